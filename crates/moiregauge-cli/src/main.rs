@@ -1,0 +1,3 @@
+//! The `moiregauge` program.
+
+fn main() {}

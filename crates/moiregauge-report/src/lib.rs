@@ -1,0 +1,1 @@
+//! Numbers → pictures, tables and the report. No measuring.

@@ -1,0 +1,245 @@
+//! What an analysis finds: sets of scans, their drift, lattices, twist and strain.
+//!
+//! Plain values in nm, s and rad; the surface units (degrees, %, nm/min) belong to the report.
+
+use nalgebra::{Matrix2, Vector2};
+use spmfile::{DateTime, FrameDirection, LineDirection};
+
+use crate::caveat::Caveat;
+use crate::estimate::Estimate;
+use crate::image::Image;
+use crate::lattice::LatticeVectors;
+use crate::settings::Settings;
+use crate::strain::TwistStrain;
+
+/// A laboratory axis.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Axis {
+    /// To the right.
+    X,
+    /// Upwards.
+    Y,
+}
+
+/// Everything found in a number of scans.
+#[derive(Clone, Debug)]
+pub struct Analysis {
+    /// The settings as they were used.
+    pub settings: Settings,
+    /// The sets, in order of time.
+    pub sets: Vec<SetAnalysis>,
+    /// All sets taken together; `None` where no set gave a drift-corrected lattice.
+    pub combined: Option<Combined>,
+    /// Doubts, in the order in which they came up.
+    pub caveats: Vec<Caveat>,
+}
+
+/// Scans of one slow axis, line rate, size and channel, in order of time.
+#[derive(Clone, Debug)]
+pub struct SetAnalysis {
+    /// Name for people, unique within the analysis, as in `slow y, 4 Hz`.
+    pub name: String,
+    /// The laboratory axis along which lines follow each other.
+    pub slow_axis: Axis,
+    /// Lines per second (trace and retrace together).
+    pub line_rate_hz: f64,
+    /// Name of the analysed channel.
+    pub channel: String,
+    /// The scans in order of time.
+    pub scans: Vec<ScanAnalysis>,
+    /// The drift, measured or given; `None` where the scans cannot determine it.
+    pub drift: Option<Drift>,
+    /// Lattice, twist and strain from all scans together, corrected for drift.
+    pub mean: Option<SetMean>,
+    /// The plain mean over the scans in sensor coordinates, not corrected for drift.
+    pub uncorrected: Option<SetMean>,
+    /// Twist and strain from the mean reciprocal lattice of up and down scans, which is free of
+    /// constant drift without knowing it; `None` where there is only one direction.
+    pub forward_backward: Option<TwistStrain>,
+    /// One scan in detail, for the figures.
+    pub illustration: Option<Illustration>,
+}
+
+/// One lattice for several scans.
+#[derive(Clone, Debug)]
+pub struct SetMean {
+    /// Lattice vectors, nm.
+    pub lattice: LatticeVectors,
+    /// Twist and strain of that lattice.
+    pub twist_strain: TwistStrain,
+    /// Standard deviation of the twist over the scans, rad; NaN for a single scan.
+    pub twist_scatter: f64,
+    /// Root-mean-square deviation per component of the strain vector over the scans; NaN for one scan.
+    pub strain_scatter: f64,
+    /// χ² per degree of freedom of the scans against the common lattice; NaN where there is none.
+    pub chi2_per_dof: f64,
+    /// Whether each scan's wavelengths lie within ±1 % of the common ones.
+    pub within_one_percent: bool,
+}
+
+/// All sets taken together.
+#[derive(Clone, Debug)]
+pub struct Combined {
+    /// Weighted mean lattice, nm.
+    pub lattice: LatticeVectors,
+    /// Its twist and strain.
+    pub twist_strain: TwistStrain,
+    /// How far every two sets are apart.
+    pub consistency: Vec<Consistency>,
+}
+
+/// How many standard deviations lie between two sets.
+#[derive(Clone, Debug)]
+pub struct Consistency {
+    /// Names of the two sets.
+    pub sets: [String; 2],
+    /// Difference of the drift velocities: square root of χ² for two components; `None` where unknown.
+    pub drift_sigmas: Option<f64>,
+    /// Difference of the twist angles in units of its σ.
+    pub twist_sigmas: f64,
+    /// Difference of the strain vectors: square root of χ² for two components.
+    pub strain_sigmas: f64,
+}
+
+/// Motion of the sample in the frame of the sensors.
+#[derive(Clone, Debug)]
+pub struct Drift {
+    /// Velocity, nm/s.
+    pub velocity: Vector2<f64>,
+    /// Its covariance, (nm/s)².
+    pub covariance: Matrix2<f64>,
+    /// Whether the user gave it (from an earlier calibration).
+    pub given: bool,
+    /// Quality of the fit; `None` for a given drift.
+    pub fit: Option<DriftFit>,
+    /// The Monte Carlo distribution; `None` for a given drift or where no draws were asked for.
+    pub monte_carlo: Option<DriftMonteCarlo>,
+}
+
+/// How well the scans determine the drift.
+#[derive(Clone, Debug)]
+pub struct DriftFit {
+    /// Rank of the six-parameter problem (two lattice vectors and the drift).
+    pub rank: usize,
+    /// Condition number of its column-scaled design matrix.
+    pub condition: f64,
+    /// Weighted sum of squared residuals.
+    pub chi2: f64,
+    /// Degrees of freedom of `chi2`.
+    pub degrees_of_freedom: usize,
+    /// The published estimate for comparison: approximate matrices, pairwise objective, nm/s.
+    pub paper_velocity: Option<Vector2<f64>>,
+}
+
+/// Distribution of the drift over draws of peak positions and tip velocities.
+#[derive(Clone, Debug)]
+pub struct DriftMonteCarlo {
+    /// Drift velocity of each draw, nm/s.
+    pub draws: Vec<Vector2<f64>>,
+    /// Root-mean-square residual of each draw, nm.
+    pub losses: Vec<f64>,
+    /// Mean of the fitted Gaussian, nm/s.
+    pub mean: Vector2<f64>,
+    /// Covariance of the fitted Gaussian, (nm/s)².
+    pub covariance: Matrix2<f64>,
+}
+
+/// One frame: its geometry, lattice, twist and strain.
+#[derive(Clone, Debug)]
+pub struct ScanAnalysis {
+    /// The file as the user named it.
+    pub file: String,
+    /// When it was saved, by the instrument's clock.
+    pub acquired: Option<DateTime>,
+    /// Sense of the slow motion.
+    pub frame_direction: FrameDirection,
+    /// The lines that were used, trace and retrace.
+    pub lines: Vec<LineAnalysis>,
+    /// Centre of the scanned window, sensor coordinates, nm.
+    pub window_centre: Vector2<f64>,
+    /// Extent of the window along its fast and slow sides, first to last pixel, nm.
+    pub window_extent: [f64; 2],
+    /// Fast tip velocity, nm/s; σ is the spread over the lines.
+    pub fast_velocity: Estimate,
+    /// Slow tip velocity, nm/s; σ is the spread over the lines.
+    pub slow_velocity: Estimate,
+    /// Lattice vectors in nominal coordinates, nm; `None` where the file gives no size.
+    pub nominal: Option<LatticeVectors>,
+    /// Lattice vectors in sensor coordinates, nm (nominal ones where there are no sensors).
+    pub sensor: LatticeVectors,
+    /// Lattice vectors corrected for drift, nm.
+    pub drift_corrected: Option<LatticeVectors>,
+    /// Twist and strain from `sensor`.
+    pub twist_strain_sensor: Option<TwistStrain>,
+    /// Twist and strain from `drift_corrected`.
+    pub twist_strain: Option<TwistStrain>,
+    /// Monte Carlo draws of twist and strain behind `twist_strain` (or `twist_strain_sensor`).
+    pub draws: Vec<StrainDraw>,
+}
+
+/// One Monte Carlo draw of twist and strain.
+#[derive(Clone, Copy, Debug)]
+pub struct StrainDraw {
+    /// θ, rad.
+    pub twist: f64,
+    /// α, rad, near the estimate (not wrapped away from it).
+    pub lattice_angle: f64,
+    /// `E = ε e^{2iφ_lab}`.
+    pub strain_vector: Vector2<f64>,
+}
+
+/// What one line direction of a frame gave.
+#[derive(Clone, Debug)]
+pub struct LineAnalysis {
+    /// Trace or retrace.
+    pub line: LineDirection,
+    /// Lattice vectors in pixels (columns, rows).
+    pub pixels: LatticeVectors,
+    /// Lattice vectors in sensor coordinates, nm.
+    pub sensor: LatticeVectors,
+    /// The other estimator's vectors in sensor coordinates, nm, for comparison.
+    pub comparison: Option<LatticeVectors>,
+    /// Affine map pixel (column, row) → nm, the linear part.
+    pub pixel_to_nm: Matrix2<f64>,
+    /// Position of pixel (0, 0), nm.
+    pub origin: Vector2<f64>,
+    /// Whether position sensors were used.
+    pub from_sensors: bool,
+    /// Number of lattice periods across the shorter side of the frame.
+    pub periods: f64,
+    /// Signal-to-noise ratio of the weakest of the three first harmonics (amplitude).
+    pub signal_to_noise: f64,
+}
+
+/// One scan in detail, for the figures.
+#[derive(Clone, Debug)]
+pub struct Illustration {
+    /// The file shown.
+    pub file: String,
+    /// The line direction shown.
+    pub line: LineDirection,
+    /// The channel's unit.
+    pub unit: String,
+    /// The image, background removed.
+    pub image: Image,
+    /// Affine map pixel → nm by the sensors.
+    pub pixel_to_nm: Matrix2<f64>,
+    /// Position of pixel (0, 0), nm.
+    pub origin: Vector2<f64>,
+    /// The same by the nominal size and rotation, if the file gives them.
+    pub nominal_pixel_to_nm: Option<Matrix2<f64>>,
+    /// Autocorrelation, lag zero at (rows/2, columns/2), one lag step per pixel.
+    pub autocorrelation: Image,
+    /// Logarithm of the power spectrum, frequency zero at (rows/2, columns/2).
+    pub spectrum: Image,
+    /// Step of `spectrum` along columns and rows, cycles per pixel.
+    pub spectrum_step: [f64; 2],
+    /// The measured lattice in pixels.
+    pub lattice: LatticeVectors,
+    /// The sensor of the fast axis along the middle line: column, measured nm, fitted nm.
+    pub sensor_line: Vec<[f64; 3]>,
+    /// Fast tip velocity of every line, nm/s.
+    pub fast_velocities: Vec<f64>,
+    /// Slow tip velocity of every column, nm/s.
+    pub slow_velocities: Vec<f64>,
+}

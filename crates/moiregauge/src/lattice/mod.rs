@@ -1,0 +1,5 @@
+//! Lattice vectors of a periodic image.
+
+mod vectors;
+
+pub use vectors::LatticeVectors;

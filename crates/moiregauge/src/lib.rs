@@ -1,0 +1,13 @@
+//! The strain gauge for moiré superlattices: [`spmfile::Scan`] → numbers.
+//!
+//! No files, no clock, no printing. Inside: nm, s, rad; x right, y up, angles counter-clockwise.
+
+pub mod analysis;
+pub mod caveat;
+pub mod estimate;
+pub mod image;
+pub mod lattice;
+pub mod material;
+pub mod rng;
+pub mod settings;
+pub mod strain;

@@ -1,0 +1,129 @@
+//! Every knob of an analysis, with its default.
+
+use serde::{Deserialize, Serialize};
+
+use crate::material::Material;
+
+/// How the lattice vectors are read off an image.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Method {
+    /// Autocorrelation divided by the overlap, sub-pixel peaks, several shells.
+    Autocorrelation,
+    /// Hann-windowed Fourier transform, sub-pixel peaks, full inverse.
+    Fourier,
+    /// As published: resampled, summed autocorrelation, whole-pixel peaks. Known to be biased.
+    Paper,
+}
+
+/// Which line directions are used.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Lines {
+    /// Trace only.
+    Trace,
+    /// Retrace only.
+    Retrace,
+    /// Both, where both are present.
+    Both,
+}
+
+/// What is subtracted from an image before its lattice is measured.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Background {
+    /// Nothing but the mean.
+    Mean,
+    /// The mean plane.
+    Plane,
+    /// A 2D polynomial of total degree 2.
+    Quadratic,
+    /// A 2D polynomial of total degree 3.
+    Cubic,
+    /// The mean plane and then the mean of each line. Damages harmonics along the fast axis.
+    LineMean,
+}
+
+/// Which form of the strain equation is meant (physics of the two: they differ at second order).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum StrainConvention {
+    /// The stretch acts on atomic positions: ε > 0 is tension.
+    RealSpace,
+    /// The stretch acts on reciprocal vectors, as in arXiv 2406.08681: ε > 0 is compression.
+    KSpace,
+}
+
+/// How files become sets.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Grouping {
+    /// By slow axis, line rate, size and channel.
+    Auto,
+    /// As `auto`, and files of different folders never share a set.
+    Folder,
+    /// Every file is a set of its own.
+    File,
+}
+
+/// A drift velocity known beforehand.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct GivenDrift {
+    /// Along x, nm/min.
+    pub x_nm_per_min: f64,
+    /// Along y, nm/min.
+    pub y_nm_per_min: f64,
+    /// Standard uncertainty of each component, nm/min.
+    #[serde(default)]
+    pub sigma_nm_per_min: f64,
+}
+
+/// Every knob of an analysis.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Settings {
+    /// Channel that shows the moiré; `None`: the first of the usual ones that is present.
+    pub channel: Option<String>,
+    /// Line directions to use.
+    pub line: Lines,
+    /// Estimator of the lattice vectors.
+    pub method: Method,
+    /// What is subtracted beforehand.
+    pub background: Background,
+    /// The layers.
+    pub material: Material,
+    /// Form of the strain equation.
+    pub strain_convention: StrainConvention,
+    /// How files become sets.
+    pub grouping: Grouping,
+    /// Use only the region that all scans of a set have in common.
+    pub overlap: bool,
+    /// A drift known beforehand; `None`: measure it.
+    pub drift: Option<GivenDrift>,
+    /// Monte Carlo draws for the drift.
+    pub drift_draws: usize,
+    /// Monte Carlo draws for twist and strain, per scan.
+    pub strain_draws: usize,
+    /// Seed of all random numbers.
+    pub seed: u64,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            channel: None,
+            line: Lines::Both,
+            method: Method::Autocorrelation,
+            background: Background::Plane,
+            material: Material::graphene(),
+            strain_convention: StrainConvention::RealSpace,
+            grouping: Grouping::Auto,
+            overlap: false,
+            drift: None,
+            drift_draws: 10_000,
+            strain_draws: 1_000,
+            seed: 1,
+        }
+    }
+}

@@ -1,0 +1,153 @@
+//! The common shape of a scan, whatever instrument wrote it.
+//!
+//! Positions: `x` to the right, `y` up. Row 0 is the bottom line (smallest y), column 0 the left
+//! one. Lengths in nm, angles in rad counter-clockwise, times in s.
+
+/// Sense of the slow motion: which line of the frame was acquired first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum FrameDirection {
+    /// The bottom line (row 0) was acquired first.
+    Up,
+    /// The top line (last row) was acquired first.
+    Down,
+}
+
+/// Sense of the fast motion within a line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum LineDirection {
+    /// Column 0 was acquired first.
+    Trace,
+    /// The last column was acquired first. The samples are stored in order of position all the same.
+    Retrace,
+}
+
+/// A calendar date and time as the instrument's clock showed it, without a time zone.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct DateTime {
+    /// Year, as in 2024.
+    pub year: i32,
+    /// Month, 1 to 12.
+    pub month: u8,
+    /// Day of the month, 1 to 31.
+    pub day: u8,
+    /// Hour, 0 to 23.
+    pub hour: u8,
+    /// Minute.
+    pub minute: u8,
+    /// Second.
+    pub second: u8,
+}
+
+/// The stored samples of one channel, kept in the width in which the file holds them.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Samples {
+    /// 16-bit counts.
+    I16(Vec<i16>),
+    /// 32-bit counts.
+    I32(Vec<i32>),
+    /// Single-precision values.
+    F32(Vec<f32>),
+    /// Double-precision values.
+    F64(Vec<f64>),
+}
+
+/// One image: a quantity recorded at every pixel of the frame.
+#[derive(Clone, Debug)]
+pub struct Channel {
+    /// The name the user sees, as in `TR Phase`.
+    pub name: String,
+    /// The instrument's own name, as in `TRPhase`; empty where there is none.
+    pub internal_name: String,
+    /// The unit of [`Channel::values`] as written in the file (`nm`, `°`, `mV`), empty if none.
+    pub unit: String,
+    /// Trace or retrace, where the file tells.
+    pub line_direction: Option<LineDirection>,
+    /// `Main`, `Interleave` and the like, where the file tells.
+    pub scan_line: Option<String>,
+    /// Number of lines.
+    pub rows: usize,
+    /// Number of samples in a line.
+    pub columns: usize,
+    /// Nominal length of a line, edge to edge; `None` where the file gives no size.
+    pub width_nm: Option<f64>,
+    /// Nominal height of the recorded lines, edge to edge.
+    pub height_nm: Option<f64>,
+    /// `value = count · scale + offset`.
+    pub scale: f64,
+    /// See [`Channel::scale`].
+    pub offset: f64,
+    /// How [`Channel::scale`] came about, in words for the user.
+    pub scaling: String,
+    /// What the instrument subtracted while or after recording (`Line`, `Full` …); `None` if nothing.
+    pub plane_fit: Option<String>,
+    /// The samples, row 0 at the bottom.
+    pub samples: Samples,
+}
+
+/// A channel that the file announces but that could not be read.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct UnreadableChannel {
+    /// Its name, or its position in the file where the name is lost.
+    pub name: String,
+    /// What was expected, what was found.
+    pub error: String,
+}
+
+/// One frame as the instrument wrote it.
+#[derive(Clone, Debug)]
+pub struct Scan {
+    /// The file format in words, as in `NanoScope 9.70`.
+    pub format: String,
+    /// The instrument, where the file names it.
+    pub instrument: Option<String>,
+    /// When the frame was saved (roughly its end), by the instrument's clock.
+    pub acquired: Option<DateTime>,
+    /// Sense of the slow motion.
+    pub frame_direction: Option<FrameDirection>,
+    /// Lines per second, a line being trace and retrace together.
+    pub line_rate_hz: Option<f64>,
+    /// Overscan: the fraction by which the fast motion exceeds the frame (NanoScope `X round`).
+    pub rounding: Option<f64>,
+    /// Rotation of the fast axis against x, counter-clockwise, rad.
+    pub rotation_rad: f64,
+    /// Centre of the frame as set by the user, nm.
+    pub offset_nm: [f64; 2],
+    /// Nominal size of the full frame (fast, slow), nm.
+    pub size_nm: Option<[f64; 2]>,
+    /// Whether the x/y scanner was under closed-loop control.
+    pub closed_loop: Option<bool>,
+    /// Every channel that could be read, in file order.
+    pub channels: Vec<Channel>,
+    /// Channels that could not be read.
+    pub unreadable: Vec<UnreadableChannel>,
+}
+
+impl Samples {
+    /// Number of samples.
+    pub fn len(&self) -> usize {
+        match self {
+            Self::I16(v) => v.len(),
+            Self::I32(v) => v.len(),
+            Self::F32(v) => v.len(),
+            Self::F64(v) => v.len(),
+        }
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+}
+
+impl Channel {
+    /// All values in [`Channel::unit`], row by row from the bottom line; missing ones are NaN.
+    pub fn values(&self) -> Vec<f64> {
+        let value = |count: f64| count * self.scale + self.offset;
+        match &self.samples {
+            Samples::I16(v) => v.iter().map(|&c| value(f64::from(c))).collect(),
+            Samples::I32(v) => v.iter().map(|&c| value(f64::from(c))).collect(),
+            Samples::F32(v) => v.iter().map(|&c| value(f64::from(c))).collect(),
+            Samples::F64(v) => v.iter().map(|&c| value(c)).collect(),
+        }
+    }
+}
