@@ -1,8 +1,15 @@
 //! The result: twist, lattice orientation and the heterostrain vector with their covariance.
 
-use nalgebra::{Matrix2, Matrix4, Vector2};
+use std::f64::consts::PI;
 
+use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
+
+use super::inversion::reduce;
+use super::limit::upper_limit_95;
 use crate::estimate::Estimate;
+
+/// The axis of the strain is quoted only if zero strain would give so large a vector less often.
+const SIGNIFICANT: f64 = 0.01;
 
 /// Twist and uniaxial heterostrain of one moiré lattice.
 ///
@@ -36,4 +43,92 @@ impl TwistStrain {
     pub fn strain_covariance(&self) -> Matrix2<f64> {
         self.covariance.fixed_view::<2, 2>(2, 2).into_owned()
     }
+
+    /// Magnitude of the strain, the bias of a noisy vector's length removed: `√max(0, |Ê|² − σ²)`.
+    ///
+    /// σ is the noise across the vector, which is what lengthens it. Where the strain is significant
+    /// the uncertainty is the noise along the vector; towards zero it goes over to that of the
+    /// noisiest direction, as the direction then means nothing.
+    pub fn heterostrain(&self) -> Estimate {
+        let length = self.strain_vector.norm();
+        let covariance = self.strain_covariance();
+        let (along, across) = if length > 0.0 {
+            let u = self.strain_vector / length;
+            let v = Vector2::new(-u.y, u.x);
+            (
+                (u.transpose() * covariance * u)[0],
+                (v.transpose() * covariance * v)[0],
+            )
+        } else {
+            (covariance.trace() / 2.0, covariance.trace() / 2.0)
+        };
+        let p = self.strain_p_value();
+        Estimate::from_variance(
+            (length * length - across).max(0.0).sqrt(),
+            along + p * (largest_variance(&covariance) - along),
+        )
+    }
+
+    /// φ_lab, the axis of the strain in the laboratory, rad in [0, π); `None` unless p < 0.01.
+    ///
+    /// Axis of tension in the real-space form, of compression in the k-space form.
+    pub fn axis_lab(&self) -> Option<Estimate> {
+        self.axis(0.0)
+    }
+
+    /// φ = φ_lab − α − θ, the axis counted from layer 1, rad in [0, π); `None` unless p < 0.01.
+    ///
+    /// Belongs to the α of this result: where α is taken 60° further, φ is 60° less.
+    pub fn axis_lattice(&self) -> Option<Estimate> {
+        self.axis(1.0)
+    }
+
+    /// φ_lab − `frame` · (α + θ).
+    fn axis(&self, frame: f64) -> Option<Estimate> {
+        let square = self.strain_vector.norm_squared();
+        if square <= 0.0 || self.strain_p_value() >= SIGNIFICANT {
+            return None;
+        }
+        let e = self.strain_vector;
+        let gradient = Vector4::new(-frame, -frame, -e.y / (2.0 * square), e.x / (2.0 * square));
+        let variance = (gradient.transpose() * self.covariance * gradient)[0];
+        let axis = e.y.atan2(e.x) / 2.0 - frame * (self.lattice_angle + self.twist);
+        Some(Estimate::from_variance(reduce(axis, PI), variance))
+    }
+
+    /// How often noise alone makes a strain vector this improbable: `exp(−Êᵀ C⁻¹ Ê / 2)`.
+    pub fn strain_p_value(&self) -> f64 {
+        if self.strain_vector.norm_squared() <= 0.0 {
+            return 1.0;
+        }
+        // Without an inverse there is a direction without noise: any strain is significant then.
+        match self.strain_covariance().try_inverse() {
+            Some(inverse) => {
+                let chi2 = (self.strain_vector.transpose() * inverse * self.strain_vector)[0];
+                (-chi2.max(0.0) / 2.0).exp()
+            }
+            None => 0.0,
+        }
+    }
+
+    /// The magnitude that the strain does not exceed, with 95 % confidence.
+    ///
+    /// From the non-central χ² distribution with the noise of the noisiest direction; never below
+    /// the limit for a measured strain of exactly zero, however well noise cancelled.
+    pub fn strain_upper_limit_95(&self) -> f64 {
+        let sigma = largest_variance(&self.strain_covariance()).sqrt();
+        let length = self.strain_vector.norm();
+        if sigma > 0.0 {
+            sigma * upper_limit_95(length / sigma)
+        } else {
+            length
+        }
+    }
+}
+
+/// The larger eigenvalue.
+fn largest_variance(c: &Matrix2<f64>) -> f64 {
+    let half_difference = (c.m11 - c.m22) / 2.0;
+    let off = (c.m12 + c.m21) / 2.0;
+    (c.trace() / 2.0 + half_difference.hypot(off)).max(0.0)
 }
