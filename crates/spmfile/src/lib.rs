@@ -2,9 +2,80 @@
 //!
 //! What the instrument wrote, and nothing else: no interpretation, no numerics.
 //! Images are stored bottom line first (y up), column 0 at the left, whatever the file does.
+//!
+//! ```no_run
+//! let bytes = std::fs::read("scan.spm")?;
+//! let scan = spmfile::read(&bytes)?;
+//! for channel in &scan.channels {
+//!     println!("{} in {}", channel.name, channel.unit);
+//! }
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+#![doc = include_str!("../FORMATS.md")]
 
+mod detect;
+mod error;
+pub mod nanoscope;
 mod scan;
+mod sensors;
+mod units;
 
+pub use detect::{Format, detect, looks_like_scan};
+pub use error::ReadError;
 pub use scan::{
     Channel, DateTime, FrameDirection, LineDirection, Samples, Scan, UnreadableChannel,
 };
+pub use sensors::{PositionSensors, SensorProblem, position_sensors, sensor_axis};
+pub use units::nm_per;
+
+/// What is known of a channel before its samples are decoded.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ChannelInfo {
+    /// The name the user sees, as in `TR Phase`.
+    pub name: String,
+    /// The instrument's own name, as in `TRPhase`; empty where there is none.
+    pub internal_name: String,
+    /// Trace or retrace, where the file tells.
+    pub line_direction: Option<LineDirection>,
+    /// `Main`, `Interleave` and the like, where the file tells.
+    pub scan_line: Option<String>,
+}
+
+/// Reads every channel of a file held in memory.
+///
+/// # Errors
+/// - The bytes are no scan, or one of a kind that is not read: the variant names it.
+/// - The file is damaged; what is whole comes with [`ReadError::Incomplete`].
+/// - No channel can be read.
+///
+/// A channel that is merely scaled in an unknown way is no error: see [`Scan::unreadable`].
+pub fn read(bytes: &[u8]) -> Result<Scan, ReadError> {
+    read_selected(bytes, &|_| true)
+}
+
+/// Reads the channels for which `wanted` returns true; the others are checked but not decoded.
+///
+/// # Errors
+/// As [`read`], except that having none of the wanted channels is no error.
+pub fn read_selected(
+    bytes: &[u8],
+    wanted: &dyn Fn(&ChannelInfo) -> bool,
+) -> Result<Scan, ReadError> {
+    match detect(bytes) {
+        Format::NanoScope => nanoscope::read(bytes, wanted),
+        Format::NanoScopeForce => Err(nanoscope::refuse_force(bytes)),
+        Format::Iso28632 => Err(ReadError::Iso28632),
+        Format::Empty => Err(ReadError::Empty),
+        Format::Other(found) => Err(ReadError::OtherFormat { found }),
+        Format::Text => Err(ReadError::Text {
+            start: String::from_utf8_lossy(&bytes[..bytes.len().min(40)])
+                .lines()
+                .next()
+                .unwrap_or("")
+                .to_owned(),
+        }),
+        Format::Unknown => Err(ReadError::Unknown {
+            start: format!("{:02x?}", &bytes[..bytes.len().min(8)]),
+        }),
+    }
+}

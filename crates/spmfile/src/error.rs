@@ -1,0 +1,109 @@
+//! Why a file is not read: what was expected, what was found.
+
+use crate::scan::Scan;
+
+/// Why a file is refused as a whole.
+///
+/// A file is refused when its bytes do not keep what its header promises (a channel cut off, a
+/// section missing), because then nothing in it can be trusted blindly; the part that is whole
+/// travels with [`ReadError::Incomplete`]. A file in which merely one channel is scaled in an
+/// unknown way is read, with that channel in [`Scan::unreadable`].
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ReadError {
+    /// No bytes.
+    #[error("the file is empty")]
+    Empty,
+    /// A known kind of file, but not one that is read.
+    #[error("this is {found}; expected a NanoScope image file (it begins with `\\*File list`)")]
+    OtherFormat {
+        /// The kind of file, in words.
+        found: &'static str,
+    },
+    /// Text that is no scan.
+    #[error(
+        "this is a text file beginning with {start:?}; expected a NanoScope image file (it begins with `\\*File list`)"
+    )]
+    Text {
+        /// Its first words.
+        start: String,
+    },
+    /// Nothing known.
+    #[error(
+        "unknown kind of file, beginning with the bytes {start}; expected a NanoScope image file (it begins with `\\*File list`)"
+    )]
+    Unknown {
+        /// Its first bytes in hexadecimal.
+        start: String,
+    },
+    /// ISO 28632 text.
+    #[error(
+        "this is text in the ISO 28632 SPM data transfer format, not a NanoScope file although it may be named .spm; export the scan as NanoScope file"
+    )]
+    Iso28632,
+    /// Force curves.
+    #[error("the file holds force curves and no image; save the scan itself")]
+    ForceCurve,
+    /// A force volume.
+    #[error("the file is a force volume; its height map is not a scan whose values can be trusted")]
+    ForceVolume,
+    /// The header has no end.
+    #[error(
+        "the header has no `\\*File list end`: the file was cut off inside the header after {found} bytes, or is damaged"
+    )]
+    HeaderCutOff {
+        /// Length of the file.
+        found: usize,
+    },
+    /// Too many sections to be true.
+    #[error("the header announces {found} images; at most {limit} are expected in one file")]
+    TooManyChannels {
+        /// Images announced.
+        found: usize,
+        /// The limit.
+        limit: usize,
+    },
+    /// A header without any image.
+    #[error("the header announces no image (no section `\\*Ciao image list`)")]
+    NoImage,
+    /// A header and nothing after it.
+    #[error(
+        "the file is a header without data: it announces {announced} channels up to byte {expected}, but ends at byte {found}"
+    )]
+    HeaderOnly {
+        /// Number of channels announced.
+        announced: usize,
+        /// Where the last one would end.
+        expected: u64,
+        /// Length of the file.
+        found: usize,
+    },
+    /// A transfer in text mode removed bytes all over the file.
+    #[error(
+        "the file was damaged by a transfer in text mode: its line ends are LF instead of CRLF and bytes are missing (expected {expected}, found {found}); copy it again in binary mode"
+    )]
+    LineEndsChanged {
+        /// Where the last channel would end.
+        expected: u64,
+        /// Length of the file.
+        found: usize,
+    },
+    /// Damaged, with whole channels in it.
+    #[error("the file is damaged: {reason}; {} of {} channels are whole", .readable.channels.len(), .readable.channels.len() + .readable.unreadable.len())]
+    Incomplete {
+        /// What is missing.
+        reason: String,
+        /// The channels that are whole, for those who ask for them.
+        readable: Box<Scan>,
+    },
+    /// Nothing in it can be read.
+    #[error("none of the {announced} channels can be read; {name}: {reason}")]
+    NoReadableChannel {
+        /// Number of channels announced.
+        announced: usize,
+        /// Name of the first one.
+        name: String,
+        /// Why it cannot be read.
+        reason: String,
+    },
+}

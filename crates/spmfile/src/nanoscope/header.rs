@@ -1,0 +1,150 @@
+//! The text header: sections of `\key: value` lines between `\*Section` lines.
+//!
+//! In: the bytes of the file. Out: borrowed names and values, nothing interpreted. Keys are
+//! compared without case, because `Scan size` became `Scan Size` between versions.
+
+use std::borrow::Cow;
+
+/// Real headers have 20 to 100 kB; beyond this no header is looked for.
+const LONGEST: usize = 4 << 20;
+const END: &[u8] = b"\\*File list end";
+
+/// The header's bytes and whether its line ends are CRLF.
+pub(super) struct HeaderText<'a> {
+    pub(super) text: Cow<'a, str>,
+    /// Length in the file, in bytes.
+    pub(super) length: usize,
+    pub(super) crlf: bool,
+}
+
+/// One `\*Name` section.
+pub(super) struct Section<'a> {
+    pub(super) name: &'a str,
+    entries: Vec<(&'a str, &'a str)>,
+}
+
+/// The header as text, or `None` where it has no end.
+pub(super) fn header_text(bytes: &[u8]) -> Option<HeaderText<'_>> {
+    let head = &bytes[..bytes.len().min(LONGEST)];
+    let length = head.windows(END.len()).position(|w| w == END)?;
+    let raw = &head[..length];
+    // Headers are Windows-1252; those that a newer program wrote as UTF-8 hardly ever decode by chance.
+    let text = match std::str::from_utf8(raw) {
+        Ok(text) => Cow::Borrowed(text),
+        Err(_) => encoding_rs::WINDOWS_1252.decode(raw).0,
+    };
+    Some(HeaderText {
+        text,
+        length: length + END.len(),
+        crlf: raw.windows(2).any(|w| w == b"\r\n"),
+    })
+}
+
+/// Splits a header into its sections, in file order.
+pub(super) fn sections(text: &str) -> Vec<Section<'_>> {
+    let mut sections: Vec<Section<'_>> = Vec::new();
+    for line in text.lines() {
+        // Notes may run over several lines: those do not begin with a backslash.
+        let Some(line) = line.strip_prefix('\\') else {
+            continue;
+        };
+        if let Some(name) = line.strip_prefix('*') {
+            sections.push(Section {
+                name: name.trim(),
+                entries: Vec::new(),
+            });
+        } else if let (Some(section), Some(entry)) = (sections.last_mut(), split_entry(line)) {
+            section.entries.push(entry);
+        }
+    }
+    sections
+}
+
+/// `key: value`; in `@2:Z scale: …` the first colon belongs to the key.
+fn split_entry(line: &str) -> Option<(&str, &str)> {
+    let group = match line.as_bytes() {
+        [b'@', digit, b':', ..] if digit.is_ascii_digit() => 3,
+        _ => 0,
+    };
+    let colon = group + line[group..].find(':')?;
+    Some((line[..colon].trim(), line[colon + 1..].trim()))
+}
+
+impl<'a> Section<'a> {
+    /// Whether the section is called `name`.
+    pub(super) fn is(&self, name: &str) -> bool {
+        self.name.eq_ignore_ascii_case(name)
+    }
+
+    /// The value of `key`.
+    pub(super) fn get(&self, key: &str) -> Option<&'a str> {
+        self.entries
+            .iter()
+            .find(|(k, _)| k.eq_ignore_ascii_case(key))
+            .map(|&(_, value)| value)
+    }
+
+    /// The value of `@N:key` for any digit N, and the digit.
+    pub(super) fn grouped(&self, key: &str) -> Option<(u8, &'a str)> {
+        self.entries.iter().find_map(|&(k, value)| {
+            let [b'@', digit, b':', rest @ ..] = k.as_bytes() else {
+                return None;
+            };
+            rest.eq_ignore_ascii_case(key.as_bytes())
+                .then_some((*digit, value))
+        })
+    }
+}
+
+/// The value of `key` in the first section called `section` that has it.
+pub(super) fn lookup<'a>(sections: &[Section<'a>], section: &str, key: &str) -> Option<&'a str> {
+    sections
+        .iter()
+        .filter(|s| s.is(section))
+        .find_map(|s| s.get(key))
+}
+
+/// The number at the start of a value, and the text after it.
+pub(super) fn leading_number(value: &str) -> Option<(f64, &str)> {
+    let value = value.trim_start();
+    let end = value.find(char::is_whitespace).unwrap_or(value.len());
+    let number: f64 = value[..end].parse().ok()?;
+    number.is_finite().then(|| (number, value[end..].trim()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn keys_values_and_groups() {
+        let text = "\\*File list\r\n\\Version: 0x09700105\r\n\\Note: first\r\nsecond line\r\n\\*Ciao image list\r\n\\@2:Z scale: V [Sens. A] (1 V/LSB) 2 V\r\n\\Capture mode : Single\r\n";
+        let sections = sections(text);
+        assert_eq!(sections.len(), 2);
+        assert_eq!(
+            lookup(&sections, "file LIST", "version"),
+            Some("0x09700105")
+        );
+        assert_eq!(
+            sections[1].grouped("z Scale"),
+            Some((b'2', "V [Sens. A] (1 V/LSB) 2 V"))
+        );
+        assert_eq!(sections[1].get("capture mode"), Some("Single"));
+    }
+
+    #[test]
+    fn windows_1252_is_decoded() {
+        let bytes = b"\\*File list\r\n\\A: 5 \xba\r\n\\*File list end";
+        let header = header_text(bytes).expect("has an end");
+        assert!(header.text.contains("5 º"));
+        assert!(header.crlf);
+        assert_eq!(header.length, bytes.len());
+    }
+
+    #[test]
+    fn numbers_must_be_finite() {
+        assert_eq!(leading_number(" 1.5 nm"), Some((1.5, "nm")));
+        assert_eq!(leading_number("inf nm"), None);
+        assert_eq!(leading_number("nm"), None);
+    }
+}

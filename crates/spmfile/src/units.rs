@@ -1,0 +1,81 @@
+//! Units as instruments write them.
+
+/// How many nanometres one `unit` is; `None` where it is not a length.
+pub fn nm_per(unit: &str) -> Option<f64> {
+    match unit.trim() {
+        "pm" => Some(1e-3),
+        "Å" | "\u{212b}" | "angstrom" => Some(0.1),
+        "nm" => Some(1.0),
+        "um" | "~m" | "µm" | "μm" => Some(1e3),
+        "mm" => Some(1e6),
+        "m" => Some(1e9),
+        _ => None,
+    }
+}
+
+/// A unit in plain signs: `~` is micro, the ordinal sign and the like are degrees.
+pub(crate) fn clean(unit: &str) -> String {
+    unit.trim()
+        .chars()
+        .map(|c| match c {
+            '~' | '\u{3bc}' => 'µ',
+            'º' | '˚' => '°',
+            other => other,
+        })
+        .collect()
+}
+
+/// Ratio of `unit` to `base` where they differ by an SI prefix at most.
+pub(crate) fn prefix_ratio(unit: &str, base: &str) -> Option<f64> {
+    if unit == base {
+        return Some(1.0);
+    }
+    let (prefix, root) = [unit, base]
+        .map(|u| {
+            let mut chars = u.chars();
+            let factor = match chars.next() {
+                Some('f') => 1e-15,
+                Some('p') => 1e-12,
+                Some('n') => 1e-9,
+                Some('u' | 'µ') => 1e-6,
+                Some('m') => 1e-3,
+                Some('k') => 1e3,
+                Some('M') => 1e6,
+                Some('G') => 1e9,
+                _ => return (1.0, ""),
+            };
+            (factor, chars.as_str())
+        })
+        .into();
+    match (prefix, root) {
+        // mV against V, V against mV, mV against µV.
+        ((f, rest), _) if !rest.is_empty() && rest == base => Some(f),
+        (_, (f, rest)) if !rest.is_empty() && rest == unit => Some(1.0 / f),
+        ((f, a), (g, b)) if !a.is_empty() && a == b => Some(f / g),
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn prefixes() {
+        assert_eq!(prefix_ratio("V", "V"), Some(1.0));
+        assert_eq!(prefix_ratio("mV", "V"), Some(1e-3));
+        assert_eq!(prefix_ratio("V", "mV"), Some(1e3));
+        assert_eq!(prefix_ratio("mV", "µV"), Some(1e-3 / 1e-6));
+        assert_eq!(prefix_ratio("m", "nm"), Some(1.0 / 1e-9));
+        assert_eq!(prefix_ratio("V", "Arb"), None);
+        assert_eq!(prefix_ratio("m", "n"), None);
+        assert_eq!(prefix_ratio("", "V"), None);
+    }
+
+    #[test]
+    fn lengths() {
+        assert_eq!(nm_per("nm"), Some(1.0));
+        assert_eq!(nm_per(&clean("~m")), Some(1e3));
+        assert_eq!(nm_per("V"), None);
+    }
+}
