@@ -1,6 +1,6 @@
 //! The atomic layers: lattice constant, Poisson ratio, and where the numbers come from.
 //!
-//! Hexagonal layers only; 1T′ layers such as WTe₂ are rectangular and are not described by these
+//! Hexagonal layers only; 1T′ layers such as `WTe₂` are rectangular and are not described by these
 //! two numbers. The twist is proportional to the lattice constant: 0.247 in place of 0.246 nm for
 //! graphene is 0.0046° at 1.126°.
 

@@ -37,7 +37,7 @@ pub struct Branch {
     pub strain: f64,
     /// φ, axis of ε counted from layer 1, rad in [0, π); belongs to the α given here.
     pub axis_lattice: f64,
-    /// φ_lab = φ + α + θ, axis of ε in the laboratory, rad in [0, π).
+    /// `φ_lab = φ + α + θ`, axis of ε in the laboratory, rad in [0, π).
     pub axis_lab: f64,
     /// Whether the moiré is read as made by strain and distorted by twist.
     pub strain_dominated: bool,

@@ -47,7 +47,7 @@ pub(super) struct Solution {
     pub(super) strain: f64,
     /// `ε e^{2iφ_lab}`.
     pub(super) strain_vector: Complex<f64>,
-    /// φ_lab for the signed ε, not reduced.
+    /// `φ_lab` for the signed ε, not reduced.
     pub(super) axis_lab: f64,
     size: f64,
     stretch: Stretch,
@@ -180,7 +180,7 @@ fn stretch(k: f64, layers: &Layers) -> Stretch {
                 strain_per_deviator,
                 strain_slope: 2.0 * along * across
                     / ((1.0 + nu) - 2.0 * k * (1.0 - nu - 2.0 * nu * strain)),
-                size: (1.0 / along + 1.0 / across) / 2.0,
+                size: f64::midpoint(1.0 / along, 1.0 / across),
                 size_slope: (nu / (across * across) - 1.0 / (along * along)) / 2.0,
             }
         }

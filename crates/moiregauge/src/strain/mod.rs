@@ -1,8 +1,9 @@
 //! Moiré vectors → twist angle and heterostrain.
 //!
-//! Layer 1 is the reference with orientation α; layer 2 is the same lattice stretched by ε along φ
+//! Layer 1 is the reference with orientation α (of its reciprocal vectors, 30° from
+//! its atomic ones; modulo 60°); layer 2 is the same lattice stretched by ε along φ
 //! (counted from layer 1) and then turned by θ. The tensile axis in the laboratory is
-//! φ_lab = φ + α + θ. Lengths in nm, angles in rad, counter-clockwise; strain without dimension.
+//! `φ_lab = φ + α + θ`. Lengths in nm, angles in rad, counter-clockwise; strain without dimension.
 //!
 //! The moiré of a single lattice holds four numbers; θ, α, ε and φ are four. An isotropic strain on
 //! top is not visible and shifts θ by about θη/2 + η²/2θ: a twist is conditional on its absence.

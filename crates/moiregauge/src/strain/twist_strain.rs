@@ -15,7 +15,8 @@ const SIGNIFICANT: f64 = 0.01;
 ///
 /// Parameters in the order `(θ, α, E₁, E₂)`: θ twist of layer 2 against layer 1 (rad, > 0 by
 /// default), α orientation of layer 1 (rad, modulo 60°), `E = ε e^{2iφ_lab}` the strain vector in
-/// the laboratory frame (φ_lab the tensile axis, counter-clockwise from x).
+/// the laboratory frame (`φ_lab` the axis of ε, counter-clockwise from x: of tension in the
+/// real-space form, of compression in the k-space form).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TwistStrain {
     /// θ, rad.
@@ -46,9 +47,9 @@ impl TwistStrain {
 
     /// Magnitude of the strain, the bias of a noisy vector's length removed: `√max(0, |Ê|² − σ²)`.
     ///
-    /// σ is the noise across the vector, which is what lengthens it. Where the strain is significant
-    /// the uncertainty is the noise along the vector; towards zero it goes over to that of the
-    /// noisiest direction, as the direction then means nothing.
+    /// σ is the noise across the vector, which is what lengthens it. The uncertainty is the noise
+    /// along the vector times the slope of that formula, which is kept finite at zero: one σ covers
+    /// 67 % of the truths or more at any strain.
     pub fn heterostrain(&self) -> Estimate {
         let length = self.strain_vector.norm();
         let covariance = self.strain_covariance();
@@ -62,28 +63,30 @@ impl TwistStrain {
         } else {
             (covariance.trace() / 2.0, covariance.trace() / 2.0)
         };
-        let p = self.strain_p_value();
-        Estimate::from_variance(
-            (length * length - across).max(0.0).sqrt(),
-            along + p * (largest_variance(&covariance) - along),
-        )
+        let square = (length * length - across).max(0.0);
+        let steepening = if across > 0.0 {
+            across / (square + across)
+        } else {
+            0.0
+        };
+        Estimate::from_variance(square.sqrt(), along * (1.0 + steepening))
     }
 
-    /// φ_lab, the axis of the strain in the laboratory, rad in [0, π); `None` unless p < 0.01.
+    /// `φ_lab`, the axis of the strain in the laboratory, rad in [0, π); `None` unless p < 0.01.
     ///
     /// Axis of tension in the real-space form, of compression in the k-space form.
     pub fn axis_lab(&self) -> Option<Estimate> {
         self.axis(0.0)
     }
 
-    /// φ = φ_lab − α − θ, the axis counted from layer 1, rad in [0, π); `None` unless p < 0.01.
+    /// `φ = φ_lab − α − θ`, the axis counted from layer 1, rad in [0, π); `None` unless p < 0.01.
     ///
     /// Belongs to the α of this result: where α is taken 60° further, φ is 60° less.
     pub fn axis_lattice(&self) -> Option<Estimate> {
         self.axis(1.0)
     }
 
-    /// φ_lab − `frame` · (α + θ).
+    /// `φ_lab − frame · (α + θ)`.
     fn axis(&self, frame: f64) -> Option<Estimate> {
         let square = self.strain_vector.norm_squared();
         if square <= 0.0 || self.strain_p_value() >= SIGNIFICANT {
@@ -129,6 +132,6 @@ impl TwistStrain {
 /// The larger eigenvalue.
 fn largest_variance(c: &Matrix2<f64>) -> f64 {
     let half_difference = (c.m11 - c.m22) / 2.0;
-    let off = (c.m12 + c.m21) / 2.0;
+    let off = f64::midpoint(c.m12, c.m21);
     (c.trace() / 2.0 + half_difference.hypot(off)).max(0.0)
 }
