@@ -21,9 +21,7 @@ pub(super) struct Layout {
 
 /// Name and directions of an image section; `number` (from 1) stands in for a lost name.
 pub(super) fn info(image: &Section<'_>, number: usize) -> ChannelInfo {
-    let (internal_name, name) = image
-        .grouped("Image Data")
-        .map_or(("", ""), |(_, v)| names(v));
+    let (internal_name, name) = image.grouped("Image Data").next().map_or(("", ""), names);
     ChannelInfo {
         name: match (name, internal_name) {
             ("", "") => format!("channel {number}"),

@@ -84,15 +84,21 @@ impl<'a> Section<'a> {
             .map(|&(_, value)| value)
     }
 
-    /// The value of `@N:key` for any digit N, and the digit.
-    pub(super) fn grouped(&self, key: &str) -> Option<(u8, &'a str)> {
-        self.entries.iter().find_map(|&(k, value)| {
+    /// The values of `@N:key` for any digit N.
+    pub(super) fn grouped<'s>(&'s self, key: &'s str) -> impl Iterator<Item = &'a str> + 's {
+        self.entries.iter().filter_map(move |&(k, value)| {
             let [b'@', digit, b':', rest @ ..] = k.as_bytes() else {
                 return None;
             };
-            rest.eq_ignore_ascii_case(key.as_bytes())
-                .then_some((*digit, value))
+            let same = digit.is_ascii_digit() && rest.eq_ignore_ascii_case(key.as_bytes());
+            same.then_some(value)
         })
+    }
+
+    /// How often `key` occurs.
+    pub(super) fn count(&self, key: &str) -> usize {
+        let same = |(k, _): &&(&str, &str)| k.eq_ignore_ascii_case(key);
+        self.entries.iter().filter(same).count()
     }
 }
 
@@ -126,8 +132,8 @@ mod tests {
             Some("0x09700105")
         );
         assert_eq!(
-            sections[1].grouped("z Scale"),
-            Some((b'2', "V [Sens. A] (1 V/LSB) 2 V"))
+            sections[1].grouped("z Scale").next(),
+            Some("V [Sens. A] (1 V/LSB) 2 V")
         );
         assert_eq!(sections[1].get("capture mode"), Some("Single"));
     }

@@ -100,15 +100,14 @@ pub(crate) fn refuse_force(bytes: &[u8]) -> ReadError {
     }
 }
 
-/// Image keys that have lost their section line: a channel that cannot be placed any more.
+/// Channels that have lost their section line.
 fn orphans(sections: &[Section<'_>]) -> Vec<UnreadableChannel> {
     sections
         .iter()
-        .filter(|s| !s.is("Ciao image list") && !s.name.to_ascii_lowercase().contains("force"))
-        .filter(|s| s.get("Number of lines").is_some() || s.get("Valid data len X").is_some())
-        .filter_map(|s| s.grouped("Image Data"))
-        .map(|(_, value)| UnreadableChannel {
+        .filter_map(orphan)
+        .map(|value| UnreadableChannel {
             name: match channel::names(value) {
+                ("", "") => "a channel without name".to_owned(),
                 (internal, "") => internal.to_owned(),
                 (_, name) => name.to_owned(),
             },
@@ -116,6 +115,21 @@ fn orphans(sections: &[Section<'_>]) -> Vec<UnreadableChannel> {
                 .to_owned(),
         })
         .collect()
+}
+
+/// The image data line of a channel whose keys stand in a foreign section, or behind those of the
+/// channel before it.
+fn orphan<'a>(section: &Section<'a>) -> Option<&'a str> {
+    let mut named = section.grouped("Image Data");
+    if section.is("Ciao image list") {
+        (section.count("Data offset") > 1).then(|| named.nth(1).unwrap_or(""))
+    } else if section.name.to_ascii_lowercase().contains("force") {
+        None
+    } else {
+        let of_an_image = ["Number of lines", "Valid data len X"];
+        let misplaced = of_an_image.iter().any(|key| section.get(key).is_some());
+        named.next().filter(|_| misplaced)
+    }
 }
 
 /// Walks the images, keeping account of which bytes belong to whom.

@@ -34,7 +34,7 @@ pub(super) fn scaling(
     sections: &[Section<'_>],
     label: i32,
 ) -> Result<Scaling, String> {
-    let (_, text) = image.grouped("Z scale").ok_or("it has no Z scale")?;
+    let text = image.grouped("Z scale").next().ok_or("it has no Z scale")?;
     let z = z_scale(text).ok_or_else(|| format!("its Z scale {text:?} is not understood"))?;
     let hard_unit = units::clean(z.hard_unit);
     let divisor_bits = 8 * label;
