@@ -3,8 +3,10 @@
 //! No files, no clock, no printing. Inside: nm, s, rad; x right, y up, angles counter-clockwise.
 
 pub mod analysis;
+pub mod background;
 pub mod caveat;
 pub mod estimate;
+pub mod geometry;
 pub mod image;
 pub mod lattice;
 pub mod material;

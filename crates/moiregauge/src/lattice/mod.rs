@@ -1,5 +1,227 @@
-//! Lattice vectors of a periodic image.
+//! Lattice vectors of one image.
+//!
+//! In: an image and its geometry. Out: two primitive vectors with their covariance, in pixels. The
+//! image is a lattice of pixels under an affine map, so the lattice is measured in pixels and the
+//! vectors are mapped; nothing is resampled (but by the published method, for reproduction).
 
+mod autocorrelation;
+mod fourier;
+mod harmonics;
+mod noise;
+mod paper;
+pub(crate) mod reciprocal;
+mod select;
+mod transform;
 mod vectors;
 
+use nalgebra::{Matrix2, Vector2};
+
 pub use vectors::LatticeVectors;
+
+use crate::background::remove_background;
+use crate::geometry::Geometry;
+use crate::image::Image;
+use crate::settings::{Background, Method};
+use harmonics::{Harmonics, Windowed};
+use transform::Spectrum;
+
+/// The smallest side of a frame, pixels.
+const SMALLEST_SIDE: usize = 16;
+
+/// The lattice of one image.
+#[derive(Clone, Debug)]
+pub struct MeasuredLattice {
+    /// Vectors in pixels (columns, rows).
+    pub pixels: LatticeVectors,
+    /// What the other estimator found: Fourier beside the autocorrelation and the published
+    /// method, autocorrelation beside Fourier.
+    pub comparison: Option<LatticeVectors>,
+    /// The shortcut wavelengths `4π/(√3|K|)` of the three first harmonics, nm.
+    pub shortcut_wavelengths: Option<[f64; 3]>,
+    /// Lattice periods across the shorter side of the frame.
+    pub periods: f64,
+    /// Amplitude over noise amplitude in one resolution cell, weakest of the first harmonics.
+    pub signal_to_noise: f64,
+}
+
+/// Why an image gives no lattice.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum LatticeError {
+    /// The frame is too small.
+    #[error("the frame has {columns} × {rows} pixels; at least 16 × 16 are needed")]
+    TooSmall {
+        /// Samples in a line.
+        columns: usize,
+        /// Lines.
+        rows: usize,
+    },
+    /// There is nothing in it.
+    #[error("the channel is constant or has no valid pixel")]
+    Constant,
+    /// Too many pixels are missing.
+    #[error("{missing} of {total} pixels are missing; at most half may be")]
+    Missing {
+        /// Missing pixels.
+        missing: usize,
+        /// All pixels.
+        total: usize,
+    },
+    /// There is no lattice in it.
+    #[error(
+        "the image shows no lattice: no three wave vectors that add up to zero stand out of the \
+         noise (the best have signal-to-noise ratios of {0:.1}, {1:.1} and {2:.1}; 3.5 are needed)",
+        best[0], best[1], best[2]
+    )]
+    NoLattice {
+        /// Signal-to-noise ratios (amplitude) of the best three wave vectors.
+        best: [f64; 3],
+    },
+}
+
+/// An image without background and what its spectrum says: where the lattice is, roughly.
+struct Prepared {
+    image: Image,
+    spectrum: Spectrum,
+    harmonics: Harmonics,
+    /// The first three wave vectors, refined one by one, rad per pixel.
+    peaks: [Vector2<f64>; 3],
+    /// Real-space pair at 60°, pixels.
+    start: Matrix2<f64>,
+}
+
+/// Finds and measures the lattice of an image.
+///
+/// # Errors
+/// - [`LatticeError::TooSmall`], [`LatticeError::Constant`], [`LatticeError::Missing`]: nothing to
+///   measure.
+/// - [`LatticeError::NoLattice`]: no consistent lattice stands out of the noise.
+pub fn measure(
+    image: &Image,
+    geometry: &Geometry,
+    background: Background,
+    method: Method,
+) -> Result<MeasuredLattice, LatticeError> {
+    let prepared = prepare(image, geometry, background)?;
+    let Prepared {
+        harmonics,
+        spectrum,
+        peaks,
+        start,
+        ..
+    } = &prepared;
+    let lost = || no_lattice(harmonics);
+    let fourier = || fourier::measure(harmonics, peaks, spectrum.image_size);
+    let autocorrelation = || autocorrelation::measure(spectrum, harmonics, start);
+    let (pixels, comparison) = match method {
+        Method::Autocorrelation => (autocorrelation(), fourier()),
+        Method::Fourier => (fourier(), autocorrelation()),
+        Method::Paper => (paper::measure(&prepared.image, geometry, start), fourier()),
+    };
+    let pixels = pixels.ok_or_else(lost)?;
+    let label = |l: LatticeVectors| reciprocal::labelled_like(&l, &pixels.basis);
+    let longest = (0..3).map(|i| pixels.vector(i)).map(|v| {
+        let [w, h] = spectrum.image_size;
+        (v.x / w as f64).hypot(v.y / h as f64)
+    });
+    Ok(MeasuredLattice {
+        pixels,
+        comparison: comparison.map(label),
+        shortcut_wavelengths: fourier::shortcut_wavelengths(peaks, &geometry.pixel_to_nm),
+        periods: 1.0 / longest.fold(0.0, f64::max),
+        signal_to_noise: signal_to_noise(harmonics)[2],
+    })
+}
+
+fn prepare(
+    image: &Image,
+    geometry: &Geometry,
+    background: Background,
+) -> Result<Prepared, LatticeError> {
+    let (rows, columns) = (image.rows, image.columns);
+    if rows < SMALLEST_SIDE || columns < SMALLEST_SIDE {
+        return Err(LatticeError::TooSmall { columns, rows });
+    }
+    let total = image.values.len();
+    let missing = image.values.iter().filter(|v| !v.is_finite()).count();
+    if missing == total {
+        return Err(LatticeError::Constant);
+    }
+    if 2 * missing > total {
+        return Err(LatticeError::Missing { missing, total });
+    }
+    let image = remove_background(image, background);
+    let largest = image
+        .values
+        .iter()
+        .filter(|v| v.is_finite())
+        .fold(0.0f64, |a, v| a.max(v.abs()));
+    if largest <= 0.0 {
+        return Err(LatticeError::Constant);
+    }
+    let spectrum = Spectrum::new(&image);
+    let windowed = Windowed::new(&image);
+    let none = LatticeError::NoLattice { best: [0.0; 3] };
+    let candidates = select::candidates(&spectrum, &geometry.pixel_to_nm);
+    let pair = candidates.first().ok_or(none.clone())?.pair;
+    let third = pair.column(1) - pair.column(0);
+    let peaks = [
+        pair.column(0).into_owned(),
+        pair.column(1).into_owned(),
+        third,
+    ]
+    .map(|q| windowed.refined_peak(q));
+    // K₁, K₂ by least squares with K₃ = K₂ − K₁, equal weights.
+    let k1 = (2.0 * peaks[0] + peaks[1] - peaks[2]) / 3.0;
+    let k2 = (peaks[0] + 2.0 * peaks[1] + peaks[2]) / 3.0;
+    let pair = Matrix2::from_columns(&[k1, k2]);
+    let harmonics = windowed.fit(&image, &pair).ok_or(none.clone())?;
+    if !is_lattice(&harmonics) {
+        return Err(no_lattice(&harmonics));
+    }
+    let start = reciprocal::reciprocal(&pair).ok_or(none)?;
+    Ok(Prepared {
+        image,
+        spectrum,
+        harmonics,
+        peaks,
+        start,
+    })
+}
+
+/// Signal-to-noise ratios (amplitude) of the first three harmonics, best first.
+fn signal_to_noise(harmonics: &Harmonics) -> [f64; 3] {
+    let mut best = [0.0; 3];
+    for (b, h) in best.iter_mut().zip(&harmonics.list) {
+        *b = h.significance(harmonics.window_sums).sqrt();
+    }
+    best.sort_by(|a, b| b.total_cmp(a));
+    best
+}
+
+fn no_lattice(harmonics: &Harmonics) -> LatticeError {
+    LatticeError::NoLattice {
+        best: signal_to_noise(harmonics),
+    }
+}
+
+/// Whether the harmonics can be chance.
+///
+/// Under noise alone the significance is exponentially distributed. Two members of a shell were
+/// searched among all frequencies, so they have to exceed the expected maximum of that search; the
+/// third was not searched: the sum rule says where it has to be. The second shell may be the strong
+/// one, as long as the first, which makes the lattice, is there at all.
+fn is_lattice(harmonics: &Harmonics) -> bool {
+    let shell = |members: &[harmonics::Harmonic]| {
+        let mut s = [0.0; 3];
+        for (s, h) in s.iter_mut().zip(members) {
+            *s = h.significance(harmonics.window_sums);
+        }
+        s.sort_by(|a, b| b.total_cmp(a));
+        s
+    };
+    let stands_out = |s: [f64; 3]| s[1] > 20.0 && s[2] > 12.0;
+    let first = shell(&harmonics.list[..3]);
+    let second = shell(&harmonics.list[3..harmonics.list.len().min(6)]);
+    stands_out(first) || (stands_out(second) && first[1] > 12.0)
+}

@@ -1,0 +1,199 @@
+//! Both position sensors of a frame → its [`Geometry`].
+
+use nalgebra::{Matrix2, Matrix4, Vector2};
+
+use super::{Geometry, PlaneFit, fit_plane};
+use crate::image::Image;
+
+/// The outer fraction of a line in which turn-around is looked for, on either side.
+const TURN_AROUND: f64 = 0.1;
+
+/// The geometry by the sensors, and how well a plane describes them.
+#[derive(Clone, Debug)]
+pub struct SensorGeometry {
+    /// The affine map.
+    pub geometry: Geometry,
+    /// Plane of the x sensor and of the y sensor, nm.
+    pub planes: [PlaneFit; 2],
+    /// Columns that were used; those outside belong to the turn-around of the tip.
+    pub columns: std::ops::Range<usize>,
+    /// Step from column to column along the fast direction, one number per line, nm.
+    pub fast_steps: Vec<f64>,
+    /// Step from row to row along the slow direction, one number per column, nm.
+    pub slow_steps: Vec<f64>,
+}
+
+/// Fits planes to the x and y sensors (nm, same shape).
+///
+/// `None` where the sensors do not span an area: constant, all missing, or moving along one line.
+pub fn from_sensors(x: &Image, y: &Image) -> Option<SensorGeometry> {
+    let (rows, columns) = (x.rows, x.columns);
+    if (y.rows, y.columns) != (rows, columns) {
+        return None;
+    }
+    let used = straight_columns(x, y)?;
+    let planes = [fit_plane(x, used.clone())?, fit_plane(y, used.clone())?];
+    let pixel_to_nm = Matrix2::new(
+        planes[0].per_column,
+        planes[0].per_row,
+        planes[1].per_column,
+        planes[1].per_row,
+    );
+    let (fast, slow) = (pixel_to_nm.column(0).norm(), pixel_to_nm.column(1).norm());
+    if !(pixel_to_nm.determinant().abs() > 0.2 * fast * slow) {
+        return None;
+    }
+    let (ef, es) = (pixel_to_nm.column(0) / fast, pixel_to_nm.column(1) / slow);
+    let line_slopes: Vec<Vector2<f64>> = (0..rows)
+        .filter_map(|row| {
+            let slope = |image: &Image| slope(used.clone().map(|c| (c, image.row(row)[c])));
+            Some(Vector2::new(slope(x)?, slope(y)?))
+        })
+        .collect();
+    let column_slopes: Vec<Vector2<f64>> = used
+        .clone()
+        .filter_map(|c| {
+            let slope = |image: &Image| slope((0..rows).map(|row| (row, image.row(row)[c])));
+            Some(Vector2::new(slope(x)?, slope(y)?))
+        })
+        .collect();
+    let covariance = covariance(&line_slopes, [x, y], &planes, &used);
+    Some(SensorGeometry {
+        geometry: Geometry {
+            size: [columns, rows],
+            pixel_to_nm,
+            origin: Vector2::new(planes[0].origin, planes[1].origin),
+            covariance,
+            from_sensors: true,
+        },
+        planes,
+        columns: used,
+        fast_steps: line_slopes.iter().map(|s| s.dot(&ef)).collect(),
+        slow_steps: column_slopes.iter().map(|s| s.dot(&es)).collect(),
+    })
+}
+
+impl SensorGeometry {
+    /// What the plane leaves of a sensor (0: x, 1: y): curvature, lag, hysteresis, noise; nm.
+    pub fn residual_map(&self, sensor: usize, measured: &Image) -> Image {
+        let plane = &self.planes[sensor];
+        let values = measured
+            .values
+            .iter()
+            .enumerate()
+            .map(|(i, v)| {
+                v - plane.at((i % measured.columns) as f64, (i / measured.columns) as f64)
+            })
+            .collect();
+        Image::new(measured.rows, measured.columns, values)
+    }
+}
+
+/// The columns in which the tip moves straight: the mean line of either sensor follows the line
+/// fitted to its inner part. Turn-around shows as a run of deviating columns at an edge.
+fn straight_columns(x: &Image, y: &Image) -> Option<std::ops::Range<usize>> {
+    let columns = x.columns;
+    let margin = (TURN_AROUND * columns as f64) as usize;
+    let (mut first, mut last) = (0, columns);
+    for image in [x, y] {
+        let inner = fit_plane(image, margin..columns - margin)?;
+        let mut deviation = vec![0.0; columns];
+        for (c, d) in deviation.iter_mut().enumerate() {
+            let values: Vec<f64> = (0..image.rows)
+                .map(|row| image.row(row)[c] - inner.at(c as f64, row as f64))
+                .filter(|r| r.is_finite())
+                .collect();
+            *d = values.iter().sum::<f64>() / values.len().max(1) as f64;
+        }
+        let inside = &deviation[margin..columns - margin];
+        let rms = (inside.iter().map(|d| d * d).sum::<f64>() / inside.len() as f64).sqrt();
+        // Half a pixel of deviation is turn-around even on a sensor without noise.
+        let pitch = inner.per_column.hypot(inner.per_row);
+        let limit = (5.0 * rms).max(0.5 * pitch);
+        let bends = |c: &usize| deviation[*c].abs() > limit;
+        first = first.max((0..margin).take_while(bends).count());
+        last = last.min(columns - (columns - margin..columns).rev().take_while(bends).count());
+    }
+    Some(first..last)
+}
+
+/// Least-squares slope of (index, value) pairs, missing values left out.
+fn slope(points: impl Iterator<Item = (usize, f64)>) -> Option<f64> {
+    let (mut n, mut sx, mut sxx, mut sv, mut sxv) = (0.0, 0.0, 0.0, 0.0, 0.0);
+    for (i, v) in points {
+        if v.is_finite() {
+            let x = i as f64;
+            n += 1.0;
+            sx += x;
+            sxx += x * x;
+            sv += v;
+            sxv += x * v;
+        }
+    }
+    let spread = n * sxx - sx * sx;
+    (n >= 3.0 && spread > 0.0).then(|| (n * sxv - sx * sv) / spread)
+}
+
+/// Covariance of `J` from what repeats: the fast step from line to line, the slow step from the
+/// scatter of the line means, each with an effective number of independent lines.
+fn covariance(
+    line_slopes: &[Vector2<f64>],
+    sensors: [&Image; 2],
+    planes: &[PlaneFit; 2],
+    columns: &std::ops::Range<usize>,
+) -> Matrix4<f64> {
+    let mut c = Matrix4::zeros();
+    for (axis, (image, plane)) in sensors.into_iter().zip(planes).enumerate() {
+        let slopes: Vec<f64> = line_slopes
+            .iter()
+            .map(|s| s[axis] - plane.per_column)
+            .collect();
+        let n = slopes.len() as f64;
+        if n > 1.0 {
+            let variance = slopes.iter().map(|s| s * s).sum::<f64>() / (n - 1.0);
+            c[(axis, axis)] = variance * correlated(&slopes) / n;
+        }
+        let means: Vec<f64> = (0..image.rows)
+            .map(|row| {
+                let values: Vec<f64> = columns
+                    .clone()
+                    .map(|col| image.row(row)[col] - plane.at(col as f64, row as f64))
+                    .filter(|r| r.is_finite())
+                    .collect();
+                values.iter().sum::<f64>() / values.len() as f64
+            })
+            .filter(|m| m.is_finite())
+            .collect();
+        let n = means.len() as f64;
+        if n > 2.0 {
+            let variance = means.iter().map(|m| m * m).sum::<f64>() / (n - 2.0);
+            let spread = n * (n * n - 1.0) / 12.0;
+            c[(2 + axis, 2 + axis)] = variance * correlated(&means) / spread;
+        }
+    }
+    c
+}
+
+/// By how much correlation between successive residuals raises the variance of their mean:
+/// `1 + 2 Σ ρ_k`, summed while the autocorrelation is positive (initial positive sequence).
+fn correlated(residuals: &[f64]) -> f64 {
+    let total: f64 = residuals.iter().map(|r| r * r).sum();
+    if total == 0.0 {
+        return 1.0;
+    }
+    let mut factor = 1.0;
+    for lag in 1..residuals.len() / 4 {
+        let rho = residuals
+            .iter()
+            .zip(&residuals[lag..])
+            .map(|(a, b)| a * b)
+            .sum::<f64>()
+            / total;
+        // Below twice the scatter of ρ for independent residuals it is noise.
+        if rho < 2.0 / (residuals.len() as f64).sqrt() {
+            break;
+        }
+        factor += 2.0 * rho;
+    }
+    factor
+}

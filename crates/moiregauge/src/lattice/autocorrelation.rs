@@ -1,0 +1,305 @@
+//! Lattice vectors from the autocorrelation, divided by the overlap, at sub-pixel peaks.
+//!
+//! The autocorrelation of a periodic image is even about every lattice vector, so the parabola
+//! through a patch centred on a peak has its top exactly there, whatever the shape of the peak. The
+//! image is windowed first: without a window the sum over the overlap keeps the beat of the
+//! harmonics with the frame and the peaks move by several thousandths of a wavelength.
+//!
+//! Noise: a peak at lag R compares the start of the image with its end. For local noise power
+//! `S_h` at the harmonics `q_h` of amplitude `2|c_h|`,
+//!   `cov(δ_R, δ_R') = κ(R, R') V`, `V = H⁻¹ N H⁻¹`, `H = Σ 2|c_h|² q qᵀ`, `N = Σ 2|c_h|² S_h q qᵀ`,
+//!   `κ(R, R') = Σ_n w²(n) [w(n+R) − w(n−R)] [w(n+R') − w(n−R')] / (W(R) W(R'))`,
+//! with `W(R) = Σ w(n) w(n+R)`. The lattice through the peaks is fitted by least squares with κ
+//! (plus the noise-with-noise term) as covariance.
+
+use nalgebra::{DMatrix, Matrix2, Matrix2xX, Matrix4, Matrix6, Vector2, Vector6};
+
+use super::LatticeVectors;
+use super::harmonics::Harmonics;
+use super::transform::{Autocorrelation, Spectrum, hann_at};
+
+/// Radius of the patch around a peak, as a share of the shortest lattice vector.
+const PATCH: f64 = 0.22;
+/// Farthest peaks used, as a share of the frame: beyond it little is left of the overlap.
+const FARTHEST: f64 = 0.45;
+/// Most peaks used: the nearest ones to find the lattice, far ones to pin it down.
+const MOST_PEAKS: usize = 30;
+
+/// Fits the lattice to the peaks of the autocorrelation, starting from `start` (px).
+///
+/// `None` where fewer than three peaks lie within the frame.
+pub(crate) fn measure(
+    spectrum: &Spectrum,
+    harmonics: &Harmonics,
+    start: &Matrix2<f64>,
+) -> Option<LatticeVectors> {
+    let autocorrelation = spectrum.autocorrelation();
+    let frame = Vector2::new(spectrum.image_size[0] as f64, spectrum.image_size[1] as f64);
+    let mut basis = *start;
+    // Near peaks first: an error of the start grows with the distance.
+    for reach in [0.5 * FARTHEST, FARTHEST] {
+        let peaks = peaks(&autocorrelation, &basis, reach * frame);
+        if peaks.len() >= 3 {
+            basis = fit(&peaks, frame, None)?.0;
+        }
+    }
+    let peaks = peaks(&autocorrelation, &basis, FARTHEST * frame);
+    if peaks.len() < 3 {
+        return None;
+    }
+    let (basis, covariance) = fit(&peaks, frame, Some(harmonics))?;
+    Some(LatticeVectors { basis, covariance })
+}
+
+struct Peak {
+    /// Lattice indices in the basis at 60°.
+    index: Vector2<f64>,
+    /// Measured position, px.
+    position: Vector2<f64>,
+    /// Relative variance from the roughness of the autocorrelation at the peak, px².
+    roughness: f64,
+}
+
+/// Measures the peaks at the lattice points within an ellipse.
+fn peaks(
+    autocorrelation: &Autocorrelation,
+    basis: &Matrix2<f64>,
+    reach: Vector2<f64>,
+) -> Vec<Peak> {
+    let third = basis.column(1) - basis.column(0);
+    let shortest = basis
+        .column(0)
+        .norm()
+        .min(basis.column(1).norm())
+        .min(third.norm());
+    let radius = (PATCH * shortest).max(1.6);
+    let mut places: Vec<(f64, Vector2<f64>)> = Vec::new();
+    let farthest = (reach.amax() / shortest).ceil() as i64 + 1;
+    for h in -farthest..=farthest {
+        for k in 0..=farthest {
+            if k == 0 && h <= 0 {
+                continue;
+            }
+            let index = Vector2::new(h as f64, k as f64);
+            let r = (basis * index).component_div(&reach).norm();
+            if r <= 1.0 {
+                places.push((r, index));
+            }
+        }
+    }
+    places.sort_by(|a, b| a.0.total_cmp(&b.0));
+    if places.len() > MOST_PEAKS {
+        // The nearest third, and of the others evenly many at every distance.
+        let near = MOST_PEAKS / 3;
+        let (far, wanted) = (places.len() - near, MOST_PEAKS - near);
+        let mut chosen: Vec<_> = places[..near].to_vec();
+        chosen
+            .extend((0..wanted).map(|i| places[near + (i * far + far - 1) / wanted.max(1) % far]));
+        chosen.dedup_by(|a, b| a.1 == b.1);
+        places = chosen;
+    }
+    places
+        .into_iter()
+        .filter_map(|(_, index)| {
+            let (position, roughness) = peak(autocorrelation, basis * index, radius)?;
+            Some(Peak {
+                index,
+                position,
+                roughness,
+            })
+        })
+        .collect()
+}
+
+/// The top of the paraboloid through a patch, re-centred until it sits on the top.
+fn peak(
+    autocorrelation: &Autocorrelation,
+    near: Vector2<f64>,
+    radius: f64,
+) -> Option<(Vector2<f64>, f64)> {
+    let mut centre = near;
+    for round in 0..12 {
+        let (step, roughness) = paraboloid(autocorrelation, centre, radius)?;
+        centre += step;
+        // A peak that runs away is not that of this lattice point.
+        if (centre - near).norm() > 1.5 * radius {
+            return None;
+        }
+        if step.norm() < 1e-4 || round == 11 {
+            return Some((centre, roughness));
+        }
+    }
+    None
+}
+
+/// Weighted fit of a paraboloid around `centre`; the offset of its top and its variance for unit
+/// noise per lag.
+fn paraboloid(
+    autocorrelation: &Autocorrelation,
+    centre: Vector2<f64>,
+    radius: f64,
+) -> Option<(Vector2<f64>, f64)> {
+    // The top of a wide peak is smooth: some hundred lags describe it.
+    let stride = (radius / 9.0).ceil() as i64;
+    let reach = (radius / stride as f64).ceil() as i64;
+    let mut normal = Matrix6::<f64>::zeros();
+    let mut right = Vector6::<f64>::zeros();
+    for dy in -reach..=reach {
+        for dx in -reach..=reach {
+            let (x, y) = (
+                centre.x.round() as i64 + stride * dx,
+                centre.y.round() as i64 + stride * dy,
+            );
+            // Offsets common to a whole line show at row lag 0 only; so does white noise at lag 0.
+            if y == 0 {
+                continue;
+            }
+            // In units of the radius, which keeps the equations well conditioned.
+            let d = (Vector2::new(x as f64, y as f64) - centre) / radius;
+            let w = 1.0 - d.norm_squared();
+            if w <= 0.0 {
+                continue;
+            }
+            let terms = Vector6::new(1.0, d.x, d.y, d.x * d.x, d.x * d.y, d.y * d.y);
+            right += w * autocorrelation.at(x, y)? * terms;
+            normal += w * terms * terms.transpose();
+        }
+    }
+    let inverse = normal.try_inverse()?;
+    let c = inverse * right;
+    let hessian = Matrix2::new(2.0 * c[3], c[4], c[4], 2.0 * c[5]);
+    // A maximum curves down in every direction.
+    if !(hessian.trace() < 0.0 && hessian.determinant() > 0.0) {
+        return None;
+    }
+    let top = hessian.try_inverse()? * radius;
+    let step = -top * Vector2::new(c[1], c[2]);
+    let gradient = 0.5 * (inverse[(1, 1)] + inverse[(2, 2)]);
+    let steepest = 0.5 * top.norm_squared() * gradient;
+    Some((step * (radius / step.norm()).min(1.0), steepest))
+}
+
+/// Generalised least squares of the basis through the peaks.
+///
+/// Without harmonics only the basis is meaningful, not the covariance.
+fn fit(
+    peaks: &[Peak],
+    frame: Vector2<f64>,
+    harmonics: Option<&Harmonics>,
+) -> Option<(Matrix2<f64>, Matrix4<f64>)> {
+    let n = peaks.len();
+    let overlaps: Vec<Overlap> = peaks
+        .iter()
+        .map(|p| Overlap::new(frame, p.position))
+        .collect();
+    // Beside κ each peak has an error of its own: noise correlated with noise, and what the finite
+    // patch leaves.
+    let mut covariance = DMatrix::from_fn(n, n, |i, j| overlaps[i].kappa(&overlaps[j]));
+    let v = harmonics.map_or(Some(Matrix2::identity()), gradient_noise)?;
+    let per_lag = harmonics.map_or(0.0, noise_with_noise);
+    for (i, (peak, overlap)) in peaks.iter().zip(&overlaps).enumerate() {
+        let own = 2.0 * per_lag * overlap.squares * peak.roughness / v.trace();
+        covariance[(i, i)] += own + 0.02 * covariance[(i, i)];
+    }
+    let weights = covariance.cholesky()?.inverse();
+    let index = Matrix2xX::from_iterator(n, peaks.iter().flat_map(|p| [p.index.x, p.index.y]));
+    let position =
+        Matrix2xX::from_iterator(n, peaks.iter().flat_map(|p| [p.position.x, p.position.y]));
+    let product = |a: &Matrix2xX<f64>, b: &Matrix2xX<f64>| -> Matrix2<f64> {
+        (a * &weights * b.transpose()).fixed_resize(0.0)
+    };
+    let inverse = product(&index, &index).try_inverse()?;
+    let basis = product(&position, &index) * inverse;
+    // What the peaks say themselves: residuals larger than the noise explains raise the errors.
+    let residual = &position - basis * &index;
+    let chi2 = (v.try_inverse()? * product(&residual, &residual)).trace();
+    let freedom = 2.0 * (n as f64 - 2.0);
+    let scale = (chi2 / freedom).max(1.0);
+    // vec(basis) = (a₁; a₂): the covariance between vectors is `inverse`, between components V.
+    Some((basis, inverse.kronecker(&v) * scale))
+}
+
+/// `V = H⁻¹ N H⁻¹`.
+fn gradient_noise(harmonics: &Harmonics) -> Option<Matrix2<f64>> {
+    let (mut h, mut n) = (Matrix2::zeros(), Matrix2::zeros());
+    for harmonic in &harmonics.list {
+        let term = 2.0 * harmonic.amplitude.norm_sqr() * harmonic.q * harmonic.q.transpose();
+        h += term;
+        n += term * harmonic.noise;
+    }
+    let inverse = h.try_inverse()?;
+    Some(inverse * n * inverse)
+}
+
+/// Variance per lag of the noise correlated with itself, before division by the overlap.
+fn noise_with_noise(harmonics: &Harmonics) -> f64 {
+    let count = harmonics.list.len() as f64;
+    let mean = harmonics.list.iter().map(|h| h.noise).sum::<f64>() / count;
+    mean * mean
+}
+
+/// Points along each side of the frame at which the (smooth) window is summed.
+const SAMPLES: usize = 48;
+
+/// The windowed frame and its copies shifted by ±R, sampled along each axis.
+struct Overlap {
+    /// Per axis and sample: `w(x)²`, times the step.
+    square: [[f64; SAMPLES]; 2],
+    /// Per axis: `w(x + R)` and `w(x − R)`.
+    shifted: [[[f64; SAMPLES]; 2]; 2],
+    /// `W(R)`.
+    weight: f64,
+    /// `Σ w² w²(n + R) / W²`.
+    squares: f64,
+}
+
+impl Overlap {
+    fn new(frame: Vector2<f64>, lag: Vector2<f64>) -> Self {
+        let mut new = Self {
+            square: [[0.0; SAMPLES]; 2],
+            shifted: [[[0.0; SAMPLES]; 2]; 2],
+            weight: 1.0,
+            squares: 1.0,
+        };
+        for axis in 0..2 {
+            let n = frame[axis];
+            let step = n / SAMPLES as f64;
+            let (mut weight, mut squares) = (0.0, 0.0);
+            for i in 0..SAMPLES {
+                let x = (i as f64 + 0.5) * step - 0.5;
+                let w = hann_at(x, n as usize);
+                let [ahead, behind] =
+                    [x + lag[axis], x - lag[axis]].map(|x| hann_at(x, n as usize));
+                new.square[axis][i] = w * w * step;
+                new.shifted[axis][0][i] = ahead;
+                new.shifted[axis][1][i] = behind;
+                weight += w * ahead * step;
+                squares += (w * ahead).powi(2) * step;
+            }
+            new.weight *= weight;
+            new.squares *= squares;
+        }
+        new.squares /= new.weight * new.weight;
+        new
+    }
+
+    /// `κ(R, R')`: the four products of shifted windows, each separable.
+    fn kappa(&self, other: &Self) -> f64 {
+        let mut total = 0.0;
+        for (a, b) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+            let term: f64 = (0..2)
+                .map(|axis| {
+                    let (s, t) = (&self.shifted[axis][a], &other.shifted[axis][b]);
+                    let squares = self.square[axis].iter();
+                    squares
+                        .zip(s)
+                        .zip(t)
+                        .map(|((w, s), t)| w * s * t)
+                        .sum::<f64>()
+                })
+                .product();
+            total += if a == b { term } else { -term };
+        }
+        total / (self.weight * other.weight)
+    }
+}

@@ -1,0 +1,292 @@
+//! Amplitudes of the lattice harmonics, and the noise around each of them.
+//!
+//! Model: `I(n) = c₀ + Σ_h [c_h e^{iq_h·n} + c.c.]`, fitted by least squares with the window as
+//! weight. What it leaves behind gives the local noise power `S(q_h)` (white noise of variance σ²
+//! has `S = σ²`), so that coloured and line noise count where they are.
+
+use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
+use rustfft::num_complex::Complex64;
+
+use super::transform::hann;
+use crate::image::Image;
+
+/// Noise is read between these distances from a harmonic, in cycles per frame: outside its main
+/// lobe (the window's is ±2), near enough to be the noise that matters.
+const ANNULUS: [f64; 2] = [1.0, 5.0];
+
+/// One harmonic of the lattice.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Harmonic {
+    /// Wave vector, rad per pixel.
+    pub(crate) q: Vector2<f64>,
+    /// Complex amplitude, phase at pixel (0, 0); a cosine of amplitude A has |c| = A/2.
+    pub(crate) amplitude: Complex64,
+    /// Local noise power `S(q)`, units of the image squared.
+    pub(crate) noise: f64,
+}
+
+/// The harmonics of a lattice in one image.
+#[derive(Clone, Debug)]
+pub(crate) struct Harmonics {
+    /// First shell first (three), then second and third shell.
+    pub(crate) list: Vec<Harmonic>,
+    /// Sum of the squared window weights and of the weights.
+    pub(crate) window_sums: [f64; 2],
+}
+
+impl Harmonic {
+    /// Power of the harmonic over the noise power in one resolution cell; exponentially
+    /// distributed with mean 1 where there is no signal.
+    pub(crate) fn significance(&self, window_sums: [f64; 2]) -> f64 {
+        self.amplitude.norm_sqr() * window_sums[1].powi(2) / (window_sums[0] * self.noise)
+    }
+}
+
+/// The image times its window, ready for transforms at arbitrary frequencies.
+pub(crate) struct Windowed {
+    values: Vec<f64>,
+    weights: Vec<f64>,
+    rows: usize,
+    columns: usize,
+}
+
+impl Windowed {
+    /// Missing pixels get no weight.
+    pub(crate) fn new(image: &Image) -> Self {
+        let (wx, wy) = (hann(image.columns), hann(image.rows));
+        let mut values = Vec::with_capacity(image.values.len());
+        let mut weights = Vec::with_capacity(image.values.len());
+        for (row, wy) in wy.iter().enumerate() {
+            for (v, wx) in image.row(row).iter().zip(&wx) {
+                let w = if v.is_finite() { wx * wy } else { 0.0 };
+                weights.push(w);
+                values.push(if v.is_finite() { v * w } else { 0.0 });
+            }
+        }
+        Self {
+            values,
+            weights,
+            rows: image.rows,
+            columns: image.columns,
+        }
+    }
+
+    /// `Σ w I e^{−iq·n}` and its moments with `n − centre` along columns and rows.
+    fn moments(&self, q: Vector2<f64>) -> [Complex64; 3] {
+        let cx = (self.columns as f64 - 1.0) / 2.0;
+        let cy = (self.rows as f64 - 1.0) / 2.0;
+        let x: Vec<f64> = (0..self.columns).map(|c| c as f64 - cx).collect();
+        let (re, im): (Vec<f64>, Vec<f64>) =
+            x.iter().map(|x| ((q.x * x).cos(), (q.x * x).sin())).unzip();
+        let (xre, xim): (Vec<f64>, Vec<f64>) = x
+            .iter()
+            .zip(re.iter().zip(&im))
+            .map(|(x, (re, im))| (x * re, x * im))
+            .unzip();
+        let mut sums = [Complex64::default(); 3];
+        for row in 0..self.rows {
+            let line = &self.values[row * self.columns..(row + 1) * self.columns];
+            let y = row as f64 - cy;
+            let turn = Complex64::from_polar(1.0, -q.y * y);
+            let plain = turn * Complex64::new(dot(line, &re), -dot(line, &im));
+            sums[0] += plain;
+            sums[1] += turn * Complex64::new(dot(line, &xre), -dot(line, &xim));
+            sums[2] += plain * y;
+        }
+        sums
+    }
+
+    /// The wave vector near `q` at which the transform is largest, in cycles-per-frame accuracy far
+    /// below the grid: at an offset δ, `∂F/∂q = F · δ · W₂/W₀` for a single harmonic.
+    pub(crate) fn refined_peak(&self, mut q: Vector2<f64>) -> Vector2<f64> {
+        let second = |n: usize| {
+            let w = hann(n);
+            let c = (n as f64 - 1.0) / 2.0;
+            let moment: f64 = w
+                .iter()
+                .enumerate()
+                .map(|(i, w)| w * (i as f64 - c).powi(2))
+                .sum();
+            moment / w.iter().sum::<f64>()
+        };
+        let width = Vector2::new(second(self.columns), second(self.rows));
+        for _ in 0..3 {
+            let [f, fx, fy] = self.moments(q);
+            // ∂F/∂q_x = −i Σ x w I e^{−iq·n}.
+            let slope = |m: Complex64| (Complex64::new(0.0, -1.0) * m / f).re;
+            let step = Vector2::new(slope(fx) / width.x, slope(fy) / width.y);
+            if !step.iter().all(|s| s.is_finite()) {
+                break;
+            }
+            // Never farther than half a cycle per frame: beyond it is another peak.
+            let most = std::f64::consts::PI
+                * Vector2::new(1.0 / self.columns as f64, 1.0 / self.rows as f64);
+            q += Vector2::new(step.x.clamp(-most.x, most.x), step.y.clamp(-most.y, most.y));
+        }
+        q
+    }
+
+    /// `Σ w e^{−iq·n}` with the phase at the centre; separable unless pixels are missing.
+    fn window_transform(&self, q: Vector2<f64>, complete: bool) -> Complex64 {
+        if complete {
+            let separable = hann_transform(q.x, self.columns) * hann_transform(q.y, self.rows);
+            return Complex64::new(separable, 0.0);
+        }
+        let cx = (self.columns as f64 - 1.0) / 2.0;
+        let cy = (self.rows as f64 - 1.0) / 2.0;
+        let mut sum = Complex64::default();
+        for row in 0..self.rows {
+            for column in 0..self.columns {
+                let phase = q.x * (column as f64 - cx) + q.y * (row as f64 - cy);
+                sum +=
+                    self.weights[row * self.columns + column] * Complex64::from_polar(1.0, -phase);
+            }
+        }
+        sum
+    }
+
+    /// Fits the harmonics `pair · (h, k)` of the first three shells.
+    ///
+    /// `None` where they cannot be told apart on this frame.
+    pub(crate) fn fit(&self, image: &Image, pair: &Matrix2<f64>) -> Option<Harmonics> {
+        let nyquist = 0.9 * std::f64::consts::PI;
+        let q: Vec<Vector2<f64>> = SHELLS
+            .iter()
+            .map(|&(h, k)| pair * Vector2::new(h, k))
+            .filter(|q| q.amax() < nyquist && q.amin() > -nyquist)
+            .collect();
+        if q.len() < 3 {
+            return None;
+        }
+        let complete = image.values.iter().all(|v| v.is_finite());
+        // Basis: 1, e^{iq}, e^{−iq}, …, phases at the centre.
+        let mut waves = vec![Vector2::zeros()];
+        waves.extend(q.iter().flat_map(|q| [*q, -*q]));
+        let n = waves.len();
+        let gram = DMatrix::from_fn(n, n, |a, b| {
+            self.window_transform(waves[a] - waves[b], complete)
+        });
+        let right = DVector::from_iterator(
+            n,
+            waves.iter().enumerate().map(|(i, &wave)| {
+                // The image is real: the transform at −q is the conjugate of that at q.
+                if i > 0 && i % 2 == 0 {
+                    Complex64::default()
+                } else {
+                    self.moments(wave)[0]
+                }
+            }),
+        );
+        let mut right = right;
+        for i in (2..n).step_by(2) {
+            right[i] = right[i - 1].conj();
+        }
+        let amplitudes = gram.lu().solve(&right)?;
+        let residual = self.residual(image, &waves, &amplitudes);
+        let noise = super::noise::LocalNoise::new(&residual);
+        let centre = Vector2::new(
+            (self.columns as f64 - 1.0) / 2.0,
+            (self.rows as f64 - 1.0) / 2.0,
+        );
+        let list = q
+            .iter()
+            .enumerate()
+            .map(|(i, &q)| Harmonic {
+                q,
+                amplitude: amplitudes[1 + 2 * i] * Complex64::from_polar(1.0, -q.dot(&centre)),
+                noise: noise.around(q, ANNULUS),
+            })
+            .collect();
+        let window_sums = [
+            self.weights.iter().map(|w| w * w).sum(),
+            self.weights.iter().sum(),
+        ];
+        Some(Harmonics { list, window_sums })
+    }
+
+    /// The image minus the model; missing pixels become 0.
+    fn residual(
+        &self,
+        image: &Image,
+        waves: &[Vector2<f64>],
+        amplitudes: &DVector<Complex64>,
+    ) -> Image {
+        let cx = (self.columns as f64 - 1.0) / 2.0;
+        let cy = (self.rows as f64 - 1.0) / 2.0;
+        let mut out = image.clone();
+        for v in &mut out.values {
+            *v = if v.is_finite() {
+                *v - amplitudes[0].re
+            } else {
+                0.0
+            };
+        }
+        for i in (1..waves.len()).step_by(2) {
+            let q = waves[i];
+            let (re, im): (Vec<f64>, Vec<f64>) = (0..self.columns)
+                .map(|c| (q.x * (c as f64 - cx)).sin_cos())
+                .map(|(s, c)| (c, s))
+                .unzip();
+            for row in 0..self.rows {
+                let c = 2.0 * amplitudes[i] * Complex64::from_polar(1.0, q.y * (row as f64 - cy));
+                let line = &mut out.values[row * self.columns..(row + 1) * self.columns];
+                for ((v, re), im) in line.iter_mut().zip(&re).zip(&im) {
+                    *v -= c.re * re - c.im * im;
+                }
+            }
+        }
+        for (v, w) in out.values.iter_mut().zip(&self.weights) {
+            if *w == 0.0 {
+                *v = 0.0;
+            }
+        }
+        out
+    }
+}
+
+/// Indices of the first three shells, one of each ± pair, in the basis at 60°.
+const SHELLS: [(f64, f64); 9] = [
+    (1.0, 0.0),
+    (0.0, 1.0),
+    (-1.0, 1.0),
+    (1.0, 1.0),
+    (-1.0, 2.0),
+    (-2.0, 1.0),
+    (2.0, 0.0),
+    (0.0, 2.0),
+    (-2.0, 2.0),
+];
+
+/// `Σ w(n) cos(q (n − centre))` of the Hann window of `n` pixels: three Dirichlet kernels.
+fn hann_transform(q: f64, n: usize) -> f64 {
+    let n = n as f64;
+    let dirichlet = |q: f64| {
+        let half = (q / 2.0).sin();
+        if half.abs() < 1e-9 {
+            // At multiples of 2π every cosine is ±1; the sign of an even n alternates with them.
+            n * (n * q / 2.0).cos() / (q / 2.0).cos()
+        } else {
+            (n * q / 2.0).sin() / half
+        }
+    };
+    let step = std::f64::consts::TAU / n;
+    0.5 * dirichlet(q) + 0.25 * (dirichlet(q + step) + dirichlet(q - step))
+}
+
+/// Sum of products in eight independent partial sums, which the compiler can keep in registers.
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let mut sums = [0.0; 8];
+    let (a8, b8) = (a.chunks_exact(8), b.chunks_exact(8));
+    let rest: f64 = a8
+        .remainder()
+        .iter()
+        .zip(b8.remainder())
+        .map(|(a, b)| a * b)
+        .sum();
+    for (a, b) in a8.zip(b8) {
+        for i in 0..8 {
+            sums[i] += a[i] * b[i];
+        }
+    }
+    sums.iter().sum::<f64>() + rest
+}
