@@ -5,7 +5,7 @@ use crate::scan::Scan;
 /// Why a file is refused as a whole.
 ///
 /// A file is refused when its bytes do not keep what its header promises (a channel cut off, a
-/// section missing), because then nothing in it can be trusted blindly; the part that is whole
+/// section missing), because then nothing in it can be trusted blindly; the rest
 /// travels with [`ReadError::Incomplete`]. A file in which merely one channel is scaled in an
 /// unknown way is read, with that channel in [`Scan::unreadable`].
 #[derive(Debug, thiserror::Error)]
@@ -88,12 +88,13 @@ pub enum ReadError {
         /// Length of the file.
         found: usize,
     },
-    /// Damaged, with whole channels in it.
-    #[error("the file is damaged: {reason}; {} of {} channels are whole", .readable.channels.len(), .readable.channels.len() + .readable.unreadable.len())]
+    /// Damaged, with channels in it that lie within the file.
+    #[error("the file is damaged: {reason}; {} of {} channels lie within the file", .readable.channels.len(), .readable.channels.len() + .readable.unreadable.len())]
     Incomplete {
         /// What is missing.
         reason: String,
-        /// The channels that are whole, for those who ask for them.
+        /// The channels that lie within the file, to look at; `reason` says whether the data have
+        /// moved, in which case their values are wrong.
         readable: Box<Scan>,
     },
     /// Nothing in it can be read.

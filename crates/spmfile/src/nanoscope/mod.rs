@@ -292,6 +292,7 @@ fn judge(
         let reason = damage
             .iter()
             .map(|d| format!("channel {:?}: {}", d.name, d.error))
+            .chain(moved_data(bytes, header))
             .collect::<Vec<_>>()
             .join("; ");
         return Err(ReadError::Incomplete {
@@ -309,4 +310,20 @@ fn judge(
         }
         _ => Ok(scan),
     }
+}
+
+/// Words for a header that has lost bytes, so that all data lie before the place it gives for them.
+///
+/// Between the header's end and its promised length there are only zeros in a whole file.
+fn moved_data(bytes: &[u8], header: &HeaderText<'_>) -> Option<String> {
+    let sections = header::sections(&header.text);
+    let (start, _) = header::leading_number(sections.first()?.get("Data length")?)?;
+    let padding = bytes.get(header.length..start as usize)?;
+    let filling = |b: &u8| matches!(b, 0 | 0x1a | b'\r' | b'\n');
+    let first = padding.iter().position(|b| !filling(b))?;
+    Some(format!(
+        "the data begin {} bytes or more before the place the header gives: bytes of the header are \
+         lost, and the values of the other channels must not be trusted",
+        padding.len() - first
+    ))
 }
