@@ -1,1 +1,19 @@
 //! Numbers → pictures, tables and the report. No measuring.
+//!
+//! In: an [`Analysis`](moiregauge::analysis::Analysis) (nm, s, rad) and a [`Provenance`]. Out: files as bytes, in
+//! the units of the surface (°, %, nm/min). Nothing is written to disk here.
+
+mod draw;
+mod error;
+mod figures;
+mod format;
+mod provenance;
+mod report;
+mod stats;
+
+pub use draw::colormap::ColorMap;
+pub use error::ReportError;
+pub use figures::{Drawing, Figure, figures};
+pub use format::plus_minus;
+pub use provenance::{FailedInput, InputFile, Provenance};
+pub use report::{Choice, write_report};

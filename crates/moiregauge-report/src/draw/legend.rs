@@ -1,0 +1,50 @@
+//! Legends: one line of keys above the panels, where they cover no data.
+
+use super::style::{BLACK, Marker, SMALL, lettering, marker, text_width};
+use super::svg::{Anchor, Ink, Rect, Svg};
+
+/// How a key looks.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Key<'a> {
+    /// A data point: shape, colour, filled.
+    Point(Marker, &'a str, bool),
+    /// A line: colour and dash pattern.
+    Line(&'a str, &'a str),
+    /// A shaded band: colour and opacity.
+    Band(&'a str, f64),
+}
+
+/// Draws keys from left to right, the first one at `start` (its left end and text baseline).
+pub(crate) fn row(svg: &mut Svg, start: (f64, f64), keys: &[(Key, &str)]) {
+    let (mut x, baseline) = start;
+    let middle = baseline - 0.36 * SMALL;
+    for (key, text) in keys {
+        let width = match *key {
+            Key::Point(shape, colour, filled) => {
+                marker(svg, (x + 3.0, middle), shape, colour, filled);
+                6.0
+            }
+            Key::Line(colour, dash) => {
+                let ink = Ink::line(colour, 1.0).dashed(dash);
+                svg.line((x, middle), (x + 13.0, middle), &ink);
+                13.0
+            }
+            Key::Band(colour, opacity) => {
+                let patch = Rect::new(x, middle - 2.5, 11.0, 5.0);
+                svg.rect(patch, &Ink::area(colour, opacity));
+                11.0
+            }
+        };
+        x += width + 2.5;
+        svg.text((x, baseline), text, &lettering(SMALL, Anchor::Start));
+        x += text_width(text, SMALL) + 9.0;
+    }
+}
+
+/// The keys of up and down scans.
+pub(crate) fn directions() -> [(Key<'static>, &'static str); 2] {
+    [
+        (Key::Point(Marker::Circle, BLACK, true), "up"),
+        (Key::Point(Marker::Circle, BLACK, false), "down"),
+    ]
+}

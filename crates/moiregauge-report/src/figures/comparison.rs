@@ -1,0 +1,123 @@
+//! Wavelengths by the estimator that was used against those by the other one.
+
+use moiregauge::estimate::Estimate;
+use moiregauge::settings::Method;
+
+use super::layout::{Grid, counting, ends, is_up, ordinal, point};
+use super::{Drawing, Subject, layout};
+use crate::draw::axes::{Axes, Labels, zero_line};
+use crate::draw::legend::{self, Key};
+use crate::draw::scale::Range;
+use crate::draw::style::{GREY, LINE, PAGE, VECTOR, VECTOR_MARKER, VECTOR_NAME};
+use crate::draw::svg::{Ink, Svg};
+
+/// One vector of one line of one scan by both estimators.
+struct Pair {
+    scan: usize,
+    vector: usize,
+    up: bool,
+    used: Estimate,
+    other: Estimate,
+}
+
+pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
+    let pairs = pairs(subject);
+    if pairs.is_empty() {
+        return Err("no second estimator was run".to_owned());
+    }
+    let (used, other) = match subject.analysis.settings.method {
+        Method::Autocorrelation => ("autocorrelation", "Fourier transform"),
+        Method::Fourier => ("Fourier transform", "autocorrelation"),
+        Method::Paper => ("published autocorrelation", "other estimator"),
+    };
+    let grid = Grid {
+        width: PAGE,
+        columns: 2,
+        rows: 1,
+        panel: 140.0,
+    };
+    let mut svg = Svg::new(subject.id, grid.width, grid.height());
+    let all = pairs.iter().flat_map(|p| [p.used, p.other]);
+    let range = Range::of(ends(all))
+        .ok_or("no wavelength is finite")?
+        .padded(0.05, 1e-6);
+    let axes = Axes::new(grid.cell(0, 0), range, range);
+    let diagonal = axes.points([(range.low, range.low), (range.high, range.high)]);
+    svg.polyline(&diagonal, &Ink::line(GREY, LINE));
+    for pair in &pairs {
+        let colour = VECTOR[pair.vector];
+        axes.error_bar_x(
+            &mut svg,
+            pair.used.value,
+            pair.other.value,
+            pair.used.sigma,
+            colour,
+        );
+        let look = (VECTOR_MARKER[pair.vector], colour);
+        point(&mut svg, &axes, pair.used.value, pair.other, look, pair.up);
+    }
+    let (x, y) = (format!("λ by {used} (nm)"), format!("λ by {other} (nm)"));
+    let labels = Labels {
+        letter: "a",
+        x: &x,
+        y: &y,
+        ..Labels::default()
+    };
+    axes.draw(&mut svg, &labels);
+
+    // Both come from the same pixels: the larger σ is a fairer bar than the sum of squares.
+    let difference = |p: &Pair| {
+        let sigma = p.used.sigma.max(p.other.sigma) * 1000.0;
+        Estimate::new((p.other.value - p.used.value) * 1000.0, sigma)
+    };
+    let range = Range::of(ends(pairs.iter().map(difference)).chain([0.0]));
+    let range = range.ok_or("no wavelength is finite")?.padded(0.06, 1e-3);
+    let axes = Axes::new(grid.cell(1, 0), counting(subject.set.scans.len()), range);
+    zero_line(&mut svg, &axes);
+    for pair in &pairs {
+        let x = ordinal(pair.scan) + (pair.vector as f64 - 1.0) * 0.2;
+        let look = (VECTOR_MARKER[pair.vector], VECTOR[pair.vector]);
+        point(&mut svg, &axes, x, difference(pair), look, pair.up);
+    }
+    let labels = Labels {
+        letter: "b",
+        x: "scan",
+        y: "difference (pm)",
+        count_x: true,
+        ..Labels::default()
+    };
+    axes.draw(&mut svg, &labels);
+    let vectors = (0..3).map(|v| {
+        (
+            Key::Point(VECTOR_MARKER[v], VECTOR[v], true),
+            VECTOR_NAME[v],
+        )
+    });
+    let keys: Vec<_> = vectors.chain(legend::directions()).collect();
+    legend::row(&mut svg, (layout::LEFT, 11.0), &keys);
+    Ok(Drawing {
+        svg: svg.finish("Wavelengths by two estimators"),
+        caption: format!(
+            "Wavelengths by the {used}, which the results use, and by the {other}, in sensor coordinates, every line direction of every scan (a), and their difference, {other} minus {used} (b; error bar: the larger σ of the two, as both see the same pixels). Filled symbols: up scans; open: down scans."
+        ),
+    })
+}
+
+fn pairs(subject: &Subject) -> Vec<Pair> {
+    let mut pairs = Vec::new();
+    for (index, scan) in subject.set.scans.iter().enumerate() {
+        for line in &scan.lines {
+            let Some(other) = &line.comparison else {
+                continue;
+            };
+            pairs.extend((0..3).map(|vector| Pair {
+                scan: index,
+                vector,
+                up: is_up(scan),
+                used: line.sensor.wavelength(vector),
+                other: other.wavelength(vector),
+            }));
+        }
+    }
+    pairs
+}

@@ -1,0 +1,101 @@
+//! What several figures need: panels in a grid, scans as points, the sense of a scan.
+
+use moiregauge::analysis::ScanAnalysis;
+use moiregauge::estimate::Estimate;
+use spmfile::{FrameDirection, LineDirection};
+
+use crate::draw::axes::Axes;
+use crate::draw::scale::Range;
+use crate::draw::style::{Marker, marker};
+use crate::draw::svg::{Rect, Svg};
+
+/// Space above the panels for a legend, pt.
+pub(super) const LEGEND: f64 = 16.0;
+/// Space left of a panel for its numbers and title, pt.
+pub(super) const LEFT: f64 = 42.0;
+/// Space below a panel for its numbers and title, pt.
+pub(super) const BELOW: f64 = 27.0;
+/// Space above a panel for its letter, pt.
+pub(super) const ABOVE: f64 = 16.0;
+const RIGHT: f64 = 9.0;
+
+/// Panels of equal size in rows and columns under a legend.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Grid {
+    pub(super) width: f64,
+    pub(super) columns: usize,
+    pub(super) rows: usize,
+    /// Height of a panel's frame.
+    pub(super) panel: f64,
+}
+
+impl Grid {
+    pub(super) fn height(&self) -> f64 {
+        LEGEND + self.rows as f64 * (ABOVE + self.panel + BELOW)
+    }
+
+    /// The frame of a panel; row 0 is the upper one.
+    pub(super) fn cell(&self, column: usize, row: usize) -> Rect {
+        let width = self.width / self.columns as f64;
+        Rect::new(
+            column as f64 * width + LEFT,
+            LEGEND + row as f64 * (ABOVE + self.panel + BELOW) + ABOVE,
+            width - LEFT - RIGHT,
+            self.panel,
+        )
+    }
+}
+
+/// Letters of the panels.
+pub(super) const LETTERS: [&str; 6] = ["a", "b", "c", "d", "e", "f"];
+
+/// The range of scan numbers from 1 to `count`.
+pub(super) fn counting(count: usize) -> Range {
+    Range::new(0.4, count as f64 + 0.6)
+}
+
+/// The number of the scan at `index`, as people count.
+pub(super) fn ordinal(index: usize) -> f64 {
+    index as f64 + 1.0
+}
+
+/// Whether the bottom line came first; decides between filled and open symbols.
+pub(super) fn is_up(scan: &ScanAnalysis) -> bool {
+    scan.frame_direction == FrameDirection::Up
+}
+
+/// `trace` or `retrace`.
+pub(super) fn line_name(line: LineDirection) -> &'static str {
+    match line {
+        LineDirection::Trace => "trace",
+        LineDirection::Retrace => "retrace",
+    }
+}
+
+/// One value with its error bar at the place of its scan.
+pub(super) fn point(
+    svg: &mut Svg,
+    axes: &Axes,
+    x: f64,
+    estimate: Estimate,
+    (shape, colour): (Marker, &str),
+    up: bool,
+) {
+    if axes.y.range.contains(estimate.value) && axes.x.range.contains(x) {
+        axes.error_bar(svg, x, estimate.value, estimate.sigma, colour);
+        marker(svg, axes.at(x, estimate.value), shape, colour, up);
+    }
+}
+
+/// Both ends of the error bars of `estimates`; unknown errors count as zero.
+pub(super) fn ends(estimates: impl IntoIterator<Item = Estimate>) -> impl Iterator<Item = f64> {
+    estimates.into_iter().flat_map(|e| {
+        let sigma = if e.sigma.is_finite() { e.sigma } else { 0.0 };
+        [e.value - sigma, e.value + sigma]
+    })
+}
+
+/// The last part of a path, for titles.
+pub(super) fn short(file: &str) -> &str {
+    file.rsplit(['/', '\\']).next().unwrap_or(file)
+}

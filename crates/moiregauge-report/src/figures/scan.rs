@@ -1,0 +1,165 @@
+//! The scan in true coordinates: every pixel where the sensors say it was, the frame that was
+//! asked for and the one that was scanned, a scale bar and the lattice vectors.
+
+use moiregauge::analysis::Illustration;
+use nalgebra::{Matrix2, Vector2};
+
+use super::{Drawing, Subject, layout};
+use crate::draw::axes::{Axes, Labels};
+use crate::draw::scale::{Range, fixed, round_step};
+use crate::draw::style::{
+    COLUMN, LINE, SMALL, TEXT, VECTOR, VECTOR_MARKER, lettering, outline, text_width,
+};
+use crate::draw::svg::{Anchor, Ink, Lettering, Rect, Svg};
+use crate::draw::{colorbar, legend, raster};
+
+pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
+    let shown = subject.set.illustration.as_ref();
+    let shown = shown.ok_or("no scan of this set could be shown in detail")?;
+    let actual = corners(shown, &shown.pixel_to_nm, shown.origin);
+    let nominal = shown.nominal_pixel_to_nm.map(|map| {
+        let middle = middle_pixel(shown);
+        corners(
+            shown,
+            &map,
+            shown.origin + (shown.pixel_to_nm - map) * middle,
+        )
+    });
+    let points: Vec<(f64, f64)> = actual
+        .iter()
+        .chain(nominal.iter().flatten())
+        .copied()
+        .collect();
+    let range = |values: Vec<f64>| {
+        let range = Range::of(values).ok_or("the frame of the scan is not finite");
+        range.map(|r| r.padded(0.02, 1e-6))
+    };
+    let x = range(points.iter().map(|p| p.0).collect())?;
+    let y = range(points.iter().map(|p| p.1).collect())?;
+
+    let side = COLUMN - layout::LEFT - 44.0;
+    let height = (side * y.width() / x.width()).clamp(0.3 * side, 1.6 * side);
+    let area = Rect::new(layout::LEFT, layout::LEGEND + 8.0, side, height);
+    let axes = Axes::equal(area, x, y);
+    let mut svg = Svg::new(subject.id, COLUMN, area.bottom() + layout::BELOW);
+    let contrast = raster::contrast(&shown.image, 0.005);
+    svg.clipped(area, |svg| {
+        let place = (&shown.pixel_to_nm, shown.origin);
+        raster::draw(
+            svg,
+            &axes,
+            &shown.image,
+            place.0,
+            place.1,
+            (subject.map, contrast),
+        );
+        svg.polygon(&axes.points(actual), &Ink::line("#222222", LINE));
+        if let Some(nominal) = nominal {
+            svg.polygon(
+                &axes.points(nominal),
+                &Ink::line("#d55e00", LINE).dashed("4 2.5"),
+            );
+        }
+    });
+    vectors(&mut svg, &axes, shown);
+    scale_bar(&mut svg, &axes);
+    let labels = Labels {
+        x: "x (nm)",
+        y: "y (nm)",
+        ..Labels::default()
+    };
+    axes.draw(&mut svg, &labels);
+    let bar = Rect::new(area.right() + 6.0, area.y, 7.0, area.height);
+    let channel = &subject.set.channel;
+    let title = if shown.unit.is_empty() {
+        channel.clone()
+    } else {
+        format!("{channel} ({})", shown.unit)
+    };
+    colorbar::draw(&mut svg, bar, subject.map, contrast, &title);
+    let mut keys = vec![(legend::Key::Line("#222222", ""), "scanned (sensors)")];
+    if nominal.is_some() {
+        keys.push((legend::Key::Line("#d55e00", "4 2.5"), "intended (nominal)"));
+    } else {
+        keys[0].1 = "scanned frame";
+    }
+    legend::row(&mut svg, (layout::LEFT, 11.0), &keys);
+
+    let nominal_note = if nominal.is_some() {
+        " The intended frame is drawn about the same centre, at the size and rotation that the file states."
+    } else {
+        " The file states no intended frame."
+    };
+    Ok(Drawing {
+        svg: svg.finish("Scan with intended and actual frame"),
+        caption: format!(
+            "{}, {} of {}, background removed. Every pixel is drawn where the position sensors place it, without resampling; x to the right, y up. Arrows: the measured lattice vectors L₁, L₂ and L₃ = L₂ − L₁, not corrected for drift.{nominal_note} Colours from the 0.5 % to the 99.5 % quantile.",
+            channel,
+            layout::line_name(shown.line),
+            layout::short(&shown.file),
+        ),
+    })
+}
+
+/// Pixel coordinates of the middle of the image.
+fn middle_pixel(shown: &Illustration) -> Vector2<f64> {
+    let image = &shown.image;
+    Vector2::new(image.columns as f64 - 1.0, image.rows as f64 - 1.0) / 2.0
+}
+
+/// The outer edges of the image, counter-clockwise from pixel (0, 0), nm.
+fn corners(shown: &Illustration, map: &Matrix2<f64>, origin: Vector2<f64>) -> [(f64, f64); 4] {
+    let (right, top) = (
+        shown.image.columns as f64 - 0.5,
+        shown.image.rows as f64 - 0.5,
+    );
+    [(-0.5, -0.5), (right, -0.5), (right, top), (-0.5, top)].map(|(column, row)| {
+        let at = origin + map * Vector2::new(column, row);
+        (at.x, at.y)
+    })
+}
+
+/// The three lattice vectors as arrows from the middle of the image.
+fn vectors(svg: &mut Svg, axes: &Axes, shown: &Illustration) {
+    let middle = shown.origin + shown.pixel_to_nm * middle_pixel(shown);
+    for index in 0..3 {
+        let tip = middle + shown.pixel_to_nm * shown.lattice.vector(index);
+        let (from, to) = (axes.at(middle.x, middle.y), axes.at(tip.x, tip.y));
+        let colour = VECTOR[index];
+        svg.line(from, to, &Ink::line("#ffffff", 2.6));
+        svg.line(from, to, &Ink::line(colour, 1.3));
+        let ink = Ink {
+            fill: colour,
+            ..Ink::line("#ffffff", 0.7)
+        };
+        outline(svg, to, VECTOR_MARKER[index], 3.0, &ink);
+        let away = Vector2::new(to.0 - from.0, to.1 - from.1).normalize() * 9.0;
+        let label = Lettering {
+            bold: true,
+            fill: colour,
+            halo: Some("#ffffff"),
+            ..lettering(TEXT, Anchor::Middle)
+        };
+        let at = (to.0 + away.x, to.1 + away.y + 0.36 * TEXT);
+        svg.text(at, ["L₁", "L₂", "L₃"][index], &label);
+    }
+}
+
+/// A bar of round length in the lower right corner.
+fn scale_bar(svg: &mut Svg, axes: &Axes) {
+    let length = round_step(axes.x.range.width() / 7.0);
+    let text = format!("{} nm", fixed(length, usize::from(length < 1.0)));
+    let points = length * axes.x.per_unit();
+    let wide = points.max(text_width(&text, SMALL)) + 8.0;
+    let area = axes.area;
+    let plate = Rect::new(area.right() - wide - 5.0, area.bottom() - 20.0, wide, 15.0);
+    svg.rect(plate, &Ink::area("#ffffff", 0.8));
+    let middle = plate.x + wide / 2.0;
+    let bar = Rect::new(middle - points / 2.0, plate.bottom() - 4.5, points, 2.0);
+    svg.rect(bar, &Ink::area("#222222", 1.0));
+    svg.text(
+        (middle, plate.y + 7.5),
+        &text,
+        &lettering(SMALL, Anchor::Middle),
+    );
+}

@@ -1,0 +1,171 @@
+//! Autocorrelation and power spectrum side by side in true coordinates, the lattice marked.
+
+use moiregauge::analysis::Illustration;
+use moiregauge::image::Image;
+use nalgebra::{Matrix2, Vector2};
+
+use super::{Drawing, Subject, layout};
+use crate::draw::axes::{Axes, Labels};
+use crate::draw::scale::Range;
+use crate::draw::style::{Marker, PAGE, VECTOR, VECTOR_MARKER, outline};
+use crate::draw::svg::{Ink, Rect, Svg};
+use crate::draw::{colorbar, raster};
+
+const SIDE: f64 = 162.0;
+
+pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
+    let shown = subject.set.illustration.as_ref();
+    let shown = shown.ok_or("no scan of this set could be shown in detail")?;
+    let basis = shown.pixel_to_nm * shown.lattice.basis;
+    let dual = basis.try_inverse().map(|inverse| inverse.transpose());
+    let to_frequency = shown
+        .pixel_to_nm
+        .try_inverse()
+        .map(|inverse| inverse.transpose());
+    let (Some(dual), Some(to_frequency)) = (dual, to_frequency) else {
+        return Err("the lattice of the scan has no area".to_owned());
+    };
+    let mut svg = Svg::new(subject.id, PAGE, 8.0 + layout::ABOVE + SIDE + layout::BELOW);
+    autocorrelation(&mut svg, subject, shown, &basis);
+    spectrum(&mut svg, subject, shown, &dual, &to_frequency);
+    Ok(Drawing {
+        svg: svg.finish("Autocorrelation and spectrum with the lattice marked"),
+        caption: format!(
+            "{} of {}: (a) autocorrelation against the shift in nm, (b) logarithm of the power spectrum against spatial frequency (cycles per nm), both in sensor coordinates, x to the right, y up, not corrected for drift. Coloured symbols: the three lattice vectors; circles: all further points of the fitted lattice and of its reciprocal lattice.",
+            layout::line_name(shown.line),
+            layout::short(&shown.file)
+        ),
+    })
+}
+
+fn panel(left: f64, half: f64) -> Axes {
+    let range = Range::new(-half, half);
+    Axes::new(
+        Rect::new(left, 8.0 + layout::ABOVE, SIDE, SIDE),
+        range,
+        range,
+    )
+}
+
+fn autocorrelation(svg: &mut Svg, subject: &Subject, shown: &Illustration, basis: &Matrix2<f64>) {
+    let axes = panel(layout::LEFT, 2.45 * longest(basis));
+    let (image, origin) = visible(&shown.autocorrelation, &shown.pixel_to_nm, &axes);
+    let contrast = raster::contrast(&image, 0.005);
+    svg.clipped(axes.area, |svg| {
+        raster::draw(
+            svg,
+            &axes,
+            &image,
+            &shown.pixel_to_nm,
+            origin,
+            (subject.map, contrast),
+        );
+        for (i, j, at) in lattice_points(basis, &axes) {
+            let ends = [(1, 0), (0, 1), (-1, 1)];
+            match ends.iter().position(|&end| end == (i, j)) {
+                Some(index) => {
+                    let ink = Ink {
+                        fill: VECTOR[index],
+                        ..Ink::line("#ffffff", 0.8)
+                    };
+                    outline(svg, at, VECTOR_MARKER[index], 3.0, &ink);
+                }
+                None => ring(svg, at, 2.6),
+            }
+        }
+    });
+    let labels = Labels {
+        letter: "a",
+        title: "autocorrelation",
+        x: "shift x (nm)",
+        y: "shift y (nm)",
+        ..Labels::default()
+    };
+    axes.draw(svg, &labels);
+    let bar = Rect::new(axes.area.right() + 5.0, axes.area.y, 6.0, SIDE);
+    colorbar::draw(svg, bar, subject.map, contrast, "autocorrelation");
+}
+
+fn spectrum(
+    svg: &mut Svg,
+    subject: &Subject,
+    shown: &Illustration,
+    dual: &Matrix2<f64>,
+    to_frequency: &Matrix2<f64>,
+) {
+    let axes = panel(PAGE / 2.0 + layout::LEFT + 2.0, 2.45 * longest(dual));
+    let [across, up] = shown.spectrum_step;
+    let map = to_frequency * Matrix2::new(across, 0.0, 0.0, up);
+    let (image, origin) = visible(&shown.spectrum, &map, &axes);
+    // The peaks are a handful of pixels: only the floor may be cut off.
+    let floor = raster::contrast(&image, 0.3).low;
+    let top = Range::of(image.values.iter().copied()).map_or(floor, |r| r.high);
+    let contrast = Range::new(floor, top.max(floor + 1e-12));
+    svg.clipped(axes.area, |svg| {
+        raster::draw(svg, &axes, &image, &map, origin, (subject.map, contrast));
+        for (_, _, at) in lattice_points(dual, &axes) {
+            ring(svg, at, 5.0);
+        }
+    });
+    let labels = Labels {
+        letter: "b",
+        title: "power spectrum",
+        x: "frequency x (1/nm)",
+        y: "frequency y (1/nm)",
+        ..Labels::default()
+    };
+    axes.draw(svg, &labels);
+    let bar = Rect::new(axes.area.right() + 5.0, axes.area.y, 6.0, SIDE);
+    colorbar::draw(svg, bar, subject.map, contrast, "logarithm of power");
+}
+
+fn longest(basis: &Matrix2<f64>) -> f64 {
+    let third = basis.column(1) - basis.column(0);
+    basis
+        .column(0)
+        .norm()
+        .max(basis.column(1).norm())
+        .max(third.norm())
+}
+
+/// A circle that is seen on light and on dark ground.
+fn ring(svg: &mut Svg, at: (f64, f64), radius: f64) {
+    outline(svg, at, Marker::Circle, radius, &Ink::line("#222222", 1.5));
+    outline(svg, at, Marker::Circle, radius, &Ink::line("#ffffff", 0.8));
+}
+
+/// Lattice points other than zero inside the panel, with their indices.
+fn lattice_points(basis: &Matrix2<f64>, axes: &Axes) -> Vec<(i32, i32, (f64, f64))> {
+    let inside = |at: &Vector2<f64>| axes.x.range.contains(at.x) && axes.y.range.contains(at.y);
+    let indices = (-4..=4).flat_map(|i| (-4..=4).map(move |j| (i, j)));
+    indices
+        .filter(|&indices| indices != (0, 0))
+        .map(|(i, j)| (i, j, basis * Vector2::new(f64::from(i), f64::from(j))))
+        .filter(|(_, _, at)| inside(at))
+        .map(|(i, j, at)| (i, j, axes.at(at.x, at.y)))
+        .collect()
+}
+
+/// The part of a centred image that the panel shows, and the place of its first pixel.
+fn visible(image: &Image, map: &Matrix2<f64>, axes: &Axes) -> (Image, Vector2<f64>) {
+    let centre = Vector2::new((image.columns / 2) as f64, (image.rows / 2) as f64);
+    let half = axes.x.range.high;
+    // A singular map was refused before; the whole image is a safe answer.
+    let inverse = map.try_inverse().unwrap_or_else(Matrix2::zeros);
+    let reach = inverse.abs() * Vector2::new(half, half);
+    let cut = |middle: f64, reach: f64, size: usize| {
+        if reach == 0.0 {
+            return (0, size);
+        }
+        let first = (middle - reach - 1.0).floor().max(0.0) as usize;
+        let last = (middle + reach + 2.0).ceil().clamp(0.0, size as f64) as usize;
+        (first, last.saturating_sub(first))
+    };
+    let (column, columns) = cut(centre.x, reach.x, image.columns);
+    let (row, rows) = cut(centre.y, reach.y, image.rows);
+    let first = Vector2::new(column as f64, row as f64);
+    (
+        raster::cropped(image, row, column, rows, columns),
+        map * (first - centre),
+    )
+}

@@ -1,0 +1,105 @@
+//! Where the centre of the scanned window was, scan by scan.
+
+use nalgebra::Vector2;
+
+use super::layout::{LEFT, counting, is_up, ordinal};
+use super::{Drawing, Subject, layout};
+use crate::draw::axes::{Axes, Labels, zero_line};
+use crate::draw::legend::{self, Key};
+use crate::draw::scale::Range;
+use crate::draw::style::{BLACK, BLUE, GREY, HAIR, Marker, ORANGE, PAGE, SMALL, lettering, marker};
+use crate::draw::svg::{Anchor, Ink, Rect, Svg};
+
+const SIDE: f64 = 150.0;
+
+pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
+    let scans = &subject.set.scans;
+    let [first, _, ..] = scans.as_slice() else {
+        return Err("a single scan has no motion".to_owned());
+    };
+    let moved: Vec<(Vector2<f64>, bool)> = scans
+        .iter()
+        .map(|s| (s.window_centre - first.window_centre, is_up(s)))
+        .collect();
+    let (Some(x), Some(y)) = (
+        Range::of(moved.iter().map(|(m, _)| m.x)),
+        Range::of(moved.iter().map(|(m, _)| m.y)),
+    ) else {
+        return Err("no window centre is finite".to_owned());
+    };
+    let top = layout::LEGEND + layout::ABOVE;
+    let mut svg = Svg::new(subject.id, PAGE, top + SIDE + layout::BELOW);
+    // One picometre: below it the sensors say nothing.
+    let (x, y) = (x.padded(0.12, 1e-3), y.padded(0.12, 1e-3));
+    let path = Axes::equal(Rect::new(LEFT, top, SIDE, SIDE), x, y);
+    path_panel(&mut svg, &path, &moved);
+
+    let left = LEFT + SIDE + 9.0 + LEFT;
+    let area = Rect::new(left, top, PAGE - left - 9.0, SIDE);
+    let both = Range::new(x.low.min(y.low), x.high.max(y.high));
+    let axes = Axes::new(area, counting(scans.len()), both);
+    zero_line(&mut svg, &axes);
+    for (component, shape, colour) in [(0, Marker::Circle, BLUE), (1, Marker::Square, ORANGE)] {
+        let points = axes.points(
+            moved
+                .iter()
+                .enumerate()
+                .map(|(i, (m, _))| (ordinal(i), m[component])),
+        );
+        svg.polyline(&points, &Ink::line(colour, HAIR));
+        for (at, (_, up)) in points.iter().zip(&moved) {
+            marker(&mut svg, *at, shape, colour, *up);
+        }
+    }
+    let labels = Labels {
+        letter: "b",
+        x: "scan",
+        y: "shift of the centre (nm)",
+        count_x: true,
+        ..Labels::default()
+    };
+    axes.draw(&mut svg, &labels);
+    let keys: Vec<_> = legend::directions()
+        .into_iter()
+        .chain([
+            (Key::Point(Marker::Circle, BLUE, true), "x"),
+            (Key::Point(Marker::Square, ORANGE, true), "y"),
+        ])
+        .collect();
+    legend::row(&mut svg, (LEFT, 11.0), &keys);
+    Ok(Drawing {
+        svg: svg.finish("Centre of the scanned window over the scans"),
+        caption: format!(
+            "Centre of the scanned window by the position sensors, relative to the first scan at ({:.1}, {:.1}) nm: path with scan numbers, x to the right, y up, equal scales (a); both components scan by scan (b). Filled symbols: up scans; open: down scans.",
+            first.window_centre.x, first.window_centre.y
+        ),
+    })
+}
+
+fn path_panel(svg: &mut Svg, axes: &Axes, moved: &[(Vector2<f64>, bool)]) {
+    let points = axes.points(moved.iter().map(|(m, _)| (m.x, m.y)));
+    svg.polyline(&points, &Ink::line(GREY, HAIR));
+    let mut numbered: Vec<(f64, f64)> = Vec::new();
+    for (index, (&at, (_, up))) in points.iter().zip(moved).enumerate() {
+        marker(svg, at, Marker::Circle, BLACK, *up);
+        // A number on top of another one can be read by nobody.
+        let label = (at.0 + 3.5, at.1 - 3.0);
+        let free =
+            |other: &(f64, f64)| (other.0 - label.0).abs() > 9.0 || (other.1 - label.1).abs() > 6.5;
+        if numbered.iter().all(free) {
+            svg.text(
+                label,
+                &(index + 1).to_string(),
+                &lettering(SMALL, Anchor::Start),
+            );
+            numbered.push(label);
+        }
+    }
+    let labels = Labels {
+        letter: "a",
+        x: "shift x (nm)",
+        y: "shift y (nm)",
+        ..Labels::default()
+    };
+    axes.draw(svg, &labels);
+}

