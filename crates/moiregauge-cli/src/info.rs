@@ -2,8 +2,10 @@
 //!
 //! Rows are counted as on the screen here: row 0 is the top line, where y is largest.
 
-use std::fmt::Write as _;
-use std::io::{ErrorKind, Read as _, Write as _};
+mod paths;
+mod table;
+
+use std::io::{ErrorKind, Write as _};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -13,11 +15,14 @@ use spmfile::{
     sensor_axis,
 };
 
+pub(crate) use paths::expand;
+use table::table;
+
 /// Show what scan files hold: channels, units, sizes, directions, scaling
 ///
 /// Reads each file and prints its channels with their statistics, how counts become values, and
-/// what is missing for the moiré analysis. Damaged files are shown as far as they are whole; the
-/// exit code then tells of the failure.
+/// what is missing for the moiré analysis. Of a damaged file the rest is shown; the exit code tells
+/// of the failure.
 #[derive(clap::Args, Clone, Debug)]
 #[command(after_long_help = "\
 Examples:
@@ -317,148 +322,6 @@ fn iso_date(t: DateTime) -> String {
     )
 }
 
-/// The readable form of one file.
-fn table(info: &FileInfo) -> String {
-    let mut text = format!("{}\n", info.file);
-    let Some(scan) = &info.scan else {
-        text += "  not read\n";
-        return text;
-    };
-    // Writing to a string cannot fail.
-    let _ = writeln!(text, "  {}", head_line(scan));
-    let _ = writeln!(text, "  {}", frame_line(scan));
-    if !scan.channels.is_empty() {
-        text.push('\n');
-        text += &aligned(&channel_cells(&scan.channels));
-    }
-    for channel in &scan.unreadable {
-        let _ = writeln!(text, "  unreadable: {}: {}", channel.name, channel.error);
-    }
-    if scan.missing_for_analysis.is_empty() {
-        text += "\n  nothing is missing for the moiré analysis\n";
-    } else {
-        text += "\n  missing for the moiré analysis:\n";
-        for words in &scan.missing_for_analysis {
-            let _ = writeln!(text, "    {words}");
-        }
-    }
-    text
-}
-
-fn head_line(scan: &ScanInfo) -> String {
-    let mut words = vec![scan.format.clone()];
-    words.extend(scan.instrument.clone());
-    words.extend(scan.acquired.as_ref().map(|date| date.replace('T', " ")));
-    words.join(", ")
-}
-
-fn frame_line(scan: &ScanInfo) -> String {
-    let number = |value: Option<f64>, unit: &str| {
-        value.map_or("unknown".to_owned(), |v| format!("{}{unit}", short(v)))
-    };
-    let size = scan.size_nm.map_or("unknown".to_owned(), |[fast, slow]| {
-        format!("{} × {} nm", short(fast), short(slow))
-    });
-    let closed_loop = match scan.closed_loop {
-        Some(true) => "on",
-        Some(false) => "off",
-        None => "unknown",
-    };
-    format!(
-        "frame {}, line rate {}, size {size}, rotation {}°, offset {}, {} nm, rounding {}, closed loop {closed_loop}",
-        scan.frame_direction.unwrap_or("direction unknown"),
-        number(scan.line_rate_hz, " Hz"),
-        short(scan.rotation_deg),
-        short(scan.offset_nm[0]),
-        short(scan.offset_nm[1]),
-        number(scan.rounding, ""),
-    )
-}
-
-fn channel_cells(channels: &[ChannelInfo]) -> Vec<Vec<String>> {
-    let mut head: Vec<String> = [
-        "channel",
-        "line",
-        "rows × cols",
-        "size nm",
-        "unit",
-        "min",
-        "max",
-        "mean",
-        "std",
-        "missing",
-    ]
-    .map(str::to_owned)
-    .to_vec();
-    let pixels = channels.first().map_or(&[][..], |c| &c.samples);
-    head.extend(pixels.iter().map(|s| format!("at {},{}", s.row, s.column)));
-    head.extend(["plane fit", "value"].map(str::to_owned));
-    let row = |c: &ChannelInfo| {
-        let interleaved = c.scan_line.as_deref().filter(|s| *s != "Main");
-        let line = [c.line_direction, interleaved].into_iter().flatten();
-        let size = match (c.width_nm, c.height_nm) {
-            (Some(width), Some(height)) => format!("{} × {}", short(width), short(height)),
-            _ => "?".to_owned(),
-        };
-        let mut cells = vec![
-            c.name.clone(),
-            line.collect::<Vec<_>>().join(" "),
-            format!("{} × {}", c.rows, c.columns),
-            size,
-            c.unit.clone(),
-        ];
-        cells.extend([c.min, c.max, c.mean, c.std].map(short));
-        cells.push(c.missing.to_string());
-        let value = |s: &Sample| s.value.map_or("-".to_owned(), short);
-        cells.extend(c.samples.iter().map(value));
-        cells.push(c.plane_fit.clone().unwrap_or_else(|| "none".to_owned()));
-        cells.push(c.scaling.clone());
-        cells
-    };
-    std::iter::once(head)
-        .chain(channels.iter().map(row))
-        .collect()
-}
-
-/// Columns two blanks apart.
-fn aligned(rows: &[Vec<String>]) -> String {
-    let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
-    let width = |column: usize| {
-        let cells = rows.iter().filter_map(|row| row.get(column));
-        cells.map(|cell| cell.chars().count()).max().unwrap_or(0)
-    };
-    let widths: Vec<usize> = (0..columns).map(width).collect();
-    let line = |row: &Vec<String>| {
-        let cells = row
-            .iter()
-            .zip(&widths)
-            .map(|(cell, width)| format!("{cell:width$}"));
-        format!("  {}\n", cells.collect::<Vec<_>>().join("  ").trim_end())
-    };
-    rows.iter().map(line).collect()
-}
-
-/// Six significant digits, without trailing zeros.
-fn short(value: f64) -> String {
-    if !value.is_finite() {
-        return "-".to_owned();
-    }
-    let magnitude = if value == 0.0 {
-        0.0
-    } else {
-        value.abs().log10().floor()
-    };
-    if (-4.0..6.0).contains(&magnitude) {
-        let digits = (5.0 - magnitude) as usize;
-        let text = format!("{value:.digits$}");
-        if text.contains('.') {
-            return text.trim_end_matches('0').trim_end_matches('.').to_owned();
-        }
-        return text;
-    }
-    format!("{value:.5e}")
-}
-
 fn parse_pixel(text: &str) -> Result<Pixel, String> {
     let parsed = || {
         let (row, column) = text.split_once(',')?;
@@ -468,104 +331,6 @@ fn parse_pixel(text: &str) -> Result<Pixel, String> {
         })
     };
     parsed().ok_or_else(|| "expected ROW,COL as two whole numbers, as in 0,511".to_owned())
-}
-
-/// The files meant by names of files, folders and wildcards, in order; names that mean none come
-/// back with the reason.
-pub(crate) fn expand(paths: &[PathBuf]) -> Vec<Result<PathBuf, (PathBuf, String)>> {
-    let mut files = Vec::new();
-    for path in paths {
-        let found = if path.is_dir() {
-            folder(
-                path,
-                &|_, file| holds_scan(file),
-                "the folder holds no scan files (subfolders are not searched)",
-            )
-        } else if path.exists() {
-            Ok(vec![path.clone()])
-        } else {
-            matching(path)
-        };
-        match found {
-            Ok(found) => files.extend(found.into_iter().map(Ok)),
-            Err(error) => files.push(Err((path.clone(), error))),
-        }
-    }
-    files
-}
-
-/// The files of a folder that pass `wanted`, by name.
-fn folder(
-    path: &Path,
-    wanted: &dyn Fn(&str, &Path) -> bool,
-    otherwise: &str,
-) -> Result<Vec<PathBuf>, String> {
-    let entries = std::fs::read_dir(path).map_err(|e| e.to_string())?;
-    let mut files: Vec<PathBuf> = entries
-        .filter_map(|entry| {
-            let entry = entry.ok()?;
-            let file = entry.path();
-            let name = entry.file_name().to_string_lossy().into_owned();
-            (file.is_file() && wanted(&name, &file)).then_some(file)
-        })
-        .collect();
-    files.sort();
-    if files.is_empty() {
-        return Err(otherwise.to_owned());
-    }
-    Ok(files)
-}
-
-/// Whether a file's first bytes are those of a scan.
-fn holds_scan(path: &Path) -> bool {
-    let mut head = Vec::new();
-    let read = std::fs::File::open(path).and_then(|file| file.take(512).read_to_end(&mut head));
-    read.is_ok() && spmfile::looks_like_scan(&head)
-}
-
-/// Wildcards in the last part of a path, for shells that leave them alone.
-fn matching(path: &Path) -> Result<Vec<PathBuf>, String> {
-    let pattern = path
-        .file_name()
-        .map(|name| name.to_string_lossy().into_owned());
-    let Some(pattern) = pattern.filter(|p| p.contains(['*', '?'])) else {
-        return Err("no such file or folder".to_owned());
-    };
-    let pattern: Vec<char> = pattern.chars().collect();
-    let parent = match path.parent() {
-        Some(parent) if parent != Path::new("") => parent,
-        _ => Path::new("."),
-    };
-    let fits = |name: &str, _: &Path| fits(&pattern, &name.chars().collect::<Vec<_>>());
-    folder(parent, &fits, "no file fits this name")
-}
-
-/// `*` stands for any characters, `?` for one. Remembers the last star only: earlier ones never
-/// have to take more than they did.
-fn fits(pattern: &[char], name: &[char]) -> bool {
-    let (mut p, mut n) = (0, 0);
-    let mut star = None;
-    while n < name.len() {
-        match pattern.get(p) {
-            Some('*') => {
-                star = Some((p + 1, n));
-                p += 1;
-            }
-            Some(&c) if c == '?' || c == name[n] => {
-                p += 1;
-                n += 1;
-            }
-            _ => match star {
-                Some((after, taken)) => {
-                    star = Some((after, taken + 1));
-                    p = after;
-                    n = taken + 1;
-                }
-                None => return false,
-            },
-        }
-    }
-    pattern[p..].iter().all(|&c| c == '*')
 }
 
 #[cfg(test)]
@@ -584,27 +349,5 @@ mod tests {
         for wrong in ["", "3", "3;4", "-1,2", "1,2,3", "a,b"] {
             assert!(parse_pixel(wrong).is_err(), "{wrong}");
         }
-    }
-
-    #[test]
-    fn numbers_are_short() {
-        assert_eq!(short(70.0), "70");
-        assert_eq!(short(209.765_625), "209.766");
-        assert_eq!(short(-0.001_234_567_89), "-0.00123457");
-        assert_eq!(short(1e-9), "1.00000e-9");
-        assert_eq!(short(100_000.0), "100000");
-        assert_eq!(short(f64::NAN), "-");
-    }
-
-    #[test]
-    fn wildcards() {
-        let fit = |p: &str, n: &str| {
-            fits(
-                &p.chars().collect::<Vec<_>>(),
-                &n.chars().collect::<Vec<_>>(),
-            )
-        };
-        assert!(fit("*.spm", "scän 1.spm") && fit("a?c*", "abc") && fit("*a*b", "xaab"));
-        assert!(!fit("*.spm", "scan.000") && !fit("a?c", "ac") && !fit("", "a"));
     }
 }

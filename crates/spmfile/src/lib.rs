@@ -45,7 +45,7 @@ pub struct ChannelInfo {
 ///
 /// # Errors
 /// - The bytes are no scan, or one of a kind that is not read: the variant names it.
-/// - The file is damaged; what is whole comes with [`ReadError::Incomplete`].
+/// - The file is damaged; what lies within it comes with [`ReadError::Incomplete`].
 /// - No channel can be read.
 ///
 /// A channel that is merely scaled in an unknown way is no error: see [`Scan::unreadable`].
