@@ -282,14 +282,14 @@ fn image_list(lines: &mut Vec<String>, scan: &Scan, encoded: &Encoded<'_>, offse
     }
     push(format!(r"\Samps/line: {}", channel.columns));
     push(format!(r"\Number of lines: {}", channel.rows));
-    if let Some([fast, slow]) = scan.size_nm {
-        // Another ratio than 1:1 marks an unfinished frame.
-        match channel.height_nm {
-            Some(height) if full_lines(scan, channel) != channel.rows => {
-                push(format!(r"\Aspect Ratio: {}", height / fast));
-            }
-            _ => push(r"\Aspect Ratio: 1:1".to_owned()),
+    // Another ratio than 1:1 marks an unfinished frame.
+    match (channel.height_nm, scan.size_nm) {
+        (Some(height), Some([fast, _])) if full_lines(scan, channel) != channel.rows => {
+            push(format!(r"\Aspect Ratio: {}", height / fast));
         }
+        _ => push(r"\Aspect Ratio: 1:1".to_owned()),
+    }
+    if let Some([fast, slow]) = scan.size_nm {
         push(format!(r"\Scan Size: {fast} {slow} nm"));
     }
     let scan_line = channel.scan_line.as_deref().unwrap_or("Main");
