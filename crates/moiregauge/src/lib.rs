@@ -13,4 +13,5 @@ pub mod lattice;
 pub mod material;
 pub mod rng;
 pub mod settings;
+pub mod simulate;
 pub mod strain;

@@ -1,0 +1,331 @@
+//! One frame: the pattern, seen through drift, time and noise, as the instrument's channels.
+//!
+//! The phase of a harmonic along a line is a quadratic in the column, as time is linear in it and
+//! the drift quadratic in time. Its values follow from two complex multiplications per pixel.
+
+use nalgebra::{Complex, Vector2};
+use rand_distr::{Distribution, StandardNormal};
+use rayon::prelude::*;
+use spmfile::{Channel, LineDirection, Samples, Scan};
+
+use super::calendar::date_after;
+use super::raster::{FramePlan, PixelTime};
+use super::scene::{Harmonic, Scene};
+use super::{Drift, Simulation};
+use crate::rng;
+
+/// Full ranges of the detectors; a count is 2⁻³² of it.
+const COUNTS: f64 = 4_294_967_296.0;
+const PHASE_RANGE_DEG: f64 = 360.0;
+const AMPLITUDE_RANGE_MV: f64 = 4000.0;
+const X_SENSOR_RANGE_NM: f64 = 24.576 * 3410.089;
+const Y_SENSOR_RANGE_NM: f64 = 24.576 * 3641.009;
+
+/// The amplitude image: where the phase is high the amplitude is low.
+const MEAN_AMPLITUDE_MV: f64 = 180.0;
+const MV_PER_DEG: f64 = -2.5;
+
+/// The channels of one line direction, as counts.
+struct Line {
+    phase: Vec<i32>,
+    amplitude: Vec<i32>,
+    x: Vec<i32>,
+    y: Vec<i32>,
+}
+
+/// The motion of the sample in nm and s.
+#[derive(Clone, Copy)]
+struct Motion {
+    velocity: Vector2<f64>,
+    acceleration: Vector2<f64>,
+}
+
+impl Motion {
+    fn new(drift: &Drift) -> Self {
+        Self {
+            velocity: Vector2::from(drift.velocity_nm_per_min) / 60.0,
+            acceleration: Vector2::from(drift.acceleration_nm_per_min2) / 3600.0,
+        }
+    }
+
+    fn at(&self, time: f64) -> Vector2<f64> {
+        (self.velocity + self.acceleration * (time / 2.0)) * time
+    }
+}
+
+/// The frame as the instrument would have written it.
+pub(super) fn record(settings: &Simulation, scene: &Scene, plan: &FramePlan) -> Scan {
+    let raster = &settings.raster;
+    let mut directions = vec![LineDirection::Trace];
+    if raster.retrace {
+        directions.push(LineDirection::Retrace);
+    }
+    let lines: Vec<(LineDirection, Line)> = directions
+        .into_iter()
+        .map(|direction| (direction, record_line(settings, scene, plan, direction)))
+        .collect();
+
+    let mut phase = Vec::new();
+    let mut amplitude = Vec::new();
+    let mut x = Vec::new();
+    let mut y = Vec::new();
+    for (direction, line) in lines {
+        let channel = |name, internal, unit, range, counts| {
+            channel(settings, direction, [name, internal, unit], range, counts)
+        };
+        phase.push(channel(
+            "TR Phase",
+            "TRPhase",
+            "°",
+            PHASE_RANGE_DEG,
+            line.phase,
+        ));
+        amplitude.push(channel(
+            "TR Amplitude",
+            "TRAmplitude",
+            "mV",
+            AMPLITUDE_RANGE_MV,
+            line.amplitude,
+        ));
+        if raster.sensors {
+            x.push(channel(
+                "Xsensor",
+                "Xsensor",
+                "nm",
+                X_SENSOR_RANGE_NM,
+                line.x,
+            ));
+            y.push(channel(
+                "Ysensor",
+                "Ysensor",
+                "nm",
+                Y_SENSOR_RANGE_NM,
+                line.y,
+            ));
+        }
+    }
+    Scan {
+        format: "simulated".to_owned(),
+        instrument: Some("moiregauge simulator".to_owned()),
+        acquired: Some(date_after(plan.end)),
+        frame_direction: Some(plan.direction),
+        line_rate_hz: Some(raster.line_rate_hz),
+        rounding: Some(raster.rounding),
+        rotation_rad: raster.rotation_deg.to_radians(),
+        offset_nm: [0.0, 0.0],
+        size_nm: Some(raster.nominal_size_nm),
+        closed_loop: Some(false),
+        channels: [phase, amplitude, x, y].concat(),
+        unreadable: Vec::new(),
+    }
+}
+
+fn channel(
+    settings: &Simulation,
+    direction: LineDirection,
+    [name, internal_name, unit]: [&str; 3],
+    range: f64,
+    counts: Vec<i32>,
+) -> Channel {
+    let [columns, rows] = settings.raster.pixels;
+    let [width, height] = settings.raster.nominal_size_nm;
+    Channel {
+        name: name.to_owned(),
+        internal_name: internal_name.to_owned(),
+        unit: unit.to_owned(),
+        line_direction: Some(direction),
+        scan_line: Some("Main".to_owned()),
+        rows,
+        columns,
+        width_nm: Some(width),
+        height_nm: Some(height),
+        scale: range / COUNTS,
+        offset: 0.0,
+        scaling: format!("count × {range} {unit} / 2³²"),
+        plane_fit: None,
+        samples: Samples::I32(counts),
+    }
+}
+
+/// All channels of one line direction; lines in parallel, each with random numbers of its own.
+fn record_line(
+    settings: &Simulation,
+    scene: &Scene,
+    plan: &FramePlan,
+    direction: LineDirection,
+) -> Line {
+    let [columns, rows] = settings.raster.pixels;
+    let empty = || vec![0_i32; columns * rows];
+    let mut line = Line {
+        phase: empty(),
+        amplitude: empty(),
+        x: empty(),
+        y: empty(),
+    };
+    let offsets = line_offsets(settings, plan, direction);
+    let recorder = Recorder {
+        settings,
+        scene,
+        plan,
+        direction,
+        time: plan.time(direction),
+        motion: Motion::new(&settings.drift),
+    };
+    (
+        line.phase.par_chunks_mut(columns),
+        line.amplitude.par_chunks_mut(columns),
+        line.x.par_chunks_mut(columns),
+        line.y.par_chunks_mut(columns),
+    )
+        .into_par_iter()
+        .enumerate()
+        .for_each(|(row, (phase, amplitude, x, y))| {
+            recorder.image(row, offsets[row], phase, amplitude);
+            if settings.raster.sensors {
+                recorder.sensors(row, x, y);
+            }
+        });
+    line
+}
+
+/// What does not change from line to line.
+struct Recorder<'a> {
+    settings: &'a Simulation,
+    scene: &'a Scene,
+    plan: &'a FramePlan,
+    direction: LineDirection,
+    time: PixelTime,
+    motion: Motion,
+}
+
+impl Recorder<'_> {
+    fn image(&self, row: usize, offset: f64, phase: &mut [i32], amplitude: &mut [i32]) {
+        let [columns, rows] = self.settings.raster.pixels.map(|n| n as f64 - 1.0);
+        let noise = &self.settings.noise;
+        let mut pattern = vec![0.0; phase.len()];
+        for harmonic in &self.scene.harmonics {
+            self.add_harmonic(row, harmonic, &mut pattern);
+        }
+        let mut normal = normals(self.settings.seed, "image", self.plan, self.direction, row);
+        let slow = noise.plane_deg[1] * (row as f64 / rows - 0.5) + offset;
+        for (column, value) in pattern.iter().enumerate() {
+            let background = slow + noise.plane_deg[0] * (column as f64 / columns - 0.5);
+            let degrees = value + background + noise.pixel_deg * normal();
+            let millivolts =
+                MEAN_AMPLITUDE_MV + MV_PER_DEG * (value + background + noise.pixel_deg * normal());
+            phase[column] = count(degrees, PHASE_RANGE_DEG);
+            amplitude[column] = count(millivolts, AMPLITUDE_RANGE_MV);
+        }
+    }
+
+    /// Adds `A cos(G·(r − d(t)) + φ)` along a line: phase a + b c + g c² in the column c.
+    fn add_harmonic(&self, row: usize, harmonic: &Harmonic, pattern: &mut [f64]) {
+        let row = row as f64;
+        let step = self.plan.pixel_to_nm;
+        let start = self.plan.origin + step.column(1) * row;
+        let time = self.time.first + self.time.step.y * row;
+        let pixel = self.time.step.x;
+        let Motion {
+            velocity,
+            acceleration,
+        } = self.motion;
+        let wave = &harmonic.wave;
+
+        let constant = wave.dot(&(start - self.motion.at(time))) + harmonic.phase;
+        let speed = velocity + acceleration * time;
+        let linear = wave.dot(&(step.column(0) - speed * pixel));
+        let quadratic = -wave.dot(&acceleration) * pixel * pixel / 2.0;
+
+        let mut value = Complex::cis(constant) * harmonic.amplitude;
+        let mut turn = Complex::cis(linear + quadratic);
+        let further = Complex::cis(2.0 * quadratic);
+        for pixel in pattern {
+            *pixel += value.re;
+            value *= turn;
+            turn *= further;
+        }
+    }
+
+    fn sensors(&self, row: usize, x: &mut [i32], y: &mut [i32]) {
+        let sigma = self.settings.noise.sensor_nm;
+        let step = self.plan.pixel_to_nm;
+        let start = self.plan.origin + step.column(1) * row as f64;
+        let mut normal = normals(
+            self.settings.seed,
+            "sensors",
+            self.plan,
+            self.direction,
+            row,
+        );
+        for (column, (x, y)) in x.iter_mut().zip(y).enumerate() {
+            let position = start + step.column(0) * column as f64;
+            *x = count(position.x + sigma * normal(), X_SENSOR_RANGE_NM);
+            *y = count(position.y + sigma * normal(), Y_SENSOR_RANGE_NM);
+        }
+    }
+}
+
+/// Offset of every row: white noise, and noise with a 1/f spectrum over the time of the frame.
+fn line_offsets(settings: &Simulation, plan: &FramePlan, direction: LineDirection) -> Vec<f64> {
+    let rows = settings.raster.pixels[1];
+    let noise = &settings.noise;
+    let index = plan.index as u64;
+    // Trace and retrace take turns; both are drawn so that they share one slow fluctuation.
+    let flicker = flicker(rows * 2, settings.seed, index);
+    let own = match direction {
+        LineDirection::Trace => 0,
+        LineDirection::Retrace => 1,
+    };
+    let mut rng = rng::stream(settings.seed, "simulate lines", index * 2 + own);
+    let in_time: Vec<f64> = (0..rows)
+        .map(|line| {
+            let white: f64 = StandardNormal.sample(&mut rng);
+            noise.line_deg * white + noise.flicker_deg * flicker[2 * line + own as usize]
+        })
+        .collect();
+    match plan.direction {
+        spmfile::FrameDirection::Up => in_time,
+        spmfile::FrameDirection::Down => in_time.into_iter().rev().collect(),
+    }
+}
+
+/// Unit variance and a 1/f spectrum: a sum of relaxations whose times double.
+fn flicker(length: usize, seed: u64, index: u64) -> Vec<f64> {
+    let octaves = length.ilog2() + 1;
+    let weight = f64::from(octaves).sqrt().recip();
+    let mut sum = vec![0.0; length];
+    let mut rng = rng::stream(seed, "simulate flicker", index);
+    for octave in 0..octaves {
+        let memory = (-0.5_f64.powf(f64::from(octave))).exp();
+        let fresh = (1.0 - memory * memory).sqrt();
+        let mut state: f64 = StandardNormal.sample(&mut rng);
+        for value in &mut sum {
+            *value += weight * state;
+            let normal: f64 = StandardNormal.sample(&mut rng);
+            state = memory * state + fresh * normal;
+        }
+    }
+    sum
+}
+
+/// Normal deviates for one line of one detector.
+fn normals(
+    seed: u64,
+    detector: &str,
+    plan: &FramePlan,
+    direction: LineDirection,
+    row: usize,
+) -> impl FnMut() -> f64 {
+    let line = match direction {
+        LineDirection::Trace => "trace",
+        LineDirection::Retrace => "retrace",
+    };
+    let index = ((plan.index as u64) << 32) | row as u64;
+    let mut rng = rng::stream(seed, &format!("simulate {detector} {line}"), index);
+    move || StandardNormal.sample(&mut rng)
+}
+
+/// Nearest count; beyond the range the detector saturates.
+fn count(value: f64, range: f64) -> i32 {
+    (value * (COUNTS / range)).round() as i32
+}

@@ -1,0 +1,70 @@
+//! Twisted layers, a drifting sample and a noisy instrument → scans whose answer is known.
+//!
+//! In: [`Simulation`], every knob in the units of the laboratory. Out: [`spmfile::Scan`]s as an
+//! instrument would have recorded them, and a [`Truth`] to check an analysis against. The same
+//! settings give the same bytes on any number of threads.
+//!
+//! A feature of the sample at R is found at `R + d(t)`; a pixel at position r, recorded at time t,
+//! shows the sample at `r − d(t)`. Nothing is approximated: every pixel has its own time.
+
+mod calendar;
+mod error;
+mod frame;
+mod raster;
+mod scene;
+mod settings;
+mod truth;
+
+use spmfile::Scan;
+
+pub use error::SimulateError;
+pub use settings::{Drift, FirstDirection, Noise, Raster, Sample, Simulation, Window};
+pub use truth::{FrameTruth, Truth};
+
+use raster::FramePlan;
+use scene::Scene;
+
+/// A simulation whose settings have been checked, ready to record frames.
+#[derive(Clone, Debug)]
+pub struct Simulator {
+    settings: Simulation,
+    scene: Scene,
+}
+
+impl Simulator {
+    /// Checks the settings and lays out the sample.
+    ///
+    /// # Errors
+    /// [`SimulateError`] names the setting that makes no sense.
+    pub fn new(settings: Simulation) -> Result<Self, SimulateError> {
+        settings.check()?;
+        let scene = Scene::new(&settings.sample)?;
+        Ok(Self { settings, scene })
+    }
+
+    /// The settings.
+    pub fn settings(&self) -> &Simulation {
+        &self.settings
+    }
+
+    /// Number of frames.
+    pub fn frames(&self) -> usize {
+        self.settings.raster.scans
+    }
+
+    /// Frame `index` as the instrument would have written it.
+    pub fn frame(&self, index: usize) -> Scan {
+        let plan = FramePlan::new(&self.settings, index);
+        frame::record(&self.settings, &self.scene, &plan)
+    }
+
+    /// Everything needed to check an analysis of the frames.
+    pub fn truth(&self) -> Truth {
+        truth::truth(&self.settings, &self.scene)
+    }
+
+    /// The name of the file for frame `index`, as in `scan.003.spm`.
+    pub fn file_name(index: usize) -> String {
+        format!("scan.{index:03}.spm")
+    }
+}
