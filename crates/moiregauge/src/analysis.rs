@@ -199,6 +199,9 @@ pub struct LineAnalysis {
     pub sensor: LatticeVectors,
     /// The other estimator's vectors in sensor coordinates, nm, for comparison.
     pub comparison: Option<LatticeVectors>,
+    /// The published shortcut `4π/(√3|K|)` for the three first wave vectors, nm: right only for
+    /// undistorted hexagons, printed for comparison.
+    pub shortcut_wavelengths: Option<[f64; 3]>,
     /// Affine map pixel (column, row) → nm, the linear part.
     pub pixel_to_nm: Matrix2<f64>,
     /// Position of pixel (0, 0), nm.

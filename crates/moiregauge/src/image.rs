@@ -29,4 +29,17 @@ impl Image {
     pub fn row(&self, row: usize) -> &[f64] {
         &self.values[row * self.columns..(row + 1) * self.columns]
     }
+
+    /// The block of `size` (columns, rows) that starts at `first` (column, row).
+    ///
+    /// # Panics
+    /// If the block does not lie within the image.
+    #[must_use]
+    pub fn cropped(&self, first: [usize; 2], size: [usize; 2]) -> Self {
+        let values = (first[1]..first[1] + size[1])
+            .flat_map(|row| &self.row(row)[first[0]..first[0] + size[0]])
+            .copied()
+            .collect();
+        Self::new(size[1], size[0], values)
+    }
 }

@@ -12,6 +12,7 @@ pub mod image;
 pub mod lattice;
 pub mod material;
 pub mod rng;
+pub mod series;
 pub mod settings;
 pub mod simulate;
 pub mod strain;

@@ -141,7 +141,8 @@ pub fn common_lattice(
     covariance: &Matrix2<f64>,
 ) -> Result<(LatticeVectors, f64, usize), DriftError> {
     let weights = weights(observations)?;
-    let (mut normal, mut right, mut lever) = (Matrix4::zeros(), Vector4::zeros(), Matrix4x2::zeros());
+    let (mut normal, mut right, mut lever) =
+        (Matrix4::zeros(), Vector4::zeros(), Matrix4x2::zeros());
     for (observation, w) in observations.iter().zip(&weights) {
         let elapsed = observation.elapsed();
         normal += w;
@@ -186,13 +187,14 @@ fn least_squares(
     for (observation, w) in observations.iter().zip(weights) {
         let elapsed = observation.elapsed();
         let (wt, wr) = (w * elapsed, w * observation.lattice.flat());
-        let mut add = |r: usize, c: usize, block: &dyn Fn(usize, usize) -> f64, n: usize, m: usize| {
-            for i in 0..n {
-                for j in 0..m {
-                    normal[(r + i, c + j)] += block(i, j);
+        let mut add =
+            |r: usize, c: usize, block: &dyn Fn(usize, usize) -> f64, n: usize, m: usize| {
+                for i in 0..n {
+                    for j in 0..m {
+                        normal[(r + i, c + j)] += block(i, j);
+                    }
                 }
-            }
-        };
+            };
         let twt = elapsed.transpose() * wt;
         add(0, 0, &|i, j| w[(i, j)], 4, 4);
         add(0, 4, &|i, j| wt[(i, j)], 4, 2);
@@ -202,7 +204,9 @@ fn least_squares(
         right += Vector6::new(wr[0], wr[1], wr[2], wr[3], tr[0], tr[1]);
     }
     // Seconds and nanometres differ by orders of magnitude: scale before inverting.
-    let scale = normal.diagonal().map(|d| if d > 0.0 { 1.0 / d.sqrt() } else { 1.0 });
+    let scale = normal
+        .diagonal()
+        .map(|d| if d > 0.0 { 1.0 / d.sqrt() } else { 1.0 });
     let scaled = Matrix6::from_fn(|i, j| normal[(i, j)] * scale[i] * scale[j]);
     let inverse = scaled.cholesky()?.inverse();
     let covariance = Matrix6::from_fn(|i, j| inverse[(i, j)] * scale[i] * scale[j]);
@@ -246,7 +250,14 @@ fn rank_and_condition(observations: &[Observation]) -> (usize, f64) {
     let largest = values.max();
     let rank = values.iter().filter(|v| **v > 1e-9 * largest).count();
     let smallest = values.min();
-    (rank, if smallest > 0.0 { largest / smallest } else { f64::INFINITY })
+    (
+        rank,
+        if smallest > 0.0 {
+            largest / smallest
+        } else {
+            f64::INFINITY
+        },
+    )
 }
 
 #[cfg(test)]

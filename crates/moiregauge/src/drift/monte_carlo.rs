@@ -69,12 +69,7 @@ pub fn monte_carlo(
     })
 }
 
-fn perturb(
-    new: &mut Observation,
-    old: &Observation,
-    factor: &Matrix4<f64>,
-    rng: &mut ChaCha8Rng,
-) {
+fn perturb(new: &mut Observation, old: &Observation, factor: &Matrix4<f64>, rng: &mut ChaCha8Rng) {
     let mut normal = || -> f64 { StandardNormal.sample(rng) };
     let noise = Vector4::from_fn(|_, _| normal());
     let shift = factor * noise;

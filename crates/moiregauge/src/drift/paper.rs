@@ -66,7 +66,10 @@ pub fn pairwise_objective(scans: &[PaperScan], drift: &Vector2<f64>) -> f64 {
 /// The drift that minimises the pairwise objective, nm/s; `None` where it has no minimum.
 pub fn pairwise_drift(scans: &[PaperScan]) -> Option<Vector2<f64>> {
     let mut drift = Vector2::zeros();
-    let scale = scans.iter().map(|s| s.slow_velocity.abs()).fold(0.0, f64::max);
+    let scale = scans
+        .iter()
+        .map(|s| s.slow_velocity.abs())
+        .fold(0.0, f64::max);
     for _ in 0..20 {
         let base = deviations(scans, &drift)?;
         let step = 1e-5 * scale;
@@ -75,7 +78,13 @@ pub fn pairwise_drift(scans: &[PaperScan]) -> Option<Vector2<f64>> {
                 let mut moved = drift;
                 moved[axis] += step;
                 let changed = deviations(scans, &moved)?;
-                Some(changed.iter().zip(&base).map(|(a, b)| (a - b) / step).collect())
+                Some(
+                    changed
+                        .iter()
+                        .zip(&base)
+                        .map(|(a, b)| (a - b) / step)
+                        .collect(),
+                )
             })
             .collect::<Option<_>>()?;
         let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();

@@ -23,8 +23,16 @@ fn frame(n: usize, slow: Axis, shear: f64) -> Geometry {
 }
 
 fn gradient(slow: Axis, shear: f64, rate: f64, up: bool, trace: bool) -> Vector2<f64> {
-    let frame_direction = if up { FrameDirection::Up } else { FrameDirection::Down };
-    let line = if trace { LineDirection::Trace } else { LineDirection::Retrace };
+    let frame_direction = if up {
+        FrameDirection::Up
+    } else {
+        FrameDirection::Down
+    };
+    let line = if trace {
+        LineDirection::Trace
+    } else {
+        LineDirection::Retrace
+    };
     let timing = Timing::new(512, rate, 0.0, frame_direction, line).unwrap();
     frame(512, slow, shear).time_gradient(&timing).unwrap()
 }
@@ -67,7 +75,10 @@ fn drift_round_trip_for_all_directions() {
                     .map(|u| observation(observed(&lattice(), &u, &drift), u, 0.01))
                     .to_vec();
                 let solution = solve(&scans).unwrap();
-                assert!((solution.velocity - drift).norm() < 1e-9, "{slow:?} {trace} {first}");
+                assert!(
+                    (solution.velocity - drift).norm() < 1e-9,
+                    "{slow:?} {trace} {first}"
+                );
                 assert!((solution.lattice.basis - lattice()).norm() < 1e-7);
                 assert!(solution.chi2 < 1e-9 && solution.rank == 6);
                 let corrected = scans[0].corrected(&drift, &Matrix2::zeros());
@@ -85,8 +96,20 @@ fn exact_and_published_matrices() {
     let (lx, ly, f, n) = (54.7, 56.8, 8.0, 512.0);
     let (vf, vs) = (2.0 * ly * f, lx * f / n);
     for (sign, expected) in [
-        (1.0, [[1.009_448_561_91, 8.885_97e-6], [-0.002_755_830_56, 0.999_997_408_26]]),
-        (-1.0, [[0.990_726_677_21, 8.721_16e-6], [0.002_704_719_15, 0.999_997_456_33]]),
+        (
+            1.0,
+            [
+                [1.009_448_561_91, 8.885_97e-6],
+                [-0.002_755_830_56, 0.999_997_408_26],
+            ],
+        ),
+        (
+            -1.0,
+            [
+                [0.990_726_677_21, 8.721_16e-6],
+                [0.002_704_719_15, 0.999_997_456_33],
+            ],
+        ),
     ] {
         let u = Vector2::new(sign / vs, 1.0 / vf);
         let exact = observed(&Matrix2::identity(), &u, &drift);
@@ -102,7 +125,10 @@ fn exact_and_published_matrices() {
                 // The specification prints eleven decimals.
                 assert!((exact[(i, j)] - value).abs() < 2e-11, "{exact}");
                 let missing = if (i, j) == (0, 1) { *value } else { 0.0 };
-                assert!((published[(i, j)] + missing - value).abs() < 1e-7, "{published}");
+                assert!(
+                    (published[(i, j)] + missing - value).abs() < 1e-7,
+                    "{published}"
+                );
             }
         }
     }
@@ -155,33 +181,47 @@ fn drift_error_follows_the_table() {
         (0..n).map(|i| scan(Axis::Y, rate, i % 2 == 0)).collect()
     };
     let xy = [Axis::X, Axis::X, Axis::Y, Axis::Y];
-    let four: Vec<_> = xy.iter().enumerate().map(|(i, a)| scan(*a, 8.0, i % 2 == 0)).collect();
+    let four: Vec<_> = xy
+        .iter()
+        .enumerate()
+        .map(|(i, a)| scan(*a, 8.0, i % 2 == 0))
+        .collect();
     for (scans, expected) in [
         (alternating(2, 8.0), 0.22),
-        (vec![scan(Axis::Y, 8.0, true), scan(Axis::Y, 4.0, true)], 0.45),
-        (vec![scan(Axis::X, 8.0, true), scan(Axis::Y, 8.0, true)], 0.32),
+        (
+            vec![scan(Axis::Y, 8.0, true), scan(Axis::Y, 4.0, true)],
+            0.45,
+        ),
+        (
+            vec![scan(Axis::X, 8.0, true), scan(Axis::Y, 8.0, true)],
+            0.32,
+        ),
         (four, 0.16),
         (alternating(10, 8.0), 0.100),
         (alternating(6, 4.0), 0.064),
     ] {
         let found = sigma_of(&scans);
         // The table has two digits; its frame is 54.7 × 56.8 nm here, which is 2 % of 55 nm.
-        assert!((found / expected - 1.0).abs() < 0.05, "{found} for {expected}");
+        assert!(
+            (found / expected - 1.0).abs() < 0.05,
+            "{found} for {expected}"
+        );
     }
 }
 
 /// One direction only, or trace and retrace of one scan, do not determine the drift.
 #[test]
 fn undetermined_drift_is_refused() {
-    let scan = |up, trace| {
-        observation(lattice(), gradient(Axis::Y, 0.0, 8.0, up, trace), 0.1)
-    };
+    let scan = |up, trace| observation(lattice(), gradient(Axis::Y, 0.0, 8.0, up, trace), 0.1);
     for scans in [
         vec![scan(true, true)],
         vec![scan(true, true); 10],
         vec![scan(true, true), scan(true, false)],
     ] {
-        assert!(matches!(solve(&scans), Err(DriftError::Undetermined { .. })));
+        assert!(matches!(
+            solve(&scans),
+            Err(DriftError::Undetermined { .. })
+        ));
     }
 }
 

@@ -9,13 +9,15 @@ mod fourier;
 mod harmonics;
 mod noise;
 mod paper;
+mod pictures;
 pub(crate) mod reciprocal;
 mod select;
 mod transform;
-mod vectors;
+pub(crate) mod vectors;
 
 use nalgebra::{Matrix2, Vector2};
 
+pub(crate) use pictures::pictures;
 pub use vectors::LatticeVectors;
 
 use crate::background::remove_background;

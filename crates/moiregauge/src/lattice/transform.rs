@@ -41,9 +41,12 @@ impl Spectrum {
 
     /// The same without a window: every pixel weighs the same.
     pub(crate) fn unwindowed(image: &Image) -> Self {
-        Self::on_grid(image, padded(2 * image.rows), padded(2 * image.columns), |n| {
-            vec![1.0; n]
-        })
+        Self::on_grid(
+            image,
+            padded(2 * image.rows),
+            padded(2 * image.columns),
+            |n| vec![1.0; n],
+        )
     }
 
     /// The same without padding: frequencies are whole cycles per frame.
@@ -319,7 +322,11 @@ mod tests {
         let values = (0..rows * columns)
             .map(|i| {
                 let v: f64 = rng.random();
-                if missing && i % 5 == 2 { f64::NAN } else { v - 0.5 }
+                if missing && i % 5 == 2 {
+                    f64::NAN
+                } else {
+                    v - 0.5
+                }
             })
             .collect();
         Image::new(rows, columns, values)
@@ -327,12 +334,20 @@ mod tests {
 
     /// `Σ w(n) w(n+d) I(n) I(n+d) / Σ w(n) w(n+d)` over pixels that are there, by its definition;
     /// without the division where `summed`.
-    fn by_definition(image: &Image, window: fn(usize) -> Vec<f64>, d: [i64; 2], summed: bool) -> f64 {
+    fn by_definition(
+        image: &Image,
+        window: fn(usize) -> Vec<f64>,
+        d: [i64; 2],
+        summed: bool,
+    ) -> f64 {
         let (wx, wy) = (window(image.columns), window(image.rows));
         let at = |x: i64, y: i64| {
-            let inside = (0..image.columns as i64).contains(&x) && (0..image.rows as i64).contains(&y);
+            let inside =
+                (0..image.columns as i64).contains(&x) && (0..image.rows as i64).contains(&y);
             let value = inside.then(|| image.row(y as usize)[x as usize])?;
-            value.is_finite().then(|| (value, wx[x as usize] * wy[y as usize]))
+            value
+                .is_finite()
+                .then(|| (value, wx[x as usize] * wy[y as usize]))
         };
         let (mut sum, mut weight) = (0.0, 0.0);
         for y in 0..image.rows as i64 {
@@ -358,7 +373,10 @@ mod tests {
                 let close = |a: f64, b: f64| assert!((a - b).abs() < 1e-11, "{d:?}: {a} {b}");
                 let at = |ac: &Autocorrelation| ac.at(d[0], d[1]).unwrap();
                 close(at(&normalised), by_definition(&image, hann, d, false));
-                close(at(&summed), by_definition(&image, |n| vec![1.0; n], d, true));
+                close(
+                    at(&summed),
+                    by_definition(&image, |n| vec![1.0; n], d, true),
+                );
             }
         }
     }

@@ -1,0 +1,75 @@
+//! Which channel shows the moiré.
+
+/// Channels in which moirés are usually seen, best first.
+const USUAL: [&str; 12] = [
+    "TR Phase",
+    "TR Amplitude",
+    "Phase",
+    "Amplitude",
+    "Friction",
+    "Lateral Deflection",
+    "Current",
+    "Adhesion",
+    "Amplitude Error",
+    "Height Sensor",
+    "Height",
+    "Z",
+];
+
+/// The channel to analyse: the one asked for, or the first usual one, or the first that is no
+/// position sensor. `None` where there is no such channel.
+///
+/// `channels` are pairs of the name the user sees and the instrument's own. Case, spaces and
+/// underscores do not count. Returns the name the user sees.
+pub fn choose_channel<'a>(
+    channels: impl Iterator<Item = (&'a str, &'a str)> + Clone,
+    wanted: Option<&str>,
+) -> Option<&'a str> {
+    let find = |wanted: &str| {
+        let wanted = plain(wanted);
+        channels
+            .clone()
+            .find(|(name, internal)| plain(name) == wanted || plain(internal) == wanted)
+            .map(|(name, _)| name)
+    };
+    match wanted {
+        Some(wanted) => find(wanted),
+        None => USUAL.iter().find_map(|name| find(name)).or_else(|| {
+            channels
+                .clone()
+                .find(|(name, internal)| spmfile::sensor_axis(name, internal).is_none())
+                .map(|(name, _)| name)
+        }),
+    }
+}
+
+/// Lower case, letters and digits only.
+pub(super) fn plain(name: &str) -> String {
+    name.chars()
+        .filter(|c| c.is_alphanumeric())
+        .flat_map(char::to_lowercase)
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const CHANNELS: [(&str, &str); 4] = [
+        ("X Sensor", "Xsensor"),
+        ("Height Sensor", "ZSensor"),
+        ("TR Amplitude", "TRAmplitude"),
+        ("TR Phase", "TRPhase"),
+    ];
+
+    #[test]
+    fn names_are_found_in_any_spelling() {
+        let choose = |wanted| choose_channel(CHANNELS.into_iter(), wanted);
+        assert_eq!(choose(None), Some("TR Phase"));
+        assert_eq!(choose(Some("tr_amplitude")), Some("TR Amplitude"));
+        assert_eq!(choose(Some("zsensor")), Some("Height Sensor"));
+        assert_eq!(choose(Some("Current")), None);
+        let odd = [("Xsensor", ""), ("Deflection μ", "")];
+        assert_eq!(choose_channel(odd.into_iter(), None), Some("Deflection μ"));
+    }
+}

@@ -1,0 +1,128 @@
+//! All sets taken together, and how well they agree.
+
+use nalgebra::{Matrix4, Vector2, Vector4};
+
+use crate::analysis::{Combined, Consistency, SetAnalysis, SetMean};
+use crate::caveat::Caveat;
+use crate::lattice::LatticeVectors;
+use crate::settings::Settings;
+use crate::strain::twist_strain;
+
+/// Wavelengths that differ by more than this are not of the same lattice.
+const SAME_LATTICE: f64 = 0.05;
+/// Sets this many σ apart deserve a word.
+const APART: f64 = 3.0;
+
+/// Weighted mean lattice of all sets that have one; `None` where there is none, or where the sets
+/// show different lattices.
+pub(super) fn combine(
+    sets: &[SetAnalysis],
+    settings: &Settings,
+    caveats: &mut Vec<Caveat>,
+) -> Option<Combined> {
+    let means: Vec<&SetMean> = sets.iter().filter_map(|s| s.mean.as_ref()).collect();
+    let first = means.first()?;
+    let different = means.iter().any(|m| {
+        (m.lattice.basis - first.lattice.basis).norm() > SAME_LATTICE * first.lattice.basis.norm()
+    });
+    if different {
+        caveats.push(Caveat::new(
+            "different-lattices",
+            "analysis",
+            "the sets show lattices that differ by more than 5 %: they are not of the same place or \
+             sample, and are not combined",
+        ));
+        return None;
+    }
+    let lattice = weighted_mean(&means)?;
+    let consistency = consistency(sets);
+    for pair in &consistency {
+        let drift = pair.drift_sigmas.unwrap_or(0.0);
+        if drift.max(pair.twist_sigmas).max(pair.strain_sigmas) > APART {
+            caveats.push(Caveat::new(
+                "sets-disagree",
+                pair.sets.join(" / "),
+                format!(
+                    "the sets disagree: drift {drift:.1} σ, twist {:.1} σ, strain {:.1} σ apart; a drift \
+                     that changes in time or a scanner whose axes differ would do this; the errors of \
+                     the combined values are enlarged to match",
+                    pair.twist_sigmas, pair.strain_sigmas
+                ),
+            ));
+        }
+    }
+    let twist_strain = twist_strain(&lattice, &settings.material, settings.strain_convention).ok()?;
+    Some(Combined {
+        lattice,
+        twist_strain,
+        consistency,
+    })
+}
+
+/// Generalised mean of the four components, its covariance enlarged where the sets scatter.
+fn weighted_mean(means: &[&SetMean]) -> Option<LatticeVectors> {
+    let (mut normal, mut right) = (Matrix4::zeros(), Vector4::zeros());
+    let mut weights = Vec::with_capacity(means.len());
+    for mean in means {
+        let w = mean.lattice.covariance.try_inverse()?;
+        normal += w;
+        right += w * mean.lattice.flat();
+        weights.push(w);
+    }
+    let covariance = normal.try_inverse()?;
+    let flat = covariance * right;
+    let chi2: f64 = means
+        .iter()
+        .zip(&weights)
+        .map(|(mean, w)| {
+            let d = mean.lattice.flat() - flat;
+            (d.transpose() * w * d)[0]
+        })
+        .sum();
+    let freedom = 4 * (means.len() - 1);
+    let scale = if freedom > 0 {
+        (chi2 / freedom as f64).max(1.0)
+    } else {
+        1.0
+    };
+    Some(LatticeVectors {
+        basis: nalgebra::Matrix2::new(flat[0], flat[2], flat[1], flat[3]),
+        covariance: covariance * scale,
+    })
+}
+
+fn consistency(sets: &[SetAnalysis]) -> Vec<Consistency> {
+    let mut all = Vec::new();
+    for (i, a) in sets.iter().enumerate() {
+        for b in &sets[i + 1..] {
+            let (Some(ma), Some(mb)) = (&a.mean, &b.mean) else {
+                continue;
+            };
+            let (ta, tb) = (&ma.twist_strain, &mb.twist_strain);
+            let twist = ta.twist() .value - tb.twist().value;
+            let drift_sigmas = match (&a.drift, &b.drift) {
+                (Some(da), Some(db)) if !da.given && !db.given => {
+                    sigmas(&(da.velocity - db.velocity), &(da.covariance + db.covariance))
+                }
+                _ => None,
+            };
+            let strain = sigmas(
+                &(ta.strain_vector - tb.strain_vector),
+                &(ta.strain_covariance() + tb.strain_covariance()),
+            );
+            all.push(Consistency {
+                sets: [a.name.clone(), b.name.clone()],
+                drift_sigmas,
+                twist_sigmas: twist.abs() / ta.twist().sigma.hypot(tb.twist().sigma),
+                strain_sigmas: strain.unwrap_or(f64::INFINITY),
+            });
+        }
+    }
+    all
+}
+
+/// `√(dᵀ C⁻¹ d)`.
+fn sigmas(d: &Vector2<f64>, covariance: &nalgebra::Matrix2<f64>) -> Option<f64> {
+    let inverse = covariance.try_inverse()?;
+    Some((d.transpose() * inverse * d)[0].max(0.0).sqrt())
+}

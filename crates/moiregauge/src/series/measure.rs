@@ -1,0 +1,446 @@
+//! One scan: geometry, timing and lattice of each of its lines, trace and retrace.
+
+use nalgebra::{Matrix2, Vector2};
+use spmfile::{Channel, DateTime, FrameDirection, LineDirection, Scan};
+
+use super::channel::{choose_channel, plain};
+use super::overlap::Window;
+use crate::caveat::Caveat;
+use crate::drift::Observation;
+use crate::estimate::Estimate;
+use crate::geometry::{Geometry, SensorGeometry, Timing, from_sensors, mean_and_spread};
+use crate::image::Image;
+use crate::lattice::{LatticeError, LatticeVectors, MeasuredLattice, measure, vectors};
+use crate::settings::{Lines, Settings};
+
+/// A sensor whose span differs from the nominal size by more than this factor is not believed.
+const WILD_SPAN: f64 = 2.0;
+/// Fewer periods than this across the shorter side deserve a warning.
+const FEW_PERIODS: f64 = 3.0;
+
+/// What the pixels of one scan gave.
+#[derive(Clone, Debug)]
+pub struct MeasuredScan {
+    /// The file as the user named it.
+    pub file: String,
+    /// When it was saved, by the instrument's clock.
+    pub acquired: Option<DateTime>,
+    /// Sense of the slow motion.
+    pub frame_direction: Option<FrameDirection>,
+    /// Lines per second.
+    pub line_rate_hz: Option<f64>,
+    /// Name of the analysed channel.
+    pub channel: String,
+    /// Nominal size (fast, slow), nm.
+    pub size_nm: Option<[f64; 2]>,
+    /// One entry for each line direction that was used.
+    pub lines: Vec<MeasuredLine>,
+    /// Doubts about this scan.
+    pub caveats: Vec<Caveat>,
+}
+
+/// What the trace or the retrace of one scan gave.
+#[derive(Clone, Debug)]
+pub struct MeasuredLine {
+    /// Trace or retrace.
+    pub line: LineDirection,
+    /// Where the pixels were.
+    pub geometry: Geometry,
+    /// Where they should have been.
+    pub nominal: Option<Geometry>,
+    /// When they were recorded; `None` where the file does not tell.
+    pub timing: Option<Timing>,
+    /// The lattice in pixels.
+    pub lattice: MeasuredLattice,
+    /// Tip speeds along the fast and slow axes, nm/s; σ is the spread over the lines. NaN without timing.
+    pub speeds: [Estimate; 2],
+    /// Relative standard error of the mean speeds.
+    pub speed_error: [f64; 2],
+}
+
+/// Why a scan cannot be measured.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum MeasureError {
+    /// The channel is not there.
+    #[error("no channel {wanted:?}; the file has {present}")]
+    NoChannel {
+        /// What was asked for.
+        wanted: String,
+        /// The channels that are there.
+        present: String,
+    },
+    /// The line direction is not there.
+    #[error("channel {channel:?} has no {wanted} lines, only {present}")]
+    NoLine {
+        /// The channel.
+        channel: String,
+        /// What was asked for.
+        wanted: &'static str,
+        /// What is there.
+        present: &'static str,
+    },
+    /// No size.
+    #[error("the file gives neither position sensors nor a scan size")]
+    NoSize,
+    /// Nothing is left of the frame.
+    #[error("the scans have no region in common: this one lies outside the others")]
+    NoOverlap,
+    /// The image shows no lattice.
+    #[error("{line} of {channel:?}: {error}")]
+    Lattice {
+        /// Trace or retrace.
+        line: &'static str,
+        /// The channel.
+        channel: String,
+        /// Why.
+        error: LatticeError,
+    },
+}
+
+impl MeasuredLine {
+    /// The lattice in sensor coordinates, nm, with the error of the plane fit.
+    pub fn in_sensor_coordinates(&self) -> LatticeVectors {
+        let pixels = &self.lattice.pixels;
+        let mut mapped = pixels.mapped(&self.geometry.pixel_to_nm);
+        // r_i = J a_i, so δr_i = (a_ix I, a_iy I) δ(J₁₁, J₂₁, J₁₂, J₂₂).
+        let b = &pixels.basis;
+        let i = Matrix2::identity();
+        let lever = vectors::block(&(i * b.m11), &(i * b.m21), &(i * b.m12), &(i * b.m22));
+        mapped.covariance += lever * self.geometry.covariance * lever.transpose();
+        mapped
+    }
+
+    /// The lattice in nominal coordinates, nm.
+    pub fn in_nominal_coordinates(&self) -> Option<LatticeVectors> {
+        let nominal = self.nominal.as_ref()?;
+        Some(self.lattice.pixels.mapped(&nominal.pixel_to_nm))
+    }
+
+    /// What the drift problem needs; `None` without timing.
+    pub(super) fn observation(&self, labelled: LatticeVectors) -> Option<Observation> {
+        Some(Observation {
+            lattice: labelled,
+            time_gradient: self.geometry.time_gradient(&self.timing?)?,
+            speed_error: self.speed_error,
+        })
+    }
+}
+
+/// Measures one scan, restricted to the window if one is given.
+///
+/// # Errors
+/// [`MeasureError`] says what the file lacks, or that its image shows no lattice. With both line
+/// directions asked for, one of them is enough.
+pub fn measure_scan(
+    file: &str,
+    scan: &Scan,
+    settings: &Settings,
+    window: Option<&Window>,
+) -> Result<MeasuredScan, MeasureError> {
+    let channels = channels(scan, settings)?;
+    let mut caveats = Vec::new();
+    let mut lines = Vec::new();
+    let mut failures = Vec::new();
+    for channel in &channels {
+        match measure_line(file, scan, channel, settings, window, &mut caveats) {
+            Ok(line) => lines.push(line),
+            Err(error) => failures.push(error),
+        }
+    }
+    if lines.is_empty() {
+        return Err(failures.swap_remove(0));
+    }
+    for error in failures {
+        caveats.push(Caveat::new(
+            "line-left-out",
+            file,
+            format!("one line direction could not be used: {error}"),
+        ));
+    }
+    caveats.dedup_by(|a, b| (&a.code, &a.message) == (&b.code, &b.message));
+    Ok(MeasuredScan {
+        file: file.to_owned(),
+        acquired: scan.acquired,
+        frame_direction: scan.frame_direction,
+        line_rate_hz: scan.line_rate_hz,
+        channel: channels[0].name.clone(),
+        size_nm: scan.size_nm,
+        lines,
+        caveats,
+    })
+}
+
+/// The images to measure: the chosen channel in the chosen line directions, main scan line first.
+pub(super) fn channels<'a>(
+    scan: &'a Scan,
+    settings: &Settings,
+) -> Result<Vec<&'a Channel>, MeasureError> {
+    let names = scan
+        .channels
+        .iter()
+        .map(|c| (c.name.as_str(), c.internal_name.as_str()));
+    let Some(name) = choose_channel(names.clone(), settings.channel.as_deref()) else {
+        let mut present: Vec<&str> = names.map(|(name, _)| name).collect();
+        present.dedup();
+        return Err(MeasureError::NoChannel {
+            wanted: settings.channel.clone().unwrap_or_default(),
+            present: present.join(", "),
+        });
+    };
+    let same = |c: &&Channel| plain(&c.name) == plain(name);
+    let direction = |c: &Channel| c.line_direction.unwrap_or(LineDirection::Trace);
+    let first = |wanted: LineDirection| {
+        let mut found = scan
+            .channels
+            .iter()
+            .filter(same)
+            .filter(|c| direction(c) == wanted);
+        let main = |c: &&Channel| c.scan_line.as_deref().is_none_or(|s| s == "Main");
+        found.clone().find(main).or_else(|| found.next())
+    };
+    let (trace, retrace) = (first(LineDirection::Trace), first(LineDirection::Retrace));
+    let lacking = |wanted, present| MeasureError::NoLine {
+        channel: name.to_owned(),
+        wanted,
+        present,
+    };
+    let chosen = match settings.line {
+        Lines::Trace => vec![trace.ok_or(lacking("trace", "retrace"))?],
+        Lines::Retrace => vec![retrace.ok_or(lacking("retrace", "trace"))?],
+        Lines::Both => trace.into_iter().chain(retrace).collect(),
+    };
+    Ok(chosen)
+}
+
+fn measure_line(
+    file: &str,
+    scan: &Scan,
+    channel: &Channel,
+    settings: &Settings,
+    window: Option<&Window>,
+    caveats: &mut Vec<Caveat>,
+) -> Result<MeasuredLine, MeasureError> {
+    let line = channel.line_direction.unwrap_or(LineDirection::Trace);
+    let nominal = nominal(scan, channel);
+    let sensors = usable_sensors(file, scan, channel, nominal.as_ref(), caveats);
+    let timing = match (scan.line_rate_hz, scan.frame_direction) {
+        (Some(rate), Some(frame)) => {
+            Timing::new(channel.columns, rate, scan.rounding.unwrap_or(0.0), frame, line)
+        }
+        _ => None,
+    };
+    let geometry = match (&sensors, &nominal) {
+        (Some(sensors), _) => sensors.geometry.clone(),
+        (None, Some(nominal)) => nominal.clone(),
+        (None, None) => return Err(MeasureError::NoSize),
+    };
+    let (speeds, speed_error) = speeds(&geometry, sensors.as_ref(), timing.as_ref());
+    let mut image = image_of(channel);
+    let (mut geometry, mut nominal) = (geometry, nominal);
+    if let Some(window) = window {
+        let (first, size) = window.pixels(&geometry).ok_or(MeasureError::NoOverlap)?;
+        image = image.cropped(first, size);
+        geometry = geometry.cropped(first, size);
+        nominal = nominal.map(|n| n.cropped(first, size));
+    }
+    let lattice = measure(&image, &geometry, settings.background, settings.method).map_err(
+        |error| MeasureError::Lattice {
+            line: line_name(line),
+            channel: channel.name.clone(),
+            error,
+        },
+    )?;
+    if lattice.periods < FEW_PERIODS {
+        caveats.push(Caveat::new(
+            "few-periods",
+            file,
+            format!(
+                "only {:.1} lattice periods fit across the frame; vectors from fewer than {FEW_PERIODS} \
+                 are less accurate than their errors say",
+                lattice.periods
+            ),
+        ));
+    }
+    Ok(MeasuredLine {
+        line,
+        geometry,
+        nominal,
+        timing,
+        lattice,
+        speeds,
+        speed_error,
+    })
+}
+
+/// `trace` or `retrace`.
+fn line_name(line: LineDirection) -> &'static str {
+    match line {
+        LineDirection::Trace => "trace",
+        LineDirection::Retrace => "retrace",
+    }
+}
+
+/// The values of a channel as an image.
+pub(super) fn image_of(channel: &Channel) -> Image {
+    Image::new(channel.rows, channel.columns, channel.values())
+}
+
+pub(super) fn nominal(scan: &Scan, channel: &Channel) -> Option<Geometry> {
+    Geometry::nominal(
+        [channel.columns, channel.rows],
+        channel.width_nm?,
+        channel.height_nm?,
+        scan.rotation_rad,
+        Vector2::from(scan.offset_nm),
+    )
+}
+
+/// The sensors of this line direction as images in nm; `None` where they are absent or levelled.
+pub(super) fn sensor_images(
+    file: &str,
+    scan: &Scan,
+    channel: &Channel,
+    caveats: &mut Vec<Caveat>,
+) -> Option<[Image; 2]> {
+    let line = channel.line_direction.unwrap_or(LineDirection::Trace);
+    let other = match line {
+        LineDirection::Trace => LineDirection::Retrace,
+        LineDirection::Retrace => LineDirection::Trace,
+    };
+    let found = match spmfile::position_sensors(scan, line) {
+        Ok(sensors) => Ok(sensors),
+        Err(problem) => spmfile::position_sensors(scan, other)
+            .inspect(|_| {
+                caveats.push(Caveat::new(
+                    "sensors-of-other-line",
+                    file,
+                    format!(
+                        "the {} image has no position sensors of its own; those of the {} are used",
+                        line_name(line),
+                        line_name(other)
+                    ),
+                ));
+            })
+            .map_err(|_| problem),
+    };
+    let sensors = match found {
+        Ok(sensors) => sensors,
+        Err(problem) => {
+            caveats.push(Caveat::new(
+                "no-position-sensors",
+                file,
+                format!(
+                    "{problem}: nominal coordinates are used; scanner calibration errors (often 1 % \
+                     and more) go into lengths, twist and strain in full"
+                ),
+            ));
+            return None;
+        }
+    };
+    for sensor in [sensors.x, sensors.y] {
+        if let Some(fit) = &sensor.plane_fit {
+            caveats.push(Caveat::new(
+                "sensor-plane-fitted",
+                file,
+                format!(
+                    "the instrument subtracted a fit ({fit}) from {:?}, so it no longer tells positions; \
+                     nominal coordinates are used",
+                    sensor.name
+                ),
+            ));
+            return None;
+        }
+    }
+    let in_nm = |c: &Channel| {
+        let factor = spmfile::nm_per(&c.unit).unwrap_or(f64::NAN);
+        let mut image = image_of(c);
+        for v in &mut image.values {
+            *v *= factor;
+        }
+        image
+    };
+    Some([in_nm(sensors.x), in_nm(sensors.y)])
+}
+
+/// The geometry by the sensors, if there are any that can be believed; else a caveat.
+pub(super) fn usable_sensors(
+    file: &str,
+    scan: &Scan,
+    channel: &Channel,
+    nominal: Option<&Geometry>,
+    caveats: &mut Vec<Caveat>,
+) -> Option<SensorGeometry> {
+    let [x, y] = sensor_images(file, scan, channel, caveats)?;
+    if (x.rows, x.columns) != (channel.rows, channel.columns) {
+        caveats.push(Caveat::new(
+            "sensor-shape",
+            file,
+            format!(
+                "the position sensors have {} × {} pixels, {:?} has {} × {}; nominal coordinates are used",
+                x.columns, x.rows, channel.name, channel.columns, channel.rows
+            ),
+        ));
+        return None;
+    }
+    let Some(sensors) = from_sensors(&x, &y) else {
+        caveats.push(Caveat::new(
+            "sensors-flat",
+            file,
+            "the position sensors do not span an area (constant, missing, or along one line); nominal \
+             coordinates are used",
+        ));
+        return None;
+    };
+    if let Some(nominal) = nominal {
+        let (measured, intended) = (sensors.geometry.extent(), nominal.extent());
+        let ratios = [measured[0] / intended[0], measured[1] / intended[1]];
+        if ratios.iter().any(|r| !(1.0 / WILD_SPAN..=WILD_SPAN).contains(r)) {
+            caveats.push(Caveat::new(
+                "sensor-span",
+                file,
+                format!(
+                    "the sensors span {:.1} × {:.1} nm where the scan size is {:.1} × {:.1} nm; their \
+                     calibration cannot be right and nominal coordinates are used",
+                    measured[0], measured[1], intended[0], intended[1]
+                ),
+            ));
+            return None;
+        }
+    }
+    if sensors.geometry.pixel_to_nm.determinant() < 0.0 {
+        caveats.push(Caveat::new(
+            "sensors-mirrored",
+            file,
+            "the sensors describe a mirrored frame: one of them has the wrong sign; the signs of twist \
+             and strain axis follow the sensors",
+        ));
+    }
+    Some(sensors)
+}
+
+/// Tip speeds with their spread, and the relative error of their means.
+fn speeds(
+    geometry: &Geometry,
+    sensors: Option<&SensorGeometry>,
+    timing: Option<&Timing>,
+) -> ([Estimate; 2], [f64; 2]) {
+    let unknown = Estimate::new(f64::NAN, f64::NAN);
+    let Some(timing) = timing else {
+        return ([unknown; 2], [0.0; 2]);
+    };
+    let plain = geometry.speeds(timing);
+    let Some(sensors) = sensors else {
+        return (plain.map(|v| Estimate::new(v, 0.0)), [0.0; 2]);
+    };
+    let of = |axis: usize, steps: &[f64]| {
+        let spread = mean_and_spread(steps).sigma;
+        let step = [geometry.fast_step(), geometry.slow_step()][axis].norm();
+        let relative = if spread.is_finite() { spread / step } else { 0.0 };
+        let speed = Estimate::new(plain[axis], plain[axis] * relative);
+        (speed, relative / (steps.len().max(1) as f64).sqrt())
+    };
+    let (fast, fast_error) = of(0, &sensors.fast_steps);
+    let (slow, slow_error) = of(1, &sensors.slow_steps);
+    ([fast, slow], [fast_error, slow_error])
+}

@@ -1,0 +1,388 @@
+//! One set: drift, and every scan before and after correction.
+
+use nalgebra::{Matrix2, Matrix4, Vector2};
+use rayon::prelude::*;
+use spmfile::FrameDirection;
+
+use super::group::Group;
+use super::measure::{MeasuredLine, MeasuredScan};
+use crate::analysis::{
+    Axis, Drift, DriftFit, LineAnalysis, ScanAnalysis, SetAnalysis, SetMean,
+};
+use crate::caveat::Caveat;
+use crate::drift::paper::{PaperScan, pairwise_drift};
+use crate::drift::{Observation, common_lattice, monte_carlo, solve};
+use crate::estimate::Estimate;
+use crate::geometry::mean_and_spread;
+use crate::lattice::LatticeVectors;
+use crate::lattice::reciprocal::{labelled_like, real_from_reciprocal};
+use crate::settings::{GivenDrift, Settings};
+use crate::strain::{TwistStrain, draws, twist_strain};
+
+/// nm/min → nm/s.
+const PER_MINUTE: f64 = 1.0 / 60.0;
+/// χ²/dof beyond which the scatter of the scans deserves a word.
+const LARGE_CHI2: f64 = 2.0;
+
+/// Everything about one set but its illustration. `first_index` numbers its scans for the draws.
+pub(super) fn analyse_set(
+    group: Group,
+    reference: &Matrix2<f64>,
+    settings: &Settings,
+    first_index: u64,
+    caveats: &mut Vec<Caveat>,
+) -> SetAnalysis {
+    let observations: Vec<Vec<Observation>> = group
+        .scans
+        .iter()
+        .map(|scan| observations(scan, reference))
+        .collect();
+    let all: Vec<Observation> = observations.concat();
+    let timed = group
+        .scans
+        .iter()
+        .all(|s| s.lines.iter().all(|l| l.timing.is_some()));
+    let solved = drift(&group, &all, timed, settings, caveats);
+    let mut scans: Vec<ScanAnalysis> = group
+        .scans
+        .iter()
+        .zip(&observations)
+        .filter_map(|(scan, seen)| scan_analysis(scan, seen, reference, solved.as_ref(), settings))
+        .collect();
+    let material = &settings.material;
+    let convention = settings.strain_convention;
+    scans.par_iter_mut().enumerate().for_each(|(i, scan)| {
+        let lattice = scan.drift_corrected.as_ref().unwrap_or(&scan.sensor);
+        let index = first_index + i as u64;
+        scan.draws = draws(
+            lattice,
+            material,
+            convention,
+            settings.strain_draws,
+            settings.seed,
+            index,
+        );
+    });
+    let uncorrected = common_lattice(&all, &Vector2::zeros(), &Matrix2::zeros())
+        .ok()
+        .and_then(|common| {
+            let of = |s: &ScanAnalysis| (s.twist_strain_sensor, s.sensor);
+            set_mean(common, scans.iter().map(of), settings)
+        });
+    let mean = solved.as_ref().and_then(|s| {
+        let of = |s: &ScanAnalysis| (s.twist_strain, s.drift_corrected.unwrap_or(s.sensor));
+        set_mean((s.lattice, s.chi2, s.freedom), scans.iter().map(of), settings)
+    });
+    let drift = solved.map(|s| s.drift);
+    about_mean(&group.name, mean.as_ref(), caveats);
+    SetAnalysis {
+        name: group.name,
+        slow_axis: group.slow_axis,
+        line_rate_hz: group.line_rate_hz,
+        channel: group.channel,
+        forward_backward: forward_backward(&scans, settings),
+        scans,
+        drift,
+        mean,
+        uncorrected,
+        illustration: None,
+    }
+}
+
+/// The drift of a set and the lattice that goes with it.
+struct Solved {
+    drift: Drift,
+    lattice: LatticeVectors,
+    chi2: f64,
+    freedom: usize,
+}
+
+fn observations(scan: &MeasuredScan, reference: &Matrix2<f64>) -> Vec<Observation> {
+    scan.lines
+        .iter()
+        .map(|line| {
+            let lattice = labelled_like(&line.in_sensor_coordinates(), reference);
+            line.observation(lattice).unwrap_or(Observation {
+                lattice,
+                time_gradient: Vector2::zeros(),
+                speed_error: [0.0; 2],
+            })
+        })
+        .collect()
+}
+
+fn drift(
+    group: &Group,
+    all: &[Observation],
+    timed: bool,
+    settings: &Settings,
+    caveats: &mut Vec<Caveat>,
+) -> Option<Solved> {
+    if !timed {
+        caveats.push(Caveat::new(
+            "no-timing",
+            &group.name,
+            "not every file tells its line rate and frame direction: nothing is corrected for drift",
+        ));
+        return None;
+    }
+    if let Some(given) = settings.drift {
+        return given_drift(group, all, given, caveats);
+    }
+    match solve(all) {
+        Ok(solution) => {
+            let scale = excess(solution.chi2, solution.degrees_of_freedom);
+            let mut lattice = solution.lattice;
+            lattice.covariance *= scale;
+            let seed = settings.seed;
+            let name = format!("drift {}", group.name);
+            Some(Solved {
+                drift: Drift {
+                    velocity: solution.velocity,
+                    covariance: solution.covariance * scale,
+                    given: false,
+                    fit: Some(DriftFit {
+                        rank: solution.rank,
+                        condition: solution.condition,
+                        chi2: solution.chi2,
+                        degrees_of_freedom: solution.degrees_of_freedom,
+                        paper_velocity: pairwise_drift(&paper_scans(group, all)),
+                    }),
+                    monte_carlo: monte_carlo(all, settings.drift_draws, seed, &name),
+                },
+                lattice,
+                chi2: solution.chi2,
+                freedom: solution.degrees_of_freedom,
+            })
+        }
+        Err(error) => {
+            caveats.push(Caveat::new("drift-undetermined", &group.name, error.to_string()));
+            None
+        }
+    }
+}
+
+fn given_drift(
+    group: &Group,
+    all: &[Observation],
+    given: GivenDrift,
+    caveats: &mut Vec<Caveat>,
+) -> Option<Solved> {
+    let velocity = Vector2::new(given.x_nm_per_min, given.y_nm_per_min) * PER_MINUTE;
+    let sigma = given.sigma_nm_per_min * PER_MINUTE;
+    let covariance = Matrix2::identity() * sigma * sigma;
+    caveats.push(Caveat::new(
+        "drift-given",
+        &group.name,
+        "the drift was given by the user and not measured; it is as right as the conditions are the same",
+    ));
+    let (mut lattice, chi2, freedom) = common_lattice(all, &velocity, &covariance).ok()?;
+    lattice.covariance *= excess(chi2, freedom);
+    Some(Solved {
+        drift: Drift {
+            velocity,
+            covariance,
+            given: true,
+            fit: None,
+            monte_carlo: None,
+        },
+        lattice,
+        chi2,
+        freedom,
+    })
+}
+
+/// By how much the variances have to grow for the scatter to be what they say; never shrinks them.
+fn excess(chi2: f64, freedom: usize) -> f64 {
+    if freedom == 0 {
+        return 1.0;
+    }
+    (chi2 / freedom as f64).max(1.0)
+}
+
+/// The scans as the published estimate wants them: signed velocities in laboratory axes.
+fn paper_scans(group: &Group, all: &[Observation]) -> Vec<PaperScan> {
+    let lines = group.scans.iter().flat_map(|s| &s.lines);
+    lines
+        .zip(all)
+        .filter_map(|(line, seen)| {
+            let tau = line.timing?.per_pixel;
+            let (fast, slow) = (
+                line.geometry.fast_step() / tau.x,
+                line.geometry.slow_step() / tau.y,
+            );
+            let (fast_velocity, slow_velocity) = match group.slow_axis {
+                Axis::X => (fast.y, slow.x),
+                Axis::Y => (fast.x, slow.y),
+            };
+            Some(PaperScan {
+                lattice: seen.lattice,
+                slow_axis: group.slow_axis,
+                fast_velocity,
+                slow_velocity,
+            })
+        })
+        .collect()
+}
+
+fn scan_analysis(
+    scan: &MeasuredScan,
+    seen: &[Observation],
+    reference: &Matrix2<f64>,
+    solved: Option<&Solved>,
+    settings: &Settings,
+) -> Option<ScanAnalysis> {
+    let (sensor, _, _) = common_lattice(seen, &Vector2::zeros(), &Matrix2::zeros()).ok()?;
+    let drift_corrected = solved
+        .and_then(|s| common_lattice(seen, &s.drift.velocity, &s.drift.covariance).ok())
+        .map(|(lattice, _, _)| lattice);
+    let nominal: Option<Vec<LatticeVectors>> = scan
+        .lines
+        .iter()
+        .map(|l| Some(labelled_like(&l.in_nominal_coordinates()?, reference)))
+        .collect();
+    let strain = |lattice: &LatticeVectors| {
+        twist_strain(lattice, &settings.material, settings.strain_convention).ok()
+    };
+    let first = scan.lines.first()?;
+    let mean = |f: &dyn Fn(&MeasuredLine) -> Estimate| {
+        let all: Vec<Estimate> = scan.lines.iter().map(f).collect();
+        let n = all.len() as f64;
+        Estimate::new(
+            all.iter().map(|e| e.value).sum::<f64>() / n,
+            (all.iter().map(|e| e.sigma.powi(2)).sum::<f64>() / n).sqrt(),
+        )
+    };
+    Some(ScanAnalysis {
+        file: scan.file.clone(),
+        acquired: scan.acquired,
+        frame_direction: scan.frame_direction.unwrap_or(FrameDirection::Up),
+        lines: scan
+            .lines
+            .iter()
+            .zip(seen)
+            .map(|(line, seen)| line_analysis(line, seen, reference))
+            .collect(),
+        window_centre: first.geometry.centre(),
+        window_extent: first.geometry.extent(),
+        fast_velocity: mean(&|l| l.speeds[0]),
+        slow_velocity: mean(&|l| l.speeds[1]),
+        nominal: nominal.and_then(|all| plain_mean(&all)),
+        twist_strain_sensor: strain(&sensor),
+        twist_strain: drift_corrected.as_ref().and_then(strain),
+        sensor,
+        drift_corrected,
+        draws: Vec::new(),
+    })
+}
+
+fn line_analysis(line: &MeasuredLine, seen: &Observation, reference: &Matrix2<f64>) -> LineAnalysis {
+    let comparison = line.lattice.comparison.map(|pixels| {
+        labelled_like(&pixels.mapped(&line.geometry.pixel_to_nm), reference)
+    });
+    LineAnalysis {
+        line: line.line,
+        pixels: line.lattice.pixels,
+        sensor: seen.lattice,
+        comparison,
+        shortcut_wavelengths: line.lattice.shortcut_wavelengths,
+        pixel_to_nm: line.geometry.pixel_to_nm,
+        origin: line.geometry.origin,
+        from_sensors: line.geometry.from_sensors,
+        periods: line.lattice.periods,
+        signal_to_noise: line.lattice.signal_to_noise,
+    }
+}
+
+/// Unweighted mean of independent lattices.
+fn plain_mean(all: &[LatticeVectors]) -> Option<LatticeVectors> {
+    let n = all.len() as f64;
+    (n > 0.0).then(|| LatticeVectors {
+        basis: all.iter().map(|l| l.basis).sum::<Matrix2<f64>>() / n,
+        covariance: all.iter().map(|l| l.covariance).sum::<Matrix4<f64>>() / (n * n),
+    })
+}
+
+/// Twist and strain of the common lattice, and how the scans scatter about it.
+fn set_mean(
+    (lattice, chi2, freedom): (LatticeVectors, f64, usize),
+    scans: impl Iterator<Item = (Option<TwistStrain>, LatticeVectors)>,
+    settings: &Settings,
+) -> Option<SetMean> {
+    let twist_strain = twist_strain(&lattice, &settings.material, settings.strain_convention).ok()?;
+    let (singles, lattices): (Vec<_>, Vec<_>) = scans.unzip();
+    let singles: Vec<TwistStrain> = singles.into_iter().flatten().collect();
+    let twists: Vec<f64> = singles.iter().map(|s| s.twist).collect();
+    let component = |i: usize| {
+        let values: Vec<f64> = singles.iter().map(|s| s.strain_vector[i]).collect();
+        mean_and_spread(&values).sigma
+    };
+    let within = lattices.iter().all(|l| {
+        (0..3).all(|i| {
+            let ratio = l.wavelength(i).value / lattice.wavelength(i).value;
+            (ratio - 1.0).abs() <= 0.01
+        })
+    });
+    Some(SetMean {
+        lattice,
+        twist_strain,
+        twist_scatter: mean_and_spread(&twists).sigma,
+        strain_scatter: component(0).hypot(component(1)) / std::f64::consts::SQRT_2,
+        chi2_per_dof: chi2 / freedom as f64,
+        within_one_percent: within,
+    })
+}
+
+/// Twist and strain of the mean reciprocal lattice of up and down scans, sensor coordinates.
+///
+/// With opposite time gradients the mean is free of constant drift exactly: a check that needs no
+/// drift estimate.
+fn forward_backward(scans: &[ScanAnalysis], settings: &Settings) -> Option<TwistStrain> {
+    let mean = |direction: FrameDirection| {
+        let reciprocal: Vec<LatticeVectors> = scans
+            .iter()
+            .filter(|s| s.frame_direction == direction)
+            .filter_map(|s| real_from_reciprocal(&s.sensor))
+            .collect();
+        plain_mean(&reciprocal)
+    };
+    let both = [mean(FrameDirection::Up)?, mean(FrameDirection::Down)?];
+    let lattice = real_from_reciprocal(&plain_mean(&both)?)?;
+    // Back and forth turns the labelling by 60°, which twist and strain do not see.
+    twist_strain(&lattice, &settings.material, settings.strain_convention).ok()
+}
+
+fn about_mean(name: &str, mean: Option<&SetMean>, caveats: &mut Vec<Caveat>) {
+    let Some(mean) = mean else { return };
+    if mean.chi2_per_dof > LARGE_CHI2 {
+        caveats.push(Caveat::new(
+            "scatter",
+            name,
+            format!(
+                "the scans scatter {:.1} times more than their errors say (χ²/dof = {:.1}): drift that \
+                 changes, an inhomogeneous lattice or sensor errors; errors of the set are enlarged to match",
+                mean.chi2_per_dof.sqrt(),
+                mean.chi2_per_dof
+            ),
+        ));
+    }
+    if !mean.within_one_percent {
+        caveats.push(Caveat::new(
+            "outside-one-percent",
+            name,
+            "a wavelength of a single scan differs by more than 1 % from that of the set",
+        ));
+    }
+    if mean.twist_strain.axis_lab().is_none() {
+        caveats.push(Caveat::new(
+            "strain-not-significant",
+            name,
+            format!(
+                "the heterostrain is not significant (p = {:.2}); it is below {:.4} % with 95 % \
+                 confidence and has no axis",
+                mean.twist_strain.strain_p_value(),
+                mean.twist_strain.strain_upper_limit_95() * 100.0
+            ),
+        ));
+    }
+}
