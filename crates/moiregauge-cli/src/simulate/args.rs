@@ -1,0 +1,216 @@
+//! The options of `moiregauge simulate` → the settings of one set.
+
+use std::path::PathBuf;
+
+use anyhow::Context as _;
+use moiregauge::material::Material;
+use moiregauge::simulate::{FirstDirection, Simulation};
+
+/// Write simulated NanoScope sets and the truth about them
+///
+/// Twisted, strained layers are scanned by a drifting, noisy instrument with position sensors. Each
+/// set goes into a folder of its own: scan.000.spm, scan.001.spm … and truth.json, which holds the
+/// moiré vectors, twist, strain, drift, the geometry and times of every frame, and all settings.
+/// Without options the conditions are those of arXiv 2406.08681.
+#[derive(clap::Args, Clone, Debug)]
+// Each is a switch of its own on the command line.
+#[allow(clippy::struct_excessive_bools)]
+#[command(after_long_help = "\
+Examples:
+  moiregauge simulate --out sim                        ten scans, slow axis y, in sim/simulated
+  moiregauge simulate --out sim --paper                the three sets of arXiv 2406.08681
+  moiregauge simulate --out sim --name fast --scans 6 --slow x --rate 4 --drift -0.3 0.6
+  moiregauge simulate --print-config > set.toml        every setting, to be edited
+  moiregauge simulate --out sim --config set.toml --seed 7
+
+Angles are counter-clockwise. The strain axis is counted from the reciprocal vectors of layer 1,
+whose orientation is the lattice angle; in the laboratory it lies at the sum of both and the twist.")]
+pub(crate) struct SimulateArgs {
+    /// Folder for the sets; made if it does not exist
+    #[arg(long, value_name = "DIR", required_unless_present = "print_config")]
+    pub(super) out: Option<PathBuf>,
+    /// Settings from a TOML file; options on the command line come on top of it
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// Print all settings as TOML and write nothing
+    #[arg(long)]
+    pub(super) print_config: bool,
+    /// Write over files of the same names
+    #[arg(long)]
+    pub(super) force: bool,
+    /// Write the three sets of arXiv 2406.08681; of the other options only --seed counts
+    #[arg(long, conflicts_with_all = ["config", "print_config"])]
+    pub(super) paper: bool,
+    /// Name of the set and of its folder
+    #[arg(long)]
+    name: Option<String>,
+    /// Seed of all noise
+    #[arg(long)]
+    pub(super) seed: Option<u64>,
+    /// Number of scans
+    #[arg(long)]
+    scans: Option<usize>,
+    /// Samples per line and lines, as in 512 or 512x256
+    #[arg(long, value_name = "N[xM]", value_parser = parse_pixels)]
+    pixels: Option<Pixels>,
+    /// Lines per second
+    #[arg(long, value_name = "HZ")]
+    rate: Option<f64>,
+    /// Slow axis: y, or x for a frame turned by 90°
+    #[arg(long, value_enum)]
+    slow: Option<SlowAxis>,
+    /// Direction of the first scan; the following ones alternate
+    #[arg(long, value_enum)]
+    first: Option<First>,
+    /// Nominal size along the fast and the slow axis, nm
+    #[arg(long, num_args = 2, value_names = ["FAST", "SLOW"])]
+    size: Option<Vec<f64>>,
+    /// Start of the first scan, s on the clock of the drift
+    #[arg(long, value_name = "S")]
+    start: Option<f64>,
+    /// Material of both layers
+    #[arg(long, value_parser = parse_material)]
+    material: Option<Material>,
+    /// Twist, degrees
+    #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
+    twist: Option<f64>,
+    /// Uniaxial strain of layer 2, per cent
+    #[arg(long, value_name = "PERCENT", allow_negative_numbers = true)]
+    strain: Option<f64>,
+    /// Axis of the strain, counted from layer 1, degrees
+    #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
+    strain_axis: Option<f64>,
+    /// Orientation of the reciprocal vectors of layer 1, degrees
+    #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
+    lattice_angle: Option<f64>,
+    /// Strength of the higher harmonics, 0 (three cosines) to below 1 (small spots)
+    #[arg(long, value_name = "S")]
+    sharpness: Option<f64>,
+    /// Drift velocity, nm/min
+    #[arg(long, num_args = 2, value_names = ["X", "Y"], allow_negative_numbers = true)]
+    drift: Option<Vec<f64>>,
+    /// Change of the drift velocity, nm/min²
+    #[arg(long, num_args = 2, value_names = ["X", "Y"], allow_negative_numbers = true)]
+    acceleration: Option<Vec<f64>>,
+    /// Noise of each pixel, degrees of phase (the moiré has an amplitude of 1°)
+    #[arg(long, value_name = "DEG")]
+    noise: Option<f64>,
+    /// Noise of each line, degrees of phase
+    #[arg(long, value_name = "DEG")]
+    line_noise: Option<f64>,
+    /// Noise of lines with a 1/f spectrum, degrees of phase
+    #[arg(long, value_name = "DEG")]
+    flicker: Option<f64>,
+    /// Noise of the position sensors, nm
+    #[arg(long, value_name = "NM")]
+    sensor_noise: Option<f64>,
+    /// Record no position sensors
+    #[arg(long)]
+    no_sensors: bool,
+    /// Record no retrace
+    #[arg(long)]
+    no_retrace: bool,
+}
+
+/// Samples in a line, lines in a frame.
+#[derive(Clone, Copy, Debug)]
+struct Pixels([usize; 2]);
+
+#[derive(clap::ValueEnum, Clone, Copy, Debug)]
+enum SlowAxis {
+    X,
+    Y,
+}
+
+#[derive(clap::ValueEnum, Clone, Copy, Debug)]
+enum First {
+    Up,
+    Down,
+}
+
+impl SimulateArgs {
+    /// The configuration file, if any, and the options on top.
+    pub(super) fn settings(&self) -> anyhow::Result<Simulation> {
+        let mut set = match &self.config {
+            Some(path) => {
+                let text = std::fs::read_to_string(path)
+                    .with_context(|| format!("cannot read {}", path.display()))?;
+                toml::from_str(&text).with_context(|| format!("{} is no set", path.display()))?
+            }
+            None => Simulation::default(),
+        };
+        let pair = |values: &[f64]| [values[0], values[1]];
+        let change = |value: Option<f64>, setting: &mut f64| {
+            if let Some(value) = value {
+                *setting = value;
+            }
+        };
+        change(self.rate, &mut set.raster.line_rate_hz);
+        change(self.start, &mut set.raster.start_s);
+        change(self.twist, &mut set.sample.twist_deg);
+        change(self.strain, &mut set.sample.strain_percent);
+        change(self.strain_axis, &mut set.sample.strain_axis_deg);
+        change(self.lattice_angle, &mut set.sample.lattice_angle_deg);
+        change(self.sharpness, &mut set.sample.sharpness);
+        change(self.noise, &mut set.noise.pixel_deg);
+        change(self.line_noise, &mut set.noise.line_deg);
+        change(self.flicker, &mut set.noise.flicker_deg);
+        change(self.sensor_noise, &mut set.noise.sensor_nm);
+        if let Some(name) = &self.name {
+            set.name.clone_from(name);
+        }
+        if let Some(seed) = self.seed {
+            set.seed = seed;
+        }
+        if let Some(scans) = self.scans {
+            set.raster.scans = scans;
+        }
+        if let Some(Pixels(pixels)) = self.pixels {
+            set.raster.pixels = pixels;
+        }
+        if let Some(slow) = self.slow {
+            set.raster.rotation_deg = match slow {
+                SlowAxis::X => 90.0,
+                SlowAxis::Y => 0.0,
+            };
+        }
+        if let Some(first) = self.first {
+            set.raster.first_direction = match first {
+                First::Up => FirstDirection::Up,
+                First::Down => FirstDirection::Down,
+            };
+        }
+        if let Some(size) = &self.size {
+            set.raster.nominal_size_nm = pair(size);
+        }
+        if let Some(material) = &self.material {
+            set.sample.material = material.clone();
+        }
+        if let Some(drift) = &self.drift {
+            set.drift.velocity_nm_per_min = pair(drift);
+        }
+        if let Some(acceleration) = &self.acceleration {
+            set.drift.acceleration_nm_per_min2 = pair(acceleration);
+        }
+        set.raster.sensors &= !self.no_sensors;
+        set.raster.retrace &= !self.no_retrace;
+        Ok(set)
+    }
+}
+
+fn parse_pixels(text: &str) -> Result<Pixels, String> {
+    let (columns, rows) = text.split_once(['x', 'X', '×']).unwrap_or((text, text));
+    let number = |part: &str| {
+        part.trim()
+            .parse::<usize>()
+            .map_err(|_| format!("expected 512 or 512x256, found {text:?}"))
+    };
+    Ok(Pixels([number(columns)?, number(rows)?]))
+}
+
+fn parse_material(text: &str) -> Result<Material, String> {
+    Material::named(text).ok_or_else(|| {
+        let names: Vec<String> = Material::all().into_iter().map(|m| m.name).collect();
+        format!("expected one of {}, found {text:?}", names.join(", "))
+    })
+}
