@@ -127,7 +127,7 @@ fn every_pixel_shows_what_was_there_at_its_time() {
 }
 
 /// The reference matrices of the drift: fast y, slow x, 54.7 nm × 56.8 nm, 8 Hz, 512 pixels,
-/// V_fast = 2 L_y f, V_slow = L_x f / N, D = (0.48, −0.14) nm/min; computed by another program.
+/// `V_fast = 2 L_y f`, `V_slow = L_x f / N`, D = (0.48, −0.14) nm/min; computed by another program.
 #[test]
 fn times_reproduce_the_reference_drift_matrices() {
     let mut settings = Simulation::default();

@@ -43,10 +43,10 @@ impl FramePlan {
         let start = raster.start_s + index as f64 * (duration + raster.gap_s);
         let first_up = raster.first_direction == FirstDirection::Up;
         let turned = raster.alternating && index % 2 == 1;
-        let direction = if first_up != turned {
-            FrameDirection::Up
-        } else {
+        let direction = if first_up == turned {
             FrameDirection::Down
+        } else {
+            FrameDirection::Up
         };
 
         let pixel_to_nm = pixel_to_nm(settings);

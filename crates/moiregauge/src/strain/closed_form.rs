@@ -72,11 +72,16 @@ pub fn twist_strain(
     let by_lattice = moire_matrix_jacobian(&labelled.lattice.basis, &labelled.moire)
         .ok_or(no_area(&labelled.lattice))?;
     let jacobian: Matrix4<f64> = by_moire * by_lattice;
+    let covariance = jacobian * labelled.lattice.covariance * jacobian.transpose();
+    // θ = 0 at the very edge of what strain can do: nothing limits its error there.
+    if covariance.iter().any(|x| !x.is_finite()) {
+        return Err(no_solution(&moire, material));
+    }
     Ok(TwistStrain {
         twist: solution.twist,
         lattice_angle: reduce(solution.lattice_angle, FRAC_PI_3),
         strain_vector: Vector2::new(solution.strain_vector.re, solution.strain_vector.im),
-        covariance: jacobian * labelled.lattice.covariance * jacobian.transpose(),
+        covariance,
     })
 }
 
