@@ -9,7 +9,9 @@ mod figures;
 mod format;
 mod provenance;
 mod report;
+pub mod results;
 mod stats;
+mod tables;
 
 pub use draw::colormap::ColorMap;
 pub use error::ReportError;
@@ -17,3 +19,4 @@ pub use figures::{Drawing, Figure, figures};
 pub use format::plus_minus;
 pub use provenance::{FailedInput, InputFile, Provenance};
 pub use report::{Choice, write_report};
+pub use results::{Results, schema};

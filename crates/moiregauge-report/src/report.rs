@@ -8,6 +8,8 @@ use crate::draw::png;
 use crate::error::ReportError;
 use crate::figures::{Figure, figures};
 use crate::provenance::Provenance;
+use crate::results::Results;
+use crate::tables::tables;
 
 /// Which parts of a report are wanted. `results.json` and the tables always are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -68,7 +70,10 @@ pub fn write_report(
     provenance: &Provenance,
     choice: &Choice,
 ) -> Result<Vec<(String, Vec<u8>)>, ReportError> {
-    let _ = provenance;
+    let results = Results::new(analysis, provenance);
+    let mut files = vec![("results.json".to_owned(), results.to_json()?)];
+    files.extend(tables(&results));
     let all = figures(analysis, choice.colormap);
-    figure_files(&all, choice.png)
+    files.extend(figure_files(&all, choice.png)?);
+    Ok(files)
 }

@@ -138,7 +138,8 @@ impl Axes {
 
     fn draw_x(&self, svg: &mut Svg, labels: &Labels, frame: &Ink) {
         let (area, range) = (self.area, self.x.range);
-        let wanted = ((area.width / 34.0) as usize).clamp(2, 12);
+        let spacing = if labels.count_x { 17.0 } else { 34.0 };
+        let wanted = ((area.width / spacing) as usize).clamp(3, 12);
         let marks = fitting(wanted, labels.count_x, range, |marks| {
             let needed: f64 = marks
                 .iter()
@@ -166,7 +167,7 @@ impl Axes {
     /// Draws ticks and numbers of y and returns the width of the widest number, pt.
     fn draw_y(&self, svg: &mut Svg, labels: &Labels, frame: &Ink) -> f64 {
         let (area, range) = (self.area, self.y.range);
-        let wanted = ((area.height / 18.0) as usize).clamp(2, 8);
+        let wanted = ((area.height / 18.0) as usize).clamp(3, 8);
         let mut widest: f64 = 0.0;
         for tick in fitting(wanted, labels.count_y, range, |_| true) {
             let y = self.y.at(tick.value);

@@ -19,7 +19,7 @@ pub(crate) fn draw(svg: &mut Svg, bar: Rect, map: ColorMap, range: Range, title:
         bar.x,
         bar.y,
     ];
-    svg.image(&png, 1, indices.len(), matrix);
+    svg.image(&png, (1, indices.len()), matrix, true);
     let frame = Ink::line(BLACK, HAIR);
     svg.rect(bar, &frame);
     let scale = Scale::new(range, bar.bottom(), bar.y);

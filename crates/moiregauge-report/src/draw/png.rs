@@ -53,6 +53,8 @@ pub(crate) fn pixmap(svg: &str, dpi: f64) -> Result<Pixmap, ReportError> {
     );
     let mut pixmap = Pixmap::new(width, height)
         .ok_or_else(|| drawn(format!("{width} × {height} pixels are out of range")))?;
+    // Before anything is drawn, or the last, half covered line would stay half transparent.
+    pixmap.fill(resvg::tiny_skia::Color::WHITE);
     resvg::render(
         &tree,
         Transform::from_scale(zoom, zoom),

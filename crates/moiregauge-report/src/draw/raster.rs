@@ -15,6 +15,15 @@ use super::svg::Svg;
 /// More pixels than this along a side are averaged away: a journal page shows no more.
 const MOST: usize = 1024;
 
+/// How values become colours.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Shades {
+    pub(crate) map: ColorMap,
+    pub(crate) range: Range,
+    /// Show every pixel as a block instead of interpolating.
+    pub(crate) crisp: bool,
+}
+
 /// The range from the `share` quantile to the `1 − share` quantile of the finite values.
 pub(crate) fn contrast(image: &Image, share: f64) -> Range {
     let mut values: Vec<f64> = image
@@ -70,7 +79,7 @@ pub(crate) fn draw(
     image: &Image,
     linear: &Matrix2<f64>,
     origin: Vector2<f64>,
-    colours: (ColorMap, Range),
+    shades: &Shades,
 ) {
     if image.rows == 0 || image.columns == 0 {
         return;
@@ -86,7 +95,7 @@ pub(crate) fn draw(
     let shift = (factor as f64 - 1.0) / 2.0 / factor as f64;
     let origin = origin + linear * Vector2::new(shift, shift);
 
-    let png = encode(small, colours);
+    let png = encode(small, shades);
     // PNG coordinates (u right, v down, edges at whole numbers): column = u − ½, row = rows − ½ − v.
     let corner = origin + linear * Vector2::new(-0.5, small.rows as f64 - 0.5);
     let (e, f) = axes.at(corner.x, corner.y);
@@ -99,11 +108,12 @@ pub(crate) fn draw(
         e,
         f,
     ];
-    svg.image(&png, small.columns, small.rows, matrix);
+    svg.image(&png, (small.columns, small.rows), matrix, shades.crisp);
 }
 
 /// Pixels as a palette PNG, top line first; missing ones are transparent.
-fn encode(image: &Image, (map, range): (ColorMap, Range)) -> Vec<u8> {
+fn encode(image: &Image, shades: &Shades) -> Vec<u8> {
+    let range = shades.range;
     let mut indices = Vec::with_capacity(image.values.len());
     for row in (0..image.rows).rev() {
         for &value in image.row(row) {
@@ -116,7 +126,7 @@ fn encode(image: &Image, (map, range): (ColorMap, Range)) -> Vec<u8> {
             });
         }
     }
-    palette_png(image.columns, image.rows, &indices, &map.table())
+    palette_png(image.columns, image.rows, &indices, &shades.map.table())
 }
 
 #[cfg(test)]
@@ -131,14 +141,18 @@ mod tests {
         let range = Range::new(-0.5, 1.5);
         let axes = Axes::new(Rect::new(0.0, 0.0, 40.0, 40.0), range, range);
         let mut svg = Svg::new("t", 40.0, 40.0);
-        let colours = (ColorMap::Grey, Range::new(0.0, 1.0));
+        let shades = Shades {
+            map: ColorMap::Grey,
+            range: Range::new(0.0, 1.0),
+            crisp: true,
+        };
         draw(
             &mut svg,
             &axes,
             &image,
             &Matrix2::identity(),
             Vector2::zeros(),
-            colours,
+            &shades,
         );
         let picture =
             crate::draw::png::pixmap(&svg.finish("t"), 72.0).map_err(|e| e.to_string())?;

@@ -72,32 +72,45 @@ pub(crate) struct Tick {
     pub(crate) label: String,
 }
 
-/// Up to about `wanted` ticks at multiples of 1, 2 or 5 times a power of ten.
+/// About `wanted` ticks at multiples of 1, 2 or 5 times a power of ten.
 pub(crate) fn ticks(range: Range, wanted: usize) -> Vec<Tick> {
-    let step = round_step(range.width() / wanted.max(1) as f64);
+    let step = nearest_step(range.width() / wanted.max(1) as f64);
     multiples(range, step)
 }
 
 /// Ticks at whole numbers, for counting scans.
 pub(crate) fn whole_ticks(range: Range, wanted: usize) -> Vec<Tick> {
-    let step = round_step(range.width() / wanted.max(1) as f64).max(1.0);
+    let step = nearest_step(range.width() / wanted.max(1) as f64).max(1.0);
     multiples(range, step)
         .into_iter()
         .filter(|tick| tick.value >= 1.0 || range.low > 0.6)
         .collect()
 }
 
-/// The smallest of 1, 2, 5, 10 … that is not below `rough`.
+/// The largest of 1, 2, 5, 10 … that is not above `rough`.
 pub(crate) fn round_step(rough: f64) -> f64 {
+    // 1e-9: 0.1 / 0.1 may come out just below 1.
+    step_by(rough, [1.0, 2.0, 5.0, 10.0].map(|f| f * (1.0 - 1e-9)))
+}
+
+/// The one of 1, 2, 5, 10 … that is nearest to `rough` by ratio.
+fn nearest_step(rough: f64) -> f64 {
+    step_by(rough, [0.0, 2_f64.sqrt(), 10_f64.sqrt(), 50_f64.sqrt()])
+}
+
+/// 1, 2, 5 or 10 times a power of ten, the last one whose threshold is not above the leading digits.
+fn step_by(rough: f64, thresholds: [f64; 4]) -> f64 {
     if !(rough.is_finite() && rough > 0.0) {
         return 1.0;
     }
     let power = 10_f64.powf(rough.log10().floor());
-    // 1e-9: 0.1 / 0.1 may come out just above 1.
-    let factor = [1.0, 2.0, 5.0, 10.0]
-        .into_iter()
-        .find(|f| f * power >= rough * (1.0 - 1e-9));
-    factor.unwrap_or(10.0) * power
+    let leading = rough / power;
+    let steps = [1.0, 2.0, 5.0, 10.0].into_iter().zip(thresholds);
+    steps
+        .filter(|&(_, from)| leading >= from)
+        .map(|(step, _)| step * power)
+        .last()
+        .unwrap_or(power)
 }
 
 fn multiples(range: Range, step: f64) -> Vec<Tick> {

@@ -224,11 +224,24 @@ impl Svg {
     }
 
     /// A PNG, `matrix` (SVG order a b c d e f) mapping its pixels (x right, y down) to the page.
-    pub(crate) fn image(&mut self, png: &[u8], columns: usize, rows: usize, matrix: [f64; 6]) {
+    ///
+    /// `crisp` pixels keep their edges (counts in cells), others are interpolated (images).
+    pub(crate) fn image(
+        &mut self,
+        png: &[u8],
+        (columns, rows): (usize, usize),
+        matrix: [f64; 6],
+        crisp: bool,
+    ) {
+        let rendering = if crisp {
+            " image-rendering=\"optimizeSpeed\" style=\"image-rendering:pixelated\""
+        } else {
+            ""
+        };
         let matrix: Vec<String> = matrix.iter().map(|&v| precise(v)).collect();
         let _ = writeln!(
             self.body,
-            "<image width=\"{columns}\" height=\"{rows}\" preserveAspectRatio=\"none\" transform=\"matrix({})\" href=\"data:image/png;base64,{}\"/>",
+            "<image width=\"{columns}\" height=\"{rows}\" preserveAspectRatio=\"none\"{rendering} transform=\"matrix({})\" href=\"data:image/png;base64,{}\"/>",
             matrix.join(" "),
             super::base64::encode(png)
         );

@@ -3,13 +3,15 @@
 use moiregauge::estimate::Estimate;
 use moiregauge::settings::Method;
 
-use super::layout::{Grid, counting, ends, is_up, ordinal, point};
+use super::layout::{counting, ends, is_up, ordinal, point};
 use super::{Drawing, Subject, layout};
 use crate::draw::axes::{Axes, Labels, zero_line};
 use crate::draw::legend::{self, Key};
 use crate::draw::scale::Range;
 use crate::draw::style::{GREY, LINE, PAGE, VECTOR, VECTOR_MARKER, VECTOR_NAME};
-use crate::draw::svg::{Ink, Svg};
+use crate::draw::svg::{Ink, Rect, Svg};
+
+const SIDE: f64 = 150.0;
 
 /// One vector of one line of one scan by both estimators.
 struct Pair {
@@ -30,18 +32,16 @@ pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
         Method::Fourier => ("Fourier transform", "autocorrelation"),
         Method::Paper => ("published autocorrelation", "other estimator"),
     };
-    let grid = Grid {
-        width: PAGE,
-        columns: 2,
-        rows: 1,
-        panel: 140.0,
-    };
-    let mut svg = Svg::new(subject.id, grid.width, grid.height());
+    let top = layout::LEGEND + layout::ABOVE;
+    let mut svg = Svg::new(subject.id, PAGE, top + SIDE + layout::BELOW);
+    let square = Rect::new(layout::LEFT, top, SIDE, SIDE);
+    let left = square.right() + 9.0 + layout::LEFT;
+    let beside = Rect::new(left, top, PAGE - left - 9.0, SIDE);
     let all = pairs.iter().flat_map(|p| [p.used, p.other]);
     let range = Range::of(ends(all))
         .ok_or("no wavelength is finite")?
         .padded(0.05, 1e-6);
-    let axes = Axes::new(grid.cell(0, 0), range, range);
+    let axes = Axes::new(square, range, range);
     let diagonal = axes.points([(range.low, range.low), (range.high, range.high)]);
     svg.polyline(&diagonal, &Ink::line(GREY, LINE));
     for pair in &pairs {
@@ -72,7 +72,7 @@ pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
     };
     let range = Range::of(ends(pairs.iter().map(difference)).chain([0.0]));
     let range = range.ok_or("no wavelength is finite")?.padded(0.06, 1e-3);
-    let axes = Axes::new(grid.cell(1, 0), counting(subject.set.scans.len()), range);
+    let axes = Axes::new(beside, counting(subject.set.scans.len()), range);
     zero_line(&mut svg, &axes);
     for pair in &pairs {
         let x = ordinal(pair.scan) + (pair.vector as f64 - 1.0) * 0.2;

@@ -74,9 +74,14 @@ pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
     })
 }
 
+/// Cells along each side of the density.
+fn cells(n: usize) -> usize {
+    3 * bins(n) / 2
+}
+
 /// Counts of draws in square cells; empty cells stay white.
 fn density(svg: &mut Svg, subject: &Subject, axes: &Axes, (x, y): (&[f64], &[f64])) {
-    let cells = 2 * bins(x.len());
+    let cells = cells(x.len());
     let (rx, ry) = (axes.x.range, axes.y.range);
     let step = Vector2::new(rx.width(), ry.width()) / cells as f64;
     let mut counts = vec![0.0; cells * cells];
@@ -93,7 +98,11 @@ fn density(svg: &mut Svg, subject: &Subject, axes: &Axes, (x, y): (&[f64], &[f64
     }
     let image = Image::new(cells, cells, counts);
     let origin = Vector2::new(rx.low, ry.low) + step / 2.0;
-    let colours = (subject.map, Range::new(0.0, most));
+    let shades = raster::Shades {
+        map: subject.map,
+        range: Range::new(0.0, most),
+        crisp: true,
+    };
     svg.clipped(axes.area, |svg| {
         raster::draw(
             svg,
@@ -101,7 +110,7 @@ fn density(svg: &mut Svg, subject: &Subject, axes: &Axes, (x, y): (&[f64], &[f64
             &image,
             &Matrix2::from_diagonal(&step),
             origin,
-            colours,
+            &shades,
         );
     });
 }
@@ -149,7 +158,7 @@ fn marginals(svg: &mut Svg, axes: &Axes, draws: &DriftMonteCarlo, (x, y): (&[f64
         let sigma = draws.covariance[(i, i)].max(0.0).sqrt() * PER_MINUTE;
         (draws.mean[i] * PER_MINUTE, sigma)
     };
-    let counts = Histogram::of(x, axes.x.range, 2 * bins(x.len()));
+    let counts = Histogram::of(x, axes.x.range, cells(x.len()));
     let full = Range::new(0.0, counts.highest() * 1.12);
     let above = Rect::new(area.x, area.y - GAP - MARGINAL, SIDE, MARGINAL);
     let top = Axes::new(above, axes.x.range, full);
@@ -166,7 +175,7 @@ fn marginals(svg: &mut Svg, axes: &Axes, draws: &DriftMonteCarlo, (x, y): (&[f64
     };
     top.draw(svg, &bare);
 
-    let counts = Histogram::of(y, axes.y.range, 2 * bins(y.len()));
+    let counts = Histogram::of(y, axes.y.range, cells(y.len()));
     let full = Range::new(0.0, counts.highest() * 1.12);
     let beside = Rect::new(area.right() + GAP, area.y, MARGINAL, SIDE);
     let right = Axes::new(beside, full, axes.y.range);

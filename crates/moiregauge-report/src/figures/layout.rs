@@ -18,6 +18,8 @@ pub(super) const BELOW: f64 = 27.0;
 /// Space above a panel for its letter, pt.
 pub(super) const ABOVE: f64 = 16.0;
 const RIGHT: f64 = 9.0;
+/// Space between rows of panels, whose numbers of x only the lowest one shows, pt.
+const GAP: f64 = 4.0;
 
 /// Panels of equal size in rows and columns under a legend.
 #[derive(Clone, Copy, Debug)]
@@ -31,7 +33,7 @@ pub(super) struct Grid {
 
 impl Grid {
     pub(super) fn height(&self) -> f64 {
-        LEGEND + self.rows as f64 * (ABOVE + self.panel + BELOW)
+        LEGEND + self.rows as f64 * (ABOVE + self.panel + GAP) - GAP + BELOW
     }
 
     /// The frame of a panel; row 0 is the upper one.
@@ -39,7 +41,7 @@ impl Grid {
         let width = self.width / self.columns as f64;
         Rect::new(
             column as f64 * width + LEFT,
-            LEGEND + row as f64 * (ABOVE + self.panel + BELOW) + ABOVE,
+            LEGEND + row as f64 * (ABOVE + self.panel + GAP) + ABOVE,
             width - LEFT - RIGHT,
             self.panel,
         )
@@ -98,4 +100,12 @@ pub(super) fn ends(estimates: impl IntoIterator<Item = Estimate>) -> impl Iterat
 /// The last part of a path, for titles.
 pub(super) fn short(file: &str) -> &str {
     file.rsplit(['/', '\\']).next().unwrap_or(file)
+}
+
+/// At most 24 characters of a name, for legends.
+pub(super) fn shortened(name: &str) -> String {
+    if name.chars().count() <= 24 {
+        return name.to_owned();
+    }
+    name.chars().take(23).chain(['…']).collect()
 }

@@ -51,7 +51,11 @@ pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
             &shown.image,
             place.0,
             place.1,
-            (subject.map, contrast),
+            &raster::Shades {
+                map: subject.map,
+                range: contrast,
+                crisp: false,
+            },
         );
         svg.polygon(&axes.points(actual), &Ink::line("#222222", LINE));
         if let Some(nominal) = nominal {

@@ -60,15 +60,19 @@ pub(super) fn draw(analysis: &Analysis, id: &str) -> Result<Drawing, String> {
         ..Labels::default()
     };
     vectors(&mut svg, area(2), &strains, &labels)?;
-    let keys: Vec<_> = sets
+    let names: Vec<(Key, String)> = sets
         .iter()
         .enumerate()
         .map(|(i, (set, _))| {
             (
                 Key::Point(Marker::Circle, SET[i % SET.len()], true),
-                set.name.as_str(),
+                layout::shortened(&set.name),
             )
         })
+        .collect();
+    let keys: Vec<_> = names
+        .iter()
+        .map(|(key, name)| (*key, name.as_str()))
         .collect();
     legend::row(&mut svg, (layout::LEFT, 11.0), &keys);
     Ok(Drawing {

@@ -31,7 +31,7 @@ pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
     Ok(Drawing {
         svg: svg.finish("Autocorrelation and spectrum with the lattice marked"),
         caption: format!(
-            "{} of {}: (a) autocorrelation against the shift in nm, (b) logarithm of the power spectrum against spatial frequency (cycles per nm), both in sensor coordinates, x to the right, y up, not corrected for drift. Coloured symbols: the three lattice vectors; circles: all further points of the fitted lattice and of its reciprocal lattice.",
+            "{} of {}: (a) autocorrelation against the shift in nm, (b) logarithm of the power spectrum against spatial frequency (cycles per nm), both in sensor coordinates, x to the right, y up, not corrected for drift. Coloured symbols: the three lattice vectors; circles: further points of the fitted lattice (a) and the first two shells of its reciprocal lattice (b).",
             layout::line_name(shown.line),
             layout::short(&shown.file)
         ),
@@ -58,7 +58,11 @@ fn autocorrelation(svg: &mut Svg, subject: &Subject, shown: &Illustration, basis
             &image,
             &shown.pixel_to_nm,
             origin,
-            (subject.map, contrast),
+            &raster::Shades {
+                map: subject.map,
+                range: contrast,
+                crisp: false,
+            },
         );
         for (i, j, at) in lattice_points(basis, &axes) {
             let ends = [(1, 0), (0, 1), (-1, 1)];
@@ -102,8 +106,26 @@ fn spectrum(
     let top = Range::of(image.values.iter().copied()).map_or(floor, |r| r.high);
     let contrast = Range::new(floor, top.max(floor + 1e-12));
     svg.clipped(axes.area, |svg| {
-        raster::draw(svg, &axes, &image, &map, origin, (subject.map, contrast));
-        for (_, _, at) in lattice_points(dual, &axes) {
+        raster::draw(
+            svg,
+            &axes,
+            &image,
+            &map,
+            origin,
+            &raster::Shades {
+                map: subject.map,
+                range: contrast,
+                crisp: false,
+            },
+        );
+        // 1.8: the first two shells; rings further out would mark noise.
+        let near = |i: i32, j: i32| {
+            (dual * Vector2::new(f64::from(i), f64::from(j))).norm() < 1.8 * longest(dual)
+        };
+        for (_, _, at) in lattice_points(dual, &axes)
+            .into_iter()
+            .filter(|&(i, j, _)| near(i, j))
+        {
             ring(svg, at, 5.0);
         }
     });

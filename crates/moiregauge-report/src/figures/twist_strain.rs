@@ -100,7 +100,8 @@ pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
             let labels = Labels {
                 letter: LETTERS[2 * row + column],
                 title: &title,
-                x: "scan",
+                x: if row == 2 { "scan" } else { "" },
+                bare_x: row < 2,
                 y: ["θ (°)", "ε (%)", "φ, from x (°)"][row],
                 count_x: true,
                 ..Labels::default()

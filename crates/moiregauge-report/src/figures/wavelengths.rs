@@ -56,7 +56,8 @@ pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
             let labels = Labels {
                 letter: LETTERS[2 * vector + column],
                 title: &title,
-                x: "scan",
+                x: if vector == 2 { "scan" } else { "" },
+                bare_x: vector < 2,
                 y: "wavelength (nm)",
                 count_x: true,
                 ..Labels::default()

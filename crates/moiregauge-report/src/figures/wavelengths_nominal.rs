@@ -71,7 +71,8 @@ pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
             let labels = Labels {
                 letter: LETTERS[2 * row + column],
                 title: ["nominal size", "position sensors"][column],
-                x: "scan",
+                x: if row == 1 { "scan" } else { "" },
+                bare_x: row < 1,
                 y: ["wavelength (nm)", "naive twist (°)"][row],
                 count_x: true,
                 ..Labels::default()

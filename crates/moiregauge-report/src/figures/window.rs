@@ -79,20 +79,30 @@ pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
 fn path_panel(svg: &mut Svg, axes: &Axes, moved: &[(Vector2<f64>, bool)]) {
     let points = axes.points(moved.iter().map(|(m, _)| (m.x, m.y)));
     svg.polyline(&points, &Ink::line(GREY, HAIR));
-    let mut numbered: Vec<(f64, f64)> = Vec::new();
-    for (index, (&at, (_, up))) in points.iter().zip(moved).enumerate() {
+    for (&at, (_, up)) in points.iter().zip(moved) {
         marker(svg, at, Marker::Circle, BLACK, *up);
-        // A number on top of another one can be read by nobody.
-        let label = (at.0 + 3.5, at.1 - 3.0);
-        let free =
-            |other: &(f64, f64)| (other.0 - label.0).abs() > 9.0 || (other.1 - label.1).abs() > 6.5;
-        if numbered.iter().all(free) {
+    }
+    let mut taken = points.clone();
+    for (index, at) in points.iter().enumerate() {
+        let places = [(6.0, -4.5), (-6.0, -4.5), (6.0, 5.5), (-6.0, 5.5)];
+        // Middle of the number; one on top of another can be read by nobody and is left out.
+        let free = |place: &(f64, f64)| {
+            taken
+                .iter()
+                .all(|t| (t.0 - place.0).abs() > 6.5 || (t.1 - place.1).abs() > 5.5)
+        };
+        let place = places
+            .map(|(dx, dy)| (at.0 + dx, at.1 + dy))
+            .into_iter()
+            .find(free);
+        if let Some(place) = place {
+            let baseline = (place.0, place.1 + 0.36 * SMALL);
             svg.text(
-                label,
+                baseline,
                 &(index + 1).to_string(),
-                &lettering(SMALL, Anchor::Start),
+                &lettering(SMALL, Anchor::Middle),
             );
-            numbered.push(label);
+            taken.push(place);
         }
     }
     let labels = Labels {

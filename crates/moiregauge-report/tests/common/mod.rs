@@ -127,6 +127,7 @@ fn scan(
         pixels: sensor.mapped(&to_pixels),
         sensor,
         comparison: Some(measured(&sensor.basis, sigma * 0.8, noise_of(set, index))),
+        shortcut_wavelengths: Some([12.46, 12.52, 12.61]),
         pixel_to_nm: frame,
         origin: Vector2::new(10.0 + creep, -20.0),
         from_sensors: true,

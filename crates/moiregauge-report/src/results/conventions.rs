@@ -1,0 +1,64 @@
+//! The conventions behind the numbers, in words, written beside them.
+
+use moiregauge::settings::{Settings, StrainConvention};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// What the numbers mean.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct Conventions {
+    /// Directions of the axes.
+    pub axes: String,
+    /// Units and sense of angles.
+    pub angles: String,
+    /// How the three vectors are named.
+    pub lattice_vectors: String,
+    /// What the three kinds of coordinates are.
+    pub coordinates: String,
+    /// What the drift velocity is the velocity of.
+    pub drift: String,
+    /// The equation behind twist and strain.
+    pub strain: String,
+    /// Which layer carries the strain.
+    pub strained_layer: String,
+    /// What the axis of the strain is and when it is given.
+    pub strain_axis: String,
+    /// What the strain vector is.
+    pub strain_vector: String,
+    /// What the magnitude of the strain is.
+    pub heterostrain: String,
+    /// What a twist does not know.
+    pub twist: String,
+    /// What σ is.
+    pub sigma: String,
+}
+
+impl Conventions {
+    /// The conventions under the given settings.
+    pub fn of(settings: &Settings) -> Self {
+        let (strain, axis) = match settings.strain_convention {
+            StrainConvention::RealSpace => (
+                "real space: M = R(α)[R(θ)S⁻¹ − I]G; the stretch S = diag(1+ε, 1−νε) along φ acts on atomic positions, ε > 0 is tension",
+                "tension",
+            ),
+            StrainConvention::KSpace => (
+                "k space, as in arXiv 2406.08681: M = R(α)[R(θ)S − I]G; the stretch S = diag(1+ε, 1−νε) along φ acts on reciprocal vectors, ε > 0 is compression",
+                "compression",
+            ),
+        };
+        Self {
+            axes: "x to the right, y up, in the frame of the position sensors".to_owned(),
+            angles: "degrees, counter-clockwise from x; axes modulo 180°, lattice angles modulo 60°".to_owned(),
+            lattice_vectors: "L1, L2 about 60° apart, L3 = L2 − L1; the opposites are not listed".to_owned(),
+            coordinates: "nominal: pixels placed by the size the file states; sensor: by the position sensors; drift_corrected: sensor coordinates with the motion of the sample removed".to_owned(),
+            drift: "velocity of the sample in the frame of the sensors".to_owned(),
+            strain: strain.to_owned(),
+            strained_layer: "layer 2 is stretched and then turned by θ against layer 1; the moiré cannot tell which layer is strained".to_owned(),
+            strain_axis: format!("axis of {axis}; strain_axis_lab_deg φ_lab from x, strain_axis_lattice_deg φ = φ_lab − α − θ from layer 1 of orientation α; null unless the strain is significant (p < 0.01)"),
+            strain_vector: "E = (ε cos 2φ_lab, ε sin 2φ_lab) in per cent, its covariance in per cent²".to_owned(),
+            heterostrain: "length of the strain vector with the noise bias removed; zero where noise alone explains it".to_owned(),
+            twist: "θ > 0 by choice: the moiré alone does not show the sign; assumes no isotropic heterostrain".to_owned(),
+            sigma: "one standard deviation of the statistical error; calibration of the scanner, lattice constant and Poisson ratio not included".to_owned(),
+        }
+    }
+}

@@ -1,0 +1,315 @@
+//! The document as a whole and its sets.
+
+use moiregauge::analysis::{
+    Analysis, Axis, Combined, Consistency, Drift, DriftFit, DriftMonteCarlo, SetAnalysis, SetMean,
+};
+use moiregauge::caveat::Caveat;
+use moiregauge::estimate::Estimate;
+use moiregauge::material::Material;
+use moiregauge::settings::Settings;
+use moiregauge::strain::TwistStrain;
+use nalgebra::{Matrix2, Vector2};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::SCHEMA;
+use super::conventions::Conventions;
+use super::convert::{PER_MINUTE, PERCENT, correlation, degree, estimate, number};
+use super::lattice::{LatticeVector, ResultEstimate, TwistStrainResult};
+use super::scan::ScanResult;
+use crate::provenance::{FailedInput, InputFile, Provenance};
+use crate::stats::mean_and_deviation;
+
+/// Everything that was found, in degrees, per cent, nm and nm/min.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Results {
+    /// `moiregauge/results/1`.
+    #[schemars(extend("const" = "moiregauge/results/1"))]
+    pub schema: String,
+    /// The sets, in order of time.
+    pub sets: Vec<SetResult>,
+    /// All sets together; `null` where no set could be corrected for drift.
+    pub combined: Option<CombinedResult>,
+    /// Doubts.
+    pub caveats: Vec<Caveat>,
+    /// Inputs that could not be used.
+    pub failed: Vec<FailedInput>,
+    /// What the numbers mean.
+    pub conventions: Conventions,
+    /// The settings as they were used.
+    pub settings: Settings,
+    /// Program, seed and inputs.
+    pub provenance: InputProvenance,
+}
+
+/// Program, seed and inputs.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct InputProvenance {
+    /// `moiregauge`.
+    pub program: String,
+    /// Its version.
+    pub version: String,
+    /// Seed of all random numbers.
+    pub seed: u64,
+    /// The files that were analysed.
+    pub inputs: Vec<InputFile>,
+}
+
+/// Scans of one slow axis, line rate, size and channel.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct SetResult {
+    /// Name for people, unique in the document.
+    pub name: String,
+    /// `x` or `y`: the axis along which lines follow each other.
+    pub slow_axis: String,
+    /// Lines per second (trace and retrace together).
+    pub line_rate_hz: Option<f64>,
+    /// The analysed channel.
+    pub channel: String,
+    /// The drift; `null` where the scans cannot determine it.
+    pub drift: Option<DriftResult>,
+    /// All scans together, corrected for drift.
+    pub mean: Option<MeanResult>,
+    /// The plain mean over the scans, not corrected for drift.
+    pub uncorrected: Option<MeanResult>,
+    /// From the mean reciprocal lattice of up and down scans: free of constant drift without
+    /// knowing it. The check on `mean`.
+    pub forward_backward: Option<TwistStrainResult>,
+    /// The scans in order of time.
+    pub scans: Vec<ScanResult>,
+}
+
+/// Velocity of the sample in the frame of the sensors.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct DriftResult {
+    /// To the right.
+    pub x_nm_per_min: ResultEstimate,
+    /// Up.
+    pub y_nm_per_min: ResultEstimate,
+    /// Correlation coefficient of the two.
+    pub correlation: Option<f64>,
+    /// Whether the user gave it.
+    pub given: bool,
+    /// Quality of the fit; `null` for a given drift.
+    pub fit: Option<DriftFitResult>,
+    /// The Monte Carlo distribution.
+    pub monte_carlo: Option<DriftMonteCarloResult>,
+}
+
+/// How well the scans determine the drift.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct DriftFitResult {
+    /// Rank of the six-parameter problem; 6 is full.
+    pub rank: usize,
+    /// Condition number.
+    pub condition: Option<f64>,
+    /// Weighted sum of squared residuals.
+    pub chi2: Option<f64>,
+    /// Degrees of freedom.
+    pub degrees_of_freedom: usize,
+    /// The published estimate (approximate matrices, pairwise objective), x and y, for comparison.
+    pub paper_nm_per_min: Option<[Option<f64>; 2]>,
+}
+
+/// Distribution of the drift over Monte Carlo draws.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct DriftMonteCarloResult {
+    /// Number of draws.
+    pub draws: usize,
+    /// Mean and standard deviation.
+    pub x_nm_per_min: ResultEstimate,
+    /// Mean and standard deviation.
+    pub y_nm_per_min: ResultEstimate,
+    /// Correlation coefficient of the two.
+    pub correlation: Option<f64>,
+    /// Mean and standard deviation of the root-mean-square residual, nm.
+    pub residual_nm: ResultEstimate,
+}
+
+/// One lattice for several scans.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct MeanResult {
+    /// Its twist and strain.
+    #[serde(flatten)]
+    pub twist_strain: TwistStrainResult,
+    /// L1, L2 and L3.
+    pub vectors: [LatticeVector; 3],
+    /// Standard deviation of the twist over the scans, degrees.
+    pub twist_scatter_deg: Option<f64>,
+    /// Root-mean-square deviation per component of the strain vector over the scans, per cent.
+    pub strain_scatter_percent: Option<f64>,
+    /// χ² per degree of freedom of the scans against this lattice. Where it exceeds 1, every σ of
+    /// this object is enlarged by its square root.
+    pub chi2_per_dof: Option<f64>,
+    /// σ of the twist before it was enlarged by √(χ²/dof), degrees.
+    pub twist_sigma_unscaled_deg: Option<f64>,
+    /// σ of the heterostrain before it was enlarged by √(χ²/dof), per cent.
+    pub heterostrain_sigma_unscaled_percent: Option<f64>,
+    /// Whether the wavelengths of every scan lie within ±1 % of these.
+    pub within_one_percent: bool,
+}
+
+/// All sets together.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct CombinedResult {
+    /// Twist and strain of the weighted mean lattice.
+    #[serde(flatten)]
+    pub twist_strain: TwistStrainResult,
+    /// L1, L2 and L3.
+    pub vectors: [LatticeVector; 3],
+    /// How far every two sets are apart.
+    pub consistency: Vec<ConsistencyResult>,
+}
+
+/// How many standard deviations lie between two sets.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ConsistencyResult {
+    /// Names of the two sets.
+    pub sets: [String; 2],
+    /// Between the drift velocities: square root of χ² for two components.
+    pub drift_sigmas: Option<f64>,
+    /// Between the twists.
+    pub twist_sigmas: Option<f64>,
+    /// Between the strain vectors: square root of χ² for two components.
+    pub strain_sigmas: Option<f64>,
+}
+
+impl Results {
+    /// The document for an analysis.
+    pub fn new(analysis: &Analysis, provenance: &Provenance) -> Self {
+        let material = &analysis.settings.material;
+        Self {
+            schema: SCHEMA.to_owned(),
+            sets: analysis
+                .sets
+                .iter()
+                .map(|set| set_result(set, material))
+                .collect(),
+            combined: analysis.combined.as_ref().map(|c| combined(c, material)),
+            caveats: analysis.caveats.clone(),
+            failed: provenance.failed.clone(),
+            conventions: Conventions::of(&analysis.settings),
+            settings: analysis.settings.clone(),
+            provenance: InputProvenance {
+                program: "moiregauge".to_owned(),
+                version: provenance.version.clone(),
+                seed: provenance.seed,
+                inputs: provenance.inputs.clone(),
+            },
+        }
+    }
+
+    /// The document as text, indented, with a newline at the end.
+    ///
+    /// # Errors
+    /// None in practice: every part can be written as JSON.
+    pub fn to_json(&self) -> Result<Vec<u8>, serde_json::Error> {
+        let mut bytes = serde_json::to_vec_pretty(self)?;
+        bytes.push(b'\n');
+        Ok(bytes)
+    }
+}
+
+fn set_result(set: &SetAnalysis, material: &Material) -> SetResult {
+    let axis = match set.slow_axis {
+        Axis::X => "x",
+        Axis::Y => "y",
+    };
+    SetResult {
+        name: set.name.clone(),
+        slow_axis: axis.to_owned(),
+        line_rate_hz: number(set.line_rate_hz),
+        channel: set.channel.clone(),
+        drift: set.drift.as_ref().map(drift),
+        mean: set.mean.as_ref().map(|m| mean(m, material)),
+        uncorrected: set.uncorrected.as_ref().map(|m| mean(m, material)),
+        forward_backward: set.forward_backward.as_ref().map(Into::into),
+        scans: set
+            .scans
+            .iter()
+            .map(|s| ScanResult::of(s, set.slow_axis, material))
+            .collect(),
+    }
+}
+
+/// Both components of a velocity (nm/s) with σ, nm/min.
+fn velocity(value: Vector2<f64>, covariance: &Matrix2<f64>) -> [ResultEstimate; 2] {
+    [0, 1].map(|i| {
+        estimate(
+            Estimate::from_variance(value[i], covariance[(i, i)]),
+            PER_MINUTE,
+        )
+    })
+}
+
+fn drift(drift: &Drift) -> DriftResult {
+    let [x_nm_per_min, y_nm_per_min] = velocity(drift.velocity, &drift.covariance);
+    DriftResult {
+        x_nm_per_min,
+        y_nm_per_min,
+        correlation: correlation(&drift.covariance),
+        given: drift.given,
+        fit: drift.fit.as_ref().map(drift_fit),
+        monte_carlo: drift.monte_carlo.as_ref().map(drift_monte_carlo),
+    }
+}
+
+fn drift_fit(fit: &DriftFit) -> DriftFitResult {
+    DriftFitResult {
+        rank: fit.rank,
+        condition: number(fit.condition),
+        chi2: number(fit.chi2),
+        degrees_of_freedom: fit.degrees_of_freedom,
+        paper_nm_per_min: fit
+            .paper_velocity
+            .map(|v| super::convert::pair(v, PER_MINUTE)),
+    }
+}
+
+fn drift_monte_carlo(draws: &DriftMonteCarlo) -> DriftMonteCarloResult {
+    let [x_nm_per_min, y_nm_per_min] = velocity(draws.mean, &draws.covariance);
+    let (mean, deviation) = mean_and_deviation(&draws.losses);
+    DriftMonteCarloResult {
+        draws: draws.draws.len(),
+        x_nm_per_min,
+        y_nm_per_min,
+        correlation: correlation(&draws.covariance),
+        residual_nm: estimate(Estimate::new(mean, deviation), 1.0),
+    }
+}
+
+fn mean(mean: &SetMean, material: &Material) -> MeanResult {
+    let result = &mean.twist_strain;
+    // The covariance of a set is enlarged by χ²/dof where that exceeds 1; NaN means there is none.
+    let unscaled = TwistStrain {
+        covariance: result.covariance / mean.chi2_per_dof.max(1.0),
+        ..*result
+    };
+    MeanResult {
+        twist_strain: result.into(),
+        vectors: LatticeVector::all(&mean.lattice, material),
+        twist_scatter_deg: number(mean.twist_scatter * degree()),
+        strain_scatter_percent: number(mean.strain_scatter * PERCENT),
+        chi2_per_dof: number(mean.chi2_per_dof),
+        twist_sigma_unscaled_deg: number(unscaled.twist().sigma * degree()),
+        heterostrain_sigma_unscaled_percent: number(unscaled.heterostrain().sigma * PERCENT),
+        within_one_percent: mean.within_one_percent,
+    }
+}
+
+fn combined(combined: &Combined, material: &Material) -> CombinedResult {
+    CombinedResult {
+        twist_strain: (&combined.twist_strain).into(),
+        vectors: LatticeVector::all(&combined.lattice, material),
+        consistency: combined.consistency.iter().map(consistency).collect(),
+    }
+}
+
+fn consistency(pair: &Consistency) -> ConsistencyResult {
+    ConsistencyResult {
+        sets: pair.sets.clone(),
+        drift_sigmas: pair.drift_sigmas.and_then(number),
+        twist_sigmas: number(pair.twist_sigmas),
+        strain_sigmas: number(pair.strain_sigmas),
+    }
+}

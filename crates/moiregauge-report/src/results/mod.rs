@@ -1,0 +1,30 @@
+//! The results as a document, `moiregauge/results/1`: degrees, per cent, nm and nm/min.
+//!
+//! In: an analysis in nm, s and rad and its provenance. Out: [`Results`], which serialises to
+//! `results.json` and is described by [`schema`]. A number that is not known is `null`, never NaN.
+
+mod conventions;
+mod convert;
+mod document;
+mod lattice;
+mod scan;
+
+pub use conventions::Conventions;
+pub use document::{
+    CombinedResult, ConsistencyResult, DriftFitResult, DriftMonteCarloResult, DriftResult,
+    InputProvenance, MeanResult, Results, SetResult,
+};
+pub use lattice::{LatticeVector, ResultEstimate, StrainMonteCarlo, TwistStrainResult};
+pub use scan::{LineResult, ScanResult, ScanTwistStrain, ScanVector, TipVelocity, Window};
+
+/// Name and version of the document.
+pub const SCHEMA: &str = "moiregauge/results/1";
+
+/// The JSON Schema (draft 2020-12) of [`Results`].
+pub fn schema() -> serde_json::Value {
+    let settings = schemars::generate::SchemaSettings::draft2020_12().for_serialize();
+    settings
+        .into_generator()
+        .into_root_schema_for::<Results>()
+        .into()
+}

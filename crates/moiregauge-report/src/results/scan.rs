@@ -1,0 +1,180 @@
+//! One scan as the document holds it.
+
+use moiregauge::analysis::{Axis, LineAnalysis, ScanAnalysis};
+use moiregauge::material::Material;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use spmfile::{DateTime, FrameDirection, LineDirection};
+
+use super::convert::{estimate, number, pair, square};
+use super::lattice::{LatticeVector, NAMES, ResultEstimate, StrainMonteCarlo, TwistStrainResult};
+
+/// One frame.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ScanResult {
+    /// The file as the user named it.
+    pub file: String,
+    /// When it was saved, by the instrument's clock, as in `2024-05-17T14:03:09`.
+    pub acquired: Option<String>,
+    /// `up`: the bottom line was acquired first; `down`: the top line.
+    pub frame_direction: String,
+    /// Where the tip was.
+    pub window: Window,
+    /// How fast it moved, nm/s; σ is the spread over the lines.
+    pub tip_velocity_nm_per_s: TipVelocity,
+    /// The three lattice vectors.
+    pub vectors: [ScanVector; 3],
+    /// Twist and strain before and after the drift was removed.
+    pub twist_strain: ScanTwistStrain,
+    /// Mean and spread of the Monte Carlo draws behind the best of `twist_strain`.
+    pub monte_carlo: Option<StrainMonteCarlo>,
+    /// The line directions that were used.
+    pub lines: Vec<LineResult>,
+}
+
+/// The scanned window.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Window {
+    /// Its centre (x, y), sensor coordinates, nm.
+    pub centre_nm: [Option<f64>; 2],
+    /// Lengths of its sides, the one nearer to x first, first to last pixel, nm.
+    pub extent_nm: [Option<f64>; 2],
+}
+
+/// Tip velocities.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct TipVelocity {
+    /// Along a line.
+    pub fast: ResultEstimate,
+    /// From line to line.
+    pub slow: ResultEstimate,
+}
+
+/// One lattice vector in three kinds of coordinates.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ScanVector {
+    /// `L1`, `L2` or `L3`.
+    pub name: String,
+    /// Direction by the best coordinates there are, degrees counter-clockwise from x.
+    pub polar_angle_deg: Option<f64>,
+    /// By the nominal size of the scan.
+    pub nominal: Option<LatticeVector>,
+    /// By the position sensors.
+    pub sensor: LatticeVector,
+    /// By the position sensors, the drift removed.
+    pub drift_corrected: Option<LatticeVector>,
+}
+
+/// Twist and strain of a scan.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ScanTwistStrain {
+    /// From sensor coordinates.
+    pub sensor: Option<TwistStrainResult>,
+    /// With the drift removed.
+    pub drift_corrected: Option<TwistStrainResult>,
+}
+
+/// What one line direction of a frame gave.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct LineResult {
+    /// `trace` or `retrace`.
+    pub line: String,
+    /// Whether position sensors placed the pixels.
+    pub from_sensors: bool,
+    /// Lattice periods across the shorter side.
+    pub periods: Option<f64>,
+    /// Amplitude of the weakest first harmonic over its noise.
+    pub signal_to_noise: Option<f64>,
+    /// Linear part of the map (column, row) → (x, y), nm per pixel, row by row.
+    pub pixel_to_nm: [[Option<f64>; 2]; 2],
+    /// Position of pixel (0, 0), the bottom left one, nm.
+    pub origin_nm: [Option<f64>; 2],
+    /// The three vectors in sensor coordinates.
+    pub vectors: [LatticeVector; 3],
+    /// The same by the other estimator.
+    pub comparison: Option<[LatticeVector; 3]>,
+    /// The published shortcut 4π/(√3|K|) of the three first wave vectors, nm: right only for
+    /// undistorted hexagons, for comparison.
+    pub shortcut_wavelengths_nm: Option<[Option<f64>; 3]>,
+}
+
+impl ScanResult {
+    pub(crate) fn of(scan: &ScanAnalysis, slow: Axis, material: &Material) -> Self {
+        let [fast_side, slow_side] = scan.window_extent;
+        let extent = match slow {
+            Axis::X => [slow_side, fast_side],
+            Axis::Y => [fast_side, slow_side],
+        };
+        Self {
+            file: scan.file.clone(),
+            acquired: scan.acquired.map(iso),
+            frame_direction: direction_name(scan.frame_direction).to_owned(),
+            window: Window {
+                centre_nm: pair(scan.window_centre, 1.0),
+                extent_nm: extent.map(number),
+            },
+            tip_velocity_nm_per_s: TipVelocity {
+                fast: estimate(scan.fast_velocity, 1.0),
+                slow: estimate(scan.slow_velocity, 1.0),
+            },
+            vectors: [0, 1, 2].map(|index| vector(scan, index, material)),
+            twist_strain: ScanTwistStrain {
+                sensor: scan.twist_strain_sensor.as_ref().map(Into::into),
+                drift_corrected: scan.twist_strain.as_ref().map(Into::into),
+            },
+            monte_carlo: StrainMonteCarlo::of(&scan.draws),
+            lines: scan
+                .lines
+                .iter()
+                .map(|line| line_result(line, material))
+                .collect(),
+        }
+    }
+}
+
+fn vector(scan: &ScanAnalysis, index: usize, material: &Material) -> ScanVector {
+    let sensor = LatticeVector::of(&scan.sensor, index, material);
+    let drift_corrected = scan
+        .drift_corrected
+        .map(|l| LatticeVector::of(&l, index, material));
+    ScanVector {
+        name: NAMES[index].to_owned(),
+        polar_angle_deg: drift_corrected.unwrap_or(sensor).polar_angle_deg,
+        nominal: scan.nominal.map(|l| LatticeVector::of(&l, index, material)),
+        sensor,
+        drift_corrected,
+    }
+}
+
+fn line_result(line: &LineAnalysis, material: &Material) -> LineResult {
+    LineResult {
+        line: match line.line {
+            LineDirection::Trace => "trace",
+            LineDirection::Retrace => "retrace",
+        }
+        .to_owned(),
+        from_sensors: line.from_sensors,
+        periods: number(line.periods),
+        signal_to_noise: number(line.signal_to_noise),
+        pixel_to_nm: square(&line.pixel_to_nm, 1.0),
+        origin_nm: pair(line.origin, 1.0),
+        vectors: LatticeVector::all(&line.sensor, material),
+        comparison: line.comparison.map(|l| LatticeVector::all(&l, material)),
+        shortcut_wavelengths_nm: line.shortcut_wavelengths.map(|l| l.map(number)),
+    }
+}
+
+fn direction_name(direction: FrameDirection) -> &'static str {
+    match direction {
+        FrameDirection::Up => "up",
+        FrameDirection::Down => "down",
+    }
+}
+
+/// ISO 8601 without a time zone, as the clock had none.
+fn iso(t: DateTime) -> String {
+    format!(
+        "{:04}-{:02}-{:02}T{:02}:{:02}:{:02}",
+        t.year, t.month, t.day, t.hour, t.minute, t.second
+    )
+}

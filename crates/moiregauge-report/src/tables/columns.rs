@@ -1,0 +1,218 @@
+//! What stands in which column. The same list makes the table and its explanation.
+
+use super::csv::{Column, number};
+use crate::results::{
+    LatticeVector, MeanResult, ResultEstimate, Results, ScanResult, SetResult, TwistStrainResult,
+};
+
+/// A kind of row.
+pub(super) trait Row<'a>: Sized + 'a {
+    /// What one row is.
+    const ABOUT: &'static str;
+    const COLUMNS: &'a [Column<Self>];
+    fn rows(results: &'a Results) -> Vec<Self>;
+}
+
+macro_rules! columns {
+    ($($name:literal, $about:literal, $value:expr;)*) => {
+        &[$(Column { name: $name, about: $about, value: $value }),*]
+    };
+}
+
+fn value(estimate: Option<ResultEstimate>) -> String {
+    number(estimate.and_then(|e| e.value))
+}
+
+fn sigma(estimate: Option<ResultEstimate>) -> String {
+    number(estimate.and_then(|e| e.sigma))
+}
+
+fn count(number: usize) -> String {
+    number.to_string()
+}
+
+/// One vector of one scan in one kind of coordinates.
+pub(super) struct VectorRow<'a> {
+    set: &'a SetResult,
+    number: usize,
+    scan: &'a ScanResult,
+    name: &'a str,
+    coordinates: &'static str,
+    vector: &'a LatticeVector,
+}
+
+impl<'a> Row<'a> for VectorRow<'a> {
+    const ABOUT: &'static str = "One row per scan, lattice vector and kind of coordinates.";
+    const COLUMNS: &'a [Column<Self>] = columns! {
+        "set", "name of the set", |r| r.set.name.clone();
+        "scan", "number of the scan in its set, from 1", |r| count(r.number);
+        "file", "the file as it was named", |r| r.scan.file.clone();
+        "frame_direction", "`up`: bottom line first; `down`: top line first", |r| r.scan.frame_direction.clone();
+        "vector", "L1, L2, or L3 = L2 − L1", |r| r.name.to_owned();
+        "coordinates", "`nominal`: stated size; `sensor`: position sensors; `drift_corrected`: sensors, drift removed", |r| r.coordinates.to_owned();
+        "x_nm", "component to the right", |r| number(r.vector.x_nm);
+        "y_nm", "component up", |r| number(r.vector.y_nm);
+        "variance_x_nm2", "variance of x", |r| number(r.vector.covariance_nm2[0][0]);
+        "variance_y_nm2", "variance of y", |r| number(r.vector.covariance_nm2[1][1]);
+        "covariance_xy_nm2", "covariance of x and y", |r| number(r.vector.covariance_nm2[0][1]);
+        "wavelength_nm", "length", |r| number(r.vector.wavelength_nm.value);
+        "wavelength_sigma_nm", "its σ", |r| number(r.vector.wavelength_nm.sigma);
+        "polar_angle_ccw_from_x_deg", "direction", |r| number(r.vector.polar_angle_deg);
+        "polar_angle_sigma_deg", "its σ", |r| number(r.vector.polar_angle_sigma_deg);
+        "naive_twist_deg", "2 arcsin(a/2λ), the twist without strain", |r| number(r.vector.naive_twist_deg.value);
+        "naive_twist_sigma_deg", "its σ", |r| number(r.vector.naive_twist_deg.sigma);
+    };
+
+    fn rows(results: &'a Results) -> Vec<Self> {
+        let mut rows = Vec::new();
+        for (set, number, scan) in scans(results) {
+            for vector in &scan.vectors {
+                let kinds = [
+                    ("nominal", vector.nominal.as_ref()),
+                    ("sensor", Some(&vector.sensor)),
+                    ("drift_corrected", vector.drift_corrected.as_ref()),
+                ];
+                rows.extend(kinds.into_iter().filter_map(|(coordinates, found)| {
+                    found.map(|found| Self {
+                        set,
+                        number,
+                        scan,
+                        name: &vector.name,
+                        coordinates,
+                        vector: found,
+                    })
+                }));
+            }
+        }
+        rows
+    }
+}
+
+/// Every scan with its set and its number.
+fn scans(results: &Results) -> impl Iterator<Item = (&SetResult, usize, &ScanResult)> {
+    results.sets.iter().flat_map(|set| {
+        set.scans
+            .iter()
+            .enumerate()
+            .map(move |(index, scan)| (set, index + 1, scan))
+    })
+}
+
+/// One scan, before or after drift correction.
+pub(super) struct ScanRow<'a> {
+    set: &'a SetResult,
+    number: usize,
+    scan: &'a ScanResult,
+    coordinates: &'static str,
+    result: Option<&'a TwistStrainResult>,
+}
+
+impl<'a> Row<'a> for ScanRow<'a> {
+    const ABOUT: &'static str = "One row per scan and kind of coordinates.";
+    const COLUMNS: &'a [Column<Self>] = columns! {
+        "set", "name of the set", |r| r.set.name.clone();
+        "scan", "number of the scan in its set, from 1", |r| count(r.number);
+        "file", "the file as it was named", |r| r.scan.file.clone();
+        "acquired", "date and time by the instrument's clock", |r| r.scan.acquired.clone().unwrap_or_default();
+        "frame_direction", "`up`: bottom line first; `down`: top line first", |r| r.scan.frame_direction.clone();
+        "slow_axis", "`x` or `y`", |r| r.set.slow_axis.clone();
+        "line_rate_hz", "lines per second", |r| number(r.set.line_rate_hz);
+        "window_centre_x_nm", "centre of the scanned window", |r| number(r.scan.window.centre_nm[0]);
+        "window_centre_y_nm", "centre of the scanned window", |r| number(r.scan.window.centre_nm[1]);
+        "window_extent_x_nm", "length of the side nearer to x", |r| number(r.scan.window.extent_nm[0]);
+        "window_extent_y_nm", "length of the side nearer to y", |r| number(r.scan.window.extent_nm[1]);
+        "tip_velocity_fast_nm_per_s", "along a line", |r| number(r.scan.tip_velocity_nm_per_s.fast.value);
+        "tip_velocity_fast_spread_nm_per_s", "standard deviation over the lines", |r| number(r.scan.tip_velocity_nm_per_s.fast.sigma);
+        "tip_velocity_slow_nm_per_s", "from line to line", |r| number(r.scan.tip_velocity_nm_per_s.slow.value);
+        "tip_velocity_slow_spread_nm_per_s", "standard deviation", |r| number(r.scan.tip_velocity_nm_per_s.slow.sigma);
+        "coordinates", "`sensor`: not corrected; `drift_corrected`: drift removed", |r| r.coordinates.to_owned();
+        "twist_deg", "twist θ", |r| value(r.result.map(|t| t.twist_deg));
+        "twist_sigma_deg", "its σ", |r| sigma(r.result.map(|t| t.twist_deg));
+        "heterostrain_percent", "ε, noise bias removed", |r| value(r.result.map(|t| t.heterostrain_percent));
+        "heterostrain_sigma_percent", "its σ", |r| sigma(r.result.map(|t| t.heterostrain_percent));
+        "strain_e1_percent", "ε cos 2φ_lab", |r| number(r.result.and_then(|t| t.strain_vector_percent[0]));
+        "strain_e2_percent", "ε sin 2φ_lab", |r| number(r.result.and_then(|t| t.strain_vector_percent[1]));
+        "strain_axis_lab_ccw_from_x_deg", "φ_lab; empty unless p < 0.01", |r| value(r.result.and_then(|t| t.strain_axis_lab_deg));
+        "strain_axis_lab_sigma_deg", "its σ", |r| sigma(r.result.and_then(|t| t.strain_axis_lab_deg));
+        "strain_axis_lattice_deg", "φ from layer 1; empty unless p < 0.01", |r| value(r.result.and_then(|t| t.strain_axis_lattice_deg));
+        "strain_axis_lattice_sigma_deg", "its σ", |r| sigma(r.result.and_then(|t| t.strain_axis_lattice_deg));
+        "strain_p_value", "how often noise alone gives such a strain", |r| number(r.result.and_then(|t| t.strain_p_value));
+        "lattice_angle_deg", "orientation α of layer 1, modulo 60°", |r| value(r.result.map(|t| t.lattice_angle_deg));
+        "lattice_angle_sigma_deg", "its σ", |r| sigma(r.result.map(|t| t.lattice_angle_deg));
+    };
+
+    fn rows(results: &'a Results) -> Vec<Self> {
+        let both = scans(results).flat_map(|(set, number, scan)| {
+            let kinds = [
+                ("sensor", scan.twist_strain.sensor.as_ref()),
+                (
+                    "drift_corrected",
+                    scan.twist_strain.drift_corrected.as_ref(),
+                ),
+            ];
+            kinds.map(|(coordinates, result)| Self {
+                set,
+                number,
+                scan,
+                coordinates,
+                result,
+            })
+        });
+        both.collect()
+    }
+}
+
+/// One set, corrected for drift.
+pub(super) struct SetRow<'a> {
+    set: &'a SetResult,
+}
+
+impl SetRow<'_> {
+    fn mean(&self) -> Option<&MeanResult> {
+        self.set.mean.as_ref()
+    }
+
+    fn result(&self) -> Option<&TwistStrainResult> {
+        self.mean().map(|m| &m.twist_strain)
+    }
+}
+
+impl<'a> Row<'a> for SetRow<'a> {
+    const ABOUT: &'static str =
+        "One row per set: drift, and twist and strain of all its scans together, drift removed.";
+    const COLUMNS: &'a [Column<Self>] = columns! {
+        "set", "name of the set", |r| r.set.name.clone();
+        "slow_axis", "`x` or `y`", |r| r.set.slow_axis.clone();
+        "line_rate_hz", "lines per second", |r| number(r.set.line_rate_hz);
+        "channel", "the analysed channel", |r| r.set.channel.clone();
+        "scans", "number of scans", |r| count(r.set.scans.len());
+        "drift_x_nm_per_min", "drift to the right", |r| value(r.set.drift.as_ref().map(|d| d.x_nm_per_min));
+        "drift_x_sigma_nm_per_min", "its σ", |r| sigma(r.set.drift.as_ref().map(|d| d.x_nm_per_min));
+        "drift_y_nm_per_min", "drift up", |r| value(r.set.drift.as_ref().map(|d| d.y_nm_per_min));
+        "drift_y_sigma_nm_per_min", "its σ", |r| sigma(r.set.drift.as_ref().map(|d| d.y_nm_per_min));
+        "drift_correlation", "correlation coefficient of the two", |r| number(r.set.drift.as_ref().and_then(|d| d.correlation));
+        "drift_given", "whether the user gave the drift", |r| r.set.drift.as_ref().map_or_else(String::new, |d| d.given.to_string());
+        "twist_deg", "twist θ", |r| value(r.result().map(|t| t.twist_deg));
+        "twist_sigma_deg", "its σ", |r| sigma(r.result().map(|t| t.twist_deg));
+        "twist_scatter_deg", "standard deviation over the scans", |r| number(r.mean().and_then(|m| m.twist_scatter_deg));
+        "heterostrain_percent", "ε, noise bias removed", |r| value(r.result().map(|t| t.heterostrain_percent));
+        "heterostrain_sigma_percent", "its σ", |r| sigma(r.result().map(|t| t.heterostrain_percent));
+        "strain_e1_percent", "ε cos 2φ_lab", |r| number(r.result().and_then(|t| t.strain_vector_percent[0]));
+        "strain_e2_percent", "ε sin 2φ_lab", |r| number(r.result().and_then(|t| t.strain_vector_percent[1]));
+        "strain_variance_e1_percent2", "variance of E₁", |r| number(r.result().and_then(|t| t.strain_vector_covariance[0][0]));
+        "strain_variance_e2_percent2", "variance of E₂", |r| number(r.result().and_then(|t| t.strain_vector_covariance[1][1]));
+        "strain_covariance_e1_e2_percent2", "covariance of E₁ and E₂", |r| number(r.result().and_then(|t| t.strain_vector_covariance[0][1]));
+        "strain_scatter_percent", "deviation per component over the scans", |r| number(r.mean().and_then(|m| m.strain_scatter_percent));
+        "strain_axis_lab_ccw_from_x_deg", "φ_lab; empty unless p < 0.01", |r| value(r.result().and_then(|t| t.strain_axis_lab_deg));
+        "strain_axis_lab_sigma_deg", "its σ", |r| sigma(r.result().and_then(|t| t.strain_axis_lab_deg));
+        "strain_p_value", "how often noise alone gives such a strain", |r| number(r.result().and_then(|t| t.strain_p_value));
+        "strain_upper_limit_95_percent", "not exceeded with 95 % confidence", |r| number(r.result().and_then(|t| t.strain_upper_limit_95_percent));
+        "lattice_angle_deg", "orientation α of layer 1, modulo 60°", |r| value(r.result().map(|t| t.lattice_angle_deg));
+        "chi2_per_dof", "χ² per degree of freedom of the scans against the common lattice; every σ is enlarged by its square root where it exceeds 1", |r| number(r.mean().and_then(|m| m.chi2_per_dof));
+        "within_one_percent", "whether all wavelengths lie within ±1 % of the common ones", |r| r.mean().map_or_else(String::new, |m| m.within_one_percent.to_string());
+    };
+
+    fn rows(results: &'a Results) -> Vec<Self> {
+        results.sets.iter().map(|set| Self { set }).collect()
+    }
+}

@@ -1,0 +1,57 @@
+//! The results as tables: `vectors.csv`, `scans.csv`, `sets.csv` and `columns.md`, which explains them.
+//!
+//! In: the document. Out: RFC 4180 text in UTF-8, one header line, units in the column names, an
+//! empty field where a number is not known. Nothing but data is in the files: comments break readers.
+
+mod columns;
+mod csv;
+
+use crate::results::Results;
+use columns::{Row, ScanRow, SetRow, VectorRow};
+
+/// All tables as named files.
+pub(crate) fn tables(results: &Results) -> Vec<(String, Vec<u8>)> {
+    let (vectors, scans, sets) = (
+        VectorRow::rows(results),
+        ScanRow::rows(results),
+        SetRow::rows(results),
+    );
+    let mut about = String::from(ABOUT);
+    about.push_str(&csv::explanation(
+        "vectors.csv",
+        VectorRow::ABOUT,
+        VectorRow::COLUMNS,
+    ));
+    about.push_str(&csv::explanation(
+        "scans.csv",
+        ScanRow::ABOUT,
+        ScanRow::COLUMNS,
+    ));
+    about.push_str(&csv::explanation(
+        "sets.csv",
+        SetRow::ABOUT,
+        SetRow::COLUMNS,
+    ));
+    vec![
+        (
+            "vectors.csv".to_owned(),
+            csv::text(VectorRow::COLUMNS, &vectors).into_bytes(),
+        ),
+        (
+            "scans.csv".to_owned(),
+            csv::text(ScanRow::COLUMNS, &scans).into_bytes(),
+        ),
+        (
+            "sets.csv".to_owned(),
+            csv::text(SetRow::COLUMNS, &sets).into_bytes(),
+        ),
+        ("columns.md".to_owned(), about.into_bytes()),
+    ]
+}
+
+const ABOUT: &str = "# Columns of the tables
+
+Comma-separated, UTF-8, RFC 4180; the unit is the end of the name (`_nm`, `_deg`, `_percent`,
+`_nm_per_min`, `_hz`); `_sigma` is one standard deviation. An empty field is not known.
+x to the right, y up; angles counter-clockwise from x. `results.json` holds the same and more.
+";
