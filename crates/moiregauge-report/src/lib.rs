@@ -7,6 +7,7 @@ mod draw;
 mod error;
 mod figures;
 mod format;
+mod html;
 mod provenance;
 mod report;
 pub mod results;

@@ -7,6 +7,7 @@ use crate::draw::colormap::ColorMap;
 use crate::draw::png;
 use crate::error::ReportError;
 use crate::figures::{Figure, figures};
+use crate::html;
 use crate::provenance::Provenance;
 use crate::results::Results;
 use crate::tables::tables;
@@ -16,9 +17,9 @@ use crate::tables::tables;
 pub struct Choice {
     /// The figures as SVG files.
     pub figures: bool,
-    /// The figures as PNG files as well, 300 dots per inch.
+    /// The figures as PNG files, 300 dots per inch.
     pub png: bool,
-    /// `report.html`.
+    /// `report.html`, with the figures inside.
     pub html: bool,
     /// Colours of images.
     pub colormap: ColorMap,
@@ -35,8 +36,8 @@ impl Default for Choice {
     }
 }
 
-/// The figures as files: SVG and, if wanted, PNG, in the order of the figures on any number of threads.
-fn figure_files(all: &[Figure], png: bool) -> Result<Vec<(String, Vec<u8>)>, ReportError> {
+/// The figures as files, in the order of the figures on any number of threads.
+fn figure_files(all: &[Figure], choice: &Choice) -> Result<Vec<(String, Vec<u8>)>, ReportError> {
     let drawn: Vec<(&str, &str)> = all
         .iter()
         .filter_map(|f| {
@@ -49,8 +50,11 @@ fn figure_files(all: &[Figure], png: bool) -> Result<Vec<(String, Vec<u8>)>, Rep
     let pictures: Vec<Vec<(String, Vec<u8>)>> = drawn
         .par_iter()
         .map(|&(name, svg)| {
-            let mut files = vec![(format!("figures/{name}.svg"), svg.as_bytes().to_vec())];
-            if png {
+            let mut files = Vec::new();
+            if choice.figures {
+                files.push((format!("figures/{name}.svg"), svg.as_bytes().to_vec()));
+            }
+            if choice.png {
                 files.push((format!("figures/{name}.png"), png::render(svg)?));
             }
             Ok(files)
@@ -73,7 +77,16 @@ pub fn write_report(
     let results = Results::new(analysis, provenance);
     let mut files = vec![("results.json".to_owned(), results.to_json()?)];
     files.extend(tables(&results));
+    if !(choice.figures || choice.png || choice.html) {
+        return Ok(files);
+    }
     let all = figures(analysis, choice.colormap);
-    files.extend(figure_files(&all, choice.png)?);
+    let page = if choice.html {
+        Some(html::page(&results, &all, &files)?)
+    } else {
+        None
+    };
+    files.extend(figure_files(&all, choice)?);
+    files.extend(page.map(|page| ("report.html".to_owned(), page)));
     Ok(files)
 }

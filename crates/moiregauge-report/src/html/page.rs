@@ -1,0 +1,255 @@
+//! What the page says, as text ready for the template.
+
+use moiregauge::settings::Method;
+use serde::Serialize;
+
+use super::words::{Numbers, consistency, conventions, plain, shown, wavelengths};
+use crate::draw::base64;
+use crate::error::ReportError;
+use crate::figures::Figure;
+use crate::results::{DriftResult, Results, ScanResult, SetResult};
+
+#[derive(Debug, Serialize)]
+pub(super) struct Page<'a> {
+    results: &'a Results,
+    scans: usize,
+    /// The published method, whose bias the page has to tell, was used.
+    paper: bool,
+    combined: Option<Numbers>,
+    combined_wavelengths: Option<[String; 3]>,
+    sets: Vec<Set<'a>>,
+    consistency: Vec<[String; 5]>,
+    /// Figures of all sets together.
+    together: Vec<Shown<'a>>,
+    conventions: Vec<[String; 2]>,
+    settings: String,
+    downloads: Vec<Download<'a>>,
+}
+
+#[derive(Debug, Serialize)]
+struct Set<'a> {
+    number: usize,
+    found: &'a SetResult,
+    rate: String,
+    drift: Option<Drift>,
+    mean: Option<Numbers>,
+    mean_wavelengths: Option<[String; 3]>,
+    uncorrected: Option<Numbers>,
+    uncorrected_wavelengths: Option<[String; 3]>,
+    forward_backward: Option<Numbers>,
+    chi2_per_dof: String,
+    twist_scatter: String,
+    strain_scatter: String,
+    scans: Vec<Scan<'a>>,
+    figures: Vec<Shown<'a>>,
+    missing: Vec<Missing<'a>>,
+}
+
+#[derive(Debug, Serialize)]
+struct Drift {
+    x: String,
+    y: String,
+    given: bool,
+    fit: Option<DriftFit>,
+    draws: Option<DriftDraws>,
+}
+
+#[derive(Debug, Serialize)]
+struct DriftFit {
+    rank: usize,
+    condition: String,
+    chi2: String,
+    degrees_of_freedom: usize,
+    paper: Option<[String; 2]>,
+}
+
+#[derive(Debug, Serialize)]
+struct DriftDraws {
+    count: usize,
+    x: String,
+    y: String,
+}
+
+#[derive(Debug, Serialize)]
+struct Scan<'a> {
+    number: usize,
+    found: &'a ScanResult,
+    before: Option<Numbers>,
+    after: Option<Numbers>,
+    wavelengths: [String; 3],
+    periods: String,
+    signal_to_noise: String,
+}
+
+#[derive(Clone, Debug, Serialize)]
+struct Shown<'a> {
+    number: usize,
+    name: &'a str,
+    title: &'a str,
+    caption: &'a str,
+    svg: &'a str,
+}
+
+#[derive(Debug, Serialize)]
+struct Missing<'a> {
+    title: &'a str,
+    reason: &'a str,
+}
+
+#[derive(Debug, Serialize)]
+struct Download<'a> {
+    name: &'a str,
+    kind: &'static str,
+    base64: String,
+}
+
+impl<'a> Page<'a> {
+    pub(super) fn new(
+        results: &'a Results,
+        figures: &'a [Figure],
+        downloads: &'a [(String, Vec<u8>)],
+    ) -> Result<Self, ReportError> {
+        let all = numbered(figures);
+        let of = |wanted: Option<usize>| {
+            let own = all.iter().filter(move |(set, _)| *set == wanted);
+            own.map(|(_, figure)| figure.clone()).collect::<Vec<_>>()
+        };
+        let combined = results.combined.as_ref();
+        let sets = results.sets.iter().enumerate();
+        Ok(Self {
+            results,
+            scans: results.sets.iter().map(|set| set.scans.len()).sum(),
+            paper: results.settings.method == Method::Paper,
+            combined: combined.map(|c| Numbers::new(&c.twist_strain)),
+            combined_wavelengths: combined.map(|c| wavelengths(&c.vectors)),
+            sets: sets
+                .map(|(i, set)| Set::new(i, set, of(Some(i)), missing(figures, i)))
+                .collect(),
+            consistency: consistency(results),
+            together: of(None),
+            conventions: conventions(&results.conventions)?,
+            settings: serde_json::to_string_pretty(&results.settings)?,
+            downloads: downloads
+                .iter()
+                .map(|(name, bytes)| download(name, bytes))
+                .collect(),
+        })
+    }
+}
+
+/// The drawn figures, numbered through, with the set each belongs to.
+fn numbered(figures: &[Figure]) -> Vec<(Option<usize>, Shown<'_>)> {
+    let drawn = figures
+        .iter()
+        .filter_map(|f| f.drawing.as_ref().ok().map(|d| (f, d)));
+    drawn
+        .enumerate()
+        .map(|(index, (figure, drawing))| {
+            let shown = Shown {
+                number: index + 1,
+                name: &figure.name,
+                title: figure.title,
+                caption: &drawing.caption,
+                svg: &drawing.svg,
+            };
+            (figure.set, shown)
+        })
+        .collect()
+}
+
+/// The figures of a set that were left out.
+fn missing(figures: &[Figure], set: usize) -> Vec<Missing<'_>> {
+    let own = figures.iter().filter(|f| f.set == Some(set));
+    own.filter_map(|f| {
+        f.drawing.as_ref().err().map(|reason| Missing {
+            title: f.title,
+            reason,
+        })
+    })
+    .collect()
+}
+
+fn download<'a>(name: &'a str, bytes: &[u8]) -> Download<'a> {
+    Download {
+        name,
+        kind: match name.rsplit('.').next() {
+            Some("json") => "application/json",
+            Some("csv") => "text/csv;charset=utf-8",
+            _ => "text/plain;charset=utf-8",
+        },
+        base64: base64::encode(bytes),
+    }
+}
+
+impl<'a> Set<'a> {
+    fn new(
+        index: usize,
+        set: &'a SetResult,
+        figures: Vec<Shown<'a>>,
+        missing: Vec<Missing<'a>>,
+    ) -> Self {
+        let (mean, uncorrected) = (set.mean.as_ref(), set.uncorrected.as_ref());
+        Self {
+            number: index + 1,
+            found: set,
+            rate: plain(set.line_rate_hz, 2),
+            drift: set.drift.as_ref().map(drift),
+            mean: mean.map(|m| Numbers::new(&m.twist_strain)),
+            mean_wavelengths: mean.map(|m| wavelengths(&m.vectors)),
+            uncorrected: uncorrected.map(|m| Numbers::new(&m.twist_strain)),
+            uncorrected_wavelengths: uncorrected.map(|m| wavelengths(&m.vectors)),
+            forward_backward: set.forward_backward.as_ref().map(Numbers::new),
+            chi2_per_dof: plain(mean.and_then(|m| m.chi2_per_dof), 2),
+            twist_scatter: plain(mean.and_then(|m| m.twist_scatter_deg), 4),
+            strain_scatter: plain(mean.and_then(|m| m.strain_scatter_percent), 4),
+            scans: set
+                .scans
+                .iter()
+                .enumerate()
+                .map(|(i, s)| Scan::new(i, s))
+                .collect(),
+            figures,
+            missing,
+        }
+    }
+}
+
+fn drift(drift: &DriftResult) -> Drift {
+    Drift {
+        x: shown(drift.x_nm_per_min),
+        y: shown(drift.y_nm_per_min),
+        given: drift.given,
+        fit: drift.fit.as_ref().map(|fit| DriftFit {
+            rank: fit.rank,
+            condition: plain(fit.condition, 2),
+            chi2: plain(fit.chi2, 1),
+            degrees_of_freedom: fit.degrees_of_freedom,
+            paper: fit.paper_nm_per_min.map(|v| v.map(|part| plain(part, 3))),
+        }),
+        draws: drift.monte_carlo.as_ref().map(|draws| DriftDraws {
+            count: draws.draws,
+            x: shown(draws.x_nm_per_min),
+            y: shown(draws.y_nm_per_min),
+        }),
+    }
+}
+
+impl<'a> Scan<'a> {
+    fn new(index: usize, scan: &'a ScanResult) -> Self {
+        let lowest = |values: fn(&crate::results::LineResult) -> Option<f64>| {
+            scan.lines.iter().filter_map(values).reduce(f64::min)
+        };
+        Self {
+            number: index + 1,
+            found: scan,
+            before: scan.twist_strain.sensor.as_ref().map(Numbers::new),
+            after: scan.twist_strain.drift_corrected.as_ref().map(Numbers::new),
+            wavelengths: scan
+                .vectors
+                .each_ref()
+                .map(|v| shown(v.drift_corrected.unwrap_or(v.sensor).wavelength_nm)),
+            periods: plain(lowest(|line| line.periods), 1),
+            signal_to_noise: plain(lowest(|line| line.signal_to_noise), 1),
+        }
+    }
+}
