@@ -1,3 +1,45 @@
-//! The `moiregauge` program.
+//! The `moiregauge` program: a table of contents.
 
-fn main() {}
+mod analyze;
+mod config;
+mod demo;
+mod info;
+mod simulate;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+/// The strain gauge for moiré superlattices
+///
+/// Scanning-probe images of stacked two-dimensional crystals in; drift velocity, moiré lattice, twist
+/// angle and heterostrain out, each with its uncertainty.
+#[derive(Parser)]
+#[command(version, max_term_width = 100)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    Analyze(Box<analyze::AnalyzeArgs>),
+    Info(info::InfoArgs),
+    Simulate(Box<simulate::SimulateArgs>),
+    Demo(demo::DemoArgs),
+    Config(config::ConfigArgs),
+}
+
+fn main() -> ExitCode {
+    let result = match Cli::parse().command {
+        Command::Analyze(args) => analyze::run(&args),
+        Command::Info(args) => info::run(&args),
+        Command::Simulate(args) => simulate::run(&args),
+        Command::Demo(args) => demo::run(&args),
+        Command::Config(args) => config::run(&args),
+    };
+    result.unwrap_or_else(|error| {
+        eprintln!("error: {error:#}");
+        ExitCode::FAILURE
+    })
+}

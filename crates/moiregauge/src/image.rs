@@ -42,4 +42,60 @@ impl Image {
             .collect();
         Self::new(size[1], size[0], values)
     }
+
+    /// Means over blocks of `factor × factor` pixels. A block of which less than half is there is
+    /// missing; rows and columns that fill no block are left out.
+    #[must_use]
+    pub fn binned(&self, factor: usize) -> Self {
+        let (rows, columns) = (self.rows / factor, self.columns / factor);
+        let mut values = Vec::with_capacity(rows * columns);
+        let (mut sums, mut counts) = (vec![0.0; columns], vec![0usize; columns]);
+        for row in 0..rows {
+            sums.fill(0.0);
+            counts.fill(0);
+            for line in row * factor..(row + 1) * factor {
+                let blocks = self.row(line).chunks_exact(factor);
+                for ((block, sum), count) in blocks.zip(&mut sums).zip(&mut counts) {
+                    for v in block.iter().filter(|v| v.is_finite()) {
+                        *sum += v;
+                        *count += 1;
+                    }
+                }
+            }
+            values.extend(sums.iter().zip(&counts).map(|(sum, &count)| {
+                if 2 * count >= factor * factor {
+                    sum / count as f64
+                } else {
+                    f64::NAN
+                }
+            }));
+        }
+        Self::new(rows, columns, values)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn blocks_and_bins() {
+        let n = f64::NAN;
+        let image = Image::new(
+            3,
+            5,
+            vec![
+                1.0, 2.0, 3.0, n, 9.0, //
+                3.0, 4.0, n, n, 9.0, //
+                9.0, 9.0, 9.0, 9.0, 9.0,
+            ],
+        );
+        let binned = image.binned(2);
+        assert_eq!((binned.rows, binned.columns), (1, 2));
+        assert_eq!(binned.values[0], 2.5);
+        assert!(binned.values[1].is_nan());
+        let block = image.cropped([1, 0], [2, 2]);
+        assert_eq!(block.row(0), [2.0, 3.0]);
+        assert_eq!(block.row(1)[0], 4.0);
+    }
 }

@@ -16,6 +16,7 @@ use nalgebra::{DMatrix, Matrix2, Matrix2xX, Matrix4, Matrix6, Vector2, Vector6};
 
 use super::LatticeVectors;
 use super::harmonics::Harmonics;
+use super::reciprocal::reciprocal;
 use super::transform::{Autocorrelation, Spectrum, hann_at};
 
 /// Radius of the patch around a peak, as a share of the shortest lattice vector.
@@ -38,19 +39,40 @@ pub(crate) fn measure(
     let mut basis = *start;
     // Near peaks first: an error of the start grows with the distance.
     for reach in [0.5 * FARTHEST, FARTHEST] {
-        let peaks = peaks(&autocorrelation, &basis, reach * frame);
-        if peaks.len() >= 3 {
-            basis = fit(&peaks, frame, None)?.0;
+        let near = peaks(&autocorrelation, &basis, &places(&basis, reach * frame));
+        if near.len() >= 3 {
+            basis = fit(&near, frame, None)?.0;
         }
     }
-    let peaks = peaks(&autocorrelation, &basis, FARTHEST * frame);
-    if peaks.len() < 3 {
+    let places = places(&basis, FARTHEST * frame);
+    let measured = peaks(&autocorrelation, &basis, &places);
+    let unbiased = unbiased(measured, harmonics, &places)?;
+    if unbiased.len() < 3 {
         return None;
     }
-    let (basis, covariance) = fit(&peaks, frame, Some(harmonics))?;
+    let (basis, covariance) = fit(&unbiased, frame, Some(harmonics))?;
     Some(LatticeVectors { basis, covariance })
 }
 
+/// Takes off what the frame does to the peaks: the same peaks are measured on the model image,
+/// whose lattice is known. Thousandths of a wavelength at four periods become some 10⁻⁵.
+fn unbiased(
+    measured: Vec<Peak>,
+    harmonics: &Harmonics,
+    places: &[Vector2<f64>],
+) -> Option<Vec<Peak>> {
+    let basis = reciprocal(&harmonics.pair)?;
+    let autocorrelation = Spectrum::new(&harmonics.model).autocorrelation();
+    let modelled = peaks(&autocorrelation, &basis, places);
+    let corrected = measured.into_iter().filter_map(|mut peak| {
+        let model = modelled.iter().find(|m| m.index == peak.index)?;
+        peak.position -= model.position - basis * peak.index;
+        Some(peak)
+    });
+    Some(corrected.collect())
+}
+
+#[derive(Clone, Debug)]
 struct Peak {
     /// Lattice indices in the basis at 60°.
     index: Vector2<f64>,
@@ -60,21 +82,10 @@ struct Peak {
     roughness: f64,
 }
 
-/// Measures the peaks at the lattice points within an ellipse.
-fn peaks(
-    autocorrelation: &Autocorrelation,
-    basis: &Matrix2<f64>,
-    reach: Vector2<f64>,
-) -> Vec<Peak> {
-    let third = basis.column(1) - basis.column(0);
-    let shortest = basis
-        .column(0)
-        .norm()
-        .min(basis.column(1).norm())
-        .min(third.norm());
-    let radius = (PATCH * shortest).max(1.6);
+/// Indices of the lattice points within an ellipse, nearest first, at most [`MOST_PEAKS`].
+fn places(basis: &Matrix2<f64>, reach: Vector2<f64>) -> Vec<Vector2<f64>> {
     let mut places: Vec<(f64, Vector2<f64>)> = Vec::new();
-    let farthest = (reach.amax() / shortest).ceil() as i64 + 1;
+    let farthest = (reach.amax() / shortest(basis)).ceil() as i64 + 1;
     for h in -farthest..=farthest {
         for k in 0..=farthest {
             if k == 0 && h <= 0 {
@@ -88,27 +99,41 @@ fn peaks(
         }
     }
     places.sort_by(|a, b| a.0.total_cmp(&b.0));
-    if places.len() > MOST_PEAKS {
-        // The nearest third, and of the others evenly many at every distance.
-        let near = MOST_PEAKS / 3;
-        let (far, wanted) = (places.len() - near, MOST_PEAKS - near);
-        let mut chosen: Vec<_> = places[..near].to_vec();
-        chosen
-            .extend((0..wanted).map(|i| places[near + (i * far + far - 1) / wanted.max(1) % far]));
-        chosen.dedup_by(|a, b| a.1 == b.1);
-        places = chosen;
+    let all = places.into_iter().map(|(_, index)| index);
+    if all.len() <= MOST_PEAKS {
+        return all.collect();
     }
-    places
-        .into_iter()
-        .filter_map(|(_, index)| {
-            let (position, roughness) = peak(autocorrelation, basis * index, radius)?;
-            Some(Peak {
-                index,
-                position,
-                roughness,
-            })
+    // The nearest third, and of the others evenly many at every distance.
+    let near = MOST_PEAKS / 3;
+    let stride = (all.len() - near) as f64 / (MOST_PEAKS - near) as f64;
+    let all: Vec<_> = all.collect();
+    let far = (1..=MOST_PEAKS - near).map(|i| near + (i as f64 * stride) as usize - 1);
+    (0..near).chain(far).map(|i| all[i]).collect()
+}
+
+/// Length of the shortest of the three vectors.
+fn shortest(basis: &Matrix2<f64>) -> f64 {
+    let third = basis.column(1) - basis.column(0);
+    let both = basis.column(0).norm().min(basis.column(1).norm());
+    both.min(third.norm())
+}
+
+/// Measures the peaks at these lattice points; those that are none are left out.
+fn peaks(
+    autocorrelation: &Autocorrelation,
+    basis: &Matrix2<f64>,
+    places: &[Vector2<f64>],
+) -> Vec<Peak> {
+    let radius = (PATCH * shortest(basis)).max(1.6);
+    let measured = places.iter().filter_map(|&index| {
+        let (position, roughness) = peak(autocorrelation, basis * index, radius)?;
+        Some(Peak {
+            index,
+            position,
+            roughness,
         })
-        .collect()
+    });
+    measured.collect()
 }
 
 /// The top of the paraboloid through a patch, re-centred until it sits on the top.
@@ -194,8 +219,15 @@ fn fit(
         .collect();
     // Beside κ each peak has an error of its own: noise correlated with noise, and what the finite
     // patch leaves.
-    let mut covariance = DMatrix::from_fn(n, n, |i, j| overlaps[i].kappa(&overlaps[j]));
-    let v = harmonics.map_or(Some(Matrix2::identity()), gradient_noise)?;
+    let noise = harmonics.map_or(Some(GradientNoise::unit()), GradientNoise::new)?;
+    let along: Vec<f64> = peaks
+        .iter()
+        .map(|p| noise.along(p.position.component_div(&frame)))
+        .collect();
+    let mut covariance = DMatrix::from_fn(n, n, |i, j| {
+        (along[i] * along[j]).sqrt() * overlaps[i].kappa(&overlaps[j])
+    });
+    let v = noise.v;
     let per_lag = harmonics.map_or(0.0, noise_with_noise);
     for (i, (peak, overlap)) in peaks.iter().zip(&overlaps).enumerate() {
         let own = 2.0 * per_lag * overlap.squares * peak.roughness / v.trace();
@@ -219,22 +251,48 @@ fn fit(
     Some((basis, inverse.kronecker(&v) * scale))
 }
 
-/// `V = H⁻¹ N H⁻¹`.
-fn gradient_noise(harmonics: &Harmonics) -> Option<Matrix2<f64>> {
-    let (mut h, mut n) = (Matrix2::zeros(), Matrix2::zeros());
-    for harmonic in &harmonics.list {
-        let term = 2.0 * harmonic.amplitude.norm_sqr() * harmonic.q * harmonic.q.transpose();
-        h += term;
-        n += term * harmonic.noise;
+/// `V = H⁻¹ N H⁻¹`, and how the noise depends on the direction of the lag.
+struct GradientNoise {
+    v: Matrix2<f64>,
+    /// Noise that acts along x and along y, over their mean.
+    axes: Vector2<f64>,
+}
+
+impl GradientNoise {
+    fn unit() -> Self {
+        Self {
+            v: Matrix2::identity(),
+            axes: Vector2::new(1.0, 1.0),
+        }
     }
-    let inverse = h.try_inverse()?;
-    Some(inverse * n * inverse)
+
+    fn new(harmonics: &Harmonics) -> Option<Self> {
+        let (mut h, mut n) = (Matrix2::zeros(), Matrix2::zeros());
+        let mut axes = Vector2::zeros();
+        for harmonic in &harmonics.list {
+            let term = 2.0 * harmonic.amplitude.norm_sqr() * harmonic.q * harmonic.q.transpose();
+            let noise = Vector2::from(harmonic.noise);
+            h += term;
+            n += term * noise.mean();
+            axes += term.trace() * noise;
+        }
+        let inverse = h.try_inverse()?;
+        Some(Self {
+            v: inverse * n * inverse,
+            axes: axes / axes.mean(),
+        })
+    }
+
+    /// The factor for a lag: it compares pixels that lie apart along it.
+    fn along(&self, lag: Vector2<f64>) -> f64 {
+        lag.component_mul(&lag).dot(&self.axes) / lag.norm_squared()
+    }
 }
 
 /// Variance per lag of the noise correlated with itself, before division by the overlap.
 fn noise_with_noise(harmonics: &Harmonics) -> f64 {
-    let count = harmonics.list.len() as f64;
-    let mean = harmonics.list.iter().map(|h| h.noise).sum::<f64>() / count;
+    let count = 2.0 * harmonics.list.len() as f64;
+    let mean = harmonics.list.iter().flat_map(|h| h.noise).sum::<f64>() / count;
     mean * mean
 }
 

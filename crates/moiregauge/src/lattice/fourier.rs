@@ -58,7 +58,7 @@ fn reciprocal_lattice(
     let variance = |h: &Harmonic, axis: usize| {
         let other = 1 - axis;
         let (m, o) = (moments[axis], moments[other]);
-        h.noise * m[3] * o[2] / (2.0 * h.amplitude.norm_sqr() * (m[1] * o[0]).powi(2))
+        h.noise[axis] * m[3] * o[2] / (2.0 * h.amplitude.norm_sqr() * (m[1] * o[0]).powi(2))
     };
     let rows = [[1.0, 0.0], [0.0, 1.0], [-1.0, 1.0]];
     let mut k = LatticeVectors {

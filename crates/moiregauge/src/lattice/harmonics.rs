@@ -8,11 +8,9 @@ use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
 use rustfft::num_complex::Complex64;
 
 use super::transform::hann;
+use crate::background::remove_background;
 use crate::image::Image;
-
-/// Noise is read between these distances from a harmonic, in cycles per frame: outside its main
-/// lobe (the window's is ±2), near enough to be the noise that matters.
-const ANNULUS: [f64; 2] = [1.0, 5.0];
+use crate::settings::Background;
 
 /// One harmonic of the lattice.
 #[derive(Clone, Copy, Debug)]
@@ -21,8 +19,8 @@ pub(crate) struct Harmonic {
     pub(crate) q: Vector2<f64>,
     /// Complex amplitude, phase at pixel (0, 0); a cosine of amplitude A has |c| = A/2.
     pub(crate) amplitude: Complex64,
-    /// Local noise power `S(q)`, units of the image squared.
-    pub(crate) noise: f64,
+    /// Local noise power `S(q)` as it acts along x and along y, units of the image squared.
+    pub(crate) noise: [f64; 2],
 }
 
 /// The harmonics of a lattice in one image.
@@ -32,13 +30,19 @@ pub(crate) struct Harmonics {
     pub(crate) list: Vec<Harmonic>,
     /// Sum of the squared window weights and of the weights.
     pub(crate) window_sums: [f64; 2],
+    /// The image that these harmonics make, missing pixels as in the measured one. Its lattice is
+    /// known exactly: what an estimator makes of it is the estimator's bias on this frame.
+    pub(crate) model: Image,
+    /// Reciprocal pair of the model, rad per pixel.
+    pub(crate) pair: Matrix2<f64>,
 }
 
 impl Harmonic {
     /// Power of the harmonic over the noise power in one resolution cell; exponentially
     /// distributed with mean 1 where there is no signal.
     pub(crate) fn significance(&self, window_sums: [f64; 2]) -> f64 {
-        self.amplitude.norm_sqr() * window_sums[1].powi(2) / (window_sums[0] * self.noise)
+        self.amplitude.norm_sqr() * window_sums[1].powi(2)
+            / (window_sums[0] * self.noise[0].max(self.noise[1]))
     }
 }
 
@@ -110,7 +114,7 @@ impl Windowed {
             moment / w.iter().sum::<f64>()
         };
         let width = Vector2::new(second(self.columns), second(self.rows));
-        for _ in 0..3 {
+        for _ in 0..4 {
             let [f, fx, fy] = self.moments(q);
             // ∂F/∂q_x = −i Σ x w I e^{−iq·n}.
             let slope = |m: Complex64| (Complex64::new(0.0, -1.0) * m / f).re;
@@ -147,8 +151,14 @@ impl Windowed {
 
     /// Fits the harmonics `pair · (h, k)` of the first three shells.
     ///
-    /// `None` where they cannot be told apart on this frame.
-    pub(crate) fn fit(&self, image: &Image, pair: &Matrix2<f64>) -> Option<Harmonics> {
+    /// `background` is what was taken off the image; it is taken off the model as well, so that the
+    /// model goes through the same mill. `None` where the harmonics cannot be told apart on this frame.
+    pub(crate) fn fit(
+        &self,
+        image: &Image,
+        pair: &Matrix2<f64>,
+        background: Background,
+    ) -> Option<Harmonics> {
         let nyquist = 0.9 * std::f64::consts::PI;
         let q: Vec<Vector2<f64>> = SHELLS
             .iter()
@@ -182,7 +192,8 @@ impl Windowed {
             right[i] = right[i - 1].conj();
         }
         let amplitudes = gram.lu().solve(&right)?;
-        let residual = self.residual(image, &waves, &amplitudes);
+        let model = remove_background(&self.model(image, &waves, &amplitudes), background);
+        let residual = residual(image, &model);
         let noise = super::noise::LocalNoise::new(&residual);
         let centre = Vector2::new(
             (self.columns as f64 - 1.0) / 2.0,
@@ -194,18 +205,23 @@ impl Windowed {
             .map(|(i, &q)| Harmonic {
                 q,
                 amplitude: amplitudes[1 + 2 * i] * Complex64::from_polar(1.0, -q.dot(&centre)),
-                noise: noise.around(q, ANNULUS),
+                noise: noise.around(q),
             })
             .collect();
         let window_sums = [
             self.weights.iter().map(|w| w * w).sum(),
             self.weights.iter().sum(),
         ];
-        Some(Harmonics { list, window_sums })
+        Some(Harmonics {
+            list,
+            window_sums,
+            model,
+            pair: *pair,
+        })
     }
 
-    /// The image minus the model; missing pixels become 0.
-    fn residual(
+    /// The sum of the waves, with the shape and the missing pixels of `image`.
+    fn model(
         &self,
         image: &Image,
         waves: &[Vector2<f64>],
@@ -213,35 +229,37 @@ impl Windowed {
     ) -> Image {
         let cx = (self.columns as f64 - 1.0) / 2.0;
         let cy = (self.rows as f64 - 1.0) / 2.0;
-        let mut out = image.clone();
-        for v in &mut out.values {
-            *v = if v.is_finite() {
-                *v - amplitudes[0].re
-            } else {
-                0.0
-            };
-        }
+        let mut values = vec![amplitudes[0].re; image.values.len()];
         for i in (1..waves.len()).step_by(2) {
             let q = waves[i];
-            let (re, im): (Vec<f64>, Vec<f64>) = (0..self.columns)
+            let (im, re): (Vec<f64>, Vec<f64>) = (0..self.columns)
                 .map(|c| (q.x * (c as f64 - cx)).sin_cos())
-                .map(|(s, c)| (c, s))
                 .unzip();
-            for row in 0..self.rows {
+            for (row, line) in values.chunks_exact_mut(self.columns).enumerate() {
                 let c = 2.0 * amplitudes[i] * Complex64::from_polar(1.0, q.y * (row as f64 - cy));
-                let line = &mut out.values[row * self.columns..(row + 1) * self.columns];
                 for ((v, re), im) in line.iter_mut().zip(&re).zip(&im) {
-                    *v -= c.re * re - c.im * im;
+                    *v += c.re * re - c.im * im;
                 }
             }
         }
-        for (v, w) in out.values.iter_mut().zip(&self.weights) {
-            if *w == 0.0 {
-                *v = 0.0;
+        for (v, measured) in values.iter_mut().zip(&image.values) {
+            if !measured.is_finite() {
+                *v = f64::NAN;
             }
         }
-        out
+        Image::new(image.rows, image.columns, values)
     }
+}
+
+/// Image minus model; missing pixels become 0.
+fn residual(image: &Image, model: &Image) -> Image {
+    let values = image
+        .values
+        .iter()
+        .zip(&model.values)
+        .map(|(v, m)| if v.is_finite() { v - m } else { 0.0 })
+        .collect();
+    Image::new(image.rows, image.columns, values)
 }
 
 /// Indices of the first three shells, one of each ± pair, in the basis at 60°.

@@ -83,12 +83,15 @@ pub enum LatticeError {
 
 /// An image without background and what its spectrum says: where the lattice is, roughly.
 struct Prepared {
+    /// The image at full resolution.
     image: Image,
+    /// Pixels of the image per bin. Everything below counts in bins.
+    binning: usize,
     spectrum: Spectrum,
     harmonics: Harmonics,
-    /// The first three wave vectors, refined one by one, rad per pixel.
+    /// The first three wave vectors, each by itself, rad per bin.
     peaks: [Vector2<f64>; 3],
-    /// Real-space pair at 60°, pixels.
+    /// Real-space pair at 60°.
     start: Matrix2<f64>,
 }
 
@@ -112,24 +115,28 @@ pub fn measure(
         start,
         ..
     } = &prepared;
-    let lost = || no_lattice(harmonics);
-    let fourier = || fourier::measure(harmonics, peaks, spectrum.image_size);
-    let autocorrelation = || autocorrelation::measure(spectrum, harmonics, start);
+    let pixels_per_bin = prepared.binning as f64;
+    let in_pixels = |l: LatticeVectors| l.mapped(&(Matrix2::identity() * pixels_per_bin));
+    let fourier = || fourier::measure(harmonics, peaks, spectrum.image_size).map(in_pixels);
+    let autocorrelation = || autocorrelation::measure(spectrum, harmonics, start).map(in_pixels);
     let (pixels, comparison) = match method {
         Method::Autocorrelation => (autocorrelation(), fourier()),
         Method::Fourier => (fourier(), autocorrelation()),
-        Method::Paper => (paper::measure(&prepared.image, geometry, start), fourier()),
+        Method::Paper => (
+            paper::measure(&prepared.image, geometry, &(start * pixels_per_bin)),
+            fourier(),
+        ),
     };
-    let pixels = pixels.ok_or_else(lost)?;
+    let pixels = pixels.ok_or_else(|| no_lattice(harmonics))?;
     let label = |l: LatticeVectors| reciprocal::labelled_like(&l, &pixels.basis);
-    let longest = (0..3).map(|i| pixels.vector(i)).map(|v| {
-        let [w, h] = spectrum.image_size;
-        (v.x / w as f64).hypot(v.y / h as f64)
-    });
+    let longest = (0..3)
+        .map(|i| pixels.vector(i))
+        .map(|v| (v.x / image.columns as f64).hypot(v.y / image.rows as f64));
+    let bin_to_nm = geometry.pixel_to_nm * pixels_per_bin;
     Ok(MeasuredLattice {
         pixels,
         comparison: comparison.map(label),
-        shortcut_wavelengths: fourier::shortcut_wavelengths(peaks, &geometry.pixel_to_nm),
+        shortcut_wavelengths: fourier::shortcut_wavelengths(peaks, &bin_to_nm),
         periods: 1.0 / longest.fold(0.0, f64::max),
         signal_to_noise: signal_to_noise(harmonics)[2],
     })
@@ -161,34 +168,82 @@ fn prepare(
     if largest <= 0.0 {
         return Err(LatticeError::Constant);
     }
-    let spectrum = Spectrum::new(&image);
-    let windowed = Windowed::new(&image);
+    let full = Spectrum::new(&image);
     let none = LatticeError::NoLattice { best: [0.0; 3] };
-    let candidates = select::candidates(&spectrum, &geometry.pixel_to_nm);
+    let candidates = select::candidates(&full, &geometry.pixel_to_nm);
     let pair = candidates.first().ok_or(none.clone())?.pair;
-    let third = pair.column(1) - pair.column(0);
-    let peaks = [
-        pair.column(0).into_owned(),
-        pair.column(1).into_owned(),
-        third,
-    ]
-    .map(|q| windowed.refined_peak(q));
-    // K₁, K₂ by least squares with K₃ = K₂ − K₁, equal weights.
-    let k1 = (2.0 * peaks[0] + peaks[1] - peaks[2]) / 3.0;
-    let k2 = (peaks[0] + 2.0 * peaks[1] + peaks[2]) / 3.0;
-    let pair = Matrix2::from_columns(&[k1, k2]);
-    let harmonics = windowed.fit(&image, &pair).ok_or(none.clone())?;
+    let binning = binning(&pair);
+    let pair = pair * binning as f64;
+    let (binned, spectrum) = if binning == 1 {
+        (image.clone(), full)
+    } else {
+        let binned = image.binned(binning);
+        let spectrum = Spectrum::new(&binned);
+        (binned, spectrum)
+    };
+    let (harmonics, peaks) = refine(&binned, &pair, background).ok_or(none.clone())?;
     if !is_lattice(&harmonics) {
         return Err(no_lattice(&harmonics));
     }
-    let start = reciprocal::reciprocal(&pair).ok_or(none)?;
+    let start = reciprocal::reciprocal(&harmonics.pair).ok_or(none)?;
     Ok(Prepared {
         image,
+        binning,
         spectrum,
         harmonics,
         peaks,
         start,
     })
+}
+
+/// Bins per shortest period of the first harmonics: enough for their second order.
+const BINS_PER_PERIOD: f64 = 16.0;
+
+/// How many pixels may be averaged without touching the lattice: it is band-limited, and what the
+/// mean over a bin does to a harmonic is to its amplitude, not to its wave vector.
+fn binning(pair: &Matrix2<f64>) -> usize {
+    let third = pair.column(1) - pair.column(0);
+    let largest = pair
+        .column(0)
+        .norm()
+        .max(pair.column(1).norm())
+        .max(third.norm());
+    let shortest_period = std::f64::consts::TAU / largest;
+    ((shortest_period / BINS_PER_PERIOD) as usize).max(1)
+}
+
+/// The harmonics and the three first wave vectors, starting from a pair found in the spectrum.
+///
+/// Neighbouring harmonics shift each peak of the transform a little. The shift is measured on the
+/// model image, whose wave vectors are known, and taken off.
+fn refine(
+    image: &Image,
+    pair: &Matrix2<f64>,
+    background: Background,
+) -> Option<(Harmonics, [Vector2<f64>; 3])> {
+    let windowed = Windowed::new(image);
+    let third = pair.column(1) - pair.column(0);
+    let seen = [
+        pair.column(0).into_owned(),
+        pair.column(1).into_owned(),
+        third,
+    ]
+    .map(|q| windowed.refined_peak(q));
+    let first = windowed.fit(image, &common_pair(&seen), background)?;
+    let model = Windowed::new(&first.model);
+    let mut peaks = seen;
+    for (peak, harmonic) in peaks.iter_mut().zip(&first.list) {
+        *peak -= model.refined_peak(harmonic.q) - harmonic.q;
+    }
+    let second = windowed.fit(image, &common_pair(&peaks), background)?;
+    Some((second, peaks))
+}
+
+/// K₁, K₂ by least squares with K₃ = K₂ − K₁, equal weights.
+fn common_pair(peaks: &[Vector2<f64>; 3]) -> Matrix2<f64> {
+    let k1 = (2.0 * peaks[0] + peaks[1] - peaks[2]) / 3.0;
+    let k2 = (peaks[0] + 2.0 * peaks[1] + peaks[2]) / 3.0;
+    Matrix2::from_columns(&[k1, k2])
 }
 
 /// Signal-to-noise ratios (amplitude) of the first three harmonics, best first.

@@ -21,9 +21,12 @@ pub(crate) fn pictures(image: &Image, lattice: &LatticeVectors) -> (Image, Image
     let longest = (0..3).map(|i| lattice.vector(i).norm()).fold(0.0, f64::max);
     let reach = |most: usize| ((LAGS * longest).ceil() as usize).min(most * 4 / 5) as i64;
     let [mx, my] = autocorrelation.max_lag.map(reach);
-    let lags = centred([mx, my], |x, y| autocorrelation.at(x, y).unwrap_or(f64::NAN));
+    let lags = centred([mx, my], |x, y| {
+        autocorrelation.at(x, y).unwrap_or(f64::NAN)
+    });
     let step = spectrum.step();
-    let largest = reciprocal(&lattice.basis).map_or(1.0, |k| k.column(0).norm().max(k.column(1).norm()));
+    let largest =
+        reciprocal(&lattice.basis).map_or(1.0, |k| k.column(0).norm().max(k.column(1).norm()));
     let bins = |step: f64, most: usize| {
         ((FREQUENCIES * largest / step).ceil() as usize).min(most / 2 - 1) as i64
     };
@@ -31,7 +34,10 @@ pub(crate) fn pictures(image: &Image, lattice: &LatticeVectors) -> (Image, Image
     let rows = spectrum.rows as i64;
     let power = centred(reach, |x, y| {
         let (x, y) = if x < 0 { (-x, -y) } else { (x, y) };
-        spectrum.power(x as usize, y.rem_euclid(rows) as usize).max(f64::MIN_POSITIVE).ln()
+        spectrum
+            .power(x as usize, y.rem_euclid(rows) as usize)
+            .max(f64::MIN_POSITIVE)
+            .ln()
     });
     let cycles = step / std::f64::consts::TAU;
     (lags, power, [cycles.x, cycles.y])

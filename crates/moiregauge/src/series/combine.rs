@@ -51,7 +51,8 @@ pub(super) fn combine(
             ));
         }
     }
-    let twist_strain = twist_strain(&lattice, &settings.material, settings.strain_convention).ok()?;
+    let twist_strain =
+        twist_strain(&lattice, &settings.material, settings.strain_convention).ok()?;
     Some(Combined {
         lattice,
         twist_strain,
@@ -99,11 +100,12 @@ fn consistency(sets: &[SetAnalysis]) -> Vec<Consistency> {
                 continue;
             };
             let (ta, tb) = (&ma.twist_strain, &mb.twist_strain);
-            let twist = ta.twist() .value - tb.twist().value;
+            let twist = ta.twist().value - tb.twist().value;
             let drift_sigmas = match (&a.drift, &b.drift) {
-                (Some(da), Some(db)) if !da.given && !db.given => {
-                    sigmas(&(da.velocity - db.velocity), &(da.covariance + db.covariance))
-                }
+                (Some(da), Some(db)) if !da.given && !db.given => sigmas(
+                    &(da.velocity - db.velocity),
+                    &(da.covariance + db.covariance),
+                ),
                 _ => None,
             };
             let strain = sigmas(

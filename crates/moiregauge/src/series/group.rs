@@ -27,6 +27,9 @@ pub(super) fn groups(mut scans: Vec<MeasuredScan>, grouping: Grouping) -> Vec<Gr
         let rate = scan.line_rate_hz.unwrap_or(f64::NAN);
         let fits = |group: &Group| {
             let other = &group.scans[0];
+            if scan.set.is_some() || other.set.is_some() {
+                return scan.set == other.set;
+            }
             let same_rate = rate == group.line_rate_hz
                 || (rate - group.line_rate_hz).abs() < 0.01 * rate.abs()
                 || (rate.is_nan() && group.line_rate_hz.is_nan());
@@ -86,7 +89,10 @@ fn natural_order(a: &str, b: &str) -> Ordering {
         let number = |s: &str| s.bytes().take_while(u8::is_ascii_digit).count();
         let (na, nb) = (number(a), number(b));
         let order = if na > 0 && nb > 0 {
-            let (ta, tb) = (a[..na].trim_start_matches('0'), b[..nb].trim_start_matches('0'));
+            let (ta, tb) = (
+                a[..na].trim_start_matches('0'),
+                b[..nb].trim_start_matches('0'),
+            );
             let order = ta.len().cmp(&tb.len()).then_with(|| ta.cmp(tb));
             (a, b) = (&a[na..], &b[nb..]);
             order
@@ -119,6 +125,9 @@ fn name(groups: &mut [Group]) {
         }
         if groups.iter().any(|g| g.channel != group.channel) {
             name += &format!(", {}", group.channel);
+        }
+        if let Some(given) = group.scans.first().and_then(|s| s.set.clone()) {
+            name = given;
         }
         let mut unique = name.clone();
         let mut count = 1;

@@ -12,7 +12,11 @@ use crate::settings::Settings;
 /// The pictures behind the numbers of `analysed`, from the pixels of the same scan.
 ///
 /// `None` where the scan no longer has what was measured.
-pub fn illustrate(scan: &Scan, analysed: &ScanAnalysis, settings: &Settings) -> Option<Illustration> {
+pub fn illustrate(
+    scan: &Scan,
+    analysed: &ScanAnalysis,
+    settings: &Settings,
+) -> Option<Illustration> {
     let line = analysed.lines.first()?;
     let channel = channels(scan, settings)
         .ok()?
@@ -34,7 +38,11 @@ pub fn illustrate(scan: &Scan, analysed: &ScanAnalysis, settings: &Settings) -> 
     );
     let velocities = |steps: &[f64], axis: usize| -> Vec<f64> {
         let seconds = timing.map_or(f64::NAN, |t| t.per_pixel[axis].abs());
-        steps.iter().map(|s| s / seconds).filter(|v| v.is_finite()).collect()
+        steps
+            .iter()
+            .map(|s| s / seconds)
+            .filter(|v| v.is_finite())
+            .collect()
     };
     let (mut fast, mut slow) = (Vec::new(), Vec::new());
     let mut sensor_line = Vec::new();
@@ -74,4 +82,3 @@ pub fn illustrate(scan: &Scan, analysed: &ScanAnalysis, settings: &Settings) -> 
         slow_velocities: slow,
     })
 }
-

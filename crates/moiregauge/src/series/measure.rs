@@ -33,6 +33,8 @@ pub struct MeasuredScan {
     pub channel: String,
     /// Nominal size (fast, slow), nm.
     pub size_nm: Option<[f64; 2]>,
+    /// Name of the set to which the user assigned it by hand.
+    pub set: Option<String>,
     /// One entry for each line direction that was used.
     pub lines: Vec<MeasuredLine>,
     /// Doubts about this scan.
@@ -166,6 +168,7 @@ pub fn measure_scan(
         line_rate_hz: scan.line_rate_hz,
         channel: channels[0].name.clone(),
         size_nm: scan.size_nm,
+        set: None,
         lines,
         caveats,
     })
@@ -225,9 +228,13 @@ fn measure_line(
     let nominal = nominal(scan, channel);
     let sensors = usable_sensors(file, scan, channel, nominal.as_ref(), caveats);
     let timing = match (scan.line_rate_hz, scan.frame_direction) {
-        (Some(rate), Some(frame)) => {
-            Timing::new(channel.columns, rate, scan.rounding.unwrap_or(0.0), frame, line)
-        }
+        (Some(rate), Some(frame)) => Timing::new(
+            channel.columns,
+            rate,
+            scan.rounding.unwrap_or(0.0),
+            frame,
+            line,
+        ),
         _ => None,
     };
     let geometry = match (&sensors, &nominal) {
@@ -244,13 +251,14 @@ fn measure_line(
         geometry = geometry.cropped(first, size);
         nominal = nominal.map(|n| n.cropped(first, size));
     }
-    let lattice = measure(&image, &geometry, settings.background, settings.method).map_err(
-        |error| MeasureError::Lattice {
-            line: line_name(line),
-            channel: channel.name.clone(),
-            error,
-        },
-    )?;
+    let lattice =
+        measure(&image, &geometry, settings.background, settings.method).map_err(|error| {
+            MeasureError::Lattice {
+                line: line_name(line),
+                channel: channel.name.clone(),
+                error,
+            }
+        })?;
     if lattice.periods < FEW_PERIODS {
         caveats.push(Caveat::new(
             "few-periods",
@@ -395,7 +403,10 @@ pub(super) fn usable_sensors(
     if let Some(nominal) = nominal {
         let (measured, intended) = (sensors.geometry.extent(), nominal.extent());
         let ratios = [measured[0] / intended[0], measured[1] / intended[1]];
-        if ratios.iter().any(|r| !(1.0 / WILD_SPAN..=WILD_SPAN).contains(r)) {
+        if ratios
+            .iter()
+            .any(|r| !(1.0 / WILD_SPAN..=WILD_SPAN).contains(r))
+        {
             caveats.push(Caveat::new(
                 "sensor-span",
                 file,
@@ -436,7 +447,11 @@ fn speeds(
     let of = |axis: usize, steps: &[f64]| {
         let spread = mean_and_spread(steps).sigma;
         let step = [geometry.fast_step(), geometry.slow_step()][axis].norm();
-        let relative = if spread.is_finite() { spread / step } else { 0.0 };
+        let relative = if spread.is_finite() {
+            spread / step
+        } else {
+            0.0
+        };
         let speed = Estimate::new(plain[axis], plain[axis] * relative);
         (speed, relative / (steps.len().max(1) as f64).sqrt())
     };

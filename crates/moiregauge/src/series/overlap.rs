@@ -51,7 +51,10 @@ impl Window {
             Vector2::new(self.low.x, self.high.y),
             Vector2::new(self.high.x, self.high.y),
         ];
-        let (back, inverse) = (self.axes.try_inverse()?, geometry.pixel_to_nm.try_inverse()?);
+        let (back, inverse) = (
+            self.axes.try_inverse()?,
+            geometry.pixel_to_nm.try_inverse()?,
+        );
         let in_pixels = corners.map(|c| inverse * (back * c - geometry.origin));
         let mut first = [0; 2];
         let mut size = [0; 2];
@@ -107,7 +110,10 @@ mod tests {
             let mut size = size;
             size.sort_unstable();
             // Rounding to whole pixels may cost one at either end.
-            assert!(size[0].abs_diff(81) <= 1 && size[1].abs_diff(91) <= 1, "{size:?}");
+            assert!(
+                size[0].abs_diff(81) <= 1 && size[1].abs_diff(91) <= 1,
+                "{size:?}"
+            );
         }
         let far = [
             Window::around(&frame(Vector2::zeros(), 0.0)).unwrap(),

@@ -6,9 +6,7 @@ use spmfile::FrameDirection;
 
 use super::group::Group;
 use super::measure::{MeasuredLine, MeasuredScan};
-use crate::analysis::{
-    Axis, Drift, DriftFit, LineAnalysis, ScanAnalysis, SetAnalysis, SetMean,
-};
+use crate::analysis::{Axis, Drift, DriftFit, LineAnalysis, ScanAnalysis, SetAnalysis, SetMean};
 use crate::caveat::Caveat;
 use crate::drift::paper::{PaperScan, pairwise_drift};
 use crate::drift::{Observation, common_lattice, monte_carlo, solve};
@@ -71,7 +69,11 @@ pub(super) fn analyse_set(
         });
     let mean = solved.as_ref().and_then(|s| {
         let of = |s: &ScanAnalysis| (s.twist_strain, s.drift_corrected.unwrap_or(s.sensor));
-        set_mean((s.lattice, s.chi2, s.freedom), scans.iter().map(of), settings)
+        set_mean(
+            (s.lattice, s.chi2, s.freedom),
+            scans.iter().map(of),
+            settings,
+        )
     });
     let drift = solved.map(|s| s.drift);
     about_mean(&group.name, mean.as_ref(), caveats);
@@ -156,7 +158,11 @@ fn drift(
             })
         }
         Err(error) => {
-            caveats.push(Caveat::new("drift-undetermined", &group.name, error.to_string()));
+            caveats.push(Caveat::new(
+                "drift-undetermined",
+                &group.name,
+                error.to_string(),
+            ));
             None
         }
     }
@@ -211,13 +217,15 @@ fn paper_scans(group: &Group, all: &[Observation]) -> Vec<PaperScan> {
                 line.geometry.fast_step() / tau.x,
                 line.geometry.slow_step() / tau.y,
             );
-            let (fast_velocity, slow_velocity) = match group.slow_axis {
+            // A set made by hand may hold scans of both slow axes.
+            let slow_axis = line.geometry.slow_axis();
+            let (fast_velocity, slow_velocity) = match slow_axis {
                 Axis::X => (fast.y, slow.x),
                 Axis::Y => (fast.x, slow.y),
             };
             Some(PaperScan {
                 lattice: seen.lattice,
-                slow_axis: group.slow_axis,
+                slow_axis,
                 fast_velocity,
                 slow_velocity,
             })
@@ -276,10 +284,15 @@ fn scan_analysis(
     })
 }
 
-fn line_analysis(line: &MeasuredLine, seen: &Observation, reference: &Matrix2<f64>) -> LineAnalysis {
-    let comparison = line.lattice.comparison.map(|pixels| {
-        labelled_like(&pixels.mapped(&line.geometry.pixel_to_nm), reference)
-    });
+fn line_analysis(
+    line: &MeasuredLine,
+    seen: &Observation,
+    reference: &Matrix2<f64>,
+) -> LineAnalysis {
+    let comparison = line
+        .lattice
+        .comparison
+        .map(|pixels| labelled_like(&pixels.mapped(&line.geometry.pixel_to_nm), reference));
     LineAnalysis {
         line: line.line,
         pixels: line.lattice.pixels,
@@ -309,7 +322,8 @@ fn set_mean(
     scans: impl Iterator<Item = (Option<TwistStrain>, LatticeVectors)>,
     settings: &Settings,
 ) -> Option<SetMean> {
-    let twist_strain = twist_strain(&lattice, &settings.material, settings.strain_convention).ok()?;
+    let twist_strain =
+        twist_strain(&lattice, &settings.material, settings.strain_convention).ok()?;
     let (singles, lattices): (Vec<_>, Vec<_>) = scans.unzip();
     let singles: Vec<TwistStrain> = singles.into_iter().flatten().collect();
     let twists: Vec<f64> = singles.iter().map(|s| s.twist).collect();

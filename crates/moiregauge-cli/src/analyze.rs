@@ -1,0 +1,64 @@
+//! `moiregauge analyze`: scan files → drift, twist, strain, figures and report.
+
+mod args;
+mod chain;
+mod files;
+mod summary;
+
+use std::process::ExitCode;
+
+pub(crate) use args::AnalyzeArgs;
+pub(crate) use chain::{Outcome, analyse_files};
+pub(crate) use files::write_all;
+pub(crate) use summary::summary;
+
+use crate::info::expand;
+use moiregauge_report::{FailedInput, write_report};
+
+/// Analyses the files and writes the results.
+pub(crate) fn run(args: &AnalyzeArgs) -> anyhow::Result<ExitCode> {
+    let settings = args.settings()?;
+    if let Some(threads) = args.threads {
+        rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build_global()?;
+    }
+    files::refuse_overwriting(&args.out, args.force)?;
+    let mut inputs = Vec::new();
+    let mut failed = Vec::new();
+    for path in expand(&args.paths) {
+        match path {
+            Ok(path) => inputs.push(path),
+            Err((path, error)) => failed.push(FailedInput {
+                file: path.display().to_string(),
+                error,
+            }),
+        }
+    }
+    let loud = !args.quiet && !args.json;
+    let outcome = analyse_files(&inputs, &args.sets()?, &settings, failed, args.illustrated(), loud);
+    let Some(Outcome {
+        analysis,
+        provenance,
+    }) = outcome.map_err(|failed| eprint!("{}", summary::failures(&failed))).ok()
+    else {
+        anyhow::bail!("nothing could be analysed");
+    };
+    let written = write_report(&analysis, &provenance, &args.choice())?;
+    write_all(&args.out, &written)?;
+    if args.json {
+        let results = written.iter().find(|(name, _)| name == "results.json");
+        if let Some((_, bytes)) = results {
+            print!("{}", String::from_utf8_lossy(bytes));
+        }
+    } else if !args.quiet {
+        print!("{}", summary(&analysis));
+        println!("\nWritten to {}", files::main_file(&args.out, &written).display());
+    }
+    eprint!("{}", summary::failures(&provenance.failed));
+    Ok(if provenance.failed.is_empty() {
+        ExitCode::SUCCESS
+    } else {
+        ExitCode::FAILURE
+    })
+}

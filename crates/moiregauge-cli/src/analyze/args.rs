@@ -1,0 +1,244 @@
+//! The options of `moiregauge analyze` → settings.
+
+use std::path::PathBuf;
+
+use clap::ValueEnum;
+use moiregauge::settings::{
+    Background, GivenDrift, Grouping, Lines, Method, Settings, StrainConvention,
+};
+use moiregauge_report::{Choice, ColorMap};
+
+use crate::config::{self, named_material};
+
+/// From scans to drift, moiré vectors, twist and heterostrain, with figures and a report
+///
+/// Scans are grouped into sets by slow axis, line rate, size and channel and ordered by time. Each set
+/// gives its drift velocity (from scans of alternating slow direction), the drift-corrected moiré
+/// lattice, twist and heterostrain; the sets are compared and combined. A file that cannot be used is
+/// reported and skipped, and the exit code tells.
+#[derive(clap::Args, Clone, Debug)]
+// Each is a switch of its own on the command line.
+#[allow(clippy::struct_excessive_bools)]
+#[command(after_long_help = "\
+Examples:
+  moiregauge analyze scans/ --out results
+  moiregauge analyze slow_y/ slow_x/ --out results --channel 'TR Amplitude'
+  moiregauge analyze scan.0_00007.spm --out one --drift 0.62 -0.35 --drift-sigma 0.05
+  moiregauge analyze scans/ --out as-published --method paper --strain-convention k-space
+  moiregauge analyze a/ b/ --out results --set before=a --set after=b
+
+Angles are counter-clockwise, x to the right and y up, as the position sensors tell.")]
+pub(crate) struct AnalyzeArgs {
+    /// Scan files, folders (the scans in them, without subfolders) or names with * and ?
+    #[arg(required = true, value_name = "PATH")]
+    pub(super) paths: Vec<PathBuf>,
+    /// Folder for results.json, tables, figures and report.html; made if it does not exist
+    #[arg(long, value_name = "DIR")]
+    pub(super) out: PathBuf,
+    /// Settings from a TOML file (see `moiregauge config`); options here come on top of it
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// Channel that shows the moiré [default: TR Phase, TR Amplitude, Phase, … the first there is]
+    #[arg(long, value_name = "NAME")]
+    channel: Option<String>,
+    /// Line directions to use [default: both]
+    #[arg(long, value_enum)]
+    line: Option<LineArg>,
+    /// Estimator of the lattice vectors [default: autocorrelation]
+    #[arg(long, value_enum)]
+    method: Option<MethodArg>,
+    /// The layers: graphene, hBN, MoS2, … [default: graphene]
+    #[arg(long, value_name = "NAME")]
+    material: Option<String>,
+    /// Lattice constant of the layers, nm, in place of the material's
+    #[arg(long, value_name = "NM")]
+    lattice_constant: Option<f64>,
+    /// Poisson ratio of the layers, in place of the material's
+    #[arg(long, value_name = "RATIO")]
+    poisson_ratio: Option<f64>,
+    /// Form of the strain equation [default: real-space]
+    #[arg(long, value_enum)]
+    strain_convention: Option<ConventionArg>,
+    /// What is subtracted from an image first [default: plane]
+    #[arg(long, value_enum)]
+    background: Option<BackgroundArg>,
+    /// How files become sets [default: auto]
+    #[arg(long, value_enum)]
+    grouping: Option<GroupingArg>,
+    /// Make a set by hand: all files under PATH form the set NAME; may be repeated
+    #[arg(long = "set", value_name = "NAME=PATH")]
+    sets: Vec<String>,
+    /// Use only the region that all scans have in common
+    #[arg(long)]
+    overlap: bool,
+    /// A drift known beforehand, nm/min, instead of measuring it
+    #[arg(long, num_args = 2, value_names = ["X", "Y"], allow_negative_numbers = true)]
+    drift: Option<Vec<f64>>,
+    /// Standard uncertainty of each component of --drift, nm/min
+    #[arg(long, value_name = "SIGMA", requires = "drift")]
+    drift_sigma: Option<f64>,
+    /// Monte Carlo draws for the drift, per set [default: 10000]
+    #[arg(long, value_name = "N")]
+    drift_draws: Option<usize>,
+    /// Monte Carlo draws for twist and strain, per scan [default: 1000]
+    #[arg(long, value_name = "N")]
+    strain_draws: Option<usize>,
+    /// Seed of all random numbers [default: 1]
+    #[arg(long)]
+    seed: Option<u64>,
+    /// Number of threads [default: all processors]; the results do not depend on it
+    #[arg(long, value_name = "N")]
+    pub(super) threads: Option<usize>,
+    /// Colours of images
+    #[arg(long, value_enum, default_value_t = ColorMapArg::Viridis)]
+    colormap: ColorMapArg,
+    /// Numbers and tables only: no figures, no report
+    #[arg(long)]
+    no_report: bool,
+    /// Figures as SVG only, without PNG copies
+    #[arg(long)]
+    no_png: bool,
+    /// Print results.json instead of the summary
+    #[arg(long)]
+    pub(super) json: bool,
+    /// Print nothing but errors
+    #[arg(long, short)]
+    pub(super) quiet: bool,
+    /// Write over the results of an earlier analysis
+    #[arg(long)]
+    pub(super) force: bool,
+}
+
+/// A set made by hand: its name and the path of its files.
+pub(crate) type NamedSet = (String, PathBuf);
+
+impl AnalyzeArgs {
+    /// The settings file, or the defaults, with the options on top.
+    pub(super) fn settings(&self) -> anyhow::Result<Settings> {
+        let mut s = match &self.config {
+            Some(path) => config::read(path)?,
+            None => Settings::default(),
+        };
+        if let Some(name) = &self.material {
+            s.material = named_material(name)?;
+        }
+        let by_user = [self.lattice_constant, self.poisson_ratio];
+        if by_user.iter().any(Option::is_some) {
+            s.material.source = format!("{}, changed by the user", s.material.name);
+        }
+        if let Some(a) = self.lattice_constant {
+            anyhow::ensure!(a > 0.0, "--lattice-constant must be positive, found {a}");
+            s.material.lattice_constant_nm = a;
+        }
+        if let Some(ratio) = self.poisson_ratio {
+            anyhow::ensure!(
+                ratio > -1.0 && ratio < 1.0,
+                "--poisson-ratio must lie between −1 and 1, found {ratio}"
+            );
+            s.material.poisson_ratio = ratio;
+        }
+        if self.channel.is_some() {
+            s.channel.clone_from(&self.channel);
+        }
+        if let Some(xy) = &self.drift {
+            s.drift = Some(GivenDrift {
+                x_nm_per_min: xy[0],
+                y_nm_per_min: xy[1],
+                sigma_nm_per_min: self.drift_sigma.unwrap_or(0.0),
+            });
+        }
+        s.line = self.line.map_or(s.line, Into::into);
+        s.method = self.method.map_or(s.method, Into::into);
+        s.strain_convention = self.strain_convention.map_or(s.strain_convention, Into::into);
+        s.background = self.background.map_or(s.background, Into::into);
+        s.grouping = self.grouping.map_or(s.grouping, Into::into);
+        s.overlap |= self.overlap;
+        s.drift_draws = self.drift_draws.unwrap_or(s.drift_draws);
+        s.strain_draws = self.strain_draws.unwrap_or(s.strain_draws);
+        s.seed = self.seed.unwrap_or(s.seed);
+        Ok(s)
+    }
+
+    /// The sets made by hand.
+    pub(super) fn sets(&self) -> anyhow::Result<Vec<NamedSet>> {
+        let parse = |text: &String| match text.split_once('=') {
+            Some((name, path)) if !name.is_empty() && !path.is_empty() => {
+                Ok((name.to_owned(), PathBuf::from(path)))
+            }
+            _ => anyhow::bail!("--set expects NAME=PATH, found {text:?}"),
+        };
+        self.sets.iter().map(parse).collect()
+    }
+
+    /// Whether pixels are needed for pictures.
+    pub(super) fn illustrated(&self) -> bool {
+        !self.no_report
+    }
+
+    pub(super) fn choice(&self) -> Choice {
+        Choice {
+            figures: !self.no_report,
+            png: !self.no_report && !self.no_png,
+            html: !self.no_report,
+            colormap: match self.colormap {
+                ColorMapArg::Viridis => ColorMap::Viridis,
+                ColorMapArg::Grey => ColorMap::Grey,
+                ColorMapArg::Nanoscope => ColorMap::Nanoscope,
+                ColorMapArg::Gwyddion => ColorMap::Gwyddion,
+            },
+        }
+    }
+}
+
+/// Colour maps of images.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum ColorMapArg {
+    Viridis,
+    Grey,
+    /// The brown of the NanoScope software
+    Nanoscope,
+    /// Gwyddion's default
+    Gwyddion,
+}
+
+/// The library's enums know nothing of command lines: one mirror each.
+macro_rules! mirror {
+    ($mirror:ident => $target:ident { $($(#[$help:meta])* $variant:ident),+ $(,)? }) => {
+        #[derive(Clone, Copy, Debug, ValueEnum)]
+        enum $mirror { $($(#[$help])* $variant),+ }
+        impl From<$mirror> for $target {
+            fn from(value: $mirror) -> Self {
+                match value { $($mirror::$variant => Self::$variant),+ }
+            }
+        }
+    };
+}
+
+mirror!(LineArg => Lines { Trace, Retrace, Both });
+mirror!(MethodArg => Method {
+    /// Divided by the overlap, sub-pixel peaks, several shells
+    Autocorrelation,
+    /// Hann window, sub-pixel peaks, full inverse
+    Fourier,
+    /// As published in arXiv 2406.08681, for comparison: known to be biased
+    Paper,
+});
+mirror!(ConventionArg => StrainConvention {
+    /// The stretch acts on atomic positions: positive is tension
+    RealSpace,
+    /// The stretch acts on reciprocal vectors: positive is compression
+    KSpace,
+});
+mirror!(BackgroundArg => Background {
+    Mean, Plane, Quadratic, Cubic,
+    /// Each line by itself: damages harmonics along the fast axis
+    LineMean,
+});
+mirror!(GroupingArg => Grouping {
+    /// By slow axis, line rate, size and channel
+    Auto,
+    /// The same, and files of different folders never share a set
+    Folder,
+    /// Every file by itself
+    File,
+});

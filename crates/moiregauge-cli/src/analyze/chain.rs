@@ -1,0 +1,156 @@
+//! Files → measured scans → analysis, one file in memory per thread.
+
+use std::path::{Path, PathBuf};
+
+use indicatif::{ProgressBar, ProgressStyle};
+use moiregauge::analysis::Analysis;
+use moiregauge::series::{
+    MeasuredScan, Window, analyse, choose_channel, common_window, illustrate, measure_scan,
+};
+use moiregauge::settings::Settings;
+use moiregauge_report::{FailedInput, InputFile, Provenance};
+use rayon::prelude::*;
+use sha2::{Digest as _, Sha256};
+use spmfile::{ChannelInfo, Scan, read_selected, sensor_axis};
+
+use super::args::NamedSet;
+
+/// What came out, and of what.
+pub(crate) struct Outcome {
+    pub(crate) analysis: Analysis,
+    pub(crate) provenance: Provenance,
+}
+
+/// Analyses files; the failed ones among them join `failed`.
+///
+/// # Errors
+/// All failures, where nothing could be analysed.
+pub(crate) fn analyse_files(
+    inputs: &[PathBuf],
+    sets: &[NamedSet],
+    settings: &Settings,
+    mut failed: Vec<FailedInput>,
+    illustrated: bool,
+    loud: bool,
+) -> Result<Outcome, Vec<FailedInput>> {
+    let window = match settings.overlap.then(|| overlap(inputs, settings)) {
+        None => None,
+        Some(Some(window)) => Some(window),
+        Some(None) => {
+            failed.push(FailedInput {
+                file: "--overlap".to_owned(),
+                error: "the scans have no region in common".to_owned(),
+            });
+            return Err(failed);
+        }
+    };
+    let progress = progress(inputs.len(), loud);
+    let measured: Vec<_> = inputs
+        .par_iter()
+        .map(|path| {
+            let result = measure_file(path, sets, settings, window.as_ref());
+            progress.inc(1);
+            result
+        })
+        .collect();
+    progress.finish_and_clear();
+    let (mut scans, mut files) = (Vec::new(), Vec::new());
+    for (path, result) in inputs.iter().zip(measured) {
+        match result {
+            Ok((scan, file)) => {
+                scans.push(scan);
+                files.push(file);
+            }
+            Err(error) => failed.push(FailedInput {
+                file: path.display().to_string(),
+                error: format!("{error:#}"),
+            }),
+        }
+    }
+    if scans.is_empty() {
+        return Err(failed);
+    }
+    let mut analysis = analyse(scans, settings);
+    if illustrated {
+        analysis.sets.par_iter_mut().for_each(|set| {
+            set.illustration = set.scans.first().and_then(|first| {
+                let (scan, _) = read(Path::new(&first.file), settings).ok()?;
+                illustrate(&scan, first, settings)
+            });
+        });
+    }
+    let provenance = Provenance {
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        seed: settings.seed,
+        inputs: files,
+        failed,
+    };
+    Ok(Outcome {
+        analysis,
+        provenance,
+    })
+}
+
+fn progress(files: usize, loud: bool) -> ProgressBar {
+    if !loud {
+        return ProgressBar::hidden();
+    }
+    // Draws on a terminal only.
+    let style = ProgressStyle::with_template("measuring {bar:30} {pos}/{len} scans, {eta} left");
+    let bar = ProgressBar::new(files as u64);
+    match style {
+        Ok(style) => bar.with_style(style),
+        Err(_) => bar,
+    }
+}
+
+fn measure_file(
+    path: &Path,
+    sets: &[NamedSet],
+    settings: &Settings,
+    window: Option<&Window>,
+) -> anyhow::Result<(MeasuredScan, InputFile)> {
+    let (scan, input) = read(path, settings)?;
+    let mut measured = measure_scan(&input.file, &scan, settings, window)?;
+    measured.set = sets
+        .iter()
+        .find(|(_, of)| path.starts_with(of))
+        .map(|(name, _)| name.clone());
+    Ok((measured, input))
+}
+
+/// Reads what the analysis needs of a file: the chosen channel and the position sensors.
+fn read(path: &Path, settings: &Settings) -> anyhow::Result<(Scan, InputFile)> {
+    let bytes = std::fs::read(path)?;
+    let channels = std::cell::RefCell::new(Vec::new());
+    read_selected(&bytes, &|channel: &ChannelInfo| {
+        channels
+            .borrow_mut()
+            .push((channel.name.clone(), channel.internal_name.clone()));
+        false
+    })?;
+    let channels = channels.into_inner();
+    let names = channels.iter().map(|(a, b)| (a.as_str(), b.as_str()));
+    let chosen = choose_channel(names, settings.channel.as_deref()).map(str::to_owned);
+    let scan = read_selected(&bytes, &|channel: &ChannelInfo| {
+        chosen.as_ref().is_none_or(|name| *name == channel.name)
+            || sensor_axis(&channel.name, &channel.internal_name).is_some()
+    })?;
+    let hash = Sha256::digest(&bytes);
+    let input = InputFile {
+        file: path.display().to_string(),
+        sha256: hash.iter().map(|b| format!("{b:02x}")).collect(),
+        bytes: bytes.len() as u64,
+    };
+    Ok((scan, input))
+}
+
+/// The region common to all files that can be read.
+fn overlap(inputs: &[PathBuf], settings: &Settings) -> Option<Window> {
+    let windows: Vec<Option<Window>> = inputs
+        .par_iter()
+        .map(|path| Window::of(&read(path, settings).ok()?.0, settings))
+        .collect();
+    let windows: Vec<Window> = windows.into_iter().flatten().collect();
+    common_window(&windows)
+}

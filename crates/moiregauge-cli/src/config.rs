@@ -1,0 +1,128 @@
+//! `moiregauge config`, and the reading of such files.
+
+use std::path::Path;
+use std::process::ExitCode;
+
+use anyhow::{Context as _, bail};
+use moiregauge::material::Material;
+use moiregauge::settings::Settings;
+
+/// Print a commented settings file with all defaults
+///
+/// Save it, change what you need, and give it to `moiregauge analyze --config FILE`. Options on the
+/// command line come on top of the file.
+#[derive(clap::Args, Clone, Debug)]
+#[command(after_long_help = "\
+Example:
+  moiregauge config > settings.toml
+  moiregauge analyze scans/ --out results --config settings.toml")]
+pub(crate) struct ConfigArgs {}
+
+/// Every setting with its default. A test compares it with [`Settings::default`].
+const COMMENTED: &str = r#"# Settings of `moiregauge analyze`. Every line shows its default.
+
+# Channel that shows the moiré, by name. Without it: TR Phase, TR Amplitude, Phase, … whichever
+# comes first.
+# channel = "TR Phase"
+
+# Line directions to use: "trace", "retrace" or "both".
+line = "both"
+
+# Estimator of the lattice vectors:
+#   "autocorrelation"  divided by the overlap, sub-pixel peaks, several shells
+#   "fourier"          Hann window, sub-pixel peaks, full inverse
+#   "paper"            as published in arXiv 2406.08681, for comparison: known to be biased
+method = "autocorrelation"
+
+# What is subtracted from an image first: "mean", "plane", "quadratic", "cubic", or "line-mean"
+# (which damages harmonics along the fast axis).
+background = "plane"
+
+# The layers: a name (graphene, hBN, MoS2, …) or a table
+#   [material]
+#   name = "mine"
+#   lattice_constant_nm = 0.2461
+#   poisson_ratio = 0.17
+#   source = "where the numbers come from"
+material = "graphene"
+
+# Form of the strain equation: "real-space" (the stretch acts on atomic positions, positive is
+# tension) or "k-space" (on reciprocal vectors as in arXiv 2406.08681, positive is compression).
+strain_convention = "real-space"
+
+# How files become sets: "auto" (slow axis, line rate, size, channel), "folder" (the same, and folders
+# never mix) or "file" (every file by itself).
+grouping = "auto"
+
+# Use only the region that all scans of an analysis have in common.
+overlap = false
+
+# A drift known beforehand, instead of measuring it.
+# [drift]
+# x_nm_per_min = 0.5
+# y_nm_per_min = -0.15
+# sigma_nm_per_min = 0.05
+
+# Monte Carlo draws for the drift (per set) and for twist and strain (per scan).
+drift_draws = 10000
+strain_draws = 1000
+
+# Seed of all random numbers: the same seed gives the same bytes.
+seed = 1
+"#;
+
+/// Prints the commented file.
+pub(crate) fn run(_args: &ConfigArgs) -> anyhow::Result<ExitCode> {
+    print!("{COMMENTED}");
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Reads a settings file. `material` may be a name.
+pub(crate) fn read(path: &Path) -> anyhow::Result<Settings> {
+    let text = std::fs::read_to_string(path)
+        .with_context(|| format!("cannot read the settings file {}", path.display()))?;
+    parse(&text).with_context(|| format!("in the settings file {}", path.display()))
+}
+
+fn parse(text: &str) -> anyhow::Result<Settings> {
+    let mut table: toml::Table = toml::from_str(text)?;
+    if let Some(toml::Value::String(name)) = table.get("material") {
+        let material = toml::Value::try_from(named_material(name)?)?;
+        table.insert("material".to_owned(), material);
+        return Ok(table.try_into()?);
+    }
+    // Straight from the text: errors then show the line.
+    Ok(toml::from_str(text)?)
+}
+
+/// A material by name, or an error that lists the names.
+pub(crate) fn named_material(name: &str) -> anyhow::Result<Material> {
+    match Material::named(name) {
+        Some(material) => Ok(material),
+        None => {
+            let known: Vec<String> = Material::all().into_iter().map(|m| m.name).collect();
+            bail!(
+                "unknown material {name:?}; known are {}; others can be described in a [material] table \
+                 of a settings file",
+                known.join(", ")
+            )
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_commented_file_holds_the_defaults() {
+        assert_eq!(parse(COMMENTED).unwrap(), Settings::default());
+    }
+
+    #[test]
+    fn unknown_keys_and_materials_are_refused_with_what_is_known() {
+        assert!(parse("metod = \"fourier\"").unwrap_err().to_string().contains("metod"));
+        let error = parse("material = \"unobtainium\"").unwrap_err().to_string();
+        assert!(error.contains("graphene"), "{error}");
+    }
+}

@@ -1,0 +1,71 @@
+//! `moiregauge demo`: simulate the paper's three sets, analyse them, compare with the truth.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use moiregauge::settings::Settings;
+use moiregauge_report::{Choice, write_report};
+
+use crate::analyze::{Outcome, analyse_files, summary, write_all};
+use crate::info::expand;
+use crate::simulate::{paper_sets, write_sets};
+
+/// Simulate the three sets of arXiv 2406.08681, analyse them and show where the report is
+///
+/// Needs no data: writes 26 simulated scans with their truth, runs the whole analysis on them and
+/// prints what was found beside what was put in.
+#[derive(clap::Args, Clone, Debug)]
+pub(crate) struct DemoArgs {
+    /// Folder for scans and results [default: moiregauge-demo, or the next free number]
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Seed of all noise
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Write over files of the same names
+    #[arg(long)]
+    force: bool,
+}
+
+/// Runs the demonstration.
+pub(crate) fn run(args: &DemoArgs) -> anyhow::Result<ExitCode> {
+    let out = args.out.clone().unwrap_or_else(free_folder);
+    let sets = paper_sets(args.seed);
+    println!("Simulating three sets of scans in {} …", out.display());
+    let folders = write_sets(&sets, &out.join("scans"), args.force)?;
+    println!("Analysing them …\n");
+    let inputs: Vec<PathBuf> = expand(&folders).into_iter().flatten().collect();
+    let settings = Settings {
+        seed: args.seed,
+        ..Settings::default()
+    };
+    let Ok(Outcome {
+        analysis,
+        provenance,
+    }) = analyse_files(&inputs, &[], &settings, Vec::new(), true, true)
+    else {
+        anyhow::bail!("the simulated scans could not be analysed");
+    };
+    let results = out.join("results");
+    write_all(&results, &write_report(&analysis, &provenance, &Choice::default())?)?;
+    print!("{}", summary(&analysis));
+    let truth = &sets[0];
+    println!(
+        "\nPut in: twist {}°, heterostrain {} %, drift ({}, {}) nm/min",
+        truth.sample.twist_deg,
+        truth.sample.strain_percent,
+        truth.drift.velocity_nm_per_min[0],
+        truth.drift.velocity_nm_per_min[1],
+    );
+    println!("Report: {}", results.join("report.html").display());
+    Ok(ExitCode::SUCCESS)
+}
+
+/// `moiregauge-demo`, or the first free `moiregauge-demo-N`.
+fn free_folder() -> PathBuf {
+    let name = |n: u32| match n {
+        1 => PathBuf::from("moiregauge-demo"),
+        n => PathBuf::from(format!("moiregauge-demo-{n}")),
+    };
+    (1..).map(name).find(|p| !p.exists()).unwrap_or_else(|| name(1))
+}
