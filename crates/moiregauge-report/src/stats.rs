@@ -91,6 +91,10 @@ pub(crate) fn ellipse(
     covariance: &nalgebra::Matrix2<f64>,
     n: f64,
 ) -> Vec<(f64, f64)> {
+    // The decomposition would not end on numbers that are none.
+    if !covariance.iter().all(|c| c.is_finite()) {
+        return Vec::new();
+    }
     let eigen = covariance.symmetric_eigen();
     (0..=72)
         .map(|i| {

@@ -167,7 +167,7 @@ impl Axes {
     /// Draws ticks and numbers of y and returns the width of the widest number, pt.
     fn draw_y(&self, svg: &mut Svg, labels: &Labels, frame: &Ink) -> f64 {
         let (area, range) = (self.area, self.y.range);
-        let wanted = ((area.height / 18.0) as usize).clamp(3, 8);
+        let wanted = ((area.height / 22.0) as usize).clamp(3, 8);
         let mut widest: f64 = 0.0;
         for tick in fitting(wanted, labels.count_y, range, |_| true) {
             let y = self.y.at(tick.value);

@@ -111,7 +111,7 @@ impl<'a> Ink<'a> {
     }
 }
 
-/// An SVG document under construction.
+/// An SVG document under construction. A shape at a place that is not finite is not drawn.
 #[derive(Debug)]
 pub(crate) struct Svg {
     /// Unique within a page that shows several figures; prefix of all ids.
@@ -138,7 +138,7 @@ impl Svg {
         self.polyline(&[from, to], ink);
     }
 
-    /// An open line through `points`; nothing is drawn for points that are not finite.
+    /// An open line through those `points` that are finite.
     pub(crate) fn polyline(&mut self, points: &[(f64, f64)], ink: &Ink) {
         self.path(points, "", ink);
     }
@@ -164,6 +164,12 @@ impl Svg {
     }
 
     pub(crate) fn rect(&mut self, rect: Rect, ink: &Ink) {
+        if ![rect.x, rect.y, rect.width, rect.height]
+            .iter()
+            .all(|v| v.is_finite())
+        {
+            return;
+        }
         let _ = writeln!(
             self.body,
             "<rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\"{}/>",
@@ -195,6 +201,9 @@ impl Svg {
             Anchor::Middle => "middle",
             Anchor::End => "end",
         };
+        if !(at.0.is_finite() && at.1.is_finite()) {
+            return;
+        }
         let (x, y) = (number(at.0), number(at.1));
         let weight = if lettering.bold {
             " font-weight=\"bold\""
@@ -211,7 +220,7 @@ impl Svg {
         };
         let halo = lettering.halo.map_or_else(String::new, |colour| {
             format!(
-                " stroke=\"{colour}\" stroke-width=\"1.6\" stroke-linejoin=\"round\" paint-order=\"stroke\""
+                " stroke=\"{colour}\" stroke-width=\"1.4\" stroke-linejoin=\"round\" paint-order=\"stroke\""
             )
         });
         let _ = writeln!(
@@ -238,6 +247,9 @@ impl Svg {
         } else {
             ""
         };
+        if !matrix.iter().all(|v| v.is_finite()) {
+            return;
+        }
         let matrix: Vec<String> = matrix.iter().map(|&v| precise(v)).collect();
         let _ = writeln!(
             self.body,

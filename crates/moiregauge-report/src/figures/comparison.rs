@@ -96,6 +96,7 @@ pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
     let keys: Vec<_> = vectors.chain(legend::directions()).collect();
     legend::row(&mut svg, (layout::LEFT, 11.0), &keys);
     Ok(Drawing {
+        wide: true,
         svg: svg.finish("Wavelengths by two estimators"),
         caption: format!(
             "Wavelengths by the {used}, which the results use, and by the {other}, in sensor coordinates, every line direction of every scan (a), and their difference, {other} minus {used} (b; error bar: the larger σ of the two, as both see the same pixels). Filled symbols: up scans; open: down scans."

@@ -66,6 +66,7 @@ pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
     }
     legend::row(&mut svg, (layout::LEFT, 11.0), &keys);
     Ok(Drawing {
+        wide: true,
         svg: svg.finish("Distribution of the drift velocity and of the residual"),
         caption: format!(
             "(a) Drift velocity of the sample in the frame of the sensors over {} Monte Carlo draws of peak positions and tip velocities; brighter means more draws. Ellipses: the Gaussian with the mean and covariance of the draws. Above and at the right: the marginal distributions with the same Gaussian. Circle: the weighted least-squares estimate with its analytic σ. (b) Root-mean-square residual of each draw.",

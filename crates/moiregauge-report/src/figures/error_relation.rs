@@ -55,6 +55,7 @@ pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
         .collect();
     legend::row(&mut svg, (layout::LEFT, 11.0), &keys);
     Ok(Drawing {
+        wide: true,
         svg: svg.finish("Twist error against wavelength error"),
         caption: format!(
             "(a) σ of the twist against σ of the wavelength, scan by scan: from one wavelength alone (coloured), and from all three vectors together against the mean σ of the three (black). (b) Deviation of each scan's twist from the common one against the deviation of its mean wavelength, before and after the removal of drift. Line: dθ = θ dλ/λ (in b with its sign) for θ = {twist:.4}° and λ = {wavelength:.3} nm. Filled symbols: up scans; open: down scans."

@@ -42,6 +42,8 @@ pub struct Drawing {
     pub svg: String,
     /// What it shows, with its conventions.
     pub caption: String,
+    /// Whether it is as wide as a journal page (180 mm) and not as a column (88 mm).
+    pub wide: bool,
 }
 
 /// What a figure is drawn from.

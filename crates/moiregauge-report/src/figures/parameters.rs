@@ -75,6 +75,7 @@ pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
         .collect();
     legend::row(&mut svg, (30.0, 11.0), &keys);
     Ok(Drawing {
+        wide: true,
         svg: svg.finish("Distributions of twist, strain and axis per scan"),
         caption: "Monte Carlo distributions of twist, strain and axis (modulo 180°) for every scan, the scans from bottom to top. Circles: the estimate with its analytic σ. The drawn strain is the plain length of the strain vector, which noise lengthens; the circle has that bias removed. An axis without circle is not significant (p ≥ 0.01).".to_owned(),
     })

@@ -95,6 +95,7 @@ pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
         " The file states no intended frame."
     };
     Ok(Drawing {
+        wide: false,
         svg: svg.finish("Scan with intended and actual frame"),
         caption: format!(
             "{}, {} of {}, background removed. Every pixel is drawn where the position sensors place it, without resampling; x to the right, y up. Arrows: the measured lattice vectors L₁, L₂ and L₃ = L₂ − L₁, not corrected for drift.{nominal_note} Colours from the 0.5 % to the 99.5 % quantile.",
@@ -151,7 +152,7 @@ fn vectors(svg: &mut Svg, axes: &Axes, shown: &Illustration) {
 
 /// A bar of round length in the lower right corner.
 fn scale_bar(svg: &mut Svg, axes: &Axes) {
-    let length = round_step(axes.x.range.width() / 7.0);
+    let length = round_step(axes.x.range.width() / 4.0);
     let text = format!("{} nm", fixed(length, usize::from(length < 1.0)));
     let points = length * axes.x.per_unit();
     let wide = points.max(text_width(&text, SMALL)) + 8.0;

@@ -66,6 +66,7 @@ pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
     ];
     legend::row(&mut svg, (layout::LEFT, 11.0), &keys);
     Ok(Drawing {
+        wide: false,
         svg: svg.finish("Position sensor along one line with fit and residual"),
         caption: format!(
             "Reading of the position sensor of the fast axis along the middle line of {} ({}), the plane fit of the whole frame along that line (a) and the difference of the two (b).",

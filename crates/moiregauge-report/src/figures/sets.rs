@@ -76,6 +76,7 @@ pub(super) fn draw(analysis: &Analysis, id: &str) -> Result<Drawing, String> {
         .collect();
     legend::row(&mut svg, (layout::LEFT, 11.0), &keys);
     Ok(Drawing {
+        wide: true,
         svg: svg.finish("Drift, twist and strain of all sets"),
         caption: "Every set that was corrected for drift: drift velocity (a) and strain vector in the laboratory (c) with their 1σ and 2σ ellipses, equal scales; twist with its σ (b). Band: all sets together. Dashed: zero. Drift may differ between sets, as it changes with time; twist and strain belong to the sample and should agree.".to_owned(),
     })

@@ -25,15 +25,22 @@ pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
     let (Some(dual), Some(to_frequency)) = (dual, to_frequency) else {
         return Err("the lattice of the scan has no area".to_owned());
     };
+    if ![longest(&basis), longest(&dual)]
+        .iter()
+        .all(|l| l.is_normal())
+    {
+        return Err("the lattice of the scan is not finite".to_owned());
+    }
     let mut svg = Svg::new(subject.id, PAGE, 8.0 + layout::ABOVE + SIDE + layout::BELOW);
     autocorrelation(&mut svg, subject, shown, &basis);
     spectrum(&mut svg, subject, shown, &dual, &to_frequency);
     Ok(Drawing {
+        wide: true,
         svg: svg.finish("Autocorrelation and spectrum with the lattice marked"),
         caption: format!(
-            "{} of {}: (a) autocorrelation against the shift in nm, (b) logarithm of the power spectrum against spatial frequency (cycles per nm), both in sensor coordinates, x to the right, y up, not corrected for drift. Coloured symbols: the three lattice vectors; circles: further points of the fitted lattice (a) and the first two shells of its reciprocal lattice (b).",
-            layout::line_name(shown.line),
-            layout::short(&shown.file)
+            "Of {}, {}: (a) autocorrelation against the shift in nm, (b) logarithm of the power spectrum against spatial frequency (cycles per nm), both in sensor coordinates, x to the right, y up, not corrected for drift. Coloured symbols: the three lattice vectors; circles: further points of the fitted lattice (a) and the first two shells of its reciprocal lattice (b).",
+            layout::short(&shown.file),
+            layout::line_name(shown.line)
         ),
     })
 }

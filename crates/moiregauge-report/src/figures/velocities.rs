@@ -62,6 +62,7 @@ pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
     ];
     legend::row(&mut svg, (layout::LEFT, 11.0), &keys);
     Ok(Drawing {
+        wide: true,
         svg: svg.finish("Distributions of the fast and slow tip velocity"),
         caption: format!(
             "Tip velocities of {} from straight-line fits to the position sensors: along each line for the fast axis (a), along each column for the slow axis (b). Above: mean ± standard deviation over the lines (the error of the mean is smaller).",

@@ -79,6 +79,7 @@ pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
         "At least one corrected wavelength lies outside the band."
     };
     Ok(Drawing {
+        wide: true,
         svg: svg.finish("Wavelengths per scan before and after drift correction"),
         caption: format!(
             "Lengths of the three lattice vectors in sensor coordinates before (left) and after (right) the drift was removed. Line: the common, drift-corrected lattice of all scans; band: ±1 % of it. Filled symbols: up scans; open: down scans. Error bars: one σ. {verdict}"

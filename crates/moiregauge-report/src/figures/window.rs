@@ -6,7 +6,7 @@ use super::layout::{LEFT, counting, is_up, ordinal};
 use super::{Drawing, Subject, layout};
 use crate::draw::axes::{Axes, Labels, zero_line};
 use crate::draw::legend::{self, Key};
-use crate::draw::scale::Range;
+use crate::draw::scale::{Range, fixed};
 use crate::draw::style::{BLACK, BLUE, GREY, HAIR, Marker, ORANGE, PAGE, SMALL, lettering, marker};
 use crate::draw::svg::{Anchor, Ink, Rect, Svg};
 
@@ -68,10 +68,12 @@ pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
         .collect();
     legend::row(&mut svg, (LEFT, 11.0), &keys);
     Ok(Drawing {
+        wide: true,
         svg: svg.finish("Centre of the scanned window over the scans"),
         caption: format!(
-            "Centre of the scanned window by the position sensors, relative to the first scan at ({:.1}, {:.1}) nm: path with scan numbers, x to the right, y up, equal scales (a); both components scan by scan (b). Filled symbols: up scans; open: down scans.",
-            first.window_centre.x, first.window_centre.y
+            "Centre of the scanned window by the position sensors, relative to the first scan at ({}, {}) nm: path with scan numbers, x to the right, y up, equal scales (a); both components scan by scan (b). Filled symbols: up scans; open: down scans.",
+            fixed(first.window_centre.x, 1),
+            fixed(first.window_centre.y, 1)
         ),
     })
 }
@@ -89,7 +91,7 @@ fn path_panel(svg: &mut Svg, axes: &Axes, moved: &[(Vector2<f64>, bool)]) {
         let free = |place: &(f64, f64)| {
             taken
                 .iter()
-                .all(|t| (t.0 - place.0).abs() > 6.5 || (t.1 - place.1).abs() > 5.5)
+                .all(|t| (t.0 - place.0).abs() > 5.9 || (t.1 - place.1).abs() > 4.4)
         };
         let place = places
             .map(|(dx, dy)| (at.0 + dx, at.1 + dy))

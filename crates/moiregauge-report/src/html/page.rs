@@ -88,6 +88,8 @@ struct Shown<'a> {
     title: &'a str,
     caption: &'a str,
     svg: &'a str,
+    /// Over the full width of a page, not of a column.
+    wide: bool,
 }
 
 #[derive(Debug, Serialize)]
@@ -151,6 +153,7 @@ fn numbered(figures: &[Figure]) -> Vec<(Option<usize>, Shown<'_>)> {
                 title: figure.title,
                 caption: &drawing.caption,
                 svg: &drawing.svg,
+                wide: drawing.wide,
             };
             (figure.set, shown)
         })
@@ -192,7 +195,9 @@ impl<'a> Set<'a> {
         Self {
             number: index + 1,
             found: set,
-            rate: plain(set.line_rate_hz, 2),
+            rate: set
+                .line_rate_hz
+                .map_or_else(|| plain(None, 0), |rate| rate.to_string()),
             drift: set.drift.as_ref().map(drift),
             mean: mean.map(|m| Numbers::new(&m.twist_strain)),
             mean_wavelengths: mean.map(|m| wavelengths(&m.vectors)),

@@ -1,6 +1,10 @@
 //! An analysis made up from formulas: two good sets and one poor scan, with a known truth.
 //!
+//! Shared by the tests and the gallery, none of which needs all of it.
+//!
 //! Twist 1.126°, strain 0.05 % along 35°, drift (0.50, −0.15) nm/min. Nothing here is measured.
+
+#![allow(dead_code, reason = "each user takes what it needs")]
 
 use std::f64::consts::TAU;
 
@@ -22,6 +26,8 @@ use spmfile::{DateTime, FrameDirection, LineDirection};
 pub(crate) const TWIST_DEG: f64 = 1.126;
 /// Heterostrain of the sample, per cent.
 pub(crate) const STRAIN_PERCENT: f64 = 0.05;
+/// Axis of the strain in the laboratory, degrees.
+pub(crate) const AXIS_LAB_DEG: f64 = 35.0;
 /// Drift, nm/min.
 pub(crate) const DRIFT_NM_PER_MIN: [f64; 2] = [0.50, -0.15];
 
@@ -54,7 +60,7 @@ fn truth(settings: &Settings) -> Matrix2<f64> {
     strain::moire_lattice(
         TWIST_DEG.to_radians(),
         STRAIN_PERCENT / 100.0,
-        (35.0_f64 - 12.0 - TWIST_DEG).to_radians(),
+        (AXIS_LAB_DEG - 12.0 - TWIST_DEG).to_radians(),
         12.0_f64.to_radians(),
         &settings.material,
         StrainConvention::RealSpace,
@@ -438,5 +444,66 @@ pub(crate) fn provenance() -> Provenance {
             error: "channel \"X Sensor\" is 524288 bytes long but its header promises 1048576"
                 .to_owned(),
         }],
+    }
+}
+
+/// Every number of `analysis` replaced by NaN, every image by one without pixels.
+pub(crate) fn spoil(analysis: &mut Analysis) {
+    let nan = LatticeVectors {
+        basis: Matrix2::from_element(f64::NAN),
+        covariance: Matrix4::from_element(f64::NAN),
+    };
+    let nothing = Vector2::new(f64::NAN, f64::NAN);
+    let spoil_result = |result: &mut strain::TwistStrain| {
+        *result = strain::TwistStrain {
+            twist: f64::NAN,
+            lattice_angle: f64::NAN,
+            strain_vector: nothing,
+            covariance: Matrix4::from_element(f64::NAN),
+        };
+    };
+    for set in &mut analysis.sets {
+        set.line_rate_hz = f64::NAN;
+        for mean in set.mean.iter_mut().chain(&mut set.uncorrected) {
+            mean.lattice = nan;
+            spoil_result(&mut mean.twist_strain);
+            mean.chi2_per_dof = f64::NAN;
+        }
+        if let Some(drift) = &mut set.drift {
+            drift.velocity = nothing;
+            drift.covariance = Matrix2::from_element(f64::NAN);
+            if let Some(draws) = &mut drift.monte_carlo {
+                draws.mean = nothing;
+                draws.covariance = Matrix2::from_element(f64::NAN);
+                draws.losses.fill(f64::NAN);
+                draws.draws.truncate(3);
+            }
+        }
+        for scan in &mut set.scans {
+            scan.window_centre = nothing;
+            scan.window_extent = [f64::NAN; 2];
+            scan.sensor = nan;
+            for lattice in scan.nominal.iter_mut().chain(&mut scan.drift_corrected) {
+                *lattice = nan;
+            }
+            for result in scan
+                .twist_strain
+                .iter_mut()
+                .chain(&mut scan.twist_strain_sensor)
+            {
+                spoil_result(result);
+            }
+            for line in &mut scan.lines {
+                line.sensor = nan;
+                line.pixel_to_nm = Matrix2::from_element(f64::NAN);
+                line.signal_to_noise = f64::INFINITY;
+            }
+        }
+        if let Some(shown) = &mut set.illustration {
+            shown.image = Image::new(0, 0, Vec::new());
+            shown.autocorrelation = Image::new(1, 1, vec![f64::NAN]);
+            shown.sensor_line = vec![[0.0, f64::NAN, f64::NAN]];
+            shown.fast_velocities.fill(f64::NAN);
+        }
     }
 }

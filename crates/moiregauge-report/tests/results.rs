@@ -1,0 +1,258 @@
+//! The document and the tables: schema, paths, units, nothing that is not a number.
+
+mod common;
+
+use moiregauge::analysis::Analysis;
+use moiregauge_report::{Choice, Results, schema, write_report};
+use serde_json::Value;
+
+const NUMBERS_ONLY: Choice = Choice {
+    figures: false,
+    png: false,
+    html: false,
+    colormap: moiregauge_report::ColorMap::Viridis,
+};
+
+fn document(analysis: &Analysis) -> Value {
+    let results = Results::new(analysis, &common::provenance());
+    let bytes = results.to_json().expect("JSON");
+    serde_json::from_slice(&bytes).expect("what was written can be read")
+}
+
+fn file(analysis: &Analysis, name: &str) -> String {
+    let files = write_report(analysis, &common::provenance(), &NUMBERS_ONLY).expect("a report");
+    let found = files
+        .into_iter()
+        .find(|(n, _)| n == name)
+        .expect("the file is there");
+    String::from_utf8(found.1).expect("UTF-8")
+}
+
+#[test]
+fn the_published_schema_is_up_to_date() {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/schema/results-1.schema.json");
+    let text = std::fs::read_to_string(path).unwrap_or_default();
+    let published: Value = serde_json::from_str(&text).unwrap_or_default();
+    assert_eq!(
+        published,
+        schema(),
+        "renew it: cargo run -p moiregauge-report --example schema > crates/moiregauge-report/schema/results-1.schema.json"
+    );
+}
+
+#[test]
+fn documents_follow_the_schema() {
+    let validator = jsonschema::validator_for(&schema()).expect("a valid schema");
+    let mut hopeless = common::analysis();
+    common::spoil(&mut hopeless);
+    let mut empty = common::analysis();
+    empty.sets.clear();
+    empty.combined = None;
+    for analysis in [common::analysis(), hopeless, empty] {
+        let document = document(&analysis);
+        let errors: Vec<String> = validator
+            .iter_errors(&document)
+            .map(|e| e.to_string())
+            .collect();
+        assert!(errors.is_empty(), "{errors:?}");
+    }
+    assert!(!validator.is_valid(&serde_json::json!({"schema": "moiregauge/results/1"})));
+}
+
+/// The paths that other programs rely on.
+#[test]
+fn promised_paths_are_there() {
+    let document = document(&common::analysis());
+    let numbers = [
+        "/sets/0/line_rate_hz",
+        "/sets/0/drift/x_nm_per_min/value",
+        "/sets/0/drift/y_nm_per_min/sigma",
+        "/sets/0/drift/correlation",
+        "/sets/0/mean/twist_deg/value",
+        "/sets/0/mean/heterostrain_percent/sigma",
+        "/sets/0/mean/strain_axis_lab_deg/value",
+        "/sets/0/mean/strain_vector_percent/1",
+        "/sets/0/mean/strain_vector_covariance/1/1",
+        "/sets/0/scans/9/window/centre_nm/1",
+        "/sets/0/scans/9/window/extent_nm/0",
+        "/sets/0/scans/9/tip_velocity_nm_per_s/fast/value",
+        "/sets/0/scans/9/tip_velocity_nm_per_s/slow/value",
+        "/sets/0/scans/9/vectors/2/polar_angle_deg",
+        "/sets/0/scans/9/vectors/2/nominal/x_nm",
+        "/sets/0/scans/9/vectors/2/sensor/y_nm",
+        "/sets/0/scans/9/vectors/2/drift_corrected/wavelength_nm/value",
+        "/sets/0/scans/9/vectors/2/drift_corrected/naive_twist_deg/sigma",
+        "/sets/0/scans/9/twist_strain/sensor/twist_deg/value",
+        "/sets/0/scans/9/twist_strain/drift_corrected/heterostrain_percent/value",
+        "/sets/0/scans/9/twist_strain/drift_corrected/lattice_angle_deg/value",
+        "/sets/0/scans/9/twist_strain/drift_corrected/strain_axis_lab_deg/value",
+        "/sets/0/scans/9/twist_strain/drift_corrected/strain_axis_lattice_deg/value",
+        "/combined/twist_deg/value",
+        "/combined/heterostrain_percent/sigma",
+        "/combined/vectors/2/x_nm",
+    ];
+    for path in numbers {
+        assert!(
+            document.pointer(path).is_some_and(Value::is_number),
+            "{path}"
+        );
+    }
+    let texts = [
+        ("/schema", "moiregauge/results/1"),
+        ("/sets/0/name", "slow y, 8 Hz"),
+        ("/sets/0/slow_axis", "y"),
+        ("/sets/1/slow_axis", "x"),
+        ("/sets/0/scans/0/frame_direction", "up"),
+        ("/sets/0/scans/1/frame_direction", "down"),
+        ("/caveats/0/code", "few-periods"),
+        ("/caveats/0/where", "slow y, 8 Hz"),
+        ("/failed/0/file", "Messung 3 ü/tbg µ-scan_1.011"),
+    ];
+    for (path, text) in texts {
+        assert_eq!(
+            document.pointer(path).and_then(Value::as_str),
+            Some(text),
+            "{path}"
+        );
+    }
+    for path in [
+        "/sets/2/drift",
+        "/sets/2/mean",
+        "/sets/2/scans/0/vectors/0/nominal",
+    ] {
+        assert!(document.pointer(path).is_some_and(Value::is_null), "{path}");
+    }
+}
+
+/// The made-up sample has round numbers in the units of the surface.
+#[test]
+fn units_are_those_of_the_surface() {
+    let document = document(&common::analysis());
+    let close = |path: &str, truth: f64, tolerance: f64| {
+        let value = document
+            .pointer(path)
+            .and_then(Value::as_f64)
+            .expect("a number");
+        assert!(
+            (value - truth).abs() < tolerance,
+            "{path}: {value}, not {truth}"
+        );
+    };
+    // Tolerances: five σ of the made-up measurement, as the document states it.
+    close("/combined/twist_deg/value", common::TWIST_DEG, 0.0011);
+    close(
+        "/combined/heterostrain_percent/value",
+        common::STRAIN_PERCENT,
+        0.0032,
+    );
+    close(
+        "/combined/strain_axis_lab_deg/value",
+        common::AXIS_LAB_DEG,
+        1.9,
+    );
+    let [x, y] = common::DRIFT_NM_PER_MIN;
+    close("/sets/0/drift/x_nm_per_min/value", x, 0.07);
+    close("/sets/0/drift/y_nm_per_min/value", y, 0.07);
+    // The side nearer to x comes first, whichever axis is the slow one.
+    close("/sets/0/scans/0/window/extent_nm/0", 54.2, 1e-9);
+    close("/sets/1/scans/0/window/extent_nm/1", 54.2, 1e-9);
+}
+
+/// The paths of the strain hang together: E₁, E₂ have the length and the axis that are stated.
+#[test]
+fn strain_vector_and_axis_agree() {
+    let document = document(&common::analysis());
+    let at = |path: &str| {
+        document
+            .pointer(path)
+            .and_then(Value::as_f64)
+            .expect("a number")
+    };
+    let (e1, e2) = (
+        at("/sets/0/mean/strain_vector_percent/0"),
+        at("/sets/0/mean/strain_vector_percent/1"),
+    );
+    let axis = (e2.atan2(e1) / 2.0).to_degrees();
+    assert!((axis - at("/sets/0/mean/strain_axis_lab_deg/value")).abs() < 1e-9);
+    let p = at("/sets/0/mean/strain_p_value");
+    assert!(
+        (0.0..0.01).contains(&p),
+        "an axis is stated, so p is below 0.01: {p}"
+    );
+}
+
+#[test]
+fn the_document_reads_back() {
+    let results = Results::new(&common::analysis(), &common::provenance());
+    let bytes = results.to_json().expect("JSON");
+    let again: Results = serde_json::from_slice(&bytes).expect("the types read what they write");
+    assert_eq!(again.to_json().expect("JSON"), bytes);
+}
+
+/// A reader of RFC 4180, written apart from the writer.
+fn parse(text: &str) -> Vec<Vec<String>> {
+    let (mut rows, mut row, mut field, mut quoted) = (Vec::new(), Vec::new(), String::new(), false);
+    let mut characters = text.chars().peekable();
+    while let Some(c) = characters.next() {
+        match (c, quoted) {
+            ('"', true) if characters.peek() == Some(&'"') => field.extend(characters.next()),
+            ('"', _) => quoted = !quoted,
+            (',', false) => row.push(std::mem::take(&mut field)),
+            ('\r', false) => {}
+            ('\n', false) => {
+                row.push(std::mem::take(&mut field));
+                rows.push(std::mem::take(&mut row));
+            }
+            (c, _) => field.push(c),
+        }
+    }
+    assert!(field.is_empty() && row.is_empty(), "the last line ends");
+    rows
+}
+
+#[test]
+fn tables_survive_hostile_names() {
+    let name = "a \"quoted\", ünïcode\r\nname, 深い.001";
+    let mut analysis = common::analysis();
+    analysis.sets[0].scans[0].file = name.to_owned();
+    for (table, lines) in [
+        ("vectors.csv", 16 * 9 + 3),
+        ("scans.csv", 17 * 2),
+        ("sets.csv", 3),
+    ] {
+        let rows = parse(&file(&analysis, table));
+        assert_eq!(rows.len(), lines + 1, "{table}");
+        assert!(
+            rows.iter().all(|row| row.len() == rows[0].len()),
+            "{table}: ragged"
+        );
+        assert!(
+            rows[0].iter().all(|n| n.is_ascii() && !n.is_empty()),
+            "{table}: names"
+        );
+        if let Some(column) = rows[0].iter().position(|n| n == "file") {
+            assert_eq!(rows[1][column], name);
+        }
+    }
+}
+
+#[test]
+fn vectors_have_the_length_they_state() {
+    let rows = parse(&file(&common::analysis(), "vectors.csv"));
+    let column = |name: &str| rows[0].iter().position(|n| n == name).expect("the column");
+    let (x, y, length) = (column("x_nm"), column("y_nm"), column("wavelength_nm"));
+    for row in &rows[1..] {
+        let number = |i: usize| row[i].parse::<f64>().expect("a number");
+        assert!((number(x).hypot(number(y)) - number(length)).abs() < 1e-9);
+    }
+}
+
+#[test]
+fn every_column_is_explained() {
+    let about = file(&common::analysis(), "columns.md");
+    for table in ["vectors.csv", "scans.csv", "sets.csv"] {
+        for name in parse(&file(&common::analysis(), table)).swap_remove(0) {
+            assert!(about.contains(&format!("| `{name}` |")), "{table}: {name}");
+        }
+    }
+}
