@@ -25,11 +25,9 @@ pub fn plus_minus(estimate: Estimate) -> String {
 
 /// Decimals that show two significant digits of `sigma`.
 fn decimals(sigma: f64) -> usize {
-    let places = |s: f64| (1.0 - s.log10().floor()).clamp(0.0, 12.0) as usize;
-    let first = places(sigma);
-    // 0.0996 becomes 0.100: rounding may have added a digit.
-    let scale = 10_f64.powi(first as i32);
-    places((sigma * scale).round() / scale).min(first)
+    // 0.0996 becomes 0.10: rounding to two digits may add one before them.
+    let carried = sigma * (1.0 + 0.05 / 9.95);
+    (1.0 - carried.log10().floor()).clamp(0.0, 12.0) as usize
 }
 
 #[cfg(test)]

@@ -37,7 +37,7 @@ impl Default for Choice {
 }
 
 /// The figures as files, in the order of the figures on any number of threads.
-fn figure_files(all: &[Figure], choice: &Choice) -> Result<Vec<(String, Vec<u8>)>, ReportError> {
+fn figure_files(all: &[Figure], choice: Choice) -> Result<Vec<(String, Vec<u8>)>, ReportError> {
     let drawn: Vec<(&str, &str)> = all
         .iter()
         .filter_map(|f| {
@@ -86,7 +86,7 @@ pub fn write_report(
     } else {
         None
     };
-    files.extend(figure_files(&all, choice)?);
+    files.extend(figure_files(&all, *choice)?);
     files.extend(page.map(|page| ("report.html".to_owned(), page)));
     Ok(files)
 }

@@ -6,8 +6,8 @@ use moiregauge_report::{Choice, ColorMap, figures, write_report};
 
 type Files = Vec<(String, Vec<u8>)>;
 
-fn report(analysis: &moiregauge::analysis::Analysis, choice: &Choice) -> Files {
-    write_report(analysis, &common::provenance(), choice).expect("a report")
+fn report(analysis: &moiregauge::analysis::Analysis, choice: Choice) -> Files {
+    write_report(analysis, &common::provenance(), &choice).expect("a report")
 }
 
 fn page(files: &Files) -> String {
@@ -45,7 +45,7 @@ fn the_bytes_do_not_depend_on_threads() {
                 .num_threads(threads)
                 .build()
                 .expect("a pool");
-            pool.install(|| report(&analysis, &Choice::default()))
+            pool.install(|| report(&analysis, Choice::default()))
         })
         .collect();
     assert!(made[0] == made[1] && made[0] == made[2]);
@@ -83,7 +83,7 @@ fn pictures_have_the_width_of_journals() {
         html: false,
         ..Choice::default()
     };
-    let files = report(&analysis, &choice);
+    let files = report(&analysis, choice);
     for figure in figures(&analysis, ColorMap::Viridis) {
         let Ok(drawing) = figure.drawing else {
             continue;
@@ -152,7 +152,7 @@ fn the_page_escapes_and_needs_no_network() {
 fn the_page_says_what_is_wrong_first() {
     let mut analysis = common::analysis();
     analysis.settings.method = moiregauge::settings::Method::Paper;
-    let page = page(&report(&analysis, &WITHOUT_PNG));
+    let page = page(&report(&analysis, WITHOUT_PNG));
     let at = |text: &str| {
         page.find(text)
             .unwrap_or_else(|| panic!("{text} is missing"))
@@ -170,7 +170,7 @@ fn nothing_to_show_is_no_error() {
     empty.sets.clear();
     empty.combined = None;
     empty.caveats.clear();
-    assert!(page(&report(&empty, &Choice::default())).contains("No set could be corrected"));
+    assert!(page(&report(&empty, Choice::default())).contains("No set could be corrected"));
 }
 
 /// Every number NaN, every image without pixels: a report still comes out.
@@ -178,9 +178,9 @@ fn nothing_to_show_is_no_error() {
 fn hopeless_numbers_are_no_error() {
     let mut analysis = common::analysis();
     common::spoil(&mut analysis);
-    let files = report(&analysis, &Choice::default());
+    let files = report(&analysis, Choice::default());
     for (name, bytes) in &files {
-        if name.ends_with(".svg") {
+        if name.starts_with("figures/") && bytes.starts_with(b"<svg") {
             let text = String::from_utf8_lossy(bytes);
             assert!(!without_images(&text).contains("NaN"), "{name}");
         }

@@ -19,16 +19,43 @@ pub(crate) struct Labels<'a> {
     pub(crate) title: &'a str,
     pub(crate) x: &'a str,
     pub(crate) y: &'a str,
-    /// x counts scans.
-    pub(crate) count_x: bool,
-    /// y counts scans.
-    pub(crate) count_y: bool,
-    /// Leave the numbers of x out (a panel below has them).
-    pub(crate) bare_x: bool,
-    /// Leave the numbers of y out (a panel at the left has them).
-    pub(crate) bare_y: bool,
-    /// Neither ticks nor numbers on y (densities in arbitrary units).
-    pub(crate) no_y: bool,
+    pub(crate) x_ticks: Ticks,
+    pub(crate) y_ticks: Ticks,
+}
+
+/// The ticks of an axis.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) enum Ticks {
+    /// At round values, with numbers.
+    #[default]
+    Values,
+    /// As `Values`, but a neighbouring panel has the numbers.
+    BareValues,
+    /// At whole numbers: the axis counts scans.
+    Scans,
+    /// As `Scans`, but a neighbouring panel has the numbers.
+    BareScans,
+    /// None: a density in arbitrary units.
+    None,
+}
+
+impl Ticks {
+    /// `Scans`, with or without numbers.
+    pub(crate) fn scans(numbers: bool) -> Self {
+        if numbers {
+            Self::Scans
+        } else {
+            Self::BareScans
+        }
+    }
+
+    fn whole(self) -> bool {
+        matches!(self, Self::Scans | Self::BareScans)
+    }
+
+    fn numbers(self) -> bool {
+        matches!(self, Self::Values | Self::Scans)
+    }
 }
 
 const TICK: f64 = 2.4;
@@ -107,7 +134,7 @@ impl Axes {
         let frame = Ink::line(BLACK, HAIR);
         svg.rect(area, &frame);
         self.draw_x(svg, labels, &frame);
-        let widest = if labels.no_y {
+        let widest = if labels.y_ticks == Ticks::None {
             -6.0
         } else {
             self.draw_y(svg, labels, &frame)
@@ -138,9 +165,9 @@ impl Axes {
 
     fn draw_x(&self, svg: &mut Svg, labels: &Labels, frame: &Ink) {
         let (area, range) = (self.area, self.x.range);
-        let spacing = if labels.count_x { 17.0 } else { 34.0 };
+        let spacing = if labels.x_ticks.whole() { 17.0 } else { 34.0 };
         let wanted = ((area.width / spacing) as usize).clamp(3, 12);
-        let marks = fitting(wanted, labels.count_x, range, |marks| {
+        let marks = fitting(wanted, labels.x_ticks.whole(), range, |marks| {
             let needed: f64 = marks
                 .iter()
                 .map(|t| text_width(&t.label, SMALL) + 5.0)
@@ -150,7 +177,7 @@ impl Axes {
         for tick in marks {
             let x = self.x.at(tick.value);
             svg.line((x, area.bottom()), (x, area.bottom() + TICK), frame);
-            if !labels.bare_x {
+            if labels.x_ticks.numbers() {
                 let at = (x, area.bottom() + TICK + 1.5 + SMALL);
                 svg.text(at, &tick.label, &lettering(SMALL, Anchor::Middle));
             }
@@ -169,10 +196,10 @@ impl Axes {
         let (area, range) = (self.area, self.y.range);
         let wanted = ((area.height / 22.0) as usize).clamp(3, 8);
         let mut widest: f64 = 0.0;
-        for tick in fitting(wanted, labels.count_y, range, |_| true) {
+        for tick in fitting(wanted, labels.y_ticks.whole(), range, |_| true) {
             let y = self.y.at(tick.value);
             svg.line((area.x - TICK, y), (area.x, y), frame);
-            if !labels.bare_y {
+            if labels.y_ticks.numbers() {
                 let at = (area.x - TICK - 2.0, y + 0.36 * SMALL);
                 svg.text(at, &tick.label, &lettering(SMALL, Anchor::End));
                 widest = widest.max(text_width(&tick.label, SMALL));

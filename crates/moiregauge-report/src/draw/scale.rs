@@ -107,10 +107,9 @@ fn step_by(rough: f64, thresholds: [f64; 4]) -> f64 {
     let leading = rough / power;
     let steps = [1.0, 2.0, 5.0, 10.0].into_iter().zip(thresholds);
     steps
-        .filter(|&(_, from)| leading >= from)
-        .map(|(step, _)| step * power)
-        .last()
-        .unwrap_or(power)
+        .rev()
+        .find(|&(_, from)| leading >= from)
+        .map_or(power, |(step, _)| step * power)
 }
 
 fn multiples(range: Range, step: f64) -> Vec<Tick> {

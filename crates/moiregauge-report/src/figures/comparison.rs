@@ -5,7 +5,7 @@ use moiregauge::settings::Method;
 
 use super::layout::{counting, ends, is_up, ordinal, point};
 use super::{Drawing, Subject, layout};
-use crate::draw::axes::{Axes, Labels, zero_line};
+use crate::draw::axes::{Axes, Labels, Ticks, zero_line};
 use crate::draw::legend::{self, Key};
 use crate::draw::scale::Range;
 use crate::draw::style::{GREY, LINE, PAGE, VECTOR, VECTOR_MARKER, VECTOR_NAME};
@@ -83,7 +83,7 @@ pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
         letter: "b",
         x: "scan",
         y: "difference (pm)",
-        count_x: true,
+        x_ticks: Ticks::Scans,
         ..Labels::default()
     };
     axes.draw(&mut svg, &labels);

@@ -6,7 +6,7 @@ use moiregauge::image::Image;
 use nalgebra::{Matrix2, Vector2};
 
 use super::{Drawing, Subject, layout};
-use crate::draw::axes::{Axes, Labels};
+use crate::draw::axes::{Axes, Labels, Ticks};
 use crate::draw::legend::{self, Key};
 use crate::draw::raster;
 use crate::draw::scale::Range;
@@ -170,8 +170,8 @@ fn marginals(svg: &mut Svg, axes: &Axes, draws: &DriftMonteCarlo, (x, y): (&[f64
     );
     let bare = Labels {
         letter: "a",
-        bare_x: true,
-        no_y: true,
+        x_ticks: Ticks::BareValues,
+        y_ticks: Ticks::None,
         ..Labels::default()
     };
     top.draw(svg, &bare);

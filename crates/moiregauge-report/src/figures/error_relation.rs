@@ -75,7 +75,7 @@ fn best(scan: &ScanAnalysis) -> (LatticeVectors, Option<TwistStrain>) {
     }
 }
 
-/// One point: Δλ or σ_λ (nm), Δθ or σ_θ (°), its look.
+/// One point: Δλ or its σ (nm), Δθ or its σ (°), its look.
 type Point = (f64, f64, Marker, &'static str, bool);
 
 fn uncertainties(svg: &mut Svg, subject: &Subject, grid: &Grid, slope: f64) -> Result<(), String> {

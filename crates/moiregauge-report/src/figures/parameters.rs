@@ -6,7 +6,7 @@ use moiregauge::strain::TwistStrain;
 
 use super::layout::{LETTERS, is_up, ordinal};
 use super::{Drawing, Subject, layout};
-use crate::draw::axes::{Axes, Labels};
+use crate::draw::axes::{Axes, Labels, Ticks};
 use crate::draw::legend::{self, Key};
 use crate::draw::scale::Range;
 use crate::draw::style::{BLACK, BLUE, Marker, PAGE, marker};
@@ -63,8 +63,7 @@ pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
             letter: LETTERS[quantity],
             x: ["twist θ (°)", "strain ε (%)", "strain axis φ, from x (°)"][quantity],
             y: if quantity == 0 { "scan" } else { "" },
-            count_y: true,
-            bare_y: quantity > 0,
+            y_ticks: Ticks::scans(quantity == 0),
             ..Labels::default()
         };
         axes.draw(&mut svg, &labels);

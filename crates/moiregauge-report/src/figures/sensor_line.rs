@@ -1,7 +1,7 @@
 //! The position sensor of the fast axis along one line: reading, fit and residual.
 
 use super::{Drawing, Subject, layout};
-use crate::draw::axes::{Axes, Labels, zero_line};
+use crate::draw::axes::{Axes, Labels, Ticks, zero_line};
 use crate::draw::legend::{self, Key};
 use crate::draw::scale::Range;
 use crate::draw::style::{BLUE, COLUMN, LINE, ORANGE};
@@ -41,7 +41,7 @@ pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
     let labels = Labels {
         letter: "a",
         y: "position (nm)",
-        bare_x: true,
+        x_ticks: Ticks::BareValues,
         ..Labels::default()
     };
     axes.draw(&mut svg, &labels);

@@ -4,7 +4,7 @@ use moiregauge::analysis::{Analysis, SetAnalysis, SetMean};
 use nalgebra::{Matrix2, Vector2};
 
 use super::{Drawing, layout};
-use crate::draw::axes::{Axes, Labels, mean_band};
+use crate::draw::axes::{Axes, Labels, Ticks, mean_band};
 use crate::draw::legend::{self, Key};
 use crate::draw::scale::Range;
 use crate::draw::style::{GREY, HAIR, Marker, PAGE, SET, marker};
@@ -162,7 +162,7 @@ fn twists(
         title: "twist",
         x: "set",
         y: "θ (°)",
-        count_x: true,
+        x_ticks: Ticks::Scans,
         ..Labels::default()
     };
     axes.draw(svg, &labels);

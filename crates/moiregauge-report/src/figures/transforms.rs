@@ -55,7 +55,7 @@ fn panel(left: f64, half: f64) -> Axes {
 }
 
 fn autocorrelation(svg: &mut Svg, subject: &Subject, shown: &Illustration, basis: &Matrix2<f64>) {
-    let axes = panel(layout::LEFT, 2.45 * longest(basis));
+    let axes = panel(layout::LEFT, 2.2 * longest(basis));
     let (image, origin) = visible(&shown.autocorrelation, &shown.pixel_to_nm, &axes);
     let contrast = raster::contrast(&image, 0.005);
     svg.clipped(axes.area, |svg| {

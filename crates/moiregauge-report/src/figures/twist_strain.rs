@@ -6,7 +6,7 @@ use moiregauge::strain::TwistStrain;
 
 use super::layout::{Grid, LETTERS, counting, ends, is_up, ordinal, point};
 use super::{Drawing, Subject, layout};
-use crate::draw::axes::{Axes, Labels, mean_band};
+use crate::draw::axes::{Axes, Labels, Ticks, mean_band};
 use crate::draw::legend::{self, Key};
 use crate::draw::scale::Range;
 use crate::draw::style::{BLUE, GREY, Marker, ORANGE, PAGE, SMALL, lettering};
@@ -101,9 +101,8 @@ pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
                 letter: LETTERS[2 * row + column],
                 title: &title,
                 x: if row == 2 { "scan" } else { "" },
-                bare_x: row < 2,
+                x_ticks: Ticks::scans(row == 2),
                 y: ["θ (°)", "ε (%)", "φ, from x (°)"][row],
-                count_x: true,
                 ..Labels::default()
             };
             axes.draw(&mut svg, &labels);

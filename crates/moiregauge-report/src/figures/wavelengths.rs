@@ -5,7 +5,7 @@ use moiregauge::estimate::Estimate;
 
 use super::layout::{Grid, LETTERS, counting, ends, is_up, ordinal, point};
 use super::{Drawing, Subject, layout};
-use crate::draw::axes::{Axes, Labels};
+use crate::draw::axes::{Axes, Labels, Ticks};
 use crate::draw::legend::{self, Key};
 use crate::draw::scale::Range;
 use crate::draw::style::{GREY, HAIR, PAGE, PALE, VECTOR, VECTOR_MARKER, VECTOR_NAME};
@@ -57,9 +57,8 @@ pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
                 letter: LETTERS[2 * vector + column],
                 title: &title,
                 x: if vector == 2 { "scan" } else { "" },
-                bare_x: vector < 2,
+                x_ticks: Ticks::scans(vector == 2),
                 y: "wavelength (nm)",
-                count_x: true,
                 ..Labels::default()
             };
             axes.draw(&mut svg, &labels);

@@ -6,7 +6,7 @@ use moiregauge::strain::naive_twist;
 
 use super::layout::{Grid, LETTERS, counting, ends, is_up, ordinal, point};
 use super::{Drawing, Subject, layout};
-use crate::draw::axes::{Axes, Labels};
+use crate::draw::axes::{Axes, Labels, Ticks};
 use crate::draw::legend::{self, Key};
 use crate::draw::scale::Range;
 use crate::draw::style::{PAGE, VECTOR, VECTOR_MARKER, VECTOR_NAME};
@@ -72,9 +72,8 @@ pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
                 letter: LETTERS[2 * row + column],
                 title: ["nominal size", "position sensors"][column],
                 x: if row == 1 { "scan" } else { "" },
-                bare_x: row < 1,
+                x_ticks: Ticks::scans(row == 1),
                 y: ["wavelength (nm)", "naive twist (°)"][row],
-                count_x: true,
                 ..Labels::default()
             };
             axes.draw(&mut svg, &labels);

@@ -4,7 +4,7 @@ use nalgebra::Vector2;
 
 use super::layout::{LEFT, counting, is_up, ordinal};
 use super::{Drawing, Subject, layout};
-use crate::draw::axes::{Axes, Labels, zero_line};
+use crate::draw::axes::{Axes, Labels, Ticks, zero_line};
 use crate::draw::legend::{self, Key};
 use crate::draw::scale::{Range, fixed};
 use crate::draw::style::{BLACK, BLUE, GREY, HAIR, Marker, ORANGE, PAGE, SMALL, lettering, marker};
@@ -55,7 +55,7 @@ pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
         letter: "b",
         x: "scan",
         y: "shift of the centre (nm)",
-        count_x: true,
+        x_ticks: Ticks::Scans,
         ..Labels::default()
     };
     axes.draw(&mut svg, &labels);

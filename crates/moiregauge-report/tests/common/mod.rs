@@ -107,7 +107,7 @@ fn scan(
     settings: &Settings,
     noise: &mut Noise,
 ) -> ScanAnalysis {
-    let up = index % 2 == 0;
+    let up = index.is_multiple_of(2);
     let (truth, sigma) = (truth(settings), 0.012 + 0.004 * set as f64);
     let u = time_gradient(axis, up, rate);
     let d = drift_nm_per_s();
