@@ -21,7 +21,7 @@ pub(super) struct Page<'a> {
     consistency: Vec<[String; 5]>,
     /// Figures of all sets together.
     together: Vec<Shown<'a>>,
-    conventions: Vec<[String; 2]>,
+    conventions: [(&'static str, &'a str); 12],
     settings: String,
     downloads: Vec<Download<'a>>,
 }
@@ -129,7 +129,7 @@ impl<'a> Page<'a> {
                 .collect(),
             consistency: consistency(results),
             together: of(None),
-            conventions: conventions(&results.conventions)?,
+            conventions: conventions(&results.conventions),
             settings: serde_json::to_string_pretty(&results.settings)?,
             downloads: downloads
                 .iter()

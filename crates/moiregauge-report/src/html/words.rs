@@ -3,7 +3,6 @@
 use serde::Serialize;
 
 use crate::draw::scale::fixed;
-use crate::error::ReportError;
 use crate::format::plus_minus;
 use crate::results::{Conventions, LatticeVector, ResultEstimate, Results, TwistStrainResult};
 
@@ -77,16 +76,20 @@ pub(super) fn consistency(results: &Results) -> Vec<[String; 5]> {
         .collect()
 }
 
-/// Name and text of every convention, in the order of the document.
-pub(super) fn conventions(conventions: &Conventions) -> Result<Vec<[String; 2]>, ReportError> {
-    let value = serde_json::to_value(conventions)?;
-    let entries = value.as_object().into_iter().flatten();
-    Ok(entries
-        .map(|(name, text)| {
-            [
-                name.replace('_', " "),
-                text.as_str().unwrap_or_default().to_owned(),
-            ]
-        })
-        .collect())
+/// Name and text of every convention.
+pub(super) fn conventions(conventions: &Conventions) -> [(&'static str, &str); 12] {
+    [
+        ("axes", &conventions.axes),
+        ("angles", &conventions.angles),
+        ("lattice vectors", &conventions.lattice_vectors),
+        ("coordinates", &conventions.coordinates),
+        ("drift", &conventions.drift),
+        ("strain", &conventions.strain),
+        ("strained layer", &conventions.strained_layer),
+        ("strain axis", &conventions.strain_axis),
+        ("strain vector", &conventions.strain_vector),
+        ("heterostrain", &conventions.heterostrain),
+        ("twist", &conventions.twist),
+        ("σ", &conventions.sigma),
+    ]
 }
