@@ -79,6 +79,15 @@ pub enum LatticeError {
         /// Signal-to-noise ratios (amplitude) of the best three wave vectors.
         best: [f64; 3],
     },
+    /// The lattice shows in the spectrum, but this method gets no hold of it.
+    #[error(
+        "the spectrum shows a lattice, but the {method:?} method finds too few of its peaks: noise \
+         hides them or the frame is too small for them; --method fourier may do"
+    )]
+    NoPeaks {
+        /// The method.
+        method: Method,
+    },
 }
 
 /// An image without background and what its spectrum says: where the lattice is, roughly.
@@ -101,6 +110,7 @@ struct Prepared {
 /// - [`LatticeError::TooSmall`], [`LatticeError::Constant`], [`LatticeError::Missing`]: nothing to
 ///   measure.
 /// - [`LatticeError::NoLattice`]: no consistent lattice stands out of the noise.
+/// - [`LatticeError::NoPeaks`]: there is one, but the method cannot measure it.
 pub fn measure(
     image: &Image,
     geometry: &Geometry,
@@ -127,7 +137,7 @@ pub fn measure(
             fourier(),
         ),
     };
-    let pixels = pixels.ok_or_else(|| no_lattice(harmonics))?;
+    let pixels = pixels.ok_or(LatticeError::NoPeaks { method })?;
     let label = |l: LatticeVectors| reciprocal::labelled_like(&l, &pixels.basis);
     let longest = (0..3)
         .map(|i| pixels.vector(i))
@@ -169,31 +179,49 @@ fn prepare(
         return Err(LatticeError::Constant);
     }
     let full = Spectrum::new(&image);
-    let none = LatticeError::NoLattice { best: [0.0; 3] };
-    let candidates = select::candidates(&full, &geometry.pixel_to_nm);
-    let pair = candidates.first().ok_or(none.clone())?.pair;
-    let binning = binning(&pair);
-    let pair = pair * binning as f64;
-    let (binned, spectrum) = if binning == 1 {
-        (image.clone(), full)
-    } else {
-        let binned = image.binned(binning);
-        let spectrum = Spectrum::new(&binned);
-        (binned, spectrum)
-    };
-    let (harmonics, peaks) = refine(&binned, &pair, background).ok_or(none.clone())?;
-    if !is_lattice(&harmonics) {
-        return Err(no_lattice(&harmonics));
+    let mut best = [0.0; 3];
+    for candidate in select::candidates(&full, &geometry.pixel_to_nm) {
+        let binning = binning(&candidate.pair);
+        let binned = if binning == 1 {
+            image.clone()
+        } else {
+            image.binned(binning)
+        };
+        let pair = candidate.pair * binning as f64;
+        let Some((harmonics, peaks)) = refine(&binned, &pair, background) else {
+            continue;
+        };
+        let verdict = verdict(&harmonics);
+        if verdict != Verdict::Lattice {
+            let ratios = signal_to_noise(&harmonics);
+            if ratios[2] > best[2] {
+                best = ratios;
+            }
+            // A strong second shell belongs to a lattice whose first shell is hidden; the lattice
+            // of the second shell alone would be a wrong answer.
+            if verdict == Verdict::Doubtful {
+                break;
+            }
+            continue;
+        }
+        let Some(start) = reciprocal::reciprocal(&harmonics.pair) else {
+            continue;
+        };
+        let spectrum = if binning == 1 {
+            full
+        } else {
+            Spectrum::new(&binned)
+        };
+        return Ok(Prepared {
+            image,
+            binning,
+            spectrum,
+            harmonics,
+            peaks,
+            start,
+        });
     }
-    let start = reciprocal::reciprocal(&harmonics.pair).ok_or(none)?;
-    Ok(Prepared {
-        image,
-        binning,
-        spectrum,
-        harmonics,
-        peaks,
-        start,
-    })
+    Err(LatticeError::NoLattice { best })
 }
 
 /// Bins per shortest period of the first harmonics: enough for their second order.
@@ -256,10 +284,15 @@ fn signal_to_noise(harmonics: &Harmonics) -> [f64; 3] {
     best
 }
 
-fn no_lattice(harmonics: &Harmonics) -> LatticeError {
-    LatticeError::NoLattice {
-        best: signal_to_noise(harmonics),
-    }
+/// What the harmonics of a proposed lattice amount to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Verdict {
+    /// They cannot be chance.
+    Lattice,
+    /// Some of them cannot, but the first shell can.
+    Doubtful,
+    /// They can all be chance.
+    Chance,
 }
 
 /// Whether the harmonics can be chance.
@@ -268,7 +301,7 @@ fn no_lattice(harmonics: &Harmonics) -> LatticeError {
 /// searched among all frequencies, so they have to exceed the expected maximum of that search; the
 /// third was not searched: the sum rule says where it has to be. The second shell may be the strong
 /// one, as long as the first, which makes the lattice, is there at all.
-fn is_lattice(harmonics: &Harmonics) -> bool {
+fn verdict(harmonics: &Harmonics) -> Verdict {
     let shell = |members: &[harmonics::Harmonic]| {
         let mut s = [0.0; 3];
         for (s, h) in s.iter_mut().zip(members) {
@@ -279,6 +312,12 @@ fn is_lattice(harmonics: &Harmonics) -> bool {
     };
     let stands_out = |s: [f64; 3]| s[1] > 20.0 && s[2] > 12.0;
     let first = shell(&harmonics.list[..3]);
-    let second = shell(&harmonics.list[3..harmonics.list.len().min(6)]);
-    stands_out(first) || (stands_out(second) && first[1] > 12.0)
+    let second = stands_out(shell(&harmonics.list[3..harmonics.list.len().min(6)]));
+    if stands_out(first) || (second && first[1] > 12.0) {
+        Verdict::Lattice
+    } else if second || first[1] > 20.0 {
+        Verdict::Doubtful
+    } else {
+        Verdict::Chance
+    }
 }
