@@ -36,11 +36,20 @@ pub(crate) fn run(args: &AnalyzeArgs) -> anyhow::Result<ExitCode> {
         }
     }
     let loud = !args.quiet && !args.json;
-    let outcome = analyse_files(&inputs, &args.sets()?, &settings, failed, args.illustrated(), loud);
+    let outcome = analyse_files(
+        &inputs,
+        &args.sets()?,
+        &settings,
+        failed,
+        args.illustrated(),
+        loud,
+    );
     let Some(Outcome {
         analysis,
         provenance,
-    }) = outcome.map_err(|failed| eprint!("{}", summary::failures(&failed))).ok()
+    }) = outcome
+        .map_err(|failed| eprint!("{}", summary::failures(&failed)))
+        .ok()
     else {
         anyhow::bail!("nothing could be analysed");
     };
@@ -53,7 +62,10 @@ pub(crate) fn run(args: &AnalyzeArgs) -> anyhow::Result<ExitCode> {
         }
     } else if !args.quiet {
         print!("{}", summary(&analysis));
-        println!("\nWritten to {}", files::main_file(&args.out, &written).display());
+        println!(
+            "\nWritten to {}",
+            files::main_file(&args.out, &written).display()
+        );
     }
     eprint!("{}", summary::failures(&provenance.failed));
     Ok(if provenance.failed.is_empty() {

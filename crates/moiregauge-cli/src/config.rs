@@ -1,5 +1,6 @@
 //! `moiregauge config`, and the reading of such files.
 
+use std::io::Write as _;
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -73,7 +74,7 @@ seed = 1
 
 /// Prints the commented file.
 pub(crate) fn run(_args: &ConfigArgs) -> anyhow::Result<ExitCode> {
-    print!("{COMMENTED}");
+    std::io::stdout().lock().write_all(COMMENTED.as_bytes())?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -97,17 +98,15 @@ fn parse(text: &str) -> anyhow::Result<Settings> {
 
 /// A material by name, or an error that lists the names.
 pub(crate) fn named_material(name: &str) -> anyhow::Result<Material> {
-    match Material::named(name) {
-        Some(material) => Ok(material),
-        None => {
-            let known: Vec<String> = Material::all().into_iter().map(|m| m.name).collect();
-            bail!(
-                "unknown material {name:?}; known are {}; others can be described in a [material] table \
-                 of a settings file",
-                known.join(", ")
-            )
-        }
+    if let Some(material) = Material::named(name) {
+        return Ok(material);
     }
+    let known: Vec<String> = Material::all().into_iter().map(|m| m.name).collect();
+    bail!(
+        "unknown material {name:?}; known are {}; others can be described in a [material] table of a \
+         settings file",
+        known.join(", ")
+    )
 }
 
 #[cfg(test)]
@@ -121,7 +120,12 @@ mod tests {
 
     #[test]
     fn unknown_keys_and_materials_are_refused_with_what_is_known() {
-        assert!(parse("metod = \"fourier\"").unwrap_err().to_string().contains("metod"));
+        assert!(
+            parse("metod = \"fourier\"")
+                .unwrap_err()
+                .to_string()
+                .contains("metod")
+        );
         let error = parse("material = \"unobtainium\"").unwrap_err().to_string();
         assert!(error.contains("graphene"), "{error}");
     }

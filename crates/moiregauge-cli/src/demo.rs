@@ -47,7 +47,10 @@ pub(crate) fn run(args: &DemoArgs) -> anyhow::Result<ExitCode> {
         anyhow::bail!("the simulated scans could not be analysed");
     };
     let results = out.join("results");
-    write_all(&results, &write_report(&analysis, &provenance, &Choice::default())?)?;
+    write_all(
+        &results,
+        &write_report(&analysis, &provenance, &Choice::default())?,
+    )?;
     print!("{}", summary(&analysis));
     let truth = &sets[0];
     println!(
@@ -67,5 +70,8 @@ fn free_folder() -> PathBuf {
         1 => PathBuf::from("moiregauge-demo"),
         n => PathBuf::from(format!("moiregauge-demo-{n}")),
     };
-    (1..).map(name).find(|p| !p.exists()).unwrap_or_else(|| name(1))
+    (1..1000)
+        .map(name)
+        .find(|p| !p.exists())
+        .unwrap_or_else(|| name(1))
 }

@@ -149,7 +149,9 @@ impl AnalyzeArgs {
         }
         s.line = self.line.map_or(s.line, Into::into);
         s.method = self.method.map_or(s.method, Into::into);
-        s.strain_convention = self.strain_convention.map_or(s.strain_convention, Into::into);
+        s.strain_convention = self
+            .strain_convention
+            .map_or(s.strain_convention, Into::into);
         s.background = self.background.map_or(s.background, Into::into);
         s.grouping = self.grouping.map_or(s.grouping, Into::into);
         s.overlap |= self.overlap;

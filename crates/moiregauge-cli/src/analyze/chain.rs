@@ -1,5 +1,6 @@
 //! Files → measured scans → analysis, one file in memory per thread.
 
+use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use indicatif::{ProgressBar, ProgressStyle};
@@ -130,8 +131,11 @@ fn read(path: &Path, settings: &Settings) -> anyhow::Result<(Scan, InputFile)> {
         false
     })?;
     let channels = channels.into_inner();
-    let names = channels.iter().map(|(a, b)| (a.as_str(), b.as_str()));
-    let chosen = choose_channel(names, settings.channel.as_deref()).map(str::to_owned);
+    let names: Vec<_> = channels
+        .iter()
+        .map(|(a, b)| (a.as_str(), b.as_str()))
+        .collect();
+    let chosen = choose_channel(&names, settings.channel.as_deref()).map(str::to_owned);
     let scan = read_selected(&bytes, &|channel: &ChannelInfo| {
         chosen.as_ref().is_none_or(|name| *name == channel.name)
             || sensor_axis(&channel.name, &channel.internal_name).is_some()
@@ -139,10 +143,19 @@ fn read(path: &Path, settings: &Settings) -> anyhow::Result<(Scan, InputFile)> {
     let hash = Sha256::digest(&bytes);
     let input = InputFile {
         file: path.display().to_string(),
-        sha256: hash.iter().map(|b| format!("{b:02x}")).collect(),
+        sha256: hexadecimal(&hash),
         bytes: bytes.len() as u64,
     };
     Ok((scan, input))
+}
+
+fn hexadecimal(bytes: &[u8]) -> String {
+    let mut text = String::with_capacity(2 * bytes.len());
+    for byte in bytes {
+        // Writing into a string cannot fail.
+        let _ = write!(text, "{byte:02x}");
+    }
+    text
 }
 
 /// The region common to all files that can be read.

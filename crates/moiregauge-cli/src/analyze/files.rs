@@ -34,5 +34,9 @@ pub(crate) fn write_all(out: &Path, files: &[(String, Vec<u8>)]) -> anyhow::Resu
 /// The file to open first.
 pub(super) fn main_file(out: &Path, files: &[(String, Vec<u8>)]) -> PathBuf {
     let report = files.iter().any(|(name, _)| name == "report.html");
-    out.join(if report { "report.html" } else { "results.json" })
+    out.join(if report {
+        "report.html"
+    } else {
+        "results.json"
+    })
 }

@@ -16,7 +16,11 @@ pub(crate) fn summary(analysis: &Analysis) -> String {
     for set in &analysis.sets {
         set_summary(&mut text, set);
     }
-    if let Some(combined) = analysis.combined.as_ref().filter(|_| analysis.sets.len() > 1) {
+    if let Some(combined) = analysis
+        .combined
+        .as_ref()
+        .filter(|_| analysis.sets.len() > 1)
+    {
         combined_summary(&mut text, combined);
     }
     caveats(&mut text, &analysis.caveats);
@@ -56,7 +60,9 @@ fn set_summary(text: &mut String, set: &SetAnalysis) {
     match (&set.mean, &set.uncorrected) {
         (Some(mean), _) => twist_strain(text, &mean.twist_strain),
         (None, Some(mean)) => {
-            text.push_str("  not corrected for drift (statistical errors only, drift not included):\n");
+            text.push_str(
+                "  not corrected for drift (statistical errors only, drift not included):\n",
+            );
             twist_strain(text, &mean.twist_strain);
         }
         (None, None) => text.push_str("  no twist and strain explain this lattice\n"),
@@ -127,7 +133,11 @@ pub(super) fn failures(failed: &[FailedInput]) -> String {
         return text;
     }
     let _ = writeln!(text, "\nnot used: {}", failed.len());
-    let width = failed.iter().map(|f| f.file.chars().count()).max().unwrap_or(0);
+    let width = failed
+        .iter()
+        .map(|f| f.file.chars().count())
+        .max()
+        .unwrap_or(0);
     for FailedInput { file, error } in failed {
         let _ = writeln!(text, "  {file:width$}  {error}");
     }

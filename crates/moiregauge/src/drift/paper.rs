@@ -58,9 +58,8 @@ pub fn matrix(scan: &PaperScan, drift: &Vector2<f64>) -> Matrix2<f64> {
 /// For n scans it is n times the sum of squared deviations from the mean, which is how it is
 /// computed.
 pub fn pairwise_objective(scans: &[PaperScan], drift: &Vector2<f64>) -> f64 {
-    deviations(scans, drift)
-        .map(|d| scans.len() as f64 * d.iter().map(|v| v * v).sum::<f64>())
-        .unwrap_or(f64::INFINITY)
+    let squares = |d: Vec<f64>| d.iter().map(|v| v * v).sum::<f64>();
+    deviations(scans, drift).map_or(f64::INFINITY, |d| scans.len() as f64 * squares(d))
 }
 
 /// The drift that minimises the pairwise objective, nm/s; `None` where it has no minimum.

@@ -89,7 +89,7 @@ fn drift_round_trip_for_all_directions() {
 }
 
 /// The reference matrices of the specification (section 8): slow x, 8 Hz, D = (0.48, −0.14) nm/min,
-/// exact; the published ones differ by the missing element D_slow/V_fast ≈ 9·10⁻⁶ and nothing else.
+/// exact; the published ones differ by the missing element `D_slow/V_fast` ≈ 9·10⁻⁶ and nothing else.
 #[test]
 fn exact_and_published_matrices() {
     let drift = Vector2::new(0.48, -0.14) * NM_PER_MIN;
@@ -151,7 +151,7 @@ fn forward_backward_identity() {
     assert!(real > 1e-8 && real < 2e-5, "{real}");
 }
 
-/// The σ_D table of the specification (section 2): λ = 12.5 nm, 512 lines of 55 nm, σ = 1.5/√3 px.
+/// The table of `σ_D` of the specification (section 2): λ = 12.5 nm, 512 lines of 55 nm, σ = 1.5/√3 px.
 /// The table's three peaks per scan are independent; two basis vectors with R₃ built in say the same.
 #[test]
 fn drift_error_follows_the_table() {
@@ -175,7 +175,7 @@ fn drift_error_follows_the_table() {
     };
     let sigma_of = |scans: &[Observation]| {
         let s = solve(scans).unwrap();
-        ((s.covariance[(0, 0)] + s.covariance[(1, 1)]) / 2.0).sqrt() / NM_PER_MIN
+        (s.covariance.trace() / 2.0).sqrt() / NM_PER_MIN
     };
     let alternating = |n: usize, rate| -> Vec<Observation> {
         (0..n).map(|i| scan(Axis::Y, rate, i % 2 == 0)).collect()

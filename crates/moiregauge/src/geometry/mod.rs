@@ -176,8 +176,8 @@ pub(crate) fn mean_and_spread(values: &[f64]) -> Estimate {
 mod tests {
     use super::*;
 
-    /// The velocities of physics.md section 1: V_fast = 2 f (1+ρ) L_f, V_slow = L_s f / N, and the
-    /// time gradient of a rectangle, (s_f/V_fast, s_s/V_slow), for both slow axes.
+    /// The velocities `V_fast = 2 f (1+ρ) L_f`, `V_slow = L_s f / N`, and the time gradient of a
+    /// rectangle, `(s_f/V_fast, s_s/V_slow)`, for both slow axes, written out independently.
     #[test]
     fn speeds_and_time_gradients_of_a_rectangle() {
         let (n, f, rounding) = (512, 8.0, 0.1);

@@ -250,7 +250,7 @@ fn padded(n: usize) -> usize {
         m == 1
     };
     let mut m = n.max(8);
-    while m % 2 != 0 || !smooth(m) {
+    while !m.is_multiple_of(2) || !smooth(m) {
         m += 1;
     }
     m

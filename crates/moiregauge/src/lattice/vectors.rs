@@ -19,12 +19,12 @@ pub struct LatticeVectors {
 impl LatticeVectors {
     /// The vector `index` (0, 1, 2): first, second, second − first.
     pub fn vector(&self, index: usize) -> Vector2<f64> {
-        self.selector(index) * self.flat()
+        Self::selector(index) * self.flat()
     }
 
     /// Covariance of [`LatticeVectors::vector`].
     pub fn vector_covariance(&self, index: usize) -> Matrix2<f64> {
-        let s = self.selector(index);
+        let s = Self::selector(index);
         s * self.covariance * s.transpose()
     }
 
@@ -76,7 +76,7 @@ impl LatticeVectors {
         nalgebra::Vector4::from_column_slice(self.basis.as_slice())
     }
 
-    fn selector(&self, index: usize) -> Matrix2x4<f64> {
+    fn selector(index: usize) -> Matrix2x4<f64> {
         let (c1, c2) = [(1.0, 0.0), (0.0, 1.0), (-1.0, 1.0)][index];
         Matrix2x4::new(c1, 0.0, c2, 0.0, 0.0, c1, 0.0, c2)
     }

@@ -22,23 +22,23 @@ const USUAL: [&str; 12] = [
 /// `channels` are pairs of the name the user sees and the instrument's own. Case, spaces and
 /// underscores do not count. Returns the name the user sees.
 pub fn choose_channel<'a>(
-    channels: impl Iterator<Item = (&'a str, &'a str)> + Clone,
+    channels: &[(&'a str, &'a str)],
     wanted: Option<&str>,
 ) -> Option<&'a str> {
     let find = |wanted: &str| {
         let wanted = plain(wanted);
         channels
-            .clone()
+            .iter()
             .find(|(name, internal)| plain(name) == wanted || plain(internal) == wanted)
-            .map(|(name, _)| name)
+            .map(|(name, _)| *name)
     };
     match wanted {
         Some(wanted) => find(wanted),
         None => USUAL.iter().find_map(|name| find(name)).or_else(|| {
             channels
-                .clone()
+                .iter()
                 .find(|(name, internal)| spmfile::sensor_axis(name, internal).is_none())
-                .map(|(name, _)| name)
+                .map(|(name, _)| *name)
         }),
     }
 }
@@ -64,12 +64,12 @@ mod tests {
 
     #[test]
     fn names_are_found_in_any_spelling() {
-        let choose = |wanted| choose_channel(CHANNELS.into_iter(), wanted);
+        let choose = |wanted| choose_channel(&CHANNELS, wanted);
         assert_eq!(choose(None), Some("TR Phase"));
         assert_eq!(choose(Some("tr_amplitude")), Some("TR Amplitude"));
         assert_eq!(choose(Some("zsensor")), Some("Height Sensor"));
         assert_eq!(choose(Some("Current")), None);
         let odd = [("Xsensor", ""), ("Deflection μ", "")];
-        assert_eq!(choose_channel(odd.into_iter(), None), Some("Deflection μ"));
+        assert_eq!(choose_channel(&odd, None), Some("Deflection μ"));
     }
 }

@@ -17,7 +17,7 @@ pub(super) struct Group {
 
 /// Groups scans; the groups are in order of their first scans.
 pub(super) fn groups(mut scans: Vec<MeasuredScan>, grouping: Grouping) -> Vec<Group> {
-    scans.sort_by(|a, b| by_time(a, b));
+    scans.sort_by(by_time);
     let mut groups: Vec<Group> = Vec::new();
     for scan in scans {
         let Some(line) = scan.lines.first() else {
@@ -121,10 +121,11 @@ fn name(groups: &mut [Group]) {
         };
         let mut name = format!("slow {axis}");
         if group.line_rate_hz.is_finite() {
-            name += &format!(", {} Hz", (group.line_rate_hz * 100.0).round() / 100.0);
+            let rate = (group.line_rate_hz * 100.0).round() / 100.0;
+            name = format!("{name}, {rate} Hz");
         }
         if groups.iter().any(|g| g.channel != group.channel) {
-            name += &format!(", {}", group.channel);
+            name = format!("{name}, {}", group.channel);
         }
         if let Some(given) = group.scans.first().and_then(|s| s.set.clone()) {
             name = given;

@@ -179,12 +179,13 @@ pub(super) fn channels<'a>(
     scan: &'a Scan,
     settings: &Settings,
 ) -> Result<Vec<&'a Channel>, MeasureError> {
-    let names = scan
+    let names: Vec<(&str, &str)> = scan
         .channels
         .iter()
-        .map(|c| (c.name.as_str(), c.internal_name.as_str()));
-    let Some(name) = choose_channel(names.clone(), settings.channel.as_deref()) else {
-        let mut present: Vec<&str> = names.map(|(name, _)| name).collect();
+        .map(|c| (c.name.as_str(), c.internal_name.as_str()))
+        .collect();
+    let Some(name) = choose_channel(&names, settings.channel.as_deref()) else {
+        let mut present: Vec<&str> = names.iter().map(|(name, _)| *name).collect();
         present.dedup();
         return Err(MeasureError::NoChannel {
             wanted: settings.channel.clone().unwrap_or_default(),
