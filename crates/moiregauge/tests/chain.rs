@@ -1,0 +1,211 @@
+//! The whole chain on simulated sets: invariances, honest errors, and what must be refused.
+
+use moiregauge::analysis::Analysis;
+use moiregauge::series::{MeasuredScan, analyse, measure_scan};
+use moiregauge::settings::{GivenDrift, Method, Settings};
+use moiregauge::simulate::{Simulation, Simulator};
+use spmfile::{FrameDirection, Samples, Scan};
+
+/// A small, quick set: 128 × 128 pixels, four scans.
+fn small_set(seed: u64) -> Simulation {
+    let mut simulation = Simulation {
+        seed,
+        ..Simulation::default()
+    };
+    simulation.raster.pixels = [128, 128];
+    simulation.raster.scans = 4;
+    simulation
+}
+
+fn frames(simulation: &Simulation) -> Vec<Scan> {
+    let simulator = Simulator::new(simulation.clone()).unwrap();
+    (0..simulator.frames())
+        .map(|i| simulator.frame(i))
+        .collect()
+}
+
+fn quick(method: Method) -> Settings {
+    Settings {
+        method,
+        drift_draws: 0,
+        strain_draws: 0,
+        ..Settings::default()
+    }
+}
+
+fn analyse_frames(frames: &[Scan], settings: &Settings) -> Analysis {
+    let measured: Vec<MeasuredScan> = frames
+        .iter()
+        .enumerate()
+        .map(|(i, scan)| measure_scan(&format!("scan.{i:03}"), scan, settings, None).unwrap())
+        .collect();
+    analyse(measured, settings)
+}
+
+fn codes(analysis: &Analysis) -> Vec<&str> {
+    analysis.caveats.iter().map(|c| c.code.as_str()).collect()
+}
+
+/// Turns samples by 180° in the file and the sensors with them: the same positions hold the same
+/// values, only the order of rows and columns (and so trace/retrace, up/down) is reversed.
+fn reversed(scan: &Scan) -> Scan {
+    let mut out = scan.clone();
+    for channel in &mut out.channels {
+        match &mut channel.samples {
+            Samples::I16(v) => v.reverse(),
+            Samples::I32(v) => v.reverse(),
+            Samples::F32(v) => v.reverse(),
+            Samples::F64(v) => v.reverse(),
+        }
+        channel.line_direction = channel.line_direction.map(|d| match d {
+            spmfile::LineDirection::Trace => spmfile::LineDirection::Retrace,
+            spmfile::LineDirection::Retrace => spmfile::LineDirection::Trace,
+        });
+    }
+    out.frame_direction = out.frame_direction.map(|d| match d {
+        FrameDirection::Up => FrameDirection::Down,
+        FrameDirection::Down => FrameDirection::Up,
+    });
+    out
+}
+
+/// The order in which rows and columns are stored is not physics: drift, twist and strain stay.
+#[test]
+fn stored_order_does_not_matter() {
+    let settings = quick(Method::Autocorrelation);
+    let scans = frames(&small_set(5));
+    let a = analyse_frames(&scans, &settings);
+    let b = analyse_frames(&scans.iter().map(reversed).collect::<Vec<_>>(), &settings);
+    let (da, db) = (
+        a.sets[0].drift.as_ref().unwrap(),
+        b.sets[0].drift.as_ref().unwrap(),
+    );
+    let sigma = da.covariance.trace().sqrt();
+    // Binning starts from the other corner, so pixels at the rim differ: far below the noise.
+    assert!((da.velocity - db.velocity).norm() < 0.2 * sigma);
+    let (ma, mb) = (
+        a.sets[0].mean.as_ref().unwrap(),
+        b.sets[0].mean.as_ref().unwrap(),
+    );
+    let (ta, tb) = (&ma.twist_strain, &mb.twist_strain);
+    assert!((ta.twist - tb.twist).abs() < 0.2 * ta.twist().sigma);
+    let shift = (ta.strain_vector - tb.strain_vector).norm();
+    assert!(shift < 0.2 * ta.strain_covariance().trace().sqrt());
+}
+
+/// Over many seeds the errors are what they say: the mean square pull of drift, twist and both strain
+/// components is 1 within its own scatter, for the default method and for Fourier.
+#[test]
+fn errors_cover_the_truth() {
+    for method in [Method::Autocorrelation, Method::Fourier] {
+        let settings = quick(method);
+        let (trials, mut squares) = (60u32, [0.0; 5]);
+        for seed in 0..trials {
+            let mut simulation = small_set(u64::from(seed) + 100);
+            simulation.sample.lattice_angle_deg = f64::from(seed) * 7.0;
+            let analysis = analyse_frames(&frames(&simulation), &settings);
+            let set = &analysis.sets[0];
+            let (drift, mean) = (set.drift.as_ref().unwrap(), set.mean.as_ref().unwrap());
+            let found = &mean.twist_strain;
+            let axis = truth_axis_lab(&simulation).to_radians();
+            let strain = simulation.sample.strain_percent / 100.0;
+            let pulls = [
+                (drift.velocity.x * 60.0 - truth_drift(&simulation)[0])
+                    / (60.0 * drift.covariance.m11.sqrt()),
+                (drift.velocity.y * 60.0 - truth_drift(&simulation)[1])
+                    / (60.0 * drift.covariance.m22.sqrt()),
+                (found.twist.to_degrees() - simulation.sample.twist_deg)
+                    / found.twist().sigma.to_degrees(),
+                (found.strain_vector.x - strain * (2.0 * axis).cos())
+                    / found.strain_covariance().m11.sqrt(),
+                (found.strain_vector.y - strain * (2.0 * axis).sin())
+                    / found.strain_covariance().m22.sqrt(),
+            ];
+            for (sum, pull) in squares.iter_mut().zip(pulls) {
+                *sum += pull * pull / f64::from(trials);
+            }
+        }
+        println!("{method:?}: mean squared pulls of drift x, y, twist, E1, E2: {squares:.2?}");
+        // The mean of 60 squared pulls scatters by √(2/60) = 0.18. Line noise is counted in full for
+        // both axes (errors too large, never too small by more than that scatter).
+        for mean_square in squares {
+            assert!(
+                (0.25..1.55).contains(&mean_square),
+                "{method:?}: {squares:?}"
+            );
+        }
+    }
+}
+
+fn truth_drift(simulation: &Simulation) -> [f64; 2] {
+    simulation.drift.velocity_nm_per_min
+}
+
+/// φ_lab = φ + α + θ.
+fn truth_axis_lab(simulation: &Simulation) -> f64 {
+    let s = &simulation.sample;
+    s.strain_axis_deg + s.lattice_angle_deg + s.twist_deg
+}
+
+/// Up and down scans: their mean reciprocal lattice gives the twist of the drift-corrected fit
+/// without any drift estimate.
+#[test]
+fn forward_backward_mean_agrees_with_the_drift_correction() {
+    let analysis = analyse_frames(&frames(&small_set(7)), &quick(Method::Fourier));
+    let set = &analysis.sets[0];
+    let (free, fitted) = (
+        set.forward_backward.as_ref().unwrap(),
+        &set.mean.as_ref().unwrap().twist_strain,
+    );
+    // Same data, other weights: within one σ.
+    assert!((free.twist - fitted.twist).abs() < fitted.twist().sigma);
+}
+
+/// One direction only: no drift, no corrected mean, and the reason; a given drift makes it work.
+#[test]
+fn one_direction_needs_a_given_drift() {
+    let mut simulation = small_set(9);
+    simulation.raster.alternating = false;
+    let scans = frames(&simulation);
+    let mut settings = quick(Method::Autocorrelation);
+    let analysis = analyse_frames(&scans, &settings);
+    let set = &analysis.sets[0];
+    assert!(set.drift.is_none() && set.mean.is_none() && analysis.combined.is_none());
+    assert!(set.uncorrected.is_some());
+    assert!(codes(&analysis).contains(&"drift-undetermined"));
+
+    let [x, y] = truth_drift(&simulation);
+    settings.drift = Some(GivenDrift {
+        x_nm_per_min: x,
+        y_nm_per_min: y,
+        sigma_nm_per_min: 0.02,
+    });
+    let analysis = analyse_frames(&scans, &settings);
+    let twist = analysis.sets[0].mean.as_ref().unwrap().twist_strain.twist();
+    let miss = twist.value.to_degrees() - simulation.sample.twist_deg;
+    assert!(
+        miss.abs() < 3.0 * twist.sigma.to_degrees(),
+        "{miss} {twist:?}"
+    );
+    assert!(codes(&analysis).contains(&"drift-given"));
+}
+
+/// Without sensors the nominal geometry is used and said so.
+#[test]
+fn no_sensors_is_a_caveat() {
+    let mut simulation = small_set(11);
+    simulation.raster.sensors = false;
+    let analysis = analyse_frames(&frames(&simulation), &quick(Method::Fourier));
+    assert!(codes(&analysis).contains(&"no-position-sensors"));
+    assert!(analysis.sets[0].mean.is_some());
+}
+
+/// A channel without a lattice ends in an error, not in vectors.
+#[test]
+fn noise_is_no_lattice() {
+    let mut simulation = small_set(13);
+    simulation.sample.contrast_deg = 0.0;
+    let scans = frames(&simulation);
+    let error = measure_scan("x", &scans[0], &quick(Method::Autocorrelation), None).unwrap_err();
+    assert!(error.to_string().contains("no lattice"), "{error}");
+}
