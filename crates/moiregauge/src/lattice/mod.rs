@@ -21,6 +21,7 @@ pub(crate) use pictures::pictures;
 pub use vectors::LatticeVectors;
 
 use crate::background::remove_background;
+use crate::estimate::Estimate;
 use crate::geometry::Geometry;
 use crate::image::Image;
 use crate::settings::{Background, Method};
@@ -40,6 +41,11 @@ pub struct MeasuredLattice {
     pub comparison: Option<LatticeVectors>,
     /// The shortcut wavelengths `4π/(√3|K|)` of the three first harmonics, nm.
     pub shortcut_wavelengths: Option<[f64; 3]>,
+    /// Reciprocal pair of the harmonics behind `phases`, rad per pixel, at 60° to each other.
+    pub reciprocal: Matrix2<f64>,
+    /// Phases of the harmonics K₁, K₂ and K₂ − K₁ of `reciprocal` at the middle of the frame, rad.
+    /// There they are uncorrelated with the wave vectors.
+    pub phases: [Estimate; 3],
     /// Lattice periods across the shorter side of the frame.
     pub periods: f64,
     /// Amplitude over noise amplitude in one resolution cell, weakest of the first harmonics.
@@ -146,6 +152,8 @@ pub fn measure(
     Ok(MeasuredLattice {
         pixels,
         comparison: comparison.map(label),
+        reciprocal: harmonics.pair / pixels_per_bin,
+        phases: phases(harmonics, spectrum.image_size),
         shortcut_wavelengths: fourier::shortcut_wavelengths(peaks, &bin_to_nm),
         periods: 1.0 / longest.fold(0.0, f64::max),
         signal_to_noise: signal_to_noise(harmonics)[2],
@@ -272,6 +280,20 @@ fn common_pair(peaks: &[Vector2<f64>; 3]) -> Matrix2<f64> {
     let k1 = (2.0 * peaks[0] + peaks[1] - peaks[2]) / 3.0;
     let k2 = (peaks[0] + 2.0 * peaks[1] + peaks[2]) / 3.0;
     Matrix2::from_columns(&[k1, k2])
+}
+
+/// Phases of the first three harmonics at the middle of the frame.
+///
+/// The variance of a phase is that of the amplitude across it: `S Σw² / (2 |c|² (Σw)²)`.
+fn phases(harmonics: &Harmonics, size: [usize; 2]) -> [Estimate; 3] {
+    let middle = Vector2::new(size[0] as f64 - 1.0, size[1] as f64 - 1.0) / 2.0;
+    let mut out = [Estimate::new(0.0, f64::INFINITY); 3];
+    for (phase, harmonic) in out.iter_mut().zip(&harmonics.list) {
+        let value = harmonic.amplitude.arg() + harmonic.q.dot(&middle);
+        let variance = 1.0 / (2.0 * harmonic.significance(harmonics.window_sums));
+        *phase = Estimate::from_variance(value, variance);
+    }
+    out
 }
 
 /// Signal-to-noise ratios (amplitude) of the first three harmonics, best first.
