@@ -2,6 +2,7 @@
 
 use moiregauge::estimate::Estimate;
 use moiregauge::settings::Method;
+use spmfile::LineDirection;
 
 use super::layout::{counting, ends, is_up, ordinal, point};
 use super::{Drawing, Subject, layout};
@@ -15,7 +16,8 @@ const SIDE: f64 = 150.0;
 
 /// One vector of one line of one scan by both estimators.
 struct Pair {
-    scan: usize,
+    /// Number of the scan, a little further right for retrace.
+    place: f64,
     vector: usize,
     up: bool,
     used: Estimate,
@@ -75,7 +77,7 @@ pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
     let axes = Axes::new(beside, counting(subject.set.scans.len()), range);
     zero_line(&mut svg, &axes);
     for pair in &pairs {
-        let x = ordinal(pair.scan) + (pair.vector as f64 - 1.0) * 0.2;
+        let x = pair.place + (pair.vector as f64 - 1.0) * 0.24;
         let look = (VECTOR_MARKER[pair.vector], VECTOR[pair.vector]);
         point(&mut svg, &axes, x, difference(pair), look, pair.up);
     }
@@ -99,7 +101,7 @@ pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
         wide: true,
         svg: svg.finish("Wavelengths by two estimators"),
         caption: format!(
-            "Wavelengths by the {used}, which the results use, and by the {other}, in sensor coordinates, every line direction of every scan (a), and their difference, {other} minus {used} (b; error bar: the larger σ of the two, as both see the same pixels). Filled symbols: up scans; open: down scans."
+            "Wavelengths by the {used}, which the results use, and by the {other}, in sensor coordinates, trace and retrace of every scan (a), and their difference, {other} minus {used} (b, retrace right of trace; error bar: the larger σ of the two, as both see the same pixels). Filled symbols: up scans; open: down scans."
         ),
     })
 }
@@ -112,7 +114,12 @@ fn pairs(subject: &Subject) -> Vec<Pair> {
                 continue;
             };
             pairs.extend((0..3).map(|vector| Pair {
-                scan: index,
+                place: ordinal(index)
+                    + if line.line == LineDirection::Trace {
+                        -0.05
+                    } else {
+                        0.05
+                    },
                 vector,
                 up: is_up(scan),
                 used: line.sensor.wavelength(vector),

@@ -1,7 +1,8 @@
 //! What several figures need: panels in a grid, scans as points, the sense of a scan.
 
-use moiregauge::analysis::ScanAnalysis;
+use moiregauge::analysis::{Illustration, ScanAnalysis, SetAnalysis};
 use moiregauge::estimate::Estimate;
+use nalgebra::Matrix2;
 use spmfile::{FrameDirection, LineDirection};
 
 use crate::draw::axes::Axes;
@@ -108,4 +109,15 @@ pub(super) fn shortened(name: &str) -> String {
         return name.to_owned();
     }
     name.chars().take(23).chain(['…']).collect()
+}
+
+/// The lattice of the illustrated line in sensor coordinates (columns, nm).
+///
+/// From the scan where it is found, as its vectors bear the names that the other figures use.
+pub(super) fn shown_lattice(set: &SetAnalysis, shown: &Illustration) -> Matrix2<f64> {
+    let scan = set.scans.iter().find(|scan| scan.file == shown.file);
+    let line = scan.and_then(|scan| scan.lines.iter().find(|line| line.line == shown.line));
+    line.map_or(shown.pixel_to_nm * shown.lattice.basis, |line| {
+        line.sensor.basis
+    })
 }

@@ -65,8 +65,9 @@ pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
             );
         }
     });
-    vectors(&mut svg, &axes, shown);
-    scale_bar(&mut svg, &axes);
+    let basis = layout::shown_lattice(subject.set, shown);
+    vectors(&mut svg, &axes, shown, &basis);
+    scale_bar(&mut svg, &axes, &actual);
     let labels = Labels {
         x: "x (nm)",
         y: "y (nm)",
@@ -125,10 +126,11 @@ fn corners(shown: &Illustration, map: &Matrix2<f64>, origin: Vector2<f64>) -> [(
 }
 
 /// The three lattice vectors as arrows from the middle of the image.
-fn vectors(svg: &mut Svg, axes: &Axes, shown: &Illustration) {
+fn vectors(svg: &mut Svg, axes: &Axes, shown: &Illustration, basis: &Matrix2<f64>) {
     let middle = shown.origin + shown.pixel_to_nm * middle_pixel(shown);
-    for index in 0..3 {
-        let tip = middle + shown.pixel_to_nm * shown.lattice.vector(index);
+    let (first, second) = (basis.column(0).into_owned(), basis.column(1).into_owned());
+    for (index, vector) in [first, second, second - first].into_iter().enumerate() {
+        let tip = middle + vector;
         let (from, to) = (axes.at(middle.x, middle.y), axes.at(tip.x, tip.y));
         let colour = VECTOR[index];
         svg.line(from, to, &Ink::line("#ffffff", 2.6));
@@ -150,14 +152,19 @@ fn vectors(svg: &mut Svg, axes: &Axes, shown: &Illustration) {
     }
 }
 
-/// A bar of round length in the lower right corner.
-fn scale_bar(svg: &mut Svg, axes: &Axes) {
+/// A bar of round length in the lower right corner of the scanned frame.
+fn scale_bar(svg: &mut Svg, axes: &Axes, frame: &[(f64, f64); 4]) {
     let length = round_step(axes.x.range.width() / 4.0);
     let text = format!("{} nm", fixed(length, usize::from(length < 1.0)));
     let points = length * axes.x.per_unit();
     let wide = points.max(text_width(&text, SMALL)) + 8.0;
-    let area = axes.area;
-    let plate = Rect::new(area.right() - wide - 5.0, area.bottom() - 20.0, wide, 15.0);
+    let corners = frame.map(|(x, y)| axes.at(x, y));
+    let lowest = |a: &(f64, f64), b: &(f64, f64)| (a.0 + a.1).total_cmp(&(b.0 + b.1));
+    let (right, bottom) = corners
+        .into_iter()
+        .max_by(lowest)
+        .unwrap_or((axes.area.right(), axes.area.bottom()));
+    let plate = Rect::new(right - wide - 6.0, bottom - 21.0, wide, 15.0);
     svg.rect(plate, &Ink::area("#ffffff", 0.8));
     let middle = plate.x + wide / 2.0;
     let bar = Rect::new(middle - points / 2.0, plate.bottom() - 4.5, points, 2.0);

@@ -16,7 +16,7 @@ const SIDE: f64 = 162.0;
 pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
     let shown = subject.set.illustration.as_ref();
     let shown = shown.ok_or("no scan of this set could be shown in detail")?;
-    let basis = shown.pixel_to_nm * shown.lattice.basis;
+    let basis = layout::shown_lattice(subject.set, shown);
     let dual = basis.try_inverse().map(|inverse| inverse.transpose());
     let to_frequency = shown
         .pixel_to_nm
@@ -55,7 +55,8 @@ fn panel(left: f64, half: f64) -> Axes {
 }
 
 fn autocorrelation(svg: &mut Svg, subject: &Subject, shown: &Illustration, basis: &Matrix2<f64>) {
-    let axes = panel(layout::LEFT, 2.2 * longest(basis));
+    let reach = reach(&shown.autocorrelation, &shown.pixel_to_nm, longest(basis));
+    let axes = panel(layout::LEFT, reach);
     let (image, origin) = visible(&shown.autocorrelation, &shown.pixel_to_nm, &axes);
     let contrast = raster::contrast(&image, 0.005);
     svg.clipped(axes.area, |svg| {
@@ -104,9 +105,10 @@ fn spectrum(
     dual: &Matrix2<f64>,
     to_frequency: &Matrix2<f64>,
 ) {
-    let axes = panel(PAGE / 2.0 + layout::LEFT + 2.0, 2.45 * longest(dual));
     let [across, up] = shown.spectrum_step;
     let map = to_frequency * Matrix2::new(across, 0.0, 0.0, up);
+    let reach = reach(&shown.spectrum, &map, longest(dual));
+    let axes = panel(PAGE / 2.0 + layout::LEFT + 2.0, reach);
     let (image, origin) = visible(&shown.spectrum, &map, &axes);
     // The peaks are a handful of pixels: only the floor may be cut off.
     let floor = raster::contrast(&image, 0.3).low;
@@ -146,6 +148,13 @@ fn spectrum(
     axes.draw(svg, &labels);
     let bar = Rect::new(axes.area.right() + 5.0, axes.area.y, 6.0, SIDE);
     colorbar::draw(svg, bar, subject.map, contrast, "logarithm of power");
+}
+
+/// Half the width of a panel: a few vectors, but not more than the picture holds.
+fn reach(image: &Image, map: &Matrix2<f64>, longest: f64) -> f64 {
+    let pixels = Vector2::new(image.columns as f64, image.rows as f64) / 2.0;
+    let held = (map[(0, 0)].abs() * pixels.x).min(map[(1, 1)].abs() * pixels.y);
+    held.clamp(1.2 * longest, 2.4 * longest)
 }
 
 fn longest(basis: &Matrix2<f64>) -> f64 {

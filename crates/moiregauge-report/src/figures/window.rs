@@ -8,7 +8,7 @@ use crate::draw::axes::{Axes, Labels, Ticks, zero_line};
 use crate::draw::legend::{self, Key};
 use crate::draw::scale::{Range, fixed};
 use crate::draw::style::{BLACK, BLUE, GREY, HAIR, Marker, ORANGE, PAGE, SMALL, lettering, marker};
-use crate::draw::svg::{Anchor, Ink, Rect, Svg};
+use crate::draw::svg::{Anchor, Ink, Lettering, Rect, Svg};
 
 const SIDE: f64 = 150.0;
 
@@ -85,6 +85,10 @@ fn path_panel(svg: &mut Svg, axes: &Axes, moved: &[(Vector2<f64>, bool)]) {
         marker(svg, at, Marker::Circle, BLACK, *up);
     }
     let mut taken = points.clone();
+    let number = Lettering {
+        halo: Some("#ffffff"),
+        ..lettering(SMALL, Anchor::Middle)
+    };
     for (index, at) in points.iter().enumerate() {
         let places = [(6.0, -4.5), (-6.0, -4.5), (6.0, 5.5), (-6.0, 5.5)];
         // Middle of the number; one on top of another can be read by nobody and is left out.
@@ -99,11 +103,7 @@ fn path_panel(svg: &mut Svg, axes: &Axes, moved: &[(Vector2<f64>, bool)]) {
             .find(free);
         if let Some(place) = place {
             let baseline = (place.0, place.1 + 0.36 * SMALL);
-            svg.text(
-                baseline,
-                &(index + 1).to_string(),
-                &lettering(SMALL, Anchor::Middle),
-            );
+            svg.text(baseline, &(index + 1).to_string(), &number);
             taken.push(place);
         }
     }
