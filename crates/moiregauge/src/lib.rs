@@ -9,6 +9,7 @@ pub mod drift;
 pub mod estimate;
 pub mod geometry;
 pub mod image;
+pub mod joint;
 pub mod lattice;
 pub mod material;
 pub mod rng;

@@ -43,9 +43,11 @@ pub struct MeasuredLattice {
     pub shortcut_wavelengths: Option<[f64; 3]>,
     /// Reciprocal pair of the harmonics behind `phases`, rad per pixel, at 60° to each other.
     pub reciprocal: Matrix2<f64>,
-    /// Phases of the harmonics K₁, K₂ and K₂ − K₁ of `reciprocal` at the middle of the frame, rad.
+    /// Phases of the harmonics K₁, K₂ and K₂ − K₁ of `reciprocal` at the pixel position `middle`, rad.
     /// There they are uncorrelated with the wave vectors.
     pub phases: [Estimate; 3],
+    /// Middle of the part of the frame that was used, (column, row), in fractions of pixels.
+    pub middle: Vector2<f64>,
     /// Lattice periods across the shorter side of the frame.
     pub periods: f64,
     /// Amplitude over noise amplitude in one resolution cell, weakest of the first harmonics.
@@ -154,6 +156,8 @@ pub fn measure(
         comparison: comparison.map(label),
         reciprocal: harmonics.pair / pixels_per_bin,
         phases: phases(harmonics, spectrum.image_size),
+        middle: middle(spectrum.image_size) * pixels_per_bin
+            + Vector2::repeat((pixels_per_bin - 1.0) / 2.0),
         shortcut_wavelengths: fourier::shortcut_wavelengths(peaks, &bin_to_nm),
         periods: 1.0 / longest.fold(0.0, f64::max),
         signal_to_noise: signal_to_noise(harmonics)[2],
@@ -282,11 +286,16 @@ fn common_pair(peaks: &[Vector2<f64>; 3]) -> Matrix2<f64> {
     Matrix2::from_columns(&[k1, k2])
 }
 
+/// The middle of a frame of (columns, rows), as a position among its pixels or bins.
+fn middle(size: [usize; 2]) -> Vector2<f64> {
+    Vector2::new(size[0] as f64 - 1.0, size[1] as f64 - 1.0) / 2.0
+}
+
 /// Phases of the first three harmonics at the middle of the frame.
 ///
 /// The variance of a phase is that of the amplitude across it: `S Σw² / (2 |c|² (Σw)²)`.
 fn phases(harmonics: &Harmonics, size: [usize; 2]) -> [Estimate; 3] {
-    let middle = Vector2::new(size[0] as f64 - 1.0, size[1] as f64 - 1.0) / 2.0;
+    let middle = middle(size);
     let mut out = [Estimate::new(0.0, f64::INFINITY); 3];
     for (phase, harmonic) in out.iter_mut().zip(&harmonics.list) {
         let value = harmonic.amplitude.arg() + harmonic.q.dot(&middle);

@@ -1,0 +1,253 @@
+//! The model of a sighting and its derivatives.
+
+use nalgebra::{DMatrix, DVector, Matrix2, Matrix4, Vector2};
+
+use super::{Sighting, TIME_SIGMA, Terms};
+
+/// Where each parameter stands in the vector.
+#[derive(Clone, Debug)]
+pub(super) struct Layout {
+    pub(super) terms: Terms,
+    /// Origin of time: the middle of the campaign.
+    pub(super) origin: f64,
+    /// Start of the first frame: where settling begins.
+    pub(super) start: f64,
+    acceleration: Option<usize>,
+    settling: Option<usize>,
+    gain: Option<usize>,
+    /// φ of the three harmonics.
+    pub(super) phases: Option<usize>,
+    /// Offsets of the classes after the first.
+    offsets: Option<usize>,
+    /// Errors of the frame times.
+    times: Option<usize>,
+    pub(super) size: usize,
+}
+
+/// Lattice 0..4 (K₁, K₂), drift 4..6, then what the terms add.
+pub(super) const DRIFT: usize = 4;
+
+impl Layout {
+    pub(super) fn new(sightings: &[Sighting], terms: Terms) -> Self {
+        let mut size = 6;
+        let mut take = |wanted: bool, n: usize| {
+            wanted.then(|| {
+                size += n;
+                size - n
+            })
+        };
+        let classes = 1 + sightings.iter().map(|s| s.class).max().unwrap_or(0);
+        let scans = 1 + sightings.iter().map(|s| s.scan).max().unwrap_or(0);
+        let acceleration = take(terms.acceleration, 2);
+        let settling = take(terms.settling.is_some(), 2);
+        let gain = take(terms.fast_gain, 1);
+        let phases = take(terms.phases, 3);
+        let offsets = take(terms.phases, 2 * (classes - 1));
+        let times = take(terms.phases, scans);
+        let times_of = || sightings.iter().map(|s| s.time);
+        let first = times_of().fold(f64::INFINITY, f64::min);
+        let last = times_of().fold(f64::NEG_INFINITY, f64::max);
+        Self {
+            terms,
+            origin: f64::midpoint(first, last),
+            start: first,
+            acceleration,
+            settling,
+            gain,
+            phases,
+            offsets,
+            times,
+            size,
+        }
+    }
+
+    /// The parameters that are results; the others are nuisance for phases.
+    pub(super) fn count(&self) -> usize {
+        self.phases.unwrap_or(self.size)
+    }
+
+    pub(super) fn acceleration_at(&self) -> Option<usize> {
+        self.acceleration
+    }
+
+    pub(super) fn gain_at(&self) -> Option<usize> {
+        self.gain
+    }
+
+    /// How much each drift parameter moves the sample at a time, and its velocity: pairs of
+    /// (parameter index of the x component, weight in d, weight in d').
+    pub(super) fn drift_weights(&self, time: f64) -> Vec<(usize, f64, f64)> {
+        let t = time - self.origin;
+        let mut weights = vec![(DRIFT, t, 1.0)];
+        if let Some(i) = self.acceleration {
+            weights.push((i, 0.5 * t * t, t));
+        }
+        if let (Some(i), Some(tau)) = (self.settling, self.terms.settling) {
+            let decay = (-(time - self.start) / tau).exp();
+            let at_origin = (-(self.origin - self.start) / tau).exp();
+            weights.push((i, at_origin - decay, decay / tau));
+        }
+        weights
+    }
+
+    /// Displacement and velocity of the sample at a time.
+    pub(super) fn motion(&self, x: &DVector<f64>, time: f64) -> (Vector2<f64>, Vector2<f64>) {
+        let (mut d, mut v) = (Vector2::zeros(), Vector2::zeros());
+        for (i, shift, speed) in self.drift_weights(time) {
+            let p = Vector2::new(x[i], x[i + 1]);
+            d += p * shift;
+            v += p * speed;
+        }
+        (d, v)
+    }
+}
+
+/// The three harmonics as combinations of K₁ and K₂.
+const HARMONICS: [(f64, f64); 3] = [(1.0, 0.0), (0.0, 1.0), (-1.0, 1.0)];
+
+/// Whitened residuals (measured − model) and their derivatives with respect to the parameters.
+pub(super) struct Linearised {
+    pub(super) residuals: Vec<f64>,
+    pub(super) jacobian: Vec<DVector<f64>>,
+    /// Unwhitened phase residuals, as distances, nm.
+    pub(super) phase_misses: Vec<f64>,
+}
+
+/// Evaluates the model at `x` for the sightings within `reach` of the origin of time (phases beyond
+/// it may be off by a whole turn and are left out). `instability` is the standard deviation of a
+/// position, nm.
+pub(super) fn linearise(
+    sightings: &[Sighting],
+    layout: &Layout,
+    x: &DVector<f64>,
+    reach: f64,
+    instability: f64,
+) -> Linearised {
+    let mut out = Linearised {
+        residuals: Vec::new(),
+        jacobian: Vec::new(),
+        phase_misses: Vec::new(),
+    };
+    for sighting in sightings {
+        waves(sighting, layout, x, &mut out);
+        if (sighting.time - layout.origin).abs() <= reach {
+            phases(sighting, layout, x, instability, &mut out);
+        }
+    }
+    if let Some(first) = layout.times {
+        for i in first..layout.size {
+            let mut row = DVector::zeros(layout.size);
+            row[i] = 1.0 / TIME_SIGMA;
+            out.residuals.push(-x[i] / TIME_SIGMA);
+            out.jacobian.push(row);
+        }
+    }
+    out
+}
+
+/// `K = (1 + g F)(G − u (D·G))`, two vectors.
+fn waves(sighting: &Sighting, layout: &Layout, x: &DVector<f64>, out: &mut Linearised) {
+    let u = &sighting.time_gradient;
+    let (_, velocity) = layout.motion(x, sighting.time);
+    let gain = layout.gain.map_or(0.0, |i| x[i]);
+    let stretch = Matrix2::identity() + gain * sighting.fast_gain;
+    let map = stretch * (Matrix2::identity() - u * velocity.transpose());
+    let mut rows = DMatrix::<f64>::zeros(4, layout.size);
+    let mut residual = nalgebra::Vector4::zeros();
+    for vector in 0..2 {
+        let g = Vector2::new(x[2 * vector], x[2 * vector + 1]);
+        let miss = sighting.waves.basis.column(vector) - map * g;
+        for i in 0..2 {
+            residual[2 * vector + i] = miss[i];
+            for j in 0..2 {
+                rows[(2 * vector + i, 2 * vector + j)] = map[(i, j)];
+            }
+        }
+        let su = stretch * u;
+        for (parameter, _, speed) in layout.drift_weights(sighting.time) {
+            for axis in 0..2 {
+                for i in 0..2 {
+                    rows[(2 * vector + i, parameter + axis)] = -su[i] * g[axis] * speed;
+                }
+            }
+        }
+        if let Some(parameter) = layout.gain {
+            let change = sighting.fast_gain * (g - u * velocity.dot(&g));
+            for i in 0..2 {
+                rows[(2 * vector + i, parameter)] = change[i];
+            }
+        }
+    }
+    // Whitening by the Cholesky factor; a floor keeps noise-free simulations solvable.
+    let floor = Matrix4::identity() * 1e-18;
+    let Some(factor) = (sighting.waves.covariance + floor).cholesky() else {
+        return;
+    };
+    let lower = factor.l();
+    let (Some(residual), Some(rows)) = (
+        lower.solve_lower_triangular(&residual),
+        lower.solve_lower_triangular(&rows),
+    ) else {
+        return;
+    };
+    for i in 0..4 {
+        out.residuals.push(residual[i]);
+        out.jacobian.push(rows.row(i).transpose());
+    }
+}
+
+/// `Φ_h = G_h·(r − d(t + δt) − o) + φ_h`, wrapped.
+fn phases(
+    sighting: &Sighting,
+    layout: &Layout,
+    x: &DVector<f64>,
+    instability: f64,
+    out: &mut Linearised,
+) {
+    let (Some(first), Some(measured)) = (layout.phases, &sighting.phases) else {
+        return;
+    };
+    let late = layout.times.map(|i| i + sighting.scan);
+    let (shift, velocity) = layout.motion(x, sighting.time);
+    let offset = layout
+        .offsets
+        .filter(|_| sighting.class > 0)
+        .map(|i| i + 2 * (sighting.class - 1));
+    let mut place = sighting.position - shift;
+    if let Some(i) = late {
+        place -= velocity * x[i];
+    }
+    if let Some(i) = offset {
+        place -= Vector2::new(x[i], x[i + 1]);
+    }
+    for (h, (a, b)) in HARMONICS.into_iter().enumerate() {
+        let g = a * Vector2::new(x[0], x[1]) + b * Vector2::new(x[2], x[3]);
+        let model = g.dot(&place) + x[first + h];
+        let miss = wrapped(measured[h].value - model);
+        let sigma = measured[h].sigma.hypot(g.norm() * instability);
+        let mut row = DVector::zeros(layout.size);
+        for axis in 0..2 {
+            row[axis] = a * place[axis];
+            row[2 + axis] = b * place[axis];
+            for (parameter, weight, _) in layout.drift_weights(sighting.time) {
+                row[parameter + axis] = -g[axis] * weight;
+            }
+            if let Some(i) = offset {
+                row[i + axis] = -g[axis];
+            }
+        }
+        if let Some(i) = late {
+            row[i] = -g.dot(&velocity);
+        }
+        row[first + h] = 1.0;
+        out.residuals.push(miss / sigma);
+        out.jacobian.push(row / sigma);
+        out.phase_misses.push(miss / g.norm());
+    }
+}
+
+/// The angle in (−π, π].
+pub(super) fn wrapped(angle: f64) -> f64 {
+    let turns = (angle / std::f64::consts::TAU).round();
+    angle - turns * std::f64::consts::TAU
+}
