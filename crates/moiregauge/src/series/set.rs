@@ -295,7 +295,7 @@ fn line_analysis(
         .map(|pixels| labelled_like(&pixels.mapped(&line.geometry.pixel_to_nm), reference));
     LineAnalysis {
         line: line.line,
-        pixels: line.lattice.pixels,
+        pixels: labelled_pixels(line, seen),
         sensor: seen.lattice,
         comparison,
         shortcut_wavelengths: line.lattice.shortcut_wavelengths,
@@ -304,6 +304,15 @@ fn line_analysis(
         from_sensors: line.geometry.from_sensors,
         periods: line.lattice.periods,
         signal_to_noise: line.lattice.signal_to_noise,
+    }
+}
+
+/// The vectors in pixels under the names that they have in sensor coordinates.
+fn labelled_pixels(line: &MeasuredLine, seen: &Observation) -> LatticeVectors {
+    let pixels = &line.lattice.pixels;
+    match line.geometry.pixel_to_nm.try_inverse() {
+        Some(inverse) => labelled_like(pixels, &(inverse * seen.lattice.basis)),
+        None => *pixels,
     }
 }
 

@@ -1,0 +1,127 @@
+//! Measured scans → what the joint fit wants of them.
+
+use nalgebra::{Matrix2, Vector2};
+use spmfile::{DateTime, LineDirection};
+
+use super::measure::{MeasuredLine, MeasuredScan};
+use crate::analysis::Axis;
+use crate::estimate::Estimate;
+use crate::joint::Sighting;
+use crate::lattice::reciprocal::{labelled_like, real_from_reciprocal, reciprocal};
+
+/// A harmonic belongs to a wave vector of the reference if it is nearer than this share of it.
+const SAME_HARMONIC: f64 = 0.2;
+
+/// One sighting for every line of every scan, in order; `reference` is the real-space pair (nm) after
+/// which all lattices are labelled. `None` where a scan has no timing.
+pub(super) fn sightings(
+    scans: &[&MeasuredScan],
+    reference: &Matrix2<f64>,
+) -> Option<Vec<Sighting>> {
+    let reference = reciprocal(reference)?;
+    let mut classes: Vec<(Axis, LineDirection)> = Vec::new();
+    let mut all = Vec::new();
+    for (index, scan) in scans.iter().enumerate() {
+        for line in &scan.lines {
+            let key = (line.geometry.slow_axis(), line.line);
+            let class = classes.iter().position(|c| *c == key).unwrap_or_else(|| {
+                classes.push(key);
+                classes.len() - 1
+            });
+            let waves = real_from_reciprocal(&line.in_sensor_coordinates())?;
+            let j = line.geometry.pixel_to_nm;
+            let dual = j.try_inverse()?.transpose();
+            let time = middle_of_frame(scan);
+            all.push(Sighting {
+                scan: index,
+                class,
+                waves: labelled_like(&waves, &reference),
+                time_gradient: line.geometry.time_gradient(&line.timing?)?,
+                fast_gain: dual * Matrix2::new(1.0, 0.0, 0.0, 0.0) * j.transpose(),
+                time: time.unwrap_or(0.0),
+                position: line.geometry.origin + j * line.lattice.middle,
+                phases: time.and_then(|_| phases(line, &dual, &reference)),
+            });
+        }
+    }
+    Some(all)
+}
+
+/// Time of the middle of a frame, s from an arbitrary day. The header's time is that of its end.
+fn middle_of_frame(scan: &MeasuredScan) -> Option<f64> {
+    let rows = scan.lines.first()?.geometry.size[1] as f64;
+    Some(seconds(scan.acquired?) - 0.5 * rows / scan.line_rate_hz?)
+}
+
+/// Seconds since the first of March of the year 0 (proleptic Gregorian calendar).
+fn seconds(t: DateTime) -> f64 {
+    // Years that start in March have their leap day at the end.
+    let (year, month) = if t.month > 2 {
+        (i64::from(t.year), i64::from(t.month) - 3)
+    } else {
+        (i64::from(t.year) - 1, i64::from(t.month) + 9)
+    };
+    let days = 365 * year + year.div_euclid(4) - year.div_euclid(100) + year.div_euclid(400)
+        + (153 * month + 2) / 5
+        + i64::from(t.day);
+    let of_day = 3600 * i64::from(t.hour) + 60 * i64::from(t.minute) + i64::from(t.second);
+    (86_400 * days + of_day) as f64
+}
+
+/// The phases of the reference's harmonics: those measured, in another order and sign.
+fn phases(
+    line: &MeasuredLine,
+    dual: &Matrix2<f64>,
+    reference: &Matrix2<f64>,
+) -> Option<[Estimate; 3]> {
+    let three = |pair: Matrix2<f64>| {
+        let (a, b) = (pair.column(0).into_owned(), pair.column(1).into_owned());
+        [a, b, b - a]
+    };
+    let measured = three(dual * line.lattice.reciprocal);
+    let mut out = [Estimate::new(0.0, f64::NAN); 3];
+    for (phase, wanted) in out.iter_mut().zip(three(*reference)) {
+        let signs = [1.0, -1.0];
+        let (h, sign) = (0..3)
+            .flat_map(|h| signs.map(|s| (h, s)))
+            .min_by(|a, b| {
+                let miss = |(h, s): &(usize, f64)| (measured[*h] * *s - wanted).norm();
+                miss(a).total_cmp(&miss(b))
+            })?;
+        let miss: Vector2<f64> = measured[h] * sign - wanted;
+        if miss.norm() > SAME_HARMONIC * wanted.norm() {
+            return None;
+        }
+        let found = line.lattice.phases[h];
+        *phase = Estimate::new(sign * found.value, found.sigma);
+    }
+    Some(out)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at(year: i32, month: u8, day: u8, second: u8) -> f64 {
+        seconds(DateTime {
+            year,
+            month,
+            day,
+            hour: 23,
+            minute: 59,
+            second,
+        })
+    }
+
+    /// Days between dates known from a calendar: leap years, centuries, year ends.
+    #[test]
+    fn seconds_follow_the_calendar() {
+        let days = |a: f64, b: f64| (b - a) / 86_400.0;
+        assert_eq!(days(at(2024, 2, 28, 0), at(2024, 3, 1, 0)), 2.0);
+        assert_eq!(days(at(2023, 2, 28, 0), at(2023, 3, 1, 0)), 1.0);
+        assert_eq!(days(at(1900, 2, 28, 0), at(1900, 3, 1, 0)), 1.0);
+        assert_eq!(days(at(2000, 1, 1, 0), at(2001, 1, 1, 0)), 366.0);
+        assert_eq!(days(at(1970, 1, 1, 0), at(2026, 11, 21, 0)), 20_778.0);
+        assert_eq!(at(2024, 12, 31, 7) - at(2024, 12, 31, 0), 7.0);
+    }
+}
