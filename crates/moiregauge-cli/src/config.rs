@@ -4,7 +4,7 @@ use std::io::Write as _;
 use std::path::Path;
 use std::process::ExitCode;
 
-use anyhow::{Context as _, bail};
+use anyhow::{Context as _, bail, ensure};
 use moiregauge::material::Material;
 use moiregauge::settings::Settings;
 
@@ -32,6 +32,7 @@ line = "both"
 # Estimator of the lattice vectors:
 #   "autocorrelation"  divided by the overlap, sub-pixel peaks, several shells
 #   "fourier"          Hann window, sub-pixel peaks, full inverse
+#   "lattice"          harmonics fitted to the pixels: errors near the Cramér–Rao bound
 #   "paper"            as published in arXiv 2406.08681, for comparison: known to be biased
 method = "autocorrelation"
 
@@ -107,6 +108,36 @@ pub(crate) fn named_material(name: &str) -> anyhow::Result<Material> {
          settings file",
         known.join(", ")
     )
+}
+
+/// Refuses numbers with which nothing sensible can come out, wherever they were given.
+pub(crate) fn check(settings: &Settings) -> anyhow::Result<()> {
+    let material = &settings.material;
+    let (a, ratio) = (material.lattice_constant_nm, material.poisson_ratio);
+    ensure!(
+        a > 0.0 && a.is_finite(),
+        "the lattice constant (--lattice-constant) must be a positive length in nm, found {a}"
+    );
+    ensure!(
+        ratio > -1.0 && ratio < 1.0,
+        "the Poisson ratio (--poisson-ratio) must lie between −1 and 1, found {ratio}"
+    );
+    if let Some(drift) = &settings.drift {
+        let (x, y, sigma) = (
+            drift.x_nm_per_min,
+            drift.y_nm_per_min,
+            drift.sigma_nm_per_min,
+        );
+        ensure!(
+            x.is_finite() && y.is_finite(),
+            "the drift (--drift) must be two numbers in nm/min, found {x} and {y}"
+        );
+        ensure!(
+            sigma >= 0.0 && sigma.is_finite(),
+            "the uncertainty of the drift (--drift-sigma) cannot be negative, found {sigma}"
+        );
+    }
+    Ok(())
 }
 
 #[cfg(test)]

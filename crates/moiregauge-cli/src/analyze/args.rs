@@ -127,14 +127,9 @@ impl AnalyzeArgs {
             s.material.source = format!("{}, changed by the user", s.material.name);
         }
         if let Some(a) = self.lattice_constant {
-            anyhow::ensure!(a > 0.0, "--lattice-constant must be positive, found {a}");
             s.material.lattice_constant_nm = a;
         }
         if let Some(ratio) = self.poisson_ratio {
-            anyhow::ensure!(
-                ratio > -1.0 && ratio < 1.0,
-                "--poisson-ratio must lie between −1 and 1, found {ratio}"
-            );
             s.material.poisson_ratio = ratio;
         }
         if self.channel.is_some() {
@@ -158,6 +153,7 @@ impl AnalyzeArgs {
         s.drift_draws = self.drift_draws.unwrap_or(s.drift_draws);
         s.strain_draws = self.strain_draws.unwrap_or(s.strain_draws);
         s.seed = self.seed.unwrap_or(s.seed);
+        config::check(&s)?;
         Ok(s)
     }
 
@@ -222,6 +218,8 @@ mirror!(MethodArg => Method {
     Autocorrelation,
     /// Hann window, sub-pixel peaks, full inverse
     Fourier,
+    /// Harmonics of a lattice fitted to the pixels: errors near the Cramér–Rao bound
+    Lattice,
     /// As published in arXiv 2406.08681, for comparison: known to be biased
     Paper,
 });

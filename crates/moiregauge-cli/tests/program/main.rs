@@ -1,0 +1,8 @@
+//! The program from outside: what a user types, what comes out, what it says when it cannot.
+
+mod acceptance;
+mod common;
+mod refusals;
+mod results;
+mod round_trip;
+mod same_bytes;
