@@ -84,6 +84,8 @@ pub struct Combined {
     pub lattice: LatticeVectors,
     /// Its twist and strain.
     pub twist_strain: TwistStrain,
+    /// Whether one joint fit over all scans made them, and with which terms.
+    pub joint: Option<JointTerms>,
     /// How far every two sets are apart.
     pub consistency: Vec<Consistency>,
 }
@@ -114,6 +116,23 @@ pub struct Drift {
     pub fit: Option<DriftFit>,
     /// The Monte Carlo distribution; `None` for a given drift or where no draws were asked for.
     pub monte_carlo: Option<DriftMonteCarlo>,
+    /// What the joint fit found beside a constant drift; `None` for other methods.
+    pub joint: Option<JointTerms>,
+}
+
+/// The terms of a joint fit that earned their place, and what they came to.
+#[derive(Clone, Debug)]
+pub struct JointTerms {
+    /// Whether phases link the frames.
+    pub phases: bool,
+    /// Change of the drift velocity, nm/s².
+    pub acceleration: Option<Vector2<f64>>,
+    /// Time constant of an exponential settling, s.
+    pub settling_s: Option<f64>,
+    /// Relative gain error of the fast axis.
+    pub fast_gain: Option<Estimate>,
+    /// Scatter of the positions about the fit beyond the noise of the phases, nm.
+    pub instability_nm: f64,
 }
 
 /// How well the scans determine the drift.

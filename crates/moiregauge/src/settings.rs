@@ -12,8 +12,17 @@ pub enum Method {
     Autocorrelation,
     /// Hann-windowed Fourier transform, sub-pixel peaks, full inverse.
     Fourier,
+    /// Harmonics of a lattice fitted to the pixels: errors near the Cramér–Rao bound.
+    Lattice,
     /// As published: resampled, summed autocorrelation, whole-pixel peaks. Known to be biased.
     Paper,
+}
+
+impl Method {
+    /// Whether all scans are fitted together, phases included, instead of each set by its vectors.
+    pub fn is_joint(self) -> bool {
+        self == Self::Lattice
+    }
 }
 
 /// Which line directions are used.

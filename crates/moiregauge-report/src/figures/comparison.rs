@@ -32,6 +32,7 @@ pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
     let (used, other) = match subject.analysis.settings.method {
         Method::Autocorrelation => ("autocorrelation", "Fourier transform"),
         Method::Fourier => ("Fourier transform", "autocorrelation"),
+        Method::Lattice => ("lattice fit", "Fourier transform"),
         Method::Paper => ("published autocorrelation", "other estimator"),
     };
     let top = layout::LEGEND + layout::ABOVE;

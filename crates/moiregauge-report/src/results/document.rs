@@ -94,6 +94,8 @@ pub struct DriftResult {
     pub fit: Option<DriftFitResult>,
     /// The Monte Carlo distribution.
     pub monte_carlo: Option<DriftMonteCarloResult>,
+    /// What a joint fit found; `null` for the other methods.
+    pub joint: Option<super::JointResult>,
 }
 
 /// How well the scans determine the drift.
@@ -157,6 +159,8 @@ pub struct CombinedResult {
     pub twist_strain: TwistStrainResult,
     /// L1, L2 and L3.
     pub vectors: [LatticeVector; 3],
+    /// The joint fit over all scans that made them; `null` for the other methods.
+    pub joint: Option<super::JointResult>,
     /// How far every two sets are apart.
     pub consistency: Vec<ConsistencyResult>,
 }
@@ -251,6 +255,7 @@ fn drift(drift: &Drift) -> DriftResult {
         given: drift.given,
         fit: drift.fit.as_ref().map(drift_fit),
         monte_carlo: drift.monte_carlo.as_ref().map(drift_monte_carlo),
+        joint: drift.joint.as_ref().map(Into::into),
     }
 }
 
@@ -301,6 +306,7 @@ fn combined(combined: &Combined, material: &Material) -> CombinedResult {
     CombinedResult {
         twist_strain: (&combined.twist_strain).into(),
         vectors: LatticeVector::all(&combined.lattice, material),
+        joint: combined.joint.as_ref().map(Into::into),
         consistency: combined.consistency.iter().map(consistency).collect(),
     }
 }

@@ -6,6 +6,7 @@
 mod conventions;
 mod convert;
 mod document;
+mod joint;
 mod lattice;
 mod scan;
 
@@ -14,6 +15,7 @@ pub use document::{
     CombinedResult, ConsistencyResult, DriftFitResult, DriftMonteCarloResult, DriftResult,
     InputProvenance, MeanResult, Results, SetResult,
 };
+pub use joint::JointResult;
 pub use lattice::{LatticeVector, ResultEstimate, StrainMonteCarlo, TwistStrainResult};
 pub use scan::{LineResult, ScanResult, ScanTwistStrain, ScanVector, TipVelocity, Window};
 

@@ -343,6 +343,7 @@ fn good_set(index: usize, axis: Axis, rate: f64, count: usize, settings: &Settin
                 paper_velocity: Some(found + Vector2::new(0.4, -0.2) / 60.0 * 0.05),
             }),
             monte_carlo: Some(monte_carlo(&mut noise, found, sigma)),
+            joint: None,
         }),
         forward_backward: mean.as_ref().map(|m| m.twist_strain),
         mean,
@@ -396,6 +397,7 @@ pub(crate) fn analysis() -> Analysis {
     let combined = mean(&both, &settings, f64::NAN).map(|m| Combined {
         lattice: m.lattice,
         twist_strain: m.twist_strain,
+        joint: None,
         consistency: vec![Consistency {
             sets: [sets[0].name.clone(), sets[1].name.clone()],
             drift_sigmas: Some(1.2),

@@ -1,10 +1,14 @@
 //! All sets taken together, and how well they agree.
 
-use nalgebra::{Matrix4, Vector2, Vector4};
+use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
+
+use super::measure::MeasuredScan;
+use super::set::{joint_fit, terms};
 
 use crate::analysis::{Combined, Consistency, SetAnalysis, SetMean};
 use crate::caveat::Caveat;
 use crate::lattice::LatticeVectors;
+use crate::lattice::reciprocal::{labelled_like, real_from_reciprocal};
 use crate::settings::Settings;
 use crate::strain::twist_strain;
 
@@ -17,6 +21,7 @@ const APART: f64 = 3.0;
 /// show different lattices.
 pub(super) fn combine(
     sets: &[SetAnalysis],
+    joint: Option<(&[&MeasuredScan], Matrix2<f64>)>,
     settings: &Settings,
     caveats: &mut Vec<Caveat>,
 ) -> Option<Combined> {
@@ -34,7 +39,16 @@ pub(super) fn combine(
         ));
         return None;
     }
-    let lattice = weighted_mean(&means)?;
+    let mut lattice = weighted_mean(&means)?;
+    let mut joint_terms = None;
+    if let Some((scans, reference)) = joint.filter(|(scans, _)| !scans.is_empty())
+        && let Some(drift) = sets.iter().find_map(|s| s.drift.as_ref())
+        && let Some((fit, _)) = joint_fit(scans, &reference, &lattice, &drift.velocity)
+        && let Some(fitted) = real_from_reciprocal(&fit.waves)
+    {
+        lattice = labelled_like(&fitted, &reference);
+        joint_terms = Some(terms(&fit));
+    }
     let consistency = consistency(sets);
     for pair in &consistency {
         let drift = pair.drift_sigmas.unwrap_or(0.0);
@@ -56,6 +70,7 @@ pub(super) fn combine(
     Some(Combined {
         lattice,
         twist_strain,
+        joint: joint_terms,
         consistency,
     })
 }
@@ -87,7 +102,7 @@ fn weighted_mean(means: &[&SetMean]) -> Option<LatticeVectors> {
         1.0
     };
     Some(LatticeVectors {
-        basis: nalgebra::Matrix2::new(flat[0], flat[2], flat[1], flat[3]),
+        basis: Matrix2::new(flat[0], flat[2], flat[1], flat[3]),
         covariance: covariance * scale,
     })
 }
@@ -124,7 +139,7 @@ fn consistency(sets: &[SetAnalysis]) -> Vec<Consistency> {
 }
 
 /// `√(dᵀ C⁻¹ d)`.
-fn sigmas(d: &Vector2<f64>, covariance: &nalgebra::Matrix2<f64>) -> Option<f64> {
+fn sigmas(d: &Vector2<f64>, covariance: &Matrix2<f64>) -> Option<f64> {
     let inverse = covariance.try_inverse()?;
     Some((d.transpose() * inverse * d)[0].max(0.0).sqrt())
 }

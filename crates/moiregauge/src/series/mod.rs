@@ -33,6 +33,7 @@ pub fn analyse(scans: Vec<MeasuredScan>, settings: &Settings) -> Analysis {
     let groups = group::groups(scans, settings.grouping);
     let mut reference: Option<Matrix2<f64>> = None;
     let mut sets = Vec::with_capacity(groups.len());
+    let mut joint_scans = Vec::new();
     let mut index = 0;
     for group in groups {
         if let Some(line) = group.scans.first().and_then(|s| s.lines.first())
@@ -45,6 +46,9 @@ pub fn analyse(scans: Vec<MeasuredScan>, settings: &Settings) -> Analysis {
         }
         let Some(reference) = reference else { continue };
         let count = group.scans.len() as u64;
+        if settings.method.is_joint() && settings.drift.is_none() {
+            joint_scans.extend(group.scans.iter().cloned());
+        }
         sets.push(set::analyse_set(
             group,
             &reference,
@@ -54,7 +58,9 @@ pub fn analyse(scans: Vec<MeasuredScan>, settings: &Settings) -> Analysis {
         ));
         index += count;
     }
-    let combined = combine::combine(&sets, settings, &mut caveats);
+    let all: Vec<&MeasuredScan> = joint_scans.iter().collect();
+    let joint = reference.map(|reference| (all.as_slice(), reference));
+    let combined = combine::combine(&sets, joint, settings, &mut caveats);
     Analysis {
         settings: settings.clone(),
         sets,

@@ -6,14 +6,18 @@ use spmfile::FrameDirection;
 
 use super::group::Group;
 use super::measure::{MeasuredLine, MeasuredScan};
-use crate::analysis::{Axis, Drift, DriftFit, LineAnalysis, ScanAnalysis, SetAnalysis, SetMean};
+use super::sightings::sightings;
+use crate::analysis::{
+    Axis, Drift, DriftFit, JointTerms, LineAnalysis, ScanAnalysis, SetAnalysis, SetMean,
+};
 use crate::caveat::Caveat;
 use crate::drift::paper::{PaperScan, pairwise_drift};
 use crate::drift::{Observation, common_lattice, monte_carlo, solve};
 use crate::estimate::Estimate;
 use crate::geometry::mean_and_spread;
+use crate::joint::{JointFit, fit};
 use crate::lattice::LatticeVectors;
-use crate::lattice::reciprocal::{labelled_like, real_from_reciprocal};
+use crate::lattice::reciprocal::{labelled_like, real_from_reciprocal, reciprocal};
 use crate::settings::{GivenDrift, Settings};
 use crate::strain::{TwistStrain, draws, twist_strain};
 
@@ -40,12 +44,24 @@ pub(super) fn analyse_set(
         .scans
         .iter()
         .all(|s| s.lines.iter().all(|l| l.timing.is_some()));
-    let solved = drift(&group, &all, timed, settings, caveats);
+    let mut solved = drift(&group, &all, timed, settings, caveats);
+    if settings.method.is_joint() && settings.drift.is_none() {
+        let scans: Vec<&MeasuredScan> = group.scans.iter().collect();
+        solved = solved.map(|linear| jointly(linear, &scans, reference));
+    }
     let mut scans: Vec<ScanAnalysis> = group
         .scans
         .iter()
         .zip(&observations)
-        .filter_map(|(scan, seen)| scan_analysis(scan, seen, reference, solved.as_ref(), settings))
+        .enumerate()
+        .filter_map(|(i, (scan, seen))| {
+            let drift = solved.as_ref().map(|s| {
+                let own = s.velocities.get(i);
+                own.copied()
+                    .unwrap_or((s.drift.velocity, s.drift.covariance))
+            });
+            scan_analysis(scan, seen, reference, drift, settings)
+        })
         .collect();
     let material = &settings.material;
     let convention = settings.strain_convention;
@@ -97,6 +113,59 @@ struct Solved {
     lattice: LatticeVectors,
     chi2: f64,
     freedom: usize,
+    /// The drift during each scan, where it is not the same for all.
+    velocities: Vec<(Vector2<f64>, Matrix2<f64>)>,
+}
+
+/// Refines the linear solution of a set with the phases of its scans; keeps it where they do not help.
+fn jointly(linear: Solved, scans: &[&MeasuredScan], reference: &Matrix2<f64>) -> Solved {
+    let Some((fit, times)) = joint_fit(scans, reference, &linear.lattice, &linear.drift.velocity)
+    else {
+        return linear;
+    };
+    let Some(lattice) = real_from_reciprocal(&fit.waves) else {
+        return linear;
+    };
+    Solved {
+        drift: Drift {
+            velocity: fit.velocity,
+            covariance: fit.velocity_covariance,
+            joint: Some(terms(&fit)),
+            ..linear.drift
+        },
+        lattice: labelled_like(&lattice, reference),
+        chi2: fit.chi2,
+        freedom: fit.degrees_of_freedom,
+        velocities: times.iter().map(|t| fit.velocity_at(*t)).collect(),
+    }
+}
+
+/// The joint fit of some scans and the times of their middles; `None` without timing.
+pub(super) fn joint_fit(
+    scans: &[&MeasuredScan],
+    reference: &Matrix2<f64>,
+    lattice: &LatticeVectors,
+    velocity: &Vector2<f64>,
+) -> Option<(JointFit, Vec<f64>)> {
+    let sightings = sightings(scans, reference)?;
+    let waves = labelled_like(&real_from_reciprocal(lattice)?, &reciprocal(reference)?);
+    let fitted = fit(&sightings, (&waves.basis, velocity))?;
+    let times = (0..scans.len())
+        .filter_map(|i| sightings.iter().find(|s| s.scan == i))
+        .map(|s| s.time)
+        .collect();
+    Some((fitted, times))
+}
+
+/// What a joint fit has beside a constant drift.
+pub(super) fn terms(fit: &JointFit) -> JointTerms {
+    JointTerms {
+        phases: fit.terms.phases,
+        acceleration: fit.acceleration,
+        settling_s: fit.terms.settling,
+        fast_gain: fit.fast_gain,
+        instability_nm: fit.instability_nm,
+    }
 }
 
 fn observations(scan: &MeasuredScan, reference: &Matrix2<f64>) -> Vec<Observation> {
@@ -151,10 +220,12 @@ fn drift(
                         paper_velocity: pairwise_drift(&paper_scans(group, all)),
                     }),
                     monte_carlo: monte_carlo(all, settings.drift_draws, seed, &name),
+                    joint: None,
                 },
                 lattice,
                 chi2: solution.chi2,
                 freedom: solution.degrees_of_freedom,
+                velocities: Vec::new(),
             })
         }
         Err(error) => {
@@ -191,10 +262,12 @@ fn given_drift(
             given: true,
             fit: None,
             monte_carlo: None,
+            joint: None,
         },
         lattice,
         chi2,
         freedom,
+        velocities: Vec::new(),
     })
 }
 
@@ -237,12 +310,12 @@ fn scan_analysis(
     scan: &MeasuredScan,
     seen: &[Observation],
     reference: &Matrix2<f64>,
-    solved: Option<&Solved>,
+    drift: Option<(Vector2<f64>, Matrix2<f64>)>,
     settings: &Settings,
 ) -> Option<ScanAnalysis> {
     let (sensor, _, _) = common_lattice(seen, &Vector2::zeros(), &Matrix2::zeros()).ok()?;
-    let drift_corrected = solved
-        .and_then(|s| common_lattice(seen, &s.drift.velocity, &s.drift.covariance).ok())
+    let drift_corrected = drift
+        .and_then(|(velocity, covariance)| common_lattice(seen, &velocity, &covariance).ok())
         .map(|(lattice, _, _)| lattice);
     let nominal: Option<Vec<LatticeVectors>> = scan
         .lines

@@ -61,7 +61,8 @@ fn seconds(t: DateTime) -> f64 {
     } else {
         (i64::from(t.year) - 1, i64::from(t.month) + 9)
     };
-    let days = 365 * year + year.div_euclid(4) - year.div_euclid(100) + year.div_euclid(400)
+    let days = 365 * year + year.div_euclid(4) - year.div_euclid(100)
+        + year.div_euclid(400)
         + (153 * month + 2) / 5
         + i64::from(t.day);
     let of_day = 3600 * i64::from(t.hour) + 60 * i64::from(t.minute) + i64::from(t.second);
@@ -82,12 +83,10 @@ fn phases(
     let mut out = [Estimate::new(0.0, f64::NAN); 3];
     for (phase, wanted) in out.iter_mut().zip(three(*reference)) {
         let signs = [1.0, -1.0];
-        let (h, sign) = (0..3)
-            .flat_map(|h| signs.map(|s| (h, s)))
-            .min_by(|a, b| {
-                let miss = |(h, s): &(usize, f64)| (measured[*h] * *s - wanted).norm();
-                miss(a).total_cmp(&miss(b))
-            })?;
+        let (h, sign) = (0..3).flat_map(|h| signs.map(|s| (h, s))).min_by(|a, b| {
+            let miss = |(h, s): &(usize, f64)| (measured[*h] * *s - wanted).norm();
+            miss(a).total_cmp(&miss(b))
+        })?;
         let miss: Vector2<f64> = measured[h] * sign - wanted;
         if miss.norm() > SAME_HARMONIC * wanted.norm() {
             return None;
