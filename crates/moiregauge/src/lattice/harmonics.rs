@@ -276,7 +276,7 @@ const SHELLS: [(f64, f64); 9] = [
 ];
 
 /// `Σ w(n) cos(q (n − centre))` of the Hann window of `n` pixels: three Dirichlet kernels.
-fn hann_transform(q: f64, n: usize) -> f64 {
+pub(super) fn hann_transform(q: f64, n: usize) -> f64 {
     let n = n as f64;
     let dirichlet = |q: f64| {
         let half = (q / 2.0).sin();

@@ -5,6 +5,7 @@
 //! vectors are mapped; nothing is resampled (but by the published method, for reproduction).
 
 mod autocorrelation;
+mod fit;
 mod fourier;
 mod harmonics;
 mod noise;
@@ -17,6 +18,7 @@ pub(crate) mod vectors;
 
 use nalgebra::{Matrix2, Vector2};
 
+pub use fit::{FittedHarmonic, ForeignWave, LatticeFit};
 pub(crate) use pictures::pictures;
 pub use vectors::LatticeVectors;
 
@@ -36,8 +38,7 @@ const SMALLEST_SIDE: usize = 16;
 pub struct MeasuredLattice {
     /// Vectors in pixels (columns, rows).
     pub pixels: LatticeVectors,
-    /// What the other estimator found: Fourier beside the autocorrelation and the published
-    /// method, autocorrelation beside Fourier.
+    /// What the other estimator found: autocorrelation beside Fourier, Fourier beside all others.
     pub comparison: Option<LatticeVectors>,
     /// The shortcut wavelengths `4π/(√3|K|)` of the three first harmonics, nm.
     pub shortcut_wavelengths: Option<[f64; 3]>,
@@ -52,6 +53,8 @@ pub struct MeasuredLattice {
     pub periods: f64,
     /// Amplitude over noise amplitude in one resolution cell, weakest of the first harmonics.
     pub signal_to_noise: f64,
+    /// The fit to the pixels; `None` with the other methods.
+    pub fit: Option<LatticeFit>,
 }
 
 /// Why an image gives no lattice.
@@ -137,14 +140,20 @@ pub fn measure(
     let in_pixels = |l: LatticeVectors| l.mapped(&(Matrix2::identity() * pixels_per_bin));
     let fourier = || fourier::measure(harmonics, peaks, spectrum.image_size).map(in_pixels);
     let autocorrelation = || autocorrelation::measure(spectrum, harmonics, start).map(in_pixels);
+    let mut fit = None;
     let (pixels, comparison) = match method {
         Method::Autocorrelation => (autocorrelation(), fourier()),
         Method::Fourier => (fourier(), autocorrelation()),
+        Method::Lattice => {
+            fit = fitted(&prepared, background);
+            (fit.as_ref().map(|(lattice, _)| *lattice), fourier())
+        }
         Method::Paper => (
             paper::measure(&prepared.image, geometry, &(start * pixels_per_bin)),
             fourier(),
         ),
     };
+    let fit = fit.map(|(_, fit)| fit);
     let pixels = pixels.ok_or(LatticeError::NoPeaks { method })?;
     let label = |l: LatticeVectors| reciprocal::labelled_like(&l, &pixels.basis);
     let longest = (0..3)
@@ -154,14 +163,36 @@ pub fn measure(
     Ok(MeasuredLattice {
         pixels,
         comparison: comparison.map(label),
-        reciprocal: harmonics.pair / pixels_per_bin,
-        phases: phases(harmonics, spectrum.image_size),
+        reciprocal: fit.as_ref().map_or(harmonics.pair / pixels_per_bin, |fit| {
+            fit.wave_vectors.basis
+        }),
+        phases: fit.as_ref().map_or_else(
+            || phases(harmonics, spectrum.image_size),
+            LatticeFit::first_phases,
+        ),
         middle: middle(spectrum.image_size) * pixels_per_bin
             + Vector2::repeat((pixels_per_bin - 1.0) / 2.0),
         shortcut_wavelengths: fourier::shortcut_wavelengths(peaks, &bin_to_nm),
         periods: 1.0 / longest.fold(0.0, f64::max),
-        signal_to_noise: signal_to_noise(harmonics)[2],
+        signal_to_noise: fit.as_ref().map_or_else(
+            || signal_to_noise(harmonics)[2],
+            LatticeFit::weakest_signal_to_noise,
+        ),
+        fit,
     })
+}
+
+/// The lattice fitted to the pixels, in pixels.
+fn fitted(prepared: &Prepared, background: Background) -> Option<(LatticeVectors, LatticeFit)> {
+    let binning = prepared.binning;
+    let pair = &prepared.harmonics.pair;
+    let (lattice, fit) = if binning == 1 {
+        fit::measure(&prepared.image, pair, background)?
+    } else {
+        fit::measure(&prepared.image.binned(binning), pair, background)?
+    };
+    let to_pixels = Matrix2::identity() * binning as f64;
+    Some((lattice.mapped(&to_pixels), fit.in_pixels(binning)))
 }
 
 fn prepare(

@@ -268,7 +268,7 @@ fn is_side_lobe(peak: &Peak, other: &Peak) -> bool {
 
 /// Noise power, constant over blocks that are narrow along kx and tall along ky, since line noise
 /// is a ridge along ky.
-struct NoiseMap {
+pub(super) struct NoiseMap {
     blocks: usize,
     values: Vec<f64>,
     rows: usize,
@@ -278,7 +278,7 @@ const BLOCK_WIDTH: usize = 4;
 const BLOCK_HEIGHT: usize = 32;
 
 impl NoiseMap {
-    fn new(spectrum: &Spectrum) -> Self {
+    pub(super) fn new(spectrum: &Spectrum) -> Self {
         let half = spectrum.half();
         let across = half.div_ceil(BLOCK_WIDTH);
         let down = spectrum.rows.div_ceil(BLOCK_HEIGHT);
@@ -312,7 +312,7 @@ impl NoiseMap {
         }
     }
 
-    fn at(&self, kx: usize, ky: usize) -> f64 {
+    pub(super) fn at(&self, kx: usize, ky: usize) -> f64 {
         let by = ((ky + BLOCK_HEIGHT / 2) % self.rows) / BLOCK_HEIGHT;
         self.values[by * self.blocks + kx / BLOCK_WIDTH]
     }

@@ -1,0 +1,124 @@
+//! The pixels of a fit: where they are, which of them count, and the basis functions on them.
+//!
+//! Coordinates run from −1 to 1 across the frame, `X = (column − centre)·2/columns` and the same for
+//! rows, so that a wave vector is the phase (rad) at the edge and every parameter is of order one.
+
+use nalgebra::{Matrix2, Vector2};
+use rustfft::num_complex::Complex64;
+
+use crate::image::Image;
+
+/// An image with the list of what is missing.
+pub(super) struct Frame<'a> {
+    pub(super) image: &'a Image,
+    /// X of the columns and Y of the rows.
+    pub(super) x: Vec<f64>,
+    pub(super) y: Vec<f64>,
+    /// Pixels of each line that count; 0 leaves the line out.
+    pub(super) present: Vec<usize>,
+    /// (row, column) of missing pixels in lines that count.
+    pub(super) missing: Vec<[usize; 2]>,
+}
+
+impl<'a> Frame<'a> {
+    pub(super) fn new(image: &'a Image) -> Self {
+        let mut frame = Self {
+            image,
+            x: positions(image.columns),
+            y: positions(image.rows),
+            present: vec![0; image.rows],
+            missing: Vec::new(),
+        };
+        frame.leave_out(|_| false);
+        frame
+    }
+
+    /// Counts anew, without the lines for which `bad` holds and those of which half is missing.
+    pub(super) fn leave_out(&mut self, bad: impl Fn(usize) -> bool) {
+        self.missing.clear();
+        for row in 0..self.image.rows {
+            let line = self.image.row(row);
+            let count = line.iter().filter(|v| v.is_finite()).count();
+            let used = !bad(row) && 2 * count >= line.len();
+            self.present[row] = if used { count } else { 0 };
+            if used && count < line.len() {
+                let gone = line.iter().enumerate().filter(|(_, v)| !v.is_finite());
+                self.missing.extend(gone.map(|(column, _)| [row, column]));
+            }
+        }
+    }
+
+    /// Number of pixels that count.
+    pub(super) fn pixels(&self) -> usize {
+        self.present.iter().sum()
+    }
+
+    /// Number of lines that count.
+    pub(super) fn lines(&self) -> usize {
+        self.present.iter().filter(|&&n| n > 0).count()
+    }
+
+    /// Wave vector in rad per pixel → phase at the edges.
+    pub(super) fn edge(&self) -> Vector2<f64> {
+        Vector2::new(self.image.columns as f64, self.image.rows as f64) / 2.0
+    }
+}
+
+fn positions(n: usize) -> Vec<f64> {
+    let centre = (n as f64 - 1.0) / 2.0;
+    (0..n)
+        .map(|i| (i as f64 - centre) * 2.0 / n as f64)
+        .collect()
+}
+
+/// Harmonic (h, k) of the pair: h K₁ + k K₂.
+pub(super) fn wave(pair: &Matrix2<f64>, [h, k]: [i32; 2]) -> Vector2<f64> {
+    pair * Vector2::new(f64::from(h), f64::from(k))
+}
+
+/// `e^{i p X}` at the given positions.
+pub(super) fn turns(p: f64, positions: &[f64]) -> Vec<Complex64> {
+    positions.iter().map(|x| Complex64::cis(p * x)).collect()
+}
+
+/// What the model is made of: the powers of X and Y in the background, and the harmonics.
+///
+/// The order of the basis functions is: background terms; then for each harmonic of phase θ
+/// `cos θ, sin θ, X cos θ, X sin θ, Y cos θ, Y sin θ`.
+#[derive(Clone, Debug)]
+pub(super) struct Basis {
+    /// Powers (a, b) of `XᵃYᵇ`.
+    pub(super) terms: Vec<[usize; 2]>,
+    /// Indices (h, k).
+    pub(super) indices: Vec<[i32; 2]>,
+}
+
+impl Basis {
+    /// A background of total degree `degree`. Where every line has an offset of its own
+    /// (`free_lines`), terms that are constant along lines are none of the background's.
+    pub(super) fn new(degree: usize, free_lines: bool, indices: &[[i32; 2]]) -> Self {
+        let terms = (0..=degree)
+            .flat_map(|total| (0..=total).map(move |b| [total - b, b]))
+            .filter(|[a, _]| *a > 0 || !free_lines)
+            .collect();
+        Self {
+            terms,
+            indices: indices.to_vec(),
+        }
+    }
+
+    /// Highest power in the background.
+    pub(super) fn degree(&self) -> usize {
+        self.terms.last().map_or(0, |t| t[0] + t[1])
+    }
+
+    /// Number of basis functions.
+    pub(super) fn len(&self) -> usize {
+        self.terms.len() + 6 * self.indices.len()
+    }
+
+    /// Position of `cos θ` of the harmonic `i`.
+    pub(super) fn cosine(&self, i: usize) -> usize {
+        self.terms.len() + 6 * i
+    }
+}

@@ -1,0 +1,100 @@
+//! What whole lines do: offsets of their own, and lines that went wrong.
+
+use super::frame::Frame;
+use super::model::{Model, Tables, middle, residuals};
+
+/// Whole cycles per line next to zero, where the noise is the same but for the offsets.
+const NEAR: std::ops::RangeInclusive<usize> = 2..=6;
+/// Median of χ² with one degree of freedom.
+const MEDIAN_CHI2: f64 = 0.454_936_423_119_572_8;
+/// A line is bad if its residual exceeds the median one by this many standard deviations of such
+/// residuals, and by half.
+const BAD: f64 = 6.0;
+/// At most this share of the lines is left out; where more are bad the noise is just like that.
+const MOST_BAD: f64 = 0.2;
+
+/// Residuals line by line.
+pub(super) struct LineStatistics {
+    /// Power of the line means over that of the waves of two to six cycles per line; 1 where
+    /// lines have no offsets of their own.
+    pub(super) ratio: f64,
+    /// Standard deviation of the offsets.
+    pub(super) sigma: f64,
+    /// Residual of each line about its own mean, root mean square.
+    rms: Vec<f64>,
+}
+
+impl LineStatistics {
+    /// Reads the residuals of `model`. Medians: a few lines that went wrong do not matter.
+    pub(super) fn new(frame: &Frame, model: &Model) -> Self {
+        let tables = Tables::new(frame, &model.pair, &model.basis.indices);
+        let columns = frame.image.columns;
+        let step = std::f64::consts::TAU / columns as f64;
+        let waves: Vec<[Vec<f64>; 2]> = NEAR
+            .map(|m| {
+                let angle = |c: usize| (step * m as f64 * c as f64).sin_cos();
+                let (sin, cos) = (0..columns).map(angle).unzip();
+                [cos, sin]
+            })
+            .collect();
+        let mut rms = vec![0.0; frame.image.rows];
+        let (mut means, mut near) = (Vec::new(), Vec::new());
+        residuals(frame, model, &tables, |row, line| {
+            let count = frame.present[row] as f64;
+            let sum: f64 = line.iter().filter(|v| v.is_finite()).sum();
+            let mean = sum / count;
+            for value in line.iter_mut() {
+                *value = if value.is_nan() { 0.0 } else { *value - mean };
+            }
+            means.push(sum * mean);
+            rms[row] = (line.iter().map(|v| v * v).sum::<f64>() / count).sqrt();
+            for [cos, sin] in &waves {
+                let along =
+                    |wave: &[f64]| -> f64 { line.iter().zip(wave).map(|(v, w)| v * w).sum() };
+                near.push((along(cos).powi(2) + along(sin).powi(2)) / count);
+            }
+        });
+        let ridge = middle(&mut means) / MEDIAN_CHI2;
+        let adjacent = middle(&mut near) / std::f64::consts::LN_2;
+        Self {
+            ratio: ridge / adjacent,
+            sigma: ((ridge - adjacent).max(0.0) / columns as f64).sqrt(),
+            rms,
+        }
+    }
+
+    /// Whether offsets explain more than chance does. The median of n squares of means scatters by
+    /// 2.3/√n; three and a half times that.
+    pub(super) fn offsets_matter(&self, frame: &Frame) -> bool {
+        self.ratio > 1.0 + 8.0 / (frame.lines() as f64).sqrt()
+    }
+
+    /// λ of each line: n σ_l²/(σ² + n σ_l²).
+    pub(super) fn lambda(&self, frame: &Frame) -> Vec<f64> {
+        let columns = frame.image.columns as f64;
+        let share = |&n: &usize| {
+            let excess = (self.ratio - 1.0) * n as f64 / columns;
+            excess / (1.0 + excess)
+        };
+        frame.present.iter().map(share).collect()
+    }
+
+    /// The lines that went wrong.
+    pub(super) fn bad(&self, frame: &Frame) -> Vec<usize> {
+        let used = |row: &usize| frame.present[*row] > 0;
+        let rows = || (0..self.rms.len()).filter(used);
+        let mut sizes: Vec<f64> = rows().map(|r| self.rms[r]).collect();
+        let typical = middle(&mut sizes);
+        for size in &mut sizes {
+            *size = (*size - typical).abs();
+        }
+        let spread = 1.4826 * middle(&mut sizes);
+        let most = typical + (BAD * spread).max(0.5 * typical);
+        let bad: Vec<usize> = rows().filter(|&r| self.rms[r] > most).collect();
+        if bad.len() as f64 > MOST_BAD * frame.lines() as f64 {
+            Vec::new()
+        } else {
+            bad
+        }
+    }
+}

@@ -1,0 +1,394 @@
+//! The lattice fitted to the pixels: harmonics of a two-dimensional lattice on a smooth background.
+//!
+//! In: an image (binned where the lattice is coarse) and a start. Out: the two wave vectors and their
+//! covariance, the harmonics, and how good the fit is. No window and no resampling: every pixel
+//! counts the same, which is what reaches the Cramér–Rao bound.
+//!
+//! Model: `I(n) = b(n) + o(row) + Σ_hk A_hk cos((h q₁ + k q₂)·n + φ_hk) + noise`. Gauss–Newton on
+//! (q₁, q₂) with amplitudes and background free in every step (variable projection); harmonics of up
+//! to five shells are added where they earn it (BIC with the local noise). Residuals beyond three
+//! standard deviations are cut off (Huber) and lines that went wrong are left out.
+//!
+//! Line offsets o are used where line means scatter more than the noise beside them explains. They
+//! are random with the variance found, not free: a line then loses the share λ of its mean, λ → 1 for
+//! strong offsets. A harmonic along the fast axis, which free offsets would swallow, keeps the weight
+//! 1 − λ that it deserves.
+//!
+//! Covariance: `(JᵀWJ)⁻¹ Jᵀ W C W J (JᵀWJ)⁻¹` with C diagonal in frequency, read from the residual
+//! around each harmonic along either axis.
+//!
+//! # References
+//! Golub and Pereyra, Inverse Problems 19, R1 (2003), variable projection with Kaufman's Jacobian;
+//! Huber, Robust Statistics (1981), modified residuals; Schwarz, Ann. Stat. 6, 461 (1978), BIC.
+
+mod choose;
+mod frame;
+mod gram;
+mod lines;
+mod model;
+mod noise;
+mod solve;
+
+use nalgebra::{DVector, Matrix2, Matrix4, Vector2};
+
+use super::LatticeVectors;
+use super::reciprocal::real_from_reciprocal;
+use crate::estimate::Estimate;
+use crate::image::Image;
+use crate::settings::Background;
+use frame::{Basis, Frame};
+use gram::gram;
+use lines::LineStatistics;
+use model::{Clip, LineOffsets, Model, Tables, look, whitened};
+pub use noise::ForeignWave;
+use noise::{Leverage, ResidualNoise};
+
+/// Steps until the fit has to stand still.
+const MOST_STEPS: usize = 30;
+/// It stands still when no parameter moves by more than some thousandth of its error.
+const STILL: f64 = 1e-6;
+/// Rounds of adding harmonics.
+const ROUNDS: usize = 5;
+
+/// A lattice fitted to the pixels of an image.
+#[derive(Clone, Debug)]
+pub struct LatticeFit {
+    /// The wave vectors q₁, q₂ (about 60° apart), rad per pixel along columns and rows.
+    pub wave_vectors: LatticeVectors,
+    /// Where the phases hold, pixels (column, row): the centre of the frame.
+    pub centre: Vector2<f64>,
+    /// The harmonics, first shell first.
+    pub harmonics: Vec<FittedHarmonic>,
+    /// Residual over noise, root mean square: 1 for white noise and a model that is complete; more
+    /// where the noise is coloured or the lattice is not the same everywhere.
+    pub goodness: f64,
+    /// Standard deviation of the line offsets, units of the image; `None` where none are used.
+    pub line_offsets: Option<f64>,
+    /// Lines left out because they went wrong or are mostly missing.
+    pub lines_left_out: usize,
+    /// Share of the pixels whose residuals are cut off; 0.3 % for Gaussian noise.
+    pub clipped: f64,
+    /// The strongest wave that is left and none of the lattice's: a second lattice, or pick-up.
+    pub foreign_wave: Option<ForeignWave>,
+}
+
+/// One harmonic of a fitted lattice.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FittedHarmonic {
+    /// (h, k): the wave vector is `h q₁ + k q₂`.
+    pub index: [i32; 2],
+    /// A of `A cos(q·(n − centre) + φ)`, units of the image.
+    pub amplitude: f64,
+    /// φ, rad; its standard error is `1/(√2 · signal_to_noise)`.
+    pub phase: f64,
+    /// Amplitude over noise amplitude in one resolution cell.
+    pub signal_to_noise: f64,
+}
+
+/// Fits the lattice, starting from `pair` (rad per pixel of `image`).
+///
+/// `None` where the fit does not settle within half a cycle over the frame of its start, or the
+/// harmonics cannot be told apart on this frame. Everything counts in pixels of `image`.
+pub(super) fn measure(
+    image: &Image,
+    pair: &Matrix2<f64>,
+    background: Background,
+) -> Option<(LatticeVectors, LatticeFit)> {
+    let mut fit = Fit::new(image, pair, background);
+    fit.start()?;
+    let noise = fit.choose()?;
+    fit.result(&noise)
+}
+
+/// A fit under way.
+struct Fit<'a> {
+    frame: Frame<'a>,
+    model: Model,
+    lines: LineOffsets,
+    /// Each line's mean is gone already.
+    free_lines: bool,
+    line_sigma: Option<f64>,
+    /// Standard deviation of the residuals.
+    sigma: f64,
+    /// Residuals cut off.
+    clipped: usize,
+    /// The pair at the start, phase at the edges.
+    origin: Matrix2<f64>,
+}
+
+/// The noise of a finished fit.
+struct FinalNoise {
+    residual: ResidualNoise,
+    /// Noise power at each harmonic along x and along y.
+    local: Vec<[f64; 2]>,
+    /// Root mean square of the residual.
+    rms: f64,
+}
+
+impl<'a> Fit<'a> {
+    fn new(image: &'a Image, pair: &Matrix2<f64>, background: Background) -> Self {
+        let frame = Frame::new(image);
+        let free_lines = background == Background::LineMean;
+        let degree = match background {
+            Background::Mean => 0,
+            Background::Plane | Background::LineMean => 1,
+            Background::Quadratic => 2,
+            Background::Cubic => 3,
+        };
+        let basis = Basis::new(degree, free_lines, &choose::FIRST_SHELL);
+        let origin = Matrix2::from_diagonal(&frame.edge()) * pair;
+        let all_of_it = if free_lines { 1.0 } else { 0.0 };
+        Self {
+            model: Model {
+                background: vec![0.0; basis.terms.len()],
+                waves: vec![[0.0; 2]; basis.indices.len()],
+                pair: origin,
+                basis,
+            },
+            lines: LineOffsets {
+                lambda: vec![all_of_it; image.rows],
+                offset: vec![0.0; image.rows],
+            },
+            frame,
+            free_lines,
+            line_sigma: None,
+            sigma: 0.0,
+            clipped: 0,
+            origin,
+        }
+    }
+
+    /// Amplitudes and background at the start, then the first shell by itself.
+    fn start(&mut self) -> Option<()> {
+        let (step, _) = self.step(Clip::NONE, false)?;
+        self.apply(&step, 1.0);
+        let tables = Tables::new(&self.frame, &self.model.pair, &self.model.basis.indices);
+        let basis = self.model.basis.clone();
+        let seen = look(
+            &self.frame,
+            &self.model,
+            &basis,
+            &tables,
+            &mut self.lines,
+            Clip::NONE,
+        );
+        self.sigma = seen.sigma;
+        self.converge()
+    }
+
+    /// Steps until nothing moves any more.
+    fn converge(&mut self) -> Option<()> {
+        for _ in 0..MOST_STEPS {
+            let (step, decrement) = self.step(Clip::at(self.sigma), true)?;
+            let n = step.len();
+            let turn = step.rows(n - 4, 4).amax();
+            // Never by more than a quarter of the radius of convergence at once.
+            let share = (std::f64::consts::FRAC_PI_8 / turn).min(1.0);
+            self.apply(&step, share);
+            let change = self.model.pair - self.origin;
+            let third = change.column(1) - change.column(0);
+            if !(change.amax().max(third.amax()) < std::f64::consts::FRAC_PI_2) {
+                return None;
+            }
+            if share == 1.0 && (decrement < STILL * self.sigma.powi(2) || turn < 1e-13) {
+                return Some(());
+            }
+        }
+        None
+    }
+
+    /// The change of all parameters by the normal equations, and how much it lowers the sum of
+    /// squares. Wave vectors stay where they are unless `free`.
+    fn step(&mut self, clip: Clip, free: bool) -> Option<(DVector<f64>, f64)> {
+        let (model, frame) = (&self.model, &self.frame);
+        let tables = Tables::new(frame, &model.pair, &model.basis.indices);
+        let seen = look(frame, model, &model.basis, &tables, &mut self.lines, clip);
+        let gram = gram(frame, &model.basis, &model.pair, &self.lines.lambda);
+        let map = solve::contraction(model, |_, _| 1.0);
+        let mut normal = map.transpose() * gram * &map;
+        let mut right = map.transpose() * seen.gradient;
+        if !free {
+            let linear = right.len() - 4;
+            normal = normal.resize(linear, linear, 0.0);
+            right = right.resize_vertically(linear, 0.0);
+        }
+        let mut step = solve::solve(&normal, &right)?;
+        let decrement = step.dot(&right);
+        if !free {
+            let n = step.len();
+            step = step.resize_vertically(n + 4, 0.0);
+        }
+        self.sigma = seen.sigma;
+        self.clipped = seen.clipped;
+        Some((step, decrement))
+    }
+
+    fn apply(&mut self, step: &DVector<f64>, share: f64) {
+        let terms = self.model.background.len();
+        for (value, change) in self.model.background.iter_mut().zip(step.iter()) {
+            *value += share * change;
+        }
+        for (i, wave) in self.model.waves.iter_mut().enumerate() {
+            wave[0] += share * step[terms + 2 * i];
+            wave[1] += share * step[terms + 2 * i + 1];
+        }
+        for (i, value) in self.model.pair.iter_mut().enumerate() {
+            *value += share * step[step.len() - 4 + i];
+        }
+    }
+
+    /// Looks at the lines: leaves out bad ones, gives them offsets where these matter.
+    fn mind_the_lines(&mut self) {
+        let statistics = LineStatistics::new(&self.frame, &self.model);
+        let bad = statistics.bad(&self.frame);
+        if !bad.is_empty() {
+            let gone: Vec<bool> = self.frame.present.iter().map(|n| *n == 0).collect();
+            self.frame.leave_out(|row| gone[row] || bad.contains(&row));
+        }
+        if self.free_lines {
+            return;
+        }
+        if statistics.offsets_matter(&self.frame) {
+            self.lines.lambda = statistics.lambda(&self.frame);
+            self.line_sigma = Some(statistics.sigma);
+        } else {
+            self.lines.lambda.fill(0.0);
+            self.lines.offset.fill(0.0);
+            self.line_sigma = None;
+        }
+    }
+
+    /// The noise that is left around each harmonic.
+    fn noise(&mut self) -> Option<FinalNoise> {
+        let clip = Clip::at(self.sigma);
+        let residual = whitened(&self.frame, &self.model, &mut self.lines, clip);
+        let squares: f64 = residual.iter().map(|v| v * v).sum();
+        let parameters = self.model.background.len() + 2 * self.model.waves.len() + 4;
+        let lost = if self.free_lines {
+            self.frame.lines()
+        } else {
+            0
+        };
+        let freedom = self.frame.pixels().saturating_sub(parameters + lost).max(1);
+        let residual = ResidualNoise::new(&self.frame, residual, self.free_lines);
+        let leverage = self.leverage()?;
+        let level = residual.level();
+        let local = (0..self.model.waves.len())
+            .map(|i| {
+                let p = frame::wave(&self.model.pair, self.model.basis.indices[i]);
+                residual.around(p, &leverage).unwrap_or([level; 2])
+            })
+            .collect();
+        Some(FinalNoise {
+            residual,
+            local,
+            rms: (squares / freedom as f64).sqrt(),
+        })
+    }
+
+    fn leverage(&self) -> Option<Leverage<'_>> {
+        let gram = gram(
+            &self.frame,
+            &self.model.basis,
+            &self.model.pair,
+            &self.lines.lambda,
+        );
+        let map = solve::contraction(&self.model, |_, _| 1.0);
+        Leverage::new(&self.frame, &self.model, &(map.transpose() * gram * map))
+    }
+
+    /// Covariance of (p₁, p₂): what the local noise does to the four derivatives.
+    fn covariance(&self, noise: &FinalNoise) -> Option<Matrix4<f64>> {
+        let model = &self.model;
+        let gram = gram(&self.frame, &model.basis, &model.pair, &self.lines.lambda);
+        let bread = solve::projected(&gram, &solve::contraction(model, |_, _| 1.0))?;
+        let weight = |i: usize, axis: usize| noise.local[i][axis].sqrt();
+        let meat = solve::projected(&gram, &solve::contraction(model, weight))?;
+        let inverse = bread.try_inverse()?;
+        // Pixels whose residuals are cut off do not follow the model.
+        let follow = 1.0 - self.clipped as f64 / self.frame.pixels() as f64;
+        Some(inverse * meat * inverse / (follow * follow))
+    }
+
+    fn result(&self, noise: &FinalNoise) -> Option<(LatticeVectors, LatticeFit)> {
+        let scale = self.frame.edge().map(|e| 1.0 / e);
+        let wave_vectors = LatticeVectors {
+            basis: self.model.pair,
+            covariance: self.covariance(noise)?,
+        }
+        .mapped(&Matrix2::from_diagonal(&scale));
+        let pixels = self.frame.pixels() as f64;
+        let waves = self.model.waves.iter().zip(&self.model.basis.indices);
+        let harmonics = waves
+            .zip(&noise.local)
+            .map(|((&[alpha, beta], &index), local)| {
+                let amplitude = alpha.hypot(beta);
+                FittedHarmonic {
+                    index,
+                    amplitude,
+                    phase: (-beta).atan2(alpha),
+                    signal_to_noise: 0.5
+                        * amplitude
+                        * (2.0 * pixels / (local[0] + local[1])).sqrt(),
+                }
+            });
+        let [columns, rows] = [
+            self.frame.image.columns as f64,
+            self.frame.image.rows as f64,
+        ];
+        let fit = LatticeFit {
+            wave_vectors,
+            centre: Vector2::new(columns - 1.0, rows - 1.0) / 2.0,
+            harmonics: harmonics.collect(),
+            goodness: noise.rms / noise.residual.level().sqrt(),
+            line_offsets: self.line_sigma,
+            lines_left_out: self.frame.image.rows - self.frame.lines(),
+            clipped: self.clipped as f64 / pixels,
+            foreign_wave: noise.residual.foreign_wave(&self.frame, &self.model),
+        };
+        Some((real_from_reciprocal(&wave_vectors)?, fit))
+    }
+}
+
+impl LatticeFit {
+    /// Phases of the first shell at the centre: q₁, q₂, q₂ − q₁.
+    pub(super) fn first_phases(&self) -> [Estimate; 3] {
+        [0, 1, 2].map(|i| {
+            let harmonic = &self.harmonics[i];
+            let sigma = 1.0 / (std::f64::consts::SQRT_2 * harmonic.signal_to_noise);
+            Estimate::new(harmonic.phase, sigma)
+        })
+    }
+
+    /// Of the first shell.
+    pub(super) fn weakest_signal_to_noise(&self) -> f64 {
+        let first = self.harmonics.iter().take(3);
+        first.fold(f64::INFINITY, |least, h| least.min(h.signal_to_noise))
+    }
+
+    /// The same in pixels of which `binning` make one bin along each axis.
+    pub(super) fn in_pixels(mut self, binning: usize) -> Self {
+        let size = binning as f64;
+        self.wave_vectors = self.wave_vectors.mapped(&(Matrix2::identity() / size));
+        self.centre = self.centre * size + Vector2::repeat((size - 1.0) / 2.0);
+        for harmonic in &mut self.harmonics {
+            let q = frame::wave(&self.wave_vectors.basis, harmonic.index);
+            // The mean over a bin lowers the amplitude, and so it does the noise in a cell.
+            harmonic.amplitude /= mean_over_bin(q.x, size) * mean_over_bin(q.y, size);
+        }
+        if let Some(foreign) = &mut self.foreign_wave {
+            foreign.wave_vector /= size;
+        }
+        self
+    }
+}
+
+/// Mean of `cos(q x)` over `size` pixels around 0.
+fn mean_over_bin(q: f64, size: f64) -> f64 {
+    let half = (q / 2.0).sin();
+    if half.abs() < 1e-12 {
+        1.0
+    } else {
+        (size * q / 2.0).sin() / (size * half)
+    }
+}

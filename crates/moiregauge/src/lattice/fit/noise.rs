@@ -1,0 +1,280 @@
+//! The noise that is left: its power around each harmonic, and what else stands out of it.
+//!
+//! The residual is Hann-windowed and transformed. The fit has emptied it where the harmonics are, and
+//! with few periods that is nearly everywhere; so the power found is divided by the power that white
+//! noise of unit variance would have left in the same bins, `Σw² − vᴴ G⁻¹ v` with v the transform
+//! of the window times each fitted function and G their normal matrix. Noise of scanning probes
+//! depends on the frequency along the lines much more than on that across them; it is averaged
+//! along the latter and weighted by what acts on a component of a wave vector: the function X of a
+//! frame has the power 1/m² at m cycles, all of it on the axis.
+
+use nalgebra::{DMatrix, DVector, Vector2};
+
+use super::frame::{Basis, Frame, wave};
+use super::model::{Model, middle};
+use crate::image::Image;
+use crate::lattice::harmonics::hann_transform;
+use crate::lattice::select::NoiseMap;
+use crate::lattice::transform::{Spectrum, hann};
+
+/// Bins (cycles per frame) on either side of a harmonic that count, along the lines and across.
+const ALONG: i64 = 3;
+const ACROSS: i64 = 5;
+/// What acts on X at 0, ±1, ±2, ±3 cycles along the lines: 1/m², smeared by the window; and on Y.
+const WEIGHTS: [[f64; 4]; 2] = [[0.16, 0.28, 0.10, 0.04], [0.5, 0.25, 0.0, 0.0]];
+/// Bins nearer to zero frequency belong to the background.
+const BACKGROUND: i64 = 2;
+/// Farther than this from a point of the lattice (cycles per frame) a wave is none of its.
+const FOREIGN: f64 = 3.0;
+
+/// The periodogram of a residual.
+pub(super) struct ResidualNoise {
+    spectrum: Spectrum,
+    /// `Σ w²` over the pixels that count.
+    window_power: f64,
+    free_lines: bool,
+}
+
+/// The strongest wave in the residual that is none of the lattice's.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ForeignWave {
+    /// Its wave vector, rad per pixel.
+    pub wave_vector: Vector2<f64>,
+    /// Its power over the noise power around it.
+    pub significance: f64,
+    /// The significance that chance exceeds once in some ten thousand images of this size.
+    pub threshold: f64,
+}
+
+impl ForeignWave {
+    /// Whether it is more than chance.
+    pub fn stands_out(&self) -> bool {
+        self.significance > self.threshold
+    }
+}
+
+impl ResidualNoise {
+    /// `residual` is 0 where pixels do not count. `free_lines`: line means are gone.
+    pub(super) fn new(frame: &Frame, residual: Vec<f64>, free_lines: bool) -> Self {
+        let image = Image::new(frame.image.rows, frame.image.columns, residual);
+        let spectrum = Spectrum::unpadded(&image);
+        let squares = |n: usize| hann(n).iter().map(|w| w * w).collect::<Vec<_>>();
+        let (x, y) = (squares(image.columns), squares(image.rows));
+        let lines: f64 = y
+            .iter()
+            .zip(&frame.present)
+            .filter(|(_, n)| **n > 0)
+            .map(|(w, _)| w)
+            .sum();
+        let missing: f64 = frame.missing.iter().map(|&[r, c]| y[r] * x[c]).sum();
+        Self {
+            window_power: x.iter().sum::<f64>() * lines - missing,
+            spectrum,
+            free_lines,
+        }
+    }
+
+    /// Noise power around a harmonic as it acts on the x and on the y component of its wave vector;
+    /// white noise of variance σ² gives σ². `None` where the fit has left nothing.
+    pub(super) fn around(&self, p: Vector2<f64>, leverage: &Leverage) -> Option<[f64; 2]> {
+        let mut power = [0.0; 4];
+        let mut expected = [0.0; 4];
+        self.bins(p, leverage, |dx, found, white| {
+            power[dx] += found;
+            expected[dx] += white;
+        });
+        let all = ratio(power.iter().sum(), expected.iter().sum())?;
+        Some(WEIGHTS.map(|weights| {
+            // A column of which the fit has left less than one bin says nothing.
+            let (mut sum, mut weight) = (0.0, 0.0);
+            for (w, (found, white)) in weights.iter().zip(power.iter().zip(&expected)) {
+                if *white > 1.0 {
+                    sum += w * found / white;
+                    weight += w;
+                }
+            }
+            if weight > 0.0 { sum / weight } else { all }
+        }))
+    }
+
+    /// The same by the median: waves that are not fitted yet do not matter.
+    pub(super) fn median_around(&self, p: Vector2<f64>, leverage: &Leverage) -> Option<f64> {
+        let mut all = Vec::new();
+        self.bins(p, leverage, |_, found, white| {
+            if white > 0.3 {
+                all.push(found / white);
+            }
+        });
+        (!all.is_empty()).then(|| middle(&mut all) / std::f64::consts::LN_2)
+    }
+
+    /// Calls `each` with the distance along the lines, the power found and that of white noise.
+    fn bins(&self, p: Vector2<f64>, leverage: &Leverage, mut each: impl FnMut(usize, f64, f64)) {
+        let centre = (p / std::f64::consts::PI).map(|c| c.round() as i64);
+        let taps = leverage.taps(centre);
+        for dx in -ALONG..=ALONG {
+            let x = centre.x + dx;
+            if self.free_lines && x.abs() < 2 {
+                continue;
+            }
+            for dy in -ACROSS..=ACROSS {
+                let y = centre.y + dy;
+                if x.abs() < BACKGROUND && y.abs() < BACKGROUND {
+                    continue;
+                }
+                let white = 1.0 - leverage.at(&taps, dx, dy) / self.window_power;
+                if white > 0.02 {
+                    each(dx.unsigned_abs() as usize, self.power(x, y), white);
+                }
+            }
+        }
+    }
+
+    /// Power per pixel at (x, y) cycles per frame.
+    fn power(&self, x: i64, y: i64) -> f64 {
+        let (rows, columns) = (self.spectrum.rows as i64, self.spectrum.columns as i64);
+        let x = x.rem_euclid(columns);
+        let (x, y) = if x > columns / 2 {
+            (columns - x, -y)
+        } else {
+            (x, y)
+        };
+        self.spectrum.power(x as usize, y.rem_euclid(rows) as usize) / self.window_power
+    }
+
+    /// Noise power per pixel over all frequencies, by the median.
+    pub(super) fn level(&self) -> f64 {
+        let powers = self.spectrum.values.iter().map(|v| v.norm_sqr());
+        let mut powers: Vec<f64> = powers.collect();
+        middle(&mut powers) / (std::f64::consts::LN_2 * self.window_power)
+    }
+
+    /// The strongest wave away from the lattice, from slow waves and from the line ridge.
+    pub(super) fn foreign_wave(&self, frame: &Frame, model: &Model) -> Option<ForeignWave> {
+        let noise = NoiseMap::new(&self.spectrum);
+        let rows = self.spectrum.rows;
+        let cycles = model.pair / std::f64::consts::PI;
+        let inverse = cycles.try_inverse()?;
+        let ours = |k: Vector2<f64>| {
+            let index = (inverse * k).map(f64::round);
+            index.amax() <= 4.0 && (k - cycles * index).norm() < FOREIGN
+        };
+        let mut best: Option<(f64, Vector2<f64>)> = None;
+        for y in 0..rows {
+            let signed = if 2 * y <= rows {
+                y as f64
+            } else {
+                y as f64 - rows as f64
+            };
+            for x in 2..self.spectrum.half() {
+                let significance = self.spectrum.power(x, y) / noise.at(x, y);
+                if best.is_none_or(|(most, _)| significance > most) {
+                    let k = Vector2::new(x as f64, signed);
+                    if !ours(k) {
+                        best = Some((significance, k));
+                    }
+                }
+            }
+        }
+        let (significance, k) = best?;
+        let bins = self.spectrum.values.len() as f64;
+        Some(ForeignWave {
+            wave_vector: (k * std::f64::consts::PI).component_div(&frame.edge()),
+            significance,
+            // The local noise is known to a fifth or so, hence the factor.
+            threshold: 1.3 * (bins.ln() + 9.0),
+        })
+    }
+}
+
+fn ratio(found: f64, white: f64) -> Option<f64> {
+    (white > 1.0).then(|| found / white)
+}
+
+/// Which part of white noise the fitted functions take up.
+pub(super) struct Leverage<'a> {
+    basis: &'a Basis,
+    model: &'a Model,
+    /// Inverse of the normal matrix of (cos, sin) of each harmonic and the four derivatives.
+    inverse: DMatrix<f64>,
+    size: [usize; 2],
+}
+
+/// Transforms of the window around one harmonic: for each fitted harmonic and either sign of its
+/// wave vector, along x and along y, the value and the slope at each bin.
+pub(super) struct Taps(Vec<[[Vec<[f64; 2]>; 2]; 2]>);
+
+impl<'a> Leverage<'a> {
+    /// `normal` is that of the whole model: background, cosines and sines, derivatives.
+    pub(super) fn new(frame: &Frame, model: &'a Model, normal: &DMatrix<f64>) -> Option<Self> {
+        let terms = model.basis.terms.len();
+        let rest = normal.nrows() - terms;
+        let inverse = super::solve::inverse(normal)?;
+        // The block of the inverse is the inverse with the background projected out.
+        let inverse = inverse.view((terms, terms), (rest, rest)).into_owned();
+        Some(Self {
+            basis: &model.basis,
+            model,
+            inverse,
+            size: [frame.image.columns, frame.image.rows],
+        })
+    }
+
+    fn taps(&self, centre: Vector2<i64>) -> Taps {
+        let half = [ALONG, ACROSS];
+        let waves = self.basis.indices.iter().map(|&index| {
+            let p = wave(&self.model.pair, index);
+            [1.0, -1.0].map(|sign| {
+                [0, 1].map(|axis| {
+                    let n = self.size[axis];
+                    (-half[axis]..=half[axis])
+                        .map(|d| {
+                            let bin = std::f64::consts::PI * (centre[axis] + d) as f64;
+                            transform(sign * p[axis] - bin, n)
+                        })
+                        .collect()
+                })
+            })
+        });
+        Taps(waves.collect())
+    }
+
+    /// `vᴴ G⁻¹ v` for the bin at (dx, dy) from the centre of the taps.
+    fn at(&self, taps: &Taps, dx: i64, dy: i64) -> f64 {
+        let count = self.basis.indices.len();
+        let mut re = DVector::zeros(2 * count + 4);
+        let mut im = DVector::zeros(2 * count + 4);
+        for (i, [plus, minus]) in taps.0.iter().enumerate() {
+            let at = |t: &[Vec<[f64; 2]>; 2]| {
+                let [x, slope_x] = t[0][(dx + ALONG) as usize];
+                let [y, slope_y] = t[1][(dy + ACROSS) as usize];
+                [x * y, slope_x * y, x * slope_y]
+            };
+            let (plus, minus) = (at(plus), at(minus));
+            re[2 * i] = 0.5 * (plus[0] + minus[0]);
+            im[2 * i + 1] = -0.5 * (plus[0] - minus[0]);
+            let [alpha, beta] = self.model.waves[i];
+            for axis in 0..2 {
+                // X e^{iθ} transforms into −i times the slope; the derivative of the model is
+                // X (β cos θ − α sin θ).
+                let (cos, sin) = (
+                    -0.5 * (plus[axis + 1] + minus[axis + 1]),
+                    -0.5 * (plus[axis + 1] - minus[axis + 1]),
+                );
+                for (vector, index) in self.basis.indices[i].into_iter().enumerate() {
+                    let j = 2 * count + 2 * vector + axis;
+                    im[j] += f64::from(index) * beta * cos;
+                    re[j] -= f64::from(index) * alpha * sin;
+                }
+            }
+        }
+        (&self.inverse * &re).dot(&re) + (&self.inverse * &im).dot(&im)
+    }
+}
+
+/// `Σ w cos(p X)` over the Hann window and its slope.
+fn transform(p: f64, n: usize) -> [f64; 2] {
+    const STEP: f64 = 1e-4;
+    let at = |p: f64| hann_transform(p * 2.0 / n as f64, n);
+    [at(p), (at(p + STEP) - at(p - STEP)) / (2.0 * STEP)]
+}

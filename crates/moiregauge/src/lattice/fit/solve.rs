@@ -1,0 +1,82 @@
+//! The normal equations of a fit and its covariance.
+
+use nalgebra::{Cholesky, DMatrix, DVector, Matrix4};
+
+use super::model::Model;
+
+/// Diagonal elements that fall below this share of themselves say that functions are the same.
+const DEGENERATE: f64 = 1e-11;
+
+/// Columns: what the basis functions are to a change of each parameter (background, α and β of each
+/// harmonic, then p₁x, p₁y, p₂x, p₂y), each derivative weighted by `weight(harmonic, axis)`.
+pub(super) fn contraction(model: &Model, weight: impl Fn(usize, usize) -> f64) -> DMatrix<f64> {
+    let basis = &model.basis;
+    let terms = basis.terms.len();
+    let linear = terms + 2 * basis.indices.len();
+    let mut map = DMatrix::zeros(basis.len(), linear + 4);
+    for t in 0..terms {
+        map[(t, t)] = 1.0;
+    }
+    for (i, [alpha, beta]) in model.waves.iter().enumerate() {
+        let first = basis.cosine(i);
+        map[(first, terms + 2 * i)] = 1.0;
+        map[(first + 1, terms + 2 * i + 1)] = 1.0;
+        for (vector, index) in basis.indices[i].into_iter().enumerate() {
+            for axis in 0..2 {
+                // d(α cos θ + β sin θ) = (β cos θ − α sin θ) dθ.
+                let factor = f64::from(index) * weight(i, axis);
+                let (row, column) = (first + 2 + 2 * axis, linear + 2 * vector + axis);
+                map[(row, column)] = factor * beta;
+                map[(row + 1, column)] = -factor * alpha;
+            }
+        }
+    }
+    map
+}
+
+/// Solves the normal equations; `None` where the parameters cannot be told apart.
+pub(super) fn solve(normal: &DMatrix<f64>, right: &DVector<f64>) -> Option<DVector<f64>> {
+    let (factor, scale) = scaled(normal)?;
+    Some(
+        factor
+            .solve(&right.component_mul(&scale))
+            .component_mul(&scale),
+    )
+}
+
+/// Inverse of a normal matrix.
+pub(super) fn inverse(normal: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let (factor, scale) = scaled(normal)?;
+    let scale = DMatrix::from_diagonal(&scale);
+    Some(&scale * factor.inverse() * &scale)
+}
+
+/// Cholesky factor with the diagonal scaled to 1, and the scale.
+fn scaled(normal: &DMatrix<f64>) -> Option<(Cholesky<f64, nalgebra::Dyn>, DVector<f64>)> {
+    let scale = normal.diagonal().map(|d| d.max(0.0).sqrt().recip());
+    if !scale.iter().all(|s| s.is_finite()) {
+        return None;
+    }
+    let matrix = DMatrix::from_fn(normal.nrows(), normal.ncols(), |i, j| {
+        normal[(i, j)] * scale[i] * scale[j]
+    });
+    let factor = matrix.cholesky()?;
+    let independent = factor
+        .l_dirty()
+        .diagonal()
+        .iter()
+        .all(|d| d * d > DEGENERATE);
+    independent.then_some((factor, scale))
+}
+
+/// `D₁ᵀ (W − W Φ (Φᵀ W Φ)⁻¹ Φᵀ W) D₁` for the derivatives weighted as in `map`: what is left of them
+/// when background and amplitudes are free.
+pub(super) fn projected(gram: &DMatrix<f64>, map: &DMatrix<f64>) -> Option<Matrix4<f64>> {
+    let normal = map.transpose() * gram * map;
+    let linear = normal.nrows() - 4;
+    let phi = normal.view((0, 0), (linear, linear)).into_owned();
+    let cross = normal.view((0, linear), (linear, 4)).into_owned();
+    let own = normal.view((linear, linear), (4, 4)).into_owned();
+    let left = own - cross.transpose() * inverse(&phi)? * &cross;
+    Some(left.fixed_view::<4, 4>(0, 0).into_owned())
+}
