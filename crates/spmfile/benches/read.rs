@@ -1,0 +1,114 @@
+//! Reading a scan, beside the copying of its bytes, which nothing can beat.
+//!
+//! `cargo bench -p spmfile`. Compare rates within one run; absolute ones depend on the machine.
+
+use divan::{Bencher, counter::BytesCount};
+use spmfile::{
+    Channel, ChannelInfo, DateTime, FrameDirection, LineDirection, Samples, Scan, nanoscope, read,
+    read_selected,
+};
+
+fn main() {
+    divan::main();
+}
+
+const SIDE: usize = 512;
+
+/// Four channels, trace and retrace of each, 512 × 512, as the instrument stores them: 32 bits.
+fn file() -> Vec<u8> {
+    let names = [
+        ("TR Phase", "TRPhase"),
+        ("TR Amplitude", "TRAmplitude"),
+        ("X Sensor", "XSensor"),
+        ("Y Sensor", "YSensor"),
+    ];
+    let lines = [LineDirection::Trace, LineDirection::Retrace];
+    let channels = names
+        .iter()
+        .flat_map(|name| lines.map(|line| channel(*name, line)));
+    let scan = Scan {
+        format: "NanoScope 9.40".to_owned(),
+        instrument: None,
+        acquired: Some(DateTime {
+            year: 2024,
+            month: 1,
+            day: 15,
+            hour: 10,
+            minute: 0,
+            second: 0,
+        }),
+        frame_direction: Some(FrameDirection::Up),
+        line_rate_hz: Some(8.0),
+        rounding: Some(0.05),
+        rotation_rad: 0.0,
+        offset_nm: [0.0; 2],
+        size_nm: Some([70.0; 2]),
+        closed_loop: Some(false),
+        channels: channels.collect(),
+        unreadable: Vec::new(),
+    };
+    nanoscope::write(&scan).expect("a scan that can be written")
+}
+
+fn channel((name, internal_name): (&str, &str), line: LineDirection) -> Channel {
+    // Counts without a pattern; what they are makes no difference to the reader.
+    let counts = (0..(SIDE * SIDE) as i32).map(|i| i.wrapping_mul(0x9e37_79b9_u32 as i32) >> 4);
+    Channel {
+        name: name.to_owned(),
+        internal_name: internal_name.to_owned(),
+        unit: "nm".to_owned(),
+        line_direction: Some(line),
+        scan_line: Some("Main".to_owned()),
+        rows: SIDE,
+        columns: SIDE,
+        width_nm: Some(70.0),
+        height_nm: Some(70.0),
+        scale: 1e-6,
+        offset: 0.0,
+        scaling: String::new(),
+        plane_fit: None,
+        samples: Samples::I32(counts.collect()),
+    }
+}
+
+#[divan::bench]
+fn copy_the_bytes(bencher: Bencher<'_, '_>) {
+    let file = file();
+    bencher
+        .counter(BytesCount::new(file.len()))
+        .bench(|| divan::black_box(&file).clone());
+}
+
+#[divan::bench]
+fn read_all_eight_channels(bencher: Bencher<'_, '_>) {
+    let file = file();
+    bencher
+        .counter(BytesCount::new(file.len()))
+        .bench(|| read(divan::black_box(&file)));
+}
+
+/// What an analysis reads: one channel and both sensors, trace and retrace.
+#[divan::bench]
+fn read_six_of_eight_channels(bencher: Bencher<'_, '_>) {
+    let file = file();
+    bencher.counter(BytesCount::new(file.len())).bench(|| {
+        read_selected(divan::black_box(&file), &|channel: &ChannelInfo| {
+            channel.name != "TR Amplitude"
+        })
+    });
+}
+
+#[divan::bench]
+fn read_the_header_only(bencher: Bencher<'_, '_>) {
+    let file = file();
+    bencher.bench(|| read_selected(divan::black_box(&file), &|_: &ChannelInfo| false));
+}
+
+#[divan::bench]
+fn counts_to_nanometres(bencher: Bencher<'_, '_>) {
+    let scan = read(&file()).expect("our own file");
+    let channel = &scan.channels[0];
+    bencher
+        .counter(BytesCount::new(4 * channel.samples.len()))
+        .bench(|| divan::black_box(channel).values());
+}
