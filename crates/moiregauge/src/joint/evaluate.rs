@@ -66,6 +66,12 @@ impl Layout {
         self.phases.unwrap_or(self.size)
     }
 
+    /// Where the offset of a class stands; `None` for the first class and beyond the last.
+    pub(super) fn offset_of(&self, class: usize) -> Option<usize> {
+        let at = self.offsets? + 2 * class.checked_sub(1)?;
+        (at < self.times?).then_some(at)
+    }
+
     pub(super) fn acceleration_at(&self) -> Option<usize> {
         self.acceleration
     }
@@ -209,10 +215,7 @@ fn phases(
     };
     let late = layout.times.map(|i| i + sighting.scan);
     let (shift, velocity) = layout.motion(x, sighting.time);
-    let offset = layout
-        .offsets
-        .filter(|_| sighting.class > 0)
-        .map(|i| i + 2 * (sighting.class - 1));
+    let offset = layout.offset_of(sighting.class);
     let mut place = sighting.position - shift;
     if let Some(i) = late {
         place -= velocity * x[i];

@@ -5,10 +5,13 @@ use nalgebra::{DMatrix, DVector, Matrix2, Matrix4, Vector2};
 
 use super::evaluate::{DRIFT, Layout, linearise, wrapped};
 use super::{Sighting, Terms};
+use crate::estimate::Estimate;
 use crate::lattice::LatticeVectors;
 
 /// Gauss–Newton steps; the problem is nearly linear.
 const STEPS: usize = 12;
+/// Relative damping of the normal equations.
+const DAMPING: f64 = 1e-10;
 /// Phases are believed to be linked if they scatter by less than this share of a wavelength.
 const LINKED: f64 = 0.08;
 /// Settling times that are tried, as shares of the duration of the campaign.
@@ -29,7 +32,7 @@ pub struct JointFit {
     /// Acceleration, nm/s², where it earned its place.
     pub acceleration: Option<Vector2<f64>>,
     /// Relative gain error of the fast axis with its uncertainty, where it earned its place.
-    pub fast_gain: Option<crate::estimate::Estimate>,
+    pub fast_gain: Option<Estimate>,
     /// The terms that the fit has.
     pub terms: Terms,
     /// Standard deviation of positions about the fit beyond the phase noise, nm.
@@ -198,7 +201,7 @@ fn solve(
             .map(|i| Vector2::new(x[i], x[i + 1])),
         fast_gain: layout
             .gain_at()
-            .map(|i| crate::estimate::Estimate::from_variance(x[i], covariance[(i, i)])),
+            .map(|i| Estimate::from_variance(x[i], covariance[(i, i)])),
         terms,
         instability_nm: instability,
         chi2,
@@ -209,20 +212,41 @@ fn solve(
     })
 }
 
-/// φ of the harmonics from the sighting nearest to the middle of the campaign.
+/// φ of the harmonics from the sighting of the first class that is nearest to the middle of the
+/// campaign; then the offset of every other class, modulo the lattice, from its nearest sighting.
 fn start_phases(sightings: &[Sighting], layout: &Layout, x: &mut DVector<f64>) -> Option<()> {
     let first = layout.phases?;
     let distance = |s: &&Sighting| (s.time - layout.origin).abs();
-    let near = sightings
-        .iter()
-        .filter(|s| s.phases.is_some() && s.class == 0)
-        .min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
-    let (shift, _) = layout.motion(x, near.time);
-    let place = near.position - shift;
+    let nearest = |class: usize| {
+        sightings
+            .iter()
+            .filter(|s| s.phases.is_some() && s.class == class)
+            .min_by(|a, b| distance(a).total_cmp(&distance(b)))
+    };
     let (k1, k2) = (Vector2::new(x[0], x[1]), Vector2::new(x[2], x[3]));
-    let phases = near.phases?;
-    for (h, k) in [k1, k2, k2 - k1].into_iter().enumerate() {
-        x[first + h] = wrapped(phases[h].value - k.dot(&place));
+    let unexplained = |s: &Sighting, x: &DVector<f64>| {
+        let (shift, _) = layout.motion(x, s.time);
+        let place = s.position - shift;
+        let miss = |h: usize, k: Vector2<f64>, phases: &[Estimate; 3]| {
+            wrapped(phases[h].value - k.dot(&place) - x[first + h])
+        };
+        s.phases
+            .map(|p| [miss(0, k1, &p), miss(1, k2, &p), miss(2, k2 - k1, &p)])
+    };
+    let phases = unexplained(nearest(0)?, x)?;
+    for (h, phase) in phases.into_iter().enumerate() {
+        x[first + h] = phase;
+    }
+    let from_phases = Matrix2::from_rows(&[k1.transpose(), k2.transpose()]).try_inverse()?;
+    for class in 1.. {
+        let Some(at) = layout.offset_of(class) else {
+            break;
+        };
+        let Some(near) = nearest(class) else { continue };
+        let miss = unexplained(near, x)?;
+        let offset = -from_phases * Vector2::new(miss[0], miss[1]);
+        x[at] = offset.x;
+        x[at + 1] = offset.y;
     }
     Some(())
 }
@@ -252,12 +276,17 @@ fn iterate(
             }
         }
         let scale = normal.diagonal().map(|d| 1.0 / d.sqrt());
-        let scaled = DMatrix::from_fn(n, n, |i, j| normal[(i, j)] * scale[i] * scale[j]);
+        let mut scaled = DMatrix::from_fn(n, n, |i, j| normal[(i, j)] * scale[i] * scale[j]);
         if layout.phases.is_none() {
             let values = scaled.symmetric_eigenvalues();
             if !(values.max() < WORST_CONDITION * values.min()) {
                 return None;
             }
+        }
+        // Near the middle of the campaign offsets and phases may only be seen together; a little
+        // damping holds what cannot be told apart and leaves the final solution where it is.
+        for i in 0..n {
+            scaled[(i, i)] += DAMPING;
         }
         let inverse = scaled.cholesky()?.inverse();
         let inverse = DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] * scale[i] * scale[j]);
