@@ -292,7 +292,7 @@ pub(super) fn hann_transform(q: f64, n: usize) -> f64 {
 }
 
 /// Sum of products in eight independent partial sums, which the compiler can keep in registers.
-fn dot(a: &[f64], b: &[f64]) -> f64 {
+pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
     let mut sums = [0.0; 8];
     let (a8, b8) = (a.chunks_exact(8), b.chunks_exact(8));
     let rest: f64 = a8

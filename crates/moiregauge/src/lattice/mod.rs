@@ -185,11 +185,11 @@ pub fn measure(
 /// The lattice fitted to the pixels, in pixels.
 fn fitted(prepared: &Prepared, background: Background) -> Option<(LatticeVectors, LatticeFit)> {
     let binning = prepared.binning;
-    let pair = &prepared.harmonics.pair;
+    let start = &prepared.harmonics;
     let (lattice, fit) = if binning == 1 {
-        fit::measure(&prepared.image, pair, background)?
+        fit::measure(&prepared.image, start, background)?
     } else {
-        fit::measure(&prepared.image.binned(binning), pair, background)?
+        fit::measure(&prepared.image.binned(binning), start, background)?
     };
     let to_pixels = Matrix2::identity() * binning as f64;
     Some((lattice.mapped(&to_pixels), fit.in_pixels(binning)))

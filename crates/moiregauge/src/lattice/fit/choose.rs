@@ -12,6 +12,9 @@ use super::{FinalNoise, Fit, ROUNDS, solve};
 pub(super) const FIRST_SHELL: [[i32; 2]; 3] = [[1, 0], [0, 1], [-1, 1]];
 /// |h|² of the last of the five shells.
 const LAST_SHELL: i32 = 9;
+/// On frames with more pixels, which have many periods, harmonics that do not show in the transform
+/// of the residual are not looked at more closely.
+const MANY_PIXELS: usize = 100_000;
 /// Largest wave vector, as a share of the Nyquist frequency.
 const HIGHEST: f64 = 0.9;
 
@@ -20,8 +23,9 @@ impl Fit<'_> {
     /// time. Returns the noise that is left.
     pub(super) fn choose(&mut self) -> Option<FinalNoise> {
         for _ in 0..ROUNDS {
-            self.mind_the_lines();
-            self.converge()?;
+            if self.mind_the_lines() {
+                self.converge()?;
+            }
             let noise = self.noise()?;
             let new = self.earned(&noise.residual)?;
             if new.is_empty() {
@@ -51,6 +55,10 @@ impl Fit<'_> {
                 let p = wave(&self.model.pair, index).component_div(&self.frame.edge());
                 p.amax().max(-p.amin()) < HIGHEST * std::f64::consts::PI
             })
+            .filter(|&index| {
+                self.frame.pixels() < MANY_PIXELS
+                    || residual.is_promising(wave(&self.model.pair, index))
+            })
             .collect();
         if outside.is_empty() {
             return Some(outside);
@@ -60,29 +68,28 @@ impl Fit<'_> {
             terms: self.model.basis.terms.clone(),
             indices: [self.model.basis.indices.clone(), outside.clone()].concat(),
         };
-        let tables = Tables::new(&self.frame, &self.model.pair, &basis.indices);
-        let clip = Clip::at(self.sigma);
-        let seen = look(
-            &self.frame,
-            &self.model,
-            &basis,
-            &tables,
-            &mut self.lines,
-            clip,
-        );
-        let gram = gram(&self.frame, &basis, &self.model.pair, &self.lines.lambda);
+        // The residual has nothing left in common with what is fitted: only the rest is looked at.
+        let tables = Tables::new(&self.frame, &self.model.pair, &self.model.basis.indices);
+        let probed = Basis {
+            terms: Vec::new(),
+            indices: outside.clone(),
+        };
+        let probes = Tables::new(&self.frame, &self.model.pair, &outside);
+        let (frame, clip) = (&self.frame, Clip::at(self.sigma));
+        let probes = (&probed, &probes);
+        let seen = look(frame, &self.model, &tables, probes, &mut self.lines, clip);
+        let gram = gram(frame, &basis, &self.model.pair, &self.lines.lambda);
         let map = solve::contraction(&self.model, |_, _| 1.0).resize_vertically(basis.len(), 0.0);
         let normal = map.transpose() * &gram * &map;
         let known = solve::inverse(&normal)?;
-        let pull = &known * (map.transpose() * &seen.gradient);
         let leverage = Leverage::new(&self.frame, &self.model, &normal)?;
         let mut earned = Vec::new();
         for (i, &index) in outside.iter().enumerate() {
             let first = basis.cosine(inside + i);
             let cross = map.transpose() * gram.columns(first, 2);
-            // What the fitted functions leave of the pair (cos, sin), and of its correlation.
+            // What the fitted functions leave of the pair (cos, sin).
             let left = gram.view((first, first), (2, 2)) - cross.transpose() * &known * &cross;
-            let score = seen.gradient.rows(first, 2) - cross.transpose() * &pull;
+            let score = seen.gradient.rows(probed.cosine(i), 2).into_owned();
             let Some(noise) = residual.median_around(wave(&self.model.pair, index), &leverage)
             else {
                 continue;

@@ -1,10 +1,13 @@
 //! What whole lines do: offsets of their own, and lines that went wrong.
 
 use super::frame::Frame;
-use super::model::{Model, Tables, middle, residuals};
+use super::model::{Model, Tables, middle, residuals, sum};
+use crate::lattice::harmonics::dot;
 
 /// Whole cycles per line next to zero, where the noise is the same but for the offsets.
 const NEAR: std::ops::RangeInclusive<usize> = 2..=6;
+/// Lines at which these are looked at; the median of so many is known well enough.
+const LOOKED_AT: usize = 512;
 /// Median of χ² with one degree of freedom.
 const MEDIAN_CHI2: f64 = 0.454_936_423_119_572_8;
 /// A line is bad if its residual exceeds the median one by this many standard deviations of such
@@ -38,20 +41,26 @@ impl LineStatistics {
             })
             .collect();
         let mut rms = vec![0.0; frame.image.rows];
+        let stride = (frame.image.rows / LOOKED_AT).max(1);
         let (mut means, mut near) = (Vec::new(), Vec::new());
         residuals(frame, model, &tables, |row, line| {
             let count = frame.present[row] as f64;
-            let sum: f64 = line.iter().filter(|v| v.is_finite()).sum();
-            let mean = sum / count;
-            for value in line.iter_mut() {
-                *value = if value.is_nan() { 0.0 } else { *value - mean };
+            if frame.present[row] < columns {
+                let mean = line.iter().filter(|v| v.is_finite()).sum::<f64>() / count;
+                for value in line.iter_mut().filter(|v| v.is_nan()) {
+                    *value = mean;
+                }
             }
-            means.push(sum * mean);
-            rms[row] = (line.iter().map(|v| v * v).sum::<f64>() / count).sqrt();
-            for [cos, sin] in &waves {
-                let along =
-                    |wave: &[f64]| -> f64 { line.iter().zip(wave).map(|(v, w)| v * w).sum() };
-                near.push((along(cos).powi(2) + along(sin).powi(2)) / count);
+            let mean = sum(line) / columns as f64;
+            for value in line.iter_mut() {
+                *value -= mean;
+            }
+            means.push(count * mean * mean);
+            rms[row] = (dot(line, line) / count).sqrt();
+            if row % stride == 0 {
+                for [cos, sin] in &waves {
+                    near.push((dot(line, cos).powi(2) + dot(line, sin).powi(2)) / count);
+                }
             }
         });
         let ridge = middle(&mut means) / MEDIAN_CHI2;
@@ -69,7 +78,7 @@ impl LineStatistics {
         self.ratio > 1.0 + 8.0 / (frame.lines() as f64).sqrt()
     }
 
-    /// λ of each line: n σ_l²/(σ² + n σ_l²).
+    /// λ of each line: `n σ_l²/(σ² + n σ_l²)`.
     pub(super) fn lambda(&self, frame: &Frame) -> Vec<f64> {
         let columns = frame.image.columns as f64;
         let share = |&n: &usize| {

@@ -30,8 +30,10 @@ mod noise;
 mod solve;
 
 use nalgebra::{DVector, Matrix2, Matrix4, Vector2};
+use rustfft::num_complex::Complex64;
 
 use super::LatticeVectors;
+use super::harmonics::Harmonics;
 use super::reciprocal::real_from_reciprocal;
 use crate::estimate::Estimate;
 use crate::image::Image;
@@ -45,8 +47,9 @@ use noise::{Leverage, ResidualNoise};
 
 /// Steps until the fit has to stand still.
 const MOST_STEPS: usize = 30;
-/// It stands still when no parameter moves by more than some thousandth of its error.
-const STILL: f64 = 1e-6;
+/// It stands still when a step moves all parameters together by less than this in units of their
+/// errors, squared. What such a step leaves is a share of it, that of the residuals cut off.
+const STILL: f64 = 0.01;
 /// Rounds of adding harmonics.
 const ROUNDS: usize = 5;
 
@@ -85,17 +88,17 @@ pub struct FittedHarmonic {
     pub signal_to_noise: f64,
 }
 
-/// Fits the lattice, starting from `pair` (rad per pixel of `image`).
+/// Fits the lattice, starting from what the spectrum of `image` says.
 ///
 /// `None` where the fit does not settle within half a cycle over the frame of its start, or the
 /// harmonics cannot be told apart on this frame. Everything counts in pixels of `image`.
 pub(super) fn measure(
     image: &Image,
-    pair: &Matrix2<f64>,
+    start: &Harmonics,
     background: Background,
 ) -> Option<(LatticeVectors, LatticeFit)> {
-    let mut fit = Fit::new(image, pair, background);
-    fit.start()?;
+    let mut fit = Fit::new(image, start, background);
+    fit.converge()?;
     let noise = fit.choose()?;
     fit.result(&noise)
 }
@@ -126,7 +129,7 @@ struct FinalNoise {
 }
 
 impl<'a> Fit<'a> {
-    fn new(image: &'a Image, pair: &Matrix2<f64>, background: Background) -> Self {
+    fn new(image: &'a Image, start: &Harmonics, background: Background) -> Self {
         let frame = Frame::new(image);
         let free_lines = background == Background::LineMean;
         let degree = match background {
@@ -136,12 +139,18 @@ impl<'a> Fit<'a> {
             Background::Cubic => 3,
         };
         let basis = Basis::new(degree, free_lines, &choose::FIRST_SHELL);
-        let origin = Matrix2::from_diagonal(&frame.edge()) * pair;
+        let origin = Matrix2::from_diagonal(&frame.edge()) * start.pair;
+        let centre = frame.edge() - Vector2::repeat(0.5);
+        // 2 Re(c e^{iθ}), the phase moved from pixel (0, 0) to the centre.
+        let waves = start.list.iter().take(basis.indices.len()).map(|harmonic| {
+            let c = 2.0 * harmonic.amplitude * Complex64::cis(harmonic.q.dot(&centre));
+            [c.re, -c.im]
+        });
         let all_of_it = if free_lines { 1.0 } else { 0.0 };
         Self {
             model: Model {
                 background: vec![0.0; basis.terms.len()],
-                waves: vec![[0.0; 2]; basis.indices.len()],
+                waves: waves.collect(),
                 pair: origin,
                 basis,
             },
@@ -152,34 +161,17 @@ impl<'a> Fit<'a> {
             frame,
             free_lines,
             line_sigma: None,
-            sigma: 0.0,
+            // Nothing is cut off at first.
+            sigma: f64::INFINITY,
             clipped: 0,
             origin,
         }
     }
 
-    /// Amplitudes and background at the start, then the first shell by itself.
-    fn start(&mut self) -> Option<()> {
-        let (step, _) = self.step(Clip::NONE, false)?;
-        self.apply(&step, 1.0);
-        let tables = Tables::new(&self.frame, &self.model.pair, &self.model.basis.indices);
-        let basis = self.model.basis.clone();
-        let seen = look(
-            &self.frame,
-            &self.model,
-            &basis,
-            &tables,
-            &mut self.lines,
-            Clip::NONE,
-        );
-        self.sigma = seen.sigma;
-        self.converge()
-    }
-
     /// Steps until nothing moves any more.
     fn converge(&mut self) -> Option<()> {
-        for _ in 0..MOST_STEPS {
-            let (step, decrement) = self.step(Clip::at(self.sigma), true)?;
+        for round in 0..MOST_STEPS {
+            let (step, decrement) = self.step()?;
             let n = step.len();
             let turn = step.rows(n - 4, 4).amax();
             // Never by more than a quarter of the radius of convergence at once.
@@ -190,7 +182,9 @@ impl<'a> Fit<'a> {
             if !(change.amax().max(third.amax()) < std::f64::consts::FRAC_PI_2) {
                 return None;
             }
-            if share == 1.0 && (decrement < STILL * self.sigma.powi(2) || turn < 1e-13) {
+            // The first step of all knows nothing of what is to be cut off.
+            let still = decrement < STILL * self.sigma.powi(2) && round > 0;
+            if share == 1.0 && (still || turn < 1e-13) {
                 return Some(());
             }
         }
@@ -198,28 +192,20 @@ impl<'a> Fit<'a> {
     }
 
     /// The change of all parameters by the normal equations, and how much it lowers the sum of
-    /// squares. Wave vectors stay where they are unless `free`.
-    fn step(&mut self, clip: Clip, free: bool) -> Option<(DVector<f64>, f64)> {
+    /// squares.
+    fn step(&mut self) -> Option<(DVector<f64>, f64)> {
         let (model, frame) = (&self.model, &self.frame);
         let tables = Tables::new(frame, &model.pair, &model.basis.indices);
-        let seen = look(frame, model, &model.basis, &tables, &mut self.lines, clip);
+        let clip = Clip::at(self.sigma);
+        let probes = (&model.basis, &tables);
+        let seen = look(frame, model, &tables, probes, &mut self.lines, clip);
         let gram = gram(frame, &model.basis, &model.pair, &self.lines.lambda);
         let map = solve::contraction(model, |_, _| 1.0);
-        let mut normal = map.transpose() * gram * &map;
-        let mut right = map.transpose() * seen.gradient;
-        if !free {
-            let linear = right.len() - 4;
-            normal = normal.resize(linear, linear, 0.0);
-            right = right.resize_vertically(linear, 0.0);
-        }
-        let mut step = solve::solve(&normal, &right)?;
-        let decrement = step.dot(&right);
-        if !free {
-            let n = step.len();
-            step = step.resize_vertically(n + 4, 0.0);
-        }
+        let right = map.transpose() * seen.gradient;
+        let step = solve::solve(&(map.transpose() * gram * map), &right)?;
         self.sigma = seen.sigma;
         self.clipped = seen.clipped;
+        let decrement = step.dot(&right);
         Some((step, decrement))
     }
 
@@ -237,8 +223,9 @@ impl<'a> Fit<'a> {
         }
     }
 
-    /// Looks at the lines: leaves out bad ones, gives them offsets where these matter.
-    fn mind_the_lines(&mut self) {
+    /// Looks at the lines: leaves out bad ones, gives them offsets where these matter. Whether that
+    /// changes anything.
+    fn mind_the_lines(&mut self) -> bool {
         let statistics = LineStatistics::new(&self.frame, &self.model);
         let bad = statistics.bad(&self.frame);
         if !bad.is_empty() {
@@ -246,8 +233,9 @@ impl<'a> Fit<'a> {
             self.frame.leave_out(|row| gone[row] || bad.contains(&row));
         }
         if self.free_lines {
-            return;
+            return !bad.is_empty();
         }
+        let before = self.line_sigma;
         if statistics.offsets_matter(&self.frame) {
             self.lines.lambda = statistics.lambda(&self.frame);
             self.line_sigma = Some(statistics.sigma);
@@ -256,6 +244,7 @@ impl<'a> Fit<'a> {
             self.lines.offset.fill(0.0);
             self.line_sigma = None;
         }
+        !bad.is_empty() || before != self.line_sigma
     }
 
     /// The noise that is left around each harmonic.

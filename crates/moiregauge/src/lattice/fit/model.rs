@@ -25,7 +25,7 @@ pub(super) struct Model {
 /// One offset per line: random, with a variance that the image tells.
 #[derive(Clone, Debug)]
 pub(super) struct LineOffsets {
-    /// What is taken off a line is λ times its mean: n σ_l²/(σ² + n σ_l²).
+    /// What is taken off a line is λ times its mean, `λ = n σ_l²/(σ² + n σ_l²)`.
     pub(super) lambda: Vec<f64>,
     /// The offsets.
     pub(super) offset: Vec<f64>,
@@ -89,9 +89,6 @@ pub(super) fn residuals(
 pub(super) struct Clip(f64);
 
 impl Clip {
-    /// Nothing is cut off.
-    pub(super) const NONE: Self = Self(f64::INFINITY);
-
     /// For residuals of this standard deviation.
     pub(super) fn at(sigma: f64) -> Self {
         Self(CLIP * sigma)
@@ -121,13 +118,13 @@ pub(super) struct Look {
     pub(super) clipped: usize,
 }
 
-/// Correlates the residuals of `model` with the functions of `basis`, whose `tables` start with the
-/// harmonics of the model. Line offsets are brought up to date on the way.
+/// Correlates the residuals of `model` with the functions of `basis`, of which `probes` are the
+/// tables. Line offsets are brought up to date on the way.
 pub(super) fn look(
     frame: &Frame,
     model: &Model,
-    basis: &Basis,
     tables: &Tables,
+    (basis, probes): (&Basis, &Tables),
     lines: &mut LineOffsets,
     clip: Clip,
 ) -> Look {
@@ -145,7 +142,14 @@ pub(super) fn look(
         for value in line.iter_mut() {
             *value = clip.apply(*value);
         }
-        add(&mut gradient, frame, basis, tables, row, line, &mut tilted);
+        add(
+            &mut gradient,
+            frame,
+            (basis, probes),
+            row,
+            line,
+            &mut tilted,
+        );
     });
     Look {
         gradient,
@@ -176,27 +180,24 @@ fn settle(line: &mut [f64], row: usize, frame: &Frame, lines: &mut LineOffsets, 
 fn add(
     gradient: &mut DVector<f64>,
     frame: &Frame,
-    basis: &Basis,
-    tables: &Tables,
+    (basis, tables): (&Basis, &Tables),
     row: usize,
     line: &[f64],
     tilted: &mut [f64],
 ) {
     let y = frame.y[row];
-    let mut moments = [0.0; 4];
-    let degree = basis.degree();
-    for (value, x) in line.iter().zip(&frame.x) {
-        let mut v = *value;
-        for moment in &mut moments[..=degree] {
-            *moment += v;
-            v *= x;
+    for ((t, v), x) in tilted.iter_mut().zip(line).zip(&frame.x) {
+        *t = v * x;
+    }
+    let mut moments = [sum(line), sum(tilted), 0.0, 0.0];
+    if basis.degree() > 1 {
+        for (t, x) in tilted.iter().zip(&frame.x) {
+            moments[2] += t * x;
+            moments[3] += t * x * x;
         }
     }
     for (t, &[a, b]) in basis.terms.iter().enumerate() {
         gradient[t] += moments[a] * y.powi(b as i32);
-    }
-    for ((t, v), x) in tilted.iter_mut().zip(line).zip(&frame.x) {
-        *t = v * x;
     }
     for i in 0..basis.indices.len() {
         let [cos, sin] = &tables.along[i];
@@ -240,6 +241,19 @@ fn products(u: &[f64], v: &[f64], cos: &[f64], sin: &[f64]) -> [f64; 4] {
         total[3] += v[i] * sin[i];
     }
     total
+}
+
+/// Sum in eight independent partial sums.
+pub(super) fn sum(values: &[f64]) -> f64 {
+    let blocks = values.chunks_exact(8);
+    let rest: f64 = blocks.remainder().iter().sum();
+    let mut sums = [0.0; 8];
+    for block in blocks {
+        for (sum, value) in sums.iter_mut().zip(block) {
+            *sum += value;
+        }
+    }
+    sums.iter().sum::<f64>() + rest
 }
 
 /// The median; 0 of nothing.

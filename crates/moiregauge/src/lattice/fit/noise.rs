@@ -19,7 +19,7 @@ use crate::lattice::transform::{Spectrum, hann};
 
 /// Bins (cycles per frame) on either side of a harmonic that count, along the lines and across.
 const ALONG: i64 = 3;
-const ACROSS: i64 = 5;
+const ACROSS: i64 = 8;
 /// What acts on X at 0, ±1, ±2, ±3 cycles along the lines: 1/m², smeared by the window; and on Y.
 const WEIGHTS: [[f64; 4]; 2] = [[0.16, 0.28, 0.10, 0.04], [0.5, 0.25, 0.0, 0.0]];
 /// Bins nearer to zero frequency belong to the background.
@@ -108,6 +108,25 @@ impl ResidualNoise {
         (!all.is_empty()).then(|| middle(&mut all) / std::f64::consts::LN_2)
     }
 
+    /// Whether there is a bit more than noise at a place. A wave that is worth its place stands there
+    /// at 12 times the noise or more, of which window and grid leave a quarter at worst.
+    pub(super) fn is_promising(&self, p: Vector2<f64>) -> bool {
+        let centre = (p / std::f64::consts::PI).map(|c| c.round() as i64);
+        let mut near = 0.0f64;
+        let mut around = Vec::new();
+        for dy in -ACROSS..=ACROSS {
+            for dx in -ALONG..=ALONG {
+                let power = self.power(centre.x + dx, centre.y + dy);
+                if dx.abs().max(dy.abs()) <= 1 {
+                    near = near.max(power);
+                } else {
+                    around.push(power);
+                }
+            }
+        }
+        near > 4.0 * middle(&mut around) / std::f64::consts::LN_2
+    }
+
     /// Calls `each` with the distance along the lines, the power found and that of white noise.
     fn bins(&self, p: Vector2<f64>, leverage: &Leverage, mut each: impl FnMut(usize, f64, f64)) {
         let centre = (p / std::f64::consts::PI).map(|c| c.round() as i64);
@@ -144,7 +163,13 @@ impl ResidualNoise {
 
     /// Noise power per pixel over all frequencies, by the median.
     pub(super) fn level(&self) -> f64 {
-        let powers = self.spectrum.values.iter().map(|v| v.norm_sqr());
+        let stride = (self.spectrum.values.len() / 65_536).max(1);
+        let powers = self
+            .spectrum
+            .values
+            .iter()
+            .step_by(stride)
+            .map(rustfft::num_complex::Complex64::norm_sqr);
         let mut powers: Vec<f64> = powers.collect();
         middle(&mut powers) / (std::f64::consts::LN_2 * self.window_power)
     }
