@@ -141,7 +141,7 @@ fn truth_drift(simulation: &Simulation) -> [f64; 2] {
     simulation.drift.velocity_nm_per_min
 }
 
-/// φ_lab = φ + α + θ.
+/// `φ_lab = φ + α + θ`.
 fn truth_axis_lab(simulation: &Simulation) -> f64 {
     let s = &simulation.sample;
     s.strain_axis_deg + s.lattice_angle_deg + s.twist_deg
