@@ -94,10 +94,10 @@ fn stored_order_does_not_matter() {
 }
 
 /// Over many seeds the errors are what they say: the mean square pull of drift, twist and both strain
-/// components is 1 within its own scatter, for the default method and for Fourier.
+/// components is 1 within its own scatter; for the lattice fit with the joint fit behind it as well.
 #[test]
 fn errors_cover_the_truth() {
-    for method in [Method::Autocorrelation, Method::Fourier] {
+    for method in [Method::Autocorrelation, Method::Fourier, Method::Lattice] {
         let settings = quick(method);
         let (trials, mut squares) = (60u32, [0.0; 5]);
         for seed in 0..trials {
