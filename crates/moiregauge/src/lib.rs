@@ -17,3 +17,8 @@ pub mod series;
 pub mod settings;
 pub mod simulate;
 pub mod strain;
+
+/// The example of the README, compiled.
+#[cfg(doctest)]
+#[doc = include_str!("../../../README.md")]
+struct Readme;
