@@ -12,6 +12,7 @@ mod noise;
 mod paper;
 mod pictures;
 pub(crate) mod reciprocal;
+mod rescue;
 mod select;
 mod transform;
 pub(crate) mod vectors;
@@ -128,7 +129,12 @@ pub fn measure(
     background: Background,
     method: Method,
 ) -> Result<MeasuredLattice, LatticeError> {
-    let prepared = prepare(image, geometry, background)?;
+    let prepared = match prepare(image, geometry, background) {
+        Err(error @ LatticeError::NoLattice { .. }) if method == Method::Lattice => {
+            rescue::prepare_again(image, geometry, background).map_err(|_| error)?
+        }
+        other => other?,
+    };
     let Prepared {
         harmonics,
         spectrum,

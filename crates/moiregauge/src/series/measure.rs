@@ -10,7 +10,9 @@ use crate::drift::Observation;
 use crate::estimate::Estimate;
 use crate::geometry::{Geometry, SensorGeometry, Timing, from_sensors, mean_and_spread};
 use crate::image::Image;
-use crate::lattice::{LatticeError, LatticeVectors, MeasuredLattice, measure, vectors};
+use crate::lattice::{
+    ForeignWave, LatticeError, LatticeFit, LatticeVectors, MeasuredLattice, measure, vectors,
+};
 use crate::settings::{Lines, Settings};
 
 /// A sensor whose span differs from the nominal size by more than this factor is not believed.
@@ -271,6 +273,9 @@ fn measure_line(
             ),
         ));
     }
+    if let Some(fit) = &lattice.fit {
+        about_fit(file, fit, &geometry, caveats);
+    }
     Ok(MeasuredLine {
         line,
         geometry,
@@ -280,6 +285,27 @@ fn measure_line(
         speeds,
         speed_error,
     })
+}
+
+/// What the fit to the pixels found beside the lattice.
+fn about_fit(file: &str, fit: &LatticeFit, geometry: &Geometry, caveats: &mut Vec<Caveat>) {
+    let Some(wave) = fit.foreign_wave.filter(ForeignWave::stands_out) else {
+        return;
+    };
+    let Some(inverse) = geometry.pixel_to_nm.try_inverse() else {
+        return;
+    };
+    let period = std::f64::consts::TAU / (inverse.transpose() * wave.wave_vector).norm();
+    caveats.push(Caveat::new(
+        "second-lattice",
+        file,
+        format!(
+            "beside the lattice a wave with a period of {period:.2} nm stands out of what the fit leaves \
+             ({:.0} times the noise around it; {:.0} can be chance): a second lattice, interference, or a \
+             lattice that is not the same everywhere in the frame",
+            wave.significance, wave.threshold
+        ),
+    ));
 }
 
 /// `trace` or `retrace`.

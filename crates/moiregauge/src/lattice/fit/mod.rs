@@ -41,6 +41,7 @@ use crate::settings::Background;
 use frame::{Basis, Frame};
 use gram::gram;
 use lines::LineStatistics;
+pub(super) use model::middle;
 use model::{Clip, LineOffsets, Model, Tables, look, whitened};
 pub use noise::ForeignWave;
 use noise::{Leverage, ResidualNoise};

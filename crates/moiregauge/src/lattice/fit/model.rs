@@ -257,7 +257,7 @@ pub(super) fn sum(values: &[f64]) -> f64 {
 }
 
 /// The median; 0 of nothing.
-pub(super) fn middle(values: &mut [f64]) -> f64 {
+pub(in crate::lattice) fn middle(values: &mut [f64]) -> f64 {
     if values.is_empty() {
         return 0.0;
     }

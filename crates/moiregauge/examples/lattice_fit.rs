@@ -1,0 +1,205 @@
+//! How good the lattice fit is on simulated images: share of right lattices, error over the
+//! Cramér–Rao bound, and pulls.
+//!
+//! `cargo run --release -p moiregauge --example lattice_fit [IMAGES [CASE]]`. Error over bound is
+//! meant for white noise; `pull` is the standard deviation of error over stated error, 1 where error
+//! bars are true; `bias` is the largest mean pull.
+
+#[path = "../tests/fit_scene/mod.rs"]
+mod fit_scene;
+
+use fit_scene::{Contrast, Scene};
+use moiregauge::lattice::{LatticeError, MeasuredLattice, measure};
+use moiregauge::settings::{Background, Method};
+use nalgebra::Vector4;
+
+/// Name, pixels, periods, contrast, noise: white, line, 1/f.
+type Case = (&'static str, [usize; 2], f64, Contrast, [f64; 3]);
+
+const CASES: [Case; 16] = [
+    (
+        "paper, σ = A",
+        [512, 512],
+        4.4,
+        Contrast::Cosines,
+        [1.0, 0.0, 0.0],
+    ),
+    (
+        "paper, σ = 2A",
+        [512, 512],
+        4.4,
+        Contrast::Cosines,
+        [2.0, 0.0, 0.0],
+    ),
+    (
+        "128 px, σ = 2A",
+        [128, 128],
+        4.4,
+        Contrast::Cosines,
+        [2.0, 0.0, 0.0],
+    ),
+    (
+        "paper, lines",
+        [512, 512],
+        4.4,
+        Contrast::Cosines,
+        [1.0, 0.5, 0.0],
+    ),
+    (
+        "paper, 1/f",
+        [512, 512],
+        4.4,
+        Contrast::Cosines,
+        [1.0, 0.0, 1.0],
+    ),
+    (
+        "spots, lines",
+        [256, 256],
+        6.0,
+        Contrast::Spots,
+        [1.0, 1.0, 0.0],
+    ),
+    (
+        "spots, 1/f",
+        [256, 256],
+        6.0,
+        Contrast::Spots,
+        [0.5, 0.0, 1.0],
+    ),
+    (
+        "2.5 periods",
+        [256, 256],
+        2.5,
+        Contrast::Cosines,
+        [2.0, 0.5, 0.0],
+    ),
+    (
+        "2.5, spots",
+        [256, 256],
+        2.5,
+        Contrast::Spots,
+        [2.0, 0.5, 0.0],
+    ),
+    (
+        "2.5, walls",
+        [256, 256],
+        2.5,
+        Contrast::Walls,
+        [2.0, 0.5, 0.0],
+    ),
+    (
+        "5, walls",
+        [256, 256],
+        5.0,
+        Contrast::Walls,
+        [2.0, 0.5, 0.0],
+    ),
+    (
+        "20, walls",
+        [256, 256],
+        20.0,
+        Contrast::Walls,
+        [2.0, 0.5, 0.0],
+    ),
+    (
+        "20, 512 px",
+        [512, 512],
+        20.0,
+        Contrast::Walls,
+        [2.0, 0.5, 0.0],
+    ),
+    (
+        "100, cosines",
+        [512, 512],
+        100.0,
+        Contrast::Cosines,
+        [2.0, 0.5, 0.0],
+    ),
+    (
+        "100, walls",
+        [512, 512],
+        100.0,
+        Contrast::Walls,
+        [2.0, 0.5, 0.0],
+    ),
+    (
+        "128 × 512",
+        [128, 512],
+        4.0,
+        Contrast::Spots,
+        [2.0, 0.5, 0.0],
+    ),
+];
+
+fn main() {
+    let mut arguments = std::env::args().skip(1);
+    let count = arguments
+        .next()
+        .map_or(50, |n| n.parse().expect("a number"));
+    let wanted = arguments.next().unwrap_or_default();
+    println!("case               right     error/bound  pull   bias  lines  waves  goodness");
+    for case in CASES.iter().filter(|c| c.0.contains(&wanted)) {
+        run(case, count);
+    }
+}
+
+fn fit(scene: &Scene) -> Result<MeasuredLattice, LatticeError> {
+    measure(
+        &scene.image(),
+        &scene.geometry(),
+        Background::Plane,
+        Method::Lattice,
+    )
+}
+
+fn run(&(name, size, periods, contrast, [white, line, flicker]): &Case, count: u64) {
+    let mut pulls: Vec<Vector4<f64>> = Vec::new();
+    let (mut error, mut bound) = (0.0, 0.0);
+    let (mut lines, mut waves, mut goodness) = (0, 0, 0.0);
+    for seed in 0..count {
+        let mut scene = Scene::new(size, periods, 0.61803 * seed as f64, contrast, seed);
+        (scene.white, scene.line, scene.flicker) = (white, line, flicker);
+        let measured = match fit(&scene) {
+            Ok(measured) => measured,
+            Err(error) => {
+                println!("  image {seed}: {error}");
+                continue;
+            }
+        };
+        let off = scene.error(&measured.pixels.basis);
+        if off.norm() > 0.02 * scene.basis.norm() {
+            println!("  image {seed}: a wrong lattice");
+            continue;
+        }
+        let (_, change) = scene.change(&measured.pixels.basis);
+        let covariance = change * measured.pixels.covariance * change.transpose();
+        let factor = covariance.cholesky().expect("a covariance");
+        pulls.push(
+            factor
+                .l()
+                .solve_lower_triangular(&off)
+                .expect("errors above zero"),
+        );
+        error += off.norm_squared();
+        // The bound takes longer than the fit, and changes little from image to image.
+        if seed < 3 {
+            bound += scene.bound().trace() / 3.0f64.min(count as f64);
+        }
+        let fit = measured.fit.expect("the method is the fit");
+        lines += i32::from(fit.line_offsets.is_some());
+        waves += fit.harmonics.len();
+        goodness += fit.goodness;
+    }
+    let n = pulls.len() as f64;
+    let mean = pulls.iter().sum::<Vector4<f64>>() / n;
+    let square = pulls.iter().map(Vector4::norm_squared).sum::<f64>() / (4.0 * n);
+    println!(
+        "{name:18} {:3}/{count:<3}   {:6.3}       {:.3}  {:.3}  {lines:4}  {:5.1}  {:.3}",
+        pulls.len(),
+        (error / n / bound).sqrt(),
+        square.sqrt(),
+        mean.amax(),
+        waves as f64 / n,
+        goodness / n,
+    );
+}
