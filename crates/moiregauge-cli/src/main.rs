@@ -5,6 +5,7 @@ mod config;
 mod demo;
 mod info;
 mod simulate;
+mod validate;
 
 use std::process::ExitCode;
 
@@ -27,6 +28,7 @@ enum Command {
     Info(info::InfoArgs),
     Simulate(Box<simulate::SimulateArgs>),
     Demo(demo::DemoArgs),
+    Validate(validate::ValidateArgs),
     Config(config::ConfigArgs),
 }
 
@@ -36,6 +38,7 @@ fn main() -> ExitCode {
         Command::Info(args) => info::run(&args),
         Command::Simulate(args) => simulate::run(&args),
         Command::Demo(args) => demo::run(&args),
+        Command::Validate(args) => validate::run(&args),
         Command::Config(args) => config::run(&args),
     };
     result.unwrap_or_else(|error| {

@@ -203,7 +203,7 @@ enum ColorMapArg {
 macro_rules! mirror {
     ($mirror:ident => $target:ident { $($(#[$help:meta])* $variant:ident),+ $(,)? }) => {
         #[derive(Clone, Copy, Debug, ValueEnum)]
-        enum $mirror { $($(#[$help])* $variant),+ }
+        pub(crate) enum $mirror { $($(#[$help])* $variant),+ }
         impl From<$mirror> for $target {
             fn from(value: $mirror) -> Self {
                 match value { $($mirror::$variant => Self::$variant),+ }
