@@ -13,6 +13,7 @@ pub(crate) use files::write_all;
 pub(crate) use summary::summary;
 
 use crate::info::expand;
+use crate::say::say;
 use moiregauge_report::{FailedInput, write_report};
 
 /// Analyses the files and writes the results.
@@ -58,14 +59,14 @@ pub(crate) fn run(args: &AnalyzeArgs) -> anyhow::Result<ExitCode> {
     if args.json {
         let results = written.iter().find(|(name, _)| name == "results.json");
         if let Some((_, bytes)) = results {
-            print!("{}", String::from_utf8_lossy(bytes));
+            say(&String::from_utf8_lossy(bytes))?;
         }
     } else if !args.quiet {
-        print!("{}", summary(&analysis));
-        println!(
-            "\nWritten to {}",
+        say(&summary(&analysis))?;
+        say(&format!(
+            "\nWritten to {}\n",
             files::main_file(&args.out, &written).display()
-        );
+        ))?;
     }
     eprint!("{}", summary::failures(&provenance.failed));
     Ok(if provenance.failed.is_empty() {

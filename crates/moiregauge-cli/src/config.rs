@@ -1,12 +1,13 @@
 //! `moiregauge config`, and the reading of such files.
 
-use std::io::Write as _;
 use std::path::Path;
 use std::process::ExitCode;
 
 use anyhow::{Context as _, bail, ensure};
 use moiregauge::material::Material;
 use moiregauge::settings::Settings;
+
+use crate::say::say;
 
 /// Print a commented settings file with all defaults
 ///
@@ -75,7 +76,7 @@ seed = 1
 
 /// Prints the commented file.
 pub(crate) fn run(_args: &ConfigArgs) -> anyhow::Result<ExitCode> {
-    std::io::stdout().lock().write_all(COMMENTED.as_bytes())?;
+    say(COMMENTED)?;
     Ok(ExitCode::SUCCESS)
 }
 

@@ -8,6 +8,7 @@ use moiregauge_report::{Choice, write_report};
 
 use crate::analyze::{Outcome, analyse_files, summary, write_all};
 use crate::info::expand;
+use crate::say::say;
 use crate::simulate::{paper_sets, write_sets};
 
 /// Simulate the three sets of arXiv 2406.08681, analyse them and show where the report is
@@ -31,9 +32,12 @@ pub(crate) struct DemoArgs {
 pub(crate) fn run(args: &DemoArgs) -> anyhow::Result<ExitCode> {
     let out = args.out.clone().unwrap_or_else(free_folder);
     let sets = paper_sets(args.seed);
-    println!("Simulating three sets of scans in {} …", out.display());
+    say(&format!(
+        "Simulating three sets of scans in {} …\n",
+        out.display()
+    ))?;
     let folders = write_sets(&sets, &out.join("scans"), args.force)?;
-    println!("Analysing them …\n");
+    say("Analysing them …\n\n")?;
     let inputs: Vec<PathBuf> = expand(&folders).into_iter().flatten().collect();
     let settings = Settings {
         seed: args.seed,
@@ -51,16 +55,19 @@ pub(crate) fn run(args: &DemoArgs) -> anyhow::Result<ExitCode> {
         &results,
         &write_report(&analysis, &provenance, &Choice::default())?,
     )?;
-    print!("{}", summary(&analysis));
+    say(&summary(&analysis))?;
     let truth = &sets[0];
-    println!(
-        "\nPut in: twist {}°, heterostrain {} %, drift ({}, {}) nm/min",
+    say(&format!(
+        "\nPut in: twist {}°, heterostrain {} %, drift ({}, {}) nm/min\n",
         truth.sample.twist_deg,
         truth.sample.strain_percent,
         truth.drift.velocity_nm_per_min[0],
         truth.drift.velocity_nm_per_min[1],
-    );
-    println!("Report: {}", results.join("report.html").display());
+    ))?;
+    say(&format!(
+        "Report: {}\n",
+        results.join("report.html").display()
+    ))?;
     Ok(ExitCode::SUCCESS)
 }
 

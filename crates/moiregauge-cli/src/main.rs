@@ -4,6 +4,7 @@ mod analyze;
 mod config;
 mod demo;
 mod info;
+mod say;
 mod simulate;
 mod validate;
 

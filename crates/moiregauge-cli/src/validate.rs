@@ -11,6 +11,7 @@ use moiregauge::simulate::{Simulation, Simulator};
 use rayon::prelude::*;
 
 use crate::analyze::MethodArg;
+use crate::say::say;
 
 /// Simulate many sets, analyse them, and report bias, scatter and coverage of the errors
 ///
@@ -83,12 +84,12 @@ pub(crate) fn run(args: &ValidateArgs) -> anyhow::Result<ExitCode> {
         "{failed} of {} sets gave no drift and twist: nothing to compare",
         args.sets
     );
-    print!("{}", table(&compared));
+    say(&table(&compared))?;
     if failed > 0 {
-        println!(
-            "\n{failed} of {} sets gave no drift or no lattice",
+        say(&format!(
+            "\n{failed} of {} sets gave no drift or no lattice\n",
             args.sets
-        );
+        ))?;
     }
     Ok(ExitCode::SUCCESS)
 }
