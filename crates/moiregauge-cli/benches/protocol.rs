@@ -44,7 +44,7 @@ fn ten_scans_by_threads(bencher: Bencher<'_, '_>, threads: usize) {
     bencher.bench(|| analyze(&scans, &out, threads, "autocorrelation"));
 }
 
-#[divan::bench(args = ["autocorrelation", "fourier", "paper"], sample_count = 5, sample_size = 1)]
+#[divan::bench(args = ["autocorrelation", "fourier", "lattice", "paper"], sample_count = 5, sample_size = 1)]
 fn ten_scans_by_method(bencher: Bencher<'_, '_>, method: &str) {
     let (folder, scans) = scans();
     let out = folder.path().join("out");

@@ -86,6 +86,11 @@ fn fourier(bencher: Bencher<'_, '_>, case: (usize, Period)) {
 }
 
 #[divan::bench(args = CASES, sample_count = 10, sample_size = 1)]
+fn lattice(bencher: Bencher<'_, '_>, case: (usize, Period)) {
+    run(bencher, case, Method::Lattice);
+}
+
+#[divan::bench(args = CASES, sample_count = 10, sample_size = 1)]
 fn paper(bencher: Bencher<'_, '_>, case: (usize, Period)) {
     run(bencher, case, Method::Paper);
 }

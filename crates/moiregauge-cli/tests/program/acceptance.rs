@@ -92,6 +92,14 @@ fn both_sets_come_out_right_by_the_fourier_method() {
     );
 }
 
+#[test]
+fn both_sets_come_out_right_by_the_lattice_method() {
+    accept(
+        "both_sets_come_out_right_by_the_lattice_method",
+        &["--method", "lattice"],
+    );
+}
+
 /// A summed autocorrelation pulls peaks inwards: twist too large by 0.005 to 0.02° at four to five
 /// periods. Whoever asks for the published method has to get its bias, and to be told.
 #[test]
