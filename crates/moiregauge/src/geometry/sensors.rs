@@ -197,3 +197,83 @@ fn correlated(residuals: &[f64]) -> f64 {
     }
     factor
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rng::stream;
+    use rand_distr::{Distribution, StandardNormal};
+
+    const STEPS: Matrix2<f64> = Matrix2::new(0.21, 0.004, -0.003, 0.22);
+
+    /// Sensors of a sheared frame of 64 lines of 80 samples with white noise (nm).
+    fn sensors(noise: f64, seed: u64) -> [Image; 2] {
+        let mut rng = stream(seed, "sensors", 0);
+        [0, 1].map(|axis| {
+            let values = (0..64 * 80)
+                .map(|i| {
+                    let n = Vector2::new((i % 80) as f64, (i / 80) as f64);
+                    let white: f64 = StandardNormal.sample(&mut rng);
+                    (STEPS * n)[axis] + noise * white
+                })
+                .collect();
+            Image::new(64, 80, values)
+        })
+    }
+
+    /// J comes back within its stated errors: mean square pull of its four entries over 200 frames
+    /// within four times its scatter, √(2/800) = 0.05, of 1.
+    #[test]
+    fn the_plane_fit_has_honest_errors() {
+        let mut pulls = 0.0;
+        for seed in 0..200 {
+            let [x, y] = sensors(0.2, seed);
+            let g = from_sensors(&x, &y).unwrap().geometry;
+            for entry in 0..4 {
+                let miss = g.pixel_to_nm[entry] - STEPS[entry];
+                pulls += miss * miss / g.covariance[(entry, entry)] / 800.0;
+            }
+        }
+        assert!((0.8..1.2).contains(&pulls), "{pulls}");
+    }
+
+    /// Columns in which the tip turns round are left out and do not bend the plane.
+    #[test]
+    fn turn_around_is_left_out() {
+        let [mut x, y] = sensors(0.0, 0);
+        for row in 0..64 {
+            for c in 0..4 {
+                x.values[row * 80 + c] += 0.3 * f64::from(4 - c as i32);
+            }
+        }
+        let found = from_sensors(&x, &y).unwrap();
+        assert_eq!(found.columns, 4..80);
+        assert!((found.geometry.pixel_to_nm - STEPS).norm() < 1e-9);
+    }
+
+    /// What the plane leaves is what was added to it.
+    #[test]
+    fn the_residual_map_shows_hysteresis() {
+        let [mut x, y] = sensors(0.0, 0);
+        // A bow along the lines with zero mean and zero mean slope.
+        let bow = |c: usize| ((c as f64 - 39.5).powi(2) - 533.25) * 1e-5;
+        for (i, v) in x.values.iter_mut().enumerate() {
+            *v += bow(i % 80);
+        }
+        let found = from_sensors(&x, &y).unwrap();
+        assert_eq!(found.columns, 0..80);
+        let map = found.residual_map(0, &x);
+        for (i, v) in map.values.iter().enumerate() {
+            assert!((v - bow(i % 80)).abs() < 1e-9, "{v} at {i}");
+        }
+    }
+
+    /// Constant sensors, or sensors that move along one line only, describe no frame.
+    #[test]
+    fn sensors_without_area_are_refused() {
+        let [x, _] = sensors(0.0, 0);
+        let still = Image::new(64, 80, vec![1.0; 64 * 80]);
+        assert!(from_sensors(&x, &still).is_none());
+        assert!(from_sensors(&x, &x).is_none());
+    }
+}
