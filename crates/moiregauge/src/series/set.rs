@@ -254,7 +254,9 @@ fn given_drift(
         "the drift was given by the user and not measured; it is as right as the conditions are the same",
     ));
     let (mut lattice, chi2, freedom) = common_lattice(all, &velocity, &covariance).ok()?;
-    lattice.covariance *= excess(chi2, freedom);
+    // Scatter enlarges what the scans say, not what the user said of the drift.
+    let (measured, _, _) = common_lattice(all, &velocity, &Matrix2::zeros()).ok()?;
+    lattice.covariance += measured.covariance * (excess(chi2, freedom) - 1.0);
     Some(Solved {
         drift: Drift {
             velocity,
