@@ -171,7 +171,9 @@ impl<'a> Fit<'a> {
 
     /// Steps until nothing moves any more.
     fn converge(&mut self) -> Option<()> {
-        for round in 0..MOST_STEPS {
+        for _ in 0..MOST_STEPS {
+            // The first step of all knows nothing of what is to be cut off.
+            let blind = self.sigma.is_infinite();
             let (step, decrement) = self.step()?;
             let n = step.len();
             let turn = step.rows(n - 4, 4).amax();
@@ -183,8 +185,7 @@ impl<'a> Fit<'a> {
             if !(change.amax().max(third.amax()) < std::f64::consts::FRAC_PI_2) {
                 return None;
             }
-            // The first step of all knows nothing of what is to be cut off.
-            let still = decrement < STILL * self.sigma.powi(2) && round > 0;
+            let still = decrement < STILL * self.sigma.powi(2) && !blind;
             if share == 1.0 && (still || turn < 1e-13) {
                 return Some(());
             }
