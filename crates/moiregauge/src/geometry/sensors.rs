@@ -210,7 +210,7 @@ mod tests {
     fn sensors(noise: f64, seed: u64) -> [Image; 2] {
         let mut rng = stream(seed, "sensors", 0);
         [0, 1].map(|axis| {
-            let values = (0..64 * 80)
+            let values = (0..64 * 80_usize)
                 .map(|i| {
                     let n = Vector2::new((i % 80) as f64, (i / 80) as f64);
                     let white: f64 = StandardNormal.sample(&mut rng);
