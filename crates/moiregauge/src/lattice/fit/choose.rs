@@ -7,6 +7,7 @@ use super::gram::gram;
 use super::model::{Clip, Tables, look};
 use super::noise::{Leverage, ResidualNoise};
 use super::{FinalNoise, Fit, ROUNDS, solve};
+use crate::lattice::harmonics::{Harmonic, Harmonics};
 
 /// The three that make the lattice; always in.
 pub(super) const FIRST_SHELL: [[i32; 2]; 3] = [[1, 0], [0, 1], [-1, 1]];
@@ -17,6 +18,24 @@ const LAST_SHELL: i32 = 9;
 const MANY_PIXELS: usize = 100_000;
 /// Largest wave vector, as a share of the Nyquist frequency.
 const HIGHEST: f64 = 0.9;
+
+/// What the fit starts with: the first shell, and of the others what the spectrum shows clearly.
+/// `None` where the first shell is not complete (one of it beyond the Nyquist frequency).
+pub(super) fn at_first(start: &Harmonics, pixels: usize) -> Option<Vec<([i32; 2], &Harmonic)>> {
+    let inverse = start.pair.try_inverse()?;
+    let price = (pixels as f64).ln();
+    let found = start.list.iter().map(|harmonic| {
+        let index = (inverse * harmonic.q).map(|n| n.round() as i32);
+        ([index.x, index.y], harmonic)
+    });
+    let chosen: Vec<_> = found
+        .filter(|(index, harmonic)| {
+            FIRST_SHELL.contains(index) || harmonic.significance(start.window_sums) > price
+        })
+        .collect();
+    let first = chosen.iter().map(|(index, _)| *index).take(3);
+    first.eq(FIRST_SHELL).then_some(chosen)
+}
 
 impl Fit<'_> {
     /// Adds harmonics until none earns its place, drops those that lost theirs, and fits anew each

@@ -98,7 +98,7 @@ pub(super) fn measure(
     start: &Harmonics,
     background: Background,
 ) -> Option<(LatticeVectors, LatticeFit)> {
-    let mut fit = Fit::new(image, start, background);
+    let mut fit = Fit::new(image, start, background)?;
     fit.converge()?;
     let noise = fit.choose()?;
     fit.result(&noise)
@@ -130,7 +130,7 @@ struct FinalNoise {
 }
 
 impl<'a> Fit<'a> {
-    fn new(image: &'a Image, start: &Harmonics, background: Background) -> Self {
+    fn new(image: &'a Image, start: &Harmonics, background: Background) -> Option<Self> {
         let frame = Frame::new(image);
         let free_lines = background == Background::LineMean;
         let degree = match background {
@@ -139,16 +139,18 @@ impl<'a> Fit<'a> {
             Background::Quadratic => 2,
             Background::Cubic => 3,
         };
-        let basis = Basis::new(degree, free_lines, &choose::FIRST_SHELL);
+        let starts = choose::at_first(start, frame.pixels())?;
+        let indices: Vec<[i32; 2]> = starts.iter().map(|(index, _)| *index).collect();
+        let basis = Basis::new(degree, free_lines, &indices);
         let origin = Matrix2::from_diagonal(&frame.edge()) * start.pair;
         let centre = frame.edge() - Vector2::repeat(0.5);
         // 2 Re(c e^{iθ}), the phase moved from pixel (0, 0) to the centre.
-        let waves = start.list.iter().take(basis.indices.len()).map(|harmonic| {
+        let waves = starts.iter().map(|(_, harmonic)| {
             let c = 2.0 * harmonic.amplitude * Complex64::cis(harmonic.q.dot(&centre));
             [c.re, -c.im]
         });
         let all_of_it = if free_lines { 1.0 } else { 0.0 };
-        Self {
+        Some(Self {
             model: Model {
                 background: vec![0.0; basis.terms.len()],
                 waves: waves.collect(),
@@ -166,7 +168,7 @@ impl<'a> Fit<'a> {
             sigma: f64::INFINITY,
             clipped: 0,
             origin,
-        }
+        })
     }
 
     /// Steps until nothing moves any more.
