@@ -44,6 +44,8 @@ fn file() -> Vec<u8> {
         offset_nm: [0.0; 2],
         size_nm: Some([70.0; 2]),
         closed_loop: Some(false),
+        line_times_s: None,
+        metadata: Vec::new(),
         channels: channels.collect(),
         unreadable: Vec::new(),
     };

@@ -94,7 +94,7 @@ pub struct UnreadableChannel {
 }
 
 /// One frame as the instrument wrote it.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Scan {
     /// The file format in words, as in `NanoScope 9.70`.
     pub format: String,
@@ -106,6 +106,9 @@ pub struct Scan {
     pub frame_direction: Option<FrameDirection>,
     /// Lines per second, a line being trace and retrace together.
     pub line_rate_hz: Option<f64>,
+    /// Time of the trace and of the retrace within the frame, s, where the file gives them apart;
+    /// otherwise each takes half a line, shortened by [`Scan::rounding`].
+    pub line_times_s: Option<[f64; 2]>,
     /// Overscan: the fraction by which the fast motion exceeds the frame (NanoScope `X round`).
     pub rounding: Option<f64>,
     /// Rotation of the fast axis against x, counter-clockwise, rad.
@@ -120,6 +123,8 @@ pub struct Scan {
     pub channels: Vec<Channel>,
     /// Channels that could not be read.
     pub unreadable: Vec<UnreadableChannel>,
+    /// What else the header says, as names and values, in the order of the file.
+    pub metadata: Vec<(String, String)>,
 }
 
 impl Samples {

@@ -38,6 +38,8 @@ static WRITTEN: LazyLock<Vec<u8>> = LazyLock::new(|| {
         offset_nm: [0.0; 2],
         size_nm: Some([100.0, 75.0]),
         closed_loop: None,
+        line_times_s: None,
+        metadata: Vec::new(),
         channels: vec![
             channel("TR Phase", "°"),
             channel("Xsensor", "nm"),

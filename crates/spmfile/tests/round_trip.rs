@@ -53,6 +53,8 @@ fn scan(channels: Vec<Channel>) -> Scan {
         offset_nm: [12.5, -0.001],
         size_nm: Some([70.0, 60.5]),
         closed_loop: Some(false),
+        line_times_s: None,
+        metadata: Vec::new(),
         channels,
         unreadable: Vec::new(),
     }

@@ -115,6 +115,8 @@ pub(super) fn record(settings: &Simulation, scene: &Scene, plan: &FramePlan) -> 
         offset_nm: [0.0, 0.0],
         size_nm: Some(raster.nominal_size_nm),
         closed_loop: Some(false),
+        line_times_s: None,
+        metadata: Vec::new(),
         channels: [phase, amplitude, x, y].concat(),
         unreadable: Vec::new(),
     }

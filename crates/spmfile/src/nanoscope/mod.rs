@@ -246,6 +246,8 @@ fn frame(sections: &[Section<'_>], images: &[&Section<'_>]) -> Scan {
             .map(|key| frame::scan_length(sections, key).unwrap_or(0.0)),
         size_nm: frame::full_size(images.first().copied(), sections),
         closed_loop: frame::scan_value(sections, "XY Closed Loop").and_then(on_off),
+        line_times_s: None,
+        metadata: Vec::new(),
         channels: Vec::new(),
         unreadable: Vec::new(),
     }
