@@ -2,6 +2,10 @@
 
 use crate::scan::Scan;
 
+/// What a user may hand in, for messages about everything else.
+const EXPECTED: &str = "a scan (NanoScope, Nanonis, Gwyddion, Igor, JPK, Nanosurf, Park, WSxM, RHK, \
+                        Agilent, ISO 28632), an array or a picture";
+
 /// Why a file is refused as a whole.
 ///
 /// A file is refused when its bytes do not keep what its header promises (a channel cut off, a
@@ -15,32 +19,39 @@ pub enum ReadError {
     #[error("the file is empty")]
     Empty,
     /// A known kind of file, but not one that is read.
-    #[error("this is {found}; expected a NanoScope image file (it begins with `\\*File list`)")]
+    #[error("this is {found}; expected {EXPECTED}")]
     OtherFormat {
         /// The kind of file, in words.
         found: &'static str,
     },
     /// Text that is no scan.
-    #[error(
-        "this is a text file beginning with {start:?}; expected a NanoScope image file (it begins with `\\*File list`)"
-    )]
+    #[error("this is a text file beginning with {start:?}; expected {EXPECTED}")]
     Text {
         /// Its first words.
         start: String,
     },
     /// Nothing known.
-    #[error(
-        "unknown kind of file, beginning with the bytes {start}; expected a NanoScope image file (it begins with `\\*File list`)"
-    )]
+    #[error("unknown kind of file, beginning with the bytes {start}; expected {EXPECTED}")]
     Unknown {
         /// Its first bytes in hexadecimal.
         start: String,
     },
-    /// ISO 28632 text.
-    #[error(
-        "this is text in the ISO 28632 SPM data transfer format, not a NanoScope file although it may be named .spm; export the scan as NanoScope file"
-    )]
-    Iso28632,
+    /// A file of a known format that is not what its own header says.
+    #[error("this {format} file is damaged: {reason}")]
+    Damaged {
+        /// The format, as in `Nanonis`.
+        format: &'static str,
+        /// What was expected, what was found, and where.
+        reason: String,
+    },
+    /// A whole file of a known format that holds no image that can be read.
+    #[error("this {format} file is not read: {reason}")]
+    Unsupported {
+        /// The format, as in `Igor binary wave`.
+        format: &'static str,
+        /// What it holds, or what is not known how to read.
+        reason: String,
+    },
     /// Force curves.
     #[error("the file holds force curves and no image; save the scan itself")]
     ForceCurve,

@@ -13,12 +13,28 @@
 //! ```
 #![doc = include_str!("../FORMATS.md")]
 
+mod agilent;
+mod arrays;
+mod cursor;
 mod detect;
 mod error;
+mod gsf;
+mod gwy;
+mod gxyzf;
+mod igor;
+mod iso28632;
+mod jpk;
+mod matrix;
+mod nanonis;
 pub mod nanoscope;
+mod nid;
+mod park;
+mod raster;
+mod rhk;
 mod scan;
 mod sensors;
 mod units;
+mod wsxm;
 
 pub use detect::{Format, detect, looks_like_scan};
 pub use error::ReadError;
@@ -64,7 +80,26 @@ pub fn read_selected(
     match detect(bytes) {
         Format::NanoScope => nanoscope::read(bytes, wanted),
         Format::NanoScopeForce => Err(nanoscope::refuse_force(bytes)),
-        Format::Iso28632 => Err(ReadError::Iso28632),
+        Format::Nanonis => nanonis::read(bytes, wanted),
+        Format::Gwy => gwy::read(bytes, wanted),
+        Format::Gsf => gsf::read(bytes, wanted),
+        Format::Gxyzf => gxyzf::read(bytes, wanted),
+        Format::Igor => igor::read(bytes, wanted),
+        Format::Wsxm => wsxm::read(bytes, wanted),
+        Format::Iso28632 => iso28632::read(bytes, wanted),
+        Format::Jpk => jpk::read(bytes, wanted),
+        Format::JpkZip => jpk::read_zip(bytes, wanted),
+        Format::Nid => nid::read(bytes, wanted),
+        Format::ParkTiff => park::read(bytes, wanted),
+        Format::Rhk => rhk::read(bytes, wanted),
+        Format::AgilentMi => agilent::read(bytes, wanted),
+        Format::OmicronMatrix => matrix::read(bytes, wanted),
+        Format::Npy
+        | Format::Npz
+        | Format::Tiff
+        | Format::Png
+        | Format::Jpeg
+        | Format::TextMatrix => arrays::read(bytes, wanted),
         Format::Empty => Err(ReadError::Empty),
         Format::Other(found) => Err(ReadError::OtherFormat { found }),
         Format::Text => Err(ReadError::Text {

@@ -292,43 +292,6 @@ fn real_files_agree_with_their_truth() {
     assert_eq!((images, channels, refused), (6, 16, 5));
 }
 
-#[test]
-fn iso_28632_text_is_named() {
-    let Some(data) = common::testdata("iso_28632_text_is_named") else {
-        return;
-    };
-    let path = data.join("real/iso28632/graphite_terrace_11nm.spm");
-    assert!(matches!(
-        read(&common::bytes(&path)),
-        Err(ReadError::Iso28632)
-    ));
-}
-
-#[test]
-fn files_of_other_instruments_are_refused() {
-    let Some(data) = common::testdata("files_of_other_instruments_are_refused") else {
-        return;
-    };
-    for folder in [
-        "array", "gwy", "ibw", "jpk", "mi", "nanonis", "nid", "park", "rhk", "wsxm",
-    ] {
-        for entry in std::fs::read_dir(data.join("real").join(folder)).expect("a folder") {
-            let path = entry.expect("an entry").path();
-            let error = read(&common::bytes(&path)).expect_err("not a NanoScope file");
-            assert!(
-                matches!(
-                    error,
-                    ReadError::OtherFormat { .. }
-                        | ReadError::Text { .. }
-                        | ReadError::Unknown { .. }
-                ),
-                "{}: {error}",
-                path.display()
-            );
-        }
-    }
-}
-
 /// The headers without data, filled up with zeros: an unfinished frame, LF line ends, 16-bit labels
 /// on 32-bit samples. The heights are those of the folder's description (300 × 209.8 nm).
 #[test]

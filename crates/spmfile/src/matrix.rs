@@ -1,0 +1,16 @@
+//! Omicron Matrix files, `.mtrx`.
+
+use crate::ChannelInfo;
+use crate::error::ReadError;
+use crate::scan::Scan;
+
+/// Reads the channels that are wanted.
+pub(crate) fn read(
+    _bytes: &[u8],
+    _wanted: &dyn Fn(&ChannelInfo) -> bool,
+) -> Result<Scan, ReadError> {
+    Err(ReadError::Unsupported {
+        format: "Omicron Matrix",
+        reason: "this format is not read yet".to_owned(),
+    })
+}
