@@ -52,6 +52,14 @@ pub enum ReadError {
         /// What it holds, or what is not known how to read.
         reason: String,
     },
+    /// Images without a sample.
+    #[error(
+        "all samples of the {channels} channels are missing (NaN): the scan was stopped before its first line"
+    )]
+    AllMissing {
+        /// Number of channels read.
+        channels: usize,
+    },
     /// Force curves.
     #[error("the file holds force curves and no image; save the scan itself")]
     ForceCurve,

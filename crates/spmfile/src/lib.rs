@@ -15,6 +15,7 @@
 
 mod agilent;
 mod arrays;
+mod clock;
 mod cursor;
 mod detect;
 mod error;
@@ -34,6 +35,7 @@ mod rhk;
 mod scan;
 mod sensors;
 mod units;
+mod whole;
 mod wsxm;
 
 pub use detect::{Format, detect, looks_like_scan};
@@ -77,6 +79,17 @@ pub fn read_selected(
     bytes: &[u8],
     wanted: &dyn Fn(&ChannelInfo) -> bool,
 ) -> Result<Scan, ReadError> {
+    let scan = dispatch(bytes, wanted)?;
+    if whole::all_missing(&scan) {
+        return Err(ReadError::AllMissing {
+            channels: scan.channels.len(),
+        });
+    }
+    Ok(scan)
+}
+
+/// Hands the bytes to the reader of their format.
+fn dispatch(bytes: &[u8], wanted: &dyn Fn(&ChannelInfo) -> bool) -> Result<Scan, ReadError> {
     match detect(bytes) {
         Format::NanoScope => nanoscope::read(bytes, wanted),
         Format::NanoScopeForce => Err(nanoscope::refuse_force(bytes)),
