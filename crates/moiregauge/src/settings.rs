@@ -106,6 +106,14 @@ pub struct Settings {
     pub strain_convention: StrainConvention,
     /// How files become sets.
     pub grouping: Grouping,
+    /// Standard uncertainty of the time of a frame, s: headers hold whole seconds (0.29 s) and are
+    /// written some time after the end of the frame.
+    pub frame_time_sigma_s: f64,
+    /// Scans that are shown but not used: names of files, `*` stands for any characters.
+    pub exclude: Vec<String>,
+    /// Whether scans that do not fit the others are left out by themselves: one after the other,
+    /// worst first, while the leave-one-out χ² of a scan has p < 0.001/n; never more than a fifth.
+    pub exclude_outliers: bool,
     /// Use only the region that all scans of a set have in common.
     pub overlap: bool,
     /// A drift known beforehand; `None`: measure it.
@@ -128,6 +136,9 @@ impl Default for Settings {
             material: Material::graphene(),
             strain_convention: StrainConvention::RealSpace,
             grouping: Grouping::Auto,
+            frame_time_sigma_s: 0.6,
+            exclude: Vec::new(),
+            exclude_outliers: false,
             overlap: false,
             drift: None,
             drift_draws: 10_000,

@@ -2,7 +2,8 @@
 
 use nalgebra::{DMatrix, DVector, Matrix2, Matrix4, Vector2};
 
-use super::{Sighting, TIME_SIGMA, Terms};
+use crate::estimate::Estimate;
+use super::{Sighting, Terms};
 
 /// Where each parameter stands in the vector.
 #[derive(Clone, Debug)]
@@ -12,10 +13,12 @@ pub(super) struct Layout {
     pub(super) origin: f64,
     /// Start of the first frame: where settling begins.
     pub(super) start: f64,
+    /// Standard uncertainty of the frame times, s.
+    pub(super) time_sigma: f64,
     acceleration: Option<usize>,
     settling: Option<usize>,
     gain: Option<usize>,
-    /// φ of the three harmonics.
+    /// φ of the three harmonics, for every block.
     pub(super) phases: Option<usize>,
     /// Offsets of the classes after the first.
     offsets: Option<usize>,
@@ -28,7 +31,7 @@ pub(super) struct Layout {
 pub(super) const DRIFT: usize = 4;
 
 impl Layout {
-    pub(super) fn new(sightings: &[Sighting], terms: Terms) -> Self {
+    pub(super) fn new(sightings: &[Sighting], terms: Terms, time_sigma: f64) -> Self {
         let mut size = 6;
         let mut take = |wanted: bool, n: usize| {
             wanted.then(|| {
@@ -37,11 +40,12 @@ impl Layout {
             })
         };
         let classes = 1 + sightings.iter().map(|s| s.class).max().unwrap_or(0);
+        let blocks = 1 + sightings.iter().map(|s| s.block).max().unwrap_or(0);
         let scans = 1 + sightings.iter().map(|s| s.scan).max().unwrap_or(0);
         let acceleration = take(terms.acceleration, 2);
         let settling = take(terms.settling.is_some(), 2);
         let gain = take(terms.fast_gain, 1);
-        let phases = take(terms.phases, 3);
+        let phases = take(terms.phases, 3 * blocks);
         let offsets = take(terms.phases, 2 * (classes - 1));
         let times = take(terms.phases, scans);
         let times_of = || sightings.iter().map(|s| s.time);
@@ -51,6 +55,7 @@ impl Layout {
             terms,
             origin: f64::midpoint(first, last),
             start: first,
+            time_sigma,
             acceleration,
             settling,
             gain,
@@ -115,8 +120,12 @@ const HARMONICS: [(f64, f64); 3] = [(1.0, 0.0), (0.0, 1.0), (-1.0, 1.0)];
 pub(super) struct Linearised {
     pub(super) residuals: Vec<f64>,
     pub(super) jacobian: Vec<DVector<f64>>,
-    /// Unwhitened phase residuals, as distances, nm.
-    pub(super) phase_misses: Vec<f64>,
+    /// The scan to which each residual belongs.
+    pub(super) scans: Vec<usize>,
+    /// Which of them are phases.
+    pub(super) phase_rows: Vec<usize>,
+    /// The phase residuals as distances, nm, with the standard deviations that noise gives them.
+    pub(super) phase_misses: Vec<Estimate>,
 }
 
 /// Evaluates the model at `x` for the sightings within `reach` of the origin of time (phases beyond
@@ -132,6 +141,8 @@ pub(super) fn linearise(
     let mut out = Linearised {
         residuals: Vec::new(),
         jacobian: Vec::new(),
+        scans: Vec::new(),
+        phase_rows: Vec::new(),
         phase_misses: Vec::new(),
     };
     for sighting in sightings {
@@ -143,9 +154,10 @@ pub(super) fn linearise(
     if let Some(first) = layout.times {
         for i in first..layout.size {
             let mut row = DVector::zeros(layout.size);
-            row[i] = 1.0 / TIME_SIGMA;
-            out.residuals.push(-x[i] / TIME_SIGMA);
+            row[i] = 1.0 / layout.time_sigma;
+            out.residuals.push(-x[i] / layout.time_sigma);
             out.jacobian.push(row);
+            out.scans.push(i - first);
         }
     }
     out
@@ -199,6 +211,7 @@ fn waves(sighting: &Sighting, layout: &Layout, x: &DVector<f64>, out: &mut Linea
     for i in 0..4 {
         out.residuals.push(residual[i]);
         out.jacobian.push(rows.row(i).transpose());
+        out.scans.push(sighting.scan);
     }
 }
 
@@ -225,7 +238,8 @@ fn phases(
     }
     for (h, (a, b)) in HARMONICS.into_iter().enumerate() {
         let g = a * Vector2::new(x[0], x[1]) + b * Vector2::new(x[2], x[3]);
-        let model = g.dot(&place) + x[first + h];
+        let constant = first + 3 * sighting.block + h;
+        let model = g.dot(&place) + x[constant];
         let miss = wrapped(measured[h].value - model);
         let sigma = measured[h].sigma.hypot(g.norm() * instability);
         let mut row = DVector::zeros(layout.size);
@@ -242,10 +256,13 @@ fn phases(
         if let Some(i) = late {
             row[i] = -g.dot(&velocity);
         }
-        row[first + h] = 1.0;
+        row[constant] = 1.0;
         out.residuals.push(miss / sigma);
         out.jacobian.push(row / sigma);
-        out.phase_misses.push(miss / g.norm());
+        out.scans.push(sighting.scan);
+        out.phase_rows.push(out.residuals.len() - 1);
+        let noise = measured[h].sigma / g.norm();
+        out.phase_misses.push(Estimate::new(miss / g.norm(), noise));
     }
 }
 

@@ -9,23 +9,25 @@
 //! delay shifts an image along its fast axis. Wave vectors see the drift within a frame; phases see
 //! the displacement from frame to frame and are a hundred times more sensitive.
 //!
-//! Phases help as far as clocks and sensors allow: frame times are whole seconds and uncertain by
-//! [`TIME_SIGMA`], and the scatter of the phases about the fit is counted as sensor instability.
+//! Phases help as far as clocks and sensors allow: frame times are uncertain nuisance parameters, the
+//! scatter of the phases about the fit is counted as instability of the positions, and frames are
+//! linked only over pauses in which the sample cannot have gone unnoticed by a lattice cell: `φ_h` is
+//! one set of constants for each block of linked frames.
 //!
 //! Units nm, s, rad. Reciprocal pairs stand at 60°: harmonics K₁, K₂, K₂ − K₁.
 
+mod checks;
 mod evaluate;
+mod link;
 mod solve;
 
 use nalgebra::{Matrix2, Vector2};
 
-pub use solve::{JointFit, fit};
+pub use checks::{LeftOut, Resampled};
+pub use solve::{JointFit, TestedTerm, fit};
 
 use crate::estimate::Estimate;
 use crate::lattice::LatticeVectors;
-
-/// Standard uncertainty of a frame time, s: headers hold whole seconds and mark roughly the end.
-pub const TIME_SIGMA: f64 = 0.6;
 
 /// What one line direction of one scan contributes.
 #[derive(Clone, Debug)]
@@ -34,6 +36,8 @@ pub struct Sighting {
     pub scan: usize,
     /// Class of scans that share an offset: fast axis and line direction.
     pub class: usize,
+    /// Block of scans whose phases are linked; [`fit`] finds it.
+    pub block: usize,
     /// Reciprocal pair as it appeared, sensor coordinates, rad/nm, all sightings labelled alike.
     pub waves: LatticeVectors,
     /// Time gradient `u`, s/nm.

@@ -1,9 +1,10 @@
 //! Gauss–Newton over all parameters, phases linked outwards from the middle of the campaign, and the
 //! choice of terms.
 
-use nalgebra::{DMatrix, DVector, Matrix2, Matrix4, Vector2};
+use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
 
 use super::evaluate::{DRIFT, Layout, linearise, wrapped};
+use super::link::number_blocks;
 use super::{Sighting, Terms};
 use crate::estimate::Estimate;
 use crate::lattice::LatticeVectors;
@@ -41,9 +42,28 @@ pub struct JointFit {
     pub chi2: f64,
     /// Degrees of freedom of `chi2`.
     pub degrees_of_freedom: usize,
-    layout: Layout,
-    solution: DVector<f64>,
+    /// The terms that were tried beside a constant drift, and what the criterion said.
+    pub tested: Vec<TestedTerm>,
+    /// What was fitted, with the blocks of linked scans.
+    pub(super) sightings: Vec<Sighting>,
+    pub(super) layout: Layout,
+    pub(super) solution: DVector<f64>,
+    /// Covariance of `solution`, as the errors of the sightings make it.
+    pub(super) unscaled: DMatrix<f64>,
+    /// The same, enlarged where the scans scatter more.
     covariance: DMatrix<f64>,
+}
+
+/// A term that was tried.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TestedTerm {
+    /// What it is called.
+    pub name: &'static str,
+    /// By how much it lowers the Bayesian information criterion; it is used if this is positive (and,
+    /// of two that describe a changing drift, the larger).
+    pub gain: f64,
+    /// Whether the fit has it.
+    pub used: bool,
 }
 
 impl JointFit {
@@ -63,186 +83,288 @@ impl JointFit {
 
 /// Fits all sightings together and adds the terms that earn it by an information criterion.
 ///
-/// `start` is the reciprocal pair (rad/nm) and the drift (nm/s) from the linear solution. `None` where
-/// the sightings do not determine lattice and drift.
-pub fn fit(sightings: &[Sighting], start: (&Matrix2<f64>, &Vector2<f64>)) -> Option<JointFit> {
-    let plain = Terms::default();
-    let mut best = solve(sightings, plain, start, None)?;
-    let with_phases = Terms {
-        phases: true,
-        ..plain
+/// `start` is the reciprocal pair (rad/nm) and the drift (nm/s) from the linear solution, `time_sigma`
+/// the standard uncertainty of a frame time, s. `None` where the sightings do not determine lattice
+/// and drift.
+pub fn fit(
+    sightings: &[Sighting],
+    start: (&Matrix2<f64>, &Vector2<f64>),
+    time_sigma: f64,
+) -> Option<JointFit> {
+    let mut problem = Problem {
+        sightings: sightings.to_vec(),
+        // Exact times would make the weights infinite; a millisecond is exact enough.
+        time_sigma: time_sigma.max(1e-3),
     };
+    let plain = Terms::default();
+    let mut best = problem.solve(plain, start, None)?;
+    let sigma = best.velocity_covariance.symmetric_eigenvalues().max().sqrt();
+    number_blocks(&mut problem.sightings, &best.waves.basis, sigma);
+    let problem = problem;
     let from = (&best.waves.basis.clone(), &best.velocity.clone());
-    if sightings.iter().any(|s| s.phases.is_some())
-        && let Some(linked) = solve(sightings, with_phases, from, None)
-    {
-        best = linked;
+    if sightings.iter().any(|s| s.phases.is_some()) {
+        // Over a long campaign a drift that changes can be linked only as what it is.
+        let linked = [false, true].into_iter().find_map(|acceleration| {
+            let terms = Terms {
+                phases: true,
+                acceleration,
+                ..plain
+            };
+            problem.solve(terms, from, None)
+        });
+        best = linked.unwrap_or(best);
     }
     let times = || sightings.iter().map(|s| s.time);
     let duration =
         times().fold(f64::NEG_INFINITY, f64::max) - times().fold(f64::INFINITY, f64::min);
-    let instability = Some(best.instability_nm);
-    let mut candidates = vec![Terms {
+    let base = Terms {
+        acceleration: false,
+        ..best.terms
+    };
+    let changing = [Terms {
         acceleration: true,
-        ..best.terms
-    }];
-    candidates.extend(SETTLING.map(|share| Terms {
+        ..base
+    }]
+    .into_iter()
+    .chain(SETTLING.map(|share| Terms {
         settling: Some(share * duration),
-        ..best.terms
+        ..base
     }));
-    best = better(best, sightings, &candidates, instability);
+    let mut choice = Choice::new(&problem, best, base);
+    choice.offer(changing);
     let classes = sightings.iter().map(|s| s.class).max().unwrap_or(0);
     if classes > 1 {
         let gain = Terms {
             fast_gain: true,
-            ..best.terms
+            ..choice.best.terms
         };
-        best = better(best, sightings, &[gain], instability);
+        choice.offer([gain].into_iter());
     }
     // The scatter that is left with the chosen terms is the instability.
+    let Choice { best, tested, .. } = choice;
     let from = (&best.waves.basis.clone(), &best.velocity.clone());
-    solve(sightings, best.terms, from, None).or(Some(best))
+    let last = problem.solve(best.terms, from, None).unwrap_or(best);
+    let has = |name| match name {
+        ACCELERATION => last.terms.acceleration,
+        EXPONENTIAL => last.terms.settling.is_some(),
+        _ => last.terms.fast_gain,
+    };
+    let tested = tested
+        .into_iter()
+        .map(|(name, gain)| TestedTerm {
+            name,
+            gain,
+            used: has(name),
+        })
+        .collect();
+    Some(JointFit { tested, ..last })
 }
 
-/// The best of `base` and the candidates by the Bayesian information criterion, for the same weights.
-fn better(
-    base: JointFit,
+const ACCELERATION: &str = "acceleration";
+const EXPONENTIAL: &str = "settling";
+const FAST_GAIN: &str = "fast-axis gain";
+
+/// Terms that are offered one after the other; all are compared with the weights of the first fit.
+struct Choice<'a> {
+    problem: &'a Problem,
+    best: JointFit,
+    instability: f64,
+    lowest: f64,
+    tested: Vec<(&'static str, f64)>,
+}
+
+impl<'a> Choice<'a> {
+    fn new(problem: &'a Problem, best: JointFit, base: Terms) -> Self {
+        let instability = best.instability_nm;
+        let start = (&best.waves.basis.clone(), &best.velocity.clone());
+        let plain = problem.solve(base, start, Some(instability));
+        // Where only a changing drift can be linked there is nothing simpler to compare with.
+        let (best, lowest) = match plain {
+            Some(fit) => (fit.clone(), criterion(&fit)),
+            None => (best, f64::INFINITY),
+        };
+        Self {
+            problem,
+            best,
+            instability,
+            lowest,
+            tested: Vec::new(),
+        }
+    }
+
+    fn offer(&mut self, candidates: impl Iterator<Item = Terms>) {
+        let before = self.lowest;
+        let from = (&self.best.waves.basis.clone(), &self.best.velocity.clone());
+        for terms in candidates {
+            let Some(fit) = self.problem.solve(terms, from, Some(self.instability)) else {
+                continue;
+            };
+            let name = if terms.fast_gain {
+                FAST_GAIN
+            } else if terms.acceleration {
+                ACCELERATION
+            } else {
+                EXPONENTIAL
+            };
+            let value = criterion(&fit);
+            let gain = if before.is_finite() {
+                before - value
+            } else {
+                f64::NAN
+            };
+            match self.tested.iter_mut().find(|(known, _)| *known == name) {
+                Some((_, best)) => *best = best.max(gain),
+                None => self.tested.push((name, gain)),
+            }
+            if value < self.lowest {
+                self.lowest = value;
+                self.best = fit;
+            }
+        }
+    }
+}
+
+/// Bayesian information criterion for given weights.
+fn criterion(fit: &JointFit) -> f64 {
+    let n = (fit.degrees_of_freedom + fit.layout.size) as f64;
+    fit.chi2 + fit.layout.count() as f64 * n.ln()
+}
+
+/// What is fitted.
+struct Problem {
+    sightings: Vec<Sighting>,
+    time_sigma: f64,
+}
+
+impl Problem {
+    /// Solves for one choice of terms. Without a given instability it is estimated from the phases.
+    fn solve(
+        &self,
+        terms: Terms,
+        start: (&Matrix2<f64>, &Vector2<f64>),
+        given: Option<f64>,
+    ) -> Option<JointFit> {
+        let sightings = &self.sightings;
+        let layout = Layout::new(sightings, terms, self.time_sigma);
+        let mut x = DVector::zeros(layout.size);
+        x.rows_mut(0, 4).copy_from_slice(start.0.as_slice());
+        x.rows_mut(DRIFT, 2).copy_from_slice(start.1.as_slice());
+        let mut instability = given.unwrap_or(0.0);
+        if terms.phases {
+            start_phases(sightings, &layout, &mut x)?;
+            link_outwards(sightings, &layout, &mut x, instability.max(0.02))?;
+        }
+        let rounds = if terms.phases && given.is_none() {
+            6
+        } else {
+            1
+        };
+        let mut unscaled = DMatrix::zeros(layout.size, layout.size);
+        for _ in 0..rounds {
+            unscaled = iterate(sightings, &layout, &mut x, f64::INFINITY, instability)?;
+            if rounds > 1 {
+                instability =
+                    estimated_instability(sightings, &layout, &x, instability, &unscaled);
+            }
+        }
+        let last = linearise(sightings, &layout, &x, f64::INFINITY, instability);
+        let wavelength = std::f64::consts::TAU / Vector2::new(x[0], x[1]).norm();
+        if terms.phases {
+            let squares = last.phase_misses.iter().map(|m| m.value * m.value);
+            let rms = (squares.sum::<f64>() / last.phase_misses.len() as f64).sqrt();
+            if !(rms < LINKED * wavelength) {
+                return None;
+            }
+        }
+        let chi2: f64 = last.residuals.iter().map(|r| r * r).sum();
+        let degrees_of_freedom = last.residuals.len().saturating_sub(layout.size);
+        let excess = (chi2 / degrees_of_freedom.max(1) as f64).max(1.0);
+        let covariance = &unscaled * excess;
+        Some(JointFit {
+            waves: LatticeVectors {
+                basis: Matrix2::new(x[0], x[2], x[1], x[3]),
+                covariance: covariance.fixed_view::<4, 4>(0, 0).into_owned(),
+            },
+            velocity: Vector2::new(x[DRIFT], x[DRIFT + 1]),
+            velocity_covariance: covariance.fixed_view::<2, 2>(DRIFT, DRIFT).into_owned(),
+            acceleration: layout
+                .acceleration_at()
+                .map(|i| Vector2::new(x[i], x[i + 1])),
+            fast_gain: layout
+                .gain_at()
+                .map(|i| Estimate::from_variance(x[i], covariance[(i, i)])),
+            terms,
+            instability_nm: instability,
+            chi2,
+            degrees_of_freedom,
+            tested: Vec::new(),
+            sightings: sightings.clone(),
+            layout,
+            solution: x,
+            unscaled,
+            covariance,
+        })
+    }
+}
+
+/// Outwards from the middle of the campaign: each round predicts the next scans well enough to
+/// unwrap them.
+fn link_outwards(
     sightings: &[Sighting],
-    candidates: &[Terms],
-    instability: Option<f64>,
-) -> JointFit {
-    let criterion = |fit: &JointFit| {
-        let n = (fit.degrees_of_freedom + fit.layout.size) as f64;
-        fit.chi2 + fit.layout.count() as f64 * n.ln()
-    };
-    let from = (&base.waves.basis.clone(), &base.velocity.clone());
-    let mut best = base;
-    // All are compared with the weights of the simplest fit.
-    let Some(mut lowest) =
-        solve(sightings, best.terms, from, instability).map(|fit| criterion(&fit))
-    else {
-        return best;
-    };
-    for &terms in candidates {
-        if let Some(fit) = solve(sightings, terms, from, instability)
-            && criterion(&fit) < lowest
-        {
-            lowest = criterion(&fit);
-            best = fit;
-        }
+    layout: &Layout,
+    x: &mut DVector<f64>,
+    instability: f64,
+) -> Option<()> {
+    let distances = || sightings.iter().map(|s| (s.time - layout.origin).abs());
+    let farthest = distances().fold(0.0, f64::max);
+    let mut reach = farthest / 16.0;
+    while reach < farthest {
+        iterate(sightings, layout, x, reach, instability)?;
+        reach *= 1.5;
     }
-    best
+    Some(())
 }
 
-/// Solves for one choice of terms. Without a given instability it is estimated from the phases.
-fn solve(
-    sightings: &[Sighting],
-    terms: Terms,
-    start: (&Matrix2<f64>, &Vector2<f64>),
-    given: Option<f64>,
-) -> Option<JointFit> {
-    let layout = Layout::new(sightings, terms);
-    let mut x = DVector::zeros(layout.size);
-    x.rows_mut(0, 4).copy_from_slice(start.0.as_slice());
-    x.rows_mut(DRIFT, 2).copy_from_slice(start.1.as_slice());
-    let farthest = sightings
-        .iter()
-        .map(|s| (s.time - layout.origin).abs())
-        .fold(0.0, f64::max);
-    let mut instability = given.unwrap_or(0.0);
-    if terms.phases {
-        start_phases(sightings, &layout, &mut x)?;
-        // Outwards from the middle: each round predicts the next scans well enough to unwrap them.
-        let mut reach = farthest / 16.0;
-        while reach < farthest {
-            iterate(sightings, &layout, &mut x, reach, instability.max(0.02))?;
-            reach *= 1.5;
-        }
-    }
-    let rounds = if terms.phases && given.is_none() {
-        6
-    } else {
-        1
-    };
-    let mut covariance = DMatrix::zeros(layout.size, layout.size);
-    for _ in 0..rounds {
-        covariance = iterate(sightings, &layout, &mut x, f64::INFINITY, instability)?;
-        if rounds > 1 {
-            instability = estimated_instability(sightings, &layout, &x, instability);
-        }
-    }
-    let last = linearise(sightings, &layout, &x, f64::INFINITY, instability);
-    let wavelength = std::f64::consts::TAU / Vector2::new(x[0], x[1]).norm();
-    if terms.phases {
-        let misses = &last.phase_misses;
-        let rms = (misses.iter().map(|m| m * m).sum::<f64>() / misses.len() as f64).sqrt();
-        if !(rms < LINKED * wavelength) {
-            return None;
-        }
-    }
-    let chi2: f64 = last.residuals.iter().map(|r| r * r).sum();
-    let degrees_of_freedom = last.residuals.len().saturating_sub(layout.size);
-    let excess = (chi2 / degrees_of_freedom.max(1) as f64).max(1.0);
-    covariance *= excess;
-    let pair = Matrix2::new(x[0], x[2], x[1], x[3]);
-    let (velocity_covariance, lattice_covariance): (Matrix2<f64>, Matrix4<f64>) = (
-        covariance.fixed_view::<2, 2>(DRIFT, DRIFT).into_owned(),
-        covariance.fixed_view::<4, 4>(0, 0).into_owned(),
-    );
-    Some(JointFit {
-        waves: LatticeVectors {
-            basis: pair,
-            covariance: lattice_covariance,
-        },
-        velocity: Vector2::new(x[DRIFT], x[DRIFT + 1]),
-        velocity_covariance,
-        acceleration: layout
-            .acceleration_at()
-            .map(|i| Vector2::new(x[i], x[i + 1])),
-        fast_gain: layout
-            .gain_at()
-            .map(|i| Estimate::from_variance(x[i], covariance[(i, i)])),
-        terms,
-        instability_nm: instability,
-        chi2,
-        degrees_of_freedom,
-        layout,
-        solution: x,
-        covariance,
-    })
-}
-
-/// φ of the harmonics from the sighting of the first class that is nearest to the middle of the
-/// campaign; then the offset of every other class, modulo the lattice, from its nearest sighting.
+/// φ of the harmonics of each block from its sighting of the lowest class nearest to the middle of the
+/// campaign; then the offset of every other class, modulo the lattice, from its nearest sighting in a
+/// block that another class has begun.
 fn start_phases(sightings: &[Sighting], layout: &Layout, x: &mut DVector<f64>) -> Option<()> {
     let first = layout.phases?;
     let distance = |s: &&Sighting| (s.time - layout.origin).abs();
-    let nearest = |class: usize| {
-        sightings
-            .iter()
-            .filter(|s| s.phases.is_some() && s.class == class)
-            .min_by(|a, b| distance(a).total_cmp(&distance(b)))
-    };
+    let with_phases = || sightings.iter().filter(|s| s.phases.is_some());
     let (k1, k2) = (Vector2::new(x[0], x[1]), Vector2::new(x[2], x[3]));
     let unexplained = |s: &Sighting, x: &DVector<f64>| {
         let (shift, _) = layout.motion(x, s.time);
         let place = s.position - shift;
         let miss = |h: usize, k: Vector2<f64>, phases: &[Estimate; 3]| {
-            wrapped(phases[h].value - k.dot(&place) - x[first + h])
+            wrapped(phases[h].value - k.dot(&place) - x[first + 3 * s.block + h])
         };
         s.phases
             .map(|p| [miss(0, k1, &p), miss(1, k2, &p), miss(2, k2 - k1, &p)])
     };
-    let phases = unexplained(nearest(0)?, x)?;
-    for (h, phase) in phases.into_iter().enumerate() {
-        x[first + h] = phase;
-    }
+    let blocks = 1 + sightings.iter().map(|s| s.block).max()?;
+    let begun: Vec<Option<usize>> = (0..blocks)
+        .map(|block| {
+            let inside = || with_phases().filter(move |s| s.block == block);
+            let class = inside().map(|s| s.class).min()?;
+            let near = inside()
+                .filter(|s| s.class == class)
+                .min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
+            for (h, phase) in unexplained(near, x)?.into_iter().enumerate() {
+                x[first + 3 * block + h] = phase;
+            }
+            Some(class)
+        })
+        .collect();
     let from_phases = Matrix2::from_rows(&[k1.transpose(), k2.transpose()]).try_inverse()?;
     for class in 1.. {
         let Some(at) = layout.offset_of(class) else {
             break;
         };
-        let Some(near) = nearest(class) else { continue };
+        let near = with_phases()
+            .filter(|s| s.class == class && begun[s.block] != Some(class))
+            .min_by(|a, b| distance(a).total_cmp(&distance(b)));
+        let Some(near) = near else { continue };
         let miss = unexplained(near, x)?;
         let offset = -from_phases * Vector2::new(miss[0], miss[1]);
         x[at] = offset.x;
@@ -306,24 +428,41 @@ fn iterate(
     covariance
 }
 
-/// The position scatter that makes the phases fit: χ² of the phases becomes their number.
+/// The position scatter s that makes the phases fit: `Σ miss²/(noise² + s²)` becomes the number of
+/// phases less what they determine (Paule and Mandel 1982, J. Res. NBS 87, 377). Zero where the noise
+/// alone explains them.
 fn estimated_instability(
     sightings: &[Sighting],
     layout: &Layout,
     x: &DVector<f64>,
     current: f64,
+    covariance: &DMatrix<f64>,
 ) -> f64 {
     let now = linearise(sightings, layout, x, f64::INFINITY, current);
-    // Phase rows stand behind four rows of waves in each sighting, before the priors of the times.
-    let count = now.phase_misses.len() as f64;
-    let used = layout.size as f64 - layout.count() as f64 + 2.0;
-    let freedom = (count - used).max(1.0);
-    let squares: f64 = now.phase_misses.iter().map(|m| m * m).sum();
-    let noise: f64 = sightings
+    let freedom: f64 = now
+        .phase_rows
         .iter()
-        .filter_map(|s| s.phases)
-        .flatten()
-        .map(|p| (p.sigma / Vector2::new(x[0], x[1]).norm()).powi(2))
+        .map(|&i| 1.0 - now.jacobian[i].dot(&(covariance * &now.jacobian[i])))
         .sum();
-    ((squares / freedom) - noise / count).max(0.0).sqrt()
+    let excess = |variance: f64| {
+        let squares = now.phase_misses.iter();
+        squares
+            .map(|m| m.value * m.value / (m.sigma * m.sigma + variance))
+            .sum::<f64>()
+            - freedom
+    };
+    let largest: f64 = now.phase_misses.iter().map(|m| m.value * m.value).sum();
+    if !(freedom > 0.0 && excess(0.0) > 0.0) {
+        return 0.0;
+    }
+    let (mut low, mut high) = (0.0, largest / freedom);
+    for _ in 0..60 {
+        let middle = f64::midpoint(low, high);
+        if excess(middle) > 0.0 {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    high.sqrt()
 }

@@ -43,7 +43,7 @@ pub(super) fn combine(
     let mut joint_terms = None;
     if let Some((scans, reference)) = joint.filter(|(scans, _)| !scans.is_empty())
         && let Some(drift) = sets.iter().find_map(|s| s.drift.as_ref())
-        && let Some((fit, _)) = joint_fit(scans, &reference, &lattice, &drift.velocity)
+        && let Some((fit, _)) = joint_fit(scans, &reference, (&lattice, &drift.velocity), settings)
         && let Some(fitted) = real_from_reciprocal(&fit.waves)
     {
         lattice = labelled_like(&fitted, &reference);

@@ -47,7 +47,7 @@ pub(super) fn analyse_set(
     let mut solved = drift(&group, &all, timed, settings, caveats);
     if settings.method.is_joint() && settings.drift.is_none() {
         let scans: Vec<&MeasuredScan> = group.scans.iter().collect();
-        solved = solved.map(|linear| jointly(linear, &scans, reference));
+        solved = solved.map(|linear| jointly(linear, &scans, reference, settings));
     }
     let mut scans: Vec<ScanAnalysis> = group
         .scans
@@ -118,9 +118,14 @@ struct Solved {
 }
 
 /// Refines the linear solution of a set with the phases of its scans; keeps it where they do not help.
-fn jointly(linear: Solved, scans: &[&MeasuredScan], reference: &Matrix2<f64>) -> Solved {
-    let Some((fit, times)) = joint_fit(scans, reference, &linear.lattice, &linear.drift.velocity)
-    else {
+fn jointly(
+    linear: Solved,
+    scans: &[&MeasuredScan],
+    reference: &Matrix2<f64>,
+    settings: &Settings,
+) -> Solved {
+    let start = (&linear.lattice, &linear.drift.velocity);
+    let Some((fit, times)) = joint_fit(scans, reference, start, settings) else {
         return linear;
     };
     let Some(lattice) = real_from_reciprocal(&fit.waves) else {
@@ -144,12 +149,12 @@ fn jointly(linear: Solved, scans: &[&MeasuredScan], reference: &Matrix2<f64>) ->
 pub(super) fn joint_fit(
     scans: &[&MeasuredScan],
     reference: &Matrix2<f64>,
-    lattice: &LatticeVectors,
-    velocity: &Vector2<f64>,
+    (lattice, velocity): (&LatticeVectors, &Vector2<f64>),
+    settings: &Settings,
 ) -> Option<(JointFit, Vec<f64>)> {
     let sightings = sightings(scans, reference)?;
     let waves = labelled_like(&real_from_reciprocal(lattice)?, &reciprocal(reference)?);
-    let fitted = fit(&sightings, (&waves.basis, velocity))?;
+    let fitted = fit(&sightings, (&waves.basis, velocity), settings.frame_time_sigma_s)?;
     let times = (0..scans.len())
         .filter_map(|i| sightings.iter().find(|s| s.scan == i))
         .map(|s| s.time)

@@ -35,6 +35,7 @@ pub(super) fn sightings(
             all.push(Sighting {
                 scan: index,
                 class,
+                block: 0,
                 waves: labelled_like(&waves, &reference),
                 time_gradient: line.geometry.time_gradient(&line.timing?)?,
                 fast_gain: dual * Matrix2::new(1.0, 0.0, 0.0, 0.0) * j.transpose(),

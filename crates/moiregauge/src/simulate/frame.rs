@@ -107,7 +107,7 @@ pub(super) fn record(settings: &Simulation, scene: &Scene, plan: &FramePlan) -> 
     Scan {
         format: "simulated".to_owned(),
         instrument: Some("moiregauge simulator".to_owned()),
-        acquired: Some(date_after(plan.end)),
+        acquired: Some(date_after(plan.end + delay(settings, plan))),
         frame_direction: Some(plan.direction),
         line_rate_hz: Some(raster.line_rate_hz),
         rounding: Some(raster.rounding),
@@ -120,6 +120,13 @@ pub(super) fn record(settings: &Simulation, scene: &Scene, plan: &FramePlan) -> 
         channels: [phase, amplitude, x, y].concat(),
         unreadable: Vec::new(),
     }
+}
+
+/// Time from the end of a frame to that in its header, s.
+fn delay(settings: &Simulation, plan: &FramePlan) -> f64 {
+    let mut rng = rng::stream(settings.seed, "simulate clock", plan.index as u64);
+    let normal: f64 = StandardNormal.sample(&mut rng);
+    settings.noise.clock_s * normal
 }
 
 fn channel(

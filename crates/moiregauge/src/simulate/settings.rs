@@ -134,6 +134,8 @@ pub struct Noise {
     pub line_deg: f64,
     /// Of lines with a 1/f spectrum, degrees of phase.
     pub flicker_deg: f64,
+    /// Of the time from the end of a frame to the (whole) second in its header, s.
+    pub clock_s: f64,
     /// Slope of the background over the whole frame along fast and slow axis, degrees of phase.
     pub plane_deg: [f64; 2],
 }
@@ -212,6 +214,7 @@ impl Default for Noise {
             pixel_deg: 0.5,
             line_deg: 0.15,
             flicker_deg: 0.1,
+            clock_s: 0.5,
             plane_deg: [2.0, -1.0],
         }
     }
@@ -270,6 +273,7 @@ impl Simulation {
             ("noise.pixel_deg", noise.pixel_deg),
             ("noise.line_deg", noise.line_deg),
             ("noise.flicker_deg", noise.flicker_deg),
+            ("noise.clock_s", noise.clock_s),
         ];
         for (setting, value) in not_negative {
             require(
