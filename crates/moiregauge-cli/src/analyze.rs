@@ -8,7 +8,7 @@ mod summary;
 use std::process::ExitCode;
 
 pub(crate) use args::{AnalyzeArgs, MethodArg};
-pub(crate) use chain::{Outcome, analyse_files};
+pub(crate) use chain::{Outcome, analyse_files, measure_file};
 pub(crate) use files::write_all;
 pub(crate) use summary::summary;
 

@@ -31,11 +31,11 @@ const COMMENTED: &str = r#"# Settings of `moiregauge analyze`. Every line shows 
 line = "both"
 
 # Estimator of the lattice vectors:
+#   "lattice"          harmonics fitted to the pixels, one joint fit over all scans, phases included
 #   "autocorrelation"  divided by the overlap, sub-pixel peaks, several shells
 #   "fourier"          Hann window, sub-pixel peaks, full inverse
-#   "lattice"          harmonics fitted to the pixels: errors near the Cramér–Rao bound
 #   "paper"            as published in arXiv 2406.08681, for comparison: known to be biased
-method = "autocorrelation"
+method = "lattice"
 
 # What is subtracted from an image first: "mean", "plane", "quadratic", "cubic", or "line-mean"
 # (which damages harmonics along the fast axis).
@@ -56,6 +56,17 @@ strain_convention = "real-space"
 # How files become sets: "auto" (slow axis, line rate, size, channel), "folder" (the same, and folders
 # never mix) or "file" (every file by itself).
 grouping = "auto"
+
+# Standard uncertainty of the time of a frame, s: headers hold whole seconds (0.29 s) and are written
+# some time after the end of the frame.
+frame_time_sigma_s = 0.6
+
+# Scans that are shown but not used: names of files, * stands for any characters.
+exclude = []
+
+# Leave out scans that do not fit the others: worst first, while the leave-one-out χ² of a scan has
+# p < 0.001 divided by the number of scans; never more than a fifth of them.
+exclude_outliers = false
 
 # Use only the region that all scans of an analysis have in common.
 overlap = false
@@ -122,6 +133,11 @@ pub(crate) fn check(settings: &Settings) -> anyhow::Result<()> {
     ensure!(
         ratio > -1.0 && ratio < 1.0,
         "the Poisson ratio (--poisson-ratio) must lie between −1 and 1, found {ratio}"
+    );
+    let clock = settings.frame_time_sigma_s;
+    ensure!(
+        clock >= 0.0 && clock.is_finite(),
+        "the uncertainty of the frame times (--frame-time-sigma) cannot be negative, found {clock}"
     );
     if let Some(drift) = &settings.drift {
         let (x, y, sigma) = (

@@ -8,6 +8,7 @@ use spmfile::{DateTime, FrameDirection, LineDirection};
 use crate::caveat::Caveat;
 use crate::estimate::Estimate;
 use crate::image::Image;
+use crate::joint::TestedTerm;
 use crate::lattice::LatticeVectors;
 use crate::settings::Settings;
 use crate::strain::TwistStrain;
@@ -56,8 +57,45 @@ pub struct SetAnalysis {
     /// Twist and strain from the mean reciprocal lattice of up and down scans, which is free of
     /// constant drift without knowing it; `None` where there is only one direction.
     pub forward_backward: Option<TwistStrain>,
+    /// What the scans themselves say of the errors; `None` for other methods than the joint fit.
+    pub checks: Option<Checks>,
     /// One scan in detail, for the figures.
     pub illustration: Option<Illustration>,
+}
+
+/// Errors from the scatter of the scans, to compare with those that are stated.
+#[derive(Clone, Debug)]
+pub struct Checks {
+    /// From leaving out one scan at a time (jackknife); `None` for fewer than four scans.
+    pub leave_one_out: Option<Scatter>,
+    /// From a bootstrap over pairs of up and down scans; `None` for fewer than four pairs.
+    pub bootstrap: Option<Scatter>,
+}
+
+/// One standard deviation of each quantity.
+#[derive(Clone, Copy, Debug)]
+pub struct Scatter {
+    /// Drift velocity along x and y, nm/s.
+    pub drift: [f64; 2],
+    /// θ, rad.
+    pub twist: f64,
+    /// Components of the strain vector.
+    pub strain: [f64; 2],
+}
+
+/// How a scan lies against the fit of all others of its set.
+#[derive(Clone, Copy, Debug)]
+pub struct Residual {
+    /// χ² of its wave vectors and phases against what the others predict.
+    pub chi2: f64,
+    /// Degrees of freedom of `chi2`.
+    pub degrees_of_freedom: usize,
+    /// How often chance makes so large a χ², that of the others taken as measure if it exceeds 1.
+    pub p_value: f64,
+    /// Where the scan stands from where the others have it, nm; `None` without linked phases.
+    pub displacement: Option<Vector2<f64>>,
+    /// Whether it stands out: p < 0.001 divided by the number of scans.
+    pub outlying: bool,
 }
 
 /// One lattice for several scans.
@@ -86,6 +124,10 @@ pub struct Combined {
     pub twist_strain: TwistStrain,
     /// Whether one joint fit over all scans made them, and with which terms.
     pub joint: Option<JointTerms>,
+    /// The drift in the middle of the campaign, where one joint fit over all scans describes it.
+    pub drift: Option<Drift>,
+    /// What the scans themselves say of the errors.
+    pub checks: Option<Checks>,
     /// How far every two sets are apart.
     pub consistency: Vec<Consistency>,
 }
@@ -133,6 +175,8 @@ pub struct JointTerms {
     pub fast_gain: Option<Estimate>,
     /// Scatter of the positions about the fit beyond the noise of the phases, nm.
     pub instability_nm: f64,
+    /// The terms that were tried, and what the information criterion said of them.
+    pub tested: Vec<TestedTerm>,
 }
 
 /// How well the scans determine the drift.
@@ -194,6 +238,10 @@ pub struct ScanAnalysis {
     pub twist_strain: Option<TwistStrain>,
     /// Monte Carlo draws of twist and strain behind `twist_strain` (or `twist_strain_sensor`).
     pub draws: Vec<StrainDraw>,
+    /// How it lies against the other scans; `None` without a joint fit of at least three scans.
+    pub residual: Option<Residual>,
+    /// Why it was not used for the results of its set; `None` where it was.
+    pub excluded: Option<String>,
 }
 
 /// One Monte Carlo draw of twist and strain.

@@ -131,7 +131,7 @@ impl Default for Settings {
         Self {
             channel: None,
             line: Lines::Both,
-            method: Method::Autocorrelation,
+            method: Method::Lattice,
             background: Background::Plane,
             material: Material::graphene(),
             strain_convention: StrainConvention::RealSpace,

@@ -44,7 +44,7 @@ pub(crate) struct AnalyzeArgs {
     /// Line directions to use [default: both]
     #[arg(long, value_enum)]
     line: Option<LineArg>,
-    /// Estimator of the lattice vectors [default: autocorrelation]
+    /// Estimator of the lattice vectors [default: lattice]
     #[arg(long, value_enum)]
     method: Option<MethodArg>,
     /// The layers: graphene, hBN, MoS2, … [default: graphene]
@@ -68,6 +68,15 @@ pub(crate) struct AnalyzeArgs {
     /// Make a set by hand: all files under PATH form the set NAME; may be repeated
     #[arg(long = "set", value_name = "NAME=PATH")]
     sets: Vec<String>,
+    /// Show these scans but do not use them: names of files, * for any characters; may be repeated
+    #[arg(long, value_name = "NAME")]
+    exclude: Vec<String>,
+    /// Leave out scans that do not fit the others (leave-one-out χ², p < 0.001 divided by their number)
+    #[arg(long)]
+    exclude_outliers: bool,
+    /// Standard uncertainty of the frame times in the files, s [default: 0.6]
+    #[arg(long, value_name = "S")]
+    frame_time_sigma: Option<f64>,
     /// Use only the region that all scans have in common
     #[arg(long)]
     overlap: bool,
@@ -150,6 +159,9 @@ impl AnalyzeArgs {
         s.background = self.background.map_or(s.background, Into::into);
         s.grouping = self.grouping.map_or(s.grouping, Into::into);
         s.overlap |= self.overlap;
+        s.exclude.extend(self.exclude.iter().cloned());
+        s.exclude_outliers |= self.exclude_outliers;
+        s.frame_time_sigma_s = self.frame_time_sigma.unwrap_or(s.frame_time_sigma_s);
         s.drift_draws = self.drift_draws.unwrap_or(s.drift_draws);
         s.strain_draws = self.strain_draws.unwrap_or(s.strain_draws);
         s.seed = self.seed.unwrap_or(s.seed);
@@ -214,12 +226,12 @@ macro_rules! mirror {
 
 mirror!(LineArg => Lines { Trace, Retrace, Both });
 mirror!(MethodArg => Method {
+    /// Harmonics fitted to the pixels, one joint fit over all scans: errors near the Cramér–Rao bound
+    Lattice,
     /// Divided by the overlap, sub-pixel peaks, several shells
     Autocorrelation,
     /// Hann window, sub-pixel peaks, full inverse
     Fourier,
-    /// Harmonics of a lattice fitted to the pixels: errors near the Cramér–Rao bound
-    Lattice,
     /// As published in arXiv 2406.08681, for comparison: known to be biased
     Paper,
 });

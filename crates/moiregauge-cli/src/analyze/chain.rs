@@ -105,7 +105,8 @@ fn progress(files: usize, loud: bool) -> ProgressBar {
     }
 }
 
-fn measure_file(
+/// One file: its lattice and what identifies it.
+pub(crate) fn measure_file(
     path: &Path,
     sets: &[NamedSet],
     settings: &Settings,

@@ -8,6 +8,7 @@ mod drift;
 mod error_relation;
 mod layout;
 mod parameters;
+mod pulls;
 mod scan;
 mod sensor_line;
 mod sets;
@@ -18,9 +19,13 @@ mod wavelengths;
 mod wavelengths_nominal;
 mod window;
 
+pub use pulls::pulls;
+
 use moiregauge::analysis::{Analysis, SetAnalysis};
 
 use crate::draw::colormap::ColorMap;
+use crate::draw::png;
+use crate::error::ReportError;
 
 /// A figure, or the reason why there is none.
 #[derive(Clone, Debug)]
@@ -44,6 +49,16 @@ pub struct Drawing {
     pub caption: String,
     /// Whether it is as wide as a journal page (180 mm) and not as a column (88 mm).
     pub wide: bool,
+}
+
+impl Drawing {
+    /// The figure as a PNG of 300 dots per inch.
+    ///
+    /// # Errors
+    /// [`ReportError::Png`] if it cannot be rendered.
+    pub fn png(&self) -> Result<Vec<u8>, ReportError> {
+        png::render(&self.svg)
+    }
 }
 
 /// What a figure is drawn from.

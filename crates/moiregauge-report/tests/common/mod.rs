@@ -176,6 +176,8 @@ fn scan(
             settings.seed,
             (set * 100 + index) as u64,
         ),
+        residual: None,
+        excluded: None,
     }
 }
 
@@ -348,6 +350,7 @@ fn good_set(index: usize, axis: Axis, rate: f64, count: usize, settings: &Settin
         forward_backward: mean.as_ref().map(|m| m.twist_strain),
         mean,
         uncorrected: self::mean(&sensor, settings, f64::NAN),
+        checks: None,
         illustration: scans.first().and_then(|s| illustration(s, &mut noise)),
         scans,
     }
@@ -376,6 +379,7 @@ fn poor_set(settings: &Settings) -> SetAnalysis {
         mean: None,
         uncorrected: mean(&[scan.sensor], settings, f64::NAN),
         forward_backward: None,
+        checks: None,
         illustration: None,
         scans: vec![scan],
     }
@@ -398,6 +402,8 @@ pub(crate) fn analysis() -> Analysis {
         lattice: m.lattice,
         twist_strain: m.twist_strain,
         joint: None,
+        drift: None,
+        checks: None,
         consistency: vec![Consistency {
             sets: [sets[0].name.clone(), sets[1].name.clone()],
             drift_sigmas: Some(1.2),

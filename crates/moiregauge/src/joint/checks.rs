@@ -11,12 +11,15 @@ use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
 use rand::RngExt as _;
 
 use super::evaluate::{DRIFT, Linearised, linearise};
-use super::solve::JointFit;
+use super::solve::{JointFit, instability, inverse, solved};
 use crate::rng::stream;
 
 /// Directions in which a scan alone determines a parameter have a residual of zero: below this share
 /// of the largest eigenvalue of S they are left out.
 const NULL: f64 = 1e-6;
+
+/// Damping that holds what nothing determines: times of scans that were not drawn.
+const HELD: f64 = 1e-10;
 
 /// One scan against all others.
 #[derive(Clone, Copy, Debug)]
@@ -27,7 +30,9 @@ pub struct LeftOut {
     pub chi2: f64,
     /// Degrees of freedom of `chi2`.
     pub degrees_of_freedom: usize,
-    /// Where the scan stands from where the fit has it, nm; `None` without linked phases.
+    /// χ² of the others about their own fit, and its degrees of freedom.
+    pub rest: (f64, usize),
+    /// Where the scan stands from where the others have it, nm; `None` without linked phases.
     pub displacement: Option<Vector2<f64>>,
     /// The result without it.
     pub without: Resampled,
@@ -43,11 +48,20 @@ pub struct Resampled {
 }
 
 impl JointFit {
-    /// Every scan against the fit of all others.
+    /// Every scan against the fit of all others. The instability of the positions is estimated anew
+    /// from the others, so that a displaced scan does not excuse itself.
     pub fn leave_one_out(&self) -> Vec<LeftOut> {
-        let rows = self.rows();
-        (0..self.scans(&rows))
-            .filter_map(|scan| self.without(scan, &rows))
+        let scans = 1 + self.sightings.iter().map(|s| s.scan).max().unwrap_or(0);
+        (0..scans)
+            .filter_map(|scan| {
+                let first = Step::new(self, self.instability_nm)?.without(scan)?;
+                if !self.terms.phases {
+                    return Some(first);
+                }
+                let others = self.instability_without(scan, &first.solution);
+                Step::new(self, others)?.without(scan)
+            })
+            .map(|step| step.left_out)
             .collect()
     }
 
@@ -60,26 +74,18 @@ impl JointFit {
         seed: u64,
         name: &str,
     ) -> Vec<Resampled> {
-        let rows = self.rows();
+        let rows = self.rows(&self.solution, self.instability_nm);
         let n = self.solution.len();
         let parts: Vec<(DMatrix<f64>, DVector<f64>)> = blocks
             .iter()
-            .map(|block| {
-                let mut normal = DMatrix::<f64>::zeros(n, n);
-                let mut right = DVector::<f64>::zeros(n);
-                for i in (0..rows.scans.len()).filter(|&i| block.contains(&rows.scans[i])) {
-                    normal.ger(1.0, &rows.jacobian[i], &rows.jacobian[i], 1.0);
-                    right.axpy(rows.residuals[i], &rows.jacobian[i], 1.0);
-                }
-                (normal, right)
-            })
+            .map(|block| normal_equations(&rows, n, |scan| block.contains(&scan)))
             .collect();
-        let scale = parts
+        let diagonal = parts
             .iter()
             .fold(DVector::<f64>::zeros(n), |sum, (normal, _)| {
                 sum + normal.diagonal()
-            })
-            .map(|d| if d > 0.0 { 1.0 / d.sqrt() } else { 1.0 });
+            });
+        let scale = diagonal.map(|d| if d > 0.0 { 1.0 / d.sqrt() } else { 1.0 });
         (0..draws)
             .filter_map(|draw| {
                 let mut rng = stream(seed, name, draw as u64);
@@ -90,39 +96,73 @@ impl JointFit {
                     normal += part;
                     right += side;
                 }
-                // Times of scans that were not drawn are determined by nothing: held by the damping.
-                let scaled = DMatrix::from_fn(n, n, |i, j| {
-                    let held = if i == j { 1e-9 } else { 0.0 };
-                    normal[(i, j)] * scale[i] * scale[j] + held
-                });
-                let step = scaled.cholesky()?.solve(&right.component_mul(&scale));
-                Some(self.moved(&step.component_mul(&scale)))
+                let step = solved(&normal, &right, &scale, HELD)?;
+                Some(resampled(&(&self.solution + step)))
             })
             .collect()
     }
 
-    fn rows(&self) -> Linearised {
+    fn rows(&self, x: &DVector<f64>, instability: f64) -> Linearised {
         linearise(
             &self.sightings,
             &self.layout,
-            &self.solution,
+            x,
             f64::INFINITY,
-            self.instability_nm,
+            instability,
         )
     }
 
-    fn scans(&self, rows: &Linearised) -> usize {
-        rows.scans.iter().max().map_or(0, |last| last + 1)
+    /// The instability that the phases of all other scans show at the solution `x` without `scan`.
+    fn instability_without(&self, scan: usize, x: &DVector<f64>) -> f64 {
+        let rows = self.rows(x, self.instability_nm);
+        let others = |row: usize| rows.scans[row] != scan;
+        instability(&rows, &self.unscaled, &others)
+    }
+}
+
+/// A Gauss–Newton step from the solution with other weights; at its end the gradient is zero.
+struct Step<'a> {
+    fit: &'a JointFit,
+    rows: Linearised,
+    covariance: DMatrix<f64>,
+    solution: DVector<f64>,
+}
+
+/// A scan left out, and the whole solution without it.
+struct Without {
+    left_out: LeftOut,
+    solution: DVector<f64>,
+}
+
+impl<'a> Step<'a> {
+    fn new(fit: &'a JointFit, instability: f64) -> Option<Self> {
+        let mut rows = fit.rows(&fit.solution, instability);
+        let (normal, right) = normal_equations(&rows, fit.solution.len(), |_| true);
+        let scale = normal
+            .diagonal()
+            .map(|d| if d > 0.0 { 1.0 / d.sqrt() } else { 1.0 });
+        let covariance = inverse(&normal, &scale, HELD)?;
+        let step = &covariance * right;
+        for (residual, row) in rows.residuals.iter_mut().zip(&rows.jacobian) {
+            *residual -= row.dot(&step);
+        }
+        Some(Self {
+            fit,
+            rows,
+            covariance,
+            solution: &fit.solution + step,
+        })
     }
 
-    fn without(&self, scan: usize, rows: &Linearised) -> Option<LeftOut> {
+    fn without(&self, scan: usize) -> Option<Without> {
+        let rows = &self.rows;
         let own: Vec<usize> = (0..rows.scans.len())
             .filter(|&i| rows.scans[i] == scan)
             .collect();
         let n = self.solution.len();
         let design = DMatrix::from_fn(own.len(), n, |i, j| rows.jacobian[own[i]][j]);
         let residual = DVector::from_fn(own.len(), |i, _| rows.residuals[own[i]]);
-        let seen = &design * &self.unscaled;
+        let seen = &design * &self.covariance;
         let s = DMatrix::identity(own.len(), own.len()) - &seen * design.transpose();
         let eigen = s.symmetric_eigen();
         let largest = eigen.eigenvalues.max();
@@ -140,19 +180,28 @@ impl JointFit {
                 freedom += 1;
             }
         }
-        let step = -(seen.transpose() * solved);
-        Some(LeftOut {
+        let all: f64 = rows.residuals.iter().map(|r| r * r).sum();
+        let solution = &self.solution - seen.transpose() * solved;
+        let left_out = LeftOut {
             scan,
             chi2,
             degrees_of_freedom: freedom,
-            displacement: self.displacement(scan, rows),
-            without: self.moved(&step),
-        })
-        .filter(|_| freedom > 0)
+            rest: (
+                all - chi2,
+                self.fit.degrees_of_freedom.saturating_sub(freedom),
+            ),
+            displacement: self.fit.displacement(scan, &solution),
+            without: resampled(&solution),
+        };
+        (freedom > 0).then_some(Without { left_out, solution })
     }
+}
 
-    /// Least squares of `G_h·δ = miss_h` over the harmonics and lines of a scan.
-    fn displacement(&self, scan: usize, rows: &Linearised) -> Option<Vector2<f64>> {
+impl JointFit {
+    /// Where a scan stands from where the solution `x` has it: least squares of `G_h·δ = miss_h` over
+    /// its harmonics and lines.
+    fn displacement(&self, scan: usize, x: &DVector<f64>) -> Option<Vector2<f64>> {
+        let rows = self.rows(x, self.instability_nm);
         let g = self.waves.basis;
         let three = [
             g.column(0).into_owned(),
@@ -172,12 +221,26 @@ impl JointFit {
         }
         Some(normal.try_inverse()? * right)
     }
+}
 
-    fn moved(&self, step: &DVector<f64>) -> Resampled {
-        let x = &self.solution + step;
-        Resampled {
-            waves: Matrix2::new(x[0], x[2], x[1], x[3]),
-            velocity: Vector2::new(x[DRIFT], x[DRIFT + 1]),
-        }
+fn resampled(x: &DVector<f64>) -> Resampled {
+    Resampled {
+        waves: Matrix2::new(x[0], x[2], x[1], x[3]),
+        velocity: Vector2::new(x[DRIFT], x[DRIFT + 1]),
     }
+}
+
+/// `XᵀX` and `Xᵀe` of the scans that are wanted.
+fn normal_equations(
+    rows: &Linearised,
+    size: usize,
+    wanted: impl Fn(usize) -> bool,
+) -> (DMatrix<f64>, DVector<f64>) {
+    let mut normal = DMatrix::<f64>::zeros(size, size);
+    let mut right = DVector::<f64>::zeros(size);
+    for i in (0..rows.scans.len()).filter(|&i| wanted(rows.scans[i])) {
+        normal.ger(1.0, &rows.jacobian[i], &rows.jacobian[i], 1.0);
+        right.axpy(rows.residuals[i], &rows.jacobian[i], 1.0);
+    }
+    (normal, right)
 }

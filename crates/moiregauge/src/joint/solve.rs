@@ -3,7 +3,7 @@
 
 use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
 
-use super::evaluate::{DRIFT, Layout, linearise, wrapped};
+use super::evaluate::{DRIFT, Layout, Linearised, linearise, wrapped};
 use super::link::number_blocks;
 use super::{Sighting, Terms};
 use crate::estimate::Estimate;
@@ -11,6 +11,8 @@ use crate::lattice::LatticeVectors;
 
 /// Gauss–Newton steps; the problem is nearly linear.
 const STEPS: usize = 12;
+/// Rounds of estimating the instability and solving with it.
+const ROUNDS: usize = 5;
 /// Relative damping of the normal equations.
 const DAMPING: f64 = 1e-10;
 /// Phases are believed to be linked if they scatter by less than this share of a wavelength.
@@ -254,17 +256,12 @@ impl Problem {
             start_phases(sightings, &layout, &mut x)?;
             link_outwards(sightings, &layout, &mut x, instability.max(0.02))?;
         }
-        let rounds = if terms.phases && given.is_none() {
-            6
-        } else {
-            1
-        };
-        let mut unscaled = DMatrix::zeros(layout.size, layout.size);
-        for _ in 0..rounds {
-            unscaled = iterate(sightings, &layout, &mut x, f64::INFINITY, instability)?;
-            if rounds > 1 {
-                instability =
-                    estimated_instability(sightings, &layout, &x, instability, &unscaled);
+        let mut unscaled = iterate(sightings, &layout, &mut x, f64::INFINITY, instability)?;
+        if terms.phases && given.is_none() {
+            for _ in 0..ROUNDS {
+                let now = linearise(sightings, &layout, &x, f64::INFINITY, instability);
+                instability = self::instability(&now, &unscaled, &|_| true);
+                unscaled = iterate(sightings, &layout, &mut x, f64::INFINITY, instability)?;
             }
         }
         let last = linearise(sightings, &layout, &x, f64::INFINITY, instability);
@@ -398,8 +395,8 @@ fn iterate(
             }
         }
         let scale = normal.diagonal().map(|d| 1.0 / d.sqrt());
-        let mut scaled = DMatrix::from_fn(n, n, |i, j| normal[(i, j)] * scale[i] * scale[j]);
         if layout.phases.is_none() {
+            let scaled = DMatrix::from_fn(n, n, |i, j| normal[(i, j)] * scale[i] * scale[j]);
             let values = scaled.symmetric_eigenvalues();
             if !(values.max() < WORST_CONDITION * values.min()) {
                 return None;
@@ -407,11 +404,7 @@ fn iterate(
         }
         // Near the middle of the campaign offsets and phases may only be seen together; a little
         // damping holds what cannot be told apart and leaves the final solution where it is.
-        for i in 0..n {
-            scaled[(i, i)] += DAMPING;
-        }
-        let inverse = scaled.cholesky()?.inverse();
-        let inverse = DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] * scale[i] * scale[j]);
+        let inverse = inverse(&normal, &scale, DAMPING)?;
         let step = &inverse * &right;
         *x += &step;
         let size = (0..n)
@@ -428,34 +421,33 @@ fn iterate(
     covariance
 }
 
-/// The position scatter s that makes the phases fit: `Σ miss²/(noise² + s²)` becomes the number of
-/// phases less what they determine (Paule and Mandel 1982, J. Res. NBS 87, 377). Zero where the noise
-/// alone explains them.
-fn estimated_instability(
-    sightings: &[Sighting],
-    layout: &Layout,
-    x: &DVector<f64>,
-    current: f64,
+/// The position scatter s that makes the phases of the wanted rows fit: `Σ miss²/(noise² + s²)` becomes
+/// their number less what they determine (Paule and Mandel 1982, J. Res. NBS 87, 377). Zero where the
+/// noise alone explains them.
+pub(super) fn instability(
+    now: &Linearised,
     covariance: &DMatrix<f64>,
+    wanted: &dyn Fn(usize) -> bool,
 ) -> f64 {
-    let now = linearise(sightings, layout, x, f64::INFINITY, current);
-    let freedom: f64 = now
-        .phase_rows
+    let rows = || now.phase_rows.iter().zip(&now.phase_misses);
+    let used: Vec<(&usize, &Estimate)> = rows().filter(|(row, _)| wanted(**row)).collect();
+    let freedom: f64 = used
         .iter()
-        .map(|&i| 1.0 - now.jacobian[i].dot(&(covariance * &now.jacobian[i])))
+        .map(|(row, _)| &now.jacobian[**row])
+        .map(|row| 1.0 - row.dot(&(covariance * row)))
         .sum();
     let excess = |variance: f64| {
-        let squares = now.phase_misses.iter();
-        squares
+        let terms = used.iter().map(|(_, m)| m);
+        terms
             .map(|m| m.value * m.value / (m.sigma * m.sigma + variance))
             .sum::<f64>()
             - freedom
     };
-    let largest: f64 = now.phase_misses.iter().map(|m| m.value * m.value).sum();
     if !(freedom > 0.0 && excess(0.0) > 0.0) {
         return 0.0;
     }
-    let (mut low, mut high) = (0.0, largest / freedom);
+    let squares: f64 = used.iter().map(|(_, m)| m.value * m.value).sum();
+    let (mut low, mut high) = (0.0, squares / freedom);
     for _ in 0..60 {
         let middle = f64::midpoint(low, high);
         if excess(middle) > 0.0 {
@@ -465,4 +457,37 @@ fn estimated_instability(
         }
     }
     high.sqrt()
+}
+
+/// `normal⁻¹ right`, as [`inverse`] does it.
+pub(super) fn solved(
+    normal: &DMatrix<f64>,
+    right: &DVector<f64>,
+    scale: &DVector<f64>,
+    damping: f64,
+) -> Option<DVector<f64>> {
+    let scaled = scaled(normal, scale, damping);
+    let solution = scaled.cholesky()?.solve(&right.component_mul(scale));
+    Some(solution.component_mul(scale))
+}
+
+fn scaled(normal: &DMatrix<f64>, scale: &DVector<f64>, damping: f64) -> DMatrix<f64> {
+    let n = normal.nrows();
+    DMatrix::from_fn(n, n, |i, j| {
+        let held = if i == j { damping } else { 0.0 };
+        normal[(i, j)] * scale[i] * scale[j] + held
+    })
+}
+
+/// Inverse of a normal matrix by way of one with units on its diagonal, a little damped.
+pub(super) fn inverse(
+    normal: &DMatrix<f64>,
+    scale: &DVector<f64>,
+    damping: f64,
+) -> Option<DMatrix<f64>> {
+    let n = normal.nrows();
+    let inverse = scaled(normal, scale, damping).cholesky()?.inverse();
+    Some(DMatrix::from_fn(n, n, |i, j| {
+        inverse[(i, j)] * scale[i] * scale[j]
+    }))
 }

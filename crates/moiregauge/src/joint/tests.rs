@@ -149,7 +149,7 @@ fn leaving_out_is_fitting_without() {
 /// χ² of scans against the others has the mean of its degrees of freedom: 4 per line for the waves, and
 /// with phases 3 per line less 1 for the scan's own clock, which its prior gives back. (50 campaigns of
 /// 10 scans: √(2·14/500) = 0.24, three of them.) A frame that stands 0.15 nm off, thirty times the
-/// error of a position, stands out, and no other does.
+/// error of a position, stands out, and is found to within a fifth of it.
 #[test]
 fn a_scan_that_does_not_fit_stands_out() {
     let drift = Vector2::new(0.5, -0.15) / MINUTE;
@@ -158,7 +158,8 @@ fn a_scan_that_does_not_fit_stands_out() {
         let mut all = sightings(10, drift, Vector2::zeros(), seed);
         let fitted = fit(&all, (&pair(), &drift), TIME_SIGMA).unwrap();
         let left_out = fitted.leave_one_out();
-        assert!(left_out.iter().all(|l| l.degrees_of_freedom == 14));
+        let freedoms: Vec<usize> = left_out.iter().map(|l| l.degrees_of_freedom).collect();
+        assert_eq!(freedoms, [14; 10]);
         mean += left_out.iter().map(|l| l.chi2).sum::<f64>() / 500.0;
         for sighting in all.iter_mut().filter(|s| s.scan == 3) {
             sighting.position += Vector2::new(0.15, 0.0);
@@ -168,7 +169,7 @@ fn a_scan_that_does_not_fit_stands_out() {
         left_out.sort_by(|a, b| b.chi2.total_cmp(&a.chi2));
         worst += u32::from(left_out[0].scan == 3);
         let displaced = left_out[0].displacement.unwrap();
-        others += u32::from((displaced - Vector2::new(-0.135, 0.0)).norm() > 0.03);
+        others += u32::from((displaced - Vector2::new(-0.15, 0.0)).norm() > 0.03);
     }
     assert!((13.2..14.8).contains(&mean), "{mean}");
     assert_eq!((worst, others), (50, 0));

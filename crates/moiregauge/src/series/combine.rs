@@ -3,9 +3,11 @@
 use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
 
 use super::measure::MeasuredScan;
-use super::set::{joint_fit, terms};
+use super::set::{checks as set_checks, joint_fit, terms};
+use super::sightings::middle_of_frame;
 
-use crate::analysis::{Combined, Consistency, SetAnalysis, SetMean};
+use crate::analysis::{Combined, Consistency, Drift, SetAnalysis, SetMean};
+use crate::joint::JointFit;
 use crate::caveat::Caveat;
 use crate::lattice::LatticeVectors;
 use crate::lattice::reciprocal::{labelled_like, real_from_reciprocal};
@@ -14,6 +16,8 @@ use crate::strain::twist_strain;
 
 /// Wavelengths that differ by more than this are not of the same lattice.
 const SAME_LATTICE: f64 = 0.05;
+/// χ² of two components beyond which the drift of a set is not that of all sets.
+const CONTRADICTION: f64 = 18.4;
 /// Sets this many σ apart deserve a word.
 const APART: f64 = 3.0;
 
@@ -40,14 +44,41 @@ pub(super) fn combine(
         return None;
     }
     let mut lattice = weighted_mean(&means)?;
-    let mut joint_terms = None;
-    if let Some((scans, reference)) = joint.filter(|(scans, _)| !scans.is_empty())
-        && let Some(drift) = sets.iter().find_map(|s| s.drift.as_ref())
-        && let Some((fit, _)) = joint_fit(scans, &reference, (&lattice, &drift.velocity), settings)
+    let (mut joint_terms, mut drift, mut checks) = (None, None, None);
+    if let ([one], Some(set)) = (sets, sets.first()) {
+        // Nothing to combine: the set has it all.
+        lattice = first.lattice;
+        joint_terms = one.drift.as_ref().and_then(|d| d.joint.clone());
+        drift = joint_terms.is_some().then(|| set.drift.clone()).flatten();
+        checks.clone_from(&set.checks);
+    } else if let Some((scans, reference)) = joint.filter(|(scans, _)| !scans.is_empty())
+        && let Some(start) = sets.iter().find_map(|s| s.drift.as_ref())
+        && let Some(fit) = joint_fit(scans, &reference, (&lattice, &start.velocity), settings)
         && let Some(fitted) = real_from_reciprocal(&fit.waves)
     {
-        lattice = labelled_like(&fitted, &reference);
-        joint_terms = Some(terms(&fit));
+        if let Some(set) = contradiction(sets, scans, &fit) {
+            caveats.push(Caveat::new(
+                "drift-not-joined",
+                "analysis",
+                format!(
+                    "no smooth drift describes all sets: it contradicts that of {set}; the lattices of \
+                     the sets, each with its own drift, are averaged instead"
+                ),
+            ));
+        } else {
+            lattice = labelled_like(&fitted, &reference);
+            joint_terms = Some(terms(&fit));
+            drift = Some(Drift {
+                velocity: fit.velocity,
+                covariance: fit.velocity_covariance,
+                given: false,
+                fit: None,
+                monte_carlo: None,
+                joint: joint_terms.clone(),
+            });
+            let left_out = fit.leave_one_out();
+            checks = Some(set_checks(&fit, &left_out, scans, ("all sets", settings)));
+        }
     }
     let consistency = consistency(sets);
     for pair in &consistency {
@@ -71,8 +102,39 @@ pub(super) fn combine(
         lattice,
         twist_strain,
         joint: joint_terms,
+        drift,
+        checks,
         consistency,
     })
+}
+
+/// The first set whose own drift is not that of the joint fit at its time: χ² of two components beyond
+/// 18.4 (p = 10⁻⁴).
+fn contradiction<'a>(
+    sets: &'a [SetAnalysis],
+    scans: &[&MeasuredScan],
+    fit: &JointFit,
+) -> Option<&'a str> {
+    sets.iter()
+        .find(|set| {
+            let times: Vec<f64> = scans
+                .iter()
+                .filter(|scan| set.scans.iter().any(|s| s.file == scan.file))
+                .filter_map(|scan| middle_of_frame(scan))
+                .collect();
+            let Some(drift) = set.drift.as_ref().filter(|_| !times.is_empty()) else {
+                return false;
+            };
+            let first = times.iter().copied().fold(f64::INFINITY, f64::min);
+            let last = times.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+            let (velocity, covariance) = fit.velocity_at(f64::midpoint(first, last));
+            let apart = sigmas(
+                &(drift.velocity - velocity),
+                &(drift.covariance + covariance),
+            );
+            apart.is_some_and(|s| s * s > CONTRADICTION)
+        })
+        .map(|set| set.name.as_str())
 }
 
 /// Generalised mean of the four components, its covariance enlarged where the sets scatter.

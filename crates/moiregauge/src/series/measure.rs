@@ -39,6 +39,8 @@ pub struct MeasuredScan {
     pub set: Option<String>,
     /// One entry for each line direction that was used.
     pub lines: Vec<MeasuredLine>,
+    /// Why it is shown but not used; `None` where it is used.
+    pub excluded: Option<String>,
     /// Doubts about this scan.
     pub caveats: Vec<Caveat>,
 }
@@ -172,6 +174,7 @@ pub fn measure_scan(
         size_nm: scan.size_nm,
         set: None,
         lines,
+        excluded: None,
         caveats,
     })
 }

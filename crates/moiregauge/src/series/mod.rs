@@ -30,12 +30,14 @@ use crate::settings::{Background, Method, Settings};
 /// out, and a caveat says why.
 pub fn analyse(scans: Vec<MeasuredScan>, settings: &Settings) -> Analysis {
     let mut caveats = about_settings(settings);
+    let mut scans = scans;
+    exclude(&mut scans, settings, &mut caveats);
     let groups = group::groups(scans, settings.grouping);
     let mut reference: Option<Matrix2<f64>> = None;
     let mut sets = Vec::with_capacity(groups.len());
     let mut joint_scans = Vec::new();
     let mut index = 0;
-    for group in groups {
+    for mut group in groups {
         if let Some(line) = group.scans.first().and_then(|s| s.lines.first())
             && reference.is_none()
         {
@@ -46,17 +48,17 @@ pub fn analyse(scans: Vec<MeasuredScan>, settings: &Settings) -> Analysis {
         }
         let Some(reference) = reference else { continue };
         let count = group.scans.len() as u64;
-        if settings.method.is_joint() && settings.drift.is_none() {
-            joint_scans.extend(group.scans.iter().cloned());
-        }
         sets.push(set::analyse_set(
-            group,
+            &mut group,
             &reference,
             settings,
             index,
             &mut caveats,
         ));
         index += count;
+        if settings.method.is_joint() && settings.drift.is_none() {
+            joint_scans.extend(group.scans.into_iter().filter(|s| s.excluded.is_none()));
+        }
     }
     let all: Vec<&MeasuredScan> = joint_scans.iter().collect();
     let joint = reference.map(|reference| (all.as_slice(), reference));
@@ -67,6 +69,42 @@ pub fn analyse(scans: Vec<MeasuredScan>, settings: &Settings) -> Analysis {
         combined,
         caveats,
     }
+}
+
+/// Marks the scans that the user does not want; a name that fits none of them deserves a word.
+fn exclude(scans: &mut [MeasuredScan], settings: &Settings, caveats: &mut Vec<Caveat>) {
+    for pattern in &settings.exclude {
+        let mut found = false;
+        for scan in scans.iter_mut().filter(|s| names(pattern, &s.file)) {
+            scan.excluded = Some("the user excluded it".to_owned());
+            found = true;
+        }
+        if !found {
+            caveats.push(Caveat::new(
+                "nothing-excluded",
+                "analysis",
+                format!("--exclude {pattern:?} fits none of the scans"),
+            ));
+        }
+    }
+}
+
+/// Whether a pattern names a file: by its whole path or by its last part; `*` is any characters.
+fn names(pattern: &str, file: &str) -> bool {
+    let last = file.rfind(['/', '\\']).map_or(file, |i| &file[i + 1..]);
+    matches(pattern, last) || matches(pattern, file)
+}
+
+fn matches(pattern: &str, text: &str) -> bool {
+    let Some((start, rest)) = pattern.split_once('*') else {
+        return pattern == text;
+    };
+    let Some(text) = text.strip_prefix(start) else {
+        return false;
+    };
+    (0..=text.len())
+        .filter(|&i| text.is_char_boundary(i))
+        .any(|i| matches(rest, &text[i..]))
 }
 
 /// What the choice of settings does to the numbers.
@@ -89,4 +127,20 @@ fn about_settings(settings: &Settings) -> Vec<Caveat> {
         );
     }
     caveats
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn patterns_name_files() {
+        assert!(names("b.spm", "a/b.spm"));
+        assert!(names("a/b.spm", "a/b.spm"));
+        assert!(names("*.00?", "x.00?"));
+        assert!(names("tbg*3.spm", "C:\\data\\tbg.0_00003.spm"));
+        assert!(names("µ*", "µm scan"));
+        assert!(!names("b", "a/b.spm"));
+        assert!(!names("*.spm", "a/b.sxm"));
+    }
 }

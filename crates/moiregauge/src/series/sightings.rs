@@ -49,7 +49,7 @@ pub(super) fn sightings(
 }
 
 /// Time of the middle of a frame, s from an arbitrary day. The header's time is that of its end.
-fn middle_of_frame(scan: &MeasuredScan) -> Option<f64> {
+pub(super) fn middle_of_frame(scan: &MeasuredScan) -> Option<f64> {
     let rows = scan.lines.first()?.geometry.size[1] as f64;
     Some(seconds(scan.acquired?) - 0.5 * rows / scan.line_rate_hz?)
 }

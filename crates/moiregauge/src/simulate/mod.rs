@@ -58,6 +58,11 @@ impl Simulator {
         frame::record(&self.settings, &self.scene, &plan)
     }
 
+    /// The wave vectors (rad/nm) and amplitudes (degrees of phase) of one half of the harmonics.
+    pub(crate) fn harmonics(&self) -> impl Iterator<Item = (nalgebra::Vector2<f64>, f64)> {
+        self.scene.harmonics.iter().map(|h| (h.wave, h.amplitude))
+    }
+
     /// Everything needed to check an analysis of the frames.
     pub fn truth(&self) -> Truth {
         truth::truth(&self.settings, &self.scene)

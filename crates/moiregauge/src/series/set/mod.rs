@@ -1,23 +1,26 @@
 //! One set: drift, and every scan before and after correction.
 
-use nalgebra::{Matrix2, Matrix4, Vector2};
+mod joint;
+mod scan;
+
+use nalgebra::{Matrix2, Vector2};
 use rayon::prelude::*;
 use spmfile::FrameDirection;
 
+pub(super) use joint::{checks, joint_fit, terms};
+use scan::{plain_mean, scan_analysis};
+
 use super::group::Group;
-use super::measure::{MeasuredLine, MeasuredScan};
-use super::sightings::sightings;
+use super::measure::MeasuredScan;
 use crate::analysis::{
-    Axis, Drift, DriftFit, JointTerms, LineAnalysis, ScanAnalysis, SetAnalysis, SetMean,
+    Axis, Checks, Drift, DriftFit, Residual, ScanAnalysis, SetAnalysis, SetMean,
 };
 use crate::caveat::Caveat;
 use crate::drift::paper::{PaperScan, pairwise_drift};
 use crate::drift::{Observation, common_lattice, monte_carlo, solve};
-use crate::estimate::Estimate;
 use crate::geometry::mean_and_spread;
-use crate::joint::{JointFit, fit};
 use crate::lattice::LatticeVectors;
-use crate::lattice::reciprocal::{labelled_like, real_from_reciprocal, reciprocal};
+use crate::lattice::reciprocal::{labelled_like, real_from_reciprocal};
 use crate::settings::{GivenDrift, Settings};
 use crate::strain::{TwistStrain, draws, twist_strain};
 
@@ -27,8 +30,9 @@ const PER_MINUTE: f64 = 1.0 / 60.0;
 const LARGE_CHI2: f64 = 2.0;
 
 /// Everything about one set but its illustration. `first_index` numbers its scans for the draws.
+/// Scans that are left out by rule are marked in the group.
 pub(super) fn analyse_set(
-    group: Group,
+    group: &mut Group,
     reference: &Matrix2<f64>,
     settings: &Settings,
     first_index: u64,
@@ -39,30 +43,50 @@ pub(super) fn analyse_set(
         .iter()
         .map(|scan| observations(scan, reference))
         .collect();
-    let all: Vec<Observation> = observations.concat();
-    let timed = group
-        .scans
-        .iter()
-        .all(|s| s.lines.iter().all(|l| l.timing.is_some()));
-    let mut solved = drift(&group, &all, timed, settings, caveats);
-    if settings.method.is_joint() && settings.drift.is_none() {
-        let scans: Vec<&MeasuredScan> = group.scans.iter().collect();
-        solved = solved.map(|linear| jointly(linear, &scans, reference, settings));
+    let joint = settings.method.is_joint() && settings.drift.is_none();
+    if joint && settings.exclude_outliers {
+        leave_out(group, &observations, reference, settings, caveats);
+    }
+    let kept: Vec<usize> = (0..group.scans.len())
+        .filter(|&i| group.scans[i].excluded.is_none())
+        .collect();
+    let used: Vec<&MeasuredScan> = kept.iter().map(|&i| &group.scans[i]).collect();
+    let all: Vec<Observation> = kept.iter().flat_map(|&i| &observations[i]).copied().collect();
+    let mut solved = drift((&group.name, &used), &all, settings, caveats);
+    let mut fit = None;
+    if joint {
+        (solved, fit) = match solved {
+            Some(linear) => {
+                let (solved, fit) = joint::jointly(linear, &used, reference, settings);
+                (Some(solved), fit)
+            }
+            None => (None, None),
+        };
     }
     let mut scans: Vec<ScanAnalysis> = group
         .scans
         .iter()
         .zip(&observations)
-        .enumerate()
-        .filter_map(|(i, (scan, seen))| {
+        .filter_map(|(scan, seen)| {
             let drift = solved.as_ref().map(|s| {
-                let own = s.velocities.get(i);
-                own.copied()
-                    .unwrap_or((s.drift.velocity, s.drift.covariance))
+                let own = fit.as_ref().and_then(|fit| joint::velocity_of(fit, scan));
+                own.unwrap_or((s.drift.velocity, s.drift.covariance))
             });
             scan_analysis(scan, seen, reference, drift, settings)
         })
         .collect();
+    let checks = fit.as_ref().map(|fit| {
+        let left_out = fit.leave_one_out();
+        let residuals = joint::residuals(&left_out);
+        for (one, residual) in left_out.iter().zip(residuals) {
+            let file = &used[one.scan].file;
+            if let Some(scan) = scans.iter_mut().find(|s| s.file == *file) {
+                scan.residual = Some(residual);
+                about_residual(file, &residual, settings, caveats);
+            }
+        }
+        joint::checks(fit, &left_out, &used, (&group.name, settings))
+    });
     let material = &settings.material;
     let convention = settings.strain_convention;
     scans.par_iter_mut().enumerate().for_each(|(i, scan)| {
@@ -77,33 +101,62 @@ pub(super) fn analyse_set(
             index,
         );
     });
+    let of_set = || scans.iter().filter(|s| s.excluded.is_none());
     let uncorrected = common_lattice(&all, &Vector2::zeros(), &Matrix2::zeros())
         .ok()
         .and_then(|common| {
             let of = |s: &ScanAnalysis| (s.twist_strain_sensor, s.sensor);
-            set_mean(common, scans.iter().map(of), settings)
+            set_mean(common, of_set().map(of), settings)
         });
     let mean = solved.as_ref().and_then(|s| {
         let of = |s: &ScanAnalysis| (s.twist_strain, s.drift_corrected.unwrap_or(s.sensor));
         set_mean(
             (s.lattice, s.chi2, s.freedom),
-            scans.iter().map(of),
+            of_set().map(of),
             settings,
         )
     });
     let drift = solved.map(|s| s.drift);
     about_mean(&group.name, mean.as_ref(), caveats);
+    about_checks(&group.name, (checks.as_ref(), drift.as_ref(), mean.as_ref()), kept.len(), caveats);
     SetAnalysis {
-        name: group.name,
+        name: group.name.clone(),
         slow_axis: group.slow_axis,
         line_rate_hz: group.line_rate_hz,
-        channel: group.channel,
-        forward_backward: forward_backward(&scans, settings),
+        channel: group.channel.clone(),
+        forward_backward: forward_backward(of_set(), settings),
         scans,
         drift,
         mean,
         uncorrected,
+        checks,
         illustration: None,
+    }
+}
+
+/// Marks the scans that do not fit the others.
+fn leave_out(
+    group: &mut Group,
+    observations: &[Vec<Observation>],
+    reference: &Matrix2<f64>,
+    settings: &Settings,
+    caveats: &mut Vec<Caveat>,
+) {
+    let kept: Vec<usize> = (0..group.scans.len())
+        .filter(|&i| group.scans[i].excluded.is_none())
+        .collect();
+    let scans: Vec<&MeasuredScan> = kept.iter().map(|&i| &group.scans[i]).collect();
+    let seen: Vec<&[Observation]> = kept.iter().map(|&i| observations[i].as_slice()).collect();
+    for i in joint::outliers(&scans, &seen, reference, settings) {
+        let scan = &mut group.scans[kept[i]];
+        let reason = "it does not fit the others (leave-one-out χ², p < 0.001 divided by the number \
+                      of scans)";
+        scan.excluded = Some(reason.to_owned());
+        caveats.push(Caveat::new(
+            "scan-left-out",
+            &scan.file,
+            format!("left out by --exclude-outliers: {reason}"),
+        ));
     }
 }
 
@@ -113,64 +166,6 @@ struct Solved {
     lattice: LatticeVectors,
     chi2: f64,
     freedom: usize,
-    /// The drift during each scan, where it is not the same for all.
-    velocities: Vec<(Vector2<f64>, Matrix2<f64>)>,
-}
-
-/// Refines the linear solution of a set with the phases of its scans; keeps it where they do not help.
-fn jointly(
-    linear: Solved,
-    scans: &[&MeasuredScan],
-    reference: &Matrix2<f64>,
-    settings: &Settings,
-) -> Solved {
-    let start = (&linear.lattice, &linear.drift.velocity);
-    let Some((fit, times)) = joint_fit(scans, reference, start, settings) else {
-        return linear;
-    };
-    let Some(lattice) = real_from_reciprocal(&fit.waves) else {
-        return linear;
-    };
-    Solved {
-        drift: Drift {
-            velocity: fit.velocity,
-            covariance: fit.velocity_covariance,
-            joint: Some(terms(&fit)),
-            ..linear.drift
-        },
-        lattice: labelled_like(&lattice, reference),
-        chi2: fit.chi2,
-        freedom: fit.degrees_of_freedom,
-        velocities: times.iter().map(|t| fit.velocity_at(*t)).collect(),
-    }
-}
-
-/// The joint fit of some scans and the times of their middles; `None` without timing.
-pub(super) fn joint_fit(
-    scans: &[&MeasuredScan],
-    reference: &Matrix2<f64>,
-    (lattice, velocity): (&LatticeVectors, &Vector2<f64>),
-    settings: &Settings,
-) -> Option<(JointFit, Vec<f64>)> {
-    let sightings = sightings(scans, reference)?;
-    let waves = labelled_like(&real_from_reciprocal(lattice)?, &reciprocal(reference)?);
-    let fitted = fit(&sightings, (&waves.basis, velocity), settings.frame_time_sigma_s)?;
-    let times = (0..scans.len())
-        .filter_map(|i| sightings.iter().find(|s| s.scan == i))
-        .map(|s| s.time)
-        .collect();
-    Some((fitted, times))
-}
-
-/// What a joint fit has beside a constant drift.
-pub(super) fn terms(fit: &JointFit) -> JointTerms {
-    JointTerms {
-        phases: fit.terms.phases,
-        acceleration: fit.acceleration,
-        settling_s: fit.terms.settling,
-        fast_gain: fit.fast_gain,
-        instability_nm: fit.instability_nm,
-    }
 }
 
 fn observations(scan: &MeasuredScan, reference: &Matrix2<f64>) -> Vec<Observation> {
@@ -188,22 +183,24 @@ fn observations(scan: &MeasuredScan, reference: &Matrix2<f64>) -> Vec<Observatio
 }
 
 fn drift(
-    group: &Group,
+    (name, scans): (&str, &[&MeasuredScan]),
     all: &[Observation],
-    timed: bool,
     settings: &Settings,
     caveats: &mut Vec<Caveat>,
 ) -> Option<Solved> {
-    if !timed {
+    if scans.is_empty() {
+        return None;
+    }
+    if scans.iter().any(|s| s.lines.iter().any(|l| l.timing.is_none())) {
         caveats.push(Caveat::new(
             "no-timing",
-            &group.name,
+            name,
             "not every file tells its line rate and frame direction: nothing is corrected for drift",
         ));
         return None;
     }
     if let Some(given) = settings.drift {
-        return given_drift(group, all, given, caveats);
+        return given_drift(name, all, given, caveats);
     }
     match solve(all) {
         Ok(solution) => {
@@ -211,7 +208,7 @@ fn drift(
             let mut lattice = solution.lattice;
             lattice.covariance *= scale;
             let seed = settings.seed;
-            let name = format!("drift {}", group.name);
+            let stream = format!("drift {name}");
             Some(Solved {
                 drift: Drift {
                     velocity: solution.velocity,
@@ -222,21 +219,20 @@ fn drift(
                         condition: solution.condition,
                         chi2: solution.chi2,
                         degrees_of_freedom: solution.degrees_of_freedom,
-                        paper_velocity: pairwise_drift(&paper_scans(group, all)),
+                        paper_velocity: pairwise_drift(&paper_scans(scans, all)),
                     }),
-                    monte_carlo: monte_carlo(all, settings.drift_draws, seed, &name),
+                    monte_carlo: monte_carlo(all, settings.drift_draws, seed, &stream),
                     joint: None,
                 },
                 lattice,
                 chi2: solution.chi2,
                 freedom: solution.degrees_of_freedom,
-                velocities: Vec::new(),
             })
         }
         Err(error) => {
             caveats.push(Caveat::new(
                 "drift-undetermined",
-                &group.name,
+                name,
                 error.to_string(),
             ));
             None
@@ -245,7 +241,7 @@ fn drift(
 }
 
 fn given_drift(
-    group: &Group,
+    name: &str,
     all: &[Observation],
     given: GivenDrift,
     caveats: &mut Vec<Caveat>,
@@ -255,7 +251,7 @@ fn given_drift(
     let covariance = Matrix2::identity() * sigma * sigma;
     caveats.push(Caveat::new(
         "drift-given",
-        &group.name,
+        name,
         "the drift was given by the user and not measured; it is as right as the conditions are the same",
     ));
     let (mut lattice, chi2, freedom) = common_lattice(all, &velocity, &covariance).ok()?;
@@ -274,7 +270,6 @@ fn given_drift(
         lattice,
         chi2,
         freedom,
-        velocities: Vec::new(),
     })
 }
 
@@ -287,8 +282,8 @@ fn excess(chi2: f64, freedom: usize) -> f64 {
 }
 
 /// The scans as the published estimate wants them: signed velocities in laboratory axes.
-fn paper_scans(group: &Group, all: &[Observation]) -> Vec<PaperScan> {
-    let lines = group.scans.iter().flat_map(|s| &s.lines);
+fn paper_scans(scans: &[&MeasuredScan], all: &[Observation]) -> Vec<PaperScan> {
+    let lines = scans.iter().flat_map(|s| &s.lines);
     lines
         .zip(all)
         .filter_map(|(line, seen)| {
@@ -311,98 +306,6 @@ fn paper_scans(group: &Group, all: &[Observation]) -> Vec<PaperScan> {
             })
         })
         .collect()
-}
-
-fn scan_analysis(
-    scan: &MeasuredScan,
-    seen: &[Observation],
-    reference: &Matrix2<f64>,
-    drift: Option<(Vector2<f64>, Matrix2<f64>)>,
-    settings: &Settings,
-) -> Option<ScanAnalysis> {
-    let (sensor, _, _) = common_lattice(seen, &Vector2::zeros(), &Matrix2::zeros()).ok()?;
-    let drift_corrected = drift
-        .and_then(|(velocity, covariance)| common_lattice(seen, &velocity, &covariance).ok())
-        .map(|(lattice, _, _)| lattice);
-    let nominal: Option<Vec<LatticeVectors>> = scan
-        .lines
-        .iter()
-        .map(|l| Some(labelled_like(&l.in_nominal_coordinates()?, reference)))
-        .collect();
-    let strain = |lattice: &LatticeVectors| {
-        twist_strain(lattice, &settings.material, settings.strain_convention).ok()
-    };
-    let first = scan.lines.first()?;
-    let mean = |f: &dyn Fn(&MeasuredLine) -> Estimate| {
-        let all: Vec<Estimate> = scan.lines.iter().map(f).collect();
-        let n = all.len() as f64;
-        Estimate::new(
-            all.iter().map(|e| e.value).sum::<f64>() / n,
-            (all.iter().map(|e| e.sigma.powi(2)).sum::<f64>() / n).sqrt(),
-        )
-    };
-    Some(ScanAnalysis {
-        file: scan.file.clone(),
-        acquired: scan.acquired,
-        frame_direction: scan.frame_direction.unwrap_or(FrameDirection::Up),
-        lines: scan
-            .lines
-            .iter()
-            .zip(seen)
-            .map(|(line, seen)| line_analysis(line, seen, reference))
-            .collect(),
-        window_centre: first.geometry.centre(),
-        window_extent: first.geometry.extent(),
-        fast_velocity: mean(&|l| l.speeds[0]),
-        slow_velocity: mean(&|l| l.speeds[1]),
-        nominal: nominal.and_then(|all| plain_mean(&all)),
-        twist_strain_sensor: strain(&sensor),
-        twist_strain: drift_corrected.as_ref().and_then(strain),
-        sensor,
-        drift_corrected,
-        draws: Vec::new(),
-    })
-}
-
-fn line_analysis(
-    line: &MeasuredLine,
-    seen: &Observation,
-    reference: &Matrix2<f64>,
-) -> LineAnalysis {
-    let comparison = line
-        .lattice
-        .comparison
-        .map(|pixels| labelled_like(&pixels.mapped(&line.geometry.pixel_to_nm), reference));
-    LineAnalysis {
-        line: line.line,
-        pixels: labelled_pixels(line, seen),
-        sensor: seen.lattice,
-        comparison,
-        shortcut_wavelengths: line.lattice.shortcut_wavelengths,
-        pixel_to_nm: line.geometry.pixel_to_nm,
-        origin: line.geometry.origin,
-        from_sensors: line.geometry.from_sensors,
-        periods: line.lattice.periods,
-        signal_to_noise: line.lattice.signal_to_noise,
-    }
-}
-
-/// The vectors in pixels under the names that they have in sensor coordinates.
-fn labelled_pixels(line: &MeasuredLine, seen: &Observation) -> LatticeVectors {
-    let pixels = &line.lattice.pixels;
-    match line.geometry.pixel_to_nm.try_inverse() {
-        Some(inverse) => labelled_like(pixels, &(inverse * seen.lattice.basis)),
-        None => *pixels,
-    }
-}
-
-/// Unweighted mean of independent lattices.
-fn plain_mean(all: &[LatticeVectors]) -> Option<LatticeVectors> {
-    let n = all.len() as f64;
-    (n > 0.0).then(|| LatticeVectors {
-        basis: all.iter().map(|l| l.basis).sum::<Matrix2<f64>>() / n,
-        covariance: all.iter().map(|l| l.covariance).sum::<Matrix4<f64>>() / (n * n),
-    })
 }
 
 /// Twist and strain of the common lattice, and how the scans scatter about it.
@@ -440,10 +343,13 @@ fn set_mean(
 ///
 /// With opposite time gradients the mean is free of constant drift exactly: a check that needs no
 /// drift estimate.
-fn forward_backward(scans: &[ScanAnalysis], settings: &Settings) -> Option<TwistStrain> {
+fn forward_backward<'a>(
+    scans: impl Iterator<Item = &'a ScanAnalysis> + Clone,
+    settings: &Settings,
+) -> Option<TwistStrain> {
     let mean = |direction: FrameDirection| {
         let reciprocal: Vec<LatticeVectors> = scans
-            .iter()
+            .clone()
             .filter(|s| s.frame_direction == direction)
             .filter_map(|s| real_from_reciprocal(&s.sensor))
             .collect();
@@ -485,6 +391,68 @@ fn about_mean(name: &str, mean: Option<&SetMean>, caveats: &mut Vec<Caveat>) {
                  confidence and has no axis",
                 mean.twist_strain.strain_p_value(),
                 mean.twist_strain.strain_upper_limit_95() * 100.0
+            ),
+        ));
+    }
+}
+
+fn about_residual(file: &str, residual: &Residual, settings: &Settings, caveats: &mut Vec<Caveat>) {
+    if !residual.outlying {
+        return;
+    }
+    let place = residual.displacement.map_or(String::new(), |d| {
+        format!(", {:.3} nm from where the others have it", d.norm())
+    });
+    let then = if settings.exclude_outliers {
+        "more than a fifth of the scans are never left out by rule"
+    } else {
+        "it is used all the same; --exclude NAME or --exclude-outliers leaves it out"
+    };
+    caveats.push(Caveat::new(
+        "outlying-scan",
+        file,
+        format!(
+            "the scan does not fit the others (χ² = {:.0} for {} degrees of freedom, p = {:.0e}{place}); {then}",
+            residual.chi2, residual.degrees_of_freedom, residual.p_value
+        ),
+    ));
+}
+
+/// Says where the scatter of `n` scans makes clearly larger errors than those stated: by more than four
+/// times the scatter of such a comparison, 1/√(2(n − 1)).
+fn about_checks(
+    name: &str,
+    (checks, drift, mean): (Option<&Checks>, Option<&Drift>, Option<&SetMean>),
+    n: usize,
+    caveats: &mut Vec<Caveat>,
+) {
+    let (Some(found), Some(drift), Some(mean)) =
+        (checks.and_then(|c| c.leave_one_out), drift, mean)
+    else {
+        return;
+    };
+    let strain = mean.twist_strain.strain_covariance();
+    let stated = [
+        ("drift x", found.drift[0], drift.covariance.m11.sqrt()),
+        ("drift y", found.drift[1], drift.covariance.m22.sqrt()),
+        ("twist", found.twist, mean.twist_strain.twist().sigma),
+        ("strain along x and y", found.strain[0], strain.m11.sqrt()),
+        ("strain along the diagonals", found.strain[1], strain.m22.sqrt()),
+    ];
+    let limit = 1.0 + 4.0 / (2.0 * (n as f64 - 1.0)).sqrt();
+    let large: Vec<String> = stated
+        .iter()
+        .filter(|(_, found, stated)| *found > limit * stated)
+        .map(|(what, found, stated)| format!("{what} {:.1} times", found / stated))
+        .collect();
+    if !large.is_empty() {
+        caveats.push(Caveat::new(
+            "scatter-of-scans",
+            name,
+            format!(
+                "leaving out one scan at a time makes larger errors than those stated: {}; trust the \
+                 larger ones",
+                large.join(", ")
             ),
         ));
     }

@@ -1,0 +1,186 @@
+//! The Cramér–Rao bound of a simulated set: the errors below which nobody gets.
+//!
+//! One harmonic `A cos(q·n + φ)` in N pixels of white noise σ (amplitude, phase and background free)
+//! tells q, in each direction of n columns or rows, with the information `A² N (n² − 1)/24σ²`, and its
+//! phase at the middle of the frame with `A² N/2σ²`, independent of q. The harmonics of one lattice add
+//! up; frames and line directions add up in the joint fit, whose covariance for exact sightings is the
+//! bound. Line noise, tip events and harmonics that overlap on a small frame raise it; they are left out.
+//!
+//! # References
+//! Rife and Boorstyn, Bell Syst. Tech. J. 55, 1389 (1976), for one wave.
+
+use nalgebra::{Matrix2, Matrix4, Vector2};
+
+use crate::estimate::Estimate;
+use crate::joint::{Sighting, fit};
+use crate::lattice::LatticeVectors;
+use crate::lattice::reciprocal::{real_from_reciprocal, reciprocal};
+use crate::simulate::{FrameTruth, Simulator};
+use crate::strain::twist_strain;
+
+/// The smallest possible standard errors of a set.
+#[derive(Clone, Copy, Debug)]
+pub struct Bound {
+    /// Of the drift along x and y, nm/s.
+    pub drift: [f64; 2],
+    /// Of the twist, rad.
+    pub twist: f64,
+    /// Of the components of the strain vector.
+    pub strain: [f64; 2],
+    /// Whether the phases of successive frames can be linked under these conditions.
+    pub linked: bool,
+}
+
+/// The bound for the frames of `simulator`, with frame times known to `time_sigma` (s) and, if `linked`,
+/// with their phases.
+///
+/// `None` without pixel noise, or where the frames do not determine drift and lattice.
+pub fn cramer_rao(simulator: &Simulator, time_sigma: f64, linked: bool) -> Option<Bound> {
+    let settings = simulator.settings();
+    let truth = simulator.truth();
+    let [first, second, _] = truth.lattice_vectors_nm.map(Vector2::from);
+    // Two of the shortest wave vectors that stand at 60°: their difference is the third.
+    let dual = reciprocal(&Matrix2::from_columns(&[first, second]))?;
+    let (k1, k2) = (dual.column(0).into_owned(), dual.column(1).into_owned());
+    let second = if k1.dot(&k2) > 0.0 { k2 } else { k1 + k2 };
+    let pair = Matrix2::from_columns(&[k1, second]);
+    let drift = Vector2::from(truth.mean_drift_nm_per_min) / 60.0;
+    let mut sightings = Vec::new();
+    for (scan, frame) in truth.frames.iter().enumerate() {
+        let lines = [Some(0), settings.raster.retrace.then_some(1)];
+        for class in lines.into_iter().flatten() {
+            let image = ideal(simulator, frame, (&pair, &drift), class)?;
+            sightings.push(Sighting {
+                scan,
+                phases: image.phases.filter(|_| linked),
+                ..image
+            });
+        }
+    }
+    let found = fit(&sightings, (&pair, &drift), time_sigma)?;
+    let lattice = real_from_reciprocal(&found.waves)?;
+    let material = &settings.sample.material;
+    let strain = twist_strain(&lattice, material, settings.sample.strain_convention).ok()?;
+    let root = |variance: f64| variance.max(0.0).sqrt();
+    let (c, e) = (found.velocity_covariance, strain.strain_covariance());
+    Some(Bound {
+        drift: [root(c.m11), root(c.m22)],
+        twist: strain.twist().sigma,
+        strain: [root(e.m11), root(e.m22)],
+        linked: found.terms.phases,
+    })
+}
+
+/// What one line direction (class 0 trace, 1 retrace) of a frame shows exactly, with the errors that it
+/// has to have.
+fn ideal(
+    simulator: &Simulator,
+    frame: &FrameTruth,
+    (pair, drift): (&Matrix2<f64>, &Vector2<f64>),
+    class: usize,
+) -> Option<Sighting> {
+    let settings = simulator.settings();
+    let noise = settings.noise.pixel_deg;
+    if !(noise > 0.0) {
+        return None;
+    }
+    let [[a, b], [c, d]] = frame.pixel_to_nm;
+    let j = Matrix2::new(a, b, c, d);
+    let tau = Vector2::from(if class == 0 {
+        frame.trace_time_per_pixel_s
+    } else {
+        frame.retrace_time_per_pixel_s
+    });
+    let u = j.try_inverse()?.transpose() * tau;
+    let [columns, rows] = settings.raster.pixels.map(|n| n as f64);
+    let pixels = columns * rows;
+    // Of (q_x, q_y), per squared amplitude over noise.
+    let spread = Matrix2::new(columns * columns - 1.0, 0.0, 0.0, rows * rows - 1.0) / 24.0;
+    let of_wave = j * spread * j.transpose() * pixels;
+    let indices = pair.try_inverse()?;
+    let mut information = Matrix4::<f64>::zeros();
+    let mut phase_sigmas = [f64::NAN; 3];
+    for (wave, amplitude) in simulator.harmonics() {
+        let ratio = (amplitude / noise).powi(2);
+        let index = indices * wave;
+        for k in 0..2 {
+            for l in 0..2 {
+                let mut block = information.fixed_view_mut::<2, 2>(2 * k, 2 * l);
+                block += of_wave * (index[k] * index[l] * ratio);
+            }
+        }
+        let firsts = [(1.0, 0.0), (0.0, 1.0), (-1.0, 1.0)];
+        for (sigma, (h, k)) in phase_sigmas.iter_mut().zip(firsts) {
+            let first = Vector2::new(h, k);
+            if (index - first).norm() < 1e-6 || (index + first).norm() < 1e-6 {
+                *sigma = (2.0 / (ratio * pixels)).sqrt();
+            }
+        }
+    }
+    let map = Matrix2::identity() - u * drift.transpose();
+    let time = f64::midpoint(frame.start_s, frame.end_s);
+    let middle = Vector2::from(frame.origin_nm) + j * Vector2::new(columns - 1.0, rows - 1.0) / 2.0;
+    let place = middle - drift * time;
+    let three = [
+        pair.column(0).into_owned(),
+        pair.column(1).into_owned(),
+        pair.column(1) - pair.column(0),
+    ];
+    let phases = [0, 1, 2].map(|h| Estimate::new(three[h].dot(&place), phase_sigmas[h]));
+    Some(Sighting {
+        scan: 0,
+        class,
+        block: 0,
+        waves: LatticeVectors {
+            basis: map * pair,
+            covariance: information.try_inverse()?,
+        },
+        time_gradient: u,
+        fast_gain: Matrix2::zeros(),
+        time,
+        position: middle,
+        phases: Some(phases).filter(|_| phase_sigmas.iter().all(|s| s.is_finite())),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simulate::Simulation;
+
+    /// The closed forms for three equal cosines in white noise on a square frame: twist
+    /// `0.390 (a/L)(σ/A)/√N` and each strain component `2 σ_θ/(1 + ν)` (derived in the project's physics
+    /// notes), for frames without drift error; and a drift from phases alone, a straight line through
+    /// the positions `√(2/3)/|G| · σ_φ` of the frames.
+    #[test]
+    fn the_bound_is_that_of_three_cosines() {
+        let mut settings = Simulation::default();
+        settings.raster.pixels = [256; 2];
+        settings.raster.scans = 10;
+        settings.raster.retrace = false;
+        settings.raster.nominal_size_nm = [55.0; 2];
+        settings.window.gain = [1.0; 2];
+        settings.window.shear_mrad = 0.0;
+        settings.sample.sharpness = 0.0;
+        settings.sample.strain_percent = 0.0;
+        settings.drift.velocity_nm_per_min = [0.0; 2];
+        settings.noise.pixel_deg = 2.0;
+        let simulator = Simulator::new(settings.clone()).unwrap();
+        let bound = cramer_rao(&simulator, 0.6, true).unwrap();
+        let pixels = 256.0 * 256.0;
+        let a = settings.sample.material.lattice_constant_nm;
+        let twist = 0.390 * (a / 55.0) * 2.0 / f64::sqrt(pixels * 10.0);
+        assert!((bound.twist / twist - 1.0).abs() < 0.01, "{bound:?}");
+        let strain = 2.0 * twist / (1.0 + settings.sample.material.poisson_ratio);
+        for found in bound.strain {
+            assert!((found / strain - 1.0).abs() < 0.01, "{bound:?}");
+        }
+        let g = 4.0 * std::f64::consts::PI / (3f64.sqrt() * a) * settings.sample.twist_deg.to_radians();
+        let position = f64::sqrt(2.0 / 3.0) / g * f64::sqrt(2.0 / pixels) * 2.0;
+        // Ten frames 33 s apart: Σ(t − t̄)² = 82.5 · 33².
+        let slope = position / (82.5_f64.sqrt() * 33.0);
+        for found in bound.drift {
+            assert!((found / slope - 1.0).abs() < 0.02, "{bound:?} {slope}");
+        }
+    }
+}
