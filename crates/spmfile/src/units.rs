@@ -13,6 +13,30 @@ pub fn nm_per(unit: &str) -> Option<f64> {
     }
 }
 
+/// `600 nm` as a finite number and the unit behind it, which may be absent.
+pub(crate) fn quantity(text: &str) -> Option<(f64, &str)> {
+    let text = text.trim();
+    let end = text
+        .find(|c: char| !(c.is_ascii_digit() || matches!(c, '+' | '-' | '.' | 'e' | 'E')))
+        .unwrap_or(text.len());
+    // `5e` of `5eV` is no number: the letter belongs to the unit.
+    let end = if text[..end].parse::<f64>().is_ok() {
+        end
+    } else {
+        text[..end]
+            .trim_end_matches(['e', 'E', '+', '-', '.'])
+            .len()
+    };
+    let number: f64 = text[..end].parse().ok()?;
+    number.is_finite().then(|| (number, text[end..].trim()))
+}
+
+/// `0.6 µm` in nm; `None` without a unit of length.
+pub(crate) fn length_nm(text: &str) -> Option<f64> {
+    let (number, unit) = quantity(text)?;
+    Some(number * nm_per(&clean(unit))?)
+}
+
 /// A unit in plain signs: `~` is micro, the ordinal sign and the like are degrees.
 pub(crate) fn clean(unit: &str) -> String {
     unit.trim()
@@ -70,6 +94,20 @@ mod tests {
         assert_eq!(prefix_ratio("V", "Arb"), None);
         assert_eq!(prefix_ratio("m", "n"), None);
         assert_eq!(prefix_ratio("", "V"), None);
+    }
+
+    #[test]
+    fn quantities() {
+        assert_eq!(quantity(" -3.5e-2 nm"), Some((-0.035, "nm")));
+        assert_eq!(quantity("600nm"), Some((600.0, "nm")));
+        assert_eq!(quantity("5eV"), Some((5.0, "eV")));
+        assert_eq!(quantity("8"), Some((8.0, "")));
+        assert_eq!(quantity("nm"), None);
+        assert_eq!(quantity("inf nm"), None);
+        assert_eq!(length_nm("0.5 µm"), Some(500.0));
+        assert_eq!(length_nm("2 Å"), Some(0.2));
+        assert_eq!(length_nm("2 V"), None);
+        assert_eq!(length_nm("2"), None);
     }
 
     #[test]
