@@ -14,18 +14,22 @@
 #![doc = include_str!("../FORMATS.md")]
 
 mod agilent;
+mod archive;
 mod arrays;
 mod clock;
 mod cursor;
 mod detect;
 mod error;
+mod fields;
 mod gsf;
 mod gwy;
 mod gxyzf;
 mod igor;
 mod iso28632;
 mod jpk;
+mod labels;
 mod matrix;
+mod missing;
 mod nanonis;
 pub mod nanoscope;
 mod nid;
@@ -34,6 +38,7 @@ mod raster;
 mod rhk;
 mod scan;
 mod sensors;
+mod tiff_tags;
 mod units;
 mod whole;
 mod wsxm;

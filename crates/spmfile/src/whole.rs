@@ -17,6 +17,8 @@ pub(crate) struct Extent {
     lost: Vec<UnreadableChannel>,
     /// Whether any of their bytes are there.
     begun: bool,
+    /// Bytes given to channels so far.
+    taken: usize,
 }
 
 impl Extent {
@@ -29,7 +31,7 @@ impl Extent {
         name: &str,
     ) -> Option<&'a [u8]> {
         self.announced += 1;
-        let end = start as u64 + length as u64;
+        let end = (start as u64).saturating_add(length as u64);
         self.expected = self.expected.max(end);
         let found = bytes.len().saturating_sub(start);
         self.begun |= found > 0;
@@ -41,8 +43,24 @@ impl Extent {
                 name: name.to_owned(),
                 error: format!("it is {found} bytes long but its header promises {length}"),
             });
+            return None;
         }
+        // Data that overlap belong to nobody; this also bounds the memory by the file's length.
+        if length > bytes.len() - self.taken {
+            self.lose(
+                name.to_owned(),
+                "its data overlap with those of others".to_owned(),
+            );
+            return None;
+        }
+        self.taken += length;
         block
+    }
+
+    /// Counts a channel as lost that a reader could not find itself.
+    pub(crate) fn lose(&mut self, name: String, error: String) {
+        self.begun = true;
+        self.lost.push(UnreadableChannel { name, error });
     }
 
     /// The scan, or the error that the missing bytes call for.
@@ -68,6 +86,18 @@ impl Extent {
             reason,
             readable: Box::new(scan),
         })
+    }
+}
+
+/// The scan, unless every one of its announced channels is scaled in an unknown way.
+pub(crate) fn some_readable(scan: Scan, announced: usize) -> Result<Scan, ReadError> {
+    match scan.unreadable.first() {
+        Some(first) if scan.unreadable.len() == announced => Err(ReadError::NoReadableChannel {
+            announced,
+            name: first.name.clone(),
+            reason: first.error.clone(),
+        }),
+        _ => Ok(scan),
     }
 }
 
