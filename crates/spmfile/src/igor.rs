@@ -165,7 +165,8 @@ fn refuse_one_dimension(bytes: &[u8], endian: Endian, version: u16) -> ReadError
         3 => 20,
         other => return unsupported(format!("expected version 5, found version {other}")),
     };
-    if let Err(error) = check_sum(bytes, start + 110, endian) {
+    // The sum takes in the first sixteen bytes of the data, which count as header in these versions.
+    if let Err(error) = check_sum(bytes, start + 126, endian) {
         return error;
     }
     match Cursor::new(bytes, endian).at(start + 42).i32() {
@@ -634,11 +635,11 @@ mod tests {
             long.contains("promises") || long.contains("lines"),
             "{long}"
         );
-        let mut elder = vec![0u8; 126];
+        let mut elder = vec![0u8; 142];
         elder[1] = 2;
         elder[17] = 2;
         elder[61] = 5;
-        let elder = summed(elder, 126, true, 14);
+        let elder = summed(elder, 142, true, 14);
         let found = crate::read(&elder).expect_err("one dimension").to_string();
         assert!(
             found.contains("5 points") && found.contains("version 2"),
