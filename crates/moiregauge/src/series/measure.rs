@@ -230,16 +230,9 @@ fn measure_line(
     let line = channel.line_direction.unwrap_or(LineDirection::Trace);
     let nominal = nominal(scan, channel);
     let sensors = usable_sensors(file, scan, channel, nominal.as_ref(), caveats);
-    let timing = match (scan.line_rate_hz, scan.frame_direction) {
-        (Some(rate), Some(frame)) => Timing::new(
-            channel.columns,
-            rate,
-            scan.rounding.unwrap_or(0.0),
-            frame,
-            line,
-        ),
-        _ => None,
-    };
+    let timing = scan
+        .frame_direction
+        .and_then(|frame| Timing::of_scan(scan, channel.columns, frame, line));
     let geometry = match (&sensors, &nominal) {
         (Some(sensors), _) => sensors.geometry.clone(),
         (None, Some(nominal)) => nominal.clone(),
