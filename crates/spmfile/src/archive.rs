@@ -14,6 +14,11 @@ const MOST_GAIN: u64 = 20;
 /// More entries than an archive of scans has; every curve of a map is one or two.
 const MOST_ENTRIES: usize = 1 << 22;
 
+/// How many bytes a compressed file of a length may become.
+pub(crate) fn unpacked_limit(length: usize) -> u64 {
+    ALWAYS_ALLOWED.max(MOST_GAIN.saturating_mul(length as u64))
+}
+
 /// An archive and how much more of it may be unpacked.
 pub(crate) struct Archive<'a> {
     zip: ZipArchive<Bytes<&'a [u8]>>,
@@ -23,8 +28,7 @@ pub(crate) struct Archive<'a> {
 impl<'a> Archive<'a> {
     /// Reads the directory of an archive.
     pub(crate) fn open(bytes: &'a [u8]) -> Result<Self, String> {
-        let limit = ALWAYS_ALLOWED.max(MOST_GAIN.saturating_mul(bytes.len() as u64));
-        Self::with_limit(bytes, limit)
+        Self::with_limit(bytes, unpacked_limit(bytes.len()))
     }
 
     fn with_limit(bytes: &'a [u8], left: u64) -> Result<Self, String> {

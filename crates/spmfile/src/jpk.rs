@@ -1,4 +1,4 @@
-//! JPK images (NanoWizard and the like), `.jpk` and `.jpk-qi-image`.
+//! JPK images (`NanoWizard` and the like), `.jpk` and `.jpk-qi-image`.
 //!
 //! A TIFF file with private tags. The first directory describes the frame and shows a coloured
 //! thumbnail; each further one holds a channel with a list of scaling slots (`raw`, `volts`,
@@ -297,7 +297,8 @@ fn centre(
     };
     let v = if reflected { -v } else { v };
     let (sin, cos) = rotation.sin_cos();
-    [x + (u * cos - v * sin) / 2.0, y + (u * sin + v * cos) / 2.0]
+    let (u, v) = (u / 2.0, v / 2.0);
+    [x + u * cos - v * sin, y + u * sin + v * cos]
 }
 
 /// `2017-01-16 16:01:36.264 GMT`.

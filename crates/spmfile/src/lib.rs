@@ -15,7 +15,7 @@
 
 mod agilent;
 mod archive;
-mod arrays;
+pub mod arrays;
 mod clock;
 mod cursor;
 mod detect;
@@ -117,7 +117,7 @@ fn dispatch(bytes: &[u8], wanted: &dyn Fn(&ChannelInfo) -> bool) -> Result<Scan,
         | Format::Tiff
         | Format::Png
         | Format::Jpeg
-        | Format::TextMatrix => arrays::read(bytes, wanted),
+        | Format::TextMatrix => arrays::read(bytes, &arrays::ArrayOptions::default(), wanted),
         Format::Empty => Err(ReadError::Empty),
         Format::Other(found) => Err(ReadError::OtherFormat { found }),
         Format::Text => Err(ReadError::Text {

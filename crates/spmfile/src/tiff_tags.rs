@@ -271,8 +271,11 @@ pub(crate) mod tests {
         Bytes(Vec<u8>),
     }
 
+    /// Tags and strips.
+    pub(crate) type Page = (Vec<(u16, Value)>, Vec<Vec<u8>>);
+
     /// A file of directories, each with tags and the bytes of its image in strips.
-    pub(crate) fn file(endian: Endian, pages: &[(Vec<(u16, Value)>, Vec<Vec<u8>>)]) -> Vec<u8> {
+    pub(crate) fn file(endian: Endian, pages: &[Page]) -> Vec<u8> {
         let big = endian == Endian::Big;
         let u16b = |n: u16| {
             if big {
@@ -406,7 +409,7 @@ pub(crate) mod tests {
             pages[0].shape().expect_err("not plain")
         };
         assert!(shape((COMPRESSION, Value::Short(5))).contains("compression 5"));
-        assert!(shape((SAMPLES_PER_PIXEL, Value::Short(3))).contains("3"));
+        assert!(shape((SAMPLES_PER_PIXEL, Value::Short(3))).contains('3'));
         assert!(shape((BITS, Value::Short(12))).contains("12 bits"));
     }
 }
