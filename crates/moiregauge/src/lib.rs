@@ -4,6 +4,7 @@
 
 pub mod analysis;
 pub mod background;
+pub mod budget;
 pub mod caveat;
 pub mod drift;
 pub mod estimate;

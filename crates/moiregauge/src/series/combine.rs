@@ -3,12 +3,12 @@
 use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
 
 use super::measure::MeasuredScan;
-use super::set::{joint_fit, terms};
+use super::set::{joint_fit, lattice_of, terms};
 
 use crate::analysis::{Combined, Consistency, SetAnalysis, SetMean};
+use crate::budget::{Budget, Statistical};
 use crate::caveat::Caveat;
 use crate::lattice::LatticeVectors;
-use crate::lattice::reciprocal::{labelled_like, real_from_reciprocal};
 use crate::settings::Settings;
 use crate::strain::twist_strain;
 
@@ -39,14 +39,14 @@ pub(super) fn combine(
         ));
         return None;
     }
-    let mut lattice = weighted_mean(&means)?;
+    let (mut lattice, mut statistical) = weighted_mean(&means)?;
     let mut joint_terms = None;
     if let Some((scans, reference)) = joint.filter(|(scans, _)| !scans.is_empty())
         && let Some(drift) = sets.iter().find_map(|s| s.drift.as_ref())
         && let Some((fit, _)) = joint_fit(scans, &reference, (&lattice, &drift.velocity), settings)
-        && let Some(fitted) = real_from_reciprocal(&fit.waves)
+        && let Some(fitted) = lattice_of(&fit, &reference)
     {
-        lattice = labelled_like(&fitted, &reference);
+        (lattice, statistical) = fitted;
         joint_terms = Some(terms(&fit));
     }
     let consistency = consistency(sets);
@@ -68,6 +68,7 @@ pub(super) fn combine(
     let twist_strain =
         twist_strain(&lattice, &settings.material, settings.strain_convention).ok()?;
     Some(Combined {
+        budget: Budget::new(&lattice, &twist_strain, &statistical, settings),
         lattice,
         twist_strain,
         joint: joint_terms,
@@ -76,7 +77,7 @@ pub(super) fn combine(
 }
 
 /// Generalised mean of the four components, its covariance enlarged where the sets scatter.
-fn weighted_mean(means: &[&SetMean]) -> Option<LatticeVectors> {
+fn weighted_mean(means: &[&SetMean]) -> Option<(LatticeVectors, Statistical)> {
     let (mut normal, mut right) = (Matrix4::zeros(), Vector4::zeros());
     let mut weights = Vec::with_capacity(means.len());
     for mean in means {
@@ -101,10 +102,12 @@ fn weighted_mean(means: &[&SetMean]) -> Option<LatticeVectors> {
     } else {
         1.0
     };
-    Some(LatticeVectors {
+    let parts: Vec<Statistical> = means.iter().map(|m| m.budget.statistical).collect();
+    let lattice = LatticeVectors {
         basis: Matrix2::new(flat[0], flat[2], flat[1], flat[3]),
         covariance: covariance * scale,
-    })
+    };
+    Some((lattice, Statistical::of_mean(&parts, scale)?))
 }
 
 fn consistency(sets: &[SetAnalysis]) -> Vec<Consistency> {

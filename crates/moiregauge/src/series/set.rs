@@ -10,9 +10,10 @@ use super::sightings::sightings;
 use crate::analysis::{
     Axis, Drift, DriftFit, JointTerms, LineAnalysis, ScanAnalysis, SetAnalysis, SetMean,
 };
+use crate::budget::{Budget, Statistical};
 use crate::caveat::Caveat;
 use crate::drift::paper::{PaperScan, pairwise_drift};
-use crate::drift::{Observation, common_lattice, monte_carlo, solve};
+use crate::drift::{Observation, at_known_drift, common_lattice, monte_carlo, solve};
 use crate::estimate::Estimate;
 use crate::geometry::mean_and_spread;
 use crate::joint::{JointFit, fit};
@@ -81,12 +82,15 @@ pub(super) fn analyse_set(
         .ok()
         .and_then(|common| {
             let of = |s: &ScanAnalysis| (s.twist_strain_sensor, s.sensor);
-            set_mean(common, scans.iter().map(of), settings)
+            let [image, sensor] = at_known_drift(&all)?;
+            let statistical = Statistical::without_drift(&image, &sensor);
+            set_mean(common, &statistical, scans.iter().map(of), settings)
         });
     let mean = solved.as_ref().and_then(|s| {
         let of = |s: &ScanAnalysis| (s.twist_strain, s.drift_corrected.unwrap_or(s.sensor));
         set_mean(
             (s.lattice, s.chi2, s.freedom),
+            &s.statistical,
             scans.iter().map(of),
             settings,
         )
@@ -111,6 +115,7 @@ pub(super) fn analyse_set(
 struct Solved {
     drift: Drift,
     lattice: LatticeVectors,
+    statistical: Statistical,
     chi2: f64,
     freedom: usize,
     /// The drift during each scan, where it is not the same for all.
@@ -128,7 +133,7 @@ fn jointly(
     let Some((fit, times)) = joint_fit(scans, reference, start, settings) else {
         return linear;
     };
-    let Some(lattice) = real_from_reciprocal(&fit.waves) else {
+    let Some((lattice, statistical)) = lattice_of(&fit, reference) else {
         return linear;
     };
     Solved {
@@ -138,7 +143,8 @@ fn jointly(
             joint: Some(terms(&fit)),
             ..linear.drift
         },
-        lattice: labelled_like(&lattice, reference),
+        lattice,
+        statistical,
         chi2: fit.chi2,
         freedom: fit.degrees_of_freedom,
         velocities: times.iter().map(|t| fit.velocity_at(*t)).collect(),
@@ -154,12 +160,37 @@ pub(super) fn joint_fit(
 ) -> Option<(JointFit, Vec<f64>)> {
     let sightings = sightings(scans, reference)?;
     let waves = labelled_like(&real_from_reciprocal(lattice)?, &reciprocal(reference)?);
-    let fitted = fit(&sightings, (&waves.basis, velocity), settings.frame_time_sigma_s)?;
+    let fitted = fit(
+        &sightings,
+        (&waves.basis, velocity),
+        settings.frame_time_sigma_s,
+    )?;
     let times = (0..scans.len())
         .filter_map(|i| sightings.iter().find(|s| s.scan == i))
         .map(|s| s.time)
         .collect();
     Some((fitted, times))
+}
+
+/// The lattice of a joint fit (nm) and where its covariance comes from.
+pub(super) fn lattice_of(
+    fit: &JointFit,
+    reference: &Matrix2<f64>,
+) -> Option<(LatticeVectors, Statistical)> {
+    let real = |covariance| {
+        let waves = LatticeVectors {
+            covariance,
+            ..fit.waves
+        };
+        Some(labelled_like(&real_from_reciprocal(&waves)?, reference))
+    };
+    let parts = fit.statistical()?;
+    let statistical = Statistical {
+        image: real(parts.image)?.covariance,
+        drift: real(parts.drift)?.covariance,
+        sensor: real(parts.sensor)?.covariance,
+    };
+    Some((real(fit.waves.covariance)?, statistical))
 }
 
 /// What a joint fit has beside a constant drift.
@@ -176,14 +207,7 @@ pub(super) fn terms(fit: &JointFit) -> JointTerms {
 fn observations(scan: &MeasuredScan, reference: &Matrix2<f64>) -> Vec<Observation> {
     scan.lines
         .iter()
-        .map(|line| {
-            let lattice = labelled_like(&line.in_sensor_coordinates(), reference);
-            line.observation(lattice).unwrap_or(Observation {
-                lattice,
-                time_gradient: Vector2::zeros(),
-                speed_error: [0.0; 2],
-            })
-        })
+        .map(|line| line.observation(reference))
         .collect()
 }
 
@@ -210,6 +234,8 @@ fn drift(
             let scale = excess(solution.chi2, solution.degrees_of_freedom);
             let mut lattice = solution.lattice;
             lattice.covariance *= scale;
+            let statistical =
+                Statistical::at_known_drift(at_known_drift(all)?, scale, &lattice.covariance);
             let seed = settings.seed;
             let name = format!("drift {}", group.name);
             Some(Solved {
@@ -228,6 +254,7 @@ fn drift(
                     joint: None,
                 },
                 lattice,
+                statistical,
                 chi2: solution.chi2,
                 freedom: solution.degrees_of_freedom,
                 velocities: Vec::new(),
@@ -261,7 +288,9 @@ fn given_drift(
     let (mut lattice, chi2, freedom) = common_lattice(all, &velocity, &covariance).ok()?;
     // Scatter enlarges what the scans say, not what the user said of the drift.
     let (measured, _, _) = common_lattice(all, &velocity, &Matrix2::zeros()).ok()?;
-    lattice.covariance += measured.covariance * (excess(chi2, freedom) - 1.0);
+    let scale = excess(chi2, freedom);
+    lattice.covariance += measured.covariance * (scale - 1.0);
+    let parts = at_known_drift(all)?;
     Some(Solved {
         drift: Drift {
             velocity,
@@ -271,6 +300,7 @@ fn given_drift(
             monte_carlo: None,
             joint: None,
         },
+        statistical: Statistical::at_known_drift(parts, scale, &lattice.covariance),
         lattice,
         chi2,
         freedom,
@@ -408,6 +438,7 @@ fn plain_mean(all: &[LatticeVectors]) -> Option<LatticeVectors> {
 /// Twist and strain of the common lattice, and how the scans scatter about it.
 fn set_mean(
     (lattice, chi2, freedom): (LatticeVectors, f64, usize),
+    statistical: &Statistical,
     scans: impl Iterator<Item = (Option<TwistStrain>, LatticeVectors)>,
     settings: &Settings,
 ) -> Option<SetMean> {
@@ -427,6 +458,7 @@ fn set_mean(
         })
     });
     Some(SetMean {
+        budget: Budget::new(&lattice, &twist_strain, statistical, settings),
         lattice,
         twist_strain,
         twist_scatter: mean_and_spread(&twists).sigma,
@@ -476,15 +508,29 @@ fn about_mean(name: &str, mean: Option<&SetMean>, caveats: &mut Vec<Caveat>) {
             "a wavelength of a single scan differs by more than 1 % from that of the set",
         ));
     }
-    if mean.twist_strain.axis_lab().is_none() {
+    let found = &mean.twist_strain;
+    let in_all = mean.budget.applied_to(found);
+    if found.axis_lab().is_none() {
         caveats.push(Caveat::new(
             "strain-not-significant",
             name,
             format!(
                 "the heterostrain is not significant (p = {:.2}); it is below {:.4} % with 95 % \
                  confidence and has no axis",
-                mean.twist_strain.strain_p_value(),
-                mean.twist_strain.strain_upper_limit_95() * 100.0
+                found.strain_p_value(),
+                found.strain_upper_limit_95() * 100.0
+            ),
+        ));
+    } else if in_all.axis_lab().is_none() {
+        caveats.push(Caveat::new(
+            "strain-within-calibration",
+            name,
+            format!(
+                "the heterostrain stands out of the noise of the scans but not of the calibration of the \
+                 scanner (p = {:.2}): with everything in the budget it is below {:.4} % with 95 % \
+                 confidence; scans of the sample turned by 90° would tell",
+                in_all.strain_p_value(),
+                in_all.strain_upper_limit_95() * 100.0
             ),
         ));
     }
