@@ -12,6 +12,8 @@
 //! - Values are in the unit `si_unit_z`; missing ones are NaN.
 //! - What a title in brackets tells of the line direction is used (`Z (Backward)`, `Height [Trace]`).
 
+use std::collections::BTreeMap;
+
 use crate::ChannelInfo;
 use crate::cursor::{Cursor, Endian};
 use crate::error::ReadError;
@@ -189,17 +191,27 @@ pub(crate) fn read(bytes: &[u8], wanted: &dyn Fn(&ChannelInfo) -> bool) -> Resul
     let (container, cut_off) = container(bytes)?;
     let mut failure = None;
     let mut fields = Vec::new();
+    let mut titles = BTreeMap::new();
+    let mut metas = BTreeMap::new();
     for item in container.items() {
-        match item {
-            Ok(item) => {
-                let number = number_of(item.name, "/data");
-                if let (Some(number), Value::Object(object)) = (number, item.value)
-                    && object.kind == b"GwyDataField"
-                {
-                    fields.push((number, object));
-                }
+        let item = match item {
+            Ok(item) => item,
+            Err(error) => {
+                failure = Some(error);
+                break;
             }
-            Err(error) => failure = Some(error),
+        };
+        match item.value {
+            Value::Object(object) if object.kind == b"GwyDataField" => {
+                fields.extend(number_of(item.name, "/data").map(|number| (number, object)));
+            }
+            Value::Object(object) => {
+                metas.extend(number_of(item.name, "/meta").map(|number| (number, object)));
+            }
+            Value::Text(title) => {
+                titles.extend(number_of(item.name, "/data/title").map(|number| (number, title)));
+            }
+            _ => {}
         }
     }
     if fields.len() > MOST_CHANNELS {
@@ -215,13 +227,13 @@ pub(crate) fn read(bytes: &[u8], wanted: &dyn Fn(&ChannelInfo) -> bool) -> Resul
             reason: "it holds no image (no item /N/data)".to_owned(),
         });
     }
-    let mut scan = frame(container, &fields);
+    let meta = |number: u32| metas.get(&number).copied().map_or_else(Vec::new, texts);
+    let mut scan = frame(&fields, &meta);
     for (number, field) in fields {
-        let title = match container.get(&format!("/{number}/data/title")) {
-            Some(Value::Text(title)) => text(title),
-            _ => String::new(),
-        };
-        let lines = meta(container, number);
+        let title = titles
+            .get(&number)
+            .map_or_else(String::new, |title| text(title));
+        let lines = meta(number);
         let own = |key: &str| labels::value(&lines, key).map(str::to_owned);
         let info = ChannelInfo {
             line_direction: labels::stated_direction(&lines)
@@ -326,7 +338,7 @@ fn channel(field: Object<'_>, info: ChannelInfo) -> Result<Channel, String> {
 }
 
 /// Everything but the channels: the first image's size and place, the header it came with.
-fn frame(container: Object<'_>, fields: &[(u32, Object<'_>)]) -> Scan {
+fn frame(fields: &[(u32, Object<'_>)], meta: &dyn Fn(u32) -> Vec<(String, String)>) -> Scan {
     let mut scan = Scan {
         format: FORMAT.to_owned(),
         ..Scan::default()
@@ -346,17 +358,14 @@ fn frame(container: Object<'_>, fields: &[(u32, Object<'_>)]) -> Scan {
             scan.offset_nm = [offset("xoff") + 0.5 * width, offset("yoff") + 0.5 * height];
         }
     }
-    scan.metadata = meta(container, number);
+    scan.metadata = meta(number);
     labels::apply(&mut scan);
     scan
 }
 
-/// The texts of the item `/N/meta`.
-fn meta(container: Object<'_>, number: u32) -> Vec<(String, String)> {
-    let Some(meta) = container.object(&format!("/{number}/meta")) else {
-        return Vec::new();
-    };
-    let texts = meta.items().map_while(Result::ok);
+/// The texts of an object by name.
+fn texts(object: Object<'_>) -> Vec<(String, String)> {
+    let texts = object.items().map_while(Result::ok);
     texts
         .filter_map(|item| match item.value {
             Value::Text(value) => Some((text(item.name), text(value))),

@@ -84,7 +84,8 @@ pub fn read_selected(
     bytes: &[u8],
     wanted: &dyn Fn(&ChannelInfo) -> bool,
 ) -> Result<Scan, ReadError> {
-    let scan = dispatch(bytes, wanted)?;
+    let mut scan = dispatch(bytes, wanted)?;
+    whole::tidy(&mut scan);
     if whole::all_missing(&scan) {
         return Err(ReadError::AllMissing {
             channels: scan.channels.len(),

@@ -111,3 +111,45 @@ pub(crate) fn all_missing(scan: &Scan) -> bool {
     };
     !scan.channels.is_empty() && scan.channels.iter().all(|c| missing(&c.samples))
 }
+
+/// Leaves out what cannot be a length, a time or a rate, as damaged headers hold it.
+pub(crate) fn tidy(scan: &mut Scan) {
+    let positive = |n: &f64| *n > 0.0 && n.is_finite();
+    scan.size_nm = scan.size_nm.filter(|size| size.iter().all(positive));
+    scan.line_rate_hz = scan.line_rate_hz.filter(positive);
+    scan.line_times_s = scan
+        .line_times_s
+        .filter(|[a, b]| *a >= 0.0 && *b >= 0.0 && positive(&(a + b)));
+    scan.rounding = scan.rounding.filter(|n| *n >= 0.0 && n.is_finite());
+    if scan.offset_nm.iter().any(|n| !n.is_finite()) {
+        scan.offset_nm = [0.0; 2];
+    }
+    if !scan.rotation_rad.is_finite() {
+        scan.rotation_rad = 0.0;
+    }
+    for channel in &mut scan.channels {
+        channel.width_nm = channel.width_nm.filter(positive);
+        channel.height_nm = channel.height_nm.filter(positive);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nonsense_is_left_out() {
+        let mut scan = Scan {
+            size_nm: Some([f64::INFINITY, 1.0]),
+            line_rate_hz: Some(-1.0),
+            line_times_s: Some([1.0, 0.0]),
+            offset_nm: [f64::NAN, 1.0],
+            rotation_rad: f64::INFINITY,
+            ..Scan::default()
+        };
+        tidy(&mut scan);
+        assert_eq!((scan.size_nm, scan.line_rate_hz), (None, None));
+        assert_eq!(scan.line_times_s, Some([1.0, 0.0]));
+        assert_eq!((scan.offset_nm, scan.rotation_rad), ([0.0; 2], 0.0));
+    }
+}
