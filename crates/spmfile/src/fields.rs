@@ -1,6 +1,8 @@
 //! The text headers of Gwyddion's simple formats: a magic line, lines `Key = value`, NULs up to
 //! the next multiple of a width, binary samples.
 
+use crate::export::one_line;
+
 /// Keys and values of the header and the byte at which the samples begin.
 ///
 /// The header ends with one to `padding` NULs, so that the samples begin at a multiple of `padding`.
@@ -27,6 +29,14 @@ pub(crate) fn header(bytes: &[u8], padding: usize) -> Result<Header, String> {
         ));
     }
     Ok((fields, start))
+}
+
+/// Adds a line; the key keeps to its side of the `=`.
+pub(crate) fn put(header: &mut String, key: &str, value: &str) {
+    header.push_str(&one_line(key).replace('=', " "));
+    header.push_str(" = ");
+    header.push_str(&one_line(value));
+    header.push('\n');
 }
 
 /// The value of a key.

@@ -6,12 +6,13 @@
 //! Points become a scan where `XRes` and `YRes` tell that they lie line by line: x and y are its
 //! position sensors. A mere cloud does not tell which points were recorded one after the other.
 //!
-//! - x to the right, y up. If the lines go down (or the points of a line left), they are turned.
+//! - x to the right, y up. Unless the file was written here: if the lines go down (or the points of a line left), they are turned.
 //! - Without a unit of length in `XYUnits` the positions are of no use, and the file is refused.
 
 use crate::ChannelInfo;
 use crate::cursor::{Cursor, Endian};
 use crate::error::ReadError;
+use crate::export::{ExportError, base_values};
 use crate::fields;
 use crate::labels;
 use crate::scan::{Channel, Samples, Scan};
@@ -83,7 +84,14 @@ pub(crate) fn read(bytes: &[u8], wanted: &dyn Fn(&ChannelInfo) -> bool) -> Resul
             "its positions are in {lateral:?}, not in a unit of length"
         ))
     })?;
-    let order = Turned::of(data, width, columns, rows);
+    // Of files written here the order is known.
+    let order = match labels::value(&fields, "rotation (rad)") {
+        Some(_) => Turned {
+            lines: false,
+            points: false,
+        },
+        None => Turned::of(data, width, columns, rows),
+    };
     let samples = |index: usize| -> Vec<f64> {
         (0..points)
             .map(|point| number(data, width, order.place(point, columns, rows), index))
@@ -193,6 +201,72 @@ impl Turned {
         };
         row * columns + column
     }
+}
+
+/// The bytes of a `.gxyzf` file: `channels` at the positions that the sensors `x` and `y` recorded.
+///
+/// Values are in SI base units; the points come line by line, the bottom line first.
+///
+/// # Errors
+/// - There is no channel, or one of another shape than the sensors.
+/// - A sensor is not in a unit of length.
+pub fn write(
+    scan: &Scan,
+    [x, y]: [&Channel; 2],
+    channels: &[&Channel],
+    log: &[String],
+) -> Result<Vec<u8>, ExportError> {
+    if channels.is_empty() {
+        return Err(ExportError::NoChannel);
+    }
+    let (rows, columns) = (x.rows, x.columns);
+    let mut values = Vec::new();
+    let mut units = Vec::new();
+    for (index, channel) in [x, y].iter().chain(channels).enumerate() {
+        if (channel.rows, channel.columns) != (rows, columns) {
+            return Err(ExportError::Unlike {
+                name: channel.name.clone(),
+                rows,
+                columns,
+            });
+        }
+        let (of_channel, unit) = base_values(channel)?;
+        if index < 2 && unit != "m" {
+            return Err(ExportError::NotALength {
+                name: channel.name.clone(),
+                unit: channel.unit.clone(),
+            });
+        }
+        values.push(of_channel);
+        units.push(unit);
+    }
+    let mut header = "Gwyddion XYZ Field 1.0\n".to_owned();
+    let mut put = |key: &str, value: &str| fields::put(&mut header, key, value);
+    put("NChannels", &channels.len().to_string());
+    put("NPoints", &(rows * columns).to_string());
+    put("XRes", &columns.to_string());
+    put("YRes", &rows.to_string());
+    put("XYUnits", "m");
+    for (index, channel) in channels.iter().enumerate() {
+        put(&format!("ZUnits{}", index + 1), &units[index + 2]);
+        put(&format!("Title{}", index + 1), &channel.name);
+    }
+    let lines = [labels::describe(scan), labels::describe_channel(x)].concat();
+    for (key, value) in &lines {
+        put(key, value);
+    }
+    for (step, text) in log.iter().enumerate() {
+        put(&format!("log {}", step + 1), text);
+    }
+    let mut bytes = header.into_bytes();
+    bytes.resize((bytes.len() / 8 + 1) * 8, 0);
+    bytes.reserve(8 * values.len() * rows * columns);
+    for point in 0..rows * columns {
+        for of_channel in &values {
+            bytes.extend(of_channel[point].to_le_bytes());
+        }
+    }
+    Ok(bytes)
 }
 
 #[cfg(test)]

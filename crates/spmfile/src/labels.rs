@@ -20,7 +20,6 @@ pub(crate) fn line_direction(title: &str) -> Option<LineDirection> {
 }
 
 /// The keys of a frame.
-#[allow(dead_code, reason = "for the writers")]
 pub(crate) fn describe(scan: &Scan) -> Vec<(String, String)> {
     let mut lines = Vec::new();
     let mut put = |key: &str, value: Option<String>| {
@@ -53,7 +52,6 @@ pub(crate) fn describe(scan: &Scan) -> Vec<(String, String)> {
 }
 
 /// The keys of a channel beside its name.
-#[allow(dead_code, reason = "for the writers")]
 pub(crate) fn describe_channel(channel: &Channel) -> Vec<(String, String)> {
     let mut lines = Vec::new();
     let mut put = |key: &str, value: Option<&str>| {

@@ -20,10 +20,11 @@ mod clock;
 mod cursor;
 mod detect;
 mod error;
+mod export;
 mod fields;
-mod gsf;
-mod gwy;
-mod gxyzf;
+pub mod gsf;
+pub mod gwy;
+pub mod gxyzf;
 mod igor;
 mod iso28632;
 mod jpk;
@@ -37,6 +38,8 @@ mod park;
 mod raster;
 mod rhk;
 mod scan;
+#[cfg(test)]
+mod seeds;
 mod sensors;
 mod tiff_tags;
 mod units;
@@ -45,6 +48,7 @@ mod wsxm;
 
 pub use detect::{Format, detect, looks_like_scan};
 pub use error::ReadError;
+pub use export::ExportError;
 pub use scan::{
     Channel, DateTime, FrameDirection, LineDirection, Samples, Scan, UnreadableChannel,
 };
@@ -96,6 +100,8 @@ pub fn read_selected(
 
 /// Hands the bytes to the reader of their format.
 fn dispatch(bytes: &[u8], wanted: &dyn Fn(&ChannelInfo) -> bool) -> Result<Scan, ReadError> {
+    #[cfg(test)]
+    seeds::keep(bytes);
     match detect(bytes) {
         Format::NanoScope => nanoscope::read(bytes, wanted),
         Format::NanoScopeForce => Err(nanoscope::refuse_force(bytes)),

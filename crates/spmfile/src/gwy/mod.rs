@@ -12,6 +12,10 @@
 //! - Values are in the unit `si_unit_z`; missing ones are NaN.
 //! - What a title in brackets tells of the line direction is used (`Z (Backward)`, `Height [Trace]`).
 
+mod write;
+
+pub use write::write;
+
 use std::collections::BTreeMap;
 
 use crate::ChannelInfo;
