@@ -273,7 +273,7 @@ fn tail(bytes: &[u8], wave: &Wave, data: usize) -> Tail {
         Ok((note, [lines, layers]))
     };
     let (note, [line_labels, labels]) = blocks().unwrap_or_default();
-    let (text, _) = encoding_rs::WINDOWS_1252.decode_without_bom_handling(note);
+    let text = units::decode(note);
     let note = text
         .split(['\r', '\n'])
         .filter_map(|line| line.split_once(':'))
@@ -293,7 +293,7 @@ fn labels(block: &[u8]) -> Vec<String> {
         .skip(1)
         .map(|label| {
             let end = label.iter().position(|&b| b == 0).unwrap_or(LABEL);
-            let (text, _) = encoding_rs::WINDOWS_1252.decode_without_bom_handling(&label[..end]);
+            let text = units::decode(&label[..end]);
             text.trim().to_owned()
         })
         .collect();

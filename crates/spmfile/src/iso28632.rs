@@ -105,7 +105,7 @@ fn split(bytes: &[u8]) -> Result<(Vec<String>, &[u8]), ReadError> {
                 lines.len()
             )));
         };
-        let (text, _) = encoding_rs::WINDOWS_1252.decode_without_bom_handling(&rest[..end]);
+        let text = units::decode(&rest[..end]);
         lines.push(text.trim().to_owned());
         rest = &rest[end + 1..];
     }

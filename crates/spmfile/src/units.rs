@@ -37,6 +37,20 @@ pub(crate) fn length_nm(text: &str) -> Option<f64> {
     Some(number * nm_per(&clean(unit))?)
 }
 
+/// The text of a header: UTF-8 if it is, as converters write it, otherwise Windows-1252.
+///
+/// Of the signs that matter (µ, °, Å) none is UTF-8 by chance in Windows-1252.
+pub(crate) fn decode(bytes: &[u8]) -> std::borrow::Cow<'_, str> {
+    match std::str::from_utf8(bytes) {
+        Ok(text) => text.into(),
+        Err(_) => {
+            encoding_rs::WINDOWS_1252
+                .decode_without_bom_handling(bytes)
+                .0
+        }
+    }
+}
+
 /// A unit in plain signs: `~` is micro, the ordinal sign and the like are degrees.
 pub(crate) fn clean(unit: &str) -> String {
     unit.trim()
@@ -94,6 +108,12 @@ mod tests {
         assert_eq!(prefix_ratio("V", "Arb"), None);
         assert_eq!(prefix_ratio("m", "n"), None);
         assert_eq!(prefix_ratio("", "V"), None);
+    }
+
+    #[test]
+    fn headers_in_either_encoding() {
+        assert_eq!(decode("0.6 µm, 5 °".as_bytes()), "0.6 µm, 5 °");
+        assert_eq!(decode(b"0.6 \xb5m, 5 \xb0"), "0.6 µm, 5 °");
     }
 
     #[test]

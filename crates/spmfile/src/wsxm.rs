@@ -44,7 +44,7 @@ pub(crate) fn read(bytes: &[u8], wanted: &dyn Fn(&ChannelInfo) -> bool) -> Resul
             ))
         });
     let head = &bytes[..end.as_ref().copied().unwrap_or(bytes.len().min(4096))];
-    let (text, _) = encoding_rs::WINDOWS_1252.decode_without_bom_handling(head);
+    let text = units::decode(head);
     // Before the header's end: tables of numbers have none.
     let kind = text.lines().nth(1).unwrap_or("").trim();
     if !kind.eq_ignore_ascii_case("SxM Image file") {
@@ -421,6 +421,15 @@ mod tests {
         assert_eq!(scan.frame_direction, Some(FrameDirection::Down));
         assert!((scan.rotation_rad - 33f64.to_radians()).abs() < 1e-12);
         assert_eq!(scan.acquired, clock::date([2011, 11, 23], [20, 23, 46]));
+        // Converters write UTF-8.
+        let text: String = file("short", AMPLITUDE)
+            .iter()
+            .map(|&b| char::from(b))
+            .collect();
+        let end = text.find("[Header end]\r\n").expect("an end") + 14;
+        let mut utf8 = text[..end].as_bytes().to_vec();
+        utf8.extend((10..16i16).flat_map(i16::to_le_bytes));
+        assert_eq!(crate::read(&utf8).expect("an image").size_nm, Some(size));
         assert_eq!(date("03/11/2011, 20:23:46"), None, "which is the month?");
         assert!(date("11/23/2011, 20:23:46") == scan.acquired);
     }
