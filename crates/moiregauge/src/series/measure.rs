@@ -3,7 +3,7 @@
 use nalgebra::{Matrix2, Vector2};
 use spmfile::{Channel, DateTime, FrameDirection, LineDirection, Scan};
 
-use super::channel::{choose_channel, plain};
+use super::channel::{choose_channel, stem};
 use super::overlap::Window;
 use crate::caveat::Caveat;
 use crate::drift::Observation;
@@ -206,7 +206,7 @@ pub(super) fn channels<'a>(
             present: present.join(", "),
         });
     };
-    let same = |c: &&Channel| plain(&c.name) == plain(name);
+    let same = |c: &&Channel| stem(&c.name) == stem(name);
     let direction = |c: &Channel| c.line_direction.unwrap_or(LineDirection::Trace);
     let first = |wanted: LineDirection| {
         let mut found = scan
