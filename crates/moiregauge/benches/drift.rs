@@ -31,6 +31,7 @@ fn observations() -> Vec<Observation> {
                 },
                 time_gradient,
                 speed_error: [1e-4, 1e-4],
+                sensor: Matrix4::zeros(),
             }
         })
         .collect()

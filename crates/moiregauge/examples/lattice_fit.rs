@@ -13,121 +13,177 @@ use moiregauge::lattice::{LatticeError, MeasuredLattice, measure};
 use moiregauge::settings::{Background, Method};
 use nalgebra::Vector4;
 
-/// Name, pixels, periods, contrast, noise: white, line, 1/f.
-type Case = (&'static str, [usize; 2], f64, Contrast, [f64; 3]);
+/// Name, pixels, periods, contrast, noise: white, line, 1/f, 1/f from line to line.
+type Case = (&'static str, [usize; 2], f64, Contrast, [f64; 4]);
 
-const CASES: [Case; 16] = [
+const CASES: [Case; 24] = [
     (
         "paper, σ = A",
         [512, 512],
         4.4,
         Contrast::Cosines,
-        [1.0, 0.0, 0.0],
+        [1.0, 0.0, 0.0, 0.0],
     ),
     (
         "paper, σ = 2A",
         [512, 512],
         4.4,
         Contrast::Cosines,
-        [2.0, 0.0, 0.0],
+        [2.0, 0.0, 0.0, 0.0],
     ),
     (
         "128 px, σ = 2A",
         [128, 128],
         4.4,
         Contrast::Cosines,
-        [2.0, 0.0, 0.0],
+        [2.0, 0.0, 0.0, 0.0],
     ),
     (
         "paper, lines",
         [512, 512],
         4.4,
         Contrast::Cosines,
-        [1.0, 0.5, 0.0],
+        [1.0, 0.5, 0.0, 0.0],
     ),
     (
         "paper, 1/f",
         [512, 512],
         4.4,
         Contrast::Cosines,
-        [1.0, 0.0, 1.0],
+        [1.0, 0.0, 1.0, 0.0],
     ),
     (
         "spots, lines",
         [256, 256],
         6.0,
         Contrast::Spots,
-        [1.0, 1.0, 0.0],
+        [1.0, 1.0, 0.0, 0.0],
     ),
     (
         "spots, 1/f",
         [256, 256],
         6.0,
         Contrast::Spots,
-        [0.5, 0.0, 1.0],
+        [0.5, 0.0, 1.0, 0.0],
     ),
     (
         "2.5 periods",
         [256, 256],
         2.5,
         Contrast::Cosines,
-        [2.0, 0.5, 0.0],
+        [2.0, 0.5, 0.0, 0.0],
     ),
     (
         "2.5, spots",
         [256, 256],
         2.5,
         Contrast::Spots,
-        [2.0, 0.5, 0.0],
+        [2.0, 0.5, 0.0, 0.0],
     ),
     (
         "2.5, walls",
         [256, 256],
         2.5,
         Contrast::Walls,
-        [2.0, 0.5, 0.0],
+        [2.0, 0.5, 0.0, 0.0],
     ),
     (
         "5, walls",
         [256, 256],
         5.0,
         Contrast::Walls,
-        [2.0, 0.5, 0.0],
+        [2.0, 0.5, 0.0, 0.0],
     ),
     (
         "20, walls",
         [256, 256],
         20.0,
         Contrast::Walls,
-        [2.0, 0.5, 0.0],
+        [2.0, 0.5, 0.0, 0.0],
     ),
     (
         "20, 512 px",
         [512, 512],
         20.0,
         Contrast::Walls,
-        [2.0, 0.5, 0.0],
+        [2.0, 0.5, 0.0, 0.0],
     ),
     (
         "100, cosines",
         [512, 512],
         100.0,
         Contrast::Cosines,
-        [2.0, 0.5, 0.0],
+        [2.0, 0.5, 0.0, 0.0],
     ),
     (
         "100, walls",
         [512, 512],
         100.0,
         Contrast::Walls,
-        [2.0, 0.5, 0.0],
+        [2.0, 0.5, 0.0, 0.0],
     ),
     (
         "128 × 512",
         [128, 512],
         4.0,
         Contrast::Spots,
-        [2.0, 0.5, 0.0],
+        [2.0, 0.5, 0.0, 0.0],
+    ),
+    (
+        "σ: white",
+        [128, 128],
+        6.0,
+        Contrast::Cosines,
+        [1.0, 0.0, 0.0, 0.0],
+    ),
+    (
+        "σ: lines",
+        [128, 128],
+        6.0,
+        Contrast::Cosines,
+        [1.0, 0.5, 0.0, 0.0],
+    ),
+    (
+        "σ: 1/f",
+        [128, 128],
+        6.0,
+        Contrast::Cosines,
+        [0.5, 0.0, 1.0, 0.0],
+    ),
+    (
+        "σ: 1/f lines",
+        [128, 128],
+        6.0,
+        Contrast::Cosines,
+        [1.0, 0.0, 0.0, 0.5],
+    ),
+    (
+        "σ: strong",
+        [128, 128],
+        6.0,
+        Contrast::Cosines,
+        [0.5, 0.0, 0.0, 1.5],
+    ),
+    (
+        "σ: strong, few",
+        [96, 96],
+        4.4,
+        Contrast::Cosines,
+        [0.5, 0.0, 0.0, 1.5],
+    ),
+    (
+        "σ: few, 1/f",
+        [128, 128],
+        4.4,
+        Contrast::Cosines,
+        [0.5, 0.0, 1.0, 0.0],
+    ),
+    (
+        "σ: 20, 1/f lines",
+        [256, 256],
+        20.0,
+        Contrast::Cosines,
+        [0.5, 0.0, 0.0, 1.0],
     ),
 ];
 
@@ -137,7 +193,9 @@ fn main() {
         .next()
         .map_or(50, |n| n.parse().expect("a number"));
     let wanted = arguments.next().unwrap_or_default();
-    println!("case               right     error/bound  pull   bias  lines  waves  goodness");
+    println!(
+        "case               right     error/bound  pull   fast   slow   bias  lines  waves  goodness"
+    );
     for case in CASES.iter().filter(|c| c.0.contains(&wanted)) {
         run(case, count);
     }
@@ -152,13 +210,16 @@ fn fit(scene: &Scene) -> Result<MeasuredLattice, LatticeError> {
     )
 }
 
-fn run(&(name, size, periods, contrast, [white, line, flicker]): &Case, count: u64) {
+fn run(&(name, size, periods, contrast, noise): &Case, count: u64) {
+    let [white, line, flicker, line_flicker] = noise;
     let mut pulls: Vec<Vector4<f64>> = Vec::new();
     let (mut error, mut bound) = (0.0, 0.0);
-    let (mut lines, mut waves, mut goodness) = (0, 0, 0.0);
+    let mut waves: Vec<Vector4<f64>> = Vec::new();
+    let (mut lines, mut shown, mut goodness) = (0, 0, 0.0);
     for seed in 0..count {
         let mut scene = Scene::new(size, periods, 0.61803 * seed as f64, contrast, seed);
-        (scene.white, scene.line, scene.flicker) = (white, line, flicker);
+        (scene.white, scene.line) = (white, line);
+        (scene.flicker, scene.line_flicker) = (flicker, line_flicker);
         let measured = match fit(&scene) {
             Ok(measured) => measured,
             Err(error) => {
@@ -180,6 +241,7 @@ fn run(&(name, size, periods, contrast, [white, line, flicker]): &Case, count: u
                 .solve_lower_triangular(&off)
                 .expect("errors above zero"),
         );
+        waves.push(scene.wave_pulls(&measured.pixels.basis, &measured.pixels.covariance));
         error += off.norm_squared();
         // The bound takes longer than the fit, and changes little from image to image.
         if seed < 3 {
@@ -187,19 +249,26 @@ fn run(&(name, size, periods, contrast, [white, line, flicker]): &Case, count: u
         }
         let fit = measured.fit.expect("the method is the fit");
         lines += i32::from(fit.line_offsets.is_some());
-        waves += fit.harmonics.len();
+        shown += fit.harmonics.len();
         goodness += fit.goodness;
     }
     let n = pulls.len() as f64;
     let mean = pulls.iter().sum::<Vector4<f64>>() / n;
     let square = pulls.iter().map(Vector4::norm_squared).sum::<f64>() / (4.0 * n);
+    // Pulls along the fast axis (x of q₁ and q₂) and along the slow one.
+    let along = |axis: usize| {
+        let squares = waves.iter().map(|w| w[axis].powi(2) + w[axis + 2].powi(2));
+        (squares.sum::<f64>() / (2.0 * n)).sqrt()
+    };
     println!(
-        "{name:18} {:3}/{count:<3}   {:6.3}       {:.3}  {:.3}  {lines:4}  {:5.1}  {:.3}",
+        "{name:18} {:3}/{count:<3}   {:6.3}       {:.3}  {:.3}  {:.3}  {:.3}  {lines:4}  {:5.1}  {:.3}",
         pulls.len(),
         (error / n / bound).sqrt(),
         square.sqrt(),
+        along(0),
+        along(1),
         mean.amax(),
-        waves as f64 / n,
+        shown as f64 / n,
         goodness / n,
     );
 }

@@ -5,6 +5,7 @@
 use nalgebra::{Matrix2, Vector2};
 use spmfile::{DateTime, FrameDirection, LineDirection};
 
+use crate::budget::Budget;
 use crate::caveat::Caveat;
 use crate::estimate::Estimate;
 use crate::image::Image;
@@ -105,6 +106,8 @@ pub struct SetMean {
     pub lattice: LatticeVectors,
     /// Twist and strain of that lattice.
     pub twist_strain: TwistStrain,
+    /// What contributes to their uncertainty, calibration and model included.
+    pub budget: Budget,
     /// Standard deviation of the twist over the scans, rad; NaN for a single scan.
     pub twist_scatter: f64,
     /// Root-mean-square deviation per component of the strain vector over the scans; NaN for one scan.
@@ -122,6 +125,8 @@ pub struct Combined {
     pub lattice: LatticeVectors,
     /// Its twist and strain.
     pub twist_strain: TwistStrain,
+    /// What contributes to their uncertainty, calibration and model included.
+    pub budget: Budget,
     /// Whether one joint fit over all scans made them, and with which terms.
     pub joint: Option<JointTerms>,
     /// The drift in the middle of the campaign, where one joint fit over all scans describes it.

@@ -135,6 +135,7 @@ fn ideal(
             basis: map * pair,
             covariance: information.try_inverse()?,
         },
+        sensor: Matrix4::zeros(),
         time_gradient: u,
         fast_gain: Matrix2::zeros(),
         time,
@@ -175,7 +176,8 @@ mod tests {
         for found in bound.strain {
             assert!((found / strain - 1.0).abs() < 0.01, "{bound:?}");
         }
-        let g = 4.0 * std::f64::consts::PI / (3f64.sqrt() * a) * settings.sample.twist_deg.to_radians();
+        let g =
+            4.0 * std::f64::consts::PI / (3f64.sqrt() * a) * settings.sample.twist_deg.to_radians();
         let position = f64::sqrt(2.0 / 3.0) / g * f64::sqrt(2.0 / pixels) * 2.0;
         // Ten frames 33 s apart: Σ(t − t̄)² = 82.5 · 33².
         let slope = position / (82.5_f64.sqrt() * 33.0);

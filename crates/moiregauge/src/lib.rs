@@ -5,6 +5,7 @@
 pub mod analysis;
 pub mod background;
 pub mod bound;
+pub mod budget;
 pub mod caveat;
 pub mod drift;
 pub mod estimate;

@@ -88,6 +88,30 @@ pub struct GivenDrift {
     pub sigma_nm_per_min: f64,
 }
 
+/// How well the position sensors (or the scanner, where there are none) are calibrated: standard
+/// uncertainties, which every scan shares. The defaults are common values; a calibration of your own
+/// scanner tells better.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Calibration {
+    /// Gain error that x and y have in common, per cent.
+    pub gain_percent: f64,
+    /// Difference of the gains of x and y, per cent.
+    pub mismatch_percent: f64,
+    /// Deviation of the axes from a right angle, mrad.
+    pub orthogonality_mrad: f64,
+}
+
+impl Default for Calibration {
+    fn default() -> Self {
+        Self {
+            gain_percent: 1.0,
+            mismatch_percent: 0.5,
+            orthogonality_mrad: 5.0,
+        }
+    }
+}
+
 /// Every knob of an analysis.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
@@ -118,6 +142,12 @@ pub struct Settings {
     pub overlap: bool,
     /// A drift known beforehand; `None`: measure it.
     pub drift: Option<GivenDrift>,
+    /// How well the scanner is calibrated, for the uncertainty budget.
+    pub calibration: Calibration,
+    /// Standard deviation of the isotropic heterostrain that the layers may have beside the uniaxial
+    /// one, per cent, for the uncertainty budget. The moiré does not show it. The default is a guess, of
+    /// the size of small uniaxial strains; up to 0.06 % the twist stays within 0.001°.
+    pub isotropic_strain_percent: f64,
     /// Monte Carlo draws for the drift.
     pub drift_draws: usize,
     /// Monte Carlo draws for twist and strain, per scan.
@@ -141,6 +171,8 @@ impl Default for Settings {
             exclude_outliers: false,
             overlap: false,
             drift: None,
+            calibration: Calibration::default(),
+            isotropic_strain_percent: 0.05,
             drift_draws: 10_000,
             strain_draws: 1_000,
             seed: 1,

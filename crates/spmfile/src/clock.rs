@@ -10,7 +10,8 @@ const DAYS_PER_CYCLE: i64 = 146_097;
 pub(crate) fn date(ymd: [i64; 3], hms: [i64; 3]) -> Option<DateTime> {
     let [year, month, day] = ymd;
     let [hour, minute, second] = hms;
-    let possible = (1..=12).contains(&month)
+    let possible = (1..=9999).contains(&year)
+        && (1..=12).contains(&month)
         && (1..=31).contains(&day)
         && (0..24).contains(&hour)
         && (0..60).contains(&minute)
@@ -61,20 +62,6 @@ pub(crate) fn later(start: DateTime, seconds: f64) -> DateTime {
     )
 }
 
-/// A count of seconds since the first second of 1904, as of Macintosh and Igor.
-pub(crate) fn since_1904(seconds: u32) -> DateTime {
-    let start = DateTime {
-        year: 1904,
-        month: 1,
-        day: 1,
-        hour: 0,
-        minute: 0,
-        second: 0,
-    };
-    let days = days(start) + i64::from(seconds) / SECONDS_PER_DAY;
-    from_days(days, i64::from(seconds) % SECONDS_PER_DAY)
-}
-
 /// Days since 1 March of year 0: years begin in March, so that the leap day is their last.
 fn days(date: DateTime) -> i64 {
     let before_march = i64::from(date.month < 3);
@@ -108,19 +95,6 @@ mod tests {
 
     fn at(ymd: [i64; 3], hms: [i64; 3]) -> DateTime {
         date(ymd, hms).expect("a date")
-    }
-
-    /// 1904-01-01 lies 24 107 days before 1970-01-01 (66 years with 17 leap days).
-    #[test]
-    fn seconds_since_1904() {
-        let unix = 24_107 * 86_400;
-        assert_eq!(since_1904(0), at([1904, 1, 1], [0, 0, 0]));
-        assert_eq!(since_1904(unix), at([1970, 1, 1], [0, 0, 0]));
-        // One thousand million seconds after 1970.
-        assert_eq!(
-            since_1904(unix + 1_000_000_000),
-            at([2001, 9, 9], [1, 46, 40])
-        );
     }
 
     #[test]

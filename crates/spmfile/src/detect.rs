@@ -210,18 +210,23 @@ fn zip(head: &[u8]) -> Format {
 
 /// An Igor binary wave has no signature: a version, and a kind of number that exists.
 fn igor(head: &[u8]) -> bool {
-    let little = matches!(head, [2 | 5, 0, ..]);
-    let big = matches!(head, [0, 2 | 5, ..]);
+    let little = matches!(head, [1..=3 | 5, 0, ..]);
+    let big = matches!(head, [0, 1..=3 | 5, ..]);
     if !little && !big {
         return false;
     }
     let endian = if little { Endian::Little } else { Endian::Big };
     let cursor = Cursor::new(head, endian);
-    let version_5 = cursor.clone().u16() == Ok(5);
     // The place of the wave's type in its header.
-    let kind = cursor.at(if version_5 { 80 } else { 16 }).u16();
+    let place = match cursor.clone().u16() {
+        Ok(1) => 8,
+        Ok(2) => 16,
+        Ok(3) => 20,
+        _ => 80,
+    };
+    let kind = cursor.at(place).u16();
     // Bits: complex 1, float 2, double 4, 8-, 16-, 32-bit integer 8, 16, 32, unsigned 64; 0 is text.
-    kind.is_ok_and(|kind| matches!(kind & !0x41, 0 | 2 | 4 | 8 | 16 | 32 | 128))
+    kind.is_ok_and(|kind| kind == 0 || matches!(kind & !0x41, 2 | 4 | 8 | 16 | 32 | 128))
 }
 
 /// Whether the lines, comments aside, hold numbers and nothing else. The last one may be cut off.

@@ -1,16 +1,664 @@
-//! Igor binary waves, `.ibw`.
+//! Igor binary waves (`WaveMetrics`), `.ibw`, as written by Asylum instruments among others.
+//!
+//! Versions 1 to 3 hold one-dimensional waves and are refused with that reason; version 5 holds up
+//! to four dimensions: x, y and channel. The byte order is that of the machine which wrote the
+//! file. All 16-bit words of the headers add up to zero (`WaveMetrics`, Technical Note 003).
+//!
+//! - x runs fastest; y = 0 is the bottom line. Retrace lines are in order of position.
+//! - The note of Asylum's software is a list of `key: value`: `FastScanSize`, `SlowScanSize` (m) are
+//!   the distances of the outermost pixel centres (the step of the wave is size/(N − 1));
+//!   `ScanRate` is in lines per second, trace and retrace together; `ScanDown` 1 (its lowest bit)
+//!   means that the top line came first; `XOffset`, `YOffset` are the centre.
+//! - `ScanAngle` turns the frame clockwise, in degrees: the scan procedure of the software moves
+//!   to `x = f cos α + s sin α`, `y = −f sin α + s cos α` (f fast, s slow).
+//! - The same procedure samples `N` of 2.5 `N` equal steps of a line in each direction: the motion
+//!   exceeds the frame by a quarter ([`Scan::rounding`] is 0.25).
 
 use crate::ChannelInfo;
+use crate::clock;
+use crate::cursor::{Cursor, Endian};
 use crate::error::ReadError;
-use crate::scan::Scan;
+use crate::raster::{self, Encoding, Order};
+use crate::scan::{Channel, DateTime, FrameDirection, LineDirection, Scan};
+use crate::units::{self, quantity};
+use crate::whole::{Extent, MOST_CHANNELS};
+
+const FORMAT: &str = "Igor binary wave";
+/// Length of both headers of a version 5 file.
+const HEADERS: usize = 64 + 320;
+/// Width of a dimension label.
+const LABEL: usize = 32;
+/// Overscan of Asylum's scan procedure.
+const ROUNDING: f64 = 0.25;
+
+fn damaged(reason: impl Into<String>) -> ReadError {
+    ReadError::Damaged {
+        format: FORMAT,
+        reason: reason.into(),
+    }
+}
+
+fn unsupported(reason: impl Into<String>) -> ReadError {
+    ReadError::Unsupported {
+        format: FORMAT,
+        reason: reason.into(),
+    }
+}
+
+/// What the headers of a version 5 file say.
+struct Wave {
+    endian: Endian,
+    kind: u16,
+    name: String,
+    /// Numbers of items along x, y, channel and one more dimension.
+    size: [usize; 4],
+    /// Steps along the dimensions.
+    step: [f64; 4],
+    unit: String,
+    /// Unit along x.
+    step_unit: String,
+    /// Lengths of the blocks behind the samples: formula, note, units, dimension units.
+    formula: usize,
+    note: usize,
+    units: usize,
+    dimension_units: usize,
+    labels: [usize; 4],
+}
 
 /// Reads the channels that are wanted.
-pub(crate) fn read(
-    _bytes: &[u8],
-    _wanted: &dyn Fn(&ChannelInfo) -> bool,
-) -> Result<Scan, ReadError> {
-    Err(ReadError::Unsupported {
-        format: "Igor binary wave",
-        reason: "this format is not read yet".to_owned(),
+pub(crate) fn read(bytes: &[u8], wanted: &dyn Fn(&ChannelInfo) -> bool) -> Result<Scan, ReadError> {
+    let endian = if bytes.first() == Some(&0) {
+        Endian::Big
+    } else {
+        Endian::Little
+    };
+    let version = Cursor::new(bytes, endian).u16().map_err(damaged)?;
+    if version != 5 {
+        return Err(refuse_one_dimension(bytes, endian, version));
+    }
+    check_sum(bytes, HEADERS, endian)?;
+    let wave = headers(bytes, endian).map_err(damaged)?;
+    let [columns, rows, layers, _] = wave.size;
+    if rows == 0 {
+        return Err(unsupported(format!(
+            "it holds a one-dimensional wave of {columns} points, no image"
+        )));
+    }
+    if wave.size[3] > 1 {
+        return Err(unsupported("it holds a wave of four dimensions, no image"));
+    }
+    let layers = layers.max(1);
+    if layers > MOST_CHANNELS {
+        return Err(ReadError::TooManyChannels {
+            found: layers,
+            limit: MOST_CHANNELS,
+        });
+    }
+    let encoding = encoding(wave.kind)?;
+    let length = raster::byte_length(rows, columns, encoding)
+        .ok_or_else(|| damaged(format!("its size is {rows} lines of {columns} samples")))?;
+    let tail = tail(bytes, &wave, length.saturating_mul(layers));
+    if !tail.line_labels.is_empty() {
+        return Err(unsupported(format!(
+            "its second dimension is named ({}): these are curves, no image",
+            tail.line_labels.join(", ")
+        )));
+    }
+    let note = Note(&tail.note);
+    let mut scan = frame(&note);
+    let [width_nm, height_nm] = extent_nm(&wave, &note);
+    scan.size_nm = width_nm
+        .zip(height_nm)
+        .map(|(width, height)| [width, height]);
+    let order = Order {
+        top_first: wave.step[1] < 0.0,
+        mirrored: wave.step[0] < 0.0,
+    };
+    let mut extent = Extent::default();
+    for layer in 0..layers {
+        let label = tail.labels.get(layer).cloned().unwrap_or_default();
+        let info = ChannelInfo {
+            line_direction: line_direction(&label),
+            name: label,
+            internal_name: if layers == 1 {
+                wave.name.clone()
+            } else {
+                String::new()
+            },
+            scan_line: None,
+        };
+        let place = layer.saturating_mul(length).saturating_add(HEADERS);
+        let Some(block) = extent.take(bytes, place, length, &info.name) else {
+            continue;
+        };
+        if !wanted(&info) {
+            continue;
+        }
+        scan.channels.push(Channel {
+            unit: unit(&wave, &info.name, layers),
+            name: info.name,
+            internal_name: info.internal_name,
+            line_direction: info.line_direction,
+            scan_line: None,
+            rows,
+            columns,
+            width_nm,
+            height_nm,
+            scale: 1.0,
+            offset: 0.0,
+            scaling: "values as stored".to_owned(),
+            plane_fit: note
+                .get(&format!("Planefit {layer}"))
+                .filter(|fit| !fit.eq_ignore_ascii_case("none"))
+                .map(str::to_owned),
+            samples: raster::decode(block, columns, encoding, endian, order),
+        });
+    }
+    extent.judge(scan, bytes)
+}
+
+/// The reason why a file of an elder version is not read.
+fn refuse_one_dimension(bytes: &[u8], endian: Endian, version: u16) -> ReadError {
+    let start = match version {
+        1 => 8,
+        2 => 16,
+        3 => 20,
+        other => return unsupported(format!("expected version 5, found version {other}")),
+    };
+    // The sum takes in the first sixteen bytes of the data, which count as header in these versions.
+    if let Err(error) = check_sum(bytes, start + 126, endian) {
+        return error;
+    }
+    match Cursor::new(bytes, endian).at(start + 42).i32() {
+        Ok(points) => unsupported(format!(
+            "it holds a one-dimensional wave of {points} points (version {version}), no image"
+        )),
+        Err(reason) => damaged(reason),
+    }
+}
+
+fn check_sum(bytes: &[u8], length: usize, endian: Endian) -> Result<(), ReadError> {
+    let mut cursor = Cursor::new(bytes, endian);
+    let mut sum = 0u16;
+    for _ in 0..length / 2 {
+        sum = sum.wrapping_add(cursor.u16().map_err(damaged)?);
+    }
+    if sum == 0 {
+        Ok(())
+    } else {
+        Err(damaged(format!(
+            "the words of its header add up to {sum} instead of 0"
+        )))
+    }
+}
+
+fn headers(bytes: &[u8], endian: Endian) -> Result<Wave, String> {
+    let mut cursor = Cursor::new(bytes, endian).at(8);
+    let mut length = || -> Result<usize, String> { Ok(cursor.u32()? as usize) };
+    let (formula, note, units) = (length()?, length()?, length()?);
+    let dimension_units = (0..4).try_fold(0usize, |sum, _| Ok::<_, String>(sum + length()?))?;
+    let mut labels = [0; 4];
+    for label in &mut labels {
+        *label = length()?;
+    }
+    let mut cursor = cursor.at(64 + 16);
+    let kind = cursor.u16()?;
+    cursor.skip(10)?;
+    let name = cursor.text(32, "a name")?;
+    cursor.skip(8)?;
+    let mut size = [0; 4];
+    for items in &mut size {
+        *items = cursor.u32()? as usize;
+    }
+    let mut step = [0.0; 4];
+    for value in &mut step {
+        *value = cursor.f64()?;
+    }
+    cursor.skip(4 * 8)?;
+    Ok(Wave {
+        endian,
+        kind,
+        name,
+        size,
+        step,
+        unit: cursor.text(4, "a unit")?,
+        step_unit: cursor.text(4, "a unit")?,
+        formula,
+        note,
+        units,
+        dimension_units,
+        labels,
     })
+}
+
+fn encoding(kind: u16) -> Result<Encoding, ReadError> {
+    Ok(match kind {
+        0x02 => Encoding::F32,
+        0x04 => Encoding::F64,
+        0x08 => Encoding::I8,
+        0x10 => Encoding::I16,
+        0x20 => Encoding::I32,
+        0x48 => Encoding::U8,
+        0x50 => Encoding::U16,
+        0x60 => Encoding::U32,
+        0x80 => Encoding::I64,
+        0xc0 => Encoding::U64,
+        0 => return Err(unsupported("it holds texts, no numbers")),
+        other if other & 1 == 1 => return Err(unsupported("it holds complex numbers")),
+        other => return Err(damaged(format!("its kind of number is {other:#x}"))),
+    })
+}
+
+/// What stands behind the samples; absent parts are empty.
+struct Tail {
+    note: Vec<(String, String)>,
+    /// Names of the second dimension's items.
+    line_labels: Vec<String>,
+    /// Names of the layers.
+    labels: Vec<String>,
+}
+
+fn tail(bytes: &[u8], wave: &Wave, data: usize) -> Tail {
+    let blocks = || -> Result<(&[u8], [Vec<String>; 2]), String> {
+        let start = HEADERS
+            .checked_add(data)
+            .and_then(|n| n.checked_add(wave.formula));
+        let mut cursor = Cursor::new(bytes, wave.endian).at(start.ok_or("too long")?);
+        let note = cursor.slice(wave.note, "a note")?;
+        cursor.skip(wave.units)?;
+        cursor.skip(wave.dimension_units)?;
+        cursor.skip(wave.labels[0])?;
+        let lines = labels(cursor.slice(wave.labels[1], "labels")?);
+        let layers = labels(cursor.slice(wave.labels[2], "labels")?);
+        Ok((note, [lines, layers]))
+    };
+    let (note, [line_labels, labels]) = blocks().unwrap_or_default();
+    let text = units::decode(note);
+    let note = text
+        .split(['\r', '\n'])
+        .filter_map(|line| line.split_once(':'))
+        .map(|(key, value)| (key.trim().to_owned(), value.trim().to_owned()))
+        .collect();
+    Tail {
+        note,
+        line_labels,
+        labels,
+    }
+}
+
+/// The labels of a dimension's items; the first one stored is that of the dimension itself.
+fn labels(block: &[u8]) -> Vec<String> {
+    let mut labels: Vec<String> = block
+        .chunks_exact(LABEL)
+        .skip(1)
+        .map(|label| {
+            let end = label.iter().position(|&b| b == 0).unwrap_or(LABEL);
+            let text = units::decode(&label[..end]);
+            text.trim().to_owned()
+        })
+        .collect();
+    if labels.iter().all(String::is_empty) {
+        labels.clear();
+    }
+    labels
+}
+
+/// `HeightRetrace` is of the retrace, `HeightTrace` and `HeightTrace2` of the trace.
+fn line_direction(label: &str) -> Option<LineDirection> {
+    let plain = label
+        .trim_end_matches(|c: char| c.is_ascii_digit())
+        .to_ascii_lowercase();
+    if plain.ends_with("retrace") {
+        Some(LineDirection::Retrace)
+    } else if plain.ends_with("trace") {
+        Some(LineDirection::Trace)
+    } else {
+        None
+    }
+}
+
+/// The unit of a layer. A wave has one unit only; where several quantities share it, the name of
+/// Asylum's channel tells.
+fn unit(wave: &Wave, label: &str, layers: usize) -> String {
+    const UNITS: [(&str, &str); 14] = [
+        ("Height", "m"),
+        ("ZSensor", "m"),
+        ("XSensor", "m"),
+        ("YSensor", "m"),
+        ("Amplitude", "m"),
+        ("Deflection", "m"),
+        ("Raw", "m"),
+        ("Phase", "deg"),
+        ("Lateral", "V"),
+        ("UserIn", "V"),
+        ("Potential", "V"),
+        ("Current", "A"),
+        ("Frequency", "Hz"),
+        ("Capacitance", "F"),
+    ];
+    let known = UNITS.iter().find(|(name, _)| label.starts_with(name));
+    match known {
+        Some((_, unit)) if line_direction(label).is_some() => (*unit).to_owned(),
+        _ if layers == 1 => units::clean(&wave.unit),
+        _ => String::new(),
+    }
+}
+
+/// Keys and values of the note; a value changed during the scan stands there again, with `@Line`.
+struct Note<'a>(&'a [(String, String)]);
+
+impl Note<'_> {
+    fn get(&self, key: &str) -> Option<&str> {
+        let (_, value) = self.0.iter().find(|(k, _)| k == key)?;
+        Some(value)
+    }
+
+    fn number(&self, key: &str) -> Option<f64> {
+        quantity(self.get(key)?).map(|(number, _)| number)
+    }
+
+    /// A number that did not change during the scan.
+    fn constant(&self, key: &str) -> Option<f64> {
+        let first = self.number(key)?;
+        let mut all = self.0.iter().filter(|(k, _)| k == key);
+        let same = |value: &str| {
+            quantity(value).is_some_and(|(n, _)| (n - first).abs() <= 1e-3 * first.abs())
+        };
+        all.all(|(_, value)| same(value)).then_some(first)
+    }
+}
+
+/// Distances of the outermost pixel centres. The note is believed where its numbers of points are
+/// the wave's; otherwise the wave's steps tell.
+fn extent_nm(wave: &Wave, note: &Note<'_>) -> [Option<f64>; 2] {
+    let axis = |index: usize, size: &str, points: &str| {
+        let count = wave.size[index] as f64;
+        let noted = note
+            .number(size)
+            .or_else(|| note.number("ScanSize"))
+            .filter(|_| note.number(points).is_none_or(|n| n == count))
+            .map(|metres| metres * 1e9);
+        let stepped = || {
+            let per_unit = units::nm_per(&wave.step_unit)?;
+            Some(wave.step[index].abs() * (count - 1.0) * per_unit)
+        };
+        noted.or_else(stepped).filter(|&n| n > 0.0 && n.is_finite())
+    };
+    [
+        axis(0, "FastScanSize", "ScanPoints"),
+        axis(1, "SlowScanSize", "ScanLines"),
+    ]
+}
+
+/// Everything about the frame but its channels and size.
+fn frame(note: &Note<'_>) -> Scan {
+    let clockwise = note.constant("ScanAngle").unwrap_or(0.0);
+    let line_rate_hz = note.constant("ScanRate").filter(|&rate| rate > 0.0);
+    let mode = note.get("ScanMode").unwrap_or("").to_ascii_lowercase();
+    Scan {
+        format: match note.get("Version") {
+            Some(version) => format!("{FORMAT}, Asylum {version}"),
+            None => FORMAT.to_owned(),
+        },
+        instrument: note.get("MicroscopeModel").map(str::to_owned),
+        acquired: acquired(note),
+        frame_direction: note.number("ScanDown").map(|down| {
+            if down as i64 & 1 == 1 {
+                FrameDirection::Down
+            } else {
+                FrameDirection::Up
+            }
+        }),
+        rounding: line_rate_hz.map(|_| ROUNDING),
+        line_rate_hz,
+        rotation_rad: if clockwise == 0.0 {
+            0.0
+        } else {
+            -clockwise.to_radians()
+        },
+        offset_nm: ["XOffset", "YOffset"].map(|key| note.number(key).unwrap_or(0.0) * 1e9),
+        closed_loop: match (mode.starts_with("closed"), mode.starts_with("open")) {
+            (true, _) => Some(true),
+            (_, true) => Some(false),
+            _ => None,
+        },
+        metadata: note.0.to_vec(),
+        ..Scan::default()
+    }
+}
+
+/// `2021-10-11` and `3:52:01 PM`.
+fn acquired(note: &Note<'_>) -> Option<DateTime> {
+    let date: Vec<i64> = note
+        .get("Date")?
+        .split('-')
+        .filter_map(|part| part.trim().parse().ok())
+        .collect();
+    let [year, month, day] = date[..] else {
+        return None;
+    };
+    clock::date([year, month, day], clock::clock(note.get("Time")?)?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A version 5 wave of single-precision samples counted up in the order of the file.
+    struct Made {
+        endian: Endian,
+        size: [u32; 4],
+        kind: u16,
+        step: [f64; 2],
+        note: &'static str,
+        line_labels: &'static [&'static str],
+        labels: &'static [&'static str],
+    }
+
+    const IMAGE: Made = Made {
+        endian: Endian::Little,
+        size: [3, 2, 2, 0],
+        kind: 2,
+        step: [1e-9, 1e-9],
+        note: "ScanSize: 2e-09\rFastScanSize: 2e-09\rSlowScanSize: 1e-09\rScanPoints: 3\rScanLines: 2\r\
+               ScanRate: 2\rScanAngle: 135\rScanDown: 1\rXOffset: 1e-06\rYOffset: -2e-06\r\
+               ScanMode:Closed Loop\rDate:2021-10-11\rTime:3:52:01 PM\rPlanefit 1: Flatten 1\r\
+               ScanRate: 2@Line: 1\r",
+        line_labels: &[],
+        labels: &["", "HeightTrace", "PhaseRetrace"],
+    };
+
+    fn file(made: &Made) -> Vec<u8> {
+        let big = made.endian == Endian::Big;
+        let mut bytes: Vec<u8> = Vec::new();
+        macro_rules! put {
+            ($($value:expr),*) => {$(
+                bytes.extend(if big { $value.to_be_bytes() } else { $value.to_le_bytes() });
+            )*};
+        }
+        let label_size = |labels: &[&str]| (labels.len() * LABEL) as u32;
+        put!(5u16, 0u16, 0u32, 0u32, made.note.len() as u32, 0u32);
+        for _ in 0..4 {
+            put!(0u32);
+        }
+        put!(
+            0u32,
+            label_size(made.line_labels),
+            label_size(made.labels),
+            0u32
+        );
+        bytes.resize(64 + 16, 0);
+        put!(made.kind);
+        bytes.resize(64 + 28, 0);
+        bytes.extend(b"wave0");
+        bytes.resize(64 + 68, 0);
+        for items in made.size {
+            put!(items);
+        }
+        put!(made.step[0], made.step[1], 1f64, 1f64);
+        bytes.resize(64 + 148, 0);
+        bytes.extend(b"V\0\0\0m\0\0\0m\0\0\0");
+        bytes.resize(HEADERS, 0);
+        let sizes = made.size.iter().filter(|&&n| n > 0);
+        let samples = sizes.fold(1u32, |all, &n| all.saturating_mul(n)).min(1000);
+        for n in 0..samples {
+            put!(n as f32);
+        }
+        bytes.extend(made.note.bytes());
+        for label in made.line_labels.iter().chain(made.labels) {
+            bytes.extend(label.bytes());
+            bytes.resize(bytes.len() + LABEL - label.len(), 0);
+        }
+        summed(bytes, HEADERS, big, 2)
+    }
+
+    /// Sets the word at `place` so that all of the header add up to zero.
+    fn summed(mut bytes: Vec<u8>, length: usize, big: bool, place: usize) -> Vec<u8> {
+        let sum = bytes[..length].chunks_exact(2).fold(0u16, |sum, b| {
+            let word = if big {
+                u16::from_be_bytes([b[0], b[1]])
+            } else {
+                u16::from_le_bytes([b[0], b[1]])
+            };
+            sum.wrapping_add(word)
+        });
+        let check = 0u16.wrapping_sub(sum);
+        let check = if big {
+            check.to_be_bytes()
+        } else {
+            check.to_le_bytes()
+        };
+        bytes[place..place + 2].copy_from_slice(&check);
+        bytes
+    }
+
+    #[test]
+    fn both_byte_orders_hold_the_same_image() {
+        for endian in [Endian::Little, Endian::Big] {
+            let scan = crate::read(&file(&Made { endian, ..IMAGE })).expect("an image");
+            let found: Vec<_> = scan
+                .channels
+                .iter()
+                .map(|c| (c.name.as_str(), c.unit.as_str(), c.line_direction))
+                .collect();
+            assert_eq!(
+                found,
+                [
+                    ("HeightTrace", "m", Some(LineDirection::Trace)),
+                    ("PhaseRetrace", "deg", Some(LineDirection::Retrace)),
+                ]
+            );
+            // y = 0 is the bottom line, retrace is in order of position: as stored.
+            assert_eq!(scan.channels[0].values(), [0.0, 1.0, 2.0, 3.0, 4.0, 5.0]);
+            assert_eq!(scan.channels[1].values(), [6.0, 7.0, 8.0, 9.0, 10.0, 11.0]);
+            assert_eq!(scan.channels[1].plane_fit.as_deref(), Some("Flatten 1"));
+        }
+    }
+
+    #[test]
+    fn the_note_tells_the_frame() {
+        let scan = crate::read(&file(&IMAGE)).expect("an image");
+        let size = scan.size_nm.expect("a size");
+        assert!((size[0] - 2.0).abs() + (size[1] - 1.0).abs() < 1e-12);
+        assert_eq!(scan.line_rate_hz, Some(2.0));
+        assert_eq!(scan.rounding, Some(0.25));
+        assert_eq!(scan.frame_direction, Some(FrameDirection::Down));
+        assert!((scan.rotation_rad + 135f64.to_radians()).abs() < 1e-12);
+        assert!((scan.offset_nm[0] - 1000.0).abs() + (scan.offset_nm[1] + 2000.0).abs() < 1e-9);
+        assert_eq!(scan.closed_loop, Some(true));
+        assert_eq!(scan.acquired, clock::date([2021, 10, 11], [15, 52, 1]));
+    }
+
+    #[test]
+    fn a_rate_changed_during_the_scan_is_no_rate() {
+        let note = "ScanRate: 2\rScanRate: 3@Line: 1\r";
+        let scan = crate::read(&file(&Made { note, ..IMAGE })).expect("an image");
+        assert_eq!((scan.line_rate_hz, scan.rounding), (None, None));
+    }
+
+    /// Without a note the steps tell; negative ones turn the image.
+    #[test]
+    fn plain_waves() {
+        let plain = Made {
+            note: "",
+            labels: &["Generated 1"],
+            size: [3, 2, 1, 0],
+            step: [-1e-9, -2e-9],
+            ..IMAGE
+        };
+        let scan = crate::read(&file(&plain)).expect("an image");
+        let channel = &scan.channels[0];
+        assert_eq!(
+            (channel.name.as_str(), channel.internal_name.as_str()),
+            ("", "wave0")
+        );
+        assert_eq!(channel.values(), [5.0, 4.0, 3.0, 2.0, 1.0, 0.0]);
+        assert_eq!(channel.unit, "V");
+        assert!((channel.width_nm.expect("width") - 2.0).abs() < 1e-12);
+        assert!((channel.height_nm.expect("height") - 2.0).abs() < 1e-12);
+        assert_eq!((scan.frame_direction, scan.line_rate_hz), (None, None));
+    }
+
+    #[test]
+    fn what_is_no_image_is_named() {
+        let error = |made: Made| crate::read(&file(&made)).expect_err("no image").to_string();
+        assert!(
+            error(Made {
+                size: [5, 0, 0, 0],
+                ..IMAGE
+            })
+            .contains("one-dimensional wave of 5")
+        );
+        assert!(
+            error(Made {
+                size: [3, 2, 2, 2],
+                ..IMAGE
+            })
+            .contains("four dimensions")
+        );
+        let curves = Made {
+            line_labels: &["", "Raw", "Defl"],
+            ..IMAGE
+        };
+        assert!(error(curves).contains("Raw, Defl"));
+        assert!(error(Made { kind: 3, ..IMAGE }).contains("complex"));
+        let giant = error(Made {
+            size: [u32::MAX; 4],
+            ..IMAGE
+        });
+        assert!(giant.contains("dimensions"), "{giant}");
+        let long = error(Made {
+            size: [u32::MAX, u32::MAX, 2, 0],
+            ..IMAGE
+        });
+        assert!(
+            long.contains("promises") || long.contains("lines"),
+            "{long}"
+        );
+        let mut elder = vec![0u8; 142];
+        elder[1] = 2;
+        elder[17] = 2;
+        elder[61] = 5;
+        let elder = summed(elder, 142, true, 14);
+        let found = crate::read(&elder).expect_err("one dimension").to_string();
+        assert!(
+            found.contains("5 points") && found.contains("version 2"),
+            "{found}"
+        );
+    }
+
+    #[test]
+    fn damage_is_seen() {
+        let whole = file(&IMAGE);
+        let mut flipped = whole.clone();
+        flipped[140] ^= 1;
+        let error = crate::read(&flipped).expect_err("flipped").to_string();
+        assert!(error.contains("instead of 0"), "{error}");
+        let Err(ReadError::Incomplete { readable, .. }) = crate::read(&whole[..HEADERS + 40])
+        else {
+            panic!("the second layer is cut off");
+        };
+        assert_eq!(readable.channels.len(), 1);
+        assert!(crate::read(&whole[..100]).is_err());
+    }
 }

@@ -1,16 +1,502 @@
-//! ISO 28632 text.
+//! ISO 28632 text (`ISO/TC 201 SPM data transfer format`), often named `.spm`.
+//!
+//! 128 lines of fixed meaning, from the magic line to `end of header`, then one line of numbers per
+//! pixel (one number per channel), then `end of experiment`. Line numbers below count from 1 as in
+//! the standard.
+//!
+//! - Pixels are in the order of the scan: lines 21 and 23 say from where to where (`left to right`,
+//!   `top to bottom`).
+//! - Line 34 is the rotation in degrees, counter-clockwise; lines 28 and 29 the field of view,
+//!   edge to edge, in the units of lines 26 and 27.
+//! - Image programs that export this format invent the scan: where line 7 calls the parameters
+//!   bogus, directions, rate and control are left open.
 
 use crate::ChannelInfo;
+use crate::clock;
 use crate::error::ReadError;
-use crate::scan::Scan;
+use crate::labels;
+use crate::raster::{self, Order};
+use crate::scan::{Channel, DateTime, FrameDirection, LineDirection, Samples, Scan};
+use crate::units;
+
+const FORMAT: &str = "ISO 28632";
+/// Number of header lines.
+const LINES: usize = 128;
+/// Lines that hold the same words in every file.
+const FIXED: [(usize, &str); 6] = [
+    (2, "general information"),
+    (16, "scan information"),
+    (68, "single-channel mapping description"),
+    (87, "data treatment description"),
+    (93, "multi-channel mapping description"),
+    (LINES, "end of header"),
+];
+
+fn damaged(reason: impl Into<String>) -> ReadError {
+    ReadError::Damaged {
+        format: FORMAT,
+        reason: reason.into(),
+    }
+}
 
 /// Reads the channels that are wanted.
-pub(crate) fn read(
-    _bytes: &[u8],
-    _wanted: &dyn Fn(&ChannelInfo) -> bool,
-) -> Result<Scan, ReadError> {
-    Err(ReadError::Unsupported {
-        format: "ISO 28632",
-        reason: "this format is not read yet".to_owned(),
-    })
+pub(crate) fn read(bytes: &[u8], wanted: &dyn Fn(&ChannelInfo) -> bool) -> Result<Scan, ReadError> {
+    let (head, body) = split(bytes)?;
+    let header = Header::of(&head)?;
+    let channels = header.channels()?;
+    let columns = header.count(24)?;
+    let rows = header.count(25)?;
+    let pixels = columns.checked_mul(rows);
+    // A number takes two bytes at least.
+    let pixels = pixels
+        .filter(|&n| n.saturating_mul(2 * channels.len()) <= bytes.len().saturating_add(1))
+        .ok_or_else(|| {
+            damaged(format!(
+                "expected {rows} lines of {columns} pixels, found {} bytes in all",
+                bytes.len()
+            ))
+        })?;
+    let order = header.order()?;
+    let mut scan = header.frame();
+    let infos: Vec<(ChannelInfo, String)> = channels;
+    let chosen: Vec<bool> = infos.iter().map(|(info, _)| wanted(info)).collect();
+    let (values, missing) = values(body, pixels, &chosen)?;
+    let size = scan.size_nm;
+    for (((info, unit), _), values) in infos
+        .into_iter()
+        .zip(chosen)
+        .filter(|(_, chosen)| *chosen)
+        .zip(values)
+    {
+        scan.channels.push(Channel {
+            name: info.name,
+            internal_name: info.internal_name,
+            unit,
+            line_direction: info.line_direction,
+            scan_line: None,
+            rows,
+            columns,
+            width_nm: size.map(|[width, _]| width),
+            height_nm: size.map(|[_, height]| height),
+            scale: 1.0,
+            offset: 0.0,
+            scaling: "values as stored".to_owned(),
+            plane_fit: header.text(89).map(str::to_owned),
+            samples: Samples::F64(raster::turned(&values, columns, order)),
+        });
+    }
+    match missing {
+        None => Ok(scan),
+        Some(reason) => Err(ReadError::Incomplete {
+            reason,
+            readable: Box::new(scan),
+        }),
+    }
+}
+
+/// The header's lines and the bytes behind them.
+fn split(bytes: &[u8]) -> Result<(Vec<String>, &[u8]), ReadError> {
+    let mut rest = bytes;
+    let mut lines = Vec::with_capacity(LINES);
+    while lines.len() < LINES {
+        let Some(end) = rest.iter().position(|&b| b == b'\n') else {
+            return Err(damaged(format!(
+                "expected {LINES} lines of header, found {}: the file was cut off inside it",
+                lines.len()
+            )));
+        };
+        let text = units::decode(&rest[..end]);
+        lines.push(text.trim().to_owned());
+        rest = &rest[end + 1..];
+    }
+    Ok((lines, rest))
+}
+
+struct Header<'a>(&'a [String]);
+
+impl<'a> Header<'a> {
+    fn of(lines: &'a [String]) -> Result<Self, ReadError> {
+        for (number, words) in FIXED {
+            let found = lines.get(number - 1).map_or("", String::as_str);
+            if !found.eq_ignore_ascii_case(words) {
+                return Err(damaged(format!(
+                    "expected {words:?} in line {number}, found {found:?}"
+                )));
+            }
+        }
+        Ok(Self(lines))
+    }
+
+    /// A line that is not empty; numbers count from 1.
+    fn text(&self, line: usize) -> Option<&'a str> {
+        let text = self.0.get(line.checked_sub(1)?)?.as_str();
+        (!text.is_empty()).then_some(text)
+    }
+
+    fn number(&self, line: usize) -> Option<f64> {
+        self.text(line)?
+            .parse()
+            .ok()
+            .filter(|n: &f64| n.is_finite())
+    }
+
+    fn count(&self, line: usize) -> Result<usize, ReadError> {
+        let text = self.text(line).unwrap_or("");
+        match text.parse() {
+            Ok(n) if n > 0 => Ok(n),
+            _ => Err(damaged(format!(
+                "expected a number above 0 in line {line}, found {text:?}"
+            ))),
+        }
+    }
+
+    /// A length: its number in one line, its unit in another.
+    fn length_nm(&self, line: usize, unit: usize) -> Option<f64> {
+        let unit = units::clean(self.text(unit)?);
+        Some(self.number(line)? * units::nm_per(&unit)?)
+    }
+
+    /// Whether the scan's parameters are said to be invented.
+    fn bogus(&self) -> bool {
+        let comment = self.text(7).unwrap_or("").to_ascii_lowercase();
+        comment.contains("bogus")
+    }
+
+    /// Name and unit of every channel.
+    fn channels(&self) -> Result<Vec<(ChannelInfo, String)>, ReadError> {
+        let mode = self.text(8).unwrap_or("");
+        let regular = self.text(17).unwrap_or("");
+        let refused = |reason: String| ReadError::Unsupported {
+            format: FORMAT,
+            reason,
+        };
+        let places: Vec<(usize, usize)> = match mode {
+            "MAP_SC" => vec![(69, 70)],
+            "MAP_MC" => {
+                let count = self.count(94)?;
+                if count > 8 {
+                    return Err(ReadError::TooManyChannels {
+                        found: count,
+                        limit: 8,
+                    });
+                }
+                (0..count).map(|n| (95 + 3 * n, 96 + 3 * n)).collect()
+            }
+            other => {
+                return Err(refused(format!(
+                    "its experiment mode is {other:?}, no image"
+                )));
+            }
+        };
+        if !regular.eq_ignore_ascii_case("REGULAR MAPPING") {
+            return Err(refused(format!(
+                "its scan mode is {regular:?}, no regular image"
+            )));
+        }
+        let channel = |(name, unit)| {
+            let name = self.text(name).unwrap_or("").to_owned();
+            let info = ChannelInfo {
+                line_direction: labels::line_direction(&name).or_else(|| self.line_direction()),
+                name,
+                internal_name: String::new(),
+                scan_line: None,
+            };
+            let unit = match self.text(unit) {
+                None | Some("n" | "d") => String::new(),
+                Some(unit) => units::clean(unit),
+            };
+            (info, unit)
+        };
+        Ok(places.into_iter().map(channel).collect())
+    }
+
+    fn line_direction(&self) -> Option<LineDirection> {
+        match self.text(21) {
+            _ if self.bogus() => None,
+            Some("left to right") => Some(LineDirection::Trace),
+            Some("right to left") => Some(LineDirection::Retrace),
+            _ => None,
+        }
+    }
+
+    /// In which order the pixels come.
+    fn order(&self) -> Result<Order, ReadError> {
+        let (fast, slow) = (self.text(20), self.text(22));
+        if (fast, slow) != (Some("X"), Some("Y")) {
+            return Err(ReadError::Unsupported {
+                format: FORMAT,
+                reason: format!(
+                    "its fast and slow axes are {:?} and {:?}; expected X and Y",
+                    fast.unwrap_or(""),
+                    slow.unwrap_or("")
+                ),
+            });
+        }
+        let told = |line: usize, usual: &str, turned: &str| match self.text(line) {
+            Some(words) if words.eq_ignore_ascii_case(usual) => Ok(false),
+            Some(words) if words.eq_ignore_ascii_case(turned) => Ok(true),
+            found => Err(damaged(format!(
+                "expected {usual:?} or {turned:?} in line {line}, found {:?}",
+                found.unwrap_or("")
+            ))),
+        };
+        Ok(Order {
+            top_first: !told(23, "top to bottom", "bottom to top")?,
+            mirrored: told(21, "left to right", "right to left")?,
+        })
+    }
+
+    /// Everything about the frame but its channels.
+    fn frame(&self) -> Scan {
+        let real = !self.bogus();
+        let size = self.length_nm(28, 26).zip(self.length_nm(29, 27));
+        Scan {
+            format: FORMAT.to_owned(),
+            instrument: self.text(4).map(str::to_owned),
+            acquired: self.date(),
+            frame_direction: match self.text(23) {
+                Some("top to bottom") if real => Some(FrameDirection::Down),
+                Some("bottom to top") if real => Some(FrameDirection::Up),
+                _ => None,
+            },
+            line_rate_hz: self
+                .number(38)
+                .filter(|&rate| real && rate > 0.0 && self.text(37) == Some("Hz")),
+            rotation_rad: self.number(34).unwrap_or(0.0).to_radians(),
+            offset_nm: [(32, 30), (33, 31)]
+                .map(|(line, unit)| self.length_nm(line, unit).unwrap_or(0.0)),
+            size_nm: size
+                .map(|(width, height)| [width, height])
+                .filter(|&[width, height]| width > 0.0 && height > 0.0),
+            closed_loop: match self.text(18).map(str::to_ascii_lowercase) {
+                Some(words) if real && words.contains("closed") => Some(true),
+                Some(words) if real && words.contains("open") => Some(false),
+                _ => None,
+            },
+            metadata: self
+                .0
+                .iter()
+                .enumerate()
+                .filter(|(index, line)| {
+                    let fixed = FIXED.iter().any(|(number, _)| number == &(index + 1));
+                    *index > 0 && !fixed && !line.is_empty()
+                })
+                .map(|(index, line)| (format!("line {}", index + 1), line.clone()))
+                .collect(),
+            ..Scan::default()
+        }
+    }
+
+    fn date(&self) -> Option<DateTime> {
+        let part = |line: usize| self.text(line)?.parse::<i64>().ok();
+        clock::date(
+            [part(9)?, part(10)?, part(11)?],
+            [part(12)?, part(13)?, part(14)?],
+        )
+    }
+}
+
+/// The values of the chosen channels, and what is missing. `chosen` has one entry per channel.
+fn values(
+    body: &[u8],
+    pixels: usize,
+    chosen: &[bool],
+) -> Result<(Vec<Vec<f64>>, Option<String>), ReadError> {
+    let count = chosen.iter().filter(|&&c| c).count();
+    let mut all: Vec<Vec<f64>> = vec![Vec::with_capacity(pixels); count];
+    let text = String::from_utf8_lossy(body);
+    let mut lines = text.lines();
+    for pixel in 0..pixels {
+        let line = lines.next().unwrap_or("").trim();
+        let mut numbers = line.split([' ', '\t', ',']).filter(|word| !word.is_empty());
+        let mut target = all.iter_mut();
+        for &chosen in chosen {
+            let word = numbers.next().unwrap_or("");
+            let Ok(value) = word.parse::<f64>() else {
+                return missing(all, pixels, pixel, line, lines.next().is_some());
+            };
+            if chosen && let Some(target) = target.next() {
+                target.push(if value.is_finite() { value } else { f64::NAN });
+            }
+        }
+    }
+    let end = lines.next().unwrap_or("").trim();
+    if end.eq_ignore_ascii_case("end of experiment") {
+        Ok((all, None))
+    } else if end.is_empty() {
+        Ok((
+            all,
+            Some("the line \"end of experiment\" is missing".to_owned()),
+        ))
+    } else {
+        Err(damaged(format!(
+            "expected \"end of experiment\" behind {pixels} pixels, found {end:?}"
+        )))
+    }
+}
+
+/// A pixel that is no number: a file cut off there is incomplete, any other is damaged.
+fn missing(
+    mut all: Vec<Vec<f64>>,
+    pixels: usize,
+    pixel: usize,
+    line: &str,
+    more: bool,
+) -> Result<(Vec<Vec<f64>>, Option<String>), ReadError> {
+    let ended = line.is_empty() || line.eq_ignore_ascii_case("end of experiment");
+    if more && !ended {
+        return Err(damaged(format!(
+            "expected numbers for pixel {pixel} of {pixels}, found {line:?}"
+        )));
+    }
+    for values in &mut all {
+        values.truncate(pixel);
+        values.resize(pixels, f64::NAN);
+    }
+    Ok((
+        all,
+        Some(format!("it ends after {pixel} of {pixels} pixels")),
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two lines of three pixels; `lines` overrides lines of the header.
+    fn file(lines: &[(usize, &str)], body: &str) -> Vec<u8> {
+        let mut header = vec![String::new(); LINES];
+        header[0] = "ISO/TC 201 SPM data transfer format".to_owned();
+        let usual = [
+            (8, "MAP_SC"),
+            (9, "2024"),
+            (10, "2"),
+            (11, "29"),
+            (12, "10"),
+            (13, "20"),
+            (14, "30"),
+            (17, "REGULAR MAPPING"),
+            (18, "open-loop scanner"),
+            (20, "X"),
+            (21, "left to right"),
+            (22, "Y"),
+            (23, "bottom to top"),
+            (24, "3"),
+            (25, "2"),
+            (26, "nm"),
+            (27, "nm"),
+            (28, "60"),
+            (29, "40"),
+            (30, "um"),
+            (31, "um"),
+            (32, "1"),
+            (33, "-2"),
+            (34, "33"),
+            (37, "Hz"),
+            (38, "1.5"),
+            (69, "Phase"),
+            (70, "d"),
+        ];
+        for &(number, words) in FIXED.iter().chain(&usual).chain(lines) {
+            words.clone_into(&mut header[number - 1]);
+        }
+        format!("{}\n{body}", header.join("\n")).into_bytes()
+    }
+
+    const BODY: &str = "0\n1\n2\n3\n4e0\nNaN\nend of experiment\n";
+
+    #[test]
+    fn pixels_follow_the_scan() {
+        let values = |lines: &[(usize, &str)]| {
+            let scan = crate::read(&file(lines, BODY)).expect("an image");
+            scan.channels[0]
+                .values()
+                .iter()
+                .map(|v| if v.is_nan() { 5.0 } else { *v })
+                .collect::<Vec<_>>()
+        };
+        assert_eq!(values(&[]), [0.0, 1.0, 2.0, 3.0, 4.0, 5.0]);
+        assert_eq!(
+            values(&[(23, "top to bottom")]),
+            [3.0, 4.0, 5.0, 0.0, 1.0, 2.0]
+        );
+        assert_eq!(
+            values(&[(21, "right to left")]),
+            [2.0, 1.0, 0.0, 5.0, 4.0, 3.0]
+        );
+    }
+
+    #[test]
+    fn the_frame_is_told_unless_bogus() {
+        let scan = crate::read(&file(&[], BODY)).expect("an image");
+        assert_eq!(scan.size_nm, Some([60.0, 40.0]));
+        assert_eq!(scan.offset_nm, [1000.0, -2000.0]);
+        assert_eq!(scan.rotation_rad, 33f64.to_radians());
+        assert_eq!(scan.line_rate_hz, Some(1.5));
+        assert_eq!(scan.frame_direction, Some(FrameDirection::Up));
+        assert_eq!(scan.closed_loop, Some(false));
+        assert_eq!(scan.acquired, clock::date([2024, 2, 29], [10, 20, 30]));
+        assert_eq!(scan.channels[0].line_direction, Some(LineDirection::Trace));
+        let bogus = [(7, "Bogus acquisition parameters."), (9, "-1")];
+        let scan = crate::read(&file(&bogus, BODY)).expect("an image");
+        assert_eq!((scan.line_rate_hz, scan.frame_direction), (None, None));
+        assert_eq!((scan.closed_loop, scan.acquired), (None, None));
+        assert_eq!(scan.channels[0].line_direction, None);
+    }
+
+    #[test]
+    fn several_channels_and_choice() {
+        let lines = [
+            (8, "MAP_MC"),
+            (94, "2"),
+            (95, "Z"),
+            (96, "nm"),
+            (98, "I (Backward)"),
+            (99, "pA"),
+        ];
+        let body = "0 10\n1 11\n2 12\n3 13\n4 14\n5 15\nend of experiment\n";
+        let scan = crate::read(&file(&lines, body)).expect("two images");
+        assert_eq!(
+            scan.channels[1].values(),
+            [10.0, 11.0, 12.0, 13.0, 14.0, 15.0]
+        );
+        assert_eq!(
+            (
+                scan.channels[0].unit.as_str(),
+                scan.channels[1].unit.as_str()
+            ),
+            ("nm", "pA")
+        );
+        assert_eq!(
+            scan.channels[1].line_direction,
+            Some(LineDirection::Retrace)
+        );
+        let only = crate::read_selected(&file(&lines, body), &|info| info.name.starts_with('I'));
+        let only = only.expect("one image");
+        assert_eq!(only.channels.len(), 1);
+        assert_eq!(only.channels[0].values()[0], 10.0);
+    }
+
+    #[test]
+    fn damage_is_named() {
+        let error = |lines: &[(usize, &str)], body: &str| {
+            crate::read(&file(lines, body))
+                .expect_err("damaged")
+                .to_string()
+        };
+        let Err(ReadError::Incomplete { readable, reason }) =
+            crate::read(&file(&[], "0\n1\n2\n3\n"))
+        else {
+            panic!("two pixels are missing");
+        };
+        assert!(reason.contains("4 of 6"), "{reason}");
+        assert!(readable.channels[0].values()[4].is_nan());
+        assert!(error(&[], "0\n1\nx\n3\n4\n5\n").contains("pixel 2"));
+        assert!(error(&[], "0\n1\n2\n3\n4\n5\n6\n").contains("\"6\""));
+        assert!(error(&[(24, "99999999999")], BODY).contains("99999999999"));
+        assert!(error(&[(128, "")], BODY).contains("line 128"));
+        assert!(error(&[(8, "SPEC_SC")], BODY).contains("SPEC_SC"));
+        assert!(error(&[(23, "inwards")], BODY).contains("inwards"));
+        assert!(crate::read(b"ISO/TC 201 SPM data transfer format\n").is_err());
+    }
 }

@@ -1,24 +1,451 @@
-//! JPK images, `.jpk` and `.jpk-qi-image`.
+//! JPK images (`NanoWizard` and the like), `.jpk` and `.jpk-qi-image`.
+//!
+//! A TIFF file with private tags. The first directory describes the frame and shows a coloured
+//! thumbnail; each further one holds a channel with a list of scaling slots (`raw`, `volts`,
+//! `calibrated` …), one of which is the default.
+//!
+//! - The first stored line is that with the smallest grid coordinate, `v` = 0: the bottom one, or
+//!   the top one where the grid is reflected. Retrace lines are stored in order of position.
+//! - The origin of the grid is its corner `u` = `v` = 0: in a real file the frame before this one
+//!   ended half a line short of `v` = 1 from there. [`Scan::offset_nm`] is the centre.
+//! - The grid is turned by `theta` against the axes of the scanner, counter-clockwise, in rad.
+//! - The scan rate counts trace and retrace together (start and end of a real file fit it within
+//!   0.1 %); the duty cycle is the share of the time within the frame.
+//!
+//! Names of the tags: Gwyddion's `jpk.h`, by the maker of the instrument.
 
 use crate::ChannelInfo;
+use crate::archive::Archive;
+use crate::clock;
 use crate::error::ReadError;
-use crate::scan::Scan;
+use crate::raster::{self, Order};
+use crate::scan::{Channel, DateTime, FrameDirection, LineDirection, Scan, UnreadableChannel};
+use crate::tiff_tags::{Directory, directories};
+use crate::whole::{Extent, some_readable};
 
-/// Reads the channels that are wanted.
-pub(crate) fn read(
-    _bytes: &[u8],
-    _wanted: &dyn Fn(&ChannelInfo) -> bool,
-) -> Result<Scan, ReadError> {
-    Err(ReadError::Unsupported {
-        format: "JPK",
-        reason: "this format is not read yet".to_owned(),
-    })
+const FORMAT: &str = "JPK";
+/// The entry of an archive of curves that holds the image of the map.
+const IMAGE_ENTRY: &str = "data-image.jpk-qi-image";
+
+const PHOTOMETRIC: u16 = 262;
+const START_DATE: u16 = 0x8003;
+const END_DATE: u16 = 0x8006;
+const PROPERTIES: u16 = 0x8017;
+const X0: u16 = 0x8040;
+const Y0: u16 = 0x8041;
+const U_LENGTH: u16 = 0x8042;
+const V_LENGTH: u16 = 0x8043;
+const THETA: u16 = 0x8044;
+const REFLECT: u16 = 0x8045;
+const RATE: u16 = 0x8049;
+const DUTY_CYCLE: u16 = 0x804a;
+const MOTION: u16 = 0x804b;
+const CHANNEL: u16 = 0x8050;
+const RETRACE: u16 = 0x8051;
+const FANCY_NAME: u16 = 0x8052;
+const SLOTS: u16 = 0x8080;
+const DEFAULT_SLOT: u16 = 0x8081;
+/// Tags of the first slot; those of the next lie [`SLOT_STRIDE`] higher.
+const SLOT_NAME: u16 = 0x8090;
+const SLOT_UNIT: u16 = 0x80a2;
+const SLOT_SCALING: u16 = 0x80a3;
+const SLOT_FACTOR: u16 = 0x80a4;
+const SLOT_OFFSET: u16 = 0x80a5;
+const SLOT_STRIDE: u16 = 0x30;
+/// Slots that fit between the first one and the end of the range of tags.
+const MOST_SLOTS: u16 = 128;
+
+/// Tags of the first directory that tell about the frame, with their names.
+const TOLD: [(u16, &str); 16] = [
+    (0x8000, "Program version"),
+    (START_DATE, "Start"),
+    (END_DATE, "End"),
+    (0x8004, "Name"),
+    (0x8005, "Comment"),
+    (0x8007, "Sample"),
+    (0x8009, "Account"),
+    (0x8010, "Cantilever"),
+    (0x8011, "Spring constant"),
+    (0x8030, "Feedback mode"),
+    (0x8033, "Setpoint"),
+    (REFLECT, "Grid reflected"),
+    (0x8048, "Line end"),
+    (RATE, "Scan rate"),
+    (DUTY_CYCLE, "Duty cycle"),
+    (MOTION, "Motion"),
+];
+
+fn damaged(reason: impl Into<String>) -> ReadError {
+    ReadError::Damaged {
+        format: FORMAT,
+        reason: reason.into(),
+    }
 }
 
-/// Reads the image within a ZIP archive.
+/// Reads the channels that are wanted.
+pub(crate) fn read(bytes: &[u8], wanted: &dyn Fn(&ChannelInfo) -> bool) -> Result<Scan, ReadError> {
+    let pages = directories(bytes).map_err(damaged)?;
+    let first = pages.first().ok_or_else(|| damaged("it holds no image"))?;
+    let mut scan = frame(first);
+    let mut extent = Extent::default();
+    let mut announced = 0;
+    let mut bytes_left = bytes.len();
+    for page in pages.iter().filter(|page| is_channel(page)) {
+        announced += 1;
+        let info = info(page);
+        match channel(page, first, &scan, &info, wanted, &mut bytes_left) {
+            Ok(channel) => scan.channels.extend(channel),
+            Err(Trouble::Scaling(error)) => scan.unreadable.push(UnreadableChannel {
+                name: info.name,
+                error,
+            }),
+            Err(Trouble::Missing(error)) => extent.lose(info.name, error),
+        }
+    }
+    if announced == 0 {
+        return Err(ReadError::Unsupported {
+            format: FORMAT,
+            reason: "it holds no channel but a picture at most".to_owned(),
+        });
+    }
+    extent.judge(some_readable(scan, announced)?, bytes)
+}
+
+/// Reads the image of a map from its archive; curves alone are refused.
 pub(crate) fn read_zip(
     bytes: &[u8],
     wanted: &dyn Fn(&ChannelInfo) -> bool,
 ) -> Result<Scan, ReadError> {
-    read(bytes, wanted)
+    let mut archive = Archive::open(bytes).map_err(damaged)?;
+    match archive.entry(IMAGE_ENTRY) {
+        Some(image) => read(&image.map_err(damaged)?, wanted),
+        None => Err(ReadError::ForceCurve),
+    }
+}
+
+/// Everything but the thumbnail: grey, and with slots.
+fn is_channel(page: &Directory<'_>) -> bool {
+    let named = page.text(FANCY_NAME).or_else(|| page.text(CHANNEL));
+    let grey = page.count(PHOTOMETRIC).is_none_or(|kind| kind <= 1);
+    grey && named.is_some_and(|name| name != "thumbnail")
+}
+
+fn info(page: &Directory<'_>) -> ChannelInfo {
+    let internal_name = page.text(CHANNEL).unwrap_or_default();
+    ChannelInfo {
+        name: page
+            .text(FANCY_NAME)
+            .filter(|name| !name.is_empty())
+            .unwrap_or_else(|| internal_name.clone()),
+        internal_name,
+        line_direction: page.number(RETRACE).map(|retrace| {
+            if retrace == 0.0 {
+                LineDirection::Trace
+            } else {
+                LineDirection::Retrace
+            }
+        }),
+        scan_line: None,
+    }
+}
+
+/// Why a channel is not read.
+enum Trouble {
+    /// Its bytes are not in the file.
+    Missing(String),
+    /// Its values are scaled or stored in an unknown way.
+    Scaling(String),
+}
+
+/// A channel, if it is wanted.
+fn channel(
+    page: &Directory<'_>,
+    first: &Directory<'_>,
+    scan: &Scan,
+    info: &ChannelInfo,
+    wanted: &dyn Fn(&ChannelInfo) -> bool,
+    bytes_left: &mut usize,
+) -> Result<Option<Channel>, Trouble> {
+    let shape = page.shape().map_err(Trouble::Scaling)?;
+    let slot = default_slot(page).map_err(Trouble::Scaling)?;
+    let length = raster::byte_length(shape.rows, shape.columns, shape.encoding)
+        .ok_or_else(|| Trouble::Missing("its image is empty or too large".to_owned()))?;
+    let block = page.image(length).map_err(Trouble::Missing)?;
+    *bytes_left = bytes_left
+        .checked_sub(length)
+        .ok_or_else(|| Trouble::Missing("its data overlap with those of others".to_owned()))?;
+    if !wanted(info) {
+        return Ok(None);
+    }
+    let order = Order {
+        top_first: reflected(page) || reflected(first),
+        mirrored: false,
+    };
+    Ok(Some(Channel {
+        name: info.name.clone(),
+        internal_name: info.internal_name.clone(),
+        unit: slot.unit,
+        line_direction: info.line_direction,
+        scan_line: None,
+        rows: shape.rows,
+        columns: shape.columns,
+        width_nm: scan.size_nm.map(|[width, _]| width),
+        height_nm: scan.size_nm.map(|[_, height]| height),
+        scale: slot.factor,
+        offset: slot.offset,
+        scaling: format!(
+            "slot {:?}: counts × {} + {}",
+            slot.name, slot.factor, slot.offset
+        ),
+        plane_fit: None,
+        samples: raster::decode(&block, shape.columns, shape.encoding, page.endian, order),
+    }))
+}
+
+fn reflected(page: &Directory<'_>) -> bool {
+    page.number(REFLECT).is_some_and(|reflect| reflect != 0.0)
+}
+
+struct Slot {
+    name: String,
+    unit: String,
+    factor: f64,
+    offset: f64,
+}
+
+/// The slot the instrument shows.
+fn default_slot(page: &Directory<'_>) -> Result<Slot, String> {
+    let wanted = page
+        .text(DEFAULT_SLOT)
+        .ok_or("expected the name of the default slot, found none")?;
+    let slots = page.count(SLOTS).unwrap_or(0).min(usize::from(MOST_SLOTS)) as u16;
+    let shift = (0..slots)
+        .map(|slot| slot * SLOT_STRIDE)
+        .find(|shift| page.text(SLOT_NAME + shift).as_deref() == Some(&*wanted))
+        .ok_or_else(|| format!("expected a slot {wanted:?}, found none among {slots}"))?;
+    let scaling = page.text(SLOT_SCALING + shift).unwrap_or_default();
+    let number = |tag: u16, name: &str| {
+        page.number(tag + shift)
+            .filter(|number| number.is_finite())
+            .ok_or_else(|| format!("expected the {name} of slot {wanted:?}, found none"))
+    };
+    let (factor, offset) = match scaling.as_str() {
+        "LinearScaling" => (
+            number(SLOT_FACTOR, "factor")?,
+            number(SLOT_OFFSET, "offset")?,
+        ),
+        "NullScaling" => (1.0, 0.0),
+        other => {
+            return Err(format!(
+                "expected a linear scaling of slot {wanted:?}, found {other:?}"
+            ));
+        }
+    };
+    Ok(Slot {
+        unit: page.text(SLOT_UNIT + shift).unwrap_or_default(),
+        name: wanted,
+        factor,
+        offset,
+    })
+}
+
+/// Everything about the frame but its channels.
+fn frame(first: &Directory<'_>) -> Scan {
+    let nm = |tag: u16| first.number(tag).map(|metres| metres * 1e9);
+    let size = nm(U_LENGTH)
+        .zip(nm(V_LENGTH))
+        .map(|(u, v)| [u.abs(), v.abs()]);
+    let size = size.filter(|&[u, v]| u > 0.0 && v > 0.0 && u.is_finite() && v.is_finite());
+    let rotation = first
+        .number(THETA)
+        .filter(|theta| theta.is_finite())
+        .unwrap_or(0.0);
+    let reflected = reflected(first);
+    let rate = first.number(RATE).filter(|&rate| rate > 0.0);
+    let duty = first.number(DUTY_CYCLE).filter(|&d| d > 0.0 && d <= 1.0);
+    Scan {
+        format: FORMAT.to_owned(),
+        acquired: [END_DATE, START_DATE]
+            .iter()
+            .find_map(|&tag| date_time(&first.text(tag)?)),
+        frame_direction: match first.text(MOTION).as_deref() {
+            // Whether a reflected grid reverses the words as well is not known.
+            Some("bottomUp") if !reflected => Some(FrameDirection::Up),
+            Some("topDown") if !reflected => Some(FrameDirection::Down),
+            _ => None,
+        },
+        line_rate_hz: rate,
+        line_times_s: rate.zip(duty).map(|(rate, duty)| [duty / rate / 2.0; 2]),
+        rotation_rad: rotation,
+        offset_nm: centre(nm(X0), nm(Y0), size, rotation, reflected),
+        size_nm: size,
+        metadata: metadata(first),
+        ..Scan::default()
+    }
+}
+
+/// The centre of a grid whose corner is given.
+fn centre(
+    x0: Option<f64>,
+    y0: Option<f64>,
+    size: Option<[f64; 2]>,
+    rotation: f64,
+    reflected: bool,
+) -> [f64; 2] {
+    let (Some(x), Some(y), Some([u, v])) = (x0, y0, size) else {
+        return [0.0, 0.0];
+    };
+    let v = if reflected { -v } else { v };
+    let (sin, cos) = rotation.sin_cos();
+    let (u, v) = (u / 2.0, v / 2.0);
+    [x + u * cos - v * sin, y + u * sin + v * cos]
+}
+
+/// `2017-01-16 16:01:36.264 GMT`.
+fn date_time(text: &str) -> Option<DateTime> {
+    let mut words = text.split_whitespace();
+    let mut ymd = words.next()?.split('-').map(str::parse::<i64>);
+    let mut number = || ymd.next()?.ok();
+    let date = [number()?, number()?, number()?];
+    clock::date(date, clock::clock(words.next()?)?)
+}
+
+/// The frame's tags by name, then the properties of the program.
+fn metadata(first: &Directory<'_>) -> Vec<(String, String)> {
+    let tags = TOLD
+        .iter()
+        .filter_map(|&(tag, name)| Some((name.to_owned(), first.words(tag)?)));
+    let properties = first.text(PROPERTIES).unwrap_or_default();
+    let properties = properties.lines().filter_map(|line| {
+        let (key, value) = line.split_once(" : ")?;
+        Some((key.trim().to_owned(), value.trim().to_owned()))
+    });
+    tags.chain(properties).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::archive::tests::zip;
+    use crate::cursor::Endian;
+    use crate::tiff_tags::tests::{Value, file, plain};
+
+    /// A thumbnail and one channel of 2 lines with 3 counts, in two slots.
+    fn image(change: impl Fn(&mut Vec<(u16, Value)>, &mut Vec<(u16, Value)>)) -> Vec<u8> {
+        let mut frame = vec![
+            (PHOTOMETRIC, Value::Short(3)),
+            (CHANNEL, Value::Text("thumbnail")),
+            (END_DATE, Value::Text("2020-02-29 10:20:30.5 GMT")),
+            (X0, Value::Double(1e-6)),
+            (Y0, Value::Double(2e-6)),
+            (U_LENGTH, Value::Double(4e-7)),
+            (V_LENGTH, Value::Double(2e-7)),
+            (THETA, Value::Double(std::f64::consts::FRAC_PI_2)),
+            (RATE, Value::Double(2.0)),
+            (DUTY_CYCLE, Value::Double(0.8)),
+            (MOTION, Value::Text("topDown")),
+        ];
+        let slot = |n: u16| n * SLOT_STRIDE;
+        let mut channel = plain(2, 3, 16);
+        channel.extend([
+            (PHOTOMETRIC, Value::Short(1)),
+            (CHANNEL, Value::Text("height")),
+            (FANCY_NAME, Value::Text("Height")),
+            (RETRACE, Value::Short(1)),
+            (SLOTS, Value::Short(2)),
+            (DEFAULT_SLOT, Value::Text("calibrated")),
+            (SLOT_NAME, Value::Text("raw")),
+            (SLOT_SCALING, Value::Text("NullScaling")),
+            (SLOT_NAME + slot(1), Value::Text("calibrated")),
+            (SLOT_SCALING + slot(1), Value::Text("LinearScaling")),
+            (SLOT_UNIT + slot(1), Value::Text("m")),
+            (SLOT_FACTOR + slot(1), Value::Double(0.5)),
+            (SLOT_OFFSET + slot(1), Value::Double(10.0)),
+        ]);
+        change(&mut frame, &mut channel);
+        let counts: Vec<u8> = (0..6i16).flat_map(i16::to_be_bytes).collect();
+        let strips = counts.chunks(6).map(<[u8]>::to_vec).collect();
+        file(Endian::Big, &[(frame, vec![]), (channel, strips)])
+    }
+
+    #[test]
+    fn the_default_slot_scales() {
+        let scan = crate::read(&image(|_, _| {})).expect("whole");
+        assert_eq!(scan.channels.len(), 1);
+        let channel = &scan.channels[0];
+        assert_eq!(
+            (channel.name.as_str(), channel.unit.as_str()),
+            ("Height", "m")
+        );
+        assert_eq!(channel.line_direction, Some(LineDirection::Retrace));
+        assert_eq!(channel.values(), [10.0, 10.5, 11.0, 11.5, 12.0, 12.5]);
+        let raw = crate::read(&image(|_, channel| {
+            for (tag, value) in channel {
+                if *tag == DEFAULT_SLOT {
+                    *value = Value::Text("raw");
+                }
+            }
+        }));
+        assert_eq!(raw.expect("whole").channels[0].values()[5], 5.0);
+    }
+
+    #[test]
+    fn the_frame_is_told() {
+        let scan = crate::read(&image(|_, _| {})).expect("whole");
+        assert_eq!(scan.frame_direction, Some(FrameDirection::Down));
+        assert_eq!(scan.line_rate_hz, Some(2.0));
+        assert_eq!(scan.line_times_s, Some([0.2, 0.2]));
+        assert_eq!(scan.acquired, clock::date([2020, 2, 29], [10, 20, 30]));
+        let close = |[x, y]: [f64; 2], [a, b]: [f64; 2]| (x - a).abs() + (y - b).abs() < 1e-9;
+        assert!(close(scan.size_nm.expect("a size"), [400.0, 200.0]));
+        // Turned by 90°: u runs along y, v along −x.
+        assert!(close(scan.offset_nm, [1000.0 - 100.0, 2000.0 + 200.0]));
+    }
+
+    #[test]
+    fn a_reflected_grid_begins_at_the_top() {
+        let reflected = image(|frame, _| frame.push((REFLECT, Value::Short(1))));
+        let scan = crate::read(&reflected).expect("whole");
+        assert_eq!(
+            scan.channels[0].values(),
+            [11.5, 12.0, 12.5, 10.0, 10.5, 11.0]
+        );
+        assert_eq!(scan.frame_direction, None);
+    }
+
+    #[test]
+    fn what_is_missing_is_said() {
+        let unknown = image(|_, channel| {
+            channel.retain(|(tag, _)| *tag != SLOT_SCALING + SLOT_STRIDE);
+        });
+        let error = crate::read(&unknown)
+            .expect_err("nothing to read")
+            .to_string();
+        assert!(error.contains("linear scaling"), "{error}");
+        let taller = image(|_, channel| {
+            for (tag, value) in channel {
+                if *tag == 257 {
+                    *value = Value::Short(9);
+                }
+            }
+        });
+        let error = crate::read(&taller).expect_err("damaged").to_string();
+        assert!(
+            error.contains("12 bytes") && error.contains("54"),
+            "{error}"
+        );
+    }
+
+    #[test]
+    fn maps_hold_their_image_in_an_archive() {
+        let header = ("header.properties", &b"#"[..]);
+        let map = zip(&[header, (IMAGE_ENTRY, &image(|_, _| {}))]);
+        let scan = crate::read(&map).expect("whole");
+        assert_eq!(scan.channels[0].values()[0], 10.0);
+        assert!(crate::read(&map[..map.len() / 2]).is_err());
+        assert!(matches!(
+            crate::read(&zip(&[header, ("segments/0/data", b"curve")])),
+            Err(ReadError::ForceCurve)
+        ));
+    }
 }

@@ -14,18 +14,23 @@
 #![doc = include_str!("../FORMATS.md")]
 
 mod agilent;
-mod arrays;
+mod archive;
+pub mod arrays;
 mod clock;
 mod cursor;
 mod detect;
 mod error;
-mod gsf;
-mod gwy;
-mod gxyzf;
+mod export;
+mod fields;
+pub mod gsf;
+pub mod gwy;
+pub mod gxyzf;
 mod igor;
 mod iso28632;
 mod jpk;
+mod labels;
 mod matrix;
+mod missing;
 mod nanonis;
 pub mod nanoscope;
 mod nid;
@@ -33,13 +38,17 @@ mod park;
 mod raster;
 mod rhk;
 mod scan;
+#[cfg(test)]
+mod seeds;
 mod sensors;
+mod tiff_tags;
 mod units;
 mod whole;
 mod wsxm;
 
 pub use detect::{Format, detect, looks_like_scan};
 pub use error::ReadError;
+pub use export::ExportError;
 pub use scan::{
     Channel, DateTime, FrameDirection, LineDirection, Samples, Scan, UnreadableChannel,
 };
@@ -79,7 +88,8 @@ pub fn read_selected(
     bytes: &[u8],
     wanted: &dyn Fn(&ChannelInfo) -> bool,
 ) -> Result<Scan, ReadError> {
-    let scan = dispatch(bytes, wanted)?;
+    let mut scan = dispatch(bytes, wanted)?;
+    whole::tidy(&mut scan);
     if whole::all_missing(&scan) {
         return Err(ReadError::AllMissing {
             channels: scan.channels.len(),
@@ -90,6 +100,8 @@ pub fn read_selected(
 
 /// Hands the bytes to the reader of their format.
 fn dispatch(bytes: &[u8], wanted: &dyn Fn(&ChannelInfo) -> bool) -> Result<Scan, ReadError> {
+    #[cfg(test)]
+    seeds::keep(bytes);
     match detect(bytes) {
         Format::NanoScope => nanoscope::read(bytes, wanted),
         Format::NanoScopeForce => Err(nanoscope::refuse_force(bytes)),
@@ -112,7 +124,7 @@ fn dispatch(bytes: &[u8], wanted: &dyn Fn(&ChannelInfo) -> bool) -> Result<Scan,
         | Format::Tiff
         | Format::Png
         | Format::Jpeg
-        | Format::TextMatrix => arrays::read(bytes, wanted),
+        | Format::TextMatrix => arrays::read(bytes, &arrays::ArrayOptions::default(), wanted),
         Format::Empty => Err(ReadError::Empty),
         Format::Other(found) => Err(ReadError::OtherFormat { found }),
         Format::Text => Err(ReadError::Text {

@@ -21,6 +21,7 @@ use crate::cursor::Endian;
 use crate::error::ReadError;
 use crate::raster::{self, Encoding, Order};
 use crate::scan::{Channel, DateTime, FrameDirection, LineDirection, Scan};
+use crate::units;
 use crate::whole::{Extent, MOST_CHANNELS};
 
 const FORMAT: &str = "Nanonis";
@@ -97,7 +98,7 @@ fn header(bytes: &[u8]) -> Result<(String, usize), ReadError> {
     };
     let end = find(END, 0).ok_or_else(|| cut_off(":SCANIT_END:"))?;
     let mark = find(&[0x1a, 0x04], end).ok_or_else(|| cut_off("the bytes 1A 04"))?;
-    let (text, _) = encoding_rs::WINDOWS_1252.decode_without_bom_handling(&bytes[..end]);
+    let text = units::decode(&bytes[..end]);
     Ok((text.into_owned(), mark + 2))
 }
 

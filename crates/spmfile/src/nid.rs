@@ -1,16 +1,527 @@
-//! Nanosurf files, `.nid`.
+//! Nanosurf files (`.nid`, and `.ezd` before).
+//!
+//! A text of sections `[name]` with lines `key=value` in Latin-1, the bytes `#!`, and the images
+//! one behind the other. The section `DataSet` lists them by group (`Gr0-Ch1`), each with a section
+//! of its own; `Dim0` and `Dim1` are the axes, `Dim2` the value.
+//!
+//! - Value = (count + half the range of counts) / range of counts × `Dim2Range` + `Dim2Min`.
+//! - The bottom line comes first, backward lines are stored in order of position.
+//! - `Time/Line` is the time of one line in one direction; the way back takes as long again
+//!   (manual of the scan software).
+//! - `Rotation` is in degrees, taken as counter-clockwise.
+//! - `CurLine` is the last line of an unfinished frame; lines never filled are missing.
+
+use std::collections::BTreeMap;
 
 use crate::ChannelInfo;
+use crate::clock;
+use crate::cursor::Endian;
 use crate::error::ReadError;
-use crate::scan::Scan;
+use crate::missing::blank_unfilled;
+use crate::raster::{self, Encoding, Order};
+use crate::scan::{
+    Channel, DateTime, FrameDirection, LineDirection, Samples, Scan, UnreadableChannel,
+};
+use crate::units::{clean, nm_per};
+use crate::whole::{Extent, MOST_CHANNELS, some_readable};
+
+const FORMAT: &str = "Nanosurf";
+const DATA_MARK: &[u8] = b"#!";
+
+fn damaged(reason: impl Into<String>) -> ReadError {
+    ReadError::Damaged {
+        format: FORMAT,
+        reason: reason.into(),
+    }
+}
+
+/// Sections by name, keys in the order of the file.
+struct Header {
+    sections: Vec<(String, Vec<(String, String)>)>,
+}
+
+impl Header {
+    fn section(&self, name: &str) -> Option<&[(String, String)]> {
+        let (_, lines) = self.sections.iter().find(|(n, _)| n == name)?;
+        Some(lines)
+    }
+
+    /// A value of what the user sees of the scan.
+    fn info(&self, key: &str) -> Option<&str> {
+        get(self.section("DataSet-Info")?, key)
+    }
+}
+
+fn get<'a>(lines: &'a [(String, String)], key: &str) -> Option<&'a str> {
+    let (_, value) = lines.iter().find(|(k, _)| k.eq_ignore_ascii_case(key))?;
+    Some(value)
+}
 
 /// Reads the channels that are wanted.
-pub(crate) fn read(
-    _bytes: &[u8],
-    _wanted: &dyn Fn(&ChannelInfo) -> bool,
-) -> Result<Scan, ReadError> {
-    Err(ReadError::Unsupported {
-        format: "Nanosurf",
-        reason: "this format is not read yet".to_owned(),
+pub(crate) fn read(bytes: &[u8], wanted: &dyn Fn(&ChannelInfo) -> bool) -> Result<Scan, ReadError> {
+    let end = bytes
+        .windows(DATA_MARK.len())
+        .position(|w| w == DATA_MARK)
+        .ok_or_else(|| {
+            damaged(format!(
+                "expected the mark #! behind the header, found none in {} bytes: the file was cut \
+                 off inside the header",
+                bytes.len()
+            ))
+        })?;
+    let header = header(&bytes[..end]);
+    let names = listed(&header)?;
+    let mut scan = frame(&header);
+    let mut extent = Extent::default();
+    let mut announced = 0;
+    let mut start = end + DATA_MARK.len();
+    for name in names {
+        let Some(section) = header.section(&name) else {
+            return Err(damaged(format!(
+                "expected a section [{name}], found none: the place of the next images is unknown"
+            )));
+        };
+        let block =
+            block(section).map_err(|reason| damaged(format!("section [{name}]: {reason}")))?;
+        let here = start;
+        start = start.saturating_add(block.length);
+        if !block.image {
+            continue;
+        }
+        announced += 1;
+        let info = info(section, &name);
+        let Some(data) = extent.take(bytes, here, block.length, &info.name) else {
+            continue;
+        };
+        match scaling(section, &block) {
+            Ok(scaling) if wanted(&info) => {
+                scan.channels.push(channel(
+                    info,
+                    data,
+                    &block,
+                    section,
+                    scaling,
+                    scan.frame_direction,
+                ));
+            }
+            Ok(_) => {}
+            Err(error) => scan.unreadable.push(UnreadableChannel {
+                name: info.name,
+                error,
+            }),
+        }
+    }
+    if announced == 0 {
+        return Err(ReadError::Unsupported {
+            format: FORMAT,
+            reason: "it holds no image (curves only)".to_owned(),
+        });
+    }
+    scan.size_nm = scan
+        .channels
+        .first()
+        .and_then(|c| c.width_nm.zip(c.height_nm))
+        .map(Into::into);
+    extent.judge(some_readable(scan, announced)?, bytes)
+}
+
+fn header(bytes: &[u8]) -> Header {
+    let text = encoding_rs::WINDOWS_1252
+        .decode_without_bom_handling(bytes)
+        .0;
+    let mut sections: Vec<(String, Vec<(String, String)>)> = Vec::new();
+    for line in text.lines().map(str::trim) {
+        let name = line.strip_prefix('[').and_then(|l| l.strip_suffix(']'));
+        if let Some(name) = name {
+            sections.push((name.to_owned(), Vec::new()));
+        } else if let (Some((key, value)), Some((_, lines))) =
+            (line.split_once('='), sections.last_mut())
+            && !line.starts_with("--")
+        {
+            lines.push((key.trim().to_owned(), value.trim().to_owned()));
+        }
+    }
+    Header { sections }
+}
+
+/// Names of the sections of all blocks of data, in the order of the data.
+fn listed(header: &Header) -> Result<Vec<String>, ReadError> {
+    let lines = header
+        .section("DataSet")
+        .ok_or_else(|| damaged("expected a section [DataSet], found none"))?;
+    let blocks: BTreeMap<(u32, u32), &String> = lines
+        .iter()
+        .filter_map(|(key, value)| {
+            let (group, channel) = key.strip_prefix("Gr")?.split_once("-Ch")?;
+            Some(((group.parse().ok()?, channel.parse().ok()?), value))
+        })
+        .collect();
+    match blocks.len() {
+        0 => Err(damaged("its section [DataSet] lists no data")),
+        found if found > MOST_CHANNELS => Err(ReadError::TooManyChannels {
+            found,
+            limit: MOST_CHANNELS,
+        }),
+        _ => Ok(blocks.into_values().cloned().collect()),
+    }
+}
+
+/// One block of data.
+struct Block {
+    rows: usize,
+    columns: usize,
+    encoding: Encoding,
+    endian: Endian,
+    length: usize,
+    image: bool,
+}
+
+fn block(section: &[(String, String)]) -> Result<Block, String> {
+    let count = |key: &str| {
+        let text = get(section, key).unwrap_or("");
+        let number = text.parse::<usize>().ok();
+        number.ok_or_else(|| format!("expected a number {key}, found {text:?}"))
+    };
+    let (columns, rows) = (count("Points")?, count("Lines")?);
+    let mode = get(section, "SaveMode").unwrap_or("Binary");
+    if mode != "Binary" {
+        return Err(format!("expected SaveMode Binary, found {mode:?}"));
+    }
+    let signed = match get(section, "SaveSign").unwrap_or("Signed") {
+        "Signed" => true,
+        "Unsigned" => false,
+        other => {
+            return Err(format!(
+                "expected SaveSign Signed or Unsigned, found {other:?}"
+            ));
+        }
+    };
+    let endian = match get(section, "SaveOrder").unwrap_or("Intel") {
+        "Intel" => Endian::Little,
+        "Motorola" => Endian::Big,
+        other => {
+            return Err(format!(
+                "expected SaveOrder Intel or Motorola, found {other:?}"
+            ));
+        }
+    };
+    let encoding = match (count("SaveBits")?, signed) {
+        (8, true) => Encoding::I8,
+        (8, false) => Encoding::U8,
+        (16, true) => Encoding::I16,
+        (16, false) => Encoding::U16,
+        (32, true) => Encoding::I32,
+        (32, false) => Encoding::U32,
+        (bits, _) => return Err(format!("expected SaveBits 8, 16 or 32, found {bits}")),
+    };
+    let frame = get(section, "Frame").unwrap_or("").to_ascii_lowercase();
+    let length = raster::byte_length(rows, columns, encoding);
+    // A block of no lines takes no place; one too large to count takes all.
+    let length = length.unwrap_or(if rows == 0 || columns == 0 {
+        0
+    } else {
+        usize::MAX
+    });
+    let axis = |key: &str| get(section, key).and_then(nm_per).is_some();
+    let curve = frame.contains("spec") || frame.contains("curve");
+    Ok(Block {
+        rows,
+        columns,
+        encoding,
+        endian,
+        length,
+        image: length > 0 && !curve && axis("Dim0Unit") && axis("Dim1Unit"),
     })
+}
+
+fn info(section: &[(String, String)], name: &str) -> ChannelInfo {
+    let frame = get(section, "Frame").unwrap_or("").to_ascii_lowercase();
+    ChannelInfo {
+        name: get(section, "Dim2Name").unwrap_or(name).to_owned(),
+        internal_name: name.to_owned(),
+        line_direction: if frame.contains("backward") {
+            Some(LineDirection::Retrace)
+        } else if frame.contains("forward") {
+            Some(LineDirection::Trace)
+        } else {
+            None
+        },
+        scan_line: frame.starts_with("2nd").then(|| "2nd".to_owned()),
+    }
+}
+
+/// Unit, factor and offset of the counts.
+fn scaling(section: &[(String, String)], block: &Block) -> Result<(String, f64, f64), String> {
+    let number = |key: &str| {
+        let text = get(section, key).unwrap_or("");
+        let number = text.parse::<f64>().ok().filter(|n| n.is_finite());
+        number.ok_or_else(|| format!("expected a number {key}, found {text:?}"))
+    };
+    let (range, least) = (number("Dim2Range")?, number("Dim2Min")?);
+    let counts = 2f64.powi(8 * block.encoding.width() as i32);
+    let signed = matches!(block.encoding, Encoding::I8 | Encoding::I16 | Encoding::I32);
+    let offset = if signed { least + range / 2.0 } else { least };
+    let unit = clean(get(section, "Dim2Unit").unwrap_or(""));
+    Ok((unit, range / counts, offset))
+}
+
+fn channel(
+    info: ChannelInfo,
+    data: &[u8],
+    block: &Block,
+    section: &[(String, String)],
+    (unit, scale, offset): (String, f64, f64),
+    direction: Option<FrameDirection>,
+) -> Channel {
+    let length = |axis: u8| {
+        let range = get(section, &format!("Dim{axis}Range"))?
+            .parse::<f64>()
+            .ok()?;
+        let nm = nm_per(get(section, &format!("Dim{axis}Unit"))?)?;
+        Some((range * nm).abs()).filter(|&length| length > 0.0 && length.is_finite())
+    };
+    let samples = raster::decode(
+        data,
+        block.columns,
+        block.encoding,
+        block.endian,
+        Order::default(),
+    );
+    Channel {
+        name: info.name,
+        internal_name: info.internal_name,
+        unit,
+        line_direction: info.line_direction,
+        scan_line: info.scan_line,
+        rows: block.rows,
+        columns: block.columns,
+        width_nm: length(0),
+        height_nm: length(1),
+        scale,
+        offset,
+        scaling: format!("counts × {scale} + {offset}: the range of Dim2 over that of the counts"),
+        plane_fit: None,
+        samples: without_unfilled(samples, block, section, direction),
+    }
+}
+
+/// Blanks what an unfinished frame never filled.
+fn without_unfilled(
+    samples: Samples,
+    block: &Block,
+    section: &[(String, String)],
+    direction: Option<FrameDirection>,
+) -> Samples {
+    let current = get(section, "CurLine").and_then(|line| line.parse::<usize>().ok());
+    let Some(current) = current.filter(|&line| line.saturating_add(1) < block.rows) else {
+        return samples;
+    };
+    let left = block.rows - 1 - current;
+    match direction {
+        Some(FrameDirection::Up) => blank_unfilled(samples, block.columns, current + 1..block.rows),
+        // Whether it counts lines or tells a place is not known.
+        Some(FrameDirection::Down) => {
+            let (more, less) = (left.max(current), left.min(current));
+            let samples = blank_unfilled(samples, block.columns, 0..more);
+            blank_unfilled(samples, block.columns, 0..less)
+        }
+        None => samples,
+    }
+}
+
+/// Everything about the frame but its channels.
+fn frame(header: &Header) -> Scan {
+    let length = |key: &str| quantity(header.info(key)?).filter(|(_, unit)| unit == "nm");
+    let offset_nm = ["X-Pos", "Y-Pos"].map(|key| length(key).map_or(0.0, |(nm, _)| nm));
+    let line_time = header
+        .info("Time/Line")
+        .and_then(quantity)
+        .filter(|(time, unit)| unit == "s" && *time > 0.0)
+        .map(|(time, _)| time);
+    let rotation = header
+        .info("Rotation")
+        .and_then(quantity)
+        .map_or(0.0, |(angle, _)| angle);
+    let software = header.info("Software ver.");
+    Scan {
+        format: match software {
+            Some(version) => format!("{FORMAT} {version}"),
+            None => FORMAT.to_owned(),
+        },
+        instrument: header.info("Head type").map(str::to_owned),
+        acquired: date_time(header),
+        frame_direction: match header
+            .info("Scan direction")
+            .map(str::to_ascii_lowercase)
+            .as_deref()
+        {
+            Some("up") => Some(FrameDirection::Up),
+            Some("down") => Some(FrameDirection::Down),
+            _ => None,
+        },
+        line_rate_hz: line_time.map(|time| 0.5 / time),
+        line_times_s: line_time.map(|time| [time, time]),
+        rotation_rad: rotation.to_radians(),
+        offset_nm,
+        metadata: header.section("DataSet-Info").unwrap_or_default().to_vec(),
+        ..Scan::default()
+    }
+}
+
+/// A number and its unit; lengths in nm, times in s.
+fn quantity(text: &str) -> Option<(f64, String)> {
+    let text = clean(text);
+    // An exponent belongs to the number, the unit begins with a letter that is none.
+    let end = text
+        .char_indices()
+        .find(|&(i, c)| {
+            let exponent = matches!(c, 'e' | 'E')
+                && text[i + 1..]
+                    .starts_with(|c: char| c.is_ascii_digit() || matches!(c, '+' | '-'));
+            !(c.is_ascii_digit() || matches!(c, '+' | '-' | '.') || exponent)
+        })
+        .map_or(text.len(), |(i, _)| i);
+    let number = text[..end].parse::<f64>().ok().filter(|n| n.is_finite())?;
+    let unit = text[end..].trim();
+    Some(match (nm_per(unit), unit) {
+        (Some(nm), _) => (number * nm, "nm".to_owned()),
+        (None, "ms") => (number * 1e-3, "s".to_owned()),
+        (None, "min") => (number * 60.0, "s".to_owned()),
+        (None, other) => (number, other.to_owned()),
+    })
+}
+
+/// `01-03-2016`, day first, and `18:36:58`.
+fn date_time(header: &Header) -> Option<DateTime> {
+    let mut dmy = header.info("Date")?.split('-').map(str::parse::<i64>);
+    let mut number = || dmy.next()?.ok();
+    let (day, month, year) = (number()?, number()?, number()?);
+    clock::date([year, month, day], clock::clock(header.info("Time")?)?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn file(change: &[(&str, &str)], blocks: usize) -> Vec<u8> {
+        let section = |name: &str, frame: &str| {
+            format!(
+                "[{name}]\r\nPoints=3\r\nLines=2\r\nFrame={frame}\r\nCurLine=1\r\nDim0Unit=m\r\n\
+                 Dim0Range=3e-008\r\nDim1Unit=m\r\nDim1Range=2e-008\r\nDim2Name=Z-Axis\r\n\
+                 Dim2Unit=m\r\nDim2Range=65536\r\nDim2Min=-32768\r\nSaveMode=Binary\r\nSaveBits=16\r\n\
+                 SaveSign=Signed\r\nSaveOrder=Intel\r\n\r\n"
+            )
+        };
+        let mut text = format!(
+            "[DataSet]\r\nGroupCount=2\r\nGr0-Count=21\r\nGr1-Ch1=DataSet-1:1\r\n\
+             Gr0-Ch1=DataSet-0:1\r\n\r\n[DataSet-Info]\r\n-- Scan --=---\r\nScan direction=Down\r\n\
+             Time/Line=500ms\r\nRotation=33 \u{b0}\r\nX-Pos=1.5\u{b5}m\r\nY-Pos=-2e-7m\r\n\
+             Date=01-03-2016\r\nTime=18:36:58\r\n\r\n{}{}",
+            section("DataSet-0:1", "Scan forward"),
+            section("DataSet-1:1", "Scan backward")
+        );
+        for (from, to) in change {
+            text = text.replace(from, to);
+        }
+        let mut bytes: Vec<u8> = text.chars().map(|c| c as u8).collect();
+        bytes.extend(DATA_MARK);
+        bytes.extend((0..6 * blocks as i16).flat_map(i16::to_le_bytes));
+        bytes
+    }
+
+    #[test]
+    fn groups_come_in_order_and_lines_as_they_are() {
+        let scan = crate::read(&file(&[], 2)).expect("whole");
+        assert_eq!(scan.channels[0].line_direction, Some(LineDirection::Trace));
+        assert_eq!(scan.channels[0].values(), [0.0, 1.0, 2.0, 3.0, 4.0, 5.0]);
+        assert_eq!(
+            scan.channels[1].line_direction,
+            Some(LineDirection::Retrace)
+        );
+        assert_eq!(scan.channels[1].values(), [6.0, 7.0, 8.0, 9.0, 10.0, 11.0]);
+        let width = scan.channels[0].width_nm.expect("a width");
+        assert!((width - 30.0).abs() < 1e-9);
+        let unsigned = crate::read(&file(&[("SaveSign=Signed", "SaveSign=Unsigned")], 2));
+        assert_eq!(unsigned.expect("whole").channels[0].values()[1], -32767.0);
+    }
+
+    #[test]
+    fn the_frame_is_told() {
+        let scan = crate::read(&file(&[], 2)).expect("whole");
+        assert_eq!(scan.frame_direction, Some(FrameDirection::Down));
+        assert_eq!(scan.line_times_s, Some([0.5, 0.5]));
+        assert_eq!(scan.line_rate_hz, Some(1.0));
+        assert!((scan.rotation_rad - 33f64.to_radians()).abs() < 1e-12);
+        assert!((scan.offset_nm[0] - 1500.0).abs() < 1e-9);
+        assert!((scan.offset_nm[1] + 200.0).abs() < 1e-9);
+        assert_eq!(scan.acquired, clock::date([2016, 3, 1], [18, 36, 58]));
+    }
+
+    #[test]
+    fn an_unfinished_frame_misses_its_end() {
+        let values = |direction: &str, samples: [i16; 4]| {
+            let turn = format!("Scan direction={direction}");
+            let change = [
+                ("CurLine=1", "CurLine=0"),
+                ("Points=3", "Points=2"),
+                ("Scan direction=Down", &*turn),
+            ];
+            let mut bytes = file(&change, 0);
+            bytes.extend(
+                [samples, samples]
+                    .as_flattened()
+                    .iter()
+                    .flat_map(|n| n.to_le_bytes()),
+            );
+            crate::read(&bytes).expect("whole").channels[0].values()
+        };
+        let up = values("Up", [7, 8, 0, 0]);
+        assert_eq!(up[..2], [7.0, 8.0]);
+        assert!(up[2].is_nan() && up[3].is_nan());
+        let down = values("Down", [0, 0, 7, 8]);
+        assert!(down[0].is_nan() && down[1].is_nan());
+        assert_eq!(down[2..], [7.0, 8.0]);
+        // Measured after all.
+        assert_eq!(values("Up", [7, 8, 0, 1]), [7.0, 8.0, 0.0, 1.0]);
+        let constant = values("Up", [7, 7, 7, 7]);
+        assert_eq!(constant[..2], [7.0, 7.0]);
+    }
+
+    #[test]
+    fn what_is_missing_is_said() {
+        let error = |change: &[(&str, &str)]| {
+            crate::read(&file(change, 2))
+                .expect_err("damaged")
+                .to_string()
+        };
+        assert!(error(&[("SaveBits=16", "SaveBits=12")]).contains("12"));
+        assert!(error(&[("[DataSet-0:1]", "[DataSet-0:7]")]).contains("DataSet-0:1"));
+        assert!(error(&[("Points=3", "Points=99999999999999999999")]).contains("Points"));
+        assert!(error(&[("Points=3", "Points=9999999999999999")]).contains("bytes long"));
+        assert!(error(&[("Dim1Unit=m", "Dim1Unit=V")]).contains("curves"));
+        assert!(error(&[("Dim2Range=65536", "Dim2Range=x")]).contains("Dim2Range"));
+        let whole = file(&[], 2);
+        assert!(matches!(
+            crate::read(&whole[..whole.len() - 1]),
+            Err(ReadError::Incomplete { readable, .. }) if readable.channels.len() == 1
+        ));
+        assert!(matches!(
+            crate::read(&file(&[], 0)),
+            Err(ReadError::HeaderOnly { announced: 2, .. })
+        ));
+        assert!(
+            crate::read(&whole[..99])
+                .expect_err("cut")
+                .to_string()
+                .contains("header")
+        );
+    }
+
+    #[test]
+    fn quantities() {
+        assert_eq!(quantity("1 s"), Some((1.0, "s".to_owned())));
+        assert_eq!(quantity("2e-7m"), Some((200.0, "nm".to_owned())));
+        assert_eq!(quantity("-0.5 \u{b0}"), Some((-0.5, "°".to_owned())));
+        assert_eq!(quantity("Free"), None);
+    }
 }

@@ -1,16 +1,602 @@
-//! RHK files, `.sm4`.
+//! RHK files of version 5, `.sm4`.
+//!
+//! Objects (kind, place, length) lead from the file's header to the index of pages, from there to
+//! the header and the samples of each page, from the page's header to its texts. All little endian,
+//! texts in UTF-16. Pages with images are read, curves left out.
+//!
+//! - Sample *i* of a line lies at offset + *i* × step: a negative step in x means that lines are
+//!   stored from right to left. The sign is the same for both directions of the tip, whose lines
+//!   are stored in the same order.
+//! - Lines are stored in order of time: a positive step in y is a frame upwards.
+//! - Value = count × z scale + z offset; lengths are in the unit of the page, mostly m.
+//! - The period is the time per sample. The angle is in degrees, taken as counter-clockwise.
+//! - The offset is the centre of the frame (manual of the R9 controller).
+//! - Lines beyond the count of completed ones are missing.
+//!
+//! Kinds of objects: Gwyddion's `rhk-sm4.c` and spym's `_sm4.py`.
 
 use crate::ChannelInfo;
+use crate::clock;
+use crate::cursor::{Cursor, Endian};
 use crate::error::ReadError;
-use crate::scan::Scan;
+use crate::missing::blank_unfilled;
+use crate::raster::{self, Encoding, Order};
+use crate::scan::{Channel, DateTime, FrameDirection, LineDirection, Scan};
+use crate::units::{clean, nm_per};
+use crate::whole::{Extent, MOST_CHANNELS};
+
+const FORMAT: &str = "RHK";
+/// Kinds of objects.
+const PAGE_INDEX_HEADER: u32 = 1;
+const PAGE_INDEX: u32 = 2;
+const PAGE_HEADER: u32 = 3;
+const PAGE_DATA: u32 = 4;
+const TEXTS: u32 = 10;
+/// Kind of a page.
+const IMAGE: u32 = 0;
+/// An object is three numbers, unless the file says more.
+const OBJECT_WIDTH: usize = 12;
+/// Places of the texts of a page.
+const LABEL: usize = 0;
+const DATE: usize = 5;
+const TIME: usize = 6;
+const X_UNIT: usize = 7;
+const Z_UNIT: usize = 9;
+const COMPLETED_LINES: usize = 13;
+/// Texts that are kept, with names.
+const TOLD: [(usize, &str); 5] = [
+    (1, "System text"),
+    (2, "Session text"),
+    (3, "User text"),
+    (4, "Path"),
+    (12, "Status"),
+];
+/// More texts than any version has.
+const MOST_TEXTS: usize = 64;
+
+fn damaged(reason: impl Into<String>) -> ReadError {
+    ReadError::Damaged {
+        format: FORMAT,
+        reason: reason.into(),
+    }
+}
 
 /// Reads the channels that are wanted.
-pub(crate) fn read(
-    _bytes: &[u8],
-    _wanted: &dyn Fn(&ChannelInfo) -> bool,
-) -> Result<Scan, ReadError> {
-    Err(ReadError::Unsupported {
-        format: "RHK",
-        reason: "this format is not read yet".to_owned(),
+pub(crate) fn read(bytes: &[u8], wanted: &dyn Fn(&ChannelInfo) -> bool) -> Result<Scan, ReadError> {
+    let version = version(bytes).map_err(damaged)?;
+    if !version.starts_with("005.") {
+        return Err(ReadError::Unsupported {
+            format: FORMAT,
+            reason: format!("expected version 005 (.sm4), found {version:?}"),
+        });
+    }
+    let objects = pages(bytes).map_err(damaged)?;
+    let mut scan = Scan {
+        format: format!("{FORMAT} {version}"),
+        ..Scan::default()
+    };
+    let mut extent = Extent::default();
+    let mut headers = Vec::new();
+    for objects in &objects {
+        let page = page(bytes, objects).map_err(damaged)?;
+        let length =
+            raster::byte_length(page.rows, page.columns, Encoding::I32).ok_or_else(|| {
+                let (rows, columns) = (page.rows, page.columns);
+                damaged(format!(
+                    "the size of a page is {rows} lines of {columns} samples"
+                ))
+            })?;
+        let data = find(objects, PAGE_DATA)
+            .ok_or_else(|| damaged("expected the samples of a page, found none"))?;
+        let info = page.info();
+        if let Some(block) = extent.take(bytes, data.place, length, &info.name)
+            && wanted(&info)
+        {
+            scan.channels.push(page.channel(info, block));
+        }
+        headers.push(page);
+    }
+    let Some(first) = headers.first() else {
+        return Err(ReadError::Unsupported {
+            format: FORMAT,
+            reason: "it holds no image (curves only)".to_owned(),
+        });
+    };
+    tell(&mut scan, first, &headers);
+    extent.judge(scan, bytes)
+}
+
+/// `005.004` of the mark `STiMage 005.004 1`.
+fn version(bytes: &[u8]) -> Result<String, String> {
+    let mut cursor = Cursor::new(bytes, Endian::Little);
+    // Before version 4 the mark stood at the first byte, in Latin-1.
+    if bytes.starts_with(b"STiMage") {
+        let mark = cursor.text(32.min(bytes.len()), "a mark")?;
+        return Ok(mark.split_whitespace().nth(1).unwrap_or("").to_owned());
+    }
+    cursor.skip(2)?;
+    let mark = wide(cursor.slice(36, "a mark")?);
+    Ok(mark.split_whitespace().nth(1).unwrap_or("").to_owned())
+}
+
+/// UTF-16 up to the first NUL.
+fn wide(bytes: &[u8]) -> String {
+    let (pairs, _) = bytes.as_chunks::<2>();
+    let units = pairs.iter().map(|&pair| u16::from_le_bytes(pair));
+    char::decode_utf16(units.take_while(|&unit| unit != 0))
+        .map(|c| c.unwrap_or(char::REPLACEMENT_CHARACTER))
+        .collect::<String>()
+        .trim()
+        .to_owned()
+}
+
+/// A part of the file.
+#[derive(Clone, Copy, Debug)]
+struct Object {
+    kind: u32,
+    place: usize,
+    length: usize,
+}
+
+fn find(objects: &[Object], kind: u32) -> Option<Object> {
+    objects
+        .iter()
+        .find(|o| o.kind == kind && o.length > 0)
+        .copied()
+}
+
+/// A list of objects; the position moves behind it.
+fn objects(cursor: &mut Cursor<'_>, count: u32, width: usize) -> Result<Vec<Object>, String> {
+    if count as usize > cursor.left() / width {
+        return Err(format!(
+            "expected {count} objects at byte {}, found the end of the file",
+            cursor.position()
+        ));
+    }
+    let mut objects = Vec::new();
+    for _ in 0..count {
+        objects.push(Object {
+            kind: cursor.u32()?,
+            place: cursor.u32()? as usize,
+            length: cursor.u32()? as usize,
+        });
+        cursor.skip(width - OBJECT_WIDTH)?;
+    }
+    Ok(objects)
+}
+
+/// The objects of every page that holds an image.
+fn pages(bytes: &[u8]) -> Result<Vec<Vec<Object>>, String> {
+    let file = Cursor::new(bytes, Endian::Little);
+    let header = usize::from(file.clone().u16()?);
+    let mut cursor = file.at(38);
+    let (_pages, count, width) = (cursor.u32()?, cursor.u32()?, cursor.u32()? as usize);
+    let width = width.max(OBJECT_WIDTH);
+    let expected = |what: &str| format!("expected {what}, found none");
+    let top = objects(&mut file.at(2 + header), count, width)?;
+    let index = find(&top, PAGE_INDEX_HEADER).ok_or_else(|| expected("an index of pages"))?;
+    let mut cursor = file.at(index.place);
+    let (pages, count) = (cursor.u32()?, cursor.u32()?);
+    cursor.skip(8)?;
+    let list = objects(&mut cursor, count, width)?;
+    let list = find(&list, PAGE_INDEX).ok_or_else(|| expected("a list of pages"))?;
+    let mut cursor = file.at(list.place);
+    let mut images = Vec::new();
+    for _ in 0..pages {
+        cursor.skip(16)?;
+        let (kind, _source, count) = (cursor.u32()?, cursor.u32()?, cursor.u32()?);
+        cursor.skip(4)?;
+        let objects = objects(&mut cursor, count, width)?;
+        if kind == IMAGE {
+            images.push(objects);
+        }
+        if images.len() > MOST_CHANNELS {
+            return Err(format!("it announces more than {MOST_CHANNELS} images"));
+        }
+    }
+    Ok(images)
+}
+
+/// The header of a page.
+struct Page {
+    columns: usize,
+    rows: usize,
+    direction: u32,
+    x_step: f64,
+    y_step: f64,
+    z_scale: f64,
+    x_offset: f64,
+    y_offset: f64,
+    z_offset: f64,
+    period: f64,
+    bias: f64,
+    current: f64,
+    angle_degrees: f64,
+    texts: Vec<String>,
+}
+
+fn page(bytes: &[u8], of_page: &[Object]) -> Result<Page, String> {
+    let header = find(of_page, PAGE_HEADER).ok_or("expected the header of a page, found none")?;
+    let mut c = Cursor::new(bytes, Endian::Little).at(header.place);
+    c.skip(2)?;
+    let number_of_texts = usize::from(c.u16()?).min(MOST_TEXTS);
+    // Kinds of page, source and line; corner.
+    c.skip(4 * 3 + 4 * 2)?;
+    let (columns, rows) = (c.u32()? as usize, c.u32()? as usize);
+    c.skip(4)?;
+    let direction = c.u32()?;
+    // Group, length of the samples, least and greatest count.
+    c.skip(4 * 4)?;
+    let mut number = || c.f32().map(f64::from);
+    let (x_step, y_step, z_scale, _xy_scale) = (number()?, number()?, number()?, number()?);
+    let (x_offset, y_offset, z_offset) = (number()?, number()?, number()?);
+    let (period, bias, current, angle_degrees) = (number()?, number()?, number()?, number()?);
+    // Colours, grid of curves.
+    c.skip(4 * 3)?;
+    let count = c.u32()?;
+    c.skip(64)?;
+    let objects = objects(&mut c, count, OBJECT_WIDTH)?;
+    if ![z_scale, z_offset].iter().all(|n| n.is_finite()) {
+        return Err(format!(
+            "expected the scale of a page, found {z_scale}, {z_offset}"
+        ));
+    }
+    let texts = find(&objects, TEXTS)
+        .map(|object| texts(bytes, object, number_of_texts))
+        .unwrap_or_default();
+    Ok(Page {
+        columns,
+        rows,
+        direction,
+        x_step,
+        y_step,
+        z_scale,
+        x_offset,
+        y_offset,
+        z_offset,
+        period,
+        bias,
+        current,
+        angle_degrees,
+        texts,
     })
+}
+
+/// Texts, each behind its length; as many as there are.
+fn texts(bytes: &[u8], object: Object, number: usize) -> Vec<String> {
+    let end = object.place.saturating_add(object.length).min(bytes.len());
+    let mut cursor = Cursor::new(&bytes[..end], Endian::Little).at(object.place);
+    let mut next = || {
+        let length = usize::from(cursor.u16().ok()?);
+        cursor.slice(2 * length, "a text").ok().map(wide)
+    };
+    (0..number).map_while(|_| next()).collect()
+}
+
+impl Page {
+    fn text(&self, index: usize) -> &str {
+        self.texts.get(index).map_or("", String::as_str)
+    }
+
+    fn info(&self) -> ChannelInfo {
+        let label = self.text(LABEL);
+        ChannelInfo {
+            name: if label.is_empty() { "image" } else { label }.to_owned(),
+            internal_name: String::new(),
+            line_direction: match self.direction {
+                0 => Some(LineDirection::Trace),
+                1 => Some(LineDirection::Retrace),
+                _ => None,
+            },
+            scan_line: None,
+        }
+    }
+
+    /// Width and height, nm.
+    fn size_nm(&self) -> Option<[f64; 2]> {
+        let unit = nm_per(&clean(self.text(X_UNIT)))?;
+        let width = self.columns as f64 * self.x_step.abs() * unit;
+        let height = self.rows as f64 * self.y_step.abs() * unit;
+        let positive = |length: f64| length > 0.0 && length.is_finite();
+        (positive(width) && positive(height)).then_some([width, height])
+    }
+
+    fn channel(&self, info: ChannelInfo, block: &[u8]) -> Channel {
+        let order = Order {
+            top_first: self.y_step < 0.0,
+            mirrored: self.x_step < 0.0,
+        };
+        let samples = raster::decode(block, self.columns, Encoding::I32, Endian::Little, order);
+        // Files of old or foreign programs count no lines.
+        let completed = self.text(COMPLETED_LINES).parse::<usize>();
+        let completed = completed.ok().filter(|&n| n > 0 && n < self.rows);
+        let samples = match completed {
+            Some(n) if order.top_first => blank_unfilled(samples, self.columns, 0..self.rows - n),
+            Some(n) => blank_unfilled(samples, self.columns, n..self.rows),
+            None => samples,
+        };
+        let size = self.size_nm();
+        Channel {
+            name: info.name,
+            internal_name: info.internal_name,
+            unit: clean(self.text(Z_UNIT)),
+            line_direction: info.line_direction,
+            scan_line: None,
+            rows: self.rows,
+            columns: self.columns,
+            width_nm: size.map(|[width, _]| width),
+            height_nm: size.map(|[_, height]| height),
+            scale: self.z_scale,
+            offset: self.z_offset,
+            scaling: format!("counts × {} + {}", self.z_scale, self.z_offset),
+            plane_fit: None,
+            samples,
+        }
+    }
+
+    /// Time of a line in one direction, s.
+    fn line_time(&self) -> Option<f64> {
+        let time = self.period * self.columns as f64;
+        (time > 0.0 && time.is_finite()).then_some(time)
+    }
+}
+
+/// What the headers of the pages say of the frame; where they contradict each other, nothing.
+fn tell(scan: &mut Scan, first: &Page, pages: &[Page]) {
+    let direction = |page: &Page| match page.y_step {
+        step if step > 0.0 => Some(FrameDirection::Up),
+        step if step < 0.0 => Some(FrameDirection::Down),
+        _ => None,
+    };
+    let told = direction(first);
+    if pages.iter().all(|page| direction(page) == told) {
+        scan.frame_direction = told;
+    }
+    // The same time for all lines of a direction.
+    let time = |of: u32| {
+        let mut times = pages
+            .iter()
+            .filter(|p| p.direction == of)
+            .map(Page::line_time);
+        let first = times.next()??;
+        times.all(|time| time == Some(first)).then_some(first)
+    };
+    if let (Some(forward), Some(backward)) = (time(0), time(1)) {
+        scan.line_times_s = Some([forward, backward]);
+        scan.line_rate_hz = Some(1.0 / (forward + backward));
+    }
+    if first.angle_degrees.is_finite() {
+        scan.rotation_rad = first.angle_degrees.to_radians();
+    }
+    let unit = nm_per(&clean(first.text(X_UNIT)));
+    let offset = unit.map(|unit| [first.x_offset * unit, first.y_offset * unit]);
+    scan.offset_nm = offset
+        .filter(|offset| offset.iter().all(|x| x.is_finite()))
+        .unwrap_or_default();
+    scan.size_nm = first.size_nm();
+    scan.acquired = date_time(first.text(DATE), first.text(TIME));
+    scan.metadata = [("Bias (V)", first.bias), ("Current (A)", first.current)]
+        .map(|(name, value)| (name.to_owned(), value.to_string()))
+        .into_iter()
+        .chain(TOLD.iter().filter_map(|&(index, name)| {
+            let text = first.text(index);
+            (!text.is_empty()).then(|| (name.to_owned(), text.to_owned()))
+        }))
+        .collect();
+}
+
+/// `07/02/20`, month first, and `07:44:02`.
+fn date_time(date: &str, time: &str) -> Option<DateTime> {
+    let mut mdy = date.split('/').map(str::parse::<i64>);
+    let mut number = || mdy.next()?.ok();
+    let (month, day, year) = (number()?, number()?, number()?);
+    // The format is younger than 2000.
+    let year = if year < 100 { year + 2000 } else { year };
+    clock::date([year, month, day], clock::clock(time)?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    struct Made {
+        version: &'static str,
+        kind: u32,
+        steps: [f32; 2],
+        completed: &'static str,
+        columns: u32,
+        pages: u32,
+    }
+
+    impl Default for Made {
+        fn default() -> Self {
+            Self {
+                version: "005.004",
+                kind: 0,
+                steps: [-1e-9, -2e-9],
+                completed: "0002",
+                columns: 3,
+                pages: 2,
+            }
+        }
+    }
+
+    /// Pages of 2 lines with 3 counts; the second one is of the way back.
+    fn made(m: &Made) -> Vec<u8> {
+        let mut file = 56u16.to_le_bytes().to_vec();
+        let mark = format!("STiMage {} 1", m.version);
+        file.extend(mark.encode_utf16().flat_map(u16::to_le_bytes));
+        file.resize(38, 0);
+        let put = |file: &mut Vec<u8>, numbers: &[u32]| {
+            file.extend(numbers.iter().flat_map(|n| n.to_le_bytes()));
+        };
+        put(&mut file, &[m.pages, 1, 12, 0, 0]);
+        put(&mut file, &[PAGE_INDEX_HEADER, 70, 16]);
+        put(&mut file, &[m.pages, 1, 0, 0]);
+        put(&mut file, &[PAGE_INDEX, 98, 32]);
+        let index = file.len();
+        file.resize(index + 56 * m.pages as usize, 0);
+        for page in 0..m.pages {
+            let header = file.len() as u32;
+            file.extend(180u16.to_le_bytes());
+            file.extend(14u16.to_le_bytes());
+            put(
+                &mut file,
+                &[1, 0, 0, 0, 0, m.columns, 2, 0, page, 0, 24, 0, 0],
+            );
+            let numbers = [
+                m.steps[0], m.steps[1], 0.5, 0.0, 5e-9, -6e-9, 100.0, 0.25, 0.1, 1e-9, 33.0,
+            ];
+            file.extend(numbers.iter().flat_map(|n| n.to_le_bytes()));
+            put(&mut file, &[0, 0, 0, 1]);
+            file.extend([0; 64]);
+            let texts = file.len() as u32 + 12;
+            put(&mut file, &[TEXTS, texts, 999_999]);
+            let list = [
+                "Topography",
+                "",
+                "",
+                "",
+                "",
+                "07/02/20",
+                "07:44:02",
+                "m",
+                "m",
+                "m",
+                "",
+                "",
+                "",
+            ];
+            for text in list.iter().chain(&[m.completed]) {
+                file.extend((text.len() as u16).to_le_bytes());
+                file.extend(text.encode_utf16().flat_map(u16::to_le_bytes));
+            }
+            let data = file.len() as u32;
+            file.extend((0..6i32).flat_map(i32::to_le_bytes));
+            let mut entry = vec![0; 16];
+            put(
+                &mut entry,
+                &[
+                    m.kind,
+                    0,
+                    2,
+                    4,
+                    PAGE_HEADER,
+                    header,
+                    180,
+                    PAGE_DATA,
+                    data,
+                    24,
+                ],
+            );
+            let at = index + 56 * page as usize;
+            file[at..at + 56].copy_from_slice(&entry);
+        }
+        file
+    }
+
+    #[test]
+    fn signs_of_the_steps_tell_the_order() {
+        let values = |steps: [f32; 2]| {
+            let scan = crate::read(&made(&Made {
+                steps,
+                ..Made::default()
+            }))
+            .expect("whole");
+            (scan.channels[0].values(), scan.frame_direction)
+        };
+        let (down, direction) = values([-1e-9, -2e-9]);
+        assert_eq!(down, [102.5, 102.0, 101.5, 101.0, 100.5, 100.0]);
+        assert_eq!(direction, Some(FrameDirection::Down));
+        let (up, direction) = values([-1e-9, 2e-9]);
+        assert_eq!(up, [101.0, 100.5, 100.0, 102.5, 102.0, 101.5]);
+        assert_eq!(direction, Some(FrameDirection::Up));
+        let (plain, _) = values([1e-9, 2e-9]);
+        assert_eq!(plain, [100.0, 100.5, 101.0, 101.5, 102.0, 102.5]);
+    }
+
+    #[test]
+    fn the_frame_is_told() {
+        let scan = crate::read(&made(&Made::default())).expect("whole");
+        assert_eq!(scan.format, "RHK 005.004");
+        let lines: Vec<_> = scan.channels.iter().map(|c| c.line_direction).collect();
+        assert_eq!(
+            lines,
+            [Some(LineDirection::Trace), Some(LineDirection::Retrace)]
+        );
+        assert_eq!(scan.line_times_s, Some([0.75, 0.75]));
+        assert!((scan.line_rate_hz.expect("a rate") - 1.0 / 1.5).abs() < 1e-12);
+        // Steps are single precision in the file.
+        let close = |[x, y]: [f64; 2], [a, b]: [f64; 2]| (x - a).abs() + (y - b).abs() < 1e-6;
+        assert!(close(scan.size_nm.expect("a size"), [3.0, 4.0]));
+        assert!(close(scan.offset_nm, [5.0, -6.0]));
+        assert!((scan.rotation_rad - 33f64.to_radians()).abs() < 1e-12);
+        assert_eq!(scan.acquired, clock::date([2020, 7, 2], [7, 44, 2]));
+        let alone = crate::read(&made(&Made {
+            pages: 1,
+            ..Made::default()
+        }))
+        .expect("whole");
+        assert_eq!((alone.line_times_s, alone.line_rate_hz), (None, None));
+    }
+
+    #[test]
+    fn lines_not_reached_are_missing() {
+        let stopped = |steps: [f32; 2]| {
+            let mut file = made(&Made {
+                completed: "0001",
+                steps,
+                pages: 1,
+                ..Made::default()
+            });
+            let end = file.len();
+            file[end - 12..].fill(0);
+            crate::read(&file).expect("whole").channels[0].values()
+        };
+        let down = stopped([-1e-9, -2e-9]);
+        assert!(down[..3].iter().all(|v| v.is_nan()));
+        assert_eq!(down[3..], [101.0, 100.5, 100.0]);
+        let up = stopped([-1e-9, 2e-9]);
+        assert_eq!(up[..3], [101.0, 100.5, 100.0]);
+        assert!(up[3..].iter().all(|v| v.is_nan()));
+    }
+
+    #[test]
+    fn what_is_missing_is_said() {
+        let error = |m: Made| crate::read(&made(&m)).expect_err("damaged").to_string();
+        assert!(
+            error(Made {
+                version: "004.001",
+                ..Made::default()
+            })
+            .contains("004.001")
+        );
+        assert!(
+            error(Made {
+                kind: 1,
+                ..Made::default()
+            })
+            .contains("curves")
+        );
+        assert!(
+            error(Made {
+                columns: 0,
+                ..Made::default()
+            })
+            .contains("0 samples")
+        );
+        let long = error(Made {
+            columns: u32::MAX,
+            ..Made::default()
+        });
+        assert!(long.contains("bytes long"), "{long}");
+        let whole = made(&Made::default());
+        assert!(matches!(
+            crate::read(&whole[..whole.len() - 1]),
+            Err(ReadError::Incomplete { readable, .. }) if readable.channels.len() == 1
+        ));
+        assert!(crate::read(&whole[..100]).is_err());
+        let error = crate::read(b"STiMage 3.1").expect_err("old").to_string();
+        assert!(error.contains("3.1"), "{error}");
+    }
 }

@@ -13,6 +13,44 @@ pub fn nm_per(unit: &str) -> Option<f64> {
     }
 }
 
+/// `600 nm` as a finite number and the unit behind it, which may be absent.
+pub(crate) fn quantity(text: &str) -> Option<(f64, &str)> {
+    let text = text.trim();
+    let end = text
+        .find(|c: char| !(c.is_ascii_digit() || matches!(c, '+' | '-' | '.' | 'e' | 'E')))
+        .unwrap_or(text.len());
+    // `5e` of `5eV` is no number: the letter belongs to the unit.
+    let end = if text[..end].parse::<f64>().is_ok() {
+        end
+    } else {
+        text[..end]
+            .trim_end_matches(['e', 'E', '+', '-', '.'])
+            .len()
+    };
+    let number: f64 = text[..end].parse().ok()?;
+    number.is_finite().then(|| (number, text[end..].trim()))
+}
+
+/// `0.6 µm` in nm; `None` without a unit of length.
+pub(crate) fn length_nm(text: &str) -> Option<f64> {
+    let (number, unit) = quantity(text)?;
+    Some(number * nm_per(&clean(unit))?)
+}
+
+/// The text of a header: UTF-8 if it is, as converters write it, otherwise Windows-1252.
+///
+/// Of the signs that matter (µ, °, Å) none is UTF-8 by chance in Windows-1252.
+pub(crate) fn decode(bytes: &[u8]) -> std::borrow::Cow<'_, str> {
+    match std::str::from_utf8(bytes) {
+        Ok(text) => text.into(),
+        Err(_) => {
+            encoding_rs::WINDOWS_1252
+                .decode_without_bom_handling(bytes)
+                .0
+        }
+    }
+}
+
 /// A unit in plain signs: `~` is micro, the ordinal sign and the like are degrees.
 pub(crate) fn clean(unit: &str) -> String {
     unit.trim()
@@ -70,6 +108,26 @@ mod tests {
         assert_eq!(prefix_ratio("V", "Arb"), None);
         assert_eq!(prefix_ratio("m", "n"), None);
         assert_eq!(prefix_ratio("", "V"), None);
+    }
+
+    #[test]
+    fn headers_in_either_encoding() {
+        assert_eq!(decode("0.6 µm, 5 °".as_bytes()), "0.6 µm, 5 °");
+        assert_eq!(decode(b"0.6 \xb5m, 5 \xb0"), "0.6 µm, 5 °");
+    }
+
+    #[test]
+    fn quantities() {
+        assert_eq!(quantity(" -3.5e-2 nm"), Some((-0.035, "nm")));
+        assert_eq!(quantity("600nm"), Some((600.0, "nm")));
+        assert_eq!(quantity("5eV"), Some((5.0, "eV")));
+        assert_eq!(quantity("8"), Some((8.0, "")));
+        assert_eq!(quantity("nm"), None);
+        assert_eq!(quantity("inf nm"), None);
+        assert_eq!(length_nm("0.5 µm"), Some(500.0));
+        assert_eq!(length_nm("2 Å"), Some(0.2));
+        assert_eq!(length_nm("2 V"), None);
+        assert_eq!(length_nm("2"), None);
     }
 
     #[test]

@@ -17,6 +17,8 @@ pub(crate) struct Extent {
     lost: Vec<UnreadableChannel>,
     /// Whether any of their bytes are there.
     begun: bool,
+    /// Bytes given to channels so far.
+    taken: usize,
 }
 
 impl Extent {
@@ -29,7 +31,7 @@ impl Extent {
         name: &str,
     ) -> Option<&'a [u8]> {
         self.announced += 1;
-        let end = start as u64 + length as u64;
+        let end = (start as u64).saturating_add(length as u64);
         self.expected = self.expected.max(end);
         let found = bytes.len().saturating_sub(start);
         self.begun |= found > 0;
@@ -41,8 +43,24 @@ impl Extent {
                 name: name.to_owned(),
                 error: format!("it is {found} bytes long but its header promises {length}"),
             });
+            return None;
         }
+        // Data that overlap belong to nobody; this also bounds the memory by the file's length.
+        if length > bytes.len() - self.taken {
+            self.lose(
+                name.to_owned(),
+                "its data overlap with those of others".to_owned(),
+            );
+            return None;
+        }
+        self.taken += length;
         block
+    }
+
+    /// Counts a channel as lost that a reader could not find itself.
+    pub(crate) fn lose(&mut self, name: String, error: String) {
+        self.begun = true;
+        self.lost.push(UnreadableChannel { name, error });
     }
 
     /// The scan, or the error that the missing bytes call for.
@@ -71,6 +89,18 @@ impl Extent {
     }
 }
 
+/// The scan, unless every one of its announced channels is scaled in an unknown way.
+pub(crate) fn some_readable(scan: Scan, announced: usize) -> Result<Scan, ReadError> {
+    match scan.unreadable.first() {
+        Some(first) if scan.unreadable.len() == announced => Err(ReadError::NoReadableChannel {
+            announced,
+            name: first.name.clone(),
+            reason: first.error.clone(),
+        }),
+        _ => Ok(scan),
+    }
+}
+
 /// Whether there are channels and none of them holds a single sample.
 pub(crate) fn all_missing(scan: &Scan) -> bool {
     let missing = |samples: &Samples| match samples {
@@ -80,4 +110,46 @@ pub(crate) fn all_missing(scan: &Scan) -> bool {
         Samples::F64(v) => v.iter().all(|value| value.is_nan()),
     };
     !scan.channels.is_empty() && scan.channels.iter().all(|c| missing(&c.samples))
+}
+
+/// Leaves out what cannot be a length, a time or a rate, as damaged headers hold it.
+pub(crate) fn tidy(scan: &mut Scan) {
+    let positive = |n: &f64| *n > 0.0 && n.is_finite();
+    scan.size_nm = scan.size_nm.filter(|size| size.iter().all(positive));
+    scan.line_rate_hz = scan.line_rate_hz.filter(positive);
+    scan.line_times_s = scan
+        .line_times_s
+        .filter(|[a, b]| *a >= 0.0 && *b >= 0.0 && positive(&(a + b)));
+    scan.rounding = scan.rounding.filter(|n| *n >= 0.0 && n.is_finite());
+    if scan.offset_nm.iter().any(|n| !n.is_finite()) {
+        scan.offset_nm = [0.0; 2];
+    }
+    if !scan.rotation_rad.is_finite() {
+        scan.rotation_rad = 0.0;
+    }
+    for channel in &mut scan.channels {
+        channel.width_nm = channel.width_nm.filter(positive);
+        channel.height_nm = channel.height_nm.filter(positive);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nonsense_is_left_out() {
+        let mut scan = Scan {
+            size_nm: Some([f64::INFINITY, 1.0]),
+            line_rate_hz: Some(-1.0),
+            line_times_s: Some([1.0, 0.0]),
+            offset_nm: [f64::NAN, 1.0],
+            rotation_rad: f64::INFINITY,
+            ..Scan::default()
+        };
+        tidy(&mut scan);
+        assert_eq!((scan.size_nm, scan.line_rate_hz), (None, None));
+        assert_eq!(scan.line_times_s, Some([1.0, 0.0]));
+        assert_eq!((scan.offset_nm, scan.rotation_rad), ([0.0; 2], 0.0));
+    }
 }

@@ -82,7 +82,17 @@ pub(super) fn compare(
             |b| b.twist,
             1f64.to_degrees(),
         ),
-        of(percent[0] - strain[0], strain_sigma.m11, |b| b.strain[0], 100.0),
-        of(percent[1] - strain[1], strain_sigma.m22, |b| b.strain[1], 100.0),
+        of(
+            percent[0] - strain[0],
+            strain_sigma.m11,
+            |b| b.strain[0],
+            100.0,
+        ),
+        of(
+            percent[1] - strain[1],
+            strain_sigma.m22,
+            |b| b.strain[1],
+            100.0,
+        ),
     ])
 }

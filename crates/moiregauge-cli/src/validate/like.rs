@@ -69,7 +69,10 @@ fn sample(
     let ratio = median(lines.iter().filter_map(|line| {
         let fit = line.lattice.fit.as_ref()?;
         let shell = |first: bool| {
-            let all = fit.harmonics.iter().filter(move |h| order(h.index) == if first { 1 } else { 3 });
+            let all = fit
+                .harmonics
+                .iter()
+                .filter(move |h| order(h.index) == if first { 1 } else { 3 });
             let squares: Vec<f64> = all.map(|h| h.amplitude * h.amplitude).collect();
             (!squares.is_empty()).then(|| (squares.iter().sum::<f64>() / 3.0).sqrt())
         };
@@ -109,19 +112,28 @@ fn raster(
     scans: &[&MeasuredScan],
     lines: &[&MeasuredLine],
 ) -> anyhow::Result<Raster> {
-    let line = lines.first().context("no line of these scans can be used")?;
+    let line = lines
+        .first()
+        .context("no line of these scans can be used")?;
     let rate = scans[0]
         .line_rate_hz
         .context("the files give no line rate: the scans cannot be simulated")?;
     let [columns, rows] = line.geometry.size;
-    let timing = line.timing.context("the files do not tell their frame direction")?;
+    let timing = line
+        .timing
+        .context("the files do not tell their frame direction")?;
     let half_line = 0.5 / rate;
     let rounding = half_line / (timing.per_pixel.x.abs() * (columns as f64 - 1.0)) - 1.0;
     let fast = line.geometry.fast_step();
     let directions: Vec<_> = scans.iter().filter_map(|s| s.frame_direction).collect();
     let frame = rows as f64 / rate;
-    let starts: Vec<f64> = scans.iter().filter_map(|s| s.acquired.map(seconds_of_day)).collect();
-    let gaps = starts.windows(2).map(|w| (w[1] - w[0]).rem_euclid(86_400.0) - frame);
+    let starts: Vec<f64> = scans
+        .iter()
+        .filter_map(|s| s.acquired.map(seconds_of_day))
+        .collect();
+    let gaps = starts
+        .windows(2)
+        .map(|w| (w[1] - w[0]).rem_euclid(86_400.0) - frame);
     Ok(Raster {
         scans: scans.len(),
         pixels: [columns, rows],
@@ -173,7 +185,11 @@ fn window(set: &SetAnalysis) -> Window {
 
 /// Noise at the harmonics, as white noise of the pixels would make it, in units of the contrast.
 fn noise(lines: &[&MeasuredLine]) -> anyhow::Result<Noise> {
-    let fits = || lines.iter().filter_map(|l| Some((l, l.lattice.fit.as_ref()?)));
+    let fits = || {
+        lines
+            .iter()
+            .filter_map(|l| Some((l, l.lattice.fit.as_ref()?)))
+    };
     let first = |fit: &moiregauge::lattice::LatticeFit| {
         let of: Vec<f64> = fit
             .harmonics
@@ -194,11 +210,16 @@ fn noise(lines: &[&MeasuredLine]) -> anyhow::Result<Noise> {
             .collect::<Vec<_>>()
     }));
     let offsets = median(fits().map(|(_, fit)| fit.line_offsets.unwrap_or(0.0) / first(fit)));
-    let sensor = median(lines.iter().filter(|l| l.geometry.from_sensors).map(|line| {
-        let [columns, rows] = line.geometry.size.map(|n| n as f64);
-        let variance = line.geometry.covariance.m11;
-        (variance * columns * rows * (columns * columns - 1.0) / 12.0).sqrt()
-    }));
+    let sensor = median(
+        lines
+            .iter()
+            .filter(|l| l.geometry.from_sensors)
+            .map(|line| {
+                let [columns, rows] = line.geometry.size.map(|n| n as f64);
+                let variance = line.geometry.covariance.m11;
+                (variance * columns * rows * (columns * columns - 1.0) / 12.0).sqrt()
+            }),
+    );
     Ok(Noise {
         sensor_nm: sensor.unwrap_or(0.0),
         pixel_deg: CONTRAST * pixel.context("the lattice fit gave no harmonics")?,

@@ -128,7 +128,11 @@ impl Validation {
         let mut table = String::from("set");
         for (name, unit) in QUANTITIES {
             let plain = name.replace(' ', "_").replace('₁', "1").replace('₂', "2");
-            let _ = write!(table, ",{plain}_error_{0},{plain}_sigma_{0}", plain_unit(unit));
+            let _ = write!(
+                table,
+                ",{plain}_error_{0},{plain}_sigma_{0}",
+                plain_unit(unit)
+            );
         }
         table.push('\n');
         for (index, set) in compared.iter().enumerate() {
@@ -168,9 +172,7 @@ fn quantity(
 ) -> Quantity {
     let n = all.clone().count() as f64;
     let mean = |f: &dyn Fn(Compared) -> f64| all.clone().map(f).sum::<f64>() / n;
-    let within = |k: f64| {
-        100.0 * mean(&|c| f64::from(u8::from(c.error.abs() <= k * c.sigma)))
-    };
+    let within = |k: f64| 100.0 * mean(&|c| f64::from(u8::from(c.error.abs() <= k * c.sigma)));
     let rms_error = mean(&|c| c.error * c.error).sqrt();
     let bound = Some(mean(&|c| c.bound * c.bound).sqrt()).filter(|b| b.is_finite());
     Quantity {
@@ -206,10 +208,16 @@ mod tests {
         let conditions = Simulation::default();
         let found = Validation::new(Method::Lattice, 1, 3, &compared, conditions);
         let twist = &found.quantities[2];
-        assert_eq!((twist.name, twist.mean_error, twist.mean_sigma), ("twist", -0.5, 0.75));
+        assert_eq!(
+            (twist.name, twist.mean_error, twist.mean_sigma),
+            ("twist", -0.5, 0.75)
+        );
         assert!((twist.rms_error - 1.25f64.sqrt()).abs() < 1e-12);
         assert_eq!(twist.error_over_bound, Some(twist.rms_error / 0.5));
-        assert_eq!((twist.within_1_sigma_percent, twist.within_2_sigma_percent), (50.0, 100.0));
+        assert_eq!(
+            (twist.within_1_sigma_percent, twist.within_2_sigma_percent),
+            (50.0, 100.0)
+        );
         assert!(found.table().contains("3 of 5 sets gave no drift"));
     }
 }

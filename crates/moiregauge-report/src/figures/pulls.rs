@@ -1,7 +1,7 @@
 //! Pulls of a validation: errors in units of the stated σ, against the normal distribution.
 
-use super::layout::{self, Grid, LETTERS};
 use super::Drawing;
+use super::layout::{self, Grid, LETTERS};
 use crate::draw::axes::{Axes, Labels, Ticks};
 use crate::draw::legend::{self, Key};
 use crate::draw::scale::Range;
@@ -19,7 +19,10 @@ const BINS: usize = 32;
 /// Says what is missing.
 pub fn pulls(quantities: &[(&str, Vec<f64>)]) -> Result<Drawing, String> {
     if quantities.is_empty() || quantities.len() > LETTERS.len() {
-        return Err(format!("{} quantities; 1 to 6 can be drawn", quantities.len()));
+        return Err(format!(
+            "{} quantities; 1 to 6 can be drawn",
+            quantities.len()
+        ));
     }
     let grid = Grid {
         width: PAGE,

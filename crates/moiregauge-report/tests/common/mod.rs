@@ -12,6 +12,7 @@ use moiregauge::analysis::{
     Analysis, Axis, Combined, Consistency, Drift, DriftFit, DriftMonteCarlo, Illustration,
     LineAnalysis, ScanAnalysis, SetAnalysis, SetMean,
 };
+use moiregauge::budget::{Budget, Statistical};
 use moiregauge::caveat::Caveat;
 use moiregauge::estimate::Estimate;
 use moiregauge::image::Image;
@@ -185,7 +186,12 @@ fn noise_of(set: usize, index: usize) -> &'static mut Noise {
     Box::leak(Box::new(Noise((set * 31 + index + 7) as u64)))
 }
 
-fn mean(lattices: &[LatticeVectors], settings: &Settings, chi2_per_dof: f64) -> Option<SetMean> {
+fn mean(
+    lattices: &[LatticeVectors],
+    settings: &Settings,
+    chi2_per_dof: f64,
+    drift_known: bool,
+) -> Option<SetMean> {
     let n = lattices.len() as f64;
     let basis = lattices.iter().map(|l| l.basis).sum::<Matrix2<f64>>() / n;
     let covariance = lattices.first()?.covariance / n;
@@ -202,7 +208,14 @@ fn mean(lattices: &[LatticeVectors], settings: &Settings, chi2_per_dof: f64) -> 
             f64::NAN
         }
     };
+    // Six tenths of the variance from the images, three from the drift, one from the sensors.
+    let statistical = Statistical {
+        image: covariance * 0.6,
+        drift: covariance * if drift_known { 0.3 } else { f64::NAN },
+        sensor: covariance * 0.1,
+    };
     Some(SetMean {
+        budget: Budget::new(&lattice, &twist_strain, &statistical, settings),
         lattice,
         twist_strain,
         twist_scatter: scatter(
@@ -324,7 +337,7 @@ fn good_set(index: usize, axis: Axis, rate: f64, count: usize, settings: &Settin
     let sensor: Vec<_> = scans.iter().map(|s| s.sensor).collect();
     let sigma = 0.014 / 60.0;
     let found = drift_nm_per_s() + sigma * noise.pair();
-    let mean = mean(&corrected, settings, 1.3);
+    let mean = mean(&corrected, settings, 1.3, true);
     SetAnalysis {
         name: format!(
             "slow {}, {rate} Hz",
@@ -349,7 +362,7 @@ fn good_set(index: usize, axis: Axis, rate: f64, count: usize, settings: &Settin
         }),
         forward_backward: mean.as_ref().map(|m| m.twist_strain),
         mean,
-        uncorrected: self::mean(&sensor, settings, f64::NAN),
+        uncorrected: self::mean(&sensor, settings, f64::NAN, false),
         checks: None,
         illustration: scans.first().and_then(|s| illustration(s, &mut noise)),
         scans,
@@ -377,7 +390,7 @@ fn poor_set(settings: &Settings) -> SetAnalysis {
         channel: "TR Amplitude".to_owned(),
         drift: None,
         mean: None,
-        uncorrected: mean(&[scan.sensor], settings, f64::NAN),
+        uncorrected: mean(&[scan.sensor], settings, f64::NAN, false),
         forward_backward: None,
         checks: None,
         illustration: None,
@@ -398,7 +411,8 @@ pub(crate) fn analysis() -> Analysis {
         .filter_map(|s| s.mean.as_ref())
         .map(|m| m.lattice)
         .collect();
-    let combined = mean(&both, &settings, f64::NAN).map(|m| Combined {
+    let combined = mean(&both, &settings, f64::NAN, true).map(|m| Combined {
+        budget: m.budget,
         lattice: m.lattice,
         twist_strain: m.twist_strain,
         joint: None,
@@ -457,6 +471,7 @@ pub(crate) fn provenance() -> Provenance {
 
 /// Every number of `analysis` replaced by NaN, every image by one without pixels.
 pub(crate) fn spoil(analysis: &mut Analysis) {
+    let settings = analysis.settings.clone();
     let nan = LatticeVectors {
         basis: Matrix2::from_element(f64::NAN),
         covariance: Matrix4::from_element(f64::NAN),
@@ -476,6 +491,8 @@ pub(crate) fn spoil(analysis: &mut Analysis) {
             mean.lattice = nan;
             spoil_result(&mut mean.twist_strain);
             mean.chi2_per_dof = f64::NAN;
+            let statistical = mean.budget.statistical;
+            mean.budget = Budget::new(&nan, &mean.twist_strain, &statistical, &settings);
         }
         if let Some(drift) = &mut set.drift {
             drift.velocity = nothing;

@@ -16,12 +16,15 @@ use nalgebra::{DMatrix, Matrix2, Matrix4, Matrix4x2, Matrix6, Vector2, Vector4, 
 
 pub use monte_carlo::monte_carlo;
 
+use crate::budget::weighted_mean;
 use crate::lattice::LatticeVectors;
 use crate::lattice::reciprocal::both;
 
 /// Condition number beyond which the scans are said not to determine the drift. Up and down scans
 /// have 2, two line rates 8, trace and retrace of one scan 2000.
 const WORST_CONDITION: f64 = 100.0;
+/// Without any noise there is nothing to weigh by: a femtometre keeps it solvable (nm²).
+const FLOOR: f64 = 1e-12;
 
 /// One measured lattice with the time gradient of its image.
 #[derive(Clone, Copy, Debug)]
@@ -32,6 +35,8 @@ pub struct Observation {
     pub time_gradient: Vector2<f64>,
     /// Relative standard error of the tip speed along the fast and slow axes.
     pub speed_error: [f64; 2],
+    /// The part of the lattice's covariance that comes from the position sensors, nm².
+    pub sensor: Matrix4<f64>,
 }
 
 /// Lattice and drift common to all observations.
@@ -162,14 +167,23 @@ pub fn common_lattice(
     Ok((lattice, chi2, 4 * (observations.len() - 1)))
 }
 
+/// The covariance that the common lattice would have if the drift were known, split into what images
+/// and what sensors make of it, nm².
+pub fn at_known_drift(observations: &[Observation]) -> Option<[Matrix4<f64>; 2]> {
+    let parts: Vec<_> = observations
+        .iter()
+        .map(|o| (o.lattice.covariance, o.sensor))
+        .collect();
+    let (whole, sensor) = weighted_mean(&parts, FLOOR)?;
+    Some([whole - sensor, sensor])
+}
+
 fn weights(observations: &[Observation]) -> Result<Vec<Matrix4<f64>>, DriftError> {
     observations
         .iter()
         .enumerate()
         .map(|(index, o)| {
-            // Without any noise there is nothing to weigh by: a femtometre keeps it solvable.
-            let floor = Matrix4::identity() * (1e-6_f64).powi(2);
-            (o.lattice.covariance + floor)
+            (o.lattice.covariance + Matrix4::identity() * FLOOR)
                 .cholesky()
                 .map(|c| c.inverse())
                 .ok_or(DriftError::Covariance { index })

@@ -59,6 +59,7 @@ fn observation(basis: Matrix2<f64>, u: Vector2<f64>, sigma: f64) -> Observation 
         },
         time_gradient: u,
         speed_error: [0.0; 2],
+        sensor: Matrix4::zeros(),
     }
 }
 
@@ -171,6 +172,7 @@ fn drift_error_follows_the_table() {
             },
             time_gradient: u,
             speed_error: [0.0; 2],
+            sensor: Matrix4::zeros(),
         }
     };
     let sigma_of = |scans: &[Observation]| {

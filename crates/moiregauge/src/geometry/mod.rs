@@ -12,7 +12,7 @@ mod plane;
 mod sensors;
 
 use nalgebra::{Matrix2, Matrix4, Vector2};
-use spmfile::{FrameDirection, LineDirection};
+use spmfile::{FrameDirection, LineDirection, Scan};
 
 pub use plane::{PlaneFit, fit_plane};
 pub use sensors::{SensorGeometry, from_sensors};
@@ -135,6 +135,39 @@ impl Geometry {
 }
 
 impl Timing {
+    /// τ of a scan, from the times of its lines where the file gives them, otherwise by [`Timing::new`].
+    ///
+    /// A line that takes `T` from the first to the last pixel has τ_fast = T/(N − 1). Trace and
+    /// retrace may differ; lines follow each other at the line rate, which is `1/(T_trace +
+    /// T_retrace)` unless the file says otherwise. `None` where the file does not tell.
+    pub fn of_scan(
+        scan: &Scan,
+        columns: usize,
+        frame: FrameDirection,
+        line: LineDirection,
+    ) -> Option<Self> {
+        let Some([trace, retrace]) = scan.line_times_s else {
+            return Self::new(
+                columns,
+                scan.line_rate_hz?,
+                scan.rounding.unwrap_or(0.0),
+                frame,
+                line,
+            );
+        };
+        let time = match line {
+            LineDirection::Trace => trace,
+            LineDirection::Retrace => retrace,
+        };
+        let rate = scan.line_rate_hz.unwrap_or(1.0 / (trace + retrace));
+        let mut timing = Self::new(columns, rate, 0.0, frame, line)?;
+        if !(time > 0.0) || time * rate > 1.0 + 1e-6 {
+            return None;
+        }
+        timing.per_pixel.x = (time / (columns - 1) as f64).copysign(timing.per_pixel.x);
+        Some(timing)
+    }
+
     /// τ of a frame of `columns` samples per line.
     ///
     /// A line is acquired in half its period, shortened by the overscan `rounding`; lines follow
@@ -202,6 +235,51 @@ mod tests {
                 if rotation == 0.0 { Axis::Y } else { Axis::X }
             );
         }
+    }
+
+    /// 25 s there and 0.2 s back, as a slow instrument does it: each line has its own time.
+    #[test]
+    fn lines_of_different_times() {
+        let scan = Scan {
+            line_times_s: Some([25.0, 0.2]),
+            line_rate_hz: Some(1.0 / 25.2),
+            ..Scan::default()
+        };
+        let of = |line| Timing::of_scan(&scan, 96, FrameDirection::Up, line).unwrap();
+        let (trace, retrace) = (of(LineDirection::Trace), of(LineDirection::Retrace));
+        assert!((trace.per_pixel - Vector2::new(25.0 / 95.0, 25.2)).norm() < 1e-12);
+        assert!((retrace.per_pixel - Vector2::new(-0.2 / 95.0, 25.2)).norm() < 1e-12);
+        // Two equal halves are the same as an overscan of nothing.
+        let halves = Scan {
+            line_times_s: Some([0.25, 0.25]),
+            ..Scan::default()
+        };
+        let down = FrameDirection::Down;
+        assert_eq!(
+            Timing::of_scan(&halves, 512, down, LineDirection::Retrace),
+            Timing::new(512, 2.0, 0.0, down, LineDirection::Retrace)
+        );
+        // A line longer than its period, or no time at all, is no timing.
+        for times in [[3.0, 0.1], [0.0, 1.0], [f64::NAN, 1.0]] {
+            let odd = Scan {
+                line_times_s: Some(times),
+                line_rate_hz: Some(1.0),
+                ..Scan::default()
+            };
+            assert_eq!(
+                Timing::of_scan(&odd, 96, FrameDirection::Up, LineDirection::Trace),
+                None
+            );
+        }
+        assert_eq!(
+            Timing::of_scan(
+                &Scan::default(),
+                96,
+                FrameDirection::Up,
+                LineDirection::Trace
+            ),
+            None
+        );
     }
 
     /// An unfinished frame keeps its pitch, and the frame is centred where it should be.

@@ -103,13 +103,7 @@ impl JointFit {
     }
 
     fn rows(&self, x: &DVector<f64>, instability: f64) -> Linearised {
-        linearise(
-            &self.sightings,
-            &self.layout,
-            x,
-            f64::INFINITY,
-            instability,
-        )
+        linearise(&self.sightings, &self.layout, x, f64::INFINITY, instability)
     }
 
     /// The instability that the phases of all other scans show at the solution `x` without `scan`.

@@ -2,8 +2,8 @@
 
 use nalgebra::{DMatrix, DVector, Matrix2, Matrix4, Vector2};
 
-use crate::estimate::Estimate;
 use super::{Sighting, Terms};
+use crate::estimate::Estimate;
 
 /// Where each parameter stands in the vector.
 #[derive(Clone, Debug)]
@@ -75,6 +75,11 @@ impl Layout {
     pub(super) fn offset_of(&self, class: usize) -> Option<usize> {
         let at = self.offsets? + 2 * class.checked_sub(1)?;
         (at < self.times?).then_some(at)
+    }
+
+    /// Where the errors of the frame times start.
+    pub(super) fn times_at(&self) -> Option<usize> {
+        self.times
     }
 
     pub(super) fn acceleration_at(&self) -> Option<usize> {
@@ -196,12 +201,9 @@ fn waves(sighting: &Sighting, layout: &Layout, x: &DVector<f64>, out: &mut Linea
             }
         }
     }
-    // Whitening by the Cholesky factor; a floor keeps noise-free simulations solvable.
-    let floor = Matrix4::identity() * 1e-18;
-    let Some(factor) = (sighting.waves.covariance + floor).cholesky() else {
+    let Some(lower) = factor(sighting) else {
         return;
     };
-    let lower = factor.l();
     let (Some(residual), Some(rows)) = (
         lower.solve_lower_triangular(&residual),
         lower.solve_lower_triangular(&rows),
@@ -213,6 +215,12 @@ fn waves(sighting: &Sighting, layout: &Layout, x: &DVector<f64>, out: &mut Linea
         out.jacobian.push(rows.row(i).transpose());
         out.scans.push(sighting.scan);
     }
+}
+
+/// The Cholesky factor that whitens the waves; a floor keeps noise-free simulations solvable.
+pub(super) fn factor(sighting: &Sighting) -> Option<Matrix4<f64>> {
+    let floor = Matrix4::identity() * 1e-18;
+    Some((sighting.waves.covariance + floor).cholesky()?.l())
 }
 
 /// `Φ_h = G_h·(r − d(t + δt) − o) + φ_h`, wrapped.

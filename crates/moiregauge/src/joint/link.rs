@@ -48,6 +48,7 @@ mod tests {
                 basis: Matrix2::identity(),
                 covariance: Matrix4::identity(),
             },
+            sensor: Matrix4::zeros(),
             time_gradient: Vector2::zeros(),
             fast_gain: Matrix2::zeros(),
             time,

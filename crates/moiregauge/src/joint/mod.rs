@@ -19,9 +19,10 @@
 mod checks;
 mod evaluate;
 mod link;
+mod parts;
 mod solve;
 
-use nalgebra::{Matrix2, Vector2};
+use nalgebra::{Matrix2, Matrix4, Vector2};
 
 pub use checks::{LeftOut, Resampled};
 pub use solve::{JointFit, TestedTerm, fit};
@@ -40,6 +41,8 @@ pub struct Sighting {
     pub block: usize,
     /// Reciprocal pair as it appeared, sensor coordinates, rad/nm, all sightings labelled alike.
     pub waves: LatticeVectors,
+    /// The part of their covariance that comes from the position sensors, (rad/nm)².
+    pub sensor: Matrix4<f64>,
     /// Time gradient `u`, s/nm.
     pub time_gradient: Vector2<f64>,
     /// What a relative gain of the fast axis does to a wave vector, `J^{−T} diag(1, 0) Jᵀ`.

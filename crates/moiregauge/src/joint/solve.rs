@@ -100,7 +100,11 @@ pub fn fit(
     };
     let plain = Terms::default();
     let mut best = problem.solve(plain, start, None)?;
-    let sigma = best.velocity_covariance.symmetric_eigenvalues().max().sqrt();
+    let sigma = best
+        .velocity_covariance
+        .symmetric_eigenvalues()
+        .max()
+        .sqrt();
     number_blocks(&mut problem.sightings, &best.waves.basis, sigma);
     let problem = problem;
     let from = (&best.waves.basis.clone(), &best.velocity.clone());

@@ -2,12 +2,13 @@
 
 use super::*;
 use crate::rng::stream;
-use nalgebra::Matrix4;
 use rand_distr::{Distribution, StandardNormal};
 
 /// Of a frame time, s.
 const TIME_SIGMA: f64 = 0.6;
 const MINUTE: f64 = 60.0;
+/// Share of the sensors in the variance of the waves.
+const SENSOR_SHARE: f64 = 0.36;
 
 fn pair() -> Matrix2<f64> {
     Matrix2::new(0.58, 0.24, 0.05, 0.54)
@@ -60,6 +61,7 @@ fn sightings(
                     basis: map * g + noise,
                     covariance: Matrix4::identity() * sigma * sigma,
                 },
+                sensor: Matrix4::identity() * SENSOR_SHARE * sigma * sigma,
                 time_gradient: u,
                 fast_gain: Matrix2::new(1.0, 0.0, 0.0, 0.0),
                 time: time + clock,
@@ -85,8 +87,8 @@ fn drift_error_from_positions(times: &[f64], drift: Vector2<f64>) -> f64 {
         .iter()
         .map(|g| g * g.transpose() * (2.0 / (sigma * sigma)))
         .sum();
-    let position = information.try_inverse().unwrap()
-        + drift * drift.transpose() * (TIME_SIGMA * TIME_SIGMA);
+    let position =
+        information.try_inverse().unwrap() + drift * drift.transpose() * (TIME_SIGMA * TIME_SIGMA);
     let mean = times.iter().sum::<f64>() / times.len() as f64;
     let spread: f64 = times.iter().map(|t| (t - mean).powi(2)).sum();
     (position.trace() / spread).sqrt()
@@ -202,7 +204,12 @@ fn acceleration_earns_its_place() {
     let acceleration = Vector2::new(0.03, 0.01) / (MINUTE * MINUTE);
     let (mut found, mut claimed) = (0, 0);
     for seed in 0..40 {
-        let fitted = fit(&sightings(20, drift, acceleration, seed), (&pair(), &drift), TIME_SIGMA).unwrap();
+        let fitted = fit(
+            &sightings(20, drift, acceleration, seed),
+            (&pair(), &drift),
+            TIME_SIGMA,
+        )
+        .unwrap();
         found += u32::from(fitted.terms.acceleration || fitted.terms.settling.is_some());
         let fitted = fit(
             &sightings(20, drift, Vector2::zeros(), seed),
@@ -225,4 +232,56 @@ fn one_direction_is_refused() {
         .filter(|s| s.time_gradient.y > 0.0)
         .collect();
     assert!(fit(&up, (&pair(), &drift), TIME_SIGMA).is_none());
+}
+
+/// Image noise, drift and sensors add up to the covariance of the lattice. At known drift it is the
+/// Schur complement of the whole covariance; without phases the mean of n equal sightings, C/n, of
+/// which the sensors have their share. Three scans, so that up and down do not balance.
+#[test]
+fn the_covariance_splits_by_source() {
+    let drift = Vector2::new(0.5, -0.15) / MINUTE;
+    let all = sightings(3, drift, Vector2::zeros(), 3);
+    let bare: Vec<Sighting> = all
+        .iter()
+        .map(|s| Sighting {
+            phases: None,
+            ..s.clone()
+        })
+        .collect();
+    for seen in [bare, all] {
+        let fitted = fit(&seen, (&pair(), &drift), TIME_SIGMA).unwrap();
+        let parts = fitted.statistical().unwrap();
+        let whole = fitted.waves.covariance;
+        assert!((parts.whole() - whole).norm() < 1e-9 * whole.norm());
+
+        let n = fitted.unscaled.nrows();
+        let fixed: Vec<usize> = (4..6)
+            .chain(fitted.layout.times_at().unwrap_or(n)..n)
+            .collect();
+        let block = |rows: &[usize], columns: &[usize]| {
+            nalgebra::DMatrix::from_fn(rows.len(), columns.len(), |i, j| {
+                fitted.unscaled[(rows[i], columns[j])]
+            })
+        };
+        let lattice = [0, 1, 2, 3];
+        let across = block(&lattice, &fixed);
+        let inside = block(&fixed, &fixed).try_inverse().unwrap();
+        let schur = block(&lattice, &lattice) - &across * inside * across.transpose();
+        let scale = whole[(0, 0)] / fitted.unscaled[(0, 0)];
+        let known = (parts.image + parts.sensor) / scale;
+        for i in 0..16 {
+            assert!((known[i] - schur[i]).abs() < 1e-6 * schur.norm(), "{i}");
+        }
+        if fitted.terms.phases {
+            // Phases know no sensors but the instability of positions, which is in them as well.
+            let share = parts.sensor.trace() / (parts.sensor + parts.image).trace();
+            assert!((0.2..0.5).contains(&share), "{share}");
+        } else {
+            let sensor = Matrix4::identity() * SENSOR_SHARE * 1e-8 / 6.0;
+            assert!((parts.sensor / scale - sensor).norm() < 0.02 * sensor.norm());
+            // Along the slow axis 3/8 in place of 1/3.
+            let drift = parts.drift[(1, 1)] / (whole - parts.drift)[(1, 1)];
+            assert!((drift - 0.125).abs() < 0.01, "{drift}");
+        }
+    }
 }

@@ -129,63 +129,119 @@ pub fn measure(
     background: Background,
     method: Method,
 ) -> Result<MeasuredLattice, LatticeError> {
-    let prepared = match prepare(image, geometry, background) {
+    let start = match Start::find(image, geometry, background) {
         Err(error @ LatticeError::NoLattice { .. }) if method == Method::Lattice => {
-            rescue::prepare_again(image, geometry, background).map_err(|_| error)?
+            Start::find_again(image, geometry, background).map_err(|_| error)?
         }
         other => other?,
     };
-    let Prepared {
-        harmonics,
-        spectrum,
-        peaks,
-        start,
-        ..
-    } = &prepared;
-    let pixels_per_bin = prepared.binning as f64;
-    let in_pixels = |l: LatticeVectors| l.mapped(&(Matrix2::identity() * pixels_per_bin));
-    let fourier = || fourier::measure(harmonics, peaks, spectrum.image_size).map(in_pixels);
-    let autocorrelation = || autocorrelation::measure(spectrum, harmonics, start).map(in_pixels);
-    let mut fit = None;
-    let (pixels, comparison) = match method {
-        Method::Autocorrelation => (autocorrelation(), fourier()),
-        Method::Fourier => (fourier(), autocorrelation()),
-        Method::Lattice => {
-            fit = fitted(&prepared, background);
-            (fit.as_ref().map(|(lattice, _)| *lattice), fourier())
+    start.measure(method)
+}
+
+/// Where the lattice of an image is, roughly: what every method starts from.
+pub struct Start {
+    prepared: Prepared,
+    geometry: Geometry,
+    background: Background,
+    /// (columns, rows).
+    size: [usize; 2],
+}
+
+impl Start {
+    /// Looks for the lattice in the spectrum.
+    ///
+    /// # Errors
+    /// As [`measure`], but for [`LatticeError::NoPeaks`].
+    pub fn find(
+        image: &Image,
+        geometry: &Geometry,
+        background: Background,
+    ) -> Result<Self, LatticeError> {
+        let prepared = prepare(image, geometry, background)?;
+        Ok(Self::new(prepared, image, geometry, background))
+    }
+
+    /// The same for an image whose lattice hides under tip events and line noise.
+    fn find_again(
+        image: &Image,
+        geometry: &Geometry,
+        background: Background,
+    ) -> Result<Self, LatticeError> {
+        let prepared = rescue::prepare_again(image, geometry, background)?;
+        Ok(Self::new(prepared, image, geometry, background))
+    }
+
+    fn new(prepared: Prepared, image: &Image, geometry: &Geometry, background: Background) -> Self {
+        Self {
+            prepared,
+            geometry: geometry.clone(),
+            background,
+            size: [image.columns, image.rows],
         }
-        Method::Paper => (
-            paper::measure(&prepared.image, geometry, &(start * pixels_per_bin)),
-            fourier(),
-        ),
-    };
-    let fit = fit.map(|(_, fit)| fit);
-    let pixels = pixels.ok_or(LatticeError::NoPeaks { method })?;
-    let label = |l: LatticeVectors| reciprocal::labelled_like(&l, &pixels.basis);
-    let longest = (0..3)
-        .map(|i| pixels.vector(i))
-        .map(|v| (v.x / image.columns as f64).hypot(v.y / image.rows as f64));
-    let bin_to_nm = geometry.pixel_to_nm * pixels_per_bin;
-    Ok(MeasuredLattice {
-        pixels,
-        comparison: comparison.map(label),
-        reciprocal: fit.as_ref().map_or(harmonics.pair / pixels_per_bin, |fit| {
-            fit.wave_vectors.basis
-        }),
-        phases: fit.as_ref().map_or_else(
-            || phases(harmonics, spectrum.image_size),
-            LatticeFit::first_phases,
-        ),
-        middle: middle(spectrum.image_size) * pixels_per_bin
-            + Vector2::repeat((pixels_per_bin - 1.0) / 2.0),
-        shortcut_wavelengths: fourier::shortcut_wavelengths(peaks, &bin_to_nm),
-        periods: 1.0 / longest.fold(0.0, f64::max),
-        signal_to_noise: fit.as_ref().map_or_else(
-            || signal_to_noise(harmonics)[2],
-            LatticeFit::weakest_signal_to_noise,
-        ),
-        fit,
-    })
+    }
+
+    /// Measures the lattice.
+    ///
+    /// # Errors
+    /// [`LatticeError::NoPeaks`]: the method gets no hold of it.
+    pub fn measure(&self, method: Method) -> Result<MeasuredLattice, LatticeError> {
+        let Prepared {
+            harmonics,
+            spectrum,
+            peaks,
+            start,
+            ..
+        } = &self.prepared;
+        let pixels_per_bin = self.prepared.binning as f64;
+        let in_pixels = |l: LatticeVectors| l.mapped(&(Matrix2::identity() * pixels_per_bin));
+        let fourier = || fourier::measure(harmonics, peaks, spectrum.image_size).map(in_pixels);
+        let autocorrelation =
+            || autocorrelation::measure(spectrum, harmonics, start).map(in_pixels);
+        let mut fit = None;
+        let (pixels, comparison) = match method {
+            Method::Autocorrelation => (autocorrelation(), fourier()),
+            Method::Fourier => (fourier(), autocorrelation()),
+            Method::Lattice => {
+                fit = fitted(&self.prepared, self.background);
+                (fit.as_ref().map(|(lattice, _)| *lattice), fourier())
+            }
+            Method::Paper => (
+                paper::measure(
+                    &self.prepared.image,
+                    &self.geometry,
+                    &(start * pixels_per_bin),
+                ),
+                fourier(),
+            ),
+        };
+        let fit = fit.map(|(_, fit)| fit);
+        let pixels = pixels.ok_or(LatticeError::NoPeaks { method })?;
+        let label = |l: LatticeVectors| reciprocal::labelled_like(&l, &pixels.basis);
+        let longest = (0..3)
+            .map(|i| pixels.vector(i))
+            .map(|v| (v.x / self.size[0] as f64).hypot(v.y / self.size[1] as f64));
+        let bin_to_nm = self.geometry.pixel_to_nm * pixels_per_bin;
+        Ok(MeasuredLattice {
+            pixels,
+            comparison: comparison.map(label),
+            reciprocal: fit.as_ref().map_or(harmonics.pair / pixels_per_bin, |fit| {
+                fit.wave_vectors.basis
+            }),
+            phases: fit.as_ref().map_or_else(
+                || phases(harmonics, spectrum.image_size),
+                LatticeFit::first_phases,
+            ),
+            middle: middle(spectrum.image_size) * pixels_per_bin
+                + Vector2::repeat((pixels_per_bin - 1.0) / 2.0),
+            shortcut_wavelengths: fourier::shortcut_wavelengths(peaks, &bin_to_nm),
+            periods: 1.0 / longest.fold(0.0, f64::max),
+            signal_to_noise: fit.as_ref().map_or_else(
+                || signal_to_noise(harmonics)[2],
+                LatticeFit::weakest_signal_to_noise,
+            ),
+            fit,
+        })
+    }
 }
 
 /// The lattice fitted to the pixels, in pixels.

@@ -274,7 +274,7 @@ pub(super) struct NoiseMap {
     rows: usize,
 }
 
-const BLOCK_WIDTH: usize = 4;
+pub(super) const BLOCK_WIDTH: usize = 4;
 const BLOCK_HEIGHT: usize = 32;
 
 impl NoiseMap {
@@ -313,7 +313,12 @@ impl NoiseMap {
     }
 
     pub(super) fn at(&self, kx: usize, ky: usize) -> f64 {
+        self.row(ky)[kx / BLOCK_WIDTH]
+    }
+
+    /// The values for `BLOCK_WIDTH` frequencies kx each.
+    pub(super) fn row(&self, ky: usize) -> &[f64] {
         let by = ((ky + BLOCK_HEIGHT / 2) % self.rows) / BLOCK_HEIGHT;
-        self.values[by * self.blocks + kx / BLOCK_WIDTH]
+        &self.values[by * self.blocks..(by + 1) * self.blocks]
     }
 }

@@ -54,6 +54,29 @@ impl Spectrum {
         Self::on_grid(image, image.rows, image.columns, hann)
     }
 
+    /// The same for values that `line` writes line by line, none of them missing.
+    pub(crate) fn of_lines(
+        image_size: [usize; 2],
+        mut line: impl FnMut(usize, &mut [f64]),
+    ) -> Self {
+        let [columns, rows] = image_size;
+        let window = image_size.map(hann);
+        let values = forward(image_size, rows, columns, |row, out: &mut [f64]| {
+            line(row, out);
+            for (value, w) in out.iter_mut().zip(&window[0]) {
+                *value *= w * window[1][row];
+            }
+        });
+        Self {
+            rows,
+            columns,
+            image_size,
+            values,
+            window,
+            weights: None,
+        }
+    }
+
     fn on_grid(
         image: &Image,
         rows: usize,
@@ -269,7 +292,7 @@ fn forward(
     image_size: [usize; 2],
     rows: usize,
     columns: usize,
-    line: impl Fn(usize, &mut [f64]),
+    mut line: impl FnMut(usize, &mut [f64]),
 ) -> Vec<Complex64> {
     let half = columns / 2 + 1;
     let (real, complex) = PLANNERS.with_borrow_mut(|(real, complex)| {

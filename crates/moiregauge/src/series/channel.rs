@@ -1,7 +1,7 @@
 //! Which channel shows the moiré.
 
 /// Channels in which moirés are usually seen, best first.
-const USUAL: [&str; 12] = [
+const USUAL: [&str; 14] = [
     "TR Phase",
     "TR Amplitude",
     "Phase",
@@ -13,6 +13,8 @@ const USUAL: [&str; 12] = [
     "Amplitude Error",
     "Height Sensor",
     "Height",
+    "Topography",
+    "Z-Axis",
     "Z",
 ];
 
@@ -20,7 +22,8 @@ const USUAL: [&str; 12] = [
 /// position sensor. `None` where there is no such channel.
 ///
 /// `channels` are pairs of the name the user sees and the instrument's own. Case, spaces and
-/// underscores do not count. Returns the name the user sees.
+/// underscores do not count, and a name without line direction stands for both (`Phase` for
+/// `PhaseTrace` and `PhaseRetrace`). Returns the name the user sees.
 pub fn choose_channel<'a>(
     channels: &[(&'a str, &'a str)],
     wanted: Option<&str>,
@@ -30,6 +33,7 @@ pub fn choose_channel<'a>(
         channels
             .iter()
             .find(|(name, internal)| plain(name) == wanted || plain(internal) == wanted)
+            .or_else(|| channels.iter().find(|(name, _)| stem(name) == wanted))
             .map(|(name, _)| *name)
     };
     match wanted {
@@ -44,11 +48,22 @@ pub fn choose_channel<'a>(
 }
 
 /// Lower case, letters and digits only.
-pub(super) fn plain(name: &str) -> String {
+fn plain(name: &str) -> String {
     name.chars()
         .filter(|c| c.is_alphanumeric())
         .flat_map(char::to_lowercase)
         .collect()
+}
+
+/// The plain name without the line direction that some instruments put behind it: what trace and
+/// retrace of one quantity have in common.
+pub(super) fn stem(name: &str) -> String {
+    let plain = plain(name);
+    let stem = ["retrace", "trace", "forward", "backward"]
+        .iter()
+        .find_map(|word| plain.strip_suffix(word))
+        .filter(|stem| !stem.is_empty());
+    stem.map_or_else(|| plain.clone(), str::to_owned)
 }
 
 #[cfg(test)]
@@ -71,5 +86,26 @@ mod tests {
         assert_eq!(choose(Some("Current")), None);
         let odd = [("Xsensor", ""), ("Deflection μ", "")];
         assert_eq!(choose_channel(&odd, None), Some("Deflection μ"));
+    }
+    #[test]
+    fn line_directions_in_names_do_not_count() {
+        let igor = [
+            ("HeightTrace", ""),
+            ("HeightRetrace", ""),
+            ("PhaseRetrace", ""),
+        ];
+        assert_eq!(choose_channel(&igor, None), Some("PhaseRetrace"));
+        assert_eq!(choose_channel(&igor, Some("height")), Some("HeightTrace"));
+        assert_eq!(
+            choose_channel(&igor, Some("heightretrace")),
+            Some("HeightRetrace")
+        );
+        assert_eq!(
+            choose_channel(&[("Z (Forward)", "")], None),
+            Some("Z (Forward)")
+        );
+        assert_eq!(stem("Z (Backward)"), stem("Z (Forward)"));
+        assert_eq!(stem("Trace"), "trace");
+        assert_ne!(stem("Amplitude Error"), stem("Amplitude"));
     }
 }

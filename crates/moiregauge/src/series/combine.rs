@@ -3,14 +3,14 @@
 use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
 
 use super::measure::MeasuredScan;
-use super::set::{checks as set_checks, joint_fit, terms};
+use super::set::{checks as set_checks, joint_fit, lattice_of, terms};
 use super::sightings::middle_of_frame;
 
 use crate::analysis::{Combined, Consistency, Drift, SetAnalysis, SetMean};
-use crate::joint::JointFit;
+use crate::budget::{Budget, Statistical};
 use crate::caveat::Caveat;
+use crate::joint::JointFit;
 use crate::lattice::LatticeVectors;
-use crate::lattice::reciprocal::{labelled_like, real_from_reciprocal};
 use crate::settings::Settings;
 use crate::strain::twist_strain;
 
@@ -43,18 +43,18 @@ pub(super) fn combine(
         ));
         return None;
     }
-    let mut lattice = weighted_mean(&means)?;
+    let (mut lattice, mut statistical) = weighted_mean(&means)?;
     let (mut joint_terms, mut drift, mut checks) = (None, None, None);
     if let ([one], Some(set)) = (sets, sets.first()) {
         // Nothing to combine: the set has it all.
-        lattice = first.lattice;
+        (lattice, statistical) = (first.lattice, first.budget.statistical);
         joint_terms = one.drift.as_ref().and_then(|d| d.joint.clone());
         drift = joint_terms.is_some().then(|| set.drift.clone()).flatten();
         checks.clone_from(&set.checks);
     } else if let Some((scans, reference)) = joint.filter(|(scans, _)| !scans.is_empty())
         && let Some(start) = sets.iter().find_map(|s| s.drift.as_ref())
         && let Some(fit) = joint_fit(scans, &reference, (&lattice, &start.velocity), settings)
-        && let Some(fitted) = real_from_reciprocal(&fit.waves)
+        && let Some(fitted) = lattice_of(&fit, &reference)
     {
         if let Some(set) = contradiction(sets, scans, &fit) {
             caveats.push(Caveat::new(
@@ -66,7 +66,7 @@ pub(super) fn combine(
                 ),
             ));
         } else {
-            lattice = labelled_like(&fitted, &reference);
+            (lattice, statistical) = fitted;
             joint_terms = Some(terms(&fit));
             drift = Some(Drift {
                 velocity: fit.velocity,
@@ -99,6 +99,7 @@ pub(super) fn combine(
     let twist_strain =
         twist_strain(&lattice, &settings.material, settings.strain_convention).ok()?;
     Some(Combined {
+        budget: Budget::new(&lattice, &twist_strain, &statistical, settings),
         lattice,
         twist_strain,
         joint: joint_terms,
@@ -138,7 +139,7 @@ fn contradiction<'a>(
 }
 
 /// Generalised mean of the four components, its covariance enlarged where the sets scatter.
-fn weighted_mean(means: &[&SetMean]) -> Option<LatticeVectors> {
+fn weighted_mean(means: &[&SetMean]) -> Option<(LatticeVectors, Statistical)> {
     let (mut normal, mut right) = (Matrix4::zeros(), Vector4::zeros());
     let mut weights = Vec::with_capacity(means.len());
     for mean in means {
@@ -163,10 +164,12 @@ fn weighted_mean(means: &[&SetMean]) -> Option<LatticeVectors> {
     } else {
         1.0
     };
-    Some(LatticeVectors {
+    let parts: Vec<Statistical> = means.iter().map(|m| m.budget.statistical).collect();
+    let lattice = LatticeVectors {
         basis: Matrix2::new(flat[0], flat[2], flat[1], flat[3]),
         covariance: covariance * scale,
-    })
+    };
+    Some((lattice, Statistical::of_mean(&parts, scale)?))
 }
 
 fn consistency(sets: &[SetAnalysis]) -> Vec<Consistency> {

@@ -29,13 +29,7 @@ pub fn illustrate(
     let measured = sensors
         .as_ref()
         .and_then(|_| sensor_images("", scan, channel, &mut ignored));
-    let timing = Timing::new(
-        channel.columns,
-        scan.line_rate_hz.unwrap_or(f64::NAN),
-        scan.rounding.unwrap_or(0.0),
-        analysed.frame_direction,
-        line.line,
-    );
+    let timing = Timing::of_scan(scan, channel.columns, analysed.frame_direction, line.line);
     let velocities = |steps: &[f64], axis: usize| -> Vec<f64> {
         let seconds = timing.map_or(f64::NAN, |t| t.per_pixel[axis].abs());
         steps

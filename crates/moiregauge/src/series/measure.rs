@@ -3,13 +3,14 @@
 use nalgebra::{Matrix2, Vector2};
 use spmfile::{Channel, DateTime, FrameDirection, LineDirection, Scan};
 
-use super::channel::{choose_channel, plain};
+use super::channel::{choose_channel, stem};
 use super::overlap::Window;
 use crate::caveat::Caveat;
 use crate::drift::Observation;
 use crate::estimate::Estimate;
 use crate::geometry::{Geometry, SensorGeometry, Timing, from_sensors, mean_and_spread};
 use crate::image::Image;
+use crate::lattice::reciprocal::labelled_like;
 use crate::lattice::{
     ForeignWave, LatticeError, LatticeFit, LatticeVectors, MeasuredLattice, measure, vectors,
 };
@@ -107,14 +108,21 @@ pub enum MeasureError {
 impl MeasuredLine {
     /// The lattice in sensor coordinates, nm, with the error of the plane fit.
     pub fn in_sensor_coordinates(&self) -> LatticeVectors {
-        let pixels = &self.lattice.pixels;
-        let mut mapped = pixels.mapped(&self.geometry.pixel_to_nm);
+        let mut mapped = self.lattice.pixels.mapped(&self.geometry.pixel_to_nm);
+        mapped.covariance += self.sensor_part().covariance;
+        mapped
+    }
+
+    /// The same with the error of the plane fit alone.
+    pub(super) fn sensor_part(&self) -> LatticeVectors {
         // r_i = J a_i, so δr_i = (a_ix I, a_iy I) δ(J₁₁, J₂₁, J₁₂, J₂₂).
-        let b = &pixels.basis;
+        let b = &self.lattice.pixels.basis;
         let i = Matrix2::identity();
         let lever = vectors::block(&(i * b.m11), &(i * b.m21), &(i * b.m12), &(i * b.m22));
-        mapped.covariance += lever * self.geometry.covariance * lever.transpose();
-        mapped
+        LatticeVectors {
+            basis: self.geometry.pixel_to_nm * b,
+            covariance: lever * self.geometry.covariance * lever.transpose(),
+        }
     }
 
     /// The lattice in nominal coordinates, nm.
@@ -123,13 +131,17 @@ impl MeasuredLine {
         Some(self.lattice.pixels.mapped(&nominal.pixel_to_nm))
     }
 
-    /// What the drift problem needs; `None` without timing.
-    pub(super) fn observation(&self, labelled: LatticeVectors) -> Option<Observation> {
-        Some(Observation {
-            lattice: labelled,
-            time_gradient: self.geometry.time_gradient(&self.timing?)?,
+    /// What the drift problem needs, labelled like `reference` (nm); no time gradient without timing.
+    pub(super) fn observation(&self, reference: &Matrix2<f64>) -> Observation {
+        let gradient = self
+            .timing
+            .and_then(|timing| self.geometry.time_gradient(&timing));
+        Observation {
+            lattice: labelled_like(&self.in_sensor_coordinates(), reference),
+            time_gradient: gradient.unwrap_or_else(Vector2::zeros),
             speed_error: self.speed_error,
-        })
+            sensor: labelled_like(&self.sensor_part(), reference).covariance,
+        }
     }
 }
 
@@ -197,7 +209,7 @@ pub(super) fn channels<'a>(
             present: present.join(", "),
         });
     };
-    let same = |c: &&Channel| plain(&c.name) == plain(name);
+    let same = |c: &&Channel| stem(&c.name) == stem(name);
     let direction = |c: &Channel| c.line_direction.unwrap_or(LineDirection::Trace);
     let first = |wanted: LineDirection| {
         let mut found = scan
@@ -233,16 +245,9 @@ fn measure_line(
     let line = channel.line_direction.unwrap_or(LineDirection::Trace);
     let nominal = nominal(scan, channel);
     let sensors = usable_sensors(file, scan, channel, nominal.as_ref(), caveats);
-    let timing = match (scan.line_rate_hz, scan.frame_direction) {
-        (Some(rate), Some(frame)) => Timing::new(
-            channel.columns,
-            rate,
-            scan.rounding.unwrap_or(0.0),
-            frame,
-            line,
-        ),
-        _ => None,
-    };
+    let timing = scan
+        .frame_direction
+        .and_then(|frame| Timing::of_scan(scan, channel.columns, frame, line));
     let geometry = match (&sensors, &nominal) {
         (Some(sensors), _) => sensors.geometry.clone(),
         (None, Some(nominal)) => nominal.clone(),

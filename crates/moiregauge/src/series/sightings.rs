@@ -29,6 +29,7 @@ pub(super) fn sightings(
                 classes.len() - 1
             });
             let waves = real_from_reciprocal(&line.in_sensor_coordinates())?;
+            let sensor = real_from_reciprocal(&line.sensor_part())?;
             let j = line.geometry.pixel_to_nm;
             let dual = j.try_inverse()?.transpose();
             let time = middle_of_frame(scan);
@@ -37,6 +38,7 @@ pub(super) fn sightings(
                 class,
                 block: 0,
                 waves: labelled_like(&waves, &reference),
+                sensor: labelled_like(&sensor, &reference).covariance,
                 time_gradient: line.geometry.time_gradient(&line.timing?)?,
                 fast_gain: dual * Matrix2::new(1.0, 0.0, 0.0, 0.0) * j.transpose(),
                 time: time.unwrap_or(0.0),

@@ -32,28 +32,77 @@ pub(super) fn probability_within(r: f64, t: f64) -> f64 {
 }
 
 /// The true length, in σ, that is excluded at 95 % by a measured length `r` (in σ).
-///
-/// The length t at which a result as short as r has a probability of 5 % of that at t = 0. Dividing
-/// by the latter keeps the limit honest when noise happens to cancel: it is never below 2.45.
 pub(super) fn upper_limit_95(r: f64) -> f64 {
+    upper_limit(r, 0.05)
+}
+
+/// The length interval, in σ, that holds the true one with 95 % confidence or more, `r` measured.
+///
+/// Each end excludes 2.5 %: below the lower one a result as long as r is rarer than that, above the
+/// upper one ([`upper_limit`]) a result as short. It begins at zero where noise alone explains r.
+pub(super) fn interval_95(r: f64) -> [f64; 2] {
+    [lower_limit(r, 0.025), upper_limit(r, 0.025)]
+}
+
+/// The length t at which a result as short as r has a probability of `tail` of that at t = 0.
+///
+/// Dividing by the latter keeps the limit honest when noise happens to cancel: it never falls below
+/// that for r = 0, 2.45 for 5 %.
+fn upper_limit(r: f64, tail: f64) -> f64 {
     if !r.is_finite() {
         return r;
     }
-    // Far out r is normal about t + 1/2t with the deviation 1 − 1/4t².
-    if r > 50.0 {
-        let one_sided = 1.644_853_626_951;
-        let t = r + one_sided;
-        return t - 0.5 / t - one_sided / (4.0 * t * t);
+    if r > FAR {
+        return far_out(r, -one_sided(tail));
     }
     let without = -(-r * r / 2.0).exp_m1();
     if without < 1e-12 {
         // The ratio tends to e^{−t²/2}.
-        return (2.0 * 20.0_f64.ln()).sqrt();
+        return (-2.0 * tail.ln()).sqrt();
     }
-    let (mut low, mut high) = (0.0, r + 6.0);
+    bisect((0.0, r + 6.0), |t| {
+        probability_within(r, t) > tail * without
+    })
+}
+
+/// The length t at which a result as long as r has a probability of `tail`; 0 where it is commoner
+/// than that without any.
+fn lower_limit(r: f64, tail: f64) -> f64 {
+    if !r.is_finite() {
+        return r;
+    }
+    if r > FAR {
+        return far_out(r, one_sided(tail));
+    }
+    if (-r * r / 2.0).exp() > tail {
+        return 0.0;
+    }
+    bisect((0.0, r), |t| 1.0 - probability_within(r, t) < tail)
+}
+
+/// Beyond this many σ a length is as good as normal.
+const FAR: f64 = 50.0;
+
+/// Where r lies `z` deviations above its mean: r is normal about t + 1/2t with the deviation 1 − 1/4t².
+fn far_out(r: f64, z: f64) -> f64 {
+    let t = r - z;
+    t - 0.5 / t + z / (4.0 * t * t)
+}
+
+/// Deviations of a normal distribution beyond which `tail` of it lies.
+fn one_sided(tail: f64) -> f64 {
+    if tail < 0.04 {
+        1.959_963_984_540
+    } else {
+        1.644_853_626_951
+    }
+}
+
+/// Where `below` turns from true to false.
+fn bisect((mut low, mut high): (f64, f64), below: impl Fn(f64) -> bool) -> f64 {
     while high - low > 1e-9 {
         let t = f64::midpoint(low, high);
-        if probability_within(r, t) > 0.05 * without {
+        if below(t) {
             low = t;
         } else {
             high = t;
@@ -118,5 +167,49 @@ mod tests {
             (probability_within(4.0, limit) - 0.05).abs() < 1e-4,
             "{limit}"
         );
+    }
+
+    /// The interval covers true lengths as often as it says: the measured lengths whose interval holds
+    /// t lie between two ends, and the probability between them is that of the textbook disc integral.
+    #[test]
+    fn interval_covers_95_percent() {
+        for t in [0.0, 0.3, 1.0, 2.0, 2.7, 3.5, 5.0, 10.0] {
+            let edge = |outside: &dyn Fn(f64) -> bool, (mut a, mut b): (f64, f64)| {
+                for _ in 0..40 {
+                    let r = f64::midpoint(a, b);
+                    if outside(r) { a = r } else { b = r }
+                }
+                a
+            };
+            // Too short: the upper end is below t; too long: the lower one above it.
+            let short = if interval_95(0.0)[1] >= t {
+                0.0
+            } else {
+                edge(&|r| interval_95(r)[1] < t, (0.0, t))
+            };
+            let long = edge(&|r| interval_95(r)[0] > t, (t + 8.0, t));
+            let covered = probability_within(long, t) - probability_within(short, t);
+            assert!(covered > 0.95 - 1e-6, "t = {t}: {covered}");
+            assert!(covered < 0.9751, "t = {t}: {covered}");
+            // Far from zero nothing is wasted.
+            if t > 4.0 {
+                assert!(covered < 0.9502, "t = {t}: {covered}");
+            }
+        }
+    }
+
+    /// Both ends pass into those of a normal distribution without a step.
+    #[test]
+    fn interval_far_out_is_normal() {
+        let (below, above) = (interval_95(49.999), interval_95(50.001));
+        for end in 0..2 {
+            assert!((above[end] - below[end] - 0.002).abs() < 2e-5, "{above:?}");
+        }
+        assert!(
+            (above[1] - above[0] - 2.0 * 1.959_964).abs() < 1e-3,
+            "{above:?}"
+        );
+        assert_eq!(interval_95(2.7)[0], 0.0);
+        assert!(interval_95(2.8)[0] > 0.0);
     }
 }

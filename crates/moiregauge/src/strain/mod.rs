@@ -17,6 +17,7 @@ mod forward;
 mod inversion;
 mod labelling;
 mod limit;
+mod other_models;
 mod twist_strain;
 
 pub use closed_form::{Branch, branches, twist_strain};
@@ -24,4 +25,5 @@ pub use closure::three_vectors;
 pub use draws::draws;
 pub use error::StrainError;
 pub use forward::{moire_lattice, naive_twist};
+pub(crate) use other_models::Reference;
 pub use twist_strain::TwistStrain;

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
 
 use super::inversion::reduce;
-use super::limit::upper_limit_95;
+use super::limit::{interval_95, upper_limit_95};
 use crate::estimate::Estimate;
 
 /// The axis of the strain is quoted only if zero strain would give so large a vector less often.
@@ -51,25 +51,51 @@ impl TwistStrain {
     /// along the vector times the slope of that formula, which is kept finite at zero: one σ covers
     /// 67 % of the truths or more at any strain.
     pub fn heterostrain(&self) -> Estimate {
+        let across = self.across();
+        let square = (self.strain_vector.norm_squared() - across).max(0.0);
+        Estimate::from_variance(
+            square.sqrt(),
+            self.magnitude_variance(&self.strain_covariance()),
+        )
+    }
+
+    /// What an error of the strain vector with this covariance does to [`TwistStrain::heterostrain`]:
+    /// linear in it, so that variances of several sources add.
+    pub(crate) fn magnitude_variance(&self, error: &Matrix2<f64>) -> f64 {
         let length = self.strain_vector.norm();
-        let covariance = self.strain_covariance();
-        let (along, across) = if length > 0.0 {
+        let along = if length > 0.0 {
             let u = self.strain_vector / length;
-            let v = Vector2::new(-u.y, u.x);
-            (
-                (u.transpose() * covariance * u)[0],
-                (v.transpose() * covariance * v)[0],
-            )
+            (u.transpose() * error * u)[0]
         } else {
-            (covariance.trace() / 2.0, covariance.trace() / 2.0)
+            error.trace() / 2.0
         };
+        let across = self.across();
         let square = (length * length - across).max(0.0);
         let steepening = if across > 0.0 {
             across / (square + across)
         } else {
             0.0
         };
-        Estimate::from_variance(square.sqrt(), along * (1.0 + steepening))
+        along * (1.0 + steepening)
+    }
+
+    /// The variance across the strain vector.
+    fn across(&self) -> f64 {
+        let length = self.strain_vector.norm();
+        let covariance = self.strain_covariance();
+        if length > 0.0 {
+            let v = Vector2::new(-self.strain_vector.y, self.strain_vector.x) / length;
+            (v.transpose() * covariance * v)[0]
+        } else {
+            covariance.trace() / 2.0
+        }
+    }
+
+    /// The variance of `φ_lab` (rad²) for an error of the strain vector with this covariance.
+    pub(crate) fn axis_variance(&self, error: &Matrix2<f64>) -> f64 {
+        let e = self.strain_vector;
+        let gradient = Vector2::new(-e.y, e.x) / (2.0 * e.norm_squared());
+        (gradient.transpose() * error * gradient)[0]
     }
 
     /// `φ_lab`, the axis of the strain in the laboratory, rad in [0, π); `None` unless p < 0.01.
@@ -119,12 +145,25 @@ impl TwistStrain {
     /// From the non-central χ² distribution with the noise of the noisiest direction; never below
     /// the limit for a measured strain of exactly zero, however well noise cancelled.
     pub fn strain_upper_limit_95(&self) -> f64 {
+        self.in_sigmas(|r| [0.0, upper_limit_95(r)])[1]
+    }
+
+    /// The interval that holds the magnitude of the strain with 95 % confidence, or more.
+    ///
+    /// From the non-central χ² distribution with the noise of the noisiest direction; it begins at zero
+    /// unless noise alone makes so long a vector in less than 2.5 % of cases.
+    pub fn strain_interval_95(&self) -> [f64; 2] {
+        self.in_sigmas(interval_95)
+    }
+
+    /// Limits for a length in units of its noise → limits for that of the strain vector.
+    fn in_sigmas(&self, limits: impl Fn(f64) -> [f64; 2]) -> [f64; 2] {
         let sigma = largest_variance(&self.strain_covariance()).sqrt();
         let length = self.strain_vector.norm();
         if sigma > 0.0 {
-            sigma * upper_limit_95(length / sigma)
+            limits(length / sigma).map(|limit| sigma * limit)
         } else {
-            length
+            [length; 2]
         }
     }
 }

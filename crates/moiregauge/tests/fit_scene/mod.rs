@@ -23,10 +23,12 @@ pub(crate) struct Scene {
     /// Real-space pair, px.
     pub(crate) basis: Matrix2<f64>,
     pub(crate) waves: Vec<Wave>,
-    /// Standard deviation of white noise, of an offset per line, and of 1/f noise in time.
+    /// Standard deviation of white noise, of an offset per line, of 1/f noise in time, and of line
+    /// offsets that are 1/f from line to line.
     pub(crate) white: f64,
     pub(crate) line: f64,
     pub(crate) flicker: f64,
+    pub(crate) line_flicker: f64,
     pub(crate) seed: u64,
 }
 
@@ -64,6 +66,7 @@ impl Scene {
             white: 0.0,
             line: 0.0,
             flicker: 0.0,
+            line_flicker: 0.0,
             seed,
         };
         let pair = scene.pair();
@@ -122,8 +125,13 @@ impl Scene {
         }
         let mut rng = stream(self.seed, "fit noise", 0);
         let mut flicker = Flicker::new(2 * columns * rows, self.seed);
+        // A stream of its own, and slow relaxations beyond the frame.
+        let mut line_flicker = Flicker::new(4 * rows, self.seed + (1 << 32));
         for (row, line) in values.chunks_exact_mut(columns).enumerate() {
-            let offset = self.line * normal(&mut rng);
+            let mut offset = self.line * normal(&mut rng);
+            if self.line_flicker > 0.0 {
+                offset += self.line_flicker * line_flicker.next();
+            }
             for (column, value) in line.iter_mut().enumerate() {
                 let plane = 0.5 * (column as f64 - row as f64) / columns as f64;
                 *value += offset + plane + self.white * normal(&mut rng);
@@ -182,6 +190,29 @@ impl Scene {
             jacobian.column_mut(i).copy_from_slice(slope.as_slice());
         }
         jacobian * of_pair * jacobian.transpose()
+    }
+
+    /// Errors over stated errors of the wave vectors, one by one: (q₁x, q₁y, q₂x, q₂y). x is the fast
+    /// axis.
+    pub(crate) fn wave_pulls(
+        &self,
+        measured: &Matrix2<f64>,
+        covariance: &Matrix4<f64>,
+    ) -> Vector4<f64> {
+        let (change, by) = self.change(measured);
+        let error = dual(&(measured * change)) - self.pair();
+        // dQ = −Q dAᵀ Q / 2π.
+        let pair = self.pair();
+        let mut jacobian = Matrix4::zeros();
+        for i in 0..4 {
+            let mut unit = Matrix2::zeros();
+            unit[i] = 1.0;
+            let slope = -pair * unit.transpose() * pair / std::f64::consts::TAU;
+            jacobian.column_mut(i).copy_from_slice(slope.as_slice());
+        }
+        let to_waves = jacobian * by;
+        let variances = (to_waves * covariance * to_waves.transpose()).diagonal();
+        Vector4::from_column_slice(error.as_slice()).component_div(&variances.map(f64::sqrt))
     }
 
     /// Errors of the four components in the labelling closest to the truth.

@@ -56,7 +56,7 @@ pub(super) fn full_size(image: Option<&Section<'_>>, sections: &[Section<'_>]) -
         .or_else(by_aspect)
         .or(height)
         .unwrap_or(width);
-    slow.is_finite().then_some([width, slow])
+    (width.is_finite() && slow.is_finite()).then_some([width, slow])
 }
 
 /// Height of `rows` recorded lines, edge to edge.

@@ -1,11 +1,11 @@
 //! Which harmonics belong to the model: those that earn their two parameters.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, Vector2};
 
 use super::frame::{Basis, wave};
 use super::gram::gram;
 use super::model::{Clip, Tables, look};
-use super::noise::{Leverage, ResidualNoise};
+use super::noise::Leverage;
 use super::{FinalNoise, Fit, ROUNDS, solve};
 use crate::lattice::harmonics::{Harmonic, Harmonics};
 
@@ -13,9 +13,14 @@ use crate::lattice::harmonics::{Harmonic, Harmonics};
 pub(super) const FIRST_SHELL: [[i32; 2]; 3] = [[1, 0], [0, 1], [-1, 1]];
 /// |h|² of the last of the five shells.
 const LAST_SHELL: i32 = 9;
-/// On frames with more pixels, which have many periods, harmonics that do not show in the transform
-/// of the residual are not looked at more closely.
+/// Frames with more pixels have many periods.
 const MANY_PIXELS: usize = 100_000;
+/// Lines of a sketch.
+const SKETCHED: usize = 64;
+/// Power over noise of the weakest first harmonic in the lines of a sketch, at least.
+const SKETCHABLE: f64 = 60.0;
+/// Multiples of it are spread evenly, modulo 1.
+const GOLDEN: f64 = 0.618_033_988_749_895;
 /// Largest wave vector, as a share of the Nyquist frequency.
 const HIGHEST: f64 = 0.9;
 
@@ -38,26 +43,83 @@ pub(super) fn at_first(start: &Harmonics, pixels: usize) -> Option<Vec<([i32; 2]
 }
 
 impl Fit<'_> {
+    /// Whether a few lines of the image are enough to get near the end.
+    pub(super) fn worth_a_sketch(&self, start: &Harmonics) -> bool {
+        let share = SKETCHED as f64 / self.frame.lines().max(1) as f64;
+        let first = start.list.iter().take(FIRST_SHELL.len());
+        let weakest = first
+            .map(|harmonic| harmonic.significance(start.window_sums))
+            .fold(f64::INFINITY, f64::min);
+        share < 0.3 && share * weakest > SKETCHABLE
+    }
+
+    /// Fits to one line of each of a few stripes. Ends near enough to the lattice of all lines for
+    /// one step.
+    pub(super) fn sketch(&mut self) -> Option<()> {
+        let whole = self.frame.clone();
+        let count: Vec<usize> = (0..whole.image.rows)
+            .filter(|&r| whole.present[r] > 0)
+            .collect();
+        let stripe = count.len() as f64 / SKETCHED as f64;
+        // At irregular places, lest waves look like others.
+        let places = (0..SKETCHED).map(|i| {
+            let within = (i as f64 * GOLDEN).fract();
+            count[((i as f64 + within) * stripe) as usize]
+        });
+        let mut picked = vec![false; whole.image.rows];
+        for row in places {
+            picked[row] = true;
+        }
+        self.frame.leave_out(|row| !picked[row]);
+        self.converge()?;
+        if self.mind_the_lines() {
+            self.converge()?;
+        }
+        let sigma = self.sigma;
+        let new = self.earned(|_| true, |_, _| Some(sigma * sigma))?;
+        if !new.is_empty() {
+            self.add(new);
+            self.converge()?;
+        }
+        self.frame = whole;
+        self.settled = false;
+        Some(())
+    }
+
     /// Adds harmonics until none earns its place, drops those that lost theirs, and fits anew each
     /// time. Returns the noise that is left.
     pub(super) fn choose(&mut self) -> Option<FinalNoise> {
+        if self.sigma.is_infinite() {
+            self.converge()?;
+        }
         for _ in 0..ROUNDS {
-            if self.mind_the_lines() {
+            if self.mind_the_lines() || !self.settled {
                 self.converge()?;
             }
             let noise = self.noise()?;
-            let new = self.earned(&noise.residual)?;
+            // On large frames, which have many periods, what does not show in the transform of the
+            // residual is not looked at more closely.
+            let all = self.frame.pixels() < MANY_PIXELS;
+            let residual = &noise.residual;
+            let new = self.earned(
+                |p| all || residual.is_promising(p),
+                |p, leverage| residual.median_around(p, leverage),
+            )?;
             if new.is_empty() {
                 return self.pruned(noise);
             }
-            for index in new {
-                self.model.basis.indices.push(index);
-                self.model.waves.push([0.0; 2]);
-            }
+            self.add(new);
             self.converge()?;
         }
         let noise = self.noise()?;
         self.pruned(noise)
+    }
+
+    fn add(&mut self, indices: Vec<[i32; 2]>) {
+        for index in indices {
+            self.model.basis.indices.push(index);
+            self.model.waves.push([0.0; 2]);
+        }
     }
 
     /// Δχ² of a harmonic has to exceed `2 ln N`, the price of two parameters.
@@ -65,8 +127,13 @@ impl Fit<'_> {
         2.0 * (self.frame.pixels() as f64).ln()
     }
 
-    /// The harmonics outside the model that are significant in the residual.
-    fn earned(&mut self, residual: &ResidualNoise) -> Option<Vec<[i32; 2]>> {
+    /// The harmonics outside the model that are `promising` by their wave vector (phase at the edges)
+    /// and significant against the `noise` there.
+    fn earned(
+        &mut self,
+        promising: impl Fn(Vector2<f64>) -> bool,
+        noise: impl Fn(Vector2<f64>, &Leverage) -> Option<f64>,
+    ) -> Option<Vec<[i32; 2]>> {
         let outside: Vec<[i32; 2]> = candidates()
             .into_iter()
             .filter(|index| !self.model.basis.indices.contains(index))
@@ -74,10 +141,7 @@ impl Fit<'_> {
                 let p = wave(&self.model.pair, index).component_div(&self.frame.edge());
                 p.amax().max(-p.amin()) < HIGHEST * std::f64::consts::PI
             })
-            .filter(|&index| {
-                self.frame.pixels() < MANY_PIXELS
-                    || residual.is_promising(wave(&self.model.pair, index))
-            })
+            .filter(|&index| promising(wave(&self.model.pair, index)))
             .collect();
         if outside.is_empty() {
             return Some(outside);
@@ -109,8 +173,7 @@ impl Fit<'_> {
             // What the fitted functions leave of the pair (cos, sin).
             let left = gram.view((first, first), (2, 2)) - cross.transpose() * &known * &cross;
             let score = seen.gradient.rows(probed.cosine(i), 2).into_owned();
-            let Some(noise) = residual.median_around(wave(&self.model.pair, index), &leverage)
-            else {
+            let Some(noise) = noise(wave(&self.model.pair, index), &leverage) else {
                 continue;
             };
             let Some(amplitudes) = solve::solve(&left, &score) else {

@@ -9,6 +9,7 @@ use rustfft::num_complex::Complex64;
 use crate::image::Image;
 
 /// An image with the list of what is missing.
+#[derive(Clone)]
 pub(super) struct Frame<'a> {
     pub(super) image: &'a Image,
     /// X of the columns and Y of the rows.
@@ -56,6 +57,11 @@ impl<'a> Frame<'a> {
     /// Number of lines that count.
     pub(super) fn lines(&self) -> usize {
         self.present.iter().filter(|&&n| n > 0).count()
+    }
+
+    /// X of the columns to the right of the middle, and of the middle where there is one.
+    pub(super) fn right(&self) -> &[f64] {
+        &self.x[self.image.columns / 2..]
     }
 
     /// Wave vector in rad per pixel → phase at the edges.

@@ -6,8 +6,9 @@ use crate::lattice::harmonics::dot;
 
 /// Whole cycles per line next to zero, where the noise is the same but for the offsets.
 const NEAR: std::ops::RangeInclusive<usize> = 2..=6;
-/// Lines at which these are looked at; the median of so many is known well enough.
-const LOOKED_AT: usize = 512;
+/// Lines at which these are looked at; the median of their five times as many numbers is known better
+/// than that of the line means.
+const LOOKED_AT: usize = 128;
 /// Median of χ² with one degree of freedom.
 const MEDIAN_CHI2: f64 = 0.454_936_423_119_572_8;
 /// A line is bad if its residual exceeds the median one by this many standard deviations of such
@@ -41,7 +42,8 @@ impl LineStatistics {
             })
             .collect();
         let mut rms = vec![0.0; frame.image.rows];
-        let stride = (frame.image.rows / LOOKED_AT).max(1);
+        let stride = (frame.lines() / LOOKED_AT).max(1);
+        let mut count_lines = 0;
         let (mut means, mut near) = (Vec::new(), Vec::new());
         residuals(frame, model, &tables, |row, line| {
             let count = frame.present[row] as f64;
@@ -57,7 +59,8 @@ impl LineStatistics {
             }
             means.push(count * mean * mean);
             rms[row] = (dot(line, line) / count).sqrt();
-            if row % stride == 0 {
+            count_lines += 1;
+            if count_lines % stride == 0 {
                 for [cos, sin] in &waves {
                     near.push((dot(line, cos).powi(2) + dot(line, sin).powi(2)) / count);
                 }

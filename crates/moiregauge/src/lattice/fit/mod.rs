@@ -29,11 +29,11 @@ mod model;
 mod noise;
 mod solve;
 
-use nalgebra::{DVector, Matrix2, Matrix4, Vector2};
+use nalgebra::{DMatrix, DVector, Matrix2, Matrix4, Vector2};
 use rustfft::num_complex::Complex64;
 
 use super::LatticeVectors;
-use super::harmonics::Harmonics;
+use super::harmonics::{Harmonics, dot};
 use super::reciprocal::real_from_reciprocal;
 use crate::estimate::Estimate;
 use crate::image::Image;
@@ -48,9 +48,12 @@ use noise::{Leverage, ResidualNoise};
 
 /// Steps until the fit has to stand still.
 const MOST_STEPS: usize = 30;
-/// It stands still when a step moves all parameters together by less than this in units of their
-/// errors, squared. What such a step leaves is a share of it, that of the residuals cut off.
-const STILL: f64 = 0.01;
+/// It stands still when what a step leaves is less than this, all parameters together, in units of
+/// their errors, squared.
+const STILL: f64 = 0.05;
+/// The share of itself that a step leaves: this, that of the residuals cut off, and the phase by which
+/// it turned the edges (the model is linear in it to that order).
+const LEFT: f64 = 0.01;
 /// Rounds of adding harmonics.
 const ROUNDS: usize = 5;
 
@@ -99,7 +102,9 @@ pub(super) fn measure(
     background: Background,
 ) -> Option<(LatticeVectors, LatticeFit)> {
     let mut fit = Fit::new(image, start, background)?;
-    fit.converge()?;
+    if fit.worth_a_sketch(start) && fit.sketch().is_none() {
+        fit = Fit::new(image, start, background)?;
+    }
     let noise = fit.choose()?;
     fit.result(&noise)
 }
@@ -118,6 +123,10 @@ struct Fit<'a> {
     clipped: usize,
     /// The pair at the start, phase at the edges.
     origin: Matrix2<f64>,
+    /// `Φᵀ W Φ` of the last step.
+    gram: DMatrix<f64>,
+    /// Nothing has changed since the last step.
+    settled: bool,
 }
 
 /// The noise of a finished fit.
@@ -168,6 +177,8 @@ impl<'a> Fit<'a> {
             sigma: f64::INFINITY,
             clipped: 0,
             origin,
+            gram: DMatrix::zeros(0, 0),
+            settled: false,
         })
     }
 
@@ -187,8 +198,10 @@ impl<'a> Fit<'a> {
             if !(change.amax().max(third.amax()) < std::f64::consts::FRAC_PI_2) {
                 return None;
             }
-            let still = decrement < STILL * self.sigma.powi(2) && !blind;
+            let left = LEFT + turn + self.clipped as f64 / self.frame.pixels() as f64;
+            let still = decrement * left * left < STILL * self.sigma.powi(2) && !blind;
             if share == 1.0 && (still || turn < 1e-13) {
+                self.settled = true;
                 return Some(());
             }
         }
@@ -206,7 +219,8 @@ impl<'a> Fit<'a> {
         let gram = gram(frame, &model.basis, &model.pair, &self.lines.lambda);
         let map = solve::contraction(model, |_, _| 1.0);
         let right = map.transpose() * seen.gradient;
-        let step = solve::solve(&(map.transpose() * gram * map), &right)?;
+        let step = solve::solve(&(map.transpose() * &gram * map), &right)?;
+        self.gram = gram;
         self.sigma = seen.sigma;
         self.clipped = seen.clipped;
         let decrement = step.dot(&right);
@@ -254,8 +268,13 @@ impl<'a> Fit<'a> {
     /// The noise that is left around each harmonic.
     fn noise(&mut self) -> Option<FinalNoise> {
         let clip = Clip::at(self.sigma);
-        let residual = whitened(&self.frame, &self.model, &mut self.lines, clip);
-        let squares: f64 = residual.iter().map(|v| v * v).sum();
+        let tables = Tables::new(&self.frame, &self.model.pair, &self.model.basis.indices);
+        let whole = (&self.frame, &self.model, &tables);
+        let (lines, mut squares) = (&mut self.lines, 0.0);
+        let residual = ResidualNoise::new(&self.frame, self.free_lines, |row, line| {
+            whitened(whole, lines, clip, row, line);
+            squares += dot(line, line);
+        });
         let parameters = self.model.background.len() + 2 * self.model.waves.len() + 4;
         let lost = if self.free_lines {
             self.frame.lines()
@@ -263,7 +282,6 @@ impl<'a> Fit<'a> {
             0
         };
         let freedom = self.frame.pixels().saturating_sub(parameters + lost).max(1);
-        let residual = ResidualNoise::new(&self.frame, residual, self.free_lines);
         let leverage = self.leverage()?;
         let level = residual.level();
         let local = (0..self.model.waves.len())
@@ -280,23 +298,20 @@ impl<'a> Fit<'a> {
     }
 
     fn leverage(&self) -> Option<Leverage<'_>> {
-        let gram = gram(
-            &self.frame,
-            &self.model.basis,
-            &self.model.pair,
-            &self.lines.lambda,
-        );
         let map = solve::contraction(&self.model, |_, _| 1.0);
-        Leverage::new(&self.frame, &self.model, &(map.transpose() * gram * map))
+        Leverage::new(
+            &self.frame,
+            &self.model,
+            &(map.transpose() * &self.gram * map),
+        )
     }
 
     /// Covariance of (p₁, p₂): what the local noise does to the four derivatives.
     fn covariance(&self, noise: &FinalNoise) -> Option<Matrix4<f64>> {
         let model = &self.model;
-        let gram = gram(&self.frame, &model.basis, &model.pair, &self.lines.lambda);
-        let bread = solve::projected(&gram, &solve::contraction(model, |_, _| 1.0))?;
+        let bread = solve::projected(&self.gram, &solve::contraction(model, |_, _| 1.0))?;
         let weight = |i: usize, axis: usize| noise.local[i][axis].sqrt();
-        let meat = solve::projected(&gram, &solve::contraction(model, weight))?;
+        let meat = solve::projected(&self.gram, &solve::contraction(model, weight))?;
         let inverse = bread.try_inverse()?;
         // Pixels whose residuals are cut off do not follow the model.
         let follow = 1.0 - self.clipped as f64 / self.frame.pixels() as f64;

@@ -1,6 +1,7 @@
 //! The model of an image, what it leaves of the image, and how the harmonics correlate with that.
 
 use nalgebra::{DVector, Matrix2};
+use rustfft::num_complex::Complex64;
 
 use super::frame::{Basis, Frame, turns, wave};
 
@@ -31,24 +32,41 @@ pub(super) struct LineOffsets {
     pub(super) offset: Vec<f64>,
 }
 
-/// `cos θ_x` and `sin θ_x` along a line, for each harmonic.
+/// Values handled together: as many as the compiler keeps in registers.
+const LANES: usize = 8;
+type Block = [f64; LANES];
+
+/// `cos θ_x` and `sin θ_x` on the right half of a line, in blocks filled up with zeros; the left half is
+/// their mirror image, which saves half of all products.
 pub(super) struct Tables {
-    along: Vec<[Vec<f64>; 2]>,
-    /// Phase at the edge along Y.
-    up: Vec<f64>,
+    /// The first block of every harmonic, then the second, and so on.
+    along: Vec<[Block; 2]>,
+    /// `e^{iθ_y}` of each line.
+    up: Vec<Vec<Complex64>>,
 }
 
 impl Tables {
     pub(super) fn new(frame: &Frame, pair: &Matrix2<f64>, indices: &[[i32; 2]]) -> Self {
         let waves: Vec<_> = indices.iter().map(|&i| wave(pair, i)).collect();
-        let along = waves.iter().map(|p| {
-            let (cos, sin) = turns(p.x, &frame.x).iter().map(|t| (t.re, t.im)).unzip();
-            [cos, sin]
-        });
-        Self {
-            along: along.collect(),
-            up: waves.iter().map(|p| p.y).collect(),
+        let mut along = vec![[[0.0; LANES]; 2]; waves.len() * frame.right().len().div_ceil(LANES)];
+        for (i, p) in waves.iter().enumerate() {
+            let turns = turns(p.x, frame.right());
+            let blocks = along.iter_mut().skip(i).step_by(waves.len());
+            for ([cos, sin], turns) in blocks.zip(turns.chunks(LANES)) {
+                for ((cos, sin), turn) in cos.iter_mut().zip(sin).zip(turns) {
+                    (*cos, *sin) = (turn.re, turn.im);
+                }
+            }
         }
+        Self {
+            along,
+            up: waves.iter().map(|p| turns(p.y, &frame.y)).collect(),
+        }
+    }
+
+    /// The blocks of one harmonic.
+    fn of(&self, harmonic: usize) -> impl Iterator<Item = &[Block; 2]> {
+        self.along.iter().skip(harmonic).step_by(self.up.len())
     }
 }
 
@@ -60,27 +78,74 @@ pub(super) fn residuals(
     mut each: impl FnMut(usize, &mut [f64]),
 ) {
     let mut line = vec![0.0; frame.image.columns];
-    for (row, &y) in frame.y.iter().enumerate() {
-        if frame.present[row] == 0 {
-            continue;
+    for row in 0..frame.image.rows {
+        if frame.present[row] > 0 {
+            residual(frame, model, tables, row, &mut line);
+            each(row, &mut line);
         }
-        let mut powers = [0.0; 4];
-        for (&[a, b], value) in model.basis.terms.iter().zip(&model.background) {
-            powers[a] += value * y.powi(b as i32);
-        }
-        let [b0, b1, b2, b3] = powers;
-        for ((out, value), x) in line.iter_mut().zip(frame.image.row(row)).zip(&frame.x) {
-            *out = value - (b0 + x * (b1 + x * (b2 + x * b3)));
-        }
-        for (i, [alpha, beta]) in model.waves.iter().enumerate() {
-            let (s, c) = (tables.up[i] * y).sin_cos();
-            let (p, q) = (alpha * c + beta * s, beta * c - alpha * s);
-            let [cos, sin] = &tables.along[i];
-            for ((out, cos), sin) in line.iter_mut().zip(cos).zip(sin) {
-                *out -= p * cos + q * sin;
+    }
+}
+
+/// The residual of one line.
+pub(super) fn residual(
+    frame: &Frame,
+    model: &Model,
+    tables: &Tables,
+    row: usize,
+    line: &mut [f64],
+) {
+    let y = frame.y[row];
+    let mut powers = [0.0; 4];
+    for (&[a, b], value) in model.basis.terms.iter().zip(&model.background) {
+        powers[a] += value * y.powi(b as i32);
+    }
+    let [b0, b1, b2, b3] = powers;
+    for ((out, value), x) in line.iter_mut().zip(frame.image.row(row)).zip(&frame.x) {
+        *out = value - (b0 + x * (b1 + x * (b2 + x * b3)));
+    }
+    let turned: Vec<[f64; 2]> = model
+        .waves
+        .iter()
+        .zip(&tables.up)
+        .map(|([alpha, beta], up)| {
+            let (c, s) = (up[row].re, up[row].im);
+            [alpha * c + beta * s, beta * c - alpha * s]
+        })
+        .collect();
+    // Cosines are the same on either side of the middle, sines change their sign.
+    let half = line.len().div_ceil(2);
+    let middle = line.len() % 2;
+    let (left, right) = line.split_at_mut(half);
+    let mut even = vec![[0.0; LANES]; half.div_ceil(LANES)];
+    let mut odd = even.clone();
+    add_up(&turned, &tables.along, &mut even, &mut odd);
+    let (even, odd) = (even.as_flattened(), odd.as_flattened());
+    for (value, (even, odd)) in left.iter_mut().rev().zip(even.iter().zip(odd)) {
+        *value -= even - odd;
+    }
+    // A middle column is among the left.
+    let sums = even.iter().zip(odd).skip(middle);
+    for (value, (even, odd)) in right.iter_mut().zip(sums) {
+        *value -= even + odd;
+    }
+}
+
+/// The cosines and the sines of a line, each with its factor, added up block by block. A function of
+/// its own: what is done with the sums must not change the order in which the compiler packs them.
+#[inline(never)]
+fn add_up(factors: &[[f64; 2]], along: &[[Block; 2]], even: &mut [Block], odd: &mut [Block]) {
+    let all = along.chunks_exact(factors.len().max(1));
+    for ((even, odd), blocks) in even.iter_mut().zip(odd).zip(all) {
+        let (mut cosines, mut sines) = ([0.0; LANES], [0.0; LANES]);
+        for ([p, q], [cos, sin]) in factors.iter().zip(blocks) {
+            for (sum, cos) in cosines.iter_mut().zip(cos) {
+                *sum += p * cos;
+            }
+            for (sum, sin) in sines.iter_mut().zip(sin) {
+                *sum += q * sin;
             }
         }
-        each(row, &mut line);
+        (*even, *odd) = (cosines, sines);
     }
 }
 
@@ -131,7 +196,7 @@ pub(super) fn look(
     let stride = (frame.pixels() / SAMPLE).max(1);
     let mut sample = Vec::with_capacity(2 * SAMPLE);
     let mut clipped = 0;
-    let mut tilted = vec![0.0; frame.image.columns];
+    let mut folded = Folded::new(frame);
     residuals(frame, model, tables, |row, line| {
         settle(line, row, frame, lines, clip);
         // Every line starts elsewhere, lest the sample sees one column only.
@@ -144,14 +209,8 @@ pub(super) fn look(
         for value in line.iter_mut() {
             *value = clip.apply(*value);
         }
-        add(
-            &mut gradient,
-            frame,
-            (basis, probes),
-            row,
-            line,
-            &mut tilted,
-        );
+        folded.take(line);
+        add(&mut gradient, frame, (basis, probes), row, &folded);
     });
     Look {
         gradient,
@@ -199,71 +258,121 @@ fn clipped_sum(line: &[f64], offset: f64, clip: Clip) -> f64 {
     sums.iter().sum::<f64>() + rest
 }
 
+/// A line folded about its middle: sums and differences of what lies at X and −X, and both times X.
+struct Folded {
+    x: Vec<Block>,
+    even: Vec<Block>,
+    odd: Vec<Block>,
+    tilted_even: Vec<Block>,
+    tilted_odd: Vec<Block>,
+}
+
+impl Folded {
+    fn new(frame: &Frame) -> Self {
+        let mut x = vec![[0.0; LANES]; frame.right().len().div_ceil(LANES)];
+        for (value, x) in x.as_flattened_mut().iter_mut().zip(frame.right()) {
+            *value = *x;
+        }
+        let zeros = vec![[0.0; LANES]; x.len()];
+        Self {
+            x,
+            even: zeros.clone(),
+            odd: zeros.clone(),
+            tilted_even: zeros.clone(),
+            tilted_odd: zeros,
+        }
+    }
+
+    fn take(&mut self, line: &[f64]) {
+        let half = line.len().div_ceil(2);
+        let (even, odd) = (self.even.as_flattened_mut(), self.odd.as_flattened_mut());
+        let pairs = line[line.len() / 2..].iter().zip(line[..half].iter().rev());
+        for ((right, left), (even, odd)) in pairs.zip(even.iter_mut().zip(odd)) {
+            *even = right + left;
+            *odd = right - left;
+        }
+        if line.len() % 2 == 1 {
+            // The middle is there once.
+            even[0] *= 0.5;
+        }
+        let tilted = self.tilted_even.iter_mut().zip(&mut self.tilted_odd);
+        let plain = self.x.iter().zip(self.even.iter().zip(&self.odd));
+        for ((te, to), (x, (e, o))) in tilted.zip(plain) {
+            for i in 0..LANES {
+                te[i] = x[i] * e[i];
+                to[i] = x[i] * o[i];
+            }
+        }
+    }
+
+    /// Sums of the line times 1, X, X², X³.
+    fn moments(&self, degree: usize) -> [f64; 4] {
+        let mut moments = [sum(self.even.as_flattened()), 0.0, 0.0, 0.0];
+        moments[1] = sum(self.tilted_odd.as_flattened());
+        if degree > 1 {
+            let tilted = self.tilted_even.iter().zip(&self.tilted_odd);
+            for ((te, to), x) in tilted.zip(&self.x) {
+                for i in 0..LANES {
+                    moments[2] += te[i] * x[i];
+                    moments[3] += to[i] * x[i] * x[i];
+                }
+            }
+        }
+        moments
+    }
+
+    /// Sums of the line times `cos`, `sin`, `X cos`, `X sin`, in partial sums that the compiler can
+    /// keep in registers.
+    fn products<'a>(&self, waves: impl Iterator<Item = &'a [Block; 2]>) -> [f64; 4] {
+        const HALF: usize = LANES / 2;
+        let mut sums = [[0.0; HALF]; 4];
+        let add = |sum: &mut [f64; HALF], a: &Block, b: &Block| {
+            for first in [0, HALF] {
+                let pairs = a[first..first + HALF].iter().zip(&b[first..first + HALF]);
+                for (sum, (a, b)) in sum.iter_mut().zip(pairs) {
+                    *sum += a * b;
+                }
+            }
+        };
+        let plain = self.even.iter().zip(&self.odd);
+        let tilted = self.tilted_even.iter().zip(&self.tilted_odd);
+        for (((e, o), (te, to)), [cos, sin]) in plain.zip(tilted).zip(waves) {
+            add(&mut sums[0], e, cos);
+            add(&mut sums[1], o, sin);
+            add(&mut sums[2], to, cos);
+            add(&mut sums[3], te, sin);
+        }
+        sums.map(|s| s.iter().sum())
+    }
+}
+
 /// Adds the correlation of one line with the basis.
 fn add(
     gradient: &mut DVector<f64>,
     frame: &Frame,
     (basis, tables): (&Basis, &Tables),
     row: usize,
-    line: &[f64],
-    tilted: &mut [f64],
+    line: &Folded,
 ) {
     let y = frame.y[row];
-    for ((t, v), x) in tilted.iter_mut().zip(line).zip(&frame.x) {
-        *t = v * x;
-    }
-    let mut moments = [sum(line), sum(tilted), 0.0, 0.0];
-    if basis.degree() > 1 {
-        for (t, x) in tilted.iter().zip(&frame.x) {
-            moments[2] += t * x;
-            moments[3] += t * x * x;
+    if !basis.terms.is_empty() {
+        let moments = line.moments(basis.degree());
+        for (t, &[a, b]) in basis.terms.iter().enumerate() {
+            gradient[t] += moments[a] * y.powi(b as i32);
         }
     }
-    for (t, &[a, b]) in basis.terms.iter().enumerate() {
-        gradient[t] += moments[a] * y.powi(b as i32);
-    }
     for i in 0..basis.indices.len() {
-        let [cos, sin] = &tables.along[i];
-        let [c, s, xc, xs] = products(line, tilted, cos, sin);
-        let (turn_s, turn_c) = (tables.up[i] * y).sin_cos();
+        let [c, s, xc, xs] = line.products(tables.of(i));
+        let turn = tables.up[i][row];
         let first = basis.cosine(i);
-        let (plain_c, plain_s) = (c * turn_c - s * turn_s, s * turn_c + c * turn_s);
+        let (plain_c, plain_s) = (c * turn.re - s * turn.im, s * turn.re + c * turn.im);
         gradient[first] += plain_c;
         gradient[first + 1] += plain_s;
-        gradient[first + 2] += xc * turn_c - xs * turn_s;
-        gradient[first + 3] += xs * turn_c + xc * turn_s;
+        gradient[first + 2] += xc * turn.re - xs * turn.im;
+        gradient[first + 3] += xs * turn.re + xc * turn.im;
         gradient[first + 4] += y * plain_c;
         gradient[first + 5] += y * plain_s;
     }
-}
-
-/// The four sums of products of `u` and `v` with `cos` and `sin`, in partial sums that the compiler
-/// can keep in registers.
-fn products(u: &[f64], v: &[f64], cos: &[f64], sin: &[f64]) -> [f64; 4] {
-    const LANES: usize = 4;
-    let mut sums = [[0.0; LANES]; 4];
-    let whole = u.len() / LANES * LANES;
-    let blocks = u[..whole]
-        .chunks_exact(LANES)
-        .zip(v[..whole].chunks_exact(LANES))
-        .zip(cos[..whole].chunks_exact(LANES))
-        .zip(sin[..whole].chunks_exact(LANES));
-    for (((u, v), cos), sin) in blocks {
-        for i in 0..LANES {
-            sums[0][i] += u[i] * cos[i];
-            sums[1][i] += u[i] * sin[i];
-            sums[2][i] += v[i] * cos[i];
-            sums[3][i] += v[i] * sin[i];
-        }
-    }
-    let mut total = sums.map(|s| s.iter().sum::<f64>());
-    for i in whole..u.len() {
-        total[0] += u[i] * cos[i];
-        total[1] += u[i] * sin[i];
-        total[2] += v[i] * cos[i];
-        total[3] += v[i] * sin[i];
-    }
-    total
 }
 
 /// Sum in eight independent partial sums.
@@ -288,33 +397,34 @@ pub(in crate::lattice) fn middle(values: &mut [f64]) -> f64 {
     *values.select_nth_unstable_by(half, f64::total_cmp).1
 }
 
-/// The residuals as they count, with the line means brought down to the level of the other noise
+/// The residual of one line as it counts, with its mean brought down to the level of the other noise
 /// (`r − (1 − √(1−λ)) r̄`); 0 where pixels do not count.
 pub(super) fn whitened(
-    frame: &Frame,
-    model: &Model,
+    (frame, model, tables): (&Frame, &Model, &Tables),
     lines: &mut LineOffsets,
     clip: Clip,
-) -> Vec<f64> {
-    let tables = Tables::new(frame, &model.pair, &model.basis.indices);
-    let columns = frame.image.columns;
-    let mut out = vec![0.0; frame.image.values.len()];
-    residuals(frame, model, &tables, |row, line| {
-        settle(line, row, frame, lines, clip);
-        let lambda = lines.lambda[row];
-        let kept = if lambda > 0.0 {
-            // The mean is o/λ, of which o is off already.
-            let mean = lines.offset[row] / lambda;
-            lines.offset[row] - (1.0 - (1.0 - lambda).sqrt()) * mean
+    row: usize,
+    line: &mut [f64],
+) {
+    if frame.present[row] == 0 {
+        line.fill(0.0);
+        return;
+    }
+    residual(frame, model, tables, row, line);
+    settle(line, row, frame, lines, clip);
+    let lambda = lines.lambda[row];
+    let kept = if lambda > 0.0 {
+        // The mean is o/λ, of which o is off already.
+        let mean = lines.offset[row] / lambda;
+        lines.offset[row] - (1.0 - (1.0 - lambda).sqrt()) * mean
+    } else {
+        0.0
+    };
+    for value in line {
+        *value = if value.is_finite() {
+            clip.apply(*value) + kept
         } else {
             0.0
         };
-        let into = &mut out[row * columns..(row + 1) * columns];
-        for (out, value) in into.iter_mut().zip(line.iter()) {
-            if value.is_finite() {
-                *out = clip.apply(*value) + kept;
-            }
-        }
-    });
-    out
+    }
 }

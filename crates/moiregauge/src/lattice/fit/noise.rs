@@ -12,9 +12,8 @@ use nalgebra::{DMatrix, DVector, Vector2};
 
 use super::frame::{Basis, Frame, wave};
 use super::model::{Model, middle};
-use crate::image::Image;
 use crate::lattice::harmonics::hann_transform;
-use crate::lattice::select::NoiseMap;
+use crate::lattice::select::{BLOCK_WIDTH, NoiseMap};
 use crate::lattice::transform::{Spectrum, hann};
 
 /// Bins (cycles per frame) on either side of a harmonic that count, along the lines and across.
@@ -24,6 +23,8 @@ const ACROSS: i64 = 8;
 const WEIGHTS: [[f64; 4]; 2] = [[0.16, 0.28, 0.10, 0.04], [0.5, 0.25, 0.0, 0.0]];
 /// Bins nearer to zero frequency belong to the background.
 const BACKGROUND: i64 = 2;
+/// A wave reaches no farther through the window (bins): beyond, 10⁻⁴ of its power is left.
+const SPREAD: f64 = 4.0;
 /// Farther than this from a point of the lattice (cycles per frame) a wave is none of its.
 const FOREIGN: f64 = 3.0;
 
@@ -54,12 +55,16 @@ impl ForeignWave {
 }
 
 impl ResidualNoise {
-    /// `residual` is 0 where pixels do not count. `free_lines`: line means are gone.
-    pub(super) fn new(frame: &Frame, residual: Vec<f64>, free_lines: bool) -> Self {
-        let image = Image::new(frame.image.rows, frame.image.columns, residual);
-        let spectrum = Spectrum::unpadded(&image);
+    /// `residual` writes a line, 0 where pixels do not count. `free_lines`: line means are gone.
+    pub(super) fn new(
+        frame: &Frame,
+        free_lines: bool,
+        residual: impl FnMut(usize, &mut [f64]),
+    ) -> Self {
+        let (columns, rows) = (frame.image.columns, frame.image.rows);
+        let spectrum = Spectrum::of_lines([columns, rows], residual);
         let squares = |n: usize| hann(n).iter().map(|w| w * w).collect::<Vec<_>>();
-        let (x, y) = (squares(image.columns), squares(image.rows));
+        let (x, y) = (squares(columns), squares(rows));
         let lines: f64 = y
             .iter()
             .zip(&frame.present)
@@ -184,28 +189,31 @@ impl ResidualNoise {
             let index = (inverse * k).map(f64::round);
             index.amax() <= 4.0 && (k - cycles * index).norm() < FOREIGN
         };
-        let mut best: Option<(f64, Vector2<f64>)> = None;
-        for y in 0..rows {
+        let half = self.spectrum.half();
+        let (mut most, mut best) = (0.0, None);
+        for (y, line) in self.spectrum.values.chunks_exact(half).enumerate() {
             let signed = if 2 * y <= rows {
                 y as f64
             } else {
                 y as f64 - rows as f64
             };
-            for x in 2..self.spectrum.half() {
-                let significance = self.spectrum.power(x, y) / noise.at(x, y);
-                if best.is_none_or(|(most, _)| significance > most) {
-                    let k = Vector2::new(x as f64, signed);
-                    if !ours(k) {
-                        best = Some((significance, k));
+            for (b, (block, noise)) in line.chunks(BLOCK_WIDTH).zip(noise.row(y)).enumerate() {
+                for (i, value) in block.iter().enumerate() {
+                    if value.norm_sqr() > most * noise && (b > 0 || i > 1) {
+                        let k = Vector2::new((b * BLOCK_WIDTH + i) as f64, signed);
+                        if !ours(k) {
+                            most = value.norm_sqr() / noise;
+                            best = Some(k);
+                        }
                     }
                 }
             }
         }
-        let (significance, k) = best?;
+        let k = best?;
         let bins = self.spectrum.values.len() as f64;
         Some(ForeignWave {
             wave_vector: (k * std::f64::consts::PI).component_div(&frame.edge()),
-            significance,
+            significance: most,
             // The local noise is known to a fifth or so, hence the factor.
             threshold: 1.3 * (bins.ln() + 9.0),
         })
@@ -225,9 +233,24 @@ pub(super) struct Leverage<'a> {
     size: [usize; 2],
 }
 
-/// Transforms of the window around one harmonic: for each fitted harmonic and either sign of its
-/// wave vector, along x and along y, the value and the slope at each bin.
-pub(super) struct Taps(Vec<[[Vec<[f64; 2]>; 2]; 2]>);
+/// What the fitted functions take up around one place: those of the waves near by, and the four
+/// derivatives.
+pub(super) struct Taps {
+    waves: Vec<Tap>,
+    /// The part of the inverse that belongs to these functions.
+    inverse: DMatrix<f64>,
+    /// Position of a harmonic's cosine in that part.
+    places: Vec<Option<usize>>,
+}
+
+/// One of the two waves of a harmonic.
+struct Tap {
+    harmonic: usize,
+    /// Of its wave vector.
+    sign: f64,
+    /// Transform of the window along x and along y: value and slope at each bin.
+    transform: [Vec<[f64; 2]>; 2],
+}
 
 impl<'a> Leverage<'a> {
     /// `normal` is that of the whole model: background, cosines and sines, derivatives.
@@ -247,58 +270,80 @@ impl<'a> Leverage<'a> {
 
     fn taps(&self, centre: Vector2<i64>) -> Taps {
         let half = [ALONG, ACROSS];
-        let waves = self.basis.indices.iter().map(|&index| {
-            let p = wave(&self.model.pair, index);
-            [1.0, -1.0].map(|sign| {
-                [0, 1].map(|axis| {
-                    let n = self.size[axis];
-                    (-half[axis]..=half[axis])
-                        .map(|d| {
-                            let bin = std::f64::consts::PI * (centre[axis] + d) as f64;
-                            transform(sign * p[axis] - bin, n)
-                        })
-                        .collect()
-                })
-            })
-        });
-        Taps(waves.collect())
+        let count = self.basis.indices.len();
+        let mut waves = Vec::new();
+        let mut places = vec![None; count];
+        let mut used = Vec::new();
+        for (i, &index) in self.basis.indices.iter().enumerate() {
+            for sign in [1.0, -1.0] {
+                let p = sign * wave(&self.model.pair, index);
+                let cycles = p / std::f64::consts::PI;
+                let apart = |axis: usize| (cycles[axis] - centre[axis] as f64).abs();
+                let reaches = |axis: usize| apart(axis) < half[axis] as f64 + SPREAD;
+                if !(reaches(0) && reaches(1)) {
+                    continue;
+                }
+                let transform = [0, 1].map(|axis| {
+                    let at = |d: i64| {
+                        let bin = std::f64::consts::PI * (centre[axis] + d) as f64;
+                        window_transform(p[axis] - bin, self.size[axis])
+                    };
+                    (-half[axis]..=half[axis]).map(at).collect()
+                });
+                waves.push(Tap {
+                    harmonic: i,
+                    sign,
+                    transform,
+                });
+                if places[i].is_none() {
+                    places[i] = Some(used.len());
+                    used.extend([2 * i, 2 * i + 1]);
+                }
+            }
+        }
+        used.extend(2 * count..2 * count + 4);
+        Taps {
+            waves,
+            inverse: self.inverse.select_rows(&used).select_columns(&used),
+            places,
+        }
     }
 
     /// `vᴴ G⁻¹ v` for the bin at (dx, dy) from the centre of the taps.
     fn at(&self, taps: &Taps, dx: i64, dy: i64) -> f64 {
-        let count = self.basis.indices.len();
-        let mut re = DVector::zeros(2 * count + 4);
-        let mut im = DVector::zeros(2 * count + 4);
-        for (i, [plus, minus]) in taps.0.iter().enumerate() {
-            let at = |t: &[Vec<[f64; 2]>; 2]| {
-                let [x, slope_x] = t[0][(dx + ALONG) as usize];
-                let [y, slope_y] = t[1][(dy + ACROSS) as usize];
-                [x * y, slope_x * y, x * slope_y]
-            };
-            let (plus, minus) = (at(plus), at(minus));
-            re[2 * i] = 0.5 * (plus[0] + minus[0]);
-            im[2 * i + 1] = -0.5 * (plus[0] - minus[0]);
+        let n = taps.inverse.nrows();
+        let mut re = DVector::zeros(n);
+        let mut im = DVector::zeros(n);
+        for tap in &taps.waves {
+            let (i, sign, [along, across]) = (tap.harmonic, tap.sign, &tap.transform);
+            let [x, slope_x] = along[(dx + ALONG) as usize];
+            let [y, slope_y] = across[(dy + ACROSS) as usize];
+            if let Some(place) = taps.places[i] {
+                re[place] += 0.5 * x * y;
+                im[place + 1] -= 0.5 * sign * x * y;
+            }
             let [alpha, beta] = self.model.waves[i];
-            for axis in 0..2 {
+            for (axis, slope) in [slope_x * y, x * slope_y].into_iter().enumerate() {
                 // X e^{iθ} transforms into −i times the slope; the derivative of the model is
                 // X (β cos θ − α sin θ).
-                let (cos, sin) = (
-                    -0.5 * (plus[axis + 1] + minus[axis + 1]),
-                    -0.5 * (plus[axis + 1] - minus[axis + 1]),
-                );
                 for (vector, index) in self.basis.indices[i].into_iter().enumerate() {
-                    let j = 2 * count + 2 * vector + axis;
-                    im[j] += f64::from(index) * beta * cos;
-                    re[j] -= f64::from(index) * alpha * sin;
+                    let j = n - 4 + 2 * vector + axis;
+                    im[j] -= 0.5 * f64::from(index) * beta * slope;
+                    re[j] += 0.5 * f64::from(index) * alpha * sign * slope;
                 }
             }
         }
-        (&self.inverse * &re).dot(&re) + (&self.inverse * &im).dot(&im)
+        let form = |v: &DVector<f64>| {
+            let rows = taps.inverse.column_iter().zip(v.iter());
+            rows.map(|(column, value)| value * column.dot(v))
+                .sum::<f64>()
+        };
+        form(&re) + form(&im)
     }
 }
 
 /// `Σ w cos(p X)` over the Hann window and its slope.
-fn transform(p: f64, n: usize) -> [f64; 2] {
+fn window_transform(p: f64, n: usize) -> [f64; 2] {
     const STEP: f64 = 1e-4;
     let at = |p: f64| hann_transform(p * 2.0 / n as f64, n);
     [at(p), (at(p + STEP) - at(p - STEP)) / (2.0 * STEP)]

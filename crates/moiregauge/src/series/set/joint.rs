@@ -5,6 +5,7 @@ use spmfile::FrameDirection;
 
 use super::Solved;
 use crate::analysis::{Checks, Drift, JointTerms, Residual, Scatter};
+use crate::budget::Statistical;
 use crate::drift::{Observation, solve};
 use crate::geometry::mean_and_spread;
 use crate::joint::{JointFit, LeftOut, Resampled, fit};
@@ -34,7 +35,7 @@ pub(super) fn jointly(
     let Some(fit) = joint_fit(scans, reference, start, settings) else {
         return (linear, None);
     };
-    let Some(lattice) = real_from_reciprocal(&fit.waves) else {
+    let Some((lattice, statistical)) = lattice_of(&fit, reference) else {
         return (linear, None);
     };
     let solved = Solved {
@@ -44,7 +45,8 @@ pub(super) fn jointly(
             joint: Some(terms(&fit)),
             ..linear.drift
         },
-        lattice: labelled_like(&lattice, reference),
+        lattice,
+        statistical,
         chi2: fit.chi2,
         freedom: fit.degrees_of_freedom,
     };
@@ -62,6 +64,27 @@ pub(in crate::series) fn joint_fit(
     let waves = labelled_like(&real_from_reciprocal(lattice)?, &reciprocal(reference)?);
     let start = (&waves.basis, velocity);
     fit(&sightings, start, settings.frame_time_sigma_s)
+}
+
+/// The lattice of a joint fit (nm) and where its covariance comes from.
+pub(in crate::series) fn lattice_of(
+    fit: &JointFit,
+    reference: &Matrix2<f64>,
+) -> Option<(LatticeVectors, Statistical)> {
+    let real = |covariance| {
+        let waves = LatticeVectors {
+            covariance,
+            ..fit.waves
+        };
+        Some(labelled_like(&real_from_reciprocal(&waves)?, reference))
+    };
+    let parts = fit.statistical()?;
+    let statistical = Statistical {
+        image: real(parts.image)?.covariance,
+        drift: real(parts.drift)?.covariance,
+        sensor: real(parts.sensor)?.covariance,
+    };
+    Some((real(fit.waves.covariance)?, statistical))
 }
 
 /// What a joint fit has beside a constant drift.
@@ -107,7 +130,11 @@ pub(super) fn outliers(
     let mut kept: Vec<usize> = (0..scans.len()).collect();
     let mut out = Vec::new();
     while out.len() < scans.len() / 5 {
-        let all: Vec<Observation> = kept.iter().flat_map(|&i| observations[i]).copied().collect();
+        let all: Vec<Observation> = kept
+            .iter()
+            .flat_map(|&i| observations[i])
+            .copied()
+            .collect();
         let of: Vec<&MeasuredScan> = kept.iter().map(|&i| scans[i]).collect();
         let Ok(linear) = solve(&all) else { break };
         let start = (&linear.lattice, &linear.velocity);

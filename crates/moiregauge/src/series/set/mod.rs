@@ -7,7 +7,7 @@ use nalgebra::{Matrix2, Vector2};
 use rayon::prelude::*;
 use spmfile::FrameDirection;
 
-pub(super) use joint::{checks, joint_fit, terms};
+pub(super) use joint::{checks, joint_fit, lattice_of, terms};
 use scan::{plain_mean, scan_analysis};
 
 use super::group::Group;
@@ -15,12 +15,13 @@ use super::measure::MeasuredScan;
 use crate::analysis::{
     Axis, Checks, Drift, DriftFit, Residual, ScanAnalysis, SetAnalysis, SetMean,
 };
+use crate::budget::{Budget, Statistical};
 use crate::caveat::Caveat;
 use crate::drift::paper::{PaperScan, pairwise_drift};
-use crate::drift::{Observation, common_lattice, monte_carlo, solve};
+use crate::drift::{Observation, at_known_drift, common_lattice, monte_carlo, solve};
 use crate::geometry::mean_and_spread;
 use crate::lattice::LatticeVectors;
-use crate::lattice::reciprocal::{labelled_like, real_from_reciprocal};
+use crate::lattice::reciprocal::real_from_reciprocal;
 use crate::settings::{GivenDrift, Settings};
 use crate::strain::{TwistStrain, draws, twist_strain};
 
@@ -51,7 +52,11 @@ pub(super) fn analyse_set(
         .filter(|&i| group.scans[i].excluded.is_none())
         .collect();
     let used: Vec<&MeasuredScan> = kept.iter().map(|&i| &group.scans[i]).collect();
-    let all: Vec<Observation> = kept.iter().flat_map(|&i| &observations[i]).copied().collect();
+    let all: Vec<Observation> = kept
+        .iter()
+        .flat_map(|&i| &observations[i])
+        .copied()
+        .collect();
     let mut solved = drift((&group.name, &used), &all, settings, caveats);
     let mut fit = None;
     if joint {
@@ -106,19 +111,27 @@ pub(super) fn analyse_set(
         .ok()
         .and_then(|common| {
             let of = |s: &ScanAnalysis| (s.twist_strain_sensor, s.sensor);
-            set_mean(common, of_set().map(of), settings)
+            let [image, sensor] = at_known_drift(&all)?;
+            let statistical = Statistical::without_drift(&image, &sensor);
+            set_mean(common, &statistical, of_set().map(of), settings)
         });
     let mean = solved.as_ref().and_then(|s| {
         let of = |s: &ScanAnalysis| (s.twist_strain, s.drift_corrected.unwrap_or(s.sensor));
         set_mean(
             (s.lattice, s.chi2, s.freedom),
+            &s.statistical,
             of_set().map(of),
             settings,
         )
     });
     let drift = solved.map(|s| s.drift);
     about_mean(&group.name, mean.as_ref(), caveats);
-    about_checks(&group.name, (checks.as_ref(), drift.as_ref(), mean.as_ref()), kept.len(), caveats);
+    about_checks(
+        &group.name,
+        (checks.as_ref(), drift.as_ref(), mean.as_ref()),
+        kept.len(),
+        caveats,
+    );
     SetAnalysis {
         name: group.name.clone(),
         slow_axis: group.slow_axis,
@@ -164,6 +177,7 @@ fn leave_out(
 struct Solved {
     drift: Drift,
     lattice: LatticeVectors,
+    statistical: Statistical,
     chi2: f64,
     freedom: usize,
 }
@@ -171,14 +185,7 @@ struct Solved {
 fn observations(scan: &MeasuredScan, reference: &Matrix2<f64>) -> Vec<Observation> {
     scan.lines
         .iter()
-        .map(|line| {
-            let lattice = labelled_like(&line.in_sensor_coordinates(), reference);
-            line.observation(lattice).unwrap_or(Observation {
-                lattice,
-                time_gradient: Vector2::zeros(),
-                speed_error: [0.0; 2],
-            })
-        })
+        .map(|line| line.observation(reference))
         .collect()
 }
 
@@ -191,7 +198,10 @@ fn drift(
     if scans.is_empty() {
         return None;
     }
-    if scans.iter().any(|s| s.lines.iter().any(|l| l.timing.is_none())) {
+    if scans
+        .iter()
+        .any(|s| s.lines.iter().any(|l| l.timing.is_none()))
+    {
         caveats.push(Caveat::new(
             "no-timing",
             name,
@@ -207,6 +217,8 @@ fn drift(
             let scale = excess(solution.chi2, solution.degrees_of_freedom);
             let mut lattice = solution.lattice;
             lattice.covariance *= scale;
+            let statistical =
+                Statistical::at_known_drift(at_known_drift(all)?, scale, &lattice.covariance);
             let seed = settings.seed;
             let stream = format!("drift {name}");
             Some(Solved {
@@ -225,16 +237,13 @@ fn drift(
                     joint: None,
                 },
                 lattice,
+                statistical,
                 chi2: solution.chi2,
                 freedom: solution.degrees_of_freedom,
             })
         }
         Err(error) => {
-            caveats.push(Caveat::new(
-                "drift-undetermined",
-                name,
-                error.to_string(),
-            ));
+            caveats.push(Caveat::new("drift-undetermined", name, error.to_string()));
             None
         }
     }
@@ -257,7 +266,9 @@ fn given_drift(
     let (mut lattice, chi2, freedom) = common_lattice(all, &velocity, &covariance).ok()?;
     // Scatter enlarges what the scans say, not what the user said of the drift.
     let (measured, _, _) = common_lattice(all, &velocity, &Matrix2::zeros()).ok()?;
-    lattice.covariance += measured.covariance * (excess(chi2, freedom) - 1.0);
+    let scale = excess(chi2, freedom);
+    lattice.covariance += measured.covariance * (scale - 1.0);
+    let parts = at_known_drift(all)?;
     Some(Solved {
         drift: Drift {
             velocity,
@@ -267,6 +278,7 @@ fn given_drift(
             monte_carlo: None,
             joint: None,
         },
+        statistical: Statistical::at_known_drift(parts, scale, &lattice.covariance),
         lattice,
         chi2,
         freedom,
@@ -311,6 +323,7 @@ fn paper_scans(scans: &[&MeasuredScan], all: &[Observation]) -> Vec<PaperScan> {
 /// Twist and strain of the common lattice, and how the scans scatter about it.
 fn set_mean(
     (lattice, chi2, freedom): (LatticeVectors, f64, usize),
+    statistical: &Statistical,
     scans: impl Iterator<Item = (Option<TwistStrain>, LatticeVectors)>,
     settings: &Settings,
 ) -> Option<SetMean> {
@@ -330,6 +343,7 @@ fn set_mean(
         })
     });
     Some(SetMean {
+        budget: Budget::new(&lattice, &twist_strain, statistical, settings),
         lattice,
         twist_strain,
         twist_scatter: mean_and_spread(&twists).sigma,
@@ -382,15 +396,29 @@ fn about_mean(name: &str, mean: Option<&SetMean>, caveats: &mut Vec<Caveat>) {
             "a wavelength of a single scan differs by more than 1 % from that of the set",
         ));
     }
-    if mean.twist_strain.axis_lab().is_none() {
+    let found = &mean.twist_strain;
+    let in_all = mean.budget.applied_to(found);
+    if found.axis_lab().is_none() {
         caveats.push(Caveat::new(
             "strain-not-significant",
             name,
             format!(
                 "the heterostrain is not significant (p = {:.2}); it is below {:.4} % with 95 % \
                  confidence and has no axis",
-                mean.twist_strain.strain_p_value(),
-                mean.twist_strain.strain_upper_limit_95() * 100.0
+                found.strain_p_value(),
+                found.strain_upper_limit_95() * 100.0
+            ),
+        ));
+    } else if in_all.axis_lab().is_none() {
+        caveats.push(Caveat::new(
+            "strain-within-calibration",
+            name,
+            format!(
+                "the heterostrain stands out of the noise of the scans but not of the calibration of the \
+                 scanner (p = {:.2}): with everything in the budget it is below {:.4} % with 95 % \
+                 confidence; scans of the sample turned by 90° would tell",
+                in_all.strain_p_value(),
+                in_all.strain_upper_limit_95() * 100.0
             ),
         ));
     }
@@ -437,7 +465,11 @@ fn about_checks(
         ("drift y", found.drift[1], drift.covariance.m22.sqrt()),
         ("twist", found.twist, mean.twist_strain.twist().sigma),
         ("strain along x and y", found.strain[0], strain.m11.sqrt()),
-        ("strain along the diagonals", found.strain[1], strain.m22.sqrt()),
+        (
+            "strain along the diagonals",
+            found.strain[1],
+            strain.m22.sqrt(),
+        ),
     ];
     let limit = 1.0 + 4.0 / (2.0 * (n as f64 - 1.0)).sqrt();
     let large: Vec<String> = stated

@@ -105,4 +105,3 @@ pub(super) fn plain_mean(all: &[LatticeVectors]) -> Option<LatticeVectors> {
         covariance: all.iter().map(|l| l.covariance).sum::<Matrix4<f64>>() / (n * n),
     })
 }
-

@@ -1,0 +1,274 @@
+//! The uncertainty budget: what every source of error contributes to twist, strain and wavelengths.
+//!
+//! In: the lattice of a set (nm), its twist and strain, the covariance of the lattice split into image
+//! noise, drift and sensor noise ([`Statistical`]), the priors of the settings. Out: variances (rad², no
+//! dimension, nm²) source by source; they are independent, so they add.
+//!
+//! Image noise, drift and sensors are what σ of a result is made of. The others are not seen by the
+//! scans and are the same in all of them, so more scans do not make them smaller:
+//!
+//! - Calibration. Sensors that show `(1 + δ) r` in place of r turn the moiré matrix `M` into
+//!   `(1 + δ)^{−T} M`. A common gain s changes the twist by −sθ; gains of x and y that differ by g, or
+//!   axes that miss a right angle by γ, change the strain vector by θg/(1+ν) or θγ/(1+ν). A rotation of
+//!   the sensors' frame has no row: angles are counted from the axis of the x sensor by definition.
+//! - Lattice constant: θ is proportional to it.
+//! - Model: see [`crate::strain`]. An isotropic strain h changes θ at first and second order; its
+//!   variance is the mean square over a Gaussian prior, `d² + 3c²` for a change `d h/σ + c h²/σ²`.
+
+mod statistical;
+
+use nalgebra::{Matrix2, Matrix4, Vector4};
+
+pub use statistical::{Statistical, weighted_mean};
+
+use crate::lattice::LatticeVectors;
+use crate::settings::Settings;
+use crate::strain::{Reference, TwistStrain, twist_strain};
+
+/// Where an error comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Source {
+    /// Noise of the images: what is left if drift and sensors are known exactly.
+    Image,
+    /// The drift, as far as it is not known.
+    Drift,
+    /// Noise of the position sensors.
+    Sensor,
+    /// One gain error of both sensors.
+    Gain,
+    /// Different gains of the x and the y sensor.
+    Mismatch,
+    /// Sensor axes that do not stand at a right angle.
+    Orthogonality,
+    /// The lattice constant.
+    LatticeConstant,
+    /// Which layer is strained.
+    StrainedLayer,
+    /// Isotropic heterostrain, which the moiré does not show.
+    IsotropicStrain,
+    /// The Poisson ratio.
+    PoissonRatio,
+}
+
+impl Source {
+    /// All of them, in the order of tables and figures.
+    pub const ALL: [Self; 10] = [
+        Self::Image,
+        Self::Drift,
+        Self::Sensor,
+        Self::Gain,
+        Self::Mismatch,
+        Self::Orthogonality,
+        Self::LatticeConstant,
+        Self::StrainedLayer,
+        Self::IsotropicStrain,
+        Self::PoissonRatio,
+    ];
+
+    /// Whether it is part of the σ of a result.
+    pub fn is_statistical(self) -> bool {
+        matches!(self, Self::Image | Self::Drift | Self::Sensor)
+    }
+}
+
+/// Variances that one source, or several together, bring about; NaN where they are not known.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Contribution {
+    /// Covariance of `(θ, α, E₁, E₂)`.
+    pub covariance: Matrix4<f64>,
+    /// Variance of the magnitude of the strain.
+    pub magnitude: f64,
+    /// Variance of the axis of the strain in the laboratory, rad².
+    pub axis_lab: f64,
+    /// Variances of the three wavelengths, nm².
+    pub wavelengths: [f64; 3],
+}
+
+/// All contributions to the uncertainty of one lattice.
+#[derive(Clone, Debug)]
+pub struct Budget {
+    /// In the order of [`Source::ALL`].
+    contributions: [Contribution; 10],
+    /// The statistical ones as covariances of the lattice.
+    pub statistical: Statistical,
+}
+
+impl Budget {
+    /// The budget of a lattice (nm) with its twist and strain.
+    ///
+    /// What cannot be computed (an isotropic strain that no twist goes with, a drift that is not known)
+    /// is NaN, and so is the total.
+    pub fn new(
+        lattice: &LatticeVectors,
+        found: &TwistStrain,
+        statistical: &Statistical,
+        settings: &Settings,
+    ) -> Self {
+        let reference = Reference::new(lattice, &settings.material, settings.strain_convention);
+        let contribution = |source: Source| {
+            let (covariance, wavelengths) =
+                match lattice_error(source, lattice, statistical, settings) {
+                    Some(error) => (
+                        through(lattice, &error, settings),
+                        squared_wavelength_sigmas(lattice, &error),
+                    ),
+                    None => (
+                        model_error(source, lattice, reference.as_ref(), settings),
+                        [0.0; 3],
+                    ),
+                };
+            let strain = covariance.fixed_view::<2, 2>(2, 2).into_owned();
+            Contribution {
+                covariance,
+                magnitude: found.magnitude_variance(&strain),
+                axis_lab: found.axis_variance(&strain),
+                wavelengths,
+            }
+        };
+        Self {
+            contributions: Source::ALL.map(contribution),
+            statistical: *statistical,
+        }
+    }
+
+    /// What one source contributes.
+    pub fn of(&self, source: Source) -> Contribution {
+        self.sum(|s| s == source)
+    }
+
+    /// What the chosen sources contribute together.
+    pub fn sum(&self, chosen: impl Fn(Source) -> bool) -> Contribution {
+        let none = Contribution {
+            covariance: Matrix4::zeros(),
+            magnitude: 0.0,
+            axis_lab: 0.0,
+            wavelengths: [0.0; 3],
+        };
+        Source::ALL
+            .iter()
+            .zip(&self.contributions)
+            .filter(|(source, _)| chosen(**source))
+            .fold(none, |sum, (_, c)| Contribution {
+                covariance: sum.covariance + c.covariance,
+                magnitude: sum.magnitude + c.magnitude,
+                axis_lab: sum.axis_lab + c.axis_lab,
+                wavelengths: [0, 1, 2].map(|i| sum.wavelengths[i] + c.wavelengths[i]),
+            })
+    }
+
+    /// Everything together.
+    pub fn total(&self) -> Contribution {
+        self.sum(|_| true)
+    }
+
+    /// Everything that is known: all but the drift where nothing tells it.
+    pub fn known(&self) -> Contribution {
+        let drift = self.drift_known();
+        self.sum(|source| drift || source != Source::Drift)
+    }
+
+    /// Whether the contribution of the drift is known.
+    pub fn drift_known(&self) -> bool {
+        !self.statistical.drift.m11.is_nan()
+    }
+
+    /// `found` with everything that is known for its uncertainty: for limits and significance.
+    pub fn applied_to(&self, found: &TwistStrain) -> TwistStrain {
+        TwistStrain {
+            covariance: self.known().covariance,
+            ..*found
+        }
+    }
+}
+
+/// What a source does to the lattice vectors, nm²; `None` for those that change only its meaning.
+fn lattice_error(
+    source: Source,
+    lattice: &LatticeVectors,
+    statistical: &Statistical,
+    settings: &Settings,
+) -> Option<Matrix4<f64>> {
+    let calibration = &settings.calibration;
+    // The whole of a difference between x and y shows as half of it in either.
+    let (distortion, sigma) = match source {
+        Source::Image => return Some(statistical.image),
+        Source::Drift => return Some(statistical.drift),
+        Source::Sensor => return Some(statistical.sensor),
+        Source::Gain => (Matrix2::identity(), calibration.gain_percent / 100.0),
+        Source::Mismatch => (
+            Matrix2::new(0.5, 0.0, 0.0, -0.5),
+            calibration.mismatch_percent / 100.0,
+        ),
+        Source::Orthogonality => (
+            Matrix2::new(0.0, 0.5, 0.5, 0.0),
+            calibration.orthogonality_mrad / 1000.0,
+        ),
+        _ => return None,
+    };
+    let change = distortion * lattice.basis * sigma;
+    Some(square(&Vector4::from_column_slice(change.as_slice())))
+}
+
+/// What a source that leaves the lattice as it is does to `(θ, α, E₁, E₂)`.
+fn model_error(
+    source: Source,
+    lattice: &LatticeVectors,
+    reference: Option<&Reference>,
+    settings: &Settings,
+) -> Matrix4<f64> {
+    let material = &settings.material;
+    let found = match source {
+        // The moiré matrix is proportional to a and to the inverse of the moiré vectors.
+        Source::LatticeConstant => {
+            let sigma = material.lattice_constant_sigma_nm / material.lattice_constant_nm;
+            let error = square(&(lattice.flat() * sigma));
+            Some(through(lattice, &error, settings))
+        }
+        Source::StrainedLayer => reference
+            .and_then(Reference::with_shared_strain)
+            .map(|change| square(&change)),
+        Source::IsotropicStrain => {
+            let sigma = settings.isotropic_strain_percent / 100.0;
+            reference.and_then(|r| mean_square(sigma, |h| r.with_isotropic_strain(h)))
+        }
+        _ => {
+            let sigma = material.poisson_ratio_sigma;
+            reference.and_then(|r| mean_square(sigma, |change| r.with_poisson_ratio(change)))
+        }
+    };
+    found.unwrap_or_else(|| Matrix4::from_element(f64::NAN))
+}
+
+/// Mean square change for a Gaussian parameter: a parabola through ±σ, with `⟨h⁴⟩ = 3σ⁴`.
+fn mean_square(sigma: f64, change: impl Fn(f64) -> Option<Vector4<f64>>) -> Option<Matrix4<f64>> {
+    let (up, down) = (change(sigma)?, change(-sigma)?);
+    let (slope, curve) = ((up - down) / 2.0, (up + down) / 2.0);
+    Some(square(&slope) + 3.0 * square(&curve))
+}
+
+fn square(v: &Vector4<f64>) -> Matrix4<f64> {
+    v * v.transpose()
+}
+
+/// Covariance of `(θ, α, E₁, E₂)` for one of the lattice vectors, by the analytic Jacobian.
+fn through(lattice: &LatticeVectors, error: &Matrix4<f64>, settings: &Settings) -> Matrix4<f64> {
+    let lattice = LatticeVectors {
+        covariance: *error,
+        ..*lattice
+    };
+    twist_strain(&lattice, &settings.material, settings.strain_convention).map_or_else(
+        |_| Matrix4::from_element(f64::NAN),
+        |found| found.covariance,
+    )
+}
+
+fn squared_wavelength_sigmas(lattice: &LatticeVectors, error: &Matrix4<f64>) -> [f64; 3] {
+    let lattice = LatticeVectors {
+        covariance: *error,
+        ..*lattice
+    };
+    [0, 1, 2].map(|i| lattice.wavelength(i).sigma.powi(2))
+}
+
+#[cfg(test)]
+mod tests;

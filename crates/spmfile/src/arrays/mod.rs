@@ -1,0 +1,326 @@
+//! Plain arrays and pictures: `.npy`, `.npz`, text matrices, TIFF, PNG, JPEG.
+//!
+//! They hold numbers and no frame: its size, direction and times are for the user to give, in
+//! [`ArrayOptions`]; what is not given stays unknown. The first line of an array or a picture is the
+//! top one. A coloured picture is a rendering; it becomes one channel of its luminance, with a note
+//! in [`Scan::metadata`].
+//!
+//! ```
+//! use spmfile::arrays::{ArrayOptions, read};
+//!
+//! let options = ArrayOptions {
+//!     size_nm: Some([70.0, 70.0]),
+//!     unit: Some("°".to_owned()),
+//!     ..ArrayOptions::default()
+//! };
+//! let scan = read(b"1 2 3\n4 5 6\n", &options, &|_| true)?;
+//! assert_eq!(scan.channels[0].values(), [4.0, 5.0, 6.0, 1.0, 2.0, 3.0]);
+//! # Ok::<(), spmfile::ReadError>(())
+//! ```
+
+mod npy;
+mod picture;
+mod text;
+
+use crate::ChannelInfo;
+use crate::archive::Archive;
+use crate::detect::{Format, detect};
+use crate::error::ReadError;
+use crate::labels;
+use crate::scan::{Channel, FrameDirection, LineDirection, Samples, Scan, UnreadableChannel};
+use crate::sensors::sensor_axis;
+use crate::whole::{MOST_CHANNELS, some_readable};
+
+/// What only the user knows of an array.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ArrayOptions {
+    /// Width and height of the image, edge to edge, nm.
+    pub size_nm: Option<[f64; 2]>,
+    /// Whether the bottom or the top line was acquired first.
+    pub frame_direction: Option<FrameDirection>,
+    /// Whether the lines are those of the way forth or back; names such as `phase_retrace` tell
+    /// it themselves.
+    pub line_direction: Option<LineDirection>,
+    /// Lines per second, a line being trace and retrace together.
+    pub line_rate_hz: Option<f64>,
+    /// See [`Scan::line_times_s`].
+    pub line_times_s: Option<[f64; 2]>,
+    /// Rotation of the fast axis against x, counter-clockwise, rad.
+    pub rotation_rad: f64,
+    /// The unit of the values.
+    pub unit: Option<String>,
+    /// The unit of arrays named as position sensors (`x_sensor`).
+    pub sensor_unit: Option<String>,
+}
+
+/// One image, lines from the bottom up.
+struct Plane {
+    rows: usize,
+    columns: usize,
+    samples: Samples,
+    /// Whether it is the luminance of a coloured picture.
+    rendering: bool,
+}
+
+/// What a file says beside its numbers; only text files do.
+#[derive(Debug, Default)]
+struct Told {
+    name: Option<String>,
+    unit: Option<String>,
+    size_nm: Option<[f64; 2]>,
+}
+
+/// Reads the arrays that are wanted; [`crate::read`] does so without options.
+///
+/// # Errors
+/// - The bytes are no array and no picture.
+/// - They are damaged, or hold kinds of numbers that are not read.
+pub fn read(
+    bytes: &[u8],
+    options: &ArrayOptions,
+    wanted: &dyn Fn(&ChannelInfo) -> bool,
+) -> Result<Scan, ReadError> {
+    let (format, told, planes) = match detect(bytes) {
+        Format::Npy => ("NumPy array", Told::default(), npy::read(bytes).map(one)),
+        Format::Npz => return archive(bytes, options, wanted),
+        Format::Tiff => ("TIFF", Told::default(), picture::tiff(bytes)),
+        Format::Png => ("PNG", Told::default(), picture::png(bytes).map(one)),
+        Format::Jpeg => ("JPEG", Told::default(), picture::jpeg(bytes).map(one)),
+        Format::TextMatrix => match text::read(bytes) {
+            Ok((told, plane)) => ("text matrix", told, Ok(one(plane))),
+            Err(error) => ("text matrix", Told::default(), Err(error)),
+        },
+        _ => {
+            return Err(ReadError::Unsupported {
+                format: "array",
+                reason: "expected an array or a picture, found another kind of file".to_owned(),
+            });
+        }
+    };
+    let planes = planes.map_err(|reason| ReadError::Damaged { format, reason })?;
+    let several = planes.len() > 1;
+    let mut scan = frame(format, options, &told);
+    for (index, plane) in planes.into_iter().enumerate() {
+        let name = match &told.name {
+            Some(name) => name.clone(),
+            None if several => format!("image {}", index + 1),
+            None => "image".to_owned(),
+        };
+        let info = info(name, options);
+        if plane.rendering {
+            scan.metadata.push(rendering(&info.name));
+        }
+        if wanted(&info) {
+            let unit = told.unit.as_deref();
+            scan.channels
+                .push(channel(info, plane, options, unit, scan.size_nm));
+        }
+    }
+    Ok(scan)
+}
+
+fn one(plane: Plane) -> Vec<Plane> {
+    vec![plane]
+}
+
+/// Reads an archive of arrays: each one of two dimensions is a channel.
+fn archive(
+    bytes: &[u8],
+    options: &ArrayOptions,
+    wanted: &dyn Fn(&ChannelInfo) -> bool,
+) -> Result<Scan, ReadError> {
+    const FORMAT: &str = "NumPy archive";
+    let damaged = |reason: String| ReadError::Damaged {
+        format: FORMAT,
+        reason,
+    };
+    let mut archive = Archive::open(bytes).map_err(damaged)?;
+    let names: Vec<String> = archive
+        .names()
+        .into_iter()
+        .filter(|name| name.strip_suffix(".npy").is_some())
+        .collect();
+    if names.len() > MOST_CHANNELS {
+        return Err(ReadError::TooManyChannels {
+            found: names.len(),
+            limit: MOST_CHANNELS,
+        });
+    }
+    let mut scan = frame(FORMAT, options, &Told::default());
+    for entry in &names {
+        let info = info(entry.trim_end_matches(".npy").to_owned(), options);
+        if !wanted(&info) {
+            continue;
+        }
+        let content = match archive.entry(entry) {
+            Some(content) => content.map_err(damaged)?,
+            None => continue,
+        };
+        match npy::read(&content) {
+            Ok(plane) => {
+                let channel = channel(info, plane, options, None, scan.size_nm);
+                scan.channels.push(channel);
+            }
+            Err(error) => scan.unreadable.push(UnreadableChannel {
+                name: info.name,
+                error,
+            }),
+        }
+    }
+    some_readable(scan, names.len())
+}
+
+fn info(name: String, options: &ArrayOptions) -> ChannelInfo {
+    ChannelInfo {
+        line_direction: labels::line_direction(&name).or(options.line_direction),
+        name,
+        internal_name: String::new(),
+        scan_line: None,
+    }
+}
+
+fn rendering(name: &str) -> (String, String) {
+    let note = format!(
+        "{name:?} is the luminance (0.299 red + 0.587 green + 0.114 blue) of a coloured picture: a \
+         rendering, not measured values"
+    );
+    ("rendering".to_owned(), note)
+}
+
+fn channel(
+    info: ChannelInfo,
+    plane: Plane,
+    options: &ArrayOptions,
+    unit: Option<&str>,
+    size_nm: Option<[f64; 2]>,
+) -> Channel {
+    let given = match sensor_axis(&info.name, "") {
+        Some(_) => options.sensor_unit.as_deref(),
+        None => options.unit.as_deref(),
+    };
+    Channel {
+        name: info.name,
+        internal_name: info.internal_name,
+        unit: given.or(unit).unwrap_or("").to_owned(),
+        line_direction: info.line_direction,
+        scan_line: None,
+        rows: plane.rows,
+        columns: plane.columns,
+        width_nm: size_nm.map(|[width, _]| width),
+        height_nm: size_nm.map(|[_, height]| height),
+        scale: 1.0,
+        offset: 0.0,
+        scaling: "values as stored".to_owned(),
+        plane_fit: None,
+        samples: plane.samples,
+    }
+}
+
+/// The frame as the user describes it.
+fn frame(format: &str, options: &ArrayOptions, told: &Told) -> Scan {
+    Scan {
+        format: format.to_owned(),
+        frame_direction: options.frame_direction,
+        line_rate_hz: options.line_rate_hz,
+        line_times_s: options.line_times_s,
+        rotation_rad: options.rotation_rad,
+        size_nm: options.size_nm.or(told.size_nm),
+        ..Scan::default()
+    }
+}
+
+/// Turns lines from the top down into lines from the bottom up, in place.
+fn turn<T>(values: &mut [T], columns: usize) {
+    if columns == 0 {
+        return;
+    }
+    let rows = values.len() / columns;
+    let (lower, upper) = values.split_at_mut(rows / 2 * columns);
+    for (low, high) in lower
+        .chunks_exact_mut(columns)
+        .zip(upper.rchunks_exact_mut(columns))
+    {
+        low.swap_with_slice(high);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::archive::tests::zip;
+
+    #[test]
+    fn lines_are_turned() {
+        for rows in 0..6 {
+            let mut values: Vec<usize> = (0..3 * rows).collect();
+            turn(&mut values, 3);
+            let expected: Vec<usize> = (0..rows)
+                .rev()
+                .flat_map(|row| 3 * row..3 * row + 3)
+                .collect();
+            assert_eq!(values, expected);
+        }
+        turn::<u8>(&mut [], 0);
+    }
+
+    #[test]
+    fn archives_give_a_channel_per_array() {
+        let image = |shape: &str, n: u8| {
+            let header = format!("{{'descr': '|u1', 'fortran_order': False, 'shape': {shape}, }}");
+            let mut bytes = b"\x93NUMPY\x01\0".to_vec();
+            bytes.extend((header.len() as u16).to_le_bytes());
+            bytes.extend(header.bytes());
+            bytes.extend(0..n);
+            bytes
+        };
+        let bytes = zip(&[
+            ("phase_retrace.npy", &image("(2, 3)", 6)),
+            ("x_sensor.npy", &image("(2, 3)", 6)),
+            ("times.npy", &image("(6,)", 6)),
+            ("notes.txt", b"hello"),
+        ]);
+        let options = ArrayOptions {
+            size_nm: Some([30.0, 20.0]),
+            frame_direction: Some(FrameDirection::Up),
+            line_direction: Some(LineDirection::Trace),
+            line_rate_hz: Some(2.0),
+            unit: Some("°".to_owned()),
+            sensor_unit: Some("nm".to_owned()),
+            ..ArrayOptions::default()
+        };
+        let scan = read(&bytes, &options, &|_| true).expect("two images");
+        let [phase, sensor] = &scan.channels[..] else {
+            panic!("two channels");
+        };
+        assert_eq!(
+            (phase.name.as_str(), phase.unit.as_str()),
+            ("phase_retrace", "°")
+        );
+        assert_eq!(
+            (sensor.name.as_str(), sensor.unit.as_str()),
+            ("x_sensor", "nm")
+        );
+        assert_eq!(phase.line_direction, Some(LineDirection::Retrace));
+        assert_eq!(sensor.line_direction, Some(LineDirection::Trace));
+        assert_eq!(phase.values(), [3.0, 4.0, 5.0, 0.0, 1.0, 2.0]);
+        assert_eq!((phase.width_nm, phase.height_nm), (Some(30.0), Some(20.0)));
+        assert_eq!(scan.unreadable.len(), 1);
+        assert_eq!(
+            (scan.frame_direction, scan.line_rate_hz),
+            (options.frame_direction, Some(2.0))
+        );
+
+        let none = read(&bytes, &options, &|info| info.name == "times");
+        assert!(none.is_ok_and(|scan| scan.channels.is_empty()));
+        let alone = zip(&[("times.npy", &image("(6,)", 6))]);
+        assert!(matches!(
+            crate::read(&alone),
+            Err(ReadError::NoReadableChannel { .. })
+        ));
+    }
+
+    #[test]
+    fn other_files_are_refused() {
+        assert!(read(b"PK", &ArrayOptions::default(), &|_| true).is_err());
+    }
+}

@@ -1,0 +1,187 @@
+//! What formats without fields for it carry along as keys and values: how a frame was scanned.
+//!
+//! [`describe`] writes it, [`apply`] takes it back; the keys begin with `spmfile`. Numbers are
+//! written so that they are read back to the last bit.
+
+use crate::scan::{Channel, DateTime, FrameDirection, LineDirection, Scan};
+
+/// The line direction that a title tells: `Z (Backward)`, `Height [Trace]`, `Phase Retrace`.
+pub(crate) fn line_direction(title: &str) -> Option<LineDirection> {
+    let last = title
+        .trim_end_matches([')', ']', ' '])
+        .rsplit(|c: char| !c.is_alphanumeric())
+        .next()?
+        .to_ascii_lowercase();
+    match last.as_str() {
+        "forward" | "trace" => Some(LineDirection::Trace),
+        "backward" | "retrace" => Some(LineDirection::Retrace),
+        _ => None,
+    }
+}
+
+/// The keys of a frame.
+pub(crate) fn describe(scan: &Scan) -> Vec<(String, String)> {
+    let mut lines = Vec::new();
+    let mut put = |key: &str, value: Option<String>| {
+        if let Some(value) = value {
+            lines.push((format!("spmfile {key}"), value));
+        }
+    };
+    let pair = |[a, b]: [f64; 2]| format!("{a} {b}");
+    put("format", Some(scan.format.clone()));
+    put("instrument", scan.instrument.clone());
+    put("acquired", scan.acquired.map(iso));
+    put(
+        "frame direction",
+        scan.frame_direction.map(|direction| {
+            match direction {
+                FrameDirection::Up => "up",
+                FrameDirection::Down => "down",
+            }
+            .to_owned()
+        }),
+    );
+    put("line rate (Hz)", scan.line_rate_hz.map(|n| n.to_string()));
+    put("line times (s)", scan.line_times_s.map(pair));
+    put("rounding", scan.rounding.map(|n| n.to_string()));
+    put("rotation (rad)", Some(scan.rotation_rad.to_string()));
+    put("offset (nm)", Some(pair(scan.offset_nm)));
+    put("size (nm)", scan.size_nm.map(pair));
+    put("closed loop", scan.closed_loop.map(|on| on.to_string()));
+    lines
+}
+
+/// The keys of a channel beside its name.
+pub(crate) fn describe_channel(channel: &Channel) -> Vec<(String, String)> {
+    let mut lines = Vec::new();
+    let mut put = |key: &str, value: Option<&str>| {
+        if let Some(value) = value.filter(|v| !v.is_empty()) {
+            lines.push((format!("spmfile {key}"), value.to_owned()));
+        }
+    };
+    put("internal name", Some(&channel.internal_name));
+    put(
+        "line direction",
+        channel.line_direction.map(|direction| match direction {
+            LineDirection::Trace => "trace",
+            LineDirection::Retrace => "retrace",
+        }),
+    );
+    put("scan line", channel.scan_line.as_deref());
+    put("plane fit", channel.plane_fit.as_deref());
+    lines
+}
+
+/// The value of one of our keys.
+pub(crate) fn value<'a>(lines: &'a [(String, String)], key: &str) -> Option<&'a str> {
+    let ours = |k: &str| k.strip_prefix("spmfile ") == Some(key);
+    let (_, value) = lines.iter().find(|(k, _)| ours(k))?;
+    Some(value)
+}
+
+/// Moves our keys from the metadata of a scan to where they belong.
+pub(crate) fn apply(scan: &mut Scan) {
+    let lines = std::mem::take(&mut scan.metadata);
+    let number = |key: &str| {
+        value(&lines, key)?
+            .parse()
+            .ok()
+            .filter(|n: &f64| n.is_finite())
+    };
+    let pair = |key: &str| -> Option<[f64; 2]> {
+        let (a, b) = value(&lines, key)?.split_once(' ')?;
+        let both = [a.parse().ok()?, b.parse().ok()?];
+        both.iter().all(|n: &f64| n.is_finite()).then_some(both)
+    };
+    if let Some(format) = value(&lines, "format") {
+        // Once only, however often it is converted.
+        let origin = format.rsplit(" from ").next().unwrap_or(format);
+        scan.format = format!("{} from {origin}", scan.format);
+    }
+    scan.instrument = value(&lines, "instrument").map(str::to_owned);
+    scan.acquired = value(&lines, "acquired").and_then(date);
+    scan.frame_direction = match value(&lines, "frame direction") {
+        Some("up") => Some(FrameDirection::Up),
+        Some("down") => Some(FrameDirection::Down),
+        _ => None,
+    };
+    scan.line_rate_hz = number("line rate (Hz)").filter(|&n| n > 0.0);
+    scan.line_times_s = pair("line times (s)").filter(|&[a, b]| a > 0.0 && b >= 0.0);
+    scan.rounding = number("rounding").filter(|&n| n >= 0.0);
+    scan.rotation_rad = number("rotation (rad)").unwrap_or(scan.rotation_rad);
+    scan.offset_nm = pair("offset (nm)").unwrap_or(scan.offset_nm);
+    scan.size_nm = pair("size (nm)").or(scan.size_nm);
+    scan.closed_loop = value(&lines, "closed loop").and_then(|v| v.parse().ok());
+    scan.metadata = lines
+        .into_iter()
+        .filter(|(key, _)| !key.starts_with("spmfile "))
+        .collect();
+}
+
+/// The line direction of one of our keys.
+pub(crate) fn stated_direction(lines: &[(String, String)]) -> Option<LineDirection> {
+    match value(lines, "line direction")? {
+        "trace" => Some(LineDirection::Trace),
+        "retrace" => Some(LineDirection::Retrace),
+        _ => None,
+    }
+}
+
+fn iso(t: DateTime) -> String {
+    format!(
+        "{:04}-{:02}-{:02}T{:02}:{:02}:{:02}",
+        t.year, t.month, t.day, t.hour, t.minute, t.second
+    )
+}
+
+fn date(text: &str) -> Option<DateTime> {
+    let (day, time) = text.split_once('T')?;
+    let numbers: Vec<i64> = day.split('-').filter_map(|n| n.parse().ok()).collect();
+    crate::clock::date(numbers.try_into().ok()?, crate::clock::clock(time)?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn titles_tell_line_directions() {
+        let trace = Some(LineDirection::Trace);
+        let retrace = Some(LineDirection::Retrace);
+        assert_eq!(line_direction("Z (Forward)"), trace);
+        assert_eq!(line_direction("Z (Backward)"), retrace);
+        assert_eq!(line_direction("Height [Trace]"), trace);
+        assert_eq!(line_direction("Phase Retrace"), retrace);
+        for none in ["", "Z", "Trace Metals", "Backwards", "Subtrace"] {
+            assert_eq!(line_direction(none), None, "{none}");
+        }
+    }
+
+    #[test]
+    fn a_description_is_taken_back() {
+        let scan = Scan {
+            format: "Nanonis 2".to_owned(),
+            instrument: Some("LT-STM".to_owned()),
+            acquired: crate::clock::date([2024, 2, 29], [23, 59, 58]),
+            frame_direction: Some(FrameDirection::Down),
+            line_rate_hz: Some(1.0 / 3.0),
+            line_times_s: Some([0.1, 0.2]),
+            rounding: Some(0.05),
+            rotation_rad: -0.575_958_653_158_128_9,
+            offset_nm: [1e9 / 7.0, -2e-3],
+            size_nm: Some([70.0, 35.1]),
+            closed_loop: Some(false),
+            metadata: vec![("Note".to_owned(), "kept".to_owned())],
+            ..Scan::default()
+        };
+        let mut read = Scan {
+            format: "Gwyddion".to_owned(),
+            metadata: [describe(&scan), scan.metadata.clone()].concat(),
+            ..Scan::default()
+        };
+        apply(&mut read);
+        assert_eq!(read.format, "Gwyddion from Nanonis 2");
+        read.format.clone_from(&scan.format);
+        assert_eq!(format!("{read:?}"), format!("{scan:?}"));
+    }
+}

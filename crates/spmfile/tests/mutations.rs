@@ -1,0 +1,60 @@
+//! Ten thousand damaged copies of every real file: no reader panics or hangs, and what is read
+//! can be true.
+
+mod common;
+mod mutation;
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use mutation::{Dice, Sample, samples, survive};
+
+const MUTATIONS: u64 = 10_000;
+/// One in so many copies is decoded; in the others only the headers matter.
+const DECODED: u64 = 250;
+/// Reading a damaged file takes milliseconds; a loaded machine makes that more.
+const LONGEST: Duration = Duration::from_secs(5);
+
+fn check(sample: &mut Sample) {
+    for number in 0..MUTATIONS {
+        let start = Instant::now();
+        let mut dice = Dice(number);
+        let outcome = catch_unwind(AssertUnwindSafe(|| {
+            sample.damaged(&mut dice, |bytes| {
+                survive(bytes, &|_| number % DECODED == 0);
+            });
+        }));
+        let name = &sample.name;
+        assert!(outcome.is_ok(), "{name}: mutation {number}");
+        let time = start.elapsed();
+        assert!(time < LONGEST, "{name}: mutation {number} took {time:?}");
+    }
+}
+
+#[test]
+fn no_reader_stumbles() {
+    let Some(data) = common::testdata("no_reader_stumbles") else {
+        return;
+    };
+    let samples = samples(&data);
+    let count = samples.len();
+    assert!(count > 0);
+    let queue: Vec<_> = samples.into_iter().map(std::sync::Mutex::new).collect();
+    let next = AtomicUsize::new(0);
+    let workers = thread::available_parallelism().map_or(1, usize::from);
+    thread::scope(|scope| {
+        for _ in 0..workers {
+            scope.spawn(|| {
+                while let Some(sample) = queue.get(next.fetch_add(1, Ordering::Relaxed)) {
+                    let mut sample = sample.lock().expect("no other worker has it");
+                    let start = Instant::now();
+                    check(&mut sample);
+                    println!("{:>6.2} s {}", start.elapsed().as_secs_f64(), sample.name);
+                }
+            });
+        }
+    });
+    println!("{MUTATIONS} damaged copies of each of {count} files");
+}

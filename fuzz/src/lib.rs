@@ -1,0 +1,54 @@
+//! What every fuzz target does: read the bytes if they are of its format, and check that what
+//! comes out can be true. The fuzzer watches for panics, memory and time.
+
+use spmfile::{Format, ReadError, Samples, Scan};
+
+/// The target of one reader.
+#[macro_export]
+macro_rules! reader {
+    ($format:path) => {
+        libfuzzer_sys::fuzz_target!(|data: &[u8]| -> libfuzzer_sys::Corpus {
+            if $crate::check(data, $format) {
+                libfuzzer_sys::Corpus::Keep
+            } else {
+                libfuzzer_sys::Corpus::Reject
+            }
+        });
+    };
+}
+
+/// Reads `data`; false if they are not of the format.
+///
+/// # Panics
+/// If what was read contradicts itself.
+pub fn check(data: &[u8], format: Format) -> bool {
+    if spmfile::detect(data) != format {
+        return false;
+    }
+    match spmfile::read(data) {
+        Ok(scan) => plausible(&scan),
+        Err(ReadError::Incomplete { readable, .. }) => plausible(&readable),
+        Err(error) => assert!(!error.to_string().is_empty()),
+    }
+    true
+}
+
+fn plausible(scan: &Scan) {
+    let length = |n: f64| n > 0.0 && n.is_finite();
+    assert!(scan.rotation_rad.is_finite());
+    assert!(scan.offset_nm.iter().all(|n| n.is_finite()));
+    assert!(scan.line_rate_hz.is_none_or(length));
+    for channel in &scan.channels {
+        assert_eq!(channel.samples.len(), channel.rows * channel.columns);
+        assert!(channel.scale.is_finite() && channel.offset.is_finite());
+        assert!(channel.width_nm.is_none_or(length) && channel.height_nm.is_none_or(length));
+        // Reads every sample once.
+        let sum: f64 = match &channel.samples {
+            Samples::I16(v) => v.iter().map(|&n| f64::from(n)).sum(),
+            Samples::I32(v) => v.iter().map(|&n| f64::from(n)).sum(),
+            Samples::F32(v) => v.iter().map(|&n| f64::from(n)).sum(),
+            Samples::F64(v) => v.iter().sum(),
+        };
+        std::hint::black_box(sum);
+    }
+}
