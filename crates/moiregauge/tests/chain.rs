@@ -94,7 +94,8 @@ fn stored_order_does_not_matter() {
 }
 
 /// Over many seeds the errors are what they say: the mean square pull of drift, twist and both strain
-/// components is 1 within its own scatter; for the lattice fit with the joint fit behind it as well.
+/// components is 1 within its own scatter. The joint fit with line noise, 1/f noise and uncertain frame
+/// times; the others, whose errors count line noise in full for both axes, without.
 #[test]
 fn errors_cover_the_truth() {
     for method in [Method::Autocorrelation, Method::Fourier, Method::Lattice] {
@@ -103,6 +104,9 @@ fn errors_cover_the_truth() {
         for seed in 0..trials {
             let mut simulation = small_set(u64::from(seed) + 100);
             simulation.sample.lattice_angle_deg = f64::from(seed) * 7.0;
+            if method != Method::Lattice {
+                (simulation.noise.line_deg, simulation.noise.flicker_deg) = (0.0, 0.0);
+            }
             let analysis = analyse_frames(&frames(&simulation), &settings);
             let set = &analysis.sets[0];
             let (drift, mean) = (set.drift.as_ref().unwrap(), set.mean.as_ref().unwrap());
@@ -126,11 +130,10 @@ fn errors_cover_the_truth() {
             }
         }
         println!("{method:?}: mean squared pulls of drift x, y, twist, E1, E2: {squares:.2?}");
-        // The mean of 60 squared pulls scatters by √(2/60) = 0.18. Line noise is counted in full for
-        // both axes (errors too large, never too small by more than that scatter).
+        // The mean of 60 squared pulls scatters by √(2/60) = 0.18; three times that.
         for mean_square in squares {
             assert!(
-                (0.25..1.55).contains(&mean_square),
+                (0.45..1.55).contains(&mean_square),
                 "{method:?}: {squares:?}"
             );
         }
@@ -208,4 +211,143 @@ fn noise_is_no_lattice() {
     let scans = frames(&simulation);
     let error = measure_scan("x", &scans[0], &quick(Method::Autocorrelation), None).unwrap_err();
     assert!(error.to_string().contains("no lattice"), "{error}");
+}
+
+/// Eight scans of which the third had its sensors displaced by 0.5 nm, forty times the error of a
+/// position.
+fn one_displaced() -> Vec<Scan> {
+    let mut simulation = small_set(17);
+    simulation.raster.scans = 8;
+    let mut scans = frames(&simulation);
+    for channel in &mut scans[2].channels {
+        if channel.name.ends_with("sensor") {
+            channel.offset += 0.5;
+        }
+    }
+    scans
+}
+
+/// It is pointed out and used; by rule it is left out; and the user may leave it out by name. Without
+/// it the drift is right, with it the errors grow. No other scan is touched.
+#[test]
+fn a_scan_that_does_not_fit_is_pointed_out() {
+    let scans = one_displaced();
+    let truth = truth_drift(&small_set(17));
+    let mut settings = quick(Method::Lattice);
+    let of = |settings: &Settings| {
+        let analysis = analyse_frames(&scans, settings);
+        let drift = analysis.sets[0].drift.clone().unwrap();
+        let miss = 60.0 * drift.velocity - nalgebra::Vector2::from(truth);
+        let sigma = 60.0 * drift.covariance.trace().sqrt();
+        (analysis, miss.norm(), sigma)
+    };
+
+    let (pointed_out, _, with) = of(&settings);
+    let places = |analysis: &Analysis, code: &str| -> Vec<String> {
+        let all = analysis.caveats.iter().filter(|c| c.code == code);
+        all.map(|c| c.place.clone()).collect()
+    };
+    assert_eq!(places(&pointed_out, "outlying-scan"), ["scan.002"]);
+    assert!(
+        pointed_out.sets[0]
+            .scans
+            .iter()
+            .all(|s| s.excluded.is_none())
+    );
+    let residual = pointed_out.sets[0].scans[2].residual.unwrap();
+    assert!(residual.outlying && residual.p_value < 1e-4);
+    let displaced = residual.displacement.unwrap();
+    // Against the others the scan stands the other way. Half a second of its clock is 4 pm, a position
+    // has an error of some 15 pm in each component.
+    let expected = nalgebra::Vector2::new(-0.5, -0.5);
+    assert!((displaced - expected).norm() < 0.07, "{displaced}");
+
+    settings.exclude_outliers = true;
+    let (by_rule, miss, without) = of(&settings);
+    assert_eq!(places(&by_rule, "scan-left-out"), ["scan.002"]);
+    assert!(miss < 3.0 * without, "{miss} {without}");
+    assert!(without < 0.5 * with, "{without} {with}");
+
+    settings.exclude_outliers = false;
+    settings.exclude = vec!["*.002".to_owned()];
+    let (by_name, same, _) = of(&settings);
+    assert_eq!(same, miss);
+    let left_out: Vec<bool> = by_name.sets[0]
+        .scans
+        .iter()
+        .map(|s| s.excluded.is_some())
+        .collect();
+    assert_eq!(
+        left_out,
+        [false, false, true, false, false, false, false, false]
+    );
+    settings.exclude = vec!["nothing".to_owned()];
+    assert!(codes(&of(&settings).0).contains(&"nothing-excluded"));
+}
+
+/// The scatter of the scans gives the stated errors: leave-one-out and bootstrap over pairs of twelve
+/// scans, within three times the scatter of such estimates over eight campaigns, 1/√(2·11·8) and
+/// 1/√(2·5·8).
+#[test]
+fn the_scatter_of_the_scans_agrees_with_the_errors() {
+    let (mut left_out, mut drawn) = (0.0, 0.0);
+    for seed in 0..8 {
+        let mut simulation = small_set(seed + 40);
+        simulation.raster.pixels = [64, 64];
+        simulation.raster.scans = 12;
+        let mut settings = quick(Method::Lattice);
+        settings.strain_draws = 400;
+        let analysis = analyse_frames(&frames(&simulation), &settings);
+        let set = &analysis.sets[0];
+        let checks = set.checks.as_ref().unwrap();
+        let stated = set.mean.as_ref().unwrap().twist_strain.twist().sigma;
+        left_out += (checks.leave_one_out.unwrap().twist / stated).powi(2) / 8.0;
+        drawn += (checks.bootstrap.unwrap().twist / stated).powi(2) / 8.0;
+    }
+    println!(
+        "leave one out {:.2}, bootstrap {:.2}",
+        left_out.sqrt(),
+        drawn.sqrt()
+    );
+    assert!((0.77..1.23).contains(&left_out.sqrt()), "{left_out}");
+    assert!((0.66..1.34).contains(&drawn.sqrt()), "{drawn}");
+}
+
+/// Three sets an hour apart, the middle one with another drift: no acceleration and no settling joins
+/// them, each keeps its own, and the common lattice is still right.
+#[test]
+fn sets_with_drifts_of_their_own_are_not_joined() {
+    let first = small_set(21);
+    let mut second = small_set(22);
+    second.raster.rotation_deg = 90.0;
+    second.raster.start_s = 3600.0;
+    second.drift.velocity_nm_per_min = [-0.8, 0.6];
+    let mut third = small_set(23);
+    third.raster.line_rate_hz = 16.0;
+    third.raster.start_s = 7200.0;
+    let mut scans = frames(&first);
+    scans.extend(frames(&second));
+    scans.extend(frames(&third));
+    let analysis = analyse_frames(&scans, &quick(Method::Lattice));
+    assert!(
+        codes(&analysis).contains(&"drift-not-joined"),
+        "{:?}",
+        codes(&analysis)
+    );
+    let combined = analysis.combined.unwrap();
+    assert!(combined.drift.is_none() && combined.joint.is_none());
+    let twist = combined.twist_strain.twist();
+    let miss = twist.value.to_degrees() - first.sample.twist_deg;
+    assert!(
+        miss.abs() < 3.0 * twist.sigma.to_degrees(),
+        "{miss} {twist:?}"
+    );
+    for (set, simulation) in analysis.sets.iter().zip([&first, &second, &third]) {
+        let drift = set.drift.as_ref().unwrap();
+        let miss = 60.0 * drift.velocity - nalgebra::Vector2::from(truth_drift(simulation));
+        assert!(
+            miss.norm() < 4.0 * 60.0 * drift.covariance.trace().sqrt(),
+            "{miss}"
+        );
+    }
 }

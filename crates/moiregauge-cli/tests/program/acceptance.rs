@@ -30,6 +30,41 @@ fn both_sets(test: &str, options: &[&str]) -> Option<(Value, Vec<(Value, Value)>
     Some((found, pairs.into()))
 }
 
+/// Both sets together, by the joint fit: drift within 0.006 nm/min, twist within 0.0003°, strain vector
+/// within 0.001 % of the truth, each within 3 σ, with σ no larger than these bounds.
+#[test]
+fn both_sets_together_reach_the_goal() {
+    let Some((found, sets)) = both_sets("both_sets_together_reach_the_goal", &[]) else {
+        return;
+    };
+    let truth = &sets[0].1;
+    let combined = &found["combined"];
+    let mut check = |pointer: &str, expected: f64, bound: f64| {
+        let (value, sigma) = estimate(combined, pointer);
+        let off = (value - expected).abs();
+        assert!(
+            off < bound && off < 3.0 * sigma && sigma < bound,
+            "{pointer}: {value} ± {sigma}, {expected}"
+        );
+    };
+    for (i, axis) in ["x", "y"].iter().enumerate() {
+        let expected = number(truth, &format!("/drift_nm_per_min/{i}"));
+        check(&format!("/drift/{axis}_nm_per_min"), expected, 0.006);
+    }
+    check("/twist_deg", number(truth, "/theta_deg"), 0.0003);
+    let axis: f64 = ["/phi_deg", "/alpha_deg", "/theta_deg"]
+        .map(|part| number(truth, part))
+        .iter()
+        .sum();
+    let (strain, twice) = (number(truth, "/eps_pct"), (2.0 * axis).to_radians());
+    for (i, expected) in [strain * twice.cos(), strain * twice.sin()]
+        .into_iter()
+        .enumerate()
+    {
+        check(&format!("/strain_vector_percent/{i}"), expected, 0.001);
+    }
+}
+
 fn accept(test: &str, options: &[&str]) {
     let Some((_, sets)) = both_sets(test, options) else {
         return;
@@ -93,10 +128,10 @@ fn both_sets_come_out_right_by_the_fourier_method() {
 }
 
 #[test]
-fn both_sets_come_out_right_by_the_lattice_method() {
+fn both_sets_come_out_right_by_the_autocorrelation_method() {
     accept(
-        "both_sets_come_out_right_by_the_lattice_method",
-        &["--method", "lattice"],
+        "both_sets_come_out_right_by_the_autocorrelation_method",
+        &["--method", "autocorrelation"],
     );
 }
 

@@ -6,3 +6,4 @@ mod refusals;
 mod results;
 mod round_trip;
 mod same_bytes;
+mod validation;

@@ -10,7 +10,7 @@
 use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
 use rand::RngExt as _;
 
-use super::evaluate::{DRIFT, Linearised, linearise};
+use super::evaluate::{Linearised, linearise};
 use super::solve::{JointFit, instability, inverse, solved};
 use crate::rng::stream;
 
@@ -97,7 +97,7 @@ impl JointFit {
                     right += side;
                 }
                 let step = solved(&normal, &right, &scale, HELD)?;
-                Some(resampled(&(&self.solution + step)))
+                Some(self.resampled(&(&self.solution + step)))
             })
             .collect()
     }
@@ -185,17 +185,29 @@ impl<'a> Step<'a> {
                 self.fit.degrees_of_freedom.saturating_sub(freedom),
             ),
             displacement: self.fit.displacement(scan, &solution),
-            without: resampled(&solution),
+            without: self.fit.resampled(&solution),
         };
         (freedom > 0).then_some(Without { left_out, solution })
     }
 }
 
 impl JointFit {
+    fn resampled(&self, x: &DVector<f64>) -> Resampled {
+        let (_, velocity) = self.layout.motion(x, self.layout.origin);
+        Resampled {
+            waves: Matrix2::new(x[0], x[2], x[1], x[3]),
+            velocity,
+        }
+    }
+
     /// Where a scan stands from where the solution `x` has it: least squares of `G_h·δ = miss_h` over
-    /// its harmonics and lines.
+    /// its harmonics and lines, its clock taken as right.
     fn displacement(&self, scan: usize, x: &DVector<f64>) -> Option<Vector2<f64>> {
-        let rows = self.rows(x, self.instability_nm);
+        let mut x = x.clone();
+        if let Some(first) = self.layout.times_at() {
+            x[first + scan] = 0.0;
+        }
+        let rows = self.rows(&x, self.instability_nm);
         let g = self.waves.basis;
         let three = [
             g.column(0).into_owned(),
@@ -214,13 +226,6 @@ impl JointFit {
             right += unit * miss.value;
         }
         Some(normal.try_inverse()? * right)
-    }
-}
-
-fn resampled(x: &DVector<f64>) -> Resampled {
-    Resampled {
-        waves: Matrix2::new(x[0], x[2], x[1], x[3]),
-        velocity: Vector2::new(x[DRIFT], x[DRIFT + 1]),
     }
 }
 

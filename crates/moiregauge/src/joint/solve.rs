@@ -19,6 +19,8 @@ const DAMPING: f64 = 1e-10;
 const LINKED: f64 = 0.08;
 /// Settling times that are tried, as shares of the duration of the campaign.
 const SETTLING: [f64; 5] = [0.05, 0.1, 0.2, 0.4, 0.8];
+/// Fewer scans than this cannot tell an exponential from a parabola.
+const FEWEST_SETTLING: usize = 6;
 /// A drift velocity worse than this (condition number of the scaled normal matrix, squared design) is
 /// not determined.
 const WORST_CONDITION: f64 = 1e4;
@@ -71,16 +73,26 @@ pub struct TestedTerm {
 impl JointFit {
     /// Drift velocity at a time (same origin as the sightings), nm/s, with its covariance.
     pub fn velocity_at(&self, time: f64) -> (Vector2<f64>, Matrix2<f64>) {
-        let (_, velocity) = self.layout.motion(&self.solution, time);
-        let weights = self.layout.drift_weights(time);
-        let mut covariance = Matrix2::zeros();
-        for &(i, _, a) in &weights {
-            for &(j, _, b) in &weights {
-                covariance += a * b * self.covariance.fixed_view::<2, 2>(i, j);
-            }
-        }
-        (velocity, covariance)
+        motion(&self.layout, &self.solution, &self.covariance, time)
     }
+}
+
+/// Drift velocity at a time and its covariance.
+fn motion(
+    layout: &Layout,
+    x: &DVector<f64>,
+    covariance: &DMatrix<f64>,
+    time: f64,
+) -> (Vector2<f64>, Matrix2<f64>) {
+    let (_, velocity) = layout.motion(x, time);
+    let weights = layout.drift_weights(time);
+    let mut of_velocity = Matrix2::zeros();
+    for &(i, _, a) in &weights {
+        for &(j, _, b) in &weights {
+            of_velocity += a * b * covariance.fixed_view::<2, 2>(i, j);
+        }
+    }
+    (velocity, of_velocity)
 }
 
 /// Fits all sightings together and adds the terms that earn it by an information criterion.
@@ -123,6 +135,7 @@ pub fn fit(
     let times = || sightings.iter().map(|s| s.time);
     let duration =
         times().fold(f64::NEG_INFINITY, f64::max) - times().fold(f64::INFINITY, f64::min);
+    let scans = 1 + sightings.iter().map(|s| s.scan).max().unwrap_or(0);
     let base = Terms {
         acceleration: false,
         ..best.terms
@@ -132,10 +145,15 @@ pub fn fit(
         ..base
     }]
     .into_iter()
-    .chain(SETTLING.map(|share| Terms {
-        settling: Some(share * duration),
-        ..base
-    }));
+    .chain(
+        SETTLING
+            .into_iter()
+            .filter(|_| scans >= FEWEST_SETTLING)
+            .map(|share| Terms {
+                settling: Some(share * duration),
+                ..base
+            }),
+    );
     let mut choice = Choice::new(&problem, best, base);
     choice.offer(changing);
     let classes = sightings.iter().map(|s| s.class).max().unwrap_or(0);
@@ -230,10 +248,11 @@ impl<'a> Choice<'a> {
     }
 }
 
-/// Bayesian information criterion for given weights.
+/// Bayesian information criterion for given weights. A settling time is a parameter as well.
 fn criterion(fit: &JointFit) -> f64 {
     let n = (fit.degrees_of_freedom + fit.layout.size) as f64;
-    fit.chi2 + fit.layout.count() as f64 * n.ln()
+    let parameters = fit.layout.count() + usize::from(fit.terms.settling.is_some());
+    fit.chi2 + parameters as f64 * n.ln()
 }
 
 /// What is fitted.
@@ -281,13 +300,14 @@ impl Problem {
         let degrees_of_freedom = last.residuals.len().saturating_sub(layout.size);
         let excess = (chi2 / degrees_of_freedom.max(1) as f64).max(1.0);
         let covariance = &unscaled * excess;
+        let (velocity, velocity_covariance) = motion(&layout, &x, &covariance, layout.origin);
         Some(JointFit {
             waves: LatticeVectors {
                 basis: Matrix2::new(x[0], x[2], x[1], x[3]),
                 covariance: covariance.fixed_view::<4, 4>(0, 0).into_owned(),
             },
-            velocity: Vector2::new(x[DRIFT], x[DRIFT + 1]),
-            velocity_covariance: covariance.fixed_view::<2, 2>(DRIFT, DRIFT).into_owned(),
+            velocity,
+            velocity_covariance,
             acceleration: layout
                 .acceleration_at()
                 .map(|i| Vector2::new(x[i], x[i + 1])),

@@ -18,6 +18,8 @@ use crate::strain::twist_strain;
 const SAME_LATTICE: f64 = 0.05;
 /// χ² of two components beyond which the drift of a set is not that of all sets.
 const CONTRADICTION: f64 = 18.4;
+/// χ²/dof of all sets over that of the single ones beyond which they have no drift in common.
+const WORSE: f64 = 3.0;
 /// Sets this many σ apart deserve a word.
 const APART: f64 = 3.0;
 
@@ -53,31 +55,33 @@ pub(super) fn combine(
         checks.clone_from(&set.checks);
     } else if let Some((scans, reference)) = joint.filter(|(scans, _)| !scans.is_empty())
         && let Some(start) = sets.iter().find_map(|s| s.drift.as_ref())
-        && let Some(fit) = joint_fit(scans, &reference, (&lattice, &start.velocity), settings)
-        && let Some(fitted) = lattice_of(&fit, &reference)
     {
-        if let Some(set) = contradiction(sets, scans, &fit) {
-            caveats.push(Caveat::new(
+        let start = (&lattice, &start.velocity);
+        match joined(sets, &means, scans, (&reference, start), settings) {
+            Ok(fit) => {
+                if let Some(fitted) = lattice_of(&fit, &reference) {
+                    (lattice, statistical) = fitted;
+                }
+                joint_terms = Some(terms(&fit));
+                drift = Some(Drift {
+                    velocity: fit.velocity,
+                    covariance: fit.velocity_covariance,
+                    given: false,
+                    fit: None,
+                    monte_carlo: None,
+                    joint: joint_terms.clone(),
+                });
+                let left_out = fit.leave_one_out();
+                checks = Some(set_checks(&fit, &left_out, scans, ("all sets", settings)));
+            }
+            Err(why) => caveats.push(Caveat::new(
                 "drift-not-joined",
                 "analysis",
                 format!(
-                    "no smooth drift describes all sets: it contradicts that of {set}; the lattices of \
-                     the sets, each with its own drift, are averaged instead"
+                    "no smooth drift describes all sets: {why}; the lattices of the sets, each with its \
+                     own drift, are averaged instead"
                 ),
-            ));
-        } else {
-            (lattice, statistical) = fitted;
-            joint_terms = Some(terms(&fit));
-            drift = Some(Drift {
-                velocity: fit.velocity,
-                covariance: fit.velocity_covariance,
-                given: false,
-                fit: None,
-                monte_carlo: None,
-                joint: joint_terms.clone(),
-            });
-            let left_out = fit.leave_one_out();
-            checks = Some(set_checks(&fit, &left_out, scans, ("all sets", settings)));
+            )),
         }
     }
     let consistency = consistency(sets);
@@ -107,6 +111,30 @@ pub(super) fn combine(
         checks,
         consistency,
     })
+}
+
+/// The joint fit of all sets, or why it does not describe them.
+fn joined(
+    sets: &[SetAnalysis],
+    means: &[&SetMean],
+    scans: &[&MeasuredScan],
+    (reference, start): (&Matrix2<f64>, (&LatticeVectors, &Vector2<f64>)),
+    settings: &Settings,
+) -> Result<JointFit, String> {
+    let fit = joint_fit(scans, reference, start, settings)
+        .ok_or("their drift cannot be determined together")?;
+    let reduced = fit.chi2 / fit.degrees_of_freedom.max(1) as f64;
+    let usual = means.iter().map(|m| m.chi2_per_dof).fold(1.0, f64::max);
+    if reduced > WORSE * usual {
+        return Err(format!(
+            "together they scatter {:.0} times more than alone",
+            (reduced / usual).sqrt()
+        ));
+    }
+    match contradiction(sets, scans, &fit) {
+        Some(set) => Err(format!("it contradicts that of {set}")),
+        None => Ok(fit),
+    }
 }
 
 /// The first set whose own drift is not that of the joint fit at its time: χ² of two components beyond
