@@ -17,7 +17,7 @@ mod tables;
 pub use draw::colormap::ColorMap;
 pub use error::ReportError;
 pub use figures::{Drawing, Figure, figures, pulls};
-pub use format::plus_minus;
+pub use format::{plus_minus, two_digits};
 pub use provenance::{FailedInput, InputFile, Provenance};
 pub use report::{Choice, write_report};
 pub use results::{Results, schema};

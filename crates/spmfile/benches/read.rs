@@ -114,3 +114,47 @@ fn counts_to_nanometres(bencher: Bencher<'_, '_>) {
         .counter(BytesCount::new(4 * channel.samples.len()))
         .bench(|| divan::black_box(channel).values());
 }
+
+/// A large image of another instrument: 4096 × 4096, forward and backward, single precision from
+/// the top, most significant byte first. Reading turns lines and samples around on the way.
+fn large() -> Vec<u8> {
+    let header = b":NANONIS_VERSION:\n2\n:SCANIT_TYPE:\nFLOAT MSBFIRST\n:SCAN_PIXELS:\n4096 4096\n\
+                   :SCAN_RANGE:\n1E-7 1E-7\n:SCAN_DIR:\ndown\n:DATA_INFO:\n\
+                   \tName\tUnit\tDirection\n\tZ\tm\tboth\n:SCANIT_END:\n\n\n\x1a\x04";
+    let samples = (0..2 * 4096 * 4096).flat_map(|n: u32| (n as f32).to_be_bytes());
+    header.iter().copied().chain(samples).collect()
+}
+
+/// What reading is measured by: its bytes copied once and converted once.
+#[divan::bench(sample_count = 5, sample_size = 1)]
+fn large_copied_and_converted(bencher: Bencher<'_, '_>) {
+    let file = large();
+    bencher.counter(BytesCount::new(file.len())).bench(|| {
+        let bytes = divan::black_box(&file).clone();
+        let (samples, _) = bytes.as_chunks::<4>();
+        samples
+            .iter()
+            .map(|&b| f32::from_be_bytes(b))
+            .collect::<Vec<_>>()
+    });
+}
+
+/// The same with our reader, from bytes that were copied as they would be from a disk.
+#[divan::bench(sample_count = 5, sample_size = 1)]
+fn large_copied_and_read(bencher: Bencher<'_, '_>) {
+    let file = large();
+    bencher
+        .counter(BytesCount::new(file.len()))
+        .bench(|| read(&divan::black_box(&file).clone()));
+}
+
+/// One of its two channels.
+#[divan::bench(sample_count = 5, sample_size = 1)]
+fn large_one_channel(bencher: Bencher<'_, '_>) {
+    let file = large();
+    bencher.counter(BytesCount::new(file.len())).bench(|| {
+        read_selected(divan::black_box(&file), &|channel: &ChannelInfo| {
+            channel.line_direction == Some(LineDirection::Trace)
+        })
+    });
+}

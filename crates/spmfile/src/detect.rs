@@ -125,6 +125,10 @@ pub fn detect(bytes: &[u8]) -> Format {
     if head.starts_with(b"MM\0*") {
         return tiff(bytes, Endian::Big);
     }
+    // BigTIFF; no instrument is known to use it.
+    if head.starts_with(b"II+\0") || head.starts_with(b"MM\0+") {
+        return Format::Tiff;
+    }
     if igor(head) {
         return Format::Igor;
     }

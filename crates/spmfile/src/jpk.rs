@@ -24,8 +24,9 @@ use crate::tiff_tags::{Directory, directories};
 use crate::whole::{Extent, some_readable};
 
 const FORMAT: &str = "JPK";
-/// The entry of an archive of curves that holds the image of the map.
-const IMAGE_ENTRY: &str = "data-image.jpk-qi-image";
+/// The entry of an archive of curves that holds the image of the map begins like this, and ends
+/// with `jpk-qi-image` or `force`.
+const IMAGE_ENTRY: &str = "data-image.";
 
 const PHOTOMETRIC: u16 = 262;
 const START_DATE: u16 = 0x8003;
@@ -117,7 +118,9 @@ pub(crate) fn read_zip(
     wanted: &dyn Fn(&ChannelInfo) -> bool,
 ) -> Result<Scan, ReadError> {
     let mut archive = Archive::open(bytes).map_err(damaged)?;
-    match archive.entry(IMAGE_ENTRY) {
+    let names = archive.names();
+    let name = names.iter().find(|name| name.starts_with(IMAGE_ENTRY));
+    match name.and_then(|name| archive.entry(name)) {
         Some(image) => read(&image.map_err(damaged)?, wanted),
         None => Err(ReadError::ForceCurve),
     }
@@ -439,7 +442,7 @@ mod tests {
     #[test]
     fn maps_hold_their_image_in_an_archive() {
         let header = ("header.properties", &b"#"[..]);
-        let map = zip(&[header, (IMAGE_ENTRY, &image(|_, _| {}))]);
+        let map = zip(&[header, ("data-image.jpk-qi-image", &image(|_, _| {}))]);
         let scan = crate::read(&map).expect("whole");
         assert_eq!(scan.channels[0].values()[0], 10.0);
         assert!(crate::read(&map[..map.len() / 2]).is_err());

@@ -88,7 +88,12 @@ pub fn read_selected(
     bytes: &[u8],
     wanted: &dyn Fn(&ChannelInfo) -> bool,
 ) -> Result<Scan, ReadError> {
-    let mut scan = dispatch(bytes, wanted)?;
+    let mut scan = dispatch(bytes, wanted).map_err(|mut error| {
+        if let ReadError::Incomplete { readable, .. } = &mut error {
+            whole::tidy(readable);
+        }
+        error
+    })?;
     whole::tidy(&mut scan);
     if whole::all_missing(&scan) {
         return Err(ReadError::AllMissing {

@@ -161,7 +161,7 @@ fn structure(c: &mut Cursor<'_>, version: f64) -> Result<(u32, Result<Header, St
         ));
     }
     let finite = |numbers: &[f64]| numbers.iter().all(|number| number.is_finite());
-    if !finite(&[gain, scale, offset]) {
+    if !finite(&[gain, scale, offset, gain * scale, gain * offset]) {
         return Ok((
             kind,
             Err(format!("expected a scale, found {gain}, {scale}, {offset}")),

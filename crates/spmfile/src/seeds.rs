@@ -51,3 +51,39 @@ fn names_of_targets() {
     assert_eq!(reader(Format::Iso28632), "iso28632");
     assert_eq!(reader(Format::NanoScopeForce), "nanoscope_force");
 }
+
+/// A small frame of the one format that unit tests do not write otherwise.
+#[test]
+fn a_small_frame_is_a_seed() {
+    use crate::{Channel, FrameDirection, LineDirection, Samples, Scan};
+    let channel = |name: &str, line| Channel {
+        name: name.to_owned(),
+        internal_name: name.to_owned(),
+        unit: "nm".to_owned(),
+        line_direction: Some(line),
+        scan_line: None,
+        rows: 4,
+        columns: 3,
+        width_nm: Some(30.0),
+        height_nm: Some(40.0),
+        scale: 0.5,
+        offset: 0.0,
+        scaling: String::new(),
+        plane_fit: None,
+        samples: Samples::I16((0..12).collect()),
+    };
+    let scan = Scan {
+        frame_direction: Some(FrameDirection::Down),
+        line_rate_hz: Some(1.0),
+        size_nm: Some([30.0, 40.0]),
+        channels: vec![
+            channel("Height", LineDirection::Trace),
+            channel("Xsensor", LineDirection::Retrace),
+        ],
+        ..Scan::default()
+    };
+    let bytes = crate::nanoscope::write(&scan).expect("finite values");
+    let read = crate::read(&bytes).expect("whole");
+    assert_eq!(read.channels.len(), 2);
+    assert_eq!(read.frame_direction, scan.frame_direction);
+}

@@ -1,7 +1,7 @@
 //! Does the file hold all that its header promises? The last step of readers of block formats.
 
 use crate::error::ReadError;
-use crate::scan::{Samples, Scan, UnreadableChannel};
+use crate::scan::{Channel, Samples, Scan, UnreadableChannel};
 
 /// More images than any instrument records at once.
 pub(crate) const MOST_CHANNELS: usize = 1024;
@@ -112,7 +112,7 @@ pub(crate) fn all_missing(scan: &Scan) -> bool {
     !scan.channels.is_empty() && scan.channels.iter().all(|c| missing(&c.samples))
 }
 
-/// Leaves out what cannot be a length, a time or a rate, as damaged headers hold it.
+/// Leaves out what cannot be a length, a time, a rate or a scale, as damaged headers hold it.
 pub(crate) fn tidy(scan: &mut Scan) {
     let positive = |n: &f64| *n > 0.0 && n.is_finite();
     scan.size_nm = scan.size_nm.filter(|size| size.iter().all(positive));
@@ -131,6 +131,16 @@ pub(crate) fn tidy(scan: &mut Scan) {
         channel.width_nm = channel.width_nm.filter(positive);
         channel.height_nm = channel.height_nm.filter(positive);
     }
+    let scaled = |channel: &Channel| channel.scale.is_finite() && channel.offset.is_finite();
+    let unscaled = scan.channels.extract_if(.., |channel| !scaled(channel));
+    scan.unreadable
+        .extend(unscaled.map(|channel| UnreadableChannel {
+            error: format!(
+                "expected a scale, found {} + {}",
+                channel.scale, channel.offset
+            ),
+            name: channel.name,
+        }));
 }
 
 #[cfg(test)]

@@ -427,7 +427,7 @@ mod tests {
             .map(|&b| char::from(b))
             .collect();
         let end = text.find("[Header end]\r\n").expect("an end") + 14;
-        let mut utf8 = text[..end].as_bytes().to_vec();
+        let mut utf8 = text.as_bytes()[..end].to_vec();
         utf8.extend((10..16i16).flat_map(i16::to_le_bytes));
         assert_eq!(crate::read(&utf8).expect("an image").size_nm, Some(size));
         assert_eq!(date("03/11/2011, 20:23:46"), None, "which is the month?");

@@ -13,6 +13,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::SCHEMA;
+use super::budget::BudgetResult;
+use super::checks::ChecksResult;
 use super::conventions::Conventions;
 use super::convert::{PER_MINUTE, PERCENT, correlation, degree, estimate, number};
 use super::lattice::{LatticeVector, ResultEstimate, TwistStrainResult};
@@ -75,6 +77,8 @@ pub struct SetResult {
     /// From the mean reciprocal lattice of up and down scans: free of constant drift without
     /// knowing it. The check on `mean`.
     pub forward_backward: Option<TwistStrainResult>,
+    /// Errors from the scatter of the scans; `null` without a joint fit.
+    pub checks: Option<ChecksResult>,
     /// The scans in order of time.
     pub scans: Vec<ScanResult>,
 }
@@ -134,6 +138,8 @@ pub struct MeanResult {
     /// Its twist and strain.
     #[serde(flatten)]
     pub twist_strain: TwistStrainResult,
+    /// What contributes to their uncertainty, calibration and model included.
+    pub budget: BudgetResult,
     /// L1, L2 and L3.
     pub vectors: [LatticeVector; 3],
     /// Standard deviation of the twist over the scans, degrees.
@@ -157,10 +163,16 @@ pub struct CombinedResult {
     /// Twist and strain of the weighted mean lattice.
     #[serde(flatten)]
     pub twist_strain: TwistStrainResult,
+    /// What contributes to their uncertainty, calibration and model included.
+    pub budget: BudgetResult,
     /// L1, L2 and L3.
     pub vectors: [LatticeVector; 3],
     /// The joint fit over all scans that made them; `null` for the other methods.
     pub joint: Option<super::JointResult>,
+    /// The drift in the middle of the campaign, where one joint fit over all scans describes it.
+    pub drift: Option<DriftResult>,
+    /// Errors from the scatter of the scans; `null` without a joint fit.
+    pub checks: Option<ChecksResult>,
     /// How far every two sets are apart.
     pub consistency: Vec<ConsistencyResult>,
 }
@@ -228,6 +240,7 @@ fn set_result(set: &SetAnalysis, material: &Material) -> SetResult {
         mean: set.mean.as_ref().map(|m| mean(m, material)),
         uncorrected: set.uncorrected.as_ref().map(|m| mean(m, material)),
         forward_backward: set.forward_backward.as_ref().map(Into::into),
+        checks: set.checks.as_ref().map(Into::into),
         scans: set
             .scans
             .iter()
@@ -292,6 +305,7 @@ fn mean(mean: &SetMean, material: &Material) -> MeanResult {
     };
     MeanResult {
         twist_strain: result.into(),
+        budget: BudgetResult::of(&mean.budget, result),
         vectors: LatticeVector::all(&mean.lattice, material),
         twist_scatter_deg: number(mean.twist_scatter * degree()),
         strain_scatter_percent: number(mean.strain_scatter * PERCENT),
@@ -305,8 +319,11 @@ fn mean(mean: &SetMean, material: &Material) -> MeanResult {
 fn combined(combined: &Combined, material: &Material) -> CombinedResult {
     CombinedResult {
         twist_strain: (&combined.twist_strain).into(),
+        budget: BudgetResult::of(&combined.budget, &combined.twist_strain),
         vectors: LatticeVector::all(&combined.lattice, material),
         joint: combined.joint.as_ref().map(Into::into),
+        drift: combined.drift.as_ref().map(drift),
+        checks: combined.checks.as_ref().map(Into::into),
         consistency: combined.consistency.iter().map(consistency).collect(),
     }
 }

@@ -11,7 +11,7 @@ use super::lattice::ResultEstimate;
 const PER_MINUTE2: f64 = 3600.0;
 
 /// Terms of a joint fit; those that are `null` did not earn their place by the information criterion.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct JointResult {
     /// Whether phases link the frames, which tightens the drift by an order of magnitude.
     pub phases_linked: bool,
@@ -23,6 +23,19 @@ pub struct JointResult {
     pub fast_gain_percent: Option<ResultEstimate>,
     /// Scatter of the positions beyond the noise of the phases.
     pub position_instability_pm: Option<f64>,
+    /// The terms that were tried beside a constant drift.
+    pub tested: Vec<TestedResult>,
+}
+
+/// A term that was tried.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct TestedResult {
+    /// `acceleration`, `settling` or `fast-axis gain`.
+    pub term: String,
+    /// By how much it lowers the Bayesian information criterion; below 0 it does not pay.
+    pub criterion_gain: Option<f64>,
+    /// Whether the fit has it.
+    pub used: bool,
 }
 
 impl From<&JointTerms> for JointResult {
@@ -33,6 +46,15 @@ impl From<&JointTerms> for JointResult {
             settling_min: terms.settling_s.and_then(|s| number(s / 60.0)),
             fast_gain_percent: terms.fast_gain.map(|g| estimate(g, 100.0)),
             position_instability_pm: number(terms.instability_nm * 1000.0).filter(|_| terms.phases),
+            tested: terms
+                .tested
+                .iter()
+                .map(|t| TestedResult {
+                    term: t.name.to_owned(),
+                    criterion_gain: number(t.gain),
+                    used: t.used,
+                })
+                .collect(),
         }
     }
 }

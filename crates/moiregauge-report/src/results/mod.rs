@@ -3,6 +3,8 @@
 //! In: an analysis in nm, s and rad and its provenance. Out: [`Results`], which serialises to
 //! `results.json` and is described by [`schema`]. A number that is not known is `null`, never NaN.
 
+mod budget;
+mod checks;
 mod conventions;
 mod convert;
 mod document;
@@ -10,12 +12,15 @@ mod joint;
 mod lattice;
 mod scan;
 
+pub(crate) use budget::source_name;
+pub use budget::{BudgetColumn, BudgetResult};
+pub use checks::{ChecksResult, ResidualResult, ScatterResult};
 pub use conventions::Conventions;
 pub use document::{
     CombinedResult, ConsistencyResult, DriftFitResult, DriftMonteCarloResult, DriftResult,
     InputProvenance, MeanResult, Results, SetResult,
 };
-pub use joint::JointResult;
+pub use joint::{JointResult, TestedResult};
 pub use lattice::{LatticeVector, ResultEstimate, StrainMonteCarlo, TwistStrainResult};
 pub use scan::{LineResult, ScanResult, ScanTwistStrain, ScanVector, TipVelocity, Window};
 

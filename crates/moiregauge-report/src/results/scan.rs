@@ -6,6 +6,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use spmfile::{DateTime, FrameDirection, LineDirection};
 
+use super::checks::ResidualResult;
 use super::convert::{estimate, number, pair, square};
 use super::lattice::{LatticeVector, NAMES, ResultEstimate, StrainMonteCarlo, TwistStrainResult};
 
@@ -28,6 +29,10 @@ pub struct ScanResult {
     pub twist_strain: ScanTwistStrain,
     /// Mean and spread of the Monte Carlo draws behind the best of `twist_strain`.
     pub monte_carlo: Option<StrainMonteCarlo>,
+    /// How it lies against the other scans; `null` without a joint fit.
+    pub residual: Option<ResidualResult>,
+    /// Why it was not used for the results of its set; `null` where it was.
+    pub excluded: Option<String>,
     /// The line directions that were used.
     pub lines: Vec<LineResult>,
 }
@@ -123,6 +128,8 @@ impl ScanResult {
                 drift_corrected: scan.twist_strain.as_ref().map(Into::into),
             },
             monte_carlo: StrainMonteCarlo::of(&scan.draws),
+            residual: scan.residual.as_ref().map(Into::into),
+            excluded: scan.excluded.clone(),
             lines: scan
                 .lines
                 .iter()

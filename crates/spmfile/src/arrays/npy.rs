@@ -11,6 +11,8 @@ const MAGIC: &[u8] = b"\x93NUMPY";
 
 /// Reads an array of two dimensions, not counting those of length 1 where there are more.
 pub(super) fn read(bytes: &[u8]) -> Result<Plane, String> {
+    #[cfg(test)]
+    crate::seeds::keep(bytes);
     let mut cursor = Cursor::new(bytes, Endian::Little);
     if cursor.slice(MAGIC.len(), "the mark of an array")? != MAGIC {
         return Err("expected the mark of an array, found other bytes".to_owned());

@@ -30,6 +30,8 @@ const TOP_FIRST: Order = Order {
 
 /// Reads a PNG picture, 8 or 16 bits deep.
 pub(super) fn png(bytes: &[u8]) -> Result<Plane, String> {
+    #[cfg(test)]
+    crate::seeds::keep(bytes);
     let limit = unpacked_limit(bytes.len());
     let mut decoder = png::Decoder::new_with_limits(
         Bytes::new(bytes),
@@ -72,6 +74,8 @@ pub(super) fn png(bytes: &[u8]) -> Result<Plane, String> {
 
 /// Reads a JPEG picture as its luminance.
 pub(super) fn jpeg(bytes: &[u8]) -> Result<Plane, String> {
+    #[cfg(test)]
+    crate::seeds::keep(bytes);
     let options = DecoderOptions::default()
         .set_max_width(usize::from(u16::MAX))
         .set_max_height(usize::from(u16::MAX))
@@ -102,6 +106,8 @@ pub(super) fn jpeg(bytes: &[u8]) -> Result<Plane, String> {
 
 /// Reads every picture of a TIFF file.
 pub(super) fn tiff(bytes: &[u8]) -> Result<Vec<Plane>, String> {
+    #[cfg(test)]
+    crate::seeds::keep(bytes);
     let words = |error: tiff::TiffError| error.to_string();
     let mut left = unpacked_limit(bytes.len()) as usize;
     let mut decoder = Decoder::new(Bytes::new(bytes)).map_err(words)?;
@@ -336,6 +342,55 @@ mod tests {
             made::<colortype::RGB8>(&grey),
             Samples::I16(vec![3, 4, 1, 2])
         );
+    }
+
+    /// Two blocks of 8 × 8 pixels, one above the other, coded by hand (ITU-T T.81, annexes B and F).
+    ///
+    /// Every quantum is 8, so that a block of nothing but the coefficient `c` has the value 128 + `c`.
+    /// The one code for coefficients is a 0 bit, for differences of four bits; so is the one for the
+    /// end of a block. Each block has the difference 10 to the one before.
+    fn grey_jpeg() -> Vec<u8> {
+        let segment = |mark: u8, content: &[u8]| {
+            let length = (content.len() as u16 + 2).to_be_bytes();
+            [&[0xff, mark], &length[..], content].concat()
+        };
+        let one_code = |class: u8, value: u8| {
+            let mut table = vec![class, 1];
+            table.extend([0; 15]);
+            table.push(value);
+            segment(0xc4, &table)
+        };
+        [
+            vec![0xff, 0xd8],
+            segment(0xdb, &[&[0], &[8; 64][..]].concat()),
+            segment(0xc0, &[8, 0, 16, 0, 8, 1, 1, 0x11, 0]),
+            one_code(0, 4),
+            one_code(0x10, 0),
+            segment(0xda, &[1, 1, 0, 0, 63, 0]),
+            // 0 1010 0, 0 1010 0, filled up with ones.
+            vec![0b0101_0001, 0b0100_1111, 0xff, 0xd9],
+        ]
+        .concat()
+    }
+
+    #[test]
+    fn grey_jpegs_keep_their_values() {
+        let bytes = grey_jpeg();
+        let plane = jpeg(&bytes).expect("a picture");
+        assert_eq!((plane.rows, plane.columns, plane.rendering), (16, 8, false));
+        let Samples::I16(values) = plane.samples else {
+            panic!("bytes");
+        };
+        assert!(values[..64].iter().all(|&v| v == 148), "{values:?}");
+        assert!(values[64..].iter().all(|&v| v == 138), "{values:?}");
+        let mut large = bytes;
+        let size = large
+            .windows(2)
+            .position(|w| w == [0xff, 0xc0])
+            .expect("a size");
+        large[size + 5..size + 9].fill(0xff);
+        let error = jpeg(&large).err().expect("too large");
+        assert!(error.contains("too many"), "{error}");
     }
 
     #[test]

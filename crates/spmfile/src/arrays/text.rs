@@ -11,6 +11,8 @@ use crate::units::{clean, nm_per};
 
 /// Reads a matrix and what its comments tell.
 pub(super) fn read(bytes: &[u8]) -> Result<(Told, Plane), String> {
+    #[cfg(test)]
+    crate::seeds::keep(bytes);
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     let mut told = Told::default();
     let mut size = [None, None];

@@ -26,7 +26,7 @@ const ODD: [u64; 12] = [
     u64::MAX,
 ];
 
-/// A sequence of numbers from a seed (SplitMix64 of Steele, Lea and Flood, 2014).
+/// A sequence of numbers from a seed (`SplitMix64` of Steele, Lea and Flood, 2014).
 pub(crate) struct Dice(pub(crate) u64);
 
 impl Dice {
