@@ -39,8 +39,7 @@ fn both_sets_together_reach_the_goal() {
     };
     let truth = &sets[0].1;
     let combined = &found["combined"];
-    let mut check = |pointer: &str, expected: f64, bound: f64| {
-        let (value, sigma) = estimate(combined, pointer);
+    let check = |pointer: &str, (value, sigma): (f64, f64), expected: f64, bound: f64| {
         let off = (value - expected).abs();
         assert!(
             off < bound && off < 3.0 * sigma && sigma < bound,
@@ -49,9 +48,11 @@ fn both_sets_together_reach_the_goal() {
     };
     for (i, axis) in ["x", "y"].iter().enumerate() {
         let expected = number(truth, &format!("/drift_nm_per_min/{i}"));
-        check(&format!("/drift/{axis}_nm_per_min"), expected, 0.006);
+        let pointer = format!("/drift/{axis}_nm_per_min");
+        check(&pointer, estimate(combined, &pointer), expected, 0.006);
     }
-    check("/twist_deg", number(truth, "/theta_deg"), 0.0003);
+    let twist = estimate(combined, "/twist_deg");
+    check("/twist_deg", twist, number(truth, "/theta_deg"), 0.0003);
     let axis: f64 = ["/phi_deg", "/alpha_deg", "/theta_deg"]
         .map(|part| number(truth, part))
         .iter()
@@ -61,7 +62,10 @@ fn both_sets_together_reach_the_goal() {
         .into_iter()
         .enumerate()
     {
-        check(&format!("/strain_vector_percent/{i}"), expected, 0.001);
+        let pointer = format!("/strain_vector_percent/{i}");
+        let variance = number(combined, &format!("/strain_vector_covariance/{i}/{i}"));
+        let found = (number(combined, &pointer), variance.sqrt());
+        check(&pointer, found, expected, 0.001);
     }
 }
 

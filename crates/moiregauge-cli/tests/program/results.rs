@@ -321,13 +321,13 @@ fn the_printed_settings_fed_back_change_nothing() {
     assert!(plain == bytes("fed-back", Some(&config), &[]));
 
     // An edited file counts like the option, and the option wins over the file.
-    let edited = printed.replace("method = \"autocorrelation\"", "method = \"fourier\"");
+    let edited = printed.replace("method = \"lattice\"", "method = \"fourier\"");
     assert_ne!(edited, printed);
     std::fs::write(&config, edited).unwrap();
     let fourier = bytes("edited", Some(&config), &[]);
     assert!(fourier != plain);
     assert!(fourier == bytes("option", None, &["--method", "fourier"]));
-    let back = ["--method", "autocorrelation"];
+    let back = ["--method", "lattice"];
     assert!(plain == bytes("over", Some(&config), &back));
 }
 

@@ -43,7 +43,10 @@ pub(super) fn sightings(
                 fast_gain: dual * Matrix2::new(1.0, 0.0, 0.0, 0.0) * j.transpose(),
                 time: time.unwrap_or(0.0),
                 position: line.geometry.origin + j * line.lattice.middle,
-                phases: time.and_then(|_| phases(line, &dual, &reference)),
+                // Without sensors a window that creeps would pass for drift of the sample.
+                phases: time
+                    .filter(|_| line.geometry.from_sensors)
+                    .and_then(|_| phases(line, &dual, &reference)),
             });
         }
     }
