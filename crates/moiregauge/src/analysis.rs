@@ -114,6 +114,8 @@ pub struct SetMean {
     pub strain_scatter: f64,
     /// χ² per degree of freedom of the scans against the common lattice; NaN where there is none.
     pub chi2_per_dof: f64,
+    /// Factor by which all variances were enlarged for that scatter; 1 where it is not significant.
+    pub enlargement: f64,
     /// Whether each scan's wavelengths lie within ±1 % of the common ones.
     pub within_one_percent: bool,
 }

@@ -7,6 +7,7 @@ pub mod background;
 pub mod bound;
 pub mod budget;
 pub mod caveat;
+mod chi2;
 pub mod drift;
 pub mod estimate;
 pub mod geometry;

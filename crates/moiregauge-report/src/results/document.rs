@@ -146,8 +146,8 @@ pub struct MeanResult {
     pub twist_scatter_deg: Option<f64>,
     /// Root-mean-square deviation per component of the strain vector over the scans, per cent.
     pub strain_scatter_percent: Option<f64>,
-    /// χ² per degree of freedom of the scans against this lattice. Where it exceeds 1, every σ of
-    /// this object is enlarged by its square root.
+    /// χ² per degree of freedom of the scans against this lattice. Where it is significantly above 1
+    /// (p < 0.05), every σ of this object is enlarged by its square root.
     pub chi2_per_dof: Option<f64>,
     /// σ of the twist before it was enlarged by √(χ²/dof), degrees.
     pub twist_sigma_unscaled_deg: Option<f64>,
@@ -298,9 +298,8 @@ fn drift_monte_carlo(draws: &DriftMonteCarlo) -> DriftMonteCarloResult {
 
 fn mean(mean: &SetMean, material: &Material) -> MeanResult {
     let result = &mean.twist_strain;
-    // The covariance of a set is enlarged by χ²/dof where that exceeds 1; NaN means there is none.
     let unscaled = TwistStrain {
-        covariance: result.covariance / mean.chi2_per_dof.max(1.0),
+        covariance: result.covariance / mean.enlargement,
         ..*result
     };
     MeanResult {

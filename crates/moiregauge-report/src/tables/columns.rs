@@ -232,7 +232,7 @@ impl<'a> Row<'a> for SetRow<'a> {
         "strain_interval_95_high_percent", "its upper end", |r| number(r.result().and_then(|t| t.strain_interval_95_percent[1]));
         "strain_upper_limit_95_percent", "not exceeded with 95 % confidence", |r| number(r.result().and_then(|t| t.strain_upper_limit_95_percent));
         "lattice_angle_deg", "orientation α of layer 1, modulo 60°", |r| value(r.result().map(|t| t.lattice_angle_deg));
-        "chi2_per_dof", "χ² per degree of freedom of the scans against the common lattice; every σ is enlarged by its square root where it exceeds 1", |r| number(r.mean().and_then(|m| m.chi2_per_dof));
+        "chi2_per_dof", "χ² per degree of freedom of the scans against the common lattice; every σ is enlarged by its square root where it is significantly above 1 (p < 0.05)", |r| number(r.mean().and_then(|m| m.chi2_per_dof));
         "within_one_percent", "whether all wavelengths lie within ±1 % of the common ones", |r| r.mean().map_or_else(String::new, |m| m.within_one_percent.to_string());
     };
 

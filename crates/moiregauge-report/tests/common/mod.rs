@@ -229,6 +229,7 @@ fn mean(
                 .sum(),
         ),
         chi2_per_dof,
+        enlargement: chi2_per_dof.max(1.0),
         within_one_percent: true,
     })
 }

@@ -6,6 +6,7 @@ use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
 use super::evaluate::{DRIFT, Layout, Linearised, linearise, wrapped};
 use super::link::number_blocks;
 use super::{Sighting, Terms};
+use crate::chi2::enlargement;
 use crate::estimate::Estimate;
 use crate::lattice::LatticeVectors;
 
@@ -298,8 +299,7 @@ impl Problem {
         }
         let chi2: f64 = last.residuals.iter().map(|r| r * r).sum();
         let degrees_of_freedom = last.residuals.len().saturating_sub(layout.size);
-        let excess = (chi2 / degrees_of_freedom.max(1) as f64).max(1.0);
-        let covariance = &unscaled * excess;
+        let covariance = &unscaled * enlargement(chi2, degrees_of_freedom);
         let (velocity, velocity_covariance) = motion(&layout, &x, &covariance, layout.origin);
         Some(JointFit {
             waves: LatticeVectors {

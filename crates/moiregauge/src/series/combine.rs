@@ -9,6 +9,7 @@ use super::sightings::middle_of_frame;
 use crate::analysis::{Combined, Consistency, Drift, SetAnalysis, SetMean};
 use crate::budget::{Budget, Statistical};
 use crate::caveat::Caveat;
+use crate::chi2::enlargement;
 use crate::joint::JointFit;
 use crate::lattice::LatticeVectors;
 use crate::settings::Settings;
@@ -187,11 +188,7 @@ fn weighted_mean(means: &[&SetMean]) -> Option<(LatticeVectors, Statistical)> {
         })
         .sum();
     let freedom = 4 * (means.len() - 1);
-    let scale = if freedom > 0 {
-        (chi2 / freedom as f64).max(1.0)
-    } else {
-        1.0
-    };
+    let scale = enlargement(chi2, freedom);
     let parts: Vec<Statistical> = means.iter().map(|m| m.budget.statistical).collect();
     let lattice = LatticeVectors {
         basis: Matrix2::new(flat[0], flat[2], flat[1], flat[3]),

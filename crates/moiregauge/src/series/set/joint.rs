@@ -6,6 +6,7 @@ use spmfile::FrameDirection;
 use super::Solved;
 use crate::analysis::{Checks, Drift, JointTerms, Residual, Scatter};
 use crate::budget::Statistical;
+use crate::chi2::{enlargement, tail};
 use crate::drift::{Observation, solve};
 use crate::geometry::mean_and_spread;
 use crate::joint::{JointFit, LeftOut, Resampled, fit};
@@ -49,6 +50,7 @@ pub(super) fn jointly(
         statistical,
         chi2: fit.chi2,
         freedom: fit.degrees_of_freedom,
+        enlargement: enlargement(fit.chi2, fit.degrees_of_freedom),
     };
     (solved, Some(fit))
 }
@@ -107,7 +109,7 @@ pub(super) fn residuals(left_out: &[LeftOut]) -> Vec<Residual> {
         .map(|one| {
             let (rest, freedom) = one.rest;
             let scale = (rest / freedom.max(1) as f64).max(1.0);
-            let p_value = chi2_tail(one.chi2 / scale, one.degrees_of_freedom);
+            let p_value = tail(one.chi2 / scale, one.degrees_of_freedom);
             Residual {
                 chi2: one.chi2,
                 degrees_of_freedom: one.degrees_of_freedom,
@@ -248,25 +250,6 @@ fn half_width(values: &[f64]) -> f64 {
     (at(0.841_345) - at(0.158_655)) / 2.0
 }
 
-/// The probability of a χ² of `freedom` degrees beyond `chi2`, by the recurrence
-/// `Q(a + 1, x) = Q(a, x) + xᵃ e⁻ˣ / Γ(a + 1)` from `Q(½, x) = erfc √x` or `Q(1, x) = e⁻ˣ`, x = χ²/2.
-fn chi2_tail(chi2: f64, freedom: usize) -> f64 {
-    let x = chi2.max(0.0) / 2.0;
-    if x == 0.0 || freedom == 0 {
-        return 1.0;
-    }
-    let (mut a, mut tail) = if freedom % 2 == 1 {
-        (0.5, libm::erfc(x.sqrt()))
-    } else {
-        (1.0, (-x).exp())
-    };
-    while a < freedom as f64 / 2.0 - 0.25 {
-        tail += (a * x.ln() - x - libm::lgamma(a + 1.0)).exp();
-        a += 1.0;
-    }
-    tail.min(1.0)
-}
-
 /// The drift of each scan, by the time of its middle.
 pub(super) fn velocity_of(
     fit: &JointFit,
@@ -278,24 +261,6 @@ pub(super) fn velocity_of(
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// Quantiles of the χ² distribution from tables (Abramowitz and Stegun, table 26.8).
-    #[test]
-    fn tails_of_chi_squared() {
-        let table = [
-            (3.841_459, 1, 0.05),
-            (5.991_465, 2, 0.05),
-            (7.814_728, 3, 0.05),
-            (23.684_79, 14, 0.05),
-            (36.123_27, 14, 0.001),
-            (37.697_30, 15, 0.001),
-            (7.260_94, 15, 0.95),
-        ];
-        for (chi2, freedom, expected) in table {
-            let found = chi2_tail(chi2, freedom);
-            assert!((found / expected - 1.0).abs() < 1e-5, "{freedom}: {found}");
-        }
-    }
 
     /// Half widths of a normal distribution, from its quantiles.
     #[test]

@@ -17,6 +17,7 @@ use crate::analysis::{
 };
 use crate::budget::{Budget, Statistical};
 use crate::caveat::Caveat;
+use crate::chi2::enlargement;
 use crate::drift::paper::{PaperScan, pairwise_drift};
 use crate::drift::{Observation, at_known_drift, common_lattice, monte_carlo, solve};
 use crate::geometry::mean_and_spread;
@@ -29,6 +30,9 @@ use crate::strain::{TwistStrain, draws, twist_strain};
 const PER_MINUTE: f64 = 1.0 / 60.0;
 /// χ²/dof beyond which the scatter of the scans deserves a word.
 const LARGE_CHI2: f64 = 2.0;
+
+/// The scatter of fewer scans is too uncertain itself to doubt the errors.
+const FEWEST_TO_DOUBT: usize = 6;
 
 /// Everything about one set but its illustration. `first_index` numbers its scans for the draws.
 /// Scans that are left out by rule are marked in the group.
@@ -113,12 +117,12 @@ pub(super) fn analyse_set(
             let of = |s: &ScanAnalysis| (s.twist_strain_sensor, s.sensor);
             let [image, sensor] = at_known_drift(&all)?;
             let statistical = Statistical::without_drift(&image, &sensor);
-            set_mean(common, &statistical, of_set().map(of), settings)
+            set_mean((common, 1.0), &statistical, of_set().map(of), settings)
         });
     let mean = solved.as_ref().and_then(|s| {
         let of = |s: &ScanAnalysis| (s.twist_strain, s.drift_corrected.unwrap_or(s.sensor));
         set_mean(
-            (s.lattice, s.chi2, s.freedom),
+            ((s.lattice, s.chi2, s.freedom), s.enlargement),
             &s.statistical,
             of_set().map(of),
             settings,
@@ -180,6 +184,8 @@ struct Solved {
     statistical: Statistical,
     chi2: f64,
     freedom: usize,
+    /// By which the variances were enlarged for the scatter of the scans.
+    enlargement: f64,
 }
 
 fn observations(scan: &MeasuredScan, reference: &Matrix2<f64>) -> Vec<Observation> {
@@ -214,7 +220,7 @@ fn drift(
     }
     match solve(all) {
         Ok(solution) => {
-            let scale = excess(solution.chi2, solution.degrees_of_freedom);
+            let scale = enlargement(solution.chi2, solution.degrees_of_freedom);
             let mut lattice = solution.lattice;
             lattice.covariance *= scale;
             let statistical =
@@ -240,6 +246,7 @@ fn drift(
                 statistical,
                 chi2: solution.chi2,
                 freedom: solution.degrees_of_freedom,
+                enlargement: scale,
             })
         }
         Err(error) => {
@@ -266,7 +273,7 @@ fn given_drift(
     let (mut lattice, chi2, freedom) = common_lattice(all, &velocity, &covariance).ok()?;
     // Scatter enlarges what the scans say, not what the user said of the drift.
     let (measured, _, _) = common_lattice(all, &velocity, &Matrix2::zeros()).ok()?;
-    let scale = excess(chi2, freedom);
+    let scale = enlargement(chi2, freedom);
     lattice.covariance += measured.covariance * (scale - 1.0);
     let parts = at_known_drift(all)?;
     Some(Solved {
@@ -282,15 +289,8 @@ fn given_drift(
         lattice,
         chi2,
         freedom,
+        enlargement: scale,
     })
-}
-
-/// By how much the variances have to grow for the scatter to be what they say; never shrinks them.
-fn excess(chi2: f64, freedom: usize) -> f64 {
-    if freedom == 0 {
-        return 1.0;
-    }
-    (chi2 / freedom as f64).max(1.0)
 }
 
 /// The scans as the published estimate wants them: signed velocities in laboratory axes.
@@ -322,7 +322,7 @@ fn paper_scans(scans: &[&MeasuredScan], all: &[Observation]) -> Vec<PaperScan> {
 
 /// Twist and strain of the common lattice, and how the scans scatter about it.
 fn set_mean(
-    (lattice, chi2, freedom): (LatticeVectors, f64, usize),
+    ((lattice, chi2, freedom), enlargement): ((LatticeVectors, f64, usize), f64),
     statistical: &Statistical,
     scans: impl Iterator<Item = (Option<TwistStrain>, LatticeVectors)>,
     settings: &Settings,
@@ -349,6 +349,7 @@ fn set_mean(
         twist_scatter: mean_and_spread(&twists).sigma,
         strain_scatter: component(0).hypot(component(1)) / std::f64::consts::SQRT_2,
         chi2_per_dof: chi2 / freedom as f64,
+        enlargement,
         within_one_percent: within,
     })
 }
@@ -454,6 +455,9 @@ fn about_checks(
     n: usize,
     caveats: &mut Vec<Caveat>,
 ) {
+    if n < FEWEST_TO_DOUBT {
+        return;
+    }
     let (Some(found), Some(drift), Some(mean)) =
         (checks.and_then(|c| c.leave_one_out), drift, mean)
     else {
