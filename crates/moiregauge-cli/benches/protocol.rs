@@ -41,7 +41,7 @@ fn analyze(scans: &Path, out: &Path, threads: usize, method: &str) {
 fn ten_scans_by_threads(bencher: Bencher<'_, '_>, threads: usize) {
     let (folder, scans) = scans();
     let out = folder.path().join("out");
-    bencher.bench(|| analyze(&scans, &out, threads, "autocorrelation"));
+    bencher.bench(|| analyze(&scans, &out, threads, "lattice"));
 }
 
 #[divan::bench(args = ["autocorrelation", "fourier", "lattice", "paper"], sample_count = 5, sample_size = 1)]
@@ -49,6 +49,26 @@ fn ten_scans_by_method(bencher: Bencher<'_, '_>, method: &str) {
     let (folder, scans) = scans();
     let out = folder.path().join("out");
     bencher.bench(|| analyze(&scans, &out, 2, method));
+}
+
+/// The three sets of arXiv 2406.08681: 26 scans, trace and retrace; the joint fit beside the
+/// autocorrelation route, two threads.
+#[divan::bench(args = ["lattice", "autocorrelation"], sample_count = 3, sample_size = 1)]
+fn three_sets_of_26_scans(bencher: Bencher<'_, '_>, method: &str) {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let sets = folder.path().join("sets");
+    succeed(program().args(["simulate", "--paper", "--out"]).arg(&sets));
+    let entries = std::fs::read_dir(&sets).expect("the folder of the sets");
+    let mut paths: Vec<PathBuf> = entries.map(|e| e.expect("an entry").path()).collect();
+    paths.retain(|path| path.is_dir());
+    paths.sort();
+    let out = folder.path().join("out");
+    bencher.bench(|| {
+        let mut command = program();
+        command.arg("analyze").args(&paths).arg("--out").arg(&out);
+        command.args(["--no-report", "--quiet", "--force", "--threads", "2"]);
+        succeed(command.args(["--method", method]));
+    });
 }
 
 #[divan::bench(sample_count = 5, sample_size = 1)]

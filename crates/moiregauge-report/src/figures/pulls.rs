@@ -11,7 +11,8 @@ use crate::stats::Histogram;
 
 /// Beyond this no pull is shown one by one; the outermost bins hold what lies further out.
 const REACH: f64 = 4.0;
-const BINS: usize = 32;
+/// A bin is half a σ wide where there are few sets, a quarter where there are many.
+const FEW: usize = 400;
 
 /// One panel for each quantity: its name and its pulls. At most six.
 ///
@@ -37,7 +38,7 @@ pub fn pulls(quantities: &[(&str, Vec<f64>)]) -> Result<Drawing, String> {
         .iter()
         .map(|(_, pulls)| {
             let held: Vec<f64> = pulls.iter().map(|p| p.clamp(-edge, edge)).collect();
-            Histogram::of(&held, x, BINS)
+            Histogram::of(&held, x, if pulls.len() < FEW { 16 } else { 32 })
         })
         .collect();
     let normal = |count: f64, step: f64| {
@@ -60,14 +61,20 @@ pub fn pulls(quantities: &[(&str, Vec<f64>)]) -> Result<Drawing, String> {
             svg.polyline(&curve, &Ink::line(BLACK, LINE));
         });
         let title = format!("{name}, rms {:.2}", rms(pulls));
+        // The lowest panel of a column bears the numbers.
+        let lowest = i + 3 >= quantities.len();
         axes.draw(
             &mut svg,
             &Labels {
                 letter: LETTERS[i],
                 title: &title,
-                x: "(found − true) / σ",
+                x: if lowest { "(found − true) / σ" } else { "" },
                 y: if i % 3 == 0 { "sets" } else { "" },
-                y_ticks: Ticks::Values,
+                x_ticks: if lowest {
+                    Ticks::Values
+                } else {
+                    Ticks::BareValues
+                },
                 ..Labels::default()
             },
         );
