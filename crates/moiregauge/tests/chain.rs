@@ -351,3 +351,38 @@ fn sets_with_drifts_of_their_own_are_not_joined() {
         );
     }
 }
+
+/// A retrace that repeats the trace adds nothing: the errors are those of the trace alone. With noise of
+/// its own it makes them smaller by √2.
+#[test]
+fn noise_that_trace_and_retrace_share_counts_once() {
+    let mut simulation = small_set(31);
+    (simulation.noise.line_deg, simulation.noise.flicker_deg) = (0.0, 0.0);
+    simulation.noise.sensor_nm = 0.01;
+    let independent = frames(&simulation);
+    let mut repeated = independent.clone();
+    for scan in &mut repeated {
+        let trace = scan.channels[0].samples.clone();
+        let retrace = &mut scan.channels[1];
+        assert_eq!(
+            retrace.line_direction,
+            Some(spmfile::LineDirection::Retrace)
+        );
+        retrace.samples = trace;
+    }
+    let settings = quick(Method::Lattice);
+    let trace_only = Settings {
+        line: moiregauge::settings::Lines::Trace,
+        ..settings.clone()
+    };
+    let sigma = |scans: &[Scan], settings: &Settings| {
+        let analysis = analyse_frames(scans, settings);
+        let mean = analysis.sets[0].mean.as_ref().unwrap();
+        mean.twist_strain.twist().sigma / mean.enlargement.sqrt()
+    };
+    let one = sigma(&independent, &trace_only);
+    let twice = sigma(&repeated, &settings);
+    assert!((twice / one - 1.0).abs() < 0.05, "{}", twice / one);
+    let two = sigma(&independent, &settings);
+    assert!((two / one - 0.5_f64.sqrt()).abs() < 0.08, "{}", two / one);
+}

@@ -122,6 +122,11 @@ impl Spectrum {
         self.values[ky * self.half() + kx].norm_sqr()
     }
 
+    /// Value at the grid point (column frequency `kx ≥ 0`, row frequency `ky` mod rows).
+    pub(crate) fn value(&self, kx: usize, ky: usize) -> Complex64 {
+        self.values[ky * self.half() + kx]
+    }
+
     /// Grid step, rad per pixel, along columns and rows.
     pub(crate) fn step(&self) -> Vector2<f64> {
         std::f64::consts::TAU * Vector2::new(1.0 / self.columns as f64, 1.0 / self.rows as f64)

@@ -5,6 +5,7 @@ use spmfile::{Channel, DateTime, FrameDirection, LineDirection, Scan};
 
 use super::channel::{choose_channel, stem};
 use super::overlap::Window;
+use super::shared::correlation;
 use crate::caveat::Caveat;
 use crate::drift::Observation;
 use crate::estimate::Estimate;
@@ -170,6 +171,7 @@ pub fn measure_scan(
     if lines.is_empty() {
         return Err(failures.swap_remove(0));
     }
+    share_noise(&mut lines);
     for error in failures {
         caveats.push(Caveat::new(
             "line-left-out",
@@ -190,6 +192,28 @@ pub fn measure_scan(
         excluded: None,
         caveats,
     })
+}
+
+/// Enlarges the errors of trace and retrace by what their noise has in common, so that they can be
+/// taken as independent.
+fn share_noise(lines: &mut [MeasuredLine]) {
+    let [first, second] = lines else { return };
+    let (Some(a), Some(b)) = (&first.lattice.fit, &second.lattice.fit) else {
+        return;
+    };
+    let correlations = [correlation(a, b), correlation(b, a)];
+    for (line, correlation) in [first, second].into_iter().zip(correlations) {
+        let (mut weighted, mut weights) = (0.0, 0.0);
+        for (phase, correlation) in line.lattice.phases.iter_mut().zip(correlation) {
+            let weight = phase.sigma.powi(-2);
+            weighted += weight * correlation;
+            weights += weight;
+            phase.sigma *= (1.0 + correlation).sqrt();
+        }
+        if weights > 0.0 {
+            line.lattice.pixels.covariance *= 1.0 + weighted / weights;
+        }
+    }
 }
 
 /// The images to measure: the chosen channel in the chosen line directions, main scan line first.

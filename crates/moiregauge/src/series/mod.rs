@@ -10,6 +10,7 @@ mod illustrate;
 mod measure;
 mod overlap;
 mod set;
+mod shared;
 mod sightings;
 
 pub use channel::choose_channel;

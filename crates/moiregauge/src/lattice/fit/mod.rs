@@ -80,6 +80,9 @@ pub struct LatticeFit {
     pub clipped: f64,
     /// The strongest wave that is left and none of the lattice's: a second lattice, or pick-up.
     pub foreign_wave: Option<ForeignWave>,
+    /// The transform of what is left, across the lines from each of the first three harmonics: (columns, rows) in
+    /// cycles per frame and value. Two images of one scan tell by it what noise they share.
+    pub(crate) residual: [Vec<([i64; 2], Complex64)>; 3],
     /// How the lattice changes across the frame; `None` where the frame is too small to tell.
     pub inhomogeneity: Option<Inhomogeneity>,
 }
@@ -357,9 +360,9 @@ impl<'a> Fit<'a> {
                     index,
                     amplitude,
                     phase: (-beta).atan2(alpha),
-                    signal_to_noise: 0.5
-                        * amplitude
-                        * (2.0 * pixels / (local[0] + local[1])).sqrt(),
+                    // The noise on the y component is that at the harmonic's own kx: on the ridge of
+                    // line noise it is the phase's, and that on the x component is not.
+                    signal_to_noise: 0.5 * amplitude * (pixels / local[1]).sqrt(),
                 }
             });
         let [columns, rows] = [
@@ -375,6 +378,10 @@ impl<'a> Fit<'a> {
             lines_left_out: self.frame.image.rows - self.frame.lines(),
             clipped: self.clipped as f64 / pixels,
             foreign_wave: noise.residual.foreign_wave(&self.frame, &self.model),
+            residual: [0, 1, 2].map(|i| {
+                let index = self.model.basis.indices[i];
+                noise.residual.samples(frame::wave(&self.model.pair, index))
+            }),
             inhomogeneity: bend::inhomogeneity(
                 &self.frame,
                 &self.model,

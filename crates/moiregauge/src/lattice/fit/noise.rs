@@ -7,6 +7,7 @@
 //! vectors is worked out in [`local`](super::local).
 
 use nalgebra::{DMatrix, DVector, Vector2};
+use rustfft::num_complex::Complex64;
 
 use super::frame::{Basis, Frame, wave};
 use super::local::{Bin, acting_on};
@@ -158,6 +159,31 @@ impl ResidualNoise {
             (x, y)
         };
         self.spectrum.power(x as usize, y.rem_euclid(rows) as usize) / self.window_power
+    }
+
+    /// The transform of the residual across the lines from a harmonic: (columns, rows) in cycles per frame, and value.
+    pub(super) fn samples(&self, p: Vector2<f64>) -> Vec<([i64; 2], Complex64)> {
+        let centre = (p / std::f64::consts::PI).map(|c| c.round() as i64);
+        // Noise of whole lines stands at kx = 0 alone: what lies at another kx says nothing of it.
+        (-ACROSS..=ACROSS)
+            .map(|dy| {
+                (
+                    [centre.x, centre.y + dy],
+                    self.value(centre.x, centre.y + dy),
+                )
+            })
+            .collect()
+    }
+
+    fn value(&self, x: i64, y: i64) -> Complex64 {
+        let (rows, columns) = (self.spectrum.rows as i64, self.spectrum.columns as i64);
+        let x = x.rem_euclid(columns);
+        if x > columns / 2 {
+            let (x, y) = ((columns - x) as usize, (-y).rem_euclid(rows) as usize);
+            self.spectrum.value(x, y).conj()
+        } else {
+            self.spectrum.value(x as usize, y.rem_euclid(rows) as usize)
+        }
     }
 
     /// Noise power per pixel over all frequencies, by the median.
