@@ -77,7 +77,9 @@ fn twist_strain(text: &mut String, found: &TwistStrain, budget: &Budget) {
     let degrees = |e: Estimate| plus_minus(e.scaled(degree));
     let known = budget.known();
     let all = budget.applied_to(found);
-    let sigma = |variance: f64, factor: f64| two_digits(factor * variance.max(0.0).sqrt());
+    let sigma = |variance: f64, factor: f64| {
+        two_digits(factor * Estimate::from_variance(0.0, variance).sigma)
+    };
     let _ = writeln!(
         text,
         "  twist         {}° (± {}° with calibration and model{})",
