@@ -55,7 +55,10 @@ impl Validation {
         let quantities = QUANTITIES
             .iter()
             .enumerate()
-            .map(|(i, &(name, unit))| quantity(name, unit, compared.iter().map(|c| c[i])))
+            .map(|(i, &(name, unit))| {
+                let all: Vec<Compared> = compared.iter().map(|c| c[i]).collect();
+                quantity(name, unit, &all)
+            })
             .collect();
         Self {
             schema: "moiregauge/validation/1",
@@ -165,13 +168,9 @@ fn plain_unit(unit: &str) -> &'static str {
     }
 }
 
-fn quantity(
-    name: &'static str,
-    unit: &'static str,
-    all: impl Iterator<Item = Compared> + Clone,
-) -> Quantity {
-    let n = all.clone().count() as f64;
-    let mean = |f: &dyn Fn(Compared) -> f64| all.clone().map(f).sum::<f64>() / n;
+fn quantity(name: &'static str, unit: &'static str, all: &[Compared]) -> Quantity {
+    let n = all.len() as f64;
+    let mean = |f: &dyn Fn(Compared) -> f64| all.iter().map(|c| f(*c)).sum::<f64>() / n;
     let within = |k: f64| 100.0 * mean(&|c| f64::from(u8::from(c.error.abs() <= k * c.sigma)));
     let rms_error = mean(&|c| c.error * c.error).sqrt();
     let bound = Some(mean(&|c| c.bound * c.bound).sqrt()).filter(|b| b.is_finite());

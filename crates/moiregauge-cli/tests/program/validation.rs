@@ -7,7 +7,7 @@ use crate::common::{json, number, program, run, simulate, succeed};
 #[test]
 fn a_validation_writes_its_evidence_and_repeats_itself() {
     let folder = tempfile::tempdir().unwrap();
-    let mut validate = |name: &str, threads: &str| {
+    let validate = |name: &str, threads: &str| {
         let out = folder.path().join(name);
         let run = succeed(
             program()

@@ -137,7 +137,7 @@ impl Geometry {
 impl Timing {
     /// τ of a scan, from the times of its lines where the file gives them, otherwise by [`Timing::new`].
     ///
-    /// A line that takes `T` from the first to the last pixel has τ_fast = T/(N − 1). Trace and
+    /// A line that takes `T` from the first to the last pixel has `τ_fast = T/(N − 1)`. Trace and
     /// retrace may differ; lines follow each other at the line rate, which is `1/(T_trace +
     /// T_retrace)` unless the file says otherwise. `None` where the file does not tell.
     pub fn of_scan(

@@ -1,11 +1,11 @@
 //! Does the fit agree with its own scans? Leave-one-out and a bootstrap, without fitting anew.
 //!
 //! At the solution the problem is linear: with the whitened residuals e and the design X of all rows,
-//! normal matrix N = XᵀX and C = N⁻¹,
+//! normal matrix `N = XᵀX` and `C = N⁻¹`,
 //!   the residual of scan i has the covariance `S = I − X_i C X_iᵀ`, and `eᵀ S⁺ e` is the χ² of the scan
 //!   against the fit of all others;
 //!   without scan i the solution moves by `−C X_iᵀ S⁺ e_i`;
-//!   with weights w_i of the scans it moves by `(Σ w_i N_i)⁻¹ Σ w_i X_iᵀ e_i`.
+//!   with weights `w_i` of the scans it moves by `(Σ w_i N_i)⁻¹ Σ w_i X_iᵀ e_i`.
 
 use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
 use rand::RngExt as _;

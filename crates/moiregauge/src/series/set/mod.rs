@@ -96,20 +96,7 @@ pub(super) fn analyse_set(
         }
         joint::checks(fit, &left_out, &used, (&group.name, settings))
     });
-    let material = &settings.material;
-    let convention = settings.strain_convention;
-    scans.par_iter_mut().enumerate().for_each(|(i, scan)| {
-        let lattice = scan.drift_corrected.as_ref().unwrap_or(&scan.sensor);
-        let index = first_index + i as u64;
-        scan.draws = draws(
-            lattice,
-            material,
-            convention,
-            settings.strain_draws,
-            settings.seed,
-            index,
-        );
-    });
+    draw(&mut scans, settings, first_index);
     let of_set = || scans.iter().filter(|s| s.excluded.is_none());
     let uncorrected = common_lattice(&all, &Vector2::zeros(), &Matrix2::zeros())
         .ok()
@@ -141,7 +128,7 @@ pub(super) fn analyse_set(
         slow_axis: group.slow_axis,
         line_rate_hz: group.line_rate_hz,
         channel: group.channel.clone(),
-        forward_backward: forward_backward(of_set(), settings),
+        forward_backward: forward_backward(&of_set().collect::<Vec<_>>(), settings),
         scans,
         drift,
         mean,
@@ -149,6 +136,21 @@ pub(super) fn analyse_set(
         checks,
         illustration: None,
     }
+}
+
+/// Draws twist and strain of every scan.
+fn draw(scans: &mut [ScanAnalysis], settings: &Settings, first_index: u64) {
+    scans.par_iter_mut().enumerate().for_each(|(i, scan)| {
+        let lattice = scan.drift_corrected.as_ref().unwrap_or(&scan.sensor);
+        scan.draws = draws(
+            lattice,
+            &settings.material,
+            settings.strain_convention,
+            settings.strain_draws,
+            settings.seed,
+            first_index + i as u64,
+        );
+    });
 }
 
 /// Marks the scans that do not fit the others.
@@ -358,13 +360,10 @@ fn set_mean(
 ///
 /// With opposite time gradients the mean is free of constant drift exactly: a check that needs no
 /// drift estimate.
-fn forward_backward<'a>(
-    scans: impl Iterator<Item = &'a ScanAnalysis> + Clone,
-    settings: &Settings,
-) -> Option<TwistStrain> {
+fn forward_backward(scans: &[&ScanAnalysis], settings: &Settings) -> Option<TwistStrain> {
     let mean = |direction: FrameDirection| {
         let reciprocal: Vec<LatticeVectors> = scans
-            .clone()
+            .iter()
             .filter(|s| s.frame_direction == direction)
             .filter_map(|s| real_from_reciprocal(&s.sensor))
             .collect();
