@@ -345,7 +345,7 @@ fn the_calibration_is_what_the_user_says() {
     let scans = small_set(folder.path());
     let of = |name: &str, options: &[&str]| {
         let out = folder.path().join(name);
-        succeed(analyze(&scans, &out).args(options).arg("--no-report"));
+        succeed(analyze(&scans, &out).args(options));
         let document = results(&out);
         let number = |path: &str| document.pointer(path).and_then(Value::as_f64).unwrap();
         let twist = number("/combined/twist_deg/value");
