@@ -99,6 +99,7 @@ pub(crate) fn read(bytes: &[u8], wanted: &dyn Fn(&ChannelInfo) -> bool) -> Resul
     };
     let span = match labels::value(&fields, "size reaches") {
         Some("edges") => Span::PixelEdges,
+        Some("frame") => Span::Frame,
         _ => Span::PixelCentres,
     };
     let mut scan = Scan {
@@ -262,6 +263,7 @@ pub fn write(
     }
     let reaches = match x.span {
         Span::PixelCentres => "centres",
+        Span::Frame => "frame",
         Span::PixelEdges => "edges",
     };
     put("spmfile size reaches", reaches);

@@ -110,14 +110,6 @@ pub(crate) fn read(bytes: &[u8], wanted: &dyn Fn(&ChannelInfo) -> bool) -> Resul
     scan.size_nm = width_nm
         .zip(height_nm)
         .map(|(width, height)| [width, height]);
-    // With as many lines as samples this is the extent itself; otherwise the lines keep their pitch.
-    let height_nm = height_nm.map(|height| match (wave.size[0], wave.size[1]) {
-        (columns @ 2.., rows @ 2..) if rows != columns => {
-            let [c, r] = [columns as f64, rows as f64];
-            height / (r - 1.0) * r * (c - 1.0) / c
-        }
-        _ => height,
-    });
     let order = Order {
         top_first: wave.step[1] < 0.0,
         mirrored: wave.step[0] < 0.0,

@@ -51,11 +51,14 @@ pub enum Samples {
     F64(Vec<f64>),
 }
 
-/// What the nominal width of a channel reaches across; the same holds for its height.
+/// What the nominal width and height of a channel reach across.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Span {
     /// From the centre of the first to that of the last pixel: N pixels are width/(N − 1) apart.
     PixelCentres,
+    /// As [`Span::PixelCentres`] along the line; the height is the share of the recorded lines in that
+    /// of the full frame, so that lines have the pitch that the aspect ratio gives them.
+    Frame,
     /// From edge to edge: N pixels are width/N apart.
     PixelEdges,
 }
@@ -169,17 +172,17 @@ impl Channel {
 
     /// Nominal distance of neighbouring samples along a line and of neighbouring lines, nm.
     ///
-    /// Lines have the pitch that the nominal aspect ratio gives them, also where the frame is
-    /// unfinished. `None` without a size, or for a single column between whose centres nothing lies.
+    /// `None` without a size, or for a single pixel between whose centre and itself nothing lies.
     pub fn pitch_nm(&self) -> Option<[f64; 2]> {
         let (width, height) = self.width_nm.zip(self.height_nm)?;
         let (columns, rows) = (self.columns as f64, self.rows as f64);
         let fast = match self.span {
-            Span::PixelCentres => width / (columns - 1.0),
+            Span::PixelCentres | Span::Frame => width / (columns - 1.0),
             Span::PixelEdges => width / columns,
         };
         let slow = match self.span {
-            Span::PixelCentres => fast * (height / rows) / (width / columns),
+            Span::PixelCentres => height / (rows - 1.0),
+            Span::Frame => fast * (height / rows) / (width / columns),
             Span::PixelEdges => height / rows,
         };
         let possible = |n: f64| n > 0.0 && n.is_finite();
@@ -214,7 +217,7 @@ mod tests {
             columns: 8,
             width_nm: Some(70.0),
             height_nm: Some(17.5),
-            span: Span::PixelCentres,
+            span: Span::Frame,
             scale: 1.0,
             offset: 0.0,
             scaling: String::new(),
@@ -223,6 +226,8 @@ mod tests {
         };
         assert_eq!(channel.pitch_nm(), Some([10.0, 10.0]));
         assert_eq!(channel.edges_nm(), Some([80.0, 20.0]));
+        channel.span = Span::PixelCentres;
+        assert_eq!(channel.pitch_nm(), Some([10.0, 17.5]));
         channel.span = Span::PixelEdges;
         assert_eq!(channel.pitch_nm(), Some([8.75, 8.75]));
         assert_eq!(channel.edges_nm(), Some([70.0, 17.5]));

@@ -26,7 +26,7 @@ fn channel(
         columns,
         width_nm: Some(70.0),
         height_nm: Some(60.5),
-        span: spmfile::Span::PixelCentres,
+        span: spmfile::Span::Frame,
         scale: 1.0,
         offset: 0.0,
         scaling: String::new(),

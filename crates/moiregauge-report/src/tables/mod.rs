@@ -5,8 +5,13 @@
 
 mod columns;
 mod csv;
+#[cfg(feature = "parquet")]
+mod parquet;
 
 use crate::results::Results;
+#[cfg(feature = "parquet")]
+pub(crate) use parquet::parquet_tables;
+
 use columns::{Row, ScanRow, SetRow, VectorRow};
 
 /// All tables as named files.

@@ -5,6 +5,7 @@
 
 mod channel;
 mod combine;
+mod corrected;
 mod group;
 mod illustrate;
 mod measure;
@@ -13,6 +14,8 @@ mod set;
 mod sightings;
 
 pub use channel::choose_channel;
+pub use corrected::{CorrectedImage, corrected_images, nominal_geometry, on_grid};
+pub use group::natural_order;
 pub use illustrate::illustrate;
 pub use measure::{MeasureError, MeasuredLine, MeasuredScan, measure_scan};
 pub use overlap::{Window, common_window};

@@ -202,7 +202,7 @@ impl Reader<'_> {
             width_nm: size.map(|[width, _]| width),
             height_nm: size
                 .map(|[_, full]| frame::recorded_height(full, layout.rows, self.sections)),
-            span: Span::PixelCentres,
+            span: Span::Frame,
             scale: scaling.scale,
             offset: 0.0,
             scaling: scaling.words,
