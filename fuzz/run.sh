@@ -18,7 +18,7 @@ mkdir -p corpus/real
 for file in "$real"/*/*; do
     case $file in
         *.json | *'*') ;;
-        *) head -c 65536 "$file" >"corpus/real/$(basename "$file")" ;;
+        *) head -c 16384 "$file" >"corpus/real/$(basename "$file")" ;;
     esac
 done
 
@@ -27,7 +27,7 @@ for reader in "$@"; do
     mkdir -p "corpus/$reader"
     log=$(mktemp)
     if cargo +nightly fuzz run "$reader" "corpus/$reader" corpus/real -- \
-        -max_total_time="$seconds" -max_len=65536 -timeout=10 -rss_limit_mb=2048 \
+        -max_total_time="$seconds" -max_len=16384 -timeout=10 -rss_limit_mb=2048 \
         -malloc_limit_mb=512 -print_final_stats=1 >"$log" 2>&1; then
         result=clean
     else

@@ -23,6 +23,17 @@ pub fn plus_minus(estimate: Estimate) -> String {
     format!("{} ± {}", fixed(value, decimals), fixed(sigma, decimals))
 }
 
+/// Two significant digits, written out.
+pub fn two_digits(value: f64) -> String {
+    if !value.is_finite() {
+        return "\u{2013}".to_owned();
+    }
+    if value.abs() < 1e-9 {
+        return "0".to_owned();
+    }
+    fixed(value, decimals(value.abs()))
+}
+
 /// Decimals that show two significant digits of `sigma`.
 fn decimals(sigma: f64) -> usize {
     // 0.0996 becomes 0.10: rounding to two digits may add one before them.
@@ -44,6 +55,12 @@ mod tests {
         assert_eq!(shown(-0.27, 0.05), "−0.270 ± 0.050");
         assert_eq!(shown(0.5, 0.0996), "0.50 ± 0.10");
         assert_eq!(shown(1234.6, 250.0), "1235 ± 250");
+    }
+
+    #[test]
+    fn numbers_have_two_digits() {
+        let shown = [0.0111, 0.0996, 1.04e-5, 23.4, 0.0].map(two_digits);
+        assert_eq!(shown, ["0.011", "0.10", "0.000010", "23", "0"]);
     }
 
     #[test]

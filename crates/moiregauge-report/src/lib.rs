@@ -17,7 +17,7 @@ mod tables;
 pub use draw::colormap::ColorMap;
 pub use error::ReportError;
 pub use figures::{Drawing, Figure, figures};
-pub use format::plus_minus;
+pub use format::{plus_minus, two_digits};
 pub use provenance::{FailedInput, InputFile, Provenance};
 #[cfg(feature = "parquet")]
 pub use report::parquet_tables;

@@ -90,6 +90,13 @@ fn promised_paths_are_there() {
         "/combined/twist_deg/value",
         "/combined/heterostrain_percent/sigma",
         "/combined/vectors/2/x_nm",
+        "/combined/budget/twist_deg/total",
+        "/sets/0/mean/strain_interval_95_percent/0",
+        "/sets/0/mean/budget/twist_deg/calibration_gain",
+        "/sets/0/mean/budget/strain_e2_percent/image",
+        "/sets/0/mean/budget/wavelengths_nm/2/sensor",
+        "/sets/0/mean/budget/strain_interval_95_percent/1",
+        "/sets/2/uncorrected/budget/twist_deg/lattice_constant",
     ];
     for path in numbers {
         assert!(
@@ -118,6 +125,8 @@ fn promised_paths_are_there() {
     for path in [
         "/sets/2/drift",
         "/sets/2/mean",
+        "/sets/2/uncorrected/budget/twist_deg/drift",
+        "/sets/2/uncorrected/budget/twist_deg/total",
         "/sets/2/scans/0/vectors/0/nominal",
     ] {
         assert!(document.pointer(path).is_some_and(Value::is_null), "{path}");
@@ -181,6 +190,71 @@ fn strain_vector_and_axis_agree() {
     );
 }
 
+/// The budget hangs together: image, drift and sensor make up σ, all rows the total; the calibration has
+/// the size that physics gives it (1 % of gain is 1 % of the twist and of every wavelength).
+#[test]
+fn the_budget_adds_up() {
+    let document = document(&common::analysis());
+    let mean = &document["sets"][0]["mean"];
+    let budget = &mean["budget"];
+    let close = |a: f64, b: f64| assert!((a / b - 1.0).abs() < 1e-9, "{a}, {b}");
+    let square_sum = |column: &Value, rows: &[&str]| {
+        let squares = rows.iter().map(|row| {
+            let sigma = column[row].as_f64().expect("a number");
+            sigma * sigma
+        });
+        squares.sum::<f64>().sqrt()
+    };
+    let sigma = |path: &str| {
+        let found = mean.pointer(path).and_then(Value::as_f64);
+        found.expect("a number")
+    };
+    let columns = [
+        ("twist_deg", sigma("/twist_deg/sigma")),
+        ("heterostrain_percent", sigma("/heterostrain_percent/sigma")),
+        (
+            "strain_e1_percent",
+            sigma("/strain_vector_covariance/0/0").sqrt(),
+        ),
+        ("strain_axis_lab_deg", sigma("/strain_axis_lab_deg/sigma")),
+        ("lattice_angle_deg", sigma("/lattice_angle_deg/sigma")),
+    ];
+    for (name, sigma) in columns {
+        let column = &budget[name];
+        close(square_sum(column, &["image", "drift", "sensor"]), sigma);
+        let all: Vec<&str> = column
+            .as_object()
+            .expect("a column")
+            .keys()
+            .map(String::as_str)
+            .filter(|key| *key != "total")
+            .collect();
+        assert_eq!(all.len(), 10, "{all:?}");
+        close(square_sum(column, &all), sigma_of(&column["total"]));
+    }
+    let gain = sigma_of(&budget["twist_deg"]["calibration_gain"]);
+    assert!(
+        (gain / (0.01 * common::TWIST_DEG) - 1.0).abs() < 0.01,
+        "{gain}"
+    );
+    let length = sigma("/vectors/1/wavelength_nm/value");
+    close(
+        sigma_of(&budget["wavelengths_nm"][1]["calibration_gain"]),
+        0.01 * length,
+    );
+    // The table holds the same.
+    let rows = parse(&file(&common::analysis(), "budget.csv"));
+    let total = rows
+        .iter()
+        .find(|row| row[0] == "slow y, 8 Hz" && row[1] == "drift_corrected" && row[2] == "total");
+    let number: f64 = total.expect("the row")[3].parse().expect("a number");
+    assert_eq!(Some(number), budget["twist_deg"]["total"].as_f64());
+}
+
+fn sigma_of(value: &Value) -> f64 {
+    value.as_f64().expect("a number")
+}
+
 #[test]
 fn the_document_reads_back() {
     let results = Results::new(&common::analysis(), &common::provenance());
@@ -219,6 +293,7 @@ fn tables_survive_hostile_names() {
         ("vectors.csv", 16 * 9 + 3),
         ("scans.csv", 17 * 2),
         ("sets.csv", 3),
+        ("budget.csv", 6 * 11),
     ] {
         let rows = parse(&file(&analysis, table));
         assert_eq!(rows.len(), lines + 1, "{table}");
@@ -250,7 +325,7 @@ fn vectors_have_the_length_they_state() {
 #[test]
 fn every_column_is_explained() {
     let about = file(&common::analysis(), "columns.md");
-    for table in ["vectors.csv", "scans.csv", "sets.csv"] {
+    for table in ["vectors.csv", "scans.csv", "sets.csv", "budget.csv"] {
         for name in parse(&file(&common::analysis(), table)).swap_remove(0) {
             assert!(about.contains(&format!("| `{name}` |")), "{table}: {name}");
         }

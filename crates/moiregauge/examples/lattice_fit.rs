@@ -3,7 +3,9 @@
 //!
 //! `cargo run --release -p moiregauge --example lattice_fit [IMAGES [CASE]]`. Error over bound is
 //! meant for white noise; `pull` is the standard deviation of error over stated error, 1 where error
-//! bars are true; `bias` is the largest mean pull.
+//! bars are true; `fast` and `slow` are the same for the wave vectors along either axis, `< 1σ` and `< 2σ`
+//! the shares (%) within one and two of them, 68.3 and 95.4; `bias` is the largest mean pull; `bent` counts images
+//! whose lattice is said to change across the frame (none of them does).
 
 #[path = "../tests/fit_scene/mod.rs"]
 mod fit_scene;
@@ -194,7 +196,7 @@ fn main() {
         .map_or(50, |n| n.parse().expect("a number"));
     let wanted = arguments.next().unwrap_or_default();
     println!(
-        "case               right     error/bound  pull   fast   slow   bias  lines  waves  goodness"
+        "case               right     error/bound  pull   fast   slow   < 1σ  < 2σ  bias  lines  bent  waves  goodness"
     );
     for case in CASES.iter().filter(|c| c.0.contains(&wanted)) {
         run(case, count);
@@ -215,7 +217,7 @@ fn run(&(name, size, periods, contrast, noise): &Case, count: u64) {
     let mut pulls: Vec<Vector4<f64>> = Vec::new();
     let (mut error, mut bound) = (0.0, 0.0);
     let mut waves: Vec<Vector4<f64>> = Vec::new();
-    let (mut lines, mut shown, mut goodness) = (0, 0, 0.0);
+    let (mut lines, mut bent, mut shown, mut goodness) = (0, 0, 0, 0.0);
     for seed in 0..count {
         let mut scene = Scene::new(size, periods, 0.61803 * seed as f64, contrast, seed);
         (scene.white, scene.line) = (white, line);
@@ -251,6 +253,10 @@ fn run(&(name, size, periods, contrast, noise): &Case, count: u64) {
         lines += i32::from(fit.line_offsets.is_some());
         shown += fit.harmonics.len();
         goodness += fit.goodness;
+        bent += i32::from(
+            fit.inhomogeneity
+                .is_some_and(|i| i.chi_squared > i.threshold),
+        );
     }
     let n = pulls.len() as f64;
     let mean = pulls.iter().sum::<Vector4<f64>>() / n;
@@ -260,13 +266,22 @@ fn run(&(name, size, periods, contrast, noise): &Case, count: u64) {
         let squares = waves.iter().map(|w| w[axis].powi(2) + w[axis + 2].powi(2));
         (squares.sum::<f64>() / (2.0 * n)).sqrt()
     };
+    let within = |limit: f64| {
+        let small = waves
+            .iter()
+            .flat_map(|w| w.iter())
+            .filter(|p| p.abs() < limit);
+        100.0 * small.count() as f64 / (4.0 * n)
+    };
     println!(
-        "{name:18} {:3}/{count:<3}   {:6.3}       {:.3}  {:.3}  {:.3}  {:.3}  {lines:4}  {:5.1}  {:.3}",
+        "{name:18} {:3}/{count:<3}   {:6.3}       {:.3}  {:.3}  {:.3}  {:4.1}  {:4.1}  {:.3}  {lines:5}  {bent:4}  {:5.1}  {:.3}",
         pulls.len(),
         (error / n / bound).sqrt(),
         square.sqrt(),
         along(0),
         along(1),
+        within(1.0),
+        within(2.0),
         mean.amax(),
         shown as f64 / n,
         goodness / n,

@@ -294,6 +294,56 @@ fn a_second_lattice_stands_out() {
     assert!(other.waves.iter().any(near), "{:?}", wave.wave_vector);
 }
 
+/// A wavelength that grows by 1 % across the frame is found, and its size; a second lattice it is not.
+#[test]
+fn a_changing_lattice_is_pointed_out() {
+    for seed in 0..20 {
+        let angle = 0.618 * seed as f64;
+        let mut scene = Scene::new([256, 256], 10.0, angle, Contrast::Cosines, seed);
+        let white = if seed % 2 == 0 { 0.5 } else { 0.1 };
+        (scene.white, scene.line, scene.change) = (white, 0.5 * white, 0.01);
+        let fit = fit(&scene.image(), &scene).fit.unwrap();
+        let found = fit.inhomogeneity.unwrap();
+        assert!(found.stands_out(), "seed {seed}: {found:?}");
+        // q along x changes by 1 %: of |q| that is the square of its cosine, of its direction the
+        // product of sine and cosine.
+        let mut expected = [0.0f64; 2];
+        for wave in &scene.waves {
+            let direction = wave.q.normalize();
+            expected[0] = expected[0].max(0.01 * direction.x.powi(2));
+            expected[1] = expected[1].max(0.01 * (direction.x * direction.y).abs());
+        }
+        // The variance of X² on a frame is 4/45: with N pixels and noise σ = A a coefficient of ψ is known
+        // to √(2/3 / (N/2 · 4/45)) = 0.015 rad, and q, 36 rad at the edge, changes by 4/36 of it, 0.17 %,
+        // from corner to corner. Four standard errors.
+        let most = 4.0 * 0.0017 * white;
+        let near = |found: f64, expected: f64| {
+            let off = (found - expected).abs();
+            assert!(off < most, "seed {seed}: {found} {expected}");
+        };
+        near(found.wavelength, expected[0]);
+        near(found.angle, expected[1]);
+        assert!(!fit.foreign_wave.unwrap().stands_out(), "seed {seed}");
+    }
+}
+
+/// A lattice that is the same everywhere is rarely said not to be: once in a thousand images or less.
+/// Three or more of 200 would be a chance of one in a thousand.
+#[test]
+fn a_constant_lattice_is_left_alone() {
+    let alarms = (0..200)
+        .filter(|&seed| {
+            let angle = 0.618 * seed as f64;
+            let periods = [3.5, 5.0, 8.0, 12.0][seed as usize % 4];
+            let mut scene = Scene::new([96, 96], periods, angle, Contrast::Cosines, seed);
+            (scene.white, scene.line) = (1.0, 0.4);
+            let fit = fit(&scene.image(), &scene).fit.unwrap();
+            fit.inhomogeneity.unwrap().stands_out()
+        })
+        .count();
+    assert!(alarms < 3, "{alarms}");
+}
+
 /// White noise, line offsets and 1/f noise alone hold no lattice, however it is looked for.
 #[test]
 fn noise_has_no_lattice() {

@@ -3,6 +3,7 @@
 //! A figure whose data are absent is left out and says why. Marker and colour of each lattice
 //! vector, and filled symbols for up scans, open ones for down scans, are the same everywhere.
 
+mod budget;
 mod comparison;
 mod drift;
 mod error_relation;
@@ -116,6 +117,12 @@ pub fn figures(analysis: &Analysis, map: ColorMap) -> Vec<Figure> {
         title: "All sets compared",
         drawing: sets::draw(analysis, "sets"),
     };
+    let budget = Figure {
+        name: "budget".to_owned(),
+        set: None,
+        title: "Uncertainty budget",
+        drawing: budget::draw(analysis, "budget"),
+    };
     let of_sets = analysis.sets.iter().enumerate().flat_map(|(index, set)| {
         OF_A_SET.iter().map(move |&(name, title, draw)| {
             let name = format!("set{}-{name}", index + 1);
@@ -133,5 +140,5 @@ pub fn figures(analysis: &Analysis, map: ColorMap) -> Vec<Figure> {
             }
         })
     });
-    std::iter::once(together).chain(of_sets).collect()
+    [together, budget].into_iter().chain(of_sets).collect()
 }

@@ -3,7 +3,7 @@
 use moiregauge::settings::Method;
 use serde::Serialize;
 
-use super::words::{Numbers, consistency, conventions, plain, shown, wavelengths};
+use super::words::{Budgeted, Numbers, consistency, conventions, plain, shown, wavelengths};
 use crate::draw::base64;
 use crate::error::ReportError;
 use crate::figures::Figure;
@@ -16,12 +16,13 @@ pub(super) struct Page<'a> {
     /// The published method, whose bias the page has to tell, was used.
     paper: bool,
     combined: Option<Numbers>,
+    combined_budget: Option<Budgeted>,
     combined_wavelengths: Option<[String; 3]>,
     sets: Vec<Set<'a>>,
     consistency: Vec<[String; 5]>,
     /// Figures of all sets together.
     together: Vec<Shown<'a>>,
-    conventions: [(&'static str, &'a str); 12],
+    conventions: [(&'static str, &'a str); 13],
     settings: String,
     downloads: Vec<Download<'a>>,
 }
@@ -33,6 +34,8 @@ struct Set<'a> {
     rate: String,
     drift: Option<Drift>,
     mean: Option<Numbers>,
+    /// Of `mean` or, where there is none, of `uncorrected`.
+    budget: Option<Budgeted>,
     mean_wavelengths: Option<[String; 3]>,
     uncorrected: Option<Numbers>,
     uncorrected_wavelengths: Option<[String; 3]>,
@@ -123,6 +126,7 @@ impl<'a> Page<'a> {
             scans: results.sets.iter().map(|set| set.scans.len()).sum(),
             paper: results.settings.method == Method::Paper,
             combined: combined.map(|c| Numbers::new(&c.twist_strain)),
+            combined_budget: combined.map(|c| Budgeted::new(&c.budget)),
             combined_wavelengths: combined.map(|c| wavelengths(&c.vectors)),
             sets: sets
                 .map(|(i, set)| Set::new(i, set, of(Some(i)), missing(figures, i)))
@@ -200,6 +204,7 @@ impl<'a> Set<'a> {
                 .map_or_else(|| plain(None, 0), |rate| rate.to_string()),
             drift: set.drift.as_ref().map(drift),
             mean: mean.map(|m| Numbers::new(&m.twist_strain)),
+            budget: mean.or(uncorrected).map(|m| Budgeted::new(&m.budget)),
             mean_wavelengths: mean.map(|m| wavelengths(&m.vectors)),
             uncorrected: uncorrected.map(|m| Numbers::new(&m.twist_strain)),
             uncorrected_wavelengths: uncorrected.map(|m| wavelengths(&m.vectors)),

@@ -1,10 +1,14 @@
 //! Numbers of the document in words.
 
+use moiregauge::estimate::Estimate;
 use serde::Serialize;
 
 use crate::draw::scale::fixed;
-use crate::format::plus_minus;
-use crate::results::{Conventions, LatticeVector, ResultEstimate, Results, TwistStrainResult};
+use crate::format::{plus_minus, two_digits};
+use crate::results::{
+    BudgetColumn, BudgetResult, Conventions, LatticeVector, ResultEstimate, Results,
+    TwistStrainResult,
+};
 
 /// Twist and strain in words.
 #[derive(Debug, Serialize)]
@@ -15,6 +19,8 @@ pub(super) struct Numbers {
     axis_lattice: String,
     lattice_angle: String,
     significant: bool,
+    interval: String,
+    vector: String,
 }
 
 impl Numbers {
@@ -39,8 +45,58 @@ impl Numbers {
             axis_lattice: axis(result.strain_axis_lattice_deg),
             lattice_angle: format!("{}°", bracketed(result.lattice_angle_deg)),
             significant,
+            interval: interval(result.strain_interval_95_percent),
+            vector: vector(result),
         }
     }
+}
+
+/// What calibration and model make of the uncertainties.
+#[derive(Debug, Serialize)]
+pub(super) struct Budgeted {
+    twist: String,
+    strain: String,
+    axis: Option<String>,
+    interval: String,
+    p_value: String,
+    /// Whether an axis that stands out of the noise stands out of everything.
+    doubtful: bool,
+    /// Whether the drift, left in, is missing in all of these.
+    without_drift: bool,
+}
+
+impl Budgeted {
+    pub(super) fn new(budget: &BudgetResult) -> Self {
+        let sigma = |column: &BudgetColumn, unit: &str| {
+            let known = column.known();
+            known.map_or_else(|| "–".to_owned(), |s| format!("{}{unit}", two_digits(s)))
+        };
+        let axis = budget.strain_axis_lab_deg.as_ref();
+        Self {
+            twist: sigma(&budget.twist_deg, "°"),
+            strain: sigma(&budget.heterostrain_percent, " %"),
+            axis: axis.map(|column| sigma(column, "°")),
+            interval: interval(budget.strain_interval_95_percent),
+            p_value: plain(budget.strain_p_value, 2),
+            doubtful: axis.is_some() && budget.strain_p_value.is_some_and(|p| p >= 0.01),
+            without_drift: budget.twist_deg.drift.is_none(),
+        }
+    }
+}
+
+/// `low to high %`.
+fn interval([low, high]: [Option<f64>; 2]) -> String {
+    format!("{} to {} %", plain(low, 4), plain(high, 4))
+}
+
+/// Both components with their σ.
+fn vector(result: &TwistStrainResult) -> String {
+    let part = |i: usize| {
+        let value = result.strain_vector_percent[i].unwrap_or(f64::NAN);
+        let variance = result.strain_vector_covariance[i][i].unwrap_or(f64::NAN);
+        plus_minus(Estimate::from_variance(value, variance))
+    };
+    format!("({}, {}) %", part(0), part(1))
 }
 
 /// `(value ± sigma)`, to be followed by a unit.
@@ -77,7 +133,7 @@ pub(super) fn consistency(results: &Results) -> Vec<[String; 5]> {
 }
 
 /// Name and text of every convention.
-pub(super) fn conventions(conventions: &Conventions) -> [(&'static str, &str); 12] {
+pub(super) fn conventions(conventions: &Conventions) -> [(&'static str, &str); 13] {
     [
         ("axes", &conventions.axes),
         ("angles", &conventions.angles),
@@ -91,5 +147,6 @@ pub(super) fn conventions(conventions: &Conventions) -> [(&'static str, &str); 1
         ("heterostrain", &conventions.heterostrain),
         ("twist", &conventions.twist),
         ("σ", &conventions.sigma),
+        ("budget", &conventions.budget),
     ]
 }

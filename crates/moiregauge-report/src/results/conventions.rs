@@ -31,6 +31,8 @@ pub struct Conventions {
     pub twist: String,
     /// What σ is.
     pub sigma: String,
+    /// What the budget is.
+    pub budget: String,
 }
 
 impl Conventions {
@@ -58,7 +60,8 @@ impl Conventions {
             strain_vector: "E = (ε cos 2φ_lab, ε sin 2φ_lab) in per cent, its covariance in per cent²".to_owned(),
             heterostrain: "length of the strain vector with the noise bias removed; zero where noise alone explains it".to_owned(),
             twist: "θ > 0 by choice: the moiré alone does not show the sign; assumes no isotropic heterostrain".to_owned(),
-            sigma: "one standard deviation of the statistical error; calibration of the scanner, lattice constant and Poisson ratio not included".to_owned(),
+            sigma: "one standard deviation of the statistical error: image noise, drift and sensor noise; calibration of the scanner, lattice constant and model are in `budget`".to_owned(),
+            budget: format!("one standard deviation for each source of error and in all; image, drift and sensor make up sigma; the scanner is taken to be known to {} % in gain, {} % in the ratio of x and y and {} mrad in the angle between them, the lattice constant to {} nm, the Poisson ratio to {}, an isotropic heterostrain to be {} %; strained_layer is the difference to strain in equal parts in both layers; angles are counted from the x axis of the sensors, so a turned frame is no error", settings.calibration.gain_percent, settings.calibration.mismatch_percent, settings.calibration.orthogonality_mrad, settings.material.lattice_constant_sigma_nm, settings.material.poisson_ratio_sigma, settings.isotropic_strain_percent),
         }
     }
 }

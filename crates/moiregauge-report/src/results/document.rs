@@ -13,6 +13,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::SCHEMA;
+use super::budget::BudgetResult;
 use super::conventions::Conventions;
 use super::convert::{PER_MINUTE, PERCENT, correlation, degree, estimate, number};
 use super::lattice::{LatticeVector, ResultEstimate, TwistStrainResult};
@@ -134,6 +135,8 @@ pub struct MeanResult {
     /// Its twist and strain.
     #[serde(flatten)]
     pub twist_strain: TwistStrainResult,
+    /// What contributes to their uncertainty, calibration and model included.
+    pub budget: BudgetResult,
     /// L1, L2 and L3.
     pub vectors: [LatticeVector; 3],
     /// Standard deviation of the twist over the scans, degrees.
@@ -157,6 +160,8 @@ pub struct CombinedResult {
     /// Twist and strain of the weighted mean lattice.
     #[serde(flatten)]
     pub twist_strain: TwistStrainResult,
+    /// What contributes to their uncertainty, calibration and model included.
+    pub budget: BudgetResult,
     /// L1, L2 and L3.
     pub vectors: [LatticeVector; 3],
     /// The joint fit over all scans that made them; `null` for the other methods.
@@ -292,6 +297,7 @@ fn mean(mean: &SetMean, material: &Material) -> MeanResult {
     };
     MeanResult {
         twist_strain: result.into(),
+        budget: BudgetResult::of(&mean.budget, result),
         vectors: LatticeVector::all(&mean.lattice, material),
         twist_scatter_deg: number(mean.twist_scatter * degree()),
         strain_scatter_percent: number(mean.strain_scatter * PERCENT),
@@ -305,6 +311,7 @@ fn mean(mean: &SetMean, material: &Material) -> MeanResult {
 fn combined(combined: &Combined, material: &Material) -> CombinedResult {
     CombinedResult {
         twist_strain: (&combined.twist_strain).into(),
+        budget: BudgetResult::of(&combined.budget, &combined.twist_strain),
         vectors: LatticeVector::all(&combined.lattice, material),
         joint: combined.joint.as_ref().map(Into::into),
         consistency: combined.consistency.iter().map(consistency).collect(),

@@ -96,6 +96,9 @@ pub struct TwistStrainResult {
     pub strain_p_value: Option<f64>,
     /// The magnitude that the strain does not exceed, with 95 % confidence, per cent.
     pub strain_upper_limit_95_percent: Option<f64>,
+    /// The interval that holds the magnitude of the strain with 95 % confidence, or more, per cent; it
+    /// begins at 0 where noise alone may explain the strain.
+    pub strain_interval_95_percent: [Option<f64>; 2],
 }
 
 impl From<&TwistStrain> for TwistStrainResult {
@@ -111,6 +114,9 @@ impl From<&TwistStrain> for TwistStrainResult {
             strain_vector_covariance: square(&result.strain_covariance(), PERCENT * PERCENT),
             strain_p_value: number(result.strain_p_value()),
             strain_upper_limit_95_percent: number(result.strain_upper_limit_95() * PERCENT),
+            strain_interval_95_percent: result
+                .strain_interval_95()
+                .map(|end| number(end * PERCENT)),
         }
     }
 }

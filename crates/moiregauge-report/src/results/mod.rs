@@ -3,6 +3,7 @@
 //! In: an analysis in nm, s and rad and its provenance. Out: [`Results`], which serialises to
 //! `results.json` and is described by [`schema`]. A number that is not known is `null`, never NaN.
 
+mod budget;
 mod conventions;
 mod convert;
 mod document;
@@ -10,6 +11,8 @@ mod joint;
 mod lattice;
 mod scan;
 
+pub(crate) use budget::source_name;
+pub use budget::{BudgetColumn, BudgetResult};
 pub use conventions::Conventions;
 pub use document::{
     CombinedResult, ConsistencyResult, DriftFitResult, DriftMonteCarloResult, DriftResult,

@@ -2,7 +2,8 @@
 
 use super::csv::{Column, number};
 use crate::results::{
-    LatticeVector, MeanResult, ResultEstimate, Results, ScanResult, SetResult, TwistStrainResult,
+    BudgetColumn, BudgetResult, LatticeVector, MeanResult, ResultEstimate, Results, ScanResult,
+    SetResult, TwistStrainResult,
 };
 
 /// A kind of row.
@@ -19,12 +20,18 @@ macro_rules! columns {
     };
 }
 
+pub(super) use columns;
+
 fn value(estimate: Option<ResultEstimate>) -> String {
     number(estimate.and_then(|e| e.value))
 }
 
 fn sigma(estimate: Option<ResultEstimate>) -> String {
     number(estimate.and_then(|e| e.sigma))
+}
+
+fn total(column: Option<BudgetColumn>) -> String {
+    number(column.and_then(|c| c.total))
 }
 
 fn count(number: usize) -> String {
@@ -175,6 +182,10 @@ impl SetRow<'_> {
     fn result(&self) -> Option<&TwistStrainResult> {
         self.mean().map(|m| &m.twist_strain)
     }
+
+    fn budget(&self) -> Option<&BudgetResult> {
+        self.mean().map(|m| &m.budget)
+    }
 }
 
 impl<'a> Row<'a> for SetRow<'a> {
@@ -194,18 +205,25 @@ impl<'a> Row<'a> for SetRow<'a> {
         "drift_given", "whether the user gave the drift", |r| r.set.drift.as_ref().map_or_else(String::new, |d| d.given.to_string());
         "twist_deg", "twist θ", |r| value(r.result().map(|t| t.twist_deg));
         "twist_sigma_deg", "its σ", |r| sigma(r.result().map(|t| t.twist_deg));
+        "twist_total_sigma_deg", "its σ with calibration and model, see budget.csv", |r| total(r.budget().map(|b| b.twist_deg));
         "twist_scatter_deg", "standard deviation over the scans", |r| number(r.mean().and_then(|m| m.twist_scatter_deg));
         "heterostrain_percent", "ε, noise bias removed", |r| value(r.result().map(|t| t.heterostrain_percent));
         "heterostrain_sigma_percent", "its σ", |r| sigma(r.result().map(|t| t.heterostrain_percent));
+        "heterostrain_total_sigma_percent", "its σ with calibration and model, see budget.csv", |r| total(r.budget().map(|b| b.heterostrain_percent));
         "strain_e1_percent", "ε cos 2φ_lab", |r| number(r.result().and_then(|t| t.strain_vector_percent[0]));
         "strain_e2_percent", "ε sin 2φ_lab", |r| number(r.result().and_then(|t| t.strain_vector_percent[1]));
+        "strain_e1_total_sigma_percent", "σ of E₁ with calibration and model, see budget.csv", |r| total(r.budget().map(|b| b.strain_e1_percent));
+        "strain_e2_total_sigma_percent", "σ of E₂ with calibration and model, see budget.csv", |r| total(r.budget().map(|b| b.strain_e2_percent));
         "strain_variance_e1_percent2", "variance of E₁", |r| number(r.result().and_then(|t| t.strain_vector_covariance[0][0]));
         "strain_variance_e2_percent2", "variance of E₂", |r| number(r.result().and_then(|t| t.strain_vector_covariance[1][1]));
         "strain_covariance_e1_e2_percent2", "covariance of E₁ and E₂", |r| number(r.result().and_then(|t| t.strain_vector_covariance[0][1]));
         "strain_scatter_percent", "deviation per component over the scans", |r| number(r.mean().and_then(|m| m.strain_scatter_percent));
         "strain_axis_lab_ccw_from_x_deg", "φ_lab; empty unless p < 0.01", |r| value(r.result().and_then(|t| t.strain_axis_lab_deg));
         "strain_axis_lab_sigma_deg", "its σ", |r| sigma(r.result().and_then(|t| t.strain_axis_lab_deg));
+        "strain_axis_lab_total_sigma_deg", "σ of φ_lab with calibration and model, see budget.csv", |r| total(r.budget().and_then(|b| b.strain_axis_lab_deg));
         "strain_p_value", "how often noise alone gives such a strain", |r| number(r.result().and_then(|t| t.strain_p_value));
+        "strain_interval_95_low_percent", "lower end of the 95 % interval of ε", |r| number(r.result().and_then(|t| t.strain_interval_95_percent[0]));
+        "strain_interval_95_high_percent", "its upper end", |r| number(r.result().and_then(|t| t.strain_interval_95_percent[1]));
         "strain_upper_limit_95_percent", "not exceeded with 95 % confidence", |r| number(r.result().and_then(|t| t.strain_upper_limit_95_percent));
         "lattice_angle_deg", "orientation α of layer 1, modulo 60°", |r| value(r.result().map(|t| t.lattice_angle_deg));
         "chi2_per_dof", "χ² per degree of freedom of the scans against the common lattice; every σ is enlarged by its square root where it exceeds 1", |r| number(r.mean().and_then(|m| m.chi2_per_dof));

@@ -1,8 +1,10 @@
-//! The results as tables: `vectors.csv`, `scans.csv`, `sets.csv` and `columns.md`, which explains them.
+//! The results as tables: `vectors.csv`, `scans.csv`, `sets.csv`, `budget.csv` and `columns.md`,
+//! which explains them.
 //!
 //! In: the document. Out: RFC 4180 text in UTF-8, one header line, units in the column names, an
 //! empty field where a number is not known. Nothing but data is in the files: comments break readers.
 
+mod budget;
 mod columns;
 mod csv;
 #[cfg(feature = "parquet")]
@@ -12,14 +14,16 @@ use crate::results::Results;
 #[cfg(feature = "parquet")]
 pub(crate) use parquet::parquet_tables;
 
+use budget::BudgetRow;
 use columns::{Row, ScanRow, SetRow, VectorRow};
 
 /// All tables as named files.
 pub(crate) fn tables(results: &Results) -> Vec<(String, Vec<u8>)> {
-    let (vectors, scans, sets) = (
+    let (vectors, scans, sets, budgets) = (
         VectorRow::rows(results),
         ScanRow::rows(results),
         SetRow::rows(results),
+        BudgetRow::rows(results),
     );
     let mut about = String::from(ABOUT);
     about.push_str(&csv::explanation(
@@ -37,6 +41,11 @@ pub(crate) fn tables(results: &Results) -> Vec<(String, Vec<u8>)> {
         SetRow::ABOUT,
         SetRow::COLUMNS,
     ));
+    about.push_str(&csv::explanation(
+        "budget.csv",
+        BudgetRow::ABOUT,
+        BudgetRow::COLUMNS,
+    ));
     vec![
         (
             "vectors.csv".to_owned(),
@@ -49,6 +58,10 @@ pub(crate) fn tables(results: &Results) -> Vec<(String, Vec<u8>)> {
         (
             "sets.csv".to_owned(),
             csv::text(SetRow::COLUMNS, &sets).into_bytes(),
+        ),
+        (
+            "budget.csv".to_owned(),
+            csv::text(BudgetRow::COLUMNS, &budgets).into_bytes(),
         ),
         ("columns.md".to_owned(), about.into_bytes()),
     ]

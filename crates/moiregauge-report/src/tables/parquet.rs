@@ -99,8 +99,7 @@ fn table<'a, R: Row<'a>>(results: &'a Results) -> Result<Vec<u8>, ParquetError> 
         .set_key_value_metadata(Some(about))
         .build();
     let mut bytes = Vec::new();
-    let mut writer =
-        SerializedFileWriter::new(&mut bytes, Arc::new(schema), Arc::new(properties))?;
+    let mut writer = SerializedFileWriter::new(&mut bytes, Arc::new(schema), Arc::new(properties))?;
     let mut group = writer.next_row_group()?;
     for column in R::COLUMNS {
         let Some(mut out) = group.next_column()? else {
@@ -110,9 +109,8 @@ fn table<'a, R: Row<'a>>(results: &'a Results) -> Result<Vec<u8>, ParquetError> 
         // 1 where there is a value, 0 where there is none.
         let present: Vec<i16> = cells.iter().map(|c| i16::from(!c.is_empty())).collect();
         let known = || cells.iter().filter(|c| !c.is_empty());
-        let wrong = |cell: &str| {
-            ParquetError::General(format!("column {}: found {cell:?}", column.name))
-        };
+        let wrong =
+            |cell: &str| ParquetError::General(format!("column {}: found {cell:?}", column.name));
         macro_rules! parsed {
             ($kind:ty) => {{
                 let values: Vec<_> = known()

@@ -2,8 +2,8 @@
 
 use nalgebra::{DMatrix, DVector, Matrix2, Matrix4, Vector2};
 
-use crate::estimate::Estimate;
 use super::{Sighting, Terms};
+use crate::estimate::Estimate;
 
 /// Where each parameter stands in the vector.
 #[derive(Clone, Debug)]

@@ -98,7 +98,11 @@ pub fn fit(
     };
     let plain = Terms::default();
     let mut best = problem.solve(plain, start, None)?;
-    let sigma = best.velocity_covariance.symmetric_eigenvalues().max().sqrt();
+    let sigma = best
+        .velocity_covariance
+        .symmetric_eigenvalues()
+        .max()
+        .sqrt();
     number_blocks(&mut problem.sightings, &best.waves.basis, sigma);
     let problem = problem;
     let from = (&best.waves.basis.clone(), &best.velocity.clone());
@@ -263,8 +267,7 @@ impl Problem {
         for _ in 0..rounds {
             unscaled = iterate(sightings, &layout, &mut x, f64::INFINITY, instability)?;
             if rounds > 1 {
-                instability =
-                    estimated_instability(sightings, &layout, &x, instability, &unscaled);
+                instability = estimated_instability(sightings, &layout, &x, instability, &unscaled);
             }
         }
         let last = linearise(sightings, &layout, &x, f64::INFINITY, instability);

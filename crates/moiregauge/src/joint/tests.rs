@@ -87,8 +87,8 @@ fn drift_error_from_positions(times: &[f64], drift: Vector2<f64>) -> f64 {
         .iter()
         .map(|g| g * g.transpose() * (2.0 / (sigma * sigma)))
         .sum();
-    let position = information.try_inverse().unwrap()
-        + drift * drift.transpose() * (TIME_SIGMA * TIME_SIGMA);
+    let position =
+        information.try_inverse().unwrap() + drift * drift.transpose() * (TIME_SIGMA * TIME_SIGMA);
     let mean = times.iter().sum::<f64>() / times.len() as f64;
     let spread: f64 = times.iter().map(|t| (t - mean).powi(2)).sum();
     (position.trace() / spread).sqrt()
@@ -203,7 +203,12 @@ fn acceleration_earns_its_place() {
     let acceleration = Vector2::new(0.03, 0.01) / (MINUTE * MINUTE);
     let (mut found, mut claimed) = (0, 0);
     for seed in 0..40 {
-        let fitted = fit(&sightings(20, drift, acceleration, seed), (&pair(), &drift), TIME_SIGMA).unwrap();
+        let fitted = fit(
+            &sightings(20, drift, acceleration, seed),
+            (&pair(), &drift),
+            TIME_SIGMA,
+        )
+        .unwrap();
         found += u32::from(fitted.terms.acceleration || fitted.terms.settling.is_some());
         let fitted = fit(
             &sightings(20, drift, Vector2::zeros(), seed),

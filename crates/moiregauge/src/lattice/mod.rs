@@ -19,7 +19,7 @@ pub(crate) mod vectors;
 
 use nalgebra::{Matrix2, Vector2};
 
-pub use fit::{FittedHarmonic, ForeignWave, LatticeFit};
+pub use fit::{FittedHarmonic, ForeignWave, Inhomogeneity, LatticeFit};
 pub(crate) use pictures::pictures;
 pub use vectors::LatticeVectors;
 

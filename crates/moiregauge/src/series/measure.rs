@@ -12,7 +12,8 @@ use crate::geometry::{Geometry, SensorGeometry, Timing, from_sensors, mean_and_s
 use crate::image::Image;
 use crate::lattice::reciprocal::labelled_like;
 use crate::lattice::{
-    ForeignWave, LatticeError, LatticeFit, LatticeVectors, MeasuredLattice, measure, vectors,
+    ForeignWave, Inhomogeneity, LatticeError, LatticeFit, LatticeVectors, MeasuredLattice, measure,
+    vectors,
 };
 use crate::settings::{Lines, Settings};
 
@@ -294,6 +295,22 @@ fn measure_line(
 
 /// What the fit to the pixels found beside the lattice.
 fn about_fit(file: &str, fit: &LatticeFit, geometry: &Geometry, caveats: &mut Vec<Caveat>) {
+    if let Some(change) = fit.inhomogeneity.filter(Inhomogeneity::stands_out) {
+        caveats.push(Caveat::new(
+            "inhomogeneous-lattice",
+            file,
+            format!(
+                "the lattice is not the same everywhere in the frame: from corner to corner its wavelength \
+                 changes by up to {:.2} % and its direction by up to {:.2}° (χ² {:.0} for 6 numbers; {:.0} can \
+                 be chance). Results are means over the frame. Drift that got faster or slower, and creep, \
+                 look like this along the slow axis",
+                100.0 * change.wavelength,
+                change.angle.to_degrees(),
+                change.chi_squared,
+                change.threshold
+            ),
+        ));
+    }
     let Some(wave) = fit.foreign_wave.filter(ForeignWave::stands_out) else {
         return;
     };

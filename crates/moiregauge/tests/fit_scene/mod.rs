@@ -29,6 +29,8 @@ pub(crate) struct Scene {
     pub(crate) line: f64,
     pub(crate) flicker: f64,
     pub(crate) line_flicker: f64,
+    /// By how much the wavelength along x changes from the left edge to the right one, as a share.
+    pub(crate) change: f64,
     pub(crate) seed: u64,
 }
 
@@ -67,6 +69,7 @@ impl Scene {
             line: 0.0,
             flicker: 0.0,
             line_flicker: 0.0,
+            change: 0.0,
             seed,
         };
         let pair = scene.pair();
@@ -111,9 +114,15 @@ impl Scene {
     pub(crate) fn image(&self) -> Image {
         let [columns, rows] = self.size;
         let mut values = vec![0.0; columns * rows];
+        // Where a position of the lattice without change ends up: x − change · (x − middle)²/2 columns.
+        let position = |c: usize| {
+            let x = c as f64;
+            let middle = 0.5 * (columns as f64 - 1.0);
+            x - 0.5 * self.change * (x - middle).powi(2) / columns as f64
+        };
         for wave in &self.waves {
             let along: Vec<(f64, f64)> = (0..columns)
-                .map(|c| (wave.q.x * c as f64).sin_cos())
+                .map(|c| (wave.q.x * position(c)).sin_cos())
                 .collect();
             for (row, line) in values.chunks_exact_mut(columns).enumerate() {
                 let (s, c) = (wave.q.y * row as f64 + wave.phase).sin_cos();

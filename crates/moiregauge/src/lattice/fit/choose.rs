@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, Vector2};
 
-use super::frame::{Basis, wave};
+use super::frame::{Basis, STRAIGHT, wave};
 use super::gram::gram;
 use super::model::{Clip, Tables, look};
 use super::noise::Leverage;
@@ -150,12 +150,14 @@ impl Fit<'_> {
         let basis = Basis {
             terms: self.model.basis.terms.clone(),
             indices: [self.model.basis.indices.clone(), outside.clone()].concat(),
+            orders: STRAIGHT,
         };
         // The residual has nothing left in common with what is fitted: only the rest is looked at.
         let tables = Tables::new(&self.frame, &self.model.pair, &self.model.basis.indices);
         let probed = Basis {
             terms: Vec::new(),
             indices: outside.clone(),
+            orders: STRAIGHT,
         };
         let probes = Tables::new(&self.frame, &self.model.pair, &outside);
         let (frame, clip) = (&self.frame, Clip::at(self.sigma));

@@ -102,14 +102,21 @@ pub(super) fn turns(p: f64, positions: &[f64]) -> Vec<Complex64> {
 /// What the model is made of: the powers of X and Y in the background, and the harmonics.
 ///
 /// The order of the basis functions is: background terms; then for each harmonic of phase θ
-/// `cos θ, sin θ, X cos θ, X sin θ, Y cos θ, Y sin θ`.
+/// `cos θ, sin θ, X cos θ, X sin θ, Y cos θ, Y sin θ`, and so on with the powers in `orders`.
 #[derive(Clone, Debug)]
 pub(super) struct Basis {
     /// Powers (a, b) of `XᵃYᵇ`.
     pub(super) terms: Vec<[usize; 2]>,
     /// Indices (h, k).
     pub(super) indices: Vec<[i32; 2]>,
+    /// Powers (a, b) by which the waves of each harmonic are multiplied.
+    pub(super) orders: &'static [[usize; 2]],
 }
+
+/// What a change of the wave vectors needs.
+pub(super) const STRAIGHT: &[[usize; 2]] = &[[0, 0], [1, 0], [0, 1]];
+/// What a bent lattice needs.
+pub(super) const BENT: &[[usize; 2]] = &[[0, 0], [1, 0], [0, 1], [2, 0], [1, 1], [0, 2]];
 
 impl Basis {
     /// A background of total degree `degree`. Where every line has an offset of its own
@@ -122,6 +129,7 @@ impl Basis {
         Self {
             terms,
             indices: indices.to_vec(),
+            orders: STRAIGHT,
         }
     }
 
@@ -130,13 +138,19 @@ impl Basis {
         self.terms.last().map_or(0, |t| t[0] + t[1])
     }
 
+    /// Highest power of all.
+    pub(super) fn highest(&self) -> usize {
+        self.degree()
+            .max(self.orders.last().map_or(0, |t| t[0] + t[1]))
+    }
+
     /// Number of basis functions.
     pub(super) fn len(&self) -> usize {
-        self.terms.len() + 6 * self.indices.len()
+        self.terms.len() + 2 * self.orders.len() * self.indices.len()
     }
 
     /// Position of `cos θ` of the harmonic `i`.
     pub(super) fn cosine(&self, i: usize) -> usize {
-        self.terms.len() + 6 * i
+        self.terms.len() + 2 * self.orders.len() * i
     }
 }

@@ -72,7 +72,7 @@ fn functions(basis: &Basis) -> Vec<Function> {
         })
         .collect();
     for &index in &basis.indices {
-        for powers in [[0, 0], [1, 0], [0, 1]] {
+        for &powers in basis.orders {
             all.extend([false, true].map(|sine| Function {
                 powers,
                 index,
@@ -107,7 +107,7 @@ struct Kernels<'a> {
 
 impl<'a> Kernels<'a> {
     fn new(frame: &'a Frame<'a>, basis: &Basis, pair: &'a Matrix2<f64>) -> Self {
-        let highest = (2 * basis.degree()).max(2);
+        let highest = 2 * basis.highest();
         let mut x = vec![vec![1.0; frame.right().len()]];
         if frame.image.columns % 2 == 1 {
             x[0][0] = 0.5;
@@ -250,24 +250,18 @@ fn line_sums(frame: &Frame, basis: &Basis, pair: &Matrix2<f64>, lambda: &[f64]) 
     for (i, &index) in basis.indices.iter().enumerate() {
         let p = wave(pair, index);
         let (across, up) = (turns(p.x, &frame.x), turns(p.y, &frame.y));
-        let full = across
-            .iter()
-            .zip(&frame.x)
-            .fold([Complex64::default(); 2], |[plain, tilted], (turn, x)| {
-                [plain + turn, tilted + turn * x]
-            });
-        let mut along = vec![full; rows];
-        for &[row, column] in &frame.missing {
-            along[row][0] -= across[column];
-            along[row][1] -= across[column] * frame.x[column];
-        }
-        let first = basis.cosine(i);
-        for (row, [plain, tilted]) in along.iter().enumerate() {
-            let turn = up[row] * root(row);
-            let values = [plain * turn, tilted * turn, plain * turn * frame.y[row]];
-            for (v, value) in values.iter().enumerate() {
-                sums[(first + 2 * v, row)] = value.re;
-                sums[(first + 2 * v + 1, row)] = value.im;
+        for (v, &[a, b]) in basis.orders.iter().enumerate() {
+            let tilted = |column: usize| across[column] * power(frame.x[column], a);
+            let full: Complex64 = (0..frame.image.columns).map(tilted).sum();
+            let mut along = vec![full; rows];
+            for &[row, column] in &frame.missing {
+                along[row] -= tilted(column);
+            }
+            let first = basis.cosine(i) + 2 * v;
+            for (row, along) in along.iter().enumerate() {
+                let value = along * up[row] * (root(row) * power(frame.y[row], b));
+                sums[(first, row)] = value.re;
+                sums[(first + 1, row)] = value.im;
             }
         }
     }
@@ -278,6 +272,7 @@ fn line_sums(frame: &Frame, basis: &Basis, pair: &Matrix2<f64>, lambda: &[f64]) 
 mod tests {
     use super::*;
     use crate::image::Image;
+    use crate::lattice::fit::frame::BENT;
     use nalgebra::DVector;
 
     /// The sums equal those over the pixels one by one, with a missing line and partial line offsets:
@@ -302,7 +297,8 @@ mod tests {
         values[7 * columns..8 * columns].fill(f64::NAN);
         let image = Image::new(rows, columns, values);
         let frame = Frame::new(&image);
-        let basis = Basis::new(2, false, &[[1, 0], [0, 1], [-1, 1], [2, -1]]);
+        let mut basis = Basis::new(2, false, &[[1, 0], [0, 1], [-1, 1], [2, -1]]);
+        basis.orders = BENT;
         let pair = Matrix2::new(2.1, 0.7, 0.4, 3.3);
         let lambda: Vec<f64> = (0..rows).map(lambda).collect();
         let n = basis.len();
@@ -317,6 +313,7 @@ mod tests {
                         f64::from(h) * (2.1 * x + 0.4 * y) + f64::from(k) * (0.7 * x + 3.3 * y);
                     let (s, c) = theta.sin_cos();
                     v.extend([c, s, x * c, x * s, y * c, y * s]);
+                    v.extend([x * x, x * y, y * y].iter().flat_map(|xy| [xy * c, xy * s]));
                 }
                 let v = DVector::from_vec(v);
                 expected += &v * v.transpose();

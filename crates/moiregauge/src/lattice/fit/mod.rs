@@ -21,10 +21,12 @@
 //! Golub and Pereyra, Inverse Problems 19, R1 (2003), variable projection with Kaufman's Jacobian;
 //! Huber, Robust Statistics (1981), modified residuals; Schwarz, Ann. Stat. 6, 461 (1978), BIC.
 
+mod bend;
 mod choose;
 mod frame;
 mod gram;
 mod lines;
+mod local;
 mod model;
 mod noise;
 mod solve;
@@ -38,11 +40,12 @@ use super::reciprocal::real_from_reciprocal;
 use crate::estimate::Estimate;
 use crate::image::Image;
 use crate::settings::Background;
+pub use bend::Inhomogeneity;
 use frame::{Basis, Frame};
 use gram::gram;
 use lines::LineStatistics;
 pub(super) use model::middle;
-use model::{Clip, LineOffsets, Model, Tables, look, whitened};
+use model::{Bends, Clip, Folded, LineOffsets, Model, Tables, look, settled};
 pub use noise::ForeignWave;
 use noise::{Leverage, ResidualNoise};
 
@@ -77,6 +80,8 @@ pub struct LatticeFit {
     pub clipped: f64,
     /// The strongest wave that is left and none of the lattice's: a second lattice, or pick-up.
     pub foreign_wave: Option<ForeignWave>,
+    /// How the lattice changes across the frame; `None` where the frame is too small to tell.
+    pub inhomogeneity: Option<Inhomogeneity>,
 }
 
 /// One harmonic of a fitted lattice.
@@ -136,6 +141,8 @@ struct FinalNoise {
     local: Vec<[f64; 2]>,
     /// Root mean square of the residual.
     rms: f64,
+    /// What the residual says about a bent lattice.
+    bends: Bends,
 }
 
 impl<'a> Fit<'a> {
@@ -271,8 +278,21 @@ impl<'a> Fit<'a> {
         let tables = Tables::new(&self.frame, &self.model.pair, &self.model.basis.indices);
         let whole = (&self.frame, &self.model, &tables);
         let (lines, mut squares) = (&mut self.lines, 0.0);
+        let mut folded = Folded::new(&self.frame);
+        let mut bends = Bends::new(self.model.waves.len());
         let residual = ResidualNoise::new(&self.frame, self.free_lines, |row, line| {
-            whitened(whole, lines, clip, row, line);
+            let kept = settled(whole, lines, clip, row, line);
+            if whole.0.present[row] > 0 {
+                folded.take(line);
+                bends.add(whole.0, &tables, row, &mut folded);
+            }
+            for (value, pixel) in line.iter_mut().zip(whole.0.image.row(row)) {
+                *value = if pixel.is_finite() {
+                    *value + kept
+                } else {
+                    0.0
+                };
+            }
             squares += dot(line, line);
         });
         let parameters = self.model.background.len() + 2 * self.model.waves.len() + 4;
@@ -294,6 +314,7 @@ impl<'a> Fit<'a> {
             residual,
             local,
             rms: (squares / freedom as f64).sqrt(),
+            bends,
         })
     }
 
@@ -309,13 +330,14 @@ impl<'a> Fit<'a> {
     /// Covariance of (p₁, p₂): what the local noise does to the four derivatives.
     fn covariance(&self, noise: &FinalNoise) -> Option<Matrix4<f64>> {
         let model = &self.model;
-        let bread = solve::projected(&self.gram, &solve::contraction(model, |_, _| 1.0))?;
+        let bread = solve::projected(&self.gram, &solve::contraction(model, |_, _| 1.0), 4)?;
         let weight = |i: usize, axis: usize| noise.local[i][axis].sqrt();
-        let meat = solve::projected(&self.gram, &solve::contraction(model, weight))?;
+        let meat = solve::projected(&self.gram, &solve::contraction(model, weight), 4)?;
         let inverse = bread.try_inverse()?;
         // Pixels whose residuals are cut off do not follow the model.
         let follow = 1.0 - self.clipped as f64 / self.frame.pixels() as f64;
-        Some(inverse * meat * inverse / (follow * follow))
+        let covariance = &inverse * meat * &inverse / (follow * follow);
+        Some(covariance.fixed_view::<4, 4>(0, 0).into_owned())
     }
 
     fn result(&self, noise: &FinalNoise) -> Option<(LatticeVectors, LatticeFit)> {
@@ -353,6 +375,13 @@ impl<'a> Fit<'a> {
             lines_left_out: self.frame.image.rows - self.frame.lines(),
             clipped: self.clipped as f64 / pixels,
             foreign_wave: noise.residual.foreign_wave(&self.frame, &self.model),
+            inhomogeneity: bend::inhomogeneity(
+                &self.frame,
+                &self.model,
+                &self.lines.lambda,
+                &noise.bends,
+                &noise.local,
+            ),
         };
         Some((real_from_reciprocal(&wave_vectors)?, fit))
     }

@@ -259,16 +259,19 @@ fn clipped_sum(line: &[f64], offset: f64, clip: Clip) -> f64 {
 }
 
 /// A line folded about its middle: sums and differences of what lies at X and −X, and both times X.
-struct Folded {
+pub(super) struct Folded {
     x: Vec<Block>,
     even: Vec<Block>,
     odd: Vec<Block>,
     tilted_even: Vec<Block>,
     tilted_odd: Vec<Block>,
+    /// Times X², on request.
+    squared_even: Vec<Block>,
+    squared_odd: Vec<Block>,
 }
 
 impl Folded {
-    fn new(frame: &Frame) -> Self {
+    pub(super) fn new(frame: &Frame) -> Self {
         let mut x = vec![[0.0; LANES]; frame.right().len().div_ceil(LANES)];
         for (value, x) in x.as_flattened_mut().iter_mut().zip(frame.right()) {
             *value = *x;
@@ -279,11 +282,13 @@ impl Folded {
             even: zeros.clone(),
             odd: zeros.clone(),
             tilted_even: zeros.clone(),
-            tilted_odd: zeros,
+            tilted_odd: zeros.clone(),
+            squared_even: zeros.clone(),
+            squared_odd: zeros,
         }
     }
 
-    fn take(&mut self, line: &[f64]) {
+    pub(super) fn take(&mut self, line: &[f64]) {
         let half = line.len().div_ceil(2);
         let (even, odd) = (self.even.as_flattened_mut(), self.odd.as_flattened_mut());
         let pairs = line[line.len() / 2..].iter().zip(line[..half].iter().rev());
@@ -303,6 +308,32 @@ impl Folded {
                 to[i] = x[i] * o[i];
             }
         }
+    }
+
+    fn square(&mut self) {
+        let squared = self.squared_even.iter_mut().zip(&mut self.squared_odd);
+        let tilted = self.tilted_even.iter().zip(&self.tilted_odd);
+        for ((se, so), (x, (te, to))) in squared.zip(self.x.iter().zip(tilted)) {
+            for i in 0..LANES {
+                se[i] = x[i] * te[i];
+                so[i] = x[i] * to[i];
+            }
+        }
+    }
+
+    /// Sums of the line times `X² cos` and `X² sin`.
+    fn squared_products<'a>(&self, waves: impl Iterator<Item = &'a [Block; 2]>) -> [f64; 2] {
+        let mut sums = [[0.0; LANES]; 2];
+        let squared = self.squared_even.iter().zip(&self.squared_odd);
+        for ((se, so), [cos, sin]) in squared.zip(waves) {
+            for (sum, (a, b)) in sums[0].iter_mut().zip(se.iter().zip(cos)) {
+                *sum += a * b;
+            }
+            for (sum, (a, b)) in sums[1].iter_mut().zip(so.iter().zip(sin)) {
+                *sum += a * b;
+            }
+        }
+        sums.map(|s| s.iter().sum())
     }
 
     /// Sums of the line times 1, X, X², X³.
@@ -343,6 +374,30 @@ impl Folded {
             add(&mut sums[3], te, sin);
         }
         sums.map(|s| s.iter().sum())
+    }
+}
+
+/// Correlations of lines with `X² e^{iθ}`, `XY e^{iθ}` and `Y² e^{iθ}` of each harmonic: real parts are
+/// those with cosines, imaginary parts those with sines.
+pub(super) struct Bends(pub(super) Vec<[Complex64; 3]>);
+
+impl Bends {
+    pub(super) fn new(harmonics: usize) -> Self {
+        Self(vec![[Complex64::default(); 3]; harmonics])
+    }
+
+    /// Adds one line.
+    pub(super) fn add(&mut self, frame: &Frame, tables: &Tables, row: usize, line: &mut Folded) {
+        let y = frame.y[row];
+        line.square();
+        for (i, sums) in self.0.iter_mut().enumerate() {
+            let [c, s, xc, xs] = line.products(tables.of(i));
+            let [xxc, xxs] = line.squared_products(tables.of(i));
+            let turn = tables.up[i][row];
+            sums[0] += Complex64::new(xxc, xxs) * turn;
+            sums[1] += Complex64::new(xc, xs) * turn * y;
+            sums[2] += Complex64::new(c, s) * turn * (y * y);
+        }
     }
 }
 
@@ -397,34 +452,30 @@ pub(in crate::lattice) fn middle(values: &mut [f64]) -> f64 {
     *values.select_nth_unstable_by(half, f64::total_cmp).1
 }
 
-/// The residual of one line as it counts, with its mean brought down to the level of the other noise
-/// (`r − (1 − √(1−λ)) r̄`); 0 where pixels do not count.
-pub(super) fn whitened(
+/// The residual of one line as it counts, 0 where pixels do not, and what is to be added to all that do
+/// for line means at the level of the other noise (`r − (1 − √(1−λ)) r̄`).
+pub(super) fn settled(
     (frame, model, tables): (&Frame, &Model, &Tables),
     lines: &mut LineOffsets,
     clip: Clip,
     row: usize,
     line: &mut [f64],
-) {
+) -> f64 {
     if frame.present[row] == 0 {
         line.fill(0.0);
-        return;
+        return 0.0;
     }
     residual(frame, model, tables, row, line);
     settle(line, row, frame, lines, clip);
+    for value in line {
+        *value = clip.apply(*value);
+    }
     let lambda = lines.lambda[row];
-    let kept = if lambda > 0.0 {
+    if lambda > 0.0 {
         // The mean is o/λ, of which o is off already.
         let mean = lines.offset[row] / lambda;
         lines.offset[row] - (1.0 - (1.0 - lambda).sqrt()) * mean
     } else {
         0.0
-    };
-    for value in line {
-        *value = if value.is_finite() {
-            clip.apply(*value) + kept
-        } else {
-            0.0
-        };
     }
 }

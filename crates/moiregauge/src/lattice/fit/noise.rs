@@ -3,24 +3,25 @@
 //! The residual is Hann-windowed and transformed. The fit has emptied it where the harmonics are, and
 //! with few periods that is nearly everywhere; so the power found is divided by the power that white
 //! noise of unit variance would have left in the same bins, `Σw² − vᴴ G⁻¹ v` with v the transform
-//! of the window times each fitted function and G their normal matrix. Noise of scanning probes
-//! depends on the frequency along the lines much more than on that across them; it is averaged
-//! along the latter and weighted by what acts on a component of a wave vector: the function X of a
-//! frame has the power 1/m² at m cycles, all of it on the axis.
+//! of the window times each fitted function and G their normal matrix. What that says about the wave
+//! vectors is worked out in [`local`](super::local).
 
 use nalgebra::{DMatrix, DVector, Vector2};
 
 use super::frame::{Basis, Frame, wave};
+use super::local::{Bin, acting_on};
 use super::model::{Model, middle};
 use crate::lattice::harmonics::hann_transform;
 use crate::lattice::select::{BLOCK_WIDTH, NoiseMap};
 use crate::lattice::transform::{Spectrum, hann};
 
 /// Bins (cycles per frame) on either side of a harmonic that count, along the lines and across.
-const ALONG: i64 = 3;
-const ACROSS: i64 = 8;
-/// What acts on X at 0, ±1, ±2, ±3 cycles along the lines: 1/m², smeared by the window; and on Y.
-const WEIGHTS: [[f64; 4]; 2] = [[0.16, 0.28, 0.10, 0.04], [0.5, 0.25, 0.0, 0.0]];
+const ALONG: i64 = 4;
+const ACROSS: i64 = 16;
+/// On small frames at most this share of all lines' frequencies counts.
+const SHARE: usize = 6;
+/// The same across where nothing but a wave is looked for.
+const NEAR: i64 = 8;
 /// Bins nearer to zero frequency belong to the background.
 const BACKGROUND: i64 = 2;
 /// A wave reaches no farther through the window (bins): beyond, 10⁻⁴ of its power is left.
@@ -82,24 +83,11 @@ impl ResidualNoise {
     /// Noise power around a harmonic as it acts on the x and on the y component of its wave vector;
     /// white noise of variance σ² gives σ². `None` where the fit has left nothing.
     pub(super) fn around(&self, p: Vector2<f64>, leverage: &Leverage) -> Option<[f64; 2]> {
-        let mut power = [0.0; 4];
-        let mut expected = [0.0; 4];
-        self.bins(p, leverage, |dx, found, white| {
-            power[dx] += found;
-            expected[dx] += white;
+        let mut bins = Vec::new();
+        self.bins(p, leverage, |k, power, white| {
+            bins.push(Bin { k, power, white });
         });
-        let all = ratio(power.iter().sum(), expected.iter().sum())?;
-        Some(WEIGHTS.map(|weights| {
-            // A column of which the fit has left less than one bin says nothing.
-            let (mut sum, mut weight) = (0.0, 0.0);
-            for (w, (found, white)) in weights.iter().zip(power.iter().zip(&expected)) {
-                if *white > 1.0 {
-                    sum += w * found / white;
-                    weight += w;
-                }
-            }
-            if weight > 0.0 { sum / weight } else { all }
-        }))
+        acting_on(p / std::f64::consts::PI, &bins)
     }
 
     /// The same by the median: waves that are not fitted yet do not matter.
@@ -119,7 +107,7 @@ impl ResidualNoise {
         let centre = (p / std::f64::consts::PI).map(|c| c.round() as i64);
         let mut near = 0.0f64;
         let mut around = Vec::new();
-        for dy in -ACROSS..=ACROSS {
+        for dy in -NEAR..=NEAR {
             for dx in -ALONG..=ALONG {
                 let power = self.power(centre.x + dx, centre.y + dy);
                 if dx.abs().max(dy.abs()) <= 1 {
@@ -132,23 +120,29 @@ impl ResidualNoise {
         near > 4.0 * middle(&mut around) / std::f64::consts::LN_2
     }
 
-    /// Calls `each` with the distance along the lines, the power found and that of white noise.
-    fn bins(&self, p: Vector2<f64>, leverage: &Leverage, mut each: impl FnMut(usize, f64, f64)) {
+    /// Calls `each` with the frequency, the power found and that of white noise.
+    fn bins(
+        &self,
+        p: Vector2<f64>,
+        leverage: &Leverage,
+        mut each: impl FnMut(Vector2<i64>, f64, f64),
+    ) {
         let centre = (p / std::f64::consts::PI).map(|c| c.round() as i64);
         let taps = leverage.taps(centre);
+        let across = leverage.across;
         for dx in -ALONG..=ALONG {
             let x = centre.x + dx;
             if self.free_lines && x.abs() < 2 {
                 continue;
             }
-            for dy in -ACROSS..=ACROSS {
+            for dy in -across..=across {
                 let y = centre.y + dy;
                 if x.abs() < BACKGROUND && y.abs() < BACKGROUND {
                     continue;
                 }
                 let white = 1.0 - leverage.at(&taps, dx, dy) / self.window_power;
                 if white > 0.02 {
-                    each(dx.unsigned_abs() as usize, self.power(x, y), white);
+                    each(Vector2::new(x, y), self.power(x, y), white);
                 }
             }
         }
@@ -220,10 +214,6 @@ impl ResidualNoise {
     }
 }
 
-fn ratio(found: f64, white: f64) -> Option<f64> {
-    (white > 1.0).then(|| found / white)
-}
-
 /// Which part of white noise the fitted functions take up.
 pub(super) struct Leverage<'a> {
     basis: &'a Basis,
@@ -231,6 +221,8 @@ pub(super) struct Leverage<'a> {
     /// Inverse of the normal matrix of (cos, sin) of each harmonic and the four derivatives.
     inverse: DMatrix<f64>,
     size: [usize; 2],
+    /// Bins on either side that count, across the lines.
+    across: i64,
 }
 
 /// What the fitted functions take up around one place: those of the waves near by, and the four
@@ -265,11 +257,12 @@ impl<'a> Leverage<'a> {
             model,
             inverse,
             size: [frame.image.columns, frame.image.rows],
+            across: ACROSS.min((frame.image.rows / SHARE) as i64),
         })
     }
 
     fn taps(&self, centre: Vector2<i64>) -> Taps {
-        let half = [ALONG, ACROSS];
+        let half = [ALONG, self.across];
         let count = self.basis.indices.len();
         let mut waves = Vec::new();
         let mut places = vec![None; count];
@@ -317,7 +310,7 @@ impl<'a> Leverage<'a> {
         for tap in &taps.waves {
             let (i, sign, [along, across]) = (tap.harmonic, tap.sign, &tap.transform);
             let [x, slope_x] = along[(dx + ALONG) as usize];
-            let [y, slope_y] = across[(dy + ACROSS) as usize];
+            let [y, slope_y] = across[(dy + self.across) as usize];
             if let Some(place) = taps.places[i] {
                 re[place] += 0.5 * x * y;
                 im[place + 1] -= 0.5 * sign * x * y;

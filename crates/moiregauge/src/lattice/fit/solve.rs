@@ -1,6 +1,6 @@
 //! The normal equations of a fit and its covariance.
 
-use nalgebra::{Cholesky, DMatrix, DVector, Matrix4};
+use nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::model::Model;
 
@@ -69,14 +69,17 @@ fn scaled(normal: &DMatrix<f64>) -> Option<(Cholesky<f64, nalgebra::Dyn>, DVecto
     independent.then_some((factor, scale))
 }
 
-/// `D₁ᵀ (W − W Φ (Φᵀ W Φ)⁻¹ Φᵀ W) D₁` for the derivatives weighted as in `map`: what is left of them
-/// when background and amplitudes are free.
-pub(super) fn projected(gram: &DMatrix<f64>, map: &DMatrix<f64>) -> Option<Matrix4<f64>> {
+/// `Dᵀ (W − W Φ (Φᵀ W Φ)⁻¹ Φᵀ W) D` for the derivatives D, the last `count` columns of `map`, weighted
+/// as there: what is left of them when background and amplitudes are free.
+pub(super) fn projected(
+    gram: &DMatrix<f64>,
+    map: &DMatrix<f64>,
+    count: usize,
+) -> Option<DMatrix<f64>> {
     let normal = map.transpose() * gram * map;
-    let linear = normal.nrows() - 4;
+    let linear = normal.nrows() - count;
     let phi = normal.view((0, 0), (linear, linear)).into_owned();
-    let cross = normal.view((0, linear), (linear, 4)).into_owned();
-    let own = normal.view((linear, linear), (4, 4)).into_owned();
-    let left = own - cross.transpose() * inverse(&phi)? * &cross;
-    Some(left.fixed_view::<4, 4>(0, 0).into_owned())
+    let cross = normal.view((0, linear), (linear, count)).into_owned();
+    let own = normal.view((linear, linear), (count, count)).into_owned();
+    Some(own - cross.transpose() * inverse(&phi)? * &cross)
 }
