@@ -2,6 +2,7 @@
 
 mod args;
 mod chain;
+mod export;
 mod files;
 mod summary;
 
@@ -19,6 +20,7 @@ use moiregauge_report::{FailedInput, write_report};
 /// Analyses the files and writes the results.
 pub(crate) fn run(args: &AnalyzeArgs) -> anyhow::Result<ExitCode> {
     let settings = args.settings()?;
+    let exports = args.exports()?;
     if let Some(threads) = args.threads {
         rayon::ThreadPoolBuilder::new()
             .num_threads(threads)
@@ -37,17 +39,18 @@ pub(crate) fn run(args: &AnalyzeArgs) -> anyhow::Result<ExitCode> {
         }
     }
     let loud = !args.quiet && !args.json;
+    let known = args.known.of(&inputs);
     let outcome = analyse_files(
         &inputs,
         &args.sets()?,
-        &settings,
+        (&settings, &known),
         failed,
         args.illustrated(),
         loud,
     );
     let Some(Outcome {
         analysis,
-        provenance,
+        mut provenance,
     }) = outcome
         .map_err(|failed| eprint!("{}", summary::failures(&failed)))
         .ok()
@@ -56,6 +59,14 @@ pub(crate) fn run(args: &AnalyzeArgs) -> anyhow::Result<ExitCode> {
     };
     let written = write_report(&analysis, &provenance, &args.choice())?;
     write_all(&args.out, &written)?;
+    #[cfg(feature = "parquet")]
+    if args.parquet {
+        let tables = moiregauge_report::parquet_tables(&analysis, &provenance)?;
+        write_all(&args.out, &tables)?;
+    }
+    // Images come last: the numbers are safe by then.
+    let lost = export::write(&args.out, &exports, &analysis, &known);
+    provenance.failed.extend(lost);
     if args.json {
         let results = written.iter().find(|(name, _)| name == "results.json");
         if let Some((_, bytes)) = results {

@@ -8,6 +8,7 @@ use moiregauge_report::{Choice, write_report};
 
 use crate::analyze::{Outcome, analyse_files, summary, write_all};
 use crate::info::expand;
+use crate::input::Known;
 use crate::say::say;
 use crate::simulate::{paper_sets, write_sets};
 
@@ -46,7 +47,14 @@ pub(crate) fn run(args: &DemoArgs) -> anyhow::Result<ExitCode> {
     let Ok(Outcome {
         analysis,
         provenance,
-    }) = analyse_files(&inputs, &[], &settings, Vec::new(), true, true)
+    }) = analyse_files(
+        &inputs,
+        &[],
+        (&settings, &Known::default()),
+        Vec::new(),
+        true,
+        true,
+    )
     else {
         anyhow::bail!("the simulated scans could not be analysed");
     };

@@ -18,6 +18,8 @@ use spmfile::{
 pub(crate) use paths::expand;
 use table::table;
 
+use crate::input::{Known, KnownArgs};
+
 /// Show what scan files hold: channels, units, sizes, directions, scaling
 ///
 /// Reads each file and prints its channels with their statistics, how counts become values, and
@@ -40,6 +42,8 @@ pub(crate) struct InfoArgs {
     /// Print the value at a pixel too; row 0 is the top line; may be repeated
     #[arg(long, value_name = "ROW,COL", value_parser = parse_pixel)]
     at: Vec<Pixel>,
+    #[command(flatten)]
+    known: KnownArgs,
 }
 
 /// A pixel in display order.
@@ -120,9 +124,12 @@ struct Unreadable {
 /// If the output cannot be written.
 pub(crate) fn run(args: &InfoArgs) -> anyhow::Result<ExitCode> {
     let mut infos = Vec::new();
-    for file in expand(&args.files) {
+    let files = expand(&args.files);
+    let paths: Vec<PathBuf> = files.iter().flatten().cloned().collect();
+    let known = args.known.of(&paths);
+    for file in files {
         let info = match file {
-            Ok(path) => file_info(&path, &args.at),
+            Ok(path) => file_info(&path, &args.at, &known),
             Err((path, error)) => FileInfo {
                 file: path.to_string_lossy().into_owned(),
                 error: Some(error),
@@ -155,10 +162,10 @@ pub(crate) fn run(args: &InfoArgs) -> anyhow::Result<ExitCode> {
     })
 }
 
-fn file_info(path: &Path, at: &[Pixel]) -> FileInfo {
-    let (scan, mut error) = match std::fs::read(path) {
+fn file_info(path: &Path, at: &[Pixel], known: &Known) -> FileInfo {
+    let (mut scan, mut error) = match std::fs::read(path) {
         Err(error) => (None, Some(error.to_string())),
-        Ok(bytes) => match spmfile::read(&bytes) {
+        Ok(bytes) => match known.decode(path, &bytes, &|_| true) {
             Ok(scan) => (Some(scan), None),
             Err(ReadError::Incomplete { reason, readable }) => {
                 let reason = format!("the file is damaged: {reason}");
@@ -167,6 +174,11 @@ fn file_info(path: &Path, at: &[Pixel]) -> FileInfo {
             Err(error) => (None, Some(error.to_string())),
         },
     };
+    if let Some(scan) = &mut scan
+        && let Err(problem) = known.complete(path, scan)
+    {
+        error = error.or(Some(format!("{problem:#}")));
+    }
     let outside = scan.iter().flat_map(|scan| &scan.channels).find_map(|c| {
         let pixel = at
             .iter()

@@ -2,8 +2,10 @@
 
 mod analyze;
 mod config;
+mod convert;
 mod demo;
 mod info;
+mod input;
 mod say;
 mod simulate;
 mod validate;
@@ -26,6 +28,7 @@ struct Cli {
 #[derive(Subcommand)]
 enum Command {
     Analyze(Box<analyze::AnalyzeArgs>),
+    Convert(Box<convert::ConvertArgs>),
     Info(info::InfoArgs),
     Simulate(Box<simulate::SimulateArgs>),
     Demo(demo::DemoArgs),
@@ -36,6 +39,7 @@ enum Command {
 fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Analyze(args) => analyze::run(&args),
+        Command::Convert(args) => convert::run(&args),
         Command::Info(args) => info::run(&args),
         Command::Simulate(args) => simulate::run(&args),
         Command::Demo(args) => demo::run(&args),

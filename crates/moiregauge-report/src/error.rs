@@ -13,4 +13,7 @@ pub enum ReportError {
     /// The page could not be filled in.
     #[error("report.html could not be filled in: {0}")]
     Html(#[from] minijinja::Error),
+    /// A table could not be written as Parquet.
+    #[error("a table could not be written as Parquet: {0}")]
+    Parquet(String),
 }

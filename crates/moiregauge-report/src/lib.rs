@@ -19,5 +19,7 @@ pub use error::ReportError;
 pub use figures::{Drawing, Figure, figures, pulls};
 pub use format::{plus_minus, two_digits};
 pub use provenance::{FailedInput, InputFile, Provenance};
+#[cfg(feature = "parquet")]
+pub use report::parquet_tables;
 pub use report::{Choice, write_report};
 pub use results::{Results, schema};

@@ -63,6 +63,18 @@ fn figure_files(all: &[Figure], choice: Choice) -> Result<Vec<(String, Vec<u8>)>
     Ok(pictures.into_iter().flatten().collect())
 }
 
+/// The tables as Parquet files, named like the CSV files of [`write_report`] and with their columns.
+///
+/// # Errors
+/// [`ReportError`] if a table cannot be written.
+#[cfg(feature = "parquet")]
+pub fn parquet_tables(
+    analysis: &Analysis,
+    provenance: &Provenance,
+) -> Result<Vec<(String, Vec<u8>)>, ReportError> {
+    crate::tables::parquet_tables(&Results::new(analysis, provenance))
+}
+
 /// All files of a report: names relative to its folder, and their bytes.
 ///
 /// Deterministic: the same analysis gives the same bytes on any number of threads.

@@ -3,13 +3,15 @@
 //! `cargo bench -p moiregauge --bench lattice`. Compare times within one run. `textbook` pads N × N
 //! pixels to 2N × 2N, transforms, squares, transforms back and divides by the overlap; it ends where
 //! the search for a lattice would begin. Methods end with lattice vectors and their covariance.
+//! `fit_after_start` is the fit to the pixels alone, `start` what comes before it, on images that are hard:
+//! domain walls, line offsets, noise of twice the signal.
 
 use std::f64::consts::TAU;
 
 use divan::Bencher;
 use moiregauge::geometry::Geometry;
 use moiregauge::image::Image;
-use moiregauge::lattice::measure;
+use moiregauge::lattice::{Start, measure};
 use moiregauge::settings::{Background, Method};
 use nalgebra::Vector2;
 use rand_distr::{Distribution, StandardNormal};
@@ -88,6 +90,72 @@ fn fourier(bencher: Bencher<'_, '_>, case: (usize, Period)) {
 #[divan::bench(args = CASES, sample_count = 10, sample_size = 1)]
 fn lattice(bencher: Bencher<'_, '_>, case: (usize, Period)) {
     run(bencher, case, Method::Lattice);
+}
+
+/// Pixels along a side and periods across it.
+const HARD: [(usize, f64); 6] = [
+    (512, 2.5),
+    (512, 5.0),
+    (512, 20.0),
+    (512, 100.0),
+    (4096, 20.0),
+    (4096, 160.0),
+];
+
+/// Three families of walls a fifth of a period wide, white noise of twice their amplitude, and line
+/// offsets of half of it.
+fn hard_image((side, periods): (usize, f64)) -> Image {
+    let size = 2.0 * TAU * periods / (3f64.sqrt() * side as f64);
+    let mut rng = moiregauge::rng::stream(1, "hard bench", 0);
+    let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
+    let mut values: Vec<f64> = Vec::with_capacity(side * side);
+    for _ in 0..side {
+        let offset = 0.5 * normal();
+        values.extend((0..side).map(|_| offset + 2.0 * normal()));
+    }
+    for degrees in [10.0, 70.0, 130.0_f64] {
+        let (sin, cos) = degrees.to_radians().sin_cos();
+        for order in [1.0, 2.0, 3.0_f64] {
+            let q = [size * order * cos, size * order * sin];
+            if q[0].abs().max(q[1].abs()) > 3.0 {
+                continue;
+            }
+            let amplitude = 1.2 * (-0.5 * (0.1 * TAU * order).powi(2)).exp();
+            let along: Vec<(f64, f64)> = (0..side).map(|c| (q[0] * c as f64).sin_cos()).collect();
+            for (row, line) in values.chunks_exact_mut(side).enumerate() {
+                let (s, c) = (q[1] * row as f64).sin_cos();
+                for (value, (sin, cos)) in line.iter_mut().zip(&along) {
+                    *value += amplitude * (c * cos - s * sin);
+                }
+            }
+        }
+    }
+    Image::new(side, side, values)
+}
+
+fn unit_pixels(side: usize) -> Geometry {
+    let extent = side as f64 - 1.0;
+    let geometry = Geometry::nominal([side; 2], extent, extent, 0.0, Vector2::zeros());
+    geometry.expect("a frame of positive size")
+}
+
+#[divan::bench(args = HARD, sample_count = 10, sample_size = 1)]
+fn start(bencher: Bencher<'_, '_>, case: (usize, f64)) {
+    let (image, geometry) = (hard_image(case), unit_pixels(case.0));
+    bencher.bench(|| {
+        Start::find(divan::black_box(&image), &geometry, Background::Plane).expect("a lattice")
+    });
+}
+
+#[divan::bench(args = HARD, sample_count = 10, sample_size = 1)]
+fn fit_after_start(bencher: Bencher<'_, '_>, case: (usize, f64)) {
+    let (image, geometry) = (hard_image(case), unit_pixels(case.0));
+    let start = Start::find(&image, &geometry, Background::Plane).expect("a lattice");
+    bencher.bench(|| {
+        divan::black_box(&start)
+            .measure(Method::Lattice)
+            .expect("a lattice")
+    });
 }
 
 #[divan::bench(args = CASES, sample_count = 10, sample_size = 1)]

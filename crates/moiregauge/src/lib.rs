@@ -15,6 +15,7 @@ pub mod image;
 pub mod joint;
 pub mod lattice;
 pub mod material;
+pub mod resample;
 pub mod rng;
 pub mod series;
 pub mod settings;

@@ -65,6 +65,7 @@ fn channel((name, internal_name): (&str, &str), line: LineDirection) -> Channel 
         columns: SIDE,
         width_nm: Some(70.0),
         height_nm: Some(70.0),
+        span: spmfile::Span::Frame,
         scale: 1e-6,
         offset: 0.0,
         scaling: String::new(),

@@ -13,7 +13,9 @@ use crate::clock;
 use crate::cursor::Endian;
 use crate::error::ReadError;
 use crate::raster::{self, Encoding, Order};
-use crate::scan::{Channel, DateTime, FrameDirection, LineDirection, Scan, UnreadableChannel};
+use crate::scan::{
+    Channel, DateTime, FrameDirection, LineDirection, Scan, Span, UnreadableChannel,
+};
 use crate::units::clean;
 use crate::whole::{Extent, MOST_CHANNELS, some_readable};
 
@@ -115,6 +117,7 @@ pub(crate) fn read(bytes: &[u8], wanted: &dyn Fn(&ChannelInfo) -> bool) -> Resul
                 columns,
                 width_nm: scan.size_nm.map(|[width, _]| width),
                 height_nm: scan.size_nm.map(|[_, height]| height),
+                span: Span::PixelEdges,
                 scale: range / full,
                 offset: 0.0,
                 scaling: format!("counts × bufferRange {range} / {full}"),

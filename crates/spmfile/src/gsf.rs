@@ -13,7 +13,7 @@ use crate::export::{ExportError, base_values};
 use crate::fields;
 use crate::labels;
 use crate::raster::{self, Encoding, Order};
-use crate::scan::{Channel, Scan};
+use crate::scan::{Channel, Scan, Span};
 use crate::units;
 use crate::whole::Extent;
 
@@ -94,6 +94,7 @@ pub(crate) fn read(bytes: &[u8], wanted: &dyn Fn(&ChannelInfo) -> bool) -> Resul
             columns,
             width_nm,
             height_nm,
+            span: Span::PixelEdges,
             scale: 1.0,
             offset: 0.0,
             scaling: "values as stored".to_owned(),
@@ -117,7 +118,7 @@ pub fn write(scan: &Scan, channel: &Channel, log: &[String]) -> Result<Vec<u8>, 
     let mut put = |key: &str, value: &str| fields::put(&mut header, key, value);
     put("XRes", &channel.columns.to_string());
     put("YRes", &channel.rows.to_string());
-    if let Some((width, height)) = channel.width_nm.zip(channel.height_nm) {
+    if let Some([width, height]) = channel.edges_nm() {
         let metres = |nm: f64| format!("{:e}", nm / 1e9);
         put("XReal", &metres(width));
         put("YReal", &metres(height));

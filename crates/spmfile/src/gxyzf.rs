@@ -15,7 +15,7 @@ use crate::error::ReadError;
 use crate::export::{ExportError, base_values};
 use crate::fields;
 use crate::labels;
-use crate::scan::{Channel, Samples, Scan};
+use crate::scan::{Channel, Samples, Scan, Span};
 use crate::units;
 use crate::whole::MOST_CHANNELS;
 
@@ -97,6 +97,11 @@ pub(crate) fn read(bytes: &[u8], wanted: &dyn Fn(&ChannelInfo) -> bool) -> Resul
             .map(|point| number(data, width, order.place(point, columns, rows), index))
             .collect()
     };
+    let span = match labels::value(&fields, "size reaches") {
+        Some("edges") => Span::PixelEdges,
+        Some("frame") => Span::Frame,
+        _ => Span::PixelCentres,
+    };
     let mut scan = Scan {
         format: FORMAT.to_owned(),
         metadata: fields.clone(),
@@ -127,6 +132,7 @@ pub(crate) fn read(bytes: &[u8], wanted: &dyn Fn(&ChannelInfo) -> bool) -> Resul
             columns,
             width_nm: scan.size_nm.map(|[width, _]| width),
             height_nm: scan.size_nm.map(|[_, height]| height),
+            span,
             scale: if index < 2 { nm } else { 1.0 },
             offset: 0.0,
             scaling: "values as stored".to_owned(),
@@ -255,6 +261,12 @@ pub fn write(
     for (key, value) in &lines {
         put(key, value);
     }
+    let reaches = match x.span {
+        Span::PixelCentres => "centres",
+        Span::Frame => "frame",
+        Span::PixelEdges => "edges",
+    };
+    put("spmfile size reaches", reaches);
     for (step, text) in log.iter().enumerate() {
         put(&format!("log {}", step + 1), text);
     }

@@ -19,7 +19,7 @@ use crate::clock;
 use crate::cursor::{Cursor, Endian};
 use crate::error::ReadError;
 use crate::raster::{self, Encoding, Order};
-use crate::scan::{Channel, DateTime, FrameDirection, LineDirection, Scan};
+use crate::scan::{Channel, DateTime, FrameDirection, LineDirection, Scan, Span};
 use crate::units::{self, quantity};
 use crate::whole::{Extent, MOST_CHANNELS};
 
@@ -144,6 +144,7 @@ pub(crate) fn read(bytes: &[u8], wanted: &dyn Fn(&ChannelInfo) -> bool) -> Resul
             columns,
             width_nm,
             height_nm,
+            span: Span::PixelCentres,
             scale: 1.0,
             offset: 0.0,
             scaling: "values as stored".to_owned(),

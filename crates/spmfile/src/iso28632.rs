@@ -16,7 +16,7 @@ use crate::clock;
 use crate::error::ReadError;
 use crate::labels;
 use crate::raster::{self, Order};
-use crate::scan::{Channel, DateTime, FrameDirection, LineDirection, Samples, Scan};
+use crate::scan::{Channel, DateTime, FrameDirection, LineDirection, Samples, Scan, Span};
 use crate::units;
 
 const FORMAT: &str = "ISO 28632";
@@ -78,6 +78,7 @@ pub(crate) fn read(bytes: &[u8], wanted: &dyn Fn(&ChannelInfo) -> bool) -> Resul
             columns,
             width_nm: size.map(|[width, _]| width),
             height_nm: size.map(|[_, height]| height),
+            span: Span::PixelEdges,
             scale: 1.0,
             offset: 0.0,
             scaling: "values as stored".to_owned(),

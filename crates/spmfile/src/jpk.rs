@@ -19,7 +19,9 @@ use crate::archive::Archive;
 use crate::clock;
 use crate::error::ReadError;
 use crate::raster::{self, Order};
-use crate::scan::{Channel, DateTime, FrameDirection, LineDirection, Scan, UnreadableChannel};
+use crate::scan::{
+    Channel, DateTime, FrameDirection, LineDirection, Scan, Span, UnreadableChannel,
+};
 use crate::tiff_tags::{Directory, directories};
 use crate::whole::{Extent, some_readable};
 
@@ -194,6 +196,7 @@ fn channel(
         columns: shape.columns,
         width_nm: scan.size_nm.map(|[width, _]| width),
         height_nm: scan.size_nm.map(|[_, height]| height),
+        span: Span::PixelEdges,
         scale: slot.factor,
         offset: slot.offset,
         scaling: format!(

@@ -3,6 +3,7 @@
 //! [`describe`] writes it, [`apply`] takes it back; the keys begin with `spmfile`. Numbers are
 //! written so that they are read back to the last bit.
 
+use crate::fields;
 use crate::scan::{Channel, DateTime, FrameDirection, LineDirection, Scan};
 
 /// The line direction that a title tells: `Z (Backward)`, `Height [Trace]`, `Phase Retrace`.
@@ -70,6 +71,107 @@ pub(crate) fn describe_channel(channel: &Channel) -> Vec<(String, String)> {
     put("scan line", channel.scan_line.as_deref());
     put("plane fit", channel.plane_fit.as_deref());
     lines
+}
+
+/// Everything about a channel and its frame as lines `key = value`, for files without fields for it.
+pub(crate) fn text(scan: &Scan, channel: &Channel, log: &[String]) -> String {
+    let mut text = String::new();
+    let mut put = |key: &str, value: &str| fields::put(&mut text, key, value);
+    put("spmfile name", &channel.name);
+    put("spmfile unit", &channel.unit);
+    put("spmfile shape", &shape([channel.rows, channel.columns]));
+    if let Some([width, height]) = channel.edges_nm() {
+        put("spmfile width (nm)", &width.to_string());
+        put("spmfile height (nm)", &height.to_string());
+    }
+    let ours = describe_channel(channel).into_iter().chain(describe(scan));
+    for (key, value) in ours.chain(scan.metadata.iter().cloned()) {
+        put(&key, &value);
+    }
+    for (step, line) in log.iter().enumerate() {
+        put(&format!("log {}", step + 1), line);
+    }
+    text
+}
+
+/// The lines `key = value` of a text; others are none.
+pub(crate) fn lines(text: &str) -> Vec<(String, String)> {
+    text.lines()
+        .filter_map(|line| line.split_once('='))
+        .map(|(key, value)| (key.trim().to_owned(), value.trim().to_owned()))
+        .collect()
+}
+
+/// Whether lines were made by [`text`] for an image of this many rows and columns: of an image that
+/// was cropped or scaled since, size and times are no longer right.
+pub(crate) fn fits(lines: &[(String, String)], size: [usize; 2]) -> bool {
+    value(lines, "shape") == Some(&shape(size))
+}
+
+fn shape([rows, columns]: [usize; 2]) -> String {
+    format!("{rows} {columns}")
+}
+
+/// Lines of [`text`], those of the frame and those of the channel apart.
+pub(crate) fn carried(lines: Vec<(String, String)>) -> (Labels, Labels) {
+    const CHANNEL: [&str; 9] = [
+        "name",
+        "unit",
+        "shape",
+        "width (nm)",
+        "height (nm)",
+        "internal name",
+        "line direction",
+        "scan line",
+        "plane fit",
+    ];
+    // What image programs want to find in a TIFF file.
+    const FOREIGN: [&str; 4] = ["ImageJ", "images", "slices", "unit"];
+    lines
+        .into_iter()
+        .filter(|(key, _)| !FOREIGN.contains(&key.as_str()))
+        .partition(|(key, _)| {
+            !key.strip_prefix("spmfile ")
+                .is_some_and(|key| CHANNEL.contains(&key))
+        })
+}
+
+/// Keys and values.
+pub(crate) type Labels = Vec<(String, String)>;
+
+/// Text in ASCII: other characters as `\u{b0}`, backslashes doubled.
+pub(crate) fn to_ascii(text: &str) -> String {
+    let mut ascii = String::with_capacity(text.len());
+    for c in text.chars() {
+        match c {
+            '\\' => ascii.push_str("\\\\"),
+            c if c.is_ascii() => ascii.push(c),
+            c => ascii.extend(c.escape_unicode()),
+        }
+    }
+    ascii
+}
+
+/// The inverse of [`to_ascii`]; what is no such escape stays.
+pub(crate) fn from_ascii(ascii: &str) -> String {
+    let mut text = String::with_capacity(ascii.len());
+    let mut rest = ascii;
+    while let Some((before, after)) = rest.split_once('\\') {
+        text.push_str(before);
+        let escaped = || {
+            let (code, rest) = after.strip_prefix("u{")?.split_once('}')?;
+            let c = char::from_u32(u32::from_str_radix(code, 16).ok()?)?;
+            Some((c, rest))
+        };
+        if let Some((c, after)) = escaped() {
+            text.push(c);
+            rest = after;
+        } else {
+            text.push('\\');
+            rest = after.strip_prefix('\\').unwrap_or(after);
+        }
+    }
+    text + rest
 }
 
 /// The value of one of our keys.
@@ -155,6 +257,16 @@ mod tests {
         for none in ["", "Z", "Trace Metals", "Backwards", "Subtrace"] {
             assert_eq!(line_direction(none), None, "{none}");
         }
+    }
+
+    #[test]
+    fn ascii_and_back() {
+        for text in ["1 µm, 5 °\nC:\\users\\u{b5} 💡", "", "\\", "\\\\u{b0}"] {
+            let ascii = to_ascii(text);
+            assert!(ascii.is_ascii(), "{ascii}");
+            assert_eq!(from_ascii(&ascii), text);
+        }
+        assert_eq!(from_ascii("a\\nb \\u{zz}"), "a\\nb \\u{zz}");
     }
 
     #[test]

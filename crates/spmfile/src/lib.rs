@@ -17,6 +17,7 @@ mod agilent;
 mod archive;
 pub mod arrays;
 mod clock;
+mod crop;
 mod cursor;
 mod detect;
 mod error;
@@ -44,16 +45,20 @@ mod sensors;
 mod tiff_tags;
 mod units;
 mod whole;
+mod writable;
 mod wsxm;
+pub mod zarr;
 
+pub use crop::{Block, CropError, crop};
 pub use detect::{Format, detect, looks_like_scan};
 pub use error::ReadError;
 pub use export::ExportError;
 pub use scan::{
-    Channel, DateTime, FrameDirection, LineDirection, Samples, Scan, UnreadableChannel,
+    Channel, DateTime, FrameDirection, LineDirection, Samples, Scan, Span, UnreadableChannel,
 };
 pub use sensors::{PositionSensors, SensorProblem, position_sensors, sensor_axis};
-pub use units::nm_per;
+pub use units::{length_nm, nm_per};
+pub use writable::{WritableFormat, write};
 
 /// What is known of a channel before its samples are decoded.
 #[derive(Clone, Debug, PartialEq, Eq)]

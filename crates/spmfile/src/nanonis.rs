@@ -20,7 +20,7 @@ use crate::clock;
 use crate::cursor::Endian;
 use crate::error::ReadError;
 use crate::raster::{self, Encoding, Order};
-use crate::scan::{Channel, DateTime, FrameDirection, LineDirection, Scan};
+use crate::scan::{Channel, DateTime, FrameDirection, LineDirection, Scan, Span};
 use crate::units;
 use crate::whole::{Extent, MOST_CHANNELS};
 
@@ -73,6 +73,7 @@ pub(crate) fn read(bytes: &[u8], wanted: &dyn Fn(&ChannelInfo) -> bool) -> Resul
             columns,
             width_nm: size.map(|[width, _]| width),
             height_nm: size.map(|[_, height]| height),
+            span: Span::PixelEdges,
             scale: 1.0,
             offset: 0.0,
             scaling: "values as stored".to_owned(),

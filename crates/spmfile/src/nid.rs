@@ -20,7 +20,7 @@ use crate::error::ReadError;
 use crate::missing::blank_unfilled;
 use crate::raster::{self, Encoding, Order};
 use crate::scan::{
-    Channel, DateTime, FrameDirection, LineDirection, Samples, Scan, UnreadableChannel,
+    Channel, DateTime, FrameDirection, LineDirection, Samples, Scan, Span, UnreadableChannel,
 };
 use crate::units::{clean, nm_per};
 use crate::whole::{Extent, MOST_CHANNELS, some_readable};
@@ -297,6 +297,7 @@ fn channel(
         columns: block.columns,
         width_nm: length(0),
         height_nm: length(1),
+        span: Span::PixelEdges,
         scale,
         offset,
         scaling: format!("counts × {scale} + {offset}: the range of Dim2 over that of the counts"),

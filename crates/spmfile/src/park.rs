@@ -15,7 +15,7 @@ use crate::clock;
 use crate::cursor::{Cursor, Endian};
 use crate::error::ReadError;
 use crate::raster::{self, Encoding, Order};
-use crate::scan::{Channel, DateTime, FrameDirection, LineDirection, Scan};
+use crate::scan::{Channel, DateTime, FrameDirection, LineDirection, Scan, Span};
 use crate::tiff_tags::{Directory, directories};
 use crate::whole::Extent;
 
@@ -216,6 +216,7 @@ fn channel(header: &Header, info: ChannelInfo, block: &[u8], size: Option<[f64; 
         columns: header.columns,
         width_nm: size.map(|[width, _]| width),
         height_nm: size.map(|[_, height]| height),
+        span: Span::PixelEdges,
         scale,
         offset,
         scaling: format!(

@@ -21,7 +21,7 @@ use crate::cursor::{Cursor, Endian};
 use crate::error::ReadError;
 use crate::missing::blank_unfilled;
 use crate::raster::{self, Encoding, Order};
-use crate::scan::{Channel, DateTime, FrameDirection, LineDirection, Scan};
+use crate::scan::{Channel, DateTime, FrameDirection, LineDirection, Scan, Span};
 use crate::units::{clean, nm_per};
 use crate::whole::{Extent, MOST_CHANNELS};
 
@@ -326,6 +326,7 @@ impl Page {
             columns: self.columns,
             width_nm: size.map(|[width, _]| width),
             height_nm: size.map(|[_, height]| height),
+            span: Span::PixelEdges,
             scale: self.z_scale,
             offset: self.z_offset,
             scaling: format!("counts × {} + {}", self.z_scale, self.z_offset),

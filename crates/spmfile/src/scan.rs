@@ -51,6 +51,18 @@ pub enum Samples {
     F64(Vec<f64>),
 }
 
+/// What the nominal width and height of a channel reach across.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Span {
+    /// From the centre of the first to that of the last pixel: N pixels are width/(N − 1) apart.
+    PixelCentres,
+    /// As [`Span::PixelCentres`] along the line; the height is the share of the recorded lines in that
+    /// of the full frame, so that lines have the pitch that the aspect ratio gives them.
+    Frame,
+    /// From edge to edge: N pixels are width/N apart.
+    PixelEdges,
+}
+
 /// One image: a quantity recorded at every pixel of the frame.
 #[derive(Clone, Debug)]
 pub struct Channel {
@@ -68,10 +80,12 @@ pub struct Channel {
     pub rows: usize,
     /// Number of samples in a line.
     pub columns: usize,
-    /// Nominal length of a line, edge to edge; `None` where the file gives no size.
+    /// Nominal length of a line; `None` where the file gives no size.
     pub width_nm: Option<f64>,
-    /// Nominal height of the recorded lines, edge to edge.
+    /// Nominal height of the recorded lines: of an unfinished frame their share of the full height.
     pub height_nm: Option<f64>,
+    /// What [`Channel::width_nm`] reaches across. [`Channel::pitch_nm`] takes it into account.
+    pub span: Span,
     /// `value = count · scale + offset`.
     pub scale: f64,
     /// See [`Channel::scale`].
@@ -154,5 +168,70 @@ impl Channel {
             Samples::F32(v) => v.iter().map(|&c| value(f64::from(c))).collect(),
             Samples::F64(v) => v.iter().map(|&c| value(c)).collect(),
         }
+    }
+
+    /// Nominal distance of neighbouring samples along a line and of neighbouring lines, nm.
+    ///
+    /// `None` without a size, or for a single pixel between whose centre and itself nothing lies.
+    pub fn pitch_nm(&self) -> Option<[f64; 2]> {
+        let (width, height) = self.width_nm.zip(self.height_nm)?;
+        let (columns, rows) = (self.columns as f64, self.rows as f64);
+        let fast = match self.span {
+            Span::PixelCentres | Span::Frame => width / (columns - 1.0),
+            Span::PixelEdges => width / columns,
+        };
+        let slow = match self.span {
+            Span::PixelCentres => height / (rows - 1.0),
+            Span::Frame => fast * (height / rows) / (width / columns),
+            Span::PixelEdges => height / rows,
+        };
+        let possible = |n: f64| n > 0.0 && n.is_finite();
+        (possible(fast) && possible(slow)).then_some([fast, slow])
+    }
+
+    /// Width and height from edge to edge, N times the pitch, nm; `None` without a size.
+    pub fn edges_nm(&self) -> Option<[f64; 2]> {
+        if self.span == Span::PixelEdges {
+            return Some([self.width_nm?, self.height_nm?]);
+        }
+        let [fast, slow] = self.pitch_nm()?;
+        Some([fast * self.columns as f64, slow * self.rows as f64])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 70 nm of 8 samples: 10 nm apart from centre to centre, 8.75 nm from edge to edge. Of 8 lines
+    /// that make a square, 2 are there.
+    #[test]
+    fn pitches_by_span() {
+        let mut channel = Channel {
+            name: String::new(),
+            internal_name: String::new(),
+            unit: String::new(),
+            line_direction: None,
+            scan_line: None,
+            rows: 2,
+            columns: 8,
+            width_nm: Some(70.0),
+            height_nm: Some(17.5),
+            span: Span::Frame,
+            scale: 1.0,
+            offset: 0.0,
+            scaling: String::new(),
+            plane_fit: None,
+            samples: Samples::F64(vec![0.0; 16]),
+        };
+        assert_eq!(channel.pitch_nm(), Some([10.0, 10.0]));
+        assert_eq!(channel.edges_nm(), Some([80.0, 20.0]));
+        channel.span = Span::PixelCentres;
+        assert_eq!(channel.pitch_nm(), Some([10.0, 17.5]));
+        channel.span = Span::PixelEdges;
+        assert_eq!(channel.pitch_nm(), Some([8.75, 8.75]));
+        assert_eq!(channel.edges_nm(), Some([70.0, 17.5]));
+        (channel.columns, channel.span) = (1, Span::PixelCentres);
+        assert_eq!((channel.pitch_nm(), channel.edges_nm()), (None, None));
     }
 }

@@ -66,6 +66,7 @@ fn a_small_frame_is_a_seed() {
         columns: 3,
         width_nm: Some(30.0),
         height_nm: Some(40.0),
+        span: crate::scan::Span::Frame,
         scale: 0.5,
         offset: 0.0,
         scaling: String::new(),

@@ -32,7 +32,7 @@ pub(crate) fn quantity(text: &str) -> Option<(f64, &str)> {
 }
 
 /// `0.6 µm` in nm; `None` without a unit of length.
-pub(crate) fn length_nm(text: &str) -> Option<f64> {
+pub fn length_nm(text: &str) -> Option<f64> {
     let (number, unit) = quantity(text)?;
     Some(number * nm_per(&clean(unit))?)
 }

@@ -18,7 +18,7 @@ use crate::clock;
 use crate::cursor::Endian;
 use crate::error::ReadError;
 use crate::raster::{self, Encoding, Order};
-use crate::scan::{Channel, DateTime, FrameDirection, LineDirection, Samples, Scan};
+use crate::scan::{Channel, DateTime, FrameDirection, LineDirection, Samples, Scan, Span};
 use crate::units::{self, quantity};
 use crate::whole::Extent;
 
@@ -99,6 +99,7 @@ pub(crate) fn read(bytes: &[u8], wanted: &dyn Fn(&ChannelInfo) -> bool) -> Resul
             columns,
             width_nm: size.map(|[width, _]| width),
             height_nm: size.map(|[_, height]| height),
+            span: Span::PixelEdges,
             scale: scaling.scale,
             offset: scaling.offset,
             scaling: scaling.words,

@@ -21,6 +21,7 @@ static WRITTEN: LazyLock<Vec<u8>> = LazyLock::new(|| {
         columns: 16,
         width_nm: Some(100.0),
         height_nm: Some(75.0),
+        span: spmfile::Span::Frame,
         scale: 1.0,
         offset: 0.0,
         scaling: String::new(),

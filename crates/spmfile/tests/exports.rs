@@ -1,8 +1,8 @@
 //! What is written for Gwyddion is read back: values, units, sizes, and how the frame was scanned.
 
 use spmfile::{
-    Channel, DateTime, ExportError, FrameDirection, LineDirection, Samples, Scan, gsf, gwy, gxyzf,
-    position_sensors, read,
+    Channel, DateTime, ExportError, FrameDirection, LineDirection, Samples, Scan, Span, gsf, gwy,
+    gxyzf, position_sensors, read,
 };
 
 fn channel(name: &str, unit: &str, line: LineDirection, samples: Vec<f64>) -> Channel {
@@ -16,6 +16,7 @@ fn channel(name: &str, unit: &str, line: LineDirection, samples: Vec<f64>) -> Ch
         columns: 3,
         width_nm: Some(70.0),
         height_nm: Some(35.0),
+        span: Span::PixelEdges,
         scale: 1.0,
         offset: 0.0,
         scaling: String::new(),

@@ -26,6 +26,7 @@ fn channel(
         columns,
         width_nm: Some(70.0),
         height_nm: Some(60.5),
+        span: spmfile::Span::Frame,
         scale: 1.0,
         offset: 0.0,
         scaling: String::new(),

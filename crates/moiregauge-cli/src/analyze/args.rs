@@ -8,7 +8,9 @@ use moiregauge::settings::{
 };
 use moiregauge_report::{Choice, ColorMap};
 
+use super::export::{self, Export};
 use crate::config::{self, named_material};
+use crate::input::KnownArgs;
 
 /// From scans to drift, moiré vectors, twist and heterostrain, with figures and a report
 ///
@@ -26,6 +28,8 @@ Examples:
   moiregauge analyze scan.0_00007.spm --out one --drift 0.62 -0.35 --drift-sigma 0.05
   moiregauge analyze scans/ --out as-published --method paper --strain-convention k-space
   moiregauge analyze a/ b/ --out results --set before=a --set after=b
+  moiregauge analyze scans/ --out results --export corrected.gwy
+  moiregauge analyze image.npy --out results --size 70nm×70nm --line-rate 4 --frame-direction up
 
 Angles are counter-clockwise, x to the right and y up, as the position sensors tell.")]
 pub(crate) struct AnalyzeArgs {
@@ -125,6 +129,21 @@ pub(crate) struct AnalyzeArgs {
     /// Figures as SVG only, without PNG copies
     #[arg(long)]
     no_png: bool,
+    /// Write images corrected by the sensors and for the drift, on a square grid in laboratory axes,
+    /// one file per scan and line: corrected.gwy makes OUT/corrected/SCAN-trace.gwy and so on; also
+    /// .gsf, .npz, .zarr, .tiff, .csv
+    #[arg(long, value_name = "NAME.EXT", value_delimiter = ',')]
+    export: Vec<String>,
+    /// Write vectors, scans, sets and budget as Parquet too
+    #[cfg(feature = "parquet")]
+    #[arg(long)]
+    pub(super) parquet: bool,
+    /// Laboratory axes for everything. This is how it always is: vectors, figures and exported images
+    /// follow the rotation of the frame
+    #[arg(long)]
+    rotate_to_lab: bool,
+    #[command(flatten)]
+    pub(super) known: KnownArgs,
     /// Print results.json instead of the summary
     #[arg(long)]
     pub(super) json: bool,
@@ -208,6 +227,11 @@ impl AnalyzeArgs {
         s.seed = self.seed.unwrap_or(s.seed);
         config::check(&s)?;
         Ok(s)
+    }
+
+    /// The corrected images that are wanted.
+    pub(super) fn exports(&self) -> anyhow::Result<Vec<Export>> {
+        self.export.iter().map(|name| export::parse(name)).collect()
     }
 
     /// The sets made by hand.

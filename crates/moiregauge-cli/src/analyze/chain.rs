@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use indicatif::{ProgressBar, ProgressStyle};
 use moiregauge::analysis::Analysis;
+use moiregauge::caveat::Caveat;
 use moiregauge::series::{
     MeasuredScan, Window, analyse, choose_channel, common_window, illustrate, measure_scan,
 };
@@ -12,9 +13,10 @@ use moiregauge::settings::Settings;
 use moiregauge_report::{FailedInput, InputFile, Provenance};
 use rayon::prelude::*;
 use sha2::{Digest as _, Sha256};
-use spmfile::{ChannelInfo, Scan, read_selected, sensor_axis};
+use spmfile::{ChannelInfo, Scan, sensor_axis};
 
 use super::args::NamedSet;
+use crate::input::Known;
 
 /// What came out, and of what.
 pub(crate) struct Outcome {
@@ -29,12 +31,12 @@ pub(crate) struct Outcome {
 pub(crate) fn analyse_files(
     inputs: &[PathBuf],
     sets: &[NamedSet],
-    settings: &Settings,
+    (settings, known): (&Settings, &Known),
     mut failed: Vec<FailedInput>,
     illustrated: bool,
     loud: bool,
 ) -> Result<Outcome, Vec<FailedInput>> {
-    let window = match settings.overlap.then(|| overlap(inputs, settings)) {
+    let window = match settings.overlap.then(|| overlap(inputs, settings, known)) {
         None => None,
         Some(Some(window)) => Some(window),
         Some(None) => {
@@ -49,7 +51,7 @@ pub(crate) fn analyse_files(
     let measured: Vec<_> = inputs
         .par_iter()
         .map(|path| {
-            let result = measure_file(path, sets, settings, window.as_ref());
+            let result = measure_file(path, sets, (settings, known), window.as_ref());
             progress.inc(1);
             result
         })
@@ -75,8 +77,8 @@ pub(crate) fn analyse_files(
     if illustrated {
         analysis.sets.par_iter_mut().for_each(|set| {
             set.illustration = set.scans.first().and_then(|first| {
-                let (scan, _) = read(Path::new(&first.file), settings).ok()?;
-                illustrate(&scan, first, settings)
+                let reading = read(Path::new(&first.file), settings, known).ok()?;
+                illustrate(&reading.scan, first, settings)
             });
         });
     }
@@ -109,11 +111,20 @@ fn progress(files: usize, loud: bool) -> ProgressBar {
 pub(crate) fn measure_file(
     path: &Path,
     sets: &[NamedSet],
-    settings: &Settings,
+    (settings, known): (&Settings, &Known),
     window: Option<&Window>,
 ) -> anyhow::Result<(MeasuredScan, InputFile)> {
-    let (scan, input) = read(path, settings)?;
+    let Reading {
+        scan,
+        input,
+        replaced,
+    } = read(path, settings, known)?;
     let mut measured = measure_scan(&input.file, &scan, settings, window)?;
+    for words in replaced {
+        measured
+            .caveats
+            .push(Caveat::new("given-by-user", input.file.as_str(), words));
+    }
     measured.set = sets
         .iter()
         .find(|(_, of)| path.starts_with(of))
@@ -121,33 +132,48 @@ pub(crate) fn measure_file(
     Ok((measured, input))
 }
 
+/// A file as the analysis reads it.
+pub(super) struct Reading {
+    pub(super) scan: Scan,
+    pub(super) input: InputFile,
+    /// What the user's options replaced in it.
+    pub(super) replaced: Vec<String>,
+}
+
 /// Reads what the analysis needs of a file: the chosen channel and the position sensors.
-fn read(path: &Path, settings: &Settings) -> anyhow::Result<(Scan, InputFile)> {
+pub(super) fn read(path: &Path, settings: &Settings, known: &Known) -> anyhow::Result<Reading> {
     let bytes = std::fs::read(path)?;
     let channels = std::cell::RefCell::new(Vec::new());
-    read_selected(&bytes, &|channel: &ChannelInfo| {
+    let list = |channel: &ChannelInfo| {
         channels
             .borrow_mut()
             .push((channel.name.clone(), channel.internal_name.clone()));
         false
-    })?;
+    };
+    known.decode(path, &bytes, &list)?;
     let channels = channels.into_inner();
     let names: Vec<_> = channels
         .iter()
         .map(|(a, b)| (a.as_str(), b.as_str()))
+        .filter(|(a, b)| !known.names_sensor(a, b))
         .collect();
     let chosen = choose_channel(&names, settings.channel.as_deref()).map(str::to_owned);
-    let scan = read_selected(&bytes, &|channel: &ChannelInfo| {
+    let wanted = |channel: &ChannelInfo| {
         chosen.as_ref().is_none_or(|name| *name == channel.name)
             || sensor_axis(&channel.name, &channel.internal_name).is_some()
-    })?;
+    };
+    let (scan, replaced) = known.read(path, &bytes, &wanted)?;
     let hash = Sha256::digest(&bytes);
     let input = InputFile {
         file: path.display().to_string(),
         sha256: hexadecimal(&hash),
         bytes: bytes.len() as u64,
     };
-    Ok((scan, input))
+    Ok(Reading {
+        scan,
+        input,
+        replaced,
+    })
 }
 
 fn hexadecimal(bytes: &[u8]) -> String {
@@ -160,10 +186,10 @@ fn hexadecimal(bytes: &[u8]) -> String {
 }
 
 /// The region common to all files that can be read.
-fn overlap(inputs: &[PathBuf], settings: &Settings) -> Option<Window> {
+fn overlap(inputs: &[PathBuf], settings: &Settings, known: &Known) -> Option<Window> {
     let windows: Vec<Option<Window>> = inputs
         .par_iter()
-        .map(|path| Window::of(&read(path, settings).ok()?.0, settings))
+        .map(|path| Window::of(&read(path, settings, known).ok()?.scan, settings))
         .collect();
     let windows: Vec<Window> = windows.into_iter().flatten().collect();
     common_window(&windows)

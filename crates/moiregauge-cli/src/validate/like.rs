@@ -11,6 +11,7 @@ use spmfile::FrameDirection;
 
 use crate::analyze::measure_file;
 use crate::info::expand;
+use crate::input::Known;
 
 /// Contrast of the simulated image, degrees of phase; the noise is scaled along.
 const CONTRAST: f64 = 1.0;
@@ -25,7 +26,7 @@ pub(super) fn conditions(paths: &[PathBuf]) -> anyhow::Result<Simulation> {
     let mut scans = Vec::new();
     for path in expand(paths) {
         let path = path.map_err(|(path, error)| anyhow::anyhow!("{}: {error}", path.display()))?;
-        let (scan, _) = measure_file(&path, &[], &settings, None)
+        let (scan, _) = measure_file(&path, &[], (&settings, &Known::default()), None)
             .with_context(|| format!("{}", path.display()))?;
         scans.push(scan);
     }

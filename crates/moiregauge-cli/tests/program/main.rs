@@ -2,6 +2,7 @@
 
 mod acceptance;
 mod common;
+mod formats;
 mod refusals;
 mod results;
 mod round_trip;

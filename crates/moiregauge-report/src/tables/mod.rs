@@ -7,8 +7,13 @@
 mod budget;
 mod columns;
 mod csv;
+#[cfg(feature = "parquet")]
+mod parquet;
 
 use crate::results::Results;
+#[cfg(feature = "parquet")]
+pub(crate) use parquet::parquet_tables;
+
 use budget::BudgetRow;
 use columns::{Row, ScanRow, SetRow, VectorRow};
 

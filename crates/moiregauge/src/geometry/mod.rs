@@ -43,23 +43,18 @@ pub struct Timing {
 }
 
 impl Geometry {
-    /// The geometry that the instrument intended: nominal width and height, rotated.
-    ///
-    /// The width is that of the outermost pixel centres, so the pitch is `width/(N − 1)`; lines have
-    /// the pitch that the nominal aspect ratio gives them, also where the frame is unfinished.
-    pub fn nominal(
+    /// The geometry of pixels that are `pitch` (along the lines, across them; nm) apart, rotated.
+    pub fn of_pitch(
         size: [usize; 2],
-        width_nm: f64,
-        height_nm: f64,
+        pitch: [f64; 2],
         rotation_rad: f64,
         centre: Vector2<f64>,
     ) -> Option<Self> {
         let [columns, rows] = [size[0] as f64, size[1] as f64];
-        if size[0] < 2 || size[1] < 2 || !(width_nm > 0.0 && height_nm > 0.0) {
+        let [fast, slow] = pitch;
+        if size[0] < 2 || size[1] < 2 || !(fast > 0.0 && slow > 0.0) {
             return None;
         }
-        let fast = width_nm / (columns - 1.0);
-        let slow = fast * (height_nm / rows) / (width_nm / columns);
         let (s, c) = rotation_rad.sin_cos();
         let pixel_to_nm = Matrix2::new(c, -s, s, c) * Matrix2::new(fast, 0.0, 0.0, slow);
         let middle = Vector2::new((columns - 1.0) / 2.0, (rows - 1.0) / 2.0);
@@ -70,6 +65,22 @@ impl Geometry {
             covariance: Matrix4::zeros(),
             from_sensors: false,
         })
+    }
+
+    /// The geometry of a frame whose width is that of the outermost pixel centres, so that the
+    /// pitch is `width/(N − 1)`; lines have the pitch that the nominal aspect ratio gives them,
+    /// also where the frame is unfinished.
+    pub fn nominal(
+        size: [usize; 2],
+        width_nm: f64,
+        height_nm: f64,
+        rotation_rad: f64,
+        centre: Vector2<f64>,
+    ) -> Option<Self> {
+        let [columns, rows] = [size[0] as f64, size[1] as f64];
+        let fast = width_nm / (columns - 1.0);
+        let slow = fast * (height_nm / rows) / (width_nm / columns);
+        Self::of_pitch(size, [fast, slow], rotation_rad, centre)
     }
 
     /// Step from column to column, nm.

@@ -83,7 +83,7 @@ fn by_time(a: &MeasuredScan, b: &MeasuredScan) -> Ordering {
 }
 
 /// Compares names with their numbers as numbers: `scan.9` comes before `scan.10`.
-fn natural_order(a: &str, b: &str) -> Ordering {
+pub fn natural_order(a: &str, b: &str) -> Ordering {
     let (mut a, mut b) = (a, b);
     loop {
         let number = |s: &str| s.bytes().take_while(u8::is_ascii_digit).count();

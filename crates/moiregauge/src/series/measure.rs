@@ -370,11 +370,11 @@ pub(super) fn image_of(channel: &Channel) -> Image {
     Image::new(channel.rows, channel.columns, channel.values())
 }
 
+/// The geometry that the instrument intended: nominal pitch, rotated.
 pub(super) fn nominal(scan: &Scan, channel: &Channel) -> Option<Geometry> {
-    Geometry::nominal(
+    Geometry::of_pitch(
         [channel.columns, channel.rows],
-        channel.width_nm?,
-        channel.height_nm?,
+        channel.pitch_nm()?,
         scan.rotation_rad,
         Vector2::from(scan.offset_nm),
     )

@@ -5,6 +5,7 @@
 
 mod channel;
 mod combine;
+mod corrected;
 mod group;
 mod illustrate;
 mod measure;
@@ -14,6 +15,8 @@ mod shared;
 mod sightings;
 
 pub use channel::choose_channel;
+pub use corrected::{CorrectedImage, corrected_images, nominal_geometry, on_grid};
+pub use group::natural_order;
 pub use illustrate::illustrate;
 pub use measure::{MeasureError, MeasuredLine, MeasuredScan, measure_scan};
 pub use overlap::{Window, common_window};

@@ -148,6 +148,7 @@ fn channel(
         columns,
         width_nm: Some(width),
         height_nm: Some(height),
+        span: spmfile::Span::Frame,
         scale: range / COUNTS,
         offset: 0.0,
         scaling: format!("count × {range} {unit} / 2³²"),

@@ -1,7 +1,8 @@
 //! Plain arrays and pictures: `.npy`, `.npz`, text matrices, TIFF, PNG, JPEG.
 //!
 //! They hold numbers and no frame: its size, direction and times are for the user to give, in
-//! [`ArrayOptions`]; what is not given stays unknown. The first line of an array or a picture is the
+//! [`ArrayOptions`]; what is not given stays unknown. Files written here ([`npz`], [`tiff`], [`csv`])
+//! carry along what was known, and it is taken back; options come before it. The first line of an array or a picture is the
 //! top one. A coloured picture is a rendering; it becomes one channel of its luminance, with a note
 //! in [`Scan::metadata`].
 //!
@@ -21,13 +22,16 @@
 mod npy;
 mod picture;
 mod text;
+mod write;
+
+pub use write::{csv, npz, tiff};
 
 use crate::ChannelInfo;
 use crate::archive::Archive;
 use crate::detect::{Format, detect};
 use crate::error::ReadError;
 use crate::labels;
-use crate::scan::{Channel, FrameDirection, LineDirection, Samples, Scan, UnreadableChannel};
+use crate::scan::{Channel, FrameDirection, LineDirection, Samples, Scan, Span, UnreadableChannel};
 use crate::sensors::sensor_axis;
 use crate::whole::{MOST_CHANNELS, some_readable};
 
@@ -46,7 +50,7 @@ pub struct ArrayOptions {
     /// See [`Scan::line_times_s`].
     pub line_times_s: Option<[f64; 2]>,
     /// Rotation of the fast axis against x, counter-clockwise, rad.
-    pub rotation_rad: f64,
+    pub rotation_rad: Option<f64>,
     /// The unit of the values.
     pub unit: Option<String>,
     /// The unit of arrays named as position sensors (`x_sensor`).
@@ -60,6 +64,8 @@ struct Plane {
     samples: Samples,
     /// Whether it is the luminance of a coloured picture.
     rendering: bool,
+    /// What the file says of it; only files written here do.
+    carried: Vec<(String, String)>,
 }
 
 /// What a file says beside its numbers; only text files do.
@@ -68,6 +74,44 @@ struct Told {
     name: Option<String>,
     unit: Option<String>,
     size_nm: Option<[f64; 2]>,
+    /// How the frame was scanned, as [`labels::describe`] has it.
+    lines: Vec<(String, String)>,
+    /// Of the channel: as [`labels::describe_channel`] has it.
+    channel: Vec<(String, String)>,
+}
+
+impl Told {
+    /// What a plane carries along.
+    fn by(plane: &mut Plane) -> Self {
+        let (lines, channel) = labels::carried(std::mem::take(&mut plane.carried));
+        let value = |key: &str| labels::value(&channel, key).map(str::to_owned);
+        let length = |key: &str| {
+            let nm: f64 = labels::value(&channel, key)?.parse().ok()?;
+            (nm > 0.0 && nm.is_finite()).then_some(nm)
+        };
+        Self {
+            name: value("name"),
+            unit: value("unit"),
+            size_nm: length("width (nm)")
+                .zip(length("height (nm)"))
+                .map(|(width, height)| [width, height]),
+            lines,
+            channel,
+        }
+    }
+
+    /// What is told twice is taken from `self`.
+    fn or(self, other: Self) -> Self {
+        if other.name.is_some() || !other.lines.is_empty() {
+            return Self {
+                name: other.name.or(self.name),
+                unit: other.unit.or(self.unit),
+                size_nm: other.size_nm.or(self.size_nm),
+                ..other
+            };
+        }
+        self
+    }
 }
 
 /// Reads the arrays that are wanted; [`crate::read`] does so without options.
@@ -97,23 +141,28 @@ pub fn read(
             });
         }
     };
-    let planes = planes.map_err(|reason| ReadError::Damaged { format, reason })?;
+    let mut planes = planes.map_err(|reason| ReadError::Damaged { format, reason })?;
     let several = planes.len() > 1;
-    let mut scan = frame(format, options, &told);
-    for (index, plane) in planes.into_iter().enumerate() {
+    let mut comments = Some(told);
+    let told: Vec<Told> = planes
+        .iter_mut()
+        .map(|plane| comments.take().unwrap_or_default().or(Told::by(plane)))
+        .collect();
+    let mut scan = told
+        .first()
+        .map_or_else(Scan::default, |told| frame(format, options, told));
+    for (index, (plane, told)) in planes.into_iter().zip(told).enumerate() {
         let name = match &told.name {
             Some(name) => name.clone(),
             None if several => format!("image {}", index + 1),
             None => "image".to_owned(),
         };
-        let info = info(name, options);
+        let info = info(name, options, &told);
         if plane.rendering {
             scan.metadata.push(rendering(&info.name));
         }
         if wanted(&info) {
-            let unit = told.unit.as_deref();
-            scan.channels
-                .push(channel(info, plane, options, unit, scan.size_nm));
+            scan.channels.push(channel(info, plane, options, &told));
         }
     }
     Ok(scan)
@@ -146,36 +195,62 @@ fn archive(
             limit: MOST_CHANNELS,
         });
     }
-    let mut scan = frame(FORMAT, options, &Told::default());
+    let mut scan: Option<Scan> = None;
+    let mut unreadable = Vec::new();
+    let mut announced = names.len();
     for entry in &names {
-        let info = info(entry.trim_end_matches(".npy").to_owned(), options);
-        if !wanted(&info) {
+        let stem = entry.trim_end_matches(".npy");
+        let mut told = Told::default();
+        let about = format!("{stem}.txt");
+        let carried = match archive.entry(&about) {
+            Some(text) => labels::lines(&String::from_utf8_lossy(&text.map_err(damaged)?)),
+            None => Vec::new(),
+        };
+        if carried.is_empty() && !wanted(&info(stem.to_owned(), options, &told)) {
+            scan.get_or_insert_with(|| frame(FORMAT, options, &told));
             continue;
         }
         let content = match archive.entry(entry) {
             Some(content) => content.map_err(damaged)?,
             None => continue,
         };
-        match npy::read(&content) {
-            Ok(plane) => {
-                let channel = channel(info, plane, options, None, scan.size_nm);
-                scan.channels.push(channel);
-            }
-            Err(error) => scan.unreadable.push(UnreadableChannel {
+        let plane = npy::read(&content).map(|mut plane| {
+            let fits = labels::fits(&carried, [plane.rows, plane.columns]);
+            plane.carried = if fits { carried } else { Vec::new() };
+            told = Told::by(&mut plane);
+            plane
+        });
+        let name = told.name.clone().unwrap_or_else(|| stem.to_owned());
+        let info = info(name, options, &told);
+        let scan = scan.get_or_insert_with(|| frame(FORMAT, options, &told));
+        match plane {
+            // Positions of the pixels, written beside the images.
+            Err(_) if COORDINATES.contains(&stem) => announced -= 1,
+            _ if !wanted(&info) => {}
+            Ok(plane) => scan.channels.push(channel(info, plane, options, &told)),
+            Err(error) => unreadable.push(UnreadableChannel {
                 name: info.name,
                 error,
             }),
         }
     }
-    some_readable(scan, names.len())
+    let mut scan = scan.unwrap_or_else(|| frame(FORMAT, options, &Told::default()));
+    scan.unreadable = unreadable;
+    some_readable(scan, announced)
 }
 
-fn info(name: String, options: &ArrayOptions) -> ChannelInfo {
+/// Arrays of one dimension beside the images: positions of columns and of lines.
+const COORDINATES: [&str; 2] = ["x_nm", "y_nm"];
+
+fn info(name: String, options: &ArrayOptions, told: &Told) -> ChannelInfo {
+    let value = |key: &str| labels::value(&told.channel, key).map(str::to_owned);
     ChannelInfo {
-        line_direction: labels::line_direction(&name).or(options.line_direction),
+        line_direction: labels::stated_direction(&told.channel)
+            .or_else(|| labels::line_direction(&name))
+            .or(options.line_direction),
         name,
-        internal_name: String::new(),
-        scan_line: None,
+        internal_name: value("internal name").unwrap_or_default(),
+        scan_line: value("scan line"),
     }
 }
 
@@ -187,46 +262,46 @@ fn rendering(name: &str) -> (String, String) {
     ("rendering".to_owned(), note)
 }
 
-fn channel(
-    info: ChannelInfo,
-    plane: Plane,
-    options: &ArrayOptions,
-    unit: Option<&str>,
-    size_nm: Option<[f64; 2]>,
-) -> Channel {
-    let given = match sensor_axis(&info.name, "") {
+fn channel(info: ChannelInfo, plane: Plane, options: &ArrayOptions, told: &Told) -> Channel {
+    let given = match sensor_axis(&info.name, &info.internal_name) {
         Some(_) => options.sensor_unit.as_deref(),
         None => options.unit.as_deref(),
     };
+    let size_nm = options.size_nm.or(told.size_nm);
     Channel {
         name: info.name,
         internal_name: info.internal_name,
-        unit: given.or(unit).unwrap_or("").to_owned(),
+        unit: given.or(told.unit.as_deref()).unwrap_or("").to_owned(),
         line_direction: info.line_direction,
-        scan_line: None,
+        scan_line: info.scan_line,
         rows: plane.rows,
         columns: plane.columns,
         width_nm: size_nm.map(|[width, _]| width),
         height_nm: size_nm.map(|[_, height]| height),
+        span: Span::PixelEdges,
         scale: 1.0,
         offset: 0.0,
         scaling: "values as stored".to_owned(),
-        plane_fit: None,
+        plane_fit: labels::value(&told.channel, "plane fit").map(str::to_owned),
         samples: plane.samples,
     }
 }
 
-/// The frame as the user describes it.
+/// The frame as the user describes it, and where he does not, the file.
 fn frame(format: &str, options: &ArrayOptions, told: &Told) -> Scan {
-    Scan {
+    let mut scan = Scan {
         format: format.to_owned(),
-        frame_direction: options.frame_direction,
-        line_rate_hz: options.line_rate_hz,
-        line_times_s: options.line_times_s,
-        rotation_rad: options.rotation_rad,
-        size_nm: options.size_nm.or(told.size_nm),
+        size_nm: told.size_nm,
+        metadata: told.lines.clone(),
         ..Scan::default()
-    }
+    };
+    labels::apply(&mut scan);
+    scan.size_nm = options.size_nm.or(scan.size_nm);
+    scan.frame_direction = options.frame_direction.or(scan.frame_direction);
+    scan.line_rate_hz = options.line_rate_hz.or(scan.line_rate_hz);
+    scan.line_times_s = options.line_times_s.or(scan.line_times_s);
+    scan.rotation_rad = options.rotation_rad.unwrap_or(scan.rotation_rad);
+    scan
 }
 
 /// Turns lines from the top down into lines from the bottom up, in place.

@@ -59,6 +59,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Plane, String> {
         columns,
         samples: raster::decode(block, columns, kind.encoding, endian, order),
         rendering: false,
+        carried: Vec::new(),
     })
 }
 

@@ -13,6 +13,7 @@ use zune_jpeg::JpegDecoder;
 use super::{Plane, turn};
 use crate::archive::unpacked_limit;
 use crate::cursor::Endian;
+use crate::labels;
 use crate::raster::{self, Encoding, Order};
 use crate::scan::Samples;
 use crate::whole::MOST_CHANNELS;
@@ -172,7 +173,12 @@ fn tiff_page(decoder: &mut Decoder<Bytes<&[u8]>>) -> Result<Plane, String> {
         DecodingResult::F32(v) => Samples::F32(v),
         DecodingResult::F64(v) => Samples::F64(v),
     };
+    let description = decoder.get_tag_ascii_string(Tag::ImageDescription);
+    let carried = labels::lines(&labels::from_ascii(&description.unwrap_or_default()));
     let mut plane = luminance(rows, columns, per_pixel, &pixels)?;
+    if labels::fits(&carried, [rows, columns]) {
+        plane.carried = carried;
+    }
     if top {
         plane.samples = turned(plane.samples, columns);
     }
@@ -188,6 +194,7 @@ fn plane(rows: usize, columns: usize, samples: Samples, rendering: bool) -> Plan
         columns,
         samples,
         rendering,
+        carried: Vec::new(),
     }
 }
 

@@ -3,9 +3,11 @@
 //! Numbers are separated by `;`, tabs, commas or blanks, whichever of these comes first in that
 //! order in the first line; with `;` and tabs a comma within a number is a decimal comma. An empty
 //! field and `nan` are missing. Lines that begin with `#` are comments; of these the ones that
-//! Gwyddion writes (`Channel`, `Width`, `Height`, `Value units`) are understood.
+//! Gwyddion writes (`Channel`, `Width`, `Height`, `Value units`) are understood, and the
+//! `key = value` of files written here.
 
 use super::{Plane, Told, turn};
+use crate::labels;
 use crate::scan::Samples;
 use crate::units::{clean, nm_per};
 
@@ -16,6 +18,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<(Told, Plane), String> {
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     let mut told = Told::default();
     let mut size = [None, None];
+    let mut carried = Vec::new();
     let mut separator = None;
     let mut values = Vec::new();
     let mut columns = 0;
@@ -23,7 +26,11 @@ pub(super) fn read(bytes: &[u8]) -> Result<(Told, Plane), String> {
         let line = String::from_utf8_lossy(line);
         let line = line.trim_matches(['\r', ' ']);
         if let Some(comment) = line.trim_start().strip_prefix('#') {
-            tell(comment, &mut told, &mut size);
+            if comment.contains('=') {
+                carried.extend(labels::lines(comment));
+            } else {
+                tell(comment, &mut told, &mut size);
+            }
             continue;
         }
         if line.trim().is_empty() {
@@ -54,11 +61,13 @@ pub(super) fn read(bytes: &[u8]) -> Result<(Told, Plane), String> {
     if let [Some(width), Some(height)] = size {
         told.size_nm = Some([width, height]);
     }
+    let fits = labels::fits(&carried, [values.len() / columns, columns]);
     let plane = Plane {
         rows: values.len() / columns,
         columns,
         samples: Samples::F64(values),
         rendering: false,
+        carried: if fits { carried } else { Vec::new() },
     };
     Ok((told, plane))
 }

@@ -23,7 +23,7 @@ use crate::cursor::{Cursor, Endian};
 use crate::error::ReadError;
 use crate::labels;
 use crate::raster::{self, Encoding, Order};
-use crate::scan::{Channel, Scan};
+use crate::scan::{Channel, Scan, Span};
 use crate::units;
 use crate::whole::MOST_CHANNELS;
 
@@ -333,6 +333,7 @@ fn channel(field: Object<'_>, info: ChannelInfo) -> Result<Channel, String> {
         columns,
         width_nm: size.map(|[width, _]| width),
         height_nm: size.map(|[_, height]| height),
+        span: Span::PixelEdges,
         scale: 1.0,
         offset: 0.0,
         scaling: "values as stored".to_owned(),

@@ -53,9 +53,10 @@ fn data_field(out: &mut Vec<u8>, scan: &Scan, channel: &Channel) -> Result<(), E
     let (columns, rows) = (count(channel.columns)?, count(channel.rows)?);
     put_integer(out, "xres", columns);
     put_integer(out, "yres", rows);
-    let size = channel.width_nm.zip(channel.height_nm);
-    let (width, height) = size.map_or((f64::from(columns), f64::from(rows)), |(width, height)| {
-        (width / 1e9, height / 1e9)
+    // Gwyddion's sizes go from edge to edge.
+    let size = channel.edges_nm();
+    let [width, height] = size.map_or([f64::from(columns), f64::from(rows)], |size| {
+        size.map(|nm| nm / 1e9)
     });
     put_double(out, "xreal", width);
     put_double(out, "yreal", height);

@@ -16,7 +16,7 @@ use std::ops::Range;
 
 use crate::ChannelInfo;
 use crate::error::ReadError;
-use crate::scan::{Channel, FrameDirection, Scan, UnreadableChannel};
+use crate::scan::{Channel, FrameDirection, Scan, Span, UnreadableChannel};
 use channel::Layout;
 use header::{HeaderText, Section, lookup};
 
@@ -202,6 +202,7 @@ impl Reader<'_> {
             width_nm: size.map(|[width, _]| width),
             height_nm: size
                 .map(|[_, full]| frame::recorded_height(full, layout.rows, self.sections)),
+            span: Span::Frame,
             scale: scaling.scale,
             offset: 0.0,
             scaling: scaling.words,

@@ -1,0 +1,359 @@
+//! `moiregauge convert`: scans from any readable into any writable format.
+
+use std::collections::HashSet;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::Mutex;
+
+use anyhow::{Context as _, bail, ensure};
+use clap::ValueEnum;
+use indicatif::{ProgressBar, ProgressStyle};
+use moiregauge::series::{nominal_geometry, on_grid};
+use rayon::prelude::*;
+use spmfile::{ChannelInfo, Scan, WritableFormat, sensor_axis};
+
+use crate::info::expand;
+use crate::input::{Known, KnownArgs, is_named};
+use crate::say::say;
+
+/// Convert scans into formats of other programs: Gwyddion, NumPy, Zarr, TIFF, text
+///
+/// Everything the file tells is kept as far as the format can: channels, units, sizes, directions,
+/// times, the header. One bad file never stops the others; the exit code tells. Nothing is written
+/// over without --force.
+#[derive(clap::Args, Clone, Debug)]
+#[command(
+    override_usage = "moiregauge convert [OPTIONS] <IN>... <OUT>",
+    after_long_help = "\
+Formats (--to, or the extension of OUT):
+  gwy    Gwyddion container, all channels
+  gsf    Gwyddion simple field, a file per channel
+  gxyzf  Gwyddion XYZ field, points where the position sensors were, a file per line direction
+  npz    archive of NumPy arrays, all channels, top line first, with x_nm and y_nm
+  zarr   Zarr 3 group with named dimensions and coordinates, y upwards; opens in xarray
+  tiff   32-bit pictures, all channels, resolution as ImageJ reads it
+  csv    matrix as text, a file per channel
+
+Examples:
+  moiregauge convert scan.spm scan.gwy
+  moiregauge convert scans/ '*.sxm' converted --to npz
+  moiregauge convert scan.000 phase.tiff --channel 'TR Phase'
+  moiregauge convert picture.png picture.gwy --size 70nm×70nm"
+)]
+pub(crate) struct ConvertArgs {
+    /// Files, folders or names with * and ?; the last one is what is written: a file whose extension
+    /// tells the format, or with --to a folder
+    #[arg(required = true, num_args = 2.., value_name = "PATH")]
+    paths: Vec<PathBuf>,
+    /// Format; OUT is then a folder, made if it does not exist, for any number of files
+    #[arg(long, value_enum, value_name = "FORMAT")]
+    to: Option<FormatArg>,
+    /// Only this channel, by name; may be repeated
+    #[arg(long, value_name = "NAME")]
+    channel: Vec<String>,
+    /// Turn images into laboratory axes by the rotation of the frame: resampled by cubic convolution,
+    /// missing outside the frame; position sensors are left out
+    #[arg(long)]
+    rotate_to_lab: bool,
+    /// Write over files that exist
+    #[arg(long)]
+    force: bool,
+    /// Print nothing but errors
+    #[arg(long, short)]
+    quiet: bool,
+    #[command(flatten)]
+    known: KnownArgs,
+}
+
+/// The writable formats as the command line names them.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum FormatArg {
+    Gwy,
+    Gsf,
+    Gxyzf,
+    Npz,
+    Zarr,
+    Tiff,
+    Csv,
+}
+
+impl From<FormatArg> for WritableFormat {
+    fn from(format: FormatArg) -> Self {
+        match format {
+            FormatArg::Gwy => Self::Gwy,
+            FormatArg::Gsf => Self::Gsf,
+            FormatArg::Gxyzf => Self::Gxyzf,
+            FormatArg::Npz => Self::Npz,
+            FormatArg::Zarr => Self::Zarr,
+            FormatArg::Tiff => Self::Tiff,
+            FormatArg::Csv => Self::Csv,
+        }
+    }
+}
+
+/// The format that the extension of a name tells.
+pub(crate) fn format_of(path: &Path) -> anyhow::Result<WritableFormat> {
+    let extension = path.extension().map(|e| e.to_string_lossy().into_owned());
+    let format = extension
+        .as_deref()
+        .and_then(WritableFormat::from_extension);
+    let known: Vec<&str> = WritableFormat::ALL.iter().map(|f| f.extension()).collect();
+    format.with_context(|| {
+        format!(
+            "{}: expected one of the extensions {}, or --to FORMAT with a folder",
+            path.display(),
+            known.join(", ")
+        )
+    })
+}
+
+/// Converts the files.
+pub(crate) fn run(args: &ConvertArgs) -> anyhow::Result<ExitCode> {
+    let Some((out, paths)) = args
+        .paths
+        .split_last()
+        .filter(|(_, paths)| !paths.is_empty())
+    else {
+        bail!("expected files to convert and what to write");
+    };
+    let (mut inputs, mut failed) = (Vec::new(), Vec::new());
+    for path in expand(paths) {
+        match path {
+            Ok(path) => inputs.push(path),
+            Err((path, error)) => failed.push(format!("{}: {error}", path.display())),
+        }
+    }
+    let format = if let Some(format) = args.to {
+        ensure!(
+            !out.is_file(),
+            "{} is a file; with --to a folder is expected",
+            out.display()
+        );
+        format.into()
+    } else {
+        let format = format_of(out)?;
+        ensure!(
+            inputs.len() + failed.len() == 1,
+            "{} is one file but there are {}; give a folder and --to {}",
+            out.display(),
+            inputs.len() + failed.len(),
+            format.extension()
+        );
+        format
+    };
+    let target = Target {
+        args,
+        out,
+        format,
+        known: args.known.of(&inputs),
+        taken: Mutex::new(HashSet::new()),
+    };
+    let progress = progress(inputs.len(), args.quiet);
+    let written: Vec<anyhow::Result<Vec<PathBuf>>> = inputs
+        .par_iter()
+        .map(|path| {
+            let result = target.convert(path);
+            progress.inc(1);
+            result
+        })
+        .collect();
+    progress.finish_and_clear();
+    let (mut files, mut scans) = (Vec::new(), 0);
+    for (path, result) in inputs.iter().zip(written) {
+        match result {
+            Ok(names) => {
+                scans += 1;
+                files.extend(names);
+            }
+            Err(error) => failed.push(format!("{}: {error:#}", path.display())),
+        }
+    }
+    if !args.quiet && scans > 0 {
+        let first = files.first().map_or(out.clone(), PathBuf::clone);
+        let more = match files.len() {
+            0 | 1 => String::new(),
+            count => format!(" and {} more", count - 1),
+        };
+        let scans = if scans == 1 {
+            "1 scan".to_owned()
+        } else {
+            format!("{scans} scans")
+        };
+        say(&format!("{scans} written to {}{more}\n", first.display()))?;
+    }
+    for error in &failed {
+        eprintln!("error: {error}");
+    }
+    Ok(if failed.is_empty() {
+        ExitCode::SUCCESS
+    } else {
+        ExitCode::FAILURE
+    })
+}
+
+fn progress(files: usize, quiet: bool) -> ProgressBar {
+    if quiet {
+        return ProgressBar::hidden();
+    }
+    // Draws on a terminal only.
+    let bar = ProgressBar::new(files as u64);
+    match ProgressStyle::with_template("converting {bar:30} {pos}/{len} files, {eta} left") {
+        Ok(style) => bar.with_style(style),
+        Err(_) => bar,
+    }
+}
+
+/// Where and how files are written.
+struct Target<'a> {
+    args: &'a ConvertArgs,
+    out: &'a Path,
+    format: WritableFormat,
+    known: Known,
+    /// Stems of this run: two inputs must not write one file.
+    taken: Mutex<HashSet<PathBuf>>,
+}
+
+impl Target<'_> {
+    /// Converts one file; returns what was written.
+    fn convert(&self, path: &Path) -> anyhow::Result<Vec<PathBuf>> {
+        let (folder, stem) = self.place(path)?;
+        let bytes = std::fs::read(path)?;
+        let is_wanted = |info: &ChannelInfo| {
+            let points = self.format == WritableFormat::Gxyzf;
+            let names = &self.args.channel;
+            names.is_empty()
+                || names.iter().any(|name| is_named(&info.name, name))
+                || (points && sensor_axis(&info.name, &info.internal_name).is_some())
+        };
+        let (mut scan, replaced) = self.known.read(path, &bytes, &is_wanted)?;
+        self.channels_are_there(&scan)?;
+        let mut log = vec![format!(
+            "converted by moiregauge {} from {}",
+            env!("CARGO_PKG_VERSION"),
+            path.file_name().unwrap_or_default().to_string_lossy()
+        )];
+        log.extend(replaced);
+        if self.args.rotate_to_lab {
+            scan = turned(&scan)?;
+            log.push("turned into laboratory axes by cubic convolution".to_owned());
+        }
+        let files = spmfile::write(&scan, self.format, &stem, &log)?;
+        self.write(&folder, &stem, files)
+    }
+
+    /// Folder and stem of what a file becomes.
+    fn place(&self, path: &Path) -> anyhow::Result<(PathBuf, String)> {
+        let (folder, stem) = if self.args.to.is_some() {
+            (self.out.to_owned(), stem_of(path))
+        } else {
+            let stem = self.out.file_stem().unwrap_or_default();
+            let folder = self.out.parent().unwrap_or(Path::new(""));
+            (folder.to_owned(), stem.to_string_lossy().into_owned())
+        };
+        let place = folder.join(stem.to_lowercase());
+        let new = self
+            .taken
+            .lock()
+            .map_or(true, |mut taken| taken.insert(place));
+        ensure!(
+            new,
+            "another file of this run already becomes {}",
+            folder.join(&stem).display()
+        );
+        Ok((folder, stem))
+    }
+
+    fn channels_are_there(&self, scan: &Scan) -> anyhow::Result<()> {
+        for name in &self.args.channel {
+            let there = scan.channels.iter().any(|c| is_named(&c.name, name));
+            ensure!(there, "no channel {name:?}");
+        }
+        Ok(())
+    }
+
+    fn write(
+        &self,
+        folder: &Path,
+        stem: &str,
+        files: Vec<(String, Vec<u8>)>,
+    ) -> anyhow::Result<Vec<PathBuf>> {
+        let plain = format!("{stem}.{}", self.format.extension());
+        // `OUT.tif` is written as it was asked for.
+        let path_of = |name: &str| match name.strip_prefix(&plain) {
+            Some("") if self.args.to.is_none() => self.out.to_owned(),
+            Some(inside) if inside.starts_with('/') && self.args.to.is_none() => {
+                self.out.join(inside.trim_start_matches('/'))
+            }
+            _ => folder.join(name),
+        };
+        let group = folder.join(&plain);
+        let is_group = self.format == WritableFormat::Zarr;
+        if !self.args.force {
+            let names = files.iter().map(|(name, _)| path_of(name));
+            let found = names
+                .chain(is_group.then_some(group.clone()))
+                .find(|p| p.exists());
+            if let Some(found) = found {
+                bail!("{} exists; --force writes over it", found.display());
+            }
+        } else if is_group && group.join("zarr.json").is_file() {
+            // Arrays of an earlier group must not stay among the new ones.
+            std::fs::remove_dir_all(&group)
+                .with_context(|| format!("cannot replace {}", group.display()))?;
+        }
+        let mut written = Vec::new();
+        for (name, bytes) in files {
+            let path = path_of(&name);
+            if let Some(folder) = path.parent() {
+                std::fs::create_dir_all(folder)
+                    .with_context(|| format!("cannot make the folder {}", folder.display()))?;
+            }
+            std::fs::write(&path, bytes)
+                .with_context(|| format!("cannot write {}", path.display()))?;
+            if !is_group {
+                written.push(path);
+            }
+        }
+        if is_group {
+            written.push(group);
+        }
+        Ok(written)
+    }
+}
+
+/// The name of a file without its extension, unless that is a number: `scan.012` is one of many.
+pub(crate) fn stem_of(path: &Path) -> String {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    match name.rsplit_once('.') {
+        Some((stem, extension))
+            if !stem.is_empty() && !extension.bytes().all(|b| b.is_ascii_digit()) =>
+        {
+            stem.to_owned()
+        }
+        _ => name.into_owned(),
+    }
+}
+
+/// Every image in laboratory axes.
+fn turned(scan: &Scan) -> anyhow::Result<Scan> {
+    let mut out: Option<Scan> = None;
+    for channel in &scan.channels {
+        if sensor_axis(&channel.name, &channel.internal_name).is_some() {
+            continue;
+        }
+        let geometry = nominal_geometry(scan, channel)
+            .context("--rotate-to-lab needs the size of the image; give it with --size")?;
+        let turned = on_grid(scan, channel, &geometry)
+            .with_context(|| format!("channel {:?} cannot be turned", channel.name))?;
+        match &mut out {
+            Some(out) => out.channels.extend(turned.channels),
+            None => {
+                out = Some(Scan {
+                    metadata: scan.metadata.clone(),
+                    ..turned
+                });
+            }
+        }
+    }
+    out.context("there is no channel but the position sensors")
+}
