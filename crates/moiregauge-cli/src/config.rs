@@ -46,6 +46,8 @@ background = "plane"
 #   name = "mine"
 #   lattice_constant_nm = 0.2461
 #   poisson_ratio = 0.17
+#   lattice_constant_sigma_nm = 0.0001
+#   poisson_ratio_sigma = 0.03
 #   source = "where the numbers come from"
 material = "graphene"
 
@@ -65,6 +67,15 @@ overlap = false
 # x_nm_per_min = 0.5
 # y_nm_per_min = -0.15
 # sigma_nm_per_min = 0.05
+
+# What the scans do not tell, for the uncertainty budget; standard uncertainties. Calibration of the
+# position sensors (or of the scanner, without sensors): gain common to x and y, difference of the two,
+# deviation from a right angle. Better: the values from your own calibration.
+calibration = { gain_percent = 1.0, mismatch_percent = 0.5, orthogonality_mrad = 5.0 }
+
+# Isotropic heterostrain that the layers may have beside the uniaxial one, per cent. The moiré does not
+# show it; 0.06 % still leave the twist within 0.001°.
+isotropic_strain_percent = 0.05
 
 # Monte Carlo draws for the drift (per set) and for twist and strain (per scan).
 drift_draws = 10000
@@ -123,6 +134,32 @@ pub(crate) fn check(settings: &Settings) -> anyhow::Result<()> {
         ratio > -1.0 && ratio < 1.0,
         "the Poisson ratio (--poisson-ratio) must lie between −1 and 1, found {ratio}"
     );
+    let calibration = &settings.calibration;
+    for (name, value, largest) in [
+        (
+            "--lattice-constant-sigma",
+            material.lattice_constant_sigma_nm,
+            0.1 * a,
+        ),
+        ("--poisson-ratio-sigma", material.poisson_ratio_sigma, 0.5),
+        ("--calibration-gain", calibration.gain_percent, 50.0),
+        ("--calibration-mismatch", calibration.mismatch_percent, 50.0),
+        (
+            "--calibration-orthogonality",
+            calibration.orthogonality_mrad,
+            500.0,
+        ),
+        (
+            "--isotropic-strain",
+            settings.isotropic_strain_percent,
+            10.0,
+        ),
+    ] {
+        ensure!(
+            value >= 0.0 && value <= largest,
+            "an uncertainty ({name}) lies between 0 and {largest}, found {value}"
+        );
+    }
     if let Some(drift) = &settings.drift {
         let (x, y, sigma) = (
             drift.x_nm_per_min,

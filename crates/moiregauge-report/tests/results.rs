@@ -127,6 +127,8 @@ fn promised_paths_are_there() {
         "/sets/2/mean",
         "/sets/2/uncorrected/budget/twist_deg/drift",
         "/sets/2/uncorrected/budget/twist_deg/total",
+        "/sets/2/uncorrected/budget/wavelengths_nm/0/drift",
+        "/sets/2/uncorrected/budget/wavelengths_nm/0/total",
         "/sets/2/scans/0/vectors/0/nominal",
     ] {
         assert!(document.pointer(path).is_some_and(Value::is_null), "{path}");

@@ -17,14 +17,28 @@ impl Estimate {
         Self { value, sigma }
     }
 
-    /// From a value and its variance; rounding may have left the variance slightly negative.
+    /// From a value and its variance; rounding may have left the variance slightly negative. An unknown
+    /// variance (NaN) is an unknown σ, not zero.
     pub fn from_variance(value: f64, variance: f64) -> Self {
-        Self::new(value, variance.max(0.0).sqrt())
+        let sigma = if variance < 0.0 { 0.0 } else { variance.sqrt() };
+        Self::new(value, sigma)
     }
 
     /// The same quantity in another unit.
     #[must_use]
     pub fn scaled(self, factor: f64) -> Self {
         Self::new(self.value * factor, self.sigma * factor.abs())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_unknown_variance_is_not_zero() {
+        assert_eq!(Estimate::from_variance(1.0, 4.0).sigma, 2.0);
+        assert_eq!(Estimate::from_variance(1.0, -1e-20).sigma, 0.0);
+        assert!(Estimate::from_variance(1.0, f64::NAN).sigma.is_nan());
     }
 }

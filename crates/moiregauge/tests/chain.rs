@@ -1,6 +1,7 @@
 //! The whole chain on simulated sets: invariances, honest errors, and what must be refused.
 
 use moiregauge::analysis::Analysis;
+use moiregauge::budget::Source;
 use moiregauge::series::{MeasuredScan, analyse, measure_scan};
 use moiregauge::settings::{GivenDrift, Method, Settings};
 use moiregauge::simulate::{Simulation, Simulator};
@@ -208,4 +209,75 @@ fn noise_is_no_lattice() {
     let scans = frames(&simulation);
     let error = measure_scan("x", &scans[0], &quick(Method::Autocorrelation), None).unwrap_err();
     assert!(error.to_string().contains("no lattice"), "{error}");
+}
+
+/// For every lattice of an analysis, joint or not, drift measured, given or left in: image noise, drift
+/// and sensors make up σ, and everything together is more.
+#[test]
+fn the_budget_of_a_whole_analysis_adds_up() {
+    let scans = frames(&small_set(8));
+    let given = Some(GivenDrift {
+        x_nm_per_min: 0.5,
+        y_nm_per_min: -0.15,
+        sigma_nm_per_min: 0.02,
+    });
+    for (method, drift, count) in [
+        (Method::Autocorrelation, None, 3),
+        (Method::Lattice, None, 3),
+        (Method::Autocorrelation, given, 4),
+    ] {
+        let settings = Settings {
+            drift,
+            ..quick(method)
+        };
+        let analysis = analyse_frames(&scans[..count], &settings);
+        let set = &analysis.sets[0];
+        let (mean, combined) = (
+            set.mean.as_ref().unwrap(),
+            analysis.combined.as_ref().unwrap(),
+        );
+        for (budget, found, lattice) in [
+            (&mean.budget, &mean.twist_strain, &mean.lattice),
+            (&combined.budget, &combined.twist_strain, &combined.lattice),
+        ] {
+            let sum = budget.sum(Source::is_statistical);
+            let miss = (sum.covariance - found.covariance).norm();
+            assert!(miss < 1e-6 * found.covariance.norm(), "{method:?}: {miss}");
+            let strain = found.heterostrain().sigma;
+            assert!((sum.magnitude.sqrt() / strain - 1.0).abs() < 1e-6);
+            let length = lattice.wavelength(2).sigma;
+            assert!((sum.wavelengths[2].sqrt() / length - 1.0).abs() < 1e-6);
+            // Each part is a variance of its own, none of the three is nothing: the sensors have
+            // 0.2 nm of noise, and two up and one down scan leave the drift in the lattice.
+            for source in [Source::Image, Source::Drift, Source::Sensor] {
+                let part = budget.of(source);
+                assert!(part.covariance[(0, 0)] > 0.0, "{method:?} {source:?}");
+                assert!(part.magnitude > 0.0, "{method:?} {source:?}");
+            }
+            let total = budget.total().covariance[(0, 0)].sqrt();
+            let gain = 0.01 * found.twist;
+            assert!((1.0..1.2).contains(&(total / gain)), "{}", total / gain);
+        }
+        let left_in = &set.uncorrected.as_ref().unwrap();
+        assert!(!left_in.budget.drift_known());
+        let known = left_in
+            .budget
+            .sum(|s| matches!(s, Source::Image | Source::Sensor));
+        let stated = left_in.twist_strain.covariance;
+        assert!((known.covariance - stated).norm() < 1e-6 * stated.norm());
+    }
+}
+
+/// A small strain stands out of the noise but not of a badly calibrated scanner, and this is said.
+#[test]
+fn strain_within_calibration_is_pointed_out() {
+    let mut simulation = small_set(4);
+    simulation.sample.strain_percent = 0.02;
+    let scans = frames(&simulation);
+    let mut settings = quick(Method::Lattice);
+    let code = "strain-within-calibration";
+    assert!(codes(&analyse_frames(&scans, &settings)).contains(&code));
+    settings.calibration.mismatch_percent = 0.01;
+    settings.calibration.orthogonality_mrad = 0.1;
+    assert!(!codes(&analyse_frames(&scans, &settings)).contains(&code));
 }

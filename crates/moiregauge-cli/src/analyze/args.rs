@@ -60,6 +60,24 @@ pub(crate) struct AnalyzeArgs {
     /// Poisson ratio of the layers, in place of the material's
     #[arg(long, value_name = "RATIO")]
     poisson_ratio: Option<f64>,
+    /// Standard uncertainty of the lattice constant, nm, for the budget [default: the material's]
+    #[arg(long, value_name = "NM")]
+    lattice_constant_sigma: Option<f64>,
+    /// Standard uncertainty of the Poisson ratio, for the budget [default: the material's]
+    #[arg(long, value_name = "RATIO")]
+    poisson_ratio_sigma: Option<f64>,
+    /// Gain error of the scanner, common to x and y, per cent, for the budget [default: 1]
+    #[arg(long, value_name = "PERCENT")]
+    calibration_gain: Option<f64>,
+    /// Difference of the gains of x and y, per cent, for the budget [default: 0.5]
+    #[arg(long, value_name = "PERCENT")]
+    calibration_mismatch: Option<f64>,
+    /// Deviation of the axes from a right angle, mrad, for the budget [default: 5]
+    #[arg(long, value_name = "MRAD")]
+    calibration_orthogonality: Option<f64>,
+    /// Isotropic heterostrain that the layers may have, per cent, for the budget [default: 0.05]
+    #[arg(long, value_name = "PERCENT")]
+    isotropic_strain: Option<f64>,
     /// Form of the strain equation [default: real-space]
     #[arg(long, value_enum)]
     strain_convention: Option<ConventionArg>,
@@ -150,6 +168,29 @@ impl AnalyzeArgs {
         }
         if let Some(ratio) = self.poisson_ratio {
             s.material.poisson_ratio = ratio;
+        }
+        let priors = [
+            (
+                self.lattice_constant_sigma,
+                &mut s.material.lattice_constant_sigma_nm,
+            ),
+            (
+                self.poisson_ratio_sigma,
+                &mut s.material.poisson_ratio_sigma,
+            ),
+            (self.calibration_gain, &mut s.calibration.gain_percent),
+            (
+                self.calibration_mismatch,
+                &mut s.calibration.mismatch_percent,
+            ),
+            (
+                self.calibration_orthogonality,
+                &mut s.calibration.orthogonality_mrad,
+            ),
+            (self.isotropic_strain, &mut s.isotropic_strain_percent),
+        ];
+        for (given, setting) in priors {
+            *setting = given.unwrap_or(*setting);
         }
         if self.channel.is_some() {
             s.channel.clone_from(&self.channel);

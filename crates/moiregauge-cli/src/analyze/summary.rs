@@ -4,10 +4,11 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use moiregauge::analysis::{Analysis, Combined, SetAnalysis};
+use moiregauge::budget::Budget;
 use moiregauge::caveat::Caveat;
 use moiregauge::estimate::Estimate;
 use moiregauge::strain::TwistStrain;
-use moiregauge_report::{FailedInput, plus_minus};
+use moiregauge_report::{FailedInput, plus_minus, two_digits};
 use spmfile::FrameDirection;
 
 /// Per set and combined: drift, twist, strain; then what to keep in mind.
@@ -58,43 +59,92 @@ fn set_summary(text: &mut String, set: &SetAnalysis) {
         None => text.push_str("  drift         not determined\n"),
     }
     match (&set.mean, &set.uncorrected) {
-        (Some(mean), _) => twist_strain(text, &mean.twist_strain),
+        (Some(mean), _) => twist_strain(text, &mean.twist_strain, &mean.budget),
         (None, Some(mean)) => {
             text.push_str(
                 "  not corrected for drift (statistical errors only, drift not included):\n",
             );
-            twist_strain(text, &mean.twist_strain);
+            twist_strain(text, &mean.twist_strain, &mean.budget);
         }
         (None, None) => text.push_str("  no twist and strain explain this lattice\n"),
     }
     text.push('\n');
 }
 
-fn twist_strain(text: &mut String, found: &TwistStrain) {
-    let degrees = |e: Estimate| plus_minus(e.scaled(1f64.to_degrees()));
-    let _ = writeln!(text, "  twist         {}°", degrees(found.twist()));
-    match found.axis_lab() {
+/// σ of the scans, and in brackets σ with everything in the budget.
+fn twist_strain(text: &mut String, found: &TwistStrain, budget: &Budget) {
+    let degree = 1f64.to_degrees();
+    let degrees = |e: Estimate| plus_minus(e.scaled(degree));
+    let known = budget.known();
+    let all = budget.applied_to(found);
+    let sigma = |variance: f64, factor: f64| {
+        two_digits(factor * Estimate::from_variance(0.0, variance).sigma)
+    };
+    let _ = writeln!(
+        text,
+        "  twist         {}° (± {}° with calibration and model{})",
+        degrees(found.twist()),
+        sigma(known.covariance[(0, 0)], degree),
+        if budget.drift_known() {
+            ""
+        } else {
+            ", without drift"
+        }
+    );
+    let percent = |[low, high]: [f64; 2]| format!("{:.4} to {:.4} %", 100.0 * low, 100.0 * high);
+    let below = |e: &TwistStrain| format!("{:.4} %", 100.0 * e.strain_upper_limit_95());
+    let (axis, interval, in_all) = (
+        found.axis_lab(),
+        found.strain_interval_95(),
+        all.strain_interval_95(),
+    );
+    match axis {
+        Some(axis) if all.axis_lab().is_some() => {
+            let _ = writeln!(
+                text,
+                "  heterostrain  {} % (± {} %), axis {}° (± {}°) to x",
+                plus_minus(found.heterostrain().scaled(100.0)),
+                sigma(known.magnitude, 100.0),
+                degrees(axis),
+                sigma(known.axis_lab, degree)
+            );
+        }
         Some(axis) => {
             let _ = writeln!(
                 text,
-                "  heterostrain  {} %, axis {}° to x",
+                "  heterostrain  {} %, axis {}° to x, in the image; with calibration and model below {} \
+                 (95 %), not significant",
                 plus_minus(found.heterostrain().scaled(100.0)),
-                degrees(axis)
+                degrees(axis),
+                below(&all)
             );
         }
         None => {
             let _ = writeln!(
                 text,
-                "  heterostrain  below {:.4} % (95 %), not significant",
-                found.strain_upper_limit_95() * 100.0
+                "  heterostrain  below {} (95 %; {} with calibration and model), not significant",
+                below(found),
+                below(&all)
             );
         }
     }
+    let part = |i: usize| {
+        let variance = found.strain_covariance()[(i, i)];
+        plus_minus(Estimate::from_variance(found.strain_vector[i], variance).scaled(100.0))
+    };
+    let _ = writeln!(
+        text,
+        "                vector ({}, {}) %; 95 %: {} ({})",
+        part(0),
+        part(1),
+        percent(interval),
+        percent(in_all)
+    );
 }
 
 fn combined_summary(text: &mut String, combined: &Combined) {
     text.push_str("all sets together\n");
-    twist_strain(text, &combined.twist_strain);
+    twist_strain(text, &combined.twist_strain, &combined.budget);
     for pair in &combined.consistency {
         let drift = pair
             .drift_sigmas

@@ -249,6 +249,16 @@ fn numbers_that_make_no_sense() {
     for options in [&["--drift", "nan", "0"][..], &["--drift", "0", "inf"]] {
         refuse(&run(analyze(&scans, &out).args(options)), &["drift"]);
     }
+    for options in [
+        &["--calibration-gain=-1"][..],
+        &["--calibration-mismatch", "nan"],
+        &["--lattice-constant-sigma", "1"],
+    ] {
+        refuse(
+            &run(analyze(&scans, &out).args(options)),
+            &["an uncertainty"],
+        );
+    }
     let sigma = ["--drift", "0.5", "0", "--drift-sigma=-1"];
     refuse(&run(analyze(&scans, &out).args(sigma)), &["drift-sigma"]);
     // The same from a file.

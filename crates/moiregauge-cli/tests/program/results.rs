@@ -104,6 +104,13 @@ const PROMISED: &[(&str, Kind)] = &[
         "sets[].scans[].twist_strain.drift_corrected.strain_axis_lattice_deg",
         EstimateOrNull,
     ),
+    ("sets[].mean.strain_interval_95_percent", Pair),
+    ("sets[].mean.budget.twist_deg.image", Number),
+    ("sets[].mean.budget.twist_deg.total", Number),
+    ("sets[].mean.budget.heterostrain_percent.total", Number),
+    ("sets[].mean.budget.strain_e1_percent.drift", Number),
+    ("sets[].mean.budget.strain_vector_covariance", Matrix),
+    ("combined.budget.twist_deg.calibration_gain", Number),
     ("combined.twist_deg", Estimate),
     ("combined.heterostrain_percent", Estimate),
     ("combined.vectors", List(3)),
@@ -331,6 +338,27 @@ fn the_printed_settings_fed_back_change_nothing() {
     assert!(plain == bytes("over", Some(&config), &back));
 }
 
+/// A gain of 0.2 % and its part of the twist; the σ of the scans does not know of it.
+#[test]
+fn the_calibration_is_what_the_user_says() {
+    let folder = tempfile::tempdir().unwrap();
+    let scans = small_set(folder.path());
+    let of = |name: &str, options: &[&str]| {
+        let out = folder.path().join(name);
+        succeed(analyze(&scans, &out).args(options).arg("--no-report"));
+        let document = results(&out);
+        let number = |path: &str| document.pointer(path).and_then(Value::as_f64).unwrap();
+        let twist = number("/combined/twist_deg/value");
+        let gain = number("/combined/budget/twist_deg/calibration_gain");
+        (gain / twist, number("/combined/twist_deg/sigma"))
+    };
+    let (by_default, sigma) = of("default", &[]);
+    let (chosen, same) = of("chosen", &["--calibration-gain", "0.2"]);
+    assert!((by_default - 0.01).abs() < 1e-4, "{by_default}");
+    assert!((chosen - 0.002).abs() < 1e-4, "{chosen}");
+    assert_eq!(sigma, same);
+}
+
 #[test]
 fn json_goes_to_the_screen_alone() {
     let folder = tempfile::tempdir().unwrap();
@@ -350,6 +378,7 @@ fn the_summary_ends_with_drift_twist_and_strain() {
         "drift",
         "twist",
         "heterostrain",
+        "with calibration and model",
         "nm/min",
         "4 scans (2 up, 2 down)",
     ] {

@@ -2,6 +2,7 @@
 
 use moiregauge::analysis::Analysis;
 use moiregauge::budget::{Budget, Contribution, Source};
+use moiregauge::estimate::Estimate;
 
 use super::{Drawing, layout};
 use crate::draw::legend::{self, Key};
@@ -83,8 +84,9 @@ pub(super) fn draw(analysis: &Analysis, id: &str) -> Result<Drawing, String> {
     let mut svg = Svg::new(id, PAGE, top + height + layout::BELOW);
     let width = (PAGE - NAMES - 3.0 * RIGHT) / 2.0;
     let panel = |i: f64| Rect::new(NAMES + i * (width + 2.0 * RIGHT), top, width, height);
-    let twist = |c: &Contribution| c.covariance[(0, 0)].max(0.0).sqrt().to_degrees();
-    let strain = |c: &Contribution| 100.0 * c.magnitude.max(0.0).sqrt();
+    let sigma = |variance: f64| Estimate::from_variance(0.0, variance).sigma;
+    let twist = |c: &Contribution| sigma(c.covariance[(0, 0)]).to_degrees();
+    let strain = |c: &Contribution| 100.0 * sigma(c.magnitude);
     bars(
         &mut svg,
         panel(0.0),

@@ -1,6 +1,7 @@
 //! The uncertainty budget as the document holds it: standard deviations, source by source.
 
 use moiregauge::budget::{Budget, Contribution, Source};
+use moiregauge::estimate::Estimate;
 use moiregauge::strain::TwistStrain;
 use nalgebra::Matrix2;
 use schemars::JsonSchema;
@@ -84,11 +85,8 @@ pub(crate) fn source_name(source: Source) -> &'static str {
 impl BudgetColumn {
     /// Square roots of a variance of every source, times `factor`.
     fn of(budget: &Budget, factor: f64, variance: impl Fn(&Contribution) -> f64) -> Self {
-        // Rounding may leave a variance that is zero slightly below.
-        let sigma = |c: &Contribution| {
-            let variance = variance(c);
-            number(if variance < 0.0 { 0.0 } else { variance.sqrt() } * factor)
-        };
+        let sigma =
+            |c: &Contribution| number(factor * Estimate::from_variance(0.0, variance(c)).sigma);
         let of = |source| sigma(&budget.of(source));
         Self {
             image: of(Source::Image),

@@ -307,5 +307,7 @@ fn statistical_rows_add_up_to_sigma() {
     let left_in = Statistical::without_drift(&part(1.3), &part(0.7));
     let budget = Budget::new(&lattice, &found, &left_in, &settings);
     assert!(!budget.drift_known() && budget.total().covariance[(0, 0)].is_nan());
-    assert!(budget.known().covariance[(0, 0)] > 0.0);
+    assert!(budget.total().wavelengths.iter().all(|v| v.is_nan()));
+    assert!(budget.total().magnitude.is_nan() && budget.total().axis_lab.is_nan());
+    assert!(budget.known().covariance[(0, 0)] > 0.0 && budget.known().wavelengths[0] > 0.0);
 }
