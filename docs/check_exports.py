@@ -89,8 +89,8 @@ for i, name in enumerate(names):
     check(field.si_unit_z["unitstr"] == unit, f"gwyfile: {name} is in {field.si_unit_z}")
     check(field.si_unit_xy["unitstr"] == "m", "gwyfile: lengths in m")
     check(titles[i] == told[name]["spmfile name"], f"gwyfile: {titles[i]}")
-    close(field.xreal / field.xres, (x[1] - x[0]) * 1e-9, 1e-9, "gwyfile: pitch along x")
-    close(field.yreal / field.yres, (y[0] - y[1]) * 1e-9, 1e-9, "gwyfile: pitch along y")
+    close(field.xreal / field.data.shape[1], (x[1] - x[0]) * 1e-9, 1e-9, "gwyfile: pitch along x")
+    close(field.yreal / field.data.shape[0], (y[0] - y[1]) * 1e-9, 1e-9, "gwyfile: pitch along y")
     middle = (x[0] + x[-1]) / 2 * 1e-9
     close(field.xoff + field.xreal / 2, middle, 1e-9, "gwyfile: centre")
 
@@ -150,7 +150,7 @@ for path in images:
     check("spmfile line rate (Hz)" not in lines, f"{path.name}: has times")
     field = gwyfile.load(str(path.with_suffix(".gwy")))["/0/data"]
     close(field.data, image[name] * to_si(lines["spmfile unit"])[0], 1e-12, path.name)
-    close(field.xreal / field.xres, field.yreal / field.yres, 1e-12, f"{path.name}: square")
+    close(field.xreal / field.data.shape[1], field.yreal / field.data.shape[0], 1e-12, f"{path.name}: square")
     array = xr.open_zarr(path.with_suffix(".zarr"), consolidated=False)[name]
     close(array.values[::-1], image[name], 0.0, path.name)
     share = np.isfinite(image[name]).mean()

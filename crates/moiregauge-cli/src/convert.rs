@@ -3,9 +3,8 @@
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::sync::Mutex;
 
-use anyhow::{Context as _, bail, ensure};
+use anyhow::{Context as _, anyhow, bail, ensure};
 use clap::ValueEnum;
 use indicatif::{ProgressBar, ProgressStyle};
 use moiregauge::series::{nominal_geometry, on_grid};
@@ -146,13 +145,30 @@ pub(crate) fn run(args: &ConvertArgs) -> anyhow::Result<ExitCode> {
         out,
         format,
         known: args.known.of(&inputs),
-        taken: Mutex::new(HashSet::new()),
     };
-    let progress = progress(inputs.len(), args.quiet);
-    let written: Vec<anyhow::Result<Vec<PathBuf>>> = inputs
-        .par_iter()
+    // Before anything runs in parallel: which of two files of one name is first must not depend on it.
+    let mut taken = HashSet::new();
+    let jobs: Vec<(&PathBuf, (PathBuf, String), bool)> = inputs
+        .iter()
         .map(|path| {
-            let result = target.convert(path);
+            let (folder, stem) = target.place(path);
+            let new = taken.insert(folder.join(stem.to_lowercase()));
+            (path, (folder, stem), new)
+        })
+        .collect();
+    let progress = progress(inputs.len(), args.quiet);
+    let written: Vec<anyhow::Result<Vec<PathBuf>>> = jobs
+        .par_iter()
+        .map(|(path, place, new)| {
+            let result = if *new {
+                target.convert(path, place)
+            } else {
+                let name = place.0.join(&place.1);
+                Err(anyhow!(
+                    "another file of this run already becomes {}",
+                    name.display()
+                ))
+            };
             progress.inc(1);
             result
         })
@@ -209,14 +225,12 @@ struct Target<'a> {
     out: &'a Path,
     format: WritableFormat,
     known: Known,
-    /// Stems of this run: two inputs must not write one file.
-    taken: Mutex<HashSet<PathBuf>>,
 }
 
 impl Target<'_> {
     /// Converts one file; returns what was written.
-    fn convert(&self, path: &Path) -> anyhow::Result<Vec<PathBuf>> {
-        let (folder, stem) = self.place(path)?;
+    fn convert(&self, path: &Path, place: &(PathBuf, String)) -> anyhow::Result<Vec<PathBuf>> {
+        let (folder, stem) = place;
         let bytes = std::fs::read(path)?;
         let is_wanted = |info: &ChannelInfo| {
             let points = self.format == WritableFormat::Gxyzf;
@@ -237,30 +251,18 @@ impl Target<'_> {
             scan = turned(&scan)?;
             log.push("turned into laboratory axes by cubic convolution".to_owned());
         }
-        let files = spmfile::write(&scan, self.format, &stem, &log)?;
-        self.write(&folder, &stem, files)
+        let files = spmfile::write(&scan, self.format, stem, &log)?;
+        self.write(folder, stem, files)
     }
 
     /// Folder and stem of what a file becomes.
-    fn place(&self, path: &Path) -> anyhow::Result<(PathBuf, String)> {
-        let (folder, stem) = if self.args.to.is_some() {
-            (self.out.to_owned(), stem_of(path))
-        } else {
-            let stem = self.out.file_stem().unwrap_or_default();
-            let folder = self.out.parent().unwrap_or(Path::new(""));
-            (folder.to_owned(), stem.to_string_lossy().into_owned())
-        };
-        let place = folder.join(stem.to_lowercase());
-        let new = self
-            .taken
-            .lock()
-            .map_or(true, |mut taken| taken.insert(place));
-        ensure!(
-            new,
-            "another file of this run already becomes {}",
-            folder.join(&stem).display()
-        );
-        Ok((folder, stem))
+    fn place(&self, path: &Path) -> (PathBuf, String) {
+        if self.args.to.is_some() {
+            return (self.out.to_owned(), stem_of(path));
+        }
+        let stem = self.out.file_stem().unwrap_or_default();
+        let folder = self.out.parent().unwrap_or(Path::new(""));
+        (folder.to_owned(), stem.to_string_lossy().into_owned())
     }
 
     fn channels_are_there(&self, scan: &Scan) -> anyhow::Result<()> {
