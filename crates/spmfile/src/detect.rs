@@ -136,7 +136,7 @@ pub fn detect(bytes: &[u8]) -> Format {
     let printable = |b: &u8| *b >= 0x20 || matches!(b, b'\t' | b'\n' | b'\r');
     if !text.iter().all(printable) {
         Format::Unknown
-    } else if numbers_only(text) {
+    } else if numbers_only(behind_comments(bytes)) {
         Format::TextMatrix
     } else {
         Format::Text
@@ -233,10 +233,29 @@ fn igor(head: &[u8]) -> bool {
     kind.is_ok_and(|kind| kind == 0 || matches!(kind & !0x41, 2 | 4 | 8 | 16 | 32 | 128))
 }
 
+/// So many bytes tell the format.
+const HEAD: usize = 512;
+
+/// The head of a text behind its leading comments, however long they are.
+fn behind_comments(text: &[u8]) -> &[u8] {
+    let mut rest = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text);
+    while rest.first() == Some(&b'#') {
+        let end = rest.iter().position(|&b| b == b'\n');
+        rest = end.map_or(&[][..], |end| &rest[end + 1..]);
+    }
+    &rest[..rest.len().min(HEAD)]
+}
+
 /// Whether the lines, comments aside, hold numbers and nothing else. The last one may be cut off.
 fn numbers_only(text: &[u8]) -> bool {
     let text = String::from_utf8_lossy(text);
-    let whole = text.rsplit_once('\n').map_or(&*text, |(whole, _)| whole);
+    // Of a single line that is longer than the head the last number may be cut off, too.
+    let cut = |text| str::rsplit_once(text, [',', ';', '\t', ' ']);
+    let whole = match text.rsplit_once('\n') {
+        Some((whole, _)) => whole,
+        None if text.len() >= HEAD => cut(&*text).map_or("", |(whole, _)| whole),
+        None => &text,
+    };
     let mut lines = whole
         .lines()
         .map(str::trim)
@@ -274,6 +293,16 @@ mod tests {
             Format::TextMatrix
         );
         assert_eq!(detect(b"1 apple\n"), Format::Text);
+        let comments = "# a comment of some length\n".repeat(40);
+        let long = "-1.25e-3,".repeat(200);
+        for text in [format!("{comments}{long}1\n"), format!("{long}1\n")] {
+            assert_eq!(detect(text.as_bytes()), Format::TextMatrix);
+        }
+        assert_eq!(detect(comments.as_bytes()), Format::Text);
+        assert_eq!(
+            detect(format!("{comments}1 apple\n").as_bytes()),
+            Format::Text
+        );
     }
 
     #[test]
