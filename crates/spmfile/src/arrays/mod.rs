@@ -1,7 +1,7 @@
 //! Plain arrays and pictures: `.npy`, `.npz`, text matrices, TIFF, PNG, JPEG.
 //!
 //! They hold numbers and no frame: its size, direction and times are for the user to give, in
-//! [`ArrayOptions`]; what is not given stays unknown. Files written here ([`npz`], [`tiff`], [`csv`])
+//! [`ArrayOptions`]; what is not given stays unknown. Files written here ([`npz`], [`tiff()`], [`csv`])
 //! carry along what was known, and it is taken back; options come before it. The first line of an array or a picture is the
 //! top one. A coloured picture is a rendering; it becomes one channel of its luminance, with a note
 //! in [`Scan::metadata`].
