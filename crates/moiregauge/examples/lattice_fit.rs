@@ -5,7 +5,8 @@
 //! meant for white noise; `pull` is the standard deviation of error over stated error, 1 where error
 //! bars are true; `fast` and `slow` are the same for the wave vectors along either axis, `< 1σ` and `< 2σ`
 //! the shares (%) within one and two of them, 68.3 and 95.4; `bias` is the largest mean pull; `bent` counts images
-//! whose lattice is said to change across the frame (none of them does).
+//! whose lattice is said to change across the frame (none of them does); `phase` is the pull of the phases of the
+//! first harmonics, `ridge` that of those with fewer than three cycles along the fast axis.
 
 #[path = "../tests/fit_scene/mod.rs"]
 mod fit_scene;
@@ -189,6 +190,9 @@ const CASES: [Case; 24] = [
     ),
 ];
 
+/// Waves of fewer cycles along the fast axis lie on the ridge of line noise.
+const RIDGE: f64 = 3.0;
+
 fn main() {
     let mut arguments = std::env::args().skip(1);
     let count = arguments
@@ -196,7 +200,7 @@ fn main() {
         .map_or(50, |n| n.parse().expect("a number"));
     let wanted = arguments.next().unwrap_or_default();
     println!(
-        "case               right     error/bound  pull   fast   slow   < 1σ  < 2σ  bias  lines  bent  waves  goodness"
+        "case               right     error/bound  pull   fast   slow   < 1σ  < 2σ  bias  lines  bent  waves  goodness  phase  ridge"
     );
     for case in CASES.iter().filter(|c| c.0.contains(&wanted)) {
         run(case, count);
@@ -217,6 +221,7 @@ fn run(&(name, size, periods, contrast, noise): &Case, count: u64) {
     let mut pulls: Vec<Vector4<f64>> = Vec::new();
     let (mut error, mut bound) = (0.0, 0.0);
     let mut waves: Vec<Vector4<f64>> = Vec::new();
+    let mut phases: Vec<(f64, f64)> = Vec::new();
     let (mut lines, mut bent, mut shown, mut goodness) = (0, 0, 0, 0.0);
     for seed in 0..count {
         let mut scene = Scene::new(size, periods, 0.61803 * seed as f64, contrast, seed);
@@ -244,6 +249,7 @@ fn run(&(name, size, periods, contrast, noise): &Case, count: u64) {
                 .expect("errors above zero"),
         );
         waves.push(scene.wave_pulls(&measured.pixels.basis, &measured.pixels.covariance));
+        phases.extend(scene.phase_pulls(&measured));
         error += off.norm_squared();
         // The bound takes longer than the fit, and changes little from image to image.
         if seed < 3 {
@@ -273,8 +279,16 @@ fn run(&(name, size, periods, contrast, noise): &Case, count: u64) {
             .filter(|p| p.abs() < limit);
         100.0 * small.count() as f64 / (4.0 * n)
     };
+    let rms = |cycles: std::ops::Range<f64>| {
+        let chosen: Vec<f64> = phases
+            .iter()
+            .filter(|(c, _)| cycles.contains(c))
+            .map(|(_, pull)| pull * pull)
+            .collect();
+        (chosen.iter().sum::<f64>() / chosen.len() as f64).sqrt()
+    };
     println!(
-        "{name:18} {:3}/{count:<3}   {:6.3}       {:.3}  {:.3}  {:.3}  {:4.1}  {:4.1}  {:.3}  {lines:5}  {bent:4}  {:5.1}  {:.3}",
+        "{name:18} {:3}/{count:<3}   {:6.3}       {:.3}  {:.3}  {:.3}  {:4.1}  {:4.1}  {:.3}  {lines:5}  {bent:4}  {:5.1}  {:.3}     {:.3}  {:.3}",
         pulls.len(),
         (error / n / bound).sqrt(),
         square.sqrt(),
@@ -285,5 +299,7 @@ fn run(&(name, size, periods, contrast, noise): &Case, count: u64) {
         mean.amax(),
         shown as f64 / n,
         goodness / n,
+        rms(0.0..f64::INFINITY),
+        rms(0.0..RIDGE),
     );
 }

@@ -11,10 +11,9 @@
 
 use nalgebra::{Matrix2, Matrix4, Vector2};
 
-use crate::estimate::Estimate;
 use crate::joint::{Sighting, fit};
-use crate::lattice::LatticeVectors;
 use crate::lattice::reciprocal::{real_from_reciprocal, reciprocal};
+use crate::lattice::{LatticeVectors, Phases};
 use crate::simulate::{FrameTruth, Simulator};
 use crate::strain::twist_strain;
 
@@ -99,7 +98,7 @@ fn ideal(
     let of_wave = j * spread * j.transpose() * pixels;
     let indices = pair.try_inverse()?;
     let mut information = Matrix4::<f64>::zeros();
-    let mut phase_sigmas = [f64::NAN; 3];
+    let mut variances = [f64::NAN; 3];
     for (wave, amplitude) in simulator.harmonics() {
         let ratio = (amplitude / noise).powi(2);
         let index = indices * wave;
@@ -110,10 +109,10 @@ fn ideal(
             }
         }
         let firsts = [(1.0, 0.0), (0.0, 1.0), (-1.0, 1.0)];
-        for (sigma, (h, k)) in phase_sigmas.iter_mut().zip(firsts) {
+        for (variance, (h, k)) in variances.iter_mut().zip(firsts) {
             let first = Vector2::new(h, k);
             if (index - first).norm() < 1e-6 || (index + first).norm() < 1e-6 {
-                *sigma = (2.0 / (ratio * pixels)).sqrt();
+                *variance = 2.0 / (ratio * pixels);
             }
         }
     }
@@ -126,7 +125,7 @@ fn ideal(
         pair.column(1).into_owned(),
         pair.column(1) - pair.column(0),
     ];
-    let phases = [0, 1, 2].map(|h| Estimate::new(three[h].dot(&place), phase_sigmas[h]));
+    let phases = Phases::independent(three.map(|g| g.dot(&place)), variances);
     Some(Sighting {
         scan: 0,
         class,
@@ -140,7 +139,7 @@ fn ideal(
         fast_gain: Matrix2::zeros(),
         time,
         position: middle,
-        phases: Some(phases).filter(|_| phase_sigmas.iter().all(|s| s.is_finite())),
+        phases: Some(phases).filter(|_| variances.iter().all(|v| v.is_finite())),
     })
 }
 

@@ -7,11 +7,16 @@ const SIGNIFICANT: f64 = 0.05;
 /// say: `χ²/dof` if chance makes so large a χ² in fewer than 5 % of cases, else 1. To enlarge for every
 /// χ²/dof above 1 would make errors too large by 5 % on average where nothing is wrong.
 pub(crate) fn enlargement(chi2: f64, freedom: usize) -> f64 {
-    if freedom > 0 && tail(chi2, freedom) < SIGNIFICANT {
+    if is_significant(chi2, freedom) {
         chi2 / freedom as f64
     } else {
         1.0
     }
+}
+
+/// Whether chance makes so large a χ² in fewer than 5 % of cases.
+pub(crate) fn is_significant(chi2: f64, freedom: usize) -> bool {
+    freedom > 0 && tail(chi2, freedom) < SIGNIFICANT
 }
 
 /// The probability of a χ² of `freedom` degrees beyond `chi2`, by the recurrence

@@ -110,7 +110,8 @@ impl JointFit {
     fn instability_without(&self, scan: usize, x: &DVector<f64>) -> f64 {
         let rows = self.rows(x, self.instability_nm);
         let others = |row: usize| rows.scans[row] != scan;
-        instability(&rows, &self.unscaled, &others)
+        let scatter = self.instability_nm * self.instability_nm;
+        instability(&rows, &self.unscaled, scatter, &others)
     }
 }
 
@@ -208,22 +209,12 @@ impl JointFit {
             x[first + scan] = 0.0;
         }
         let rows = self.rows(&x, self.instability_nm);
-        let g = self.waves.basis;
-        let three = [
-            g.column(0).into_owned(),
-            g.column(1).into_owned(),
-            g.column(1) - g.column(0),
-        ];
+        let of_scan = rows.phases.iter().filter(|p| rows.scans[p.row] == scan);
         let (mut normal, mut right) = (Matrix2::zeros(), Vector2::zeros());
-        let of_scan = rows
-            .phase_rows
-            .iter()
-            .zip(&rows.phase_misses)
-            .filter(|(row, _)| rows.scans[**row] == scan);
-        for (k, (_, miss)) in of_scan.enumerate() {
-            let unit = three[k % 3].normalize();
-            normal += unit * unit.transpose();
-            right += unit * miss.value;
+        for phases in of_scan {
+            let g = &phases.waves;
+            normal += g.transpose() * g;
+            right += g.transpose() * phases.miss;
         }
         Some(normal.try_inverse()? * right)
     }

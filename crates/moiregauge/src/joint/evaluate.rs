@@ -1,9 +1,8 @@
 //! The model of a sighting and its derivatives.
 
-use nalgebra::{DMatrix, DVector, Matrix2, Matrix4, Vector2};
+use nalgebra::{DMatrix, DVector, Matrix2, Matrix3, Matrix3x2, Matrix4, Vector2, Vector3};
 
 use super::{Sighting, Terms};
-use crate::estimate::Estimate;
 
 /// Where each parameter stands in the vector.
 #[derive(Clone, Debug)]
@@ -127,10 +126,37 @@ pub(super) struct Linearised {
     pub(super) jacobian: Vec<DVector<f64>>,
     /// The scan to which each residual belongs.
     pub(super) scans: Vec<usize>,
-    /// Which of them are phases.
-    pub(super) phase_rows: Vec<usize>,
-    /// The phase residuals as distances, nm, with the standard deviations that noise gives them.
-    pub(super) phase_misses: Vec<Estimate>,
+    /// The phases, which have three rows each.
+    pub(super) phases: Vec<PhaseMiss>,
+}
+
+/// The phases of one sighting against the model.
+pub(super) struct PhaseMiss {
+    /// The first of its three rows.
+    pub(super) row: usize,
+    /// Measured − model, rad.
+    pub(super) miss: Vector3<f64>,
+    /// Covariance of what noise does to the measured ones, rad².
+    pub(super) noise: Matrix3<f64>,
+    /// The three wave vectors as rows, rad/nm: what a displacement does.
+    pub(super) waves: Matrix3x2<f64>,
+}
+
+impl PhaseMiss {
+    /// The Cholesky factor that whitens the phases where positions have the variance `scatter`, nm².
+    pub(super) fn factor(&self, scatter: f64) -> Option<Matrix3<f64>> {
+        let shaken = self.waves * self.waves.transpose() * scatter;
+        Some((self.noise + shaken).cholesky()?.l())
+    }
+
+    /// The displacement that explains the phases best, nm, and the covariance that noise gives it, nm².
+    pub(super) fn displacement(&self) -> Option<(Vector2<f64>, Matrix2<f64>)> {
+        let lower = self.factor(0.0)?;
+        let design = lower.solve_lower_triangular(&self.waves)?;
+        let miss = lower.solve_lower_triangular(&self.miss)?;
+        let covariance = (design.transpose() * design).try_inverse()?;
+        Some((covariance * design.transpose() * miss, covariance))
+    }
 }
 
 /// Evaluates the model at `x` for the sightings within `reach` of the origin of time (phases beyond
@@ -147,8 +173,7 @@ pub(super) fn linearise(
         residuals: Vec::new(),
         jacobian: Vec::new(),
         scans: Vec::new(),
-        phase_rows: Vec::new(),
-        phase_misses: Vec::new(),
+        phases: Vec::new(),
     };
     for sighting in sightings {
         waves(sighting, layout, x, &mut out);
@@ -244,34 +269,49 @@ fn phases(
     if let Some(i) = offset {
         place -= Vector2::new(x[i], x[i + 1]);
     }
+    let mut rows = DMatrix::<f64>::zeros(3, layout.size);
+    let mut found = PhaseMiss {
+        row: out.residuals.len(),
+        miss: Vector3::zeros(),
+        noise: measured.covariance,
+        waves: Matrix3x2::zeros(),
+    };
     for (h, (a, b)) in HARMONICS.into_iter().enumerate() {
         let g = a * Vector2::new(x[0], x[1]) + b * Vector2::new(x[2], x[3]);
         let constant = first + 3 * sighting.block + h;
         let model = g.dot(&place) + x[constant];
-        let miss = wrapped(measured[h].value - model);
-        let sigma = measured[h].sigma.hypot(g.norm() * instability);
-        let mut row = DVector::zeros(layout.size);
+        found.miss[h] = wrapped(measured.values[h] - model);
+        found.waves.set_row(h, &g.transpose());
         for axis in 0..2 {
-            row[axis] = a * place[axis];
-            row[2 + axis] = b * place[axis];
+            rows[(h, axis)] = a * place[axis];
+            rows[(h, 2 + axis)] = b * place[axis];
             for (parameter, weight, _) in layout.drift_weights(sighting.time) {
-                row[parameter + axis] = -g[axis] * weight;
+                rows[(h, parameter + axis)] = -g[axis] * weight;
             }
             if let Some(i) = offset {
-                row[i + axis] = -g[axis];
+                rows[(h, i + axis)] = -g[axis];
             }
         }
         if let Some(i) = late {
-            row[i] = -g.dot(&velocity);
+            rows[(h, i)] = -g.dot(&velocity);
         }
-        row[constant] = 1.0;
-        out.residuals.push(miss / sigma);
-        out.jacobian.push(row / sigma);
-        out.scans.push(sighting.scan);
-        out.phase_rows.push(out.residuals.len() - 1);
-        let noise = measured[h].sigma / g.norm();
-        out.phase_misses.push(Estimate::new(miss / g.norm(), noise));
+        rows[(h, constant)] = 1.0;
     }
+    let Some(lower) = found.factor(instability * instability) else {
+        return;
+    };
+    let (Some(residual), Some(rows)) = (
+        lower.solve_lower_triangular(&found.miss),
+        lower.solve_lower_triangular(&rows),
+    ) else {
+        return;
+    };
+    for h in 0..3 {
+        out.residuals.push(residual[h]);
+        out.jacobian.push(rows.row(h).transpose());
+        out.scans.push(sighting.scan);
+    }
+    out.phases.push(found);
 }
 
 /// The angle in (−π, π].

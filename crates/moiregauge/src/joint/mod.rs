@@ -27,8 +27,7 @@ use nalgebra::{Matrix2, Matrix4, Vector2};
 pub use checks::{LeftOut, Resampled};
 pub use solve::{JointFit, TestedTerm, fit};
 
-use crate::estimate::Estimate;
-use crate::lattice::LatticeVectors;
+use crate::lattice::{LatticeVectors, Phases};
 
 /// What one line direction of one scan contributes.
 #[derive(Clone, Debug)]
@@ -52,7 +51,7 @@ pub struct Sighting {
     /// Position of the middle of the frame, nm.
     pub position: Vector2<f64>,
     /// Phases of K₁, K₂, K₂ − K₁ there, rad; `None` where they cannot be told.
-    pub phases: Option<[Estimate; 3]>,
+    pub phases: Option<Phases>,
 }
 
 /// Which terms a fit has beside lattice and constant drift.

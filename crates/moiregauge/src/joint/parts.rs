@@ -48,16 +48,19 @@ impl JointFit {
             let share = lower.solve_lower_triangular(&half.transpose())?;
             shares += own.transpose() * DMatrix::from_fn(4, 4, |i, j| share[(i, j)]) * own;
             at += 4;
-            while rows.phase_rows.contains(&at) {
-                at += 1;
+            if rows.phases.iter().any(|p| p.row == at) {
+                at += 3;
             }
         }
-        let instability = self.instability_nm * self.instability_nm;
-        for (&row, miss) in rows.phase_rows.iter().zip(&rows.phase_misses) {
-            let variance = miss.sigma * miss.sigma + instability;
-            if variance > 0.0 {
-                shares.ger(instability / variance, &design[row], &design[row], 1.0);
-            }
+        let scatter = self.instability_nm * self.instability_nm;
+        for phases in &rows.phases {
+            let Some(lower) = phases.factor(scatter) else {
+                continue;
+            };
+            let half = lower.solve_lower_triangular(&phases.waves)?;
+            let own = DMatrix::from_fn(3, n, |i, j| design[phases.row + i][j]);
+            let seen = own.transpose() * half;
+            shares += scatter * &seen * seen.transpose();
         }
 
         // Enlarged like the covariance of the fit.

@@ -6,9 +6,9 @@ use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
 use super::evaluate::{DRIFT, Layout, Linearised, linearise, wrapped};
 use super::link::number_blocks;
 use super::{Sighting, Terms};
-use crate::chi2::enlargement;
+use crate::chi2::{enlargement, is_significant};
 use crate::estimate::Estimate;
-use crate::lattice::LatticeVectors;
+use crate::lattice::{LatticeVectors, Phases};
 
 /// Gauss–Newton steps; the problem is nearly linear.
 const STEPS: usize = 12;
@@ -284,16 +284,17 @@ impl Problem {
         if terms.phases && given.is_none() {
             for _ in 0..ROUNDS {
                 let now = linearise(sightings, &layout, &x, f64::INFINITY, instability);
-                instability = self::instability(&now, &unscaled, &|_| true);
+                let scatter = instability * instability;
+                instability = self::instability(&now, &unscaled, scatter, &|_| true);
                 unscaled = iterate(sightings, &layout, &mut x, f64::INFINITY, instability)?;
             }
         }
         let last = linearise(sightings, &layout, &x, f64::INFINITY, instability);
-        let wavelength = std::f64::consts::TAU / Vector2::new(x[0], x[1]).norm();
         if terms.phases {
-            let squares = last.phase_misses.iter().map(|m| m.value * m.value);
-            let rms = (squares.sum::<f64>() / last.phase_misses.len() as f64).sqrt();
-            if !(rms < LINKED * wavelength) {
+            // In units of a whole turn, which is a wavelength.
+            let squares = last.phases.iter().map(|p| p.miss.norm_squared());
+            let rms = (squares.sum::<f64>() / (3 * last.phases.len()) as f64).sqrt();
+            if !(rms < LINKED * std::f64::consts::TAU) {
                 return None;
             }
         }
@@ -357,8 +358,8 @@ fn start_phases(sightings: &[Sighting], layout: &Layout, x: &mut DVector<f64>) -
     let unexplained = |s: &Sighting, x: &DVector<f64>| {
         let (shift, _) = layout.motion(x, s.time);
         let place = s.position - shift;
-        let miss = |h: usize, k: Vector2<f64>, phases: &[Estimate; 3]| {
-            wrapped(phases[h].value - k.dot(&place) - x[first + 3 * s.block + h])
+        let miss = |h: usize, k: Vector2<f64>, phases: &Phases| {
+            wrapped(phases.values[h] - k.dot(&place) - x[first + 3 * s.block + h])
         };
         s.phases
             .map(|p| [miss(0, k1, &p), miss(1, k2, &p), miss(2, k2 - k1, &p)])
@@ -445,33 +446,50 @@ fn iterate(
     covariance
 }
 
-/// The position scatter s that makes the phases of the wanted rows fit: `Σ miss²/(noise² + s²)` becomes
-/// their number less what they determine (Paule and Mandel 1982, J. Res. NBS 87, 377). Zero where the
-/// noise alone explains them.
+/// The position scatter s that makes the phases of the wanted rows fit: `Σ δᵀ(P + s²)⁻¹ δ` of the displacements
+/// δ that they show, with covariance P, becomes the number of components less what the fit has taken up (Paule
+/// and Mandel 1982, J. Res. NBS 87, 377). Zero where the noise alone explains them: where chance makes as much in
+/// more than 5 % of cases, as with all enlarged errors. `scatter` is the s² (nm²) that `now` and `covariance` were
+/// made with.
 pub(super) fn instability(
     now: &Linearised,
     covariance: &DMatrix<f64>,
+    scatter: f64,
     wanted: &dyn Fn(usize) -> bool,
 ) -> f64 {
-    let rows = || now.phase_rows.iter().zip(&now.phase_misses);
-    let used: Vec<(&usize, &Estimate)> = rows().filter(|(row, _)| wanted(**row)).collect();
-    let freedom: f64 = used
-        .iter()
-        .map(|(row, _)| &now.jacobian[**row])
-        .map(|row| 1.0 - row.dot(&(covariance * row)))
-        .sum();
+    let mut freedom = 0.0;
+    let mut displacements = Vec::new();
+    for phases in now.phases.iter().filter(|p| wanted(p.row)) {
+        let known = phases.displacement().zip(phases.factor(scatter));
+        let Some((displacement, lower)) = known else {
+            continue;
+        };
+        let Some(plane) = lower.solve_lower_triangular(&phases.waves) else {
+            continue;
+        };
+        // What of the two displacements, whitened, is left free by the fit.
+        for unit in plane.qr().q().column_iter() {
+            let rows = now.jacobian[phases.row..phases.row + 3].iter();
+            let seen: DVector<f64> = rows.zip(&unit).map(|(row, u)| row * *u).sum();
+            freedom += 1.0 - seen.dot(&(covariance * &seen));
+        }
+        displacements.push(displacement);
+    }
     let excess = |variance: f64| {
-        let terms = used.iter().map(|(_, m)| m);
-        terms
-            .map(|m| m.value * m.value / (m.sigma * m.sigma + variance))
-            .sum::<f64>()
-            - freedom
+        let squares = displacements.iter().filter_map(|(shift, noise)| {
+            let whole = noise + Matrix2::identity() * variance;
+            Some(shift.dot(&(whole.try_inverse()? * shift)))
+        });
+        squares.sum::<f64>() - freedom
     };
-    if !(freedom > 0.0 && excess(0.0) > 0.0) {
+    let chi2 = excess(0.0) + freedom;
+    if !is_significant(chi2, freedom.round() as usize) {
         return 0.0;
     }
-    let squares: f64 = used.iter().map(|(_, m)| m.value * m.value).sum();
-    let (mut low, mut high) = (0.0, squares / freedom);
+    let (mut low, mut high) = (0.0, 1e-6);
+    while excess(high) > 0.0 && high < 1e3 {
+        (low, high) = (high, 10.0 * high);
+    }
     for _ in 0..60 {
         let middle = f64::midpoint(low, high);
         if excess(middle) > 0.0 {

@@ -51,7 +51,7 @@ fn sightings(
             ];
             let phases = [0, 1, 2].map(|h| {
                 let noisy = harmonics[h].dot(&place) + 0.7 * h as f64 + 0.003 * normal();
-                Estimate::new(super::evaluate::wrapped(noisy), 0.003)
+                super::evaluate::wrapped(noisy)
             });
             all.push(Sighting {
                 scan,
@@ -66,7 +66,7 @@ fn sightings(
                 fast_gain: Matrix2::new(1.0, 0.0, 0.0, 0.0),
                 time: time + clock,
                 position,
-                phases: Some(phases),
+                phases: Some(Phases::independent(phases, [0.003 * 0.003; 3])),
             });
         }
     }

@@ -10,6 +10,7 @@ mod fourier;
 mod harmonics;
 mod noise;
 mod paper;
+mod phases;
 mod pictures;
 pub(crate) mod reciprocal;
 mod rescue;
@@ -20,11 +21,11 @@ pub(crate) mod vectors;
 use nalgebra::{Matrix2, Vector2};
 
 pub use fit::{FittedHarmonic, ForeignWave, Inhomogeneity, LatticeFit};
+pub use phases::Phases;
 pub(crate) use pictures::pictures;
 pub use vectors::LatticeVectors;
 
 use crate::background::remove_background;
-use crate::estimate::Estimate;
 use crate::geometry::Geometry;
 use crate::image::Image;
 use crate::settings::{Background, Method};
@@ -47,7 +48,7 @@ pub struct MeasuredLattice {
     pub reciprocal: Matrix2<f64>,
     /// Phases of the harmonics K₁, K₂ and K₂ − K₁ of `reciprocal` at the pixel position `middle`, rad.
     /// There they are uncorrelated with the wave vectors.
-    pub phases: [Estimate; 3],
+    pub phases: Phases,
     /// Middle of the part of the frame that was used, (column, row), in fractions of pixels.
     pub middle: Vector2<f64>,
     /// Lattice periods across the shorter side of the frame.
@@ -387,15 +388,14 @@ fn middle(size: [usize; 2]) -> Vector2<f64> {
 /// Phases of the first three harmonics at the middle of the frame.
 ///
 /// The variance of a phase is that of the amplitude across it: `S Σw² / (2 |c|² (Σw)²)`.
-fn phases(harmonics: &Harmonics, size: [usize; 2]) -> [Estimate; 3] {
+fn phases(harmonics: &Harmonics, size: [usize; 2]) -> Phases {
     let middle = middle(size);
-    let mut out = [Estimate::new(0.0, f64::INFINITY); 3];
-    for (phase, harmonic) in out.iter_mut().zip(&harmonics.list) {
-        let value = harmonic.amplitude.arg() + harmonic.q.dot(&middle);
-        let variance = 1.0 / (2.0 * harmonic.significance(harmonics.window_sums));
-        *phase = Estimate::from_variance(value, variance);
+    let (mut values, mut variances) = ([0.0; 3], [f64::INFINITY; 3]);
+    for (h, harmonic) in harmonics.list.iter().take(3).enumerate() {
+        values[h] = harmonic.amplitude.arg() + harmonic.q.dot(&middle);
+        variances[h] = 1.0 / (2.0 * harmonic.significance(harmonics.window_sums));
     }
-    out
+    Phases::independent(values, variances)
 }
 
 /// Signal-to-noise ratios (amplitude) of the first three harmonics, best first.

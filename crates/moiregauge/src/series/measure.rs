@@ -204,12 +204,12 @@ fn share_noise(lines: &mut [MeasuredLine]) {
     let correlations = [correlation(a, b), correlation(b, a)];
     for (line, correlation) in [first, second].into_iter().zip(correlations) {
         let (mut weighted, mut weights) = (0.0, 0.0);
-        for (phase, correlation) in line.lattice.phases.iter_mut().zip(correlation) {
-            let weight = phase.sigma.powi(-2);
-            weighted += weight * correlation;
-            weights += weight;
-            phase.sigma *= (1.0 + correlation).sqrt();
+        let variances = line.lattice.phases.covariance.diagonal();
+        for (variance, correlation) in variances.iter().zip(correlation) {
+            weighted += correlation / variance;
+            weights += variance.recip();
         }
+        line.lattice.phases = line.lattice.phases.enlarged(correlation.map(|c| 1.0 + c));
         if weights > 0.0 {
             line.lattice.pixels.covariance *= 1.0 + weighted / weights;
         }

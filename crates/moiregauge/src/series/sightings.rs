@@ -5,8 +5,8 @@ use spmfile::{DateTime, LineDirection};
 
 use super::measure::{MeasuredLine, MeasuredScan};
 use crate::analysis::Axis;
-use crate::estimate::Estimate;
 use crate::joint::Sighting;
+use crate::lattice::Phases;
 use crate::lattice::reciprocal::{labelled_like, real_from_reciprocal, reciprocal};
 
 /// A harmonic belongs to a wave vector of the reference if it is nearer than this share of it.
@@ -76,18 +76,14 @@ fn seconds(t: DateTime) -> f64 {
 }
 
 /// The phases of the reference's harmonics: those measured, in another order and sign.
-fn phases(
-    line: &MeasuredLine,
-    dual: &Matrix2<f64>,
-    reference: &Matrix2<f64>,
-) -> Option<[Estimate; 3]> {
+fn phases(line: &MeasuredLine, dual: &Matrix2<f64>, reference: &Matrix2<f64>) -> Option<Phases> {
     let three = |pair: Matrix2<f64>| {
         let (a, b) = (pair.column(0).into_owned(), pair.column(1).into_owned());
         [a, b, b - a]
     };
     let measured = three(dual * line.lattice.reciprocal);
-    let mut out = [Estimate::new(0.0, f64::NAN); 3];
-    for (phase, wanted) in out.iter_mut().zip(three(*reference)) {
+    let mut places = [(0, 0.0); 3];
+    for (place, wanted) in places.iter_mut().zip(three(*reference)) {
         let signs = [1.0, -1.0];
         let (h, sign) = (0..3).flat_map(|h| signs.map(|s| (h, s))).min_by(|a, b| {
             let miss = |(h, s): &(usize, f64)| (measured[*h] * *s - wanted).norm();
@@ -97,10 +93,9 @@ fn phases(
         if miss.norm() > SAME_HARMONIC * wanted.norm() {
             return None;
         }
-        let found = line.lattice.phases[h];
-        *phase = Estimate::new(sign * found.value, found.sigma);
+        *place = (h, sign);
     }
-    Some(out)
+    Some(line.lattice.phases.relabelled(places))
 }
 
 #[cfg(test)]

@@ -1,7 +1,10 @@
 //! Images of a known lattice with everything that makes them hard, and the bound on what they tell.
 
+use std::f64::consts::TAU;
+
 use moiregauge::geometry::Geometry;
 use moiregauge::image::Image;
+use moiregauge::lattice::MeasuredLattice;
 use moiregauge::rng::stream;
 use nalgebra::{DMatrix, Matrix2, Matrix4, Vector2, Vector4};
 use rand_chacha::ChaCha8Rng;
@@ -81,7 +84,7 @@ impl Scene {
                 Contrast::Cosines if order == 1 => 1.0,
                 Contrast::Spots if order <= 9 => 0.6f64.powi(order - 1),
                 Contrast::Walls if on_axis => {
-                    1.2 * (-0.5 * f64::from(order) * (0.1 * std::f64::consts::TAU).powi(2)).exp()
+                    1.2 * (-0.5 * f64::from(order) * (0.1 * TAU).powi(2)).exp()
                 }
                 _ => 0.0,
             };
@@ -216,12 +219,35 @@ impl Scene {
         for i in 0..4 {
             let mut unit = Matrix2::zeros();
             unit[i] = 1.0;
-            let slope = -pair * unit.transpose() * pair / std::f64::consts::TAU;
+            let slope = -pair * unit.transpose() * pair / TAU;
             jacobian.column_mut(i).copy_from_slice(slope.as_slice());
         }
         let to_waves = jacobian * by;
         let variances = (to_waves * covariance * to_waves.transpose()).diagonal();
         Vector4::from_column_slice(error.as_slice()).component_div(&variances.map(f64::sqrt))
+    }
+
+    /// Errors over stated errors of the phases of the first harmonics, each with its cycles per frame along
+    /// the fast axis.
+    pub(crate) fn phase_pulls(&self, measured: &MeasuredLattice) -> Vec<(f64, f64)> {
+        let (q1, q2) = (measured.reciprocal.column(0), measured.reciprocal.column(1));
+        let three = [q1.into_owned(), q2.into_owned(), q2 - q1];
+        let mut pulls = Vec::new();
+        for (h, q) in three.into_iter().enumerate() {
+            for wave in &self.waves {
+                for sign in [1.0, -1.0] {
+                    if (wave.q * sign - q).norm() < 0.05 * q.norm() {
+                        let truth = sign * (wave.q.dot(&measured.middle) + wave.phase);
+                        let miss = measured.phases.values[h] - truth;
+                        let miss = miss - (miss / TAU).round() * TAU;
+                        let cycles = wave.q.x.abs() * self.size[0] as f64 / TAU;
+                        let sigma = measured.phases.covariance[(h, h)].sqrt();
+                        pulls.push((cycles, miss / sigma));
+                    }
+                }
+            }
+        }
+        pulls
     }
 
     /// Errors of the four components in the labelling closest to the truth.
@@ -246,7 +272,7 @@ impl Scene {
 }
 
 fn dual(basis: &Matrix2<f64>) -> Matrix2<f64> {
-    basis.try_inverse().unwrap().transpose() * std::f64::consts::TAU
+    basis.try_inverse().unwrap().transpose() * TAU
 }
 
 fn normal(rng: &mut ChaCha8Rng) -> f64 {

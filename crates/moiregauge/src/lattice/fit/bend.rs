@@ -51,14 +51,14 @@ pub(super) fn inhomogeneity(
     model: &Model,
     lambda: &[f64],
     bends: &Bends,
-    noise: &[[f64; 2]],
+    noise: &[[f64; 3]],
 ) -> Option<Inhomogeneity> {
     let mut basis = model.basis.clone();
     basis.orders = BENT;
     let gram = gram(frame, &basis, &model.pair, lambda);
     let bread = left(&gram, model, |_, _| 1.0)?;
     let meat = left(&gram, model, |i, [a, b]| {
-        let [x, y] = noise[i];
+        let [x, y, _] = noise[i];
         // What bends along an axis is moved by the noise along it.
         ((a as f64 * x + b as f64 * y) / (a + b) as f64).sqrt()
     })?;

@@ -2,8 +2,9 @@
 //!
 //! In: powers of a residual's transform around the harmonic, each with the power that white noise of
 //! unit variance would have there. Out: the noise power as it acts on the x and on the y component of
-//! the wave vector, `Σ S(k) |D(k)|² / Σ |D(k)|²` with D the transform of X (or Y) on the frame: its power
-//! is 1/m² at m cycles, along one axis.
+//! the wave vector and on the phase, `Σ S(k) |D(k)|² / Σ |D(k)|²` with D the transform of X (or Y, or 1)
+//! on the frame: its power is 1/m² at m cycles, along one axis. What line offsets take up of D, which is
+//! what it has at kx = 0, does not count.
 //!
 //! The fit has emptied the spectrum where D is large, so S is a smooth function fitted to what lies
 //! around. Noise of scanning probes is a function of time, which runs along the lines: S depends on
@@ -43,9 +44,10 @@ const STEP: f64 = 2.0;
 const FEWEST: f64 = 6.0;
 const ROUNDS: usize = 12;
 
-/// Noise power on the x and on the y component of the wave vector at `k` (cycles per frame).
-/// `None` where the fit has left nothing.
-pub(super) fn acting_on(k: Vector2<f64>, bins: &[Bin]) -> Option<[f64; 2]> {
+/// Noise power on the x and on the y component of the wave vector at `k` (cycles per frame), and on the
+/// phase. Line offsets take up the share `lambda` of what whole lines do. `None` where the fit has left
+/// nothing.
+pub(super) fn acting_on(k: Vector2<f64>, lambda: f64, bins: &[Bin]) -> Option<[f64; 3]> {
     let ridge = |k: Vector2<i64>| k.x.abs() <= RIDGE;
     // ln S = a + b ln|kx| off the ridge, and a + b ln|ky| + c [kx = 0] on it.
     let features = |at: Vector2<i64>, on_ridge: bool| {
@@ -74,7 +76,7 @@ pub(super) fn acting_on(k: Vector2<f64>, bins: &[Bin]) -> Option<[f64; 2]> {
         ln.exp()
     };
     let centre = k.map(|k| k.round() as i64);
-    Some([0, 1].map(|component| {
+    Some([0, 1, 2].map(|component| {
         let (mut sum, mut weight) = (0.0, 0.0);
         for dy in -LEVER[1]..=LEVER[1] {
             for dx in -LEVER[0]..=LEVER[0] {
@@ -87,7 +89,8 @@ pub(super) fn acting_on(k: Vector2<f64>, bins: &[Bin]) -> Option<[f64; 2]> {
                         plain(angle)
                     }
                 });
-                let share = (d[0] * d[1]).powi(2);
+                let left = if at.x == 0 { 1.0 - lambda } else { 1.0 };
+                let share = left * (d[0] * d[1]).powi(2);
                 sum += share * power(at);
                 weight += share;
             }
@@ -156,7 +159,7 @@ mod tests {
     #[test]
     fn white_noise_is_the_same_everywhere() {
         for k in [Vector2::new(4.3, 4.1), Vector2::new(0.2, 5.0)] {
-            let found = acting_on(k, &bins(|_| 2.5)).unwrap();
+            let found = acting_on(k, 0.0, &bins(|_| 2.5)).unwrap();
             assert!(found.iter().all(|s| (s - 2.5).abs() < 1e-9), "{found:?}");
         }
     }
@@ -167,7 +170,7 @@ mod tests {
     fn power_laws_are_followed() {
         let spectrum = |x: f64| 1.0 / x.abs().max(1.0);
         let law = bins(|k| spectrum(k.x as f64));
-        let [x, y] = acting_on(Vector2::new(5.0, 4.0), &law).unwrap();
+        let [x, y, _] = acting_on(Vector2::new(5.0, 4.0), 0.0, &law).unwrap();
         let (mut sum, mut weight) = (0.0, 0.0);
         for m in 1..=8 {
             let share = f64::from(m).powi(-2);
@@ -183,13 +186,27 @@ mod tests {
         );
     }
 
-    /// A ridge ten times the noise beside it acts on harmonics that lie on it and on no others.
+    /// A ridge ten times the noise beside it acts on harmonics that lie on it and on no others; of one
+    /// half a cycle beside it, which lies on it with sinc²(½) = 4/π², it moves the phase by
+    /// 1 + 9·4/π², and where line offsets take it all up by nothing.
     #[test]
     fn ridges_act_where_they_are() {
         let law = bins(|k| if k.x == 0 { 10.0 } else { 1.0 });
-        let [_, on] = acting_on(Vector2::new(0.0, 5.0), &law).unwrap();
-        let [_, off] = acting_on(Vector2::new(4.0, 5.0), &law).unwrap();
-        assert!((8.0..10.5).contains(&on), "{on}");
+        let [_, y, on] = acting_on(Vector2::new(0.0, 5.0), 0.0, &law).unwrap();
+        let [_, _, off] = acting_on(Vector2::new(4.0, 5.0), 0.0, &law).unwrap();
+        assert!(
+            (8.0..10.5).contains(&on) && (8.0..10.5).contains(&y),
+            "{on} {y}"
+        );
         assert!((off - 1.0).abs() < 1e-6, "{off}");
+        let beside = Vector2::new(0.5, 5.0);
+        let [_, _, half] = acting_on(beside, 0.0, &law).unwrap();
+        let expected = 1.0 + 9.0 * 4.0 / std::f64::consts::PI.powi(2);
+        assert!((half / expected - 1.0).abs() < 0.15, "{half} {expected}");
+        let [x, y, free] = acting_on(beside, 1.0, &law).unwrap();
+        assert!(
+            [x, y, free].iter().all(|s| (s - 1.0).abs() < 0.2),
+            "{x} {y} {free}"
+        );
     }
 }

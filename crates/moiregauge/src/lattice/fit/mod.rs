@@ -31,13 +31,12 @@ mod model;
 mod noise;
 mod solve;
 
-use nalgebra::{DMatrix, DVector, Matrix2, Matrix4, Vector2};
+use nalgebra::{DMatrix, DVector, Matrix2, Matrix3, SMatrix, Vector2};
 use rustfft::num_complex::Complex64;
 
-use super::LatticeVectors;
 use super::harmonics::{Harmonics, dot};
 use super::reciprocal::real_from_reciprocal;
-use crate::estimate::Estimate;
+use super::{LatticeVectors, Phases};
 use crate::image::Image;
 use crate::settings::Background;
 pub use bend::Inhomogeneity;
@@ -69,6 +68,9 @@ pub struct LatticeFit {
     pub centre: Vector2<f64>,
     /// The harmonics, first shell first.
     pub harmonics: Vec<FittedHarmonic>,
+    /// Covariance of the phases of the first three harmonics, rad². Where line offsets or neighbours take
+    /// up a part of a harmonic its phase is less certain than its signal and noise say.
+    pub phase_covariance: Matrix3<f64>,
     /// Residual over noise, root mean square: 1 for white noise and a model that is complete; more
     /// where the noise is coloured or the lattice is not the same everywhere.
     pub goodness: f64,
@@ -94,7 +96,8 @@ pub struct FittedHarmonic {
     pub index: [i32; 2],
     /// A of `A cos(q·(n − centre) + φ)`, units of the image.
     pub amplitude: f64,
-    /// φ, rad; its standard error is `1/(√2 · signal_to_noise)`.
+    /// φ, rad. Far from other harmonics and from line offsets its standard error is
+    /// `1/(√2 · signal_to_noise)`.
     pub phase: f64,
     /// Amplitude over noise amplitude in one resolution cell.
     pub signal_to_noise: f64,
@@ -140,8 +143,8 @@ struct Fit<'a> {
 /// The noise of a finished fit.
 struct FinalNoise {
     residual: ResidualNoise,
-    /// Noise power at each harmonic along x and along y.
-    local: Vec<[f64; 2]>,
+    /// Noise power at each harmonic as it acts along x, along y and on the phase.
+    local: Vec<[f64; 3]>,
     /// Root mean square of the residual.
     rms: f64,
     /// What the residual says about a bent lattice.
@@ -307,10 +310,11 @@ impl<'a> Fit<'a> {
         let freedom = self.frame.pixels().saturating_sub(parameters + lost).max(1);
         let leverage = self.leverage()?;
         let level = residual.level();
+        let lambda = self.lines.lambda.iter().sum::<f64>() / self.lines.lambda.len() as f64;
         let local = (0..self.model.waves.len())
             .map(|i| {
                 let p = frame::wave(&self.model.pair, self.model.basis.indices[i]);
-                residual.around(p, &leverage).unwrap_or([level; 2])
+                residual.around(p, lambda, &leverage).unwrap_or([level; 3])
             })
             .collect();
         Some(FinalNoise {
@@ -330,24 +334,31 @@ impl<'a> Fit<'a> {
         )
     }
 
-    /// Covariance of (p₁, p₂): what the local noise does to the four derivatives.
-    fn covariance(&self, noise: &FinalNoise) -> Option<Matrix4<f64>> {
+    /// Covariance of the phases of the first three harmonics and of (p₁, p₂): what the local noise does to
+    /// the seven derivatives when background and amplitudes are free.
+    fn covariance(&self, noise: &FinalNoise) -> Option<SMatrix<f64, 7, 7>> {
+        const FIRST: usize = choose::FIRST_SHELL.len();
         let model = &self.model;
-        let bread = solve::projected(&self.gram, &solve::contraction(model, |_, _| 1.0), 4)?;
+        let plain = solve::contraction(model, |_, _| 1.0);
+        let plain = solve::by_phases(model, FIRST, &plain, |_| 1.0);
+        let bread = solve::projected(&self.gram, &plain, FIRST + 4)?;
         let weight = |i: usize, axis: usize| noise.local[i][axis].sqrt();
-        let meat = solve::projected(&self.gram, &solve::contraction(model, weight), 4)?;
-        let inverse = bread.try_inverse()?;
+        let noisy = solve::contraction(model, weight);
+        let noisy = solve::by_phases(model, FIRST, &noisy, |i| weight(i, 2));
+        let meat = solve::projected(&self.gram, &noisy, FIRST + 4)?;
+        let inverse = solve::inverse(&bread)?;
         // Pixels whose residuals are cut off do not follow the model.
         let follow = 1.0 - self.clipped as f64 / self.frame.pixels() as f64;
         let covariance = &inverse * meat * &inverse / (follow * follow);
-        Some(covariance.fixed_view::<4, 4>(0, 0).into_owned())
+        Some(covariance.fixed_view::<7, 7>(0, 0).into_owned())
     }
 
     fn result(&self, noise: &FinalNoise) -> Option<(LatticeVectors, LatticeFit)> {
         let scale = self.frame.edge().map(|e| 1.0 / e);
+        let covariance = self.covariance(noise)?;
         let wave_vectors = LatticeVectors {
             basis: self.model.pair,
-            covariance: self.covariance(noise)?,
+            covariance: covariance.fixed_view::<4, 4>(3, 3).into_owned(),
         }
         .mapped(&Matrix2::from_diagonal(&scale));
         let pixels = self.frame.pixels() as f64;
@@ -360,9 +371,7 @@ impl<'a> Fit<'a> {
                     index,
                     amplitude,
                     phase: (-beta).atan2(alpha),
-                    // The noise on the y component is that at the harmonic's own kx: on the ridge of
-                    // line noise it is the phase's, and that on the x component is not.
-                    signal_to_noise: 0.5 * amplitude * (pixels / local[1]).sqrt(),
+                    signal_to_noise: 0.5 * amplitude * (pixels / local[2]).sqrt(),
                 }
             });
         let [columns, rows] = [
@@ -373,6 +382,7 @@ impl<'a> Fit<'a> {
             wave_vectors,
             centre: Vector2::new(columns - 1.0, rows - 1.0) / 2.0,
             harmonics: harmonics.collect(),
+            phase_covariance: covariance.fixed_view::<3, 3>(0, 0).into_owned(),
             goodness: noise.rms / noise.residual.level().sqrt(),
             line_offsets: self.line_sigma,
             lines_left_out: self.frame.image.rows - self.frame.lines(),
@@ -380,7 +390,9 @@ impl<'a> Fit<'a> {
             foreign_wave: noise.residual.foreign_wave(&self.frame, &self.model),
             residual: [0, 1, 2].map(|i| {
                 let index = self.model.basis.indices[i];
-                noise.residual.samples(frame::wave(&self.model.pair, index))
+                let offsets = self.free_lines || self.line_sigma.is_some();
+                let p = frame::wave(&self.model.pair, index);
+                noise.residual.samples(p, offsets)
             }),
             inhomogeneity: bend::inhomogeneity(
                 &self.frame,
@@ -396,12 +408,11 @@ impl<'a> Fit<'a> {
 
 impl LatticeFit {
     /// Phases of the first shell at the centre: q₁, q₂, q₂ − q₁.
-    pub(super) fn first_phases(&self) -> [Estimate; 3] {
-        [0, 1, 2].map(|i| {
-            let harmonic = &self.harmonics[i];
-            let sigma = 1.0 / (std::f64::consts::SQRT_2 * harmonic.signal_to_noise);
-            Estimate::new(harmonic.phase, sigma)
-        })
+    pub(super) fn first_phases(&self) -> Phases {
+        Phases {
+            values: [0, 1, 2].map(|i| self.harmonics[i].phase),
+            covariance: self.phase_covariance,
+        }
     }
 
     /// Of the first shell.

@@ -25,6 +25,8 @@ const SHARE: usize = 6;
 const NEAR: i64 = 8;
 /// Bins nearer to zero frequency belong to the background.
 const BACKGROUND: i64 = 2;
+/// The first column that the window keeps free of what whole lines do.
+const BESIDE: i64 = 2;
 /// A wave reaches no farther through the window (bins): beyond, 10⁻⁴ of its power is left.
 const SPREAD: f64 = 4.0;
 /// Farther than this from a point of the lattice (cycles per frame) a wave is none of its.
@@ -81,14 +83,20 @@ impl ResidualNoise {
         }
     }
 
-    /// Noise power around a harmonic as it acts on the x and on the y component of its wave vector;
-    /// white noise of variance σ² gives σ². `None` where the fit has left nothing.
-    pub(super) fn around(&self, p: Vector2<f64>, leverage: &Leverage) -> Option<[f64; 2]> {
+    /// Noise power around a harmonic as it acts on the x and on the y component of its wave vector and on
+    /// its phase; white noise of variance σ² gives σ². `lambda` is the share of line means that offsets
+    /// take up. `None` where the fit has left nothing.
+    pub(super) fn around(
+        &self,
+        p: Vector2<f64>,
+        lambda: f64,
+        leverage: &Leverage,
+    ) -> Option<[f64; 3]> {
         let mut bins = Vec::new();
         self.bins(p, leverage, |k, power, white| {
             bins.push(Bin { k, power, white });
         });
-        acting_on(p / std::f64::consts::PI, &bins)
+        acting_on(p / std::f64::consts::PI, lambda, &bins)
     }
 
     /// The same by the median: waves that are not fitted yet do not matter.
@@ -161,17 +169,22 @@ impl ResidualNoise {
         self.spectrum.power(x as usize, y.rem_euclid(rows) as usize) / self.window_power
     }
 
-    /// The transform of the residual across the lines from a harmonic: (columns, rows) in cycles per frame, and value.
-    pub(super) fn samples(&self, p: Vector2<f64>) -> Vec<([i64; 2], Complex64)> {
+    /// The transform of the residual across the lines from a harmonic: (columns, rows) in cycles per frame, and
+    /// value. `offsets`: offsets take up what whole lines do, so that it is no part of the harmonic's noise.
+    pub(super) fn samples(&self, p: Vector2<f64>, offsets: bool) -> Vec<([i64; 2], Complex64)> {
         let centre = (p / std::f64::consts::PI).map(|c| c.round() as i64);
-        // Noise of whole lines stands at kx = 0 alone: what lies at another kx says nothing of it.
-        (-ACROSS..=ACROSS)
-            .map(|dy| {
-                (
-                    [centre.x, centre.y + dy],
-                    self.value(centre.x, centre.y + dy),
-                )
-            })
+        // Noise of whole lines stands at kx = 0 alone, and beside it through the window: what lies at another kx
+        // says nothing of it.
+        let columns = if offsets && centre.x.abs() < BESIDE {
+            vec![-BESIDE, BESIDE]
+        } else {
+            vec![centre.x]
+        };
+        let rows = || (-ACROSS..=ACROSS).map(|dy| centre.y + dy);
+        columns
+            .into_iter()
+            .flat_map(|x| rows().map(move |y| [x, y]))
+            .map(|[x, y]| ([x, y], self.value(x, y)))
             .collect()
     }
 

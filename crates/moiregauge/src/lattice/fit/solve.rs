@@ -34,6 +34,37 @@ pub(super) fn contraction(model: &Model, weight: impl Fn(usize, usize) -> f64) -
     map
 }
 
+/// The columns of [`contraction`] with the amplitudes of the `first` harmonics turned into (radius, phase):
+/// columns for background, radii and the amplitudes of the others; then the phases of the first, and the four
+/// derivatives. Every phase is weighted by `weight(harmonic)`.
+pub(super) fn by_phases(
+    model: &Model,
+    first: usize,
+    contraction: &DMatrix<f64>,
+    weight: impl Fn(usize) -> f64,
+) -> DMatrix<f64> {
+    let terms = model.basis.terms.len();
+    let total = contraction.ncols();
+    let linear = total - 4 - first;
+    let mut map = DMatrix::zeros(contraction.nrows(), total);
+    map.columns_mut(0, terms)
+        .copy_from(&contraction.columns(0, terms));
+    for (i, [alpha, beta]) in model.waves[..first].iter().enumerate() {
+        let [cos, sin] = [0, 1].map(|part| contraction.column(terms + 2 * i + part));
+        let size = alpha.hypot(*beta);
+        map.set_column(terms + i, &((cos * *alpha + sin * *beta) / size));
+        // A cos(θ + φ) with α = A cos φ and β = −A sin φ: dα/dφ = β, dβ/dφ = −α.
+        let by_phase = (cos * *beta - sin * *alpha) * weight(i);
+        map.set_column(linear + i, &by_phase);
+    }
+    let others = total - 4 - terms - 2 * first;
+    map.columns_mut(terms + first, others)
+        .copy_from(&contraction.columns(terms + 2 * first, others));
+    map.columns_mut(total - 4, 4)
+        .copy_from(&contraction.columns(total - 4, 4));
+    map
+}
+
 /// Solves the normal equations; `None` where the parameters cannot be told apart.
 pub(super) fn solve(normal: &DMatrix<f64>, right: &DVector<f64>) -> Option<DVector<f64>> {
     let (factor, scale) = scaled(normal)?;
