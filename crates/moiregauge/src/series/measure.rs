@@ -4,6 +4,7 @@ use nalgebra::{Matrix2, Vector2};
 use spmfile::{Channel, DateTime, FrameDirection, LineDirection, Scan};
 
 use super::channel::{choose_channel, stem};
+use super::moires::in_order;
 use super::overlap::Window;
 use super::shared::correlation;
 use crate::caveat::Caveat;
@@ -14,7 +15,7 @@ use crate::image::Image;
 use crate::lattice::reciprocal::labelled_like;
 use crate::lattice::{
     ForeignWave, Inhomogeneity, LatticeError, LatticeFit, LatticeVectors, MeasuredLattice, measure,
-    vectors,
+    measure_several, vectors,
 };
 use crate::settings::{Lines, Settings};
 
@@ -158,20 +159,45 @@ pub fn measure_scan(
     settings: &Settings,
     window: Option<&Window>,
 ) -> Result<MeasuredScan, MeasureError> {
+    Ok(measure_moires(file, scan, settings, window)?.swap_remove(0))
+}
+
+/// Measures every moiré of one scan, as many as `settings` say, the largest cell first; otherwise as
+/// [`measure_scan`]. There is at least one.
+///
+/// # Errors
+/// As [`measure_scan`]; also where there are fewer moirés, or two that cannot be told apart.
+pub fn measure_moires(
+    file: &str,
+    scan: &Scan,
+    settings: &Settings,
+    window: Option<&Window>,
+) -> Result<Vec<MeasuredScan>, MeasureError> {
     let channels = channels(scan, settings)?;
     let mut caveats = Vec::new();
-    let mut lines = Vec::new();
+    let mut moires: Vec<Vec<MeasuredLine>> = Vec::new();
     let mut failures = Vec::new();
     for channel in &channels {
         match measure_line(file, scan, channel, settings, window, &mut caveats) {
-            Ok(line) => lines.push(line),
+            Ok(lines) if moires.is_empty() => {
+                moires = lines.into_iter().map(|line| vec![line]).collect();
+            }
+            Ok(lines) => {
+                let first: Vec<_> = moires
+                    .iter()
+                    .map(|lines| lines[0].in_sensor_coordinates())
+                    .collect();
+                let lines = in_order(&first, lines, |l| Some(l.in_sensor_coordinates()));
+                for (all, line) in moires.iter_mut().zip(lines) {
+                    all.push(line);
+                }
+            }
             Err(error) => failures.push(error),
         }
     }
-    if lines.is_empty() {
+    if moires.is_empty() {
         return Err(failures.swap_remove(0));
     }
-    share_noise(&mut lines);
     for error in failures {
         caveats.push(Caveat::new(
             "line-left-out",
@@ -180,18 +206,22 @@ pub fn measure_scan(
         ));
     }
     caveats.dedup_by(|a, b| (&a.code, &a.message) == (&b.code, &b.message));
-    Ok(MeasuredScan {
-        file: file.to_owned(),
-        acquired: scan.acquired,
-        frame_direction: scan.frame_direction,
-        line_rate_hz: scan.line_rate_hz,
-        channel: channels[0].name.clone(),
-        size_nm: scan.size_nm,
-        set: None,
-        lines,
-        excluded: None,
-        caveats,
-    })
+    let measured = moires.into_iter().map(|mut lines| {
+        share_noise(&mut lines);
+        MeasuredScan {
+            file: file.to_owned(),
+            acquired: scan.acquired,
+            frame_direction: scan.frame_direction,
+            line_rate_hz: scan.line_rate_hz,
+            channel: channels[0].name.clone(),
+            size_nm: scan.size_nm,
+            set: None,
+            lines,
+            excluded: None,
+            caveats: caveats.clone(),
+        }
+    });
+    Ok(measured.collect())
 }
 
 /// Enlarges the errors of trace and retrace by what their noise has in common, so that they can be
@@ -266,7 +296,7 @@ fn measure_line(
     settings: &Settings,
     window: Option<&Window>,
     caveats: &mut Vec<Caveat>,
-) -> Result<MeasuredLine, MeasureError> {
+) -> Result<Vec<MeasuredLine>, MeasureError> {
     let line = channel.line_direction.unwrap_or(LineDirection::Trace);
     let nominal = nominal(scan, channel);
     let sensors = usable_sensors(file, scan, channel, nominal.as_ref(), caveats);
@@ -287,14 +317,39 @@ fn measure_line(
         geometry = geometry.cropped(first, size);
         nominal = nominal.map(|n| n.cropped(first, size));
     }
-    let lattice =
-        measure(&image, &geometry, settings.background, settings.method).map_err(|error| {
-            MeasureError::Lattice {
-                line: line_name(line),
-                channel: channel.name.clone(),
-                error,
-            }
-        })?;
+    let (background, method) = (settings.background, settings.method);
+    let lattices = match settings.moires {
+        0 | 1 => measure(&image, &geometry, background, method).map(|lattice| vec![lattice]),
+        n => measure_several(&image, &geometry, background, n),
+    };
+    let mut lattices = lattices.map_err(|error| MeasureError::Lattice {
+        line: line_name(line),
+        channel: channel.name.clone(),
+        error,
+    })?;
+    let cell = |lattice: &MeasuredLattice| lattice.pixels.basis.determinant().abs();
+    lattices.sort_by(|a, b| cell(b).total_cmp(&cell(a)));
+    let lines = lattices.into_iter().map(|lattice| {
+        about_lattice(file, &lattice, &geometry, caveats);
+        MeasuredLine {
+            line,
+            geometry: geometry.clone(),
+            nominal: nominal.clone(),
+            timing,
+            lattice,
+            speeds,
+            speed_error,
+        }
+    });
+    Ok(lines.collect())
+}
+
+fn about_lattice(
+    file: &str,
+    lattice: &MeasuredLattice,
+    geometry: &Geometry,
+    caveats: &mut Vec<Caveat>,
+) {
     if lattice.periods < FEW_PERIODS {
         caveats.push(Caveat::new(
             "few-periods",
@@ -307,17 +362,8 @@ fn measure_line(
         ));
     }
     if let Some(fit) = &lattice.fit {
-        about_fit(file, fit, &geometry, caveats);
+        about_fit(file, fit, geometry, caveats);
     }
-    Ok(MeasuredLine {
-        line,
-        geometry,
-        nominal,
-        timing,
-        lattice,
-        speeds,
-        speed_error,
-    })
 }
 
 /// What the fit to the pixels found beside the lattice.

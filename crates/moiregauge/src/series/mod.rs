@@ -9,6 +9,7 @@ mod corrected;
 mod group;
 mod illustrate;
 mod measure;
+mod moires;
 mod overlap;
 mod set;
 mod shared;
@@ -18,7 +19,8 @@ pub use channel::choose_channel;
 pub use corrected::{CorrectedImage, corrected_images, nominal_geometry, on_grid};
 pub use group::natural_order;
 pub use illustrate::illustrate;
-pub use measure::{MeasureError, MeasuredLine, MeasuredScan, measure_scan};
+pub use measure::{MeasureError, MeasuredLine, MeasuredScan, measure_moires, measure_scan};
+pub use moires::sorted_moires;
 pub use overlap::{Window, common_window};
 
 use nalgebra::Matrix2;
