@@ -44,7 +44,7 @@ for reader in "$@"; do
     mkdir -p "corpus/$reader" "artifacts/$reader"
     log=$(mktemp)
     if "$programs/$reader" "corpus/$reader" corpus/real -artifact_prefix="artifacts/$reader/" \
-        -max_total_time="$seconds" -max_len=16384 -timeout=10 -rss_limit_mb=2048 \
+        -max_total_time="$seconds" -max_len=16384 -timeout=60 -rss_limit_mb=2048 \
         -malloc_limit_mb=512 -print_final_stats=1 >"$log" 2>&1; then
         result=clean
     else
