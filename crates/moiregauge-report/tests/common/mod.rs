@@ -126,7 +126,7 @@ fn scan(
     let to_pixels = frame.try_inverse().expect("a frame");
     let nominal = sensor.mapped(&(Matrix2::identity() * SIZE_NM / (PIXELS - 1) as f64 * to_pixels));
     let twist_strain = |l: &LatticeVectors| {
-        strain::twist_strain(l, &settings.material, settings.strain_convention).ok()
+        strain::twist_strain(l, settings.bilayer(), settings.strain_convention).ok()
     };
     let creep = index as f64 * 0.9;
     let line = |line| LineAnalysis {
@@ -171,7 +171,7 @@ fn scan(
         twist_strain: twist_strain(&corrected),
         draws: strain::draws(
             &corrected,
-            &settings.material,
+            settings.bilayer(),
             settings.strain_convention,
             1000,
             settings.seed,
@@ -197,7 +197,7 @@ fn mean(
     let covariance = lattices.first()?.covariance / n;
     let lattice = LatticeVectors { basis, covariance };
     let of = |l: &LatticeVectors| {
-        strain::twist_strain(l, &settings.material, settings.strain_convention).ok()
+        strain::twist_strain(l, settings.bilayer(), settings.strain_convention).ok()
     };
     let all: Vec<_> = lattices.iter().filter_map(of).collect();
     let twist_strain = of(&lattice)?;

@@ -102,7 +102,7 @@ pub(super) fn combine(
         }
     }
     let twist_strain =
-        twist_strain(&lattice, &settings.material, settings.strain_convention).ok()?;
+        twist_strain(&lattice, settings.bilayer(), settings.strain_convention).ok()?;
     Some(Combined {
         budget: Budget::new(&lattice, &twist_strain, &statistical, settings),
         lattice,

@@ -144,7 +144,7 @@ fn draw(scans: &mut [ScanAnalysis], settings: &Settings, first_index: u64) {
         let lattice = scan.drift_corrected.as_ref().unwrap_or(&scan.sensor);
         scan.draws = draws(
             lattice,
-            &settings.material,
+            settings.bilayer(),
             settings.strain_convention,
             settings.strain_draws,
             settings.seed,
@@ -330,7 +330,7 @@ fn set_mean(
     settings: &Settings,
 ) -> Option<SetMean> {
     let twist_strain =
-        twist_strain(&lattice, &settings.material, settings.strain_convention).ok()?;
+        twist_strain(&lattice, settings.bilayer(), settings.strain_convention).ok()?;
     let (singles, lattices): (Vec<_>, Vec<_>) = scans.unzip();
     let singles: Vec<TwistStrain> = singles.into_iter().flatten().collect();
     let twists: Vec<f64> = singles.iter().map(|s| s.twist).collect();
@@ -372,7 +372,7 @@ fn forward_backward(scans: &[&ScanAnalysis], settings: &Settings) -> Option<Twis
     let both = [mean(FrameDirection::Up)?, mean(FrameDirection::Down)?];
     let lattice = real_from_reciprocal(&plain_mean(&both)?)?;
     // Back and forth turns the labelling by 60°, which twist and strain do not see.
-    twist_strain(&lattice, &settings.material, settings.strain_convention).ok()
+    twist_strain(&lattice, settings.bilayer(), settings.strain_convention).ok()
 }
 
 fn about_mean(name: &str, mean: Option<&SetMean>, caveats: &mut Vec<Caveat>) {
