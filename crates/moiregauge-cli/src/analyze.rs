@@ -4,6 +4,7 @@ mod args;
 mod chain;
 mod export;
 mod files;
+mod orientation;
 mod summary;
 
 use std::process::ExitCode;
@@ -19,7 +20,7 @@ use moiregauge_report::{FailedInput, write_report};
 
 /// Analyses the files and writes the results.
 pub(crate) fn run(args: &AnalyzeArgs) -> anyhow::Result<ExitCode> {
-    let settings = args.settings()?;
+    let mut settings = args.settings()?;
     let exports = args.exports()?;
     if let Some(threads) = args.threads {
         rayon::ThreadPoolBuilder::new()
@@ -40,6 +41,10 @@ pub(crate) fn run(args: &AnalyzeArgs) -> anyhow::Result<ExitCode> {
     }
     let loud = !args.quiet && !args.json;
     let known = args.known.of(&inputs);
+    let atomic = args.orientation.measure(&settings, &args.known)?;
+    if let Some((found, _)) = &atomic {
+        settings.lattice_angle = Some(found.known());
+    }
     let outcome = analyse_files(
         &inputs,
         &args.sets()?,
@@ -49,7 +54,7 @@ pub(crate) fn run(args: &AnalyzeArgs) -> anyhow::Result<ExitCode> {
         loud,
     );
     let Some(Outcome {
-        analysis,
+        mut analysis,
         mut provenance,
     }) = outcome
         .map_err(|failed| eprint!("{}", summary::failures(&failed)))
@@ -57,6 +62,11 @@ pub(crate) fn run(args: &AnalyzeArgs) -> anyhow::Result<ExitCode> {
     else {
         anyhow::bail!("nothing could be analysed");
     };
+    if let Some((found, files)) = atomic {
+        analysis.caveats.extend(found.caveats.iter().cloned());
+        analysis.atomic = Some(found);
+        provenance.inputs.extend(files);
+    }
     let written = write_report(&analysis, &provenance, &args.choice())?;
     write_all(&args.out, &written)?;
     #[cfg(feature = "parquet")]

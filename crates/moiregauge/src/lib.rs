@@ -15,6 +15,7 @@ pub mod image;
 pub mod joint;
 pub mod lattice;
 pub mod material;
+pub mod readings;
 pub mod resample;
 pub mod rng;
 pub mod series;

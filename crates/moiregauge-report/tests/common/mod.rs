@@ -17,6 +17,7 @@ use moiregauge::caveat::Caveat;
 use moiregauge::estimate::Estimate;
 use moiregauge::image::Image;
 use moiregauge::lattice::LatticeVectors;
+use moiregauge::readings::Readings;
 use moiregauge::settings::{Settings, StrainConvention};
 use moiregauge::strain;
 use moiregauge_report::{FailedInput, InputFile, Provenance};
@@ -214,8 +215,10 @@ fn mean(
         drift: covariance * if drift_known { 0.3 } else { f64::NAN },
         sensor: covariance * 0.1,
     };
+    let budget = Budget::new(&lattice, &twist_strain, &statistical, settings);
     Some(SetMean {
-        budget: Budget::new(&lattice, &twist_strain, &statistical, settings),
+        readings: Readings::new(&lattice, &twist_strain, &budget, settings),
+        budget,
         lattice,
         twist_strain,
         twist_scatter: scatter(
@@ -414,6 +417,7 @@ pub(crate) fn analysis() -> Analysis {
         .collect();
     let combined = mean(&both, &settings, f64::NAN, true).map(|m| Combined {
         budget: m.budget,
+        readings: m.readings,
         lattice: m.lattice,
         twist_strain: m.twist_strain,
         joint: None,
@@ -430,6 +434,7 @@ pub(crate) fn analysis() -> Analysis {
         settings,
         sets,
         combined,
+        atomic: None,
         caveats: vec![
             Caveat::new(
                 "few-periods",

@@ -132,6 +132,19 @@ impl Budget {
         }
     }
 
+    /// What the calibration of the scanner may do to a lattice: covariances of its vectors, nm², one for
+    /// each source.
+    pub(crate) fn calibration_errors(
+        &self,
+        lattice: &LatticeVectors,
+        settings: &Settings,
+    ) -> [Matrix4<f64>; 3] {
+        [Source::Gain, Source::Mismatch, Source::Orthogonality].map(|source| {
+            lattice_error(source, lattice, &self.statistical, settings)
+                .unwrap_or_else(Matrix4::zeros)
+        })
+    }
+
     /// What one source contributes.
     pub fn of(&self, source: Source) -> Contribution {
         self.sum(|s| s == source)

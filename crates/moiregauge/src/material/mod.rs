@@ -35,7 +35,12 @@ pub struct Material {
     #[serde(default = "poisson_ratio_sigma")]
     pub poisson_ratio_sigma: f64,
     /// Where the numbers come from.
+    #[serde(default = "given_by_user")]
     pub source: String,
+}
+
+fn given_by_user() -> String {
+    "given by the user".to_owned()
 }
 
 /// For a layer described by the user without saying how well it is known: nm.

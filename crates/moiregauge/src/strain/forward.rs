@@ -29,6 +29,46 @@ pub struct Stacking {
     pub biaxial: f64,
 }
 
+impl Stacking {
+    /// What the strain makes of reciprocal vectors of layer 2, before it is turned.
+    fn reciprocal_stretch(&self, layers: &Layers) -> Matrix2<f64> {
+        let scale = 1.0 + self.biaxial;
+        let (along, across) = (
+            scale * (1.0 + self.strain),
+            scale * (1.0 - layers.poisson_ratio * self.strain),
+        );
+        let principal = match layers.convention {
+            StrainConvention::RealSpace => Matrix2::new(1.0 / along, 0.0, 0.0, 1.0 / across),
+            StrainConvention::KSpace => Matrix2::new(along, 0.0, 0.0, across),
+        };
+        let turn = |angle: f64| Rotation2::new(angle).into_inner();
+        turn(self.axis_lattice) * principal * turn(-self.axis_lattice)
+    }
+
+    /// The atomic vectors (columns, nm) of layers 1 and 2 in the laboratory.
+    ///
+    /// # Errors
+    /// [`StrainError::Material`]; [`StrainError::NoArea`] for a strain that leaves nothing of layer 2.
+    pub fn atoms<'a>(
+        &self,
+        bilayer: impl Into<Bilayer<'a>>,
+        convention: StrainConvention,
+    ) -> Result<[Matrix2<f64>; 2], StrainError> {
+        let bilayer = bilayer.into();
+        let layers = Layers::new(bilayer, convention)?;
+        let turn = |angle: f64| Rotation2::new(angle).into_inner();
+        let stretch = self
+            .reciprocal_stretch(&layers)
+            .transpose()
+            .try_inverse()
+            .ok_or(StrainError::NoArea { area: 0.0 })?;
+        Ok([
+            turn(self.lattice_angle) * bilayer.reference.atomic_pair(),
+            turn(self.lattice_angle + self.twist) * stretch * bilayer.stretched.atomic_pair(),
+        ])
+    }
+}
+
 /// The primitive pair (columns, nm, about 60° apart) of the moiré of two equal layers.
 ///
 /// `twist` θ and `lattice_angle` α in rad; `strain` ε along the axis `axis_lattice` φ, counted from
@@ -68,16 +108,7 @@ pub fn moire_of<'a>(
 ) -> Result<Matrix2<f64>, StrainError> {
     let layers = Layers::new(bilayer.into(), convention)?;
     let turn = |angle: f64| Rotation2::new(angle).into_inner();
-    let scale = 1.0 + stacking.biaxial;
-    let (along, across) = (
-        scale * (1.0 + stacking.strain),
-        scale * (1.0 - layers.poisson_ratio * stacking.strain),
-    );
-    let principal = match convention {
-        StrainConvention::RealSpace => Matrix2::new(1.0 / along, 0.0, 0.0, 1.0 / across),
-        StrainConvention::KSpace => Matrix2::new(along, 0.0, 0.0, across),
-    };
-    let stretch = turn(stacking.axis_lattice) * principal * turn(-stacking.axis_lattice);
+    let stretch = stacking.reciprocal_stretch(&layers);
     let mismatch = layers.inverse.matrix().try_inverse().ok_or(StrainError::NoMoire)?;
     let moire = turn(stacking.lattice_angle)
         * (turn(stacking.twist) * stretch * mismatch - Matrix2::identity());

@@ -21,6 +21,8 @@ use super::layers::{Layers, Stretch, strain_side};
 
 /// Steps of the grid on which roots of f are looked for.
 const GRID: usize = 720;
+/// An f that comes this near to zero touches it, as it does without strain, where |N_q| has a corner.
+const TOUCHING: f64 = 1e-10;
 
 /// Which of the four solutions.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -136,6 +138,8 @@ fn roots(moire: &ComplexPair, layers: &Layers, sign: f64) -> Vec<f64> {
             if f(lowest) * here <= 0.0 {
                 found.push(bisect(&f, at(k) - at(1), lowest));
                 found.push(bisect(&f, lowest, at(k + 1)));
+            } else if f(lowest).abs() < TOUCHING {
+                found.push(lowest);
             }
         }
     }

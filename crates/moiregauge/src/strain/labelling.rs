@@ -18,6 +18,13 @@ use super::layers::Layers;
 use crate::lattice::LatticeVectors;
 use crate::lattice::reciprocal::shortest_pair;
 
+/// Largest number in the name of a moiré vector that is tried for layers of different lattices.
+const LARGEST_ENTRY: i32 = 3;
+/// How many of these names are solved.
+const SOLVED: usize = 8;
+/// Orientations at which names are compared.
+const ORIENTATIONS: i32 = 180;
+
 /// `P = (A⁰ L⁻¹)ᵀ`; `None` for a lattice without area.
 pub(super) fn moire_matrix(basis: &Matrix2<f64>, atoms: &Matrix2<f64>) -> Option<Matrix2<f64>> {
     let inverse = basis.try_inverse()?;
@@ -76,13 +83,19 @@ pub(super) fn least_strained(lattice: &LatticeVectors, layers: &Layers) -> Optio
     }
 }
 
-/// For layers of different lattices: every name near the shortest pair, of either handedness, is solved.
+/// For layers of different lattices: the names that come nearest to an explanation without strain are
+/// solved, and the one that needs the least is taken.
 fn least_strained_by_trial(lattice: &LatticeVectors, layers: &Layers) -> Option<LatticeVectors> {
-    let shortest = lattice.relabelled(&shortest_pair(&lattice.basis)?);
-    let swap = Matrix2::new(0.0, 1.0, 1.0, 0.0);
-    let mut best = (f64::INFINITY, shortest);
-    for change in small_changes().flat_map(|change| [change, change * swap]) {
-        let named = shortest.relabelled(&change);
+    let mut scored: Vec<(f64, LatticeVectors)> = names(lattice)?
+        .into_iter()
+        .filter_map(|named| {
+            let moire = ComplexPair::from(moire_matrix(&named.basis, &layers.atoms)?);
+            Some((least_mismatch(&moire, layers), named))
+        })
+        .collect();
+    scored.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut best = (f64::INFINITY, scored.first()?.1);
+    for (_, named) in scored.iter().take(SOLVED) {
         let moire = ComplexPair::from(moire_matrix(&named.basis, &layers.atoms)?);
         let strain = ALL_SIGNS
             .into_iter()
@@ -90,10 +103,38 @@ fn least_strained_by_trial(lattice: &LatticeVectors, layers: &Layers) -> Option<
             .map(|solution| solution.strain.abs())
             .fold(f64::INFINITY, f64::min);
         if strain < best.0 * (1.0 - 1e-9) {
-            best = (strain, named);
+            best = (strain, *named);
         }
     }
     Some(best.1)
+}
+
+/// The least difference of N from a turn, over all orientations of layer 1.
+fn least_mismatch(moire: &ComplexPair, layers: &Layers) -> f64 {
+    (0..ORIENTATIONS)
+        .map(|k| {
+            let angle = std::f64::consts::TAU * f64::from(k) / f64::from(ORIENTATIONS);
+            let n = layers.stretched(moire, angle);
+            (n.p.norm() - 1.0).hypot(n.q.norm())
+        })
+        .fold(f64::INFINITY, f64::min)
+}
+
+/// The names of a lattice near its shortest pair, of either handedness: a moiré of different lattices can
+/// be far longer one way than the other, and its cell far from the shortest one.
+pub(super) fn names(lattice: &LatticeVectors) -> Option<Vec<LatticeVectors>> {
+    let shortest = lattice.relabelled(&shortest_pair(&lattice.basis)?);
+    let entries = || (-LARGEST_ENTRY..=LARGEST_ENTRY).map(f64::from);
+    let mut found = Vec::new();
+    for (a, b) in entries().flat_map(|a| entries().map(move |b| (a, b))) {
+        for (c, d) in entries().flat_map(|c| entries().map(move |d| (c, d))) {
+            let change = Matrix2::new(a, b, c, d);
+            if change.determinant().abs() == 1.0 {
+                found.push(shortest.relabelled(&change));
+            }
+        }
+    }
+    Some(found)
 }
 
 /// All matrices of determinant 1 with entries −1, 0, 1.

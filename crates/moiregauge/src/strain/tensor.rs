@@ -19,7 +19,7 @@ use super::StrainError;
 use super::closed_form::{Labelled, labelled};
 use super::complex_pair::ComplexPair;
 use super::inversion::{by_angle, directions, reduce, wrap};
-use super::labelling::moire_matrix_jacobian;
+use super::labelling::{moire_matrix, moire_matrix_jacobian, names};
 use super::layers::Layers;
 use crate::estimate::Estimate;
 use crate::lattice::LatticeVectors;
@@ -102,7 +102,19 @@ pub fn strain_tensors<'a>(
 ) -> Result<Vec<StrainTensor>, StrainError> {
     let bilayer = bilayer.into();
     let layers = Layers::new(bilayer, StrainConvention::RealSpace)?;
-    let labelled = labelled(lattice, &layers)?;
+    let named = labelled(lattice, &layers)?;
+    let similar = layers.ratio().is_some();
+    // For similar layers other names are other orientations; for different ones they are tried.
+    let all = if similar {
+        vec![named]
+    } else {
+        let names = names(lattice).ok_or(StrainError::NoMoire)?;
+        let labelled = |lattice: LatticeVectors| {
+            let moire = moire_matrix(&lattice.basis, &layers.atoms)?;
+            Some(Labelled { lattice, moire })
+        };
+        names.into_iter().filter_map(labelled).collect()
+    };
     let period = if orientation.of_reference {
         bilayer.reference.rotation_period()
     } else {
@@ -110,14 +122,25 @@ pub fn strain_tensors<'a>(
     };
     let equal = layers.ratio() == Some(1.0);
     let turns = (TAU / period).round() as usize;
-    let mut found: Vec<StrainTensor> = (0..turns)
-        .filter_map(|k| {
-            let angle = orientation.angle + k as f64 * period;
-            tensor(&labelled, &layers, &Orientation { angle, ..*orientation })
-        })
-        .collect();
-    // The best by its mean strain; of the pair that equal layers leave open, the one with θ > 0.
-    let rank = |t: &StrainTensor| (equal && t.twist < 0.0, t.mean.abs());
+    let mut found: Vec<StrainTensor> = Vec::new();
+    for (k, named) in (0..turns).flat_map(|k| all.iter().map(move |named| (k, named))) {
+        let angle = orientation.angle + k as f64 * period;
+        let turned = Orientation {
+            angle,
+            ..*orientation
+        };
+        found.extend(tensor(named, &layers, &turned));
+    }
+    // The best by its strain, of which similar layers leave only the mean open; of the pair that equal
+    // layers leave open, the one with θ > 0.
+    let size = |t: &StrainTensor| {
+        if similar {
+            t.mean.abs()
+        } else {
+            t.mean.hypot(t.shear.norm())
+        }
+    };
+    let rank = |t: &StrainTensor| (equal && t.twist < 0.0, size(t));
     found.sort_by(|a, b| {
         let ((a_back, a_mean), (b_back, b_mean)) = (rank(a), rank(b));
         a_back.cmp(&b_back).then(a_mean.total_cmp(&b_mean))
@@ -125,7 +148,8 @@ pub fn strain_tensors<'a>(
     let Some(best) = found.first().copied() else {
         return Err(StrainError::NoMoire);
     };
-    found.retain(|t| *t == best || t.mean.abs() < LARGEST_MEAN_STRAIN);
+    found.retain(|t| *t == best || size(t) < LARGEST_MEAN_STRAIN);
+    found.dedup_by(|a, b| (a.twist - b.twist).abs() + (a.mean - b.mean).abs() < 1e-12);
     Ok(found)
 }
 

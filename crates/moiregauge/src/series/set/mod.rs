@@ -23,6 +23,7 @@ use crate::drift::{Observation, at_known_drift, common_lattice, monte_carlo, sol
 use crate::geometry::mean_and_spread;
 use crate::lattice::LatticeVectors;
 use crate::lattice::reciprocal::real_from_reciprocal;
+use crate::readings::{Readings, caveats as about_readings};
 use crate::settings::{GivenDrift, Settings};
 use crate::strain::{TwistStrain, draws, twist_strain};
 
@@ -117,6 +118,16 @@ pub(super) fn analyse_set(
     });
     let drift = solved.map(|s| s.drift);
     about_mean(&group.name, mean.as_ref(), caveats);
+    if let Some(m) = mean.as_ref().or(uncorrected.as_ref()) {
+        let found = about_readings(
+            &group.name,
+            &m.lattice,
+            &m.twist_strain,
+            &m.readings,
+            settings,
+        );
+        caveats.extend(found);
+    }
     about_checks(
         &group.name,
         (checks.as_ref(), drift.as_ref(), mean.as_ref()),
@@ -344,8 +355,10 @@ fn set_mean(
             (ratio - 1.0).abs() <= 0.01
         })
     });
+    let budget = Budget::new(&lattice, &twist_strain, statistical, settings);
     Some(SetMean {
-        budget: Budget::new(&lattice, &twist_strain, statistical, settings),
+        readings: Readings::new(&lattice, &twist_strain, &budget, settings),
+        budget,
         lattice,
         twist_strain,
         twist_scatter: mean_and_spread(&twists).sigma,
