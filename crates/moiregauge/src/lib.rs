@@ -7,6 +7,7 @@ pub mod background;
 pub mod bound;
 pub mod budget;
 pub mod caveat;
+pub mod cell;
 mod chi2;
 pub mod drift;
 pub mod estimate;

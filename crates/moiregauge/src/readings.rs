@@ -3,6 +3,8 @@
 //!
 //! In: a lattice (nm) with its covariance, the settings. Out: rad, no dimension.
 
+use std::f64::consts::FRAC_PI_6;
+
 use nalgebra::{Matrix5, Vector5};
 
 use crate::budget::Budget;
@@ -16,7 +18,7 @@ use crate::strain::{
     strain_tensors,
 };
 
-/// A mean strain this large, relative to its σ and in itself, contradicts the orientation.
+/// A mean strain this large contradicts the orientation.
 const CONTRADICTION: f64 = 0.01;
 /// Standard deviations that deserve a word.
 const CLEARLY: f64 = 3.0;
@@ -46,6 +48,9 @@ pub struct TensorReading {
     pub alternatives: Vec<StrainTensor>,
     /// ν of the strained layer.
     pub poisson_ratio: f64,
+    /// The mean strain, if the orientation were that of the other kind of vector, 30° off; `None` for
+    /// layers that are not hexagonal.
+    pub other_vector: Option<f64>,
 }
 
 impl TensorReading {
@@ -137,8 +142,31 @@ fn tensor(
         best,
         known,
         alternatives: found.collect(),
+        other_vector: other_vector(lattice, bilayer, &exact),
         poisson_ratio: bilayer.stretched.poisson_ratio,
     })
+}
+
+/// The mean strain for an orientation 30° off.
+fn other_vector(
+    lattice: &LatticeVectors,
+    bilayer: Bilayer<'_>,
+    orientation: &Orientation,
+) -> Option<f64> {
+    let material = if orientation.of_reference {
+        bilayer.reference
+    } else {
+        bilayer.stretched
+    };
+    if !material.is_hexagonal() {
+        return None;
+    }
+    let turned = Orientation {
+        angle: orientation.angle + FRAC_PI_6,
+        ..*orientation
+    };
+    let all = strain_tensors(lattice, bilayer, &turned).ok()?;
+    all.first().map(|t| t.mean)
 }
 
 /// The layers with lattice constants off by one σ: both together where they are one material, each by
@@ -276,14 +304,23 @@ fn about_alignment(
 fn about_tensor(tensor: &TensorReading, settings: &Settings, add: &mut impl FnMut(&str, String)) {
     let best = tensor.in_all();
     let mean = best.mean();
-    if mean.value.abs() > CONTRADICTION {
+    let likely = CLEARLY * settings.isotropic_strain_percent / 100.0;
+    let nearer = tensor
+        .other_vector
+        .is_some_and(|other| other.abs() < mean.value.abs())
+        && mean.value.abs() > likely.max(CLEARLY * mean.sigma);
+    if mean.value.abs() > CONTRADICTION || nearer {
         add(
             "orientation-contradicts",
             format!(
-                "the orientation that was given would need an isotropic heterostrain of {:+.2} %: it is that of \
+                "the orientation that was given would need an isotropic heterostrain of {:+.2} %{}: it is that of \
                  another vector (30° off for a hexagonal layer; see --lattice-angle-of), another layer or \
                  another sample",
-                100.0 * mean.value
+                100.0 * mean.value,
+                tensor.other_vector.map_or_else(String::new, |other| format!(
+                    ", one 30° further {:+.2} %",
+                    100.0 * other
+                ))
             ),
         );
     }

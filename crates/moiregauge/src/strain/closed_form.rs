@@ -13,7 +13,7 @@ use nalgebra::{Matrix2, Matrix4, Vector2};
 use super::aligned;
 use super::complex_pair::ComplexPair;
 use super::inversion::{ALL_SIGNS, Signs, Solution, reduce, solve};
-use super::labelling::{least_strained, moire_matrix, moire_matrix_jacobian};
+use super::labelling::{least_strained, likely_names, moire_matrix, moire_matrix_jacobian};
 use super::layers::Layers;
 use super::{StrainError, TwistStrain};
 use crate::lattice::LatticeVectors;
@@ -22,6 +22,8 @@ use crate::settings::StrainConvention;
 
 /// Above this |q|/|p| the mirrored labelling (strain makes the moiré, twist distorts it) is listed.
 const MIRRORED_FROM: f64 = 0.3;
+/// Readings of layers of different lattices that need more strain are not listed.
+const LIKELY_STRAIN: f64 = 0.03;
 
 /// One exact solution of the strain equation.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -139,8 +141,11 @@ pub fn branches(
     let layers = Layers::new(bilayer, convention)?;
     let labelled = labelled(lattice, &layers)?;
     let moire = ComplexPair::from(labelled.moire);
+    if layers.ratio().is_none() {
+        return branches_by_trial(lattice, &layers);
+    }
     let mut found = solutions(&labelled, &layers, false);
-    if moire.q.norm() > MIRRORED_FROM * moire.p.norm() && layers.ratio().is_some() {
+    if moire.q.norm() > MIRRORED_FROM * moire.p.norm() {
         let swap = Matrix2::new(0.0, 1.0, 1.0, 0.0);
         let lattice = labelled.lattice.relabelled(&swap);
         let moire = moire_matrix(&lattice.basis, &layers.atoms).ok_or(no_area(&lattice))?;
@@ -148,6 +153,35 @@ pub fn branches(
     }
     if found.is_empty() {
         return Err(no_solution(&moire, &layers));
+    }
+    Ok(found)
+}
+
+/// The solutions for layers of different lattices under every likely name, the least strained first.
+fn branches_by_trial(
+    lattice: &LatticeVectors,
+    layers: &Layers,
+) -> Result<Vec<Branch>, StrainError> {
+    let mut found: Vec<Branch> = Vec::new();
+    for lattice in likely_names(lattice, layers).ok_or(no_area(lattice))? {
+        let moire = moire_matrix(&lattice.basis, &layers.atoms).ok_or(no_area(&lattice))?;
+        for branch in solutions(&Labelled { lattice, moire }, layers, false) {
+            let same = |b: &Branch| {
+                (b.twist - branch.twist).abs() + (b.strain - branch.strain).abs() < 1e-9
+            };
+            if branch.strain.abs() < LIKELY_STRAIN && !found.iter().any(same) {
+                found.push(branch);
+            }
+        }
+    }
+    found.sort_by(|a, b| {
+        let key = |b: &Branch| (b.twist < 0.0, b.strain.abs());
+        let ((back_a, strain_a), (back_b, strain_b)) = (key(a), key(b));
+        back_a.cmp(&back_b).then(strain_a.total_cmp(&strain_b))
+    });
+    let first = labelled(lattice, layers)?;
+    if found.is_empty() {
+        return Err(no_solution(&ComplexPair::from(first.moire), layers));
     }
     Ok(found)
 }

@@ -19,7 +19,7 @@ use crate::lattice::LatticeVectors;
 use crate::lattice::reciprocal::shortest_pair;
 
 /// Largest number in the name of a moiré vector that is tried for layers of different lattices.
-const LARGEST_ENTRY: i32 = 3;
+const LARGEST_ENTRY: i32 = 5;
 /// How many of these names are solved.
 const SOLVED: usize = 8;
 /// Orientations at which names are compared.
@@ -86,16 +86,9 @@ pub(super) fn least_strained(lattice: &LatticeVectors, layers: &Layers) -> Optio
 /// For layers of different lattices: the names that come nearest to an explanation without strain are
 /// solved, and the one that needs the least is taken.
 fn least_strained_by_trial(lattice: &LatticeVectors, layers: &Layers) -> Option<LatticeVectors> {
-    let mut scored: Vec<(f64, LatticeVectors)> = names(lattice)?
-        .into_iter()
-        .filter_map(|named| {
-            let moire = ComplexPair::from(moire_matrix(&named.basis, &layers.atoms)?);
-            Some((least_mismatch(&moire, layers), named))
-        })
-        .collect();
-    scored.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let mut best = (f64::INFINITY, scored.first()?.1);
-    for (_, named) in scored.iter().take(SOLVED) {
+    let likely = likely_names(lattice, layers)?;
+    let mut best = (f64::INFINITY, *likely.first()?);
+    for named in &likely {
         let moire = ComplexPair::from(moire_matrix(&named.basis, &layers.atoms)?);
         let strain = ALL_SIGNS
             .into_iter()
@@ -107,6 +100,22 @@ fn least_strained_by_trial(lattice: &LatticeVectors, layers: &Layers) -> Option<
         }
     }
     Some(best.1)
+}
+
+/// The names that come nearest to an explanation without strain, the nearest first.
+pub(super) fn likely_names(
+    lattice: &LatticeVectors,
+    layers: &Layers,
+) -> Option<Vec<LatticeVectors>> {
+    let mut scored: Vec<(f64, LatticeVectors)> = names(lattice)?
+        .into_iter()
+        .filter_map(|named| {
+            let moire = ComplexPair::from(moire_matrix(&named.basis, &layers.atoms)?);
+            Some((least_mismatch(&moire, layers), named))
+        })
+        .collect();
+    scored.sort_by(|a, b| a.0.total_cmp(&b.0));
+    Some(scored.into_iter().take(SOLVED).map(|(_, l)| l).collect())
 }
 
 /// The least difference of N from a turn, over all orientations of layer 1.
@@ -129,7 +138,9 @@ pub(super) fn names(lattice: &LatticeVectors) -> Option<Vec<LatticeVectors>> {
     for (a, b) in entries().flat_map(|a| entries().map(move |b| (a, b))) {
         for (c, d) in entries().flat_map(|c| entries().map(move |d| (c, d))) {
             let change = Matrix2::new(a, b, c, d);
-            if change.determinant().abs() == 1.0 {
+            // Turning a name by 180° turns the orientation by as much.
+            let first = [a, b, c, d].into_iter().find(|x| *x != 0.0);
+            if change.determinant().abs() == 1.0 && first > Some(0.0) {
                 found.push(shortest.relabelled(&change));
             }
         }
