@@ -4,6 +4,7 @@ mod args;
 mod chain;
 mod export;
 mod files;
+mod orientation;
 mod summary;
 
 use std::process::ExitCode;
@@ -19,7 +20,7 @@ use moiregauge_report::{FailedInput, write_report};
 
 /// Analyses the files and writes the results.
 pub(crate) fn run(args: &AnalyzeArgs) -> anyhow::Result<ExitCode> {
-    let settings = args.settings()?;
+    let mut settings = args.settings()?;
     let exports = args.exports()?;
     if let Some(threads) = args.threads {
         rayon::ThreadPoolBuilder::new()
@@ -40,6 +41,10 @@ pub(crate) fn run(args: &AnalyzeArgs) -> anyhow::Result<ExitCode> {
     }
     let loud = !args.quiet && !args.json;
     let known = args.known.of(&inputs);
+    let atomic = args.orientation.measure(&settings, &args.known)?;
+    if let Some((found, _)) = &atomic {
+        settings.lattice_angle = Some(found.known());
+    }
     let outcome = analyse_files(
         &inputs,
         &args.sets()?,
@@ -48,9 +53,20 @@ pub(crate) fn run(args: &AnalyzeArgs) -> anyhow::Result<ExitCode> {
         args.illustrated(),
         loud,
     );
-    let outcomes = outcome
+    let mut outcomes = outcome
         .map_err(|failed| eprint!("{}", summary::failures(&failed)))
         .map_err(|()| anyhow::anyhow!("nothing could be analysed"))?;
+    if let Some((found, files)) = atomic {
+        for Outcome {
+            analysis,
+            provenance,
+        } in &mut outcomes
+        {
+            analysis.caveats.extend(found.caveats.iter().cloned());
+            analysis.atomic = Some(found.clone());
+            provenance.inputs.extend(files.iter().cloned());
+        }
+    }
     let folders = files::folders(&args.out, outcomes.len());
     let mut failed = Vec::new();
     for (number, (outcome, out)) in outcomes.iter().zip(&folders).enumerate() {

@@ -41,10 +41,12 @@ method = "lattice"
 # (which damages harmonics along the fast axis).
 background = "plane"
 
-# The layers: a name (graphene, hBN, MoS2, …) or a table
+# The layers: a name (graphene, hBN, MoS2, …; `moiregauge moire --list` has them all) or a table
 #   [material]
 #   name = "mine"
 #   lattice_constant_nm = 0.2461
+#   lattice_constant_b_nm = 0.2461   # these two only for lattices that are not hexagonal
+#   cell_angle_deg = 60.0
 #   poisson_ratio = 0.17
 #   lattice_constant_sigma_nm = 0.0001
 #   poisson_ratio_sigma = 0.03
@@ -54,6 +56,15 @@ material = "graphene"
 # How many moirés every image shows (a twisted trilayer, twisted graphene on aligned hBN); each is fitted
 # with the others taken off and has results of its own.
 moires = 1
+
+# The lower layer, where it is another one; `material` is then the upper one: a name or a table
+# [substrate].
+# substrate = "hBN"
+
+# The orientation of one of the layers in the frame of the scans, if it is known: of layer 1 (the lower
+# one, the reference) or 2, of its atomic vector ("atomic": a row of atoms, a zigzag edge) or of its
+# reciprocal vector ("reciprocal": an armchair edge). It tells isotropic strain from twist.
+# lattice_angle = { angle_deg = 12.0, sigma_deg = 0.2, layer = 1, of = "atomic" }
 
 # Form of the strain equation: "real-space" (the stretch acts on atomic positions, positive is
 # tension) or "k-space" (on reciprocal vectors as in arXiv 2406.08681, positive is compression).
@@ -115,9 +126,15 @@ pub(crate) fn read(path: &Path) -> anyhow::Result<Settings> {
 
 fn parse(text: &str) -> anyhow::Result<Settings> {
     let mut table: toml::Table = toml::from_str(text)?;
-    if let Some(toml::Value::String(name)) = table.get("material") {
-        let material = toml::Value::try_from(named_material(name)?)?;
-        table.insert("material".to_owned(), material);
+    let mut named = false;
+    for key in ["material", "substrate"] {
+        if let Some(toml::Value::String(name)) = table.get(key) {
+            let material = toml::Value::try_from(named_material(name)?)?;
+            table.insert(key.to_owned(), material);
+            named = true;
+        }
+    }
+    if named {
         return Ok(table.try_into()?);
     }
     // Straight from the text: errors then show the line.
@@ -126,19 +143,86 @@ fn parse(text: &str) -> anyhow::Result<Settings> {
 
 /// A material by name, or an error that lists the names.
 pub(crate) fn named_material(name: &str) -> anyhow::Result<Material> {
-    if let Some(material) = Material::named(name) {
+    find_material(name, &[])
+}
+
+/// A material by name, one of the user's own first.
+fn find_material(name: &str, own: &[Material]) -> anyhow::Result<Material> {
+    let of_user = own
+        .iter()
+        .find(|m| m.name.eq_ignore_ascii_case(name.trim()));
+    if let Some(material) = of_user.cloned().or_else(|| Material::named(name)) {
         return Ok(material);
     }
-    let known: Vec<String> = Material::all().into_iter().map(|m| m.name).collect();
+    let known: Vec<String> = own
+        .iter()
+        .cloned()
+        .chain(Material::all())
+        .map(|m| m.name)
+        .collect();
     bail!(
-        "unknown material {name:?}; known are {}; others can be described in a [material] table of a \
-         settings file",
+        "unknown material {name:?}; known are {}; others can be described in a file (--materials) or in a \
+         [material] table of a settings file",
         known.join(", ")
     )
 }
 
+/// `graphene`, or `graphene/hBN` for graphene on hBN: the layers (upper, lower where it is another one).
+pub(crate) fn named_layers(
+    text: &str,
+    own: &[Material],
+) -> anyhow::Result<(Material, Option<Material>)> {
+    match text.split_once('/') {
+        None => Ok((find_material(text, own)?, None)),
+        Some((upper, lower)) => {
+            let (upper, lower) = (find_material(upper, own)?, find_material(lower, own)?);
+            let substrate = (upper != lower).then_some(lower);
+            Ok((upper, substrate))
+        }
+    }
+}
+
+/// The layers that the user describes in a file: `[[layer]]` tables.
+pub(crate) fn own_materials(path: Option<&Path>) -> anyhow::Result<Vec<Material>> {
+    #[derive(serde::Deserialize)]
+    #[serde(deny_unknown_fields)]
+    struct File {
+        layer: Vec<Material>,
+    }
+    let Some(path) = path else {
+        return Ok(Vec::new());
+    };
+    let about = || format!("in the layers of {}", path.display());
+    let text = std::fs::read_to_string(path)
+        .with_context(|| format!("cannot read the layers of {}", path.display()))?;
+    let file: File = toml::from_str(&text).with_context(about)?;
+    for layer in &file.layer {
+        if let Some(problem) = layer.problem() {
+            return Err(anyhow::anyhow!(problem)).with_context(about);
+        }
+    }
+    Ok(file.layer)
+}
+
 /// Refuses numbers with which nothing sensible can come out, wherever they were given.
 pub(crate) fn check(settings: &Settings) -> anyhow::Result<()> {
+    let substrate = settings.substrate.as_ref();
+    if let Some(problem) = substrate.and_then(Material::problem) {
+        bail!("the substrate: {problem}");
+    }
+    if let Some(known) = &settings.lattice_angle {
+        let (angle, sigma) = (known.angle_deg, known.sigma_deg);
+        ensure!(
+            angle.is_finite() && sigma >= 0.0 && sigma.is_finite(),
+            "the orientation of a layer (--lattice-angle) must be an angle in degrees and its uncertainty, \
+             found {angle} and {sigma}"
+        );
+        ensure!(
+            known.layer == 1 || known.layer == 2,
+            "the layer of an orientation (--lattice-angle-layer) must be 1, the lower one, or 2, found {}",
+            known.layer
+        );
+    }
     let material = &settings.material;
     let (a, ratio) = (material.lattice_constant_nm, material.poisson_ratio);
     ensure!(
@@ -158,6 +242,9 @@ pub(crate) fn check(settings: &Settings) -> anyhow::Result<()> {
         moires == 1 || settings.method == Method::Lattice,
         "several moirés (--moires {moires}) can be measured by --method lattice only"
     );
+    if let Some(problem) = material.problem() {
+        bail!("{problem}");
+    }
     let clock = settings.frame_time_sigma_s;
     ensure!(
         clock >= 0.0 && clock.is_finite(),

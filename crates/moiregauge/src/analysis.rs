@@ -11,6 +11,8 @@ use crate::estimate::Estimate;
 use crate::image::Image;
 use crate::joint::TestedTerm;
 use crate::lattice::LatticeVectors;
+use crate::readings::Readings;
+use crate::series::AtomicOrientation;
 use crate::settings::Settings;
 use crate::strain::TwistStrain;
 
@@ -32,6 +34,8 @@ pub struct Analysis {
     pub sets: Vec<SetAnalysis>,
     /// All sets taken together; `None` where no set gave a drift-corrected lattice.
     pub combined: Option<Combined>,
+    /// The orientation of a layer, where atomically resolved images gave it.
+    pub atomic: Option<AtomicOrientation>,
     /// Doubts, in the order in which they came up.
     pub caveats: Vec<Caveat>,
 }
@@ -108,6 +112,8 @@ pub struct SetMean {
     pub twist_strain: TwistStrain,
     /// What contributes to their uncertainty, calibration and model included.
     pub budget: Budget,
+    /// What else the lattice can mean.
+    pub readings: Readings,
     /// Standard deviation of the twist over the scans, rad; NaN for a single scan.
     pub twist_scatter: f64,
     /// Root-mean-square deviation per component of the strain vector over the scans; NaN for one scan.
@@ -129,6 +135,8 @@ pub struct Combined {
     pub twist_strain: TwistStrain,
     /// What contributes to their uncertainty, calibration and model included.
     pub budget: Budget,
+    /// What else the lattice can mean.
+    pub readings: Readings,
     /// Whether one joint fit over all scans made them, and with which terms.
     pub joint: Option<JointTerms>,
     /// The drift in the middle of the campaign, where one joint fit over all scans describes it.

@@ -58,8 +58,8 @@ pub fn cramer_rao(simulator: &Simulator, time_sigma: f64, linked: bool) -> Optio
     }
     let found = fit(&sightings, (&pair, &drift), time_sigma)?;
     let lattice = real_from_reciprocal(&found.waves)?;
-    let material = &settings.sample.material;
-    let strain = twist_strain(&lattice, material, settings.sample.strain_convention).ok()?;
+    let sample = &settings.sample;
+    let strain = twist_strain(&lattice, sample.bilayer(), sample.strain_convention).ok()?;
     let root = |variance: f64| variance.max(0.0).sqrt();
     let (c, e) = (found.velocity_covariance, strain.strain_covariance());
     Some(Bound {

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::material::Material;
+use crate::material::{Bilayer, Material};
 
 /// How the lattice vectors are read off an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
@@ -88,6 +88,37 @@ pub struct GivenDrift {
     pub sigma_nm_per_min: f64,
 }
 
+/// Which vector of an atomic lattice an orientation is that of.
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
+)]
+#[serde(rename_all = "kebab-case")]
+pub enum LatticeDirection {
+    /// The atomic vector a: for hexagonal layers a row of atoms, a zigzag edge.
+    #[default]
+    Atomic,
+    /// The reciprocal vector of a: for hexagonal layers an armchair edge, 30° from a row of atoms, and a
+    /// spot of the Fourier transform of an atomic image.
+    Reciprocal,
+}
+
+/// The orientation of one of the layers, known from elsewhere: an atomic image or the edge of a crystal,
+/// in the frame of the position sensors and free of drift.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct KnownOrientation {
+    /// Degrees counter-clockwise from x, of any of the equivalent directions.
+    pub angle_deg: f64,
+    /// Standard uncertainty, degrees.
+    pub sigma_deg: f64,
+    /// Layer 1, the reference, or layer 2. For a strained layer the mean over its three directions is
+    /// meant: a single one differs from it by up to (1+ν)ε/2.
+    pub layer: u8,
+    /// Of which vector.
+    #[serde(default)]
+    pub of: LatticeDirection,
+}
+
 /// How well the position sensors (or the scanner, where there are none) are calibrated: standard
 /// uncertainties, which every scan shares. The defaults are common values; a calibration of your own
 /// scanner tells better.
@@ -124,10 +155,16 @@ pub struct Settings {
     pub method: Method,
     /// What is subtracted beforehand.
     pub background: Background,
-    /// The layers.
+    /// The layers: both, or the upper one (layer 2) where there is a `substrate`.
     pub material: Material,
     /// How many moirés every image shows; each is fitted with the others taken off.
     pub moires: usize,
+    /// The lower layer (layer 1, the reference) where it is another one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub substrate: Option<Material>,
+    /// The orientation of one of the layers, if it is known: tells isotropic strain from twist.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub lattice_angle: Option<KnownOrientation>,
     /// Form of the strain equation.
     pub strain_convention: StrainConvention,
     /// How files become sets.
@@ -158,6 +195,16 @@ pub struct Settings {
     pub seed: u64,
 }
 
+impl Settings {
+    /// The two layers: `material` on itself or on the `substrate`.
+    pub fn bilayer(&self) -> Bilayer<'_> {
+        Bilayer {
+            reference: self.substrate.as_ref().unwrap_or(&self.material),
+            stretched: &self.material,
+        }
+    }
+}
+
 impl Default for Settings {
     fn default() -> Self {
         Self {
@@ -167,6 +214,8 @@ impl Default for Settings {
             background: Background::Plane,
             material: Material::graphene(),
             moires: 1,
+            substrate: None,
+            lattice_angle: None,
             strain_convention: StrainConvention::RealSpace,
             grouping: Grouping::Auto,
             frame_time_sigma_s: 0.6,

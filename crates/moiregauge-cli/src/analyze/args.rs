@@ -9,7 +9,8 @@ use moiregauge::settings::{
 use moiregauge_report::{Choice, ColorMap};
 
 use super::export::{self, Export};
-use crate::config::{self, named_material};
+use super::orientation::OrientationArgs;
+use crate::config;
 use crate::input::KnownArgs;
 
 /// From scans to drift, moiré vectors, twist and heterostrain, with figures and a report
@@ -29,6 +30,8 @@ Examples:
   moiregauge analyze scans/ --out as-published --method paper --strain-convention k-space
   moiregauge analyze a/ b/ --out results --set before=a --set after=b
   moiregauge analyze scans/ --out results --export corrected.gwy
+  moiregauge analyze scans/ --out results --layers graphene/hBN --lattice-angle 12.3±0.2
+  moiregauge analyze scans/ --out results --atomic atomic_up.spm atomic_down.spm
   moiregauge analyze image.npy --out results --size 70nm×70nm --line-rate 4 --frame-direction up
 
 Angles are counter-clockwise, x to the right and y up, as the position sensors tell.")]
@@ -54,6 +57,15 @@ pub(crate) struct AnalyzeArgs {
     /// The layers: graphene, hBN, MoS2, … [default: graphene]
     #[arg(long, value_name = "NAME")]
     material: Option<String>,
+    /// The layers: graphene for two equal ones, graphene/hBN for graphene (layer 2) on hBN (layer 1, the
+    /// reference); names of --materials too
+    #[arg(long, value_name = "UPPER/LOWER", conflicts_with = "material")]
+    layers: Option<String>,
+    /// TOML file with layers of your own, one [[layer]] table each (see `moiregauge config`)
+    #[arg(long, value_name = "FILE")]
+    pub(super) materials: Option<PathBuf>,
+    #[command(flatten)]
+    pub(super) orientation: OrientationArgs,
     /// Lattice constant of the layers, nm, in place of the material's
     #[arg(long, value_name = "NM")]
     lattice_constant: Option<f64>,
@@ -169,11 +181,20 @@ impl AnalyzeArgs {
             Some(path) => config::read(path)?,
             None => Settings::default(),
         };
-        if let Some(name) = &self.material {
-            s.material = named_material(name)?;
+        let own = config::own_materials(self.materials.as_deref())?;
+        if let Some(layers) = &self.layers {
+            (s.material, s.substrate) = config::named_layers(layers, &own)?;
+        } else if let Some(name) = &self.material {
+            (s.material, s.substrate) = config::named_layers(name, &own)?;
         }
+        s.lattice_angle = self.orientation.known().or(s.lattice_angle);
         let by_user = [self.lattice_constant, self.poisson_ratio];
         if by_user.iter().any(Option::is_some) {
+            anyhow::ensure!(
+                s.substrate.is_none(),
+                "--lattice-constant and --poisson-ratio describe two equal layers; describe different ones in \
+                 a file (--materials)"
+            );
             s.material.source = format!("{}, changed by the user", s.material.name);
         }
         if let Some(a) = self.lattice_constant {

@@ -7,6 +7,7 @@ use moiregauge::analysis::{Analysis, Combined, SetAnalysis};
 use moiregauge::budget::Budget;
 use moiregauge::caveat::Caveat;
 use moiregauge::estimate::Estimate;
+use moiregauge::readings::Readings;
 use moiregauge::strain::TwistStrain;
 use moiregauge_report::{FailedInput, plus_minus, two_digits};
 use spmfile::FrameDirection;
@@ -59,12 +60,16 @@ fn set_summary(text: &mut String, set: &SetAnalysis) {
         None => text.push_str("  drift         not determined\n"),
     }
     match (&set.mean, &set.uncorrected) {
-        (Some(mean), _) => twist_strain(text, &mean.twist_strain, &mean.budget),
+        (Some(mean), _) => {
+            twist_strain(text, &mean.twist_strain, &mean.budget);
+            readings(text, &mean.readings);
+        }
         (None, Some(mean)) => {
             text.push_str(
                 "  not corrected for drift (statistical errors only, drift not included):\n",
             );
             twist_strain(text, &mean.twist_strain, &mean.budget);
+            readings(text, &mean.readings);
         }
         (None, None) => text.push_str("  no twist and strain explain this lattice\n"),
     }
@@ -142,9 +147,65 @@ fn twist_strain(text: &mut String, found: &TwistStrain, budget: &Budget) {
     );
 }
 
+/// What else the lattice can mean: all readings of different layers, or the strain tensor.
+fn readings(text: &mut String, readings: &Readings) {
+    let degrees = |e: Estimate| plus_minus(e.scaled(1f64.to_degrees()));
+    let percent = |e: Estimate| plus_minus(e.scaled(100.0));
+    if let Some(tensor) = &readings.tensor {
+        let (best, all) = (&tensor.best, tensor.in_all());
+        let sigma = |e: Estimate, factor: f64| two_digits(factor * e.sigma);
+        let _ = writeln!(
+            text,
+            "  with the orientation of a layer:\n    twist       {}° (± {}° with calibration and constants)\n    \
+             mean strain {} % (± {} %), shear part {} % (± {} %){}",
+            degrees(best.twist()),
+            sigma(all.twist(), 1f64.to_degrees()),
+            percent(best.mean()),
+            sigma(all.mean(), 100.0),
+            percent(best.shear()),
+            sigma(all.shear(), 100.0),
+            best.axis_lab()
+                .map_or_else(String::new, |a| format!(", axis {}°", degrees(a)))
+        );
+        for (word, split) in ["= uniaxial", "or"]
+            .iter()
+            .zip(all.splits(tensor.poisson_ratio))
+        {
+            let _ = writeln!(
+                text,
+                "    {word:11} {} %{} and biaxial {} %",
+                percent(split.uniaxial),
+                split
+                    .axis_lab
+                    .map_or_else(String::new, |a| format!(" along {}°", degrees(a))),
+                percent(split.biaxial)
+            );
+        }
+        return;
+    }
+    if !readings.layers_differ {
+        return;
+    }
+    for (index, branch) in readings.choices().enumerate() {
+        let _ = writeln!(
+            text,
+            "  {} twist {}°, strain {} % along {:.2}°",
+            if index == 0 {
+                "either       "
+            } else {
+                "or           "
+            },
+            degrees(Estimate::new(branch.twist, branch.twist_sigma)),
+            percent(Estimate::new(branch.strain, branch.strain_sigma)),
+            branch.axis_lab.to_degrees()
+        );
+    }
+}
+
 fn combined_summary(text: &mut String, combined: &Combined) {
     text.push_str("all sets together\n");
     twist_strain(text, &combined.twist_strain, &combined.budget);
+    readings(text, &combined.readings);
     for pair in &combined.consistency {
         let drift = pair
             .drift_sigmas

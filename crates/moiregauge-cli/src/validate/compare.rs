@@ -42,6 +42,7 @@ pub(super) fn compare(
     let settings = Settings {
         method,
         material: simulation.sample.material.clone(),
+        substrate: simulation.sample.substrate.clone(),
         strain_convention: simulation.sample.strain_convention,
         drift_draws: 0,
         strain_draws: 0,

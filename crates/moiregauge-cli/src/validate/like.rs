@@ -81,6 +81,7 @@ fn sample(
     }));
     Ok(Sample {
         material: settings.material.clone(),
+        substrate: settings.substrate.clone(),
         strain_convention: settings.strain_convention,
         twist_deg: found.twist.to_degrees(),
         strain_percent: 100.0 * e.norm(),

@@ -79,14 +79,14 @@ fn best(scan: &ScanAnalysis) -> (LatticeVectors, Option<TwistStrain>) {
 type Point = (f64, f64, Marker, &'static str, bool);
 
 fn uncertainties(svg: &mut Svg, subject: &Subject, grid: &Grid, slope: f64) -> Result<(), String> {
-    let material = &subject.analysis.settings.material;
+    let bilayer = subject.analysis.settings.bilayer();
     let mut points: Vec<Point> = Vec::new();
     for scan in &subject.set.scans {
         let (lattice, fit) = best(scan);
         let up = is_up(scan);
         for vector in 0..3 {
             let wavelength = lattice.wavelength(vector);
-            let twist = naive_twist(wavelength, material).sigma.to_degrees();
+            let twist = naive_twist(wavelength, bilayer).sigma.to_degrees();
             points.push((
                 wavelength.sigma,
                 twist,

@@ -17,9 +17,9 @@ pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
     if scans.iter().all(|scan| scan.nominal.is_none()) {
         return Err("the files state no nominal size".to_owned());
     }
-    let material = &subject.analysis.settings.material;
+    let bilayer = subject.analysis.settings.bilayer();
     let twist = |wavelength: Estimate| {
-        let angle = naive_twist(wavelength, material);
+        let angle = naive_twist(wavelength, bilayer);
         angle.scaled(1_f64.to_degrees())
     };
     let value = |lattice: &LatticeVectors, vector: usize, row: usize| {

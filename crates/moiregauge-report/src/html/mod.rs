@@ -3,6 +3,7 @@
 //! In: the document, the figures and the tables. Out: the page. Every text from outside (file names,
 //! channel names, error messages) is escaped by the template engine; only our own SVG is not.
 
+mod meanings;
 mod page;
 mod words;
 

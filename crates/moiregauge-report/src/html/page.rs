@@ -3,11 +3,12 @@
 use moiregauge::settings::Method;
 use serde::Serialize;
 
+use super::meanings::Meanings;
 use super::words::{Budgeted, Numbers, consistency, conventions, plain, shown, wavelengths};
 use crate::draw::base64;
 use crate::error::ReportError;
 use crate::figures::Figure;
-use crate::results::{DriftResult, Results, ScanResult, SetResult};
+use crate::results::{AtomicResult, DriftResult, Results, ScanResult, SetResult};
 
 #[derive(Debug, Serialize)]
 pub(super) struct Page<'a> {
@@ -18,11 +19,15 @@ pub(super) struct Page<'a> {
     combined: Option<Numbers>,
     combined_budget: Option<Budgeted>,
     combined_wavelengths: Option<[String; 3]>,
+    combined_meanings: Option<Meanings>,
+    /// Names of the layers.
+    layers: String,
+    atomic: Option<Atomic>,
     sets: Vec<Set<'a>>,
     consistency: Vec<[String; 5]>,
     /// Figures of all sets together.
     together: Vec<Shown<'a>>,
-    conventions: [(&'static str, &'a str); 13],
+    conventions: [(&'static str, &'a str); 15],
     settings: String,
     downloads: Vec<Download<'a>>,
 }
@@ -37,6 +42,7 @@ struct Set<'a> {
     /// Of `mean` or, where there is none, of `uncorrected`.
     budget: Option<Budgeted>,
     mean_wavelengths: Option<[String; 3]>,
+    meanings: Option<Meanings>,
     uncorrected: Option<Numbers>,
     uncorrected_wavelengths: Option<[String; 3]>,
     forward_backward: Option<Numbers>,
@@ -46,6 +52,16 @@ struct Set<'a> {
     scans: Vec<Scan<'a>>,
     figures: Vec<Shown<'a>>,
     missing: Vec<Missing<'a>>,
+}
+
+/// The orientation by atomic images.
+#[derive(Debug, Serialize)]
+struct Atomic {
+    files: String,
+    layer: u8,
+    angle: String,
+    size: String,
+    drift: Option<[String; 2]>,
 }
 
 #[derive(Debug, Serialize)]
@@ -128,6 +144,9 @@ impl<'a> Page<'a> {
             combined: combined.map(|c| Numbers::new(&c.twist_strain)),
             combined_budget: combined.map(|c| Budgeted::new(&c.budget)),
             combined_wavelengths: combined.map(|c| wavelengths(&c.vectors)),
+            combined_meanings: combined.map(|c| Meanings::new(&c.readings)),
+            layers: layers(results),
+            atomic: results.atomic.as_ref().map(atomic),
             sets: sets
                 .map(|(i, set)| Set::new(i, set, of(Some(i)), missing(figures, i)))
                 .collect(),
@@ -140,6 +159,32 @@ impl<'a> Page<'a> {
                 .map(|(name, bytes)| download(name, bytes))
                 .collect(),
         })
+    }
+}
+
+/// `graphene (a = 0.246 nm, ν = 0.16)`, or two of them.
+fn layers(results: &Results) -> String {
+    let bilayer = results.settings.bilayer();
+    let of = |m: &moiregauge::material::Material| {
+        format!(
+            "{} (a = {} nm, ν = {})",
+            m.name, m.lattice_constant_nm, m.poisson_ratio
+        )
+    };
+    if bilayer.reference == bilayer.stretched {
+        of(bilayer.stretched)
+    } else {
+        format!("{} on {}", of(bilayer.stretched), of(bilayer.reference))
+    }
+}
+
+fn atomic(found: &AtomicResult) -> Atomic {
+    Atomic {
+        files: found.files.join(", "),
+        layer: found.layer,
+        angle: format!("({})°", shown(found.lattice_angle_deg)),
+        size: plain(found.size, 4),
+        drift: found.drift_nm_per_min.map(|d| d.map(|part| plain(part, 3))),
     }
 }
 
@@ -206,6 +251,7 @@ impl<'a> Set<'a> {
             mean: mean.map(|m| Numbers::new(&m.twist_strain)),
             budget: mean.or(uncorrected).map(|m| Budgeted::new(&m.budget)),
             mean_wavelengths: mean.map(|m| wavelengths(&m.vectors)),
+            meanings: mean.or(uncorrected).map(|m| Meanings::new(&m.readings)),
             uncorrected: uncorrected.map(|m| Numbers::new(&m.twist_strain)),
             uncorrected_wavelengths: uncorrected.map(|m| wavelengths(&m.vectors)),
             forward_backward: set.forward_backward.as_ref().map(Numbers::new),

@@ -133,7 +133,7 @@ pub(super) fn consistency(results: &Results) -> Vec<[String; 5]> {
 }
 
 /// Name and text of every convention.
-pub(super) fn conventions(conventions: &Conventions) -> [(&'static str, &str); 13] {
+pub(super) fn conventions(conventions: &Conventions) -> [(&'static str, &str); 15] {
     [
         ("axes", &conventions.axes),
         ("angles", &conventions.angles),
@@ -141,11 +141,13 @@ pub(super) fn conventions(conventions: &Conventions) -> [(&'static str, &str); 1
         ("coordinates", &conventions.coordinates),
         ("drift", &conventions.drift),
         ("strain", &conventions.strain),
+        ("layers", &conventions.layers),
         ("strained layer", &conventions.strained_layer),
         ("strain axis", &conventions.strain_axis),
         ("strain vector", &conventions.strain_vector),
         ("heterostrain", &conventions.heterostrain),
         ("twist", &conventions.twist),
+        ("strain tensor", &conventions.strain_tensor),
         ("σ", &conventions.sigma),
         ("budget", &conventions.budget),
     ]

@@ -5,7 +5,7 @@ use moiregauge::analysis::{
 };
 use moiregauge::caveat::Caveat;
 use moiregauge::estimate::Estimate;
-use moiregauge::material::Material;
+use moiregauge::material::Bilayer;
 use moiregauge::settings::Settings;
 use moiregauge::strain::TwistStrain;
 use nalgebra::{Matrix2, Vector2};
@@ -18,6 +18,7 @@ use super::checks::ChecksResult;
 use super::conventions::Conventions;
 use super::convert::{PER_MINUTE, PERCENT, correlation, degree, estimate, number};
 use super::lattice::{LatticeVector, ResultEstimate, TwistStrainResult};
+use super::readings::{AtomicResult, ReadingsResult};
 use super::scan::ScanResult;
 use crate::provenance::{FailedInput, InputFile, Provenance};
 use crate::stats::mean_and_deviation;
@@ -32,6 +33,8 @@ pub struct Results {
     pub sets: Vec<SetResult>,
     /// All sets together; `null` where no set could be corrected for drift.
     pub combined: Option<CombinedResult>,
+    /// The orientation of a layer by atomically resolved images; `null` without any.
+    pub atomic: Option<AtomicResult>,
     /// Doubts.
     pub caveats: Vec<Caveat>,
     /// Inputs that could not be used.
@@ -140,6 +143,8 @@ pub struct MeanResult {
     pub twist_strain: TwistStrainResult,
     /// What contributes to their uncertainty, calibration and model included.
     pub budget: BudgetResult,
+    /// What else the lattice can mean.
+    pub readings: ReadingsResult,
     /// L1, L2 and L3.
     pub vectors: [LatticeVector; 3],
     /// Standard deviation of the twist over the scans, degrees.
@@ -165,6 +170,8 @@ pub struct CombinedResult {
     pub twist_strain: TwistStrainResult,
     /// What contributes to their uncertainty, calibration and model included.
     pub budget: BudgetResult,
+    /// What else the lattice can mean.
+    pub readings: ReadingsResult,
     /// L1, L2 and L3.
     pub vectors: [LatticeVector; 3],
     /// The joint fit over all scans that made them; `null` for the other methods.
@@ -193,15 +200,16 @@ pub struct ConsistencyResult {
 impl Results {
     /// The document for an analysis.
     pub fn new(analysis: &Analysis, provenance: &Provenance) -> Self {
-        let material = &analysis.settings.material;
+        let bilayer = analysis.settings.bilayer();
         Self {
             schema: SCHEMA.to_owned(),
             sets: analysis
                 .sets
                 .iter()
-                .map(|set| set_result(set, material))
+                .map(|set| set_result(set, bilayer))
                 .collect(),
-            combined: analysis.combined.as_ref().map(|c| combined(c, material)),
+            combined: analysis.combined.as_ref().map(|c| combined(c, bilayer)),
+            atomic: analysis.atomic.as_ref().map(Into::into),
             caveats: analysis.caveats.clone(),
             failed: provenance.failed.clone(),
             conventions: Conventions::of(&analysis.settings),
@@ -226,7 +234,7 @@ impl Results {
     }
 }
 
-fn set_result(set: &SetAnalysis, material: &Material) -> SetResult {
+fn set_result(set: &SetAnalysis, bilayer: Bilayer<'_>) -> SetResult {
     let axis = match set.slow_axis {
         Axis::X => "x",
         Axis::Y => "y",
@@ -237,14 +245,14 @@ fn set_result(set: &SetAnalysis, material: &Material) -> SetResult {
         line_rate_hz: number(set.line_rate_hz),
         channel: set.channel.clone(),
         drift: set.drift.as_ref().map(drift),
-        mean: set.mean.as_ref().map(|m| mean(m, material)),
-        uncorrected: set.uncorrected.as_ref().map(|m| mean(m, material)),
+        mean: set.mean.as_ref().map(|m| mean(m, bilayer)),
+        uncorrected: set.uncorrected.as_ref().map(|m| mean(m, bilayer)),
         forward_backward: set.forward_backward.as_ref().map(Into::into),
         checks: set.checks.as_ref().map(Into::into),
         scans: set
             .scans
             .iter()
-            .map(|s| ScanResult::of(s, set.slow_axis, material))
+            .map(|s| ScanResult::of(s, set.slow_axis, bilayer))
             .collect(),
     }
 }
@@ -296,7 +304,7 @@ fn drift_monte_carlo(draws: &DriftMonteCarlo) -> DriftMonteCarloResult {
     }
 }
 
-fn mean(mean: &SetMean, material: &Material) -> MeanResult {
+fn mean(mean: &SetMean, bilayer: Bilayer<'_>) -> MeanResult {
     let result = &mean.twist_strain;
     let unscaled = TwistStrain {
         covariance: result.covariance / mean.enlargement,
@@ -305,7 +313,8 @@ fn mean(mean: &SetMean, material: &Material) -> MeanResult {
     MeanResult {
         twist_strain: result.into(),
         budget: BudgetResult::of(&mean.budget, result),
-        vectors: LatticeVector::all(&mean.lattice, material),
+        readings: (&mean.readings).into(),
+        vectors: LatticeVector::all(&mean.lattice, bilayer),
         twist_scatter_deg: number(mean.twist_scatter * degree()),
         strain_scatter_percent: number(mean.strain_scatter * PERCENT),
         chi2_per_dof: number(mean.chi2_per_dof),
@@ -315,11 +324,12 @@ fn mean(mean: &SetMean, material: &Material) -> MeanResult {
     }
 }
 
-fn combined(combined: &Combined, material: &Material) -> CombinedResult {
+fn combined(combined: &Combined, bilayer: Bilayer<'_>) -> CombinedResult {
     CombinedResult {
         twist_strain: (&combined.twist_strain).into(),
         budget: BudgetResult::of(&combined.budget, &combined.twist_strain),
-        vectors: LatticeVector::all(&combined.lattice, material),
+        readings: (&combined.readings).into(),
+        vectors: LatticeVector::all(&combined.lattice, bilayer),
         joint: combined.joint.as_ref().map(Into::into),
         drift: combined.drift.as_ref().map(drift),
         checks: combined.checks.as_ref().map(Into::into),

@@ -3,7 +3,7 @@
 use moiregauge::analysis::StrainDraw;
 use moiregauge::estimate::Estimate;
 use moiregauge::lattice::LatticeVectors;
-use moiregauge::material::Material;
+use moiregauge::material::Bilayer;
 use moiregauge::strain::{TwistStrain, naive_twist};
 use nalgebra::{Matrix2, Vector2};
 use schemars::JsonSchema;
@@ -55,7 +55,7 @@ pub struct LatticeVector {
 }
 
 impl LatticeVector {
-    pub(crate) fn of(lattice: &LatticeVectors, index: usize, material: &Material) -> Self {
+    pub(crate) fn of(lattice: &LatticeVectors, index: usize, bilayer: Bilayer<'_>) -> Self {
         let vector = lattice.vector(index);
         let wavelength = lattice.wavelength(index);
         let angle = estimate(lattice.polar_angle(index), degree());
@@ -66,12 +66,12 @@ impl LatticeVector {
             wavelength_nm: estimate(wavelength, 1.0),
             polar_angle_deg: angle.value,
             polar_angle_sigma_deg: angle.sigma,
-            naive_twist_deg: estimate(naive_twist(wavelength, material), degree()),
+            naive_twist_deg: estimate(naive_twist(wavelength, bilayer), degree()),
         }
     }
 
-    pub(crate) fn all(lattice: &LatticeVectors, material: &Material) -> [Self; 3] {
-        [0, 1, 2].map(|index| Self::of(lattice, index, material))
+    pub(crate) fn all(lattice: &LatticeVectors, bilayer: Bilayer<'_>) -> [Self; 3] {
+        [0, 1, 2].map(|index| Self::of(lattice, index, bilayer))
     }
 }
 

@@ -1,7 +1,7 @@
 //! One scan as the document holds it.
 
 use moiregauge::analysis::{Axis, LineAnalysis, ScanAnalysis};
-use moiregauge::material::Material;
+use moiregauge::material::Bilayer;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use spmfile::{DateTime, FrameDirection, LineDirection};
@@ -104,7 +104,7 @@ pub struct LineResult {
 }
 
 impl ScanResult {
-    pub(crate) fn of(scan: &ScanAnalysis, slow: Axis, material: &Material) -> Self {
+    pub(crate) fn of(scan: &ScanAnalysis, slow: Axis, bilayer: Bilayer<'_>) -> Self {
         let [fast_side, slow_side] = scan.window_extent;
         let extent = match slow {
             Axis::X => [slow_side, fast_side],
@@ -122,7 +122,7 @@ impl ScanResult {
                 fast: estimate(scan.fast_velocity, 1.0),
                 slow: estimate(scan.slow_velocity, 1.0),
             },
-            vectors: [0, 1, 2].map(|index| vector(scan, index, material)),
+            vectors: [0, 1, 2].map(|index| vector(scan, index, bilayer)),
             twist_strain: ScanTwistStrain {
                 sensor: scan.twist_strain_sensor.as_ref().map(Into::into),
                 drift_corrected: scan.twist_strain.as_ref().map(Into::into),
@@ -133,27 +133,27 @@ impl ScanResult {
             lines: scan
                 .lines
                 .iter()
-                .map(|line| line_result(line, material))
+                .map(|line| line_result(line, bilayer))
                 .collect(),
         }
     }
 }
 
-fn vector(scan: &ScanAnalysis, index: usize, material: &Material) -> ScanVector {
-    let sensor = LatticeVector::of(&scan.sensor, index, material);
+fn vector(scan: &ScanAnalysis, index: usize, bilayer: Bilayer<'_>) -> ScanVector {
+    let sensor = LatticeVector::of(&scan.sensor, index, bilayer);
     let drift_corrected = scan
         .drift_corrected
-        .map(|l| LatticeVector::of(&l, index, material));
+        .map(|l| LatticeVector::of(&l, index, bilayer));
     ScanVector {
         name: NAMES[index].to_owned(),
         polar_angle_deg: drift_corrected.unwrap_or(sensor).polar_angle_deg,
-        nominal: scan.nominal.map(|l| LatticeVector::of(&l, index, material)),
+        nominal: scan.nominal.map(|l| LatticeVector::of(&l, index, bilayer)),
         sensor,
         drift_corrected,
     }
 }
 
-fn line_result(line: &LineAnalysis, material: &Material) -> LineResult {
+fn line_result(line: &LineAnalysis, bilayer: Bilayer<'_>) -> LineResult {
     LineResult {
         line: match line.line {
             LineDirection::Trace => "trace",
@@ -165,8 +165,8 @@ fn line_result(line: &LineAnalysis, material: &Material) -> LineResult {
         signal_to_noise: number(line.signal_to_noise),
         pixel_to_nm: square(&line.pixel_to_nm, 1.0),
         origin_nm: pair(line.origin, 1.0),
-        vectors: LatticeVector::all(&line.sensor, material),
-        comparison: line.comparison.map(|l| LatticeVector::all(&l, material)),
+        vectors: LatticeVector::all(&line.sensor, bilayer),
+        comparison: line.comparison.map(|l| LatticeVector::all(&l, bilayer)),
         shortcut_wavelengths_nm: line.shortcut_wavelengths.map(|l| l.map(number)),
     }
 }

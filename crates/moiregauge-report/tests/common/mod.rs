@@ -17,6 +17,7 @@ use moiregauge::caveat::Caveat;
 use moiregauge::estimate::Estimate;
 use moiregauge::image::Image;
 use moiregauge::lattice::LatticeVectors;
+use moiregauge::readings::Readings;
 use moiregauge::settings::{Settings, StrainConvention};
 use moiregauge::strain;
 use moiregauge_report::{FailedInput, InputFile, Provenance};
@@ -126,7 +127,7 @@ fn scan(
     let to_pixels = frame.try_inverse().expect("a frame");
     let nominal = sensor.mapped(&(Matrix2::identity() * SIZE_NM / (PIXELS - 1) as f64 * to_pixels));
     let twist_strain = |l: &LatticeVectors| {
-        strain::twist_strain(l, &settings.material, settings.strain_convention).ok()
+        strain::twist_strain(l, settings.bilayer(), settings.strain_convention).ok()
     };
     let creep = index as f64 * 0.9;
     let line = |line| LineAnalysis {
@@ -171,7 +172,7 @@ fn scan(
         twist_strain: twist_strain(&corrected),
         draws: strain::draws(
             &corrected,
-            &settings.material,
+            settings.bilayer(),
             settings.strain_convention,
             1000,
             settings.seed,
@@ -197,7 +198,7 @@ fn mean(
     let covariance = lattices.first()?.covariance / n;
     let lattice = LatticeVectors { basis, covariance };
     let of = |l: &LatticeVectors| {
-        strain::twist_strain(l, &settings.material, settings.strain_convention).ok()
+        strain::twist_strain(l, settings.bilayer(), settings.strain_convention).ok()
     };
     let all: Vec<_> = lattices.iter().filter_map(of).collect();
     let twist_strain = of(&lattice)?;
@@ -214,8 +215,10 @@ fn mean(
         drift: covariance * if drift_known { 0.3 } else { f64::NAN },
         sensor: covariance * 0.1,
     };
+    let budget = Budget::new(&lattice, &twist_strain, &statistical, settings);
     Some(SetMean {
-        budget: Budget::new(&lattice, &twist_strain, &statistical, settings),
+        readings: Readings::new(&lattice, &twist_strain, &budget, settings),
+        budget,
         lattice,
         twist_strain,
         twist_scatter: scatter(
@@ -414,6 +417,7 @@ pub(crate) fn analysis() -> Analysis {
         .collect();
     let combined = mean(&both, &settings, f64::NAN, true).map(|m| Combined {
         budget: m.budget,
+        readings: m.readings,
         lattice: m.lattice,
         twist_strain: m.twist_strain,
         joint: None,
@@ -430,6 +434,7 @@ pub(crate) fn analysis() -> Analysis {
         settings,
         sets,
         combined,
+        atomic: None,
         caveats: vec![
             Caveat::new(
                 "few-periods",

@@ -22,6 +22,7 @@ use nalgebra::{Matrix2, Matrix4, Vector4};
 pub use statistical::{Statistical, weighted_mean};
 
 use crate::lattice::LatticeVectors;
+use crate::material::Material;
 use crate::settings::Settings;
 use crate::strain::{Reference, TwistStrain, twist_strain};
 
@@ -104,7 +105,7 @@ impl Budget {
         statistical: &Statistical,
         settings: &Settings,
     ) -> Self {
-        let reference = Reference::new(lattice, &settings.material, settings.strain_convention);
+        let reference = Reference::new(lattice, settings.bilayer(), settings.strain_convention);
         let contribution = |source: Source| {
             let (covariance, wavelengths) =
                 match lattice_error(source, lattice, statistical, settings) {
@@ -129,6 +130,19 @@ impl Budget {
             contributions: Source::ALL.map(contribution),
             statistical: *statistical,
         }
+    }
+
+    /// What the calibration of the scanner may do to a lattice: covariances of its vectors, nm², one for
+    /// each source.
+    pub(crate) fn calibration_errors(
+        &self,
+        lattice: &LatticeVectors,
+        settings: &Settings,
+    ) -> [Matrix4<f64>; 3] {
+        [Source::Gain, Source::Mismatch, Source::Orthogonality].map(|source| {
+            lattice_error(source, lattice, &self.statistical, settings)
+                .unwrap_or_else(Matrix4::zeros)
+        })
     }
 
     /// What one source contributes.
@@ -216,14 +230,24 @@ fn model_error(
     reference: Option<&Reference>,
     settings: &Settings,
 ) -> Matrix4<f64> {
-    let material = &settings.material;
+    let bilayer = settings.bilayer();
+    let relative = |m: &Material| m.lattice_constant_sigma_nm / m.lattice_constant_nm;
     let found = match source {
         // The moiré matrix is proportional to a and to the inverse of the moiré vectors.
-        Source::LatticeConstant => {
-            let sigma = material.lattice_constant_sigma_nm / material.lattice_constant_nm;
-            let error = square(&(lattice.flat() * sigma));
+        Source::LatticeConstant if bilayer.is_equal() => {
+            let error = square(&(lattice.flat() * relative(bilayer.stretched)));
             Some(through(lattice, &error, settings))
         }
+        // Two constants that nothing binds to each other: their ratio moves the twist at first order.
+        Source::LatticeConstant => reference.and_then(|r| {
+            let first = mean_square(relative(bilayer.reference), |d| {
+                r.with_lattice_constants([d, 0.0])
+            })?;
+            let second = mean_square(relative(bilayer.stretched), |d| {
+                r.with_lattice_constants([0.0, d])
+            })?;
+            Some(first + second)
+        }),
         Source::StrainedLayer => reference
             .and_then(Reference::with_shared_strain)
             .map(|change| square(&change)),
@@ -232,16 +256,24 @@ fn model_error(
             reference.and_then(|r| mean_square(sigma, |h| r.with_isotropic_strain(h)))
         }
         _ => {
-            let sigma = material.poisson_ratio_sigma;
+            let sigma = bilayer.stretched.poisson_ratio_sigma;
             reference.and_then(|r| mean_square(sigma, |change| r.with_poisson_ratio(change)))
         }
     };
     found.unwrap_or_else(|| Matrix4::from_element(f64::NAN))
 }
 
-/// Mean square change for a Gaussian parameter: a parabola through ±σ, with `⟨h⁴⟩ = 3σ⁴`.
+/// Mean square change for a Gaussian parameter: a parabola through ±σ, with `⟨h⁴⟩ = 3σ⁴`. Where nothing
+/// explains the moiré on one side (layers of different size, nearly aligned), the other one counts.
 fn mean_square(sigma: f64, change: impl Fn(f64) -> Option<Vector4<f64>>) -> Option<Matrix4<f64>> {
-    let (up, down) = (change(sigma)?, change(-sigma)?);
+    let (up, down) = match (change(sigma), change(-sigma)) {
+        (Some(up), Some(down)) => (up, down),
+        (None, None) => return None,
+        (one, other) => {
+            let one = one.or(other)?;
+            (one, -one)
+        }
+    };
     let (slope, curve) = ((up - down) / 2.0, (up + down) / 2.0);
     Some(square(&slope) + 3.0 * square(&curve))
 }
@@ -256,7 +288,7 @@ fn through(lattice: &LatticeVectors, error: &Matrix4<f64>, settings: &Settings) 
         covariance: *error,
         ..*lattice
     };
-    twist_strain(&lattice, &settings.material, settings.strain_convention).map_or_else(
+    twist_strain(&lattice, settings.bilayer(), settings.strain_convention).map_or_else(
         |_| Matrix4::from_element(f64::NAN),
         |found| found.covariance,
     )

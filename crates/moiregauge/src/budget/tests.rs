@@ -153,7 +153,7 @@ fn the_strained_layer_has_the_known_effect() {
         let e = turn(axis) * Matrix2::new(strain, 0.0, 0.0, -0.16 * strain) * turn(-axis);
         let p = turn(0.7) * (2.0 * (twist / 2.0).sin() * quarter - (twist / 2.0).cos() * e);
         let shared = lattice_of(&p);
-        let change = Reference::new(&shared, &settings.material, settings.strain_convention)
+        let change = Reference::new(&shared, settings.bilayer(), settings.strain_convention)
             .unwrap()
             .with_shared_strain()
             .unwrap();
@@ -192,7 +192,7 @@ fn isotropic_strain_has_the_known_effect() {
         let shift = (found.twist - twist).to_degrees();
         assert!((shift - degrees).abs() < 5e-5, "{shift}");
         let reference =
-            Reference::new(&lattice, &settings.material, settings.strain_convention).unwrap();
+            Reference::new(&lattice, settings.bilayer(), settings.strain_convention).unwrap();
         let change = reference
             .with_isotropic_strain(1.0 / (1.0 + eta) - 1.0)
             .unwrap();
@@ -201,7 +201,7 @@ fn isotropic_strain_has_the_known_effect() {
     // Mean square over a Gaussian prior, by summation over it.
     let lattice = graphene(1.126, 0.001);
     let reference =
-        Reference::new(&lattice, &settings.material, settings.strain_convention).unwrap();
+        Reference::new(&lattice, settings.bilayer(), settings.strain_convention).unwrap();
     let sigma = settings.isotropic_strain_percent / 100.0;
     let (mut square, mut weights) = (0.0, 0.0);
     for step in -500..=500 {

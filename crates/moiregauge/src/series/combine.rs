@@ -12,6 +12,7 @@ use crate::caveat::Caveat;
 use crate::chi2::enlargement;
 use crate::joint::JointFit;
 use crate::lattice::LatticeVectors;
+use crate::readings::{Readings, caveats as about_readings};
 use crate::settings::Settings;
 use crate::strain::twist_strain;
 
@@ -102,9 +103,16 @@ pub(super) fn combine(
         }
     }
     let twist_strain =
-        twist_strain(&lattice, &settings.material, settings.strain_convention).ok()?;
+        twist_strain(&lattice, settings.bilayer(), settings.strain_convention).ok()?;
+    let budget = Budget::new(&lattice, &twist_strain, &statistical, settings);
+    let readings = Readings::new(&lattice, &twist_strain, &budget, settings);
+    if sets.len() > 1 {
+        let found = about_readings("analysis", &lattice, &twist_strain, &readings, settings);
+        caveats.extend(found);
+    }
     Some(Combined {
-        budget: Budget::new(&lattice, &twist_strain, &statistical, settings),
+        readings,
+        budget,
         lattice,
         twist_strain,
         joint: joint_terms,

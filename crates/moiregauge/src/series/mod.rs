@@ -3,6 +3,7 @@
 //! [`measure_scan`] does what needs the pixels, one scan at a time; [`analyse`] does the rest from
 //! the few numbers that remain. [`illustrate`] goes back to the pixels of one scan for the figures.
 
+mod atomic;
 mod channel;
 mod combine;
 mod corrected;
@@ -15,6 +16,7 @@ mod set;
 mod shared;
 mod sightings;
 
+pub use atomic::{AtomicError, AtomicOrientation, atomic_orientation};
 pub use channel::choose_channel;
 pub use corrected::{CorrectedImage, corrected_images, nominal_geometry, on_grid};
 pub use group::natural_order;
@@ -73,6 +75,7 @@ pub fn analyse(scans: Vec<MeasuredScan>, settings: &Settings) -> Analysis {
         settings: settings.clone(),
         sets,
         combined,
+        atomic: None,
         caveats,
     }
 }

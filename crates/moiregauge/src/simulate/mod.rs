@@ -18,7 +18,7 @@ mod truth;
 use spmfile::Scan;
 
 pub use error::SimulateError;
-pub use settings::{Drift, FirstDirection, Noise, Raster, Sample, Simulation, Window};
+pub use settings::{Drift, FirstDirection, Noise, Pattern, Raster, Sample, Simulation, Window};
 pub use truth::{FrameTruth, Truth};
 
 use raster::FramePlan;

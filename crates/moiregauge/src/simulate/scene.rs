@@ -6,9 +6,9 @@
 use nalgebra::{Matrix2, Vector2};
 use rand_distr::{Distribution, StandardNormal};
 
-use super::{Sample, SimulateError};
+use super::{Pattern, Sample, SimulateError};
 use crate::rng;
-use crate::strain::moire_lattice;
+use crate::strain::moire_of;
 
 /// One harmonic of the pattern.
 #[derive(Clone, Copy, Debug)]
@@ -59,14 +59,12 @@ const FAINTEST: f64 = 1e-6;
 
 impl Scene {
     pub(super) fn new(sample: &Sample) -> Result<Self, SimulateError> {
-        let basis = moire_lattice(
-            sample.twist_deg.to_radians(),
-            sample.strain_percent / 100.0,
-            sample.strain_axis_deg.to_radians(),
-            sample.lattice_angle_deg.to_radians(),
-            &sample.material,
-            sample.strain_convention,
-        )?;
+        let (stacking, bilayer) = (sample.stacking(), sample.bilayer());
+        let basis = match sample.pattern {
+            Pattern::Moire => moire_of(&stacking, bilayer, sample.strain_convention)?,
+            Pattern::Layer1 => stacking.atoms(bilayer, sample.strain_convention)?[0],
+            Pattern::Layer2 => stacking.atoms(bilayer, sample.strain_convention)?[1],
+        };
         let inverse = basis
             .try_inverse()
             .ok_or(crate::strain::StrainError::NoMoire)?;

@@ -3,8 +3,9 @@
 use serde::{Deserialize, Serialize};
 
 use super::SimulateError;
-use crate::material::Material;
+use crate::material::{Bilayer, Material};
 use crate::settings::StrainConvention;
+use crate::strain::Stacking;
 
 /// One set of frames of one sample.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
@@ -26,12 +27,33 @@ pub struct Simulation {
     pub noise: Noise,
 }
 
-/// Two equal layers and the contrast of their moiré.
+/// What the pattern is.
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
+)]
+#[serde(rename_all = "kebab-case")]
+pub enum Pattern {
+    /// The moiré of the two layers.
+    #[default]
+    Moire,
+    /// The atomic lattice of layer 1, the reference.
+    Layer1,
+    /// The atomic lattice of layer 2, stretched and turned.
+    Layer2,
+}
+
+/// Two layers and the contrast of their moiré, or of the atoms of one of them.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Sample {
-    /// The layers.
+    /// What is seen.
+    #[serde(default)]
+    pub pattern: Pattern,
+    /// The layers: both, or layer 2 where there is a `substrate`.
     pub material: Material,
+    /// Layer 1, where it is another one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub substrate: Option<Material>,
     /// Form of the strain equation in which twist and strain are meant.
     pub strain_convention: StrainConvention,
     /// θ, degrees.
@@ -40,6 +62,8 @@ pub struct Sample {
     pub strain_percent: f64,
     /// φ, axis of ε counted from layer 1, degrees counter-clockwise.
     pub strain_axis_deg: f64,
+    /// Strain of layer 2 that is the same in all directions, on top of the uniaxial one, per cent.
+    pub biaxial_percent: f64,
     /// α, orientation of the reciprocal vectors of layer 1, degrees.
     pub lattice_angle_deg: f64,
     /// Amplitude of each of the three first harmonics, degrees of phase.
@@ -160,11 +184,14 @@ impl Default for Simulation {
 impl Default for Sample {
     fn default() -> Self {
         Self {
+            pattern: Pattern::Moire,
             material: Material::graphene(),
+            substrate: None,
             strain_convention: StrainConvention::RealSpace,
             twist_deg: 1.13,
             strain_percent: 0.12,
             strain_axis_deg: 25.0,
+            biaxial_percent: 0.0,
             lattice_angle_deg: 12.0,
             contrast_deg: 1.0,
             sharpness: 0.3,
@@ -216,6 +243,27 @@ impl Default for Noise {
             flicker_deg: 0.1,
             clock_s: 0.5,
             plane_deg: [2.0, -1.0],
+        }
+    }
+}
+
+impl Sample {
+    /// The two layers.
+    pub fn bilayer(&self) -> Bilayer<'_> {
+        Bilayer {
+            reference: self.substrate.as_ref().unwrap_or(&self.material),
+            stretched: &self.material,
+        }
+    }
+
+    /// How layer 2 lies on layer 1.
+    pub fn stacking(&self) -> Stacking {
+        Stacking {
+            twist: self.twist_deg.to_radians(),
+            lattice_angle: self.lattice_angle_deg.to_radians(),
+            strain: self.strain_percent / 100.0,
+            axis_lattice: self.strain_axis_deg.to_radians(),
+            biaxial: self.biaxial_percent / 100.0,
         }
     }
 }
@@ -312,6 +360,7 @@ impl Simulation {
                 "sample.strain_axis_deg and sample.lattice_angle_deg",
                 [sample.strain_axis_deg, sample.lattice_angle_deg],
             ),
+            ("sample.biaxial_percent", [sample.biaxial_percent, 0.0]),
         ];
         for (setting, pair) in pairs {
             require(

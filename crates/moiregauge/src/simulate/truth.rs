@@ -19,6 +19,9 @@ pub struct Truth {
     pub twist_deg: f64,
     /// ε, per cent.
     pub strain_percent: f64,
+    /// `ε_b`, the same in all directions, per cent.
+    #[serde(default)]
+    pub biaxial_percent: f64,
     /// φ, degrees in [0, 180).
     pub strain_axis_lattice_deg: f64,
     /// φ + α + θ, degrees in [0, 180).
@@ -79,8 +82,14 @@ const CONVENTIONS: [&str; 6] = [
 
 pub(super) fn truth(settings: &Simulation, scene: &Scene) -> Truth {
     let sample = &settings.sample;
-    // α is reduced modulo 60°, φ takes up what α loses.
-    let lattice_angle = sample.lattice_angle_deg.rem_euclid(60.0);
+    // α is reduced modulo 60° (the symmetry of layer 1), φ takes up what α loses.
+    let period = sample
+        .bilayer()
+        .reference
+        .rotation_period()
+        .to_degrees()
+        .round();
+    let lattice_angle = sample.lattice_angle_deg.rem_euclid(period);
     let axis = sample.strain_axis_deg + sample.lattice_angle_deg - lattice_angle;
     let column = |m: &Matrix2<f64>, k: usize| -> Vector2<f64> { m.column(k).into() };
     let (first, second) = (column(&scene.basis, 0), column(&scene.basis, 1));
@@ -93,6 +102,7 @@ pub(super) fn truth(settings: &Simulation, scene: &Scene) -> Truth {
         conventions: CONVENTIONS.map(str::to_owned).to_vec(),
         twist_deg: sample.twist_deg,
         strain_percent: sample.strain_percent,
+        biaxial_percent: sample.biaxial_percent,
         strain_axis_lattice_deg: axis.rem_euclid(180.0),
         strain_axis_lab_deg: (axis + lattice_angle + sample.twist_deg).rem_euclid(180.0),
         lattice_angle_deg: lattice_angle,

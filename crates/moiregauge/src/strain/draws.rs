@@ -5,13 +5,14 @@
 use nalgebra::{Matrix4, SymmetricEigen, Vector2, Vector4};
 use rand_distr::{Distribution, StandardNormal};
 
-use super::closed_form::{DEFAULT_SIGNS, labelled, layers};
+use super::closed_form::{default_signs, labelled};
 use super::complex_pair::ComplexPair;
 use super::inversion::{reduce, solve, wrap};
 use super::labelling::moire_matrix;
+use super::layers::Layers;
 use crate::analysis::StrainDraw;
 use crate::lattice::LatticeVectors;
-use crate::material::Material;
+use crate::material::Bilayer;
 use crate::rng;
 use crate::settings::StrainConvention;
 
@@ -20,25 +21,29 @@ use crate::settings::StrainConvention;
 /// Names of vectors and signs stay those of the estimate, so α never jumps by 60°. Draws without a
 /// solution are left out (fewer come back than were asked for); none come back for a lattice that
 /// [`super::twist_strain`] refuses. `seed` and `index` (of the scan) fix every digit.
-pub fn draws(
+pub fn draws<'a>(
     lattice: &LatticeVectors,
-    material: &Material,
+    bilayer: impl Into<Bilayer<'a>>,
     convention: StrainConvention,
     count: usize,
     seed: u64,
     index: u64,
 ) -> Vec<StrainDraw> {
-    let (Ok(layers), Ok(labelled)) = (
-        layers(material, material, convention),
-        labelled(lattice, material),
-    ) else {
+    let Ok(layers) = Layers::new(bilayer.into(), convention) else {
+        return Vec::new();
+    };
+    let Ok(labelled) = labelled(lattice, &layers) else {
         return Vec::new();
     };
     let lattice = labelled.lattice;
-    let Some(centre) = solve(&ComplexPair::from(labelled.moire), &layers, DEFAULT_SIGNS) else {
+    let moire = ComplexPair::from(labelled.moire);
+    let found = default_signs(&layers)
+        .iter()
+        .find_map(|signs| Some((*signs, solve(&moire, &layers, *signs)?)));
+    let Some((signs, centre)) = found else {
         return Vec::new();
     };
-    let reported_angle = reduce(centre.lattice_angle, std::f64::consts::FRAC_PI_3);
+    let reported_angle = reduce(centre.lattice_angle, layers.period);
     let root = root(&lattice.covariance);
     let mut rng = rng::stream(seed, "strain", index);
     let mut normal = move || -> f64 { StandardNormal.sample(&mut rng) };
@@ -47,8 +52,8 @@ pub fn draws(
             let white = Vector4::from_fn(|_, _| normal());
             let moved = lattice.flat() + root * white;
             let basis = nalgebra::Matrix2::from_column_slice(moved.as_slice());
-            let moire = moire_matrix(&basis, material.lattice_constant_nm)?;
-            let solution = solve(&ComplexPair::from(moire), &layers, DEFAULT_SIGNS)?;
+            let moire = moire_matrix(&basis, &layers.atoms)?;
+            let solution = solve(&ComplexPair::from(moire), &layers, signs)?;
             Some(StrainDraw {
                 twist: solution.twist,
                 lattice_angle: reported_angle + wrap(solution.lattice_angle - centre.lattice_angle),

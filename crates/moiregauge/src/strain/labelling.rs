@@ -1,29 +1,34 @@
 //! Which moiré vector belongs to which atomic vector: lattice vectors → strain-free-most labelling.
 //!
-//! The measured primitive pair `L = [a₁ a₂]` is matched with the atomic pair
-//! `A⁰ = a [∠30°, ∠90°]`, whose reciprocal pair lies at 0° and 120°; α is then the orientation of
-//! the reciprocal vectors of layer 1. With `M = 2π L⁻ᵀ` the first moiré harmonics,
+//! The measured primitive pair `L = [a₁ a₂]` is matched with the atomic pair `A⁰` of layer 1, for a
+//! hexagonal layer `a [∠30°, ∠90°]`, whose reciprocal pair lies at 0° and 120°; α is then the
+//! orientation of the reciprocal vectors of layer 1. With `M = 2π L⁻ᵀ` the first moiré harmonics,
 //! `P = M (G⁰)⁻¹ = (A⁰ L⁻¹)ᵀ` has no dimension and needs no 2π.
 //!
 //! Every other primitive pair of the same lattice, `L U` with U in SL(2, Z), is as good a name for
-//! it. The one with the smallest anisotropic part |q| of P is used; as the determinant is fixed by
-//! the area of the cell, it is the pair with the shortest reciprocal vectors.
+//! it. For similar layers the one with the smallest anisotropic part |q| of P is used; as the
+//! determinant is fixed by the area of the cell, it is, for hexagonal layers, the pair with the shortest
+//! reciprocal vectors. For layers of different lattices it is the one that needs the least strain.
 
 use nalgebra::{Matrix2, Matrix4, Vector4};
 
 use super::complex_pair::ComplexPair;
+use super::inversion::{ALL_SIGNS, solve};
+use super::layers::Layers;
 use crate::lattice::LatticeVectors;
+use crate::lattice::reciprocal::shortest_pair;
 
-/// `A⁰`: the atomic vectors at 30° and 90° as columns.
-pub(super) fn atomic_pair(lattice_constant_nm: f64) -> Matrix2<f64> {
-    let half_root3 = 3.0_f64.sqrt() / 2.0;
-    lattice_constant_nm * Matrix2::new(half_root3, 0.0, 0.5, 1.0)
-}
+/// Largest number in the name of a moiré vector that is tried for layers of different lattices.
+const LARGEST_ENTRY: i32 = 5;
+/// How many of these names are solved.
+const SOLVED: usize = 8;
+/// Orientations at which names are compared.
+const ORIENTATIONS: i32 = 180;
 
 /// `P = (A⁰ L⁻¹)ᵀ`; `None` for a lattice without area.
-pub(super) fn moire_matrix(basis: &Matrix2<f64>, lattice_constant_nm: f64) -> Option<Matrix2<f64>> {
+pub(super) fn moire_matrix(basis: &Matrix2<f64>, atoms: &Matrix2<f64>) -> Option<Matrix2<f64>> {
     let inverse = basis.try_inverse()?;
-    let p = (atomic_pair(lattice_constant_nm) * inverse).transpose();
+    let p = (atoms * inverse).transpose();
     p.iter().all(|x| x.is_finite()).then_some(p)
 }
 
@@ -47,9 +52,14 @@ pub(super) fn moire_matrix_jacobian(
 }
 
 /// The same lattice named by its least strained right-handed pair; `None` without area.
-pub(super) fn least_strained(lattice: &LatticeVectors) -> Option<LatticeVectors> {
+pub(super) fn least_strained(lattice: &LatticeVectors, layers: &Layers) -> Option<LatticeVectors> {
+    if layers.ratio().is_none() {
+        return least_strained_by_trial(lattice, layers);
+    }
+    // Only the shape of the atomic cell matters.
+    let atoms = layers.atoms / layers.atoms.norm();
     let anisotropy =
-        |basis: &Matrix2<f64>| Some(ComplexPair::from(moire_matrix(basis, 1.0)?).q.norm());
+        |basis: &Matrix2<f64>| Some(ComplexPair::from(moire_matrix(basis, &atoms)?).q.norm());
     let mut best = *lattice;
     if best.basis.determinant() < 0.0 {
         best = best.relabelled(&Matrix2::new(0.0, 1.0, 1.0, 0.0));
@@ -73,8 +83,73 @@ pub(super) fn least_strained(lattice: &LatticeVectors) -> Option<LatticeVectors>
     }
 }
 
+/// For layers of different lattices: the names that come nearest to an explanation without strain are
+/// solved, and the one that needs the least is taken.
+fn least_strained_by_trial(lattice: &LatticeVectors, layers: &Layers) -> Option<LatticeVectors> {
+    let likely = likely_names(lattice, layers)?;
+    let mut best = (f64::INFINITY, *likely.first()?);
+    for named in &likely {
+        let moire = ComplexPair::from(moire_matrix(&named.basis, &layers.atoms)?);
+        let strain = ALL_SIGNS
+            .into_iter()
+            .filter_map(|signs| solve(&moire, layers, signs))
+            .map(|solution| solution.strain.abs())
+            .fold(f64::INFINITY, f64::min);
+        if strain < best.0 * (1.0 - 1e-9) {
+            best = (strain, *named);
+        }
+    }
+    Some(best.1)
+}
+
+/// The names that come nearest to an explanation without strain, the nearest first.
+pub(super) fn likely_names(
+    lattice: &LatticeVectors,
+    layers: &Layers,
+) -> Option<Vec<LatticeVectors>> {
+    let mut scored: Vec<(f64, LatticeVectors)> = names(lattice)?
+        .into_iter()
+        .filter_map(|named| {
+            let moire = ComplexPair::from(moire_matrix(&named.basis, &layers.atoms)?);
+            Some((least_mismatch(&moire, layers), named))
+        })
+        .collect();
+    scored.sort_by(|a, b| a.0.total_cmp(&b.0));
+    Some(scored.into_iter().take(SOLVED).map(|(_, l)| l).collect())
+}
+
+/// The least difference of N from a turn, over all orientations of layer 1.
+fn least_mismatch(moire: &ComplexPair, layers: &Layers) -> f64 {
+    (0..ORIENTATIONS)
+        .map(|k| {
+            let angle = std::f64::consts::TAU * f64::from(k) / f64::from(ORIENTATIONS);
+            let n = layers.stretched(moire, angle);
+            (n.p.norm() - 1.0).hypot(n.q.norm())
+        })
+        .fold(f64::INFINITY, f64::min)
+}
+
+/// The names of a lattice near its shortest pair, of either handedness: a moiré of different lattices can
+/// be far longer one way than the other, and its cell far from the shortest one.
+pub(super) fn names(lattice: &LatticeVectors) -> Option<Vec<LatticeVectors>> {
+    let shortest = lattice.relabelled(&shortest_pair(&lattice.basis)?);
+    let entries = || (-LARGEST_ENTRY..=LARGEST_ENTRY).map(f64::from);
+    let mut found = Vec::new();
+    for (a, b) in entries().flat_map(|a| entries().map(move |b| (a, b))) {
+        for (c, d) in entries().flat_map(|c| entries().map(move |d| (c, d))) {
+            let change = Matrix2::new(a, b, c, d);
+            // Turning a name by 180° turns the orientation by as much.
+            let first = [a, b, c, d].into_iter().find(|x| *x != 0.0);
+            if change.determinant().abs() == 1.0 && first > Some(0.0) {
+                found.push(shortest.relabelled(&change));
+            }
+        }
+    }
+    Some(found)
+}
+
 /// All matrices of determinant 1 with entries −1, 0, 1.
-fn small_changes() -> impl Iterator<Item = Matrix2<f64>> {
+pub(super) fn small_changes() -> impl Iterator<Item = Matrix2<f64>> {
     (0..81).filter_map(|code: i32| {
         let entry = |power: u32| f64::from(code / 3_i32.pow(power) % 3 - 1);
         let change = Matrix2::new(entry(0), entry(1), entry(2), entry(3));

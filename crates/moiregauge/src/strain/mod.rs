@@ -6,24 +6,32 @@
 //! `φ_lab = φ + α + θ`. Lengths in nm, angles in rad, counter-clockwise; strain without dimension.
 //!
 //! The moiré of a single lattice holds four numbers; θ, α, ε and φ are four. An isotropic strain on
-//! top is not visible and shifts θ by about θη/2 + η²/2θ: a twist is conditional on its absence.
+//! top is not visible and shifts θ by about θη/2 + η²/2θ, at first order where the layers differ: a twist is
+//! conditional on its absence. [`degeneracy`] says by how much; with the orientation of one layer
+//! [`strain_tensors`] has no need of the assumption.
 
+mod aligned;
 mod closed_form;
 mod closure;
 mod complex_pair;
+mod degeneracy;
 mod draws;
 mod error;
 mod forward;
 mod inversion;
 mod labelling;
+mod layers;
 mod limit;
 mod other_models;
+mod tensor;
 mod twist_strain;
 
 pub use closed_form::{Branch, branches, twist_strain};
 pub use closure::three_vectors;
+pub use degeneracy::{Degeneracy, degeneracy};
 pub use draws::draws;
 pub use error::StrainError;
-pub use forward::{moire_lattice, naive_twist};
+pub use forward::{Stacking, moire_lattice, moire_of, naive_twist};
 pub(crate) use other_models::Reference;
+pub use tensor::{Orientation, Split, StrainTensor, strain_tensors};
 pub use twist_strain::TwistStrain;

@@ -6,17 +6,19 @@
 
 use nalgebra::{Complex, Vector4};
 
-use super::closed_form::{DEFAULT_SIGNS, labelled, layers};
+use super::closed_form::labelled;
 use super::complex_pair::ComplexPair;
-use super::inversion::{Layers, Solution, solve, wrap};
+use super::inversion::{ALL_SIGNS, Signs, Solution, solve, wrap};
+use super::layers::Layers;
 use crate::lattice::LatticeVectors;
-use crate::material::Material;
+use crate::material::Bilayer;
 use crate::settings::StrainConvention;
 
 /// The moiré of a lattice and what it means by default.
 pub(crate) struct Reference {
     moire: ComplexPair,
     layers: Layers,
+    signs: Signs,
     solution: Solution,
 }
 
@@ -24,26 +26,64 @@ impl Reference {
     /// `None` where [`super::twist_strain`] finds nothing.
     pub(crate) fn new(
         lattice: &LatticeVectors,
-        material: &Material,
+        bilayer: Bilayer<'_>,
         convention: StrainConvention,
     ) -> Option<Self> {
-        let layers = layers(material, material, convention).ok()?;
-        let moire = ComplexPair::from(labelled(lattice, material).ok()?.moire);
-        let solution = solve(&moire, &layers, DEFAULT_SIGNS)?;
-        Some(Self {
-            moire,
-            layers,
-            solution,
-        })
+        Self::both(lattice, bilayer, convention).into_iter().next()
+    }
+
+    /// The default solution, and that with the other sign of the strain; those that there are.
+    pub(crate) fn both(
+        lattice: &LatticeVectors,
+        bilayer: Bilayer<'_>,
+        convention: StrainConvention,
+    ) -> Vec<Self> {
+        let Ok(layers) = Layers::new(bilayer, convention) else {
+            return Vec::new();
+        };
+        let Ok(labelled) = labelled(lattice, &layers) else {
+            return Vec::new();
+        };
+        let moire = ComplexPair::from(labelled.moire);
+        let reading = |signs: &Signs| {
+            Some(Self {
+                moire,
+                layers,
+                signs: *signs,
+                solution: solve(&moire, &layers, *signs)?,
+            })
+        };
+        ALL_SIGNS[..2].iter().filter_map(reading).collect()
+    }
+
+    /// θ, rad.
+    pub(crate) fn twist(&self) -> f64 {
+        self.solution.twist
     }
 
     /// The Poisson ratio is larger by `change`.
     pub(crate) fn with_poisson_ratio(&self, change: f64) -> Option<Vector4<f64>> {
         let poisson_ratio = self.layers.poisson_ratio + change;
-        self.with(&Layers {
-            poisson_ratio,
-            ..self.layers
-        })
+        self.with(
+            &self.moire,
+            &Layers {
+                poisson_ratio,
+                ..self.layers
+            },
+        )
+    }
+
+    /// The lattice constants of layers 1 and 2 are larger by these fractions.
+    pub(crate) fn with_lattice_constants(&self, [first, second]: [f64; 2]) -> Option<Vector4<f64>> {
+        let moire = self.moire.scaled(1.0 + first);
+        let inverse = self.layers.inverse.scaled((1.0 + second) / (1.0 + first));
+        self.with(
+            &moire,
+            &Layers {
+                inverse,
+                ..self.layers
+            },
+        )
     }
 
     /// Layer 2 is stretched by `strain` in all directions beside its uniaxial strain.
@@ -51,11 +91,14 @@ impl Reference {
     /// The same as a larger lattice constant of layer 2. With η the isotropic stretch in all, θ² + η²
     /// stays what it is (exactly: `|(1+η) e^{iθ} − 1|`), and α turns by η/θ.
     pub(crate) fn with_isotropic_strain(&self, strain: f64) -> Option<Vector4<f64>> {
-        let ratio = self.layers.ratio / (1.0 + strain);
-        self.with(&Layers {
-            ratio,
-            ..self.layers
-        })
+        let inverse = self.layers.inverse.scaled(1.0 + strain);
+        self.with(
+            &self.moire,
+            &Layers {
+                inverse,
+                ..self.layers
+            },
+        )
     }
 
     /// Both layers share the strain in equal parts with opposite signs.
@@ -65,6 +108,9 @@ impl Reference {
     /// all strain in layer 1, or with compression across in place of tension along, θ changes by twice
     /// as much.
     pub(crate) fn with_shared_strain(&self) -> Option<Vector4<f64>> {
+        if self.layers.ratio() != Some(1.0) {
+            return Some(self.with_strain_in_the_other_layer()? / 2.0);
+        }
         let nu = self.layers.poisson_ratio;
         let (p, q) = (self.moire.p, self.moire.q);
         let isotropic = (1.0 - nu) / (1.0 + nu) * q.norm();
@@ -85,8 +131,20 @@ impl Reference {
         Some(self.change(twist, middle - twist / 2.0, strain))
     }
 
-    fn with(&self, layers: &Layers) -> Option<Vector4<f64>> {
-        let other = solve(&self.moire, layers, DEFAULT_SIGNS)?;
+    /// All strain is in layer 1: the solution for the layers with names exchanged.
+    fn with_strain_in_the_other_layer(&self) -> Option<Vector4<f64>> {
+        let (layers, moire) = self.layers.exchanged(&self.moire)?;
+        let signs = Signs {
+            strain: -self.signs.strain,
+            twist: -self.signs.twist,
+        };
+        let other = solve(&moire, &layers, signs)?;
+        let lattice_angle = other.lattice_angle + other.twist;
+        Some(self.change(-other.twist, lattice_angle, -other.strain_vector))
+    }
+
+    fn with(&self, moire: &ComplexPair, layers: &Layers) -> Option<Vector4<f64>> {
+        let other = solve(moire, layers, self.signs)?;
         Some(self.change(other.twist, other.lattice_angle, other.strain_vector))
     }
 

@@ -224,7 +224,7 @@ fn scatter(
                 covariance: fit.waves.covariance,
             };
             let lattice = real_from_reciprocal(&waves)?;
-            twist_strain(&lattice, &settings.material, settings.strain_convention).ok()
+            twist_strain(&lattice, settings.bilayer(), settings.strain_convention).ok()
         })
         .collect();
     if strains.len() < 2 {

@@ -23,6 +23,7 @@ use crate::drift::{Observation, at_known_drift, common_lattice, monte_carlo, sol
 use crate::geometry::mean_and_spread;
 use crate::lattice::LatticeVectors;
 use crate::lattice::reciprocal::real_from_reciprocal;
+use crate::readings::{Readings, caveats as about_readings};
 use crate::settings::{GivenDrift, Settings};
 use crate::strain::{TwistStrain, draws, twist_strain};
 
@@ -117,6 +118,16 @@ pub(super) fn analyse_set(
     });
     let drift = solved.map(|s| s.drift);
     about_mean(&group.name, mean.as_ref(), caveats);
+    if let Some(m) = mean.as_ref().or(uncorrected.as_ref()) {
+        let found = about_readings(
+            &group.name,
+            &m.lattice,
+            &m.twist_strain,
+            &m.readings,
+            settings,
+        );
+        caveats.extend(found);
+    }
     about_checks(
         &group.name,
         (checks.as_ref(), drift.as_ref(), mean.as_ref()),
@@ -144,7 +155,7 @@ fn draw(scans: &mut [ScanAnalysis], settings: &Settings, first_index: u64) {
         let lattice = scan.drift_corrected.as_ref().unwrap_or(&scan.sensor);
         scan.draws = draws(
             lattice,
-            &settings.material,
+            settings.bilayer(),
             settings.strain_convention,
             settings.strain_draws,
             settings.seed,
@@ -330,7 +341,7 @@ fn set_mean(
     settings: &Settings,
 ) -> Option<SetMean> {
     let twist_strain =
-        twist_strain(&lattice, &settings.material, settings.strain_convention).ok()?;
+        twist_strain(&lattice, settings.bilayer(), settings.strain_convention).ok()?;
     let (singles, lattices): (Vec<_>, Vec<_>) = scans.unzip();
     let singles: Vec<TwistStrain> = singles.into_iter().flatten().collect();
     let twists: Vec<f64> = singles.iter().map(|s| s.twist).collect();
@@ -344,8 +355,10 @@ fn set_mean(
             (ratio - 1.0).abs() <= 0.01
         })
     });
+    let budget = Budget::new(&lattice, &twist_strain, statistical, settings);
     Some(SetMean {
-        budget: Budget::new(&lattice, &twist_strain, statistical, settings),
+        readings: Readings::new(&lattice, &twist_strain, &budget, settings),
+        budget,
         lattice,
         twist_strain,
         twist_scatter: mean_and_spread(&twists).sigma,
@@ -372,7 +385,7 @@ fn forward_backward(scans: &[&ScanAnalysis], settings: &Settings) -> Option<Twis
     let both = [mean(FrameDirection::Up)?, mean(FrameDirection::Down)?];
     let lattice = real_from_reciprocal(&plain_mean(&both)?)?;
     // Back and forth turns the labelling by 60°, which twist and strain do not see.
-    twist_strain(&lattice, &settings.material, settings.strain_convention).ok()
+    twist_strain(&lattice, settings.bilayer(), settings.strain_convention).ok()
 }
 
 fn about_mean(name: &str, mean: Option<&SetMean>, caveats: &mut Vec<Caveat>) {

@@ -29,7 +29,7 @@ pub(super) fn scan_analysis(
         .map(|l| Some(labelled_like(&l.in_nominal_coordinates()?, reference)))
         .collect();
     let strain = |lattice: &LatticeVectors| {
-        twist_strain(lattice, &settings.material, settings.strain_convention).ok()
+        twist_strain(lattice, settings.bilayer(), settings.strain_convention).ok()
     };
     let first = scan.lines.first()?;
     let mean = |f: &dyn Fn(&MeasuredLine) -> Estimate| {

@@ -1,0 +1,159 @@
+//! The orientation of a layer: given, or measured in atomically resolved images.
+
+use std::path::PathBuf;
+
+use anyhow::{Context as _, ensure};
+use clap::ValueEnum;
+use moiregauge::series::{AtomicOrientation, atomic_orientation};
+use moiregauge::settings::{KnownOrientation, LatticeDirection, Method, Settings};
+use moiregauge_report::InputFile;
+
+use super::chain::measure_file;
+use crate::info::expand;
+use crate::input::KnownArgs;
+
+/// The options for it.
+#[derive(clap::Args, Clone, Debug, Default)]
+#[command(next_help_heading = "Orientation of a layer: tells isotropic strain from twist")]
+pub(crate) struct OrientationArgs {
+    /// Orientation of the atomic lattice or of a crystal edge in the frame of the scans, degrees
+    /// counter-clockwise from x, and its standard uncertainty, as in 12.3±0.2 or 12.3+-0.2; any of the
+    /// equivalent directions will do
+    #[arg(long, value_name = "DEG±SIGMA", allow_hyphen_values = true, value_parser = parse_angle)]
+    lattice_angle: Option<Angle>,
+    /// The layer it is that of: 1, the lower one and the reference (of equal layers, the one that counts
+    /// as unstrained), or 2. Of a strained layer 2 the mean over its three directions is meant
+    #[arg(long, value_name = "1|2", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=2))]
+    lattice_angle_layer: u8,
+    /// The vector it is that of
+    #[arg(long, value_enum, default_value_t = DirectionArg::Atomic)]
+    lattice_angle_of: DirectionArg,
+    /// Atomically resolved images of the layer --lattice-angle-layer, taken with the frame and the sensors of
+    /// the scans: the program measures the orientation. Best up and down, which takes out their own drift
+    #[arg(long, value_name = "FILE", num_args = 1.., conflicts_with_all = ["lattice_angle", "lattice_angle_of"])]
+    atomic: Vec<PathBuf>,
+    /// Channel that shows the atoms [default: as --channel]
+    #[arg(long, value_name = "NAME", requires = "atomic")]
+    atomic_channel: Option<String>,
+}
+
+/// Which vector an orientation is that of.
+#[derive(Clone, Copy, Debug, Default, ValueEnum)]
+pub(crate) enum DirectionArg {
+    /// The atomic vector: a row of atoms of a hexagonal layer, a zigzag edge
+    #[default]
+    Atomic,
+    /// The reciprocal vector, 30° from it: an armchair edge, a spot of the Fourier transform
+    Reciprocal,
+}
+
+/// Degrees and σ.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Angle([f64; 2]);
+
+impl OrientationArgs {
+    /// The orientation that was given.
+    pub(super) fn known(&self) -> Option<KnownOrientation> {
+        let Angle([angle_deg, sigma_deg]) = self.lattice_angle?;
+        Some(KnownOrientation {
+            angle_deg,
+            sigma_deg,
+            layer: self.lattice_angle_layer,
+            of: match self.lattice_angle_of {
+                DirectionArg::Atomic => LatticeDirection::Atomic,
+                DirectionArg::Reciprocal => LatticeDirection::Reciprocal,
+            },
+        })
+    }
+
+    /// The orientation measured in the atomic images, and these; `None` without any.
+    pub(super) fn measure(
+        &self,
+        settings: &Settings,
+        known: &KnownArgs,
+    ) -> anyhow::Result<Option<(AtomicOrientation, Vec<InputFile>)>> {
+        if self.atomic.is_empty() {
+            return Ok(None);
+        }
+        let mut paths = Vec::new();
+        for path in expand(&self.atomic) {
+            match path {
+                Ok(path) => paths.push(path),
+                Err((path, error)) => anyhow::bail!("--atomic {}: {error}", path.display()),
+            }
+        }
+        let settings = Settings {
+            channel: self
+                .atomic_channel
+                .clone()
+                .or_else(|| settings.channel.clone()),
+            method: match settings.method {
+                Method::Paper => Method::Lattice,
+                other => other,
+            },
+            ..settings.clone()
+        };
+        let known = known.of(&paths);
+        let (mut scans, mut files) = (Vec::new(), Vec::new());
+        for path in &paths {
+            let (scan, file) = measure_file(path, &[], (&settings, &known), None)
+                .with_context(|| format!("--atomic {}", path.display()))?;
+            scans.push(scan);
+            files.push(file);
+        }
+        let layers = settings.bilayer();
+        let material = match self.lattice_angle_layer {
+            1 => layers.reference,
+            _ => layers.stretched,
+        };
+        let found = atomic_orientation(
+            &scans,
+            material,
+            self.lattice_angle_layer,
+            &settings.calibration,
+        )
+        .context("--atomic")?;
+        ensure!(
+            found.angle.sigma.is_finite(),
+            "--atomic: the images do not tell the orientation"
+        );
+        Ok(Some((found, files)))
+    }
+}
+
+/// `12.3±0.2`, `12.3+-0.2` or `12.3+/-0.2`.
+fn parse_angle(text: &str) -> Result<Angle, String> {
+    let parsed = || {
+        let (angle, sigma) = ["±", "+/-", "+-"]
+            .iter()
+            .find_map(|sign| text.split_once(sign))?;
+        let number = |part: &str| {
+            let plain = part.trim().trim_end_matches('°').trim();
+            plain.parse().ok().filter(|x: &f64| x.is_finite())
+        };
+        let sigma = number(sigma).filter(|s| *s >= 0.0)?;
+        Some(Angle([number(angle)?, sigma]))
+    };
+    parsed().ok_or_else(|| {
+        format!(
+            "expected an angle and its standard uncertainty in degrees, as in 12.3±0.2 or 12.3+-0.2, found \
+             {text:?}"
+        )
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn angles_have_uncertainties() {
+        for text in ["12.3±0.2", "12.3 +- 0.2", "12.3°+/-0.2°"] {
+            assert_eq!(parse_angle(text), Ok(Angle([12.3, 0.2])), "{text}");
+        }
+        assert_eq!(parse_angle("-7±0"), Ok(Angle([-7.0, 0.0])));
+        for wrong in ["12.3", "12.3±", "±2", "12±-1", "a±1", ""] {
+            assert!(parse_angle(wrong).is_err(), "{wrong}");
+        }
+    }
+}

@@ -1,0 +1,301 @@
+//! Atomically resolved images → the orientation of a layer.
+//!
+//! In: scans of the layer, measured like any others, in the frame of the moiré scans. Out: the
+//! orientation of its reciprocal vectors (rad) with σ.
+//!
+//! Frames up and down give the lattice L and the drift by the same linear least squares as a moiré. With
+//! the atomic vectors A⁰ at orientation zero, `F = L A⁰⁻¹` is a turn and a small distortion, and the turn
+//! of its polar decomposition, the angle of its complex part p, is the orientation; what scanner and
+//! strain distort symmetrically does not change it.
+//!
+//! Frames of one direction do not tell the drift, which at atomic magnification turns a lattice by
+//! degrees. But with the lattice constant known, `(I − D uᵀ) F = R(α)`: the vector v with `uᵀF v = 0`, along
+//! which no time passes (the fast axis), is turned by exactly α, whatever the drift. There orientation
+//! rests on one direction, which errors of the calibration turn: by half the mismatch and half the error
+//! of the right angle.
+
+use nalgebra::{Complex, Matrix2, Matrix4, RowVector4, Vector2};
+
+use super::measure::MeasuredScan;
+use crate::caveat::Caveat;
+use crate::drift::{Observation, solve};
+use crate::estimate::Estimate;
+use crate::lattice::LatticeVectors;
+use crate::lattice::reciprocal::canonical;
+use crate::material::Material;
+use crate::settings::{Calibration, KnownOrientation, LatticeDirection};
+
+/// A lattice whose size differs from that of the material by more is another one.
+const LARGEST_ERROR: f64 = 0.15;
+/// A size off by more than this many per cent of the priors deserves a word.
+const CLEARLY: f64 = 3.0;
+
+/// The orientation of a layer by its atomic lattice.
+#[derive(Clone, Debug, PartialEq)]
+pub struct AtomicOrientation {
+    /// The files.
+    pub files: Vec<String>,
+    /// Layer 1, the reference, or layer 2.
+    pub layer: u8,
+    /// Of a reciprocal vector, rad, modulo the symmetry of the layer.
+    pub angle: Estimate,
+    /// Mean lattice constant that was found over that of the material.
+    pub size: f64,
+    /// How far the lattice found is from the shape of the material's: `|q|/|p|` of F.
+    pub distortion: f64,
+    /// Velocity of the drift, nm/s; `None` where the frames do not tell.
+    pub drift: Option<Vector2<f64>>,
+    /// Doubts.
+    pub caveats: Vec<Caveat>,
+}
+
+impl AtomicOrientation {
+    /// As the user would have given it.
+    pub fn known(&self) -> KnownOrientation {
+        KnownOrientation {
+            angle_deg: self.angle.value.to_degrees(),
+            sigma_deg: self.angle.sigma.to_degrees(),
+            layer: self.layer,
+            of: LatticeDirection::Reciprocal,
+        }
+    }
+}
+
+/// Why atomic images give no orientation.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum AtomicError {
+    /// No image.
+    #[error("no atomic image could be used")]
+    Nothing,
+    /// Frames without a time gradient.
+    #[error(
+        "{0}: the file does not tell line rate and frame direction, so that its drift is unknown"
+    )]
+    NoTiming(String),
+    /// Another lattice.
+    #[error(
+        "expected the lattice of {material} in the atomic images, found one {percent:+.0} % larger: another \
+         layer, a superstructure or a scanner that is far off"
+    )]
+    OtherLattice {
+        /// The layer that was expected.
+        material: String,
+        /// By how much the lattice that was found is larger.
+        percent: f64,
+    },
+    /// No area, or a time gradient along both axes.
+    #[error("the lattice of the atomic images cannot be used")]
+    Degenerate,
+}
+
+/// The orientation of the layer `material`, number `layer` of the two, by atomic images of it.
+///
+/// # Errors
+/// [`AtomicError`]: nothing to measure, no timing, or not the lattice of the material.
+pub fn atomic_orientation(
+    scans: &[MeasuredScan],
+    material: &Material,
+    layer: u8,
+    calibration: &Calibration,
+) -> Result<AtomicOrientation, AtomicError> {
+    let first = scans.iter().find_map(|s| s.lines.first());
+    let reference = first.ok_or(AtomicError::Nothing)?.in_sensor_coordinates();
+    let reference = canonical(&reference).basis;
+    let mut observations = Vec::new();
+    for scan in scans {
+        for line in &scan.lines {
+            if line.timing.is_none() {
+                return Err(AtomicError::NoTiming(scan.file.clone()));
+            }
+            observations.push(line.observation(&reference));
+        }
+    }
+    let mut caveats: Vec<Caveat> = scans.iter().flat_map(|s| s.caveats.clone()).collect();
+    let files: Vec<String> = scans.iter().map(|s| s.file.clone()).collect();
+    let place = files.join(", ");
+    let atoms = material.atomic_pair();
+    let found = match solve(&observations) {
+        Ok(solution) => {
+            let (shape, angle) = turned(&solution.lattice, &atoms)?;
+            Found {
+                shape,
+                angle,
+                drift: Some(solution.velocity),
+            }
+        }
+        Err(_) => {
+            caveats.push(Caveat::new(
+                "atomic-drift-assumed",
+                &place,
+                "the atomic images are all of one frame direction, which does not tell their drift: the \
+                 orientation rests on the rows of atoms along the fast axis alone and on the lattice \
+                 constant; frames up and down would do better",
+            ));
+            one_direction(&observations, material, calibration)?
+        }
+    };
+    let off = found.shape.0 - 1.0;
+    if off.abs() > LARGEST_ERROR {
+        return Err(AtomicError::OtherLattice {
+            material: material.name.clone(),
+            percent: 100.0 * off,
+        });
+    }
+    let allowed = calibration.gain_percent / 100.0;
+    if off.abs() > CLEARLY * allowed.max(0.01) {
+        caveats.push(Caveat::new(
+            "atomic-size",
+            &place,
+            format!(
+                "the lattice of the atomic images is {:+.1} % larger than that of {}: the gain of the scanner \
+                 is off by that much, or it is another layer",
+                100.0 * off,
+                material.name
+            ),
+        ));
+    }
+    Ok(AtomicOrientation {
+        files,
+        layer,
+        angle: Estimate::new(
+            found.angle.value.rem_euclid(material.rotation_period()),
+            found.angle.sigma,
+        ),
+        size: found.shape.0,
+        distortion: found.shape.1,
+        drift: found.drift,
+        caveats,
+    })
+}
+
+struct Found {
+    /// Size and distortion of F.
+    shape: (f64, f64),
+    angle: Estimate,
+    drift: Option<Vector2<f64>>,
+}
+
+/// `F = L U A⁰⁻¹` for the name L U of the lattice that distorts the material's least.
+fn deformation(
+    lattice: &LatticeVectors,
+    atoms: &Matrix2<f64>,
+) -> Option<(LatticeVectors, Matrix2<f64>)> {
+    let inverse = atoms.try_inverse()?;
+    let distortion = |f: &Matrix2<f64>| {
+        let (p, q) = parts(f);
+        q.norm() / p.norm()
+    };
+    // Two rounds reach every name of a pair that is nearly reduced.
+    let mut best = *lattice;
+    for _ in 0..2 {
+        let start = best;
+        for code in 0..81_i32 {
+            let entry = |power: u32| f64::from(code / 3_i32.pow(power) % 3 - 1);
+            let change = Matrix2::new(entry(0), entry(1), entry(2), entry(3));
+            if change.determinant().abs() != 1.0 {
+                continue;
+            }
+            let named = start.relabelled(&change);
+            let f = named.basis * inverse;
+            if f.determinant() > 0.0
+                && distortion(&f) < distortion(&(best.basis * inverse)) * (1.0 - 1e-9)
+            {
+                best = named;
+            }
+        }
+    }
+    let f = best.basis * inverse;
+    (f.determinant() > 0.0).then_some((best, f))
+}
+
+/// The isotropic part, with the turn, and the anisotropic part.
+fn parts(f: &Matrix2<f64>) -> (Complex<f64>, Complex<f64>) {
+    (
+        Complex::new(f.m11 + f.m22, f.m21 - f.m12) / 2.0,
+        Complex::new(f.m11 - f.m22, f.m21 + f.m12) / 2.0,
+    )
+}
+
+/// Size, distortion and turn of a lattice that is free of drift.
+fn turned(
+    lattice: &LatticeVectors,
+    atoms: &Matrix2<f64>,
+) -> Result<((f64, f64), Estimate), AtomicError> {
+    let (lattice, f) = deformation(lattice, atoms).ok_or(AtomicError::Degenerate)?;
+    let inverse = atoms.try_inverse().ok_or(AtomicError::Degenerate)?;
+    let (p, q) = parts(&f);
+    let slopes = RowVector4::from_fn(|_, component| {
+        let mut unit = Matrix2::zeros();
+        unit[component] = 1.0;
+        (p.conj() * parts(&(unit * inverse)).0).im / p.norm_sqr()
+    });
+    let variance = (slopes * lattice.covariance * slopes.transpose())[0];
+    Ok((
+        (p.norm(), q.norm() / p.norm()),
+        Estimate::from_variance(p.arg(), variance),
+    ))
+}
+
+/// The turn of the direction along which no time passes, averaged over the images.
+fn one_direction(
+    observations: &[Observation],
+    material: &Material,
+    calibration: &Calibration,
+) -> Result<Found, AtomicError> {
+    let atoms = material.atomic_pair();
+    let inverse = atoms.try_inverse().ok_or(AtomicError::Degenerate)?;
+    let (mut weights, mut sum, mut size, mut distortion) = (0.0, 0.0, 0.0, 0.0);
+    let (mut reference, mut fast) = (None, Vector2::x());
+    for seen in observations {
+        let (lattice, f) = deformation(&seen.lattice, &atoms).ok_or(AtomicError::Degenerate)?;
+        let u = seen.time_gradient;
+        if !(u.norm() > 0.0) {
+            return Err(AtomicError::Degenerate);
+        }
+        let turn = |f: &Matrix2<f64>| {
+            let w = f.transpose() * u;
+            let along = Vector2::new(w.y, -w.x);
+            let image = f * along;
+            (
+                (along.perp(&image)).atan2(along.dot(&image)),
+                image.norm() / along.norm(),
+            )
+        };
+        let (angle, length) = turn(&f);
+        let step = 1e-6;
+        let slopes = RowVector4::from_fn(|_, component| {
+            let side = |sign: f64| {
+                let mut basis = lattice.basis;
+                basis[component] += sign * step * atoms.norm();
+                turn(&(basis * inverse)).0
+            };
+            let difference = side(1.0) - side(-1.0);
+            difference.sin().atan2(difference.cos()) / (2.0 * step * atoms.norm())
+        });
+        let covariance: &Matrix4<f64> = &lattice.covariance;
+        let variance = (slopes * covariance * slopes.transpose())[0].max(f64::MIN_POSITIVE);
+        let start = *reference.get_or_insert(angle);
+        let turns = angle - start;
+        // Names of vectors may differ by a turn that is none for the lattice.
+        let period = material.rotation_period();
+        let near = turns - period * (turns / period).round();
+        let (p, q) = parts(&f);
+        weights += variance.recip();
+        sum += near / variance;
+        size += length / observations.len() as f64;
+        distortion += q.norm() / p.norm() / observations.len() as f64;
+        fast = Vector2::new(u.y, -u.x) / u.norm();
+    }
+    let start = reference.ok_or(AtomicError::Nothing)?;
+    // Half the mismatch turns what lies along a diagonal, half the shear what lies along an axis.
+    let (sine, cosine) = (2.0 * fast.x * fast.y, fast.x * fast.x - fast.y * fast.y);
+    let mismatch = 0.5 * sine * calibration.mismatch_percent / 100.0;
+    let shear = 0.5 * cosine * calibration.orthogonality_mrad / 1000.0;
+    let variance = weights.recip() + mismatch * mismatch + shear * shear;
+    Ok(Found {
+        shape: (size, distortion),
+        angle: Estimate::from_variance(start + sum / weights, variance),
+        drift: None,
+    })
+}

@@ -1,0 +1,156 @@
+//! Twist, biaxial and uniaxial strain of simulated sets, with and without atomic images.
+
+mod tensor_scene;
+
+use moiregauge::series::{analyse, atomic_orientation};
+use moiregauge::settings::{KnownOrientation, LatticeDirection};
+use tensor_scene::{atoms, measured, moire, on_hbn, run, settings, truth};
+
+/// χ² of twist, mean strain and shear part over several sets is that of true errors (p > 10⁻³ to either
+/// side), and nothing is further off than 4 σ: no one in a hundred of true errors is beyond 3.
+fn assert_true_errors(all: &[[f64; 6]]) {
+    let chi2: f64 = all.iter().flat_map(|p| &p[..4]).map(|p| p * p).sum();
+    let freedom = 4.0 * all.len() as f64;
+    // Wilson and Hilferty's normal approximation.
+    let spread = (2.0 / (9.0 * freedom)).sqrt();
+    let z = ((chi2 / freedom).cbrt() - (1.0 - spread * spread)) / spread;
+    assert!(z.abs() < 3.3, "χ² {chi2} of {freedom}: {all:?}");
+    assert!(all.iter().flatten().all(|p| p.abs() < 4.0), "{all:?}");
+}
+
+#[test]
+fn biaxial_and_uniaxial_strain_with_an_atomic_image() {
+    for layer in [1, 2] {
+        let mut all = Vec::new();
+        for seed in 1..=6 {
+            let outcome = run(moire(seed), layer, 4);
+            all.push(outcome.pulls());
+            let found = outcome.tensor();
+            // The orientation is good to some hundredths of a degree, so that σ_η = θσ_α is some 10⁻⁵.
+            assert!(found.mean().sigma < 1e-4, "{:?}", found.mean());
+            assert!(outcome.atomic.drift.is_some() && outcome.atomic.caveats.is_empty());
+        }
+        assert_true_errors(&all);
+    }
+}
+
+#[test]
+fn different_layers_with_an_atomic_image() {
+    for layer in [1, 2] {
+        let all: Vec<[f64; 6]> = (1..=6)
+            .map(|seed| run(on_hbn(moire(seed)), layer, 4).pulls())
+            .collect();
+        assert_true_errors(&all);
+    }
+}
+
+/// A single atomic frame: drift turns the lattice by degrees, the row along the fast axis by nothing.
+#[test]
+fn one_atomic_frame_gives_the_orientation_by_its_fast_rows() {
+    for seed in 1..=4 {
+        for layer in [1, 2] {
+            let outcome = run(moire(seed), layer, 1);
+            let sample = &outcome.simulation.sample;
+            let turn = if layer == 1 { 0.0 } else { sample.twist_deg };
+            let off = outcome.atomic.angle.value.to_degrees() - sample.lattice_angle_deg - turn;
+            let off = off - 60.0 * (off / 60.0).round();
+            let sigma = outcome.atomic.angle.sigma.to_degrees();
+            // Half of 5 mrad at the least.
+            assert!(sigma > 0.14 && sigma < 0.5, "{sigma}");
+            assert!(off.abs() < 2.0 * sigma, "{off} {sigma}");
+            let codes: Vec<&str> = outcome
+                .atomic
+                .caveats
+                .iter()
+                .map(|c| c.code.as_str())
+                .collect();
+            assert!(codes.contains(&"atomic-drift-assumed"), "{codes:?}");
+            let pulls = outcome.pulls();
+            assert!(pulls[0].abs() < 3.0 && pulls[1].abs() < 3.0, "{pulls:?}");
+        }
+    }
+}
+
+/// Without an orientation the interval that isotropic strain leaves open holds the truth, also where the
+/// twist itself is many σ off.
+#[test]
+fn without_an_orientation_the_interval_holds_the_truth() {
+    let mut far = 0;
+    for seed in 1..=6 {
+        for set in [moire(seed), on_hbn(moire(seed))] {
+            let mut settings = settings(&set);
+            settings.isotropic_strain_percent = 0.11;
+            let analysis = analyse(measured(&set, &settings), &settings);
+            let mean = analysis.sets[0].mean.as_ref().unwrap();
+            let twist = truth(&set)[0];
+            let [low, high] = mean.readings.degeneracy.as_ref().unwrap().interval;
+            assert!(
+                low <= twist && twist <= high,
+                "seed {seed}: {low} {twist} {high}"
+            );
+            let found = mean.twist_strain.twist();
+            far += usize::from((found.value - twist).abs() > 5.0 * found.sigma);
+            assert!(mean.readings.tensor.is_none());
+            let told = analysis
+                .caveats
+                .iter()
+                .any(|c| c.code == "twist-trades-with-strain");
+            assert_eq!(told, set.sample.substrate.is_some());
+        }
+    }
+    assert!(far >= 6, "{far}");
+}
+
+/// 30° is the difference between a row of atoms and a reciprocal vector: named, or found out.
+#[test]
+fn the_wrong_vector_is_found_out() {
+    let set = moire(2);
+    let mut settings = settings(&set);
+    let scans = measured(&set, &settings);
+    let mut with = |angle_deg: f64, of: LatticeDirection| {
+        settings.lattice_angle = Some(KnownOrientation {
+            angle_deg,
+            sigma_deg: 0.05,
+            layer: 1,
+            of,
+        });
+        let analysis = analyse(scans.clone(), &settings);
+        let found = analysis.sets[0]
+            .mean
+            .as_ref()
+            .unwrap()
+            .readings
+            .tensor
+            .clone()
+            .unwrap();
+        let told = analysis
+            .caveats
+            .iter()
+            .any(|c| c.code == "orientation-contradicts");
+        (found.best, told)
+    };
+    let angle = set.sample.lattice_angle_deg;
+    let (right, told) = with(angle, LatticeDirection::Reciprocal);
+    assert!(!told);
+    let (row, told) = with(angle + 30.0, LatticeDirection::Atomic);
+    assert!(!told && (row.twist - right.twist).abs() < 1e-12);
+    let (wrong, told) = with(angle, LatticeDirection::Atomic);
+    assert!(told && wrong.mean.abs() > 0.009, "{wrong:?}");
+}
+
+/// The lattice constant of the images tells another layer.
+#[test]
+fn another_lattice_is_refused() {
+    let set = moire(1);
+    let settings = settings(&set);
+    let images = measured(&atoms(&set, 1, 2), &settings);
+    let tungsten = moiregauge::material::Material::named("WSe2").unwrap();
+    let error = atomic_orientation(&images, &tungsten, 1, &settings.calibration).unwrap_err();
+    assert!(error.to_string().contains("WSe2"), "{error}");
+    // hBN is 1.8 % larger: within what a scanner may be off, but it is said.
+    let hbn = moiregauge::material::Material::named("hBN").unwrap();
+    let mut strict = settings.calibration;
+    strict.gain_percent = 0.3;
+    let found = atomic_orientation(&images, &hbn, 1, &strict).unwrap();
+    assert!((found.size - 0.246 / 0.2504).abs() < 3e-3, "{}", found.size);
+}
