@@ -3,7 +3,7 @@
 use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
 
 use super::measure::MeasuredScan;
-use super::set::{checks as set_checks, joint_fit, lattice_of, terms};
+use super::set::{checks as set_checks, joint_fit, lattice_of, moire, terms};
 use super::sightings::middle_of_frame;
 
 use crate::analysis::{Combined, Consistency, Drift, SetAnalysis, SetMean};
@@ -13,7 +13,6 @@ use crate::chi2::enlargement;
 use crate::joint::JointFit;
 use crate::lattice::LatticeVectors;
 use crate::settings::Settings;
-use crate::strain::twist_strain;
 
 /// Wavelengths that differ by more than this are not of the same lattice.
 const SAME_LATTICE: f64 = 0.05;
@@ -101,8 +100,7 @@ pub(super) fn combine(
             ));
         }
     }
-    let twist_strain =
-        twist_strain(&lattice, &settings.material, settings.strain_convention).ok()?;
+    let twist_strain = moire(&lattice, settings)?;
     Some(Combined {
         budget: Budget::new(&lattice, &twist_strain, &statistical, settings),
         lattice,

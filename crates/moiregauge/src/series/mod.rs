@@ -6,6 +6,7 @@
 mod channel;
 mod combine;
 mod corrected;
+mod doubts;
 mod group;
 mod illustrate;
 mod measure;
@@ -15,7 +16,7 @@ mod set;
 mod shared;
 mod sightings;
 
-pub use channel::choose_channel;
+pub use channel::{channels_by_preference, choose_channel};
 pub use corrected::{CorrectedImage, corrected_images, nominal_geometry, on_grid};
 pub use group::natural_order;
 pub use illustrate::illustrate;

@@ -76,9 +76,13 @@ impl TwistStrain {
 
 /// θ = 2 arcsin(a / 2λ): the twist that one wavelength (nm) suggests if nothing is strained.
 ///
-/// NaN for a wavelength below a/2, which no twist makes.
+/// NaN for a wavelength below 1.93 a, which no twist up to 30° makes; layers turned further look like layers
+/// turned the other way.
 pub fn naive_twist(wavelength: Estimate, material: &Material) -> Estimate {
     let sine = material.lattice_constant_nm / (2.0 * wavelength.value);
+    if !(sine <= (std::f64::consts::FRAC_PI_6 / 2.0).sin()) {
+        return Estimate::new(f64::NAN, f64::NAN);
+    }
     let slope = 2.0 * sine / (wavelength.value * (1.0 - sine * sine).sqrt());
     Estimate::new(2.0 * sine.asin(), slope * wavelength.sigma)
 }
