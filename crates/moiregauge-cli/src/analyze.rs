@@ -2,6 +2,7 @@
 
 mod args;
 mod chain;
+mod channel;
 mod export;
 mod files;
 mod orientation;

@@ -229,8 +229,8 @@ pub struct ScanAnalysis {
     pub file: String,
     /// When it was saved, by the instrument's clock.
     pub acquired: Option<DateTime>,
-    /// Sense of the slow motion.
-    pub frame_direction: FrameDirection,
+    /// Sense of the slow motion; `None` where the file does not tell.
+    pub frame_direction: Option<FrameDirection>,
     /// The lines that were used, trace and retrace.
     pub lines: Vec<LineAnalysis>,
     /// Centre of the scanned window, sensor coordinates, nm.
@@ -247,6 +247,8 @@ pub struct ScanAnalysis {
     pub sensor: LatticeVectors,
     /// Lattice vectors corrected for drift, nm.
     pub drift_corrected: Option<LatticeVectors>,
+    /// The drift that was taken off, nm/s: that of its set at its time.
+    pub drift: Option<Vector2<f64>>,
     /// Twist and strain from `sensor`.
     pub twist_strain_sensor: Option<TwistStrain>,
     /// Twist and strain from `drift_corrected`.

@@ -45,7 +45,8 @@ pub(crate) struct AnalyzeArgs {
     /// Settings from a TOML file (see `moiregauge config`); options here come on top of it
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
-    /// Channel that shows the moiré [default: TR Phase, TR Amplitude, Phase, … the first there is]
+    /// Channel that shows the moiré [default: TR Phase, TR Amplitude, Phase, … the first there is; if no
+    /// scan shows a lattice in it, the next]
     #[arg(long, value_name = "NAME")]
     channel: Option<String>,
     /// Line directions to use [default: both]
@@ -154,8 +155,8 @@ pub(crate) struct AnalyzeArgs {
     #[cfg(feature = "parquet")]
     #[arg(long)]
     pub(super) parquet: bool,
-    /// Laboratory axes for everything. This is how it always is: vectors, figures and exported images
-    /// follow the rotation of the frame
+    /// Laboratory axes for vectors, angles, drift, figures and exported images: a frame that is turned by
+    /// its scan angle is turned back. This is the default; `--rotation 0` gives the axes of the image
     #[arg(long)]
     rotate_to_lab: bool,
     #[command(flatten)]

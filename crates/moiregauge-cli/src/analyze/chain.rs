@@ -17,6 +17,7 @@ use sha2::{Digest as _, Sha256};
 use spmfile::{ChannelInfo, Scan, sensor_axis};
 
 use super::args::NamedSet;
+use super::channel;
 use crate::input::Known;
 
 /// What came out, and of what.
@@ -48,16 +49,23 @@ pub(crate) fn analyse_files(
             return Err(failed);
         }
     };
-    let progress = progress(inputs.len(), loud);
-    let measured: Vec<_> = inputs
-        .par_iter()
-        .map(|path| {
-            let result = measure_file(path, sets, (settings, known), window.as_ref());
-            progress.inc(1);
-            result
-        })
-        .collect();
-    progress.finish_and_clear();
+    let window = window.as_ref();
+    let measured = measure_all(inputs, sets, (settings, known), window, loud);
+    let (other, measured) = match channel::another(inputs, &measured, (settings, known)) {
+        Some(others) => others
+            .into_iter()
+            .find_map(|other| {
+                let with = (&other.settings, known);
+                let measured = measure_all(inputs, sets, with, window, loud);
+                measured
+                    .iter()
+                    .any(Result::is_ok)
+                    .then_some((Some(other), measured))
+            })
+            .unwrap_or((None, measured)),
+        None => (None, measured),
+    };
+    let settings = other.as_ref().map_or(settings, |other| &other.settings);
     let (mut scans, mut files) = (Vec::new(), Vec::new());
     for (path, result) in inputs.iter().zip(measured) {
         match result {
@@ -82,6 +90,9 @@ pub(crate) fn analyse_files(
     };
     let outcomes = sorted_moires(scans).into_iter().map(|scans| {
         let mut analysis = analyse(scans, settings);
+        analysis
+            .caveats
+            .extend(other.as_ref().map(channel::Other::caveat));
         if illustrated {
             analysis.sets.par_iter_mut().for_each(|set| {
                 set.illustration = set.scans.first().and_then(|first| {
@@ -96,6 +107,26 @@ pub(crate) fn analyse_files(
         }
     });
     Ok(outcomes.collect())
+}
+
+fn measure_all(
+    inputs: &[PathBuf],
+    sets: &[NamedSet],
+    with: (&Settings, &Known),
+    window: Option<&Window>,
+    loud: bool,
+) -> Vec<anyhow::Result<(Vec<MeasuredScan>, InputFile)>> {
+    let progress = progress(inputs.len(), loud);
+    let measured = inputs
+        .par_iter()
+        .map(|path| {
+            let result = measure_file(path, sets, with, window);
+            progress.inc(1);
+            result
+        })
+        .collect();
+    progress.finish_and_clear();
+    measured
 }
 
 fn progress(files: usize, loud: bool) -> ProgressBar {
@@ -149,19 +180,10 @@ pub(super) struct Reading {
 /// Reads what the analysis needs of a file: the chosen channel and the position sensors.
 pub(super) fn read(path: &Path, settings: &Settings, known: &Known) -> anyhow::Result<Reading> {
     let bytes = std::fs::read(path)?;
-    let channels = std::cell::RefCell::new(Vec::new());
-    let list = |channel: &ChannelInfo| {
-        channels
-            .borrow_mut()
-            .push((channel.name.clone(), channel.internal_name.clone()));
-        false
-    };
-    known.decode(path, &bytes, &list)?;
-    let channels = channels.into_inner();
+    let channels = channel::names(path, &bytes, known)?;
     let names: Vec<_> = channels
         .iter()
         .map(|(a, b)| (a.as_str(), b.as_str()))
-        .filter(|(a, b)| !known.names_sensor(a, b))
         .collect();
     let chosen = choose_channel(&names, settings.channel.as_deref()).map(str::to_owned);
     let wanted = |channel: &ChannelInfo| {

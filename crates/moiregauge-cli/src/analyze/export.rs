@@ -7,7 +7,6 @@ use anyhow::{Context as _, ensure};
 use moiregauge::analysis::{Analysis, ScanAnalysis};
 use moiregauge::series::corrected_images;
 use moiregauge_report::FailedInput;
-use nalgebra::Vector2;
 use rayon::prelude::*;
 use spmfile::{LineDirection, WritableFormat};
 
@@ -53,14 +52,11 @@ pub(super) fn write(
     known: &Known,
 ) -> Vec<FailedInput> {
     let mut names = HashSet::new();
-    let scans: Vec<(String, &ScanAnalysis, Option<Vector2<f64>>)> = analysis
+    let scans: Vec<(String, &ScanAnalysis)> = analysis
         .sets
         .iter()
-        .flat_map(|set| {
-            let drift = set.drift.as_ref().map(|d| d.velocity);
-            set.scans.iter().map(move |scan| (scan, drift))
-        })
-        .map(|(scan, drift)| {
+        .flat_map(|set| &set.scans)
+        .map(|scan| {
             let file = Path::new(&scan.file).file_name().unwrap_or_default();
             let file = file.to_string_lossy();
             // Files of the same name in several folders.
@@ -70,13 +66,13 @@ pub(super) fn write(
                 number += 1;
                 name = format!("{file}-{number}");
             }
-            (name, scan, drift)
+            (name, scan)
         })
         .collect();
     scans
         .par_iter()
-        .filter_map(|(name, scan, drift)| {
-            let result = one(out, exports, (name, scan, *drift), analysis, known);
+        .filter_map(|(name, scan)| {
+            let result = one(out, exports, (name, scan), analysis, known);
             result.err().map(|error| FailedInput {
                 file: scan.file.clone(),
                 error: format!("--export: {error:#}"),
@@ -88,13 +84,13 @@ pub(super) fn write(
 fn one(
     out: &Path,
     exports: &[Export],
-    (name, analysed, drift): (&str, &ScanAnalysis, Option<Vector2<f64>>),
+    (name, analysed): (&str, &ScanAnalysis),
     analysis: &Analysis,
     known: &Known,
 ) -> anyhow::Result<()> {
     let settings = &analysis.settings;
     let reading = chain::read(&PathBuf::from(&analysed.file), settings, known)?;
-    let images = corrected_images(&reading.scan, analysed, drift, settings);
+    let images = corrected_images(&reading.scan, analysed, settings);
     ensure!(!images.is_empty(), "no image could be corrected");
     for image in images {
         let line = match image.line {

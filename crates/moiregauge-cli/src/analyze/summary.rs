@@ -7,6 +7,7 @@ use moiregauge::analysis::{Analysis, Combined, SetAnalysis};
 use moiregauge::budget::Budget;
 use moiregauge::caveat::Caveat;
 use moiregauge::estimate::Estimate;
+use moiregauge::lattice::LatticeVectors;
 use moiregauge::readings::Readings;
 use moiregauge::strain::TwistStrain;
 use moiregauge_report::{FailedInput, plus_minus, two_digits};
@@ -30,19 +31,14 @@ pub(crate) fn summary(analysis: &Analysis) -> String {
 }
 
 fn set_summary(text: &mut String, set: &SetAnalysis) {
-    let up = set
-        .scans
-        .iter()
-        .filter(|s| s.frame_direction == FrameDirection::Up)
-        .count();
     let count = set.scans.len();
     let _ = writeln!(
         text,
-        "{}: {}, {count} scan{} ({up} up, {} down)",
+        "{}: {}, {count} scan{} ({})",
         set.name,
         set.channel,
         if count == 1 { "" } else { "s" },
-        count - up
+        directions(set)
     );
     match &set.drift {
         Some(drift) => {
@@ -61,6 +57,7 @@ fn set_summary(text: &mut String, set: &SetAnalysis) {
     }
     match (&set.mean, &set.uncorrected) {
         (Some(mean), _) => {
+            lattice(text, &mean.lattice);
             twist_strain(text, &mean.twist_strain, &mean.budget);
             readings(text, &mean.readings);
         }
@@ -68,12 +65,53 @@ fn set_summary(text: &mut String, set: &SetAnalysis) {
             text.push_str(
                 "  not corrected for drift (statistical errors only, drift not included):\n",
             );
+            lattice(text, &mean.lattice);
             twist_strain(text, &mean.twist_strain, &mean.budget);
             readings(text, &mean.readings);
         }
-        (None, None) => text.push_str("  no twist and strain explain this lattice\n"),
+        (None, None) => {
+            if let Some(scan) = set.scans.first() {
+                lattice(text, scan.drift_corrected.as_ref().unwrap_or(&scan.sensor));
+            }
+            text.push_str("  no twist and strain explain this lattice\n");
+        }
     }
     text.push('\n');
+}
+
+/// How many scans went up, how many down.
+fn directions(set: &SetAnalysis) -> String {
+    let count = |direction: Option<FrameDirection>| {
+        let scans = set.scans.iter();
+        scans.filter(|s| s.frame_direction == direction).count()
+    };
+    let known = format!(
+        "{} up, {} down",
+        count(Some(FrameDirection::Up)),
+        count(Some(FrameDirection::Down))
+    );
+    match count(None) {
+        0 => known,
+        all if all == set.scans.len() => "direction unknown".to_owned(),
+        unknown => format!("{known}, {unknown} unknown"),
+    }
+}
+
+/// One decimal and a true minus sign.
+fn fixed(angle: f64) -> String {
+    format!("{angle:.1}").replace('-', "−")
+}
+
+/// Lengths and directions of the three vectors.
+fn lattice(text: &mut String, lattice: &LatticeVectors) {
+    let lengths = [0, 1, 2].map(|i| plus_minus(lattice.wavelength(i)));
+    let angles = [0, 1, 2].map(|i| fixed(lattice.polar_angle(i).value.to_degrees()));
+    let _ = writeln!(
+        text,
+        "  lattice       {} nm at {}° to x",
+        lengths.join(", "),
+        angles.join(", ")
+    );
 }
 
 /// σ of the scans, and in brackets σ with everything in the budget.

@@ -166,7 +166,7 @@ fn window(set: &SetAnalysis) -> Window {
         let all: Vec<_> = set
             .scans
             .iter()
-            .filter(|s| (s.frame_direction == FrameDirection::Up) == up)
+            .filter(|s| (s.frame_direction == Some(FrameDirection::Up)) == up)
             .map(|s| s.window_centre)
             .collect();
         let n = all.len() as f64;

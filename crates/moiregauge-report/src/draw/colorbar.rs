@@ -6,8 +6,21 @@ use super::scale::{Range, Scale, ticks};
 use super::style::{BLACK, HAIR, SMALL, TEXT, lettering, text_width};
 use super::svg::{Anchor, Ink, Lettering, Rect, Svg};
 
-/// Draws the colours of `range` in `bar`, with numbers and a title at its right.
-pub(crate) fn draw(svg: &mut Svg, bar: Rect, map: ColorMap, range: Range, title: &str) {
+/// Draws the colours of `range` in `bar`, with numbers and a title at its right: what it is and its unit,
+/// with a power of ten where the numbers are small or large.
+pub(crate) fn draw(
+    svg: &mut Svg,
+    bar: Rect,
+    map: ColorMap,
+    range: Range,
+    (quantity, unit): (&str, &str),
+) {
+    let (power, range) = by_thousands(range);
+    let unit = [power, unit.to_owned()].join(" ");
+    let title = match unit.trim() {
+        "" => quantity.to_owned(),
+        unit => format!("{quantity} ({unit})"),
+    };
     let steps = 128_u8;
     let indices: Vec<u8> = (0..steps).rev().map(|i| 1 + i * 2).collect();
     let png = palette_png(1, indices.len(), &indices, &map.table());
@@ -36,5 +49,48 @@ pub(crate) fn draw(svg: &mut Svg, bar: Rect, map: ColorMap, range: Range, title:
         ..lettering(TEXT, Anchor::Middle)
     };
     let x = bar.right() + 3.5 + widest + 3.0 + TEXT;
-    svg.text((x, bar.y + bar.height / 2.0), title, &upright);
+    svg.text((x, bar.y + bar.height / 2.0), &title, &upright);
+}
+
+/// The power of a thousand that makes the numbers of a range handy, in words, and the range in it. Files in SI
+/// units hold heights of 10⁻¹⁰ m.
+fn by_thousands(range: Range) -> (String, Range) {
+    let largest = range.low.abs().max(range.high.abs());
+    if !largest.is_normal() || (0.01..1e5).contains(&largest) {
+        return (String::new(), range);
+    }
+    let exponent = 3 * (largest.log10() / 3.0).floor() as i32;
+    let digits = exponent.to_string();
+    let raised = digits.chars().map(|c| match c {
+        '-' => '⁻',
+        '1' => '¹',
+        '2' => '²',
+        '3' => '³',
+        digit => char::from_u32(0x2070 + u32::from(digit) - u32::from('0')).unwrap_or(digit),
+    });
+    let unit = 10_f64.powi(exponent);
+    (
+        format!("10{}", raised.collect::<String>()),
+        Range::new(range.low / unit, range.high / unit),
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn heights_in_metres_get_a_power_of_ten() {
+        let (power, range) = by_thousands(Range::new(-1e-10, 3.5e-10));
+        assert_eq!(power, "10⁻¹²");
+        assert!((range.low + 100.0).abs() < 1e-9 && (range.high - 350.0).abs() < 1e-9);
+        assert_eq!(by_thousands(Range::new(0.0, 4e6)).0, "10⁶");
+        for handy in [
+            Range::new(-0.3, 0.2),
+            Range::new(0.0, 9e4),
+            Range::new(0.0, 0.0),
+        ] {
+            assert_eq!(by_thousands(handy), (String::new(), handy));
+        }
+    }
 }

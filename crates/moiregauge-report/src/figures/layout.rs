@@ -62,9 +62,9 @@ pub(super) fn ordinal(index: usize) -> f64 {
     index as f64 + 1.0
 }
 
-/// Whether the bottom line came first; decides between filled and open symbols.
+/// Whether the bottom line came first, or nobody knows; decides between filled and open symbols.
 pub(super) fn is_up(scan: &ScanAnalysis) -> bool {
-    scan.frame_direction == FrameDirection::Up
+    scan.frame_direction != Some(FrameDirection::Down)
 }
 
 /// `trace` or `retrace`.

@@ -76,12 +76,8 @@ pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
     axes.draw(&mut svg, &labels);
     let bar = Rect::new(area.right() + 6.0, area.y, 7.0, area.height);
     let channel = &subject.set.channel;
-    let title = if shown.unit.is_empty() {
-        channel.clone()
-    } else {
-        format!("{channel} ({})", shown.unit)
-    };
-    colorbar::draw(&mut svg, bar, subject.map, contrast, &title);
+    let what = (channel.as_str(), shown.unit.as_str());
+    colorbar::draw(&mut svg, bar, subject.map, contrast, what);
     let mut keys = vec![(legend::Key::Line("#222222", ""), "scanned (sensors)")];
     if nominal.is_some() {
         keys.push((legend::Key::Line("#d55e00", "4 2.5"), "intended (nominal)"));

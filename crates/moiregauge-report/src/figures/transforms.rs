@@ -95,7 +95,7 @@ fn autocorrelation(svg: &mut Svg, subject: &Subject, shown: &Illustration, basis
     };
     axes.draw(svg, &labels);
     let bar = Rect::new(axes.area.right() + 5.0, axes.area.y, 6.0, SIDE);
-    colorbar::draw(svg, bar, subject.map, contrast, "autocorrelation");
+    colorbar::draw(svg, bar, subject.map, contrast, ("autocorrelation", ""));
 }
 
 fn spectrum(
@@ -147,7 +147,7 @@ fn spectrum(
     };
     axes.draw(svg, &labels);
     let bar = Rect::new(axes.area.right() + 5.0, axes.area.y, 6.0, SIDE);
-    colorbar::draw(svg, bar, subject.map, contrast, "logarithm of power");
+    colorbar::draw(svg, bar, subject.map, contrast, ("logarithm of power", ""));
 }
 
 /// Half the width of a panel: a few vectors, but not more than the picture holds.

@@ -17,7 +17,7 @@ pub struct ScanResult {
     pub file: String,
     /// When it was saved, by the instrument's clock, as in `2024-05-17T14:03:09`.
     pub acquired: Option<String>,
-    /// `up`: the bottom line was acquired first; `down`: the top line.
+    /// `up`: the bottom line was acquired first; `down`: the top line; `unknown`.
     pub frame_direction: String,
     /// Where the tip was.
     pub window: Window,
@@ -171,10 +171,11 @@ fn line_result(line: &LineAnalysis, bilayer: Bilayer<'_>) -> LineResult {
     }
 }
 
-fn direction_name(direction: FrameDirection) -> &'static str {
+fn direction_name(direction: Option<FrameDirection>) -> &'static str {
     match direction {
-        FrameDirection::Up => "up",
-        FrameDirection::Down => "down",
+        Some(FrameDirection::Up) => "up",
+        Some(FrameDirection::Down) => "down",
+        None => "unknown",
     }
 }
 

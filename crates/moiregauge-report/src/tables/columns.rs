@@ -54,7 +54,7 @@ impl<'a> Row<'a> for VectorRow<'a> {
         "set", "name of the set", |r| r.set.name.clone();
         "scan", "number of the scan in its set, from 1", |r| count(r.number);
         "file", "the file as it was named", |r| r.scan.file.clone();
-        "frame_direction", "`up`: bottom line first; `down`: top line first", |r| r.scan.frame_direction.clone();
+        "frame_direction", "`up`: bottom line first; `down`: top line first; `unknown`", |r| r.scan.frame_direction.clone();
         "vector", "L1, L2, or L3 = L2 − L1", |r| r.name.to_owned();
         "coordinates", "`nominal`: stated size; `sensor`: position sensors; `drift_corrected`: sensors, drift removed", |r| r.coordinates.to_owned();
         "x_nm", "component to the right", |r| number(r.vector.x_nm);
@@ -121,7 +121,7 @@ impl<'a> Row<'a> for ScanRow<'a> {
         "scan", "number of the scan in its set, from 1", |r| count(r.number);
         "file", "the file as it was named", |r| r.scan.file.clone();
         "acquired", "date and time by the instrument's clock", |r| r.scan.acquired.clone().unwrap_or_default();
-        "frame_direction", "`up`: bottom line first; `down`: top line first", |r| r.scan.frame_direction.clone();
+        "frame_direction", "`up`: bottom line first; `down`: top line first; `unknown`", |r| r.scan.frame_direction.clone();
         "slow_axis", "`x` or `y`", |r| r.set.slow_axis.clone();
         "line_rate_hz", "lines per second", |r| number(r.set.line_rate_hz);
         "window_centre_x_nm", "centre of the scanned window", |r| number(r.scan.window.centre_nm[0]);

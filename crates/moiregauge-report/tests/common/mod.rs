@@ -152,11 +152,11 @@ fn scan(
             minute: (3 + 2 * index) as u8,
             second: 9,
         }),
-        frame_direction: if up {
+        frame_direction: Some(if up {
             FrameDirection::Up
         } else {
             FrameDirection::Down
-        },
+        }),
         lines: vec![line(LineDirection::Trace), line(LineDirection::Retrace)],
         window_centre: Vector2::new(
             1240.0 + creep + 0.3 * noise.normal(),
@@ -168,6 +168,7 @@ fn scan(
         nominal: Some(nominal),
         sensor,
         drift_corrected: Some(corrected),
+        drift: Some(Vector2::new(0.0086, -0.0026)),
         twist_strain_sensor: twist_strain(&sensor),
         twist_strain: twist_strain(&corrected),
         draws: strain::draws(

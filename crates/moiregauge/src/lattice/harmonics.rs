@@ -26,7 +26,7 @@ pub(crate) struct Harmonic {
 /// The harmonics of a lattice in one image.
 #[derive(Clone, Debug)]
 pub(crate) struct Harmonics {
-    /// First shell first (three), then second and third shell.
+    /// First shell first (three), then the others.
     pub(crate) list: Vec<Harmonic>,
     /// Sum of the squared window weights and of the weights.
     pub(crate) window_sums: [f64; 2],
@@ -149,7 +149,7 @@ impl Windowed {
         sum
     }
 
-    /// Fits the harmonics `pair · (h, k)` of the first three shells.
+    /// Fits the harmonics `pair · (h, k)` of `shells`, which begin with the first one.
     ///
     /// `background` is what was taken off the image; it is taken off the model as well, so that the
     /// model goes through the same mill. `None` where the harmonics cannot be told apart on this frame.
@@ -158,9 +158,10 @@ impl Windowed {
         image: &Image,
         pair: &Matrix2<f64>,
         background: Background,
+        shells: &[(f64, f64)],
     ) -> Option<Harmonics> {
         let nyquist = 0.9 * std::f64::consts::PI;
-        let q: Vec<Vector2<f64>> = SHELLS
+        let q: Vec<Vector2<f64>> = shells
             .iter()
             .map(|&(h, k)| pair * Vector2::new(h, k))
             .filter(|q| q.amax() < nyquist && q.amin() > -nyquist)
@@ -263,7 +264,7 @@ fn residual(image: &Image, model: &Image) -> Image {
 }
 
 /// Indices of the first three shells, one of each ± pair, in the basis at 60°.
-const SHELLS: [(f64, f64); 9] = [
+pub(super) const SHELLS: [(f64, f64); 9] = [
     (1.0, 0.0),
     (0.0, 1.0),
     (-1.0, 1.0),

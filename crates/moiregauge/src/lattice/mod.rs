@@ -8,6 +8,7 @@ mod autocorrelation;
 mod fit;
 mod fourier;
 mod harmonics;
+mod high_orders;
 mod noise;
 mod paper;
 mod phases;
@@ -21,7 +22,7 @@ pub(crate) mod vectors;
 
 use nalgebra::{Matrix2, Vector2};
 
-pub use fit::{FittedHarmonic, ForeignWave, Inhomogeneity, LatticeFit};
+pub use fit::{Closure, FittedHarmonic, ForeignWave, Inhomogeneity, LatticeFit};
 pub use phases::Phases;
 pub(crate) use pictures::pictures;
 pub use several::measure_several;
@@ -31,7 +32,7 @@ use crate::background::remove_background;
 use crate::geometry::Geometry;
 use crate::image::Image;
 use crate::settings::{Background, Method};
-use harmonics::{Harmonics, Windowed};
+use harmonics::{Harmonics, SHELLS, Windowed};
 use transform::Spectrum;
 
 /// The smallest side of a frame, pixels.
@@ -346,10 +347,16 @@ fn prepare(
             image.binned(binning)
         };
         let pair = candidate.pair * binning as f64;
-        let Some((harmonics, peaks)) = refine(&binned, &pair, background) else {
+        let Some((mut harmonics, mut peaks)) = refine(&binned, &pair, background) else {
             continue;
         };
-        let verdict = verdict(&harmonics);
+        let mut verdict = verdict(&harmonics);
+        if verdict != Verdict::Lattice
+            && let Some(found) = high_orders::refine(&binned, &pair, background)
+        {
+            (harmonics, peaks) = found;
+            verdict = Verdict::Lattice;
+        }
         if verdict != Verdict::Lattice {
             let ratios = signal_to_noise(&harmonics);
             if ratios[2] > best[2] {
@@ -415,13 +422,13 @@ fn refine(
         third,
     ]
     .map(|q| windowed.refined_peak(q));
-    let first = windowed.fit(image, &common_pair(&seen), background)?;
+    let first = windowed.fit(image, &common_pair(&seen), background, &SHELLS)?;
     let model = Windowed::new(&first.model);
     let mut peaks = seen;
     for (peak, harmonic) in peaks.iter_mut().zip(&first.list) {
         *peak -= model.refined_peak(harmonic.q) - harmonic.q;
     }
-    let second = windowed.fit(image, &common_pair(&peaks), background)?;
+    let second = windowed.fit(image, &common_pair(&peaks), background, &SHELLS)?;
     Some((second, peaks))
 }
 

@@ -38,13 +38,27 @@ pub fn choose_channel<'a>(
     };
     match wanted {
         Some(wanted) => find(wanted),
-        None => USUAL.iter().find_map(|name| find(name)).or_else(|| {
-            channels
-                .iter()
-                .find(|(name, internal)| spmfile::sensor_axis(name, internal).is_none())
-                .map(|(name, _)| *name)
-        }),
+        None => channels_by_preference(channels).first().copied(),
     }
+}
+
+/// All channels that can show the moiré, the usual ones first: one name for each, whatever its line
+/// directions.
+pub fn channels_by_preference<'a>(channels: &[(&'a str, &'a str)]) -> Vec<&'a str> {
+    let usual = USUAL
+        .iter()
+        .filter_map(|name| choose_channel(channels, Some(name)));
+    let others = channels
+        .iter()
+        .filter(|(name, internal)| spmfile::sensor_axis(name, internal).is_none())
+        .map(|(name, _)| *name);
+    let mut all: Vec<&str> = Vec::new();
+    for name in usual.chain(others) {
+        if !all.iter().any(|known| stem(known) == stem(name)) {
+            all.push(name);
+        }
+    }
+    all
 }
 
 /// Lower case, letters and digits only.
@@ -87,6 +101,25 @@ mod tests {
         let odd = [("Xsensor", ""), ("Deflection μ", "")];
         assert_eq!(choose_channel(&odd, None), Some("Deflection μ"));
     }
+
+    #[test]
+    fn every_channel_is_offered_once() {
+        let stm = [
+            ("LIA Current", ""),
+            ("LIA Current", ""),
+            ("Current", ""),
+            ("Topography", ""),
+        ];
+        assert_eq!(
+            channels_by_preference(&stm),
+            ["Current", "Topography", "LIA Current"]
+        );
+        assert_eq!(
+            channels_by_preference(&CHANNELS),
+            ["TR Phase", "TR Amplitude", "Height Sensor"]
+        );
+    }
+
     #[test]
     fn line_directions_in_names_do_not_count() {
         let igor = [

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
 
 use super::measure::MeasuredScan;
-use super::set::{checks as set_checks, joint_fit, lattice_of, terms};
+use super::set::{checks as set_checks, joint_fit, lattice_of, moire, terms};
 use super::sightings::middle_of_frame;
 
 use crate::analysis::{Combined, Consistency, Drift, SetAnalysis, SetMean};
@@ -14,7 +14,6 @@ use crate::joint::JointFit;
 use crate::lattice::LatticeVectors;
 use crate::readings::{Readings, caveats as about_readings};
 use crate::settings::Settings;
-use crate::strain::twist_strain;
 
 /// Wavelengths that differ by more than this are not of the same lattice.
 const SAME_LATTICE: f64 = 0.05;
@@ -102,8 +101,7 @@ pub(super) fn combine(
             ));
         }
     }
-    let twist_strain =
-        twist_strain(&lattice, settings.bilayer(), settings.strain_convention).ok()?;
+    let twist_strain = moire(&lattice, settings)?;
     let budget = Budget::new(&lattice, &twist_strain, &statistical, settings);
     let readings = Readings::new(&lattice, &twist_strain, &budget, settings);
     if sets.len() > 1 {

@@ -22,13 +22,12 @@ pub struct CorrectedImage {
 }
 
 /// The images behind `analysed`, corrected by the position sensors and, where it is known, for the
-/// drift (nm/s); whole frames, values as recorded.
+/// drift at the time of the scan; whole frames, values as recorded.
 ///
 /// Lines without a geometry are left out.
 pub fn corrected_images(
     scan: &Scan,
     analysed: &ScanAnalysis,
-    drift: Option<Vector2<f64>>,
     settings: &Settings,
 ) -> Vec<CorrectedImage> {
     let Ok(channels) = channels(scan, settings) else {
@@ -41,7 +40,7 @@ pub fn corrected_images(
     channels
         .into_iter()
         .filter(wanted)
-        .filter_map(|channel| corrected(scan, channel, &analysed.file, drift))
+        .filter_map(|channel| corrected(scan, channel, &analysed.file, analysed.drift))
         .collect()
 }
 
@@ -69,7 +68,7 @@ fn corrected(
         (Some(drift), Some(timing)) => {
             let [x, y] = [drift.x * 60.0, drift.y * 60.0];
             log.push(format!(
-                "corrected for the drift of the set, {x} nm/min along x and {y} nm/min along y"
+                "corrected for the drift at its time, {x} nm/min along x and {y} nm/min along y"
             ));
             at_rest(&geometry, &timing, drift)
         }

@@ -29,7 +29,9 @@ pub fn illustrate(
     let measured = sensors
         .as_ref()
         .and_then(|_| sensor_images("", scan, channel, &mut ignored));
-    let timing = Timing::of_scan(scan, channel.columns, analysed.frame_direction, line.line);
+    let timing = analysed
+        .frame_direction
+        .and_then(|frame| Timing::of_scan(scan, channel.columns, frame, line.line));
     let velocities = |steps: &[f64], axis: usize| -> Vec<f64> {
         let seconds = timing.map_or(f64::NAN, |t| t.per_pixel[axis].abs());
         steps

@@ -4,6 +4,7 @@ use nalgebra::{Matrix2, Vector2};
 use spmfile::{Channel, DateTime, FrameDirection, LineDirection, Scan};
 
 use super::channel::{choose_channel, stem};
+use super::doubts::{about_fit, few_periods, lines_disagree, turned};
 use super::moires::in_order;
 use super::overlap::Window;
 use super::shared::correlation;
@@ -14,15 +15,12 @@ use crate::geometry::{Geometry, SensorGeometry, Timing, from_sensors, mean_and_s
 use crate::image::Image;
 use crate::lattice::reciprocal::labelled_like;
 use crate::lattice::{
-    ForeignWave, Inhomogeneity, LatticeError, LatticeFit, LatticeVectors, MeasuredLattice, measure,
-    measure_several, vectors,
+    LatticeError, LatticeVectors, MeasuredLattice, measure, measure_several, vectors,
 };
 use crate::settings::{Lines, Settings};
 
 /// A sensor whose span differs from the nominal size by more than this factor is not believed.
 const WILD_SPAN: f64 = 2.0;
-/// Fewer periods than this across the shorter side deserve a warning.
-const FEW_PERIODS: f64 = 3.0;
 
 /// What the pixels of one scan gave.
 #[derive(Clone, Debug)]
@@ -60,6 +58,8 @@ pub struct MeasuredLine {
     pub nominal: Option<Geometry>,
     /// When they were recorded; `None` where the file does not tell.
     pub timing: Option<Timing>,
+    /// Lines that were recorded after the part of the frame that was used.
+    pub lines_after: usize,
     /// The lattice in pixels.
     pub lattice: MeasuredLattice,
     /// Tip speeds along the fast and slow axes, nm/s; σ is the spread over the lines. NaN without timing.
@@ -208,6 +208,8 @@ pub fn measure_moires(
     caveats.dedup_by(|a, b| (&a.code, &a.message) == (&b.code, &b.message));
     let measured = moires.into_iter().map(|mut lines| {
         share_noise(&mut lines);
+        let mut caveats = caveats.clone();
+        let excluded = lines_disagree(file, &lines, &mut caveats);
         MeasuredScan {
             file: file.to_owned(),
             acquired: scan.acquired,
@@ -217,8 +219,8 @@ pub fn measure_moires(
             size_nm: scan.size_nm,
             set: None,
             lines,
-            excluded: None,
-            caveats: caveats.clone(),
+            excluded,
+            caveats,
         }
     });
     Ok(measured.collect())
@@ -305,14 +307,22 @@ fn measure_line(
         .and_then(|frame| Timing::of_scan(scan, channel.columns, frame, line));
     let geometry = match (&sensors, &nominal) {
         (Some(sensors), _) => sensors.geometry.clone(),
-        (None, Some(nominal)) => nominal.clone(),
+        (None, Some(nominal)) => {
+            turned(file, scan.rotation_rad, caveats);
+            nominal.clone()
+        }
         (None, None) => return Err(MeasureError::NoSize),
     };
     let (speeds, speed_error) = speeds(&geometry, sensors.as_ref(), timing.as_ref());
     let mut image = image_of(channel);
     let (mut geometry, mut nominal) = (geometry, nominal);
+    let mut lines_after = 0;
     if let Some(window) = window {
         let (first, size) = window.pixels(&geometry).ok_or(MeasureError::NoOverlap)?;
+        lines_after = match scan.frame_direction {
+            Some(FrameDirection::Down) => first[1],
+            _ => image.rows - first[1] - size[1],
+        };
         image = image.cropped(first, size);
         geometry = geometry.cropped(first, size);
         nominal = nominal.map(|n| n.cropped(first, size));
@@ -336,6 +346,7 @@ fn measure_line(
             geometry: geometry.clone(),
             nominal: nominal.clone(),
             timing,
+            lines_after,
             lattice,
             speeds,
             speed_error,
@@ -350,57 +361,10 @@ fn about_lattice(
     geometry: &Geometry,
     caveats: &mut Vec<Caveat>,
 ) {
-    if lattice.periods < FEW_PERIODS {
-        caveats.push(Caveat::new(
-            "few-periods",
-            file,
-            format!(
-                "only {:.1} lattice periods fit across the frame; vectors from fewer than {FEW_PERIODS} \
-                 are less accurate than their errors say",
-                lattice.periods
-            ),
-        ));
-    }
+    few_periods(file, lattice, caveats);
     if let Some(fit) = &lattice.fit {
         about_fit(file, fit, geometry, caveats);
     }
-}
-
-/// What the fit to the pixels found beside the lattice.
-fn about_fit(file: &str, fit: &LatticeFit, geometry: &Geometry, caveats: &mut Vec<Caveat>) {
-    if let Some(change) = fit.inhomogeneity.filter(Inhomogeneity::stands_out) {
-        caveats.push(Caveat::new(
-            "inhomogeneous-lattice",
-            file,
-            format!(
-                "the lattice is not the same everywhere in the frame: from corner to corner its wavelength \
-                 changes by up to {:.2} % and its direction by up to {:.2}° (χ² {:.0} for 6 numbers; {:.0} can \
-                 be chance). Results are means over the frame. Drift that got faster or slower, and creep, \
-                 look like this along the slow axis",
-                100.0 * change.wavelength,
-                change.angle.to_degrees(),
-                change.chi_squared,
-                change.threshold
-            ),
-        ));
-    }
-    let Some(wave) = fit.foreign_wave.filter(ForeignWave::stands_out) else {
-        return;
-    };
-    let Some(inverse) = geometry.pixel_to_nm.try_inverse() else {
-        return;
-    };
-    let period = std::f64::consts::TAU / (inverse.transpose() * wave.wave_vector).norm();
-    caveats.push(Caveat::new(
-        "second-lattice",
-        file,
-        format!(
-            "beside the lattice a wave with a period of {period:.2} nm stands out of what the fit leaves \
-             ({:.0} times the noise around it; {:.0} can be chance): a second lattice, interference, or a \
-             lattice that is not the same everywhere in the frame",
-            wave.significance, wave.threshold
-        ),
-    ));
 }
 
 /// `trace` or `retrace`.

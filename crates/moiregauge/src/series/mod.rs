@@ -7,6 +7,7 @@ mod atomic;
 mod channel;
 mod combine;
 mod corrected;
+mod doubts;
 mod group;
 mod illustrate;
 mod measure;
@@ -17,7 +18,7 @@ mod shared;
 mod sightings;
 
 pub use atomic::{AtomicError, AtomicOrientation, atomic_orientation};
-pub use channel::choose_channel;
+pub use channel::{channels_by_preference, choose_channel};
 pub use corrected::{CorrectedImage, corrected_images, nominal_geometry, on_grid};
 pub use group::natural_order;
 pub use illustrate::illustrate;

@@ -53,10 +53,12 @@ pub(super) fn sightings(
     Some(all)
 }
 
-/// Time of the middle of a frame, s from an arbitrary day. The header's time is that of its end.
+/// Time of the middle of what was used of a frame, s from an arbitrary day. The header's time is that of
+/// the frame's end.
 pub(super) fn middle_of_frame(scan: &MeasuredScan) -> Option<f64> {
-    let rows = scan.lines.first()?.geometry.size[1] as f64;
-    Some(seconds(scan.acquired?) - 0.5 * rows / scan.line_rate_hz?)
+    let line = scan.lines.first()?;
+    let lines = line.lines_after as f64 + 0.5 * line.geometry.size[1] as f64;
+    Some(seconds(scan.acquired?) - lines / scan.line_rate_hz?)
 }
 
 /// Seconds since the first of March of the year 0 (proleptic Gregorian calendar).

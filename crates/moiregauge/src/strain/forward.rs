@@ -158,7 +158,8 @@ impl TwistStrain {
 /// The twist that one wavelength (nm) suggests if nothing is strained: θ = 2 arcsin(a / 2λ) for equal
 /// hexagonal layers, `cos θ = (1 + κ² − (a₁/λ)²)/2κ` for different ones.
 ///
-/// NaN for a wavelength that no twist makes, and for layers that are not hexagonal.
+/// NaN for a wavelength that no twist up to 30° makes (layers turned further look like layers turned the other
+/// way), and for layers that are not hexagonal.
 pub fn naive_twist<'a>(wavelength: Estimate, bilayer: impl Into<Bilayer<'a>>) -> Estimate {
     let Bilayer {
         reference,
@@ -172,6 +173,9 @@ pub fn naive_twist<'a>(wavelength: Estimate, bilayer: impl Into<Bilayer<'a>>) ->
     let size = a / wavelength.value;
     // 2κ(1 − cos θ) = 4κ sin²(θ/2) = p² − (κ − 1)²: nothing cancels for equal layers.
     let sine = ((size * size - (ratio - 1.0).powi(2)) / (4.0 * ratio)).sqrt();
+    if !(sine <= (std::f64::consts::FRAC_PI_6 / 2.0).sin()) {
+        return Estimate::new(f64::NAN, f64::NAN);
+    }
     let slope = size * size / (wavelength.value * ratio * 2.0 * sine * (1.0 - sine * sine).sqrt());
     Estimate::new(2.0 * sine.asin(), slope * wavelength.sigma)
 }

@@ -23,6 +23,7 @@
 
 mod bend;
 mod choose;
+mod closure;
 mod frame;
 mod gram;
 mod lines;
@@ -40,6 +41,7 @@ use super::{LatticeVectors, Phases};
 use crate::image::Image;
 use crate::settings::Background;
 pub use bend::Inhomogeneity;
+pub use closure::Closure;
 use frame::{Basis, Frame};
 use gram::gram;
 use lines::LineStatistics;
@@ -87,6 +89,9 @@ pub struct LatticeFit {
     pub(crate) residual: [Vec<([i64; 2], Complex64)>; 3],
     /// How the lattice changes across the frame; `None` where the frame is too small to tell.
     pub inhomogeneity: Option<Inhomogeneity>,
+    /// Whether the harmonics agree on one lattice; `None` where too few of them are strong. The
+    /// covariance of `wave_vectors` is enlarged already where they do not.
+    pub closure: Option<Closure>,
 }
 
 /// One harmonic of a fitted lattice.
@@ -136,6 +141,8 @@ struct Fit<'a> {
     origin: Matrix2<f64>,
     /// `Φᵀ W Φ` of the last step.
     gram: DMatrix<f64>,
+    /// `Φᵀ W` times the residual of the last step.
+    gradient: DVector<f64>,
     /// Nothing has changed since the last step.
     settled: bool,
 }
@@ -191,6 +198,7 @@ impl<'a> Fit<'a> {
             clipped: 0,
             origin,
             gram: DMatrix::zeros(0, 0),
+            gradient: DVector::zeros(0),
             settled: false,
         })
     }
@@ -231,9 +239,10 @@ impl<'a> Fit<'a> {
         let seen = look(frame, model, &tables, probes, &mut self.lines, clip);
         let gram = gram(frame, &model.basis, &model.pair, &self.lines.lambda);
         let map = solve::contraction(model, |_, _| 1.0);
-        let right = map.transpose() * seen.gradient;
+        let right = map.transpose() * &seen.gradient;
         let step = solve::solve(&(map.transpose() * &gram * map), &right)?;
         self.gram = gram;
+        self.gradient = seen.gradient;
         self.sigma = seen.sigma;
         self.clipped = seen.clipped;
         let decrement = step.dot(&right);
@@ -355,15 +364,9 @@ impl<'a> Fit<'a> {
 
     fn result(&self, noise: &FinalNoise) -> Option<(LatticeVectors, LatticeFit)> {
         let scale = self.frame.edge().map(|e| 1.0 / e);
-        let covariance = self.covariance(noise)?;
-        let wave_vectors = LatticeVectors {
-            basis: self.model.pair,
-            covariance: covariance.fixed_view::<4, 4>(3, 3).into_owned(),
-        }
-        .mapped(&Matrix2::from_diagonal(&scale));
         let pixels = self.frame.pixels() as f64;
         let waves = self.model.waves.iter().zip(&self.model.basis.indices);
-        let harmonics = waves
+        let harmonics: Vec<FittedHarmonic> = waves
             .zip(&noise.local)
             .map(|((&[alpha, beta], &index), local)| {
                 let amplitude = alpha.hypot(beta);
@@ -373,7 +376,23 @@ impl<'a> Fit<'a> {
                     phase: (-beta).atan2(alpha),
                     signal_to_noise: 0.5 * amplitude * (pixels / local[2]).sqrt(),
                 }
-            });
+            })
+            .collect();
+        let strengths: Vec<f64> = harmonics.iter().map(|h| h.signal_to_noise).collect();
+        let closure = closure::closure(
+            &self.model,
+            &self.gram,
+            &self.gradient,
+            &noise.local,
+            &strengths,
+        );
+        let covariance = self.covariance(noise)?;
+        let enlargement = closure.map_or(1.0, |closure| closure.enlargement());
+        let wave_vectors = LatticeVectors {
+            basis: self.model.pair,
+            covariance: covariance.fixed_view::<4, 4>(3, 3) * enlargement,
+        }
+        .mapped(&Matrix2::from_diagonal(&scale));
         let [columns, rows] = [
             self.frame.image.columns as f64,
             self.frame.image.rows as f64,
@@ -381,7 +400,7 @@ impl<'a> Fit<'a> {
         let fit = LatticeFit {
             wave_vectors,
             centre: Vector2::new(columns - 1.0, rows - 1.0) / 2.0,
-            harmonics: harmonics.collect(),
+            harmonics,
             phase_covariance: covariance.fixed_view::<3, 3>(0, 0).into_owned(),
             goodness: noise.rms / noise.residual.level().sqrt(),
             line_offsets: self.line_sigma,
@@ -401,6 +420,7 @@ impl<'a> Fit<'a> {
                 &noise.bends,
                 &noise.local,
             ),
+            closure,
         };
         Some((real_from_reciprocal(&wave_vectors)?, fit))
     }

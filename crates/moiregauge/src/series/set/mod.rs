@@ -1,20 +1,22 @@
 //! One set: drift, and every scan before and after correction.
 
+mod doubts;
 mod joint;
+mod moire;
 mod scan;
 
 use nalgebra::{Matrix2, Vector2};
 use rayon::prelude::*;
 use spmfile::FrameDirection;
 
+use doubts::{about_checks, about_mean, about_residual};
 pub(super) use joint::{checks, joint_fit, lattice_of, terms};
+pub(super) use moire::moire;
 use scan::{plain_mean, scan_analysis};
 
 use super::group::Group;
 use super::measure::MeasuredScan;
-use crate::analysis::{
-    Axis, Checks, Drift, DriftFit, Residual, ScanAnalysis, SetAnalysis, SetMean,
-};
+use crate::analysis::{Axis, Drift, DriftFit, ScanAnalysis, SetAnalysis, SetMean};
 use crate::budget::{Budget, Statistical};
 use crate::caveat::Caveat;
 use crate::chi2::enlargement;
@@ -25,15 +27,10 @@ use crate::lattice::LatticeVectors;
 use crate::lattice::reciprocal::real_from_reciprocal;
 use crate::readings::{Readings, caveats as about_readings};
 use crate::settings::{GivenDrift, Settings};
-use crate::strain::{TwistStrain, draws, twist_strain};
+use crate::strain::{TwistStrain, draws};
 
 /// nm/min → nm/s.
 const PER_MINUTE: f64 = 1.0 / 60.0;
-/// χ²/dof beyond which the scatter of the scans deserves a word.
-const LARGE_CHI2: f64 = 2.0;
-
-/// The scatter of fewer scans is too uncertain itself to doubt the errors.
-const FEWEST_TO_DOUBT: usize = 6;
 
 /// Everything about one set but its illustration. `first_index` numbers its scans for the draws.
 /// Scans that are left out by rule are marked in the group.
@@ -105,7 +102,15 @@ pub(super) fn analyse_set(
             let of = |s: &ScanAnalysis| (s.twist_strain_sensor, s.sensor);
             let [image, sensor] = at_known_drift(&all)?;
             let statistical = Statistical::without_drift(&image, &sensor);
-            set_mean((common, 1.0), &statistical, of_set().map(of), settings)
+            // The scatter of several scans is that of their drift; that of the two lines of one is not.
+            let (_, chi2, freedom) = common;
+            let scale = if kept.len() == 1 {
+                enlargement(chi2, freedom)
+            } else {
+                1.0
+            };
+            let (common, statistical) = moire::enlarged(common, &statistical, scale);
+            set_mean((common, scale), &statistical, of_set().map(of), settings)
         });
     let mean = solved.as_ref().and_then(|s| {
         let of = |s: &ScanAnalysis| (s.twist_strain, s.drift_corrected.unwrap_or(s.sensor));
@@ -128,6 +133,13 @@ pub(super) fn analyse_set(
         );
         caveats.extend(found);
     }
+    moire::doubts(
+        &group.name,
+        mean.as_ref().or(uncorrected.as_ref()),
+        &scans,
+        settings,
+        caveats,
+    );
     about_checks(
         &group.name,
         (checks.as_ref(), drift.as_ref(), mean.as_ref()),
@@ -340,8 +352,7 @@ fn set_mean(
     scans: impl Iterator<Item = (Option<TwistStrain>, LatticeVectors)>,
     settings: &Settings,
 ) -> Option<SetMean> {
-    let twist_strain =
-        twist_strain(&lattice, settings.bilayer(), settings.strain_convention).ok()?;
+    let twist_strain = moire(&lattice, settings)?;
     let (singles, lattices): (Vec<_>, Vec<_>) = scans.unzip();
     let singles: Vec<TwistStrain> = singles.into_iter().flatten().collect();
     let twists: Vec<f64> = singles.iter().map(|s| s.twist).collect();
@@ -377,7 +388,7 @@ fn forward_backward(scans: &[&ScanAnalysis], settings: &Settings) -> Option<Twis
     let mean = |direction: FrameDirection| {
         let reciprocal: Vec<LatticeVectors> = scans
             .iter()
-            .filter(|s| s.frame_direction == direction)
+            .filter(|s| s.frame_direction == Some(direction))
             .filter_map(|s| real_from_reciprocal(&s.sensor))
             .collect();
         plain_mean(&reciprocal)
@@ -385,123 +396,5 @@ fn forward_backward(scans: &[&ScanAnalysis], settings: &Settings) -> Option<Twis
     let both = [mean(FrameDirection::Up)?, mean(FrameDirection::Down)?];
     let lattice = real_from_reciprocal(&plain_mean(&both)?)?;
     // Back and forth turns the labelling by 60°, which twist and strain do not see.
-    twist_strain(&lattice, settings.bilayer(), settings.strain_convention).ok()
-}
-
-fn about_mean(name: &str, mean: Option<&SetMean>, caveats: &mut Vec<Caveat>) {
-    let Some(mean) = mean else { return };
-    if mean.chi2_per_dof > LARGE_CHI2 {
-        caveats.push(Caveat::new(
-            "scatter",
-            name,
-            format!(
-                "the scans scatter {:.1} times more than their errors say (χ²/dof = {:.1}): drift that \
-                 changes, an inhomogeneous lattice or sensor errors; errors of the set are enlarged to match",
-                mean.chi2_per_dof.sqrt(),
-                mean.chi2_per_dof
-            ),
-        ));
-    }
-    if !mean.within_one_percent {
-        caveats.push(Caveat::new(
-            "outside-one-percent",
-            name,
-            "a wavelength of a single scan differs by more than 1 % from that of the set",
-        ));
-    }
-    let found = &mean.twist_strain;
-    let in_all = mean.budget.applied_to(found);
-    if found.axis_lab().is_none() {
-        caveats.push(Caveat::new(
-            "strain-not-significant",
-            name,
-            format!(
-                "the heterostrain is not significant (p = {:.2}); it is below {:.4} % with 95 % \
-                 confidence and has no axis",
-                found.strain_p_value(),
-                found.strain_upper_limit_95() * 100.0
-            ),
-        ));
-    } else if in_all.axis_lab().is_none() {
-        caveats.push(Caveat::new(
-            "strain-within-calibration",
-            name,
-            format!(
-                "the heterostrain stands out of the noise of the scans but not of the calibration of the \
-                 scanner (p = {:.2}): with everything in the budget it is below {:.4} % with 95 % \
-                 confidence; scans of the sample turned by 90° would tell",
-                in_all.strain_p_value(),
-                in_all.strain_upper_limit_95() * 100.0
-            ),
-        ));
-    }
-}
-
-fn about_residual(file: &str, residual: &Residual, settings: &Settings, caveats: &mut Vec<Caveat>) {
-    if !residual.outlying {
-        return;
-    }
-    let place = residual.displacement.map_or(String::new(), |d| {
-        format!(", {:.3} nm from where the others have it", d.norm())
-    });
-    let then = if settings.exclude_outliers {
-        "more than a fifth of the scans are never left out by rule"
-    } else {
-        "it is used all the same; --exclude NAME or --exclude-outliers leaves it out"
-    };
-    caveats.push(Caveat::new(
-        "outlying-scan",
-        file,
-        format!(
-            "the scan does not fit the others (χ² = {:.0} for {} degrees of freedom, p = {:.0e}{place}); {then}",
-            residual.chi2, residual.degrees_of_freedom, residual.p_value
-        ),
-    ));
-}
-
-/// Says where the scatter of `n` scans makes clearly larger errors than those stated: by more than four
-/// times the scatter of such a comparison, 1/√(2(n − 1)).
-fn about_checks(
-    name: &str,
-    (checks, drift, mean): (Option<&Checks>, Option<&Drift>, Option<&SetMean>),
-    n: usize,
-    caveats: &mut Vec<Caveat>,
-) {
-    if n < FEWEST_TO_DOUBT {
-        return;
-    }
-    let (Some(found), Some(drift), Some(mean)) =
-        (checks.and_then(|c| c.leave_one_out), drift, mean)
-    else {
-        return;
-    };
-    let strain = mean.twist_strain.strain_covariance();
-    let stated = [
-        ("drift x", found.drift[0], drift.covariance.m11.sqrt()),
-        ("drift y", found.drift[1], drift.covariance.m22.sqrt()),
-        ("twist", found.twist, mean.twist_strain.twist().sigma),
-        ("strain along x and y", found.strain[0], strain.m11.sqrt()),
-        (
-            "strain along the diagonals",
-            found.strain[1],
-            strain.m22.sqrt(),
-        ),
-    ];
-    let limit = 1.0 + 4.0 / (2.0 * (n as f64 - 1.0)).sqrt();
-    let large: Vec<String> = stated
-        .iter()
-        .filter(|(_, found, stated)| *found > limit * stated)
-        .map(|(what, found, stated)| format!("{what} {:.1} times", found / stated))
-        .collect();
-    if !large.is_empty() {
-        caveats.push(Caveat::new(
-            "scatter-of-scans",
-            name,
-            format!(
-                "leaving out one scan at a time makes larger errors than those stated: {}; trust the \
-                 larger ones",
-                large.join(", ")
-            ),
-        ));
-    }
+    moire(&lattice, settings)
 }

@@ -1,8 +1,8 @@
 //! One scan of a set, before and after its drift is taken off.
 
 use nalgebra::{Matrix2, Matrix4, Vector2};
-use spmfile::FrameDirection;
 
+use super::moire::moire;
 use crate::analysis::{LineAnalysis, ScanAnalysis};
 use crate::drift::{Observation, common_lattice};
 use crate::estimate::Estimate;
@@ -10,7 +10,6 @@ use crate::lattice::LatticeVectors;
 use crate::lattice::reciprocal::labelled_like;
 use crate::series::measure::{MeasuredLine, MeasuredScan};
 use crate::settings::Settings;
-use crate::strain::twist_strain;
 
 pub(super) fn scan_analysis(
     scan: &MeasuredScan,
@@ -28,9 +27,7 @@ pub(super) fn scan_analysis(
         .iter()
         .map(|l| Some(labelled_like(&l.in_nominal_coordinates()?, reference)))
         .collect();
-    let strain = |lattice: &LatticeVectors| {
-        twist_strain(lattice, settings.bilayer(), settings.strain_convention).ok()
-    };
+    let strain = |lattice: &LatticeVectors| moire(lattice, settings);
     let first = scan.lines.first()?;
     let mean = |f: &dyn Fn(&MeasuredLine) -> Estimate| {
         let all: Vec<Estimate> = scan.lines.iter().map(f).collect();
@@ -43,7 +40,7 @@ pub(super) fn scan_analysis(
     Some(ScanAnalysis {
         file: scan.file.clone(),
         acquired: scan.acquired,
-        frame_direction: scan.frame_direction.unwrap_or(FrameDirection::Up),
+        frame_direction: scan.frame_direction,
         lines: scan
             .lines
             .iter()
@@ -58,6 +55,7 @@ pub(super) fn scan_analysis(
         twist_strain_sensor: strain(&sensor),
         twist_strain: drift_corrected.as_ref().and_then(strain),
         sensor,
+        drift: drift.filter(|_| drift_corrected.is_some()).map(|d| d.0),
         drift_corrected,
         draws: Vec::new(),
         residual: None,
