@@ -10,9 +10,10 @@ mod summary;
 
 use std::process::ExitCode;
 
-pub(crate) use args::{AnalyzeArgs, MethodArg};
+pub(crate) use args::{AnalyzeArgs, ConventionArg, MethodArg};
 pub(crate) use chain::{Outcome, analyse_files, measure_file};
 pub(crate) use files::write_all;
+pub(crate) use orientation::{Angle, DirectionArg, parse_angle};
 pub(crate) use summary::summary;
 
 use crate::info::expand;

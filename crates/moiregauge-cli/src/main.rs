@@ -6,6 +6,7 @@ mod convert;
 mod demo;
 mod info;
 mod input;
+mod moire;
 mod say;
 mod simulate;
 mod validate;
@@ -29,6 +30,7 @@ struct Cli {
 enum Command {
     Analyze(Box<analyze::AnalyzeArgs>),
     Convert(Box<convert::ConvertArgs>),
+    Moire(Box<moire::MoireArgs>),
     Info(info::InfoArgs),
     Simulate(Box<simulate::SimulateArgs>),
     Demo(demo::DemoArgs),
@@ -40,6 +42,7 @@ fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Analyze(args) => analyze::run(&args),
         Command::Convert(args) => convert::run(&args),
+        Command::Moire(args) => moire::run(&args),
         Command::Info(args) => info::run(&args),
         Command::Simulate(args) => simulate::run(&args),
         Command::Demo(args) => demo::run(&args),

@@ -8,6 +8,7 @@ mod error;
 mod figures;
 mod format;
 mod html;
+mod moire;
 mod provenance;
 mod report;
 pub mod results;
@@ -16,8 +17,9 @@ mod tables;
 
 pub use draw::colormap::ColorMap;
 pub use error::ReportError;
-pub use figures::{Drawing, Figure, figures, pulls};
+pub use figures::{Drawing, Figure, cell_figure, figures, pulls};
 pub use format::{plus_minus, two_digits};
+pub use moire::{CellResult, MoireDocument};
 pub use provenance::{FailedInput, InputFile, Provenance};
 #[cfg(feature = "parquet")]
 pub use report::parquet_tables;

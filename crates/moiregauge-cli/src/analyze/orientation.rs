@@ -49,7 +49,16 @@ pub(crate) enum DirectionArg {
 
 /// Degrees and σ.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Angle([f64; 2]);
+pub(crate) struct Angle(pub(crate) [f64; 2]);
+
+impl From<DirectionArg> for LatticeDirection {
+    fn from(of: DirectionArg) -> Self {
+        match of {
+            DirectionArg::Atomic => Self::Atomic,
+            DirectionArg::Reciprocal => Self::Reciprocal,
+        }
+    }
+}
 
 impl OrientationArgs {
     /// The orientation that was given.
@@ -59,10 +68,7 @@ impl OrientationArgs {
             angle_deg,
             sigma_deg,
             layer: self.lattice_angle_layer,
-            of: match self.lattice_angle_of {
-                DirectionArg::Atomic => LatticeDirection::Atomic,
-                DirectionArg::Reciprocal => LatticeDirection::Reciprocal,
-            },
+            of: self.lattice_angle_of.into(),
         })
     }
 
@@ -122,7 +128,7 @@ impl OrientationArgs {
 }
 
 /// `12.3±0.2`, `12.3+-0.2` or `12.3+/-0.2`.
-fn parse_angle(text: &str) -> Result<Angle, String> {
+pub(crate) fn parse_angle(text: &str) -> Result<Angle, String> {
     let parsed = || {
         let (angle, sigma) = ["±", "+/-", "+-"]
             .iter()

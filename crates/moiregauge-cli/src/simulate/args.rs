@@ -4,7 +4,9 @@ use std::path::PathBuf;
 
 use anyhow::Context as _;
 use moiregauge::material::Material;
-use moiregauge::simulate::{FirstDirection, Simulation};
+use moiregauge::simulate::{FirstDirection, Pattern, Simulation};
+
+use crate::config::named_layers;
 
 /// Write simulated NanoScope sets and the truth about them
 ///
@@ -20,6 +22,8 @@ Examples:
   moiregauge simulate --out sim                        ten scans, slow axis y, in sim/simulated
   moiregauge simulate --out sim --paper                the three sets of arXiv 2406.08681
   moiregauge simulate --out sim --name fast --scans 6 --slow x --rate 4 --drift -0.3 0.6
+  moiregauge simulate --out sim --layers graphene/hBN --twist 0.8 --biaxial 0.1
+  moiregauge simulate --out sim --name atoms --atoms 1 --size 5 5 --scans 2 --pixels 256
   moiregauge simulate --print-config > set.toml        every setting, to be edited
   moiregauge simulate --out sim --config set.toml --seed 7
 
@@ -71,12 +75,21 @@ pub(crate) struct SimulateArgs {
     /// Material of both layers
     #[arg(long, value_parser = parse_material)]
     material: Option<Material>,
+    /// The layers: graphene for two equal ones, graphene/hBN for graphene (layer 2) on hBN (layer 1)
+    #[arg(long, value_name = "UPPER/LOWER", conflicts_with = "material")]
+    layers: Option<String>,
+    /// Show the atoms of this layer in place of the moiré: 1, the lower one, or 2
+    #[arg(long, value_name = "1|2", value_parser = clap::value_parser!(u8).range(1..=2))]
+    atoms: Option<u8>,
     /// Twist, degrees
     #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
     twist: Option<f64>,
     /// Uniaxial strain of layer 2, per cent
     #[arg(long, value_name = "PERCENT", allow_negative_numbers = true)]
     strain: Option<f64>,
+    /// Strain of layer 2 that is the same in all directions, on top of the uniaxial one, per cent
+    #[arg(long, value_name = "PERCENT", allow_negative_numbers = true)]
+    biaxial: Option<f64>,
     /// Axis of the strain, counted from layer 1, degrees
     #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
     strain_axis: Option<f64>,
@@ -149,6 +162,7 @@ impl SimulateArgs {
         change(self.start, &mut set.raster.start_s);
         change(self.twist, &mut set.sample.twist_deg);
         change(self.strain, &mut set.sample.strain_percent);
+        change(self.biaxial, &mut set.sample.biaxial_percent);
         change(self.strain_axis, &mut set.sample.strain_axis_deg);
         change(self.lattice_angle, &mut set.sample.lattice_angle_deg);
         change(self.sharpness, &mut set.sample.sharpness);
@@ -185,6 +199,16 @@ impl SimulateArgs {
         }
         if let Some(material) = &self.material {
             set.sample.material = material.clone();
+        }
+        if let Some(layers) = &self.layers {
+            (set.sample.material, set.sample.substrate) = named_layers(layers, &[])?;
+        }
+        if let Some(layer) = self.atoms {
+            set.sample.pattern = if layer == 1 {
+                Pattern::Layer1
+            } else {
+                Pattern::Layer2
+            };
         }
         if let Some(drift) = &self.drift {
             set.drift.velocity_nm_per_min = pair(drift);

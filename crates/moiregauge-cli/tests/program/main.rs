@@ -3,6 +3,7 @@
 mod acceptance;
 mod common;
 mod formats;
+mod layers;
 mod refusals;
 mod results;
 mod round_trip;

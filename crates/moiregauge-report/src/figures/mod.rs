@@ -4,6 +4,7 @@
 //! vector, and filled symbols for up scans, open ones for down scans, are the same everywhere.
 
 mod budget;
+mod cell;
 mod comparison;
 mod drift;
 mod error_relation;
@@ -20,6 +21,7 @@ mod wavelengths;
 mod wavelengths_nominal;
 mod window;
 
+pub use cell::cell as cell_figure;
 pub use pulls::pulls;
 
 use moiregauge::analysis::{Analysis, SetAnalysis};

@@ -1,0 +1,115 @@
+//! `moiregauge moire`: layers, twist and strain → the moiré they make; and a moiré → what it means.
+
+mod args;
+mod words;
+
+use std::process::ExitCode;
+
+use anyhow::{Context as _, bail, ensure};
+use moiregauge::budget::{Budget, Statistical};
+use moiregauge::cell::{MoireCell, from_wavelengths};
+use moiregauge::lattice::LatticeVectors;
+use moiregauge::material::Material;
+use moiregauge::readings::Readings;
+use moiregauge::settings::Settings;
+use moiregauge::strain::{Stacking, moire_of, twist_strain};
+use moiregauge_report::{CellResult, MoireDocument, cell_figure};
+use nalgebra::{Matrix2, Matrix4};
+
+pub(crate) use args::MoireArgs;
+
+use crate::say::say;
+
+/// Calculates, prints and draws.
+pub(crate) fn run(args: &MoireArgs) -> anyhow::Result<ExitCode> {
+    if args.list {
+        say(&words::list(&Material::all()))?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    let settings = args.settings()?;
+    let asked = args.question()?;
+    let lattice = match &asked {
+        Question::Forward(stacking) => LatticeVectors {
+            basis: moire_of(stacking, settings.bilayer(), settings.strain_convention)?,
+            covariance: Matrix4::zeros(),
+        },
+        Question::Wavelengths {
+            lengths,
+            sigmas,
+            meaning,
+        } => from_wavelengths(*lengths, *sigmas, *meaning)?,
+        Question::Vectors { basis, sigma } => LatticeVectors {
+            basis: *basis,
+            covariance: Matrix4::identity() * (sigma * sigma),
+        },
+    };
+    let cell = MoireCell::new(&lattice.basis).context("the two vectors are parallel")?;
+    let forward = matches!(asked, Question::Forward(_));
+    let read = if forward {
+        None
+    } else {
+        ensure!(
+            settings.lattice_angle.is_none() || !matches!(asked, Question::Wavelengths { .. }),
+            "--lattice-angle needs --vectors: three wavelengths do not tell how the moiré lies in the \
+             laboratory"
+        );
+        Some(read(&lattice, &settings)?)
+    };
+    let document = MoireDocument::new(
+        args.in_words(),
+        CellResult::new(&cell, args.band_degeneracy),
+        read.as_ref().map(|(found, readings)| (found, readings)),
+        &settings,
+    );
+    if args.json {
+        say(&document.to_json()?)?;
+    } else {
+        say(&words::answer(
+            &document,
+            read.as_ref().map(|(_, readings)| readings),
+            matches!(asked, Question::Wavelengths { .. }),
+        ))?;
+    }
+    if let Some(path) = &args.figure {
+        let drawing = cell_figure(&cell, "moire", &document.layers);
+        let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("");
+        let bytes = match extension.to_ascii_lowercase().as_str() {
+            "svg" => drawing.svg.into_bytes(),
+            "png" => drawing.png()?,
+            other => bail!("--figure: expected a name that ends in .svg or .png, found {other:?}"),
+        };
+        std::fs::write(path, bytes).with_context(|| format!("cannot write {}", path.display()))?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// What is asked.
+#[derive(Clone, Debug)]
+enum Question {
+    /// Which moiré do these layers make?
+    Forward(Stacking),
+    /// What do three wavelengths mean?
+    Wavelengths {
+        lengths: [f64; 3],
+        sigmas: [f64; 3],
+        meaning: moiregauge::cell::WavelengthMeaning,
+    },
+    /// What do two vectors mean?
+    Vectors { basis: Matrix2<f64>, sigma: f64 },
+}
+
+/// All readings of a lattice whose covariance is all that is not known of it.
+fn read(
+    lattice: &LatticeVectors,
+    settings: &Settings,
+) -> anyhow::Result<(moiregauge::strain::TwistStrain, Readings)> {
+    let found = twist_strain(lattice, settings.bilayer(), settings.strain_convention)?;
+    let statistical = Statistical {
+        image: lattice.covariance,
+        drift: Matrix4::zeros(),
+        sensor: Matrix4::zeros(),
+    };
+    let budget = Budget::new(lattice, &found, &statistical, settings);
+    let readings = Readings::new(lattice, &found, &budget, settings);
+    Ok((found, readings))
+}

@@ -1,0 +1,261 @@
+//! The options of `moiregauge moire`.
+
+use std::fmt::Write as _;
+use std::path::PathBuf;
+
+use anyhow::{bail, ensure};
+use clap::ValueEnum;
+use moiregauge::cell::WavelengthMeaning;
+use moiregauge::settings::{Calibration, KnownOrientation, Settings};
+use moiregauge::strain::{Orientation, Stacking};
+use nalgebra::Matrix2;
+
+use super::Question;
+use crate::analyze::{Angle, ConventionArg, DirectionArg, parse_angle};
+use crate::config;
+
+/// The moiré of two layers, or the layers behind a moiré
+///
+/// Forwards: layers, twist and strain give the moiré vectors, wavelengths, angles, cell area and carrier
+/// density. Backwards: three wavelengths or two vectors give twist and strain, all solutions, and what
+/// isotropic strain does to them. Layer 1 is the lower one and the reference; layer 2 lies on it, is stretched
+/// and then turned by the twist.
+#[derive(clap::Args, Clone, Debug)]
+#[command(after_long_help = "\
+Examples:
+  moiregauge moire --twist 1.1
+  moiregauge moire --twist 1.1 --strain 0.3 --strain-axis 20 --figure cell.svg
+  moiregauge moire --layers graphene/hBN --twist 0
+  moiregauge moire --wavelengths 13.72,12.7,10.18 --meaning real-space --sigma 0.05
+  moiregauge moire --vectors 12.9,0.4 6.1,11.5 --sigma 0.02 --lattice-angle 11.2±0.3
+  moiregauge moire --list
+
+Angles are degrees counter-clockwise from x; strains per cent.")]
+pub(crate) struct MoireArgs {
+    /// The layers: graphene for two equal ones, graphene/hBN for graphene (layer 2) on hBN (layer 1)
+    #[arg(long, value_name = "UPPER/LOWER", default_value = "graphene")]
+    layers: String,
+    /// TOML file with layers of your own, one [[layer]] table each
+    #[arg(long, value_name = "FILE")]
+    materials: Option<PathBuf>,
+    /// Twist of layer 2 against layer 1, degrees
+    #[arg(long, value_name = "DEG", allow_negative_numbers = true, conflicts_with_all = ["wavelengths", "vectors"])]
+    twist: Option<f64>,
+    /// Uniaxial strain of layer 2, per cent: that much along the axis, −ν times as much across
+    #[arg(long, value_name = "PERCENT", allow_negative_numbers = true, conflicts_with_all = ["wavelengths", "vectors"])]
+    strain: Option<f64>,
+    /// Axis of the strain, degrees, counted from the reciprocal vectors of layer 1 (φ)
+    #[arg(long, value_name = "DEG", allow_negative_numbers = true, requires = "strain")]
+    strain_axis: Option<f64>,
+    /// Strain of layer 2 that is the same in all directions, per cent, on top
+    #[arg(long, value_name = "PERCENT", allow_negative_numbers = true, conflicts_with_all = ["wavelengths", "vectors"])]
+    biaxial: Option<f64>,
+    /// Orientation of layer 1, degrees; backwards with its standard uncertainty, as in 11.2±0.3, and it
+    /// gives the whole strain tensor
+    #[arg(long, value_name = "DEG[±SIGMA]", allow_hyphen_values = true)]
+    lattice_angle: Option<String>,
+    /// The layer it is that of, backwards
+    #[arg(long, value_name = "1|2", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=2))]
+    lattice_angle_layer: u8,
+    /// The vector it is that of
+    #[arg(long, value_enum, default_value_t = DirectionArg::Atomic)]
+    lattice_angle_of: DirectionArg,
+    /// Three wavelengths, nm; --meaning has to say what they are
+    #[arg(long, value_name = "A,B,C", value_delimiter = ',', conflicts_with = "vectors")]
+    wavelengths: Vec<f64>,
+    /// What the three wavelengths are: they differ as soon as there is strain
+    #[arg(long, value_enum)]
+    meaning: Option<MeaningArg>,
+    /// Two moiré vectors, nm
+    #[arg(long, num_args = 2, value_names = ["X,Y", "X,Y"], allow_hyphen_values = true)]
+    vectors: Vec<String>,
+    /// Standard uncertainty of each wavelength, or of each component of the vectors, nm
+    #[arg(long, value_name = "NM", default_value_t = 0.0)]
+    sigma: f64,
+    /// Standard deviation of the isotropic strain that the layers may have, per cent
+    #[arg(long, value_name = "PERCENT", default_value_t = Settings::default().isotropic_strain_percent)]
+    isotropic_strain: f64,
+    /// Form of the strain equation [default: real-space]
+    #[arg(long, value_enum)]
+    strain_convention: Option<ConventionArg>,
+    /// Electrons per cell at full filling: 4 in graphene (two spins, two valleys)
+    #[arg(long, value_name = "G", default_value_t = 4.0)]
+    pub(super) band_degeneracy: f64,
+    /// Draw the cell: a name that ends in .svg or .png
+    #[arg(long, value_name = "FILE")]
+    pub(super) figure: Option<PathBuf>,
+    /// Print JSON
+    #[arg(long)]
+    pub(super) json: bool,
+    /// List the layers known by name, with their sources
+    #[arg(long)]
+    pub(super) list: bool,
+}
+
+/// What three wavelengths are.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum MeaningArg {
+    /// Lengths of the vectors between neighbouring spots of the image: L₁, L₂ and L₂ − L₁
+    RealSpace,
+    /// 4π/(√3|K|) of the three spots of the Fourier transform
+    KSpace,
+}
+
+impl MoireArgs {
+    /// Layers, conventions and priors.
+    pub(super) fn settings(&self) -> anyhow::Result<Settings> {
+        let own = config::own_materials(self.materials.as_deref())?;
+        let (material, substrate) = config::named_layers(&self.layers, &own)?;
+        ensure!(
+            self.sigma >= 0.0 && self.sigma.is_finite(),
+            "--sigma cannot be negative, found {}",
+            self.sigma
+        );
+        ensure!(
+            self.band_degeneracy > 0.0 && self.band_degeneracy.is_finite(),
+            "--band-degeneracy must be a number above 0, found {}",
+            self.band_degeneracy
+        );
+        let settings = Settings {
+            material,
+            substrate,
+            lattice_angle: self.orientation()?,
+            strain_convention: self
+                .strain_convention
+                .map_or(Settings::default().strain_convention, Into::into),
+            isotropic_strain_percent: self.isotropic_strain,
+            // What is typed in has the uncertainty that is typed in.
+            calibration: Calibration {
+                gain_percent: 0.0,
+                mismatch_percent: 0.0,
+                orthogonality_mrad: 0.0,
+            },
+            ..Settings::default()
+        };
+        config::check(&settings)?;
+        Ok(settings)
+    }
+
+    fn backwards(&self) -> bool {
+        !self.wavelengths.is_empty() || !self.vectors.is_empty()
+    }
+
+    /// The orientation with its uncertainty, for reading a moiré.
+    fn orientation(&self) -> anyhow::Result<Option<KnownOrientation>> {
+        let Some(text) = self.lattice_angle.as_ref().filter(|_| self.backwards()) else {
+            return Ok(None);
+        };
+        let Angle([angle_deg, sigma_deg]) = parse_angle(text)
+            .map_err(|error| anyhow::anyhow!("--lattice-angle: {error}"))?;
+        Ok(Some(KnownOrientation {
+            angle_deg,
+            sigma_deg,
+            layer: self.lattice_angle_layer,
+            of: self.lattice_angle_of.into(),
+        }))
+    }
+
+    /// What is asked.
+    pub(super) fn question(&self) -> anyhow::Result<Question> {
+        if !self.vectors.is_empty() {
+            let [a, b] = [&self.vectors[0], &self.vectors[1]].map(|text| vector(text));
+            let (a, b) = (a?, b?);
+            return Ok(Question::Vectors {
+                basis: Matrix2::new(a[0], b[0], a[1], b[1]),
+                sigma: self.sigma,
+            });
+        }
+        if !self.wavelengths.is_empty() {
+            let Ok(lengths) = <[f64; 3]>::try_from(self.wavelengths.clone()) else {
+                bail!(
+                    "--wavelengths: expected three lengths in nm, as in 13.72,12.7,10.18, found {}",
+                    self.wavelengths.len()
+                );
+            };
+            let Some(meaning) = self.meaning else {
+                bail!(
+                    "three wavelengths have two meanings: the lengths of the vectors between neighbouring \
+                     spots of the image (--meaning real-space), or 4π/(√3|K|) of the three spots of its \
+                     Fourier transform (--meaning k-space). They are equal without strain only; 13.72, 12.7 and \
+                     10.18 nm mean a twist of 1.190° or of 1.152°"
+                );
+            };
+            return Ok(Question::Wavelengths {
+                lengths,
+                sigmas: [self.sigma; 3],
+                meaning: match meaning {
+                    MeaningArg::RealSpace => WavelengthMeaning::RealSpace,
+                    MeaningArg::KSpace => WavelengthMeaning::KSpace,
+                },
+            });
+        }
+        let Some(twist) = self.twist else {
+            bail!("expected --twist, --wavelengths or --vectors; see moiregauge moire --help");
+        };
+        Ok(Question::Forward(Stacking {
+            twist: twist.to_radians(),
+            lattice_angle: self.reference_angle()?,
+            strain: self.strain.unwrap_or(0.0) / 100.0,
+            axis_lattice: self.strain_axis.unwrap_or(0.0).to_radians(),
+            biaxial: self.biaxial.unwrap_or(0.0) / 100.0,
+        }))
+    }
+
+    /// α for the forward question: of the reciprocal vectors of layer 1, rad.
+    fn reference_angle(&self) -> anyhow::Result<f64> {
+        let Some(text) = &self.lattice_angle else {
+            return Ok(0.0);
+        };
+        let plain: Option<f64> = text.trim().trim_end_matches('°').parse().ok();
+        let Some(angle_deg) = plain.filter(|x| x.is_finite()) else {
+            bail!("--lattice-angle: expected degrees, found {text:?}");
+        };
+        let own = config::own_materials(self.materials.as_deref())?;
+        let (material, substrate) = config::named_layers(&self.layers, &own)?;
+        let known = KnownOrientation {
+            angle_deg,
+            sigma_deg: 0.0,
+            layer: 1,
+            of: self.lattice_angle_of.into(),
+        };
+        let reference = substrate.unwrap_or(material);
+        Ok(Orientation::of(&known, (&reference).into()).angle)
+    }
+
+    /// What is asked, in words.
+    pub(super) fn in_words(&self) -> String {
+        let mut text = String::new();
+        if let [a, b, c] = self.wavelengths.as_slice() {
+            let meaning = match self.meaning {
+                Some(MeaningArg::KSpace) => "4π/(√3|K|) of the wave vectors",
+                _ => "lengths of the real-space vectors",
+            };
+            let _ = write!(text, "wavelengths {a}, {b}, {c} nm, {meaning}");
+        } else if let [a, b] = self.vectors.as_slice() {
+            let _ = write!(text, "vectors ({a}) and ({b}) nm");
+        } else {
+            let _ = write!(text, "twist {}°", self.twist.unwrap_or(0.0));
+            if let Some(strain) = self.strain {
+                let axis = self.strain_axis.unwrap_or(0.0);
+                let _ = write!(text, ", strain {strain} % along {axis}° from layer 1");
+            }
+            if let Some(biaxial) = self.biaxial {
+                let _ = write!(text, ", biaxial strain {biaxial} %");
+            }
+        }
+        text
+    }
+}
+
+/// `12.9,0.4`.
+fn vector(text: &str) -> anyhow::Result<[f64; 2]> {
+    let numbers: Vec<f64> = text
+        .split(',')
+        .filter_map(|part| part.trim().parse().ok())
+        .filter(|x: &f64| x.is_finite())
+        .collect();
+    match numbers.as_slice() {
+        &[x, y] if text.split(',').count() == 2 => Ok([x, y]),
+        _ => bail!("--vectors: expected two components in nm, as in 12.9,0.4, found {text:?}"),
+    }
+}

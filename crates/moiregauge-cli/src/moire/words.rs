@@ -1,0 +1,174 @@
+//! What `moiregauge moire` prints.
+
+use std::fmt::Write as _;
+
+use moiregauge::estimate::Estimate;
+use moiregauge::material::Material;
+use moiregauge::readings::Readings;
+use moiregauge::strain::Branch;
+use moiregauge_report::{CellResult, MoireDocument, plus_minus};
+
+/// The cell, and what it means.
+pub(super) fn answer(
+    document: &MoireDocument,
+    readings: Option<&Readings>,
+    in_own_frame: bool,
+) -> String {
+    let mut text = format!("{}: {}\n", document.layers, document.input);
+    cell(&mut text, &document.cell);
+    if let Some(readings) = readings {
+        meaning(&mut text, readings, in_own_frame);
+    }
+    text
+}
+
+fn cell(text: &mut String, cell: &CellResult) {
+    let three = |values: &[f64; 3]| values.map(|v| format!("{v:.4}")).join(", ");
+    let vectors = |values: &[[f64; 2]; 3], decimals: usize| {
+        values
+            .map(|[x, y]| format!("({x:.decimals$}, {y:.decimals$})"))
+            .join(" ")
+    };
+    let _ = writeln!(text, "  L1, L2, L2 − L1     {} nm", vectors(&cell.vectors_nm, 4));
+    let _ = writeln!(text, "  wavelengths         {} nm", three(&cell.wavelengths_nm));
+    let _ = writeln!(
+        text,
+        "  angle L1 to L2      {:.4}°; directions {}°",
+        cell.angle_deg,
+        three(&cell.polar_angles_deg)
+    );
+    let _ = writeln!(
+        text,
+        "  K1, K2, K2 − K1     {} rad/nm",
+        vectors(&cell.wave_vectors_rad_per_nm, 5)
+    );
+    let _ = writeln!(
+        text,
+        "  4π/(√3|K|)          {} nm",
+        three(&cell.k_space_wavelengths_nm)
+    );
+    let _ = writeln!(text, "  cell area           {:.4} nm²", cell.area_nm2);
+    let _ = writeln!(
+        text,
+        "  carrier density     {:.4e} /cm² for one electron per cell, {:.4e} /cm² for {} (full filling{})",
+        cell.density_per_electron_cm2,
+        cell.density_full_cm2,
+        cell.band_degeneracy,
+        if cell.band_degeneracy == 4.0 {
+            " with two spins and two valleys"
+        } else {
+            ""
+        }
+    );
+}
+
+fn meaning(text: &mut String, readings: &Readings, in_own_frame: bool) {
+    let degree = 1f64.to_degrees();
+    let axes = if in_own_frame {
+        "counted from L1"
+    } else {
+        "counted from x"
+    };
+    let _ = writeln!(text, "\nreadings with uniaxial strain alone (axis {axes}):");
+    if readings.solutions.is_empty() {
+        text.push_str("  none; the nearest is that of aligned layers\n");
+    }
+    for branch in &readings.solutions {
+        solution(text, branch);
+    }
+    if let Some(found) = &readings.degeneracy {
+        text.push_str("isotropic strain of layer 2 changes the twist:");
+        for (strain, change) in &found.shifts {
+            let change = change.map_or_else(
+                || "no twist".to_owned(),
+                |c| format!("{:+.4}°", c * degree),
+            );
+            let _ = write!(text, " {:+.1} % {change};", 100.0 * strain);
+        }
+        let [low, high] = found.interval;
+        let _ = writeln!(
+            text,
+            "\n  {:.4}° to {:.4}° are open for isotropic strains of {:.3} % (1 σ) and either sign of the strain (95 %)",
+            low * degree,
+            high * degree,
+            100.0 * found.prior
+        );
+    }
+    if let Some(tensor) = &readings.tensor {
+        let best = &tensor.best;
+        let percent = |e: Estimate| plus_minus(e.scaled(100.0));
+        let _ = writeln!(
+            text,
+            "with the orientation of the layer:\n  twist {}°, mean strain {} %, shear part {} %{}",
+            plus_minus(best.twist().scaled(degree)),
+            percent(best.mean()),
+            percent(best.shear()),
+            best.axis_lab().map_or_else(String::new, |a| format!(
+                ", axis {}°",
+                plus_minus(a.scaled(degree))
+            ))
+        );
+        for split in best.splits(tensor.poisson_ratio) {
+            let _ = writeln!(
+                text,
+                "  = uniaxial {} % and biaxial {} %",
+                percent(split.uniaxial),
+                percent(split.biaxial)
+            );
+        }
+        for other in &tensor.alternatives {
+            let _ = writeln!(
+                text,
+                "  or twist {}°, mean strain {} %",
+                plus_minus(other.twist().scaled(degree)),
+                percent(other.mean())
+            );
+        }
+    }
+}
+
+fn solution(text: &mut String, branch: &Branch) {
+    let degree = 1f64.to_degrees();
+    // Without σ, as many digits as the two meanings of a wavelength and a strain by eye need.
+    let number = |value: f64, sigma: f64, decimals: usize| {
+        if sigma > 0.0 {
+            plus_minus(Estimate::new(value, sigma))
+        } else {
+            format!("{value:.decimals$}")
+        }
+    };
+    let _ = writeln!(
+        text,
+        "  twist {}°, strain {} % along {:.2}°{}",
+        number(branch.twist * degree, branch.twist_sigma * degree, 4),
+        number(branch.strain * 100.0, branch.strain_sigma * 100.0, 4),
+        branch.axis_lab * degree,
+        if branch.strain_dominated {
+            " (made by strain, distorted by twist)"
+        } else {
+            ""
+        }
+    );
+}
+
+/// The layers known by name.
+pub(super) fn list(all: &[Material]) -> String {
+    let mut text = String::new();
+    for material in all {
+        let cell = match (material.lattice_constant_b_nm, material.cell_angle_deg) {
+            (Some(b), Some(angle)) => format!(" × {b} nm, {angle}°"),
+            _ => " nm".to_owned(),
+        };
+        let _ = writeln!(
+            text,
+            "{:10} a = {}{cell} (± {}), ν = {} (± {}); {}",
+            material.name,
+            material.lattice_constant_nm,
+            material.lattice_constant_sigma_nm,
+            material.poisson_ratio,
+            material.poisson_ratio_sigma,
+            material.source
+        );
+    }
+    text
+}
