@@ -9,9 +9,9 @@ mod summary;
 use std::process::ExitCode;
 
 pub(crate) use args::{AnalyzeArgs, MethodArg};
-pub(crate) use chain::{Outcome, analyse_files, measure_file};
+pub(crate) use chain::{Outcome, analyse_files, measure_file, read};
 pub(crate) use files::write_all;
-pub(crate) use summary::summary;
+pub(crate) use summary::{failures, summary};
 
 use crate::info::expand;
 use crate::say::say;
@@ -21,11 +21,7 @@ use moiregauge_report::{FailedInput, write_report};
 pub(crate) fn run(args: &AnalyzeArgs) -> anyhow::Result<ExitCode> {
     let settings = args.settings()?;
     let exports = args.exports()?;
-    if let Some(threads) = args.threads {
-        rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build_global()?;
-    }
+    args.start_threads()?;
     files::refuse_overwriting(&args.out, args.force)?;
     let mut inputs = Vec::new();
     let mut failed = Vec::new();
@@ -38,7 +34,7 @@ pub(crate) fn run(args: &AnalyzeArgs) -> anyhow::Result<ExitCode> {
             }),
         }
     }
-    let loud = !args.quiet && !args.json;
+    let loud = args.is_loud();
     let known = args.known.of(&inputs);
     let outcome = analyse_files(
         &inputs,

@@ -6,6 +6,7 @@ mod convert;
 mod demo;
 mod info;
 mod input;
+mod map;
 mod say;
 mod simulate;
 mod validate;
@@ -28,6 +29,7 @@ struct Cli {
 #[derive(Subcommand)]
 enum Command {
     Analyze(Box<analyze::AnalyzeArgs>),
+    Map(Box<map::MapArgs>),
     Convert(Box<convert::ConvertArgs>),
     Info(info::InfoArgs),
     Simulate(Box<simulate::SimulateArgs>),
@@ -39,6 +41,7 @@ enum Command {
 fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Analyze(args) => analyze::run(&args),
+        Command::Map(args) => map::run(&args),
         Command::Convert(args) => convert::run(&args),
         Command::Info(args) => info::run(&args),
         Command::Simulate(args) => simulate::run(&args),

@@ -16,10 +16,11 @@ mod tables;
 
 pub use draw::colormap::ColorMap;
 pub use error::ReportError;
-pub use figures::{Drawing, Figure, figures, pulls};
+pub use figures::{Drawing, Figure, figures, map_figures, pulls};
 pub use format::{plus_minus, two_digits};
 pub use provenance::{FailedInput, InputFile, Provenance};
 #[cfg(feature = "parquet")]
 pub use report::parquet_tables;
-pub use report::{Choice, write_report};
+pub use report::{Choice, figure_files, write_report};
 pub use results::{Results, schema};
+pub use tables::map_scan;

@@ -239,6 +239,8 @@ pub struct ScanAnalysis {
     pub sensor: LatticeVectors,
     /// Lattice vectors corrected for drift, nm.
     pub drift_corrected: Option<LatticeVectors>,
+    /// The drift that was taken off, nm/s: that of its set at its time.
+    pub drift: Option<Vector2<f64>>,
     /// Twist and strain from `sensor`.
     pub twist_strain_sensor: Option<TwistStrain>,
     /// Twist and strain from `drift_corrected`.

@@ -14,6 +14,7 @@ pub mod geometry;
 pub mod image;
 pub mod joint;
 pub mod lattice;
+pub mod map;
 pub mod material;
 pub mod resample;
 pub mod rng;

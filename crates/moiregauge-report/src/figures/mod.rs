@@ -8,6 +8,7 @@ mod comparison;
 mod drift;
 mod error_relation;
 mod layout;
+mod map;
 mod parameters;
 mod pulls;
 mod scan;
@@ -20,6 +21,7 @@ mod wavelengths;
 mod wavelengths_nominal;
 mod window;
 
+pub use map::map_figures;
 pub use pulls::pulls;
 
 use moiregauge::analysis::{Analysis, SetAnalysis};

@@ -10,6 +10,7 @@ mod convert;
 mod document;
 mod joint;
 mod lattice;
+mod map;
 mod scan;
 
 pub(crate) use budget::source_name;
@@ -22,6 +23,10 @@ pub use document::{
 };
 pub use joint::{JointResult, TestedResult};
 pub use lattice::{LatticeVector, ResultEstimate, StrainMonteCarlo, TwistStrainResult};
+pub use map::{
+    AgreementResult, HarmonicResult, MapResults, MappedImage, MaskCount, QuantityResult,
+    mask_counts, quantities,
+};
 pub use scan::{LineResult, ScanResult, ScanTwistStrain, ScanVector, TipVelocity, Window};
 
 /// Name and version of the document.

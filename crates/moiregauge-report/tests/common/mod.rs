@@ -167,6 +167,7 @@ fn scan(
         nominal: Some(nominal),
         sensor,
         drift_corrected: Some(corrected),
+        drift: Some(Vector2::new(0.0086, -0.0026)),
         twist_strain_sensor: twist_strain(&sensor),
         twist_strain: twist_strain(&corrected),
         draws: strain::draws(

@@ -8,6 +8,7 @@ mod combine;
 mod corrected;
 mod group;
 mod illustrate;
+mod mapping;
 mod measure;
 mod overlap;
 mod set;
@@ -18,6 +19,7 @@ pub use channel::choose_channel;
 pub use corrected::{CorrectedImage, corrected_images, nominal_geometry, on_grid};
 pub use group::natural_order;
 pub use illustrate::illustrate;
+pub use mapping::{LineMap, MapError, map_scan};
 pub use measure::{MeasureError, MeasuredLine, MeasuredScan, measure_scan};
 pub use overlap::{Window, common_window};
 

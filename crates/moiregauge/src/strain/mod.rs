@@ -17,6 +17,7 @@ mod forward;
 mod inversion;
 mod labelling;
 mod limit;
+mod local;
 mod other_models;
 mod twist_strain;
 
@@ -25,5 +26,6 @@ pub use closure::three_vectors;
 pub use draws::draws;
 pub use error::StrainError;
 pub use forward::{moire_lattice, naive_twist};
+pub(crate) use local::FixedBranch;
 pub(crate) use other_models::Reference;
 pub use twist_strain::TwistStrain;

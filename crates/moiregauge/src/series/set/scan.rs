@@ -58,6 +58,7 @@ pub(super) fn scan_analysis(
         twist_strain_sensor: strain(&sensor),
         twist_strain: drift_corrected.as_ref().and_then(strain),
         sensor,
+        drift: drift.filter(|_| drift_corrected.is_some()).map(|d| d.0),
         drift_corrected,
         draws: Vec::new(),
         residual: None,
