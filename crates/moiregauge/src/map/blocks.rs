@@ -86,29 +86,42 @@ pub(super) fn mix(
         .map(|line| {
             let (pixels, share) = lines(image, line * height, [used, height], width);
             let mut out = vec![0.0; 2 * waves.len() * size[0]];
+            let (mut all_re, mut all_im) = (vec![0.0f32; chunk], vec![0.0f32; chunk]);
             for (i, sums) in out.chunks_exact_mut(2 * size[0].max(1)).enumerate() {
                 let (re, im) = sums.split_at_mut(size[0]);
                 let mut start = 0;
                 while start < used {
                     let end = (start + chunk).min(used);
                     let part = start..end;
-                    let (mut sum_re, mut sum_im) = (vec![0.0; end - start], vec![0.0; end - start]);
+                    let (sum_re, sum_im) = (&mut all_re[..end - start], &mut all_im[..end - start]);
+                    sum_re.fill(0.0);
+                    sum_im.fill(0.0);
                     for (row, values) in pixels.chunks_exact(used).enumerate() {
                         let [c, s] = [up[i][0][line * height + row], up[i][1][line * height + row]];
-                        let sums = sum_re.iter_mut().zip(&mut sum_im);
+                        let sums = sum_re.iter_mut().zip(sum_im.iter_mut());
                         for ((re, im), value) in sums.zip(&values[part.clone()]) {
                             *re += c * value;
                             *im += s * value;
                         }
                     }
                     let turn = along[i][0][part.clone()].iter().zip(&along[i][1][part]);
-                    for ((re, im), (c, s)) in sum_re.iter_mut().zip(&mut sum_im).zip(turn) {
+                    for ((re, im), (c, s)) in sum_re.iter_mut().zip(sum_im.iter_mut()).zip(turn) {
                         (*re, *im) = (*re * c - *im * s, *re * s + *im * c);
                     }
                     let first = start / width;
-                    for (out, sums) in [(&mut *re, &sum_re), (&mut *im, &sum_im)] {
-                        for (value, cells) in out[first..].iter_mut().zip(sums.chunks(width)) {
-                            *value = scale * cells.iter().sum::<f32>();
+                    for (out, sums) in [(&mut *re, &*sum_re), (&mut *im, &*sum_im)] {
+                        let cells = out[first..].iter_mut();
+                        match width {
+                            1 => cells.zip(sums).for_each(|(v, a)| *v = scale * a),
+                            2 => {
+                                let pairs = sums.as_chunks::<2>().0;
+                                cells
+                                    .zip(pairs)
+                                    .for_each(|(v, [a, b])| *v = scale * (a + b));
+                            }
+                            _ => cells
+                                .zip(sums.chunks(width))
+                                .for_each(|(v, all)| *v = scale * all.iter().sum::<f32>()),
                         }
                     }
                     start = end;

@@ -4,6 +4,7 @@ use nalgebra::Vector2;
 
 use super::smooth::Smoothed;
 use super::waves::{LocalLattice, Nothing};
+use super::window;
 
 /// Why a node has no value, or none to be believed; 0 is a good one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -20,7 +21,7 @@ pub enum Mask {
     /// The harmonics contradict each other (closure χ²), or a phase winds around a point nearby: a
     /// dislocation, a domain boundary, an end of the lattice.
     Defect = 4,
-    /// The lattice turns or stretches so fast that it is not straight under the window: a boundary of domains.
+    /// The lattice turns or stretches so fast that the window blurs it: a boundary of domains.
     Bent = 5,
     /// No twist and strain of the layers explain the local lattice.
     NoSolution = 6,
@@ -60,8 +61,14 @@ impl Mask {
 const IMPROBABLE: f64 = 4.26;
 /// Phase (rad) by which a wave may bend over one window width.
 const STRAIGHT: f64 = 0.35;
-/// Nodes this near to a winding point (window widths) see it.
+/// Nodes this near to a winding point, to contradicting harmonics and to lost signal (window widths) see them.
 const NEAR: f64 = 2.0;
+/// Nodes this near to a bent one are bent.
+const BESIDE: f64 = 1.0;
+/// Signal is lost, and not just hidden by noise, where its power is below this share of the usual.
+const LOST: f64 = 0.25;
+/// Blur that matters: a window wider by √2 changes a wave vector by this share of itself.
+const BLURRED: f64 = 0.004;
 /// Less of a window than this is too little.
 const SHARE: f64 = 0.6;
 /// A wave winds only where it usually stands out by so many noise units.
@@ -80,12 +87,57 @@ pub(super) struct Setting<'a> {
     /// Noise amplitude over signal amplitude of each wave, typical of the frame; waves that wind count only
     /// where this is small.
     pub(super) noise_share: &'a [f64],
+    /// What a wider window changes at each node.
+    pub(super) blurs: &'a [Blur],
+}
+
+/// What a window wider by √2 changes at a node.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Blur {
+    /// χ² of the four components of the change, noise alone being 4.
+    pub(super) chi2: f64,
+    /// The change as a share of the wave vectors.
+    pub(super) share: f64,
+}
+
+impl Blur {
+    /// The change from one lattice to that under a wider window.
+    pub(super) fn between(narrow: &LocalLattice, wide: &LocalLattice) -> Self {
+        let change = wide.pair - narrow.pair;
+        let inverse = |m: &nalgebra::Matrix2<f64>| m.try_inverse().unwrap_or_default();
+        // vec(Δ)ᵀ (indices ⊗ slope)⁻¹ vec(Δ).
+        let form = inverse(&narrow.slope) * change * inverse(&narrow.indices);
+        Self {
+            chi2: form.dot(&change) / window::OF_DIFFERENCE,
+            share: change.norm() / narrow.pair.norm(),
+        }
+    }
+
+    /// Factor on the variances of a node for what the window blurs, where that is more than chance (p < 0.01).
+    pub(super) fn factor(self) -> f64 {
+        if self.chi2 > 13.3 {
+            1.0 + (self.chi2 / 4.0 - 1.0) * window::OF_DIFFERENCE
+        } else {
+            1.0
+        }
+    }
 }
 
 /// The mask of every node.
 pub(super) fn masks(setting: &Setting, lattices: &[Result<LocalLattice, Nothing>]) -> Vec<Mask> {
     let nodes = setting.smoothed.nodes;
     let winding = windings(setting);
+    let improbable = |node: usize| {
+        let lattice = lattices[node].as_ref();
+        lattice.is_ok_and(|l| is_improbable(l.chi2, l.freedom))
+    };
+    let lost = lost(setting, lattices);
+    let spoilt = near(setting, NEAR, |n| improbable(n) || lost[n]);
+    let bent = near(setting, BESIDE, |n| {
+        let blur = setting.blurs[n];
+        (is_improbable(blur.chi2, 4) && blur.share > BLURRED)
+            || bend(setting, lattices, n) > STRAIGHT
+    });
     (0..nodes.len())
         .map(|node| {
             let at = setting.places[node];
@@ -98,20 +150,69 @@ pub(super) fn masks(setting: &Setting, lattices: &[Result<LocalLattice, Nothing>
             if setting.smoothed.support[node].is_none_or(|s| s.share < SHARE) {
                 return Mask::Missing;
             }
-            let lattice = match &lattices[node] {
-                Ok(lattice) => lattice,
+            match &lattices[node] {
                 Err(Nothing::NoPixels) => return Mask::Missing,
                 Err(Nothing::Weak) => return Mask::Weak,
-            };
-            if is_improbable(lattice.chi2, lattice.freedom) || winding[node] {
-                return Mask::Defect;
+                Ok(_) if lost[node] => return Mask::Weak,
+                Ok(_) => {}
             }
-            if bend(setting, lattices, node) > STRAIGHT {
-                return Mask::Bent;
+            if spoilt[node] || winding[node] {
+                Mask::Defect
+            } else if bent[node] {
+                Mask::Bent
+            } else {
+                Mask::Good
             }
-            Mask::Good
         })
         .collect()
+}
+
+/// Where the signal is gone.
+fn lost(setting: &Setting, lattices: &[Result<LocalLattice, Nothing>]) -> Vec<bool> {
+    let envelopes = &setting.smoothed.envelopes;
+    let power = |node: usize| {
+        let first = envelopes.iter().take(3);
+        let sum = first.map(|e| f64::from(e.amplitude[node].norm_sqr()));
+        sum.sum::<f64>()
+    };
+    let mut all: Vec<f64> = (0..lattices.len())
+        .filter(|&n| setting.smoothed.support[n].is_some_and(|s| s.share > SHARE))
+        .map(power)
+        .collect();
+    let usual = super::median(&mut all);
+    (0..lattices.len())
+        .map(|n| setting.smoothed.support[n].is_some() && power(n) < LOST * usual)
+        .collect()
+}
+
+/// Nodes no farther than so many window widths from one for which `is_core` holds.
+fn near(setting: &Setting, widths: f64, is_core: impl Fn(usize) -> bool) -> Vec<bool> {
+    let [columns, rows] = setting.smoothed.nodes.size;
+    let step = |axis: usize, next: usize| {
+        let places = (setting.places.get(next), setting.places.first());
+        match places {
+            (Some(a), Some(b)) => (a - b)[axis],
+            _ => 1.0,
+        }
+    };
+    let reach = [
+        widths * setting.width[0] / step(0, 1),
+        widths * setting.width[1] / step(1, columns),
+    ];
+    let mut out = vec![false; columns * rows];
+    for core in (0..columns * rows).filter(|&n| is_core(n)) {
+        let (column, row) = ((core % columns) as f64, (core / columns) as f64);
+        let span = |at: f64, reach: f64, count: usize| {
+            (at - reach).max(0.0).ceil() as usize..=((at + reach) as usize).min(count - 1)
+        };
+        for r in span(row, reach[1], rows) {
+            for c in span(column, reach[0], columns) {
+                let (x, y) = ((c as f64 - column) / reach[0], (r as f64 - row) / reach[1]);
+                out[r * columns + c] |= x * x + y * y <= 1.0;
+            }
+        }
+    }
+    out
 }
 
 /// Whether χ² is beyond chance: Wilson and Hilferty, PNAS 17, 684 (1931).
@@ -161,7 +262,7 @@ fn bend(setting: &Setting, lattices: &[Result<LocalLattice, Nothing>], node: usi
 fn windings(setting: &Setting) -> Vec<bool> {
     let nodes = setting.smoothed.nodes;
     let [columns, rows] = nodes.size;
-    let mut near = vec![false; nodes.len()];
+    let mut cores = vec![false; nodes.len()];
     let clear = |i: &usize| setting.noise_share[*i] * CLEAR < 1.0;
     for i in (0..setting.smoothed.envelopes.len().min(3)).filter(clear) {
         let amplitude = &setting.smoothed.envelopes[i].amplitude;
@@ -178,21 +279,10 @@ fn windings(setting: &Setting) -> Vec<bool> {
                 }
                 let turns: f64 = (0..4).map(|k| turn(around[k], around[(k + 1) % 4])).sum();
                 if turns.abs() > std::f64::consts::PI {
-                    let middle = 0.5 * (setting.places[corner] + setting.places[around[2]]);
-                    mark(setting, middle, &mut near);
+                    cores[corner] = true;
                 }
             }
         }
     }
-    near
-}
-
-fn mark(setting: &Setting, middle: Vector2<f64>, near: &mut [bool]) {
-    for (node, at) in setting.places.iter().enumerate() {
-        let away = at - middle;
-        let distance = (away.x / setting.width[0]).hypot(away.y / setting.width[1]);
-        if distance < NEAR {
-            near[node] = true;
-        }
-    }
+    near(setting, NEAR, |n| cores[n])
 }

@@ -8,7 +8,7 @@ use nalgebra::{Matrix2, Vector2};
 
 use super::blocks::{Blocks, Place, mix};
 use super::carrier::{Carrier, MOST_CELLS, Slope, Turns};
-use super::defects::{Mask, Setting, masks};
+use super::defects::{Blur, Mask, Setting, masks};
 use super::median;
 use super::noise::{Noise, PROBE_WINDOW, probes};
 use super::smooth::{Nodes, Smoothed, smooth};
@@ -37,7 +37,7 @@ const LIKELY: [[i32; 2]; 15] = [
 /// Wave vectors beyond this (rad per pixel, each component) are too near the limit of sampling.
 const FASTEST: f64 = 2.6;
 /// Blocks per period.
-const BLOCKS: f64 = 6.0;
+const BLOCKS: f64 = 5.0;
 /// The pilot's window in periods.
 const PILOT: f64 = 0.65;
 /// A harmonic that adds less than this share to what is known is not worth its time.
@@ -48,6 +48,9 @@ const NEAR_ENOUGH: f64 = 0.15;
 const ROUNDS: usize = 3;
 /// Cells of the first carrier along each axis; each round has twice as many.
 const FIRST_CELLS: usize = 4;
+/// Nodes along each axis to which the carrier is fitted, and by which windows and harmonics are chosen.
+const FOLLOWED: usize = 100;
+const LOOKED_AT: usize = 40;
 /// Nodes per width of the window.
 const NODES: f64 = 3.0;
 
@@ -243,6 +246,12 @@ impl Work {
         smooth(&self.blocks, self.reference.in_pixels(width), nodes, turns)
     }
 
+    /// The stride of nodes `distance_nm` apart, or so far that few enough fit into the frame.
+    fn sparse(&self, distance_nm: f64, most: usize) -> [usize; 2] {
+        let stride = self.stride(distance_nm);
+        [0, 1].map(|i| stride[i].max(self.blocks.size[i] / most))
+    }
+
     fn stride(&self, distance_nm: f64) -> [usize; 2] {
         let pixels = self.reference.in_pixels(distance_nm);
         [0, 1].map(|i| ((pixels[i] / self.blocks.block[i] as f64).round() as usize).max(1))
@@ -291,7 +300,7 @@ impl Work {
         self.powers = vec![0.0; 3];
         let mut found = None;
         for round in 0..ROUNDS {
-            let smoothed = self.smoothed(width, self.stride(width));
+            let smoothed = self.smoothed(width, self.sparse(width, FOLLOWED));
             let lattices = self.lattices(&smoothed, width, false);
             let mut slopes = Vec::new();
             // Turn over a window and what noise makes of it, squared.
@@ -348,7 +357,7 @@ impl Work {
     /// Keeps the harmonics that tell something of the lattice.
     fn choose_harmonics(&mut self) {
         let width = PILOT * self.period;
-        let smoothed = self.smoothed(width, self.stride(width));
+        let smoothed = self.smoothed(width, self.sparse(width, LOOKED_AT));
         let level = self.noise.levels.iter().sum::<f64>() / self.noise.levels.len() as f64;
         let mut told = Vec::new();
         for (envelope, [h, k]) in smoothed.envelopes.iter().zip(&self.indices) {
@@ -397,7 +406,7 @@ impl Work {
         };
         for &width in &steps {
             // Sparse nodes are enough, and all are independent.
-            let stride = self.stride(1.5 * width * self.period);
+            let stride = self.sparse(1.5 * width * self.period, LOOKED_AT);
             let wider = width * std::f64::consts::SQRT_2;
             let (narrow, wide) = (of(width, stride), of(wider, stride));
             let nodes = Nodes::filling(self.blocks.size, stride);
@@ -437,7 +446,17 @@ impl Work {
         }
         let step = resolution.step_nm.unwrap_or(window_nm / NODES);
         let smoothed = self.smoothed(window_nm, self.stride(step));
-        let lattices = self.lattices(&smoothed, window_nm, true);
+        let mut lattices = self.lattices(&smoothed, window_nm, true);
+        let blurs = self.blurs(
+            &lattices,
+            window_nm * std::f64::consts::SQRT_2,
+            smoothed.nodes,
+        );
+        for (lattice, blur) in lattices.iter_mut().zip(&blurs) {
+            if let Ok(lattice) = lattice {
+                lattice.slope *= blur.factor();
+            }
+        }
         let nodes = smoothed.nodes;
         let places: Vec<Vector2<f64>> = (0..nodes.len())
             .map(|n| nodes.place(&self.blocks, n))
@@ -452,6 +471,7 @@ impl Work {
                 margin: width.map(|w| w * resolution.margin),
                 frame: self.frame,
                 noise_share: &shares,
+                blurs: &blurs,
             },
             &lattices,
         );
@@ -514,6 +534,23 @@ impl Work {
                 })
                 .collect(),
         })
+    }
+
+    /// What a window of `wider` nm changes at each node.
+    fn blurs(
+        &self,
+        lattices: &[Result<LocalLattice, Nothing>],
+        wider: f64,
+        nodes: Nodes,
+    ) -> Vec<Blur> {
+        let wide = self.lattices(&self.smoothed(wider, nodes.stride), wider, true);
+        let pairs = lattices.iter().zip(&wide);
+        pairs
+            .map(|pair| match pair {
+                (Ok(narrow), Ok(wide)) => Blur::between(narrow, wide),
+                _ => Blur::default(),
+            })
+            .collect()
     }
 
     /// Noise amplitude over the median amplitude of each wave.

@@ -20,7 +20,7 @@ pub(super) const PROBE_WINDOW: f64 = 1.5;
 /// The local ratio is averaged over so many windows.
 const AVERAGED: f64 = 3.0;
 /// Windows that hold less are not looked at.
-const WHOLE: f64 = 0.98;
+const WHOLE: f64 = 0.9;
 /// Nodes that have to be left.
 const FEWEST: usize = 6;
 

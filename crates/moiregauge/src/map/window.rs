@@ -21,9 +21,9 @@ pub(super) fn ladder(side: f64) -> Vec<f64> {
 }
 
 /// Variance of the difference of two windows, a and √2 a, in units of that of window a: 1 + ¼ − 8/9.
-const OF_DIFFERENCE: f64 = 1.25 - 8.0 / 9.0;
+pub(super) const OF_DIFFERENCE: f64 = 1.25 - 8.0 / 9.0;
 /// Where a defect is, changes beyond this many of these variances say nothing of the window.
-const OUTLYING: f64 = 25.0;
+const OUTLYING: f64 = 9.0;
 
 /// Whether a window is narrow enough: `changes` are the squared changes by a window √2 wider over the
 /// variance of this one, for independent nodes and components.
