@@ -11,10 +11,10 @@ mod summary;
 use std::process::ExitCode;
 
 pub(crate) use args::{AnalyzeArgs, ConventionArg, MethodArg};
-pub(crate) use chain::{Outcome, analyse_files, measure_file};
+pub(crate) use chain::{Outcome, analyse_files, measure_file, read};
 pub(crate) use files::write_all;
 pub(crate) use orientation::{Angle, DirectionArg, parse_angle};
-pub(crate) use summary::summary;
+pub(crate) use summary::{failures, summary};
 
 use crate::info::expand;
 use crate::say::say;
@@ -24,11 +24,7 @@ use moiregauge_report::{FailedInput, write_report};
 pub(crate) fn run(args: &AnalyzeArgs) -> anyhow::Result<ExitCode> {
     let mut settings = args.settings()?;
     let exports = args.exports()?;
-    if let Some(threads) = args.threads {
-        rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build_global()?;
-    }
+    args.start_threads()?;
     files::refuse_overwriting(&args.out, args.force)?;
     let mut inputs = Vec::new();
     let mut failed = Vec::new();
@@ -41,7 +37,7 @@ pub(crate) fn run(args: &AnalyzeArgs) -> anyhow::Result<ExitCode> {
             }),
         }
     }
-    let loud = !args.quiet && !args.json;
+    let loud = args.is_loud();
     let known = args.known.of(&inputs);
     let atomic = args.orientation.measure(&settings, &args.known)?;
     if let Some((found, _)) = &atomic {

@@ -6,6 +6,7 @@ mod convert;
 mod demo;
 mod info;
 mod input;
+mod map;
 mod moire;
 mod say;
 mod simulate;
@@ -29,6 +30,7 @@ struct Cli {
 #[derive(Subcommand)]
 enum Command {
     Analyze(Box<analyze::AnalyzeArgs>),
+    Map(Box<map::MapArgs>),
     Convert(Box<convert::ConvertArgs>),
     Moire(Box<moire::MoireArgs>),
     Info(info::InfoArgs),
@@ -41,6 +43,7 @@ enum Command {
 fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Analyze(args) => analyze::run(&args),
+        Command::Map(args) => map::run(&args),
         Command::Convert(args) => convert::run(&args),
         Command::Moire(args) => moire::run(&args),
         Command::Info(args) => info::run(&args),

@@ -17,11 +17,12 @@ mod tables;
 
 pub use draw::colormap::ColorMap;
 pub use error::ReportError;
-pub use figures::{Drawing, Figure, cell_figure, figures, pulls};
+pub use figures::{Drawing, Figure, cell_figure, figures, map_figures, pulls};
 pub use format::{plus_minus, two_digits};
 pub use moire::{CellResult, MoireDocument};
 pub use provenance::{FailedInput, InputFile, Provenance};
 #[cfg(feature = "parquet")]
 pub use report::parquet_tables;
-pub use report::{Choice, write_report};
+pub use report::{Choice, figure_files, write_report};
 pub use results::{Results, schema};
+pub use tables::map_scan;

@@ -37,7 +37,10 @@ impl Default for Choice {
 }
 
 /// The figures as files, in the order of the figures on any number of threads.
-fn figure_files(all: &[Figure], choice: Choice) -> Result<Vec<(String, Vec<u8>)>, ReportError> {
+///
+/// # Errors
+/// [`ReportError::Png`] if a figure cannot be rendered.
+pub fn figure_files(all: &[Figure], choice: Choice) -> Result<Vec<(String, Vec<u8>)>, ReportError> {
     let drawn: Vec<(&str, &str)> = all
         .iter()
         .filter_map(|f| {

@@ -15,6 +15,7 @@ pub mod geometry;
 pub mod image;
 pub mod joint;
 pub mod lattice;
+pub mod map;
 pub mod material;
 pub mod readings;
 pub mod resample;

@@ -177,7 +177,7 @@ pub(crate) type NamedSet = (String, PathBuf);
 
 impl AnalyzeArgs {
     /// The settings file, or the defaults, with the options on top.
-    pub(super) fn settings(&self) -> anyhow::Result<Settings> {
+    pub(crate) fn settings(&self) -> anyhow::Result<Settings> {
         let mut s = match &self.config {
             Some(path) => config::read(path)?,
             None => Settings::default(),
@@ -256,13 +256,53 @@ impl AnalyzeArgs {
         Ok(s)
     }
 
+    /// Makes the number of threads that is wanted.
+    pub(crate) fn start_threads(&self) -> anyhow::Result<()> {
+        if let Some(threads) = self.threads {
+            rayon::ThreadPoolBuilder::new()
+                .num_threads(threads)
+                .build_global()?;
+        }
+        Ok(())
+    }
+
+    /// The files, folders and patterns as given.
+    pub(crate) fn paths(&self) -> &[PathBuf] {
+        &self.paths
+    }
+
+    /// The folder for results.
+    pub(crate) fn out(&self) -> &std::path::Path {
+        &self.out
+    }
+
+    /// What the files do not tell.
+    pub(crate) fn known(&self) -> &KnownArgs {
+        &self.known
+    }
+
+    /// Whether results may be written over.
+    pub(crate) fn force(&self) -> bool {
+        self.force
+    }
+
+    /// Whether results go to standard output as JSON.
+    pub(crate) fn json(&self) -> bool {
+        self.json
+    }
+
+    /// Whether words for people go to the screen.
+    pub(crate) fn is_loud(&self) -> bool {
+        !self.quiet && !self.json
+    }
+
     /// The corrected images that are wanted.
     pub(super) fn exports(&self) -> anyhow::Result<Vec<Export>> {
         self.export.iter().map(|name| export::parse(name)).collect()
     }
 
     /// The sets made by hand.
-    pub(super) fn sets(&self) -> anyhow::Result<Vec<NamedSet>> {
+    pub(crate) fn sets(&self) -> anyhow::Result<Vec<NamedSet>> {
         let parse = |text: &String| match text.split_once('=') {
             Some((name, path)) if !name.is_empty() && !path.is_empty() => {
                 Ok((name.to_owned(), PathBuf::from(path)))
@@ -277,7 +317,7 @@ impl AnalyzeArgs {
         !self.no_report
     }
 
-    pub(super) fn choice(&self) -> Choice {
+    pub(crate) fn choice(&self) -> Choice {
         Choice {
             figures: !self.no_report,
             png: !self.no_report && !self.no_png,

@@ -170,15 +170,15 @@ pub(crate) fn measure_file(
 }
 
 /// A file as the analysis reads it.
-pub(super) struct Reading {
-    pub(super) scan: Scan,
+pub(crate) struct Reading {
+    pub(crate) scan: Scan,
     pub(super) input: InputFile,
     /// What the user's options replaced in it.
     pub(super) replaced: Vec<String>,
 }
 
 /// Reads what the analysis needs of a file: the chosen channel and the position sensors.
-pub(super) fn read(path: &Path, settings: &Settings, known: &Known) -> anyhow::Result<Reading> {
+pub(crate) fn read(path: &Path, settings: &Settings, known: &Known) -> anyhow::Result<Reading> {
     let bytes = std::fs::read(path)?;
     let channels = channel::names(path, &bytes, known)?;
     let names: Vec<_> = channels

@@ -276,7 +276,7 @@ fn caveats(text: &mut String, all: &[Caveat]) {
 }
 
 /// The table of what failed and why; empty if nothing did.
-pub(super) fn failures(failed: &[FailedInput]) -> String {
+pub(crate) fn failures(failed: &[FailedInput]) -> String {
     let mut text = String::new();
     if failed.is_empty() {
         return text;

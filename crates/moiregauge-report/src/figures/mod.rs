@@ -9,6 +9,7 @@ mod comparison;
 mod drift;
 mod error_relation;
 mod layout;
+mod map;
 mod parameters;
 mod pulls;
 mod scan;
@@ -22,6 +23,7 @@ mod wavelengths_nominal;
 mod window;
 
 pub use cell::cell as cell_figure;
+pub use map::map_figures;
 pub use pulls::pulls;
 
 use moiregauge::analysis::{Analysis, SetAnalysis};

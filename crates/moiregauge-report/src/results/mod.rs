@@ -10,6 +10,7 @@ mod convert;
 mod document;
 mod joint;
 mod lattice;
+mod map;
 mod readings;
 mod scan;
 
@@ -23,6 +24,10 @@ pub use document::{
 };
 pub use joint::{JointResult, TestedResult};
 pub use lattice::{LatticeVector, ResultEstimate, StrainMonteCarlo, TwistStrainResult};
+pub use map::{
+    AgreementResult, HarmonicResult, MapResults, MappedImage, MaskCount, QuantityResult,
+    mask_counts, quantities,
+};
 pub use readings::{
     AtomicResult, IsotropicStrainResult, ReadingsResult, ShiftResult, SolutionResult, SplitResult,
     StrainTensorResult, TensorNumbers, TensorSigmas,

@@ -7,8 +7,11 @@
 mod budget;
 mod columns;
 mod csv;
+mod map;
 #[cfg(feature = "parquet")]
 mod parquet;
+
+pub use map::map_scan;
 
 use crate::results::Results;
 #[cfg(feature = "parquet")]

@@ -9,6 +9,7 @@
 
 mod calendar;
 mod error;
+mod field;
 mod frame;
 mod raster;
 mod scene;
@@ -18,6 +19,7 @@ mod truth;
 use spmfile::Scan;
 
 pub use error::SimulateError;
+pub use field::{Feature, FieldScene, Ripple};
 pub use settings::{Drift, FirstDirection, Noise, Pattern, Raster, Sample, Simulation, Window};
 pub use truth::{FrameTruth, Truth};
 

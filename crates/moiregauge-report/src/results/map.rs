@@ -1,0 +1,180 @@
+//! The summary of a map as a document, `moiregauge/map/1`: degrees, per cent, nm.
+
+use moiregauge::caveat::Caveat;
+use moiregauge::map::{Agreement, Mask, Plane, TwistStrainMap, UsedHarmonic};
+use moiregauge::settings::Settings;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::{Conventions, TwistStrainResult};
+use crate::provenance::Provenance;
+
+/// What a map comes to.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+pub struct MapResults {
+    /// Name and version of this document.
+    pub schema: String,
+    /// Program, seed, inputs.
+    pub provenance: Provenance,
+    /// What the numbers mean.
+    pub conventions: Conventions,
+    /// What the errors of the maps are and what they leave out.
+    pub errors: String,
+    /// The settings of the analysis.
+    pub settings: Settings,
+    /// How the map was made: `demodulation` or `tiles`.
+    pub method: String,
+    /// Width of the window, standard deviation of the Gaussian, nm.
+    pub window_nm: f64,
+    /// Full width at half maximum of what a point becomes, nm.
+    pub resolution_nm: f64,
+    /// Columns and rows of nodes.
+    pub nodes: [usize; 2],
+    /// Node (0, 0), nm.
+    pub origin_nm: [f64; 2],
+    /// The way to the next node in a row, and to the next row, nm.
+    pub step_nm: [[f64; 2]; 2],
+    /// Nodes by mask.
+    pub masks: Vec<MaskCount>,
+    /// Mean and spread of every quantity over the good nodes.
+    pub quantities: Vec<QuantityResult>,
+    /// The fit to the whole images, to compare with: twist and strain with all errors.
+    pub whole_image: Option<TwistStrainResult>,
+    /// The images behind the map.
+    pub images: Vec<MappedImage>,
+    /// How images of one place agree.
+    pub agreement: Option<AgreementResult>,
+    /// Doubts.
+    pub caveats: Vec<Caveat>,
+}
+
+/// How many nodes have a mask.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+pub struct MaskCount {
+    /// Its number in the files.
+    pub value: u8,
+    /// What it means.
+    pub name: String,
+    /// Nodes.
+    pub nodes: usize,
+}
+
+/// Mean and spread of a quantity over the good nodes.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+pub struct QuantityResult {
+    /// Its name in the files.
+    pub name: String,
+    /// Its unit.
+    pub unit: String,
+    /// Mean.
+    pub mean: f64,
+    /// Upper limit of the standard error of the mean by image noise.
+    pub mean_sigma: f64,
+    /// Standard deviation over the nodes.
+    pub spread: f64,
+    /// The same with the noise taken off.
+    pub spread_corrected: f64,
+    /// Root mean square of the errors of the nodes.
+    pub noise: f64,
+}
+
+/// One image behind a map.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+pub struct MappedImage {
+    /// The file as the user named it.
+    pub file: String,
+    /// `trace` or `retrace`.
+    pub line: String,
+    /// Whether its drift is taken off.
+    pub drift_corrected: bool,
+    /// The harmonics that were used.
+    pub harmonics: Vec<HarmonicResult>,
+}
+
+/// A harmonic of the lattice.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+pub struct HarmonicResult {
+    /// (h, k).
+    pub index: [i32; 2],
+    /// Amplitude, root mean square over the frame, unit of the image.
+    pub amplitude: f64,
+    /// Variance per pixel of white noise as strong as the noise there.
+    pub noise: f64,
+}
+
+impl From<&UsedHarmonic> for HarmonicResult {
+    fn from(h: &UsedHarmonic) -> Self {
+        Self {
+            index: h.index,
+            amplitude: h.amplitude,
+            noise: h.noise,
+        }
+    }
+}
+
+/// How images of one place agree.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize, JsonSchema)]
+pub struct AgreementResult {
+    /// χ² per degree of freedom of the single images about their average.
+    pub chi2_per_dof: f64,
+    /// Factor on all variances that follows from it.
+    pub variance_factor: f64,
+    /// Nodes that two images or more cover.
+    pub nodes: usize,
+}
+
+impl From<Agreement> for AgreementResult {
+    fn from(a: Agreement) -> Self {
+        Self {
+            chi2_per_dof: a.chi2_per_dof,
+            variance_factor: a.factor,
+            nodes: a.nodes,
+        }
+    }
+}
+
+/// Nodes by mask, those that do not occur left out.
+pub fn mask_counts(map: &TwistStrainMap) -> Vec<MaskCount> {
+    let count = |mask: Mask| MaskCount {
+        value: mask as u8,
+        name: mask.name().to_owned(),
+        nodes: map.count(mask),
+    };
+    let all = Mask::ALL.into_iter().map(count);
+    all.filter(|c| c.nodes > 0).collect()
+}
+
+/// Mean and spread of every quantity.
+pub fn quantities(map: &TwistStrainMap) -> Vec<QuantityResult> {
+    let degree = 1f64.to_degrees();
+    let [e1, e2] = &map.strain;
+    let [l1, l2, l3] = &map.wavelengths;
+    let [ux, uy] = &map.displacement;
+    let all: [(&str, &str, &Plane, f64); 11] = [
+        ("twist", "°", &map.twist, degree),
+        ("strain", "%", &map.magnitude, 100.0),
+        ("strain vector 1", "%", e1, 100.0),
+        ("strain vector 2", "%", e2, 100.0),
+        ("lattice angle", "°", &map.lattice_angle, degree),
+        ("wavelength 1", "nm", l1, 1.0),
+        ("wavelength 2", "nm", l2, 1.0),
+        ("wavelength 3", "nm", l3, 1.0),
+        ("orientation", "°", &map.orientation, degree),
+        ("displacement x", "nm", ux, 1.0),
+        ("displacement y", "nm", uy, 1.0),
+    ];
+    all.into_iter()
+        .filter_map(|(name, unit, plane, factor)| {
+            let found = map.spread(plane)?;
+            Some(QuantityResult {
+                name: name.to_owned(),
+                unit: unit.to_owned(),
+                mean: factor * found.mean,
+                mean_sigma: factor * found.mean_sigma,
+                spread: factor * found.spread,
+                spread_corrected: factor * found.corrected,
+                noise: factor * found.noise,
+            })
+        })
+        .collect()
+}

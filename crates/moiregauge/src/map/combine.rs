@@ -1,0 +1,223 @@
+//! Several maps of one place → one: on a common grid, compared and averaged node by node.
+//!
+//! Averages are those of wave vectors, weighted by their inverse covariance. χ² of the single maps about the
+//! average says whether they agree: node by node (mask), and over all nodes, where it either enlarges the
+//! errors (scatter beyond them) or, for two maps that share noise, shows how much they share:
+//! `χ²/dof = 1 − ρ`, `σ² → σ²(1 + ρ)`.
+
+use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
+use rayon::prelude::*;
+
+use super::defects::{Mask, is_improbable};
+use super::sample::{Grid, LatticeMap, LatticeNode};
+use crate::lattice::LatticeVectors;
+
+/// How well maps agree.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Agreement {
+    /// χ² per degree of freedom of the single maps about their average, over nodes that all cover.
+    pub chi2_per_dof: f64,
+    /// Factor on all variances that follows from it.
+    pub factor: f64,
+    /// Nodes that two maps or more cover.
+    pub nodes: usize,
+}
+
+/// The average of maps of one place; `None` of none. One map alone is returned as it is.
+pub fn combine(maps: &[&LatticeMap]) -> Option<(LatticeMap, Option<Agreement>)> {
+    let [first, rest @ ..] = maps else {
+        return None;
+    };
+    if rest.is_empty() {
+        return Some(((*first).clone(), None));
+    }
+    let grid = common_grid(maps)?;
+    let views: Vec<View> = maps.iter().filter_map(|map| View::new(map)).collect();
+    let mut found: Vec<(LatticeNode, f64, usize)> = (0..grid.len())
+        .into_par_iter()
+        .map(|node| average(&views, grid.place(node)))
+        .collect();
+    let (mut sum, mut freedom, mut nodes) = (0.0, 0, 0);
+    for (node, chi2, dof) in &found {
+        if node.mask == Mask::Good && *dof > 0 {
+            sum += chi2;
+            freedom += dof;
+            nodes += 1;
+        }
+    }
+    let agreement = (freedom > 0).then(|| {
+        let reduced = sum / freedom as f64;
+        let factor = if reduced >= 1.0 {
+            reduced
+        } else {
+            2.0 - reduced
+        };
+        Agreement {
+            chi2_per_dof: reduced,
+            factor,
+            nodes,
+        }
+    });
+    if let Some(agreement) = agreement {
+        for (node, chi2, dof) in &mut found {
+            if *dof > 0 {
+                node.waves.covariance *= agreement.factor;
+                let scaled = *chi2 / agreement.chi2_per_dof.max(1.0);
+                if node.mask == Mask::Good && is_improbable(scaled, *dof) {
+                    node.mask = Mask::Contradiction;
+                }
+            }
+        }
+    }
+    let map = LatticeMap {
+        grid,
+        window_nm: maps.iter().map(|m| m.window_nm).fold(0.0, f64::max),
+        nodes: found.into_iter().map(|(node, _, _)| node).collect(),
+    };
+    Some((map, agreement))
+}
+
+/// A square grid along the axes of the laboratory that covers all maps, as fine as the finest.
+fn common_grid(maps: &[&LatticeMap]) -> Option<Grid> {
+    let corners = maps.iter().flat_map(|map| {
+        let [columns, rows] = map.grid.size.map(|n| n as f64 - 1.0);
+        [(0.0, 0.0), (columns, 0.0), (0.0, rows), (columns, rows)]
+            .map(|(c, r)| map.grid.origin + map.grid.step * Vector2::new(c, r))
+    });
+    let (low, high) = corners.fold(
+        (
+            Vector2::repeat(f64::INFINITY),
+            Vector2::repeat(f64::NEG_INFINITY),
+        ),
+        |(low, high): (Vector2<f64>, Vector2<f64>), c| (low.inf(&c), high.sup(&c)),
+    );
+    let steps = maps
+        .iter()
+        .flat_map(|m| [m.grid.step.column(0).norm(), m.grid.step.column(1).norm()]);
+    let step = steps.fold(f64::INFINITY, f64::min);
+    if !(step > 0.0 && step.is_finite()) {
+        return None;
+    }
+    let count = |length: f64| (length / step + 1e-6).floor() as usize + 1;
+    let extent = high - low;
+    let size = [count(extent.x), count(extent.y)];
+    let used = Vector2::new(size[0] as f64 - 1.0, size[1] as f64 - 1.0) * step;
+    Some(Grid {
+        size,
+        origin: low + 0.5 * (extent - used),
+        step: Matrix2::identity() * step,
+    })
+}
+
+/// A map and the way from places to its nodes.
+struct View<'a> {
+    map: &'a LatticeMap,
+    inverse: Matrix2<f64>,
+}
+
+impl<'a> View<'a> {
+    fn new(map: &'a LatticeMap) -> Option<Self> {
+        let inverse = map.grid.step.try_inverse()?;
+        Some(Self { map, inverse })
+    }
+
+    /// The map at a place, between its nodes (bilinear); the mask is the worst of those around.
+    fn at(&self, place: Vector2<f64>) -> Option<LatticeNode> {
+        let t = self.inverse * (place - self.map.grid.origin);
+        let along = |axis: usize| {
+            let last = self.map.grid.size[axis] as f64 - 1.0;
+            if !(-1e-6..=last + 1e-6).contains(&t[axis]) {
+                return None;
+            }
+            let cell = t[axis].floor().clamp(0.0, (last - 1.0).max(0.0));
+            Some((cell as usize, (t[axis] - cell).clamp(0.0, 1.0)))
+        };
+        let ((column, u), (row, v)) = (along(0)?, along(1)?);
+        let columns = self.map.grid.size[0];
+        let mut out: Option<LatticeNode> = None;
+        for (c, r, weight) in [
+            (column, row, (1.0 - u) * (1.0 - v)),
+            (column + 1, row, u * (1.0 - v)),
+            (column, row + 1, (1.0 - u) * v),
+            (column + 1, row + 1, u * v),
+        ] {
+            if weight < 1e-9 {
+                continue;
+            }
+            let node = self.map.nodes[r * columns + c];
+            let scaled = LatticeNode {
+                waves: LatticeVectors {
+                    basis: node.waves.basis * weight,
+                    covariance: node.waves.covariance * weight,
+                },
+                chi2: node.chi2 * weight,
+                signal_to_noise: node.signal_to_noise * weight,
+                ..node
+            };
+            out = Some(match out {
+                None => scaled,
+                Some(sum) => LatticeNode {
+                    mask: sum.mask.max(node.mask),
+                    waves: LatticeVectors {
+                        basis: sum.waves.basis + scaled.waves.basis,
+                        covariance: sum.waves.covariance + scaled.waves.covariance,
+                    },
+                    chi2: sum.chi2 + scaled.chi2,
+                    freedom: sum.freedom.max(node.freedom),
+                    signal_to_noise: sum.signal_to_noise + scaled.signal_to_noise,
+                },
+            });
+        }
+        out
+    }
+}
+
+/// The weighted mean at a place, χ² of the maps about it and its degrees of freedom.
+fn average(views: &[View], place: Vector2<f64>) -> (LatticeNode, f64, usize) {
+    let seen: Vec<LatticeNode> = views.iter().filter_map(|view| view.at(place)).collect();
+    let good: Vec<&LatticeNode> = seen.iter().filter(|n| n.mask == Mask::Good).collect();
+    let nothing = |mask| LatticeNode {
+        mask,
+        waves: LatticeVectors {
+            basis: Matrix2::repeat(f64::NAN),
+            covariance: Matrix4::repeat(f64::NAN),
+        },
+        chi2: f64::NAN,
+        freedom: 0,
+        signal_to_noise: 0.0,
+    };
+    if good.is_empty() {
+        // The least bad reason, with its values if it has any.
+        let best = seen.iter().min_by_key(|n| n.mask);
+        return (best.copied().unwrap_or(nothing(Mask::Margin)), 0.0, 0);
+    }
+    let (mut normal, mut right) = (Matrix4::zeros(), Vector4::zeros());
+    let mut weights = Vec::with_capacity(good.len());
+    for node in &good {
+        let Some(weight) = node.waves.covariance.try_inverse() else {
+            return (nothing(Mask::Weak), 0.0, 0);
+        };
+        normal += weight;
+        right += weight * node.waves.flat();
+        weights.push(weight);
+    }
+    let Some(covariance) = normal.try_inverse() else {
+        return (nothing(Mask::Weak), 0.0, 0);
+    };
+    let mean = covariance * right;
+    let chi2 = good.iter().zip(&weights).map(|(node, weight)| {
+        let miss = node.waves.flat() - mean;
+        (miss.transpose() * weight * miss)[0]
+    });
+    let node = LatticeNode {
+        mask: Mask::Good,
+        waves: LatticeVectors {
+            basis: Matrix2::from_column_slice(mean.as_slice()),
+            covariance,
+        },
+        chi2: good.iter().map(|n| n.chi2).sum(),
+        freedom: good.iter().map(|n| n.freedom).sum(),
+        signal_to_noise: good.iter().map(|n| n.signal_to_noise).sum(),
+    };
+    (node, chi2.sum(), 4 * (good.len() - 1))
+}

@@ -1,0 +1,288 @@
+//! Which nodes are to be believed, and why others are not.
+
+use nalgebra::Vector2;
+
+use super::smooth::Smoothed;
+use super::waves::{LocalLattice, Nothing};
+use super::window;
+
+/// Why a node has no value, or none to be believed; 0 is a good one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[repr(u8)]
+pub enum Mask {
+    /// To be believed.
+    Good = 0,
+    /// So near the edge that the window reaches beyond the frame.
+    Margin = 1,
+    /// Too many pixels are missing under the window.
+    Missing = 2,
+    /// The lattice does not stand out of the noise.
+    Weak = 3,
+    /// The harmonics contradict each other (closure χ²), or a phase winds around a point nearby: a
+    /// dislocation, a domain boundary, an end of the lattice.
+    Defect = 4,
+    /// The lattice turns or stretches so fast that the window blurs it: a boundary of domains.
+    Bent = 5,
+    /// No twist and strain of the layers explain the local lattice.
+    NoSolution = 6,
+    /// Scans that both cover the place contradict each other.
+    Contradiction = 7,
+}
+
+impl Mask {
+    /// All of them, in the order of their numbers.
+    pub const ALL: [Self; 8] = [
+        Self::Good,
+        Self::Margin,
+        Self::Missing,
+        Self::Weak,
+        Self::Defect,
+        Self::Bent,
+        Self::NoSolution,
+        Self::Contradiction,
+    ];
+
+    /// A word for people and files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Good => "good",
+            Self::Margin => "margin",
+            Self::Missing => "missing pixels",
+            Self::Weak => "weak signal",
+            Self::Defect => "defect",
+            Self::Bent => "bent",
+            Self::NoSolution => "no solution",
+            Self::Contradiction => "contradiction",
+        }
+    }
+}
+
+/// A good χ² exceeds the limit once in some 10⁵ nodes.
+const IMPROBABLE: f64 = 4.26;
+/// Phase (rad) by which a wave may bend over one window width.
+const STRAIGHT: f64 = 0.35;
+/// Nodes this near to a winding point, to contradicting harmonics and to lost signal (window widths) see them.
+const NEAR: f64 = 2.0;
+/// Nodes this near to a bent one are bent.
+const BESIDE: f64 = 1.0;
+/// Signal is lost, and not just hidden by noise, where its power is below this share of the usual.
+const LOST: f64 = 0.25;
+/// Blur that matters: a window wider by √2 changes a wave vector by this share of itself.
+const BLURRED: f64 = 0.004;
+/// Less of a window than this is too little.
+const SHARE: f64 = 0.6;
+/// A wave winds only where it usually stands out by so many noise units.
+const CLEAR: f64 = 6.0;
+
+/// What the masks need to know of the nodes.
+pub(super) struct Setting<'a> {
+    pub(super) smoothed: &'a Smoothed,
+    /// Place of every node, pixels.
+    pub(super) places: &'a [Vector2<f64>],
+    /// Width of the window and margin, pixels.
+    pub(super) width: [f64; 2],
+    pub(super) margin: [f64; 2],
+    /// First and last pixel of the frame.
+    pub(super) frame: [Vector2<f64>; 2],
+    /// Noise amplitude over signal amplitude of each wave, typical of the frame; waves that wind count only
+    /// where this is small.
+    pub(super) noise_share: &'a [f64],
+    /// What a wider window changes at each node.
+    pub(super) blurs: &'a [Blur],
+}
+
+/// What a window wider by √2 changes at a node.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Blur {
+    /// χ² of the four components of the change, noise alone being 4.
+    pub(super) chi2: f64,
+    /// The change as a share of the wave vectors.
+    pub(super) share: f64,
+}
+
+impl Blur {
+    /// The change from one lattice to that under a wider window.
+    pub(super) fn between(narrow: &LocalLattice, wide: &LocalLattice) -> Self {
+        let change = wide.pair - narrow.pair;
+        let inverse = |m: &nalgebra::Matrix2<f64>| m.try_inverse().unwrap_or_default();
+        // vec(Δ)ᵀ (indices ⊗ slope)⁻¹ vec(Δ).
+        let form = inverse(&narrow.slope) * change * inverse(&narrow.indices);
+        Self {
+            chi2: form.dot(&change) / window::OF_DIFFERENCE,
+            share: change.norm() / narrow.pair.norm(),
+        }
+    }
+
+    /// Factor on the variances of a node for what the window blurs, where that is more than chance (p < 0.01).
+    pub(super) fn factor(self) -> f64 {
+        if self.chi2 > 13.3 {
+            1.0 + (self.chi2 / 4.0 - 1.0) * window::OF_DIFFERENCE
+        } else {
+            1.0
+        }
+    }
+}
+
+/// The mask of every node.
+pub(super) fn masks(setting: &Setting, lattices: &[Result<LocalLattice, Nothing>]) -> Vec<Mask> {
+    let nodes = setting.smoothed.nodes;
+    let winding = windings(setting);
+    let improbable = |node: usize| {
+        let lattice = lattices[node].as_ref();
+        lattice.is_ok_and(|l| is_improbable(l.chi2, l.freedom))
+    };
+    let lost = lost(setting, lattices);
+    let spoilt = near(setting, NEAR, |n| improbable(n) || lost[n]);
+    let bent = near(setting, BESIDE, |n| {
+        let blur = setting.blurs[n];
+        (is_improbable(blur.chi2, 4) && blur.share > BLURRED)
+            || bend(setting, lattices, n) > STRAIGHT
+    });
+    (0..nodes.len())
+        .map(|node| {
+            let at = setting.places[node];
+            let [low, high] = setting.frame;
+            let outside = (0..2)
+                .any(|i| at[i] - low[i] < setting.margin[i] || high[i] - at[i] < setting.margin[i]);
+            if outside {
+                return Mask::Margin;
+            }
+            if setting.smoothed.support[node].is_none_or(|s| s.share < SHARE) {
+                return Mask::Missing;
+            }
+            match &lattices[node] {
+                Err(Nothing::NoPixels) => return Mask::Missing,
+                Err(Nothing::Weak) => return Mask::Weak,
+                Ok(_) if lost[node] => return Mask::Weak,
+                Ok(_) => {}
+            }
+            if spoilt[node] || winding[node] {
+                Mask::Defect
+            } else if bent[node] {
+                Mask::Bent
+            } else {
+                Mask::Good
+            }
+        })
+        .collect()
+}
+
+/// Where the signal is gone.
+fn lost(setting: &Setting, lattices: &[Result<LocalLattice, Nothing>]) -> Vec<bool> {
+    let envelopes = &setting.smoothed.envelopes;
+    let power = |node: usize| {
+        let first = envelopes.iter().take(3);
+        let sum = first.map(|e| f64::from(e.amplitude[node].norm_sqr()));
+        sum.sum::<f64>()
+    };
+    let mut all: Vec<f64> = (0..lattices.len())
+        .filter(|&n| setting.smoothed.support[n].is_some_and(|s| s.share > SHARE))
+        .map(power)
+        .collect();
+    let usual = super::median(&mut all);
+    (0..lattices.len())
+        .map(|n| setting.smoothed.support[n].is_some() && power(n) < LOST * usual)
+        .collect()
+}
+
+/// Nodes no farther than so many window widths from one for which `is_core` holds.
+fn near(setting: &Setting, widths: f64, is_core: impl Fn(usize) -> bool) -> Vec<bool> {
+    let [columns, rows] = setting.smoothed.nodes.size;
+    let step = |axis: usize, next: usize| {
+        let places = (setting.places.get(next), setting.places.first());
+        match places {
+            (Some(a), Some(b)) => (a - b)[axis],
+            _ => 1.0,
+        }
+    };
+    let reach = [
+        widths * setting.width[0] / step(0, 1),
+        widths * setting.width[1] / step(1, columns),
+    ];
+    let mut out = vec![false; columns * rows];
+    for core in (0..columns * rows).filter(|&n| is_core(n)) {
+        let (column, row) = ((core % columns) as f64, (core / columns) as f64);
+        let span = |at: f64, reach: f64, count: usize| {
+            (at - reach).max(0.0).ceil() as usize..=((at + reach) as usize).min(count - 1)
+        };
+        for r in span(row, reach[1], rows) {
+            for c in span(column, reach[0], columns) {
+                let (x, y) = ((c as f64 - column) / reach[0], (r as f64 - row) / reach[1]);
+                out[r * columns + c] |= x * x + y * y <= 1.0;
+            }
+        }
+    }
+    out
+}
+
+/// Whether χ² is beyond chance: Wilson and Hilferty, PNAS 17, 684 (1931).
+pub(super) fn is_improbable(chi2: f64, freedom: usize) -> bool {
+    if freedom == 0 {
+        return false;
+    }
+    let n = freedom as f64;
+    let a = 2.0 / (9.0 * n);
+    chi2 > n * (1.0 - a + IMPROBABLE * a.sqrt()).powi(3)
+}
+
+/// How far the phase of the first waves bends over a window width, from differences to the neighbours.
+fn bend(setting: &Setting, lattices: &[Result<LocalLattice, Nothing>], node: usize) -> f64 {
+    let [columns, rows] = setting.smoothed.nodes.size;
+    let (column, row) = (node % columns, node / columns);
+    let mut most = 0.0f64;
+    for axis in 0..2 {
+        let (low, high) = match axis {
+            0 => (
+                column.checked_sub(1).map(|_| node - 1),
+                (column + 1 < columns).then(|| node + 1),
+            ),
+            _ => (
+                row.checked_sub(1).map(|_| node - columns),
+                (row + 1 < rows).then(|| node + columns),
+            ),
+        };
+        let of = |n: Option<usize>| n.and_then(|n| Some((n, lattices[n].as_ref().ok()?)));
+        let here = lattices[node].as_ref().ok().map(|l| (node, l));
+        let (Some((a, first)), Some((b, second))) = (of(low).or(here), of(high).or(here)) else {
+            continue;
+        };
+        let distance = (setting.places[b] - setting.places[a]).norm();
+        if distance > 0.0 {
+            let slope = (second.pair - first.pair) / distance;
+            for wave in [slope.column(0).into_owned(), slope.column(1).into_owned()] {
+                let across = Vector2::new(wave.x * setting.width[0], wave.y * setting.width[1]);
+                most = most.max(across.norm() * setting.width[axis]);
+            }
+        }
+    }
+    most
+}
+
+/// Nodes near a point around which the phase of a first wave winds.
+fn windings(setting: &Setting) -> Vec<bool> {
+    let nodes = setting.smoothed.nodes;
+    let [columns, rows] = nodes.size;
+    let mut cores = vec![false; nodes.len()];
+    let clear = |i: &usize| setting.noise_share[*i] * CLEAR < 1.0;
+    for i in (0..setting.smoothed.envelopes.len().min(3)).filter(clear) {
+        let amplitude = &setting.smoothed.envelopes[i].amplitude;
+        let turn = |a: usize, b: usize| f64::from((amplitude[b] * amplitude[a].conj()).arg());
+        for row in 1..rows {
+            for column in 1..columns {
+                let corner = row * columns + column;
+                let around = [corner, corner - 1, corner - 1 - columns, corner - columns];
+                if around
+                    .iter()
+                    .any(|&n| setting.smoothed.support[n].is_none())
+                {
+                    continue;
+                }
+                let turns: f64 = (0..4).map(|k| turn(around[k], around[(k + 1) % 4])).sum();
+                if turns.abs() > std::f64::consts::PI {
+                    cores[corner] = true;
+                }
+            }
+        }
+    }
+    near(setting, NEAR, |n| cores[n])
+}

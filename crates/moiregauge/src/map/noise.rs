@@ -1,0 +1,189 @@
+//! Noise at every harmonic and at every place, read beside the harmonics.
+//!
+//! The image is demodulated at wave vectors above and below each harmonic where no harmonic is: there is
+//! only noise. Above and below, along ky, because the noise of a scan is noise in time and as good as a
+//! function of kx alone. Its mean power is the level of the harmonic; how it varies over the frame, all
+//! harmonics together, is the local ratio.
+//!
+//! Levels are those of white noise: variance σ² per pixel has the level σ².
+
+use nalgebra::{Matrix2, Vector2};
+
+use super::blocks::Blocks;
+use super::median;
+use super::smooth::{Nodes, Smoothed, smooth};
+
+/// Places tried beside a harmonic, as shares of the length of q₁.
+const TRIED: [f64; 9] = [0.35, 0.4, 0.45, 0.5, 0.55, 0.6, 0.65, 0.7, 0.75];
+/// Window of the probes in periods, lest harmonics reach them.
+pub(super) const PROBE_WINDOW: f64 = 1.5;
+/// The local ratio is averaged over so many windows.
+const AVERAGED: f64 = 3.0;
+/// Windows that hold less are not looked at.
+const WHOLE: f64 = 0.9;
+/// Nodes that have to be left.
+const FEWEST: usize = 6;
+
+/// Two wave vectors beside harmonic (h, k) that are as far from the lattice as can be, rad per pixel.
+pub(super) fn probes(pair: &Matrix2<f64>, [h, k]: [i32; 2], pitch: [f64; 2]) -> [Vector2<f64>; 2] {
+    let metric = Vector2::new(1.0 / pitch[0], 1.0 / pitch[1]);
+    let harmonic = pair * Vector2::new(f64::from(h), f64::from(k));
+    let length = pair.column(0).component_mul(&metric).norm();
+    let inverse = pair.try_inverse().unwrap_or_else(Matrix2::identity);
+    let distance = |g: &Vector2<f64>| {
+        let near = (inverse * g).map(f64::round);
+        let corners =
+            (-1..=1).flat_map(|i| (-1..=1).map(move |j| Vector2::new(f64::from(i), f64::from(j))));
+        let apart = corners.map(|c| (g - pair * (near + c)).component_mul(&metric).norm());
+        apart.fold(f64::INFINITY, f64::min)
+    };
+    [1.0, -1.0].map(|side| {
+        let candidates = TRIED.map(|share| {
+            let up = Vector2::new(0.0, side * share * length * pitch[1]);
+            harmonic + up
+        });
+        let best = candidates
+            .iter()
+            .max_by(|a, b| distance(a).total_cmp(&distance(b)));
+        // A lattice line along ky passes other harmonics: aside then.
+        match best {
+            Some(g) if distance(g) > 0.4 * length => *g,
+            _ => {
+                let third = pair.column(0) + pair.column(1);
+                harmonic + third * (side / 3.0)
+            }
+        }
+    })
+}
+
+/// The noise of every harmonic.
+pub(super) struct Noise {
+    /// Level of each harmonic.
+    pub(super) levels: Vec<f64>,
+    /// Where the ratio is known, and the ratio.
+    grid: Option<Ratio>,
+}
+
+struct Ratio {
+    first: Vector2<f64>,
+    step: Vector2<f64>,
+    size: [usize; 2],
+    values: Vec<f64>,
+}
+
+impl Noise {
+    /// From blocks that hold two probes for each harmonic, one after the other. `width` is that of the
+    /// windows, pixels; `fallback` the levels where the frame is too small to tell.
+    pub(super) fn new(blocks: &Blocks, width: [f64; 2], fallback: &[f64]) -> Self {
+        let stride = [0, 1].map(|i| ((width[i] / blocks.block[i] as f64).round() as usize).max(1));
+        let nodes = Nodes::filling(blocks.size, stride);
+        let smoothed = smooth(blocks, width, nodes, None);
+        let whole: Vec<Option<f64>> = smoothed
+            .support
+            .iter()
+            .map(|s| s.filter(|s| s.share > WHOLE).map(|s| s.amplitude_noise))
+            .collect();
+        if whole.iter().flatten().count() < FEWEST {
+            return Self {
+                levels: fallback.to_vec(),
+                grid: None,
+            };
+        }
+        let power = |probe: usize, node: usize| {
+            let noise = whole[node]?;
+            Some(f64::from(smoothed.envelopes[probe].amplitude[node].norm_sqr()) / noise)
+        };
+        let harmonics = blocks.layers.len() / 2;
+        let levels: Vec<f64> = (0..harmonics)
+            .map(|i| {
+                let both = (0..nodes.len()).flat_map(|n| [power(2 * i, n), power(2 * i + 1, n)]);
+                let mut all: Vec<f64> = both.flatten().collect();
+                // Of an exponential distribution: robust against what a defect throws there.
+                median(&mut all) / std::f64::consts::LN_2
+            })
+            .collect();
+        let grid = Ratio::new(blocks, &smoothed, &levels, power);
+        Self {
+            levels,
+            grid: Some(grid),
+        }
+    }
+
+    /// The local ratio at a place, pixels.
+    pub(super) fn ratio(&self, at: Vector2<f64>) -> f64 {
+        self.grid.as_ref().map_or(1.0, |grid| grid.at(at))
+    }
+}
+
+impl Ratio {
+    fn new(
+        blocks: &Blocks,
+        smoothed: &Smoothed,
+        levels: &[f64],
+        power: impl Fn(usize, usize) -> Option<f64>,
+    ) -> Self {
+        let nodes = smoothed.nodes;
+        let of_node = |node: usize| {
+            let (mut sum, mut count) = (0.0, 0.0);
+            for (i, level) in levels.iter().enumerate().filter(|(_, l)| **l > 0.0) {
+                for probe in [2 * i, 2 * i + 1] {
+                    if let Some(power) = power(probe, node) {
+                        sum += power / level;
+                        count += 1.0;
+                    }
+                }
+            }
+            [sum, count]
+        };
+        let raw: Vec<[f64; 2]> = (0..nodes.len()).map(of_node).collect();
+        // A Gaussian along the lines, then across, of sums and counts alike.
+        let [columns, rows] = nodes.size;
+        let reach = (3.0 * AVERAGED) as isize;
+        let pass = |values: &[[f64; 2]], across: bool| -> Vec<[f64; 2]> {
+            (0..nodes.len())
+                .map(|node| {
+                    let (column, row) = ((node % columns) as isize, (node / columns) as isize);
+                    let mut out = [0.0; 2];
+                    for d in -reach..=reach {
+                        let (c, r) = if across {
+                            (column, row + d)
+                        } else {
+                            (column + d, row)
+                        };
+                        if c < 0 || r < 0 || c >= columns as isize || r >= rows as isize {
+                            continue;
+                        }
+                        let weight = (-0.5 * (d as f64 / AVERAGED).powi(2)).exp();
+                        let value = values[r as usize * columns + c as usize];
+                        out[0] += weight * value[0];
+                        out[1] += weight * value[1];
+                    }
+                    out
+                })
+                .collect()
+        };
+        let smooth = pass(&pass(&raw, false), true);
+        let mean = |[sum, count]: &[f64; 2]| if *count > 0.0 { sum / count } else { 1.0 };
+        let step = |i: usize| (nodes.stride[i] * blocks.block[i]) as f64;
+        Self {
+            first: nodes.place(blocks, 0),
+            step: Vector2::new(step(0), step(1)),
+            size: nodes.size,
+            values: smooth.iter().map(mean).collect(),
+        }
+    }
+
+    fn at(&self, at: Vector2<f64>) -> f64 {
+        let along = |axis: usize| {
+            let last = self.size[axis] as f64 - 1.0;
+            let t = ((at - self.first)[axis] / self.step[axis]).clamp(0.0, last);
+            let cell = t.floor().min((last - 1.0).max(0.0));
+            let next = (cell as usize + 1).min(self.size[axis] - 1);
+            (cell as usize, next, t - cell)
+        };
+        let ((c, c1, u), (r, r1, v)) = (along(0), along(1));
+        let value = |c: usize, r: usize| self.values[r * self.size[0] + c];
+        (1.0 - v) * ((1.0 - u) * value(c, r) + u * value(c1, r))
+            + v * ((1.0 - u) * value(c, r1) + u * value(c1, r1))
+    }
+}

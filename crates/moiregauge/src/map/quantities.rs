@@ -1,0 +1,156 @@
+//! What a map shows: every quantity with its error, as planes of single-precision numbers.
+
+use nalgebra::Vector2;
+
+use super::defects::Mask;
+use super::sample::{Grid, LatticeMap};
+use crate::estimate::Estimate;
+use crate::lattice::reciprocal::real_from_reciprocal;
+use crate::strain::TwistStrain;
+
+/// One quantity on all nodes, row by row; NaN where there is none.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Plane {
+    /// Values.
+    pub value: Vec<f32>,
+    /// Standard errors.
+    pub sigma: Vec<f32>,
+}
+
+impl Plane {
+    fn push(&mut self, estimate: Option<Estimate>) {
+        let Estimate { value, sigma } = estimate.unwrap_or(Estimate::new(f64::NAN, f64::NAN));
+        self.value.push(value as f32);
+        self.sigma.push(sigma as f32);
+    }
+
+    /// A node's value and error.
+    pub fn at(&self, node: usize) -> Estimate {
+        Estimate::new(f64::from(self.value[node]), f64::from(self.sigma[node]))
+    }
+}
+
+/// Maps of twist, strain and lattice. Values are there wherever a lattice was found, also where `mask`
+/// says that they are not to be believed; rad, nm, strain without dimension.
+///
+/// The errors are those of the noise in the image alone: what is common to all nodes (drift, calibration, lattice
+/// constant) is not in them.
+#[derive(Clone, Debug)]
+pub struct TwistStrainMap {
+    /// Where the nodes are.
+    pub grid: Grid,
+    /// Width of the window (standard deviation of the Gaussian), nm.
+    pub window_nm: f64,
+    /// Row by row.
+    pub mask: Vec<Mask>,
+    /// θ, rad.
+    pub twist: Plane,
+    /// α, rad, near that of the mean lattice (not reduced to [0, 60°)).
+    pub lattice_angle: Plane,
+    /// Components of `E = ε e^{2iφ_lab}`.
+    pub strain: [Plane; 2],
+    /// Covariance of the two components.
+    pub strain_covariance: Vec<f32>,
+    /// |E|, the bias of noise removed.
+    pub magnitude: Plane,
+    /// φ_lab, rad in [0, π); NaN where the strain is not significant (p < 0.01).
+    pub axis: Plane,
+    /// Lengths of the real-space vectors a₁, a₂, a₂ − a₁, nm.
+    pub wavelengths: [Plane; 3],
+    /// Direction of a₁, rad.
+    pub orientation: Plane,
+    /// Displacement of the pattern against the mean lattice, nm; NaN where the phase could not be followed.
+    pub displacement: [Plane; 2],
+    /// χ² per degree of freedom of the closure.
+    pub closure: Vec<f32>,
+    /// `∂_x q_y − ∂_y q_x` of the worse of q₁ and q₂, rad/nm²; 0 for a lattice without tears.
+    pub curl: Vec<f32>,
+    /// Signal over noise (amplitude) under the window.
+    pub signal_to_noise: Vec<f32>,
+}
+
+impl TwistStrainMap {
+    /// Collects a lattice map and its twists and strains ([`LatticeMap::twist_strain`]).
+    pub fn new(map: &LatticeMap, found: &[Option<TwistStrain>]) -> Self {
+        let mut out = Self {
+            grid: map.grid,
+            window_nm: map.window_nm,
+            mask: Vec::new(),
+            twist: Plane::default(),
+            lattice_angle: Plane::default(),
+            strain: Default::default(),
+            strain_covariance: Vec::new(),
+            magnitude: Plane::default(),
+            axis: Plane::default(),
+            wavelengths: Default::default(),
+            orientation: Plane::default(),
+            displacement: Default::default(),
+            closure: Vec::new(),
+            curl: curl(map),
+            signal_to_noise: Vec::new(),
+        };
+        for (node, found) in map.nodes.iter().zip(found) {
+            let mask = match node.mask {
+                Mask::Good if found.is_none() => Mask::NoSolution,
+                other => other,
+            };
+            out.mask.push(mask);
+            out.twist.push(found.map(|f| f.twist()));
+            out.lattice_angle.push(found.map(|f| f.lattice_angle()));
+            for (i, plane) in out.strain.iter_mut().enumerate() {
+                let component = |f: TwistStrain| {
+                    Estimate::from_variance(f.strain_vector[i], f.strain_covariance()[(i, i)])
+                };
+                plane.push(found.map(component));
+            }
+            let covariance = found.map_or(f64::NAN, |f| f.strain_covariance()[(0, 1)]);
+            out.strain_covariance.push(covariance as f32);
+            out.magnitude.push(found.map(|f| f.heterostrain()));
+            out.axis.push(found.and_then(|f| f.axis_lab()));
+            let known = node.waves.basis.iter().all(|x| x.is_finite());
+            let real = known.then(|| real_from_reciprocal(&node.waves)).flatten();
+            for (i, plane) in out.wavelengths.iter_mut().enumerate() {
+                plane.push(real.map(|l| l.wavelength(i)));
+            }
+            out.orientation.push(real.map(|l| l.polar_angle(0)));
+            for plane in &mut out.displacement {
+                plane.push(None);
+            }
+            let closure = node.chi2 / node.freedom as f64;
+            out.closure.push(if node.freedom > 0 {
+                closure as f32
+            } else {
+                f32::NAN
+            });
+            out.signal_to_noise.push(node.signal_to_noise.sqrt() as f32);
+        }
+        out
+    }
+}
+
+/// The curl of the wave vectors by differences of neighbours; NaN at edges and beside gaps.
+fn curl(map: &LatticeMap) -> Vec<f32> {
+    let [columns, rows] = map.grid.size;
+    let Some(inverse) = map.grid.step.try_inverse() else {
+        return vec![f32::NAN; map.nodes.len()];
+    };
+    let of_node = |node: usize| {
+        let (column, row) = (node % columns, node / columns);
+        if column == 0 || row == 0 || column + 1 >= columns || row + 1 >= rows {
+            return f64::NAN;
+        }
+        let waves = |n: usize| map.nodes[n].waves.basis;
+        let along = (waves(node + 1) - waves(node - 1)) / 2.0;
+        let across = (waves(node + columns) - waves(node - columns)) / 2.0;
+        // Per node → per nm: ∂/∂x = Σ inverse(i, x) ∂/∂i.
+        let slope = |axis: usize| along * inverse[(0, axis)] + across * inverse[(1, axis)];
+        let (x, y) = (slope(0), slope(1));
+        let curl = Vector2::new(x[(1, 0)] - y[(0, 0)], x[(1, 1)] - y[(0, 1)]);
+        if curl.x.abs() > curl.y.abs() {
+            curl.x
+        } else {
+            curl.y
+        }
+    };
+    (0..map.nodes.len()).map(|n| of_node(n) as f32).collect()
+}

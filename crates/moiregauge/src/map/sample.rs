@@ -1,0 +1,148 @@
+//! Local lattices in pixels → in coordinates of the sample at rest, and twist and strain from them.
+//!
+//! One linear map for all: a frame's pixels lie at `r = r₀ + (J − D τᵀ) n` on a sample that drifts with D
+//! (see [`crate::drift`]), so that wave vectors are mapped by the inverse transpose; nm, rad.
+
+use nalgebra::{Matrix2, Matrix4, Vector2};
+use rayon::prelude::*;
+
+use super::defects::Mask;
+use super::demodulate::WaveMap;
+use crate::geometry::Geometry;
+use crate::lattice::LatticeVectors;
+use crate::lattice::reciprocal::{both, real_from_reciprocal};
+use crate::material::Bilayer;
+use crate::settings::StrainConvention;
+use crate::strain::{FixedBranch, StrainError, TwistStrain};
+
+/// Where the nodes of a map lie: `origin + step · (column, row)`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Grid {
+    /// Columns and rows.
+    pub size: [usize; 2],
+    /// Node (0, 0), nm.
+    pub origin: Vector2<f64>,
+    /// Columns: the way to the next node in a row, and to the next row, nm.
+    pub step: Matrix2<f64>,
+}
+
+impl Grid {
+    /// Number of nodes.
+    pub fn len(&self) -> usize {
+        self.size[0] * self.size[1]
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Place of a node, counted row by row, nm.
+    pub fn place(&self, node: usize) -> Vector2<f64> {
+        let (column, row) = (node % self.size[0], node / self.size[0]);
+        self.origin + self.step * Vector2::new(column as f64, row as f64)
+    }
+}
+
+/// A local lattice on the sample.
+#[derive(Clone, Copy, Debug)]
+pub struct LatticeNode {
+    /// Whether it is to be believed.
+    pub mask: Mask,
+    /// q₁, q₂ as columns, rad/nm, with the covariance of (q₁x, q₁y, q₂x, q₂y); NaN where there is none.
+    pub waves: LatticeVectors,
+    /// χ² of the closure of all harmonics.
+    pub chi2: f64,
+    /// Its degrees of freedom.
+    pub freedom: usize,
+    /// Signal power over noise power under the window.
+    pub signal_to_noise: f64,
+}
+
+/// Local lattices on the sample, in nm.
+#[derive(Clone, Debug)]
+pub struct LatticeMap {
+    /// Where the nodes are.
+    pub grid: Grid,
+    /// Width of the window, nm.
+    pub window_nm: f64,
+    /// Row by row.
+    pub nodes: Vec<LatticeNode>,
+}
+
+impl LatticeMap {
+    /// Takes a map in pixels to the sample. `at_rest` is the geometry of the frame without drift
+    /// ([`crate::resample::at_rest`]), or the geometry itself where the drift is not known.
+    ///
+    /// `None` where the geometry is singular.
+    pub fn new(map: &WaveMap, at_rest: &Geometry) -> Option<Self> {
+        let j = at_rest.pixel_to_nm;
+        let dual = j.try_inverse()?.transpose();
+        let nodes = map.nodes.par_iter().map(|node| LatticeNode {
+            mask: node.mask,
+            waves: LatticeVectors {
+                basis: dual * node.pair,
+                covariance: kronecker(&node.indices, &(dual * node.slope * dual.transpose())),
+            },
+            chi2: node.chi2,
+            freedom: node.freedom,
+            signal_to_noise: node.signal_to_noise,
+        });
+        Some(Self {
+            grid: Grid {
+                size: map.size,
+                origin: at_rest.origin + j * map.first,
+                step: j * Matrix2::new(map.step[0], 0.0, 0.0, map.step[1]),
+            },
+            window_nm: map.window_nm,
+            nodes: nodes.collect(),
+        })
+    }
+
+    /// The mean lattice of the good nodes: plain mean of their wave vectors, rad/nm.
+    pub fn mean(&self) -> Option<Matrix2<f64>> {
+        let good = self.nodes.iter().filter(|n| n.mask == Mask::Good);
+        let (sum, count) = good.fold((Matrix2::zeros(), 0.0), |(sum, count), node| {
+            (sum + node.waves.basis, count + 1.0)
+        });
+        (count > 0.0).then(|| sum / count)
+    }
+
+    /// Twist and strain of every node that has a lattice, with the labelling and the branch of
+    /// `reference` (wave vectors, rad/nm).
+    ///
+    /// # Errors
+    /// What [`crate::strain::twist_strain`] says of the reference.
+    pub fn twist_strain<'a>(
+        &self,
+        reference: &Matrix2<f64>,
+        bilayer: impl Into<Bilayer<'a>>,
+        convention: StrainConvention,
+    ) -> Result<Vec<Option<TwistStrain>>, StrainError> {
+        let exact = LatticeVectors {
+            basis: *reference,
+            covariance: Matrix4::zeros(),
+        };
+        let no_area = StrainError::NoArea {
+            area: reference.determinant(),
+        };
+        let real = real_from_reciprocal(&exact).ok_or(no_area)?;
+        let branch = FixedBranch::of(&real, bilayer, convention)?;
+        let found = self.nodes.par_iter().map(|node| {
+            if node.waves.basis.iter().any(|x| x.is_nan()) {
+                return None;
+            }
+            branch.at(&real_from_reciprocal(&node.waves)?)
+        });
+        Ok(found.collect())
+    }
+}
+
+/// Covariance of (q₁x, q₁y, q₂x, q₂y) from that of the indices and that of the components.
+fn kronecker(indices: &Matrix2<f64>, slope: &Matrix2<f64>) -> Matrix4<f64> {
+    let mut out = both(slope);
+    for (a, b) in (0..4).flat_map(|a| (0..4).map(move |b| (a, b))) {
+        out[(a, b)] = indices[(a / 2, b / 2)] * slope[(a % 2, b % 2)];
+    }
+    out
+}

@@ -1,0 +1,331 @@
+//! Maps against images whose phases are known, and against closed forms.
+
+use nalgebra::{Matrix2, Matrix4, Vector2};
+
+use super::*;
+use crate::geometry::Geometry;
+use crate::lattice::LatticeVectors;
+use crate::lattice::reciprocal::real_from_reciprocal;
+use crate::material::Material;
+use crate::settings::StrainConvention;
+use crate::simulate::{Feature, FieldScene, Ripple};
+use crate::strain::twist_strain;
+
+/// A lattice whose wave vectors change by ± `share` across the frame, smoothly.
+fn rippled(size: usize, periods: f64, share: f64) -> FieldScene {
+    let mut scene = FieldScene::hexagonal([size, size], size as f64 / periods, 0.3);
+    let length = scene.pair.column(0).norm();
+    let across = std::f64::consts::TAU / size as f64;
+    for (direction, phase, factors) in [
+        ([0.6, 0.8], 0.3, [0.5, -0.4]),
+        ([-0.7, 0.5], 1.9, [0.3, 0.6]),
+    ] {
+        let wave = Vector2::from(direction) * across;
+        scene.ripples.push(Ripple {
+            wave,
+            phase,
+            amplitude: factors.map(|f: f64| f * share * length / wave.norm()),
+        });
+    }
+    scene
+}
+
+fn map_of(scene: &FieldScene, window: Option<f64>) -> WaveMap {
+    let reference = Reference {
+        pair: scene.pair,
+        pitch: [1.0; 2],
+    };
+    let resolution = Resolution {
+        window_nm: window,
+        ..Resolution::default()
+    };
+    local_lattices(&scene.image(), &reference, &resolution).expect("a map")
+}
+
+fn place(map: &WaveMap, node: usize) -> Vector2<f64> {
+    let (column, row) = (node % map.size[0], node / map.size[0]);
+    map.first + Vector2::new(column as f64 * map.step[0], row as f64 * map.step[1])
+}
+
+/// Good nodes and their places.
+fn good(map: &WaveMap) -> impl Iterator<Item = (&WaveNode, Vector2<f64>)> {
+    let all = map.nodes.iter().enumerate();
+    all.filter(|(_, node)| node.mask == Mask::Good)
+        .map(|(i, node)| (node, place(map, i)))
+}
+
+/// Errors over stated errors of all components at good nodes, and those over `sigma`.
+fn pulls(scene: &FieldScene, map: &WaveMap, sigma: f64) -> [Vec<f64>; 2] {
+    let mut out = [Vec::new(), Vec::new()];
+    for (node, at) in good(map) {
+        let error = node.pair - scene.waves(at);
+        for (wave, axis) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+            let stated = (node.indices[(wave, wave)] * node.slope[(axis, axis)]).sqrt();
+            out[0].push(error[(axis, wave)] / stated);
+            out[1].push(error[(axis, wave)] / sigma);
+        }
+    }
+    out
+}
+
+fn rms(values: &[f64]) -> f64 {
+    (values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64).sqrt()
+}
+
+/// `σ_g = (σ/A)/(2√π w²)` per wave; of three equal waves at q₁, q₂, q₂ − q₁ the first two are then known to
+/// `√(2/3)` of that.
+fn formula(noise: f64, window: f64) -> f64 {
+    (2.0f64 / 3.0).sqrt() * noise / (2.0 * std::f64::consts::PI.sqrt() * window * window)
+}
+
+#[test]
+fn stated_errors_follow_the_formula() {
+    let mut scene = rippled(400, 25.0, 0.0);
+    scene.white = 1.2;
+    let map = map_of(&scene, Some(16.0));
+    let stated: Vec<f64> = good(&map)
+        .map(|(n, _)| (n.indices[(0, 0)] * n.slope[(0, 0)]).sqrt())
+        .collect();
+    let mean = stated.iter().sum::<f64>() / stated.len() as f64;
+    // Noise is measured on the image, to some per cent.
+    assert!((mean / formula(1.2, 16.0) - 1.0).abs() < 0.06, "{mean}");
+}
+
+/// Noise as strong as the signal, wave vectors ± 10 % over the frame, windows chosen by themselves.
+#[test]
+fn errors_are_as_stated_and_near_the_formula() {
+    let (mut all, mut against) = (Vec::new(), Vec::new());
+    for (seed, size, periods) in [
+        (1, 512, 20.0),
+        (2, 640, 40.0),
+        (3, 512, 60.0),
+        (4, 512, 20.0),
+    ] {
+        let mut scene = rippled(size, periods, 0.1);
+        scene.white = scene.signal_rms();
+        scene.seed = seed;
+        let map = map_of(&scene, None);
+        let [stated, formula] = pulls(&scene, &map, formula(scene.white, map.window_nm));
+        assert!(rms(&formula) < 1.3, "{seed}: {}", rms(&formula));
+        all.extend(stated);
+        against.extend(formula);
+    }
+    let inside = all.iter().filter(|p| p.abs() < 1.0).count() as f64 / all.len() as f64;
+    assert!((inside - 0.683).abs() < 0.04, "{inside}");
+    assert!(rms(&against) < 1.15, "{}", rms(&against));
+}
+
+/// A step of the wave vectors becomes an error function of the window's width.
+#[test]
+fn a_step_is_smeared_by_the_window() {
+    let mut scene = FieldScene::hexagonal([400, 300], 12.0, 0.2);
+    let normal = 0.5f64;
+    let direction = Vector2::new(normal.cos(), normal.sin());
+    let on = Vector2::new(200.0, 150.0);
+    let change = [3e-4, -2e-4];
+    scene.features = vec![Feature::Step {
+        at: on,
+        normal,
+        change,
+    }];
+    let window = 14.0;
+    let map = map_of(&scene, Some(window));
+    let (mut seen, mut most) = (0, 0.0f64);
+    for (i, node) in map.nodes.iter().enumerate() {
+        let at = place(&map, i);
+        let inside = at.x.min(at.y).min(399.0 - at.x).min(299.0 - at.y) > 4.0 * window;
+        if !inside {
+            continue;
+        }
+        let s = (at - on).dot(&direction) / (window * std::f64::consts::SQRT_2);
+        let expected = 0.5 * (1.0 + libm::erf(s));
+        for (wave, change) in change.into_iter().enumerate() {
+            let step = (node.pair.column(wave) - scene.pair.column(wave)).dot(&direction);
+            most = most.max((step / change - expected).abs());
+            seen += 1;
+        }
+    }
+    assert!(seen > 500 && most < 0.02, "{seen} {most}");
+}
+
+/// Around dislocations, wrinkles and boundaries nothing false is left: no error beyond six σ, nor beyond a
+/// tenth of the wave vector; and the rest of the map is there.
+#[test]
+fn defects_are_masked() {
+    let middle = Vector2::new(200.0, 210.0);
+    let normal = 0.4;
+    let dislocation = |turns| Feature::Dislocation { at: middle, turns };
+    for (what, feature) in [
+        (Mask::Defect, dislocation([1, 0])),
+        (Mask::Defect, dislocation([1, -1])),
+        (
+            Mask::Weak,
+            Feature::Wrinkle {
+                at: middle,
+                normal,
+                width: 60.0,
+            },
+        ),
+        (
+            Mask::Defect,
+            Feature::Boundary {
+                at: middle,
+                normal,
+                turn: 0.15,
+            },
+        ),
+    ] {
+        let mut scene = rippled(420, 26.0, 0.0);
+        scene.white = 0.4;
+        scene.features = vec![feature];
+        let map = map_of(&scene, None);
+        let count = |mask: Mask| map.nodes.iter().filter(|n| n.mask == mask).count();
+        assert!(count(what) > 10, "{feature:?}: {}", count(what));
+        let inner = map.nodes.len() - count(Mask::Margin);
+        assert!(5 * count(Mask::Good) > 2 * inner, "{feature:?}");
+        for (node, at) in good(&map) {
+            let error = (node.pair - scene.waves(at)).amax();
+            let sigma = (node.indices.trace() * node.slope.trace() / 4.0).sqrt();
+            assert!(
+                error < 6.5 * sigma,
+                "{feature:?} at {at}: {}",
+                error / sigma
+            );
+            assert!(error < 0.1 * scene.pair.column(0).norm(), "{feature:?}");
+        }
+    }
+}
+
+/// Lines and a block of missing pixels: what is left is as good as its errors say.
+#[test]
+fn missing_pixels_do_no_harm() {
+    let mut scene = rippled(360, 24.0, 0.03);
+    scene.white = 0.8;
+    let mut image = scene.image();
+    for row in 0..360 {
+        for column in 0..360 {
+            let block = (150..190).contains(&row) && (100..150).contains(&column);
+            if block || row % 40 == 7 {
+                image.values[row * 360 + column] = f64::NAN;
+            }
+        }
+    }
+    let reference = Reference {
+        pair: scene.pair,
+        pitch: [1.0; 2],
+    };
+    let map = local_lattices(&image, &reference, &Resolution::default()).unwrap();
+    assert!(map.nodes.iter().any(|n| n.mask == Mask::Missing));
+    let [stated, _] = pulls(&scene, &map, 1.0);
+    assert!(stated.len() > 1000);
+    assert!((0.85..1.15).contains(&rms(&stated)), "{}", rms(&stated));
+}
+
+/// Nothing but noise has no map, or one without good nodes.
+#[test]
+fn noise_has_no_map() {
+    let mut scene = rippled(256, 16.0, 0.0);
+    scene.harmonics.clear();
+    scene.white = 1.0;
+    let reference = Reference {
+        pair: scene.pair,
+        pitch: [1.0; 2],
+    };
+    let map = local_lattices(&scene.image(), &reference, &Resolution::default());
+    let good = map.map_or(0, |m| good(&m).count());
+    assert!(good < 5, "{good}");
+}
+
+/// The chain from pixels to twist and strain, on a turned and sheared frame, against the general solution
+/// for the true local lattice.
+#[test]
+fn twist_and_strain_are_those_of_the_local_lattice() {
+    let scene = rippled(512, 24.0, 0.02);
+    let map = map_of(&scene, None);
+    let geometry = Geometry {
+        size: [512, 512],
+        pixel_to_nm: Matrix2::new(0.55, -0.21, 0.2, 0.57),
+        origin: Vector2::new(-3.0, 8.0),
+        covariance: Matrix4::zeros(),
+        from_sensors: true,
+    };
+    let lattices = LatticeMap::new(&map, &geometry).unwrap();
+    let material = Material::graphene();
+    let convention = StrainConvention::RealSpace;
+    let mean = lattices.mean().unwrap();
+    let found = lattices.twist_strain(&mean, &material, convention).unwrap();
+    let dual = geometry.pixel_to_nm.try_inverse().unwrap().transpose();
+    let mut seen = 0;
+    for (i, node) in map
+        .nodes
+        .iter()
+        .enumerate()
+        .filter(|(_, n)| n.mask == Mask::Good)
+    {
+        let at = place(&map, i);
+        let position = geometry.origin + geometry.pixel_to_nm * at;
+        assert!((lattices.grid.place(i) - position).norm() < 1e-9);
+        let exact = LatticeVectors {
+            basis: dual * scene.waves(at),
+            covariance: Matrix4::identity(),
+        };
+        let real = real_from_reciprocal(&exact).unwrap();
+        let truth = twist_strain(&real, &material, convention).unwrap();
+        let here = found[i].unwrap();
+        // What the window blurs: some 10⁻³ of the wave vectors.
+        assert!((here.twist / truth.twist - 1.0).abs() < 2e-3);
+        let apart = (here.strain_vector - truth.strain_vector).norm();
+        assert!(apart < 3e-3 * truth.twist, "{apart}");
+        assert!(node.chi2.is_finite());
+        seen += 1;
+    }
+    assert!(seen > 100, "{seen}");
+}
+
+/// Two halves of the noise average to less, and what they share is found.
+#[test]
+fn maps_of_one_place_are_averaged() {
+    let scene = rippled(400, 25.0, 0.03);
+    let geometry = Geometry {
+        size: [400, 400],
+        pixel_to_nm: Matrix2::identity(),
+        origin: Vector2::zeros(),
+        covariance: Matrix4::zeros(),
+        from_sensors: false,
+    };
+    let one = |seed: u64, white: f64| {
+        let scene = FieldScene {
+            seed,
+            white,
+            ..scene.clone()
+        };
+        LatticeMap::new(&map_of(&scene, Some(14.0)), &geometry).unwrap()
+    };
+    let (a, b) = (one(1, 1.0), one(2, 1.0));
+    let (both, agreement) = combine(&[&a, &b]).unwrap();
+    let agreement = agreement.unwrap();
+    assert!((agreement.chi2_per_dof - 1.0).abs() < 0.15, "{agreement:?}");
+    let mut found = Vec::new();
+    for (i, node) in both.nodes.iter().enumerate() {
+        if node.mask == Mask::Good {
+            let error = node.waves.basis - scene.waves(both.grid.place(i));
+            found.push(error.m11 / node.waves.covariance[(0, 0)].sqrt());
+        }
+    }
+    assert!((0.8..1.2).contains(&rms(&found)), "{}", rms(&found));
+    // The same image twice says nothing new: χ² is 0, and the errors stay those of one.
+    let (same, agreement) = combine(&[&a, &a]).unwrap();
+    assert!(agreement.unwrap().chi2_per_dof < 1e-9);
+    let node = same
+        .nodes
+        .iter()
+        .position(|n| n.mask == Mask::Good)
+        .unwrap();
+    let near = (0..a.grid.len()).min_by(|&i, &j| {
+        let away = |n: usize| (a.grid.place(n) - same.grid.place(node)).norm();
+        away(i).total_cmp(&away(j))
+    });
+    let ratio =
+        same.nodes[node].waves.covariance[(0, 0)] / a.nodes[near.unwrap()].waves.covariance[(0, 0)];
+    assert!((0.9..1.1).contains(&ratio), "{ratio}");
+}

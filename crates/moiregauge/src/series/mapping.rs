@@ -1,0 +1,125 @@
+//! Scans that were analysed → maps of their local lattice on the sample.
+
+use nalgebra::Matrix2;
+use spmfile::{Channel, FrameDirection, LineDirection, Scan};
+
+use super::measure::{channels, image_of, nominal, usable_sensors};
+use crate::analysis::ScanAnalysis;
+use crate::background::remove_background;
+use crate::geometry::{Geometry, Timing};
+use crate::lattice::reciprocal::reciprocal;
+use crate::map::{LatticeMap, Reference, Resolution, UsedHarmonic, local_lattices};
+use crate::resample::at_rest;
+use crate::settings::Settings;
+
+/// The map of one line direction of a scan.
+#[derive(Clone, Debug)]
+pub struct LineMap {
+    /// The file as the user named it.
+    pub file: String,
+    /// Trace or retrace.
+    pub line: LineDirection,
+    /// Sense of the slow motion.
+    pub frame_direction: Option<FrameDirection>,
+    /// Whether the drift is taken off.
+    pub drift_corrected: bool,
+    /// The harmonics that were used.
+    pub harmonics: Vec<UsedHarmonic>,
+    /// The lattice of the whole image under the same corrections, wave vectors as columns, rad/nm.
+    pub whole: Matrix2<f64>,
+    /// Local lattices on the sample.
+    pub map: LatticeMap,
+}
+
+/// Why an image gives no map.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum MapError {
+    /// Neither trace nor retrace of the scan was analysed, or it has no size.
+    #[error("no analysed image with a size")]
+    NoImage,
+    /// The windows do not fit into the frame.
+    #[error(
+        "the frame is too small for a map, or the lattice shows nowhere in it: windows of 0.6 periods \
+         and margins of two windows have to fit"
+    )]
+    TooSmall,
+}
+
+/// Maps the images behind `analysed`, drift and sensors taken into account as there.
+///
+/// # Errors
+/// [`MapError`], where none of its images gives a map.
+pub fn map_scan(
+    scan: &Scan,
+    analysed: &ScanAnalysis,
+    settings: &Settings,
+    resolution: &Resolution,
+) -> Result<Vec<LineMap>, MapError> {
+    let channels = channels(scan, settings).map_err(|_| MapError::NoImage)?;
+    let (mut maps, mut error) = (Vec::new(), MapError::NoImage);
+    for channel in channels {
+        match map_line(scan, channel, analysed, settings, resolution) {
+            Ok(map) => maps.push(map),
+            Err(why) => error = why,
+        }
+    }
+    if maps.is_empty() {
+        Err(error)
+    } else {
+        Ok(maps)
+    }
+}
+
+fn map_line(
+    scan: &Scan,
+    channel: &Channel,
+    analysed: &ScanAnalysis,
+    settings: &Settings,
+    resolution: &Resolution,
+) -> Result<LineMap, MapError> {
+    let line = channel.line_direction.unwrap_or(LineDirection::Trace);
+    let found = analysed.lines.iter().find(|l| l.line == line);
+    let pixels = found.ok_or(MapError::NoImage)?.pixels.basis;
+    let nominal = nominal(scan, channel);
+    // Doubts about the sensors are in the analysis already.
+    let sensors = usable_sensors(
+        &analysed.file,
+        scan,
+        channel,
+        nominal.as_ref(),
+        &mut Vec::new(),
+    );
+    let geometry = sensors
+        .map(|s| s.geometry)
+        .or(nominal)
+        .ok_or(MapError::NoImage)?;
+    let frame = analysed.frame_direction;
+    let timing = frame.and_then(|frame| Timing::of_scan(scan, channel.columns, frame, line));
+    let still = match (analysed.drift, timing) {
+        (Some(drift), Some(timing)) => Some(at_rest(&geometry, &timing, drift)),
+        _ => None,
+    };
+    let image = remove_background(&image_of(channel), settings.background);
+    let reference = Reference {
+        pair: reciprocal(&pixels).ok_or(MapError::NoImage)?,
+        pitch: pitch(&geometry),
+    };
+    let waves = local_lattices(&image, &reference, resolution).ok_or(MapError::TooSmall)?;
+    let placed = still.as_ref().unwrap_or(&geometry);
+    let map = LatticeMap::new(&waves, placed).ok_or(MapError::NoImage)?;
+    let dual = placed.pixel_to_nm.try_inverse().ok_or(MapError::NoImage)?;
+    Ok(LineMap {
+        file: analysed.file.clone(),
+        line,
+        frame_direction: analysed.frame_direction,
+        drift_corrected: still.is_some(),
+        harmonics: waves.harmonics,
+        whole: dual.transpose() * reference.pair,
+        map,
+    })
+}
+
+fn pitch(geometry: &Geometry) -> [f64; 2] {
+    [geometry.fast_step().norm(), geometry.slow_step().norm()]
+}
