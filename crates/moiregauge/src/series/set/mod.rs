@@ -96,22 +96,7 @@ pub(super) fn analyse_set(
     });
     draw(&mut scans, settings, first_index);
     let of_set = || scans.iter().filter(|s| s.excluded.is_none());
-    let uncorrected = common_lattice(&all, &Vector2::zeros(), &Matrix2::zeros())
-        .ok()
-        .and_then(|common| {
-            let of = |s: &ScanAnalysis| (s.twist_strain_sensor, s.sensor);
-            let [image, sensor] = at_known_drift(&all)?;
-            let statistical = Statistical::without_drift(&image, &sensor);
-            // The scatter of several scans is that of their drift; that of the two lines of one is not.
-            let (_, chi2, freedom) = common;
-            let scale = if kept.len() == 1 {
-                enlargement(chi2, freedom)
-            } else {
-                1.0
-            };
-            let (common, statistical) = moire::enlarged(common, &statistical, scale);
-            set_mean((common, scale), &statistical, of_set().map(of), settings)
-        });
+    let uncorrected = without_drift(&all, &scans, kept.len(), settings);
     let mean = solved.as_ref().and_then(|s| {
         let of = |s: &ScanAnalysis| (s.twist_strain, s.drift_corrected.unwrap_or(s.sensor));
         set_mean(
@@ -123,23 +108,13 @@ pub(super) fn analyse_set(
     });
     let drift = solved.map(|s| s.drift);
     about_mean(&group.name, mean.as_ref(), caveats);
-    if let Some(m) = mean.as_ref().or(uncorrected.as_ref()) {
-        let found = about_readings(
-            &group.name,
-            &m.lattice,
-            &m.twist_strain,
-            &m.readings,
-            settings,
-        );
-        caveats.extend(found);
+    let shown = mean.as_ref().or(uncorrected.as_ref());
+    if let Some(m) = shown {
+        let (lattice, found) = (&m.lattice, &m.twist_strain);
+        let all = about_readings(&group.name, lattice, found, &m.readings, settings);
+        caveats.extend(all);
     }
-    moire::doubts(
-        &group.name,
-        mean.as_ref().or(uncorrected.as_ref()),
-        &scans,
-        settings,
-        caveats,
-    );
+    moire::doubts(&group.name, shown, &scans, settings, caveats);
     about_checks(
         &group.name,
         (checks.as_ref(), drift.as_ref(), mean.as_ref()),
@@ -159,6 +134,29 @@ pub(super) fn analyse_set(
         checks,
         illustration: None,
     }
+}
+
+/// The mean of the `used` scans as if nothing drifted, with the errors that drift adds left out.
+fn without_drift(
+    all: &[Observation],
+    scans: &[ScanAnalysis],
+    used: usize,
+    settings: &Settings,
+) -> Option<SetMean> {
+    let common = common_lattice(all, &Vector2::zeros(), &Matrix2::zeros()).ok()?;
+    let [image, sensor] = at_known_drift(all)?;
+    let statistical = Statistical::without_drift(&image, &sensor);
+    // The scatter of several scans is that of their drift; that of the two lines of one is not.
+    let (_, chi2, freedom) = common;
+    let scale = if used == 1 {
+        enlargement(chi2, freedom)
+    } else {
+        1.0
+    };
+    let (common, statistical) = moire::enlarged(common, &statistical, scale);
+    let of_set = scans.iter().filter(|s| s.excluded.is_none());
+    let of = |s: &ScanAnalysis| (s.twist_strain_sensor, s.sensor);
+    set_mean((common, scale), &statistical, of_set.map(of), settings)
 }
 
 /// Draws twist and strain of every scan.
