@@ -9,7 +9,7 @@ mod summary;
 use std::process::ExitCode;
 
 pub(crate) use args::{AnalyzeArgs, MethodArg};
-pub(crate) use chain::{Outcome, analyse_files, measure_file, read};
+pub(crate) use chain::{Outcome, analyse_files, hexadecimal, measure_file, read};
 pub(crate) use files::write_all;
 pub(crate) use summary::{failures, summary};
 

@@ -24,8 +24,8 @@ pub use document::{
 pub use joint::{JointResult, TestedResult};
 pub use lattice::{LatticeVector, ResultEstimate, StrainMonteCarlo, TwistStrainResult};
 pub use map::{
-    AgreementResult, HarmonicResult, MapResults, MappedImage, MaskCount, QuantityResult,
-    mask_counts, quantities,
+    AgreementResult, DriftChangeResult, HarmonicResult, MapResults, MappedImage, MaskCount,
+    QuantityResult, mask_counts, quantities,
 };
 pub use scan::{LineResult, ScanResult, ScanTwistStrain, ScanVector, TipVelocity, Window};
 
