@@ -11,7 +11,7 @@ mod summary;
 use std::process::ExitCode;
 
 pub(crate) use args::{AnalyzeArgs, ConventionArg, MethodArg};
-pub(crate) use chain::{Outcome, analyse_files, measure_file, read};
+pub(crate) use chain::{Outcome, analyse_files, hexadecimal, measure_file, read};
 pub(crate) use files::write_all;
 pub(crate) use orientation::{Angle, DirectionArg, parse_angle};
 pub(crate) use summary::{failures, summary};

@@ -1,24 +1,26 @@
 //! `moiregauge map`: scan files → maps of twist, strain and lattice with their errors.
 
-use std::path::Path;
+mod output;
+mod source;
+mod survey;
+
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::{Context as _, bail, ensure};
-use moiregauge::analysis::{Analysis, ScanAnalysis, SetAnalysis};
+use clap::ValueEnum;
+use moiregauge::analysis::Axis;
 use moiregauge::caveat::Caveat;
-use moiregauge::map::{LatticeMap, Resolution, TwistStrainMap, combine};
-use moiregauge::series::{LineMap, map_scan};
-use moiregauge_report::results::{
-    Conventions, MapResults, MappedImage, TwistStrainResult, mask_counts, quantities,
-};
-use moiregauge_report::{
-    FailedInput, Provenance, figure_files, map_figures, map_scan as as_scan, two_digits,
-};
-use spmfile::{LineDirection, WritableFormat};
+use moiregauge::map::{DriftChange, LatticeMap, Resolution, TwistStrainMap, combine, drift_change};
+use moiregauge::series::{LineMap, MapMethod, map_scan};
+use moiregauge::settings::Settings;
+use moiregauge_report::{FailedInput, Provenance};
+use spmfile::FrameDirection;
 
-use crate::analyze::{AnalyzeArgs, Outcome, analyse_files, read, write_all};
+use crate::analyze::{AnalyzeArgs, Outcome, analyse_files, failures, read};
 use crate::info::expand;
-use crate::say::say;
+use crate::input::Known;
+use output::{Made, write};
 
 /// Maps of twist, strain, wavelength and orientation across an image, with the error of every node
 ///
@@ -37,16 +39,47 @@ Written: map.zarr and map.gwy (all quantities, their errors, mask), map.json (su
 pub(crate) struct MapArgs {
     #[command(flatten)]
     analyze: AnalyzeArgs,
+    /// How local lattices are measured
+    #[arg(long, value_enum, default_value_t = MapMethodArg::Demodulation)]
+    map_method: MapMethodArg,
     /// Width of the Gaussian window (standard deviation), nm; a point becomes 2.35 of it wide [default: as
-    /// wide as noise needs and the lattice stays straight, at least 0.6 periods]
+    /// wide as the lattice stays straight, at least 0.6 periods]. By tiles: the side of a tile [default: 6
+    /// periods]
     #[arg(long, value_name = "NM")]
     window: Option<f64>,
-    /// Distance of the nodes, nm [default: a third of the window]
+    /// Distance of the nodes, nm [default: a third of the window, a quarter of a tile]
     #[arg(long, value_name = "NM")]
     step: Option<f64>,
     /// Margin at the edges, in windows
     #[arg(long, value_name = "WINDOWS", default_value_t = 2.0)]
     margin: f64,
+}
+
+/// How local lattices are measured.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum MapMethodArg {
+    /// Phases of all harmonics under a Gaussian window
+    Demodulation,
+    /// The fit of whole images on overlapping tiles: slower and coarser, for comparison
+    Tiles,
+}
+
+impl MapMethodArg {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Demodulation => "demodulation",
+            Self::Tiles => "tiles",
+        }
+    }
+}
+
+impl From<MapMethodArg> for MapMethod {
+    fn from(value: MapMethodArg) -> Self {
+        match value {
+            MapMethodArg::Demodulation => Self::Demodulation,
+            MapMethodArg::Tiles => Self::Tiles,
+        }
+    }
 }
 
 /// Makes the maps and writes them.
@@ -71,27 +104,98 @@ pub(crate) fn run(args: &MapArgs) -> anyhow::Result<ExitCode> {
         }
     }
     let known = args.analyze.known().of(&inputs);
-    let loud = args.analyze.is_loud();
+    let whole = (&settings, &known, &resolution);
+    let made = match survey(args, &inputs, whole)? {
+        Some(made) => made,
+        None => together(args, &inputs, whole, failed)?,
+    };
+    let lost = failures(&made.provenance.failed);
+    let complete = made.provenance.failed.is_empty();
+    write(&made, args)?;
+    eprint!("{lost}");
+    Ok(if complete {
+        ExitCode::SUCCESS
+    } else {
+        ExitCode::FAILURE
+    })
+}
+
+/// Maps a single image that is too large for memory; `None` for others.
+fn survey(
+    args: &MapArgs,
+    inputs: &[PathBuf],
+    (settings, known, resolution): (&Settings, &Known, &Resolution),
+) -> anyhow::Result<Option<Made>> {
+    for path in inputs {
+        let large = survey::Large::open(path, settings, known)
+            .with_context(|| path.display().to_string())?;
+        let Some(large) = large else { continue };
+        survey::alone(inputs)?;
+        let (out, loud) = (args.analyze.out(), args.analyze.is_loud());
+        let (map, plan) = large.map(settings, resolution, out, loud)?;
+        let file = large.input.file.clone();
+        return Ok(Some(Made {
+            caveats: vec![Caveat::new(
+                "survey",
+                file.as_str(),
+                "the image was mapped in bands, with nominal positions, without correction for drift, and \
+                 without displacements",
+            )],
+            provenance: Provenance {
+                version: env!("CARGO_PKG_VERSION").to_owned(),
+                seed: settings.seed,
+                inputs: vec![large.input],
+                failed: Vec::new(),
+            },
+            settings: settings.clone(),
+            images: vec![output::image(&file, None, false, &plan.harmonics)],
+            map,
+            whole: None,
+            agreement: None,
+            drift_change: None,
+        }));
+    }
+    Ok(None)
+}
+
+/// Analyses all scans, maps them, and averages.
+fn together(
+    args: &MapArgs,
+    inputs: &[PathBuf],
+    (settings, known, resolution): (&Settings, &Known, &Resolution),
+    failed: Vec<FailedInput>,
+) -> anyhow::Result<Made> {
+    ensure!(
+        settings.moires == 1,
+        "maps are made of one moiré; --moires {} is for analyze",
+        settings.moires
+    );
     let sets = args.analyze.sets()?;
-    let outcome = analyse_files(&inputs, &sets, (&settings, &known), failed, false, loud);
+    let loud = args.analyze.is_loud();
+    let outcome = analyse_files(inputs, &sets, (settings, known), failed, false, loud);
     let Outcome {
         analysis,
         mut provenance,
     } = match outcome {
-        Ok(outcome) => outcome,
+        Ok(mut outcomes) => outcomes.swap_remove(0),
         Err(failed) => {
-            eprint!("{}", crate::analyze::failures(&failed));
+            eprint!("{}", failures(&failed));
             bail!("nothing could be analysed");
         }
     };
+    let used = || {
+        analysis
+            .sets
+            .iter()
+            .flat_map(|s| &s.scans)
+            .filter(|s| s.excluded.is_none())
+    };
+    let origin = used().filter_map(|s| s.acquired).min();
+    let how = (args.map_method.into(), resolution);
     let mut maps = Vec::new();
-    for scan in analysis.sets.iter().flat_map(|s| &s.scans) {
-        if scan.excluded.is_some() {
-            continue;
-        }
-        let path = Path::new(&scan.file);
-        let mapped = read(path, &settings, &known)
-            .and_then(|reading| Ok(map_scan(&reading.scan, scan, &settings, &resolution)?));
+    for scan in used() {
+        let mapped = read(Path::new(&scan.file), settings, known)
+            .and_then(|r| Ok(map_scan(&r.scan, (scan, origin), settings, how)?));
         match mapped {
             Ok(lines) => maps.extend(lines),
             Err(error) => provenance.failed.push(FailedInput {
@@ -100,21 +204,84 @@ pub(crate) fn run(args: &MapArgs) -> anyhow::Result<ExitCode> {
             }),
         }
     }
-    let results = assemble(&maps, &analysis, &provenance, args, out)?;
-    if args.analyze.json() {
-        say(&format!("{}\n", serde_json::to_string_pretty(&results)?))?;
-    } else if loud {
-        say(&summary(&results))?;
-        say(&format!(
-            "\nWritten to {}\n",
-            out.join("map.json").display()
-        ))?;
+    let all: Vec<&LatticeMap> = maps.iter().map(|m| &m.map).collect();
+    let Some((lattices, agreement)) = combine(&all) else {
+        eprint!("{}", failures(&provenance.failed));
+        bail!("no image gave a map");
+    };
+    let reference = maps[0].whole;
+    let (layers, convention) = (settings.bilayer(), settings.strain_convention);
+    let mut caveats = analysis.caveats.clone();
+    let found = lattices
+        .twist_strain(&reference, layers, convention)
+        .unwrap_or_else(|why| {
+            caveats.push(Caveat::new(
+                "no-twist-strain",
+                "map",
+                format!("{why}: the map has wavelengths and directions only"),
+            ));
+            vec![None; lattices.nodes.len()]
+        });
+    if maps.iter().any(|m| !m.drift_corrected) {
+        caveats.push(Caveat::new(
+            "map-not-drift-corrected",
+            "map",
+            "the drift of some images is not known: it stretches and shears their maps, the same everywhere",
+        ));
     }
-    eprint!("{}", crate::analyze::failures(&provenance.failed));
-    Ok(if provenance.failed.is_empty() {
-        ExitCode::SUCCESS
-    } else {
-        ExitCode::FAILURE
+    let drift_change = change(&maps);
+    if let Some(found) = drift_change.filter(DriftChange::stands_out) {
+        let [x, y] = found
+            .acceleration
+            .map(|a| moiregauge_report::plus_minus(a.scaled(3600.0)));
+        caveats.push(Caveat::new(
+            "drift-changes",
+            "map",
+            format!(
+                "upward and downward frames differ along their slow axis as if the drift changed within a \
+                 frame, by ({x}, {y}) nm/min² more upwards than downwards: that is no strain, and the average of \
+                 both is free of it. A change of drift common to both directions looks like strain"
+            ),
+        ));
+    }
+    Ok(Made {
+        map: TwistStrainMap::new(&lattices, &found),
+        images: maps
+            .iter()
+            .map(|m| output::image(&m.file, Some(m.line), m.drift_corrected, &m.harmonics))
+            .collect(),
+        whole: output::whole_image(&analysis),
+        settings: analysis.settings.clone(),
+        provenance,
+        agreement,
+        drift_change,
+        caveats,
+    })
+}
+
+/// Compares upward with downward frames of one slow axis.
+fn change(maps: &[LineMap]) -> Option<DriftChange> {
+    let axis = |m: &LineMap| {
+        m.time_gradient.map(|u| {
+            if u.x.abs() > u.y.abs() {
+                Axis::X
+            } else {
+                Axis::Y
+            }
+        })
+    };
+    let of = |direction: FrameDirection, slow: Axis| -> Vec<&LineMap> {
+        let wanted = |m: &&LineMap| m.frame_direction == Some(direction) && axis(m) == Some(slow);
+        maps.iter().filter(wanted).collect()
+    };
+    [Axis::Y, Axis::X].into_iter().find_map(|slow| {
+        let (up, down) = (of(FrameDirection::Up, slow), of(FrameDirection::Down, slow));
+        let gradient = up.first()?.time_gradient?;
+        let average = |maps: &[&LineMap]| {
+            let maps: Vec<&LatticeMap> = maps.iter().map(|m| &m.map).collect();
+            Some(combine(&maps)?.0)
+        };
+        drift_change(&average(&up)?, &average(&down)?, gradient)
     })
 }
 
@@ -137,141 +304,9 @@ impl MapArgs {
             margin: self.margin,
         })
     }
-}
 
-/// Averages, writes, summarises.
-fn assemble(
-    maps: &[LineMap],
-    analysis: &Analysis,
-    provenance: &Provenance,
-    args: &MapArgs,
-    out: &Path,
-) -> anyhow::Result<MapResults> {
-    let settings = &analysis.settings;
-    let all: Vec<&LatticeMap> = maps.iter().map(|m| &m.map).collect();
-    let (lattices, agreement) = combine(&all).context("no image gave a map")?;
-    let reference = lattices
-        .mean()
-        .or(maps.first().map(|m| m.whole))
-        .context("no image gave a map")?;
-    let found =
-        lattices.twist_strain(&reference, settings.bilayer(), settings.strain_convention)?;
-    let map = TwistStrainMap::new(&lattices, &found);
-    let mut caveats = analysis.caveats.clone();
-    if maps.iter().any(|m| !m.drift_corrected) {
-        caveats.push(Caveat::new(
-            "map-not-drift-corrected",
-            "map",
-            "the drift of some images is not known: it stretches and shears their maps, the same everywhere",
-        ));
+    /// How local lattices are measured, for the results.
+    fn method_name(&self) -> &'static str {
+        self.map_method.name()
     }
-    let [columns, rows] = [0, 1].map(|i| map.grid.step.column(i).into_owned());
-    let results = MapResults {
-        schema: "moiregauge/map/1".to_owned(),
-        provenance: provenance.clone(),
-        conventions: Conventions::of(settings),
-        errors: ERRORS.to_owned(),
-        settings: settings.clone(),
-        method: "demodulation".to_owned(),
-        window_nm: map.window_nm,
-        resolution_nm: 2.355 * map.window_nm,
-        nodes: map.grid.size,
-        origin_nm: map.grid.origin.into(),
-        step_nm: [columns.into(), rows.into()],
-        masks: mask_counts(&map),
-        quantities: quantities(&map),
-        whole_image: whole_image(analysis),
-        images: maps.iter().map(mapped_image).collect(),
-        agreement: agreement.map(Into::into),
-        caveats,
-    };
-    let log = vec![format!("moiregauge {} map", env!("CARGO_PKG_VERSION"))];
-    let scan = as_scan(&map);
-    let group = out.join("map.zarr");
-    if group.join("zarr.json").is_file() {
-        std::fs::remove_dir_all(&group)
-            .with_context(|| format!("cannot replace {}", group.display()))?;
-    }
-    for format in [WritableFormat::Zarr, WritableFormat::Gwy] {
-        write_all(out, &spmfile::write(&scan, format, "map", &log)?)?;
-    }
-    let choice = args.analyze.choice();
-    if choice.figures {
-        write_all(
-            out,
-            &figure_files(&map_figures(&map, choice.colormap), choice)?,
-        )?;
-    }
-    let json = serde_json::to_vec_pretty(&results)?;
-    write_all(out, &[("map.json".to_owned(), json)])?;
-    Ok(results)
-}
-
-const ERRORS: &str = "one standard deviation by the noise of the images, node by node, neighbouring nodes not \
-     independent; what all nodes share (drift, calibration, lattice constant, model) is in whole_image and its \
-     budget in the results of `moiregauge analyze`; smoothing by the window adds a bias, on average at most a quarter of the \
-     noise where the window was chosen by itself";
-
-/// Twist and strain of the whole images.
-fn whole_image(analysis: &Analysis) -> Option<TwistStrainResult> {
-    if let Some(combined) = &analysis.combined {
-        return Some((&combined.twist_strain).into());
-    }
-    let set: &SetAnalysis = analysis.sets.first()?;
-    let mean = set.mean.as_ref().or(set.uncorrected.as_ref());
-    let scan: Option<&ScanAnalysis> = set.scans.first();
-    mean.map(|m| &m.twist_strain)
-        .or(scan.and_then(|s| s.twist_strain_sensor.as_ref()))
-        .map(Into::into)
-}
-
-fn mapped_image(map: &LineMap) -> MappedImage {
-    MappedImage {
-        file: map.file.clone(),
-        line: match map.line {
-            LineDirection::Trace => "trace",
-            LineDirection::Retrace => "retrace",
-        }
-        .to_owned(),
-        drift_corrected: map.drift_corrected,
-        harmonics: map.harmonics.iter().map(Into::into).collect(),
-    }
-}
-
-/// What is said on the screen.
-fn summary(results: &MapResults) -> String {
-    let mut text = format!(
-        "{} × {} nodes, window {} nm (resolution {} nm)\n",
-        results.nodes[0],
-        results.nodes[1],
-        two_digits(results.window_nm),
-        two_digits(results.resolution_nm)
-    );
-    for mask in &results.masks {
-        text.push_str(&format!("  {:16} {} nodes\n", mask.name, mask.nodes));
-    }
-    for q in &results.quantities {
-        text.push_str(&format!(
-            "  {:16} mean {:.5} {}, spread {} (noise {}, without it {})\n",
-            q.name,
-            q.mean,
-            q.unit,
-            two_digits(q.spread),
-            two_digits(q.noise),
-            two_digits(q.spread_corrected)
-        ));
-    }
-    if let Some(a) = &results.agreement {
-        text.push_str(&format!(
-            "  images agree with χ²/dof {:.2} at {} nodes\n",
-            a.chi2_per_dof, a.nodes
-        ));
-    }
-    for caveat in &results.caveats {
-        text.push_str(&format!(
-            "caveat {} ({}): {}\n",
-            caveat.code, caveat.place, caveat.message
-        ));
-    }
-    text
 }

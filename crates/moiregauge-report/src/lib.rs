@@ -25,4 +25,4 @@ pub use provenance::{FailedInput, InputFile, Provenance};
 pub use report::parquet_tables;
 pub use report::{Choice, figure_files, write_report};
 pub use results::{Results, schema};
-pub use tables::map_scan;
+pub use tables::{map_scan, map_scans};

@@ -170,6 +170,19 @@ impl Channel {
         }
     }
 
+    /// The values of the lines `rows`, row by row; empty beyond the last one.
+    pub fn lines(&self, rows: std::ops::Range<usize>) -> Vec<f64> {
+        let end = (rows.end * self.columns).min(self.samples.len());
+        let part = (rows.start * self.columns).min(end)..end;
+        let value = |count: f64| count * self.scale + self.offset;
+        match &self.samples {
+            Samples::I16(v) => v[part].iter().map(|&c| value(f64::from(c))).collect(),
+            Samples::I32(v) => v[part].iter().map(|&c| value(f64::from(c))).collect(),
+            Samples::F32(v) => v[part].iter().map(|&c| value(f64::from(c))).collect(),
+            Samples::F64(v) => v[part].iter().map(|&c| value(c)).collect(),
+        }
+    }
+
     /// Nominal distance of neighbouring samples along a line and of neighbouring lines, nm.
     ///
     /// `None` without a size, or for a single pixel between whose centre and itself nothing lies.
@@ -233,5 +246,8 @@ mod tests {
         assert_eq!(channel.edges_nm(), Some([70.0, 17.5]));
         (channel.columns, channel.span) = (1, Span::PixelCentres);
         assert_eq!((channel.pitch_nm(), channel.edges_nm()), (None, None));
+        channel.columns = 8;
+        assert_eq!(channel.lines(1..2), channel.values()[8..]);
+        assert!(channel.lines(2..5).is_empty());
     }
 }

@@ -204,7 +204,7 @@ pub(crate) fn read(path: &Path, settings: &Settings, known: &Known) -> anyhow::R
     })
 }
 
-fn hexadecimal(bytes: &[u8]) -> String {
+pub(crate) fn hexadecimal(bytes: &[u8]) -> String {
     let mut text = String::with_capacity(2 * bytes.len());
     for byte in bytes {
         // Writing into a string cannot fail.

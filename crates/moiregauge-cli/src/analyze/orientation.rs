@@ -97,14 +97,15 @@ impl OrientationArgs {
                 Method::Paper => Method::Lattice,
                 other => other,
             },
+            moires: 1,
             ..settings.clone()
         };
         let known = known.of(&paths);
         let (mut scans, mut files) = (Vec::new(), Vec::new());
         for path in &paths {
-            let (scan, file) = measure_file(path, &[], (&settings, &known), None)
+            let (mut moires, file) = measure_file(path, &[], (&settings, &known), None)
                 .with_context(|| format!("--atomic {}", path.display()))?;
-            scans.push(scan);
+            scans.push(moires.swap_remove(0));
             files.push(file);
         }
         let layers = settings.bilayer();

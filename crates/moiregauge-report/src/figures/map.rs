@@ -123,7 +123,7 @@ fn draw(
     };
     axes.draw(&mut svg, &labels);
     let bar = Rect::new(area.right() + 6.0, area.y, 7.0, area.height);
-    colorbar::draw(&mut svg, bar, colours, contrast, label);
+    colorbar::draw(&mut svg, bar, colours, contrast, (label, ""));
     Ok(Drawing {
         wide: false,
         svg: svg.finish(title),

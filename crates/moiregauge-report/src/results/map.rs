@@ -1,7 +1,7 @@
 //! The summary of a map as a document, `moiregauge/map/1`: degrees, per cent, nm.
 
 use moiregauge::caveat::Caveat;
-use moiregauge::map::{Agreement, Mask, Plane, TwistStrainMap, UsedHarmonic};
+use moiregauge::map::{Agreement, DriftChange, Mask, Plane, TwistStrainMap, UsedHarmonic};
 use moiregauge::settings::Settings;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -44,6 +44,8 @@ pub struct MapResults {
     pub images: Vec<MappedImage>,
     /// How images of one place agree.
     pub agreement: Option<AgreementResult>,
+    /// What differs between upward and downward frames along the slow axis: drift that changes, no strain.
+    pub drift_change: Option<DriftChangeResult>,
     /// Doubts.
     pub caveats: Vec<Caveat>,
 }
@@ -108,6 +110,34 @@ impl From<&UsedHarmonic> for HarmonicResult {
             index: h.index,
             amplitude: h.amplitude,
             noise: h.noise,
+        }
+    }
+}
+
+/// `A_up − A_down` of the drift within frames.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize, JsonSchema)]
+pub struct DriftChangeResult {
+    /// Along x, nm/min².
+    pub x: f64,
+    /// Its standard error.
+    pub x_sigma: f64,
+    /// Along y, nm/min².
+    pub y: f64,
+    /// Its standard error.
+    pub y_sigma: f64,
+    /// χ² that both are zero, two degrees of freedom.
+    pub chi2: f64,
+}
+
+impl From<DriftChange> for DriftChangeResult {
+    fn from(found: DriftChange) -> Self {
+        let [x, y] = found.acceleration.map(|a| a.scaled(3600.0));
+        Self {
+            x: x.value,
+            x_sigma: x.sigma,
+            y: y.value,
+            y_sigma: y.sigma,
+            chi2: found.chi2,
         }
     }
 }

@@ -25,8 +25,8 @@ pub use document::{
 pub use joint::{JointResult, TestedResult};
 pub use lattice::{LatticeVector, ResultEstimate, StrainMonteCarlo, TwistStrainResult};
 pub use map::{
-    AgreementResult, HarmonicResult, MapResults, MappedImage, MaskCount, QuantityResult,
-    mask_counts, quantities,
+    AgreementResult, DriftChangeResult, HarmonicResult, MapResults, MappedImage, MaskCount,
+    QuantityResult, mask_counts, quantities,
 };
 pub use readings::{
     AtomicResult, IsotropicStrainResult, ReadingsResult, ShiftResult, SolutionResult, SplitResult,

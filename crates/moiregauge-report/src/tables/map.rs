@@ -5,14 +5,93 @@
 //! axes of a file are not.
 
 use moiregauge::map::{Plane, TwistStrainMap};
+use nalgebra::Vector2;
 use spmfile::{Channel, Samples, Scan, Span};
 
-/// The map as a scan; its axes run along the rows and columns of nodes.
+/// What a channel shows.
+#[derive(Clone, Copy)]
+enum Shown<'a> {
+    Values(&'a [f32], f64),
+    Mask,
+    Position(usize),
+}
+
+/// The map as a scan of all its quantities; its axes run along the rows and columns of nodes.
 pub fn map_scan(map: &TwistStrainMap) -> Scan {
-    let step = map.grid.step;
-    let pitch = [step.column(0).norm(), step.column(1).norm()];
+    let all = shown(map);
+    let channels = all
+        .into_iter()
+        .map(|(name, unit, shown)| channel(map, &name, unit, shown));
+    scan(map, channels.collect())
+}
+
+/// The same one quantity at a time, for maps of which memory holds no second copy.
+pub fn map_scans(map: &TwistStrainMap) -> impl Iterator<Item = Scan> + '_ {
+    let all = shown(map).into_iter();
+    all.map(|(name, unit, shown)| scan(map, vec![channel(map, &name, unit, shown)]))
+}
+
+fn shown(map: &TwistStrainMap) -> Vec<(String, &'static str, Shown<'_>)> {
+    let mut all = Vec::new();
+    let degree = 1f64.to_degrees();
+    let [l1, l2, l3] = &map.wavelengths;
+    let planes: [(&str, &'static str, &Plane, f64); 12] = [
+        ("twist", "°", &map.twist, degree),
+        ("strain", "%", &map.magnitude, 100.0),
+        ("strain axis", "°", &map.axis, degree),
+        ("strain vector 1", "%", &map.strain[0], 100.0),
+        ("strain vector 2", "%", &map.strain[1], 100.0),
+        ("lattice angle", "°", &map.lattice_angle, degree),
+        ("wavelength 1", "nm", l1, 1.0),
+        ("wavelength 2", "nm", l2, 1.0),
+        ("wavelength 3", "nm", l3, 1.0),
+        ("orientation", "°", &map.orientation, degree),
+        ("displacement x", "nm", &map.displacement[0], 1.0),
+        ("displacement y", "nm", &map.displacement[1], 1.0),
+    ];
+    for (name, unit, plane, factor) in planes {
+        all.push((name.to_owned(), unit, Shown::Values(&plane.value, factor)));
+        all.push((
+            format!("{name} sigma"),
+            unit,
+            Shown::Values(&plane.sigma, factor),
+        ));
+    }
+    let plain: [(&str, &'static str, &[f32], f64); 4] = [
+        (
+            "strain vector covariance",
+            "%²",
+            &map.strain_covariance,
+            1e4,
+        ),
+        ("closure chi2 per dof", "", &map.closure, 1.0),
+        ("curl", "rad/nm²", &map.curl, 1.0),
+        ("signal to noise", "", &map.signal_to_noise, 1.0),
+    ];
+    for (name, unit, values, factor) in plain {
+        all.push((name.to_owned(), unit, Shown::Values(values, factor)));
+    }
+    all.push(("mask".to_owned(), "", Shown::Mask));
+    all.push(("position x".to_owned(), "nm", Shown::Position(0)));
+    all.push(("position y".to_owned(), "nm", Shown::Position(1)));
+    all
+}
+
+fn pitch(map: &TwistStrainMap) -> [f64; 2] {
+    [0, 1].map(|i| map.grid.step.column(i).norm())
+}
+
+fn channel(map: &TwistStrainMap, name: &str, unit: &str, shown: Shown) -> Channel {
     let [columns, rows] = map.grid.size;
-    let channel = |name: &str, unit: &str, values: Vec<f64>| Channel {
+    let [along, across] = pitch(map);
+    let values = match shown {
+        Shown::Values(values, factor) => values.iter().map(|v| factor * f64::from(*v)).collect(),
+        Shown::Mask => map.mask.iter().map(|m| f64::from(*m as u8)).collect(),
+        Shown::Position(axis) => (0..map.grid.len())
+            .map(|n| map.grid.place(n)[axis])
+            .collect(),
+    };
+    Channel {
         name: name.to_owned(),
         internal_name: String::new(),
         unit: unit.to_owned(),
@@ -20,62 +99,27 @@ pub fn map_scan(map: &TwistStrainMap) -> Scan {
         scan_line: None,
         rows,
         columns,
-        width_nm: Some(pitch[0] * columns as f64),
-        height_nm: Some(pitch[1] * rows as f64),
+        width_nm: Some(along * columns as f64),
+        height_nm: Some(across * rows as f64),
         span: Span::PixelEdges,
         scale: 1.0,
         offset: 0.0,
         scaling: "computed".to_owned(),
         plane_fit: None,
         samples: Samples::F64(values),
-    };
-    let mut channels = Vec::new();
-    let mut plane = |name: &str, unit: &str, plane: &Plane, factor: f64| {
-        let scaled = |values: &[f32]| values.iter().map(|v| factor * f64::from(*v)).collect();
-        channels.push(channel(name, unit, scaled(&plane.value)));
-        channels.push(channel(
-            &format!("{name} sigma"),
-            unit,
-            scaled(&plane.sigma),
-        ));
-    };
-    let degree = 1f64.to_degrees();
-    plane("twist", "°", &map.twist, degree);
-    plane("strain", "%", &map.magnitude, 100.0);
-    plane("strain axis", "°", &map.axis, degree);
-    plane("strain vector 1", "%", &map.strain[0], 100.0);
-    plane("strain vector 2", "%", &map.strain[1], 100.0);
-    plane("lattice angle", "°", &map.lattice_angle, degree);
-    for (i, wavelength) in map.wavelengths.iter().enumerate() {
-        plane(&format!("wavelength {}", i + 1), "nm", wavelength, 1.0);
     }
-    plane("orientation", "°", &map.orientation, degree);
-    for (axis, displacement) in ["x", "y"].iter().zip(&map.displacement) {
-        plane(&format!("displacement {axis}"), "nm", displacement, 1.0);
-    }
-    let single = |values: &[f32]| values.iter().map(|v| f64::from(*v)).collect::<Vec<f64>>();
-    let covariance = map.strain_covariance.iter().map(|v| 1e4 * f64::from(*v));
-    channels.push(channel(
-        "strain vector covariance",
-        "%²",
-        covariance.collect(),
-    ));
-    channels.push(channel("closure chi2 per dof", "", single(&map.closure)));
-    channels.push(channel("curl", "rad/nm²", single(&map.curl)));
-    channels.push(channel("signal to noise", "", single(&map.signal_to_noise)));
-    let mask = map.mask.iter().map(|m| f64::from(*m as u8));
-    channels.push(channel("mask", "", mask.collect()));
-    for (axis, name) in ["position x", "position y"].into_iter().enumerate() {
-        let places = (0..map.grid.len()).map(|node| map.grid.place(node)[axis]);
-        channels.push(channel(name, "nm", places.collect()));
-    }
-    let half = nalgebra::Vector2::new(columns as f64 - 1.0, rows as f64 - 1.0) / 2.0;
-    let centre = map.grid.origin + step * half;
+}
+
+fn scan(map: &TwistStrainMap, channels: Vec<Channel>) -> Scan {
+    let [columns, rows] = map.grid.size.map(|n| n as f64);
+    let step = map.grid.step;
+    let centre = map.grid.origin + step * Vector2::new(columns - 1.0, rows - 1.0) / 2.0;
+    let [along, across] = pitch(map);
     Scan {
         format: "moiregauge map".to_owned(),
         rotation_rad: step[(1, 0)].atan2(step[(0, 0)]),
         offset_nm: centre.into(),
-        size_nm: Some([pitch[0] * columns as f64, pitch[1] * rows as f64]),
+        size_nm: Some([along * columns, across * rows]),
         channels,
         ..Scan::default()
     }

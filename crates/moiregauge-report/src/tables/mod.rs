@@ -11,7 +11,7 @@ mod map;
 #[cfg(feature = "parquet")]
 mod parquet;
 
-pub use map::map_scan;
+pub use map::{map_scan, map_scans};
 
 use crate::results::Results;
 #[cfg(feature = "parquet")]

@@ -17,6 +17,8 @@ const CHUNK: usize = 256;
 pub(super) struct Place {
     /// First row of the part.
     pub(super) row: usize,
+    /// Rows of the whole image, if this is only a part of it.
+    pub(super) rows: Option<usize>,
     /// Where all phases are zero, pixels of the whole image.
     pub(super) centre: Vector2<f64>,
 }
@@ -209,6 +211,7 @@ mod tests {
         let image = Image::new(rows, columns, values.collect());
         let place = Place {
             row: 40,
+            rows: None,
             centre: Vector2::new(12.5, 50.0),
         };
         let waves = [Vector2::new(0.3, -0.7), Vector2::new(-1.1, 0.2)];

@@ -110,19 +110,19 @@ fn common_grid(maps: &[&LatticeMap]) -> Option<Grid> {
 }
 
 /// A map and the way from places to its nodes.
-struct View<'a> {
+pub(super) struct View<'a> {
     map: &'a LatticeMap,
     inverse: Matrix2<f64>,
 }
 
 impl<'a> View<'a> {
-    fn new(map: &'a LatticeMap) -> Option<Self> {
+    pub(super) fn new(map: &'a LatticeMap) -> Option<Self> {
         let inverse = map.grid.step.try_inverse()?;
         Some(Self { map, inverse })
     }
 
     /// The map at a place, between its nodes (bilinear); the mask is the worst of those around.
-    fn at(&self, place: Vector2<f64>) -> Option<LatticeNode> {
+    pub(super) fn at(&self, place: Vector2<f64>) -> Option<LatticeNode> {
         let t = self.inverse * (place - self.map.grid.origin);
         let along = |axis: usize| {
             let last = self.map.grid.size[axis] as f64 - 1.0;
@@ -152,6 +152,8 @@ impl<'a> View<'a> {
                 },
                 chi2: node.chi2 * weight,
                 signal_to_noise: node.signal_to_noise * weight,
+                displacement: node.displacement * weight,
+                displacement_covariance: node.displacement_covariance * weight,
                 ..node
             };
             out = Some(match out {
@@ -165,6 +167,9 @@ impl<'a> View<'a> {
                     chi2: sum.chi2 + scaled.chi2,
                     freedom: sum.freedom.max(node.freedom),
                     signal_to_noise: sum.signal_to_noise + scaled.signal_to_noise,
+                    displacement: sum.displacement + scaled.displacement,
+                    displacement_covariance: sum.displacement_covariance
+                        + scaled.displacement_covariance,
                 },
             });
         }
@@ -185,6 +190,8 @@ fn average(views: &[View], place: Vector2<f64>) -> (LatticeNode, f64, usize) {
         chi2: f64::NAN,
         freedom: 0,
         signal_to_noise: 0.0,
+        displacement: Vector2::repeat(f64::NAN),
+        displacement_covariance: Matrix2::repeat(f64::NAN),
     };
     if good.is_empty() {
         // The least bad reason, with its values if it has any.
@@ -218,6 +225,9 @@ fn average(views: &[View], place: Vector2<f64>) -> (LatticeNode, f64, usize) {
         chi2: good.iter().map(|n| n.chi2).sum(),
         freedom: good.iter().map(|n| n.freedom).sum(),
         signal_to_noise: good.iter().map(|n| n.signal_to_noise).sum(),
+        // Of the first map that has one: maps have mean lattices of their own.
+        displacement: good[0].displacement,
+        displacement_covariance: good[0].displacement_covariance,
     };
     (node, chi2.sum(), 4 * (good.len() - 1))
 }

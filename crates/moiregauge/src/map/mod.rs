@@ -17,20 +17,27 @@ mod carrier;
 mod combine;
 mod defects;
 mod demodulate;
+mod displacement;
+mod drift_change;
 mod noise;
+mod pilot;
 mod quantities;
 mod sample;
 mod smooth;
 mod summary;
+mod survey;
+mod types;
 mod waves;
 mod window;
 
 pub use combine::{Agreement, combine};
 pub use defects::Mask;
-pub use demodulate::{Reference, Resolution, UsedHarmonic, WaveMap, WaveNode};
+pub use drift_change::{DriftChange, drift_change};
 pub use quantities::{Plane, TwistStrainMap};
 pub use sample::{Grid, LatticeMap, LatticeNode};
 pub use summary::Spread;
+pub use survey::Survey;
+pub use types::{Reference, Resolution, UsedHarmonic, WaveMap, WaveNode};
 
 use nalgebra::Vector2;
 
@@ -46,7 +53,12 @@ pub fn local_lattices(
     resolution: &Resolution,
 ) -> Option<WaveMap> {
     let centre = Vector2::new(image.columns as f64 - 1.0, image.rows as f64 - 1.0) / 2.0;
-    demodulate::demodulate(image, Place { row: 0, centre }, reference, resolution)
+    let place = Place {
+        row: 0,
+        rows: None,
+        centre,
+    };
+    demodulate::demodulate(image, place, reference, resolution)
 }
 
 /// The middle one of some values; they are reordered. 0 of none.

@@ -19,8 +19,10 @@ const TRIED: [f64; 9] = [0.35, 0.4, 0.45, 0.5, 0.55, 0.6, 0.65, 0.7, 0.75];
 pub(super) const PROBE_WINDOW: f64 = 1.5;
 /// The local ratio is averaged over so many windows.
 const AVERAGED: f64 = 3.0;
-/// Windows that hold less are not looked at.
-const WHOLE: f64 = 0.9;
+/// Windows of which more is missing are not looked at, nor those nearer to the edges than so many widths: harmonics
+/// that are cut off reach the probes.
+const WHOLE: f64 = 0.85;
+const AWAY: f64 = 2.5;
 /// Nodes that have to be left.
 const FEWEST: usize = 6;
 
@@ -78,10 +80,18 @@ impl Noise {
         let stride = [0, 1].map(|i| ((width[i] / blocks.block[i] as f64).round() as usize).max(1));
         let nodes = Nodes::filling(blocks.size, stride);
         let smoothed = smooth(blocks, width, nodes, None);
+        let low = blocks.middle(0.0, 0.0);
+        let high = blocks.middle(blocks.size[0] as f64 - 1.0, blocks.size[1] as f64 - 1.0);
         let whole: Vec<Option<f64>> = smoothed
             .support
             .iter()
-            .map(|s| s.filter(|s| s.share > WHOLE).map(|s| s.amplitude_noise))
+            .enumerate()
+            .map(|(node, support)| {
+                let at = nodes.place(blocks, node);
+                let inside = (0..2).all(|i| (at - low)[i].min((high - at)[i]) > AWAY * width[i]);
+                let support = support.filter(|s| inside && s.share > WHOLE)?;
+                Some(support.amplitude_noise)
+            })
             .collect();
         if whole.iter().flatten().count() < FEWEST {
             return Self {

@@ -53,7 +53,7 @@ pub struct TwistStrainMap {
     pub strain_covariance: Vec<f32>,
     /// |E|, the bias of noise removed.
     pub magnitude: Plane,
-    /// φ_lab, rad in [0, π); NaN where the strain is not significant (p < 0.01).
+    /// Axis `φ_lab` of the strain, rad in [0, π); NaN where the strain is not significant (p < 0.01).
     pub axis: Plane,
     /// Lengths of the real-space vectors a₁, a₂, a₂ − a₁, nm.
     pub wavelengths: [Plane; 3],
@@ -113,8 +113,12 @@ impl TwistStrainMap {
                 plane.push(real.map(|l| l.wavelength(i)));
             }
             out.orientation.push(real.map(|l| l.polar_angle(0)));
-            for plane in &mut out.displacement {
-                plane.push(None);
+            for (i, plane) in out.displacement.iter_mut().enumerate() {
+                let variance = node.displacement_covariance[(i, i)];
+                plane.push(Some(Estimate::from_variance(
+                    node.displacement[i],
+                    variance,
+                )));
             }
             let closure = node.chi2 / node.freedom as f64;
             out.closure.push(if node.freedom > 0 {
@@ -125,6 +129,62 @@ impl TwistStrainMap {
             out.signal_to_noise.push(node.signal_to_noise.sqrt() as f32);
         }
         out
+    }
+}
+
+impl TwistStrainMap {
+    /// All numbers but the mask, in a fixed order: for keeping parts of a map on disk.
+    pub fn planes_mut(&mut self) -> Vec<&mut Vec<f32>> {
+        let [e1, e2] = &mut self.strain;
+        let [l1, l2, l3] = &mut self.wavelengths;
+        let [ux, uy] = &mut self.displacement;
+        let both = [
+            &mut self.twist,
+            &mut self.lattice_angle,
+            e1,
+            e2,
+            &mut self.magnitude,
+            &mut self.axis,
+            l1,
+            l2,
+            l3,
+            &mut self.orientation,
+            ux,
+            uy,
+        ];
+        let mut all: Vec<&mut Vec<f32>> = both
+            .into_iter()
+            .flat_map(|plane| [&mut plane.value, &mut plane.sigma])
+            .collect();
+        all.extend([
+            &mut self.strain_covariance,
+            &mut self.closure,
+            &mut self.curl,
+            &mut self.signal_to_noise,
+        ]);
+        all
+    }
+
+    /// Puts the rows of `other`, which follow on those of this map, behind them.
+    pub fn append(&mut self, mut other: Self) {
+        self.grid.size[1] += other.grid.size[1];
+        self.mask.append(&mut other.mask);
+        for (mine, more) in self.planes_mut().into_iter().zip(other.planes_mut()) {
+            mine.append(more);
+        }
+    }
+
+    /// A map without nodes, to append to.
+    pub fn empty(grid: Grid, window_nm: f64) -> Self {
+        let none = LatticeMap {
+            grid: Grid {
+                size: [grid.size[0], 0],
+                ..grid
+            },
+            window_nm,
+            nodes: Vec::new(),
+        };
+        Self::new(&none, &[])
     }
 }
 

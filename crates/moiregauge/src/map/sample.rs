@@ -7,7 +7,8 @@ use nalgebra::{Matrix2, Matrix4, Vector2};
 use rayon::prelude::*;
 
 use super::defects::Mask;
-use super::demodulate::WaveMap;
+use super::displacement;
+use super::types::WaveMap;
 use crate::geometry::Geometry;
 use crate::lattice::LatticeVectors;
 use crate::lattice::reciprocal::{both, real_from_reciprocal};
@@ -57,6 +58,11 @@ pub struct LatticeNode {
     pub freedom: usize,
     /// Signal power over noise power under the window.
     pub signal_to_noise: f64,
+    /// Displacement of the pattern against the mean lattice of the good nodes, nm, and its covariance; NaN
+    /// where it could not be followed.
+    pub displacement: Vector2<f64>,
+    /// See `displacement`, nm².
+    pub displacement_covariance: Matrix2<f64>,
 }
 
 /// Local lattices on the sample, in nm.
@@ -78,15 +84,29 @@ impl LatticeMap {
     pub fn new(map: &WaveMap, at_rest: &Geometry) -> Option<Self> {
         let j = at_rest.pixel_to_nm;
         let dual = j.try_inverse()?.transpose();
-        let nodes = map.nodes.par_iter().map(|node| LatticeNode {
-            mask: node.mask,
-            waves: LatticeVectors {
-                basis: dual * node.pair,
-                covariance: kronecker(&node.indices, &(dual * node.slope * dual.transpose())),
-            },
-            chi2: node.chi2,
-            freedom: node.freedom,
-            signal_to_noise: node.signal_to_noise,
+        let phases = displacement::phases(map);
+        let good = map.nodes.iter().filter(|n| n.mask == Mask::Good);
+        let (sum, count) = good.fold((Matrix2::zeros(), 0.0f64), |(sum, count), node| {
+            (sum + node.pair, count + 1.0)
+        });
+        // ψ = −Qᵀ u.
+        let back = (dual * sum / count.max(1.0)).transpose().try_inverse();
+        let back = -back.unwrap_or_else(|| Matrix2::repeat(f64::NAN));
+        let unknown = (Vector2::repeat(f64::NAN), Matrix2::repeat(f64::NAN));
+        let nodes = map.nodes.par_iter().zip(phases).map(|(node, phases)| {
+            let (phases, covariance) = phases.unwrap_or(unknown);
+            LatticeNode {
+                mask: node.mask,
+                waves: LatticeVectors {
+                    basis: dual * node.pair,
+                    covariance: kronecker(&node.indices, &(dual * node.slope * dual.transpose())),
+                },
+                chi2: node.chi2,
+                freedom: node.freedom,
+                signal_to_noise: node.signal_to_noise,
+                displacement: back * phases,
+                displacement_covariance: back * covariance * back.transpose(),
+            }
         });
         Some(Self {
             grid: Grid {

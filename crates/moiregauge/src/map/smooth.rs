@@ -309,10 +309,12 @@ fn envelope(
                 vec![0.0; 2 * count],
                 vec![0.0; 2 * count],
             ];
-            for line in at.saturating_sub(radius)..(at + radius + 1).min(blocks.size[1]) {
-                let i = line + radius - at;
+            let first = at.saturating_sub(radius);
+            let last = (at + radius + 1).min(blocks.size[1]);
+            for (i, line) in lines[first..last].iter().enumerate() {
+                let i = i + first + radius - at;
                 let (w, wd) = (kernels[1].plain[i], kernels[1].tilted[i]);
-                let (plain, tilted) = lines[line].split_at(2 * count);
+                let (plain, tilted) = line.split_at(2 * count);
                 let [s, x, y] = &mut sums;
                 for ((s, y), value) in s.iter_mut().zip(y.iter_mut()).zip(plain) {
                     *s += w * value;

@@ -295,8 +295,8 @@ fn maps_of_one_place_are_averaged() {
     };
     let one = |seed: u64, white: f64| {
         let scene = FieldScene {
-            seed,
             white,
+            seed,
             ..scene.clone()
         };
         LatticeMap::new(&map_of(&scene, Some(14.0)), &geometry).unwrap()
@@ -328,4 +328,122 @@ fn maps_of_one_place_are_averaged() {
     let ratio =
         same.nodes[node].waves.covariance[(0, 0)] / a.nodes[near.unwrap()].waves.covariance[(0, 0)];
     assert!((0.9..1.1).contains(&ratio), "{ratio}");
+}
+
+/// Displacements of a rippled lattice are those of its phases, whatever their number of turns, but for the
+/// constant and what belongs to the mean lattice.
+#[test]
+fn displacements_follow_the_phases() {
+    let mut scene = rippled(512, 32.0, 0.05);
+    scene.white = 0.5;
+    let map = map_of(&scene, None);
+    let geometry = Geometry {
+        size: [512, 512],
+        pixel_to_nm: Matrix2::identity(),
+        origin: Vector2::zeros(),
+        covariance: Matrix4::zeros(),
+        from_sensors: false,
+    };
+    let lattices = LatticeMap::new(&map, &geometry).unwrap();
+    let mean = lattices.mean().unwrap();
+    let back = -mean.transpose().try_inverse().unwrap();
+    let (mut difference, mut stated) = (Vec::new(), Vec::new());
+    for (i, node) in lattices.nodes.iter().enumerate() {
+        if node.displacement.x.is_finite() {
+            let at = lattices.grid.place(i);
+            let truth = back * (scene.phases(at) - mean.transpose() * at);
+            difference.push(node.displacement - truth);
+            stated.push(node.displacement_covariance.m11.sqrt());
+        }
+    }
+    assert!(difference.len() * 10 > 9 * good(&map).count());
+    let centre = difference.iter().sum::<Vector2<f64>>() / difference.len() as f64;
+    let spread: Vec<f64> = difference.iter().map(|d| (d - centre).x).collect();
+    // Noise, and the curvature that the window takes off the phases (tenths of a pixel).
+    let typical = stated.iter().sum::<f64>() / stated.len() as f64;
+    assert!(
+        rms(&spread) < 1.5 * typical + 0.1,
+        "{} {typical}",
+        rms(&spread)
+    );
+    assert!(rms(&spread) > 0.5 * typical);
+}
+
+/// Bands of a survey are the map of the whole image, node by node: places exactly, values within a small
+/// part of their errors (each band has a carrier and a noise level of its own).
+#[test]
+fn bands_go_on_where_others_end() {
+    let mut scene = rippled(512, 40.0, 0.03);
+    scene.white = 0.7;
+    let image = scene.image();
+    let reference = Reference {
+        pair: scene.pair,
+        pitch: [1.0; 2],
+    };
+    let resolution = Resolution {
+        window_nm: Some(14.0),
+        ..Resolution::default()
+    };
+    let survey = Survey::new([512, 512], reference, resolution, 14.0, 150);
+    assert!(survey.bands() >= 3);
+    let mut nodes = 0;
+    let mut next = None;
+    for band in 0..survey.bands() {
+        let rows = survey.rows(band);
+        let part = image.cropped([0, rows.start], [512, rows.len()]);
+        let map = survey.map(band, &part).unwrap();
+        // Rows of nodes follow each other at equal steps.
+        if let Some(next) = next {
+            assert_eq!(map.first.y, next);
+        }
+        next = Some(map.first.y + map.step[1] * map.size[1] as f64);
+        nodes += map.nodes.len();
+        let [stated, _] = pulls(&scene, &map, 1.0);
+        assert!(
+            (0.8..1.2).contains(&rms(&stated)),
+            "{band}: {}",
+            rms(&stated)
+        );
+    }
+    let whole = local_lattices(&image, &reference, &resolution).unwrap();
+    assert!(nodes.abs_diff(whole.nodes.len()) <= 2 * whole.size[0]);
+}
+
+/// Opposite changes of drift in upward and downward frames are found, with their size; equal ones are not.
+#[test]
+fn changing_drift_is_told_from_strain() {
+    // 0.05 s per nm along y, A = (2, −3)·10⁻³ nm/s²: the phase of G changes by −½ (A·G)(u·r)².
+    let u = 0.05;
+    let acceleration = Vector2::new(2e-3, -3e-3);
+    let of = |sign: f64, seed: u64| {
+        let mut scene = FieldScene::hexagonal([400, 400], 16.0, 0.2);
+        let at = scene.pair.tr_mul(&acceleration) * sign;
+        // A sine of long period is a parabola where it bends most.
+        let wave = 1e-3;
+        scene.ripples.push(Ripple {
+            wave: Vector2::new(0.0, wave),
+            phase: std::f64::consts::FRAC_PI_2 - 200.0 * wave,
+            amplitude: [at.x, at.y].map(|a| a * u * u / (wave * wave)),
+        });
+        scene.white = 0.5;
+        scene.seed = seed;
+        let geometry = Geometry {
+            size: [400, 400],
+            pixel_to_nm: Matrix2::identity(),
+            origin: Vector2::zeros(),
+            covariance: Matrix4::zeros(),
+            from_sensors: true,
+        };
+        LatticeMap::new(&map_of(&scene, Some(16.0)), &geometry).unwrap()
+    };
+    let gradient = Vector2::new(0.0, u);
+    let found = drift_change(&of(1.0, 1), &of(-1.0, 2), gradient).unwrap();
+    assert!(found.stands_out(), "{found:?}");
+    for i in 0..2 {
+        let error = found.acceleration[i].value - 2.0 * acceleration[i];
+        assert!(error.abs() < 4.0 * found.acceleration[i].sigma, "{found:?}");
+        assert!(error.abs() < 0.3 * acceleration.norm(), "{found:?}");
+    }
+    let same = drift_change(&of(1.0, 3), &of(1.0, 4), gradient).unwrap();
+    assert!(!same.stands_out(), "{same:?}");
 }

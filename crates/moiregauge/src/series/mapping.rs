@@ -1,9 +1,14 @@
 //! Scans that were analysed → maps of their local lattice on the sample.
+//!
+//! Places are those on the sample at the time of the first scan: what it drifts until a later scan is taken off.
 
 use nalgebra::Matrix2;
-use spmfile::{Channel, FrameDirection, LineDirection, Scan};
+use nalgebra::Vector2;
+use spmfile::{Channel, DateTime, FrameDirection, LineDirection, Scan};
 
 use super::measure::{channels, image_of, nominal, usable_sensors};
+use super::sightings::seconds;
+use super::tiling::tile_map;
 use crate::analysis::ScanAnalysis;
 use crate::background::remove_background;
 use crate::geometry::{Geometry, Timing};
@@ -23,12 +28,24 @@ pub struct LineMap {
     pub frame_direction: Option<FrameDirection>,
     /// Whether the drift is taken off.
     pub drift_corrected: bool,
-    /// The harmonics that were used.
+    /// Time gradient of the frame, s/nm; `None` without timing.
+    pub time_gradient: Option<Vector2<f64>>,
+    /// The harmonics that were used; none by tiles.
     pub harmonics: Vec<UsedHarmonic>,
     /// The lattice of the whole image under the same corrections, wave vectors as columns, rad/nm.
     pub whole: Matrix2<f64>,
     /// Local lattices on the sample.
     pub map: LatticeMap,
+}
+
+/// How local lattices are measured.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum MapMethod {
+    /// Phases under a Gaussian window.
+    #[default]
+    Demodulation,
+    /// The fit of whole images on overlapping tiles.
+    Tiles,
 }
 
 /// Why an image gives no map.
@@ -48,19 +65,25 @@ pub enum MapError {
 
 /// Maps the images behind `analysed`, drift and sensors taken into account as there.
 ///
+/// `origin` is the time at which places on the sample are meant, that of the first scan. By tiles, the window
+/// of `resolution` is the side of a tile.
+///
 /// # Errors
 /// [`MapError`], where none of its images gives a map.
 pub fn map_scan(
     scan: &Scan,
-    analysed: &ScanAnalysis,
+    (analysed, origin): (&ScanAnalysis, Option<DateTime>),
     settings: &Settings,
-    resolution: &Resolution,
+    (method, resolution): (MapMethod, &Resolution),
 ) -> Result<Vec<LineMap>, MapError> {
     let channels = channels(scan, settings).map_err(|_| MapError::NoImage)?;
     let (mut maps, mut error) = (Vec::new(), MapError::NoImage);
     for channel in channels {
-        match map_line(scan, channel, analysed, settings, resolution) {
-            Ok(map) => maps.push(map),
+        match map_line(scan, channel, analysed, settings, (method, resolution)) {
+            Ok(mut map) => {
+                map.map.grid.origin -= drifted(analysed, origin);
+                maps.push(map);
+            }
             Err(why) => error = why,
         }
     }
@@ -71,12 +94,20 @@ pub fn map_scan(
     }
 }
 
+/// How far the sample drifted from `origin` until the scan.
+fn drifted(analysed: &ScanAnalysis, origin: Option<DateTime>) -> Vector2<f64> {
+    match (analysed.drift, analysed.acquired, origin) {
+        (Some(drift), Some(now), Some(then)) => drift * (seconds(now) - seconds(then)),
+        _ => Vector2::zeros(),
+    }
+}
+
 fn map_line(
     scan: &Scan,
     channel: &Channel,
     analysed: &ScanAnalysis,
     settings: &Settings,
-    resolution: &Resolution,
+    (method, resolution): (MapMethod, &Resolution),
 ) -> Result<LineMap, MapError> {
     let line = channel.line_direction.unwrap_or(LineDirection::Trace);
     let found = analysed.lines.iter().find(|l| l.line == line);
@@ -100,21 +131,33 @@ fn map_line(
         (Some(drift), Some(timing)) => Some(at_rest(&geometry, &timing, drift)),
         _ => None,
     };
-    let image = remove_background(&image_of(channel), settings.background);
     let reference = Reference {
         pair: reciprocal(&pixels).ok_or(MapError::NoImage)?,
         pitch: pitch(&geometry),
     };
-    let waves = local_lattices(&image, &reference, resolution).ok_or(MapError::TooSmall)?;
     let placed = still.as_ref().unwrap_or(&geometry);
-    let map = LatticeMap::new(&waves, placed).ok_or(MapError::NoImage)?;
+    let (map, harmonics) = match method {
+        MapMethod::Demodulation => {
+            let image = remove_background(&image_of(channel), settings.background);
+            let waves = local_lattices(&image, &reference, resolution).ok_or(MapError::TooSmall)?;
+            let map = LatticeMap::new(&waves, placed).ok_or(MapError::NoImage)?;
+            (map, waves.harmonics)
+        }
+        MapMethod::Tiles => {
+            let image = image_of(channel);
+            let sides = (resolution.window_nm, resolution.step_nm);
+            let map = tile_map(&image, (&geometry, placed), &reference, sides, settings);
+            (map.ok_or(MapError::TooSmall)?, Vec::new())
+        }
+    };
     let dual = placed.pixel_to_nm.try_inverse().ok_or(MapError::NoImage)?;
     Ok(LineMap {
         file: analysed.file.clone(),
         line,
         frame_direction: analysed.frame_direction,
         drift_corrected: still.is_some(),
-        harmonics: waves.harmonics,
+        time_gradient: timing.and_then(|timing| geometry.time_gradient(&timing)),
+        harmonics,
         whole: dual.transpose() * reference.pair,
         map,
     })

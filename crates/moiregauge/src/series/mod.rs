@@ -17,16 +17,19 @@ mod overlap;
 mod set;
 mod shared;
 mod sightings;
+mod surveying;
+mod tiling;
 
 pub use atomic::{AtomicError, AtomicOrientation, atomic_orientation};
 pub use channel::{channels_by_preference, choose_channel};
 pub use corrected::{CorrectedImage, corrected_images, nominal_geometry, on_grid};
 pub use group::natural_order;
 pub use illustrate::illustrate;
-pub use mapping::{LineMap, MapError, map_scan};
+pub use mapping::{LineMap, MapError, MapMethod, map_scan};
 pub use measure::{MeasureError, MeasuredLine, MeasuredScan, measure_moires, measure_scan};
 pub use moires::sorted_moires;
 pub use overlap::{Window, common_window};
+pub use surveying::{ReadBlock, SurveyError, SurveyPlan};
 
 use nalgebra::Matrix2;
 

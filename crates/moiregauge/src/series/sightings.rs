@@ -62,7 +62,7 @@ pub(super) fn middle_of_frame(scan: &MeasuredScan) -> Option<f64> {
 }
 
 /// Seconds since the first of March of the year 0 (proleptic Gregorian calendar).
-fn seconds(t: DateTime) -> f64 {
+pub(super) fn seconds(t: DateTime) -> f64 {
     // Years that start in March have their leap day at the end.
     let (year, month) = if t.month > 2 {
         (i64::from(t.year), i64::from(t.month) - 3)

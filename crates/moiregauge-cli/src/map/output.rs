@@ -1,0 +1,184 @@
+//! A finished map → files and words.
+
+use std::fmt::Write as _;
+
+use anyhow::Context as _;
+use moiregauge::analysis::Analysis;
+use moiregauge::caveat::Caveat;
+use moiregauge::map::{Agreement, DriftChange, TwistStrainMap, UsedHarmonic};
+use moiregauge::settings::Settings;
+use moiregauge_report::results::{
+    Conventions, MapResults, MappedImage, TwistStrainResult, mask_counts, quantities,
+};
+use moiregauge_report::{
+    Provenance, figure_files, map_figures, map_scan, map_scans, plus_minus, two_digits,
+};
+use spmfile::{LineDirection, WritableFormat};
+
+use super::MapArgs;
+use crate::analyze::write_all;
+use crate::say::say;
+
+/// With more nodes than this there is no `.gwy` file: it would not fit into memory beside the map.
+const MANY: usize = 1_500_000;
+
+const ERRORS: &str = "one standard deviation by the noise of the images, node by node, neighbouring nodes not \
+     independent, enlarged where the window visibly blurs; what all nodes share (drift, calibration, lattice \
+     constant, model) is in whole_image and in the budget of `moiregauge analyze`; smoothing by the window adds a \
+     bias, about a quarter of the noise where the window was chosen by itself";
+
+/// A map and what came with it.
+pub(super) struct Made {
+    pub(super) map: TwistStrainMap,
+    pub(super) settings: Settings,
+    pub(super) provenance: Provenance,
+    pub(super) whole: Option<TwistStrainResult>,
+    pub(super) images: Vec<MappedImage>,
+    pub(super) agreement: Option<Agreement>,
+    pub(super) drift_change: Option<DriftChange>,
+    pub(super) caveats: Vec<Caveat>,
+}
+
+/// Writes everything and says what there is.
+pub(super) fn write(made: &Made, args: &MapArgs) -> anyhow::Result<()> {
+    let (map, out) = (&made.map, args.analyze.out());
+    let log = vec![format!("moiregauge {} map", env!("CARGO_PKG_VERSION"))];
+    let group = out.join("map.zarr");
+    if group.join("zarr.json").is_file() {
+        std::fs::remove_dir_all(&group)
+            .with_context(|| format!("cannot replace {}", group.display()))?;
+    }
+    // One array at a time; the group and its coordinates are the same every time.
+    for scan in map_scans(map) {
+        write_all(
+            out,
+            &spmfile::write(&scan, WritableFormat::Zarr, "map", &log)?,
+        )?;
+    }
+    if map.grid.len() <= MANY {
+        write_all(
+            out,
+            &spmfile::write(&map_scan(map), WritableFormat::Gwy, "map", &log)?,
+        )?;
+    }
+    let choice = args.analyze.choice();
+    if choice.figures {
+        write_all(
+            out,
+            &figure_files(&map_figures(map, choice.colormap), choice)?,
+        )?;
+    }
+    let results = results(made, args.method_name());
+    let json = serde_json::to_vec_pretty(&results)?;
+    write_all(out, &[("map.json".to_owned(), json)])?;
+    if args.analyze.json() {
+        say(&format!("{}\n", serde_json::to_string_pretty(&results)?))?;
+    } else if args.analyze.is_loud() {
+        say(&summary(&results))?;
+        say(&format!(
+            "\nWritten to {}\n",
+            out.join("map.json").display()
+        ))?;
+    }
+    Ok(())
+}
+
+fn results(made: &Made, method: &str) -> MapResults {
+    let map = &made.map;
+    let [columns, rows] = [0, 1].map(|i| map.grid.step.column(i).into_owned());
+    MapResults {
+        schema: "moiregauge/map/1".to_owned(),
+        provenance: made.provenance.clone(),
+        conventions: Conventions::of(&made.settings),
+        errors: ERRORS.to_owned(),
+        settings: made.settings.clone(),
+        method: method.to_owned(),
+        window_nm: map.window_nm,
+        resolution_nm: 2.355 * map.window_nm,
+        nodes: map.grid.size,
+        origin_nm: map.grid.origin.into(),
+        step_nm: [columns.into(), rows.into()],
+        masks: mask_counts(map),
+        quantities: quantities(map),
+        whole_image: made.whole.clone(),
+        images: made.images.clone(),
+        agreement: made.agreement.map(Into::into),
+        drift_change: made.drift_change.map(Into::into),
+        caveats: made.caveats.clone(),
+    }
+}
+
+/// Twist and strain of the whole images.
+pub(super) fn whole_image(analysis: &Analysis) -> Option<TwistStrainResult> {
+    if let Some(combined) = &analysis.combined {
+        return Some((&combined.twist_strain).into());
+    }
+    let set = analysis.sets.first()?;
+    let mean = set.mean.as_ref().or(set.uncorrected.as_ref());
+    let scan = set.scans.first();
+    mean.map(|m| &m.twist_strain)
+        .or(scan.and_then(|s| s.twist_strain_sensor.as_ref()))
+        .map(Into::into)
+}
+
+/// One image behind a map.
+pub(super) fn image(
+    file: &str,
+    line: Option<LineDirection>,
+    drift_corrected: bool,
+    harmonics: &[UsedHarmonic],
+) -> MappedImage {
+    MappedImage {
+        file: file.to_owned(),
+        line: match line {
+            Some(LineDirection::Retrace) => "retrace",
+            Some(LineDirection::Trace) | None => "trace",
+        }
+        .to_owned(),
+        drift_corrected,
+        harmonics: harmonics.iter().map(Into::into).collect(),
+    }
+}
+
+/// What is said on the screen.
+fn summary(results: &MapResults) -> String {
+    let mut text = String::new();
+    let _ = writeln!(
+        text,
+        "{} × {} nodes, window {} nm (resolution {} nm)",
+        results.nodes[0],
+        results.nodes[1],
+        two_digits(results.window_nm),
+        two_digits(results.resolution_nm)
+    );
+    for mask in &results.masks {
+        let _ = writeln!(text, "  {:16} {} nodes", mask.name, mask.nodes);
+    }
+    for q in &results.quantities {
+        let _ = writeln!(
+            text,
+            "  {:16} {} {}, spread {} (noise {}, without it {})",
+            q.name,
+            plus_minus(moiregauge::estimate::Estimate::new(q.mean, q.mean_sigma)),
+            q.unit,
+            two_digits(q.spread),
+            two_digits(q.noise),
+            two_digits(q.spread_corrected)
+        );
+    }
+    if let Some(a) = &results.agreement {
+        let _ = writeln!(
+            text,
+            "  images agree with χ²/dof {:.2} at {} nodes",
+            a.chi2_per_dof, a.nodes
+        );
+    }
+    for caveat in &results.caveats {
+        let _ = writeln!(
+            text,
+            "caveat {} ({}): {}",
+            caveat.code, caveat.place, caveat.message
+        );
+    }
+    text
+}

@@ -1,0 +1,238 @@
+//! Surveys: images too large for memory, mapped band by band. Finished bands stay in the folder of the
+//! results until the map is complete, so that an interrupted run goes on where it stopped.
+
+use std::io::Read as _;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context as _, ensure};
+use indicatif::{ProgressBar, ProgressStyle};
+use moiregauge::geometry::Geometry;
+use moiregauge::map::{Mask, Resolution, TwistStrainMap};
+use moiregauge::series::{SurveyPlan, choose_channel, nominal_geometry};
+use moiregauge::settings::Settings;
+use moiregauge_report::InputFile;
+use nalgebra::{Matrix2, Vector2};
+use sha2::{Digest as _, Sha256};
+
+use super::source::{Array, Source};
+use crate::input::Known;
+
+/// Images with more pixels than this are mapped in bands.
+const LARGE: usize = 4096 * 4096 * 5 / 4;
+
+/// A large image that can be mapped.
+pub(super) struct Large {
+    pub(super) input: InputFile,
+    geometry: Geometry,
+    source: Source,
+}
+
+impl Large {
+    /// Opens a file if its image is large; `None` for one that is read as a whole.
+    pub(super) fn open(
+        path: &Path,
+        settings: &Settings,
+        known: &Known,
+    ) -> anyhow::Result<Option<Self>> {
+        if let Some(array) = Array::open(path) {
+            if array.size[0] * array.size[1] < LARGE {
+                return Ok(None);
+            }
+            // Two lines tell what the options make of the file: its scale, rotation and size.
+            let (scan, _) = known.read(path, &array.part(&(0..2))?, &|_| true)?;
+            let mut channel = scan
+                .channels
+                .first()
+                .context("the array holds no image")?
+                .clone();
+            channel.rows = array.size[0];
+            let geometry = nominal_geometry(&scan, &channel)
+                .context("the array has no size; give it with --size")?;
+            return Ok(Some(Self {
+                input: identity(path)?,
+                geometry,
+                source: Source::Array(array),
+            }));
+        }
+        // Other files are read as a whole anyway; small ones go the common way.
+        if std::fs::metadata(path)?.len() < LARGE as u64 {
+            return Ok(None);
+        }
+        let reading = crate::analyze::read(path, settings, known)?;
+        let names: Vec<(&str, &str)> = reading
+            .scan
+            .channels
+            .iter()
+            .map(|c| (c.name.as_str(), c.internal_name.as_str()))
+            .collect();
+        let chosen = choose_channel(&names, settings.channel.as_deref()).map(str::to_owned);
+        let channel = reading
+            .scan
+            .channels
+            .iter()
+            .find(|c| Some(&c.name) == chosen.as_ref());
+        let Some(channel) = channel.filter(|c| c.rows * c.columns >= LARGE) else {
+            return Ok(None);
+        };
+        let geometry =
+            nominal_geometry(&reading.scan, channel).context("the file gives no scan size")?;
+        Ok(Some(Self {
+            input: identity(path)?,
+            geometry,
+            source: Source::Memory(channel.clone()),
+        }))
+    }
+
+    /// Maps band by band; `resume` keeps finished bands in `out` and takes those of an earlier run.
+    pub(super) fn map(
+        &self,
+        settings: &Settings,
+        resolution: &Resolution,
+        out: &Path,
+        loud: bool,
+    ) -> anyhow::Result<(TwistStrainMap, SurveyPlan)> {
+        let read = |block| self.source.block(block);
+        let plan = SurveyPlan::new(&self.geometry, settings, resolution, &read)?;
+        let folder = out.join("bands");
+        std::fs::create_dir_all(&folder)
+            .with_context(|| format!("cannot make the folder {}", folder.display()))?;
+        let key = key(&self.input, settings, resolution)?;
+        let progress = progress(plan.bands(), loud);
+        let mut whole: Option<TwistStrainMap> = None;
+        for band in 0..plan.bands() {
+            let path = folder.join(format!("{key}-{band:04}"));
+            let map = if let Some(kept) = load(&path, &plan) {
+                kept
+            } else {
+                let mut map = plan.band(band, &read)?;
+                keep(&path, &mut map)?;
+                map
+            };
+            let all = whole.get_or_insert_with(|| plan.start(&map.grid));
+            all.append(map);
+            progress.inc(1);
+        }
+        progress.finish_and_clear();
+        let whole = whole.context("the image has no lines")?;
+        std::fs::remove_dir_all(&folder).ok();
+        Ok((whole, plan))
+    }
+}
+
+/// The file by its content, read piece by piece.
+fn identity(path: &Path) -> anyhow::Result<InputFile> {
+    let mut file = std::fs::File::open(path)?;
+    let mut hash = Sha256::new();
+    let mut buffer = vec![0; 1 << 20];
+    let mut bytes = 0;
+    loop {
+        let count = file.read(&mut buffer)?;
+        if count == 0 {
+            break;
+        }
+        hash.update(&buffer[..count]);
+        bytes += count as u64;
+    }
+    Ok(InputFile {
+        file: path.display().to_string(),
+        sha256: crate::analyze::hexadecimal(&hash.finalize()),
+        bytes,
+    })
+}
+
+/// What a band depends on: input, settings, resolution, program.
+fn key(input: &InputFile, settings: &Settings, resolution: &Resolution) -> anyhow::Result<String> {
+    let mut hash = Sha256::new();
+    hash.update(&input.sha256);
+    hash.update(serde_json::to_vec(settings)?);
+    hash.update(format!("{resolution:?} {}", env!("CARGO_PKG_VERSION")));
+    Ok(crate::analyze::hexadecimal(&hash.finalize())[..16].to_owned())
+}
+
+/// Numbers of a band's head: columns, rows, origin, steps.
+const HEAD: usize = 8;
+
+/// Writes a band: head in double precision, masks, then all planes in single precision, little endian.
+fn keep(path: &Path, map: &mut TwistStrainMap) -> anyhow::Result<()> {
+    let grid = map.grid;
+    let head: [f64; HEAD] = [
+        grid.size[0] as f64,
+        grid.size[1] as f64,
+        grid.origin.x,
+        grid.origin.y,
+        grid.step.m11,
+        grid.step.m21,
+        grid.step.m12,
+        grid.step.m22,
+    ];
+    let mut bytes: Vec<u8> = head.iter().flat_map(|v| v.to_le_bytes()).collect();
+    bytes.extend(map.mask.iter().map(|m| *m as u8));
+    for plane in map.planes_mut() {
+        bytes.extend(plane.iter().flat_map(|v| v.to_le_bytes()));
+    }
+    // Renamed when complete, lest an interrupted write pass for a band.
+    let unfinished: PathBuf = path.with_extension("part");
+    std::fs::write(&unfinished, bytes)
+        .with_context(|| format!("cannot write {}", unfinished.display()))?;
+    std::fs::rename(&unfinished, path)?;
+    Ok(())
+}
+
+/// A band that was kept; `None` if there is none, or it is damaged.
+fn load(path: &Path, plan: &SurveyPlan) -> Option<TwistStrainMap> {
+    let bytes = std::fs::read(path).ok()?;
+    let (head, rest) = bytes.split_at_checked(8 * HEAD)?;
+    let head: Vec<f64> = head
+        .as_chunks::<8>()
+        .0
+        .iter()
+        .map(|b| f64::from_le_bytes(*b))
+        .collect();
+    let size = [head[0] as usize, head[1] as usize];
+    let nodes = size[0].checked_mul(size[1])?;
+    let grid = moiregauge::map::Grid {
+        size,
+        origin: Vector2::new(head[2], head[3]),
+        step: Matrix2::new(head[4], head[6], head[5], head[7]),
+    };
+    let mut map = plan.start(&grid);
+    map.grid = grid;
+    let (masks, mut rest) = rest.split_at_checked(nodes)?;
+    map.mask = masks
+        .iter()
+        .map(|m| Mask::ALL.get(usize::from(*m)).copied())
+        .collect::<Option<_>>()?;
+    for plane in map.planes_mut() {
+        let (values, after) = rest.split_at_checked(4 * nodes)?;
+        *plane = values
+            .as_chunks::<4>()
+            .0
+            .iter()
+            .map(|b| f32::from_le_bytes(*b))
+            .collect();
+        rest = after;
+    }
+    rest.is_empty().then_some(map)
+}
+
+fn progress(bands: usize, loud: bool) -> ProgressBar {
+    if !loud {
+        return ProgressBar::hidden();
+    }
+    let style = ProgressStyle::with_template("mapping {bar:30} {pos}/{len} bands, {eta} left");
+    let bar = ProgressBar::new(bands as u64);
+    match style {
+        Ok(style) => bar.with_style(style),
+        Err(_) => bar,
+    }
+}
+
+/// An error if several files are given and one of them is large.
+pub(super) fn alone(inputs: &[PathBuf]) -> anyhow::Result<()> {
+    ensure!(
+        inputs.len() == 1,
+        "images of more than {LARGE} pixels are mapped one at a time; {} files were given",
+        inputs.len()
+    );
+    Ok(())
+}

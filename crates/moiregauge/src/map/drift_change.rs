@@ -1,0 +1,94 @@
+//! Drift that changes within the frames, seen as the difference of upward and downward maps.
+//!
+//! A drift that changes by A (nm/s²) while a frame is recorded bends the phases along the slow axis: the local
+//! wave vectors change by `−u (A·G)(u·r)`, u the time gradient (s/nm). What is the same in maps of upward
+//! and downward frames may be strain of the sample (or a change of drift common to both); what differs is none:
+//! the slope of the difference along the slow axis gives `A_up − A_down`.
+
+use nalgebra::{Matrix2, Vector2};
+
+use super::combine::View;
+use super::defects::Mask;
+use super::sample::LatticeMap;
+use crate::estimate::Estimate;
+
+/// How the change of drift differs between upward and downward frames.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DriftChange {
+    /// `A_up − A_down` along x and y, nm/s².
+    pub acceleration: [Estimate; 2],
+    /// χ² that it is zero, two degrees of freedom.
+    pub chi2: f64,
+}
+
+impl DriftChange {
+    /// Whether it is more than chance (p < 0.01).
+    pub fn stands_out(&self) -> bool {
+        self.chi2 > 9.21
+    }
+}
+
+/// Compares the average of upward with that of downward maps. `time_gradient` is that of upward frames, s/nm.
+///
+/// `None` where they have too few good nodes in common.
+pub fn drift_change(
+    up: &LatticeMap,
+    down: &LatticeMap,
+    time_gradient: Vector2<f64>,
+) -> Option<DriftChange> {
+    let other = View::new(down)?;
+    let pair = up.mean()?;
+    // (time from the middle, difference of q along u, its variance) for both waves.
+    let mut seen: Vec<(f64, [f64; 2], [f64; 2])> = Vec::new();
+    let norm = time_gradient.norm();
+    let along = time_gradient / norm;
+    for (node, here) in up
+        .nodes
+        .iter()
+        .enumerate()
+        .filter(|(_, n)| n.mask == Mask::Good)
+    {
+        let place = up.grid.place(node);
+        let Some(there) = other.at(place).filter(|n| n.mask == Mask::Good) else {
+            continue;
+        };
+        let change = (here.waves.basis - there.waves.basis).tr_mul(&along);
+        let covariance = here.waves.covariance + there.waves.covariance;
+        let variance = [0, 1].map(|wave| {
+            let block = covariance.fixed_view::<2, 2>(2 * wave, 2 * wave);
+            (along.transpose() * block * along)[0]
+        });
+        seen.push((time_gradient.dot(&place), change.into(), variance));
+    }
+    if seen.len() < 10 {
+        return None;
+    }
+    // Nodes under one window share their noise.
+    let window = 4.0 * std::f64::consts::PI * up.window_nm.powi(2);
+    let shared = (window / up.grid.step.determinant().abs()).max(1.0);
+    let slope = |wave: usize| {
+        let weight = |s: &(f64, [f64; 2], [f64; 2])| 1.0 / s.2[wave];
+        let total: f64 = seen.iter().map(weight).sum();
+        let mean = |f: &dyn Fn(&(f64, [f64; 2], [f64; 2])) -> f64| {
+            seen.iter().map(|s| weight(s) * f(s)).sum::<f64>() / total
+        };
+        let (time, value) = (mean(&|s| s.0), mean(&|s| s.1[wave]));
+        let spread: f64 = seen.iter().map(|s| weight(s) * (s.0 - time).powi(2)).sum();
+        let product =
+            |s: &(f64, [f64; 2], [f64; 2])| weight(s) * (s.0 - time) * (s.1[wave] - value);
+        let slope = seen.iter().map(product).sum::<f64>() / spread;
+        // δq·û = −|u| (A·G)(u·r).
+        Estimate::new(-slope / norm, (shared / spread).sqrt() / norm)
+    };
+    let both = [slope(0), slope(1)];
+    let to_drift: Matrix2<f64> = pair.transpose().try_inverse()?;
+    let projected = Vector2::new(both[0].value, both[1].value);
+    let variance = Matrix2::new(both[0].sigma.powi(2), 0.0, 0.0, both[1].sigma.powi(2));
+    let found = to_drift * projected;
+    let covariance = to_drift * variance * to_drift.transpose();
+    let chi2 = (found.transpose() * covariance.try_inverse()? * found)[0];
+    Some(DriftChange {
+        acceleration: [0, 1].map(|i| Estimate::from_variance(found[i], covariance[(i, i)])),
+        chi2,
+    })
+}

@@ -1,0 +1,105 @@
+//! What goes into a map of one image and what comes out, in pixels.
+
+use nalgebra::{Matrix2, Vector2};
+
+use super::defects::Mask;
+
+/// How maps are made.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Resolution {
+    /// Width of the Gaussian window (standard deviation), nm; `None`: as wide as the lattice is straight.
+    pub window_nm: Option<f64>,
+    /// Distance of the nodes, nm; `None`: a third of the window.
+    pub step_nm: Option<f64>,
+    /// Margin at the edges of the frame, in window widths.
+    pub margin: f64,
+}
+
+impl Default for Resolution {
+    fn default() -> Self {
+        Self {
+            window_nm: None,
+            step_nm: None,
+            margin: 2.0,
+        }
+    }
+}
+
+/// The lattice of an image as a start, and the size of its pixels.
+#[derive(Clone, Copy, Debug)]
+pub struct Reference {
+    /// q₁, q₂ as columns, 60° apart, rad per pixel.
+    pub pair: Matrix2<f64>,
+    /// Pixels from column to column and from row to row, nm.
+    pub pitch: [f64; 2],
+}
+
+impl Reference {
+    /// Distance of neighbouring spots, `4π/(√3|q|)` of the mean |q|, nm.
+    pub fn period(&self) -> f64 {
+        let metric = Matrix2::new(1.0 / self.pitch[0], 0.0, 0.0, 1.0 / self.pitch[1]);
+        let pair = metric * self.pair;
+        let third = pair.column(1) - pair.column(0);
+        let mean = (pair.column(0).norm() + pair.column(1).norm() + third.norm()) / 3.0;
+        2.0 * std::f64::consts::TAU / (3.0f64.sqrt() * mean)
+    }
+
+    pub(super) fn in_pixels(&self, nm: f64) -> [f64; 2] {
+        self.pitch.map(|p| nm / p)
+    }
+
+    pub(super) fn wave(&self, [h, k]: [i32; 2]) -> Vector2<f64> {
+        self.pair * Vector2::new(f64::from(h), f64::from(k))
+    }
+}
+
+/// The local lattice at a node, or why there is none.
+#[derive(Clone, Copy, Debug)]
+pub struct WaveNode {
+    /// Whether it is to be believed.
+    pub mask: Mask,
+    /// q₁, q₂ as columns, rad per pixel; NaN where there is none.
+    pub pair: Matrix2<f64>,
+    /// Covariance of `(h, k)` combinations: that of (q₁, q₂) is `indices ⊗ slope`.
+    pub indices: Matrix2<f64>,
+    /// Covariance of the two components, see `indices`.
+    pub slope: Matrix2<f64>,
+    /// χ² of the closure of all harmonics.
+    pub chi2: f64,
+    /// Its degrees of freedom.
+    pub freedom: usize,
+    /// Signal power over noise power under the window, all harmonics.
+    pub signal_to_noise: f64,
+    /// Phases of the first three harmonics against the reference lattice, rad, modulo 2π.
+    pub phases: [f64; 3],
+}
+
+/// A harmonic that the map used.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct UsedHarmonic {
+    /// (h, k).
+    pub index: [i32; 2],
+    /// Root mean square amplitude over the frame, units of the image.
+    pub amplitude: f64,
+    /// Noise level at it: variance per pixel of white noise of the same power.
+    pub noise: f64,
+}
+
+/// The local lattices of an image.
+#[derive(Clone, Debug)]
+pub struct WaveMap {
+    /// Columns and rows of nodes.
+    pub size: [usize; 2],
+    /// Place of node (0, 0) and the way to the next ones, pixels.
+    pub first: Vector2<f64>,
+    /// Pixels from node to node along columns and rows.
+    pub step: [f64; 2],
+    /// Width of the window, nm.
+    pub window_nm: f64,
+    /// What the phases count against.
+    pub reference: Reference,
+    /// Row by row.
+    pub nodes: Vec<WaveNode>,
+    /// The harmonics that were used, first shell first.
+    pub harmonics: Vec<UsedHarmonic>,
+}
