@@ -144,7 +144,9 @@ pub(crate) fn named_material(name: &str) -> anyhow::Result<Material> {
 
 /// A material by name, one of the user's own first.
 fn find_material(name: &str, own: &[Material]) -> anyhow::Result<Material> {
-    let of_user = own.iter().find(|m| m.name.eq_ignore_ascii_case(name.trim()));
+    let of_user = own
+        .iter()
+        .find(|m| m.name.eq_ignore_ascii_case(name.trim()));
     if let Some(material) = of_user.cloned().or_else(|| Material::named(name)) {
         return Ok(material);
     }

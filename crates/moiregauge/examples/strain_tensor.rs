@@ -24,7 +24,11 @@ fn main() {
     let results: Vec<([f64; 7], [f64; 7])> = (1..=sets)
         .into_par_iter()
         .map(|seed| {
-            let set = if hetero { on_hbn(moire(seed)) } else { moire(seed) };
+            let set = if hetero {
+                on_hbn(moire(seed))
+            } else {
+                moire(seed)
+            };
             let outcome = run(set, layer as u8, frames as usize);
             let (found, put_in) = (outcome.tensor(), truth(&outcome.simulation));
             let [split, _] = found.splits(outcome.simulation.sample.material.poisson_ratio);
@@ -36,7 +40,11 @@ fn main() {
                 100.0 * (split.uniaxial.value - put_in[4]),
                 100.0 * (split.biaxial.value - put_in[5]),
             ];
-            let turn = if layer == 1 { 0.0 } else { outcome.simulation.sample.twist_deg };
+            let turn = if layer == 1 {
+                0.0
+            } else {
+                outcome.simulation.sample.twist_deg
+            };
             let off = outcome.atomic.angle.value.to_degrees()
                 - outcome.simulation.sample.lattice_angle_deg
                 - turn;
@@ -50,7 +58,15 @@ fn main() {
         .collect();
     let n = results.len() as f64;
     println!("quantity       < 1σ   < 2σ   pull    mean    rms error");
-    let names = ["twist", "mean strain", "shear 1", "shear 2", "uniaxial", "biaxial", "orientation"];
+    let names = [
+        "twist",
+        "mean strain",
+        "shear 1",
+        "shear 2",
+        "uniaxial",
+        "biaxial",
+        "orientation",
+    ];
     for (i, name) in names.into_iter().enumerate() {
         let share = |limit: f64| {
             100.0 * results.iter().filter(|(p, _)| p[i].abs() < limit).count() as f64 / n

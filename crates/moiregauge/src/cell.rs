@@ -27,7 +27,9 @@ pub enum CellError {
     #[error("expected three lengths above 0 nm, found {0:?}")]
     NotPositive([f64; 3]),
     /// No triangle has such sides.
-    #[error("{lengths:?} nm are not the {what} of a lattice: the longest must be shorter than the sum of the others")]
+    #[error(
+        "{lengths:?} nm are not the {what} of a lattice: the longest must be shorter than the sum of the others"
+    )]
     NoTriangle {
         /// As given.
         lengths: [f64; 3],
@@ -184,7 +186,11 @@ mod tests {
         let basis = moire_lattice(0.02, 0.0, 0.0, 0.3, &Material::graphene(), RealSpace).unwrap();
         let cell = MoireCell::new(&basis).unwrap();
         let length = 0.246 / (2.0 * 0.01_f64.sin());
-        for found in cell.wavelengths().into_iter().chain(cell.k_space_wavelengths()) {
+        for found in cell
+            .wavelengths()
+            .into_iter()
+            .chain(cell.k_space_wavelengths())
+        {
             assert!((found - length).abs() < 1e-9);
         }
         assert!((cell.area - 0.75_f64.sqrt() * length * length).abs() < 1e-9);
@@ -195,20 +201,31 @@ mod tests {
     /// σ of three equal lengths: the twist of an undistorted moiré goes with their mean.
     #[test]
     fn errors_of_wavelengths() {
-        let lattice =
-            from_wavelengths([12.5; 3], [0.03; 3], WavelengthMeaning::RealSpace).unwrap();
+        let lattice = from_wavelengths([12.5; 3], [0.03; 3], WavelengthMeaning::RealSpace).unwrap();
         let found = twist_strain(&lattice, &Material::graphene(), RealSpace).unwrap();
         let twist = 2.0 * (0.246_f64 / 25.0).asin();
         let expected = twist * (0.03 / 3.0_f64.sqrt()) / 12.5;
-        assert!((found.twist().sigma / expected - 1.0).abs() < 0.01, "{found:?}");
+        assert!(
+            (found.twist().sigma / expected - 1.0).abs() < 0.01,
+            "{found:?}"
+        );
     }
 
     #[test]
     fn what_makes_no_triangle() {
         let of = |lengths| from_wavelengths(lengths, [0.0; 3], WavelengthMeaning::RealSpace);
-        assert!(matches!(of([1.0, 2.0, 3.1]), Err(CellError::NoTriangle { .. })));
-        assert!(matches!(of([1.0, 2.0, -2.0]), Err(CellError::NotPositive(_))));
-        assert!(matches!(of([1.0, f64::NAN, 2.0]), Err(CellError::NotPositive(_))));
+        assert!(matches!(
+            of([1.0, 2.0, 3.1]),
+            Err(CellError::NoTriangle { .. })
+        ));
+        assert!(matches!(
+            of([1.0, 2.0, -2.0]),
+            Err(CellError::NotPositive(_))
+        ));
+        assert!(matches!(
+            of([1.0, f64::NAN, 2.0]),
+            Err(CellError::NotPositive(_))
+        ));
         assert_eq!(MoireCell::new(&Matrix2::new(1.0, 2.0, 1.0, 2.0)), None);
     }
 }

@@ -102,7 +102,9 @@ fn tensor(
     settings: &Settings,
 ) -> Option<TensorReading> {
     let bilayer = settings.bilayer();
-    let mut found = strain_tensors(lattice, bilayer, orientation).ok()?.into_iter();
+    let mut found = strain_tensors(lattice, bilayer, orientation)
+        .ok()?
+        .into_iter();
     let best = found.next()?;
     // The same reading for other errors: its orientation is known exactly there.
     let exact = Orientation {
@@ -231,7 +233,13 @@ fn about_different_layers(
 ) {
     let choices: Vec<String> = readings
         .choices()
-        .map(|b| format!("{} with a strain of {:+.3} %", degrees(b.twist), 100.0 * b.strain))
+        .map(|b| {
+            format!(
+                "{} with a strain of {:+.3} %",
+                degrees(b.twist),
+                100.0 * b.strain
+            )
+        })
         .collect();
     let shift = readings.degeneracy.as_ref().and_then(|d| {
         let (_, change) = d.shifts.iter().find(|(h, _)| *h == 0.001)?;
@@ -240,10 +248,13 @@ fn about_different_layers(
             |c| format!("0.1 % of isotropic strain moves it by {}", degrees(c)),
         ))
     });
-    let interval = readings
-        .degeneracy
-        .as_ref()
-        .map(|d| format!("; {} to {} in all", degrees(d.interval[0]), degrees(d.interval[1])));
+    let interval = readings.degeneracy.as_ref().map(|d| {
+        format!(
+            "; {} to {} in all",
+            degrees(d.interval[0]),
+            degrees(d.interval[1])
+        )
+    });
     if choices.is_empty() && found.twist > 0.0 {
         return;
     }
@@ -317,10 +328,12 @@ fn about_tensor(tensor: &TensorReading, settings: &Settings, add: &mut impl FnMu
                  another vector (30° off for a hexagonal layer; see --lattice-angle-of), another layer or \
                  another sample",
                 100.0 * mean.value,
-                tensor.other_vector.map_or_else(String::new, |other| format!(
-                    ", one 30° further {:+.2} %",
-                    100.0 * other
-                ))
+                tensor
+                    .other_vector
+                    .map_or_else(String::new, |other| format!(
+                        ", one 30° further {:+.2} %",
+                        100.0 * other
+                    ))
             ),
         );
     }

@@ -294,7 +294,10 @@ fn error_of_the_mean_strain_is_that_of_the_orientation_times_the_twist() {
             let found = strain_tensors(&lattice, &graphene, &orientation).unwrap()[0];
             let expected = made.twist * sigma_deg.to_radians();
             // η is that of reciprocal vectors; sin θ for θ at second order.
-            assert!((found.mean().sigma / expected - 1.0).abs() < 1e-3, "{found:?}");
+            assert!(
+                (found.mean().sigma / expected - 1.0).abs() < 1e-3,
+                "{found:?}"
+            );
         }
     }
 }
@@ -357,7 +360,10 @@ fn different_layers_trade_at_first_order() {
     let expected = (0.001 * slope).to_degrees();
     assert!((expected - 0.053).abs() < 1e-3);
     let central = (shift(0.001) - shift(-0.001)) / 2.0;
-    assert!((central / expected - 1.0).abs() < 0.01, "{central} {expected}");
+    assert!(
+        (central / expected - 1.0).abs() < 0.01,
+        "{central} {expected}"
+    );
 }
 
 /// Near alignment `σ_θ = |p| σ_p / (κ sin θ)`; at θ = 0 and beyond it stays finite.
@@ -436,7 +442,13 @@ fn exchange_of_different_layers() {
             reference: &first,
         };
         let basis = moire_of(&made, plain, RealSpace).unwrap();
-        let all = branches(&exact(basis), swapped.reference, swapped.stretched, RealSpace).unwrap();
+        let all = branches(
+            &exact(basis),
+            swapped.reference,
+            swapped.stretched,
+            RealSpace,
+        )
+        .unwrap();
         all.into_iter()
             .map(|b| (b.twist + made.twist).abs() + (b.strain + made.strain).abs())
             .fold(f64::INFINITY, f64::min)
@@ -460,7 +472,12 @@ fn relabelling_of_different_layers() {
     };
     let basis = moire_of(&made, layers, RealSpace).unwrap();
     let plain = twist_strain(&exact(basis), layers, RealSpace).unwrap();
-    for u in [[1.0, 1.0, 0.0, 1.0], [0.0, 1.0, -1.0, 0.0], [2.0, 1.0, 1.0, 1.0], [0.0, 1.0, 1.0, 0.0]] {
+    for u in [
+        [1.0, 1.0, 0.0, 1.0],
+        [0.0, 1.0, -1.0, 0.0],
+        [2.0, 1.0, 1.0, 1.0],
+        [0.0, 1.0, 1.0, 0.0],
+    ] {
         let change = Matrix2::new(u[0], u[1], u[2], u[3]);
         let found = twist_strain(&exact(basis * change), layers, RealSpace).unwrap();
         assert!((found.twist - plain.twist).abs() < 1e-10, "{change}");

@@ -163,8 +163,11 @@ fn three_wavelengths_of_the_published_fit() {
     let graphene = named("graphene");
     let k = 4.0 * std::f64::consts::PI / (3.0_f64.sqrt() * 0.246);
     let turn = |angle: f64| Rotation2::new(angle).into_inner();
-    for (theta_deg, axis_deg, strain) in [(1.1_f64, 25.0_f64, 0.002), (0.79, 70.0, 0.006), (2.0, 5.0, 0.004)]
-    {
+    for (theta_deg, axis_deg, strain) in [
+        (1.1_f64, 25.0_f64, 0.002),
+        (0.79, 70.0, 0.006),
+        (2.0, 5.0, 0.004),
+    ] {
         let principal = Matrix2::new(1.0 / (1.0 + strain), 0.0, 0.0, 1.0 / (1.0 - 0.16 * strain));
         let axis = axis_deg.to_radians();
         let m = turn(theta_deg.to_radians()) - turn(-axis) * principal * turn(axis);
@@ -175,7 +178,8 @@ fn three_wavelengths_of_the_published_fit() {
         let lattice = from_wavelengths(lengths, [0.0; 3], WavelengthMeaning::KSpace).unwrap();
         let found = branches(&lattice, &graphene, &graphene, RealSpace).unwrap();
         let hit = found.iter().any(|b| {
-            (b.twist.abs().to_degrees() - theta_deg).abs() < 1e-8 && (b.strain - strain).abs() < 1e-10
+            (b.twist.abs().to_degrees() - theta_deg).abs() < 1e-8
+                && (b.strain - strain).abs() < 1e-10
         });
         assert!(hit, "{theta_deg} {found:#?}");
         // Taken for lengths of real-space vectors they mean something else.

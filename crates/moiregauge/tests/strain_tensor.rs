@@ -58,7 +58,12 @@ fn one_atomic_frame_gives_the_orientation_by_its_fast_rows() {
             // Half of 5 mrad at the least.
             assert!(sigma > 0.14 && sigma < 0.5, "{sigma}");
             assert!(off.abs() < 2.0 * sigma, "{off} {sigma}");
-            let codes: Vec<&str> = outcome.atomic.caveats.iter().map(|c| c.code.as_str()).collect();
+            let codes: Vec<&str> = outcome
+                .atomic
+                .caveats
+                .iter()
+                .map(|c| c.code.as_str())
+                .collect();
             assert!(codes.contains(&"atomic-drift-assumed"), "{codes:?}");
             let pulls = outcome.pulls();
             assert!(pulls[0].abs() < 3.0 && pulls[1].abs() < 3.0, "{pulls:?}");
@@ -79,11 +84,17 @@ fn without_an_orientation_the_interval_holds_the_truth() {
             let mean = analysis.sets[0].mean.as_ref().unwrap();
             let twist = truth(&set)[0];
             let [low, high] = mean.readings.degeneracy.as_ref().unwrap().interval;
-            assert!(low <= twist && twist <= high, "seed {seed}: {low} {twist} {high}");
+            assert!(
+                low <= twist && twist <= high,
+                "seed {seed}: {low} {twist} {high}"
+            );
             let found = mean.twist_strain.twist();
             far += usize::from((found.value - twist).abs() > 5.0 * found.sigma);
             assert!(mean.readings.tensor.is_none());
-            let told = analysis.caveats.iter().any(|c| c.code == "twist-trades-with-strain");
+            let told = analysis
+                .caveats
+                .iter()
+                .any(|c| c.code == "twist-trades-with-strain");
             assert_eq!(told, set.sample.substrate.is_some());
         }
     }
@@ -104,8 +115,18 @@ fn the_wrong_vector_is_found_out() {
             of,
         });
         let analysis = analyse(scans.clone(), &settings);
-        let found = analysis.sets[0].mean.as_ref().unwrap().readings.tensor.clone().unwrap();
-        let told = analysis.caveats.iter().any(|c| c.code == "orientation-contradicts");
+        let found = analysis.sets[0]
+            .mean
+            .as_ref()
+            .unwrap()
+            .readings
+            .tensor
+            .clone()
+            .unwrap();
+        let told = analysis
+            .caveats
+            .iter()
+            .any(|c| c.code == "orientation-contradicts");
         (found.best, told)
     };
     let angle = set.sample.lattice_angle_deg;

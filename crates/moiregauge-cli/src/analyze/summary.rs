@@ -167,7 +167,10 @@ fn readings(text: &mut String, readings: &Readings) {
             best.axis_lab()
                 .map_or_else(String::new, |a| format!(", axis {}°", degrees(a)))
         );
-        for (word, split) in ["= uniaxial", "or"].iter().zip(all.splits(tensor.poisson_ratio)) {
+        for (word, split) in ["= uniaxial", "or"]
+            .iter()
+            .zip(all.splits(tensor.poisson_ratio))
+        {
             let _ = writeln!(
                 text,
                 "    {word:11} {} %{} and biaxial {} %",
@@ -183,11 +186,16 @@ fn readings(text: &mut String, readings: &Readings) {
     if !readings.layers_differ {
         return;
     }
+    text.push_str("  the layers differ: twist and strain trade, and these readings are as good as each other\n");
     for (index, branch) in readings.choices().enumerate() {
         let _ = writeln!(
             text,
             "  {} twist {}°, strain {} % along {:.2}°",
-            if index == 0 { "either       " } else { "or           " },
+            if index == 0 {
+                "either       "
+            } else {
+                "or           "
+            },
             degrees(Estimate::new(branch.twist, branch.twist_sigma)),
             percent(Estimate::new(branch.strain, branch.strain_sigma)),
             branch.axis_lab.to_degrees()

@@ -45,7 +45,12 @@ pub(crate) struct MoireArgs {
     #[arg(long, value_name = "PERCENT", allow_negative_numbers = true, conflicts_with_all = ["wavelengths", "vectors"])]
     strain: Option<f64>,
     /// Axis of the strain, degrees, counted from the reciprocal vectors of layer 1 (φ)
-    #[arg(long, value_name = "DEG", allow_negative_numbers = true, requires = "strain")]
+    #[arg(
+        long,
+        value_name = "DEG",
+        allow_negative_numbers = true,
+        requires = "strain"
+    )]
     strain_axis: Option<f64>,
     /// Strain of layer 2 that is the same in all directions, per cent, on top
     #[arg(long, value_name = "PERCENT", allow_negative_numbers = true, conflicts_with_all = ["wavelengths", "vectors"])]
@@ -61,7 +66,12 @@ pub(crate) struct MoireArgs {
     #[arg(long, value_enum, default_value_t = DirectionArg::Atomic)]
     lattice_angle_of: DirectionArg,
     /// Three wavelengths, nm; --meaning has to say what they are
-    #[arg(long, value_name = "A,B,C", value_delimiter = ',', conflicts_with = "vectors")]
+    #[arg(
+        long,
+        value_name = "A,B,C",
+        value_delimiter = ',',
+        conflicts_with = "vectors"
+    )]
     wavelengths: Vec<f64>,
     /// What the three wavelengths are: they differ as soon as there is strain
     #[arg(long, value_enum)]
@@ -145,8 +155,8 @@ impl MoireArgs {
         let Some(text) = self.lattice_angle.as_ref().filter(|_| self.backwards()) else {
             return Ok(None);
         };
-        let Angle([angle_deg, sigma_deg]) = parse_angle(text)
-            .map_err(|error| anyhow::anyhow!("--lattice-angle: {error}"))?;
+        let Angle([angle_deg, sigma_deg]) =
+            parse_angle(text).map_err(|error| anyhow::anyhow!("--lattice-angle: {error}"))?;
         Ok(Some(KnownOrientation {
             angle_deg,
             sigma_deg,

@@ -29,8 +29,16 @@ fn cell(text: &mut String, cell: &CellResult) {
             .map(|[x, y]| format!("({x:.decimals$}, {y:.decimals$})"))
             .join(" ")
     };
-    let _ = writeln!(text, "  L1, L2, L2 − L1     {} nm", vectors(&cell.vectors_nm, 4));
-    let _ = writeln!(text, "  wavelengths         {} nm", three(&cell.wavelengths_nm));
+    let _ = writeln!(
+        text,
+        "  L1, L2, L2 − L1     {} nm",
+        vectors(&cell.vectors_nm, 4)
+    );
+    let _ = writeln!(
+        text,
+        "  wavelengths         {} nm",
+        three(&cell.wavelengths_nm)
+    );
     let _ = writeln!(
         text,
         "  angle L1 to L2      {:.4}°; directions {}°",
@@ -79,10 +87,8 @@ fn meaning(text: &mut String, readings: &Readings, in_own_frame: bool) {
     if let Some(found) = &readings.degeneracy {
         text.push_str("isotropic strain of layer 2 changes the twist:");
         for (strain, change) in &found.shifts {
-            let change = change.map_or_else(
-                || "no twist".to_owned(),
-                |c| format!("{:+.4}°", c * degree),
-            );
+            let change =
+                change.map_or_else(|| "no twist".to_owned(), |c| format!("{:+.4}°", c * degree));
             let _ = write!(text, " {:+.1} % {change};", 100.0 * strain);
         }
         let [low, high] = found.interval;

@@ -30,7 +30,16 @@ fn the_moire_of_a_twist() {
 /// Forwards and backwards: the vectors of a strained moiré mean what made them.
 #[test]
 fn forwards_and_backwards() {
-    let options = ["--twist", "1.1", "--strain", "0.3", "--strain-axis", "20", "--lattice-angle", "37"];
+    let options = [
+        "--twist",
+        "1.1",
+        "--strain",
+        "0.3",
+        "--strain-axis",
+        "20",
+        "--lattice-angle",
+        "37",
+    ];
     let made = calculate(&[&options[..], &["--lattice-angle-of", "reciprocal"]].concat());
     let vector = |i: usize| {
         let part = |k: usize| number(&made, &format!("/cell/vectors_nm/{i}/{k}"));
@@ -40,12 +49,18 @@ fn forwards_and_backwards() {
     let read = calculate(&["--vectors", &first, &second, "--lattice-angle", "67±0.1"]);
     let twist = number(&read, "/twist_strain/twist_deg/value");
     assert!((twist - 1.1).abs() < 1e-9);
-    assert_eq!(read["readings"]["solutions"].as_array().map(Vec::len), Some(4));
+    assert_eq!(
+        read["readings"]["solutions"].as_array().map(Vec::len),
+        Some(4)
+    );
     let tensor = &read["readings"]["strain_tensor"];
     assert!((number(tensor, "/twist_deg/value") - 1.1).abs() < 1e-9);
     let split = number(tensor, "/splits/0/uniaxial_percent/value");
     let biaxial = number(tensor, "/splits/0/biaxial_percent/value");
-    assert!((split - 0.3).abs() < 1e-9 && biaxial.abs() < 1e-9, "{split} {biaxial}");
+    assert!(
+        (split - 0.3).abs() < 1e-9 && biaxial.abs() < 1e-9,
+        "{split} {biaxial}"
+    );
     // A row of atoms lies 30° from the reciprocal vector: 67° and not 37°.
     let (_, sigma) = estimate(tensor, "/mean_strain_percent");
     let expected = 100.0 * 1.1_f64.to_radians() * 0.1_f64.to_radians();
@@ -55,21 +70,37 @@ fn forwards_and_backwards() {
 #[test]
 fn three_wavelengths_have_to_say_what_they_are() {
     let ask = |options: &[&str]| {
-        run(program().args(["moire", "--wavelengths", "13.72,12.7,10.18"]).args(options))
+        run(program()
+            .args(["moire", "--wavelengths", "13.72,12.7,10.18"])
+            .args(options))
     };
     let refused = ask(&[]);
     assert_eq!(refused.code, Some(1));
-    for word in ["--meaning real-space", "--meaning k-space", "1.190", "1.152"] {
+    for word in [
+        "--meaning real-space",
+        "--meaning k-space",
+        "1.190",
+        "1.152",
+    ] {
         assert!(refused.stderr.contains(word), "{}", refused.stderr);
     }
     for (meaning, twist) in [("real-space", "1.190"), ("k-space", "1.152")] {
         let told = ask(&["--meaning", meaning]);
         assert_eq!(told.code, Some(0), "{}", told.stderr);
-        assert!(told.stdout.contains(&format!("twist {twist}")), "{}", told.stdout);
+        assert!(
+            told.stdout.contains(&format!("twist {twist}")),
+            "{}",
+            told.stdout
+        );
     }
-    let impossible = run(program().args(["moire", "--wavelengths", "1,2,4", "--meaning", "real-space"]));
+    let impossible =
+        run(program().args(["moire", "--wavelengths", "1,2,4", "--meaning", "real-space"]));
     assert_eq!(impossible.code, Some(1));
-    assert!(impossible.stderr.contains("longest"), "{}", impossible.stderr);
+    assert!(
+        impossible.stderr.contains("longest"),
+        "{}",
+        impossible.stderr
+    );
 }
 
 #[test]
@@ -77,7 +108,11 @@ fn figures_of_the_cell() {
     let folder = tempfile::tempdir().unwrap();
     for (name, start) in [("cell.svg", &b"<svg"[..]), ("cell.png", &b"\x89PNG"[..])] {
         let path = folder.path().join(name);
-        succeed(program().args(["moire", "--twist", "1.1", "--figure"]).arg(&path));
+        succeed(
+            program()
+                .args(["moire", "--twist", "1.1", "--figure"])
+                .arg(&path),
+        );
         let bytes = std::fs::read(&path).unwrap();
         let head = &bytes[..bytes.len().min(200)];
         assert!(head.windows(start.len()).any(|w| w == start), "{name}");
@@ -104,7 +139,15 @@ fn layers_of_a_file() {
         assert!(refused.stderr.contains("hBN"), "{}", refused.stderr);
     }
     std::fs::write(path, text.replace("cell_angle_deg = 85.0\n", "")).unwrap();
-    let refused = run(program().args(["moire", "--materials", path, "--layers", "mine", "--twist", "1"]));
+    let refused = run(program().args([
+        "moire",
+        "--materials",
+        path,
+        "--layers",
+        "mine",
+        "--twist",
+        "1",
+    ]));
     assert!(refused.stderr.contains("go together"), "{}", refused.stderr);
 }
 
@@ -114,20 +157,36 @@ fn layers_of_a_file() {
 fn graphene_on_boron_nitride() {
     let folder = tempfile::tempdir().unwrap();
     let layers = ["--layers", "graphene/hBN"];
-    let sample = [&layers[..], &["--twist", "0.8", "--strain", "0.2", "--biaxial", "0.1"]].concat();
+    let sample = [
+        &layers[..],
+        &["--twist", "0.8", "--strain", "0.2", "--biaxial", "0.1"],
+    ]
+    .concat();
     let moire = simulate(folder.path(), &[&SMALL[..], &sample].concat());
-    let atoms = [&sample[..], &SMALL, &["--atoms", "1", "--size", "5", "5", "--name", "atoms"]].concat();
+    let atoms = [
+        &sample[..],
+        &SMALL,
+        &["--atoms", "1", "--size", "5", "5", "--name", "atoms"],
+    ]
+    .concat();
     simulate(folder.path(), &atoms);
     let atoms = folder.path().join("atoms");
 
     let out = folder.path().join("plain");
     let plain = succeed(analyze(&moire, &out).args(layers));
-    assert!(plain.stdout.contains("either") && plain.stdout.contains("or  "), "{}", plain.stdout);
+    assert!(
+        plain.stdout.contains("either") && plain.stdout.contains("or  "),
+        "{}",
+        plain.stdout
+    );
     let found = results(&out);
     assert!(caveats(&found).contains(&"twist-trades-with-strain"));
     let readings = &found["sets"][0]["mean"]["readings"];
     let open = &readings["isotropic_strain"]["twist_interval_deg"];
-    assert!(number(open, "/0") < 0.8 && number(open, "/1") > 0.8, "{open}");
+    assert!(
+        number(open, "/0") < 0.8 && number(open, "/1") > 0.8,
+        "{open}"
+    );
     assert!(readings["strain_tensor"].is_null());
     let twists: Vec<f64> = readings["solutions"]
         .as_array()
@@ -136,10 +195,18 @@ fn graphene_on_boron_nitride() {
         .map(|s| number(s, "/twist_deg/value"))
         .filter(|t| *t > 0.0)
         .collect();
-    assert!(twists.len() == 2 && (twists[0] - twists[1]).abs() > 0.02, "{twists:?}");
+    assert!(
+        twists.len() == 2 && (twists[0] - twists[1]).abs() > 0.02,
+        "{twists:?}"
+    );
 
     let out = folder.path().join("atomic");
-    succeed(analyze(&moire, &out).args(layers).arg("--atomic").arg(&atoms));
+    succeed(
+        analyze(&moire, &out)
+            .args(layers)
+            .arg("--atomic")
+            .arg(&atoms),
+    );
     let found = results(&out);
     let tensor = &found["sets"][0]["mean"]["readings"]["strain_tensor"];
     let truth = json(&moire.join("truth.json"));
@@ -150,15 +217,26 @@ fn graphene_on_boron_nitride() {
         ("/splits/0/biaxial_percent", 0.1),
     ] {
         let (value, sigma) = estimate(tensor, pointer);
-        assert!((value - truth).abs() < 4.0 * sigma, "{pointer}: {value} ± {sigma}");
+        assert!(
+            (value - truth).abs() < 4.0 * sigma,
+            "{pointer}: {value} ± {sigma}"
+        );
     }
     assert_eq!(found["atomic"]["layer"], 1);
-    assert_eq!(found["provenance"]["inputs"].as_array().map(Vec::len), Some(8));
+    assert_eq!(
+        found["provenance"]["inputs"].as_array().map(Vec::len),
+        Some(8)
+    );
     // The same by its number.
     let (angle, sigma) = estimate(&found, "/atomic/lattice_angle_deg");
     let given = format!("{angle}±{sigma}");
     let out = folder.path().join("given");
-    let options = ["--lattice-angle", &given, "--lattice-angle-of", "reciprocal"];
+    let options = [
+        "--lattice-angle",
+        &given,
+        "--lattice-angle-of",
+        "reciprocal",
+    ];
     succeed(analyze(&moire, &out).args(layers).args(options));
     let again = results(&out);
     let again = &again["sets"][0]["mean"]["readings"]["strain_tensor"];

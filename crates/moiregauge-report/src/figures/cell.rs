@@ -52,13 +52,7 @@ pub fn cell(cell: &MoireCell, name: &str, layers: &str) -> Drawing {
     }
 }
 
-fn panel(
-    svg: &mut Svg,
-    left: f64,
-    vectors: &[Vector2<f64>; 3],
-    labels: &Labels,
-    names: [&str; 3],
-) {
+fn panel(svg: &mut Svg, left: f64, vectors: &[Vector2<f64>; 3], labels: &Labels, names: [&str; 3]) {
     let longest = vectors.iter().map(Vector2::norm).fold(0.0, f64::max);
     let reach = Range::new(-REACH * longest, REACH * longest);
     let area = Rect::new(left, LEGEND + ABOVE, SIDE, SIDE);

@@ -196,9 +196,7 @@ impl From<&TensorReading> for StrainTensorResult {
 
 fn in_surface_units(covariance: &Matrix5<f64>) -> [[Option<f64>; 5]; 5] {
     let unit = [degree(), degree(), PERCENT, PERCENT, PERCENT];
-    [0, 1, 2, 3, 4].map(|i| {
-        [0, 1, 2, 3, 4].map(|j| number(covariance[(i, j)] * unit[i] * unit[j]))
-    })
+    [0, 1, 2, 3, 4].map(|i| [0, 1, 2, 3, 4].map(|j| number(covariance[(i, j)] * unit[i] * unit[j])))
 }
 
 impl From<&StrainTensor> for TensorNumbers {

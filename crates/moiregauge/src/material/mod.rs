@@ -128,7 +128,9 @@ impl Material {
 
     /// Whether the lattice is hexagonal.
     pub fn is_hexagonal(&self) -> bool {
-        let b = self.lattice_constant_b_nm.unwrap_or(self.lattice_constant_nm);
+        let b = self
+            .lattice_constant_b_nm
+            .unwrap_or(self.lattice_constant_nm);
         let angle = self.cell_angle_deg.unwrap_or(60.0);
         (b / self.lattice_constant_nm - 1.0).abs() < 1e-9
             && ((angle - 60.0).abs() < 1e-9 || (angle - 120.0).abs() < 1e-9)
@@ -139,7 +141,9 @@ impl Material {
     pub fn rotation_period(&self) -> f64 {
         let square = self.lattice_constant_b_nm.is_some_and(|b| {
             (b / self.lattice_constant_nm - 1.0).abs() < 1e-9
-                && self.cell_angle_deg.is_some_and(|angle| (angle - 90.0).abs() < 1e-9)
+                && self
+                    .cell_angle_deg
+                    .is_some_and(|angle| (angle - 90.0).abs() < 1e-9)
         });
         if self.is_hexagonal() {
             FRAC_PI_3

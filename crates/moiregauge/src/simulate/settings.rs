@@ -4,8 +4,8 @@ use serde::{Deserialize, Serialize};
 
 use super::SimulateError;
 use crate::material::{Bilayer, Material};
-use crate::strain::Stacking;
 use crate::settings::StrainConvention;
+use crate::strain::Stacking;
 
 /// One set of frames of one sample.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]

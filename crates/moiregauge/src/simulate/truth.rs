@@ -83,7 +83,12 @@ const CONVENTIONS: [&str; 6] = [
 pub(super) fn truth(settings: &Simulation, scene: &Scene) -> Truth {
     let sample = &settings.sample;
     // α is reduced modulo 60° (the symmetry of layer 1), φ takes up what α loses.
-    let period = sample.bilayer().reference.rotation_period().to_degrees().round();
+    let period = sample
+        .bilayer()
+        .reference
+        .rotation_period()
+        .to_degrees()
+        .round();
     let lattice_angle = sample.lattice_angle_deg.rem_euclid(period);
     let axis = sample.strain_axis_deg + sample.lattice_angle_deg - lattice_angle;
     let column = |m: &Matrix2<f64>, k: usize| -> Vector2<f64> { m.column(k).into() };

@@ -77,8 +77,7 @@ pub fn twist_strain<'a>(
     let Some(solution) = default_solution(&moire, &layers) else {
         return aligned::aligned(&labelled, &layers).ok_or(no_solution(&moire, &layers));
     };
-    let covariance = covariance(&solution, &labelled, &layers)
-        .ok_or(no_area(&labelled.lattice))?;
+    let covariance = covariance(&solution, &labelled, &layers).ok_or(no_area(&labelled.lattice))?;
     // θ = 0 at the very edge of what strain can do: nothing limits its error there.
     if covariance.iter().any(|x| !x.is_finite()) {
         return Err(no_solution(&moire, &layers));
@@ -109,11 +108,7 @@ pub(super) fn default_signs(layers: &Layers) -> &'static [Signs] {
 }
 
 /// Covariance of `(θ, α, E₁, E₂)` of a solution.
-fn covariance(
-    solution: &Solution,
-    labelled: &Labelled,
-    layers: &Layers,
-) -> Option<Matrix4<f64>> {
+fn covariance(solution: &Solution, labelled: &Labelled, layers: &Layers) -> Option<Matrix4<f64>> {
     let moire = ComplexPair::from(labelled.moire);
     let by_lattice = moire_matrix_jacobian(&labelled.lattice.basis, &labelled.moire)?;
     let jacobian: Matrix4<f64> = solution.jacobian(&moire, layers) * by_lattice;
@@ -206,7 +201,11 @@ fn branch(
 ) -> Branch {
     let lattice_angle = reduce(solution.lattice_angle, layers.period);
     let e = Vector2::new(solution.strain_vector.re, solution.strain_vector.im);
-    let along = if e.norm() > 0.0 { e / e.norm() } else { Vector2::x() };
+    let along = if e.norm() > 0.0 {
+        e / e.norm()
+    } else {
+        Vector2::x()
+    };
     let sigma = |variance: Option<f64>| {
         let known = variance.filter(|v| v.is_finite());
         known.map_or(f64::NAN, |v| v.max(0.0).sqrt())
@@ -219,9 +218,9 @@ fn branch(
         axis_lab: reduce(solution.axis_lab, PI),
         strain_dominated,
         twist_sigma: sigma(covariance.map(|c| c[(0, 0)])),
-        strain_sigma: sigma(covariance.map(|c| {
-            (along.transpose() * c.fixed_view::<2, 2>(2, 2) * along)[0]
-        })),
+        strain_sigma: sigma(
+            covariance.map(|c| (along.transpose() * c.fixed_view::<2, 2>(2, 2) * along)[0]),
+        ),
     }
 }
 

@@ -67,7 +67,10 @@ mod tests {
             Matrix2::new(0.2, 0.9, -1.3, 0.5),
         );
         let near = |x: ComplexPair, y: ComplexPair| {
-            assert!((x.p - y.p).norm() + (x.q - y.q).norm() < 1e-14, "{x:?} {y:?}");
+            assert!(
+                (x.p - y.p).norm() + (x.q - y.q).norm() < 1e-14,
+                "{x:?} {y:?}"
+            );
         };
         near(
             ComplexPair::from(a).times(&b.into()),

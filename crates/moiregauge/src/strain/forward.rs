@@ -109,7 +109,11 @@ pub fn moire_of<'a>(
     let layers = Layers::new(bilayer.into(), convention)?;
     let turn = |angle: f64| Rotation2::new(angle).into_inner();
     let stretch = stacking.reciprocal_stretch(&layers);
-    let mismatch = layers.inverse.matrix().try_inverse().ok_or(StrainError::NoMoire)?;
+    let mismatch = layers
+        .inverse
+        .matrix()
+        .try_inverse()
+        .ok_or(StrainError::NoMoire)?;
     let moire = turn(stacking.lattice_angle)
         * (turn(stacking.twist) * stretch * mismatch - Matrix2::identity());
     let basis = moire

@@ -21,7 +21,7 @@ use super::layers::{Layers, Stretch, strain_side};
 
 /// Steps of the grid on which roots of f are looked for.
 const GRID: usize = 720;
-/// An f that comes this near to zero touches it, as it does without strain, where |N_q| has a corner.
+/// An f that comes this near to zero touches it, as it does without strain, where `|N_q|` has a corner.
 const TOUCHING: f64 = 1e-10;
 
 /// Which of the four solutions.
@@ -35,10 +35,22 @@ pub(super) struct Signs {
 
 /// All of them, the default first.
 pub(super) const ALL_SIGNS: [Signs; 4] = [
-    Signs { strain: 1.0, twist: 1.0 },
-    Signs { strain: -1.0, twist: 1.0 },
-    Signs { strain: 1.0, twist: -1.0 },
-    Signs { strain: -1.0, twist: -1.0 },
+    Signs {
+        strain: 1.0,
+        twist: 1.0,
+    },
+    Signs {
+        strain: -1.0,
+        twist: 1.0,
+    },
+    Signs {
+        strain: 1.0,
+        twist: -1.0,
+    },
+    Signs {
+        strain: -1.0,
+        twist: -1.0,
+    },
 ];
 
 /// One solution of the strain equation.
@@ -182,7 +194,11 @@ fn extremum(f: &dyn Fn(f64) -> f64, mut a: f64, mut b: f64) -> f64 {
 
 /// The four directions in which (Re p, Im p, Re q, Im q) change.
 pub(super) fn directions() -> [ComplexPair; 4] {
-    let (zero, one, i) = (Complex::new(0.0, 0.0), Complex::new(1.0, 0.0), Complex::<f64>::i());
+    let (zero, one, i) = (
+        Complex::new(0.0, 0.0),
+        Complex::new(1.0, 0.0),
+        Complex::<f64>::i(),
+    );
     [(one, zero), (i, zero), (zero, one), (zero, i)].map(|(p, q)| ComplexPair { p, q })
 }
 

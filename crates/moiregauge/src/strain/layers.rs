@@ -102,9 +102,7 @@ fn check(material: &Material) -> Result<(), StrainError> {
 /// in shape; the cell as it is given where another is no better.
 fn most_alike(first: &Matrix2<f64>, second: &Matrix2<f64>) -> Option<ComplexPair> {
     let inverse = first.try_inverse()?;
-    let pair = |change: &Matrix2<f64>| {
-        ComplexPair::from((second * change * inverse).transpose())
-    };
+    let pair = |change: &Matrix2<f64>| ComplexPair::from((second * change * inverse).transpose());
     let distortion = |pair: &ComplexPair| pair.q.norm() / pair.p.norm();
     let mut best = pair(&Matrix2::identity());
     for change in super::labelling::small_changes() {

@@ -64,20 +64,26 @@ impl Reference {
     /// The Poisson ratio is larger by `change`.
     pub(crate) fn with_poisson_ratio(&self, change: f64) -> Option<Vector4<f64>> {
         let poisson_ratio = self.layers.poisson_ratio + change;
-        self.with(&self.moire, &Layers {
-            poisson_ratio,
-            ..self.layers
-        })
+        self.with(
+            &self.moire,
+            &Layers {
+                poisson_ratio,
+                ..self.layers
+            },
+        )
     }
 
     /// The lattice constants of layers 1 and 2 are larger by these fractions.
     pub(crate) fn with_lattice_constants(&self, [first, second]: [f64; 2]) -> Option<Vector4<f64>> {
         let moire = self.moire.scaled(1.0 + first);
         let inverse = self.layers.inverse.scaled((1.0 + second) / (1.0 + first));
-        self.with(&moire, &Layers {
-            inverse,
-            ..self.layers
-        })
+        self.with(
+            &moire,
+            &Layers {
+                inverse,
+                ..self.layers
+            },
+        )
     }
 
     /// Layer 2 is stretched by `strain` in all directions beside its uniaxial strain.
@@ -86,10 +92,13 @@ impl Reference {
     /// stays what it is (exactly: `|(1+η) e^{iθ} − 1|`), and α turns by η/θ.
     pub(crate) fn with_isotropic_strain(&self, strain: f64) -> Option<Vector4<f64>> {
         let inverse = self.layers.inverse.scaled(1.0 + strain);
-        self.with(&self.moire, &Layers {
-            inverse,
-            ..self.layers
-        })
+        self.with(
+            &self.moire,
+            &Layers {
+                inverse,
+                ..self.layers
+            },
+        )
     }
 
     /// Both layers share the strain in equal parts with opposite signs.

@@ -6,8 +6,8 @@
 //! Out: θ, the mean strain `½(ε₁ + ε₂)`, the shear part `γ = ½(ε₁ − ε₂)` and its axis: of the atoms of layer
 //! 2 against those of layer 1, tension positive, in either form of the equation.
 //!
-//! Without an orientation P leaves a circle of solutions, `|κ(1+η) e^{iθ} − 1| = |p|`; with it σ_η = θσ_α
-//! for equal layers. What is left open: orientations are known modulo the symmetry of the layer. For equal
+//! Without an orientation P leaves a circle of solutions, `|κ(1+η) e^{iθ} − 1| = |p|`; with it
+//! `σ_η = θ σ_α` for equal layers. What is left open: orientations are known modulo the symmetry of the layer. For equal
 //! layers (θ, η) and about (−θ, −η) go with one orientation modulo 60°; θ > 0 is chosen. For different
 //! layers the reading with the least mean strain is the best, and its sign is that of the twist.
 
@@ -154,11 +154,7 @@ pub fn strain_tensors<'a>(
 }
 
 /// The reading for one orientation, taken as it is.
-fn tensor(
-    labelled: &Labelled,
-    layers: &Layers,
-    orientation: &Orientation,
-) -> Option<StrainTensor> {
+fn tensor(labelled: &Labelled, layers: &Layers, orientation: &Orientation) -> Option<StrainTensor> {
     let moire = ComplexPair::from(labelled.moire);
     let alpha = if orientation.of_reference {
         orientation.angle
@@ -293,7 +289,8 @@ impl StrainTensor {
         let axis = self.axis_lab();
         [1.0, -1.0].map(|side| {
             // Mean strain and γ → (ε_u, ε_b), with slopes by central differences of a smooth function.
-            let of = |mean: f64, gamma: f64| uniaxial_and_biaxial(mean, side * gamma, poisson_ratio);
+            let of =
+                |mean: f64, gamma: f64| uniaxial_and_biaxial(mean, side * gamma, poisson_ratio);
             let step = 1e-6;
             let [u, b] = of(self.mean, length);
             let difference = |plus: [f64; 2], minus: [f64; 2]| {
@@ -315,7 +312,11 @@ impl StrainTensor {
                 uniaxial: Estimate::from_variance(u, variance(0)),
                 biaxial: Estimate::from_variance(b, variance(1)),
                 axis_lab: axis.map(|a| {
-                    let turned = if side > 0.0 { a.value } else { a.value + FRAC_PI_2 };
+                    let turned = if side > 0.0 {
+                        a.value
+                    } else {
+                        a.value + FRAC_PI_2
+                    };
                     Estimate::new(reduce(turned, PI), a.sigma)
                 }),
             }
@@ -323,7 +324,7 @@ impl StrainTensor {
     }
 }
 
-/// `(ε_u, ε_b)` of a layer stretched by `mean + gamma` along and `mean − gamma` across the axis of ε_u.
+/// `(ε_u, ε_b)` of a layer stretched by `mean + gamma` along and `mean − gamma` across the axis of `ε_u`.
 fn uniaxial_and_biaxial(mean: f64, gamma: f64, poisson_ratio: f64) -> [f64; 2] {
     let (along, across) = (1.0 + mean + gamma, 1.0 + mean - gamma);
     let ratio = along / across;

@@ -2,7 +2,9 @@
 
 use moiregauge::analysis::Analysis;
 use moiregauge::material::Material;
-use moiregauge::series::{AtomicOrientation, MeasuredScan, analyse, atomic_orientation, measure_scan};
+use moiregauge::series::{
+    AtomicOrientation, MeasuredScan, analyse, atomic_orientation, measure_scan,
+};
 use moiregauge::settings::Settings;
 use moiregauge::simulate::{Pattern, Simulation, Simulator};
 use moiregauge::strain::StrainTensor;
@@ -81,7 +83,11 @@ pub(crate) fn run(simulation: Simulation, layer: u8, frames: usize) -> Outcome {
     let mut settings = settings(&simulation);
     let images = measured(&atoms(&simulation, layer, frames), &settings);
     let layers = settings.bilayer();
-    let material = if layer == 1 { layers.reference } else { layers.stretched };
+    let material = if layer == 1 {
+        layers.reference
+    } else {
+        layers.stretched
+    };
     let atomic = atomic_orientation(&images, material, layer, &settings.calibration)
         .expect("an orientation");
     settings.lattice_angle = Some(atomic.known());
@@ -96,7 +102,10 @@ pub(crate) fn run(simulation: Simulation, layer: u8, frames: usize) -> Outcome {
 /// Twist, mean strain, shear vector, uniaxial and biaxial part as they were put in.
 pub(crate) fn truth(simulation: &Simulation) -> [f64; 6] {
     let sample = &simulation.sample;
-    let (strain, biaxial) = (sample.strain_percent / 100.0, sample.biaxial_percent / 100.0);
+    let (strain, biaxial) = (
+        sample.strain_percent / 100.0,
+        sample.biaxial_percent / 100.0,
+    );
     let scale = 1.0 + biaxial;
     let (along, across) = (
         scale * (1.0 + strain) - 1.0,
