@@ -7,7 +7,7 @@ use std::process::ExitCode;
 
 use anyhow::{Context as _, bail, ensure};
 use moiregauge::budget::{Budget, Statistical};
-use moiregauge::cell::{MoireCell, from_wavelengths};
+use moiregauge::cell::{MoireCell, WavelengthMeaning, from_wavelengths};
 use moiregauge::lattice::LatticeVectors;
 use moiregauge::material::Material;
 use moiregauge::readings::Readings;
@@ -67,7 +67,14 @@ pub(crate) fn run(args: &MoireArgs) -> anyhow::Result<ExitCode> {
         say(&words::answer(
             &document,
             read.as_ref().map(|(_, readings)| readings),
-            matches!(asked, Question::Wavelengths { .. }),
+            match &asked {
+                Question::Wavelengths {
+                    meaning: WavelengthMeaning::RealSpace,
+                    ..
+                } => "the vector of the first wavelength",
+                Question::Wavelengths { .. } => "the wave vector of the first wavelength",
+                _ => "x",
+            },
         ))?;
     }
     if let Some(path) = &args.figure {
@@ -92,7 +99,7 @@ enum Question {
     Wavelengths {
         lengths: [f64; 3],
         sigmas: [f64; 3],
-        meaning: moiregauge::cell::WavelengthMeaning,
+        meaning: WavelengthMeaning,
     },
     /// What do two vectors mean?
     Vectors { basis: Matrix2<f64>, sigma: f64 },

@@ -8,7 +8,7 @@
 use nalgebra::{Matrix2, Matrix4, SMatrix, Vector2};
 
 use crate::lattice::LatticeVectors;
-use crate::lattice::reciprocal::{reciprocal, shortest_pair};
+use crate::lattice::reciprocal::{canonical, reciprocal, shortest_pair};
 
 /// What three wavelengths are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -52,7 +52,17 @@ pub struct MoireCell {
 impl MoireCell {
     /// The cell of a lattice by any pair of its vectors (columns, nm); `None` for parallel ones.
     pub fn new(basis: &Matrix2<f64>) -> Option<Self> {
-        let basis = basis * shortest_pair(basis)?;
+        let shortest = basis * shortest_pair(basis)?;
+        // L₁ between 0° and 60°, where it can be.
+        let named = canonical(&LatticeVectors {
+            basis: shortest,
+            covariance: Matrix4::zeros(),
+        });
+        let basis = if shortest_pair(&named.basis)? == Matrix2::identity() {
+            named.basis
+        } else {
+            shortest
+        };
         let pair = reciprocal(&basis)?;
         let three = |m: &Matrix2<f64>| {
             let (a, b): (Vector2<f64>, Vector2<f64>) = (m.column(0).into(), m.column(1).into());
@@ -89,7 +99,8 @@ impl MoireCell {
     }
 }
 
-/// The lattice of three wavelengths (nm) with standard uncertainties, L₁ along x.
+/// The lattice of three wavelengths (nm) with standard uncertainties: the vector of the first one along x,
+/// or, in the k-space meaning, its wave vector.
 ///
 /// # Errors
 /// [`CellError`] where they are not positive or make no triangle.
@@ -124,7 +135,7 @@ pub fn from_wavelengths(
     Ok(LatticeVectors { basis, covariance })
 }
 
-/// The pair with these lengths, the first along x; `None` where there is no such triangle.
+/// The pair of real-space vectors; `None` where there is no such triangle.
 fn triangle(lengths: [f64; 3], meaning: WavelengthMeaning) -> Option<Matrix2<f64>> {
     let sides = match meaning {
         WavelengthMeaning::RealSpace => lengths,
@@ -140,12 +151,7 @@ fn triangle(lengths: [f64; 3], meaning: WavelengthMeaning) -> Option<Matrix2<f64
     let pair = Matrix2::new(a, b * cosine, 0.0, b * (1.0 - cosine * cosine).sqrt());
     match meaning {
         WavelengthMeaning::RealSpace => Some(pair),
-        WavelengthMeaning::KSpace => {
-            let real = reciprocal(&pair)?;
-            let along: Vector2<f64> = real.column(0).into();
-            let turn = nalgebra::Rotation2::new(-along.y.atan2(along.x));
-            Some(turn * real)
-        }
+        WavelengthMeaning::KSpace => reciprocal(&pair),
     }
 }
 

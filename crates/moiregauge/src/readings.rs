@@ -320,7 +320,8 @@ fn about_tensor(tensor: &TensorReading, settings: &Settings, add: &mut impl FnMu
         .other_vector
         .is_some_and(|other| other.abs() < mean.value.abs())
         && mean.value.abs() > likely.max(CLEARLY * mean.sigma);
-    if mean.value.abs() > CONTRADICTION || nearer {
+    let contradicted = mean.value.abs() > CONTRADICTION || nearer;
+    if contradicted {
         add(
             "orientation-contradicts",
             format!(
@@ -342,7 +343,7 @@ fn about_tensor(tensor: &TensorReading, settings: &Settings, add: &mut impl FnMu
         e.value.abs() > CLEARLY * e.sigma
             && e.value.abs() > CLEARLY * settings.isotropic_strain_percent / 100.0
     };
-    if beyond(first.biaxial) && beyond(second.biaxial) {
+    if beyond(first.biaxial) && beyond(second.biaxial) && !contradicted {
         add(
             "isotropic-strain-found",
             format!(

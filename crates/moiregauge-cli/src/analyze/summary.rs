@@ -59,6 +59,7 @@ fn set_summary(text: &mut String, set: &SetAnalysis) {
         (Some(mean), _) => {
             lattice(text, &mean.lattice);
             twist_strain(text, &mean.twist_strain, &mean.budget);
+            twist_strain(text, &mean.twist_strain, &mean.budget, &mean.readings);
             readings(text, &mean.readings);
         }
         (None, Some(mean)) => {
@@ -67,6 +68,7 @@ fn set_summary(text: &mut String, set: &SetAnalysis) {
             );
             lattice(text, &mean.lattice);
             twist_strain(text, &mean.twist_strain, &mean.budget);
+            twist_strain(text, &mean.twist_strain, &mean.budget, &mean.readings);
             readings(text, &mean.readings);
         }
         (None, None) => {
@@ -115,7 +117,7 @@ fn lattice(text: &mut String, lattice: &LatticeVectors) {
 }
 
 /// σ of the scans, and in brackets σ with everything in the budget.
-fn twist_strain(text: &mut String, found: &TwistStrain, budget: &Budget) {
+fn twist_strain(text: &mut String, found: &TwistStrain, budget: &Budget, readings: &Readings) {
     let degree = 1f64.to_degrees();
     let degrees = |e: Estimate| plus_minus(e.scaled(degree));
     let known = budget.known();
@@ -125,13 +127,20 @@ fn twist_strain(text: &mut String, found: &TwistStrain, budget: &Budget) {
     };
     let _ = writeln!(
         text,
-        "  twist         {}° (± {}° with calibration and model{})",
+        "  twist         {}° (± {}° with calibration and model{}){}",
         degrees(found.twist()),
         sigma(known.covariance[(0, 0)], degree),
         if budget.drift_known() {
             ""
         } else {
             ", without drift"
+        },
+        if readings.tensor.is_some() {
+            ", if nothing is strained in all directions"
+        } else if readings.layers_differ {
+            ", one reading of several"
+        } else {
+            ""
         }
     );
     let percent = |[low, high]: [f64; 2]| format!("{:.4} to {:.4} %", 100.0 * low, 100.0 * high);
@@ -219,11 +228,24 @@ fn readings(text: &mut String, readings: &Readings) {
                 percent(split.biaxial)
             );
         }
+        for other in tensor
+            .alternatives
+            .iter()
+            .filter(|_| readings.layers_differ)
+        {
+            let _ = writeln!(
+                text,
+                "    the same orientation by symmetry: twist {}°, mean strain {} %",
+                degrees(other.twist()),
+                percent(other.mean())
+            );
+        }
         return;
     }
     if !readings.layers_differ {
         return;
     }
+    text.push_str("  the layers differ: twist and strain trade, and these readings are as good as each other\n");
     for (index, branch) in readings.choices().enumerate() {
         let _ = writeln!(
             text,
@@ -242,7 +264,12 @@ fn readings(text: &mut String, readings: &Readings) {
 
 fn combined_summary(text: &mut String, combined: &Combined) {
     text.push_str("all sets together\n");
-    twist_strain(text, &combined.twist_strain, &combined.budget);
+    twist_strain(
+        text,
+        &combined.twist_strain,
+        &combined.budget,
+        &combined.readings,
+    );
     readings(text, &combined.readings);
     for pair in &combined.consistency {
         let drift = pair

@@ -9,15 +9,11 @@ use moiregauge::strain::Branch;
 use moiregauge_report::{CellResult, MoireDocument, plus_minus};
 
 /// The cell, and what it means.
-pub(super) fn answer(
-    document: &MoireDocument,
-    readings: Option<&Readings>,
-    in_own_frame: bool,
-) -> String {
+pub(super) fn answer(document: &MoireDocument, readings: Option<&Readings>, axes: &str) -> String {
     let mut text = format!("{}: {}\n", document.layers, document.input);
     cell(&mut text, &document.cell);
     if let Some(readings) = readings {
-        meaning(&mut text, readings, in_own_frame);
+        meaning(&mut text, document, readings, axes);
     }
     text
 }
@@ -63,23 +59,26 @@ fn cell(text: &mut String, cell: &CellResult) {
         cell.density_full_cm2,
         cell.band_degeneracy,
         if cell.band_degeneracy == 4.0 {
-            " with two spins and two valleys"
+            " of a band with two spins and two valleys, as in graphene"
         } else {
             ""
         }
     );
 }
 
-fn meaning(text: &mut String, readings: &Readings, in_own_frame: bool) {
+fn meaning(text: &mut String, document: &MoireDocument, readings: &Readings, axes: &str) {
     let degree = 1f64.to_degrees();
-    let axes = if in_own_frame {
-        "counted from L1"
-    } else {
-        "counted from x"
-    };
-    let _ = writeln!(text, "\nreadings with uniaxial strain alone (axis {axes}):");
+    let _ = writeln!(
+        text,
+        "\nreadings with uniaxial strain alone (axis counted from {axes}):"
+    );
     if readings.solutions.is_empty() {
-        text.push_str("  none; the nearest is that of aligned layers\n");
+        let sigma = document.twist_strain.and_then(|t| t.twist_deg.sigma);
+        let _ = writeln!(
+            text,
+            "  none: the moiré is larger than any twist makes it; the nearest is that of aligned layers, twist 0 ± {:.3}°",
+            sigma.unwrap_or(f64::INFINITY)
+        );
     }
     for branch in &readings.solutions {
         solution(text, branch);

@@ -174,6 +174,11 @@ fn graphene_on_boron_nitride() {
 
     let out = folder.path().join("plain");
     let plain = succeed(analyze(&moire, &out).args(layers));
+    let plain = succeed(
+        analyze(&moire, &out)
+            .args(layers)
+            .args(["--isotropic-strain", "0.1"]),
+    );
     assert!(
         plain.stdout.contains("either") && plain.stdout.contains("or  "),
         "{}",

@@ -11,6 +11,8 @@ use crate::results::{ReadingsResult, SolutionResult, StrainTensorResult, TensorN
 #[derive(Debug, Serialize)]
 pub(super) struct Meanings {
     differ: bool,
+    /// What takes the place of the twist in the headline, and why: the tensor's, or all readings.
+    headline: Option<[String; 2]>,
     /// Twist, strain and axis of every solution that a user has to choose from.
     choices: Vec<[String; 3]>,
     /// Isotropic strain and what it does to the twist.
@@ -39,15 +41,28 @@ struct Tensor {
 
 impl Meanings {
     pub(super) fn new(readings: &ReadingsResult) -> Self {
+        let choices: Vec<[String; 3]> = readings
+            .solutions
+            .iter()
+            .filter(|s| !s.strain_dominated && s.twist_deg.value.is_some_and(|t| t > 0.0))
+            .map(choice)
+            .collect();
+        let headline = match &readings.strain_tensor {
+            Some(tensor) => Some([
+                "with the orientation of a layer".to_owned(),
+                format!("({})°", shown(tensor.found.twist_deg)),
+            ]),
+            None if readings.layers_differ && !choices.is_empty() => {
+                let twists: Vec<&str> = choices.iter().map(|c| c[0].as_str()).collect();
+                Some(["the layers differ".to_owned(), twists.join(" or ")])
+            }
+            None => None,
+        };
         let isotropic = readings.isotropic_strain.as_ref();
         Self {
             differ: readings.layers_differ,
-            choices: readings
-                .solutions
-                .iter()
-                .filter(|s| !s.strain_dominated && s.twist_deg.value.is_some_and(|t| t > 0.0))
-                .map(choice)
-                .collect(),
+            headline,
+            choices,
             shifts: isotropic.map_or_else(Vec::new, |found| {
                 let shifts = found.shifts.iter();
                 shifts

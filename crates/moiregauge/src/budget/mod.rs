@@ -231,6 +231,9 @@ fn model_error(
     settings: &Settings,
 ) -> Matrix4<f64> {
     let bilayer = settings.bilayer();
+    if reference.is_none() && !bilayer.is_equal() {
+        return aligned_error(source, settings);
+    }
     let relative = |m: &Material| m.lattice_constant_sigma_nm / m.lattice_constant_nm;
     let found = match source {
         // The moiré matrix is proportional to a and to the inverse of the moiré vectors.
@@ -261,6 +264,25 @@ fn model_error(
         }
     };
     found.unwrap_or_else(|| Matrix4::from_element(f64::NAN))
+}
+
+/// What the model leaves open of layers of different size that are read as aligned, because their moiré is
+/// larger than any twist makes it. An error δ of the mismatch κ − 1 moves θ² by `2|κ − 1|δ`, and α by
+/// `κ/(κ − 1)` times as much as θ; the rest is of second order.
+fn aligned_error(source: Source, settings: &Settings) -> Matrix4<f64> {
+    let bilayer = settings.bilayer();
+    let relative = |m: &Material| m.lattice_constant_sigma_nm / m.lattice_constant_nm;
+    let error = match source {
+        Source::LatticeConstant => relative(bilayer.reference).hypot(relative(bilayer.stretched)),
+        Source::IsotropicStrain => settings.isotropic_strain_percent / 100.0,
+        _ => return Matrix4::zeros(),
+    };
+    let ratio = bilayer.reference.lattice_constant_nm / bilayer.stretched.lattice_constant_nm;
+    let twist = 2.0 * (ratio - 1.0).abs() * error;
+    let mut covariance = Matrix4::zeros();
+    covariance[(0, 0)] = twist;
+    covariance[(1, 1)] = twist * (ratio / (ratio - 1.0)).powi(2);
+    covariance
 }
 
 /// Mean square change for a Gaussian parameter: a parabola through ±σ, with `⟨h⁴⟩ = 3σ⁴`. Where nothing

@@ -1,7 +1,7 @@
 //! The layers known by name.
 //!
-//! Uncertainties are those between sources; where there is one source, or one that could not be looked
-//! up, 0.0005 nm and 0.03. The Poisson ratio of a layer with the 2D moduli K and G is (K − G)/(K + G).
+//! Uncertainties are those between sources; where there is one source, or one that is to be
+//! confirmed, 0.0005 nm and 0.03. The Poisson ratio of a layer with the 2D moduli K and G is (K − G)/(K + G).
 
 /// One layer: a (nm); b (nm) and γ (degrees) where it is not hexagonal; ν; uncertainties of a and ν.
 pub(super) struct Row {
@@ -35,7 +35,7 @@ pub(super) const GRAPHENE: Row = hexagonal(
     "graphene",
     [0.246, 0.0001],
     [0.16, 0.03],
-    "a, ν: Blakslee et al. 1970, as used in arXiv 2406.08681",
+    "a: Cao et al. 2018, arXiv 1803.02342; ν: Blakslee et al. 1970; both as used in arXiv 2008.09761 and 2406.08681",
 );
 
 pub(super) const OTHERS: [Row; 8] = [
@@ -43,43 +43,43 @@ pub(super) const OTHERS: [Row; 8] = [
         "hBN",
         [0.2504, 0.0003],
         [0.21, 0.03],
-        "ν: Falin et al. 2017; a: 0.251 nm is also in use",
+        "a: 0.251 nm is also in use; ν: Falin et al. 2017; both to be confirmed",
     ),
     hexagonal(
         "MoS2",
         [0.3160, 0.0005],
         [0.25, 0.03],
-        "a: Wilson and Yoffe 1969; ν: Çakır et al. 2014 (DFT), not looked up",
+        "a: Wilson and Yoffe 1969; ν: Çakır et al. 2014 (DFT); both to be confirmed",
     ),
     hexagonal(
         "MoSe2",
         [0.3288, 0.0005],
         [0.21, 0.02],
-        "a, ν (2D moduli): Shabani et al. 2021, Halbertal et al. 2021",
+        "a, and ν from the 2D moduli: Shabani et al. 2021, Nature Physics 17, 720; Halbertal et al. 2021, Nature Communications 12, 242",
     ),
     hexagonal(
         "MoTe2",
         [0.352, 0.0005],
         [0.24, 0.03],
-        "a: Wilson and Yoffe 1969; ν: Çakır et al. 2014 (DFT), not looked up",
+        "a: Wilson and Yoffe 1969; ν: Çakır et al. 2014 (DFT); both to be confirmed",
     ),
     hexagonal(
         "WS2",
         [0.3153, 0.0005],
         [0.22, 0.03],
-        "a: Schutte et al. 1987; ν: Çakır et al. 2014 (DFT), not looked up",
+        "a: Schutte et al. 1987; ν: Çakır et al. 2014 (DFT); both to be confirmed",
     ),
     hexagonal(
         "WSe2",
         [0.3282, 0.0005],
         [0.17, 0.02],
-        "a, ν (2D moduli): Shabani et al. 2021, Halbertal et al. 2021",
+        "a, and ν from the 2D moduli: Shabani et al. 2021, Nature Physics 17, 720; Halbertal et al. 2021, Nature Communications 12, 242",
     ),
     hexagonal(
         "NbSe2",
         [0.3444, 0.0005],
         [0.25, 0.05],
-        "a: Wilson and Yoffe 1969; ν: between 0.2 and 0.3, no good source, give your own",
+        "a: Wilson and Yoffe 1969, to be confirmed; ν: between 0.2 and 0.3, no good source, give your own",
     ),
     Row {
         name: "WTe2 1T′",
@@ -88,6 +88,6 @@ pub(super) const OTHERS: [Row; 8] = [
         poisson_ratio: 0.2,
         a_sigma: 0.001,
         poisson_ratio_sigma: 0.1,
-        source: "a, b: bulk Td-WTe2, Brown 1966; ν: a guess, the layer is not isotropic, give your own",
+        source: "a, b: bulk, Brown 1966, to be confirmed; ν: a guess, the layer is not isotropic, give your own",
     },
 ];

@@ -18,6 +18,7 @@ use nalgebra::{Complex, Matrix2, Matrix4, RowVector4, Vector2};
 
 use super::measure::MeasuredScan;
 use crate::caveat::Caveat;
+use crate::chi2::enlargement;
 use crate::drift::{Observation, solve};
 use crate::estimate::Estimate;
 use crate::lattice::LatticeVectors;
@@ -27,6 +28,8 @@ use crate::settings::{Calibration, KnownOrientation, LatticeDirection};
 
 /// A lattice whose size differs from that of the material by more is another one.
 const LARGEST_ERROR: f64 = 0.15;
+/// χ²/dof beyond which the scatter of the images deserves a word.
+const LARGE_SCATTER: f64 = 2.0;
 /// A size off by more than this many per cent of the priors deserves a word.
 const CLEARLY: f64 = 3.0;
 
@@ -115,25 +118,38 @@ pub fn atomic_orientation(
     let files: Vec<String> = scans.iter().map(|s| s.file.clone()).collect();
     let place = files.join(", ");
     let atoms = material.atomic_pair();
-    let found = match solve(&observations) {
-        Ok(solution) => {
-            let (shape, angle) = turned(&solution.lattice, &atoms)?;
-            Found {
-                shape,
-                angle,
-                drift: Some(solution.velocity),
-            }
-        }
-        Err(_) => {
+    let found = if let Ok(solution) = solve(&observations) {
+        let scale = enlargement(solution.chi2, solution.degrees_of_freedom);
+        if scale > LARGE_SCATTER {
             caveats.push(Caveat::new(
-                "atomic-drift-assumed",
+                "atomic-scatter",
                 &place,
-                "the atomic images are all of one frame direction, which does not tell their drift: the \
-                 orientation rests on the rows of atoms along the fast axis alone and on the lattice \
-                 constant; frames up and down would do better",
+                format!(
+                    "the atomic images scatter {:.1} times more than their errors say: drift that changes, as \
+                     after a move of the window; the error of the orientation is enlarged to match",
+                    scale.sqrt()
+                ),
             ));
-            one_direction(&observations, material, calibration)?
         }
+        let lattice = LatticeVectors {
+            covariance: solution.lattice.covariance * scale,
+            ..solution.lattice
+        };
+        let (shape, angle) = turned(&lattice, &atoms)?;
+        Found {
+            shape,
+            angle,
+            drift: Some(solution.velocity),
+        }
+    } else {
+        caveats.push(Caveat::new(
+            "atomic-drift-assumed",
+            &place,
+            "the atomic images are all of one frame direction, which does not tell their drift: the \
+             orientation rests on the rows of atoms along the fast axis alone and on the lattice constant; \
+             frames up and down would do better",
+        ));
+        one_direction(&observations, material, calibration)?
     };
     let off = found.shape.0 - 1.0;
     if off.abs() > LARGEST_ERROR {

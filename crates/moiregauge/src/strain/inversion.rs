@@ -21,7 +21,7 @@ use super::layers::{Layers, Stretch, strain_side};
 
 /// Steps of the grid on which roots of f are looked for.
 const GRID: usize = 720;
-/// An f that comes this near to zero touches it, as it does without strain, where |N_q| has a corner.
+/// An f that comes this near to zero touches it, as it does without strain, where `|N_q|` has a corner.
 const TOUCHING: f64 = 1e-10;
 
 /// Which of the four solutions.

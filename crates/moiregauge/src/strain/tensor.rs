@@ -6,8 +6,8 @@
 //! Out: θ, the mean strain `½(ε₁ + ε₂)`, the shear part `γ = ½(ε₁ − ε₂)` and its axis: of the atoms of layer
 //! 2 against those of layer 1, tension positive, in either form of the equation.
 //!
-//! Without an orientation P leaves a circle of solutions, `|κ(1+η) e^{iθ} − 1| = |p|`; with it σ_η = θσ_α
-//! for equal layers. What is left open: orientations are known modulo the symmetry of the layer. For equal
+//! Without an orientation P leaves a circle of solutions, `|κ(1+η) e^{iθ} − 1| = |p|`; with it
+//! `σ_η = θ σ_α` for equal layers. What is left open: orientations are known modulo the symmetry of the layer. For equal
 //! layers (θ, η) and about (−θ, −η) go with one orientation modulo 60°; θ > 0 is chosen. For different
 //! layers the reading with the least mean strain is the best, and its sign is that of the twist.
 
@@ -324,7 +324,7 @@ impl StrainTensor {
     }
 }
 
-/// `(ε_u, ε_b)` of a layer stretched by `mean + gamma` along and `mean − gamma` across the axis of ε_u.
+/// `(ε_u, ε_b)` of a layer stretched by `mean + gamma` along and `mean − gamma` across the axis of `ε_u`.
 fn uniaxial_and_biaxial(mean: f64, gamma: f64, poisson_ratio: f64) -> [f64; 2] {
     let (along, across) = (1.0 + mean + gamma, 1.0 + mean - gamma);
     let ratio = along / across;

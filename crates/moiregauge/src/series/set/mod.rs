@@ -1,6 +1,7 @@
 //! One set: drift, and every scan before and after correction.
 
 mod doubts;
+mod about;
 mod joint;
 mod moire;
 mod scan;
@@ -10,6 +11,7 @@ use rayon::prelude::*;
 use spmfile::FrameDirection;
 
 use doubts::{about_checks, about_mean, about_residual};
+use about::{about_checks, about_mean, about_readings, about_residual};
 pub(super) use joint::{checks, joint_fit, lattice_of, terms};
 pub(super) use moire::moire;
 use scan::{plain_mean, scan_analysis};
@@ -25,7 +27,7 @@ use crate::drift::{Observation, at_known_drift, common_lattice, monte_carlo, sol
 use crate::geometry::mean_and_spread;
 use crate::lattice::LatticeVectors;
 use crate::lattice::reciprocal::real_from_reciprocal;
-use crate::readings::{Readings, caveats as about_readings};
+use crate::readings::Readings;
 use crate::settings::{GivenDrift, Settings};
 use crate::strain::{TwistStrain, draws};
 
@@ -113,6 +115,8 @@ pub(super) fn analyse_set(
         let (lattice, found) = (&m.lattice, &m.twist_strain);
         let all = about_readings(&group.name, lattice, found, &m.readings, settings);
         caveats.extend(all);
+    if let Some(m) = mean.as_ref().or(uncorrected.as_ref()) {
+        caveats.extend(about_readings(&group.name, m, settings));
     }
     moire::doubts(&group.name, shown, &scans, settings, caveats);
     about_checks(
@@ -395,4 +399,5 @@ fn forward_backward(scans: &[&ScanAnalysis], settings: &Settings) -> Option<Twis
     let lattice = real_from_reciprocal(&plain_mean(&both)?)?;
     // Back and forth turns the labelling by 60°, which twist and strain do not see.
     moire(&lattice, settings)
+    twist_strain(&lattice, settings.bilayer(), settings.strain_convention).ok()
 }
