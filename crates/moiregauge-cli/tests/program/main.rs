@@ -3,6 +3,7 @@
 mod acceptance;
 mod common;
 mod formats;
+mod real_images;
 mod refusals;
 mod results;
 mod round_trip;

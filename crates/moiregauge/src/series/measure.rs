@@ -55,6 +55,8 @@ pub struct MeasuredLine {
     pub nominal: Option<Geometry>,
     /// When they were recorded; `None` where the file does not tell.
     pub timing: Option<Timing>,
+    /// Samples in a line of the whole frame.
+    pub frame_columns: usize,
     /// Lines that were recorded after the part of the frame that was used.
     pub lines_after: usize,
     /// The lattice in pixels.
@@ -311,6 +313,7 @@ fn measure_line(
         geometry,
         nominal,
         timing,
+        frame_columns: channel.columns,
         lines_after,
         lattice,
         speeds,
