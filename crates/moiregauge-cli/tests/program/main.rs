@@ -4,6 +4,7 @@ mod acceptance;
 mod common;
 mod formats;
 mod layers;
+mod real_images;
 mod refusals;
 mod results;
 mod round_trip;

@@ -17,14 +17,19 @@ pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
     let shown = subject.set.illustration.as_ref();
     let shown = shown.ok_or("no scan of this set could be shown in detail")?;
     let actual = corners(shown, &shown.pixel_to_nm, shown.origin);
-    let nominal = shown.nominal_pixel_to_nm.map(|map| {
-        let middle = middle_pixel(shown);
-        corners(
-            shown,
-            &map,
-            shown.origin + (shown.pixel_to_nm - map) * middle,
-        )
-    });
+    // Without sensors the frame is the intended one.
+    let from_sensors = !shown.sensor_line.is_empty();
+    let nominal = shown
+        .nominal_pixel_to_nm
+        .filter(|_| from_sensors)
+        .map(|map| {
+            let middle = middle_pixel(shown);
+            corners(
+                shown,
+                &map,
+                shown.origin + (shown.pixel_to_nm - map) * middle,
+            )
+        });
     let points: Vec<(f64, f64)> = actual
         .iter()
         .chain(nominal.iter().flatten())
@@ -78,24 +83,29 @@ pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
     let channel = &subject.set.channel;
     let what = (channel.as_str(), shown.unit.as_str());
     colorbar::draw(&mut svg, bar, subject.map, contrast, what);
-    let mut keys = vec![(legend::Key::Line("#222222", ""), "scanned (sensors)")];
+    let (scanned, places) = if from_sensors {
+        ("scanned (sensors)", "the position sensors place it")
+    } else {
+        ("frame (nominal)", "nominal size and rotation place it")
+    };
+    let mut keys = vec![(legend::Key::Line("#222222", ""), scanned)];
     if nominal.is_some() {
         keys.push((legend::Key::Line("#d55e00", "4 2.5"), "intended (nominal)"));
-    } else {
-        keys[0].1 = "scanned frame";
     }
     legend::row(&mut svg, (layout::LEFT, 11.0), &keys);
 
-    let nominal_note = if nominal.is_some() {
-        " The intended frame is drawn about the same centre, at the size and rotation that the file states."
-    } else {
-        " The file states no intended frame."
+    let nominal_note = match (from_sensors, nominal.is_some()) {
+        (false, _) => " There are no position sensors that could be used.",
+        (true, true) => {
+            " The intended frame is drawn about the same centre, at the size and rotation that the file states."
+        }
+        (true, false) => " The file states no intended frame.",
     };
     Ok(Drawing {
         wide: false,
         svg: svg.finish("Scan with intended and actual frame"),
         caption: format!(
-            "{}, {} of {}, background removed. Every pixel is drawn where the position sensors place it, without resampling; x to the right, y up. Arrows: the measured lattice vectors L₁, L₂ and L₃ = L₂ − L₁, not corrected for drift.{nominal_note} Colours from the 0.5 % to the 99.5 % quantile.",
+            "{}, {} of {}, background removed. Every pixel is drawn where {places}, without resampling; x to the right, y up. Arrows: the measured lattice vectors L₁, L₂ and L₃ = L₂ − L₁, not corrected for drift.{nominal_note} Colours from the 0.5 % to the 99.5 % quantile.",
             channel,
             layout::line_name(shown.line),
             layout::short(&shown.file),

@@ -38,8 +38,7 @@ pub(super) fn groups(mut scans: Vec<MeasuredScan>, grouping: Grouping) -> Vec<Gr
                 (a, b) => a == b,
             };
             // Unfinished frames have fewer lines and belong to the set all the same.
-            let same_pixels = line.nominal.as_ref().map(|n| n.size[0])
-                == other.lines[0].nominal.as_ref().map(|n| n.size[0]);
+            let same_pixels = line.frame_columns == other.lines[0].frame_columns;
             slow_axis == group.slow_axis
                 && same_rate
                 && same_size

@@ -58,6 +58,8 @@ pub struct MeasuredLine {
     pub nominal: Option<Geometry>,
     /// When they were recorded; `None` where the file does not tell.
     pub timing: Option<Timing>,
+    /// Samples in a line of the whole frame.
+    pub frame_columns: usize,
     /// Lines that were recorded after the part of the frame that was used.
     pub lines_after: usize,
     /// The lattice in pixels.
@@ -365,6 +367,17 @@ fn about_lattice(
     if let Some(fit) = &lattice.fit {
         about_fit(file, fit, geometry, caveats);
     }
+    Ok(MeasuredLine {
+        line,
+        geometry,
+        nominal,
+        timing,
+        frame_columns: channel.columns,
+        lines_after,
+        lattice,
+        speeds,
+        speed_error,
+    })
 }
 
 /// `trace` or `retrace`.

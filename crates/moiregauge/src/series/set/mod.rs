@@ -167,6 +167,9 @@ fn without_drift(
 fn draw(scans: &mut [ScanAnalysis], settings: &Settings, first_index: u64) {
     scans.par_iter_mut().enumerate().for_each(|(i, scan)| {
         let lattice = scan.drift_corrected.as_ref().unwrap_or(&scan.sensor);
+        if moire(lattice, settings).is_none() {
+            return;
+        }
         scan.draws = draws(
             lattice,
             settings.bilayer(),

@@ -1,0 +1,128 @@
+//! Lattices whose first shell is hidden, waves of pick-up, and harmonics that do not agree.
+
+// The tests of the fit use the rest.
+#[allow(dead_code)]
+mod fit_scene;
+
+use fit_scene::{Contrast, Scene, Wave};
+use moiregauge::image::Image;
+use moiregauge::lattice::{MeasuredLattice, measure};
+use moiregauge::settings::{Background, Method};
+use nalgebra::Vector2;
+
+fn fit(image: &Image, scene: &Scene) -> MeasuredLattice {
+    measure(image, &scene.geometry(), Background::Plane, Method::Lattice).unwrap()
+}
+
+/// Errors of the four components over their stated errors, decorrelated: χ² with four degrees of freedom.
+fn chi_squared(scene: &Scene, measured: &MeasuredLattice) -> f64 {
+    let (_, change) = scene.change(&measured.pixels.basis);
+    let covariance = change * measured.pixels.covariance * change.transpose();
+    let error = scene.error(&measured.pixels.basis);
+    error.dot(&(covariance.try_inverse().unwrap() * error))
+}
+
+/// A cell with many atoms: as in Si(111)-7×7, the waves of the shells 7, 9 and 13 are strong and those below 7
+/// are lost in noise.
+fn many_atoms(seed: u64) -> Scene {
+    let angle = 0.618 * seed as f64;
+    let mut scene = Scene::new([192, 192], 6.5, angle, Contrast::Cosines, seed);
+    let pair = scene.pair();
+    scene.waves.clear();
+    for (h, k) in (-4..=4).flat_map(|h| (-4..=4).map(move |k| (h, k))) {
+        let order = h * h - h * k + k * k;
+        let amplitude = match order {
+            1 | 3 | 4 => 0.01,
+            7 | 9 | 13 => 0.3,
+            _ => 0.0,
+        };
+        if amplitude > 0.0 && (k > 0 || (k == 0 && h > 0)) {
+            scene.waves.push(Wave {
+                q: pair * Vector2::new(f64::from(h), f64::from(k)),
+                amplitude,
+                phase: f64::from(7 * h + 3 * k),
+            });
+        }
+    }
+    scene.white = 1.0;
+    scene
+}
+
+/// Waves in time are multiples of one wave in the image, folded back at the line rate: a grid of peaks in the
+/// spectrum. Amplitude a third of the lattice's, as strong against the noise around it.
+fn with_pick_up(mut scene: Scene) -> Scene {
+    let base = Vector2::new(0.71, 0.513 * std::f64::consts::TAU);
+    for order in 1..=4 {
+        let mut q = base * f64::from(order);
+        q.y -= (q.y / std::f64::consts::TAU).round() * std::f64::consts::TAU;
+        scene.waves.push(Wave {
+            q,
+            amplitude: 0.1,
+            phase: f64::from(order),
+        });
+    }
+    scene
+}
+
+/// The lattice of the high orders is found, with pick-up and without, and its errors are as stated.
+#[test]
+fn high_orders_make_the_lattice() {
+    let mut sum = 0.0;
+    for seed in 0..12 {
+        for scene in [many_atoms(seed), with_pick_up(many_atoms(seed))] {
+            let measured = fit(&scene.image(), &scene);
+            let error = scene.error(&measured.pixels.basis).norm();
+            assert!(error < 1e-2 * scene.basis.norm(), "seed {seed}: {error}");
+            sum += chi_squared(&scene, &measured);
+        }
+    }
+    // 24 times four degrees of freedom, not quite independent: 96 with a standard deviation of 20.
+    assert!((36.0..156.0).contains(&sum), "{sum}");
+}
+
+/// Images of one lattice say so: χ² of the closure is what it should be, and no error is enlarged.
+#[test]
+fn harmonics_of_one_lattice_agree() {
+    let (mut sum, mut freedom) = (0.0, 0);
+    for seed in 0..60 {
+        let angle = 0.618 * seed as f64;
+        let periods = [4.0, 6.0, 9.0][seed as usize % 3];
+        let mut scene = Scene::new([96, 96], periods, angle, Contrast::Spots, seed);
+        (scene.white, scene.line) = (0.7, 0.2);
+        let closure = fit(&scene.image(), &scene).fit.unwrap().closure.unwrap();
+        assert_eq!(closure.enlargement(), 1.0, "seed {seed}: {closure:?}");
+        sum += closure.chi_squared;
+        freedom += closure.degrees_of_freedom;
+    }
+    // The noise around harmonics is known to some ten per cent only.
+    let reduced = sum / f64::from(freedom as u32);
+    assert!((0.8..1.25).contains(&reduced), "{reduced} for {freedom}");
+}
+
+/// Three waves that do not add up to zero by 0.4 cycles over the frame, each known to 0.03: no lattice is right for
+/// all of them, and the errors are enlarged to say so. The lattice of the first two, which are right, is
+/// then within them.
+#[test]
+fn harmonics_that_make_no_lattice_enlarge_the_errors() {
+    for seed in 0..8 {
+        let angle = 0.618 * seed as f64;
+        let mut scene = Scene::new([160, 160], 10.0, angle, Contrast::Cosines, seed);
+        // Amplitude over noise in one resolution cell: 160/(2 · 6) = 13. Phase zero in the middle.
+        scene.white = 6.0;
+        for wave in &mut scene.waves {
+            wave.phase = -wave.q.dot(&Vector2::repeat(79.5));
+        }
+        let whole = fit(&scene.image(), &scene);
+        let closure = whole.fit.unwrap().closure.unwrap();
+        assert_eq!(closure.enlargement(), 1.0, "seed {seed}: {closure:?}");
+        let change = 0.4 * std::f64::consts::TAU / 160.0;
+        scene.waves[2].q.x += change;
+        scene.waves[2].phase -= 79.5 * change;
+        let measured = fit(&scene.image(), &scene);
+        let closure = measured.fit.as_ref().unwrap().closure.unwrap();
+        assert!(closure.enlargement() > 5.0, "seed {seed}: {closure:?}");
+        let chi_squared = chi_squared(&scene, &measured);
+        // Four degrees of freedom: once in ten thousand, and χ² of the closure is uncertain itself.
+        assert!(chi_squared < 24.0, "seed {seed}: {chi_squared}");
+    }
+}
