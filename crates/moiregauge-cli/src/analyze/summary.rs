@@ -58,7 +58,6 @@ fn set_summary(text: &mut String, set: &SetAnalysis) {
     match (&set.mean, &set.uncorrected) {
         (Some(mean), _) => {
             lattice(text, &mean.lattice);
-            twist_strain(text, &mean.twist_strain, &mean.budget);
             twist_strain(text, &mean.twist_strain, &mean.budget, &mean.readings);
             readings(text, &mean.readings);
         }
@@ -67,7 +66,6 @@ fn set_summary(text: &mut String, set: &SetAnalysis) {
                 "  not corrected for drift (statistical errors only, drift not included):\n",
             );
             lattice(text, &mean.lattice);
-            twist_strain(text, &mean.twist_strain, &mean.budget);
             twist_strain(text, &mean.twist_strain, &mean.budget, &mean.readings);
             readings(text, &mean.readings);
         }

@@ -173,7 +173,6 @@ fn graphene_on_boron_nitride() {
     let atoms = folder.path().join("atoms");
 
     let out = folder.path().join("plain");
-    let plain = succeed(analyze(&moire, &out).args(layers));
     let plain = succeed(
         analyze(&moire, &out)
             .args(layers)

@@ -348,6 +348,7 @@ fn measure_line(
             geometry: geometry.clone(),
             nominal: nominal.clone(),
             timing,
+            frame_columns: channel.columns,
             lines_after,
             lattice,
             speeds,
@@ -367,17 +368,6 @@ fn about_lattice(
     if let Some(fit) = &lattice.fit {
         about_fit(file, fit, geometry, caveats);
     }
-    Ok(MeasuredLine {
-        line,
-        geometry,
-        nominal,
-        timing,
-        frame_columns: channel.columns,
-        lines_after,
-        lattice,
-        speeds,
-        speed_error,
-    })
 }
 
 /// `trace` or `retrace`.

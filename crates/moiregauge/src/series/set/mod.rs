@@ -1,6 +1,5 @@
 //! One set: drift, and every scan before and after correction.
 
-mod doubts;
 mod about;
 mod joint;
 mod moire;
@@ -10,7 +9,6 @@ use nalgebra::{Matrix2, Vector2};
 use rayon::prelude::*;
 use spmfile::FrameDirection;
 
-use doubts::{about_checks, about_mean, about_residual};
 use about::{about_checks, about_mean, about_readings, about_residual};
 pub(super) use joint::{checks, joint_fit, lattice_of, terms};
 pub(super) use moire::moire;
@@ -112,10 +110,6 @@ pub(super) fn analyse_set(
     about_mean(&group.name, mean.as_ref(), caveats);
     let shown = mean.as_ref().or(uncorrected.as_ref());
     if let Some(m) = shown {
-        let (lattice, found) = (&m.lattice, &m.twist_strain);
-        let all = about_readings(&group.name, lattice, found, &m.readings, settings);
-        caveats.extend(all);
-    if let Some(m) = mean.as_ref().or(uncorrected.as_ref()) {
         caveats.extend(about_readings(&group.name, m, settings));
     }
     moire::doubts(&group.name, shown, &scans, settings, caveats);
@@ -402,5 +396,4 @@ fn forward_backward(scans: &[&ScanAnalysis], settings: &Settings) -> Option<Twis
     let lattice = real_from_reciprocal(&plain_mean(&both)?)?;
     // Back and forth turns the labelling by 60°, which twist and strain do not see.
     moire(&lattice, settings)
-    twist_strain(&lattice, settings.bilayer(), settings.strain_convention).ok()
 }
