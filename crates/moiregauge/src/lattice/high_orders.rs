@@ -9,6 +9,7 @@
 use nalgebra::{Matrix2, Vector2};
 
 use super::harmonics::{Harmonics, Windowed};
+use super::rescue::cut_off;
 use crate::image::Image;
 use crate::settings::Background;
 
@@ -18,6 +19,8 @@ const LAST_SHELL: i32 = 9;
 const STANDS_OUT: f64 = 20.0;
 /// So many harmonics that stand out make a lattice of which the first shell may be missing.
 const FEWEST: usize = 5;
+/// Share of the power of a lattice that is left when outliers are cut off, at least.
+const LEFT: f64 = 0.4;
 /// Weights are capped: beyond, errors are no longer those of noise.
 const MOST_WEIGHT: f64 = 1e3;
 
@@ -53,6 +56,16 @@ pub(super) fn refine(
     let pair = right * normal.try_inverse()?;
     let (k1, k2) = (pair.column(0).into_owned(), pair.column(1).into_owned());
     let harmonics = windowed.fit(image, &pair, background, &shells)?;
+    // Tip events in step with the lines make such harmonics, too, which vanish with the outliers.
+    let clipped = cut_off(image);
+    let without = Windowed::new(&clipped).fit(&clipped, &pair, background, &shells)?;
+    let power = |harmonics: &Harmonics| -> f64 {
+        let each = harmonics.list.iter().map(|h| h.amplitude.norm_sqr());
+        each.sum()
+    };
+    if power(&without) < LEFT * power(&harmonics) {
+        return None;
+    }
     Some((harmonics, [k1, k2, k2 - k1]))
 }
 

@@ -34,7 +34,7 @@ pub(super) fn prepare_again(
 }
 
 /// The image with outliers moved to where they are none.
-fn cut_off(image: &Image) -> Image {
+pub(super) fn cut_off(image: &Image) -> Image {
     let mut values: Vec<f64> = image
         .values
         .iter()
