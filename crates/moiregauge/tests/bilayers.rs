@@ -273,8 +273,8 @@ proptest! {
     }
 }
 
-/// σ_η = θ σ_α for equal layers: 0.0034, 0.010, 0.034 and 0.10 % for 0.1°, 0.3°, 1° and 3° at 1.95°;
-/// the numbers of the specification are for its own reference twist, so the closed form is the measure.
+/// The error of the mean strain of equal layers is `θ σ_α`: 0.0034, 0.010, 0.034 and 0.10 % for 0.1°, 0.3°, 1° and
+/// 3° at 1.126°.
 #[test]
 fn error_of_the_mean_strain_is_that_of_the_orientation_times_the_twist() {
     let graphene = named("graphene");
