@@ -3,6 +3,7 @@
 mod acceptance;
 mod common;
 mod formats;
+mod odd_files;
 mod real_images;
 mod refusals;
 mod results;
