@@ -4,6 +4,7 @@ mod acceptance;
 mod common;
 mod formats;
 mod layers;
+mod odd_files;
 mod real_images;
 mod refusals;
 mod results;

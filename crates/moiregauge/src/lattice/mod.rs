@@ -35,6 +35,8 @@ use crate::settings::{Background, Method};
 use harmonics::{Harmonics, SHELLS, Windowed};
 use transform::Spectrum;
 
+/// What is left of a constant or a plane when it is taken off, as a share of the values.
+const ROUNDING: f64 = 1e-13;
 /// The smallest side of a frame, pixels.
 const SMALLEST_SIDE: usize = 16;
 
@@ -328,13 +330,13 @@ fn prepare(
     if 2 * missing > total {
         return Err(LatticeError::Missing { missing, total });
     }
+    let largest = |image: &Image| {
+        let finite = image.values.iter().filter(|v| v.is_finite());
+        finite.fold(0.0f64, |a, v| a.max(v.abs()))
+    };
+    let before = largest(image);
     let image = remove_background(image, background);
-    let largest = image
-        .values
-        .iter()
-        .filter(|v| v.is_finite())
-        .fold(0.0f64, |a, v| a.max(v.abs()));
-    if largest <= 0.0 {
+    if largest(&image) <= ROUNDING * before {
         return Err(LatticeError::Constant);
     }
     let full = Spectrum::new(&image);
