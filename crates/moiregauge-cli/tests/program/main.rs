@@ -3,6 +3,7 @@
 mod acceptance;
 mod common;
 mod formats;
+mod maps;
 mod refusals;
 mod results;
 mod round_trip;
