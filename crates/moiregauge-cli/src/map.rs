@@ -50,6 +50,9 @@ pub(crate) struct MapArgs {
     /// Distance of the nodes, nm [default: a third of the window, a quarter of a tile]
     #[arg(long, value_name = "NM")]
     step: Option<f64>,
+    /// Map in bands, as images of more than 20 million pixels are; one file at a time
+    #[arg(long)]
+    in_bands: bool,
     /// Margin at the edges, in windows
     #[arg(long, value_name = "WINDOWS", default_value_t = 2.0)]
     margin: f64,
@@ -127,7 +130,7 @@ fn survey(
     (settings, known, resolution): (&Settings, &Known, &Resolution),
 ) -> anyhow::Result<Option<Made>> {
     for path in inputs {
-        let large = survey::Large::open(path, settings, known)
+        let large = survey::Large::open(path, settings, known, args.in_bands)
             .with_context(|| path.display().to_string())?;
         let Some(large) = large else { continue };
         survey::alone(inputs)?;

@@ -28,14 +28,16 @@ pub(super) struct Large {
 }
 
 impl Large {
-    /// Opens a file if its image is large; `None` for one that is read as a whole.
+    /// Opens a file if its image is large, or `always`; `None` for one that is read as a whole.
     pub(super) fn open(
         path: &Path,
         settings: &Settings,
         known: &Known,
+        always: bool,
     ) -> anyhow::Result<Option<Self>> {
+        let large = if always { 0 } else { LARGE };
         if let Some(array) = Array::open(path) {
-            if array.size[0] * array.size[1] < LARGE {
+            if array.size[0] * array.size[1] < large {
                 return Ok(None);
             }
             // Two lines tell what the options make of the file: its scale, rotation and size.
@@ -55,7 +57,7 @@ impl Large {
             }));
         }
         // Other files are read as a whole anyway; small ones go the common way.
-        if std::fs::metadata(path)?.len() < LARGE as u64 {
+        if std::fs::metadata(path)?.len() < large as u64 {
             return Ok(None);
         }
         let reading = crate::analyze::read(path, settings, known)?;
@@ -71,7 +73,7 @@ impl Large {
             .channels
             .iter()
             .find(|c| Some(&c.name) == chosen.as_ref());
-        let Some(channel) = channel.filter(|c| c.rows * c.columns >= LARGE) else {
+        let Some(channel) = channel.filter(|c| c.rows * c.columns >= large) else {
             return Ok(None);
         };
         let geometry =

@@ -6,6 +6,7 @@ mod formats;
 mod layers;
 mod odd_files;
 mod real_images;
+mod maps;
 mod refusals;
 mod results;
 mod round_trip;

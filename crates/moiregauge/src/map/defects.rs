@@ -131,20 +131,20 @@ pub(super) fn masks(setting: &Setting, lattices: &[Result<LocalLattice, Nothing>
         let lattice = lattices[node].as_ref();
         lattice.is_ok_and(|l| is_improbable(l.chi2, l.freedom))
     };
+    let outside = |node: usize| {
+        let (at, [low, high]) = (setting.places[node], setting.frame);
+        (0..2).any(|i| (at - low)[i].min((high - at)[i]) < setting.margin[i])
+    };
     let lost = lost(setting, lattices);
-    let spoilt = near(setting, NEAR, |n| improbable(n) || lost[n]);
+    let spoilt = near(setting, NEAR, |n| !outside(n) && (improbable(n) || lost[n]));
     let bent = near(setting, BESIDE, |n| {
         let blur = setting.blurs[n];
-        (is_improbable(blur.chi2, 4) && blur.share > BLURRED)
-            || bend(setting, lattices, n) > STRAIGHT
+        let blurred = is_improbable(blur.chi2, 4) && blur.share > BLURRED;
+        !outside(n) && (blurred || bend(setting, lattices, n) > STRAIGHT)
     });
     (0..nodes.len())
         .map(|node| {
-            let at = setting.places[node];
-            let [low, high] = setting.frame;
-            let outside = (0..2)
-                .any(|i| at[i] - low[i] < setting.margin[i] || high[i] - at[i] < setting.margin[i]);
-            if outside {
+            if outside(node) {
                 return Mask::Margin;
             }
             if setting.smoothed.support[node].is_none_or(|s| s.share < SHARE) {

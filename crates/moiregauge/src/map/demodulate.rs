@@ -8,7 +8,7 @@ use nalgebra::{Matrix2, Vector2};
 
 use super::blocks::{Blocks, Place, mix};
 use super::carrier::{Carrier, Turns};
-use super::defects::{Blur, Mask, Setting, masks};
+use super::defects::{Blur, Setting, masks};
 use super::median;
 use super::noise::{Noise, PROBE_WINDOW, probes};
 use super::smooth::{Nodes, Smoothed, smooth};
@@ -54,8 +54,9 @@ pub(super) fn demodulate(
     resolution: &Resolution,
 ) -> Option<WaveMap> {
     let mut work = Work::new(image, place, *reference)?;
-    work.follow()?;
+    work.follow();
     work.choose_harmonics();
+    work.guess_noise(image);
     let window = match resolution.window_nm {
         Some(window) => window.max(NARROWEST * work.period),
         None => work.choose_window(),
@@ -196,6 +197,7 @@ impl Work {
                 .collect();
             let beside = mix(image, self.place, &waves, self.blocks.block);
             self.noise = noise_of(&beside, &self.reference, self.period, image);
+            self.guess_noise(image);
         }
         let stride = stride_of(&self.reference, step_of(resolution, window_nm));
         let smoothed = self.smoothed(window_nm, stride);
@@ -298,6 +300,19 @@ impl Work {
         }
     }
 
+    /// Where the frame is too small to see noise between the harmonics: what is left of the variance of the image
+    /// when they are taken off, or a hundredth of it.
+    fn guess_noise(&mut self, image: &Image) {
+        if self.noise.is_measured() {
+            return;
+        }
+        let variance = variance(image);
+        let signal: f64 = self.powers.iter().map(|power| 2.0 * power).sum();
+        self.noise
+            .levels
+            .fill((variance - signal).max(0.01 * variance));
+    }
+
     /// What a window of `wider` nm changes at each node.
     fn blurs(
         &self,
@@ -333,12 +348,17 @@ impl Work {
     }
 }
 
+/// Mean square of the pixels; the background is gone.
+fn variance(image: &Image) -> f64 {
+    let finite = image.values.iter().filter(|v| v.is_finite());
+    let (sum, count) = finite.fold((0.0, 0.0f64), |(s, n), v| (s + v * v, n + 1.0));
+    sum / count.max(1.0)
+}
+
 /// Noise from blocks mixed with two probes for each harmonic; where the frame is too small for probes, the
 /// image's own variance, which is too much and not too little.
 fn noise_of(beside: &Blocks, reference: &Reference, period: f64, image: &Image) -> Noise {
-    let finite = image.values.iter().filter(|v| v.is_finite());
-    let (sum, count) = finite.fold((0.0, 0.0f64), |(s, n), v| (s + v * v, n + 1.0));
-    let fallback = vec![sum / count.max(1.0); beside.layers.len() / 2];
+    let fallback = vec![variance(image); beside.layers.len() / 2];
     let width = reference.in_pixels(PROBE_WINDOW * period);
     Noise::new(beside, width, &fallback)
 }

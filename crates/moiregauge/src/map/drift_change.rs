@@ -28,6 +28,15 @@ impl DriftChange {
     }
 }
 
+/// A place that both maps cover.
+struct Seen {
+    /// Time from upward frames' start, s.
+    time: f64,
+    /// Difference of both waves along u, rad/nm, and its variance.
+    change: [f64; 2],
+    variance: [f64; 2],
+}
+
 /// Compares the average of upward with that of downward maps. `time_gradient` is that of upward frames, s/nm.
 ///
 /// `None` where they have too few good nodes in common.
@@ -38,8 +47,7 @@ pub fn drift_change(
 ) -> Option<DriftChange> {
     let other = View::new(down)?;
     let pair = up.mean()?;
-    // (time from the middle, difference of q along u, its variance) for both waves.
-    let mut seen: Vec<(f64, [f64; 2], [f64; 2])> = Vec::new();
+    let mut seen: Vec<Seen> = Vec::new();
     let norm = time_gradient.norm();
     let along = time_gradient / norm;
     for (node, here) in up
@@ -58,7 +66,11 @@ pub fn drift_change(
             let block = covariance.fixed_view::<2, 2>(2 * wave, 2 * wave);
             (along.transpose() * block * along)[0]
         });
-        seen.push((time_gradient.dot(&place), change.into(), variance));
+        seen.push(Seen {
+            time: time_gradient.dot(&place),
+            change: change.into(),
+            variance,
+        });
     }
     if seen.len() < 10 {
         return None;
@@ -67,15 +79,15 @@ pub fn drift_change(
     let window = 4.0 * std::f64::consts::PI * up.window_nm.powi(2);
     let shared = (window / up.grid.step.determinant().abs()).max(1.0);
     let slope = |wave: usize| {
-        let weight = |s: &(f64, [f64; 2], [f64; 2])| 1.0 / s.2[wave];
+        let weight = |s: &Seen| 1.0 / s.variance[wave];
         let total: f64 = seen.iter().map(weight).sum();
-        let mean = |f: &dyn Fn(&(f64, [f64; 2], [f64; 2])) -> f64| {
-            seen.iter().map(|s| weight(s) * f(s)).sum::<f64>() / total
-        };
-        let (time, value) = (mean(&|s| s.0), mean(&|s| s.1[wave]));
-        let spread: f64 = seen.iter().map(|s| weight(s) * (s.0 - time).powi(2)).sum();
-        let product =
-            |s: &(f64, [f64; 2], [f64; 2])| weight(s) * (s.0 - time) * (s.1[wave] - value);
+        let time = seen.iter().map(|s| weight(s) * s.time).sum::<f64>() / total;
+        let change = seen.iter().map(|s| weight(s) * s.change[wave]).sum::<f64>() / total;
+        let spread: f64 = seen
+            .iter()
+            .map(|s| weight(s) * (s.time - time).powi(2))
+            .sum();
+        let product = |s: &Seen| weight(s) * (s.time - time) * (s.change[wave] - change);
         let slope = seen.iter().map(product).sum::<f64>() / spread;
         // δq·û = −|u| (A·G)(u·r).
         Estimate::new(-slope / norm, (shared / spread).sqrt() / norm)

@@ -119,6 +119,11 @@ impl Noise {
         }
     }
 
+    /// Whether it was seen, and not only guessed.
+    pub(super) fn is_measured(&self) -> bool {
+        self.grid.is_some()
+    }
+
     /// The local ratio at a place, pixels.
     pub(super) fn ratio(&self, at: Vector2<f64>) -> f64 {
         self.grid.as_ref().map_or(1.0, |grid| grid.at(at))

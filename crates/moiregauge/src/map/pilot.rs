@@ -1,8 +1,6 @@
 //! A first look with a narrow window: the carrier, the harmonics that tell something, and how wide the
 //! window may be.
 
-use nalgebra::{Matrix2, Vector2};
-
 use super::carrier::{Carrier, MOST_CELLS, Slope};
 use super::demodulate::{PILOT, Work, stride_of};
 use super::window;
@@ -21,7 +19,7 @@ const LOOKED_AT: usize = 40;
 
 impl Work {
     /// Fits the carrier to what a narrow window sees, until little is left.
-    pub(super) fn follow(&mut self) -> Option<()> {
+    pub(super) fn follow(&mut self) {
         let width = PILOT * self.period;
         // Only the first three for this: the others have no noise level yet.
         let all = std::mem::take(&mut self.blocks.layers);
@@ -31,7 +29,6 @@ impl Work {
         self.blocks.layers = all.by_ref().take(3).collect();
         self.indices = indices[..3].to_vec();
         self.powers = vec![0.0; 3];
-        let mut found = None;
         for round in 0..ROUNDS {
             let smoothed = self.smoothed(width, self.sparse(width, FOLLOWED));
             let lattices = self.lattices(&smoothed, width, false);
@@ -58,7 +55,6 @@ impl Work {
             if slopes.len() < 4 {
                 break;
             }
-            found = Some(());
             let near = NEAR_ENOUGH.powi(2) * 2.0 * slopes.len() as f64;
             if left - noise < near {
                 break;
@@ -73,7 +69,6 @@ impl Work {
         self.blocks.layers.extend(all);
         self.indices = indices;
         self.powers = powers;
-        found
     }
 
     /// The stride of nodes `distance_nm` apart, or so far that few enough fit into the frame.

@@ -52,10 +52,10 @@ pub enum SurveyError {
     },
     /// There is no lattice in the middle.
     #[error("the middle of the image: {0}")]
-    Lattice(#[from] LatticeError),
+    Lattice(LatticeError),
     /// No twist and strain explain it.
     #[error("the middle of the image: {0}")]
-    Strain(#[from] StrainError),
+    Strain(StrainError),
     /// The lattice is there but cannot be mapped.
     #[error("the middle of the image shows a lattice, but nowhere clearly enough for a map")]
     NoMap,
@@ -91,7 +91,8 @@ impl SurveyPlan {
         let corner = [columns.start, rows.start];
         let middle = block(read, columns, rows)?;
         let of_middle = geometry.cropped(corner, [middle.columns, middle.rows]);
-        let found = measure(&middle, &of_middle, settings.background, Method::Lattice)?;
+        let found = measure(&middle, &of_middle, settings.background, Method::Lattice)
+            .map_err(SurveyError::Lattice)?;
         let reference = Reference {
             pair: found.reciprocal,
             pitch: [geometry.fast_step().norm(), geometry.slow_step().norm()],
@@ -139,7 +140,9 @@ impl SurveyPlan {
             node.displacement.fill(f64::NAN);
         }
         let (layers, convention) = (self.settings.bilayer(), self.settings.strain_convention);
-        let found = lattices.twist_strain(&self.whole, layers, convention)?;
+        let found = lattices
+            .twist_strain(&self.whole, layers, convention)
+            .map_err(SurveyError::Strain)?;
         Ok(TwistStrainMap::new(&lattices, &found))
     }
 

@@ -1,0 +1,105 @@
+//! Maps beside the plain textbook autocorrelation alone, in the same run.
+//!
+//! `cargo bench -p moiregauge --bench map`. `textbook` pads N × N pixels to 2N × 2N, transforms, squares and
+//! transforms back. `map` starts from an image without background and a lattice, and ends with twist, strain and all
+//! errors on every node.
+
+use std::time::Instant;
+
+use moiregauge::geometry::Geometry;
+use moiregauge::image::Image;
+use moiregauge::map::{LatticeMap, Reference, Resolution, TwistStrainMap, local_lattices};
+use moiregauge::material::Material;
+use moiregauge::settings::StrainConvention;
+use moiregauge::simulate::FieldScene;
+use nalgebra::Vector2;
+use realfft::RealFftPlanner;
+use rustfft::num_complex::Complex;
+
+fn main() {
+    println!("side  period  map, s  textbook, s  ratio");
+    for (side, period) in [(2048, 25.0), (2048, 10.0), (4096, 25.0)] {
+        let mut scene = FieldScene::hexagonal([side, side], period, 0.3);
+        scene.white = 0.6;
+        let image = scene.image();
+        let best = |f: &dyn Fn()| {
+            let time = || {
+                let start = Instant::now();
+                f();
+                start.elapsed().as_secs_f64()
+            };
+            (0..3).map(|_| time()).fold(f64::INFINITY, f64::min)
+        };
+        let map = best(&|| map(&scene, &image));
+        let textbook = best(&|| textbook(&image));
+        println!(
+            "{side:4}  {period:6}  {map:6.2}  {textbook:11.2}  {:5.2}",
+            map / textbook
+        );
+    }
+}
+
+fn map(scene: &FieldScene, image: &Image) {
+    // Pixels for which the lattice is that of graphene at 1.14°.
+    let reference = Reference {
+        pair: scene.pair,
+        pitch: [1.0; 2],
+    };
+    let pitch = 12.36 / reference.period();
+    let reference = Reference {
+        pitch: [pitch; 2],
+        ..reference
+    };
+    let geometry =
+        Geometry::of_pitch(scene.size, [pitch; 2], 0.0, Vector2::zeros()).expect("pixels");
+    let waves = local_lattices(image, &reference, &Resolution::default()).expect("a map");
+    let lattices = LatticeMap::new(&waves, &geometry).expect("a geometry");
+    let mean = lattices.mean().expect("good nodes");
+    let convention = StrainConvention::RealSpace;
+    let found = lattices
+        .twist_strain(&mean, &Material::graphene(), convention)
+        .expect("a moiré");
+    std::hint::black_box(TwistStrainMap::new(&lattices, &found));
+}
+
+/// Autocorrelation of the padded image, rows in real transforms, columns in complex ones.
+fn textbook(image: &Image) {
+    let n = 2 * image.columns;
+    let mut planner = RealFftPlanner::<f64>::new();
+    let (forward, backward) = (planner.plan_fft_forward(n), planner.plan_fft_inverse(n));
+    let mut complex = rustfft::FftPlanner::<f64>::new();
+    let (up, down) = (complex.plan_fft_forward(n), complex.plan_fft_inverse(n));
+    let half = n / 2 + 1;
+    // Column by column after a transposition.
+    let mut columns = vec![Complex::default(); half * n];
+    let mut line = vec![0.0; n];
+    let mut spectrum = forward.make_output_vec();
+    for row in 0..image.rows {
+        line.fill(0.0);
+        line[..image.columns].copy_from_slice(image.row(row));
+        forward
+            .process(&mut line, &mut spectrum)
+            .expect("lengths fit");
+        for (column, value) in spectrum.iter().enumerate() {
+            columns[column * n + row] = *value;
+        }
+    }
+    for column in columns.chunks_exact_mut(n) {
+        up.process(column);
+        for value in column.iter_mut() {
+            *value = Complex::new(value.norm_sqr(), 0.0);
+        }
+        down.process(column);
+    }
+    for row in 0..n {
+        for (column, value) in spectrum.iter_mut().enumerate() {
+            *value = columns[column * n + row];
+        }
+        spectrum[0].im = 0.0;
+        spectrum[half - 1].im = 0.0;
+        backward
+            .process(&mut spectrum, &mut line)
+            .expect("lengths fit");
+        std::hint::black_box(&line);
+    }
+}
