@@ -30,7 +30,7 @@ fn twisted(degrees: f64) -> Stacking {
     }
 }
 
-/// Cao et al. 2018, arXiv 1803.02342 and 1802.00553: a full band holds n_s = 4/A, A ≈ √3a²/2θ², a = 0.246 nm;
+/// Cao et al. 2018, arXiv 1803.02342 and 1802.00553: a full band holds `n_s = 4/A`, `A ≈ √3a²/2θ²`, a = 0.246 nm;
 /// 2.7·10¹² per cm² at 1.08°.
 #[test]
 fn carrier_density_of_magic_angle_graphene() {

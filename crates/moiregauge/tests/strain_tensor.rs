@@ -28,7 +28,12 @@ fn biaxial_and_uniaxial_strain_with_an_atomic_image() {
             let found = outcome.tensor();
             // The orientation is good to some hundredths of a degree, so that σ_η = θσ_α is some 10⁻⁵.
             assert!(found.mean().sigma < 1e-4, "{:?}", found.mean());
-            assert!(outcome.atomic.drift.is_some() && outcome.atomic.caveats.is_empty());
+            assert!(outcome.atomic.drift.is_some());
+            assert!(
+                outcome.atomic.caveats.is_empty(),
+                "{:?}",
+                outcome.atomic.caveats
+            );
         }
         assert_true_errors(&all);
     }

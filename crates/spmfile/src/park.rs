@@ -5,7 +5,8 @@
 //!
 //! - Value = gain × (scale × sample + offset), in the unit of the header; a scale of 0 means 1.
 //! - Samples are 16-bit or 32-bit integers or single-precision numbers, bottom line first.
-//! - Lengths are in µm, the angle in degrees, taken as counter-clockwise.
+//! - Lengths are in µm, the angle in degrees is that of the fast
+//!   direction about the positive x-axis (declaration of the header in the manual).
 //! - Where x and y are swapped the lines ran along y: rows are no lines then, and nothing is said
 //!   about their times.
 //! - Files of force curves hold the image on which the curves were placed; it is read.
