@@ -28,12 +28,11 @@ fn biaxial_and_uniaxial_strain_with_an_atomic_image() {
             let found = outcome.tensor();
             // The orientation is good to some hundredths of a degree, so that σ_η = θσ_α is some 10⁻⁵.
             assert!(found.mean().sigma < 1e-4, "{:?}", found.mean());
+            // Frames up and down tell the drift; that they scatter (1/f noise of the lines) may be said.
             assert!(outcome.atomic.drift.is_some());
-            assert!(
-                outcome.atomic.caveats.is_empty(),
-                "{:?}",
-                outcome.atomic.caveats
-            );
+            let codes = outcome.atomic.caveats.iter().map(|c| c.code.as_str());
+            let others: Vec<&str> = codes.filter(|code| *code != "atomic-scatter").collect();
+            assert!(others.is_empty(), "{others:?}");
         }
         assert_true_errors(&all);
     }
