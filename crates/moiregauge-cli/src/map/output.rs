@@ -100,7 +100,7 @@ fn results(made: &Made, method: &str) -> MapResults {
         step_nm: [columns.into(), rows.into()],
         masks: mask_counts(map),
         quantities: quantities(map),
-        whole_image: made.whole.clone(),
+        whole_image: made.whole,
         images: made.images.clone(),
         agreement: made.agreement.map(Into::into),
         drift_change: made.drift_change.map(Into::into),
