@@ -11,6 +11,9 @@ mod tensor_scene;
 use rayon::prelude::*;
 use tensor_scene::{moire, on_hbn, run, truth};
 
+/// Pulls and errors of one set.
+type Outcome = ([f64; 7], [f64; 7]);
+
 fn main() {
     let mut arguments = std::env::args().skip(1);
     let mut number = |default: u64| {
@@ -71,7 +74,7 @@ fn main() {
         let share = |limit: f64| {
             100.0 * results.iter().filter(|(p, _)| p[i].abs() < limit).count() as f64 / n
         };
-        let rms = |values: &dyn Fn(&([f64; 7], [f64; 7])) -> f64| {
+        let rms = |values: &dyn Fn(&Outcome) -> f64| {
             (results.iter().map(|r| values(r).powi(2)).sum::<f64>() / n).sqrt()
         };
         let mean = results.iter().map(|(p, _)| p[i]).sum::<f64>() / n;
