@@ -8,10 +8,10 @@ mod summary;
 
 use std::process::ExitCode;
 
-pub(crate) use args::{AnalyzeArgs, MethodArg};
-pub(crate) use chain::{Outcome, analyse_files, measure_file};
+pub(crate) use args::{AnalyzeArgs, BackgroundArg, LineArg, MethodArg};
+pub(crate) use chain::{Outcome, Reading, analyse_files, measure_file, progress, read};
 pub(crate) use files::write_all;
-pub(crate) use summary::summary;
+pub(crate) use summary::{caveats as caveat_lines, failures, summary};
 
 use crate::info::expand;
 use crate::say::say;

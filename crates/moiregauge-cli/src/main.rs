@@ -1,6 +1,7 @@
 //! The `moiregauge` program: a table of contents.
 
 mod analyze;
+mod calibrate;
 mod config;
 mod convert;
 mod demo;
@@ -28,6 +29,7 @@ struct Cli {
 #[derive(Subcommand)]
 enum Command {
     Analyze(Box<analyze::AnalyzeArgs>),
+    Calibrate(Box<calibrate::CalibrateArgs>),
     Convert(Box<convert::ConvertArgs>),
     Info(info::InfoArgs),
     Simulate(Box<simulate::SimulateArgs>),
@@ -39,6 +41,7 @@ enum Command {
 fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Analyze(args) => analyze::run(&args),
+        Command::Calibrate(args) => calibrate::run(&args),
         Command::Convert(args) => convert::run(&args),
         Command::Info(args) => info::run(&args),
         Command::Simulate(args) => simulate::run(&args),

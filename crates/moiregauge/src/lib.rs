@@ -6,6 +6,7 @@ pub mod analysis;
 pub mod background;
 pub mod bound;
 pub mod budget;
+pub mod calibration;
 pub mod caveat;
 mod chi2;
 pub mod drift;

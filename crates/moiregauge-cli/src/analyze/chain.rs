@@ -94,7 +94,7 @@ pub(crate) fn analyse_files(
     })
 }
 
-fn progress(files: usize, loud: bool) -> ProgressBar {
+pub(crate) fn progress(files: usize, loud: bool) -> ProgressBar {
     if !loud {
         return ProgressBar::hidden();
     }
@@ -133,15 +133,15 @@ pub(crate) fn measure_file(
 }
 
 /// A file as the analysis reads it.
-pub(super) struct Reading {
-    pub(super) scan: Scan,
-    pub(super) input: InputFile,
+pub(crate) struct Reading {
+    pub(crate) scan: Scan,
+    pub(crate) input: InputFile,
     /// What the user's options replaced in it.
-    pub(super) replaced: Vec<String>,
+    pub(crate) replaced: Vec<String>,
 }
 
 /// Reads what the analysis needs of a file: the chosen channel and the position sensors.
-pub(super) fn read(path: &Path, settings: &Settings, known: &Known) -> anyhow::Result<Reading> {
+pub(crate) fn read(path: &Path, settings: &Settings, known: &Known) -> anyhow::Result<Reading> {
     let bytes = std::fs::read(path)?;
     let channels = std::cell::RefCell::new(Vec::new());
     let list = |channel: &ChannelInfo| {

@@ -159,7 +159,7 @@ fn combined_summary(text: &mut String, combined: &Combined) {
 }
 
 /// One line for each caveat, however many files it concerns.
-fn caveats(text: &mut String, all: &[Caveat]) {
+pub(crate) fn caveats(text: &mut String, all: &[Caveat]) {
     let mut by_message: BTreeMap<(&str, &str), Vec<&str>> = BTreeMap::new();
     for caveat in all {
         let places = by_message
@@ -177,7 +177,7 @@ fn caveats(text: &mut String, all: &[Caveat]) {
 }
 
 /// The table of what failed and why; empty if nothing did.
-pub(super) fn failures(failed: &[FailedInput]) -> String {
+pub(crate) fn failures(failed: &[FailedInput]) -> String {
     let mut text = String::new();
     if failed.is_empty() {
         return text;

@@ -6,6 +6,7 @@ use spmfile::{Channel, DateTime, FrameDirection, LineDirection, Scan};
 use super::channel::{choose_channel, stem};
 use super::overlap::Window;
 use super::shared::correlation;
+use crate::calibration::{Calibration, Coordinates};
 use crate::caveat::Caveat;
 use crate::drift::Observation;
 use crate::estimate::Estimate;
@@ -13,13 +14,15 @@ use crate::geometry::{Geometry, SensorGeometry, Timing, from_sensors, mean_and_s
 use crate::image::Image;
 use crate::lattice::reciprocal::labelled_like;
 use crate::lattice::{
-    ForeignWave, Inhomogeneity, LatticeError, LatticeFit, LatticeVectors, MeasuredLattice, measure,
-    vectors,
+    ForeignWave, Inhomogeneity, LatticeError, LatticeFit, LatticeVectors, MeasuredLattice, Start,
+    measure, vectors,
 };
 use crate::settings::{Lines, Settings};
 
 /// A sensor whose span differs from the nominal size by more than this factor is not believed.
 const WILD_SPAN: f64 = 2.0;
+/// Sizes and line rates that differ by more than this factor are other conditions.
+const EXTRAPOLATED: f64 = 3.0;
 /// Fewer periods than this across the shorter side deserve a warning.
 const FEW_PERIODS: f64 = 3.0;
 
@@ -158,12 +161,44 @@ pub fn measure_scan(
     settings: &Settings,
     window: Option<&Window>,
 ) -> Result<MeasuredScan, MeasureError> {
+    let find = |image: &Image, geometry: &Geometry| {
+        measure(image, geometry, settings.background, settings.method)
+    };
+    measure_with(file, scan, settings, window, &find)
+}
+
+/// Measures a scan of a lattice whose cell is known: `cell` is its real-space pair, nm, at any orientation.
+///
+/// # Errors
+/// As [`measure_scan`]; an image that shows another lattice shows none.
+pub fn measure_known(
+    file: &str,
+    scan: &Scan,
+    settings: &Settings,
+    cell: &Matrix2<f64>,
+) -> Result<MeasuredScan, MeasureError> {
+    let find = |image: &Image, geometry: &Geometry| {
+        Start::find_known(image, geometry, settings.background, cell)?.measure(settings.method)
+    };
+    measure_with(file, scan, settings, None, &find)
+}
+
+/// How the lattice of an image is found and measured.
+type Find<'a> = &'a dyn Fn(&Image, &Geometry) -> Result<MeasuredLattice, LatticeError>;
+
+fn measure_with(
+    file: &str,
+    scan: &Scan,
+    settings: &Settings,
+    window: Option<&Window>,
+    find: Find,
+) -> Result<MeasuredScan, MeasureError> {
     let channels = channels(scan, settings)?;
     let mut caveats = Vec::new();
     let mut lines = Vec::new();
     let mut failures = Vec::new();
     for channel in &channels {
-        match measure_line(file, scan, channel, settings, window, &mut caveats) {
+        match measure_line(file, scan, channel, settings, (window, find), &mut caveats) {
             Ok(line) => lines.push(line),
             Err(error) => failures.push(error),
         }
@@ -179,6 +214,7 @@ pub fn measure_scan(
             format!("one line direction could not be used: {error}"),
         ));
     }
+    about_calibration(file, scan, &lines, settings, &mut caveats);
     caveats.dedup_by(|a, b| (&a.code, &a.message) == (&b.code, &b.message));
     Ok(MeasuredScan {
         file: file.to_owned(),
@@ -264,7 +300,7 @@ fn measure_line(
     scan: &Scan,
     channel: &Channel,
     settings: &Settings,
-    window: Option<&Window>,
+    (window, find): (Option<&Window>, Find),
     caveats: &mut Vec<Caveat>,
 ) -> Result<MeasuredLine, MeasureError> {
     let line = channel.line_direction.unwrap_or(LineDirection::Trace);
@@ -287,14 +323,19 @@ fn measure_line(
         geometry = geometry.cropped(first, size);
         nominal = nominal.map(|n| n.cropped(first, size));
     }
-    let lattice =
-        measure(&image, &geometry, settings.background, settings.method).map_err(|error| {
-            MeasureError::Lattice {
-                line: line_name(line),
-                channel: channel.name.clone(),
-                error,
-            }
-        })?;
+    let geometry = calibrated(geometry, settings);
+    let speeds = match (&timing, &settings.scanner) {
+        (Some(timing), Some(_)) => {
+            let now = geometry.speeds(timing);
+            [0, 1].map(|i| speeds[i].scaled(now[i] / speeds[i].value))
+        }
+        _ => speeds,
+    };
+    let lattice = find(&image, &geometry).map_err(|error| MeasureError::Lattice {
+        line: line_name(line),
+        channel: channel.name.clone(),
+        error,
+    })?;
     if lattice.periods < FEW_PERIODS {
         caveats.push(Caveat::new(
             "few-periods",
@@ -318,6 +359,69 @@ fn measure_line(
         speeds,
         speed_error,
     })
+}
+
+/// The geometry corrected by the calibration of the scanner, if there is one.
+pub(super) fn calibrated(geometry: Geometry, settings: &Settings) -> Geometry {
+    let map = settings.scanner.as_ref().and_then(Calibration::map);
+    map.map_or_else(|| geometry.clone(), |map| geometry.mapped(&map))
+}
+
+/// Whether the calibration was measured under the conditions of this scan.
+fn about_calibration(
+    file: &str,
+    scan: &Scan,
+    lines: &[MeasuredLine],
+    settings: &Settings,
+    caveats: &mut Vec<Caveat>,
+) {
+    let Some(scanner) = &settings.scanner else {
+        return;
+    };
+    let from_sensors = scanner.coordinates == Coordinates::Sensors;
+    if lines.iter().any(|l| l.geometry.from_sensors != from_sensors) {
+        let words = |sensors| {
+            if sensors {
+                "position sensors"
+            } else {
+                "nominal coordinates"
+            }
+        };
+        caveats.push(Caveat::new(
+            "calibration-of-other-coordinates",
+            file,
+            format!(
+                "the calibration is one of {}, the scan has {}: it need not hold for them",
+                words(from_sensors),
+                words(!from_sensors)
+            ),
+        ));
+    } else if !from_sensors {
+        caveats.retain(|c| c.code != "no-position-sensors");
+    }
+    let apart = |value: f64, known: Vec<f64>| {
+        let near = |other: &f64| (1.0 / EXTRAPOLATED..=EXTRAPOLATED).contains(&(value / other));
+        !known.is_empty() && !known.iter().any(near)
+    };
+    let sizes = || scanner.sizes_nm.iter().map(|s| s[0]).collect();
+    let rate = scan
+        .line_rate_hz
+        .is_some_and(|hz| apart(hz, scanner.line_rates_hz.clone()));
+    let size = scan.size_nm.is_some_and(|[w, _]| apart(w, sizes()));
+    if rate || size {
+        let what = match (rate, size) {
+            (true, true) => "size and line rate",
+            (true, false) => "line rate",
+            _ => "size",
+        };
+        caveats.push(Caveat::new(
+            "calibration-extrapolated",
+            file,
+            format!(
+                "the {what} of the scan is more than {EXTRAPOLATED} times that of the images that the calibration                  comes from, or less than its {EXTRAPOLATED}th part: hysteresis, creep and lag of a scanner change                  with both, and their change is not in the budget"
+            ),
+        ));
+    }
 }
 
 /// What the fit to the pixels found beside the lattice.

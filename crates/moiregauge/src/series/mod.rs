@@ -3,6 +3,7 @@
 //! [`measure_scan`] does what needs the pixels, one scan at a time; [`analyse`] does the rest from
 //! the few numbers that remain. [`illustrate`] goes back to the pixels of one scan for the figures.
 
+mod calibrate;
 mod channel;
 mod combine;
 mod corrected;
@@ -14,11 +15,12 @@ mod set;
 mod shared;
 mod sightings;
 
+pub use calibrate::{Calibrated, CalibratedSet, CalibrateError, calibrate};
 pub use channel::choose_channel;
 pub use corrected::{CorrectedImage, corrected_images, nominal_geometry, on_grid};
 pub use group::natural_order;
 pub use illustrate::illustrate;
-pub use measure::{MeasureError, MeasuredLine, MeasuredScan, measure_scan};
+pub use measure::{MeasureError, MeasuredLine, MeasuredScan, measure_known, measure_scan};
 pub use overlap::{Window, common_window};
 
 use nalgebra::Matrix2;
