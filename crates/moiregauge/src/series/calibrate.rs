@@ -73,7 +73,7 @@ pub struct CalibratedSet {
     pub estimates: [Estimate; 3],
     /// Orientation of the known cell's first vector, rad.
     pub orientation: Estimate,
-    /// Drift velocity, nm/s, where frames of both directions tell it: value and σ along x and y.
+    /// Drift velocity in true lengths, nm/s, where frames of both directions tell it: value and σ along x and y.
     pub drift: Option<[Estimate; 2]>,
     /// Whether it was used: frames of one direction are not, where there is better.
     pub used: bool,
@@ -108,7 +108,8 @@ struct Seen {
     found: Shown,
     /// Without.
     bare: Shown,
-    drift: Option<[Estimate; 2]>,
+    /// Velocity as it is shown, nm/s, and its covariance.
+    drift: Option<(Vector2<f64>, Matrix2<f64>)>,
     /// The prior of the drift could be applied, or was not needed.
     known: bool,
 }
@@ -171,12 +172,15 @@ pub fn calibrate(
     };
     let covariance_known = sets.iter().filter(|s| used(s)).all(|s| s.known);
     let in_units = Calibration::new(&values, &statistical, coordinates).estimates();
+    let calibration = Calibration {
+        sizes_nm: sizes,
+        line_rates_hz: rates,
+        ..Calibration::new(&values, &covariance, coordinates)
+    };
+    let map = calibration
+        .map()
+        .ok_or_else(|| CalibrateError::Lattice("all sets".to_owned()))?;
     Ok(Calibrated {
-        calibration: Calibration {
-            sizes_nm: sizes,
-            line_rates_hz: rates,
-            ..Calibration::new(&values, &covariance, coordinates)
-        },
         covariance_known,
         statistical: in_units.map(|e| e.sigma),
         chi2,
@@ -185,9 +189,10 @@ pub fn calibrate(
             .into_iter()
             .map(|s| {
                 let used = used(&s);
-                summary(s, coordinates, used)
+                summary(s, &map, coordinates, used)
             })
             .collect(),
+        calibration,
         caveats,
     })
 }
@@ -219,14 +224,11 @@ fn see(
         lattice.covariance *= scale;
         let found = shown(&lattice, cell).ok_or_else(unusable)?;
         about_name(&name, &found, caveats);
-        let sigma = solution.covariance * scale;
         return Ok(Seen {
             lattice,
             bare: found,
             found,
-            drift: Some([0, 1].map(|i| {
-                Estimate::from_variance(solution.velocity[i], sigma[(i, i)])
-            })),
+            drift: Some((solution.velocity, solution.covariance * scale)),
             known: true,
             group,
         });
@@ -301,7 +303,12 @@ fn mean(all: &[&Shown]) -> Option<(Vector3<f64>, Matrix3<f64>, f64)> {
     Some((values, covariance, chi2))
 }
 
-fn summary(seen: Seen, coordinates: Coordinates, used: bool) -> CalibratedSet {
+fn summary(
+    seen: Seen,
+    map: &Matrix2<f64>,
+    coordinates: Coordinates,
+    used: bool,
+) -> CalibratedSet {
     let Seen {
         group,
         lattice,
@@ -317,7 +324,10 @@ fn summary(seen: Seen, coordinates: Coordinates, used: bool) -> CalibratedSet {
         lattice,
         estimates: Calibration::new(&found.values, &found.covariance, coordinates).estimates(),
         orientation: found.orientation,
-        drift,
+        drift: drift.map(|(velocity, covariance)| {
+            let (velocity, covariance) = (map * velocity, map * covariance * map.transpose());
+            [0, 1].map(|i| Estimate::from_variance(velocity[i], covariance[(i, i)]))
+        }),
         used,
     }
 }

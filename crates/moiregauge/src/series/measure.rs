@@ -418,7 +418,9 @@ fn about_calibration(
             "calibration-extrapolated",
             file,
             format!(
-                "the {what} of the scan is more than {EXTRAPOLATED} times that of the images that the calibration                  comes from, or less than its {EXTRAPOLATED}th part: hysteresis, creep and lag of a scanner change                  with both, and their change is not in the budget"
+                "the {what} of the scan differs by more than a factor of {EXTRAPOLATED} from that of the images \
+                 that the calibration comes from: hysteresis, creep and lag of a scanner change with both, and \
+                 their change is not in the budget"
             ),
         ));
     }
