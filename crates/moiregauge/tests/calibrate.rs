@@ -21,8 +21,8 @@ fn atoms(seed: u64) -> Simulation {
     set.sample.sharpness = 0.1;
     set.sample.lattice_angle_deg = 137.5 * seed as f64;
     set.raster.scans = 2;
-    set.raster.pixels = [128; 2];
-    set.raster.nominal_size_nm = [5.0; 2];
+    set.raster.pixels = [96; 2];
+    set.raster.nominal_size_nm = [4.0; 2];
     set.raster.sensors = false;
     // A scanner of its own for every seed, by multiples of irrational numbers.
     let spread = |k: f64| 2.0 * (k * (seed as f64 + 0.5)).fract() - 1.0;
@@ -90,7 +90,7 @@ fn assert_honest(all: &[[f64; 3]], what: &str) {
 /// One pair of frames tells the scanner as well as it says, drift and all.
 #[test]
 fn a_pair_of_frames_tells_the_scanner() {
-    let all: Vec<[f64; 3]> = (0..120_u64)
+    let all: Vec<[f64; 3]> = (0..100_u64)
         .into_par_iter()
         .map(|seed| {
             let set = atoms(seed);
@@ -109,7 +109,7 @@ fn a_pair_of_frames_tells_the_scanner() {
 #[test]
 fn one_frame_does_not_tell_drift_from_gain() {
     let sigma = 0.1;
-    let all: Vec<[f64; 3]> = (0..120_u64)
+    let all: Vec<[f64; 3]> = (0..60_u64)
         .into_par_iter()
         .map(|seed| {
             let mut set = atoms(seed);

@@ -93,14 +93,22 @@ fn candidates(
     let peaks = spectrum_peaks(spectrum);
     let generators = generators(&peaks, spectrum, &to_physical, &wanted);
     let mut found = Vec::new();
+    // |p|² − |q|²: what most pairs have wrong is told by their area.
+    let area = (wanted.determinant() / to_physical.determinant()).abs();
+    let areas = area / MOST_SCALE.powi(2) * (1.0 - MOST_DISTORTION.powi(2))
+        ..=area * MOST_SCALE.powi(2);
     for (i, a) in generators.iter().enumerate() {
         for b in &generators[i + 1..] {
             let pair = Matrix2::from_columns(&[*a, *b]);
+            if !areas.contains(&pair.determinant().abs()) {
+                continue;
+            }
             let Some(change) = shortest_pair(&(to_physical * pair)) else {
                 continue;
             };
             let pair = pair * change;
             if like(&pair)
+                && !known_already(&found, &pair, spectrum)
                 && let Some(candidate) = score(&pair, &peaks, spectrum, Orders(ORDERS))
                 && like(&candidate.pair)
             {
@@ -109,6 +117,18 @@ fn candidates(
         }
     }
     by_score(found, spectrum)
+}
+
+/// Whether a candidate has the same vectors already, before it was refined or after.
+fn known_already(found: &[Candidate], pair: &Matrix2<f64>, spectrum: &Spectrum) -> bool {
+    let frame = frame_cycles(spectrum);
+    let near = |d: &Matrix2<f64>| {
+        let d = frame * d;
+        d.column(0).norm() < SAME && d.column(1).norm() < SAME
+    };
+    found
+        .iter()
+        .any(|c| near(&(c.pair - pair)) || near(&(c.pair + pair)))
 }
 
 /// Wave vectors that may be first harmonics, rad per pixel: those of peaks, and differences of peaks where
