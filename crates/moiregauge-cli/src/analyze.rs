@@ -48,39 +48,50 @@ pub(crate) fn run(args: &AnalyzeArgs) -> anyhow::Result<ExitCode> {
         args.illustrated(),
         loud,
     );
-    let Some(Outcome {
-        analysis,
-        mut provenance,
-    }) = outcome
+    let outcomes = outcome
         .map_err(|failed| eprint!("{}", summary::failures(&failed)))
-        .ok()
-    else {
-        anyhow::bail!("nothing could be analysed");
-    };
-    let written = write_report(&analysis, &provenance, &args.choice())?;
-    write_all(&args.out, &written)?;
-    #[cfg(feature = "parquet")]
-    if args.parquet {
-        let tables = moiregauge_report::parquet_tables(&analysis, &provenance)?;
-        write_all(&args.out, &tables)?;
-    }
-    // Images come last: the numbers are safe by then.
-    let lost = export::write(&args.out, &exports, &analysis, &known);
-    provenance.failed.extend(lost);
-    if args.json {
-        let results = written.iter().find(|(name, _)| name == "results.json");
-        if let Some((_, bytes)) = results {
-            say(&String::from_utf8_lossy(bytes))?;
+        .map_err(|()| anyhow::anyhow!("nothing could be analysed"))?;
+    let folders = files::folders(&args.out, outcomes.len());
+    let mut failed = Vec::new();
+    for (number, (outcome, out)) in outcomes.iter().zip(&folders).enumerate() {
+        let Outcome {
+            analysis,
+            provenance,
+        } = outcome;
+        let written = write_report(analysis, provenance, &args.choice())?;
+        write_all(out, &written)?;
+        #[cfg(feature = "parquet")]
+        if args.parquet {
+            let tables = moiregauge_report::parquet_tables(analysis, provenance)?;
+            write_all(out, &tables)?;
         }
-    } else if !args.quiet {
-        say(&summary(&analysis))?;
-        say(&format!(
-            "\nWritten to {}\n",
-            files::main_file(&args.out, &written).display()
-        ))?;
+        if number == 0 {
+            failed.clone_from(&provenance.failed);
+            // Images are the same for all moirés. They come after the numbers of the first.
+            failed.extend(export::write(&args.out, &exports, analysis, &known));
+        }
+        if args.json {
+            let results = written.iter().find(|(name, _)| name == "results.json");
+            if let Some((_, bytes)) = results {
+                say(&String::from_utf8_lossy(bytes))?;
+            }
+        } else if !args.quiet {
+            if outcomes.len() > 1 {
+                say(&format!(
+                    "\n== moiré {} of {}\n",
+                    number + 1,
+                    outcomes.len()
+                ))?;
+            }
+            say(&summary(analysis))?;
+            say(&format!(
+                "\nWritten to {}\n",
+                files::main_file(out, &written).display()
+            ))?;
+        }
     }
-    eprint!("{}", summary::failures(&provenance.failed));
-    Ok(if provenance.failed.is_empty() {
+    eprint!("{}", summary::failures(&failed));
+    Ok(if failed.is_empty() {
         ExitCode::SUCCESS
     } else {
         ExitCode::FAILURE

@@ -153,7 +153,11 @@ pub(crate) fn run(args: &CalibrateArgs) -> anyhow::Result<ExitCode> {
         }
     }
     eprint!("{}", failures(&failed));
-    ensure!(!scans.is_empty(), "no image shows the lattice of {}", lattice.name);
+    ensure!(
+        !scans.is_empty(),
+        "no image shows the lattice of {}",
+        lattice.name
+    );
     let sigma = args.drift_sigma / 60.0;
     let found = moiregauge::series::calibrate(scans, &lattice, sigma, Grouping::Auto)?;
     if !args.quiet {
@@ -274,7 +278,9 @@ fn parse_lattice(text: &str) -> Result<Cell, String> {
         .parse()
         .map_err(|_| expected.to_owned())?;
     if !(angle_deg > 5.0 && angle_deg < 175.0) {
-        return Err(format!("expected an angle between 5° and 175°, found {angle_deg}°"));
+        return Err(format!(
+            "expected an angle between 5° and 175°, found {angle_deg}°"
+        ));
     }
     Ok(Cell {
         a_nm: parse_length(a)?,
@@ -303,6 +309,9 @@ mod tests {
         assert_eq!(named("Si111-7x7").unwrap().a_nm, 2.688);
         assert_eq!(named("hbn").unwrap().a_nm, 0.2504);
         let error = named("cheese").unwrap_err().to_string();
-        assert!(error.contains("graphite") && error.contains("MoS2"), "{error}");
+        assert!(
+            error.contains("graphite") && error.contains("MoS2"),
+            "{error}"
+        );
     }
 }

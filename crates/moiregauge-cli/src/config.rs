@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use anyhow::{Context as _, bail, ensure};
 use moiregauge::material::Material;
-use moiregauge::settings::Settings;
+use moiregauge::settings::{Method, Settings};
 
 use crate::say::say;
 
@@ -50,6 +50,10 @@ background = "plane"
 #   poisson_ratio_sigma = 0.03
 #   source = "where the numbers come from"
 material = "graphene"
+
+# How many moirés every image shows (a twisted trilayer, twisted graphene on aligned hBN); each is fitted
+# with the others taken off and has results of its own.
+moires = 1
 
 # Form of the strain equation: "real-space" (the stretch acts on atomic positions, positive is
 # tension) or "k-space" (on reciprocal vectors as in arXiv 2406.08681, positive is compression).
@@ -159,6 +163,15 @@ pub(crate) fn check(settings: &Settings) -> anyhow::Result<()> {
         ratio > -1.0 && ratio < 1.0,
         "the Poisson ratio (--poisson-ratio) must lie between −1 and 1, found {ratio}"
     );
+    let moires = settings.moires;
+    ensure!(
+        (1..=6).contains(&moires),
+        "the number of moirés (--moires) must lie between 1 and 6, found {moires}"
+    );
+    ensure!(
+        moires == 1 || settings.method == Method::Lattice,
+        "several moirés (--moires {moires}) can be measured by --method lattice only"
+    );
     let clock = settings.frame_time_sigma_s;
     ensure!(
         clock >= 0.0 && clock.is_finite(),
@@ -217,7 +230,10 @@ mod tests {
 
     #[test]
     fn the_commented_file_holds_the_defaults() {
-        assert_eq!(parse(COMMENTED, Path::new("")).unwrap(), Settings::default());
+        assert_eq!(
+            parse(COMMENTED, Path::new("")).unwrap(),
+            Settings::default()
+        );
     }
 
     #[test]
@@ -228,7 +244,9 @@ mod tests {
                 .to_string()
                 .contains("metod")
         );
-        let error = parse("material = \"unobtainium\"", Path::new("")).unwrap_err().to_string();
+        let error = parse("material = \"unobtainium\"", Path::new(""))
+            .unwrap_err()
+            .to_string();
         assert!(error.contains("graphene"), "{error}");
     }
 }

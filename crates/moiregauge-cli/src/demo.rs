@@ -44,17 +44,18 @@ pub(crate) fn run(args: &DemoArgs) -> anyhow::Result<ExitCode> {
         seed: args.seed,
         ..Settings::default()
     };
-    let Ok(Outcome {
-        analysis,
-        provenance,
-    }) = analyse_files(
+    let analysed = analyse_files(
         &inputs,
         &[],
         (&settings, &Known::default()),
         Vec::new(),
         true,
         true,
-    )
+    );
+    let Some(Outcome {
+        analysis,
+        provenance,
+    }) = analysed.ok().and_then(|mut moires| moires.pop())
     else {
         anyhow::bail!("the simulated scans could not be analysed");
     };

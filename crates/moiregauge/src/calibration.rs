@@ -206,7 +206,11 @@ impl Calibration {
     /// What is wrong with the numbers; `None` where they make sense.
     pub fn problem(&self) -> Option<String> {
         let covariance = self.parameter_covariance();
-        let finite = self.values().iter().chain(covariance.iter()).all(|v| v.is_finite());
+        let finite = self
+            .values()
+            .iter()
+            .chain(covariance.iter())
+            .all(|v| v.is_finite());
         if !finite {
             return Some("expected finite numbers".to_owned());
         }
@@ -220,9 +224,8 @@ impl Calibration {
         }
         let symmetric = (covariance - covariance.transpose()).amax() <= 1e-9 * covariance.amax();
         let least = covariance.symmetric_eigenvalues().min();
-        (!symmetric || least < -1e-9 * covariance.amax()).then(|| {
-            "expected a covariance that is symmetric and not negative".to_owned()
-        })
+        (!symmetric || least < -1e-9 * covariance.amax())
+            .then(|| "expected a covariance that is symmetric and not negative".to_owned())
     }
 
     /// Gain, mismatch (per cent) and deviation from a right angle (mrad) with their σ.
@@ -240,9 +243,8 @@ impl Calibration {
     pub(crate) fn independent_errors(&self) -> [Matrix2<f64>; 3] {
         let lower = root(&self.parameter_covariance());
         let parts = distortions();
-        [0, 1, 2].map(|k| {
-            parts[0] * lower[(0, k)] + parts[1] * lower[(1, k)] + parts[2] * lower[(2, k)]
-        })
+        [0, 1, 2]
+            .map(|k| parts[0] * lower[(0, k)] + parts[1] * lower[(1, k)] + parts[2] * lower[(2, k)])
     }
 }
 

@@ -126,6 +126,8 @@ pub struct Settings {
     pub background: Background,
     /// The layers.
     pub material: Material,
+    /// How many moirés every image shows; each is fitted with the others taken off.
+    pub moires: usize,
     /// Form of the strain equation.
     pub strain_convention: StrainConvention,
     /// How files become sets.
@@ -168,6 +170,7 @@ impl Default for Settings {
             method: Method::Lattice,
             background: Background::Plane,
             material: Material::graphene(),
+            moires: 1,
             strain_convention: StrainConvention::RealSpace,
             grouping: Grouping::Auto,
             frame_time_sigma_s: 0.6,

@@ -26,7 +26,10 @@ fn atoms(seed: u64) -> Simulation {
     set.raster.sensors = false;
     // A scanner of its own for every seed, by multiples of irrational numbers.
     let spread = |k: f64| 2.0 * (k * (seed as f64 + 0.5)).fract() - 1.0;
-    set.window.gain = [1.0 + 0.04 * spread(0.618_034), 1.0 + 0.04 * spread(0.414_214)];
+    set.window.gain = [
+        1.0 + 0.04 * spread(0.618_034),
+        1.0 + 0.04 * spread(0.414_214),
+    ];
     set.window.shear_mrad = 15.0 * spread(0.732_051);
     set.drift.velocity_nm_per_min = [0.3 * spread(0.236_068), 0.3 * spread(0.141_593)];
     set
@@ -55,7 +58,9 @@ fn calibrated(set: &Simulation, drift_sigma_nm_per_min: f64) -> Calibrated {
 fn truth(set: &Simulation) -> [f64; 3] {
     let [x, y] = set.window.gain;
     let (sine, cosine) = (set.window.shear_mrad / 1000.0).sin_cos();
-    let inverse = Matrix2::new(x, y * sine, 0.0, y * cosine).try_inverse().unwrap();
+    let inverse = Matrix2::new(x, y * sine, 0.0, y * cosine)
+        .try_inverse()
+        .unwrap();
     let square = inverse * inverse.transpose();
     let det = square.determinant().sqrt();
     let f = (square + Matrix2::identity() * det) / (square.trace() + 2.0 * det).sqrt();
@@ -78,10 +83,16 @@ fn assert_honest(all: &[[f64; 3]], what: &str) {
     for i in 0..3 {
         let square = all.iter().map(|p| p[i] * p[i]).sum::<f64>() / n;
         let tolerance = 4.0 * (2.0 / n).sqrt();
-        assert!((square - 1.0).abs() < tolerance, "{what} {i}: mean square pull {square}");
+        assert!(
+            (square - 1.0).abs() < tolerance,
+            "{what} {i}: mean square pull {square}"
+        );
         let within = all.iter().filter(|p| p[i].abs() < 1.0).count() as f64 / n;
         let tolerance = 4.0 * (0.683 * 0.317 / n).sqrt();
-        assert!((within - 0.683).abs() < tolerance, "{what} {i}: {within} within 1 σ");
+        assert!(
+            (within - 0.683).abs() < tolerance,
+            "{what} {i}: {within} within 1 σ"
+        );
         let farthest = all.iter().map(|p| p[i].abs()).fold(0.0, f64::max);
         assert!(farthest < 4.0, "{what} {i}: {farthest} σ");
     }
@@ -121,7 +132,12 @@ fn one_frame_does_not_tell_drift_from_gain() {
             set.drift.velocity_nm_per_min = [radius * cosine, radius * sine];
             let found = calibrated(&set, sigma);
             assert!(found.sets[0].drift.is_none());
-            assert!(found.caveats.iter().any(|c| c.code == "drift-not-separated"));
+            assert!(
+                found
+                    .caveats
+                    .iter()
+                    .any(|c| c.code == "drift-not-separated")
+            );
             assert!(found.calibration.estimates()[1].sigma > 10.0 * found.statistical[1]);
             pulls(&found.calibration, truth(&set))
         })
@@ -172,7 +188,10 @@ fn a_calibration_takes_the_scanner_out_of_twist_and_strain() {
     };
     let (without, priors, codes) = mean(None);
     // θ s and θ g/(1 + ν), with s = −0.9 % and g = 4.2 %.
-    assert!((without[0].abs() / 0.0102 - 1.0).abs() < 0.15, "{without:?}");
+    assert!(
+        (without[0].abs() / 0.0102 - 1.0).abs() < 0.15,
+        "{without:?}"
+    );
     let size = without[1].hypot(without[2]);
     let expected = 100.0 * 1.13_f64.to_radians() * 0.0428_f64.hypot(0.006) / 1.16;
     assert!((size / expected - 1.0).abs() < 0.05, "{size} {expected}");
@@ -181,19 +200,33 @@ fn a_calibration_takes_the_scanner_out_of_twist_and_strain() {
     let (with, budget, codes) = mean(Some(&calibration));
     let statistical = budget.statistical.whole();
     assert!(statistical.iter().all(|v| v.is_finite()));
-    let sigma = budget.sum(|s| s.is_statistical() || calibrates(s)).covariance;
+    let sigma = budget
+        .sum(|s| s.is_statistical() || calibrates(s))
+        .covariance;
     // A rotation of the scanner is not known: it turns the strain by no more than the shear, 6 mrad.
     let turned = 0.12 * 0.006;
-    assert!(with[0].abs() < 3.0 * sigma[(0, 0)].sqrt().to_degrees(), "{with:?}");
+    assert!(
+        with[0].abs() < 3.0 * sigma[(0, 0)].sqrt().to_degrees(),
+        "{with:?}"
+    );
     for i in [1, 2] {
         let limit = 3.0 * 100.0 * sigma[(i + 1, i + 1)].sqrt() + turned;
         assert!(with[i].abs() < limit, "{with:?} {limit}");
     }
-    assert!(codes.iter().all(|c| c != "no-position-sensors"), "{codes:?}");
-    assert!(codes.iter().any(|c| c == "calibration-extrapolated"), "{codes:?}");
+    assert!(
+        codes.iter().all(|c| c != "no-position-sensors"),
+        "{codes:?}"
+    );
+    assert!(
+        codes.iter().any(|c| c == "calibration-extrapolated"),
+        "{codes:?}"
+    );
     for source in [Source::Gain, Source::Mismatch, Source::Orthogonality] {
         let (before, after) = (priors.of(source).wavelengths, budget.of(source).wavelengths);
-        assert!(after[0] > 0.0 && after[0] < 0.1 * before[0], "{source:?} {after:?} {before:?}");
+        assert!(
+            after[0] > 0.0 && after[0] < 0.1 * before[0],
+            "{source:?} {after:?} {before:?}"
+        );
     }
     // Of an error that gain and mismatch share, only what the map makes of it counts: dL = −F⁻¹ dF L.
     let mut along_x = calibration.clone();

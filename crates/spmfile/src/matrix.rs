@@ -8,6 +8,8 @@
 //! Marks of blocks (four letters, read backwards): Gwyddion's `omicronmatrix.c`. No file to test
 //! with is at hand.
 
+use memchr::memmem;
+
 use crate::ChannelInfo;
 use crate::cursor::{Cursor, Endian};
 use crate::error::ReadError;
@@ -54,7 +56,7 @@ pub(crate) fn read(
 /// Samples recorded and intended.
 fn recorded(bytes: &[u8]) -> Option<(u32, u32)> {
     let head = &bytes[..bytes.len().min(4096)];
-    let place = head.windows(4).position(|w| w == DESCRIPTION)?;
+    let place = memmem::find(head, DESCRIPTION)?;
     // Length of the block, twenty bytes of no known use, then the numbers.
     let mut cursor = Cursor::new(bytes, Endian::Little).at(place + 8 + 20);
     let (intended, recorded) = (cursor.u32().ok()?, cursor.u32().ok()?);

@@ -15,6 +15,8 @@
 //!   the time of saving, the name agrees with the sum to the second).
 //! - Lines that were not recorded are NaN.
 
+use memchr::memmem;
+
 use crate::ChannelInfo;
 use crate::clock;
 use crate::cursor::Endian;
@@ -88,7 +90,7 @@ pub(crate) fn read(bytes: &[u8], wanted: &dyn Fn(&ChannelInfo) -> bool) -> Resul
 fn header(bytes: &[u8]) -> Result<(String, usize), ReadError> {
     let find = |needle: &[u8], from: usize| {
         let rest = bytes.get(from..)?;
-        let place = rest.windows(needle.len()).position(|w| w == needle)?;
+        let place = memmem::find(rest, needle)?;
         Some(from + place)
     };
     let cut_off = |what: &str| {

@@ -13,6 +13,8 @@
 
 use std::collections::BTreeMap;
 
+use memchr::memmem;
+
 use crate::ChannelInfo;
 use crate::clock;
 use crate::cursor::Endian;
@@ -59,16 +61,13 @@ fn get<'a>(lines: &'a [(String, String)], key: &str) -> Option<&'a str> {
 
 /// Reads the channels that are wanted.
 pub(crate) fn read(bytes: &[u8], wanted: &dyn Fn(&ChannelInfo) -> bool) -> Result<Scan, ReadError> {
-    let end = bytes
-        .windows(DATA_MARK.len())
-        .position(|w| w == DATA_MARK)
-        .ok_or_else(|| {
-            damaged(format!(
-                "expected the mark #! behind the header, found none in {} bytes: the file was cut \
+    let end = memmem::find(bytes, DATA_MARK).ok_or_else(|| {
+        damaged(format!(
+            "expected the mark #! behind the header, found none in {} bytes: the file was cut \
                  off inside the header",
-                bytes.len()
-            ))
-        })?;
+            bytes.len()
+        ))
+    })?;
     let header = header(&bytes[..end]);
     let names = listed(&header)?;
     let mut scan = frame(&header);

@@ -13,6 +13,8 @@
 //! - `X scanning direction` and `Y scanning direction` are those of the acquisition, `Forward` or
 //!   `Backward`, `Up` or `Down`; the samples are in order of position all the same.
 
+use memchr::memmem;
+
 use crate::ChannelInfo;
 use crate::clock;
 use crate::cursor::Endian;
@@ -34,15 +36,12 @@ fn damaged(reason: impl Into<String>) -> ReadError {
 
 /// Reads the channel if it is wanted.
 pub(crate) fn read(bytes: &[u8], wanted: &dyn Fn(&ChannelInfo) -> bool) -> Result<Scan, ReadError> {
-    let end = bytes
-        .windows(END.len())
-        .position(|window| window == END)
-        .ok_or_else(|| {
-            damaged(format!(
-                "expected [Header end], found none in {} bytes: the file was cut off inside the header",
-                bytes.len()
-            ))
-        });
+    let end = memmem::find(bytes, END).ok_or_else(|| {
+        damaged(format!(
+            "expected [Header end], found none in {} bytes: the file was cut off inside the header",
+            bytes.len()
+        ))
+    });
     let head = &bytes[..end.as_ref().copied().unwrap_or(bytes.len().min(4096))];
     let text = units::decode(head);
     // Before the header's end: tables of numbers have none.

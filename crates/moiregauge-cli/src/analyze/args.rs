@@ -103,6 +103,10 @@ pub(crate) struct AnalyzeArgs {
     /// Standard uncertainty of the frame times in the files, s [default: 0.6]
     #[arg(long, value_name = "S")]
     frame_time_sigma: Option<f64>,
+    /// How many moirés every image shows; each is fitted with the others taken off, and has a folder of
+    /// results of its own [default: 1]
+    #[arg(long, value_name = "N")]
+    moires: Option<usize>,
     /// Use only the region that all scans have in common
     #[arg(long)]
     overlap: bool,
@@ -226,6 +230,7 @@ impl AnalyzeArgs {
         s.background = self.background.map_or(s.background, Into::into);
         s.grouping = self.grouping.map_or(s.grouping, Into::into);
         s.overlap |= self.overlap;
+        s.moires = self.moires.unwrap_or(s.moires);
         s.exclude.extend(self.exclude.iter().cloned());
         s.exclude_outliers |= self.exclude_outliers;
         s.frame_time_sigma_s = self.frame_time_sigma.unwrap_or(s.frame_time_sigma_s);

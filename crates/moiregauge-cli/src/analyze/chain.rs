@@ -7,7 +7,8 @@ use indicatif::{ProgressBar, ProgressStyle};
 use moiregauge::analysis::Analysis;
 use moiregauge::caveat::Caveat;
 use moiregauge::series::{
-    MeasuredScan, Window, analyse, choose_channel, common_window, illustrate, measure_scan,
+    MeasuredScan, Window, analyse, choose_channel, common_window, illustrate, measure_moires,
+    sorted_moires,
 };
 use moiregauge::settings::Settings;
 use moiregauge_report::{FailedInput, InputFile, Provenance};
@@ -24,7 +25,7 @@ pub(crate) struct Outcome {
     pub(crate) provenance: Provenance,
 }
 
-/// Analyses files; the failed ones among them join `failed`.
+/// Analyses files, every moiré that they show by itself; the failed ones among them join `failed`.
 ///
 /// # Errors
 /// All failures, where nothing could be analysed.
@@ -35,7 +36,7 @@ pub(crate) fn analyse_files(
     mut failed: Vec<FailedInput>,
     illustrated: bool,
     loud: bool,
-) -> Result<Outcome, Vec<FailedInput>> {
+) -> Result<Vec<Outcome>, Vec<FailedInput>> {
     let window = match settings.overlap.then(|| overlap(inputs, settings, known)) {
         None => None,
         Some(Some(window)) => Some(window),
@@ -60,8 +61,8 @@ pub(crate) fn analyse_files(
     let (mut scans, mut files) = (Vec::new(), Vec::new());
     for (path, result) in inputs.iter().zip(measured) {
         match result {
-            Ok((scan, file)) => {
-                scans.push(scan);
+            Ok((moires, file)) => {
+                scans.push(moires);
                 files.push(file);
             }
             Err(error) => failed.push(FailedInput {
@@ -73,25 +74,28 @@ pub(crate) fn analyse_files(
     if scans.is_empty() {
         return Err(failed);
     }
-    let mut analysis = analyse(scans, settings);
-    if illustrated {
-        analysis.sets.par_iter_mut().for_each(|set| {
-            set.illustration = set.scans.first().and_then(|first| {
-                let reading = read(Path::new(&first.file), settings, known).ok()?;
-                illustrate(&reading.scan, first, settings)
-            });
-        });
-    }
     let provenance = Provenance {
         version: env!("CARGO_PKG_VERSION").to_owned(),
         seed: settings.seed,
         inputs: files,
         failed,
     };
-    Ok(Outcome {
-        analysis,
-        provenance,
-    })
+    let outcomes = sorted_moires(scans).into_iter().map(|scans| {
+        let mut analysis = analyse(scans, settings);
+        if illustrated {
+            analysis.sets.par_iter_mut().for_each(|set| {
+                set.illustration = set.scans.first().and_then(|first| {
+                    let reading = read(Path::new(&first.file), settings, known).ok()?;
+                    illustrate(&reading.scan, first, settings)
+                });
+            });
+        }
+        Outcome {
+            analysis,
+            provenance: provenance.clone(),
+        }
+    });
+    Ok(outcomes.collect())
 }
 
 pub(crate) fn progress(files: usize, loud: bool) -> ProgressBar {
@@ -107,29 +111,31 @@ pub(crate) fn progress(files: usize, loud: bool) -> ProgressBar {
     }
 }
 
-/// One file: its lattice and what identifies it.
+/// One file: its moirés and what identifies it.
 pub(crate) fn measure_file(
     path: &Path,
     sets: &[NamedSet],
     (settings, known): (&Settings, &Known),
     window: Option<&Window>,
-) -> anyhow::Result<(MeasuredScan, InputFile)> {
+) -> anyhow::Result<(Vec<MeasuredScan>, InputFile)> {
     let Reading {
         scan,
         input,
         replaced,
     } = read(path, settings, known)?;
-    let mut measured = measure_scan(&input.file, &scan, settings, window)?;
-    for words in replaced {
-        measured
-            .caveats
-            .push(Caveat::new("given-by-user", input.file.as_str(), words));
-    }
-    measured.set = sets
+    let mut moires = measure_moires(&input.file, &scan, settings, window)?;
+    let set = sets
         .iter()
         .find(|(_, of)| path.starts_with(of))
         .map(|(name, _)| name.clone());
-    Ok((measured, input))
+    for measured in &mut moires {
+        let given = replaced
+            .iter()
+            .map(|words| Caveat::new("given-by-user", input.file.as_str(), words.clone()));
+        measured.caveats.extend(given);
+        measured.set.clone_from(&set);
+    }
+    Ok((moires, input))
 }
 
 /// A file as the analysis reads it.

@@ -12,11 +12,24 @@ pub(super) fn refuse_overwriting(out: &Path, force: bool) -> anyhow::Result<()> 
         out.display()
     );
     ensure!(
-        force || !out.join("results.json").exists(),
+        force
+            || !["", "moire-1"]
+                .iter()
+                .any(|of| out.join(of).join("results.json").exists()),
         "{} already holds results; give another --out, or --force to write over them",
         out.display()
     );
     Ok(())
+}
+
+/// Where the results of each of `moires` moirés go.
+pub(super) fn folders(out: &Path, moires: usize) -> Vec<PathBuf> {
+    if moires == 1 {
+        return vec![out.to_owned()];
+    }
+    (1..=moires)
+        .map(|n| out.join(format!("moire-{n}")))
+        .collect()
 }
 
 /// Writes named files into a folder.

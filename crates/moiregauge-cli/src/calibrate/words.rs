@@ -28,7 +28,11 @@ pub(super) fn summary(found: &Calibrated, lattice: &KnownLattice) -> String {
         Coordinates::Nominal => "nominal coordinates",
     };
     let sets = found.sets.iter().filter(|s| s.used).count();
-    let of = if sets == 1 { "1 set".to_owned() } else { format!("{sets} sets") };
+    let of = if sets == 1 {
+        "1 set".to_owned()
+    } else {
+        format!("{sets} sets")
+    };
     let all = found.calibration.estimates();
     let unknown = |e: Estimate| {
         if found.covariance_known {
@@ -41,9 +45,27 @@ pub(super) fn summary(found: &Calibrated, lattice: &KnownLattice) -> String {
     let noise = found.statistical.map(two_digits);
     let _ = writeln!(text, "calibration of the {coordinates}, {of}");
     let rows = [
-        ("gain", gain, "%", &noise[0], "lengths are shown too long by this, mean of x and y"),
-        ("mismatch", mismatch, "%", &noise[1], "along x by this much more than along y"),
-        ("orthogonality", right, "mrad", &noise[2], "the axes shown enclose a right angle less this"),
+        (
+            "gain",
+            gain,
+            "%",
+            &noise[0],
+            "lengths are shown too long by this, mean of x and y",
+        ),
+        (
+            "mismatch",
+            mismatch,
+            "%",
+            &noise[1],
+            "along x by this much more than along y",
+        ),
+        (
+            "orthogonality",
+            right,
+            "mrad",
+            &noise[2],
+            "the axes shown enclose a right angle less this",
+        ),
     ];
     for (name, value, unit, noise, words) in rows {
         let _ = writeln!(

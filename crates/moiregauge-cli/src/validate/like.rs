@@ -26,9 +26,9 @@ pub(super) fn conditions(paths: &[PathBuf]) -> anyhow::Result<Simulation> {
     let mut scans = Vec::new();
     for path in expand(paths) {
         let path = path.map_err(|(path, error)| anyhow::anyhow!("{}: {error}", path.display()))?;
-        let (scan, _) = measure_file(&path, &[], (&settings, &Known::default()), None)
+        let (mut moires, _) = measure_file(&path, &[], (&settings, &Known::default()), None)
             .with_context(|| format!("{}", path.display()))?;
-        scans.push(scan);
+        scans.push(moires.swap_remove(0));
     }
     let analysis = analyse(scans.clone(), &settings);
     let [set] = analysis.sets.as_slice() else {

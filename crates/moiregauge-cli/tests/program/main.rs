@@ -7,4 +7,5 @@ mod refusals;
 mod results;
 mod round_trip;
 mod same_bytes;
+mod several;
 mod validation;

@@ -76,7 +76,10 @@ fn oblique_cells_and_their_mirror_images() {
             covariance: Matrix4::zeros(),
         };
         let values = shown(&lattice, &cell).unwrap().values;
-        assert!((values - Vector3::new(0.01, 0.03, -0.008)).norm() < 1e-12, "{values}");
+        assert!(
+            (values - Vector3::new(0.01, 0.03, -0.008)).norm() < 1e-12,
+            "{values}"
+        );
     }
 }
 
@@ -128,7 +131,10 @@ fn errors_are_split_without_loss() {
         assert!((sum - one.parameter_covariance()).norm() < 1e-15, "{sum}");
         assert!((parts[1].m11, parts[2].m12) == (0.5, 0.5));
     }
-    let plain = calibration([0.0; 3], [[1.0, 0.0, 0.0], [0.0, 0.25, 0.0], [0.0, 0.0, 25.0]]);
+    let plain = calibration(
+        [0.0; 3],
+        [[1.0, 0.0, 0.0], [0.0, 0.25, 0.0], [0.0, 0.0, 25.0]],
+    );
     let errors = plain.independent_errors();
     assert!((errors[0] - Matrix2::identity() * 0.01).norm() < 1e-15);
     assert!((errors[1] - Matrix2::new(0.0025, 0.0, 0.0, -0.0025)).norm() < 1e-15);

@@ -11,7 +11,8 @@ use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
 use rand::RngExt as _;
 
 use super::evaluate::{Linearised, linearise};
-use super::solve::{JointFit, instability, inverse, solved};
+use super::instability::instability;
+use super::solve::{JointFit, inverse, solved};
 use crate::rng::stream;
 
 /// Directions in which a scan alone determines a parameter have a residual of zero: below this share

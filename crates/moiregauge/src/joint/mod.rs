@@ -17,7 +17,9 @@
 //! Units nm, s, rad. Reciprocal pairs stand at 60°: harmonics K₁, K₂, K₂ − K₁.
 
 mod checks;
+mod choose;
 mod evaluate;
+mod instability;
 mod link;
 mod parts;
 mod solve;

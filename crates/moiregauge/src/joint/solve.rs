@@ -3,10 +3,10 @@
 
 use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
 
-use super::evaluate::{DRIFT, Layout, Linearised, linearise, wrapped};
+use super::evaluate::{DRIFT, Layout, linearise, wrapped};
 use super::link::number_blocks;
-use super::{Sighting, Terms};
-use crate::chi2::{enlargement, is_significant};
+use super::{Sighting, Terms, choose};
+use crate::chi2::enlargement;
 use crate::estimate::Estimate;
 use crate::lattice::{LatticeVectors, Phases};
 
@@ -18,10 +18,6 @@ const ROUNDS: usize = 5;
 const DAMPING: f64 = 1e-10;
 /// Phases are believed to be linked if they scatter by less than this share of a wavelength.
 const LINKED: f64 = 0.08;
-/// Settling times that are tried, as shares of the duration of the campaign.
-const SETTLING: [f64; 5] = [0.05, 0.1, 0.2, 0.4, 0.8];
-/// Fewer scans than this cannot tell an exponential from a parabola.
-const FEWEST_SETTLING: usize = 6;
 /// A drift velocity worse than this (condition number of the scaled normal matrix, squared design) is
 /// not determined.
 const WORST_CONDITION: f64 = 1e4;
@@ -56,7 +52,7 @@ pub struct JointFit {
     /// Covariance of `solution`, as the errors of the sightings make it.
     pub(super) unscaled: DMatrix<f64>,
     /// The same, enlarged where the scans scatter more.
-    covariance: DMatrix<f64>,
+    pub(super) covariance: DMatrix<f64>,
 }
 
 /// A term that was tried.
@@ -133,138 +129,18 @@ pub fn fit(
         });
         best = linked.unwrap_or(best);
     }
-    let times = || sightings.iter().map(|s| s.time);
-    let duration =
-        times().fold(f64::NEG_INFINITY, f64::max) - times().fold(f64::INFINITY, f64::min);
-    let scans = 1 + sightings.iter().map(|s| s.scan).max().unwrap_or(0);
-    let base = Terms {
-        acceleration: false,
-        ..best.terms
-    };
-    let changing = [Terms {
-        acceleration: true,
-        ..base
-    }]
-    .into_iter()
-    .chain(
-        SETTLING
-            .into_iter()
-            .filter(|_| scans >= FEWEST_SETTLING)
-            .map(|share| Terms {
-                settling: Some(share * duration),
-                ..base
-            }),
-    );
-    let mut choice = Choice::new(&problem, best, base);
-    choice.offer(changing);
-    let classes = sightings.iter().map(|s| s.class).max().unwrap_or(0);
-    if classes > 1 {
-        let gain = Terms {
-            fast_gain: true,
-            ..choice.best.terms
-        };
-        choice.offer([gain].into_iter());
-    }
-    // The scatter that is left with the chosen terms is the instability.
-    let Choice { best, tested, .. } = choice;
-    let from = (&best.waves.basis.clone(), &best.velocity.clone());
-    let last = problem.solve(best.terms, from, None).unwrap_or(best);
-    let has = |name| match name {
-        ACCELERATION => last.terms.acceleration,
-        EXPONENTIAL => last.terms.settling.is_some(),
-        _ => last.terms.fast_gain,
-    };
-    let tested = tested
-        .into_iter()
-        .map(|(name, gain)| TestedTerm {
-            name,
-            gain,
-            used: has(name),
-        })
-        .collect();
-    Some(JointFit { tested, ..last })
-}
-
-const ACCELERATION: &str = "acceleration";
-const EXPONENTIAL: &str = "settling";
-const FAST_GAIN: &str = "fast-axis gain";
-
-/// Terms that are offered one after the other; all are compared with the weights of the first fit.
-struct Choice<'a> {
-    problem: &'a Problem,
-    best: JointFit,
-    instability: f64,
-    lowest: f64,
-    tested: Vec<(&'static str, f64)>,
-}
-
-impl<'a> Choice<'a> {
-    fn new(problem: &'a Problem, best: JointFit, base: Terms) -> Self {
-        let instability = best.instability_nm;
-        let start = (&best.waves.basis.clone(), &best.velocity.clone());
-        let plain = problem.solve(base, start, Some(instability));
-        // Where only a changing drift can be linked there is nothing simpler to compare with.
-        let (best, lowest) = match plain {
-            Some(fit) => (fit.clone(), criterion(&fit)),
-            None => (best, f64::INFINITY),
-        };
-        Self {
-            problem,
-            best,
-            instability,
-            lowest,
-            tested: Vec::new(),
-        }
-    }
-
-    fn offer(&mut self, candidates: impl Iterator<Item = Terms>) {
-        let before = self.lowest;
-        let from = (&self.best.waves.basis.clone(), &self.best.velocity.clone());
-        for terms in candidates {
-            let Some(fit) = self.problem.solve(terms, from, Some(self.instability)) else {
-                continue;
-            };
-            let name = if terms.fast_gain {
-                FAST_GAIN
-            } else if terms.acceleration {
-                ACCELERATION
-            } else {
-                EXPONENTIAL
-            };
-            let value = criterion(&fit);
-            let gain = if before.is_finite() {
-                before - value
-            } else {
-                f64::NAN
-            };
-            match self.tested.iter_mut().find(|(known, _)| *known == name) {
-                Some((_, best)) => *best = best.max(gain),
-                None => self.tested.push((name, gain)),
-            }
-            if value < self.lowest {
-                self.lowest = value;
-                self.best = fit;
-            }
-        }
-    }
-}
-
-/// Bayesian information criterion for given weights. A settling time is a parameter as well.
-fn criterion(fit: &JointFit) -> f64 {
-    let n = (fit.degrees_of_freedom + fit.layout.size) as f64;
-    let parameters = fit.layout.count() + usize::from(fit.terms.settling.is_some());
-    fit.chi2 + parameters as f64 * n.ln()
+    Some(choose::terms(&problem, best))
 }
 
 /// What is fitted.
-struct Problem {
-    sightings: Vec<Sighting>,
+pub(super) struct Problem {
+    pub(super) sightings: Vec<Sighting>,
     time_sigma: f64,
 }
 
 impl Problem {
     /// Solves for one choice of terms. Without a given instability it is estimated from the phases.
-    fn solve(
+    pub(super) fn solve(
         &self,
         terms: Terms,
         start: (&Matrix2<f64>, &Vector2<f64>),
@@ -285,7 +161,7 @@ impl Problem {
             for _ in 0..ROUNDS {
                 let now = linearise(sightings, &layout, &x, f64::INFINITY, instability);
                 let scatter = instability * instability;
-                instability = self::instability(&now, &unscaled, scatter, &|_| true);
+                instability = super::instability::instability(&now, &unscaled, scatter, &|_| true);
                 unscaled = iterate(sightings, &layout, &mut x, f64::INFINITY, instability)?;
             }
         }
@@ -444,61 +320,6 @@ fn iterate(
         }
     }
     covariance
-}
-
-/// The position scatter s that makes the phases of the wanted rows fit: `Σ δᵀ(P + s²)⁻¹ δ` of the displacements
-/// δ that they show, with covariance P, becomes the number of components less what the fit has taken up (Paule
-/// and Mandel 1982, J. Res. NBS 87, 377). Zero where the noise alone explains them: where chance makes as much in
-/// more than 5 % of cases, as with all enlarged errors. `scatter` is the s² (nm²) that `now` and `covariance` were
-/// made with.
-pub(super) fn instability(
-    now: &Linearised,
-    covariance: &DMatrix<f64>,
-    scatter: f64,
-    wanted: &dyn Fn(usize) -> bool,
-) -> f64 {
-    let mut freedom = 0.0;
-    let mut displacements = Vec::new();
-    for phases in now.phases.iter().filter(|p| wanted(p.row)) {
-        let known = phases.displacement().zip(phases.factor(scatter));
-        let Some((displacement, lower)) = known else {
-            continue;
-        };
-        let Some(plane) = lower.solve_lower_triangular(&phases.waves) else {
-            continue;
-        };
-        // What of the two displacements, whitened, is left free by the fit.
-        for unit in plane.qr().q().column_iter() {
-            let rows = now.jacobian[phases.row..phases.row + 3].iter();
-            let seen: DVector<f64> = rows.zip(&unit).map(|(row, u)| row * *u).sum();
-            freedom += 1.0 - seen.dot(&(covariance * &seen));
-        }
-        displacements.push(displacement);
-    }
-    let excess = |variance: f64| {
-        let squares = displacements.iter().filter_map(|(shift, noise)| {
-            let whole = noise + Matrix2::identity() * variance;
-            Some(shift.dot(&(whole.try_inverse()? * shift)))
-        });
-        squares.sum::<f64>() - freedom
-    };
-    let chi2 = excess(0.0) + freedom;
-    if !is_significant(chi2, freedom.round() as usize) {
-        return 0.0;
-    }
-    let (mut low, mut high) = (0.0, 1e-6);
-    while excess(high) > 0.0 && high < 1e3 {
-        (low, high) = (high, 10.0 * high);
-    }
-    for _ in 0..60 {
-        let middle = f64::midpoint(low, high);
-        if excess(middle) > 0.0 {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
-    high.sqrt()
 }
 
 /// `normal⁻¹ right`, as [`inverse`] does it.

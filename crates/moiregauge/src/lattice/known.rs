@@ -95,8 +95,8 @@ fn candidates(
     let mut found = Vec::new();
     // |p|² − |q|²: what most pairs have wrong is told by their area.
     let area = (wanted.determinant() / to_physical.determinant()).abs();
-    let areas = area / MOST_SCALE.powi(2) * (1.0 - MOST_DISTORTION.powi(2))
-        ..=area * MOST_SCALE.powi(2);
+    let areas =
+        area / MOST_SCALE.powi(2) * (1.0 - MOST_DISTORTION.powi(2))..=area * MOST_SCALE.powi(2);
     for (i, a) in generators.iter().enumerate() {
         for b in &generators[i + 1..] {
             let pair = Matrix2::from_columns(&[*a, *b]);

@@ -16,6 +16,7 @@ mod pictures;
 pub(crate) mod reciprocal;
 mod rescue;
 mod select;
+mod several;
 mod transform;
 pub(crate) mod vectors;
 
@@ -24,6 +25,7 @@ use nalgebra::{Matrix2, Vector2};
 pub use fit::{FittedHarmonic, ForeignWave, Inhomogeneity, LatticeFit};
 pub use phases::Phases;
 pub(crate) use pictures::pictures;
+pub use several::measure_several;
 pub use vectors::LatticeVectors;
 
 use crate::background::remove_background;
@@ -102,6 +104,22 @@ pub enum LatticeError {
         /// The method.
         method: Method,
     },
+    /// Several lattices were asked for.
+    #[error(
+        "{wanted} lattices were asked for, of which {found} can be found; --moires {found} measures what is there"
+    )]
+    FewerLattices {
+        /// How many there are.
+        found: usize,
+        /// How many were wanted.
+        wanted: usize,
+    },
+    /// Several lattices lie too close to each other.
+    #[error(
+        "the wave vectors of two lattices lie so close to each other that this frame cannot tell them apart; \
+         a larger frame can"
+    )]
+    Entangled,
 }
 
 /// An image without background and what its spectrum says: where the lattice is, roughly.
@@ -186,6 +204,40 @@ impl Start {
     ) -> Result<Self, LatticeError> {
         let prepared = rescue::prepare_again(image, geometry, background)?;
         Ok(Self::new(prepared, image, geometry, background))
+    }
+
+    /// The reciprocal pairs (rad per pixel) that the spectrum proposes, whether they stand out or not.
+    fn proposals(image: &Image, geometry: &Geometry, background: Background) -> Vec<Matrix2<f64>> {
+        let flat = remove_background(image, background);
+        let proposed = select::candidates(&Spectrum::new(&flat), &geometry.pixel_to_nm);
+        proposed.into_iter().map(|c| c.pair).collect()
+    }
+
+    /// Starts from a reciprocal pair (rad per pixel) that is known to within half a cycle over the frame.
+    /// `None` where it cannot be measured.
+    fn near(
+        image: &Image,
+        geometry: &Geometry,
+        background: Background,
+        pair: &Matrix2<f64>,
+    ) -> Option<Self> {
+        let flat = remove_background(image, background);
+        let binning = binning(pair);
+        let binned = if binning == 1 {
+            flat.clone()
+        } else {
+            flat.binned(binning)
+        };
+        let (harmonics, peaks) = refine(&binned, &(pair * binning as f64), background)?;
+        let prepared = Prepared {
+            start: reciprocal::reciprocal(&harmonics.pair)?,
+            spectrum: Spectrum::new(&binned),
+            image: flat,
+            binning,
+            harmonics,
+            peaks,
+        };
+        Some(Self::new(prepared, image, geometry, background))
     }
 
     fn new(prepared: Prepared, image: &Image, geometry: &Geometry, background: Background) -> Self {

@@ -87,7 +87,9 @@ pub enum CalibrateError {
     #[error("no scan can be used")]
     Nothing,
     /// A cell without area.
-    #[error("the known lattice has no area: expected two lengths > 0 and an angle between 0° and 180°")]
+    #[error(
+        "the known lattice has no area: expected two lengths > 0 and an angle between 0° and 180°"
+    )]
     Cell,
     /// Sensors in some scans only.
     #[error(
@@ -206,13 +208,16 @@ fn see(
 ) -> Result<Seen, CalibrateError> {
     let name = group.name.clone();
     let unusable = || CalibrateError::Lattice(name.clone());
-    let lines = || group.scans.iter().flat_map(|s| s.lines.iter().map(move |l| (s, l)));
+    let lines = || {
+        group
+            .scans
+            .iter()
+            .flat_map(|s| s.lines.iter().map(move |l| (s, l)))
+    };
     let first = lines().next().ok_or(CalibrateError::Nothing)?.1;
     let reference = canonical(&first.in_sensor_coordinates()).basis;
     let observations: Vec<Observation> = lines().map(|(_, l)| l.observation(&reference)).collect();
-    let strange = |o: &Observation| {
-        (o.lattice.basis - reference).norm() > SAME * reference.norm()
-    };
+    let strange = |o: &Observation| (o.lattice.basis - reference).norm() > SAME * reference.norm();
     if observations.iter().any(strange) {
         return Err(unusable());
     }
@@ -262,7 +267,12 @@ fn see(
     };
     let found = shown(&lattice, cell).ok_or_else(unusable)?;
     about_name(&name, &found, caveats);
-    about_drift(&name, gradients.first().copied().flatten(), drift_sigma, caveats);
+    about_drift(
+        &name,
+        gradients.first().copied().flatten(),
+        drift_sigma,
+        caveats,
+    );
     Ok(Seen {
         lattice,
         found,
@@ -303,12 +313,7 @@ fn mean(all: &[&Shown]) -> Option<(Vector3<f64>, Matrix3<f64>, f64)> {
     Some((values, covariance, chi2))
 }
 
-fn summary(
-    seen: Seen,
-    map: &Matrix2<f64>,
-    coordinates: Coordinates,
-    used: bool,
-) -> CalibratedSet {
+fn summary(seen: Seen, map: &Matrix2<f64>, coordinates: Coordinates, used: bool) -> CalibratedSet {
     let Seen {
         group,
         lattice,

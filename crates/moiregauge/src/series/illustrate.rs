@@ -2,7 +2,8 @@
 
 use spmfile::{LineDirection, Scan};
 
-use super::measure::{calibrated, channels, image_of, nominal, sensor_images, usable_sensors};
+use super::measure::{channels, image_of, nominal, sensor_images, usable_sensors};
+use super::scanner::calibrated;
 use crate::analysis::{Illustration, ScanAnalysis};
 use crate::background::remove_background;
 use crate::geometry::Timing;
@@ -44,7 +45,10 @@ pub fn illustrate(
     let mut origin = line.origin;
     if let (Some(sensors), Some(measured)) = (&sensors, &measured) {
         let scaled = |steps: &[f64], by: f64| steps.iter().map(|s| s * by).collect::<Vec<f64>>();
-        let (raw, now) = (&sensors.geometry, calibrated(sensors.geometry.clone(), settings));
+        let (raw, now) = (
+            &sensors.geometry,
+            calibrated(sensors.geometry.clone(), settings),
+        );
         let by = [
             now.fast_step().norm() / raw.fast_step().norm(),
             now.slow_step().norm() / raw.slow_step().norm(),

@@ -4,9 +4,10 @@ use nalgebra::{Matrix2, Vector2};
 use spmfile::{Channel, DateTime, FrameDirection, LineDirection, Scan};
 
 use super::channel::{choose_channel, stem};
+use super::moires::in_order;
 use super::overlap::Window;
+use super::scanner::{about_calibration, calibrated};
 use super::shared::correlation;
-use crate::calibration::{Calibration, Coordinates};
 use crate::caveat::Caveat;
 use crate::drift::Observation;
 use crate::estimate::Estimate;
@@ -15,14 +16,12 @@ use crate::image::Image;
 use crate::lattice::reciprocal::labelled_like;
 use crate::lattice::{
     ForeignWave, Inhomogeneity, LatticeError, LatticeFit, LatticeVectors, MeasuredLattice, Start,
-    measure, vectors,
+    measure, measure_several, vectors,
 };
 use crate::settings::{Lines, Settings};
 
 /// A sensor whose span differs from the nominal size by more than this factor is not believed.
 const WILD_SPAN: f64 = 2.0;
-/// Sizes and line rates that differ by more than this factor are other conditions.
-const EXTRAPOLATED: f64 = 3.0;
 /// Fewer periods than this across the shorter side deserve a warning.
 const FEW_PERIODS: f64 = 3.0;
 
@@ -161,10 +160,7 @@ pub fn measure_scan(
     settings: &Settings,
     window: Option<&Window>,
 ) -> Result<MeasuredScan, MeasureError> {
-    let find = |image: &Image, geometry: &Geometry| {
-        measure(image, geometry, settings.background, settings.method)
-    };
-    measure_with(file, scan, settings, window, &find)
+    Ok(measure_moires(file, scan, settings, window)?.swap_remove(0))
 }
 
 /// Measures a scan of a lattice whose cell is known: `cell` is its real-space pair, nm, at any orientation.
@@ -178,13 +174,33 @@ pub fn measure_known(
     cell: &Matrix2<f64>,
 ) -> Result<MeasuredScan, MeasureError> {
     let find = |image: &Image, geometry: &Geometry| {
-        Start::find_known(image, geometry, settings.background, cell)?.measure(settings.method)
+        let start = Start::find_known(image, geometry, settings.background, cell)?;
+        Ok(vec![start.measure(settings.method)?])
     };
-    measure_with(file, scan, settings, None, &find)
+    Ok(measure_with(file, scan, settings, None, &find)?.swap_remove(0))
 }
 
-/// How the lattice of an image is found and measured.
-type Find<'a> = &'a dyn Fn(&Image, &Geometry) -> Result<MeasuredLattice, LatticeError>;
+/// Measures every moiré of one scan, as many as `settings` say, the largest cell first; otherwise as
+/// [`measure_scan`]. There is at least one.
+///
+/// # Errors
+/// As [`measure_scan`]; also where there are fewer moirés, or two that cannot be told apart.
+pub fn measure_moires(
+    file: &str,
+    scan: &Scan,
+    settings: &Settings,
+    window: Option<&Window>,
+) -> Result<Vec<MeasuredScan>, MeasureError> {
+    let (background, method) = (settings.background, settings.method);
+    let find = |image: &Image, geometry: &Geometry| match settings.moires {
+        0 | 1 => measure(image, geometry, background, method).map(|lattice| vec![lattice]),
+        n => measure_several(image, geometry, background, n),
+    };
+    measure_with(file, scan, settings, window, &find)
+}
+
+/// How the lattices of an image are found and measured; at least one.
+type Find<'a> = &'a dyn Fn(&Image, &Geometry) -> Result<Vec<MeasuredLattice>, LatticeError>;
 
 fn measure_with(
     file: &str,
@@ -192,21 +208,32 @@ fn measure_with(
     settings: &Settings,
     window: Option<&Window>,
     find: Find,
-) -> Result<MeasuredScan, MeasureError> {
+) -> Result<Vec<MeasuredScan>, MeasureError> {
     let channels = channels(scan, settings)?;
     let mut caveats = Vec::new();
-    let mut lines = Vec::new();
+    let mut moires: Vec<Vec<MeasuredLine>> = Vec::new();
     let mut failures = Vec::new();
     for channel in &channels {
         match measure_line(file, scan, channel, settings, (window, find), &mut caveats) {
-            Ok(line) => lines.push(line),
+            Ok(lines) if moires.is_empty() => {
+                moires = lines.into_iter().map(|line| vec![line]).collect();
+            }
+            Ok(lines) => {
+                let first: Vec<_> = moires
+                    .iter()
+                    .map(|lines| lines[0].in_sensor_coordinates())
+                    .collect();
+                let lines = in_order(&first, lines, |l| Some(l.in_sensor_coordinates()));
+                for (all, line) in moires.iter_mut().zip(lines) {
+                    all.push(line);
+                }
+            }
             Err(error) => failures.push(error),
         }
     }
-    if lines.is_empty() {
+    if moires.is_empty() {
         return Err(failures.swap_remove(0));
     }
-    share_noise(&mut lines);
     for error in failures {
         caveats.push(Caveat::new(
             "line-left-out",
@@ -214,20 +241,24 @@ fn measure_with(
             format!("one line direction could not be used: {error}"),
         ));
     }
-    about_calibration(file, scan, &lines, settings, &mut caveats);
+    about_calibration(file, scan, moires.iter().flatten(), settings, &mut caveats);
     caveats.dedup_by(|a, b| (&a.code, &a.message) == (&b.code, &b.message));
-    Ok(MeasuredScan {
-        file: file.to_owned(),
-        acquired: scan.acquired,
-        frame_direction: scan.frame_direction,
-        line_rate_hz: scan.line_rate_hz,
-        channel: channels[0].name.clone(),
-        size_nm: scan.size_nm,
-        set: None,
-        lines,
-        excluded: None,
-        caveats,
-    })
+    let measured = moires.into_iter().map(|mut lines| {
+        share_noise(&mut lines);
+        MeasuredScan {
+            file: file.to_owned(),
+            acquired: scan.acquired,
+            frame_direction: scan.frame_direction,
+            line_rate_hz: scan.line_rate_hz,
+            channel: channels[0].name.clone(),
+            size_nm: scan.size_nm,
+            set: None,
+            lines,
+            excluded: None,
+            caveats: caveats.clone(),
+        }
+    });
+    Ok(measured.collect())
 }
 
 /// Enlarges the errors of trace and retrace by what their noise has in common, so that they can be
@@ -302,7 +333,7 @@ fn measure_line(
     settings: &Settings,
     (window, find): (Option<&Window>, Find),
     caveats: &mut Vec<Caveat>,
-) -> Result<MeasuredLine, MeasureError> {
+) -> Result<Vec<MeasuredLine>, MeasureError> {
     let line = channel.line_direction.unwrap_or(LineDirection::Trace);
     let nominal = nominal(scan, channel);
     let sensors = usable_sensors(file, scan, channel, nominal.as_ref(), caveats);
@@ -331,11 +362,34 @@ fn measure_line(
         }
         _ => speeds,
     };
-    let lattice = find(&image, &geometry).map_err(|error| MeasureError::Lattice {
+    let mut lattices = find(&image, &geometry).map_err(|error| MeasureError::Lattice {
         line: line_name(line),
         channel: channel.name.clone(),
         error,
     })?;
+    let cell = |lattice: &MeasuredLattice| lattice.pixels.basis.determinant().abs();
+    lattices.sort_by(|a, b| cell(b).total_cmp(&cell(a)));
+    let lines = lattices.into_iter().map(|lattice| {
+        about_lattice(file, &lattice, &geometry, caveats);
+        MeasuredLine {
+            line,
+            geometry: geometry.clone(),
+            nominal: nominal.clone(),
+            timing,
+            lattice,
+            speeds,
+            speed_error,
+        }
+    });
+    Ok(lines.collect())
+}
+
+fn about_lattice(
+    file: &str,
+    lattice: &MeasuredLattice,
+    geometry: &Geometry,
+    caveats: &mut Vec<Caveat>,
+) {
     if lattice.periods < FEW_PERIODS {
         caveats.push(Caveat::new(
             "few-periods",
@@ -348,81 +402,7 @@ fn measure_line(
         ));
     }
     if let Some(fit) = &lattice.fit {
-        about_fit(file, fit, &geometry, caveats);
-    }
-    Ok(MeasuredLine {
-        line,
-        geometry,
-        nominal,
-        timing,
-        lattice,
-        speeds,
-        speed_error,
-    })
-}
-
-/// The geometry corrected by the calibration of the scanner, if there is one.
-pub(super) fn calibrated(geometry: Geometry, settings: &Settings) -> Geometry {
-    let map = settings.scanner.as_ref().and_then(Calibration::map);
-    map.map_or_else(|| geometry.clone(), |map| geometry.mapped(&map))
-}
-
-/// Whether the calibration was measured under the conditions of this scan.
-fn about_calibration(
-    file: &str,
-    scan: &Scan,
-    lines: &[MeasuredLine],
-    settings: &Settings,
-    caveats: &mut Vec<Caveat>,
-) {
-    let Some(scanner) = &settings.scanner else {
-        return;
-    };
-    let from_sensors = scanner.coordinates == Coordinates::Sensors;
-    if lines.iter().any(|l| l.geometry.from_sensors != from_sensors) {
-        let words = |sensors| {
-            if sensors {
-                "position sensors"
-            } else {
-                "nominal coordinates"
-            }
-        };
-        caveats.push(Caveat::new(
-            "calibration-of-other-coordinates",
-            file,
-            format!(
-                "the calibration is one of {}, the scan has {}: it need not hold for them",
-                words(from_sensors),
-                words(!from_sensors)
-            ),
-        ));
-    } else if !from_sensors {
-        caveats.retain(|c| c.code != "no-position-sensors");
-    }
-    let apart = |value: f64, known: Vec<f64>| {
-        let near = |other: &f64| (1.0 / EXTRAPOLATED..=EXTRAPOLATED).contains(&(value / other));
-        !known.is_empty() && !known.iter().any(near)
-    };
-    let sizes = || scanner.sizes_nm.iter().map(|s| s[0]).collect();
-    let rate = scan
-        .line_rate_hz
-        .is_some_and(|hz| apart(hz, scanner.line_rates_hz.clone()));
-    let size = scan.size_nm.is_some_and(|[w, _]| apart(w, sizes()));
-    if rate || size {
-        let what = match (rate, size) {
-            (true, true) => "size and line rate",
-            (true, false) => "line rate",
-            _ => "size",
-        };
-        caveats.push(Caveat::new(
-            "calibration-extrapolated",
-            file,
-            format!(
-                "the {what} of the scan differs by more than a factor of {EXTRAPOLATED} from that of the images \
-                 that the calibration comes from: hysteresis, creep and lag of a scanner change with both, and \
-                 their change is not in the budget"
-            ),
-        ));
+        about_fit(file, fit, geometry, caveats);
     }
 }
 

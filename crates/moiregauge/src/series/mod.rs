@@ -10,17 +10,22 @@ mod corrected;
 mod group;
 mod illustrate;
 mod measure;
+mod moires;
 mod overlap;
+mod scanner;
 mod set;
 mod shared;
 mod sightings;
 
-pub use calibrate::{Calibrated, CalibratedSet, CalibrateError, calibrate};
+pub use calibrate::{CalibrateError, Calibrated, CalibratedSet, calibrate};
 pub use channel::choose_channel;
 pub use corrected::{CorrectedImage, corrected_images, nominal_geometry, on_grid};
 pub use group::natural_order;
 pub use illustrate::illustrate;
-pub use measure::{MeasureError, MeasuredLine, MeasuredScan, measure_known, measure_scan};
+pub use measure::{
+    MeasureError, MeasuredLine, MeasuredScan, measure_known, measure_moires, measure_scan,
+};
+pub use moires::sorted_moires;
 pub use overlap::{Window, common_window};
 
 use nalgebra::Matrix2;

@@ -5,6 +5,8 @@
 
 use std::borrow::Cow;
 
+use memchr::memmem;
+
 /// Real headers have 20 to 100 kB; beyond this no header is looked for.
 const LONGEST: usize = 4 << 20;
 const END: &[u8] = b"\\*File list end";
@@ -26,7 +28,7 @@ pub(super) struct Section<'a> {
 /// The header as text, or `None` where it has no end.
 pub(super) fn header_text(bytes: &[u8]) -> Option<HeaderText<'_>> {
     let head = &bytes[..bytes.len().min(LONGEST)];
-    let length = head.windows(END.len()).position(|w| w == END)?;
+    let length = memmem::find(head, END)?;
     let raw = &head[..length];
     // Headers are Windows-1252; those that a newer program wrote as UTF-8 hardly ever decode by chance.
     let text = match std::str::from_utf8(raw) {
@@ -36,7 +38,7 @@ pub(super) fn header_text(bytes: &[u8]) -> Option<HeaderText<'_>> {
     Some(HeaderText {
         text,
         length: length + END.len(),
-        crlf: raw.windows(2).any(|w| w == b"\r\n"),
+        crlf: memmem::find(raw, b"\r\n").is_some(),
     })
 }
 

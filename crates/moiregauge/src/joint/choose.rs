@@ -1,0 +1,135 @@
+//! Which terms a fit has: those that lower the Bayesian information criterion.
+
+use super::Terms;
+use super::solve::{JointFit, Problem, TestedTerm};
+
+/// Settling times that are tried, as shares of the duration of the campaign.
+const SETTLING: [f64; 5] = [0.05, 0.1, 0.2, 0.4, 0.8];
+/// Fewer scans than this cannot tell an exponential from a parabola.
+const FEWEST_SETTLING: usize = 6;
+
+/// The fit with the terms that earn their place beside those of `best`.
+pub(super) fn terms(problem: &Problem, best: JointFit) -> JointFit {
+    let sightings = &problem.sightings;
+    let times = || sightings.iter().map(|s| s.time);
+    let duration =
+        times().fold(f64::NEG_INFINITY, f64::max) - times().fold(f64::INFINITY, f64::min);
+    let scans = 1 + sightings.iter().map(|s| s.scan).max().unwrap_or(0);
+    let base = Terms {
+        acceleration: false,
+        ..best.terms
+    };
+    let changing = [Terms {
+        acceleration: true,
+        ..base
+    }]
+    .into_iter()
+    .chain(
+        SETTLING
+            .into_iter()
+            .filter(|_| scans >= FEWEST_SETTLING)
+            .map(|share| Terms {
+                settling: Some(share * duration),
+                ..base
+            }),
+    );
+    let mut choice = Choice::new(problem, best, base);
+    choice.offer(changing);
+    let classes = sightings.iter().map(|s| s.class).max().unwrap_or(0);
+    if classes > 1 {
+        let gain = Terms {
+            fast_gain: true,
+            ..choice.best.terms
+        };
+        choice.offer([gain].into_iter());
+    }
+    // The scatter that is left with the chosen terms is the instability.
+    let Choice { best, tested, .. } = choice;
+    let from = (&best.waves.basis.clone(), &best.velocity.clone());
+    let last = problem.solve(best.terms, from, None).unwrap_or(best);
+    let has = |name| match name {
+        ACCELERATION => last.terms.acceleration,
+        EXPONENTIAL => last.terms.settling.is_some(),
+        _ => last.terms.fast_gain,
+    };
+    let tested = tested
+        .into_iter()
+        .map(|(name, gain)| TestedTerm {
+            name,
+            gain,
+            used: has(name),
+        })
+        .collect();
+    JointFit { tested, ..last }
+}
+
+const ACCELERATION: &str = "acceleration";
+const EXPONENTIAL: &str = "settling";
+const FAST_GAIN: &str = "fast-axis gain";
+
+/// Terms that are offered one after the other; all are compared with the weights of the first fit.
+struct Choice<'a> {
+    problem: &'a Problem,
+    best: JointFit,
+    instability: f64,
+    lowest: f64,
+    tested: Vec<(&'static str, f64)>,
+}
+
+impl<'a> Choice<'a> {
+    fn new(problem: &'a Problem, best: JointFit, base: Terms) -> Self {
+        let instability = best.instability_nm;
+        let start = (&best.waves.basis.clone(), &best.velocity.clone());
+        let plain = problem.solve(base, start, Some(instability));
+        // Where only a changing drift can be linked there is nothing simpler to compare with.
+        let (best, lowest) = match plain {
+            Some(fit) => (fit.clone(), criterion(&fit)),
+            None => (best, f64::INFINITY),
+        };
+        Self {
+            problem,
+            best,
+            instability,
+            lowest,
+            tested: Vec::new(),
+        }
+    }
+
+    fn offer(&mut self, candidates: impl Iterator<Item = Terms>) {
+        let before = self.lowest;
+        let from = (&self.best.waves.basis.clone(), &self.best.velocity.clone());
+        for terms in candidates {
+            let Some(fit) = self.problem.solve(terms, from, Some(self.instability)) else {
+                continue;
+            };
+            let name = if terms.fast_gain {
+                FAST_GAIN
+            } else if terms.acceleration {
+                ACCELERATION
+            } else {
+                EXPONENTIAL
+            };
+            let value = criterion(&fit);
+            let gain = if before.is_finite() {
+                before - value
+            } else {
+                f64::NAN
+            };
+            match self.tested.iter_mut().find(|(known, _)| *known == name) {
+                Some((_, best)) => *best = best.max(gain),
+                None => self.tested.push((name, gain)),
+            }
+            if value < self.lowest {
+                self.lowest = value;
+                self.best = fit;
+            }
+        }
+    }
+}
+
+/// Bayesian information criterion for given weights. A settling time is a parameter as well.
+fn criterion(fit: &JointFit) -> f64 {
+    let n = (fit.degrees_of_freedom + fit.layout.size) as f64;
+    let parameters = fit.layout.count() + usize::from(fit.terms.settling.is_some());
+    fit.chi2 + parameters as f64 * n.ln()
+}

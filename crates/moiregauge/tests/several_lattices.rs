@@ -1,0 +1,131 @@
+//! Several lattices in one image are separated, each within its errors.
+
+#[allow(dead_code, reason = "other tests use the rest of it")]
+mod fit_scene;
+
+use fit_scene::{Contrast, Scene};
+use moiregauge::lattice::{LatticeError, MeasuredLattice, measure_several};
+use moiregauge::settings::Background;
+use nalgebra::{Matrix2, Vector4};
+
+/// Size and turn a lattice.
+fn changed(scene: &mut Scene, size: f64, turn: f64) {
+    let (s, c) = turn.sin_cos();
+    let map = Matrix2::new(c, -s, s, c);
+    scene.basis = map * scene.basis * size;
+    for wave in &mut scene.waves {
+        wave.q = map * wave.q / size;
+    }
+}
+
+/// One image with the lattices of all scenes and the noise of the first one.
+fn together(scenes: &[Scene]) -> Scene {
+    let mut all = scenes[0].clone();
+    for scene in &scenes[1..] {
+        all.waves.extend(scene.waves.iter().copied());
+    }
+    all
+}
+
+fn separate(scenes: &[Scene]) -> Result<Vec<MeasuredLattice>, LatticeError> {
+    let all = together(scenes);
+    measure_several(
+        &all.image(),
+        &all.geometry(),
+        Background::Plane,
+        scenes.len(),
+    )
+}
+
+/// Decorrelated errors over stated errors of the lattice that is nearest to that of the scene.
+fn pulls(scene: &Scene, found: &[MeasuredLattice]) -> Vector4<f64> {
+    let off = |m: &&MeasuredLattice| scene.error(&m.pixels.basis).norm();
+    let nearest = found
+        .iter()
+        .min_by(|a, b| off(a).total_cmp(&off(b)))
+        .unwrap();
+    let (_, change) = scene.change(&nearest.pixels.basis);
+    let covariance = change * nearest.pixels.covariance * change.transpose();
+    let factor = covariance.cholesky().unwrap();
+    let error = scene.error(&nearest.pixels.basis);
+    factor.l().solve_lower_triangular(&error).unwrap()
+}
+
+/// Over `count` images no pull beyond 4, and their mean square 1 within three times its scatter.
+fn each_within_its_errors(count: u64, scenes: impl Fn(u64) -> Vec<Scene>) {
+    let (mut squares, mut n) = (0.0, 0.0);
+    for seed in 0..count {
+        let scenes = scenes(seed);
+        let found = separate(&scenes).unwrap_or_else(|error| panic!("{seed}: {error}"));
+        assert_eq!(found.len(), scenes.len());
+        for (i, scene) in scenes.iter().enumerate() {
+            let pull = pulls(scene, &found);
+            assert!(pull.amax() < 4.0, "seed {seed}, lattice {i}: {pull:?}");
+            squares += pull.norm_squared();
+            n += 4.0;
+        }
+    }
+    let mean = squares / n;
+    let scatter = 3.0 * f64::sqrt(2.0 / n);
+    assert!((mean - 1.0).abs() < scatter, "{mean} ± {scatter}");
+}
+
+fn scene(size: usize, periods: f64, angle: f64, contrast: Contrast, seed: u64) -> Scene {
+    let mut scene = Scene::new([size; 2], periods, angle, contrast, seed);
+    scene.white = 1.0;
+    scene
+}
+
+/// Twisted bilayer graphene on hBN: 12 and 8.5 periods, in any orientation, one sharp and one smooth.
+#[test]
+fn two_lattices_are_separated() {
+    each_within_its_errors(20, |seed| {
+        let angle = 0.618_034 * seed as f64;
+        vec![
+            scene(256, 12.0, angle, Contrast::Cosines, seed),
+            scene(256, 8.5, 1.7 * angle, Contrast::Spots, seed + 100),
+        ]
+    });
+}
+
+/// A trilayer: 8, 13 and 19 periods.
+#[test]
+fn three_lattices_are_separated() {
+    each_within_its_errors(10, |seed| {
+        let angle = 0.618_034 * seed as f64;
+        vec![
+            scene(256, 8.0, angle, Contrast::Cosines, seed),
+            scene(256, 13.0, 0.2 + angle, Contrast::Cosines, seed + 100),
+            scene(256, 19.0, 0.5 - angle, Contrast::Cosines, seed + 200),
+        ]
+    });
+}
+
+/// The same orientation, wavelengths 5 % apart: 30 and 31.5 periods, so that wave vectors lie one and a half
+/// cycles per frame from each other, within the resolution of a window.
+#[test]
+fn nearly_equal_lattices_are_separated() {
+    each_within_its_errors(15, |seed| {
+        let angle = 0.618_034 * seed as f64;
+        let first = scene(384, 30.0, angle, Contrast::Cosines, seed);
+        let mut second = scene(384, 30.0, angle, Contrast::Cosines, seed + 100);
+        changed(&mut second, 1.0 / 1.05, 0.0);
+        vec![first, second]
+    });
+}
+
+/// A second lattice is not made up, and not taken from the first one's overtones.
+#[test]
+fn what_is_not_there_is_not_found() {
+    for seed in 0..10 {
+        let one = scene(256, 9.0, 0.3 * seed as f64, Contrast::Walls, seed);
+        let all = [one.clone()];
+        let image = together(&all).image();
+        let found = measure_several(&image, &one.geometry(), Background::Plane, 2);
+        let expected = LatticeError::FewerLattices {
+            found: 1,
+            wanted: 2,
+        };
+        assert_eq!(found.err(), Some(expected), "{seed}");
+    }
+}
