@@ -7,6 +7,7 @@ mod convert;
 mod demo;
 mod info;
 mod input;
+mod plan;
 mod say;
 mod simulate;
 mod validate;
@@ -35,6 +36,7 @@ enum Command {
     Simulate(Box<simulate::SimulateArgs>),
     Demo(demo::DemoArgs),
     Validate(validate::ValidateArgs),
+    Plan(Box<plan::PlanArgs>),
     Config(config::ConfigArgs),
 }
 
@@ -47,6 +49,7 @@ fn main() -> ExitCode {
         Command::Simulate(args) => simulate::run(&args),
         Command::Demo(args) => demo::run(&args),
         Command::Validate(args) => validate::run(&args),
+        Command::Plan(args) => plan::run(&args),
         Command::Config(args) => config::run(&args),
     };
     result.unwrap_or_else(|error| {

@@ -16,6 +16,7 @@ pub mod image;
 pub mod joint;
 pub mod lattice;
 pub mod material;
+pub mod plan;
 pub mod resample;
 pub mod rng;
 pub mod series;
