@@ -10,11 +10,13 @@ mod summary;
 
 use std::process::ExitCode;
 
-pub(crate) use args::{AnalyzeArgs, ConventionArg, MethodArg};
-pub(crate) use chain::{Outcome, analyse_files, hexadecimal, measure_file, read};
+pub(crate) use args::{AnalyzeArgs, BackgroundArg, ConventionArg, LineArg, MethodArg};
+pub(crate) use chain::{
+    Outcome, Reading, analyse_files, hexadecimal, measure_file, progress, read,
+};
 pub(crate) use files::write_all;
 pub(crate) use orientation::{Angle, DirectionArg, parse_angle};
-pub(crate) use summary::{failures, summary};
+pub(crate) use summary::{caveats as caveat_lines, failures, summary};
 
 use crate::info::expand;
 use crate::say::say;

@@ -99,6 +99,10 @@ overlap = false
 # deviation from a right angle. Better: the values from your own calibration.
 calibration = { gain_percent = 1.0, mismatch_percent = 0.5, orthogonality_mrad = 5.0 }
 
+# A calibration of the scanner that `moiregauge calibrate` wrote: a file, seen from the folder of this one.
+# Positions are corrected with it, and its errors take the place of those above.
+# scanner = "scanner.toml"
+
 # Isotropic heterostrain that the layers may have beside the uniaxial one, per cent. The moiré does not
 # show it; 0.06 % still leave the twist within 0.001°.
 isotropic_strain_percent = 0.05
@@ -121,20 +125,26 @@ pub(crate) fn run(_args: &ConfigArgs) -> anyhow::Result<ExitCode> {
 pub(crate) fn read(path: &Path) -> anyhow::Result<Settings> {
     let text = std::fs::read_to_string(path)
         .with_context(|| format!("cannot read the settings file {}", path.display()))?;
-    parse(&text).with_context(|| format!("in the settings file {}", path.display()))
+    let folder = path.parent().unwrap_or(Path::new(""));
+    parse(&text, folder).with_context(|| format!("in the settings file {}", path.display()))
 }
 
-fn parse(text: &str) -> anyhow::Result<Settings> {
+fn parse(text: &str, folder: &Path) -> anyhow::Result<Settings> {
     let mut table: toml::Table = toml::from_str(text)?;
-    let mut named = false;
+    let mut changed = false;
     for key in ["material", "substrate"] {
         if let Some(toml::Value::String(name)) = table.get(key) {
             let material = toml::Value::try_from(named_material(name)?)?;
             table.insert(key.to_owned(), material);
-            named = true;
+            changed = true;
         }
     }
-    if named {
+    if let Some(toml::Value::String(file)) = table.get("scanner") {
+        let scanner = toml::Value::try_from(crate::calibrate::file::read(&folder.join(file))?)?;
+        table.insert("scanner".to_owned(), scanner);
+        changed = true;
+    }
+    if changed {
         return Ok(table.try_into()?);
     }
     // Straight from the text: errors then show the line.
@@ -276,6 +286,9 @@ pub(crate) fn check(settings: &Settings) -> anyhow::Result<()> {
             "an uncertainty ({name}) lies between 0 and {largest}, found {value}"
         );
     }
+    if let Some(problem) = settings.scanner.as_ref().and_then(|s| s.problem()) {
+        bail!("the calibration of the scanner makes no sense: {problem}");
+    }
     if let Some(drift) = &settings.drift {
         let (x, y, sigma) = (
             drift.x_nm_per_min,
@@ -300,18 +313,23 @@ mod tests {
 
     #[test]
     fn the_commented_file_holds_the_defaults() {
-        assert_eq!(parse(COMMENTED).unwrap(), Settings::default());
+        assert_eq!(
+            parse(COMMENTED, Path::new("")).unwrap(),
+            Settings::default()
+        );
     }
 
     #[test]
     fn unknown_keys_and_materials_are_refused_with_what_is_known() {
         assert!(
-            parse("metod = \"fourier\"")
+            parse("metod = \"fourier\"", Path::new(""))
                 .unwrap_err()
                 .to_string()
                 .contains("metod")
         );
-        let error = parse("material = \"unobtainium\"").unwrap_err().to_string();
+        let error = parse("material = \"unobtainium\"", Path::new(""))
+            .unwrap_err()
+            .to_string();
         assert!(error.contains("graphene"), "{error}");
     }
 }

@@ -1,6 +1,7 @@
 //! The `moiregauge` program: a table of contents.
 
 mod analyze;
+mod calibrate;
 mod config;
 mod convert;
 mod demo;
@@ -8,6 +9,7 @@ mod info;
 mod input;
 mod map;
 mod moire;
+mod plan;
 mod say;
 mod simulate;
 mod validate;
@@ -31,12 +33,14 @@ struct Cli {
 enum Command {
     Analyze(Box<analyze::AnalyzeArgs>),
     Map(Box<map::MapArgs>),
+    Calibrate(Box<calibrate::CalibrateArgs>),
     Convert(Box<convert::ConvertArgs>),
     Moire(Box<moire::MoireArgs>),
     Info(info::InfoArgs),
     Simulate(Box<simulate::SimulateArgs>),
     Demo(demo::DemoArgs),
     Validate(validate::ValidateArgs),
+    Plan(Box<plan::PlanArgs>),
     Config(config::ConfigArgs),
 }
 
@@ -44,12 +48,14 @@ fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Analyze(args) => analyze::run(&args),
         Command::Map(args) => map::run(&args),
+        Command::Calibrate(args) => calibrate::run(&args),
         Command::Convert(args) => convert::run(&args),
         Command::Moire(args) => moire::run(&args),
         Command::Info(args) => info::run(&args),
         Command::Simulate(args) => simulate::run(&args),
         Command::Demo(args) => demo::run(&args),
         Command::Validate(args) => validate::run(&args),
+        Command::Plan(args) => plan::run(&args),
         Command::Config(args) => config::run(&args),
     };
     result.unwrap_or_else(|error| {

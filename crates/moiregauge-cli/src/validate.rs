@@ -105,16 +105,25 @@ pub(crate) fn run(args: &ValidateArgs) -> anyhow::Result<ExitCode> {
 }
 
 fn conditions(args: &ValidateArgs) -> anyhow::Result<Simulation> {
-    if !args.like.is_empty() {
-        return like::conditions(&args.like);
-    }
-    if let Some(path) = &args.config {
-        return read(path);
+    if let Some(given) = given_conditions(args.config.as_deref(), &args.like)? {
+        return Ok(given);
     }
     let mut conditions = Simulation::default();
     conditions.raster.pixels = [args.pixels; 2];
     conditions.raster.scans = args.scans;
     Ok(conditions)
+}
+
+/// Those of a settings file or of the user's own scans; `None` without either.
+pub(crate) fn given_conditions(
+    config: Option<&Path>,
+    like: &[PathBuf],
+) -> anyhow::Result<Option<Simulation>> {
+    if like.is_empty() {
+        config.map(read).transpose()
+    } else {
+        like::conditions(like).map(Some)
+    }
 }
 
 fn read(path: &Path) -> anyhow::Result<Simulation> {

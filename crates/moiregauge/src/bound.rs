@@ -36,6 +36,28 @@ pub struct Bound {
 /// `None` without pixel noise, or where the frames do not determine drift and lattice.
 pub fn cramer_rao(simulator: &Simulator, time_sigma: f64, linked: bool) -> Option<Bound> {
     let settings = simulator.settings();
+    let (sightings, pair, drift) = ideal_sightings(simulator, linked)?;
+    let found = fit(&sightings, (&pair, &drift), time_sigma)?;
+    let lattice = real_from_reciprocal(&found.waves)?;
+    let sample = &settings.sample;
+    let strain = twist_strain(&lattice, sample.bilayer(), sample.strain_convention).ok()?;
+    let root = |variance: f64| variance.max(0.0).sqrt();
+    let (c, e) = (found.velocity_covariance, strain.strain_covariance());
+    Some(Bound {
+        drift: [root(c.m11), root(c.m22)],
+        twist: strain.twist().sigma,
+        strain: [root(e.m11), root(e.m22)],
+        linked: found.terms.phases,
+    })
+}
+
+/// What every line of every frame of a set shows exactly, with the errors that it has to have, the
+/// reciprocal pair (rad/nm) and the drift (nm/s).
+pub(crate) fn ideal_sightings(
+    simulator: &Simulator,
+    linked: bool,
+) -> Option<(Vec<Sighting>, Matrix2<f64>, Vector2<f64>)> {
+    let settings = simulator.settings();
     let truth = simulator.truth();
     let [first, second, _] = truth.lattice_vectors_nm.map(Vector2::from);
     // Two of the shortest wave vectors that stand at 60°: their difference is the third.
@@ -56,18 +78,7 @@ pub fn cramer_rao(simulator: &Simulator, time_sigma: f64, linked: bool) -> Optio
             });
         }
     }
-    let found = fit(&sightings, (&pair, &drift), time_sigma)?;
-    let lattice = real_from_reciprocal(&found.waves)?;
-    let sample = &settings.sample;
-    let strain = twist_strain(&lattice, sample.bilayer(), sample.strain_convention).ok()?;
-    let root = |variance: f64| variance.max(0.0).sqrt();
-    let (c, e) = (found.velocity_covariance, strain.strain_covariance());
-    Some(Bound {
-        drift: [root(c.m11), root(c.m22)],
-        twist: strain.twist().sigma,
-        strain: [root(e.m11), root(e.m22)],
-        linked: found.terms.phases,
-    })
+    Some((sightings, pair, drift))
 }
 
 /// What one line direction (class 0 trace, 1 retrace) of a frame shows exactly, with the errors that it

@@ -183,6 +183,10 @@ pub struct Settings {
     pub drift: Option<GivenDrift>,
     /// How well the scanner is calibrated, for the uncertainty budget.
     pub calibration: Calibration,
+    /// A measured calibration of the scanner: positions are corrected with it, and its covariance takes the
+    /// place of `calibration` in the budget.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub scanner: Option<crate::calibration::Calibration>,
     /// Standard deviation of the isotropic heterostrain that the layers may have beside the uniaxial
     /// one, per cent, for the uncertainty budget. The moiré does not show it. The default is a guess, of
     /// the size of small uniaxial strains; up to 0.06 % the twist stays within 0.001°.
@@ -224,6 +228,7 @@ impl Default for Settings {
             overlap: false,
             drift: None,
             calibration: Calibration::default(),
+            scanner: None,
             isotropic_strain_percent: 0.05,
             drift_draws: 10_000,
             strain_draws: 1_000,

@@ -79,6 +79,10 @@ pub(crate) struct AnalyzeArgs {
     /// Standard uncertainty of the Poisson ratio, for the budget [default: the material's]
     #[arg(long, value_name = "RATIO")]
     poisson_ratio_sigma: Option<f64>,
+    /// Calibration of the scanner, as `moiregauge calibrate` writes it: corrects positions, and its errors take
+    /// the place of the three below
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["calibration_gain", "calibration_mismatch", "calibration_orthogonality"])]
+    calibration: Option<PathBuf>,
     /// Gain error of the scanner, common to x and y, per cent, for the budget [default: 1]
     #[arg(long, value_name = "PERCENT")]
     calibration_gain: Option<f64>,
@@ -226,6 +230,9 @@ impl AnalyzeArgs {
         ];
         for (given, setting) in priors {
             *setting = given.unwrap_or(*setting);
+        }
+        if let Some(path) = &self.calibration {
+            s.scanner = Some(crate::calibrate::file::read(path)?);
         }
         if self.channel.is_some() {
             s.channel.clone_from(&self.channel);

@@ -129,7 +129,7 @@ fn measure_all(
     measured
 }
 
-fn progress(files: usize, loud: bool) -> ProgressBar {
+pub(crate) fn progress(files: usize, loud: bool) -> ProgressBar {
     if !loud {
         return ProgressBar::hidden();
     }
@@ -172,9 +172,9 @@ pub(crate) fn measure_file(
 /// A file as the analysis reads it.
 pub(crate) struct Reading {
     pub(crate) scan: Scan,
-    pub(super) input: InputFile,
+    pub(crate) input: InputFile,
     /// What the user's options replaced in it.
-    pub(super) replaced: Vec<String>,
+    pub(crate) replaced: Vec<String>,
 }
 
 /// Reads what the analysis needs of a file: the chosen channel and the position sensors.

@@ -283,7 +283,7 @@ fn combined_summary(text: &mut String, combined: &Combined) {
 }
 
 /// One line for each caveat, however many files it concerns.
-fn caveats(text: &mut String, all: &[Caveat]) {
+pub(crate) fn caveats(text: &mut String, all: &[Caveat]) {
     let mut by_message: BTreeMap<(&str, &str), Vec<&str>> = BTreeMap::new();
     for caveat in all {
         let places = by_message

@@ -9,7 +9,9 @@
 //!
 //! - Calibration. Sensors that show `(1 + δ) r` in place of r turn the moiré matrix `M` into
 //!   `(1 + δ)^{−T} M`. A common gain s changes the twist by −sθ; gains of x and y that differ by g, or
-//!   axes that miss a right angle by γ, change the strain vector by θg/(1+ν) or θγ/(1+ν). A rotation of
+//!   axes that miss a right angle by γ, change the strain vector by θg/(1+ν) or θγ/(1+ν). A measured
+//!   calibration ([`crate::calibration`]) takes the place of the priors; where its three errors are correlated,
+//!   what one shares with those before it is counted with them, so that the rows add up. A rotation of
 //!   the sensors' frame has no row: angles are counted from the axis of the x sensor by definition.
 //! - Lattice constant: θ is proportional to it.
 //! - Model: see [`crate::strain`]. An isotropic strain h changes θ at first and second order; its
@@ -202,6 +204,13 @@ fn lattice_error(
     statistical: &Statistical,
     settings: &Settings,
 ) -> Option<Matrix4<f64>> {
+    if let Source::Gain | Source::Mismatch | Source::Orthogonality = source
+        && let Some(scanner) = &settings.scanner
+    {
+        let error = scanner.independent_errors()[source as usize - Source::Gain as usize];
+        let change = scanner.map()? * error * lattice.basis;
+        return Some(square(&Vector4::from_column_slice(change.as_slice())));
+    }
     let calibration = &settings.calibration;
     // The whole of a difference between x and y shows as half of it in either.
     let (distortion, sigma) = match source {

@@ -19,6 +19,7 @@ pub use sensors::{SensorGeometry, from_sensors};
 
 use crate::analysis::Axis;
 use crate::estimate::Estimate;
+use crate::lattice::reciprocal::both;
 
 /// The affine map from pixels to nm.
 #[derive(Clone, Debug)]
@@ -125,6 +126,18 @@ impl Geometry {
         Self {
             size,
             origin: self.origin + self.pixel_to_nm * shift,
+            ..self.clone()
+        }
+    }
+
+    /// The same pixels in coordinates that are `map` times these (known exactly).
+    #[must_use]
+    pub fn mapped(&self, map: &Matrix2<f64>) -> Self {
+        let both = both(map);
+        Self {
+            pixel_to_nm: map * self.pixel_to_nm,
+            origin: map * self.origin,
+            covariance: both * self.covariance * both.transpose(),
             ..self.clone()
         }
     }

@@ -27,6 +27,7 @@ mod solve;
 use nalgebra::{Matrix2, Matrix4, Vector2};
 
 pub use checks::{LeftOut, Resampled};
+pub(crate) use solve::foreseen;
 pub use solve::{JointFit, TestedTerm, fit};
 
 use crate::lattice::{LatticeVectors, Phases};

@@ -132,6 +132,35 @@ pub fn fit(
     Some(choose::terms(&problem, best))
 }
 
+/// The covariance that a fit with a constant drift has for sightings that are exactly what the model says:
+/// nothing is chosen, nothing scatters. Otherwise as [`fit`].
+pub(crate) fn foreseen(
+    sightings: &[Sighting],
+    start: (&Matrix2<f64>, &Vector2<f64>),
+    time_sigma: f64,
+) -> Option<JointFit> {
+    let mut problem = Problem {
+        sightings: sightings.to_vec(),
+        time_sigma: time_sigma.max(1e-3),
+    };
+    let plain = problem.solve(Terms::default(), start, None)?;
+    let sigma = plain
+        .velocity_covariance
+        .symmetric_eigenvalues()
+        .max()
+        .sqrt();
+    number_blocks(&mut problem.sightings, &plain.waves.basis, sigma);
+    let with_phases = Terms {
+        phases: sightings.iter().any(|s| s.phases.is_some()),
+        ..Terms::default()
+    };
+    Some(
+        problem
+            .solve(with_phases, start, Some(0.0))
+            .unwrap_or(plain),
+    )
+}
+
 /// What is fitted.
 pub(super) struct Problem {
     pub(super) sightings: Vec<Sighting>,

@@ -9,6 +9,7 @@ mod fit;
 mod fourier;
 mod harmonics;
 mod high_orders;
+pub(crate) mod known;
 mod noise;
 mod paper;
 mod phases;
@@ -183,6 +184,21 @@ impl Start {
         Ok(Self::new(prepared, image, geometry, background))
     }
 
+    /// Looks for a lattice of about the cell `known` (real-space pair, nm), at any orientation.
+    ///
+    /// # Errors
+    /// As [`Start::find`]: [`LatticeError::NoLattice`] where there is none of that size and shape.
+    pub fn find_known(
+        image: &Image,
+        geometry: &Geometry,
+        background: Background,
+        known: &Matrix2<f64>,
+    ) -> Result<Self, LatticeError> {
+        let prepared = known::prepare(image, geometry, background, known)
+            .or_else(|_| rescue::prepare_known_again(image, geometry, background, known))?;
+        Ok(Self::new(prepared, image, geometry, background))
+    }
+
     /// The same for an image whose lattice hides under tip events and line noise.
     fn find_again(
         image: &Image,
@@ -318,27 +334,7 @@ fn prepare(
     geometry: &Geometry,
     background: Background,
 ) -> Result<Prepared, LatticeError> {
-    let (rows, columns) = (image.rows, image.columns);
-    if rows < SMALLEST_SIDE || columns < SMALLEST_SIDE {
-        return Err(LatticeError::TooSmall { columns, rows });
-    }
-    let total = image.values.len();
-    let missing = image.values.iter().filter(|v| !v.is_finite()).count();
-    if missing == total {
-        return Err(LatticeError::Constant);
-    }
-    if 2 * missing > total {
-        return Err(LatticeError::Missing { missing, total });
-    }
-    let largest = |image: &Image| {
-        let finite = image.values.iter().filter(|v| v.is_finite());
-        finite.fold(0.0f64, |a, v| a.max(v.abs()))
-    };
-    let before = largest(image);
-    let image = remove_background(image, background);
-    if largest(&image) <= ROUNDING * before {
-        return Err(LatticeError::Constant);
-    }
+    let image = levelled(image, background)?;
     let full = Spectrum::new(&image);
     let mut best = [0.0; 3];
     for candidate in select::candidates(&full, &geometry.pixel_to_nm) {
@@ -389,6 +385,32 @@ fn prepare(
         });
     }
     Err(LatticeError::NoLattice { best })
+}
+
+/// The image without its background, if there is anything in it to measure.
+fn levelled(image: &Image, background: Background) -> Result<Image, LatticeError> {
+    let (rows, columns) = (image.rows, image.columns);
+    if rows < SMALLEST_SIDE || columns < SMALLEST_SIDE {
+        return Err(LatticeError::TooSmall { columns, rows });
+    }
+    let total = image.values.len();
+    let missing = image.values.iter().filter(|v| !v.is_finite()).count();
+    if missing == total {
+        return Err(LatticeError::Constant);
+    }
+    if 2 * missing > total {
+        return Err(LatticeError::Missing { missing, total });
+    }
+    let largest = |image: &Image| {
+        let finite = image.values.iter().filter(|v| v.is_finite());
+        finite.fold(0.0f64, |a, v| a.max(v.abs()))
+    };
+    let before = largest(image);
+    let image = remove_background(image, background);
+    if largest(&image) <= ROUNDING * before {
+        return Err(LatticeError::Constant);
+    }
+    Ok(image)
 }
 
 /// Bins per shortest period of the first harmonics: enough for their second order.

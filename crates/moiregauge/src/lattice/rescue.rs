@@ -4,8 +4,10 @@
 //! with both by itself once it knows where to look. The other estimators have no such means and are
 //! not offered this.
 
+use nalgebra::Matrix2;
+
 use super::fit::middle as median;
-use super::{LatticeError, Prepared, prepare};
+use super::{LatticeError, Prepared, known, levelled, prepare};
 use crate::background::remove_background;
 use crate::geometry::Geometry;
 use crate::image::Image;
@@ -25,6 +27,27 @@ pub(super) fn prepare_again(
     let clipped = cut_off(&flat);
     let found = match prepare(&clipped, geometry, background) {
         Err(LatticeError::NoLattice { .. }) => prepare(&clipped, geometry, Background::LineMean),
+        other => other,
+    };
+    found.map(|prepared| Prepared {
+        image: flat,
+        ..prepared
+    })
+}
+
+/// The same for a lattice of about the cell `known`.
+pub(super) fn prepare_known_again(
+    image: &Image,
+    geometry: &Geometry,
+    background: Background,
+    known: &Matrix2<f64>,
+) -> Result<Prepared, LatticeError> {
+    let flat = levelled(image, background)?;
+    let clipped = cut_off(&flat);
+    let found = match known::prepare(&clipped, geometry, background, known) {
+        Err(LatticeError::NoLattice { .. }) => {
+            known::prepare(&clipped, geometry, Background::LineMean, known)
+        }
         other => other,
     };
     found.map(|prepared| Prepared {

@@ -31,12 +31,21 @@ pub(crate) struct Candidate {
     pub(crate) pair: Matrix2<f64>,
     /// How well it explains the peaks; larger is better.
     pub(crate) score: f64,
+    /// How many peaks it explains, and how many it would by chance.
+    pub(crate) explained: [f64; 2],
 }
 
+/// Whether more peaks lie on the lattice than chance puts there, were it to try many times.
+pub(super) fn well_explained(candidate: &Candidate) -> bool {
+    let [found, expected] = candidate.explained;
+    found >= 6.0 && found > 6.0 * expected
+}
+
+/// A local maximum of the spectrum.
 #[derive(Clone, Copy, Debug)]
-struct Peak {
+pub(super) struct Peak {
     /// rad per pixel, sub-bin.
-    q: Vector2<f64>,
+    pub(super) q: Vector2<f64>,
     /// The same in cycles per frame.
     cycles: Vector2<f64>,
     /// Power over the local noise power.
@@ -52,7 +61,7 @@ pub(crate) fn candidates(spectrum: &Spectrum, pixel_to_nm: &Matrix2<f64>) -> Vec
     let Some(to_physical) = pixel_to_nm.try_inverse().map(|m| m.transpose()) else {
         return Vec::new();
     };
-    let peaks = peaks(spectrum);
+    let peaks = spectrum_peaks(spectrum);
     let mut found: Vec<Candidate> = Vec::new();
     let generators = &peaks[..peaks.len().min(GENERATORS)];
     for (i, a) in generators.iter().enumerate() {
@@ -63,6 +72,11 @@ pub(crate) fn candidates(spectrum: &Spectrum, pixel_to_nm: &Matrix2<f64>) -> Vec
             }
         }
     }
+    by_score(found, spectrum)
+}
+
+/// The best few that are different lattices.
+pub(super) fn by_score(mut found: Vec<Candidate>, spectrum: &Spectrum) -> Vec<Candidate> {
     found.sort_by(|a, b| b.score.total_cmp(&a.score));
     let mut distinct: Vec<Candidate> = Vec::new();
     let frame = frame_cycles(spectrum);
@@ -82,7 +96,7 @@ pub(crate) fn candidates(spectrum: &Spectrum, pixel_to_nm: &Matrix2<f64>) -> Vec
 }
 
 /// rad per pixel → cycles per frame.
-fn frame_cycles(spectrum: &Spectrum) -> Matrix2<f64> {
+pub(super) fn frame_cycles(spectrum: &Spectrum) -> Matrix2<f64> {
     let [w, h] = spectrum.image_size;
     Matrix2::from_diagonal(&Vector2::new(w as f64, h as f64)) / std::f64::consts::TAU
 }
@@ -117,20 +131,42 @@ fn assess(
     if shortest(&pair) < LOWEST_CYCLES {
         return None;
     }
+    let candidate = score(&pair, peaks, spectrum, Orders(ORDERS))?;
+    Some(Candidate {
+        score: candidate.score * (1.0 - distortion(&(to_physical * candidate.pair)).powi(2)),
+        ..candidate
+    })
+}
+
+/// The highest order of harmonics that count.
+#[derive(Clone, Copy)]
+pub(super) struct Orders(pub(super) f64);
+
+/// Refines the pair with the peaks it explains and scores it.
+pub(super) fn score(
+    pair: &Matrix2<f64>,
+    peaks: &[Peak],
+    spectrum: &Spectrum,
+    orders: Orders,
+) -> Option<Candidate> {
+    let frame = frame_cycles(spectrum);
+    let mut pair = *pair;
     // Two rounds: the first with peaks near by, the second with all that fit the refined pair.
     for _ in 0..2 {
-        pair = refined(&pair, peaks, &frame)?;
+        pair = refined(&pair, peaks, &frame, orders)?;
     }
     let cell = (frame * pair).determinant().abs();
     let chance = (std::f64::consts::PI * TOLERANCE * TOLERANCE / cell).min(1.0);
     let mut score = 0.0;
     let mut first_shell = [0.0f64; 3];
+    let mut found = 0.0;
     for peak in peaks {
-        let Some((h, k)) = explained(peak, &pair, &frame) else {
+        let Some((h, k)) = explained(peak, &pair, &frame, orders) else {
             continue;
         };
         let weight = (1.0 + peak.significance).ln();
         score += weight * (1.0 - chance);
+        found += 1.0;
         let shell = [[1.0, 0.0], [0.0, 1.0], [-1.0, 1.0]];
         for (best, [sh, sk]) in first_shell.iter_mut().zip(shell) {
             if (h, k) == (sh, sk) || (h, k) == (-sh, -sk) {
@@ -141,15 +177,23 @@ fn assess(
     // The sum rule: a lattice is as good as the weakest of its three shortest vectors.
     first_shell.sort_by(f64::total_cmp);
     score += 2.0 * first_shell[0] + first_shell[1];
-    score *= 1.0 - distortion(&(to_physical * pair)).powi(2);
-    Some(Candidate { pair, score })
+    Some(Candidate {
+        pair,
+        score,
+        explained: [found, chance * peaks.len() as f64],
+    })
 }
 
 /// The indices of the lattice point on which the peak lies, if it does.
-fn explained(peak: &Peak, pair: &Matrix2<f64>, frame: &Matrix2<f64>) -> Option<(f64, f64)> {
+fn explained(
+    peak: &Peak,
+    pair: &Matrix2<f64>,
+    frame: &Matrix2<f64>,
+    orders: Orders,
+) -> Option<(f64, f64)> {
     let indices = pair.try_inverse()? * peak.q;
     let (h, k) = (indices.x.round(), indices.y.round());
-    if (h == 0.0 && k == 0.0) || h.abs().max(k.abs()).max((h + k).abs()) > ORDERS {
+    if (h == 0.0 && k == 0.0) || h.abs().max(k.abs()).max((h + k).abs()) > orders.0 {
         return None;
     }
     let miss = frame * (peak.q - pair * Vector2::new(h, k));
@@ -157,11 +201,16 @@ fn explained(peak: &Peak, pair: &Matrix2<f64>, frame: &Matrix2<f64>) -> Option<(
 }
 
 /// Least-squares pair through the peaks it explains, each weighted by its significance.
-fn refined(pair: &Matrix2<f64>, peaks: &[Peak], frame: &Matrix2<f64>) -> Option<Matrix2<f64>> {
+fn refined(
+    pair: &Matrix2<f64>,
+    peaks: &[Peak],
+    frame: &Matrix2<f64>,
+    orders: Orders,
+) -> Option<Matrix2<f64>> {
     let mut normal = Matrix2::zeros();
     let mut right = Matrix2::zeros();
     for peak in peaks {
-        if let Some((h, k)) = explained(peak, pair, frame) {
+        if let Some((h, k)) = explained(peak, pair, frame, orders) {
             let index = Vector2::new(h, k);
             let weight = peak.significance.min(1e4);
             normal += weight * index * index.transpose();
@@ -172,7 +221,7 @@ fn refined(pair: &Matrix2<f64>, peaks: &[Peak], frame: &Matrix2<f64>) -> Option<
 }
 
 /// The most significant local maxima of the spectrum, best first.
-fn peaks(spectrum: &Spectrum) -> Vec<Peak> {
+pub(super) fn spectrum_peaks(spectrum: &Spectrum) -> Vec<Peak> {
     let noise = NoiseMap::new(spectrum);
     let half = spectrum.half();
     let rows = spectrum.rows;

@@ -4,6 +4,7 @@ use nalgebra::Vector2;
 use spmfile::{Channel, LineDirection, Samples, Scan, Span};
 
 use super::measure::{channels, image_of, nominal, usable_sensors};
+use super::scanner::calibrated;
 use crate::analysis::ScanAnalysis;
 use crate::geometry::{Geometry, Timing};
 use crate::resample::{at_rest, resample};
@@ -40,7 +41,7 @@ pub fn corrected_images(
     channels
         .into_iter()
         .filter(wanted)
-        .filter_map(|channel| corrected(scan, channel, &analysed.file, analysed.drift))
+        .filter_map(|channel| corrected(scan, channel, &analysed.file, analysed.drift, settings))
         .collect()
 }
 
@@ -49,12 +50,13 @@ fn corrected(
     channel: &Channel,
     file: &str,
     drift: Option<Vector2<f64>>,
+    settings: &Settings,
 ) -> Option<CorrectedImage> {
     let line = channel.line_direction.unwrap_or(LineDirection::Trace);
     let nominal = nominal(scan, channel);
     let mut doubts = Vec::new();
     let sensors = usable_sensors(file, scan, channel, nominal.as_ref(), &mut doubts);
-    let geometry = sensors.map(|s| s.geometry).or(nominal)?;
+    let geometry = calibrated(sensors.map(|s| s.geometry).or(nominal)?, settings);
     let timing = scan
         .frame_direction
         .and_then(|frame| Timing::of_scan(scan, channel.columns, frame, line));
@@ -64,6 +66,9 @@ fn corrected(
     } else {
         "positions: nominal size and rotation, no position sensors".to_owned()
     });
+    if settings.scanner.is_some() {
+        log.push("corrected by the calibration of the scanner".to_owned());
+    }
     let at_rest = match (drift, timing) {
         (Some(drift), Some(timing)) => {
             let [x, y] = [drift.x * 60.0, drift.y * 60.0];

@@ -3,6 +3,7 @@
 use spmfile::{LineDirection, Scan};
 
 use super::measure::{channels, image_of, nominal, sensor_images, usable_sensors};
+use super::scanner::calibrated;
 use crate::analysis::{Illustration, ScanAnalysis};
 use crate::background::remove_background;
 use crate::geometry::Timing;
@@ -45,11 +46,20 @@ pub fn illustrate(
     let mut pixel_to_nm = line.pixel_to_nm;
     let mut origin = line.origin;
     if let (Some(sensors), Some(measured)) = (&sensors, &measured) {
-        fast = velocities(&sensors.fast_steps, 0);
-        slow = velocities(&sensors.slow_steps, 1);
+        let scaled = |steps: &[f64], by: f64| steps.iter().map(|s| s * by).collect::<Vec<f64>>();
+        let (raw, now) = (
+            &sensors.geometry,
+            calibrated(sensors.geometry.clone(), settings),
+        );
+        let by = [
+            now.fast_step().norm() / raw.fast_step().norm(),
+            now.slow_step().norm() / raw.slow_step().norm(),
+        ];
+        fast = velocities(&scaled(&sensors.fast_steps, by[0]), 0);
+        slow = velocities(&scaled(&sensors.slow_steps, by[1]), 1);
         // The whole frame is shown, also where only a part of it was analysed.
-        pixel_to_nm = sensors.geometry.pixel_to_nm;
-        origin = sensors.geometry.origin;
+        pixel_to_nm = now.pixel_to_nm;
+        origin = now.origin;
         let axis = usize::from(pixel_to_nm.m11.abs() < pixel_to_nm.m21.abs());
         let row = channel.rows / 2;
         let plane = &sensors.planes[axis];

@@ -7,6 +7,7 @@ use super::channel::{choose_channel, stem};
 use super::doubts::{about_fit, few_periods, lines_disagree, turned};
 use super::moires::in_order;
 use super::overlap::Window;
+use super::scanner::{about_calibration, calibrated};
 use super::shared::correlation;
 use crate::caveat::Caveat;
 use crate::drift::Observation;
@@ -15,7 +16,7 @@ use crate::geometry::{Geometry, SensorGeometry, Timing, from_sensors, mean_and_s
 use crate::image::Image;
 use crate::lattice::reciprocal::labelled_like;
 use crate::lattice::{
-    LatticeError, LatticeVectors, MeasuredLattice, measure, measure_several, vectors,
+    LatticeError, LatticeVectors, MeasuredLattice, Start, measure, measure_several, vectors,
 };
 use crate::settings::{Lines, Settings};
 
@@ -164,6 +165,23 @@ pub fn measure_scan(
     Ok(measure_moires(file, scan, settings, window)?.swap_remove(0))
 }
 
+/// Measures a scan of a lattice whose cell is known: `cell` is its real-space pair, nm, at any orientation.
+///
+/// # Errors
+/// As [`measure_scan`]; an image that shows another lattice shows none.
+pub fn measure_known(
+    file: &str,
+    scan: &Scan,
+    settings: &Settings,
+    cell: &Matrix2<f64>,
+) -> Result<MeasuredScan, MeasureError> {
+    let find = |image: &Image, geometry: &Geometry| {
+        let start = Start::find_known(image, geometry, settings.background, cell)?;
+        Ok(vec![start.measure(settings.method)?])
+    };
+    Ok(measure_with(file, scan, settings, None, &find)?.swap_remove(0))
+}
+
 /// Measures every moiré of one scan, as many as `settings` say, the largest cell first; otherwise as
 /// [`measure_scan`]. There is at least one.
 ///
@@ -175,12 +193,30 @@ pub fn measure_moires(
     settings: &Settings,
     window: Option<&Window>,
 ) -> Result<Vec<MeasuredScan>, MeasureError> {
+    let (background, method) = (settings.background, settings.method);
+    let find = |image: &Image, geometry: &Geometry| match settings.moires {
+        0 | 1 => measure(image, geometry, background, method).map(|lattice| vec![lattice]),
+        n => measure_several(image, geometry, background, n),
+    };
+    measure_with(file, scan, settings, window, &find)
+}
+
+/// How the lattices of an image are found and measured; at least one.
+type Find<'a> = &'a dyn Fn(&Image, &Geometry) -> Result<Vec<MeasuredLattice>, LatticeError>;
+
+fn measure_with(
+    file: &str,
+    scan: &Scan,
+    settings: &Settings,
+    window: Option<&Window>,
+    find: Find,
+) -> Result<Vec<MeasuredScan>, MeasureError> {
     let channels = channels(scan, settings)?;
     let mut caveats = Vec::new();
     let mut moires: Vec<Vec<MeasuredLine>> = Vec::new();
     let mut failures = Vec::new();
     for channel in &channels {
-        match measure_line(file, scan, channel, settings, window, &mut caveats) {
+        match measure_line(file, scan, channel, settings, (window, find), &mut caveats) {
             Ok(lines) if moires.is_empty() => {
                 moires = lines.into_iter().map(|line| vec![line]).collect();
             }
@@ -207,6 +243,7 @@ pub fn measure_moires(
             format!("one line direction could not be used: {error}"),
         ));
     }
+    about_calibration(file, scan, moires.iter().flatten(), settings, &mut caveats);
     caveats.dedup_by(|a, b| (&a.code, &a.message) == (&b.code, &b.message));
     let measured = moires.into_iter().map(|mut lines| {
         share_noise(&mut lines);
@@ -298,7 +335,7 @@ fn measure_line(
     scan: &Scan,
     channel: &Channel,
     settings: &Settings,
-    window: Option<&Window>,
+    (window, find): (Option<&Window>, Find),
     caveats: &mut Vec<Caveat>,
 ) -> Result<Vec<MeasuredLine>, MeasureError> {
     let line = channel.line_direction.unwrap_or(LineDirection::Trace);
@@ -329,12 +366,15 @@ fn measure_line(
         geometry = geometry.cropped(first, size);
         nominal = nominal.map(|n| n.cropped(first, size));
     }
-    let (background, method) = (settings.background, settings.method);
-    let lattices = match settings.moires {
-        0 | 1 => measure(&image, &geometry, background, method).map(|lattice| vec![lattice]),
-        n => measure_several(&image, &geometry, background, n),
+    let geometry = calibrated(geometry, settings);
+    let speeds = match (&timing, &settings.scanner) {
+        (Some(timing), Some(_)) => {
+            let now = geometry.speeds(timing);
+            [0, 1].map(|i| speeds[i].scaled(now[i] / speeds[i].value))
+        }
+        _ => speeds,
     };
-    let mut lattices = lattices.map_err(|error| MeasureError::Lattice {
+    let mut lattices = find(&image, &geometry).map_err(|error| MeasureError::Lattice {
         line: line_name(line),
         channel: channel.name.clone(),
         error,

@@ -4,6 +4,7 @@
 //! the few numbers that remain. [`illustrate`] goes back to the pixels of one scan for the figures.
 
 mod atomic;
+mod calibrate;
 mod channel;
 mod combine;
 mod corrected;
@@ -14,6 +15,7 @@ mod mapping;
 mod measure;
 mod moires;
 mod overlap;
+mod scanner;
 mod set;
 mod shared;
 mod sightings;
@@ -21,12 +23,15 @@ mod surveying;
 mod tiling;
 
 pub use atomic::{AtomicError, AtomicOrientation, atomic_orientation};
+pub use calibrate::{CalibrateError, Calibrated, CalibratedSet, calibrate};
 pub use channel::{channels_by_preference, choose_channel};
 pub use corrected::{CorrectedImage, corrected_images, nominal_geometry, on_grid};
 pub use group::natural_order;
 pub use illustrate::illustrate;
 pub use mapping::{LineMap, MapError, MapMethod, map_scan};
-pub use measure::{MeasureError, MeasuredLine, MeasuredScan, measure_moires, measure_scan};
+pub use measure::{
+    MeasureError, MeasuredLine, MeasuredScan, measure_known, measure_moires, measure_scan,
+};
 pub use moires::sorted_moires;
 pub use overlap::{Window, common_window};
 pub use surveying::{ReadBlock, SurveyError, SurveyPlan};

@@ -1,0 +1,317 @@
+//! `moiregauge calibrate`: images of a known lattice → the calibration of a scanner.
+
+pub(crate) mod file;
+mod words;
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use anyhow::{Context as _, bail, ensure};
+use indicatif::ProgressBar;
+use moiregauge::calibration::KnownLattice;
+use moiregauge::caveat::Caveat;
+use moiregauge::material::Material;
+use moiregauge::series::{MeasuredScan, measure_known};
+use moiregauge::settings::{Grouping, Settings};
+use moiregauge_report::{FailedInput, InputFile};
+use rayon::prelude::*;
+
+use crate::analyze::{BackgroundArg, LineArg, Reading, failures, read};
+use crate::info::expand;
+use crate::input::{Known, KnownArgs};
+use crate::say::say;
+
+/// Measure gain, mismatch and orthogonality of a scanner on images of a known lattice
+///
+/// The lattice of each image is found from its known size, at any orientation; frames up and down (or of both
+/// slow axes, or of two line rates) separate the drift. What is left against the known lattice is the
+/// distortion of the scanner: of its position sensors, or of its nominal coordinates where there are none. A
+/// turn is not seen. `moiregauge analyze --calibration FILE` corrects positions with it and takes its errors
+/// into the budget. Frames of one direction give the distortion too, but not what of it is drift.
+#[derive(clap::Args, Clone, Debug)]
+#[command(after_long_help = "\
+Examples:
+  moiregauge calibrate hopg_up.spm hopg_down.spm --material graphite --out scanner.toml
+  moiregauge calibrate si/*.sxm --material si111-7x7 --channel Z --out scanner.toml
+  moiregauge calibrate grid/ --lattice 0.5nm,0.62nm,103 --lattice-sigma 0.1
+  moiregauge calibrate one.sxm --material graphite --drift-sigma 0.2
+  moiregauge analyze scans/ --out results --calibration scanner.toml
+
+Lengths are shown (1 + gain) times too long, those along x more than those along y by the mismatch;
+the axes shown enclose a right angle less the orthogonality error.")]
+pub(crate) struct CalibrateArgs {
+    /// Scan files, folders (the scans in them, without subfolders) or names with * and ?
+    #[arg(required = true, value_name = "PATH")]
+    paths: Vec<PathBuf>,
+    /// The lattice that the images show: graphite, mica, si111-7x7, si111, au111 or a layer (graphene, hBN, …)
+    #[arg(long, value_name = "NAME", required_unless_present_any = ["lattice", "lattice_constant"])]
+    material: Option<String>,
+    /// Any lattice: two lengths and the angle between them in degrees, as in 0.5nm,0.62nm,103
+    #[arg(long, value_name = "A,B,ANGLE", value_parser = parse_lattice, conflicts_with_all = ["material", "lattice_constant"])]
+    lattice: Option<Cell>,
+    /// A hexagonal lattice by its constant, as in 0.246nm
+    #[arg(long, value_name = "LENGTH", value_parser = parse_length, conflicts_with = "material")]
+    lattice_constant: Option<f64>,
+    /// Standard uncertainty of the known lattice, per cent [default: the material's; 0.1 for one of your own]
+    #[arg(long, value_name = "PERCENT")]
+    lattice_sigma: Option<f64>,
+    /// File for the calibration (TOML)
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Standard deviation of each component of a drift that the frames cannot tell, nm/min
+    #[arg(long, value_name = "NM/MIN", default_value_t = 1.0)]
+    drift_sigma: f64,
+    /// Channel that shows the lattice [default: the first of the usual ones]
+    #[arg(long, value_name = "NAME")]
+    channel: Option<String>,
+    /// Line directions to use [default: both]
+    #[arg(long, value_enum)]
+    line: Option<LineArg>,
+    /// What is subtracted from an image first [default: plane]
+    #[arg(long, value_enum)]
+    background: Option<BackgroundArg>,
+    #[command(flatten)]
+    known: KnownArgs,
+    /// Write over an earlier calibration
+    #[arg(long, requires = "out")]
+    force: bool,
+    /// Print nothing but errors
+    #[arg(long, short)]
+    quiet: bool,
+}
+
+/// A lattice as it is typed in.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Cell {
+    a_nm: f64,
+    b_nm: f64,
+    angle_deg: f64,
+}
+
+/// Measures the images, prints what they say, and writes the file.
+pub(crate) fn run(args: &CalibrateArgs) -> anyhow::Result<ExitCode> {
+    ensure!(
+        args.drift_sigma >= 0.0 && args.drift_sigma.is_finite(),
+        "--drift-sigma expects a number ≥ 0, found {}",
+        args.drift_sigma
+    );
+    if let Some(out) = &args.out {
+        ensure!(
+            args.force || !out.exists(),
+            "{} exists already; give another --out, or --force to write over it",
+            out.display()
+        );
+    }
+    let lattice = args.known_lattice()?;
+    let cell = lattice
+        .cell()
+        .context("the known lattice has no area: expected two vectors that are not parallel")?;
+    let defaults = Settings::default();
+    let settings = Settings {
+        channel: args.channel.clone(),
+        line: args.line.map_or(defaults.line, Into::into),
+        background: args.background.map_or(defaults.background, Into::into),
+        ..defaults
+    };
+    let mut failed = Vec::new();
+    let mut inputs = Vec::new();
+    for path in expand(&args.paths) {
+        match path {
+            Ok(path) => inputs.push(path),
+            Err((path, error)) => failed.push(FailedInput {
+                file: path.display().to_string(),
+                error,
+            }),
+        }
+    }
+    let known = args.known.of(&inputs);
+    let bar = if args.quiet {
+        ProgressBar::hidden()
+    } else {
+        crate::analyze::progress(inputs.len(), true)
+    };
+    let measured: Vec<_> = inputs
+        .par_iter()
+        .map(|path| {
+            let result = measured(path, &settings, &known, &cell);
+            bar.inc(1);
+            result
+        })
+        .collect();
+    bar.finish_and_clear();
+    let (mut scans, mut files): (Vec<MeasuredScan>, Vec<InputFile>) = (Vec::new(), Vec::new());
+    for (path, result) in inputs.iter().zip(measured) {
+        match result {
+            Ok((scan, file)) => {
+                scans.push(scan);
+                files.push(file);
+            }
+            Err(error) => failed.push(FailedInput {
+                file: path.display().to_string(),
+                error: format!("{error:#}"),
+            }),
+        }
+    }
+    eprint!("{}", failures(&failed));
+    ensure!(
+        !scans.is_empty(),
+        "no image shows the lattice of {}",
+        lattice.name
+    );
+    let sigma = args.drift_sigma / 60.0;
+    let found = moiregauge::series::calibrate(scans, &lattice, sigma, Grouping::Auto)?;
+    if !args.quiet {
+        say(&words::summary(&found, &lattice))?;
+    }
+    if let Some(out) = &args.out {
+        if !found.covariance_known {
+            bail!(
+                "{} is not written: nobody knows its errors, since the frames do not tell the drift and have no line \
+                 rate; give --line-rate",
+                out.display()
+            );
+        }
+        let text = file::text(&found, &lattice, args.drift_sigma, &files)?;
+        std::fs::write(out, text).with_context(|| format!("cannot write {}", out.display()))?;
+        if !args.quiet {
+            say(&format!(
+                "\nWritten to {0}; for moiregauge analyze --calibration {0}\n",
+                out.display()
+            ))?;
+        }
+    }
+    Ok(if failed.is_empty() {
+        ExitCode::SUCCESS
+    } else {
+        ExitCode::FAILURE
+    })
+}
+
+/// One image of the known cell.
+fn measured(
+    path: &std::path::Path,
+    settings: &Settings,
+    known: &Known,
+    cell: &nalgebra::Matrix2<f64>,
+) -> anyhow::Result<(MeasuredScan, InputFile)> {
+    let Reading {
+        scan,
+        input,
+        replaced,
+    } = read(path, settings, known)?;
+    let mut measured = measure_known(&input.file, &scan, settings, cell)
+        .context("looking for the known lattice (another --channel may show it better)")?;
+    for words in replaced {
+        let caveat = Caveat::new("given-by-user", input.file.as_str(), words);
+        measured.caveats.push(caveat);
+    }
+    Ok((measured, input))
+}
+
+impl CalibrateArgs {
+    fn known_lattice(&self) -> anyhow::Result<KnownLattice> {
+        let own = self.lattice_sigma.unwrap_or(0.1);
+        let mut lattice = match (self.lattice, self.lattice_constant, &self.material) {
+            (Some(cell), _, _) => KnownLattice {
+                name: format!("{} × {} nm, {}°", cell.a_nm, cell.b_nm, cell.angle_deg),
+                a_nm: cell.a_nm,
+                b_nm: cell.b_nm,
+                angle_deg: cell.angle_deg,
+                sigma_percent: own,
+                source: "given by the user".to_owned(),
+            },
+            (_, Some(a), _) => {
+                KnownLattice::hexagonal(&format!("hexagonal, {a} nm"), a, own, "given by the user")
+            }
+            (_, _, Some(name)) => named(name)?,
+            _ => bail!("give --material, --lattice or --lattice-constant"),
+        };
+        if let Some(sigma) = self.lattice_sigma {
+            ensure!(
+                (0.0..=10.0).contains(&sigma),
+                "--lattice-sigma lies between 0 and 10 %, found {sigma}"
+            );
+            lattice.sigma_percent = sigma;
+        }
+        Ok(lattice)
+    }
+}
+
+fn named(name: &str) -> anyhow::Result<KnownLattice> {
+    if let Some(known) = KnownLattice::named(name) {
+        return Ok(known);
+    }
+    if let Some(layer) = Material::named(name) {
+        return Ok(KnownLattice::hexagonal(
+            &layer.name,
+            layer.lattice_constant_nm,
+            100.0 * layer.lattice_constant_sigma_nm / layer.lattice_constant_nm,
+            &layer.source,
+        ));
+    }
+    let surfaces = KnownLattice::all().into_iter().map(|k| k.name);
+    let layers = Material::all().into_iter().map(|m| m.name);
+    let all: Vec<String> = surfaces.chain(layers).collect();
+    bail!(
+        "unknown lattice {name:?}; known are {}; any other: --lattice A,B,ANGLE or --lattice-constant A",
+        all.join(", ")
+    )
+}
+
+/// A length with its unit; a bare number is nm.
+fn parse_length(text: &str) -> Result<f64, String> {
+    let with_unit = spmfile::length_nm(text);
+    let length = with_unit.or_else(|| text.trim().parse().ok());
+    length
+        .filter(|nm: &f64| *nm > 0.0 && nm.is_finite())
+        .ok_or_else(|| "expected a length with a unit, as in 0.246nm".to_owned())
+}
+
+fn parse_lattice(text: &str) -> Result<Cell, String> {
+    let parts: Vec<&str> = text.split(',').map(str::trim).collect();
+    let expected = "expected two lengths and an angle in degrees, as in 0.5nm,0.62nm,103";
+    let [a, b, angle] = parts.as_slice() else {
+        return Err(expected.to_owned());
+    };
+    let angle_deg: f64 = angle
+        .trim_end_matches('°')
+        .parse()
+        .map_err(|_| expected.to_owned())?;
+    if !(angle_deg > 5.0 && angle_deg < 175.0) {
+        return Err(format!(
+            "expected an angle between 5° and 175°, found {angle_deg}°"
+        ));
+    }
+    Ok(Cell {
+        a_nm: parse_length(a)?,
+        b_nm: parse_length(b)?,
+        angle_deg,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lattices_are_typed_with_units() {
+        let cell = parse_lattice("5 Å, 0.62nm,103°").unwrap();
+        assert!((cell.a_nm - 0.5).abs() < 1e-12);
+        assert_eq!((cell.b_nm, cell.angle_deg), (0.62, 103.0));
+        assert_eq!(parse_length("0.246"), Ok(0.246));
+        for wrong in ["0.5nm,0.6nm", "0.5nm,0.6V,90", "0.5nm,0.6nm,0", "a,b,c"] {
+            assert!(parse_lattice(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn surfaces_and_layers_have_names() {
+        assert_eq!(named("Si111-7x7").unwrap().a_nm, 2.688);
+        assert_eq!(named("hbn").unwrap().a_nm, 0.2504);
+        let error = named("cheese").unwrap_err().to_string();
+        assert!(
+            error.contains("graphite") && error.contains("MoS2"),
+            "{error}"
+        );
+    }
+}

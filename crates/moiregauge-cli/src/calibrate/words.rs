@@ -1,0 +1,116 @@
+//! What a calibration says on the screen.
+
+use std::fmt::Write as _;
+
+use moiregauge::calibration::{Coordinates, KnownLattice};
+use moiregauge::estimate::Estimate;
+use moiregauge::series::{Calibrated, CalibratedSet};
+use moiregauge_report::{plus_minus, two_digits};
+
+use crate::analyze::caveat_lines;
+
+/// The sets, the calibration, and what to keep in mind.
+pub(super) fn summary(found: &Calibrated, lattice: &KnownLattice) -> String {
+    let mut text = format!(
+        "known lattice: {}, {} × {} nm, {}° (± {} %; {})\n\n",
+        lattice.name,
+        lattice.a_nm,
+        lattice.b_nm,
+        lattice.angle_deg,
+        two_digits(lattice.sigma_percent),
+        lattice.source
+    );
+    for set in &found.sets {
+        one_set(&mut text, set);
+    }
+    let coordinates = match found.calibration.coordinates {
+        Coordinates::Sensors => "position sensors",
+        Coordinates::Nominal => "nominal coordinates",
+    };
+    let sets = found.sets.iter().filter(|s| s.used).count();
+    let of = if sets == 1 {
+        "1 set".to_owned()
+    } else {
+        format!("{sets} sets")
+    };
+    let all = found.calibration.estimates();
+    let unknown = |e: Estimate| {
+        if found.covariance_known {
+            e
+        } else {
+            Estimate::new(e.value, f64::NAN)
+        }
+    };
+    let [gain, mismatch, right] = all.map(unknown);
+    let noise = found.statistical.map(two_digits);
+    let _ = writeln!(text, "calibration of the {coordinates}, {of}");
+    let rows = [
+        (
+            "gain",
+            gain,
+            "%",
+            &noise[0],
+            "lengths are shown too long by this, mean of x and y",
+        ),
+        (
+            "mismatch",
+            mismatch,
+            "%",
+            &noise[1],
+            "along x by this much more than along y",
+        ),
+        (
+            "orthogonality",
+            right,
+            "mrad",
+            &noise[2],
+            "the axes shown enclose a right angle less this",
+        ),
+    ];
+    for (name, value, unit, noise, words) in rows {
+        let _ = writeln!(
+            text,
+            "  {name:14}{} {unit}  ({noise} from the images alone): {words}",
+            plus_minus(value)
+        );
+    }
+    let c = &found.calibration.covariance;
+    let along = |sign: f64| {
+        let variance = c[0][0] + c[1][1] / 4.0 + sign * c[0][1];
+        unknown(Estimate::from_variance(
+            all[0].value + sign * all[1].value / 2.0,
+            variance,
+        ))
+    };
+    let _ = writeln!(
+        text,
+        "  which is      x {} %, y {} %\n",
+        plus_minus(along(1.0)),
+        plus_minus(along(-1.0))
+    );
+    caveat_lines(&mut text, &found.caveats);
+    text
+}
+
+fn one_set(text: &mut String, set: &CalibratedSet) {
+    let count = set.files.len();
+    let plural = if count == 1 { "" } else { "s" };
+    let _ = writeln!(text, "{}: {}, {count} scan{plural}", set.name, set.channel);
+    let lengths = [0, 1, 2].map(|i| format!("{:.4}", set.lattice.wavelength(i).value));
+    let _ = writeln!(text, "  lattice shown {} nm", lengths.join(", "));
+    match &set.drift {
+        Some([x, y]) => {
+            let _ = writeln!(
+                text,
+                "  drift         x {}, y {} nm/min",
+                plus_minus(x.scaled(60.0)),
+                plus_minus(y.scaled(60.0))
+            );
+        }
+        None => text.push_str("  drift         not separated from gain and shear\n"),
+    }
+    if !set.used {
+        text.push_str("  not used: other sets tell their drift\n");
+    }
+    text.push('\n');
+}

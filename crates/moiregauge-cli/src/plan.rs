@@ -1,0 +1,199 @@
+//! `moiregauge plan`: wanted errors and an instrument → how to scan, how long, and what limits.
+
+mod search;
+mod words;
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use anyhow::{Context as _, ensure};
+use moiregauge::settings::Settings;
+use moiregauge::simulate::{Simulation, Simulator};
+
+use crate::say::say;
+use search::Limits;
+
+/// How many scans, how fast and how large, for the errors that are wanted
+///
+/// For several frame sizes and line rates the smallest number of alternating scans is sought that gives the wanted
+/// standard errors, by the Fisher information of pixel and sensor noise and the covariance of the joint fit;
+/// `moiregauge validate` simulates the same. Beside it stands what no number of scans makes smaller: the
+/// calibration of the scanner, the lattice constant, isotropic strain. A wish below that cannot be reached, and the
+/// plan says what stands in the way.
+#[derive(clap::Args, Clone, Debug)]
+#[command(after_long_help = "\
+Examples:
+  moiregauge plan --twist-sigma 0.02
+  moiregauge plan --twist-sigma 0.001 --strain-sigma 0.005 --like scan.000.spm scan.001.spm
+  moiregauge plan --drift-sigma 0.01 --max-size 100 --max-rate 8 --calibration scanner.toml
+  moiregauge plan --strain-sigma 0.02 --config mine.toml --out plan.toml
+  moiregauge validate --config plan.toml              (simulates the recommended plan)
+
+The wanted errors are meant with calibration and model; one that these alone exceed is held against the
+statistical error of the scans, and said to be out of reach.")]
+pub(crate) struct PlanArgs {
+    /// Wanted standard error of the twist, degrees
+    #[arg(long, value_name = "DEG", required_unless_present_any = ["strain_sigma", "drift_sigma"])]
+    twist_sigma: Option<f64>,
+    /// Wanted standard error of each component of the strain vector, per cent
+    #[arg(long, value_name = "PERCENT")]
+    strain_sigma: Option<f64>,
+    /// Wanted standard error of each component of the drift, nm/min
+    #[arg(long, value_name = "NM/MIN")]
+    drift_sigma: Option<f64>,
+    /// The instrument and the sample: a file as `moiregauge simulate --print-config` prints it
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// The instrument and the sample: those of your own scans of one set
+    #[arg(long, value_name = "FILE", num_args = 1.., conflicts_with = "config")]
+    like: Vec<PathBuf>,
+    /// Largest frame, nm along the longer side [default: twice that of the conditions]
+    #[arg(long, value_name = "NM")]
+    max_size: Option<f64>,
+    /// Largest line rate, Hz [default: twice that of the conditions]
+    #[arg(long, value_name = "HZ")]
+    max_rate: Option<f64>,
+    /// The noise of a pixel does not depend on the time spent on it. Otherwise its square is taken to fall with
+    /// that time, from the line rate of the conditions on
+    #[arg(long)]
+    noise_per_pixel: bool,
+    /// Standard uncertainty of the times of frames, s
+    #[arg(long, value_name = "S", default_value_t = 0.6)]
+    frame_time_sigma: f64,
+    /// Calibration of the scanner, as `moiregauge calibrate` writes it
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["calibration_gain", "calibration_mismatch", "calibration_orthogonality"])]
+    calibration: Option<PathBuf>,
+    /// Gain error of the scanner, common to x and y, per cent [default: 1]
+    #[arg(long, value_name = "PERCENT")]
+    calibration_gain: Option<f64>,
+    /// Difference of the gains of x and y, per cent [default: 0.5]
+    #[arg(long, value_name = "PERCENT")]
+    calibration_mismatch: Option<f64>,
+    /// Deviation of the axes from a right angle, mrad [default: 5]
+    #[arg(long, value_name = "MRAD")]
+    calibration_orthogonality: Option<f64>,
+    /// Isotropic heterostrain that the layers may have, per cent [default: 0.05]
+    #[arg(long, value_name = "PERCENT")]
+    isotropic_strain: Option<f64>,
+    /// Write the recommended plan as conditions for `moiregauge validate` and `simulate`
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Write over an earlier plan
+    #[arg(long, requires = "out")]
+    force: bool,
+}
+
+/// What is wanted, in the units of the surface.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Wishes {
+    twist_deg: Option<f64>,
+    strain_percent: Option<f64>,
+    drift_nm_per_min: Option<f64>,
+}
+
+/// Searches and prints.
+pub(crate) fn run(args: &PlanArgs) -> anyhow::Result<ExitCode> {
+    for (name, wish) in [
+        ("--twist-sigma", args.twist_sigma),
+        ("--strain-sigma", args.strain_sigma),
+        ("--drift-sigma", args.drift_sigma),
+        ("--max-size", args.max_size),
+        ("--max-rate", args.max_rate),
+    ] {
+        ensure!(
+            wish.is_none_or(|w| w > 0.0 && w.is_finite()),
+            "{name} expects a number > 0, found {}",
+            wish.unwrap_or_default()
+        );
+    }
+    if let Some(out) = &args.out {
+        ensure!(
+            args.force || !out.exists(),
+            "{} exists already; give another --out, or --force to write over it",
+            out.display()
+        );
+    }
+    let given = crate::validate::given_conditions(args.config.as_deref(), &args.like)?;
+    let mut conditions = given.unwrap_or_default();
+    // What the header of a file says of its time is rounded to whole seconds: 0.29 s.
+    let clock = args.frame_time_sigma.powi(2) - 1.0 / 12.0;
+    conditions.noise.clock_s = clock.max(0.0).sqrt();
+    Simulator::new(conditions.clone()).context("these conditions make no sense")?;
+    ensure!(
+        conditions.noise.pixel_deg > 0.0,
+        "the conditions have no noise (noise.pixel_deg): every error would be zero"
+    );
+    let settings = args.settings(&conditions)?;
+    let wishes = Wishes {
+        twist_deg: args.twist_sigma,
+        strain_percent: args.strain_sigma,
+        drift_nm_per_min: args.drift_sigma,
+    };
+    let longest = conditions
+        .raster
+        .nominal_size_nm
+        .iter()
+        .zip(conditions.window.gain)
+        .map(|(size, gain)| size * gain)
+        .fold(0.0, f64::max);
+    let limits = Limits {
+        size_nm: args.max_size.unwrap_or(2.0 * longest),
+        rate_hz: args
+            .max_rate
+            .unwrap_or(2.0 * conditions.raster.line_rate_hz),
+        noise_per_pixel: args.noise_per_pixel,
+    };
+    let plans = search::plans(&conditions, &settings, &wishes, &limits);
+    let best = plans.first().context(
+        "no frame within --max-size and --max-rate shows the lattice: at least four periods across it, five pixels \
+         per period, and a signal that stands out of the noise are needed",
+    )?;
+    say(&words::plan(&conditions, &settings, &wishes, &plans))?;
+    if let Some(out) = &args.out {
+        let text = toml::to_string_pretty(&best.set)?;
+        std::fs::write(out, text).with_context(|| format!("cannot write {}", out.display()))?;
+        say(&format!(
+            "\nWritten to {0}; moiregauge validate --config {0} simulates it\n",
+            out.display()
+        ))?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+impl PlanArgs {
+    /// What is known of scanner and layers.
+    fn settings(&self, conditions: &Simulation) -> anyhow::Result<Settings> {
+        let mut settings = Settings {
+            material: conditions.sample.material.clone(),
+            strain_convention: conditions.sample.strain_convention,
+            frame_time_sigma_s: self.frame_time_sigma,
+            ..Settings::default()
+        };
+        let priors = [
+            (
+                self.calibration_gain,
+                &mut settings.calibration.gain_percent,
+            ),
+            (
+                self.calibration_mismatch,
+                &mut settings.calibration.mismatch_percent,
+            ),
+            (
+                self.calibration_orthogonality,
+                &mut settings.calibration.orthogonality_mrad,
+            ),
+            (
+                self.isotropic_strain,
+                &mut settings.isotropic_strain_percent,
+            ),
+        ];
+        for (given, setting) in priors {
+            *setting = given.unwrap_or(*setting);
+        }
+        if let Some(path) = &self.calibration {
+            settings.scanner = Some(crate::calibrate::file::read(path)?);
+        }
+        crate::config::check(&settings)?;
+        Ok(settings)
+    }
+}

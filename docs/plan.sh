@@ -1,0 +1,44 @@
+#!/usr/bin/env bash
+# Predictions of `moiregauge plan` against the scatter of simulated sets: makes docs/plan.md. Takes about ten minutes on
+# two cores.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+sets=${1:-400}
+cargo build --release --quiet
+program=${CARGO_TARGET_DIR:-target}/release/moiregauge
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+"$program" simulate --print-config | sed 's/^pixels = .*/pixels = [128, 128]/' > "$work/base.toml"
+{
+  printf '# What `moiregauge plan` foresees and what simulated sets give\n\n'
+  printf 'The recommended plan for each wish, and the root-mean-square error over %s simulated sets of just such scans\n' "$sets"
+  printf '(mean of x and y, and of both strain components). `docs/plan.sh` makes this page.\n\n'
+  printf '| wish, conditions | scans | Hz | size (nm) | minutes | quantity | foreseen σ | rms error | ratio |\n'
+  printf '| --- | --- | --- | --- | --- | --- | --- | --- | --- |\n'
+  while IFS='|' read -r name wishes change; do
+    sed "$change" "$work/base.toml" > "$work/conditions.toml"
+    # shellcheck disable=SC2086 # several words on purpose
+    "$program" plan $wishes --config "$work/conditions.toml" --out "$work/plan.toml" --force > "$work/plan.txt"
+    "$program" validate --quiet --sets "$sets" --config "$work/plan.toml" > "$work/validated.txt"
+    awk -v name="$name" '
+      FNR == NR && /^(→|✗)/ && !seen { scans = $2; hz = $3; size = $4 " × " $6; minutes = $7; drift = $8; twist = $9; strain = $11; seen = 1 }
+      FNR != NR && / \((nm\/min|°|%)\) / { rms[$1] += $(NF-6)^2; count[$1]++ }
+      END {
+        row("drift (nm/min)", drift, sqrt(rms["drift"] / count["drift"]))
+        row("twist (°)", twist, sqrt(rms["twist"] / count["twist"]))
+        row("strain (%)", strain, sqrt(rms["strain"] / count["strain"]))
+      }
+      function row(what, foreseen, found) {
+        printf "| %s | %s | %s | %s | %s | %s | %s | %.2g | %.2f |\n", name, scans, hz, size, minutes, what, foreseen, found, found / foreseen
+        name = scans = hz = size = minutes = ""
+      }' "$work/plan.txt" "$work/validated.txt"
+  done << 'WISHES'
+twist ± 0.02°|--twist-sigma 0.02|
+drift ± 0.005 nm/min|--drift-sigma 0.005|
+drift ± 0.001 nm/min, frames no larger than 60 nm, 8 Hz|--drift-sigma 0.001 --max-size 60 --max-rate 8|
+strain ± 0.0095 %, noise twice the signal|--strain-sigma 0.0095 --max-size 60 --max-rate 8|s/^pixel_deg = .*/pixel_deg = 2.0/
+drift ± 0.01 nm/min, no position sensors|--drift-sigma 0.01 --max-size 60 --max-rate 8|s/^sensors = .*/sensors = false/;s/^gain = .*/gain = [1.0, 1.0]/;s/^shear_mrad = .*/shear_mrad = 0.0/
+WISHES
+  printf '\nAn rms over %s sets scatters by some %.0f %%.\n' "$sets" "$(awk -v n="$sets" 'BEGIN { print 100 / sqrt(2 * n) }')"
+} > docs/plan.md
+cat docs/plan.md
