@@ -65,8 +65,15 @@ fn a_calibration_is_written_and_applied() {
     let file = folder.path().join("scanner.toml");
     let scans = graphite(folder.path());
     let to = file.to_str().unwrap();
-    let said = succeed(&mut calibrate(&scans, &["--material", "graphite", "--out", to])).stdout;
-    assert!(said.contains("calibration of the nominal coordinates"), "{said}");
+    let said = succeed(&mut calibrate(
+        &scans,
+        &["--material", "graphite", "--out", to],
+    ))
+    .stdout;
+    assert!(
+        said.contains("calibration of the nominal coordinates"),
+        "{said}"
+    );
     assert!(!said.contains("drift-not-separated"), "{said}");
     let written: toml::Table = toml::from_str(&std::fs::read_to_string(&file).unwrap()).unwrap();
     assert_eq!(written["schema"].as_str(), Some("moiregauge/calibration/1"));
@@ -79,7 +86,10 @@ fn a_calibration_is_written_and_applied() {
     assert!((of("gain_percent") - (x + y) / 2.0).abs() < 0.15);
     assert!((of("mismatch_percent") - (x - y)).abs() < 0.05);
     assert!((of("orthogonality_mrad") + 6.0).abs() < 0.3);
-    let again = run(&mut calibrate(&scans, &["--material", "graphite", "--out", to]));
+    let again = run(&mut calibrate(
+        &scans,
+        &["--material", "graphite", "--out", to],
+    ));
     assert_eq!(again.code, Some(1));
     assert!(again.stderr.contains("--force"), "{}", again.stderr);
 
@@ -139,7 +149,10 @@ fn printed(said: &str, name: &str) -> f64 {
         .lines()
         .find(|l| l.trim_start().starts_with(name))
         .unwrap_or_else(|| panic!("no {name} in {said}"));
-    let number = line.trim_start()[name.len()..].split_whitespace().next().unwrap();
+    let number = line.trim_start()[name.len()..]
+        .split_whitespace()
+        .next()
+        .unwrap();
     number.replace('−', "-").parse().unwrap()
 }
 
@@ -179,7 +192,11 @@ fn real_surfaces() {
     let options = ["--material", "graphite", "--out", file.to_str().unwrap()];
     let refused = run(&mut calibrate(&graphite, &options));
     assert_eq!(refused.code, Some(1));
-    assert!(refused.stdout.contains("drift-not-separated"), "{}", refused.stdout);
+    assert!(
+        refused.stdout.contains("drift-not-separated"),
+        "{}",
+        refused.stdout
+    );
     assert!(refused.stderr.contains("--line-rate"), "{}", refused.stderr);
     assert!(!file.exists());
     // The mean over the three rows of atoms is right within a per cent, x and y are 19 % apart.
@@ -191,9 +208,14 @@ fn real_surfaces() {
     let written: toml::Table = toml::from_str(&std::fs::read_to_string(&file).unwrap()).unwrap();
     assert_eq!(written["drift_separated"].as_bool(), Some(false));
     // 0.5 nm/min over 512 lines at 10 Hz and 11.48 nm: 0.0372 along the slow axis, which is half of it in the gain.
-    let variance = written["calibration"]["covariance"][0][0].as_float().unwrap();
+    let variance = written["calibration"]["covariance"][0][0]
+        .as_float()
+        .unwrap();
     let slow = 0.5 / 60.0 * 51.2 / 11.48 * 0.906;
-    assert!((variance.sqrt() / (100.0 * slow / 2.0) - 1.0).abs() < 0.1, "{variance}");
+    assert!(
+        (variance.sqrt() / (100.0 * slow / 2.0) - 1.0).abs() < 0.1,
+        "{variance}"
+    );
 }
 
 #[test]
@@ -203,7 +225,14 @@ fn a_plan_says_how_and_what_cannot_be_had() {
     let out = folder.path().join("plan.toml");
     let planned = succeed(
         program()
-            .args(["plan", "--twist-sigma", "0.02", "--drift-sigma", "0.05", "--like"])
+            .args([
+                "plan",
+                "--twist-sigma",
+                "0.02",
+                "--drift-sigma",
+                "0.05",
+                "--like",
+            ])
             .arg(&scans)
             .arg("--out")
             .arg(&out),
@@ -211,11 +240,18 @@ fn a_plan_says_how_and_what_cannot_be_had() {
     .stdout;
     assert!(planned.contains("recommended:"), "{planned}");
     assert!(!planned.contains("out of reach"), "{planned}");
-    succeed(program().args(["validate", "--sets", "2", "--quiet", "--config"]).arg(&out));
+    succeed(
+        program()
+            .args(["validate", "--sets", "2", "--quiet", "--config"])
+            .arg(&out),
+    );
     // 1 % of gain are 0.011° of twist: 0.001° cannot be had without a calibration.
     let vain = succeed(program().args(["plan", "--twist-sigma", "0.001"])).stdout;
     assert!(vain.contains("out of reach: twist ± 0.001°"), "{vain}");
-    assert!(vain.contains("± 0.011°") && vain.contains("moiregauge calibrate"), "{vain}");
+    assert!(
+        vain.contains("± 0.011°") && vain.contains("moiregauge calibrate"),
+        "{vain}"
+    );
     let known = [
         "plan",
         "--twist-sigma",
