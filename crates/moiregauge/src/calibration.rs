@@ -284,20 +284,21 @@ pub struct Shown {
 /// Compares a lattice, free of drift, with the known `cell` (reduced, nm), under the names of its vectors
 /// that make the distortion smallest. `None` where either has no area.
 pub fn shown(lattice: &LatticeVectors, cell: &Matrix2<f64>) -> Option<Shown> {
+    // The surface may lie either face up.
     let mirror = Matrix2::new(1.0, 0.0, 0.0, -1.0);
-    let mut found: Vec<Shown> = names()
-        .filter_map(|name| {
-            let known = if name.determinant() > 0.0 {
-                *cell
-            } else {
-                mirror * cell
-            };
-            let named = lattice.relabelled(&name);
-            let all = by_name(&named, &known.try_inverse()?);
-            (named.basis.determinant() * known.determinant() > 0.0).then_some(all)
-        })
-        .collect();
-    found.sort_by(|a, b| a.distortion.total_cmp(&b.distortion));
+    let mut found: Vec<Shown> = Vec::new();
+    for known in [*cell, mirror * cell] {
+        let inverse = known.try_inverse()?;
+        let same_face = |l: &LatticeVectors| l.basis.determinant() * known.determinant() > 0.0;
+        let named = names().map(|name| lattice.relabelled(&name));
+        found.extend(named.filter(same_face).map(|l| by_name(&l, &inverse)));
+    }
+    // Of names that a symmetry of the cell makes equal, the one that turns it least.
+    let rank = |s: &Shown| ((s.distortion * 1e9).round(), s.orientation.value.abs());
+    found.sort_by(|a, b| {
+        let (a, b) = (rank(a), rank(b));
+        a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1))
+    });
     let best = *found.first()?;
     let other = found
         .iter()

@@ -185,7 +185,7 @@ fn at_one_orientation(sets: &[Simulation], settings: &Settings) -> Option<Predic
     let found = fit(settings.frame_time_sigma_s)?;
     let exact = fit(0.0)?;
     let (lattice, statistical) = real(&found)?;
-    let strained = twist_strain(&lattice, &settings.material, settings.strain_convention).ok()?;
+    let strained = twist_strain(&lattice, settings.bilayer(), settings.strain_convention).ok()?;
     let budget = Budget::new(&lattice, &strained, &statistical, settings);
     let component = |fit: &JointFit| fit.velocity_covariance.trace() / 2.0;
     Some(Prediction {

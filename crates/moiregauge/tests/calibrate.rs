@@ -65,7 +65,7 @@ fn truth(set: &Simulation) -> [f64; 3] {
     let det = square.determinant().sqrt();
     let f = (square + Matrix2::identity() * det) / (square.trace() + 2.0 * det).sqrt();
     [
-        100.0 * ((f.m11 + f.m22) / 2.0 - 1.0),
+        100.0 * (f64::midpoint(f.m11, f.m22) - 1.0),
         100.0 * (f.m11 - f.m22),
         2000.0 * f.m12,
     ]

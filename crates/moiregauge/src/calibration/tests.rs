@@ -122,7 +122,7 @@ fn errors_are_split_without_loss() {
         for error in one.independent_errors() {
             // (s, g, γ) of a symmetric change.
             let v = Vector3::new(
-                (error.m11 + error.m22) / 2.0,
+                f64::midpoint(error.m11, error.m22),
                 error.m11 - error.m22,
                 2.0 * error.m12,
             );

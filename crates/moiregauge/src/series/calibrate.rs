@@ -7,7 +7,7 @@
 //! the same linear least squares; its vectors against the known cell are the distortion ([`shown`]). Sets
 //! share the scanner and not the orientation of the sample, so that what is averaged is the distortion.
 //! Frames of one direction do not tell drift from gain: they are taken as they are, and a prior of the drift
-//! enlarges the errors along what it does, `t_j D` for the vector j that takes the time t_j.
+//! enlarges the errors along what it does, `t_j D` for the vector j that takes the time `t_j`.
 //!
 //! Phases of the frames are not used: at atomic distances nobody can tell by how many cells a sample has
 //! moved between two frames.

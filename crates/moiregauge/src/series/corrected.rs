@@ -56,7 +56,7 @@ fn corrected(
     let nominal = nominal(scan, channel);
     let mut doubts = Vec::new();
     let sensors = usable_sensors(file, scan, channel, nominal.as_ref(), &mut doubts);
-    let geometry = calibrated(sensors.map(|s| s.geometry).or(nominal)?, settings);
+    let geometry = calibrated(&sensors.map(|s| s.geometry).or(nominal)?, settings);
     let timing = scan
         .frame_direction
         .and_then(|frame| Timing::of_scan(scan, channel.columns, frame, line));

@@ -47,10 +47,7 @@ pub fn illustrate(
     let mut origin = line.origin;
     if let (Some(sensors), Some(measured)) = (&sensors, &measured) {
         let scaled = |steps: &[f64], by: f64| steps.iter().map(|s| s * by).collect::<Vec<f64>>();
-        let (raw, now) = (
-            &sensors.geometry,
-            calibrated(sensors.geometry.clone(), settings),
-        );
+        let (raw, now) = (&sensors.geometry, calibrated(&sensors.geometry, settings));
         let by = [
             now.fast_step().norm() / raw.fast_step().norm(),
             now.slow_step().norm() / raw.slow_step().norm(),

@@ -7,6 +7,7 @@ use nalgebra::Vector2;
 use spmfile::{Channel, DateTime, FrameDirection, LineDirection, Scan};
 
 use super::measure::{channels, image_of, nominal, usable_sensors};
+use super::scanner::calibrated;
 use super::sightings::seconds;
 use super::tiling::tile_map;
 use crate::analysis::ScanAnalysis;
@@ -125,6 +126,7 @@ fn map_line(
         .map(|s| s.geometry)
         .or(nominal)
         .ok_or(MapError::NoImage)?;
+    let geometry = calibrated(&geometry, settings);
     let frame = analysed.frame_direction;
     let timing = frame.and_then(|frame| Timing::of_scan(scan, channel.columns, frame, line));
     let still = match (analysed.drift, timing) {

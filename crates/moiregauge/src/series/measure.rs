@@ -366,7 +366,7 @@ fn measure_line(
         geometry = geometry.cropped(first, size);
         nominal = nominal.map(|n| n.cropped(first, size));
     }
-    let geometry = calibrated(geometry, settings);
+    let geometry = calibrated(&geometry, settings);
     let speeds = match (&timing, &settings.scanner) {
         (Some(timing), Some(_)) => {
             let now = geometry.speeds(timing);

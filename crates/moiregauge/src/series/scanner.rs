@@ -12,7 +12,7 @@ use crate::settings::Settings;
 const EXTRAPOLATED: f64 = 3.0;
 
 /// The geometry corrected by the calibration of the scanner, if there is one.
-pub(super) fn calibrated(geometry: Geometry, settings: &Settings) -> Geometry {
+pub(super) fn calibrated(geometry: &Geometry, settings: &Settings) -> Geometry {
     let map = settings.scanner.as_ref().and_then(Calibration::map);
     map.map_or_else(|| geometry.clone(), |map| geometry.mapped(&map))
 }
