@@ -286,7 +286,11 @@ pub(crate) fn check(settings: &Settings) -> anyhow::Result<()> {
             "an uncertainty ({name}) lies between 0 and {largest}, found {value}"
         );
     }
-    if let Some(problem) = settings.scanner.as_ref().and_then(|s| s.problem()) {
+    if let Some(problem) = settings
+        .scanner
+        .as_ref()
+        .and_then(moiregauge::calibration::Calibration::problem)
+    {
         bail!("the calibration of the scanner makes no sense: {problem}");
     }
     if let Some(drift) = &settings.drift {
