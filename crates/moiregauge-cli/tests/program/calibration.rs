@@ -83,7 +83,7 @@ fn a_calibration_is_written_and_applied() {
     // The inverse of the scanner's gains, by hand to first order in the shear: lengths are shown too long along x.
     let of = |key: &str| written["calibration"][key].as_float().unwrap();
     let (x, y) = (100.0 * (1.0 / 0.97 - 1.0), 100.0 * (1.0 / 1.012 - 1.0));
-    assert!((of("gain_percent") - (x + y) / 2.0).abs() < 0.15);
+    assert!((of("gain_percent") - f64::midpoint(x, y)).abs() < 0.15);
     assert!((of("mismatch_percent") - (x - y)).abs() < 0.05);
     assert!((of("orthogonality_mrad") + 6.0).abs() < 0.3);
     let again = run(&mut calibrate(
