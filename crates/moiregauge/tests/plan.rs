@@ -35,9 +35,9 @@ fn scatter(conditions: &Simulation, settings: &Settings, sets: u64) -> [f64; 3] 
                 strained.strain_vector.y - size * axis.sin(),
             ];
             [
-                (d[0] * d[0] + d[1] * d[1]) / 2.0,
+                f64::midpoint(d[0] * d[0], d[1] * d[1]),
                 (strained.twist - truth.twist_deg.to_radians()).powi(2),
-                (e[0] * e[0] + e[1] * e[1]) / 2.0,
+                f64::midpoint(e[0] * e[0], e[1] * e[1]),
             ]
         })
         .collect();
