@@ -46,20 +46,7 @@ fn stretched(size: usize, periods: f64, share: f64, seed: u64) -> FieldScene {
 
 /// A lattice of `periods` periods whose wave vectors change by ± `share`, with the waves that make it so.
 fn scene(size: usize, periods: f64, share: f64, seed: u64) -> FieldScene {
-    let mut scene = FieldScene::hexagonal([size, size], size as f64 / periods, 0.3);
-    let length = scene.pair.column(0).norm();
-    let across = TAU / size as f64;
-    for (direction, phase, factors) in [
-        ([0.6, 0.8], 0.3, [0.5, -0.4]),
-        ([-0.7, 0.5], 1.9, [0.3, 0.6]),
-    ] {
-        let wave = Vector2::from(direction) * across;
-        scene.ripples.push(Ripple {
-            wave,
-            phase,
-            amplitude: factors.map(|f: f64| f * share * length / wave.norm()),
-        });
-    }
+    let mut scene = FieldScene::rippled(size, periods, share);
     scene.seed = seed;
     scene
 }

@@ -1,7 +1,7 @@
 //! Lattices whose first shell is hidden, waves of pick-up, and harmonics that do not agree.
 
 // The tests of the fit use the rest.
-#[allow(dead_code)]
+#[allow(dead_code, reason = "other tests use the rest of it")]
 mod fit_scene;
 
 use fit_scene::{Contrast, Scene, Wave};

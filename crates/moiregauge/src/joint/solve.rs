@@ -102,20 +102,8 @@ pub fn fit(
     start: (&Matrix2<f64>, &Vector2<f64>),
     time_sigma: f64,
 ) -> Option<JointFit> {
-    let mut problem = Problem {
-        sightings: sightings.to_vec(),
-        // Exact times would make the weights infinite; a millisecond is exact enough.
-        time_sigma: time_sigma.max(1e-3),
-    };
+    let (problem, mut best) = Problem::linked(sightings, start, time_sigma)?;
     let plain = Terms::default();
-    let mut best = problem.solve(plain, start, None)?;
-    let sigma = best
-        .velocity_covariance
-        .symmetric_eigenvalues()
-        .max()
-        .sqrt();
-    number_blocks(&mut problem.sightings, &best.waves.basis, sigma);
-    let problem = problem;
     let from = (&best.waves.basis.clone(), &best.velocity.clone());
     if sightings.iter().any(|s| s.phases.is_some()) {
         // Over a long campaign a drift that changes can be linked only as what it is.
@@ -139,17 +127,7 @@ pub(crate) fn foreseen(
     start: (&Matrix2<f64>, &Vector2<f64>),
     time_sigma: f64,
 ) -> Option<JointFit> {
-    let mut problem = Problem {
-        sightings: sightings.to_vec(),
-        time_sigma: time_sigma.max(1e-3),
-    };
-    let plain = problem.solve(Terms::default(), start, None)?;
-    let sigma = plain
-        .velocity_covariance
-        .symmetric_eigenvalues()
-        .max()
-        .sqrt();
-    number_blocks(&mut problem.sightings, &plain.waves.basis, sigma);
+    let (problem, plain) = Problem::linked(sightings, start, time_sigma)?;
     let with_phases = Terms {
         phases: sightings.iter().any(|s| s.phases.is_some()),
         ..Terms::default()
@@ -168,6 +146,25 @@ pub(super) struct Problem {
 }
 
 impl Problem {
+    /// The problem with its scans in blocks whose phases can be linked, and the fit without phases that tells
+    /// the blocks.
+    fn linked(
+        sightings: &[Sighting],
+        start: (&Matrix2<f64>, &Vector2<f64>),
+        time_sigma: f64,
+    ) -> Option<(Self, JointFit)> {
+        let mut problem = Self {
+            sightings: sightings.to_vec(),
+            // Exact times would make the weights infinite; a millisecond is exact enough.
+            time_sigma: time_sigma.max(1e-3),
+        };
+        let plain = problem.solve(Terms::default(), start, None)?;
+        let speeds = plain.velocity_covariance.symmetric_eigenvalues();
+        let sigma = speeds.max().sqrt();
+        number_blocks(&mut problem.sightings, &plain.waves.basis, sigma);
+        Some((problem, plain))
+    }
+
     /// Solves for one choice of terms. Without a given instability it is estimated from the phases.
     pub(super) fn solve(
         &self,

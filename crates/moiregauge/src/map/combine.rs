@@ -181,35 +181,27 @@ impl<'a> View<'a> {
 fn average(views: &[View], place: Vector2<f64>) -> (LatticeNode, f64, usize) {
     let seen: Vec<LatticeNode> = views.iter().filter_map(|view| view.at(place)).collect();
     let good: Vec<&LatticeNode> = seen.iter().filter(|n| n.mask == Mask::Good).collect();
-    let nothing = |mask| LatticeNode {
-        mask,
-        waves: LatticeVectors {
-            basis: Matrix2::repeat(f64::NAN),
-            covariance: Matrix4::repeat(f64::NAN),
-        },
-        chi2: f64::NAN,
-        freedom: 0,
-        signal_to_noise: 0.0,
-        displacement: Vector2::repeat(f64::NAN),
-        displacement_covariance: Matrix2::repeat(f64::NAN),
-    };
     if good.is_empty() {
         // The least bad reason, with its values if it has any.
         let best = seen.iter().min_by_key(|n| n.mask);
-        return (best.copied().unwrap_or(nothing(Mask::Margin)), 0.0, 0);
+        return (
+            best.copied().unwrap_or(LatticeNode::nothing(Mask::Margin)),
+            0.0,
+            0,
+        );
     }
     let (mut normal, mut right) = (Matrix4::zeros(), Vector4::zeros());
     let mut weights = Vec::with_capacity(good.len());
     for node in &good {
         let Some(weight) = node.waves.covariance.try_inverse() else {
-            return (nothing(Mask::Weak), 0.0, 0);
+            return (LatticeNode::nothing(Mask::Weak), 0.0, 0);
         };
         normal += weight;
         right += weight * node.waves.flat();
         weights.push(weight);
     }
     let Some(covariance) = normal.try_inverse() else {
-        return (nothing(Mask::Weak), 0.0, 0);
+        return (LatticeNode::nothing(Mask::Weak), 0.0, 0);
     };
     let mean = covariance * right;
     let chi2 = good.iter().zip(&weights).map(|(node, weight)| {

@@ -65,6 +65,24 @@ pub struct LatticeNode {
     pub displacement_covariance: Matrix2<f64>,
 }
 
+impl LatticeNode {
+    /// A place that has no lattice, and why.
+    pub(crate) fn nothing(mask: Mask) -> Self {
+        Self {
+            mask,
+            waves: LatticeVectors {
+                basis: Matrix2::repeat(f64::NAN),
+                covariance: Matrix4::repeat(f64::NAN),
+            },
+            chi2: f64::NAN,
+            freedom: 0,
+            signal_to_noise: 0.0,
+            displacement: Vector2::repeat(f64::NAN),
+            displacement_covariance: Matrix2::repeat(f64::NAN),
+        }
+    }
+}
+
 /// Local lattices on the sample, in nm.
 #[derive(Clone, Debug)]
 pub struct LatticeMap {

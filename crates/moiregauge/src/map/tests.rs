@@ -11,25 +11,6 @@ use crate::settings::StrainConvention;
 use crate::simulate::{Feature, FieldScene, Ripple};
 use crate::strain::twist_strain;
 
-/// A lattice whose wave vectors change by ± `share` across the frame, smoothly.
-fn rippled(size: usize, periods: f64, share: f64) -> FieldScene {
-    let mut scene = FieldScene::hexagonal([size, size], size as f64 / periods, 0.3);
-    let length = scene.pair.column(0).norm();
-    let across = std::f64::consts::TAU / size as f64;
-    for (direction, phase, factors) in [
-        ([0.6, 0.8], 0.3, [0.5, -0.4]),
-        ([-0.7, 0.5], 1.9, [0.3, 0.6]),
-    ] {
-        let wave = Vector2::from(direction) * across;
-        scene.ripples.push(Ripple {
-            wave,
-            phase,
-            amplitude: factors.map(|f: f64| f * share * length / wave.norm()),
-        });
-    }
-    scene
-}
-
 fn map_of(scene: &FieldScene, window: Option<f64>) -> WaveMap {
     let reference = Reference {
         pair: scene.pair,
@@ -80,7 +61,7 @@ fn formula(noise: f64, window: f64) -> f64 {
 
 #[test]
 fn stated_errors_follow_the_formula() {
-    let mut scene = rippled(400, 25.0, 0.0);
+    let mut scene = FieldScene::rippled(400, 25.0, 0.0);
     scene.white = 1.2;
     let map = map_of(&scene, Some(16.0));
     let stated: Vec<f64> = good(&map)
@@ -101,7 +82,7 @@ fn errors_are_as_stated_and_near_the_formula() {
         (3, 512, 60.0),
         (4, 512, 20.0),
     ] {
-        let mut scene = rippled(size, periods, 0.1);
+        let mut scene = FieldScene::rippled(size, periods, 0.1);
         scene.white = scene.signal_rms();
         scene.seed = seed;
         let map = map_of(&scene, None);
@@ -175,7 +156,7 @@ fn defects_are_masked() {
             },
         ),
     ] {
-        let mut scene = rippled(420, 26.0, 0.0);
+        let mut scene = FieldScene::rippled(420, 26.0, 0.0);
         scene.white = 0.4;
         scene.features = vec![feature];
         let map = map_of(&scene, None);
@@ -199,7 +180,7 @@ fn defects_are_masked() {
 /// Lines and a block of missing pixels: what is left is as good as its errors say.
 #[test]
 fn missing_pixels_do_no_harm() {
-    let mut scene = rippled(360, 24.0, 0.03);
+    let mut scene = FieldScene::rippled(360, 24.0, 0.03);
     scene.white = 0.8;
     let mut image = scene.image();
     for row in 0..360 {
@@ -224,7 +205,7 @@ fn missing_pixels_do_no_harm() {
 /// Nothing but noise has no map, or one without good nodes.
 #[test]
 fn noise_has_no_map() {
-    let mut scene = rippled(256, 16.0, 0.0);
+    let mut scene = FieldScene::rippled(256, 16.0, 0.0);
     scene.harmonics.clear();
     scene.white = 1.0;
     let reference = Reference {
@@ -240,7 +221,7 @@ fn noise_has_no_map() {
 /// for the true local lattice.
 #[test]
 fn twist_and_strain_are_those_of_the_local_lattice() {
-    let scene = rippled(512, 24.0, 0.02);
+    let scene = FieldScene::rippled(512, 24.0, 0.02);
     let map = map_of(&scene, None);
     let geometry = Geometry {
         size: [512, 512],
@@ -285,7 +266,7 @@ fn twist_and_strain_are_those_of_the_local_lattice() {
 /// Two halves of the noise average to less, and what they share is found.
 #[test]
 fn maps_of_one_place_are_averaged() {
-    let scene = rippled(400, 25.0, 0.03);
+    let scene = FieldScene::rippled(400, 25.0, 0.03);
     let geometry = Geometry {
         size: [400, 400],
         pixel_to_nm: Matrix2::identity(),
@@ -334,7 +315,7 @@ fn maps_of_one_place_are_averaged() {
 /// constant and what belongs to the mean lattice.
 #[test]
 fn displacements_follow_the_phases() {
-    let mut scene = rippled(512, 32.0, 0.05);
+    let mut scene = FieldScene::rippled(512, 32.0, 0.05);
     scene.white = 0.5;
     let map = map_of(&scene, None);
     let geometry = Geometry {
@@ -373,7 +354,7 @@ fn displacements_follow_the_phases() {
 /// part of their errors (each band has a carrier and a noise level of its own).
 #[test]
 fn bands_go_on_where_others_end() {
-    let mut scene = rippled(512, 40.0, 0.03);
+    let mut scene = FieldScene::rippled(512, 40.0, 0.03);
     scene.white = 0.7;
     let image = scene.image();
     let reference = Reference {

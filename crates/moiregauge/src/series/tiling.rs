@@ -1,7 +1,7 @@
 //! Maps by tiles: the lattice fit of whole images on overlapping tiles. Slower and coarser than demodulation,
 //! and another way to the same numbers.
 
-use nalgebra::{Matrix2, Matrix4, Vector2};
+use nalgebra::{Matrix2, Vector2};
 use rayon::prelude::*;
 
 use crate::geometry::Geometry;
@@ -71,18 +71,7 @@ fn node(
     reference: &Reference,
     settings: &Settings,
 ) -> LatticeNode {
-    let nothing = LatticeNode {
-        mask: Mask::Weak,
-        waves: LatticeVectors {
-            basis: Matrix2::repeat(f64::NAN),
-            covariance: Matrix4::repeat(f64::NAN),
-        },
-        chi2: f64::NAN,
-        freedom: 0,
-        signal_to_noise: 0.0,
-        displacement: Vector2::repeat(f64::NAN),
-        displacement_covariance: Matrix2::repeat(f64::NAN),
-    };
+    let nothing = LatticeNode::nothing(Mask::Weak);
     let Ok(found) = measure(tile, geometry, settings.background, Method::Lattice) else {
         return nothing;
     };

@@ -104,6 +104,26 @@ impl FieldScene {
         }
     }
 
+    /// The same with `periods` periods across a square of `size` pixels, whose wave vectors change smoothly by
+    /// ± `share` across the frame.
+    pub fn rippled(size: usize, periods: f64, share: f64) -> Self {
+        let mut scene = Self::hexagonal([size, size], size as f64 / periods, 0.3);
+        let length = scene.pair.column(0).norm();
+        let across = std::f64::consts::TAU / size as f64;
+        for (direction, phase, factors) in [
+            ([0.6, 0.8], 0.3, [0.5, -0.4]),
+            ([-0.7, 0.5], 1.9, [0.3, 0.6]),
+        ] {
+            let wave = Vector2::from(direction) * across;
+            scene.ripples.push(Ripple {
+                wave,
+                phase,
+                amplitude: factors.map(|f: f64| f * share * length / wave.norm()),
+            });
+        }
+        scene
+    }
+
     fn centre(&self) -> Vector2<f64> {
         Vector2::new(self.size[0] as f64 - 1.0, self.size[1] as f64 - 1.0) / 2.0
     }
