@@ -13,7 +13,7 @@ use super::select::{
     Candidate, Orders, Peak, by_score, frame_cycles, score, spectrum_peaks, well_explained,
 };
 use super::transform::Spectrum;
-use super::{LatticeError, Prepared, Verdict, binning, levelled, signal_to_noise, verdict};
+use super::{LatticeError, Prepared, Verdict, binned, levelled, signal_to_noise, verdict};
 use crate::geometry::Geometry;
 use crate::image::Image;
 use crate::settings::Background;
@@ -41,12 +41,7 @@ pub(super) fn prepare(
     let full = Spectrum::new(&image);
     let mut best = [0.0; 3];
     for candidate in candidates(&full, &geometry.pixel_to_nm, known) {
-        let binning = binning(&candidate.pair);
-        let binned = if binning == 1 {
-            image.clone()
-        } else {
-            image.binned(binning)
-        };
+        let (binning, binned) = binned(&image, &candidate.pair);
         // The pair goes through all peaks that it explains; the first harmonics may be faint.
         let pair = candidate.pair * binning as f64;
         let Some(harmonics) = Windowed::new(&binned).fit(&binned, &pair, background, &SHELLS)
