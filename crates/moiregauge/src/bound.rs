@@ -6,10 +6,10 @@
 //! up; frames and line directions add up in the joint fit, whose covariance for exact sightings is the
 //! bound.
 //!
-//! Lines of n pixels that have offsets of their own, with the variance `σ_l²`, lose the share
-//! `λ = n σ_l²/(σ² + n σ_l²)` of their means, and with it what a wave of m cycles per line has there:
-//! `s² = sinc²(πm)` of itself and t of its slope along the line ([`Lines`]). Taken for white from line to line. Tip
-//! events and harmonics that overlap on a small frame raise the bound further; they are left out.
+//! Line noise, tip events and harmonics that overlap on a small frame raise it; they are left out. A plan
+//! ([`crate::plan`]) asks for line noise: lines of n pixels that have offsets of their own, with the variance `σ_l²`, lose
+//! the share `λ = n σ_l²/(σ² + n σ_l²)` of their means, and with it what a wave of m cycles per line has there: `s² =
+//! sinc²(πm)` of itself and t of its slope along the line ([`Lines`]). Offsets are taken for white from line to line.
 //!
 //! # References
 //! Rife and Boorstyn, Bell Syst. Tech. J. 55, 1389 (1976), for one wave.
@@ -19,7 +19,7 @@ use nalgebra::{Matrix2, Matrix4, Vector2};
 use crate::joint::{Sighting, fit};
 use crate::lattice::reciprocal::{real_from_reciprocal, reciprocal};
 use crate::lattice::{LatticeVectors, Phases};
-use crate::simulate::{FrameTruth, Simulator};
+use crate::simulate::{FrameTruth, Simulation, Simulator};
 use crate::strain::twist_strain;
 
 /// The smallest possible standard errors of a set.
@@ -41,7 +41,7 @@ pub struct Bound {
 /// `None` without pixel noise, or where the frames do not determine drift and lattice.
 pub fn cramer_rao(simulator: &Simulator, time_sigma: f64, linked: bool) -> Option<Bound> {
     let settings = simulator.settings();
-    let (sightings, pair, drift) = ideal_sightings(simulator, linked)?;
+    let (sightings, pair, drift) = ideal_sightings(simulator, linked, false)?;
     let found = fit(&sightings, (&pair, &drift), time_sigma)?;
     let lattice = real_from_reciprocal(&found.waves)?;
     let sample = &settings.sample;
@@ -56,13 +56,19 @@ pub fn cramer_rao(simulator: &Simulator, time_sigma: f64, linked: bool) -> Optio
     })
 }
 
-/// What every line of every frame of a set shows exactly, with the errors that it has to have, the
-/// reciprocal pair (rad/nm) and the drift (nm/s).
+/// What every line of every frame of a set shows exactly, with the errors that noise of the pixels, and with
+/// `line_noise` that of the lines, makes inevitable; the reciprocal pair (rad/nm) and the drift (nm/s).
 pub(crate) fn ideal_sightings(
     simulator: &Simulator,
     linked: bool,
+    line_noise: bool,
 ) -> Option<(Vec<Sighting>, Matrix2<f64>, Vector2<f64>)> {
     let settings = simulator.settings();
+    let lines = if line_noise {
+        Lines::of(settings)
+    } else {
+        Lines { lambda: 0.0 }
+    };
     let truth = simulator.truth();
     let [first, second, _] = truth.lattice_vectors_nm.map(Vector2::from);
     // Two of the shortest wave vectors that stand at 60°: their difference is the third.
@@ -75,7 +81,7 @@ pub(crate) fn ideal_sightings(
     for (scan, frame) in truth.frames.iter().enumerate() {
         let lines = [Some(0), settings.raster.retrace.then_some(1)];
         for class in lines.into_iter().flatten() {
-            let image = ideal(simulator, frame, (&pair, &drift), class)?;
+            let image = ideal(simulator, frame, (&pair, &drift), class, &lines)?;
             sightings.push(Sighting {
                 scan,
                 phases: image.phases.filter(|_| linked),
@@ -93,6 +99,7 @@ fn ideal(
     frame: &FrameTruth,
     (pair, drift): (&Matrix2<f64>, &Vector2<f64>),
     class: usize,
+    lines: &Lines,
 ) -> Option<Sighting> {
     let settings = simulator.settings();
     let noise = settings.noise.pixel_deg;
@@ -109,10 +116,6 @@ fn ideal(
     let u = j.try_inverse()?.transpose() * tau;
     let [columns, rows] = settings.raster.pixels.map(|n| n as f64);
     let pixels = columns * rows;
-    let offsets = settings.noise.line_deg.powi(2) + settings.noise.flicker_deg.powi(2);
-    let lines = Lines {
-        lambda: columns * offsets / (noise * noise + columns * offsets),
-    };
     let indices = pair.try_inverse()?;
     let mut information = Matrix4::<f64>::zeros();
     let mut variances = [f64::NAN; 3];
@@ -177,6 +180,15 @@ struct Lines {
 }
 
 impl Lines {
+    fn of(settings: &Simulation) -> Self {
+        let noise = &settings.noise;
+        let offsets = noise.line_deg.powi(2) + noise.flicker_deg.powi(2);
+        let means = settings.raster.pixels[0] as f64 * offsets;
+        Self {
+            lambda: means / (noise.pixel_deg.powi(2) + means),
+        }
+    }
+
     /// The share of the information that is left for a wave of m cycles per line: along the lines, and across
     /// (as for the phase). With `x` from −1 to 1 the line means of `e^{iπmx}` and `x e^{iπmx}` are s and it,
     /// `s = sin πm/πm`, `t = (s − cos πm)/πm`; λ of their squares is gone from 1 and from ⟨x²⟩ = ⅓, and the
@@ -197,7 +209,6 @@ impl Lines {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::simulate::Simulation;
 
     /// Against the normal matrix itself: amplitude, phase and both slopes of one wave on 48 × 48 pixels with the
     /// weight `1 − λ 11ᵀ/n` in each line, the amplitude and the phase projected out.
@@ -255,7 +266,6 @@ mod tests {
         settings.sample.strain_percent = 0.0;
         settings.drift.velocity_nm_per_min = [0.0; 2];
         settings.noise.pixel_deg = 2.0;
-        (settings.noise.line_deg, settings.noise.flicker_deg) = (0.0, 0.0);
         let simulator = Simulator::new(settings.clone()).unwrap();
         let bound = cramer_rao(&simulator, 0.6, true).unwrap();
         let pixels = 256.0 * 256.0;

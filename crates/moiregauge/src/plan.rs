@@ -155,7 +155,7 @@ fn at_one_orientation(sets: &[Simulation], settings: &Settings) -> Option<Predic
             sightings.iter().map(|s| s.scan + 1).max().unwrap_or(0),
             sightings.iter().map(|s| s.class + 1).max().unwrap_or(0),
         );
-        let (images, pair, drift) = ideal_sightings(&simulator, set.raster.sensors)?;
+        let (images, pair, drift) = ideal_sightings(&simulator, set.raster.sensors, true)?;
         let step = Matrix2::from(simulator.truth().frames.first()?.pixel_to_nm).transpose();
         for image in images {
             let sensor = of_sensors(&image, set, &step)?;
