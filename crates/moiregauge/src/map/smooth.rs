@@ -17,7 +17,6 @@ use rayon::prelude::*;
 use rustfft::num_complex::{Complex32, Complex64};
 
 use super::blocks::{Blocks, Layer};
-use super::carrier::Turns;
 
 /// Windows end so many widths from their middle.
 const REACH: f64 = 4.5;
@@ -154,20 +153,12 @@ impl Kernel {
     }
 }
 
-/// Smooths every layer of `blocks` with a window of the given widths (pixels). `turns` takes a phase field off first: the
-/// indices (h, k) of each layer say how often its two phases count.
-pub(super) fn smooth(
-    blocks: &Blocks,
-    width: [f64; 2],
-    nodes: Nodes,
-    turns: Option<(&Turns, &[[i32; 2]])>,
-) -> Smoothed {
+/// Smooths every layer of `blocks` with a window of the given widths (pixels).
+pub(super) fn smooth(blocks: &Blocks, width: [f64; 2], nodes: Nodes) -> Smoothed {
     let kernels = [0, 1].map(|axis| Kernel::new(width[axis], blocks.block[axis]));
     let fits = fits(blocks, &kernels, nodes);
-    let envelopes = blocks.layers.iter().enumerate().map(|(i, layer)| {
-        let turns = turns.map(|(turns, indices)| (turns, indices[i]));
-        envelope(blocks, layer, &kernels, (nodes, &fits), turns)
-    });
+    let layers = blocks.layers.iter();
+    let envelopes = layers.map(|layer| envelope(blocks, layer, &kernels, (nodes, &fits)));
     Smoothed {
         nodes,
         envelopes: envelopes.collect(),
@@ -291,18 +282,28 @@ fn envelope(
     layer: &Layer,
     kernels: &[Kernel; 2],
     (nodes, fits): (Nodes, &[Option<Fit>]),
-    turns: Option<(&Turns, [i32; 2])>,
 ) -> Envelope {
     let count = nodes.size[0];
+    let radius = kernels[1].radius;
+    let is_seen = |row: usize| {
+        let nearest = (row + nodes.stride[1] / 2).saturating_sub(nodes.first[1]) / nodes.stride[1];
+        let nearest = nodes.first[1] + nearest.min(nodes.size[1] - 1) * nodes.stride[1];
+        nearest.abs_diff(row) <= radius
+    };
     let lines: Vec<Vec<f32>> = (0..blocks.size[1])
         .into_par_iter()
-        .map(|row| along(blocks.size[0], layer, &kernels[0], nodes, (row, turns)))
+        .map(|row| {
+            if is_seen(row) {
+                along(blocks.size[0], layer, &kernels[0], nodes, row)
+            } else {
+                Vec::new()
+            }
+        })
         .collect();
     let rows: Vec<Vec<(Complex32, [f32; 2])>> = (0..nodes.size[1])
         .into_par_iter()
         .map(|node_row| {
             let at = nodes.first[1] + node_row * nodes.stride[1];
-            let radius = kernels[1].radius;
             // Plain sums, those tilted along the line, those tilted across.
             let mut sums = [
                 vec![0.0f32; 2 * count],
@@ -359,23 +360,13 @@ fn envelope(
 }
 
 /// A line of blocks, smoothed, at the columns of the nodes: real, imaginary, and both tilted.
-fn along(
-    columns: usize,
-    layer: &Layer,
-    kernel: &Kernel,
-    nodes: Nodes,
-    (row, turns): (usize, Option<(&Turns, [i32; 2])>),
-) -> Vec<f32> {
+fn along(columns: usize, layer: &Layer, kernel: &Kernel, nodes: Nodes, row: usize) -> Vec<f32> {
     let radius = kernel.radius;
     let length = columns + 2 * radius + LANES;
     let (mut re, mut im) = (vec![0.0f32; length], vec![0.0f32; length]);
     let line = row * columns..(row + 1) * columns;
     re[radius..radius + columns].copy_from_slice(&layer.re[line.clone()]);
     im[radius..radius + columns].copy_from_slice(&layer.im[line]);
-    if let Some((turns, index)) = turns {
-        let part = radius..radius + columns;
-        turns.apply(row, index, &mut re[part.clone()], &mut im[part]);
-    }
     let count = nodes.size[0];
     let mut out = vec![0.0; 4 * count];
     for i in 0..count {
