@@ -9,6 +9,7 @@ use nalgebra::{Matrix2, Vector2};
 use super::blocks::{Blocks, Place, mix};
 use super::carrier::Carrier;
 use super::defects::{Blur, Setting, masks};
+use super::leaks::clean;
 use super::median;
 use super::noise::{Beside, Noise};
 use super::smooth::{Nodes, Smoothed, smooth};
@@ -41,8 +42,8 @@ const FASTEST: f64 = 2.6;
 const BLOCKS: f64 = 5.0;
 /// The pilot's window in periods.
 pub(super) const PILOT: f64 = 0.65;
-/// Likely harmonics looked at together.
-const AT_ONCE: usize = 6;
+/// Likely harmonics looked at together; and where blocks are single pixels, for the memory's sake.
+const AT_ONCE: [usize; 2] = [6, 2];
 /// Nodes per width of the window.
 const NODES: f64 = 3.0;
 
@@ -69,7 +70,8 @@ pub(super) fn demodulate(
 /// Pixels of a block along columns and rows.
 pub(super) fn block_of(reference: &Reference) -> [usize; 2] {
     let block = reference.in_pixels(reference.period() / BLOCKS);
-    block.map(|b| (b as usize).max(1))
+    // Periods of whole pixels come out a hair too short.
+    block.map(|b| ((b + 1e-9) as usize).max(1))
 }
 
 /// Blocks from node to node, `distance_nm` apart.
@@ -141,7 +143,9 @@ impl Work {
         image: &'a Image,
     ) -> impl Iterator<Item = (Vec<[i32; 2]>, Blocks)> + 'a {
         let slow_enough = |g: Vector2<f64>| g.x.abs() < FASTEST && g.y.abs() < FASTEST;
-        LIKELY[3..].chunks(AT_ONCE).filter_map(move |some| {
+        let single = self.blocks.block == [1, 1];
+        let at_once = AT_ONCE[usize::from(single)];
+        LIKELY[3..].chunks(at_once).filter_map(move |some| {
             let mut some = some.to_vec();
             some.retain(|&index| slow_enough(self.reference.wave(index)));
             if some.is_empty() {
@@ -164,6 +168,20 @@ impl Work {
             nodes.first[1] = 0;
         }
         nodes
+    }
+
+    /// The same without what leaks through cut windows.
+    fn cleaned(&self, width: f64, stride: [usize; 2]) -> Smoothed {
+        let mut smoothed = self.smoothed(width, stride);
+        let window = self.reference.in_pixels(width);
+        let taken = |at: Vector2<f64>| {
+            let slopes = self.taken_off(at, width);
+            let carrier = self.carrier.as_ref().map(|c| c.at(at).0);
+            let phases = self.reference.pair.tr_mul(&(at - self.place.centre));
+            (phases + carrier.unwrap_or_default(), slopes)
+        };
+        clean(&mut smoothed, (&self.blocks, window), &self.indices, taken);
+        smoothed
     }
 
     /// What was taken off, as a window of `width` nm sees it.
@@ -206,7 +224,7 @@ impl Work {
             self.guess_noise(image);
         }
         let stride = stride_of(&self.reference, step_of(resolution, window_nm));
-        let smoothed = self.smoothed(window_nm, stride);
+        let smoothed = self.cleaned(window_nm, stride);
         let mut lattices = self.lattices(&smoothed, window_nm, true);
         let blurs = self.blurs(
             &lattices,
@@ -326,7 +344,7 @@ impl Work {
         wider: f64,
         nodes: Nodes,
     ) -> Vec<Blur> {
-        let wide = self.lattices(&self.smoothed(wider, nodes.stride), wider, true);
+        let wide = self.lattices(&self.cleaned(wider, nodes.stride), wider, true);
         let pairs = lattices.iter().zip(&wide);
         pairs
             .map(|pair| match pair {

@@ -29,7 +29,7 @@ const AWAY: f64 = 2.5;
 /// Nodes that have to be left.
 const FEWEST: usize = 6;
 /// Harmonics looked beside at a time.
-const AT_ONCE: usize = 3;
+const AT_ONCE: usize = 2;
 
 /// Two wave vectors beside harmonic (h, k) that are as far from the lattice as can be, rad per pixel.
 pub(super) fn probes(pair: &Matrix2<f64>, [h, k]: [i32; 2], pitch: [f64; 2]) -> [Vector2<f64>; 2] {

@@ -56,13 +56,19 @@ impl Nodes {
         self.size[0] * self.size[1]
     }
 
+    /// The block on which a node lies.
+    pub(super) fn block(&self, node: usize) -> [usize; 2] {
+        let (column, row) = (node % self.size[0], node / self.size[0]);
+        [
+            self.first[0] + column * self.stride[0],
+            self.first[1] + row * self.stride[1],
+        ]
+    }
+
     /// Place of a node, pixels.
     pub(super) fn place(&self, blocks: &Blocks, node: usize) -> Vector2<f64> {
-        let (column, row) = (node % self.size[0], node / self.size[0]);
-        blocks.middle(
-            (self.first[0] + column * self.stride[0]) as f64,
-            (self.first[1] + row * self.stride[1]) as f64,
-        )
+        let [column, row] = self.block(node).map(|i| i as f64);
+        blocks.middle(column, row)
     }
 }
 
@@ -75,6 +81,8 @@ pub(super) struct Support {
     pub(super) amplitude_noise: f64,
     /// Covariance of the components of c₁ for such noise, per pixel².
     pub(super) slope_noise: Matrix2<f64>,
+    /// Inverse of the moments: from the plain sum and those tilted along x and y to c₀ and c₁.
+    pub(super) inverse: Matrix3<f64>,
 }
 
 /// Amplitude and slope of one wave at every node.
@@ -83,6 +91,10 @@ pub(super) struct Envelope {
     pub(super) amplitude: Vec<Complex32>,
     /// `Im(c₁/c₀)`, rad per pixel.
     pub(super) slope: Vec<[f32; 2]>,
+    /// `Re(c₁/c₀)`, per pixel.
+    pub(super) growth: Vec<[f32; 2]>,
+    /// What may be left of other harmonics in the slope, rad per pixel; empty where nothing was looked for.
+    pub(super) unsure: Vec<f32>,
 }
 
 /// The envelopes of all waves.
@@ -94,16 +106,19 @@ pub(super) struct Smoothed {
 }
 
 /// Weights along one axis, and times the distance in pixels, filled up with zeros to whole lanes.
-struct Kernel {
-    radius: usize,
-    plain: Vec<f32>,
-    tilted: Vec<f32>,
-    step: f64,
+pub(super) struct Kernel {
+    pub(super) radius: usize,
+    pub(super) plain: Vec<f32>,
+    pub(super) tilted: Vec<f32>,
+    /// Pixels of a block.
+    pub(super) step: f64,
+    /// Variance of the weights, pixels².
+    pub(super) own: f64,
 }
 
 impl Kernel {
     /// For blocks of `block` pixels; `width` is that of the window with the block.
-    fn new(width: f64, block: usize) -> Self {
+    pub(super) fn new(width: f64, block: usize) -> Self {
         let step = block as f64;
         // The mean over a block widens by (b² − 1)/12 pixels².
         let own = (width * width - (step * step - 1.0) / 12.0).max(0.25 * step * step);
@@ -126,6 +141,7 @@ impl Kernel {
             plain,
             tilted,
             step,
+            own,
         }
     }
 
@@ -159,22 +175,15 @@ pub(super) fn smooth(blocks: &Blocks, width: [f64; 2], nodes: Nodes) -> Smoothed
     let fits = fits(blocks, &kernels, nodes);
     let layers = blocks.layers.iter();
     let envelopes = layers.map(|layer| envelope(blocks, layer, &kernels, (nodes, &fits)));
+    let envelopes = envelopes.collect();
     Smoothed {
         nodes,
-        envelopes: envelopes.collect(),
-        support: fits.iter().map(|fit| fit.map(|f| f.support)).collect(),
+        envelopes,
+        support: fits,
     }
 }
 
-/// How the sums around a node become amplitude and slope.
-#[derive(Clone, Copy)]
-struct Fit {
-    /// Inverse of the moments.
-    inverse: Matrix3<f64>,
-    support: Support,
-}
-
-impl Fit {
+impl Support {
     /// From the moments of w and of w² over the window: 1, x, y, xx, xy, yy.
     fn new(first: [f64; 6], second: [f64; 6], pixels: f64) -> Option<Self> {
         let matrix = |[a, x, y, xx, xy, yy]: [f64; 6]| Matrix3::new(a, x, y, x, xx, xy, y, xy, yy);
@@ -184,17 +193,15 @@ impl Fit {
         let inverse = matrix(first).try_inverse()?;
         let noise = inverse * matrix(second) * inverse / pixels;
         Some(Self {
+            share: first[0],
+            amplitude_noise: noise[(0, 0)],
+            slope_noise: noise.fixed_view::<2, 2>(1, 1).into_owned(),
             inverse,
-            support: Support {
-                share: first[0],
-                amplitude_noise: noise[(0, 0)],
-                slope_noise: noise.fixed_view::<2, 2>(1, 1).into_owned(),
-            },
         })
     }
 }
 
-fn fits(blocks: &Blocks, kernels: &[Kernel; 2], nodes: Nodes) -> Vec<Option<Fit>> {
+fn fits(blocks: &Blocks, kernels: &[Kernel; 2], nodes: Nodes) -> Vec<Option<Support>> {
     let pixels = (blocks.block[0] * blocks.block[1]) as f64;
     if let Some(share) = &blocks.share {
         return fits_with_gaps(blocks, share, kernels, nodes);
@@ -216,7 +223,7 @@ fn fits(blocks: &Blocks, kernels: &[Kernel; 2], nodes: Nodes) -> Vec<Option<Fit>
     };
     let all = along[1].iter().flat_map(|y| {
         let of_row = along[0].iter();
-        of_row.map(move |x| Fit::new(product(&x[0], &y[0]), product(&x[1], &y[1]), pixels))
+        of_row.map(move |x| Support::new(product(&x[0], &y[0]), product(&x[1], &y[1]), pixels))
     });
     all.collect()
 }
@@ -227,7 +234,7 @@ fn fits_with_gaps(
     share: &[f32],
     kernels: &[Kernel; 2],
     nodes: Nodes,
-) -> Vec<Option<Fit>> {
+) -> Vec<Option<Support>> {
     let pixels = (blocks.block[0] * blocks.block[1]) as f64;
     let reach = |axis: usize, at: usize| {
         let radius = kernels[axis].radius;
@@ -272,7 +279,7 @@ fn fits_with_gaps(
                     second[i] += squared[i] * x[3 + power];
                 }
             }
-            Fit::new(first, second, pixels)
+            Support::new(first, second, pixels)
         })
         .collect()
 }
@@ -281,7 +288,7 @@ fn envelope(
     blocks: &Blocks,
     layer: &Layer,
     kernels: &[Kernel; 2],
-    (nodes, fits): (Nodes, &[Option<Fit>]),
+    (nodes, fits): (Nodes, &[Option<Support>]),
 ) -> Envelope {
     let count = nodes.size[0];
     let radius = kernels[1].radius;
@@ -300,7 +307,7 @@ fn envelope(
             }
         })
         .collect();
-    let rows: Vec<Vec<(Complex32, [f32; 2])>> = (0..nodes.size[1])
+    let rows: Vec<Vec<(Complex32, [Complex32; 2])>> = (0..nodes.size[1])
         .into_par_iter()
         .map(|node_row| {
             let at = nodes.first[1] + node_row * nodes.stride[1];
@@ -327,7 +334,7 @@ fn envelope(
             }
             let of_node = |column: usize| {
                 let Some(fit) = &fits[node_row * count + column] else {
-                    return (Complex32::default(), [0.0; 2]);
+                    return (Complex32::default(), [Complex32::default(); 2]);
                 };
                 let [s, x, y] = [0, 1, 2].map(|i| {
                     let values = &sums[i];
@@ -338,12 +345,16 @@ fn envelope(
                     s * m[0] + x * m[1] + y * m[2]
                 };
                 let amplitude = row(0);
-                let slope = |i: usize| {
-                    let slope = (row(i) / amplitude).im as f32;
-                    if slope.is_finite() { slope } else { 0.0 }
+                let single = |c: Complex64| Complex32::new(c.re as f32, c.im as f32);
+                let relative = |i: usize| {
+                    let relative = single(row(i) / amplitude);
+                    if relative.is_finite() {
+                        relative
+                    } else {
+                        Complex32::default()
+                    }
                 };
-                let single = Complex32::new(amplitude.re as f32, amplitude.im as f32);
-                (single, [slope(1), slope(2)])
+                (single(amplitude), [relative(1), relative(2)])
             };
             (0..count).map(of_node).collect()
         })
@@ -351,10 +362,13 @@ fn envelope(
     let mut envelope = Envelope {
         amplitude: Vec::with_capacity(nodes.len()),
         slope: Vec::with_capacity(nodes.len()),
+        growth: Vec::with_capacity(nodes.len()),
+        unsure: Vec::new(),
     };
-    for (amplitude, slope) in rows.into_iter().flatten() {
+    for (amplitude, relative) in rows.into_iter().flatten() {
         envelope.amplitude.push(amplitude);
-        envelope.slope.push(slope);
+        envelope.slope.push(relative.map(|c| c.im));
+        envelope.growth.push(relative.map(|c| c.re));
     }
     envelope
 }
