@@ -16,6 +16,7 @@ pub mod joint;
 pub mod lattice;
 pub mod map;
 pub mod material;
+pub mod region;
 pub mod resample;
 pub mod rng;
 pub mod series;
