@@ -8,6 +8,7 @@ pub mod bound;
 pub mod budget;
 pub mod caveat;
 mod chi2;
+pub mod domains;
 pub mod drift;
 pub mod estimate;
 pub mod geometry;

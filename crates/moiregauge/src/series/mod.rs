@@ -6,6 +6,7 @@
 mod channel;
 mod combine;
 mod corrected;
+mod domain_mapping;
 mod group;
 mod illustrate;
 mod mapping;
@@ -19,6 +20,7 @@ mod tiling;
 
 pub use channel::choose_channel;
 pub use corrected::{CorrectedImage, corrected_images, nominal_geometry, on_grid};
+pub use domain_mapping::domains_of_scan;
 pub use group::natural_order;
 pub use illustrate::illustrate;
 pub use mapping::{LineMap, MapError, MapMethod, map_scan};
