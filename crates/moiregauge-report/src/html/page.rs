@@ -85,7 +85,7 @@ struct Scan<'a> {
 }
 
 #[derive(Clone, Debug, Serialize)]
-struct Shown<'a> {
+pub(super) struct Shown<'a> {
     number: usize,
     name: &'a str,
     title: &'a str,
@@ -96,13 +96,13 @@ struct Shown<'a> {
 }
 
 #[derive(Debug, Serialize)]
-struct Missing<'a> {
+pub(super) struct Missing<'a> {
     title: &'a str,
     reason: &'a str,
 }
 
 #[derive(Debug, Serialize)]
-struct Download<'a> {
+pub(super) struct Download<'a> {
     name: &'a str,
     kind: &'static str,
     base64: String,
@@ -129,7 +129,7 @@ impl<'a> Page<'a> {
             combined_budget: combined.map(|c| Budgeted::new(&c.budget)),
             combined_wavelengths: combined.map(|c| wavelengths(&c.vectors)),
             sets: sets
-                .map(|(i, set)| Set::new(i, set, of(Some(i)), missing(figures, i)))
+                .map(|(i, set)| Set::new(i, set, of(Some(i)), missing(figures, Some(i))))
                 .collect(),
             consistency: consistency(results),
             together: of(None),
@@ -144,7 +144,7 @@ impl<'a> Page<'a> {
 }
 
 /// The drawn figures, numbered through, with the set each belongs to.
-fn numbered(figures: &[Figure]) -> Vec<(Option<usize>, Shown<'_>)> {
+pub(super) fn numbered(figures: &[Figure]) -> Vec<(Option<usize>, Shown<'_>)> {
     let drawn = figures
         .iter()
         .filter_map(|f| f.drawing.as_ref().ok().map(|d| (f, d)));
@@ -165,8 +165,8 @@ fn numbered(figures: &[Figure]) -> Vec<(Option<usize>, Shown<'_>)> {
 }
 
 /// The figures of a set that were left out.
-fn missing(figures: &[Figure], set: usize) -> Vec<Missing<'_>> {
-    let own = figures.iter().filter(|f| f.set == Some(set));
+pub(super) fn missing(figures: &[Figure], set: Option<usize>) -> Vec<Missing<'_>> {
+    let own = figures.iter().filter(|f| f.set == set);
     own.filter_map(|f| {
         f.drawing.as_ref().err().map(|reason| Missing {
             title: f.title,
@@ -176,7 +176,7 @@ fn missing(figures: &[Figure], set: usize) -> Vec<Missing<'_>> {
     .collect()
 }
 
-fn download<'a>(name: &'a str, bytes: &[u8]) -> Download<'a> {
+pub(super) fn download<'a>(name: &'a str, bytes: &[u8]) -> Download<'a> {
     Download {
         name,
         kind: match name.rsplit('.').next() {

@@ -8,9 +8,11 @@ mod checks;
 mod conventions;
 mod convert;
 mod document;
+mod domains;
 mod joint;
 mod lattice;
 mod map;
+mod region;
 mod scan;
 
 pub(crate) use budget::source_name;
@@ -21,11 +23,15 @@ pub use document::{
     CombinedResult, ConsistencyResult, DriftFitResult, DriftMonteCarloResult, DriftResult,
     InputProvenance, MeanResult, Results, SetResult,
 };
+pub use domains::{DislocationResult, DomainsResult, RegimeResult};
 pub use joint::{JointResult, TestedResult};
 pub use lattice::{LatticeVector, ResultEstimate, StrainMonteCarlo, TwistStrainResult};
 pub use map::{
     AgreementResult, DriftChangeResult, HarmonicResult, MapResults, MappedImage, MaskCount,
     QuantityResult, mask_counts, quantities,
+};
+pub use region::{
+    DeviceResult, MapDetailsResult, MaskShare, RegionMeanResult, RegionResult, WantedResult,
 };
 pub use scan::{LineResult, ScanResult, ScanTwistStrain, ScanVector, TipVelocity, Window};
 
