@@ -1,6 +1,8 @@
 //! `moiregauge map`: scan files → maps of twist, strain and lattice with their errors.
 
+mod domains;
 mod output;
+mod regions;
 mod source;
 mod survey;
 
@@ -12,7 +14,7 @@ use clap::ValueEnum;
 use moiregauge::analysis::Axis;
 use moiregauge::caveat::Caveat;
 use moiregauge::map::{DriftChange, LatticeMap, Resolution, TwistStrainMap, combine, drift_change};
-use moiregauge::series::{LineMap, MapMethod, map_scan};
+use moiregauge::series::{LineMap, MapMethod, domains_of_scan, map_scan};
 use moiregauge::settings::Settings;
 use moiregauge_report::{FailedInput, Provenance};
 use spmfile::FrameDirection;
@@ -34,8 +36,11 @@ Examples:
   moiregauge map scan.000 --out maps
   moiregauge map scans/ --out maps --window 12
   moiregauge map survey.npy --out maps --size 1.5um×1.5um --step 5
+  moiregauge map scan.000 --out maps --device 200nm×100nm --wanted 1.05±0.02
+  moiregauge map scan.000 --out maps --region bar=10,20,80,40 --profile 'cut=0,0 100,80'
 
-Written: map.zarr and map.gwy (all quantities, their errors, mask), map.json (summary), figures/.")]
+Written: report.html, map.zarr and map.gwy (all quantities, their errors, mask), map.json (summary), figures/,
+and what was asked for: regions.csv, profiles.csv, devices.csv.")]
 pub(crate) struct MapArgs {
     #[command(flatten)]
     analyze: AnalyzeArgs,
@@ -56,6 +61,10 @@ pub(crate) struct MapArgs {
     /// Margin at the edges, in windows
     #[arg(long, value_name = "WINDOWS", default_value_t = 2.0)]
     margin: f64,
+    #[command(flatten)]
+    regions: regions::RegionArgs,
+    #[command(flatten)]
+    domains: domains::DomainArgs,
 }
 
 /// How local lattices are measured.
@@ -156,6 +165,7 @@ fn survey(
             whole: None,
             agreement: None,
             drift_change: None,
+            domains: None,
         }));
     }
     Ok(None)
@@ -247,8 +257,20 @@ fn together(
             ),
         ));
     }
+    let map = TwistStrainMap::new(&lattices, &found);
+    let domains = args.domains.answer(&map, &maps[0].harmonics, |contrast| {
+        let all = used().flat_map(|scan| {
+            let reading = read(Path::new(&scan.file), settings, known).ok();
+            reading.map_or_else(Vec::new, |r| {
+                domains_of_scan(&r.scan, (scan, origin), settings, contrast)
+            })
+        });
+        all.collect()
+    });
+    caveats.extend(domains.iter().flat_map(|d| d.caveats.clone()));
     Ok(Made {
-        map: TwistStrainMap::new(&lattices, &found),
+        map,
+        domains,
         images: maps
             .iter()
             .map(|m| output::image(&m.file, Some(m.line), m.drift_corrected, &m.harmonics))

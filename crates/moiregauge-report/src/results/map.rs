@@ -46,6 +46,8 @@ pub struct MapResults {
     pub agreement: Option<AgreementResult>,
     /// What differs between upward and downward frames along the slow axis: drift that changes, no strain.
     pub drift_change: Option<DriftChangeResult>,
+    /// Regions, uniform areas, wanted twist.
+    pub details: super::MapDetailsResult,
     /// Doubts.
     pub caveats: Vec<Caveat>,
 }

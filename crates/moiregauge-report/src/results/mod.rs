@@ -8,10 +8,12 @@ mod checks;
 mod conventions;
 mod convert;
 mod document;
+mod domains;
 mod joint;
 mod lattice;
 mod map;
 mod readings;
+mod region;
 mod scan;
 
 pub(crate) use budget::source_name;
@@ -22,6 +24,7 @@ pub use document::{
     CombinedResult, ConsistencyResult, DriftFitResult, DriftMonteCarloResult, DriftResult,
     InputProvenance, MeanResult, Results, SetResult,
 };
+pub use domains::{DislocationResult, DomainsResult, RegimeResult};
 pub use joint::{JointResult, TestedResult};
 pub use lattice::{LatticeVector, ResultEstimate, StrainMonteCarlo, TwistStrainResult};
 pub use map::{
@@ -31,6 +34,9 @@ pub use map::{
 pub use readings::{
     AtomicResult, IsotropicStrainResult, ReadingsResult, ShiftResult, SolutionResult, SplitResult,
     StrainTensorResult, TensorNumbers, TensorSigmas,
+};
+pub use region::{
+    DeviceResult, MapDetailsResult, MaskShare, RegionMeanResult, RegionResult, WantedResult,
 };
 pub use scan::{LineResult, ScanResult, ScanTwistStrain, ScanVector, TipVelocity, Window};
 

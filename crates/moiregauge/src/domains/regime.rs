@@ -1,0 +1,152 @@
+//! Which answer holds where the moiré relaxes: phases under a window, or nodes and triangles.
+
+use super::cells::DomainMap;
+use crate::map::{Mask, TwistStrainMap, UsedHarmonic};
+
+/// Below this twist the layers of most materials relax into domains, rad (0.5°).
+const RELAXED: f64 = 0.5 / 57.295_779_513;
+/// Power of higher harmonics over that of the first ones: walls and nodes are sharp.
+const SHARP: f64 = 0.35;
+/// Share of the inner nodes of a map that the window blurs or whose harmonics contradict each other.
+const BLURRED: f64 = 0.3;
+/// Change of the cell's area over one window, as a share of itself.
+const VARIED: f64 = 0.2;
+
+/// What is to be used.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RegimeChoice {
+    /// The maps of phases under a window.
+    Phases,
+    /// The triangles between nodes.
+    Domains,
+}
+
+/// Which regime applies, and what says so.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Regime {
+    /// What is to be used.
+    pub choice: RegimeChoice,
+    /// Typical twist, rad.
+    pub twist: Option<f64>,
+    /// Power of higher harmonics over that of the first shell.
+    pub sharpness: f64,
+    /// Share of inner nodes that are bent or defects, 0 to 1.
+    pub blurred: f64,
+    /// Typical change of the area of a cell over the full width of a window, as a share of itself; NaN without cells.
+    pub variation: f64,
+    /// In words.
+    pub reasons: Vec<String>,
+}
+
+/// Decides from a map, its harmonics, and the cells if there are any.
+///
+/// Domains are for a relaxed lattice (small twist, or sharp walls) and for one that changes faster than the window
+/// resolves; phases for all others.
+pub fn regime(
+    map: &TwistStrainMap,
+    harmonics: &[UsedHarmonic],
+    domains: Option<&DomainMap>,
+) -> Regime {
+    let inner = map.grid.len() - map.count(Mask::Margin) - map.count(Mask::Missing);
+    let bad = map.count(Mask::Bent) + map.count(Mask::Defect) + map.count(Mask::NoSolution);
+    let blurred = bad as f64 / inner.max(1) as f64;
+    let sharpness = sharpness(harmonics);
+    let of_cells = domains.and_then(|d| {
+        median(
+            d.cells
+                .iter()
+                .filter_map(|c| c.twist_strain)
+                .map(|t| t.twist)
+                .collect(),
+        )
+    });
+    let twist = of_cells.or_else(|| map.spread(&map.twist).map(|s| s.mean));
+    let variation = domains.map_or(f64::NAN, |d| variation(d, 2.355 * map.window_nm));
+    let mut reasons = Vec::new();
+    if let Some(twist) = twist.filter(|t| t.abs() < RELAXED) {
+        reasons.push(format!(
+            "the twist of {:.2}° is below 0.5°, where lattices relax into domains",
+            twist.to_degrees()
+        ));
+    }
+    if sharpness > SHARP {
+        reasons.push(format!(
+            "higher harmonics have {:.0} % of the power of the first ones: nodes or walls are sharp",
+            100.0 * sharpness
+        ));
+    }
+    if blurred > BLURRED {
+        reasons.push(format!(
+            "{:.0} % of the inner nodes of the map change too fast for its window or contradict themselves",
+            100.0 * blurred
+        ));
+    }
+    if variation > VARIED {
+        reasons.push(format!(
+            "cells change by {:.0} % of their area over the width of the window",
+            100.0 * variation
+        ));
+    }
+    let choice = if reasons.is_empty() || domains.is_none() {
+        RegimeChoice::Phases
+    } else {
+        RegimeChoice::Domains
+    };
+    Regime {
+        choice,
+        twist,
+        sharpness,
+        blurred,
+        variation,
+        reasons,
+    }
+}
+
+/// Whether a lattice may be relaxed at all, before its nodes are looked for.
+fn sharpness(harmonics: &[UsedHarmonic]) -> f64 {
+    let order = |[h, k]: [i32; 2]| h * h + h * k + k * k;
+    let power = |first: bool| -> f64 {
+        let of = harmonics.iter().filter(|x| (order(x.index) == 1) == first);
+        of.map(|x| x.amplitude * x.amplitude).sum()
+    };
+    let first = power(true);
+    if first > 0.0 {
+        power(false) / first
+    } else {
+        0.0
+    }
+}
+
+/// Median over pairs of neighbouring cells of |ln(area ratio)|, scaled from their distance to `width`, its noise
+/// taken off.
+fn variation(domains: &DomainMap, width: f64) -> f64 {
+    let mut by_edge = std::collections::BTreeMap::<[usize; 2], Vec<usize>>::new();
+    for (n, cell) in domains.cells.iter().enumerate() {
+        for i in 0..3 {
+            let mut edge = [cell.nodes[i], cell.nodes[(i + 1) % 3]];
+            edge.sort_unstable();
+            by_edge.entry(edge).or_default().push(n);
+        }
+    }
+    let area = |n: usize| domains.cells[n].lattice.basis.determinant().abs();
+    // Variance of ln|det B| by the errors of a cell: bᵀ C b with b the entries of B⁻ᵀ.
+    let noise = |n: usize| {
+        let lattice = &domains.cells[n].lattice;
+        lattice.basis.try_inverse().map_or(f64::NAN, |inverse| {
+            let slope = nalgebra::Vector4::from_column_slice(inverse.transpose().as_slice());
+            (slope.transpose() * lattice.covariance * slope)[0]
+        })
+    };
+    let changes = by_edge.values().filter_map(|two| {
+        let &[a, b] = two.as_slice() else { return None };
+        let apart = (domains.cells[a].centre - domains.cells[b].centre).norm();
+        let change = (area(a) / area(b)).ln().powi(2) - noise(a) - noise(b);
+        (apart > 0.0).then(|| change.max(0.0).sqrt() * width / apart)
+    });
+    median(changes.filter(|c| c.is_finite()).collect()).unwrap_or(f64::NAN)
+}
+
+fn median(mut values: Vec<f64>) -> Option<f64> {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied()
+}

@@ -1,0 +1,90 @@
+//! How the noise of neighbouring nodes goes together.
+//!
+//! Twist and strain are slopes of phases under a Gaussian window of width w. White noise under the window
+//! gives phases with the correlation `e^{−d²/4w²}`; for three equal harmonics at 60° their slopes, combined
+//! to twist or to a component of strain, have `ρ(d) = (1 − d²/4w²) e^{−d²/4w²}` (minus the Laplacian of it).
+//! It integrates to zero: the mean slope over an area is the difference of phases across it.
+
+use nalgebra::Vector2;
+use rayon::prelude::*;
+
+use crate::map::Grid;
+
+/// Beyond this many windows nodes count as independent.
+const REACH: f64 = 7.0;
+
+/// Sums over all pairs of nodes of an area, `Σρ_ij/N²` and `Σρ²_ij/N²`: what noise of unit variance leaves in
+/// the mean, and how much its variance over the area scatters.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Pairs {
+    pub(super) mean: f64,
+    pub(super) square: f64,
+}
+
+/// Correlation of the noise of nodes `d` windows apart, d² given.
+fn rho(square: f64) -> f64 {
+    (1.0 - square / 4.0) * (-square / 4.0).exp()
+}
+
+/// The sums for these nodes of a grid, under windows of this width (nm).
+pub(super) fn pairs(grid: &Grid, nodes: &[usize], window: f64) -> Pairs {
+    let count = nodes.len() as f64;
+    if nodes.is_empty() || !(window > 0.0) {
+        let one = 1.0 / count.max(1.0);
+        return Pairs {
+            mean: one,
+            square: one,
+        };
+    }
+    let [columns, rows] = grid.size.map(|n| n as i64);
+    let mut inside = vec![false; grid.len()];
+    nodes.iter().for_each(|&n| inside[n] = true);
+    let offsets = offsets(grid, window);
+    let sums: Vec<[f64; 2]> = nodes
+        .par_iter()
+        .map(|&node| {
+            let (column, row) = (node as i64 % columns, node as i64 / columns);
+            let mut sum = [0.0; 2];
+            for &([c, r], rho) in &offsets {
+                let (c, r) = (column + c, row + r);
+                let there = (0..columns).contains(&c) && (0..rows).contains(&r);
+                if there && inside[(r * columns + c) as usize] {
+                    sum[0] += rho;
+                    sum[1] += rho * rho;
+                }
+            }
+            sum
+        })
+        .collect();
+    let total = sums
+        .iter()
+        .fold([0.0; 2], |t, s| [t[0] + s[0], t[1] + s[1]]);
+    Pairs {
+        // What is cut off beyond the reach may leave a little less than nothing.
+        mean: (total[0] / (count * count)).max(0.0),
+        square: total[1] / (count * count),
+    }
+}
+
+/// Steps on the grid within reach, and the correlation over each.
+fn offsets(grid: &Grid, window: f64) -> Vec<([i64; 2], f64)> {
+    let Some(inverse) = grid.step.try_inverse() else {
+        return vec![([0, 0], 1.0)];
+    };
+    let most = |axis: usize| (REACH * window * inverse.row(axis).norm()).ceil() as i64;
+    let (columns, rows) = (
+        most(0).min(grid.size[0] as i64),
+        most(1).min(grid.size[1] as i64),
+    );
+    let mut out = Vec::new();
+    for row in -rows..=rows {
+        for column in -columns..=columns {
+            let away = grid.step * Vector2::new(column as f64, row as f64) / window;
+            let square = away.norm_squared();
+            if square < REACH * REACH {
+                out.push(([column, row], rho(square)));
+            }
+        }
+    }
+    out
+}
