@@ -13,6 +13,7 @@ use anyhow::{Context as _, bail, ensure};
 use clap::ValueEnum;
 use moiregauge::analysis::Axis;
 use moiregauge::caveat::Caveat;
+use moiregauge::domains::{Contrast, DomainMap};
 use moiregauge::map::{DriftChange, LatticeMap, Resolution, TwistStrainMap, combine, drift_change};
 use moiregauge::series::{LineMap, MapMethod, domains_of_scan, map_scan};
 use moiregauge::settings::Settings;
@@ -37,10 +38,12 @@ Examples:
   moiregauge map scans/ --out maps --window 12
   moiregauge map survey.npy --out maps --size 1.5um×1.5um --step 5
   moiregauge map scan.000 --out maps --device 200nm×100nm --wanted 1.05±0.02
-  moiregauge map scan.000 --out maps --region bar=10,20,80,40 --profile 'cut=0,0 100,80'
+  moiregauge map scan.000 --out maps --region bar=10,20,80,40 --region 'flake=0,0 1um,10nm 600nm,0.8um'
+  moiregauge map scan.000 --out maps --profile 'cut=0,0 100,80'
+  moiregauge map small_angle.sxm --out maps --domains on --nodes bright
 
 Written: report.html, map.zarr and map.gwy (all quantities, their errors, mask), map.json (summary), figures/,
-and what was asked for: regions.csv, profiles.csv, devices.csv.")]
+and what was asked for: regions.csv, profiles.csv, devices.csv, domains.csv, nodes.csv; columns.md explains them.")]
 pub(crate) struct MapArgs {
     #[command(flatten)]
     analyze: AnalyzeArgs,
@@ -98,6 +101,7 @@ impl From<MapMethodArg> for MapMethod {
 pub(crate) fn run(args: &MapArgs) -> anyhow::Result<ExitCode> {
     let settings = args.analyze.settings()?;
     let resolution = args.resolution()?;
+    args.regions.check()?;
     let out = args.analyze.out();
     ensure!(
         args.analyze.force() || !out.join("map.json").exists(),
@@ -146,13 +150,17 @@ fn survey(
         let (out, loud) = (args.analyze.out(), args.analyze.is_loud());
         let (map, plan) = large.map(settings, resolution, out, loud)?;
         let file = large.input.file.clone();
+        let mut caveats = vec![Caveat::new(
+            "survey",
+            file.as_str(),
+            "the image was mapped in bands, with nominal positions, without correction for drift, and without \
+             displacements",
+        )];
+        let look = None::<fn(Contrast) -> Vec<DomainMap>>;
+        let domains = args.domains.answer(&map, look);
+        caveats.extend(domains.caveats.iter().cloned());
         return Ok(Some(Made {
-            caveats: vec![Caveat::new(
-                "survey",
-                file.as_str(),
-                "the image was mapped in bands, with nominal positions, without correction for drift, and \
-                 without displacements",
-            )],
+            caveats,
             provenance: Provenance {
                 version: env!("CARGO_PKG_VERSION").to_owned(),
                 seed: settings.seed,
@@ -165,7 +173,7 @@ fn survey(
             whole: None,
             agreement: None,
             drift_change: None,
-            domains: None,
+            domains,
         }));
     }
     Ok(None)
@@ -258,7 +266,7 @@ fn together(
         ));
     }
     let map = TwistStrainMap::new(&lattices, &found);
-    let domains = args.domains.answer(&map, &maps[0].harmonics, |contrast| {
+    let look = |contrast| {
         let all = used().flat_map(|scan| {
             let reading = read(Path::new(&scan.file), settings, known).ok();
             reading.map_or_else(Vec::new, |r| {
@@ -266,8 +274,9 @@ fn together(
             })
         });
         all.collect()
-    });
-    caveats.extend(domains.iter().flat_map(|d| d.caveats.clone()));
+    };
+    let domains = args.domains.answer(&map, Some(look));
+    caveats.extend(domains.caveats.iter().cloned());
     Ok(Made {
         map,
         domains,

@@ -27,5 +27,5 @@ pub use provenance::{FailedInput, InputFile, Provenance};
 #[cfg(feature = "parquet")]
 pub use report::parquet_tables;
 pub use report::{Choice, figure_files, write_report};
-pub use results::{Results, schema};
+pub use results::{Results, map_schema, schema};
 pub use tables::{map_scan, map_scans, map_tables};

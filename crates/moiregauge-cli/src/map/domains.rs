@@ -3,14 +3,14 @@
 use clap::ValueEnum;
 use moiregauge::caveat::Caveat;
 use moiregauge::domains::{Contrast, DomainMap, Regime, RegimeChoice, regime};
-use moiregauge::map::{TwistStrainMap, UsedHarmonic};
+use moiregauge::map::TwistStrainMap;
 
 /// Domain structure at small angles.
 #[derive(clap::Args, Clone, Debug)]
 #[command(next_help_heading = "Domains at small angles")]
 pub(super) struct DomainArgs {
     /// Look for nodes and the triangles between them: twist and strain of each where the lattice relaxes into
-    /// domains. auto: only where maps of phases are in doubt (twist below 0.5°, sharp walls, fast changes)
+    /// domains. auto: only where maps of phases are in doubt (twist below 0.5°, fast changes, no good node)
     #[arg(long, value_enum, default_value_t = When::Auto)]
     domains: When,
     /// Whether nodes are bright or dark [default: what the image tells]
@@ -31,7 +31,7 @@ enum Look {
     Dark,
 }
 
-/// What was found.
+/// What was found, and which regime applies.
 #[derive(Clone, Debug)]
 pub(super) struct Domains {
     pub(super) map: Option<DomainMap>,
@@ -39,18 +39,34 @@ pub(super) struct Domains {
     pub(super) caveats: Vec<Caveat>,
 }
 
+/// Missing and extra nodes beyond this share of all make the mesh doubtful.
+const ODD: f64 = 0.15;
+
 impl DomainArgs {
-    /// Looks for domains if they are wanted; `find` gives those of all images.
+    /// Which regime applies; looks for domains if they are wanted. `find` gives those of all images, or is `None` where
+    /// the image is too large to look.
     pub(super) fn answer(
         &self,
         map: &TwistStrainMap,
-        harmonics: &[UsedHarmonic],
-        find: impl FnOnce(Contrast) -> Vec<DomainMap>,
-    ) -> Option<Domains> {
-        let before = regime(map, harmonics, None);
-        if self.domains == When::Off || (self.domains == When::Auto && before.reasons.is_empty()) {
-            return None;
-        }
+        find: Option<impl FnOnce(Contrast) -> Vec<DomainMap>>,
+    ) -> Domains {
+        let before = regime(map, None);
+        let wanted = match self.domains {
+            When::Off => false,
+            When::Auto => before.in_doubt,
+            When::On => true,
+        };
+        let Some(find) = find.filter(|_| wanted) else {
+            let caveats = before.in_doubt.then(|| {
+                let why = format!("{}: they were not looked for", before.reasons.join("; "));
+                Caveat::new("phases-in-doubt", "map", why)
+            });
+            return Domains {
+                map: None,
+                regime: before,
+                caveats: caveats.into_iter().collect(),
+            };
+        };
         let contrast = match self.nodes {
             None => Contrast::Auto,
             Some(Look::Bright) => Contrast::Bright,
@@ -59,38 +75,57 @@ impl DomainArgs {
         let found = find(contrast);
         let images = found.len();
         let best = found.into_iter().max_by_key(|d| d.cells.len());
-        let regime = regime(map, harmonics, best.as_ref());
+        let regime = regime(map, best.as_ref());
         let mut caveats = Vec::new();
+        let mut doubt = |code, why: String| caveats.push(Caveat::new(code, "domains", why));
         if images > 1 {
-            caveats.push(Caveat::new(
-                "domains-of-one-image",
-                "domains",
-                format!("{images} images show domains; the triangles are those of the one with most of them"),
-            ));
+            let why = "images show domains; the triangles are those of the one with most of them";
+            doubt("domains-of-one-image", format!("{images} {why}"));
         }
         match &best {
-            None => caveats.push(Caveat::new(
+            None => doubt(
                 "no-domains",
-                "domains",
-                "phases under a window are in doubt here, and nodes could not be found either",
-            )),
-            Some(d) if !d.contrast_is_clear && self.nodes.is_none() => caveats.push(Caveat::new(
-                "nodes-bright-or-dark",
-                "domains",
-                "the image does not tell whether nodes are bright or dark: triangles may stand on domains instead \
-                 of nodes; say --nodes bright or dark",
-            )),
-            Some(_) if regime.choice == RegimeChoice::Domains => caveats.push(Caveat::new(
-                "use-domains",
-                "map",
-                "the maps of phases mix relaxation with strain here: use the triangles between nodes",
-            )),
-            Some(_) => {}
+                "no mesh of nodes could be found in the image".to_owned(),
+            ),
+            Some(d) => {
+                if !d.contrast_is_clear && self.nodes.is_none() {
+                    doubt(
+                        "nodes-bright-or-dark",
+                        "the image does not tell whether nodes are bright or dark: triangles may stand on domains \
+                         instead of nodes; say --nodes bright or dark"
+                            .to_owned(),
+                    );
+                }
+                let odd = d.missing.len() + d.extra.len();
+                if odd as f64 > ODD * d.nodes.len() as f64 {
+                    doubt(
+                        "mesh-with-gaps",
+                        format!(
+                            "{odd} of {} nodes are missing or fit into no triangle: the mesh may not be that of the \
+                             lattice",
+                            d.nodes.len()
+                        ),
+                    );
+                }
+            }
         }
-        Some(Domains {
+        if regime.choice == RegimeChoice::Domains {
+            let why = format!(
+                "use the triangles between nodes and not the maps of phases: {}",
+                regime.reasons.join("; ")
+            );
+            caveats.push(Caveat::new("use-domains", "map", why));
+        } else if regime.in_doubt {
+            caveats.push(Caveat::new(
+                "phases-in-doubt",
+                "map",
+                regime.reasons.join("; "),
+            ));
+        }
+        Domains {
             map: best,
             regime,
             caveats,
-        })
+        }
     }
 }

@@ -39,7 +39,7 @@ pub(super) struct Made {
     pub(super) images: Vec<MappedImage>,
     pub(super) agreement: Option<Agreement>,
     pub(super) drift_change: Option<DriftChange>,
-    pub(super) domains: Option<Domains>,
+    pub(super) domains: Domains,
     pub(super) caveats: Vec<Caveat>,
 }
 
@@ -65,11 +65,9 @@ pub(super) fn write(made: &Made, args: &MapArgs) -> anyhow::Result<()> {
             &spmfile::write(&map_scan(map), WritableFormat::Gwy, "map", &log)?,
         )?;
     }
-    let (mut details, doubts) = args.regions.answer(map);
-    if let Some(domains) = &made.domains {
-        details.domains.clone_from(&domains.map);
-        details.regime = Some(domains.regime.clone());
-    }
+    let (mut details, doubts) = args.regions.answer(map)?;
+    details.domains.clone_from(&made.domains.map);
+    details.regime = Some(made.domains.regime.clone());
     let mut results = results(made, args.method_name());
     results.details = (&details).into();
     results.caveats.extend(doubts);

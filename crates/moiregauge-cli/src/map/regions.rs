@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use anyhow::ensure;
 use moiregauge::caveat::Caveat;
 use moiregauge::map::TwistStrainMap;
 use moiregauge::region::{
@@ -18,17 +19,14 @@ use crate::input::parse_size;
 #[derive(clap::Args, Clone, Debug)]
 #[command(next_help_heading = "Regions of the map")]
 pub(super) struct RegionArgs {
-    /// Mean, spread and errors within a box: lower left corner, width, height; nm, or with a unit
-    /// (bar=0.1um,0.2um,1um,500nm); may be repeated
+    /// Mean, spread and errors within a box: lower left corner, width, height; or within a polygon, its corners
+    /// apart by blanks (flake='0,0 100,10 60,80'); nm, or with a unit (bar=0.1um,0.2um,1um,500nm); may be repeated
     #[arg(long, value_name = "NAME=X,Y,W,H", value_parser = parse_region, allow_hyphen_values = true)]
     region: Vec<Region>,
-    /// The same within a polygon, its corners apart by blanks
-    #[arg(long, value_name = "NAME=X1,Y1 X2,Y2 …", value_parser = parse_polygon, allow_hyphen_values = true)]
-    polygon: Vec<Region>,
-    /// Twist, strain and wavelength along a line
+    /// Twist, strain and wavelength along a line; nm, or with a unit; may be repeated
     #[arg(long, value_name = "NAME=X1,Y1 X2,Y2", value_parser = parse_line, allow_hyphen_values = true)]
     profile: Vec<Line>,
-    /// The most uniform areas of this size: where the twist varies least
+    /// The most uniform areas of this size (200nm×100nm): where the twist varies least, ranked
     #[arg(long, value_name = "W×H", value_parser = parse_size)]
     device: Option<[f64; 2]>,
     /// Orientations of the device to try, evenly over half a turn; 1: along x only
@@ -52,12 +50,38 @@ struct Line {
 }
 
 impl RegionArgs {
+    /// Refuses names that are used twice.
+    pub(super) fn check(&self) -> anyhow::Result<()> {
+        let regions: Vec<&str> = self.region.iter().map(|r| r.name.as_str()).collect();
+        let lines: Vec<&str> = self.profile.iter().map(|l| l.name.as_str()).collect();
+        for (option, names) in [("--region", regions), ("--profile", lines)] {
+            for (n, name) in names.iter().enumerate() {
+                ensure!(
+                    !names[..n].contains(name),
+                    "{option}: the name {name:?} is used twice"
+                );
+            }
+        }
+        Ok(())
+    }
+
     /// The answers, and doubts about them.
-    pub(super) fn answer(&self, map: &TwistStrainMap) -> (MapDetails, Vec<Caveat>) {
+    ///
+    /// # Errors
+    /// Regions and lines beyond the map.
+    pub(super) fn answer(&self, map: &TwistStrainMap) -> anyhow::Result<(MapDetails, Vec<Caveat>)> {
         let mut doubts = Vec::new();
-        let regions = self.region.iter().chain(&self.polygon);
-        let regions: Vec<RegionStatistics> =
-            regions.map(|r| RegionStatistics::new(map, r)).collect();
+        for region in &self.region {
+            within(map, "--region", &region.name, &region.corners)?;
+        }
+        for line in &self.profile {
+            within(map, "--profile", &line.name, &line.ends)?;
+        }
+        let regions: Vec<RegionStatistics> = self
+            .region
+            .iter()
+            .map(|r| RegionStatistics::new(map, r))
+            .collect();
         for found in &regions {
             let name = found.region.name.as_str();
             if found.good == 0 {
@@ -120,8 +144,40 @@ impl RegionArgs {
             domains: None,
             regime: None,
         };
-        (details, doubts)
+        Ok((details, doubts))
     }
+}
+
+/// An error if none of the places, nor anything between them, can lie in the map.
+fn within(
+    map: &TwistStrainMap,
+    option: &str,
+    name: &str,
+    places: &[Vector2<f64>],
+) -> anyhow::Result<()> {
+    let corners = map.grid.corners();
+    let ends = |places: &[Vector2<f64>], axis: usize| {
+        let along = places.iter().map(|p| p[axis]);
+        along.fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], v| {
+            [l.min(v), h.max(v)]
+        })
+    };
+    let [x, y] = [0, 1].map(|axis| ends(&corners, axis));
+    let [u, v] = [0, 1].map(|axis| ends(places, axis));
+    ensure!(
+        u[0] <= x[1] && u[1] >= x[0] && v[0] <= y[1] && v[1] >= y[0],
+        "{option} {name}: x from {:.1} to {:.1} nm, y from {:.1} to {:.1} nm lies outside of the map, which reaches \
+         from {:.1} to {:.1} nm in x and from {:.1} to {:.1} nm in y",
+        u[0],
+        u[1],
+        v[0],
+        v[1],
+        x[0],
+        x[1],
+        y[0],
+        y[1]
+    );
+    Ok(())
 }
 
 /// What is said of them on the screen.
@@ -157,10 +213,11 @@ pub(super) fn summary(details: &MapDetailsResult) -> String {
         let known = |v: Option<f64>| v.unwrap_or(f64::NAN);
         let _ = writeln!(
             text,
-            "domains: {} {} nodes, {} triangles, {} missing, {} extra, {} dislocations; median twist {:.4}°, spread \
-             {}° (noise {}°)",
+            "domains: {} {} nodes (± {} nm), {} triangles, {} missing, {} extra, {} dislocations; median twist \
+             {:.4}°, spread {}° (noise {}°)",
             d.nodes,
             d.nodes_are,
+            two_digits(known(d.node_sigma_nm)),
             d.triangles,
             d.missing_nm.len(),
             d.extra_nm.len(),
@@ -171,7 +228,7 @@ pub(super) fn summary(details: &MapDetailsResult) -> String {
         );
     }
     if let Some(r) = &details.regime {
-        let _ = writeln!(text, "use the {}: {}", r.use_of, r.reasons.join("; "));
+        let _ = writeln!(text, "regime: {} ({})", r.use_of, r.reasons.join("; "));
     }
     if let Some(w) = &details.wanted {
         let percent = |v: Option<f64>| v.map_or_else(|| "–".to_owned(), |v| format!("{v:.1}"));
@@ -201,18 +258,36 @@ fn named(text: &str) -> Option<(&str, &str)> {
 }
 
 fn parse_region(text: &str) -> Result<Region, String> {
-    let parsed = || {
-        let (name, rest) = named(text)?;
-        let numbers: Vec<f64> = rest.split(',').map(length).collect::<Option<_>>()?;
-        let [x, y, w, h] = numbers[..] else {
-            return None;
-        };
-        (w > 0.0 && h > 0.0).then(|| Region::rectangle(name, Vector2::new(x, y), [w, h]))
+    let expected = "expected a name and, in nm, a box or the corners of a polygon, as in bar=10,20,80,40 (lower left \
+                    corner, width, height) or 'flake=0,0 100,10 60,80'";
+    let (name, rest) = named(text).ok_or(expected)?;
+    let numbers: Option<Vec<f64>> = rest.split(',').map(length).collect();
+    if let Some(&[x, y, w, h]) = numbers.as_deref() {
+        if !(w > 0.0 && h > 0.0) {
+            return Err(format!(
+                "width and height of a box are above 0, found {w} and {h} nm"
+            ));
+        }
+        return Ok(Region::rectangle(name, Vector2::new(x, y), [w, h]));
+    }
+    let corners = places(rest).ok_or(expected)?;
+    if corners.len() < 3 {
+        return Err(format!(
+            "a polygon has three corners or more, found {}; {expected}",
+            corners.len()
+        ));
+    }
+    let region = Region {
+        name: name.to_owned(),
+        corners,
     };
-    parsed().ok_or_else(|| {
-        "expected a name, the lower left corner, width and height in nm, as in bar=10,20,80,40"
-            .to_owned()
-    })
+    if region.crosses_itself() || !(region.area() > 0.0) {
+        return Err(
+            "the sides of the polygon cross each other, or it has no area: give its corners in order"
+                .to_owned(),
+        );
+    }
+    Ok(region)
 }
 
 fn places(text: &str) -> Option<Vec<Vector2<f64>>> {
@@ -224,20 +299,6 @@ fn places(text: &str) -> Option<Vec<Vector2<f64>>> {
         .filter(|t| !t.is_empty())
         .map(place)
         .collect()
-}
-
-fn parse_polygon(text: &str) -> Result<Region, String> {
-    let parsed = || {
-        let (name, rest) = named(text)?;
-        let region = Region {
-            name: name.to_owned(),
-            corners: places(rest)?,
-        };
-        (region.corners.len() >= 3 && region.area() > 0.0).then_some(region)
-    };
-    parsed().ok_or_else(|| {
-        "expected a name and three corners or more in nm, as in 'flake=0,0 100,10 60,80'".to_owned()
-    })
 }
 
 fn parse_line(text: &str) -> Result<Line, String> {
@@ -258,7 +319,10 @@ fn parse_line(text: &str) -> Result<Line, String> {
 fn parse_wanted(text: &str) -> Result<WantedTwist, String> {
     let parsed = || {
         let (twist, within) = text.split_once('±').or_else(|| text.split_once("+-"))?;
-        let degrees = |text: &str| text.trim().trim_end_matches('°').trim().parse::<f64>().ok();
+        let degrees = |text: &str| {
+            let number = text.trim().trim_end_matches("deg").trim_end_matches('°');
+            number.trim().parse::<f64>().ok()
+        };
         let (twist, within) = (degrees(twist)?, degrees(within)?);
         let good = twist.is_finite() && within > 0.0 && within.is_finite();
         good.then(|| WantedTwist {
@@ -280,11 +344,16 @@ mod tests {
         assert_eq!(region.name, "a b");
         assert!((region.area() - 13.5).abs() < 1e-9);
         assert!((region.corners[0] - Vector2::new(1000.0, -20.0)).norm() < 1e-9);
-        let triangle = parse_polygon("t=0,0 4,0 0,2").expect("a triangle");
+        let triangle = parse_region("t=0,0 4,0 0nm,2").expect("a triangle");
         assert!((triangle.area() - 4.0).abs() < 1e-12);
         let line = parse_line("cut=0,0 3,4").expect("a line");
         assert!(((line.ends[1] - line.ends[0]).norm() - 5.0).abs() < 1e-12);
-        for text in ["1.05±0.02", "1.05 +- 0.02", "1.05° ± 0.02°"] {
+        for text in [
+            "1.05±0.02",
+            "1.05 +- 0.02",
+            "1.05° ± 0.02°",
+            "1.05deg±0.02deg",
+        ] {
             let wanted = parse_wanted(text).expect(text);
             assert!((wanted.twist.to_degrees() - 1.05).abs() < 1e-12);
             assert!((wanted.within.to_degrees() - 0.02).abs() < 1e-12);
@@ -296,10 +365,14 @@ mod tests {
             "=1,2,3,4",
             "a=1,2,x,4",
             "a=1,2,1V,4",
+            "t=0,0 1,1",
+            "t=0,0 1,1 2,2",
+            "bow=0,0 2,2 2,0 0,2",
         ] {
             assert!(parse_region(wrong).is_err(), "{wrong}");
         }
-        assert!(parse_polygon("t=0,0 1,1").is_err() && parse_polygon("t=0,0 1,1 2,2").is_err());
+        let error = parse_region("t=0,0 1,1").unwrap_err();
+        assert!(error.contains("three corners or more, found 2"), "{error}");
         assert!(parse_line("l=0,0 0,0").is_err() && parse_line("l=0,0").is_err());
         assert!(parse_wanted("1.05").is_err() && parse_wanted("1±0").is_err());
     }

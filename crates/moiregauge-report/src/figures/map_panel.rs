@@ -23,17 +23,10 @@ pub(super) struct Panel {
     pub(super) axes: Axes,
 }
 
-/// Where the corners of the map lie: half a node beyond the outer ones.
-fn corners(map: &TwistStrainMap) -> [Vector2<f64>; 4] {
-    let [columns, rows] = map.grid.size.map(|n| n as f64 - 0.5);
-    [(-0.5, -0.5), (columns, -0.5), (columns, rows), (-0.5, rows)]
-        .map(|(c, r)| map.grid.origin + map.grid.step * Vector2::new(c, r))
-}
-
 impl Panel {
     /// An empty panel over the whole map, `above` more space on top of it (pt).
     pub(super) fn new(id: &str, map: &TwistStrainMap, above: f64) -> Result<Self, String> {
-        let corners = corners(map);
+        let corners = map.grid.corners();
         let range = |axis: usize| {
             let range = Range::of(corners.iter().map(|c| c[axis]));
             range.filter(|r| r.width() > 0.0)

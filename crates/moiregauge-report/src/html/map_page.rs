@@ -9,7 +9,8 @@ use super::words::{Numbers, conventions, plain};
 use crate::error::ReportError;
 use crate::figures::Figure;
 use crate::format::{plus_minus, two_digits};
-use crate::results::{MapResults, RegionMeanResult, RegionResult};
+use crate::results::{DomainsResult, MapResults, RegionMeanResult, RegionResult};
+use crate::tables::COMMON;
 
 const TEMPLATE: &str = include_str!("map.html");
 
@@ -27,6 +28,12 @@ struct Page<'a> {
     regions: Vec<Area>,
     devices: Vec<Area>,
     wanted: Option<[String; 6]>,
+    /// Names and values.
+    domains: Option<Vec<[String; 2]>>,
+    /// χ²/dof, nodes, factor.
+    agreement: Option<[String; 3]>,
+    /// What the errors of regions leave out.
+    common: &'static str,
     figures: Vec<Shown<'a>>,
     missing: Vec<Missing<'a>>,
     conventions: [(&'static str, &'a str); 15],
@@ -83,6 +90,22 @@ impl Area {
             wavelength: mean(region.wavelength_nm),
         }
     }
+}
+
+fn domains(found: &DomainsResult) -> Vec<[String; 2]> {
+    let digits = |value: Option<f64>| value.map_or_else(|| "–".to_owned(), two_digits);
+    let rows = [
+        ("nodes", format!("{} ({})", found.nodes, found.nodes_are)),
+        ("error of a node (nm)", digits(found.node_sigma_nm)),
+        ("triangles", found.triangles.to_string()),
+        ("median twist (°)", plain(found.median_twist_deg, 4)),
+        ("spread (°)", digits(found.twist_spread_deg)),
+        ("error of a triangle (°)", digits(found.twist_noise_deg)),
+        ("missing nodes", found.missing_nm.len().to_string()),
+        ("extra nodes", found.extra_nm.len().to_string()),
+        ("dislocations", found.dislocations.len().to_string()),
+    ];
+    rows.map(|(name, value)| [name.to_owned(), value]).into()
 }
 
 /// The page of a map. `downloads` are the files that it carries for saving.
@@ -149,6 +172,12 @@ pub fn map_page(
                 plain(w.possible_percent, 1),
             ]
         }),
+        domains: details.domains.as_ref().map(domains),
+        agreement: results.agreement.as_ref().map(|a| {
+            let [chi2, factor] = [a.chi2_per_dof, a.variance_factor].map(|v| plain(Some(v), 2));
+            [chi2, a.nodes.to_string(), factor]
+        }),
+        common: COMMON,
         figures: numbered(figures)
             .into_iter()
             .map(|(_, shown)| shown)

@@ -6,13 +6,15 @@ use serde::{Deserialize, Serialize};
 
 use super::convert::{PERCENT, degree, number};
 
-/// Nodes and triangles in a few numbers; each triangle is in `triangles.csv`.
+/// Nodes and triangles in a few numbers; each of them is in `nodes.csv` and `domains.csv`.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 pub struct DomainsResult {
     /// `bright` or `dark`.
     pub nodes_are: String,
     /// Nodes found.
     pub nodes: usize,
+    /// Median error of the place of a node along an axis, nm; what all nodes share is not in it.
+    pub node_sigma_nm: Option<f64>,
     /// Triangles with twist and strain.
     pub triangles: usize,
     /// Places where a node is missing, nm.
@@ -41,12 +43,12 @@ pub struct DislocationResult {
 /// Which regime applies.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 pub struct RegimeResult {
-    /// `phases` (the maps) or `domains` (the triangles): what is to be used.
+    /// `phase map` or `domains` (the triangles between nodes): what is to be used.
     pub use_of: String,
+    /// Whether the phase map is in doubt.
+    pub phase_map_in_doubt: bool,
     /// Why.
     pub reasons: Vec<String>,
-    /// Power of higher harmonics over that of the first ones.
-    pub sharpness: Option<f64>,
     /// Share of inner nodes of the map that are bent or defects, %.
     pub blurred_percent: Option<f64>,
     /// Change of the area of cells over the width of the window, %.
@@ -70,6 +72,12 @@ impl From<&DomainMap> for DomainsResult {
             }
             .to_owned(),
             nodes: map.nodes.len(),
+            node_sigma_nm: median(
+                map.covariances
+                    .iter()
+                    .map(|c| (c.trace() / 2.0).sqrt())
+                    .collect(),
+            ),
             triangles: map.cells.len(),
             missing_nm: map.missing.iter().map(|p| (*p).into()).collect(),
             extra_nm: map.extra.iter().map(|&n| map.nodes[n].into()).collect(),
@@ -97,12 +105,12 @@ impl From<&Regime> for RegimeResult {
     fn from(regime: &Regime) -> Self {
         Self {
             use_of: match regime.choice {
-                RegimeChoice::Phases => "phases",
+                RegimeChoice::Phases => "phase map",
                 RegimeChoice::Domains => "domains",
             }
             .to_owned(),
+            phase_map_in_doubt: regime.in_doubt,
             reasons: regime.reasons.clone(),
-            sharpness: number(regime.sharpness),
             blurred_percent: number(PERCENT * regime.blurred),
             variation_percent: number(PERCENT * regime.variation),
         }

@@ -1,8 +1,8 @@
-//! `triangles.csv`: the domain structure of a map.
+//! `domains.csv` and `nodes.csv`: the domain structure of a map.
 
 use moiregauge::domains::{DomainCell, DomainMap};
 use moiregauge::strain::TwistStrain;
-use nalgebra::Vector2;
+use nalgebra::{Matrix2, Vector2};
 
 use super::columns::columns;
 use super::csv::{Column, number};
@@ -58,4 +58,41 @@ pub(super) const CELL: &[Column<CellRow>] = columns! {
     "strain_1_sigma_percent", "its σ", |r| of(r, |t| t.strain_covariance().m11.sqrt(), 100.0);
     "strain_2_percent", "ε sin 2φ", |r| of(r, |t| t.strain_vector.y, 100.0);
     "strain_2_sigma_percent", "its σ", |r| of(r, |t| t.strain_covariance().m22.sqrt(), 100.0);
+};
+
+/// A node with its number.
+pub(super) struct NodeRow {
+    number: usize,
+    place: Vector2<f64>,
+    covariance: Matrix2<f64>,
+    index: Option<[i32; 2]>,
+    extra: bool,
+}
+
+impl NodeRow {
+    pub(super) fn new(map: &DomainMap, number: usize) -> Self {
+        Self {
+            number: number + 1,
+            place: map.nodes[number],
+            covariance: map.covariances[number],
+            index: map.indices[number],
+            extra: map.extra.contains(&number),
+        }
+    }
+}
+
+fn index(row: &NodeRow, i: usize) -> String {
+    row.index.map_or_else(String::new, |hk| hk[i].to_string())
+}
+
+pub(super) const NODE: &[Column<NodeRow>] = columns! {
+    "node", "number, as in `domains.csv`", |r| r.number.to_string();
+    "x_nm", "place", |r| number(Some(r.place.x));
+    "y_nm", "place", |r| number(Some(r.place.y));
+    "x_sigma_nm", "its σ; an offset that all nodes share is not in it", |r| number(Some(r.covariance.m11.sqrt()));
+    "y_sigma_nm", "its σ", |r| number(Some(r.covariance.m22.sqrt()));
+    "covariance_xy_nm2", "covariance of x and y", |r| number(Some(r.covariance.m12));
+    "h", "index on the lattice, from a node of its part of the mesh; empty for nodes in no triangle", |r| index(r, 0);
+    "k", "index on the lattice", |r| index(r, 1);
+    "extra", "`yes`: within the mesh, and fits into no triangle", |r| if r.extra { "yes" } else { "no" }.to_owned();
 };

@@ -14,6 +14,7 @@ mod parquet;
 mod region;
 
 pub use map::{map_scan, map_scans};
+pub(crate) use region::COMMON;
 pub use region::map_tables;
 
 use crate::results::Results;

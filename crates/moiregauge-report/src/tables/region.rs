@@ -4,7 +4,7 @@ use moiregauge::region::ProfilePoint;
 
 use super::columns::columns;
 use super::csv::{Column, explanation, number, text};
-use super::domains::{CELL, CellRow};
+use super::domains::{CELL, CellRow, NODE, NodeRow};
 use crate::map_details::MapDetails;
 use crate::results::{DeviceResult, MapDetailsResult, RegionMeanResult, RegionResult};
 
@@ -12,7 +12,7 @@ use crate::results::{DeviceResult, MapDetailsResult, RegionMeanResult, RegionRes
 pub fn map_tables(details: &MapDetails) -> Vec<(String, Vec<u8>)> {
     let found = MapDetailsResult::from(details);
     let mut files = Vec::new();
-    let mut about = String::from(ABOUT);
+    let mut about = format!("{ABOUT}{COMMON}\n");
     if !found.regions.is_empty() {
         add(
             &mut files,
@@ -56,7 +56,10 @@ pub fn map_tables(details: &MapDetails) -> Vec<(String, Vec<u8>)> {
     if let Some(map) = &details.domains {
         let rows: Vec<CellRow> = (0..map.cells.len()).map(|n| CellRow::new(map, n)).collect();
         let what = "One row per triangle of neighbouring nodes.";
-        add(&mut files, &mut about, "triangles.csv", what, CELL, &rows);
+        add(&mut files, &mut about, "domains.csv", what, CELL, &rows);
+        let rows: Vec<NodeRow> = (0..map.nodes.len()).map(|n| NodeRow::new(map, n)).collect();
+        let what = "One row per node.";
+        add(&mut files, &mut about, "nodes.csv", what, NODE, &rows);
     }
     if !files.is_empty() {
         files.push(("columns.md".to_owned(), about.into_bytes()));
@@ -80,7 +83,14 @@ const ABOUT: &str = "# Columns of the tables of a map
 
 Comma-separated, UTF-8, RFC 4180; the unit is the end of the name (`_nm`, `_deg`, `_percent`); `_sigma` is one
 standard deviation by image noise. An empty field is not known. Places are those of the map: x to the right, y up.
+Twist, strain ε and its axis φ (from x, counter-clockwise) are defined under `conventions` in `map.json`.
+
 ";
+
+/// What the errors of tables leave out.
+pub(crate) const COMMON: &str = "Errors are those of image noise; means of regions take into account that neighbouring \
+    nodes share theirs. What all places have in common is not in them: drift, calibration of the scanner, lattice \
+    constant and model (the budget of `moiregauge analyze` has them), nor the smoothing by the window.";
 
 fn of(mean: Option<RegionMeanResult>, value: fn(&RegionMeanResult) -> Option<f64>) -> String {
     number(mean.as_ref().and_then(value))

@@ -1,16 +1,17 @@
 //! Which answer holds where the moiré relaxes: phases under a window, or nodes and triangles.
 
 use super::cells::DomainMap;
-use crate::map::{Mask, TwistStrainMap, UsedHarmonic};
+use crate::map::{Mask, TwistStrainMap};
+use crate::strain::TwistStrain;
 
 /// Below this twist the layers of most materials relax into domains, rad (0.5°).
 const RELAXED: f64 = 0.5 / 57.295_779_513;
-/// Power of higher harmonics over that of the first ones: walls and nodes are sharp.
-const SHARP: f64 = 0.35;
 /// Share of the inner nodes of a map that the window blurs or whose harmonics contradict each other.
 const BLURRED: f64 = 0.3;
 /// Change of the cell's area over one window, as a share of itself.
 const VARIED: f64 = 0.2;
+/// Error of the twist of a triangle as a share of it, beyond which triangles tell nothing.
+const NOISY: f64 = 0.2;
 
 /// What is to be used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -26,53 +27,42 @@ pub enum RegimeChoice {
 pub struct Regime {
     /// What is to be used.
     pub choice: RegimeChoice,
-    /// Typical twist, rad.
-    pub twist: Option<f64>,
-    /// Power of higher harmonics over that of the first shell.
-    pub sharpness: f64,
-    /// Share of inner nodes that are bent or defects, 0 to 1.
+    /// Whether the maps of phases are in doubt.
+    pub in_doubt: bool,
+    /// Share of inner nodes that are bent or defects, 0 to 1; NaN without inner nodes.
     pub blurred: f64,
     /// Typical change of the area of a cell over the full width of a window, as a share of itself; NaN without cells.
     pub variation: f64,
-    /// In words.
+    /// In words: what speaks against the maps of phases, and against the triangles.
     pub reasons: Vec<String>,
 }
 
-/// Decides from a map, its harmonics, and the cells if there are any.
+/// Decides from a map, and from the cells if there are any.
 ///
-/// Domains are for a relaxed lattice (small twist, or sharp walls) and for one that changes faster than the window
-/// resolves; phases for all others.
-pub fn regime(
-    map: &TwistStrainMap,
-    harmonics: &[UsedHarmonic],
-    domains: Option<&DomainMap>,
-) -> Regime {
+/// Domains are for a relaxed lattice (small twist) and for one that changes faster than the window resolves, provided
+/// that their triangles tell something; phases for all others.
+pub fn regime(map: &TwistStrainMap, domains: Option<&DomainMap>) -> Regime {
     let inner = map.grid.len() - map.count(Mask::Margin) - map.count(Mask::Missing);
     let bad = map.count(Mask::Bent) + map.count(Mask::Defect) + map.count(Mask::NoSolution);
-    let blurred = bad as f64 / inner.max(1) as f64;
-    let sharpness = sharpness(harmonics);
-    let of_cells = domains.and_then(|d| {
-        median(
-            d.cells
-                .iter()
-                .filter_map(|c| c.twist_strain)
-                .map(|t| t.twist)
-                .collect(),
-        )
+    let blurred = bad as f64 / inner as f64;
+    let found: Vec<TwistStrain> = domains.map_or_else(Vec::new, |d| {
+        d.cells.iter().filter_map(|c| c.twist_strain).collect()
     });
+    let of_cells = median(found.iter().map(|t| t.twist).collect());
     let twist = of_cells.or_else(|| map.spread(&map.twist).map(|s| s.mean));
     let variation = domains.map_or(f64::NAN, |d| variation(d, 2.355 * map.window_nm));
     let mut reasons = Vec::new();
+    if map.good() == 0 {
+        reasons.push(
+            "no node of the map of phases is to be believed: too few periods lie within the margins, or the \
+             lattice changes too fast"
+                .to_owned(),
+        );
+    }
     if let Some(twist) = twist.filter(|t| t.abs() < RELAXED) {
         reasons.push(format!(
             "the twist of {:.2}° is below 0.5°, where lattices relax into domains",
             twist.to_degrees()
-        ));
-    }
-    if sharpness > SHARP {
-        reasons.push(format!(
-            "higher harmonics have {:.0} % of the power of the first ones: nodes or walls are sharp",
-            100.0 * sharpness
         ));
     }
     if blurred > BLURRED {
@@ -87,33 +77,32 @@ pub fn regime(
             100.0 * variation
         ));
     }
-    let choice = if reasons.is_empty() || domains.is_none() {
-        RegimeChoice::Phases
-    } else {
-        RegimeChoice::Domains
+    let in_doubt = !reasons.is_empty();
+    let shares = found.iter().map(|t| t.twist().sigma / t.twist.abs());
+    let noise = median(shares.filter(|s| s.is_finite()).collect());
+    let told = match noise {
+        None if in_doubt => Some("no triangles were found or looked for".to_owned()),
+        Some(noise) if noise > NOISY => Some(format!(
+            "the twists of the triangles are uncertain by {:.0} %",
+            100.0 * noise
+        )),
+        _ => None,
     };
+    let choice = if in_doubt && told.is_none() {
+        RegimeChoice::Domains
+    } else {
+        RegimeChoice::Phases
+    };
+    reasons.extend(told);
+    if !in_doubt {
+        reasons.push("the lattice changes slowly within the window".to_owned());
+    }
     Regime {
         choice,
-        twist,
-        sharpness,
+        in_doubt,
         blurred,
         variation,
         reasons,
-    }
-}
-
-/// Whether a lattice may be relaxed at all, before its nodes are looked for.
-fn sharpness(harmonics: &[UsedHarmonic]) -> f64 {
-    let order = |[h, k]: [i32; 2]| h * h + h * k + k * k;
-    let power = |first: bool| -> f64 {
-        let of = harmonics.iter().filter(|x| (order(x.index) == 1) == first);
-        of.map(|x| x.amplitude * x.amplitude).sum()
-    };
-    let first = power(true);
-    if first > 0.0 {
-        power(false) / first
-    } else {
-        0.0
     }
 }
 

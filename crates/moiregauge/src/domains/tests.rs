@@ -3,10 +3,12 @@ use nalgebra::{Matrix2, Matrix4, Vector2};
 use super::*;
 use crate::geometry::Geometry;
 use crate::lattice::LatticeVectors;
+use crate::map::Mask;
 use crate::material::Material;
+use crate::region::tests::made;
 use crate::settings::StrainConvention;
 use crate::simulate::DomainScene;
-use crate::strain::twist_strain;
+use crate::strain::{moire_lattice, twist_strain};
 
 fn rms(values: &[f64]) -> f64 {
     (values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64).sqrt()
@@ -230,6 +232,49 @@ fn triangles_have_the_twist_of_their_nodes() {
     assert!((0.85..1.2).contains(&rms(&strains)), "{}", rms(&strains));
 }
 
+/// Layers of known twist and strain: their moiré by the strain equation, drawn with nodes and walls, gives both back
+/// in every triangle within its errors, and in the mean of all of them.
+#[test]
+fn triangles_of_known_layers_have_their_twist_and_strain() {
+    let (material, convention) = (Material::graphene(), StrainConvention::RealSpace);
+    let (twist, strain, axis, angle) = (0.25f64.to_radians(), 8e-4, 0.5, 0.2);
+    let basis = moire_lattice(twist, strain, axis, angle, &material, convention).unwrap();
+    let pitch = 1.4;
+    let geometry = Geometry {
+        size: [400, 380],
+        pixel_to_nm: Matrix2::identity() * pitch,
+        origin: Vector2::zeros(),
+        covariance: Matrix4::zeros(),
+        from_sensors: false,
+    };
+    let lab = 2.0 * (axis + angle + twist);
+    let truth = strain * Vector2::new(lab.cos(), lab.sin());
+    let (mut twists, mut strains, mut mean) = (Vec::new(), Vec::new(), 0.0);
+    for seed in 0..4 {
+        let mut scene = DomainScene::hexagonal([400, 380], 40.0, 0.0);
+        scene.lattice = basis / pitch;
+        (scene.white, scene.seed) = (0.3, seed);
+        let found = find_nodes(&scene.image(), &scene.lattice, [pitch; 2], Contrast::Auto).unwrap();
+        let mesh = mesh_of(&scene, &found);
+        let map = DomainMap::new(&found, &mesh, &geometry, &material, convention)
+            .unwrap()
+            .unwrap();
+        for cell in &map.cells {
+            let found = cell.twist_strain.unwrap();
+            twists.push((found.twist - twist) / found.twist().sigma);
+            mean += found.twist / twist - 1.0;
+            for i in 0..2 {
+                let sigma = found.strain_covariance()[(i, i)].sqrt();
+                strains.push((found.strain_vector[i] - truth[i]) / sigma);
+            }
+        }
+    }
+    assert!(twists.len() > 200, "{}", twists.len());
+    assert!((mean / twists.len() as f64).abs() < 2e-3);
+    assert!((0.85..1.2).contains(&rms(&twists)), "{}", rms(&twists));
+    assert!((0.85..1.2).contains(&rms(&strains)), "{}", rms(&strains));
+}
+
 /// Noise alone has no mesh.
 #[test]
 fn noise_has_no_nodes() {
@@ -238,4 +283,60 @@ fn noise_has_no_nodes() {
     let found = find_nodes(&scene.image(), &scene.lattice, [1.0; 2], Contrast::Auto);
     let triangles = found.map_or(0, |f| mesh_of(&scene, &f).triangles.len());
     assert!(triangles < 12, "{triangles}");
+}
+
+/// Which regime applies, case by case: the map is a constant twist, the triangles those of a simulated image.
+#[test]
+fn the_regime_has_its_reasons() {
+    let scene = scene(3);
+    let found = found(&scene);
+    let geometry = |pitch: f64| Geometry {
+        size: [420, 380],
+        pixel_to_nm: Matrix2::identity() * pitch,
+        origin: Vector2::zeros(),
+        covariance: Matrix4::zeros(),
+        from_sensors: false,
+    };
+    let (material, convention) = (Material::graphene(), StrainConvention::RealSpace);
+    let domains = |pitch: f64, found: &FoundNodes| {
+        let mesh = mesh_of(&scene, found);
+        DomainMap::new(found, &mesh, &geometry(pitch), &material, convention)
+            .unwrap()
+            .unwrap()
+    };
+    let map = |degrees: f64| made(|_| degrees.to_radians(), 1e-6);
+    let plain = regime(&map(1.2), None);
+    assert_eq!(plain.choice, RegimeChoice::Phases);
+    assert!(!plain.in_doubt && plain.blurred == 0.0 && plain.variation.is_nan());
+    // A small twist: triangles if there are any that tell something.
+    let alone = regime(&map(0.3), None);
+    assert!(alone.in_doubt && alone.choice == RegimeChoice::Phases);
+    let small = regime(&map(0.3), Some(&domains(2.0, &found)));
+    assert_eq!(small.choice, RegimeChoice::Domains);
+    assert!(small.reasons[0].contains("below 0.5°"), "{:?}", small.reasons);
+    let mut blunt = found.clone();
+    blunt
+        .nodes
+        .iter_mut()
+        .for_each(|n| n.covariance = Matrix2::identity() * 100.0);
+    let noisy = regime(&map(0.3), Some(&domains(2.0, &blunt)));
+    assert!(noisy.in_doubt && noisy.choice == RegimeChoice::Phases);
+    assert!(noisy.reasons.iter().any(|r| r.contains("uncertain")));
+    // Wide windows on a lattice that changes by a third across the frame; 44 pixels of 0.27 nm: 1.2°.
+    let mut wide = map(1.2);
+    wide.window_nm = 40.0;
+    let changing = regime(&wide, Some(&domains(0.27, &found)));
+    assert_eq!(changing.choice, RegimeChoice::Domains);
+    assert!(changing.variation > 0.2, "{}", changing.variation);
+    let narrow = regime(&map(1.2), Some(&domains(0.27, &found)));
+    assert_eq!(narrow.choice, RegimeChoice::Phases, "{:?}", narrow.reasons);
+    // Nodes that are bent, and no good node at all.
+    let mut bent = map(1.2);
+    for node in 0..bent.mask.len() {
+        bent.mask[node] = if node % 2 == 0 { Mask::Bent } else { Mask::Good };
+    }
+    assert!(regime(&bent, None).in_doubt);
+    bent.mask.fill(Mask::Margin);
+    let none = regime(&bent, Some(&domains(0.27, &found)));
+    assert!(none.choice == RegimeChoice::Domains && none.blurred.is_nan());
 }

@@ -43,6 +43,13 @@ impl Grid {
         let (column, row) = (node % self.size[0], node / self.size[0]);
         self.origin + self.step * Vector2::new(column as f64, row as f64)
     }
+
+    /// The corners of what it covers, half a step beyond the outer nodes, in order, nm.
+    pub fn corners(&self) -> [Vector2<f64>; 4] {
+        let [columns, rows] = self.size.map(|n| n as f64 - 0.5);
+        [(-0.5, -0.5), (columns, -0.5), (columns, rows), (-0.5, rows)]
+            .map(|(c, r)| self.origin + self.step * Vector2::new(c, r))
+    }
 }
 
 /// A local lattice on the sample.

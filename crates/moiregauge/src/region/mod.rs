@@ -75,6 +75,19 @@ impl Region {
         crossings.count() % 2 == 1
     }
 
+    /// Whether two sides cross or touch that are no neighbours.
+    pub fn crosses_itself(&self) -> bool {
+        let sides: Vec<_> = self.sides().collect();
+        let side = |a: Vector2<f64>, b: Vector2<f64>, p: Vector2<f64>| (b - a).perp(&(p - a));
+        let apart = |(a, b), (c, d)| {
+            side(a, b, c) * side(a, b, d) > 0.0 || side(c, d, a) * side(c, d, b) > 0.0
+        };
+        (0..sides.len()).any(|i| {
+            let others = i + 2..sides.len() - usize::from(i == 0);
+            others.into_iter().any(|j| !apart(sides[i], sides[j]))
+        })
+    }
+
     /// The nodes of a grid that lie within, in their order.
     pub fn nodes(&self, grid: &Grid) -> Vec<usize> {
         (0..grid.len())
@@ -92,4 +105,4 @@ fn mean_wavelength(map: &TwistStrainMap, node: usize) -> [f64; 2] {
 }
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

@@ -9,7 +9,7 @@ use crate::settings::StrainConvention;
 use crate::simulate::FieldScene;
 
 /// A map with this twist and error everywhere, on a sheared grid of 60 × 50 nodes about 2 nm apart.
-fn made(twist: impl Fn(Vector2<f64>) -> f64, sigma: f64) -> TwistStrainMap {
+pub(crate) fn made(twist: impl Fn(Vector2<f64>) -> f64, sigma: f64) -> TwistStrainMap {
     let grid = Grid {
         size: [60, 50],
         origin: Vector2::new(-5.0, 3.0),
@@ -109,6 +109,23 @@ fn polygons_have_an_inside() {
         (0.5, 1.5, true),
     ] {
         assert_eq!(region.contains(Vector2::new(x, y)), inside);
+    }
+}
+
+/// A bow tie crosses itself; a triangle, a box and a polygon that is not convex do not.
+#[test]
+fn bow_ties_cross_themselves() {
+    let of = |corners: &[[f64; 2]]| Region {
+        name: String::new(),
+        corners: corners.iter().map(|c| Vector2::from(*c)).collect(),
+    };
+    assert!(of(&[[0.0, 0.0], [2.0, 2.0], [2.0, 0.0], [0.0, 2.0]]).crosses_itself());
+    for plain in [
+        of(&[[0.0, 0.0], [2.0, 0.0], [1.0, 3.0]]),
+        of(&[[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]]),
+        of(&[[0.0, 0.0], [2.0, 0.0], [1.0, 0.5], [0.0, 2.0]]),
+    ] {
+        assert!(!plain.crosses_itself(), "{plain:?}");
     }
 }
 
