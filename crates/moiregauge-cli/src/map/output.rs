@@ -110,6 +110,7 @@ fn results(made: &Made, method: &str) -> MapResults {
         nodes: map.grid.size,
         origin_nm: map.grid.origin.into(),
         step_nm: [columns.into(), rows.into()],
+        extent_nm: map.grid.extent(),
         masks: mask_counts(map),
         quantities: quantities(map),
         whole_image: made.whole,
@@ -163,6 +164,12 @@ fn summary(results: &MapResults) -> String {
         results.nodes[1],
         two_digits(results.window_nm),
         two_digits(results.resolution_nm)
+    );
+    let [x, y] = results.extent_nm;
+    let _ = writeln!(
+        text,
+        "x from {:.1} to {:.1} nm, y from {:.1} to {:.1} nm",
+        x[0], x[1], y[0], y[1]
     );
     for mask in &results.masks {
         let _ = writeln!(text, "  {:16} {} nodes", mask.name, mask.nodes);

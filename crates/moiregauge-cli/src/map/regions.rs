@@ -90,7 +90,7 @@ impl RegionArgs {
                     name,
                     "the region has no good node: it has no values",
                 ));
-            } else if found.covered < 0.95 || found.masked_share() > 0.05 {
+            } else if found.covered < 0.95 || found.masked_share > 0.05 {
                 doubts.push(Caveat::new(
                     "region-in-part",
                     name,
@@ -98,7 +98,7 @@ impl RegionArgs {
                         "the map reaches {:.0} % of the region, and {:.0} % of the nodes there are not to be \
                          believed: its numbers are those of the rest",
                         100.0 * found.covered,
-                        100.0 * found.masked_share()
+                        100.0 * found.masked_share
                     ),
                 ));
             }
@@ -155,15 +155,13 @@ fn within(
     name: &str,
     places: &[Vector2<f64>],
 ) -> anyhow::Result<()> {
-    let corners = map.grid.corners();
-    let ends = |places: &[Vector2<f64>], axis: usize| {
+    let [x, y] = map.grid.extent();
+    let [u, v] = [0, 1].map(|axis| {
         let along = places.iter().map(|p| p[axis]);
         along.fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], v| {
             [l.min(v), h.max(v)]
         })
-    };
-    let [x, y] = [0, 1].map(|axis| ends(&corners, axis));
-    let [u, v] = [0, 1].map(|axis| ends(places, axis));
+    });
     ensure!(
         u[0] <= x[1] && u[1] >= x[0] && v[0] <= y[1] && v[1] >= y[0],
         "{option} {name}: x from {:.1} to {:.1} nm, y from {:.1} to {:.1} nm lies outside of the map, which reaches \

@@ -128,10 +128,10 @@ fn questions_about_a_map_have_answers() {
         program()
             .args(["map", &file, "--size", "280nm×280nm", "--out"])
             .arg(&out)
-            .args(["--no-png", "--quiet", "--region", "bar=60,80,0.1um,50"])
-            .args(["--region", "flake=60,60 200,80 120nm,190"])
-            .args(["--region", "edge=-40,100,90,40"])
-            .args(["--profile", "cut=60,60 210,200", "--device", "60nm×30nm"])
+            .args(["--no-png", "--quiet", "--region", "bar=-80,-60,0.1um,50"])
+            .args(["--region", "flake=-80,-80 60,-60 -20nm,50"])
+            .args(["--region", "edge=-180,-40,90,40"])
+            .args(["--profile", "cut=-80,-80 70,60", "--device", "60nm×30nm"])
             .args(["--device-angles", "3", "--wanted", "1.26±0.01"]),
     );
     let results = json(&out.join("map.json"));

@@ -27,10 +27,13 @@ pub struct MapDetailsResult {
 /// Mean and spread of a quantity over an area.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize, JsonSchema)]
 pub struct RegionMeanResult {
-    /// Plain mean over the good nodes.
+    /// Mean over the area of the good nodes.
     pub mean: Option<f64>,
-    /// Its standard error by image noise; noise that neighbouring nodes share is accounted for.
+    /// Its standard error by image noise, with what neighbouring nodes share, and by `blur`. What all nodes have in
+    /// common (drift, calibration, lattice constant, model) is not in it.
     pub sigma: Option<f64>,
+    /// How far smoothing by the window has moved the mean, as the curvature of the map tells.
+    pub blur: Option<f64>,
     /// Standard deviation over the nodes.
     pub spread: Option<f64>,
     /// The same without what noise adds.
@@ -47,6 +50,7 @@ impl RegionMeanResult {
         Self {
             mean: number(scaled.mean),
             sigma: number(scaled.sigma),
+            blur: number(scaled.blur),
             spread: number(scaled.spread),
             spread_corrected: number(scaled.corrected),
             spread_below_95: number(scaled.below),
@@ -66,7 +70,7 @@ pub struct RegionResult {
     pub area_nm2: f64,
     /// Share of the area that the map reaches, %.
     pub covered_percent: f64,
-    /// Nodes within.
+    /// Nodes whose cells it covers at least in part.
     pub nodes: usize,
     /// Those to be believed.
     pub good_nodes: usize,
@@ -110,7 +114,7 @@ impl From<&RegionStatistics> for RegionResult {
             covered_percent: PERCENT * found.covered,
             nodes: found.nodes,
             good_nodes: found.good,
-            masked_percent: PERCENT * found.masked_share(),
+            masked_percent: PERCENT * found.masked_share,
             masked_by_percent: found.masked.iter().map(share).collect(),
             twist_deg: found.twist.map(|t| RegionMeanResult::new(t, degree())),
             strain_vector_percent: found.strain.map(|e| e.map(percent)),

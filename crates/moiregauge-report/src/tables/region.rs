@@ -89,8 +89,8 @@ Twist, strain ε and its axis φ (from x, counter-clockwise) are defined under `
 
 /// What the errors of tables leave out.
 pub(crate) const COMMON: &str = "Errors are those of image noise; means of regions take into account that neighbouring \
-    nodes share theirs. What all places have in common is not in them: drift, calibration of the scanner, lattice \
-    constant and model (the budget of `moiregauge analyze` has them), nor the smoothing by the window.";
+    nodes share theirs, and how far smoothing by the window has moved them. What all places have in common is not in \
+    them: drift, calibration of the scanner, lattice constant and model (the budget of `moiregauge analyze` has them).";
 
 fn of(mean: Option<RegionMeanResult>, value: fn(&RegionMeanResult) -> Option<f64>) -> String {
     number(mean.as_ref().and_then(value))
@@ -104,12 +104,13 @@ const REGION: &[Column<RegionResult>] = columns! {
     "region", "name of the region", |r| r.name.clone();
     "area_nm2", "its area", |r| number(Some(r.area_nm2));
     "covered_percent", "share of the area that the map reaches", |r| number(Some(r.covered_percent));
-    "nodes", "nodes of the map within", |r| r.nodes.to_string();
+    "nodes", "nodes of the map whose cells it covers at least in part", |r| r.nodes.to_string();
     "good_nodes", "those to be believed", |r| r.good_nodes.to_string();
     "masked_percent", "share of nodes that are not", |r| number(Some(r.masked_percent));
     "masked_by", "reasons, in % of the nodes", masked_by;
     "twist_deg", "mean twist", |r| of(r.twist_deg, |t| t.mean);
-    "twist_sigma_deg", "standard error of the mean; noise that neighbours share is accounted for", |r| of(r.twist_deg, |t| t.sigma);
+    "twist_sigma_deg", "standard error of the mean: noise, with what neighbours share, and blur", |r| of(r.twist_deg, |t| t.sigma);
+    "twist_blur_deg", "how far smoothing by the window has moved the mean, as the curvature of the map tells", |r| of(r.twist_deg, |t| t.blur);
     "twist_spread_deg", "standard deviation over the nodes", |r| of(r.twist_deg, |t| t.spread);
     "twist_spread_corrected_deg", "the same without noise", |r| of(r.twist_deg, |t| t.spread_corrected);
     "twist_spread_below_deg", "what the spread without noise does not exceed, 95 %", |r| of(r.twist_deg, |t| t.spread_below_95);
@@ -148,7 +149,7 @@ const DEVICE: &[Column<DeviceRow>] = columns! {
     "angle_deg", "direction of the first side from x, counter-clockwise", |r| number(Some(r.0.angle_deg));
     "masked_percent", "share of nodes that are not to be believed", |r| number(Some(r.0.area.masked_percent));
     "twist_deg", "mean twist", |r| of(r.0.area.twist_deg, |t| t.mean);
-    "twist_sigma_deg", "standard error of the mean", |r| of(r.0.area.twist_deg, |t| t.sigma);
+    "twist_sigma_deg", "standard error of the mean: noise, with what neighbours share, and blur", |r| of(r.0.area.twist_deg, |t| t.sigma);
     "twist_spread_deg", "standard deviation over the nodes", |r| of(r.0.area.twist_deg, |t| t.spread);
     "twist_spread_corrected_deg", "the same without noise", |r| of(r.0.area.twist_deg, |t| t.spread_corrected);
     "twist_spread_below_deg", "what the spread without noise does not exceed, 95 %", |r| of(r.0.area.twist_deg, |t| t.spread_below_95);

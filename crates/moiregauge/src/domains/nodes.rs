@@ -21,8 +21,11 @@ const APART: f64 = 0.45;
 const RADIUS: f64 = 0.36;
 /// Candidates and nodes this weak against the usual one are none.
 const WEAK: f64 = 0.4;
-/// Nodes stand out of their noise by this.
-const CLEAR: f64 = 5.0;
+/// Nodes stand out of their noise by this: below, places jump to peaks of the noise.
+const CLEAR: f64 = 7.0;
+/// What noise in the curvature of a node adds to the variance of its place, over the squared signal to noise: to second
+/// order `3 (var X_xx + var X_xy)` with X the noise of the curvature over the curvature, 3/S² and 1/S² for a Gaussian.
+const CURVATURE: f64 = 12.0;
 /// So much of a patch has to lie in the frame.
 const SHARE: f64 = 0.8;
 /// Below this skewness the image does not tell whether nodes are bright or dark.
@@ -106,17 +109,19 @@ pub fn find_nodes(
     let starts = peaks(&band, sign, period, expected as usize);
     let radius = period.map(|p| RADIUS * p);
     let (fits, line_offsets) = refined(&binned, &starts, radius)?;
-    let kept = believable(fits, period);
+    let inflation = inflation(&fits);
+    let kept = believable(fits, period, inflation);
     if kept.len() < 7 {
         return None;
     }
-    let inflation = inflation(&kept);
     // Each node is 1/N of the template that it is fitted to.
     let inflation = inflation * (1.0 + 1.0 / kept.len() as f64);
     let mut nodes: Vec<FoundNode> = kept
         .iter()
         .map(|fit| {
-            let covariance = fit.inverse.fixed_view::<2, 2>(1, 1) * (fit.variance * inflation);
+            let noise = fit.variance * inflation;
+            let weak = CURVATURE * fit.inverse[(0, 0)] * noise / fit.amplitude.powi(2);
+            let covariance = fit.inverse.fixed_view::<2, 2>(1, 1) * (noise * (1.0 + weak));
             FoundNode {
                 place: fit.place * bin + Vector2::repeat((bin - 1.0) / 2.0),
                 covariance: covariance * (bin * bin),
@@ -171,12 +176,12 @@ fn refined(image: &Image, starts: &[Vector2<f64>], radius: [f64; 2]) -> Option<(
 }
 
 /// Nodes that stand out, lie within the frame and are no other's double.
-fn believable(fits: Vec<Fit>, period: [f64; 2]) -> Vec<Fit> {
+fn believable(fits: Vec<Fit>, period: [f64; 2], inflation: f64) -> Vec<Fit> {
     let mut heights: Vec<f64> = fits.iter().map(|f| f.amplitude).collect();
     let usual = median(&mut heights);
     let mut kept: Vec<Fit> = Vec::new();
     for fit in fits {
-        let sigma = (fit.inverse[(0, 0)] * fit.variance).sqrt();
+        let sigma = (fit.inverse[(0, 0)] * fit.variance * inflation).sqrt();
         let clear = fit.amplitude > WEAK * usual && fit.amplitude > CLEAR * sigma;
         let near = |other: &Fit| distance(other.place - fit.place, period) < APART;
         if clear && fit.share >= SHARE && !kept.iter().any(near) {

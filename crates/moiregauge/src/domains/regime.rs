@@ -52,12 +52,14 @@ pub fn regime(map: &TwistStrainMap, domains: Option<&DomainMap>) -> Regime {
     let twist = of_cells.or_else(|| map.spread(&map.twist).map(|s| s.mean));
     let variation = domains.map_or(f64::NAN, |d| variation(d, 2.355 * map.window_nm));
     let mut reasons = Vec::new();
-    if map.good() == 0 {
-        reasons.push(
-            "no node of the map of phases is to be believed: too few periods lie within the margins, or the \
-             lattice changes too fast"
-                .to_owned(),
-        );
+    let window = 4.0 * std::f64::consts::PI * map.window_nm * map.window_nm;
+    if map.good() as f64 * map.node_area() < window {
+        reasons.push(format!(
+            "{} of {} nodes of the map of phases are to be believed, less than the area of one window: too few \
+             periods lie within the margins, or the lattice changes too fast",
+            map.good(),
+            map.grid.len()
+        ));
     }
     if let Some(twist) = twist.filter(|t| t.abs() < RELAXED) {
         reasons.push(format!(

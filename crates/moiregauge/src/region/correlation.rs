@@ -13,8 +13,8 @@ use crate::map::Grid;
 /// Beyond this many windows nodes count as independent.
 const REACH: f64 = 7.0;
 
-/// Sums over all pairs of nodes of an area, `Σρ_ij/N²` and `Σρ²_ij/N²`: what noise of unit variance leaves in
-/// the mean, and how much its variance over the area scatters.
+/// Sums over all pairs of nodes of an area, with weights that add up to one: `Σ w_i w_j ρ_ij` is what noise of unit
+/// variance leaves in the mean, `Σ w_i w_j ρ²_ij` how much its variance over the area scatters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Pairs {
     pub(super) mean: f64,
@@ -26,31 +26,30 @@ fn rho(square: f64) -> f64 {
     (1.0 - square / 4.0) * (-square / 4.0).exp()
 }
 
-/// The sums for these nodes of a grid, under windows of this width (nm).
-pub(super) fn pairs(grid: &Grid, nodes: &[usize], window: f64) -> Pairs {
-    let count = nodes.len() as f64;
-    if nodes.is_empty() || !(window > 0.0) {
-        let one = 1.0 / count.max(1.0);
+/// The sums for these nodes of a grid and their weights, under windows of this width (nm).
+pub(super) fn pairs(grid: &Grid, nodes: &[(usize, f64)], window: f64) -> Pairs {
+    if !(window > 0.0) {
+        let alone = nodes.iter().map(|(_, w)| w * w).sum();
         return Pairs {
-            mean: one,
-            square: one,
+            mean: alone,
+            square: alone,
         };
     }
     let [columns, rows] = grid.size.map(|n| n as i64);
-    let mut inside = vec![false; grid.len()];
-    nodes.iter().for_each(|&n| inside[n] = true);
+    let mut weights = vec![0.0; grid.len()];
+    nodes.iter().for_each(|&(n, w)| weights[n] = w);
     let offsets = offsets(grid, window);
     let sums: Vec<[f64; 2]> = nodes
         .par_iter()
-        .map(|&node| {
+        .map(|&(node, weight)| {
             let (column, row) = (node as i64 % columns, node as i64 / columns);
             let mut sum = [0.0; 2];
             for &([c, r], rho) in &offsets {
                 let (c, r) = (column + c, row + r);
-                let there = (0..columns).contains(&c) && (0..rows).contains(&r);
-                if there && inside[(r * columns + c) as usize] {
-                    sum[0] += rho;
-                    sum[1] += rho * rho;
+                if (0..columns).contains(&c) && (0..rows).contains(&r) {
+                    let both = weight * weights[(r * columns + c) as usize] * rho;
+                    sum[0] += both;
+                    sum[1] += both * rho;
                 }
             }
             sum
@@ -61,8 +60,8 @@ pub(super) fn pairs(grid: &Grid, nodes: &[usize], window: f64) -> Pairs {
         .fold([0.0; 2], |t, s| [t[0] + s[0], t[1] + s[1]]);
     Pairs {
         // What is cut off beyond the reach may leave a little less than nothing.
-        mean: (total[0] / (count * count)).max(0.0),
-        square: total[1] / (count * count),
+        mean: total[0].max(0.0),
+        square: total[1],
     }
 }
 

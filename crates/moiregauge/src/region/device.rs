@@ -62,7 +62,7 @@ pub fn uniform_areas(map: &TwistStrainMap, search: &DeviceSearch) -> Vec<Device>
         let Some(middle) = shape.nodes_about(&map.grid) else {
             continue;
         };
-        let pairs = pairs(&map.grid, &middle, map.window_nm);
+        let pairs = pairs(&map.grid, &evenly(&middle), map.window_nm);
         let found: Vec<(f64, usize)> = (0..map.grid.len())
             .into_par_iter()
             .filter_map(|node| {
@@ -99,6 +99,12 @@ pub fn uniform_areas(map: &TwistStrainMap, search: &DeviceSearch) -> Vec<Device>
     chosen
 }
 
+/// Equal weights.
+fn evenly(nodes: &[usize]) -> Vec<(usize, f64)> {
+    let weight = 1.0 / nodes.len().max(1) as f64;
+    nodes.iter().map(|&n| (n, weight)).collect()
+}
+
 /// The nodes of a box about a node: for each row of the grid, the first and the last column.
 struct Shape {
     /// Rows above the middle one, columns from the middle one.
@@ -109,6 +115,8 @@ impl Shape {
     /// `None` where the grid is flat or the box holds no node.
     fn new(grid: &Grid, size: [f64; 2], angle: f64) -> Option<Self> {
         let inverse = grid.step.try_inverse()?;
+        // Half a node more on every side: cells that are covered in part count.
+        let size = size.map(|s| s + grid.step.determinant().abs().sqrt());
         let region = Region::turned_rectangle("", Vector2::zeros(), size, angle);
         let rows = region.corners.iter().map(|c| (inverse * c).y.abs());
         let most = rows.fold(0.0, f64::max).ceil().min(grid.size[1] as f64) as i64;

@@ -88,11 +88,25 @@ impl Region {
         })
     }
 
-    /// The nodes of a grid that lie within, in their order.
-    pub fn nodes(&self, grid: &Grid) -> Vec<usize> {
-        (0..grid.len())
-            .filter(|&n| self.contains(grid.place(n)))
-            .collect()
+    /// The nodes of a grid whose cells it covers, in their order, with the share of the cell (to 4 %).
+    pub fn shares(&self, grid: &Grid) -> Vec<(usize, f64)> {
+        let parts = [-0.4, -0.2, 0.0, 0.2, 0.4];
+        let steps: Vec<Vector2<f64>> = (0..25)
+            .map(|i| grid.step * Vector2::new(parts[i % 5], parts[i / 5]))
+            .collect();
+        let reach = grid.step.abs() * Vector2::repeat(0.5);
+        let first = self.corners.first().copied().unwrap_or_default();
+        let low = self.corners.iter().fold(first, |a, c| a.inf(c)) - reach;
+        let high = self.corners.iter().fold(first, |a, c| a.sup(c)) + reach;
+        let of_node = |node: usize| {
+            let place = grid.place(node);
+            if place.inf(&low) != low || place.sup(&high) != high {
+                return None;
+            }
+            let count = steps.iter().filter(|s| self.contains(place + **s)).count();
+            (count > 0).then_some((node, count as f64 / 25.0))
+        };
+        (0..grid.len()).filter_map(of_node).collect()
     }
 }
 
