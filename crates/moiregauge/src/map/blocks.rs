@@ -11,6 +11,8 @@ use crate::image::Image;
 
 /// Columns handled together, so that sums stay in the fastest memory.
 const CHUNK: usize = 256;
+/// Rows of blocks made together.
+const TOGETHER: usize = 64;
 
 /// Which part of a larger image the rows in hand are, and where its phases count from.
 #[derive(Clone, Copy, Debug)]
@@ -82,56 +84,6 @@ pub(super) fn mix(
         .collect();
     let scale = 1.0 / (width * height) as f32;
     let chunk = (CHUNK / width).max(1) * width;
-    // One entry per row of blocks: every wave's blocks, real and imaginary parts after each other.
-    let mixed: Vec<(Vec<f32>, Option<Vec<f32>>)> = (0..size[1])
-        .into_par_iter()
-        .map(|line| {
-            let (pixels, share) = lines(image, line * height, [used, height], width);
-            let mut out = vec![0.0; 2 * waves.len() * size[0]];
-            let (mut all_re, mut all_im) = (vec![0.0f32; chunk], vec![0.0f32; chunk]);
-            for (i, sums) in out.chunks_exact_mut(2 * size[0].max(1)).enumerate() {
-                let (re, im) = sums.split_at_mut(size[0]);
-                let mut start = 0;
-                while start < used {
-                    let end = (start + chunk).min(used);
-                    let part = start..end;
-                    let (sum_re, sum_im) = (&mut all_re[..end - start], &mut all_im[..end - start]);
-                    sum_re.fill(0.0);
-                    sum_im.fill(0.0);
-                    for (row, values) in pixels.chunks_exact(used).enumerate() {
-                        let [c, s] = [up[i][0][line * height + row], up[i][1][line * height + row]];
-                        let sums = sum_re.iter_mut().zip(sum_im.iter_mut());
-                        for ((re, im), value) in sums.zip(&values[part.clone()]) {
-                            *re += c * value;
-                            *im += s * value;
-                        }
-                    }
-                    let turn = along[i][0][part.clone()].iter().zip(&along[i][1][part]);
-                    for ((re, im), (c, s)) in sum_re.iter_mut().zip(sum_im.iter_mut()).zip(turn) {
-                        (*re, *im) = (*re * c - *im * s, *re * s + *im * c);
-                    }
-                    let first = start / width;
-                    for (out, sums) in [(&mut *re, &*sum_re), (&mut *im, &*sum_im)] {
-                        let cells = out[first..].iter_mut();
-                        match width {
-                            1 => cells.zip(sums).for_each(|(v, a)| *v = scale * a),
-                            2 => {
-                                let pairs = sums.as_chunks::<2>().0;
-                                cells
-                                    .zip(pairs)
-                                    .for_each(|(v, [a, b])| *v = scale * (a + b));
-                            }
-                            _ => cells
-                                .zip(sums.chunks(width))
-                                .for_each(|(v, all)| *v = scale * all.iter().sum::<f32>()),
-                        }
-                    }
-                    start = end;
-                }
-            }
-            (out, share)
-        })
-        .collect();
     let mut layers: Vec<Layer> = waves
         .iter()
         .map(|_| Layer {
@@ -139,20 +91,68 @@ pub(super) fn mix(
             im: Vec::with_capacity(size[0] * size[1]),
         })
         .collect();
-    let incomplete = mixed.iter().any(|(_, share)| share.is_some());
-    let mut share = incomplete.then(|| Vec::with_capacity(size[0] * size[1]));
-    for (sums, of_line) in mixed {
-        for (layer, sums) in layers.iter_mut().zip(sums.chunks_exact(2 * size[0].max(1))) {
-            layer.re.extend_from_slice(&sums[..size[0]]);
-            layer.im.extend_from_slice(&sums[size[0]..]);
-        }
-        if let Some(share) = &mut share {
-            match of_line {
-                Some(line) => share.extend(line),
-                None => share.extend(std::iter::repeat_n(1.0, size[0])),
+    let mut shares = Vec::new();
+    // One entry per row of blocks: every wave's blocks, real and imaginary parts after each other. A few
+    // rows at a time, so that they need no memory to speak of.
+    let mut first = 0;
+    while first < size[1] {
+        let last = (first + TOGETHER).min(size[1]);
+        let mixed: Vec<(Vec<f32>, Option<Vec<f32>>)> = (first..last)
+            .into_par_iter()
+            .map(|line| {
+                let (pixels, share) = lines(image, line * height, [used, height], width);
+                let mut out = vec![0.0; 2 * waves.len() * size[0]];
+                let (mut all_re, mut all_im) = (vec![0.0f32; chunk], vec![0.0f32; chunk]);
+                for (i, sums) in out.chunks_exact_mut(2 * size[0].max(1)).enumerate() {
+                    let (re, im) = sums.split_at_mut(size[0]);
+                    let mut start = 0;
+                    while start < used {
+                        let end = (start + chunk).min(used);
+                        let part = start..end;
+                        let (sum_re, sum_im) =
+                            (&mut all_re[..end - start], &mut all_im[..end - start]);
+                        sum_re.fill(0.0);
+                        sum_im.fill(0.0);
+                        for (row, values) in pixels.chunks_exact(used).enumerate() {
+                            let [c, s] =
+                                [up[i][0][line * height + row], up[i][1][line * height + row]];
+                            let sums = sum_re.iter_mut().zip(sum_im.iter_mut());
+                            for ((re, im), value) in sums.zip(&values[part.clone()]) {
+                                *re += c * value;
+                                *im += s * value;
+                            }
+                        }
+                        let turn = along[i][0][part.clone()].iter().zip(&along[i][1][part]);
+                        for ((re, im), (c, s)) in sum_re.iter_mut().zip(sum_im.iter_mut()).zip(turn)
+                        {
+                            (*re, *im) = (*re * c - *im * s, *re * s + *im * c);
+                        }
+                        let first = start / width;
+                        average(sum_re, &mut re[first..], width, scale);
+                        average(sum_im, &mut im[first..], width, scale);
+                        start = end;
+                    }
+                }
+                (out, share)
+            })
+            .collect();
+        for (row, (sums, of_line)) in mixed.into_iter().enumerate() {
+            for (layer, sums) in layers.iter_mut().zip(sums.chunks_exact(2 * size[0].max(1))) {
+                layer.re.extend_from_slice(&sums[..size[0]]);
+                layer.im.extend_from_slice(&sums[size[0]..]);
+            }
+            if let Some(of_line) = of_line {
+                // Everything was there so far.
+                shares.resize((first + row) * size[0], 1.0);
+                shares.extend(of_line);
             }
         }
+        first = last;
     }
+    let share = (!shares.is_empty()).then(|| {
+        shares.resize(size[0] * size[1], 1.0);
+        shares
+    });
     Blocks {
         size,
         block,
@@ -162,6 +162,21 @@ pub(super) fn mix(
         ),
         layers,
         share,
+    }
+}
+
+/// Sums of `width` columns, times `scale`.
+fn average(columns: &[f32], out: &mut [f32], width: usize, scale: f32) {
+    let out = out.iter_mut();
+    match width {
+        1 => out.zip(columns).for_each(|(v, a)| *v = scale * a),
+        2 => {
+            let pairs = columns.as_chunks::<2>().0;
+            out.zip(pairs).for_each(|(v, [a, b])| *v = scale * (a + b));
+        }
+        _ => out
+            .zip(columns.chunks(width))
+            .for_each(|(v, all)| *v = scale * all.iter().sum::<f32>()),
     }
 }
 

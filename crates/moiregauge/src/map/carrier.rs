@@ -12,7 +12,7 @@ use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
 use rayon::prelude::*;
 use rustfft::num_complex::Complex32;
 
-use super::blocks::Blocks;
+use super::blocks::{Blocks, Layer};
 
 /// Weight of the penalty as a share of the mean diagonal element.
 const STIFFNESS: f64 = 1e-4;
@@ -169,39 +169,63 @@ impl Carrier {
         mean
     }
 
-    /// The phases of every block as turns.
-    pub(super) fn turns(&self, blocks: &Blocks) -> Turns {
-        let [columns, rows] = blocks.size;
-        let along: Vec<(usize, [f64; 4])> = (0..columns)
-            .map(|column| {
-                let (cell, u) = self.cell_of(0, blocks.middle(column as f64, 0.0).x);
-                (cell, cubic(u)[0])
-            })
-            .collect();
+    /// Takes these phases off the layers, which are those of the harmonics `indices`; `before` is what has
+    /// been taken off already.
+    pub(super) fn take_off(
+        &self,
+        before: Option<&Self>,
+        (layers, indices): (&mut [Layer], &[[i32; 2]]),
+        places: &Blocks,
+    ) {
+        let columns = places.size[0];
+        // The same row of all layers together.
+        let mut rows: Vec<Vec<(&mut [f32], &mut [f32])>> = Vec::new();
+        rows.resize_with(places.size[1], Vec::new);
+        for layer in layers {
+            let lines = layer.re.chunks_exact_mut(columns);
+            let lines = lines.zip(layer.im.chunks_exact_mut(columns));
+            rows.iter_mut()
+                .zip(lines)
+                .for_each(|(r, line)| r.push(line));
+        }
+        rows.into_par_iter().enumerate().for_each(|(row, layers)| {
+            let mut phases = self.line(places, row);
+            if let Some(before) = before {
+                for (new, old) in phases.iter_mut().zip(before.line(places, row)) {
+                    new.iter_mut().zip(old).for_each(|(n, o)| *n -= o);
+                }
+            }
+            let [first, second] = phases.map(|p| p.into_iter().map(|p| cis(-p)).collect());
+            for ((re, im), index) in layers.into_iter().zip(indices) {
+                turn([&first, &second], *index, re, im);
+            }
+        });
+    }
+
+    /// ψ₁ and ψ₂ of a line of blocks.
+    fn line(&self, places: &Blocks, row: usize) -> [Vec<f64>; 2] {
+        let (cell, v) = self.cell_of(1, places.middle(0.0, row as f64).y);
+        let across = cubic(v)[0];
         let width = self.cells[0] + 3;
-        let lines: Vec<[Vec<Complex32>; 2]> = (0..rows)
-            .into_par_iter()
-            .map(|row| {
-                let (cell, v) = self.cell_of(1, blocks.middle(0.0, row as f64).y);
-                let across = cubic(v)[0];
-                [0, 1].map(|k| {
-                    // The coefficients of this line.
-                    let of_line: Vec<f64> = (0..width)
-                        .map(|i| {
-                            let rows = across.iter().enumerate();
-                            let terms =
-                                rows.map(|(b, y)| y * self.coefficients[k][(cell + b) * width + i]);
-                            terms.sum()
-                        })
-                        .collect();
-                    let phase = |(cell, x): &(usize, [f64; 4])| -> f64 {
-                        x.iter().zip(&of_line[*cell..]).map(|(x, c)| x * c).sum()
-                    };
-                    along.iter().map(|a| cis(-phase(a))).collect()
-                })
-            })
-            .collect();
-        Turns { lines }
+        // The coefficients of this line.
+        let of_line = [0, 1].map(|k| {
+            let sum = |i: usize| -> f64 {
+                let rows = across.iter().enumerate();
+                let terms = rows.map(|(b, y)| y * self.coefficients[k][(cell + b) * width + i]);
+                terms.sum()
+            };
+            (0..width).map(sum).collect::<Vec<f64>>()
+        });
+        let mut out = [0, 1].map(|_| Vec::with_capacity(places.size[0]));
+        for column in 0..places.size[0] {
+            let (cell, u) = self.cell_of(0, places.middle(column as f64, 0.0).x);
+            let along = cubic(u)[0];
+            for (out, of_line) in out.iter_mut().zip(&of_line) {
+                let terms = along.iter().zip(&of_line[cell..]);
+                out.push(terms.map(|(x, c)| x * c).sum());
+            }
+        }
+        out
     }
 }
 
@@ -210,20 +234,12 @@ fn cis(phase: f64) -> Complex32 {
     Complex32::new(cosine as f32, sine as f32)
 }
 
-/// `e^{−iψ₁}` and `e^{−iψ₂}` of every block, row by row.
-pub(super) struct Turns {
-    lines: Vec<[Vec<Complex32>; 2]>,
-}
-
-impl Turns {
-    /// Turns a line of blocks of the harmonic (h, k).
-    pub(super) fn apply(&self, row: usize, [h, k]: [i32; 2], re: &mut [f32], im: &mut [f32]) {
-        let [first, second] = &self.lines[row];
-        let turns = first.iter().zip(second);
-        for ((re, im), (a, b)) in re.iter_mut().zip(im).zip(turns) {
-            let turn = power(*a, h) * power(*b, k);
-            (*re, *im) = (*re * turn.re - *im * turn.im, *re * turn.im + *im * turn.re);
-        }
+/// Turns a line of blocks of the harmonic (h, k) by `turns` of q₁ and q₂.
+fn turn(turns: [&Vec<Complex32>; 2], [h, k]: [i32; 2], re: &mut [f32], im: &mut [f32]) {
+    let turns = turns[0].iter().zip(turns[1]);
+    for ((re, im), (a, b)) in re.iter_mut().zip(im).zip(turns) {
+        let turn = power(*a, h) * power(*b, k);
+        (*re, *im) = (*re * turn.re - *im * turn.im, *re * turn.im + *im * turn.re);
     }
 }
 

@@ -7,10 +7,11 @@
 use nalgebra::{Matrix2, Vector2};
 
 use super::blocks::{Blocks, Place, mix};
-use super::carrier::{Carrier, Turns};
+use super::carrier::Carrier;
 use super::defects::{Blur, Setting, masks};
+use super::leaks::clean;
 use super::median;
-use super::noise::{Noise, PROBE_WINDOW, probes};
+use super::noise::{Beside, Noise};
 use super::smooth::{Nodes, Smoothed, smooth};
 use super::types::{Reference, Resolution, UsedHarmonic, WaveMap, WaveNode};
 use super::waves::{Harmonics, LocalLattice, Nothing, local_lattices};
@@ -41,6 +42,8 @@ const FASTEST: f64 = 2.6;
 const BLOCKS: f64 = 5.0;
 /// The pilot's window in periods.
 pub(super) const PILOT: f64 = 0.65;
+/// Likely harmonics looked at together; and where blocks are single pixels, for the memory's sake.
+const AT_ONCE: [usize; 2] = [6, 2];
 /// Nodes per width of the window.
 const NODES: f64 = 3.0;
 
@@ -55,7 +58,7 @@ pub(super) fn demodulate(
 ) -> Option<WaveMap> {
     let mut work = Work::new(image, place, *reference)?;
     work.follow();
-    work.choose_harmonics();
+    work.choose_harmonics(image);
     work.guess_noise(image);
     let window = match resolution.window_nm {
         Some(window) => window.max(NARROWEST * work.period),
@@ -67,7 +70,8 @@ pub(super) fn demodulate(
 /// Pixels of a block along columns and rows.
 pub(super) fn block_of(reference: &Reference) -> [usize; 2] {
     let block = reference.in_pixels(reference.period() / BLOCKS);
-    block.map(|b| (b as usize).max(1))
+    // Periods of whole pixels come out a hair too short.
+    block.map(|b| ((b + 1e-9) as usize).max(1))
 }
 
 /// Blocks from node to node, `distance_nm` apart.
@@ -91,9 +95,10 @@ pub(super) struct Work {
     pub(super) frame: [Vector2<f64>; 2],
     pub(super) indices: Vec<[i32; 2]>,
     pub(super) blocks: Blocks,
+    beside: Beside,
     pub(super) noise: Noise,
+    /// What has been taken off the blocks.
     pub(super) carrier: Option<Carrier>,
-    pub(super) turns: Option<Turns>,
     /// Mean |c₀|² of each harmonic in the pilot, noise taken off.
     pub(super) powers: Vec<f64>,
 }
@@ -105,25 +110,11 @@ impl Work {
         if image.columns < 4 * block[0] || image.rows < 4 * block[1] {
             return None;
         }
-        let slow_enough = |g: Vector2<f64>| g.x.abs() < FASTEST && g.y.abs() < FASTEST;
-        let indices: Vec<[i32; 2]> = LIKELY
-            .into_iter()
-            .enumerate()
-            .filter(|&(i, index)| i < 3 || slow_enough(reference.wave(index)))
-            .map(|(_, index)| index)
-            .collect();
-        let mut waves: Vec<Vector2<f64>> = indices.iter().map(|&i| reference.wave(i)).collect();
-        let likely = waves.len();
-        for index in &indices[..3] {
-            waves.extend(probes(&reference.pair, *index, reference.pitch));
-        }
-        let mut blocks = mix(image, place, &waves, block);
-        let beside = Blocks {
-            layers: blocks.layers.split_off(likely),
-            share: blocks.share.clone(),
-            ..blocks
-        };
-        let noise = noise_of(&beside, &reference, period, image);
+        let indices = LIKELY[..3].to_vec();
+        let beside = Beside::new((image, place), &reference, &indices);
+        let noise = Noise::new(&beside, variance(image));
+        let waves: Vec<Vector2<f64>> = indices.iter().map(|&i| reference.wave(i)).collect();
+        let blocks = mix(image, place, &waves, block);
         let first = Vector2::new(0.0, place.row as f64);
         let last = Vector2::new(image.columns as f64 - 1.0, image.rows as f64 - 1.0);
         Some(Self {
@@ -134,17 +125,39 @@ impl Work {
             powers: vec![0.0; indices.len()],
             indices,
             blocks,
+            beside,
             noise,
             carrier: None,
-            turns: None,
         })
     }
 
-    /// Smooths the first `harmonics` layers with a window of `width` nm, nodes `per_width` to a width.
+    /// Smooths all layers with a window of `width` nm.
     pub(super) fn smoothed(&self, width: f64, stride: [usize; 2]) -> Smoothed {
         let nodes = self.nodes(stride);
-        let turns = self.turns.as_ref().map(|t| (t, self.indices.as_slice()));
-        smooth(&self.blocks, self.reference.in_pixels(width), nodes, turns)
+        smooth(&self.blocks, self.reference.in_pixels(width), nodes)
+    }
+
+    /// Blocks of the other likely harmonics, the carrier off, a few at a time.
+    pub(super) fn others<'a>(
+        &'a self,
+        image: &'a Image,
+    ) -> impl Iterator<Item = (Vec<[i32; 2]>, Blocks)> + 'a {
+        let slow_enough = |g: Vector2<f64>| g.x.abs() < FASTEST && g.y.abs() < FASTEST;
+        let single = self.blocks.block == [1, 1];
+        let at_once = AT_ONCE[usize::from(single)];
+        LIKELY[3..].chunks(at_once).filter_map(move |some| {
+            let mut some = some.to_vec();
+            some.retain(|&index| slow_enough(self.reference.wave(index)));
+            if some.is_empty() {
+                return None;
+            }
+            let waves: Vec<Vector2<f64>> = some.iter().map(|&i| self.reference.wave(i)).collect();
+            let mut blocks = mix(image, self.place, &waves, self.blocks.block);
+            if let Some(carrier) = &self.carrier {
+                carrier.take_off(None, (&mut blocks.layers, &some), &self.blocks);
+            }
+            Some((some, blocks))
+        })
     }
 
     /// Nodes in the middle of the blocks; in a part of an image from its first line on, so that those of
@@ -155,6 +168,20 @@ impl Work {
             nodes.first[1] = 0;
         }
         nodes
+    }
+
+    /// The same without what leaks through cut windows.
+    fn cleaned(&self, width: f64, stride: [usize; 2]) -> Smoothed {
+        let mut smoothed = self.smoothed(width, stride);
+        let window = self.reference.in_pixels(width);
+        let taken = |at: Vector2<f64>| {
+            let slopes = self.taken_off(at, width);
+            let carrier = self.carrier.as_ref().map(|c| c.at(at).0);
+            let phases = self.reference.pair.tr_mul(&(at - self.place.centre));
+            (phases + carrier.unwrap_or_default(), slopes)
+        };
+        clean(&mut smoothed, (&self.blocks, window), &self.indices, taken);
+        smoothed
     }
 
     /// What was taken off, as a window of `width` nm sees it.
@@ -190,17 +217,14 @@ impl Work {
     /// The map with its final window.
     fn map(mut self, image: &Image, window_nm: f64, resolution: &Resolution) -> WaveMap {
         if self.indices.len() > 3 {
-            let waves: Vec<Vector2<f64>> = self
-                .indices
-                .iter()
-                .flat_map(|index| probes(&self.reference.pair, *index, self.reference.pitch))
-                .collect();
-            let beside = mix(image, self.place, &waves, self.blocks.block);
-            self.noise = noise_of(&beside, &self.reference, self.period, image);
+            let others = &self.indices[3..];
+            let others = Beside::new((image, self.place), &self.reference, others);
+            self.beside.extend(others);
+            self.noise = Noise::new(&self.beside, variance(image));
             self.guess_noise(image);
         }
         let stride = stride_of(&self.reference, step_of(resolution, window_nm));
-        let smoothed = self.smoothed(window_nm, stride);
+        let smoothed = self.cleaned(window_nm, stride);
         let mut lattices = self.lattices(&smoothed, window_nm, true);
         let blurs = self.blurs(
             &lattices,
@@ -320,7 +344,7 @@ impl Work {
         wider: f64,
         nodes: Nodes,
     ) -> Vec<Blur> {
-        let wide = self.lattices(&self.smoothed(wider, nodes.stride), wider, true);
+        let wide = self.lattices(&self.cleaned(wider, nodes.stride), wider, true);
         let pairs = lattices.iter().zip(&wide);
         pairs
             .map(|pair| match pair {
@@ -353,12 +377,4 @@ fn variance(image: &Image) -> f64 {
     let finite = image.values.iter().filter(|v| v.is_finite());
     let (sum, count) = finite.fold((0.0, 0.0f64), |(s, n), v| (s + v * v, n + 1.0));
     sum / count.max(1.0)
-}
-
-/// Noise from blocks mixed with two probes for each harmonic; where the frame is too small for probes, the
-/// image's own variance, which is too much and not too little.
-fn noise_of(beside: &Blocks, reference: &Reference, period: f64, image: &Image) -> Noise {
-    let fallback = vec![variance(image); beside.layers.len() / 2];
-    let width = reference.in_pixels(PROBE_WINDOW * period);
-    Noise::new(beside, width, &fallback)
 }

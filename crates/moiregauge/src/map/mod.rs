@@ -19,6 +19,7 @@ mod defects;
 mod demodulate;
 mod displacement;
 mod drift_change;
+mod leaks;
 mod noise;
 mod pilot;
 mod quantities;

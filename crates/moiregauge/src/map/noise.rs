@@ -9,14 +9,17 @@
 
 use nalgebra::{Matrix2, Vector2};
 
-use super::blocks::Blocks;
+use super::blocks::{Blocks, Place, mix};
+use super::demodulate::block_of;
 use super::median;
 use super::smooth::{Nodes, Smoothed, smooth};
+use super::types::Reference;
+use crate::image::Image;
 
 /// Places tried beside a harmonic, as shares of the length of q₁.
 const TRIED: [f64; 9] = [0.35, 0.4, 0.45, 0.5, 0.55, 0.6, 0.65, 0.7, 0.75];
 /// Window of the probes in periods, lest harmonics reach them.
-pub(super) const PROBE_WINDOW: f64 = 1.5;
+const PROBE_WINDOW: f64 = 1.5;
 /// The local ratio is averaged over so many windows.
 const AVERAGED: f64 = 3.0;
 /// Windows of which more is missing are not looked at, nor those nearer to the edges than so many widths: harmonics
@@ -25,6 +28,8 @@ const WHOLE: f64 = 0.85;
 const AWAY: f64 = 2.5;
 /// Nodes that have to be left.
 const FEWEST: usize = 6;
+/// Harmonics looked beside at a time.
+const AT_ONCE: usize = 2;
 
 /// Two wave vectors beside harmonic (h, k) that are as far from the lattice as can be, rad per pixel.
 pub(super) fn probes(pair: &Matrix2<f64>, [h, k]: [i32; 2], pitch: [f64; 2]) -> [Vector2<f64>; 2] {
@@ -73,13 +78,63 @@ struct Ratio {
     values: Vec<f64>,
 }
 
+/// Envelopes at the places beside harmonics, two for each.
+pub(super) struct Beside {
+    /// Where the blocks lie; they are gone.
+    blocks: Blocks,
+    smoothed: Smoothed,
+    /// Widths of the windows, pixels.
+    width: [f64; 2],
+}
+
+impl Beside {
+    /// Of harmonics of a lattice; a few at a time, which bounds the memory.
+    pub(super) fn new(
+        (image, place): (&Image, Place),
+        reference: &Reference,
+        indices: &[[i32; 2]],
+    ) -> Self {
+        let block = block_of(reference);
+        let width = reference.in_pixels(PROBE_WINDOW * reference.period());
+        let stride = [0, 1].map(|i| ((width[i] / block[i] as f64).round() as usize).max(1));
+        let mut out: Option<Self> = None;
+        for some in indices.chunks(AT_ONCE) {
+            let of_one = |index: &[i32; 2]| probes(&reference.pair, *index, reference.pitch);
+            let waves: Vec<Vector2<f64>> = some.iter().flat_map(of_one).collect();
+            let mut blocks = mix(image, place, &waves, block);
+            let nodes = Nodes::filling(blocks.size, stride);
+            let smoothed = smooth(&blocks, width, nodes);
+            blocks.layers.clear();
+            match &mut out {
+                Some(all) => all.smoothed.envelopes.extend(smoothed.envelopes),
+                None => {
+                    out = Some(Self {
+                        blocks,
+                        smoothed,
+                        width,
+                    });
+                }
+            }
+        }
+        out.expect("a lattice has harmonics")
+    }
+
+    /// Adds other harmonics of the same lattice.
+    pub(super) fn extend(&mut self, other: Self) {
+        self.smoothed.envelopes.extend(other.smoothed.envelopes);
+    }
+}
+
 impl Noise {
-    /// From blocks that hold two probes for each harmonic, one after the other. `width` is that of the
-    /// windows, pixels; `fallback` the levels where the frame is too small to tell.
-    pub(super) fn new(blocks: &Blocks, width: [f64; 2], fallback: &[f64]) -> Self {
-        let stride = [0, 1].map(|i| ((width[i] / blocks.block[i] as f64).round() as usize).max(1));
-        let nodes = Nodes::filling(blocks.size, stride);
-        let smoothed = smooth(blocks, width, nodes, None);
+    /// `fallback` is the level where the frame is too small to tell.
+    pub(super) fn new(beside: &Beside, fallback: f64) -> Self {
+        let Beside {
+            blocks,
+            smoothed,
+            width,
+        } = beside;
+        let nodes = smoothed.nodes;
+        let harmonics = smoothed.envelopes.len() / 2;
         let low = blocks.middle(0.0, 0.0);
         let high = blocks.middle(blocks.size[0] as f64 - 1.0, blocks.size[1] as f64 - 1.0);
         let whole: Vec<Option<f64>> = smoothed
@@ -95,7 +150,7 @@ impl Noise {
             .collect();
         if whole.iter().flatten().count() < FEWEST {
             return Self {
-                levels: fallback.to_vec(),
+                levels: vec![fallback; harmonics],
                 grid: None,
             };
         }
@@ -103,7 +158,6 @@ impl Noise {
             let noise = whole[node]?;
             Some(f64::from(smoothed.envelopes[probe].amplitude[node].norm_sqr()) / noise)
         };
-        let harmonics = blocks.layers.len() / 2;
         let levels: Vec<f64> = (0..harmonics)
             .map(|i| {
                 let both = (0..nodes.len()).flat_map(|n| [power(2 * i, n), power(2 * i + 1, n)]);
@@ -112,7 +166,7 @@ impl Noise {
                 median(&mut all) / std::f64::consts::LN_2
             })
             .collect();
-        let grid = Ratio::new(blocks, &smoothed, &levels, power);
+        let grid = Ratio::new(blocks, smoothed, &levels, power);
         Self {
             levels,
             grid: Some(grid),

@@ -1,9 +1,12 @@
 //! A first look with a narrow window: the carrier, the harmonics that tell something, and how wide the
 //! window may be.
 
+use super::blocks::Layer;
 use super::carrier::{Carrier, MOST_CELLS, Slope};
 use super::demodulate::{PILOT, Work, stride_of};
+use super::smooth::{Envelope, Smoothed, smooth};
 use super::window;
+use crate::image::Image;
 
 /// A harmonic that adds less than this share to what is known is not worth its time.
 const WORTH: f64 = 0.02;
@@ -21,14 +24,6 @@ impl Work {
     /// Fits the carrier to what a narrow window sees, until little is left.
     pub(super) fn follow(&mut self) {
         let width = PILOT * self.period;
-        // Only the first three for this: the others have no noise level yet.
-        let all = std::mem::take(&mut self.blocks.layers);
-        let indices = std::mem::take(&mut self.indices);
-        let powers = std::mem::take(&mut self.powers);
-        let mut all = all.into_iter();
-        self.blocks.layers = all.by_ref().take(3).collect();
-        self.indices = indices[..3].to_vec();
-        self.powers = vec![0.0; 3];
         for round in 0..ROUNDS {
             let smoothed = self.smoothed(width, self.sparse(width, FOLLOWED));
             let lattices = self.lattices(&smoothed, width, false);
@@ -63,12 +58,12 @@ impl Work {
             let Some(carrier) = Carrier::fit(&slopes, frame, self.cells(round)) else {
                 break;
             };
-            self.turns = Some(carrier.turns(&self.blocks));
+            let mut layers = std::mem::take(&mut self.blocks.layers);
+            let all = (layers.as_mut_slice(), self.indices.as_slice());
+            carrier.take_off(self.carrier.as_ref(), all, &self.blocks);
+            self.blocks.layers = layers;
             self.carrier = Some(carrier);
         }
-        self.blocks.layers.extend(all);
-        self.indices = indices;
-        self.powers = powers;
     }
 
     /// The stride of nodes `distance_nm` apart, or so far that few enough fit into the frame.
@@ -88,42 +83,34 @@ impl Work {
         })
     }
 
-    /// Keeps the harmonics that tell something of the lattice.
-    pub(super) fn choose_harmonics(&mut self) {
+    /// Adds the harmonics that tell something of the lattice to the first three.
+    pub(super) fn choose_harmonics(&mut self, image: &Image) {
         let width = PILOT * self.period;
-        let smoothed = self.smoothed(width, self.sparse(width, LOOKED_AT));
+        let stride = self.sparse(width, LOOKED_AT);
         let level = self.noise.levels.iter().sum::<f64>() / self.noise.levels.len() as f64;
-        let mut told = Vec::new();
-        for (envelope, [h, k]) in smoothed.envelopes.iter().zip(&self.indices) {
-            let (mut sum, mut units, mut count) = (0.0, 0.0, 0.0);
-            for (amplitude, support) in envelope.amplitude.iter().zip(&smoothed.support) {
-                if let Some(support) = support.filter(|s| s.share > 0.9) {
-                    sum += f64::from(amplitude.norm_sqr());
-                    units += level * support.amplitude_noise;
-                    count += 1.0f64;
+        let first = self.smoothed(width, stride);
+        let told = |envelope: &Envelope, index: [i32; 2]| told(envelope, &first, level, index);
+        let of_first = first.envelopes.iter().zip(&self.indices);
+        let of_first: Vec<Told> = of_first.map(|(e, &index)| told(e, index)).collect();
+        let mut most = of_first.iter().map(|t| t.worth).fold(0.0, f64::max);
+        let mut kept: Vec<([i32; 2], Told, Layer)> = Vec::new();
+        for (indices, blocks) in self.others(image) {
+            let smoothed = smooth(&blocks, self.reference.in_pixels(width), first.nodes);
+            let layers = blocks.layers.into_iter().zip(smoothed.envelopes);
+            for (index, (layer, envelope)) in indices.into_iter().zip(layers) {
+                let found = told(&envelope, index);
+                most = most.max(found.worth);
+                if found.worth > WORTH * most {
+                    kept.push((index, found, layer));
                 }
             }
-            let power = (sum - units) / count.max(1.0);
-            // Chance of the mean: nodes a window apart are nearly independent.
-            let chance = 4.0 * units / count.max(1.0) / count.max(1.0).sqrt();
-            let order = f64::from(h * h + h * k + k * k);
-            told.push((power, if power > chance { power * order } else { 0.0 }));
         }
-        let most = told.iter().map(|t| t.1).fold(0.0, f64::max);
-        let keep: Vec<bool> = told
-            .iter()
-            .enumerate()
-            .map(|(i, t)| i < 3 || t.1 > WORTH * most)
-            .collect();
-        let mut kept = keep.iter();
-        self.blocks
-            .layers
-            .retain(|_| *kept.next().unwrap_or(&false));
-        let mut kept = keep.iter();
-        self.indices.retain(|_| *kept.next().unwrap_or(&false));
-        let powers = told.iter().zip(&keep).filter(|(_, keep)| **keep);
-        self.powers = powers.map(|(t, _)| t.0.max(0.0)).collect();
-        while self.noise.levels.len() < self.indices.len() {
+        kept.retain(|(_, told, _)| told.worth > WORTH * most);
+        self.powers = of_first.iter().map(|t| t.power.max(0.0)).collect();
+        for (index, told, layer) in kept {
+            self.indices.push(index);
+            self.powers.push(told.power.max(0.0));
+            self.blocks.layers.push(layer);
             self.noise.levels.push(level);
         }
     }
@@ -166,4 +153,30 @@ impl Work {
         }
         chosen * self.period
     }
+}
+
+/// What a harmonic tells.
+struct Told {
+    /// Mean |c₀|², noise taken off.
+    power: f64,
+    /// That times h² + hk + k², if it is more than chance.
+    worth: f64,
+}
+
+/// From the envelope of harmonic (h, k) at sparse nodes; `level` is that of the noise.
+fn told(envelope: &Envelope, nodes: &Smoothed, level: f64, [h, k]: [i32; 2]) -> Told {
+    let (mut sum, mut units, mut count) = (0.0, 0.0, 0.0);
+    for (amplitude, support) in envelope.amplitude.iter().zip(&nodes.support) {
+        if let Some(support) = support.filter(|s| s.share > 0.9) {
+            sum += f64::from(amplitude.norm_sqr());
+            units += level * support.amplitude_noise;
+            count += 1.0f64;
+        }
+    }
+    let power = (sum - units) / count.max(1.0);
+    // Chance of the mean: nodes a window apart are nearly independent.
+    let chance = 4.0 * units / count.max(1.0) / count.max(1.0).sqrt();
+    let order = f64::from(h * h + h * k + k * k);
+    let worth = if power > chance { power * order } else { 0.0 };
+    Told { power, worth }
 }

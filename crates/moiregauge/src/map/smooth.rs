@@ -17,7 +17,6 @@ use rayon::prelude::*;
 use rustfft::num_complex::{Complex32, Complex64};
 
 use super::blocks::{Blocks, Layer};
-use super::carrier::Turns;
 
 /// Windows end so many widths from their middle.
 const REACH: f64 = 4.5;
@@ -57,13 +56,19 @@ impl Nodes {
         self.size[0] * self.size[1]
     }
 
+    /// The block on which a node lies.
+    pub(super) fn block(&self, node: usize) -> [usize; 2] {
+        let (column, row) = (node % self.size[0], node / self.size[0]);
+        [
+            self.first[0] + column * self.stride[0],
+            self.first[1] + row * self.stride[1],
+        ]
+    }
+
     /// Place of a node, pixels.
     pub(super) fn place(&self, blocks: &Blocks, node: usize) -> Vector2<f64> {
-        let (column, row) = (node % self.size[0], node / self.size[0]);
-        blocks.middle(
-            (self.first[0] + column * self.stride[0]) as f64,
-            (self.first[1] + row * self.stride[1]) as f64,
-        )
+        let [column, row] = self.block(node).map(|i| i as f64);
+        blocks.middle(column, row)
     }
 }
 
@@ -76,6 +81,8 @@ pub(super) struct Support {
     pub(super) amplitude_noise: f64,
     /// Covariance of the components of c₁ for such noise, per pixel².
     pub(super) slope_noise: Matrix2<f64>,
+    /// Inverse of the moments: from the plain sum and those tilted along x and y to c₀ and c₁.
+    pub(super) inverse: Matrix3<f64>,
 }
 
 /// Amplitude and slope of one wave at every node.
@@ -84,6 +91,10 @@ pub(super) struct Envelope {
     pub(super) amplitude: Vec<Complex32>,
     /// `Im(c₁/c₀)`, rad per pixel.
     pub(super) slope: Vec<[f32; 2]>,
+    /// `Re(c₁/c₀)`, per pixel.
+    pub(super) growth: Vec<[f32; 2]>,
+    /// What may be left of other harmonics in the slope, rad per pixel; empty where nothing was looked for.
+    pub(super) unsure: Vec<f32>,
 }
 
 /// The envelopes of all waves.
@@ -95,16 +106,19 @@ pub(super) struct Smoothed {
 }
 
 /// Weights along one axis, and times the distance in pixels, filled up with zeros to whole lanes.
-struct Kernel {
-    radius: usize,
-    plain: Vec<f32>,
-    tilted: Vec<f32>,
-    step: f64,
+pub(super) struct Kernel {
+    pub(super) radius: usize,
+    pub(super) plain: Vec<f32>,
+    pub(super) tilted: Vec<f32>,
+    /// Pixels of a block.
+    pub(super) step: f64,
+    /// Variance of the weights, pixels².
+    pub(super) own: f64,
 }
 
 impl Kernel {
     /// For blocks of `block` pixels; `width` is that of the window with the block.
-    fn new(width: f64, block: usize) -> Self {
+    pub(super) fn new(width: f64, block: usize) -> Self {
         let step = block as f64;
         // The mean over a block widens by (b² − 1)/12 pixels².
         let own = (width * width - (step * step - 1.0) / 12.0).max(0.25 * step * step);
@@ -127,6 +141,7 @@ impl Kernel {
             plain,
             tilted,
             step,
+            own,
         }
     }
 
@@ -154,36 +169,21 @@ impl Kernel {
     }
 }
 
-/// Smooths every layer of `blocks` with a window of the given widths (pixels). `turns` takes a phase field off first: the
-/// indices (h, k) of each layer say how often its two phases count.
-pub(super) fn smooth(
-    blocks: &Blocks,
-    width: [f64; 2],
-    nodes: Nodes,
-    turns: Option<(&Turns, &[[i32; 2]])>,
-) -> Smoothed {
+/// Smooths every layer of `blocks` with a window of the given widths (pixels).
+pub(super) fn smooth(blocks: &Blocks, width: [f64; 2], nodes: Nodes) -> Smoothed {
     let kernels = [0, 1].map(|axis| Kernel::new(width[axis], blocks.block[axis]));
     let fits = fits(blocks, &kernels, nodes);
-    let envelopes = blocks.layers.iter().enumerate().map(|(i, layer)| {
-        let turns = turns.map(|(turns, indices)| (turns, indices[i]));
-        envelope(blocks, layer, &kernels, (nodes, &fits), turns)
-    });
+    let layers = blocks.layers.iter();
+    let envelopes = layers.map(|layer| envelope(blocks, layer, &kernels, (nodes, &fits)));
+    let envelopes = envelopes.collect();
     Smoothed {
         nodes,
-        envelopes: envelopes.collect(),
-        support: fits.iter().map(|fit| fit.map(|f| f.support)).collect(),
+        envelopes,
+        support: fits,
     }
 }
 
-/// How the sums around a node become amplitude and slope.
-#[derive(Clone, Copy)]
-struct Fit {
-    /// Inverse of the moments.
-    inverse: Matrix3<f64>,
-    support: Support,
-}
-
-impl Fit {
+impl Support {
     /// From the moments of w and of w² over the window: 1, x, y, xx, xy, yy.
     fn new(first: [f64; 6], second: [f64; 6], pixels: f64) -> Option<Self> {
         let matrix = |[a, x, y, xx, xy, yy]: [f64; 6]| Matrix3::new(a, x, y, x, xx, xy, y, xy, yy);
@@ -193,17 +193,15 @@ impl Fit {
         let inverse = matrix(first).try_inverse()?;
         let noise = inverse * matrix(second) * inverse / pixels;
         Some(Self {
+            share: first[0],
+            amplitude_noise: noise[(0, 0)],
+            slope_noise: noise.fixed_view::<2, 2>(1, 1).into_owned(),
             inverse,
-            support: Support {
-                share: first[0],
-                amplitude_noise: noise[(0, 0)],
-                slope_noise: noise.fixed_view::<2, 2>(1, 1).into_owned(),
-            },
         })
     }
 }
 
-fn fits(blocks: &Blocks, kernels: &[Kernel; 2], nodes: Nodes) -> Vec<Option<Fit>> {
+fn fits(blocks: &Blocks, kernels: &[Kernel; 2], nodes: Nodes) -> Vec<Option<Support>> {
     let pixels = (blocks.block[0] * blocks.block[1]) as f64;
     if let Some(share) = &blocks.share {
         return fits_with_gaps(blocks, share, kernels, nodes);
@@ -225,7 +223,7 @@ fn fits(blocks: &Blocks, kernels: &[Kernel; 2], nodes: Nodes) -> Vec<Option<Fit>
     };
     let all = along[1].iter().flat_map(|y| {
         let of_row = along[0].iter();
-        of_row.map(move |x| Fit::new(product(&x[0], &y[0]), product(&x[1], &y[1]), pixels))
+        of_row.map(move |x| Support::new(product(&x[0], &y[0]), product(&x[1], &y[1]), pixels))
     });
     all.collect()
 }
@@ -236,7 +234,7 @@ fn fits_with_gaps(
     share: &[f32],
     kernels: &[Kernel; 2],
     nodes: Nodes,
-) -> Vec<Option<Fit>> {
+) -> Vec<Option<Support>> {
     let pixels = (blocks.block[0] * blocks.block[1]) as f64;
     let reach = |axis: usize, at: usize| {
         let radius = kernels[axis].radius;
@@ -281,7 +279,7 @@ fn fits_with_gaps(
                     second[i] += squared[i] * x[3 + power];
                 }
             }
-            Fit::new(first, second, pixels)
+            Support::new(first, second, pixels)
         })
         .collect()
 }
@@ -290,19 +288,29 @@ fn envelope(
     blocks: &Blocks,
     layer: &Layer,
     kernels: &[Kernel; 2],
-    (nodes, fits): (Nodes, &[Option<Fit>]),
-    turns: Option<(&Turns, [i32; 2])>,
+    (nodes, fits): (Nodes, &[Option<Support>]),
 ) -> Envelope {
     let count = nodes.size[0];
+    let radius = kernels[1].radius;
+    let is_seen = |row: usize| {
+        let nearest = (row + nodes.stride[1] / 2).saturating_sub(nodes.first[1]) / nodes.stride[1];
+        let nearest = nodes.first[1] + nearest.min(nodes.size[1] - 1) * nodes.stride[1];
+        nearest.abs_diff(row) <= radius
+    };
     let lines: Vec<Vec<f32>> = (0..blocks.size[1])
         .into_par_iter()
-        .map(|row| along(blocks.size[0], layer, &kernels[0], nodes, (row, turns)))
+        .map(|row| {
+            if is_seen(row) {
+                along(blocks.size[0], layer, &kernels[0], nodes, row)
+            } else {
+                Vec::new()
+            }
+        })
         .collect();
-    let rows: Vec<Vec<(Complex32, [f32; 2])>> = (0..nodes.size[1])
+    let rows: Vec<Vec<(Complex32, [Complex32; 2])>> = (0..nodes.size[1])
         .into_par_iter()
         .map(|node_row| {
             let at = nodes.first[1] + node_row * nodes.stride[1];
-            let radius = kernels[1].radius;
             // Plain sums, those tilted along the line, those tilted across.
             let mut sums = [
                 vec![0.0f32; 2 * count],
@@ -326,7 +334,7 @@ fn envelope(
             }
             let of_node = |column: usize| {
                 let Some(fit) = &fits[node_row * count + column] else {
-                    return (Complex32::default(), [0.0; 2]);
+                    return (Complex32::default(), [Complex32::default(); 2]);
                 };
                 let [s, x, y] = [0, 1, 2].map(|i| {
                     let values = &sums[i];
@@ -337,12 +345,16 @@ fn envelope(
                     s * m[0] + x * m[1] + y * m[2]
                 };
                 let amplitude = row(0);
-                let slope = |i: usize| {
-                    let slope = (row(i) / amplitude).im as f32;
-                    if slope.is_finite() { slope } else { 0.0 }
+                let single = |c: Complex64| Complex32::new(c.re as f32, c.im as f32);
+                let relative = |i: usize| {
+                    let relative = single(row(i) / amplitude);
+                    if relative.is_finite() {
+                        relative
+                    } else {
+                        Complex32::default()
+                    }
                 };
-                let single = Complex32::new(amplitude.re as f32, amplitude.im as f32);
-                (single, [slope(1), slope(2)])
+                (single(amplitude), [relative(1), relative(2)])
             };
             (0..count).map(of_node).collect()
         })
@@ -350,32 +362,25 @@ fn envelope(
     let mut envelope = Envelope {
         amplitude: Vec::with_capacity(nodes.len()),
         slope: Vec::with_capacity(nodes.len()),
+        growth: Vec::with_capacity(nodes.len()),
+        unsure: Vec::new(),
     };
-    for (amplitude, slope) in rows.into_iter().flatten() {
+    for (amplitude, relative) in rows.into_iter().flatten() {
         envelope.amplitude.push(amplitude);
-        envelope.slope.push(slope);
+        envelope.slope.push(relative.map(|c| c.im));
+        envelope.growth.push(relative.map(|c| c.re));
     }
     envelope
 }
 
 /// A line of blocks, smoothed, at the columns of the nodes: real, imaginary, and both tilted.
-fn along(
-    columns: usize,
-    layer: &Layer,
-    kernel: &Kernel,
-    nodes: Nodes,
-    (row, turns): (usize, Option<(&Turns, [i32; 2])>),
-) -> Vec<f32> {
+fn along(columns: usize, layer: &Layer, kernel: &Kernel, nodes: Nodes, row: usize) -> Vec<f32> {
     let radius = kernel.radius;
     let length = columns + 2 * radius + LANES;
     let (mut re, mut im) = (vec![0.0f32; length], vec![0.0f32; length]);
     let line = row * columns..(row + 1) * columns;
     re[radius..radius + columns].copy_from_slice(&layer.re[line.clone()]);
     im[radius..radius + columns].copy_from_slice(&layer.im[line]);
-    if let Some((turns, index)) = turns {
-        let part = radius..radius + columns;
-        turns.apply(row, index, &mut re[part.clone()], &mut im[part]);
-    }
     let count = nodes.size[0];
     let mut out = vec![0.0; 4 * count];
     for i in 0..count {

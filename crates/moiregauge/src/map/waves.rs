@@ -138,7 +138,9 @@ fn regression(
         } else {
             f64::INFINITY
         };
-        let variance = level / (2.0 * signal) + harmonics.leaks[i].powi(2) / spread;
+        let unsure = envelope.unsure.get(node).copied().map_or(0.0, f64::from);
+        let leaks = harmonics.leaks[i].powi(2) + unsure * unsure;
+        let variance = level / (2.0 * signal) + leaks / spread;
         let weight = 1.0 / variance;
         let index = Vector2::from(harmonics.indices[i].map(f64::from));
         let [x, y] = envelope.slope[node].map(f64::from);

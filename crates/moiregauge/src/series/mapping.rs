@@ -6,7 +6,8 @@ use nalgebra::Matrix2;
 use nalgebra::Vector2;
 use spmfile::{Channel, DateTime, FrameDirection, LineDirection, Scan};
 
-use super::measure::{channels, image_of, nominal, usable_sensors};
+use super::measure::{channels, image_of};
+use super::positions::{nominal, usable_sensors};
 use super::scanner::calibrated;
 use super::sightings::seconds;
 use super::tiling::tile_map;

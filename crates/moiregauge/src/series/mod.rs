@@ -16,6 +16,7 @@ mod mapping;
 mod measure;
 mod moires;
 mod overlap;
+mod positions;
 mod scanner;
 mod set;
 mod shared;
