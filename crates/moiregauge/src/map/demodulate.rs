@@ -304,6 +304,8 @@ impl Work {
             step: [0, 1].map(|i| (nodes.stride[i] * self.blocks.block[i]) as f64),
             window_nm,
             reference: self.reference,
+            centre: self.place.centre,
+            noise_measured: self.noise.is_measured(),
             nodes: nodes_out.collect(),
             harmonics: harmonics
                 .map(|((&index, power), &noise)| UsedHarmonic {
