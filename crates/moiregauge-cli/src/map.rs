@@ -306,7 +306,7 @@ fn doubts(maps: &[LineMap], caveats: &mut Vec<Caveat>) {
             "map-noise-guessed",
             guessed.file.as_str(),
             "the frame holds too few periods to see noise between the harmonics: the errors of the map are those of \
-             what the lattice leaves of the variance of the image",
+             what the lattice leaves of the variance of the image, enlarged where the harmonics disagree by more",
         ));
     }
 }

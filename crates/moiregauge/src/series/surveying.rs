@@ -25,6 +25,8 @@ use crate::strain::StrainError;
 const MIDDLE: usize = 2048;
 /// Pixels of a band, halo not counted.
 const BAND: usize = 1 << 24;
+/// Smaller images are cut into so many bands.
+const FEWEST_BANDS: usize = 4;
 
 /// A large image, ready to be mapped band by band.
 #[derive(Clone, Debug)]
@@ -137,7 +139,7 @@ impl SurveyPlan {
                 reference,
                 *resolution,
                 map.window_nm,
-                BAND / geometry.size[0].max(1),
+                (BAND / geometry.size[0].max(1)).min(geometry.size[1].div_ceil(FEWEST_BANDS)),
             ),
             placed,
             drift_corrected,
