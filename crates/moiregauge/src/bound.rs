@@ -64,7 +64,7 @@ pub(crate) fn ideal_sightings(
     line_noise: bool,
 ) -> Option<(Vec<Sighting>, Matrix2<f64>, Vector2<f64>)> {
     let settings = simulator.settings();
-    let lines = if line_noise {
+    let offsets = if line_noise {
         Lines::of(settings)
     } else {
         Lines { lambda: 0.0 }
@@ -81,7 +81,7 @@ pub(crate) fn ideal_sightings(
     for (scan, frame) in truth.frames.iter().enumerate() {
         let lines = [Some(0), settings.raster.retrace.then_some(1)];
         for class in lines.into_iter().flatten() {
-            let image = ideal(simulator, frame, (&pair, &drift), class, &lines)?;
+            let image = ideal(simulator, frame, (&pair, &drift), class, &offsets)?;
             sightings.push(Sighting {
                 scan,
                 phases: image.phases.filter(|_| linked),
