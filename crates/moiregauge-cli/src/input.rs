@@ -342,7 +342,7 @@ pub(crate) fn is_named(name: &str, wanted: &str) -> bool {
 }
 
 /// `70nm×70nm`, `70x70 nm`: two lengths; the first may leave its unit to the second.
-fn parse_size(text: &str) -> Result<[f64; 2], String> {
+pub(crate) fn parse_size(text: &str) -> Result<[f64; 2], String> {
     let parsed = || {
         let (width, height) = text.split_once(['×', 'x', 'X', '*'])?;
         // `um` is how the micrometre is typed.

@@ -1,6 +1,8 @@
 //! `moiregauge map`: scan files → maps of twist, strain and lattice with their errors.
 
+mod domains;
 mod output;
+mod regions;
 mod source;
 mod survey;
 
@@ -11,10 +13,11 @@ use anyhow::{Context as _, bail, ensure};
 use clap::ValueEnum;
 use moiregauge::analysis::Axis;
 use moiregauge::caveat::Caveat;
+use moiregauge::domains::{Contrast, DomainMap};
 use moiregauge::map::{
     DriftChange, LatticeMap, Resolution, TwistStrainMap, combine, drift_change, register,
 };
-use moiregauge::series::{LineMap, MapMethod, map_scan};
+use moiregauge::series::{LineMap, MapMethod, domains_of_scan, map_scan};
 use moiregauge::settings::Settings;
 use moiregauge_report::{FailedInput, Provenance};
 use spmfile::FrameDirection;
@@ -36,8 +39,13 @@ Examples:
   moiregauge map scan.000 --out maps
   moiregauge map scans/ --out maps --window 12
   moiregauge map survey.npy --out maps --size 1.5um×1.5um --step 5
+  moiregauge map scan.000 --out maps --device 200nm×100nm --wanted 1.05±0.02
+  moiregauge map scan.000 --out maps --region bar=10,20,80,40 --region 'flake=0,0 1um,10nm 600nm,0.8um'
+  moiregauge map scan.000 --out maps --profile 'cut=0,0 100,80'
+  moiregauge map small_angle.sxm --out maps --domains on --nodes bright
 
-Written: map.zarr and map.gwy (all quantities, their errors, mask), map.json (summary), figures/.")]
+Written: report.html, map.zarr and map.gwy (all quantities, their errors, mask), map.json (summary), figures/,
+and what was asked for: regions.csv, profiles.csv, devices.csv, domains.csv, nodes.csv; columns.md explains them.")]
 pub(crate) struct MapArgs {
     #[command(flatten)]
     analyze: AnalyzeArgs,
@@ -58,6 +66,10 @@ pub(crate) struct MapArgs {
     /// Margin at the edges, in windows
     #[arg(long, value_name = "WINDOWS", default_value_t = 2.0)]
     margin: f64,
+    #[command(flatten)]
+    regions: regions::RegionArgs,
+    #[command(flatten)]
+    domains: domains::DomainArgs,
 }
 
 /// Shifts beyond this share of a period may belong to another one.
@@ -94,6 +106,7 @@ impl From<MapMethodArg> for MapMethod {
 pub(crate) fn run(args: &MapArgs) -> anyhow::Result<ExitCode> {
     let settings = args.analyze.settings()?;
     let resolution = args.resolution()?;
+    args.regions.check()?;
     let out = args.analyze.out();
     ensure!(
         args.analyze.force() || !out.join("map.json").exists(),
@@ -179,6 +192,9 @@ fn survey(
         first.get_or_insert(plan);
     }
     let map = TwistStrainMap::side_by_side(maps).context("no image")?;
+    let look = None::<fn(Contrast) -> Vec<DomainMap>>;
+    let domains = args.domains.answer(&map, look);
+    caveats.extend(domains.caveats.iter().cloned());
     Ok(Some(Made {
         caveats,
         provenance: Provenance {
@@ -193,6 +209,7 @@ fn survey(
         whole: None,
         agreement: None,
         drift_change: None,
+        domains,
     }))
 }
 
@@ -277,8 +294,21 @@ fn together(
             ),
         ));
     }
+    let map = TwistStrainMap::new(&lattices, &found);
+    let look = |contrast| {
+        let all = used().flat_map(|scan| {
+            let reading = read(Path::new(&scan.file), settings, known).ok();
+            reading.map_or_else(Vec::new, |r| {
+                domains_of_scan(&r.scan, (scan, origin), settings, contrast)
+            })
+        });
+        all.collect()
+    };
+    let domains = args.domains.answer(&map, Some(look));
+    caveats.extend(domains.caveats.iter().cloned());
     Ok(Made {
-        map: TwistStrainMap::new(&lattices, &found),
+        map,
+        domains,
         images: maps
             .iter()
             .map(|m| output::image(&m.file, Some(m.line), m.drift_corrected, &m.harmonics))

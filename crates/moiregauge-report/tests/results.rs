@@ -3,7 +3,7 @@
 mod common;
 
 use moiregauge::analysis::Analysis;
-use moiregauge_report::{Choice, Results, schema, write_report};
+use moiregauge_report::{Choice, Results, map_schema, schema, write_report};
 use serde_json::Value;
 
 const NUMBERS_ONLY: Choice = Choice {
@@ -29,15 +29,17 @@ fn file(analysis: &Analysis, name: &str) -> String {
 }
 
 #[test]
-fn the_published_schema_is_up_to_date() {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/schema/results-1.schema.json");
-    let text = std::fs::read_to_string(path).unwrap_or_default();
-    let published: Value = serde_json::from_str(&text).unwrap_or_default();
-    assert_eq!(
-        published,
-        schema(),
-        "renew it: cargo run -p moiregauge-report --example schema > crates/moiregauge-report/schema/results-1.schema.json"
-    );
+fn the_published_schemas_are_up_to_date() {
+    for (name, now) in [("results", schema()), ("map", map_schema())] {
+        let path = format!("{}/schema/{name}-1.schema.json", env!("CARGO_MANIFEST_DIR"));
+        let text = std::fs::read_to_string(path).unwrap_or_default();
+        let published: Value = serde_json::from_str(&text).unwrap_or_default();
+        assert_eq!(
+            published, now,
+            "renew it: cargo run -p moiregauge-report --example schema {name} > \
+             crates/moiregauge-report/schema/{name}-1.schema.json"
+        );
+    }
 }
 
 #[test]

@@ -8,14 +8,17 @@ use moiregauge::caveat::Caveat;
 use moiregauge::map::{Agreement, DriftChange, TwistStrainMap, UsedHarmonic};
 use moiregauge::settings::Settings;
 use moiregauge_report::results::{
-    Conventions, MapResults, MappedImage, TwistStrainResult, mask_counts, quantities,
+    Conventions, MapDetailsResult, MapResults, MappedImage, TwistStrainResult, mask_counts,
+    quantities,
 };
 use moiregauge_report::{
-    Provenance, figure_files, map_figures, map_scan, map_scans, plus_minus, two_digits,
+    Provenance, figure_files, map_figures, map_page, map_scan, map_scans, map_tables, plus_minus,
+    two_digits,
 };
 use spmfile::{LineDirection, WritableFormat};
 
-use super::MapArgs;
+use super::domains::Domains;
+use super::{MapArgs, regions};
 use crate::analyze::write_all;
 use crate::say::say;
 
@@ -36,6 +39,7 @@ pub(super) struct Made {
     pub(super) images: Vec<MappedImage>,
     pub(super) agreement: Option<Agreement>,
     pub(super) drift_change: Option<DriftChange>,
+    pub(super) domains: Domains,
     pub(super) caveats: Vec<Caveat>,
 }
 
@@ -61,16 +65,24 @@ pub(super) fn write(made: &Made, args: &MapArgs) -> anyhow::Result<()> {
             &spmfile::write(&map_scan(map), WritableFormat::Gwy, "map", &log)?,
         )?;
     }
+    let (mut details, doubts) = args.regions.answer(map)?;
+    details.domains.clone_from(&made.domains.map);
+    details.regime = Some(made.domains.regime.clone());
+    let mut results = results(made, args.method_name());
+    results.details = (&details).into();
+    results.caveats.extend(doubts);
+    let mut files = vec![("map.json".to_owned(), serde_json::to_vec_pretty(&results)?)];
+    files.extend(map_tables(&details));
     let choice = args.analyze.choice();
-    if choice.figures {
-        write_all(
-            out,
-            &figure_files(&map_figures(map, choice.colormap), choice)?,
-        )?;
+    if choice.figures || choice.png || choice.html {
+        let figures = map_figures(map, &details, choice.colormap);
+        if choice.html {
+            let page = map_page(&results, &figures, &files)?;
+            files.push(("report.html".to_owned(), page));
+        }
+        files.extend(figure_files(&figures, choice)?);
     }
-    let results = results(made, args.method_name());
-    let json = serde_json::to_vec_pretty(&results)?;
-    write_all(out, &[("map.json".to_owned(), json)])?;
+    write_all(out, &files)?;
     if args.analyze.json() {
         say(&format!("{}\n", serde_json::to_string_pretty(&results)?))?;
     } else if args.analyze.is_loud() {
@@ -98,12 +110,14 @@ fn results(made: &Made, method: &str) -> MapResults {
         nodes: map.grid.size,
         origin_nm: map.grid.origin.into(),
         step_nm: [columns.into(), rows.into()],
+        extent_nm: map.grid.extent(),
         masks: mask_counts(map),
         quantities: quantities(map),
         whole_image: made.whole,
         images: made.images.clone(),
         agreement: made.agreement.map(Into::into),
         drift_change: made.drift_change.map(Into::into),
+        details: MapDetailsResult::default(),
         caveats: made.caveats.clone(),
     }
 }
@@ -151,6 +165,12 @@ fn summary(results: &MapResults) -> String {
         two_digits(results.window_nm),
         two_digits(results.resolution_nm)
     );
+    let [x, y] = results.extent_nm;
+    let _ = writeln!(
+        text,
+        "x from {:.1} to {:.1} nm, y from {:.1} to {:.1} nm",
+        x[0], x[1], y[0], y[1]
+    );
     for mask in &results.masks {
         let _ = writeln!(text, "  {:16} {} nodes", mask.name, mask.nodes);
     }
@@ -173,6 +193,7 @@ fn summary(results: &MapResults) -> String {
             a.chi2_per_dof, a.nodes
         );
     }
+    text.push_str(&regions::summary(&results.details));
     for caveat in &results.caveats {
         let _ = writeln!(
             text,

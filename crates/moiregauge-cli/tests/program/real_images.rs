@@ -117,9 +117,46 @@ fn nanomesh() {
     }
 }
 
-/// The atoms of graphite beside a step, on a drifting scanner: the published wave vectors within their tolerance.
-/// The lattice bends, so that its harmonics do not agree; the record's own, made of two of the three,
-/// lie within four of our errors.
+/// Where near `k` (cycles per nm) the Hann-windowed power of an image is largest: rows are lines of pixels
+/// `pitch` nm apart, from the bottom up.
+fn strongest_near(rows: &[Vec<f64>], pitch: f64, mut k: Vector2<f64>) -> Vector2<f64> {
+    let turns = |n: usize, k: f64| -> Vec<(f64, f64)> {
+        let angles = (0..n).map(|i| std::f64::consts::TAU * k * pitch * i as f64);
+        angles.map(f64::sin_cos).collect()
+    };
+    let power = |k: Vector2<f64>| -> f64 {
+        let (along, up) = (turns(rows[0].len(), k.x), turns(rows.len(), k.y));
+        let (mut re, mut im) = (0.0, 0.0);
+        for (row, (sin, cos)) in rows.iter().zip(up) {
+            let (mut a, mut b) = (0.0, 0.0);
+            for (value, (sin, cos)) in row.iter().zip(&along) {
+                a += value * cos;
+                b += value * sin;
+            }
+            re += a * cos - b * sin;
+            im += a * sin + b * cos;
+        }
+        re * re + im * im
+    };
+    let mut best = power(k);
+    let mut step = 0.02;
+    while step > 1e-4 {
+        let around = [(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)];
+        let tried = around.map(|(x, y)| k + step * Vector2::new(x, y));
+        let powers = tried.map(power);
+        let first = (0..4).max_by(|&a, &b| powers[a].total_cmp(&powers[b]));
+        match first {
+            Some(i) if powers[i] > best => (k, best) = (tried[i], powers[i]),
+            _ => step /= 2.0,
+        }
+    }
+    k
+}
+
+/// The atoms of graphite beside a step, on a drifting scanner. The record has two wave vectors as they are published
+/// (read off by eye, to 0.005/Å) and as the maximum of the windowed power gives them. The third one, the strongest of all,
+/// is not their difference but three times the record's tolerance (0.001/Å) away from it, and without the window the first
+/// moves by twice that: the image bends, and no lattice has all of them. Ours says so, and has errors to match.
 #[test]
 fn graphite() {
     let Some(data) = testdata("graphite") else {
@@ -134,30 +171,55 @@ fn graphite() {
     let dual = lattice.basis.try_inverse().expect("an area").transpose();
     let (k1, k2) = (dual.column(0).into_owned(), dual.column(1).into_owned());
     let ours = [k1, k2, k1 + k2].map(|k| [k, -k]).concat();
-    let nearest = |wanted: Vector2<f64>| -> Vector2<f64> {
-        let off = |k: &&Vector2<f64>| (*k - wanted).amax();
-        let found = ours.iter().min_by(|a, b| off(a).total_cmp(&off(b)));
-        found.expect("six") - wanted
+    let off = |wanted: Vector2<f64>| -> f64 {
+        let all = ours.iter().map(|k| (k - wanted).amax());
+        all.fold(f64::INFINITY, f64::min)
     };
     // 1/Å in the record.
-    let vectors = |of: &str| -> Vec<Vector2<f64>> {
-        let list = record["lattice"][of]["K"].as_array().expect("two vectors");
+    let vectors = |of: &str| -> [Vector2<f64>; 2] {
+        let list = &record["lattice"][of]["K"];
         let part = |k: &Value, i: usize| 10.0 * k[i].as_f64().expect("a number");
-        list.iter()
-            .map(|k| Vector2::new(part(k, 0), part(k, 1)))
-            .collect()
+        [0, 1].map(|k| Vector2::new(part(&list[k], 0), part(&list[k], 1)))
     };
     for wanted in vectors("published") {
-        let off = nearest(wanted);
-        assert!(off.amax() < 0.05, "{wanted:?}: {off:?} 1/nm");
+        assert!(off(wanted) < 0.05, "{wanted:?}: {} 1/nm", off(wanted));
     }
-    for wanted in vectors("measured") {
-        let relative = lattice.wavelength(0).sigma / lattice.wavelength(0).value;
-        let off = nearest(wanted).norm() / wanted.norm();
-        assert!(
-            off < 4.0 * relative,
-            "{wanted:?}: {off} of it, ± {relative}"
-        );
+
+    let scan = read(&std::fs::read(&file).expect("a file")).expect("an image");
+    let image = &scan.channels[0];
+    let (columns, rows) = (image.columns, image.rows);
+    let values = image.values();
+    let mean = values.iter().sum::<f64>() / values.len() as f64;
+    let hann = |i: usize, n: usize| {
+        (std::f64::consts::PI * i as f64 / (n - 1) as f64)
+            .sin()
+            .powi(2)
+    };
+    let weighted = |weight: &dyn Fn(usize, usize) -> f64| -> Vec<Vec<f64>> {
+        let lines = values.chunks_exact(columns).enumerate();
+        let line = |(r, line): (usize, &[f64])| {
+            let pixels = line.iter().enumerate();
+            pixels.map(|(c, v)| (v - mean) * weight(c, r)).collect()
+        };
+        lines.map(line).collect()
+    };
+    let windowed = weighted(&|c, r| hann(c, columns) * hann(r, rows));
+    let plain = weighted(&|_, _| 1.0);
+    let pitch = image.pitch_nm().expect("a size")[0];
+    let [first, second] = vectors("measured");
+    let peaks = [first, second, first - second].map(|k| strongest_near(&windowed, pitch, k));
+    for (peak, recorded) in peaks.iter().zip([first, second]) {
+        assert!((peak - recorded).amax() < 0.01, "{peak} {recorded}");
+    }
+    let moved = (strongest_near(&plain, pitch, first) - peaks[0]).amax();
+    assert!(moved > 0.02, "a window moves it by {moved} 1/nm only");
+    let misfit = (peaks[0] - peaks[1] - peaks[2]).amax();
+    assert!(misfit > 0.03, "they close to {misfit} 1/nm");
+    let errors = [0, 1, 2].map(|i| lattice.wavelength(i).sigma / lattice.wavelength(i).value);
+    let relative = errors.into_iter().fold(0.0, f64::max);
+    for peak in peaks {
+        let allowed = 4.0 * relative * peak.norm();
+        assert!(off(peak) < allowed, "{peak}: {} of {allowed}", off(peak));
     }
 }
 

@@ -7,6 +7,7 @@ pub(crate) mod axes;
 pub(crate) mod base64;
 pub(crate) mod colorbar;
 pub(crate) mod colormap;
+pub(crate) mod contour;
 pub(crate) mod legend;
 pub(crate) mod png;
 pub(crate) mod raster;

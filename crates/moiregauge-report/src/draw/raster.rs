@@ -96,8 +96,58 @@ pub(crate) fn draw(
     let origin = origin + linear * Vector2::new(shift, shift);
 
     let png = encode(small, shades);
+    place(
+        svg,
+        axes,
+        (&png, [small.columns, small.rows]),
+        (&linear, origin),
+        shades.crisp,
+    );
+}
+
+/// Draws classes (numbers of `colours`) of nodes, row by row, placed like the pixels of [`draw`].
+pub(crate) fn draw_classes(
+    svg: &mut Svg,
+    axes: &Axes,
+    ([columns, rows], classes): ([usize; 2], &[u8]),
+    (linear, origin): (&Matrix2<f64>, Vector2<f64>),
+    colours: &[[u8; 3]],
+) {
+    // Classes have no mean: of many nodes one in the middle of a block is shown.
+    let factor = rows.max(columns).div_ceil(MOST).max(1);
+    let size = [columns.div_ceil(factor), rows.div_ceil(factor)];
+    let pick = |i: usize, n: usize| (i * factor + factor / 2).min(n - 1);
+    let mut indices = Vec::with_capacity(size[0] * size[1]);
+    for row in (0..size[1]).rev() {
+        for column in 0..size[0] {
+            let class = classes[pick(row, rows) * columns + pick(column, columns)];
+            indices.push(class.saturating_add(1));
+        }
+    }
+    let mut table = [[255; 3]; 256];
+    table.iter_mut().zip(colours).for_each(|(t, c)| *t = *c);
+    let png = palette_png(size[0], size[1], &indices, &table);
+    let shift = (factor as f64 - 1.0) / 2.0;
+    let origin = origin + linear * Vector2::new(shift, shift);
+    place(
+        svg,
+        axes,
+        (&png, size),
+        (&(linear * factor as f64), origin),
+        true,
+    );
+}
+
+/// Puts a PNG on the page, its pixel (column, row) centred at `origin + linear · (column, row)`.
+fn place(
+    svg: &mut Svg,
+    axes: &Axes,
+    (png, [columns, rows]): (&[u8], [usize; 2]),
+    (linear, origin): (&Matrix2<f64>, Vector2<f64>),
+    crisp: bool,
+) {
     // PNG coordinates (u right, v down, edges at whole numbers): column = u − ½, row = rows − ½ − v.
-    let corner = origin + linear * Vector2::new(-0.5, small.rows as f64 - 0.5);
+    let corner = origin + linear * Vector2::new(-0.5, rows as f64 - 0.5);
     let (e, f) = axes.at(corner.x, corner.y);
     let (sx, sy) = (axes.x.per_unit(), axes.y.per_unit());
     let matrix = [
@@ -108,7 +158,7 @@ pub(crate) fn draw(
         e,
         f,
     ];
-    svg.image(&png, (small.columns, small.rows), matrix, shades.crisp);
+    svg.image(png, (columns, rows), matrix, crisp);
 }
 
 /// Pixels as a palette PNG, top line first; missing ones are transparent.

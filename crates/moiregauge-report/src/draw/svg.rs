@@ -147,6 +147,23 @@ impl Svg {
         self.path(points, "Z", ink);
     }
 
+    /// Many short lines as one shape.
+    pub(crate) fn segments(&mut self, ends: &[[(f64, f64); 2]], ink: &Ink) {
+        let finite = |p: &(f64, f64)| p.0.is_finite() && p.1.is_finite();
+        let mut data = String::new();
+        for [a, b] in ends.iter().filter(|ends| ends.iter().all(finite)) {
+            let [x, y] = [number(a.0), number(a.1)];
+            let _ = write!(data, "M{x} {y}L{} {}", number(b.0), number(b.1));
+        }
+        if !data.is_empty() {
+            let _ = writeln!(
+                self.body,
+                "<path d=\"{data}\" stroke-linecap=\"round\"{}/>",
+                ink.attributes()
+            );
+        }
+    }
+
     fn path(&mut self, points: &[(f64, f64)], end: &str, ink: &Ink) {
         let mut data = String::new();
         for &(x, y) in points

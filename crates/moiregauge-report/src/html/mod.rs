@@ -3,13 +3,15 @@
 //! In: the document, the figures and the tables. Out: the page. Every text from outside (file names,
 //! channel names, error messages) is escaped by the template engine; only our own SVG is not.
 
+mod map_page;
 mod meanings;
 mod page;
 mod words;
 
 use minijinja::syntax::SyntaxConfig;
 use minijinja::value::Serde;
-use minijinja::{Environment, UndefinedBehavior};
+use minijinja::{Environment, UndefinedBehavior, Value};
+use serde::Serialize;
 
 use crate::error::ReportError;
 use crate::figures::Figure;
@@ -17,12 +19,22 @@ use crate::results::Results;
 
 const TEMPLATE: &str = include_str!("report.html");
 
+/// What pages share: their look.
+const STYLE: &str = include_str!("style.html");
+
+pub use map_page::map_page;
+
 /// The page. `downloads` are the files that it carries for saving.
 pub(crate) fn page(
     results: &Results,
     figures: &[Figure],
     downloads: &[(String, Vec<u8>)],
 ) -> Result<Vec<u8>, ReportError> {
+    rendered(TEMPLATE, page::Page::new(results, figures, downloads)?)
+}
+
+/// The template filled in.
+fn rendered(template: &'static str, content: impl Serialize) -> Result<Vec<u8>, ReportError> {
     let mut environment = Environment::new();
     // A misspelt name is an error, not an empty place in the page.
     environment.set_undefined_behavior(UndefinedBehavior::Strict);
@@ -32,8 +44,8 @@ pub(crate) fn page(
         .build()?;
     environment.set_syntax(syntax);
     // The name ends in .html, which switches escaping on.
-    environment.add_template("report.html", TEMPLATE)?;
-    let content = page::Page::new(results, figures, downloads)?;
+    environment.add_global("style", Value::from_safe_string(STYLE.to_owned()));
+    environment.add_template("report.html", template)?;
     let text = environment
         .get_template("report.html")?
         .render(Serde(content))?;

@@ -1,6 +1,6 @@
 //! What the page says, as text ready for the template.
 
-use moiregauge::settings::Method;
+use moiregauge::settings::{Method, Settings};
 use serde::Serialize;
 
 use super::meanings::Meanings;
@@ -101,7 +101,7 @@ struct Scan<'a> {
 }
 
 #[derive(Clone, Debug, Serialize)]
-struct Shown<'a> {
+pub(super) struct Shown<'a> {
     number: usize,
     name: &'a str,
     title: &'a str,
@@ -112,13 +112,13 @@ struct Shown<'a> {
 }
 
 #[derive(Debug, Serialize)]
-struct Missing<'a> {
+pub(super) struct Missing<'a> {
     title: &'a str,
     reason: &'a str,
 }
 
 #[derive(Debug, Serialize)]
-struct Download<'a> {
+pub(super) struct Download<'a> {
     name: &'a str,
     kind: &'static str,
     base64: String,
@@ -145,10 +145,10 @@ impl<'a> Page<'a> {
             combined_budget: combined.map(|c| Budgeted::new(&c.budget)),
             combined_wavelengths: combined.map(|c| wavelengths(&c.vectors)),
             combined_meanings: combined.map(|c| Meanings::new(&c.readings)),
-            layers: layers(results),
+            layers: layers(&results.settings),
             atomic: results.atomic.as_ref().map(atomic),
             sets: sets
-                .map(|(i, set)| Set::new(i, set, of(Some(i)), missing(figures, i)))
+                .map(|(i, set)| Set::new(i, set, of(Some(i)), missing(figures, Some(i))))
                 .collect(),
             consistency: consistency(results),
             together: of(None),
@@ -163,8 +163,8 @@ impl<'a> Page<'a> {
 }
 
 /// `graphene (a = 0.246 nm, ν = 0.16)`, or two of them.
-fn layers(results: &Results) -> String {
-    let bilayer = results.settings.bilayer();
+pub(super) fn layers(settings: &Settings) -> String {
+    let bilayer = settings.bilayer();
     let of = |m: &moiregauge::material::Material| {
         format!(
             "{} (a = {} nm, ν = {})",
@@ -189,7 +189,7 @@ fn atomic(found: &AtomicResult) -> Atomic {
 }
 
 /// The drawn figures, numbered through, with the set each belongs to.
-fn numbered(figures: &[Figure]) -> Vec<(Option<usize>, Shown<'_>)> {
+pub(super) fn numbered(figures: &[Figure]) -> Vec<(Option<usize>, Shown<'_>)> {
     let drawn = figures
         .iter()
         .filter_map(|f| f.drawing.as_ref().ok().map(|d| (f, d)));
@@ -210,8 +210,8 @@ fn numbered(figures: &[Figure]) -> Vec<(Option<usize>, Shown<'_>)> {
 }
 
 /// The figures of a set that were left out.
-fn missing(figures: &[Figure], set: usize) -> Vec<Missing<'_>> {
-    let own = figures.iter().filter(|f| f.set == Some(set));
+pub(super) fn missing(figures: &[Figure], set: Option<usize>) -> Vec<Missing<'_>> {
+    let own = figures.iter().filter(|f| f.set == set);
     own.filter_map(|f| {
         f.drawing.as_ref().err().map(|reason| Missing {
             title: f.title,
@@ -221,7 +221,7 @@ fn missing(figures: &[Figure], set: usize) -> Vec<Missing<'_>> {
     .collect()
 }
 
-fn download<'a>(name: &'a str, bytes: &[u8]) -> Download<'a> {
+pub(super) fn download<'a>(name: &'a str, bytes: &[u8]) -> Download<'a> {
     Download {
         name,
         kind: match name.rsplit('.').next() {

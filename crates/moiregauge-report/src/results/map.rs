@@ -34,6 +34,8 @@ pub struct MapResults {
     pub origin_nm: [f64; 2],
     /// The way to the next node in a row, and to the next row, nm.
     pub step_nm: [[f64; 2]; 2],
+    /// From where to where the nodes reach, half a step beyond the outer ones: along x and along y, nm.
+    pub extent_nm: [[f64; 2]; 2],
     /// Nodes by mask.
     pub masks: Vec<MaskCount>,
     /// Mean and spread of every quantity over the good nodes.
@@ -46,6 +48,8 @@ pub struct MapResults {
     pub agreement: Option<AgreementResult>,
     /// What differs between upward and downward frames along the slow axis: drift that changes, no strain.
     pub drift_change: Option<DriftChangeResult>,
+    /// Regions, uniform areas, wanted twist.
+    pub details: super::MapDetailsResult,
     /// Doubts.
     pub caveats: Vec<Caveat>,
 }

@@ -8,10 +8,12 @@ mod checks;
 mod conventions;
 mod convert;
 mod document;
+mod domains;
 mod joint;
 mod lattice;
 mod map;
 mod readings;
+mod region;
 mod scan;
 
 pub(crate) use budget::source_name;
@@ -22,6 +24,7 @@ pub use document::{
     CombinedResult, ConsistencyResult, DriftFitResult, DriftMonteCarloResult, DriftResult,
     InputProvenance, MeanResult, Results, SetResult,
 };
+pub use domains::{DislocationResult, DomainsResult, RegimeResult};
 pub use joint::{JointResult, TestedResult};
 pub use lattice::{LatticeVector, ResultEstimate, StrainMonteCarlo, TwistStrainResult};
 pub use map::{
@@ -32,6 +35,9 @@ pub use readings::{
     AtomicResult, IsotropicStrainResult, ReadingsResult, ShiftResult, SolutionResult, SplitResult,
     StrainTensorResult, TensorNumbers, TensorSigmas,
 };
+pub use region::{
+    DeviceResult, MapDetailsResult, MaskShare, RegionMeanResult, RegionResult, WantedResult,
+};
 pub use scan::{LineResult, ScanResult, ScanTwistStrain, ScanVector, TipVelocity, Window};
 
 /// Name and version of the document.
@@ -39,9 +45,15 @@ pub const SCHEMA: &str = "moiregauge/results/1";
 
 /// The JSON Schema (draft 2020-12) of [`Results`].
 pub fn schema() -> serde_json::Value {
+    schema_of::<Results>()
+}
+
+/// The JSON Schema (draft 2020-12) of [`MapResults`], `map.json`.
+pub fn map_schema() -> serde_json::Value {
+    schema_of::<MapResults>()
+}
+
+fn schema_of<T: schemars::JsonSchema>() -> serde_json::Value {
     let settings = schemars::generate::SchemaSettings::draft2020_12().for_serialize();
-    settings
-        .into_generator()
-        .into_root_schema_for::<Results>()
-        .into()
+    settings.into_generator().into_root_schema_for::<T>().into()
 }

@@ -7,11 +7,15 @@
 mod budget;
 mod columns;
 mod csv;
+mod domains;
 mod map;
 #[cfg(feature = "parquet")]
 mod parquet;
+mod region;
 
 pub use map::{map_scan, map_scans};
+pub(crate) use region::COMMON;
+pub use region::map_tables;
 
 use crate::results::Results;
 #[cfg(feature = "parquet")]

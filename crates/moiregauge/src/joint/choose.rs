@@ -43,14 +43,11 @@ pub(super) fn terms(problem: &Problem, best: JointFit) -> JointFit {
         };
         choice.offer([gain].into_iter());
     }
-    // The scatter that is left with the chosen terms is the instability.
     let Choice { best, tested, .. } = choice;
-    let from = (&best.waves.basis.clone(), &best.velocity.clone());
-    let last = problem.solve(best.terms, from, None).unwrap_or(best);
     let has = |name| match name {
-        ACCELERATION => last.terms.acceleration,
-        EXPONENTIAL => last.terms.settling.is_some(),
-        _ => last.terms.fast_gain,
+        ACCELERATION => best.terms.acceleration,
+        EXPONENTIAL => best.terms.settling.is_some(),
+        _ => best.terms.fast_gain,
     };
     let tested = tested
         .into_iter()
@@ -60,27 +57,25 @@ pub(super) fn terms(problem: &Problem, best: JointFit) -> JointFit {
             used: has(name),
         })
         .collect();
-    JointFit { tested, ..last }
+    JointFit { tested, ..best }
 }
 
 const ACCELERATION: &str = "acceleration";
 const EXPONENTIAL: &str = "settling";
 const FAST_GAIN: &str = "fast-axis gain";
 
-/// Terms that are offered one after the other; all are compared with the weights of the first fit.
+/// Terms that are offered one after the other, each with the scatter of positions that it leaves.
 struct Choice<'a> {
     problem: &'a Problem,
     best: JointFit,
-    instability: f64,
     lowest: f64,
     tested: Vec<(&'static str, f64)>,
 }
 
 impl<'a> Choice<'a> {
     fn new(problem: &'a Problem, best: JointFit, base: Terms) -> Self {
-        let instability = best.instability_nm;
         let start = (&best.waves.basis.clone(), &best.velocity.clone());
-        let plain = problem.solve(base, start, Some(instability));
+        let plain = problem.solve(base, start, None);
         // Where only a changing drift can be linked there is nothing simpler to compare with.
         let (best, lowest) = match plain {
             Some(fit) => (fit.clone(), criterion(&fit)),
@@ -89,7 +84,6 @@ impl<'a> Choice<'a> {
         Self {
             problem,
             best,
-            instability,
             lowest,
             tested: Vec::new(),
         }
@@ -99,7 +93,7 @@ impl<'a> Choice<'a> {
         let before = self.lowest;
         let from = (&self.best.waves.basis.clone(), &self.best.velocity.clone());
         for terms in candidates {
-            let Some(fit) = self.problem.solve(terms, from, Some(self.instability)) else {
+            let Some(fit) = self.problem.solve(terms, from, None) else {
                 continue;
             };
             let name = if terms.fast_gain {
@@ -127,9 +121,13 @@ impl<'a> Choice<'a> {
     }
 }
 
-/// Bayesian information criterion for given weights. A settling time is a parameter as well.
+/// Bayesian information criterion, up to a constant: −2 ln L and ln n for each parameter. A settling time is a
+/// parameter as well, and so is the scatter of positions, which lowers χ² at the cost of wider distributions: a
+/// drift that changes must not pass for scatter.
 fn criterion(fit: &JointFit) -> f64 {
     let n = (fit.degrees_of_freedom + fit.layout.size) as f64;
-    let parameters = fit.layout.count() + usize::from(fit.terms.settling.is_some());
-    fit.chi2 + parameters as f64 * n.ln()
+    let settling = usize::from(fit.terms.settling.is_some());
+    let scatter = usize::from(fit.instability_nm > 0.0);
+    let parameters = fit.layout.count() + settling + scatter;
+    fit.chi2 + fit.widening + parameters as f64 * n.ln()
 }

@@ -149,6 +149,17 @@ impl PhaseMiss {
         Some((self.noise + shaken).cholesky()?.l())
     }
 
+    /// By how much `scatter` raises the logarithm of the determinant of their covariance.
+    pub(super) fn widening(&self, scatter: f64) -> f64 {
+        let logarithm = |variance| {
+            let diagonal = self.factor(variance)?.diagonal();
+            Some(2.0 * diagonal.iter().map(|d| d.ln()).sum::<f64>())
+        };
+        logarithm(scatter)
+            .zip(logarithm(0.0))
+            .map_or(0.0, |(wide, narrow)| wide - narrow)
+    }
+
     /// The displacement that explains the phases best, nm, and the covariance that noise gives it, nm².
     pub(super) fn displacement(&self) -> Option<(Vector2<f64>, Matrix2<f64>)> {
         let lower = self.factor(0.0)?;

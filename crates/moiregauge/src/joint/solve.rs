@@ -43,6 +43,8 @@ pub struct JointFit {
     pub chi2: f64,
     /// Degrees of freedom of `chi2`.
     pub degrees_of_freedom: usize,
+    /// What the instability adds to the logarithm of the determinant of the covariance of what was measured.
+    pub(super) widening: f64,
     /// The terms that were tried beside a constant drift, and what the criterion said.
     pub tested: Vec<TestedTerm>,
     /// What was fitted, with the blocks of linked scans.
@@ -183,11 +185,12 @@ impl Problem {
             link_outwards(sightings, &layout, &mut x, instability.max(0.02))?;
         }
         let mut unscaled = iterate(sightings, &layout, &mut x, f64::INFINITY, instability)?;
+        let mut scatter = instability * instability;
         if terms.phases && given.is_none() {
             for _ in 0..ROUNDS {
                 let now = linearise(sightings, &layout, &x, f64::INFINITY, instability);
-                let scatter = instability * instability;
                 instability = super::instability::instability(&now, &unscaled, scatter, &|_| true);
+                scatter = instability * instability;
                 unscaled = iterate(sightings, &layout, &mut x, f64::INFINITY, instability)?;
             }
         }
@@ -221,6 +224,7 @@ impl Problem {
             instability_nm: instability,
             chi2,
             degrees_of_freedom,
+            widening: last.phases.iter().map(|p| p.widening(scatter)).sum(),
             tested: Vec::new(),
             sightings: sightings.clone(),
             layout,

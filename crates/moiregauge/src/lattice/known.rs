@@ -7,13 +7,14 @@
 
 use nalgebra::{Complex, Matrix2, Vector2};
 
+use super::LatticeError;
 use super::harmonics::{SHELLS, Windowed};
+use super::prepare::{Prepared, Verdict, binning, levelled, signal_to_noise, verdict};
 use super::reciprocal::{reciprocal, shortest_pair};
 use super::select::{
     Candidate, Orders, Peak, by_score, frame_cycles, score, spectrum_peaks, well_explained,
 };
 use super::transform::Spectrum;
-use super::{LatticeError, Prepared, Verdict, binning, levelled, signal_to_noise, verdict};
 use crate::geometry::Geometry;
 use crate::image::Image;
 use crate::settings::Background;

@@ -7,7 +7,8 @@
 use nalgebra::Matrix2;
 
 use super::fit::middle as median;
-use super::{LatticeError, Prepared, known, levelled, prepare};
+use super::prepare::{Prepared, levelled, prepare};
+use super::{LatticeError, known};
 use crate::background::remove_background;
 use crate::geometry::Geometry;
 use crate::image::Image;

@@ -43,6 +43,24 @@ impl Grid {
         let (column, row) = (node % self.size[0], node / self.size[0]);
         self.origin + self.step * Vector2::new(column as f64, row as f64)
     }
+
+    /// The corners of what it covers, half a step beyond the outer nodes, in order, nm.
+    pub fn corners(&self) -> [Vector2<f64>; 4] {
+        let [columns, rows] = self.size.map(|n| n as f64 - 0.5);
+        [(-0.5, -0.5), (columns, -0.5), (columns, rows), (-0.5, rows)]
+            .map(|(c, r)| self.origin + self.step * Vector2::new(c, r))
+    }
+
+    /// From where to where it reaches along x and along y, nm.
+    pub fn extent(&self) -> [[f64; 2]; 2] {
+        let corners = self.corners();
+        [0, 1].map(|axis| {
+            let along = corners.iter().map(|c| c[axis]);
+            along.fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], v| {
+                [l.min(v), h.max(v)]
+            })
+        })
+    }
 }
 
 /// A local lattice on the sample.

@@ -3,7 +3,8 @@
 use nalgebra::Vector2;
 use spmfile::{Channel, LineDirection, Samples, Scan, Span};
 
-use super::measure::{channels, image_of, nominal, usable_sensors};
+use super::measure::{channels, image_of};
+use super::positions::{nominal, usable_sensors};
 use super::scanner::calibrated;
 use crate::analysis::ScanAnalysis;
 use crate::geometry::{Geometry, Timing};

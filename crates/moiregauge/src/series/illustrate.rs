@@ -2,7 +2,8 @@
 
 use spmfile::{LineDirection, Scan};
 
-use super::measure::{channels, image_of, nominal, sensor_images, usable_sensors};
+use super::measure::{channels, image_of};
+use super::positions::{nominal, sensor_images, usable_sensors};
 use super::scanner::calibrated;
 use crate::analysis::{Illustration, ScanAnalysis};
 use crate::background::remove_background;

@@ -6,7 +6,8 @@ use nalgebra::Matrix2;
 use nalgebra::Vector2;
 use spmfile::{Channel, DateTime, FrameDirection, LineDirection, Scan};
 
-use super::measure::{channels, image_of, nominal, usable_sensors};
+use super::measure::{channels, image_of};
+use super::positions::{nominal, usable_sensors};
 use super::scanner::calibrated;
 use super::sightings::seconds;
 use super::tiling::tile_map;
@@ -98,7 +99,7 @@ pub fn map_scan(
 }
 
 /// How far the sample drifted from `origin` until the scan.
-fn drifted(analysed: &ScanAnalysis, origin: Option<DateTime>) -> Vector2<f64> {
+pub(super) fn drifted(analysed: &ScanAnalysis, origin: Option<DateTime>) -> Vector2<f64> {
     match (analysed.drift, analysed.acquired, origin) {
         (Some(drift), Some(now), Some(then)) => drift * (seconds(now) - seconds(then)),
         _ => Vector2::zeros(),
@@ -112,29 +113,13 @@ fn map_line(
     settings: &Settings,
     (method, resolution): (MapMethod, &Resolution),
 ) -> Result<LineMap, MapError> {
-    let line = channel.line_direction.unwrap_or(LineDirection::Trace);
-    let found = analysed.lines.iter().find(|l| l.line == line);
-    let pixels = found.ok_or(MapError::NoImage)?.pixels.basis;
-    let nominal = nominal(scan, channel);
-    // Doubts about the sensors are in the analysis already.
-    let sensors = usable_sensors(
-        &analysed.file,
-        scan,
-        channel,
-        nominal.as_ref(),
-        &mut Vec::new(),
-    );
-    let geometry = sensors
-        .map(|s| s.geometry)
-        .or(nominal)
-        .ok_or(MapError::NoImage)?;
-    let geometry = calibrated(&geometry, settings);
-    let frame = analysed.frame_direction;
-    let timing = frame.and_then(|frame| Timing::of_scan(scan, channel.columns, frame, line));
-    let still = match (analysed.drift, timing) {
-        (Some(drift), Some(timing)) => Some(at_rest(&geometry, &timing, drift)),
-        _ => None,
-    };
+    let Frame {
+        line,
+        pixels,
+        geometry,
+        timing,
+        still,
+    } = frame(scan, channel, analysed, settings).ok_or(MapError::NoImage)?;
     let reference = Reference {
         pair: reciprocal(&pixels).ok_or(MapError::NoImage)?,
         pitch: pitch(&geometry),
@@ -168,6 +153,53 @@ fn map_line(
     })
 }
 
-fn pitch(geometry: &Geometry) -> [f64; 2] {
+/// A channel with its lattice and its place.
+pub(super) struct Frame {
+    pub(super) line: LineDirection,
+    /// Lattice of the whole image, pixels.
+    pub(super) pixels: Matrix2<f64>,
+    pub(super) geometry: Geometry,
+    pub(super) timing: Option<Timing>,
+    /// The geometry without drift, where the drift is known.
+    pub(super) still: Option<Geometry>,
+}
+
+/// `None` for a channel that was not analysed or has no size.
+pub(super) fn frame(
+    scan: &Scan,
+    channel: &Channel,
+    analysed: &ScanAnalysis,
+    settings: &Settings,
+) -> Option<Frame> {
+    let line = channel.line_direction.unwrap_or(LineDirection::Trace);
+    let found = analysed.lines.iter().find(|l| l.line == line);
+    let pixels = found?.pixels.basis;
+    let nominal = nominal(scan, channel);
+    // Doubts about the sensors are in the analysis already.
+    let sensors = usable_sensors(
+        &analysed.file,
+        scan,
+        channel,
+        nominal.as_ref(),
+        &mut Vec::new(),
+    );
+    let geometry = sensors.map(|s| s.geometry).or(nominal)?;
+    let geometry = calibrated(&geometry, settings);
+    let frame = analysed.frame_direction;
+    let timing = frame.and_then(|frame| Timing::of_scan(scan, channel.columns, frame, line));
+    let still = match (analysed.drift, timing) {
+        (Some(drift), Some(timing)) => Some(at_rest(&geometry, &timing, drift)),
+        _ => None,
+    };
+    Some(Frame {
+        line,
+        pixels,
+        geometry,
+        timing,
+        still,
+    })
+}
+
+pub(super) fn pitch(geometry: &Geometry) -> [f64; 2] {
     [geometry.fast_step().norm(), geometry.slow_step().norm()]
 }

@@ -3,7 +3,8 @@
 use nalgebra::{Matrix2, Vector2};
 use spmfile::Scan;
 
-use super::measure::{channels, nominal, usable_sensors};
+use super::measure::channels;
+use super::positions::{nominal, usable_sensors};
 use crate::geometry::Geometry;
 use crate::settings::Settings;
 

@@ -8,6 +8,7 @@
 //! shows the sample at `r − d(t)`. Nothing is approximated: every pixel has its own time.
 
 mod calendar;
+mod domains;
 mod error;
 mod field;
 mod frame;
@@ -18,6 +19,7 @@ mod truth;
 
 use spmfile::Scan;
 
+pub use domains::DomainScene;
 pub use error::SimulateError;
 pub use field::{Feature, FieldScene, Ripple};
 pub use settings::{Drift, FirstDirection, Noise, Pattern, Raster, Sample, Simulation, Window};

@@ -13,9 +13,10 @@
 
 use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
 
+use super::folded::Bends;
 use super::frame::{BENT, Frame, wave};
 use super::gram::gram;
-use super::model::{Bends, Model};
+use super::model::Model;
 use super::solve;
 
 /// χ² with six degrees of freedom exceeds 22.5 once in a thousand; the noise that it is counted in is

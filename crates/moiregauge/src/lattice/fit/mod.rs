@@ -24,6 +24,7 @@
 mod bend;
 mod choose;
 mod closure;
+mod folded;
 mod frame;
 mod gram;
 mod lines;
@@ -42,11 +43,12 @@ use crate::image::Image;
 use crate::settings::Background;
 pub use bend::Inhomogeneity;
 pub use closure::Closure;
+use folded::{Bends, Folded};
 use frame::{Basis, Frame};
 use gram::gram;
 use lines::LineStatistics;
 pub(super) use model::middle;
-use model::{Bends, Clip, Folded, LineOffsets, Model, Tables, look, settled};
+use model::{Clip, LineOffsets, Model, Tables, look, settled};
 pub use noise::ForeignWave;
 use noise::{Leverage, ResidualNoise};
 

@@ -3,6 +3,7 @@
 use nalgebra::{DVector, Matrix2};
 use rustfft::num_complex::Complex64;
 
+use super::folded::{Folded, widest};
 use super::frame::{Basis, Frame, turns, wave};
 
 /// Residuals beyond this many standard deviations pull no harder (Huber). At 3 the loss of
@@ -33,40 +34,46 @@ pub(super) struct LineOffsets {
 }
 
 /// Values handled together: as many as the compiler keeps in registers.
-const LANES: usize = 8;
-type Block = [f64; LANES];
+pub(super) const LANES: usize = 8;
+pub(super) type Block = [f64; LANES];
 
 /// `cos θ_x` and `sin θ_x` on the right half of a line, in blocks filled up with zeros; the left half is
 /// their mirror image, which saves half of all products.
 pub(super) struct Tables {
-    /// The first block of every harmonic, then the second, and so on.
+    /// The first block of every harmonic, then the second, and so on: for adding them up.
     along: Vec<[Block; 2]>,
+    /// The blocks of each harmonic one after the other: for products with one of them.
+    each: Vec<[Block; 2]>,
     /// `e^{iθ_y}` of each line.
-    up: Vec<Vec<Complex64>>,
+    pub(super) up: Vec<Vec<Complex64>>,
 }
 
 impl Tables {
     pub(super) fn new(frame: &Frame, pair: &Matrix2<f64>, indices: &[[i32; 2]]) -> Self {
         let waves: Vec<_> = indices.iter().map(|&i| wave(pair, i)).collect();
-        let mut along = vec![[[0.0; LANES]; 2]; waves.len() * frame.right().len().div_ceil(LANES)];
-        for (i, p) in waves.iter().enumerate() {
-            let turns = turns(p.x, frame.right());
-            let blocks = along.iter_mut().skip(i).step_by(waves.len());
-            for ([cos, sin], turns) in blocks.zip(turns.chunks(LANES)) {
-                for ((cos, sin), turn) in cos.iter_mut().zip(sin).zip(turns) {
-                    (*cos, *sin) = (turn.re, turn.im);
+        let mut each = Vec::with_capacity(waves.len() * frame.right().len().div_ceil(LANES));
+        for p in &waves {
+            each.extend(turns(p.x, frame.right()).chunks(LANES).map(|turns| {
+                let mut block = [[0.0; LANES]; 2];
+                for (i, turn) in turns.iter().enumerate() {
+                    (block[0][i], block[1][i]) = (turn.re, turn.im);
                 }
-            }
+                block
+            }));
         }
+        let blocks = each.len() / waves.len().max(1);
+        let along = (0..each.len()).map(|i| each[i % waves.len() * blocks + i / waves.len()]);
         Self {
-            along,
+            along: along.collect(),
+            each,
             up: waves.iter().map(|p| turns(p.y, &frame.y)).collect(),
         }
     }
 
     /// The blocks of one harmonic.
-    fn of(&self, harmonic: usize) -> impl Iterator<Item = &[Block; 2]> {
-        self.along.iter().skip(harmonic).step_by(self.up.len())
+    pub(super) fn of(&self, harmonic: usize) -> &[[Block; 2]] {
+        let blocks = self.each.len() / self.up.len();
+        &self.each[harmonic * blocks..][..blocks]
     }
 }
 
@@ -100,9 +107,15 @@ pub(super) fn residual(
         powers[a] += value * y.powi(b as i32);
     }
     let [b0, b1, b2, b3] = powers;
-    for ((out, value), x) in line.iter_mut().zip(frame.image.row(row)).zip(&frame.x) {
-        *out = value - (b0 + x * (b1 + x * (b2 + x * b3)));
-    }
+    let pixels = frame.image.row(row);
+    widest(
+        #[inline(always)]
+        || {
+            for ((out, value), x) in line.iter_mut().zip(pixels).zip(&frame.x) {
+                *out = value - (b0 + x * (b1 + x * (b2 + x * b3)));
+            }
+        },
+    );
     let turned: Vec<[f64; 2]> = model
         .waves
         .iter()
@@ -120,33 +133,43 @@ pub(super) fn residual(
     let mut odd = even.clone();
     add_up(&turned, &tables.along, &mut even, &mut odd);
     let (even, odd) = (even.as_flattened(), odd.as_flattened());
-    for (value, (even, odd)) in left.iter_mut().rev().zip(even.iter().zip(odd)) {
-        *value -= even - odd;
-    }
-    // A middle column is among the left.
-    let sums = even.iter().zip(odd).skip(middle);
-    for (value, (even, odd)) in right.iter_mut().zip(sums) {
-        *value -= even + odd;
-    }
+    widest(
+        #[inline(always)]
+        || {
+            for (value, (even, odd)) in left.iter_mut().rev().zip(even.iter().zip(odd)) {
+                *value -= even - odd;
+            }
+            // A middle column is among the left.
+            let sums = even[middle..].iter().zip(&odd[middle..]);
+            for (value, (even, odd)) in right.iter_mut().zip(sums) {
+                *value -= even + odd;
+            }
+        },
+    );
 }
 
 /// The cosines and the sines of a line, each with its factor, added up block by block. A function of
 /// its own: what is done with the sums must not change the order in which the compiler packs them.
 #[inline(never)]
 fn add_up(factors: &[[f64; 2]], along: &[[Block; 2]], even: &mut [Block], odd: &mut [Block]) {
-    let all = along.chunks_exact(factors.len().max(1));
-    for ((even, odd), blocks) in even.iter_mut().zip(odd).zip(all) {
-        let (mut cosines, mut sines) = ([0.0; LANES], [0.0; LANES]);
-        for ([p, q], [cos, sin]) in factors.iter().zip(blocks) {
-            for (sum, cos) in cosines.iter_mut().zip(cos) {
-                *sum += p * cos;
+    widest(
+        #[inline(always)]
+        || {
+            let all = along.chunks_exact(factors.len().max(1));
+            for ((even, odd), blocks) in even.iter_mut().zip(odd).zip(all) {
+                let (mut cosines, mut sines) = ([0.0; LANES], [0.0; LANES]);
+                for ([p, q], [cos, sin]) in factors.iter().zip(blocks) {
+                    for (sum, cos) in cosines.iter_mut().zip(cos) {
+                        *sum += p * cos;
+                    }
+                    for (sum, sin) in sines.iter_mut().zip(sin) {
+                        *sum += q * sin;
+                    }
+                }
+                (*even, *odd) = (cosines, sines);
             }
-            for (sum, sin) in sines.iter_mut().zip(sin) {
-                *sum += q * sin;
-            }
-        }
-        (*even, *odd) = (cosines, sines);
-    }
+        },
+    );
 }
 
 /// Where residuals are cut off.
@@ -160,6 +183,7 @@ impl Clip {
     }
 
     /// The residual as it counts; missing pixels not at all.
+    #[inline]
     pub(super) fn apply(self, value: f64) -> f64 {
         // Comparisons one by one, which the compiler can do for several pixels at once.
         let below = if value > self.0 { self.0 } else { value };
@@ -167,8 +191,19 @@ impl Clip {
         if within.is_nan() { 0.0 } else { within }
     }
 
-    fn cuts(self, value: f64) -> bool {
-        value.abs() > self.0
+    /// A line as it counts; how many of its residuals are cut off.
+    fn all(self, line: &mut [f64]) -> usize {
+        widest(
+            #[inline(always)]
+            || {
+                let cut = line.iter().map(|v| u64::from(v.abs() > self.0));
+                let cut = cut.sum::<u64>();
+                for value in line.iter_mut() {
+                    *value = self.apply(*value);
+                }
+                cut as usize
+            },
+        )
     }
 }
 
@@ -202,13 +237,7 @@ pub(super) fn look(
         // Every line starts elsewhere, lest the sample sees one column only.
         let picked = line.iter().skip((row * 7) % stride).step_by(stride);
         sample.extend(picked.filter(|v| v.is_finite()).map(|v| v.abs()));
-        clipped += line
-            .iter()
-            .map(|v| usize::from(clip.cuts(*v)))
-            .sum::<usize>();
-        for value in line.iter_mut() {
-            *value = clip.apply(*value);
-        }
+        clipped += clip.all(line);
         folded.take(line);
         add(&mut gradient, frame, (basis, probes), row, &folded);
     });
@@ -243,162 +272,21 @@ fn settle(line: &mut [f64], row: usize, frame: &Frame, lines: &mut LineOffsets, 
 
 /// Sum of what counts of the residuals less `offset`, in eight partial sums.
 fn clipped_sum(line: &[f64], offset: f64, clip: Clip) -> f64 {
-    let blocks = line.chunks_exact(8);
-    let rest: f64 = blocks
-        .remainder()
-        .iter()
-        .map(|v| clip.apply(v - offset))
-        .sum();
-    let mut sums = [0.0; 8];
-    for block in blocks {
-        for (sum, value) in sums.iter_mut().zip(block) {
-            *sum += clip.apply(value - offset);
-        }
-    }
-    sums.iter().sum::<f64>() + rest
-}
-
-/// A line folded about its middle: sums and differences of what lies at X and −X, and both times X.
-pub(super) struct Folded {
-    x: Vec<Block>,
-    even: Vec<Block>,
-    odd: Vec<Block>,
-    tilted_even: Vec<Block>,
-    tilted_odd: Vec<Block>,
-    /// Times X², on request.
-    squared_even: Vec<Block>,
-    squared_odd: Vec<Block>,
-}
-
-impl Folded {
-    pub(super) fn new(frame: &Frame) -> Self {
-        let mut x = vec![[0.0; LANES]; frame.right().len().div_ceil(LANES)];
-        for (value, x) in x.as_flattened_mut().iter_mut().zip(frame.right()) {
-            *value = *x;
-        }
-        let zeros = vec![[0.0; LANES]; x.len()];
-        Self {
-            x,
-            even: zeros.clone(),
-            odd: zeros.clone(),
-            tilted_even: zeros.clone(),
-            tilted_odd: zeros.clone(),
-            squared_even: zeros.clone(),
-            squared_odd: zeros,
-        }
-    }
-
-    pub(super) fn take(&mut self, line: &[f64]) {
-        let half = line.len().div_ceil(2);
-        let (even, odd) = (self.even.as_flattened_mut(), self.odd.as_flattened_mut());
-        let pairs = line[line.len() / 2..].iter().zip(line[..half].iter().rev());
-        for ((right, left), (even, odd)) in pairs.zip(even.iter_mut().zip(odd)) {
-            *even = right + left;
-            *odd = right - left;
-        }
-        if line.len() % 2 == 1 {
-            // The middle is there once.
-            even[0] *= 0.5;
-        }
-        let tilted = self.tilted_even.iter_mut().zip(&mut self.tilted_odd);
-        let plain = self.x.iter().zip(self.even.iter().zip(&self.odd));
-        for ((te, to), (x, (e, o))) in tilted.zip(plain) {
-            for i in 0..LANES {
-                te[i] = x[i] * e[i];
-                to[i] = x[i] * o[i];
-            }
-        }
-    }
-
-    fn square(&mut self) {
-        let squared = self.squared_even.iter_mut().zip(&mut self.squared_odd);
-        let tilted = self.tilted_even.iter().zip(&self.tilted_odd);
-        for ((se, so), (x, (te, to))) in squared.zip(self.x.iter().zip(tilted)) {
-            for i in 0..LANES {
-                se[i] = x[i] * te[i];
-                so[i] = x[i] * to[i];
-            }
-        }
-    }
-
-    /// Sums of the line times `X² cos` and `X² sin`.
-    fn squared_products<'a>(&self, waves: impl Iterator<Item = &'a [Block; 2]>) -> [f64; 2] {
-        let mut sums = [[0.0; LANES]; 2];
-        let squared = self.squared_even.iter().zip(&self.squared_odd);
-        for ((se, so), [cos, sin]) in squared.zip(waves) {
-            for (sum, (a, b)) in sums[0].iter_mut().zip(se.iter().zip(cos)) {
-                *sum += a * b;
-            }
-            for (sum, (a, b)) in sums[1].iter_mut().zip(so.iter().zip(sin)) {
-                *sum += a * b;
-            }
-        }
-        sums.map(|s| s.iter().sum())
-    }
-
-    /// Sums of the line times 1, X, X², X³.
-    fn moments(&self, degree: usize) -> [f64; 4] {
-        let mut moments = [sum(self.even.as_flattened()), 0.0, 0.0, 0.0];
-        moments[1] = sum(self.tilted_odd.as_flattened());
-        if degree > 1 {
-            let tilted = self.tilted_even.iter().zip(&self.tilted_odd);
-            for ((te, to), x) in tilted.zip(&self.x) {
-                for i in 0..LANES {
-                    moments[2] += te[i] * x[i];
-                    moments[3] += to[i] * x[i] * x[i];
+    widest(
+        #[inline(always)]
+        || {
+            let blocks = line.chunks_exact(8);
+            let rest = blocks.remainder().iter();
+            let rest: f64 = rest.map(|v| clip.apply(v - offset)).sum();
+            let mut sums = [0.0; 8];
+            for block in blocks {
+                for (sum, value) in sums.iter_mut().zip(block) {
+                    *sum += clip.apply(value - offset);
                 }
             }
-        }
-        moments
-    }
-
-    /// Sums of the line times `cos`, `sin`, `X cos`, `X sin`, in partial sums that the compiler can
-    /// keep in registers.
-    fn products<'a>(&self, waves: impl Iterator<Item = &'a [Block; 2]>) -> [f64; 4] {
-        const HALF: usize = LANES / 2;
-        let mut sums = [[0.0; HALF]; 4];
-        let add = |sum: &mut [f64; HALF], a: &Block, b: &Block| {
-            for first in [0, HALF] {
-                let pairs = a[first..first + HALF].iter().zip(&b[first..first + HALF]);
-                for (sum, (a, b)) in sum.iter_mut().zip(pairs) {
-                    *sum += a * b;
-                }
-            }
-        };
-        let plain = self.even.iter().zip(&self.odd);
-        let tilted = self.tilted_even.iter().zip(&self.tilted_odd);
-        for (((e, o), (te, to)), [cos, sin]) in plain.zip(tilted).zip(waves) {
-            add(&mut sums[0], e, cos);
-            add(&mut sums[1], o, sin);
-            add(&mut sums[2], to, cos);
-            add(&mut sums[3], te, sin);
-        }
-        sums.map(|s| s.iter().sum())
-    }
-}
-
-/// Correlations of lines with `X² e^{iθ}`, `XY e^{iθ}` and `Y² e^{iθ}` of each harmonic: real parts are
-/// those with cosines, imaginary parts those with sines.
-pub(super) struct Bends(pub(super) Vec<[Complex64; 3]>);
-
-impl Bends {
-    pub(super) fn new(harmonics: usize) -> Self {
-        Self(vec![[Complex64::default(); 3]; harmonics])
-    }
-
-    /// Adds one line.
-    pub(super) fn add(&mut self, frame: &Frame, tables: &Tables, row: usize, line: &mut Folded) {
-        let y = frame.y[row];
-        line.square();
-        for (i, sums) in self.0.iter_mut().enumerate() {
-            let [c, s, xc, xs] = line.products(tables.of(i));
-            let [xxc, xxs] = line.squared_products(tables.of(i));
-            let turn = tables.up[i][row];
-            sums[0] += Complex64::new(xxc, xxs) * turn;
-            sums[1] += Complex64::new(xc, xs) * turn * y;
-            sums[2] += Complex64::new(c, s) * turn * (y * y);
-        }
-    }
+            sums.iter().sum::<f64>() + rest
+        },
+    )
 }
 
 /// Adds the correlation of one line with the basis.
@@ -416,8 +304,7 @@ fn add(
             gradient[t] += moments[a] * y.powi(b as i32);
         }
     }
-    for i in 0..basis.indices.len() {
-        let [c, s, xc, xs] = line.products(tables.of(i));
+    line.all_products(tables, |i, [c, s, xc, xs]| {
         let turn = tables.up[i][row];
         let first = basis.cosine(i);
         let (plain_c, plain_s) = (c * turn.re - s * turn.im, s * turn.re + c * turn.im);
@@ -427,7 +314,7 @@ fn add(
         gradient[first + 3] += xs * turn.re + xc * turn.im;
         gradient[first + 4] += y * plain_c;
         gradient[first + 5] += y * plain_s;
-    }
+    });
 }
 
 /// Sum in eight independent partial sums.
@@ -467,9 +354,7 @@ pub(super) fn settled(
     }
     residual(frame, model, tables, row, line);
     settle(line, row, frame, lines, clip);
-    for value in line {
-        *value = clip.apply(*value);
-    }
+    clip.all(line);
     let lambda = lines.lambda[row];
     if lambda > 0.0 {
         // The mean is o/λ, of which o is off already.

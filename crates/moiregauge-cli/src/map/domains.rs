@@ -1,0 +1,131 @@
+//! Whether nodes and triangles are looked for, and what they say.
+
+use clap::ValueEnum;
+use moiregauge::caveat::Caveat;
+use moiregauge::domains::{Contrast, DomainMap, Regime, RegimeChoice, regime};
+use moiregauge::map::TwistStrainMap;
+
+/// Domain structure at small angles.
+#[derive(clap::Args, Clone, Debug)]
+#[command(next_help_heading = "Domains at small angles")]
+pub(super) struct DomainArgs {
+    /// Look for nodes and the triangles between them: twist and strain of each where the lattice relaxes into
+    /// domains. auto: only where maps of phases are in doubt (twist below 0.5°, fast changes, no good node)
+    #[arg(long, value_enum, default_value_t = When::Auto)]
+    domains: When,
+    /// Whether nodes are bright or dark [default: what the image tells]
+    #[arg(long, value_enum)]
+    nodes: Option<Look>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum When {
+    Auto,
+    On,
+    Off,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Look {
+    Bright,
+    Dark,
+}
+
+/// What was found, and which regime applies.
+#[derive(Clone, Debug)]
+pub(super) struct Domains {
+    pub(super) map: Option<DomainMap>,
+    pub(super) regime: Regime,
+    pub(super) caveats: Vec<Caveat>,
+}
+
+/// Missing and extra nodes beyond this share of all make the mesh doubtful.
+const ODD: f64 = 0.15;
+
+impl DomainArgs {
+    /// Which regime applies; looks for domains if they are wanted. `find` gives those of all images, or is `None` where
+    /// the image is too large to look.
+    pub(super) fn answer(
+        &self,
+        map: &TwistStrainMap,
+        find: Option<impl FnOnce(Contrast) -> Vec<DomainMap>>,
+    ) -> Domains {
+        let before = regime(map, None);
+        let wanted = match self.domains {
+            When::Off => false,
+            When::Auto => before.in_doubt,
+            When::On => true,
+        };
+        let Some(find) = find.filter(|_| wanted) else {
+            let caveats = before.in_doubt.then(|| {
+                let why = format!("{}: they were not looked for", before.reasons.join("; "));
+                Caveat::new("phases-in-doubt", "map", why)
+            });
+            return Domains {
+                map: None,
+                regime: before,
+                caveats: caveats.into_iter().collect(),
+            };
+        };
+        let contrast = match self.nodes {
+            None => Contrast::Auto,
+            Some(Look::Bright) => Contrast::Bright,
+            Some(Look::Dark) => Contrast::Dark,
+        };
+        let found = find(contrast);
+        let images = found.len();
+        let best = found.into_iter().max_by_key(|d| d.cells.len());
+        let regime = regime(map, best.as_ref());
+        let mut caveats = Vec::new();
+        let mut doubt = |code, why: String| caveats.push(Caveat::new(code, "domains", why));
+        if images > 1 {
+            let why = "images show domains; the triangles are those of the one with most of them";
+            doubt("domains-of-one-image", format!("{images} {why}"));
+        }
+        match &best {
+            None => doubt(
+                "no-domains",
+                "no mesh of nodes could be found in the image".to_owned(),
+            ),
+            Some(d) => {
+                if !d.contrast_is_clear && self.nodes.is_none() {
+                    doubt(
+                        "nodes-bright-or-dark",
+                        "the image does not tell whether nodes are bright or dark: triangles may stand on domains \
+                         instead of nodes; say --nodes bright or dark"
+                            .to_owned(),
+                    );
+                }
+                let odd = d.missing.len() + d.extra.len();
+                if odd as f64 > ODD * d.nodes.len() as f64 {
+                    doubt(
+                        "mesh-with-gaps",
+                        format!(
+                            "{odd} of {} nodes are missing or fit into no triangle: the mesh may not be that of the \
+                             lattice",
+                            d.nodes.len()
+                        ),
+                    );
+                }
+            }
+        }
+        if regime.choice == RegimeChoice::Domains {
+            let why = format!(
+                "use the triangles between nodes and not the maps of phases: {}",
+                regime.reasons.join("; ")
+            );
+            caveats.push(Caveat::new("use-domains", "map", why));
+        } else if regime.in_doubt {
+            caveats.push(Caveat::new(
+                "phases-in-doubt",
+                "map",
+                regime.reasons.join("; "),
+            ));
+        }
+        Domains {
+            map: best,
+            regime,
+            caveats,
+        }
+    }
+}

@@ -1,0 +1,377 @@
+//! What is asked of a map: regions, lines, areas for devices, a wanted twist.
+
+use std::fmt::Write as _;
+
+use anyhow::ensure;
+use moiregauge::caveat::Caveat;
+use moiregauge::map::TwistStrainMap;
+use moiregauge::region::{
+    DeviceSearch, Profile, Region, RegionStatistics, WantedArea, WantedTwist, uniform_areas,
+};
+use moiregauge_report::results::{MapDetailsResult, RegionMeanResult};
+use moiregauge_report::{MapDetails, plus_minus, two_digits};
+use nalgebra::Vector2;
+use spmfile::length_nm;
+
+use crate::input::parse_size;
+
+/// Questions about a map. Places are those of the map: x right, y up, nm.
+#[derive(clap::Args, Clone, Debug)]
+#[command(next_help_heading = "Regions of the map")]
+pub(super) struct RegionArgs {
+    /// Mean, spread and errors within a box: lower left corner, width, height; or within a polygon, its corners
+    /// apart by blanks (flake='0,0 100,10 60,80'); nm, or with a unit (bar=0.1um,0.2um,1um,500nm); may be repeated
+    #[arg(long, value_name = "NAME=X,Y,W,H", value_parser = parse_region, allow_hyphen_values = true)]
+    region: Vec<Region>,
+    /// Twist, strain and wavelength along a line; nm, or with a unit; may be repeated
+    #[arg(long, value_name = "NAME=X1,Y1 X2,Y2", value_parser = parse_line, allow_hyphen_values = true)]
+    profile: Vec<Line>,
+    /// The most uniform areas of this size (200nm×100nm): where the twist varies least, ranked
+    #[arg(long, value_name = "W×H", value_parser = parse_size)]
+    device: Option<[f64; 2]>,
+    /// Orientations of the device to try, evenly over half a turn; 1: along x only
+    #[arg(long, value_name = "N", default_value_t = 1, requires = "device",
+        value_parser = clap::value_parser!(u16).range(1..=180))]
+    device_angles: u16,
+    /// How many areas to list
+    #[arg(long, value_name = "N", default_value_t = 10, requires = "device",
+        value_parser = clap::value_parser!(u16).range(1..=1000))]
+    device_count: u16,
+    /// How much of the map has this twist, degrees: 1.05±0.02 or 1.05+-0.02
+    #[arg(long, value_name = "TWIST±DEG", value_parser = parse_wanted)]
+    wanted: Option<WantedTwist>,
+}
+
+/// A line with a name.
+#[derive(Clone, Debug)]
+struct Line {
+    name: String,
+    ends: [Vector2<f64>; 2],
+}
+
+impl RegionArgs {
+    /// Refuses names that are used twice.
+    pub(super) fn check(&self) -> anyhow::Result<()> {
+        let regions: Vec<&str> = self.region.iter().map(|r| r.name.as_str()).collect();
+        let lines: Vec<&str> = self.profile.iter().map(|l| l.name.as_str()).collect();
+        for (option, names) in [("--region", regions), ("--profile", lines)] {
+            for (n, name) in names.iter().enumerate() {
+                ensure!(
+                    !names[..n].contains(name),
+                    "{option}: the name {name:?} is used twice"
+                );
+            }
+        }
+        Ok(())
+    }
+
+    /// The answers, and doubts about them.
+    ///
+    /// # Errors
+    /// Regions and lines beyond the map.
+    pub(super) fn answer(&self, map: &TwistStrainMap) -> anyhow::Result<(MapDetails, Vec<Caveat>)> {
+        let mut doubts = Vec::new();
+        for region in &self.region {
+            within(map, "--region", &region.name, &region.corners)?;
+        }
+        for line in &self.profile {
+            within(map, "--profile", &line.name, &line.ends)?;
+        }
+        let regions: Vec<RegionStatistics> = self
+            .region
+            .iter()
+            .map(|r| RegionStatistics::new(map, r))
+            .collect();
+        for found in &regions {
+            let name = found.region.name.as_str();
+            if found.good == 0 {
+                doubts.push(Caveat::new(
+                    "region-empty",
+                    name,
+                    "the region has no good node: it has no values",
+                ));
+            } else if found.covered < 0.95 || found.masked_share > 0.05 {
+                doubts.push(Caveat::new(
+                    "region-in-part",
+                    name,
+                    format!(
+                        "the map reaches {:.0} % of the region, and {:.0} % of the nodes there are not to be \
+                         believed: its numbers are those of the rest",
+                        100.0 * found.covered,
+                        100.0 * found.masked_share
+                    ),
+                ));
+            }
+        }
+        let devices = self.device.map(|size| {
+            let search = DeviceSearch {
+                orientations: usize::from(self.device_angles),
+                most: usize::from(self.device_count),
+                ..DeviceSearch::new(size)
+            };
+            let [w, h] = size.map(two_digits);
+            let place = format!("device {w} nm × {h} nm");
+            if size[0].min(size[1]) < 2.355 * map.window_nm {
+                doubts.push(Caveat::new(
+                    "device-below-resolution",
+                    place.as_str(),
+                    "the device is narrower than the map resolves: the twist may vary more within it than the \
+                     map shows",
+                ));
+            }
+            let found = uniform_areas(map, &search);
+            if found.is_empty() {
+                doubts.push(Caveat::new(
+                    "device-fits-nowhere",
+                    place,
+                    "no area of this size lies within the map with 95 % of its nodes to be believed",
+                ));
+            }
+            found
+        });
+        let wanted = self
+            .wanted
+            .map(|w| (w, WantedArea::new(map, 0..map.grid.len(), &w)));
+        let profiles = self
+            .profile
+            .iter()
+            .map(|l| Profile::new(map, &l.name, l.ends));
+        let details = MapDetails {
+            regions,
+            profiles: profiles.collect(),
+            devices: devices.unwrap_or_default(),
+            wanted,
+            domains: None,
+            regime: None,
+        };
+        Ok((details, doubts))
+    }
+}
+
+/// An error if none of the places, nor anything between them, can lie in the map.
+fn within(
+    map: &TwistStrainMap,
+    option: &str,
+    name: &str,
+    places: &[Vector2<f64>],
+) -> anyhow::Result<()> {
+    let [x, y] = map.grid.extent();
+    let [u, v] = [0, 1].map(|axis| {
+        let along = places.iter().map(|p| p[axis]);
+        along.fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], v| {
+            [l.min(v), h.max(v)]
+        })
+    });
+    ensure!(
+        u[0] <= x[1] && u[1] >= x[0] && v[0] <= y[1] && v[1] >= y[0],
+        "{option} {name}: x from {:.1} to {:.1} nm, y from {:.1} to {:.1} nm lies outside of the map, which reaches \
+         from {:.1} to {:.1} nm in x and from {:.1} to {:.1} nm in y",
+        u[0],
+        u[1],
+        v[0],
+        v[1],
+        x[0],
+        x[1],
+        y[0],
+        y[1]
+    );
+    Ok(())
+}
+
+/// What is said of them on the screen.
+pub(super) fn summary(details: &MapDetailsResult) -> String {
+    let mut text = String::new();
+    let twist = |found: Option<RegionMeanResult>| {
+        let Some(t) = found else {
+            return "no good node".to_owned();
+        };
+        let known = |v: Option<f64>| v.unwrap_or(f64::NAN);
+        let mean = moiregauge::estimate::Estimate::new(known(t.mean), known(t.sigma));
+        format!(
+            "twist {}°, varies by {}° (below {}°, 95 %)",
+            plus_minus(mean),
+            two_digits(known(t.spread_corrected)),
+            two_digits(known(t.spread_below_95))
+        )
+    };
+    for region in &details.regions {
+        let _ = writeln!(text, "region {}: {}", region.name, twist(region.twist_deg));
+    }
+    for device in &details.devices {
+        let [x, y] = device.centre_nm;
+        let _ = writeln!(
+            text,
+            "area {} at ({x:.1}, {y:.1}) nm, {:.0}°: {}",
+            device.rank,
+            device.angle_deg,
+            twist(device.area.twist_deg)
+        );
+    }
+    if let Some(d) = &details.domains {
+        let known = |v: Option<f64>| v.unwrap_or(f64::NAN);
+        let _ = writeln!(
+            text,
+            "domains: {} {} nodes (± {} nm), {} triangles, {} missing, {} extra, {} dislocations; median twist \
+             {:.4}°, spread {}° (noise {}°)",
+            d.nodes,
+            d.nodes_are,
+            two_digits(known(d.node_sigma_nm)),
+            d.triangles,
+            d.missing_nm.len(),
+            d.extra_nm.len(),
+            d.dislocations.len(),
+            known(d.median_twist_deg),
+            two_digits(known(d.twist_spread_deg)),
+            two_digits(known(d.twist_noise_deg))
+        );
+    }
+    if let Some(r) = &details.regime {
+        let _ = writeln!(text, "regime: {} ({})", r.use_of, r.reasons.join("; "));
+    }
+    if let Some(w) = &details.wanted {
+        let percent = |v: Option<f64>| v.map_or_else(|| "–".to_owned(), |v| format!("{v:.1}"));
+        let _ = writeln!(
+            text,
+            "twist {} ± {}°: {} % of the good area ({} to {} % at 2 σ)",
+            w.twist_deg,
+            w.within_deg,
+            percent(w.corrected_percent),
+            percent(w.certain_percent),
+            percent(w.possible_percent)
+        );
+    }
+    text
+}
+
+/// A length in nm, with or without a unit.
+fn length(text: &str) -> Option<f64> {
+    let text = text.trim();
+    let nm = text.parse().ok().or_else(|| length_nm(text))?;
+    f64::is_finite(nm).then_some(nm)
+}
+
+fn named(text: &str) -> Option<(&str, &str)> {
+    let (name, rest) = text.split_once('=')?;
+    (!name.trim().is_empty()).then_some((name.trim(), rest))
+}
+
+fn parse_region(text: &str) -> Result<Region, String> {
+    let expected = "expected a name and, in nm, a box or the corners of a polygon, as in bar=10,20,80,40 (lower left \
+                    corner, width, height) or 'flake=0,0 100,10 60,80'";
+    let (name, rest) = named(text).ok_or(expected)?;
+    let numbers: Option<Vec<f64>> = rest.split(',').map(length).collect();
+    if let Some(&[x, y, w, h]) = numbers.as_deref() {
+        if !(w > 0.0 && h > 0.0) {
+            return Err(format!(
+                "width and height of a box are above 0, found {w} and {h} nm"
+            ));
+        }
+        return Ok(Region::rectangle(name, Vector2::new(x, y), [w, h]));
+    }
+    let corners = places(rest).ok_or(expected)?;
+    if corners.len() < 3 {
+        return Err(format!(
+            "a polygon has three corners or more, found {}; {expected}",
+            corners.len()
+        ));
+    }
+    let region = Region {
+        name: name.to_owned(),
+        corners,
+    };
+    if region.crosses_itself() || !(region.area() > 0.0) {
+        return Err(
+            "the sides of the polygon cross each other, or it has no area: give its corners in order"
+                .to_owned(),
+        );
+    }
+    Ok(region)
+}
+
+fn places(text: &str) -> Option<Vec<Vector2<f64>>> {
+    let place = |text: &str| {
+        let (x, y) = text.split_once(',')?;
+        Some(Vector2::new(length(x)?, length(y)?))
+    };
+    text.split([' ', ';'])
+        .filter(|t| !t.is_empty())
+        .map(place)
+        .collect()
+}
+
+fn parse_line(text: &str) -> Result<Line, String> {
+    let parsed = || {
+        let (name, rest) = named(text)?;
+        let [a, b] = places(rest)?[..] else {
+            return None;
+        };
+        (a != b).then(|| Line {
+            name: name.to_owned(),
+            ends: [a, b],
+        })
+    };
+    parsed()
+        .ok_or_else(|| "expected a name and two places in nm, as in 'cut=0,0 100,80'".to_owned())
+}
+
+fn parse_wanted(text: &str) -> Result<WantedTwist, String> {
+    let parsed = || {
+        let (twist, within) = text.split_once('±').or_else(|| text.split_once("+-"))?;
+        let degrees = |text: &str| {
+            let number = text.trim().trim_end_matches("deg").trim_end_matches('°');
+            number.trim().parse::<f64>().ok()
+        };
+        let (twist, within) = (degrees(twist)?, degrees(within)?);
+        let good = twist.is_finite() && within > 0.0 && within.is_finite();
+        good.then(|| WantedTwist {
+            twist: twist.to_radians(),
+            within: within.to_radians(),
+        })
+    };
+    parsed()
+        .ok_or_else(|| "expected a twist and a tolerance in degrees, as in 1.05±0.02".to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn questions_in_words() {
+        let region = parse_region("a b=1um,-20nm,3,4.5").expect("a box");
+        assert_eq!(region.name, "a b");
+        assert!((region.area() - 13.5).abs() < 1e-9);
+        assert!((region.corners[0] - Vector2::new(1000.0, -20.0)).norm() < 1e-9);
+        let triangle = parse_region("t=0,0 4,0 0nm,2").expect("a triangle");
+        assert!((triangle.area() - 4.0).abs() < 1e-12);
+        let line = parse_line("cut=0,0 3,4").expect("a line");
+        assert!(((line.ends[1] - line.ends[0]).norm() - 5.0).abs() < 1e-12);
+        for text in [
+            "1.05±0.02",
+            "1.05 +- 0.02",
+            "1.05° ± 0.02°",
+            "1.05deg±0.02deg",
+        ] {
+            let wanted = parse_wanted(text).expect(text);
+            assert!((wanted.twist.to_degrees() - 1.05).abs() < 1e-12);
+            assert!((wanted.within.to_degrees() - 0.02).abs() < 1e-12);
+        }
+        for wrong in [
+            "1,2,3,4",
+            "a=1,2,3",
+            "a=1,2,0,4",
+            "=1,2,3,4",
+            "a=1,2,x,4",
+            "a=1,2,1V,4",
+            "t=0,0 1,1",
+            "t=0,0 1,1 2,2",
+            "bow=0,0 2,2 2,0 0,2",
+        ] {
+            assert!(parse_region(wrong).is_err(), "{wrong}");
+        }
+        let error = parse_region("t=0,0 1,1").unwrap_err();
+        assert!(error.contains("three corners or more, found 2"), "{error}");
+        assert!(parse_line("l=0,0 0,0").is_err() && parse_line("l=0,0").is_err());
+        assert!(parse_wanted("1.05").is_err() && parse_wanted("1±0").is_err());
+    }
+}

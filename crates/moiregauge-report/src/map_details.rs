@@ -1,0 +1,21 @@
+//! What was asked of a map beside the map itself.
+
+use moiregauge::domains::{DomainMap, Regime};
+use moiregauge::region::{Device, Profile, RegionStatistics, WantedArea, WantedTwist};
+
+/// Answers to what was asked of a map.
+#[derive(Clone, Debug, Default)]
+pub struct MapDetails {
+    /// Boxes and polygons.
+    pub regions: Vec<RegionStatistics>,
+    /// Lines.
+    pub profiles: Vec<Profile>,
+    /// The most uniform areas of the wanted size, best first.
+    pub devices: Vec<Device>,
+    /// The twist that is wanted, and how much of the map has it.
+    pub wanted: Option<(WantedTwist, Option<WantedArea>)>,
+    /// Nodes and triangles.
+    pub domains: Option<DomainMap>,
+    /// Whether phases or domains are to be used.
+    pub regime: Option<Regime>,
+}

@@ -1,0 +1,190 @@
+//! A line of an image folded about its middle, and its products with harmonics.
+
+use rustfft::num_complex::Complex64;
+
+use super::frame::Frame;
+use super::model::{Block, LANES, Tables, sum};
+
+/// A line folded about its middle: sums and differences of what lies at X and −X, and both times X.
+pub(super) struct Folded {
+    x: Vec<Block>,
+    even: Vec<Block>,
+    odd: Vec<Block>,
+    tilted_even: Vec<Block>,
+    tilted_odd: Vec<Block>,
+    /// Times X², on request.
+    squared_even: Vec<Block>,
+    squared_odd: Vec<Block>,
+}
+
+impl Folded {
+    pub(super) fn new(frame: &Frame) -> Self {
+        let mut x = vec![[0.0; LANES]; frame.right().len().div_ceil(LANES)];
+        for (value, x) in x.as_flattened_mut().iter_mut().zip(frame.right()) {
+            *value = *x;
+        }
+        let zeros = vec![[0.0; LANES]; x.len()];
+        Self {
+            x,
+            even: zeros.clone(),
+            odd: zeros.clone(),
+            tilted_even: zeros.clone(),
+            tilted_odd: zeros.clone(),
+            squared_even: zeros.clone(),
+            squared_odd: zeros,
+        }
+    }
+
+    pub(super) fn take(&mut self, line: &[f64]) {
+        let half = line.len().div_ceil(2);
+        let (even, odd) = (self.even.as_flattened_mut(), self.odd.as_flattened_mut());
+        widest(
+            #[inline(always)]
+            || {
+                let pairs = line[line.len() / 2..].iter().zip(line[..half].iter().rev());
+                for ((right, left), (even, odd)) in pairs.zip(even.iter_mut().zip(odd)) {
+                    *even = right + left;
+                    *odd = right - left;
+                }
+            },
+        );
+        if line.len() % 2 == 1 {
+            // The middle is there once.
+            even[0] *= 0.5;
+        }
+        let tilted = self.tilted_even.iter_mut().zip(&mut self.tilted_odd);
+        let plain = self.x.iter().zip(self.even.iter().zip(&self.odd));
+        for ((te, to), (x, (e, o))) in tilted.zip(plain) {
+            for i in 0..LANES {
+                te[i] = x[i] * e[i];
+                to[i] = x[i] * o[i];
+            }
+        }
+    }
+
+    fn square(&mut self) {
+        let squared = self.squared_even.iter_mut().zip(&mut self.squared_odd);
+        let tilted = self.tilted_even.iter().zip(&self.tilted_odd);
+        for ((se, so), (x, (te, to))) in squared.zip(self.x.iter().zip(tilted)) {
+            for i in 0..LANES {
+                se[i] = x[i] * te[i];
+                so[i] = x[i] * to[i];
+            }
+        }
+    }
+
+    /// Sums of the line times `X² cos` and `X² sin`.
+    fn squared_products(&self, waves: &[[Block; 2]]) -> [f64; 2] {
+        widest(
+            #[inline(always)]
+            || {
+                let mut sums = [[0.0; LANES]; 2];
+                let squared = self.squared_even.iter().zip(&self.squared_odd);
+                for ((se, so), [cos, sin]) in squared.zip(waves) {
+                    for (sum, (a, b)) in sums[0].iter_mut().zip(se.iter().zip(cos)) {
+                        *sum += a * b;
+                    }
+                    for (sum, (a, b)) in sums[1].iter_mut().zip(so.iter().zip(sin)) {
+                        *sum += a * b;
+                    }
+                }
+                sums.map(|s| s.iter().sum())
+            },
+        )
+    }
+
+    /// Sums of the line times 1, X, X², X³.
+    pub(super) fn moments(&self, degree: usize) -> [f64; 4] {
+        let mut moments = [sum(self.even.as_flattened()), 0.0, 0.0, 0.0];
+        moments[1] = sum(self.tilted_odd.as_flattened());
+        if degree > 1 {
+            let tilted = self.tilted_even.iter().zip(&self.tilted_odd);
+            for ((te, to), x) in tilted.zip(&self.x) {
+                for i in 0..LANES {
+                    moments[2] += te[i] * x[i];
+                    moments[3] += to[i] * x[i] * x[i];
+                }
+            }
+        }
+        moments
+    }
+
+    /// Sums of the line times `cos`, `sin`, `X cos`, `X sin` of some harmonics, in partial sums that the
+    /// compiler can keep in registers.
+    fn products<const N: usize>(&self, waves: [&[[Block; 2]]; N]) -> [[f64; 4]; N] {
+        const HALF: usize = LANES / 2;
+        widest(
+            #[inline(always)]
+            || {
+                let n = self.even.len();
+                let (even, odd) = (&self.even[..n], &self.odd[..n]);
+                let (tilted_even, tilted_odd) = (&self.tilted_even[..n], &self.tilted_odd[..n]);
+                let waves = waves.map(|blocks| &blocks[..n]);
+                let mut sums = [[[0.0; HALF]; 4]; N];
+                for block in 0..n {
+                    for half in [0, HALF] {
+                        let part = |values: &[Block]| -> [f64; HALF] {
+                            std::array::from_fn(|i| values[block][half + i])
+                        };
+                        let (e, o) = (part(even), part(odd));
+                        let (te, to) = (part(tilted_even), part(tilted_odd));
+                        for (sums, wave) in sums.iter_mut().zip(waves) {
+                            let [cos, sin] = &wave[block];
+                            for i in 0..HALF {
+                                sums[0][i] += e[i] * cos[half + i];
+                                sums[1][i] += o[i] * sin[half + i];
+                                sums[2][i] += to[i] * cos[half + i];
+                                sums[3][i] += te[i] * sin[half + i];
+                            }
+                        }
+                    }
+                }
+                sums.map(|sums| sums.map(|s| s.iter().sum()))
+            },
+        )
+    }
+
+    /// The same for all harmonics, two at a time.
+    pub(super) fn all_products(&self, tables: &Tables, mut each: impl FnMut(usize, [f64; 4])) {
+        let harmonics = tables.up.len();
+        for i in (0..harmonics - harmonics % 2).step_by(2) {
+            let [first, second] = self.products([tables.of(i), tables.of(i + 1)]);
+            each(i, first);
+            each(i + 1, second);
+        }
+        if harmonics % 2 == 1 {
+            let [last] = self.products([tables.of(harmonics - 1)]);
+            each(harmonics - 1, last);
+        }
+    }
+}
+
+/// Correlations of lines with `X² e^{iθ}`, `XY e^{iθ}` and `Y² e^{iθ}` of each harmonic: real parts are
+/// those with cosines, imaginary parts those with sines.
+pub(super) struct Bends(pub(super) Vec<[Complex64; 3]>);
+
+impl Bends {
+    pub(super) fn new(harmonics: usize) -> Self {
+        Self(vec![[Complex64::default(); 3]; harmonics])
+    }
+
+    /// Adds one line.
+    pub(super) fn add(&mut self, frame: &Frame, tables: &Tables, row: usize, line: &mut Folded) {
+        let y = frame.y[row];
+        line.square();
+        line.all_products(tables, |i, [c, s, xc, xs]| {
+            let [xxc, xxs] = line.squared_products(tables.of(i));
+            let (turn, sums) = (tables.up[i][row], &mut self.0[i]);
+            sums[0] += Complex64::new(xxc, xxs) * turn;
+            sums[1] += Complex64::new(xc, xs) * turn * y;
+            sums[2] += Complex64::new(c, s) * turn * (y * y);
+        });
+    }
+}
+
+/// Runs a loop that is compiled for the widest vectors that this machine has. Products and sums stay separate
+/// and in their order, so that all machines give the same bits.
+#[inline]
+pub(super) fn widest<R>(work: impl FnOnce() -> R) -> R {
+    pulp::Arch::new().dispatch(work)
+}

@@ -1,0 +1,236 @@
+//! The most uniform areas of a given size: where to put a device.
+//!
+//! Every node is tried as the centre, in every wanted orientation, by running sums along the rows of nodes. Areas
+//! are ranked by the twist spread that they do not exceed (95 %, noise taken off), so that neither a noisy
+//! area nor one that noise makes look smooth comes first; areas that overlap a better one are left out.
+
+use nalgebra::Vector2;
+use rayon::prelude::*;
+
+use super::Region;
+use super::correlation::pairs;
+use super::statistics::{RegionMean, RegionStatistics};
+use crate::map::{Grid, Mask, TwistStrainMap};
+
+/// What is looked for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DeviceSearch {
+    /// Length and width, nm.
+    pub size: [f64; 2],
+    /// Orientations to try, evenly over half a turn, the first along x.
+    pub orientations: usize,
+    /// How many areas are wanted at most.
+    pub most: usize,
+    /// Share of the nodes within that have to be good.
+    pub good: f64,
+}
+
+impl DeviceSearch {
+    /// Along x only, the ten best, 95 % of the nodes good.
+    pub fn new(size: [f64; 2]) -> Self {
+        Self {
+            size,
+            orientations: 1,
+            most: 10,
+            good: 0.95,
+        }
+    }
+}
+
+/// An area for a device.
+#[derive(Clone, Debug)]
+pub struct Device {
+    /// Centre, nm.
+    pub centre: Vector2<f64>,
+    /// Direction of the first side, rad in [0, π).
+    pub angle: f64,
+    /// The area in numbers.
+    pub found: RegionStatistics,
+}
+
+/// The most uniform areas, best first; empty where none fits into the map.
+pub fn uniform_areas(map: &TwistStrainMap, search: &DeviceSearch) -> Vec<Device> {
+    let sums = RunningSums::new(map);
+    let mut candidates: Vec<(f64, usize, usize)> = Vec::new();
+    let angles: Vec<f64> = (0..search.orientations.max(1))
+        .map(|i| std::f64::consts::PI * i as f64 / search.orientations.max(1) as f64)
+        .collect();
+    for (turn, &angle) in angles.iter().enumerate() {
+        let Some(shape) = Shape::new(&map.grid, search.size, angle) else {
+            continue;
+        };
+        let Some(middle) = shape.nodes_about(&map.grid) else {
+            continue;
+        };
+        let pairs = pairs(&map.grid, &evenly(&middle), map.window_nm);
+        let found: Vec<(f64, usize)> = (0..map.grid.len())
+            .into_par_iter()
+            .filter_map(|node| {
+                let (sum, all) = sums.within(&shape, node)?;
+                if sum[0] < search.good * all || sum[0] < 1.0 {
+                    return None;
+                }
+                let below = RegionMean::of_sums(sum, &pairs)?.below;
+                below.is_finite().then_some((below, node))
+            })
+            .collect();
+        candidates.extend(found.into_iter().map(|(below, node)| (below, turn, node)));
+    }
+    candidates.sort_by(|a, b| a.0.total_cmp(&b.0).then((a.1, a.2).cmp(&(b.1, b.2))));
+    let mut chosen: Vec<Device> = Vec::new();
+    for (_, turn, node) in candidates {
+        if chosen.len() >= search.most {
+            break;
+        }
+        let (centre, angle) = (map.grid.place(node), angles[turn]);
+        let free = chosen
+            .iter()
+            .all(|other| apart(search.size, (centre, angle), (other.centre, other.angle)));
+        if free {
+            let name = (chosen.len() + 1).to_string();
+            let region = Region::turned_rectangle(&name, centre, search.size, angle);
+            chosen.push(Device {
+                centre,
+                angle,
+                found: RegionStatistics::new(map, &region),
+            });
+        }
+    }
+    chosen
+}
+
+/// Equal weights.
+fn evenly(nodes: &[usize]) -> Vec<(usize, f64)> {
+    let weight = 1.0 / nodes.len().max(1) as f64;
+    nodes.iter().map(|&n| (n, weight)).collect()
+}
+
+/// The nodes of a box about a node: for each row of the grid, the first and the last column.
+struct Shape {
+    /// Rows above the middle one, columns from the middle one.
+    rows: Vec<(i64, [i64; 2])>,
+}
+
+impl Shape {
+    /// `None` where the grid is flat or the box holds no node.
+    fn new(grid: &Grid, size: [f64; 2], angle: f64) -> Option<Self> {
+        let inverse = grid.step.try_inverse()?;
+        // Half a node more on every side: cells that are covered in part count.
+        let size = size.map(|s| s + grid.step.determinant().abs().sqrt());
+        let region = Region::turned_rectangle("", Vector2::zeros(), size, angle);
+        let rows = region.corners.iter().map(|c| (inverse * c).y.abs());
+        let most = rows.fold(0.0, f64::max).ceil().min(grid.size[1] as f64) as i64;
+        let reach = region.corners.iter().map(|c| (inverse * c).x.abs());
+        let wide = reach.fold(0.0, f64::max).ceil().min(grid.size[0] as f64) as i64;
+        let inside = |column: i64, row: i64| {
+            region.contains(grid.step * Vector2::new(column as f64, row as f64))
+        };
+        let rows = (-most..=most).filter_map(|row| {
+            let mut columns = (-wide..=wide).filter(|&c| inside(c, row));
+            let first = columns.next()?;
+            Some((row, [first, columns.last().unwrap_or(first)]))
+        });
+        let rows: Vec<_> = rows.collect();
+        (!rows.is_empty()).then_some(Self { rows })
+    }
+
+    /// The nodes of the box somewhere in the grid; `None` where it does not fit.
+    fn nodes_about(&self, grid: &Grid) -> Option<Vec<usize>> {
+        let bounds = |values: &mut dyn Iterator<Item = i64>| {
+            values.fold((i64::MAX, i64::MIN), |(a, b), v| (a.min(v), b.max(v)))
+        };
+        let (bottom, top) = bounds(&mut self.rows.iter().map(|r| r.0));
+        let (left, right) = bounds(&mut self.rows.iter().flat_map(|r| r.1));
+        if top - bottom >= grid.size[1] as i64 || right - left >= grid.size[0] as i64 {
+            return None;
+        }
+        let nodes = self.rows.iter().flat_map(|&(row, [first, last])| {
+            let start = (row - bottom) * grid.size[0] as i64 - left;
+            (start + first..=start + last).map(|n| n as usize)
+        });
+        Some(nodes.collect())
+    }
+}
+
+/// Sums along each row of nodes: good nodes, their twist, its square and the variance of its noise.
+struct RunningSums {
+    size: [usize; 2],
+    sums: Vec<[f64; 4]>,
+}
+
+impl RunningSums {
+    fn new(map: &TwistStrainMap) -> Self {
+        let size = map.grid.size;
+        let good = |n: usize| map.mask[n] == Mask::Good && map.twist.value[n].is_finite();
+        let (total, count) = (0..map.grid.len())
+            .filter(|&n| good(n))
+            .fold((0.0, 0.0f64), |(s, c), n| {
+                (s + map.twist.at(n).value, c + 1.0)
+            });
+        // Against the mean, so that squares keep their digits.
+        let mean = total / count.max(1.0);
+        let mut sums = Vec::with_capacity(size[1] * (size[0] + 1));
+        for row in 0..size[1] {
+            let mut sum = [0.0; 4];
+            sums.push(sum);
+            for node in row * size[0]..(row + 1) * size[0] {
+                if good(node) {
+                    let twist = map.twist.at(node);
+                    let value = twist.value - mean;
+                    let new = [1.0, value, value * value, twist.sigma * twist.sigma];
+                    sum.iter_mut().zip(new).for_each(|(s, n)| *s += n);
+                }
+                sums.push(sum);
+            }
+        }
+        Self { size, sums }
+    }
+
+    /// The sums over a box about a node and the number of its nodes; `None` where it leaves the map.
+    fn within(&self, shape: &Shape, node: usize) -> Option<([f64; 4], f64)> {
+        let [columns, rows] = self.size.map(|n| n as i64);
+        let (column, row) = (node as i64 % columns, node as i64 / columns);
+        let (mut sum, mut all) = ([0.0; 4], 0);
+        for &(up, [first, last]) in &shape.rows {
+            let (row, first, last) = (row + up, column + first, column + last);
+            if !(0..rows).contains(&row) || first < 0 || last >= columns {
+                return None;
+            }
+            let line = row * (columns + 1);
+            let (from, to) = (
+                self.sums[(line + first) as usize],
+                self.sums[(line + last + 1) as usize],
+            );
+            for i in 0..4 {
+                sum[i] += to[i] - from[i];
+            }
+            all += last - first + 1;
+        }
+        Some((sum, all as f64))
+    }
+}
+
+/// Whether two boxes of the same size do not overlap: some side of one separates them.
+fn apart(
+    size: [f64; 2],
+    (a, angle_a): (Vector2<f64>, f64),
+    (b, angle_b): (Vector2<f64>, f64),
+) -> bool {
+    let one = Region::turned_rectangle("", a, size, angle_a).corners;
+    let other = Region::turned_rectangle("", b, size, angle_b).corners;
+    [angle_a, angle_b]
+        .into_iter()
+        .flat_map(|t| [t, t + std::f64::consts::FRAC_PI_2])
+        .any(|t| {
+            let axis = Vector2::new(t.cos(), t.sin());
+            let ends = |corners: &[Vector2<f64>]| {
+                let along = corners.iter().map(|c| c.dot(&axis));
+                along.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| {
+                    (l.min(x), h.max(x))
+                })
+            };
+            let ((low, high), (from, to)) = (ends(&one), ends(&other));
+            let slack = 1e-9 * (size[0] + size[1]);
+            high <= from + slack || to <= low + slack
+        })
+}
