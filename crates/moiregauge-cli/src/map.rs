@@ -14,7 +14,9 @@ use clap::ValueEnum;
 use moiregauge::analysis::Axis;
 use moiregauge::caveat::Caveat;
 use moiregauge::domains::{Contrast, DomainMap};
-use moiregauge::map::{DriftChange, LatticeMap, Resolution, TwistStrainMap, combine, drift_change};
+use moiregauge::map::{
+    DriftChange, LatticeMap, Resolution, TwistStrainMap, combine, drift_change, register,
+};
 use moiregauge::series::{LineMap, MapMethod, domains_of_scan, map_scan};
 use moiregauge::settings::Settings;
 use moiregauge_report::{FailedInput, Provenance};
@@ -58,7 +60,7 @@ pub(crate) struct MapArgs {
     /// Distance of the nodes, nm [default: a third of the window, a quarter of a tile]
     #[arg(long, value_name = "NM")]
     step: Option<f64>,
-    /// Map in bands, as images of more than 20 million pixels are; one file at a time
+    /// Map in bands, as images of more than 20 million pixels are; several files are put side by side
     #[arg(long)]
     in_bands: bool,
     /// Margin at the edges, in windows
@@ -69,6 +71,9 @@ pub(crate) struct MapArgs {
     #[command(flatten)]
     domains: domains::DomainArgs,
 }
+
+/// Shifts beyond this share of a period may belong to another one.
+const FAR: f64 = 0.3;
 
 /// How local lattices are measured.
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -128,6 +133,7 @@ pub(crate) fn run(args: &MapArgs) -> anyhow::Result<ExitCode> {
     let lost = failures(&made.provenance.failed);
     let complete = made.provenance.failed.is_empty();
     write(&made, args)?;
+    survey::forget(out);
     eprint!("{lost}");
     Ok(if complete {
         ExitCode::SUCCESS
@@ -136,47 +142,75 @@ pub(crate) fn run(args: &MapArgs) -> anyhow::Result<ExitCode> {
     })
 }
 
-/// Maps a single image that is too large for memory; `None` for others.
+/// Maps images that are too large for memory, side by side; `None` where the first is not large.
 fn survey(
     args: &MapArgs,
     inputs: &[PathBuf],
     (settings, known, resolution): (&Settings, &Known, &Resolution),
 ) -> anyhow::Result<Option<Made>> {
+    let open = |path: &PathBuf, always: bool| {
+        survey::Large::open(path, settings, known, always)
+            .with_context(|| path.display().to_string())
+    };
+    // One large image makes a survey of all.
+    let mut any = args.in_bands;
     for path in inputs {
-        let large = survey::Large::open(path, settings, known, args.in_bands)
+        any = any || open(path, false)?.is_some();
+    }
+    if !any {
+        return Ok(None);
+    }
+    let (out, loud) = (args.analyze.out(), args.analyze.is_loud());
+    let (mut maps, mut images, mut caveats) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut read, mut first) = (Vec::new(), None);
+    for path in inputs {
+        let large = open(path, true)?.context("no image")?;
+        let (map, plan) = large
+            .map((settings, resolution), first.as_ref(), out, loud)
             .with_context(|| path.display().to_string())?;
-        let Some(large) = large else { continue };
-        survey::alone(inputs)?;
-        let (out, loud) = (args.analyze.out(), args.analyze.is_loud());
-        let (map, plan) = large.map(settings, resolution, out, loud)?;
         let file = large.input.file.clone();
-        let mut caveats = vec![Caveat::new(
+        let drift = if plan.drift_corrected {
+            "corrected for the drift that was given"
+        } else if settings.drift.is_some() {
+            "not corrected for the drift that was given (the file tells no line rate and frame direction)"
+        } else {
+            "without correction for drift"
+        };
+        caveats.push(Caveat::new(
             "survey",
             file.as_str(),
-            "the image was mapped in bands, with nominal positions, without correction for drift, and without \
-             displacements",
-        )];
-        let look = None::<fn(Contrast) -> Vec<DomainMap>>;
-        let domains = args.domains.answer(&map, look);
-        caveats.extend(domains.caveats.iter().cloned());
-        return Ok(Some(Made {
-            caveats,
-            provenance: Provenance {
-                version: env!("CARGO_PKG_VERSION").to_owned(),
-                seed: settings.seed,
-                inputs: vec![large.input],
-                failed: Vec::new(),
-            },
-            settings: settings.clone(),
-            images: vec![output::image(&file, None, false, &plan.harmonics)],
-            map,
-            whole: None,
-            agreement: None,
-            drift_change: None,
-            domains,
-        }));
+            format!("the image was mapped in bands, with nominal positions, {drift}, and without displacements"),
+        ));
+        images.push(output::image(
+            &file,
+            None,
+            plan.drift_corrected,
+            &plan.harmonics,
+        ));
+        maps.push(map);
+        read.push(large.input);
+        first.get_or_insert(plan);
     }
-    Ok(None)
+    let map = TwistStrainMap::side_by_side(maps).context("no image")?;
+    let look = None::<fn(Contrast) -> Vec<DomainMap>>;
+    let domains = args.domains.answer(&map, look);
+    caveats.extend(domains.caveats.iter().cloned());
+    Ok(Some(Made {
+        caveats,
+        provenance: Provenance {
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            seed: settings.seed,
+            inputs: read,
+            failed: Vec::new(),
+        },
+        settings: settings.clone(),
+        images,
+        map,
+        whole: None,
+        agreement: None,
+        drift_change: None,
+        domains,
+    }))
 }
 
 /// Analyses all scans, maps them, and averages.
@@ -225,6 +259,8 @@ fn together(
             }),
         }
     }
+    let mut caveats = analysis.caveats.clone();
+    registered(&mut maps, &mut caveats);
     let all: Vec<&LatticeMap> = maps.iter().map(|m| &m.map).collect();
     let Some((lattices, agreement)) = combine(&all) else {
         eprint!("{}", failures(&provenance.failed));
@@ -232,7 +268,6 @@ fn together(
     };
     let reference = maps[0].whole;
     let (layers, convention) = (settings.bilayer(), settings.strain_convention);
-    let mut caveats = analysis.caveats.clone();
     let found = lattices
         .twist_strain(&reference, layers, convention)
         .unwrap_or_else(|why| {
@@ -243,13 +278,7 @@ fn together(
             ));
             vec![None; lattices.nodes.len()]
         });
-    if maps.iter().any(|m| !m.drift_corrected) {
-        caveats.push(Caveat::new(
-            "map-not-drift-corrected",
-            "map",
-            "the drift of some images is not known: it stretches and shears their maps, the same everywhere",
-        ));
-    }
+    doubts(&maps, &mut caveats);
     let drift_change = change(&maps);
     if let Some(found) = drift_change.filter(DriftChange::stands_out) {
         let [x, y] = found
@@ -291,6 +320,46 @@ fn together(
         drift_change,
         caveats,
     })
+}
+
+/// What is not as good as it could be.
+fn doubts(maps: &[LineMap], caveats: &mut Vec<Caveat>) {
+    if maps.iter().any(|m| !m.drift_corrected) {
+        caveats.push(Caveat::new(
+            "map-not-drift-corrected",
+            "map",
+            "the drift of some images is not known: it stretches and shears their maps, the same everywhere",
+        ));
+    }
+    if let Some(guessed) = maps.iter().find(|m| !m.noise_measured) {
+        caveats.push(Caveat::new(
+            "map-noise-guessed",
+            guessed.file.as_str(),
+            "the frame holds too few periods to see noise between the harmonics: the errors of the map are those of \
+             what the lattice leaves of the variance of the image, enlarged where the harmonics disagree by more",
+        ));
+    }
+}
+
+/// Puts the maps on each other by the phases of the pattern.
+fn registered(maps: &mut [LineMap], caveats: &mut Vec<Caveat>) {
+    let mut all: Vec<&mut LatticeMap> = maps.iter_mut().map(|m| &mut m.map).collect();
+    let found = register(&mut all);
+    for (map, found) in maps.iter().zip(found) {
+        let Some(found) = found.filter(|f| f.of_period > FAR) else {
+            continue;
+        };
+        let [x, y] = found.shift.map(moiregauge_report::plus_minus);
+        caveats.push(Caveat::new(
+            "map-registration",
+            map.file.as_str(),
+            format!(
+                "by its phases the pattern stands ({x}, {y}) nm from where time and drift put it, {} of a period: it \
+                 may have been put on the wrong period",
+                moiregauge_report::two_digits(found.of_period)
+            ),
+        ));
+    }
 }
 
 /// Compares upward with downward frames of one slow axis.

@@ -88,6 +88,13 @@ pub struct GivenDrift {
     pub sigma_nm_per_min: f64,
 }
 
+impl GivenDrift {
+    /// The velocity of the sample, nm/s.
+    pub fn velocity(&self) -> nalgebra::Vector2<f64> {
+        nalgebra::Vector2::new(self.x_nm_per_min, self.y_nm_per_min) / 60.0
+    }
+}
+
 /// Which vector of an atomic lattice an orientation is that of.
 #[derive(
     Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,

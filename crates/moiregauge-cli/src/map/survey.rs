@@ -4,15 +4,16 @@
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context as _, ensure};
+use anyhow::Context as _;
 use indicatif::{ProgressBar, ProgressStyle};
-use moiregauge::geometry::Geometry;
+use moiregauge::geometry::{Geometry, Timing};
 use moiregauge::map::{Mask, Resolution, TwistStrainMap};
 use moiregauge::series::{SurveyPlan, choose_channel, nominal_geometry};
 use moiregauge::settings::Settings;
 use moiregauge_report::InputFile;
 use nalgebra::{Matrix2, Vector2};
 use sha2::{Digest as _, Sha256};
+use spmfile::{Channel, LineDirection, Scan};
 
 use super::source::{Array, Source};
 use crate::input::Known;
@@ -24,6 +25,8 @@ const LARGE: usize = 4096 * 4096 * 5 / 4;
 pub(super) struct Large {
     pub(super) input: InputFile,
     geometry: Geometry,
+    /// Where the file tells its line rate and frame direction.
+    pub(super) timing: Option<Timing>,
     source: Source,
 }
 
@@ -48,11 +51,13 @@ impl Large {
                 .context("the array holds no image")?
                 .clone();
             channel.rows = array.size[0];
+            let timing = timing(&scan, &channel);
             let geometry = nominal_geometry(&scan, &channel)
                 .context("the array has no size; give it with --size")?;
             return Ok(Some(Self {
                 input: identity(path)?,
                 geometry,
+                timing,
                 source: Source::Array(array),
             }));
         }
@@ -81,24 +86,27 @@ impl Large {
         Ok(Some(Self {
             input: identity(path)?,
             geometry,
+            timing: timing(&reading.scan, channel),
             source: Source::Memory(channel.clone()),
         }))
     }
 
-    /// Maps band by band; `resume` keeps finished bands in `out` and takes those of an earlier run.
+    /// Maps band by band, as `first` of the same survey was. Finished bands are kept in `out`, and those of an
+    /// earlier run are taken; [`forget`] removes them when all is written.
     pub(super) fn map(
         &self,
-        settings: &Settings,
-        resolution: &Resolution,
+        (settings, resolution): (&Settings, &Resolution),
+        first: Option<&SurveyPlan>,
         out: &Path,
         loud: bool,
     ) -> anyhow::Result<(TwistStrainMap, SurveyPlan)> {
         let read = |block| self.source.block(block);
-        let plan = SurveyPlan::new(&self.geometry, settings, resolution, &read)?;
+        let place = (&self.geometry, self.timing.as_ref());
+        let plan = SurveyPlan::new(place, (settings, resolution), first, &read)?;
         let folder = out.join("bands");
         std::fs::create_dir_all(&folder)
             .with_context(|| format!("cannot make the folder {}", folder.display()))?;
-        let key = key(&self.input, settings, resolution)?;
+        let key = key(&self.input, settings, resolution, &plan)?;
         let progress = progress(plan.bands(), loud);
         let mut whole: Option<TwistStrainMap> = None;
         for band in 0..plan.bands() {
@@ -116,9 +124,18 @@ impl Large {
         }
         progress.finish_and_clear();
         let whole = whole.context("the image has no lines")?;
-        std::fs::remove_dir_all(&folder).ok();
         Ok((whole, plan))
     }
+}
+
+/// Removes the bands.
+pub(super) fn forget(out: &Path) {
+    std::fs::remove_dir_all(out.join("bands")).ok();
+}
+
+fn timing(scan: &Scan, channel: &Channel) -> Option<Timing> {
+    let line = channel.line_direction.unwrap_or(LineDirection::Trace);
+    Timing::of_scan(scan, channel.columns, scan.frame_direction?, line)
 }
 
 /// The file by its content, read piece by piece.
@@ -142,10 +159,16 @@ fn identity(path: &Path) -> anyhow::Result<InputFile> {
     })
 }
 
-/// What a band depends on: input, settings, resolution, program.
-fn key(input: &InputFile, settings: &Settings, resolution: &Resolution) -> anyhow::Result<String> {
+/// What a band depends on: input, settings, resolution, the first image of the survey (window and labelling), program.
+fn key(
+    input: &InputFile,
+    settings: &Settings,
+    resolution: &Resolution,
+    plan: &SurveyPlan,
+) -> anyhow::Result<String> {
     let mut hash = Sha256::new();
     hash.update(&input.sha256);
+    hash.update(format!("{} {}", plan.window_nm, plan.whole));
     hash.update(serde_json::to_vec(settings)?);
     hash.update(format!("{resolution:?} {}", env!("CARGO_PKG_VERSION")));
     Ok(crate::analyze::hexadecimal(&hash.finalize())[..16].to_owned())
@@ -227,14 +250,4 @@ fn progress(bands: usize, loud: bool) -> ProgressBar {
         Ok(style) => bar.with_style(style),
         Err(_) => bar,
     }
-}
-
-/// An error if several files are given and one of them is large.
-pub(super) fn alone(inputs: &[PathBuf]) -> anyhow::Result<()> {
-    ensure!(
-        inputs.len() == 1,
-        "images of more than {LARGE} pixels are mapped one at a time; {} files were given",
-        inputs.len()
-    );
-    Ok(())
 }

@@ -1,6 +1,7 @@
 //! Maps from the command line: whole, in bands, by tiles.
 
 use std::path::Path;
+use std::process::Command;
 
 use moiregauge::image::Image;
 use moiregauge::simulate::{DomainScene, FieldScene};
@@ -40,28 +41,24 @@ fn written(folder: &Path, image: &Image) -> String {
     path.display().to_string()
 }
 
-fn map(folder: &Path, name: &str, options: &[&str]) -> Value {
-    let file = array(folder);
-    let out = folder.join(name).display().to_string();
+/// The command that maps it.
+pub(crate) fn command(folder: &Path, name: &str, options: &[&str]) -> Command {
     let side = SIDE as f64 * PITCH;
     let size = format!("{side}nm×{side}nm");
-    let mut args = vec![
-        "map",
-        &file,
-        "--out",
-        &out,
-        "--size",
-        &size,
-        "--no-report",
-        "--quiet",
-    ];
-    args.extend(options);
-    succeed(program().args(&args));
+    let mut command = program();
+    command.arg("map").arg(array(folder)).arg("--out");
+    command.arg(folder.join(name)).args(["--size", &size]);
+    command.args(["--no-report", "--quiet"]).args(options);
+    command
+}
+
+pub(crate) fn map(folder: &Path, name: &str, options: &[&str]) -> Value {
+    succeed(&mut command(folder, name, options));
     let text = std::fs::read(folder.join(name).join("map.json")).expect("map.json");
     serde_json::from_slice(&text).expect("JSON")
 }
 
-fn quantity<'a>(results: &'a Value, name: &str) -> &'a Value {
+pub(crate) fn quantity<'a>(results: &'a Value, name: &str) -> &'a Value {
     let all = results["quantities"].as_array().expect("quantities");
     all.iter().find(|q| q["name"] == name).expect(name)
 }

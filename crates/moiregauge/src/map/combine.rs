@@ -121,6 +121,18 @@ impl<'a> View<'a> {
         Some(Self { map, inverse })
     }
 
+    /// The node next to a place within the map, and where it lies.
+    pub(super) fn nearest(&self, place: Vector2<f64>) -> Option<(&'a LatticeNode, Vector2<f64>)> {
+        let grid = &self.map.grid;
+        let t = (self.inverse * (place - grid.origin)).map(f64::round);
+        let [columns, rows] = grid.size.map(|n| n as f64);
+        if t.x < 0.0 || t.y < 0.0 || t.x >= columns || t.y >= rows {
+            return None;
+        }
+        let node = t.y as usize * grid.size[0] + t.x as usize;
+        Some((&self.map.nodes[node], grid.place(node)))
+    }
+
     /// The map at a place, between its nodes (bilinear); the mask is the worst of those around.
     pub(super) fn at(&self, place: Vector2<f64>) -> Option<LatticeNode> {
         let t = self.inverse * (place - self.map.grid.origin);
@@ -167,6 +179,8 @@ impl<'a> View<'a> {
                     chi2: sum.chi2 + scaled.chi2,
                     freedom: sum.freedom.max(node.freedom),
                     signal_to_noise: sum.signal_to_noise + scaled.signal_to_noise,
+                    // Phases cannot be averaged.
+                    phases: Vector2::repeat(f64::NAN),
                     displacement: sum.displacement + scaled.displacement,
                     displacement_covariance: sum.displacement_covariance
                         + scaled.displacement_covariance,
@@ -217,6 +231,7 @@ fn average(views: &[View], place: Vector2<f64>) -> (LatticeNode, f64, usize) {
         chi2: good.iter().map(|n| n.chi2).sum(),
         freedom: good.iter().map(|n| n.freedom).sum(),
         signal_to_noise: good.iter().map(|n| n.signal_to_noise).sum(),
+        phases: Vector2::repeat(f64::NAN),
         // Of the first map that has one: maps have mean lattices of their own.
         displacement: good[0].displacement,
         displacement_covariance: good[0].displacement_covariance,

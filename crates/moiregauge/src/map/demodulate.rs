@@ -44,6 +44,8 @@ const BLOCKS: f64 = 5.0;
 pub(super) const PILOT: f64 = 0.65;
 /// Likely harmonics looked at together; and where blocks are single pixels, for the memory's sake.
 const AT_ONCE: [usize; 2] = [6, 2];
+/// Nodes so many windows from the edges say how well the harmonics agree.
+const CLOSURE: f64 = 1.0;
 /// Nodes per width of the window.
 const NODES: f64 = 3.0;
 
@@ -226,6 +228,10 @@ impl Work {
         let stride = stride_of(&self.reference, step_of(resolution, window_nm));
         let smoothed = self.cleaned(window_nm, stride);
         let mut lattices = self.lattices(&smoothed, window_nm, true);
+        if !self.noise.is_measured() {
+            self.noise.disagreement = self.disagreement(&lattices, smoothed.nodes, window_nm);
+            lattices = self.lattices(&smoothed, window_nm, true);
+        }
         let blurs = self.blurs(
             &lattices,
             window_nm * std::f64::consts::SQRT_2,
@@ -304,6 +310,8 @@ impl Work {
             step: [0, 1].map(|i| (nodes.stride[i] * self.blocks.block[i]) as f64),
             window_nm,
             reference: self.reference,
+            centre: self.place.centre,
+            noise_measured: self.noise.is_measured(),
             nodes: nodes_out.collect(),
             harmonics: harmonics
                 .map(|((&index, power), &noise)| UsedHarmonic {
@@ -335,6 +343,30 @@ impl Work {
         self.noise
             .levels
             .fill((variance - signal).max(0.01 * variance));
+    }
+
+    /// χ² per degree of freedom of the closure as it is typical of the frame, 1 at least: noise that is only guessed,
+    /// and as if it were white, is corrected by what the harmonics say of each other.
+    fn disagreement(
+        &self,
+        lattices: &[Result<LocalLattice, Nothing>],
+        nodes: Nodes,
+        width: f64,
+    ) -> f64 {
+        let away = self.reference.in_pixels(CLOSURE * width);
+        let inside = |node: &usize| {
+            let at = nodes.place(&self.blocks, *node);
+            let [low, high] = self.frame;
+            (0..2).all(|i| (at - low)[i].min((high - at)[i]) > away[i])
+        };
+        let reduced = |node: usize| {
+            let lattice = lattices[node].as_ref().ok()?;
+            let n = lattice.freedom as f64;
+            // The median of χ² is n (1 − 2/(9n))³.
+            (lattice.freedom > 0).then(|| lattice.chi2 / (n * (1.0 - 2.0 / (9.0 * n)).powi(3)))
+        };
+        let all = (0..nodes.len()).filter(inside).filter_map(reduced);
+        median(&mut all.collect::<Vec<f64>>()).max(1.0)
     }
 
     /// What a window of `wider` nm changes at each node.

@@ -69,6 +69,8 @@ pub(super) struct Noise {
     pub(super) levels: Vec<f64>,
     /// Where the ratio is known, and the ratio.
     grid: Option<Ratio>,
+    /// Factor on variances for harmonics that contradict each other everywhere, where the levels are but guessed.
+    pub(super) disagreement: f64,
 }
 
 struct Ratio {
@@ -152,6 +154,7 @@ impl Noise {
             return Self {
                 levels: vec![fallback; harmonics],
                 grid: None,
+                disagreement: 1.0,
             };
         }
         let power = |probe: usize, node: usize| {
@@ -170,6 +173,7 @@ impl Noise {
         Self {
             levels,
             grid: Some(grid),
+            disagreement: 1.0,
         }
     }
 

@@ -76,6 +76,8 @@ pub struct LatticeNode {
     pub freedom: usize,
     /// Signal power over noise power under the window.
     pub signal_to_noise: f64,
+    /// Phases of q₁ and q₂ of the pattern at the node, rad, modulo 2π; NaN where they are not known.
+    pub phases: Vector2<f64>,
     /// Displacement of the pattern against the mean lattice of the good nodes, nm, and its covariance; NaN
     /// where it could not be followed.
     pub displacement: Vector2<f64>,
@@ -95,6 +97,7 @@ impl LatticeNode {
             chi2: f64::NAN,
             freedom: 0,
             signal_to_noise: 0.0,
+            phases: Vector2::repeat(f64::NAN),
             displacement: Vector2::repeat(f64::NAN),
             displacement_covariance: Matrix2::repeat(f64::NAN),
         }
@@ -120,7 +123,7 @@ impl LatticeMap {
     pub fn new(map: &WaveMap, at_rest: &Geometry) -> Option<Self> {
         let j = at_rest.pixel_to_nm;
         let dual = j.try_inverse()?.transpose();
-        let phases = displacement::phases(map);
+        let followed = displacement::phases(map);
         let good = map.nodes.iter().filter(|n| n.mask == Mask::Good);
         let (sum, count) = good.fold((Matrix2::zeros(), 0.0f64), |(sum, count), node| {
             (sum + node.pair, count + 1.0)
@@ -129,8 +132,9 @@ impl LatticeMap {
         let back = (dual * sum / count.max(1.0)).transpose().try_inverse();
         let back = -back.unwrap_or_else(|| Matrix2::repeat(f64::NAN));
         let unknown = (Vector2::repeat(f64::NAN), Matrix2::repeat(f64::NAN));
-        let nodes = map.nodes.par_iter().zip(phases).map(|(node, phases)| {
-            let (phases, covariance) = phases.unwrap_or(unknown);
+        let nodes = map.nodes.par_iter().zip(followed).enumerate();
+        let nodes = nodes.map(|(n, (node, followed))| {
+            let (followed, covariance) = followed.unwrap_or(unknown);
             LatticeNode {
                 mask: node.mask,
                 waves: LatticeVectors {
@@ -140,7 +144,8 @@ impl LatticeMap {
                 chi2: node.chi2,
                 freedom: node.freedom,
                 signal_to_noise: node.signal_to_noise,
-                displacement: back * phases,
+                phases: map.phases(n),
+                displacement: back * followed,
                 displacement_covariance: back * covariance * back.transpose(),
             }
         });

@@ -1,5 +1,7 @@
 //! What goes into a map of one image and what comes out, in pixels.
 
+use std::f64::consts::{PI, TAU};
+
 use nalgebra::{Matrix2, Vector2};
 
 use super::defects::Mask;
@@ -98,8 +100,34 @@ pub struct WaveMap {
     pub window_nm: f64,
     /// What the phases count against.
     pub reference: Reference,
+    /// Where the phases of the reference are zero, pixels.
+    pub centre: Vector2<f64>,
     /// Row by row.
     pub nodes: Vec<WaveNode>,
     /// The harmonics that were used, first shell first.
     pub harmonics: Vec<UsedHarmonic>,
+    /// Whether noise was seen beside the harmonics; else it is guessed from the variance of the image.
+    pub noise_measured: bool,
+}
+
+impl WaveMap {
+    /// Place of a node, pixels.
+    pub fn place(&self, node: usize) -> Vector2<f64> {
+        let (column, row) = (node % self.size[0], node / self.size[0]);
+        self.first + Vector2::new(column as f64 * self.step[0], row as f64 * self.step[1])
+    }
+
+    /// Phases of q₁ and q₂ of the pattern at a node, rad, modulo 2π: least squares of those of the first three
+    /// harmonics.
+    pub(super) fn phases(&self, node: usize) -> Vector2<f64> {
+        let [a, b, c] = self.nodes[node].phases;
+        // What the third has more than the difference of the others.
+        let turn = (c - (b - a) + PI).rem_euclid(TAU) - PI;
+        let against = Vector2::new(a - turn / 3.0, b + turn / 3.0);
+        against
+            + self
+                .reference
+                .pair
+                .tr_mul(&(self.place(node) - self.centre))
+    }
 }

@@ -140,7 +140,7 @@ fn regression(
         };
         let unsure = envelope.unsure.get(node).copied().map_or(0.0, f64::from);
         let leaks = harmonics.leaks[i].powi(2) + unsure * unsure;
-        let variance = level / (2.0 * signal) + leaks / spread;
+        let variance = harmonics.noise.disagreement * level / (2.0 * signal) + leaks / spread;
         let weight = 1.0 / variance;
         let index = Vector2::from(harmonics.indices[i].map(f64::from));
         let [x, y] = envelope.slope[node].map(f64::from);

@@ -1,19 +1,23 @@
 //! Maps of images too large for memory, band by band.
 //!
 //! The lattice is looked for in the middle of the image; its fit is the reference of all bands, and the window that
-//! the middle wants is that of all. Nothing is corrected for drift, and positions are nominal.
+//! the middle wants is that of all. Positions are nominal, corrected by the calibration of the scanner and for a drift
+//! that the user gives.
 
 use std::ops::Range;
 
-use nalgebra::Matrix2;
+use nalgebra::{Matrix2, Matrix4};
 
+use super::scanner::calibrated;
 use crate::background::remove_background;
-use crate::geometry::Geometry;
+use crate::geometry::{Geometry, Timing};
 use crate::image::Image;
-use crate::lattice::{LatticeError, measure};
+use crate::lattice::reciprocal::labelled_like;
+use crate::lattice::{LatticeError, LatticeVectors, measure};
 use crate::map::{
     Grid, LatticeMap, Reference, Resolution, Survey, TwistStrainMap, UsedHarmonic, local_lattices,
 };
+use crate::resample::at_rest;
 use crate::settings::{Method, Settings};
 use crate::strain::StrainError;
 
@@ -21,12 +25,17 @@ use crate::strain::StrainError;
 const MIDDLE: usize = 2048;
 /// Pixels of a band, halo not counted.
 const BAND: usize = 1 << 24;
+/// Smaller images are cut into so many bands.
+const FEWEST_BANDS: usize = 4;
 
 /// A large image, ready to be mapped band by band.
 #[derive(Clone, Debug)]
 pub struct SurveyPlan {
     survey: Survey,
-    geometry: Geometry,
+    /// Of the pixels on the sample at rest.
+    placed: Geometry,
+    /// Whether a drift was taken off.
+    pub drift_corrected: bool,
     settings: Settings,
     /// Width of the window, nm.
     pub window_nm: f64,
@@ -74,16 +83,26 @@ fn block(
 }
 
 impl SurveyPlan {
-    /// Looks at the middle of an image of this geometry.
+    /// Looks at the middle of an image of this geometry, timing known or not. Other images of a survey take the
+    /// window and the labelling of the first.
     ///
     /// # Errors
     /// [`SurveyError`]: no lines, or no lattice in the middle.
     pub fn new(
-        geometry: &Geometry,
-        settings: &Settings,
-        resolution: &Resolution,
+        (geometry, timing): (&Geometry, Option<&Timing>),
+        (settings, resolution): (&Settings, &Resolution),
+        first: Option<&Self>,
         read: &ReadBlock,
     ) -> Result<Self, SurveyError> {
+        let geometry = &calibrated(geometry, settings);
+        let drift = settings.drift.map(|d| d.velocity());
+        let still = timing
+            .zip(drift)
+            .map(|(timing, d)| at_rest(geometry, timing, d));
+        let drift_corrected = still.is_some();
+        let placed = still.unwrap_or_else(|| geometry.clone());
+        let dual = placed.pixel_to_nm.try_inverse().ok_or(SurveyError::NoMap)?;
+        let dual = dual.transpose();
         let [columns, rows] = geometry.size.map(|n| {
             let side = n.min(MIDDLE);
             (n - side) / 2..(n - side) / 2 + side
@@ -93,28 +112,40 @@ impl SurveyPlan {
         let of_middle = geometry.cropped(corner, [middle.columns, middle.rows]);
         let found = measure(&middle, &of_middle, settings.background, Method::Lattice)
             .map_err(SurveyError::Lattice)?;
+        let pair = match first {
+            Some(first) => {
+                let back = dual.try_inverse().ok_or(SurveyError::NoMap)?;
+                let exact = LatticeVectors {
+                    basis: found.reciprocal,
+                    covariance: Matrix4::zeros(),
+                };
+                labelled_like(&exact, &(back * first.whole)).basis
+            }
+            None => found.reciprocal,
+        };
+        let resolution = &Resolution {
+            window_nm: first.map(|f| f.window_nm).or(resolution.window_nm),
+            ..*resolution
+        };
         let reference = Reference {
-            pair: found.reciprocal,
+            pair,
             pitch: [geometry.fast_step().norm(), geometry.slow_step().norm()],
         };
         let flat = remove_background(&middle, settings.background);
         let map = local_lattices(&flat, &reference, resolution).ok_or(SurveyError::NoMap)?;
-        let dual = geometry
-            .pixel_to_nm
-            .try_inverse()
-            .ok_or(SurveyError::NoMap)?;
         Ok(Self {
             survey: Survey::new(
                 geometry.size,
                 reference,
                 *resolution,
                 map.window_nm,
-                BAND / geometry.size[0].max(1),
+                (BAND / geometry.size[0].max(1)).min(geometry.size[1].div_ceil(FEWEST_BANDS)),
             ),
-            geometry: geometry.clone(),
+            placed,
+            drift_corrected,
             settings: settings.clone(),
             window_nm: map.window_nm,
-            whole: dual.transpose() * reference.pair,
+            whole: dual * reference.pair,
             harmonics: map.harmonics,
         })
     }
@@ -130,11 +161,11 @@ impl SurveyPlan {
     /// [`SurveyError`], where its lines cannot be read.
     pub fn band(&self, band: usize, read: &ReadBlock) -> Result<TwistStrainMap, SurveyError> {
         let rows = self.survey.rows(band);
-        let lines = block(read, 0..self.geometry.size[0], rows)?;
+        let lines = block(read, 0..self.placed.size[0], rows)?;
         let flat = remove_background(&lines, self.settings.background);
         drop(lines);
         let map = self.survey.map(band, &flat).ok_or(SurveyError::NoMap)?;
-        let mut lattices = LatticeMap::new(&map, &self.geometry).ok_or(SurveyError::NoMap)?;
+        let mut lattices = LatticeMap::new(&map, &self.placed).ok_or(SurveyError::NoMap)?;
         for node in &mut lattices.nodes {
             // Phases are followed within a band only.
             node.displacement.fill(f64::NAN);

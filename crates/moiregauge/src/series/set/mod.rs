@@ -286,7 +286,7 @@ fn given_drift(
     given: GivenDrift,
     caveats: &mut Vec<Caveat>,
 ) -> Option<Solved> {
-    let velocity = Vector2::new(given.x_nm_per_min, given.y_nm_per_min) * PER_MINUTE;
+    let velocity = given.velocity();
     let sigma = given.sigma_nm_per_min * PER_MINUTE;
     let covariance = Matrix2::identity() * sigma * sigma;
     caveats.push(Caveat::new(
