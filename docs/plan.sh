@@ -13,7 +13,7 @@ trap 'rm -rf "$work"' EXIT
   printf '# What `moiregauge plan` foresees and what simulated sets give\n\n'
   printf 'The recommended plan for each wish, and the root-mean-square error over %s simulated sets of just such scans\n' "$sets"
   printf '(mean of x and y, and of both strain components). Sets whose own σ of the twist is more than three times its median\n'
-  printf 'are counted apart: a scan of theirs was measured badly, and they say so. `docs/plan.sh` makes this page.\n\n'
+  printf 'are counted apart: by their own σ they are much worse than the others. `docs/plan.sh` makes this page.\n\n'
   printf '| wish, conditions | scans | Hz | size (nm) | minutes | quantity | foreseen σ | rms error | ratio | sets apart |\n'
   printf '| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n'
   while IFS='|' read -r name wishes change; do
