@@ -4,7 +4,7 @@
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 sets=${1:-400}
-cargo build --release --quiet
+cargo build --release --quiet -p moiregauge-cli
 program=${CARGO_TARGET_DIR:-target}/release/moiregauge
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT

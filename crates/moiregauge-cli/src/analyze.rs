@@ -18,9 +18,9 @@ pub(crate) use files::write_all;
 pub(crate) use orientation::{Angle, DirectionArg, parse_angle};
 pub(crate) use summary::{caveats as caveat_lines, failures, summary};
 
-use crate::info::expand;
+use crate::info::inputs;
 use crate::say::say;
-use moiregauge_report::{FailedInput, write_report};
+use moiregauge_report::write_report;
 
 /// Analyses the files and writes the results.
 pub(crate) fn run(args: &AnalyzeArgs) -> anyhow::Result<ExitCode> {
@@ -28,22 +28,13 @@ pub(crate) fn run(args: &AnalyzeArgs) -> anyhow::Result<ExitCode> {
     let exports = args.exports()?;
     args.start_threads()?;
     files::refuse_overwriting(&args.out, args.force)?;
-    let mut inputs = Vec::new();
-    let mut failed = Vec::new();
-    for path in expand(&args.paths) {
-        match path {
-            Ok(path) => inputs.push(path),
-            Err((path, error)) => failed.push(FailedInput {
-                file: path.display().to_string(),
-                error,
-            }),
-        }
-    }
+    let (inputs, failed) = inputs(&args.paths);
     let loud = args.is_loud();
     let known = args.known.of(&inputs);
     let atomic = args.orientation.measure(&settings, &args.known)?;
     if let Some((found, _)) = &atomic {
         settings.lattice_angle = Some(found.known());
+        crate::config::check(&settings)?;
     }
     let outcome = analyse_files(
         &inputs,
@@ -94,9 +85,10 @@ pub(crate) fn run(args: &AnalyzeArgs) -> anyhow::Result<ExitCode> {
         } else if !args.quiet {
             if outcomes.len() > 1 {
                 say(&format!(
-                    "\n== moiré {} of {}\n",
+                    "\n== moiré {} of {}: {}\n",
                     number + 1,
-                    outcomes.len()
+                    outcomes.len(),
+                    analysis.settings.bilayer().name()
                 ))?;
             }
             say(&summary(analysis))?;

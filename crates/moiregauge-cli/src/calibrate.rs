@@ -17,7 +17,8 @@ use moiregauge_report::{FailedInput, InputFile};
 use rayon::prelude::*;
 
 use crate::analyze::{BackgroundArg, LineArg, Reading, failures, read};
-use crate::info::expand;
+use crate::config;
+use crate::info::inputs;
 use crate::input::{Known, KnownArgs};
 use crate::say::say;
 
@@ -46,6 +47,9 @@ pub(crate) struct CalibrateArgs {
     /// The lattice that the images show: graphite, mica, si111-7x7, si111, au111 or a layer (graphene, hBN, …)
     #[arg(long, value_name = "NAME", required_unless_present_any = ["lattice", "lattice_constant"])]
     material: Option<String>,
+    /// TOML file with layers of your own, one [[layer]] table each, for --material
+    #[arg(long, value_name = "FILE", requires = "material")]
+    materials: Option<PathBuf>,
     /// Any lattice: two lengths and the angle between them in degrees, as in 0.5nm,0.62nm,103
     #[arg(long, value_name = "A,B,ANGLE", value_parser = parse_lattice, conflicts_with_all = ["material", "lattice_constant"])]
     lattice: Option<Cell>,
@@ -113,17 +117,7 @@ pub(crate) fn run(args: &CalibrateArgs) -> anyhow::Result<ExitCode> {
         background: args.background.map_or(defaults.background, Into::into),
         ..defaults
     };
-    let mut failed = Vec::new();
-    let mut inputs = Vec::new();
-    for path in expand(&args.paths) {
-        match path {
-            Ok(path) => inputs.push(path),
-            Err((path, error)) => failed.push(FailedInput {
-                file: path.display().to_string(),
-                error,
-            }),
-        }
-    }
+    let (inputs, mut failed) = inputs(&args.paths);
     let known = args.known.of(&inputs);
     let bar = if args.quiet {
         ProgressBar::hidden()
@@ -223,7 +217,7 @@ impl CalibrateArgs {
             (_, Some(a), _) => {
                 KnownLattice::hexagonal(&format!("hexagonal, {a} nm"), a, own, "given by the user")
             }
-            (_, _, Some(name)) => named(name)?,
+            (_, _, Some(name)) => named(name, &config::own_materials(self.materials.as_deref())?)?,
             _ => bail!("give --material, --lattice or --lattice-constant"),
         };
         if let Some(sigma) = self.lattice_sigma {
@@ -237,23 +231,21 @@ impl CalibrateArgs {
     }
 }
 
-fn named(name: &str) -> anyhow::Result<KnownLattice> {
-    if let Some(known) = KnownLattice::named(name) {
+/// A surface or a layer by its name, one of the user's `own` layers first.
+fn named(name: &str, own: &[Material]) -> anyhow::Result<KnownLattice> {
+    let of_user = own.iter().any(|m| m.name.eq_ignore_ascii_case(name.trim()));
+    if let Some(known) = KnownLattice::named(name).filter(|_| !of_user) {
         return Ok(known);
     }
-    if let Some(layer) = Material::named(name) {
-        return Ok(KnownLattice::hexagonal(
-            &layer.name,
-            layer.lattice_constant_nm,
-            100.0 * layer.lattice_constant_sigma_nm / layer.lattice_constant_nm,
-            &layer.source,
-        ));
+    if let Some(layer) = config::find_material(name, own) {
+        return Ok(KnownLattice::of_layer(&layer));
     }
     let surfaces = KnownLattice::all().into_iter().map(|k| k.name);
-    let layers = Material::all().into_iter().map(|m| m.name);
+    let layers = own.iter().cloned().chain(Material::all()).map(|m| m.name);
     let all: Vec<String> = surfaces.chain(layers).collect();
     bail!(
-        "unknown lattice {name:?}; known are {}; any other: --lattice A,B,ANGLE or --lattice-constant A",
+        "unknown lattice {name:?}; known are {}; any other: --lattice A,B,ANGLE, --lattice-constant A or a layer \
+         of your own (--materials)",
         all.join(", ")
     )
 }
@@ -306,9 +298,19 @@ mod tests {
 
     #[test]
     fn surfaces_and_layers_have_names() {
-        assert_eq!(named("Si111-7x7").unwrap().a_nm, 2.688);
-        assert_eq!(named("hbn").unwrap().a_nm, 0.2504);
-        let error = named("cheese").unwrap_err().to_string();
+        assert_eq!(named("Si111-7x7", &[]).unwrap().a_nm, 2.688);
+        assert_eq!(named("hbn", &[]).unwrap().a_nm, 0.2504);
+        // Not all layers are hexagonal.
+        let telluride = named("WTe2 1T'", &[]).unwrap();
+        assert_eq!(telluride.angle_deg, 90.0);
+        assert!(telluride.b_nm > 1.7 * telluride.a_nm);
+        let mine = Material {
+            name: "graphite".to_owned(),
+            lattice_constant_nm: 0.2461,
+            ..Material::graphene()
+        };
+        assert_eq!(named("graphite", &[mine]).unwrap().a_nm, 0.2461);
+        let error = named("cheese", &[]).unwrap_err().to_string();
         assert!(
             error.contains("graphite") && error.contains("MoS2"),
             "{error}"

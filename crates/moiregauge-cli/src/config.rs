@@ -61,6 +61,14 @@ moires = 1
 # [substrate].
 # substrate = "hBN"
 
+# The layers of each moiré, the largest cell first, where they are not all of the same layers: one such table for
+# each of them, in place of `material` and `substrate`.
+#   [[moire_layers]]
+#   material = "graphene"
+#   [[moire_layers]]
+#   material = "graphene"
+#   substrate = "hBN"
+
 # The orientation of one of the layers in the frame of the scans, if it is known: of layer 1 (the lower
 # one, the reference) or 2, of its atomic vector ("atomic": a row of atoms, a zigzag edge) or of its
 # reciprocal vector ("reciprocal": an armchair edge). It tells isotropic strain from twist.
@@ -132,11 +140,10 @@ pub(crate) fn read(path: &Path) -> anyhow::Result<Settings> {
 fn parse(text: &str, folder: &Path) -> anyhow::Result<Settings> {
     let mut table: toml::Table = toml::from_str(text)?;
     let mut changed = false;
-    for key in ["material", "substrate"] {
-        if let Some(toml::Value::String(name)) = table.get(key) {
-            let material = toml::Value::try_from(named_material(name)?)?;
-            table.insert(key.to_owned(), material);
-            changed = true;
+    changed |= name_materials(&mut table)?;
+    if let Some(toml::Value::Array(moires)) = table.get_mut("moire_layers") {
+        for layers in moires.iter_mut().filter_map(toml::Value::as_table_mut) {
+            changed |= name_materials(layers)?;
         }
     }
     if let Some(toml::Value::String(file)) = table.get("scanner") {
@@ -151,17 +158,35 @@ fn parse(text: &str, folder: &Path) -> anyhow::Result<Settings> {
     Ok(toml::from_str(text)?)
 }
 
+/// Puts materials in the place of their names; whether there were any.
+fn name_materials(table: &mut toml::Table) -> anyhow::Result<bool> {
+    let mut changed = false;
+    for key in ["material", "substrate"] {
+        if let Some(toml::Value::String(name)) = table.get(key) {
+            let material = toml::Value::try_from(named_material(name)?)?;
+            table.insert(key.to_owned(), material);
+            changed = true;
+        }
+    }
+    Ok(changed)
+}
+
 /// A material by name, or an error that lists the names.
 pub(crate) fn named_material(name: &str) -> anyhow::Result<Material> {
-    find_material(name, &[])
+    material_of(name, &[])
 }
 
 /// A material by name, one of the user's own first.
-fn find_material(name: &str, own: &[Material]) -> anyhow::Result<Material> {
+pub(crate) fn find_material(name: &str, own: &[Material]) -> Option<Material> {
     let of_user = own
         .iter()
         .find(|m| m.name.eq_ignore_ascii_case(name.trim()));
-    if let Some(material) = of_user.cloned().or_else(|| Material::named(name)) {
+    of_user.cloned().or_else(|| Material::named(name))
+}
+
+/// A material by name, one of the user's own first, or an error that lists the names.
+fn material_of(name: &str, own: &[Material]) -> anyhow::Result<Material> {
+    if let Some(material) = find_material(name, own) {
         return Ok(material);
     }
     let known: Vec<String> = own
@@ -183,9 +208,9 @@ pub(crate) fn named_layers(
     own: &[Material],
 ) -> anyhow::Result<(Material, Option<Material>)> {
     match text.split_once('/') {
-        None => Ok((find_material(text, own)?, None)),
+        None => Ok((material_of(text, own)?, None)),
         Some((upper, lower)) => {
-            let (upper, lower) = (find_material(upper, own)?, find_material(lower, own)?);
+            let (upper, lower) = (material_of(upper, own)?, material_of(lower, own)?);
             let substrate = (upper != lower).then_some(lower);
             Ok((upper, substrate))
         }
@@ -255,6 +280,7 @@ pub(crate) fn check(settings: &Settings) -> anyhow::Result<()> {
     if let Some(problem) = material.problem() {
         bail!("{problem}");
     }
+    check_moire_layers(settings)?;
     let clock = settings.frame_time_sigma_s;
     ensure!(
         clock >= 0.0 && clock.is_finite(),
@@ -311,9 +337,55 @@ pub(crate) fn check(settings: &Settings) -> anyhow::Result<()> {
     Ok(())
 }
 
+/// As many pairs of layers as moirés, none of them nonsense, and nothing beside them that is of one pair only.
+fn check_moire_layers(settings: &Settings) -> anyhow::Result<()> {
+    let (layers, moires) = (&settings.moire_layers, settings.moires);
+    if layers.is_empty() {
+        return Ok(());
+    }
+    ensure!(
+        layers.len() == moires,
+        "expected one pair of layers (--layers) for all moirés or one for each of the {moires} (--moires), found {}",
+        layers.len()
+    );
+    ensure!(
+        settings.lattice_angle.is_none(),
+        "the orientation of a layer (--lattice-angle, --atomic) goes with one pair of layers; the moirés have layers of \
+         their own (--layers), whose layer 1 is not the same: analyse each with --layers of its own"
+    );
+    for layers in layers {
+        for material in std::iter::once(&layers.material).chain(&layers.substrate) {
+            if let Some(problem) = material.problem() {
+                bail!("{problem}");
+            }
+        }
+    }
+    Ok(())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Layers of each moiré by name; as many as there are moirés.
+    #[test]
+    fn moires_have_layers_of_their_own() {
+        let text = "moires = 2\n[[moire_layers]]\nmaterial = \"graphene\"\n[[moire_layers]]\n\
+                    material = \"graphene\"\nsubstrate = \"hBN\"\n";
+        let settings = parse(text, Path::new("")).unwrap();
+        check(&settings).unwrap();
+        assert_eq!(settings.of_moire(0).bilayer().name(), "graphene");
+        assert_eq!(settings.of_moire(1).bilayer().name(), "graphene/hBN");
+        let three = Settings {
+            moires: 3,
+            ..settings
+        };
+        let error = check(&three).unwrap_err().to_string();
+        assert!(
+            error.contains("each of the 3") && error.contains("found 2"),
+            "{error}"
+        );
+    }
 
     #[test]
     fn the_commented_file_holds_the_defaults() {

@@ -15,7 +15,7 @@ use spmfile::{
     sensor_axis,
 };
 
-pub(crate) use paths::expand;
+pub(crate) use paths::{expand, inputs};
 use table::table;
 
 use crate::input::{Known, KnownArgs};

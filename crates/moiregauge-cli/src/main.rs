@@ -11,6 +11,7 @@ mod map;
 mod moire;
 mod plan;
 mod say;
+mod scanner;
 mod simulate;
 mod validate;
 

@@ -11,6 +11,7 @@ use moiregauge::settings::Settings;
 use moiregauge::simulate::{Simulation, Simulator};
 
 use crate::say::say;
+use crate::scanner::ScannerArgs;
 use search::Limits;
 
 /// How many scans, how fast and how large, for the errors that are wanted
@@ -60,21 +61,8 @@ pub(crate) struct PlanArgs {
     /// Standard uncertainty of the times of frames, s
     #[arg(long, value_name = "S", default_value_t = 0.6)]
     frame_time_sigma: f64,
-    /// Calibration of the scanner, as `moiregauge calibrate` writes it
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["calibration_gain", "calibration_mismatch", "calibration_orthogonality"])]
-    calibration: Option<PathBuf>,
-    /// Gain error of the scanner, common to x and y, per cent [default: 1]
-    #[arg(long, value_name = "PERCENT")]
-    calibration_gain: Option<f64>,
-    /// Difference of the gains of x and y, per cent [default: 0.5]
-    #[arg(long, value_name = "PERCENT")]
-    calibration_mismatch: Option<f64>,
-    /// Deviation of the axes from a right angle, mrad [default: 5]
-    #[arg(long, value_name = "MRAD")]
-    calibration_orthogonality: Option<f64>,
-    /// Isotropic heterostrain that the layers may have, per cent [default: 0.05]
-    #[arg(long, value_name = "PERCENT")]
-    isotropic_strain: Option<f64>,
+    #[command(flatten)]
+    scanner: ScannerArgs,
     /// Write the recommended plan as conditions for `moiregauge validate` and `simulate`
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -169,30 +157,7 @@ impl PlanArgs {
             frame_time_sigma_s: self.frame_time_sigma,
             ..Settings::default()
         };
-        let priors = [
-            (
-                self.calibration_gain,
-                &mut settings.calibration.gain_percent,
-            ),
-            (
-                self.calibration_mismatch,
-                &mut settings.calibration.mismatch_percent,
-            ),
-            (
-                self.calibration_orthogonality,
-                &mut settings.calibration.orthogonality_mrad,
-            ),
-            (
-                self.isotropic_strain,
-                &mut settings.isotropic_strain_percent,
-            ),
-        ];
-        for (given, setting) in priors {
-            *setting = given.unwrap_or(*setting);
-        }
-        if let Some(path) = &self.calibration {
-            settings.scanner = Some(crate::calibrate::file::read(path)?);
-        }
+        self.scanner.apply(&mut settings)?;
         crate::config::check(&settings)?;
         Ok(settings)
     }

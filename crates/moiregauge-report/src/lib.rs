@@ -17,6 +17,7 @@ mod stats;
 mod tables;
 
 pub use draw::colormap::ColorMap;
+pub use draw::scale::fixed;
 pub use error::ReportError;
 pub use figures::{Drawing, Figure, cell_figure, figures, map_figures, pulls};
 pub use format::{plus_minus, two_digits};

@@ -18,6 +18,7 @@ use crate::estimate::Estimate;
 use crate::lattice::LatticeVectors;
 use crate::lattice::known::{names, parts};
 use crate::lattice::reciprocal::shortest_pair;
+use crate::material::Material;
 
 /// A lattice whose cell is known.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
@@ -81,6 +82,23 @@ impl KnownLattice {
             angle_deg: 60.0,
             sigma_percent,
             source: source.to_owned(),
+        }
+    }
+
+    /// The lattice of a layer, hexagonal or not.
+    pub fn of_layer(layer: &Material) -> Self {
+        let a = layer.lattice_constant_nm;
+        let (b_nm, angle_deg) = match (layer.lattice_constant_b_nm, layer.cell_angle_deg) {
+            (Some(b), Some(angle)) => (b, angle),
+            _ => (a, 60.0),
+        };
+        Self {
+            name: layer.name.clone(),
+            a_nm: a,
+            b_nm,
+            angle_deg,
+            sigma_percent: 100.0 * layer.lattice_constant_sigma_nm / a,
+            source: layer.source.clone(),
         }
     }
 

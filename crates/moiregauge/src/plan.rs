@@ -2,14 +2,13 @@
 //!
 //! In: the settings of a simulation, which describe sample, raster and noise, one for each slow axis, and the
 //! settings of the analysis, which say what is known of scanner and layers. Out: the standard errors of twist,
-//! strain and drift, and what each source contributes. The Fisher information of white noise in the pixels
-//! ([`crate::bound`]) and of noise of the position sensors goes through the covariance of the joint fit, frame
+//! strain and drift, and what each source contributes. The Fisher information of pixels with white noise and of lines with
+//! offsets ([`crate::bound`]) and of noise of the position sensors goes through the covariance of the joint fit, frame
 //! times being as uncertain as the settings say; what no scan shows comes from the budget.
 //!
 //! The lattice may lie at any angle: variances are means over orientations.
 //!
-//! Left out: line noise, of which the fit takes almost all (it acts where a wave vector lies close to the slow
-//! axis), drift that changes, and positions that are less stable than their sensors say.
+//! Left out: drift that changes, and positions that are less stable than their sensors say.
 
 use nalgebra::{Matrix2, Matrix4};
 
@@ -156,7 +155,7 @@ fn at_one_orientation(sets: &[Simulation], settings: &Settings) -> Option<Predic
             sightings.iter().map(|s| s.scan + 1).max().unwrap_or(0),
             sightings.iter().map(|s| s.class + 1).max().unwrap_or(0),
         );
-        let (images, pair, drift) = ideal_sightings(&simulator, set.raster.sensors)?;
+        let (images, pair, drift) = ideal_sightings(&simulator, set.raster.sensors, true)?;
         let step = Matrix2::from(simulator.truth().frames.first()?.pixel_to_nm).transpose();
         for image in images {
             let sensor = of_sensors(&image, set, &step)?;

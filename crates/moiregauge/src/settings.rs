@@ -150,6 +150,17 @@ impl Default for Calibration {
     }
 }
 
+/// The layers of one of several moirés.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct MoireLayers {
+    /// Both layers, or the upper one (layer 2) where there is a `substrate`.
+    pub material: Material,
+    /// The lower layer (layer 1, the reference) where it is another one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub substrate: Option<Material>,
+}
+
 /// Every knob of an analysis.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
@@ -169,6 +180,10 @@ pub struct Settings {
     /// The lower layer (layer 1, the reference) where it is another one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub substrate: Option<Material>,
+    /// The layers of each moiré, the largest cell first, where not all moirés are of the same; they take the place of
+    /// `material` and `substrate`.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub moire_layers: Vec<MoireLayers>,
     /// The orientation of one of the layers, if it is known: tells isotropic strain from twist.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lattice_angle: Option<KnownOrientation>,
@@ -207,6 +222,17 @@ pub struct Settings {
 }
 
 impl Settings {
+    /// The settings for the moiré `index` (0 has the largest cell): `material` and `substrate` are its own.
+    #[must_use]
+    pub fn of_moire(&self, index: usize) -> Self {
+        let mut own = self.clone();
+        if let Some(layers) = self.moire_layers.get(index) {
+            own.material.clone_from(&layers.material);
+            own.substrate.clone_from(&layers.substrate);
+        }
+        own
+    }
+
     /// The two layers: `material` on itself or on the `substrate`.
     pub fn bilayer(&self) -> Bilayer<'_> {
         Bilayer {
@@ -226,6 +252,7 @@ impl Default for Settings {
             material: Material::graphene(),
             moires: 1,
             substrate: None,
+            moire_layers: Vec::new(),
             lattice_angle: None,
             strain_convention: StrainConvention::RealSpace,
             grouping: Grouping::Auto,

@@ -1,5 +1,7 @@
 //! Two layers of any kind: forward and back, the circle of isotropic strains, the strain tensor.
 
+mod two_layers;
+
 use std::f64::consts::PI;
 
 use moiregauge::lattice::LatticeVectors;
@@ -9,34 +11,9 @@ use moiregauge::strain::{
     Orientation, Stacking, StrainTensor, branches, degeneracy, moire_of, strain_tensors,
     twist_strain,
 };
-use nalgebra::{Matrix2, Matrix4, Matrix5, Vector2, Vector5};
+use nalgebra::{Matrix2, Matrix5, Vector2, Vector5};
 use proptest::prelude::*;
-
-fn named(name: &str) -> Material {
-    Material::named(name).unwrap()
-}
-
-fn exact(basis: Matrix2<f64>) -> LatticeVectors {
-    LatticeVectors {
-        basis,
-        covariance: Matrix4::zeros(),
-    }
-}
-
-/// A covariance without any symmetry, nm².
-fn some_covariance() -> Matrix4<f64> {
-    let root = Matrix4::new(
-        0.9, 0.2, 0.4, 0.0, //
-        0.1, 1.1, 0.0, 0.5, //
-        -0.3, 0.0, 0.8, 0.1, //
-        0.2, -0.1, 0.3, 1.0,
-    ) * 0.001;
-    root * root.transpose()
-}
-
-fn modulo(difference: f64, period: f64) -> f64 {
-    (difference - period * (difference / period).round()).abs()
-}
+use two_layers::{exact, modulo, named, some_covariance};
 
 /// An oblique layer, and one of another shape that is a little different.
 fn oblique(a: f64, b: f64, angle: f64) -> Material {
@@ -183,7 +160,7 @@ proptest! {
             if elongated(&basis, layers) {
                 continue;
             }
-            let lattice = LatticeVectors { basis, covariance: some_covariance() };
+            let lattice = LatticeVectors { basis, covariance: some_covariance(0.001) };
             let values = |basis: Matrix2<f64>| {
                 let found = twist_strain(&exact(basis), layers, RealSpace).ok()?;
                 Some(nalgebra::Vector3::new(found.twist, found.strain_vector.x, found.strain_vector.y))

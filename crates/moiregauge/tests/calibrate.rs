@@ -96,9 +96,18 @@ fn assert_honest(all: &[[f64; 3]], what: &str) {
         let farthest = all.iter().map(|p| p[i].abs()).fold(0.0, f64::max);
         assert!(farthest < 4.0, "{what} {i}: {farthest} σ");
     }
+    // 0.27 % of true errors lie beyond 3 σ: the number is Poisson's; three and a half of its standard errors.
+    let expected = 0.0027 * 3.0 * n;
+    let beyond = all.iter().flatten().filter(|p| p.abs() > 3.0).count() as f64;
+    let most = expected + 3.5 * expected.sqrt();
+    assert!(
+        beyond <= most,
+        "{what}: {beyond} beyond 3 σ, expected {expected}"
+    );
 }
 
-/// One pair of frames tells the scanner as well as it says, drift and all.
+/// One pair of frames tells the scanner as well as it says, drift and all: each number of the first ten scanners within
+/// 3 σ, and as many of all hundred within 1 σ as there have to be.
 #[test]
 fn a_pair_of_frames_tells_the_scanner() {
     let all: Vec<[f64; 3]> = (0..100_u64)
@@ -112,6 +121,8 @@ fn a_pair_of_frames_tells_the_scanner() {
             pulls(&found.calibration, truth(&set))
         })
         .collect();
+    let few = &all[..10];
+    assert!(few.iter().flatten().all(|p| p.abs() < 3.0), "{few:?}");
     assert_honest(&all, "pair");
 }
 

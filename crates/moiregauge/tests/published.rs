@@ -1,23 +1,14 @@
 //! Numbers and formulas of the literature, each with its source and its convention.
 
+mod two_layers;
+
 use moiregauge::cell::{MoireCell, WavelengthMeaning, from_wavelengths};
 use moiregauge::estimate::Estimate;
-use moiregauge::lattice::LatticeVectors;
-use moiregauge::material::{Bilayer, Material};
+use moiregauge::material::Bilayer;
 use moiregauge::settings::StrainConvention::{KSpace, RealSpace};
 use moiregauge::strain::{Stacking, branches, moire_of, naive_twist, twist_strain};
-use nalgebra::{Matrix2, Matrix4, Rotation2, Vector2};
-
-fn named(name: &str) -> Material {
-    Material::named(name).unwrap()
-}
-
-fn exact(basis: Matrix2<f64>) -> LatticeVectors {
-    LatticeVectors {
-        basis,
-        covariance: Matrix4::zeros(),
-    }
-}
+use nalgebra::{Matrix2, Rotation2, Vector2};
+use two_layers::{exact, named};
 
 fn cell(stacking: &Stacking, layers: Bilayer<'_>) -> MoireCell {
     MoireCell::new(&moire_of(stacking, layers, RealSpace).unwrap()).unwrap()

@@ -2,13 +2,14 @@
 
 mod tensor_scene;
 
+use moiregauge::caveat::Caveat;
 use moiregauge::series::{analyse, atomic_orientation};
 use moiregauge::settings::{KnownOrientation, LatticeDirection};
 use tensor_scene::{atoms, measured, moire, on_hbn, run, settings, truth};
 
-/// χ² of twist, mean strain and shear part over several sets is that of true errors (p > 10⁻³ to either
-/// side), and nothing is further off than 4 σ: no one in a hundred of true errors is beyond 3.
-fn assert_true_errors(all: &[[f64; 6]]) {
+/// χ² of twist, mean strain and shear part over several sets is that of true errors (p > 10⁻³ to either side).
+/// Returns how many sets have one of these, the uniaxial or the biaxial part beyond 3 σ.
+fn assert_true_errors(all: &[[f64; 6]]) -> usize {
     let chi2: f64 = all.iter().flat_map(|p| &p[..4]).map(|p| p * p).sum();
     let freedom = 4.0 * all.len() as f64;
     // Wilson and Hilferty's normal approximation.
@@ -16,36 +17,62 @@ fn assert_true_errors(all: &[[f64; 6]]) {
     let z = ((chi2 / freedom).cbrt() - (1.0 - spread * spread)) / spread;
     assert!(z.abs() < 3.3, "χ² {chi2} of {freedom}: {all:?}");
     assert!(all.iter().flatten().all(|p| p.abs() < 4.0), "{all:?}");
+    let beyond = |p: &&[f64; 6]| p.iter().any(|p| p.abs() > 3.0);
+    all.iter().filter(beyond).count()
+}
+
+/// Sets of twelve that may have a number beyond 3 σ: of true errors one does in a hundred sets (four independent
+/// numbers, 0.27 % each), so that two of twelve have in less than one case of a hundred. `docs/tensor.md` has the shares
+/// over a thousand sets.
+const BEYOND: usize = 1;
+
+/// Six sets for the atoms of each layer: the moiré makes most of the errors, so that it must not be the same.
+fn seeds(layer: u8) -> std::ops::RangeInclusive<u64> {
+    let before = 6 * (u64::from(layer) - 1);
+    before + 1..=before + 6
 }
 
 #[test]
 fn biaxial_and_uniaxial_strain_with_an_atomic_image() {
+    let (mut scattered, mut beyond) = (0, 0);
     for layer in [1, 2] {
         let mut all = Vec::new();
-        for seed in 1..=6 {
+        for seed in seeds(layer) {
             let outcome = run(moire(seed), layer, 4);
             all.push(outcome.pulls());
             let found = outcome.tensor();
             // The orientation is good to some hundredths of a degree, so that σ_η = θσ_α is some 10⁻⁵.
             assert!(found.mean().sigma < 1e-4, "{:?}", found.mean());
-            // Frames up and down tell the drift; that they scatter (1/f noise of the lines) may be said.
+            // Frames up and down tell the drift.
             assert!(outcome.atomic.drift.is_some());
-            let codes = outcome.atomic.caveats.iter().map(|c| c.code.as_str());
-            let others: Vec<&str> = codes.filter(|code| *code != "atomic-scatter").collect();
-            assert!(others.is_empty(), "{others:?}");
+            scattered += scatters(&outcome.atomic.caveats);
         }
-        assert_true_errors(&all);
+        beyond += assert_true_errors(&all);
     }
+    assert!(beyond <= BEYOND, "{beyond} of 12 sets beyond 3 σ");
+    // Chance makes χ²/dof > 2 of 26 once in some five hundred sets of images; two in twelve would be no chance.
+    assert!(scattered <= 1, "{scattered}");
+}
+
+/// Whether the images are said to scatter; they have no other doubts.
+fn scatters(caveats: &[Caveat]) -> usize {
+    assert!(
+        caveats.iter().all(|c| c.code == "atomic-scatter"),
+        "{caveats:?}"
+    );
+    caveats.len()
 }
 
 #[test]
 fn different_layers_with_an_atomic_image() {
+    let mut beyond = 0;
     for layer in [1, 2] {
-        let all: Vec<[f64; 6]> = (1..=6)
+        let all: Vec<[f64; 6]> = seeds(layer)
             .map(|seed| run(on_hbn(moire(seed)), layer, 4).pulls())
             .collect();
-        assert_true_errors(&all);
+        beyond += assert_true_errors(&all);
     }
+    assert!(beyond <= BEYOND, "{beyond} of 12 sets beyond 3 σ");
 }
 
 /// A single atomic frame: drift turns the lattice by degrees, the row along the fast axis by nothing.

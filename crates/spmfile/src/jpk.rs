@@ -46,6 +46,8 @@ const MOTION: u16 = 0x804b;
 const CHANNEL: u16 = 0x8050;
 const RETRACE: u16 = 0x8051;
 const FANCY_NAME: u16 = 0x8052;
+/// Lines of `key : value` about the channel; files of some programs and of maps have its name only there.
+const PARAMETERS: u16 = 0x8053;
 const SLOTS: u16 = 0x8080;
 const DEFAULT_SLOT: u16 = 0x8081;
 /// Tags of the first slot; those of the next lie [`SLOT_STRIDE`] higher.
@@ -128,26 +130,40 @@ pub(crate) fn read_zip(
     }
 }
 
-/// Everything but the thumbnail: grey, and with slots.
+/// Everything but the thumbnail: grey, and named.
 fn is_channel(page: &Directory<'_>) -> bool {
-    let named = page.text(FANCY_NAME).or_else(|| page.text(CHANNEL));
     let grey = page.count(PHOTOMETRIC).is_none_or(|kind| kind <= 1);
-    grey && named.is_some_and(|name| name != "thumbnail")
+    grey && !matches!(&*info(page).name, "" | "thumbnail")
+}
+
+/// The value of the parameter whose key ends so.
+fn parameter(page: &Directory<'_>, key: &str) -> Option<String> {
+    let parameters = page.text(PARAMETERS)?;
+    let mut pairs = parameters.lines().filter_map(|line| line.split_once(':'));
+    let (_, value) = pairs.find(|(name, _)| name.trim().ends_with(key))?;
+    Some(value.trim().to_owned())
 }
 
 fn info(page: &Directory<'_>) -> ChannelInfo {
-    let internal_name = page.text(CHANNEL).unwrap_or_default();
+    let internal_name = page
+        .text(CHANNEL)
+        .or_else(|| parameter(page, "channel.name"))
+        .unwrap_or_default();
+    let shown = page.text(FANCY_NAME).filter(|name| !name.is_empty());
+    let retrace = match page.number(RETRACE) {
+        Some(retrace) => Some(retrace != 0.0),
+        None => parameter(page, "retrace").and_then(|retrace| retrace.parse().ok()),
+    };
     ChannelInfo {
-        name: page
-            .text(FANCY_NAME)
-            .filter(|name| !name.is_empty())
+        name: shown
+            .or_else(|| parameter(page, "fancy-name"))
             .unwrap_or_else(|| internal_name.clone()),
         internal_name,
-        line_direction: page.number(RETRACE).map(|retrace| {
-            if retrace == 0.0 {
-                LineDirection::Trace
-            } else {
+        line_direction: retrace.map(|retrace| {
+            if retrace {
                 LineDirection::Retrace
+            } else {
+                LineDirection::Trace
             }
         }),
         scan_line: None,
@@ -330,128 +346,4 @@ fn metadata(first: &Directory<'_>) -> Vec<(String, String)> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::archive::tests::zip;
-    use crate::cursor::Endian;
-    use crate::tiff_tags::tests::{Value, file, plain};
-
-    /// A thumbnail and one channel of 2 lines with 3 counts, in two slots.
-    fn image(change: impl Fn(&mut Vec<(u16, Value)>, &mut Vec<(u16, Value)>)) -> Vec<u8> {
-        let mut frame = vec![
-            (PHOTOMETRIC, Value::Short(3)),
-            (CHANNEL, Value::Text("thumbnail")),
-            (END_DATE, Value::Text("2020-02-29 10:20:30.5 GMT")),
-            (X0, Value::Double(1e-6)),
-            (Y0, Value::Double(2e-6)),
-            (U_LENGTH, Value::Double(4e-7)),
-            (V_LENGTH, Value::Double(2e-7)),
-            (THETA, Value::Double(std::f64::consts::FRAC_PI_2)),
-            (RATE, Value::Double(2.0)),
-            (DUTY_CYCLE, Value::Double(0.8)),
-            (MOTION, Value::Text("topDown")),
-        ];
-        let slot = |n: u16| n * SLOT_STRIDE;
-        let mut channel = plain(2, 3, 16);
-        channel.extend([
-            (PHOTOMETRIC, Value::Short(1)),
-            (CHANNEL, Value::Text("height")),
-            (FANCY_NAME, Value::Text("Height")),
-            (RETRACE, Value::Short(1)),
-            (SLOTS, Value::Short(2)),
-            (DEFAULT_SLOT, Value::Text("calibrated")),
-            (SLOT_NAME, Value::Text("raw")),
-            (SLOT_SCALING, Value::Text("NullScaling")),
-            (SLOT_NAME + slot(1), Value::Text("calibrated")),
-            (SLOT_SCALING + slot(1), Value::Text("LinearScaling")),
-            (SLOT_UNIT + slot(1), Value::Text("m")),
-            (SLOT_FACTOR + slot(1), Value::Double(0.5)),
-            (SLOT_OFFSET + slot(1), Value::Double(10.0)),
-        ]);
-        change(&mut frame, &mut channel);
-        let counts: Vec<u8> = (0..6i16).flat_map(i16::to_be_bytes).collect();
-        let strips = counts.chunks(6).map(<[u8]>::to_vec).collect();
-        file(Endian::Big, &[(frame, vec![]), (channel, strips)])
-    }
-
-    #[test]
-    fn the_default_slot_scales() {
-        let scan = crate::read(&image(|_, _| {})).expect("whole");
-        assert_eq!(scan.channels.len(), 1);
-        let channel = &scan.channels[0];
-        assert_eq!(
-            (channel.name.as_str(), channel.unit.as_str()),
-            ("Height", "m")
-        );
-        assert_eq!(channel.line_direction, Some(LineDirection::Retrace));
-        assert_eq!(channel.values(), [10.0, 10.5, 11.0, 11.5, 12.0, 12.5]);
-        let raw = crate::read(&image(|_, channel| {
-            for (tag, value) in channel {
-                if *tag == DEFAULT_SLOT {
-                    *value = Value::Text("raw");
-                }
-            }
-        }));
-        assert_eq!(raw.expect("whole").channels[0].values()[5], 5.0);
-    }
-
-    #[test]
-    fn the_frame_is_told() {
-        let scan = crate::read(&image(|_, _| {})).expect("whole");
-        assert_eq!(scan.frame_direction, Some(FrameDirection::Down));
-        assert_eq!(scan.line_rate_hz, Some(2.0));
-        assert_eq!(scan.line_times_s, Some([0.2, 0.2]));
-        assert_eq!(scan.acquired, clock::date([2020, 2, 29], [10, 20, 30]));
-        let close = |[x, y]: [f64; 2], [a, b]: [f64; 2]| (x - a).abs() + (y - b).abs() < 1e-9;
-        assert!(close(scan.size_nm.expect("a size"), [400.0, 200.0]));
-        // Turned by 90°: u runs along y, v along −x.
-        assert!(close(scan.offset_nm, [1000.0 - 100.0, 2000.0 + 200.0]));
-    }
-
-    #[test]
-    fn a_reflected_grid_begins_at_the_top() {
-        let reflected = image(|frame, _| frame.push((REFLECT, Value::Short(1))));
-        let scan = crate::read(&reflected).expect("whole");
-        assert_eq!(
-            scan.channels[0].values(),
-            [11.5, 12.0, 12.5, 10.0, 10.5, 11.0]
-        );
-        assert_eq!(scan.frame_direction, None);
-    }
-
-    #[test]
-    fn what_is_missing_is_said() {
-        let unknown = image(|_, channel| {
-            channel.retain(|(tag, _)| *tag != SLOT_SCALING + SLOT_STRIDE);
-        });
-        let error = crate::read(&unknown)
-            .expect_err("nothing to read")
-            .to_string();
-        assert!(error.contains("linear scaling"), "{error}");
-        let taller = image(|_, channel| {
-            for (tag, value) in channel {
-                if *tag == 257 {
-                    *value = Value::Short(9);
-                }
-            }
-        });
-        let error = crate::read(&taller).expect_err("damaged").to_string();
-        assert!(
-            error.contains("12 bytes") && error.contains("54"),
-            "{error}"
-        );
-    }
-
-    #[test]
-    fn maps_hold_their_image_in_an_archive() {
-        let header = ("header.properties", &b"#"[..]);
-        let map = zip(&[header, ("data-image.jpk-qi-image", &image(|_, _| {}))]);
-        let scan = crate::read(&map).expect("whole");
-        assert_eq!(scan.channels[0].values()[0], 10.0);
-        assert!(crate::read(&map[..map.len() / 2]).is_err());
-        assert!(matches!(
-            crate::read(&zip(&[header, ("segments/0/data", b"curve")])),
-            Err(ReadError::ForceCurve)
-        ));
-    }
-}
+mod tests;

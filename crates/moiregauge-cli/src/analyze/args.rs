@@ -3,8 +3,9 @@
 use std::path::PathBuf;
 
 use clap::ValueEnum;
+use moiregauge::material::Material;
 use moiregauge::settings::{
-    Background, GivenDrift, Grouping, Lines, Method, Settings, StrainConvention,
+    Background, GivenDrift, Grouping, Lines, Method, MoireLayers, Settings, StrainConvention,
 };
 use moiregauge_report::{Choice, ColorMap};
 
@@ -12,6 +13,7 @@ use super::export::{self, Export};
 use super::orientation::OrientationArgs;
 use crate::config;
 use crate::input::KnownArgs;
+use crate::scanner::ScannerArgs;
 
 /// From scans to drift, moiré vectors, twist and heterostrain, with figures and a report
 ///
@@ -32,6 +34,7 @@ Examples:
   moiregauge analyze scans/ --out results --export corrected.gwy
   moiregauge analyze scans/ --out results --layers graphene/hBN --lattice-angle 12.3±0.2
   moiregauge analyze scans/ --out results --atomic atomic_up.spm atomic_down.spm
+  moiregauge analyze scans/ --out results --moires 2 --layers graphene,graphene/hBN
   moiregauge analyze image.npy --out results --size 70nm×70nm --line-rate 4 --frame-direction up
 
 Angles are counter-clockwise, x to the right and y up, as the position sensors tell.")]
@@ -59,9 +62,15 @@ pub(crate) struct AnalyzeArgs {
     #[arg(long, value_name = "NAME")]
     material: Option<String>,
     /// The layers: graphene for two equal ones, graphene/hBN for graphene (layer 2) on hBN (layer 1, the
-    /// reference); names of --materials too
-    #[arg(long, value_name = "UPPER/LOWER", conflicts_with = "material")]
-    layers: Option<String>,
+    /// reference); names of --materials too. With --moires N one for all, or one for each moiré, the largest
+    /// cell first: graphene,graphene/hBN
+    #[arg(
+        long,
+        value_name = "UPPER/LOWER[,…]",
+        value_delimiter = ',',
+        conflicts_with = "material"
+    )]
+    layers: Vec<String>,
     /// TOML file with layers of your own, one [[layer]] table each (see `moiregauge config`)
     #[arg(long, value_name = "FILE")]
     pub(super) materials: Option<PathBuf>,
@@ -79,22 +88,8 @@ pub(crate) struct AnalyzeArgs {
     /// Standard uncertainty of the Poisson ratio, for the budget [default: the material's]
     #[arg(long, value_name = "RATIO")]
     poisson_ratio_sigma: Option<f64>,
-    /// Calibration of the scanner, as `moiregauge calibrate` writes it: corrects positions, and its errors take
-    /// the place of the three below
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["calibration_gain", "calibration_mismatch", "calibration_orthogonality"])]
-    calibration: Option<PathBuf>,
-    /// Gain error of the scanner, common to x and y, per cent, for the budget [default: 1]
-    #[arg(long, value_name = "PERCENT")]
-    calibration_gain: Option<f64>,
-    /// Difference of the gains of x and y, per cent, for the budget [default: 0.5]
-    #[arg(long, value_name = "PERCENT")]
-    calibration_mismatch: Option<f64>,
-    /// Deviation of the axes from a right angle, mrad, for the budget [default: 5]
-    #[arg(long, value_name = "MRAD")]
-    calibration_orthogonality: Option<f64>,
-    /// Isotropic heterostrain that the layers may have, per cent, for the budget [default: 0.05]
-    #[arg(long, value_name = "PERCENT")]
-    isotropic_strain: Option<f64>,
+    #[command(flatten)]
+    scanner: ScannerArgs,
     /// Form of the strain equation [default: real-space]
     #[arg(long, value_enum)]
     strain_convention: Option<ConventionArg>,
@@ -187,16 +182,12 @@ impl AnalyzeArgs {
             None => Settings::default(),
         };
         let own = config::own_materials(self.materials.as_deref())?;
-        if let Some(layers) = &self.layers {
-            (s.material, s.substrate) = config::named_layers(layers, &own)?;
-        } else if let Some(name) = &self.material {
-            (s.material, s.substrate) = config::named_layers(name, &own)?;
-        }
+        self.layers(&mut s, &own)?;
         s.lattice_angle = self.orientation.known().or(s.lattice_angle);
         let by_user = [self.lattice_constant, self.poisson_ratio];
         if by_user.iter().any(Option::is_some) {
             anyhow::ensure!(
-                s.substrate.is_none(),
+                s.substrate.is_none() && s.moire_layers.is_empty(),
                 "--lattice-constant and --poisson-ratio describe two equal layers; describe different ones in \
                  a file (--materials)"
             );
@@ -217,23 +208,11 @@ impl AnalyzeArgs {
                 self.poisson_ratio_sigma,
                 &mut s.material.poisson_ratio_sigma,
             ),
-            (self.calibration_gain, &mut s.calibration.gain_percent),
-            (
-                self.calibration_mismatch,
-                &mut s.calibration.mismatch_percent,
-            ),
-            (
-                self.calibration_orthogonality,
-                &mut s.calibration.orthogonality_mrad,
-            ),
-            (self.isotropic_strain, &mut s.isotropic_strain_percent),
         ];
         for (given, setting) in priors {
             *setting = given.unwrap_or(*setting);
         }
-        if let Some(path) = &self.calibration {
-            s.scanner = Some(crate::calibrate::file::read(path)?);
-        }
+        self.scanner.apply(&mut s)?;
         if self.channel.is_some() {
             s.channel.clone_from(&self.channel);
         }
@@ -261,6 +240,29 @@ impl AnalyzeArgs {
         s.seed = self.seed.unwrap_or(s.seed);
         config::check(&s)?;
         Ok(s)
+    }
+
+    /// The layers: one pair for all moirés, or one for each.
+    fn layers(&self, s: &mut Settings, own: &[Material]) -> anyhow::Result<()> {
+        let named = self.layers.iter().chain(&self.material);
+        let mut pairs = named
+            .map(|name| config::named_layers(name, own))
+            .collect::<anyhow::Result<Vec<_>>>()?;
+        if pairs.is_empty() {
+            return Ok(());
+        }
+        s.moire_layers.clear();
+        if pairs.len() == 1 {
+            (s.material, s.substrate) = pairs.swap_remove(0);
+        } else {
+            let each = pairs.into_iter();
+            s.moire_layers
+                .extend(each.map(|(material, substrate)| MoireLayers {
+                    material,
+                    substrate,
+                }));
+        }
+        Ok(())
     }
 
     /// Makes the number of threads that is wanted.

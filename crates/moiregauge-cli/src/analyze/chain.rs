@@ -88,24 +88,28 @@ pub(crate) fn analyse_files(
         inputs: files,
         failed,
     };
-    let outcomes = sorted_moires(scans).into_iter().map(|scans| {
-        let mut analysis = analyse(scans, settings);
-        analysis
-            .caveats
-            .extend(other.as_ref().map(channel::Other::caveat));
-        if illustrated {
-            analysis.sets.par_iter_mut().for_each(|set| {
-                set.illustration = set.scans.first().and_then(|first| {
-                    let reading = read(Path::new(&first.file), settings, known).ok()?;
-                    illustrate(&reading.scan, first, settings)
+    let outcomes = sorted_moires(scans)
+        .into_iter()
+        .enumerate()
+        .map(|(moire, scans)| {
+            let settings = &settings.of_moire(moire);
+            let mut analysis = analyse(scans, settings);
+            analysis
+                .caveats
+                .extend(other.as_ref().map(channel::Other::caveat));
+            if illustrated {
+                analysis.sets.par_iter_mut().for_each(|set| {
+                    set.illustration = set.scans.first().and_then(|first| {
+                        let reading = read(Path::new(&first.file), settings, known).ok()?;
+                        illustrate(&reading.scan, first, settings)
+                    });
                 });
-            });
-        }
-        Outcome {
-            analysis,
-            provenance: provenance.clone(),
-        }
-    });
+            }
+            Outcome {
+                analysis,
+                provenance: provenance.clone(),
+            }
+        });
     Ok(outcomes.collect())
 }
 

@@ -10,7 +10,7 @@ use moiregauge::estimate::Estimate;
 use moiregauge::lattice::LatticeVectors;
 use moiregauge::readings::Readings;
 use moiregauge::strain::TwistStrain;
-use moiregauge_report::{FailedInput, plus_minus, two_digits};
+use moiregauge_report::{FailedInput, fixed, plus_minus, two_digits};
 use spmfile::FrameDirection;
 
 /// Per set and combined: drift, twist, strain; then what to keep in mind.
@@ -97,15 +97,10 @@ fn directions(set: &SetAnalysis) -> String {
     }
 }
 
-/// One decimal and a true minus sign.
-fn fixed(angle: f64) -> String {
-    format!("{angle:.1}").replace('-', "−")
-}
-
 /// Lengths and directions of the three vectors.
 fn lattice(text: &mut String, lattice: &LatticeVectors) {
     let lengths = [0, 1, 2].map(|i| plus_minus(lattice.wavelength(i)));
-    let angles = [0, 1, 2].map(|i| fixed(lattice.polar_angle(i).value.to_degrees()));
+    let angles = [0, 1, 2].map(|i| fixed(lattice.polar_angle(i).value.to_degrees(), 1));
     let _ = writeln!(
         text,
         "  lattice       {} nm at {}° to x",

@@ -3,6 +3,8 @@
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
+use moiregauge_report::FailedInput;
+
 /// The files meant by names of files, folders and wildcards, in order; names that mean none come
 /// back with the reason.
 pub(crate) fn expand(paths: &[PathBuf]) -> Vec<Result<PathBuf, (PathBuf, String)>> {
@@ -25,6 +27,21 @@ pub(crate) fn expand(paths: &[PathBuf]) -> Vec<Result<PathBuf, (PathBuf, String)
         }
     }
     files
+}
+
+/// The same, what can be read apart from what cannot.
+pub(crate) fn inputs(paths: &[PathBuf]) -> (Vec<PathBuf>, Vec<FailedInput>) {
+    let (mut files, mut failed) = (Vec::new(), Vec::new());
+    for path in expand(paths) {
+        match path {
+            Ok(path) => files.push(path),
+            Err((path, error)) => failed.push(FailedInput {
+                file: path.display().to_string(),
+                error,
+            }),
+        }
+    }
+    (files, failed)
 }
 
 /// The files of a folder that pass `wanted`, by name.

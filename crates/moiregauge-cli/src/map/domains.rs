@@ -57,10 +57,8 @@ impl DomainArgs {
             When::On => true,
         };
         let Some(find) = find.filter(|_| wanted) else {
-            let caveats = before.in_doubt.then(|| {
-                let why = format!("{}: they were not looked for", before.reasons.join("; "));
-                Caveat::new("phases-in-doubt", "map", why)
-            });
+            let doubt = || Caveat::new("phases-in-doubt", "map", before.reasons.join("; "));
+            let caveats = before.in_doubt.then(doubt);
             return Domains {
                 map: None,
                 regime: before,

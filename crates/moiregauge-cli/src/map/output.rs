@@ -46,6 +46,8 @@ pub(super) struct Made {
 /// Writes everything and says what there is.
 pub(super) fn write(made: &Made, args: &MapArgs) -> anyhow::Result<()> {
     let (map, out) = (&made.map, args.analyze.out());
+    // First, lest a region beyond the map leave half of the files.
+    let (mut details, doubts) = args.regions.answer(map)?;
     let log = vec![format!("moiregauge {} map", env!("CARGO_PKG_VERSION"))];
     let group = out.join("map.zarr");
     if group.join("zarr.json").is_file() {
@@ -65,7 +67,6 @@ pub(super) fn write(made: &Made, args: &MapArgs) -> anyhow::Result<()> {
             &spmfile::write(&map_scan(map), WritableFormat::Gwy, "map", &log)?,
         )?;
     }
-    let (mut details, doubts) = args.regions.answer(map)?;
     details.domains.clone_from(&made.domains.map);
     details.regime = Some(made.domains.regime.clone());
     let mut results = results(made, args.method_name());

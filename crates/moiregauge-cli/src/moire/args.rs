@@ -234,6 +234,8 @@ impl MoireArgs {
 
     /// What is asked, in words.
     pub(super) fn in_words(&self) -> String {
+        // Numbers as they were typed, with true minus signs.
+        let typed = |value: f64| value.to_string().replace('-', "−");
         let mut text = String::new();
         if let [a, b, c] = self.wavelengths.as_slice() {
             let meaning = match self.meaning {
@@ -242,15 +244,17 @@ impl MoireArgs {
             };
             let _ = write!(text, "wavelengths {a}, {b}, {c} nm, {meaning}");
         } else if let [a, b] = self.vectors.as_slice() {
-            let _ = write!(text, "vectors ({a}) and ({b}) nm");
+            let plain = |v: &str| v.trim_matches(['(', ')', ' ']).replace('-', "−");
+            let _ = write!(text, "vectors ({}) and ({}) nm", plain(a), plain(b));
         } else {
-            let _ = write!(text, "twist {}°", self.twist.unwrap_or(0.0));
+            let _ = write!(text, "twist {}°", typed(self.twist.unwrap_or(0.0)));
             if let Some(strain) = self.strain {
-                let axis = self.strain_axis.unwrap_or(0.0);
+                let axis = typed(self.strain_axis.unwrap_or(0.0));
+                let strain = typed(strain);
                 let _ = write!(text, ", strain {strain} % along {axis}° from layer 1");
             }
             if let Some(biaxial) = self.biaxial {
-                let _ = write!(text, ", biaxial strain {biaxial} %");
+                let _ = write!(text, ", biaxial strain {} %", typed(biaxial));
             }
         }
         text
@@ -259,7 +263,10 @@ impl MoireArgs {
 
 /// `12.9,0.4`.
 fn vector(text: &str) -> anyhow::Result<[f64; 2]> {
-    let numbers: Vec<f64> = text
+    // As it was printed, with brackets and true minus signs.
+    let plain = text.replace('−', "-");
+    let numbers: Vec<f64> = plain
+        .trim_matches(['(', ')', ' '])
         .split(',')
         .filter_map(|part| part.trim().parse().ok())
         .filter(|x: &f64| x.is_finite())

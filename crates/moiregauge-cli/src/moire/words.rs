@@ -6,7 +6,7 @@ use moiregauge::estimate::Estimate;
 use moiregauge::material::Material;
 use moiregauge::readings::Readings;
 use moiregauge::strain::Branch;
-use moiregauge_report::{CellResult, MoireDocument, plus_minus};
+use moiregauge_report::{CellResult, MoireDocument, fixed, plus_minus};
 
 /// The cell, and what it means.
 pub(super) fn answer(document: &MoireDocument, readings: Option<&Readings>, axes: &str) -> String {
@@ -19,10 +19,10 @@ pub(super) fn answer(document: &MoireDocument, readings: Option<&Readings>, axes
 }
 
 fn cell(text: &mut String, cell: &CellResult) {
-    let three = |values: &[f64; 3]| values.map(|v| format!("{v:.4}")).join(", ");
+    let three = |values: &[f64; 3]| values.map(|v| fixed(v, 4)).join(", ");
     let vectors = |values: &[[f64; 2]; 3], decimals: usize| {
         values
-            .map(|[x, y]| format!("({x:.decimals$}, {y:.decimals$})"))
+            .map(|[x, y]| format!("({}, {})", fixed(x, decimals), fixed(y, decimals)))
             .join(" ")
     };
     let _ = writeln!(
@@ -86,16 +86,18 @@ fn meaning(text: &mut String, document: &MoireDocument, readings: &Readings, axe
     if let Some(found) = &readings.degeneracy {
         text.push_str("isotropic strain of layer 2 changes the twist:");
         for (strain, change) in &found.shifts {
-            let change =
-                change.map_or_else(|| "no twist".to_owned(), |c| format!("{:+.4}°", c * degree));
-            let _ = write!(text, " {:+.1} % {change};", 100.0 * strain);
+            let change = change.map_or_else(
+                || "no twist".to_owned(),
+                |c| format!("{}°", signed(c * degree, 4)),
+            );
+            let _ = write!(text, " {} % {change};", signed(100.0 * strain, 1));
         }
         let [low, high] = found.interval;
         let _ = writeln!(
             text,
-            "\n  {:.4}° to {:.4}° are open for isotropic strains of {:.3} % (1 σ) and either sign of the strain (95 %)",
-            low * degree,
-            high * degree,
+            "\n  {}° to {}° are open for isotropic strains of {:.3} % (1 σ) and either sign of the strain (95 %)",
+            fixed(low * degree, 4),
+            fixed(high * degree, 4),
             100.0 * found.prior
         );
     }
@@ -132,6 +134,16 @@ fn meaning(text: &mut String, document: &MoireDocument, readings: &Readings, axe
     }
 }
 
+/// A change, with its sign.
+fn signed(value: f64, decimals: usize) -> String {
+    let text = fixed(value, decimals);
+    if text.starts_with('−') {
+        text
+    } else {
+        format!("+{text}")
+    }
+}
+
 fn solution(text: &mut String, branch: &Branch) {
     let degree = 1f64.to_degrees();
     // Without σ, as many digits as the two meanings of a wavelength and a strain by eye need.
@@ -139,15 +151,15 @@ fn solution(text: &mut String, branch: &Branch) {
         if sigma > 0.0 {
             plus_minus(Estimate::new(value, sigma))
         } else {
-            format!("{value:.decimals$}")
+            fixed(value, decimals)
         }
     };
     let _ = writeln!(
         text,
-        "  twist {}°, strain {} % along {:.2}°{}",
+        "  twist {}°, strain {} % along {}°{}",
         number(branch.twist * degree, branch.twist_sigma * degree, 4),
         number(branch.strain * 100.0, branch.strain_sigma * 100.0, 4),
-        branch.axis_lab * degree,
+        fixed(branch.axis_lab * degree, 2),
         if branch.strain_dominated {
             " (made by strain, distorted by twist)"
         } else {

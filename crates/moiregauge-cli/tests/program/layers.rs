@@ -103,6 +103,44 @@ fn three_wavelengths_have_to_say_what_they_are() {
     );
 }
 
+/// What is printed has true minus signs and can be typed in again: forwards and back is the same twist and strain, one
+/// of the branches.
+#[test]
+fn what_is_printed_can_be_typed_in() {
+    let options = ["--twist", "1.1", "--strain", "0.3", "--strain-axis", "-70"];
+    let forward = succeed(program().arg("moire").args(options)).stdout;
+    let line = forward.lines().find(|l| l.contains("L1, L2")).unwrap();
+    assert!(line.contains('−'), "{line}");
+    let vectors: Vec<&str> = line.split_inclusive(')').collect();
+    let vectors = [0, 1].map(|i: usize| {
+        let text: &str = vectors[i];
+        &text[text.find('(').unwrap()..]
+    });
+    let back = program()
+        .args(["moire", "--vectors"])
+        .args(vectors)
+        .output()
+        .unwrap();
+    let back = String::from_utf8(back.stdout).unwrap();
+    for text in [&forward, &back] {
+        let hyphen = text.as_bytes().windows(2);
+        assert!(
+            !hyphen
+                .clone()
+                .any(|w| w[0] == b'-' && w[1].is_ascii_digit()),
+            "{text}"
+        );
+    }
+    let branches: Vec<&str> = back.lines().filter(|l| l.contains("along")).collect();
+    assert!(branches.len() >= 2, "{back}");
+    assert!(
+        branches
+            .iter()
+            .any(|l| l.contains("twist 1.1") && l.contains("strain 0.3")),
+        "{back}"
+    );
+}
+
 #[test]
 fn figures_of_the_cell() {
     let folder = tempfile::tempdir().unwrap();

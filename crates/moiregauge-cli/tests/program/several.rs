@@ -63,6 +63,50 @@ fn two_moires_have_two_results() {
         assert!(sigma < 0.002, "{sigma}");
         assert_eq!(number(&results, "/settings/moires"), 2.0);
     }
+    // Layers of each moiré: the second is read as that of graphene on hBN, the first as before.
+    let other = folder.path().join("layers");
+    let said = succeed(analyze(&scans, &other).args([
+        "--moires",
+        "2",
+        "--layers",
+        "graphene,graphene/hBN",
+    ]));
+    assert!(
+        said.stdout.contains("moiré 2 of 2: graphene/hBN"),
+        "{}",
+        said.stdout
+    );
+    let both = [1, 2].map(|n| results(&other.join(format!("moire-{n}"))));
+    let (twist, _) = estimate(&both[0], "/sets/0/mean/twist_deg");
+    let (before, _) = estimate(&results(&out.join("moire-1")), "/sets/0/mean/twist_deg");
+    assert!((twist - before).abs() < 1e-12);
+    assert!(both[0].pointer("/settings/substrate").is_none());
+    assert_eq!(both[1].pointer("/settings/substrate/name").unwrap(), "hBN");
+    // λ = κ a/√(κ² − 2κ cos θ + 1): a moiré of 7.42 nm is one of graphene on hBN at 1.60°.
+    let (twist, _) = estimate(&both[1], "/sets/0/mean/twist_deg");
+    let (kappa, lambda) = (0.2504 / 0.246, 0.246 / (2.0 * 0.95_f64.to_radians().sin()));
+    let square = (kappa * 0.246 / lambda).powi(2);
+    let expected = ((kappa * kappa + 1.0 - square) / (2.0 * kappa))
+        .acos()
+        .to_degrees();
+    assert!((twist - expected).abs() < 0.1, "{twist} {expected}");
+    for (arguments, words) in [
+        (vec!["--layers", "graphene,graphene/hBN"], "found 2"),
+        (
+            vec![
+                "--moires",
+                "2",
+                "--layers",
+                "graphene,hBN",
+                "--lattice-angle",
+                "12±0.1",
+            ],
+            "layers of their own",
+        ),
+    ] {
+        let refused = run(analyze(&scans, &folder.path().join("no")).args(arguments));
+        assert!(refused.stderr.contains(words), "{}", refused.stderr);
+    }
     // Nothing is written over unasked.
     let again = run(analyze(&scans, &out).args(["--moires", "2"]));
     assert!(

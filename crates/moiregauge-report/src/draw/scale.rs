@@ -131,7 +131,7 @@ fn multiples(range: Range, step: f64) -> Vec<Tick> {
 }
 
 /// A number with `decimals` decimals and a true minus sign; never `−0`.
-pub(crate) fn fixed(value: f64, decimals: usize) -> String {
+pub fn fixed(value: f64, decimals: usize) -> String {
     let text = format!("{value:.decimals$}");
     let digits = text.trim_start_matches('-');
     if digits.len() < text.len() && digits.bytes().any(|b| (b'1'..=b'9').contains(&b)) {

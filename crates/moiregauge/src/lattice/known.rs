@@ -9,7 +9,7 @@ use nalgebra::{Complex, Matrix2, Vector2};
 
 use super::LatticeError;
 use super::harmonics::{SHELLS, Windowed};
-use super::prepare::{Prepared, Verdict, binning, levelled, signal_to_noise, verdict};
+use super::prepare::{Prepared, Verdict, binned, levelled, signal_to_noise, verdict};
 use super::reciprocal::{reciprocal, shortest_pair};
 use super::select::{
     Candidate, Orders, Peak, by_score, frame_cycles, score, spectrum_peaks, well_explained,
@@ -42,12 +42,7 @@ pub(super) fn prepare(
     let full = Spectrum::new(&image);
     let mut best = [0.0; 3];
     for candidate in candidates(&full, &geometry.pixel_to_nm, known) {
-        let binning = binning(&candidate.pair);
-        let binned = if binning == 1 {
-            image.clone()
-        } else {
-            image.binned(binning)
-        };
+        let (binning, binned) = binned(&image, &candidate.pair);
         // The pair goes through all peaks that it explains; the first harmonics may be faint.
         let pair = candidate.pair * binning as f64;
         let Some(harmonics) = Windowed::new(&binned).fit(&binned, &pair, background, &SHELLS)

@@ -38,12 +38,7 @@ pub(super) fn prepare(
     let full = Spectrum::new(&image);
     let mut best = [0.0; 3];
     for candidate in select::candidates(&full, &geometry.pixel_to_nm) {
-        let binning = binning(&candidate.pair);
-        let binned = if binning == 1 {
-            image.clone()
-        } else {
-            image.binned(binning)
-        };
+        let (binning, binned) = binned(&image, &candidate.pair);
         let pair = candidate.pair * binning as f64;
         let Some((mut harmonics, mut peaks)) = refine(&binned, &pair, background) else {
             continue;
@@ -127,6 +122,14 @@ pub(super) fn binning(pair: &Matrix2<f64>) -> usize {
         .max(third.norm());
     let shortest_period = std::f64::consts::TAU / largest;
     ((shortest_period / BINS_PER_PERIOD) as usize).max(1)
+}
+
+/// The image with as many pixels averaged as [`binning`] allows, and how many these are along each axis.
+pub(super) fn binned(image: &Image, pair: &Matrix2<f64>) -> (usize, Image) {
+    match binning(pair) {
+        1 => (1, image.clone()),
+        size => (size, image.binned(size)),
+    }
 }
 
 /// The harmonics and the three first wave vectors, starting from a pair found in the spectrum.

@@ -1,7 +1,7 @@
 //! The layers known by name.
 //!
-//! Uncertainties are those between sources; where there is one source, or one that is to be
-//! confirmed, 0.0005 nm and 0.03. The Poisson ratio of a layer with the 2D moduli K and G is (K − G)/(K + G).
+//! Uncertainties are those between sources; where there is one source, or one whose number was not seen in print, 0.0005 nm
+//! and 0.03 or more, and the source says so. Bulk crystals stand for their layers. The Poisson ratio of a layer with the 2D moduli K and G is (K − G)/(K + G).
 
 /// One layer: a (nm); b (nm) and γ (degrees) where it is not hexagonal; ν; uncertainties of a and ν.
 pub(super) struct Row {
@@ -43,13 +43,13 @@ pub(super) const OTHERS: [Row; 8] = [
         "hBN",
         [0.2504, 0.0003],
         [0.21, 0.03],
-        "a: 0.251 nm is also in use; ν: Falin et al. 2017; both to be confirmed",
+        "a: 0.25039 nm by X-rays, Pease 1952, Acta Cryst. 5, 356 (0.251 nm is also in use); ν: Falin et al. 2017, Nature Communications 8, 15815",
     ),
     hexagonal(
         "MoS2",
         [0.3160, 0.0005],
         [0.25, 0.03],
-        "a: Wilson and Yoffe 1969; ν: Çakır et al. 2014 (DFT); both to be confirmed",
+        "a: bulk molybdenite, 0.316 nm in handbooks and in Wilson and Yoffe 1969; ν: DFT, Çakır et al. 2014, Appl. Phys. Lett. 104, 203110, number not verified",
     ),
     hexagonal(
         "MoSe2",
@@ -61,13 +61,13 @@ pub(super) const OTHERS: [Row; 8] = [
         "MoTe2",
         [0.352, 0.0005],
         [0.24, 0.03],
-        "a: Wilson and Yoffe 1969; ν: Çakır et al. 2014 (DFT); both to be confirmed",
+        "a: bulk 2H, 0.3519 nm in data collections, primary source not verified; ν: DFT, Çakır et al. 2014, Appl. Phys. Lett. 104, 203110, number not verified",
     ),
     hexagonal(
         "WS2",
         [0.3153, 0.0005],
         [0.22, 0.03],
-        "a: Schutte et al. 1987; ν: Çakır et al. 2014 (DFT); both to be confirmed",
+        "a: bulk 2H, 0.31532 nm, Schutte et al. 1987, J. Solid State Chem. 70, 207; ν: DFT (PBE), C₁₁ = 143.2 and C₁₂ = 31.5 N/m of the layer",
     ),
     hexagonal(
         "WSe2",
@@ -77,9 +77,9 @@ pub(super) const OTHERS: [Row; 8] = [
     ),
     hexagonal(
         "NbSe2",
-        [0.3444, 0.0005],
+        [0.3444, 0.001],
         [0.25, 0.05],
-        "a: Wilson and Yoffe 1969, to be confirmed; ν: between 0.2 and 0.3, no good source, give your own",
+        "a: bulk 2H, as in Wilson and Yoffe 1969, number not verified (0.3458 nm is the mean below the charge-density-wave transition); ν: between 0.2 and 0.3, no source, give your own",
     ),
     Row {
         name: "WTe2 1T′",
@@ -88,6 +88,6 @@ pub(super) const OTHERS: [Row; 8] = [
         poisson_ratio: 0.2,
         a_sigma: 0.001,
         poisson_ratio_sigma: 0.1,
-        source: "a, b: bulk, Brown 1966, to be confirmed; ν: a guess, the layer is not isotropic, give your own",
+        source: "a, b: bulk, Brown 1966, Acta Cryst. 20, 268, numbers not verified; ν: a guess, the layer is not isotropic, give your own",
     },
 ];

@@ -1,6 +1,7 @@
 //! Simulated sets with biaxial strain, and atomic images of one layer in the same frame of the scanner.
 
 use moiregauge::analysis::Analysis;
+use moiregauge::caveat::Caveat;
 use moiregauge::material::Material;
 use moiregauge::series::{
     AtomicOrientation, MeasuredScan, analyse, atomic_orientation, measure_scan,
@@ -125,10 +126,25 @@ pub(crate) fn truth(simulation: &Simulation) -> [f64; 6] {
 }
 
 impl Outcome {
-    /// The strain tensor of the set.
+    /// The strain tensor of the set. An orientation is known modulo 60°, and different layers may then have two readings of
+    /// little strain: the one that was put in, whichever comes first, if the ambiguity is told.
     pub(crate) fn tensor(&self) -> StrainTensor {
         let mean = self.analysis.sets[0].mean.as_ref().expect("a mean");
-        mean.readings.tensor.as_ref().expect("a tensor").best
+        let found = mean.readings.tensor.as_ref().expect("a tensor");
+        if !self.is_ambiguous() {
+            return found.best;
+        }
+        let twist = truth(&self.simulation)[0];
+        let all = std::iter::once(&found.best).chain(&found.alternatives);
+        let off = |t: &&StrainTensor| (t.twist - twist).abs();
+        *all.min_by(|a, b| off(a).total_cmp(&off(b)))
+            .expect("a tensor")
+    }
+
+    /// Whether different layers have more than one reading, and the analysis says so.
+    pub(crate) fn is_ambiguous(&self) -> bool {
+        let told = |c: &Caveat| c.code == "orientation-ambiguous";
+        self.simulation.sample.substrate.is_some() && self.analysis.caveats.iter().any(told)
     }
 
     /// Errors in units of σ: twist, mean strain, both components of the shear part, uniaxial and biaxial part.

@@ -1,0 +1,51 @@
+//! Options that say what is known of the scanner and of isotropic strain, for the uncertainty budget.
+
+use std::path::PathBuf;
+
+use moiregauge::settings::Settings;
+
+/// What no scan of a moiré tells.
+#[derive(clap::Args, Clone, Debug)]
+pub(crate) struct ScannerArgs {
+    /// Calibration of the scanner, as `moiregauge calibrate` writes it: corrects positions, and its errors take
+    /// the place of the three below
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["calibration_gain", "calibration_mismatch", "calibration_orthogonality"])]
+    calibration: Option<PathBuf>,
+    /// Gain error of the scanner, common to x and y, per cent, for the budget [default: 1]
+    #[arg(long, value_name = "PERCENT")]
+    calibration_gain: Option<f64>,
+    /// Difference of the gains of x and y, per cent, for the budget [default: 0.5]
+    #[arg(long, value_name = "PERCENT")]
+    calibration_mismatch: Option<f64>,
+    /// Deviation of the axes from a right angle, mrad, for the budget [default: 5]
+    #[arg(long, value_name = "MRAD")]
+    calibration_orthogonality: Option<f64>,
+    /// Isotropic heterostrain that the layers may have, per cent, for the budget [default: 0.05]
+    #[arg(long, value_name = "PERCENT")]
+    isotropic_strain: Option<f64>,
+}
+
+impl ScannerArgs {
+    /// Puts what was given on top of the settings.
+    pub(crate) fn apply(&self, settings: &mut Settings) -> anyhow::Result<()> {
+        let priors = &mut settings.calibration;
+        for (given, setting) in [
+            (self.calibration_gain, &mut priors.gain_percent),
+            (self.calibration_mismatch, &mut priors.mismatch_percent),
+            (
+                self.calibration_orthogonality,
+                &mut priors.orthogonality_mrad,
+            ),
+            (
+                self.isotropic_strain,
+                &mut settings.isotropic_strain_percent,
+            ),
+        ] {
+            *setting = given.unwrap_or(*setting);
+        }
+        if let Some(path) = &self.calibration {
+            settings.scanner = Some(crate::calibrate::file::read(path)?);
+        }
+        Ok(())
+    }
+}
