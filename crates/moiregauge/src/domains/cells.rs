@@ -93,9 +93,9 @@ impl DomainMap {
         // On the sample the pair may stand clockwise: a mirrored scan.
         if j.determinant() < 0.0 {
             let swap = Matrix2::new(0.0, 1.0, 1.0, 0.0);
-            cells
-                .iter_mut()
-                .for_each(|c| c.lattice = c.lattice.relabelled(&swap));
+            for cell in &mut cells {
+                cell.lattice = cell.lattice.relabelled(&swap);
+            }
         }
         let sum: Matrix2<f64> = cells.iter().map(|c| c.lattice.basis).sum();
         let mean = sum / cells.len() as f64;

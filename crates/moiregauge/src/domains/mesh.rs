@@ -193,7 +193,9 @@ impl<'a> Net<'a> {
         let bad: Vec<usize> = (0..self.kept.len())
             .filter(|t| (0..3).any(|i| core(self.starts[3 * t + i])))
             .collect();
-        bad.into_iter().for_each(|t| self.kept[t] = false);
+        for triangle in bad {
+            self.kept[triangle] = false;
+        }
     }
 
     /// Gives every edge its step and every node its index, part by part; drops parts that are too small.
@@ -212,7 +214,7 @@ impl<'a> Net<'a> {
             if part.len() < FEW {
                 for t in part {
                     self.kept[t] = false;
-                    (0..3).for_each(|i| self.steps[3 * t + i] = None);
+                    self.steps[3 * t..3 * t + 3].fill(None);
                 }
                 continue;
             }

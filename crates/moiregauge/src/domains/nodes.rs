@@ -263,19 +263,19 @@ pub(super) fn blurred(image: &Image, width: [f64; 2]) -> Vec<f64> {
         .values
         .iter()
         .map(|v| f64::from(u8::from(v.is_finite())));
-    let weights = blur(known.collect(), image, width);
+    let weights = blur(&known.collect::<Vec<_>>(), image, width);
     let values = image
         .values
         .iter()
         .map(|v| if v.is_finite() { *v } else { 0.0 });
-    let sums = blur(values.collect(), image, width);
+    let sums = blur(&values.collect::<Vec<_>>(), image, width);
     sums.iter()
         .zip(weights)
         .map(|(s, w)| s / w.max(1e-9))
         .collect()
 }
 
-fn blur(values: Vec<f64>, image: &Image, width: [f64; 2]) -> Vec<f64> {
+fn blur(values: &[f64], image: &Image, width: [f64; 2]) -> Vec<f64> {
     let kernel = |w: f64| -> Vec<f64> {
         let reach = (3.5 * w).ceil() as i32;
         (-reach..=reach)

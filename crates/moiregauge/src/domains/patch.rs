@@ -163,7 +163,9 @@ impl Template {
             row += 1.0;
         }
         if self.lines {
-            rows.iter_mut().for_each(|line| less_mean(line));
+            for line in &mut rows {
+                less_mean(line);
+            }
         }
         // Instrumental variables: noise in the slopes of the mean node is not in the probes.
         let (mut normal, mut right, mut count) = (Matrix6::zeros(), Vector6::zeros(), 0.0);

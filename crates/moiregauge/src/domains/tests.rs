@@ -72,7 +72,9 @@ fn places_have_honest_errors() {
             let mut scene = scene(seed);
             scene.line = line;
             let mut image = scene.image();
-            image.values.iter_mut().for_each(|v| *v *= sign);
+            for value in &mut image.values {
+                *value *= sign;
+            }
             let found = find_nodes(&image, &scene.lattice, [1.0; 2], Contrast::Auto).unwrap();
             let contrast = if sign > 0.0 {
                 Contrast::Bright
@@ -319,10 +321,9 @@ fn the_regime_has_its_reasons() {
         small.reasons
     );
     let mut blunt = found.clone();
-    blunt
-        .nodes
-        .iter_mut()
-        .for_each(|n| n.covariance = Matrix2::identity() * 100.0);
+    for node in &mut blunt.nodes {
+        node.covariance = Matrix2::identity() * 100.0;
+    }
     let noisy = regime(&map(0.3), Some(&domains(2.0, &blunt)));
     assert!(noisy.in_doubt && noisy.choice == RegimeChoice::Phases);
     assert!(noisy.reasons.iter().any(|r| r.contains("uncertain")));

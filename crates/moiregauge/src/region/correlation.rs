@@ -37,7 +37,9 @@ pub(super) fn pairs(grid: &Grid, nodes: &[(usize, f64)], window: f64) -> Pairs {
     }
     let [columns, rows] = grid.size.map(|n| n as i64);
     let mut weights = vec![0.0; grid.len()];
-    nodes.iter().for_each(|&(n, w)| weights[n] = w);
+    for &(node, weight) in nodes {
+        weights[node] = weight;
+    }
     let offsets = offsets(grid, window);
     let sums: Vec<[f64; 2]> = nodes
         .par_iter()

@@ -128,7 +128,7 @@ impl Shape {
         let rows = (-most..=most).filter_map(|row| {
             let mut columns = (-wide..=wide).filter(|&c| inside(c, row));
             let first = columns.next()?;
-            Some((row, [first, columns.last().unwrap_or(first)]))
+            Some((row, [first, columns.next_back().unwrap_or(first)]))
         });
         let rows: Vec<_> = rows.collect();
         (!rows.is_empty()).then_some(Self { rows })

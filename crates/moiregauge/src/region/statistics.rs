@@ -9,7 +9,7 @@ use crate::strain::TwistStrain;
 
 /// Mean and spread of a quantity over an area.
 ///
-/// With weights w_i that add up to one, errors σ_i and correlations ρ_ij of the noise of nodes:
+/// With weights `w_i` that add up to one, errors `σ_i` and correlations `ρ_ij` of the noise of nodes:
 /// `var(mean) = ⟨σ²⟩ Σ w_i w_j ρ_ij`, and the expected square scatter about the mean is
 /// `v + ⟨σ²⟩(1 − Σ w_i w_j ρ_ij)` with v that of the quantity itself.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -85,7 +85,9 @@ struct Area<'a> {
 impl<'a> Area<'a> {
     fn new(map: &'a TwistStrainMap, mut nodes: Vec<(usize, f64)>) -> Self {
         let all: f64 = nodes.iter().map(|n| n.1).sum();
-        nodes.iter_mut().for_each(|n| n.1 /= all);
+        for node in &mut nodes {
+            node.1 /= all;
+        }
         let curvature = curvature(map, &nodes);
         Self {
             pairs: pairs(&map.grid, &nodes, map.window_nm),

@@ -385,7 +385,7 @@ fn errors_of_means_are_those_of_the_noise() {
                 pulls.len()
             );
         }
-        let share = exceeded as f64 / all as f64;
+        let share = exceeded as f64 / f64::from(all);
         assert!(share < 0.12, "{amplitudes:?}: {share}");
     }
 }
