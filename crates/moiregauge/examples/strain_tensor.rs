@@ -8,11 +8,12 @@
 #[path = "../tests/tensor_scene/mod.rs"]
 mod tensor_scene;
 
+use moiregauge::caveat::Caveat;
 use rayon::prelude::*;
 use tensor_scene::{moire, on_hbn, run, truth};
 
-/// Pulls and errors of one set, and whether it has more than one reading.
-type Outcome = ([f64; 7], [f64; 7], bool);
+/// Pulls and errors of one set, whether it has more than one reading, and whether its atomic images scatter.
+type Outcome = ([f64; 7], [f64; 7], [bool; 2]);
 
 fn main() {
     let mut arguments = std::env::args().skip(1);
@@ -56,7 +57,9 @@ fn main() {
             pulls[..6].copy_from_slice(&outcome.pulls());
             all[..6].copy_from_slice(&errors);
             (pulls[6], all[6]) = (off / outcome.atomic.angle.sigma.to_degrees(), off);
-            (pulls, all, outcome.is_ambiguous())
+            let scatter = |c: &Caveat| c.code == "atomic-scatter";
+            let scatters = outcome.atomic.caveats.iter().any(scatter);
+            (pulls, all, [outcome.is_ambiguous(), scatters])
         })
         .collect();
     let n = results.len() as f64;
@@ -87,8 +90,15 @@ fn main() {
             if i == 0 || i == 6 { "°" } else { "%" }
         );
     }
-    let ambiguous = results.iter().filter(|r| r.2).count();
-    if ambiguous > 0 {
-        println!("{ambiguous} sets are said to have more than one reading; the nearest is counted");
+    let count = |i: usize| results.iter().filter(|r| r.2[i]).count();
+    println!(
+        "{} sets whose atomic images scatter more than they should",
+        count(1)
+    );
+    if hetero {
+        println!(
+            "{} sets with more than one reading, of which the nearest is counted",
+            count(0)
+        );
     }
 }

@@ -13,4 +13,5 @@ mod results;
 mod round_trip;
 mod same_bytes;
 mod several;
+mod surveys;
 mod validation;
