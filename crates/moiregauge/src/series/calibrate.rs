@@ -376,12 +376,12 @@ fn about_drift(
     let per_minute = drift_sigma * 60.0;
     let size = match gradient {
         Some(u) => format!(
-            "a drift of 1 nm/min makes {:.2} % along the slow axis, or {:.1} mrad of shear; a drift of 0 ± {per_minute} \
+            "A drift of 1 nm/min makes {:.2} % along the slow axis, or {:.1} mrad of shear; a drift of 0 ± {per_minute} \
              nm/min is assumed (--drift-sigma) and is in the errors",
             100.0 * u.norm() / 60.0,
             1000.0 * u.norm() / 60.0
         ),
-        None => "without a line rate it cannot be said how much: --line-rate would tell, and until then the errors \
+        None => "Without a line rate it cannot be said how much: --line-rate would tell, and until then the errors \
                  are without it"
             .to_owned(),
     };
