@@ -67,10 +67,12 @@ fn an_interrupted_survey_goes_on() {
 fn surveys_are_calibrated() {
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("scanner.toml");
-    let text = "schema = \"moiregauge/calibration/1\"\n[calibration]\ngain_percent = 2.0\n\
+    let text = "schema = \"moiregauge/calibration/1\"\nversion = \"0\"\n[calibration]\ngain_percent = 2.0\n\
                 mismatch_percent = 0.0\northogonality_mrad = 0.0\n\
                 covariance = [[1e-6, 0.0, 0.0], [0.0, 1e-6, 0.0], [0.0, 0.0, 1e-6]]\n\
-                coordinates = \"nominal\"\n";
+                coordinates = \"nominal\"\n\
+                [known_lattice]\nname = \"graphite\"\na_nm = 0.2461\nb_nm = 0.2461\nangle_deg = 120.0\n\
+                sigma_percent = 0.04\nsource = \"the test\"\n";
     std::fs::write(&file, text).expect("a file");
     let plain = map(folder.path(), "plain", &["--in-bands"]);
     let file = file.display().to_string();
@@ -114,7 +116,8 @@ fn real_images_have_maps() {
         let off = (of("mean") - whole("value")).abs();
         let allowed = 3.0 * of("mean_sigma").hypot(whole("sigma")) + of("spread_corrected");
         assert!(off < allowed, "{name}: {off} {allowed} {twist}");
-        assert!(off < 0.01 * whole("value"), "{name}: {off} {twist}");
+        // The wavelengths of both change by more than 10 % from corner to corner.
+        assert!(off < 0.02 * whole("value"), "{name}: {off} {twist}");
     }
     // Stripes have one wave vector in each domain: no twist, and that is said.
     let file = data.join("real/nanonis/au111_herringbone_40nm.sxm");

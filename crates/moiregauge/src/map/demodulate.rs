@@ -8,7 +8,7 @@ use nalgebra::{Matrix2, Vector2};
 
 use super::blocks::{Blocks, Place, mix};
 use super::carrier::Carrier;
-use super::defects::{Blur, Setting, masks};
+use super::defects::{Blur, Mask, Setting, masks};
 use super::leaks::clean;
 use super::median;
 use super::noise::{Beside, Noise};
@@ -260,45 +260,16 @@ impl Work {
             },
             &lattices,
         );
-        let unknown = Matrix2::repeat(f64::NAN);
-        let nodes_out = lattices
-            .iter()
-            .zip(&masks)
-            .enumerate()
-            .map(|(n, (lattice, &mask))| {
-                let carried = self
-                    .carrier
-                    .as_ref()
-                    .map(|c| c.at(places[n]).0)
-                    .unwrap_or_default();
-                let phases = [0, 1, 2].map(|i| {
-                    let [h, k] = self.indices[i].map(f64::from);
-                    let amplitude = smoothed.envelopes[i].amplitude[n];
-                    f64::from(amplitude.arg()) + h * carried.x + k * carried.y
-                });
-                match lattice {
-                    Ok(l) => WaveNode {
-                        mask,
-                        pair: l.pair,
-                        indices: l.indices,
-                        slope: l.slope,
-                        chi2: l.chi2,
-                        freedom: l.freedom,
-                        signal_to_noise: l.signal_to_noise,
-                        phases,
-                    },
-                    Err(_) => WaveNode {
-                        mask,
-                        pair: unknown,
-                        indices: unknown,
-                        slope: unknown,
-                        chi2: f64::NAN,
-                        freedom: 0,
-                        signal_to_noise: 0.0,
-                        phases,
-                    },
-                }
+        let nodes_out = (0..nodes.len()).map(|n| {
+            let carried = self.carrier.as_ref().map(|c| c.at(places[n]).0);
+            let carried = carried.unwrap_or_default();
+            let phases = [0, 1, 2].map(|i| {
+                let [h, k] = self.indices[i].map(f64::from);
+                let amplitude = smoothed.envelopes[i].amplitude[n];
+                f64::from(amplitude.arg()) + h * carried.x + k * carried.y
             });
+            node_of(lattices[n].as_ref().ok(), masks[n], phases)
+        });
         let harmonics = self
             .indices
             .iter()
@@ -401,6 +372,21 @@ impl Work {
                 median(&mut of_node.collect::<Vec<f64>>())
             });
         shares.collect()
+    }
+}
+
+/// A node of the map; NaN where there is no lattice.
+fn node_of(lattice: Option<&LocalLattice>, mask: Mask, phases: [f64; 3]) -> WaveNode {
+    let unknown = Matrix2::repeat(f64::NAN);
+    WaveNode {
+        mask,
+        pair: lattice.map_or(unknown, |l| l.pair),
+        indices: lattice.map_or(unknown, |l| l.indices),
+        slope: lattice.map_or(unknown, |l| l.slope),
+        chi2: lattice.map_or(f64::NAN, |l| l.chi2),
+        freedom: lattice.map_or(0, |l| l.freedom),
+        signal_to_noise: lattice.map_or(0.0, |l| l.signal_to_noise),
+        phases,
     }
 }
 

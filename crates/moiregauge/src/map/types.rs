@@ -1,7 +1,5 @@
 //! What goes into a map of one image and what comes out, in pixels.
 
-use std::f64::consts::{PI, TAU};
-
 use nalgebra::{Matrix2, Vector2};
 
 use super::defects::Mask;
@@ -117,17 +115,11 @@ impl WaveMap {
         self.first + Vector2::new(column as f64 * self.step[0], row as f64 * self.step[1])
     }
 
-    /// Phases of q₁ and q₂ of the pattern at a node, rad, modulo 2π: least squares of those of the first three
-    /// harmonics.
+    /// Phases of q₁ and q₂ of the pattern at a node, rad, modulo 2π. The third harmonic says nothing of them: its phase
+    /// is `φ₂ − φ₁` and a constant of the pattern, which is π where the contrast is the other way round.
     pub(super) fn phases(&self, node: usize) -> Vector2<f64> {
-        let [a, b, c] = self.nodes[node].phases;
-        // What the third has more than the difference of the others.
-        let turn = (c - (b - a) + PI).rem_euclid(TAU) - PI;
-        let against = Vector2::new(a - turn / 3.0, b + turn / 3.0);
-        against
-            + self
-                .reference
-                .pair
-                .tr_mul(&(self.place(node) - self.centre))
+        let [a, b, _] = self.nodes[node].phases;
+        let from_centre = self.place(node) - self.centre;
+        Vector2::new(a, b) + self.reference.pair.tr_mul(&from_centre)
     }
 }
