@@ -9,7 +9,7 @@
 //! Line noise, tip events and harmonics that overlap on a small frame raise it; they are left out. A plan
 //! ([`crate::plan`]) asks for line noise: lines of n pixels that have offsets of their own, with the variance `σ_l²`, lose
 //! the share `λ = n σ_l²/(σ² + n σ_l²)` of their means, and with it what a wave of m cycles per line has there: `s² =
-//! sinc²(πm)` of itself and t of its slope along the line ([`Lines`]). Offsets are taken for white from line to line.
+//! sinc²(πm)` of itself and t of its slope along the line (`Lines`). Offsets are taken for white from line to line.
 //!
 //! # References
 //! Rife and Boorstyn, Bell Syst. Tech. J. 55, 1389 (1976), for one wave.
