@@ -5,6 +5,8 @@ use super::solve::{JointFit, Problem, TestedTerm};
 
 /// Settling times that are tried, as shares of the duration of the campaign.
 const SETTLING: [f64; 5] = [0.05, 0.1, 0.2, 0.4, 0.8];
+/// Errors of the lattice that grow by more than this say that a term is not determined.
+const LOOSE: f64 = 3.0;
 /// Fewer scans than this cannot tell an exponential from a parabola.
 const FEWEST_SETTLING: usize = 6;
 
@@ -96,6 +98,9 @@ impl<'a> Choice<'a> {
             let Some(fit) = self.problem.solve(terms, from, None) else {
                 continue;
             };
+            if self.lowest.is_finite() && loosens(&fit, &self.best) {
+                continue;
+            }
             let name = if terms.fast_gain {
                 FAST_GAIN
             } else if terms.acceleration {
@@ -119,6 +124,12 @@ impl<'a> Choice<'a> {
             }
         }
     }
+}
+
+/// Whether a fit knows the lattice much worse than a simpler one: its terms cannot be told from the lattice (two scans
+/// do not tell a drift that changes), so that no χ² speaks for them.
+pub(super) fn loosens(fit: &JointFit, simpler: &JointFit) -> bool {
+    (0..4).any(|i| fit.unscaled[(i, i)] > LOOSE * LOOSE * simpler.unscaled[(i, i)])
 }
 
 /// Bayesian information criterion, up to a constant: −2 ln L and ln n for each parameter. A settling time is a

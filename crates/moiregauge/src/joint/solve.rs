@@ -115,7 +115,8 @@ pub fn fit(
                 acceleration,
                 ..plain
             };
-            problem.solve(terms, from, None)
+            let linked = problem.solve(terms, from, None);
+            linked.filter(|fit| !choose::loosens(fit, &best))
         });
         best = linked.unwrap_or(best);
     }

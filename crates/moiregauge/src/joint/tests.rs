@@ -148,6 +148,23 @@ fn a_changing_drift_is_no_scatter() {
     assert!(scatter <= 9, "{scatter} of 60");
 }
 
+/// Up and down alone: a drift that changes stretches the lattice of both alike, so that nothing tells it from the
+/// lattice, whatever χ² says.
+#[test]
+fn two_scans_do_not_tell_a_changing_drift() {
+    let drift = Vector2::new(0.5, -0.15) / MINUTE;
+    for seed in 0..100 {
+        let mut all = sightings(2, drift, Vector2::zeros(), seed);
+        // What would speak for anything that takes it up.
+        all[0].waves.basis.m21 += 3e-4;
+        all[2].waves.basis.m21 += 3e-4;
+        let found = fit(&all, (&pair(), &drift), TIME_SIGMA).unwrap();
+        assert!(!found.terms.acceleration, "{seed}");
+        let worst = (0..4).map(|i| found.waves.covariance[(i, i)].sqrt());
+        assert!(worst.fold(0.0, f64::max) < 3e-4, "{seed}");
+    }
+}
+
 /// The closed form against fits without each scan. Without phases the problem is bilinear in drift and
 /// lattice, |D u| = 0.01: differences are of that order.
 #[test]
