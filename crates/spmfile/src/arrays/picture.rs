@@ -43,6 +43,12 @@ pub(super) fn png(bytes: &[u8]) -> Result<Plane, String> {
     // Palettes into colours, fewer bits than eight into eight.
     decoder.set_transformations(Transformations::EXPAND);
     let mut reader = decoder.read_info().map_err(|e| e.to_string())?;
+    let palette = reader.info().palette.as_deref().unwrap_or_default().len();
+    if palette % 3 != 0 || palette > 3 * 256 {
+        return Err(format!(
+            "expected a palette of three bytes for each of up to 256 colours, found {palette} bytes"
+        ));
+    }
     let length = reader
         .output_buffer_size()
         .filter(|&length| length as u64 <= limit)
@@ -410,5 +416,50 @@ mod tests {
         assert!(png(&wide).is_err());
         assert!(jpeg(b"\xff\xd8\xff\xe0\0\x10JFIF").is_err());
         assert!(tiff(b"II*\0\x08\0\0\0\0\0").is_err());
+    }
+
+    /// CRC-32 as the chunks of a PNG file have it.
+    fn crc(bytes: &[u8]) -> u32 {
+        !bytes.iter().fold(u32::MAX, |crc, byte| {
+            (0..8).fold(crc ^ u32::from(*byte), |crc, _| {
+                (crc >> 1) ^ (0xedb8_8320 & 0u32.wrapping_sub(crc & 1))
+            })
+        })
+    }
+
+    /// A picture of two colours whose palette has so many bytes.
+    fn indexed(palette: usize) -> Vec<u8> {
+        let mut whole = Vec::new();
+        let mut encoder = png::Encoder::new(&mut whole, 2, 2);
+        encoder.set_color(png::ColorType::Indexed);
+        encoder.set_depth(png::BitDepth::Eight);
+        encoder.set_palette(vec![0, 0, 0, 200, 200, 200]);
+        let mut writer = encoder.write_header().expect("a header");
+        writer.write_image_data(&[0, 1, 1, 0]).expect("an image");
+        writer.finish().expect("an end");
+        let at = whole
+            .windows(4)
+            .position(|w| w == b"PLTE")
+            .expect("a palette");
+        let mut chunk = b"PLTE".to_vec();
+        chunk.extend((0..palette).map(|i| (i * 40) as u8));
+        let sum = crc(&chunk);
+        let mut changed = whole[..at - 4].to_vec();
+        changed.extend((palette as u32).to_be_bytes());
+        changed.extend(&chunk);
+        changed.extend(sum.to_be_bytes());
+        changed.extend(&whole[at + 4 + 6 + 4..]);
+        changed
+    }
+
+    /// Found by fuzzing: the library stumbles over such a palette.
+    #[test]
+    fn broken_palettes_are_refused() {
+        assert_eq!(super::png(&indexed(6)).expect("two colours").rows, 2);
+        for broken in [1, 5, 148] {
+            let error = super::png(&indexed(broken)).err().expect("no palette");
+            assert!(error.contains(&format!("found {broken} bytes")), "{error}");
+        }
+        assert!(super::png(&indexed(3 * 257)).is_err());
     }
 }
