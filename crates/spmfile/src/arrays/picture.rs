@@ -456,10 +456,12 @@ mod tests {
     #[test]
     fn broken_palettes_are_refused() {
         assert_eq!(super::png(&indexed(6)).expect("two colours").rows, 2);
-        for broken in [1, 5, 148] {
+        for broken in [5, 148] {
             let error = super::png(&indexed(broken)).err().expect("no palette");
             assert!(error.contains(&format!("found {broken} bytes")), "{error}");
         }
-        assert!(super::png(&indexed(3 * 257)).is_err());
+        for broken in [1, 3 * 257] {
+            assert!(super::png(&indexed(broken)).is_err());
+        }
     }
 }
