@@ -9,7 +9,6 @@ use std::process::ExitCode;
 use anyhow::{Context as _, bail, ensure};
 use indicatif::ProgressBar;
 use moiregauge::calibration::KnownLattice;
-use moiregauge::caveat::Caveat;
 use moiregauge::material::Material;
 use moiregauge::series::{MeasuredScan, measure_known};
 use moiregauge::settings::{Grouping, Settings};
@@ -191,14 +190,11 @@ fn measured(
     let Reading {
         scan,
         input,
-        replaced,
+        caveats,
     } = read(path, settings, known)?;
     let mut measured = measure_known(&input.file, &scan, settings, cell)
         .context("looking for the known lattice (another --channel may show it better)")?;
-    for words in replaced {
-        let caveat = Caveat::new("given-by-user", input.file.as_str(), words);
-        measured.caveats.push(caveat);
-    }
+    measured.caveats.extend(caveats);
     Ok((measured, input))
 }
 

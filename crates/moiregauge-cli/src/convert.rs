@@ -247,6 +247,7 @@ impl Target<'_> {
             path.file_name().unwrap_or_default().to_string_lossy()
         )];
         log.extend(replaced);
+        log.extend(scan.notes.iter().cloned());
         if self.args.rotate_to_lab {
             scan = turned(&scan)?;
             log.push("turned into laboratory axes by cubic convolution".to_owned());
@@ -351,6 +352,7 @@ fn turned(scan: &Scan) -> anyhow::Result<Scan> {
             Some(out) => out.channels.extend(turned.channels),
             None => {
                 out = Some(Scan {
+                    notes: scan.notes.clone(),
                     metadata: scan.metadata.clone(),
                     ..turned
                 });

@@ -169,6 +169,7 @@ fn survey(
             .map((settings, resolution), first.as_ref(), out, loud)
             .with_context(|| path.display().to_string())?;
         let file = large.input.file.clone();
+        caveats.extend(large.caveats.iter().cloned());
         let drift = if plan.drift_corrected {
             "corrected for the drift that was given"
         } else if settings.drift.is_some() {

@@ -156,7 +156,7 @@ pub(crate) fn measure_file(
     let Reading {
         scan,
         input,
-        replaced,
+        caveats,
     } = read(path, settings, known)?;
     let mut moires = measure_moires(&input.file, &scan, settings, window)?;
     let set = sets
@@ -164,10 +164,7 @@ pub(crate) fn measure_file(
         .find(|(_, of)| path.starts_with(of))
         .map(|(name, _)| name.clone());
     for measured in &mut moires {
-        let given = replaced
-            .iter()
-            .map(|words| Caveat::new("given-by-user", input.file.as_str(), words.clone()));
-        measured.caveats.extend(given);
+        measured.caveats.extend(caveats.iter().cloned());
         measured.set.clone_from(&set);
     }
     Ok((moires, input))
@@ -177,8 +174,8 @@ pub(crate) fn measure_file(
 pub(crate) struct Reading {
     pub(crate) scan: Scan,
     pub(crate) input: InputFile,
-    /// What the user's options replaced in it.
-    pub(crate) replaced: Vec<String>,
+    /// What the user's options replaced in it, and what its reader doubts.
+    pub(crate) caveats: Vec<Caveat>,
 }
 
 /// Reads what the analysis needs of a file: the chosen channel and the position sensors.
@@ -201,10 +198,16 @@ pub(crate) fn read(path: &Path, settings: &Settings, known: &Known) -> anyhow::R
         sha256: hexadecimal(&hash),
         bytes: bytes.len() as u64,
     };
+    let caveat = |code| {
+        let file = input.file.as_str();
+        move |words: String| Caveat::new(code, file, words)
+    };
+    let doubts = scan.notes.iter().cloned().map(caveat("reader-doubt"));
+    let caveats = replaced.into_iter().map(caveat("given-by-user"));
     Ok(Reading {
+        caveats: caveats.chain(doubts).collect(),
         scan,
         input,
-        replaced,
     })
 }
 
