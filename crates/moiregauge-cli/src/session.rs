@@ -79,6 +79,29 @@ pub(crate) fn one_per_frame(files: Vec<PathBuf>, head: impl Fn(&Path) -> Vec<u8>
     kept
 }
 
+/// Files apart that are another channel of a frame among those before: with the first file of the frame.
+///
+/// Measured both, they would count as two frames.
+pub(crate) fn channels_of_one_frame(
+    files: Vec<PathBuf>,
+) -> (Vec<PathBuf>, Vec<(PathBuf, PathBuf)>) {
+    let (mut kept, mut others) = (Vec::new(), Vec::new());
+    let mut first: BTreeMap<PathBuf, PathBuf> = BTreeMap::new();
+    for file in files {
+        let name = file.file_name().unwrap_or_default().to_string_lossy();
+        let frame = frame_and_channel(&name).map(|(frame, _)| file.with_file_name(frame));
+        if let Some(other) = frame.as_ref().and_then(|frame| first.get(frame)) {
+            others.push((file, other.clone()));
+            continue;
+        }
+        if let Some(frame) = frame {
+            first.insert(frame, file.clone());
+        }
+        kept.push(file);
+    }
+    (kept, others)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -112,6 +135,12 @@ mod tests {
             "odd",
         ];
         assert_eq!(kept(&names), expected);
+        let (kept_files, others) = channels_of_one_frame(names.iter().map(PathBuf::from).collect());
+        assert_eq!(kept_files.len(), 5);
+        assert_eq!(
+            others[1],
+            ("a--1_1.Z_mtrx".into(), "a--1_1.I(V)_mtrx".into())
+        );
         assert!(kept(&["a--1_1.I(V)_mtrx"]).is_empty());
     }
 }

@@ -7,8 +7,8 @@ use indicatif::{ProgressBar, ProgressStyle};
 use moiregauge::analysis::Analysis;
 use moiregauge::caveat::Caveat;
 use moiregauge::series::{
-    MeasuredScan, Window, analyse, choose_channel, common_window, illustrate, measure_moires,
-    sorted_moires,
+    MeasureError, MeasuredScan, Window, analyse, choose_channel, common_window, illustrate,
+    measure_moires, sorted_moires,
 };
 use moiregauge::settings::Settings;
 use moiregauge_report::{FailedInput, InputFile, Provenance};
@@ -158,7 +158,7 @@ pub(crate) fn measure_file(
         input,
         caveats,
     } = read(path, settings, known)?;
-    let mut moires = measure_moires(&input.file, &scan, settings, window)?;
+    let mut moires = measure_moires(&input.file, &scan, settings, window).map_err(with_hint)?;
     let set = sets
         .iter()
         .find(|(_, of)| path.starts_with(of))
@@ -168,6 +168,19 @@ pub(crate) fn measure_file(
         measured.set.clone_from(&set);
     }
     Ok((moires, input))
+}
+
+/// The error, with the option that helps against it.
+pub(crate) fn with_hint(error: MeasureError) -> anyhow::Error {
+    let hint = match error {
+        MeasureError::NoSize => Some("give the size, as in --size 70nm×70nm"),
+        _ => None,
+    };
+    let error = anyhow::Error::new(error);
+    match hint {
+        Some(hint) => error.context(hint),
+        None => error,
+    }
 }
 
 /// A file as the analysis reads it.

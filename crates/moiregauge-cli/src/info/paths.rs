@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use moiregauge_report::FailedInput;
 
-use crate::session::one_per_frame;
+use crate::session::{channels_of_one_frame, one_per_frame};
 
 /// The files meant by names of files, folders and wildcards, in order; names that mean none come
 /// back with the reason.
@@ -27,7 +27,7 @@ pub(crate) fn expand(paths: &[PathBuf]) -> Vec<Result<PathBuf, (PathBuf, String)
     files
 }
 
-/// The same, what can be read apart from what cannot.
+/// The same for measuring: what can be read apart from what cannot, and each frame once.
 pub(crate) fn inputs(paths: &[PathBuf]) -> (Vec<PathBuf>, Vec<FailedInput>) {
     let (mut files, mut failed) = (Vec::new(), Vec::new());
     for path in expand(paths) {
@@ -39,6 +39,15 @@ pub(crate) fn inputs(paths: &[PathBuf]) -> (Vec<PathBuf>, Vec<FailedInput>) {
             }),
         }
     }
+    let (files, others) = channels_of_one_frame(files);
+    failed.extend(others.into_iter().map(|(file, first)| FailedInput {
+        file: file.display().to_string(),
+        error: format!(
+            "another channel of the frame of {}, which is measured already; give the files of one channel, as in \
+             '*.Z_mtrx'",
+            first.display()
+        ),
+    }));
     (files, failed)
 }
 

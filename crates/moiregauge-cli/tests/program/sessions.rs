@@ -91,7 +91,7 @@ fn info_and_convert_find_the_log() {
             .arg(&out)
             .args(["--to", "gwy"]),
     );
-    let stem = format!("Größe_{BASE}--1_2.gwy");
+    let stem = format!("Größe_{BASE}--1_2.Z.gwy");
     let read = infos(&[&out.join(stem)], &[]);
     assert!(
         read[0]["format"]
@@ -192,4 +192,15 @@ fn results_carry_the_doubt() {
     assert!(ran.stdout.contains("reader-doubt"), "{}", ran.stdout);
     let found = results(&out);
     assert!(caveats(&found).contains(&"reader-doubt"));
+    // The same frame by another channel is no second frame.
+    let current = work.path().join("s--1_1.I_mtrx");
+    std::fs::copy(&file, &current).expect("copied");
+    let twice = run(analyze(&file, &work.path().join("twice")).arg(&current));
+    assert_eq!(twice.code, Some(1));
+    assert!(
+        twice.stderr.contains("another channel of the frame"),
+        "{}",
+        twice.stderr
+    );
+    assert_eq!(results(&work.path().join("twice"))["scans"], found["scans"]);
 }
