@@ -5,8 +5,8 @@ use super::blocks::Layer;
 use super::carrier::{Carrier, MOST_CELLS, Slope};
 use super::demodulate::{PILOT, Work, stride_of};
 use super::smooth::{Envelope, Smoothed, smooth};
-use super::window;
-use crate::image::Image;
+use super::waves::level_of_ridge;
+use super::window::{self, of_difference};
 
 /// A harmonic that adds less than this share to what is known is not worth its time.
 const WORTH: f64 = 0.02;
@@ -20,13 +20,13 @@ const FIRST_CELLS: usize = 4;
 const FOLLOWED: usize = 100;
 const LOOKED_AT: usize = 40;
 
-impl Work {
+impl Work<'_> {
     /// Fits the carrier to what a narrow window sees, until little is left.
     pub(super) fn follow(&mut self) {
         let width = PILOT * self.period;
         for round in 0..ROUNDS {
             let smoothed = self.smoothed(width, self.sparse(width, FOLLOWED));
-            let lattices = self.lattices(&smoothed, width, false);
+            let lattices = self.lattices(&smoothed, width);
             let mut slopes = Vec::new();
             // Turn over a window and what noise makes of it, squared.
             let (mut left, mut noise) = (0.0, 0.0);
@@ -36,15 +36,16 @@ impl Work {
                     continue;
                 };
                 let at = smoothed.nodes.place(&self.blocks, node);
+                let change = lattice.pair - self.taken_off(at, width);
                 for axis in 0..2 {
                     let scale = self.reference.in_pixels(width)[axis].powi(2);
-                    left += scale * lattice.pair.row(axis).norm_squared();
-                    noise += scale * lattice.slope[(axis, axis)] * lattice.indices.trace();
+                    left += scale * change.row(axis).norm_squared();
+                    let of = |wave: usize| lattice.variance(axis, wave);
+                    noise += scale * (of(0) + of(1));
                 }
-                let before = self.taken_off(at, width) - self.reference.pair;
                 slopes.push(Slope {
                     at,
-                    slopes: lattice.pair + before,
+                    slopes: lattice.pair - self.reference.pair,
                 });
             }
             if slopes.len() < 4 {
@@ -84,18 +85,23 @@ impl Work {
     }
 
     /// Adds the harmonics that tell something of the lattice to the first three.
-    pub(super) fn choose_harmonics(&mut self, image: &Image) {
+    pub(super) fn choose_harmonics(&mut self) {
         let width = PILOT * self.period;
         let stride = self.sparse(width, LOOKED_AT);
         let level = self.noise.levels.iter().sum::<f64>() / self.noise.levels.len() as f64;
         let first = self.smoothed(width, stride);
-        let told = |envelope: &Envelope, index: [i32; 2]| told(envelope, &first, level, index);
+        let in_pixels = self.reference.in_pixels(width);
+        let told = |envelope: &Envelope, index: [i32; 2]| {
+            let g = self.reference.wave(index);
+            let ridge = level_of_ridge(self.image.ridge(g), g.x * in_pixels[0], in_pixels[0]);
+            told(envelope, &first, level + ridge, index)
+        };
         let of_first = first.envelopes.iter().zip(&self.indices);
         let of_first: Vec<Told> = of_first.map(|(e, &index)| told(e, index)).collect();
         let mut most = of_first.iter().map(|t| t.worth).fold(0.0, f64::max);
         let mut kept: Vec<([i32; 2], Told, Layer)> = Vec::new();
-        for (indices, blocks) in self.others(image) {
-            let smoothed = smooth(&blocks, self.reference.in_pixels(width), first.nodes);
+        for (indices, blocks) in self.others() {
+            let smoothed = smooth(&blocks, in_pixels, first.nodes);
             let layers = blocks.layers.into_iter().zip(smoothed.envelopes);
             for (index, (layer, envelope)) in indices.into_iter().zip(layers) {
                 let found = told(&envelope, index);
@@ -123,7 +129,7 @@ impl Work {
         let mut chosen = steps[0];
         let of = |width: f64, stride| {
             let width = width * self.period;
-            self.lattices(&self.smoothed(width, stride), width, true)
+            self.lattices(&self.smoothed(width, stride), width)
         };
         for &width in &steps {
             // Sparse nodes are enough, and all are independent.
@@ -140,9 +146,10 @@ impl Work {
                 });
                 if let (true, Ok(a), Ok(b)) = (inside, a, b) {
                     let change = b.pair - a.pair;
-                    for (component, wave) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
-                        let variance = a.slope[(component, component)] * a.indices[(wave, wave)];
-                        changes.push(change[(component, wave)].powi(2) / variance);
+                    for (axis, wave) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
+                        let variance =
+                            of_difference(a.variance(axis, wave), b.variance(axis, wave));
+                        changes.push(change[(axis, wave)].powi(2) / variance);
                     }
                 }
             }
