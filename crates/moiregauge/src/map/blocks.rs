@@ -71,6 +71,17 @@ pub(super) fn mix(
     waves: &[Vector2<f64>],
     block: [usize; 2],
 ) -> Blocks {
+    mix_some(levelled, place, waves, block, |_| true)
+}
+
+/// The same for the rows of blocks that are `wanted`; the others are zero.
+pub(super) fn mix_some(
+    levelled: &Levelled,
+    place: Place,
+    waves: &[Vector2<f64>],
+    block: [usize; 2],
+    wanted: impl Fn(usize) -> bool + Sync,
+) -> Blocks {
     let [width, height] = block;
     let image = levelled.image;
     let size = [image.columns / width, image.rows / height];
@@ -103,6 +114,9 @@ pub(super) fn mix(
             .map(|line| {
                 let (pixels, share) = lines(levelled, line * height, [used, height], width);
                 let mut out = vec![0.0; 2 * waves.len() * size[0]];
+                if !wanted(line) {
+                    return (out, share);
+                }
                 let (mut all_re, mut all_im) = (vec![0.0f32; chunk], vec![0.0f32; chunk]);
                 for (i, sums) in out.chunks_exact_mut(2 * size[0].max(1)).enumerate() {
                     let (re, im) = sums.split_at_mut(size[0]);

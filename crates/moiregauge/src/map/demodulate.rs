@@ -6,7 +6,7 @@
 
 use nalgebra::{Matrix2, Matrix4, Vector2};
 
-use super::blocks::{Blocks, Place, mix};
+use super::blocks::{Blocks, Place, mix, mix_some};
 use super::carrier::Carrier;
 use super::defects::{Blur, Mask, Setting, masks};
 use super::leaks::clean;
@@ -44,7 +44,7 @@ const BLOCKS: f64 = 5.0;
 /// The pilot's window in periods.
 pub(super) const PILOT: f64 = 0.65;
 /// Likely harmonics looked at together; and where blocks are single pixels, for the memory's sake.
-const AT_ONCE: [usize; 2] = [6, 2];
+const AT_ONCE: [usize; 2] = [6, 1];
 /// Nodes so many windows from the edges say how well the harmonics agree.
 const CLOSURE: f64 = 1.0;
 /// Nodes per width of the window.
@@ -147,24 +147,28 @@ impl<'a> Work<'a> {
         smooth(&self.blocks, self.reference.in_pixels(width), nodes)
     }
 
-    /// Blocks of the other likely harmonics, the carrier off, a few at a time.
-    pub(super) fn others(&self) -> impl Iterator<Item = (Vec<[i32; 2]>, Blocks)> + '_ {
-        let slow_enough = |g: Vector2<f64>| g.x.abs() < FASTEST && g.y.abs() < FASTEST;
-        let single = self.blocks.block == [1, 1];
-        let at_once = AT_ONCE[usize::from(single)];
-        LIKELY[3..].chunks(at_once).filter_map(move |some| {
-            let mut some = some.to_vec();
-            some.retain(|&index| slow_enough(self.reference.wave(index)));
-            if some.is_empty() {
-                return None;
-            }
+    /// Blocks of other harmonics, the carrier off, a few at a time; only the rows of blocks that are `wanted`.
+    pub(super) fn others<'b>(
+        &'b self,
+        indices: &'b [[i32; 2]],
+        wanted: impl Fn(usize) -> bool + Sync + 'b,
+    ) -> impl Iterator<Item = (&'b [[i32; 2]], Blocks)> + 'b {
+        let at_once = AT_ONCE[usize::from(self.blocks.block == [1, 1])];
+        indices.chunks(at_once).map(move |some| {
             let waves: Vec<Vector2<f64>> = some.iter().map(|&i| self.reference.wave(i)).collect();
-            let mut blocks = mix(&self.image, self.place, &waves, self.blocks.block);
+            let block = self.blocks.block;
+            let mut blocks = mix_some(&self.image, self.place, &waves, block, &wanted);
             if let Some(carrier) = &self.carrier {
-                carrier.take_off(None, (&mut blocks.layers, &some), &self.blocks);
+                carrier.take_off(None, (&mut blocks.layers, some), &self.blocks);
             }
-            Some((some, blocks))
+            (some, blocks)
         })
+    }
+
+    /// The likely harmonics beyond the first shell that are slow enough to be sampled.
+    pub(super) fn likely(&self) -> Vec<[i32; 2]> {
+        let slow_enough = |index: &[i32; 2]| self.reference.wave(*index).amax() < FASTEST;
+        LIKELY[3..].iter().copied().filter(slow_enough).collect()
     }
 
     /// Nodes in the middle of the blocks; in a part of an image from its first line on, so that those of
