@@ -23,7 +23,7 @@ use moiregauge_report::{FailedInput, Provenance};
 use spmfile::FrameDirection;
 
 use crate::analyze::{AnalyzeArgs, Outcome, analyse_files, failures, read};
-use crate::info::expand;
+use crate::info::inputs;
 use crate::input::Known;
 use output::{Made, write};
 
@@ -114,19 +114,10 @@ pub(crate) fn run(args: &MapArgs) -> anyhow::Result<ExitCode> {
         out.display()
     );
     args.analyze.start_threads()?;
-    let (mut inputs, mut failed) = (Vec::new(), Vec::new());
-    for path in expand(args.analyze.paths()) {
-        match path {
-            Ok(path) => inputs.push(path),
-            Err((path, error)) => failed.push(FailedInput {
-                file: path.display().to_string(),
-                error,
-            }),
-        }
-    }
+    let (inputs, failed) = inputs(args.analyze.paths());
     let known = args.analyze.known().of(&inputs);
     let whole = (&settings, &known, &resolution);
-    let made = match survey(args, &inputs, whole)? {
+    let made = match survey(args, &inputs, whole, &failed)? {
         Some(made) => made,
         None => together(args, &inputs, whole, failed)?,
     };
@@ -147,6 +138,7 @@ fn survey(
     args: &MapArgs,
     inputs: &[PathBuf],
     (settings, known, resolution): (&Settings, &Known, &Resolution),
+    failed: &[FailedInput],
 ) -> anyhow::Result<Option<Made>> {
     let open = |path: &PathBuf, always: bool| {
         survey::Large::open(path, settings, known, always)
@@ -169,6 +161,7 @@ fn survey(
             .map((settings, resolution), first.as_ref(), out, loud)
             .with_context(|| path.display().to_string())?;
         let file = large.input.file.clone();
+        caveats.extend(large.caveats.iter().cloned());
         let drift = if plan.drift_corrected {
             "corrected for the drift that was given"
         } else if settings.drift.is_some() {
@@ -201,7 +194,7 @@ fn survey(
             version: env!("CARGO_PKG_VERSION").to_owned(),
             seed: settings.seed,
             inputs: read,
-            failed: Vec::new(),
+            failed: failed.to_vec(),
         },
         settings: settings.clone(),
         images,
