@@ -9,7 +9,7 @@
 mod scan;
 mod sets;
 
-use moiregauge::analysis::{Analysis, Axis, Combined, Consistency, Drift};
+use moiregauge::analysis::{Analysis, Axis, Combined, Consistency};
 use moiregauge::budget::Budget;
 use moiregauge::caveat::Caveat;
 use moiregauge::image::Image;
