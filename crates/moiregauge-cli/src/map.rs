@@ -4,6 +4,7 @@ mod domains;
 mod output;
 mod regions;
 mod source;
+mod stripes;
 mod survey;
 
 use std::path::{Path, PathBuf};
@@ -26,6 +27,7 @@ use crate::analyze::{AnalyzeArgs, Outcome, analyse_files, failures, read};
 use crate::info::expand;
 use crate::input::Known;
 use output::{Made, write};
+pub(crate) use stripes::in_words as stripes_in_words;
 
 /// Maps of twist, strain, wavelength and orientation across an image, with the error of every node
 ///
@@ -63,9 +65,9 @@ pub(crate) struct MapArgs {
     /// Map in bands, as images of more than 20 million pixels are; several files are put side by side
     #[arg(long)]
     in_bands: bool,
-    /// Margin at the edges, in windows
-    #[arg(long, value_name = "WINDOWS", default_value_t = 2.0)]
-    margin: f64,
+    /// Margin at the edges, in windows [default: 2, or a quarter of the frame where that is less]
+    #[arg(long, value_name = "WINDOWS")]
+    margin: Option<f64>,
     #[command(flatten)]
     regions: regions::RegionArgs,
     #[command(flatten)]
@@ -128,7 +130,13 @@ pub(crate) fn run(args: &MapArgs) -> anyhow::Result<ExitCode> {
     let whole = (&settings, &known, &resolution);
     let made = match survey(args, &inputs, whole)? {
         Some(made) => made,
-        None => together(args, &inputs, whole, failed)?,
+        None => match together(args, &inputs, whole, failed)? {
+            Answer::Lattice(made) => *made,
+            Answer::Stripes(found) => {
+                stripes::write(&found, args)?;
+                return Ok(ExitCode::SUCCESS);
+            }
+        },
     };
     let lost = failures(&made.provenance.failed);
     let complete = made.provenance.failed.is_empty();
@@ -213,13 +221,19 @@ fn survey(
     }))
 }
 
-/// Analyses all scans, maps them, and averages.
+/// What scans show.
+enum Answer {
+    Lattice(Box<Made>),
+    Stripes(Box<stripes::Striped>),
+}
+
+/// Analyses all scans, maps them, and averages; stripes, where none of them shows a lattice.
 fn together(
     args: &MapArgs,
     inputs: &[PathBuf],
     (settings, known, resolution): (&Settings, &Known, &Resolution),
     failed: Vec<FailedInput>,
-) -> anyhow::Result<Made> {
+) -> anyhow::Result<Answer> {
     ensure!(
         settings.moires == 1,
         "maps are made of one moiré; --moires {} is for analyze",
@@ -234,6 +248,9 @@ fn together(
     } = match outcome {
         Ok(mut outcomes) => outcomes.swap_remove(0),
         Err(failed) => {
+            if let Some(found) = stripes::look(args, inputs, (settings, known, resolution))? {
+                return Ok(Answer::Stripes(Box::new(found)));
+            }
             eprint!("{}", failures(&failed));
             bail!("nothing could be analysed");
         }
@@ -279,6 +296,10 @@ fn together(
             vec![None; lattices.nodes.len()]
         });
     doubts(&maps, &mut caveats);
+    if args.margin.is_none() {
+        let narrow = maps.iter().find_map(|m| narrow_margin(m.margin, &m.file));
+        caveats.extend(narrow);
+    }
     let drift_change = change(&maps);
     if let Some(found) = drift_change.filter(DriftChange::stands_out) {
         let [x, y] = found
@@ -306,7 +327,7 @@ fn together(
     };
     let domains = args.domains.answer(&map, Some(look));
     caveats.extend(domains.caveats.iter().cloned());
-    Ok(Made {
+    Ok(Answer::Lattice(Box::new(Made {
         map,
         domains,
         images: maps
@@ -319,7 +340,19 @@ fn together(
         agreement,
         drift_change,
         caveats,
-    })
+    })))
+}
+
+/// Says that the margin is narrower than two windows where nobody asked for that.
+fn narrow_margin(margin: f64, file: &str) -> Option<Caveat> {
+    let why = || {
+        format!(
+            "the frame is small for its window: the margin is {margin:.2} windows wide and not two. Windows there are \
+             cut by the edge; what that does to their noise, and what leaks through them, is in their errors, but they \
+             see less of the outer side (--margin 2 leaves such nodes out)"
+        )
+    };
+    (margin > 0.0 && margin < 1.99).then(|| Caveat::new("map-narrow-margin", file, why()))
 }
 
 /// What is not as good as it could be.
@@ -397,9 +430,9 @@ impl MapArgs {
             );
         }
         ensure!(
-            (0.0..=10.0).contains(&self.margin),
+            self.margin.is_none_or(|m| (0.0..=10.0).contains(&m)),
             "--margin lies between 0 and 10 windows, found {}",
-            self.margin
+            self.margin.unwrap_or(f64::NAN)
         );
         Ok(Resolution {
             window_nm: self.window,

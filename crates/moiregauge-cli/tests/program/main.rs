@@ -13,5 +13,6 @@ mod results;
 mod round_trip;
 mod same_bytes;
 mod several;
+mod stripes;
 mod surveys;
 mod validation;

@@ -41,7 +41,8 @@ pub use quantities::{Plane, TwistStrainMap};
 pub use register::{Registration, register};
 pub use sample::{Grid, LatticeMap, LatticeNode};
 pub use stripes::{
-    FittedWave, NoStripes, SampledPattern, SampledStripes, StripeMap, StripeNode, StripePattern, find_stripes, stripe_maps,
+    FittedWave, NoStripes, SampledPattern, SampledStripes, StripeMap, StripeNode, StripePattern,
+    find_stripes, stripe_maps,
 };
 pub use summary::Spread;
 pub use survey::Survey;

@@ -69,9 +69,7 @@ fn frames(
             .frame_direction
             .and_then(|frame| Timing::of_scan(scan, channel.columns, frame, line));
         let still = match (settings.drift, timing) {
-            (Some(drift), Some(timing)) => {
-                Some(at_rest(&geometry, &timing, drift.velocity()))
-            }
+            (Some(drift), Some(timing)) => Some(at_rest(&geometry, &timing, drift.velocity())),
             _ => None,
         };
         let flat = remove_background(&image_of(channel), settings.background);
@@ -89,9 +87,9 @@ fn frames(
     Ok((name, frames))
 }
 
-/// Wavelength (nm) and direction (rad, along the stripes) of the patterns that a scan shows, strongest first; none
-/// where it shows nothing.
-pub fn stripes_in_short(scan: &Scan, settings: &Settings) -> Vec<[f64; 2]> {
+/// Wavelength (nm), direction (rad, along the stripes) and log₁₀ of the chance that noise makes them, of the patterns
+/// that a scan shows, strongest first; none where it shows nothing.
+pub fn stripes_in_short(scan: &Scan, settings: &Settings) -> Vec<[f64; 3]> {
     let Ok((_, frames)) = frames("", scan, settings, &mut Vec::new()) else {
         return Vec::new();
     };
@@ -102,12 +100,13 @@ pub fn stripes_in_short(scan: &Scan, settings: &Settings) -> Vec<[f64; 2]> {
     };
     let found = find_stripes(&images, pitch(geometry)).into_iter();
     found
-        .map(|(wave, _)| {
+        .map(|(wave, log_chance)| {
             let wave = dual * wave;
             let along = wave.y.atan2(wave.x) + std::f64::consts::FRAC_PI_2;
             [
                 std::f64::consts::TAU / wave.norm(),
                 along.rem_euclid(std::f64::consts::PI),
+                log_chance,
             ]
         })
         .collect()

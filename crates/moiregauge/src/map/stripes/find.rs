@@ -81,9 +81,8 @@ pub(super) fn find(images: &[&Image], pitch: [f64; 2]) -> Vec<Pattern> {
             let tried = ((parts * parts * PARTS.len()) as f64).log10();
             for pattern in patterns(&cut, pitch, tried) {
                 let same = |p: &&mut Pattern| {
-                    let near = |w: Vector2<f64>| {
-                        metric(w - p.wave, pitch) < SAME * metric(p.wave, pitch)
-                    };
+                    let near =
+                        |w: Vector2<f64>| metric(w - p.wave, pitch) < SAME * metric(p.wave, pitch);
                     near(pattern.wave) || near(-pattern.wave)
                 };
                 match found.iter_mut().find(same) {
@@ -168,7 +167,9 @@ fn belongs(m: &Maximum, q: &Vector2<f64>, n: i32) -> bool {
 /// Whether it is so near to it that it is a part of it.
 fn is_near(m: &Maximum, q: &Vector2<f64>, n: i32) -> bool {
     let harmonic = q * f64::from(n);
-    let off = (m.cycles - harmonic).norm().min((m.cycles + harmonic).norm());
+    let off = (m.cycles - harmonic)
+        .norm()
+        .min((m.cycles + harmonic).norm());
     off < OWN.max(SAME * harmonic.norm())
 }
 
@@ -226,9 +227,7 @@ fn maxima(image: &Image, pitch: [f64; 2]) -> Vec<Maximum> {
         log_chance: trials + power.log_chance(x, y),
     });
     assessed
-        .filter(|m| {
-            m.log_chance < MEMBER && m.cycles.norm() > FEWEST && m.cycles.x > ALONG
-        })
+        .filter(|m| m.log_chance < MEMBER && m.cycles.norm() > FEWEST && m.cycles.x > ALONG)
         .collect()
 }
 
@@ -268,11 +267,7 @@ impl Power<'_> {
     /// log₁₀ of the chance that one bin of noise is as high as this.
     fn log_chance(&self, x: i64, y: i64) -> f64 {
         let height = self.at(x, y);
-        let [around, ring, column] = [
-            self.around(x, y),
-            self.ring(x, y),
-            self.column(x, y),
-        ];
+        let [around, ring, column] = [self.around(x, y), self.ring(x, y), self.column(x, y)];
         let chance = |mut bins: Vec<f64>| {
             // The median of a quarter as many: neighbouring bins share the window, and medians are worth half a mean.
             let n = (bins.len() as f64 / 4.0).max(1.0);
@@ -314,8 +309,8 @@ impl Power<'_> {
         let mut out = Vec::new();
         for i in 0..=((length + wide) / u) as i64 {
             let along = i as f64 * u;
-            let [low, high] = [length - wide, length + wide]
-                .map(|l| (l * l - along * along).max(0.0).sqrt() / v);
+            let [low, high] =
+                [length - wide, length + wide].map(|l| (l * l - along * along).max(0.0).sqrt() / v);
             for j in low.ceil() as i64..=high as i64 {
                 // A wave and its mirror image are one.
                 let mirrored = (i != 0 && j != 0).then_some((i, -j));

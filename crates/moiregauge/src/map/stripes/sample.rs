@@ -8,11 +8,12 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use nalgebra::{Matrix2, Vector2};
 
 use super::super::combine::Agreement;
+use super::super::defects::{Mask, is_improbable};
 use super::super::quantities::{Plane, TwistStrainMap};
 use super::super::sample::Grid;
 use super::super::summary::Spread;
 use super::super::types::UsedHarmonic;
-use super::{Mask, StripeMap, StripeNode, is_improbable};
+use super::{StripeMap, StripeNode};
 use crate::estimate::Estimate;
 use crate::geometry::Geometry;
 
@@ -33,6 +34,8 @@ pub struct SampledStripes {
     pub agreement: Option<Agreement>,
     /// Whether the noise was seen beside the harmonics everywhere.
     pub noise_measured: bool,
+    /// Margin at the edges, in windows.
+    pub margin: f64,
 }
 
 /// A pattern on the sample.
@@ -64,7 +67,10 @@ fn shown(q: Vector2<f64>, covariance: &Matrix2<f64>, near: f64) -> [Estimate; 2]
     let direction = q.y.atan2(q.x) + FRAC_PI_2;
     let direction = near + (direction - near + FRAC_PI_2).rem_euclid(PI) - FRAC_PI_2;
     [
-        Estimate::from_variance(TAU / length, variance(along) * (TAU / length.powi(2)).powi(2)),
+        Estimate::from_variance(
+            TAU / length,
+            variance(along) * (TAU / length.powi(2)).powi(2),
+        ),
         Estimate::from_variance(direction, variance(across) / length.powi(2)),
     ]
 }
@@ -82,7 +88,11 @@ impl SampledStripes {
         let mut nodes: Vec<Averaged> = (0..first.nodes.len())
             .map(|n| {
                 let seen = maps.iter().zip(&duals);
-                average(&seen.map(|((m, _), d)| m.nodes[n].mapped(d)).collect::<Vec<_>>())
+                average(
+                    &seen
+                        .map(|((m, _), d)| m.nodes[n].mapped(d))
+                        .collect::<Vec<_>>(),
+                )
             })
             .collect();
         let agreement = agree(&mut nodes);
@@ -109,7 +119,12 @@ impl SampledStripes {
                 let share = across[axis] / length;
                 Estimate::new(-node.phase * share, node.phase_sigma * share.abs())
             };
-            push(&mut map, node.mask, [wavelength, direction, moved(0), moved(1)], node);
+            push(
+                &mut map,
+                node.mask,
+                [wavelength, direction, moved(0), moved(1)],
+                node,
+            );
         }
         let whole: Vec<SampledPattern> = (0..first.patterns.len())
             .map(|p| pattern(p, (maps, &duals), (&map, &nodes), directions[p]))
@@ -122,6 +137,7 @@ impl SampledStripes {
             noise_measured: maps
                 .iter()
                 .all(|(m, _)| m.patterns.iter().all(|p| p.noise_measured)),
+            margin: first.margin,
             map,
             patterns: whole,
             agreement,
@@ -212,7 +228,11 @@ fn agree(nodes: &mut [Averaged]) -> Option<Agreement> {
         return None;
     }
     let reduced = chi2 / freedom as f64;
-    let factor = if reduced >= 1.0 { reduced } else { 2.0 - reduced };
+    let factor = if reduced >= 1.0 {
+        reduced
+    } else {
+        2.0 - reduced
+    };
     for averaged in nodes.iter_mut().filter(|n| n.freedom > 0) {
         averaged.node.covariance *= factor;
         let scaled = averaged.chi2 / reduced.max(1.0);
@@ -288,7 +308,10 @@ fn pattern(
         .zip(map.spread_where(&map.orientation, own));
     SampledPattern {
         fit: both(&fits).map(|(wave, covariance)| shown(wave, &covariance, direction)),
-        fitted: found.fit.as_ref().map_or_else(Vec::new, |f| f.amplitudes.clone()),
+        fitted: found
+            .fit
+            .as_ref()
+            .map_or_else(Vec::new, |f| f.amplitudes.clone()),
         local: local.map(|(a, b)| [a, b]),
         good: (0..nodes.len())
             .filter(|&n| own(n) && nodes[n].node.mask == Mask::Good)
