@@ -59,7 +59,7 @@ pub(crate) struct MapArgs {
     /// periods]
     #[arg(long, value_name = "NM")]
     window: Option<f64>,
-    /// Distance of the nodes, nm [default: a third of the window, a quarter of a tile]
+    /// Distance of the nodes, nm [default: a third of the window, two pixels at least; a quarter of a tile]
     #[arg(long, value_name = "NM")]
     step: Option<f64>,
     /// Map in bands, as images of more than 20 million pixels are; several files are put side by side

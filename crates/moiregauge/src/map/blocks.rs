@@ -7,7 +7,7 @@
 use nalgebra::Vector2;
 use rayon::prelude::*;
 
-use crate::image::Image;
+use super::lines::Levelled;
 
 /// Columns handled together, so that sums stay in the fastest memory.
 const CHUNK: usize = 256;
@@ -63,15 +63,27 @@ fn turns(g: f64, from: usize, count: usize, centre: f64) -> [Vec<f32>; 2] {
     out
 }
 
-/// Mixes the image with every wave (rad per pixel) and averages over blocks (pixels). What does not fill
+/// Mixes the levelled image with every wave (rad per pixel) and averages over blocks (pixels). What does not fill
 /// a block at the right and the top is left out; missing pixels count as zero.
 pub(super) fn mix(
-    image: &Image,
+    levelled: &Levelled,
     place: Place,
     waves: &[Vector2<f64>],
     block: [usize; 2],
 ) -> Blocks {
+    mix_some(levelled, place, waves, block, |_| true)
+}
+
+/// The same for the rows of blocks that are `wanted`; the others are zero.
+pub(super) fn mix_some(
+    levelled: &Levelled,
+    place: Place,
+    waves: &[Vector2<f64>],
+    block: [usize; 2],
+    wanted: impl Fn(usize) -> bool + Sync,
+) -> Blocks {
     let [width, height] = block;
+    let image = levelled.image;
     let size = [image.columns / width, image.rows / height];
     let used = size[0] * width;
     let along: Vec<_> = waves
@@ -100,8 +112,11 @@ pub(super) fn mix(
         let mixed: Vec<(Vec<f32>, Option<Vec<f32>>)> = (first..last)
             .into_par_iter()
             .map(|line| {
-                let (pixels, share) = lines(image, line * height, [used, height], width);
+                let (pixels, share) = lines(levelled, line * height, [used, height], width);
                 let mut out = vec![0.0; 2 * waves.len() * size[0]];
+                if !wanted(line) {
+                    return (out, share);
+                }
                 let (mut all_re, mut all_im) = (vec![0.0f32; chunk], vec![0.0f32; chunk]);
                 for (i, sums) in out.chunks_exact_mut(2 * size[0].max(1)).enumerate() {
                     let (re, im) = sums.split_at_mut(size[0]);
@@ -183,7 +198,7 @@ fn average(columns: &[f32], out: &mut [f32], width: usize, scale: f32) {
 /// The lines of a row of blocks in single precision, missing pixels zero; and which share of each block is
 /// there, unless all is.
 fn lines(
-    image: &Image,
+    levelled: &Levelled,
     first: usize,
     [used, height]: [usize; 2],
     width: usize,
@@ -192,9 +207,10 @@ fn lines(
     let mut missing = vec![0usize; used / width];
     let mut any = false;
     for row in first..first + height {
-        for (column, value) in image.row(row)[..used].iter().enumerate() {
+        let offset = levelled.offset(row);
+        for (column, value) in levelled.image.row(row)[..used].iter().enumerate() {
             if value.is_finite() {
-                pixels.push(*value as f32);
+                pixels.push((*value - offset) as f32);
             } else {
                 pixels.push(0.0);
                 missing[column / width] += 1;
@@ -210,6 +226,7 @@ fn lines(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::image::Image;
     use rustfft::num_complex::Complex64;
 
     /// Against the definition, with a missing pixel, at an offset, on a frame that blocks do not fill.
@@ -230,7 +247,7 @@ mod tests {
             centre: Vector2::new(12.5, 50.0),
         };
         let waves = [Vector2::new(0.3, -0.7), Vector2::new(-1.1, 0.2)];
-        let blocks = mix(&image, place, &waves, [7, 3]);
+        let blocks = mix(&Levelled::as_is(&image), place, &waves, [7, 3]);
         assert_eq!(blocks.size, [42, 3]);
         assert!((blocks.middle(2.0, 1.0) - Vector2::new(17.0, 44.0)).norm() < 1e-12);
         for (layer, g) in blocks.layers.iter().zip(&waves) {

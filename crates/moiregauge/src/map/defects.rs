@@ -1,10 +1,10 @@
 //! Which nodes are to be believed, and why others are not.
 
-use nalgebra::{Matrix2, Vector2};
+use nalgebra::{Matrix2, Vector2, Vector4};
 
 use super::smooth::Smoothed;
 use super::waves::{LocalLattice, Nothing};
-use super::window;
+use super::window::of_difference;
 
 /// Why a node has no value, or none to be believed; 0 is a good one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -98,25 +98,32 @@ pub(super) struct Blur {
     pub(super) chi2: f64,
     /// The change as a share of the wave vectors.
     pub(super) share: f64,
+    /// Variance that noise gives the change, in units of that of the node.
+    of_noise: f64,
 }
 
 impl Blur {
     /// The change from one lattice to that under a wider window.
     pub(super) fn between(narrow: &LocalLattice, wide: &LocalLattice) -> Self {
         let change = wide.pair - narrow.pair;
-        let inverse = |m: &Matrix2<f64>| m.try_inverse().unwrap_or_default();
-        // vec(Δ)ᵀ (indices ⊗ slope)⁻¹ vec(Δ).
-        let form = inverse(&narrow.slope) * change * inverse(&narrow.indices);
+        let share = |i: usize| {
+            let (a, b) = (narrow.covariance[(i, i)], wide.covariance[(i, i)]);
+            of_difference(a, b) / a
+        };
+        // Scaled so that each variance is that of its change.
+        let scaled = Vector4::from_fn(|i, _| change[(i % 2, i / 2)] / share(i).sqrt());
+        let inverse = narrow.covariance.try_inverse().unwrap_or_default();
         Self {
-            chi2: form.dot(&change) / window::OF_DIFFERENCE,
+            chi2: (scaled.transpose() * inverse * scaled)[0],
             share: change.norm() / narrow.pair.norm(),
+            of_noise: (0..4).map(share).sum::<f64>() / 4.0,
         }
     }
 
     /// Factor on the variances of a node for what the window blurs, where that is more than chance (p < 0.01).
     pub(super) fn factor(self) -> f64 {
         if self.chi2 > 13.3 {
-            1.0 + (self.chi2 / 4.0 - 1.0) * window::OF_DIFFERENCE
+            1.0 + (self.chi2 / 4.0 - 1.0) * self.of_noise
         } else {
             1.0
         }

@@ -4,12 +4,13 @@
 //! what the pilot saw; which harmonics tell something; how wide the window may be; the noise; then the
 //! wave vectors with that window, and masks.
 
-use nalgebra::{Matrix2, Vector2};
+use nalgebra::{Matrix2, Matrix4, Vector2};
 
-use super::blocks::{Blocks, Place, mix};
+use super::blocks::{Blocks, Place, mix, mix_some};
 use super::carrier::Carrier;
 use super::defects::{Blur, Mask, Setting, masks};
 use super::leaks::clean;
+use super::lines::Levelled;
 use super::median;
 use super::noise::{Beside, Noise};
 use super::smooth::{Nodes, Smoothed, smooth};
@@ -43,11 +44,13 @@ const BLOCKS: f64 = 5.0;
 /// The pilot's window in periods.
 pub(super) const PILOT: f64 = 0.65;
 /// Likely harmonics looked at together; and where blocks are single pixels, for the memory's sake.
-const AT_ONCE: [usize; 2] = [6, 2];
+const AT_ONCE: [usize; 2] = [6, 1];
 /// Nodes so many windows from the edges say how well the harmonics agree.
 const CLOSURE: f64 = 1.0;
 /// Nodes per width of the window.
 const NODES: f64 = 3.0;
+/// Nodes are so many pixels apart at least.
+const APART: f64 = 2.0;
 
 /// Demodulates an image whose background is gone. `place` says which part of a larger image it is.
 ///
@@ -60,13 +63,13 @@ pub(super) fn demodulate(
 ) -> Option<WaveMap> {
     let mut work = Work::new(image, place, *reference)?;
     work.follow();
-    work.choose_harmonics(image);
-    work.guess_noise(image);
+    work.choose_harmonics();
+    work.guess_noise();
     let window = match resolution.window_nm {
         Some(window) => window.max(NARROWEST * work.period),
         None => work.choose_window(),
     };
-    Some(work.map(image, window, resolution))
+    Some(work.map(window, resolution))
 }
 
 /// Pixels of a block along columns and rows.
@@ -83,12 +86,15 @@ pub(super) fn stride_of(reference: &Reference, distance_nm: f64) -> [usize; 2] {
 }
 
 /// Distance of the nodes, nm, with a window of `window_nm`.
-pub(super) fn step_of(resolution: &Resolution, window_nm: f64) -> f64 {
-    resolution.step_nm.unwrap_or(window_nm / NODES)
+pub(super) fn step_of(resolution: &Resolution, reference: &Reference, window_nm: f64) -> f64 {
+    let least = APART * reference.pitch[0].max(reference.pitch[1]);
+    let usual = (window_nm / NODES).max(least);
+    resolution.step_nm.unwrap_or(usual)
 }
 
 /// A map under way.
-pub(super) struct Work {
+pub(super) struct Work<'a> {
+    pub(super) image: Levelled<'a>,
     pub(super) reference: Reference,
     place: Place,
     /// nm.
@@ -105,21 +111,23 @@ pub(super) struct Work {
     pub(super) powers: Vec<f64>,
 }
 
-impl Work {
-    fn new(image: &Image, place: Place, reference: Reference) -> Option<Self> {
+impl<'a> Work<'a> {
+    fn new(image: &'a Image, place: Place, reference: Reference) -> Option<Self> {
         let period = reference.period();
         let block = block_of(&reference);
         if image.columns < 4 * block[0] || image.rows < 4 * block[1] {
             return None;
         }
         let indices = LIKELY[..3].to_vec();
-        let beside = Beside::new((image, place), &reference, &indices);
-        let noise = Noise::new(&beside, variance(image));
+        let levelled = Levelled::new(image, &reference);
+        let beside = Beside::new((&levelled, place), &reference, &indices);
+        let noise = Noise::new(&beside, levelled.variance());
         let waves: Vec<Vector2<f64>> = indices.iter().map(|&i| reference.wave(i)).collect();
-        let blocks = mix(image, place, &waves, block);
+        let blocks = mix(&levelled, place, &waves, block);
         let first = Vector2::new(0.0, place.row as f64);
         let last = Vector2::new(image.columns as f64 - 1.0, image.rows as f64 - 1.0);
         Some(Self {
+            image: levelled,
             reference,
             place,
             period,
@@ -139,27 +147,28 @@ impl Work {
         smooth(&self.blocks, self.reference.in_pixels(width), nodes)
     }
 
-    /// Blocks of the other likely harmonics, the carrier off, a few at a time.
-    pub(super) fn others<'a>(
-        &'a self,
-        image: &'a Image,
-    ) -> impl Iterator<Item = (Vec<[i32; 2]>, Blocks)> + 'a {
-        let slow_enough = |g: Vector2<f64>| g.x.abs() < FASTEST && g.y.abs() < FASTEST;
-        let single = self.blocks.block == [1, 1];
-        let at_once = AT_ONCE[usize::from(single)];
-        LIKELY[3..].chunks(at_once).filter_map(move |some| {
-            let mut some = some.to_vec();
-            some.retain(|&index| slow_enough(self.reference.wave(index)));
-            if some.is_empty() {
-                return None;
-            }
+    /// Blocks of other harmonics, the carrier off, a few at a time; only the rows of blocks that are `wanted`.
+    pub(super) fn others<'b>(
+        &'b self,
+        indices: &'b [[i32; 2]],
+        wanted: impl Fn(usize) -> bool + Sync + 'b,
+    ) -> impl Iterator<Item = (&'b [[i32; 2]], Blocks)> + 'b {
+        let at_once = AT_ONCE[usize::from(self.blocks.block == [1, 1])];
+        indices.chunks(at_once).map(move |some| {
             let waves: Vec<Vector2<f64>> = some.iter().map(|&i| self.reference.wave(i)).collect();
-            let mut blocks = mix(image, self.place, &waves, self.blocks.block);
+            let block = self.blocks.block;
+            let mut blocks = mix_some(&self.image, self.place, &waves, block, &wanted);
             if let Some(carrier) = &self.carrier {
-                carrier.take_off(None, (&mut blocks.layers, &some), &self.blocks);
+                carrier.take_off(None, (&mut blocks.layers, some), &self.blocks);
             }
-            Some((some, blocks))
+            (some, blocks)
         })
+    }
+
+    /// The likely harmonics beyond the first shell that are slow enough to be sampled.
+    pub(super) fn likely(&self) -> Vec<[i32; 2]> {
+        let slow_enough = |index: &[i32; 2]| self.reference.wave(*index).amax() < FASTEST;
+        LIKELY[3..].iter().copied().filter(slow_enough).collect()
     }
 
     /// Nodes in the middle of the blocks; in a part of an image from its first line on, so that those of
@@ -198,39 +207,39 @@ impl Work {
         &self,
         smoothed: &Smoothed,
         width: f64,
-        absolute: bool,
     ) -> Vec<Result<LocalLattice, Nothing>> {
         let amplitudes: Vec<f64> = self.powers.iter().map(|p| p.max(0.0).sqrt()).collect();
+        let ridge = |&index: &[i32; 2]| self.image.ridge(self.reference.wave(index));
         let harmonics = Harmonics::new(
             (&self.indices, &self.noise),
+            self.indices.iter().map(ridge).collect(),
             &self.reference.pair,
             &amplitudes,
             self.reference.in_pixels(width),
         );
         local_lattices(&self.blocks, smoothed, &harmonics, |at| {
-            if absolute {
-                self.taken_off(at, width)
-            } else {
-                Matrix2::zeros()
-            }
+            self.taken_off(at, width)
         })
     }
 
     /// The map with its final window.
-    fn map(mut self, image: &Image, window_nm: f64, resolution: &Resolution) -> WaveMap {
+    fn map(mut self, window_nm: f64, resolution: &Resolution) -> WaveMap {
         if self.indices.len() > 3 {
             let others = &self.indices[3..];
-            let others = Beside::new((image, self.place), &self.reference, others);
+            let others = Beside::new((&self.image, self.place), &self.reference, others);
             self.beside.extend(others);
-            self.noise = Noise::new(&self.beside, variance(image));
-            self.guess_noise(image);
+            self.noise = Noise::new(&self.beside, self.image.variance());
+            self.guess_noise();
         }
-        let stride = stride_of(&self.reference, step_of(resolution, window_nm));
+        let stride = stride_of(
+            &self.reference,
+            step_of(resolution, &self.reference, window_nm),
+        );
         let smoothed = self.cleaned(window_nm, stride);
-        let mut lattices = self.lattices(&smoothed, window_nm, true);
+        let mut lattices = self.lattices(&smoothed, window_nm);
         if !self.noise.is_measured() {
             self.noise.disagreement = self.disagreement(&lattices, smoothed.nodes, window_nm);
-            lattices = self.lattices(&smoothed, window_nm, true);
+            lattices = self.lattices(&smoothed, window_nm);
         }
         let blurs = self.blurs(
             &lattices,
@@ -239,7 +248,7 @@ impl Work {
         );
         for (lattice, blur) in lattices.iter_mut().zip(&blurs) {
             if let Ok(lattice) = lattice {
-                lattice.slope *= blur.factor();
+                lattice.covariance *= blur.factor();
             }
         }
         let nodes = smoothed.nodes;
@@ -309,11 +318,11 @@ impl Work {
 
     /// Where the frame is too small to see noise between the harmonics: what is left of the variance of the image
     /// when they are taken off, or a hundredth of it.
-    fn guess_noise(&mut self, image: &Image) {
+    fn guess_noise(&mut self) {
         if self.noise.is_measured() {
             return;
         }
-        let variance = variance(image);
+        let variance = self.image.variance();
         let signal: f64 = self.powers.iter().map(|power| 2.0 * power).sum();
         self.noise
             .levels
@@ -351,7 +360,7 @@ impl Work {
         wider: f64,
         nodes: Nodes,
     ) -> Vec<Blur> {
-        let wide = self.lattices(&self.cleaned(wider, nodes.stride), wider, true);
+        let wide = self.lattices(&self.cleaned(wider, nodes.stride), wider);
         let pairs = lattices.iter().zip(&wide);
         pairs
             .map(|pair| match pair {
@@ -385,18 +394,11 @@ fn node_of(lattice: Option<&LocalLattice>, mask: Mask, phases: [f64; 3]) -> Wave
     WaveNode {
         mask,
         pair: lattice.map_or(unknown, |l| l.pair),
-        indices: lattice.map_or(unknown, |l| l.indices),
-        slope: lattice.map_or(unknown, |l| l.slope),
+        covariance: lattice.map_or(Matrix4::repeat(f64::NAN), |l| l.covariance),
+        phase_covariance: lattice.map_or(unknown, |l| l.phase_covariance),
         chi2: lattice.map_or(f64::NAN, |l| l.chi2),
         freedom: lattice.map_or(0, |l| l.freedom),
         signal_to_noise: lattice.map_or(0.0, |l| l.signal_to_noise),
         phases,
     }
-}
-
-/// Mean square of the pixels; the background is gone.
-fn variance(image: &Image) -> f64 {
-    let finite = image.values.iter().filter(|v| v.is_finite());
-    let (sum, count) = finite.fold((0.0, 0.0f64), |(s, n), v| (s + v * v, n + 1.0));
-    sum / count.max(1.0)
 }

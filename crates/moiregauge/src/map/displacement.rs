@@ -33,16 +33,12 @@ pub(super) fn phases(map: &WaveMap) -> Vec<Option<(Vector2<f64>, Matrix2<f64>)>>
             sum
         });
     let offset = sum.map(|s| s / found.len().max(1) as f64);
-    let width = map.reference.pitch.map(|p| map.window_nm / p);
     let node = |n: usize| {
         let phases = unwrapped[n]?;
         let [a, b, c] = [0, 1, 2].map(|i| phases[i] - offset[i]);
         // Least squares of (ψ₁, ψ₂, ψ₂ − ψ₁), equal weights.
         let both = Vector2::new(2.0 * a + b - c, a + 2.0 * b + c) / 3.0;
-        let node = &map.nodes[n];
-        // Noise of amplitudes over that of slopes is 2w² along each axis.
-        let scale = 2.0 * width[0] * width[1] * node.slope.determinant().max(0.0).sqrt();
-        Some((both, node.indices * scale))
+        Some((both, map.nodes[n].phase_covariance))
     };
     (0..map.nodes.len()).map(node).collect()
 }

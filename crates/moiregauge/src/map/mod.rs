@@ -20,6 +20,7 @@ mod demodulate;
 mod displacement;
 mod drift_change;
 mod leaks;
+mod lines;
 mod mosaic;
 mod noise;
 mod pilot;

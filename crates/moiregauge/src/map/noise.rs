@@ -5,16 +5,20 @@
 //! function of kx alone. Its mean power is the level of the harmonic; how it varies over the frame, all
 //! harmonics together, is the local ratio.
 //!
+//! Few nodes say how much noise there is at one harmonic; levels of all are drawn together as far as they agree.
+//!
 //! Levels are those of white noise: variance σ² per pixel has the level σ².
+
+use std::f64::consts::TAU;
 
 use nalgebra::{Matrix2, Vector2};
 
 use super::blocks::{Blocks, Place, mix};
 use super::demodulate::block_of;
+use super::lines::Levelled;
 use super::median;
 use super::smooth::{Nodes, Smoothed, smooth};
 use super::types::Reference;
-use crate::image::Image;
 
 /// Places tried beside a harmonic, as shares of the length of q₁.
 const TRIED: [f64; 9] = [0.35, 0.4, 0.45, 0.5, 0.55, 0.6, 0.65, 0.7, 0.75];
@@ -28,6 +32,8 @@ const WHOLE: f64 = 0.85;
 const AWAY: f64 = 2.5;
 /// Nodes that have to be left.
 const FEWEST: usize = 6;
+/// Powers count up to so many times their level.
+const CUT: f64 = 4.0;
 /// Harmonics looked beside at a time.
 const AT_ONCE: usize = 2;
 
@@ -92,7 +98,7 @@ pub(super) struct Beside {
 impl Beside {
     /// Of harmonics of a lattice; a few at a time, which bounds the memory.
     pub(super) fn new(
-        (image, place): (&Image, Place),
+        (image, place): (&Levelled, Place),
         reference: &Reference,
         indices: &[[i32; 2]],
     ) -> Self {
@@ -164,11 +170,14 @@ impl Noise {
         let levels: Vec<f64> = (0..harmonics)
             .map(|i| {
                 let both = (0..nodes.len()).flat_map(|n| [power(2 * i, n), power(2 * i + 1, n)]);
-                let mut all: Vec<f64> = both.flatten().collect();
-                // Of an exponential distribution: robust against what a defect throws there.
-                median(&mut all) / std::f64::consts::LN_2
+                level_of(&mut both.flatten().collect::<Vec<f64>>())
             })
             .collect();
+        let cell = (0..2).map(|i| (nodes.stride[i] * blocks.block[i]) as f64 / width[i]);
+        let count = 2.0 * whole.iter().flatten().count() as f64;
+        // Powers under a Gaussian window have the correlation e^{−d²/2w²}.
+        let independent = (count * cell.product::<f64>() / TAU).clamp(2.0, count);
+        let levels = pooled(&levels, 1.0 / independent);
         let grid = Ratio::new(blocks, smoothed, &levels, power);
         Self {
             levels,
@@ -186,6 +195,28 @@ impl Noise {
     pub(super) fn ratio(&self, at: Vector2<f64>) -> f64 {
         self.grid.as_ref().map_or(1.0, |grid| grid.at(at))
     }
+}
+
+/// The level of powers with an exponential distribution. What a defect throws there is cut off.
+fn level_of(powers: &mut [f64]) -> f64 {
+    let most = CUT * median(powers) / std::f64::consts::LN_2;
+    let sum: f64 = powers.iter().map(|p| p.min(most)).sum();
+    sum / powers.len().max(1) as f64 / (1.0 - (-CUT).exp())
+}
+
+/// Levels of several harmonics, each known to the relative variance `own`, drawn towards their mean as far as they do not
+/// differ by more than chance: ln S of each is normal about a common mean, with a variance that is estimated.
+fn pooled(levels: &[f64], own: f64) -> Vec<f64> {
+    let logs: Vec<f64> = levels.iter().map(|l| l.ln()).collect();
+    if logs.len() < 2 || logs.iter().any(|l| !l.is_finite()) {
+        return levels.to_vec();
+    }
+    let mean = logs.iter().sum::<f64>() / logs.len() as f64;
+    let squares: f64 = logs.iter().map(|l| (l - mean).powi(2)).sum();
+    let between = (squares / (logs.len() as f64 - 1.0) - own).max(0.0);
+    let share = between / (between + own);
+    let drawn = logs.iter().map(|l| (mean + share * (l - mean)).exp());
+    drawn.collect()
 }
 
 impl Ratio {

@@ -4,9 +4,9 @@
 use super::blocks::Layer;
 use super::carrier::{Carrier, MOST_CELLS, Slope};
 use super::demodulate::{PILOT, Work, stride_of};
-use super::smooth::{Envelope, Smoothed, smooth};
-use super::window;
-use crate::image::Image;
+use super::smooth::{Envelope, Smoothed, radius, smooth};
+use super::waves::level_of_ridge;
+use super::window::{self, of_difference};
 
 /// A harmonic that adds less than this share to what is known is not worth its time.
 const WORTH: f64 = 0.02;
@@ -19,14 +19,16 @@ const FIRST_CELLS: usize = 4;
 /// Nodes along each axis to which the carrier is fitted, and by which windows and harmonics are chosen.
 const FOLLOWED: usize = 100;
 const LOOKED_AT: usize = 40;
+/// Rows of nodes by which harmonics are chosen; no other lines are mixed for that.
+const ROWS_LOOKED_AT: usize = 12;
 
-impl Work {
+impl Work<'_> {
     /// Fits the carrier to what a narrow window sees, until little is left.
     pub(super) fn follow(&mut self) {
         let width = PILOT * self.period;
         for round in 0..ROUNDS {
             let smoothed = self.smoothed(width, self.sparse(width, FOLLOWED));
-            let lattices = self.lattices(&smoothed, width, false);
+            let lattices = self.lattices(&smoothed, width);
             let mut slopes = Vec::new();
             // Turn over a window and what noise makes of it, squared.
             let (mut left, mut noise) = (0.0, 0.0);
@@ -36,15 +38,16 @@ impl Work {
                     continue;
                 };
                 let at = smoothed.nodes.place(&self.blocks, node);
+                let change = lattice.pair - self.taken_off(at, width);
                 for axis in 0..2 {
                     let scale = self.reference.in_pixels(width)[axis].powi(2);
-                    left += scale * lattice.pair.row(axis).norm_squared();
-                    noise += scale * lattice.slope[(axis, axis)] * lattice.indices.trace();
+                    left += scale * change.row(axis).norm_squared();
+                    let of = |wave: usize| lattice.variance(axis, wave);
+                    noise += scale * (of(0) + of(1));
                 }
-                let before = self.taken_off(at, width) - self.reference.pair;
                 slopes.push(Slope {
                     at,
-                    slopes: lattice.pair + before,
+                    slopes: lattice.pair - self.reference.pair,
                 });
             }
             if slopes.len() < 4 {
@@ -84,30 +87,38 @@ impl Work {
     }
 
     /// Adds the harmonics that tell something of the lattice to the first three.
-    pub(super) fn choose_harmonics(&mut self, image: &Image) {
+    pub(super) fn choose_harmonics(&mut self) {
         let width = PILOT * self.period;
-        let stride = self.sparse(width, LOOKED_AT);
+        let [along, _] = self.sparse(width, LOOKED_AT);
+        let [_, across] = self.sparse(width, ROWS_LOOKED_AT);
+        let stride = [along, across];
         let level = self.noise.levels.iter().sum::<f64>() / self.noise.levels.len() as f64;
         let first = self.smoothed(width, stride);
-        let told = |envelope: &Envelope, index: [i32; 2]| told(envelope, &first, level, index);
+        let in_pixels = self.reference.in_pixels(width);
+        let told = |envelope: &Envelope, index: [i32; 2]| {
+            let g = self.reference.wave(index);
+            let ridge = level_of_ridge(self.image.ridge(g), g.x * in_pixels[0], in_pixels[0]);
+            told(envelope, &first, level + ridge, index)
+        };
         let of_first = first.envelopes.iter().zip(&self.indices);
         let of_first: Vec<Told> = of_first.map(|(e, &index)| told(e, index)).collect();
         let mut most = of_first.iter().map(|t| t.worth).fold(0.0, f64::max);
-        let mut kept: Vec<([i32; 2], Told, Layer)> = Vec::new();
-        for (indices, blocks) in self.others(image) {
-            let smoothed = smooth(&blocks, self.reference.in_pixels(width), first.nodes);
-            let layers = blocks.layers.into_iter().zip(smoothed.envelopes);
-            for (index, (layer, envelope)) in indices.into_iter().zip(layers) {
-                let found = told(&envelope, index);
-                most = most.max(found.worth);
-                if found.worth > WORTH * most {
-                    kept.push((index, found, layer));
-                }
-            }
+        let reach = radius(in_pixels[1], self.blocks.block[1]);
+        let mut found: Vec<([i32; 2], Told)> = Vec::new();
+        let likely = self.likely();
+        for (indices, blocks) in self.others(&likely, |row| first.nodes.see(row, reach)) {
+            let smoothed = smooth(&blocks, in_pixels, first.nodes);
+            let of_each = indices.iter().zip(&smoothed.envelopes);
+            found.extend(of_each.map(|(&index, envelope)| (index, told(envelope, index))));
         }
-        kept.retain(|(_, told, _)| told.worth > WORTH * most);
+        let all = found.iter().map(|(_, told)| told.worth);
+        most = all.fold(most, f64::max);
+        found.retain(|(_, told)| told.worth > WORTH * most);
+        let kept: Vec<[i32; 2]> = found.iter().map(|(index, _)| *index).collect();
+        let all = self.others(&kept, |_| true);
+        let layers: Vec<Layer> = all.flat_map(|(_, blocks)| blocks.layers).collect();
         self.powers = of_first.iter().map(|t| t.power.max(0.0)).collect();
-        for (index, told, layer) in kept {
+        for ((index, told), layer) in found.into_iter().zip(layers) {
             self.indices.push(index);
             self.powers.push(told.power.max(0.0));
             self.blocks.layers.push(layer);
@@ -123,13 +134,19 @@ impl Work {
         let mut chosen = steps[0];
         let of = |width: f64, stride| {
             let width = width * self.period;
-            self.lattices(&self.smoothed(width, stride), width, true)
+            self.lattices(&self.smoothed(width, stride), width)
         };
+        // What the last wider window saw, which is the next narrow one.
+        let mut last = None;
         for &width in &steps {
             // Sparse nodes are enough, and all are independent.
             let stride = self.sparse(1.5 * width * self.period, LOOKED_AT);
             let wider = width * std::f64::consts::SQRT_2;
-            let (narrow, wide) = (of(width, stride), of(wider, stride));
+            let narrow = match last.take() {
+                Some((before, seen)) if before == stride => seen,
+                _ => of(width, stride),
+            };
+            let wide = of(wider, stride);
             let nodes = self.nodes(stride);
             let away = self.reference.in_pixels(3.0 * wider * self.period);
             let mut changes = Vec::new();
@@ -140,9 +157,10 @@ impl Work {
                 });
                 if let (true, Ok(a), Ok(b)) = (inside, a, b) {
                     let change = b.pair - a.pair;
-                    for (component, wave) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
-                        let variance = a.slope[(component, component)] * a.indices[(wave, wave)];
-                        changes.push(change[(component, wave)].powi(2) / variance);
+                    for (axis, wave) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
+                        let variance =
+                            of_difference(a.variance(axis, wave), b.variance(axis, wave));
+                        changes.push(change[(axis, wave)].powi(2) / variance);
                     }
                 }
             }
@@ -150,6 +168,7 @@ impl Work {
                 break;
             }
             chosen = width;
+            last = Some((stride, wide));
         }
         chosen * self.period
     }

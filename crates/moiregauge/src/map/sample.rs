@@ -123,6 +123,7 @@ impl LatticeMap {
     pub fn new(map: &WaveMap, at_rest: &Geometry) -> Option<Self> {
         let j = at_rest.pixel_to_nm;
         let dual = j.try_inverse()?.transpose();
+        let of_both = both(&dual);
         let followed = displacement::phases(map);
         let good = map.nodes.iter().filter(|n| n.mask == Mask::Good);
         let (sum, count) = good.fold((Matrix2::zeros(), 0.0f64), |(sum, count), node| {
@@ -139,7 +140,7 @@ impl LatticeMap {
                 mask: node.mask,
                 waves: LatticeVectors {
                     basis: dual * node.pair,
-                    covariance: kronecker(&node.indices, &(dual * node.slope * dual.transpose())),
+                    covariance: of_both * node.covariance * of_both.transpose(),
                 },
                 chi2: node.chi2,
                 freedom: node.freedom,
@@ -197,13 +198,4 @@ impl LatticeMap {
         });
         Ok(found.collect())
     }
-}
-
-/// Covariance of (q₁x, q₁y, q₂x, q₂y) from that of the indices and that of the components.
-fn kronecker(indices: &Matrix2<f64>, slope: &Matrix2<f64>) -> Matrix4<f64> {
-    let mut out = both(slope);
-    for (a, b) in (0..4).flat_map(|a| (0..4).map(move |b| (a, b))) {
-        out[(a, b)] = indices[(a / 2, b / 2)] * slope[(a % 2, b % 2)];
-    }
-    out
 }

@@ -56,6 +56,13 @@ impl Nodes {
         self.size[0] * self.size[1]
     }
 
+    /// Whether a row of blocks is no farther than `radius` from a row of nodes.
+    pub(super) fn see(&self, row: usize, radius: usize) -> bool {
+        let nearest = (row + self.stride[1] / 2).saturating_sub(self.first[1]) / self.stride[1];
+        let nearest = self.first[1] + nearest.min(self.size[1] - 1) * self.stride[1];
+        nearest.abs_diff(row) <= radius
+    }
+
     /// The block on which a node lies.
     pub(super) fn block(&self, node: usize) -> [usize; 2] {
         let (column, row) = (node % self.size[0], node / self.size[0]);
@@ -116,13 +123,18 @@ pub(super) struct Kernel {
     pub(super) own: f64,
 }
 
+/// Blocks of `block` pixels from the middle of a window of `width` pixels to its end.
+pub(super) fn radius(width: f64, block: usize) -> usize {
+    (REACH * width / block as f64).ceil() as usize
+}
+
 impl Kernel {
     /// For blocks of `block` pixels; `width` is that of the window with the block.
     pub(super) fn new(width: f64, block: usize) -> Self {
         let step = block as f64;
         // The mean over a block widens by (b² − 1)/12 pixels².
         let own = (width * width - (step * step - 1.0) / 12.0).max(0.25 * step * step);
-        let radius = (REACH * width / step).ceil() as usize;
+        let radius = radius(width, block);
         let distance = |i: usize| (i as f64 - radius as f64) * step;
         let weights: Vec<f64> = (0..=2 * radius)
             .map(|i| (-0.5 * distance(i).powi(2) / own).exp())
@@ -292,15 +304,10 @@ fn envelope(
 ) -> Envelope {
     let count = nodes.size[0];
     let radius = kernels[1].radius;
-    let is_seen = |row: usize| {
-        let nearest = (row + nodes.stride[1] / 2).saturating_sub(nodes.first[1]) / nodes.stride[1];
-        let nearest = nodes.first[1] + nearest.min(nodes.size[1] - 1) * nodes.stride[1];
-        nearest.abs_diff(row) <= radius
-    };
     let lines: Vec<Vec<f32>> = (0..blocks.size[1])
         .into_par_iter()
         .map(|row| {
-            if is_seen(row) {
+            if nodes.see(row, radius) {
                 along(blocks.size[0], layer, &kernels[0], nodes, row)
             } else {
                 Vec::new()

@@ -11,7 +11,7 @@ use crate::settings::StrainConvention;
 use crate::simulate::{Feature, FieldScene, Ripple};
 use crate::strain::twist_strain;
 
-fn map_of(scene: &FieldScene, window: Option<f64>) -> WaveMap {
+pub(super) fn map_of(scene: &FieldScene, window: Option<f64>) -> WaveMap {
     let reference = Reference {
         pair: scene.pair,
         pitch: [1.0; 2],
@@ -29,19 +29,19 @@ fn place(map: &WaveMap, node: usize) -> Vector2<f64> {
 }
 
 /// Good nodes and their places.
-fn good(map: &WaveMap) -> impl Iterator<Item = (&WaveNode, Vector2<f64>)> {
+pub(super) fn good(map: &WaveMap) -> impl Iterator<Item = (&WaveNode, Vector2<f64>)> {
     let all = map.nodes.iter().enumerate();
     all.filter(|(_, node)| node.mask == Mask::Good)
         .map(|(i, node)| (node, place(map, i)))
 }
 
 /// Errors over stated errors of all components at good nodes, and those over `sigma`.
-fn pulls(scene: &FieldScene, map: &WaveMap, sigma: f64) -> [Vec<f64>; 2] {
+pub(super) fn pulls(scene: &FieldScene, map: &WaveMap, sigma: f64) -> [Vec<f64>; 2] {
     let mut out = [Vec::new(), Vec::new()];
     for (node, at) in good(map) {
         let error = node.pair - scene.waves(at);
         for (wave, axis) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
-            let stated = (node.indices[(wave, wave)] * node.slope[(axis, axis)]).sqrt();
+            let stated = node.covariance[(2 * wave + axis, 2 * wave + axis)].sqrt();
             out[0].push(error[(axis, wave)] / stated);
             out[1].push(error[(axis, wave)] / sigma);
         }
@@ -49,7 +49,7 @@ fn pulls(scene: &FieldScene, map: &WaveMap, sigma: f64) -> [Vec<f64>; 2] {
     out
 }
 
-fn rms(values: &[f64]) -> f64 {
+pub(super) fn rms(values: &[f64]) -> f64 {
     (values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64).sqrt()
 }
 
@@ -65,7 +65,7 @@ fn stated_errors_follow_the_formula() {
     scene.white = 1.2;
     let map = map_of(&scene, Some(16.0));
     let stated: Vec<f64> = good(&map)
-        .map(|(n, _)| (n.indices[(0, 0)] * n.slope[(0, 0)]).sqrt())
+        .map(|(n, _)| n.covariance[(0, 0)].sqrt())
         .collect();
     let mean = stated.iter().sum::<f64>() / stated.len() as f64;
     // Noise is measured on the image, to some per cent.
@@ -228,7 +228,7 @@ fn defects_are_masked() {
         assert!(5 * count(Mask::Good) > 2 * inner, "{feature:?}");
         for (node, at) in good(&map) {
             let error = (node.pair - scene.waves(at)).amax();
-            let sigma = (node.indices.trace() * node.slope.trace() / 4.0).sqrt();
+            let sigma = (node.covariance.trace() / 4.0).sqrt();
             assert!(
                 error < 6.5 * sigma,
                 "{feature:?} at {at}: {}",

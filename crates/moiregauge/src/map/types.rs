@@ -1,6 +1,6 @@
 //! What goes into a map of one image and what comes out, in pixels.
 
-use nalgebra::{Matrix2, Vector2};
+use nalgebra::{Matrix2, Matrix4, Vector2};
 
 use super::defects::Mask;
 
@@ -9,7 +9,7 @@ use super::defects::Mask;
 pub struct Resolution {
     /// Width of the Gaussian window (standard deviation), nm; `None`: as wide as the lattice is straight.
     pub window_nm: Option<f64>,
-    /// Distance of the nodes, nm; `None`: a third of the window.
+    /// Distance of the nodes, nm; `None`: a third of the window, two pixels at least.
     pub step_nm: Option<f64>,
     /// Margin at the edges of the frame, in window widths; `None`: two, or a quarter of the frame where that is less.
     pub margin: Option<f64>,
@@ -72,10 +72,10 @@ pub struct WaveNode {
     pub mask: Mask,
     /// q₁, q₂ as columns, rad per pixel; NaN where there is none.
     pub pair: Matrix2<f64>,
-    /// Covariance of `(h, k)` combinations: that of (q₁, q₂) is `indices ⊗ slope`.
-    pub indices: Matrix2<f64>,
-    /// Covariance of the two components, see `indices`.
-    pub slope: Matrix2<f64>,
+    /// Covariance of (q₁x, q₁y, q₂x, q₂y), rad² per pixel².
+    pub covariance: Matrix4<f64>,
+    /// Covariance of the phases of q₁ and q₂, rad².
+    pub phase_covariance: Matrix2<f64>,
     /// χ² of the closure of all harmonics.
     pub chi2: f64,
     /// Its degrees of freedom.

@@ -1,13 +1,24 @@
 //! Envelopes of all harmonics → the two local wave vectors, their covariance and how they close.
 //!
 //! Every harmonic (h, k) says `h q₁ + k q₂`; weighted least squares over all of them. For white or locally
-//! white noise the weights are `2|c₀|²/S`, and the covariance of (q₁, q₂) is `N⁻¹ ⊗ Γ` with the 2 × 2
-//! normal matrix N of the indices and Γ the slope noise of the window. One cosine of amplitude A = 2|c₀|
-//! under a whole window: `σ_g = (σ/A)/(2√π w²)`.
+//! white noise of level S the variance of a slope is `S/(2|c₀|²)` in units of the noise Γ of the window: one cosine of
+//! amplitude A = 2|c₀| under a whole window has `σ_g = (σ/A)/(2√π w²)`. Offsets of lines that could not be taken off
+//! (variance R per line, see [`super::lines`]) add to a harmonic g under a window w, in units of the white noise:
+//!
+//! ```text
+//! phase         (R/S) e^{−gₓ²wₓ²} 2√π wₓ
+//! slope along x (R/S) e^{−gₓ²wₓ²} 4√π gₓ² wₓ³
+//! slope along y (R/S) e^{−gₓ²wₓ²} 2√π wₓ
+//! ```
+//!
+//! from the transforms `e^{−κ²w²/2}` and `κ e^{−κ²w²/2}` of the window and its slope. Both components have weights
+//! of their own then.
 //!
 //! Two gradients and more over-determine q₁ and q₂: χ² of what is left is the closure test.
 
-use nalgebra::{Matrix2, Vector2};
+use std::f64::consts::PI;
+
+use nalgebra::{Matrix2, Matrix4, Vector2};
 use rayon::prelude::*;
 
 use super::blocks::Blocks;
@@ -26,15 +37,22 @@ const ROUNDING: f64 = 3e-6;
 pub(super) struct LocalLattice {
     /// q₁, q₂ as columns, rad per pixel.
     pub(super) pair: Matrix2<f64>,
-    /// N⁻¹: covariance of the pair in units of `slope`.
-    pub(super) indices: Matrix2<f64>,
-    /// Γ: covariance of the two components of a slope at unit weight.
-    pub(super) slope: Matrix2<f64>,
+    /// Covariance of (q₁x, q₁y, q₂x, q₂y).
+    pub(super) covariance: Matrix4<f64>,
+    /// Covariance of the phases of q₁ and q₂, rad².
+    pub(super) phase_covariance: Matrix2<f64>,
     /// χ² of the closure, and its degrees of freedom.
     pub(super) chi2: f64,
     pub(super) freedom: usize,
     /// Signal power over noise power of the window, all harmonics.
     pub(super) signal_to_noise: f64,
+}
+
+impl LocalLattice {
+    /// Variance of a component (0: x, 1: y) of a wave (0: q₁, 1: q₂).
+    pub(super) fn variance(&self, axis: usize, wave: usize) -> f64 {
+        self.covariance[(2 * wave + axis, 2 * wave + axis)]
+    }
 }
 
 /// Why a node has no lattice of its own.
@@ -51,6 +69,10 @@ pub(super) struct Harmonics<'a> {
     /// (h, k) of each envelope.
     pub(super) indices: &'a [[i32; 2]],
     pub(super) noise: &'a Noise,
+    /// Variance of the offsets of lines that are left at each, see [`super::lines`].
+    ridges: Vec<f64>,
+    /// Width of the window along x, pixels.
+    width: f64,
     /// How far other harmonics that reach through the window can pull each slope, rad per pixel.
     pub(super) leaks: Vec<f64>,
 }
@@ -59,6 +81,7 @@ impl<'a> Harmonics<'a> {
     /// `pair` and the mean amplitudes say what leaks through a window of this width (pixels).
     pub(super) fn new(
         (indices, noise): (&'a [[i32; 2]], &'a Noise),
+        ridges: Vec<f64>,
         pair: &Matrix2<f64>,
         amplitudes: &[f64],
         width: [f64; 2],
@@ -82,49 +105,72 @@ impl<'a> Harmonics<'a> {
         Self {
             indices,
             noise,
+            ridges,
+            width: width[0],
             leaks: (0..indices.len()).map(leak).collect(),
         }
     }
 }
 
-/// The local lattice of every node. `reference` gives what was taken off at a place: the slopes of the
-/// carrier and the mean pair together, rad per pixel.
+/// Variances of a harmonic at a node, in units of the white noise of the window.
+struct Variances {
+    /// Of white noise, whatever the component.
+    plain: f64,
+    /// Of the phase and of the components of the slope.
+    phase: f64,
+    slope: [f64; 2],
+}
+
+/// Power that offsets of lines (variance `ridge`) add to an envelope, as the level of white noise that adds as much;
+/// `turn` is gₓwₓ.
+pub(super) fn level_of_ridge(ridge: f64, turn: f64, width: f64) -> f64 {
+    ridge * (-turn * turn).exp() * 2.0 * PI.sqrt() * width
+}
+
+/// The local lattice of every node. `taken` gives what was taken off at a place: the slopes of the carrier and the
+/// mean pair together, rad per pixel.
 pub(super) fn local_lattices(
     blocks: &Blocks,
     smoothed: &Smoothed,
     harmonics: &Harmonics,
-    reference: impl Fn(Vector2<f64>) -> Matrix2<f64> + Sync,
+    taken: impl Fn(Vector2<f64>) -> Matrix2<f64> + Sync,
 ) -> Vec<Result<LocalLattice, Nothing>> {
     (0..smoothed.nodes.len())
         .into_par_iter()
         .map(|node| {
             let support = smoothed.support[node].ok_or(Nothing::NoPixels)?;
             let at = smoothed.nodes.place(blocks, node);
-            let mut lattice = regression(smoothed, node, &support, harmonics, at)?;
-            lattice.pair += reference(at);
-            Ok(lattice)
+            regression((smoothed, node), &support, harmonics, (at, taken(at)))
         })
         .collect()
 }
 
+/// A harmonic in the regression.
+struct Term {
+    index: Vector2<f64>,
+    slope: Vector2<f64>,
+    variances: Variances,
+}
+
 fn regression(
-    smoothed: &Smoothed,
-    node: usize,
+    (smoothed, node): (&Smoothed, usize),
     support: &Support,
     harmonics: &Harmonics,
-    at: Vector2<f64>,
+    (at, taken): (Vector2<f64>, Matrix2<f64>),
 ) -> Result<LocalLattice, Nothing> {
     let ratio = harmonics.noise.ratio(at);
     let spread = 0.5 * support.slope_noise.trace();
-    let inverse = support.slope_noise.try_inverse().ok_or(Nothing::NoPixels)?;
-    let (mut normal, mut right) = (Matrix2::zeros(), Matrix2::zeros());
     let mut terms = Vec::with_capacity(harmonics.indices.len());
     let mut strong = Vec::with_capacity(harmonics.indices.len());
     let mut signal_to_noise = 0.0;
     for (i, envelope) in smoothed.envelopes.iter().enumerate() {
+        let index = Vector2::from(harmonics.indices[i].map(f64::from));
+        let slope = Vector2::from(envelope.slope[node].map(f64::from));
         let level = harmonics.noise.levels[i] * ratio;
+        let turn = (taken * index + slope).x * harmonics.width;
+        let ridge = level_of_ridge(harmonics.ridges[i], turn, harmonics.width);
         let power = f64::from(envelope.amplitude[node].norm_sqr());
-        let unit = level * support.amplitude_noise;
+        let unit = (level + ridge) * support.amplitude_noise;
         if power <= FAINT * FAINT * unit || power <= 0.0 {
             continue;
         }
@@ -139,14 +185,18 @@ fn regression(
             f64::INFINITY
         };
         let unsure = envelope.unsure.get(node).copied().map_or(0.0, f64::from);
-        let leaks = harmonics.leaks[i].powi(2) + unsure * unsure;
-        let variance = harmonics.noise.disagreement * level / (2.0 * signal) + leaks / spread;
-        let weight = 1.0 / variance;
-        let index = Vector2::from(harmonics.indices[i].map(f64::from));
-        let [x, y] = envelope.slope[node].map(f64::from);
-        normal += weight * index * index.transpose();
-        right += weight * Vector2::new(x, y) * index.transpose();
-        terms.push((weight, index, Vector2::new(x, y)));
+        let leaks = (harmonics.leaks[i].powi(2) + unsure * unsure) / spread;
+        let plain = harmonics.noise.disagreement * level / (2.0 * signal) + leaks;
+        let ridge = ridge / (2.0 * signal);
+        terms.push(Term {
+            index,
+            slope,
+            variances: Variances {
+                plain,
+                phase: plain + ridge,
+                slope: [plain + 2.0 * turn * turn * ridge, plain + ridge],
+            },
+        });
     }
     let independent = strong
         .iter()
@@ -154,17 +204,50 @@ fn regression(
     if !independent {
         return Err(Nothing::Weak);
     }
-    let indices = normal.try_inverse().ok_or(Nothing::Weak)?;
-    let pair = right * indices;
-    let chi2 = terms.iter().map(|(weight, index, slope)| {
-        let miss = slope - pair * index;
-        weight * (miss.transpose() * inverse * miss)[0]
+    let of_terms = |weight: &dyn Fn(&Variances) -> f64| {
+        let outer = |t: &Term| weight(&t.variances) * t.index * t.index.transpose();
+        terms.iter().map(outer).sum::<Matrix2<f64>>()
+    };
+    let inverse = |m: Matrix2<f64>| m.try_inverse().ok_or(Nothing::Weak);
+    let indices = [
+        inverse(of_terms(&|v| 1.0 / v.slope[0]))?,
+        inverse(of_terms(&|v| 1.0 / v.slope[1]))?,
+    ];
+    let mut pair = Matrix2::zeros();
+    for (axis, indices) in indices.iter().enumerate() {
+        let right = terms
+            .iter()
+            .map(|t| t.index * t.slope[axis] / t.variances.slope[axis]);
+        let row: Vector2<f64> = indices * right.sum::<Vector2<f64>>();
+        pair.set_row(axis, &row.transpose());
+    }
+    let noise = &support.slope_noise;
+    let both = of_terms(&|v| v.plain / (v.slope[0] * v.slope[1]));
+    let mixed = indices[0] * both * indices[1];
+    let covariance = Matrix4::from_fn(|a, b| match (a % 2, b % 2) {
+        (0, 1) => mixed[(a / 2, b / 2)] * noise[(0, 1)],
+        (1, 0) => mixed[(b / 2, a / 2)] * noise[(0, 1)],
+        (axis, _) => indices[axis][(a / 2, b / 2)] * noise[(axis, axis)],
     });
+    let mut chi2 = 0.0;
+    for term in &terms {
+        let miss = term.slope - pair * term.index;
+        let Variances { plain, slope, .. } = term.variances;
+        let of_term = Matrix2::new(
+            slope[0] * noise[(0, 0)],
+            plain * noise[(0, 1)],
+            plain * noise[(0, 1)],
+            slope[1] * noise[(1, 1)],
+        );
+        let inverse = of_term.try_inverse().ok_or(Nothing::NoPixels)?;
+        chi2 += (miss.transpose() * inverse * miss)[0];
+    }
+    let phases = inverse(of_terms(&|v| 1.0 / v.phase))?;
     Ok(LocalLattice {
-        pair,
-        indices,
-        slope: support.slope_noise,
-        chi2: chi2.sum(),
+        pair: pair + taken,
+        covariance,
+        phase_covariance: phases * support.amplitude_noise,
+        chi2,
         freedom: 2 * terms.len() - 4,
         signal_to_noise,
     })

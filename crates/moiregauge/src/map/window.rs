@@ -20,20 +20,28 @@ pub(super) fn ladder(side: f64) -> Vec<f64> {
     steps.take_while(|w| *w <= widest * 1.0001).collect()
 }
 
-/// Variance of the difference of two windows, a and √2 a, in units of that of window a: 1 + ¼ − 8/9.
-pub(super) const OF_DIFFERENCE: f64 = 1.25 - 8.0 / 9.0;
+/// Correlation of white noise under a window a and under b = √2 a: `4 a² b²/(a² + b²)²`.
+const CORRELATION: f64 = 8.0 / 9.0;
+/// Variance of the difference of the two in white noise, in units of that of the narrow one: 1 + ¼ − 8/9.
+pub(super) const OF_DIFFERENCE: f64 = 1.25 - CORRELATION;
 /// Where a defect is, changes beyond this many of these variances say nothing of the window.
 const OUTLYING: f64 = 9.0;
 
-/// Whether a window is narrow enough: `changes` are the squared changes by a window √2 wider over the
-/// variance of this one, for independent nodes and components.
+/// Variance of the difference of a value under two windows from the variances under each. Offsets of lines are correlated
+/// a little more than white noise (0.97 where a harmonic stands on their ridge), which makes this a little large.
+pub(super) fn of_difference(narrow: f64, wide: f64) -> f64 {
+    narrow + wide - 2.0 * CORRELATION * (narrow * wide).sqrt()
+}
+
+/// Whether a window is narrow enough: `changes` are the squared changes by a window √2 wider over the variance that
+/// noise gives them, for independent nodes and components.
 ///
 /// Half a standard deviation of chance is allowed for, so that it does not make windows narrow where nodes are few.
 pub(super) fn is_straight(changes: &mut [f64]) -> bool {
     let typical = super::median(changes) / 0.454_936;
-    let limit = OUTLYING * typical.max(OF_DIFFERENCE);
+    let limit = OUTLYING * typical.max(1.0);
     let kept = changes.iter().filter(|c| **c < limit);
     let (sum, count) = kept.fold((0.0, 0.0f64), |(s, n), c| (s + c, n + 1.0));
-    let chance = 0.5 * OF_DIFFERENCE * (2.0 / count.max(1.0)).sqrt();
-    sum / count.max(1.0) <= OF_DIFFERENCE + ALLOWED * ALLOWED + chance
+    let chance = 0.5 * (2.0 / count.max(1.0)).sqrt();
+    sum / count.max(1.0) <= 1.0 + ALLOWED * ALLOWED / OF_DIFFERENCE + chance
 }

@@ -1,8 +1,8 @@
 //! The waves of all patterns → nodes: which pattern is the strongest, what is to be believed, phases.
 
-use nalgebra::{Matrix2, Vector2};
+use nalgebra::{Matrix2, Matrix4, Vector2};
 
-use super::super::defects::{Blur, Mask, Setting, bend, is_improbable, near};
+use super::super::defects::{Mask, Setting, bend, is_improbable, near};
 use super::super::displacement;
 use super::super::smooth::{Envelope, Nodes, Smoothed};
 use super::super::types::{Reference, UsedHarmonic, WaveMap, WaveNode};
@@ -190,7 +190,7 @@ impl Work<'_> {
     }
 
     /// What a window √2 wider changes at each node of each pattern.
-    fn blurs(&self, locals: &[Vec<Option<Local>>]) -> Vec<Vec<Blur>> {
+    fn blurs(&self, locals: &[Vec<Option<Local>>]) -> Vec<Vec<Change>> {
         let wider = self.window * std::f64::consts::SQRT_2;
         let smoothed: Vec<Smoothed> = self
             .waves
@@ -202,7 +202,7 @@ impl Work<'_> {
             pairs
                 .map(|pair| match pair {
                     (Some(a), Some(b)) => blur(a, b),
-                    _ => Blur::default(),
+                    _ => Change::default(),
                 })
                 .collect()
         };
@@ -217,7 +217,7 @@ impl Work<'_> {
         &self,
         (smoothed, locals): (&[Smoothed], &[Vec<Option<Local>>]),
         owner: &[Option<usize>],
-        blurs: &[Vec<Blur>],
+        blurs: &[Vec<Change>],
     ) -> Vec<Mask> {
         let count = self.nodes.len();
         let places: Vec<Vector2<f64>> = (0..count).map(|n| self.place(n)).collect();
@@ -299,15 +299,15 @@ impl Work<'_> {
         let of_node = |n: usize| {
             let own = nodes[n].pattern == Some(p) && nodes[n].mask == Mask::Good;
             let phase = wave.phase(smoothed, n);
-            let support = smoothed.support[n];
             // Of the first harmonic alone, whose phase this is.
             let power = f64::from(smoothed.envelopes[0].amplitude[n].norm_sqr());
-            let variance = wave.levels[0] / (2.0 * power);
+            let unit = smoothed.support[n].map_or(f64::NAN, |s| s.amplitude_noise);
+            let variance = wave.levels[0] * unit / (2.0 * power);
             WaveNode {
                 mask: if own { Mask::Good } else { Mask::Weak },
                 pair: only(nodes[n].wave),
-                indices: Matrix2::identity() * variance,
-                slope: support.map_or(Matrix2::repeat(f64::NAN), |s| s.slope_noise),
+                covariance: Matrix4::zeros(),
+                phase_covariance: Matrix2::identity() * variance,
                 chi2: 0.0,
                 freedom: 0,
                 signal_to_noise: nodes[n].signal_to_noise,
@@ -338,6 +338,15 @@ impl Work<'_> {
     }
 }
 
+/// What a window √2 wider changes at a node.
+#[derive(Clone, Copy, Debug, Default)]
+struct Change {
+    /// χ² of its two numbers.
+    chi2: f64,
+    /// As a share of the wave vector.
+    share: f64,
+}
+
 /// The strongest pattern at every node.
 fn owners(locals: &[Vec<Option<Local>>], count: usize) -> Vec<Option<usize>> {
     let of_node = |n: usize| {
@@ -364,18 +373,18 @@ fn is_between(locals: &[Vec<Option<Local>>], node: usize) -> bool {
 }
 
 /// The change from one wave to that under a wider window; χ² of two numbers.
-fn blur(narrow: &Local, wide: &Local) -> Blur {
+fn blur(narrow: &Local, wide: &Local) -> Change {
     let change = wide.wave - narrow.wave;
     let inverse = narrow.slope.try_inverse().unwrap_or_default();
     let chi2 = change.dot(&(inverse * change)) / (narrow.variance * OF_DIFFERENCE);
-    Blur {
+    Change {
         chi2,
         share: change.norm() / narrow.wave.norm(),
     }
 }
 
 /// A node; its error is enlarged by what the window blurs where that is more than chance.
-fn node_of(local: Option<(usize, &Local)>, mask: Mask, blur: Option<Blur>) -> StripeNode {
+fn node_of(local: Option<(usize, &Local)>, mask: Mask, blur: Option<Change>) -> StripeNode {
     let factor = match blur {
         Some(blur) if blur.chi2 > MORE_THAN_CHANCE => 1.0 + (blur.chi2 / 2.0 - 1.0) * OF_DIFFERENCE,
         _ => 1.0,

@@ -4,8 +4,9 @@ use nalgebra::{Matrix2, Rotation2, Vector2};
 
 use super::super::blocks::{Place, mix};
 use super::super::carrier::{Carrier, MOST_CELLS, Slope};
+use super::super::lines::Levelled;
 use super::super::median;
-use super::super::smooth::{Nodes, Smoothed, smooth};
+use super::super::smooth::{Smoothed, smooth};
 use super::super::window;
 use super::wave::Wave;
 use crate::image::Image;
@@ -57,7 +58,7 @@ impl Wave {
         let (low, high) = (Vector2::zeros(), self.frame);
         let mut levels = Vec::with_capacity(self.indices.len());
         for pair in waves.chunks(2) {
-            let blocks = mix(image, place, pair, self.blocks.block);
+            let blocks = mix(&Levelled::as_is(image), place, pair, self.blocks.block);
             let smoothed = smooth(&blocks, width, nodes);
             let whole = |n: &usize| {
                 let at = nodes.place(&blocks, *n);
@@ -229,7 +230,8 @@ impl Wave {
                 if let (true, Some(a), Some(b)) = (inside, &a[n], &b[n]) {
                     let change = b.wave - a.wave;
                     for i in 0..2 {
-                        changes.push(change[i].powi(2) / (a.slope[(i, i)] * a.variance));
+                        let variance = a.slope[(i, i)] * a.variance * window::OF_DIFFERENCE;
+                        changes.push(change[i].powi(2) / variance);
                     }
                 }
             }

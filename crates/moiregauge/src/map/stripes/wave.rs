@@ -10,6 +10,7 @@ use rayon::prelude::*;
 use super::super::blocks::{Blocks, Place, mix};
 use super::super::carrier::Carrier;
 use super::super::leaks::clean;
+use super::super::lines::Levelled;
 use super::super::smooth::{Nodes, Smoothed, smooth};
 use super::super::types::Reference;
 use crate::image::Image;
@@ -93,7 +94,7 @@ impl Wave {
         let mut out = Self {
             centre,
             frame: 2.0 * centre,
-            blocks: mix(image, place, &waves, block),
+            blocks: mix(&Levelled::as_is(image), place, &waves, block),
             levels: vec![variance(image); indices.len()],
             noise_measured: false,
             powers: vec![0.0; indices.len()],
