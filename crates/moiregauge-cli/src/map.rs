@@ -248,10 +248,12 @@ fn together(
     } = match outcome {
         Ok(mut outcomes) => outcomes.swap_remove(0),
         Err(failed) => {
-            if let Some(found) = stripes::look(args, inputs, (settings, known, resolution))? {
+            let stripes = stripes::look(args, inputs, (settings, known, resolution));
+            if let Ok(Some(found)) = stripes {
                 return Ok(Answer::Stripes(Box::new(found)));
             }
             eprint!("{}", failures(&failed));
+            stripes?;
             bail!("nothing could be analysed");
         }
     };

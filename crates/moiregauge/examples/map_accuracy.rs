@@ -25,15 +25,21 @@ fn main() {
     published();
 }
 
-/// A lattice of `periods` periods that is stretched and compressed by ± `share` along two directions.
-fn stretched(size: usize, periods: f64, share: f64, seed: u64) -> FieldScene {
+/// A lattice of `periods` periods that is stretched and compressed by ± `share` along two directions, which changes the
+/// twist as much, and sheared by ± `shear`, which adds strain.
+fn stretched(size: usize, periods: f64, [share, shear]: [f64; 2], seed: u64) -> FieldScene {
     let mut scene = FieldScene::hexagonal([size, size], size as f64 / periods, 0.3);
     let across = TAU / size as f64;
-    for (direction, phase) in [([0.6, 0.8], 0.3), ([-0.8, 0.6], 1.9)] {
+    // Displacements along the direction in which they change, and across it.
+    for (direction, phase, along, aside) in [
+        ([0.6, 0.8], 0.3, share, 0.0),
+        ([-0.8, 0.6], 1.9, share, 0.0),
+        ([0.28, 0.96], 1.1, 0.0, shear),
+    ] {
         let direction = Vector2::from(direction);
         let wave = direction * across;
-        // Displacements along the direction in which they change.
-        let amplitude = scene.pair.tr_mul(&direction) * (share / across);
+        let way = direction * along + Vector2::new(-direction.y, direction.x) * aside;
+        let amplitude = scene.pair.tr_mul(&way) / across;
         scene.ripples.push(Ripple {
             wave,
             phase,
@@ -210,7 +216,7 @@ fn published() {
     );
     for size in [2048, 4096] {
         for window in [Some(23.0), None] {
-            let mut scene = stretched(size, size as f64 / 25.0, 0.07, 1);
+            let mut scene = stretched(size, size as f64 / 25.0, [0.07, 0.17], 1);
             scene.white = 0.5 * scene.signal_rms();
             let image = scene.image();
             let start = Instant::now();

@@ -218,19 +218,25 @@ pub(super) fn summary(results: &MapResults) -> String {
 fn trends(results: &MapResults) -> String {
     let mut text = String::new();
     for q in &results.quantities {
-        let Some(t) = q.trend.filter(|_| TRENDS.contains(&q.name.as_str())) else {
+        let told = results.stripes.is_some() || TRENDS.contains(&q.name.as_str());
+        let Some(t) = q.trend.filter(|_| told) else {
             continue;
         };
         let [x, y] =
             [0, 1].map(|i| plus_minus(Estimate::new(t.per_100nm[i], t.per_100nm_sigma[i])));
         let _ = write!(
             text,
-            "  {:16} trend ({x}, {y}) {} per 100 nm; spread = {} (trend), {} (noise), {} (rest); middle of the frame {}",
+            "  {:16} trend ({x}, {y}) {} per 100 nm; spread = {} (trend), {} (noise), {} (rest); at the middle of the {} {}",
             q.name,
             q.unit,
             two_digits(t.of_trend),
             two_digits(t.noise),
             two_digits(t.rest),
+            if results.stripes.is_some() {
+                "pattern"
+            } else {
+                "frame"
+            },
             plus_minus(Estimate::new(t.middle, t.middle_sigma)),
         );
         let whole = results.whole_image.as_ref().map(|w| w.twist_deg);

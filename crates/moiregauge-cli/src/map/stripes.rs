@@ -71,7 +71,7 @@ pub(crate) fn in_words(inputs: &[PathBuf], settings: &Settings, known: &Known) -
     let channel = settings.channel.unwrap_or_default();
     let all: Vec<String> = found
         .iter()
-        .map(|[length, along, _]| format!("{length:.2} nm along {:.0}°", along.to_degrees()))
+        .map(|[length, along, _]| format!("about {length:.1} nm along {:.0}°", along.to_degrees()))
         .collect();
     Some(format!(
         "{} shows stripes in {channel}: {}. One wave vector says nothing of twist and strain; `moiregauge map` maps \
@@ -208,8 +208,8 @@ fn doubts(found: &ScanStripes, file: &str, caveats: &mut Vec<Caveat>) {
             doubt(
                 "stripes-map-and-fit",
                 format!(
-                    "pattern {}: the mean of the map less the fit to all pixels is {} nm and {}°: the good nodes are \
-                     not where all of the pattern is, and it changes across the frame",
+                    "pattern {}: at the middle of the pattern the map less the fit to all its pixels is {} nm and {}°: \
+                     it changes by more than a plane across the frame",
                     pattern.number,
                     plus_minus(length),
                     plus_minus(along)

@@ -99,7 +99,8 @@ pub struct TrendResult {
     pub per_100nm: [f64; 2],
     /// Their standard errors by the noise of the image.
     pub per_100nm_sigma: [f64; 2],
-    /// Value at the middle of the frame, where a fit to the whole image has its mean.
+    /// Value at the middle of the frame (of stripes: of the nodes of the pattern), where a fit to all its pixels has its
+    /// mean.
     pub middle: f64,
     /// Its standard error by the noise of the image.
     pub middle_sigma: f64,
@@ -112,7 +113,7 @@ pub struct TrendResult {
 }
 
 impl TrendResult {
-    fn new(t: &Trend, factor: f64) -> Self {
+    pub(super) fn new(t: &Trend, factor: f64) -> Self {
         let scaled = t.gradient.map(|g| g.scaled(100.0 * factor));
         Self {
             per_100nm: scaled.map(|g| g.value),

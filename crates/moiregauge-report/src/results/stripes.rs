@@ -1,13 +1,15 @@
 //! Patterns of stripes in the document of a map.
 
 use moiregauge::estimate::Estimate;
-use moiregauge::map::{SampledPattern, SampledStripes, Spread};
+use moiregauge::map::{Mask, SampledPattern, SampledStripes, Spread};
+use moiregauge::region::{Trend, Trends};
+use nalgebra::Vector2;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::ResultEstimate;
 use super::convert::estimate;
-use super::map::QuantityResult;
+use super::map::{QuantityResult, TrendResult};
 
 /// A map of stripes: patterns with one wave vector each, which say nothing of twist and strain.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
@@ -53,13 +55,33 @@ pub struct StripeHarmonicResult {
 impl From<&SampledStripes> for StripesResult {
     fn from(found: &SampledStripes) -> Self {
         let patterns = found.patterns.iter().enumerate();
+        let all = patterns.map(|(i, p)| pattern(i + 1, p, trends(found, i + 1)));
         Self {
-            patterns: patterns.map(|(i, p)| pattern(i + 1, p)).collect(),
+            patterns: all.collect(),
         }
     }
 }
 
-fn pattern(number: usize, p: &SampledPattern) -> StripePatternResult {
+/// Planes through wavelength and direction over the good nodes of a pattern, about the middle of all its nodes. The
+/// correlation of their noise is that of slopes in all directions.
+fn trends(found: &SampledStripes, number: usize) -> [Option<Trend>; 2] {
+    let own = |n: &usize| usize::from(found.pattern[*n]) == number;
+    let mut map = found.map.clone();
+    let (mut sum, mut count) = (Vector2::zeros(), 0.0);
+    for n in 0..map.grid.len() {
+        if own(&n) {
+            sum += map.grid.place(n);
+            count += 1.0;
+        } else {
+            map.mask[n] = Mask::Weak;
+        }
+    }
+    let trends = Trends::about(&map, sum / count);
+    let of = |plane| trends.as_ref().and_then(|t| t.of(plane));
+    [of(&map.wavelengths[0]), of(&map.orientation)]
+}
+
+fn pattern(number: usize, p: &SampledPattern, trends: [Option<Trend>; 2]) -> StripePatternResult {
     let degree = 1f64.to_degrees();
     let [wavelength, direction] = match p.fit {
         Some([wavelength, direction]) => [
@@ -68,9 +90,12 @@ fn pattern(number: usize, p: &SampledPattern) -> StripePatternResult {
         ],
         None => [None, None],
     };
-    let quantity = |name: &str, unit: &str, s: &Spread, factor: f64| {
+    let quantity = |name: &str, unit: &str, s: &Spread, trend: Option<Trend>, factor: f64| {
         let name = format!("{name} {number}");
-        QuantityResult::new(&name, unit, s, factor)
+        QuantityResult {
+            trend: trend.map(|t| TrendResult::new(&t, factor)),
+            ..QuantityResult::new(&name, unit, s, factor)
+        }
     };
     StripePatternResult {
         number,
@@ -80,8 +105,8 @@ fn pattern(number: usize, p: &SampledPattern) -> StripePatternResult {
         direction_deg: direction,
         map: p.local.as_ref().map_or_else(Vec::new, |[w, d]| {
             vec![
-                quantity("wavelength", "nm", w, 1.0),
-                quantity("direction", "°", d, degree),
+                quantity("wavelength", "nm", w, trends[0], 1.0),
+                quantity("direction", "°", d, trends[1], degree),
             ]
         }),
         coherence_percent: p.coherence.is_finite().then_some(100.0 * p.coherence),
@@ -103,15 +128,19 @@ fn pattern(number: usize, p: &SampledPattern) -> StripePatternResult {
 }
 
 impl StripePatternResult {
-    /// How far the mean of the map lies from the fit to all pixels: wavelength (nm) and direction (degrees), each
-    /// with the error of both.
+    /// How far the map lies from the fit to all pixels where these have their middle: wavelength (nm) and direction
+    /// (degrees), each with the error of both. Without a trend the means of the map.
     pub fn apart(&self) -> Option<[Estimate; 2]> {
         let [w, d] = [self.wavelength_nm?.plain(), self.direction_deg?.plain()];
         let [a, b] = self.map.as_slice() else {
             return None;
         };
         let off = |q: &QuantityResult, fit: Estimate| {
-            Estimate::new(q.mean - fit.value, q.mean_sigma.hypot(fit.sigma))
+            let [value, sigma] = match q.trend {
+                Some(t) => [t.middle, t.middle_sigma],
+                None => [q.mean, q.mean_sigma],
+            };
+            Estimate::new(value - fit.value, sigma.hypot(fit.sigma))
         };
         Some([off(a, w), off(b, d)])
     }

@@ -22,7 +22,7 @@ const REACH: f64 = 1.0;
 pub struct Trend {
     /// Change per nm along x and along y.
     pub gradient: [Estimate; 2],
-    /// Value of the plane at the middle of the frame.
+    /// Value of the plane at the middle of the frame, or at the place that was asked for.
     pub middle: Estimate,
     /// Standard deviation over the good nodes that the plane makes.
     pub of_trend: f64,
@@ -37,7 +37,7 @@ pub struct Trends {
     nodes: Vec<(usize, Vector2<f64>)>,
     inverse: Matrix2<f64>,
     second: Matrix2<f64>,
-    /// From the middle of the good nodes to that of the frame, nm.
+    /// From the middle of the good nodes to that place, nm.
     aside: Vector2<f64>,
     /// What noise of unit variance leaves in the mean, in both slopes and their covariance, at the middle.
     mean: f64,
@@ -46,9 +46,16 @@ pub struct Trends {
 }
 
 impl Trends {
-    /// `None` where the good nodes are too few or lie too near to each other.
+    /// About the middle of the frame. `None` where the good nodes are too few or lie too near to each other.
     pub fn new(map: &TwistStrainMap) -> Option<Self> {
-        let [columns, rows] = map.grid.size;
+        let [columns, rows] = map.grid.size.map(|n| n as f64 - 1.0);
+        let half = Vector2::new(columns, rows) / 2.0;
+        Self::about(map, map.grid.origin + map.grid.step * half)
+    }
+
+    /// The same about another place, nm, at which [`Trend::middle`] is then.
+    pub fn about(map: &TwistStrainMap, place: Vector2<f64>) -> Option<Self> {
+        let columns = map.grid.size[0];
         let every = ((map.good() as f64 / MOST as f64).sqrt().ceil() as usize).max(1);
         let good: Vec<usize> = (0..map.grid.len())
             .filter(|n| (n % columns).is_multiple_of(every) && (n / columns).is_multiple_of(every))
@@ -77,8 +84,7 @@ impl Trends {
             return None;
         }
         let inverse = second.try_inverse()?;
-        let half = Vector2::new(columns as f64 - 1.0, rows as f64 - 1.0) / 2.0;
-        let aside = map.grid.origin + map.grid.step * half - middle;
+        let aside = place - middle;
         let left = |weight: &dyn Fn(&Vector2<f64>) -> f64| {
             let weights: Vec<(usize, f64)> =
                 nodes.iter().map(|(n, d)| (*n, weight(d) / count)).collect();

@@ -5,6 +5,7 @@
 //! `cov(q)⁻¹ = Σ_k k² (a_k² + b_k²)/(2 S_k) · Σ (n − n̄)(n − n̄)ᵀ`.
 
 use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
+use rayon::prelude::*;
 use rustfft::num_complex::Complex64;
 
 use crate::image::Image;
@@ -14,6 +15,8 @@ use crate::lattice::transform::hann;
 /// Gauss–Newton steps at most; the wave vector stands when it moves by less than this, in cycles over the frame.
 const STEPS: usize = 20;
 const STANDS: f64 = 1e-6;
+/// Pixels whose sums are made together.
+const TOGETHER: usize = 1 << 14;
 /// Pixels that have to show the pattern.
 const FEWEST: usize = 64;
 
@@ -56,20 +59,32 @@ pub(super) fn fit(
     for step in 0..STEPS {
         // The first step finds the amplitudes alone.
         let all = if step == 0 { size } else { size + 2 };
+        let sums: Vec<(DMatrix<f64>, DVector<f64>)> = used
+            .par_chunks(TOGETHER)
+            .map(|some| {
+                let mut normal = DMatrix::<f64>::zeros(all, all);
+                let mut right = DVector::<f64>::zeros(all);
+                let mut row = vec![0.0; size + 2];
+                for &i in some {
+                    let d = place(i) - middle;
+                    terms(&mut row, d, (&wave, orders), &linear, reach);
+                    let model: f64 = (0..size).map(|k| row[k] * linear[k]).sum();
+                    let miss = image.values[i] - model;
+                    for a in 0..all {
+                        right[a] += row[a] * miss;
+                        for b in 0..=a {
+                            normal[(a, b)] += row[a] * row[b];
+                        }
+                    }
+                }
+                (normal, right)
+            })
+            .collect();
         let mut normal = DMatrix::<f64>::zeros(all, all);
         let mut right = DVector::<f64>::zeros(all);
-        let mut row = vec![0.0; size + 2];
-        for &i in &used {
-            let d = place(i) - middle;
-            terms(&mut row, d, (&wave, orders), &linear, reach);
-            let model: f64 = (0..size).map(|k| row[k] * linear[k]).sum();
-            let miss = image.values[i] - model;
-            for a in 0..all {
-                right[a] += row[a] * miss;
-                for b in 0..=a {
-                    normal[(a, b)] += row[a] * row[b];
-                }
-            }
+        for (n, r) in &sums {
+            normal += n;
+            right += r;
         }
         normal.fill_upper_triangle_with_lower_triangle();
         let change = normal.cholesky()?.solve(&right);
