@@ -1,7 +1,7 @@
 //! What every fuzz target does: read the bytes if they are of its format, and check that what
 //! comes out can be true. The fuzzer watches for panics, memory and time.
 
-use spmfile::{Format, ReadError, Samples, Scan};
+use spmfile::{Format, FrameDirection, ReadError, Samples, Scan};
 
 /// The target of one reader.
 #[macro_export]
@@ -28,6 +28,31 @@ pub fn check(data: &[u8], format: Format) -> bool {
     match spmfile::read(data) {
         Ok(scan) => plausible(&scan),
         Err(ReadError::Incomplete { readable, .. }) => plausible(&readable),
+        Err(error) => assert!(!error.to_string().is_empty()),
+    }
+    true
+}
+
+/// Takes an Omicron Matrix file and its log apart and reads them; false if there are no two. The first
+/// byte says which frame is wanted, the next four the length of the file.
+///
+/// # Panics
+/// As [`check`].
+pub fn check_session(data: &[u8]) -> bool {
+    let Some((&[choice, ref length @ ..], both)) = data.split_first_chunk::<5>() else {
+        return false;
+    };
+    let Some((file, log)) = both.split_at_checked(u32::from_le_bytes(*length) as usize) else {
+        return false;
+    };
+    let frame = match choice % 3 {
+        0 => None,
+        1 => Some(FrameDirection::Up),
+        _ => Some(FrameDirection::Down),
+    };
+    let name = "s--1_1.Z_mtrx";
+    match spmfile::matrix::read(file, &[log], name, frame, &|_| choice < 128) {
+        Ok(scan) => plausible(&scan),
         Err(error) => assert!(!error.to_string().is_empty()),
     }
     true

@@ -12,7 +12,7 @@ use std::process::ExitCode;
 
 pub(crate) use args::{AnalyzeArgs, BackgroundArg, ConventionArg, LineArg, MethodArg};
 pub(crate) use chain::{
-    Outcome, Reading, analyse_files, hexadecimal, measure_file, progress, read,
+    Outcome, Reading, analyse_files, hexadecimal, measure_file, progress, read, with_hint,
 };
 pub(crate) use channel::channel_names;
 pub(crate) use files::write_all;

@@ -9,14 +9,13 @@ use std::process::ExitCode;
 use anyhow::{Context as _, bail, ensure};
 use indicatif::ProgressBar;
 use moiregauge::calibration::KnownLattice;
-use moiregauge::caveat::Caveat;
 use moiregauge::material::Material;
-use moiregauge::series::{MeasuredScan, measure_known};
+use moiregauge::series::{MeasureError, MeasuredScan, measure_known};
 use moiregauge::settings::{Grouping, Settings};
 use moiregauge_report::{FailedInput, InputFile};
 use rayon::prelude::*;
 
-use crate::analyze::{BackgroundArg, LineArg, Reading, failures, read};
+use crate::analyze::{BackgroundArg, LineArg, Reading, failures, read, with_hint};
 use crate::config;
 use crate::info::inputs;
 use crate::input::{Known, KnownArgs};
@@ -134,19 +133,30 @@ pub(crate) fn run(args: &CalibrateArgs) -> anyhow::Result<ExitCode> {
         .collect();
     bar.finish_and_clear();
     let (mut scans, mut files): (Vec<MeasuredScan>, Vec<InputFile>) = (Vec::new(), Vec::new());
+    // Images in which no lattice was found.
+    let mut looked_at = 0;
     for (path, result) in inputs.iter().zip(measured) {
         match result {
             Ok((scan, file)) => {
                 scans.push(scan);
                 files.push(file);
             }
-            Err(error) => failed.push(FailedInput {
-                file: path.display().to_string(),
-                error: format!("{error:#}"),
-            }),
+            Err(error) => {
+                let cause = error.downcast_ref();
+                looked_at += usize::from(matches!(cause, Some(MeasureError::Lattice { .. })));
+                failed.push(FailedInput {
+                    file: path.display().to_string(),
+                    error: format!("{error:#}"),
+                });
+            }
         }
     }
     eprint!("{}", failures(&failed));
+    ensure!(
+        !scans.is_empty() || looked_at > 0,
+        "nothing could be read: there is no image to look for the lattice of {} in",
+        lattice.name
+    );
     ensure!(
         !scans.is_empty(),
         "no image shows the lattice of {}",
@@ -191,14 +201,19 @@ fn measured(
     let Reading {
         scan,
         input,
-        replaced,
+        caveats,
     } = read(path, settings, known)?;
-    let mut measured = measure_known(&input.file, &scan, settings, cell)
-        .context("looking for the known lattice (another --channel may show it better)")?;
-    for words in replaced {
-        let caveat = Caveat::new("given-by-user", input.file.as_str(), words);
-        measured.caveats.push(caveat);
-    }
+    let measured = measure_known(&input.file, &scan, settings, cell);
+    let mut measured = measured.map_err(|error| {
+        let seen = matches!(error, MeasureError::Lattice { .. });
+        let error = with_hint(error);
+        if seen {
+            return error
+                .context("looking for the known lattice (another --channel may show it better)");
+        }
+        error
+    })?;
+    measured.caveats.extend(caveats);
     Ok((measured, input))
 }
 

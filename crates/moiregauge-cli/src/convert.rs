@@ -247,6 +247,7 @@ impl Target<'_> {
             path.file_name().unwrap_or_default().to_string_lossy()
         )];
         log.extend(replaced);
+        log.extend(scan.notes.iter().cloned());
         if self.args.rotate_to_lab {
             scan = turned(&scan)?;
             log.push("turned into laboratory axes by cubic convolution".to_owned());
@@ -323,9 +324,13 @@ impl Target<'_> {
     }
 }
 
-/// The name of a file without its extension, unless that is a number: `scan.012` is one of many.
+/// The name of a file without its extension, unless that is a number, `scan.012` being one of many, or that of
+/// a channel, as in `scan.Z_mtrx`.
 pub(crate) fn stem_of(path: &Path) -> String {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
+    if let Some(channel) = name.strip_suffix("_mtrx") {
+        return channel.to_owned();
+    }
     match name.rsplit_once('.') {
         Some((stem, extension))
             if !stem.is_empty() && !extension.bytes().all(|b| b.is_ascii_digit()) =>
@@ -351,6 +356,7 @@ fn turned(scan: &Scan) -> anyhow::Result<Scan> {
             Some(out) => out.channels.extend(turned.channels),
             None => {
                 out = Some(Scan {
+                    notes: scan.notes.clone(),
                     metadata: scan.metadata.clone(),
                     ..turned
                 });

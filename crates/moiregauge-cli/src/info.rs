@@ -77,6 +77,8 @@ struct ScanInfo {
     closed_loop: Option<bool>,
     channels: Vec<ChannelInfo>,
     unreadable: Vec<Unreadable>,
+    /// Doubts about how the file was understood.
+    notes: Vec<String>,
     missing_for_analysis: Vec<String>,
 }
 
@@ -220,6 +222,7 @@ fn scan_info(scan: &Scan, at: &[Pixel]) -> ScanInfo {
                 error: u.error.clone(),
             })
             .collect(),
+        notes: scan.notes.clone(),
         missing_for_analysis: missing_for_analysis(scan),
     }
 }

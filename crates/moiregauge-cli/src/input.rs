@@ -11,6 +11,8 @@ use spmfile::{
     read_selected, sensor_axis,
 };
 
+use crate::session;
+
 /// The options for what files do not tell.
 #[derive(clap::Args, Clone, Debug, Default)]
 #[command(next_help_heading = "What the files do not tell")]
@@ -26,7 +28,8 @@ pub(crate) struct KnownArgs {
     #[arg(long, value_name = "HZ", value_parser = parse_positive)]
     line_rate: Option<f64>,
     /// Which line was first: up is the bottom one. The alternating ones begin with the first file by
-    /// name, numbers in names counting as numbers
+    /// name, numbers in names counting as numbers. Of files that hold a frame of each (Omicron Matrix)
+    /// that one is read, otherwise up
     #[arg(long, value_enum)]
     frame_direction: Option<FrameArg>,
     /// Angle by which the fast axis is turned against x, degrees, counter-clockwise
@@ -113,6 +116,8 @@ impl Known {
             |info: &ChannelInfo| wanted(info) || self.names_sensor(&info.name, &info.internal_name);
         if is_array(bytes) {
             spmfile::arrays::read(bytes, &self.array_options(path), &wanted)
+        } else if detect(bytes) == Format::OmicronMatrix {
+            session::read(path, bytes, self.frame_direction(path), &wanted)
         } else {
             read_selected(bytes, &wanted)
         }

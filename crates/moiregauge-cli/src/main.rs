@@ -12,6 +12,7 @@ mod moire;
 mod plan;
 mod say;
 mod scanner;
+mod session;
 mod simulate;
 mod validate;
 

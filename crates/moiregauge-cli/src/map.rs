@@ -24,7 +24,7 @@ use moiregauge_report::{FailedInput, Provenance};
 use spmfile::FrameDirection;
 
 use crate::analyze::{AnalyzeArgs, Outcome, analyse_files, failures, read};
-use crate::info::expand;
+use crate::info::inputs;
 use crate::input::Known;
 use output::{Made, write};
 pub(crate) use stripes::in_words as stripes_in_words;
@@ -116,19 +116,10 @@ pub(crate) fn run(args: &MapArgs) -> anyhow::Result<ExitCode> {
         out.display()
     );
     args.analyze.start_threads()?;
-    let (mut inputs, mut failed) = (Vec::new(), Vec::new());
-    for path in expand(args.analyze.paths()) {
-        match path {
-            Ok(path) => inputs.push(path),
-            Err((path, error)) => failed.push(FailedInput {
-                file: path.display().to_string(),
-                error,
-            }),
-        }
-    }
+    let (inputs, failed) = inputs(args.analyze.paths());
     let known = args.analyze.known().of(&inputs);
     let whole = (&settings, &known, &resolution);
-    let made = match survey(args, &inputs, whole)? {
+    let made = match survey(args, &inputs, whole, &failed)? {
         Some(made) => made,
         None => match together(args, &inputs, whole, failed)? {
             Answer::Lattice(made) => *made,
@@ -155,6 +146,7 @@ fn survey(
     args: &MapArgs,
     inputs: &[PathBuf],
     (settings, known, resolution): (&Settings, &Known, &Resolution),
+    failed: &[FailedInput],
 ) -> anyhow::Result<Option<Made>> {
     let open = |path: &PathBuf, always: bool| {
         survey::Large::open(path, settings, known, always)
@@ -177,6 +169,7 @@ fn survey(
             .map((settings, resolution), first.as_ref(), out, loud)
             .with_context(|| path.display().to_string())?;
         let file = large.input.file.clone();
+        caveats.extend(large.caveats.iter().cloned());
         let drift = if plan.drift_corrected {
             "corrected for the drift that was given"
         } else if settings.drift.is_some() {
@@ -209,7 +202,7 @@ fn survey(
             version: env!("CARGO_PKG_VERSION").to_owned(),
             seed: settings.seed,
             inputs: read,
-            failed: Vec::new(),
+            failed: failed.to_vec(),
         },
         settings: settings.clone(),
         images,
@@ -303,20 +296,7 @@ fn together(
         caveats.extend(narrow);
     }
     let drift_change = change(&maps);
-    if let Some(found) = drift_change.filter(DriftChange::stands_out) {
-        let [x, y] = found
-            .acceleration
-            .map(|a| moiregauge_report::plus_minus(a.scaled(3600.0)));
-        caveats.push(Caveat::new(
-            "drift-changes",
-            "map",
-            format!(
-                "upward and downward frames differ along their slow axis as if the drift changed within a \
-                 frame, by ({x}, {y}) nm/min² more upwards than downwards: that is no strain, and the average of \
-                 both is free of it. A change of drift common to both directions looks like strain"
-            ),
-        ));
-    }
+    about_change(drift_change, &mut caveats);
     let map = TwistStrainMap::new(&lattices, &found);
     let look = |contrast| {
         let all = used().flat_map(|scan| {
@@ -343,6 +323,24 @@ fn together(
         drift_change,
         caveats,
     })))
+}
+
+/// Says that the drift changes, where it does.
+fn about_change(drift_change: Option<DriftChange>, caveats: &mut Vec<Caveat>) {
+    if let Some(found) = drift_change.filter(DriftChange::stands_out) {
+        let [x, y] = found
+            .acceleration
+            .map(|a| moiregauge_report::plus_minus(a.scaled(3600.0)));
+        caveats.push(Caveat::new(
+            "drift-changes",
+            "map",
+            format!(
+                "upward and downward frames differ along their slow axis as if the drift changed within a \
+                 frame, by ({x}, {y}) nm/min² more upwards than downwards: that is no strain, and the average of \
+                 both is free of it. A change of drift common to both directions looks like strain"
+            ),
+        ));
+    }
 }
 
 /// Says that the margin is narrower than two windows where nobody asked for that.

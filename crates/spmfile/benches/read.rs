@@ -45,6 +45,7 @@ fn file(side: usize) -> Vec<u8> {
         size_nm: Some([70.0; 2]),
         closed_loop: Some(false),
         line_times_s: None,
+        notes: Vec::new(),
         metadata: Vec::new(),
         channels: channels.collect(),
         unreadable: Vec::new(),

@@ -34,8 +34,10 @@ pub enum Format {
     Rhk,
     /// Agilent, Molecular Imaging (`.mi`).
     AgilentMi,
-    /// Omicron Matrix (`.mtrx`).
+    /// Omicron Matrix, the file of a channel (`.Z_mtrx`).
     OmicronMatrix,
+    /// Omicron Matrix, the log of a session (`_0001.mtrx`).
+    OmicronMatrixLog,
     /// ISO 28632 text (`ISO/TC 201 SPM data transfer format`), often named `.spm`.
     Iso28632,
     /// `NumPy` array.
@@ -61,7 +63,7 @@ pub enum Format {
 }
 
 /// First bytes that say it all.
-const SIGNATURES: [(&[u8], Format); 19] = [
+const SIGNATURES: [(&[u8], Format); 20] = [
     (b":NANONIS_VERSION:", Format::Nanonis),
     (b"GWYP", Format::Gwy),
     (b"GWYO", Format::Gwy),
@@ -70,6 +72,7 @@ const SIGNATURES: [(&[u8], Format); 19] = [
     (b"[DataSet]", Format::Nid),
     (b"WSxM file", Format::Wsxm),
     (b"fileType ", Format::AgilentMi),
+    (b"ONTMATRX0101ATEM", Format::OmicronMatrixLog),
     (b"ONTMATRX", Format::OmicronMatrix),
     (b"ISO/TC 201 SPM data transfer format", Format::Iso28632),
     (b"\x93NUMPY", Format::Npy),
@@ -146,11 +149,12 @@ pub fn detect(bytes: &[u8]) -> Format {
 /// Whether a file that begins like this is meant to be a scan, readable or not.
 ///
 /// For picking the scans out of a folder that also holds notes, pictures and arrays: of these the
-/// user has to say that they are scans, by naming them.
+/// user has to say that they are scans, by naming them. Logs that go with scans are none.
 pub fn looks_like_scan(head: &[u8]) -> bool {
     !matches!(
         detect(head),
-        Format::Npy
+        Format::OmicronMatrixLog
+            | Format::Npy
             | Format::Npz
             | Format::Tiff
             | Format::Png
@@ -340,6 +344,8 @@ mod tests {
         assert!(looks_like_scan(b"\\*Force file list\r\n"));
         assert!(!looks_like_scan(b"\x93NUMPY\x01\0"));
         assert!(!looks_like_scan(b"1 2 3\n4 5 6\n"));
+        assert!(looks_like_scan(b"ONTMATRX0101TLKB"));
+        assert!(!looks_like_scan(b"ONTMATRX0101ATEM"));
         assert!(!looks_like_scan(b""));
     }
 }

@@ -49,6 +49,9 @@ pub(crate) fn describe(scan: &Scan) -> Vec<(String, String)> {
     put("offset (nm)", Some(pair(scan.offset_nm)));
     put("size (nm)", scan.size_nm.map(pair));
     put("closed loop", scan.closed_loop.map(|on| on.to_string()));
+    for (n, note) in scan.notes.iter().enumerate() {
+        put(&format!("note {}", n + 1), Some(note.clone()));
+    }
     lines
 }
 
@@ -214,6 +217,8 @@ pub(crate) fn apply(scan: &mut Scan) {
     scan.offset_nm = pair("offset (nm)").unwrap_or(scan.offset_nm);
     scan.size_nm = pair("size (nm)").or(scan.size_nm);
     scan.closed_loop = value(&lines, "closed loop").and_then(|v| v.parse().ok());
+    let notes = (1..).map_while(|n| value(&lines, &format!("note {n}")));
+    scan.notes.extend(notes.map(str::to_owned));
     scan.metadata = lines
         .into_iter()
         .filter(|(key, _)| !key.starts_with("spmfile "))
@@ -283,6 +288,7 @@ mod tests {
             offset_nm: [1e9 / 7.0, -2e-3],
             size_nm: Some([70.0, 35.1]),
             closed_loop: Some(false),
+            notes: vec!["One = doubt".to_owned(), "Another".to_owned()],
             metadata: vec![("Note".to_owned(), "kept".to_owned())],
             ..Scan::default()
         };

@@ -30,7 +30,7 @@ mod igor;
 mod iso28632;
 mod jpk;
 mod labels;
-mod matrix;
+pub mod matrix;
 mod missing;
 mod nanonis;
 pub mod nanoscope;
@@ -93,7 +93,12 @@ pub fn read_selected(
     bytes: &[u8],
     wanted: &dyn Fn(&ChannelInfo) -> bool,
 ) -> Result<Scan, ReadError> {
-    let mut scan = dispatch(bytes, wanted).map_err(|mut error| {
+    checked(dispatch(bytes, wanted))
+}
+
+/// Leaves out what cannot be true, and refuses images without a sample.
+pub(crate) fn checked(scan: Result<Scan, ReadError>) -> Result<Scan, ReadError> {
+    let mut scan = scan.map_err(|mut error| {
         if let ReadError::Incomplete { readable, .. } = &mut error {
             whole::tidy(readable);
         }
@@ -128,7 +133,7 @@ fn dispatch(bytes: &[u8], wanted: &dyn Fn(&ChannelInfo) -> bool) -> Result<Scan,
         Format::ParkTiff => park::read(bytes, wanted),
         Format::Rhk => rhk::read(bytes, wanted),
         Format::AgilentMi => agilent::read(bytes, wanted),
-        Format::OmicronMatrix => matrix::read(bytes, wanted),
+        Format::OmicronMatrix | Format::OmicronMatrixLog => Err(matrix::refuse(bytes)),
         Format::Npy
         | Format::Npz
         | Format::Tiff

@@ -137,6 +137,8 @@ pub struct Scan {
     pub channels: Vec<Channel>,
     /// Channels that could not be read.
     pub unreadable: Vec<UnreadableChannel>,
+    /// Doubts about how the file was understood, in words for the user.
+    pub notes: Vec<String>,
     /// What else the header says, as names and values, in the order of the file.
     pub metadata: Vec<(String, String)>,
 }

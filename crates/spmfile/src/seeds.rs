@@ -10,16 +10,33 @@ use crate::detect::{Format, detect};
 const LONGEST: usize = 1 << 16;
 
 pub(crate) fn keep(bytes: &[u8]) {
+    let format = detect(bytes);
+    let paired = matches!(format, Format::OmicronMatrix | Format::OmicronMatrixLog);
+    if !paired && !matches!(format, Format::Other(_)) {
+        write(&reader(format), bytes);
+    }
+}
+
+/// A file of a channel and its log in one: a byte, the length of the first, both, as the fuzz target
+/// `matrix` takes them apart.
+pub(crate) fn keep_session(bytes: &[u8], log: &[&[u8]], file_name: &str) {
+    if file_name == "s--1_1.Z_mtrx" {
+        let length = (bytes.len() as u32).to_le_bytes();
+        let both = [&[0], &length[..], bytes, &log.concat()].concat();
+        write("matrix", &both);
+    }
+}
+
+fn write(reader: &str, bytes: &[u8]) {
     let Some(folder) = std::env::var_os("SPMFILE_SEEDS") else {
         return;
     };
-    let format = detect(bytes);
-    if bytes.len() > LONGEST || matches!(format, Format::Other(_)) {
+    if bytes.len() > LONGEST {
         return;
     }
     let mut hasher = DefaultHasher::new();
     bytes.hash(&mut hasher);
-    let folder = PathBuf::from(folder).join(reader(format));
+    let folder = PathBuf::from(folder).join(reader);
     std::fs::create_dir_all(&folder).expect("a folder for seeds");
     let name = format!("{:016x}", hasher.finish());
     std::fs::write(folder.join(name), bytes).expect("a seed");
@@ -32,7 +49,6 @@ fn reader(format: Format) -> String {
         Format::NanoScopeForce => return "nanoscope_force".to_owned(),
         Format::ParkTiff => return "park".to_owned(),
         Format::AgilentMi => return "agilent".to_owned(),
-        Format::OmicronMatrix => return "matrix".to_owned(),
         _ => {}
     }
     let mut name = String::new();

@@ -40,6 +40,7 @@ static WRITTEN: LazyLock<Vec<u8>> = LazyLock::new(|| {
         size_nm: Some([100.0, 75.0]),
         closed_loop: None,
         line_times_s: None,
+        notes: Vec::new(),
         metadata: Vec::new(),
         channels: vec![
             channel("TR Phase", "°"),

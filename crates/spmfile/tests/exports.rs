@@ -74,6 +74,7 @@ fn scan() -> Scan {
             ),
         ],
         unreadable: Vec::new(),
+        notes: Vec::new(),
         metadata: vec![("Bias".to_owned(), "10 µV".to_owned())],
     }
 }

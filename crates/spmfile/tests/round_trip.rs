@@ -55,6 +55,7 @@ fn scan(channels: Vec<Channel>) -> Scan {
         size_nm: Some([70.0, 60.5]),
         closed_loop: Some(false),
         line_times_s: None,
+        notes: Vec::new(),
         metadata: Vec::new(),
         channels,
         unreadable: Vec::new(),

@@ -7,8 +7,8 @@ use indicatif::{ProgressBar, ProgressStyle};
 use moiregauge::analysis::Analysis;
 use moiregauge::caveat::Caveat;
 use moiregauge::series::{
-    MeasuredScan, Window, analyse, choose_channel, common_window, illustrate, measure_moires,
-    sorted_moires,
+    MeasureError, MeasuredScan, Window, analyse, choose_channel, common_window, illustrate,
+    measure_moires, sorted_moires,
 };
 use moiregauge::settings::Settings;
 use moiregauge_report::{FailedInput, InputFile, Provenance};
@@ -156,29 +156,39 @@ pub(crate) fn measure_file(
     let Reading {
         scan,
         input,
-        replaced,
+        caveats,
     } = read(path, settings, known)?;
-    let mut moires = measure_moires(&input.file, &scan, settings, window)?;
+    let mut moires = measure_moires(&input.file, &scan, settings, window).map_err(with_hint)?;
     let set = sets
         .iter()
         .find(|(_, of)| path.starts_with(of))
         .map(|(name, _)| name.clone());
     for measured in &mut moires {
-        let given = replaced
-            .iter()
-            .map(|words| Caveat::new("given-by-user", input.file.as_str(), words.clone()));
-        measured.caveats.extend(given);
+        measured.caveats.extend(caveats.iter().cloned());
         measured.set.clone_from(&set);
     }
     Ok((moires, input))
+}
+
+/// The error, with the option that helps against it.
+pub(crate) fn with_hint(error: MeasureError) -> anyhow::Error {
+    let hint = match error {
+        MeasureError::NoSize => Some("give the size, as in --size 70nm×70nm"),
+        _ => None,
+    };
+    let error = anyhow::Error::new(error);
+    match hint {
+        Some(hint) => error.context(hint),
+        None => error,
+    }
 }
 
 /// A file as the analysis reads it.
 pub(crate) struct Reading {
     pub(crate) scan: Scan,
     pub(crate) input: InputFile,
-    /// What the user's options replaced in it.
-    pub(crate) replaced: Vec<String>,
+    /// What the user's options replaced in it, and what its reader doubts.
+    pub(crate) caveats: Vec<Caveat>,
 }
 
 /// Reads what the analysis needs of a file: the chosen channel and the position sensors.
@@ -201,10 +211,16 @@ pub(crate) fn read(path: &Path, settings: &Settings, known: &Known) -> anyhow::R
         sha256: hexadecimal(&hash),
         bytes: bytes.len() as u64,
     };
+    let caveat = |code| {
+        let file = input.file.as_str();
+        move |words: String| Caveat::new(code, file, words)
+    };
+    let doubts = scan.notes.iter().cloned().map(caveat("reader-doubt"));
+    let caveats = replaced.into_iter().map(caveat("given-by-user"));
     Ok(Reading {
+        caveats: caveats.chain(doubts).collect(),
         scan,
         input,
-        replaced,
     })
 }
 

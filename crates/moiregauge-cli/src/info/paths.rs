@@ -5,17 +5,15 @@ use std::path::{Path, PathBuf};
 
 use moiregauge_report::FailedInput;
 
+use crate::session::{channels_of_one_frame, one_per_frame};
+
 /// The files meant by names of files, folders and wildcards, in order; names that mean none come
 /// back with the reason.
 pub(crate) fn expand(paths: &[PathBuf]) -> Vec<Result<PathBuf, (PathBuf, String)>> {
     let mut files = Vec::new();
     for path in paths {
         let found = if path.is_dir() {
-            folder(
-                path,
-                &|_, file| holds_scan(file),
-                "the folder holds no scan files (subfolders are not searched)",
-            )
+            scans(path)
         } else if path.exists() {
             Ok(vec![path.clone()])
         } else {
@@ -29,7 +27,7 @@ pub(crate) fn expand(paths: &[PathBuf]) -> Vec<Result<PathBuf, (PathBuf, String)
     files
 }
 
-/// The same, what can be read apart from what cannot.
+/// The same for measuring: what can be read apart from what cannot, and each frame once.
 pub(crate) fn inputs(paths: &[PathBuf]) -> (Vec<PathBuf>, Vec<FailedInput>) {
     let (mut files, mut failed) = (Vec::new(), Vec::new());
     for path in expand(paths) {
@@ -41,6 +39,15 @@ pub(crate) fn inputs(paths: &[PathBuf]) -> (Vec<PathBuf>, Vec<FailedInput>) {
             }),
         }
     }
+    let (files, others) = channels_of_one_frame(files);
+    failed.extend(others.into_iter().map(|(file, first)| FailedInput {
+        file: file.display().to_string(),
+        error: format!(
+            "another channel of the frame of {}, which is measured already; give the files of one channel, as in \
+             '*.Z_mtrx'",
+            first.display()
+        ),
+    }));
     (files, failed)
 }
 
@@ -66,11 +73,25 @@ fn folder(
     Ok(files)
 }
 
-/// Whether a file's first bytes are those of a scan.
-fn holds_scan(path: &Path) -> bool {
+/// The scans in a folder.
+fn scans(path: &Path) -> Result<Vec<PathBuf>, String> {
+    let none = "the folder holds no scan files (subfolders are not searched)";
+    let found = folder(path, &|_, file| spmfile::looks_like_scan(&head(file)), none)?;
+    let files = one_per_frame(found, head);
+    if files.is_empty() {
+        return Err(none.to_owned());
+    }
+    Ok(files)
+}
+
+/// The first bytes of a file, which tell its format; none of one that cannot be read.
+fn head(path: &Path) -> Vec<u8> {
     let mut head = Vec::new();
     let read = std::fs::File::open(path).and_then(|file| file.take(512).read_to_end(&mut head));
-    read.is_ok() && spmfile::looks_like_scan(&head)
+    if read.is_err() {
+        head.clear();
+    }
+    head
 }
 
 /// Wildcards in the last part of a path, for shells that leave them alone.

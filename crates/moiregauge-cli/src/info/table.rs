@@ -21,6 +21,9 @@ pub(super) fn table(info: &FileInfo) -> String {
     for channel in &scan.unreadable {
         let _ = writeln!(text, "  unreadable: {}: {}", channel.name, channel.error);
     }
+    for note in &scan.notes {
+        let _ = writeln!(text, "  note: {note}");
+    }
     if scan.missing_for_analysis.is_empty() {
         text += "\n  nothing is missing for the moiré analysis\n";
     } else {

@@ -34,17 +34,16 @@ const ERRORS: &str = "one standard deviation by the noise of the images, node by
 /// The channel in which a file shows stripes best: settings that name it, and its patterns (wavelength in nm, direction
 /// in rad, log₁₀ of the chance of noise).
 fn best(path: &Path, settings: &Settings, known: &Known) -> Option<(Settings, Vec<[f64; 3]>)> {
-    let names = match &settings.channel {
-        Some(name) => vec![name.clone()],
-        None => {
-            let names = crate::analyze::channel_names(path, known)?;
-            let names: Vec<_> = names
-                .iter()
-                .map(|(a, b)| (a.as_str(), b.as_str()))
-                .collect();
-            let all = channels_by_preference(&names);
-            all.into_iter().map(str::to_owned).collect()
-        }
+    let names = if let Some(name) = &settings.channel {
+        vec![name.clone()]
+    } else {
+        let names = crate::analyze::channel_names(path, known)?;
+        let names: Vec<_> = names
+            .iter()
+            .map(|(a, b)| (a.as_str(), b.as_str()))
+            .collect();
+        let all = channels_by_preference(&names);
+        all.into_iter().map(str::to_owned).collect()
     };
     let mut best: Option<(Settings, Vec<[f64; 3]>)> = None;
     let total = |found: &[[f64; 3]]| found.iter().map(|f| f[2]).sum::<f64>();

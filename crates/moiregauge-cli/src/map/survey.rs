@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
 use indicatif::{ProgressBar, ProgressStyle};
+use moiregauge::caveat::Caveat;
 use moiregauge::geometry::{Geometry, Timing};
 use moiregauge::map::{Mask, Resolution, TwistStrainMap};
 use moiregauge::series::{SurveyPlan, choose_channel, nominal_geometry};
@@ -24,6 +25,8 @@ const LARGE: usize = 4096 * 4096 * 5 / 4;
 /// A large image that can be mapped.
 pub(super) struct Large {
     pub(super) input: InputFile,
+    /// What the user's options replaced in it, and what its reader doubts.
+    pub(super) caveats: Vec<Caveat>,
     geometry: Geometry,
     /// Where the file tells its line rate and frame direction.
     pub(super) timing: Option<Timing>,
@@ -56,6 +59,7 @@ impl Large {
                 .context("the array has no size; give it with --size")?;
             return Ok(Some(Self {
                 input: identity(path)?,
+                caveats: Vec::new(),
                 geometry,
                 timing,
                 source: Source::Array(array),
@@ -85,6 +89,7 @@ impl Large {
             nominal_geometry(&reading.scan, channel).context("the file gives no scan size")?;
         Ok(Some(Self {
             input: identity(path)?,
+            caveats: reading.caveats,
             geometry,
             timing: timing(&reading.scan, channel),
             source: Source::Memory(channel.clone()),

@@ -147,6 +147,30 @@ fn another_lattice_is_not_taken_for_the_known_one() {
     assert!(unknown.stderr.contains("graphite"), "{}", unknown.stderr);
 }
 
+/// A folder without scans and a picture without a size are not blamed on the lattice.
+#[test]
+fn nothing_to_look_at_is_no_missing_lattice() {
+    let folder = tempfile::tempdir().unwrap();
+    let empty = folder.path().join("empty");
+    std::fs::create_dir(&empty).unwrap();
+    let picture = folder.path().join("picture.csv");
+    std::fs::write(&picture, "1,2,3\n4,5,6\n7,8,9\n").unwrap();
+    for (input, reason) in [
+        (&empty, "holds no scan files"),
+        (&picture, "--size 70nm×70nm"),
+    ] {
+        let run = run(&mut calibrate(input, &["--material", "graphite"]));
+        assert_eq!(run.code, Some(1));
+        assert!(
+            run.stderr.contains("nothing could be read"),
+            "{}",
+            run.stderr
+        );
+        assert!(run.stderr.contains(reason), "{}", run.stderr);
+        assert!(!run.stderr.contains("shows the lattice"), "{}", run.stderr);
+    }
+}
+
 /// Numbers after a name in what was printed.
 fn printed(said: &str, name: &str) -> f64 {
     let line = said

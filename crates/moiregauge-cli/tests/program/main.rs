@@ -12,7 +12,11 @@ mod refusals;
 mod results;
 mod round_trip;
 mod same_bytes;
+mod sessions;
 mod several;
 mod stripes;
 mod surveys;
 mod validation;
+/// Made-up sessions of Omicron Matrix, as the tests of the reader have them.
+#[path = "../../../spmfile/src/matrix/tests/writer.rs"]
+mod writer;

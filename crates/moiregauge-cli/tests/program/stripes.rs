@@ -18,7 +18,7 @@ fn stripes(folder: &Path) -> String {
     written(folder, &scene.image())
 }
 
-fn pattern<'a>(results: &'a Value, number: usize) -> &'a Value {
+fn pattern(results: &Value, number: usize) -> &Value {
     &results["stripes"]["patterns"][number]
 }
 

@@ -19,8 +19,9 @@ use crate::results::Results;
 
 const TEMPLATE: &str = include_str!("report.html");
 
-/// What pages share: their look.
+/// What pages share: their look, and their last sections.
 const STYLE: &str = include_str!("style.html");
+const END: &str = include_str!("end.html");
 
 pub use map_page::map_page;
 
@@ -45,6 +46,7 @@ fn rendered(template: &'static str, content: impl Serialize) -> Result<Vec<u8>, 
     environment.set_syntax(syntax);
     // The name ends in .html, which switches escaping on.
     environment.add_global("style", Value::from_safe_string(STYLE.to_owned()));
+    environment.add_template("end.html", END)?;
     environment.add_template("report.html", template)?;
     let text = environment
         .get_template("report.html")?

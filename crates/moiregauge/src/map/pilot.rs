@@ -98,7 +98,7 @@ impl Work<'_> {
         let told = |envelope: &Envelope, index: [i32; 2]| {
             let g = self.reference.wave(index);
             let ridge = level_of_ridge(self.image.ridge(g), g.x * in_pixels[0], in_pixels[0]);
-            told(envelope, &first, level + ridge, index)
+            told(envelope, &first, [level, ridge], index)
         };
         let of_first = first.envelopes.iter().zip(&self.indices);
         let of_first: Vec<Told> = of_first.map(|(e, &index)| told(e, index)).collect();
@@ -182,19 +182,22 @@ struct Told {
     worth: f64,
 }
 
-/// From the envelope of harmonic (h, k) at sparse nodes; `level` is that of the noise.
-fn told(envelope: &Envelope, nodes: &Smoothed, level: f64, [h, k]: [i32; 2]) -> Told {
-    let (mut sum, mut units, mut count) = (0.0, 0.0, 0.0);
+/// From the envelope of harmonic (h, k) at sparse nodes; the levels are those of white noise and of offsets of lines.
+fn told(envelope: &Envelope, nodes: &Smoothed, levels: [f64; 2], [h, k]: [i32; 2]) -> Told {
+    let (mut sum, mut noise, mut count) = (0.0, 0.0, 0.0);
     for (amplitude, support) in envelope.amplitude.iter().zip(&nodes.support) {
         if let Some(support) = support.filter(|s| s.share > 0.9) {
             sum += f64::from(amplitude.norm_sqr());
-            units += level * support.amplitude_noise;
+            noise += support.amplitude_noise;
             count += 1.0f64;
         }
     }
-    let power = (sum - units) / count.max(1.0);
-    // Chance of the mean: nodes a window apart are nearly independent.
-    let chance = 4.0 * units / count.max(1.0) / count.max(1.0).sqrt();
+    let count = count.max(1.0);
+    let units = levels.map(|level| level * noise / count);
+    let power = sum / count - units[0] - units[1];
+    // Chance of the mean: nodes a window apart are nearly independent, but offsets are the same all along a row.
+    let rows = nodes.nodes.size[1] as f64;
+    let chance = 4.0 * (units[0] / count.sqrt() + units[1] / rows.min(count).sqrt());
     let order = f64::from(h * h + h * k + k * k);
     let worth = if power > chance { power * order } else { 0.0 };
     Told { power, worth }

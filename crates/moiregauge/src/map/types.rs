@@ -5,7 +5,7 @@ use nalgebra::{Matrix2, Matrix4, Vector2};
 use super::defects::Mask;
 
 /// How maps are made.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Resolution {
     /// Width of the Gaussian window (standard deviation), nm; `None`: as wide as the lattice is straight.
     pub window_nm: Option<f64>,
@@ -24,16 +24,6 @@ impl Resolution {
     pub fn margin_of(&self, window_nm: f64, sides: [f64; 2]) -> f64 {
         let most = OF_SIDE * sides[0].min(sides[1]) / window_nm;
         self.margin.unwrap_or(MARGIN.min(most))
-    }
-}
-
-impl Default for Resolution {
-    fn default() -> Self {
-        Self {
-            window_nm: None,
-            step_nm: None,
-            margin: None,
-        }
     }
 }
 

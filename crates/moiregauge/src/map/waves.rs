@@ -167,7 +167,7 @@ fn regression(
         let index = Vector2::from(harmonics.indices[i].map(f64::from));
         let slope = Vector2::from(envelope.slope[node].map(f64::from));
         let level = harmonics.noise.levels[i] * ratio;
-        let turn = (taken * index + slope).x * harmonics.width;
+        let turn = (taken * index).x * harmonics.width;
         let ridge = level_of_ridge(harmonics.ridges[i], turn, harmonics.width);
         let power = f64::from(envelope.amplitude[node].norm_sqr());
         let unit = (level + ridge) * support.amplitude_noise;

@@ -116,6 +116,7 @@ pub(super) fn record(settings: &Simulation, scene: &Scene, plan: &FramePlan) -> 
         size_nm: Some(raster.nominal_size_nm),
         closed_loop: Some(false),
         line_times_s: None,
+        notes: Vec::new(),
         metadata: Vec::new(),
         channels: [phase, amplitude, x, y].concat(),
         unreadable: Vec::new(),

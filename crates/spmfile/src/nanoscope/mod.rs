@@ -248,6 +248,7 @@ fn frame(sections: &[Section<'_>], images: &[&Section<'_>]) -> Scan {
         size_nm: frame::full_size(images.first().copied(), sections),
         closed_loop: frame::scan_value(sections, "XY Closed Loop").and_then(on_off),
         line_times_s: None,
+        notes: Vec::new(),
         metadata: Vec::new(),
         channels: Vec::new(),
         unreadable: Vec::new(),

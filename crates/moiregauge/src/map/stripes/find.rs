@@ -281,18 +281,13 @@ impl Power<'_> {
         chance(around).max(chance(ring)).max(chance(column))
     }
 
-    fn is_far(&self, (x, y): (i64, i64), (u, v): (i64, i64)) -> bool {
-        let off = |s: i64| ((x - s * u) as f64).hypot((y - s * v) as f64);
-        off(1) > OWN && off(-1) > OWN
-    }
-
     fn around(&self, x: i64, y: i64) -> Vec<f64> {
         let reach = AROUND as i64;
         let places = (-reach..=reach).flat_map(|i| (-reach..=reach).map(move |j| (i, j)));
         places
             .filter(|(i, j)| (*i as f64).hypot(*j as f64) < AROUND)
             .map(|(i, j)| (x + i, y + j))
-            .filter(|&at| self.is_inside(at) && self.is_far(at, (x, y)))
+            .filter(|&at| self.is_inside(at) && is_far(at, (x, y)))
             .map(|(u, v)| self.at(u, v))
             .collect()
     }
@@ -315,7 +310,7 @@ impl Power<'_> {
                 // A wave and its mirror image are one.
                 let mirrored = (i != 0 && j != 0).then_some((i, -j));
                 for at in [(i, j)].into_iter().chain(mirrored) {
-                    if self.is_inside(at) && self.is_far(at, (x, y)) {
+                    if self.is_inside(at) && is_far(at, (x, y)) {
                         out.push(self.at(at.0, at.1));
                     }
                 }
@@ -328,8 +323,14 @@ impl Power<'_> {
     fn column(&self, x: i64, y: i64) -> Vec<f64> {
         let reach = (0.45 * self.size[1] as f64) as i64;
         let all = (-reach..=reach).map(|j| (x, j));
-        all.filter(|&at| self.is_far(at, (x, y)))
+        all.filter(|&at| is_far(at, (x, y)))
             .map(|(u, v)| self.at(u, v))
             .collect()
     }
+}
+
+/// Whether a bin is neither near another one nor near its mirror image.
+fn is_far((x, y): (i64, i64), (u, v): (i64, i64)) -> bool {
+    let off = |s: i64| ((x - s * u) as f64).hypot((y - s * v) as f64);
+    off(1) > OWN && off(-1) > OWN
 }

@@ -82,8 +82,8 @@ impl Work<'_> {
                 node_of(local, masks[n], local.map(|(p, _)| blurs[p][n]))
             })
             .collect();
-        for p in 0..self.waves.len() {
-            self.follow(p, &smoothed[p], &mut nodes);
+        for (p, smoothed) in smoothed.iter().enumerate() {
+            self.follow(p, smoothed, &mut nodes);
         }
         let blocks = &self.waves[0].blocks;
         Ok(StripeMap {

@@ -33,7 +33,7 @@ impl Wave {
         let width = PILOT * self.wavelength();
         let smoothed = self.smoothed(width, self.sparse(width, LOOKED_AT));
         let locals = self.locals(&smoothed, width, &[]);
-        let present = self.present(&smoothed).into_iter();
+        let present = present(&smoothed).into_iter();
         let (sum, weight) = present
             .filter_map(|n| locals[n].as_ref())
             .fold((Vector2::zeros(), 0.0), |(s, w), l| {
@@ -117,7 +117,7 @@ impl Wave {
     pub(super) fn choose_harmonics(&mut self) {
         let width = PILOT * self.wavelength();
         let smoothed = self.smoothed(width, self.sparse(width, LOOKED_AT));
-        let present = self.present(&smoothed);
+        let present = present(&smoothed);
         let power = |i: usize| {
             let (mut sum, mut units) = (0.0, 0.0);
             for &n in &present {
@@ -148,24 +148,6 @@ impl Wave {
             .retain(|_| kept.next().is_some_and(|k| *k));
     }
 
-    /// Nodes where the pattern is: a quarter of its power at the best twentieth, all harmonics together.
-    fn present(&self, smoothed: &Smoothed) -> Vec<usize> {
-        let power = |n: usize| -> f64 {
-            let all = smoothed.envelopes.iter();
-            all.map(|e| f64::from(e.amplitude[n].norm_sqr())).sum()
-        };
-        let whole: Vec<usize> = (0..smoothed.nodes.len())
-            .filter(|&n| smoothed.support[n].is_some_and(|s| s.share > 0.9))
-            .collect();
-        let mut powers: Vec<f64> = whole.iter().map(|&n| power(n)).collect();
-        powers.sort_by(f64::total_cmp);
-        let best = powers.get(powers.len() * 19 / 20).copied().unwrap_or(0.0);
-        whole
-            .into_iter()
-            .filter(|&n| power(n) > 0.25 * best)
-            .collect()
-    }
-
     /// Fits the carrier to what a narrow window sees.
     pub(super) fn follow(&mut self) {
         let wavelength = self.wavelength();
@@ -180,7 +162,7 @@ impl Wave {
         for _ in 0..ROUNDS {
             let smoothed = self.smoothed(width, self.sparse(width, FOLLOWED));
             let locals = self.locals(&smoothed, width, &[]);
-            let present = self.present(&smoothed);
+            let present = present(&smoothed);
             let slopes: Vec<Slope> = present
                 .iter()
                 .filter_map(|&n| {
@@ -217,7 +199,7 @@ impl Wave {
             let wider = width_nm * std::f64::consts::SQRT_2;
             let nodes = self.sparse(1.5 * width_nm, LOOKED_AT);
             let narrow = self.smoothed(width_nm, nodes);
-            let present = self.present(&narrow);
+            let present = present(&narrow);
             let (a, b) = (
                 self.locals(&narrow, width_nm, &[]),
                 self.locals(&self.smoothed(wider, nodes), wider, &[]),
@@ -242,4 +224,22 @@ impl Wave {
         }
         chosen * period
     }
+}
+
+/// Nodes where the pattern is: a quarter of its power at the best twentieth, all harmonics together.
+fn present(smoothed: &Smoothed) -> Vec<usize> {
+    let power = |n: usize| -> f64 {
+        let all = smoothed.envelopes.iter();
+        all.map(|e| f64::from(e.amplitude[n].norm_sqr())).sum()
+    };
+    let whole: Vec<usize> = (0..smoothed.nodes.len())
+        .filter(|&n| smoothed.support[n].is_some_and(|s| s.share > 0.9))
+        .collect();
+    let mut powers: Vec<f64> = whole.iter().map(|&n| power(n)).collect();
+    powers.sort_by(f64::total_cmp);
+    let best = powers.get(powers.len() * 19 / 20).copied().unwrap_or(0.0);
+    whole
+        .into_iter()
+        .filter(|&n| power(n) > 0.25 * best)
+        .collect()
 }

@@ -1,0 +1,146 @@
+//! Scans that are spread over several files: Omicron Matrix, whose log lies beside the images.
+
+use std::collections::BTreeMap;
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+
+use spmfile::matrix::{frame_and_channel, is_curve, log_file};
+use spmfile::{ChannelInfo, Format, FrameDirection, ReadError, Scan, detect};
+
+fn refused(reason: String) -> ReadError {
+    ReadError::Unsupported {
+        format: "Omicron Matrix",
+        reason,
+    }
+}
+
+/// Reads the frame upwards, or the one that is wanted, with the log of the session beside the file.
+pub(crate) fn read(
+    path: &Path,
+    bytes: &[u8],
+    frame: Option<FrameDirection>,
+    wanted: &dyn Fn(&ChannelInfo) -> bool,
+) -> Result<Scan, ReadError> {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let parts = log(path, &name)?;
+    let parts: Vec<&[u8]> = parts.iter().map(Vec::as_slice).collect();
+    spmfile::matrix::read(bytes, &parts, &name, frame, wanted)
+}
+
+/// The parts of the log, as many as there are.
+fn log(path: &Path, name: &str) -> Result<Vec<Vec<u8>>, ReadError> {
+    let mut parts = Vec::new();
+    for number in 1.. {
+        // A name that tells no log is refused by the reader, in its words.
+        let Some(log) = log_file(name, number) else {
+            break;
+        };
+        match std::fs::read(path.with_file_name(&log)) {
+            Ok(bytes) => parts.push(bytes),
+            Err(error) if error.kind() == ErrorKind::NotFound && number > 1 => break,
+            Err(error) if error.kind() == ErrorKind::NotFound => {
+                return Err(refused(format!(
+                    "its lines, size and scale are in the log of its session: expected the file {log} beside \
+                     it, found none"
+                )));
+            }
+            Err(error) => return Err(refused(format!("{log} beside it: {error}"))),
+        }
+    }
+    Ok(parts)
+}
+
+/// Of the scans found in a folder, sorted by name, those to read: of a frame whose channels are files of
+/// their own one file, that of Z where there is one, and no curves.
+pub(crate) fn one_per_frame(files: Vec<PathBuf>, head: impl Fn(&Path) -> Vec<u8>) -> Vec<PathBuf> {
+    let mut kept = Vec::new();
+    let mut places = BTreeMap::new();
+    for file in files {
+        let name = file.file_name().unwrap_or_default().to_string_lossy();
+        let parts = frame_and_channel(&name);
+        let Some((frame, channel)) =
+            parts.filter(|_| detect(&head(&file)) == Format::OmicronMatrix)
+        else {
+            kept.push(file);
+            continue;
+        };
+        if is_curve(&channel) {
+            continue;
+        }
+        match places.get(&frame) {
+            Some(&place) if channel == "Z" => kept[place] = file,
+            Some(_) => {}
+            None => {
+                places.insert(frame, kept.len());
+                kept.push(file);
+            }
+        }
+    }
+    kept
+}
+
+/// Files apart that are another channel of a frame among those before: with the first file of the frame.
+///
+/// Measured both, they would count as two frames.
+pub(crate) fn channels_of_one_frame(
+    files: Vec<PathBuf>,
+) -> (Vec<PathBuf>, Vec<(PathBuf, PathBuf)>) {
+    let (mut kept, mut others) = (Vec::new(), Vec::new());
+    let mut first: BTreeMap<PathBuf, PathBuf> = BTreeMap::new();
+    for file in files {
+        let name = file.file_name().unwrap_or_default().to_string_lossy();
+        let frame = frame_and_channel(&name).map(|(frame, _)| file.with_file_name(frame));
+        if let Some(other) = frame.as_ref().and_then(|frame| first.get(frame)) {
+            others.push((file, other.clone()));
+            continue;
+        }
+        if let Some(frame) = frame {
+            first.insert(frame, file.clone());
+        }
+        kept.push(file);
+    }
+    (kept, others)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn of_a_folder_one_file_of_each_frame() {
+        let kept = |names: &[&str]| -> Vec<String> {
+            let files = names.iter().map(PathBuf::from).collect();
+            let head = |path: &Path| match path.extension() {
+                Some(other) if other == "spm" => b"\\*File list\r\n".to_vec(),
+                _ => b"ONTMATRX0101TLKB".to_vec(),
+            };
+            let kept = one_per_frame(files, head);
+            kept.iter().map(|f| f.display().to_string()).collect()
+        };
+        let names = [
+            "a--1_1.I(V)_mtrx",
+            "a--1_1.I_mtrx",
+            "a--1_1.Z_mtrx",
+            "a--1_2.Aux_mtrx",
+            "a--1_2.I_mtrx",
+            "b--1_1.Z_mtrx",
+            "c--1_1.I.spm",
+            "odd",
+        ];
+        let expected = [
+            "a--1_1.Z_mtrx",
+            "a--1_2.Aux_mtrx",
+            "b--1_1.Z_mtrx",
+            "c--1_1.I.spm",
+            "odd",
+        ];
+        assert_eq!(kept(&names), expected);
+        let (kept_files, others) = channels_of_one_frame(names.iter().map(PathBuf::from).collect());
+        assert_eq!(kept_files.len(), 5);
+        assert_eq!(
+            others[1],
+            ("a--1_1.Z_mtrx".into(), "a--1_1.I(V)_mtrx".into())
+        );
+        assert!(kept(&["a--1_1.I(V)_mtrx"]).is_empty());
+    }
+}
