@@ -11,7 +11,7 @@ use crate::common::{caveats, json, number, program, run, succeed};
 
 /// 16 pixels per period, 0.7 nm per pixel: 11.2 nm.
 const PERIOD: f64 = 16.0;
-const PITCH: f64 = 0.7;
+pub(crate) const PITCH: f64 = 0.7;
 const SIDE: usize = 400;
 
 /// A simulated image as an array.

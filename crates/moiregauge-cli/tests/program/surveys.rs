@@ -3,10 +3,13 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use moiregauge::image::Image;
+use moiregauge::simulate::FieldScene;
+use nalgebra::{Matrix2, Vector2};
 use serde_json::Value;
 
 use crate::common::{caveats, json, number, program, run, succeed, testdata};
-use crate::maps::{command, map, quantity};
+use crate::maps::{PITCH, command, map, quantity};
 
 /// All files under a folder, by their names there.
 fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
@@ -60,6 +63,135 @@ fn an_interrupted_survey_goes_on() {
         // What was kept is used, and nothing else changes.
         assert_eq!(files(&out) == straight, !spoil);
     }
+}
+
+/// A simple field (`.gsf`) of part of an image, top line first; `first` is its first pixel (column, row) and says where it lies.
+fn simple_field(path: &Path, image: &Image, first: [usize; 2], size: [usize; 2]) {
+    let part = image.cropped(first, size);
+    let metres = |pixels: usize| pixels as f64 * PITCH * 1e-9;
+    let header = format!(
+        "Gwyddion Simple Field 1.0\nXRes = {}\nYRes = {}\nXReal = {:e}\nYReal = {:e}\nXOffset = {:e}\n\
+         YOffset = {:e}\nXYUnits = m\nZUnits = m\nTitle = Height\n",
+        size[0],
+        size[1],
+        metres(size[0]),
+        metres(size[1]),
+        metres(first[0]),
+        metres(first[1]),
+    );
+    let mut bytes = header.into_bytes();
+    bytes.resize((bytes.len() / 4 + 1) * 4, 0);
+    for row in (0..part.rows).rev() {
+        bytes.extend(part.row(row).iter().flat_map(|v| (*v as f32).to_le_bytes()));
+    }
+    std::fs::write(path, bytes).expect("a file");
+}
+
+/// Maps files in bands.
+fn survey(folder: &Path, files: &[&str], options: &[&str]) -> Value {
+    let mut command = program();
+    let out = folder.join(format!("{}-{}", files.concat(), options.len()));
+    command
+        .arg("map")
+        .args(files.iter().map(|f| folder.join(f)));
+    command
+        .args(["--in-bands", "--no-report", "--quiet", "--out"])
+        .arg(&out);
+    succeed(command.args(options));
+    json(&out.join("map.json"))
+}
+
+/// Four files of one surface, written with their stage offsets, give the map of the whole: the same extent, and the same
+/// numbers in boxes of it, one across the seams.
+#[test]
+fn parts_of_a_survey_lie_where_they_were() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut scene = FieldScene::rippled(600, 37.5, 0.03);
+    scene.white = 0.6;
+    let image = scene.image();
+    simple_field(&folder.path().join("all.gsf"), &image, [0, 0], [600, 600]);
+    // They overlap, as the margin of each has no good nodes.
+    let names = ["a.gsf", "b.gsf", "c.gsf", "d.gsf"];
+    let firsts = [[0, 0], [240, 0], [0, 240], [240, 240]];
+    for (name, first) in names.iter().zip(firsts) {
+        simple_field(&folder.path().join(name), &image, first, [360, 360]);
+    }
+    let boxes = [
+        "--region",
+        "seam=150,150,120,120",
+        "--region",
+        "corner=300,300,60,60",
+        "--window",
+        "9",
+    ];
+    let whole = survey(folder.path(), &["all.gsf"], &boxes);
+    let parts = survey(folder.path(), &names, &boxes);
+    for axis in 0..2 {
+        for end in 0..2 {
+            let of = |r: &Value| number(r, &format!("/extent_nm/{axis}/{end}"));
+            let apart = (of(&whole) - of(&parts)).abs();
+            assert!(
+                apart < 5.0,
+                "{apart} nm: {} {}",
+                whole["extent_nm"],
+                parts["extent_nm"]
+            );
+        }
+    }
+    for region in 0..2 {
+        let of =
+            |r: &Value, key: &str| number(r, &format!("/details/regions/{region}/twist_deg/{key}"));
+        let apart = (of(&whole, "mean") - of(&parts, "mean")).abs();
+        // The same pixels: what differs is which nodes are there, and the noise that the files see at their edges.
+        assert!(
+            apart < 1.5 * of(&whole, "sigma"),
+            "{region}: {apart} {}",
+            of(&whole, "sigma")
+        );
+    }
+}
+
+/// A hexagonal lattice recorded while the sample drifts, whose drift is given with the line rate: twist and strain are those
+/// of the lattice at rest. Pixel (i, j) of an upward trace shows the sample at `(p i − Dₓ t, p j − D_y t)`, t = (i/2N + j)/f.
+#[test]
+fn surveys_are_corrected_for_a_given_drift() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (rate, drift) = (0.5, [0.6, -0.9]);
+    let mut scene = FieldScene::hexagonal([400, 400], 16.0, 0.3);
+    let velocity = Vector2::new(drift[0] / 60.0, drift[1] / 60.0);
+    let time = Vector2::new(0.5 / 400.0, 1.0) / rate;
+    let to_sample = Matrix2::identity() * PITCH - velocity * time.transpose();
+    scene.pair = to_sample.tr_mul(&(scene.pair / PITCH));
+    scene.white = 0.6;
+    simple_field(
+        &folder.path().join("drifting.gsf"),
+        &scene.image(),
+        [0, 0],
+        [400, 400],
+    );
+    let told = [
+        "--line-rate",
+        "0.5",
+        "--frame-direction",
+        "up",
+        "--drift",
+        "0.6",
+        "-0.9",
+    ];
+    let right = survey(folder.path(), &["drifting.gsf"], &told);
+    let truth = 2.0 * (0.246 / (2.0 * 16.0 * PITCH)).asin().to_degrees();
+    let twist = quantity(&right, "twist");
+    let error = (number(twist, "/mean") - truth).abs();
+    assert!(error < 3.0 * number(twist, "/mean_sigma"), "{twist}");
+    for name in ["strain vector 1", "strain vector 2"] {
+        let component = quantity(&right, name);
+        let pull = number(component, "/mean") / number(component, "/mean_sigma");
+        assert!(pull.abs() < 3.0, "{component}");
+    }
+    // Without it the strain would be many times its error.
+    let wrong = survey(folder.path(), &["drifting.gsf"], &[]);
+    let component = quantity(&wrong, "strain vector 2");
+    assert!(number(component, "/mean").abs() > 20.0 * number(component, "/mean_sigma"));
 }
 
 /// What calibration and a given drift do to the lengths of a survey.

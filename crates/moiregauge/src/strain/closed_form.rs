@@ -136,7 +136,8 @@ pub fn branches(
     let layers = Layers::new(bilayer, convention)?;
     let labelled = labelled(lattice, &layers)?;
     let moire = ComplexPair::from(labelled.moire);
-    if layers.ratio().is_none() {
+    // Lattices that are not hexagonal have names of nearly equal strain, too.
+    if layers.ratio().is_none() || !layers.are_hexagonal() {
         return branches_by_trial(lattice, &layers);
     }
     let mut found = solutions(&labelled, &layers, false);
@@ -152,7 +153,7 @@ pub fn branches(
     Ok(found)
 }
 
-/// The solutions for layers of different lattices under every likely name, the least strained first.
+/// The solutions for layers of different or not hexagonal lattices under every likely name, the least strained first.
 fn branches_by_trial(
     lattice: &LatticeVectors,
     layers: &Layers,

@@ -66,6 +66,11 @@ impl Layers {
         (q.norm() < 1e-12 * p.norm() && p.im.abs() < 1e-12 * p.norm()).then(|| p.re.recip())
     }
 
+    /// Whether layer 1 has the symmetry of a hexagonal lattice.
+    pub(super) fn are_hexagonal(&self) -> bool {
+        (self.period - std::f64::consts::FRAC_PI_3).abs() < 1e-9
+    }
+
     /// `N = (R(α) + P) K⁻¹`, which is `R(β) S^∓¹` if P is explained by a layer 1 of orientation α.
     pub(super) fn stretched(&self, moire: &ComplexPair, lattice_angle: f64) -> ComplexPair {
         let turned = ComplexPair {
