@@ -14,6 +14,7 @@ pub(crate) use args::{AnalyzeArgs, BackgroundArg, ConventionArg, LineArg, Method
 pub(crate) use chain::{
     Outcome, Reading, analyse_files, hexadecimal, measure_file, progress, read, with_hint,
 };
+pub(crate) use channel::channel_names;
 pub(crate) use files::write_all;
 pub(crate) use orientation::{Angle, DirectionArg, parse_angle};
 pub(crate) use summary::{caveats as caveat_lines, failures, summary};
@@ -45,7 +46,12 @@ pub(crate) fn run(args: &AnalyzeArgs) -> anyhow::Result<ExitCode> {
         loud,
     );
     let mut outcomes = outcome
-        .map_err(|failed| eprint!("{}", summary::failures(&failed)))
+        .map_err(|failed| {
+            eprint!("{}", summary::failures(&failed));
+            if let Some(stripes) = crate::map::stripes_in_words(&inputs, &settings, &known) {
+                eprintln!("{stripes}");
+            }
+        })
         .map_err(|()| anyhow::anyhow!("nothing could be analysed"))?;
     if let Some((found, files)) = atomic {
         for Outcome {

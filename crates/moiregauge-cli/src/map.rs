@@ -4,6 +4,7 @@ mod domains;
 mod output;
 mod regions;
 mod source;
+mod stripes;
 mod survey;
 
 use std::path::{Path, PathBuf};
@@ -26,6 +27,7 @@ use crate::analyze::{AnalyzeArgs, Outcome, analyse_files, failures, read};
 use crate::info::inputs;
 use crate::input::Known;
 use output::{Made, write};
+pub(crate) use stripes::in_words as stripes_in_words;
 
 /// Maps of twist, strain, wavelength and orientation across an image, with the error of every node
 ///
@@ -63,9 +65,9 @@ pub(crate) struct MapArgs {
     /// Map in bands, as images of more than 20 million pixels are; several files are put side by side
     #[arg(long)]
     in_bands: bool,
-    /// Margin at the edges, in windows
-    #[arg(long, value_name = "WINDOWS", default_value_t = 2.0)]
-    margin: f64,
+    /// Margin at the edges, in windows [default: 2, or a quarter of the frame where that is less]
+    #[arg(long, value_name = "WINDOWS")]
+    margin: Option<f64>,
     #[command(flatten)]
     regions: regions::RegionArgs,
     #[command(flatten)]
@@ -119,7 +121,13 @@ pub(crate) fn run(args: &MapArgs) -> anyhow::Result<ExitCode> {
     let whole = (&settings, &known, &resolution);
     let made = match survey(args, &inputs, whole, &failed)? {
         Some(made) => made,
-        None => together(args, &inputs, whole, failed)?,
+        None => match together(args, &inputs, whole, failed)? {
+            Answer::Lattice(made) => *made,
+            Answer::Stripes(found) => {
+                stripes::write(&found, args)?;
+                return Ok(ExitCode::SUCCESS);
+            }
+        },
     };
     let lost = failures(&made.provenance.failed);
     let complete = made.provenance.failed.is_empty();
@@ -206,13 +214,19 @@ fn survey(
     }))
 }
 
-/// Analyses all scans, maps them, and averages.
+/// What scans show.
+enum Answer {
+    Lattice(Box<Made>),
+    Stripes(Box<stripes::Striped>),
+}
+
+/// Analyses all scans, maps them, and averages; stripes, where none of them shows a lattice.
 fn together(
     args: &MapArgs,
     inputs: &[PathBuf],
     (settings, known, resolution): (&Settings, &Known, &Resolution),
     failed: Vec<FailedInput>,
-) -> anyhow::Result<Made> {
+) -> anyhow::Result<Answer> {
     ensure!(
         settings.moires == 1,
         "maps are made of one moiré; --moires {} is for analyze",
@@ -227,7 +241,12 @@ fn together(
     } = match outcome {
         Ok(mut outcomes) => outcomes.swap_remove(0),
         Err(failed) => {
+            let stripes = stripes::look(args, inputs, (settings, known, resolution));
+            if let Ok(Some(found)) = stripes {
+                return Ok(Answer::Stripes(Box::new(found)));
+            }
             eprint!("{}", failures(&failed));
+            stripes?;
             bail!("nothing could be analysed");
         }
     };
@@ -272,7 +291,42 @@ fn together(
             vec![None; lattices.nodes.len()]
         });
     doubts(&maps, &mut caveats);
+    if args.margin.is_none() {
+        let narrow = maps.iter().find_map(|m| narrow_margin(m.margin, &m.file));
+        caveats.extend(narrow);
+    }
     let drift_change = change(&maps);
+    about_change(drift_change, &mut caveats);
+    let map = TwistStrainMap::new(&lattices, &found);
+    let look = |contrast| {
+        let all = used().flat_map(|scan| {
+            let reading = read(Path::new(&scan.file), settings, known).ok();
+            reading.map_or_else(Vec::new, |r| {
+                domains_of_scan(&r.scan, (scan, origin), settings, contrast)
+            })
+        });
+        all.collect()
+    };
+    let domains = args.domains.answer(&map, Some(look));
+    caveats.extend(domains.caveats.iter().cloned());
+    Ok(Answer::Lattice(Box::new(Made {
+        map,
+        domains,
+        images: maps
+            .iter()
+            .map(|m| output::image(&m.file, Some(m.line), m.drift_corrected, &m.harmonics))
+            .collect(),
+        whole: output::whole_image(&analysis),
+        settings: analysis.settings.clone(),
+        provenance,
+        agreement,
+        drift_change,
+        caveats,
+    })))
+}
+
+/// Says that the drift changes, where it does.
+fn about_change(drift_change: Option<DriftChange>, caveats: &mut Vec<Caveat>) {
     if let Some(found) = drift_change.filter(DriftChange::stands_out) {
         let [x, y] = found
             .acceleration
@@ -287,32 +341,18 @@ fn together(
             ),
         ));
     }
-    let map = TwistStrainMap::new(&lattices, &found);
-    let look = |contrast| {
-        let all = used().flat_map(|scan| {
-            let reading = read(Path::new(&scan.file), settings, known).ok();
-            reading.map_or_else(Vec::new, |r| {
-                domains_of_scan(&r.scan, (scan, origin), settings, contrast)
-            })
-        });
-        all.collect()
+}
+
+/// Says that the margin is narrower than two windows where nobody asked for that.
+fn narrow_margin(margin: f64, file: &str) -> Option<Caveat> {
+    let why = || {
+        format!(
+            "the frame is small for its window: the margin is {margin:.2} windows wide and not two. Windows there are \
+             cut by the edge; what that does to their noise, and what leaks through them, is in their errors, but they \
+             see less of the outer side (--margin 2 leaves such nodes out)"
+        )
     };
-    let domains = args.domains.answer(&map, Some(look));
-    caveats.extend(domains.caveats.iter().cloned());
-    Ok(Made {
-        map,
-        domains,
-        images: maps
-            .iter()
-            .map(|m| output::image(&m.file, Some(m.line), m.drift_corrected, &m.harmonics))
-            .collect(),
-        whole: output::whole_image(&analysis),
-        settings: analysis.settings.clone(),
-        provenance,
-        agreement,
-        drift_change,
-        caveats,
-    })
+    (margin > 0.0 && margin < 1.99).then(|| Caveat::new("map-narrow-margin", file, why()))
 }
 
 /// What is not as good as it could be.
@@ -390,9 +430,9 @@ impl MapArgs {
             );
         }
         ensure!(
-            (0.0..=10.0).contains(&self.margin),
+            self.margin.is_none_or(|m| (0.0..=10.0).contains(&m)),
             "--margin lies between 0 and 10 windows, found {}",
-            self.margin
+            self.margin.unwrap_or(f64::NAN)
         );
         Ok(Resolution {
             window_nm: self.window,

@@ -62,6 +62,11 @@ pub(super) fn another<T>(
     Some(others.collect())
 }
 
+/// The same for a file on disk; `None` where it cannot be read.
+pub(crate) fn channel_names(path: &Path, known: &Known) -> Option<Vec<(String, String)>> {
+    names(path, &std::fs::read(path).ok()?, known).ok()
+}
+
 /// The names of the channels of a file, the user's and the instrument's own, without those that the user
 /// calls position sensors.
 pub(super) fn names(

@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use anyhow::Context as _;
 use moiregauge::analysis::Analysis;
 use moiregauge::caveat::Caveat;
+use moiregauge::estimate::Estimate;
 use moiregauge::map::{Agreement, DriftChange, TwistStrainMap, UsedHarmonic};
 use moiregauge::settings::Settings;
 use moiregauge_report::results::{
@@ -18,10 +19,12 @@ use moiregauge_report::{
 use spmfile::{LineDirection, WritableFormat};
 
 use super::domains::Domains;
-use super::{MapArgs, regions};
+use super::{MapArgs, regions, stripes};
 use crate::analyze::write_all;
 use crate::say::say;
 
+/// Quantities whose trend is told on the screen.
+const TRENDS: [&str; 3] = ["twist", "strain vector 1", "strain vector 2"];
 /// With more nodes than this there is no `.gwy` file: it would not fit into memory beside the map.
 const MANY: usize = 1_500_000;
 
@@ -115,6 +118,7 @@ fn results(made: &Made, method: &str) -> MapResults {
         masks: mask_counts(map),
         quantities: quantities(map),
         whole_image: made.whole,
+        stripes: None,
         images: made.images.clone(),
         agreement: made.agreement.map(Into::into),
         drift_change: made.drift_change.map(Into::into),
@@ -156,7 +160,7 @@ pub(super) fn image(
 }
 
 /// What is said on the screen.
-fn summary(results: &MapResults) -> String {
+pub(super) fn summary(results: &MapResults) -> String {
     let mut text = String::new();
     let _ = writeln!(
         text,
@@ -180,12 +184,16 @@ fn summary(results: &MapResults) -> String {
             text,
             "  {:16} {} {}, spread {} (noise {}, without it {})",
             q.name,
-            plus_minus(moiregauge::estimate::Estimate::new(q.mean, q.mean_sigma)),
+            plus_minus(Estimate::new(q.mean, q.mean_sigma)),
             q.unit,
             two_digits(q.spread),
             two_digits(q.noise),
             two_digits(q.spread_corrected)
         );
+    }
+    text.push_str(&trends(results));
+    if let Some(found) = &results.stripes {
+        text.push_str(&stripes::summary(found));
     }
     if let Some(a) = &results.agreement {
         let _ = writeln!(
@@ -201,6 +209,47 @@ fn summary(results: &MapResults) -> String {
             "caveat {} ({}): {}",
             caveat.code, caveat.place, caveat.message
         );
+    }
+    text
+}
+
+/// How much of the spread of twist and strain is a trend across the frame, and what the whole image says where the map
+/// has its middle.
+fn trends(results: &MapResults) -> String {
+    let mut text = String::new();
+    for q in &results.quantities {
+        let told = results.stripes.is_some() || TRENDS.contains(&q.name.as_str());
+        let Some(t) = q.trend.filter(|_| told) else {
+            continue;
+        };
+        let [x, y] =
+            [0, 1].map(|i| plus_minus(Estimate::new(t.per_100nm[i], t.per_100nm_sigma[i])));
+        let _ = write!(
+            text,
+            "  {:16} trend ({x}, {y}) {} per 100 nm; spread = {} (trend), {} (noise), {} (rest); at the middle of the {} {}",
+            q.name,
+            q.unit,
+            two_digits(t.of_trend),
+            two_digits(t.noise),
+            two_digits(t.rest),
+            if results.stripes.is_some() {
+                "pattern"
+            } else {
+                "frame"
+            },
+            plus_minus(Estimate::new(t.middle, t.middle_sigma)),
+        );
+        let whole = results.whole_image.as_ref().map(|w| w.twist_deg);
+        if let (Some(whole), "twist") = (whole, q.name.as_str())
+            && let (Some(value), Some(sigma)) = (whole.value, whole.sigma)
+        {
+            let _ = write!(
+                text,
+                ", whole image {}",
+                plus_minus(Estimate::new(value, sigma))
+            );
+        }
+        text.push('\n');
     }
     text
 }

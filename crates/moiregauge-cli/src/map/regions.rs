@@ -65,6 +65,12 @@ impl RegionArgs {
         Ok(())
     }
 
+    /// Whether nothing is asked.
+    pub(super) fn ask_nothing(&self) -> bool {
+        let places = self.region.is_empty() && self.profile.is_empty();
+        places && self.device.is_none() && self.wanted.is_none()
+    }
+
     /// The answers, and doubts about them.
     ///
     /// # Errors

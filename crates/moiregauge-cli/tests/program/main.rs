@@ -14,6 +14,7 @@ mod round_trip;
 mod same_bytes;
 mod sessions;
 mod several;
+mod stripes;
 mod surveys;
 mod validation;
 /// Made-up sessions of Omicron Matrix, as the tests of the reader have them.

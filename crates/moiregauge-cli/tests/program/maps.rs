@@ -22,7 +22,7 @@ fn array(folder: &Path) -> String {
 }
 
 /// An image as an array, top line first.
-fn written(folder: &Path, image: &Image) -> String {
+pub(crate) fn written(folder: &Path, image: &Image) -> String {
     let shape = format!("{}, {}", image.rows, image.columns);
     let header = format!("{{'descr': '<f4', 'fortran_order': False, 'shape': ({shape}), }}\n");
     let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
@@ -105,7 +105,7 @@ fn column(table: &[Vec<String>], name: &str) -> Vec<f64> {
         .collect()
 }
 
-fn follows_schema(results: &Value) {
+pub(crate) fn follows_schema(results: &Value) {
     let schema = moiregauge_report::map_schema();
     let validator = jsonschema::validator_for(&schema).expect("a valid schema");
     let errors: Vec<String> = validator

@@ -17,7 +17,7 @@ use crate::format::two_digits;
 const STROKES: f64 = 16.0;
 
 /// A plane at the good nodes in another unit, NaN elsewhere.
-fn shown(map: &TwistStrainMap, plane: &Plane, factor: f64) -> impl Fn(usize) -> f64 {
+pub(super) fn shown(map: &TwistStrainMap, plane: &Plane, factor: f64) -> impl Fn(usize) -> f64 {
     move |n| {
         if map.mask[n] == Mask::Good {
             factor * f64::from(plane.value[n])
@@ -28,7 +28,7 @@ fn shown(map: &TwistStrainMap, plane: &Plane, factor: f64) -> impl Fn(usize) -> 
 }
 
 /// Root mean square of the errors of a plane at the good nodes.
-fn noise(map: &TwistStrainMap, plane: &Plane) -> f64 {
+pub(super) fn noise(map: &TwistStrainMap, plane: &Plane) -> f64 {
     map.spread(plane).map_or(f64::NAN, |s| s.noise)
 }
 
@@ -129,7 +129,11 @@ pub(super) fn strain(subject: &MapSubject) -> Result<Drawing, String> {
 }
 
 /// Calls `draw` with good nodes on a coarse grid, their place on the page and the distance of neighbours there.
-fn sparse(map: &TwistStrainMap, axes: &Axes, mut draw: impl FnMut(usize, (f64, f64), f64)) {
+pub(super) fn sparse(
+    map: &TwistStrainMap,
+    axes: &Axes,
+    mut draw: impl FnMut(usize, (f64, f64), f64),
+) {
     let [columns, rows] = map.grid.size;
     let side = columns.min(rows) as f64;
     let every = (side / STROKES).ceil().max(1.0) as usize;

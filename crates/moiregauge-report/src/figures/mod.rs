@@ -16,6 +16,7 @@ mod map_histograms;
 mod map_mask;
 mod map_panel;
 mod map_profiles;
+mod map_stripes;
 mod parameters;
 mod pulls;
 mod scan;
@@ -30,6 +31,7 @@ mod window;
 
 pub use cell::cell as cell_figure;
 pub use map::map_figures;
+pub use map_stripes::stripe_figures;
 pub use pulls::pulls;
 
 use moiregauge::analysis::{Analysis, SetAnalysis};

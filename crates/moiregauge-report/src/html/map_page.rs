@@ -9,7 +9,10 @@ use super::words::{Numbers, conventions, plain};
 use crate::error::ReportError;
 use crate::figures::Figure;
 use crate::format::{plus_minus, two_digits};
-use crate::results::{DomainsResult, MapResults, RegionMeanResult, RegionResult};
+use crate::results::{
+    DomainsResult, MapResults, RegionMeanResult, RegionResult, ResultEstimate, StripePatternResult,
+    StripesResult, TrendResult,
+};
 use crate::tables::COMMON;
 
 const TEMPLATE: &str = include_str!("map.html");
@@ -22,12 +25,16 @@ struct Page<'a> {
     whole: Option<Numbers>,
     /// Name, mean, spread, noise, spread without noise.
     quantities: Vec<[String; 5]>,
+    /// Name, slopes along x and y, spread by trend, noise and rest, middle of the frame.
+    trends: Vec<[String; 7]>,
     /// Reason, nodes, per cent.
     masks: Vec<[String; 3]>,
     resolution: [String; 2],
     regions: Vec<Area>,
     devices: Vec<Area>,
     wanted: Option<[String; 6]>,
+    /// Number, share, good nodes, wavelength and direction of the fit, coherence, chance of noise.
+    stripes: Vec<[String; 7]>,
     /// Names and values.
     domains: Option<Vec<[String; 2]>>,
     /// χ²/dof, nodes, factor.
@@ -108,6 +115,30 @@ fn domains(found: &DomainsResult) -> Vec<[String; 2]> {
     rows.map(|(name, value)| [name.to_owned(), value]).into()
 }
 
+fn trend(name: &str, unit: &str, t: &TrendResult) -> [String; 7] {
+    let [x, y] = [0, 1].map(|i| plus_minus(Estimate::new(t.per_100nm[i], t.per_100nm_sigma[i])));
+    let [trend, noise, rest] = [t.of_trend, t.noise, t.rest].map(two_digits);
+    let middle = plus_minus(Estimate::new(t.middle, t.middle_sigma));
+    [format!("{name} ({unit})"), x, y, trend, noise, rest, middle]
+}
+
+fn stripes(found: &StripesResult) -> Vec<[String; 7]> {
+    let shown =
+        |e: Option<ResultEstimate>| e.map_or_else(|| "–".to_owned(), |e| plus_minus(e.plain()));
+    let row = |p: &StripePatternResult| {
+        [
+            p.number.to_string(),
+            plain(Some(p.share_percent), 0),
+            p.good_nodes.to_string(),
+            shown(p.wavelength_nm),
+            shown(p.direction_deg),
+            plain(p.coherence_percent, 0),
+            format!("10^{:.0}", p.log10_chance),
+        ]
+    };
+    found.patterns.iter().map(row).collect()
+}
+
 /// The page of a map. `downloads` are the files that it carries for saving.
 ///
 /// # Errors
@@ -135,6 +166,11 @@ pub fn map_page(
                     two_digits(q.spread_corrected),
                 ]
             })
+            .collect(),
+        trends: results
+            .quantities
+            .iter()
+            .filter_map(|q| Some(trend(&q.name, &q.unit, &q.trend?)))
             .collect(),
         masks: results
             .masks
@@ -172,6 +208,7 @@ pub fn map_page(
                 plain(w.possible_percent, 1),
             ]
         }),
+        stripes: results.stripes.as_ref().map_or_else(Vec::new, stripes),
         domains: details.domains.as_ref().map(domains),
         agreement: results.agreement.as_ref().map(|a| {
             let [chi2, factor] = [a.chi2_per_dof, a.variance_factor].map(|v| plain(Some(v), 2));

@@ -1,7 +1,8 @@
 //! The summary of a map as a document, `moiregauge/map/1`: degrees, per cent, nm.
 
 use moiregauge::caveat::Caveat;
-use moiregauge::map::{Agreement, DriftChange, Mask, Plane, TwistStrainMap, UsedHarmonic};
+use moiregauge::map::{Agreement, DriftChange, Mask, Plane, Spread, TwistStrainMap, UsedHarmonic};
+use moiregauge::region::{Trend, Trends};
 use moiregauge::settings::Settings;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -44,6 +45,9 @@ pub struct MapResults {
     pub whole_image: Option<TwistStrainResult>,
     /// The images behind the map.
     pub images: Vec<MappedImage>,
+    /// Patterns of stripes, in a map of stripes: such a map has no twist and no strain.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stripes: Option<super::StripesResult>,
     /// How images of one place agree.
     pub agreement: Option<AgreementResult>,
     /// What differs between upward and downward frames along the slow axis: drift that changes, no strain.
@@ -82,6 +86,61 @@ pub struct QuantityResult {
     pub spread_corrected: f64,
     /// Root mean square of the errors of the nodes.
     pub noise: f64,
+    /// A plane through the good nodes; `null` where they are too few or too near to each other.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub trend: Option<TrendResult>,
+}
+
+/// A plane through the good nodes: how much of the spread is a change across the frame (creep, drift that changes, a
+/// scanner that bows, or the sample).
+#[derive(Clone, Copy, Debug, Serialize, Deserialize, JsonSchema)]
+pub struct TrendResult {
+    /// Change along x and along y, per 100 nm.
+    pub per_100nm: [f64; 2],
+    /// Their standard errors by the noise of the image.
+    pub per_100nm_sigma: [f64; 2],
+    /// Value at the middle of the frame (of stripes: of the nodes of the pattern), where a fit to all its pixels has its
+    /// mean.
+    pub middle: f64,
+    /// Its standard error by the noise of the image.
+    pub middle_sigma: f64,
+    /// Standard deviation over the good nodes that the plane makes.
+    pub of_trend: f64,
+    /// What noise adds to the scatter about the plane.
+    pub noise: f64,
+    /// What neither explains.
+    pub rest: f64,
+}
+
+impl TrendResult {
+    pub(super) fn new(t: &Trend, factor: f64) -> Self {
+        let scaled = t.gradient.map(|g| g.scaled(100.0 * factor));
+        Self {
+            per_100nm: scaled.map(|g| g.value),
+            per_100nm_sigma: scaled.map(|g| g.sigma),
+            middle: factor * t.middle.value,
+            middle_sigma: factor * t.middle.sigma,
+            of_trend: factor * t.of_trend,
+            noise: factor * t.noise,
+            rest: factor * t.rest,
+        }
+    }
+}
+
+impl QuantityResult {
+    /// In another unit, without a trend.
+    pub(super) fn new(name: &str, unit: &str, found: &Spread, factor: f64) -> Self {
+        Self {
+            name: name.to_owned(),
+            unit: unit.to_owned(),
+            mean: factor * found.mean,
+            mean_sigma: factor * found.mean_sigma,
+            spread: factor * found.spread,
+            spread_corrected: factor * found.corrected,
+            noise: factor * found.noise,
+            trend: None,
+        }
+    }
 }
 
 /// One image behind a map.
@@ -197,17 +256,14 @@ pub fn quantities(map: &TwistStrainMap) -> Vec<QuantityResult> {
         ("displacement x", "nm", ux, 1.0),
         ("displacement y", "nm", uy, 1.0),
     ];
+    let trends = Trends::new(map);
     all.into_iter()
         .filter_map(|(name, unit, plane, factor)| {
             let found = map.spread(plane)?;
+            let trend = trends.as_ref().and_then(|t| t.of(plane));
             Some(QuantityResult {
-                name: name.to_owned(),
-                unit: unit.to_owned(),
-                mean: factor * found.mean,
-                mean_sigma: factor * found.mean_sigma,
-                spread: factor * found.spread,
-                spread_corrected: factor * found.corrected,
-                noise: factor * found.noise,
+                trend: trend.map(|t| TrendResult::new(&t, factor)),
+                ..QuantityResult::new(name, unit, &found, factor)
             })
         })
         .collect()

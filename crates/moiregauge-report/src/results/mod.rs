@@ -15,6 +15,7 @@ mod map;
 mod readings;
 mod region;
 mod scan;
+mod stripes;
 
 pub(crate) use budget::source_name;
 pub use budget::{BudgetColumn, BudgetResult};
@@ -29,7 +30,7 @@ pub use joint::{JointResult, TestedResult};
 pub use lattice::{LatticeVector, ResultEstimate, StrainMonteCarlo, TwistStrainResult};
 pub use map::{
     AgreementResult, DriftChangeResult, HarmonicResult, MapResults, MappedImage, MaskCount,
-    QuantityResult, mask_counts, quantities,
+    QuantityResult, TrendResult, mask_counts, quantities,
 };
 pub use readings::{
     AtomicResult, IsotropicStrainResult, ReadingsResult, ShiftResult, SolutionResult, SplitResult,
@@ -39,6 +40,7 @@ pub use region::{
     DeviceResult, MapDetailsResult, MaskShare, RegionMeanResult, RegionResult, WantedResult,
 };
 pub use scan::{LineResult, ScanResult, ScanTwistStrain, ScanVector, TipVelocity, Window};
+pub use stripes::{StripeHarmonicResult, StripePatternResult, StripesResult};
 
 /// Name and version of the document.
 pub const SCHEMA: &str = "moiregauge/results/1";

@@ -10,15 +10,20 @@ use spmfile::{Channel, Samples, Scan, Span};
 
 /// What a channel shows.
 #[derive(Clone, Copy)]
-enum Shown<'a> {
+pub(super) enum Shown<'a> {
     Values(&'a [f32], f64),
+    Classes(&'a [u8]),
     Mask,
     Position(usize),
 }
 
 /// The map as a scan of all its quantities; its axes run along the rows and columns of nodes.
 pub fn map_scan(map: &TwistStrainMap) -> Scan {
-    let all = shown(map);
+    scan_of(map, shown(map))
+}
+
+/// Named quantities of a map as a scan.
+pub(super) fn scan_of(map: &TwistStrainMap, all: Vec<(String, &'static str, Shown)>) -> Scan {
     let channels = all
         .into_iter()
         .map(|(name, unit, shown)| channel(map, &name, unit, shown));
@@ -86,6 +91,7 @@ fn channel(map: &TwistStrainMap, name: &str, unit: &str, shown: Shown) -> Channe
     let [along, across] = pitch(map);
     let values = match shown {
         Shown::Values(values, factor) => values.iter().map(|v| factor * f64::from(*v)).collect(),
+        Shown::Classes(values) => values.iter().map(|v| f64::from(*v)).collect(),
         Shown::Mask => map.mask.iter().map(|m| f64::from(*m as u8)).collect(),
         Shown::Position(axis) => (0..map.grid.len())
             .map(|n| map.grid.place(n)[axis])

@@ -12,10 +12,12 @@ mod map;
 #[cfg(feature = "parquet")]
 mod parquet;
 mod region;
+mod stripes;
 
 pub use map::{map_scan, map_scans};
 pub(crate) use region::COMMON;
 pub use region::map_tables;
+pub use stripes::stripe_scan;
 
 use crate::results::Results;
 #[cfg(feature = "parquet")]

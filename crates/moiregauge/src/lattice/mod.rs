@@ -10,7 +10,7 @@ mod fourier;
 mod harmonics;
 mod high_orders;
 pub(crate) mod known;
-mod noise;
+pub(crate) mod noise;
 mod paper;
 mod phases;
 mod pictures;
@@ -19,7 +19,7 @@ pub(crate) mod reciprocal;
 mod rescue;
 mod select;
 mod several;
-mod transform;
+pub(crate) mod transform;
 pub(crate) mod vectors;
 
 use nalgebra::{Matrix2, Vector2};

@@ -1,6 +1,6 @@
 //! Which nodes are to be believed, and why others are not.
 
-use nalgebra::{Vector2, Vector4};
+use nalgebra::{Matrix2, Vector2, Vector4};
 
 use super::smooth::Smoothed;
 use super::waves::{LocalLattice, Nothing};
@@ -144,10 +144,11 @@ pub(super) fn masks(setting: &Setting, lattices: &[Result<LocalLattice, Nothing>
     };
     let lost = lost(setting, lattices);
     let spoilt = near(setting, NEAR, |n| !outside(n) && (improbable(n) || lost[n]));
+    let pair = |n: usize| lattices[n].as_ref().ok().map(|l| l.pair);
     let bent = near(setting, BESIDE, |n| {
         let blur = setting.blurs[n];
         let blurred = is_improbable(blur.chi2, 4) && blur.share > BLURRED;
-        !outside(n) && (blurred || bend(setting, lattices, n) > STRAIGHT)
+        !outside(n) && (blurred || bend(setting, pair, n) > STRAIGHT)
     });
     (0..nodes.len())
         .map(|node| {
@@ -193,7 +194,7 @@ fn lost(setting: &Setting, lattices: &[Result<LocalLattice, Nothing>]) -> Vec<bo
 }
 
 /// Nodes no farther than so many window widths from one for which `is_core` holds.
-fn near(setting: &Setting, widths: f64, is_core: impl Fn(usize) -> bool) -> Vec<bool> {
+pub(super) fn near(setting: &Setting, widths: f64, is_core: impl Fn(usize) -> bool) -> Vec<bool> {
     let [columns, rows] = setting.smoothed.nodes.size;
     let step = |axis: usize, next: usize| {
         let places = (setting.places.get(next), setting.places.first());
@@ -232,8 +233,12 @@ pub(super) fn is_improbable(chi2: f64, freedom: usize) -> bool {
     chi2 > n * (1.0 - a + IMPROBABLE * a.sqrt()).powi(3)
 }
 
-/// How far the phase of the first waves bends over a window width, from differences to the neighbours.
-fn bend(setting: &Setting, lattices: &[Result<LocalLattice, Nothing>], node: usize) -> f64 {
+/// How far the phase of the first waves (`pair` of a node) bends over a window width, from differences to the neighbours.
+pub(super) fn bend(
+    setting: &Setting,
+    pair: impl Fn(usize) -> Option<Matrix2<f64>>,
+    node: usize,
+) -> f64 {
     let [columns, rows] = setting.smoothed.nodes.size;
     let (column, row) = (node % columns, node / columns);
     let mut most = 0.0f64;
@@ -248,14 +253,14 @@ fn bend(setting: &Setting, lattices: &[Result<LocalLattice, Nothing>], node: usi
                 (row + 1 < rows).then(|| node + columns),
             ),
         };
-        let of = |n: Option<usize>| n.and_then(|n| Some((n, lattices[n].as_ref().ok()?)));
-        let here = lattices[node].as_ref().ok().map(|l| (node, l));
+        let of = |n: Option<usize>| n.and_then(|n| Some((n, pair(n)?)));
+        let here = pair(node).map(|l| (node, l));
         let (Some((a, first)), Some((b, second))) = (of(low).or(here), of(high).or(here)) else {
             continue;
         };
         let distance = (setting.places[b] - setting.places[a]).norm();
         if distance > 0.0 {
-            let slope = (second.pair - first.pair) / distance;
+            let slope = (second - first) / distance;
             for wave in [slope.column(0).into_owned(), slope.column(1).into_owned()] {
                 let across = Vector2::new(wave.x * setting.width[0], wave.y * setting.width[1]);
                 most = most.max(across.norm() * setting.width[axis]);

@@ -257,12 +257,15 @@ impl<'a> Work<'a> {
             .collect();
         let width = self.reference.in_pixels(window_nm);
         let shares = self.noise_shares(&smoothed);
+        let [first, last] = self.whole();
+        let sides = [0, 1].map(|i| ((last - first)[i] + 1.0) * self.reference.pitch[i]);
+        let margin = resolution.margin_of(window_nm, sides);
         let masks = masks(
             &Setting {
                 smoothed: &smoothed,
                 places: &places,
                 width,
-                margin: width.map(|w| w * resolution.margin),
+                margin: width.map(|w| w * margin),
                 frame: self.whole(),
                 noise_share: &shares,
                 blurs: &blurs,
@@ -289,6 +292,7 @@ impl<'a> Work<'a> {
             first: nodes.place(&self.blocks, 0),
             step: [0, 1].map(|i| (nodes.stride[i] * self.blocks.block[i]) as f64),
             window_nm,
+            margin,
             reference: self.reference,
             centre: self.place.centre,
             noise_measured: self.noise.is_measured(),

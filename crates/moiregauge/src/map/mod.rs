@@ -28,6 +28,7 @@ mod quantities;
 mod register;
 mod sample;
 mod smooth;
+mod stripes;
 mod summary;
 mod survey;
 mod types;
@@ -40,6 +41,10 @@ pub use drift_change::{DriftChange, drift_change};
 pub use quantities::{Plane, TwistStrainMap};
 pub use register::{Registration, register};
 pub use sample::{Grid, LatticeMap, LatticeNode};
+pub use stripes::{
+    FittedWave, NoStripes, SampledPattern, SampledStripes, StripeMap, StripeNode, StripePattern,
+    find_stripes, stripe_maps,
+};
 pub use summary::Spread;
 pub use survey::Survey;
 pub use types::{Reference, Resolution, UsedHarmonic, WaveMap, WaveNode};

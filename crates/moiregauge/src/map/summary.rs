@@ -39,8 +39,13 @@ impl TwistStrainMap {
     ///
     /// Nodes under one window share their noise: a window counts as `4πw²`, but at least one node.
     pub fn spread(&self, plane: &Plane) -> Option<Spread> {
+        self.spread_where(plane, |_| true)
+    }
+
+    /// The same over the good nodes that pass.
+    pub fn spread_where(&self, plane: &Plane, wanted: impl Fn(usize) -> bool) -> Option<Spread> {
         let good: Vec<[f64; 2]> = (0..self.mask.len())
-            .filter(|&n| self.mask[n] == Mask::Good)
+            .filter(|&n| self.mask[n] == Mask::Good && wanted(n))
             .map(|n| [f64::from(plane.value[n]), f64::from(plane.sigma[n])])
             .filter(|v| v.iter().all(|x| x.is_finite()))
             .collect();

@@ -5,23 +5,25 @@ use nalgebra::{Matrix2, Matrix4, Vector2};
 use super::defects::Mask;
 
 /// How maps are made.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Resolution {
     /// Width of the Gaussian window (standard deviation), nm; `None`: as wide as the lattice is straight.
     pub window_nm: Option<f64>,
     /// Distance of the nodes, nm; `None`: a third of the window, two pixels at least.
     pub step_nm: Option<f64>,
-    /// Margin at the edges of the frame, in window widths.
-    pub margin: f64,
+    /// Margin at the edges of the frame, in window widths; `None`: two, or a quarter of the frame where that is less.
+    pub margin: Option<f64>,
 }
 
-impl Default for Resolution {
-    fn default() -> Self {
-        Self {
-            window_nm: None,
-            step_nm: None,
-            margin: 2.0,
-        }
+/// Margin in windows where nobody asks for another, and as a share of the shorter side of small frames.
+const MARGIN: f64 = 2.0;
+const OF_SIDE: f64 = 0.25;
+
+impl Resolution {
+    /// The margin, in window widths, of a frame with sides of so many nm.
+    pub fn margin_of(&self, window_nm: f64, sides: [f64; 2]) -> f64 {
+        let most = OF_SIDE * sides[0].min(sides[1]) / window_nm;
+        self.margin.unwrap_or(MARGIN.min(most))
     }
 }
 
@@ -96,6 +98,8 @@ pub struct WaveMap {
     pub step: [f64; 2],
     /// Width of the window, nm.
     pub window_nm: f64,
+    /// Margin at the edges, in windows.
+    pub margin: f64,
     /// What the phases count against.
     pub reference: Reference,
     /// Where the phases of the reference are zero, pixels.

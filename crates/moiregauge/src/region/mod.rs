@@ -7,11 +7,13 @@ mod correlation;
 mod device;
 mod profile;
 mod statistics;
+mod trend;
 mod wanted;
 
 pub use device::{Device, DeviceSearch, uniform_areas};
 pub use profile::{Profile, ProfilePoint, ProfileValues};
 pub use statistics::{RegionMean, RegionStatistics};
+pub use trend::{Trend, Trends};
 pub use wanted::{WantedArea, WantedTwist};
 
 use nalgebra::{Rotation2, Vector2};

@@ -394,3 +394,56 @@ fn errors_of_means_are_those_of_the_noise() {
         assert!(share < 0.12, "{amplitudes:?}: {share}");
     }
 }
+
+/// A plane with one wiggle: its slopes, its value at the middle of the frame (half of the nodes masked), and the wiggle as
+/// what is left.
+#[test]
+fn trends_are_planes() {
+    let plane = |p: Vector2<f64>| 0.02 + 3e-5 * p.x - 2e-5 * p.y;
+    let wiggle = |p: Vector2<f64>| 1e-4 * (p.x * 0.9).sin();
+    let mut map = made(|p| plane(p) + wiggle(p), 1e-6);
+    for node in 0..map.grid.len() {
+        if map.grid.place(node).x > 50.0 {
+            map.mask[node] = Mask::Weak;
+        }
+    }
+    let trends = Trends::new(&map).unwrap();
+    let found = trends.of(&map.twist).unwrap();
+    assert!((found.gradient[0].value - 3e-5).abs() < 1e-6, "{found:?}");
+    assert!((found.gradient[1].value + 2e-5).abs() < 1e-6, "{found:?}");
+    let middle = map.grid.origin + map.grid.step * Vector2::new(29.5, 24.5);
+    assert!(
+        (found.middle.value - plane(middle)).abs() < 2e-5,
+        "{found:?}"
+    );
+    assert!(
+        (found.rest / (1e-4 / 2f64.sqrt()) - 1.0).abs() < 0.1,
+        "{found:?}"
+    );
+    let mut few = map.clone();
+    few.mask.iter_mut().skip(8).for_each(|m| *m = Mask::Weak);
+    assert!(Trends::new(&few).is_none());
+}
+
+/// Slopes and middles of maps of a lattice that is the same everywhere scatter about the truth as stated, and noise
+/// explains the spread.
+#[test]
+fn trends_have_honest_errors() {
+    let mut pulls = [Vec::new(), Vec::new(), Vec::new()];
+    let (mut left, mut noise) = (0.0, 0.0);
+    for seed in 0..24 {
+        let (map, truth) = simulated(300 + seed, [1.0; 3]);
+        let trend = Trends::new(&map).unwrap().of(&map.twist).unwrap();
+        for (pulls, slope) in pulls.iter_mut().zip(trend.gradient) {
+            pulls.push(slope.value / slope.sigma);
+        }
+        pulls[2].push((trend.middle.value - truth) / trend.middle.sigma);
+        left += trend.rest.powi(2);
+        noise += trend.noise.powi(2);
+    }
+    // 24 numbers: 1 ± 0.14.
+    for p in &pulls {
+        assert!((0.6..1.45).contains(&rms(p)), "{} {pulls:?}", rms(p));
+    }
+    assert!(left < 0.3 * noise, "{left} {noise}");
+}

@@ -34,6 +34,8 @@ pub struct LineMap {
     pub time_gradient: Option<Vector2<f64>>,
     /// The harmonics that were used; none by tiles.
     pub harmonics: Vec<UsedHarmonic>,
+    /// Margin at the edges, in windows; 0 by tiles.
+    pub margin: f64,
     /// Whether the noise was seen between the harmonics and not guessed.
     pub noise_measured: bool,
     /// The lattice of the whole image under the same corrections, wave vectors as columns, rad/nm.
@@ -125,18 +127,18 @@ fn map_line(
         pitch: pitch(&geometry),
     };
     let placed = still.as_ref().unwrap_or(&geometry);
-    let (map, harmonics, noise_measured) = match method {
+    let (map, harmonics, noise_measured, margin) = match method {
         MapMethod::Demodulation => {
             let image = remove_background(&image_of(channel), settings.background);
             let waves = local_lattices(&image, &reference, resolution).ok_or(MapError::TooSmall)?;
             let map = LatticeMap::new(&waves, placed).ok_or(MapError::NoImage)?;
-            (map, waves.harmonics, waves.noise_measured)
+            (map, waves.harmonics, waves.noise_measured, waves.margin)
         }
         MapMethod::Tiles => {
             let image = image_of(channel);
             let sides = (resolution.window_nm, resolution.step_nm);
             let map = tile_map(&image, (&geometry, placed), &reference, sides, settings);
-            (map.ok_or(MapError::TooSmall)?, Vec::new(), true)
+            (map.ok_or(MapError::TooSmall)?, Vec::new(), true, 0.0)
         }
     };
     let dual = placed.pixel_to_nm.try_inverse().ok_or(MapError::NoImage)?;
@@ -147,6 +149,7 @@ fn map_line(
         drift_corrected: still.is_some(),
         time_gradient: timing.and_then(|timing| geometry.time_gradient(&timing)),
         harmonics,
+        margin,
         noise_measured,
         whole: dual.transpose() * reference.pair,
         map,

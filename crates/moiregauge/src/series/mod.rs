@@ -21,6 +21,7 @@ mod scanner;
 mod set;
 mod shared;
 mod sightings;
+mod striping;
 mod surveying;
 mod tiling;
 
@@ -37,6 +38,7 @@ pub use measure::{
 };
 pub use moires::sorted_moires;
 pub use overlap::{Window, common_window};
+pub use striping::{ScanStripes, StripeError, stripes_in_short, stripes_of_scan};
 pub use surveying::{ReadBlock, SurveyError, SurveyPlan};
 
 use nalgebra::Matrix2;

@@ -1,0 +1,138 @@
+//! How much of the spread of a map is a trend across the frame.
+//!
+//! Creep, a drift that changes and a scanner that bows stretch one side of a frame more than the other. A plane fitted to
+//! the good nodes by least squares says how much: `s² = trend² + noise² + rest²`. The mean of a map is that at the middle
+//! of its good nodes; a fit to the whole image weighs the frame evenly about its own middle, where the trend tells the
+//! value of the map. Errors count that neighbouring nodes share their noise (see [`correlation`](super::correlation)).
+
+use nalgebra::{Matrix2, Vector2};
+
+use super::correlation::pairs;
+use crate::estimate::Estimate;
+use crate::map::{Mask, Plane, TwistStrainMap};
+
+/// Good nodes that it takes, and how many are used at most.
+const FEWEST: usize = 12;
+const MOST: usize = 10_000;
+/// They have to reach so many windows along both axes (root mean square distance from their middle, times √12).
+const REACH: f64 = 1.0;
+
+/// A plane through a quantity of a map.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Trend {
+    /// Change per nm along x and along y.
+    pub gradient: [Estimate; 2],
+    /// Value of the plane at the middle of the frame, or at the place that was asked for.
+    pub middle: Estimate,
+    /// Standard deviation over the good nodes that the plane makes.
+    pub of_trend: f64,
+    /// What noise adds to the scatter about the plane.
+    pub noise: f64,
+    /// What neither explains.
+    pub rest: f64,
+}
+
+/// The good nodes of a map, ready for planes through its quantities.
+pub struct Trends {
+    nodes: Vec<(usize, Vector2<f64>)>,
+    inverse: Matrix2<f64>,
+    second: Matrix2<f64>,
+    /// From the middle of the good nodes to that place, nm.
+    aside: Vector2<f64>,
+    /// What noise of unit variance leaves in the mean, in both slopes and their covariance, at the middle.
+    mean: f64,
+    slopes: Matrix2<f64>,
+    middle: f64,
+}
+
+impl Trends {
+    /// About the middle of the frame. `None` where the good nodes are too few or lie too near to each other.
+    pub fn new(map: &TwistStrainMap) -> Option<Self> {
+        let [columns, rows] = map.grid.size.map(|n| n as f64 - 1.0);
+        let half = Vector2::new(columns, rows) / 2.0;
+        Self::about(map, map.grid.origin + map.grid.step * half)
+    }
+
+    /// The same about another place, nm, at which [`Trend::middle`] is then.
+    pub fn about(map: &TwistStrainMap, place: Vector2<f64>) -> Option<Self> {
+        let columns = map.grid.size[0];
+        let every = ((map.good() as f64 / MOST as f64).sqrt().ceil() as usize).max(1);
+        let good: Vec<usize> = (0..map.grid.len())
+            .filter(|n| (n % columns).is_multiple_of(every) && (n / columns).is_multiple_of(every))
+            .filter(|&n| map.mask[n] == Mask::Good)
+            .collect();
+        if good.len() < FEWEST {
+            return None;
+        }
+        let count = good.len() as f64;
+        let middle = good
+            .iter()
+            .map(|&n| map.grid.place(n))
+            .sum::<Vector2<f64>>()
+            / count;
+        let nodes: Vec<(usize, Vector2<f64>)> = good
+            .iter()
+            .map(|&n| (n, map.grid.place(n) - middle))
+            .collect();
+        let second = nodes
+            .iter()
+            .map(|(_, d)| d * d.transpose())
+            .sum::<Matrix2<f64>>()
+            / count;
+        let shortest = second.symmetric_eigenvalues().min();
+        if (12.0 * shortest).sqrt() < REACH * map.window_nm {
+            return None;
+        }
+        let inverse = second.try_inverse()?;
+        let aside = place - middle;
+        let left = |weight: &dyn Fn(&Vector2<f64>) -> f64| {
+            let weights: Vec<(usize, f64)> =
+                nodes.iter().map(|(n, d)| (*n, weight(d) / count)).collect();
+            pairs(&map.grid, &weights, map.window_nm).mean
+        };
+        let slope = |way: Vector2<f64>| left(&|d| way.dot(&(inverse * d)));
+        let (x, y) = (slope(Vector2::x()), slope(Vector2::y()));
+        let both = 0.5 * (slope(Vector2::new(1.0, 1.0)) - x - y);
+        Some(Self {
+            mean: left(&|_| 1.0),
+            middle: left(&|d| 1.0 + aside.dot(&(inverse * d))),
+            slopes: Matrix2::new(x, both, both, y),
+            inverse,
+            second,
+            aside,
+            nodes,
+        })
+    }
+
+    /// The plane through a quantity of this map; `None` where a good node has no value.
+    pub fn of(&self, plane: &Plane) -> Option<Trend> {
+        let count = self.nodes.len() as f64;
+        let (mut mean, mut noise) = (0.0, 0.0);
+        for (n, _) in &self.nodes {
+            let Estimate { value, sigma } = plane.at(*n);
+            mean += value / count;
+            noise += sigma * sigma / count;
+        }
+        if !(mean.is_finite() && noise.is_finite()) {
+            return None;
+        }
+        let (mut cross, mut square) = (Vector2::zeros(), 0.0);
+        for (n, d) in &self.nodes {
+            let off = plane.at(*n).value - mean;
+            cross += d * off / count;
+            square += off * off / count;
+        }
+        let gradient = self.inverse * cross;
+        let trend = gradient.dot(&cross);
+        let fitted = self.mean + (self.slopes * self.second).trace();
+        let by_noise = noise * (1.0 - fitted).max(0.0);
+        let sigma = |share: f64| (noise * share).sqrt();
+        Some(Trend {
+            gradient: [0, 1].map(|i| Estimate::new(gradient[i], sigma(self.slopes[(i, i)]))),
+            middle: Estimate::new(mean + gradient.dot(&self.aside), sigma(self.middle)),
+            of_trend: trend.max(0.0).sqrt(),
+            noise: by_noise.sqrt(),
+            rest: (square - trend - by_noise).max(0.0).sqrt(),
+        })
+    }
+}
