@@ -323,7 +323,7 @@ fn missing_for_analysis(scan: &Scan) -> Vec<String> {
     missing
 }
 
-fn line_name(line: LineDirection) -> &'static str {
+pub(crate) fn line_name(line: LineDirection) -> &'static str {
     match line {
         LineDirection::Trace => "trace",
         LineDirection::Retrace => "retrace",

@@ -379,6 +379,17 @@ fn registered(maps: &mut [LineMap], caveats: &mut Vec<Caveat>) {
     let mut all: Vec<&mut LatticeMap> = maps.iter_mut().map(|m| &mut m.map).collect();
     let found = register(&mut all);
     for (map, found) in maps.iter().zip(found) {
+        if found.is_some_and(|f| f.reversed) {
+            caveats.push(Caveat::new(
+                "contrast-reversed",
+                map.file.as_str(),
+                format!(
+                    "the contrast of the {} is the other way round than in the images before, as that of error signals \
+                     is: half a period between them is taken for that and not for a shift",
+                    crate::info::line_name(map.line)
+                ),
+            ));
+        }
         let Some(found) = found.filter(|f| f.of_period > FAR) else {
             continue;
         };

@@ -5,7 +5,7 @@
 //! errors (scatter beyond them) or, for two maps that share noise, shows how much they share:
 //! `χ²/dof = 1 − ρ`, `σ² → σ²(1 + ρ)`.
 
-use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
+use nalgebra::{Matrix2, Matrix4, Vector2, Vector3, Vector4};
 use rayon::prelude::*;
 
 use super::defects::{Mask, is_improbable};
@@ -180,7 +180,7 @@ impl<'a> View<'a> {
                     freedom: sum.freedom.max(node.freedom),
                     signal_to_noise: sum.signal_to_noise + scaled.signal_to_noise,
                     // Phases cannot be averaged.
-                    phases: Vector2::repeat(f64::NAN),
+                    phases: Vector3::repeat(f64::NAN),
                     displacement: sum.displacement + scaled.displacement,
                     displacement_covariance: sum.displacement_covariance
                         + scaled.displacement_covariance,
@@ -231,7 +231,7 @@ fn average(views: &[View], place: Vector2<f64>) -> (LatticeNode, f64, usize) {
         chi2: good.iter().map(|n| n.chi2).sum(),
         freedom: good.iter().map(|n| n.freedom).sum(),
         signal_to_noise: good.iter().map(|n| n.signal_to_noise).sum(),
-        phases: Vector2::repeat(f64::NAN),
+        phases: Vector3::repeat(f64::NAN),
         // Of the first map that has one: maps have mean lattices of their own.
         displacement: good[0].displacement,
         displacement_covariance: good[0].displacement_covariance,

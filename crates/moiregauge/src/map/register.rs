@@ -3,11 +3,12 @@
 //! Where a later frame stands is known from its time and the drift only roughly: drift changes between frames, and
 //! stages creep. The pattern itself says it: a frame whose pattern stands s farther has phases that differ by
 //! `−Qᵀ s` everywhere. All nodes that two maps share tell the same s, to a small part of a pixel; whole lattice
-//! vectors are left open, and the nearest is taken.
+//! vectors are left open, and the nearest is taken. Where the contrast is the other way round, as that of error signals of
+//! trace and retrace, all three phases are off by π; no shift does that to `φ₃ − φ₂ + φ₁`, which tells.
 
 use std::f64::consts::{PI, TAU};
 
-use nalgebra::{Matrix2, Vector2};
+use nalgebra::{Matrix2, Vector2, Vector3};
 
 use super::combine::View;
 use super::defects::Mask;
@@ -26,6 +27,8 @@ pub struct Registration {
     pub shift: [Estimate; 2],
     /// The shift as a share of the period of the pattern: beyond 0.3 it may be another lattice vector.
     pub of_period: f64,
+    /// Whether its contrast is the other way round.
+    pub reversed: bool,
 }
 
 /// Moves every map after the first onto those before it. `None` for the first, for maps that share too few good nodes
@@ -53,7 +56,7 @@ pub fn register(maps: &mut [&mut LatticeMap]) -> Vec<Option<Registration>> {
 fn shift(fixed: &LatticeMap, map: &LatticeMap) -> Option<(Registration, f64)> {
     let waves = fixed.mean()?;
     let view = View::new(fixed)?;
-    let mut sums = [Vector2::<f64>::zeros(); 2];
+    let mut sums = [Vector2::<f64>::zeros(); 3];
     let mut shared = Vec::new();
     for (n, node) in map.nodes.iter().enumerate() {
         if node.mask != Mask::Good || node.phases.iter().any(|p| p.is_nan()) {
@@ -68,18 +71,18 @@ fn shift(fixed: &LatticeMap, map: &LatticeMap) -> Option<(Registration, f64)> {
         }
         // From the node next to the place, by the wave vectors of both.
         let way = 0.5 * (near.waves.basis + node.waves.basis);
-        let there = near.phases + way.tr_mul(&(place - at));
-        let difference = node.phases - there;
+        let way = way.tr_mul(&(place - at));
+        let difference = node.phases - near.phases - Vector3::new(way.x, way.y, 0.0);
         for (sum, d) in sums.iter_mut().zip(difference.iter()) {
             *sum += Vector2::new(d.cos(), d.sin());
         }
-        shared.push(difference);
+        shared.push(difference.xy());
     }
     if shared.len() < FEWEST {
         return None;
     }
     let count = shared.len() as f64;
-    if sums.iter().any(|s| s.norm() < COHERENT * count) {
+    if sums[..2].iter().any(|s| s.norm() < COHERENT * count) {
         return None;
     }
     let mean = Vector2::new(sums[0].y.atan2(sums[0].x), sums[1].y.atan2(sums[1].x));
@@ -91,6 +94,8 @@ fn shift(fixed: &LatticeMap, map: &LatticeMap) -> Option<(Registration, f64)> {
         let miss = (d - mean).map(wrap);
         sum + miss * miss.transpose()
     }) / (count * independent);
+    let reversed = sums[2].x < -COHERENT * count;
+    let mean = mean.map(|phase| wrap(phase - if reversed { PI } else { 0.0 }));
     let back = -waves.transpose().try_inverse()?;
     // The nearest of the lattice vectors that would do.
     let candidates = (-1..=1).flat_map(|h| (-1..=1).map(move |k| (f64::from(h), f64::from(k))));
@@ -103,6 +108,7 @@ fn shift(fixed: &LatticeMap, map: &LatticeMap) -> Option<(Registration, f64)> {
         Registration {
             shift: [0, 1].map(|i| Estimate::from_variance(shift[i], covariance[(i, i)])),
             of_period: shift.norm() / period,
+            reversed,
         },
         count,
     ))
@@ -180,6 +186,28 @@ mod tests {
         {
             assert!(again.shift.iter().all(|s| s.value.abs() < 3.0 * s.sigma));
         }
+    }
+
+    /// The other contrast is no shift by half a period.
+    #[test]
+    fn reversed_contrast_is_no_shift() {
+        let off = Vector2::new(1.2, -0.7);
+        let mut reversed = frame([0, 0], off, 2);
+        for node in &mut reversed.nodes {
+            // All three harmonics of −I, the third less the difference of the first two.
+            node.phases = node.phases.map(|phase| phase + PI);
+        }
+        let mut maps = [frame([0, 0], Vector2::zeros(), 1), reversed];
+        let found = register(&mut maps.iter_mut().collect::<Vec<_>>());
+        let found = found[1].expect("shared nodes");
+        assert!(found.reversed);
+        for axis in 0..2 {
+            let error = found.shift[axis].value - off[axis];
+            assert!(error.abs() < 4.0 * found.shift[axis].sigma, "{found:?}");
+        }
+        let mut alike = [frame([0, 0], Vector2::zeros(), 1), frame([0, 0], off, 2)];
+        let found = register(&mut alike.iter_mut().collect::<Vec<_>>());
+        assert!(!found[1].expect("shared nodes").reversed);
     }
 
     /// Another pattern is not forced upon the first.

@@ -3,7 +3,7 @@
 //! One linear map for all: a frame's pixels lie at `r = r₀ + (J − D τᵀ) n` on a sample that drifts with D
 //! (see [`crate::drift`]), so that wave vectors are mapped by the inverse transpose; nm, rad.
 
-use nalgebra::{Matrix2, Matrix4, Vector2};
+use nalgebra::{Matrix2, Matrix4, Vector2, Vector3};
 use rayon::prelude::*;
 
 use super::defects::Mask;
@@ -76,8 +76,9 @@ pub struct LatticeNode {
     pub freedom: usize,
     /// Signal power over noise power under the window.
     pub signal_to_noise: f64,
-    /// Phases of q₁ and q₂ of the pattern at the node, rad, modulo 2π; NaN where they are not known.
-    pub phases: Vector2<f64>,
+    /// Phases of q₁ and q₂ of the pattern at the node, rad, modulo 2π, and that of the third harmonic less their
+    /// difference; NaN where they are not known.
+    pub phases: Vector3<f64>,
     /// Displacement of the pattern against the mean lattice of the good nodes, nm, and its covariance; NaN
     /// where it could not be followed.
     pub displacement: Vector2<f64>,
@@ -97,7 +98,7 @@ impl LatticeNode {
             chi2: f64::NAN,
             freedom: 0,
             signal_to_noise: 0.0,
-            phases: Vector2::repeat(f64::NAN),
+            phases: Vector3::repeat(f64::NAN),
             displacement: Vector2::repeat(f64::NAN),
             displacement_covariance: Matrix2::repeat(f64::NAN),
         }

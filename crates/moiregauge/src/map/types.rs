@@ -1,6 +1,6 @@
 //! What goes into a map of one image and what comes out, in pixels.
 
-use nalgebra::{Matrix2, Matrix4, Vector2};
+use nalgebra::{Matrix2, Matrix4, Vector2, Vector3};
 
 use super::defects::Mask;
 
@@ -119,11 +119,13 @@ impl WaveMap {
         self.first + Vector2::new(column as f64 * self.step[0], row as f64 * self.step[1])
     }
 
-    /// Phases of q₁ and q₂ of the pattern at a node, rad, modulo 2π. The third harmonic says nothing of them: its phase
-    /// is `φ₂ − φ₁` and a constant of the pattern, which is π where the contrast is the other way round.
-    pub(super) fn phases(&self, node: usize) -> Vector2<f64> {
-        let [a, b, _] = self.nodes[node].phases;
+    /// Phases of q₁ and q₂ of the pattern at a node, rad, modulo 2π, and the phase of the third harmonic less their
+    /// difference: a constant of the pattern that no shift changes, but that is off by π where the contrast is the other
+    /// way round.
+    pub(super) fn phases(&self, node: usize) -> Vector3<f64> {
+        let [a, b, c] = self.nodes[node].phases;
         let from_centre = self.place(node) - self.centre;
-        Vector2::new(a, b) + self.reference.pair.tr_mul(&from_centre)
+        let way = self.reference.pair.tr_mul(&from_centre);
+        Vector3::new(a + way.x, b + way.y, c - b + a)
     }
 }
