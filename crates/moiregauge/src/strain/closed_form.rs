@@ -12,7 +12,7 @@ use nalgebra::{Matrix2, Matrix4, Vector2};
 
 use super::aligned;
 use super::complex_pair::ComplexPair;
-use super::inversion::{ALL_SIGNS, Signs, Solution, reduce, solve};
+use super::inversion::{ALL_SIGNS, Signs, Solution, reduce, solve, solve_all};
 use super::labelling::{least_strained, likely_names, moire_matrix, moire_matrix_jacobian};
 use super::layers::Layers;
 use super::{StrainError, TwistStrain};
@@ -24,6 +24,8 @@ use crate::settings::StrainConvention;
 const MIRRORED_FROM: f64 = 0.3;
 /// Readings of layers of different lattices that need more strain are not listed.
 const LIKELY_STRAIN: f64 = 0.03;
+/// Readings of such layers that are listed for either sense of the twist, the least strained ones.
+const LISTED: usize = 12;
 
 /// One exact solution of the strain equation.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -162,8 +164,15 @@ fn branches_by_trial(
     for lattice in likely_names(lattice, layers).ok_or(no_area(lattice))? {
         let moire = moire_matrix(&lattice.basis, &layers.atoms).ok_or(no_area(&lattice))?;
         for branch in solutions(&Labelled { lattice, moire }, layers, false) {
+            let apart = |a: f64, b: f64, period: f64| {
+                let between = (a - b).rem_euclid(period);
+                between.min(period - between)
+            };
+            // Readings of one twist and strain may differ in their orientation.
             let same = |b: &Branch| {
                 (b.twist - branch.twist).abs() + (b.strain - branch.strain).abs() < 1e-9
+                    && apart(b.lattice_angle, branch.lattice_angle, layers.period) < 1e-6
+                    && apart(b.axis_lab, branch.axis_lab, PI) * branch.strain.abs() < 1e-9
             };
             if branch.strain.abs() < LIKELY_STRAIN && !found.iter().any(same) {
                 found.push(branch);
@@ -174,6 +183,12 @@ fn branches_by_trial(
         let key = |b: &Branch| (b.twist < 0.0, b.strain.abs());
         let ((back_a, strain_a), (back_b, strain_b)) = (key(a), key(b));
         back_a.cmp(&back_b).then(strain_a.total_cmp(&strain_b))
+    });
+    let mut listed = [0; 2];
+    found.retain(|branch| {
+        let count = &mut listed[usize::from(branch.twist < 0.0)];
+        *count += 1;
+        *count <= LISTED
     });
     let first = labelled(lattice, layers)?;
     if found.is_empty() {
@@ -186,7 +201,7 @@ fn solutions(labelled: &Labelled, layers: &Layers, strain_dominated: bool) -> Ve
     let moire = ComplexPair::from(labelled.moire);
     ALL_SIGNS
         .into_iter()
-        .filter_map(|signs| solve(&moire, layers, signs))
+        .flat_map(|signs| solve_all(&moire, layers, signs))
         .map(|solution| {
             let covariance = covariance(&solution, labelled, layers);
             branch(&solution, covariance.as_ref(), layers, strain_dominated)

@@ -74,11 +74,8 @@ pub(super) struct Solution {
 /// layers of different lattices have several, the one of the least strain.
 pub(super) fn solve(moire: &ComplexPair, layers: &Layers, signs: Signs) -> Option<Solution> {
     let Some(ratio) = layers.ratio() else {
-        return roots(moire, layers, signs.strain)
-            .into_iter()
-            .filter_map(|alpha| solution_at(moire, layers, alpha, signs.strain))
-            .filter(|s| s.twist * signs.twist >= 0.0)
-            .min_by(|a, b| a.strain.abs().total_cmp(&b.strain.abs()));
+        let all = solve_all(moire, layers, signs).into_iter();
+        return all.min_by(|a, b| a.strain.abs().total_cmp(&b.strain.abs()));
     };
     let cosine = cosine(moire, layers, ratio, signs.strain);
     if !cosine.is_finite() || cosine.abs() > 1.0 {
@@ -86,6 +83,17 @@ pub(super) fn solve(moire: &ComplexPair, layers: &Layers, signs: Signs) -> Optio
     }
     let lattice_angle = moire.p.arg() - signs.twist * cosine.acos();
     solution_at(moire, layers, lattice_angle, signs.strain)
+}
+
+/// All solutions with the given signs: one at most for similar lattices.
+pub(super) fn solve_all(moire: &ComplexPair, layers: &Layers, signs: Signs) -> Vec<Solution> {
+    if layers.ratio().is_some() {
+        return solve(moire, layers, signs).into_iter().collect();
+    }
+    let all = roots(moire, layers, signs.strain).into_iter();
+    all.filter_map(|alpha| solution_at(moire, layers, alpha, signs.strain))
+        .filter(|s| s.twist * signs.twist >= 0.0)
+        .collect()
 }
 
 /// `cos(α − arg p)` for similar lattices: |p + e^{iα}| is the size that the strain leaves. Written so that

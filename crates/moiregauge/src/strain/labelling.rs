@@ -21,7 +21,7 @@ use crate::lattice::reciprocal::shortest_pair;
 /// Largest number in the name of a moiré vector that is tried for layers of different lattices.
 const LARGEST_ENTRY: i32 = 5;
 /// How many of these names are solved.
-const SOLVED: usize = 8;
+const SOLVED: usize = 32;
 /// Orientations at which names are compared.
 const ORIENTATIONS: i32 = 180;
 
