@@ -14,11 +14,10 @@ use anyhow::{Context as _, bail, ensure};
 use clap::ValueEnum;
 use moiregauge::analysis::Axis;
 use moiregauge::caveat::Caveat;
-use moiregauge::domains::{Contrast, DomainMap};
 use moiregauge::map::{
     DriftChange, LatticeMap, Resolution, TwistStrainMap, combine, drift_change, register,
 };
-use moiregauge::series::{LineMap, MapMethod, domains_of_scan, map_scan};
+use moiregauge::series::{LineMap, MapMethod, SurveyPlan, domains_of_scan, map_scan};
 use moiregauge::settings::Settings;
 use moiregauge_report::{FailedInput, Provenance};
 use spmfile::FrameDirection;
@@ -162,11 +161,16 @@ fn survey(
     }
     let (out, loud) = (args.analyze.out(), args.analyze.is_loud());
     let (mut maps, mut images, mut caveats) = (Vec::new(), Vec::new(), Vec::new());
-    let (mut read, mut first) = (Vec::new(), None);
+    let (mut read, mut plans) = (Vec::new(), Vec::<(survey::Large, SurveyPlan)>::new());
     for path in inputs {
         let large = open(path, true)?.context("no image")?;
         let (map, plan) = large
-            .map((settings, resolution), first.as_ref(), out, loud)
+            .map(
+                (settings, resolution),
+                plans.first().map(|p| &p.1),
+                out,
+                loud,
+            )
             .with_context(|| path.display().to_string())?;
         let file = large.input.file.clone();
         caveats.extend(large.caveats.iter().cloned());
@@ -189,11 +193,16 @@ fn survey(
             &plan.harmonics,
         ));
         maps.push(map);
-        read.push(large.input);
-        first.get_or_insert(plan);
+        read.push(large.input.clone());
+        plans.push((large, plan));
     }
     let map = TwistStrainMap::side_by_side(maps).context("no image")?;
-    let look = None::<fn(Contrast) -> Vec<DomainMap>>;
+    let look = |contrast| {
+        let found = plans
+            .iter()
+            .filter_map(|(large, plan)| large.domains(plan, contrast));
+        found.collect()
+    };
     let domains = args.domains.answer(&map, look);
     caveats.extend(domains.caveats.iter().cloned());
     Ok(Some(Made {
@@ -307,7 +316,7 @@ fn together(
         });
         all.collect()
     };
-    let domains = args.domains.answer(&map, Some(look));
+    let domains = args.domains.answer(&map, look);
     caveats.extend(domains.caveats.iter().cloned());
     Ok(Answer::Lattice(Box::new(Made {
         map,

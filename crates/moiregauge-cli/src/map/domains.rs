@@ -43,12 +43,11 @@ pub(super) struct Domains {
 const ODD: f64 = 0.15;
 
 impl DomainArgs {
-    /// Which regime applies; looks for domains if they are wanted. `find` gives those of all images, or is `None` where
-    /// the image is too large to look.
+    /// Which regime applies; looks for domains if they are wanted. `find` gives those of all images.
     pub(super) fn answer(
         &self,
         map: &TwistStrainMap,
-        find: Option<impl FnOnce(Contrast) -> Vec<DomainMap>>,
+        find: impl FnOnce(Contrast) -> Vec<DomainMap>,
     ) -> Domains {
         let before = regime(map, None);
         let wanted = match self.domains {
@@ -56,7 +55,7 @@ impl DomainArgs {
             When::Auto => before.in_doubt,
             When::On => true,
         };
-        let Some(find) = find.filter(|_| wanted) else {
+        if !wanted {
             let doubt = || Caveat::new("phases-in-doubt", "map", before.reasons.join("; "));
             let caveats = before.in_doubt.then(doubt);
             return Domains {
@@ -64,7 +63,7 @@ impl DomainArgs {
                 regime: before,
                 caveats: caveats.into_iter().collect(),
             };
-        };
+        }
         let contrast = match self.nodes {
             None => Contrast::Auto,
             Some(Look::Bright) => Contrast::Bright,

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use anyhow::Context as _;
 use indicatif::{ProgressBar, ProgressStyle};
 use moiregauge::caveat::Caveat;
+use moiregauge::domains::{Contrast, DomainMap};
 use moiregauge::geometry::{Geometry, Timing};
 use moiregauge::map::{Mask, Resolution, TwistStrainMap};
 use moiregauge::series::{SurveyPlan, choose_channel, nominal_geometry};
@@ -130,6 +131,14 @@ impl Large {
         progress.finish_and_clear();
         let whole = whole.context("the image has no lines")?;
         Ok((whole, plan))
+    }
+}
+
+impl Large {
+    /// Nodes and triangles of the image; none where its lines cannot be read.
+    pub(super) fn domains(&self, plan: &SurveyPlan, contrast: Contrast) -> Option<DomainMap> {
+        let read = |block| self.source.block(block);
+        plan.domains(&read, contrast).ok().flatten()
     }
 }
 

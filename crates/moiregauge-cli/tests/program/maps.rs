@@ -312,6 +312,14 @@ fn small_angles_have_domains() {
     assert!(out.join("figures/map-domains.svg").exists());
     let page = std::fs::read_to_string(out.join("report.html")).expect("a page");
     assert!(page.contains("Regime: domains"));
+    // In bands the same mesh is found in blocks of pixels.
+    let bands = map(&folder.path().join("bands"), &["--in-bands", "--no-report"]);
+    assert_eq!(bands["details"]["regime"]["use_of"], "domains");
+    let of = |key: &str| number(&bands, &format!("/details/domains/{key}"));
+    let share = of("triangles") / number(details, "/domains/triangles");
+    assert!((0.9..1.1).contains(&share), "{share}");
+    let noise = of("twist_noise_deg");
+    assert!((of("median_twist_deg") - truth).abs() < 0.6 * noise);
     let off = map(
         &folder.path().join("off"),
         &["--domains", "off", "--no-report"],

@@ -215,7 +215,7 @@ impl<'a> Work<'a> {
             self.indices.iter().map(ridge).collect(),
             &self.reference.pair,
             &amplitudes,
-            self.reference.in_pixels(width),
+            (self.reference.in_pixels(width), self.blocks.block),
         );
         local_lattices(&self.blocks, smoothed, &harmonics, |at| {
             self.taken_off(at, width)

@@ -4,12 +4,15 @@
 //! the middle wants is that of all. Positions are nominal, corrected by the calibration of the scanner and for a drift
 //! that the user gives.
 
+use std::f64::consts::TAU;
 use std::ops::Range;
 
-use nalgebra::{Matrix2, Matrix4};
+use nalgebra::{Matrix2, Matrix4, Vector2};
 
+use super::mapping::pitch;
 use super::scanner::calibrated;
 use crate::background::remove_background;
+use crate::domains::{Contrast, DomainMap, Mesh, find_nodes};
 use crate::geometry::{Geometry, Timing};
 use crate::image::Image;
 use crate::lattice::reciprocal::labelled_like;
@@ -27,6 +30,11 @@ const MIDDLE: usize = 2048;
 const BAND: usize = 1 << 24;
 /// Smaller images are cut into so many bands.
 const FEWEST_BANDS: usize = 4;
+
+/// Pixels of an image in which domains are looked for, and how many there should be to a period, and at least.
+const DOMAIN_PIXELS: f64 = (1 << 24) as f64;
+const PER_PERIOD: f64 = 24.0;
+const COARSEST: f64 = 8.0;
 
 /// A large image, ready to be mapped band by band.
 #[derive(Clone, Debug)]
@@ -175,6 +183,65 @@ impl SurveyPlan {
             .twist_strain(&self.whole, layers, convention)
             .map_err(SurveyError::Strain)?;
         Ok(TwistStrainMap::new(&lattices, &found))
+    }
+
+    /// Nodes and triangles of the whole image, its pixels averaged over blocks that leave some 24 to a period, and 16
+    /// million in all. `None` where there is no mesh, or such blocks would be too coarse for one.
+    ///
+    /// # Errors
+    /// [`SurveyError`], where its lines cannot be read.
+    pub fn domains(
+        &self,
+        read: &ReadBlock,
+        contrast: Contrast,
+    ) -> Result<Option<DomainMap>, SurveyError> {
+        let j = self.placed.pixel_to_nm;
+        // Two primitive vectors of the lattice, nm; in pixels.
+        let Some(real) = self.whole.transpose().try_inverse() else {
+            return Ok(None);
+        };
+        // A pair at 60° where that of the wave vectors is.
+        let (a, b) = (real.column(0) * TAU, real.column(1) * TAU);
+        let real = Matrix2::from_columns(&[a, a + b]);
+        let Some(pixels) = j.try_inverse().map(|back| back * real) else {
+            return Ok(None);
+        };
+        let shortest = pixels.column(0).norm().min(pixels.column(1).norm());
+        let [columns, rows] = self.placed.size;
+        let by_size = (columns as f64 * rows as f64 / DOMAIN_PIXELS).sqrt().ceil();
+        let bin = (shortest / PER_PERIOD).floor().max(by_size).max(1.0) as usize;
+        if shortest < COARSEST * bin as f64 {
+            return Ok(None);
+        }
+        let mut values = Vec::with_capacity((columns / bin) * (rows / bin));
+        let together = (BAND / columns.max(1) / bin).max(1) * bin;
+        for from in (0..rows / bin * bin).step_by(together) {
+            let lines = block(
+                read,
+                0..columns,
+                from..(from + together).min(rows / bin * bin),
+            )?;
+            values.extend(lines.binned(bin).values);
+        }
+        let image = Image::new(rows / bin, columns / bin, values);
+        let image = remove_background(&image, self.settings.background);
+        let share = bin as f64;
+        let binned = Geometry {
+            size: [image.columns, image.rows],
+            pixel_to_nm: j * share,
+            origin: self.placed.origin + j * Vector2::repeat(0.5 * (share - 1.0)),
+            covariance: self.placed.covariance * (share * share),
+            from_sensors: self.placed.from_sensors,
+        };
+        let pixels = pixels / share;
+        let Some(found) = find_nodes(&image, &pixels, pitch(&binned), contrast) else {
+            return Ok(None);
+        };
+        let places: Vec<_> = found.nodes.iter().map(|n| n.place).collect();
+        let mesh = Mesh::new(&places, &pixels);
+        let (layers, convention) = (self.settings.bilayer(), self.settings.strain_convention);
+        let map = DomainMap::new(&found, &mesh, &binned, layers, convention);
+        Ok(map.and_then(Result::ok))
     }
 
     /// A map of this window that has no nodes yet, on the grid of `first`.
