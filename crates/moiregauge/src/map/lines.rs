@@ -13,6 +13,7 @@ use rustfft::num_complex::Complex64;
 use super::median;
 use super::types::Reference;
 use crate::image::Image;
+use crate::lattice::transform::hann;
 
 /// An image and what is taken off each of its lines.
 pub(super) struct Levelled<'a> {
@@ -62,7 +63,8 @@ impl<'a> Levelled<'a> {
     pub(super) fn new(image: &'a Image, reference: &Reference) -> Self {
         let plain = Self::as_is(image);
         let sums = line_sums(image);
-        let length = reference.pair.column(0).norm();
+        // Rad per line, whatever the shape of the pixels.
+        let length = on_sample(reference, reference.wave([1, 0])).norm() * reference.pitch[1];
         let standing = standing(reference, image.columns);
         let [offsets, beside_a, beside_b] =
             [0, 1, 2].map(|i| Periodogram::new(sums.iter().map(|line| line[i])));
@@ -124,13 +126,19 @@ impl<'a> Levelled<'a> {
     }
 }
 
+/// A wave vector in rad/nm: pixels need not be square.
+fn on_sample(reference: &Reference, g: Vector2<f64>) -> Vector2<f64> {
+    g.component_div(&Vector2::from(reference.pitch))
+}
+
 /// The ky (positive, rad per pixel) of harmonics that hardly turn along the lines.
 fn standing(reference: &Reference, columns: usize) -> Vec<f64> {
     let cycle = std::f64::consts::TAU / columns as f64;
     let all = (-ORDERS..=ORDERS).flat_map(|h| (-ORDERS..=ORDERS).map(move |k| [h, k]));
     let found = all.filter_map(|index| {
         let g = reference.wave(index);
-        let stands = g.x.abs() < ON_RIDGE * g.norm() + CYCLES * cycle;
+        let least = ON_RIDGE * on_sample(reference, g).norm() * reference.pitch[0];
+        let stands = g.x.abs() < least + CYCLES * cycle;
         (stands && g.y > 0.0 && g.y < std::f64::consts::PI).then_some(g.y)
     });
     found.collect()
@@ -163,11 +171,6 @@ fn line_sums(image: &Image) -> Vec<[Complex64; 3]> {
         sums.map(|s| s / there)
     };
     (0..image.rows).into_par_iter().map(of_line).collect()
-}
-
-fn hann(count: usize) -> Vec<f64> {
-    let angle = |i: usize| std::f64::consts::TAU * (i as f64 + 0.5) / count as f64;
-    (0..count).map(|i| 0.5 - 0.5 * angle(i).cos()).collect()
 }
 
 /// Powers of a series over ky, those of white noise being its variance.
@@ -297,6 +300,36 @@ mod tests {
         }
         let inside = all.iter().filter(|p| p.abs() < 1.0).count() as f64 / all.len() as f64;
         assert!((inside - 0.683).abs() < 0.04, "{inside}");
+    }
+
+    /// Lines twice as far apart as columns: what stands on the ridge and how wide it is are those of the sample.
+    #[test]
+    fn pixels_need_not_be_square() {
+        let mut all = Vec::new();
+        for (seed, degrees) in [(1, 30.0), (2, 26.0), (3, 17.0), (4, 0.0)] {
+            let mut scene = scene(degrees, seed);
+            scene.pair.row_mut(1).scale_mut(2.0);
+            (scene.white, scene.line) = (0.6, 1.0);
+            let reference = Reference {
+                pair: scene.pair,
+                pitch: [1.0, 2.0],
+            };
+            let resolution = Resolution {
+                window_nm: Some(20.0),
+                ..Resolution::default()
+            };
+            let map = local_lattices(&scene.image(), &reference, &resolution).unwrap();
+            let flagged = map.nodes.iter().filter(|n| n.mask > Mask::Margin);
+            assert_eq!(flagged.count(), 0, "{degrees}°");
+            let [stated, _] = pulls(&scene, &map, 1.0);
+            assert!(
+                (0.75..1.25).contains(&rms(&stated)),
+                "{degrees}°: {}",
+                rms(&stated)
+            );
+            all.extend(stated);
+        }
+        assert!((0.88..1.12).contains(&rms(&all)), "{}", rms(&all));
     }
 
     /// A weak harmonic on the ridge, in wide windows: its own noisy slope must not say how far from the ridge it stands.
