@@ -12,7 +12,7 @@ use std::process::ExitCode;
 
 pub(crate) use args::{AnalyzeArgs, BackgroundArg, ConventionArg, LineArg, MethodArg};
 pub(crate) use chain::{
-    Outcome, Reading, analyse_files, hexadecimal, measure_file, progress, read, with_hint,
+    Outcome, Reading, analyse_files, hexadecimal, measure_file, progress, read, read_any, with_hint,
 };
 pub(crate) use channel::channel_names;
 pub(crate) use files::write_all;
@@ -29,8 +29,8 @@ pub(crate) fn run(args: &AnalyzeArgs) -> anyhow::Result<ExitCode> {
     let exports = args.exports()?;
     args.start_threads()?;
     files::refuse_overwriting(&args.out, args.force)?;
-    let (inputs, failed) = inputs(&args.paths);
     let loud = args.is_loud();
+    let (inputs, failed) = inputs(&args.paths, loud);
     let known = args.known.of(&inputs);
     let atomic = args.orientation.measure(&settings, &args.known)?;
     if let Some((found, _)) = &atomic {

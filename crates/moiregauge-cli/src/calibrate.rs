@@ -116,7 +116,7 @@ pub(crate) fn run(args: &CalibrateArgs) -> anyhow::Result<ExitCode> {
         background: args.background.map_or(defaults.background, Into::into),
         ..defaults
     };
-    let (inputs, mut failed) = inputs(&args.paths);
+    let (inputs, mut failed) = inputs(&args.paths, !args.quiet);
     let known = args.known.of(&inputs);
     let bar = if args.quiet {
         ProgressBar::hidden()

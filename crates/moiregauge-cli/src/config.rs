@@ -131,7 +131,7 @@ pub(crate) fn run(_args: &ConfigArgs) -> anyhow::Result<ExitCode> {
 
 /// Reads a settings file. `material` may be a name.
 pub(crate) fn read(path: &Path) -> anyhow::Result<Settings> {
-    let text = std::fs::read_to_string(path)
+    let text = moiregauge_pipeline::read_text(path)
         .with_context(|| format!("cannot read the settings file {}", path.display()))?;
     let folder = path.parent().unwrap_or(Path::new(""));
     parse(&text, folder).with_context(|| format!("in the settings file {}", path.display()))
@@ -228,7 +228,7 @@ pub(crate) fn own_materials(path: Option<&Path>) -> anyhow::Result<Vec<Material>
         return Ok(Vec::new());
     };
     let about = || format!("in the layers of {}", path.display());
-    let text = std::fs::read_to_string(path)
+    let text = moiregauge_pipeline::read_text(path)
         .with_context(|| format!("cannot read the layers of {}", path.display()))?;
     let file: File = toml::from_str(&text).with_context(about)?;
     for layer in &file.layer {

@@ -126,15 +126,15 @@ struct Unreadable {
 /// If the output cannot be written.
 pub(crate) fn run(args: &InfoArgs) -> anyhow::Result<ExitCode> {
     let mut infos = Vec::new();
-    let files = expand(&args.files);
+    let files = expand(&args.files, !args.json);
     let paths: Vec<PathBuf> = files.iter().flatten().cloned().collect();
     let known = args.known.of(&paths);
     for file in files {
         let info = match file {
             Ok(path) => file_info(&path, &args.at, &known),
-            Err((path, error)) => FileInfo {
-                file: path.to_string_lossy().into_owned(),
-                error: Some(error),
+            Err(failed) => FileInfo {
+                file: failed.file,
+                error: Some(failed.error),
                 scan: None,
             },
         };
@@ -165,7 +165,7 @@ pub(crate) fn run(args: &InfoArgs) -> anyhow::Result<ExitCode> {
 }
 
 fn file_info(path: &Path, at: &[Pixel], known: &Known) -> FileInfo {
-    let (mut scan, mut error) = match std::fs::read(path) {
+    let (mut scan, mut error) = match moiregauge_pipeline::read(path) {
         Err(error) => (None, Some(error.to_string())),
         Ok(bytes) => match known.decode(path, &bytes, &|_| true) {
             Ok(scan) => (Some(scan), None),

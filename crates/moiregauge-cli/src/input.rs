@@ -5,13 +5,12 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context as _, bail, ensure};
 use clap::ValueEnum;
 use moiregauge::series::natural_order;
+use moiregauge_pipeline::session;
 use spmfile::arrays::ArrayOptions;
 use spmfile::{
     Block, ChannelInfo, Format, FrameDirection, ReadError, Scan, Span, crop, detect, length_nm,
     read_selected, sensor_axis,
 };
-
-use crate::session;
 
 /// The options for what files do not tell.
 #[derive(clap::Args, Clone, Debug, Default)]
@@ -241,7 +240,7 @@ impl Known {
             return Ok(());
         };
         let about = || format!("--sensors {}", path.display());
-        let bytes = std::fs::read(path).with_context(about)?;
+        let bytes = moiregauge_pipeline::read(path).with_context(about)?;
         let mut second = self.decode(path, &bytes, &|_| true).with_context(about)?;
         if let Some(names) = names {
             adopt(&mut second, names).with_context(about)?;

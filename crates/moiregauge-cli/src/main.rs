@@ -12,7 +12,6 @@ mod moire;
 mod plan;
 mod say;
 mod scanner;
-mod session;
 mod simulate;
 mod validate;
 

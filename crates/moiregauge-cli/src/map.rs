@@ -115,7 +115,7 @@ pub(crate) fn run(args: &MapArgs) -> anyhow::Result<ExitCode> {
         out.display()
     );
     args.analyze.start_threads()?;
-    let (inputs, failed) = inputs(args.analyze.paths());
+    let (inputs, failed) = inputs(args.analyze.paths(), args.analyze.is_loud());
     let known = args.analyze.known().of(&inputs);
     let whole = (&settings, &known, &resolution);
     let made = match survey(args, &inputs, whole, &failed)? {

@@ -127,7 +127,7 @@ pub(crate) fn given_conditions(
 }
 
 fn read(path: &Path) -> anyhow::Result<Simulation> {
-    let text = std::fs::read_to_string(path)
+    let text = moiregauge_pipeline::read_text(path)
         .with_context(|| format!("cannot read the settings file {}", path.display()))?;
     toml::from_str(&text).with_context(|| format!("in the settings file {}", path.display()))
 }

@@ -2,3 +2,12 @@
 //!
 //! Files and settings, but no arguments of a program, no printing and no physics. Front ends (the program, a
 //! Python package, a page) stand on this crate.
+
+mod find;
+mod memory;
+mod reading;
+pub mod session;
+
+pub use find::{Found, LeftAlone, find};
+pub use memory::{NotEnoughMemory, available, enough_for};
+pub use reading::{FileError, open, read, read_text};

@@ -191,9 +191,17 @@ pub(crate) struct Reading {
     pub(crate) caveats: Vec<Caveat>,
 }
 
-/// Reads what the analysis needs of a file: the chosen channel and the position sensors.
+/// Reads what the analysis needs of a file: the chosen channel and the position sensors; not more than the memory
+/// holds while it is analysed.
 pub(crate) fn read(path: &Path, settings: &Settings, known: &Known) -> anyhow::Result<Reading> {
-    let bytes = std::fs::read(path)?;
+    let reading = read_any(path, settings, known)?;
+    moiregauge_pipeline::enough_for(&reading.scan)?;
+    Ok(reading)
+}
+
+/// The same of an image of any size, for surveys.
+pub(crate) fn read_any(path: &Path, settings: &Settings, known: &Known) -> anyhow::Result<Reading> {
+    let bytes = moiregauge_pipeline::read(path)?;
     let channels = channel::names(path, &bytes, known)?;
     let names: Vec<_> = channels
         .iter()

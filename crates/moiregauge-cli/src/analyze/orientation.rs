@@ -82,10 +82,10 @@ impl OrientationArgs {
             return Ok(None);
         }
         let mut paths = Vec::new();
-        for path in expand(&self.atomic) {
+        for path in expand(&self.atomic, true) {
             match path {
                 Ok(path) => paths.push(path),
-                Err((path, error)) => anyhow::bail!("--atomic {}: {error}", path.display()),
+                Err(one) => anyhow::bail!("--atomic {}: {}", one.file, one.error),
             }
         }
         let settings = Settings {

@@ -70,7 +70,7 @@ impl Large {
         if std::fs::metadata(path)?.len() < large as u64 {
             return Ok(None);
         }
-        let reading = crate::analyze::read(path, settings, known)?;
+        let reading = crate::analyze::read_any(path, settings, known)?;
         let names: Vec<(&str, &str)> = reading
             .scan
             .channels
@@ -154,7 +154,7 @@ fn timing(scan: &Scan, channel: &Channel) -> Option<Timing> {
 
 /// The file by its content, read piece by piece.
 fn identity(path: &Path) -> anyhow::Result<InputFile> {
-    let mut file = std::fs::File::open(path)?;
+    let mut file = moiregauge_pipeline::open(path)?;
     let mut hash = Sha256::new();
     let mut buffer = vec![0; 1 << 20];
     let mut bytes = 0;

@@ -146,7 +146,7 @@ impl SimulateArgs {
     pub(super) fn settings(&self) -> anyhow::Result<Simulation> {
         let mut set = match &self.config {
             Some(path) => {
-                let text = std::fs::read_to_string(path)
+                let text = moiregauge_pipeline::read_text(path)
                     .with_context(|| format!("cannot read {}", path.display()))?;
                 toml::from_str(&text).with_context(|| format!("{} is no set", path.display()))?
             }

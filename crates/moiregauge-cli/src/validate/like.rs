@@ -24,8 +24,8 @@ pub(super) fn conditions(paths: &[PathBuf]) -> anyhow::Result<Simulation> {
         ..Settings::default()
     };
     let mut scans = Vec::new();
-    for path in expand(paths) {
-        let path = path.map_err(|(path, error)| anyhow::anyhow!("{}: {error}", path.display()))?;
+    for path in expand(paths, true) {
+        let path = path.map_err(|one| anyhow::anyhow!("{}: {}", one.file, one.error))?;
         let (mut moires, _) = measure_file(&path, &[], (&settings, &Known::default()), None)
             .with_context(|| format!("{}", path.display()))?;
         scans.push(moires.swap_remove(0));

@@ -59,8 +59,15 @@ fn a_jpeg() {
         std::fs::write(&picture, JPEG).unwrap();
         refuse(&run(&mut analyze(&picture, &out)), &[name, "JPEG"]);
     }
-    // In a folder it is no scan, whatever its name.
-    refuse(&run(&mut analyze(folder.path(), &out)), &["no scan files"]);
+    // In a folder one is no scan by its name, and the other should be one.
+    refuse(
+        &run(&mut analyze(folder.path(), &out)),
+        &[
+            "left alone: 1 other file (picture.jpg)",
+            "picture.spm",
+            "it holds a picture",
+        ],
+    );
 }
 
 #[test]

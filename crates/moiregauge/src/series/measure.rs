@@ -21,6 +21,10 @@ use crate::lattice::{
 };
 use crate::settings::{Lines, Settings};
 
+/// Bytes of memory that the analysis of an image takes for each of its pixels at most: measured with 2048 × 2048
+/// single-precision samples and eight pixels per period, where nothing can be binned.
+pub const BYTES_PER_PIXEL: u64 = 105;
+
 /// What the pixels of one scan gave.
 #[derive(Clone, Debug)]
 pub struct MeasuredScan {

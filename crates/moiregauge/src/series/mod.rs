@@ -34,7 +34,8 @@ pub use group::natural_order;
 pub use illustrate::illustrate;
 pub use mapping::{LineMap, MapError, MapMethod, map_scan};
 pub use measure::{
-    MeasureError, MeasuredLine, MeasuredScan, measure_known, measure_moires, measure_scan,
+    BYTES_PER_PIXEL, MeasureError, MeasuredLine, MeasuredScan, measure_known, measure_moires,
+    measure_scan,
 };
 pub use moires::sorted_moires;
 pub use overlap::{Window, common_window};
