@@ -27,6 +27,9 @@ const COMMENTED: &str = r#"# Settings of `moiregauge analyze`. Every line shows 
 # comes first.
 # channel = "TR Phase"
 
+# Of several images of the channel in one file (pages, frames) this one, counted from 1. Without it: the first.
+# image = 2
+
 # Line directions to use: "trace", "retrace" or "both".
 line = "both"
 
@@ -318,6 +321,9 @@ pub(crate) fn check(settings: &Settings) -> anyhow::Result<()> {
         .and_then(moiregauge::calibration::Calibration::problem)
     {
         bail!("the calibration of the scanner makes no sense: {problem}");
+    }
+    if let Some(problem) = settings.out_of_range() {
+        bail!("{problem}");
     }
     if let Some(drift) = &settings.drift {
         let (x, y, sigma) = (

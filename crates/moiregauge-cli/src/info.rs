@@ -9,6 +9,8 @@ use std::io::{ErrorKind, Write as _};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+use moiregauge::series::image_choice;
+use moiregauge::settings::Settings;
 use serde::Serialize;
 use spmfile::{
     Channel, DateTime, FrameDirection, LineDirection, ReadError, Scan, position_sensors,
@@ -181,21 +183,38 @@ fn file_info(path: &Path, at: &[Pixel], known: &Known) -> FileInfo {
     {
         error = error.or(Some(format!("{problem:#}")));
     }
-    let outside = scan.iter().flat_map(|scan| &scan.channels).find_map(|c| {
-        let pixel = at
-            .iter()
-            .find(|p| p.row >= c.rows || p.column >= c.columns)?;
-        Some(format!(
-            "--at {},{} lies outside channel {:?} with {} rows and {} columns",
-            pixel.row, pixel.column, c.name, c.rows, c.columns
-        ))
-    });
-    error = error.or(outside);
+    error = error.or_else(|| outside(scan.as_ref()?, at));
     FileInfo {
         file: path.to_string_lossy().into_owned(),
         error,
         scan: scan.as_ref().map(|scan| scan_info(scan, at)),
     }
+}
+
+/// Words for a pixel that lies outside of all channels. Of several channels some may be smaller.
+fn outside(scan: &Scan, at: &[Pixel]) -> Option<String> {
+    let largest = scan.channels.iter().max_by_key(|c| c.samples.len())?;
+    let inside = |p: &Pixel| {
+        let mut channels = scan.channels.iter();
+        channels.any(|c| p.row < c.rows && p.column < c.columns)
+    };
+    let pixel = at.iter().find(|p| !inside(p))?;
+    Some(format!(
+        "--at {},{} lies outside of all channels; the largest, {:?}, has {} rows and {} columns",
+        pixel.row, pixel.column, largest.name, largest.rows, largest.columns
+    ))
+}
+
+/// Notes of the reader, and which image would be analysed.
+fn notes(scan: &Scan) -> Vec<String> {
+    let choice = image_choice(scan, &Settings::default());
+    let hint =
+        |words| format!("{words} (--channel NAME and --image N of analyze say which one is)");
+    scan.notes
+        .iter()
+        .cloned()
+        .chain(choice.into_iter().map(hint))
+        .collect()
 }
 
 fn scan_info(scan: &Scan, at: &[Pixel]) -> ScanInfo {
@@ -222,7 +241,7 @@ fn scan_info(scan: &Scan, at: &[Pixel]) -> ScanInfo {
                 error: u.error.clone(),
             })
             .collect(),
-        notes: scan.notes.clone(),
+        notes: notes(scan),
         missing_for_analysis: missing_for_analysis(scan),
     }
 }

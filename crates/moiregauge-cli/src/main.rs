@@ -9,6 +9,7 @@ mod info;
 mod input;
 mod map;
 mod moire;
+mod numbers;
 mod plan;
 mod say;
 mod scanner;
@@ -17,7 +18,7 @@ mod validate;
 
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 
 /// The strain gauge for moiré superlattices
 ///
@@ -45,8 +46,21 @@ enum Command {
     Config(config::ConfigArgs),
 }
 
+/// The arguments. A negative number is a value everywhere, so that its option is named where it is refused.
+fn arguments() -> clap::Command {
+    Cli::command().mut_subcommands(|command| command.allow_negative_numbers(true))
+}
+
 fn main() -> ExitCode {
-    let result = match Cli::parse().command {
+    let parsed = Cli::from_arg_matches(&arguments().get_matches()).unwrap_or_else(|e| e.exit());
+    run(parsed.command).unwrap_or_else(|error| {
+        eprintln!("error: {error:#}");
+        ExitCode::FAILURE
+    })
+}
+
+fn run(command: Command) -> anyhow::Result<ExitCode> {
+    match command {
         Command::Analyze(args) => analyze::run(&args),
         Command::Map(args) => map::run(&args),
         Command::Calibrate(args) => calibrate::run(&args),
@@ -58,9 +72,5 @@ fn main() -> ExitCode {
         Command::Validate(args) => validate::run(&args),
         Command::Plan(args) => plan::run(&args),
         Command::Config(args) => config::run(&args),
-    };
-    result.unwrap_or_else(|error| {
-        eprintln!("error: {error:#}");
-        ExitCode::FAILURE
-    })
+    }
 }

@@ -10,10 +10,11 @@ use std::process::ExitCode;
 use anyhow::Context as _;
 use indicatif::{ProgressBar, ProgressStyle};
 use moiregauge::settings::Method;
-use moiregauge::simulate::{Simulation, Simulator};
+use moiregauge::simulate::{MOST_PIXELS, Simulation, Simulator};
 use rayon::prelude::*;
 
 use crate::analyze::{MethodArg, write_all};
+use crate::numbers;
 use crate::say::say;
 use compare::{Comparison, compare};
 use output::Validation;
@@ -34,7 +35,7 @@ Examples:
   moiregauge validate --config mine.toml")]
 pub(crate) struct ValidateArgs {
     /// Number of simulated sets
-    #[arg(long, default_value_t = 200, value_name = "N")]
+    #[arg(long, default_value_t = 200, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=1_000_000))]
     sets: u32,
     /// Estimator of the lattice vectors
     #[arg(long, value_enum, default_value = "lattice")]
@@ -46,10 +47,10 @@ pub(crate) struct ValidateArgs {
     #[arg(long, value_name = "FILE", num_args = 1.., conflicts_with = "config")]
     like: Vec<PathBuf>,
     /// Side of the frames, pixels, where no file gives it; small frames are quick
-    #[arg(long, default_value_t = 128, value_name = "N")]
+    #[arg(long, default_value_t = 128, value_name = "N", value_parser = numbers::count(2, MOST_PIXELS))]
     pixels: usize,
     /// Scans per set, where no file gives it
-    #[arg(long, default_value_t = 4, value_name = "N")]
+    #[arg(long, default_value_t = 4, value_name = "N", value_parser = numbers::count(1, 9999))]
     scans: usize,
     /// Seed of all noise
     #[arg(long, default_value_t = 1)]
@@ -67,7 +68,6 @@ pub(crate) struct ValidateArgs {
 
 /// Runs the validation.
 pub(crate) fn run(args: &ValidateArgs) -> anyhow::Result<ExitCode> {
-    anyhow::ensure!(args.sets >= 2, "--sets must be at least 2");
     if let Some(out) = &args.out {
         anyhow::ensure!(
             args.force || !out.join("validation.json").exists(),

@@ -8,7 +8,7 @@ use moiregauge::analysis::Analysis;
 use moiregauge::caveat::Caveat;
 use moiregauge::series::{
     MeasureError, MeasuredScan, Window, analyse, choose_channel, common_window, illustrate,
-    measure_moires, sorted_moires,
+    measure_moires, sorted_moires, unusual_channels,
 };
 use moiregauge::settings::Settings;
 use moiregauge_report::{FailedInput, InputFile, Provenance};
@@ -164,6 +164,10 @@ pub(crate) fn measure_file(
         .find(|(_, of)| path.starts_with(of))
         .map(|(name, _)| name.clone());
     for measured in &mut moires {
+        let several = |c: &&mut Caveat| c.code == "several-images";
+        for caveat in measured.caveats.iter_mut().filter(several) {
+            caveat.message += "; --image N says which one";
+        }
         measured.caveats.extend(caveats.iter().cloned());
         measured.set.clone_from(&set);
     }
@@ -223,10 +227,15 @@ pub(crate) fn read_any(path: &Path, settings: &Settings, known: &Known) -> anyho
         let file = input.file.as_str();
         move |words: String| Caveat::new(code, file, words)
     };
+    let wanted = settings.channel.as_deref();
+    let several = unusual_channels(&names, wanted).map(|words| {
+        let words = format!("{words}; --channel NAME says which one shows the moiré");
+        Caveat::new("several-images", input.file.as_str(), words)
+    });
     let doubts = scan.notes.iter().cloned().map(caveat("reader-doubt"));
     let caveats = replaced.into_iter().map(caveat("given-by-user"));
     Ok(Reading {
-        caveats: caveats.chain(doubts).collect(),
+        caveats: several.into_iter().chain(caveats).chain(doubts).collect(),
         scan,
         input,
     })

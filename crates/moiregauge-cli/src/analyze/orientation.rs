@@ -11,6 +11,7 @@ use moiregauge_report::InputFile;
 use super::chain::measure_file;
 use crate::info::expand;
 use crate::input::KnownArgs;
+use crate::numbers;
 
 /// The options for it.
 #[derive(clap::Args, Clone, Debug, Default)]
@@ -138,8 +139,9 @@ pub(crate) fn parse_angle(text: &str) -> Result<Angle, String> {
             let plain = part.trim().trim_end_matches('°').trim();
             plain.parse().ok().filter(|x: &f64| x.is_finite())
         };
-        let sigma = number(sigma).filter(|s| *s >= 0.0)?;
-        Some(Angle([number(angle)?, sigma]))
+        let angle = numbers::within(numbers::ANGLE_DEG, number(angle))?;
+        let sigma = numbers::within([0.0, 180.0], number(sigma))?;
+        Some(Angle([angle, sigma]))
     };
     parsed().ok_or_else(|| {
         format!(

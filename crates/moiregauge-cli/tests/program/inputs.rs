@@ -65,7 +65,7 @@ fn what_looks_like_a_scan_is_named() {
     assert!(of("scan.007.spm").contains("empty"));
     assert!(of("scan.008.spm").contains("damaged"));
     assert!(of("scan.002").contains("Remember"));
-    assert_eq!(results["inputs"].as_array().unwrap().len(), 2);
+    assert_eq!(results["provenance"]["inputs"].as_array().unwrap().len(), 2);
     let mut info = program();
     info.arg("info").arg(&scans);
     let mut convert = program();

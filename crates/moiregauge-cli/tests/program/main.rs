@@ -15,6 +15,7 @@ mod round_trip;
 mod same_bytes;
 mod sessions;
 mod several;
+mod several_images;
 mod stripes;
 mod surveys;
 mod validation;

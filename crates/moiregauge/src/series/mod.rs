@@ -12,6 +12,7 @@ mod domain_mapping;
 mod doubts;
 mod group;
 mod illustrate;
+mod images;
 mod mapping;
 mod measure;
 mod moires;
@@ -32,6 +33,7 @@ pub use corrected::{CorrectedImage, corrected_images, nominal_geometry, on_grid}
 pub use domain_mapping::domains_of_scan;
 pub use group::natural_order;
 pub use illustrate::illustrate;
+pub use images::{image_choice, unusual_channels};
 pub use mapping::{LineMap, MapError, MapMethod, map_scan};
 pub use measure::{
     BYTES_PER_PIXEL, MeasureError, MeasuredLine, MeasuredScan, measure_known, measure_moires,

@@ -269,7 +269,7 @@ impl Sample {
 }
 
 /// Frames larger than this hold more pixels than any instrument writes.
-const MOST_PIXELS: usize = 16_384;
+pub const MOST_PIXELS: usize = 16_384;
 
 impl Simulation {
     /// Refuses what no instrument can do.
@@ -305,9 +305,9 @@ impl Simulation {
         ];
         for (setting, value) in positive {
             require(
-                value.is_finite() && value > 0.0,
+                (1e-9..=1e9).contains(&value),
                 setting,
-                "a number > 0",
+                "a number > 0, from 1e-9 to 1e9",
                 &value,
             )?;
         }
@@ -325,9 +325,9 @@ impl Simulation {
         ];
         for (setting, value) in not_negative {
             require(
-                value.is_finite() && value >= 0.0,
+                (0.0..=1e9).contains(&value),
                 setting,
-                "a number ≥ 0",
+                "a number ≥ 0, up to 1e9",
                 &value,
             )?;
         }
@@ -364,9 +364,9 @@ impl Simulation {
         ];
         for (setting, pair) in pairs {
             require(
-                pair.iter().all(|x| x.is_finite()),
+                pair.iter().all(|x| x.abs() <= 1e9),
                 setting,
-                "finite numbers",
+                "finite numbers, up to 1e9",
                 &pair,
             )?;
         }
