@@ -16,7 +16,7 @@ pub(crate) use chain::{
 };
 pub(crate) use channel::channel_names;
 pub(crate) use files::write_all;
-pub(crate) use orientation::{Angle, DirectionArg, parse_angle};
+pub(crate) use orientation::{Angle, DirectionArg, SenseArg, parse_angle};
 pub(crate) use summary::{caveats as caveat_lines, failures, summary};
 
 use crate::info::inputs;

@@ -174,6 +174,7 @@ fn survey(
             .with_context(|| path.display().to_string())?;
         let file = large.input.file.clone();
         caveats.extend(large.caveats.iter().cloned());
+        caveats.extend(plan.caveats.iter().cloned());
         let drift = if plan.drift_corrected {
             "corrected for the drift that was given"
         } else if settings.drift.is_some() {
@@ -259,6 +260,8 @@ fn together(
             bail!("nothing could be analysed");
         }
     };
+    // The maps read the lattice under the name that the analysis found.
+    let settings = &analysis.named_settings();
     let used = || {
         analysis
             .sets

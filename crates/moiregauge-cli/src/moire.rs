@@ -10,7 +10,7 @@ use moiregauge::budget::{Budget, Statistical};
 use moiregauge::cell::{MoireCell, WavelengthMeaning, from_wavelengths};
 use moiregauge::lattice::LatticeVectors;
 use moiregauge::material::Material;
-use moiregauge::readings::Readings;
+use moiregauge::readings::{Readings, WaveStrengths};
 use moiregauge::settings::Settings;
 use moiregauge::strain::{Stacking, moire_of, twist_strain};
 use moiregauge_report::{CellResult, MoireDocument, cell_figure};
@@ -44,6 +44,8 @@ pub(crate) fn run(args: &MoireArgs) -> anyhow::Result<ExitCode> {
         },
     };
     let cell = MoireCell::new(&lattice.basis).context("the two vectors are parallel")?;
+    // Names of waves are those of the vectors that are shown.
+    let lattice = cell.pair_of(&lattice);
     let forward = matches!(asked, Question::Forward(_));
     let read = if forward {
         None
@@ -117,6 +119,12 @@ fn read(
         sensor: Matrix4::zeros(),
     };
     let budget = Budget::new(lattice, &found, &statistical, settings);
-    let readings = Readings::new(lattice, &found, &budget, settings);
+    let readings = Readings::new(
+        lattice,
+        &found,
+        &budget,
+        &WaveStrengths::default(),
+        settings,
+    );
     Ok((found, readings))
 }

@@ -183,7 +183,7 @@ impl AnalyzeArgs {
         };
         let own = config::own_materials(self.materials.as_deref())?;
         self.layers(&mut s, &own)?;
-        s.lattice_angle = self.orientation.known().or(s.lattice_angle);
+        self.orientation.apply(&mut s);
         let by_user = [self.lattice_constant, self.poisson_ratio];
         if by_user.iter().any(Option::is_some) {
             anyhow::ensure!(

@@ -12,7 +12,7 @@ use crate::caveat::Caveat;
 use crate::chi2::enlargement;
 use crate::joint::JointFit;
 use crate::lattice::LatticeVectors;
-use crate::readings::{Readings, caveats as about_readings};
+use crate::readings::{Readings, WaveStrengths, caveats as about_readings};
 use crate::settings::Settings;
 
 /// Wavelengths that differ by more than this are not of the same lattice.
@@ -30,6 +30,7 @@ pub(super) fn combine(
     sets: &[SetAnalysis],
     joint: Option<(&[&MeasuredScan], Matrix2<f64>)>,
     settings: &Settings,
+    strengths: &WaveStrengths,
     caveats: &mut Vec<Caveat>,
 ) -> Option<Combined> {
     let means: Vec<&SetMean> = sets.iter().filter_map(|s| s.mean.as_ref()).collect();
@@ -103,7 +104,7 @@ pub(super) fn combine(
     }
     let twist_strain = moire(&lattice, settings)?;
     let budget = Budget::new(&lattice, &twist_strain, &statistical, settings);
-    let readings = Readings::new(&lattice, &twist_strain, &budget, settings);
+    let readings = Readings::new(&lattice, &twist_strain, &budget, strengths, settings);
     if sets.len() > 1 {
         let found = about_readings("analysis", &lattice, &twist_strain, &readings, settings);
         caveats.extend(found);

@@ -15,6 +15,7 @@ mod illustrate;
 mod mapping;
 mod measure;
 mod moires;
+mod naming;
 mod overlap;
 mod positions;
 mod scanner;
@@ -43,6 +44,8 @@ pub use surveying::{ReadBlock, SurveyError, SurveyPlan};
 
 use nalgebra::Matrix2;
 
+use naming::Named;
+
 use crate::analysis::Analysis;
 use crate::caveat::Caveat;
 use crate::lattice::reciprocal::canonical;
@@ -57,6 +60,8 @@ pub fn analyse(scans: Vec<MeasuredScan>, settings: &Settings) -> Analysis {
     let mut scans = scans;
     exclude(&mut scans, settings, &mut caveats);
     let groups = group::groups(scans, settings.grouping);
+    let used: Vec<&MeasuredScan> = groups.iter().flat_map(|group| &group.scans).collect();
+    let named = Named::new(&used, settings);
     let mut reference: Option<Matrix2<f64>> = None;
     let mut sets = Vec::with_capacity(groups.len());
     let mut joint_scans = Vec::new();
@@ -75,7 +80,8 @@ pub fn analyse(scans: Vec<MeasuredScan>, settings: &Settings) -> Analysis {
         sets.push(set::analyse_set(
             &mut group,
             &reference,
-            settings,
+            &named.settings,
+            &named.strengths,
             index,
             &mut caveats,
         ));
@@ -86,7 +92,13 @@ pub fn analyse(scans: Vec<MeasuredScan>, settings: &Settings) -> Analysis {
     }
     let all: Vec<&MeasuredScan> = joint_scans.iter().collect();
     let joint = reference.map(|reference| (all.as_slice(), reference));
-    let combined = combine::combine(&sets, joint, settings, &mut caveats);
+    let combined = combine::combine(
+        &sets,
+        joint,
+        &named.settings,
+        &named.strengths,
+        &mut caveats,
+    );
     Analysis {
         settings: settings.clone(),
         sets,

@@ -25,19 +25,20 @@ use crate::drift::{Observation, at_known_drift, common_lattice, monte_carlo, sol
 use crate::geometry::mean_and_spread;
 use crate::lattice::LatticeVectors;
 use crate::lattice::reciprocal::real_from_reciprocal;
-use crate::readings::Readings;
+use crate::readings::{Readings, WaveStrengths};
 use crate::settings::{GivenDrift, Settings};
 use crate::strain::{TwistStrain, draws};
 
 /// nm/min → nm/s.
 const PER_MINUTE: f64 = 1.0 / 60.0;
 
-/// Everything about one set but its illustration. `first_index` numbers its scans for the draws.
+/// Everything about one set but its illustration; the settings name the waves of the lattice. `first_index` numbers its scans for the draws.
 /// Scans that are left out by rule are marked in the group.
 pub(super) fn analyse_set(
     group: &mut Group,
     reference: &Matrix2<f64>,
     settings: &Settings,
+    strengths: &WaveStrengths,
     first_index: u64,
     caveats: &mut Vec<Caveat>,
 ) -> SetAnalysis {
@@ -96,7 +97,7 @@ pub(super) fn analyse_set(
     });
     draw(&mut scans, settings, first_index);
     let of_set = || scans.iter().filter(|s| s.excluded.is_none());
-    let uncorrected = without_drift(&all, &scans, kept.len(), settings);
+    let uncorrected = without_drift(&all, &scans, kept.len(), settings, strengths);
     let mean = solved.as_ref().and_then(|s| {
         let of = |s: &ScanAnalysis| (s.twist_strain, s.drift_corrected.unwrap_or(s.sensor));
         set_mean(
@@ -104,6 +105,7 @@ pub(super) fn analyse_set(
             &s.statistical,
             of_set().map(of),
             settings,
+            strengths,
         )
     });
     let drift = solved.map(|s| s.drift);
@@ -140,6 +142,7 @@ fn without_drift(
     scans: &[ScanAnalysis],
     used: usize,
     settings: &Settings,
+    strengths: &WaveStrengths,
 ) -> Option<SetMean> {
     let common = common_lattice(all, &Vector2::zeros(), &Matrix2::zeros()).ok()?;
     let [image, sensor] = at_known_drift(all)?;
@@ -154,7 +157,13 @@ fn without_drift(
     let (common, statistical) = moire::enlarged(common, &statistical, scale);
     let of_set = scans.iter().filter(|s| s.excluded.is_none());
     let of = |s: &ScanAnalysis| (s.twist_strain_sensor, s.sensor);
-    set_mean((common, scale), &statistical, of_set.map(of), settings)
+    set_mean(
+        (common, scale),
+        &statistical,
+        of_set.map(of),
+        settings,
+        strengths,
+    )
 }
 
 /// Draws twist and strain of every scan.
@@ -350,6 +359,7 @@ fn set_mean(
     statistical: &Statistical,
     scans: impl Iterator<Item = (Option<TwistStrain>, LatticeVectors)>,
     settings: &Settings,
+    strengths: &WaveStrengths,
 ) -> Option<SetMean> {
     let twist_strain = moire(&lattice, settings)?;
     let (singles, lattices): (Vec<_>, Vec<_>) = scans.unzip();
@@ -367,7 +377,7 @@ fn set_mean(
     });
     let budget = Budget::new(&lattice, &twist_strain, statistical, settings);
     Some(SetMean {
-        readings: Readings::new(&lattice, &twist_strain, &budget, settings),
+        readings: Readings::new(&lattice, &twist_strain, &budget, strengths, settings),
         budget,
         lattice,
         twist_strain,
