@@ -19,6 +19,7 @@ mod several;
 mod stripes;
 mod surveys;
 mod validation;
+mod zz_schema;
 /// Made-up sessions of Omicron Matrix, as the tests of the reader have them.
 #[path = "../../../spmfile/src/matrix/tests/writer.rs"]
 mod writer;

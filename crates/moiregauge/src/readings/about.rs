@@ -196,11 +196,11 @@ fn about_tensor(
             "isotropic-strain-found",
             format!(
                 "with the orientation of layer {} the layers differ in size by {}, more than uniaxial strain brings \
-                 with it: `twist_deg` assumes that there is none and is {} less than the twist of `strain_tensor`, \
-                 which does not",
+                 with it: `twist_deg` assumes that there is none, and differs by {} from the magnitude of the twist of \
+                 `strain_tensor`, which does not",
                 known_orientation(settings).map_or(1, |known| known.layer),
                 shown.join(", or for the other sense of the twist by "),
-                degrees(best.twist.abs() - found.twist.abs()),
+                degrees((best.twist.abs() - found.twist.abs()).abs()),
             ),
         );
     }
