@@ -9,7 +9,11 @@ fn the_published_method_is_the_whole_protocol() {
     let scans = simulate(folder.path(), &["--pixels", "128", "--scans", "4"]);
     let with = |name: &str, options: &[&str]| {
         let out = folder.path().join(name);
-        succeed(analyze(&scans, &out).args(["--quiet", "--method", "paper"]).args(options));
+        succeed(
+            analyze(&scans, &out)
+                .args(["--quiet", "--method", "paper"])
+                .args(options),
+        );
         results(&out)
     };
     let found = with("plain", &[]);
@@ -23,7 +27,10 @@ fn the_published_method_is_the_whole_protocol() {
         let (value, sigma) = estimate(drift, &format!("/{axis}_nm_per_min"));
         // The drift is the mean of the draws, not a least-squares solution beside them; rounding is all that may differ.
         let of_draws = number(drift, &format!("/monte_carlo/{axis}_nm_per_min/value"));
-        assert!((value - of_draws).abs() < 1e-9 * sigma, "{value} {of_draws}");
+        assert!(
+            (value - of_draws).abs() < 1e-9 * sigma,
+            "{value} {of_draws}"
+        );
     }
     // Draws of twist and strain come from the 48 equations, and scatter about the scan's own solution.
     let scan = &found["sets"][0]["scans"][0];

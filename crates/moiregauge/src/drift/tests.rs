@@ -299,8 +299,8 @@ fn successive_scans_are_compared() {
         let (mut sum, mut count) = (0.0, 0.0);
         for pair in scans.windows(2) {
             for k in 0..6 {
-                let [a, b] = [&pair[0], &pair[1]]
-                    .map(|s| matrix(s, d).try_inverse().unwrap() * s.peaks[k]);
+                let [a, b] =
+                    [&pair[0], &pair[1]].map(|s| matrix(s, d).try_inverse().unwrap() * s.peaks[k]);
                 sum += (a - b).norm_squared();
                 count += 1.0;
             }
@@ -336,7 +336,10 @@ fn published_draws_scatter_as_their_inputs() {
     let drift = Vector2::new(0.5, -0.15) * NM_PER_MIN;
     let mut scans = noisy_scans(6, 0.02, &drift);
     for scan in &mut scans {
-        scan.velocity_sigmas = [0.05 * scan.fast_velocity.abs(), 0.05 * scan.slow_velocity.abs()];
+        scan.velocity_sigmas = [
+            0.05 * scan.fast_velocity.abs(),
+            0.05 * scan.slow_velocity.abs(),
+        ];
     }
     let minimum = successive_drift(&scans).unwrap();
     let mut expected = Matrix2::zeros();
@@ -352,7 +355,11 @@ fn published_draws_scatter_as_their_inputs() {
         }
         let mut moved = scans.clone();
         moved[i].slow_velocity *= 1.0 + 1e-4;
-        add(&moved, 1e-4 * scans[i].slow_velocity, 0.05 * scans[i].slow_velocity);
+        add(
+            &moved,
+            1e-4 * scans[i].slow_velocity,
+            0.05 * scans[i].slow_velocity,
+        );
     }
     let draws = successive_draws(&scans, 4000, 1, "drift").unwrap();
     for i in 0..2 {

@@ -18,7 +18,10 @@ use crate::strain::published_draws;
 /// The scans as the published estimate wants them: six peaks, signed velocities in laboratory axes.
 pub(super) fn paper_scans(scans: &[&MeasuredScan], all: &[Observation]) -> Vec<PaperScan> {
     let lines = scans.iter().flat_map(|s| &s.lines);
-    lines.zip(all).filter_map(|(l, o)| paper_scan(l, o)).collect()
+    lines
+        .zip(all)
+        .filter_map(|(l, o)| paper_scan(l, o))
+        .collect()
 }
 
 fn paper_scan(line: &MeasuredLine, seen: &Observation) -> Option<PaperScan> {
@@ -40,7 +43,9 @@ fn paper_scan(line: &MeasuredLine, seen: &Observation) -> Option<PaperScan> {
         slow_axis,
         fast_velocity,
         slow_velocity,
-        velocity_sigmas: line.speeds.map(|v| if v.sigma > 0.0 { v.sigma } else { 0.0 }),
+        velocity_sigmas: line
+            .speeds
+            .map(|v| if v.sigma > 0.0 { v.sigma } else { 0.0 }),
         line: line.line,
     })
 }
