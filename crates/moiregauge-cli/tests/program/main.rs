@@ -8,6 +8,7 @@ mod layers;
 mod maps;
 mod names;
 mod odd_files;
+mod published;
 mod real_images;
 mod refusals;
 mod results;
@@ -19,7 +20,6 @@ mod several;
 mod stripes;
 mod surveys;
 mod validation;
-mod zz_schema;
 /// Made-up sessions of Omicron Matrix, as the tests of the reader have them.
 #[path = "../../../spmfile/src/matrix/tests/writer.rs"]
 mod writer;

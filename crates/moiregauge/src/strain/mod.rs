@@ -25,6 +25,7 @@ mod limit;
 mod local;
 mod names;
 mod other_models;
+mod paper;
 mod tensor;
 mod twist_strain;
 
@@ -37,5 +38,6 @@ pub use forward::{Stacking, moire_lattice, moire_of, naive_twist};
 pub(crate) use local::FixedBranch;
 pub use names::LatticeName;
 pub(crate) use other_models::Reference;
+pub use paper::published_draws;
 pub use tensor::{Orientation, Split, StrainTensor, strain_tensors};
 pub use twist_strain::TwistStrain;
