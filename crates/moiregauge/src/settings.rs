@@ -184,6 +184,8 @@ pub struct Settings {
     /// `material` and `substrate`.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub moire_layers: Vec<MoireLayers>,
+    /// Whether somebody chose the layers; what nobody chose is said to be assumed.
+    pub layers_chosen: bool,
     /// The orientation of one of the layers, if it is known: tells isotropic strain from twist.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lattice_angle: Option<KnownOrientation>,
@@ -233,6 +235,12 @@ impl Settings {
         own
     }
 
+    /// Whether nobody chose the layers: they are the default, and nothing says that they are meant.
+    pub fn layers_are_assumed(&self) -> bool {
+        let defaults = self.substrate.is_none() && self.moire_layers.is_empty();
+        !self.layers_chosen && defaults && self.material == Material::graphene()
+    }
+
     /// The two layers: `material` on itself or on the `substrate`.
     pub fn bilayer(&self) -> Bilayer<'_> {
         Bilayer {
@@ -253,6 +261,7 @@ impl Default for Settings {
             moires: 1,
             substrate: None,
             moire_layers: Vec::new(),
+            layers_chosen: false,
             lattice_angle: None,
             strain_convention: StrainConvention::RealSpace,
             grouping: Grouping::Auto,
