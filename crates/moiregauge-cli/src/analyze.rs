@@ -12,7 +12,8 @@ use std::process::ExitCode;
 
 pub(crate) use args::{AnalyzeArgs, BackgroundArg, ConventionArg, LineArg, MethodArg};
 pub(crate) use chain::{
-    Outcome, Reading, analyse_files, hexadecimal, measure_file, progress, read, with_hint,
+    Outcome, Reading, analyse_files, given_again, hexadecimal, measure_file, progress, read,
+    with_hint,
 };
 pub(crate) use channel::channel_names;
 pub(crate) use files::write_all;
@@ -21,6 +22,7 @@ pub(crate) use summary::{caveats as caveat_lines, failures, summary};
 
 use crate::info::inputs;
 use crate::say::say;
+use moiregauge::series::refusal;
 use moiregauge_report::write_report;
 
 /// Analyses the files and writes the results.
@@ -64,6 +66,13 @@ pub(crate) fn run(args: &AnalyzeArgs) -> anyhow::Result<ExitCode> {
             provenance.inputs.extend(files.iter().cloned());
         }
     }
+    let refused = outcomes.iter().find_map(|o| refusal(&o.analysis)).cloned();
+    if let Some(why) = refused
+        .as_ref()
+        .filter(|why| why.code == "everything-excluded")
+    {
+        anyhow::bail!("{}", why.message);
+    }
     let folders = files::folders(&args.out, outcomes.len());
     let mut failed = Vec::new();
     for (number, (outcome, out)) in outcomes.iter().zip(&folders).enumerate() {
@@ -105,7 +114,10 @@ pub(crate) fn run(args: &AnalyzeArgs) -> anyhow::Result<ExitCode> {
         }
     }
     eprint!("{}", summary::failures(&failed));
-    Ok(if failed.is_empty() {
+    if let Some(why) = &refused {
+        eprintln!("error: {}: {}", why.place, why.message);
+    }
+    Ok(if failed.is_empty() && refused.is_none() {
         ExitCode::SUCCESS
     } else {
         ExitCode::FAILURE

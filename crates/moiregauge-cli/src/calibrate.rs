@@ -15,7 +15,7 @@ use moiregauge::settings::{Grouping, Settings};
 use moiregauge_report::{FailedInput, InputFile};
 use rayon::prelude::*;
 
-use crate::analyze::{BackgroundArg, LineArg, Reading, failures, read, with_hint};
+use crate::analyze::{BackgroundArg, LineArg, Reading, failures, given_again, read, with_hint};
 use crate::config;
 use crate::info::inputs;
 use crate::input::{Known, KnownArgs};
@@ -117,6 +117,7 @@ pub(crate) fn run(args: &CalibrateArgs) -> anyhow::Result<ExitCode> {
         ..defaults
     };
     let (inputs, mut failed) = inputs(&args.paths);
+    let (inputs, repeated) = moiregauge_pipeline::distinct(&inputs);
     let known = args.known.of(&inputs);
     let bar = if args.quiet {
         ProgressBar::hidden()
@@ -163,7 +164,8 @@ pub(crate) fn run(args: &CalibrateArgs) -> anyhow::Result<ExitCode> {
         lattice.name
     );
     let sigma = args.drift_sigma / 60.0;
-    let found = moiregauge::series::calibrate(scans, &lattice, sigma, Grouping::Auto)?;
+    let mut found = moiregauge::series::calibrate(scans, &lattice, sigma, Grouping::Auto)?;
+    found.caveats.extend(given_again(&repeated));
     if !args.quiet {
         say(&words::summary(&found, &lattice))?;
     }
@@ -214,6 +216,7 @@ fn measured(
         error
     })?;
     measured.caveats.extend(caveats);
+    measured.digest = Some(input.sha256.clone());
     Ok((measured, input))
 }
 

@@ -42,6 +42,7 @@ pub(crate) fn run(args: &DemoArgs) -> anyhow::Result<ExitCode> {
     let inputs: Vec<PathBuf> = expand(&folders).into_iter().flatten().collect();
     let settings = Settings {
         seed: args.seed,
+        layers_chosen: true,
         ..Settings::default()
     };
     let analysed = analyse_files(

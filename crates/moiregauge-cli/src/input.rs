@@ -81,7 +81,7 @@ pub(crate) struct Known {
 impl KnownArgs {
     /// What is known of these files.
     pub(crate) fn of(&self, inputs: &[PathBuf]) -> Known {
-        let mut order = inputs.to_vec();
+        let (mut order, _) = moiregauge_pipeline::distinct(inputs);
         order.sort_by(|a, b| natural_order(&a.to_string_lossy(), &b.to_string_lossy()));
         Known {
             args: self.clone(),

@@ -17,12 +17,14 @@ use moiregauge::caveat::Caveat;
 use moiregauge::map::{
     DriftChange, LatticeMap, Resolution, TwistStrainMap, combine, drift_change, register,
 };
-use moiregauge::series::{LineMap, MapMethod, SurveyPlan, domains_of_scan, map_scan};
+use moiregauge::series::{
+    LineMap, MapMethod, SurveyPlan, about_repeat, domains_of_scan, map_scan, refusal,
+};
 use moiregauge::settings::Settings;
 use moiregauge_report::{FailedInput, Provenance};
 use spmfile::FrameDirection;
 
-use crate::analyze::{AnalyzeArgs, Outcome, analyse_files, failures, read};
+use crate::analyze::{AnalyzeArgs, Outcome, analyse_files, failures, given_again, read};
 use crate::info::inputs;
 use crate::input::Known;
 use output::{Made, write};
@@ -160,10 +162,16 @@ fn survey(
         return Ok(None);
     }
     let (out, loud) = (args.analyze.out(), args.analyze.is_loud());
-    let (mut maps, mut images, mut caveats) = (Vec::new(), Vec::new(), Vec::new());
+    let (inputs, again) = moiregauge_pipeline::distinct(inputs);
+    let (mut maps, mut images, mut caveats) = (Vec::new(), Vec::new(), given_again(&again));
     let (mut read, mut plans) = (Vec::new(), Vec::<(survey::Large, SurveyPlan)>::new());
-    for path in inputs {
+    for path in &inputs {
         let large = open(path, true)?.context("no image")?;
+        let same = |(known, _): &&(survey::Large, _)| known.input.sha256 == large.input.sha256;
+        if let Some((known, _)) = plans.iter().find(same) {
+            caveats.push(about_repeat(&large.input.file, &known.input.file));
+            continue;
+        }
         let (map, plan) = large
             .map(
                 (settings, resolution),
@@ -260,6 +268,9 @@ fn together(
             bail!("nothing could be analysed");
         }
     };
+    if let Some(why) = refusal(&analysis).filter(|why| why.code == "everything-excluded") {
+        bail!("{}", why.message);
+    }
     // The maps read the lattice under the name that the analysis found.
     let settings = &analysis.named_settings();
     let used = || {

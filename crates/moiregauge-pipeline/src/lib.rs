@@ -2,3 +2,7 @@
 //!
 //! Files and settings, but no arguments of a program, no printing and no physics. Front ends (the program, a
 //! Python package, a page) stand on this crate.
+
+mod twice;
+
+pub use twice::{Repeated, distinct};

@@ -7,10 +7,11 @@ use indicatif::{ProgressBar, ProgressStyle};
 use moiregauge::analysis::Analysis;
 use moiregauge::caveat::Caveat;
 use moiregauge::series::{
-    MeasureError, MeasuredScan, Window, analyse, choose_channel, common_window, illustrate,
-    measure_moires, sorted_moires,
+    MeasureError, MeasuredScan, Window, about_repeat, analyse, choose_channel, common_window,
+    illustrate, measure_moires, sorted_moires,
 };
 use moiregauge::settings::Settings;
+use moiregauge_pipeline::{Repeated, distinct};
 use moiregauge_report::{FailedInput, InputFile, Provenance};
 use rayon::prelude::*;
 use sha2::{Digest as _, Sha256};
@@ -38,6 +39,8 @@ pub(crate) fn analyse_files(
     illustrated: bool,
     loud: bool,
 ) -> Result<Vec<Outcome>, Vec<FailedInput>> {
+    let (inputs, repeated) = distinct(inputs);
+    let inputs = inputs.as_slice();
     let window = match settings.overlap.then(|| overlap(inputs, settings, known)) {
         None => None,
         Some(Some(window)) => Some(window),
@@ -94,6 +97,7 @@ pub(crate) fn analyse_files(
         .map(|(moire, scans)| {
             let settings = &settings.of_moire(moire);
             let mut analysis = analyse(scans, settings);
+            analysis.caveats.extend(given_again(&repeated));
             analysis
                 .caveats
                 .extend(other.as_ref().map(channel::Other::caveat));
@@ -111,6 +115,17 @@ pub(crate) fn analyse_files(
             }
         });
     Ok(outcomes.collect())
+}
+
+/// What has to be said of files that were named more than once.
+pub(crate) fn given_again(repeated: &[Repeated]) -> Vec<Caveat> {
+    let words = |again: &Repeated| {
+        let of = again.of.display().to_string();
+        about_repeat(&again.path.display().to_string(), &of)
+    };
+    let mut caveats: Vec<Caveat> = repeated.iter().map(words).collect();
+    caveats.dedup();
+    caveats
 }
 
 fn measure_all(
@@ -166,6 +181,7 @@ pub(crate) fn measure_file(
     for measured in &mut moires {
         measured.caveats.extend(caveats.iter().cloned());
         measured.set.clone_from(&set);
+        measured.digest = Some(input.sha256.clone());
     }
     Ok((moires, input))
 }

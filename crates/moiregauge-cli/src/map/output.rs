@@ -13,8 +13,8 @@ use moiregauge_report::results::{
     quantities,
 };
 use moiregauge_report::{
-    Provenance, figure_files, map_figures, map_page, map_scan, map_scans, map_tables, plus_minus,
-    two_digits,
+    Provenance, figure_files, layers, map_figures, map_page, map_scan, map_scans, map_tables,
+    plus_minus, two_digits,
 };
 use spmfile::{LineDirection, WritableFormat};
 
@@ -162,6 +162,9 @@ pub(super) fn image(
 /// What is said on the screen.
 pub(super) fn summary(results: &MapResults) -> String {
     let mut text = String::new();
+    if results.stripes.is_none() {
+        let _ = writeln!(text, "Layers: {}", layers(&results.settings));
+    }
     let _ = writeln!(
         text,
         "{} × {} nodes, window {} nm (resolution {} nm)",

@@ -4,6 +4,7 @@ mod acceptance;
 mod calibration;
 mod common;
 mod formats;
+mod identity;
 mod layers;
 mod maps;
 mod names;
