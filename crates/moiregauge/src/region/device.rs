@@ -9,6 +9,7 @@ use rayon::prelude::*;
 
 use super::Region;
 use super::correlation::pairs;
+use super::smoothing::Slopes;
 use super::statistics::{RegionMean, RegionStatistics};
 use crate::map::{Grid, Mask, TwistStrainMap};
 
@@ -70,7 +71,9 @@ pub fn uniform_areas(map: &TwistStrainMap, search: &DeviceSearch) -> Vec<Device>
                 if sum[0] < search.good * all || sum[0] < 1.0 {
                     return None;
                 }
-                let below = RegionMean::of_sums(sum, &pairs)?.below;
+                let [good, twist, squares, noise, moving @ ..] = sum;
+                let values = [good, twist, squares, noise];
+                let below = RegionMean::of_sums(values, (&sums.slopes, moving), &pairs)?.below;
                 below.is_finite().then_some((below, node))
             })
             .collect();
@@ -152,10 +155,12 @@ impl Shape {
     }
 }
 
-/// Sums along each row of nodes: good nodes, their twist, its square and the variance of its noise.
+/// Sums along each row of nodes: good nodes, their twist, its square and the variance of its noise; those with a slope,
+/// its square and what noise adds to that.
 struct RunningSums {
     size: [usize; 2],
-    sums: Vec<[f64; 4]>,
+    sums: Vec<[f64; 7]>,
+    slopes: Slopes,
 }
 
 impl RunningSums {
@@ -169,28 +174,36 @@ impl RunningSums {
             });
         // Against the mean, so that squares keep their digits.
         let mean = total / count.max(1.0);
+        let slopes = Slopes::new(map);
+        let twist = |node: usize| {
+            let twist = map.twist.at(node);
+            [twist.value, twist.sigma]
+        };
         let mut sums = Vec::with_capacity(size[1] * (size[0] + 1));
         for row in 0..size[1] {
-            let mut sum = [0.0; 4];
+            let mut sum = [0.0; 7];
             sums.push(sum);
             for node in row * size[0]..(row + 1) * size[0] {
                 if good(node) {
-                    let twist = map.twist.at(node);
-                    let value = twist.value - mean;
-                    let new = [1.0, value, value * value, twist.sigma * twist.sigma];
+                    let [value, sigma] = twist(node);
+                    let value = value - mean;
+                    let slope = slopes.at(map, node, &twist);
+                    let [known, square, noise] = slope.map_or([0.0; 3], |[s, n]| [1.0, s, n]);
+                    let variance = sigma * sigma;
+                    let new = [1.0, value, value * value, variance, known, square, noise];
                     sum.iter_mut().zip(new).for_each(|(s, n)| *s += n);
                 }
                 sums.push(sum);
             }
         }
-        Self { size, sums }
+        Self { size, sums, slopes }
     }
 
     /// The sums over a box about a node and the number of its nodes; `None` where it leaves the map.
-    fn within(&self, shape: &Shape, node: usize) -> Option<([f64; 4], f64)> {
+    fn within(&self, shape: &Shape, node: usize) -> Option<([f64; 7], f64)> {
         let [columns, rows] = self.size.map(|n| n as i64);
         let (column, row) = (node as i64 % columns, node as i64 / columns);
-        let (mut sum, mut all) = ([0.0; 4], 0);
+        let (mut sum, mut all) = ([0.0; 7], 0);
         for &(up, [first, last]) in &shape.rows {
             let (row, first, last) = (row + up, column + first, column + last);
             if !(0..rows).contains(&row) || first < 0 || last >= columns {
@@ -201,7 +214,7 @@ impl RunningSums {
                 self.sums[(line + first) as usize],
                 self.sums[(line + last + 1) as usize],
             );
-            for i in 0..4 {
+            for i in 0..7 {
                 sum[i] += to[i] - from[i];
             }
             all += last - first + 1;

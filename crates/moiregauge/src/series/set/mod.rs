@@ -79,7 +79,8 @@ pub(super) fn analyse_set(
                 let own = fit.as_ref().and_then(|fit| joint::velocity_of(fit, scan));
                 own.unwrap_or((s.drift.velocity, s.drift.covariance))
             });
-            scan_analysis(scan, seen, reference, drift, settings)
+            let motion = drift.and_then(|(v, _)| joint::motion_of(fit.as_ref(), scan, v));
+            scan_analysis(scan, seen, reference, (drift, motion), settings)
         })
         .collect();
     let checks = fit.as_ref().map(|fit| {
