@@ -38,11 +38,9 @@ pub struct RegionMeanResult {
     pub spread: Option<f64>,
     /// The same without what noise adds.
     pub spread_corrected: Option<f64>,
-    /// What the spread of the lattice does not exceed, 95 %: noise is in it, and what the window may hide of changes over
-    /// six windows and more (`spread_widening`).
+    /// What the spread does not exceed, 95 %, noise and what the window hides (`spread_widening`) accounted for.
     pub spread_below_95: Option<f64>,
-    /// Factor by which the window may have made the spread smaller, as the slopes of the map tell; in `spread_below_95`.
-    #[serde(default)]
+    /// Factor by which the window may have made the spread smaller, as the curvature of the map tells.
     pub spread_widening: Option<f64>,
     /// Root mean square of the errors of the nodes.
     pub noise: Option<f64>,
@@ -156,8 +154,7 @@ pub struct WantedResult {
     pub measured_percent: Option<f64>,
     /// Share expected without noise.
     pub corrected_percent: Option<f64>,
-    /// How far the window may have moved that share, as the slopes of the map tell.
-    #[serde(default)]
+    /// How far the window may have moved that share, as the curvature of the map tells.
     pub blur_percent: Option<f64>,
     /// Share that is within by two σ of its own.
     pub certain_percent: Option<f64>,

@@ -383,12 +383,12 @@ mod tests {
         for q in [[0.0, 0.0], [0.41, -0.23], [-2.3, 0.02], [5.9, 3.3]] {
             let q = Vector2::from(q);
             let mut slow = Complex64::default();
-            for row in 0..rows {
-                for column in 0..columns {
+            for (row, wy) in wy.iter().enumerate() {
+                for (column, wx) in wx.iter().enumerate() {
                     if image.values[row * columns + column].is_finite() {
                         let x = column as f64 - (columns as f64 - 1.0) / 2.0;
                         let y = row as f64 - (rows as f64 - 1.0) / 2.0;
-                        let weight = wx[column] * wy[row];
+                        let weight = wx * wy;
                         slow += Complex64::from_polar(weight, -(q.x * x + q.y * y));
                     }
                 }

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix2, Matrix4, Vector2};
 
 use super::correlation::{Pairs, pairs};
-use super::smoothing::Slopes;
+use super::smoothing::{Bends, Bent};
 use super::{Region, mean_wavelength};
 use crate::map::{Mask, Plane, TwistStrainMap};
 use crate::strain::TwistStrain;
@@ -28,7 +28,7 @@ pub struct RegionMean {
     /// What the spread of the lattice does not exceed, with 95 % confidence as far as noise goes, for changes over no
     /// less than some six windows: noise and `widening` are in it.
     pub below: f64,
-    /// Factor by which the window may have made the spread smaller, as the slopes of the map tell.
+    /// Factor by which the window may have made the spread smaller, as the curvature of the map tells.
     pub widening: f64,
     /// Root mean square of the errors of the nodes.
     pub noise: f64,
@@ -36,10 +36,10 @@ pub struct RegionMean {
 
 impl RegionMean {
     /// From sums of weights, values, their squares and variances of their noise, and those of
-    /// [`Slopes::widening`].
+    /// [`Bends::widening`].
     pub(super) fn of_sums(
         [weight, sum, squares, variances]: [f64; 4],
-        (slopes, moving): (&Slopes, [f64; 3]),
+        (bends, bent): (&Bends, &Bent),
         pairs: &Pairs,
     ) -> Option<Self> {
         if !(weight > 0.0) {
@@ -50,7 +50,7 @@ impl RegionMean {
         let noise = variances / weight;
         let own = variance - noise * (1.0 - pairs.mean).max(0.0);
         let doubt = ((2.0 * noise * noise + 4.0 * own.max(0.0) * noise) * pairs.square).sqrt();
-        let widening = slopes.widening(own.max(0.0), doubt, moving);
+        let widening = bends.widening([own.max(0.0), doubt], mean, bent);
         Some(Self {
             mean,
             sigma: (noise * pairs.mean).sqrt(),
@@ -89,7 +89,7 @@ struct Area<'a> {
     /// Nodes with weights that make `½ w² ∇²` of a quantity, mean over the area, out of its values.
     curvature: Vec<(usize, f64)>,
     curvature_pairs: Pairs,
-    slopes: Slopes,
+    bends: Bends,
 }
 
 impl<'a> Area<'a> {
@@ -102,7 +102,7 @@ impl<'a> Area<'a> {
         Self {
             pairs: pairs(&map.grid, &nodes, map.window_nm),
             curvature_pairs: pairs(&map.grid, &curvature, map.window_nm),
-            slopes: Slopes::new(map),
+            bends: Bends::new(map),
             map,
             nodes,
             curvature,
@@ -126,13 +126,14 @@ impl<'a> Area<'a> {
                 s[3] + w * sigma * sigma,
             ]
         });
-        let moving = self.nodes.iter().fold([0.0; 3], |s, &(n, w)| {
-            match self.slopes.at(self.map, n, value) {
-                Some([square, noise]) => [s[0] + w, s[1] + w * square, s[2] + w * noise],
-                None => s,
+        let all = self.nodes.iter();
+        let bent = all.fold(Bent::default(), |sums, &(n, w)| {
+            match self.bends.at(self.map, n, value) {
+                Some(bend) => sums.and(w, value(n)[0] - offset, bend),
+                None => sums,
             }
         });
-        let found = RegionMean::of_sums(sums, (&self.slopes, moving), &self.pairs)?;
+        let found = RegionMean::of_sums(sums, (&self.bends, &bent), &self.pairs)?;
         let bend: f64 = self.curvature.iter().map(|&(n, w)| w * value(n)[0]).sum();
         let by_noise = found.noise * found.noise * self.curvature_pairs.mean;
         let blur = (bend * bend - by_noise).max(0.0);

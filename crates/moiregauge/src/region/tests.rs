@@ -453,8 +453,8 @@ fn trends_have_honest_errors() {
 fn ripples(kappa: f64, seed: u64) -> FieldScene {
     let mut scene = FieldScene::hexagonal([288, 256], 20.0, 0.3);
     (scene.white, scene.seed) = (0.4, seed);
-    // Near the direction that turns the lattice most.
-    let direction = 1.23 + 0.4 * (seed as f64).sin();
+    // Near the direction that changes the lengths of the waves, and so the twist, most.
+    let direction = -0.34 + 0.4 * (seed as f64).sin();
     // Wave vectors change by the same share of a per cent, however long the ripples are.
     let depth = 0.0035 * 14.0 / kappa;
     scene.ripples = vec![Ripple {
@@ -507,9 +507,8 @@ fn the_limit_of_a_spread_knows_the_smoothing() {
     let trend = made(|p| 0.02 + 1e-5 * p.x, 1e-6);
     let region = Region::rectangle("r", Vector2::new(20.0, 20.0), [80.0, 60.0]);
     let found = RegionStatistics::new(&trend, &region).twist.unwrap();
-    // Over a length L a trend has κ² = 12 w²/L².
-    let expected = (6.0 * 36.0 / 6400.0_f64).exp();
-    assert!((found.widening / expected - 1.0).abs() < 0.02, "{found:?}");
+    // The window leaves a trend as it is.
+    assert!((found.widening - 1.0).abs() < 0.02, "{found:?}");
 }
 
 /// What the window does to the share of a wanted twist is said beside it.

@@ -8,7 +8,7 @@
 
 use std::f64::consts::SQRT_2;
 
-use super::smoothing::Slopes;
+use super::smoothing::{Bends, Bent};
 use crate::map::{Mask, TwistStrainMap};
 
 /// A twist that a device is to have.
@@ -29,7 +29,7 @@ pub struct WantedArea {
     pub measured: f64,
     /// Share expected without noise.
     pub corrected: f64,
-    /// How far the window may have moved that, as the slopes of the map tell: it draws twists towards their mean.
+    /// How far the window may have moved that, as the curvature of the map tells: it draws twists towards their mean.
     pub blur: f64,
     /// Share that is within the limits by two σ of its own.
     pub certain: f64,
@@ -79,12 +79,12 @@ impl WantedArea {
                 within(best - wanted.twist, doubt, wanted.within)
             })
         };
-        let slopes = Slopes::new(map);
-        let sums = nodes
+        let bends = Bends::new(map);
+        let bent = nodes
             .iter()
-            .filter_map(|&n| slopes.at(map, n, &twist))
-            .fold([0.0; 3], |s, [square, noise]| {
-                [s[0] + 1.0, s[1] + square, s[2] + noise]
+            .fold(Bent::default(), |sums, &n| match bends.at(map, n, &twist) {
+                Some(bend) => sums.and(1.0, twist(n)[0] - mean, bend),
+                None => sums,
             });
         let corrected = expected(1.0);
         Some(Self {
@@ -92,7 +92,7 @@ impl WantedArea {
             measured: share(&|x, _| one(off(x) <= wanted.within)),
             corrected,
             // Doubt about a spread of many nodes is small.
-            blur: (expected(slopes.widening(variance, 0.0, sums)) - corrected).abs(),
+            blur: (expected(bends.widening([variance, 0.0], 0.0, &bent)) - corrected).abs(),
             certain: share(&|x, sigma| one(off(x) + 2.0 * sigma <= wanted.within)),
             possible: share(&|x, sigma| one(off(x) - 2.0 * sigma <= wanted.within)),
         })

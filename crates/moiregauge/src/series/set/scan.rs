@@ -3,7 +3,7 @@
 use nalgebra::{Matrix2, Matrix4, Vector2};
 
 use super::moire::moire;
-use crate::analysis::{LineAnalysis, Motion, ScanAnalysis};
+use crate::analysis::{LineAnalysis, ScanAnalysis};
 use crate::drift::{Observation, common_lattice};
 use crate::estimate::Estimate;
 use crate::lattice::LatticeVectors;
@@ -11,11 +11,12 @@ use crate::lattice::reciprocal::labelled_like;
 use crate::series::measure::{MeasuredLine, MeasuredScan};
 use crate::settings::Settings;
 
+/// Without its motion, which the fit of its set tells.
 pub(super) fn scan_analysis(
     scan: &MeasuredScan,
     seen: &[Observation],
     reference: &Matrix2<f64>,
-    (drift, path): (Option<(Vector2<f64>, Matrix2<f64>)>, Option<Motion>),
+    drift: Option<(Vector2<f64>, Matrix2<f64>)>,
     settings: &Settings,
 ) -> Option<ScanAnalysis> {
     let (sensor, _, _) = common_lattice(seen, &Vector2::zeros(), &Matrix2::zeros()).ok()?;
@@ -56,7 +57,7 @@ pub(super) fn scan_analysis(
         twist_strain: drift_corrected.as_ref().and_then(strain),
         sensor,
         drift: drift.filter(|_| drift_corrected.is_some()).map(|d| d.0),
-        motion: path.filter(|_| drift_corrected.is_some()),
+        motion: None,
         drift_corrected,
         draws: Vec::new(),
         residual: None,
