@@ -12,17 +12,14 @@ use std::process::ExitCode;
 
 use anyhow::{Context as _, bail, ensure};
 use clap::ValueEnum;
-use moiregauge::analysis::Axis;
 use moiregauge::caveat::Caveat;
-use moiregauge::map::{
-    DriftChange, LatticeMap, Resolution, TwistStrainMap, combine, drift_change, register,
-};
+use moiregauge::map::{DriftChange, LatticeMap, Resolution, TwistStrainMap, register};
 use moiregauge::series::{
-    LineMap, MapMethod, SurveyPlan, about_repeat, domains_of_scan, map_scan, refusal,
+    LineMap, MapMethod, SurveyPlan, about_repeat, average_maps, change_of_drift, domains_of_scan,
+    map_scan, refusal,
 };
 use moiregauge::settings::Settings;
 use moiregauge_report::{FailedInput, Provenance};
-use spmfile::FrameDirection;
 
 use crate::analyze::{AnalyzeArgs, Outcome, analyse_files, failures, given_again, read};
 use crate::info::inputs;
@@ -280,7 +277,9 @@ fn together(
             .flat_map(|s| &s.scans)
             .filter(|s| s.excluded.is_none())
     };
-    let origin = used().filter_map(|s| s.acquired).min();
+    let origin = used()
+        .filter_map(|s| s.motion.map(|m| m.middle))
+        .min_by(f64::total_cmp);
     let how = (args.map_method.into(), resolution);
     let mut maps = Vec::new();
     for scan in used() {
@@ -296,8 +295,7 @@ fn together(
     }
     let mut caveats = analysis.caveats.clone();
     registered(&mut maps, &mut caveats);
-    let all: Vec<&LatticeMap> = maps.iter().map(|m| &m.map).collect();
-    let Some((lattices, agreement)) = combine(&all) else {
+    let Some((lattices, agreement)) = average_maps(&maps) else {
         eprint!("{}", failures(&provenance.failed));
         bail!("no image gave a map");
     };
@@ -318,7 +316,7 @@ fn together(
         let narrow = maps.iter().find_map(|m| narrow_margin(m.margin, &m.file));
         caveats.extend(narrow);
     }
-    let drift_change = change(&maps);
+    let drift_change = change_of_drift(&maps);
     about_change(drift_change, &mut caveats);
     let map = TwistStrainMap::new(&lattices, &found);
     let look = |contrast| {
@@ -427,32 +425,6 @@ fn registered(maps: &mut [LineMap], caveats: &mut Vec<Caveat>) {
             ),
         ));
     }
-}
-
-/// Compares upward with downward frames of one slow axis.
-fn change(maps: &[LineMap]) -> Option<DriftChange> {
-    let axis = |m: &LineMap| {
-        m.time_gradient.map(|u| {
-            if u.x.abs() > u.y.abs() {
-                Axis::X
-            } else {
-                Axis::Y
-            }
-        })
-    };
-    let of = |direction: FrameDirection, slow: Axis| -> Vec<&LineMap> {
-        let wanted = |m: &&LineMap| m.frame_direction == Some(direction) && axis(m) == Some(slow);
-        maps.iter().filter(wanted).collect()
-    };
-    [Axis::Y, Axis::X].into_iter().find_map(|slow| {
-        let (up, down) = (of(FrameDirection::Up, slow), of(FrameDirection::Down, slow));
-        let gradient = up.first()?.time_gradient?;
-        let average = |maps: &[&LineMap]| {
-            let maps: Vec<&LatticeMap> = maps.iter().map(|m| &m.map).collect();
-            Some(combine(&maps)?.0)
-        };
-        drift_change(&average(&up)?, &average(&down)?, gradient)
-    })
 }
 
 impl MapArgs {

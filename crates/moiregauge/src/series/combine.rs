@@ -58,6 +58,7 @@ pub(super) fn combine(
     }
     let (mut lattice, mut statistical) = weighted_mean(&means)?;
     let (mut joint_terms, mut drift, mut checks) = (None, None, None);
+    let mut path = None;
     if let ([one], Some(set)) = (sets, sets.first()) {
         // Nothing to combine: the set has it all.
         (lattice, statistical) = (first.lattice, first.budget.statistical);
@@ -74,6 +75,7 @@ pub(super) fn combine(
                     (lattice, statistical) = fitted;
                 }
                 joint_terms = Some(terms(&fit));
+                path = Some(fit.path());
                 drift = Some(Drift {
                     velocity: fit.velocity,
                     covariance: fit.velocity_covariance,
@@ -125,6 +127,7 @@ pub(super) fn combine(
         twist_strain,
         joint: joint_terms,
         drift,
+        path,
         checks,
         consistency,
     })

@@ -4,6 +4,7 @@
 //! the few numbers that remain. [`illustrate`] goes back to the pixels of one scan for the figures.
 
 mod atomic;
+mod averaging;
 mod calibrate;
 mod channel;
 mod combine;
@@ -29,6 +30,7 @@ mod surveying;
 mod tiling;
 
 pub use atomic::{AtomicError, AtomicOrientation, atomic_orientation};
+pub use averaging::{average_maps, change_of_drift};
 pub use calibrate::{CalibrateError, Calibrated, CalibratedSet, calibrate};
 pub use channel::{channels_by_preference, choose_channel};
 pub use corrected::{CorrectedImage, corrected_images, nominal_geometry, on_grid};
@@ -106,6 +108,12 @@ pub fn analyse(scans: Vec<MeasuredScan>, settings: &Settings) -> Analysis {
             combine::combine(&sets, joint, settings, strengths, &mut caveats)
         })
         .flatten();
+    if let Some(path) = combined.as_ref().and_then(|c| c.path) {
+        let scans = sets.iter_mut().flat_map(|set| &mut set.scans);
+        for motion in scans.filter_map(|scan| scan.motion.as_mut()) {
+            motion.path = path;
+        }
+    }
     Analysis {
         settings: settings.clone(),
         sets,

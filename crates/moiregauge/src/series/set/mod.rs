@@ -93,7 +93,12 @@ pub(super) fn analyse_set(
                 let own = fit.as_ref().and_then(|fit| joint::velocity_of(fit, scan));
                 own.unwrap_or((s.drift.velocity, s.drift.covariance))
             });
-            scan_analysis(scan, seen, reference, drift, settings)
+            let found = scan_analysis(scan, seen, reference, drift, settings)?;
+            let motion = |velocity| joint::motion_of(fit.as_ref(), scan, velocity);
+            Some(ScanAnalysis {
+                motion: found.drift.and_then(motion),
+                ..found
+            })
         })
         .collect();
     let checks = fit.as_ref().map(|fit| {
