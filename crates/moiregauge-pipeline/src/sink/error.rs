@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 #[non_exhaustive]
 pub enum SinkError {
     /// The system refuses.
-    #[error("cannot write {}: {source}", path.display())]
+    #[error("cannot write {}", path.display())]
     Write {
         /// What is to be written.
         path: PathBuf,
@@ -75,7 +75,7 @@ pub enum SinkError {
     },
     /// Everything is written, but not everything could be moved to its place.
     #[error(
-        "cannot replace {}: {source}. What is new waits in {}; the next run into this folder puts it in place",
+        "cannot replace {}: what is new waits in {}, and the next run into this folder puts it in place",
         path.display(),
         work.display()
     )]

@@ -25,16 +25,15 @@ impl FileSink {
     /// # Errors
     /// [`SinkError`] if the folder cannot be written.
     pub fn open(folder: &Path, force: bool, inputs: &[PathBuf]) -> Result<Self, SinkError> {
-        let folder = match folder {
-            none if none == Path::new("") => Path::new("."),
-            some => some,
-        };
-        if exists(folder) && !folder.is_dir() {
+        let here = folder == Path::new("");
+        let real = if here { Path::new(".") } else { folder };
+        if exists(real) && !real.is_dir() {
             return Err(SinkError::NoFolder(folder.to_owned()));
         }
         Ok(Self {
+            // Names are shown as they were given.
             folder: folder.to_owned(),
-            work: Work::own(folder)?,
+            work: Work::own(real)?,
             force,
             inputs: canonical(inputs),
             next: AtomicUsize::new(0),
