@@ -8,6 +8,7 @@ mod layers;
 mod maps;
 mod odd_files;
 mod outputs;
+mod published;
 mod real_images;
 mod refusals;
 mod results;
