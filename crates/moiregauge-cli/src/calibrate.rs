@@ -98,13 +98,6 @@ pub(crate) fn run(args: &CalibrateArgs) -> anyhow::Result<ExitCode> {
         "--drift-sigma expects a number ≥ 0, found {}",
         args.drift_sigma
     );
-    if let Some(out) = &args.out {
-        ensure!(
-            args.force || !out.exists(),
-            "{} exists already; give another --out, or --force to write over it",
-            out.display()
-        );
-    }
     let lattice = args.known_lattice()?;
     let cell = lattice
         .cell()
@@ -118,6 +111,8 @@ pub(crate) fn run(args: &CalibrateArgs) -> anyhow::Result<ExitCode> {
     };
     let (inputs, mut failed) = inputs(&args.paths);
     let (inputs, repeated) = moiregauge_pipeline::distinct(&inputs);
+    let file = |out| crate::outputs::file(out, args.force, &inputs);
+    let file = args.out.as_deref().map(file).transpose()?;
     let known = args.known.of(&inputs);
     let bar = if args.quiet {
         ProgressBar::hidden()
@@ -146,7 +141,7 @@ pub(crate) fn run(args: &CalibrateArgs) -> anyhow::Result<ExitCode> {
                 let cause = error.downcast_ref();
                 looked_at += usize::from(matches!(cause, Some(MeasureError::Lattice { .. })));
                 failed.push(FailedInput {
-                    file: path.display().to_string(),
+                    file: moiregauge_pipeline::names::in_words(path),
                     error: format!("{error:#}"),
                 });
             }
@@ -169,7 +164,7 @@ pub(crate) fn run(args: &CalibrateArgs) -> anyhow::Result<ExitCode> {
     if !args.quiet {
         say(&words::summary(&found, &lattice))?;
     }
-    if let Some(out) = &args.out {
+    if let (Some(out), Some(file)) = (&args.out, file) {
         if !found.covariance_known {
             bail!(
                 "{} is not written: nobody knows its errors, since the frames do not tell the drift and have no line \
@@ -178,7 +173,7 @@ pub(crate) fn run(args: &CalibrateArgs) -> anyhow::Result<ExitCode> {
             );
         }
         let text = file::text(&found, &lattice, args.drift_sigma, &files)?;
-        std::fs::write(out, text).with_context(|| format!("cannot write {}", out.display()))?;
+        file.write(text.into_bytes())?;
         if !args.quiet {
             say(&format!(
                 "\nWritten to {0}; for moiregauge analyze --calibration {0}\n",

@@ -79,6 +79,11 @@ pub(crate) struct Known {
 }
 
 impl KnownArgs {
+    /// The file that is read beside each scan.
+    pub(crate) fn second_file(&self) -> Option<&PathBuf> {
+        self.sensors.as_ref()
+    }
+
     /// What is known of these files.
     pub(crate) fn of(&self, inputs: &[PathBuf]) -> Known {
         let (mut order, _) = moiregauge_pipeline::distinct(inputs);

@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
+use anyhow::Context as _;
 use indicatif::{ProgressBar, ProgressStyle};
 use moiregauge::analysis::Analysis;
 use moiregauge::caveat::Caveat;
@@ -11,7 +12,7 @@ use moiregauge::series::{
     illustrate, measure_moires, sorted_moires,
 };
 use moiregauge::settings::Settings;
-use moiregauge_pipeline::{Repeated, distinct};
+use moiregauge_pipeline::{Repeated, distinct, names};
 use moiregauge_report::{FailedInput, InputFile, Provenance};
 use rayon::prelude::*;
 use sha2::{Digest as _, Sha256};
@@ -77,7 +78,7 @@ pub(crate) fn analyse_files(
                 files.push(file);
             }
             Err(error) => failed.push(FailedInput {
-                file: path.display().to_string(),
+                file: names::in_words(path),
                 error: format!("{error:#}"),
             }),
         }
@@ -104,7 +105,7 @@ pub(crate) fn analyse_files(
             if illustrated {
                 analysis.sets.par_iter_mut().for_each(|set| {
                     set.illustration = set.scans.first().and_then(|first| {
-                        let reading = read(Path::new(&first.file), settings, known).ok()?;
+                        let reading = read_again(inputs, &first.file, settings, known).ok()?;
                         illustrate(&reading.scan, first, settings)
                     });
                 });
@@ -223,7 +224,7 @@ pub(crate) fn read(path: &Path, settings: &Settings, known: &Known) -> anyhow::R
     let (scan, replaced) = known.read(path, &bytes, &wanted)?;
     let hash = Sha256::digest(&bytes);
     let input = InputFile {
-        file: path.display().to_string(),
+        file: names::in_words(path),
         sha256: hexadecimal(&hash),
         bytes: bytes.len() as u64,
     };
@@ -238,6 +239,17 @@ pub(crate) fn read(path: &Path, settings: &Settings, known: &Known) -> anyhow::R
         scan,
         input,
     })
+}
+
+/// Reads an input again that the results know by the words of its path.
+pub(crate) fn read_again(
+    inputs: &[PathBuf],
+    words: &str,
+    settings: &Settings,
+    known: &Known,
+) -> anyhow::Result<Reading> {
+    let path = names::with_words(inputs, words).context("it is none of the inputs")?;
+    read(path, settings, known)
 }
 
 pub(crate) fn hexadecimal(bytes: &[u8]) -> String {

@@ -9,6 +9,7 @@ mod layers;
 mod maps;
 mod names;
 mod odd_files;
+mod outputs;
 mod published;
 mod real_images;
 mod refusals;
