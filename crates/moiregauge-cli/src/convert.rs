@@ -124,24 +124,7 @@ pub(crate) fn run(args: &ConvertArgs) -> anyhow::Result<ExitCode> {
             Err((path, error)) => failed.push(format!("{}: {error}", path.display())),
         }
     }
-    let format = if let Some(format) = args.to {
-        ensure!(
-            !out.is_file(),
-            "{} is a file; with --to a folder is expected",
-            out.display()
-        );
-        format.into()
-    } else {
-        let format = format_of(out)?;
-        ensure!(
-            inputs.len() + failed.len() == 1,
-            "{} is one file but there are {}; give a folder and --to {}",
-            out.display(),
-            inputs.len() + failed.len(),
-            format.extension()
-        );
-        format
-    };
+    let format = format(args, out, inputs.len() + failed.len())?;
     let folder = if args.to.is_some() {
         out
     } else {
@@ -199,17 +182,7 @@ pub(crate) fn run(args: &ConvertArgs) -> anyhow::Result<ExitCode> {
         }
     }
     if !args.quiet && scans > 0 {
-        let first = files.first().map_or(out.clone(), PathBuf::clone);
-        let more = match files.len() {
-            0 | 1 => String::new(),
-            count => format!(" and {} more", count - 1),
-        };
-        let scans = if scans == 1 {
-            "1 scan".to_owned()
-        } else {
-            format!("{scans} scans")
-        };
-        say(&format!("{scans} written to {}{more}\n", first.display()))?;
+        say(&in_words(out, scans, &files))?;
     }
     for error in &failed {
         eprintln!("error: {error}");
@@ -219,6 +192,41 @@ pub(crate) fn run(args: &ConvertArgs) -> anyhow::Result<ExitCode> {
     } else {
         ExitCode::FAILURE
     })
+}
+
+/// The format that is asked for, and an error if the output does not fit it or that many files.
+fn format(args: &ConvertArgs, out: &Path, files: usize) -> anyhow::Result<WritableFormat> {
+    if let Some(format) = args.to {
+        ensure!(
+            !out.is_file(),
+            "{} is a file; with --to a folder is expected",
+            out.display()
+        );
+        return Ok(format.into());
+    }
+    let format = format_of(out)?;
+    ensure!(
+        files == 1,
+        "{} is one file but there are {files}; give a folder and --to {}",
+        out.display(),
+        format.extension()
+    );
+    Ok(format)
+}
+
+/// What was written.
+fn in_words(out: &Path, scans: usize, files: &[PathBuf]) -> String {
+    let first = files.first().map_or(out, PathBuf::as_path);
+    let more = match files.len() {
+        0 | 1 => String::new(),
+        count => format!(" and {} more", count - 1),
+    };
+    let scans = if scans == 1 {
+        "1 scan".to_owned()
+    } else {
+        format!("{scans} scans")
+    };
+    format!("{scans} written to {}{more}\n", first.display())
 }
 
 fn progress(files: usize, quiet: bool) -> ProgressBar {

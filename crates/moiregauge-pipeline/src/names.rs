@@ -1,5 +1,6 @@
 //! Paths in words that lead back to the path, for results that know files by text.
 
+use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 /// The path as text: as it is where it is Unicode, otherwise with every byte that is not as `%` and two
@@ -12,7 +13,8 @@ pub fn in_words(path: &Path) -> String {
     for chunk in path.as_os_str().as_encoded_bytes().utf8_chunks() {
         words.push_str(chunk.valid());
         for byte in chunk.invalid() {
-            words.push_str(&format!("%{byte:02X}"));
+            // Writing into a string cannot fail.
+            let _ = write!(words, "%{byte:02X}");
         }
     }
     words

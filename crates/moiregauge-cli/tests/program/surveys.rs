@@ -78,24 +78,6 @@ fn an_interrupted_survey_goes_on() {
     assert!(files(&out) == straight);
 }
 
-/// Bands belong to one geometry: those of another size are not taken.
-#[test]
-fn bands_of_another_size_are_not_taken() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let of = |name: &str, options: &[&str]| {
-        let mut command = command(folder.path(), name, &["--in-bands", "--window", "12"]);
-        command.args(options);
-        run(&mut command)
-    };
-    let stopped = of("out", &["--region", "far=9000,9000,10,10"]);
-    assert_eq!(stopped.code, Some(1), "{}", stopped.stderr);
-    let turned = ["--rotation", "20"];
-    assert_eq!(of("out", &turned).code, Some(0));
-    assert_eq!(of("straight", &turned).code, Some(0));
-    let [a, b] = ["out", "straight"].map(|name| files(&folder.path().join(name)));
-    assert!(a == b);
-}
-
 /// A simple field (`.gsf`) of part of an image, top line first; `first` is its first pixel (column, row) and says where it lies.
 fn simple_field(path: &Path, image: &Image, first: [usize; 2], size: [usize; 2]) {
     let part = image.cropped(first, size);

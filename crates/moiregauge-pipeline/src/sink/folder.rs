@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
+use std::sync::{Mutex, PoisonError};
 
 use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
@@ -136,7 +136,7 @@ impl FolderSink {
         check_name(name)?;
         self.work.stage(name, bytes)?;
         let entry = Entry::of_bytes(name, bytes);
-        let mut written = self.written.lock().unwrap_or_else(|e| e.into_inner());
+        let mut written = self.written.lock().unwrap_or_else(PoisonError::into_inner);
         written.insert(name.to_owned(), entry);
         Ok(())
     }
@@ -174,7 +174,7 @@ impl FolderSink {
     /// # Errors
     /// [`SinkError`]; nothing has changed then, except after [`SinkError::Unfinished`].
     pub fn commit(self) -> Result<(), SinkError> {
-        let written = self.written.lock().unwrap_or_else(|e| e.into_inner());
+        let written = self.written.lock().unwrap_or_else(PoisonError::into_inner);
         let manifest = Manifest::new(&self.kind, written.values().cloned().collect());
         drop(written);
         let intent = Intent {
@@ -209,7 +209,7 @@ impl FolderSink {
         let Ok(folder) = self.folder.canonicalize() else {
             return Ok(());
         };
-        let written = self.written.lock().unwrap_or_else(|e| e.into_inner());
+        let written = self.written.lock().unwrap_or_else(PoisonError::into_inner);
         for input in &self.inputs {
             let inside = input.strip_prefix(&folder).ok().and_then(Path::to_str);
             let Some(name) = inside.map(|name| name.replace('\\', "/")) else {
