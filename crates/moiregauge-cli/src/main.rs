@@ -10,6 +10,7 @@ mod input;
 mod map;
 mod moire;
 mod numbers;
+mod outputs;
 mod plan;
 mod say;
 mod scanner;

@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 use moiregauge_report::FailedInput;
 use spmfile::{Format, detect, looks_like_scan, named_like_scan};
 
+use crate::names::in_words;
 use crate::reading;
 use crate::session::{channels_of_one_frame, one_per_frame};
 
@@ -93,7 +94,7 @@ impl Found {
         }
         let (files, others) = channels_of_one_frame(files);
         failed.extend(others.into_iter().map(|(file, first)| FailedInput {
-            file: file.display().to_string(),
+            file: in_words(&file),
             error: format!(
                 "another channel of the frame of {}, which is measured already; give the files of one channel, as in \
                  '*.Z_mtrx'",
@@ -105,7 +106,7 @@ impl Found {
 
     fn fail(&mut self, path: &Path, error: String) {
         self.files.push(Err(FailedInput {
-            file: path.display().to_string(),
+            file: in_words(path),
             error,
         }));
     }

@@ -5,9 +5,13 @@
 
 mod find;
 mod memory;
+pub mod names;
 mod reading;
 pub mod session;
+pub mod sink;
+mod twice;
 
 pub use find::{Found, LeftAlone, find};
 pub use memory::{NotEnoughMemory, available, enough_for};
 pub use reading::{FileError, open, read, read_text};
+pub use twice::{Repeated, distinct};

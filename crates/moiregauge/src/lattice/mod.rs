@@ -25,6 +25,7 @@ pub(crate) mod vectors;
 use nalgebra::{Matrix2, Vector2};
 
 pub use fit::{Closure, FittedHarmonic, ForeignWave, Inhomogeneity, LatticeFit};
+pub use paper::PublishedPeaks;
 pub use phases::Phases;
 pub(crate) use pictures::pictures;
 pub use several::measure_several;
@@ -57,6 +58,8 @@ pub struct MeasuredLattice {
     pub periods: f64,
     /// Amplitude over noise amplitude in one resolution cell, weakest of the first harmonics.
     pub signal_to_noise: f64,
+    /// The peaks as published; `None` with the other methods.
+    pub published: Option<PublishedPeaks>,
     /// The fit to the pixels; `None` with the other methods.
     pub fit: Option<LatticeFit>,
 }
@@ -85,13 +88,9 @@ pub enum LatticeError {
         total: usize,
     },
     /// There is no lattice in it.
-    #[error(
-        "the image shows no lattice: no three wave vectors that add up to zero stand out of the \
-         noise (the best have signal-to-noise ratios of {0:.1}, {1:.1} and {2:.1}; 3.5 are needed)",
-        best[0], best[1], best[2]
-    )]
+    #[error("the image shows no lattice: {}", prepare::too_weak(best))]
     NoLattice {
-        /// Signal-to-noise ratios (amplitude) of the best three wave vectors.
+        /// Signal-to-noise ratios (amplitude) of the best three wave vectors, largest first; 0 where none were found.
         best: [f64; 3],
     },
     /// The lattice shows in the spectrum, but this method gets no hold of it.
@@ -251,7 +250,7 @@ impl Start {
         let fourier = || fourier::measure(harmonics, peaks, spectrum.image_size).map(in_pixels);
         let autocorrelation =
             || autocorrelation::measure(spectrum, harmonics, start).map(in_pixels);
-        let mut fit = None;
+        let (mut fit, mut published) = (None, None);
         let (pixels, comparison) = match method {
             Method::Autocorrelation => (autocorrelation(), fourier()),
             Method::Fourier => (fourier(), autocorrelation()),
@@ -259,14 +258,12 @@ impl Start {
                 fit = fitted(&self.prepared, self.background);
                 (fit.as_ref().map(|(lattice, _)| *lattice), fourier())
             }
-            Method::Paper => (
-                paper::measure(
-                    &self.prepared.image,
-                    &self.geometry,
-                    &(start * pixels_per_bin),
-                ),
-                fourier(),
-            ),
+            Method::Paper => {
+                let image = &self.prepared.image;
+                let found = paper::measure(image, &self.geometry, &(start * pixels_per_bin));
+                published = found.map(|(_, peaks)| peaks);
+                (found.map(|(lattice, _)| lattice), fourier())
+            }
         };
         let fit = fit.map(|(_, fit)| fit);
         let pixels = pixels.ok_or(LatticeError::NoPeaks { method })?;
@@ -293,6 +290,7 @@ impl Start {
                 || signal_to_noise(harmonics)[2],
                 LatticeFit::weakest_signal_to_noise,
             ),
+            published,
             fit,
         })
     }

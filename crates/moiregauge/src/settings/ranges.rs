@@ -79,7 +79,7 @@ impl Settings {
                 ("drift.sigma_nm_per_min", drift.sigma_nm_per_min, 0.0, 1e6),
             ]);
         }
-        if let Some(known) = &self.lattice_angle {
+        for known in self.lattice_angle.iter().chain(&self.lattice_angle_2) {
             ranges.extend([
                 ("lattice_angle.angle_deg", known.angle_deg, -3600.0, 3600.0),
                 ("lattice_angle.sigma_deg", known.sigma_deg, 0.0, 180.0),

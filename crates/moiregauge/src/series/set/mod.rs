@@ -1,8 +1,10 @@
 //! One set: drift, and every scan before and after correction.
 
 mod about;
+mod headers;
 mod joint;
 mod moire;
+mod published;
 mod scan;
 
 use nalgebra::{Matrix2, Vector2};
@@ -10,34 +12,36 @@ use rayon::prelude::*;
 use spmfile::FrameDirection;
 
 use about::{about_checks, about_mean, about_readings, about_residual};
+use headers::{about_dates, about_headers};
 pub(super) use joint::{checks, joint_fit, lattice_of, terms};
-pub(super) use moire::moire;
+pub(super) use moire::{IMPOSSIBLE, moire};
 use scan::{plain_mean, scan_analysis};
 
 use super::group::Group;
 use super::measure::MeasuredScan;
-use crate::analysis::{Axis, Drift, DriftFit, ScanAnalysis, SetAnalysis, SetMean};
+use crate::analysis::{Drift, DriftFit, ScanAnalysis, SetAnalysis, SetMean};
 use crate::budget::{Budget, Statistical};
 use crate::caveat::Caveat;
 use crate::chi2::enlargement;
-use crate::drift::paper::{PaperScan, pairwise_drift};
+use crate::drift::paper::successive_drift;
 use crate::drift::{Observation, at_known_drift, common_lattice, monte_carlo, solve};
 use crate::geometry::mean_and_spread;
 use crate::lattice::LatticeVectors;
 use crate::lattice::reciprocal::real_from_reciprocal;
-use crate::readings::Readings;
-use crate::settings::{GivenDrift, Settings};
+use crate::readings::{Readings, WaveStrengths};
+use crate::settings::{GivenDrift, Method, Settings};
 use crate::strain::{TwistStrain, draws};
 
 /// nm/min → nm/s.
 const PER_MINUTE: f64 = 1.0 / 60.0;
 
-/// Everything about one set but its illustration. `first_index` numbers its scans for the draws.
+/// Everything about one set but its illustration; the settings name the waves of the lattice. `first_index` numbers its scans for the draws.
 /// Scans that are left out by rule are marked in the group.
 pub(super) fn analyse_set(
     group: &mut Group,
     reference: &Matrix2<f64>,
     settings: &Settings,
+    strengths: &WaveStrengths,
     first_index: u64,
     caveats: &mut Vec<Caveat>,
 ) -> SetAnalysis {
@@ -60,11 +64,21 @@ pub(super) fn analyse_set(
         .copied()
         .collect();
     let mut solved = drift((&group.name, &used), &all, settings, caveats);
+    caveats.extend(
+        solved
+            .as_ref()
+            .and_then(|_| about_dates(&group.name, &used)),
+    );
     let mut fit = None;
     if joint {
         (solved, fit) = match solved {
             Some(linear) => {
+                let (lattice, velocity) = (linear.lattice, linear.drift.velocity);
                 let (solved, fit) = joint::jointly(linear, &used, reference, settings);
+                caveats.extend(fit.as_ref().and_then(|fit| {
+                    let name = &group.name;
+                    about_headers(name, &used, reference, &lattice, &velocity, fit, settings)
+                }));
                 (Some(solved), fit)
             }
             None => (None, None),
@@ -79,7 +93,12 @@ pub(super) fn analyse_set(
                 let own = fit.as_ref().and_then(|fit| joint::velocity_of(fit, scan));
                 own.unwrap_or((s.drift.velocity, s.drift.covariance))
             });
-            scan_analysis(scan, seen, reference, drift, settings)
+            let found = scan_analysis(scan, seen, reference, drift, settings)?;
+            let motion = |velocity| joint::motion_of(fit.as_ref(), scan, velocity);
+            Some(ScanAnalysis {
+                motion: found.drift.and_then(motion),
+                ..found
+            })
         })
         .collect();
     let checks = fit.as_ref().map(|fit| {
@@ -95,8 +114,13 @@ pub(super) fn analyse_set(
         joint::checks(fit, &left_out, &used, (&group.name, settings))
     });
     draw(&mut scans, settings, first_index);
+    if let (Method::Paper, Some(solved)) = (settings.method, &solved) {
+        let drift = (solved.drift.velocity, solved.drift.covariance);
+        let measured = (group.scans.as_slice(), observations.as_slice());
+        published::draw_all(&mut scans, measured, drift, settings, first_index);
+    }
     let of_set = || scans.iter().filter(|s| s.excluded.is_none());
-    let uncorrected = without_drift(&all, &scans, kept.len(), settings);
+    let uncorrected = without_drift(&all, &scans, kept.len(), settings, strengths);
     let mean = solved.as_ref().and_then(|s| {
         let of = |s: &ScanAnalysis| (s.twist_strain, s.drift_corrected.unwrap_or(s.sensor));
         set_mean(
@@ -104,6 +128,7 @@ pub(super) fn analyse_set(
             &s.statistical,
             of_set().map(of),
             settings,
+            strengths,
         )
     });
     let drift = solved.map(|s| s.drift);
@@ -140,6 +165,7 @@ fn without_drift(
     scans: &[ScanAnalysis],
     used: usize,
     settings: &Settings,
+    strengths: &WaveStrengths,
 ) -> Option<SetMean> {
     let common = common_lattice(all, &Vector2::zeros(), &Matrix2::zeros()).ok()?;
     let [image, sensor] = at_known_drift(all)?;
@@ -154,7 +180,13 @@ fn without_drift(
     let (common, statistical) = moire::enlarged(common, &statistical, scale);
     let of_set = scans.iter().filter(|s| s.excluded.is_none());
     let of = |s: &ScanAnalysis| (s.twist_strain_sensor, s.sensor);
-    set_mean((common, scale), &statistical, of_set.map(of), settings)
+    set_mean(
+        (common, scale),
+        &statistical,
+        of_set.map(of),
+        settings,
+        strengths,
+    )
 }
 
 /// Draws twist and strain of every scan.
@@ -243,6 +275,10 @@ fn drift(
         return given_drift(name, all, given, caveats);
     }
     match solve(all) {
+        Ok(solution) if settings.method == Method::Paper => {
+            let scans = published::paper_scans(scans, all);
+            published::drift((name, &scans), all, &solution, settings, caveats)
+        }
         Ok(solution) => {
             let scale = enlargement(solution.chi2, solution.degrees_of_freedom);
             let mut lattice = solution.lattice;
@@ -261,7 +297,7 @@ fn drift(
                         condition: solution.condition,
                         chi2: solution.chi2,
                         degrees_of_freedom: solution.degrees_of_freedom,
-                        paper_velocity: pairwise_drift(&paper_scans(scans, all)),
+                        paper_velocity: successive_drift(&published::paper_scans(scans, all)),
                     }),
                     monte_carlo: monte_carlo(all, settings.drift_draws, seed, &stream),
                     joint: None,
@@ -317,39 +353,13 @@ fn given_drift(
     })
 }
 
-/// The scans as the published estimate wants them: signed velocities in laboratory axes.
-fn paper_scans(scans: &[&MeasuredScan], all: &[Observation]) -> Vec<PaperScan> {
-    let lines = scans.iter().flat_map(|s| &s.lines);
-    lines
-        .zip(all)
-        .filter_map(|(line, seen)| {
-            let tau = line.timing?.per_pixel;
-            let (fast, slow) = (
-                line.geometry.fast_step() / tau.x,
-                line.geometry.slow_step() / tau.y,
-            );
-            // A set made by hand may hold scans of both slow axes.
-            let slow_axis = line.geometry.slow_axis();
-            let (fast_velocity, slow_velocity) = match slow_axis {
-                Axis::X => (fast.y, slow.x),
-                Axis::Y => (fast.x, slow.y),
-            };
-            Some(PaperScan {
-                lattice: seen.lattice,
-                slow_axis,
-                fast_velocity,
-                slow_velocity,
-            })
-        })
-        .collect()
-}
-
 /// Twist and strain of the common lattice, and how the scans scatter about it.
 fn set_mean(
     ((lattice, chi2, freedom), enlargement): ((LatticeVectors, f64, usize), f64),
     statistical: &Statistical,
     scans: impl Iterator<Item = (Option<TwistStrain>, LatticeVectors)>,
     settings: &Settings,
+    strengths: &WaveStrengths,
 ) -> Option<SetMean> {
     let twist_strain = moire(&lattice, settings)?;
     let (singles, lattices): (Vec<_>, Vec<_>) = scans.unzip();
@@ -367,7 +377,7 @@ fn set_mean(
     });
     let budget = Budget::new(&lattice, &twist_strain, statistical, settings);
     Some(SetMean {
-        readings: Readings::new(&lattice, &twist_strain, &budget, settings),
+        readings: Readings::new(&lattice, &twist_strain, &budget, strengths, settings),
         budget,
         lattice,
         twist_strain,
