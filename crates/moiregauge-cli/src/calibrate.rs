@@ -175,6 +175,9 @@ pub(crate) fn run(args: &CalibrateArgs) -> anyhow::Result<ExitCode> {
                 out.display()
             );
         }
+        if let Some(problem) = found.calibration.problem() {
+            bail!("{} is not written: {problem}", out.display());
+        }
         let text = file::text(&found, &lattice, args.drift_sigma, &files)?;
         std::fs::write(out, text).with_context(|| format!("cannot write {}", out.display()))?;
         if !args.quiet {
