@@ -6,8 +6,8 @@ use moiregauge::budget::Source;
 use moiregauge::calibration::{Calibration, Coordinates, KnownLattice};
 use moiregauge::material::Material;
 use moiregauge::series::{
-    CalibrateError, Calibrated, MeasureError, analyse, atomic_orientation, calibrate, measure_known,
-    measure_scan,
+    CalibrateError, Calibrated, MeasureError, analyse, atomic_orientation, calibrate,
+    measure_known, measure_scan,
 };
 use moiregauge::settings::{Grouping, Settings};
 use moiregauge::simulate::{Pattern, Simulation, Simulator};
@@ -253,12 +253,12 @@ fn a_calibration_takes_the_scanner_out_of_twist_and_strain() {
     assert!((rows[0] / lattice_like[0] - 1.0).abs() < 1e-9, "{rows:?}");
 }
 
-/// Two frames of 5 nm at 4 lines/s, as atoms are imaged, that drift at `speed` nm/min in a direction of the seed's.
+/// Two frames of 5 nm in 64 s each, as atoms are imaged, that drift at `speed` nm/min in a direction of the seed's.
 fn drifting(seed: u64, speed: f64) -> Simulation {
     let mut set = atoms(seed);
-    set.raster.pixels = [96, 256];
+    set.raster.pixels = [128; 2];
     set.raster.nominal_size_nm = [5.0; 2];
-    set.raster.line_rate_hz = 4.0;
+    set.raster.line_rate_hz = 2.0;
     let (sine, cosine) = (2.399_963 * (seed as f64 + 0.3)).sin_cos();
     set.drift.velocity_nm_per_min = [speed * cosine, speed * sine];
     set
@@ -424,6 +424,7 @@ fn the_wrong_lattice_is_no_scanner() {
     let mut set = drifting(3, 0.3);
     set.sample.pattern = Pattern::Layer1;
     set.sample.material = Material::named("MoS2").unwrap();
+    set.raster.sensors = true;
     let problem = tried(&set).unwrap_err();
     assert!(problem.contains("the common gain"), "{problem}");
 }

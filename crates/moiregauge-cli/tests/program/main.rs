@@ -12,6 +12,7 @@ mod refusals;
 mod results;
 mod round_trip;
 mod same_bytes;
+mod scanner;
 mod sessions;
 mod several;
 mod stripes;

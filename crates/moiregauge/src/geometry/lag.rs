@@ -128,7 +128,9 @@ fn bend(
 fn best_decay(left: &dyn Fn(f64) -> f64, longest: f64) -> f64 {
     let ratio = (longest / SHORTEST).powf(1.0 / STEPS as f64);
     let grid = (0..=STEPS).map(|i| SHORTEST * ratio.powi(i as i32));
-    let best = grid.map(|c| (left(c), c)).min_by(|a, b| a.0.total_cmp(&b.0));
+    let best = grid
+        .map(|c| (left(c), c))
+        .min_by(|a, b| a.0.total_cmp(&b.0));
     let middle = best.map_or(SHORTEST, |(_, c)| c);
     let (mut low, mut high) = (middle / ratio, middle * ratio);
     let golden = 0.618_034;
@@ -291,10 +293,16 @@ mod tests {
         let shapes: [(&str, Box<dyn Fn(f64) -> f64>); 6] = [
             ("noise", Box::new(|_| 0.0)),
             ("bow", Box::new(move |c| 1.5 * place(c).powi(2))),
-            ("bend of hysteresis", Box::new(move |c| 0.8 * (1.3 * place(c)).sin())),
+            (
+                "bend of hysteresis",
+                Box::new(move |c| 0.8 * (1.3 * place(c)).sin()),
+            ),
             ("creep", Box::new(move |c| 0.8 * (1.6 + place(c)).ln())),
             ("ripple", Box::new(move |c| 0.05 * (40.0 * place(c)).sin())),
-            ("step", Box::new(move |c| if place(c) > 0.1 { 0.1 } else { 0.0 })),
+            (
+                "step",
+                Box::new(move |c| if place(c) > 0.1 { 0.1 } else { 0.0 }),
+            ),
         ];
         for (name, shape) in &shapes {
             for seed in 0..20 {

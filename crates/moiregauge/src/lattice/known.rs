@@ -100,8 +100,7 @@ fn candidates(
     let mut found = Vec::new();
     // |p|² − |q|²: what most pairs have wrong is told by their area.
     let area = (wanted.determinant() / to_physical.determinant()).abs();
-    let areas =
-        area / MOST_SCALE.powi(2) * (1.0 - most.powi(2))..=area * MOST_SCALE.powi(2);
+    let areas = area / MOST_SCALE.powi(2) * (1.0 - most.powi(2))..=area * MOST_SCALE.powi(2);
     for (i, a) in generators.iter().enumerate() {
         for b in &generators[i + 1..] {
             let pair = Matrix2::from_columns(&[*a, *b]);
@@ -221,7 +220,11 @@ mod tests {
             let turn = nalgebra::Rotation2::new(turn).into_inner();
             let stretched = Matrix2::new(1.05, 0.02, 0.0, 0.97) * turn * hexagon;
             assert!(resembles(&stretched, &hexagon, MOST_DISTORTION));
-            assert!(!resembles(&(stretched * 3_f64.sqrt()), &hexagon, MOST_DISTORTION));
+            assert!(!resembles(
+                &(stretched * 3_f64.sqrt()),
+                &hexagon,
+                MOST_DISTORTION
+            ));
             let rectangle = turn * Matrix2::new(1.0, 0.0, 0.0, 2.0);
             assert!(!resembles(&rectangle, &hexagon, MOST_DISTORTION));
         }

@@ -163,7 +163,10 @@ fn about_lag(
     let direction = scan.frame_direction.unwrap_or(FrameDirection::Up);
     let timing = Timing::of_scan(scan, channel.columns, direction, line);
     let step = sensors.geometry.fast_step().norm();
-    let each = ["x", "y"].into_iter().zip(sensors.lags).zip(&sensors.planes);
+    let each = ["x", "y"]
+        .into_iter()
+        .zip(sensors.lags)
+        .zip(&sensors.planes);
     for ((name, lag), plane) in each {
         let Some(lag) = lag.filter(|lag| lag.slope_nm.abs() > NOTABLE_LAG * step) else {
             continue;
