@@ -194,8 +194,7 @@ pub fn named_like_scan(name: &str) -> bool {
     };
     let number = extension.len() == 3 && extension.bytes().all(|b| b.is_ascii_digit());
     let known = |known: &&str| extension.eq_ignore_ascii_case(known);
-    !stem.is_empty()
-        && (number || EXTENSIONS.iter().any(known) || extension.ends_with("_mtrx"))
+    !stem.is_empty() && (number || EXTENSIONS.iter().any(known) || extension.ends_with("_mtrx"))
 }
 
 /// A TIFF file's first directory tells whose it is.

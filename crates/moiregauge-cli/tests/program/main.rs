@@ -17,6 +17,7 @@ mod refusals;
 mod results;
 mod round_trip;
 mod same_bytes;
+mod scanner;
 mod senses;
 mod sessions;
 mod several;

@@ -12,6 +12,7 @@ use super::overlap::Window;
 use super::positions::{nominal, speeds, usable_sensors};
 use super::scanner::{about_calibration, calibrated};
 use super::shared::correlation;
+use crate::calibration::Calibration;
 use crate::caveat::Caveat;
 use crate::drift::Observation;
 use crate::estimate::Estimate;
@@ -116,6 +117,9 @@ pub enum MeasureError {
     /// A setting that makes no sense.
     #[error(transparent)]
     Settings(#[from] OutOfRange),
+    /// A calibration that no scanner can have.
+    #[error("the calibration of the scanner cannot be used: {0}")]
+    Calibration(String),
     /// No size.
     #[error("the file gives neither position sensors nor a scan size")]
     NoSize,
@@ -237,6 +241,10 @@ fn measure_with(
     window: Option<&Window>,
     find: Find,
 ) -> Result<Vec<MeasuredScan>, MeasureError> {
+    let problem = settings.scanner.as_ref().and_then(Calibration::problem);
+    if let Some(problem) = problem {
+        return Err(MeasureError::Calibration(problem));
+    }
     let channels = channels(scan, settings)?;
     let several = first_of_several(scan, &channels[0].name, settings);
     let mut caveats: Vec<Caveat> = several
