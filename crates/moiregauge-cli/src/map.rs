@@ -22,8 +22,7 @@ use moiregauge::settings::Settings;
 use moiregauge_report::{FailedInput, Provenance};
 use spmfile::FrameDirection;
 
-use crate::analyze::{AnalyzeArgs, Outcome, analyse_files, failures, read};
-use crate::info::inputs;
+use crate::analyze::{AnalyzeArgs, Outcome, Task, analyse_files, failures, read};
 use crate::input::Known;
 use output::{Made, write};
 pub(crate) use stripes::in_words as stripes_in_words;
@@ -105,7 +104,15 @@ impl From<MapMethodArg> for MapMethod {
 
 /// Makes the maps and writes them.
 pub(crate) fn run(args: &MapArgs) -> anyhow::Result<ExitCode> {
-    let settings = args.analyze.settings()?;
+    let task = Task::new(&args.analyze, "map")?;
+    let as_before;
+    let args = if args.analyze.is_replay() {
+        as_before = args.again(&task)?;
+        &as_before
+    } else {
+        args
+    };
+    let settings = task.run.settings.clone();
     let resolution = args.resolution()?;
     args.regions.check()?;
     let out = args.analyze.out();
@@ -115,25 +122,33 @@ pub(crate) fn run(args: &MapArgs) -> anyhow::Result<ExitCode> {
         out.display()
     );
     args.analyze.start_threads()?;
-    let (inputs, failed) = inputs(args.analyze.paths());
-    let known = args.analyze.known().of(&inputs);
+    let inputs = &task.inputs;
+    let known = task.known(inputs);
     let whole = (&settings, &known, &resolution);
-    let made = match survey(args, &inputs, whole, &failed)? {
+    let written = [out.join("map.json")];
+    let mut made = match survey(args, inputs, whole, &task.failed)? {
         Some(made) => made,
-        None => match together(args, &inputs, whole, failed)? {
+        None => match together(args, inputs, whole, task.failed.clone())? {
             Answer::Lattice(made) => *made,
-            Answer::Stripes(found) => {
+            Answer::Stripes(mut found) => {
+                let provenance = &mut found.provenance;
+                provenance.run = Some(task.record(&known, &provenance.inputs));
                 stripes::write(&found, args)?;
-                return Ok(ExitCode::SUCCESS);
+                return Ok(if task.is_same(&written) {
+                    ExitCode::SUCCESS
+                } else {
+                    ExitCode::FAILURE
+                });
             }
         },
     };
+    made.provenance.run = Some(task.record(&known, &made.provenance.inputs));
     let lost = failures(&made.provenance.failed);
     let complete = made.provenance.failed.is_empty();
     write(&made, args)?;
     survey::forget(out);
     eprint!("{lost}");
-    Ok(if complete {
+    Ok(if task.is_same(&written) && complete {
         ExitCode::SUCCESS
     } else {
         ExitCode::FAILURE
@@ -159,6 +174,10 @@ fn survey(
     if !any {
         return Ok(None);
     }
+    ensure!(
+        args.analyze.sets()?.is_empty(),
+        "--set: images that are mapped in bands lie side by side in one map and make no sets"
+    );
     let (out, loud) = (args.analyze.out(), args.analyze.is_loud());
     let (mut maps, mut images, mut caveats) = (Vec::new(), Vec::new(), Vec::new());
     let (mut read, mut plans) = (Vec::new(), Vec::<(survey::Large, SurveyPlan)>::new());
@@ -212,6 +231,7 @@ fn survey(
             seed: settings.seed,
             inputs: read,
             failed: failed.to_vec(),
+            run: None,
         },
         settings: settings.clone(),
         images,
@@ -442,6 +462,19 @@ fn change(maps: &[LineMap]) -> Option<DriftChange> {
 }
 
 impl MapArgs {
+    /// The options of the run to be repeated, with the place and the words of this one.
+    fn again(&self, task: &Task) -> anyhow::Result<Self> {
+        let program = std::iter::once("moiregauge".to_owned());
+        let arguments = program.chain(task.run.arguments.iter().cloned());
+        let crate::Command::Map(mut args) = crate::command(arguments)
+            .context("--replay: the document does not hold the options of a map")?
+        else {
+            bail!("--replay: expected the options of a map");
+        };
+        args.analyze = args.analyze.with_place_of(&self.analyze);
+        Ok(*args)
+    }
+
     fn resolution(&self) -> anyhow::Result<Resolution> {
         for (name, value) in [("--window", self.window), ("--step", self.step)] {
             ensure!(

@@ -22,8 +22,13 @@ pub(super) struct Export {
     format: WritableFormat,
 }
 
+/// All that are wanted.
+pub(super) fn all(names: &[String]) -> anyhow::Result<Vec<Export>> {
+    names.iter().map(|name| parse(name)).collect()
+}
+
 /// `corrected.gwy` as the folder `corrected` and the format.
-pub(super) fn parse(name: &str) -> anyhow::Result<Export> {
+fn parse(name: &str) -> anyhow::Result<Export> {
     let path = Path::new(name);
     let format = format_of(path).context("--export")?;
     ensure!(
