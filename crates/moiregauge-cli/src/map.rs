@@ -112,6 +112,10 @@ pub(crate) fn run(args: &MapArgs) -> anyhow::Result<ExitCode> {
     } else {
         args
     };
+    ensure!(
+        task.run.atomic.is_none() && task.run.export.is_empty() && !task.run.parquet,
+        "--atomic, --export and --parquet are for `moiregauge analyze`: a map has no use for them"
+    );
     let settings = task.run.settings.clone();
     let resolution = args.resolution()?;
     args.regions.check()?;

@@ -83,22 +83,10 @@ fn excluded_scans_stop_neither_parquet_nor_export() {
         "--drift-draws",
         "0",
     ]));
-    let table = std::fs::read_to_string(out.join("scans.csv")).unwrap();
-    let excluded = table
-        .lines()
-        .next()
-        .unwrap()
-        .split(',')
-        .position(|c| c == "excluded")
-        .unwrap();
-    let words = table
-        .lines()
-        .last()
-        .unwrap()
-        .splitn(excluded + 1, ',')
-        .last()
-        .unwrap();
-    assert!(!words.is_empty(), "{table}");
+    let found = results(&out);
+    let words = found["sets"][0]["scans"][2]["excluded"]
+        .as_str()
+        .expect("a reason");
     for name in ["vectors", "scans", "sets", "budget"] {
         let bytes = std::fs::read(out.join(format!("{name}.parquet"))).unwrap();
         assert!(
@@ -108,8 +96,10 @@ fn excluded_scans_stop_neither_parquet_nor_export() {
     }
     // The words are in the table of scans as they are: text is stored plainly.
     let bytes = std::fs::read(out.join("scans.parquet")).unwrap();
-    let words = words.trim_matches('"').as_bytes();
-    assert!(bytes.windows(words.len()).any(|w| w == words));
+    assert!(
+        bytes.windows(words.len()).any(|w| w == words.as_bytes()),
+        "{words}"
+    );
     assert!(std::fs::read_dir(out.join("corrected")).unwrap().count() >= 4);
 }
 
