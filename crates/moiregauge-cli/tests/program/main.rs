@@ -8,6 +8,7 @@ mod layers;
 mod maps;
 mod odd_files;
 mod options;
+mod published;
 mod real_images;
 mod refusals;
 mod repeats;
