@@ -23,12 +23,19 @@ pub(crate) use task::{Task, out_beside};
 use crate::say::say;
 use moiregauge_report::write_report;
 
+/// Whether the program can write Parquet.
+const PARQUET: bool = cfg!(feature = "parquet");
+
 /// Analyses the files and writes the results.
 pub(crate) fn run(args: &AnalyzeArgs) -> anyhow::Result<ExitCode> {
     let out = args.results_folder();
     files::refuse_overwriting(&out, args.force)?;
     let task = Task::new(args, "analyze")?;
     let exports = export::all(&task.run.export)?;
+    anyhow::ensure!(
+        PARQUET || !task.run.parquet,
+        "--parquet: this program was built without it"
+    );
     args.start_threads()?;
     let outcomes = outcomes(&task, args.is_loud())?;
     let folders = files::folders(&out, outcomes.len());
@@ -139,8 +146,8 @@ fn parquet(outcome: &Outcome) -> anyhow::Result<Vec<(String, Vec<u8>)>> {
     Ok(tables)
 }
 
-/// The tables as Parquet, which this program cannot write.
+/// None, in a program that was built without.
 #[cfg(not(feature = "parquet"))]
 fn parquet(_: &Outcome) -> anyhow::Result<Vec<(String, Vec<u8>)>> {
-    anyhow::bail!("the run wants its tables as Parquet, and this program was built without it")
+    anyhow::bail!("this program was built without Parquet")
 }

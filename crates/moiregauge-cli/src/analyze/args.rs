@@ -162,7 +162,6 @@ pub(crate) struct AnalyzeArgs {
     #[arg(long, value_name = "NAME.EXT", value_delimiter = ',')]
     pub(super) export: Vec<String>,
     /// Write vectors, scans, sets and budget as Parquet too
-    #[cfg(feature = "parquet")]
     #[arg(long)]
     pub(super) parquet: bool,
     /// Laboratory axes for vectors, angles, drift, figures and exported images: a frame that is turned by
@@ -313,14 +312,6 @@ impl AnalyzeArgs {
             quiet: other.quiet,
             ..self
         }
-    }
-
-    /// Whether tables are wanted as Parquet.
-    pub(super) fn wants_parquet(&self) -> bool {
-        #[cfg(feature = "parquet")]
-        return self.parquet;
-        #[cfg(not(feature = "parquet"))]
-        return false;
     }
 
     /// Whether results may be written over.

@@ -50,7 +50,7 @@ impl Task {
             atomic: args.orientation.asked()?,
             report: args.choice(),
             export: args.export.clone(),
-            parquet: args.wants_parquet(),
+            parquet: args.parquet,
             inputs: Vec::new(),
             other_files: Vec::new(),
             left_out: failed.clone(),
