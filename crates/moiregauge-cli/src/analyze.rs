@@ -12,15 +12,20 @@ mod task;
 use std::process::ExitCode;
 
 pub(crate) use args::{AnalyzeArgs, BackgroundArg, ConventionArg, LineArg, MethodArg};
-pub(crate) use chain::{Outcome, Reading, analyse_files, measure_file, progress, read, with_hint};
+pub(crate) use chain::{
+    Outcome, Reading, analyse_files, given_again, measure_file, progress, read, read_again,
+    with_hint,
+};
 pub(crate) use channel::channel_names;
-pub(crate) use files::write_all;
+pub(crate) use files::report_names;
 pub(crate) use moiregauge_pipeline::hexadecimal;
-pub(crate) use orientation::{Angle, DirectionArg, parse_angle};
+pub(crate) use orientation::{Angle, DirectionArg, SenseArg, parse_angle};
 pub(crate) use summary::{caveats as caveat_lines, failures, summary};
 pub(crate) use task::{Task, out_beside};
 
+use crate::outputs::{commit, write_all};
 use crate::say::say;
+use moiregauge::series::refusal;
 use moiregauge_report::write_report;
 
 /// Whether the program can write Parquet.
@@ -29,7 +34,6 @@ const PARQUET: bool = cfg!(feature = "parquet");
 /// Analyses the files and writes the results.
 pub(crate) fn run(args: &AnalyzeArgs) -> anyhow::Result<ExitCode> {
     let out = args.results_folder();
-    files::refuse_overwriting(&out, args.force)?;
     let task = Task::new(args, "analyze")?;
     let exports = export::all(&task.run.export)?;
     anyhow::ensure!(
@@ -37,53 +41,70 @@ pub(crate) fn run(args: &AnalyzeArgs) -> anyhow::Result<ExitCode> {
         "--parquet: this program was built without it"
     );
     args.start_threads()?;
+    let sink = files::sink((out.as_path(), args.force), &exports, &task.files())?;
     let outcomes = outcomes(&task, args.is_loud())?;
-    let folders = files::folders(&out, outcomes.len());
-    let (mut failed, mut documents) = (Vec::new(), Vec::new());
-    for (number, (outcome, folder)) in outcomes.iter().zip(&folders).enumerate() {
+    let refused = outcomes.iter().find_map(|o| refusal(&o.analysis)).cloned();
+    if let Some(why) = refused
+        .as_ref()
+        .filter(|why| why.code == "everything-excluded")
+    {
+        anyhow::bail!("{}", why.message);
+    }
+    let (mut failed, mut answers, mut documents) = (Vec::new(), Vec::new(), Vec::new());
+    let folders = files::within(outcomes.len());
+    for (number, (outcome, within)) in outcomes.iter().zip(&folders).enumerate() {
         let Outcome {
             analysis,
             provenance,
         } = outcome;
         let written = write_report(analysis, provenance, &task.run.report)?;
-        write_all(folder, &written)?;
+        write_all(&sink, within, &written)?;
         if task.run.parquet {
-            write_all(folder, &parquet(outcome)?)?;
+            write_all(&sink, within, &parquet(outcome)?)?;
         }
         if number == 0 {
             failed.clone_from(&provenance.failed);
             // Images are the same for all moirés. They come after the numbers of the first.
             let known = task.known(&task.inputs);
-            failed.extend(export::write(&out, &exports, analysis, &known));
+            let from = (task.inputs.as_slice(), &known);
+            failed.extend(export::write(&sink, &exports, analysis, from));
         }
         if !args.quiet && !args.json {
             if outcomes.len() > 1 {
-                say(&format!(
+                answers.push(format!(
                     "\n== moiré {} of {}: {}\n",
                     number + 1,
                     outcomes.len(),
                     analysis.settings.bilayer().name()
-                ))?;
+                ));
             }
-            say(&summary(analysis))?;
-            say(&format!(
+            answers.push(summary(analysis));
+            answers.push(format!(
                 "\nWritten to {}\n",
-                files::main_file(folder, &written).display()
-            ))?;
+                files::main_file(&out.join(within), &written).display()
+            ));
         }
         let results = written.into_iter().find(|(name, _)| name == "results.json");
         documents.extend(results.map(|(_, bytes)| bytes));
     }
     if args.json {
-        say(&one_document(&documents))?;
+        answers.push(one_document(&documents));
+    }
+    commit(sink)?;
+    for answer in answers {
+        say(&answer)?;
     }
     eprint!("{}", summary::failures(&failed));
-    let written: Vec<_> = folders.iter().map(|f| f.join("results.json")).collect();
-    Ok(if task.is_same(&written) && failed.is_empty() {
-        ExitCode::SUCCESS
-    } else {
-        ExitCode::FAILURE
-    })
+    if let Some(why) = &refused {
+        eprintln!("error: {}: {}", why.place, why.message);
+    }
+    Ok(
+        if task.is_same(&documents) && failed.is_empty() && refused.is_none() {
+            ExitCode::SUCCESS
+        } else {
+            ExitCode::FAILURE
+        },
+    )
 }
 
 /// The analysis of every moiré, with the record of the run.

@@ -69,6 +69,11 @@ impl From<FrameArg> for FrameOrder {
 }
 
 impl KnownArgs {
+    /// The file that is read beside each scan.
+    pub(crate) fn second_file(&self) -> Option<&PathBuf> {
+        self.sensors.as_ref()
+    }
+
     /// What the user tells.
     pub(crate) fn told(&self) -> Told {
         let sensors = self.sensors.as_ref();
@@ -81,7 +86,7 @@ impl KnownArgs {
             x_sensor: self.x_sensor.clone(),
             y_sensor: self.y_sensor.clone(),
             sensor_unit: self.sensor_unit.clone(),
-            sensors: sensors.map(|path| path.display().to_string()),
+            sensors: sensors.map(|path| moiregauge_pipeline::names::in_words(path)),
             crop: self.crop,
         }
     }

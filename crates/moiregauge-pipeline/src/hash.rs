@@ -8,6 +8,8 @@ use std::path::Path;
 use moiregauge_report::InputFile;
 use sha2::{Digest as _, Sha256};
 
+use crate::names::in_words;
+
 /// The digits of a hash.
 pub fn hexadecimal(bytes: &[u8]) -> String {
     let mut text = String::with_capacity(2 * bytes.len());
@@ -39,7 +41,7 @@ pub fn identity(name: &Path, place: &Path) -> io::Result<InputFile> {
         bytes += count as u64;
     }
     Ok(InputFile {
-        file: name.display().to_string(),
+        file: in_words(name),
         sha256: hexadecimal(&hash.finalize()),
         bytes,
     })

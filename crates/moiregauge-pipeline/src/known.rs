@@ -12,6 +12,7 @@ use spmfile::{
 };
 
 use crate::session;
+use crate::twice::distinct;
 
 /// Why a file cannot be read as the user knows it.
 #[derive(Debug, thiserror::Error)]
@@ -66,7 +67,7 @@ pub struct Known {
 impl Known {
     /// What is told of these files.
     pub fn new(told: &Told, inputs: &[PathBuf]) -> Self {
-        let mut order = inputs.to_vec();
+        let (mut order, _) = distinct(inputs);
         order.sort_by(|a, b| natural_order(&a.to_string_lossy(), &b.to_string_lossy()));
         Self {
             told: told.clone(),

@@ -11,6 +11,7 @@ use serde::Deserialize;
 
 use crate::hash::identity;
 use crate::known::{Known, Places};
+use crate::names::in_words;
 use crate::session;
 
 /// Why a run cannot be repeated.
@@ -217,14 +218,14 @@ fn by_content(file: &InputFile, folder: &Path) -> Option<PathBuf> {
 pub fn record_files(run: &mut Run, known: &Known, inputs: &[PathBuf], measured: &[InputFile]) {
     let mut others = BTreeMap::new();
     let mut add = |name: &Path, place: &Path| -> std::io::Result<()> {
-        let file = name.display().to_string();
+        let file = in_words(name);
         if !measured.iter().any(|m| m.file == file) && !others.contains_key(&file) {
             others.insert(file, identity(name, place)?);
         }
         Ok(())
     };
     for path in inputs {
-        let file = path.display().to_string();
+        let file = in_words(path);
         match add(path, known.place(path)) {
             Ok(()) => run.inputs.push(file),
             Err(error) => run.left_out.push(FailedInput {

@@ -2,15 +2,16 @@
 
 use std::path::{Path, PathBuf};
 
+use anyhow::Context as _;
 use indicatif::{ProgressBar, ProgressStyle};
 use moiregauge::analysis::Analysis;
 use moiregauge::caveat::Caveat;
 use moiregauge::series::{
-    MeasureError, MeasuredScan, Window, analyse, choose_channel, common_window, illustrate,
-    measure_moires, sorted_moires,
+    MeasureError, MeasuredScan, Window, about_repeat, analyse, choose_channel, common_window,
+    illustrate, measure_moires, sorted_moires,
 };
 use moiregauge::settings::Settings;
-use moiregauge_pipeline::{hexadecimal, set_of};
+use moiregauge_pipeline::{Repeated, distinct, hexadecimal, names, set_of};
 use moiregauge_report::results::NamedSet;
 use moiregauge_report::{FailedInput, InputFile, Provenance};
 use rayon::prelude::*;
@@ -38,6 +39,8 @@ pub(crate) fn analyse_files(
     illustrated: bool,
     loud: bool,
 ) -> Result<Vec<Outcome>, Vec<FailedInput>> {
+    let (inputs, repeated) = distinct(inputs);
+    let inputs = inputs.as_slice();
     let window = match settings.overlap.then(|| overlap(inputs, settings, known)) {
         None => None,
         Some(Some(window)) => Some(window),
@@ -74,7 +77,7 @@ pub(crate) fn analyse_files(
                 files.push(file);
             }
             Err(error) => failed.push(FailedInput {
-                file: path.display().to_string(),
+                file: names::in_words(path),
                 error: format!("{error:#}"),
             }),
         }
@@ -95,13 +98,14 @@ pub(crate) fn analyse_files(
         .map(|(moire, scans)| {
             let settings = &settings.of_moire(moire);
             let mut analysis = analyse(scans, settings);
+            analysis.caveats.extend(given_again(&repeated));
             analysis
                 .caveats
                 .extend(other.as_ref().map(channel::Other::caveat));
             if illustrated {
                 analysis.sets.par_iter_mut().for_each(|set| {
                     set.illustration = set.scans.first().and_then(|first| {
-                        let reading = read(Path::new(&first.file), settings, known).ok()?;
+                        let reading = read_again(inputs, &first.file, settings, known).ok()?;
                         illustrate(&reading.scan, first, settings)
                     });
                 });
@@ -112,6 +116,17 @@ pub(crate) fn analyse_files(
             }
         });
     Ok(outcomes.collect())
+}
+
+/// What has to be said of files that were named more than once.
+pub(crate) fn given_again(repeated: &[Repeated]) -> Vec<Caveat> {
+    let words = |again: &Repeated| {
+        let of = again.of.display().to_string();
+        about_repeat(&again.path.display().to_string(), &of)
+    };
+    let mut caveats: Vec<Caveat> = repeated.iter().map(words).collect();
+    caveats.dedup();
+    caveats
 }
 
 fn measure_all(
@@ -164,6 +179,7 @@ pub(crate) fn measure_file(
     for measured in &mut moires {
         measured.caveats.extend(caveats.iter().cloned());
         measured.set.clone_from(&set);
+        measured.digest = Some(input.sha256.clone());
     }
     Ok((moires, input))
 }
@@ -205,7 +221,7 @@ pub(crate) fn read(path: &Path, settings: &Settings, known: &Known) -> anyhow::R
     let (scan, replaced) = known.read(path, &bytes, &wanted).map_err(with_option)?;
     let hash = Sha256::digest(&bytes);
     let input = InputFile {
-        file: path.display().to_string(),
+        file: names::in_words(path),
         sha256: hexadecimal(&hash),
         bytes: bytes.len() as u64,
     };
@@ -220,6 +236,17 @@ pub(crate) fn read(path: &Path, settings: &Settings, known: &Known) -> anyhow::R
         scan,
         input,
     })
+}
+
+/// Reads an input again that the results know by the words of its path.
+pub(crate) fn read_again(
+    inputs: &[PathBuf],
+    words: &str,
+    settings: &Settings,
+    known: &Known,
+) -> anyhow::Result<Reading> {
+    let path = names::with_words(inputs, words).context("it is none of the inputs")?;
+    read(path, settings, known)
 }
 
 /// The region common to all files that can be read.

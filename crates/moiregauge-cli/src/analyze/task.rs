@@ -113,13 +113,19 @@ impl Task {
         run
     }
 
-    /// Whether a repetition came to the same document, one of `written`; says so if not. A new run always did.
-    pub(crate) fn is_same(&self, written: &[PathBuf]) -> bool {
+    /// All files that are read: they are never written over.
+    pub(crate) fn files(&self) -> Vec<PathBuf> {
+        let inputs = self.inputs.iter();
+        let places = inputs.map(|path| self.places.get(path).unwrap_or(path).clone());
+        places.collect()
+    }
+
+    /// Whether a repetition came to the same document, one of these; says so if not. A new run always did.
+    pub(crate) fn is_same(&self, documents: &[Vec<u8>]) -> bool {
         let Some((path, document)) = &self.document else {
             return true;
         };
-        let same = |file: &PathBuf| std::fs::read(file).is_ok_and(|b| b == document.bytes);
-        if written.iter().any(same) {
+        if documents.contains(&document.bytes) {
             return true;
         }
         eprintln!(
