@@ -172,6 +172,9 @@ pub(crate) fn run(args: &CalibrateArgs) -> anyhow::Result<ExitCode> {
                 out.display()
             );
         }
+        if let Some(problem) = found.calibration.problem() {
+            bail!("{} is not written: {problem}", out.display());
+        }
         let text = file::text(&found, &lattice, args.drift_sigma, &files)?;
         file.write(text.into_bytes())?;
         if !args.quiet {

@@ -18,6 +18,7 @@ mod repeats;
 mod results;
 mod round_trip;
 mod same_bytes;
+mod scanner;
 mod senses;
 mod sessions;
 mod several;

@@ -11,6 +11,7 @@ use super::overlap::Window;
 use super::positions::{nominal, speeds, usable_sensors};
 use super::scanner::{about_calibration, calibrated};
 use super::shared::correlation;
+use crate::calibration::Calibration;
 use crate::caveat::Caveat;
 use crate::drift::Observation;
 use crate::estimate::Estimate;
@@ -98,6 +99,9 @@ pub enum MeasureError {
         /// What is there.
         present: &'static str,
     },
+    /// A calibration that no scanner can have.
+    #[error("the calibration of the scanner cannot be used: {0}")]
+    Calibration(String),
     /// No size.
     #[error("the file gives neither position sensors nor a scan size")]
     NoSize,
@@ -216,6 +220,10 @@ fn measure_with(
     window: Option<&Window>,
     find: Find,
 ) -> Result<Vec<MeasuredScan>, MeasureError> {
+    let problem = settings.scanner.as_ref().and_then(Calibration::problem);
+    if let Some(problem) = problem {
+        return Err(MeasureError::Calibration(problem));
+    }
     let channels = channels(scan, settings)?;
     let mut caveats = Vec::new();
     let mut moires: Vec<Vec<MeasuredLine>> = Vec::new();

@@ -3,6 +3,7 @@
 //! [`measure_scan`] does what needs the pixels, one scan at a time; [`analyse`] does the rest from
 //! the few numbers that remain. [`illustrate`] goes back to the pixels of one scan for the figures.
 
+mod alike;
 mod atomic;
 mod averaging;
 mod calibrate;
