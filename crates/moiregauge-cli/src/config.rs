@@ -51,7 +51,8 @@ background = "plane"
 #   lattice_constant_sigma_nm = 0.0001
 #   poisson_ratio_sigma = 0.03
 #   source = "where the numbers come from"
-material = "graphene"
+# Without it graphene is assumed, and results say so.
+# material = "graphene"
 
 # How many moirés every image shows (a twisted trilayer, twisted graphene on aligned hBN); each is fitted
 # with the others taken off and has results of its own.
@@ -149,6 +150,12 @@ pub(crate) fn read(path: &Path) -> anyhow::Result<Settings> {
 fn parse(text: &str, folder: &Path) -> anyhow::Result<Settings> {
     let mut table: toml::Table = toml::from_str(text)?;
     let mut changed = false;
+    // Who names layers has chosen them.
+    let layers = ["material", "substrate", "moire_layers"];
+    if layers.iter().any(|key| table.contains_key(*key)) && !table.contains_key("layers_chosen") {
+        table.insert("layers_chosen".to_owned(), toml::Value::Boolean(true));
+        changed = true;
+    }
     changed |= name_materials(&mut table)?;
     if let Some(toml::Value::Array(moires)) = table.get_mut("moire_layers") {
         for layers in moires.iter_mut().filter_map(toml::Value::as_table_mut) {

@@ -79,9 +79,14 @@ pub(crate) struct Known {
 }
 
 impl KnownArgs {
+    /// The file that is read beside each scan.
+    pub(crate) fn second_file(&self) -> Option<&PathBuf> {
+        self.sensors.as_ref()
+    }
+
     /// What is known of these files.
     pub(crate) fn of(&self, inputs: &[PathBuf]) -> Known {
-        let mut order = inputs.to_vec();
+        let (mut order, _) = moiregauge_pipeline::distinct(inputs);
         order.sort_by(|a, b| natural_order(&a.to_string_lossy(), &b.to_string_lossy()));
         Known {
             args: self.clone(),

@@ -27,6 +27,8 @@ pub(crate) fn run(args: &MoireArgs) -> anyhow::Result<ExitCode> {
         return Ok(ExitCode::SUCCESS);
     }
     let settings = args.settings()?;
+    let file = |path| crate::outputs::file(path, args.force, &[]);
+    let file = args.figure.as_deref().map(file).transpose()?;
     let asked = args.question()?;
     let lattice = match &asked {
         Question::Forward(stacking) => LatticeVectors {
@@ -79,7 +81,7 @@ pub(crate) fn run(args: &MoireArgs) -> anyhow::Result<ExitCode> {
             },
         ))?;
     }
-    if let Some(path) = &args.figure {
+    if let (Some(path), Some(file)) = (&args.figure, file) {
         let drawing = cell_figure(&cell, "moire", &document.layers);
         let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("");
         let bytes = match extension.to_ascii_lowercase().as_str() {
@@ -87,7 +89,7 @@ pub(crate) fn run(args: &MoireArgs) -> anyhow::Result<ExitCode> {
             "png" => drawing.png()?,
             other => bail!("--figure: expected a name that ends in .svg or .png, found {other:?}"),
         };
-        std::fs::write(path, bytes).with_context(|| format!("cannot write {}", path.display()))?;
+        file.write(bytes)?;
     }
     Ok(ExitCode::SUCCESS)
 }

@@ -205,6 +205,8 @@ pub struct Settings {
     /// `material` and `substrate`.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub moire_layers: Vec<MoireLayers>,
+    /// Whether somebody chose the layers; what nobody chose is said to be assumed.
+    pub layers_chosen: bool,
     /// The orientation of one of the layers, if it is known: tells isotropic strain from twist.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lattice_angle: Option<KnownOrientation>,
@@ -265,6 +267,12 @@ impl Settings {
         own
     }
 
+    /// Whether nobody chose the layers: they are the default, and nothing says that they are meant.
+    pub fn layers_are_assumed(&self) -> bool {
+        let defaults = self.substrate.is_none() && self.moire_layers.is_empty();
+        !self.layers_chosen && defaults && self.material == Material::graphene()
+    }
+
     /// These settings with the method of arXiv:2406.08681 and all that belongs to it: its form of the strain equation,
     /// and images cropped to the region that all scans share.
     #[must_use]
@@ -300,6 +308,7 @@ impl Default for Settings {
             moires: 1,
             substrate: None,
             moire_layers: Vec::new(),
+            layers_chosen: false,
             lattice_angle: None,
             lattice_angle_2: None,
             twist_sense: None,

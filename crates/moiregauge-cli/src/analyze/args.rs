@@ -195,6 +195,7 @@ impl AnalyzeArgs {
         }
         if let Some(a) = self.lattice_constant {
             s.material.lattice_constant_nm = a;
+            s.layers_chosen = true;
         }
         if let Some(ratio) = self.poisson_ratio {
             s.material.poisson_ratio = ratio;
@@ -255,6 +256,7 @@ impl AnalyzeArgs {
             return Ok(());
         }
         s.moire_layers.clear();
+        s.layers_chosen = true;
         if pairs.len() == 1 {
             (s.material, s.substrate) = pairs.swap_remove(0);
         } else {

@@ -8,7 +8,7 @@ use moiregauge::series::{AtomicOrientation, atomic_orientation};
 use moiregauge::settings::{KnownOrientation, LatticeDirection, Method, Settings, TwistSense};
 use moiregauge_report::InputFile;
 
-use super::chain::measure_file;
+use super::chain::{given_again, measure_file};
 use crate::info::expand;
 use crate::input::KnownArgs;
 
@@ -140,6 +140,7 @@ impl OrientationArgs {
             moires: 1,
             ..settings.clone()
         };
+        let (paths, repeated) = moiregauge_pipeline::distinct(&paths);
         let known = known.of(&paths);
         let (mut scans, mut files) = (Vec::new(), Vec::new());
         for path in &paths {
@@ -153,13 +154,14 @@ impl OrientationArgs {
             1 => layers.reference,
             _ => layers.stretched,
         };
-        let found = atomic_orientation(
+        let mut found = atomic_orientation(
             &scans,
             material,
             self.lattice_angle_layer,
             &settings.calibration,
         )
         .context("--atomic")?;
+        found.caveats.extend(given_again(&repeated));
         ensure!(
             found.angle.sigma.is_finite(),
             "--atomic: the images do not tell the orientation"

@@ -3,19 +3,19 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-use moiregauge::analysis::{Analysis, Combined, SetAnalysis};
+use moiregauge::analysis::{Analysis, Combined, ScanAnalysis, SetAnalysis};
 use moiregauge::budget::Budget;
 use moiregauge::caveat::Caveat;
 use moiregauge::estimate::Estimate;
 use moiregauge::lattice::LatticeVectors;
 use moiregauge::readings::{ChosenBy, NameReading, Naming, Readings};
 use moiregauge::strain::{StrainTensor, TwistStrain};
-use moiregauge_report::{FailedInput, fixed, plus_minus, two_digits};
+use moiregauge_report::{FailedInput, fixed, layers, plus_minus, two_digits};
 use spmfile::FrameDirection;
 
 /// Per set and combined: drift, twist, strain; then what to keep in mind.
 pub(crate) fn summary(analysis: &Analysis) -> String {
-    let mut text = String::new();
+    let mut text = format!("Layers: {}\n", layers(&analysis.settings));
     for set in &analysis.sets {
         set_summary(&mut text, set);
     }
@@ -31,14 +31,19 @@ pub(crate) fn summary(analysis: &Analysis) -> String {
 }
 
 fn set_summary(text: &mut String, set: &SetAnalysis) {
-    let count = set.scans.len();
+    let used = || set.scans.iter().filter(|s| s.excluded.is_none());
+    let (count, others) = (used().count(), set.scans.len() - used().count());
     let _ = writeln!(
         text,
-        "{}: {}, {count} scan{} ({})",
+        "{}: {}, {count} scan{} ({}){}",
         set.name,
         set.channel,
         if count == 1 { "" } else { "s" },
-        directions(set)
+        directions(&used().collect::<Vec<_>>()),
+        match others {
+            0 => String::new(),
+            n => format!(", {n} more not used"),
+        }
     );
     match &set.drift {
         Some(drift) => {
@@ -80,9 +85,9 @@ fn set_summary(text: &mut String, set: &SetAnalysis) {
 }
 
 /// How many scans went up, how many down.
-fn directions(set: &SetAnalysis) -> String {
+fn directions(scans: &[&ScanAnalysis]) -> String {
     let count = |direction: Option<FrameDirection>| {
-        let scans = set.scans.iter();
+        let scans = scans.iter();
         scans.filter(|s| s.frame_direction == direction).count()
     };
     let known = format!(
@@ -92,7 +97,7 @@ fn directions(set: &SetAnalysis) -> String {
     );
     match count(None) {
         0 => known,
-        all if all == set.scans.len() => "direction unknown".to_owned(),
+        all if all == scans.len() => "direction unknown".to_owned(),
         unknown => format!("{known}, {unknown} unknown"),
     }
 }

@@ -101,6 +101,9 @@ pub(crate) struct MoireArgs {
     /// Draw the cell: a name that ends in .svg or .png
     #[arg(long, value_name = "FILE")]
     pub(super) figure: Option<PathBuf>,
+    /// Write over a figure that exists
+    #[arg(long, requires = "figure")]
+    pub(super) force: bool,
     /// Print JSON
     #[arg(long)]
     pub(super) json: bool,

@@ -16,6 +16,7 @@
 
 use nalgebra::{Complex, Matrix2, Matrix4, RowVector4, Vector2};
 
+use super::identity::once;
 use super::measure::MeasuredScan;
 use crate::caveat::Caveat;
 use crate::chi2::enlargement;
@@ -102,11 +103,12 @@ pub fn atomic_orientation(
     layer: u8,
     calibration: &Calibration,
 ) -> Result<AtomicOrientation, AtomicError> {
+    let (scans, repeats) = once(scans.to_vec());
     let first = scans.iter().find_map(|s| s.lines.first());
     let reference = first.ok_or(AtomicError::Nothing)?.in_sensor_coordinates();
     let reference = canonical(&reference).basis;
     let mut observations = Vec::new();
-    for scan in scans {
+    for scan in &scans {
         for line in &scan.lines {
             if line.timing.is_none() {
                 return Err(AtomicError::NoTiming(scan.file.clone()));
@@ -115,6 +117,7 @@ pub fn atomic_orientation(
         }
     }
     let mut caveats: Vec<Caveat> = scans.iter().flat_map(|s| s.caveats.clone()).collect();
+    caveats.extend(repeats);
     let files: Vec<String> = scans.iter().map(|s| s.file.clone()).collect();
     let place = files.join(", ");
     let atoms = material.atomic_pair();

@@ -16,6 +16,7 @@ use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
 use spmfile::{FrameDirection, LineDirection};
 
 use super::group::{Group, groups};
+use super::identity::once;
 use super::measure::{MeasuredLine, MeasuredScan};
 use crate::analysis::Axis;
 use crate::calibration::{Calibration, Coordinates, KnownLattice, Shown, shown};
@@ -128,7 +129,9 @@ pub fn calibrate(
     grouping: Grouping,
 ) -> Result<Calibrated, CalibrateError> {
     let cell = known.cell().ok_or(CalibrateError::Cell)?;
+    let (scans, repeats) = once(scans);
     let mut caveats: Vec<Caveat> = scans.iter().flat_map(|s| s.caveats.clone()).collect();
+    caveats.extend(repeats);
     caveats.retain(|c| c.code != "no-position-sensors" && c.code != "second-lattice");
     let from_sensors = |line: &MeasuredLine| line.geometry.from_sensors;
     let lines = || scans.iter().flat_map(|s| &s.lines);

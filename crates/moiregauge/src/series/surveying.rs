@@ -19,7 +19,8 @@ use crate::image::Image;
 use crate::lattice::reciprocal::{labelled_like, real_from_reciprocal};
 use crate::lattice::{LatticeError, LatticeVectors, MeasuredLattice, measure};
 use crate::map::{
-    Grid, LatticeMap, Reference, Resolution, Survey, TwistStrainMap, UsedHarmonic, local_lattices,
+    FULL_WIDTH, Grid, LatticeMap, Reference, Resolution, ResolutionError, Survey, TwistStrainMap,
+    UsedHarmonic, local_lattices,
 };
 use crate::readings::{WaveStrengths, name_caveats, named_waves};
 use crate::resample::at_rest;
@@ -61,6 +62,9 @@ pub struct SurveyPlan {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SurveyError {
+    /// No image of this size has such a map.
+    #[error(transparent)]
+    Resolution(#[from] ResolutionError),
     /// The lines could not be had.
     #[error("lines {from} to {to} cannot be read: {why}")]
     Lines {
@@ -142,6 +146,7 @@ impl SurveyPlan {
             (n - side) / 2..(n - side) / 2 + side
         });
         let corner = [columns.start, rows.start];
+        resolution.fits(geometry.extent(), FULL_WIDTH)?;
         let middle = block(read, columns, rows)?;
         let of_middle = geometry.cropped(corner, [middle.columns, middle.rows]);
         let found = measure(&middle, &of_middle, settings.background, Method::Lattice)

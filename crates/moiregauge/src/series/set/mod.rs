@@ -1,6 +1,7 @@
 //! One set: drift, and every scan before and after correction.
 
 mod about;
+mod headers;
 mod joint;
 mod moire;
 mod published;
@@ -11,8 +12,9 @@ use rayon::prelude::*;
 use spmfile::FrameDirection;
 
 use about::{about_checks, about_mean, about_readings, about_residual};
+use headers::{about_dates, about_headers};
 pub(super) use joint::{checks, joint_fit, lattice_of, terms};
-pub(super) use moire::moire;
+pub(super) use moire::{IMPOSSIBLE, moire};
 use scan::{plain_mean, scan_analysis};
 
 use super::group::Group;
@@ -62,11 +64,21 @@ pub(super) fn analyse_set(
         .copied()
         .collect();
     let mut solved = drift((&group.name, &used), &all, settings, caveats);
+    caveats.extend(
+        solved
+            .as_ref()
+            .and_then(|_| about_dates(&group.name, &used)),
+    );
     let mut fit = None;
     if joint {
         (solved, fit) = match solved {
             Some(linear) => {
+                let (lattice, velocity) = (linear.lattice, linear.drift.velocity);
                 let (solved, fit) = joint::jointly(linear, &used, reference, settings);
+                caveats.extend(fit.as_ref().and_then(|fit| {
+                    let name = &group.name;
+                    about_headers(name, &used, reference, &lattice, &velocity, fit, settings)
+                }));
                 (Some(solved), fit)
             }
             None => (None, None),
@@ -81,7 +93,12 @@ pub(super) fn analyse_set(
                 let own = fit.as_ref().and_then(|fit| joint::velocity_of(fit, scan));
                 own.unwrap_or((s.drift.velocity, s.drift.covariance))
             });
-            scan_analysis(scan, seen, reference, drift, settings)
+            let found = scan_analysis(scan, seen, reference, drift, settings)?;
+            let motion = |velocity| joint::motion_of(fit.as_ref(), scan, velocity);
+            Some(ScanAnalysis {
+                motion: found.drift.and_then(motion),
+                ..found
+            })
         })
         .collect();
     let checks = fit.as_ref().map(|fit| {
