@@ -1,6 +1,5 @@
 //! Files → measured scans → analysis, one file in memory per thread.
 
-use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
@@ -12,15 +11,15 @@ use moiregauge::series::{
     illustrate, measure_moires, sorted_moires, unusual_channels,
 };
 use moiregauge::settings::Settings;
-use moiregauge_pipeline::{Repeated, distinct, names};
+use moiregauge_pipeline::{Repeated, distinct, hexadecimal, names, set_of};
+use moiregauge_report::results::NamedSet;
 use moiregauge_report::{FailedInput, InputFile, Provenance};
 use rayon::prelude::*;
 use sha2::{Digest as _, Sha256};
 use spmfile::{ChannelInfo, Scan, sensor_axis};
 
-use super::args::NamedSet;
 use super::channel;
-use crate::input::Known;
+use crate::input::{Known, with_option};
 
 /// What came out, and of what.
 pub(crate) struct Outcome {
@@ -91,6 +90,7 @@ pub(crate) fn analyse_files(
         seed: settings.seed,
         inputs: files,
         failed,
+        run: None,
     };
     let outcomes = sorted_moires(scans)
         .into_iter()
@@ -175,10 +175,7 @@ pub(crate) fn measure_file(
         caveats,
     } = read(path, settings, known)?;
     let mut moires = measure_moires(&input.file, &scan, settings, window).map_err(with_hint)?;
-    let set = sets
-        .iter()
-        .find(|(_, of)| path.starts_with(of))
-        .map(|(name, _)| name.clone());
+    let set = set_of(sets, path).map(str::to_owned);
     for measured in &mut moires {
         let several = |c: &&mut Caveat| c.code == "several-images";
         for caveat in measured.caveats.iter_mut().filter(several) {
@@ -222,7 +219,7 @@ pub(crate) fn read(path: &Path, settings: &Settings, known: &Known) -> anyhow::R
 
 /// The same of an image of any size, for surveys.
 pub(crate) fn read_any(path: &Path, settings: &Settings, known: &Known) -> anyhow::Result<Reading> {
-    let bytes = moiregauge_pipeline::read(path)?;
+    let bytes = moiregauge_pipeline::read(known.place(path))?;
     let channels = channel::names(path, &bytes, known)?;
     let names: Vec<_> = channels
         .iter()
@@ -233,7 +230,7 @@ pub(crate) fn read_any(path: &Path, settings: &Settings, known: &Known) -> anyho
         chosen.as_ref().is_none_or(|name| *name == channel.name)
             || sensor_axis(&channel.name, &channel.internal_name).is_some()
     };
-    let (scan, replaced) = known.read(path, &bytes, &wanted)?;
+    let (scan, replaced) = known.read(path, &bytes, &wanted).map_err(with_option)?;
     let hash = Sha256::digest(&bytes);
     let input = InputFile {
         file: names::in_words(path),
@@ -267,15 +264,6 @@ pub(crate) fn read_again(
 ) -> anyhow::Result<Reading> {
     let path = names::with_words(inputs, words).context("it is none of the inputs")?;
     read(path, settings, known)
-}
-
-pub(crate) fn hexadecimal(bytes: &[u8]) -> String {
-    let mut text = String::with_capacity(2 * bytes.len());
-    for byte in bytes {
-        // Writing into a string cannot fail.
-        let _ = write!(text, "{byte:02x}");
-    }
-    text
 }
 
 /// The region common to all files that can be read.
