@@ -12,18 +12,19 @@ use std::process::ExitCode;
 
 use anyhow::{Context as _, bail, ensure};
 use clap::ValueEnum;
-use moiregauge::analysis::Axis;
 use moiregauge::caveat::Caveat;
-use moiregauge::map::{
-    DriftChange, LatticeMap, Resolution, TwistStrainMap, combine, drift_change, register,
+use moiregauge::map::{DriftChange, LatticeMap, Resolution, TwistStrainMap, register};
+use moiregauge::series::{
+    LineMap, MapMethod, SurveyPlan, about_repeat, average_maps, change_of_drift, domains_of_scan,
+    map_scan, refusal,
 };
-use moiregauge::series::{LineMap, MapMethod, SurveyPlan, domains_of_scan, map_scan};
 use moiregauge::settings::Settings;
+use moiregauge_pipeline::sink::FolderSink;
 use moiregauge_report::{FailedInput, Provenance};
-use spmfile::FrameDirection;
 
-use crate::analyze::{AnalyzeArgs, Outcome, analyse_files, failures, read};
-use crate::info::inputs;
+use crate::analyze::{
+    AnalyzeArgs, Outcome, Task, analyse_files, failures, given_again, read_again,
+};
 use crate::input::Known;
 use output::{Made, write};
 pub(crate) use stripes::in_words as stripes_in_words;
@@ -105,44 +106,63 @@ impl From<MapMethodArg> for MapMethod {
 
 /// Makes the maps and writes them.
 pub(crate) fn run(args: &MapArgs) -> anyhow::Result<ExitCode> {
-    let settings = args.analyze.settings()?;
+    let task = Task::new(&args.analyze, "map")?;
+    let as_before;
+    let args = if args.analyze.is_replay() {
+        as_before = args.again(&task)?;
+        &as_before
+    } else {
+        args
+    };
+    ensure!(
+        task.run.atomic.is_none() && task.run.export.is_empty() && !task.run.parquet,
+        "--atomic, --export and --parquet are for `moiregauge analyze`: a map has no use for them"
+    );
+    let settings = task.run.settings.clone();
     let resolution = args.resolution()?;
     args.regions.check()?;
-    let out = args.analyze.out();
-    ensure!(
-        args.analyze.force() || !out.join("map.json").exists(),
-        "{} already holds a map; give another --out, or --force to write over it",
-        out.display()
-    );
     args.analyze.start_threads()?;
-    let (inputs, failed) = inputs(args.analyze.paths());
-    let known = args.analyze.known().of(&inputs);
+    let inputs = &task.inputs;
+    let sink = output::sink(args, &task.files())?;
+    let known = task.known(inputs);
     let whole = (&settings, &known, &resolution);
-    let made = match survey(args, &inputs, whole, &failed)? {
+    let document = args.analyze.out().join("map.json");
+    let mut made = match survey((args, &sink), inputs, whole, &task.failed)? {
         Some(made) => made,
-        None => match together(args, &inputs, whole, failed)? {
+        None => match together(args, inputs, whole, task.failed.clone())? {
             Answer::Lattice(made) => *made,
-            Answer::Stripes(found) => {
-                stripes::write(&found, args)?;
-                return Ok(ExitCode::SUCCESS);
+            Answer::Stripes(mut found) => {
+                let provenance = &mut found.provenance;
+                provenance.run = Some(task.record(&known, &provenance.inputs));
+                stripes::write(&found, args, sink)?;
+                return Ok(ended(task.is_same(&written(&document))));
             }
         },
     };
+    made.provenance.run = Some(task.record(&known, &made.provenance.inputs));
     let lost = failures(&made.provenance.failed);
     let complete = made.provenance.failed.is_empty();
-    write(&made, args)?;
-    survey::forget(out);
+    write(&made, args, sink)?;
     eprint!("{lost}");
-    Ok(if complete {
+    Ok(ended(task.is_same(&written(&document)) && complete))
+}
+
+/// The document of a map, if it can be read.
+fn written(document: &Path) -> Vec<Vec<u8>> {
+    std::fs::read(document).into_iter().collect()
+}
+
+fn ended(well: bool) -> ExitCode {
+    if well {
         ExitCode::SUCCESS
     } else {
         ExitCode::FAILURE
-    })
+    }
 }
 
 /// Maps images that are too large for memory, side by side; `None` where the first is not large.
 fn survey(
-    args: &MapArgs,
+    (args, sink): (&MapArgs, &FolderSink),
     inputs: &[PathBuf],
     (settings, known, resolution): (&Settings, &Known, &Resolution),
     failed: &[FailedInput],
@@ -159,21 +179,32 @@ fn survey(
     if !any {
         return Ok(None);
     }
-    let (out, loud) = (args.analyze.out(), args.analyze.is_loud());
-    let (mut maps, mut images, mut caveats) = (Vec::new(), Vec::new(), Vec::new());
+    ensure!(
+        args.analyze.sets()?.is_empty(),
+        "--set: images that are mapped in bands lie side by side in one map and make no sets"
+    );
+    let loud = args.analyze.is_loud();
+    let (inputs, again) = moiregauge_pipeline::distinct(inputs);
+    let (mut maps, mut images, mut caveats) = (Vec::new(), Vec::new(), given_again(&again));
     let (mut read, mut plans) = (Vec::new(), Vec::<(survey::Large, SurveyPlan)>::new());
-    for path in inputs {
+    for path in &inputs {
         let large = open(path, true)?.context("no image")?;
+        let same = |(known, _): &&(survey::Large, _)| known.input.sha256 == large.input.sha256;
+        if let Some((known, _)) = plans.iter().find(same) {
+            caveats.push(about_repeat(&large.input.file, &known.input.file));
+            continue;
+        }
         let (map, plan) = large
             .map(
                 (settings, resolution),
                 plans.first().map(|p| &p.1),
-                out,
+                sink,
                 loud,
             )
             .with_context(|| path.display().to_string())?;
         let file = large.input.file.clone();
         caveats.extend(large.caveats.iter().cloned());
+        caveats.extend(plan.caveats.iter().cloned());
         let drift = if plan.drift_corrected {
             "corrected for the drift that was given"
         } else if settings.drift.is_some() {
@@ -212,6 +243,7 @@ fn survey(
             seed: settings.seed,
             inputs: read,
             failed: failed.to_vec(),
+            run: None,
         },
         settings: settings.clone(),
         images,
@@ -259,6 +291,11 @@ fn together(
             bail!("nothing could be analysed");
         }
     };
+    if let Some(why) = refusal(&analysis).filter(|why| why.code == "everything-excluded") {
+        bail!("{}", why.message);
+    }
+    // The maps read the lattice under the name that the analysis found.
+    let settings = &analysis.named_settings();
     let used = || {
         analysis
             .sets
@@ -266,11 +303,13 @@ fn together(
             .flat_map(|s| &s.scans)
             .filter(|s| s.excluded.is_none())
     };
-    let origin = used().filter_map(|s| s.acquired).min();
+    let origin = used()
+        .filter_map(|s| s.motion.map(|m| m.middle))
+        .min_by(f64::total_cmp);
     let how = (args.map_method.into(), resolution);
     let mut maps = Vec::new();
     for scan in used() {
-        let mapped = read(Path::new(&scan.file), settings, known)
+        let mapped = read_again(inputs, &scan.file, settings, known)
             .and_then(|r| Ok(map_scan(&r.scan, (scan, origin), settings, how)?));
         match mapped {
             Ok(lines) => maps.extend(lines),
@@ -282,8 +321,7 @@ fn together(
     }
     let mut caveats = analysis.caveats.clone();
     registered(&mut maps, &mut caveats);
-    let all: Vec<&LatticeMap> = maps.iter().map(|m| &m.map).collect();
-    let Some((lattices, agreement)) = combine(&all) else {
+    let Some((lattices, agreement)) = average_maps(&maps) else {
         eprint!("{}", failures(&provenance.failed));
         bail!("no image gave a map");
     };
@@ -304,12 +342,12 @@ fn together(
         let narrow = maps.iter().find_map(|m| narrow_margin(m.margin, &m.file));
         caveats.extend(narrow);
     }
-    let drift_change = change(&maps);
+    let drift_change = change_of_drift(&maps);
     about_change(drift_change, &mut caveats);
     let map = TwistStrainMap::new(&lattices, &found);
     let look = |contrast| {
         let all = used().flat_map(|scan| {
-            let reading = read(Path::new(&scan.file), settings, known).ok();
+            let reading = read_again(inputs, &scan.file, settings, known).ok();
             reading.map_or_else(Vec::new, |r| {
                 domains_of_scan(&r.scan, (scan, origin), settings, contrast)
             })
@@ -415,33 +453,20 @@ fn registered(maps: &mut [LineMap], caveats: &mut Vec<Caveat>) {
     }
 }
 
-/// Compares upward with downward frames of one slow axis.
-fn change(maps: &[LineMap]) -> Option<DriftChange> {
-    let axis = |m: &LineMap| {
-        m.time_gradient.map(|u| {
-            if u.x.abs() > u.y.abs() {
-                Axis::X
-            } else {
-                Axis::Y
-            }
-        })
-    };
-    let of = |direction: FrameDirection, slow: Axis| -> Vec<&LineMap> {
-        let wanted = |m: &&LineMap| m.frame_direction == Some(direction) && axis(m) == Some(slow);
-        maps.iter().filter(wanted).collect()
-    };
-    [Axis::Y, Axis::X].into_iter().find_map(|slow| {
-        let (up, down) = (of(FrameDirection::Up, slow), of(FrameDirection::Down, slow));
-        let gradient = up.first()?.time_gradient?;
-        let average = |maps: &[&LineMap]| {
-            let maps: Vec<&LatticeMap> = maps.iter().map(|m| &m.map).collect();
-            Some(combine(&maps)?.0)
-        };
-        drift_change(&average(&up)?, &average(&down)?, gradient)
-    })
-}
-
 impl MapArgs {
+    /// The options of the run to be repeated, with the place and the words of this one.
+    fn again(&self, task: &Task) -> anyhow::Result<Self> {
+        let program = std::iter::once("moiregauge".to_owned());
+        let arguments = program.chain(task.run.arguments.iter().cloned());
+        let crate::Command::Map(mut args) = crate::command(arguments)
+            .context("--replay: the document does not hold the options of a map")?
+        else {
+            bail!("--replay: expected the options of a map");
+        };
+        args.analyze = args.analyze.with_place_of(&self.analyze);
+        Ok(*args)
+    }
+
     fn resolution(&self) -> anyhow::Result<Resolution> {
         for (name, value) in [("--window", self.window), ("--step", self.step)] {
             ensure!(

@@ -1,24 +1,25 @@
 //! Files → measured scans → analysis, one file in memory per thread.
 
-use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
+use anyhow::Context as _;
 use indicatif::{ProgressBar, ProgressStyle};
 use moiregauge::analysis::Analysis;
 use moiregauge::caveat::Caveat;
 use moiregauge::series::{
-    MeasureError, MeasuredScan, Window, analyse, choose_channel, common_window, illustrate,
-    measure_moires, sorted_moires,
+    MeasureError, MeasuredScan, Window, about_repeat, analyse, choose_channel, common_window,
+    illustrate, measure_moires, sorted_moires,
 };
 use moiregauge::settings::Settings;
+use moiregauge_pipeline::{Repeated, distinct, hexadecimal, names, set_of};
+use moiregauge_report::results::NamedSet;
 use moiregauge_report::{FailedInput, InputFile, Provenance};
 use rayon::prelude::*;
 use sha2::{Digest as _, Sha256};
 use spmfile::{ChannelInfo, Scan, sensor_axis};
 
-use super::args::NamedSet;
 use super::channel;
-use crate::input::Known;
+use crate::input::{Known, with_option};
 
 /// What came out, and of what.
 pub(crate) struct Outcome {
@@ -38,6 +39,8 @@ pub(crate) fn analyse_files(
     illustrated: bool,
     loud: bool,
 ) -> Result<Vec<Outcome>, Vec<FailedInput>> {
+    let (inputs, repeated) = distinct(inputs);
+    let inputs = inputs.as_slice();
     let window = match settings.overlap.then(|| overlap(inputs, settings, known)) {
         None => None,
         Some(Some(window)) => Some(window),
@@ -74,7 +77,7 @@ pub(crate) fn analyse_files(
                 files.push(file);
             }
             Err(error) => failed.push(FailedInput {
-                file: path.display().to_string(),
+                file: names::in_words(path),
                 error: format!("{error:#}"),
             }),
         }
@@ -87,6 +90,7 @@ pub(crate) fn analyse_files(
         seed: settings.seed,
         inputs: files,
         failed,
+        run: None,
     };
     let outcomes = sorted_moires(scans)
         .into_iter()
@@ -94,13 +98,14 @@ pub(crate) fn analyse_files(
         .map(|(moire, scans)| {
             let settings = &settings.of_moire(moire);
             let mut analysis = analyse(scans, settings);
+            analysis.caveats.extend(given_again(&repeated));
             analysis
                 .caveats
                 .extend(other.as_ref().map(channel::Other::caveat));
             if illustrated {
                 analysis.sets.par_iter_mut().for_each(|set| {
                     set.illustration = set.scans.first().and_then(|first| {
-                        let reading = read(Path::new(&first.file), settings, known).ok()?;
+                        let reading = read_again(inputs, &first.file, settings, known).ok()?;
                         illustrate(&reading.scan, first, settings)
                     });
                 });
@@ -111,6 +116,17 @@ pub(crate) fn analyse_files(
             }
         });
     Ok(outcomes.collect())
+}
+
+/// What has to be said of files that were named more than once.
+pub(crate) fn given_again(repeated: &[Repeated]) -> Vec<Caveat> {
+    let words = |again: &Repeated| {
+        let of = again.of.display().to_string();
+        about_repeat(&again.path.display().to_string(), &of)
+    };
+    let mut caveats: Vec<Caveat> = repeated.iter().map(words).collect();
+    caveats.dedup();
+    caveats
 }
 
 fn measure_all(
@@ -159,13 +175,11 @@ pub(crate) fn measure_file(
         caveats,
     } = read(path, settings, known)?;
     let mut moires = measure_moires(&input.file, &scan, settings, window).map_err(with_hint)?;
-    let set = sets
-        .iter()
-        .find(|(_, of)| path.starts_with(of))
-        .map(|(name, _)| name.clone());
+    let set = set_of(sets, path).map(str::to_owned);
     for measured in &mut moires {
         measured.caveats.extend(caveats.iter().cloned());
         measured.set.clone_from(&set);
+        measured.digest = Some(input.sha256.clone());
     }
     Ok((moires, input))
 }
@@ -193,7 +207,7 @@ pub(crate) struct Reading {
 
 /// Reads what the analysis needs of a file: the chosen channel and the position sensors.
 pub(crate) fn read(path: &Path, settings: &Settings, known: &Known) -> anyhow::Result<Reading> {
-    let bytes = std::fs::read(path)?;
+    let bytes = std::fs::read(known.place(path))?;
     let channels = channel::names(path, &bytes, known)?;
     let names: Vec<_> = channels
         .iter()
@@ -204,10 +218,10 @@ pub(crate) fn read(path: &Path, settings: &Settings, known: &Known) -> anyhow::R
         chosen.as_ref().is_none_or(|name| *name == channel.name)
             || sensor_axis(&channel.name, &channel.internal_name).is_some()
     };
-    let (scan, replaced) = known.read(path, &bytes, &wanted)?;
+    let (scan, replaced) = known.read(path, &bytes, &wanted).map_err(with_option)?;
     let hash = Sha256::digest(&bytes);
     let input = InputFile {
-        file: path.display().to_string(),
+        file: names::in_words(path),
         sha256: hexadecimal(&hash),
         bytes: bytes.len() as u64,
     };
@@ -224,13 +238,15 @@ pub(crate) fn read(path: &Path, settings: &Settings, known: &Known) -> anyhow::R
     })
 }
 
-pub(crate) fn hexadecimal(bytes: &[u8]) -> String {
-    let mut text = String::with_capacity(2 * bytes.len());
-    for byte in bytes {
-        // Writing into a string cannot fail.
-        let _ = write!(text, "{byte:02x}");
-    }
-    text
+/// Reads an input again that the results know by the words of its path.
+pub(crate) fn read_again(
+    inputs: &[PathBuf],
+    words: &str,
+    settings: &Settings,
+    known: &Known,
+) -> anyhow::Result<Reading> {
+    let path = names::with_words(inputs, words).context("it is none of the inputs")?;
+    read(path, settings, known)
 }
 
 /// The region common to all files that can be read.

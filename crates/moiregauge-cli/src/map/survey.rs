@@ -1,10 +1,9 @@
-//! Surveys: images too large for memory, mapped band by band. Finished bands stay in the folder of the
-//! results until the map is complete, so that an interrupted run goes on where it stopped.
+//! Surveys: images too large for memory, mapped band by band. Finished bands are kept beside the results until the map
+//! is complete, so that an interrupted run goes on where it stopped; one that is damaged is made again.
 
-use std::io::Read as _;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use anyhow::Context as _;
+use anyhow::{Context as _, ensure};
 use indicatif::{ProgressBar, ProgressStyle};
 use moiregauge::caveat::Caveat;
 use moiregauge::domains::{Contrast, DomainMap};
@@ -12,13 +11,15 @@ use moiregauge::geometry::{Geometry, Timing};
 use moiregauge::map::{Mask, Resolution, TwistStrainMap};
 use moiregauge::series::{SurveyPlan, choose_channel, nominal_geometry};
 use moiregauge::settings::Settings;
+use moiregauge_pipeline::identity;
+use moiregauge_pipeline::sink::{FolderSink, Part, build};
 use moiregauge_report::InputFile;
 use nalgebra::{Matrix2, Vector2};
 use sha2::{Digest as _, Sha256};
 use spmfile::{Channel, LineDirection, Scan};
 
 use super::source::{Array, Source};
-use crate::input::Known;
+use crate::input::{Known, with_option};
 
 /// Images with more pixels than this are mapped in bands.
 const LARGE: usize = 4096 * 4096 * 5 / 4;
@@ -43,31 +44,16 @@ impl Large {
         always: bool,
     ) -> anyhow::Result<Option<Self>> {
         let large = if always { 0 } else { LARGE };
-        if let Some(array) = Array::open(path) {
+        let place = known.place(path);
+        if let Some(array) = Array::open(place) {
             if array.size[0] * array.size[1] < large {
                 return Ok(None);
             }
-            // Two lines tell what the options make of the file: its scale, rotation and size.
-            let (scan, _) = known.read(path, &array.part(&(0..2))?, &|_| true)?;
-            let mut channel = scan
-                .channels
-                .first()
-                .context("the array holds no image")?
-                .clone();
-            channel.rows = array.size[0];
-            let timing = timing(&scan, &channel);
-            let geometry = nominal_geometry(&scan, &channel)
-                .context("the array has no size; give it with --size")?;
-            return Ok(Some(Self {
-                input: identity(path)?,
-                caveats: Vec::new(),
-                geometry,
-                timing,
-                source: Source::Array(array),
-            }));
+            no_sensors(known)?;
+            return Self::of_array(path, array, known).map(Some);
         }
         // Other files are read as a whole anyway; small ones go the common way.
-        if std::fs::metadata(path)?.len() < large as u64 {
+        if std::fs::metadata(place)?.len() < large as u64 {
             return Ok(None);
         }
         let reading = crate::analyze::read(path, settings, known)?;
@@ -86,10 +72,11 @@ impl Large {
         let Some(channel) = channel.filter(|c| c.rows * c.columns >= large) else {
             return Ok(None);
         };
+        no_sensors(known)?;
         let geometry =
             nominal_geometry(&reading.scan, channel).context("the file gives no scan size")?;
         Ok(Some(Self {
-            input: identity(path)?,
+            input: identity(path, place)?,
             caveats: reading.caveats,
             geometry,
             timing: timing(&reading.scan, channel),
@@ -97,31 +84,61 @@ impl Large {
         }))
     }
 
-    /// Maps band by band, as `first` of the same survey was. Finished bands are kept in `out`, and those of an
-    /// earlier run are taken; [`forget`] removes them when all is written.
+    /// An array, of which no more than two lines are read here.
+    fn of_array(path: &Path, array: Array, known: &Known) -> anyhow::Result<Self> {
+        // They tell what is known of the whole: scale, rotation and size; and of the block that is wanted of it.
+        let mut scan = known.decode(path, &array.part(&(0..array.size[0].min(2)))?, &|_| true)?;
+        for channel in &mut scan.channels {
+            channel.rows = array.size[0];
+        }
+        let replaced = known.tell(path, &mut scan);
+        let block = known.cut(&mut scan).map_err(with_option)?;
+        let input = identity(path, known.place(path))?;
+        let channel = scan.channels.first().context("the array holds no image")?;
+        let caveat = |words| Caveat::new("given-by-user", input.file.as_str(), words);
+        Ok(Self {
+            caveats: replaced.into_iter().map(caveat).collect(),
+            geometry: nominal_geometry(&scan, channel)
+                .context("the array has no size; give it with --size")?,
+            timing: timing(&scan, channel),
+            source: Source::Array(array.with_block(block)),
+            input,
+        })
+    }
+
+    /// Maps band by band, as `first` of the same survey was. Finished bands are kept until all is written, and those of
+    /// an earlier run of the same program are taken.
     pub(super) fn map(
         &self,
         (settings, resolution): (&Settings, &Resolution),
         first: Option<&SurveyPlan>,
-        out: &Path,
+        sink: &FolderSink,
         loud: bool,
     ) -> anyhow::Result<(TwistStrainMap, SurveyPlan)> {
         let read = |block| self.source.block(block);
         let place = (&self.geometry, self.timing.as_ref());
         let plan = SurveyPlan::new(place, (settings, resolution), first, &read)?;
-        let folder = out.join("bands");
-        std::fs::create_dir_all(&folder)
-            .with_context(|| format!("cannot make the folder {}", folder.display()))?;
-        let key = key(&self.input, settings, resolution, &plan)?;
+        let key = key(self, settings, resolution, &plan)?;
         let progress = progress(plan.bands(), loud);
         let mut whole: Option<TwistStrainMap> = None;
         for band in 0..plan.bands() {
-            let path = folder.join(format!("{key}-{band:04}"));
-            let map = if let Some(kept) = load(&path, &plan) {
+            let name = format!("{key}-{band:04}");
+            let kept = match sink.kept(&name) {
+                Part::Whole(bytes) => decoded(&bytes, &plan),
+                Part::Absent => None,
+                Part::Damaged => {
+                    eprintln!(
+                        "band {} was damaged on the disk and is mapped again",
+                        band + 1
+                    );
+                    None
+                }
+            };
+            let map = if let Some(kept) = kept {
                 kept
             } else {
                 let mut map = plan.band(band, &read)?;
-                keep(&path, &mut map)?;
+                sink.keep(&name, &encoded(&mut map))?;
                 map
             };
             let all = whole.get_or_insert_with(|| plan.start(&map.grid));
@@ -142,57 +159,45 @@ impl Large {
     }
 }
 
-/// Removes the bands.
-pub(super) fn forget(out: &Path) {
-    std::fs::remove_dir_all(out.join("bands")).ok();
-}
-
 fn timing(scan: &Scan, channel: &Channel) -> Option<Timing> {
     let line = channel.line_direction.unwrap_or(LineDirection::Trace);
     Timing::of_scan(scan, channel.columns, scan.frame_direction?, line)
 }
 
-/// The file by its content, read piece by piece.
-fn identity(path: &Path) -> anyhow::Result<InputFile> {
-    let mut file = std::fs::File::open(path)?;
-    let mut hash = Sha256::new();
-    let mut buffer = vec![0; 1 << 20];
-    let mut bytes = 0;
-    loop {
-        let count = file.read(&mut buffer)?;
-        if count == 0 {
-            break;
-        }
-        hash.update(&buffer[..count]);
-        bytes += count as u64;
-    }
-    Ok(InputFile {
-        file: path.display().to_string(),
-        sha256: crate::analyze::hexadecimal(&hash.finalize()),
-        bytes,
-    })
+/// Refuses position sensors, which have no use here.
+fn no_sensors(known: &Known) -> anyhow::Result<()> {
+    let told = known.told();
+    ensure!(
+        told.sensors.is_none() && told.x_sensor.is_none(),
+        "--sensors, --x-sensor and --y-sensor: an image that is mapped in bands has nominal positions, and position \
+         sensors are not used"
+    );
+    Ok(())
 }
 
-/// What a band depends on: input, settings, resolution, the first image of the survey (window and labelling), program.
+/// What a band depends on: input, settings, resolution, geometry and times of the image, the first image of the survey
+/// (window and labelling), and the program to its last bit.
 fn key(
-    input: &InputFile,
+    large: &Large,
     settings: &Settings,
     resolution: &Resolution,
     plan: &SurveyPlan,
 ) -> anyhow::Result<String> {
     let mut hash = Sha256::new();
-    hash.update(&input.sha256);
+    hash.update(&large.input.sha256);
+    hash.update(format!("{:?} {:?}", large.geometry, large.timing));
     hash.update(format!("{} {}", plan.window_nm, plan.whole));
     hash.update(serde_json::to_vec(settings)?);
-    hash.update(format!("{resolution:?} {}", env!("CARGO_PKG_VERSION")));
+    let build = build().context("the program cannot read itself: bands cannot be kept")?;
+    hash.update(format!("{resolution:?} {build}"));
     Ok(crate::analyze::hexadecimal(&hash.finalize())[..16].to_owned())
 }
 
 /// Numbers of a band's head: columns, rows, origin, steps.
 const HEAD: usize = 8;
 
-/// Writes a band: head in double precision, masks, then all planes in single precision, little endian.
-fn keep(path: &Path, map: &mut TwistStrainMap) -> anyhow::Result<()> {
+/// A band as bytes: head in double precision, masks, then all planes in single precision, little endian.
+fn encoded(map: &mut TwistStrainMap) -> Vec<u8> {
     let grid = map.grid;
     let head: [f64; HEAD] = [
         grid.size[0] as f64,
@@ -209,17 +214,11 @@ fn keep(path: &Path, map: &mut TwistStrainMap) -> anyhow::Result<()> {
     for plane in map.planes_mut() {
         bytes.extend(plane.iter().flat_map(|v| v.to_le_bytes()));
     }
-    // Renamed when complete, lest an interrupted write pass for a band.
-    let unfinished: PathBuf = path.with_extension("part");
-    std::fs::write(&unfinished, bytes)
-        .with_context(|| format!("cannot write {}", unfinished.display()))?;
-    std::fs::rename(&unfinished, path)?;
-    Ok(())
+    bytes
 }
 
-/// A band that was kept; `None` if there is none, or it is damaged.
-fn load(path: &Path, plan: &SurveyPlan) -> Option<TwistStrainMap> {
-    let bytes = std::fs::read(path).ok()?;
+/// The band; `None` if it is none.
+fn decoded(bytes: &[u8], plan: &SurveyPlan) -> Option<TwistStrainMap> {
     let (head, rest) = bytes.split_at_checked(8 * HEAD)?;
     let head: Vec<f64> = head
         .as_chunks::<8>()

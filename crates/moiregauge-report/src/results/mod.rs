@@ -14,6 +14,7 @@ mod lattice;
 mod map;
 mod readings;
 mod region;
+mod run;
 mod scan;
 mod stripes;
 
@@ -33,12 +34,13 @@ pub use map::{
     QuantityResult, TrendResult, mask_counts, quantities,
 };
 pub use readings::{
-    AtomicResult, IsotropicStrainResult, ReadingsResult, ShiftResult, SolutionResult, SplitResult,
-    StrainTensorResult, TensorNumbers, TensorSigmas,
+    AtomicResult, IsotropicStrainResult, NameResult, NamesResult, OtherSenseResult, ReadingsResult,
+    ShiftResult, SolutionResult, SplitResult, StrainTensorResult, TensorNumbers, TensorSigmas,
 };
 pub use region::{
     DeviceResult, MapDetailsResult, MaskShare, RegionMeanResult, RegionResult, WantedResult,
 };
+pub use run::{AtomicImages, Crop, FrameOrder, NamedSet, Run, Told};
 pub use scan::{LineResult, ScanResult, ScanTwistStrain, ScanVector, TipVelocity, Window};
 pub use stripes::{StripeHarmonicResult, StripePatternResult, StripesResult};
 

@@ -50,6 +50,7 @@ pub(crate) fn analysis() -> Analysis {
         twist_strain: m.twist_strain,
         joint: None,
         drift: None,
+        path: None,
         checks: None,
         consistency: vec![Consistency {
             sets: [sets[0].name.clone(), sets[1].name.clone()],
@@ -100,6 +101,7 @@ pub(crate) fn provenance() -> Provenance {
             error: "channel \"X Sensor\" is 524288 bytes long but its header promises 1048576"
                 .to_owned(),
         }],
+        run: None,
     }
 }
 

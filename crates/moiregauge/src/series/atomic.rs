@@ -17,6 +17,7 @@
 use nalgebra::{Matrix2, Matrix4, RowVector4, Vector2};
 
 use super::alike::{Alike, alike};
+use super::identity::once;
 use super::measure::MeasuredScan;
 use crate::caveat::Caveat;
 use crate::chi2::enlargement;
@@ -145,6 +146,7 @@ pub fn atomic_orientation(
     layer: u8,
     calibration: &Calibration,
 ) -> Result<AtomicOrientation, AtomicError> {
+    let (scans, repeats) = once(scans.to_vec());
     let timeless = |scan: &&MeasuredScan| scan.lines.iter().any(|line| line.timing.is_none());
     if let Some(scan) = scans.iter().find(timeless) {
         return Err(AtomicError::NoTiming(scan.file.clone()));
@@ -162,6 +164,7 @@ pub fn atomic_orientation(
         });
     }
     let mut caveats: Vec<Caveat> = scans.iter().flat_map(|s| s.caveats.clone()).collect();
+    caveats.extend(repeats);
     let files: Vec<String> = scans.iter().map(|s| s.file.clone()).collect();
     let place = files.join(", ");
     let found = if let Ok(solution) = solve(&observations) {

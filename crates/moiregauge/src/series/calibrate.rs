@@ -17,6 +17,7 @@ use spmfile::{FrameDirection, LineDirection};
 
 use super::alike::{Alike, alike};
 use super::group::{Group, groups};
+use super::identity::once;
 use super::measure::{MeasuredLine, MeasuredScan};
 use crate::analysis::Axis;
 use crate::calibration::{Calibration, Coordinates, KnownLattice, Shown, shown};
@@ -147,7 +148,9 @@ pub fn calibrate(
         .cell()
         .filter(|_| known.problem().is_none())
         .ok_or(CalibrateError::Cell)?;
+    let (scans, repeats) = once(scans);
     let mut caveats: Vec<Caveat> = scans.iter().flat_map(|s| s.caveats.clone()).collect();
+    caveats.extend(repeats);
     caveats.retain(|c| c.code != "no-position-sensors" && c.code != "second-lattice");
     let from_sensors = |line: &MeasuredLine| line.geometry.from_sensors;
     let lines = || scans.iter().flat_map(|s| &s.lines);

@@ -5,6 +5,7 @@ use spmfile::{Channel, DateTime, FrameDirection, LineDirection, Scan};
 
 use super::channel::{choose_channel, stem};
 use super::doubts::{about_fit, few_periods, lines_disagree, turned};
+use super::identity::Fingerprint;
 use super::moires::in_order;
 use super::overlap::Window;
 use super::positions::{nominal, speeds, usable_sensors};
@@ -39,10 +40,14 @@ pub struct MeasuredScan {
     pub size_nm: Option<[f64; 2]>,
     /// Name of the set to which the user assigned it by hand.
     pub set: Option<String>,
+    /// Hash of the bytes of its file, where whoever read it tells it; files of equal bytes are one.
+    pub digest: Option<String>,
     /// One entry for each line direction that was used.
     pub lines: Vec<MeasuredLine>,
     /// Why it is shown but not used; `None` where it is used.
     pub excluded: Option<String>,
+    /// The file that holds the same data and is used in its place.
+    pub repeats: Option<String>,
     /// Doubts about this scan.
     pub caveats: Vec<Caveat>,
 }
@@ -68,6 +73,8 @@ pub struct MeasuredLine {
     pub speeds: [Estimate; 2],
     /// Relative standard error of the mean speeds.
     pub speed_error: [f64; 2],
+    /// To know the whole image again.
+    pub(super) pixels: Fingerprint,
 }
 
 /// Why a scan cannot be measured.
@@ -263,8 +270,10 @@ fn measure_with(
             channel: channels[0].name.clone(),
             size_nm: scan.size_nm,
             set: None,
+            digest: None,
             lines,
             excluded,
+            repeats: None,
             caveats,
         }
     });
@@ -360,6 +369,7 @@ fn measure_line(
     };
     let (speeds, speed_error) = speeds(&geometry, sensors.as_ref(), timing.as_ref());
     let mut image = image_of(channel);
+    let pixels = Fingerprint::of(&image);
     let (mut geometry, mut nominal) = (geometry, nominal);
     let mut lines_after = 0;
     if let Some(window) = window {
@@ -399,6 +409,7 @@ fn measure_line(
             lattice,
             speeds,
             speed_error,
+            pixels: pixels.clone(),
         }
     });
     Ok(lines.collect())

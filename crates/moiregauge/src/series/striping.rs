@@ -11,7 +11,9 @@ use crate::caveat::Caveat;
 use crate::geometry::{Geometry, Timing};
 use crate::image::Image;
 use crate::lattice::Start;
-use crate::map::{NoStripes, Resolution, SampledStripes, find_stripes, stripe_maps};
+use crate::map::{
+    FULL_WIDTH, NoStripes, Resolution, ResolutionError, SampledStripes, find_stripes, stripe_maps,
+};
 use crate::resample::at_rest;
 use crate::settings::Settings;
 
@@ -31,9 +33,12 @@ pub struct ScanStripes {
 }
 
 /// Why a scan gives no map of stripes.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum StripeError {
+    /// No image of this size has such a map.
+    #[error(transparent)]
+    Resolution(#[from] ResolutionError),
     /// The channel is not there, or the image has no size.
     #[error("no image with a size")]
     NoImage,
@@ -130,6 +135,7 @@ pub fn stripes_of_scan(
 ) -> Result<ScanStripes, StripeError> {
     let mut caveats = Vec::new();
     let (channel, frames) = frames(file, scan, settings, &mut caveats)?;
+    resolution.fits(frames[0].geometry.extent(), FULL_WIDTH)?;
     let images: Vec<&Image> = frames.iter().map(|f| &f.flat).collect();
     let maps = stripe_maps(&images, pitch(&frames[0].geometry), resolution)?;
     let placed: Vec<&Geometry> = frames
