@@ -96,7 +96,11 @@ pub fn from_sensors(x: &Image, y: &Image) -> Option<SensorGeometry> {
 }
 
 /// A sensor without its lag in the columns `used`.
-fn straight<'a>(sensor: &'a Image, lag: Option<Lag>, used: &std::ops::Range<usize>) -> Cow<'a, Image> {
+fn straight<'a>(
+    sensor: &'a Image,
+    lag: Option<Lag>,
+    used: &std::ops::Range<usize>,
+) -> Cow<'a, Image> {
     match lag {
         Some(lag) => Cow::Owned(lag.taken_off(sensor, used)),
         None => Cow::Borrowed(sensor),
