@@ -7,7 +7,7 @@ mod source;
 mod stripes;
 mod survey;
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use anyhow::{Context as _, bail, ensure};
@@ -15,12 +15,14 @@ use clap::ValueEnum;
 use moiregauge::caveat::Caveat;
 use moiregauge::map::{DriftChange, LatticeMap, Resolution, TwistStrainMap, register};
 use moiregauge::series::{
-    LineMap, MapMethod, SurveyPlan, average_maps, change_of_drift, domains_of_scan, map_scan,
+    LineMap, MapMethod, SurveyPlan, about_repeat, average_maps, change_of_drift, domains_of_scan,
+    map_scan, refusal,
 };
 use moiregauge::settings::Settings;
+use moiregauge_pipeline::sink::FolderSink;
 use moiregauge_report::{FailedInput, Provenance};
 
-use crate::analyze::{AnalyzeArgs, Outcome, analyse_files, failures, read};
+use crate::analyze::{AnalyzeArgs, Outcome, analyse_files, failures, given_again, read_again};
 use crate::info::inputs;
 use crate::input::Known;
 use output::{Made, write};
@@ -106,30 +108,24 @@ pub(crate) fn run(args: &MapArgs) -> anyhow::Result<ExitCode> {
     let settings = args.analyze.settings()?;
     let resolution = args.resolution()?;
     args.regions.check()?;
-    let out = args.analyze.out();
-    ensure!(
-        args.analyze.force() || !out.join("map.json").exists(),
-        "{} already holds a map; give another --out, or --force to write over it",
-        out.display()
-    );
     args.analyze.start_threads()?;
     let (inputs, failed) = inputs(args.analyze.paths());
+    let sink = output::sink(args, &inputs)?;
     let known = args.analyze.known().of(&inputs);
     let whole = (&settings, &known, &resolution);
-    let made = match survey(args, &inputs, whole, &failed)? {
+    let made = match survey((args, &sink), &inputs, whole, &failed)? {
         Some(made) => made,
         None => match together(args, &inputs, whole, failed)? {
             Answer::Lattice(made) => *made,
             Answer::Stripes(found) => {
-                stripes::write(&found, args)?;
+                stripes::write(&found, args, sink)?;
                 return Ok(ExitCode::SUCCESS);
             }
         },
     };
     let lost = failures(&made.provenance.failed);
     let complete = made.provenance.failed.is_empty();
-    write(&made, args)?;
-    survey::forget(out);
+    write(&made, args, sink)?;
     eprint!("{lost}");
     Ok(if complete {
         ExitCode::SUCCESS
@@ -140,7 +136,7 @@ pub(crate) fn run(args: &MapArgs) -> anyhow::Result<ExitCode> {
 
 /// Maps images that are too large for memory, side by side; `None` where the first is not large.
 fn survey(
-    args: &MapArgs,
+    (args, sink): (&MapArgs, &FolderSink),
     inputs: &[PathBuf],
     (settings, known, resolution): (&Settings, &Known, &Resolution),
     failed: &[FailedInput],
@@ -157,21 +153,28 @@ fn survey(
     if !any {
         return Ok(None);
     }
-    let (out, loud) = (args.analyze.out(), args.analyze.is_loud());
-    let (mut maps, mut images, mut caveats) = (Vec::new(), Vec::new(), Vec::new());
+    let loud = args.analyze.is_loud();
+    let (inputs, again) = moiregauge_pipeline::distinct(inputs);
+    let (mut maps, mut images, mut caveats) = (Vec::new(), Vec::new(), given_again(&again));
     let (mut read, mut plans) = (Vec::new(), Vec::<(survey::Large, SurveyPlan)>::new());
-    for path in inputs {
+    for path in &inputs {
         let large = open(path, true)?.context("no image")?;
+        let same = |(known, _): &&(survey::Large, _)| known.input.sha256 == large.input.sha256;
+        if let Some((known, _)) = plans.iter().find(same) {
+            caveats.push(about_repeat(&large.input.file, &known.input.file));
+            continue;
+        }
         let (map, plan) = large
             .map(
                 (settings, resolution),
                 plans.first().map(|p| &p.1),
-                out,
+                sink,
                 loud,
             )
             .with_context(|| path.display().to_string())?;
         let file = large.input.file.clone();
         caveats.extend(large.caveats.iter().cloned());
+        caveats.extend(plan.caveats.iter().cloned());
         let drift = if plan.drift_corrected {
             "corrected for the drift that was given"
         } else if settings.drift.is_some() {
@@ -257,6 +260,11 @@ fn together(
             bail!("nothing could be analysed");
         }
     };
+    if let Some(why) = refusal(&analysis).filter(|why| why.code == "everything-excluded") {
+        bail!("{}", why.message);
+    }
+    // The maps read the lattice under the name that the analysis found.
+    let settings = &analysis.named_settings();
     let used = || {
         analysis
             .sets
@@ -270,7 +278,7 @@ fn together(
     let how = (args.map_method.into(), resolution);
     let mut maps = Vec::new();
     for scan in used() {
-        let mapped = read(Path::new(&scan.file), settings, known)
+        let mapped = read_again(inputs, &scan.file, settings, known)
             .and_then(|r| Ok(map_scan(&r.scan, (scan, origin), settings, how)?));
         match mapped {
             Ok(lines) => maps.extend(lines),
@@ -308,7 +316,7 @@ fn together(
     let map = TwistStrainMap::new(&lattices, &found);
     let look = |contrast| {
         let all = used().flat_map(|scan| {
-            let reading = read(Path::new(&scan.file), settings, known).ok();
+            let reading = read_again(inputs, &scan.file, settings, known).ok();
             reading.map_or_else(Vec::new, |r| {
                 domains_of_scan(&r.scan, (scan, origin), settings, contrast)
             })

@@ -40,6 +40,34 @@ pub struct Analysis {
     pub caveats: Vec<Caveat>,
 }
 
+impl Analysis {
+    /// The settings with the waves of the lattice that the numbers go with, for what is made from the same scans: maps
+    /// have to read the lattice under the same name.
+    pub fn named_settings(&self) -> Settings {
+        let of_set = |set: &SetAnalysis| set.mean.clone().or(set.uncorrected.clone());
+        let found = self
+            .combined
+            .as_ref()
+            .map(|all| (all.lattice, all.readings.clone()))
+            .or_else(|| {
+                let mean = self.sets.iter().find_map(of_set)?;
+                Some((mean.lattice, mean.readings))
+            });
+        let waves = found.and_then(|(lattice, readings)| {
+            let naming = readings.naming?;
+            let least = naming.names.iter().map(|n| n.strain);
+            let least = least.fold(f64::INFINITY, f64::min);
+            let reported = naming.names.first().filter(|n| n.strain > least)?;
+            reported.name.waves(&lattice.basis)
+        });
+        let mut settings = self.settings.clone();
+        if let Some(waves) = waves {
+            settings.moire_waves = Some([0, 1].map(|i| [waves[(0, i)], waves[(1, i)]]));
+        }
+        settings
+    }
+}
+
 /// Scans of one slow axis, line rate, size and channel, in order of time.
 #[derive(Clone, Debug)]
 pub struct SetAnalysis {

@@ -5,7 +5,9 @@ use serde::Serialize;
 use super::words::{plain, shown};
 use crate::draw::scale::fixed;
 use crate::format::two_digits;
-use crate::results::{ReadingsResult, SolutionResult, StrainTensorResult, TensorNumbers};
+use crate::results::{
+    NamesResult, ReadingsResult, SolutionResult, SplitResult, TensorNumbers, TensorSigmas,
+};
 
 /// The readings of a lattice.
 #[derive(Debug, Serialize)]
@@ -17,9 +19,13 @@ pub(super) struct Meanings {
     choices: Vec<[String; 3]>,
     /// Isotropic strain and what it does to the twist.
     shifts: Vec<[String; 2]>,
+    /// Names of the lattice that are open, with what decided: chosen by, then twist and strain of each.
+    names: Option<(String, Vec<[String; 2]>)>,
     prior: String,
     interval: Option<[String; 2]>,
     tensor: Option<Tensor>,
+    /// The tensor for the other sense of the twist, and the magnitudes that are open, where the sense is.
+    other_sense: Option<(Tensor, [String; 2])>,
 }
 
 /// The strain tensor.
@@ -45,13 +51,26 @@ impl Meanings {
             .solutions
             .iter()
             .filter(|s| !s.strain_dominated && s.twist_deg.value.is_some_and(|t| t > 0.0))
+            .filter(|s| {
+                readings
+                    .names
+                    .as_ref()
+                    .is_none_or(|n| n.names[0].waves == s.waves)
+            })
             .map(choice)
             .collect();
         let headline = match &readings.strain_tensor {
-            Some(tensor) => Some([
-                "with the orientation of a layer".to_owned(),
-                format!("({})°", shown(tensor.found.twist_deg)),
-            ]),
+            Some(tensor) => {
+                let twist = |e| format!("({})°", shown(e));
+                let first = twist(tensor.found.twist_deg);
+                Some(match &tensor.other_sense {
+                    None => ["with the orientation of a layer".to_owned(), first],
+                    Some(other) => [
+                        "with the orientation of a layer; the sense is open".to_owned(),
+                        format!("{first} or {}", twist(other.found.twist_deg)),
+                    ],
+                })
+            }
             None if readings.layers_differ && !choices.is_empty() => {
                 let twists: Vec<&str> = choices.iter().map(|c| c[0].as_str()).collect();
                 Some(["the layers differ".to_owned(), twists.join(" or ")])
@@ -74,15 +93,49 @@ impl Meanings {
                     })
                     .collect()
             }),
+            names: readings.names.as_ref().and_then(names),
             prior: isotropic.map_or_else(String::new, |found| format!("{} %", found.prior_percent)),
             interval: isotropic.map(|found| {
                 found
                     .twist_interval_deg
                     .map(|end| format!("{}°", plain(end, 4)))
             }),
-            tensor: readings.strain_tensor.as_ref().map(tensor),
+            tensor: readings.strain_tensor.as_ref().map(|found| Tensor {
+                alternatives: found.alternatives.iter().map(alternative).collect(),
+                ..tensor(&found.found, &found.total, &found.splits)
+            }),
+            other_sense: readings.strain_tensor.as_ref().and_then(|found| {
+                let other = found.other_sense.as_ref()?;
+                let ends = other.twist_interval_deg;
+                Some((
+                    tensor(&other.found, &other.total, &other.splits),
+                    ends.map(|end| format!("{}°", plain(end, 4))),
+                ))
+            }),
         }
     }
+}
+
+/// What chose the name of the lattice, and the names that are open; nothing where only one is plausible.
+fn names(found: &NamesResult) -> Option<(String, Vec<[String; 2]>)> {
+    let open: Vec<[String; 2]> = found
+        .names
+        .iter()
+        .filter(|n| n.standing == "open" || n.standing == "reported")
+        .map(|n| {
+            [
+                format!("{}°", fixed(n.twist_deg, 4)),
+                format!("{} %", fixed(n.strain_percent, 3)),
+            ]
+        })
+        .collect();
+    let chosen_by = match found.chosen_by.as_str() {
+        "image" => "the image: of each other plausible pair one wave is too weak",
+        "orientation" => "the orientation of a layer: other pairs need isotropic strain",
+        "user" => "the user",
+        _ => "the least strain",
+    };
+    (open.len() > 1 || found.chosen_by != "least-strain").then(|| (chosen_by.to_owned(), open))
 }
 
 fn choice(solution: &SolutionResult) -> [String; 3] {
@@ -93,32 +146,36 @@ fn choice(solution: &SolutionResult) -> [String; 3] {
     ]
 }
 
-fn tensor(found: &StrainTensorResult) -> Tensor {
-    let TensorNumbers {
+fn alternative(found: &TensorNumbers) -> [String; 2] {
+    let twist = format!("({})°", shown(found.twist_deg));
+    [twist, format!("({}) %", shown(found.mean_strain_percent))]
+}
+
+fn tensor(found: &TensorNumbers, all: &TensorSigmas, splits: &[SplitResult; 2]) -> Tensor {
+    let &TensorNumbers {
         twist_deg,
         lattice_angle_deg,
         mean_strain_percent,
         shear_percent,
         axis_lab_deg,
         ..
-    } = found.found;
+    } = found;
     let total = |sigma: Option<f64>, unit: &str| {
         sigma.map_or_else(|| "–".to_owned(), |s| format!("{}{unit}", two_digits(s)))
     };
     Tensor {
         twist: format!("({})°", shown(twist_deg)),
-        twist_total: total(found.total.twist_deg, "°"),
+        twist_total: total(all.twist_deg, "°"),
         mean: format!("({}) %", shown(mean_strain_percent)),
-        mean_total: total(found.total.mean_strain_percent, " %"),
+        mean_total: total(all.mean_strain_percent, " %"),
         shear: format!("({}) %", shown(shear_percent)),
-        shear_total: total(found.total.shear_percent, " %"),
+        shear_total: total(all.shear_percent, " %"),
         axis: axis_lab_deg.map_or_else(
             || "not significant".to_owned(),
             |a| format!("({})°", shown(a)),
         ),
         lattice_angle: format!("({})°", shown(lattice_angle_deg)),
-        splits: found
-            .splits
+        splits: splits
             .iter()
             .map(|s| {
                 [
@@ -129,14 +186,7 @@ fn tensor(found: &StrainTensorResult) -> Tensor {
                 ]
             })
             .collect(),
-        alternatives: found
-            .alternatives
-            .iter()
-            .map(|a| {
-                let twist = format!("({})°", shown(a.twist_deg));
-                [twist, format!("({}) %", shown(a.mean_strain_percent))]
-            })
-            .collect(),
+        alternatives: Vec::new(),
     }
 }
 

@@ -104,7 +104,9 @@ pub enum LatticeError {
     },
     /// Several lattices were asked for.
     #[error(
-        "{wanted} lattices were asked for, of which {found} can be found; --moires {found} measures what is there"
+        "{wanted} lattices were asked for, of which {found} can be found: what else stands out is noise or lies on \
+         the waves of these, as their harmonics do and those of a lattice that is nearly commensurate with them; --moires \
+         {found} measures what is there"
     )]
     FewerLattices {
         /// How many there are.

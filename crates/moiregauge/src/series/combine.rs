@@ -12,11 +12,15 @@ use crate::caveat::Caveat;
 use crate::chi2::enlargement;
 use crate::joint::JointFit;
 use crate::lattice::LatticeVectors;
-use crate::readings::{Readings, caveats as about_readings};
+use crate::readings::{Readings, WaveStrengths, caveats as about_readings};
 use crate::settings::Settings;
 
-/// Wavelengths that differ by more than this are not of the same lattice.
+/// Wavelengths that differ by more than this are not of the same lattice, …
 const SAME_LATTICE: f64 = 0.05;
+/// … nor are those that differ by more than this if their errors do not explain it: χ² of four components beyond
+/// `NO_CHANCE` (p = 4·10⁻¹⁰).
+const NEARLY_SAME: f64 = 0.02;
+const NO_CHANCE: f64 = 50.0;
 /// χ² of two components beyond which the drift of a set is not that of all sets.
 const CONTRADICTION: f64 = 18.4;
 /// χ²/dof of all sets over that of the single ones beyond which they have no drift in common.
@@ -30,19 +34,25 @@ pub(super) fn combine(
     sets: &[SetAnalysis],
     joint: Option<(&[&MeasuredScan], Matrix2<f64>)>,
     settings: &Settings,
+    strengths: &WaveStrengths,
     caveats: &mut Vec<Caveat>,
 ) -> Option<Combined> {
     let means: Vec<&SetMean> = sets.iter().filter_map(|s| s.mean.as_ref()).collect();
     let first = means.first()?;
-    let different = means.iter().any(|m| {
-        (m.lattice.basis - first.lattice.basis).norm() > SAME_LATTICE * first.lattice.basis.norm()
-    });
-    if different {
+    let others = means.iter().map(|m| &m.lattice);
+    let largest = others
+        .filter(|other| are_different(&first.lattice, other))
+        .map(|other| (other.basis - first.lattice.basis).norm() / first.lattice.basis.norm())
+        .reduce(f64::max);
+    if let Some(largest) = largest {
         caveats.push(Caveat::new(
             "different-lattices",
             "analysis",
-            "the sets show lattices that differ by more than 5 %: they are not of the same place or \
-             sample, and are not combined",
+            format!(
+                "the sets show lattices that differ by up to {:.1} %: they are not of the same place or \
+                 sample, and are not combined",
+                100.0 * largest
+            ),
         ));
         return None;
     }
@@ -105,7 +115,7 @@ pub(super) fn combine(
     }
     let twist_strain = moire(&lattice, settings)?;
     let budget = Budget::new(&lattice, &twist_strain, &statistical, settings);
-    let readings = Readings::new(&lattice, &twist_strain, &budget, settings);
+    let readings = Readings::new(&lattice, &twist_strain, &budget, strengths, settings);
     if sets.len() > 1 {
         let found = about_readings("analysis", &lattice, &twist_strain, &readings, settings);
         caveats.extend(found);
@@ -121,6 +131,15 @@ pub(super) fn combine(
         checks,
         consistency,
     })
+}
+
+/// Whether two lattices are of different samples or places.
+fn are_different(a: &LatticeVectors, b: &LatticeVectors) -> bool {
+    let share = (b.basis - a.basis).norm() / a.basis.norm();
+    let difference = b.flat() - a.flat();
+    let inverse = (a.covariance + b.covariance).try_inverse();
+    let chi2 = inverse.map_or(0.0, |inverse| difference.dot(&(inverse * difference)));
+    share > SAME_LATTICE || (share > NEARLY_SAME && chi2 > NO_CHANCE)
 }
 
 /// The joint fit of all sets, or why it does not describe them.

@@ -10,6 +10,7 @@ use crate::background::remove_background;
 use crate::caveat::Caveat;
 use crate::geometry::{Geometry, Timing};
 use crate::image::Image;
+use crate::lattice::Start;
 use crate::map::{
     FULL_WIDTH, NoStripes, Resolution, ResolutionError, SampledStripes, find_stripes, stripe_maps,
 };
@@ -93,13 +94,17 @@ fn frames(
 }
 
 /// Wavelength (nm), direction (rad, along the stripes) and log₁₀ of the chance that noise makes them, of the patterns
-/// that a scan shows, strongest first; none where it shows nothing.
+/// that a scan shows, strongest first; none where it shows nothing, or a lattice, each of whose waves would pass for
+/// stripes.
 pub fn stripes_in_short(scan: &Scan, settings: &Settings) -> Vec<[f64; 3]> {
     let Ok((_, frames)) = frames("", scan, settings, &mut Vec::new()) else {
         return Vec::new();
     };
     let images: Vec<&Image> = frames.iter().map(|f| &f.flat).collect();
     let geometry = &frames[0].geometry;
+    if Start::find(&frames[0].flat, geometry, settings.background).is_ok() {
+        return Vec::new();
+    }
     let Some(dual) = geometry.pixel_to_nm.try_inverse().map(|j| j.transpose()) else {
         return Vec::new();
     };
