@@ -18,7 +18,7 @@ fn refused(reason: String) -> ReadError {
 /// Reads the frame upwards, or the one that is wanted, with the log of the session beside the file.
 ///
 /// # Errors
-/// No log lies there, or one of the files cannot be read.
+/// As [`spmfile::matrix::read`], and where there is no log.
 pub fn read(
     path: &Path,
     bytes: &[u8],
