@@ -13,7 +13,7 @@ use rayon::prelude::*;
 use spmfile::{ChannelInfo, Scan, WritableFormat, sensor_axis};
 
 use crate::info::expand;
-use crate::input::{Known, KnownArgs, is_named};
+use crate::input::{Known, KnownArgs, is_named, with_option};
 use crate::outputs;
 use crate::say::say;
 
@@ -118,10 +118,10 @@ pub(crate) fn run(args: &ConvertArgs) -> anyhow::Result<ExitCode> {
         bail!("expected files to convert and what to write");
     };
     let (mut inputs, mut failed) = (Vec::new(), Vec::new());
-    for path in expand(paths) {
+    for path in expand(paths, !args.quiet) {
         match path {
             Ok(path) => inputs.push(path),
-            Err((path, error)) => failed.push(format!("{}: {error}", path.display())),
+            Err(one) => failed.push(format!("{}: {}", one.file, one.error)),
         }
     }
     let format = format(args, out, inputs.len() + failed.len())?;
@@ -253,7 +253,7 @@ struct Target<'a> {
 impl Target<'_> {
     /// Converts one file; returns what was written.
     fn convert(&self, path: &Path, stem: &str) -> anyhow::Result<Vec<PathBuf>> {
-        let bytes = std::fs::read(path)?;
+        let bytes = moiregauge_pipeline::read(path)?;
         let is_wanted = |info: &ChannelInfo| {
             let points = self.format == WritableFormat::Gxyzf;
             let names = &self.args.channel;
@@ -261,7 +261,8 @@ impl Target<'_> {
                 || names.iter().any(|name| is_named(&info.name, name))
                 || (points && sensor_axis(&info.name, &info.internal_name).is_some())
         };
-        let (mut scan, replaced) = self.known.read(path, &bytes, &is_wanted)?;
+        let read = self.known.read(path, &bytes, &is_wanted);
+        let (mut scan, replaced) = read.map_err(with_option)?;
         self.channels_are_there(&scan)?;
         let mut log = vec![format!(
             "converted by moiregauge {} from {}",

@@ -7,7 +7,7 @@ mod source;
 mod stripes;
 mod survey;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::{Context as _, bail, ensure};
@@ -22,9 +22,11 @@ use moiregauge::settings::Settings;
 use moiregauge_pipeline::sink::FolderSink;
 use moiregauge_report::{FailedInput, Provenance};
 
-use crate::analyze::{AnalyzeArgs, Outcome, analyse_files, failures, given_again, read_again};
-use crate::info::inputs;
+use crate::analyze::{
+    AnalyzeArgs, Outcome, Task, analyse_files, failures, given_again, read_again,
+};
 use crate::input::Known;
+use crate::numbers;
 use output::{Made, write};
 pub(crate) use stripes::in_words as stripes_in_words;
 
@@ -56,16 +58,16 @@ pub(crate) struct MapArgs {
     /// Width of the Gaussian window (standard deviation), nm; a point becomes 2.35 of it wide [default: as
     /// wide as the lattice stays straight, at least 0.6 periods]. By tiles: the side of a tile [default: 6
     /// periods]
-    #[arg(long, value_name = "NM")]
+    #[arg(long, value_name = "NM", value_parser = numbers::number(numbers::LENGTH_NM))]
     window: Option<f64>,
     /// Distance of the nodes, nm [default: a third of the window, two pixels at least; a quarter of a tile]
-    #[arg(long, value_name = "NM")]
+    #[arg(long, value_name = "NM", value_parser = numbers::number(numbers::LENGTH_NM))]
     step: Option<f64>,
     /// Map in bands, as images of more than 20 million pixels are; several files are put side by side
     #[arg(long)]
     in_bands: bool,
     /// Margin at the edges, in windows [default: 2, or a quarter of the frame where that is less]
-    #[arg(long, value_name = "WINDOWS")]
+    #[arg(long, value_name = "WINDOWS", value_parser = numbers::number([0.0, 10.0]))]
     margin: Option<f64>,
     #[command(flatten)]
     regions: regions::RegionArgs,
@@ -105,33 +107,58 @@ impl From<MapMethodArg> for MapMethod {
 
 /// Makes the maps and writes them.
 pub(crate) fn run(args: &MapArgs) -> anyhow::Result<ExitCode> {
-    let settings = args.analyze.settings()?;
-    let resolution = args.resolution()?;
+    let task = Task::new(&args.analyze, "map")?;
+    let as_before;
+    let args = if args.analyze.is_replay() {
+        as_before = args.again(&task)?;
+        &as_before
+    } else {
+        args
+    };
+    ensure!(
+        task.run.atomic.is_none() && task.run.export.is_empty() && !task.run.parquet,
+        "--atomic, --export and --parquet are for `moiregauge analyze`: a map has no use for them"
+    );
+    let settings = task.run.settings.clone();
+    let resolution = args.resolution();
     args.regions.check()?;
     args.analyze.start_threads()?;
-    let (inputs, failed) = inputs(args.analyze.paths());
-    let sink = output::sink(args, &inputs)?;
-    let known = args.analyze.known().of(&inputs);
+    let inputs = &task.inputs;
+    let sink = output::sink(args, &task.files())?;
+    let known = task.known(inputs);
     let whole = (&settings, &known, &resolution);
-    let made = match survey((args, &sink), &inputs, whole, &failed)? {
+    let document = args.analyze.out().join("map.json");
+    let mut made = match survey((args, &sink), inputs, whole, &task.failed)? {
         Some(made) => made,
-        None => match together(args, &inputs, whole, failed)? {
+        None => match together(args, inputs, whole, task.failed.clone())? {
             Answer::Lattice(made) => *made,
-            Answer::Stripes(found) => {
+            Answer::Stripes(mut found) => {
+                let provenance = &mut found.provenance;
+                provenance.run = Some(task.record(&known, &provenance.inputs));
                 stripes::write(&found, args, sink)?;
-                return Ok(ExitCode::SUCCESS);
+                return Ok(ended(task.is_same(&written(&document))));
             }
         },
     };
+    made.provenance.run = Some(task.record(&known, &made.provenance.inputs));
     let lost = failures(&made.provenance.failed);
     let complete = made.provenance.failed.is_empty();
     write(&made, args, sink)?;
     eprint!("{lost}");
-    Ok(if complete {
+    Ok(ended(task.is_same(&written(&document)) && complete))
+}
+
+/// The document of a map, if it can be read.
+fn written(document: &Path) -> Vec<Vec<u8>> {
+    std::fs::read(document).into_iter().collect()
+}
+
+fn ended(well: bool) -> ExitCode {
+    if well {
         ExitCode::SUCCESS
     } else {
         ExitCode::FAILURE
-    })
+    }
 }
 
 /// Maps images that are too large for memory, side by side; `None` where the first is not large.
@@ -153,6 +180,10 @@ fn survey(
     if !any {
         return Ok(None);
     }
+    ensure!(
+        args.analyze.sets()?.is_empty(),
+        "--set: images that are mapped in bands lie side by side in one map and make no sets"
+    );
     let loud = args.analyze.is_loud();
     let (inputs, again) = moiregauge_pipeline::distinct(inputs);
     let (mut maps, mut images, mut caveats) = (Vec::new(), Vec::new(), given_again(&again));
@@ -213,6 +244,7 @@ fn survey(
             seed: settings.seed,
             inputs: read,
             failed: failed.to_vec(),
+            run: None,
         },
         settings: settings.clone(),
         images,
@@ -423,23 +455,25 @@ fn registered(maps: &mut [LineMap], caveats: &mut Vec<Caveat>) {
 }
 
 impl MapArgs {
-    fn resolution(&self) -> anyhow::Result<Resolution> {
-        for (name, value) in [("--window", self.window), ("--step", self.step)] {
-            ensure!(
-                value.is_none_or(|v| v > 0.0 && v.is_finite()),
-                "{name} must be a positive length in nm"
-            );
-        }
-        ensure!(
-            self.margin.is_none_or(|m| (0.0..=10.0).contains(&m)),
-            "--margin lies between 0 and 10 windows, found {}",
-            self.margin.unwrap_or(f64::NAN)
-        );
-        Ok(Resolution {
+    /// The options of the run to be repeated, with the place and the words of this one.
+    fn again(&self, task: &Task) -> anyhow::Result<Self> {
+        let program = std::iter::once("moiregauge".to_owned());
+        let arguments = program.chain(task.run.arguments.iter().cloned());
+        let crate::Command::Map(mut args) = crate::command(arguments)
+            .context("--replay: the document does not hold the options of a map")?
+        else {
+            bail!("--replay: expected the options of a map");
+        };
+        args.analyze = args.analyze.with_place_of(&self.analyze);
+        Ok(*args)
+    }
+
+    fn resolution(&self) -> Resolution {
+        Resolution {
             window_nm: self.window,
             step_nm: self.step,
             margin: self.margin,
-        })
+        }
     }
 
     /// How local lattices are measured, for the results.

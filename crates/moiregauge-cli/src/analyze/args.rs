@@ -5,14 +5,16 @@ use std::path::PathBuf;
 use clap::ValueEnum;
 use moiregauge::material::Material;
 use moiregauge::settings::{
-    Background, GivenDrift, Grouping, Lines, Method, MoireLayers, Settings, StrainConvention,
+    Background, GivenDrift, Grouping, Lines, MOST_DRAWS, MOST_IMAGES, Method, MoireLayers,
+    Settings, StrainConvention,
 };
+use moiregauge_report::results::NamedSet;
 use moiregauge_report::{Choice, ColorMap};
 
-use super::export::{self, Export};
 use super::orientation::OrientationArgs;
 use crate::config;
 use crate::input::KnownArgs;
+use crate::numbers;
 use crate::scanner::ScannerArgs;
 
 /// From scans to drift, moiré vectors, twist and heterostrain, with figures and a report
@@ -40,18 +42,32 @@ Examples:
 Angles are counter-clockwise, x to the right and y up, as the position sensors tell.")]
 pub(crate) struct AnalyzeArgs {
     /// Scan files, folders (the scans in them, without subfolders) or names with * and ?
-    #[arg(required = true, value_name = "PATH")]
+    #[arg(required_unless_present = "replay", value_name = "PATH")]
     pub(super) paths: Vec<PathBuf>,
-    /// Folder for results.json, tables, figures and report.html; made if it does not exist
-    #[arg(long, value_name = "DIR")]
-    pub(super) out: PathBuf,
-    /// Settings from a TOML file (see `moiregauge config`); options here come on top of it
+    /// Folder for results.json, tables, figures and report.html; made if it does not exist [default with --replay:
+    /// beside the folder of the document]
+    #[arg(long, value_name = "DIR", required_unless_present = "replay")]
+    pub(super) out: Option<PathBuf>,
+    /// Repeat the run that a results.json (or a map.json, with `map`) records: the same files, settings and options
+    /// give the same bytes. The files are looked for by name and by content, and checked first; other options are
+    /// refused
+    #[arg(long, value_name = "FILE")]
+    pub(super) replay: Option<PathBuf>,
+    /// A folder to look for the files of --replay in; may be repeated [default: the current one by name; that of the
+    /// document and the one above it]
+    #[arg(long, value_name = "DIR", requires = "replay")]
+    pub(super) data: Vec<PathBuf>,
+    /// Settings from a TOML file (see `moiregauge config`), or those that a results.json or map.json holds; options
+    /// here come on top of it
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
     /// Channel that shows the moiré [default: TR Phase, TR Amplitude, Phase, … the first there is; if no
     /// scan shows a lattice in it, the next]
     #[arg(long, value_name = "NAME")]
     channel: Option<String>,
+    /// Of several images of the channel in one file (pages, frames) this one [default: the first]
+    #[arg(long, value_name = "N", value_parser = numbers::count(1, MOST_IMAGES))]
+    image: Option<usize>,
     /// Line directions to use [default: both]
     #[arg(long, value_enum)]
     line: Option<LineArg>,
@@ -77,16 +93,16 @@ pub(crate) struct AnalyzeArgs {
     #[command(flatten)]
     pub(super) orientation: OrientationArgs,
     /// Lattice constant of the layers, nm, in place of the material's
-    #[arg(long, value_name = "NM")]
+    #[arg(long, value_name = "NM", value_parser = numbers::number([0.01, 100.0]))]
     lattice_constant: Option<f64>,
     /// Poisson ratio of the layers, in place of the material's
-    #[arg(long, value_name = "RATIO")]
+    #[arg(long, value_name = "RATIO", value_parser = numbers::number([-1.0, 1.0]))]
     poisson_ratio: Option<f64>,
     /// Standard uncertainty of the lattice constant, nm, for the budget [default: the material's]
-    #[arg(long, value_name = "NM")]
+    #[arg(long, value_name = "NM", value_parser = numbers::number([0.0, 10.0]))]
     lattice_constant_sigma: Option<f64>,
     /// Standard uncertainty of the Poisson ratio, for the budget [default: the material's]
-    #[arg(long, value_name = "RATIO")]
+    #[arg(long, value_name = "RATIO", value_parser = numbers::number([0.0, 0.5]))]
     poisson_ratio_sigma: Option<f64>,
     #[command(flatten)]
     scanner: ScannerArgs,
@@ -99,7 +115,7 @@ pub(crate) struct AnalyzeArgs {
     /// How files become sets [default: auto]
     #[arg(long, value_enum)]
     grouping: Option<GroupingArg>,
-    /// Make a set by hand: all files under PATH form the set NAME; may be repeated
+    /// Make a set by hand: all files under PATH (a folder or a file among the inputs) form the set NAME; may be repeated
     #[arg(long = "set", value_name = "NAME=PATH")]
     sets: Vec<String>,
     /// Show these scans but do not use them: names of files, * for any characters; may be repeated
@@ -109,32 +125,32 @@ pub(crate) struct AnalyzeArgs {
     #[arg(long)]
     exclude_outliers: bool,
     /// Standard uncertainty of the frame times in the files, s [default: 0.6]
-    #[arg(long, value_name = "S")]
+    #[arg(long, value_name = "S", value_parser = numbers::number(numbers::TIME_S))]
     frame_time_sigma: Option<f64>,
     /// How many moirés every image shows; each is fitted with the others taken off, and has a folder of
     /// results of its own [default: 1]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = numbers::count(1, 6))]
     moires: Option<usize>,
     /// Use only the region that all scans have in common
     #[arg(long)]
     overlap: bool,
     /// A drift known beforehand, nm/min, instead of measuring it
-    #[arg(long, num_args = 2, value_names = ["X", "Y"], allow_negative_numbers = true)]
+    #[arg(long, num_args = 2, value_names = ["X", "Y"], allow_negative_numbers = true, value_parser = numbers::number(numbers::DRIFT))]
     drift: Option<Vec<f64>>,
     /// Standard uncertainty of each component of --drift, nm/min
-    #[arg(long, value_name = "SIGMA", requires = "drift")]
+    #[arg(long, value_name = "SIGMA", requires = "drift", value_parser = numbers::number(numbers::NOT_NEGATIVE))]
     drift_sigma: Option<f64>,
     /// Monte Carlo draws for the drift, per set [default: 10000]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = numbers::count(0, MOST_DRAWS))]
     drift_draws: Option<usize>,
     /// Monte Carlo draws for twist and strain, per scan [default: 1000]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = numbers::count(0, MOST_DRAWS))]
     strain_draws: Option<usize>,
     /// Seed of all random numbers [default: 1]
     #[arg(long)]
     seed: Option<u64>,
     /// Number of threads [default: all processors]; the results do not depend on it
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = numbers::count(1, 1024))]
     pub(super) threads: Option<usize>,
     /// Colours of images
     #[arg(long, value_enum, default_value_t = ColorMapArg::Viridis)]
@@ -149,9 +165,8 @@ pub(crate) struct AnalyzeArgs {
     /// one file per scan and line: corrected.gwy makes OUT/corrected/SCAN-trace.gwy and so on; also
     /// .gsf, .npz, .zarr, .tiff, .csv
     #[arg(long, value_name = "NAME.EXT", value_delimiter = ',')]
-    export: Vec<String>,
+    pub(super) export: Vec<String>,
     /// Write vectors, scans, sets and budget as Parquet too
-    #[cfg(feature = "parquet")]
     #[arg(long)]
     pub(super) parquet: bool,
     /// Laboratory axes for vectors, angles, drift, figures and exported images: a frame that is turned by
@@ -160,7 +175,7 @@ pub(crate) struct AnalyzeArgs {
     rotate_to_lab: bool,
     #[command(flatten)]
     pub(super) known: KnownArgs,
-    /// Print results.json instead of the summary
+    /// Print results.json instead of the summary; with --moires a list of those of all moirés, the largest cell first
     #[arg(long)]
     pub(super) json: bool,
     /// Print nothing but errors
@@ -170,9 +185,6 @@ pub(crate) struct AnalyzeArgs {
     #[arg(long)]
     pub(super) force: bool,
 }
-
-/// A set made by hand: its name and the path of its files.
-pub(crate) type NamedSet = (String, PathBuf);
 
 impl AnalyzeArgs {
     /// The settings file, or the defaults, with the options on top.
@@ -217,6 +229,7 @@ impl AnalyzeArgs {
         if self.channel.is_some() {
             s.channel.clone_from(&self.channel);
         }
+        s.image = self.image.or(s.image);
         if let Some(xy) = &self.drift {
             s.drift = Some(GivenDrift {
                 x_nm_per_min: xy[0],
@@ -280,19 +293,33 @@ impl AnalyzeArgs {
         Ok(())
     }
 
-    /// The files, folders and patterns as given.
-    pub(crate) fn paths(&self) -> &[PathBuf] {
-        &self.paths
-    }
-
     /// The folder for results.
     pub(crate) fn out(&self) -> &std::path::Path {
-        &self.out
+        self.out.as_deref().unwrap_or(std::path::Path::new(""))
     }
 
-    /// What the files do not tell.
-    pub(crate) fn known(&self) -> &KnownArgs {
-        &self.known
+    /// The folder for results, that of a repetition where none is given.
+    pub(crate) fn results_folder(&self) -> PathBuf {
+        let document = self.replay.as_ref().filter(|_| self.out.is_none());
+        document.map_or_else(|| self.out().to_owned(), |d| super::out_beside(d))
+    }
+
+    /// Whether an earlier run is to be repeated.
+    pub(crate) fn is_replay(&self) -> bool {
+        self.replay.is_some()
+    }
+
+    /// These options, with the folder of results, the threads and the words of others.
+    pub(crate) fn with_place_of(self, other: &Self) -> Self {
+        Self {
+            out: Some(other.results_folder()),
+            replay: other.replay.clone(),
+            threads: other.threads,
+            force: other.force,
+            json: other.json,
+            quiet: other.quiet,
+            ..self
+        }
     }
 
     /// Whether results may be written over.
@@ -310,25 +337,16 @@ impl AnalyzeArgs {
         !self.quiet && !self.json
     }
 
-    /// The corrected images that are wanted.
-    pub(super) fn exports(&self) -> anyhow::Result<Vec<Export>> {
-        self.export.iter().map(|name| export::parse(name)).collect()
-    }
-
     /// The sets made by hand.
     pub(crate) fn sets(&self) -> anyhow::Result<Vec<NamedSet>> {
         let parse = |text: &String| match text.split_once('=') {
-            Some((name, path)) if !name.is_empty() && !path.is_empty() => {
-                Ok((name.to_owned(), PathBuf::from(path)))
-            }
+            Some((name, path)) if !name.is_empty() && !path.is_empty() => Ok(NamedSet {
+                name: name.to_owned(),
+                path: path.to_owned(),
+            }),
             _ => anyhow::bail!("--set expects NAME=PATH, found {text:?}"),
         };
         self.sets.iter().map(parse).collect()
-    }
-
-    /// Whether pixels are needed for pictures.
-    pub(super) fn illustrated(&self) -> bool {
-        !self.no_report
     }
 
     pub(crate) fn choice(&self) -> Choice {

@@ -1,6 +1,5 @@
 //! Files → measured scans → analysis, one file in memory per thread.
 
-use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
@@ -9,18 +8,18 @@ use moiregauge::analysis::Analysis;
 use moiregauge::caveat::Caveat;
 use moiregauge::series::{
     MeasureError, MeasuredScan, Window, about_repeat, analyse, choose_channel, common_window,
-    illustrate, measure_moires, sorted_moires,
+    illustrate, measure_moires, sorted_moires, unusual_channels,
 };
 use moiregauge::settings::Settings;
-use moiregauge_pipeline::{Repeated, distinct, names};
+use moiregauge_pipeline::{Repeated, distinct, hexadecimal, names, set_of};
+use moiregauge_report::results::NamedSet;
 use moiregauge_report::{FailedInput, InputFile, Provenance};
 use rayon::prelude::*;
 use sha2::{Digest as _, Sha256};
 use spmfile::{ChannelInfo, Scan, sensor_axis};
 
-use super::args::NamedSet;
 use super::channel;
-use crate::input::Known;
+use crate::input::{Known, with_option};
 
 /// What came out, and of what.
 pub(crate) struct Outcome {
@@ -91,6 +90,7 @@ pub(crate) fn analyse_files(
         seed: settings.seed,
         inputs: files,
         failed,
+        run: None,
     };
     let outcomes = sorted_moires(scans)
         .into_iter()
@@ -175,11 +175,12 @@ pub(crate) fn measure_file(
         caveats,
     } = read(path, settings, known)?;
     let mut moires = measure_moires(&input.file, &scan, settings, window).map_err(with_hint)?;
-    let set = sets
-        .iter()
-        .find(|(_, of)| path.starts_with(of))
-        .map(|(name, _)| name.clone());
+    let set = set_of(sets, path).map(str::to_owned);
     for measured in &mut moires {
+        let several = |c: &&mut Caveat| c.code == "several-images";
+        for caveat in measured.caveats.iter_mut().filter(several) {
+            caveat.message += "; --image N says which one";
+        }
         measured.caveats.extend(caveats.iter().cloned());
         measured.set.clone_from(&set);
         measured.digest = Some(input.sha256.clone());
@@ -208,9 +209,17 @@ pub(crate) struct Reading {
     pub(crate) caveats: Vec<Caveat>,
 }
 
-/// Reads what the analysis needs of a file: the chosen channel and the position sensors.
+/// Reads what the analysis needs of a file: the chosen channel and the position sensors; not more than the memory
+/// holds while it is analysed.
 pub(crate) fn read(path: &Path, settings: &Settings, known: &Known) -> anyhow::Result<Reading> {
-    let bytes = std::fs::read(path)?;
+    let reading = read_any(path, settings, known)?;
+    moiregauge_pipeline::enough_for(&reading.scan)?;
+    Ok(reading)
+}
+
+/// The same of an image of any size, for surveys.
+pub(crate) fn read_any(path: &Path, settings: &Settings, known: &Known) -> anyhow::Result<Reading> {
+    let bytes = moiregauge_pipeline::read(known.place(path))?;
     let channels = channel::names(path, &bytes, known)?;
     let names: Vec<_> = channels
         .iter()
@@ -221,7 +230,7 @@ pub(crate) fn read(path: &Path, settings: &Settings, known: &Known) -> anyhow::R
         chosen.as_ref().is_none_or(|name| *name == channel.name)
             || sensor_axis(&channel.name, &channel.internal_name).is_some()
     };
-    let (scan, replaced) = known.read(path, &bytes, &wanted)?;
+    let (scan, replaced) = known.read(path, &bytes, &wanted).map_err(with_option)?;
     let hash = Sha256::digest(&bytes);
     let input = InputFile {
         file: names::in_words(path),
@@ -232,10 +241,15 @@ pub(crate) fn read(path: &Path, settings: &Settings, known: &Known) -> anyhow::R
         let file = input.file.as_str();
         move |words: String| Caveat::new(code, file, words)
     };
+    let wanted = settings.channel.as_deref();
+    let several = unusual_channels(&names, wanted).map(|words| {
+        let words = format!("{words}; --channel NAME says which one shows the moiré");
+        Caveat::new("several-images", input.file.as_str(), words)
+    });
     let doubts = scan.notes.iter().cloned().map(caveat("reader-doubt"));
     let caveats = replaced.into_iter().map(caveat("given-by-user"));
     Ok(Reading {
-        caveats: caveats.chain(doubts).collect(),
+        caveats: several.into_iter().chain(caveats).chain(doubts).collect(),
         scan,
         input,
     })
@@ -250,15 +264,6 @@ pub(crate) fn read_again(
 ) -> anyhow::Result<Reading> {
     let path = names::with_words(inputs, words).context("it is none of the inputs")?;
     read(path, settings, known)
-}
-
-pub(crate) fn hexadecimal(bytes: &[u8]) -> String {
-    let mut text = String::with_capacity(2 * bytes.len());
-    for byte in bytes {
-        // Writing into a string cannot fail.
-        let _ = write!(text, "{byte:02x}");
-    }
-    text
 }
 
 /// The region common to all files that can be read.

@@ -1,13 +1,12 @@
 //! Lines of an image, from a scan in memory or straight from an uncompressed `.npy` file.
 
-use std::fs::File;
 use std::io::{Read as _, Seek as _, SeekFrom};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, ensure};
 use moiregauge::image::Image;
-use spmfile::Channel;
+use spmfile::{Block, Channel};
 
 /// Where lines come from.
 pub(super) enum Source {
@@ -28,16 +27,20 @@ pub(super) struct Array {
     /// Rows and columns.
     pub(super) size: [usize; 2],
     line: usize,
+    /// The part of it that is the image, if not all.
+    block: Option<Block>,
 }
 
 impl Source {
     /// Reads a block of columns and rows, the bottom line being row 0.
     pub(super) fn block(&self, [columns, rows]: [Range<usize>; 2]) -> Result<Image, String> {
-        let (width, count, values) = match self {
-            Self::Memory(channel) => (channel.columns, rows.len(), channel.lines(rows)),
+        let (width, count) = (self.width(), rows.len());
+        let (values, columns) = match self {
+            Self::Memory(channel) => (channel.lines(rows), columns),
             Self::Array(array) => {
-                let values = array.lines(rows.clone()).map_err(|e| format!("{e:#}"))?;
-                (array.size[1], rows.len(), values)
+                let [columns, rows] = array.of_whole([columns, rows]);
+                let values = array.lines(rows).map_err(|e| format!("{e:#}"))?;
+                (values, columns)
             }
         };
         if values.len() != width * count {
@@ -49,12 +52,20 @@ impl Source {
         }
         Ok(image.cropped([columns.start, 0], [columns.len(), count]))
     }
+
+    /// Samples of a line as they are stored.
+    fn width(&self) -> usize {
+        match self {
+            Self::Memory(channel) => channel.columns,
+            Self::Array(array) => array.size[1],
+        }
+    }
 }
 
 impl Array {
     /// Opens a file if it is such an array; `None` for anything else.
     pub(super) fn open(path: &Path) -> Option<Self> {
-        let mut file = File::open(path).ok()?;
+        let mut file = moiregauge_pipeline::open(path).ok()?;
         let mut first = [0; 10];
         file.read_exact(&mut first).ok()?;
         // Versions 2 and 3 are for headers longer than an image needs.
@@ -90,7 +101,20 @@ impl Array {
             start: 10 + length as u64,
             size: [rows, columns],
             line,
+            block: None,
         })
+    }
+
+    /// The same with a part of it as the image.
+    pub(super) fn with_block(self, block: Option<Block>) -> Self {
+        Self { block, ..self }
+    }
+
+    /// Columns and rows of the image as those of the array.
+    fn of_whole(&self, [columns, rows]: [Range<usize>; 2]) -> [Range<usize>; 2] {
+        let first = self.block.map_or([0, 0], |b| [b.column, b.row]);
+        let moved = |range: Range<usize>, by: usize| range.start + by..range.end + by;
+        [moved(columns, first[0]), moved(rows, first[1])]
     }
 
     /// The file as if it had only these lines, counted from the bottom.
@@ -100,7 +124,7 @@ impl Array {
             "the array has {} lines",
             self.size[0]
         );
-        let mut file = File::open(&self.path)?;
+        let mut file = moiregauge_pipeline::open(&self.path)?;
         let top = self.size[0] - rows.end;
         file.seek(SeekFrom::Start(self.start + (top * self.line) as u64))?;
         let mut header = self.header.clone();
