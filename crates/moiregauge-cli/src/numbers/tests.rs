@@ -23,7 +23,6 @@ fn templates(command: &str, option: &str) -> Vec<&'static str> {
     match (command, option) {
         ("simulate", "size" | "drift" | "acceleration") => vec!["{}|50", "50|{}"],
         ("simulate", "pixels") => vec!["{}", "{}x32", "32x{}"],
-        ("simulate" | "calibrate", "lattice_angle" | "lattice_constant") => vec!["{}"],
         (_, "size" | "device") => vec!["{}nm×12nm", "12nm×{}nm"],
         (_, "crop") => vec!["{},0,32,32", "0,{},32,32", "0,0,{},32", "0,0,32,{}"],
         (_, "at") => vec!["{},0", "0,{}"],
@@ -42,9 +41,8 @@ fn templates(command: &str, option: &str) -> Vec<&'static str> {
 /// A number that the option takes.
 fn usual(option: &str) -> &'static str {
     match option {
-        "pixels" | "twist" => "40",
+        "pixels" | "twist" | "lattice" => "40",
         "lattice_constant" | "sharpness" | "poisson_ratio" | "poisson_ratio_sigma" => "0.3",
-        "lattice" => "40",
         "wavelengths" | "vectors" => "12",
         "size" | "device" => "10",
         "sets" | "scans" => "2",
@@ -110,6 +108,10 @@ fn base(command: &str, option: &str, folder: &Path) -> Option<Vec<OsString>> {
                     base.extend([format!("--{name}").into(), value.into()]);
                 }
             }
+        }
+        // The options of the budget are those of `analyze`.
+        "plan" if option.starts_with("calibration") || option.starts_with("isotropic") => {
+            return None;
         }
         "plan" if option != "twist_sigma" => base.extend(words("--twist-sigma 0.02")),
         "plan" | "moire" => {}
