@@ -8,7 +8,7 @@ use moiregauge::analysis::Analysis;
 use moiregauge::caveat::Caveat;
 use moiregauge::series::{
     MeasureError, MeasuredScan, Window, about_repeat, analyse, choose_channel, common_window,
-    illustrate, measure_moires, sorted_moires,
+    illustrate, measure_moires, sorted_moires, unusual_channels,
 };
 use moiregauge::settings::Settings;
 use moiregauge_pipeline::{Repeated, distinct, hexadecimal, names, set_of};
@@ -177,6 +177,10 @@ pub(crate) fn measure_file(
     let mut moires = measure_moires(&input.file, &scan, settings, window).map_err(with_hint)?;
     let set = set_of(sets, path).map(str::to_owned);
     for measured in &mut moires {
+        let several = |c: &&mut Caveat| c.code == "several-images";
+        for caveat in measured.caveats.iter_mut().filter(several) {
+            caveat.message += "; --image N says which one";
+        }
         measured.caveats.extend(caveats.iter().cloned());
         measured.set.clone_from(&set);
         measured.digest = Some(input.sha256.clone());
@@ -205,9 +209,17 @@ pub(crate) struct Reading {
     pub(crate) caveats: Vec<Caveat>,
 }
 
-/// Reads what the analysis needs of a file: the chosen channel and the position sensors.
+/// Reads what the analysis needs of a file: the chosen channel and the position sensors; not more than the memory
+/// holds while it is analysed.
 pub(crate) fn read(path: &Path, settings: &Settings, known: &Known) -> anyhow::Result<Reading> {
-    let bytes = std::fs::read(known.place(path))?;
+    let reading = read_any(path, settings, known)?;
+    moiregauge_pipeline::enough_for(&reading.scan)?;
+    Ok(reading)
+}
+
+/// The same of an image of any size, for surveys.
+pub(crate) fn read_any(path: &Path, settings: &Settings, known: &Known) -> anyhow::Result<Reading> {
+    let bytes = moiregauge_pipeline::read(known.place(path))?;
     let channels = channel::names(path, &bytes, known)?;
     let names: Vec<_> = channels
         .iter()
@@ -229,10 +241,15 @@ pub(crate) fn read(path: &Path, settings: &Settings, known: &Known) -> anyhow::R
         let file = input.file.as_str();
         move |words: String| Caveat::new(code, file, words)
     };
+    let wanted = settings.channel.as_deref();
+    let several = unusual_channels(&names, wanted).map(|words| {
+        let words = format!("{words}; --channel NAME says which one shows the moiré");
+        Caveat::new("several-images", input.file.as_str(), words)
+    });
     let doubts = scan.notes.iter().cloned().map(caveat("reader-doubt"));
     let caveats = replaced.into_iter().map(caveat("given-by-user"));
     Ok(Reading {
-        caveats: caveats.chain(doubts).collect(),
+        caveats: several.into_iter().chain(caveats).chain(doubts).collect(),
         scan,
         input,
     })
