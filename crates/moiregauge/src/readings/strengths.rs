@@ -22,8 +22,16 @@ const WHOLE: f64 = 0.3;
 pub struct WaveStrengths {
     /// Reciprocal pair that the waves are counted in, rad/nm.
     pair: Option<Matrix2<f64>>,
-    /// For each image: lower and upper bound of every wave that was fitted, and the upper bound of the others.
-    images: Vec<(BTreeMap<[i32; 2], [f64; 2]>, f64)>,
+    images: Vec<InImage>,
+}
+
+/// Relative amplitudes in one image.
+#[derive(Clone, Debug)]
+struct InImage {
+    /// Lower and upper bound of every wave that was fitted.
+    fitted: BTreeMap<[i32; 2], [f64; 2]>,
+    /// Upper bound of the others.
+    left_out: f64,
 }
 
 impl WaveStrengths {
@@ -38,7 +46,7 @@ impl WaveStrengths {
     /// Adds an image; `pixel_to_nm` is its J.
     pub fn add(&mut self, fit: &LatticeFit, pixel_to_nm: &Matrix2<f64>) {
         let dual = pixel_to_nm.try_inverse().map(|inverse| inverse.transpose());
-        let Some((inverse, dual)) = self.pair.and_then(|p| p.try_inverse()).zip(dual) else {
+        let Some((inverse, dual)) = self.pair.and_then(Matrix2::try_inverse).zip(dual) else {
             return;
         };
         let power: f64 = fit.harmonics.iter().map(|h| h.amplitude.powi(2)).sum();
@@ -61,7 +69,10 @@ impl WaveStrengths {
         }
         let left_out = LEFT_OUT * usual / scale;
         if scale > 0.0 && left_out.is_finite() {
-            self.images.push((waves, left_out));
+            self.images.push(InImage {
+                fitted: waves,
+                left_out,
+            });
         }
     }
 
@@ -72,9 +83,10 @@ impl WaveStrengths {
             return None;
         }
         // A wave and its opposite are one.
-        let of = |(waves, left_out): &(BTreeMap<[i32; 2], [f64; 2]>, f64)| {
-            let found = waves.get(&index).or_else(|| waves.get(&index.map(|n| -n)));
-            found.copied().unwrap_or([0.0, *left_out])
+        let of = |image: &InImage| {
+            let opposite = index.map(|n| -n);
+            let found = image.fitted.get(&index).or(image.fitted.get(&opposite));
+            found.copied().unwrap_or([0.0, image.left_out])
         };
         let count = self.images.len() as f64;
         let sums = self.images.iter().map(of);

@@ -26,7 +26,7 @@ pub struct RegionMean {
     /// The same without what noise adds, 0 where noise explains it.
     pub corrected: f64,
     /// What the spread of the lattice does not exceed, with 95 % confidence as far as noise goes, for changes over no
-    /// less than some six windows: noise and `widening` are in it.
+    /// less than some eight windows: noise and `widening` are in it.
     pub below: f64,
     /// Factor by which the window may have made the spread smaller, as the curvature of the map tells.
     pub widening: f64,

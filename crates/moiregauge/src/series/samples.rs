@@ -195,7 +195,7 @@ fn about(group: &Group, names: &[String], apart: f64, by_hand: bool) -> Caveat {
         &group.name,
         format!(
             "the scans show {} different lattices ({}), which differ {difference}; drift does not change a lattice \
-             there. They are of different samples or places: {then}",
+             there. They are of different samples or places, or something else was taken for the lattice in some: {then}",
             names.len(),
             names.join("; ")
         ),

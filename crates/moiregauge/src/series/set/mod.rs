@@ -26,6 +26,7 @@ use crate::chi2::enlargement;
 use crate::drift::paper::successive_drift;
 use crate::drift::{Observation, at_known_drift, common_lattice, monte_carlo, solve};
 use crate::geometry::mean_and_spread;
+use crate::joint::JointFit;
 use crate::lattice::LatticeVectors;
 use crate::lattice::reciprocal::real_from_reciprocal;
 use crate::readings::{Readings, WaveStrengths};
@@ -63,27 +64,13 @@ pub(super) fn analyse_set(
         .flat_map(|&i| &observations[i])
         .copied()
         .collect();
-    let mut solved = drift((&group.name, &used), &all, settings, caveats);
-    caveats.extend(
-        solved
-            .as_ref()
-            .and_then(|_| about_dates(&group.name, &used)),
-    );
-    let mut fit = None;
-    if joint {
-        (solved, fit) = match solved {
-            Some(linear) => {
-                let (lattice, velocity) = (linear.lattice, linear.drift.velocity);
-                let (solved, fit) = joint::jointly(linear, &used, reference, settings);
-                caveats.extend(fit.as_ref().and_then(|fit| {
-                    let name = &group.name;
-                    about_headers(name, &used, reference, &lattice, &velocity, fit, settings)
-                }));
-                (Some(solved), fit)
-            }
-            None => (None, None),
-        };
-    }
+    let (solved, fit) = match drift((&group.name, &used), &all, settings, caveats) {
+        Some(linear) if joint => {
+            let (solved, fit) = refined(&group.name, linear, &used, reference, settings, caveats);
+            (Some(solved), fit)
+        }
+        linear => (linear, None),
+    };
     let mut scans: Vec<ScanAnalysis> = group
         .scans
         .iter()
@@ -203,6 +190,24 @@ fn draw(scans: &mut [ScanAnalysis], settings: &Settings, first_index: u64) {
     });
 }
 
+/// The linear solution refined by the joint fit, with doubts about headers that contradict it.
+fn refined(
+    name: &str,
+    linear: Solved,
+    used: &[&MeasuredScan],
+    reference: &Matrix2<f64>,
+    settings: &Settings,
+    caveats: &mut Vec<Caveat>,
+) -> (Solved, Option<JointFit>) {
+    let (lattice, velocity) = (linear.lattice, linear.drift.velocity);
+    let (solved, fit) = joint::jointly(linear, used, reference, settings);
+    let doubts = fit
+        .as_ref()
+        .and_then(|fit| about_headers(name, used, reference, &lattice, &velocity, fit, settings));
+    caveats.extend(doubts);
+    (solved, fit)
+}
+
 /// Marks the scans that do not fit the others.
 fn leave_out(
     group: &mut Group,
@@ -267,6 +272,7 @@ fn drift(
         ));
         return None;
     }
+    caveats.extend(about_dates(name, scans));
     if let Some(given) = settings.drift {
         return given_drift(name, all, given, caveats);
     }
