@@ -6,9 +6,14 @@ mod channel;
 mod export;
 mod files;
 mod orientation;
-mod summary;
 
+use std::path::Path;
 use std::process::ExitCode;
+
+use anyhow::Context as _;
+use moiregauge::analysis::Picture;
+use moiregauge::series::picture;
+use moiregauge::settings::Settings;
 
 pub(crate) use args::{AnalyzeArgs, BackgroundArg, ConventionArg, LineArg, MethodArg};
 pub(crate) use chain::{
@@ -16,12 +21,13 @@ pub(crate) use chain::{
 };
 pub(crate) use channel::channel_names;
 pub(crate) use files::write_all;
+pub(crate) use moiregauge_report::screen::{caveats as caveat_lines, failures, summary};
 pub(crate) use orientation::{Angle, DirectionArg, parse_angle};
-pub(crate) use summary::{caveats as caveat_lines, failures, summary};
 
 use crate::info::inputs;
+use crate::input::KnownArgs;
 use crate::say::say;
-use moiregauge_report::write_report;
+use moiregauge_report::{InputFile, write_report};
 
 /// Analyses the files and writes the results.
 pub(crate) fn run(args: &AnalyzeArgs) -> anyhow::Result<ExitCode> {
@@ -32,6 +38,11 @@ pub(crate) fn run(args: &AnalyzeArgs) -> anyhow::Result<ExitCode> {
     let (inputs, failed) = inputs(&args.paths);
     let loud = args.is_loud();
     let known = args.known.of(&inputs);
+    let survey = args
+        .survey_image
+        .as_deref()
+        .map(|path| survey_image(path, &settings))
+        .transpose()?;
     let atomic = args.orientation.measure(&settings, &args.known)?;
     if let Some((found, _)) = &atomic {
         settings.lattice_angle = Some(found.known());
@@ -47,7 +58,7 @@ pub(crate) fn run(args: &AnalyzeArgs) -> anyhow::Result<ExitCode> {
     );
     let mut outcomes = outcome
         .map_err(|failed| {
-            eprint!("{}", summary::failures(&failed));
+            eprint!("{}", failures(&failed));
             if let Some(stripes) = crate::map::stripes_in_words(&inputs, &settings, &known) {
                 eprintln!("{stripes}");
             }
@@ -62,6 +73,12 @@ pub(crate) fn run(args: &AnalyzeArgs) -> anyhow::Result<ExitCode> {
             analysis.caveats.extend(found.caveats.iter().cloned());
             analysis.atomic = Some(found.clone());
             provenance.inputs.extend(files.iter().cloned());
+        }
+    }
+    if let Some((picture, file)) = survey {
+        for outcome in &mut outcomes {
+            outcome.analysis.survey = Some(picture.clone());
+            outcome.provenance.inputs.push(file.clone());
         }
     }
     let folders = files::folders(&args.out, outcomes.len());
@@ -104,10 +121,23 @@ pub(crate) fn run(args: &AnalyzeArgs) -> anyhow::Result<ExitCode> {
             ))?;
         }
     }
-    eprint!("{}", summary::failures(&failed));
+    eprint!("{}", failures(&failed));
     Ok(if failed.is_empty() {
         ExitCode::SUCCESS
     } else {
         ExitCode::FAILURE
     })
+}
+
+/// The image of a larger area, read before the work.
+fn survey_image(path: &Path, settings: &Settings) -> anyhow::Result<(Picture, InputFile)> {
+    let paths = [path.to_owned()];
+    // What is known of the scans, as their size, is not known of it.
+    let reading = read(path, settings, &KnownArgs::default().of(&paths))
+        .with_context(|| format!("--survey-image {}", path.display()))?;
+    let name = path.display().to_string();
+    let shown = picture(&name, &reading.scan, settings).with_context(|| {
+        format!("--survey-image {name}: it has no image with a size and a place")
+    })?;
+    Ok((shown, reading.input))
 }

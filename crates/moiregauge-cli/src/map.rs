@@ -17,7 +17,7 @@ use moiregauge::caveat::Caveat;
 use moiregauge::map::{
     DriftChange, LatticeMap, Resolution, TwistStrainMap, combine, drift_change, register,
 };
-use moiregauge::series::{LineMap, MapMethod, SurveyPlan, domains_of_scan, map_scan};
+use moiregauge::series::{LineMap, MapMethod, SurveyPlan, domains_of_scan, map_scan, picture};
 use moiregauge::settings::Settings;
 use moiregauge_report::{FailedInput, Provenance};
 use spmfile::FrameDirection;
@@ -51,21 +51,21 @@ pub(crate) struct MapArgs {
     #[command(flatten)]
     analyze: AnalyzeArgs,
     /// How local lattices are measured
-    #[arg(long, value_enum, default_value_t = MapMethodArg::Demodulation)]
+    #[arg(help_heading = "Maps", long, value_enum, default_value_t = MapMethodArg::Demodulation)]
     map_method: MapMethodArg,
     /// Width of the Gaussian window (standard deviation), nm; a point becomes 2.35 of it wide [default: as
     /// wide as the lattice stays straight, at least 0.6 periods]. By tiles: the side of a tile [default: 6
     /// periods]
-    #[arg(long, value_name = "NM")]
+    #[arg(help_heading = "Maps", long, value_name = "NM")]
     window: Option<f64>,
     /// Distance of the nodes, nm [default: a third of the window, two pixels at least; a quarter of a tile]
-    #[arg(long, value_name = "NM")]
+    #[arg(help_heading = "Maps", long, value_name = "NM")]
     step: Option<f64>,
     /// Map in bands, as images of more than 20 million pixels are; several files are put side by side
-    #[arg(long)]
+    #[arg(help_heading = "Maps", long)]
     in_bands: bool,
     /// Margin at the edges, in windows [default: 2, or a quarter of the frame where that is less]
-    #[arg(long, value_name = "WINDOWS")]
+    #[arg(help_heading = "Maps", long, value_name = "WINDOWS")]
     margin: Option<f64>,
     #[command(flatten)]
     regions: regions::RegionArgs,
@@ -109,6 +109,10 @@ pub(crate) fn run(args: &MapArgs) -> anyhow::Result<ExitCode> {
     let resolution = args.resolution()?;
     args.regions.check()?;
     let out = args.analyze.out();
+    ensure!(
+        args.analyze.survey_image().is_none(),
+        "--survey-image is for analyze"
+    );
     ensure!(
         args.analyze.force() || !out.join("map.json").exists(),
         "{} already holds a map; give another --out, or --force to write over it",
@@ -214,6 +218,7 @@ fn survey(
             failed: failed.to_vec(),
         },
         settings: settings.clone(),
+        picture: plans.first().and_then(|(large, _)| large.picture(settings)),
         images,
         map,
         whole: None,
@@ -268,10 +273,15 @@ fn together(
     };
     let origin = used().filter_map(|s| s.acquired).min();
     let how = (args.map_method.into(), resolution);
-    let mut maps = Vec::new();
+    let (mut maps, mut shown) = (Vec::new(), None);
     for scan in used() {
-        let mapped = read(Path::new(&scan.file), settings, known)
-            .and_then(|r| Ok(map_scan(&r.scan, (scan, origin), settings, how)?));
+        let mapped = read(Path::new(&scan.file), settings, known).and_then(|r| {
+            let lines = map_scan(&r.scan, (scan, origin), settings, how)?;
+            shown = shown
+                .take()
+                .or_else(|| picture(&scan.file, &r.scan, settings));
+            Ok(lines)
+        });
         match mapped {
             Ok(lines) => maps.extend(lines),
             Err(error) => provenance.failed.push(FailedInput {
@@ -320,6 +330,7 @@ fn together(
     caveats.extend(domains.caveats.iter().cloned());
     Ok(Answer::Lattice(Box::new(Made {
         map,
+        picture: shown,
         domains,
         images: maps
             .iter()

@@ -7,8 +7,8 @@ use indicatif::{ProgressBar, ProgressStyle};
 use moiregauge::analysis::Analysis;
 use moiregauge::caveat::Caveat;
 use moiregauge::series::{
-    MeasureError, MeasuredScan, Window, analyse, choose_channel, common_window, illustrate,
-    measure_moires, sorted_moires,
+    MeasureError, MeasuredScan, Window, amplitude_of, analyse, choose_channel, common_window,
+    illustrate, measure_moires, sorted_moires,
 };
 use moiregauge::settings::Settings;
 use moiregauge_report::{FailedInput, InputFile, Provenance};
@@ -100,7 +100,7 @@ pub(crate) fn analyse_files(
             if illustrated {
                 analysis.sets.par_iter_mut().for_each(|set| {
                     set.illustration = set.scans.first().and_then(|first| {
-                        let reading = read(Path::new(&first.file), settings, known).ok()?;
+                        let reading = read_shown(Path::new(&first.file), settings, known).ok()?;
                         illustrate(&reading.scan, first, settings)
                     });
                 });
@@ -193,6 +193,19 @@ pub(crate) struct Reading {
 
 /// Reads what the analysis needs of a file: the chosen channel and the position sensors.
 pub(crate) fn read(path: &Path, settings: &Settings, known: &Known) -> anyhow::Result<Reading> {
+    read_more(path, (settings, known), |_| None)
+}
+
+/// The same and what is shown beside it: the amplitude of a phase.
+fn read_shown(path: &Path, settings: &Settings, known: &Known) -> anyhow::Result<Reading> {
+    read_more(path, (settings, known), amplitude_of)
+}
+
+fn read_more(
+    path: &Path,
+    (settings, known): (&Settings, &Known),
+    companion: impl Fn(&str) -> Option<String>,
+) -> anyhow::Result<Reading> {
     let bytes = std::fs::read(path)?;
     let channels = channel::names(path, &bytes, known)?;
     let names: Vec<_> = channels
@@ -200,8 +213,10 @@ pub(crate) fn read(path: &Path, settings: &Settings, known: &Known) -> anyhow::R
         .map(|(a, b)| (a.as_str(), b.as_str()))
         .collect();
     let chosen = choose_channel(&names, settings.channel.as_deref()).map(str::to_owned);
+    let beside = chosen.as_deref().and_then(companion);
     let wanted = |channel: &ChannelInfo| {
         chosen.as_ref().is_none_or(|name| *name == channel.name)
+            || beside.as_ref() == Some(&channel.name.to_lowercase())
             || sensor_axis(&channel.name, &channel.internal_name).is_some()
     };
     let (scan, replaced) = known.read(path, &bytes, &wanted)?;

@@ -149,6 +149,7 @@ impl RegionArgs {
             wanted,
             domains: None,
             regime: None,
+            picture: None,
         };
         Ok((details, doubts))
     }

@@ -2,17 +2,17 @@
 
 use serde::Serialize;
 
-use super::words::{plain, shown};
+use super::words::{plain, shown, statistical};
 use crate::draw::scale::fixed;
-use crate::format::two_digits;
 use crate::results::{ReadingsResult, SolutionResult, StrainTensorResult, TensorNumbers};
 
 /// The readings of a lattice.
 #[derive(Debug, Serialize)]
 pub(super) struct Meanings {
     differ: bool,
-    /// What takes the place of the twist in the headline, and why: the tensor's, or all readings.
-    headline: Option<[String; 2]>,
+    /// Why, what takes the place of the twist in the headline (the tensor's, or all readings), and its statistical
+    /// part.
+    headline: Option<[String; 3]>,
     /// Twist, strain and axis of every solution that a user has to choose from.
     choices: Vec<[String; 3]>,
     /// Isotropic strain and what it does to the twist.
@@ -26,11 +26,10 @@ pub(super) struct Meanings {
 #[derive(Debug, Serialize)]
 struct Tensor {
     twist: String,
-    twist_total: String,
     mean: String,
-    mean_total: String,
     shear: String,
-    shear_total: String,
+    /// The same with their statistical σ.
+    statistical: [String; 3],
     axis: String,
     lattice_angle: String,
     /// Uniaxial part, its axis, biaxial part.
@@ -51,10 +50,15 @@ impl Meanings {
             Some(tensor) => Some([
                 "with the orientation of a layer".to_owned(),
                 format!("({})°", shown(tensor.found.twist_deg)),
+                format!("({})°", statistical(tensor.found.twist_deg)),
             ]),
             None if readings.layers_differ && !choices.is_empty() => {
                 let twists: Vec<&str> = choices.iter().map(|c| c[0].as_str()).collect();
-                Some(["the layers differ".to_owned(), twists.join(" or ")])
+                Some([
+                    "the layers differ".to_owned(),
+                    twists.join(" or "),
+                    "the σ shown".to_owned(),
+                ])
             }
             None => None,
         };
@@ -102,16 +106,15 @@ fn tensor(found: &StrainTensorResult) -> Tensor {
         axis_lab_deg,
         ..
     } = found.found;
-    let total = |sigma: Option<f64>, unit: &str| {
-        sigma.map_or_else(|| "–".to_owned(), |s| format!("{}{unit}", two_digits(s)))
-    };
     Tensor {
         twist: format!("({})°", shown(twist_deg)),
-        twist_total: total(found.total.twist_deg, "°"),
         mean: format!("({}) %", shown(mean_strain_percent)),
-        mean_total: total(found.total.mean_strain_percent, " %"),
         shear: format!("({}) %", shown(shear_percent)),
-        shear_total: total(found.total.shear_percent, " %"),
+        statistical: [
+            format!("({})°", statistical(twist_deg)),
+            format!("({}) %", statistical(mean_strain_percent)),
+            format!("({}) %", statistical(shear_percent)),
+        ],
         axis: axis_lab_deg.map_or_else(
             || "not significant".to_owned(),
             |a| format!("({})°", shown(a)),

@@ -31,7 +31,7 @@ pub use channel::{channels_by_preference, choose_channel};
 pub use corrected::{CorrectedImage, corrected_images, nominal_geometry, on_grid};
 pub use domain_mapping::domains_of_scan;
 pub use group::natural_order;
-pub use illustrate::illustrate;
+pub use illustrate::{amplitude_of, illustrate, picture};
 pub use mapping::{LineMap, MapError, MapMethod, map_scan};
 pub use measure::{
     MeasureError, MeasuredLine, MeasuredScan, measure_known, measure_moires, measure_scan,
@@ -92,6 +92,7 @@ pub fn analyse(scans: Vec<MeasuredScan>, settings: &Settings) -> Analysis {
         sets,
         combined,
         atomic: None,
+        survey: None,
         caveats,
     }
 }

@@ -15,7 +15,7 @@ use crate::background::remove_background;
 use crate::domains::{Contrast, DomainMap, Mesh, find_nodes};
 use crate::geometry::{Geometry, Timing};
 use crate::image::Image;
-use crate::lattice::reciprocal::labelled_like;
+use crate::lattice::reciprocal::{canonical, labelled_like, reciprocal};
 use crate::lattice::{LatticeError, LatticeVectors, measure};
 use crate::map::{
     Grid, LatticeMap, Reference, Resolution, Survey, TwistStrainMap, UsedHarmonic, local_lattices,
@@ -90,6 +90,15 @@ fn block(
     read([columns, rows]).map_err(|why| SurveyError::Lines { from, to, why })
 }
 
+/// The wave vectors (rad/pixel) of the lattice whose vectors have the names that an analysis would give them.
+fn named(waves: &Matrix2<f64>, pixel_to_nm: &Matrix2<f64>) -> Option<Matrix2<f64>> {
+    let real = LatticeVectors {
+        basis: pixel_to_nm * reciprocal(waves)?,
+        covariance: Matrix4::zeros(),
+    };
+    reciprocal(&(pixel_to_nm.try_inverse()? * canonical(&real).basis))
+}
+
 impl SurveyPlan {
     /// Looks at the middle of an image of this geometry, timing known or not. Other images of a survey take the
     /// window and the labelling of the first.
@@ -129,7 +138,7 @@ impl SurveyPlan {
                 };
                 labelled_like(&exact, &(back * first.whole)).basis
             }
-            None => found.reciprocal,
+            None => named(&found.reciprocal, &placed.pixel_to_nm).ok_or(SurveyError::NoMap)?,
         };
         let resolution = &Resolution {
             window_nm: first.map(|f| f.window_nm).or(resolution.window_nm),
