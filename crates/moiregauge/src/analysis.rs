@@ -207,7 +207,7 @@ pub struct DriftFit {
     pub chi2: f64,
     /// Degrees of freedom of `chi2`.
     pub degrees_of_freedom: usize,
-    /// The published estimate for comparison: approximate matrices, pairwise objective, nm/s.
+    /// The published estimate for comparison: approximate matrices, successive scans compared, nm/s.
     pub paper_velocity: Option<Vector2<f64>>,
 }
 

@@ -14,7 +14,8 @@ pub enum Method {
     Fourier,
     /// Harmonics of a lattice fitted to the pixels: errors near the Cramér–Rao bound.
     Lattice,
-    /// As published: resampled, summed autocorrelation, whole-pixel peaks. Known to be biased.
+    /// As published: resampled, summed autocorrelation, whole-pixel peaks; drift from successive scans; 48 equations
+    /// for twist and strain. Known to be biased. [`Settings::as_published`] sets what goes with it.
     Paper,
 }
 
@@ -231,6 +232,18 @@ impl Settings {
             own.substrate.clone_from(&layers.substrate);
         }
         own
+    }
+
+    /// These settings with the method of arXiv:2406.08681 and all that belongs to it: its form of the strain equation,
+    /// and images cropped to the region that all scans share.
+    #[must_use]
+    pub fn as_published(self) -> Self {
+        Self {
+            method: Method::Paper,
+            strain_convention: StrainConvention::KSpace,
+            overlap: true,
+            ..self
+        }
     }
 
     /// The two layers: `material` on itself or on the `substrate`.

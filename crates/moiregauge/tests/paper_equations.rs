@@ -9,7 +9,7 @@ use std::f64::consts::{FRAC_PI_3, PI};
 use moiregauge::lattice::LatticeVectors;
 use moiregauge::material::Material;
 use moiregauge::settings::StrainConvention::KSpace;
-use moiregauge::strain::{moire_lattice, twist_strain};
+use moiregauge::strain::{moire_lattice, published_draws, twist_strain};
 use nalgebra::{Matrix2, Matrix4, Rotation2, SMatrix, SVector, Vector2, Vector4};
 
 type Equations = SVector<f64, 48>;
@@ -128,4 +128,63 @@ fn closed_form_solves_the_published_equations() {
 fn naming(six: &[Vector2<f64>; 6], angle: f64) -> f64 {
     let first = six[0].y.atan2(six[0].x) - PI / 6.0 - PI / 2.0;
     FRAC_PI_3 * ((first - angle) / FRAC_PI_3).round()
+}
+
+/// Six vectors that no lattice has: the least squares over α, θ, ε and φ, iterated, end where the linear problem and
+/// the closed form are at once.
+#[test]
+fn twelve_pairs_of_drawn_peaks_are_solved_at_once() {
+    let graphene = Material::graphene();
+    let basis = moire_lattice(
+        f64::to_radians(1.1),
+        0.003,
+        f64::to_radians(20.0),
+        f64::to_radians(37.0),
+        &graphene,
+        KSpace,
+    )
+    .unwrap();
+    let lattice = LatticeVectors {
+        basis,
+        covariance: Matrix4::zeros(),
+    };
+    let found = twist_strain(&lattice, &graphene, KSpace).unwrap();
+    let (first, second): (Vector2<f64>, Vector2<f64>) =
+        (basis.column(0).into(), basis.column(1).into());
+    let third = second - first;
+    let exact = [first, second, third, -first, -second, -third];
+    // Up to 1 % off, each in a direction of its own.
+    for seed in 0..5 {
+        let six: [Vector2<f64>; 6] = std::array::from_fn(|k| {
+            let angle = 2.399 * (6 * seed + k) as f64;
+            exact[k] + 0.1 * Vector2::new(angle.cos(), angle.sin())
+        });
+        let ahead = naming(&six, found.lattice_angle);
+        let start = Vector4::new(
+            found.lattice_angle + ahead,
+            found.twist,
+            found.strain_vector.norm(),
+            -found.axis_lattice().unwrap().value + ahead,
+        );
+        let solved = fit(&six, start);
+        let drawn = published_draws(&lattice, &graphene, KSpace, &[six]);
+        let drawn = drawn[0];
+        assert!((solved[1] - drawn.twist).abs() < 1e-8, "{solved} {drawn:?}");
+        let strain = drawn.strain_vector.norm();
+        assert!((solved[2] - strain).abs() < 1e-7, "{solved} {drawn:?}");
+        let axis_lab = -solved[3] + solved[0] + solved[1];
+        let axis = drawn.strain_vector.y.atan2(drawn.strain_vector.x) / 2.0;
+        let difference = axis_lab - axis;
+        assert!(
+            (difference - PI * (difference / PI).round()).abs() < 1e-5,
+            "{solved} {drawn:?}"
+        );
+        // It is not the lattice of two of the six.
+        let two = LatticeVectors {
+            basis: Matrix2::from_columns(&[six[0], six[1]]),
+            covariance: Matrix4::zeros(),
+        };
+        let of_two = twist_strain(&two, &graphene, KSpace).unwrap();
+        assert!((of_two.twist - drawn.twist).abs() > 1e-6);
+    }
 }

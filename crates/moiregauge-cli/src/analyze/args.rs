@@ -233,6 +233,9 @@ impl AnalyzeArgs {
                 sigma_nm_per_min: self.drift_sigma.unwrap_or(0.0),
             });
         }
+        if matches!(self.method, Some(MethodArg::Paper)) {
+            s = s.as_published();
+        }
         s.line = self.line.map_or(s.line, Into::into);
         s.method = self.method.map_or(s.method, Into::into);
         s.strain_convention = self

@@ -8,6 +8,7 @@ mod formats;
 mod layers;
 mod maps;
 mod odd_files;
+mod published;
 mod real_images;
 mod refusals;
 mod results;

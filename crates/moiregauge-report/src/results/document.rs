@@ -116,7 +116,7 @@ pub struct DriftFitResult {
     pub chi2: Option<f64>,
     /// Degrees of freedom.
     pub degrees_of_freedom: usize,
-    /// The published estimate (approximate matrices, pairwise objective), x and y, for comparison.
+    /// The published estimate (approximate matrices, successive scans compared), x and y, for comparison.
     pub paper_nm_per_min: Option<[Option<f64>; 2]>,
 }
 

@@ -53,7 +53,17 @@ pub fn monte_carlo(
                 .collect()
         })
         .collect();
-    let (draws, losses): (Vec<_>, Vec<_>) = batches.into_iter().flatten().unzip();
+    distribution(batches.into_iter().flatten())
+}
+
+/// Mean and covariance of draws of the drift (nm/s) with their losses (nm); `None` for fewer than two.
+pub(super) fn distribution(
+    drawn: impl Iterator<Item = (Vector2<f64>, f64)>,
+) -> Option<DriftMonteCarlo> {
+    let (draws, losses): (Vec<_>, Vec<_>) = drawn.unzip();
+    if draws.len() < 2 {
+        return None;
+    }
     let n = draws.len() as f64;
     let mean = draws.iter().sum::<Vector2<f64>>() / n;
     let covariance = draws

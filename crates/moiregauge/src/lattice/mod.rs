@@ -25,6 +25,7 @@ pub(crate) mod vectors;
 use nalgebra::{Matrix2, Vector2};
 
 pub use fit::{Closure, FittedHarmonic, ForeignWave, Inhomogeneity, LatticeFit};
+pub use paper::PublishedPeaks;
 pub use phases::Phases;
 pub(crate) use pictures::pictures;
 pub use several::measure_several;
@@ -57,6 +58,8 @@ pub struct MeasuredLattice {
     pub periods: f64,
     /// Amplitude over noise amplitude in one resolution cell, weakest of the first harmonics.
     pub signal_to_noise: f64,
+    /// The peaks as published; `None` with the other methods.
+    pub published: Option<PublishedPeaks>,
     /// The fit to the pixels; `None` with the other methods.
     pub fit: Option<LatticeFit>,
 }
@@ -251,7 +254,7 @@ impl Start {
         let fourier = || fourier::measure(harmonics, peaks, spectrum.image_size).map(in_pixels);
         let autocorrelation =
             || autocorrelation::measure(spectrum, harmonics, start).map(in_pixels);
-        let mut fit = None;
+        let (mut fit, mut published) = (None, None);
         let (pixels, comparison) = match method {
             Method::Autocorrelation => (autocorrelation(), fourier()),
             Method::Fourier => (fourier(), autocorrelation()),
@@ -259,14 +262,12 @@ impl Start {
                 fit = fitted(&self.prepared, self.background);
                 (fit.as_ref().map(|(lattice, _)| *lattice), fourier())
             }
-            Method::Paper => (
-                paper::measure(
-                    &self.prepared.image,
-                    &self.geometry,
-                    &(start * pixels_per_bin),
-                ),
-                fourier(),
-            ),
+            Method::Paper => {
+                let image = &self.prepared.image;
+                let found = paper::measure(image, &self.geometry, &(start * pixels_per_bin));
+                published = found.map(|(_, peaks)| peaks);
+                (found.map(|(lattice, _)| lattice), fourier())
+            }
         };
         let fit = fit.map(|(_, fit)| fit);
         let pixels = pixels.ok_or(LatticeError::NoPeaks { method })?;
@@ -293,6 +294,7 @@ impl Start {
                 || signal_to_noise(harmonics)[2],
                 LatticeFit::weakest_signal_to_noise,
             ),
+            published,
             fit,
         })
     }

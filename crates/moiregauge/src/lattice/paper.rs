@@ -19,14 +19,24 @@ use crate::strain::three_vectors;
 /// The assumed half-width of a peak, pixels; a uniform distribution of that width has σ = w/√3.
 const PEAK_HALF_WIDTH: f64 = 1.5;
 
-/// Measures the three vectors (px of the original image), looking around `start` (px).
+/// Peaks of the autocorrelation as published: each for itself, not made to close.
+#[derive(Clone, Copy, Debug)]
+pub struct PublishedPeaks {
+    /// Three of the six peaks, about 60° apart; the others are their opposites. Pixels (columns, rows).
+    pub vectors: [Vector2<f64>; 3],
+    /// Covariance of each, px²: a uniform distribution over ±1.5 steps of the grid along x and along y.
+    pub covariance: Matrix2<f64>,
+}
+
+/// Measures the three vectors (px of the original image), looking around `start` (px): the lattice that fits them
+/// best, and the peaks themselves.
 ///
 /// `None` where the frame is too small to hold the peaks.
 pub(crate) fn measure(
     image: &Image,
     geometry: &Geometry,
     start: &Matrix2<f64>,
-) -> Option<LatticeVectors> {
+) -> Option<(LatticeVectors, PublishedPeaks)> {
     let (grid, pitch) = resampled(image, geometry)?;
     let spectrum = Spectrum::unwindowed(&grid);
     let summed = spectrum.summed_autocorrelation();
@@ -62,7 +72,14 @@ pub(crate) fn measure(
     let sigma = pitch * (PEAK_HALF_WIDTH / 3.0f64.sqrt());
     let variances = [sigma.x, sigma.y, sigma.x, sigma.y, sigma.x, sigma.y].map(|s| s * s);
     let (lattice, _closure) = three_vectors(&vectors, &Matrix6::from_diagonal(&variances.into()));
-    Some(lattice.mapped(&geometry.pixel_to_nm.try_inverse()?))
+    let to_pixels = geometry.pixel_to_nm.try_inverse()?;
+    let peaks = PublishedPeaks {
+        vectors: vectors.map(|v| to_pixels * v),
+        covariance: to_pixels
+            * Matrix2::from_diagonal(&sigma.component_mul(&sigma))
+            * to_pixels.transpose(),
+    };
+    Some((lattice.mapped(&to_pixels), peaks))
 }
 
 /// The image on a regular x, y grid over its bounding box, and the pitch of that grid, nm.

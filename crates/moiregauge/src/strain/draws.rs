@@ -2,12 +2,12 @@
 //!
 //! The check on the analytic covariance, and what the paper quotes (1,000 draws per scan).
 
-use nalgebra::{Matrix4, SymmetricEigen, Vector2, Vector4};
+use nalgebra::{Matrix2, Matrix4, SymmetricEigen, Vector2, Vector4};
 use rand_distr::{Distribution, StandardNormal};
 
 use super::closed_form::{default_signs, labelled};
 use super::complex_pair::ComplexPair;
-use super::inversion::{reduce, solve, wrap};
+use super::inversion::{Signs, reduce, solve, wrap};
 use super::labelling::moire_matrix;
 use super::layers::Layers;
 use crate::analysis::StrainDraw;
@@ -29,21 +29,10 @@ pub fn draws<'a>(
     seed: u64,
     index: u64,
 ) -> Vec<StrainDraw> {
-    let Ok(layers) = Layers::new(bilayer.into(), convention) else {
+    let Some(around) = Around::new(lattice, bilayer.into(), convention) else {
         return Vec::new();
     };
-    let Ok(labelled) = labelled(lattice, &layers) else {
-        return Vec::new();
-    };
-    let lattice = labelled.lattice;
-    let moire = ComplexPair::from(labelled.moire);
-    let found = default_signs(&layers)
-        .iter()
-        .find_map(|signs| Some((*signs, solve(&moire, &layers, *signs)?)));
-    let Some((signs, centre)) = found else {
-        return Vec::new();
-    };
-    let reported_angle = reduce(centre.lattice_angle, layers.period);
+    let lattice = around.lattice;
     let root = root(&lattice.covariance);
     let mut rng = rng::stream(seed, "strain", index);
     let mut normal = move || -> f64 { StandardNormal.sample(&mut rng) };
@@ -51,16 +40,56 @@ pub fn draws<'a>(
         .filter_map(|_| {
             let white = Vector4::from_fn(|_, _| normal());
             let moved = lattice.flat() + root * white;
-            let basis = nalgebra::Matrix2::from_column_slice(moved.as_slice());
-            let moire = moire_matrix(&basis, &layers.atoms)?;
-            let solution = solve(&ComplexPair::from(moire), &layers, signs)?;
-            Some(StrainDraw {
-                twist: solution.twist,
-                lattice_angle: reported_angle + wrap(solution.lattice_angle - centre.lattice_angle),
-                strain_vector: Vector2::new(solution.strain_vector.re, solution.strain_vector.im),
-            })
+            let basis = Matrix2::from_column_slice(moved.as_slice());
+            around.draw(&moire_matrix(&basis, &around.layers.atoms)?)
         })
         .collect()
+}
+
+/// The solution about which is drawn: names of vectors and signs of the draws are its own.
+pub(super) struct Around {
+    pub(super) layers: Layers,
+    /// The lattice under the names of the solution.
+    pub(super) lattice: LatticeVectors,
+    signs: Signs,
+    /// α of the solution, and as it is reported.
+    lattice_angle: [f64; 2],
+}
+
+impl Around {
+    /// `None` for a lattice without a solution.
+    pub(super) fn new(
+        lattice: &LatticeVectors,
+        bilayer: Bilayer<'_>,
+        convention: StrainConvention,
+    ) -> Option<Self> {
+        let layers = Layers::new(bilayer, convention).ok()?;
+        let named = labelled(lattice, &layers).ok()?;
+        let moire = ComplexPair::from(named.moire);
+        let (signs, centre) = default_signs(&layers)
+            .iter()
+            .find_map(|signs| Some((*signs, solve(&moire, &layers, *signs)?)))?;
+        Some(Self {
+            lattice: named.lattice,
+            signs,
+            lattice_angle: [
+                centre.lattice_angle,
+                reduce(centre.lattice_angle, layers.period),
+            ],
+            layers,
+        })
+    }
+
+    /// Twist and strain of a drawn `P`; `None` where it has no solution.
+    pub(super) fn draw(&self, moire: &Matrix2<f64>) -> Option<StrainDraw> {
+        let solution = solve(&ComplexPair::from(*moire), &self.layers, self.signs)?;
+        let [centre, reported] = self.lattice_angle;
+        Some(StrainDraw {
+            twist: solution.twist,
+            lattice_angle: reported + wrap(solution.lattice_angle - centre),
+            strain_vector: Vector2::new(solution.strain_vector.re, solution.strain_vector.im),
+        })
+    }
 }
 
 /// A matrix whose square is the covariance; rounding may have left eigenvalues slightly negative.

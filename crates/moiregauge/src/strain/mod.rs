@@ -24,6 +24,7 @@ mod layers;
 mod limit;
 mod local;
 mod other_models;
+mod paper;
 mod tensor;
 mod twist_strain;
 
@@ -35,5 +36,6 @@ pub use error::StrainError;
 pub use forward::{Stacking, moire_lattice, moire_of, naive_twist};
 pub(crate) use local::FixedBranch;
 pub(crate) use other_models::Reference;
+pub use paper::published_draws;
 pub use tensor::{Orientation, Split, StrainTensor, strain_tensors};
 pub use twist_strain::TwistStrain;

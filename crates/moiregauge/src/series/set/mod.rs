@@ -3,6 +3,7 @@
 mod about;
 mod joint;
 mod moire;
+mod published;
 mod scan;
 
 use nalgebra::{Matrix2, Vector2};
@@ -16,17 +17,17 @@ use scan::{plain_mean, scan_analysis};
 
 use super::group::Group;
 use super::measure::MeasuredScan;
-use crate::analysis::{Axis, Drift, DriftFit, ScanAnalysis, SetAnalysis, SetMean};
+use crate::analysis::{Drift, DriftFit, ScanAnalysis, SetAnalysis, SetMean};
 use crate::budget::{Budget, Statistical};
 use crate::caveat::Caveat;
 use crate::chi2::enlargement;
-use crate::drift::paper::{PaperScan, pairwise_drift};
+use crate::drift::paper::successive_drift;
 use crate::drift::{Observation, at_known_drift, common_lattice, monte_carlo, solve};
 use crate::geometry::mean_and_spread;
 use crate::lattice::LatticeVectors;
 use crate::lattice::reciprocal::real_from_reciprocal;
 use crate::readings::Readings;
-use crate::settings::{GivenDrift, Settings};
+use crate::settings::{GivenDrift, Method, Settings};
 use crate::strain::{TwistStrain, draws};
 
 /// nm/min → nm/s.
@@ -95,6 +96,11 @@ pub(super) fn analyse_set(
         joint::checks(fit, &left_out, &used, (&group.name, settings))
     });
     draw(&mut scans, settings, first_index);
+    if let (Method::Paper, Some(solved)) = (settings.method, &solved) {
+        let drift = (solved.drift.velocity, solved.drift.covariance);
+        let measured = (group.scans.as_slice(), observations.as_slice());
+        published::draw_all(&mut scans, measured, drift, settings, first_index);
+    }
     let of_set = || scans.iter().filter(|s| s.excluded.is_none());
     let uncorrected = without_drift(&all, &scans, kept.len(), settings);
     let mean = solved.as_ref().and_then(|s| {
@@ -243,6 +249,10 @@ fn drift(
         return given_drift(name, all, given, caveats);
     }
     match solve(all) {
+        Ok(solution) if settings.method == Method::Paper => {
+            let scans = published::paper_scans(scans, all);
+            published::drift((name, &scans), all, &solution, settings, caveats)
+        }
         Ok(solution) => {
             let scale = enlargement(solution.chi2, solution.degrees_of_freedom);
             let mut lattice = solution.lattice;
@@ -261,7 +271,7 @@ fn drift(
                         condition: solution.condition,
                         chi2: solution.chi2,
                         degrees_of_freedom: solution.degrees_of_freedom,
-                        paper_velocity: pairwise_drift(&paper_scans(scans, all)),
+                        paper_velocity: successive_drift(&published::paper_scans(scans, all)),
                     }),
                     monte_carlo: monte_carlo(all, settings.drift_draws, seed, &stream),
                     joint: None,
@@ -315,33 +325,6 @@ fn given_drift(
         freedom,
         enlargement: scale,
     })
-}
-
-/// The scans as the published estimate wants them: signed velocities in laboratory axes.
-fn paper_scans(scans: &[&MeasuredScan], all: &[Observation]) -> Vec<PaperScan> {
-    let lines = scans.iter().flat_map(|s| &s.lines);
-    lines
-        .zip(all)
-        .filter_map(|(line, seen)| {
-            let tau = line.timing?.per_pixel;
-            let (fast, slow) = (
-                line.geometry.fast_step() / tau.x,
-                line.geometry.slow_step() / tau.y,
-            );
-            // A set made by hand may hold scans of both slow axes.
-            let slow_axis = line.geometry.slow_axis();
-            let (fast_velocity, slow_velocity) = match slow_axis {
-                Axis::X => (fast.y, slow.x),
-                Axis::Y => (fast.x, slow.y),
-            };
-            Some(PaperScan {
-                lattice: seen.lattice,
-                slow_axis,
-                fast_velocity,
-                slow_velocity,
-            })
-        })
-        .collect()
 }
 
 /// Twist and strain of the common lattice, and how the scans scatter about it.
