@@ -193,17 +193,18 @@ pub(crate) struct Reading {
 
 /// Reads what the analysis needs of a file: the chosen channel and the position sensors.
 pub(crate) fn read(path: &Path, settings: &Settings, known: &Known) -> anyhow::Result<Reading> {
-    read_more(path, (settings, known), |_| None)
+    read_more(path, settings, known, |_| None)
 }
 
 /// The same and what is shown beside it: the amplitude of a phase.
 fn read_shown(path: &Path, settings: &Settings, known: &Known) -> anyhow::Result<Reading> {
-    read_more(path, (settings, known), amplitude_of)
+    read_more(path, settings, known, amplitude_of)
 }
 
 fn read_more(
     path: &Path,
-    (settings, known): (&Settings, &Known),
+    settings: &Settings,
+    known: &Known,
     companion: impl Fn(&str) -> Option<String>,
 ) -> anyhow::Result<Reading> {
     let bytes = std::fs::read(path)?;

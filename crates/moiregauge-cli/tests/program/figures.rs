@@ -6,7 +6,15 @@ use crate::common::{analyze, json, number, program, results, run, simulate, succ
 
 /// A set whose three wavelengths differ by more than a per cent.
 fn strained(folder: &Path) -> std::path::PathBuf {
-    let options = ["--pixels", "128", "--scans", "2", "--strain", "0.4", "--no-retrace"];
+    let options = [
+        "--pixels",
+        "128",
+        "--scans",
+        "2",
+        "--strain",
+        "0.4",
+        "--no-retrace",
+    ];
     simulate(folder, &options)
 }
 
@@ -20,22 +28,39 @@ fn maps_number_the_vectors_as_the_analysis_does() {
     let analysed = results(&out);
     let maps = folder.path().join("maps");
     let mut command = program();
-    command.arg("map").arg(&scans).arg("--out").arg(&maps).arg("--no-report");
+    command
+        .arg("map")
+        .arg(&scans)
+        .arg("--out")
+        .arg(&maps)
+        .arg("--no-report");
     succeed(&mut command);
     let map = json(&maps.join("map.json"));
     let mean = |name: &str| {
         let all = map["quantities"].as_array().expect("a list");
-        let found = all.iter().find(|q| q["name"] == name).expect("the quantity");
+        let found = all
+            .iter()
+            .find(|q| q["name"] == name)
+            .expect("the quantity");
         number(found, "/mean")
     };
     let lengths = [0, 1, 2].map(|i| {
-        number(&analysed, &format!("/sets/0/mean/vectors/{i}/wavelength_nm/value"))
+        number(
+            &analysed,
+            &format!("/sets/0/mean/vectors/{i}/wavelength_nm/value"),
+        )
     });
     for (i, length) in lengths.iter().enumerate() {
         let found = mean(&format!("wavelength {}", i + 1));
-        assert!((found / length - 1.0).abs() < 0.004, "{i}: {found}, {length}");
+        assert!(
+            (found / length - 1.0).abs() < 0.004,
+            "{i}: {found}, {length}"
+        );
         let others = lengths.iter().filter(|other| *other != length);
-        assert!(others.into_iter().all(|o| (found / o - 1.0).abs() > 0.008), "{lengths:?}");
+        assert!(
+            others.into_iter().all(|o| (found / o - 1.0).abs() > 0.008),
+            "{lengths:?}"
+        );
     }
     let direction = number(&analysed, "/sets/0/mean/vectors/0/polar_angle_deg");
     assert!((mean("orientation") - direction).abs() < 0.5);
@@ -59,7 +84,10 @@ fn options_stand_under_headings_that_fit() {
                 if heading.starts_with("Orientation") {
                     let option = line.trim_start();
                     let fits = ["--lattice-angle", "--atomic", "--twist-sense"];
-                    assert!(fits.iter().any(|f| option.starts_with(f)), "{command}: {option}");
+                    assert!(
+                        fits.iter().any(|f| option.starts_with(f)),
+                        "{command}: {option}"
+                    );
                 }
             }
         }
@@ -74,7 +102,9 @@ fn options_stand_under_headings_that_fit() {
 fn a_survey_image_shows_where_the_scans_are() {
     let folder = tempfile::tempdir().unwrap();
     let scans = strained(folder.path());
-    let options = ["--pixels", "64", "--scans", "1", "--size", "200", "200", "--twist", "0.6"];
+    let options = [
+        "--pixels", "64", "--scans", "1", "--size", "200", "200", "--twist", "0.6",
+    ];
     let survey = simulate(&folder.path().join("large"), &options);
     let survey = std::fs::read_dir(survey)
         .unwrap()
@@ -92,12 +122,19 @@ fn a_survey_image_shows_where_the_scans_are() {
     for name in ["set1-residuals", "set1-amplitude", "set1-twist-wavelength"] {
         assert!(out.join(format!("figures/{name}.svg")).is_file(), "{name}");
     }
-    let inputs = results(&out)["provenance"]["inputs"].as_array().expect("a list").len();
+    let inputs = results(&out)["provenance"]["inputs"]
+        .as_array()
+        .expect("a list")
+        .len();
     assert_eq!(inputs, 3);
 
     let mut command = analyze(&scans, &folder.path().join("none"));
     let refused = run(command.args(["--survey-image", "nowhere.spm"]));
     assert_eq!(refused.code, Some(1));
-    assert!(refused.stderr.contains("--survey-image nowhere.spm"), "{}", refused.stderr);
+    assert!(
+        refused.stderr.contains("--survey-image nowhere.spm"),
+        "{}",
+        refused.stderr
+    );
     assert!(!folder.path().join("none").exists());
 }

@@ -333,7 +333,13 @@ impl Svg {
     pub(crate) fn finish(self, title: &str) -> String {
         let millimetres = |points: f64| number(points * 25.4 / 72.0);
         // Half a point of paper beyond letters that reach the edge.
-        let edge = |at: f64, page: f64, pad: f64| if at == page { at } else { at + pad };
+        let edge = |at: f64, page: f64, pad: f64| {
+            if (at - page).abs() > 0.0 {
+                at + pad
+            } else {
+                at
+            }
+        };
         let [left, top] = [self.needed[0], self.needed[1]].map(|at| edge(at, 0.0, -0.5));
         let right = edge(self.needed[2], self.width, 0.5);
         let bottom = edge(self.needed[3], self.height, 0.5);

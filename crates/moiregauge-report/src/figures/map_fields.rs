@@ -5,7 +5,7 @@ use nalgebra::Vector2;
 
 use super::Drawing;
 use super::map::MapSubject;
-use super::map_panel::{Panel, about};
+use super::map_panel::{Panel, Shown, about};
 use crate::draw::axes::Axes;
 use crate::draw::contour::contours;
 use crate::draw::scale::{Range, ticks};
@@ -32,13 +32,21 @@ pub(super) fn noise(map: &TwistStrainMap, plane: &Plane) -> f64 {
     map.spread(plane).map_or(f64::NAN, |s| s.noise)
 }
 
+fn twist_with(sigma: f64) -> Shown<'static> {
+    Shown {
+        name: "twist θ",
+        unit: "°",
+        sigma,
+    }
+}
+
 pub(super) fn twist(subject: &MapSubject) -> Result<Drawing, String> {
     let map = subject.map;
     let degree = 1f64.to_degrees();
     let value = shown(map, &map.twist, degree);
     let sigma = degree * noise(map, &map.twist);
     let mut panel = Panel::new(subject.id, map, 0.0)?;
-    let range = panel.values(subject, (("twist θ", "°"), sigma), &value)?;
+    let range = panel.values(subject, &twist_with(sigma), &value)?;
     let lines = lines(&mut panel, map, range, sigma, &value);
     Ok(Drawing {
         wide: false,
@@ -93,7 +101,7 @@ pub(super) fn overlays(subject: &MapSubject) -> Result<Drawing, String> {
     let sigma = degree * noise(map, &map.twist);
     let mut panel = Panel::new(subject.id, map, 0.0)?;
     let value = shown(map, &map.twist, degree);
-    panel.values(subject, (("twist θ", "°"), sigma), value)?;
+    panel.values(subject, &twist_with(sigma), value)?;
     panel.overlays(details);
     let mut words = Vec::new();
     if !details.regions.is_empty() {
@@ -117,7 +125,11 @@ pub(super) fn strain(subject: &MapSubject) -> Result<Drawing, String> {
     let mut panel = Panel::new(subject.id, map, 0.0)?;
     panel.values(
         subject,
-        (("strain |ε|", "%"), 100.0 * noise(map, &map.strain[0])),
+        &Shown {
+            name: "strain |ε|",
+            unit: "%",
+            sigma: 100.0 * noise(map, &map.strain[0]),
+        },
         shown(map, &map.magnitude, 100.0),
     )?;
     let axes = panel.axes;
@@ -182,9 +194,12 @@ pub(super) fn wavelength(subject: &MapSubject) -> Result<Drawing, String> {
     // As if the three were independent, which errs by little.
     let square = map.wavelengths.each_ref().map(|w| noise(map, w).powi(2));
     let sigma = square.iter().sum::<f64>().sqrt() / 3.0;
-    panel.values(subject, (("mean wavelength", "nm"), sigma), |n| {
-        (a(n) + b(n) + c(n)) / 3.0
-    })?;
+    let label = Shown {
+        name: "mean wavelength",
+        unit: "nm",
+        sigma,
+    };
+    panel.values(subject, &label, |n| (a(n) + b(n) + c(n)) / 3.0)?;
     Ok(Drawing {
         wide: false,
         svg: panel.finish("Wavelength"),
@@ -205,7 +220,11 @@ pub(super) fn twist_sigma(subject: &MapSubject) -> Result<Drawing, String> {
     let mut panel = Panel::new(subject.id, map, 0.0)?;
     panel.values(
         subject,
-        (("σ of θ", "°"), f64::NAN),
+        &Shown {
+            name: "σ of θ",
+            unit: "°",
+            sigma: f64::NAN,
+        },
         shown(map, &sigma, 1f64.to_degrees()),
     )?;
     Ok(Drawing {
@@ -224,8 +243,12 @@ pub(super) fn displacement(subject: &MapSubject) -> Result<Drawing, String> {
     let mut panel = Panel::new(subject.id, map, 0.0)?;
     let sigma = map.displacement.each_ref().map(|d| noise(map, d).powi(2));
     let sigma = (sigma.iter().sum::<f64>() / 2.0).sqrt();
-    let label = ("displacement |u|", "nm");
-    let range = panel.values(subject, (label, sigma), |n| x(n).hypot(y(n)))?;
+    let label = Shown {
+        name: "displacement |u|",
+        unit: "nm",
+        sigma,
+    };
+    let range = panel.values(subject, &label, |n| x(n).hypot(y(n)))?;
     let axes = panel.axes;
     panel.svg.clipped(axes.area, |svg| {
         sparse(map, &axes, |node, at, length| {

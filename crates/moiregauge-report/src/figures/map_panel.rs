@@ -20,6 +20,14 @@ const BAR: f64 = 50.0;
 /// Colours span this many σ of a node at least: noise alone, ± 2 σ, takes a third of them.
 const LEAST: f64 = 12.0;
 
+/// What a map shows.
+pub(super) struct Shown<'a> {
+    pub(super) name: &'a str,
+    pub(super) unit: &'a str,
+    /// Noise of a node, in that unit; NaN where there is none to be told.
+    pub(super) sigma: f64,
+}
+
 /// A page with one panel for a map.
 pub(super) struct Panel {
     pub(super) svg: Svg,
@@ -47,12 +55,12 @@ impl Panel {
 
     /// The values of the nodes as an image with its colour bar; NaN stays blank. Returns the range of colours.
     ///
-    /// `sigma` is the noise of a node (NaN where there is none to be told): the colours span at least twelve of it, so
-    /// that noise does not look like a landscape, and it is marked in the colour bar.
+    /// The colours span at least twelve σ of a node, so that noise does not look like a landscape, and σ is marked in
+    /// the colour bar.
     pub(super) fn values(
         &mut self,
         subject: &MapSubject,
-        (label, sigma): ((&str, &str), f64),
+        shown: &Shown,
         value: impl Fn(usize) -> f64,
     ) -> Result<Range, String> {
         let grid = &subject.map.grid;
@@ -63,7 +71,7 @@ impl Panel {
         let image = Image::new(grid.size[1], grid.size[0], values);
         let shades = raster::Shades {
             map: subject.colours,
-            range: held(raster::contrast(&image, 0.002), sigma),
+            range: held(raster::contrast(&image, 0.002), shown.sigma),
             crisp: true,
         };
         let axes = self.axes;
@@ -72,8 +80,9 @@ impl Panel {
         });
         let area = axes.area;
         let bar = Rect::new(area.right() + 6.0, area.y, 7.0, area.height);
+        let label = (shown.name, shown.unit);
         colorbar::draw(&mut self.svg, bar, subject.colours, shades.range, label);
-        colorbar::noise(&mut self.svg, bar, shades.range, sigma);
+        colorbar::noise(&mut self.svg, bar, shades.range, shown.sigma);
         Ok(shades.range)
     }
 

@@ -5,7 +5,7 @@ use nalgebra::Vector2;
 
 use super::map::MapSubject;
 use super::map_fields::{noise, shown, sparse};
-use super::map_panel::{Panel, about};
+use super::map_panel::{Panel, Shown, about};
 use super::{Drawing, Figure, map_fields, map_mask};
 use crate::draw::axes::Axes;
 use crate::draw::colormap::ColorMap;
@@ -68,8 +68,12 @@ fn wavelength(subject: &MapSubject) -> Result<Drawing, String> {
     let map = subject.map;
     let plane = &map.wavelengths[0];
     let mut panel = Panel::new(subject.id, map, 0.0)?;
-    let label = (("wavelength λ", "nm"), noise(map, plane));
-    panel.values(subject, label, shown(map, plane, 1.0))?;
+    let label = Shown {
+        name: "wavelength λ",
+        unit: "nm",
+        sigma: noise(map, plane),
+    };
+    panel.values(subject, &label, shown(map, plane, 1.0))?;
     let axes = panel.axes;
     panel
         .svg
@@ -101,8 +105,12 @@ fn direction(subject: &MapSubject, stripes: &SampledStripes) -> Result<Drawing, 
     };
     let mut panel = Panel::new(subject.id, map, 0.0)?;
     let sigma = degree * noise(map, &map.orientation);
-    let label = ("direction − mean of its pattern", "°");
-    panel.values(subject, (label, sigma), off)?;
+    let label = Shown {
+        name: "direction − mean of its pattern",
+        unit: "°",
+        sigma,
+    };
+    panel.values(subject, &label, off)?;
     let axes = panel.axes;
     panel
         .svg
