@@ -17,16 +17,19 @@ use moiregauge::settings::Settings;
 
 pub(crate) use args::{AnalyzeArgs, BackgroundArg, ConventionArg, LineArg, MethodArg};
 pub(crate) use chain::{
-    Outcome, Reading, analyse_files, hexadecimal, measure_file, progress, read, with_hint,
+    Outcome, Reading, analyse_files, given_again, hexadecimal, measure_file, progress, read,
+    read_again, with_hint,
 };
 pub(crate) use channel::channel_names;
-pub(crate) use files::write_all;
+pub(crate) use files::report_names;
 pub(crate) use moiregauge_report::screen::{caveats as caveat_lines, failures, summary};
-pub(crate) use orientation::{Angle, DirectionArg, parse_angle};
+pub(crate) use orientation::{Angle, DirectionArg, SenseArg, parse_angle};
 
 use crate::info::inputs;
 use crate::input::KnownArgs;
+use crate::outputs::{commit, write_all};
 use crate::say::say;
+use moiregauge::series::refusal;
 use moiregauge_report::{InputFile, write_report};
 
 /// Analyses the files and writes the results.
@@ -34,8 +37,8 @@ pub(crate) fn run(args: &AnalyzeArgs) -> anyhow::Result<ExitCode> {
     let mut settings = args.settings()?;
     let exports = args.exports()?;
     args.start_threads()?;
-    files::refuse_overwriting(&args.out, args.force)?;
     let (inputs, failed) = inputs(&args.paths);
+    let sink = files::sink(args, &exports, &inputs)?;
     let loud = args.is_loud();
     let known = args.known.of(&inputs);
     let survey = args
@@ -81,48 +84,63 @@ pub(crate) fn run(args: &AnalyzeArgs) -> anyhow::Result<ExitCode> {
             outcome.provenance.inputs.push(file.clone());
         }
     }
-    let folders = files::folders(&args.out, outcomes.len());
-    let mut failed = Vec::new();
-    for (number, (outcome, out)) in outcomes.iter().zip(&folders).enumerate() {
+    let refused = outcomes.iter().find_map(|o| refusal(&o.analysis)).cloned();
+    if let Some(why) = refused
+        .as_ref()
+        .filter(|why| why.code == "everything-excluded")
+    {
+        anyhow::bail!("{}", why.message);
+    }
+    let (mut failed, mut answers) = (Vec::new(), Vec::new());
+    let folders = files::within(outcomes.len());
+    for (number, (outcome, within)) in outcomes.iter().zip(&folders).enumerate() {
         let Outcome {
             analysis,
             provenance,
         } = outcome;
         let written = write_report(analysis, provenance, &args.choice())?;
-        write_all(out, &written)?;
+        write_all(&sink, within, &written)?;
         #[cfg(feature = "parquet")]
         if args.parquet {
             let tables = moiregauge_report::parquet_tables(analysis, provenance)?;
-            write_all(out, &tables)?;
+            write_all(&sink, within, &tables)?;
         }
         if number == 0 {
             failed.clone_from(&provenance.failed);
             // Images are the same for all moirés. They come after the numbers of the first.
-            failed.extend(export::write(&args.out, &exports, analysis, &known));
+            let from = (inputs.as_slice(), &known);
+            failed.extend(export::write(&sink, &exports, analysis, from));
         }
         if args.json {
             let results = written.iter().find(|(name, _)| name == "results.json");
             if let Some((_, bytes)) = results {
-                say(&String::from_utf8_lossy(bytes))?;
+                answers.push(String::from_utf8_lossy(bytes).into_owned());
             }
         } else if !args.quiet {
             if outcomes.len() > 1 {
-                say(&format!(
+                answers.push(format!(
                     "\n== moiré {} of {}: {}\n",
                     number + 1,
                     outcomes.len(),
                     analysis.settings.bilayer().name()
-                ))?;
+                ));
             }
-            say(&summary(analysis))?;
-            say(&format!(
+            answers.push(summary(analysis));
+            answers.push(format!(
                 "\nWritten to {}\n",
-                files::main_file(out, &written).display()
-            ))?;
+                files::main_file(&args.out.join(within), &written).display()
+            ));
         }
     }
+    commit(sink)?;
+    for answer in answers {
+        say(&answer)?;
+    }
     eprint!("{}", failures(&failed));
-    Ok(if failed.is_empty() {
+    if let Some(why) = &refused {
+        eprintln!("error: {}: {}", why.place, why.message);
+    }
+    Ok(if failed.is_empty() && refused.is_none() {
         ExitCode::SUCCESS
     } else {
         ExitCode::FAILURE

@@ -15,7 +15,7 @@ use moiregauge::settings::{Grouping, Settings};
 use moiregauge_report::{FailedInput, InputFile};
 use rayon::prelude::*;
 
-use crate::analyze::{BackgroundArg, LineArg, Reading, failures, read, with_hint};
+use crate::analyze::{BackgroundArg, LineArg, Reading, failures, given_again, read, with_hint};
 use crate::config;
 use crate::info::inputs;
 use crate::input::{Known, KnownArgs};
@@ -98,13 +98,6 @@ pub(crate) fn run(args: &CalibrateArgs) -> anyhow::Result<ExitCode> {
         "--drift-sigma expects a number ≥ 0, found {}",
         args.drift_sigma
     );
-    if let Some(out) = &args.out {
-        ensure!(
-            args.force || !out.exists(),
-            "{} exists already; give another --out, or --force to write over it",
-            out.display()
-        );
-    }
     let lattice = args.known_lattice()?;
     let cell = lattice
         .cell()
@@ -117,6 +110,9 @@ pub(crate) fn run(args: &CalibrateArgs) -> anyhow::Result<ExitCode> {
         ..defaults
     };
     let (inputs, mut failed) = inputs(&args.paths);
+    let (inputs, repeated) = moiregauge_pipeline::distinct(&inputs);
+    let file = |out| crate::outputs::file(out, args.force, &inputs);
+    let file = args.out.as_deref().map(file).transpose()?;
     let known = args.known.of(&inputs);
     let bar = if args.quiet {
         ProgressBar::hidden()
@@ -145,7 +141,7 @@ pub(crate) fn run(args: &CalibrateArgs) -> anyhow::Result<ExitCode> {
                 let cause = error.downcast_ref();
                 looked_at += usize::from(matches!(cause, Some(MeasureError::Lattice { .. })));
                 failed.push(FailedInput {
-                    file: path.display().to_string(),
+                    file: moiregauge_pipeline::names::in_words(path),
                     error: format!("{error:#}"),
                 });
             }
@@ -163,11 +159,12 @@ pub(crate) fn run(args: &CalibrateArgs) -> anyhow::Result<ExitCode> {
         lattice.name
     );
     let sigma = args.drift_sigma / 60.0;
-    let found = moiregauge::series::calibrate(scans, &lattice, sigma, Grouping::Auto)?;
+    let mut found = moiregauge::series::calibrate(scans, &lattice, sigma, Grouping::Auto)?;
+    found.caveats.extend(given_again(&repeated));
     if !args.quiet {
         say(&words::summary(&found, &lattice))?;
     }
-    if let Some(out) = &args.out {
+    if let (Some(out), Some(file)) = (&args.out, file) {
         if !found.covariance_known {
             bail!(
                 "{} is not written: nobody knows its errors, since the frames do not tell the drift and have no line \
@@ -175,8 +172,11 @@ pub(crate) fn run(args: &CalibrateArgs) -> anyhow::Result<ExitCode> {
                 out.display()
             );
         }
+        if let Some(problem) = found.calibration.problem() {
+            bail!("{} is not written: {problem}", out.display());
+        }
         let text = file::text(&found, &lattice, args.drift_sigma, &files)?;
-        std::fs::write(out, text).with_context(|| format!("cannot write {}", out.display()))?;
+        file.write(text.into_bytes())?;
         if !args.quiet {
             say(&format!(
                 "\nWritten to {0}; for moiregauge analyze --calibration {0}\n",
@@ -214,6 +214,7 @@ fn measured(
         error
     })?;
     measured.caveats.extend(caveats);
+    measured.digest = Some(input.sha256.clone());
     Ok((measured, input))
 }
 

@@ -51,7 +51,8 @@ background = "plane"
 #   lattice_constant_sigma_nm = 0.0001
 #   poisson_ratio_sigma = 0.03
 #   source = "where the numbers come from"
-material = "graphene"
+# Without it graphene is assumed, and results say so.
+# material = "graphene"
 
 # How many moirés every image shows (a twisted trilayer, twisted graphene on aligned hBN); each is fitted
 # with the others taken off and has results of its own.
@@ -73,6 +74,15 @@ moires = 1
 # one, the reference) or 2, of its atomic vector ("atomic": a row of atoms, a zigzag edge) or of its
 # reciprocal vector ("reciprocal": an armchair edge). It tells isotropic strain from twist.
 # lattice_angle = { angle_deg = 12.0, sigma_deg = 0.2, layer = 1, of = "atomic" }
+
+# Of two equal layers one orientation leaves the sense of the twist open. The orientation of the other layer
+# tells it, or you: "positive" (layer 2 is turned counter-clockwise against layer 1) or "negative".
+# lattice_angle_2 = { angle_deg = 13.1, sigma_deg = 0.2, layer = 2, of = "atomic" }
+# twist_sense = "positive"
+
+# Two wave vectors of the moiré, x and y in rad/nm, that belong to the reciprocal vectors of the atoms at 0° and 120°.
+# A strained lattice can be read by several pairs; without this the image, an orientation or the least strain chooses.
+# moire_waves = [[0.24, 0.01], [-0.11, 0.21]]
 
 # Form of the strain equation: "real-space" (the stretch acts on atomic positions, positive is
 # tension) or "k-space" (on reciprocal vectors as in arXiv 2406.08681, positive is compression).
@@ -140,6 +150,12 @@ pub(crate) fn read(path: &Path) -> anyhow::Result<Settings> {
 fn parse(text: &str, folder: &Path) -> anyhow::Result<Settings> {
     let mut table: toml::Table = toml::from_str(text)?;
     let mut changed = false;
+    // Who names layers has chosen them.
+    let layers = ["material", "substrate", "moire_layers"];
+    if layers.iter().any(|key| table.contains_key(*key)) && !table.contains_key("layers_chosen") {
+        table.insert("layers_chosen".to_owned(), toml::Value::Boolean(true));
+        changed = true;
+    }
     changed |= name_materials(&mut table)?;
     if let Some(toml::Value::Array(moires)) = table.get_mut("moire_layers") {
         for layers in moires.iter_mut().filter_map(toml::Value::as_table_mut) {
@@ -245,19 +261,7 @@ pub(crate) fn check(settings: &Settings) -> anyhow::Result<()> {
     if let Some(problem) = substrate.and_then(Material::problem) {
         bail!("the substrate: {problem}");
     }
-    if let Some(known) = &settings.lattice_angle {
-        let (angle, sigma) = (known.angle_deg, known.sigma_deg);
-        ensure!(
-            angle.is_finite() && sigma >= 0.0 && sigma.is_finite(),
-            "the orientation of a layer (--lattice-angle) must be an angle in degrees and its uncertainty, \
-             found {angle} and {sigma}"
-        );
-        ensure!(
-            known.layer == 1 || known.layer == 2,
-            "the layer of an orientation (--lattice-angle-layer) must be 1, the lower one, or 2, found {}",
-            known.layer
-        );
-    }
+    check_orientations(settings)?;
     let material = &settings.material;
     let (a, ratio) = (material.lattice_constant_nm, material.poisson_ratio);
     ensure!(
@@ -337,6 +341,33 @@ pub(crate) fn check(settings: &Settings) -> anyhow::Result<()> {
     Ok(())
 }
 
+/// Orientations are angles of layers that there are.
+fn check_orientations(settings: &Settings) -> anyhow::Result<()> {
+    let both = [&settings.lattice_angle, &settings.lattice_angle_2];
+    for known in both.into_iter().flatten() {
+        let (angle, sigma) = (known.angle_deg, known.sigma_deg);
+        ensure!(
+            angle.is_finite() && sigma >= 0.0 && sigma.is_finite(),
+            "the orientation of a layer (--lattice-angle) must be an angle in degrees and its uncertainty, \
+             found {angle} and {sigma}"
+        );
+        ensure!(
+            known.layer == 1 || known.layer == 2,
+            "the layer of an orientation (--lattice-angle-layer) must be 1, the lower one, or 2, found {}",
+            known.layer
+        );
+    }
+    if let [Some(first), Some(second)] = both {
+        ensure!(
+            first.layer != second.layer,
+            "the two orientations (lattice_angle and lattice_angle_2) must be those of layers 1 and 2, found layer \
+             {} twice",
+            first.layer
+        );
+    }
+    Ok(())
+}
+
 /// As many pairs of layers as moirés, none of them nonsense, and nothing beside them that is of one pair only.
 fn check_moire_layers(settings: &Settings) -> anyhow::Result<()> {
     let (layers, moires) = (&settings.moire_layers, settings.moires);
@@ -349,7 +380,7 @@ fn check_moire_layers(settings: &Settings) -> anyhow::Result<()> {
         layers.len()
     );
     ensure!(
-        settings.lattice_angle.is_none(),
+        settings.lattice_angle.is_none() && settings.lattice_angle_2.is_none(),
         "the orientation of a layer (--lattice-angle, --atomic) goes with one pair of layers; the moirés have layers of \
          their own (--layers), whose layer 1 is not the same: analyse each with --layers of its own"
     );

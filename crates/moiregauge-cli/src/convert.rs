@@ -8,11 +8,13 @@ use anyhow::{Context as _, anyhow, bail, ensure};
 use clap::ValueEnum;
 use indicatif::{ProgressBar, ProgressStyle};
 use moiregauge::series::{nominal_geometry, on_grid};
+use moiregauge_pipeline::sink::{FileSink, SinkError};
 use rayon::prelude::*;
 use spmfile::{ChannelInfo, Scan, WritableFormat, sensor_axis};
 
 use crate::info::expand;
 use crate::input::{Known, KnownArgs, is_named};
+use crate::outputs;
 use crate::say::say;
 
 /// Convert scans into formats of other programs: Gwyddion, NumPy, Zarr, TIFF, text
@@ -122,48 +124,43 @@ pub(crate) fn run(args: &ConvertArgs) -> anyhow::Result<ExitCode> {
             Err((path, error)) => failed.push(format!("{}: {error}", path.display())),
         }
     }
-    let format = if let Some(format) = args.to {
-        ensure!(
-            !out.is_file(),
-            "{} is a file; with --to a folder is expected",
-            out.display()
-        );
-        format.into()
+    let format = format(args, out, inputs.len() + failed.len())?;
+    let folder = if args.to.is_some() {
+        out
     } else {
-        let format = format_of(out)?;
-        ensure!(
-            inputs.len() + failed.len() == 1,
-            "{} is one file but there are {}; give a folder and --to {}",
-            out.display(),
-            inputs.len() + failed.len(),
-            format.extension()
-        );
-        format
+        out.parent().unwrap_or(Path::new(""))
     };
+    let protected: Vec<PathBuf> = inputs
+        .iter()
+        .chain(args.known.second_file())
+        .cloned()
+        .collect();
     let target = Target {
         args,
         out,
         format,
         known: args.known.of(&inputs),
+        sink: outputs::files(folder, args.force, &protected)?,
     };
+    target.can_be_written()?;
     // Before anything runs in parallel: which of two files of one name is first must not depend on it.
     let mut taken = HashSet::new();
-    let jobs: Vec<(&PathBuf, (PathBuf, String), bool)> = inputs
+    let jobs: Vec<(&PathBuf, String, bool)> = inputs
         .iter()
         .map(|path| {
-            let (folder, stem) = target.place(path);
-            let new = taken.insert(folder.join(stem.to_lowercase()));
-            (path, (folder, stem), new)
+            let stem = target.stem(path);
+            let new = taken.insert(stem.to_lowercase());
+            (path, stem, new)
         })
         .collect();
     let progress = progress(inputs.len(), args.quiet);
     let written: Vec<anyhow::Result<Vec<PathBuf>>> = jobs
         .par_iter()
-        .map(|(path, place, new)| {
+        .map(|(path, stem, new)| {
             let result = if *new {
-                target.convert(path, place)
+                target.convert(path, stem)
             } else {
-                let name = place.0.join(&place.1);
+                let name = folder.join(stem);
                 Err(anyhow!(
                     "another file of this run already becomes {}",
                     name.display()
@@ -185,17 +182,7 @@ pub(crate) fn run(args: &ConvertArgs) -> anyhow::Result<ExitCode> {
         }
     }
     if !args.quiet && scans > 0 {
-        let first = files.first().map_or(out.clone(), PathBuf::clone);
-        let more = match files.len() {
-            0 | 1 => String::new(),
-            count => format!(" and {} more", count - 1),
-        };
-        let scans = if scans == 1 {
-            "1 scan".to_owned()
-        } else {
-            format!("{scans} scans")
-        };
-        say(&format!("{scans} written to {}{more}\n", first.display()))?;
+        say(&in_words(out, scans, &files))?;
     }
     for error in &failed {
         eprintln!("error: {error}");
@@ -205,6 +192,41 @@ pub(crate) fn run(args: &ConvertArgs) -> anyhow::Result<ExitCode> {
     } else {
         ExitCode::FAILURE
     })
+}
+
+/// The format that is asked for, and an error if the output does not fit it or that many files.
+fn format(args: &ConvertArgs, out: &Path, files: usize) -> anyhow::Result<WritableFormat> {
+    if let Some(format) = args.to {
+        ensure!(
+            !out.is_file(),
+            "{} is a file; with --to a folder is expected",
+            out.display()
+        );
+        return Ok(format.into());
+    }
+    let format = format_of(out)?;
+    ensure!(
+        files == 1,
+        "{} is one file but there are {files}; give a folder and --to {}",
+        out.display(),
+        format.extension()
+    );
+    Ok(format)
+}
+
+/// What was written.
+fn in_words(out: &Path, scans: usize, files: &[PathBuf]) -> String {
+    let first = files.first().map_or(out, PathBuf::as_path);
+    let more = match files.len() {
+        0 | 1 => String::new(),
+        count => format!(" and {} more", count - 1),
+    };
+    let scans = if scans == 1 {
+        "1 scan".to_owned()
+    } else {
+        format!("{scans} scans")
+    };
+    format!("{scans} written to {}{more}\n", first.display())
 }
 
 fn progress(files: usize, quiet: bool) -> ProgressBar {
@@ -225,12 +247,12 @@ struct Target<'a> {
     out: &'a Path,
     format: WritableFormat,
     known: Known,
+    sink: FileSink,
 }
 
 impl Target<'_> {
     /// Converts one file; returns what was written.
-    fn convert(&self, path: &Path, place: &(PathBuf, String)) -> anyhow::Result<Vec<PathBuf>> {
-        let (folder, stem) = place;
+    fn convert(&self, path: &Path, stem: &str) -> anyhow::Result<Vec<PathBuf>> {
         let bytes = std::fs::read(path)?;
         let is_wanted = |info: &ChannelInfo| {
             let points = self.format == WritableFormat::Gxyzf;
@@ -253,17 +275,30 @@ impl Target<'_> {
             log.push("turned into laboratory axes by cubic convolution".to_owned());
         }
         let files = spmfile::write(&scan, self.format, stem, &log)?;
-        self.write(folder, stem, files)
+        self.write(stem, files).map_err(outputs::hinted)
     }
 
-    /// Folder and stem of what a file becomes.
-    fn place(&self, path: &Path) -> (PathBuf, String) {
+    /// Stem of what a file becomes.
+    fn stem(&self, path: &Path) -> String {
         if self.args.to.is_some() {
-            return (self.out.to_owned(), stem_of(path));
+            return stem_of(path);
         }
         let stem = self.out.file_stem().unwrap_or_default();
-        let folder = self.out.parent().unwrap_or(Path::new(""));
-        (folder.to_owned(), stem.to_string_lossy().into_owned())
+        stem.to_string_lossy().into_owned()
+    }
+
+    /// Finds out before the work whether the one file that was asked for may be written.
+    fn can_be_written(&self) -> anyhow::Result<()> {
+        let Some(name) = self.out.file_name().filter(|_| self.args.to.is_none()) else {
+            return Ok(());
+        };
+        let checked = match self.format {
+            WritableFormat::Zarr => self.sink.check_group(Path::new(name)),
+            // Named by their channels or lines.
+            WritableFormat::Gsf | WritableFormat::Csv | WritableFormat::Gxyzf => Ok(()),
+            _ => self.sink.check(Path::new(name)),
+        };
+        checked.map_err(outputs::hinted)
     }
 
     fn channels_are_there(&self, scan: &Scan) -> anyhow::Result<()> {
@@ -274,53 +309,23 @@ impl Target<'_> {
         Ok(())
     }
 
-    fn write(
-        &self,
-        folder: &Path,
-        stem: &str,
-        files: Vec<(String, Vec<u8>)>,
-    ) -> anyhow::Result<Vec<PathBuf>> {
+    fn write(&self, stem: &str, files: Vec<(String, Vec<u8>)>) -> Result<Vec<PathBuf>, SinkError> {
         let plain = format!("{stem}.{}", self.format.extension());
         // `OUT.tif` is written as it was asked for.
-        let path_of = |name: &str| match name.strip_prefix(&plain) {
-            Some("") if self.args.to.is_none() => self.out.to_owned(),
-            Some(inside) if inside.starts_with('/') && self.args.to.is_none() => {
-                self.out.join(inside.trim_start_matches('/'))
-            }
-            _ => folder.join(name),
+        let asked = self.out.file_name().filter(|_| self.args.to.is_none());
+        let named = |name: String| match asked {
+            Some(asked) if name == plain => PathBuf::from(asked),
+            _ => PathBuf::from(name),
         };
-        let group = folder.join(&plain);
-        let is_group = self.format == WritableFormat::Zarr;
-        if !self.args.force {
-            let names = files.iter().map(|(name, _)| path_of(name));
-            let found = names
-                .chain(is_group.then_some(group.clone()))
-                .find(|p| p.exists());
-            if let Some(found) = found {
-                bail!("{} exists; --force writes over it", found.display());
-            }
-        } else if is_group && group.join("zarr.json").is_file() {
-            // Arrays of an earlier group must not stay among the new ones.
-            std::fs::remove_dir_all(&group)
-                .with_context(|| format!("cannot replace {}", group.display()))?;
+        if self.format != WritableFormat::Zarr {
+            let files = files.into_iter().map(|(name, bytes)| (named(name), bytes));
+            return self.sink.write(&files.collect::<Vec<_>>());
         }
-        let mut written = Vec::new();
-        for (name, bytes) in files {
-            let path = path_of(&name);
-            if let Some(folder) = path.parent() {
-                std::fs::create_dir_all(folder)
-                    .with_context(|| format!("cannot make the folder {}", folder.display()))?;
-            }
-            std::fs::write(&path, bytes)
-                .with_context(|| format!("cannot write {}", path.display()))?;
-            if !is_group {
-                written.push(path);
-            }
-        }
-        if is_group {
-            written.push(group);
-        }
-        Ok(written)
+        let inside = |name: String| name[plain.len() + 1..].to_owned();
+        let files = files.into_iter().map(|(name, bytes)| (inside(name), bytes));
+        let group = named(plain.clone());
+        let written = self.sink.write_group(&group, &files.collect::<Vec<_>>())?;
+        Ok(vec![written])
     }
 }
 

@@ -4,11 +4,13 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use moiregauge::settings::Settings;
+use moiregauge_pipeline::sink::Target;
 use moiregauge_report::{Choice, write_report};
 
-use crate::analyze::{Outcome, analyse_files, summary, write_all};
+use crate::analyze::{Outcome, analyse_files, report_names, summary};
 use crate::info::expand;
 use crate::input::Known;
+use crate::outputs;
 use crate::say::say;
 use crate::simulate::{paper_sets, write_sets};
 
@@ -33,6 +35,15 @@ pub(crate) struct DemoArgs {
 pub(crate) fn run(args: &DemoArgs) -> anyhow::Result<ExitCode> {
     let out = args.out.clone().unwrap_or_else(free_folder);
     let sets = paper_sets(args.seed);
+    let results = out.join("results");
+    let names: Vec<String> = report_names().collect();
+    let sink = outputs::folder(&Target {
+        folder: &results,
+        kind: "analyze",
+        names: &names,
+        inputs: &[],
+        force: args.force,
+    })?;
     say(&format!(
         "Simulating three sets of scans in {} …\n",
         out.display()
@@ -42,6 +53,7 @@ pub(crate) fn run(args: &DemoArgs) -> anyhow::Result<ExitCode> {
     let inputs: Vec<PathBuf> = expand(&folders).into_iter().flatten().collect();
     let settings = Settings {
         seed: args.seed,
+        layers_chosen: true,
         ..Settings::default()
     };
     let analysed = analyse_files(
@@ -59,11 +71,9 @@ pub(crate) fn run(args: &DemoArgs) -> anyhow::Result<ExitCode> {
     else {
         anyhow::bail!("the simulated scans could not be analysed");
     };
-    let results = out.join("results");
-    write_all(
-        &results,
-        &write_report(&analysis, &provenance, &Choice::default())?,
-    )?;
+    let report = write_report(&analysis, &provenance, &Choice::default())?;
+    outputs::write_all(&sink, "", &report)?;
+    outputs::commit(sink)?;
     say(&summary(&analysis))?;
     let truth = &sets[0];
     say(&format!(

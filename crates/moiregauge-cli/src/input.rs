@@ -25,7 +25,7 @@ pub(crate) struct KnownArgs {
     #[arg(long, value_name = "UNIT")]
     unit: Option<String>,
     /// Lines per second, trace and retrace together
-    #[arg(long, value_name = "HZ", value_parser = parse_positive)]
+    #[arg(long, value_name = "HZ", value_parser = parse_line_rate)]
     line_rate: Option<f64>,
     /// Which line was first: up is the bottom one. The alternating ones begin with the first file by
     /// name, numbers in names counting as numbers. Of files that hold a frame of each (Omicron Matrix)
@@ -79,9 +79,14 @@ pub(crate) struct Known {
 }
 
 impl KnownArgs {
+    /// The file that is read beside each scan.
+    pub(crate) fn second_file(&self) -> Option<&PathBuf> {
+        self.sensors.as_ref()
+    }
+
     /// What is known of these files.
     pub(crate) fn of(&self, inputs: &[PathBuf]) -> Known {
-        let mut order = inputs.to_vec();
+        let (mut order, _) = moiregauge_pipeline::distinct(inputs);
         order.sort_by(|a, b| natural_order(&a.to_string_lossy(), &b.to_string_lossy()));
         Known {
             args: self.clone(),
@@ -369,11 +374,12 @@ fn parse_number(text: &str) -> Result<f64, String> {
         .ok_or_else(|| "expected a number".to_owned())
 }
 
-fn parse_positive(text: &str) -> Result<f64, String> {
+/// From an hour a line to the fastest video microscopes.
+fn parse_line_rate(text: &str) -> Result<f64, String> {
     parse_number(text)
         .ok()
-        .filter(|n| *n > 0.0)
-        .ok_or_else(|| "expected a number above 0".to_owned())
+        .filter(|rate| (1e-4..=1e5).contains(rate))
+        .ok_or_else(|| "expected a line rate between 0.0001 and 100000 Hz".to_owned())
 }
 
 fn parse_crop(text: &str) -> Result<Crop, String> {

@@ -9,6 +9,7 @@ mod info;
 mod input;
 mod map;
 mod moire;
+mod outputs;
 mod plan;
 mod say;
 mod scanner;

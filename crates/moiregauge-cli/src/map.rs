@@ -7,22 +7,22 @@ mod source;
 mod stripes;
 mod survey;
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use anyhow::{Context as _, bail, ensure};
 use clap::ValueEnum;
-use moiregauge::analysis::Axis;
 use moiregauge::caveat::Caveat;
-use moiregauge::map::{
-    DriftChange, LatticeMap, Resolution, TwistStrainMap, combine, drift_change, register,
+use moiregauge::map::{DriftChange, LatticeMap, Resolution, TwistStrainMap, register};
+use moiregauge::series::{
+    LineMap, MapMethod, SurveyPlan, about_repeat, average_maps, change_of_drift, domains_of_scan,
+    map_scan, picture, refusal,
 };
-use moiregauge::series::{LineMap, MapMethod, SurveyPlan, domains_of_scan, map_scan, picture};
 use moiregauge::settings::Settings;
+use moiregauge_pipeline::sink::FolderSink;
 use moiregauge_report::{FailedInput, Provenance};
-use spmfile::FrameDirection;
 
-use crate::analyze::{AnalyzeArgs, Outcome, analyse_files, failures, read};
+use crate::analyze::{AnalyzeArgs, Outcome, analyse_files, failures, given_again, read_again};
 use crate::info::inputs;
 use crate::input::Known;
 use output::{Made, write};
@@ -108,34 +108,28 @@ pub(crate) fn run(args: &MapArgs) -> anyhow::Result<ExitCode> {
     let settings = args.analyze.settings()?;
     let resolution = args.resolution()?;
     args.regions.check()?;
-    let out = args.analyze.out();
     ensure!(
         args.analyze.survey_image().is_none(),
         "--survey-image is for analyze"
     );
-    ensure!(
-        args.analyze.force() || !out.join("map.json").exists(),
-        "{} already holds a map; give another --out, or --force to write over it",
-        out.display()
-    );
     args.analyze.start_threads()?;
     let (inputs, failed) = inputs(args.analyze.paths());
+    let sink = output::sink(args, &inputs)?;
     let known = args.analyze.known().of(&inputs);
     let whole = (&settings, &known, &resolution);
-    let made = match survey(args, &inputs, whole, &failed)? {
+    let made = match survey((args, &sink), &inputs, whole, &failed)? {
         Some(made) => made,
         None => match together(args, &inputs, whole, failed)? {
             Answer::Lattice(made) => *made,
             Answer::Stripes(found) => {
-                stripes::write(&found, args)?;
+                stripes::write(&found, args, sink)?;
                 return Ok(ExitCode::SUCCESS);
             }
         },
     };
     let lost = failures(&made.provenance.failed);
     let complete = made.provenance.failed.is_empty();
-    write(&made, args)?;
-    survey::forget(out);
+    write(&made, args, sink)?;
     eprint!("{lost}");
     Ok(if complete {
         ExitCode::SUCCESS
@@ -146,7 +140,7 @@ pub(crate) fn run(args: &MapArgs) -> anyhow::Result<ExitCode> {
 
 /// Maps images that are too large for memory, side by side; `None` where the first is not large.
 fn survey(
-    args: &MapArgs,
+    (args, sink): (&MapArgs, &FolderSink),
     inputs: &[PathBuf],
     (settings, known, resolution): (&Settings, &Known, &Resolution),
     failed: &[FailedInput],
@@ -163,21 +157,28 @@ fn survey(
     if !any {
         return Ok(None);
     }
-    let (out, loud) = (args.analyze.out(), args.analyze.is_loud());
-    let (mut maps, mut images, mut caveats) = (Vec::new(), Vec::new(), Vec::new());
+    let loud = args.analyze.is_loud();
+    let (inputs, again) = moiregauge_pipeline::distinct(inputs);
+    let (mut maps, mut images, mut caveats) = (Vec::new(), Vec::new(), given_again(&again));
     let (mut read, mut plans) = (Vec::new(), Vec::<(survey::Large, SurveyPlan)>::new());
-    for path in inputs {
+    for path in &inputs {
         let large = open(path, true)?.context("no image")?;
+        let same = |(known, _): &&(survey::Large, _)| known.input.sha256 == large.input.sha256;
+        if let Some((known, _)) = plans.iter().find(same) {
+            caveats.push(about_repeat(&large.input.file, &known.input.file));
+            continue;
+        }
         let (map, plan) = large
             .map(
                 (settings, resolution),
                 plans.first().map(|p| &p.1),
-                out,
+                sink,
                 loud,
             )
             .with_context(|| path.display().to_string())?;
         let file = large.input.file.clone();
         caveats.extend(large.caveats.iter().cloned());
+        caveats.extend(plan.caveats.iter().cloned());
         let drift = if plan.drift_corrected {
             "corrected for the drift that was given"
         } else if settings.drift.is_some() {
@@ -264,6 +265,11 @@ fn together(
             bail!("nothing could be analysed");
         }
     };
+    if let Some(why) = refusal(&analysis).filter(|why| why.code == "everything-excluded") {
+        bail!("{}", why.message);
+    }
+    // The maps read the lattice under the name that the analysis found.
+    let settings = &analysis.named_settings();
     let used = || {
         analysis
             .sets
@@ -271,11 +277,13 @@ fn together(
             .flat_map(|s| &s.scans)
             .filter(|s| s.excluded.is_none())
     };
-    let origin = used().filter_map(|s| s.acquired).min();
+    let origin = used()
+        .filter_map(|s| s.motion.map(|m| m.middle))
+        .min_by(f64::total_cmp);
     let how = (args.map_method.into(), resolution);
     let (mut maps, mut shown) = (Vec::new(), None);
     for scan in used() {
-        let mapped = read(Path::new(&scan.file), settings, known).and_then(|r| {
+        let mapped = read_again(inputs, &scan.file, settings, known).and_then(|r| {
             let lines = map_scan(&r.scan, (scan, origin), settings, how)?;
             shown = shown
                 .take()
@@ -292,8 +300,7 @@ fn together(
     }
     let mut caveats = analysis.caveats.clone();
     registered(&mut maps, &mut caveats);
-    let all: Vec<&LatticeMap> = maps.iter().map(|m| &m.map).collect();
-    let Some((lattices, agreement)) = combine(&all) else {
+    let Some((lattices, agreement)) = average_maps(&maps) else {
         eprint!("{}", failures(&provenance.failed));
         bail!("no image gave a map");
     };
@@ -314,12 +321,12 @@ fn together(
         let narrow = maps.iter().find_map(|m| narrow_margin(m.margin, &m.file));
         caveats.extend(narrow);
     }
-    let drift_change = change(&maps);
+    let drift_change = change_of_drift(&maps);
     about_change(drift_change, &mut caveats);
     let map = TwistStrainMap::new(&lattices, &found);
     let look = |contrast| {
         let all = used().flat_map(|scan| {
-            let reading = read(Path::new(&scan.file), settings, known).ok();
+            let reading = read_again(inputs, &scan.file, settings, known).ok();
             reading.map_or_else(Vec::new, |r| {
                 domains_of_scan(&r.scan, (scan, origin), settings, contrast)
             })
@@ -424,32 +431,6 @@ fn registered(maps: &mut [LineMap], caveats: &mut Vec<Caveat>) {
             ),
         ));
     }
-}
-
-/// Compares upward with downward frames of one slow axis.
-fn change(maps: &[LineMap]) -> Option<DriftChange> {
-    let axis = |m: &LineMap| {
-        m.time_gradient.map(|u| {
-            if u.x.abs() > u.y.abs() {
-                Axis::X
-            } else {
-                Axis::Y
-            }
-        })
-    };
-    let of = |direction: FrameDirection, slow: Axis| -> Vec<&LineMap> {
-        let wanted = |m: &&LineMap| m.frame_direction == Some(direction) && axis(m) == Some(slow);
-        maps.iter().filter(wanted).collect()
-    };
-    [Axis::Y, Axis::X].into_iter().find_map(|slow| {
-        let (up, down) = (of(FrameDirection::Up, slow), of(FrameDirection::Down, slow));
-        let gradient = up.first()?.time_gradient?;
-        let average = |maps: &[&LineMap]| {
-            let maps: Vec<&LatticeMap> = maps.iter().map(|m| &m.map).collect();
-            Some(combine(&maps)?.0)
-        };
-        drift_change(&average(&up)?, &average(&down)?, gradient)
-    })
 }
 
 impl MapArgs {

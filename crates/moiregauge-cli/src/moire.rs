@@ -10,7 +10,7 @@ use moiregauge::budget::{Budget, Statistical};
 use moiregauge::cell::{MoireCell, WavelengthMeaning, from_wavelengths};
 use moiregauge::lattice::LatticeVectors;
 use moiregauge::material::Material;
-use moiregauge::readings::Readings;
+use moiregauge::readings::{Readings, WaveStrengths};
 use moiregauge::settings::Settings;
 use moiregauge::strain::{Stacking, moire_of, twist_strain};
 use moiregauge_report::{CellResult, MoireDocument, cell_figure};
@@ -27,6 +27,8 @@ pub(crate) fn run(args: &MoireArgs) -> anyhow::Result<ExitCode> {
         return Ok(ExitCode::SUCCESS);
     }
     let settings = args.settings()?;
+    let file = |path| crate::outputs::file(path, args.force, &[]);
+    let file = args.figure.as_deref().map(file).transpose()?;
     let asked = args.question()?;
     let lattice = match &asked {
         Question::Forward(stacking) => LatticeVectors {
@@ -44,6 +46,8 @@ pub(crate) fn run(args: &MoireArgs) -> anyhow::Result<ExitCode> {
         },
     };
     let cell = MoireCell::new(&lattice.basis).context("the two vectors are parallel")?;
+    // Names of waves are those of the vectors that are shown.
+    let lattice = cell.pair_of(&lattice);
     let forward = matches!(asked, Question::Forward(_));
     let read = if forward {
         None
@@ -77,7 +81,7 @@ pub(crate) fn run(args: &MoireArgs) -> anyhow::Result<ExitCode> {
             },
         ))?;
     }
-    if let Some(path) = &args.figure {
+    if let (Some(path), Some(file)) = (&args.figure, file) {
         let drawing = cell_figure(&cell, "moire", &document.layers);
         let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("");
         let bytes = match extension.to_ascii_lowercase().as_str() {
@@ -85,7 +89,7 @@ pub(crate) fn run(args: &MoireArgs) -> anyhow::Result<ExitCode> {
             "png" => drawing.png()?,
             other => bail!("--figure: expected a name that ends in .svg or .png, found {other:?}"),
         };
-        std::fs::write(path, bytes).with_context(|| format!("cannot write {}", path.display()))?;
+        file.write(bytes)?;
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -117,6 +121,12 @@ fn read(
         sensor: Matrix4::zeros(),
     };
     let budget = Budget::new(lattice, &found, &statistical, settings);
-    let readings = Readings::new(lattice, &found, &budget, settings);
+    let readings = Readings::new(
+        lattice,
+        &found,
+        &budget,
+        &WaveStrengths::default(),
+        settings,
+    );
     Ok((found, readings))
 }

@@ -94,13 +94,9 @@ pub(crate) fn run(args: &PlanArgs) -> anyhow::Result<ExitCode> {
             wish.unwrap_or_default()
         );
     }
-    if let Some(out) = &args.out {
-        ensure!(
-            args.force || !out.exists(),
-            "{} exists already; give another --out, or --force to write over it",
-            out.display()
-        );
-    }
+    let inputs: Vec<PathBuf> = args.config.iter().chain(&args.like).cloned().collect();
+    let file = |out| crate::outputs::file(out, args.force, &inputs);
+    let file = args.out.as_deref().map(file).transpose()?;
     let given = crate::validate::given_conditions(args.config.as_deref(), &args.like)?;
     let mut conditions = given.unwrap_or_default();
     // What the header of a file says of its time is rounded to whole seconds: 0.29 s.
@@ -137,9 +133,8 @@ pub(crate) fn run(args: &PlanArgs) -> anyhow::Result<ExitCode> {
          per period, and a signal that stands out of the noise are needed",
     )?;
     say(&words::plan(&conditions, &settings, &wishes, &plans))?;
-    if let Some(out) = &args.out {
-        let text = toml::to_string_pretty(&best.set)?;
-        std::fs::write(out, text).with_context(|| format!("cannot write {}", out.display()))?;
+    if let (Some(out), Some(file)) = (&args.out, file) {
+        file.write(toml::to_string_pretty(&best.set)?.into_bytes())?;
         say(&format!(
             "\nWritten to {0}; moiregauge validate --config {0} simulates it\n",
             out.display()

@@ -8,8 +8,11 @@ use std::process::ExitCode;
 
 use anyhow::{Context as _, bail, ensure};
 use moiregauge::simulate::{Simulation, Simulator};
+use moiregauge_pipeline::sink::{FolderSink, Manifest, Target};
 
 pub(crate) use args::SimulateArgs;
+
+use crate::outputs;
 
 /// Writes the set, or the paper's three.
 pub(crate) fn run(args: &SimulateArgs) -> anyhow::Result<ExitCode> {
@@ -89,58 +92,60 @@ pub(crate) fn write_sets(
         let simulator = Simulator::new(set.clone())
             .with_context(|| format!("set {name:?} cannot be simulated"))?;
         let folder = out.join(name);
-        check_folder(&folder, simulator.frames(), force)?;
-        ready.push((simulator, folder));
+        let sink = sink(&folder, simulator.frames(), force)?;
+        ready.push((simulator, folder, sink));
     }
-    for (simulator, folder) in &ready {
-        write_set(simulator, folder)?;
+    let mut written = Vec::new();
+    for (simulator, folder, sink) in ready {
+        write_set(&simulator, &sink)?;
+        outputs::commit(sink)?;
+        written.push(folder);
     }
-    Ok(ready.into_iter().map(|(_, folder)| folder).collect())
+    Ok(written)
 }
 
-fn write_set(simulator: &Simulator, folder: &Path) -> anyhow::Result<()> {
-    std::fs::create_dir_all(folder)
-        .with_context(|| format!("cannot make the folder {}", folder.display()))?;
+fn write_set(simulator: &Simulator, sink: &FolderSink) -> anyhow::Result<()> {
     for index in 0..simulator.frames() {
         let bytes = spmfile::nanoscope::write(&simulator.frame(index))?;
-        write_file(&folder.join(Simulator::file_name(index)), &bytes)?;
+        sink.write(&Simulator::file_name(index), &bytes)?;
     }
     let mut truth = serde_json::to_vec_pretty(&simulator.truth())?;
     truth.push(b'\n');
-    write_file(&folder.join(TRUTH), &truth)
+    Ok(sink.write(TRUTH, &truth)?)
 }
 
 const TRUTH: &str = "truth.json";
 
-fn write_file(path: &Path, bytes: &[u8]) -> anyhow::Result<()> {
-    std::fs::write(path, bytes).with_context(|| format!("cannot write {}", path.display()))
-}
-
-/// Refuses to write over anything, unless forced; and to leave scans of an older, longer set among
-/// the new ones, where an analysis would take them for part of it.
-fn check_folder(folder: &Path, frames: usize, force: bool) -> anyhow::Result<()> {
-    let ours: Vec<PathBuf> = (0..frames)
-        .map(|index| folder.join(Simulator::file_name(index)))
-        .chain([folder.join(TRUTH)])
-        .collect();
-    if let Some(there) = ours.iter().find(|path| path.exists() && !force) {
-        bail!("{} exists already; --force writes over it", there.display());
-    }
-    let Ok(entries) = std::fs::read_dir(folder) else {
-        return Ok(());
-    };
+/// Makes the folder of a set ready, and refuses to put the set among scans of others, which an analysis would take for
+/// part of it.
+fn sink(folder: &Path, frames: usize, force: bool) -> anyhow::Result<FolderSink> {
+    let mut names: Vec<String> = (0..frames).map(Simulator::file_name).collect();
+    names.push(TRUTH.to_owned());
+    let sink = outputs::folder(&Target {
+        folder,
+        kind: "simulate",
+        names: &names,
+        inputs: &[],
+        force,
+    })?;
+    let earlier = Manifest::read(folder)?;
+    let listed = earlier.iter().flat_map(|m| &m.files).map(|f| &f.path);
+    let ours: Vec<&String> = names.iter().chain(listed).collect();
+    let entries =
+        std::fs::read_dir(folder).with_context(|| format!("cannot list {}", folder.display()))?;
     for entry in entries {
         let path = entry
             .with_context(|| format!("cannot list {}", folder.display()))?
             .path();
         let is_scan = path.extension().is_some_and(|extension| extension == "spm");
+        let name = path.file_name().unwrap_or_default();
         ensure!(
-            !is_scan || ours.contains(&path),
+            !is_scan || ours.iter().any(|ours| name == ours.as_str()),
             "{} is no part of the new set: remove it or choose another --name",
             path.display()
         );
     }
-    Ok(())
+    Ok(sink)
 }
 
 #[cfg(test)]
@@ -184,12 +189,17 @@ mod tests {
         );
     }
 
+    /// Those of the program go with the set that is replaced; those of others are in the way.
     #[test]
     fn scans_of_an_older_set_do_not_mix_with_the_new_ones() {
         let out = tempfile::tempdir().unwrap();
-        write_sets(&[small("set", 3)], out.path(), false).unwrap();
+        let folders = write_sets(&[small("set", 3)], out.path(), false).unwrap();
+        write_sets(&[small("set", 2)], out.path(), true).unwrap();
+        let there = |name: &str| folders[0].join(name).exists();
+        assert!(there("scan.001.spm") && !there("scan.002.spm"));
+        std::fs::write(folders[0].join("mine.spm"), "a scan").unwrap();
         let error = write_sets(&[small("set", 2)], out.path(), true).unwrap_err();
-        assert!(error.to_string().contains("scan.002.spm"), "{error}");
+        assert!(error.to_string().contains("mine.spm"), "{error}");
     }
 
     #[test]

@@ -11,9 +11,11 @@ use anyhow::Context as _;
 use indicatif::{ProgressBar, ProgressStyle};
 use moiregauge::settings::Method;
 use moiregauge::simulate::{Simulation, Simulator};
+use moiregauge_pipeline::sink::Target;
 use rayon::prelude::*;
 
-use crate::analyze::{MethodArg, write_all};
+use crate::analyze::MethodArg;
+use crate::outputs;
 use crate::say::say;
 use compare::{Comparison, compare};
 use output::Validation;
@@ -68,13 +70,17 @@ pub(crate) struct ValidateArgs {
 /// Runs the validation.
 pub(crate) fn run(args: &ValidateArgs) -> anyhow::Result<ExitCode> {
     anyhow::ensure!(args.sets >= 2, "--sets must be at least 2");
-    if let Some(out) = &args.out {
-        anyhow::ensure!(
-            args.force || !out.join("validation.json").exists(),
-            "{} already holds a validation; give another --out, or --force to write over it",
-            out.display()
-        );
-    }
+    let names = output::NAMES.map(str::to_owned);
+    let folder = |out| {
+        outputs::folder(&Target {
+            folder: out,
+            kind: "validate",
+            names: &names,
+            inputs: &args.like,
+            force: args.force,
+        })
+    };
+    let sink = args.out.as_deref().map(folder).transpose()?;
     let conditions = conditions(args)?;
     Simulator::new(conditions.clone()).context("these conditions cannot be simulated")?;
     let progress = progress(u64::from(args.sets), args.quiet);
@@ -97,8 +103,9 @@ pub(crate) fn run(args: &ValidateArgs) -> anyhow::Result<ExitCode> {
     );
     let validation = Validation::new(method, args.seed, failed, &compared, conditions);
     say(&validation.table())?;
-    if let Some(out) = &args.out {
-        write_all(out, &validation.files(&compared)?)?;
+    if let (Some(out), Some(sink)) = (&args.out, sink) {
+        outputs::write_all(&sink, "", &validation.files(&compared)?)?;
+        outputs::commit(sink)?;
         say(&format!("Written to {}\n", out.join("pulls.png").display()))?;
     }
     Ok(ExitCode::SUCCESS)

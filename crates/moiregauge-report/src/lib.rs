@@ -22,7 +22,7 @@ pub use draw::scale::fixed;
 pub use error::ReportError;
 pub use figures::{Drawing, Figure, cell_figure, figures, map_figures, pulls, stripe_figures};
 pub use format::{plus_minus, two_digits, with_statistical};
-pub use html::map_page;
+pub use html::{layers, map_page};
 pub use map_details::MapDetails;
 pub use moire::{CellResult, MoireDocument};
 pub use provenance::{FailedInput, InputFile, Provenance};

@@ -6,23 +6,24 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-use moiregauge::analysis::{Analysis, Combined, Drift, SetAnalysis, SetMean};
+use moiregauge::analysis::{Analysis, Combined, Drift, ScanAnalysis, SetAnalysis, SetMean};
 use moiregauge::budget::Budget;
 use moiregauge::caveat::Caveat;
 use moiregauge::estimate::{Estimate, TotalEstimate};
 use moiregauge::lattice::LatticeVectors;
-use moiregauge::readings::Readings;
+use moiregauge::readings::{ChosenBy, NameReading, Naming, Readings};
 use moiregauge::settings::Settings;
-use moiregauge::strain::TwistStrain;
+use moiregauge::strain::{StrainTensor, TwistStrain};
 use spmfile::FrameDirection;
 
 use crate::draw::scale::fixed;
 use crate::format::{plus_minus, two_digits, with_statistical};
+use crate::html::layers;
 use crate::provenance::FailedInput;
 
 /// Per set and combined: drift, twist, strain; then what to keep in mind.
 pub fn summary(analysis: &Analysis) -> String {
-    let mut text = String::new();
+    let mut text = format!("Layers: {}\n", layers(&analysis.settings));
     for set in &analysis.sets {
         set_summary(&mut text, set, &analysis.settings);
     }
@@ -38,14 +39,19 @@ pub fn summary(analysis: &Analysis) -> String {
 }
 
 fn set_summary(text: &mut String, set: &SetAnalysis, settings: &Settings) {
-    let count = set.scans.len();
+    let used = || set.scans.iter().filter(|s| s.excluded.is_none());
+    let (count, others) = (used().count(), set.scans.len() - used().count());
     let _ = writeln!(
         text,
-        "{}: {}, {count} scan{} ({})",
+        "{}: {}, {count} scan{} ({}){}",
         set.name,
         set.channel,
         if count == 1 { "" } else { "s" },
-        directions(set)
+        directions(&used().collect::<Vec<_>>()),
+        match others {
+            0 => String::new(),
+            n => format!(", {n} more not used"),
+        }
     );
     match &set.drift {
         Some(drift) => drift_line(text, drift, settings),
@@ -92,9 +98,9 @@ fn set_mean(text: &mut String, mean: &SetMean) {
 }
 
 /// How many scans went up, how many down.
-fn directions(set: &SetAnalysis) -> String {
+fn directions(scans: &[&ScanAnalysis]) -> String {
     let count = |direction: Option<FrameDirection>| {
-        let scans = set.scans.iter();
+        let scans = scans.iter();
         scans.filter(|s| s.frame_direction == direction).count()
     };
     let known = format!(
@@ -104,7 +110,7 @@ fn directions(set: &SetAnalysis) -> String {
     );
     match count(None) {
         0 => known,
-        all if all == set.scans.len() => "direction unknown".to_owned(),
+        all if all == scans.len() => "direction unknown".to_owned(),
         unknown => format!("{known}, {unknown} unknown"),
     }
 }
@@ -195,40 +201,72 @@ fn heterostrain(text: &mut String, found: &TwistStrain, budget: &Budget) {
     );
 }
 
+/// A strain tensor with the errors of the scans and those of all.
+fn strain_tensor(
+    text: &mut String,
+    word: &str,
+    found: &StrainTensor,
+    all: &StrainTensor,
+    poisson_ratio: f64,
+) {
+    let degrees = |e: Estimate| plus_minus(e.scaled(1f64.to_degrees()));
+    let percent = |e: Estimate| plus_minus(e.scaled(100.0));
+    let both = |part: Estimate, all: Estimate, factor: f64, unit: &str| {
+        let found = TotalEstimate::new(part, all.sigma * all.sigma);
+        with_statistical(found.scaled(factor), unit)
+    };
+    let _ = writeln!(
+        text,
+        "    {word}twist       {}\n    mean strain {}, shear part {}{}",
+        both(found.twist(), all.twist(), 1f64.to_degrees(), "°"),
+        both(found.mean(), all.mean(), 100.0, " %"),
+        both(found.shear(), all.shear(), 100.0, " %"),
+        all.axis_lab()
+            .map_or_else(String::new, |a| format!(", axis {}°", degrees(a)))
+    );
+    for (word, split) in ["= uniaxial", "or"].iter().zip(all.splits(poisson_ratio)) {
+        let _ = writeln!(
+            text,
+            "    {word:11} {} %{} and biaxial {} %",
+            percent(split.uniaxial),
+            split
+                .axis_lab
+                .map_or_else(String::new, |a| format!(" along {}°", degrees(a))),
+            percent(split.biaxial)
+        );
+    }
+}
+
 /// What else the lattice can mean: all readings of different layers, or the strain tensor.
 fn readings(text: &mut String, readings: &Readings) {
     let degrees = |e: Estimate| plus_minus(e.scaled(1f64.to_degrees()));
     let percent = |e: Estimate| plus_minus(e.scaled(100.0));
+    if let Some(naming) = &readings.naming {
+        names(text, naming);
+    }
     if let Some(tensor) = &readings.tensor {
-        let (best, all) = (&tensor.best, tensor.in_all());
-        let both = |part: Estimate, all: Estimate, factor: f64, unit: &str| {
-            with_statistical(
-                TotalEstimate::new(part, all.sigma.powi(2)).scaled(factor),
-                unit,
-            )
-        };
-        let _ = writeln!(
-            text,
-            "  with the orientation of a layer:\n    twist       {}\n    mean strain {}, shear part {}{}",
-            both(best.twist(), all.twist(), 1f64.to_degrees(), "°"),
-            both(best.mean(), all.mean(), 100.0, " %"),
-            both(best.shear(), all.shear(), 100.0, " %"),
-            all.axis_lab()
-                .map_or_else(String::new, |a| format!(", axis {}°", degrees(a)))
-        );
-        for (word, split) in ["= uniaxial", "or"]
-            .iter()
-            .zip(all.splits(tensor.poisson_ratio))
-        {
-            let _ = writeln!(
-                text,
-                "    {word:11} {} %{} and biaxial {} %",
-                percent(split.uniaxial),
-                split
-                    .axis_lab
-                    .map_or_else(String::new, |a| format!(" along {}°", degrees(a))),
-                percent(split.biaxial)
-            );
+        let ratio = tensor.poisson_ratio;
+        match &tensor.opposite {
+            None => {
+                text.push_str("  with the orientation of a layer:\n");
+                strain_tensor(text, "", &tensor.best, &tensor.in_all(), ratio);
+            }
+            Some(opposite) => {
+                text.push_str(
+                    "  with the orientation of a layer, the sense of the twist open: these readings are as good as each \
+                     other\n",
+                );
+                strain_tensor(text, "either ", &tensor.best, &tensor.in_all(), ratio);
+                strain_tensor(text, "or     ", &opposite.found, &opposite.in_all(), ratio);
+                if let Some([low, high]) = tensor.magnitudes() {
+                    let ends = [low, high].map(|end| fixed(end.to_degrees(), 4));
+                    let _ = writeln!(
+                        text,
+                        "    magnitudes from {}° to {}° are open (95 %)",
+                        ends[0], ends[1]
+                    );
+                }
+            }
         }
         for other in tensor
             .alternatives
@@ -261,6 +299,29 @@ fn readings(text: &mut String, readings: &Readings) {
             percent(Estimate::new(branch.strain, branch.strain_sigma)),
             branch.axis_lab.to_degrees()
         );
+    }
+}
+
+/// What chose the pair of waves that is read, and the pairs that may be right as well.
+fn names(text: &mut String, naming: &Naming) {
+    let words = |n: &NameReading| {
+        format!(
+            "twist {}° with {} % of strain",
+            fixed(n.twist.to_degrees(), 4),
+            fixed(100.0 * n.strain, 3)
+        )
+    };
+    let by = match naming.chosen_by {
+        ChosenBy::LeastStrain => None,
+        ChosenBy::Image => Some("the image: of each other plausible pair one wave is too weak"),
+        ChosenBy::Orientation => Some("the orientation of a layer"),
+        ChosenBy::User => Some("the user"),
+    };
+    if let Some(by) = by {
+        let _ = writeln!(text, "  pair of waves chosen by {by}");
+    }
+    for other in naming.open() {
+        let _ = writeln!(text, "  or, by another pair of waves, {}", words(other));
     }
 }
 

@@ -158,6 +158,27 @@ fn fit_after_start(bencher: Bencher<'_, '_>, case: (usize, f64)) {
     });
 }
 
+/// What missing pixels cost: none, one, and a tenth of the image in places of their own.
+#[divan::bench(args = [0, 1, 58_982], sample_count = 10, sample_size = 1)]
+fn missing_pixels_of_768(bencher: Bencher<'_, '_>, missing: usize) {
+    let side = 768;
+    let mut image = image(side, Period::Pixels25);
+    for i in 0..missing {
+        // Steps that share no divisor with the number of pixels meet no pixel twice.
+        image.values[(i * 1_000_003 + 295_000) % (side * side)] = f64::NAN;
+    }
+    let geometry = unit_pixels(side);
+    bencher.bench(|| {
+        measure(
+            divan::black_box(&image),
+            &geometry,
+            Background::Plane,
+            Method::Lattice,
+        )
+        .expect("a lattice")
+    });
+}
+
 #[divan::bench(args = CASES, sample_count = 10, sample_size = 1)]
 fn paper(bencher: Bencher<'_, '_>, case: (usize, Period)) {
     run(bencher, case, Method::Paper);

@@ -1,6 +1,8 @@
 //! How accurate maps are, on simulated lattices whose local twist and strain are known.
 //!
-//! `cargo run --release -p moiregauge --example map_accuracy` prints the tables of `docs/maps.md`.
+//! `cargo run --release -p moiregauge --example map_accuracy` prints the tables of `docs/maps.md`: maps that start from
+//! the true mean lattice. What the program makes of the same images, which has to find it, `docs/maps_accuracy.sh` tells,
+//! by `map_accuracy images DIR` and `map_accuracy compare NAME MAP.gwy`.
 
 use std::f64::consts::{PI, TAU};
 use std::time::Instant;
@@ -23,9 +25,93 @@ const OBLIQUE: f64 = 0.9;
 const TWIST: f64 = 1.14;
 
 fn main() {
-    formula();
-    offsets();
-    published();
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let words: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    match words[..] {
+        ["images", folder] => images(folder),
+        ["compare", name, map] => compare(name, map),
+        _ => {
+            formula();
+            offsets();
+            published();
+        }
+    }
+}
+
+/// The images for the program, with their names.
+fn programs() -> Vec<(String, FieldScene)> {
+    let mut all = Vec::new();
+    for (size, periods) in [(512, 20.0), (1024, 40.0), (1024, 80.0), (2048, 200.0)] {
+        let mut scene = scene(size, periods, 0.1, 1);
+        scene.white = scene.signal_rms();
+        all.push((format!("varied-{size}-{periods}"), scene));
+    }
+    for size in [1024, 2048] {
+        let mut scene = stretched(size, size as f64 / 25.0, 0.07, 1);
+        scene.white = 0.5 * scene.signal_rms();
+        all.push((format!("stretched-{size}"), scene));
+    }
+    all
+}
+
+/// Writes them as arrays; prints their names and sides in nm.
+fn images(folder: &str) {
+    for (name, scene) in programs() {
+        let image = scene.image();
+        let mut header = format!(
+            "{{'descr': '<f4', 'fortran_order': False, 'shape': ({}, {}), }}",
+            image.rows, image.columns
+        );
+        let padding = (64 - (header.len() + 11) % 64) % 64;
+        header.push_str(&" ".repeat(padding));
+        header.push('\n');
+        let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+        bytes.extend((header.len() as u16).to_le_bytes());
+        bytes.extend(header.as_bytes());
+        // The first line of an array is the top one.
+        for row in (0..image.rows).rev() {
+            let line = image.row(row).iter();
+            bytes.extend(line.flat_map(|v| (*v as f32).to_le_bytes()));
+        }
+        let path = std::path::Path::new(folder).join(format!("{name}.npy"));
+        std::fs::write(path, bytes).expect("the image is written");
+        println!("{name} {}", pitch(&scene) * scene.size[0] as f64);
+    }
+}
+
+/// A map of the program against the truth.
+fn compare(name: &str, map: &str) {
+    let (_, scene) = programs()
+        .into_iter()
+        .find(|(known, _)| known == name)
+        .expect("an image of this name");
+    let bytes = std::fs::read(map).expect("a map");
+    let found = spmfile::read(&bytes).expect("a map");
+    let plane = |name: &str| -> Vec<f64> {
+        let channel = found.channels.iter().find(|c| c.name == name);
+        channel.expect("a channel").values()
+    };
+    let [x, y] = ["x", "y"].map(plane);
+    let (twist, sigma) = (plane("twist"), plane("twist sigma"));
+    let (strain, mask) = (plane("strain"), plane("mask"));
+    let pitch = pitch(&scene);
+    let middle = Vector2::from(scene.size.map(|n| (n as f64 - 1.0) / 2.0));
+    let (mut squares, mut inside, mut count) = ([0.0; 2], 0.0, 0.0);
+    for node in (0..mask.len()).filter(|&n| mask[n] == 0.0) {
+        let at = middle + Vector2::new(x[node], y[node]) / pitch;
+        let truth = truth(&(scene.waves(at) / pitch));
+        let off = twist[node] - truth.twist.to_degrees();
+        squares[0] += off * off;
+        squares[1] += (strain[node] - 100.0 * truth.strain_vector.norm()).powi(2);
+        inside += f64::from(u8::from(off.abs() < sigma[node]));
+        count += 1.0;
+    }
+    let [theta, strain] = squares.map(|s| (s / count).sqrt());
+    println!(
+        "| {name} | {count} of {} | {theta:.5} | {strain:.5} | {:.1} % |",
+        mask.len(),
+        100.0 * inside / count
+    );
 }
 
 /// A lattice of `periods` periods that is displaced along two waves, at an angle to each: what is along a wave changes the

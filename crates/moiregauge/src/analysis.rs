@@ -9,7 +9,7 @@ use crate::budget::Budget;
 use crate::caveat::Caveat;
 use crate::estimate::Estimate;
 use crate::image::Image;
-use crate::joint::TestedTerm;
+use crate::joint::{DriftPath, TestedTerm};
 use crate::lattice::LatticeVectors;
 use crate::readings::Readings;
 use crate::series::AtomicOrientation;
@@ -40,6 +40,34 @@ pub struct Analysis {
     pub survey: Option<Picture>,
     /// Doubts, in the order in which they came up.
     pub caveats: Vec<Caveat>,
+}
+
+impl Analysis {
+    /// The settings with the waves of the lattice that the numbers go with, for what is made from the same scans: maps
+    /// have to read the lattice under the same name.
+    pub fn named_settings(&self) -> Settings {
+        let of_set = |set: &SetAnalysis| set.mean.clone().or(set.uncorrected.clone());
+        let found = self
+            .combined
+            .as_ref()
+            .map(|all| (all.lattice, all.readings.clone()))
+            .or_else(|| {
+                let mean = self.sets.iter().find_map(of_set)?;
+                Some((mean.lattice, mean.readings))
+            });
+        let waves = found.and_then(|(lattice, readings)| {
+            let naming = readings.naming?;
+            let least = naming.names.iter().map(|n| n.strain);
+            let least = least.fold(f64::INFINITY, f64::min);
+            let reported = naming.names.first().filter(|n| n.strain > least)?;
+            reported.name.waves(&lattice.basis)
+        });
+        let mut settings = self.settings.clone();
+        if let Some(waves) = waves {
+            settings.moire_waves = Some([0, 1].map(|i| [waves[(0, i)], waves[(1, i)]]));
+        }
+        settings
+    }
 }
 
 /// Scans of one slow axis, line rate, size and channel, in order of time.
@@ -143,6 +171,8 @@ pub struct Combined {
     pub joint: Option<JointTerms>,
     /// The drift in the middle of the campaign, where one joint fit over all scans describes it.
     pub drift: Option<Drift>,
+    /// The way of the sample by the fit over all scans, where that made them.
+    pub path: Option<DriftPath>,
     /// What the scans themselves say of the errors.
     pub checks: Option<Checks>,
     /// How far every two sets are apart.
@@ -251,6 +281,8 @@ pub struct ScanAnalysis {
     pub drift_corrected: Option<LatticeVectors>,
     /// The drift that was taken off, nm/s: that of its set at its time.
     pub drift: Option<Vector2<f64>>,
+    /// Its time and the way of the sample; `None` where either is not known.
+    pub motion: Option<Motion>,
     /// Twist and strain from `sensor`.
     pub twist_strain_sensor: Option<TwistStrain>,
     /// Twist and strain from `drift_corrected`.
@@ -261,6 +293,15 @@ pub struct ScanAnalysis {
     pub residual: Option<Residual>,
     /// Why it was not used for the results of its set; `None` where it was.
     pub excluded: Option<String>,
+}
+
+/// When a frame was taken, and where the sample was.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Motion {
+    /// Time of the middle of the frame, s from an origin that all scans share.
+    pub middle: f64,
+    /// The way of the sample, by the fit of all sets where there is one, otherwise by that of its set.
+    pub path: DriftPath,
 }
 
 /// One Monte Carlo draw of twist and strain.

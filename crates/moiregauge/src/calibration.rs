@@ -72,6 +72,9 @@ const SURFACES: [(&str, f64, f64, &str); 5] = [
     ),
 ];
 
+/// Lengths that the vectors of a known lattice can have, nm.
+const LENGTHS: std::ops::RangeInclusive<f64> = 0.05..=1e5;
+
 impl KnownLattice {
     /// A hexagonal lattice.
     pub fn hexagonal(name: &str, a_nm: f64, sigma_percent: f64, source: &str) -> Self {
@@ -115,6 +118,31 @@ impl KnownLattice {
         Self::all()
             .into_iter()
             .find(|known| known.name.eq_ignore_ascii_case(name.trim()))
+    }
+
+    /// What is wrong with the numbers; `None` where they describe a lattice.
+    pub fn problem(&self) -> Option<String> {
+        for (what, length) in [("a_nm", self.a_nm), ("b_nm", self.b_nm)] {
+            if !LENGTHS.contains(&length) {
+                return Some(format!(
+                    "{what} of the known lattice: expected {} to {} nm, found {length}",
+                    LENGTHS.start(),
+                    LENGTHS.end()
+                ));
+            }
+        }
+        if !(5.0..=175.0).contains(&self.angle_deg) {
+            return Some(format!(
+                "angle_deg of the known lattice: expected 5° to 175°, found {}",
+                self.angle_deg
+            ));
+        }
+        (!(0.0..=10.0).contains(&self.sigma_percent)).then(|| {
+            format!(
+                "sigma_percent of the known lattice: expected 0 to 10 %, found {}",
+                self.sigma_percent
+            )
+        })
     }
 
     /// The shortest two vectors that stand at 60° to 90°, as columns, nm; `None` without an area.
@@ -162,6 +190,19 @@ pub struct Calibration {
     pub line_rates_hz: Vec<f64>,
 }
 
+/// Gain (per cent), mismatch (per cent) and deviation from a right angle (mrad) that no position sensors have: they are
+/// calibrated, if badly.
+const WORST_SENSORS: [f64; 3] = [20.0, 10.0, 100.0];
+/// The same for nominal coordinates: an open piezo tube makes a frame of 55 nm where 70 nm are asked for.
+const WORST_NOMINAL: [f64; 3] = [40.0, 25.0, 200.0];
+/// Standard uncertainties beyond which a calibration tells less than none.
+const MOST_UNCERTAIN: [f64; 3] = [5.0, 10.0, 100.0];
+/// What the three numbers are called, and their units.
+const NAMES: [(&str, &str); 3] = [
+    ("the common gain", "%"),
+    ("the mismatch of x and y", "%"),
+    ("the deviation from a right angle", "mrad"),
+];
 /// Units of a calibration: per cent, per cent, mrad.
 const UNITS: [f64; 3] = [100.0, 100.0, 1000.0];
 
@@ -214,15 +255,71 @@ impl Calibration {
         Matrix2::identity() + parts[0] * values[0] + parts[1] * values[1] + parts[2] * values[2]
     }
 
-    /// `F⁻¹`: shown → true. `None` for numbers that describe no scanner.
+    /// `F⁻¹`: shown → true. `None` for numbers that are no distortion.
     pub fn map(&self) -> Option<Matrix2<f64>> {
-        self.problem()
+        self.nonsense()
             .is_none()
             .then(|| self.distortion().try_inverse())?
     }
 
-    /// What is wrong with the numbers; `None` where they make sense.
+    /// What is wrong with the numbers, or why they can be those of no scanner; `None` where they can be used.
     pub fn problem(&self) -> Option<String> {
+        self.nonsense().or_else(|| self.implausible())
+    }
+
+    /// Why these can be the numbers of no scanner, or are too uncertain to correct anything with.
+    fn implausible(&self) -> Option<String> {
+        let (of, worst) = self.worst();
+        let named = NAMES.iter().zip(self.estimates());
+        for (((name, unit), found), worst) in named.clone().zip(worst) {
+            if found.value.abs() > worst {
+                return Some(format!(
+                    "{name}: expected between −{worst} and {worst} {unit} for the {of} of a scanner, found {:.1} ± {:.1} \
+                     {unit}; the images show another lattice than the one they were compared with, their size is wrong, \
+                     or it is their drift",
+                    found.value, found.sigma
+                ));
+            }
+        }
+        for (((name, unit), found), worst) in named.zip(MOST_UNCERTAIN) {
+            if found.sigma > worst {
+                return Some(format!(
+                    "{name}: expected a standard uncertainty of {worst} {unit} or less, found {:.1} ± {:.1} {unit}; frames \
+                     up and down, faster lines and smaller frames tell more",
+                    found.value, found.sigma
+                ));
+            }
+        }
+        None
+    }
+
+    /// Numbers that a scanner can have but rarely has: more than half of what none can have, at two standard
+    /// uncertainties.
+    pub(crate) fn unusual(&self) -> Option<String> {
+        let (of, worst) = self.worst();
+        let named = NAMES.iter().zip(self.estimates()).zip(worst);
+        let mut unusual = named.filter_map(|(((name, unit), found), worst)| {
+            let clearly = found.value.abs() - 2.0 * found.sigma > worst / 2.0;
+            clearly.then(|| {
+                format!(
+                    "{name} of {:.1} ± {:.1} {unit} for the {of}",
+                    found.value, found.sigma
+                )
+            })
+        });
+        unusual.next()
+    }
+
+    /// What it is a calibration of, and the numbers that no such scanner has (per cent, per cent, mrad).
+    fn worst(&self) -> (&'static str, [f64; 3]) {
+        match self.coordinates {
+            Coordinates::Sensors => ("position sensors", WORST_SENSORS),
+            Coordinates::Nominal => ("nominal coordinates", WORST_NOMINAL),
+        }
+    }
+
+    /// What is wrong with the numbers as numbers.
+    fn nonsense(&self) -> Option<String> {
         let covariance = self.parameter_covariance();
         let finite = self
             .values()
@@ -231,6 +328,12 @@ impl Calibration {
             .all(|v| v.is_finite());
         if !finite {
             return Some("expected finite numbers".to_owned());
+        }
+        let conditions = self.sizes_nm.iter().flatten().chain(&self.line_rates_hz);
+        if let Some(value) = conditions.copied().find(|v| !(*v > 0.0 && v.is_finite())) {
+            return Some(format!(
+                "expected sizes and line rates greater than 0, found {value}"
+            ));
         }
         let own = self.distortion().symmetric_eigenvalues();
         if !(own.min() > 0.1 && own.max() < 10.0) {

@@ -75,6 +75,15 @@ impl MoireCell {
         })
     }
 
+    /// The lattice that the cell was made of, by the first two vectors of the cell.
+    pub fn pair_of(&self, lattice: &LatticeVectors) -> LatticeVectors {
+        let own = Matrix2::from_columns(&[self.vectors[0], self.vectors[1]]);
+        match lattice.basis.try_inverse() {
+            Some(inverse) => lattice.relabelled(&(inverse * own).map(f64::round)),
+            None => *lattice,
+        }
+    }
+
     /// Lengths of the three real-space vectors, nm.
     pub fn wavelengths(&self) -> [f64; 3] {
         self.vectors.map(|v| v.norm())

@@ -2,12 +2,27 @@
 
 /// Scatter that chance makes less often than this enlarges the errors.
 const SIGNIFICANT: f64 = 0.05;
+/// The same for tests that are made once for each image.
+const RARE: f64 = 1e-3;
 
 /// The factor by which variances are enlarged where scans scatter significantly more than their errors
 /// say: `χ²/dof` if chance makes so large a χ² in fewer than 5 % of cases, else 1. To enlarge for every
 /// χ²/dof above 1 would make errors too large by 5 % on average where nothing is wrong.
+///
+/// This is the rule for all errors. One does not follow it: [`enlargement_by_estimated_noise`].
 pub(crate) fn enlargement(chi2: f64, freedom: usize) -> f64 {
     if is_significant(chi2, freedom) {
+        chi2 / freedom as f64
+    } else {
+        1.0
+    }
+}
+
+/// The same where the errors come from noise that was read off the data and is known to the share `known_to`, as a
+/// variance: the excess has to be one for the largest such noise. There is one such test for each image and none looks at
+/// them together, so that what counts is what chance makes in one of a thousand.
+pub(crate) fn enlargement_by_estimated_noise(chi2: f64, freedom: usize, known_to: f64) -> f64 {
+    if freedom > 0 && tail(chi2 / known_to, freedom) < RARE {
         chi2 / freedom as f64
     } else {
         1.0
@@ -66,5 +81,13 @@ mod tests {
         assert_eq!(enlargement(24.0, 14), 24.0 / 14.0);
         assert_eq!(enlargement(5.0, 14), 1.0);
         assert_eq!(enlargement(5.0, 0), 1.0);
+    }
+
+    /// 36.12 is what chance exceeds once in a thousand times with 14 degrees of freedom.
+    #[test]
+    fn noise_that_is_estimated_needs_more() {
+        assert_eq!(enlargement_by_estimated_noise(45.0, 14, 1.25), 1.0);
+        assert_eq!(enlargement_by_estimated_noise(45.4, 14, 1.25), 45.4 / 14.0);
+        assert_eq!(enlargement_by_estimated_noise(1e3, 0, 1.25), 1.0);
     }
 }

@@ -127,6 +127,26 @@ pub struct KnownOrientation {
     pub of: LatticeDirection,
 }
 
+/// Which way layer 2 is turned against layer 1.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum TwistSense {
+    /// Counter-clockwise: θ > 0.
+    Positive,
+    /// Clockwise: θ < 0.
+    Negative,
+}
+
+impl TwistSense {
+    /// Whether a twist is of this sense; 0 is of both.
+    pub fn has(self, twist: f64) -> bool {
+        match self {
+            Self::Positive => twist >= 0.0,
+            Self::Negative => twist <= 0.0,
+        }
+    }
+}
+
 /// How well the position sensors (or the scanner, where there are none) are calibrated: standard
 /// uncertainties, which every scan shares. The defaults are common values; a calibration of your own
 /// scanner tells better.
@@ -185,9 +205,22 @@ pub struct Settings {
     /// `material` and `substrate`.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub moire_layers: Vec<MoireLayers>,
+    /// Whether somebody chose the layers; what nobody chose is said to be assumed.
+    pub layers_chosen: bool,
     /// The orientation of one of the layers, if it is known: tells isotropic strain from twist.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lattice_angle: Option<KnownOrientation>,
+    /// The orientation of the other layer, if it is known as well: tells the sense of the twist of equal layers.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub lattice_angle_2: Option<KnownOrientation>,
+    /// The sense of the twist, if it is known: an orientation of one of two equal layers leaves it open.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub twist_sense: Option<TwistSense>,
+    /// Two wave vectors of the moiré, x and y in rad/nm, that belong to the reciprocal vectors of the atoms at 0° and
+    /// (hexagonal layers) 120°; about will do. The lattice of a strained moiré has other pairs that can be meant;
+    /// without this, image and orientation choose where they can, and else the least strain.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub moire_waves: Option<[[f64; 2]; 2]>,
     /// Form of the strain equation.
     pub strain_convention: StrainConvention,
     /// How files become sets.
@@ -234,6 +267,12 @@ impl Settings {
         own
     }
 
+    /// Whether nobody chose the layers: they are the default, and nothing says that they are meant.
+    pub fn layers_are_assumed(&self) -> bool {
+        let defaults = self.substrate.is_none() && self.moire_layers.is_empty();
+        !self.layers_chosen && defaults && self.material == Material::graphene()
+    }
+
     /// These settings with the method of arXiv:2406.08681 and all that belongs to it: its form of the strain equation,
     /// and images cropped to the region that all scans share.
     #[must_use]
@@ -251,6 +290,9 @@ impl Settings {
         Bilayer {
             reference: self.substrate.as_ref().unwrap_or(&self.material),
             stretched: &self.material,
+            waves: self
+                .moire_waves
+                .map(|[a, b]| nalgebra::Matrix2::new(a[0], b[0], a[1], b[1])),
         }
     }
 }
@@ -266,7 +308,11 @@ impl Default for Settings {
             moires: 1,
             substrate: None,
             moire_layers: Vec::new(),
+            layers_chosen: false,
             lattice_angle: None,
+            lattice_angle_2: None,
+            twist_sense: None,
+            moire_waves: None,
             strain_convention: StrainConvention::RealSpace,
             grouping: Grouping::Auto,
             frame_time_sigma_s: 0.6,

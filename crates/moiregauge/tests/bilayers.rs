@@ -55,6 +55,7 @@ fn bilayer(pair: &[Material; 2]) -> Bilayer<'_> {
     Bilayer {
         stretched: &pair[0],
         reference: &pair[1],
+        waves: None,
     }
 }
 
@@ -318,6 +319,7 @@ fn different_layers_trade_at_first_order() {
     let layers = Bilayer {
         stretched: &graphene,
         reference: &hbn,
+        waves: None,
     };
     let made = Stacking {
         twist: 1.1_f64.to_radians(),
@@ -350,6 +352,7 @@ fn errors_near_alignment() {
     let layers = Bilayer {
         stretched: &graphene,
         reference: &hbn,
+        waves: None,
     };
     let ratio: f64 = 0.2504 / 0.246;
     for twist_deg in [0.05_f64, 0.2, 1.0] {
@@ -413,10 +416,12 @@ fn exchange_of_different_layers() {
         let plain = Bilayer {
             stretched: &first,
             reference: &second,
+            waves: None,
         };
         let swapped = Bilayer {
             stretched: &second,
             reference: &first,
+            waves: None,
         };
         let basis = moire_of(&made, plain, RealSpace).unwrap();
         let all = branches(

@@ -3,10 +3,14 @@
 //! `λ = a/(2 sin 30°)`, an atomic lattice for the simulator.
 
 use moiregauge::budget::Source;
-use moiregauge::calibration::{Calibration, KnownLattice};
-use moiregauge::series::{Calibrated, analyse, calibrate, measure_known, measure_scan};
+use moiregauge::calibration::{Calibration, Coordinates, KnownLattice};
+use moiregauge::material::Material;
+use moiregauge::series::{
+    CalibrateError, Calibrated, MeasureError, analyse, atomic_orientation, calibrate,
+    measure_known, measure_scan,
+};
 use moiregauge::settings::{Grouping, Settings};
-use moiregauge::simulate::{Simulation, Simulator};
+use moiregauge::simulate::{Pattern, Simulation, Simulator};
 use nalgebra::Matrix2;
 use rayon::prelude::*;
 
@@ -247,6 +251,182 @@ fn a_calibration_takes_the_scanner_out_of_twist_and_strain() {
     let rows = [Source::Gain, Source::Mismatch, Source::Orthogonality];
     let rows: Vec<f64> = rows.iter().map(|s| budget.of(*s).wavelengths[0]).collect();
     assert!((rows[0] / lattice_like[0] - 1.0).abs() < 1e-9, "{rows:?}");
+}
+
+/// Two frames of 5 nm in 64 s each, as atoms are imaged, that drift at `speed` nm/min in a direction of the seed's.
+fn drifting(seed: u64, speed: f64) -> Simulation {
+    let mut set = atoms(seed);
+    set.raster.pixels = [128; 2];
+    set.raster.nominal_size_nm = [5.0; 2];
+    set.raster.line_rate_hz = 2.0;
+    let (sine, cosine) = (2.399_963 * (seed as f64 + 0.3)).sin_cos();
+    set.drift.velocity_nm_per_min = [speed * cosine, speed * sine];
+    set
+}
+
+/// The calibration, or why there is none.
+fn tried(set: &Simulation) -> Result<Calibrated, String> {
+    let simulator = Simulator::new(set.clone()).unwrap();
+    let known = exact();
+    let cell = known.cell().unwrap();
+    let mut scans = Vec::new();
+    for i in 0..simulator.frames() {
+        let (name, frame) = (Simulator::file_name(i), simulator.frame(i));
+        let scan = measure_known(&name, &frame, &Settings::default(), &cell);
+        scans.push(scan.map_err(|error| error.to_string())?);
+    }
+    let found = calibrate(scans, &known, 1.0 / 60.0, Grouping::Auto);
+    let found = found.map_err(|error| error.to_string())?;
+    match found.calibration.problem() {
+        None => Ok(found),
+        Some(problem) => Err(problem),
+    }
+}
+
+/// A drift that moves the sample by a tenth to a third of the frame is taken out, in whatever direction; where it is not,
+/// nothing is said of the scanner.
+#[test]
+fn frames_that_drift_by_a_third_of_their_width() {
+    for (speed, least) in [(0.5, 10), (1.0, 10), (1.5, 8)] {
+        let all: Vec<_> = (0..10_u64)
+            .into_par_iter()
+            .map(|seed| {
+                let set = drifting(seed, speed);
+                (seed, tried(&set), truth(&set))
+            })
+            .collect();
+        let mut accepted = 0;
+        for (seed, found, truth) in all {
+            match found {
+                Ok(found) => {
+                    accepted += 1;
+                    let pulls = pulls(&found.calibration, truth);
+                    let worst = pulls.map(f64::abs).into_iter().fold(0.0, f64::max);
+                    assert!(worst < 4.0, "{speed} nm/min, {seed}: {pulls:?}");
+                }
+                Err(reason) => println!("{speed} nm/min, {seed}: {reason}"),
+            }
+        }
+        assert!(accepted >= least, "{speed} nm/min: {accepted} of 10");
+    }
+}
+
+/// The orientation of a layer by frames that drift by up to more than half of their width is right within its errors, or
+/// is not given.
+#[test]
+fn atoms_that_drift_turn_by_what_they_say_or_are_refused() {
+    let mut given = 0;
+    let all: Vec<_> = (0..12_u64)
+        .into_par_iter()
+        .flat_map_iter(|seed| [0.7, 1.5, 2.4].map(|speed| (seed, speed)))
+        .map(|(seed, speed)| {
+            let mut set = drifting(seed, speed);
+            set.sample.pattern = Pattern::Layer1;
+            set.window.gain = [1.0; 2];
+            set.window.shear_mrad = 0.0;
+            if seed % 3 == 2 {
+                set.raster.scans = 1;
+            }
+            let simulator = Simulator::new(set.clone()).unwrap();
+            let scans = (0..simulator.frames()).map(|i| {
+                let (name, frame) = (Simulator::file_name(i), simulator.frame(i));
+                measure_scan(&name, &frame, &Settings::default(), None)
+            });
+            let scans: Result<Vec<_>, _> = scans.collect();
+            let found = scans.map_err(|error| error.to_string()).and_then(|scans| {
+                let (material, priors) = (Material::graphene(), Settings::default().calibration);
+                atomic_orientation(&scans, &material, 1, &priors).map_err(|e| e.to_string())
+            });
+            (seed, speed, set.sample.lattice_angle_deg, found)
+        })
+        .collect();
+    for (seed, speed, truth, found) in all {
+        match found {
+            Ok(found) => {
+                given += 1;
+                let miss = found.angle.value.to_degrees() - truth;
+                let miss = miss - 60.0 * (miss / 60.0).round();
+                let sigma = found.angle.sigma.to_degrees();
+                assert!(
+                    miss.abs() < 4.0 * sigma,
+                    "{speed} nm/min, {seed}: {miss} ± {sigma}"
+                );
+            }
+            Err(reason) => println!("{speed} nm/min, {seed}: {reason}"),
+        }
+    }
+    assert!(given >= 18, "{given} of 36");
+}
+
+/// What no scanner can be is said with its numbers, refused where it is to be applied, and not silently left out.
+#[test]
+fn what_no_scanner_can_be_is_refused() {
+    let good = Calibration {
+        gain_percent: 2.0,
+        mismatch_percent: -1.0,
+        orthogonality_mrad: 5.0,
+        covariance: [[0.01, 0.0, 0.0], [0.0, 0.01, 0.0], [0.0, 0.0, 0.1]],
+        coordinates: Coordinates::Sensors,
+        sizes_nm: vec![[5.0; 2]],
+        line_rates_hz: vec![4.0],
+    };
+    assert_eq!(good.problem(), None);
+    let mut far = good.clone();
+    far.gain_percent = 58.0;
+    far.covariance[0][0] = 169.0;
+    let problem = far.problem().unwrap();
+    assert!(problem.contains("58.0 ± 13.0 %"), "{problem}");
+    let changes: [fn(&mut Calibration); 8] = [
+        |c| c.gain_percent = 100.0,
+        |c| c.gain_percent = f64::NAN,
+        |c| c.mismatch_percent = -30.0,
+        |c| c.orthogonality_mrad = 300.0,
+        |c| c.covariance[0][0] = 100.0,
+        |c| c.covariance[1][1] = 400.0,
+        |c| c.sizes_nm = vec![[5.0, f64::NAN]],
+        |c| c.line_rates_hz = vec![-4.0],
+    ];
+    for (i, change) in changes.into_iter().enumerate() {
+        let mut bad = good.clone();
+        change(&mut bad);
+        assert!(bad.problem().is_some(), "{i}");
+    }
+    // Nominal coordinates are further off: a frame of 55 nm where 70 nm were asked for.
+    let mut nominal = good.clone();
+    nominal.gain_percent = 100.0 * (70.0 / 55.0 - 1.0);
+    assert!(nominal.problem().is_some());
+    nominal.coordinates = Coordinates::Nominal;
+    assert_eq!(nominal.problem(), None);
+
+    let simulator = Simulator::new(atoms(0)).unwrap();
+    let settings = Settings {
+        scanner: Some(far),
+        ..Settings::default()
+    };
+    let refused = measure_scan("a", &simulator.frame(0), &settings, None);
+    assert!(matches!(refused, Err(MeasureError::Calibration(_))));
+
+    for change in [f64::NAN, 0.0, -0.2, 1e9] {
+        let lattice = KnownLattice {
+            a_nm: change,
+            ..exact()
+        };
+        assert!(lattice.problem().is_some(), "{change}");
+        let frame = measure_scan("a", &simulator.frame(0), &Settings::default(), None).unwrap();
+        let found = calibrate(vec![frame], &lattice, 0.01, Grouping::Auto);
+        assert_eq!(found.err(), Some(CalibrateError::Cell));
+    }
+}
+
+/// Images of another lattice than the named one: 0.316 nm and not 0.246 nm.
+#[test]
+fn the_wrong_lattice_is_no_scanner() {
+    let mut set = drifting(3, 0.3);
+    set.sample.pattern = Pattern::Layer1;
+    set.sample.material = Material::named("MoS2").unwrap();
+    set.raster.sensors = true;
+    let problem = tried(&set).unwrap_err();
+    assert!(problem.contains("the common gain"), "{problem}");
 }
 
 fn calibrates(source: Source) -> bool {

@@ -61,6 +61,7 @@ fn graphene_on_boron_nitride() {
     let layers = Bilayer {
         stretched: &graphene,
         reference: &hbn,
+        waves: None,
     };
     let aligned = cell(&twisted(0.0), layers);
     assert!((aligned.wavelengths()[0] - 13.9).abs() < 0.05);
@@ -68,6 +69,7 @@ fn graphene_on_boron_nitride() {
     let table = Bilayer {
         stretched: &graphene,
         reference: &named("hBN"),
+        waves: None,
     };
     assert!((cell(&twisted(0.0), table).wavelengths()[0] - 14.0).abs() < 0.05);
     for degrees in [0.0_f64, 0.3, 1.0, 2.5, 10.0] {
@@ -111,6 +113,7 @@ fn dichalcogenide_heterobilayers() {
         let layers = Bilayer {
             stretched: upper,
             reference: lower,
+            waves: None,
         };
         let found = cell(&twisted(degrees), layers).wavelengths()[0];
         assert!((found - period).abs() < within, "{} {found}", layers.name());

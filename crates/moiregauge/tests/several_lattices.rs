@@ -129,3 +129,41 @@ fn what_is_not_there_is_not_found() {
         assert_eq!(found.err(), Some(expected), "{seed}");
     }
 }
+
+/// Cells of 2, √3 and √7 times the length at the angles of those vectors of a hexagonal lattice, and a little off: the
+/// first harmonics of one lie near higher ones of the other. Both are right within their errors, or refused with the
+/// reason.
+#[test]
+fn nearly_commensurate_lattices_are_measured_or_refused() {
+    let ratios = [
+        (2.0, 0.0),
+        (3f64.sqrt(), 30f64.to_radians()),
+        (7f64.sqrt(), 19.107f64.to_radians()),
+    ];
+    let offsets = [-0.03, -0.01, 0.0, 0.015, 0.04];
+    let pairs = ratios
+        .into_iter()
+        .flat_map(|(ratio, turn)| offsets.map(|off| (ratio, turn, off)));
+    for (i, (ratio, turn, off)) in pairs.enumerate() {
+        let seed = i as u64;
+        let angle = 0.618_034 * seed as f64;
+        let first = scene(192, 7.0, angle, Contrast::Spots, seed);
+        let contrast = if i % 2 == 0 {
+            Contrast::Spots
+        } else {
+            Contrast::Cosines
+        };
+        let mut second = scene(192, 7.0, angle, contrast, seed + 100);
+        changed(&mut second, 1.0 / (ratio * (1.0 + off)), turn + 0.5 * off);
+        let scenes = [first, second];
+        match separate(&scenes) {
+            Ok(found) => {
+                for scene in &scenes {
+                    let pull = pulls(scene, &found);
+                    assert!(pull.amax() < 5.0, "{ratio:.3} {off}: {pull:?}");
+                }
+            }
+            Err(error) => println!("{ratio:.3} {off}: {error}"),
+        }
+    }
+}

@@ -258,7 +258,9 @@ pub fn write(
         put(&format!("Title{}", index + 1), &channel.name);
     }
     let lines = [labels::describe(scan), labels::describe_channel(x)].concat();
-    for (key, value) in &lines {
+    // Keys of the format in the header of another one would contradict those above.
+    let others = fields::others(scan.metadata.clone(), &KEYS);
+    for (key, value) in lines.iter().chain(&others) {
         put(key, value);
     }
     let reaches = match x.span {

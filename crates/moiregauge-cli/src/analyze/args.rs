@@ -193,7 +193,7 @@ impl AnalyzeArgs {
         };
         let own = config::own_materials(self.materials.as_deref())?;
         self.layers(&mut s, &own)?;
-        s.lattice_angle = self.orientation.known().or(s.lattice_angle);
+        self.orientation.apply(&mut s);
         let by_user = [self.lattice_constant, self.poisson_ratio];
         if by_user.iter().any(Option::is_some) {
             anyhow::ensure!(
@@ -205,6 +205,7 @@ impl AnalyzeArgs {
         }
         if let Some(a) = self.lattice_constant {
             s.material.lattice_constant_nm = a;
+            s.layers_chosen = true;
         }
         if let Some(ratio) = self.poisson_ratio {
             s.material.poisson_ratio = ratio;
@@ -265,6 +266,7 @@ impl AnalyzeArgs {
             return Ok(());
         }
         s.moire_layers.clear();
+        s.layers_chosen = true;
         if pairs.len() == 1 {
             (s.material, s.substrate) = pairs.swap_remove(0);
         } else {

@@ -3,14 +3,16 @@
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
+use anyhow::Context as _;
 use indicatif::{ProgressBar, ProgressStyle};
 use moiregauge::analysis::Analysis;
 use moiregauge::caveat::Caveat;
 use moiregauge::series::{
-    MeasureError, MeasuredScan, Window, amplitude_of, analyse, choose_channel, common_window,
-    illustrate, measure_moires, sorted_moires,
+    MeasureError, MeasuredScan, Window, about_repeat, amplitude_of, analyse, choose_channel,
+    common_window, illustrate, measure_moires, sorted_moires,
 };
 use moiregauge::settings::Settings;
+use moiregauge_pipeline::{Repeated, distinct, names};
 use moiregauge_report::{FailedInput, InputFile, Provenance};
 use rayon::prelude::*;
 use sha2::{Digest as _, Sha256};
@@ -38,6 +40,8 @@ pub(crate) fn analyse_files(
     illustrated: bool,
     loud: bool,
 ) -> Result<Vec<Outcome>, Vec<FailedInput>> {
+    let (inputs, repeated) = distinct(inputs);
+    let inputs = inputs.as_slice();
     let window = match settings.overlap.then(|| overlap(inputs, settings, known)) {
         None => None,
         Some(Some(window)) => Some(window),
@@ -74,7 +78,7 @@ pub(crate) fn analyse_files(
                 files.push(file);
             }
             Err(error) => failed.push(FailedInput {
-                file: path.display().to_string(),
+                file: names::in_words(path),
                 error: format!("{error:#}"),
             }),
         }
@@ -94,13 +98,15 @@ pub(crate) fn analyse_files(
         .map(|(moire, scans)| {
             let settings = &settings.of_moire(moire);
             let mut analysis = analyse(scans, settings);
+            analysis.caveats.extend(given_again(&repeated));
             analysis
                 .caveats
                 .extend(other.as_ref().map(channel::Other::caveat));
             if illustrated {
                 analysis.sets.par_iter_mut().for_each(|set| {
                     set.illustration = set.scans.first().and_then(|first| {
-                        let reading = read_shown(Path::new(&first.file), settings, known).ok()?;
+                        let path = names::with_words(inputs, &first.file)?;
+                        let reading = read_shown(path, settings, known).ok()?;
                         illustrate(&reading.scan, first, settings)
                     });
                 });
@@ -111,6 +117,17 @@ pub(crate) fn analyse_files(
             }
         });
     Ok(outcomes.collect())
+}
+
+/// What has to be said of files that were named more than once.
+pub(crate) fn given_again(repeated: &[Repeated]) -> Vec<Caveat> {
+    let words = |again: &Repeated| {
+        let of = again.of.display().to_string();
+        about_repeat(&again.path.display().to_string(), &of)
+    };
+    let mut caveats: Vec<Caveat> = repeated.iter().map(words).collect();
+    caveats.dedup();
+    caveats
 }
 
 fn measure_all(
@@ -166,6 +183,7 @@ pub(crate) fn measure_file(
     for measured in &mut moires {
         measured.caveats.extend(caveats.iter().cloned());
         measured.set.clone_from(&set);
+        measured.digest = Some(input.sha256.clone());
     }
     Ok((moires, input))
 }
@@ -223,7 +241,7 @@ fn read_more(
     let (scan, replaced) = known.read(path, &bytes, &wanted)?;
     let hash = Sha256::digest(&bytes);
     let input = InputFile {
-        file: path.display().to_string(),
+        file: names::in_words(path),
         sha256: hexadecimal(&hash),
         bytes: bytes.len() as u64,
     };
@@ -238,6 +256,17 @@ fn read_more(
         scan,
         input,
     })
+}
+
+/// Reads an input again that the results know by the words of its path.
+pub(crate) fn read_again(
+    inputs: &[PathBuf],
+    words: &str,
+    settings: &Settings,
+    known: &Known,
+) -> anyhow::Result<Reading> {
+    let path = names::with_words(inputs, words).context("it is none of the inputs")?;
+    read(path, settings, known)
 }
 
 pub(crate) fn hexadecimal(bytes: &[u8]) -> String {

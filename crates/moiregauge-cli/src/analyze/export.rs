@@ -6,20 +6,27 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context as _, ensure};
 use moiregauge::analysis::{Analysis, ScanAnalysis};
 use moiregauge::series::corrected_images;
+use moiregauge_pipeline::sink::FolderSink;
 use moiregauge_report::FailedInput;
 use rayon::prelude::*;
 use spmfile::{LineDirection, WritableFormat};
 
 use super::chain;
-use super::files::write_all;
 use crate::convert::format_of;
 use crate::input::Known;
+use crate::outputs::write_all;
 
 /// A folder of corrected images and their format.
 #[derive(Clone, Debug)]
 pub(super) struct Export {
     folder: String,
     format: WritableFormat,
+}
+
+impl Export {
+    pub(super) fn folder(&self) -> &str {
+        &self.folder
+    }
 }
 
 /// `corrected.gwy` as the folder `corrected` and the format.
@@ -44,13 +51,17 @@ pub(super) fn parse(name: &str) -> anyhow::Result<Export> {
     })
 }
 
-/// Writes one image for each scan and line direction below `out`; what failed comes back.
+/// Writes one image for each scan and line direction; what failed comes back. Files are read again for that, and only
+/// for that.
 pub(super) fn write(
-    out: &Path,
+    sink: &FolderSink,
     exports: &[Export],
     analysis: &Analysis,
-    known: &Known,
+    from: (&[PathBuf], &Known),
 ) -> Vec<FailedInput> {
+    if exports.is_empty() {
+        return Vec::new();
+    }
     let mut names = HashSet::new();
     let scans: Vec<(String, &ScanAnalysis)> = analysis
         .sets
@@ -72,7 +83,7 @@ pub(super) fn write(
     scans
         .par_iter()
         .filter_map(|(name, scan)| {
-            let result = one(out, exports, (name, scan), analysis, known);
+            let result = one(sink, exports, (name, scan), analysis, from);
             result.err().map(|error| FailedInput {
                 file: scan.file.clone(),
                 error: format!("--export: {error:#}"),
@@ -82,14 +93,14 @@ pub(super) fn write(
 }
 
 fn one(
-    out: &Path,
+    sink: &FolderSink,
     exports: &[Export],
     (name, analysed): (&str, &ScanAnalysis),
     analysis: &Analysis,
-    known: &Known,
+    (inputs, known): (&[PathBuf], &Known),
 ) -> anyhow::Result<()> {
     let settings = &analysis.settings;
-    let reading = chain::read(&PathBuf::from(&analysed.file), settings, known)?;
+    let reading = chain::read_again(inputs, &analysed.file, settings, known)?;
     let images = corrected_images(&reading.scan, analysed, settings);
     ensure!(!images.is_empty(), "no image could be corrected");
     for image in images {
@@ -101,8 +112,56 @@ fn one(
         log.insert(0, format!("moiregauge {}", env!("CARGO_PKG_VERSION")));
         for Export { folder, format } in exports {
             let stem = format!("{folder}/{name}-{line}");
-            write_all(out, &spmfile::write(&image.scan, *format, &stem, &log)?)?;
+            write_all(
+                sink,
+                "",
+                &spmfile::write(&image.scan, *format, &stem, &log)?,
+            )?;
         }
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use moiregauge::series::{analyse, measure_moires};
+    use moiregauge::settings::Settings;
+    use moiregauge::simulate::{Simulation, Simulator};
+    use moiregauge_pipeline::sink::Target;
+
+    /// The files are gone after they were measured: that is noticed where an export needs them, and not otherwise.
+    #[test]
+    fn files_are_read_again_only_for_exports() {
+        let mut set = Simulation::default();
+        set.raster.pixels = [128; 2];
+        set.raster.scans = 2;
+        let simulator = Simulator::new(set).unwrap();
+        let settings = Settings {
+            drift_draws: 0,
+            strain_draws: 0,
+            ..Settings::default()
+        };
+        let files = [PathBuf::from("gone-1.spm"), PathBuf::from("gone-2.spm")];
+        let measured = files.iter().enumerate().map(|(index, file)| {
+            let frame = simulator.frame(index);
+            let name = file.display().to_string();
+            measure_moires(&name, &frame, &settings, None)
+                .unwrap()
+                .remove(0)
+        });
+        let analysis = analyse(measured.collect(), &settings);
+        let out = tempfile::tempdir().unwrap();
+        let sink = crate::outputs::folder(&Target {
+            folder: out.path(),
+            kind: "analyze",
+            names: &[],
+            inputs: &[],
+            force: false,
+        });
+        let (sink, known) = (sink.unwrap(), Known::default());
+        let failed = |exports: &[Export]| write(&sink, exports, &analysis, (&files, &known)).len();
+        assert_eq!(failed(&[]), 0);
+        assert_eq!(failed(&[parse("corrected.gwy").unwrap()]), 2);
+    }
 }

@@ -1,47 +1,57 @@
-//! Writing results, never over older ones without leave.
+//! Where results go.
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context as _, ensure};
+use moiregauge_pipeline::sink::{FolderSink, Target};
 
-/// An error if the folder holds the results of an earlier analysis.
-pub(super) fn refuse_overwriting(out: &Path, force: bool) -> anyhow::Result<()> {
-    ensure!(
-        !out.exists() || out.is_dir(),
-        "--out {} is a file; a folder is expected",
-        out.display()
-    );
-    ensure!(
-        force
-            || !["", "moire-1"]
-                .iter()
-                .any(|of| out.join(of).join("results.json").exists()),
-        "{} already holds results; give another --out, or --force to write over them",
-        out.display()
-    );
-    Ok(())
+use super::AnalyzeArgs;
+use super::export::Export;
+
+/// What may be written at the top of the folder of results; folders end with a slash.
+const NAMES: [&str; 12] = [
+    "results.json",
+    "report.html",
+    "columns.md",
+    "vectors.csv",
+    "vectors.parquet",
+    "scans.csv",
+    "scans.parquet",
+    "sets.csv",
+    "sets.parquet",
+    "budget.csv",
+    "budget.parquet",
+    "figures/",
+];
+
+/// Makes the folder of results ready, before the work.
+pub(super) fn sink(
+    args: &AnalyzeArgs,
+    exports: &[Export],
+    inputs: &[PathBuf],
+) -> anyhow::Result<FolderSink> {
+    let moires = (1..=6).map(|n| format!("moire-{n}/"));
+    let exported = exports.iter().map(|e| format!("{}/", e.folder()));
+    let names: Vec<String> = report_names().chain(moires).chain(exported).collect();
+    crate::outputs::folder(&Target {
+        folder: &args.out,
+        kind: "analyze",
+        names: &names,
+        inputs,
+        force: args.force,
+    })
 }
 
-/// Where the results of each of `moires` moirés go.
-pub(super) fn folders(out: &Path, moires: usize) -> Vec<PathBuf> {
+/// What the report of an analysis consists of.
+pub(crate) fn report_names() -> impl Iterator<Item = String> {
+    NAMES.map(str::to_owned).into_iter()
+}
+
+/// Where the results of each of `moires` moirés go within the folder.
+pub(super) fn within(moires: usize) -> Vec<String> {
     if moires == 1 {
-        return vec![out.to_owned()];
+        return vec![String::new()];
     }
-    (1..=moires)
-        .map(|n| out.join(format!("moire-{n}")))
-        .collect()
-}
-
-/// Writes named files into a folder.
-pub(crate) fn write_all(out: &Path, files: &[(String, Vec<u8>)]) -> anyhow::Result<()> {
-    for (name, bytes) in files {
-        let path = out.join(name);
-        let folder = path.parent().unwrap_or(out);
-        std::fs::create_dir_all(folder)
-            .with_context(|| format!("cannot make the folder {}", folder.display()))?;
-        std::fs::write(&path, bytes).with_context(|| format!("cannot write {}", path.display()))?;
-    }
-    Ok(())
+    (1..=moires).map(|n| format!("moire-{n}/")).collect()
 }
 
 /// The file to open first.

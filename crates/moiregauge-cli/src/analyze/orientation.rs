@@ -5,10 +5,10 @@ use std::path::PathBuf;
 use anyhow::{Context as _, ensure};
 use clap::ValueEnum;
 use moiregauge::series::{AtomicOrientation, atomic_orientation};
-use moiregauge::settings::{KnownOrientation, LatticeDirection, Method, Settings};
+use moiregauge::settings::{KnownOrientation, LatticeDirection, Method, Settings, TwistSense};
 use moiregauge_report::InputFile;
 
-use super::chain::measure_file;
+use super::chain::{given_again, measure_file};
 use crate::info::expand;
 use crate::input::KnownArgs;
 
@@ -32,6 +32,13 @@ pub(crate) struct OrientationArgs {
     /// the scans: the program measures the orientation. Best up and down, which takes out their own drift
     #[arg(long, value_name = "FILE", num_args = 1.., conflicts_with_all = ["lattice_angle", "lattice_angle_of"])]
     atomic: Vec<PathBuf>,
+    /// Orientation of the other layer, as --lattice-angle: of two equal layers, one orientation leaves the sense
+    /// of the twist open, both tell it
+    #[arg(long, value_name = "DEG±SIGMA", allow_hyphen_values = true, value_parser = parse_angle)]
+    lattice_angle_2: Option<Angle>,
+    /// The sense of the twist of layer 2 against layer 1, if it is known: positive is counter-clockwise
+    #[arg(long, value_enum)]
+    twist_sense: Option<SenseArg>,
     /// Channel that shows the atoms [default: as --channel]
     #[arg(long, value_name = "NAME", requires = "atomic")]
     atomic_channel: Option<String>,
@@ -45,6 +52,24 @@ pub(crate) enum DirectionArg {
     Atomic,
     /// The reciprocal vector, 30° from it: an armchair edge, a spot of the Fourier transform
     Reciprocal,
+}
+
+/// The sense of a twist.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum SenseArg {
+    /// Layer 2 is turned counter-clockwise against layer 1
+    Positive,
+    /// Layer 2 is turned clockwise
+    Negative,
+}
+
+impl From<SenseArg> for TwistSense {
+    fn from(sense: SenseArg) -> Self {
+        match sense {
+            SenseArg::Positive => Self::Positive,
+            SenseArg::Negative => Self::Negative,
+        }
+    }
 }
 
 /// Degrees and σ.
@@ -61,8 +86,23 @@ impl From<DirectionArg> for LatticeDirection {
 }
 
 impl OrientationArgs {
+    /// What was given beside the orientation of one layer: that of the other one, and the sense of the twist.
+    pub(super) fn apply(&self, settings: &mut Settings) {
+        settings.lattice_angle = self.known().or(settings.lattice_angle);
+        if let Some(Angle([angle_deg, sigma_deg])) = self.lattice_angle_2 {
+            let first = settings.lattice_angle.filter(|_| self.atomic.is_empty());
+            settings.lattice_angle_2 = Some(KnownOrientation {
+                angle_deg,
+                sigma_deg,
+                layer: 3 - first.map_or(self.lattice_angle_layer, |known| known.layer),
+                of: self.lattice_angle_of.into(),
+            });
+        }
+        settings.twist_sense = self.twist_sense.map(Into::into).or(settings.twist_sense);
+    }
+
     /// The orientation that was given.
-    pub(super) fn known(&self) -> Option<KnownOrientation> {
+    fn known(&self) -> Option<KnownOrientation> {
         let Angle([angle_deg, sigma_deg]) = self.lattice_angle?;
         Some(KnownOrientation {
             angle_deg,
@@ -100,6 +140,7 @@ impl OrientationArgs {
             moires: 1,
             ..settings.clone()
         };
+        let (paths, repeated) = moiregauge_pipeline::distinct(&paths);
         let known = known.of(&paths);
         let (mut scans, mut files) = (Vec::new(), Vec::new());
         for path in &paths {
@@ -113,13 +154,14 @@ impl OrientationArgs {
             1 => layers.reference,
             _ => layers.stretched,
         };
-        let found = atomic_orientation(
+        let mut found = atomic_orientation(
             &scans,
             material,
             self.lattice_angle_layer,
             &settings.calibration,
         )
         .context("--atomic")?;
+        found.caveats.extend(given_again(&repeated));
         ensure!(
             found.angle.sigma.is_finite(),
             "--atomic: the images do not tell the orientation"

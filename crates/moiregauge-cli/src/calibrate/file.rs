@@ -118,7 +118,8 @@ pub(crate) fn read(path: &Path) -> anyhow::Result<Calibration> {
         of(),
         file.schema
     );
-    if let Some(problem) = file.calibration.problem() {
+    let lattice = file.known_lattice.problem();
+    if let Some(problem) = file.calibration.problem().or(lattice) {
         anyhow::bail!("{}: {problem}", of());
     }
     Ok(file.calibration)

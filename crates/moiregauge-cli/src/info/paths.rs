@@ -3,6 +3,7 @@
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
+use moiregauge_pipeline::names::in_words;
 use moiregauge_report::FailedInput;
 
 use crate::session::{channels_of_one_frame, one_per_frame};
@@ -34,14 +35,14 @@ pub(crate) fn inputs(paths: &[PathBuf]) -> (Vec<PathBuf>, Vec<FailedInput>) {
         match path {
             Ok(path) => files.push(path),
             Err((path, error)) => failed.push(FailedInput {
-                file: path.display().to_string(),
+                file: in_words(&path),
                 error,
             }),
         }
     }
     let (files, others) = channels_of_one_frame(files);
     failed.extend(others.into_iter().map(|(file, first)| FailedInput {
-        file: file.display().to_string(),
+        file: in_words(&file),
         error: format!(
             "another channel of the frame of {}, which is measured already; give the files of one channel, as in \
              '*.Z_mtrx'",

@@ -2,25 +2,27 @@
 
 use std::fmt::Write as _;
 
-use anyhow::Context as _;
+use std::path::PathBuf;
+
 use moiregauge::analysis::{Analysis, Picture};
 use moiregauge::caveat::Caveat;
 use moiregauge::estimate::Estimate;
 use moiregauge::map::{Agreement, DriftChange, TwistStrainMap, UsedHarmonic};
 use moiregauge::settings::Settings;
+use moiregauge_pipeline::sink::{FolderSink, Target};
 use moiregauge_report::results::{
     Conventions, MapDetailsResult, MapResults, MappedImage, TwistStrainResult, mask_counts,
     quantities,
 };
 use moiregauge_report::{
-    Provenance, figure_files, map_figures, map_page, map_scan, map_scans, map_tables, plus_minus,
-    two_digits,
+    Provenance, figure_files, layers, map_figures, map_page, map_scan, map_scans, map_tables,
+    plus_minus, two_digits,
 };
 use spmfile::{LineDirection, WritableFormat};
 
 use super::domains::Domains;
 use super::{MapArgs, regions, stripes};
-use crate::analyze::write_all;
+use crate::outputs::{self, commit, write_all};
 use crate::say::say;
 
 /// Quantities whose trend is told on the screen.
@@ -48,29 +50,46 @@ pub(super) struct Made {
     pub(super) caveats: Vec<Caveat>,
 }
 
+/// What may be written at the top of the folder; folders of which others may have files, too, end with a slash.
+const NAMES: [&str; 11] = [
+    "map.json",
+    "map.zarr",
+    "map.gwy",
+    "report.html",
+    "columns.md",
+    "regions.csv",
+    "profiles.csv",
+    "devices.csv",
+    "domains.csv",
+    "nodes.csv",
+    "figures/",
+];
+
+/// Makes the folder ready, before the work.
+pub(super) fn sink(args: &MapArgs, inputs: &[PathBuf]) -> anyhow::Result<FolderSink> {
+    outputs::folder(&Target {
+        folder: args.analyze.out(),
+        kind: "map",
+        names: &NAMES.map(str::to_owned),
+        inputs,
+        force: args.analyze.force(),
+    })
+}
+
 /// Writes everything and says what there is.
-pub(super) fn write(made: &Made, args: &MapArgs) -> anyhow::Result<()> {
+pub(super) fn write(made: &Made, args: &MapArgs, sink: FolderSink) -> anyhow::Result<()> {
     let (map, out) = (&made.map, args.analyze.out());
     // First, lest a region beyond the map leave half of the files.
     let (mut details, doubts) = args.regions.answer(map)?;
     let log = vec![format!("moiregauge {} map", env!("CARGO_PKG_VERSION"))];
-    let group = out.join("map.zarr");
-    if group.join("zarr.json").is_file() {
-        std::fs::remove_dir_all(&group)
-            .with_context(|| format!("cannot replace {}", group.display()))?;
-    }
     // One array at a time; the group and its coordinates are the same every time.
     for scan in map_scans(map) {
-        write_all(
-            out,
-            &spmfile::write(&scan, WritableFormat::Zarr, "map", &log)?,
-        )?;
+        let files = spmfile::write(&scan, WritableFormat::Zarr, "map", &log)?;
+        write_all(&sink, "", &files)?;
     }
     if map.grid.len() <= MANY {
-        write_all(
-            out,
-            &spmfile::write(&map_scan(map), WritableFormat::Gwy, "map", &log)?,
-        )?;
+        let files = spmfile::write(&map_scan(map), WritableFormat::Gwy, "map", &log)?;
+        write_all(&sink, "", &files)?;
     }
     details.picture.clone_from(&made.picture);
     details.domains.clone_from(&made.domains.map);
@@ -89,7 +108,8 @@ pub(super) fn write(made: &Made, args: &MapArgs) -> anyhow::Result<()> {
         }
         files.extend(figure_files(&figures, choice)?);
     }
-    write_all(out, &files)?;
+    write_all(&sink, "", &files)?;
+    commit(sink)?;
     if args.analyze.json() {
         say(&format!("{}\n", serde_json::to_string_pretty(&results)?))?;
     } else if args.analyze.is_loud() {
@@ -165,6 +185,9 @@ pub(super) fn image(
 /// What is said on the screen.
 pub(super) fn summary(results: &MapResults) -> String {
     let mut text = String::new();
+    if results.stripes.is_none() {
+        let _ = writeln!(text, "Layers: {}", layers(&results.settings));
+    }
     let _ = writeln!(
         text,
         "{} × {} nodes, window {} nm (resolution {} nm)",

@@ -239,10 +239,11 @@ pub(super) fn summary(details: &MapDetailsResult) -> String {
         let percent = |v: Option<f64>| v.map_or_else(|| "–".to_owned(), |v| format!("{v:.1}"));
         let _ = writeln!(
             text,
-            "twist {} ± {}°: {} % of the good area ({} to {} % at 2 σ)",
+            "twist {} ± {}°: {} % of the good area (± {} % by smoothing; {} to {} % at 2 σ)",
             w.twist_deg,
             w.within_deg,
             percent(w.corrected_percent),
+            percent(w.blur_percent),
             percent(w.certain_percent),
             percent(w.possible_percent)
         );

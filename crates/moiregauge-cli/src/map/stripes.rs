@@ -8,6 +8,7 @@ use moiregauge::caveat::Caveat;
 use moiregauge::map::{Resolution, SampledStripes};
 use moiregauge::series::{ScanStripes, channels_by_preference, stripes_in_short, stripes_of_scan};
 use moiregauge::settings::Settings;
+use moiregauge_pipeline::sink::FolderSink;
 use moiregauge_report::results::{
     Conventions, MapDetailsResult, MapResults, StripesResult, mask_counts,
 };
@@ -18,8 +19,9 @@ use moiregauge_report::{
 use spmfile::{LineDirection, WritableFormat};
 
 use super::{MapArgs, MapMethodArg, output};
-use crate::analyze::{read, write_all};
+use crate::analyze::read;
 use crate::input::Known;
+use crate::outputs::{commit, write_all};
 use crate::say::say;
 
 /// Patterns beyond this share of the power of local stripes are one wave.
@@ -233,17 +235,12 @@ fn doubts(found: &ScanStripes, file: &str, caveats: &mut Vec<Caveat>) {
 }
 
 /// Writes everything and says what there is.
-pub(super) fn write(striped: &Striped, args: &MapArgs) -> anyhow::Result<()> {
+pub(super) fn write(striped: &Striped, args: &MapArgs, sink: FolderSink) -> anyhow::Result<()> {
     let (stripes, out) = (&striped.found.stripes, args.analyze.out());
     let log = vec![format!("moiregauge {} map", env!("CARGO_PKG_VERSION"))];
-    let group = out.join("map.zarr");
-    if group.join("zarr.json").is_file() {
-        std::fs::remove_dir_all(&group)
-            .with_context(|| format!("cannot replace {}", group.display()))?;
-    }
     let scan = stripe_scan(stripes);
     for format in [WritableFormat::Zarr, WritableFormat::Gwy] {
-        write_all(out, &spmfile::write(&scan, format, "map", &log)?)?;
+        write_all(&sink, "", &spmfile::write(&scan, format, "map", &log)?)?;
     }
     let results = results(striped);
     let mut files = vec![("map.json".to_owned(), serde_json::to_vec_pretty(&results)?)];
@@ -256,7 +253,8 @@ pub(super) fn write(striped: &Striped, args: &MapArgs) -> anyhow::Result<()> {
         }
         files.extend(figure_files(&figures, choice)?);
     }
-    write_all(out, &files)?;
+    write_all(&sink, "", &files)?;
+    commit(sink)?;
     if args.analyze.json() {
         say(&format!("{}\n", serde_json::to_string_pretty(&results)?))?;
     } else if args.analyze.is_loud() {

@@ -1,8 +1,8 @@
-//! Surveys: images too large for memory, mapped band by band. Finished bands stay in the folder of the
-//! results until the map is complete, so that an interrupted run goes on where it stopped.
+//! Surveys: images too large for memory, mapped band by band. Finished bands are kept beside the results until the map
+//! is complete, so that an interrupted run goes on where it stopped; one that is damaged is made again.
 
 use std::io::Read as _;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use anyhow::Context as _;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -15,6 +15,8 @@ use moiregauge::image::Image;
 use moiregauge::map::{Mask, Resolution, TwistStrainMap};
 use moiregauge::series::{SurveyPlan, choose_channel, nominal_geometry};
 use moiregauge::settings::Settings;
+use moiregauge_pipeline::names::in_words;
+use moiregauge_pipeline::sink::{FolderSink, Part, build};
 use moiregauge_report::InputFile;
 use nalgebra::{Matrix2, Vector2};
 use sha2::{Digest as _, Sha256};
@@ -107,31 +109,39 @@ impl Large {
         }))
     }
 
-    /// Maps band by band, as `first` of the same survey was. Finished bands are kept in `out`, and those of an
-    /// earlier run are taken; [`forget`] removes them when all is written.
+    /// Maps band by band, as `first` of the same survey was. Finished bands are kept until all is written, and those of
+    /// an earlier run of the same program are taken.
     pub(super) fn map(
         &self,
         (settings, resolution): (&Settings, &Resolution),
         first: Option<&SurveyPlan>,
-        out: &Path,
+        sink: &FolderSink,
         loud: bool,
     ) -> anyhow::Result<(TwistStrainMap, SurveyPlan)> {
         let read = |block| self.source.block(block);
         let place = (&self.geometry, self.timing.as_ref());
         let plan = SurveyPlan::new(place, (settings, resolution), first, &read)?;
-        let folder = out.join("bands");
-        std::fs::create_dir_all(&folder)
-            .with_context(|| format!("cannot make the folder {}", folder.display()))?;
-        let key = key(&self.input, settings, resolution, &plan)?;
+        let key = key(self, settings, resolution, &plan)?;
         let progress = progress(plan.bands(), loud);
         let mut whole: Option<TwistStrainMap> = None;
         for band in 0..plan.bands() {
-            let path = folder.join(format!("{key}-{band:04}"));
-            let map = if let Some(kept) = load(&path, &plan) {
+            let name = format!("{key}-{band:04}");
+            let kept = match sink.kept(&name) {
+                Part::Whole(bytes) => decoded(&bytes, &plan),
+                Part::Absent => None,
+                Part::Damaged => {
+                    eprintln!(
+                        "band {} was damaged on the disk and is mapped again",
+                        band + 1
+                    );
+                    None
+                }
+            };
+            let map = if let Some(kept) = kept {
                 kept
             } else {
                 let mut map = plan.band(band, &read)?;
-                keep(&path, &mut map)?;
+                sink.keep(&name, &encoded(&mut map))?;
                 map
             };
             let all = whole.get_or_insert_with(|| plan.start(&map.grid));
@@ -184,11 +194,6 @@ impl Large {
     }
 }
 
-/// Removes the bands.
-pub(super) fn forget(out: &Path) {
-    std::fs::remove_dir_all(out.join("bands")).ok();
-}
-
 fn timing(scan: &Scan, channel: &Channel) -> Option<Timing> {
     let line = channel.line_direction.unwrap_or(LineDirection::Trace);
     Timing::of_scan(scan, channel.columns, scan.frame_direction?, line)
@@ -209,32 +214,35 @@ fn identity(path: &Path) -> anyhow::Result<InputFile> {
         bytes += count as u64;
     }
     Ok(InputFile {
-        file: path.display().to_string(),
+        file: in_words(path),
         sha256: crate::analyze::hexadecimal(&hash.finalize()),
         bytes,
     })
 }
 
-/// What a band depends on: input, settings, resolution, the first image of the survey (window and labelling), program.
+/// What a band depends on: input, settings, resolution, geometry and times of the image, the first image of the survey
+/// (window and labelling), and the program to its last bit.
 fn key(
-    input: &InputFile,
+    large: &Large,
     settings: &Settings,
     resolution: &Resolution,
     plan: &SurveyPlan,
 ) -> anyhow::Result<String> {
     let mut hash = Sha256::new();
-    hash.update(&input.sha256);
+    hash.update(&large.input.sha256);
+    hash.update(format!("{:?} {:?}", large.geometry, large.timing));
     hash.update(format!("{} {}", plan.window_nm, plan.whole));
     hash.update(serde_json::to_vec(settings)?);
-    hash.update(format!("{resolution:?} {}", env!("CARGO_PKG_VERSION")));
+    let build = build().context("the program cannot read itself: bands cannot be kept")?;
+    hash.update(format!("{resolution:?} {build}"));
     Ok(crate::analyze::hexadecimal(&hash.finalize())[..16].to_owned())
 }
 
 /// Numbers of a band's head: columns, rows, origin, steps.
 const HEAD: usize = 8;
 
-/// Writes a band: head in double precision, masks, then all planes in single precision, little endian.
-fn keep(path: &Path, map: &mut TwistStrainMap) -> anyhow::Result<()> {
+/// A band as bytes: head in double precision, masks, then all planes in single precision, little endian.
+fn encoded(map: &mut TwistStrainMap) -> Vec<u8> {
     let grid = map.grid;
     let head: [f64; HEAD] = [
         grid.size[0] as f64,
@@ -251,17 +259,11 @@ fn keep(path: &Path, map: &mut TwistStrainMap) -> anyhow::Result<()> {
     for plane in map.planes_mut() {
         bytes.extend(plane.iter().flat_map(|v| v.to_le_bytes()));
     }
-    // Renamed when complete, lest an interrupted write pass for a band.
-    let unfinished: PathBuf = path.with_extension("part");
-    std::fs::write(&unfinished, bytes)
-        .with_context(|| format!("cannot write {}", unfinished.display()))?;
-    std::fs::rename(&unfinished, path)?;
-    Ok(())
+    bytes
 }
 
-/// A band that was kept; `None` if there is none, or it is damaged.
-fn load(path: &Path, plan: &SurveyPlan) -> Option<TwistStrainMap> {
-    let bytes = std::fs::read(path).ok()?;
+/// The band; `None` if it is none.
+fn decoded(bytes: &[u8], plan: &SurveyPlan) -> Option<TwistStrainMap> {
     let (head, rest) = bytes.split_at_checked(8 * HEAD)?;
     let head: Vec<f64> = head
         .as_chunks::<8>()

@@ -11,7 +11,7 @@ use moiregauge::strain::{Orientation, Stacking};
 use nalgebra::Matrix2;
 
 use super::Question;
-use crate::analyze::{Angle, ConventionArg, DirectionArg, parse_angle};
+use crate::analyze::{Angle, ConventionArg, DirectionArg, SenseArg, parse_angle};
 use crate::config;
 
 /// The moiré of two layers, or the layers behind a moiré
@@ -65,6 +65,13 @@ pub(crate) struct MoireArgs {
     /// The vector it is that of
     #[arg(long, value_enum, default_value_t = DirectionArg::Atomic)]
     lattice_angle_of: DirectionArg,
+    /// Backwards: orientation of the other layer with its standard uncertainty; of two equal layers one orientation
+    /// leaves the sense of the twist open
+    #[arg(long, value_name = "DEG±SIGMA", allow_hyphen_values = true, value_parser = parse_angle, requires_all = ["lattice_angle", "vectors"])]
+    lattice_angle_2: Option<Angle>,
+    /// Backwards: the sense of the twist, if it is known
+    #[arg(long, value_enum, requires = "lattice_angle", conflicts_with = "twist")]
+    twist_sense: Option<SenseArg>,
     /// Three wavelengths, nm; --meaning has to say what they are
     #[arg(
         long,
@@ -94,6 +101,9 @@ pub(crate) struct MoireArgs {
     /// Draw the cell: a name that ends in .svg or .png
     #[arg(long, value_name = "FILE")]
     pub(super) figure: Option<PathBuf>,
+    /// Write over a figure that exists
+    #[arg(long, requires = "figure")]
+    pub(super) force: bool,
     /// Print JSON
     #[arg(long)]
     pub(super) json: bool,
@@ -130,6 +140,15 @@ impl MoireArgs {
             material,
             substrate,
             lattice_angle: self.orientation()?,
+            lattice_angle_2: self.lattice_angle_2.map(|Angle([angle_deg, sigma_deg])| {
+                KnownOrientation {
+                    angle_deg,
+                    sigma_deg,
+                    layer: 3 - self.lattice_angle_layer,
+                    of: self.lattice_angle_of.into(),
+                }
+            }),
+            twist_sense: self.twist_sense.map(Into::into),
             strain_convention: self
                 .strain_convention
                 .map_or(Settings::default().strain_convention, Into::into),

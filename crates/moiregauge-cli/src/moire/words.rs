@@ -5,8 +5,11 @@ use std::fmt::Write as _;
 use moiregauge::estimate::Estimate;
 use moiregauge::material::Material;
 use moiregauge::readings::Readings;
-use moiregauge::strain::Branch;
+use moiregauge::strain::{Branch, StrainTensor};
 use moiregauge_report::{CellResult, MoireDocument, fixed, plus_minus};
+
+/// Readings by other pairs of waves that are printed.
+const SHOWN: usize = 8;
 
 /// The cell, and what it means.
 pub(super) fn answer(document: &MoireDocument, readings: Option<&Readings>, axes: &str) -> String {
@@ -80,7 +83,23 @@ fn meaning(text: &mut String, document: &MoireDocument, readings: &Readings, axe
             sigma.unwrap_or(f64::INFINITY)
         );
     }
-    for branch in &readings.solutions {
+    let first = readings.solutions.first().map(|b| b.name);
+    let (own, others): (Vec<&Branch>, Vec<&Branch>) = readings
+        .solutions
+        .iter()
+        .partition(|b| readings.naming.is_none() || Some(b.name) == first);
+    for branch in own {
+        solution(text, branch);
+    }
+    let others: Vec<&&Branch> = others.iter().filter(|b| b.twist >= 0.0).collect();
+    if !others.is_empty() {
+        let _ = writeln!(
+            text,
+            "the same lattice by other pairs of its waves (θ > 0; all with up to {:.2} % of strain are in --json):",
+            100.0 * readings.complete_to
+        );
+    }
+    for branch in others.into_iter().take(SHOWN) {
         solution(text, branch);
     }
     if let Some(found) = &readings.degeneracy {
@@ -102,26 +121,12 @@ fn meaning(text: &mut String, document: &MoireDocument, readings: &Readings, axe
         );
     }
     if let Some(tensor) = &readings.tensor {
-        let best = &tensor.best;
         let percent = |e: Estimate| plus_minus(e.scaled(100.0));
-        let _ = writeln!(
-            text,
-            "with the orientation of the layer:\n  twist {}°, mean strain {} %, shear part {} %{}",
-            plus_minus(best.twist().scaled(degree)),
-            percent(best.mean()),
-            percent(best.shear()),
-            best.axis_lab().map_or_else(String::new, |a| format!(
-                ", axis {}°",
-                plus_minus(a.scaled(degree))
-            ))
-        );
-        for split in best.splits(tensor.poisson_ratio) {
-            let _ = writeln!(
-                text,
-                "  = uniaxial {} % and biaxial {} %",
-                percent(split.uniaxial),
-                percent(split.biaxial)
-            );
+        text.push_str("with the orientation of the layer:\n");
+        strain_tensor(text, &tensor.best, tensor.poisson_ratio);
+        if let Some(opposite) = &tensor.opposite {
+            text.push_str("  as good, with the other sense of the twist:\n");
+            strain_tensor(text, &opposite.found, tensor.poisson_ratio);
         }
         for other in &tensor.alternatives {
             let _ = writeln!(
@@ -131,6 +136,30 @@ fn meaning(text: &mut String, document: &MoireDocument, readings: &Readings, axe
                 percent(other.mean())
             );
         }
+    }
+}
+
+fn strain_tensor(text: &mut String, found: &StrainTensor, poisson_ratio: f64) {
+    let degree = 1f64.to_degrees();
+    let percent = |e: Estimate| plus_minus(e.scaled(100.0));
+    let _ = writeln!(
+        text,
+        "  twist {}°, mean strain {} %, shear part {} %{}",
+        plus_minus(found.twist().scaled(degree)),
+        percent(found.mean()),
+        percent(found.shear()),
+        found.axis_lab().map_or_else(String::new, |a| format!(
+            ", axis {}°",
+            plus_minus(a.scaled(degree))
+        ))
+    );
+    for split in found.splits(poisson_ratio) {
+        let _ = writeln!(
+            text,
+            "  = uniaxial {} % and biaxial {} %",
+            percent(split.uniaxial),
+            percent(split.biaxial)
+        );
     }
 }
 

@@ -23,9 +23,10 @@ pub(super) fn conditions(paths: &[PathBuf]) -> anyhow::Result<Simulation> {
         strain_draws: 0,
         ..Settings::default()
     };
+    let found: Result<Vec<PathBuf>, _> = expand(paths).into_iter().collect();
+    let found = found.map_err(|(path, error)| anyhow::anyhow!("{}: {error}", path.display()))?;
     let mut scans = Vec::new();
-    for path in expand(paths) {
-        let path = path.map_err(|(path, error)| anyhow::anyhow!("{}: {error}", path.display()))?;
+    for path in moiregauge_pipeline::distinct(&found).0 {
         let (mut moires, _) = measure_file(&path, &[], (&settings, &Known::default()), None)
             .with_context(|| format!("{}", path.display()))?;
         scans.push(moires.swap_remove(0));
@@ -40,6 +41,7 @@ pub(super) fn conditions(paths: &[PathBuf]) -> anyhow::Result<Simulation> {
     let scans: Vec<&MeasuredScan> = set
         .scans
         .iter()
+        .filter(|s| s.excluded.is_none())
         .filter_map(|s| scans.iter().find(|m| m.file == s.file))
         .collect();
     let lines: Vec<&MeasuredLine> = scans.iter().flat_map(|s| &s.lines).collect();

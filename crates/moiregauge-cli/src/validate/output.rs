@@ -9,6 +9,15 @@ use serde::Serialize;
 
 use super::compare::{Compared, Comparison, QUANTITIES};
 
+/// What is written.
+pub(super) const NAMES: [&str; 5] = [
+    "validation.json",
+    "sets.csv",
+    "conditions.toml",
+    "pulls.png",
+    "pulls.svg",
+];
+
 /// The document `validation.json`.
 #[derive(Serialize)]
 pub(super) struct Validation {

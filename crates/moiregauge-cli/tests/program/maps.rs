@@ -85,7 +85,7 @@ fn maps_of_one_lattice_show_its_twist() {
         let there = folder.path().join(name);
         assert!(there.join("map.zarr/twist/zarr.json").exists(), "{name}");
         assert!(there.join("map.gwy").exists(), "{name}");
-        assert!(!there.join("bands").exists(), "{name}");
+        assert!(!there.join("moiregauge-unfinished").exists(), "{name}");
     }
 }
 

@@ -41,7 +41,7 @@ struct Page<'a> {
     resolution: [String; 2],
     regions: Vec<Area>,
     devices: Vec<Area>,
-    wanted: Option<[String; 6]>,
+    wanted: Option<[String; 7]>,
     /// Number, share, good nodes, wavelength and direction of the fit, coherence, chance of noise.
     stripes: Vec<[String; 7]>,
     /// Names and values.
@@ -219,6 +219,7 @@ pub fn map_page(
                 plain(w.measured_percent, 1),
                 plain(w.certain_percent, 1),
                 plain(w.possible_percent, 1),
+                plain(w.blur_percent, 1),
             ]
         }),
         stripes: results.stripes.as_ref().map_or_else(Vec::new, stripes),

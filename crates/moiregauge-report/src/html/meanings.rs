@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::words::{plain, shown, statistical};
 use crate::draw::scale::fixed;
-use crate::results::{ReadingsResult, SolutionResult, StrainTensorResult, TensorNumbers};
+use crate::results::{NamesResult, ReadingsResult, SolutionResult, SplitResult, TensorNumbers};
 
 /// The readings of a lattice.
 #[derive(Debug, Serialize)]
@@ -17,9 +17,13 @@ pub(super) struct Meanings {
     choices: Vec<[String; 3]>,
     /// Isotropic strain and what it does to the twist.
     shifts: Vec<[String; 2]>,
+    /// Names of the lattice that are open, with what decided: chosen by, then twist and strain of each.
+    names: Option<(String, Vec<[String; 2]>)>,
     prior: String,
     interval: Option<[String; 2]>,
     tensor: Option<Tensor>,
+    /// The tensor for the other sense of the twist, and the magnitudes that are open, where the sense is.
+    other_sense: Option<(Tensor, [String; 2])>,
 }
 
 /// The strain tensor.
@@ -44,14 +48,32 @@ impl Meanings {
             .solutions
             .iter()
             .filter(|s| !s.strain_dominated && s.twist_deg.value.is_some_and(|t| t > 0.0))
+            .filter(|s| {
+                readings
+                    .names
+                    .as_ref()
+                    .is_none_or(|n| n.names[0].waves == s.waves)
+            })
             .map(choice)
             .collect();
         let headline = match &readings.strain_tensor {
-            Some(tensor) => Some([
-                "with the orientation of a layer".to_owned(),
-                format!("({})°", shown(tensor.found.twist_deg)),
-                format!("({})°", statistical(tensor.found.twist_deg)),
-            ]),
+            Some(tensor) => {
+                let twist = |e| format!("({})°", shown(e));
+                let part = |e| format!("({})°", statistical(e));
+                let first = tensor.found.twist_deg;
+                Some(match &tensor.other_sense {
+                    None => [
+                        "with the orientation of a layer".to_owned(),
+                        twist(first),
+                        part(first),
+                    ],
+                    Some(other) => [
+                        "with the orientation of a layer; the sense is open".to_owned(),
+                        format!("{} or {}", twist(first), twist(other.found.twist_deg)),
+                        format!("{} or {}", part(first), part(other.found.twist_deg)),
+                    ],
+                })
+            }
             None if readings.layers_differ && !choices.is_empty() => {
                 let twists: Vec<&str> = choices.iter().map(|c| c[0].as_str()).collect();
                 Some([
@@ -78,15 +100,49 @@ impl Meanings {
                     })
                     .collect()
             }),
+            names: readings.names.as_ref().and_then(names),
             prior: isotropic.map_or_else(String::new, |found| format!("{} %", found.prior_percent)),
             interval: isotropic.map(|found| {
                 found
                     .twist_interval_deg
                     .map(|end| format!("{}°", plain(end, 4)))
             }),
-            tensor: readings.strain_tensor.as_ref().map(tensor),
+            tensor: readings.strain_tensor.as_ref().map(|found| Tensor {
+                alternatives: found.alternatives.iter().map(alternative).collect(),
+                ..tensor(&found.found, &found.splits)
+            }),
+            other_sense: readings.strain_tensor.as_ref().and_then(|found| {
+                let other = found.other_sense.as_ref()?;
+                let ends = other.twist_interval_deg;
+                Some((
+                    tensor(&other.found, &other.splits),
+                    ends.map(|end| format!("{}°", plain(end, 4))),
+                ))
+            }),
         }
     }
+}
+
+/// What chose the name of the lattice, and the names that are open; nothing where only one is plausible.
+fn names(found: &NamesResult) -> Option<(String, Vec<[String; 2]>)> {
+    let open: Vec<[String; 2]> = found
+        .names
+        .iter()
+        .filter(|n| n.standing == "open" || n.standing == "reported")
+        .map(|n| {
+            [
+                format!("{}°", fixed(n.twist_deg, 4)),
+                format!("{} %", fixed(n.strain_percent, 3)),
+            ]
+        })
+        .collect();
+    let chosen_by = match found.chosen_by.as_str() {
+        "image" => "the image: of each other plausible pair one wave is too weak",
+        "orientation" => "the orientation of a layer: other pairs need isotropic strain",
+        "user" => "the user",
+        _ => "the least strain",
+    };
+    (open.len() > 1 || found.chosen_by != "least-strain").then(|| (chosen_by.to_owned(), open))
 }
 
 fn choice(solution: &SolutionResult) -> [String; 3] {
@@ -97,15 +153,20 @@ fn choice(solution: &SolutionResult) -> [String; 3] {
     ]
 }
 
-fn tensor(found: &StrainTensorResult) -> Tensor {
-    let TensorNumbers {
+fn alternative(found: &TensorNumbers) -> [String; 2] {
+    let twist = format!("({})°", shown(found.twist_deg));
+    [twist, format!("({}) %", shown(found.mean_strain_percent))]
+}
+
+fn tensor(found: &TensorNumbers, splits: &[SplitResult; 2]) -> Tensor {
+    let &TensorNumbers {
         twist_deg,
         lattice_angle_deg,
         mean_strain_percent,
         shear_percent,
         axis_lab_deg,
         ..
-    } = found.found;
+    } = found;
     Tensor {
         twist: format!("({})°", shown(twist_deg)),
         mean: format!("({}) %", shown(mean_strain_percent)),
@@ -120,8 +181,7 @@ fn tensor(found: &StrainTensorResult) -> Tensor {
             |a| format!("({})°", shown(a)),
         ),
         lattice_angle: format!("({})°", shown(lattice_angle_deg)),
-        splits: found
-            .splits
+        splits: splits
             .iter()
             .map(|s| {
                 [
@@ -132,14 +192,7 @@ fn tensor(found: &StrainTensorResult) -> Tensor {
                 ]
             })
             .collect(),
-        alternatives: found
-            .alternatives
-            .iter()
-            .map(|a| {
-                let twist = format!("({})°", shown(a.twist_deg));
-                [twist, format!("({}) %", shown(a.mean_strain_percent))]
-            })
-            .collect(),
+        alternatives: Vec::new(),
     }
 }
 

@@ -24,6 +24,7 @@ const STYLE: &str = include_str!("style.html");
 const END: &str = include_str!("end.html");
 
 pub use map_page::map_page;
+pub use page::layers;
 
 /// The page. `downloads` are the files that it carries for saving.
 pub(crate) fn page(

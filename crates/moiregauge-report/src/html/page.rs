@@ -23,6 +23,8 @@ pub(super) struct Page<'a> {
     combined_budget: Option<Budgeted>,
     combined_wavelengths: Option<[String; 3]>,
     combined_meanings: Option<Meanings>,
+    /// Why there is no combined result, where there is none.
+    not_combined: String,
     /// Names of the layers.
     layers: String,
     atomic: Option<Atomic>,
@@ -39,6 +41,8 @@ pub(super) struct Page<'a> {
 struct Set<'a> {
     number: usize,
     found: &'a SetResult,
+    /// Scans that were used.
+    used: usize,
     rate: String,
     drift: Option<Drift>,
     mean: Option<Numbers>,
@@ -145,13 +149,14 @@ impl<'a> Page<'a> {
         let sets = results.sets.iter().enumerate();
         Ok(Self {
             results,
-            scans: results.sets.iter().map(|set| set.scans.len()).sum(),
+            scans: results.sets.iter().map(used).sum(),
             paper: results.settings.method == Method::Paper,
             combined: combined.map(|c| Numbers::in_all(&c.twist_strain, &c.budget)),
             combined_statistical: combined.map(|c| Numbers::statistical(&c.twist_strain)),
             combined_budget: combined.map(|c| Budgeted::new(&c.budget)),
             combined_wavelengths: combined.map(|c| wavelengths(&c.vectors)),
             combined_meanings: combined.map(|c| Meanings::new(&c.readings)),
+            not_combined: not_combined(results),
             layers: layers(&results.settings),
             atomic: results.atomic.as_ref().map(atomic),
             sets: sets
@@ -169,8 +174,28 @@ impl<'a> Page<'a> {
     }
 }
 
-/// `graphene (a = 0.246 nm, ν = 0.16)`, or two of them.
-pub(super) fn layers(settings: &Settings) -> String {
+/// Why there is no combined result.
+fn not_combined(results: &Results) -> String {
+    let codes = [
+        "samples-separated",
+        "different-lattices",
+        "layers-cannot-make-it",
+        "no-moire",
+    ];
+    let mut reasons = results
+        .caveats
+        .iter()
+        .filter(|c| codes.contains(&c.code.as_str()));
+    match reasons.next() {
+        Some(why) => format!("There is no combined result: {}.", why.message),
+        None => "No set could be corrected for drift, so there is no combined result. The numbers below are those of \
+                 single sets and contain whatever the drift did to them."
+            .to_owned(),
+    }
+}
+
+/// `graphene (a = 0.246 nm, ν = 0.16)`, or two of them, and whether nobody chose them.
+pub fn layers(settings: &Settings) -> String {
     let bilayer = settings.bilayer();
     let of = |m: &moiregauge::material::Material| {
         format!(
@@ -178,10 +203,19 @@ pub(super) fn layers(settings: &Settings) -> String {
             m.name, m.lattice_constant_nm, m.poisson_ratio
         )
     };
-    if bilayer.reference == bilayer.stretched {
-        of(bilayer.stretched)
+    let assumed = if settings.layers_are_assumed() {
+        " (assumed)"
     } else {
-        format!("{} on {}", of(bilayer.stretched), of(bilayer.reference))
+        ""
+    };
+    if bilayer.reference == bilayer.stretched {
+        format!("{}{assumed}", of(bilayer.stretched))
+    } else {
+        format!(
+            "{} on {}{assumed}",
+            of(bilayer.stretched),
+            of(bilayer.reference)
+        )
     }
 }
 
@@ -251,6 +285,7 @@ impl<'a> Set<'a> {
         Self {
             number: index + 1,
             found: set,
+            used: used(set),
             rate: set
                 .line_rate_hz
                 .map_or_else(|| plain(None, 0), |rate| rate.to_string()),
@@ -276,6 +311,11 @@ impl<'a> Set<'a> {
             missing,
         }
     }
+}
+
+/// How many scans of a set were used.
+fn used(set: &SetResult) -> usize {
+    set.scans.iter().filter(|s| s.excluded.is_none()).count()
 }
 
 fn drift(drift: &DriftResult) -> Drift {

@@ -33,8 +33,8 @@ pub use map::{
     QuantityResult, TrendResult, mask_counts, quantities,
 };
 pub use readings::{
-    AtomicResult, IsotropicStrainResult, ReadingsResult, ShiftResult, SolutionResult, SplitResult,
-    StrainTensorResult, TensorNumbers, TensorSigmas,
+    AtomicResult, IsotropicStrainResult, NameResult, NamesResult, OtherSenseResult, ReadingsResult,
+    ShiftResult, SolutionResult, SplitResult, StrainTensorResult, TensorNumbers, TensorSigmas,
 };
 pub use region::{
     DeviceResult, MapDetailsResult, MaskShare, RegionMeanResult, RegionResult, WantedResult,

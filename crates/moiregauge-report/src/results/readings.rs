@@ -1,6 +1,6 @@
 //! What else a lattice can mean, as the document holds it.
 
-use moiregauge::readings::{Readings, TensorReading};
+use moiregauge::readings::{ChosenBy, NameReading, Naming, Readings, Standing, TensorReading};
 use moiregauge::series::AtomicOrientation;
 use moiregauge::strain::{Branch, Degeneracy, Split, StrainTensor};
 use nalgebra::Matrix5;
@@ -15,10 +15,18 @@ use moiregauge::estimate::Estimate;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ReadingsResult {
     /// Whether the layers differ: twist and strain then trade at first order, and every entry of
-    /// `solutions` with `twist_deg` > 0 is as good as another.
+    /// `solutions` with `twist_deg` > 0 and the waves of the first is as good as another.
     pub layers_differ: bool,
-    /// Every exact solution with uniaxial strain alone.
+    /// Every exact solution with uniaxial strain alone, under every name of the lattice: those of the reported name
+    /// first, then the least strained names.
     pub solutions: Vec<SolutionResult>,
+    /// `solutions` holds all that have no more strain than this.
+    #[serde(default)]
+    pub solutions_complete_to_percent: f64,
+    /// The names of the lattice, that is which of its waves belong to the atoms, and the choice among them; `null` for
+    /// layers of dissimilar lattices.
+    #[serde(default)]
+    pub names: Option<NamesResult>,
     /// What an isotropic heterostrain does to the twist; `null` where no solution is exact.
     pub isotropic_strain: Option<IsotropicStrainResult>,
     /// Twist and the whole relative strain; `null` unless the orientation of a layer is known.
@@ -38,6 +46,34 @@ pub struct SolutionResult {
     pub lattice_angle_deg: Option<f64>,
     /// Whether the moiré is read as made by strain and distorted by twist.
     pub strain_dominated: bool,
+    /// Which waves of the lattice belong to the reciprocal vectors of the atoms at 0° and 120°: `[[h₁, k₁], [h₂, k₂]]` means
+    /// `h₁ K₁ + k₁ K₂` and `h₂ K₁ + k₂ K₂`, with `K_i · L_j = 2π δ_ij` for the L₁ and L₂ that are reported.
+    #[serde(default)]
+    pub waves: [[i32; 2]; 2],
+}
+
+/// The names of a lattice and the choice among them.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct NamesResult {
+    /// What chose the reported name: `least-strain` (nothing tells more), `image` (of each other plausible name one wave is
+    /// too weak), `orientation` (the others need isotropic strain) or `user`.
+    pub chosen_by: String,
+    /// The reported name first.
+    pub names: Vec<NameResult>,
+}
+
+/// One name of a lattice.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct NameResult {
+    /// As of the solutions.
+    pub waves: [[i32; 2]; 2],
+    /// The least strain that explains the lattice under this name.
+    pub strain_percent: f64,
+    /// The twist that goes with it.
+    pub twist_deg: f64,
+    /// `reported`, `open` (as plausible as the reported one), `against-image`, `against-orientation` or `unlikely` (much
+    /// strain).
+    pub standing: String,
 }
 
 /// The twist–biaxial degeneracy in numbers.
@@ -73,8 +109,28 @@ pub struct StrainTensorResult {
     pub splits: [SplitResult; 2],
     /// Covariance of (twist, lattice angle, mean strain, shear₁, shear₂) in degrees and per cent.
     pub covariance: [[Option<f64>; 5]; 5],
+    /// Two equal layers whose sense of twist is open: the reading for the other sense, which is as good; `null`
+    /// otherwise.
+    #[serde(default)]
+    pub other_sense: Option<OtherSenseResult>,
     /// Other readings of the same orientation with less than 1 % of mean strain.
     pub alternatives: Vec<TensorNumbers>,
+}
+
+/// The reading for θ < 0 where the sense of the twist is open.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct OtherSenseResult {
+    /// As of the reading with θ > 0.
+    #[serde(flatten)]
+    pub found: TensorNumbers,
+    /// σ of the same with calibration and lattice constants as well.
+    pub total: TensorSigmas,
+    /// Its uniaxial and isotropic part.
+    pub splits: [SplitResult; 2],
+    /// Covariance of (twist, lattice angle, mean strain, shear₁, shear₂) in degrees and per cent.
+    pub covariance: [[Option<f64>; 5]; 5],
+    /// The magnitudes of twist that both readings leave open, with 1.96 σ of `total` on either side.
+    pub twist_interval_deg: [Option<f64>; 2],
 }
 
 /// Twist and strain tensor.
@@ -140,6 +196,8 @@ impl From<&Readings> for ReadingsResult {
         Self {
             layers_differ: readings.layers_differ,
             solutions: readings.solutions.iter().map(Into::into).collect(),
+            solutions_complete_to_percent: readings.complete_to * PERCENT,
+            names: readings.naming.as_ref().map(Into::into),
             isotropic_strain: readings.degeneracy.as_ref().map(Into::into),
             strain_tensor: readings.tensor.as_ref().map(Into::into),
         }
@@ -154,6 +212,35 @@ impl From<&Branch> for SolutionResult {
             strain_axis_lab_deg: number(branch.axis_lab * degree()),
             lattice_angle_deg: number(branch.lattice_angle * degree()),
             strain_dominated: branch.strain_dominated,
+            waves: branch.name.0,
+        }
+    }
+}
+
+impl From<&Naming> for NamesResult {
+    fn from(naming: &Naming) -> Self {
+        let chosen_by = match naming.chosen_by {
+            ChosenBy::LeastStrain => "least-strain",
+            ChosenBy::Image => "image",
+            ChosenBy::Orientation => "orientation",
+            ChosenBy::User => "user",
+        };
+        let name = |n: &NameReading| NameResult {
+            waves: n.name.0,
+            strain_percent: n.strain * PERCENT,
+            twist_deg: n.twist * degree(),
+            standing: match n.standing {
+                Standing::Reported => "reported",
+                Standing::Open => "open",
+                Standing::AgainstImage => "against-image",
+                Standing::AgainstOrientation => "against-orientation",
+                Standing::Unlikely => "unlikely",
+            }
+            .to_owned(),
+        };
+        Self {
+            chosen_by: chosen_by.to_owned(),
+            names: naming.names.iter().map(name).collect(),
         }
     }
 }
@@ -178,18 +265,35 @@ impl From<&Degeneracy> for IsotropicStrainResult {
 impl From<&TensorReading> for StrainTensorResult {
     fn from(reading: &TensorReading) -> Self {
         let all = reading.in_all();
-        let sigma = |e: Estimate, factor: f64| number(e.scaled(factor).sigma);
+        let interval = reading.magnitudes().unwrap_or([f64::NAN; 2]);
         Self {
             found: tensor_numbers(&reading.best, &all),
-            total: TensorSigmas {
-                twist_deg: sigma(all.twist(), degree()),
-                mean_strain_percent: sigma(all.mean(), PERCENT),
-                shear_percent: sigma(all.shear(), PERCENT),
-                axis_lab_deg: all.axis_lab().and_then(|a| sigma(a, degree())),
-            },
+            total: (&all).into(),
             splits: all.splits(reading.poisson_ratio).each_ref().map(Into::into),
             covariance: in_surface_units(&reading.best.covariance),
+            other_sense: reading.opposite.as_ref().map(|opposite| {
+                let all = opposite.in_all();
+                OtherSenseResult {
+                    found: tensor_numbers(&opposite.found, &all),
+                    total: (&all).into(),
+                    splits: all.splits(reading.poisson_ratio).each_ref().map(Into::into),
+                    covariance: in_surface_units(&opposite.found.covariance),
+                    twist_interval_deg: interval.map(|end| number(end * degree())),
+                }
+            }),
             alternatives: reading.alternatives.iter().map(Into::into).collect(),
+        }
+    }
+}
+
+impl From<&StrainTensor> for TensorSigmas {
+    fn from(all: &StrainTensor) -> Self {
+        let sigma = |e: Estimate, factor: f64| number(e.scaled(factor).sigma);
+        Self {
+            twist_deg: sigma(all.twist(), degree()),
+            mean_strain_percent: sigma(all.mean(), PERCENT),
+            shear_percent: sigma(all.shear(), PERCENT),
+            axis_lab_deg: all.axis_lab().and_then(|a| sigma(a, degree())),
         }
     }
 }

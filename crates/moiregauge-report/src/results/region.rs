@@ -38,8 +38,10 @@ pub struct RegionMeanResult {
     pub spread: Option<f64>,
     /// The same without what noise adds.
     pub spread_corrected: Option<f64>,
-    /// What the spread without noise does not exceed, 95 %.
+    /// What the spread does not exceed, 95 %, noise and what the window hides (`spread_widening`) accounted for.
     pub spread_below_95: Option<f64>,
+    /// Factor by which the window may have made the spread smaller, as the curvature of the map tells.
+    pub spread_widening: Option<f64>,
     /// Root mean square of the errors of the nodes.
     pub noise: Option<f64>,
 }
@@ -54,6 +56,7 @@ impl RegionMeanResult {
             spread: number(scaled.spread),
             spread_corrected: number(scaled.corrected),
             spread_below_95: number(scaled.below),
+            spread_widening: number(scaled.widening),
             noise: number(scaled.noise),
         }
     }
@@ -151,6 +154,8 @@ pub struct WantedResult {
     pub measured_percent: Option<f64>,
     /// Share expected without noise.
     pub corrected_percent: Option<f64>,
+    /// How far the window may have moved that share, as the curvature of the map tells.
+    pub blur_percent: Option<f64>,
     /// Share that is within by two σ of its own.
     pub certain_percent: Option<f64>,
     /// Share that is not beyond by two σ.
@@ -165,6 +170,7 @@ fn wanted((wanted, area): &(WantedTwist, Option<WantedArea>)) -> WantedResult {
         nodes: area.map_or(0, |a| a.nodes),
         measured_percent: share(|a| a.measured),
         corrected_percent: share(|a| a.corrected),
+        blur_percent: share(|a| a.blur),
         certain_percent: share(|a| a.certain),
         possible_percent: share(|a| a.possible),
     }

@@ -113,7 +113,7 @@ const REGION: &[Column<RegionResult>] = columns! {
     "twist_blur_deg", "how far smoothing by the window has moved the mean, as the curvature of the map tells", |r| of(r.twist_deg, |t| t.blur);
     "twist_spread_deg", "standard deviation over the nodes", |r| of(r.twist_deg, |t| t.spread);
     "twist_spread_corrected_deg", "the same without noise", |r| of(r.twist_deg, |t| t.spread_corrected);
-    "twist_spread_below_deg", "what the spread without noise does not exceed, 95 %", |r| of(r.twist_deg, |t| t.spread_below_95);
+    "twist_spread_below_deg", "what the spread does not exceed, noise and smoothing accounted for, 95 %", |r| of(r.twist_deg, |t| t.spread_below_95);
     "twist_noise_deg", "rms error of the nodes", |r| of(r.twist_deg, |t| t.noise);
     "strain_percent", "magnitude of the mean strain vector, bias of noise removed", |r| number(r.mean.as_ref().and_then(|m| m.heterostrain_percent.value));
     "strain_sigma_percent", "its σ", |r| number(r.mean.as_ref().and_then(|m| m.heterostrain_percent.sigma));
@@ -152,7 +152,7 @@ const DEVICE: &[Column<DeviceRow>] = columns! {
     "twist_sigma_deg", "standard error of the mean: noise, with what neighbours share, and blur", |r| of(r.0.area.twist_deg, |t| t.sigma);
     "twist_spread_deg", "standard deviation over the nodes", |r| of(r.0.area.twist_deg, |t| t.spread);
     "twist_spread_corrected_deg", "the same without noise", |r| of(r.0.area.twist_deg, |t| t.spread_corrected);
-    "twist_spread_below_deg", "what the spread without noise does not exceed, 95 %", |r| of(r.0.area.twist_deg, |t| t.spread_below_95);
+    "twist_spread_below_deg", "what the spread does not exceed, noise and smoothing accounted for, 95 %", |r| of(r.0.area.twist_deg, |t| t.spread_below_95);
     "strain_percent", "magnitude of the mean strain vector", |r| number(r.0.area.mean.as_ref().and_then(|m| m.heterostrain_percent.value));
     "strain_sigma_percent", "its σ", |r| number(r.0.area.mean.as_ref().and_then(|m| m.heterostrain_percent.sigma));
     "strain_rms_percent", "root mean square of the local strain without noise", |r| number(r.0.area.strain_rms_percent);

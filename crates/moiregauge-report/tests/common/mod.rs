@@ -50,6 +50,7 @@ pub(crate) fn analysis() -> Analysis {
         twist_strain: m.twist_strain,
         joint: None,
         drift: None,
+        path: None,
         checks: None,
         consistency: vec![Consistency {
             sets: [sets[0].name.clone(), sets[1].name.clone()],

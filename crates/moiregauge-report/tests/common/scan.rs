@@ -148,6 +148,7 @@ pub(super) fn scan(
         sensor,
         drift_corrected: Some(corrected),
         drift: Some(Vector2::new(0.0086, -0.0026)),
+        motion: None,
         twist_strain_sensor: twist_strain(&sensor),
         twist_strain: twist_strain(&corrected),
         draws: strain::draws(

@@ -9,7 +9,7 @@ use moiregauge::analysis::{
 use moiregauge::budget::{Budget, Statistical};
 use moiregauge::image::Image;
 use moiregauge::lattice::LatticeVectors;
-use moiregauge::readings::Readings;
+use moiregauge::readings::{Readings, WaveStrengths};
 use moiregauge::settings::Settings;
 use moiregauge::strain;
 use nalgebra::{Matrix2, Vector2};
@@ -46,7 +46,13 @@ pub(super) fn mean(
     };
     let budget = Budget::new(&lattice, &twist_strain, &statistical, settings);
     Some(SetMean {
-        readings: Readings::new(&lattice, &twist_strain, &budget, settings),
+        readings: Readings::new(
+            &lattice,
+            &twist_strain,
+            &budget,
+            &WaveStrengths::default(),
+            settings,
+        ),
         budget,
         lattice,
         twist_strain,

@@ -8,12 +8,14 @@
 //! Plane fit and tip velocities: Tran et al., arXiv:2406.08681. With N pixels the extent is
 //! `(N − 1)·|column of J|`: positions are those of pixel centres.
 
+mod lag;
 mod plane;
 mod sensors;
 
 use nalgebra::{Matrix2, Matrix4, Vector2};
 use spmfile::{FrameDirection, LineDirection, Scan};
 
+pub use lag::Lag;
 pub use plane::{PlaneFit, fit_plane};
 pub use sensors::{SensorGeometry, from_sensors};
 

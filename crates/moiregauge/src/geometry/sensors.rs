@@ -1,7 +1,10 @@
 //! Both position sensors of a frame → its [`Geometry`].
 
+use std::borrow::Cow;
+
 use nalgebra::{Matrix2, Matrix4, Vector2};
 
+use super::lag::{self, Lag};
 use super::{Geometry, PlaneFit, fit_plane};
 use crate::image::Image;
 
@@ -17,6 +20,8 @@ pub struct SensorGeometry {
     pub planes: [PlaneFit; 2],
     /// Columns that were used; those outside belong to the turn-around of the tip.
     pub columns: std::ops::Range<usize>,
+    /// How the x sensor and the y sensor lag behind the tip, where their lines show it; planes and steps are free of it.
+    pub lags: [Option<Lag>; 2],
     /// Step from column to column along the fast direction, one number per line, nm.
     pub fast_steps: Vec<f64>,
     /// Step from row to row along the slow direction, one number per column, nm.
@@ -32,6 +37,12 @@ pub fn from_sensors(x: &Image, y: &Image) -> Option<SensorGeometry> {
         return None;
     }
     let used = straight_columns(x, y)?;
+    let lags = [x, y].map(|sensor| lag::find(sensor, &used));
+    let [x, y] = [(x, lags[0]), (y, lags[1])].map(|(sensor, lag)| match lag {
+        Some(lag) => Cow::Owned(lag.taken_off(sensor, &used)),
+        None => Cow::Borrowed(sensor),
+    });
+    let (x, y) = (x.as_ref(), y.as_ref());
     let planes = [fit_plane(x, used.clone())?, fit_plane(y, used.clone())?];
     let pixel_to_nm = Matrix2::new(
         planes[0].per_column,
@@ -57,7 +68,10 @@ pub fn from_sensors(x: &Image, y: &Image) -> Option<SensorGeometry> {
             Some(Vector2::new(slope(x)?, slope(y)?))
         })
         .collect();
-    let covariance = covariance(&line_slopes, [x, y], &planes, &used);
+    let mut covariance = covariance(&line_slopes, [x, y], &planes, &used);
+    for (axis, lag) in lags.iter().enumerate() {
+        covariance[(axis, axis)] += lag.map_or(0.0, |lag| lag.slope_variance);
+    }
     Some(SensorGeometry {
         geometry: Geometry {
             size: [columns, rows],
@@ -68,6 +82,7 @@ pub fn from_sensors(x: &Image, y: &Image) -> Option<SensorGeometry> {
         },
         planes,
         columns: used,
+        lags,
         fast_steps: line_slopes.iter().map(|s| s.dot(&ef)).collect(),
         slow_steps: column_slopes.iter().map(|s| s.dot(&es)).collect(),
     })

@@ -135,7 +135,7 @@ pub(super) fn loosens(fit: &JointFit, simpler: &JointFit) -> bool {
 /// Bayesian information criterion, up to a constant: −2 ln L and ln n for each parameter. A settling time is a
 /// parameter as well, and so is the scatter of positions, which lowers χ² at the cost of wider distributions: a
 /// drift that changes must not pass for scatter.
-fn criterion(fit: &JointFit) -> f64 {
+pub(super) fn criterion(fit: &JointFit) -> f64 {
     let n = (fit.degrees_of_freedom + fit.layout.size) as f64;
     let settling = usize::from(fit.terms.settling.is_some());
     let scatter = usize::from(fit.instability_nm > 0.0);

@@ -2,6 +2,7 @@
 
 use nalgebra::{DMatrix, DVector, Matrix2, Matrix3, Matrix3x2, Matrix4, Vector2, Vector3};
 
+use super::path::{DriftPath, Settling};
 use super::{Sighting, Terms};
 
 /// Where each parameter stands in the vector.
@@ -103,6 +104,23 @@ impl Layout {
             weights.push((i, at_origin - decay, decay / tau));
         }
         weights
+    }
+
+    /// The way of the sample.
+    pub(super) fn path(&self, x: &DVector<f64>) -> DriftPath {
+        let two = |i: usize| Vector2::new(x[i], x[i + 1]);
+        let settling = self.settling.zip(self.terms.settling);
+        // The origin is the middle of the first and the last frame.
+        let last = 2.0 * self.origin - self.start;
+        DriftPath::steady(two(DRIFT), self.origin).with_terms(
+            self.acceleration.map_or_else(Vector2::zeros, two),
+            settling.map(|(i, time)| Settling {
+                amount: two(i),
+                start: self.start,
+                time,
+            }),
+            [self.start, last],
+        )
     }
 
     /// Displacement and velocity of the sample at a time.

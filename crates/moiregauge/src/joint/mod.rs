@@ -22,11 +22,13 @@ mod evaluate;
 mod instability;
 mod link;
 mod parts;
+mod path;
 mod solve;
 
 use nalgebra::{Matrix2, Matrix4, Vector2};
 
 pub use checks::{LeftOut, Resampled};
+pub use path::DriftPath;
 pub(crate) use solve::foreseen;
 pub use solve::{JointFit, TestedTerm, fit};
 

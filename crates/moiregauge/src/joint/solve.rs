@@ -5,6 +5,7 @@ use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
 
 use super::evaluate::{DRIFT, Layout, linearise, wrapped};
 use super::link::number_blocks;
+use super::path::DriftPath;
 use super::{Sighting, Terms, choose};
 use crate::chi2::enlargement;
 use crate::estimate::Estimate;
@@ -70,9 +71,24 @@ pub struct TestedTerm {
 }
 
 impl JointFit {
+    /// What was fitted, with the blocks of linked scans.
+    pub(crate) fn sightings(&self) -> &[Sighting] {
+        &self.sightings
+    }
+
+    /// Bayesian information criterion, up to a constant that fits of the same data with phases have in common.
+    pub(crate) fn criterion(&self) -> f64 {
+        choose::criterion(self)
+    }
+
     /// Drift velocity at a time (same origin as the sightings), nm/s, with its covariance.
     pub fn velocity_at(&self, time: f64) -> (Vector2<f64>, Matrix2<f64>) {
         motion(&self.layout, &self.solution, &self.covariance, time)
+    }
+
+    /// The way of the sample (times of the same origin as the sightings).
+    pub fn path(&self) -> DriftPath {
+        self.layout.path(&self.solution)
     }
 }
 

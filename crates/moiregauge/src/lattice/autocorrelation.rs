@@ -18,6 +18,7 @@ use super::LatticeVectors;
 use super::harmonics::Harmonics;
 use super::reciprocal::reciprocal;
 use super::transform::{Autocorrelation, Spectrum, hann_at};
+use crate::chi2::enlargement;
 
 /// Radius of the patch around a peak, as a share of the shortest lattice vector.
 const PATCH: f64 = 0.22;
@@ -242,11 +243,10 @@ fn fit(
     };
     let inverse = product(&index, &index).try_inverse()?;
     let basis = product(&position, &index) * inverse;
-    // What the peaks say themselves: residuals larger than the noise explains raise the errors.
+    // What the peaks say themselves: residuals clearly larger than the noise explains raise the errors.
     let residual = &position - basis * &index;
     let chi2 = (v.try_inverse()? * product(&residual, &residual)).trace();
-    let freedom = 2.0 * (n as f64 - 2.0);
-    let scale = (chi2 / freedom).max(1.0);
+    let scale = enlargement(chi2, 2 * n.saturating_sub(2));
     // vec(basis) = (a₁; a₂): the covariance between vectors is `inverse`, between components V.
     Some((basis, inverse.kronecker(&v) * scale))
 }
@@ -359,5 +359,58 @@ impl Overlap {
             total += if a == b { term } else { -term };
         }
         total / (self.weight * other.weight)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Ten peaks that scatter more and more: errors are those of the noise until chance makes such a scatter in fewer than
+    /// 5 % of cases (χ²/dof = 26.296/16 for 16 degrees of freedom), and χ²/dof times larger from there on.
+    #[test]
+    fn only_significant_scatter_of_peaks_enlarges() {
+        let basis = Matrix2::new(20.0, 10.0, 0.0, 17.32);
+        let places = [
+            [1, 0],
+            [0, 1],
+            [-1, 1],
+            [2, 0],
+            [0, 2],
+            [-2, 2],
+            [1, 1],
+            [-1, 2],
+            [-2, 1],
+            [3, 0],
+        ];
+        let scattered = |size: f64| {
+            let peaks: Vec<Peak> = places
+                .iter()
+                .enumerate()
+                .map(|(i, place)| {
+                    let index = Vector2::new(f64::from(place[0]), f64::from(place[1]));
+                    let off = Vector2::new((7.0 * i as f64).sin(), (5.0 * i as f64).cos());
+                    Peak {
+                        index,
+                        position: basis * index + size * off,
+                        roughness: 0.0,
+                    }
+                })
+                .collect();
+            fit(&peaks, Vector2::new(256.0, 256.0), None).unwrap().1[(0, 0)]
+        };
+        let least = scattered(0.0);
+        let ratios: Vec<f64> = (0..200)
+            .map(|i| scattered(1e-4 * 1.05f64.powi(i)) / least)
+            .collect();
+        let threshold = 26.296 / 16.0;
+        let between = |r: &&f64| **r > 1.1 && **r < threshold / 1.05;
+        // Weights depend on the positions, by some per cent.
+        assert_eq!(ratios.iter().find(between), None, "{ratios:?}");
+        assert!(
+            ratios
+                .iter()
+                .any(|r| *r > threshold && *r < 1.3 * threshold)
+        );
     }
 }

@@ -50,8 +50,17 @@ impl Harmonic {
 pub(crate) struct Windowed {
     values: Vec<f64>,
     weights: Vec<f64>,
+    /// Row by row.
+    holes: Vec<Hole>,
     rows: usize,
     columns: usize,
+}
+
+/// A missing pixel and the weight that the window would give it.
+struct Hole {
+    row: usize,
+    column: usize,
+    weight: f64,
 }
 
 impl Windowed {
@@ -60,16 +69,28 @@ impl Windowed {
         let (wx, wy) = (hann(image.columns), hann(image.rows));
         let mut values = Vec::with_capacity(image.values.len());
         let mut weights = Vec::with_capacity(image.values.len());
+        let mut holes = Vec::new();
         for (row, wy) in wy.iter().enumerate() {
-            for (v, wx) in image.row(row).iter().zip(&wx) {
-                let w = if v.is_finite() { wx * wy } else { 0.0 };
-                weights.push(w);
-                values.push(if v.is_finite() { v * w } else { 0.0 });
+            for (column, (v, wx)) in image.row(row).iter().zip(&wx).enumerate() {
+                let weight = wx * wy;
+                if v.is_finite() {
+                    weights.push(weight);
+                    values.push(v * weight);
+                } else {
+                    weights.push(0.0);
+                    values.push(0.0);
+                    holes.push(Hole {
+                        row,
+                        column,
+                        weight,
+                    });
+                }
             }
         }
         Self {
             values,
             weights,
+            holes,
             rows: image.rows,
             columns: image.columns,
         }
@@ -130,23 +151,44 @@ impl Windowed {
         q
     }
 
-    /// `Σ w e^{−iq·n}` with the phase at the centre; separable unless pixels are missing.
-    fn window_transform(&self, q: Vector2<f64>, complete: bool) -> Complex64 {
-        if complete {
-            let separable = hann_transform(q.x, self.columns) * hann_transform(q.y, self.rows);
-            return Complex64::new(separable, 0.0);
+    /// `Σ w e^{−iq·n}` with the phase at the centre: that of the whole window, which is separable, less what
+    /// the missing pixels would add.
+    fn window_transform(&self, q: Vector2<f64>) -> Complex64 {
+        let separable = hann_transform(q.x, self.columns) * hann_transform(q.y, self.rows);
+        let mut sum = Complex64::new(separable, 0.0);
+        if self.holes.is_empty() {
+            return sum;
         }
         let cx = (self.columns as f64 - 1.0) / 2.0;
         let cy = (self.rows as f64 - 1.0) / 2.0;
-        let mut sum = Complex64::default();
-        for row in 0..self.rows {
-            for column in 0..self.columns {
-                let phase = q.x * (column as f64 - cx) + q.y * (row as f64 - cy);
-                sum +=
-                    self.weights[row * self.columns + column] * Complex64::from_polar(1.0, -phase);
-            }
+        let along: Vec<Complex64> = (0..self.columns)
+            .map(|c| Complex64::from_polar(1.0, -q.x * (c as f64 - cx)))
+            .collect();
+        for line in self.holes.chunk_by(|a, b| a.row == b.row) {
+            let turn = Complex64::from_polar(1.0, -q.y * (line[0].row as f64 - cy));
+            let missing: Complex64 = line.iter().map(|h| along[h.column] * h.weight).sum();
+            sum -= turn * missing;
         }
         sum
+    }
+
+    /// What the window makes of pairs of waves, `Σ w e^{−i(q_a − q_b)·n}`; each difference is summed once.
+    fn gram(&self, pair: &Matrix2<f64>, indices: &[(f64, f64)]) -> DMatrix<Complex64> {
+        let mut known: Vec<((f64, f64), Complex64)> = Vec::new();
+        let mut of = |(h, k): (f64, f64)| {
+            if let Some((_, sum)) = known.iter().find(|(seen, _)| *seen == (h, k)) {
+                return *sum;
+            }
+            let sum = self.window_transform(pair * Vector2::new(h, k));
+            known.push(((h, k), sum));
+            // The weights are real.
+            known.push(((-h, -k), sum.conj()));
+            sum
+        };
+        DMatrix::from_fn(indices.len(), indices.len(), |a, b| {
+            let ((ha, ka), (hb, kb)) = (indices[a], indices[b]);
+            of((ha - hb, ka - kb))
+        })
     }
 
     /// Fits the harmonics `pair · (h, k)` of `shells`, which begin with the first one.
@@ -161,22 +203,20 @@ impl Windowed {
         shells: &[(f64, f64)],
     ) -> Option<Harmonics> {
         let nyquist = 0.9 * std::f64::consts::PI;
-        let q: Vec<Vector2<f64>> = shells
-            .iter()
-            .map(|&(h, k)| pair * Vector2::new(h, k))
-            .filter(|q| q.amax() < nyquist && q.amin() > -nyquist)
-            .collect();
-        if q.len() < 3 {
+        let wave = |&(h, k): &(f64, f64)| pair * Vector2::new(h, k);
+        let resolved = shells.iter().copied().filter(|index| {
+            let q = wave(index);
+            q.amax() < nyquist && q.amin() > -nyquist
+        });
+        // Basis: 1, e^{iq}, e^{−iq}, …, phases at the centre.
+        let mut indices = vec![(0.0, 0.0)];
+        indices.extend(resolved.flat_map(|(h, k)| [(h, k), (-h, -k)]));
+        let n = indices.len();
+        if n < 7 {
             return None;
         }
-        let complete = image.values.iter().all(|v| v.is_finite());
-        // Basis: 1, e^{iq}, e^{−iq}, …, phases at the centre.
-        let mut waves = vec![Vector2::zeros()];
-        waves.extend(q.iter().flat_map(|q| [*q, -*q]));
-        let n = waves.len();
-        let gram = DMatrix::from_fn(n, n, |a, b| {
-            self.window_transform(waves[a] - waves[b], complete)
-        });
+        let waves: Vec<Vector2<f64>> = indices.iter().map(wave).collect();
+        let gram = self.gram(pair, &indices);
         let right = DVector::from_iterator(
             n,
             waves.iter().enumerate().map(|(i, &wave)| {
@@ -200,12 +240,12 @@ impl Windowed {
             (self.columns as f64 - 1.0) / 2.0,
             (self.rows as f64 - 1.0) / 2.0,
         );
-        let list = q
-            .iter()
-            .enumerate()
-            .map(|(i, &q)| Harmonic {
+        let list = (1..n)
+            .step_by(2)
+            .map(|i| (waves[i], amplitudes[i]))
+            .map(|(q, amplitude)| Harmonic {
                 q,
-                amplitude: amplitudes[1 + 2 * i] * Complex64::from_polar(1.0, -q.dot(&centre)),
+                amplitude: amplitude * Complex64::from_polar(1.0, -q.dot(&centre)),
                 noise: noise.around(q),
             })
             .collect();
@@ -308,4 +348,71 @@ pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
         }
     }
     sums.iter().sum::<f64>() + rest
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// An image with holes: one pixel, part of a line, whole lines, a corner.
+    fn torn(rows: usize, columns: usize) -> Image {
+        let mut values: Vec<f64> = (0..rows * columns)
+            .map(|i| (0.7 * i as f64).sin())
+            .collect();
+        let mut lose = |row: usize, columns_lost: std::ops::Range<usize>| {
+            for column in columns_lost {
+                values[row * columns + column] = f64::NAN;
+            }
+        };
+        lose(11, 17..18);
+        lose(20, 5..31);
+        lose(30, 0..columns);
+        for row in 40..rows {
+            lose(row, 33..columns);
+        }
+        Image::new(rows, columns, values)
+    }
+
+    /// The sum over all pixels that are there, as the definition has it.
+    #[test]
+    fn holes_are_taken_off_the_window_exactly() {
+        let (rows, columns) = (52, 47);
+        let image = torn(rows, columns);
+        let windowed = Windowed::new(&image);
+        let (wx, wy) = (hann(columns), hann(rows));
+        for q in [[0.0, 0.0], [0.41, -0.23], [-2.3, 0.02], [5.9, 3.3]] {
+            let q = Vector2::from(q);
+            let mut slow = Complex64::default();
+            for (row, wy) in wy.iter().enumerate() {
+                for (column, wx) in wx.iter().enumerate() {
+                    if image.values[row * columns + column].is_finite() {
+                        let x = column as f64 - (columns as f64 - 1.0) / 2.0;
+                        let y = row as f64 - (rows as f64 - 1.0) / 2.0;
+                        let weight = wx * wy;
+                        slow += Complex64::from_polar(weight, -(q.x * x + q.y * y));
+                    }
+                }
+            }
+            let fast = windowed.window_transform(q);
+            assert!((fast - slow).norm() < 1e-9, "{q}: {fast} {slow}");
+        }
+    }
+
+    /// Every entry of the normal matrix is the transform at the difference of its two waves.
+    #[test]
+    fn equal_differences_share_their_sum() {
+        let windowed = Windowed::new(&torn(52, 47));
+        let pair = Matrix2::new(0.5, 0.17, 0.06, 0.46);
+        let indices: Vec<(f64, f64)> = std::iter::once((0.0, 0.0))
+            .chain(SHELLS.iter().flat_map(|&(h, k)| [(h, k), (-h, -k)]))
+            .collect();
+        let gram = windowed.gram(&pair, &indices);
+        for (a, &(ha, ka)) in indices.iter().enumerate() {
+            for (b, &(hb, kb)) in indices.iter().enumerate() {
+                let q = pair * Vector2::new(ha - hb, ka - kb);
+                let alone = windowed.window_transform(q);
+                assert!((gram[(a, b)] - alone).norm() < 1e-9, "{a} {b}");
+            }
+        }
+    }
 }

@@ -24,6 +24,8 @@ use crate::settings::Background;
 const MOST_SCALE: f64 = 1.6;
 /// Largest distortion `|q|/|p|`: half of the stretch of one axis against the other.
 const MOST_DISTORTION: f64 = 0.25;
+/// The same where no lattice is as little distorted: a drift of half a frame does that.
+const DRIFTING: f64 = 0.45;
 /// Peaks whose wave vectors and differences may be first harmonics.
 const GENERATORS: usize = 24;
 /// Wave vectors closer than this are the same, cycles per frame.
@@ -41,7 +43,12 @@ pub(super) fn prepare(
     let image = levelled(image, background)?;
     let full = Spectrum::new(&image);
     let mut best = [0.0; 3];
-    for candidate in candidates(&full, &geometry.pixel_to_nm, known) {
+    let little = candidates(&full, &geometry.pixel_to_nm, known, MOST_DISTORTION);
+    let drifting = || candidates(&full, &geometry.pixel_to_nm, known, DRIFTING);
+    let all = little
+        .into_iter()
+        .chain(std::iter::once_with(drifting).flatten());
+    for candidate in all {
         let (binning, binned) = binned(&image, &candidate.pair);
         // The pair goes through all peaks that it explains; the first harmonics may be faint.
         let pair = candidate.pair * binning as f64;
@@ -81,19 +88,19 @@ fn candidates(
     spectrum: &Spectrum,
     pixel_to_nm: &Matrix2<f64>,
     known: &Matrix2<f64>,
+    most: f64,
 ) -> Vec<Candidate> {
     let to_physical = pixel_to_nm.try_inverse().map(|m| m.transpose());
     let (Some(to_physical), Some(wanted)) = (to_physical, reciprocal(known)) else {
         return Vec::new();
     };
-    let like = |pair: &Matrix2<f64>| resembles(&(to_physical * pair), &wanted);
+    let like = |pair: &Matrix2<f64>| resembles(&(to_physical * pair), &wanted, most);
     let peaks = spectrum_peaks(spectrum);
-    let generators = generators(&peaks, spectrum, &to_physical, &wanted);
+    let generators = generators(&peaks, spectrum, &to_physical, &wanted, most);
     let mut found = Vec::new();
     // |p|² − |q|²: what most pairs have wrong is told by their area.
     let area = (wanted.determinant() / to_physical.determinant()).abs();
-    let areas =
-        area / MOST_SCALE.powi(2) * (1.0 - MOST_DISTORTION.powi(2))..=area * MOST_SCALE.powi(2);
+    let areas = area / MOST_SCALE.powi(2) * (1.0 - most.powi(2))..=area * MOST_SCALE.powi(2);
     for (i, a) in generators.iter().enumerate() {
         for b in &generators[i + 1..] {
             let pair = Matrix2::from_columns(&[*a, *b]);
@@ -135,10 +142,11 @@ fn generators(
     spectrum: &Spectrum,
     to_physical: &Matrix2<f64>,
     wanted: &Matrix2<f64>,
+    most: f64,
 ) -> Vec<Vector2<f64>> {
     let (a, b) = (wanted.column(0), wanted.column(1));
     let lengths = [a.norm(), b.norm(), (b - a).norm()];
-    let stretch = MOST_SCALE * (1.0 + MOST_DISTORTION);
+    let stretch = MOST_SCALE * (1.0 + most);
     let low = lengths.iter().copied().fold(f64::INFINITY, f64::min) / stretch;
     let high = lengths.iter().copied().fold(0.0, f64::max) * stretch;
     let frame = frame_cycles(spectrum);
@@ -166,14 +174,14 @@ fn generators(
 }
 
 /// Whether `pair` is `wanted`, turned and a little distorted, under any of its names.
-fn resembles(pair: &Matrix2<f64>, wanted: &Matrix2<f64>) -> bool {
+fn resembles(pair: &Matrix2<f64>, wanted: &Matrix2<f64>, most: f64) -> bool {
     let Some(inverse) = wanted.try_inverse() else {
         return false;
     };
     names().any(|name| {
         let (p, q) = parts(&(pair * name * inverse));
         let stretch = q.norm() / p.norm();
-        (1.0 / MOST_SCALE..MOST_SCALE).contains(&p.norm()) && stretch < MOST_DISTORTION
+        (1.0 / MOST_SCALE..MOST_SCALE).contains(&p.norm()) && stretch < most
     })
 }
 
@@ -211,10 +219,14 @@ mod tests {
         for turn in [0.0, 0.7, 2.1, 4.4] {
             let turn = nalgebra::Rotation2::new(turn).into_inner();
             let stretched = Matrix2::new(1.05, 0.02, 0.0, 0.97) * turn * hexagon;
-            assert!(resembles(&stretched, &hexagon));
-            assert!(!resembles(&(stretched * 3_f64.sqrt()), &hexagon));
+            assert!(resembles(&stretched, &hexagon, MOST_DISTORTION));
+            assert!(!resembles(
+                &(stretched * 3_f64.sqrt()),
+                &hexagon,
+                MOST_DISTORTION
+            ));
             let rectangle = turn * Matrix2::new(1.0, 0.0, 0.0, 2.0);
-            assert!(!resembles(&rectangle, &hexagon));
+            assert!(!resembles(&rectangle, &hexagon, MOST_DISTORTION));
         }
     }
 }

@@ -88,13 +88,9 @@ pub enum LatticeError {
         total: usize,
     },
     /// There is no lattice in it.
-    #[error(
-        "the image shows no lattice: no three wave vectors that add up to zero stand out of the \
-         noise (the best have signal-to-noise ratios of {0:.1}, {1:.1} and {2:.1}; 3.5 are needed)",
-        best[0], best[1], best[2]
-    )]
+    #[error("the image shows no lattice: {}", prepare::too_weak(best))]
     NoLattice {
-        /// Signal-to-noise ratios (amplitude) of the best three wave vectors.
+        /// Signal-to-noise ratios (amplitude) of the best three wave vectors, largest first; 0 where none were found.
         best: [f64; 3],
     },
     /// The lattice shows in the spectrum, but this method gets no hold of it.
@@ -108,7 +104,9 @@ pub enum LatticeError {
     },
     /// Several lattices were asked for.
     #[error(
-        "{wanted} lattices were asked for, of which {found} can be found; --moires {found} measures what is there"
+        "{wanted} lattices were asked for, of which {found} can be found: what else stands out is noise or lies on \
+         the waves of these, as their harmonics do and those of a lattice that is nearly commensurate with them; --moires \
+         {found} measures what is there"
     )]
     FewerLattices {
         /// How many there are.

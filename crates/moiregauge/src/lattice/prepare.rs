@@ -205,6 +205,40 @@ pub(super) enum Verdict {
     Chance,
 }
 
+/// Significance that the second of a shell needs, which was searched like the first, and the third, which was not.
+const SECOND: f64 = 20.0;
+const THIRD: f64 = 12.0;
+
+/// Which of three wave vectors (signal-to-noise ratios, largest first) are too weak for a lattice, and what they need.
+pub(super) fn too_weak(best: &[f64; 3]) -> String {
+    if best[0] == 0.0 {
+        return "no three wave vectors that add up to zero were found in its spectrum".to_owned();
+    }
+    // Rounded away from each other, so that what falls short never looks equal.
+    let needed = [("second", best[1], SECOND), ("third", best[2], THIRD)]
+        .map(|(name, found, needed)| (name, found, needed.sqrt()));
+    let short: Vec<String> = needed
+        .iter()
+        .filter(|(_, found, needed)| found <= needed)
+        .map(|(name, found, needed)| {
+            let (found, needed) = ((100.0 * found).floor(), (100.0 * needed).ceil());
+            format!(
+                "the {name} has {:.2} of the {:.2} it needs",
+                found / 100.0,
+                needed / 100.0
+            )
+        })
+        .collect();
+    format!(
+        "no three wave vectors that add up to zero stand out of the noise. The best have signal-to-noise ratios of \
+         {:.1}, {:.1} and {:.1}: {}",
+        best[0],
+        best[1],
+        best[2],
+        short.join(", ")
+    )
+}
+
 /// Whether the harmonics can be chance.
 ///
 /// Under noise alone the significance is exponentially distributed. Two members of a shell were
@@ -220,14 +254,64 @@ pub(super) fn verdict(harmonics: &Harmonics) -> Verdict {
         s.sort_by(|a, b| b.total_cmp(a));
         s
     };
-    let stands_out = |s: [f64; 3]| s[1] > 20.0 && s[2] > 12.0;
+    let stands_out = |s: [f64; 3]| s[1] > SECOND && s[2] > THIRD;
     let first = shell(&harmonics.list[..3]);
     let second = stands_out(shell(&harmonics.list[3..harmonics.list.len().min(6)]));
-    if stands_out(first) || (second && first[1] > 12.0) {
+    if stands_out(first) || (second && first[1] > THIRD) {
         Verdict::Lattice
-    } else if second || first[1] > 20.0 {
+    } else if second || first[1] > SECOND {
         Verdict::Doubtful
     } else {
         Verdict::Chance
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The reason is named with what was found and what is needed, and nothing that was met.
+    #[test]
+    fn the_wave_vector_that_falls_short_is_named() {
+        let words = |best| LatticeError::NoLattice { best }.to_string();
+        let second = words([4.7, 4.4, 4.1]);
+        assert!(
+            second.ends_with(": the second has 4.40 of the 4.48 it needs"),
+            "{second}"
+        );
+        let third = words([9.0, 8.0, 3.0]);
+        assert!(
+            third.ends_with(": the third has 3.00 of the 3.47 it needs"),
+            "{third}"
+        );
+        let both = words([4.0, 4.0, 2.0]);
+        assert!(
+            both.contains("second has 4.00") && both.contains("third has 2.00"),
+            "{both}"
+        );
+        let barely = words([4.472, 4.472, 4.1]);
+        assert!(barely.ends_with("4.47 of the 4.48 it needs"), "{barely}");
+        assert!(!words([0.0; 3]).contains("signal-to-noise"));
+    }
+
+    /// What the message asks for is what the verdict asks for.
+    #[test]
+    fn the_limits_of_the_message_are_those_of_the_verdict() {
+        let with = |ratios: [f64; 3]| {
+            let list = ratios.iter().map(|ratio| Harmonic {
+                q: Vector2::x(),
+                amplitude: rustfft::num_complex::Complex64::new(*ratio, 0.0),
+                noise: [1.0; 2],
+            });
+            verdict(&Harmonics {
+                list: list.collect(),
+                window_sums: [1.0; 2],
+                model: Image::new(1, 1, vec![0.0]),
+                pair: Matrix2::identity(),
+            })
+        };
+        assert_eq!(with([9.0, 4.48, 3.47]), Verdict::Lattice);
+        assert_ne!(with([9.0, 4.47, 3.47]), Verdict::Lattice);
+        assert_ne!(with([9.0, 4.48, 3.46]), Verdict::Lattice);
     }
 }

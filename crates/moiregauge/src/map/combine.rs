@@ -1,68 +1,99 @@
 //! Several maps of one place → one: on a common grid, compared and averaged node by node.
 //!
-//! Averages are those of wave vectors, weighted by their inverse covariance. χ² of the single maps about the
+//! Averages are those of wave vectors, weighted by their inverse covariance. χ² of the n maps about the
 //! average says whether they agree: node by node (mask), and over all nodes, where it either enlarges the
-//! errors (scatter beyond them) or, for two maps that share noise, shows how much they share:
-//! `χ²/dof = 1 − ρ`, `σ² → σ²(1 + ρ)`.
+//! errors (scatter beyond them) or shows how much of their noise the maps share:
+//! `χ²/dof = 1 − ρ`, `σ² → σ²(1 + (n − 1)ρ)`. What trace and retrace share they share with each other, what the sample
+//! carries (contamination) is in all frames: the lines of a frame are averaged first, then the frames.
+
+use std::borrow::Cow;
+use std::f64::consts::PI;
 
 use nalgebra::{Matrix2, Matrix4, Vector2, Vector3, Vector4};
 use rayon::prelude::*;
 
 use super::defects::{Mask, is_improbable};
 use super::sample::{Grid, LatticeMap, LatticeNode};
+use crate::chi2::enlargement;
 use crate::lattice::LatticeVectors;
 
 /// How well maps agree.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Agreement {
-    /// χ² per degree of freedom of the single maps about their average, over nodes that all cover.
+    /// χ² per degree of freedom of the single maps about their average, over all nodes that two or more cover.
     pub chi2_per_dof: f64,
-    /// Factor on all variances that follows from it.
+    /// Factor on all variances that follows from it, where all maps are there.
     pub factor: f64,
     /// Nodes that two maps or more cover.
     pub nodes: usize,
 }
 
+/// What is done about noise that maps share.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Shared {
+    /// It is in the errors of the average.
+    Counted,
+    /// It is left out where it is common to all frames: it cancels in differences.
+    Cancels,
+}
+
 /// The average of maps of one place; `None` of none. One map alone is returned as it is.
 pub fn combine(maps: &[&LatticeMap]) -> Option<(LatticeMap, Option<Agreement>)> {
-    let [first, rest @ ..] = maps else {
-        return None;
-    };
-    if rest.is_empty() {
-        return Some(((*first).clone(), None));
+    let frames: Vec<Vec<&LatticeMap>> = maps.iter().map(|map| vec![*map]).collect();
+    combine_frames(&frames)
+}
+
+/// The same of the maps of several frames, those of the lines of a frame (trace and retrace) together.
+pub fn combine_frames(frames: &[Vec<&LatticeMap>]) -> Option<(LatticeMap, Option<Agreement>)> {
+    combine_with(frames, Shared::Counted)
+}
+
+/// [`combine_frames`] with a choice of what noise common to all frames is to the errors.
+pub(crate) fn combine_with(
+    frames: &[Vec<&LatticeMap>],
+    shared: Shared,
+) -> Option<(LatticeMap, Option<Agreement>)> {
+    let all: Vec<&LatticeMap> = frames.iter().flatten().copied().collect();
+    if let [alone] = all[..] {
+        return Some((alone.clone(), None));
     }
-    let grid = common_grid(maps)?;
+    let grid = common_grid(&all)?;
+    let frames: Vec<(Cow<LatticeMap>, Option<Agreement>)> = frames
+        .iter()
+        .filter_map(|lines| match lines[..] {
+            [] => None,
+            [line] => Some((Cow::Borrowed(line), None)),
+            _ => {
+                let (map, agreement) = average_of(&grid, lines, Shared::Counted);
+                Some((Cow::Owned(map), agreement))
+            }
+        })
+        .collect();
+    if let [(map, agreement)] = &frames[..] {
+        return Some((map.clone().into_owned(), *agreement));
+    }
+    let maps: Vec<&LatticeMap> = frames.iter().map(|(map, _)| map.as_ref()).collect();
+    Some(average_of(&grid, &maps, shared))
+}
+
+/// The average of maps on a grid.
+fn average_of(
+    grid: &Grid,
+    maps: &[&LatticeMap],
+    shared: Shared,
+) -> (LatticeMap, Option<Agreement>) {
     let views: Vec<View> = maps.iter().filter_map(|map| View::new(map)).collect();
     let mut found: Vec<(LatticeNode, f64, usize)> = (0..grid.len())
         .into_par_iter()
         .map(|node| average(&views, grid.place(node)))
         .collect();
-    let (mut sum, mut freedom, mut nodes) = (0.0, 0, 0);
-    for (node, chi2, dof) in &found {
-        if node.mask == Mask::Good && *dof > 0 {
-            sum += chi2;
-            freedom += dof;
-            nodes += 1;
-        }
-    }
-    let agreement = (freedom > 0).then(|| {
-        let reduced = sum / freedom as f64;
-        let factor = if reduced >= 1.0 {
-            reduced
-        } else {
-            2.0 - reduced
-        };
-        Agreement {
-            chi2_per_dof: reduced,
-            factor,
-            nodes,
-        }
-    });
-    if let Some(agreement) = agreement {
+    let window_nm = maps.iter().map(|m| m.window_nm).fold(0.0, f64::max);
+    let scatter = Scatter::of(&found, grid, window_nm, shared);
+    if let Some(scatter) = &scatter {
         for (node, chi2, dof) in &mut found {
             if *dof > 0 {
-                node.waves.covariance *= agreement.factor;
-                let scaled = *chi2 / agreement.chi2_per_dof.max(1.0);
+                node.waves.covariance *= scatter.factor(1 + *dof / COMPONENTS);
+                let scaled = *chi2 / scatter.reduced.max(1.0);
                 if node.mask == Mask::Good && is_improbable(scaled, *dof) {
                     node.mask = Mask::Contradiction;
                 }
@@ -70,11 +101,73 @@ pub fn combine(maps: &[&LatticeMap]) -> Option<(LatticeMap, Option<Agreement>)> 
         }
     }
     let map = LatticeMap {
-        grid,
-        window_nm: maps.iter().map(|m| m.window_nm).fold(0.0, f64::max),
+        grid: *grid,
+        window_nm,
         nodes: found.into_iter().map(|(node, _, _)| node).collect(),
     };
-    Some((map, agreement))
+    let agreement = scatter.map(|scatter| Agreement {
+        chi2_per_dof: scatter.reduced,
+        factor: scatter.factor(maps.len()),
+        nodes: scatter.nodes,
+    });
+    (map, agreement)
+}
+
+/// Numbers that a node has.
+const COMPONENTS: usize = 4;
+
+/// How maps scatter about their average.
+struct Scatter {
+    /// χ²/dof.
+    reduced: f64,
+    /// What that does to variances if it is too much for chance, else 1.
+    enlargement: f64,
+    /// Correlation ρ of the noise of two maps.
+    correlation: f64,
+    nodes: usize,
+}
+
+impl Scatter {
+    /// From averages with their χ² and degrees of freedom.
+    fn of(
+        found: &[(LatticeNode, f64, usize)],
+        grid: &Grid,
+        window_nm: f64,
+        shared: Shared,
+    ) -> Option<Self> {
+        let (mut sum, mut freedom, mut nodes) = (0.0, 0, 0);
+        for (node, chi2, dof) in found {
+            if node.mask == Mask::Good && *dof > 0 {
+                sum += chi2;
+                freedom += dof;
+                nodes += 1;
+            }
+        }
+        if freedom == 0 {
+            return None;
+        }
+        let reduced = sum / freedom as f64;
+        // Nodes under one window share their noise.
+        let cell = grid.step.determinant().abs();
+        let together = (4.0 * PI * window_nm * window_nm / cell).max(1.0);
+        let independent = (freedom as f64 / together).ceil();
+        Some(Self {
+            reduced,
+            enlargement: enlargement(reduced * independent, independent as usize),
+            // No test for chance here: with many maps the little that it would let pass is much of their mean.
+            correlation: match shared {
+                Shared::Counted => (1.0 - reduced).max(0.0),
+                Shared::Cancels => 0.0,
+            },
+            nodes,
+        })
+    }
+
+    /// On the variances of the average of so many maps.
+    fn factor(&self, maps: usize) -> f64 {
+        self.enlargement
+            .max(1.0 + (maps as f64 - 1.0) * self.correlation)
+    }
 }
 
 /// A square grid along the axes of the laboratory that covers all maps, as fine as the finest.
@@ -142,7 +235,8 @@ impl<'a> View<'a> {
                 return None;
             }
             let cell = t[axis].floor().clamp(0.0, (last - 1.0).max(0.0));
-            Some((cell as usize, (t[axis] - cell).clamp(0.0, 1.0)))
+            // A single node has no next one.
+            Some((cell as usize, (t[axis] - cell).clamp(0.0, last.min(1.0))))
         };
         let ((column, u), (row, v)) = (along(0)?, along(1)?);
         let columns = self.map.grid.size[0];
@@ -236,5 +330,5 @@ fn average(views: &[View], place: Vector2<f64>) -> (LatticeNode, f64, usize) {
         displacement: good[0].displacement,
         displacement_covariance: good[0].displacement_covariance,
     };
-    (node, chi2.sum(), 4 * (good.len() - 1))
+    (node, chi2.sum(), COMPONENTS * (good.len() - 1))
 }

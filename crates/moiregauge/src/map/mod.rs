@@ -35,7 +35,8 @@ mod types;
 mod waves;
 mod window;
 
-pub use combine::{Agreement, combine};
+pub use combine::{Agreement, combine, combine_frames};
+pub(crate) use combine::{Shared, combine_with};
 pub use defects::Mask;
 pub use drift_change::{DriftChange, drift_change};
 pub use quantities::{Plane, TwistStrainMap};
@@ -47,7 +48,8 @@ pub use stripes::{
 };
 pub use summary::Spread;
 pub use survey::Survey;
-pub use types::{Reference, Resolution, UsedHarmonic, WaveMap, WaveNode};
+pub(crate) use types::FULL_WIDTH;
+pub use types::{Reference, Resolution, ResolutionError, UsedHarmonic, WaveMap, WaveNode};
 
 use nalgebra::Vector2;
 

@@ -19,7 +19,63 @@ pub struct Resolution {
 const MARGIN: f64 = 2.0;
 const OF_SIDE: f64 = 0.25;
 
+/// What no image can give.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum ResolutionError {
+    /// The window is wider than the image.
+    #[error(
+        "a window of {window_nm} nm does not fit into this image: its width has to be positive, and {widths} times that \
+         has to fit into the shorter side, {side_nm:.1} nm"
+    )]
+    Window {
+        /// What was asked for.
+        window_nm: f64,
+        /// How many widths have to fit.
+        widths: f64,
+        /// Shorter side of the image.
+        side_nm: f64,
+    },
+    /// The nodes are farther from each other than the image is wide.
+    #[error(
+        "nodes {step_nm} nm apart do not fit into this image: their distance has to be positive and no more than the \
+         shorter side, {side_nm:.1} nm"
+    )]
+    Step {
+        /// What was asked for.
+        step_nm: f64,
+        /// Shorter side of the image.
+        side_nm: f64,
+    },
+}
+
+/// Full width of a Gaussian window at half maximum, in standard deviations.
+pub(crate) const FULL_WIDTH: f64 = 2.35;
+
 impl Resolution {
+    /// Whether a map with this resolution can be made of an image with sides of so many nm, of which `widths` windows
+    /// have to fit into the shorter.
+    ///
+    /// # Errors
+    /// [`ResolutionError`], where not.
+    pub(crate) fn fits(&self, sides: [f64; 2], widths: f64) -> Result<(), ResolutionError> {
+        let side_nm = sides[0].min(sides[1]);
+        if let Some(window_nm) = self.window_nm
+            && !(window_nm > 0.0 && widths * window_nm <= side_nm)
+        {
+            return Err(ResolutionError::Window {
+                window_nm,
+                widths,
+                side_nm,
+            });
+        }
+        match self.step_nm {
+            Some(step_nm) if !(step_nm > 0.0 && step_nm <= side_nm) => {
+                Err(ResolutionError::Step { step_nm, side_nm })
+            }
+            _ => Ok(()),
+        }
+    }
+
     /// The margin, in window widths, of a frame with sides of so many nm.
     pub fn margin_of(&self, window_nm: f64, sides: [f64; 2]) -> f64 {
         let most = OF_SIDE * sides[0].min(sides[1]) / window_nm;

@@ -183,6 +183,9 @@ pub struct Bilayer<'a> {
     pub reference: &'a Material,
     /// Layer 2.
     pub stretched: &'a Material,
+    /// Two wave vectors of the moiré (columns, rad/nm) that belong to the reciprocal vectors of the atoms, if these are
+    /// known: the same lattice has other pairs, too. `None`: those that need the least strain.
+    pub waves: Option<nalgebra::Matrix2<f64>>,
 }
 
 impl<'a> From<&'a Material> for Bilayer<'a> {
@@ -191,6 +194,7 @@ impl<'a> From<&'a Material> for Bilayer<'a> {
         Self {
             reference: material,
             stretched: material,
+            waves: None,
         }
     }
 }

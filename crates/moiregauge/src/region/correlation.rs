@@ -22,7 +22,7 @@ pub(super) struct Pairs {
 }
 
 /// Correlation of the noise of nodes `d` windows apart, d² given.
-fn rho(square: f64) -> f64 {
+pub(super) fn rho(square: f64) -> f64 {
     (1.0 - square / 4.0) * (-square / 4.0).exp()
 }
 

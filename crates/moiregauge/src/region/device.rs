@@ -9,6 +9,7 @@ use rayon::prelude::*;
 
 use super::Region;
 use super::correlation::pairs;
+use super::smoothing::{Bends, Bent};
 use super::statistics::{RegionMean, RegionStatistics};
 use crate::map::{Grid, Mask, TwistStrainMap};
 
@@ -70,7 +71,24 @@ pub fn uniform_areas(map: &TwistStrainMap, search: &DeviceSearch) -> Vec<Device>
                 if sum[0] < search.good * all || sum[0] < 1.0 {
                     return None;
                 }
-                let below = RegionMean::of_sums(sum, &pairs)?.below;
+                let [
+                    good,
+                    twist,
+                    squares,
+                    variances,
+                    weight,
+                    bends,
+                    products,
+                    noise,
+                ] = sum;
+                let values = [good, twist, squares, variances];
+                let bent = Bent {
+                    weight,
+                    bends,
+                    products,
+                    noise,
+                };
+                let below = RegionMean::of_sums(values, (&sums.bends, &bent), &pairs)?.below;
                 below.is_finite().then_some((below, node))
             })
             .collect();
@@ -152,10 +170,12 @@ impl Shape {
     }
 }
 
-/// Sums along each row of nodes: good nodes, their twist, its square and the variance of its noise.
+/// Sums along each row of nodes: good nodes, their twist, its square and the variance of its noise; those with a
+/// curvature, that, its product with the twist, and what noise makes of the product.
 struct RunningSums {
     size: [usize; 2],
-    sums: Vec<[f64; 4]>,
+    sums: Vec<[f64; 8]>,
+    bends: Bends,
 }
 
 impl RunningSums {
@@ -169,28 +189,45 @@ impl RunningSums {
             });
         // Against the mean, so that squares keep their digits.
         let mean = total / count.max(1.0);
+        let bends = Bends::new(map);
+        let twist = |node: usize| {
+            let twist = map.twist.at(node);
+            [twist.value, twist.sigma]
+        };
         let mut sums = Vec::with_capacity(size[1] * (size[0] + 1));
         for row in 0..size[1] {
-            let mut sum = [0.0; 4];
+            let mut sum = [0.0; 8];
             sums.push(sum);
             for node in row * size[0]..(row + 1) * size[0] {
                 if good(node) {
-                    let twist = map.twist.at(node);
-                    let value = twist.value - mean;
-                    let new = [1.0, value, value * value, twist.sigma * twist.sigma];
+                    let [value, sigma] = twist(node);
+                    let value = value - mean;
+                    let none = Bent::default();
+                    let bend = bends.at(map, node, &twist);
+                    let bent = bend.map_or(none, |bend| none.and(1.0, value, bend));
+                    let new = [
+                        1.0,
+                        value,
+                        value * value,
+                        sigma * sigma,
+                        bent.weight,
+                        bent.bends,
+                        bent.products,
+                        bent.noise,
+                    ];
                     sum.iter_mut().zip(new).for_each(|(s, n)| *s += n);
                 }
                 sums.push(sum);
             }
         }
-        Self { size, sums }
+        Self { size, sums, bends }
     }
 
     /// The sums over a box about a node and the number of its nodes; `None` where it leaves the map.
-    fn within(&self, shape: &Shape, node: usize) -> Option<([f64; 4], f64)> {
+    fn within(&self, shape: &Shape, node: usize) -> Option<([f64; 8], f64)> {
         let [columns, rows] = self.size.map(|n| n as i64);
         let (column, row) = (node as i64 % columns, node as i64 / columns);
-        let (mut sum, mut all) = ([0.0; 4], 0);
+        let (mut sum, mut all) = ([0.0; 8], 0);
         for &(up, [first, last]) in &shape.rows {
             let (row, first, last) = (row + up, column + first, column + last);
             if !(0..rows).contains(&row) || first < 0 || last >= columns {
@@ -201,7 +238,7 @@ impl RunningSums {
                 self.sums[(line + first) as usize],
                 self.sums[(line + last + 1) as usize],
             );
-            for i in 0..4 {
+            for i in 0..8 {
                 sum[i] += to[i] - from[i];
             }
             all += last - first + 1;

@@ -6,6 +6,7 @@
 mod correlation;
 mod device;
 mod profile;
+mod smoothing;
 mod statistics;
 mod trend;
 mod wanted;

@@ -3,6 +3,7 @@
 use nalgebra::{Matrix2, Matrix4, Vector2};
 
 use super::correlation::{Pairs, pairs};
+use super::smoothing::{Bends, Bent};
 use super::{Region, mean_wavelength};
 use crate::map::{Mask, Plane, TwistStrainMap};
 use crate::strain::TwistStrain;
@@ -24,16 +25,21 @@ pub struct RegionMean {
     pub spread: f64,
     /// The same without what noise adds, 0 where noise explains it.
     pub corrected: f64,
-    /// What `corrected` does not exceed, with 95 % confidence as far as noise goes.
+    /// What the spread of the lattice does not exceed, with 95 % confidence as far as noise goes, for changes over no
+    /// less than some six windows: noise and `widening` are in it.
     pub below: f64,
+    /// Factor by which the window may have made the spread smaller, as the curvature of the map tells.
+    pub widening: f64,
     /// Root mean square of the errors of the nodes.
     pub noise: f64,
 }
 
 impl RegionMean {
-    /// From sums of weights, values, their squares and variances of their noise.
+    /// From sums of weights, values, their squares and variances of their noise, and those of
+    /// [`Bends::widening`].
     pub(super) fn of_sums(
         [weight, sum, squares, variances]: [f64; 4],
+        (bends, bent): (&Bends, &Bent),
         pairs: &Pairs,
     ) -> Option<Self> {
         if !(weight > 0.0) {
@@ -44,13 +50,15 @@ impl RegionMean {
         let noise = variances / weight;
         let own = variance - noise * (1.0 - pairs.mean).max(0.0);
         let doubt = ((2.0 * noise * noise + 4.0 * own.max(0.0) * noise) * pairs.square).sqrt();
+        let widening = bends.widening([own.max(0.0), doubt], mean, bent);
         Some(Self {
             mean,
             sigma: (noise * pairs.mean).sqrt(),
             blur: 0.0,
             spread: variance.sqrt(),
             corrected: own.max(0.0).sqrt(),
-            below: (own.max(0.0) + 1.645 * doubt).sqrt(),
+            below: (own.max(0.0) + 1.645 * doubt).sqrt() * widening,
+            widening,
             noise: noise.sqrt(),
         })
     }
@@ -66,6 +74,7 @@ impl RegionMean {
             spread: self.spread * size,
             corrected: self.corrected * size,
             below: self.below * size,
+            widening: self.widening,
             noise: self.noise * size,
         }
     }
@@ -80,6 +89,7 @@ struct Area<'a> {
     /// Nodes with weights that make `½ w² ∇²` of a quantity, mean over the area, out of its values.
     curvature: Vec<(usize, f64)>,
     curvature_pairs: Pairs,
+    bends: Bends,
 }
 
 impl<'a> Area<'a> {
@@ -92,6 +102,7 @@ impl<'a> Area<'a> {
         Self {
             pairs: pairs(&map.grid, &nodes, map.window_nm),
             curvature_pairs: pairs(&map.grid, &curvature, map.window_nm),
+            bends: Bends::new(map),
             map,
             nodes,
             curvature,
@@ -115,7 +126,14 @@ impl<'a> Area<'a> {
                 s[3] + w * sigma * sigma,
             ]
         });
-        let found = RegionMean::of_sums(sums, &self.pairs)?;
+        let all = self.nodes.iter();
+        let bent = all.fold(Bent::default(), |sums, &(n, w)| {
+            match self.bends.at(self.map, n, value) {
+                Some(bend) => sums.and(w, value(n)[0] - offset, bend),
+                None => sums,
+            }
+        });
+        let found = RegionMean::of_sums(sums, (&self.bends, &bent), &self.pairs)?;
         let bend: f64 = self.curvature.iter().map(|&(n, w)| w * value(n)[0]).sum();
         let by_noise = found.noise * found.noise * self.curvature_pairs.mean;
         let blur = (bend * bend - by_noise).max(0.0);

@@ -375,7 +375,8 @@ fn errors_of_means_are_those_of_the_noise() {
                     strains[i].push(e.mean / noise(&e));
                 }
                 // Truth: no spread. `corrected` is significant if `below` were far from it.
-                let doubt = (twist.below.powi(2) - twist.corrected.powi(2)) / 1.645;
+                let limit = twist.below / twist.widening;
+                let doubt = (limit.powi(2) - twist.corrected.powi(2)) / 1.645;
                 exceeded += usize::from(twist.corrected.powi(2) > 1.645 * doubt);
                 all += 1;
             }
@@ -446,4 +447,89 @@ fn trends_have_honest_errors() {
         assert!((0.6..1.45).contains(&rms(p)), "{} {pulls:?}", rms(p));
     }
     assert!(left < 0.3 * noise, "{left} {noise}");
+}
+
+/// A lattice that changes by ripples with `k w = kappa`, on windows of w = 14 pixels.
+fn ripples(kappa: f64, seed: u64) -> FieldScene {
+    let mut scene = FieldScene::hexagonal([288, 256], 20.0, 0.3);
+    (scene.white, scene.seed) = (0.4, seed);
+    // Near the direction that changes the lengths of the waves, and so the twist, most.
+    let direction = -0.34 + 0.4 * (seed as f64).sin();
+    // Wave vectors change by the same share of a per cent, however long the ripples are.
+    let depth = 0.0035 * 14.0 / kappa;
+    scene.ripples = vec![Ripple {
+        wave: Vector2::new(direction.cos(), direction.sin()) * (kappa / 14.0),
+        phase: 0.7 * seed as f64,
+        amplitude: [depth, -0.6 * depth],
+    }];
+    scene
+}
+
+/// The twist of a scene at places evenly over a box, nm.
+fn twists(scene: &FieldScene, centre: [f64; 2], size: [f64; 2]) -> Vec<f64> {
+    let place = |i: u32| {
+        let share = Vector2::new(f64::from(i % 40), f64::from(i / 40)) / 40.0;
+        let away = share.add_scalar(0.0125 - 0.5);
+        Vector2::from(centre) + Vector2::new(away.x * size[0], away.y * size[1])
+    };
+    (0..1600)
+        .map(|i| exact_twist(&scene.waves(place(i) * 2.0)))
+        .collect()
+}
+
+/// The upper limit of a spread holds what the window takes off it; of a trend over the frame it takes off next to nothing.
+#[test]
+fn the_limit_of_a_spread_knows_the_smoothing() {
+    let (centre, size) = ([72.0, 64.0], [80.0, 60.0]);
+    for kappa in [0.5, 0.8, 1.1, 1.4] {
+        let (mut held, mut held_without) = (0, 0);
+        let (mut limits, mut spreads) = (0.0, 0.0);
+        for seed in 0..12 {
+            let scene = ripples(kappa, seed);
+            let (map, _) = mapped(&scene);
+            let region = Region::turned_rectangle("r", centre.into(), size, 0.0);
+            let found = RegionStatistics::new(&map, &region).twist.unwrap();
+            let truth = twists(&scene, centre, size);
+            let mean = truth.iter().sum::<f64>() / truth.len() as f64;
+            let spread = rms(&truth.iter().map(|t| t - mean).collect::<Vec<_>>());
+            held += usize::from(spread < found.below);
+            held_without += usize::from(spread < found.below / found.widening);
+            limits += found.below.powi(2);
+            spreads += spread.powi(2);
+        }
+        assert!(held >= 11, "{kappa}: {held} of 12");
+        // A limit that is anything would hold, too.
+        assert!(limits < 4.0 * spreads, "{kappa}: {limits} {spreads}");
+        if kappa > 1.0 {
+            assert!(held_without < 6, "{kappa}: {held_without}");
+        }
+    }
+    let trend = made(|p| 0.02 + 1e-5 * p.x, 1e-6);
+    let region = Region::rectangle("r", Vector2::new(20.0, 20.0), [80.0, 60.0]);
+    let found = RegionStatistics::new(&trend, &region).twist.unwrap();
+    // The window leaves a trend as it is.
+    assert!((found.widening - 1.0).abs() < 0.02, "{found:?}");
+}
+
+/// What the window does to the share of a wanted twist is said beside it.
+#[test]
+fn the_share_of_a_wanted_twist_knows_the_smoothing() {
+    let (mut off, mut said) = (0.0, 0.0);
+    for seed in 0..6 {
+        let scene = ripples(1.1, seed);
+        let (map, mean) = mapped(&scene);
+        let wanted = WantedTwist {
+            twist: mean,
+            within: 6e-5,
+        };
+        let found = WantedArea::new(&map, 0..map.grid.len(), &wanted).unwrap();
+        let truth = twists(&scene, [72.0, 64.0], [116.0, 100.0]);
+        let within = truth.iter().filter(|t| (*t - mean).abs() < wanted.within);
+        off += found.corrected - within.count() as f64 / truth.len() as f64;
+        said += found.blur;
+    }
+    assert!(
+        off > 0.3 && said > 0.5 * off && said < 1.5 * off,
+        "{off} {said}"
+    );
 }

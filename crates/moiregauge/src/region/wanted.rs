@@ -4,9 +4,11 @@
 //! node is its value and its error; what the map says of all nodes is their mean μ and their spread without
 //! noise, √v. Together (normal distributions): the true twist of a node measured as x ± σ has the mean
 //! `μ + (x − μ) v/(v + σ²)` and the variance `vσ²/(v + σ²)`. The area is the mean probability of the nodes.
+//! The window draws twists towards their mean, too; how far that may move the answer is said beside it.
 
 use std::f64::consts::SQRT_2;
 
+use super::smoothing::{Bends, Bent};
 use crate::map::{Mask, TwistStrainMap};
 
 /// A twist that a device is to have.
@@ -27,6 +29,8 @@ pub struct WantedArea {
     pub measured: f64,
     /// Share expected without noise.
     pub corrected: f64,
+    /// How far the window may have moved that, as the curvature of the map tells: it draws twists towards their mean.
+    pub blur: f64,
     /// Share that is within the limits by two σ of its own.
     pub certain: f64,
     /// Share that is not beyond them by two σ.
@@ -40,12 +44,12 @@ impl WantedArea {
         nodes: impl IntoIterator<Item = usize>,
         wanted: &WantedTwist,
     ) -> Option<Self> {
-        let found: Vec<[f64; 2]> = nodes
+        let twist = |n: usize| [map.twist.at(n).value, map.twist.at(n).sigma];
+        let nodes: Vec<usize> = nodes
             .into_iter()
-            .filter(|&n| map.mask[n] == Mask::Good)
-            .map(|n| [map.twist.at(n).value, map.twist.at(n).sigma])
-            .filter(|v| v.iter().all(|x| x.is_finite()))
+            .filter(|&n| map.mask[n] == Mask::Good && twist(n).iter().all(|x| x.is_finite()))
             .collect();
+        let found: Vec<[f64; 2]> = nodes.iter().map(|&n| twist(n)).collect();
         let count = found.len() as f64;
         if found.is_empty() {
             return None;
@@ -61,19 +65,34 @@ impl WantedArea {
         };
         let off = |x: f64| (x - wanted.twist).abs();
         let one = |yes: bool| f64::from(u8::from(yes));
-        Some(Self {
-            nodes: found.len(),
-            measured: share(&|x, _| one(off(x) <= wanted.within)),
-            corrected: share(&|x, sigma| {
+        // The share if all twists lie farther from their mean by a factor.
+        let expected = |stretch: f64| {
+            share(&|x, sigma| {
                 let noise = sigma * sigma;
                 let weight = if noise > 0.0 {
                     variance / (variance + noise)
                 } else {
                     1.0
                 };
-                let best = mean + weight * (x - mean);
-                within(best - wanted.twist, (weight * noise).sqrt(), wanted.within)
-            }),
+                let best = mean + stretch * weight * (x - mean);
+                let doubt = stretch * (weight * noise).sqrt();
+                within(best - wanted.twist, doubt, wanted.within)
+            })
+        };
+        let bends = Bends::new(map);
+        let bent = nodes
+            .iter()
+            .fold(Bent::default(), |sums, &n| match bends.at(map, n, &twist) {
+                Some(bend) => sums.and(1.0, twist(n)[0] - mean, bend),
+                None => sums,
+            });
+        let corrected = expected(1.0);
+        Some(Self {
+            nodes: found.len(),
+            measured: share(&|x, _| one(off(x) <= wanted.within)),
+            corrected,
+            // Doubt about a spread of many nodes is small.
+            blur: (expected(bends.widening([variance, 0.0], 0.0, &bent)) - corrected).abs(),
             certain: share(&|x, sigma| one(off(x) + 2.0 * sigma <= wanted.within)),
             possible: share(&|x, sigma| one(off(x) - 2.0 * sigma <= wanted.within)),
         })

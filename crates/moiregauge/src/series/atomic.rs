@@ -14,20 +14,30 @@
 //! rests on one direction, which errors of the calibration turn: by half the mismatch and half the error
 //! of the right angle.
 
-use nalgebra::{Complex, Matrix2, Matrix4, RowVector4, Vector2};
+use nalgebra::{Matrix2, Matrix4, RowVector4, Vector2};
 
+use super::alike::{Alike, alike};
+use super::identity::once;
 use super::measure::MeasuredScan;
 use crate::caveat::Caveat;
 use crate::chi2::enlargement;
 use crate::drift::{Observation, solve};
 use crate::estimate::Estimate;
 use crate::lattice::LatticeVectors;
-use crate::lattice::reciprocal::canonical;
+use crate::lattice::known::{names, parts};
 use crate::material::Material;
 use crate::settings::{Calibration, KnownOrientation, LatticeDirection};
 
 /// A lattice whose size differs from that of the material by more is another one.
 const LARGEST_ERROR: f64 = 0.15;
+/// A lattice free of drift that is further from the shape of the material's (`|q|/|p|`) is another one.
+const LARGEST_DISTORTION: f64 = 0.1;
+/// Frames up and down that a constant drift does not make of one another to this share contradict each other.
+const LARGEST_MISFIT: f64 = 0.05;
+/// With frames of one direction, another orientation with a distortion that is larger by less than this is as good.
+const AMBIGUOUS: f64 = 0.1;
+/// Orientations that differ by less are the same, rad.
+const SAME_ANGLE: f64 = 1e-3;
 /// χ²/dof beyond which the scatter of the images deserves a word.
 const LARGE_SCATTER: f64 = 2.0;
 /// A size off by more than this many per cent of the priors deserves a word.
@@ -87,6 +97,40 @@ pub enum AtomicError {
         /// By how much the lattice that was found is larger.
         percent: f64,
     },
+    /// Another lattice, by its shape.
+    #[error(
+        "expected the lattice of {material} in the atomic images, found one that is {percent:.0} % longer along one \
+         direction than along another: another layer, another lattice in one of the frames, or drift that changes. Faster \
+         lines and smaller frames make the drift matter less"
+    )]
+    OtherShape {
+        /// The layer that was expected.
+        material: String,
+        /// How much longer one direction is than the one across it, per cent.
+        percent: f64,
+    },
+    /// Frames up and down that contradict each other.
+    #[error(
+        "no constant drift makes the atomic frames upwards and downwards the same lattice (they miss by \
+         {misfit_percent:.0} %): one of them shows another one, or the drift changed or moved the sample too far within a \
+         frame. Faster lines and smaller frames make the drift matter less"
+    )]
+    Drift {
+        /// What the best drift leaves, as a share of the lattice vectors, per cent.
+        misfit_percent: f64,
+    },
+    /// Frames of one direction, too distorted.
+    #[error(
+        "the atomic images are all of one frame direction, and drift distorts them so much that orientations of \
+         {first_deg:.1}° and of {second_deg:.1}° explain them as well: frames up and down tell, and so do faster lines and \
+         smaller frames"
+    )]
+    Ambiguous {
+        /// The orientation with the least distortion, degrees.
+        first_deg: f64,
+        /// The next one.
+        second_deg: f64,
+    },
     /// No area, or a time gradient along both axes.
     #[error("the lattice of the atomic images cannot be used")]
     Degenerate,
@@ -102,22 +146,27 @@ pub fn atomic_orientation(
     layer: u8,
     calibration: &Calibration,
 ) -> Result<AtomicOrientation, AtomicError> {
-    let first = scans.iter().find_map(|s| s.lines.first());
-    let reference = first.ok_or(AtomicError::Nothing)?.in_sensor_coordinates();
-    let reference = canonical(&reference).basis;
-    let mut observations = Vec::new();
-    for scan in scans {
-        for line in &scan.lines {
-            if line.timing.is_none() {
-                return Err(AtomicError::NoTiming(scan.file.clone()));
-            }
-            observations.push(line.observation(&reference));
-        }
+    let (scans, repeats) = once(scans.to_vec());
+    let timeless = |scan: &&MeasuredScan| scan.lines.iter().any(|line| line.timing.is_none());
+    if let Some(scan) = scans.iter().find(timeless) {
+        return Err(AtomicError::NoTiming(scan.file.clone()));
+    }
+    let atoms = material.atomic_pair();
+    let lines = scans.iter().flat_map(|scan| &scan.lines);
+    let Alike {
+        observations,
+        misfit,
+        ..
+    } = alike(lines, &atoms).ok_or(AtomicError::Nothing)?;
+    if misfit > LARGEST_MISFIT {
+        return Err(AtomicError::Drift {
+            misfit_percent: 100.0 * misfit,
+        });
     }
     let mut caveats: Vec<Caveat> = scans.iter().flat_map(|s| s.caveats.clone()).collect();
+    caveats.extend(repeats);
     let files: Vec<String> = scans.iter().map(|s| s.file.clone()).collect();
     let place = files.join(", ");
-    let atoms = material.atomic_pair();
     let found = if let Ok(solution) = solve(&observations) {
         let scale = enlargement(solution.chi2, solution.degrees_of_freedom);
         if scale > LARGE_SCATTER {
@@ -151,7 +200,13 @@ pub fn atomic_orientation(
         ));
         one_direction(&observations, material, calibration)?
     };
-    let off = found.shape.0 - 1.0;
+    let (off, distortion) = (found.shape.0 - 1.0, found.shape.1);
+    if found.drift.is_some() && distortion > LARGEST_DISTORTION {
+        return Err(AtomicError::OtherShape {
+            material: material.name.clone(),
+            percent: 200.0 * distortion,
+        });
+    }
     if off.abs() > LARGEST_ERROR {
         return Err(AtomicError::OtherLattice {
             material: material.name.clone(),
@@ -225,14 +280,6 @@ fn deformation(
     (f.determinant() > 0.0).then_some((best, f))
 }
 
-/// The isotropic part, with the turn, and the anisotropic part.
-fn parts(f: &Matrix2<f64>) -> (Complex<f64>, Complex<f64>) {
-    (
-        Complex::new(f.m11 + f.m22, f.m21 - f.m12) / 2.0,
-        Complex::new(f.m11 - f.m22, f.m21 + f.m12) / 2.0,
-    )
-}
-
 /// Size, distortion and turn of a lattice that is free of drift.
 fn turned(
     lattice: &LatticeVectors,
@@ -253,6 +300,50 @@ fn turned(
     ))
 }
 
+/// The turn of the direction along which no time passes, and by how much it is longer.
+fn turn_of_fast_axis(f: &Matrix2<f64>, time_gradient: &Vector2<f64>) -> (f64, f64) {
+    let w = f.transpose() * time_gradient;
+    let along = Vector2::new(w.y, -w.x);
+    let image = f * along;
+    (
+        (along.perp(&image)).atan2(along.dot(&image)),
+        image.norm() / along.norm(),
+    )
+}
+
+/// Refuses a lattice that another orientation of the material explains with nearly as little distortion.
+fn unambiguous(
+    lattice: &LatticeVectors,
+    atoms: &Matrix2<f64>,
+    time_gradient: &Vector2<f64>,
+    period: f64,
+) -> Result<(), AtomicError> {
+    let inverse = atoms.try_inverse().ok_or(AtomicError::Degenerate)?;
+    let of = |f: &Matrix2<f64>| {
+        let (p, q) = parts(f);
+        (q.norm() / p.norm(), turn_of_fast_axis(f, time_gradient))
+    };
+    let (least, (angle, _)) = of(&(lattice.basis * inverse));
+    let apart = |other: f64| {
+        let turns = (other - angle) / period;
+        (turns - turns.round()).abs() * period
+    };
+    let others = names()
+        .map(|name| lattice.basis * name * inverse)
+        .filter(|f| f.determinant() > 0.0)
+        .map(|f| of(&f))
+        .filter(|(distortion, _)| *distortion < least + AMBIGUOUS)
+        .find(|(_, (other, length))| {
+            apart(*other) > SAME_ANGLE && (length - 1.0).abs() < LARGEST_ERROR
+        });
+    others.map_or(Ok(()), |(_, (other, _))| {
+        Err(AtomicError::Ambiguous {
+            first_deg: angle.rem_euclid(period).to_degrees(),
+            second_deg: other.rem_euclid(period).to_degrees(),
+        })
+    })
+}
+
 /// The turn of the direction along which no time passes, averaged over the images.
 fn one_direction(
     observations: &[Observation],
@@ -269,16 +360,9 @@ fn one_direction(
         if !(u.norm() > 0.0) {
             return Err(AtomicError::Degenerate);
         }
-        let turn = |f: &Matrix2<f64>| {
-            let w = f.transpose() * u;
-            let along = Vector2::new(w.y, -w.x);
-            let image = f * along;
-            (
-                (along.perp(&image)).atan2(along.dot(&image)),
-                image.norm() / along.norm(),
-            )
-        };
+        let turn = |f: &Matrix2<f64>| turn_of_fast_axis(f, &u);
         let (angle, length) = turn(&f);
+        unambiguous(&lattice, &atoms, &u, material.rotation_period())?;
         let step = 1e-6;
         let slopes = RowVector4::from_fn(|_, component| {
             let side = |sign: f64| {

@@ -15,7 +15,9 @@
 use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
 use spmfile::{FrameDirection, LineDirection};
 
+use super::alike::{Alike, alike};
 use super::group::{Group, groups};
+use super::identity::once;
 use super::measure::{MeasuredLine, MeasuredScan};
 use crate::analysis::Axis;
 use crate::calibration::{Calibration, Coordinates, KnownLattice, Shown, shown};
@@ -25,13 +27,16 @@ use crate::drift::{Observation, common_lattice, solve};
 use crate::estimate::Estimate;
 use crate::geometry::Timing;
 use crate::lattice::LatticeVectors;
-use crate::lattice::reciprocal::canonical;
 use crate::settings::Grouping;
 
 /// Another way of naming the vectors that is not this much more distorted is a doubt.
 const AMBIGUOUS: f64 = 0.1;
-/// Lattices of trace and retrace, up and down, that differ by more than this share are of different things.
+/// Lattices of frames of one direction that differ by more than this share are of different things.
 const SAME: f64 = 0.35;
+/// Frames up and down that a constant drift does not make of one another to this share are not used.
+const LARGEST_MISFIT: f64 = 0.05;
+/// A drift of this share of the speed of the slow axis deserves a word.
+const LARGE_DRIFT: f64 = 0.2;
 /// χ²/dof of a set or between sets beyond which its scatter deserves a word.
 const LARGE_CHI2: f64 = 2.0;
 
@@ -97,6 +102,18 @@ pub enum CalibrateError {
          them apart"
     )]
     Mixed,
+    /// Frames up and down that contradict each other.
+    #[error(
+        "{set}: no constant drift makes the frames upwards and downwards the same lattice (they miss by \
+         {misfit_percent:.0} %): one of them shows another one, or the drift changed within the frames or moved the sample \
+         too far. Faster lines and smaller frames make the drift matter less"
+    )]
+    Drift {
+        /// The set.
+        set: String,
+        /// What the best drift leaves, as a share of the lattice vectors, per cent.
+        misfit_percent: f64,
+    },
     /// The vectors of a set cannot be used.
     #[error("{0}: the lattice of these scans cannot be compared with the known one")]
     Lattice(String),
@@ -127,8 +144,13 @@ pub fn calibrate(
     drift_sigma: f64,
     grouping: Grouping,
 ) -> Result<Calibrated, CalibrateError> {
-    let cell = known.cell().ok_or(CalibrateError::Cell)?;
+    let cell = known
+        .cell()
+        .filter(|_| known.problem().is_none())
+        .ok_or(CalibrateError::Cell)?;
+    let (scans, repeats) = once(scans);
     let mut caveats: Vec<Caveat> = scans.iter().flat_map(|s| s.caveats.clone()).collect();
+    caveats.extend(repeats);
     caveats.retain(|c| c.code != "no-position-sensors" && c.code != "second-lattice");
     let from_sensors = |line: &MeasuredLine| line.geometry.from_sensors;
     let lines = || scans.iter().flat_map(|s| &s.lines);
@@ -179,6 +201,7 @@ pub fn calibrate(
         line_rates_hz: rates,
         ..Calibration::new(&values, &covariance, coordinates)
     };
+    about_plausibility(&calibration, covariance_known, &mut caveats);
     let map = calibration
         .map()
         .ok_or_else(|| CalibrateError::Lattice("all sets".to_owned()))?;
@@ -214,13 +237,9 @@ fn see(
             .iter()
             .flat_map(|s| s.lines.iter().map(move |l| (s, l)))
     };
-    let first = lines().next().ok_or(CalibrateError::Nothing)?.1;
-    let reference = canonical(&first.in_sensor_coordinates()).basis;
-    let observations: Vec<Observation> = lines().map(|(_, l)| l.observation(&reference)).collect();
-    let strange = |o: &Observation| (o.lattice.basis - reference).norm() > SAME * reference.norm();
-    if observations.iter().any(strange) {
-        return Err(unusable());
-    }
+    let found = alike(lines().map(|(_, l)| l), cell).ok_or(CalibrateError::Nothing)?;
+    about_one_drift(&name, &found, caveats)?;
+    let observations = found.observations;
     let timed = lines().all(|(_, l)| l.timing.is_some());
     if timed && let Ok(solution) = solve(&observations) {
         let scale = enlargement(solution.chi2, solution.degrees_of_freedom);
@@ -283,6 +302,45 @@ fn see(
     })
 }
 
+/// Whether one drift explains the frames: an error where none does, a word where it is large.
+fn about_one_drift(
+    name: &str,
+    found: &Alike,
+    caveats: &mut Vec<Caveat>,
+) -> Result<(), CalibrateError> {
+    let along = found.observations[0].time_gradient;
+    for sense in [1.0, -1.0] {
+        let of_sense = |o: &&Observation| sense * o.time_gradient.dot(&along) >= 0.0;
+        let mut same = found.observations.iter().filter(of_sense);
+        let Some(first) = same.next().map(|o| o.lattice.basis) else {
+            continue;
+        };
+        if same.any(|o| (o.lattice.basis - first).norm() > SAME * first.norm()) {
+            return Err(CalibrateError::Lattice(name.to_owned()));
+        }
+    }
+    if found.misfit > LARGEST_MISFIT {
+        return Err(CalibrateError::Drift {
+            set: name.to_owned(),
+            misfit_percent: 100.0 * found.misfit,
+        });
+    }
+    if found.drift > LARGE_DRIFT {
+        caveats.push(Caveat::new(
+            "large-drift",
+            name,
+            format!(
+                "the sample drifts at {:.0} % of the speed at which lines follow each other. A constant drift is taken \
+                 out exactly, but one that changes by a tenth during a frame makes errors of {:.0} %: faster lines or \
+                 smaller frames make them smaller",
+                100.0 * found.drift,
+                10.0 * found.drift
+            ),
+        ));
+    }
+    Ok(())
+}
+
 /// The time gradient of a line, s/nm; with a line rate alone, that of a frame upwards.
 fn gradient(scan: &MeasuredScan, line: &MeasuredLine) -> Option<Vector2<f64>> {
     let up = || {
@@ -334,6 +392,25 @@ fn summary(seen: Seen, map: &Matrix2<f64>, coordinates: Coordinates, used: bool)
             [0, 1].map(|i| Estimate::from_variance(velocity[i], covariance[(i, i)]))
         }),
         used,
+    }
+}
+
+/// Whether a scanner can be like that.
+fn about_plausibility(calibration: &Calibration, known: bool, caveats: &mut Vec<Caveat>) {
+    if let Some(problem) = calibration.problem() {
+        caveats.push(Caveat::new(
+            "calibration-implausible",
+            "calibration",
+            format!("no scanner can be like that, and nothing is corrected with it: {problem}"),
+        ));
+    } else if let Some(what) = calibration.unusual().filter(|_| known) {
+        caveats.push(Caveat::new(
+            "calibration-unusual",
+            "calibration",
+            format!(
+                "a scanner rarely has a {what}: make sure that the images show the known lattice and have the right size"
+            ),
+        ));
     }
 }
 

@@ -12,11 +12,15 @@ use crate::caveat::Caveat;
 use crate::chi2::enlargement;
 use crate::joint::JointFit;
 use crate::lattice::LatticeVectors;
-use crate::readings::{Readings, caveats as about_readings};
+use crate::readings::{Readings, WaveStrengths, caveats as about_readings};
 use crate::settings::Settings;
 
-/// Wavelengths that differ by more than this are not of the same lattice.
+/// Wavelengths that differ by more than this are not of the same lattice, …
 const SAME_LATTICE: f64 = 0.05;
+/// … nor are those that differ by more than this if their errors do not explain it: χ² of four components beyond
+/// `NO_CHANCE` (p = 4·10⁻¹⁰).
+const NEARLY_SAME: f64 = 0.02;
+const NO_CHANCE: f64 = 50.0;
 /// χ² of two components beyond which the drift of a set is not that of all sets.
 const CONTRADICTION: f64 = 18.4;
 /// χ²/dof of all sets over that of the single ones beyond which they have no drift in common.
@@ -30,24 +34,31 @@ pub(super) fn combine(
     sets: &[SetAnalysis],
     joint: Option<(&[&MeasuredScan], Matrix2<f64>)>,
     settings: &Settings,
+    strengths: &WaveStrengths,
     caveats: &mut Vec<Caveat>,
 ) -> Option<Combined> {
     let means: Vec<&SetMean> = sets.iter().filter_map(|s| s.mean.as_ref()).collect();
     let first = means.first()?;
-    let different = means.iter().any(|m| {
-        (m.lattice.basis - first.lattice.basis).norm() > SAME_LATTICE * first.lattice.basis.norm()
-    });
-    if different {
+    let others = means.iter().map(|m| &m.lattice);
+    let largest = others
+        .filter(|other| are_different(&first.lattice, other))
+        .map(|other| (other.basis - first.lattice.basis).norm() / first.lattice.basis.norm())
+        .reduce(f64::max);
+    if let Some(largest) = largest {
         caveats.push(Caveat::new(
             "different-lattices",
             "analysis",
-            "the sets show lattices that differ by more than 5 %: they are not of the same place or \
-             sample, and are not combined",
+            format!(
+                "the sets show lattices that differ by up to {:.1} %: they are not of the same place or \
+                 sample, and are not combined",
+                100.0 * largest
+            ),
         ));
         return None;
     }
     let (mut lattice, mut statistical) = weighted_mean(&means)?;
     let (mut joint_terms, mut drift, mut checks) = (None, None, None);
+    let mut path = None;
     if let ([one], Some(set)) = (sets, sets.first()) {
         // Nothing to combine: the set has it all.
         (lattice, statistical) = (first.lattice, first.budget.statistical);
@@ -64,6 +75,7 @@ pub(super) fn combine(
                     (lattice, statistical) = fitted;
                 }
                 joint_terms = Some(terms(&fit));
+                path = Some(fit.path());
                 drift = Some(Drift {
                     velocity: fit.velocity,
                     covariance: fit.velocity_covariance,
@@ -103,7 +115,7 @@ pub(super) fn combine(
     }
     let twist_strain = moire(&lattice, settings)?;
     let budget = Budget::new(&lattice, &twist_strain, &statistical, settings);
-    let readings = Readings::new(&lattice, &twist_strain, &budget, settings);
+    let readings = Readings::new(&lattice, &twist_strain, &budget, strengths, settings);
     if sets.len() > 1 {
         let found = about_readings("analysis", &lattice, &twist_strain, &readings, settings);
         caveats.extend(found);
@@ -115,9 +127,19 @@ pub(super) fn combine(
         twist_strain,
         joint: joint_terms,
         drift,
+        path,
         checks,
         consistency,
     })
+}
+
+/// Whether two lattices are of different samples or places.
+fn are_different(a: &LatticeVectors, b: &LatticeVectors) -> bool {
+    let share = (b.basis - a.basis).norm() / a.basis.norm();
+    let difference = b.flat() - a.flat();
+    let inverse = (a.covariance + b.covariance).try_inverse();
+    let chi2 = inverse.map_or(0.0, |inverse| difference.dot(&(inverse * difference)));
+    share > SAME_LATTICE || (share > NEARLY_SAME && chi2 > NO_CHANCE)
 }
 
 /// The joint fit of all sets, or why it does not describe them.

@@ -1,6 +1,6 @@
 //! Scans that were analysed → their nodes and triangles on the sample, at small angles.
 
-use spmfile::{DateTime, Scan};
+use spmfile::Scan;
 
 use super::mapping::{Frame, drifted, frame, pitch};
 use super::measure::{channels, image_of};
@@ -13,7 +13,7 @@ use crate::settings::Settings;
 /// `origin` as for [`super::map_scan`].
 pub fn domains_of_scan(
     scan: &Scan,
-    (analysed, origin): (&ScanAnalysis, Option<DateTime>),
+    (analysed, origin): (&ScanAnalysis, Option<f64>),
     settings: &Settings,
     contrast: Contrast,
 ) -> Vec<DomainMap> {

@@ -6,7 +6,7 @@ use super::measure::MeasuredScan;
 use crate::analysis::Axis;
 use crate::settings::Grouping;
 
-/// The scans of one set, in order of time.
+/// The scans of one set, in order of time; at the end those that repeat others.
 pub(super) struct Group {
     pub(super) name: String,
     pub(super) slow_axis: Axis,
@@ -15,9 +15,10 @@ pub(super) struct Group {
     pub(super) scans: Vec<MeasuredScan>,
 }
 
-/// Groups scans; the groups are in order of their first scans.
+/// Groups scans; the groups are in order of their first scans. Scans that repeat others go with them.
 pub(super) fn groups(mut scans: Vec<MeasuredScan>, grouping: Grouping) -> Vec<Group> {
     scans.sort_by(by_time);
+    let (repeated, scans): (Vec<_>, Vec<_>) = scans.into_iter().partition(|s| s.repeats.is_some());
     let mut groups: Vec<Group> = Vec::new();
     for scan in scans {
         let Some(line) = scan.lines.first() else {
@@ -63,11 +64,20 @@ pub(super) fn groups(mut scans: Vec<MeasuredScan>, grouping: Grouping) -> Vec<Gr
         }
     }
     name(&mut groups);
+    for scan in repeated {
+        let with = |group: &&mut Group| {
+            let mut files = group.scans.iter().map(|s| &s.file);
+            files.any(|file| Some(file) == scan.repeats.as_ref())
+        };
+        if let Some(group) = groups.iter_mut().find(with) {
+            group.scans.push(scan);
+        }
+    }
     groups
 }
 
 /// The folder part of a path, whatever its separators.
-fn folder(file: &str) -> &str {
+pub(super) fn folder(file: &str) -> &str {
     file.rfind(['/', '\\']).map_or("", |i| &file[..i])
 }
 

@@ -4,18 +4,19 @@
 
 use nalgebra::Matrix2;
 use nalgebra::Vector2;
-use spmfile::{Channel, DateTime, FrameDirection, LineDirection, Scan};
+use spmfile::{Channel, FrameDirection, LineDirection, Scan};
 
 use super::measure::{channels, image_of};
 use super::positions::{nominal, usable_sensors};
 use super::scanner::calibrated;
-use super::sightings::seconds;
 use super::tiling::tile_map;
 use crate::analysis::ScanAnalysis;
 use crate::background::remove_background;
 use crate::geometry::{Geometry, Timing};
 use crate::lattice::reciprocal::reciprocal;
-use crate::map::{LatticeMap, Reference, Resolution, UsedHarmonic, local_lattices};
+use crate::map::{
+    FULL_WIDTH, LatticeMap, Reference, Resolution, ResolutionError, UsedHarmonic, local_lattices,
+};
 use crate::resample::at_rest;
 use crate::settings::Settings;
 
@@ -55,9 +56,12 @@ pub enum MapMethod {
 }
 
 /// Why an image gives no map.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum MapError {
+    /// No image of this size has such a map.
+    #[error(transparent)]
+    Resolution(#[from] ResolutionError),
     /// Neither trace nor retrace of the scan was analysed, or it has no size.
     #[error("no analysed image with a size")]
     NoImage,
@@ -71,14 +75,14 @@ pub enum MapError {
 
 /// Maps the images behind `analysed`, drift and sensors taken into account as there.
 ///
-/// `origin` is the time at which places on the sample are meant, that of the first scan. By tiles, the window
-/// of `resolution` is the side of a tile.
+/// `origin` is the time at which places on the sample are meant, that of the middle of the first frame
+/// ([`crate::analysis::Motion`]). By tiles, the window of `resolution` is the side of a tile.
 ///
 /// # Errors
 /// [`MapError`], where none of its images gives a map.
 pub fn map_scan(
     scan: &Scan,
-    (analysed, origin): (&ScanAnalysis, Option<DateTime>),
+    (analysed, origin): (&ScanAnalysis, Option<f64>),
     settings: &Settings,
     (method, resolution): (MapMethod, &Resolution),
 ) -> Result<Vec<LineMap>, MapError> {
@@ -100,10 +104,10 @@ pub fn map_scan(
     }
 }
 
-/// How far the sample drifted from `origin` until the scan.
-pub(super) fn drifted(analysed: &ScanAnalysis, origin: Option<DateTime>) -> Vector2<f64> {
-    match (analysed.drift, analysed.acquired, origin) {
-        (Some(drift), Some(now), Some(then)) => drift * (seconds(now) - seconds(then)),
+/// How far the sample drifted from `origin` until the middle of the scan.
+pub(super) fn drifted(analysed: &ScanAnalysis, origin: Option<f64>) -> Vector2<f64> {
+    match (analysed.motion, origin) {
+        (Some(motion), Some(then)) => motion.path.between(then, motion.middle),
         _ => Vector2::zeros(),
     }
 }
@@ -127,6 +131,12 @@ fn map_line(
         pitch: pitch(&geometry),
     };
     let placed = still.as_ref().unwrap_or(&geometry);
+    let widths = match method {
+        MapMethod::Demodulation => FULL_WIDTH,
+        // The window is the side of a tile.
+        MapMethod::Tiles => 1.0,
+    };
+    resolution.fits(geometry.extent(), widths)?;
     let (map, harmonics, noise_measured, margin) = match method {
         MapMethod::Demodulation => {
             let image = remove_background(&image_of(channel), settings.background);

@@ -5,11 +5,13 @@ use spmfile::{Channel, DateTime, FrameDirection, LineDirection, Scan};
 
 use super::channel::{choose_channel, stem};
 use super::doubts::{about_fit, few_periods, lines_disagree, turned};
+use super::identity::Fingerprint;
 use super::moires::in_order;
 use super::overlap::Window;
 use super::positions::{nominal, speeds, usable_sensors};
 use super::scanner::{about_calibration, calibrated};
 use super::shared::correlation;
+use crate::calibration::Calibration;
 use crate::caveat::Caveat;
 use crate::drift::Observation;
 use crate::estimate::Estimate;
@@ -38,10 +40,14 @@ pub struct MeasuredScan {
     pub size_nm: Option<[f64; 2]>,
     /// Name of the set to which the user assigned it by hand.
     pub set: Option<String>,
+    /// Hash of the bytes of its file, where whoever read it tells it; files of equal bytes are one.
+    pub digest: Option<String>,
     /// One entry for each line direction that was used.
     pub lines: Vec<MeasuredLine>,
     /// Why it is shown but not used; `None` where it is used.
     pub excluded: Option<String>,
+    /// The file that holds the same data and is used in its place.
+    pub repeats: Option<String>,
     /// Doubts about this scan.
     pub caveats: Vec<Caveat>,
 }
@@ -67,6 +73,8 @@ pub struct MeasuredLine {
     pub speeds: [Estimate; 2],
     /// Relative standard error of the mean speeds.
     pub speed_error: [f64; 2],
+    /// To know the whole image again.
+    pub(super) pixels: Fingerprint,
 }
 
 /// Why a scan cannot be measured.
@@ -91,6 +99,9 @@ pub enum MeasureError {
         /// What is there.
         present: &'static str,
     },
+    /// A calibration that no scanner can have.
+    #[error("the calibration of the scanner cannot be used: {0}")]
+    Calibration(String),
     /// No size.
     #[error("the file gives neither position sensors nor a scan size")]
     NoSize,
@@ -209,6 +220,10 @@ fn measure_with(
     window: Option<&Window>,
     find: Find,
 ) -> Result<Vec<MeasuredScan>, MeasureError> {
+    let problem = settings.scanner.as_ref().and_then(Calibration::problem);
+    if let Some(problem) = problem {
+        return Err(MeasureError::Calibration(problem));
+    }
     let channels = channels(scan, settings)?;
     let mut caveats = Vec::new();
     let mut moires: Vec<Vec<MeasuredLine>> = Vec::new();
@@ -255,8 +270,10 @@ fn measure_with(
             channel: channels[0].name.clone(),
             size_nm: scan.size_nm,
             set: None,
+            digest: None,
             lines,
             excluded,
+            repeats: None,
             caveats,
         }
     });
@@ -352,6 +369,7 @@ fn measure_line(
     };
     let (speeds, speed_error) = speeds(&geometry, sensors.as_ref(), timing.as_ref());
     let mut image = image_of(channel);
+    let pixels = Fingerprint::of(&image);
     let (mut geometry, mut nominal) = (geometry, nominal);
     let mut lines_after = 0;
     if let Some(window) = window {
@@ -391,6 +409,7 @@ fn measure_line(
             lattice,
             speeds,
             speed_error,
+            pixels: pixels.clone(),
         }
     });
     Ok(lines.collect())

@@ -3,7 +3,9 @@
 //! [`measure_scan`] does what needs the pixels, one scan at a time; [`analyse`] does the rest from
 //! the few numbers that remain. [`illustrate`] goes back to the pixels of one scan for the figures.
 
+mod alike;
 mod atomic;
+mod averaging;
 mod calibrate;
 mod channel;
 mod combine;
@@ -11,12 +13,15 @@ mod corrected;
 mod domain_mapping;
 mod doubts;
 mod group;
+mod identity;
 mod illustrate;
 mod mapping;
 mod measure;
 mod moires;
+mod naming;
 mod overlap;
 mod positions;
+mod samples;
 mod scanner;
 mod set;
 mod shared;
@@ -26,11 +31,13 @@ mod surveying;
 mod tiling;
 
 pub use atomic::{AtomicError, AtomicOrientation, atomic_orientation};
+pub use averaging::{average_maps, change_of_drift};
 pub use calibrate::{CalibrateError, Calibrated, CalibratedSet, calibrate};
 pub use channel::{channels_by_preference, choose_channel};
 pub use corrected::{CorrectedImage, corrected_images, nominal_geometry, on_grid};
 pub use domain_mapping::domains_of_scan;
 pub use group::natural_order;
+pub use identity::about_repeat;
 pub use illustrate::{amplitude_of, illustrate, picture};
 pub use mapping::{LineMap, MapError, MapMethod, map_scan};
 pub use measure::{
@@ -42,6 +49,8 @@ pub use striping::{ScanStripes, StripeError, stripes_in_short, stripes_of_scan};
 pub use surveying::{ReadBlock, SurveyError, SurveyPlan};
 
 use nalgebra::Matrix2;
+
+use naming::Named;
 
 use crate::analysis::Analysis;
 use crate::caveat::Caveat;
@@ -56,7 +65,12 @@ pub fn analyse(scans: Vec<MeasuredScan>, settings: &Settings) -> Analysis {
     let mut caveats = about_settings(settings);
     let mut scans = scans;
     exclude(&mut scans, settings, &mut caveats);
+    caveats.extend(nothing_left(&scans));
+    identity::mark_repeats(&mut scans, &mut caveats);
     let groups = group::groups(scans, settings.grouping);
+    let (groups, separated) = samples::separated(groups, settings, &mut caveats);
+    let used: Vec<&MeasuredScan> = groups.iter().flat_map(|group| &group.scans).collect();
+    let named = Named::new(&used, settings);
     let mut reference: Option<Matrix2<f64>> = None;
     let mut sets = Vec::with_capacity(groups.len());
     let mut joint_scans = Vec::new();
@@ -67,15 +81,17 @@ pub fn analyse(scans: Vec<MeasuredScan>, settings: &Settings) -> Analysis {
         {
             reference = Some(canonical(&line.in_sensor_coordinates()).basis);
         }
-        for scan in &group.scans {
+        for scan in group.scans.iter().filter(|s| s.repeats.is_none()) {
             caveats.extend(scan.caveats.iter().cloned());
         }
         let Some(reference) = reference else { continue };
-        let count = group.scans.len() as u64;
+        // Repeated scans come last and take no random numbers from those that follow.
+        let count = group.scans.iter().filter(|s| s.repeats.is_none()).count() as u64;
         sets.push(set::analyse_set(
             &mut group,
             &reference,
-            settings,
+            &named.settings,
+            &named.strengths,
             index,
             &mut caveats,
         ));
@@ -86,7 +102,19 @@ pub fn analyse(scans: Vec<MeasuredScan>, settings: &Settings) -> Analysis {
     }
     let all: Vec<&MeasuredScan> = joint_scans.iter().collect();
     let joint = reference.map(|reference| (all.as_slice(), reference));
-    let combined = combine::combine(&sets, joint, settings, &mut caveats);
+    // Samples have no mean.
+    let combined = (!separated)
+        .then(|| {
+            let (settings, strengths) = (&named.settings, &named.strengths);
+            combine::combine(&sets, joint, settings, strengths, &mut caveats)
+        })
+        .flatten();
+    if let Some(path) = combined.as_ref().and_then(|c| c.path) {
+        let scans = sets.iter_mut().flat_map(|set| &mut set.scans);
+        for motion in scans.filter_map(|scan| scan.motion.as_mut()) {
+            motion.path = path;
+        }
+    }
     Analysis {
         settings: settings.clone(),
         sets,
@@ -97,12 +125,44 @@ pub fn analyse(scans: Vec<MeasuredScan>, settings: &Settings) -> Analysis {
     }
 }
 
+/// Why an analysis has no result that could be used: every scan was left out, or the layers cannot make the lattices.
+/// `None` where a set has twist and strain, and for other reasons, which are no refusal.
+pub fn refusal(analysis: &Analysis) -> Option<&Caveat> {
+    let mut sets = analysis.sets.iter();
+    if sets.any(|set| set.mean.is_some() || set.uncorrected.is_some()) {
+        return None;
+    }
+    let codes = [NOTHING_LEFT, set::IMPOSSIBLE];
+    let of = |code| analysis.caveats.iter().find(|c| c.code == code);
+    codes.into_iter().find_map(of)
+}
+
+/// The code of the caveat that says that every scan was left out.
+const NOTHING_LEFT: &str = "everything-excluded";
+
+fn nothing_left(scans: &[MeasuredScan]) -> Option<Caveat> {
+    let by_user = |scan: &MeasuredScan| scan.excluded.as_deref() == Some(EXCLUDED);
+    let which = match scans.len() {
+        0 => return None,
+        1 => "the only scan".to_owned(),
+        n => format!("all {n} scans"),
+    };
+    let words = format!("the user excluded {which}: nothing is left to analyse");
+    scans
+        .iter()
+        .all(by_user)
+        .then(|| Caveat::new(NOTHING_LEFT, "analysis", words))
+}
+
+/// Why a scan is left out that the user does not want.
+const EXCLUDED: &str = "the user excluded it";
+
 /// Marks the scans that the user does not want; a name that fits none of them deserves a word.
 fn exclude(scans: &mut [MeasuredScan], settings: &Settings, caveats: &mut Vec<Caveat>) {
     for pattern in &settings.exclude {
         let mut found = false;
         for scan in scans.iter_mut().filter(|s| names(pattern, &s.file)) {
-            scan.excluded = Some("the user excluded it".to_owned());
+            scan.excluded = Some(EXCLUDED.to_owned());
             found = true;
         }
         if !found {

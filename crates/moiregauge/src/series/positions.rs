@@ -1,7 +1,7 @@
 //! Where the pixels of an image are: by its position sensors, or as the instrument intended.
 
 use nalgebra::Vector2;
-use spmfile::{Channel, LineDirection, Scan};
+use spmfile::{Channel, FrameDirection, LineDirection, Scan};
 
 use super::measure::{image_of, line_name};
 use crate::caveat::Caveat;
@@ -11,6 +11,8 @@ use crate::image::Image;
 
 /// A sensor whose span differs from the nominal size by more than this factor is not believed.
 const WILD_SPAN: f64 = 2.0;
+/// A lag that changes the fast step by more than this share deserves a word.
+const NOTABLE_LAG: f64 = 1e-4;
 
 /// The geometry that the instrument intended: nominal pitch, rotated.
 pub(super) fn nominal(scan: &Scan, channel: &Channel) -> Option<Geometry> {
@@ -145,7 +147,54 @@ pub(super) fn usable_sensors(
              and strain axis follow the sensors",
         ));
     }
+    about_lag(file, scan, channel, &sensors, caveats);
     Some(sensors)
+}
+
+/// Says where the lines of a sensor bend as those of one that lags behind the tip.
+fn about_lag(
+    file: &str,
+    scan: &Scan,
+    channel: &Channel,
+    sensors: &SensorGeometry,
+    caveats: &mut Vec<Caveat>,
+) {
+    let line = channel.line_direction.unwrap_or(LineDirection::Trace);
+    let direction = scan.frame_direction.unwrap_or(FrameDirection::Up);
+    let timing = Timing::of_scan(scan, channel.columns, direction, line);
+    let step = sensors.geometry.fast_step().norm();
+    let each = ["x", "y"]
+        .into_iter()
+        .zip(sensors.lags)
+        .zip(&sensors.planes);
+    for ((name, lag), plane) in each {
+        let Some(lag) = lag.filter(|lag| lag.slope_nm.abs() > NOTABLE_LAG * step) else {
+            continue;
+        };
+        let time = timing.map_or(String::new(), |timing| {
+            let constant = 1000.0 * lag.columns * timing.per_pixel.x.abs();
+            format!(", a time constant of {constant:.2} ms")
+        });
+        caveats.push(Caveat::new(
+            "sensor-lag",
+            file,
+            format!(
+                "in the {} the {name} sensor lags behind the tip: its lines bend by {:.2} nm where they begin and are \
+                 straight again over {:.1} columns{time}. A plane through the whole would make the pixels {:.2} % too \
+                 {} along the fast axis; the bend is taken off, and a part of that stands in the errors. If it is the \
+                 tip that is late there and not its sensor, the first columns of the image are distorted",
+                line_name(line),
+                lag.bend_nm.abs(),
+                lag.columns,
+                100.0 * (lag.slope_nm / step).abs(),
+                if lag.slope_nm * plane.per_column < 0.0 {
+                    "short"
+                } else {
+                    "long"
+                }
+            ),
+        ));
+    }
 }
 
 /// Tip speeds with their spread, and the relative error of their means.

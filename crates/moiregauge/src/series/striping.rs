@@ -10,7 +10,10 @@ use crate::background::remove_background;
 use crate::caveat::Caveat;
 use crate::geometry::{Geometry, Timing};
 use crate::image::Image;
-use crate::map::{NoStripes, Resolution, SampledStripes, find_stripes, stripe_maps};
+use crate::lattice::Start;
+use crate::map::{
+    FULL_WIDTH, NoStripes, Resolution, ResolutionError, SampledStripes, find_stripes, stripe_maps,
+};
 use crate::resample::at_rest;
 use crate::settings::Settings;
 
@@ -30,9 +33,12 @@ pub struct ScanStripes {
 }
 
 /// Why a scan gives no map of stripes.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum StripeError {
+    /// No image of this size has such a map.
+    #[error(transparent)]
+    Resolution(#[from] ResolutionError),
     /// The channel is not there, or the image has no size.
     #[error("no image with a size")]
     NoImage,
@@ -88,13 +94,17 @@ fn frames(
 }
 
 /// Wavelength (nm), direction (rad, along the stripes) and log₁₀ of the chance that noise makes them, of the patterns
-/// that a scan shows, strongest first; none where it shows nothing.
+/// that a scan shows, strongest first; none where it shows nothing, or a lattice, each of whose waves would pass for
+/// stripes.
 pub fn stripes_in_short(scan: &Scan, settings: &Settings) -> Vec<[f64; 3]> {
     let Ok((_, frames)) = frames("", scan, settings, &mut Vec::new()) else {
         return Vec::new();
     };
     let images: Vec<&Image> = frames.iter().map(|f| &f.flat).collect();
     let geometry = &frames[0].geometry;
+    if Start::find(&frames[0].flat, geometry, settings.background).is_ok() {
+        return Vec::new();
+    }
     let Some(dual) = geometry.pixel_to_nm.try_inverse().map(|j| j.transpose()) else {
         return Vec::new();
     };
@@ -125,6 +135,7 @@ pub fn stripes_of_scan(
 ) -> Result<ScanStripes, StripeError> {
     let mut caveats = Vec::new();
     let (channel, frames) = frames(file, scan, settings, &mut caveats)?;
+    resolution.fits(frames[0].geometry.extent(), FULL_WIDTH)?;
     let images: Vec<&Image> = frames.iter().map(|f| &f.flat).collect();
     let maps = stripe_maps(&images, pitch(&frames[0].geometry), resolution)?;
     let placed: Vec<&Geometry> = frames

@@ -12,14 +12,17 @@ use nalgebra::{Matrix2, Matrix4, Vector2};
 use super::mapping::pitch;
 use super::scanner::calibrated;
 use crate::background::remove_background;
+use crate::caveat::Caveat;
 use crate::domains::{Contrast, DomainMap, Mesh, find_nodes};
 use crate::geometry::{Geometry, Timing};
 use crate::image::Image;
-use crate::lattice::reciprocal::{canonical, labelled_like, reciprocal};
-use crate::lattice::{LatticeError, LatticeVectors, measure};
+use crate::lattice::reciprocal::{canonical, labelled_like, real_from_reciprocal, reciprocal};
+use crate::lattice::{LatticeError, LatticeVectors, MeasuredLattice, measure};
 use crate::map::{
-    Grid, LatticeMap, Reference, Resolution, Survey, TwistStrainMap, UsedHarmonic, local_lattices,
+    FULL_WIDTH, Grid, LatticeMap, Reference, Resolution, ResolutionError, Survey, TwistStrainMap,
+    UsedHarmonic, local_lattices,
 };
+use crate::readings::{WaveStrengths, name_caveats, named_waves};
 use crate::resample::at_rest;
 use crate::settings::{Method, Settings};
 use crate::strain::StrainError;
@@ -49,6 +52,8 @@ pub struct SurveyPlan {
     pub window_nm: f64,
     /// The lattice of the middle, wave vectors as columns, rad/nm: labelling and branch of all nodes.
     pub whole: Matrix2<f64>,
+    /// Doubts about which waves of the lattice belong to the atoms.
+    pub caveats: Vec<Caveat>,
     /// The harmonics of the middle.
     pub harmonics: Vec<UsedHarmonic>,
 }
@@ -57,6 +62,9 @@ pub struct SurveyPlan {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SurveyError {
+    /// No image of this size has such a map.
+    #[error(transparent)]
+    Resolution(#[from] ResolutionError),
     /// The lines could not be had.
     #[error("lines {from} to {to} cannot be read: {why}")]
     Lines {
@@ -80,6 +88,28 @@ pub enum SurveyError {
 
 /// The block of an image: columns and rows, the bottom line being row 0.
 pub type ReadBlock<'a> = dyn Fn([Range<usize>; 2]) -> Result<Image, String> + 'a;
+
+/// Names the waves of the lattice by their strengths in the middle of the image.
+fn name(
+    whole: &Matrix2<f64>,
+    found: &MeasuredLattice,
+    placed: &Geometry,
+    settings: &mut Settings,
+) -> Vec<Caveat> {
+    let exact = LatticeVectors {
+        basis: *whole,
+        covariance: Matrix4::zeros(),
+    };
+    let Some(real) = real_from_reciprocal(&exact) else {
+        return Vec::new();
+    };
+    let mut strengths = WaveStrengths::new(&real.basis);
+    if let Some(fit) = &found.fit {
+        strengths.add(fit, &placed.pixel_to_nm);
+    }
+    settings.moire_waves = named_waves(&real, &strengths, settings).or(settings.moire_waves);
+    name_caveats("map", &real, &strengths, settings)
+}
 
 fn block(
     read: &ReadBlock,
@@ -125,6 +155,7 @@ impl SurveyPlan {
             (n - side) / 2..(n - side) / 2 + side
         });
         let corner = [columns.start, rows.start];
+        resolution.fits(geometry.extent(), FULL_WIDTH)?;
         let middle = block(read, columns, rows)?;
         let of_middle = geometry.cropped(corner, [middle.columns, middle.rows]);
         let found = measure(&middle, &of_middle, settings.background, Method::Lattice)
@@ -150,7 +181,17 @@ impl SurveyPlan {
         };
         let flat = remove_background(&middle, settings.background);
         let map = local_lattices(&flat, &reference, resolution).ok_or(SurveyError::NoMap)?;
+        let whole = dual * reference.pair;
+        let mut settings = settings.clone();
+        let caveats = match first {
+            Some(first) => {
+                settings.moire_waves = first.settings.moire_waves;
+                Vec::new()
+            }
+            None => name(&whole, &found, &placed, &mut settings),
+        };
         Ok(Self {
+            caveats,
             survey: Survey::new(
                 geometry.size,
                 reference,
@@ -160,9 +201,9 @@ impl SurveyPlan {
             ),
             placed,
             drift_corrected,
-            settings: settings.clone(),
+            settings,
             window_nm: map.window_nm,
-            whole: dual * reference.pair,
+            whole,
             harmonics: map.harmonics,
         })
     }

@@ -253,6 +253,7 @@ impl Sample {
         Bilayer {
             reference: self.substrate.as_ref().unwrap_or(&self.material),
             stretched: &self.material,
+            waves: None,
         }
     }
 

@@ -15,6 +15,7 @@ use super::complex_pair::ComplexPair;
 use super::inversion::{ALL_SIGNS, Signs, Solution, reduce, solve, solve_all};
 use super::labelling::{least_strained, likely_names, moire_matrix, moire_matrix_jacobian};
 use super::layers::Layers;
+use super::names::{LatticeName, all_names, change_to};
 use super::{StrainError, TwistStrain};
 use crate::lattice::LatticeVectors;
 use crate::material::{Bilayer, Material};
@@ -22,7 +23,7 @@ use crate::settings::StrainConvention;
 
 /// Above this |q|/|p| the mirrored labelling (strain makes the moiré, twist distorts it) is listed.
 const MIRRORED_FROM: f64 = 0.3;
-/// Readings of layers of different lattices that need more strain are not listed.
+/// Readings of layers of different, dissimilar lattices that need more strain are not listed.
 const LIKELY_STRAIN: f64 = 0.03;
 /// Readings of such layers that are listed for either sense of the twist, the least strained ones.
 const LISTED: usize = 12;
@@ -46,10 +47,22 @@ pub struct Branch {
     pub twist_sigma: f64,
     /// σ of ε, as of `twist_sigma`.
     pub strain_sigma: f64,
+    /// Which waves of the lattice are those of the atoms.
+    pub name: LatticeName,
 }
 
-/// A lattice under its least strained name, and P of that name.
+/// All exact solutions up to a strain.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Solutions {
+    /// The default one and those of its name first.
+    pub branches: Vec<Branch>,
+    /// The strain up to which there are no others.
+    pub complete_to: f64,
+}
+
+/// A lattice under one of its names, and P of that name.
 pub(super) struct Labelled {
+    pub(super) name: LatticeName,
     pub(super) lattice: LatticeVectors,
     pub(super) moire: Matrix2<f64>,
 }
@@ -134,36 +147,66 @@ pub fn branches(
     let bilayer = Bilayer {
         reference,
         stretched,
+        waves: None,
     };
-    let layers = Layers::new(bilayer, convention)?;
-    let labelled = labelled(lattice, &layers)?;
-    let moire = ComplexPair::from(labelled.moire);
-    // Lattices that are not hexagonal have names of nearly equal strain, too.
-    if layers.ratio().is_none() || !layers.are_hexagonal() {
+    Ok(solutions(lattice, bilayer, convention)?.branches)
+}
+
+/// All exact solutions for two layers, under every name of the lattice.
+///
+/// Those of the default name come first, whatever their strain; where |q| > 0.3 |p| with them those of the mirrored
+/// name. The other names follow, the least strained first, with strains up to `complete_to`. For layers of dissimilar
+/// lattices the search ends at vectors whose names have numbers up to 5.
+///
+/// # Errors
+/// As [`branches`].
+pub fn solutions<'a>(
+    lattice: &LatticeVectors,
+    bilayer: impl Into<Bilayer<'a>>,
+    convention: StrainConvention,
+) -> Result<Solutions, StrainError> {
+    let layers = Layers::new(bilayer.into(), convention)?;
+    let first = labelled(lattice, &layers)?;
+    let moire = ComplexPair::from(first.moire);
+    if layers.ratio().is_none() {
         return branches_by_trial(lattice, &layers);
     }
-    let mut found = solutions(&labelled, &layers, false);
+    let mut found = solutions_of(&first, &layers, first.name);
+    let mut known = vec![first.name];
     if moire.q.norm() > MIRRORED_FROM * moire.p.norm() {
         let swap = Matrix2::new(0.0, 1.0, 1.0, 0.0);
-        let lattice = labelled.lattice.relabelled(&swap);
-        let moire = moire_matrix(&lattice.basis, &layers.atoms).ok_or(no_area(&lattice))?;
-        found.extend(solutions(&Labelled { lattice, moire }, &layers, true));
+        let mirrored = first.lattice.relabelled(&swap);
+        let mirrored = under_name(lattice, mirrored, &layers).ok_or(no_area(lattice))?;
+        known.push(mirrored.name);
+        found.extend(solutions_of(&mirrored, &layers, mirrored.name));
+    }
+    let mut complete_to = 0.0;
+    if let Some((names, bound)) = all_names(lattice, &layers) {
+        complete_to = bound;
+        for name in names.into_iter().filter(|name| !known.contains(name)) {
+            let named = name.change().map(|change| lattice.relabelled(&change));
+            let named = named.and_then(|named| under_name(lattice, named, &layers));
+            let named = named.ok_or(no_area(lattice))?;
+            let all = solutions_of(&named, &layers, name);
+            found.extend(all.into_iter().filter(|b| b.strain.abs() <= bound));
+        }
     }
     if found.is_empty() {
         return Err(no_solution(&moire, &layers));
     }
-    Ok(found)
+    Ok(Solutions {
+        branches: found,
+        complete_to,
+    })
 }
 
-/// The solutions for layers of different or not hexagonal lattices under every likely name, the least strained first.
-fn branches_by_trial(
-    lattice: &LatticeVectors,
-    layers: &Layers,
-) -> Result<Vec<Branch>, StrainError> {
+/// The solutions for layers of dissimilar lattices under every likely name, the least strained first.
+fn branches_by_trial(lattice: &LatticeVectors, layers: &Layers) -> Result<Solutions, StrainError> {
     let mut found: Vec<Branch> = Vec::new();
-    for lattice in likely_names(lattice, layers).ok_or(no_area(lattice))? {
-        let moire = moire_matrix(&lattice.basis, &layers.atoms).ok_or(no_area(&lattice))?;
-        for branch in solutions(&Labelled { lattice, moire }, layers, false) {
+    for named in likely_names(lattice, layers).ok_or(no_area(lattice))? {
+        let named = under_name(lattice, named, layers).ok_or(no_area(lattice))?;
+        for mut branch in solutions_of(&named, layers, named.name) {
+            branch.strain_dominated = false;
             let apart = |a: f64, b: f64, period: f64| {
                 let between = (a - b).rem_euclid(period);
                 between.min(period - between)
@@ -185,26 +228,39 @@ fn branches_by_trial(
         back_a.cmp(&back_b).then(strain_a.total_cmp(&strain_b))
     });
     let mut listed = [0; 2];
+    let mut complete_to = LIKELY_STRAIN;
     found.retain(|branch| {
         let count = &mut listed[usize::from(branch.twist < 0.0)];
         *count += 1;
+        if *count > LISTED {
+            complete_to = complete_to.min(branch.strain.abs());
+        }
         *count <= LISTED
     });
     let first = labelled(lattice, layers)?;
     if found.is_empty() {
         return Err(no_solution(&ComplexPair::from(first.moire), layers));
     }
-    Ok(found)
+    Ok(Solutions {
+        branches: found,
+        complete_to,
+    })
 }
 
-fn solutions(labelled: &Labelled, layers: &Layers, strain_dominated: bool) -> Vec<Branch> {
+/// The solutions of one name.
+fn solutions_of(labelled: &Labelled, layers: &Layers, name: LatticeName) -> Vec<Branch> {
+    let strain_dominated = labelled.moire.determinant() < 0.0;
     let moire = ComplexPair::from(labelled.moire);
     ALL_SIGNS
         .into_iter()
         .flat_map(|signs| solve_all(&moire, layers, signs))
         .map(|solution| {
             let covariance = covariance(&solution, labelled, layers);
-            branch(&solution, covariance.as_ref(), layers, strain_dominated)
+            let found = branch(&solution, covariance.as_ref(), layers, name);
+            Branch {
+                strain_dominated,
+                ..found
+            }
         })
         .collect()
 }
@@ -213,7 +269,7 @@ fn branch(
     solution: &Solution,
     covariance: Option<&Matrix4<f64>>,
     layers: &Layers,
-    strain_dominated: bool,
+    name: LatticeName,
 ) -> Branch {
     let lattice_angle = reduce(solution.lattice_angle, layers.period);
     let e = Vector2::new(solution.strain_vector.re, solution.strain_vector.im);
@@ -232,7 +288,8 @@ fn branch(
         strain: solution.strain,
         axis_lattice: reduce(solution.axis_lab - lattice_angle - solution.twist, PI),
         axis_lab: reduce(solution.axis_lab, PI),
-        strain_dominated,
+        strain_dominated: false,
+        name,
         twist_sigma: sigma(covariance.map(|c| c[(0, 0)])),
         strain_sigma: sigma(
             covariance.map(|c| (along.transpose() * c.fixed_view::<2, 2>(2, 2) * along)[0]),
@@ -240,7 +297,7 @@ fn branch(
     }
 }
 
-/// The least strained name of a lattice, once its numbers are known to be finite.
+/// The name of a lattice that was given, or the least strained one, once its numbers are known to be finite.
 pub(super) fn labelled(lattice: &LatticeVectors, layers: &Layers) -> Result<Labelled, StrainError> {
     let finite = |values: &[f64]| values.iter().all(|x| x.is_finite());
     if !finite(lattice.basis.as_slice()) || !finite(lattice.covariance.as_slice()) {
@@ -248,9 +305,27 @@ pub(super) fn labelled(lattice: &LatticeVectors, layers: &Layers) -> Result<Labe
             basis: lattice.flat().into(),
         });
     }
-    let lattice = least_strained(lattice, layers).ok_or(no_area(lattice))?;
-    let moire = moire_matrix(&lattice.basis, &layers.atoms).ok_or(no_area(&lattice))?;
-    Ok(Labelled { lattice, moire })
+    let given = layers
+        .waves
+        .and_then(|waves| change_to(&lattice.basis, &waves));
+    let named = match given {
+        Some(change) => lattice.relabelled(&change),
+        None => least_strained(lattice, layers).ok_or(no_area(lattice))?,
+    };
+    under_name(lattice, named, layers).ok_or(no_area(lattice))
+}
+
+/// A lattice under the name of `named`.
+fn under_name(
+    lattice: &LatticeVectors,
+    named: LatticeVectors,
+    layers: &Layers,
+) -> Option<Labelled> {
+    Some(Labelled {
+        name: LatticeName::of(&lattice.basis, &named.basis, layers)?,
+        moire: moire_matrix(&named.basis, &layers.atoms)?,
+        lattice: named,
+    })
 }
 
 fn no_area(lattice: &LatticeVectors) -> StrainError {

@@ -164,6 +164,7 @@ pub fn naive_twist<'a>(wavelength: Estimate, bilayer: impl Into<Bilayer<'a>>) ->
     let Bilayer {
         reference,
         stretched,
+        ..
     } = bilayer.into();
     if !(reference.is_hexagonal() && stretched.is_hexagonal()) {
         return Estimate::new(f64::NAN, f64::NAN);

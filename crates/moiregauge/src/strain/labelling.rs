@@ -6,9 +6,10 @@
 //! `P = M (G⁰)⁻¹ = (A⁰ L⁻¹)ᵀ` has no dimension and needs no 2π.
 //!
 //! Every other primitive pair of the same lattice, `L U` with U in SL(2, Z), is as good a name for
-//! it. For similar layers the one with the smallest anisotropic part |q| of P is used; as the
+//! it. For similar layers the one with the smallest anisotropic part |q| of P is used where nothing tells more; as the
 //! determinant is fixed by the area of the cell, it is, for hexagonal layers, the pair with the shortest
-//! reciprocal vectors. For layers of different lattices it is the one that needs the least strain.
+//! reciprocal vectors. For layers of different lattices it is the one that needs the least strain. From ε ≈ 0.46 θ on
+//! the true pair can be another one: all of them are in `names`, and what chooses among them in `readings`.
 
 use nalgebra::{Matrix2, Matrix4, Vector4};
 

@@ -27,6 +27,8 @@ pub(super) struct Layers {
     pub(super) convention: StrainConvention,
     /// By how much layer 1 can be turned without being another lattice, rad.
     pub(super) period: f64,
+    /// The wave vectors that the user or the image named, rad/nm.
+    pub(super) waves: Option<Matrix2<f64>>,
 }
 
 impl Layers {
@@ -38,6 +40,7 @@ impl Layers {
         let Bilayer {
             reference,
             stretched,
+            waves,
         } = bilayer;
         for material in [reference, stretched] {
             check(material)?;
@@ -57,6 +60,7 @@ impl Layers {
             poisson_ratio_reference: reference.poisson_ratio,
             convention,
             period: reference.rotation_period(),
+            waves,
         })
     }
 
@@ -64,11 +68,6 @@ impl Layers {
     pub(super) fn ratio(&self) -> Option<f64> {
         let ComplexPair { p, q } = self.inverse;
         (q.norm() < 1e-12 * p.norm() && p.im.abs() < 1e-12 * p.norm()).then(|| p.re.recip())
-    }
-
-    /// Whether layer 1 has the symmetry of a hexagonal lattice.
-    pub(super) fn are_hexagonal(&self) -> bool {
-        (self.period - std::f64::consts::FRAC_PI_3).abs() < 1e-9
     }
 
     /// `N = (R(α) + P) K⁻¹`, which is `R(β) S^∓¹` if P is explained by a layer 1 of orientation α.

@@ -8,7 +8,7 @@
 //!
 //! Without an orientation P leaves a circle of solutions, `|κ(1+η) e^{iθ} − 1| = |p|`; with it
 //! `σ_η = θ σ_α` for equal layers. What is left open: orientations are known modulo the symmetry of the layer. For equal
-//! layers (θ, η) and about (−θ, −η) go with one orientation modulo 60°; θ > 0 is chosen. For different
+//! layers (θ, η) and about (−θ, −η) go with one orientation modulo 60°; that with θ > 0 comes first. For different
 //! layers the reading with the least mean strain is the best, and its sign is that of the twist.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
@@ -103,6 +103,7 @@ pub fn strain_tensors<'a>(
     let bilayer = bilayer.into();
     let layers = Layers::new(bilayer, StrainConvention::RealSpace)?;
     let named = labelled(lattice, &layers)?;
+    let name = named.name;
     let similar = layers.ratio().is_some();
     // For similar layers other names are other orientations; for different ones they are tried.
     let all = if similar {
@@ -111,7 +112,11 @@ pub fn strain_tensors<'a>(
         let names = names(lattice).ok_or(StrainError::NoMoire)?;
         let labelled = |lattice: LatticeVectors| {
             let moire = moire_matrix(&lattice.basis, &layers.atoms)?;
-            Some(Labelled { lattice, moire })
+            Some(Labelled {
+                name,
+                lattice,
+                moire,
+            })
         };
         names.into_iter().filter_map(labelled).collect()
     };
@@ -148,7 +153,10 @@ pub fn strain_tensors<'a>(
     let Some(best) = found.first().copied() else {
         return Err(StrainError::NoMoire);
     };
-    found.retain(|t| *t == best || size(t) < LARGEST_MEAN_STRAIN);
+    // Equal layers: the other sense of the twist is as good as the first.
+    let opposite = found.iter().find(|t| equal && t.twist * best.twist < 0.0);
+    let opposite = opposite.copied();
+    found.retain(|t| *t == best || Some(*t) == opposite || size(t) < LARGEST_MEAN_STRAIN);
     found.dedup_by(|a, b| (a.twist - b.twist).abs() + (a.mean - b.mean).abs() < 1e-12);
     Ok(found)
 }

@@ -4,8 +4,11 @@
 //! compared without case, because `Scan size` became `Scan Size` between versions.
 
 use std::borrow::Cow;
+use std::collections::HashMap;
 
 use memchr::memmem;
+
+use crate::export::one_line;
 
 /// Real headers have 20 to 100 kB; beyond this no header is looked for.
 const LONGEST: usize = 4 << 20;
@@ -104,6 +107,60 @@ impl<'a> Section<'a> {
     }
 }
 
+/// Every line of a header as a name and a value, so that formats which keep names and values lose nothing.
+///
+/// A name is that of the section, a colon and the key; it occurs once: a second section or key of the same name has
+/// ` (2)` behind it. Further lines of a note are entries of their own, and so is a section without any.
+pub(super) fn all_lines(text: &str) -> Vec<(String, String)> {
+    let mut lines = Vec::new();
+    let mut names = Names::default();
+    let (mut section, mut key) = (String::new(), String::new());
+    let (mut below, mut continued) = (0, 1);
+    for line in text.lines().filter(|line| !line.trim().is_empty()) {
+        let (name, value) = if let Some(name) = line.strip_prefix("\\*") {
+            if below == 0 && !section.is_empty() {
+                lines.push((std::mem::take(&mut section), String::new()));
+            }
+            section = names.unique(name.trim());
+            (key, below, continued) = (String::new(), 0, 1);
+            continue;
+        } else if let Some(line) = line.strip_prefix('\\') {
+            let (name, value) = split_entry(line).unwrap_or((line.trim(), ""));
+            (key, continued) = (name.to_owned(), 1);
+            (format!("{section}: {name}"), value)
+        } else {
+            continued += 1;
+            (format!("{section}: {key}, line {continued}"), line.trim())
+        };
+        below += 1;
+        lines.push((names.unique(&name), value.to_owned()));
+    }
+    if below == 0 && !section.is_empty() {
+        lines.push((section, String::new()));
+    }
+    lines
+}
+
+/// Names that were given away, with how often.
+#[derive(Default)]
+struct Names(HashMap<String, usize>);
+
+impl Names {
+    /// The name, with a number behind it where it is taken. Formats with lines `key = value` need an `=` for
+    /// themselves.
+    fn unique(&mut self, name: &str) -> String {
+        let name = one_line(name).replace('=', " ");
+        let mut free = name.clone();
+        while self.0.contains_key(&free) {
+            let count = self.0.entry(name.clone()).or_insert(1);
+            *count += 1;
+            free = format!("{name} ({count})");
+        }
+        self.0.insert(free.clone(), 1);
+        free
+    }
+}
+
 /// The value of `key` in the first section called `section` that has it.
 pub(super) fn lookup<'a>(sections: &[Section<'a>], section: &str, key: &str) -> Option<&'a str> {
     sections
@@ -138,6 +195,26 @@ mod tests {
             Some("V [Sens. A] (1 V/LSB) 2 V")
         );
         assert_eq!(sections[1].get("capture mode"), Some("Single"));
+    }
+
+    #[test]
+    fn every_line_has_a_name_of_its_own() {
+        let text = "\\*File list\r\n\\Note: first\r\nsecond\r\n\r\nthird\r\n\\*Empty list\r\n\\*Ciao image list\r\n\
+                    \\@2:Z scale: V 2\r\n\\a=b: 1\r\n\\Odd\r\n\\*Ciao image list\r\n\\Odd\r\n\\Odd\r\n\\*Last\r\n";
+        let expected = [
+            ("File list: Note", "first"),
+            ("File list: Note, line 2", "second"),
+            ("File list: Note, line 3", "third"),
+            ("Empty list", ""),
+            ("Ciao image list: @2:Z scale", "V 2"),
+            ("Ciao image list: a b", "1"),
+            ("Ciao image list: Odd", ""),
+            ("Ciao image list (2): Odd", ""),
+            ("Ciao image list (2): Odd (2)", ""),
+            ("Last", ""),
+        ]
+        .map(|(key, value)| (key.to_owned(), value.to_owned()));
+        assert_eq!(all_lines(text), expected);
     }
 
     #[test]

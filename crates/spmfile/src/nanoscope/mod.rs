@@ -54,6 +54,7 @@ pub(crate) fn read(bytes: &[u8], wanted: &dyn Fn(&ChannelInfo) -> bool) -> Resul
         damage: orphans(&sections),
     };
     let mut scan = frame(&sections, &images);
+    scan.metadata = header::all_lines(&header.text);
     let mut skipped = 0;
     for orphan in &reader.damage {
         scan.unreadable.push(orphan.clone());

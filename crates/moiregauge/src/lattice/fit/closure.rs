@@ -13,13 +13,11 @@ use nalgebra::{DMatrix, DVector};
 
 use super::model::Model;
 use super::solve;
-use crate::chi2;
+use crate::chi2::enlargement_by_estimated_noise;
 
 /// Amplitude over noise from which a harmonic has a wave vector of its own: its phase is then good to
 /// 0.14 rad.
 const STRONG: f64 = 5.0;
-/// What chance does less often than this counts.
-const SIGNIFICANT: f64 = 1e-3;
 /// By which the noise around harmonics may be underestimated, as a power.
 const NOISE_KNOWN_TO: f64 = 1.25;
 
@@ -35,12 +33,8 @@ pub struct Closure {
 impl Closure {
     /// The factor by which the variances of the lattice are enlarged: χ²/dof where it is no chance, else 1.
     pub fn enlargement(&self) -> f64 {
-        let chance = chi2::tail(self.chi_squared / NOISE_KNOWN_TO, self.degrees_of_freedom);
-        if chance < SIGNIFICANT {
-            self.chi_squared / self.degrees_of_freedom as f64
-        } else {
-            1.0
-        }
+        let (chi2, freedom) = (self.chi_squared, self.degrees_of_freedom);
+        enlargement_by_estimated_noise(chi2, freedom, NOISE_KNOWN_TO)
     }
 }
 

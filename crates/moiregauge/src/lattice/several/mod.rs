@@ -37,6 +37,11 @@ const WEAKEST: f64 = 5.0;
 const ON_TRIAL: f64 = 1.5;
 /// Lattices whose wave vectors lie within this of each other (cycles per frame) are one.
 const SAME: f64 = 0.3;
+/// A lattice whose first harmonics lie so near to higher ones of another (indices of a cell 3, 4 or 7 times as dense) that
+/// they are taken for these shows by its own higher ones: those of a cell that is at least this much denser ...
+const HIDDEN: f64 = 9.0;
+/// ... and whose waves lie within this of the other's: cycles per frame, and as a share of the distance of the points.
+const NEAR_HIDDEN: [f64; 2] = [1.5, 0.2];
 /// Samples per shortest period at which the correlation of lattices is worked out.
 const SAMPLES: f64 = 5.0;
 
@@ -65,7 +70,10 @@ pub fn measure_several(
         }
         scene.take_turns(&mut parts)?;
     }
-    let found = parts.iter().filter(|part| part.stands_out()).count();
+    let own = |i: usize| !parts[..i].iter().any(|other| parts[i].is(other, image));
+    let found = (0..parts.len())
+        .filter(|&i| parts[i].stands_out() && own(i))
+        .count();
     if count > 1 && found < count {
         return Err(LatticeError::FewerLattices {
             found,
@@ -108,7 +116,9 @@ impl Part {
         self.lattice.signal_to_noise > WEAKEST
     }
 
-    /// Whether both are the same lattice: the pair of this one lies on points of the other.
+    /// Whether both are the same lattice: the pair of this one lies on points of the other, as what is left of the
+    /// harmonics of the other does, and as a lattice does whose first harmonics lie so near to those of the other that
+    /// they are taken for them.
     fn is(&self, other: &Self, image: &Image) -> bool {
         let frame = Vector2::new(image.columns as f64, image.rows as f64) / std::f64::consts::TAU;
         let pair = &self.fit.wave_vectors.basis;
@@ -117,7 +127,15 @@ impl Part {
             let whole = (inverse * pair).map(f64::round);
             let miss = pair - theirs * whole;
             let cycles = Matrix2::from_diagonal(&frame) * miss;
-            cycles.column(0).norm().max(cycles.column(1).norm()) < SAME
+            let apart = cycles.column(0).norm().max(cycles.column(1).norm());
+            let points = Matrix2::from_diagonal(&frame) * theirs;
+            let spacing = points.column(0).norm().min(points.column(1).norm());
+            let near = if whole.determinant().abs() >= HIDDEN - 0.5 {
+                NEAR_HIDDEN[0].min(NEAR_HIDDEN[1] * spacing).max(SAME)
+            } else {
+                SAME
+            };
+            apart < near
         })
     }
 }

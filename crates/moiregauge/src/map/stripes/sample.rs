@@ -14,6 +14,7 @@ use super::super::sample::Grid;
 use super::super::summary::Spread;
 use super::super::types::UsedHarmonic;
 use super::{StripeMap, StripeNode};
+use crate::chi2::enlargement;
 use crate::estimate::Estimate;
 use crate::geometry::Geometry;
 
@@ -229,7 +230,7 @@ fn agree(nodes: &mut [Averaged]) -> Option<Agreement> {
     }
     let reduced = chi2 / freedom as f64;
     let factor = if reduced >= 1.0 {
-        reduced
+        enlargement(chi2, freedom)
     } else {
         2.0 - reduced
     };

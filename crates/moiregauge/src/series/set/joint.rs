@@ -4,12 +4,12 @@ use nalgebra::{Matrix2, Vector2};
 use spmfile::FrameDirection;
 
 use super::Solved;
-use crate::analysis::{Checks, Drift, JointTerms, Residual, Scatter};
+use crate::analysis::{Checks, Drift, JointTerms, Motion, Residual, Scatter};
 use crate::budget::Statistical;
 use crate::chi2::{enlargement, tail};
 use crate::drift::{Observation, solve};
 use crate::geometry::mean_and_spread;
-use crate::joint::{JointFit, LeftOut, Resampled, fit};
+use crate::joint::{DriftPath, JointFit, LeftOut, Resampled, fit};
 use crate::lattice::LatticeVectors;
 use crate::lattice::reciprocal::{labelled_like, real_from_reciprocal, reciprocal};
 use crate::series::measure::MeasuredScan;
@@ -256,6 +256,20 @@ pub(super) fn velocity_of(
     scan: &MeasuredScan,
 ) -> Option<(Vector2<f64>, Matrix2<f64>)> {
     Some(fit.velocity_at(middle_of_frame(scan)?))
+}
+
+/// When a scan was taken and the way of the sample: that of the fit, or without one that of a steady drift.
+pub(super) fn motion_of(
+    fit: Option<&JointFit>,
+    scan: &MeasuredScan,
+    velocity: Vector2<f64>,
+) -> Option<Motion> {
+    let middle = middle_of_frame(scan)?;
+    let steady = || DriftPath::steady(velocity, middle);
+    Some(Motion {
+        middle,
+        path: fit.map_or_else(steady, JointFit::path),
+    })
 }
 
 #[cfg(test)]

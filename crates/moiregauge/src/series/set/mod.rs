@@ -1,6 +1,7 @@
 //! One set: drift, and every scan before and after correction.
 
 mod about;
+mod headers;
 mod joint;
 mod moire;
 mod published;
@@ -11,8 +12,9 @@ use rayon::prelude::*;
 use spmfile::FrameDirection;
 
 use about::{about_checks, about_mean, about_readings, about_residual};
+use headers::{about_dates, about_headers};
 pub(super) use joint::{checks, joint_fit, lattice_of, terms};
-pub(super) use moire::moire;
+pub(super) use moire::{IMPOSSIBLE, moire};
 use scan::{plain_mean, scan_analysis};
 
 use super::group::Group;
@@ -26,19 +28,20 @@ use crate::drift::{Observation, at_known_drift, common_lattice, monte_carlo, sol
 use crate::geometry::mean_and_spread;
 use crate::lattice::LatticeVectors;
 use crate::lattice::reciprocal::real_from_reciprocal;
-use crate::readings::Readings;
+use crate::readings::{Readings, WaveStrengths};
 use crate::settings::{GivenDrift, Method, Settings};
 use crate::strain::{TwistStrain, draws};
 
 /// nm/min → nm/s.
 const PER_MINUTE: f64 = 1.0 / 60.0;
 
-/// Everything about one set but its illustration. `first_index` numbers its scans for the draws.
+/// Everything about one set but its illustration; the settings name the waves of the lattice. `first_index` numbers its scans for the draws.
 /// Scans that are left out by rule are marked in the group.
 pub(super) fn analyse_set(
     group: &mut Group,
     reference: &Matrix2<f64>,
     settings: &Settings,
+    strengths: &WaveStrengths,
     first_index: u64,
     caveats: &mut Vec<Caveat>,
 ) -> SetAnalysis {
@@ -61,11 +64,21 @@ pub(super) fn analyse_set(
         .copied()
         .collect();
     let mut solved = drift((&group.name, &used), &all, settings, caveats);
+    caveats.extend(
+        solved
+            .as_ref()
+            .and_then(|_| about_dates(&group.name, &used)),
+    );
     let mut fit = None;
     if joint {
         (solved, fit) = match solved {
             Some(linear) => {
+                let (lattice, velocity) = (linear.lattice, linear.drift.velocity);
                 let (solved, fit) = joint::jointly(linear, &used, reference, settings);
+                caveats.extend(fit.as_ref().and_then(|fit| {
+                    let name = &group.name;
+                    about_headers(name, &used, reference, &lattice, &velocity, fit, settings)
+                }));
                 (Some(solved), fit)
             }
             None => (None, None),
@@ -80,7 +93,12 @@ pub(super) fn analyse_set(
                 let own = fit.as_ref().and_then(|fit| joint::velocity_of(fit, scan));
                 own.unwrap_or((s.drift.velocity, s.drift.covariance))
             });
-            scan_analysis(scan, seen, reference, drift, settings)
+            let found = scan_analysis(scan, seen, reference, drift, settings)?;
+            let motion = |velocity| joint::motion_of(fit.as_ref(), scan, velocity);
+            Some(ScanAnalysis {
+                motion: found.drift.and_then(motion),
+                ..found
+            })
         })
         .collect();
     let checks = fit.as_ref().map(|fit| {
@@ -102,7 +120,7 @@ pub(super) fn analyse_set(
         published::draw_all(&mut scans, measured, drift, settings, first_index);
     }
     let of_set = || scans.iter().filter(|s| s.excluded.is_none());
-    let uncorrected = without_drift(&all, &scans, kept.len(), settings);
+    let uncorrected = without_drift(&all, &scans, kept.len(), settings, strengths);
     let mean = solved.as_ref().and_then(|s| {
         let of = |s: &ScanAnalysis| (s.twist_strain, s.drift_corrected.unwrap_or(s.sensor));
         set_mean(
@@ -110,6 +128,7 @@ pub(super) fn analyse_set(
             &s.statistical,
             of_set().map(of),
             settings,
+            strengths,
         )
     });
     let drift = solved.map(|s| s.drift);
@@ -146,6 +165,7 @@ fn without_drift(
     scans: &[ScanAnalysis],
     used: usize,
     settings: &Settings,
+    strengths: &WaveStrengths,
 ) -> Option<SetMean> {
     let common = common_lattice(all, &Vector2::zeros(), &Matrix2::zeros()).ok()?;
     let [image, sensor] = at_known_drift(all)?;
@@ -160,7 +180,13 @@ fn without_drift(
     let (common, statistical) = moire::enlarged(common, &statistical, scale);
     let of_set = scans.iter().filter(|s| s.excluded.is_none());
     let of = |s: &ScanAnalysis| (s.twist_strain_sensor, s.sensor);
-    set_mean((common, scale), &statistical, of_set.map(of), settings)
+    set_mean(
+        (common, scale),
+        &statistical,
+        of_set.map(of),
+        settings,
+        strengths,
+    )
 }
 
 /// Draws twist and strain of every scan.
@@ -333,6 +359,7 @@ fn set_mean(
     statistical: &Statistical,
     scans: impl Iterator<Item = (Option<TwistStrain>, LatticeVectors)>,
     settings: &Settings,
+    strengths: &WaveStrengths,
 ) -> Option<SetMean> {
     let twist_strain = moire(&lattice, settings)?;
     let (singles, lattices): (Vec<_>, Vec<_>) = scans.unzip();
@@ -350,7 +377,7 @@ fn set_mean(
     });
     let budget = Budget::new(&lattice, &twist_strain, statistical, settings);
     Some(SetMean {
-        readings: Readings::new(&lattice, &twist_strain, &budget, settings),
+        readings: Readings::new(&lattice, &twist_strain, &budget, strengths, settings),
         budget,
         lattice,
         twist_strain,

@@ -11,6 +11,7 @@ use crate::lattice::reciprocal::labelled_like;
 use crate::series::measure::{MeasuredLine, MeasuredScan};
 use crate::settings::Settings;
 
+/// Without its motion, which the fit of its set tells.
 pub(super) fn scan_analysis(
     scan: &MeasuredScan,
     seen: &[Observation],
@@ -56,6 +57,7 @@ pub(super) fn scan_analysis(
         twist_strain: drift_corrected.as_ref().and_then(strain),
         sensor,
         drift: drift.filter(|_| drift_corrected.is_some()).map(|d| d.0),
+        motion: None,
         drift_corrected,
         draws: Vec::new(),
         residual: None,
