@@ -12,7 +12,8 @@ use crate::say::say;
 /// Print a commented settings file with all defaults
 ///
 /// Save it, change what you need, and give it to `moiregauge analyze --config FILE`. Options on the
-/// command line come on top of the file.
+/// command line come on top of the file. A results.json does as well: `--config results.json` takes the
+/// settings that it holds.
 #[derive(clap::Args, Clone, Debug)]
 #[command(after_long_help = "\
 Example:
@@ -139,10 +140,14 @@ pub(crate) fn run(_args: &ConfigArgs) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Reads a settings file. `material` may be a name.
+/// Reads a settings file, in which `material` may be a name, or the settings that results hold.
 pub(crate) fn read(path: &Path) -> anyhow::Result<Settings> {
     let text = std::fs::read_to_string(path)
         .with_context(|| format!("cannot read the settings file {}", path.display()))?;
+    // No TOML file begins so.
+    if text.trim_start().starts_with('{') {
+        return Ok(moiregauge_pipeline::settings_of(path, text.as_bytes())?);
+    }
     let folder = path.parent().unwrap_or(Path::new(""));
     parse(&text, folder).with_context(|| format!("in the settings file {}", path.display()))
 }

@@ -13,7 +13,7 @@ use rayon::prelude::*;
 use spmfile::{ChannelInfo, Scan, WritableFormat, sensor_axis};
 
 use crate::info::expand;
-use crate::input::{Known, KnownArgs, is_named};
+use crate::input::{Known, KnownArgs, is_named, with_option};
 use crate::outputs;
 use crate::say::say;
 
@@ -261,7 +261,8 @@ impl Target<'_> {
                 || names.iter().any(|name| is_named(&info.name, name))
                 || (points && sensor_axis(&info.name, &info.internal_name).is_some())
         };
-        let (mut scan, replaced) = self.known.read(path, &bytes, &is_wanted)?;
+        let read = self.known.read(path, &bytes, &is_wanted);
+        let (mut scan, replaced) = read.map_err(with_option)?;
         self.channels_are_there(&scan)?;
         let mut log = vec![format!(
             "converted by moiregauge {} from {}",

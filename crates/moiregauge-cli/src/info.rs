@@ -18,7 +18,7 @@ use spmfile::{
 pub(crate) use paths::{expand, inputs};
 use table::table;
 
-use crate::input::{Known, KnownArgs};
+use crate::input::{Known, KnownArgs, with_option};
 
 /// Show what scan files hold: channels, units, sizes, directions, scaling
 ///
@@ -179,7 +179,7 @@ fn file_info(path: &Path, at: &[Pixel], known: &Known) -> FileInfo {
     if let Some(scan) = &mut scan
         && let Err(problem) = known.complete(path, scan)
     {
-        error = error.or(Some(format!("{problem:#}")));
+        error = error.or(Some(format!("{:#}", with_option(problem))));
     }
     let outside = scan.iter().flat_map(|scan| &scan.channels).find_map(|c| {
         let pixel = at

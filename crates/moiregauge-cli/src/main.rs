@@ -13,7 +13,6 @@ mod outputs;
 mod plan;
 mod say;
 mod scanner;
-mod session;
 mod simulate;
 mod validate;
 
@@ -45,6 +44,16 @@ enum Command {
     Validate(validate::ValidateArgs),
     Plan(Box<plan::PlanArgs>),
     Config(config::ConfigArgs),
+}
+
+/// The command of a command line, its program first, with or without a place for results.
+fn command(arguments: impl IntoIterator<Item = String>) -> Result<Command, clap::Error> {
+    // Where results go is no part of what was asked.
+    let place = ["--out".to_owned(), ".".to_owned()];
+    let mut arguments: Vec<String> = arguments.into_iter().collect();
+    let after = arguments.len().min(2);
+    arguments.splice(after..after, place);
+    Ok(Cli::try_parse_from(arguments)?.command)
 }
 
 fn main() -> ExitCode {

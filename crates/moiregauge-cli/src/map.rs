@@ -7,7 +7,7 @@ mod source;
 mod stripes;
 mod survey;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::{Context as _, bail, ensure};
@@ -22,8 +22,9 @@ use moiregauge::settings::Settings;
 use moiregauge_pipeline::sink::FolderSink;
 use moiregauge_report::{FailedInput, Provenance};
 
-use crate::analyze::{AnalyzeArgs, Outcome, analyse_files, failures, given_again, read_again};
-use crate::info::inputs;
+use crate::analyze::{
+    AnalyzeArgs, Outcome, Task, analyse_files, failures, given_again, read_again,
+};
 use crate::input::Known;
 use output::{Made, write};
 pub(crate) use stripes::in_words as stripes_in_words;
@@ -105,7 +106,19 @@ impl From<MapMethodArg> for MapMethod {
 
 /// Makes the maps and writes them.
 pub(crate) fn run(args: &MapArgs) -> anyhow::Result<ExitCode> {
-    let settings = args.analyze.settings()?;
+    let task = Task::new(&args.analyze, "map")?;
+    let as_before;
+    let args = if args.analyze.is_replay() {
+        as_before = args.again(&task)?;
+        &as_before
+    } else {
+        args
+    };
+    ensure!(
+        task.run.atomic.is_none() && task.run.export.is_empty() && !task.run.parquet,
+        "--atomic, --export and --parquet are for `moiregauge analyze`: a map has no use for them"
+    );
+    let settings = task.run.settings.clone();
     let resolution = args.resolution()?;
     args.regions.check()?;
     ensure!(
@@ -113,29 +126,42 @@ pub(crate) fn run(args: &MapArgs) -> anyhow::Result<ExitCode> {
         "--survey-image is for analyze"
     );
     args.analyze.start_threads()?;
-    let (inputs, failed) = inputs(args.analyze.paths());
-    let sink = output::sink(args, &inputs)?;
-    let known = args.analyze.known().of(&inputs);
+    let inputs = &task.inputs;
+    let sink = output::sink(args, &task.files())?;
+    let known = task.known(inputs);
     let whole = (&settings, &known, &resolution);
-    let made = match survey((args, &sink), &inputs, whole, &failed)? {
+    let document = args.analyze.out().join("map.json");
+    let mut made = match survey((args, &sink), inputs, whole, &task.failed)? {
         Some(made) => made,
-        None => match together(args, &inputs, whole, failed)? {
+        None => match together(args, inputs, whole, task.failed.clone())? {
             Answer::Lattice(made) => *made,
-            Answer::Stripes(found) => {
+            Answer::Stripes(mut found) => {
+                let provenance = &mut found.provenance;
+                provenance.run = Some(task.record(&known, &provenance.inputs));
                 stripes::write(&found, args, sink)?;
-                return Ok(ExitCode::SUCCESS);
+                return Ok(ended(task.is_same(&written(&document))));
             }
         },
     };
+    made.provenance.run = Some(task.record(&known, &made.provenance.inputs));
     let lost = failures(&made.provenance.failed);
     let complete = made.provenance.failed.is_empty();
     write(&made, args, sink)?;
     eprint!("{lost}");
-    Ok(if complete {
+    Ok(ended(task.is_same(&written(&document)) && complete))
+}
+
+/// The document of a map, if it can be read.
+fn written(document: &Path) -> Vec<Vec<u8>> {
+    std::fs::read(document).into_iter().collect()
+}
+
+fn ended(well: bool) -> ExitCode {
+    if well {
         ExitCode::SUCCESS
     } else {
         ExitCode::FAILURE
-    })
+    }
 }
 
 /// Maps images that are too large for memory, side by side; `None` where the first is not large.
@@ -157,6 +183,10 @@ fn survey(
     if !any {
         return Ok(None);
     }
+    ensure!(
+        args.analyze.sets()?.is_empty(),
+        "--set: images that are mapped in bands lie side by side in one map and make no sets"
+    );
     let loud = args.analyze.is_loud();
     let (inputs, again) = moiregauge_pipeline::distinct(inputs);
     let (mut maps, mut images, mut caveats) = (Vec::new(), Vec::new(), given_again(&again));
@@ -217,6 +247,7 @@ fn survey(
             seed: settings.seed,
             inputs: read,
             failed: failed.to_vec(),
+            run: None,
         },
         settings: settings.clone(),
         picture: plans.first().and_then(|(large, _)| large.picture(settings)),
@@ -434,6 +465,19 @@ fn registered(maps: &mut [LineMap], caveats: &mut Vec<Caveat>) {
 }
 
 impl MapArgs {
+    /// The options of the run to be repeated, with the place and the words of this one.
+    fn again(&self, task: &Task) -> anyhow::Result<Self> {
+        let program = std::iter::once("moiregauge".to_owned());
+        let arguments = program.chain(task.run.arguments.iter().cloned());
+        let crate::Command::Map(mut args) = crate::command(arguments)
+            .context("--replay: the document does not hold the options of a map")?
+        else {
+            bail!("--replay: expected the options of a map");
+        };
+        args.analyze = args.analyze.with_place_of(&self.analyze);
+        Ok(*args)
+    }
+
     fn resolution(&self) -> anyhow::Result<Resolution> {
         for (name, value) in [("--window", self.window), ("--step", self.step)] {
             ensure!(

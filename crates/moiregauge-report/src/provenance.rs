@@ -3,8 +3,10 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::results::Run;
+
 /// What is needed to make the numbers again.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Provenance {
     /// Version of the program.
     pub version: String,
@@ -14,6 +16,9 @@ pub struct Provenance {
     pub inputs: Vec<InputFile>,
     /// The files that were given but could not be used.
     pub failed: Vec<FailedInput>,
+    /// What was asked, for a repetition.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub run: Option<Run>,
 }
 
 /// An input, known by its content.

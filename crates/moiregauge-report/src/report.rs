@@ -2,6 +2,8 @@
 
 use moiregauge::analysis::Analysis;
 use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 use crate::draw::colormap::ColorMap;
 use crate::draw::png;
@@ -13,7 +15,7 @@ use crate::results::Results;
 use crate::tables::tables;
 
 /// Which parts of a report are wanted. `results.json` and the tables always are.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct Choice {
     /// The figures as SVG files.
     pub figures: bool,

@@ -324,6 +324,32 @@ fn tables_survive_hostile_names() {
     }
 }
 
+/// A name that a spreadsheet would run has an apostrophe before it, everywhere it stands; numbers keep their signs.
+#[test]
+fn tables_hold_nothing_that_runs() {
+    let name = "=cmd|' /C calc'!A0.spm";
+    let mut analysis = common::analysis();
+    analysis.sets[0].scans[0].file = name.to_owned();
+    analysis.sets[0].scans[0].excluded = Some("@excluded, by hand".to_owned());
+    analysis.sets[0].name = "-set".to_owned();
+    let (mut marked, mut negative) = (0, 0);
+    for table in ["vectors.csv", "scans.csv", "sets.csv", "budget.csv"] {
+        for cell in parse(&file(&analysis, table)).concat() {
+            let number = cell.parse::<f64>();
+            assert!(
+                number.is_ok() || !cell.starts_with(['=', '+', '-', '@', '\t', '\r']),
+                "{table}: {cell:?}"
+            );
+            negative += usize::from(number.is_ok_and(|n| n < 0.0));
+            marked += usize::from(["'-set", "'@excluded, by hand"].contains(&cell.as_str()));
+            marked += usize::from(cell == format!("'{name}"));
+        }
+    }
+    assert!(marked > 3 && negative > 100, "{marked} {negative}");
+    let about = file(&analysis, "columns.md");
+    assert!(about.contains("has an apostrophe before it: take one off"));
+}
+
 #[test]
 fn vectors_have_the_length_they_state() {
     let rows = parse(&file(&common::analysis(), "vectors.csv"));

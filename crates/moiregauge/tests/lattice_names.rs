@@ -6,7 +6,7 @@ use std::f64::consts::{PI, TAU};
 use moiregauge::budget::{Budget, Statistical};
 use moiregauge::lattice::LatticeVectors;
 use moiregauge::material::{Bilayer, Material};
-use moiregauge::readings::{ChosenBy, Readings, Standing, WaveStrengths, caveats};
+use moiregauge::readings::{ChosenBy, NameReading, Readings, Standing, WaveStrengths, caveats};
 use moiregauge::settings::{KnownOrientation, LatticeDirection, Settings, StrainConvention};
 use moiregauge::strain::{LatticeName, solutions, twist_strain};
 use nalgebra::{Matrix2, Matrix4, Rotation2};
@@ -178,14 +178,22 @@ fn ordinary_samples_have_one_name() {
         assert_eq!(readings.naming.unwrap().chosen_by, ChosenBy::LeastStrain);
     }
     assert_eq!(alarms, 0);
-    let small = Truth([0.3_f64.to_radians(), 0.0035, 0.87, 0.17]);
-    let (readings, said) = read(small, &settings);
-    assert!(said.iter().any(|c| c == "names-compete"), "{said:?}");
-    let open = readings.naming.unwrap();
-    assert!(
-        open.open().any(|n| (n.strain - 0.0035).abs() < 1e-9),
-        "{open:?}"
-    );
+    // At 0.3° and 0.35 % the reported pair is right or wrong by the axis of the strain; the truth is among those that
+    // are open either way.
+    let mut wrong = 0;
+    for k in 0..12 {
+        let small = Truth([0.3_f64.to_radians(), 0.0035, 0.26 * f64::from(k), 0.17]);
+        let (readings, said) = read(small, &settings);
+        assert!(said.iter().any(|c| c == "names-compete"), "{said:?}");
+        let naming = readings.naming.unwrap();
+        let is_true = |n: &NameReading| (n.strain - 0.0035).abs() < 1e-9;
+        assert!(
+            is_true(&naming.names[0]) || naming.open().any(is_true),
+            "{naming:?}"
+        );
+        wrong += usize::from(!is_true(&naming.names[0]));
+    }
+    assert!(wrong > 2, "{wrong}");
 }
 
 /// An orientation tells names apart where the wrong one needs isotropic strain, and the waves that the user names are taken.

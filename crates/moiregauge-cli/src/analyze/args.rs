@@ -7,9 +7,9 @@ use moiregauge::material::Material;
 use moiregauge::settings::{
     Background, GivenDrift, Grouping, Lines, Method, MoireLayers, Settings, StrainConvention,
 };
+use moiregauge_report::results::NamedSet;
 use moiregauge_report::{Choice, ColorMap};
 
-use super::export::{self, Export};
 use super::orientation::OrientationArgs;
 use crate::config;
 use crate::input::KnownArgs;
@@ -46,12 +46,23 @@ Examples:
 Angles are counter-clockwise, x to the right and y up, as the position sensors tell.")]
 pub(crate) struct AnalyzeArgs {
     /// Scan files, folders (the scans in them, without subfolders) or names with * and ?
-    #[arg(required = true, value_name = "PATH")]
+    #[arg(required_unless_present = "replay", value_name = "PATH")]
     pub(super) paths: Vec<PathBuf>,
-    /// Folder for results.json, tables, figures and report.html; made if it does not exist
-    #[arg(long, value_name = "DIR")]
-    pub(super) out: PathBuf,
-    /// Settings from a TOML file (see `moiregauge config`); options here come on top of it
+    /// Folder for results.json, tables, figures and report.html; made if it does not exist [default with --replay:
+    /// beside the folder of the document]
+    #[arg(long, value_name = "DIR", required_unless_present = "replay")]
+    pub(super) out: Option<PathBuf>,
+    /// Repeat the run that a results.json (or a map.json, with `map`) records: the same files, settings and options
+    /// give the same bytes. The files are looked for by name and by content, and checked first; other options are
+    /// refused
+    #[arg(long, value_name = "FILE")]
+    pub(super) replay: Option<PathBuf>,
+    /// A folder to look for the files of --replay in; may be repeated [default: the current one by name; that of the
+    /// document and the one above it]
+    #[arg(long, value_name = "DIR", requires = "replay")]
+    pub(super) data: Vec<PathBuf>,
+    /// Settings from a TOML file (see `moiregauge config`), or those that a results.json or map.json holds; options
+    /// here come on top of it
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
     /// Channel that shows the moiré [default: TR Phase, TR Amplitude, Phase, … the first there is; if no
@@ -101,7 +112,7 @@ pub(crate) struct AnalyzeArgs {
     /// How files become sets [default: auto]
     #[arg(long, value_enum, help_heading = SCANS)]
     grouping: Option<GroupingArg>,
-    /// Make a set by hand: all files under PATH form the set NAME; may be repeated
+    /// Make a set by hand: all files under PATH (a folder or a file among the inputs) form the set NAME; may be repeated
     #[arg(long = "set", value_name = "NAME=PATH", help_heading = SCANS)]
     sets: Vec<String>,
     /// Show these scans but do not use them: names of files, * for any characters; may be repeated
@@ -154,16 +165,15 @@ pub(crate) struct AnalyzeArgs {
     /// one file per scan and line: corrected.gwy makes OUT/corrected/SCAN-trace.gwy and so on; also
     /// .gsf, .npz, .zarr, .tiff, .csv
     #[arg(long, value_name = "NAME.EXT", value_delimiter = ',', help_heading = OUTPUT)]
-    export: Vec<String>,
+    pub(super) export: Vec<String>,
     /// Write vectors, scans, sets and budget as Parquet too
-    #[cfg(feature = "parquet")]
     #[arg(long, help_heading = OUTPUT)]
     pub(super) parquet: bool,
     /// Laboratory axes for vectors, angles, drift, figures and exported images: a frame that is turned by
     /// its scan angle is turned back. This is the default; `--rotation 0` gives the axes of the image
     #[arg(long, help_heading = OUTPUT)]
     rotate_to_lab: bool,
-    /// Print results.json instead of the summary
+    /// Print results.json instead of the summary; with --moires a list of those of all moirés, the largest cell first
     #[arg(long)]
     pub(super) json: bool,
     /// Print nothing but errors
@@ -180,9 +190,6 @@ pub(crate) struct AnalyzeArgs {
     #[command(flatten)]
     pub(super) known: KnownArgs,
 }
-
-/// A set made by hand: its name and the path of its files.
-pub(crate) type NamedSet = (String, PathBuf);
 
 impl AnalyzeArgs {
     /// The settings file, or the defaults, with the options on top.
@@ -290,14 +297,9 @@ impl AnalyzeArgs {
         Ok(())
     }
 
-    /// The files, folders and patterns as given.
-    pub(crate) fn paths(&self) -> &[PathBuf] {
-        &self.paths
-    }
-
     /// The folder for results.
     pub(crate) fn out(&self) -> &std::path::Path {
-        &self.out
+        self.out.as_deref().unwrap_or(std::path::Path::new(""))
     }
 
     /// The image of a larger area.
@@ -305,9 +307,28 @@ impl AnalyzeArgs {
         self.survey_image.as_deref()
     }
 
-    /// What the files do not tell.
-    pub(crate) fn known(&self) -> &KnownArgs {
-        &self.known
+    /// The folder for results, that of a repetition where none is given.
+    pub(crate) fn results_folder(&self) -> PathBuf {
+        let document = self.replay.as_ref().filter(|_| self.out.is_none());
+        document.map_or_else(|| self.out().to_owned(), |d| super::out_beside(d))
+    }
+
+    /// Whether an earlier run is to be repeated.
+    pub(crate) fn is_replay(&self) -> bool {
+        self.replay.is_some()
+    }
+
+    /// These options, with the folder of results, the threads and the words of others.
+    pub(crate) fn with_place_of(self, other: &Self) -> Self {
+        Self {
+            out: Some(other.results_folder()),
+            replay: other.replay.clone(),
+            threads: other.threads,
+            force: other.force,
+            json: other.json,
+            quiet: other.quiet,
+            ..self
+        }
     }
 
     /// Whether results may be written over.
@@ -325,25 +346,16 @@ impl AnalyzeArgs {
         !self.quiet && !self.json
     }
 
-    /// The corrected images that are wanted.
-    pub(super) fn exports(&self) -> anyhow::Result<Vec<Export>> {
-        self.export.iter().map(|name| export::parse(name)).collect()
-    }
-
     /// The sets made by hand.
     pub(crate) fn sets(&self) -> anyhow::Result<Vec<NamedSet>> {
         let parse = |text: &String| match text.split_once('=') {
-            Some((name, path)) if !name.is_empty() && !path.is_empty() => {
-                Ok((name.to_owned(), PathBuf::from(path)))
-            }
+            Some((name, path)) if !name.is_empty() && !path.is_empty() => Ok(NamedSet {
+                name: name.to_owned(),
+                path: path.to_owned(),
+            }),
             _ => anyhow::bail!("--set expects NAME=PATH, found {text:?}"),
         };
         self.sets.iter().map(parse).collect()
-    }
-
-    /// Whether pixels are needed for pictures.
-    pub(super) fn illustrated(&self) -> bool {
-        !self.no_report
     }
 
     pub(crate) fn choice(&self) -> Choice {

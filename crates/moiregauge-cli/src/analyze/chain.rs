@@ -1,6 +1,5 @@
 //! Files → measured scans → analysis, one file in memory per thread.
 
-use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
@@ -12,15 +11,15 @@ use moiregauge::series::{
     common_window, illustrate, measure_moires, sorted_moires,
 };
 use moiregauge::settings::Settings;
-use moiregauge_pipeline::{Repeated, distinct, names};
+use moiregauge_pipeline::{Repeated, distinct, hexadecimal, names, set_of};
+use moiregauge_report::results::NamedSet;
 use moiregauge_report::{FailedInput, InputFile, Provenance};
 use rayon::prelude::*;
 use sha2::{Digest as _, Sha256};
 use spmfile::{ChannelInfo, Scan, sensor_axis};
 
-use super::args::NamedSet;
 use super::channel;
-use crate::input::Known;
+use crate::input::{Known, with_option};
 
 /// What came out, and of what.
 pub(crate) struct Outcome {
@@ -91,6 +90,7 @@ pub(crate) fn analyse_files(
         seed: settings.seed,
         inputs: files,
         failed,
+        run: None,
     };
     let outcomes = sorted_moires(scans)
         .into_iter()
@@ -176,10 +176,7 @@ pub(crate) fn measure_file(
         caveats,
     } = read(path, settings, known)?;
     let mut moires = measure_moires(&input.file, &scan, settings, window).map_err(with_hint)?;
-    let set = sets
-        .iter()
-        .find(|(_, of)| path.starts_with(of))
-        .map(|(name, _)| name.clone());
+    let set = set_of(sets, path).map(str::to_owned);
     for measured in &mut moires {
         measured.caveats.extend(caveats.iter().cloned());
         measured.set.clone_from(&set);
@@ -225,7 +222,7 @@ fn read_more(
     known: &Known,
     companion: impl Fn(&str) -> Option<String>,
 ) -> anyhow::Result<Reading> {
-    let bytes = std::fs::read(path)?;
+    let bytes = std::fs::read(known.place(path))?;
     let channels = channel::names(path, &bytes, known)?;
     let names: Vec<_> = channels
         .iter()
@@ -238,7 +235,7 @@ fn read_more(
             || beside.as_ref() == Some(&channel.name.to_lowercase())
             || sensor_axis(&channel.name, &channel.internal_name).is_some()
     };
-    let (scan, replaced) = known.read(path, &bytes, &wanted)?;
+    let (scan, replaced) = known.read(path, &bytes, &wanted).map_err(with_option)?;
     let hash = Sha256::digest(&bytes);
     let input = InputFile {
         file: names::in_words(path),
@@ -267,15 +264,6 @@ pub(crate) fn read_again(
 ) -> anyhow::Result<Reading> {
     let path = names::with_words(inputs, words).context("it is none of the inputs")?;
     read(path, settings, known)
-}
-
-pub(crate) fn hexadecimal(bytes: &[u8]) -> String {
-    let mut text = String::with_capacity(2 * bytes.len());
-    for byte in bytes {
-        // Writing into a string cannot fail.
-        let _ = write!(text, "{byte:02x}");
-    }
-    text
 }
 
 /// The region common to all files that can be read.

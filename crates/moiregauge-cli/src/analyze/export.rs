@@ -23,6 +23,11 @@ pub(super) struct Export {
     format: WritableFormat,
 }
 
+/// All that are wanted.
+pub(super) fn all(names: &[String]) -> anyhow::Result<Vec<Export>> {
+    names.iter().map(|name| parse(name)).collect()
+}
+
 impl Export {
     pub(super) fn folder(&self) -> &str {
         &self.folder
@@ -30,7 +35,7 @@ impl Export {
 }
 
 /// `corrected.gwy` as the folder `corrected` and the format.
-pub(super) fn parse(name: &str) -> anyhow::Result<Export> {
+fn parse(name: &str) -> anyhow::Result<Export> {
     let path = Path::new(name);
     let format = format_of(path).context("--export")?;
     ensure!(

@@ -4,7 +4,6 @@ use std::path::{Path, PathBuf};
 
 use moiregauge_pipeline::sink::{FolderSink, Target};
 
-use super::AnalyzeArgs;
 use super::export::Export;
 
 /// What may be written at the top of the folder of results; folders end with a slash.
@@ -25,7 +24,7 @@ const NAMES: [&str; 12] = [
 
 /// Makes the folder of results ready, before the work.
 pub(super) fn sink(
-    args: &AnalyzeArgs,
+    (out, force): (&Path, bool),
     exports: &[Export],
     inputs: &[PathBuf],
 ) -> anyhow::Result<FolderSink> {
@@ -33,11 +32,11 @@ pub(super) fn sink(
     let exported = exports.iter().map(|e| format!("{}/", e.folder()));
     let names: Vec<String> = report_names().chain(moires).chain(exported).collect();
     crate::outputs::folder(&Target {
-        folder: &args.out,
+        folder: out,
         kind: "analyze",
         names: &names,
         inputs,
-        force: args.force,
+        force,
     })
 }
 

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use moiregauge_pipeline::names::in_words;
 use moiregauge_report::FailedInput;
 
-use crate::session::{channels_of_one_frame, one_per_frame};
+use moiregauge_pipeline::session::{channels_of_one_frame, one_per_frame};
 
 /// The files meant by names of files, folders and wildcards, in order; names that mean none come
 /// back with the reason.

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, ensure};
 use moiregauge::image::Image;
-use spmfile::Channel;
+use spmfile::{Block, Channel};
 
 /// Where lines come from.
 pub(super) enum Source {
@@ -28,16 +28,20 @@ pub(super) struct Array {
     /// Rows and columns.
     pub(super) size: [usize; 2],
     line: usize,
+    /// The part of it that is the image, if not all.
+    block: Option<Block>,
 }
 
 impl Source {
     /// Reads a block of columns and rows, the bottom line being row 0.
     pub(super) fn block(&self, [columns, rows]: [Range<usize>; 2]) -> Result<Image, String> {
-        let (width, count, values) = match self {
-            Self::Memory(channel) => (channel.columns, rows.len(), channel.lines(rows)),
+        let (width, count) = (self.width(), rows.len());
+        let (values, columns) = match self {
+            Self::Memory(channel) => (channel.lines(rows), columns),
             Self::Array(array) => {
-                let values = array.lines(rows.clone()).map_err(|e| format!("{e:#}"))?;
-                (array.size[1], rows.len(), values)
+                let [columns, rows] = array.of_whole([columns, rows]);
+                let values = array.lines(rows).map_err(|e| format!("{e:#}"))?;
+                (values, columns)
             }
         };
         if values.len() != width * count {
@@ -48,6 +52,14 @@ impl Source {
             return Ok(image);
         }
         Ok(image.cropped([columns.start, 0], [columns.len(), count]))
+    }
+
+    /// Samples of a line as they are stored.
+    fn width(&self) -> usize {
+        match self {
+            Self::Memory(channel) => channel.columns,
+            Self::Array(array) => array.size[1],
+        }
     }
 }
 
@@ -90,7 +102,20 @@ impl Array {
             start: 10 + length as u64,
             size: [rows, columns],
             line,
+            block: None,
         })
+    }
+
+    /// The same with a part of it as the image.
+    pub(super) fn with_block(self, block: Option<Block>) -> Self {
+        Self { block, ..self }
+    }
+
+    /// Columns and rows of the image as those of the array.
+    fn of_whole(&self, [columns, rows]: [Range<usize>; 2]) -> [Range<usize>; 2] {
+        let first = self.block.map_or([0, 0], |b| [b.column, b.row]);
+        let moved = |range: Range<usize>, by: usize| range.start + by..range.end + by;
+        [moved(columns, first[0]), moved(rows, first[1])]
     }
 
     /// The file as if it had only these lines, counted from the bottom.

@@ -86,7 +86,7 @@ pub(crate) fn in_words(inputs: &[PathBuf], settings: &Settings, known: &Known) -
 pub(super) struct Striped {
     found: ScanStripes,
     settings: Settings,
-    provenance: Provenance,
+    pub(super) provenance: Provenance,
     caveats: Vec<Caveat>,
 }
 
@@ -144,6 +144,7 @@ pub(super) fn look(
             seed: settings.seed,
             inputs: vec![reading.input],
             failed: Vec::<FailedInput>::new(),
+            run: None,
         },
         found,
         caveats,

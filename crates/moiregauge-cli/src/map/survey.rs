@@ -1,10 +1,9 @@
 //! Surveys: images too large for memory, mapped band by band. Finished bands are kept beside the results until the map
 //! is complete, so that an interrupted run goes on where it stopped; one that is damaged is made again.
 
-use std::io::Read as _;
 use std::path::Path;
 
-use anyhow::Context as _;
+use anyhow::{Context as _, ensure};
 use indicatif::{ProgressBar, ProgressStyle};
 use moiregauge::analysis::Picture;
 use moiregauge::background::remove_background;
@@ -15,7 +14,7 @@ use moiregauge::image::Image;
 use moiregauge::map::{Mask, Resolution, TwistStrainMap};
 use moiregauge::series::{SurveyPlan, choose_channel, nominal_geometry};
 use moiregauge::settings::Settings;
-use moiregauge_pipeline::names::in_words;
+use moiregauge_pipeline::identity;
 use moiregauge_pipeline::sink::{FolderSink, Part, build};
 use moiregauge_report::InputFile;
 use nalgebra::{Matrix2, Vector2};
@@ -23,7 +22,7 @@ use sha2::{Digest as _, Sha256};
 use spmfile::{Channel, LineDirection, Scan};
 
 use super::source::{Array, Source};
-use crate::input::Known;
+use crate::input::{Known, with_option};
 
 /// Images with more pixels than this are mapped in bands.
 const LARGE: usize = 4096 * 4096 * 5 / 4;
@@ -51,33 +50,16 @@ impl Large {
         always: bool,
     ) -> anyhow::Result<Option<Self>> {
         let large = if always { 0 } else { LARGE };
-        if let Some(array) = Array::open(path) {
+        let place = known.place(path);
+        if let Some(array) = Array::open(place) {
             if array.size[0] * array.size[1] < large {
                 return Ok(None);
             }
-            // Two lines tell what the options make of the file: its scale, rotation and size.
-            let (scan, _) = known.read(path, &array.part(&(0..2))?, &|_| true)?;
-            let mut channel = scan
-                .channels
-                .first()
-                .context("the array holds no image")?
-                .clone();
-            channel.rows = array.size[0];
-            let timing = timing(&scan, &channel);
-            let geometry = nominal_geometry(&scan, &channel)
-                .context("the array has no size; give it with --size")?;
-            return Ok(Some(Self {
-                input: identity(path)?,
-                caveats: Vec::new(),
-                geometry,
-                channel: channel.name,
-                unit: channel.unit,
-                timing,
-                source: Source::Array(array),
-            }));
+            no_sensors(known)?;
+            return Self::of_array(path, array, known).map(Some);
         }
         // Other files are read as a whole anyway; small ones go the common way.
-        if std::fs::metadata(path)?.len() < large as u64 {
+        if std::fs::metadata(place)?.len() < large as u64 {
             return Ok(None);
         }
         let reading = crate::analyze::read(path, settings, known)?;
@@ -96,10 +78,11 @@ impl Large {
         let Some(channel) = channel.filter(|c| c.rows * c.columns >= large) else {
             return Ok(None);
         };
+        no_sensors(known)?;
         let geometry =
             nominal_geometry(&reading.scan, channel).context("the file gives no scan size")?;
         Ok(Some(Self {
-            input: identity(path)?,
+            input: identity(path, place)?,
             caveats: reading.caveats,
             geometry,
             channel: channel.name.clone(),
@@ -107,6 +90,30 @@ impl Large {
             timing: timing(&reading.scan, channel),
             source: Source::Memory(channel.clone()),
         }))
+    }
+
+    /// An array, of which no more than two lines are read here.
+    fn of_array(path: &Path, array: Array, known: &Known) -> anyhow::Result<Self> {
+        // They tell what is known of the whole: scale, rotation and size; and of the block that is wanted of it.
+        let mut scan = known.decode(path, &array.part(&(0..array.size[0].min(2)))?, &|_| true)?;
+        for channel in &mut scan.channels {
+            channel.rows = array.size[0];
+        }
+        let replaced = known.tell(path, &mut scan);
+        let block = known.cut(&mut scan).map_err(with_option)?;
+        let input = identity(path, known.place(path))?;
+        let channel = scan.channels.first().context("the array holds no image")?;
+        let caveat = |words| Caveat::new("given-by-user", input.file.as_str(), words);
+        Ok(Self {
+            caveats: replaced.into_iter().map(caveat).collect(),
+            geometry: nominal_geometry(&scan, channel)
+                .context("the array has no size; give it with --size")?,
+            timing: timing(&scan, channel),
+            channel: channel.name.clone(),
+            unit: channel.unit.clone(),
+            source: Source::Array(array.with_block(block)),
+            input,
+        })
     }
 
     /// Maps band by band, as `first` of the same survey was. Finished bands are kept until all is written, and those of
@@ -199,25 +206,15 @@ fn timing(scan: &Scan, channel: &Channel) -> Option<Timing> {
     Timing::of_scan(scan, channel.columns, scan.frame_direction?, line)
 }
 
-/// The file by its content, read piece by piece.
-fn identity(path: &Path) -> anyhow::Result<InputFile> {
-    let mut file = std::fs::File::open(path)?;
-    let mut hash = Sha256::new();
-    let mut buffer = vec![0; 1 << 20];
-    let mut bytes = 0;
-    loop {
-        let count = file.read(&mut buffer)?;
-        if count == 0 {
-            break;
-        }
-        hash.update(&buffer[..count]);
-        bytes += count as u64;
-    }
-    Ok(InputFile {
-        file: in_words(path),
-        sha256: crate::analyze::hexadecimal(&hash.finalize()),
-        bytes,
-    })
+/// Refuses position sensors, which have no use here.
+fn no_sensors(known: &Known) -> anyhow::Result<()> {
+    let told = known.told();
+    ensure!(
+        told.sensors.is_none() && told.x_sensor.is_none(),
+        "--sensors, --x-sensor and --y-sensor: an image that is mapped in bands has nominal positions, and position \
+         sensors are not used"
+    );
+    Ok(())
 }
 
 /// What a band depends on: input, settings, resolution, geometry and times of the image, the first image of the survey

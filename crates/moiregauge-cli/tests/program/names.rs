@@ -137,13 +137,14 @@ fn the_calculator_lists_other_pairs() {
             && (number(s, "/strain_percent/value") - 0.3).abs() < 1e-9
     });
     let hit = hit.expect("the truth is listed");
-    // The waves that are named, for K₁ and K₂ as they are shown, have the area of the moiré.
-    let waves = |i: usize, k: usize| {
-        number(
-            &read_back,
-            &format!("/cell/wave_vectors_rad_per_nm/{i}/{k}"),
-        )
-    };
+    // The waves that are named, for K₁ and K₂ dual to the vectors that are shown.
+    let shown = |i: usize, k: usize| number(&read_back, &format!("/cell/vectors_nm/{i}/{k}"));
+    let per_area = std::f64::consts::TAU / (shown(0, 0) * shown(1, 1) - shown(0, 1) * shown(1, 0));
+    let dual = [
+        [shown(1, 1) * per_area, -shown(1, 0) * per_area],
+        [-shown(0, 1) * per_area, shown(0, 0) * per_area],
+    ];
+    let waves = |i: usize, k: usize| dual[i][k];
     let number_of = |i: usize, k: usize| number(hit, &format!("/waves/{i}/{k}"));
     let wave =
         |i: usize| [0, 1].map(|k| number_of(i, 0) * waves(0, k) + number_of(i, 1) * waves(1, k));

@@ -6,7 +6,7 @@ use std::path::Path;
 use crate::common::{program, small_set, succeed};
 
 /// Every file below a folder by its name.
-fn contents(folder: &Path) -> BTreeMap<String, Vec<u8>> {
+pub(crate) fn contents(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     let mut files = BTreeMap::new();
     for entry in std::fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();
@@ -30,7 +30,11 @@ fn analysed(scans: &Path, options: &[&str]) -> BTreeMap<String, Vec<u8>> {
     contents(out.path())
 }
 
-fn assert_same(a: &BTreeMap<String, Vec<u8>>, b: &BTreeMap<String, Vec<u8>>, what: &str) {
+pub(crate) fn assert_same(
+    a: &BTreeMap<String, Vec<u8>>,
+    b: &BTreeMap<String, Vec<u8>>,
+    what: &str,
+) {
     assert!(a.keys().eq(b.keys()), "{what}: other files");
     let differ: Vec<&String> = a.keys().filter(|name| a[*name] != b[*name]).collect();
     assert!(differ.is_empty(), "{what}: {differ:?} differ");

@@ -10,7 +10,7 @@ use crate::common::{analyze, estimate, number, results, run, small_set, succeed}
 const TWISTS: [f64; 2] = [1.1, 1.9];
 
 /// Four frames whose phase channels hold the moirés of two samples in one scanner frame.
-fn two_moires(folder: &Path) {
+pub(crate) fn two_moires(folder: &Path) {
     let simulators = [0, 1].map(|i| {
         let mut settings = Simulation::default();
         settings.raster.pixels = [192; 2];

@@ -3,7 +3,9 @@
 use serde::{Deserialize, Serialize};
 
 /// A colour map for scans.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
+)]
 #[serde(rename_all = "kebab-case")]
 pub enum ColorMap {
     /// Viridis: perceptually uniform, safe for the colour-blind.

@@ -48,7 +48,7 @@ pub struct Results {
 }
 
 /// Program, seed and inputs.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct InputProvenance {
     /// `moiregauge`.
     pub program: String,
@@ -58,6 +58,9 @@ pub struct InputProvenance {
     pub seed: u64,
     /// The files that were analysed.
     pub inputs: Vec<InputFile>,
+    /// What was asked, for a repetition.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub run: Option<super::Run>,
 }
 
 /// Scans of one slow axis, line rate, size and channel.
@@ -219,6 +222,7 @@ impl Results {
                 version: provenance.version.clone(),
                 seed: provenance.seed,
                 inputs: provenance.inputs.clone(),
+                run: provenance.run.clone(),
             },
         }
     }

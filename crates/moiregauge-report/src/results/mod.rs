@@ -14,6 +14,7 @@ mod lattice;
 mod map;
 mod readings;
 mod region;
+mod run;
 mod scan;
 mod stripes;
 
@@ -39,6 +40,7 @@ pub use readings::{
 pub use region::{
     DeviceResult, MapDetailsResult, MaskShare, RegionMeanResult, RegionResult, WantedResult,
 };
+pub use run::{AtomicImages, Crop, FrameOrder, NamedSet, Run, Told};
 pub use scan::{LineResult, ScanResult, ScanTwistStrain, ScanVector, TipVelocity, Window};
 pub use stripes::{StripeHarmonicResult, StripePatternResult, StripesResult};
 

@@ -67,7 +67,7 @@ pub struct NamesResult {
 pub struct NameResult {
     /// As of the solutions.
     pub waves: [[i32; 2]; 2],
-    /// The least strain that explains the lattice under this name.
+    /// The strain of its first solution with θ > 0.
     pub strain_percent: f64,
     /// The twist that goes with it.
     pub twist_deg: f64,

@@ -1,4 +1,4 @@
-//! RFC 4180: fields, lines, quotes.
+//! RFC 4180: fields, lines, quotes; and no field that a spreadsheet would run.
 
 use std::fmt::Write as _;
 
@@ -28,14 +28,30 @@ pub(super) fn explanation<R>(file: &str, about: &str, columns: &[Column<R>]) -> 
 }
 
 fn line(fields: impl Iterator<Item = String>) -> String {
-    let fields: Vec<String> = fields.map(|f| quoted(&f)).collect();
+    let fields: Vec<String> = fields.map(|f| quoted(&harmless(f))).collect();
     fields.join(",") + "\r\n"
 }
 
-/// A field in quotes if it needs them.
+/// For the reader of a table: what [`harmless`] does, and how to undo it.
+pub(super) const APOSTROPHE: &str = "Text that a spreadsheet would run (it begins with `=`, `+`, `-`, `@` or a control \
+    character) or that begins with an apostrophe has an apostrophe before it: take one off. Numbers are as they are.";
+
+/// A text that begins like a formula, or already with an apostrophe, with one before it; a number as it is.
 ///
-/// A name that begins like a formula is left as it is: changing data is worse, and the numbers
-/// themselves may begin with a minus sign.
+/// Names of files and sets are anybody's, and spreadsheets run what begins so. Blanks before it do not stop all of
+/// them, and Japanese ones take the wide signs as well.
+fn harmless(field: String) -> String {
+    let first = field.chars().find(|c| !c.is_whitespace());
+    let formula = first.is_some_and(|c| "=+-@＝＋－＠".contains(c) || c.is_control());
+    let marked = field.starts_with(|c: char| c.is_control() || c == '\'');
+    if (formula || marked) && field.parse::<f64>().is_err() {
+        format!("'{field}")
+    } else {
+        field
+    }
+}
+
+/// A field in quotes if it needs them.
 fn quoted(field: &str) -> String {
     if field.contains([',', '"', '\r', '\n']) || field.starts_with(' ') || field.ends_with(' ') {
         format!("\"{}\"", field.replace('"', "\"\""))
@@ -60,6 +76,38 @@ mod tests {
         assert_eq!(quoted("a,b"), "\"a,b\"");
         assert_eq!(quoted("say \"x\""), "\"say \"\"x\"\"\"");
         assert_eq!(quoted("two\nlines"), "\"two\nlines\"");
+    }
+
+    /// What a spreadsheet shows of such a cell is the text after the apostrophe.
+    #[test]
+    fn nothing_is_run() {
+        let plain = |text: &str| harmless(text.to_owned());
+        for formula in [
+            "=cmd|' /C calc'!A0.spm",
+            "+1+cmd",
+            "-2+3",
+            "-a",
+            "@SUM(1)",
+            "\t=1",
+            "\r=1",
+            "\n=1",
+            " =1",
+            "＝1+1",
+            "'quoted'",
+            "+",
+            "=",
+        ] {
+            assert_eq!(plain(formula), format!("'{formula}"));
+        }
+        for kept in [
+            "-0.35", "+2", "-1e-9", "-inf", "a=b", "a-b", "3", "", " ", "name, x", "don't",
+        ] {
+            assert_eq!(plain(kept), kept);
+        }
+        assert_eq!(
+            line(["=a,\"b\"\r\n.spm".to_owned(), "-0.35".to_owned()].into_iter()),
+            "\"'=a,\"\"b\"\"\r\n.spm\",-0.35\r\n"
+        );
     }
 
     #[test]

@@ -34,7 +34,7 @@ pub(crate) fn tables(results: &Results) -> Vec<(String, Vec<u8>)> {
         SetRow::rows(results),
         BudgetRow::rows(results),
     );
-    let mut about = String::from(ABOUT);
+    let mut about = format!("{ABOUT}{}\n", csv::APOSTROPHE);
     about.push_str(&csv::explanation(
         "vectors.csv",
         VectorRow::ABOUT,

@@ -56,7 +56,7 @@ impl Kind {
     fn of(column: &str) -> Self {
         match column {
             "set" | "file" | "frame_direction" | "vector" | "coordinates" | "acquired"
-            | "slow_axis" | "channel" | "source" => Self::Text,
+            | "slow_axis" | "channel" | "source" | "excluded" => Self::Text,
             "scan" | "scans" => Self::Count,
             "drift_given" | "within_one_percent" => Self::Answer,
             _ => Self::Number,

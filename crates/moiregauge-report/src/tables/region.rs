@@ -3,7 +3,7 @@
 use moiregauge::region::ProfilePoint;
 
 use super::columns::columns;
-use super::csv::{Column, explanation, number, text};
+use super::csv::{APOSTROPHE, Column, explanation, number, text};
 use super::domains::{CELL, CellRow, NODE, NodeRow};
 use crate::map_details::MapDetails;
 use crate::results::{DeviceResult, MapDetailsResult, RegionMeanResult, RegionResult};
@@ -12,7 +12,7 @@ use crate::results::{DeviceResult, MapDetailsResult, RegionMeanResult, RegionRes
 pub fn map_tables(details: &MapDetails) -> Vec<(String, Vec<u8>)> {
     let found = MapDetailsResult::from(details);
     let mut files = Vec::new();
-    let mut about = format!("{ABOUT}{COMMON}\n");
+    let mut about = format!("{ABOUT}{COMMON}\n\n{APOSTROPHE}\n");
     if !found.regions.is_empty() {
         add(
             &mut files,

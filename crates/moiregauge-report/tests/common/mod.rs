@@ -119,6 +119,7 @@ pub(crate) fn provenance() -> Provenance {
             error: "channel \"X Sensor\" is 524288 bytes long but its header promises 1048576"
                 .to_owned(),
         }],
+        run: None,
     }
 }
 

@@ -61,7 +61,7 @@ pub enum ChosenBy {
 pub struct NameReading {
     /// Which waves.
     pub name: LatticeName,
-    /// The least uniaxial strain (magnitude) that explains the lattice under this name.
+    /// The uniaxial strain (magnitude) of its default reading.
     pub strain: f64,
     /// The twist that goes with it, rad.
     pub twist: f64,
@@ -154,20 +154,17 @@ fn plausible(name: &NameReading) -> f64 {
     PLAUSIBLE_STRAIN.max(2.0 * name.strain.min(PLAUSIBLE_STRAIN))
 }
 
-/// The names of the solutions with the least strain of each, in their order.
+/// The names of the solutions in their order, each with its default reading: θ > 0 and ε ≥ 0 where there is one.
 fn by_name(found: &Solutions) -> Vec<NameReading> {
     let mut names: Vec<NameReading> = Vec::new();
     for branch in found.branches.iter().filter(|b| b.twist >= 0.0) {
-        let (name, strain) = (branch.name, branch.strain.abs());
-        match names.iter_mut().find(|n| n.name == name) {
-            Some(known) if known.strain <= strain => {}
-            Some(known) => (known.strain, known.twist) = (strain, branch.twist),
-            None => names.push(NameReading {
-                name,
-                strain,
+        if names.iter().all(|n| n.name != branch.name) {
+            names.push(NameReading {
+                name: branch.name,
+                strain: branch.strain.abs(),
                 twist: branch.twist,
                 standing: Standing::Open,
-            }),
+            });
         }
     }
     names

@@ -8,7 +8,7 @@ use rand_distr::{Distribution, StandardNormal};
 
 use super::{Pattern, Sample, SimulateError};
 use crate::rng;
-use crate::strain::moire_of;
+use crate::strain::{moire_of, moire_pair_of};
 
 /// One harmonic of the pattern.
 #[derive(Clone, Copy, Debug)]
@@ -61,6 +61,12 @@ impl Scene {
     pub(super) fn new(sample: &Sample) -> Result<Self, SimulateError> {
         let (stacking, bilayer) = (sample.stacking(), sample.bilayer());
         let basis = match sample.pattern {
+            // The contrast follows the stacking: the waves b₂ − b₁ are the strong ones, whatever the strain.
+            Pattern::Moire
+                if bilayer.reference.is_hexagonal() && bilayer.stretched.is_hexagonal() =>
+            {
+                moire_pair_of(&stacking, bilayer, sample.strain_convention)?
+            }
             Pattern::Moire => moire_of(&stacking, bilayer, sample.strain_convention)?,
             Pattern::Layer1 => stacking.atoms(bilayer, sample.strain_convention)?[0],
             Pattern::Layer2 => stacking.atoms(bilayer, sample.strain_convention)?[1],

@@ -106,6 +106,27 @@ pub fn moire_of<'a>(
     bilayer: impl Into<Bilayer<'a>>,
     convention: StrainConvention,
 ) -> Result<Matrix2<f64>, StrainError> {
+    let bilayer = bilayer.into();
+    let layers = Layers::new(bilayer, convention)?;
+    let lattice = LatticeVectors {
+        basis: moire_pair_of(stacking, bilayer, convention)?,
+        covariance: Matrix4::zeros(),
+    };
+    Ok(least_strained(&lattice, &layers)
+        .ok_or(StrainError::NoMoire)?
+        .basis)
+}
+
+/// The pair (columns, nm) of the moiré of two layers whose waves are the differences of the first reciprocal vectors of the
+/// layers: those that the contrast of an image shows strongest, and not always the least strained pair of the lattice.
+///
+/// # Errors
+/// As [`moire_of`].
+pub fn moire_pair_of<'a>(
+    stacking: &Stacking,
+    bilayer: impl Into<Bilayer<'a>>,
+    convention: StrainConvention,
+) -> Result<Matrix2<f64>, StrainError> {
     let layers = Layers::new(bilayer.into(), convention)?;
     let turn = |angle: f64| Rotation2::new(angle).into_inner();
     let stretch = stacking.reciprocal_stretch(&layers);
@@ -121,16 +142,10 @@ pub fn moire_of<'a>(
         .try_inverse()
         .ok_or(StrainError::NoMoire)?
         * layers.atoms;
-    let lattice = LatticeVectors {
-        basis,
-        covariance: Matrix4::zeros(),
-    };
     if !basis.iter().all(|x| x.is_finite()) {
         return Err(StrainError::NoMoire);
     }
-    Ok(least_strained(&lattice, &layers)
-        .ok_or(StrainError::NoMoire)?
-        .basis)
+    Ok(basis)
 }
 
 impl TwistStrain {

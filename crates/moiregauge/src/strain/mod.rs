@@ -34,7 +34,7 @@ pub use closure::three_vectors;
 pub use degeneracy::{Degeneracy, degeneracy};
 pub use draws::draws;
 pub use error::StrainError;
-pub use forward::{Stacking, moire_lattice, moire_of, naive_twist};
+pub use forward::{Stacking, moire_lattice, moire_of, moire_pair_of, naive_twist};
 pub(crate) use local::FixedBranch;
 pub use names::LatticeName;
 pub(crate) use other_models::Reference;

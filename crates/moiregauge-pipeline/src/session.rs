@@ -15,7 +15,10 @@ fn refused(reason: String) -> ReadError {
 }
 
 /// Reads the frame upwards, or the one that is wanted, with the log of the session beside the file.
-pub(crate) fn read(
+///
+/// # Errors
+/// No log lies there, or one of the files cannot be read.
+pub fn read(
     path: &Path,
     bytes: &[u8],
     frame: Option<FrameDirection>,
@@ -50,9 +53,18 @@ fn log(path: &Path, name: &str) -> Result<Vec<Vec<u8>>, ReadError> {
     Ok(parts)
 }
 
+/// The parts of the log beside a file of a session; none beside any other file.
+pub fn log_files(path: &Path) -> Vec<PathBuf> {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    (1..)
+        .map_while(|number| Some(path.with_file_name(log_file(&name, number)?)))
+        .take_while(|log| log.is_file())
+        .collect()
+}
+
 /// Of the scans found in a folder, sorted by name, those to read: of a frame whose channels are files of
 /// their own one file, that of Z where there is one, and no curves.
-pub(crate) fn one_per_frame(files: Vec<PathBuf>, head: impl Fn(&Path) -> Vec<u8>) -> Vec<PathBuf> {
+pub fn one_per_frame(files: Vec<PathBuf>, head: impl Fn(&Path) -> Vec<u8>) -> Vec<PathBuf> {
     let mut kept = Vec::new();
     let mut places = BTreeMap::new();
     for file in files {
@@ -82,9 +94,7 @@ pub(crate) fn one_per_frame(files: Vec<PathBuf>, head: impl Fn(&Path) -> Vec<u8>
 /// Files apart that are another channel of a frame among those before: with the first file of the frame.
 ///
 /// Measured both, they would count as two frames.
-pub(crate) fn channels_of_one_frame(
-    files: Vec<PathBuf>,
-) -> (Vec<PathBuf>, Vec<(PathBuf, PathBuf)>) {
+pub fn channels_of_one_frame(files: Vec<PathBuf>) -> (Vec<PathBuf>, Vec<(PathBuf, PathBuf)>) {
     let (mut kept, mut others) = (Vec::new(), Vec::new());
     let mut first: BTreeMap<PathBuf, PathBuf> = BTreeMap::new();
     for file in files {
