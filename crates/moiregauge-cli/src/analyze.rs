@@ -19,7 +19,7 @@ use moiregauge::settings::Settings;
 pub(crate) use args::{AnalyzeArgs, BackgroundArg, ConventionArg, LineArg, MethodArg};
 pub(crate) use chain::{
     Outcome, Reading, analyse_files, given_again, measure_file, progress, read, read_again,
-    with_hint,
+    read_any, with_hint,
 };
 pub(crate) use channel::channel_names;
 pub(crate) use files::report_names;

@@ -11,7 +11,7 @@ use indicatif::ProgressBar;
 use moiregauge::calibration::KnownLattice;
 use moiregauge::material::Material;
 use moiregauge::series::{MeasureError, MeasuredScan, measure_known};
-use moiregauge::settings::{Grouping, Settings};
+use moiregauge::settings::{Grouping, MOST_IMAGES, Settings};
 use moiregauge_report::{FailedInput, InputFile};
 use rayon::prelude::*;
 
@@ -19,6 +19,7 @@ use crate::analyze::{BackgroundArg, LineArg, Reading, failures, given_again, rea
 use crate::config;
 use crate::info::inputs;
 use crate::input::{Known, KnownArgs};
+use crate::numbers;
 use crate::say::say;
 
 /// Measure gain, mismatch and orthogonality of a scanner on images of a known lattice
@@ -56,17 +57,20 @@ pub(crate) struct CalibrateArgs {
     #[arg(long, value_name = "LENGTH", value_parser = parse_length, conflicts_with = "material")]
     lattice_constant: Option<f64>,
     /// Standard uncertainty of the known lattice, per cent [default: the material's; 0.1 for one of your own]
-    #[arg(long, value_name = "PERCENT")]
+    #[arg(long, value_name = "PERCENT", value_parser = numbers::number([0.0, 10.0]))]
     lattice_sigma: Option<f64>,
     /// File for the calibration (TOML)
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Standard deviation of each component of a drift that the frames cannot tell, nm/min
-    #[arg(long, value_name = "NM/MIN", default_value_t = 1.0)]
+    #[arg(long, value_name = "NM/MIN", default_value_t = 1.0, value_parser = numbers::number(numbers::NOT_NEGATIVE))]
     drift_sigma: f64,
     /// Channel that shows the lattice [default: the first of the usual ones]
     #[arg(long, value_name = "NAME")]
     channel: Option<String>,
+    /// Of several images of the channel in one file (pages, frames) this one [default: the first]
+    #[arg(long, value_name = "N", value_parser = numbers::count(1, MOST_IMAGES))]
+    image: Option<usize>,
     /// Line directions to use [default: both]
     #[arg(long, value_enum)]
     line: Option<LineArg>,
@@ -93,11 +97,6 @@ struct Cell {
 
 /// Measures the images, prints what they say, and writes the file.
 pub(crate) fn run(args: &CalibrateArgs) -> anyhow::Result<ExitCode> {
-    ensure!(
-        args.drift_sigma >= 0.0 && args.drift_sigma.is_finite(),
-        "--drift-sigma expects a number ≥ 0, found {}",
-        args.drift_sigma
-    );
     let lattice = args.known_lattice()?;
     let cell = lattice
         .cell()
@@ -105,11 +104,12 @@ pub(crate) fn run(args: &CalibrateArgs) -> anyhow::Result<ExitCode> {
     let defaults = Settings::default();
     let settings = Settings {
         channel: args.channel.clone(),
+        image: args.image,
         line: args.line.map_or(defaults.line, Into::into),
         background: args.background.map_or(defaults.background, Into::into),
         ..defaults
     };
-    let (inputs, mut failed) = inputs(&args.paths);
+    let (inputs, mut failed) = inputs(&args.paths, !args.quiet);
     let (inputs, repeated) = moiregauge_pipeline::distinct(&inputs);
     let file = |out| crate::outputs::file(out, args.force, &inputs);
     let file = args.out.as_deref().map(file).transpose()?;
@@ -237,10 +237,6 @@ impl CalibrateArgs {
             _ => bail!("give --material, --lattice or --lattice-constant"),
         };
         if let Some(sigma) = self.lattice_sigma {
-            ensure!(
-                (0.0..=10.0).contains(&sigma),
-                "--lattice-sigma lies between 0 and 10 %, found {sigma}"
-            );
             lattice.sigma_percent = sigma;
         }
         Ok(lattice)
@@ -270,9 +266,9 @@ fn named(name: &str, own: &[Material]) -> anyhow::Result<KnownLattice> {
 fn parse_length(text: &str) -> Result<f64, String> {
     let with_unit = spmfile::length_nm(text);
     let length = with_unit.or_else(|| text.trim().parse().ok());
-    length
-        .filter(|nm: &f64| *nm > 0.0 && nm.is_finite())
-        .ok_or_else(|| "expected a length with a unit, as in 0.246nm".to_owned())
+    numbers::within([0.01, 1e6], length).ok_or_else(|| {
+        "expected a length with a unit, as in 0.246nm, from 0.01 nm to 1 mm".to_owned()
+    })
 }
 
 fn parse_lattice(text: &str) -> Result<Cell, String> {

@@ -28,6 +28,9 @@ const COMMENTED: &str = r#"# Settings of `moiregauge analyze`. Every line shows 
 # comes first.
 # channel = "TR Phase"
 
+# Of several images of the channel in one file (pages, frames) this one, counted from 1. Without it: the first.
+# image = 2
+
 # Line directions to use: "trace", "retrace" or "both".
 line = "both"
 
@@ -142,7 +145,7 @@ pub(crate) fn run(_args: &ConfigArgs) -> anyhow::Result<ExitCode> {
 
 /// Reads a settings file, in which `material` may be a name, or the settings that results hold.
 pub(crate) fn read(path: &Path) -> anyhow::Result<Settings> {
-    let text = std::fs::read_to_string(path)
+    let text = moiregauge_pipeline::read_text(path)
         .with_context(|| format!("cannot read the settings file {}", path.display()))?;
     // No TOML file begins so.
     if text.trim_start().starts_with('{') {
@@ -249,7 +252,7 @@ pub(crate) fn own_materials(path: Option<&Path>) -> anyhow::Result<Vec<Material>
         return Ok(Vec::new());
     };
     let about = || format!("in the layers of {}", path.display());
-    let text = std::fs::read_to_string(path)
+    let text = moiregauge_pipeline::read_text(path)
         .with_context(|| format!("cannot read the layers of {}", path.display()))?;
     let file: File = toml::from_str(&text).with_context(about)?;
     for layer in &file.layer {
@@ -327,6 +330,9 @@ pub(crate) fn check(settings: &Settings) -> anyhow::Result<()> {
         .and_then(moiregauge::calibration::Calibration::problem)
     {
         bail!("the calibration of the scanner makes no sense: {problem}");
+    }
+    if let Some(problem) = settings.out_of_range() {
+        bail!("{problem}");
     }
     if let Some(drift) = &settings.drift {
         let (x, y, sigma) = (

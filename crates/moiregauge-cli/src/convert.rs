@@ -118,10 +118,10 @@ pub(crate) fn run(args: &ConvertArgs) -> anyhow::Result<ExitCode> {
         bail!("expected files to convert and what to write");
     };
     let (mut inputs, mut failed) = (Vec::new(), Vec::new());
-    for path in expand(paths) {
+    for path in expand(paths, !args.quiet) {
         match path {
             Ok(path) => inputs.push(path),
-            Err((path, error)) => failed.push(format!("{}: {error}", path.display())),
+            Err(one) => failed.push(format!("{}: {}", one.file, one.error)),
         }
     }
     let format = format(args, out, inputs.len() + failed.len())?;
@@ -253,7 +253,7 @@ struct Target<'a> {
 impl Target<'_> {
     /// Converts one file; returns what was written.
     fn convert(&self, path: &Path, stem: &str) -> anyhow::Result<Vec<PathBuf>> {
-        let bytes = std::fs::read(path)?;
+        let bytes = moiregauge_pipeline::read(path)?;
         let is_wanted = |info: &ChannelInfo| {
             let points = self.format == WritableFormat::Gxyzf;
             let names = &self.args.channel;

@@ -50,7 +50,7 @@ pub(crate) fn run(args: &DemoArgs) -> anyhow::Result<ExitCode> {
     ))?;
     let folders = write_sets(&sets, &out.join("scans"), args.force)?;
     say("Analysing them …\n\n")?;
-    let inputs: Vec<PathBuf> = expand(&folders).into_iter().flatten().collect();
+    let inputs: Vec<PathBuf> = expand(&folders, false).into_iter().flatten().collect();
     let settings = Settings {
         seed: args.seed,
         layers_chosen: true,

@@ -9,6 +9,8 @@ use std::io::{ErrorKind, Write as _};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+use moiregauge::series::image_choice;
+use moiregauge::settings::Settings;
 use serde::Serialize;
 use spmfile::{
     Channel, DateTime, FrameDirection, LineDirection, ReadError, Scan, position_sensors,
@@ -126,15 +128,15 @@ struct Unreadable {
 /// If the output cannot be written.
 pub(crate) fn run(args: &InfoArgs) -> anyhow::Result<ExitCode> {
     let mut infos = Vec::new();
-    let files = expand(&args.files);
+    let files = expand(&args.files, !args.json);
     let paths: Vec<PathBuf> = files.iter().flatten().cloned().collect();
     let known = args.known.of(&paths);
     for file in files {
         let info = match file {
             Ok(path) => file_info(&path, &args.at, &known),
-            Err((path, error)) => FileInfo {
-                file: path.to_string_lossy().into_owned(),
-                error: Some(error),
+            Err(failed) => FileInfo {
+                file: failed.file,
+                error: Some(failed.error),
                 scan: None,
             },
         };
@@ -165,7 +167,7 @@ pub(crate) fn run(args: &InfoArgs) -> anyhow::Result<ExitCode> {
 }
 
 fn file_info(path: &Path, at: &[Pixel], known: &Known) -> FileInfo {
-    let (mut scan, mut error) = match std::fs::read(path) {
+    let (mut scan, mut error) = match moiregauge_pipeline::read(path) {
         Err(error) => (None, Some(error.to_string())),
         Ok(bytes) => match known.decode(path, &bytes, &|_| true) {
             Ok(scan) => (Some(scan), None),
@@ -181,21 +183,38 @@ fn file_info(path: &Path, at: &[Pixel], known: &Known) -> FileInfo {
     {
         error = error.or(Some(format!("{:#}", with_option(problem))));
     }
-    let outside = scan.iter().flat_map(|scan| &scan.channels).find_map(|c| {
-        let pixel = at
-            .iter()
-            .find(|p| p.row >= c.rows || p.column >= c.columns)?;
-        Some(format!(
-            "--at {},{} lies outside channel {:?} with {} rows and {} columns",
-            pixel.row, pixel.column, c.name, c.rows, c.columns
-        ))
-    });
-    error = error.or(outside);
+    error = error.or_else(|| outside(scan.as_ref()?, at));
     FileInfo {
         file: path.to_string_lossy().into_owned(),
         error,
         scan: scan.as_ref().map(|scan| scan_info(scan, at)),
     }
+}
+
+/// Words for a pixel that lies outside of all channels. Of several channels some may be smaller.
+fn outside(scan: &Scan, at: &[Pixel]) -> Option<String> {
+    let largest = scan.channels.iter().max_by_key(|c| c.samples.len())?;
+    let inside = |p: &Pixel| {
+        let mut channels = scan.channels.iter();
+        channels.any(|c| p.row < c.rows && p.column < c.columns)
+    };
+    let pixel = at.iter().find(|p| !inside(p))?;
+    Some(format!(
+        "--at {},{} lies outside of all channels; the largest, {:?}, has {} rows and {} columns",
+        pixel.row, pixel.column, largest.name, largest.rows, largest.columns
+    ))
+}
+
+/// Notes of the reader, and which image would be analysed.
+fn notes(scan: &Scan) -> Vec<String> {
+    let choice = image_choice(scan, &Settings::default());
+    let hint =
+        |words| format!("{words} (--channel NAME and --image N of analyze say which one is)");
+    scan.notes
+        .iter()
+        .cloned()
+        .chain(choice.into_iter().map(hint))
+        .collect()
 }
 
 fn scan_info(scan: &Scan, at: &[Pixel]) -> ScanInfo {
@@ -222,7 +241,7 @@ fn scan_info(scan: &Scan, at: &[Pixel]) -> ScanInfo {
                 error: u.error.clone(),
             })
             .collect(),
-        notes: scan.notes.clone(),
+        notes: notes(scan),
         missing_for_analysis: missing_for_analysis(scan),
     }
 }

@@ -8,6 +8,8 @@ pub(crate) use moiregauge_pipeline::{Known, is_named};
 use moiregauge_report::results::{Crop, FrameOrder, Told};
 use spmfile::length_nm;
 
+use crate::numbers;
+
 /// The options for what files do not tell.
 #[derive(clap::Args, Clone, Debug, Default)]
 #[command(next_help_heading = "What the files do not tell")]
@@ -20,7 +22,7 @@ pub(crate) struct KnownArgs {
     #[arg(long, value_name = "UNIT")]
     unit: Option<String>,
     /// Lines per second, trace and retrace together
-    #[arg(long, value_name = "HZ", value_parser = parse_line_rate)]
+    #[arg(long, value_name = "HZ", value_parser = numbers::number(numbers::LINE_RATE_HZ))]
     line_rate: Option<f64>,
     /// Which line was first: up is the bottom one. The alternating ones begin with the first file by
     /// name, numbers in names counting as numbers. Of files that hold a frame of each (Omicron Matrix)
@@ -28,7 +30,7 @@ pub(crate) struct KnownArgs {
     #[arg(long, value_enum)]
     frame_direction: Option<FrameArg>,
     /// Angle by which the fast axis is turned against x, degrees, counter-clockwise
-    #[arg(long, value_name = "DEG", allow_negative_numbers = true, value_parser = parse_number)]
+    #[arg(long, value_name = "DEG", allow_negative_numbers = true, value_parser = numbers::number(numbers::ANGLE_DEG))]
     rotation: Option<f64>,
     /// Channel that is the position sensor along x, by name
     #[arg(long, value_name = "NAME", requires = "y_sensor")]
@@ -116,27 +118,12 @@ pub(crate) fn parse_size(text: &str) -> Result<[f64; 2], String> {
         let height_nm = length_nm(height)?;
         let unit = height.trim_start_matches(|c: char| !c.is_alphabetic() || c == 'e');
         let width_nm = length_nm(width).or_else(|| length_nm(&format!("{width}{unit}")))?;
-        let good = |n: f64| n > 0.0 && n.is_finite();
-        (good(width_nm) && good(height_nm)).then_some([width_nm, height_nm])
+        Some([width_nm, height_nm])
     };
-    parsed().ok_or_else(|| {
+    let size = parsed().ok_or_else(|| {
         "expected width × height with a unit (pm, Å, nm, um, mm), as in 70nm×70nm".to_owned()
-    })
-}
-
-fn parse_number(text: &str) -> Result<f64, String> {
-    let number: Option<f64> = text.trim().parse().ok();
-    number
-        .filter(|n| n.is_finite())
-        .ok_or_else(|| "expected a number".to_owned())
-}
-
-/// From an hour a line to the fastest video microscopes.
-fn parse_line_rate(text: &str) -> Result<f64, String> {
-    parse_number(text)
-        .ok()
-        .filter(|rate| (1e-4..=1e5).contains(rate))
-        .ok_or_else(|| "expected a line rate between 0.0001 and 100000 Hz".to_owned())
+    })?;
+    numbers::sides(size)
 }
 
 fn parse_crop(text: &str) -> Result<Crop, String> {

@@ -9,6 +9,7 @@ mod info;
 mod input;
 mod map;
 mod moire;
+mod numbers;
 mod outputs;
 mod plan;
 mod say;
@@ -18,7 +19,7 @@ mod validate;
 
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 
 /// The strain gauge for moiré superlattices
 ///
@@ -46,18 +47,31 @@ enum Command {
     Config(config::ConfigArgs),
 }
 
+/// The arguments. A negative number is a value everywhere, so that its option is named where it is refused.
+fn arguments() -> clap::Command {
+    Cli::command().mut_subcommands(|command| command.allow_negative_numbers(true))
+}
+
 /// The command of a command line, its program first, with or without a place for results.
-fn command(arguments: impl IntoIterator<Item = String>) -> Result<Command, clap::Error> {
+fn command(given: impl IntoIterator<Item = String>) -> Result<Command, clap::Error> {
     // Where results go is no part of what was asked.
     let place = ["--out".to_owned(), ".".to_owned()];
-    let mut arguments: Vec<String> = arguments.into_iter().collect();
-    let after = arguments.len().min(2);
-    arguments.splice(after..after, place);
-    Ok(Cli::try_parse_from(arguments)?.command)
+    let mut given: Vec<String> = given.into_iter().collect();
+    let after = given.len().min(2);
+    given.splice(after..after, place);
+    Ok(Cli::from_arg_matches(&arguments().try_get_matches_from(given)?)?.command)
 }
 
 fn main() -> ExitCode {
-    let result = match Cli::parse().command {
+    let parsed = Cli::from_arg_matches(&arguments().get_matches()).unwrap_or_else(|e| e.exit());
+    run(parsed.command).unwrap_or_else(|error| {
+        eprintln!("error: {error:#}");
+        ExitCode::FAILURE
+    })
+}
+
+fn run(command: Command) -> anyhow::Result<ExitCode> {
+    match command {
         Command::Analyze(args) => analyze::run(&args),
         Command::Map(args) => map::run(&args),
         Command::Calibrate(args) => calibrate::run(&args),
@@ -69,9 +83,5 @@ fn main() -> ExitCode {
         Command::Validate(args) => validate::run(&args),
         Command::Plan(args) => plan::run(&args),
         Command::Config(args) => config::run(&args),
-    };
-    result.unwrap_or_else(|error| {
-        eprintln!("error: {error:#}");
-        ExitCode::FAILURE
-    })
+    }
 }

@@ -26,6 +26,7 @@ use crate::analyze::{
     AnalyzeArgs, Outcome, Task, analyse_files, failures, given_again, read_again,
 };
 use crate::input::Known;
+use crate::numbers;
 use output::{Made, write};
 pub(crate) use stripes::in_words as stripes_in_words;
 
@@ -57,16 +58,16 @@ pub(crate) struct MapArgs {
     /// Width of the Gaussian window (standard deviation), nm; a point becomes 2.35 of it wide [default: as
     /// wide as the lattice stays straight, at least 0.6 periods]. By tiles: the side of a tile [default: 6
     /// periods]
-    #[arg(help_heading = "Maps", long, value_name = "NM")]
+    #[arg(long, value_name = "NM", value_parser = numbers::number(numbers::LENGTH_NM), help_heading = "Maps")]
     window: Option<f64>,
     /// Distance of the nodes, nm [default: a third of the window, two pixels at least; a quarter of a tile]
-    #[arg(help_heading = "Maps", long, value_name = "NM")]
+    #[arg(long, value_name = "NM", value_parser = numbers::number(numbers::LENGTH_NM), help_heading = "Maps")]
     step: Option<f64>,
     /// Map in bands, as images of more than 20 million pixels are; several files are put side by side
     #[arg(help_heading = "Maps", long)]
     in_bands: bool,
     /// Margin at the edges, in windows [default: 2, or a quarter of the frame where that is less]
-    #[arg(help_heading = "Maps", long, value_name = "WINDOWS")]
+    #[arg(long, value_name = "WINDOWS", value_parser = numbers::number([0.0, 10.0]), help_heading = "Maps")]
     margin: Option<f64>,
     #[command(flatten)]
     regions: regions::RegionArgs,
@@ -119,7 +120,7 @@ pub(crate) fn run(args: &MapArgs) -> anyhow::Result<ExitCode> {
         "--atomic, --export and --parquet are for `moiregauge analyze`: a map has no use for them"
     );
     let settings = task.run.settings.clone();
-    let resolution = args.resolution()?;
+    let resolution = args.resolution();
     args.regions.check()?;
     ensure!(
         args.analyze.survey_image().is_none(),
@@ -478,23 +479,12 @@ impl MapArgs {
         Ok(*args)
     }
 
-    fn resolution(&self) -> anyhow::Result<Resolution> {
-        for (name, value) in [("--window", self.window), ("--step", self.step)] {
-            ensure!(
-                value.is_none_or(|v| v > 0.0 && v.is_finite()),
-                "{name} must be a positive length in nm"
-            );
-        }
-        ensure!(
-            self.margin.is_none_or(|m| (0.0..=10.0).contains(&m)),
-            "--margin lies between 0 and 10 windows, found {}",
-            self.margin.unwrap_or(f64::NAN)
-        );
-        Ok(Resolution {
+    fn resolution(&self) -> Resolution {
+        Resolution {
             window_nm: self.window,
             step_nm: self.step,
             margin: self.margin,
-        })
+        }
     }
 
     /// How local lattices are measured, for the results.

@@ -10,6 +10,7 @@ use anyhow::{Context as _, ensure};
 use moiregauge::settings::Settings;
 use moiregauge::simulate::{Simulation, Simulator};
 
+use crate::numbers;
 use crate::say::say;
 use crate::scanner::ScannerArgs;
 use search::Limits;
@@ -34,13 +35,13 @@ The wanted errors are meant with calibration and model; one that these alone exc
 statistical error of the scans, and said to be out of reach.")]
 pub(crate) struct PlanArgs {
     /// Wanted standard error of the twist, degrees
-    #[arg(long, value_name = "DEG", required_unless_present_any = ["strain_sigma", "drift_sigma"])]
+    #[arg(long, value_name = "DEG", required_unless_present_any = ["strain_sigma", "drift_sigma"], value_parser = numbers::number(numbers::WISH))]
     twist_sigma: Option<f64>,
     /// Wanted standard error of each component of the strain vector, per cent
-    #[arg(long, value_name = "PERCENT")]
+    #[arg(long, value_name = "PERCENT", value_parser = numbers::number(numbers::WISH))]
     strain_sigma: Option<f64>,
     /// Wanted standard error of each component of the drift, nm/min
-    #[arg(long, value_name = "NM/MIN")]
+    #[arg(long, value_name = "NM/MIN", value_parser = numbers::number(numbers::WISH))]
     drift_sigma: Option<f64>,
     /// The instrument and the sample: a file as `moiregauge simulate --print-config` prints it
     #[arg(long, value_name = "FILE")]
@@ -49,17 +50,17 @@ pub(crate) struct PlanArgs {
     #[arg(long, value_name = "FILE", num_args = 1.., conflicts_with = "config")]
     like: Vec<PathBuf>,
     /// Largest frame, nm along the longer side [default: twice that of the conditions]
-    #[arg(long, value_name = "NM")]
+    #[arg(long, value_name = "NM", value_parser = numbers::number(numbers::LENGTH_NM))]
     max_size: Option<f64>,
     /// Largest line rate, Hz [default: twice that of the conditions]
-    #[arg(long, value_name = "HZ")]
+    #[arg(long, value_name = "HZ", value_parser = numbers::number(numbers::LINE_RATE_HZ))]
     max_rate: Option<f64>,
     /// The noise of a pixel does not depend on the time spent on it. Otherwise its square is taken to fall with
     /// that time, from the line rate of the conditions on
     #[arg(long)]
     noise_per_pixel: bool,
     /// Standard uncertainty of the times of frames, s
-    #[arg(long, value_name = "S", default_value_t = 0.6)]
+    #[arg(long, value_name = "S", default_value_t = 0.6, value_parser = numbers::number(numbers::TIME_S))]
     frame_time_sigma: f64,
     #[command(flatten)]
     scanner: ScannerArgs,
@@ -81,19 +82,6 @@ pub(crate) struct Wishes {
 
 /// Searches and prints.
 pub(crate) fn run(args: &PlanArgs) -> anyhow::Result<ExitCode> {
-    for (name, wish) in [
-        ("--twist-sigma", args.twist_sigma),
-        ("--strain-sigma", args.strain_sigma),
-        ("--drift-sigma", args.drift_sigma),
-        ("--max-size", args.max_size),
-        ("--max-rate", args.max_rate),
-    ] {
-        ensure!(
-            wish.is_none_or(|w| w > 0.0 && w.is_finite()),
-            "{name} expects a number > 0, found {}",
-            wish.unwrap_or_default()
-        );
-    }
     let inputs: Vec<PathBuf> = args.config.iter().chain(&args.like).cloned().collect();
     let file = |out| crate::outputs::file(out, args.force, &inputs);
     let file = args.out.as_deref().map(file).transpose()?;

@@ -4,6 +4,8 @@ use std::path::PathBuf;
 
 use moiregauge::settings::Settings;
 
+use crate::numbers::number;
+
 /// What no scan of a moiré tells.
 #[derive(clap::Args, Clone, Debug)]
 #[command(next_help_heading = "Scanner and uncertainty budget")]
@@ -13,16 +15,16 @@ pub(crate) struct ScannerArgs {
     #[arg(long, value_name = "FILE", conflicts_with_all = ["calibration_gain", "calibration_mismatch", "calibration_orthogonality"])]
     calibration: Option<PathBuf>,
     /// Gain error of the scanner, common to x and y, per cent, for the budget [default: 1]
-    #[arg(long, value_name = "PERCENT")]
+    #[arg(long, value_name = "PERCENT", value_parser = number([0.0, 50.0]))]
     calibration_gain: Option<f64>,
     /// Difference of the gains of x and y, per cent, for the budget [default: 0.5]
-    #[arg(long, value_name = "PERCENT")]
+    #[arg(long, value_name = "PERCENT", value_parser = number([0.0, 50.0]))]
     calibration_mismatch: Option<f64>,
     /// Deviation of the axes from a right angle, mrad, for the budget [default: 5]
-    #[arg(long, value_name = "MRAD")]
+    #[arg(long, value_name = "MRAD", value_parser = number([0.0, 500.0]))]
     calibration_orthogonality: Option<f64>,
     /// Isotropic heterostrain that the layers may have, per cent, for the budget [default: 0.05]
-    #[arg(long, value_name = "PERCENT")]
+    #[arg(long, value_name = "PERCENT", value_parser = number([0.0, 10.0]))]
     isotropic_strain: Option<f64>,
 }
 

@@ -10,11 +10,12 @@ use std::process::ExitCode;
 use anyhow::Context as _;
 use indicatif::{ProgressBar, ProgressStyle};
 use moiregauge::settings::Method;
-use moiregauge::simulate::{Simulation, Simulator};
+use moiregauge::simulate::{MOST_PIXELS, Simulation, Simulator};
 use moiregauge_pipeline::sink::Target;
 use rayon::prelude::*;
 
 use crate::analyze::MethodArg;
+use crate::numbers;
 use crate::outputs;
 use crate::say::say;
 use compare::{Comparison, compare};
@@ -36,7 +37,7 @@ Examples:
   moiregauge validate --config mine.toml")]
 pub(crate) struct ValidateArgs {
     /// Number of simulated sets
-    #[arg(long, default_value_t = 200, value_name = "N")]
+    #[arg(long, default_value_t = 200, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=1_000_000))]
     sets: u32,
     /// Estimator of the lattice vectors
     #[arg(long, value_enum, default_value = "lattice")]
@@ -48,10 +49,10 @@ pub(crate) struct ValidateArgs {
     #[arg(long, value_name = "FILE", num_args = 1.., conflicts_with = "config")]
     like: Vec<PathBuf>,
     /// Side of the frames, pixels, where no file gives it; small frames are quick
-    #[arg(long, default_value_t = 128, value_name = "N")]
+    #[arg(long, default_value_t = 128, value_name = "N", value_parser = numbers::count(2, MOST_PIXELS))]
     pixels: usize,
     /// Scans per set, where no file gives it
-    #[arg(long, default_value_t = 4, value_name = "N")]
+    #[arg(long, default_value_t = 4, value_name = "N", value_parser = numbers::count(1, 9999))]
     scans: usize,
     /// Seed of all noise
     #[arg(long, default_value_t = 1)]
@@ -69,7 +70,6 @@ pub(crate) struct ValidateArgs {
 
 /// Runs the validation.
 pub(crate) fn run(args: &ValidateArgs) -> anyhow::Result<ExitCode> {
-    anyhow::ensure!(args.sets >= 2, "--sets must be at least 2");
     let names = output::NAMES.map(str::to_owned);
     let folder = |out| {
         outputs::folder(&Target {
@@ -134,7 +134,7 @@ pub(crate) fn given_conditions(
 }
 
 fn read(path: &Path) -> anyhow::Result<Simulation> {
-    let text = std::fs::read_to_string(path)
+    let text = moiregauge_pipeline::read_text(path)
         .with_context(|| format!("cannot read the settings file {}", path.display()))?;
     toml::from_str(&text).with_context(|| format!("in the settings file {}", path.display()))
 }

@@ -1,14 +1,14 @@
 //! Files known by their content.
 
 use std::fmt::Write as _;
-use std::fs::File;
-use std::io::{self, Read as _};
+use std::io::Read as _;
 use std::path::Path;
 
 use moiregauge_report::InputFile;
 use sha2::{Digest as _, Sha256};
 
 use crate::names::in_words;
+use crate::reading::{FileError, open};
 
 /// The digits of a hash.
 pub fn hexadecimal(bytes: &[u8]) -> String {
@@ -24,11 +24,8 @@ pub fn hexadecimal(bytes: &[u8]) -> String {
 ///
 /// # Errors
 /// The file cannot be read, or is none.
-pub fn identity(name: &Path, place: &Path) -> io::Result<InputFile> {
-    if !std::fs::metadata(place)?.is_file() {
-        return Err(io::Error::other("expected a file"));
-    }
-    let mut file = File::open(place)?;
+pub fn identity(name: &Path, place: &Path) -> Result<InputFile, FileError> {
+    let mut file = open(place)?;
     let mut hash = Sha256::new();
     let mut buffer = vec![0; 1 << 20];
     let mut bytes = 0;

@@ -258,7 +258,7 @@ impl Known {
             reason,
         };
         let path = Path::new(file);
-        let bytes = std::fs::read(self.place(path)).map_err(|e| refused(e.to_string()))?;
+        let bytes = crate::reading::read(self.place(path)).map_err(|e| refused(e.to_string()))?;
         let mut second = self
             .decode(path, &bytes, &|_| true)
             .map_err(|e| refused(e.to_string()))?;

@@ -3,17 +3,23 @@
 //! Files and settings, but no arguments of a program, no printing and no physics. Front ends (the program, a
 //! Python package, a page) stand on this crate.
 
+mod find;
 mod hash;
 mod known;
+mod memory;
 pub mod names;
+mod reading;
 mod replay;
 pub mod session;
 mod sets;
 pub mod sink;
 mod twice;
 
+pub use find::{Found, LeftAlone, find};
 pub use hash::{hexadecimal, identity};
 pub use known::{Known, KnownError, Places, is_named};
+pub use memory::{NotEnoughMemory, available, enough_for};
+pub use reading::{FileError, open, read, read_text};
 pub use replay::{Document, ReplayError, record_files, settings_of};
 pub use sets::{SetError, absolute, check_sets, set_of};
 pub use twice::{Repeated, distinct};

@@ -93,7 +93,7 @@ impl Document {
     /// It cannot be read, or does not record its run.
     pub fn read(path: &Path) -> Result<Self, ReplayError> {
         let file = path.display().to_string();
-        let bytes = std::fs::read(path).map_err(|error| ReplayError::Unreadable {
+        let bytes = crate::reading::read(path).map_err(|error| ReplayError::Unreadable {
             file: file.clone(),
             reason: error.to_string(),
         })?;
@@ -217,7 +217,7 @@ fn by_content(file: &InputFile, folder: &Path) -> Option<PathBuf> {
 /// Puts into the record of a run which files it read; `measured` are those whose hashes the document has anyway.
 pub fn record_files(run: &mut Run, known: &Known, inputs: &[PathBuf], measured: &[InputFile]) {
     let mut others = BTreeMap::new();
-    let mut add = |name: &Path, place: &Path| -> std::io::Result<()> {
+    let mut add = |name: &Path, place: &Path| -> Result<(), crate::reading::FileError> {
         let file = in_words(name);
         if !measured.iter().any(|m| m.file == file) && !others.contains_key(&file) {
             others.insert(file, identity(name, place)?);

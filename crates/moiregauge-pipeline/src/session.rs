@@ -1,11 +1,12 @@
 //! Scans that are spread over several files: Omicron Matrix, whose log lies beside the images.
 
 use std::collections::BTreeMap;
-use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use spmfile::matrix::{frame_and_channel, is_curve, log_file};
 use spmfile::{ChannelInfo, Format, FrameDirection, ReadError, Scan, detect};
+
+use crate::reading;
 
 fn refused(reason: String) -> ReadError {
     ReadError::Unsupported {
@@ -17,7 +18,7 @@ fn refused(reason: String) -> ReadError {
 /// Reads the frame upwards, or the one that is wanted, with the log of the session beside the file.
 ///
 /// # Errors
-/// No log lies there, or one of the files cannot be read.
+/// As [`spmfile::matrix::read`], and where there is no log.
 pub fn read(
     path: &Path,
     bytes: &[u8],
@@ -38,10 +39,10 @@ fn log(path: &Path, name: &str) -> Result<Vec<Vec<u8>>, ReadError> {
         let Some(log) = log_file(name, number) else {
             break;
         };
-        match std::fs::read(path.with_file_name(&log)) {
+        match reading::read(&path.with_file_name(&log)) {
             Ok(bytes) => parts.push(bytes),
-            Err(error) if error.kind() == ErrorKind::NotFound && number > 1 => break,
-            Err(error) if error.kind() == ErrorKind::NotFound => {
+            Err(error) if error.is_missing() && number > 1 => break,
+            Err(error) if error.is_missing() => {
                 return Err(refused(format!(
                     "its lines, size and scale are in the log of its session: expected the file {log} beside \
                      it, found none"

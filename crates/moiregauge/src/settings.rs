@@ -1,6 +1,10 @@
 //! Every knob of an analysis, with its default.
 
+mod ranges;
+
 use serde::{Deserialize, Serialize};
+
+pub use ranges::{MOST_DRAWS, MOST_IMAGES, MOST_MOIRES, OutOfRange};
 
 use crate::material::{Bilayer, Material};
 
@@ -188,6 +192,9 @@ pub struct MoireLayers {
 pub struct Settings {
     /// Channel that shows the moiré; `None`: the first of the usual ones that is present.
     pub channel: Option<String>,
+    /// Which of several images of the channel in one file, counted from 1; `None`: the first.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub image: Option<usize>,
     /// Line directions to use.
     pub line: Lines,
     /// Estimator of the lattice vectors.
@@ -301,6 +308,7 @@ impl Default for Settings {
     fn default() -> Self {
         Self {
             channel: None,
+            image: None,
             line: Lines::Both,
             method: Method::Lattice,
             background: Background::Plane,

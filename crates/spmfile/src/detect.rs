@@ -167,6 +167,36 @@ pub fn looks_like_scan(head: &[u8]) -> bool {
     )
 }
 
+/// Whether a file of this name should be a scan: instruments have extensions of their own, and number files,
+/// `scan.002`.
+///
+/// For saying of a file that it is empty, cut off or something else; [`detect`] never looks at names.
+pub fn named_like_scan(name: &str) -> bool {
+    const EXTENSIONS: [&str; 15] = [
+        "spm",
+        "sxm",
+        "gwy",
+        "gsf",
+        "gxyzf",
+        "ibw",
+        "jpk",
+        "jpk-qi-image",
+        "nid",
+        "stp",
+        "top",
+        "sm2",
+        "sm3",
+        "sm4",
+        "mi",
+    ];
+    let Some((stem, extension)) = name.rsplit_once('.') else {
+        return false;
+    };
+    let number = extension.len() == 3 && extension.bytes().all(|b| b.is_ascii_digit());
+    let known = |known: &&str| extension.eq_ignore_ascii_case(known);
+    !stem.is_empty() && (number || EXTENSIONS.iter().any(known) || extension.ends_with("_mtrx"))
+}
+
 /// A TIFF file's first directory tells whose it is.
 fn tiff(bytes: &[u8], endian: Endian) -> Format {
     let tags = || -> Result<Vec<u16>, String> {
@@ -347,5 +377,17 @@ mod tests {
         assert!(looks_like_scan(b"ONTMATRX0101TLKB"));
         assert!(!looks_like_scan(b"ONTMATRX0101ATEM"));
         assert!(!looks_like_scan(b""));
+    }
+
+    #[test]
+    fn names_of_scans() {
+        for name in ["a.spm", "scan.002", "x.0_00001.SPM", "b.Z_mtrx", "c.sm4"] {
+            assert!(named_like_scan(name), "{name}");
+        }
+        for name in [
+            "spm", ".spm", "a.2024", "a.txt", "a.npy", "a.mtrx", "a.tiff", "a.12",
+        ] {
+            assert!(!named_like_scan(name), "{name}");
+        }
     }
 }

@@ -50,7 +50,7 @@ mod wsxm;
 pub mod zarr;
 
 pub use crop::{Block, CropError, crop};
-pub use detect::{Format, detect, looks_like_scan};
+pub use detect::{Format, detect, looks_like_scan, named_like_scan};
 pub use error::ReadError;
 pub use export::ExportError;
 pub use scan::{

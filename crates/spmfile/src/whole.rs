@@ -114,7 +114,8 @@ pub(crate) fn all_missing(scan: &Scan) -> bool {
 
 /// Leaves out what cannot be a length, a time, a rate or a scale, as damaged headers hold it.
 pub(crate) fn tidy(scan: &mut Scan) {
-    let positive = |n: &f64| *n > 0.0 && n.is_finite();
+    // Lengths in nm, rates in Hz, times in s; beyond, arithmetic fails.
+    let positive = |n: &f64| (1e-9..=1e12).contains(n);
     scan.size_nm = scan.size_nm.filter(|size| size.iter().all(positive));
     scan.line_rate_hz = scan.line_rate_hz.filter(positive);
     scan.line_times_s = scan

@@ -5,7 +5,8 @@ use std::path::PathBuf;
 use clap::ValueEnum;
 use moiregauge::material::Material;
 use moiregauge::settings::{
-    Background, GivenDrift, Grouping, Lines, Method, MoireLayers, Settings, StrainConvention,
+    Background, GivenDrift, Grouping, Lines, MOST_DRAWS, MOST_IMAGES, Method, MoireLayers,
+    Settings, StrainConvention,
 };
 use moiregauge_report::results::NamedSet;
 use moiregauge_report::{Choice, ColorMap};
@@ -13,6 +14,7 @@ use moiregauge_report::{Choice, ColorMap};
 use super::orientation::OrientationArgs;
 use crate::config;
 use crate::input::KnownArgs;
+use crate::numbers;
 use crate::scanner::ScannerArgs;
 
 /// Headings of the help.
@@ -69,6 +71,9 @@ pub(crate) struct AnalyzeArgs {
     /// scan shows a lattice in it, the next]
     #[arg(long, value_name = "NAME", help_heading = SCANS)]
     channel: Option<String>,
+    /// Of several images of the channel in one file (pages, frames) this one [default: the first]
+    #[arg(long, value_name = "N", value_parser = numbers::count(1, MOST_IMAGES))]
+    image: Option<usize>,
     /// Line directions to use [default: both]
     #[arg(long, value_enum, help_heading = SCANS)]
     line: Option<LineArg>,
@@ -92,16 +97,16 @@ pub(crate) struct AnalyzeArgs {
     #[arg(long, value_name = "FILE", help_heading = LAYERS)]
     pub(super) materials: Option<PathBuf>,
     /// Lattice constant of the layers, nm, in place of the material's
-    #[arg(long, value_name = "NM", help_heading = LAYERS)]
+    #[arg(long, value_name = "NM", value_parser = numbers::number([0.01, 100.0]), help_heading = LAYERS)]
     lattice_constant: Option<f64>,
     /// Poisson ratio of the layers, in place of the material's
-    #[arg(long, value_name = "RATIO", help_heading = LAYERS)]
+    #[arg(long, value_name = "RATIO", value_parser = numbers::number([-1.0, 1.0]), help_heading = LAYERS)]
     poisson_ratio: Option<f64>,
     /// Standard uncertainty of the lattice constant, nm, for the budget [default: the material's]
-    #[arg(long, value_name = "NM", help_heading = LAYERS)]
+    #[arg(long, value_name = "NM", value_parser = numbers::number([0.0, 10.0]), help_heading = LAYERS)]
     lattice_constant_sigma: Option<f64>,
     /// Standard uncertainty of the Poisson ratio, for the budget [default: the material's]
-    #[arg(long, value_name = "RATIO", help_heading = LAYERS)]
+    #[arg(long, value_name = "RATIO", value_parser = numbers::number([0.0, 0.5]), help_heading = LAYERS)]
     poisson_ratio_sigma: Option<f64>,
     /// Form of the strain equation [default: real-space]
     #[arg(long, value_enum, help_heading = METHOD)]
@@ -122,32 +127,32 @@ pub(crate) struct AnalyzeArgs {
     #[arg(long, help_heading = SCANS)]
     exclude_outliers: bool,
     /// Standard uncertainty of the frame times in the files, s [default: 0.6]
-    #[arg(long, value_name = "S", help_heading = METHOD)]
+    #[arg(long, value_name = "S", value_parser = numbers::number(numbers::TIME_S), help_heading = METHOD)]
     frame_time_sigma: Option<f64>,
     /// How many moirés every image shows; each is fitted with the others taken off, and has a folder of
     /// results of its own [default: 1]
-    #[arg(long, value_name = "N", help_heading = SCANS)]
+    #[arg(long, value_name = "N", value_parser = numbers::count(1, 6), help_heading = SCANS)]
     moires: Option<usize>,
     /// Use only the region that all scans have in common
     #[arg(long, help_heading = SCANS)]
     overlap: bool,
     /// A drift known beforehand, nm/min, instead of measuring it
-    #[arg(long, num_args = 2, value_names = ["X", "Y"], allow_negative_numbers = true, help_heading = METHOD)]
+    #[arg(long, num_args = 2, value_names = ["X", "Y"], allow_negative_numbers = true, value_parser = numbers::number(numbers::DRIFT), help_heading = METHOD)]
     drift: Option<Vec<f64>>,
     /// Standard uncertainty of each component of --drift, nm/min
-    #[arg(long, value_name = "SIGMA", requires = "drift", help_heading = METHOD)]
+    #[arg(long, value_name = "SIGMA", requires = "drift", value_parser = numbers::number(numbers::NOT_NEGATIVE), help_heading = METHOD)]
     drift_sigma: Option<f64>,
     /// Monte Carlo draws for the drift, per set [default: 10000]
-    #[arg(long, value_name = "N", help_heading = METHOD)]
+    #[arg(long, value_name = "N", value_parser = numbers::count(0, MOST_DRAWS), help_heading = METHOD)]
     drift_draws: Option<usize>,
     /// Monte Carlo draws for twist and strain, per scan [default: 1000]
-    #[arg(long, value_name = "N", help_heading = METHOD)]
+    #[arg(long, value_name = "N", value_parser = numbers::count(0, MOST_DRAWS), help_heading = METHOD)]
     strain_draws: Option<usize>,
     /// Seed of all random numbers [default: 1]
     #[arg(long, help_heading = METHOD)]
     seed: Option<u64>,
     /// Number of threads [default: all processors]; the results do not depend on it
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = numbers::count(1, 1024))]
     pub(super) threads: Option<usize>,
     /// Colours of images
     #[arg(long, value_enum, default_value_t = ColorMapArg::Viridis, help_heading = OUTPUT)]
@@ -234,6 +239,7 @@ impl AnalyzeArgs {
         if self.channel.is_some() {
             s.channel.clone_from(&self.channel);
         }
+        s.image = self.image.or(s.image);
         if let Some(xy) = &self.drift {
             s.drift = Some(GivenDrift {
                 x_nm_per_min: xy[0],

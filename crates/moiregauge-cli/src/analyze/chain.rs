@@ -8,7 +8,7 @@ use moiregauge::analysis::Analysis;
 use moiregauge::caveat::Caveat;
 use moiregauge::series::{
     MeasureError, MeasuredScan, Window, about_repeat, amplitude_of, analyse, choose_channel,
-    common_window, illustrate, measure_moires, sorted_moires,
+    common_window, illustrate, measure_moires, sorted_moires, unusual_channels,
 };
 use moiregauge::settings::Settings;
 use moiregauge_pipeline::{Repeated, distinct, hexadecimal, names, set_of};
@@ -178,6 +178,10 @@ pub(crate) fn measure_file(
     let mut moires = measure_moires(&input.file, &scan, settings, window).map_err(with_hint)?;
     let set = set_of(sets, path).map(str::to_owned);
     for measured in &mut moires {
+        let several = |c: &&mut Caveat| c.code == "several-images";
+        for caveat in measured.caveats.iter_mut().filter(several) {
+            caveat.message += "; --image N says which one";
+        }
         measured.caveats.extend(caveats.iter().cloned());
         measured.set.clone_from(&set);
         measured.digest = Some(input.sha256.clone());
@@ -206,14 +210,22 @@ pub(crate) struct Reading {
     pub(crate) caveats: Vec<Caveat>,
 }
 
-/// Reads what the analysis needs of a file: the chosen channel and the position sensors.
+/// Reads what the analysis needs of a file: the chosen channel and the position sensors; not more than the memory
+/// holds while it is analysed.
 pub(crate) fn read(path: &Path, settings: &Settings, known: &Known) -> anyhow::Result<Reading> {
-    read_more(path, settings, known, |_| None)
+    let reading = read_any(path, settings, known)?;
+    moiregauge_pipeline::enough_for(&reading.scan)?;
+    Ok(reading)
 }
 
 /// The same and what is shown beside it: the amplitude of a phase.
 fn read_shown(path: &Path, settings: &Settings, known: &Known) -> anyhow::Result<Reading> {
     read_more(path, settings, known, amplitude_of)
+}
+
+/// The same of an image of any size, for surveys.
+pub(crate) fn read_any(path: &Path, settings: &Settings, known: &Known) -> anyhow::Result<Reading> {
+    read_more(path, settings, known, |_| None)
 }
 
 fn read_more(
@@ -222,7 +234,7 @@ fn read_more(
     known: &Known,
     companion: impl Fn(&str) -> Option<String>,
 ) -> anyhow::Result<Reading> {
-    let bytes = std::fs::read(known.place(path))?;
+    let bytes = moiregauge_pipeline::read(known.place(path))?;
     let channels = channel::names(path, &bytes, known)?;
     let names: Vec<_> = channels
         .iter()
@@ -246,10 +258,15 @@ fn read_more(
         let file = input.file.as_str();
         move |words: String| Caveat::new(code, file, words)
     };
+    let wanted = settings.channel.as_deref();
+    let several = unusual_channels(&names, wanted).map(|words| {
+        let words = format!("{words}; --channel NAME says which one shows the moiré");
+        Caveat::new("several-images", input.file.as_str(), words)
+    });
     let doubts = scan.notes.iter().cloned().map(caveat("reader-doubt"));
     let caveats = replaced.into_iter().map(caveat("given-by-user"));
     Ok(Reading {
-        caveats: caveats.chain(doubts).collect(),
+        caveats: several.into_iter().chain(caveats).chain(doubts).collect(),
         scan,
         input,
     })

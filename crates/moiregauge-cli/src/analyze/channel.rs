@@ -46,7 +46,12 @@ pub(super) fn another<T>(
     }
     let first = measured.iter().position(|r| no_lattice(r).is_some())?;
     let path = inputs.get(first)?;
-    let names = names(path, &std::fs::read(known.place(path)).ok()?, known).ok()?;
+    let names = names(
+        path,
+        &moiregauge_pipeline::read(known.place(path)).ok()?,
+        known,
+    )
+    .ok()?;
     let names: Vec<_> = names
         .iter()
         .map(|(a, b)| (a.as_str(), b.as_str()))
@@ -64,7 +69,12 @@ pub(super) fn another<T>(
 
 /// The same for a file on disk; `None` where it cannot be read.
 pub(crate) fn channel_names(path: &Path, known: &Known) -> Option<Vec<(String, String)>> {
-    names(path, &std::fs::read(known.place(path)).ok()?, known).ok()
+    names(
+        path,
+        &moiregauge_pipeline::read(known.place(path)).ok()?,
+        known,
+    )
+    .ok()
 }
 
 /// The names of the channels of a file, the user's and the instrument's own, without those that the user

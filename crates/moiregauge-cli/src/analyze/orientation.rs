@@ -12,6 +12,7 @@ use moiregauge_report::results::AtomicImages;
 use super::Task;
 use super::chain::{given_again, measure_file};
 use crate::info::expand;
+use crate::numbers;
 
 /// The options for it.
 #[derive(clap::Args, Clone, Debug, Default)]
@@ -119,10 +120,10 @@ impl OrientationArgs {
             return Ok(None);
         }
         let mut files = Vec::new();
-        for path in expand(&self.atomic) {
+        for path in expand(&self.atomic, true) {
             match path {
                 Ok(path) => files.push(path.display().to_string()),
-                Err((path, error)) => anyhow::bail!("--atomic {}: {error}", path.display()),
+                Err(one) => anyhow::bail!("--atomic {}: {}", one.file, one.error),
             }
         }
         Ok(Some(AtomicImages {
@@ -190,8 +191,9 @@ pub(crate) fn parse_angle(text: &str) -> Result<Angle, String> {
             let plain = part.trim().trim_end_matches('°').trim();
             plain.parse().ok().filter(|x: &f64| x.is_finite())
         };
-        let sigma = number(sigma).filter(|s| *s >= 0.0)?;
-        Some(Angle([number(angle)?, sigma]))
+        let angle = numbers::within(numbers::ANGLE_DEG, number(angle))?;
+        let sigma = numbers::within([0.0, 180.0], number(sigma))?;
+        Some(Angle([angle, sigma]))
     };
     parsed().ok_or_else(|| {
         format!(

@@ -36,7 +36,7 @@ impl Task {
             return Self::again(args, path, command);
         }
         let settings = args.settings()?;
-        let (inputs, failed) = inputs(&args.paths);
+        let (inputs, failed) = inputs(&args.paths, args.is_loud());
         let sets = args.sets()?;
         if !inputs.is_empty() {
             check_sets(&sets, &inputs).context("--set")?;

@@ -109,7 +109,7 @@ pub(super) fn text(
 /// The calibration in a file.
 pub(crate) fn read(path: &Path) -> anyhow::Result<Calibration> {
     let of = || format!("in the calibration file {}", path.display());
-    let text = std::fs::read_to_string(path)
+    let text = moiregauge_pipeline::read_text(path)
         .with_context(|| format!("cannot read the calibration file {}", path.display()))?;
     let file: CalibrationFile = toml::from_str(&text).with_context(of)?;
     ensure!(

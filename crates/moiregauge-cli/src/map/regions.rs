@@ -14,6 +14,7 @@ use nalgebra::Vector2;
 use spmfile::length_nm;
 
 use crate::input::parse_size;
+use crate::numbers;
 
 /// Questions about a map. Places are those of the map: x right, y up, nm.
 #[derive(clap::Args, Clone, Debug)]
@@ -255,7 +256,7 @@ pub(super) fn summary(details: &MapDetailsResult) -> String {
 fn length(text: &str) -> Option<f64> {
     let text = text.trim();
     let nm = text.parse().ok().or_else(|| length_nm(text))?;
-    f64::is_finite(nm).then_some(nm)
+    numbers::within([-1e9, 1e9], Some(nm))
 }
 
 fn named(text: &str) -> Option<(&str, &str)> {
@@ -330,7 +331,7 @@ fn parse_wanted(text: &str) -> Result<WantedTwist, String> {
             number.trim().parse::<f64>().ok()
         };
         let (twist, within) = (degrees(twist)?, degrees(within)?);
-        let good = twist.is_finite() && within > 0.0 && within.is_finite();
+        let good = twist.abs() <= 180.0 && within > 0.0 && within <= 180.0;
         good.then(|| WantedTwist {
             twist: twist.to_radians(),
             within: within.to_radians(),

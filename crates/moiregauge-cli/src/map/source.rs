@@ -1,6 +1,5 @@
 //! Lines of an image, from a scan in memory or straight from an uncompressed `.npy` file.
 
-use std::fs::File;
 use std::io::{Read as _, Seek as _, SeekFrom};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -66,7 +65,7 @@ impl Source {
 impl Array {
     /// Opens a file if it is such an array; `None` for anything else.
     pub(super) fn open(path: &Path) -> Option<Self> {
-        let mut file = File::open(path).ok()?;
+        let mut file = moiregauge_pipeline::open(path).ok()?;
         let mut first = [0; 10];
         file.read_exact(&mut first).ok()?;
         // Versions 2 and 3 are for headers longer than an image needs.
@@ -125,7 +124,7 @@ impl Array {
             "the array has {} lines",
             self.size[0]
         );
-        let mut file = File::open(&self.path)?;
+        let mut file = moiregauge_pipeline::open(&self.path)?;
         let top = self.size[0] - rows.end;
         file.seek(SeekFrom::Start(self.start + (top * self.line) as u64))?;
         let mut header = self.header.clone();

@@ -62,7 +62,7 @@ impl Large {
         if std::fs::metadata(place)?.len() < large as u64 {
             return Ok(None);
         }
-        let reading = crate::analyze::read(path, settings, known)?;
+        let reading = crate::analyze::read_any(path, settings, known)?;
         let names: Vec<(&str, &str)> = reading
             .scan
             .channels

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
-use anyhow::{bail, ensure};
+use anyhow::bail;
 use clap::ValueEnum;
 use moiregauge::cell::WavelengthMeaning;
 use moiregauge::settings::{Calibration, KnownOrientation, Settings};
@@ -13,6 +13,7 @@ use nalgebra::Matrix2;
 use super::Question;
 use crate::analyze::{Angle, ConventionArg, DirectionArg, SenseArg, parse_angle};
 use crate::config;
+use crate::numbers;
 
 /// The moiré of two layers, or the layers behind a moiré
 ///
@@ -39,21 +40,20 @@ pub(crate) struct MoireArgs {
     #[arg(long, value_name = "FILE")]
     materials: Option<PathBuf>,
     /// Twist of layer 2 against layer 1, degrees
-    #[arg(long, value_name = "DEG", allow_negative_numbers = true, conflicts_with_all = ["wavelengths", "vectors"])]
+    #[arg(long, value_name = "DEG", allow_negative_numbers = true, conflicts_with_all = ["wavelengths", "vectors"], value_parser = numbers::number(numbers::ANGLE_DEG))]
     twist: Option<f64>,
     /// Uniaxial strain of layer 2, per cent: that much along the axis, −ν times as much across
-    #[arg(long, value_name = "PERCENT", allow_negative_numbers = true, conflicts_with_all = ["wavelengths", "vectors"])]
+    #[arg(long, value_name = "PERCENT", allow_negative_numbers = true, conflicts_with_all = ["wavelengths", "vectors"], value_parser = numbers::number(numbers::STRAIN_PERCENT))]
     strain: Option<f64>,
     /// Axis of the strain, degrees, counted from the reciprocal vectors of layer 1 (φ)
     #[arg(
         long,
         value_name = "DEG",
         allow_negative_numbers = true,
-        requires = "strain"
-    )]
+        requires = "strain", value_parser = numbers::number(numbers::ANGLE_DEG))]
     strain_axis: Option<f64>,
     /// Strain of layer 2 that is the same in all directions, per cent, on top
-    #[arg(long, value_name = "PERCENT", allow_negative_numbers = true, conflicts_with_all = ["wavelengths", "vectors"])]
+    #[arg(long, value_name = "PERCENT", allow_negative_numbers = true, conflicts_with_all = ["wavelengths", "vectors"], value_parser = numbers::number(numbers::STRAIN_PERCENT))]
     biaxial: Option<f64>,
     /// Orientation of layer 1, degrees; backwards with its standard uncertainty, as in 11.2±0.3, and it
     /// gives the whole strain tensor
@@ -77,8 +77,7 @@ pub(crate) struct MoireArgs {
         long,
         value_name = "A,B,C",
         value_delimiter = ',',
-        conflicts_with = "vectors"
-    )]
+        conflicts_with = "vectors", value_parser = numbers::number(numbers::LENGTH_NM))]
     wavelengths: Vec<f64>,
     /// What the three wavelengths are: they differ as soon as there is strain
     #[arg(long, value_enum)]
@@ -87,16 +86,16 @@ pub(crate) struct MoireArgs {
     #[arg(long, num_args = 2, value_names = ["X,Y", "X,Y"], allow_hyphen_values = true)]
     vectors: Vec<String>,
     /// Standard uncertainty of each wavelength, or of each component of the vectors, nm
-    #[arg(long, value_name = "NM", default_value_t = 0.0)]
+    #[arg(long, value_name = "NM", default_value_t = 0.0, value_parser = numbers::number(numbers::NOT_NEGATIVE))]
     sigma: f64,
     /// Standard deviation of the isotropic strain that the layers may have, per cent
-    #[arg(long, value_name = "PERCENT", default_value_t = Settings::default().isotropic_strain_percent)]
+    #[arg(long, value_name = "PERCENT", default_value_t = Settings::default().isotropic_strain_percent, value_parser = numbers::number([0.0, 10.0]))]
     isotropic_strain: f64,
     /// Form of the strain equation [default: real-space]
     #[arg(long, value_enum)]
     strain_convention: Option<ConventionArg>,
     /// Electrons per cell at full filling: 4 in graphene (two spins, two valleys)
-    #[arg(long, value_name = "G", default_value_t = 4.0)]
+    #[arg(long, value_name = "G", default_value_t = 4.0, value_parser = numbers::number([1e-3, 1e6]))]
     pub(super) band_degeneracy: f64,
     /// Draw the cell: a name that ends in .svg or .png
     #[arg(long, value_name = "FILE")]
@@ -126,16 +125,6 @@ impl MoireArgs {
     pub(super) fn settings(&self) -> anyhow::Result<Settings> {
         let own = config::own_materials(self.materials.as_deref())?;
         let (material, substrate) = config::named_layers(&self.layers, &own)?;
-        ensure!(
-            self.sigma >= 0.0 && self.sigma.is_finite(),
-            "--sigma cannot be negative, found {}",
-            self.sigma
-        );
-        ensure!(
-            self.band_degeneracy > 0.0 && self.band_degeneracy.is_finite(),
-            "--band-degeneracy must be a number above 0, found {}",
-            self.band_degeneracy
-        );
         let settings = Settings {
             material,
             substrate,
@@ -236,8 +225,8 @@ impl MoireArgs {
             return Ok(0.0);
         };
         let plain: Option<f64> = text.trim().trim_end_matches('°').parse().ok();
-        let Some(angle_deg) = plain.filter(|x| x.is_finite()) else {
-            bail!("--lattice-angle: expected degrees, found {text:?}");
+        let Some(angle_deg) = numbers::within(numbers::ANGLE_DEG, plain) else {
+            bail!("--lattice-angle: expected degrees from −3600 to 3600, found {text:?}");
         };
         let own = config::own_materials(self.materials.as_deref())?;
         let (material, substrate) = config::named_layers(&self.layers, &own)?;
@@ -288,10 +277,12 @@ fn vector(text: &str) -> anyhow::Result<[f64; 2]> {
         .trim_matches(['(', ')', ' '])
         .split(',')
         .filter_map(|part| part.trim().parse().ok())
-        .filter(|x: &f64| x.is_finite())
+        .filter_map(|x: f64| numbers::within([-1e7, 1e7], Some(x)))
         .collect();
     match numbers.as_slice() {
         &[x, y] if text.split(',').count() == 2 => Ok([x, y]),
-        _ => bail!("--vectors: expected two components in nm, as in 12.9,0.4, found {text:?}"),
+        _ => bail!(
+            "--vectors: expected two components in nm, up to 1 cm, as in 12.9,0.4, found {text:?}"
+        ),
     }
 }

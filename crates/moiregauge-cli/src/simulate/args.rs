@@ -4,9 +4,10 @@ use std::path::PathBuf;
 
 use anyhow::Context as _;
 use moiregauge::material::Material;
-use moiregauge::simulate::{FirstDirection, Pattern, Simulation};
+use moiregauge::simulate::{FirstDirection, MOST_PIXELS, Pattern, Simulation};
 
 use crate::config::named_layers;
+use crate::numbers;
 
 /// Write simulated NanoScope sets and the truth about them
 ///
@@ -52,13 +53,13 @@ pub(crate) struct SimulateArgs {
     #[arg(long)]
     pub(super) seed: Option<u64>,
     /// Number of scans
-    #[arg(long)]
+    #[arg(long, value_parser = numbers::count(1, 9999))]
     scans: Option<usize>,
     /// Samples per line and lines, as in 512 or 512x256
     #[arg(long, value_name = "N[xM]", value_parser = parse_pixels)]
     pixels: Option<Pixels>,
     /// Lines per second
-    #[arg(long, value_name = "HZ")]
+    #[arg(long, value_name = "HZ", value_parser = numbers::number(numbers::LINE_RATE_HZ))]
     rate: Option<f64>,
     /// Slow axis: y, or x for a frame turned by 90°
     #[arg(long, value_enum)]
@@ -67,10 +68,10 @@ pub(crate) struct SimulateArgs {
     #[arg(long, value_enum)]
     first: Option<First>,
     /// Nominal size along the fast and the slow axis, nm
-    #[arg(long, num_args = 2, value_names = ["FAST", "SLOW"])]
+    #[arg(long, num_args = 2, value_names = ["FAST", "SLOW"], value_parser = numbers::number(numbers::LENGTH_NM))]
     size: Option<Vec<f64>>,
     /// Start of the first scan, s on the clock of the drift
-    #[arg(long, value_name = "S")]
+    #[arg(long, value_name = "S", value_parser = numbers::number(numbers::NOT_NEGATIVE))]
     start: Option<f64>,
     /// Material of both layers
     #[arg(long, value_parser = parse_material)]
@@ -82,40 +83,40 @@ pub(crate) struct SimulateArgs {
     #[arg(long, value_name = "1|2", value_parser = clap::value_parser!(u8).range(1..=2))]
     atoms: Option<u8>,
     /// Twist, degrees
-    #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
+    #[arg(long, value_name = "DEG", allow_negative_numbers = true, value_parser = numbers::number(numbers::ANGLE_DEG))]
     twist: Option<f64>,
     /// Uniaxial strain of layer 2, per cent
-    #[arg(long, value_name = "PERCENT", allow_negative_numbers = true)]
+    #[arg(long, value_name = "PERCENT", allow_negative_numbers = true, value_parser = numbers::number(numbers::STRAIN_PERCENT))]
     strain: Option<f64>,
     /// Strain of layer 2 that is the same in all directions, on top of the uniaxial one, per cent
-    #[arg(long, value_name = "PERCENT", allow_negative_numbers = true)]
+    #[arg(long, value_name = "PERCENT", allow_negative_numbers = true, value_parser = numbers::number(numbers::STRAIN_PERCENT))]
     biaxial: Option<f64>,
     /// Axis of the strain, counted from layer 1, degrees
-    #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
+    #[arg(long, value_name = "DEG", allow_negative_numbers = true, value_parser = numbers::number(numbers::ANGLE_DEG))]
     strain_axis: Option<f64>,
     /// Orientation of the reciprocal vectors of layer 1, degrees
-    #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
+    #[arg(long, value_name = "DEG", allow_negative_numbers = true, value_parser = numbers::number(numbers::ANGLE_DEG))]
     lattice_angle: Option<f64>,
     /// Strength of the higher harmonics, 0 (three cosines) to below 1 (small spots)
-    #[arg(long, value_name = "S")]
+    #[arg(long, value_name = "S", value_parser = numbers::number([0.0, 0.999]))]
     sharpness: Option<f64>,
     /// Drift velocity, nm/min
-    #[arg(long, num_args = 2, value_names = ["X", "Y"], allow_negative_numbers = true)]
+    #[arg(long, num_args = 2, value_names = ["X", "Y"], allow_negative_numbers = true, value_parser = numbers::number(numbers::DRIFT))]
     drift: Option<Vec<f64>>,
     /// Change of the drift velocity, nm/min²
-    #[arg(long, num_args = 2, value_names = ["X", "Y"], allow_negative_numbers = true)]
+    #[arg(long, num_args = 2, value_names = ["X", "Y"], allow_negative_numbers = true, value_parser = numbers::number(numbers::DRIFT))]
     acceleration: Option<Vec<f64>>,
     /// Noise of each pixel, degrees of phase (the moiré has an amplitude of 1°)
-    #[arg(long, value_name = "DEG")]
+    #[arg(long, value_name = "DEG", value_parser = numbers::number(numbers::NOT_NEGATIVE))]
     noise: Option<f64>,
     /// Noise of each line, degrees of phase
-    #[arg(long, value_name = "DEG")]
+    #[arg(long, value_name = "DEG", value_parser = numbers::number(numbers::NOT_NEGATIVE))]
     line_noise: Option<f64>,
     /// Noise of lines with a 1/f spectrum, degrees of phase
-    #[arg(long, value_name = "DEG")]
+    #[arg(long, value_name = "DEG", value_parser = numbers::number(numbers::NOT_NEGATIVE))]
     flicker: Option<f64>,
     /// Noise of the position sensors, nm
-    #[arg(long, value_name = "NM")]
+    #[arg(long, value_name = "NM", value_parser = numbers::number(numbers::NOT_NEGATIVE))]
     sensor_noise: Option<f64>,
     /// Record no position sensors
     #[arg(long)]
@@ -146,7 +147,7 @@ impl SimulateArgs {
     pub(super) fn settings(&self) -> anyhow::Result<Simulation> {
         let mut set = match &self.config {
             Some(path) => {
-                let text = std::fs::read_to_string(path)
+                let text = moiregauge_pipeline::read_text(path)
                     .with_context(|| format!("cannot read {}", path.display()))?;
                 toml::from_str(&text).with_context(|| format!("{} is no set", path.display()))?
             }
@@ -225,9 +226,8 @@ impl SimulateArgs {
 fn parse_pixels(text: &str) -> Result<Pixels, String> {
     let (columns, rows) = text.split_once(['x', 'X', '×']).unwrap_or((text, text));
     let number = |part: &str| {
-        part.trim()
-            .parse::<usize>()
-            .map_err(|_| format!("expected 512 or 512x256, found {text:?}"))
+        numbers::count(2, MOST_PIXELS)(part)
+            .map_err(|expected| format!("{expected}, or two of them as in 512x256, found {text:?}"))
     };
     Ok(Pixels([number(columns)?, number(rows)?]))
 }

@@ -23,8 +23,8 @@ pub(super) fn conditions(paths: &[PathBuf]) -> anyhow::Result<Simulation> {
         strain_draws: 0,
         ..Settings::default()
     };
-    let found: Result<Vec<PathBuf>, _> = expand(paths).into_iter().collect();
-    let found = found.map_err(|(path, error)| anyhow::anyhow!("{}: {error}", path.display()))?;
+    let found: Result<Vec<PathBuf>, _> = expand(paths, true).into_iter().collect();
+    let found = found.map_err(|one| anyhow::anyhow!("{}: {}", one.file, one.error))?;
     let mut scans = Vec::new();
     for path in moiregauge_pipeline::distinct(&found).0 {
         let (mut moires, _) = measure_file(&path, &[], (&settings, &Known::default()), None)

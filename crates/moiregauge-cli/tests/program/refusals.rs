@@ -59,8 +59,15 @@ fn a_jpeg() {
         std::fs::write(&picture, JPEG).unwrap();
         refuse(&run(&mut analyze(&picture, &out)), &[name, "JPEG"]);
     }
-    // In a folder it is no scan, whatever its name.
-    refuse(&run(&mut analyze(folder.path(), &out)), &["no scan files"]);
+    // In a folder one is no scan by its name, and the other should be one.
+    refuse(
+        &run(&mut analyze(folder.path(), &out)),
+        &[
+            "left alone: 1 other file (picture.jpg)",
+            "picture.spm",
+            "it holds a picture",
+        ],
+    );
 }
 
 #[test]
@@ -239,28 +246,35 @@ fn numbers_that_make_no_sense() {
     let scans = small_set(folder.path());
     let out = folder.path().join("out");
     for options in [
-        ["--lattice-constant", "0"],
-        ["--lattice-constant", "nan"],
-        ["--poisson-ratio", "1.5"],
-        ["--poisson-ratio", "nan"],
-    ] {
-        refuse(&run(analyze(&scans, &out).args(options)), &[options[0]]);
-    }
-    for options in [&["--drift", "nan", "0"][..], &["--drift", "0", "inf"]] {
-        refuse(&run(analyze(&scans, &out).args(options)), &["drift"]);
-    }
-    for options in [
-        &["--calibration-gain=-1"][..],
+        &["--lattice-constant", "0"][..],
+        &["--lattice-constant", "nan"],
+        &["--poisson-ratio", "1.5"],
+        &["--poisson-ratio", "nan"],
+        &["--calibration-gain", "-1"],
         &["--calibration-mismatch", "nan"],
-        &["--lattice-constant-sigma", "1"],
+        &["--drift", "nan", "0"],
+        &["--drift", "0", "inf"],
+        &["--drift-sigma", "-1", "--drift", "0.5", "0"],
+        &["--drift-draws", "18446744073709551615"],
+        &["--line-rate", "1e-308"],
+        &["--threads", "100000"],
     ] {
-        refuse(
-            &run(analyze(&scans, &out).args(options)),
-            &["an uncertainty"],
-        );
+        let run = run(analyze(&scans, &out).args(options));
+        // Arguments that cannot be read at all have an exit code of their own.
+        assert_eq!(run.code, Some(2), "{}", run.stderr);
+        let told = run.stderr.contains(options[0]) && run.stderr.contains(" from ");
+        assert!(told, "{options:?}: {}", run.stderr);
     }
-    let sigma = ["--drift", "0.5", "0", "--drift-sigma=-1"];
-    refuse(&run(analyze(&scans, &out).args(sigma)), &["drift-sigma"]);
+    let size = ["--size", "4294967296nm×70nm"];
+    let run_of_size = run(analyze(&scans, &out).args(size));
+    assert!(
+        run_of_size.stderr.contains("--size"),
+        "{}",
+        run_of_size.stderr
+    );
+    let sigma = ["--lattice-constant-sigma", "1"];
+    let run_of_sigma = run(analyze(&scans, &out).args(sigma));
+    refuse(&run_of_sigma, &["an uncertainty"]);
     // The same from a file.
     let config = folder.path().join("settings.toml");
     std::fs::write(&config, "[drift]\nx_nm_per_min = nan\ny_nm_per_min = 0.1").unwrap();

@@ -260,6 +260,10 @@ fn rank_and_condition(observations: &[Observation]) -> (usize, f64) {
             column /= norm;
         }
     }
+    // The decomposition of anything else does not end.
+    if design.iter().any(|value| !value.is_finite()) {
+        return (0, f64::INFINITY);
+    }
     let values = design.singular_values();
     let largest = values.max();
     let rank = values.iter().filter(|v| **v > 1e-9 * largest).count();

@@ -22,6 +22,10 @@ const SLOWEST: f64 = 0.1;
 const SHARE: f64 = 0.5;
 /// ... and improves χ² by this much, in units of what it leaves.
 const IMPROVEMENT: f64 = 50.0;
+/// A lag that explains whole lines leaves less than this many times the noise, ...
+const EXCESS: f64 = 3.0;
+/// ... or this share of the bend, where there is no noise.
+const NOTHING: f64 = 1e-3;
 /// Steps of the search for the decay, and its shortest one, columns.
 const STEPS: usize = 40;
 const SHORTEST: f64 = 0.5;
@@ -66,12 +70,24 @@ impl Lag {
     }
 }
 
+/// Looks for a lag that explains the whole lines of a sensor, turn-around and all.
+pub(super) fn find_whole(image: &Image) -> Option<Lag> {
+    let (lag, left, noise) = search(image, &(0..image.columns))?;
+    let exact = NOTHING * lag.bend_nm;
+    (left < EXCESS * noise + exact * exact).then_some(lag)
+}
+
 /// Looks for the lag of a sensor in the columns `used`.
 pub(super) fn find(image: &Image, used: &Range<usize>) -> Option<Lag> {
+    search(image, used).map(|(lag, ..)| lag)
+}
+
+/// The lag, the variance that it leaves in the mean line, and that of the noise of the mean line, nm².
+fn search(image: &Image, used: &Range<usize>) -> Option<(Lag, f64, f64)> {
     if used.len() < FEWEST {
         return None;
     }
-    let line = mean_line(image, used)?;
+    let (line, noise) = mean_line(image, used)?;
     let smooth = polynomials(used.len());
     let plain = residual(&smooth, &line)?;
     let mut best: Option<(f64, f64, bool)> = None;
@@ -93,7 +109,8 @@ pub(super) fn find(image: &Image, used: &Range<usize>) -> Option<Lag> {
     if !(explained > SHARE * plain && explained > IMPROVEMENT * variance) {
         return None;
     }
-    bend(&line, &smooth, (columns, from_last), variance)
+    let lag = bend(&line, &smooth, (columns, from_last), variance)?;
+    Some((lag, variance, noise))
 }
 
 /// The bend of the decay that was found, and what it does to the slope.
@@ -145,23 +162,35 @@ fn best_decay(left: &dyn Fn(f64) -> f64, longest: f64) -> f64 {
     f64::midpoint(low, high)
 }
 
-/// Median of each column about the plane of the sensor, nm; `None` where a column has no values.
-fn mean_line(image: &Image, used: &Range<usize>) -> Option<DVector<f64>> {
+/// Median of each column about the plane of the sensor, nm, and the variance that noise gives it; `None` where a column has
+/// no values.
+fn mean_line(image: &Image, used: &Range<usize>) -> Option<(DVector<f64>, f64)> {
     let plane = fit_plane(image, used.clone())?;
     let mut line = DVector::zeros(used.len());
+    let mut noise = 0.0;
     for (place, column) in used.clone().enumerate() {
         let mut values: Vec<f64> = (0..image.rows)
             .step_by(1 + image.rows / MOST_ROWS)
             .map(|row| image.row(row)[column] - plane.at(column as f64, row as f64))
             .filter(|v| v.is_finite())
             .collect();
-        if values.is_empty() {
-            return None;
-        }
-        let middle = values.len() / 2;
-        line[place] = *values.select_nth_unstable_by(middle, f64::total_cmp).1;
+        let middle = median(&mut values)?;
+        line[place] = middle;
+        let count = values.len() as f64;
+        let mut sizes: Vec<f64> = values.iter().map(|v| (v - middle).abs()).collect();
+        // Of Gaussian noise: σ is 1.4826 of the median size, and the median has π/2 of the variance of the mean.
+        let sigma = 1.4826 * median(&mut sizes)?;
+        noise += std::f64::consts::FRAC_PI_2 * sigma * sigma / count / used.len() as f64;
     }
-    Some(line)
+    Some((line, noise))
+}
+
+fn median(values: &mut [f64]) -> Option<f64> {
+    if values.is_empty() {
+        return None;
+    }
+    let middle = values.len() / 2;
+    Some(*values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
 
 /// Columns from where lines begin.

@@ -36,12 +36,19 @@ pub fn from_sensors(x: &Image, y: &Image) -> Option<SensorGeometry> {
     if (y.rows, y.columns) != (rows, columns) {
         return None;
     }
-    let used = straight_columns(x, y)?;
-    let lags = [x, y].map(|sensor| lag::find(sensor, &used));
-    let [x, y] = [(x, lags[0]), (y, lags[1])].map(|(sensor, lag)| match lag {
-        Some(lag) => Cow::Owned(lag.taken_off(sensor, &used)),
-        None => Cow::Borrowed(sensor),
-    });
+    // A lag that explains whole lines is taken off first; of any other bend what is not straight is left out, and a lag is
+    // looked for in the rest.
+    let whole = [x, y].map(lag::find_whole);
+    let every = 0..columns;
+    let [x, y] = [straight(x, whole[0], &every), straight(y, whole[1], &every)];
+    let used = straight_columns(&x, &y)?;
+    let rest = |sensor, whole: Option<Lag>| match whole {
+        Some(_) => None,
+        None => lag::find(sensor, &used),
+    };
+    let rest = [rest(&x, whole[0]), rest(&y, whole[1])];
+    let lags = [whole[0].or(rest[0]), whole[1].or(rest[1])];
+    let [x, y] = [straight(&x, rest[0], &used), straight(&y, rest[1], &used)];
     let (x, y) = (x.as_ref(), y.as_ref());
     let planes = [fit_plane(x, used.clone())?, fit_plane(y, used.clone())?];
     let pixel_to_nm = Matrix2::new(
@@ -86,6 +93,18 @@ pub fn from_sensors(x: &Image, y: &Image) -> Option<SensorGeometry> {
         fast_steps: line_slopes.iter().map(|s| s.dot(&ef)).collect(),
         slow_steps: column_slopes.iter().map(|s| s.dot(&es)).collect(),
     })
+}
+
+/// A sensor without its lag in the columns `used`.
+fn straight<'a>(
+    sensor: &'a Image,
+    lag: Option<Lag>,
+    used: &std::ops::Range<usize>,
+) -> Cow<'a, Image> {
+    match lag {
+        Some(lag) => Cow::Owned(lag.taken_off(sensor, used)),
+        None => Cow::Borrowed(sensor),
+    }
 }
 
 impl SensorGeometry {

@@ -61,6 +61,13 @@ pub fn channels_by_preference<'a>(channels: &[(&'a str, &'a str)]) -> Vec<&'a st
     all
 }
 
+/// Whether one of them has the name of a channel in which moirés are usually seen.
+pub(super) fn is_usual(channels: &[(&str, &str)]) -> bool {
+    USUAL
+        .iter()
+        .any(|name| choose_channel(channels, Some(name)).is_some())
+}
+
 /// Lower case, letters and digits only.
 fn plain(name: &str) -> String {
     name.chars()

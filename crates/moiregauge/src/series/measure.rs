@@ -3,9 +3,10 @@
 use nalgebra::{Matrix2, Vector2};
 use spmfile::{Channel, DateTime, FrameDirection, LineDirection, Scan};
 
-use super::channel::{choose_channel, stem};
+use super::channel::choose_channel;
 use super::doubts::{about_fit, few_periods, lines_disagree, turned};
 use super::identity::Fingerprint;
+use super::images::{first_of_several, images_of};
 use super::moires::in_order;
 use super::overlap::Window;
 use super::positions::{nominal, speeds, usable_sensors};
@@ -21,7 +22,11 @@ use crate::lattice::reciprocal::labelled_like;
 use crate::lattice::{
     LatticeError, LatticeVectors, MeasuredLattice, Start, measure, measure_several, vectors,
 };
-use crate::settings::{Lines, Settings};
+use crate::settings::{Lines, OutOfRange, Settings};
+
+/// Bytes of memory that the analysis of an image takes for each of its pixels at most: measured with 2048 × 2048
+/// single-precision samples and eight pixels per period, where nothing can be binned.
+pub const BYTES_PER_PIXEL: u64 = 105;
 
 /// What the pixels of one scan gave.
 #[derive(Clone, Debug)]
@@ -89,6 +94,16 @@ pub enum MeasureError {
         /// The channels that are there.
         present: String,
     },
+    /// There are not so many images of the channel.
+    #[error("expected image {wanted} of {channel:?}, found {found} in the file")]
+    NoSuchImage {
+        /// The channel.
+        channel: String,
+        /// What was asked for, counted from 1.
+        wanted: usize,
+        /// How many there are.
+        found: usize,
+    },
     /// The line direction is not there.
     #[error("channel {channel:?} has no {wanted} lines, only {present}")]
     NoLine {
@@ -99,6 +114,9 @@ pub enum MeasureError {
         /// What is there.
         present: &'static str,
     },
+    /// A setting that makes no sense.
+    #[error(transparent)]
+    Settings(#[from] OutOfRange),
     /// A calibration that no scanner can have.
     #[error("the calibration of the scanner cannot be used: {0}")]
     Calibration(String),
@@ -202,6 +220,9 @@ pub fn measure_moires(
     settings: &Settings,
     window: Option<&Window>,
 ) -> Result<Vec<MeasuredScan>, MeasureError> {
+    if let Some(problem) = settings.out_of_range() {
+        return Err(problem.into());
+    }
     let (background, method) = (settings.background, settings.method);
     let find = |image: &Image, geometry: &Geometry| match settings.moires {
         0 | 1 => measure(image, geometry, background, method).map(|lattice| vec![lattice]),
@@ -225,7 +246,11 @@ fn measure_with(
         return Err(MeasureError::Calibration(problem));
     }
     let channels = channels(scan, settings)?;
-    let mut caveats = Vec::new();
+    let several = first_of_several(scan, &channels[0].name, settings);
+    let mut caveats: Vec<Caveat> = several
+        .into_iter()
+        .map(|words| Caveat::new("several-images", file, words))
+        .collect();
     let mut moires: Vec<Vec<MeasuredLine>> = Vec::new();
     let mut failures = Vec::new();
     for channel in &channels {
@@ -320,18 +345,18 @@ pub(super) fn channels<'a>(
             present: present.join(", "),
         });
     };
-    let same = |c: &&Channel| stem(&c.name) == stem(name);
-    let direction = |c: &Channel| c.line_direction.unwrap_or(LineDirection::Trace);
-    let first = |wanted: LineDirection| {
-        let mut found = scan
-            .channels
-            .iter()
-            .filter(same)
-            .filter(|c| direction(c) == wanted);
-        let main = |c: &&Channel| c.scan_line.as_deref().is_none_or(|s| s == "Main");
-        found.clone().find(main).or_else(|| found.next())
-    };
-    let (trace, retrace) = (first(LineDirection::Trace), first(LineDirection::Retrace));
+    let number = settings.image.unwrap_or(1);
+    let of = |direction| images_of(scan, name, direction);
+    let all = [LineDirection::Trace, LineDirection::Retrace].map(of);
+    let found = all.iter().map(Vec::len).max().unwrap_or(0);
+    if settings.image.is_some() && !(1..=found).contains(&number) {
+        return Err(MeasureError::NoSuchImage {
+            channel: name.to_owned(),
+            wanted: number,
+            found,
+        });
+    }
+    let [trace, retrace] = all.map(|images| images.get(number.wrapping_sub(1)).copied());
     let lacking = |wanted, present| MeasureError::NoLine {
         channel: name.to_owned(),
         wanted,

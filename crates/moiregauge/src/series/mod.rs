@@ -15,6 +15,7 @@ mod doubts;
 mod group;
 mod identity;
 mod illustrate;
+mod images;
 mod mapping;
 mod measure;
 mod moires;
@@ -39,9 +40,11 @@ pub use domain_mapping::domains_of_scan;
 pub use group::natural_order;
 pub use identity::about_repeat;
 pub use illustrate::{amplitude_of, illustrate, picture};
+pub use images::{image_choice, unusual_channels};
 pub use mapping::{LineMap, MapError, MapMethod, map_scan};
 pub use measure::{
-    MeasureError, MeasuredLine, MeasuredScan, measure_known, measure_moires, measure_scan,
+    BYTES_PER_PIXEL, MeasureError, MeasuredLine, MeasuredScan, measure_known, measure_moires,
+    measure_scan,
 };
 pub use moires::sorted_moires;
 pub use overlap::{Window, common_window};

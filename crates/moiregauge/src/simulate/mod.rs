@@ -22,7 +22,9 @@ use spmfile::Scan;
 pub use domains::DomainScene;
 pub use error::SimulateError;
 pub use field::{Feature, FieldScene, Ripple};
-pub use settings::{Drift, FirstDirection, Noise, Pattern, Raster, Sample, Simulation, Window};
+pub use settings::{
+    Drift, FirstDirection, MOST_PIXELS, Noise, Pattern, Raster, Sample, Simulation, Window,
+};
 pub use truth::{FrameTruth, Truth};
 
 use raster::FramePlan;

@@ -270,7 +270,7 @@ impl Sample {
 }
 
 /// Frames larger than this hold more pixels than any instrument writes.
-const MOST_PIXELS: usize = 16_384;
+pub const MOST_PIXELS: usize = 16_384;
 
 impl Simulation {
     /// Refuses what no instrument can do.
@@ -306,9 +306,9 @@ impl Simulation {
         ];
         for (setting, value) in positive {
             require(
-                value.is_finite() && value > 0.0,
+                (1e-9..=1e9).contains(&value),
                 setting,
-                "a number > 0",
+                "a number > 0, from 1e-9 to 1e9",
                 &value,
             )?;
         }
@@ -326,9 +326,9 @@ impl Simulation {
         ];
         for (setting, value) in not_negative {
             require(
-                value.is_finite() && value >= 0.0,
+                (0.0..=1e9).contains(&value),
                 setting,
-                "a number ≥ 0",
+                "a number ≥ 0, up to 1e9",
                 &value,
             )?;
         }
@@ -365,9 +365,9 @@ impl Simulation {
         ];
         for (setting, pair) in pairs {
             require(
-                pair.iter().all(|x| x.is_finite()),
+                pair.iter().all(|x| x.abs() <= 1e9),
                 setting,
-                "finite numbers",
+                "finite numbers, up to 1e9",
                 &pair,
             )?;
         }

@@ -42,6 +42,8 @@ const SAME: f64 = 0.25;
 const MOST: usize = 3;
 /// Parts along each axis, one after the other: a pattern that changes across the frame is sharp in its parts.
 const PARTS: [usize; 3] = [1, 2, 4];
+/// Pixels are no more elongated than this.
+const THINNEST: f64 = 1e3;
 /// Parts have this many pixels along each axis.
 const SMALLEST: usize = 64;
 
@@ -69,6 +71,11 @@ pub(super) fn find(images: &[&Image], pitch: [f64; 2]) -> Vec<Pattern> {
     let Some(first) = images.first() else {
         return Vec::new();
     };
+    // Waves of one length then lie on an ellipse so thin that it holds no bins.
+    let [narrow, wide] = [pitch[0].min(pitch[1]), pitch[0].max(pitch[1])];
+    if !(wide <= THINNEST * narrow) {
+        return Vec::new();
+    }
     for parts in PARTS {
         let size = [first.columns / parts, first.rows / parts];
         if size[0].min(size[1]) < SMALLEST && parts > 1 {

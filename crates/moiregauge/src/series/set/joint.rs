@@ -4,7 +4,7 @@ use nalgebra::{Matrix2, Vector2};
 use spmfile::FrameDirection;
 
 use super::Solved;
-use crate::analysis::{Checks, Drift, JointTerms, Motion, Residual, Scatter};
+use crate::analysis::{Checks, Drift, JointTerms, Motion, Residual, ScanAnalysis, Scatter};
 use crate::budget::Statistical;
 use crate::chi2::{enlargement, tail};
 use crate::drift::{Observation, solve};
@@ -258,18 +258,24 @@ pub(super) fn velocity_of(
     Some(fit.velocity_at(middle_of_frame(scan)?))
 }
 
-/// When a scan was taken and the way of the sample: that of the fit, or without one that of a steady drift.
-pub(super) fn motion_of(
+/// A scan with its time and the way of the sample: that of the fit, or without one that of a steady drift.
+pub(super) fn with_motion(
+    found: ScanAnalysis,
     fit: Option<&JointFit>,
     scan: &MeasuredScan,
-    velocity: Vector2<f64>,
-) -> Option<Motion> {
-    let middle = middle_of_frame(scan)?;
-    let steady = || DriftPath::steady(velocity, middle);
-    Some(Motion {
-        middle,
-        path: fit.map_or_else(steady, JointFit::path),
-    })
+) -> ScanAnalysis {
+    let of = |velocity| {
+        let middle = middle_of_frame(scan)?;
+        let steady = || DriftPath::steady(velocity, middle);
+        Some(Motion {
+            middle,
+            path: fit.map_or_else(steady, JointFit::path),
+        })
+    };
+    ScanAnalysis {
+        motion: found.drift.and_then(of),
+        ..found
+    }
 }
 
 #[cfg(test)]

@@ -94,11 +94,7 @@ pub(super) fn analyse_set(
                 own.unwrap_or((s.drift.velocity, s.drift.covariance))
             });
             let found = scan_analysis(scan, seen, reference, drift, settings)?;
-            let motion = |velocity| joint::motion_of(fit.as_ref(), scan, velocity);
-            Some(ScanAnalysis {
-                motion: found.drift.and_then(motion),
-                ..found
-            })
+            Some(joint::with_motion(found, fit.as_ref(), scan))
         })
         .collect();
     let checks = fit.as_ref().map(|fit| {
