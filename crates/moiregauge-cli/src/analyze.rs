@@ -6,10 +6,15 @@ mod channel;
 mod export;
 mod files;
 mod orientation;
-mod summary;
 mod task;
 
+use std::path::Path;
 use std::process::ExitCode;
+
+use anyhow::Context as _;
+use moiregauge::analysis::Picture;
+use moiregauge::series::picture;
+use moiregauge::settings::Settings;
 
 pub(crate) use args::{AnalyzeArgs, BackgroundArg, ConventionArg, LineArg, MethodArg};
 pub(crate) use chain::{
@@ -19,14 +24,14 @@ pub(crate) use chain::{
 pub(crate) use channel::channel_names;
 pub(crate) use files::report_names;
 pub(crate) use moiregauge_pipeline::hexadecimal;
+pub(crate) use moiregauge_report::screen::{caveats as caveat_lines, failures, summary};
 pub(crate) use orientation::{Angle, DirectionArg, SenseArg, parse_angle};
-pub(crate) use summary::{caveats as caveat_lines, failures, summary};
 pub(crate) use task::{Task, out_beside};
 
 use crate::outputs::{commit, write_all};
 use crate::say::say;
 use moiregauge::series::refusal;
-use moiregauge_report::write_report;
+use moiregauge_report::{InputFile, write_report};
 
 /// Whether the program can write Parquet.
 const PARQUET: bool = cfg!(feature = "parquet");
@@ -94,7 +99,7 @@ pub(crate) fn run(args: &AnalyzeArgs) -> anyhow::Result<ExitCode> {
     for answer in answers {
         say(&answer)?;
     }
-    eprint!("{}", summary::failures(&failed));
+    eprint!("{}", failures(&failed));
     if let Some(why) = &refused {
         eprintln!("error: {}: {}", why.place, why.message);
     }
@@ -111,6 +116,7 @@ pub(crate) fn run(args: &AnalyzeArgs) -> anyhow::Result<ExitCode> {
 fn outcomes(task: &Task, loud: bool) -> anyhow::Result<Vec<Outcome>> {
     let mut settings = task.run.settings.clone();
     let known = task.known(&task.inputs);
+    let survey = survey_image(task, &settings)?;
     let atomic = orientation::measure(task, &settings)?;
     if let Some((found, _)) = &atomic {
         settings.lattice_angle = Some(found.known());
@@ -127,7 +133,7 @@ fn outcomes(task: &Task, loud: bool) -> anyhow::Result<Vec<Outcome>> {
     );
     let mut outcomes = outcome
         .map_err(|failed| {
-            eprint!("{}", summary::failures(&failed));
+            eprint!("{}", failures(&failed));
             if let Some(stripes) = crate::map::stripes_in_words(&task.inputs, &settings, &known) {
                 eprintln!("{stripes}");
             }
@@ -142,6 +148,10 @@ fn outcomes(task: &Task, loud: bool) -> anyhow::Result<Vec<Outcome>> {
             analysis.caveats.extend(found.caveats.iter().cloned());
             analysis.atomic = Some(found.clone());
             provenance.inputs.extend(files.iter().cloned());
+        }
+        if let Some((picture, file)) = &survey {
+            analysis.survey = Some(picture.clone());
+            provenance.inputs.push(file.clone());
         }
         provenance.run = Some(task.record(&known, &provenance.inputs));
     }
@@ -171,4 +181,19 @@ fn parquet(outcome: &Outcome) -> anyhow::Result<Vec<(String, Vec<u8>)>> {
 #[cfg(not(feature = "parquet"))]
 fn parquet(_: &Outcome) -> anyhow::Result<Vec<(String, Vec<u8>)>> {
     anyhow::bail!("this program was built without Parquet")
+}
+
+/// The image of a larger area, read before the work.
+fn survey_image(task: &Task, settings: &Settings) -> anyhow::Result<Option<(Picture, InputFile)>> {
+    let Some(name) = &task.run.survey_image else {
+        return Ok(None);
+    };
+    let path = Path::new(name);
+    // What is known of the scans, as their size, is not known of it.
+    let reading = read(path, settings, &task.nothing_known(path))
+        .with_context(|| format!("--survey-image {name}"))?;
+    let shown = picture(name, &reading.scan, settings).with_context(|| {
+        format!("--survey-image {name}: it has no image with a size and a place")
+    })?;
+    Ok(Some((shown, reading.input)))
 }

@@ -16,7 +16,7 @@ use moiregauge::caveat::Caveat;
 use moiregauge::map::{DriftChange, LatticeMap, Resolution, TwistStrainMap, register};
 use moiregauge::series::{
     LineMap, MapMethod, SurveyPlan, about_repeat, average_maps, change_of_drift, domains_of_scan,
-    map_scan, refusal,
+    map_scan, picture, refusal,
 };
 use moiregauge::settings::Settings;
 use moiregauge_pipeline::sink::FolderSink;
@@ -53,21 +53,21 @@ pub(crate) struct MapArgs {
     #[command(flatten)]
     analyze: AnalyzeArgs,
     /// How local lattices are measured
-    #[arg(long, value_enum, default_value_t = MapMethodArg::Demodulation)]
+    #[arg(help_heading = "Maps", long, value_enum, default_value_t = MapMethodArg::Demodulation)]
     map_method: MapMethodArg,
     /// Width of the Gaussian window (standard deviation), nm; a point becomes 2.35 of it wide [default: as
     /// wide as the lattice stays straight, at least 0.6 periods]. By tiles: the side of a tile [default: 6
     /// periods]
-    #[arg(long, value_name = "NM", value_parser = numbers::number(numbers::LENGTH_NM))]
+    #[arg(long, value_name = "NM", value_parser = numbers::number(numbers::LENGTH_NM), help_heading = "Maps")]
     window: Option<f64>,
     /// Distance of the nodes, nm [default: a third of the window, two pixels at least; a quarter of a tile]
-    #[arg(long, value_name = "NM", value_parser = numbers::number(numbers::LENGTH_NM))]
+    #[arg(long, value_name = "NM", value_parser = numbers::number(numbers::LENGTH_NM), help_heading = "Maps")]
     step: Option<f64>,
     /// Map in bands, as images of more than 20 million pixels are; several files are put side by side
-    #[arg(long)]
+    #[arg(help_heading = "Maps", long)]
     in_bands: bool,
     /// Margin at the edges, in windows [default: 2, or a quarter of the frame where that is less]
-    #[arg(long, value_name = "WINDOWS", value_parser = numbers::number([0.0, 10.0]))]
+    #[arg(long, value_name = "WINDOWS", value_parser = numbers::number([0.0, 10.0]), help_heading = "Maps")]
     margin: Option<f64>,
     #[command(flatten)]
     regions: regions::RegionArgs,
@@ -122,6 +122,10 @@ pub(crate) fn run(args: &MapArgs) -> anyhow::Result<ExitCode> {
     let settings = task.run.settings.clone();
     let resolution = args.resolution();
     args.regions.check()?;
+    ensure!(
+        args.analyze.survey_image().is_none(),
+        "--survey-image is for analyze"
+    );
     args.analyze.start_threads()?;
     let inputs = &task.inputs;
     let sink = output::sink(args, &task.files())?;
@@ -247,6 +251,7 @@ fn survey(
             run: None,
         },
         settings: settings.clone(),
+        picture: plans.first().and_then(|(large, _)| large.picture(settings)),
         images,
         map,
         whole: None,
@@ -308,10 +313,15 @@ fn together(
         .filter_map(|s| s.motion.map(|m| m.middle))
         .min_by(f64::total_cmp);
     let how = (args.map_method.into(), resolution);
-    let mut maps = Vec::new();
+    let (mut maps, mut shown) = (Vec::new(), None);
     for scan in used() {
-        let mapped = read_again(inputs, &scan.file, settings, known)
-            .and_then(|r| Ok(map_scan(&r.scan, (scan, origin), settings, how)?));
+        let mapped = read_again(inputs, &scan.file, settings, known).and_then(|r| {
+            let lines = map_scan(&r.scan, (scan, origin), settings, how)?;
+            shown = shown
+                .take()
+                .or_else(|| picture(&scan.file, &r.scan, settings));
+            Ok(lines)
+        });
         match mapped {
             Ok(lines) => maps.extend(lines),
             Err(error) => provenance.failed.push(FailedInput {
@@ -359,6 +369,7 @@ fn together(
     caveats.extend(domains.caveats.iter().cloned());
     Ok(Answer::Lattice(Box::new(Made {
         map,
+        picture: shown,
         domains,
         images: maps
             .iter()

@@ -8,6 +8,7 @@ use crate::numbers::number;
 
 /// What no scan of a moiré tells.
 #[derive(clap::Args, Clone, Debug)]
+#[command(next_help_heading = "Scanner and uncertainty budget")]
 pub(crate) struct ScannerArgs {
     /// Calibration of the scanner, as `moiregauge calibrate` writes it: corrects positions, and its errors take
     /// the place of the three below

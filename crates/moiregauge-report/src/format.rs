@@ -1,6 +1,6 @@
 //! Numbers as people read them: rounded to their uncertainty.
 
-use moiregauge::estimate::Estimate;
+use moiregauge::estimate::{Estimate, TotalEstimate};
 
 use crate::draw::scale::fixed;
 
@@ -21,6 +21,16 @@ pub fn plus_minus(estimate: Estimate) -> String {
     }
     let decimals = decimals(sigma);
     format!("{} ± {}", fixed(value, decimals), fixed(sigma, decimals))
+}
+
+/// `value ± total unit (statistical ± part unit)`: the total is what may be published.
+pub fn with_statistical(found: TotalEstimate, unit: &str) -> String {
+    let total = plus_minus(found.total());
+    if !found.value.is_finite() {
+        return total;
+    }
+    let part = two_digits(found.statistical);
+    format!("{total}{unit} (statistical ± {part}{unit})")
 }
 
 /// Two significant digits, written out.
@@ -55,6 +65,23 @@ mod tests {
         assert_eq!(shown(-0.27, 0.05), "−0.270 ± 0.050");
         assert_eq!(shown(0.5, 0.0996), "0.50 ± 0.10");
         assert_eq!(shown(1234.6, 250.0), "1235 ± 250");
+    }
+
+    #[test]
+    fn the_total_comes_first() {
+        let found = TotalEstimate {
+            value: 1.130_004,
+            statistical: 0.000_014,
+            total: 0.011,
+        };
+        let shown = with_statistical(found, "°");
+        assert_eq!(shown, "1.130 ± 0.011° (statistical ± 0.000014°)");
+        let unknown = TotalEstimate {
+            total: f64::NAN,
+            ..found
+        };
+        let shown = with_statistical(unknown, "°");
+        assert_eq!(shown, "1.1300 ± ?° (statistical ± 0.000014°)");
     }
 
     #[test]

@@ -13,6 +13,7 @@ mod moire;
 mod provenance;
 mod report;
 pub mod results;
+pub mod screen;
 mod stats;
 mod tables;
 
@@ -20,7 +21,7 @@ pub use draw::colormap::ColorMap;
 pub use draw::scale::fixed;
 pub use error::ReportError;
 pub use figures::{Drawing, Figure, cell_figure, figures, map_figures, pulls, stripe_figures};
-pub use format::{plus_minus, two_digits};
+pub use format::{plus_minus, two_digits, with_statistical};
 pub use html::{layers, map_page};
 pub use map_details::MapDetails;
 pub use moire::{CellResult, MoireDocument};

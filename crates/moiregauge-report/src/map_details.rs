@@ -1,5 +1,6 @@
 //! What was asked of a map beside the map itself.
 
+use moiregauge::analysis::Picture;
 use moiregauge::domains::{DomainMap, Regime};
 use moiregauge::region::{Device, Profile, RegionStatistics, WantedArea, WantedTwist};
 
@@ -18,4 +19,6 @@ pub struct MapDetails {
     pub domains: Option<DomainMap>,
     /// Whether phases or domains are to be used.
     pub regime: Option<Regime>,
+    /// The first image behind the map, to be shown.
+    pub picture: Option<Picture>,
 }

@@ -89,6 +89,15 @@ fn promised_paths_are_there() {
         "/sets/0/scans/9/twist_strain/drift_corrected/lattice_angle_deg/value",
         "/sets/0/scans/9/twist_strain/drift_corrected/strain_axis_lab_deg/value",
         "/sets/0/scans/9/twist_strain/drift_corrected/strain_axis_lattice_deg/value",
+        "/sets/0/mean/twist_deg/sigma_total",
+        "/sets/0/mean/heterostrain_percent/sigma_total",
+        "/sets/0/mean/strain_axis_lab_deg/sigma_total",
+        "/sets/0/mean/strain_axis_lattice_deg/sigma_total",
+        "/sets/0/mean/strain_vector_sigma_total_percent/1",
+        "/sets/0/mean/vectors/2/wavelength_nm/sigma_total",
+        "/sets/0/drift/x_nm_per_min/sigma_total",
+        "/combined/twist_deg/sigma_total",
+        "/combined/strain_vector_sigma_total_percent/0",
         "/combined/twist_deg/value",
         "/combined/heterostrain_percent/sigma",
         "/combined/vectors/2/x_nm",
@@ -359,5 +368,60 @@ fn every_column_is_explained() {
         for name in parse(&file(&common::analysis(), table)).swap_remove(0) {
             assert!(about.contains(&format!("| `{name}` |")), "{table}: {name}");
         }
+    }
+}
+
+/// The total is what stands first on the screen and in large type on the page, and what a reader finds beside σ.
+#[test]
+fn totals_come_first() {
+    let analysis = common::analysis();
+    let document = document(&analysis);
+    let mean = &document["sets"][0]["mean"];
+    let number = |value: &Value| value.as_f64().expect("a number");
+    let twist = &mean["twist_deg"];
+    let total = number(&twist["sigma_total"]);
+    assert!(total > 5.0 * number(&twist["sigma"]));
+    // 1 % of gain and 0.04 % of the lattice constant at 1.126°; the rest is small.
+    assert!(
+        (total / (0.01 * common::TWIST_DEG) - 1.0).abs() < 0.03,
+        "{total}"
+    );
+    assert_eq!(twist["sigma_total"], mean["budget"]["twist_deg"]["total"]);
+    assert!(
+        document["sets"][2]["uncorrected"]["twist_deg"]
+            .get("sigma_total")
+            .is_none()
+    );
+
+    let screen = moiregauge_report::screen::summary(&analysis);
+    let line = screen
+        .lines()
+        .find(|l| l.starts_with("  twist"))
+        .expect("a twist");
+    let (first, rest) = line.split_once('(').expect("a statistical part");
+    assert!(first.contains("± 0.011°"), "{line}");
+    assert!(rest.starts_with("statistical ± 0.00"), "{line}");
+
+    let files =
+        write_report(&analysis, &common::provenance(), &Choice::default()).expect("a report");
+    let (_, page) = files
+        .iter()
+        .find(|(name, _)| name == "report.html")
+        .expect("the page");
+    let page = String::from_utf8_lossy(page);
+    let large = page.split("class=\"value\">").nth(1).expect("a headline");
+    assert!(large.contains("± 0.011)°"), "{}", &large[..60]);
+    let sets = file(&analysis, "sets.csv");
+    for column in [
+        "twist_total_sigma_deg",
+        "drift_x_total_sigma_nm_per_min",
+        "lattice_angle_total_sigma_deg",
+    ] {
+        assert!(
+            sets.lines()
+                .next()
+                .is_some_and(|head| head.contains(column)),
+            "{column}"
+        );
     }
 }

@@ -36,6 +36,8 @@ pub struct Analysis {
     pub combined: Option<Combined>,
     /// The orientation of a layer, where atomically resolved images gave it.
     pub atomic: Option<AtomicOrientation>,
+    /// An image of a larger area, to show where the scans were made.
+    pub survey: Option<Picture>,
     /// Doubts, in the order in which they came up.
     pub caveats: Vec<Caveat>,
 }
@@ -370,4 +372,41 @@ pub struct Illustration {
     pub fast_velocities: Vec<f64>,
     /// Slow tip velocity of every column, nm/s.
     pub slow_velocities: Vec<f64>,
+    /// Reading of the x and of the y sensor less the affine fit that places the pixels, nm, means over blocks;
+    /// `None` without sensors.
+    pub sensor_residuals: Option<[Image; 2]>,
+    /// Pixels along the side of such a block.
+    pub residual_block: usize,
+    /// The amplitude of the same line, where the phase is shown and both were recorded.
+    pub amplitude: Option<Companion>,
+}
+
+/// Another channel of a scan, pixel by pixel beside the one that is analysed.
+#[derive(Clone, Debug)]
+pub struct Companion {
+    /// Its name.
+    pub channel: String,
+    /// Its unit.
+    pub unit: String,
+    /// Its values, background removed.
+    pub image: Image,
+}
+
+/// An image and where its pixels are, to be shown.
+#[derive(Clone, Debug)]
+pub struct Picture {
+    /// The file as the user named it.
+    pub file: String,
+    /// Name of the channel.
+    pub channel: String,
+    /// Its unit.
+    pub unit: String,
+    /// Its values, background removed.
+    pub image: Image,
+    /// Affine map pixel (column, row) → nm, the linear part.
+    pub pixel_to_nm: Matrix2<f64>,
+    /// Position of pixel (0, 0), nm.
+    pub origin: Vector2<f64>,
+    /// Whether position sensors tell so; otherwise the size and offset that the file states.
+    pub from_sensors: bool,
 }

@@ -17,6 +17,12 @@ use crate::input::KnownArgs;
 use crate::numbers;
 use crate::scanner::ScannerArgs;
 
+/// Headings of the help.
+const SCANS: &str = "Which scans, and how they belong together";
+const METHOD: &str = "Method";
+const LAYERS: &str = "Layers";
+const OUTPUT: &str = "Output";
+
 /// From scans to drift, moiré vectors, twist and heterostrain, with figures and a report
 ///
 /// Scans are grouped into sets by slow axis, line rate, size and channel and ordered by time. Each set
@@ -63,19 +69,19 @@ pub(crate) struct AnalyzeArgs {
     config: Option<PathBuf>,
     /// Channel that shows the moiré [default: TR Phase, TR Amplitude, Phase, … the first there is; if no
     /// scan shows a lattice in it, the next]
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", help_heading = SCANS)]
     channel: Option<String>,
     /// Of several images of the channel in one file (pages, frames) this one [default: the first]
     #[arg(long, value_name = "N", value_parser = numbers::count(1, MOST_IMAGES))]
     image: Option<usize>,
     /// Line directions to use [default: both]
-    #[arg(long, value_enum)]
+    #[arg(long, value_enum, help_heading = SCANS)]
     line: Option<LineArg>,
     /// Estimator of the lattice vectors [default: lattice]
-    #[arg(long, value_enum)]
+    #[arg(long, value_enum, help_heading = METHOD)]
     method: Option<MethodArg>,
     /// The layers: graphene, hBN, MoS2, … [default: graphene]
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", help_heading = LAYERS)]
     material: Option<String>,
     /// The layers: graphene for two equal ones, graphene/hBN for graphene (layer 2) on hBN (layer 1, the
     /// reference); names of --materials too. With --moires N one for all, or one for each moiré, the largest
@@ -84,97 +90,94 @@ pub(crate) struct AnalyzeArgs {
         long,
         value_name = "UPPER/LOWER[,…]",
         value_delimiter = ',',
-        conflicts_with = "material"
+        conflicts_with = "material", help_heading = LAYERS
     )]
     layers: Vec<String>,
     /// TOML file with layers of your own, one [[layer]] table each (see `moiregauge config`)
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", help_heading = LAYERS)]
     pub(super) materials: Option<PathBuf>,
-    #[command(flatten)]
-    pub(super) orientation: OrientationArgs,
     /// Lattice constant of the layers, nm, in place of the material's
-    #[arg(long, value_name = "NM", value_parser = numbers::number([0.01, 100.0]))]
+    #[arg(long, value_name = "NM", value_parser = numbers::number([0.01, 100.0]), help_heading = LAYERS)]
     lattice_constant: Option<f64>,
     /// Poisson ratio of the layers, in place of the material's
-    #[arg(long, value_name = "RATIO", value_parser = numbers::number([-1.0, 1.0]))]
+    #[arg(long, value_name = "RATIO", value_parser = numbers::number([-1.0, 1.0]), help_heading = LAYERS)]
     poisson_ratio: Option<f64>,
     /// Standard uncertainty of the lattice constant, nm, for the budget [default: the material's]
-    #[arg(long, value_name = "NM", value_parser = numbers::number([0.0, 10.0]))]
+    #[arg(long, value_name = "NM", value_parser = numbers::number([0.0, 10.0]), help_heading = LAYERS)]
     lattice_constant_sigma: Option<f64>,
     /// Standard uncertainty of the Poisson ratio, for the budget [default: the material's]
-    #[arg(long, value_name = "RATIO", value_parser = numbers::number([0.0, 0.5]))]
+    #[arg(long, value_name = "RATIO", value_parser = numbers::number([0.0, 0.5]), help_heading = LAYERS)]
     poisson_ratio_sigma: Option<f64>,
-    #[command(flatten)]
-    scanner: ScannerArgs,
     /// Form of the strain equation [default: real-space]
-    #[arg(long, value_enum)]
+    #[arg(long, value_enum, help_heading = METHOD)]
     strain_convention: Option<ConventionArg>,
     /// What is subtracted from an image first [default: plane]
-    #[arg(long, value_enum)]
+    #[arg(long, value_enum, help_heading = METHOD)]
     background: Option<BackgroundArg>,
     /// How files become sets [default: auto]
-    #[arg(long, value_enum)]
+    #[arg(long, value_enum, help_heading = SCANS)]
     grouping: Option<GroupingArg>,
     /// Make a set by hand: all files under PATH (a folder or a file among the inputs) form the set NAME; may be repeated
-    #[arg(long = "set", value_name = "NAME=PATH")]
+    #[arg(long = "set", value_name = "NAME=PATH", help_heading = SCANS)]
     sets: Vec<String>,
     /// Show these scans but do not use them: names of files, * for any characters; may be repeated
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", help_heading = SCANS)]
     exclude: Vec<String>,
     /// Leave out scans that do not fit the others (leave-one-out χ², p < 0.001 divided by their number)
-    #[arg(long)]
+    #[arg(long, help_heading = SCANS)]
     exclude_outliers: bool,
     /// Standard uncertainty of the frame times in the files, s [default: 0.6]
-    #[arg(long, value_name = "S", value_parser = numbers::number(numbers::TIME_S))]
+    #[arg(long, value_name = "S", value_parser = numbers::number(numbers::TIME_S), help_heading = METHOD)]
     frame_time_sigma: Option<f64>,
     /// How many moirés every image shows; each is fitted with the others taken off, and has a folder of
     /// results of its own [default: 1]
-    #[arg(long, value_name = "N", value_parser = numbers::count(1, 6))]
+    #[arg(long, value_name = "N", value_parser = numbers::count(1, 6), help_heading = SCANS)]
     moires: Option<usize>,
     /// Use only the region that all scans have in common
-    #[arg(long)]
+    #[arg(long, help_heading = SCANS)]
     overlap: bool,
     /// A drift known beforehand, nm/min, instead of measuring it
-    #[arg(long, num_args = 2, value_names = ["X", "Y"], allow_negative_numbers = true, value_parser = numbers::number(numbers::DRIFT))]
+    #[arg(long, num_args = 2, value_names = ["X", "Y"], allow_negative_numbers = true, value_parser = numbers::number(numbers::DRIFT), help_heading = METHOD)]
     drift: Option<Vec<f64>>,
     /// Standard uncertainty of each component of --drift, nm/min
-    #[arg(long, value_name = "SIGMA", requires = "drift", value_parser = numbers::number(numbers::NOT_NEGATIVE))]
+    #[arg(long, value_name = "SIGMA", requires = "drift", value_parser = numbers::number(numbers::NOT_NEGATIVE), help_heading = METHOD)]
     drift_sigma: Option<f64>,
     /// Monte Carlo draws for the drift, per set [default: 10000]
-    #[arg(long, value_name = "N", value_parser = numbers::count(0, MOST_DRAWS))]
+    #[arg(long, value_name = "N", value_parser = numbers::count(0, MOST_DRAWS), help_heading = METHOD)]
     drift_draws: Option<usize>,
     /// Monte Carlo draws for twist and strain, per scan [default: 1000]
-    #[arg(long, value_name = "N", value_parser = numbers::count(0, MOST_DRAWS))]
+    #[arg(long, value_name = "N", value_parser = numbers::count(0, MOST_DRAWS), help_heading = METHOD)]
     strain_draws: Option<usize>,
     /// Seed of all random numbers [default: 1]
-    #[arg(long)]
+    #[arg(long, help_heading = METHOD)]
     seed: Option<u64>,
     /// Number of threads [default: all processors]; the results do not depend on it
     #[arg(long, value_name = "N", value_parser = numbers::count(1, 1024))]
     pub(super) threads: Option<usize>,
     /// Colours of images
-    #[arg(long, value_enum, default_value_t = ColorMapArg::Viridis)]
+    #[arg(long, value_enum, default_value_t = ColorMapArg::Viridis, help_heading = OUTPUT)]
     colormap: ColorMapArg,
+    /// An image of a larger area, taken with the same scanner: a figure marks the frames of the scans in it
+    #[arg(long, value_name = "FILE", help_heading = OUTPUT)]
+    pub(super) survey_image: Option<PathBuf>,
     /// Numbers and tables only: no figures, no report
-    #[arg(long)]
+    #[arg(long, help_heading = OUTPUT)]
     no_report: bool,
     /// Figures as SVG only, without PNG copies
-    #[arg(long)]
+    #[arg(long, help_heading = OUTPUT)]
     no_png: bool,
     /// Write images corrected by the sensors and for the drift, on a square grid in laboratory axes,
     /// one file per scan and line: corrected.gwy makes OUT/corrected/SCAN-trace.gwy and so on; also
     /// .gsf, .npz, .zarr, .tiff, .csv
-    #[arg(long, value_name = "NAME.EXT", value_delimiter = ',')]
+    #[arg(long, value_name = "NAME.EXT", value_delimiter = ',', help_heading = OUTPUT)]
     pub(super) export: Vec<String>,
     /// Write vectors, scans, sets and budget as Parquet too
-    #[arg(long)]
+    #[arg(long, help_heading = OUTPUT)]
     pub(super) parquet: bool,
     /// Laboratory axes for vectors, angles, drift, figures and exported images: a frame that is turned by
     /// its scan angle is turned back. This is the default; `--rotation 0` gives the axes of the image
-    #[arg(long)]
+    #[arg(long, help_heading = OUTPUT)]
     rotate_to_lab: bool,
-    #[command(flatten)]
-    pub(super) known: KnownArgs,
     /// Print results.json instead of the summary; with --moires a list of those of all moirés, the largest cell first
     #[arg(long)]
     pub(super) json: bool,
@@ -184,6 +187,13 @@ pub(crate) struct AnalyzeArgs {
     /// Write over the results of an earlier analysis
     #[arg(long)]
     pub(super) force: bool,
+    // Last, since a heading holds for all that follows.
+    #[command(flatten)]
+    pub(super) orientation: OrientationArgs,
+    #[command(flatten)]
+    scanner: ScannerArgs,
+    #[command(flatten)]
+    pub(super) known: KnownArgs,
 }
 
 impl AnalyzeArgs {
@@ -296,6 +306,11 @@ impl AnalyzeArgs {
     /// The folder for results.
     pub(crate) fn out(&self) -> &std::path::Path {
         self.out.as_deref().unwrap_or(std::path::Path::new(""))
+    }
+
+    /// The image of a larger area.
+    pub(crate) fn survey_image(&self) -> Option<&std::path::Path> {
+        self.survey_image.as_deref()
     }
 
     /// The folder for results, that of a repetition where none is given.

@@ -7,8 +7,8 @@ use indicatif::{ProgressBar, ProgressStyle};
 use moiregauge::analysis::Analysis;
 use moiregauge::caveat::Caveat;
 use moiregauge::series::{
-    MeasureError, MeasuredScan, Window, about_repeat, analyse, choose_channel, common_window,
-    illustrate, measure_moires, sorted_moires, unusual_channels,
+    MeasureError, MeasuredScan, Window, about_repeat, amplitude_of, analyse, choose_channel,
+    common_window, illustrate, measure_moires, sorted_moires, unusual_channels,
 };
 use moiregauge::settings::Settings;
 use moiregauge_pipeline::{Repeated, distinct, hexadecimal, names, set_of};
@@ -105,7 +105,8 @@ pub(crate) fn analyse_files(
             if illustrated {
                 analysis.sets.par_iter_mut().for_each(|set| {
                     set.illustration = set.scans.first().and_then(|first| {
-                        let reading = read_again(inputs, &first.file, settings, known).ok()?;
+                        let path = names::with_words(inputs, &first.file)?;
+                        let reading = read_shown(path, settings, known).ok()?;
                         illustrate(&reading.scan, first, settings)
                     });
                 });
@@ -217,8 +218,22 @@ pub(crate) fn read(path: &Path, settings: &Settings, known: &Known) -> anyhow::R
     Ok(reading)
 }
 
+/// The same and what is shown beside it: the amplitude of a phase.
+fn read_shown(path: &Path, settings: &Settings, known: &Known) -> anyhow::Result<Reading> {
+    read_more(path, settings, known, amplitude_of)
+}
+
 /// The same of an image of any size, for surveys.
 pub(crate) fn read_any(path: &Path, settings: &Settings, known: &Known) -> anyhow::Result<Reading> {
+    read_more(path, settings, known, |_| None)
+}
+
+fn read_more(
+    path: &Path,
+    settings: &Settings,
+    known: &Known,
+    companion: impl Fn(&str) -> Option<String>,
+) -> anyhow::Result<Reading> {
     let bytes = moiregauge_pipeline::read(known.place(path))?;
     let channels = channel::names(path, &bytes, known)?;
     let names: Vec<_> = channels
@@ -226,8 +241,10 @@ pub(crate) fn read_any(path: &Path, settings: &Settings, known: &Known) -> anyho
         .map(|(a, b)| (a.as_str(), b.as_str()))
         .collect();
     let chosen = choose_channel(&names, settings.channel.as_deref()).map(str::to_owned);
+    let beside = chosen.as_deref().and_then(companion);
     let wanted = |channel: &ChannelInfo| {
         chosen.as_ref().is_none_or(|name| *name == channel.name)
+            || beside.as_ref() == Some(&channel.name.to_lowercase())
             || sensor_axis(&channel.name, &channel.internal_name).is_some()
     };
     let (scan, replaced) = known.read(path, &bytes, &wanted).map_err(with_option)?;

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, ensure};
 use moiregauge_pipeline::{Document, Places, check_sets, record_files};
-use moiregauge_report::results::Run;
+use moiregauge_report::results::{Run, Told};
 use moiregauge_report::{FailedInput, InputFile};
 
 use super::AnalyzeArgs;
@@ -49,6 +49,7 @@ impl Task {
             sets,
             atomic: args.orientation.asked()?,
             report: args.choice(),
+            survey_image: args.survey_image().map(|path| path.display().to_string()),
             export: args.export.clone(),
             parquet: args.parquet,
             inputs: Vec::new(),
@@ -102,6 +103,11 @@ impl Task {
     /// What is known of these files, and where they lie.
     pub(crate) fn known(&self, files: &[PathBuf]) -> Known {
         Known::new(&self.run.known, files).at(&self.places)
+    }
+
+    /// A file of which nothing is known but where it lies.
+    pub(crate) fn nothing_known(&self, path: &Path) -> Known {
+        Known::new(&Told::default(), &[path.to_owned()]).at(&self.places)
     }
 
     /// The record of the run for its results, `measured` being the files whose hashes these have anyway.

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use std::path::PathBuf;
 
-use moiregauge::analysis::Analysis;
+use moiregauge::analysis::{Analysis, Picture};
 use moiregauge::caveat::Caveat;
 use moiregauge::estimate::Estimate;
 use moiregauge::map::{Agreement, DriftChange, TwistStrainMap, UsedHarmonic};
@@ -42,6 +42,8 @@ pub(super) struct Made {
     pub(super) provenance: Provenance,
     pub(super) whole: Option<TwistStrainResult>,
     pub(super) images: Vec<MappedImage>,
+    /// The first of them, to be shown.
+    pub(super) picture: Option<Picture>,
     pub(super) agreement: Option<Agreement>,
     pub(super) drift_change: Option<DriftChange>,
     pub(super) domains: Domains,
@@ -89,6 +91,7 @@ pub(super) fn write(made: &Made, args: &MapArgs, sink: FolderSink) -> anyhow::Re
         let files = spmfile::write(&map_scan(map), WritableFormat::Gwy, "map", &log)?;
         write_all(&sink, "", &files)?;
     }
+    details.picture.clone_from(&made.picture);
     details.domains.clone_from(&made.domains.map);
     details.regime = Some(made.domains.regime.clone());
     let mut results = results(made, args.method_name());
@@ -150,14 +153,14 @@ fn results(made: &Made, method: &str) -> MapResults {
 /// Twist and strain of the whole images.
 pub(super) fn whole_image(analysis: &Analysis) -> Option<TwistStrainResult> {
     if let Some(combined) = &analysis.combined {
-        return Some((&combined.twist_strain).into());
+        let found = &combined.twist_strain;
+        return Some(TwistStrainResult::of_mean(found, &combined.budget));
     }
     let set = analysis.sets.first()?;
     let mean = set.mean.as_ref().or(set.uncorrected.as_ref());
     let scan = set.scans.first();
-    mean.map(|m| &m.twist_strain)
-        .or(scan.and_then(|s| s.twist_strain_sensor.as_ref()))
-        .map(Into::into)
+    mean.map(|m| TwistStrainResult::of_mean(&m.twist_strain, &m.budget))
+        .or(scan.and_then(|s| s.twist_strain_sensor.as_ref().map(Into::into)))
 }
 
 /// One image behind a map.

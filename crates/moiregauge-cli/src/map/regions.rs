@@ -150,6 +150,7 @@ impl RegionArgs {
             wanted,
             domains: None,
             regime: None,
+            picture: None,
         };
         Ok((details, doubts))
     }

@@ -5,9 +5,12 @@ use std::path::Path;
 
 use anyhow::{Context as _, ensure};
 use indicatif::{ProgressBar, ProgressStyle};
+use moiregauge::analysis::Picture;
+use moiregauge::background::remove_background;
 use moiregauge::caveat::Caveat;
 use moiregauge::domains::{Contrast, DomainMap};
 use moiregauge::geometry::{Geometry, Timing};
+use moiregauge::image::Image;
 use moiregauge::map::{Mask, Resolution, TwistStrainMap};
 use moiregauge::series::{SurveyPlan, choose_channel, nominal_geometry};
 use moiregauge::settings::Settings;
@@ -30,6 +33,9 @@ pub(super) struct Large {
     /// What the user's options replaced in it, and what its reader doubts.
     pub(super) caveats: Vec<Caveat>,
     geometry: Geometry,
+    /// Name and unit of the channel.
+    channel: String,
+    unit: String,
     /// Where the file tells its line rate and frame direction.
     pub(super) timing: Option<Timing>,
     source: Source,
@@ -79,6 +85,8 @@ impl Large {
             input: identity(path, place)?,
             caveats: reading.caveats,
             geometry,
+            channel: channel.name.clone(),
+            unit: channel.unit.clone(),
             timing: timing(&reading.scan, channel),
             source: Source::Memory(channel.clone()),
         }))
@@ -101,6 +109,8 @@ impl Large {
             geometry: nominal_geometry(&scan, channel)
                 .context("the array has no size; give it with --size")?,
             timing: timing(&scan, channel),
+            channel: channel.name.clone(),
+            unit: channel.unit.clone(),
             source: Source::Array(array.with_block(block)),
             input,
         })
@@ -156,6 +166,38 @@ impl Large {
     pub(super) fn domains(&self, plan: &SurveyPlan, contrast: Contrast) -> Option<DomainMap> {
         let read = |block| self.source.block(block);
         plan.domains(&read, contrast).ok().flatten()
+    }
+}
+
+/// Pixels along the longer side of a picture of a survey, at most.
+const SHOWN: usize = 1024;
+
+impl Large {
+    /// The image in little, to be shown: one line of every block of lines. `None` where its lines cannot be read.
+    pub(super) fn picture(&self, settings: &Settings) -> Option<Picture> {
+        let [columns, rows] = self.geometry.size;
+        let block = columns.max(rows).div_ceil(SHOWN).max(1);
+        let mut values = Vec::new();
+        for row in 0..rows / block {
+            let row = row * block + block / 2;
+            let line = self.source.block([0..columns, row..row + 1]).ok()?;
+            values.extend(line.values.chunks_exact(block).map(|pixels| {
+                let there: Vec<f64> = pixels.iter().copied().filter(|v| v.is_finite()).collect();
+                there.iter().sum::<f64>() / there.len() as f64
+            }));
+        }
+        let image = Image::new(rows / block, columns / block, values);
+        let geometry = &self.geometry;
+        let middle = Vector2::repeat((block - 1) as f64 / 2.0);
+        Some(Picture {
+            file: self.input.file.clone(),
+            channel: self.channel.clone(),
+            unit: self.unit.clone(),
+            image: remove_background(&image, settings.background),
+            pixel_to_nm: geometry.pixel_to_nm * block as f64,
+            origin: geometry.origin + geometry.pixel_to_nm * middle,
+            from_sensors: false,
+        })
     }
 }
 

@@ -383,7 +383,7 @@ fn the_summary_ends_with_drift_twist_and_strain() {
         "drift",
         "twist",
         "heterostrain",
-        "with calibration and model",
+        "(statistical ± ",
         "nm/min",
         "4 scans (2 up, 2 down)",
     ] {

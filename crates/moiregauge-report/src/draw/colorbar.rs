@@ -3,7 +3,7 @@
 use super::colormap::ColorMap;
 use super::png::palette_png;
 use super::scale::{Range, Scale, ticks};
-use super::style::{BLACK, HAIR, SMALL, TEXT, lettering, text_width};
+use super::style::{BLACK, HAIR, SMALL, TEXT, fitted, lettering, text_width};
 use super::svg::{Anchor, Ink, Lettering, Rect, Svg};
 
 /// Draws the colours of `range` in `bar`, with numbers and a title at its right: what it is and its unit,
@@ -17,10 +17,13 @@ pub(crate) fn draw(
 ) {
     let (power, range) = by_thousands(range);
     let unit = [power, unit.to_owned()].join(" ");
-    let title = match unit.trim() {
-        "" => quantity.to_owned(),
-        unit => format!("{quantity} ({unit})"),
+    let unit = match unit.trim() {
+        "" => String::new(),
+        unit => format!(" ({})", fitted(unit, TEXT, bar.height / 2.0)),
     };
+    // A long name of a channel is cut off, its unit is not; the caption has all of it.
+    let space = bar.height + 2.0 * TEXT - text_width(&unit, TEXT);
+    let title = fitted(quantity, TEXT, space) + &unit;
     let steps = 128_u8;
     let indices: Vec<u8> = (0..steps).rev().map(|i| 1 + i * 2).collect();
     let png = palette_png(1, indices.len(), &indices, &map.table());
@@ -50,6 +53,20 @@ pub(crate) fn draw(
     };
     let x = bar.right() + 3.5 + widest + 3.0 + TEXT;
     svg.text((x, bar.y + bar.height / 2.0), &title, &upright);
+}
+
+/// Marks ± `sigma` in a colour bar, about the middle of its range: differences of such colours are noise.
+pub(crate) fn noise(svg: &mut Svg, bar: Rect, range: Range, sigma: f64) {
+    let half = sigma * bar.height / range.width();
+    if !(half.is_finite() && half > 0.0) {
+        return;
+    }
+    let half = half.min(bar.height / 2.0);
+    let (x, y) = (bar.x + bar.width / 2.0, bar.y + bar.height / 2.0);
+    let caps = [y - half, y + half].map(|y| [(x - 2.0, y), (x + 2.0, y)]);
+    let bracket = [[(x, y - half), (x, y + half)], caps[0], caps[1]];
+    svg.segments(&bracket, &Ink::line("#ffffff", 2.0));
+    svg.segments(&bracket, &Ink::line(BLACK, 0.8));
 }
 
 /// The power of a thousand that makes the numbers of a range handy, in words, and the range in it. Files in SI

@@ -1,6 +1,6 @@
 //! Legends: one line of keys above the panels, where they cover no data.
 
-use super::style::{BLACK, Marker, SMALL, lettering, marker, text_width};
+use super::style::{BLACK, Marker, SMALL, fitted, lettering, marker, text_width};
 use super::svg::{Anchor, Ink, Rect, Svg};
 
 /// How a key looks.
@@ -14,9 +14,22 @@ pub(crate) enum Key<'a> {
     Band(&'a str, f64),
 }
 
-/// Draws keys from left to right, the first one at `start` (its left end and text baseline).
+/// Space that a key and the gaps beside its text take, pt.
+const BESIDE: f64 = 25.0;
+
+/// Draws keys from left to right, the first one at `start` (its left end and text baseline). Where the texts are too
+/// long for the page, the longest are cut off.
 pub(crate) fn row(svg: &mut Svg, start: (f64, f64), keys: &[(Key, &str)]) {
     let (mut x, baseline) = start;
+    let room = svg.width() - x - BESIDE * keys.len() as f64;
+    let widths: Vec<f64> = keys.iter().map(|(_, t)| text_width(t, SMALL)).collect();
+    let needed = |limit: f64| widths.iter().map(|w| w.min(limit)).sum::<f64>();
+    let mut limit = widths.iter().copied().fold(0.0, f64::max);
+    while needed(limit) > room && limit > 4.0 * SMALL {
+        limit *= 0.9;
+    }
+    // Texts that have the width of the limit are whole.
+    limit += 0.01;
     let middle = baseline - 0.36 * SMALL;
     for (key, text) in keys {
         let width = match *key {
@@ -36,8 +49,9 @@ pub(crate) fn row(svg: &mut Svg, start: (f64, f64), keys: &[(Key, &str)]) {
             }
         };
         x += width + 2.5;
-        svg.text((x, baseline), text, &lettering(SMALL, Anchor::Start));
-        x += text_width(text, SMALL) + 9.0;
+        let text = fitted(text, SMALL, limit);
+        svg.text((x, baseline), &text, &lettering(SMALL, Anchor::Start));
+        x += text_width(&text, SMALL) + 9.0;
     }
 }
 

@@ -2,7 +2,13 @@
 
 use std::fmt::Write as _;
 
-use super::style::FONT;
+use super::style::{FONT, text_width};
+
+/// Height above and depth below the baseline that the font reserves, em.
+const ASCENT: f64 = 0.93;
+const DESCENT: f64 = 0.24;
+/// Bold letters over plain ones.
+const BOLD: f64 = 1.13;
 
 /// A rectangle on the page, pt; `y` is its upper edge.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -120,6 +126,8 @@ pub(crate) struct Svg {
     height: f64,
     clips: usize,
     body: String,
+    /// What texts need: left, top, right, bottom. The page grows to hold them.
+    needed: [f64; 4],
 }
 
 impl Svg {
@@ -131,6 +139,33 @@ impl Svg {
             height,
             clips: 0,
             body: String::new(),
+            needed: [0.0, 0.0, width, height],
+        }
+    }
+
+    /// Width of the page, pt.
+    pub(crate) fn width(&self) -> f64 {
+        self.width
+    }
+
+    /// Makes room for a text.
+    fn hold(&mut self, (x, y): (f64, f64), text: &str, lettering: &Lettering) {
+        let width = text_width(text, lettering.size) * if lettering.bold { BOLD } else { 1.0 };
+        let start = match lettering.anchor {
+            Anchor::Start => 0.0,
+            Anchor::Middle => -width / 2.0,
+            Anchor::End => -width,
+        };
+        let (sin, cos) = (-lettering.turned).to_radians().sin_cos();
+        for along in [start, start + width] {
+            for across in [-ASCENT * lettering.size, DESCENT * lettering.size] {
+                let (px, py) = (
+                    x + cos * along - sin * across,
+                    y + sin * along + cos * across,
+                );
+                let [left, top, right, bottom] = self.needed;
+                self.needed = [left.min(px), top.min(py), right.max(px), bottom.max(py)];
+            }
         }
     }
 
@@ -221,6 +256,7 @@ impl Svg {
         if !(at.0.is_finite() && at.1.is_finite()) {
             return;
         }
+        self.hold(at, text, lettering);
         let (x, y) = (number(at.0), number(at.1));
         let weight = if lettering.bold {
             " font-weight=\"bold\""
@@ -292,16 +328,31 @@ impl Svg {
         self.body.push_str("</g>\n");
     }
 
-    /// The finished document; `title` is read out by screen readers.
+    /// The finished document; `title` is read out by screen readers. Its width is the one that was asked for: where
+    /// a text would leave the page, all is drawn a little smaller.
     pub(crate) fn finish(self, title: &str) -> String {
         let millimetres = |points: f64| number(points * 25.4 / 72.0);
+        // Half a point of paper beyond letters that reach the edge.
+        let edge = |at: f64, page: f64, pad: f64| {
+            if (at - page).abs() > 0.0 {
+                at + pad
+            } else {
+                at
+            }
+        };
+        let [left, top] = [self.needed[0], self.needed[1]].map(|at| edge(at, 0.0, -0.5));
+        let right = edge(self.needed[2], self.width, 0.5);
+        let bottom = edge(self.needed[3], self.height, 0.5);
+        let (width, height) = (right - left, bottom - top);
         format!(
-            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{}mm\" height=\"{}mm\" viewBox=\"0 0 {} {}\" font-family=\"{FONT}\" role=\"img\" aria-label=\"{title}\">\n<title>{title}</title>\n<rect width=\"100%\" height=\"100%\" fill=\"#ffffff\"/>\n{}</svg>\n",
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{}mm\" height=\"{}mm\" viewBox=\"{x} {y} {w} {h}\" font-family=\"{FONT}\" role=\"img\" aria-label=\"{title}\">\n<title>{title}</title>\n<rect x=\"{x}\" y=\"{y}\" width=\"{w}\" height=\"{h}\" fill=\"#ffffff\"/>\n{}</svg>\n",
             millimetres(self.width),
-            millimetres(self.height),
-            number(self.width),
-            number(self.height),
+            millimetres(height * self.width / width),
             self.body,
+            x = number(left),
+            y = number(top),
+            w = number(width),
+            h = number(height),
             title = escape(title),
         )
     }

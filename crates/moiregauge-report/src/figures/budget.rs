@@ -8,7 +8,7 @@ use super::{Drawing, layout};
 use crate::draw::legend::{self, Key};
 use crate::draw::scale::{Range, Scale, fixed};
 use crate::draw::style::{
-    BLACK, BLUE, GREY, HAIR, LETTER, ORANGE, PAGE, SMALL, TEXT, VECTOR, lettering,
+    BLACK, BLUE, GREY, HAIR, LETTER, ORANGE, PAGE, SMALL, TEXT, VECTOR, lettering, text_width,
 };
 use crate::draw::svg::{Anchor, Ink, Lettering, Rect, Svg};
 use crate::format::two_digits;
@@ -28,7 +28,7 @@ const ROWS: [(&str, Kind, &[Source]); 12] = [
     ("drift", Kind::Statistical, &[Source::Drift]),
     ("sensor noise", Kind::Statistical, &[Source::Sensor]),
     (
-        "σ: the three above",
+        "statistical σ: all three",
         Kind::Sum,
         &[Source::Image, Source::Drift, Source::Sensor],
     ),
@@ -120,7 +120,7 @@ pub(super) fn draw(analysis: &Analysis, id: &str) -> Result<Drawing, String> {
         wide: true,
         svg: svg.finish("Uncertainty budget"),
         caption: format!(
-            "What contributes to the uncertainty of twist (a) and heterostrain (b) of {of}; one standard deviation each, logarithmic scale. The squares add up: image noise, drift and sensor noise to that of σ, which is quoted with every result, all of them to that of the total. More scans make the first three smaller; the others are the same in every scan, and only a better calibration or other knowledge of the layers makes them smaller. Calibration, lattice constant and model are as certain as the settings say."
+            "What contributes to the uncertainty of twist (a) and heterostrain (b) of {of}; one standard deviation each, logarithmic scale. The squares add up: image noise, drift and sensor noise to that of the statistical σ, all of them to that of the total, which is quoted first with every result. More scans make the first three smaller; the others are the same in every scan, and only a better calibration or other knowledge of the layers makes them smaller. Calibration, lattice constant and model are as certain as the settings say."
         ),
     })
 }
@@ -182,9 +182,15 @@ fn bars(
     let smallest = smallest.fold(largest, f64::min);
     let high = largest.log10().ceil();
     let low = (smallest.log10() - 0.2).floor().max(high - DECADES);
-    // Space for the number at the end of the longest bar.
+    let words = values.map(|(value, incomplete)| number(value, incomplete));
+    // Every bar leaves space for the number at its end.
+    let spans = values.iter().zip(&words).filter(|(v, _)| v.0 > 0.0);
+    let reach = spans.map(|(v, text)| {
+        let room = area.width - text_width(text, SMALL) * 1.15 - 4.0;
+        low + (v.0.log10() - low).max(0.02) * area.width / room.max(0.2 * area.width)
+    });
     let scale = Scale::new(
-        Range::new(low, high.max(largest.log10() + 0.7)),
+        Range::new(low, reach.fold(high, f64::max)),
         area.x,
         area.right(),
     );
@@ -196,25 +202,19 @@ fn bars(
         svg.text(at, &power(decade), &lettering(SMALL, Anchor::Middle));
         decade += 1.0;
     }
-    for (row, ((_, kind, _), (value, incomplete))) in ROWS.iter().zip(values).enumerate() {
+    for (row, ((_, kind, _), (value, _))) in ROWS.iter().zip(values).enumerate() {
         let y = middle(area.y, row);
         let shown = if value > 0.0 { value.log10() } else { low };
         let end = scale.at(shown.max(low + 0.02));
         let bar = Rect::new(area.x, y - 0.32 * ROW, end - area.x, 0.64 * ROW);
         svg.rect(bar, &Ink::area(kind.colour(), 1.0));
-        let number = if value.is_finite() {
-            let mark = if incomplete { " + drift" } else { "" };
-            format!("{}{mark}", two_digits(value))
-        } else {
-            "not known".to_owned()
-        };
         let at = (end + 3.0, y + 0.36 * SMALL);
         let text = Lettering {
             bold: *kind == Kind::Sum,
             fill: if value.is_finite() { BLACK } else { GREY },
             ..lettering(SMALL, Anchor::Start)
         };
-        svg.text(at, &number, &text);
+        svg.text(at, &words[row], &text);
     }
     svg.line(
         (area.x, area.y),
@@ -232,6 +232,15 @@ fn bars(
     };
     svg.text((area.x, area.y - 4.0), letter, &bold);
     Ok(())
+}
+
+/// What stands at the end of a bar.
+fn number(value: f64, incomplete: bool) -> String {
+    if !value.is_finite() {
+        return "not known".to_owned();
+    }
+    let mark = if incomplete { " + drift" } else { "" };
+    format!("{}{mark}", two_digits(value))
 }
 
 /// Ten to a whole power, written out unless it is long.

@@ -24,6 +24,16 @@ struct Pair {
     other: Estimate,
 }
 
+/// The title, which has the estimators' names.
+pub(super) fn title(method: Method) -> &'static str {
+    match method {
+        Method::Autocorrelation => "Autocorrelation against Fourier transform",
+        Method::Fourier => "Fourier transform against autocorrelation",
+        Method::Lattice => "Lattice fit against Fourier transform",
+        Method::Paper => "Published autocorrelation against the other estimator",
+    }
+}
+
 pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
     let pairs = pairs(subject);
     if pairs.is_empty() {

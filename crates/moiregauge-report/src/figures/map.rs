@@ -2,7 +2,9 @@
 
 use moiregauge::map::TwistStrainMap;
 
-use super::{Drawing, Figure, map_domains, map_fields, map_histograms, map_mask, map_profiles};
+use super::{
+    Drawing, Figure, map_domains, map_fields, map_histograms, map_image, map_mask, map_profiles,
+};
 use crate::draw::colormap::ColorMap;
 use crate::map_details::MapDetails;
 
@@ -16,9 +18,16 @@ pub(super) struct MapSubject<'a> {
     pub(super) colours: ColorMap,
 }
 
-const ALL: [(&str, &str, Draw); 9] = [
+/// The image first, then the maps; what was asked of them is drawn in a figure of its own.
+const ALL: [(&str, &str, Draw); 11] = [
+    ("map-image", "Image", map_image::draw),
     ("map-twist", "Twist", map_fields::twist),
     ("map-strain", "Heterostrain", map_fields::strain),
+    (
+        "map-overlays",
+        "Twist with regions, areas for devices and lines",
+        map_fields::overlays,
+    ),
     ("map-wavelength", "Wavelength", map_fields::wavelength),
     ("map-displacement", "Displacement", map_fields::displacement),
     (

@@ -91,7 +91,7 @@ pub(super) fn draw(subject: &MapSubject) -> Result<Drawing, String> {
     let sigma = sigmas.get(sigmas.len() / 2).copied().unwrap_or(f64::NAN);
     Ok(Drawing {
         wide: false,
-        svg: panel.finish(subject, "Domains"),
+        svg: panel.finish("Domains"),
         caption: format!(
             "Twist of every triangle of neighbouring nodes, from its three edges (median σ {}°). {} nodes, {} \
              missing, {} that fit into no triangle, {} dislocations (⊥). x to the right, y up.",

@@ -5,7 +5,7 @@ use nalgebra::Vector2;
 
 use super::Drawing;
 use super::map::MapSubject;
-use super::map_panel::{Panel, about};
+use super::map_panel::{Panel, Shown, about};
 use crate::draw::axes::Axes;
 use crate::draw::contour::contours;
 use crate::draw::scale::{Range, ticks};
@@ -32,21 +32,28 @@ pub(super) fn noise(map: &TwistStrainMap, plane: &Plane) -> f64 {
     map.spread(plane).map_or(f64::NAN, |s| s.noise)
 }
 
+fn twist_with(sigma: f64) -> Shown<'static> {
+    Shown {
+        name: "twist θ",
+        unit: "°",
+        sigma,
+    }
+}
+
 pub(super) fn twist(subject: &MapSubject) -> Result<Drawing, String> {
     let map = subject.map;
     let degree = 1f64.to_degrees();
     let value = shown(map, &map.twist, degree);
-    let mut panel = Panel::new(subject.id, map, 0.0)?;
-    let range = panel.values(subject, ("twist θ", "°"), &value)?;
     let sigma = degree * noise(map, &map.twist);
+    let mut panel = Panel::new(subject.id, map, 0.0)?;
+    let range = panel.values(subject, &twist_with(sigma), &value)?;
     let lines = lines(&mut panel, map, range, sigma, &value);
     Ok(Drawing {
         wide: false,
-        svg: panel.finish(subject, "Twist"),
+        svg: panel.finish("Twist"),
         caption: format!(
-            "Twist θ. {lines} Noise of a node {}° (σ, rms). {}{}",
+            "Twist θ. {lines} Noise of a node {}° (σ, rms; bracket in the colour bar: ± σ). {}",
             two_digits(sigma),
-            outlined(subject),
             about(map)
         ),
     })
@@ -84,12 +91,33 @@ fn lines(
     "Contour lines at the ticks of the colour bar."
 }
 
-fn outlined(subject: &MapSubject) -> &'static str {
-    if subject.details.devices.is_empty() {
-        ""
-    } else {
-        "Dashed boxes: the most uniform areas for the device, numbered by rank. "
+/// The twist with everything that was asked of the map drawn on it.
+pub(super) fn overlays(subject: &MapSubject) -> Result<Drawing, String> {
+    let (map, details) = (subject.map, subject.details);
+    if details.regions.is_empty() && details.devices.is_empty() && details.profiles.is_empty() {
+        return Err("no region, device or line was asked for".to_owned());
     }
+    let degree = 1f64.to_degrees();
+    let sigma = degree * noise(map, &map.twist);
+    let mut panel = Panel::new(subject.id, map, 0.0)?;
+    let value = shown(map, &map.twist, degree);
+    panel.values(subject, &twist_with(sigma), value)?;
+    panel.overlays(details);
+    let mut words = Vec::new();
+    if !details.regions.is_empty() {
+        words.push("Solid outlines: the regions.");
+    }
+    if !details.devices.is_empty() {
+        words.push("Dashed boxes: the most uniform areas for the device, numbered by rank.");
+    }
+    if !details.profiles.is_empty() {
+        words.push("Lines: those of the figure Line profiles.");
+    }
+    Ok(Drawing {
+        wide: false,
+        svg: panel.finish("Twist with regions, areas for devices and lines"),
+        caption: format!("Twist θ. {} {}", words.join(" "), about(map)),
+    })
 }
 
 pub(super) fn strain(subject: &MapSubject) -> Result<Drawing, String> {
@@ -97,7 +125,11 @@ pub(super) fn strain(subject: &MapSubject) -> Result<Drawing, String> {
     let mut panel = Panel::new(subject.id, map, 0.0)?;
     panel.values(
         subject,
-        ("strain |ε|", "%"),
+        &Shown {
+            name: "strain |ε|",
+            unit: "%",
+            sigma: 100.0 * noise(map, &map.strain[0]),
+        },
         shown(map, &map.magnitude, 100.0),
     )?;
     let axes = panel.axes;
@@ -118,7 +150,7 @@ pub(super) fn strain(subject: &MapSubject) -> Result<Drawing, String> {
     });
     Ok(Drawing {
         wide: false,
-        svg: panel.finish(subject, "Heterostrain"),
+        svg: panel.finish("Heterostrain"),
         caption: format!(
             "Magnitude of the heterostrain, the bias of noise removed (σ of a component {} %, rms), and its axis \
              in the laboratory where it is significant (p < 0.01). {}",
@@ -159,13 +191,23 @@ pub(super) fn wavelength(subject: &MapSubject) -> Result<Drawing, String> {
     let map = subject.map;
     let [a, b, c] = map.wavelengths.each_ref().map(|w| shown(map, w, 1.0));
     let mut panel = Panel::new(subject.id, map, 0.0)?;
-    panel.values(subject, ("mean wavelength", "nm"), |n| {
-        (a(n) + b(n) + c(n)) / 3.0
-    })?;
+    // As if the three were independent, which errs by little.
+    let square = map.wavelengths.each_ref().map(|w| noise(map, w).powi(2));
+    let sigma = square.iter().sum::<f64>().sqrt() / 3.0;
+    let label = Shown {
+        name: "mean wavelength",
+        unit: "nm",
+        sigma,
+    };
+    panel.values(subject, &label, |n| (a(n) + b(n) + c(n)) / 3.0)?;
     Ok(Drawing {
         wide: false,
-        svg: panel.finish(subject, "Wavelength"),
-        caption: format!("Mean of the three moiré wavelengths. {}", about(map)),
+        svg: panel.finish("Wavelength"),
+        caption: format!(
+            "Mean of the three moiré wavelengths. Noise of a node {} nm (σ, rms; bracket in the colour bar: ± σ). {}",
+            two_digits(sigma),
+            about(map)
+        ),
     })
 }
 
@@ -178,12 +220,16 @@ pub(super) fn twist_sigma(subject: &MapSubject) -> Result<Drawing, String> {
     let mut panel = Panel::new(subject.id, map, 0.0)?;
     panel.values(
         subject,
-        ("σ of θ", "°"),
+        &Shown {
+            name: "σ of θ",
+            unit: "°",
+            sigma: f64::NAN,
+        },
         shown(map, &sigma, 1f64.to_degrees()),
     )?;
     Ok(Drawing {
         wide: false,
-        svg: panel.finish(subject, "Error of the twist"),
+        svg: panel.finish("Error of the twist"),
         caption: format!(
             "Standard error of the twist of each node by the noise of the image. {}",
             about(map)
@@ -195,7 +241,14 @@ pub(super) fn displacement(subject: &MapSubject) -> Result<Drawing, String> {
     let map = subject.map;
     let [x, y] = map.displacement.each_ref().map(|d| shown(map, d, 1.0));
     let mut panel = Panel::new(subject.id, map, 0.0)?;
-    let range = panel.values(subject, ("displacement |u|", "nm"), |n| x(n).hypot(y(n)))?;
+    let sigma = map.displacement.each_ref().map(|d| noise(map, d).powi(2));
+    let sigma = (sigma.iter().sum::<f64>() / 2.0).sqrt();
+    let label = Shown {
+        name: "displacement |u|",
+        unit: "nm",
+        sigma,
+    };
+    let range = panel.values(subject, &label, |n| x(n).hypot(y(n)))?;
     let axes = panel.axes;
     panel.svg.clipped(axes.area, |svg| {
         sparse(map, &axes, |node, at, length| {
@@ -207,7 +260,7 @@ pub(super) fn displacement(subject: &MapSubject) -> Result<Drawing, String> {
     });
     Ok(Drawing {
         wide: false,
-        svg: panel.finish(subject, "Displacement"),
+        svg: panel.finish("Displacement"),
         caption: format!(
             "Displacement of the pattern against the mean lattice of the good nodes, where its phase could be \
              followed; arrows are scaled to be seen, colours have the length. {}",

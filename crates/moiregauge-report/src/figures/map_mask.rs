@@ -65,7 +65,7 @@ pub(super) fn draw(subject: &MapSubject) -> Result<Drawing, String> {
     }
     Ok(Drawing {
         wide: false,
-        svg: panel.finish(subject, "Mask"),
+        svg: panel.finish("Mask"),
         caption: format!(
             "Which nodes are to be believed, and why others are not (share of all nodes): margin, the window \
              reaches beyond the frame; weak signal, the lattice does not stand out; defect, harmonics contradict \

@@ -1,4 +1,4 @@
-//! The panel that all maps share: node values as an image in sample coordinates, scale bar, outlines of regions.
+//! The panel that all maps share: node values as an image in sample coordinates, scale bar, outlines of what was asked.
 
 use moiregauge::image::Image;
 use moiregauge::map::TwistStrainMap;
@@ -8,14 +8,25 @@ use super::layout;
 use super::map::MapSubject;
 use crate::draw::axes::{Axes, Labels};
 use crate::draw::scale::{Range, fixed, round_step};
-use crate::draw::style::{BLACK, COLUMN, SMALL, TEXT, lettering};
+use crate::draw::style::{BLACK, COLUMN, SMALL, TEXT, lettering, text_width};
 use crate::draw::svg::{Anchor, Ink, Lettering, Rect, Svg};
 use crate::draw::{colorbar, raster};
+use crate::map_details::MapDetails;
 
 /// Space above the panel, pt.
 const TOP: f64 = 12.0;
 /// Space for the colour bar, pt.
 const BAR: f64 = 50.0;
+/// Colours span this many σ of a node at least: noise alone, ± 2 σ, takes a third of them.
+const LEAST: f64 = 12.0;
+
+/// What a map shows.
+pub(super) struct Shown<'a> {
+    pub(super) name: &'a str,
+    pub(super) unit: &'a str,
+    /// Noise of a node, in that unit; NaN where there is none to be told.
+    pub(super) sigma: f64,
+}
 
 /// A page with one panel for a map.
 pub(super) struct Panel {
@@ -43,10 +54,13 @@ impl Panel {
     }
 
     /// The values of the nodes as an image with its colour bar; NaN stays blank. Returns the range of colours.
+    ///
+    /// The colours span at least twelve σ of a node, so that noise does not look like a landscape, and σ is marked in
+    /// the colour bar.
     pub(super) fn values(
         &mut self,
         subject: &MapSubject,
-        label: (&str, &str),
+        shown: &Shown,
         value: impl Fn(usize) -> f64,
     ) -> Result<Range, String> {
         let grid = &subject.map.grid;
@@ -57,7 +71,7 @@ impl Panel {
         let image = Image::new(grid.size[1], grid.size[0], values);
         let shades = raster::Shades {
             map: subject.colours,
-            range: raster::contrast(&image, 0.002),
+            range: held(raster::contrast(&image, 0.002), shown.sigma),
             crisp: true,
         };
         let axes = self.axes;
@@ -66,17 +80,31 @@ impl Panel {
         });
         let area = axes.area;
         let bar = Rect::new(area.right() + 6.0, area.y, 7.0, area.height);
+        let label = (shown.name, shown.unit);
         colorbar::draw(&mut self.svg, bar, subject.colours, shades.range, label);
+        colorbar::noise(&mut self.svg, bar, shades.range, shown.sigma);
         Ok(shades.range)
     }
 
-    /// Outlines of what was asked, scale bar, axes; the finished document.
-    pub(super) fn finish(mut self, subject: &MapSubject, title: &str) -> String {
+    /// Outlines and names of what was asked of the map.
+    pub(super) fn overlays(&mut self, details: &MapDetails) {
         let axes = self.axes;
+        let asked = asked(details);
         self.svg.clipped(axes.area, |svg| {
-            outlines(svg, &axes, subject);
-            scale_bar(svg, &axes);
+            for one in &asked {
+                one.outline(svg, &axes);
+            }
         });
+        // Names last, so that no line strikes through them.
+        for one in &asked {
+            one.write(&mut self.svg, &axes);
+        }
+    }
+
+    /// Scale bar, axes; the finished document.
+    pub(super) fn finish(mut self, title: &str) -> String {
+        let axes = self.axes;
+        self.svg.clipped(axes.area, |svg| scale_bar(svg, &axes));
         let labels = Labels {
             x: "x (nm)",
             y: "y (nm)",
@@ -109,47 +137,90 @@ fn scale_bar(svg: &mut Svg, axes: &Axes) {
     svg.text((middle, ends.0.1 - 4.0), &text, &style);
 }
 
-/// Regions (solid), areas for devices (dashed, with their rank), lines.
-fn outlines(svg: &mut Svg, axes: &Axes, subject: &MapSubject) {
-    let mut outline = |corners: &[Vector2<f64>], dash: &str, name: &str, closed: bool| {
-        let points = axes.points(corners.iter().map(|c| (c.x, c.y)));
+/// A range of colours that noise of `sigma` does not fill.
+fn held(range: Range, sigma: f64) -> Range {
+    if sigma.is_finite() {
+        range.padded(0.0, LEAST * sigma)
+    } else {
+        range
+    }
+}
+
+/// A region (solid), an area for a device (dashed, with its rank) or a line, as it is drawn.
+struct Asked<'a> {
+    corners: &'a [Vector2<f64>],
+    name: &'a str,
+    dash: &'static str,
+    closed: bool,
+}
+
+fn asked(details: &MapDetails) -> Vec<Asked<'_>> {
+    let regions = details.regions.iter().map(|found| Asked {
+        corners: &found.region.corners,
+        name: &found.region.name,
+        dash: "",
+        closed: true,
+    });
+    let devices = details.devices.iter().map(|device| Asked {
+        corners: &device.found.region.corners,
+        name: &device.found.region.name,
+        dash: "2.5 1.5",
+        closed: true,
+    });
+    let profiles = details.profiles.iter().map(|profile| Asked {
+        corners: &profile.ends,
+        name: &profile.name,
+        dash: "",
+        closed: false,
+    });
+    regions.chain(devices).chain(profiles).collect()
+}
+
+impl Asked<'_> {
+    fn points(&self, axes: &Axes) -> Vec<(f64, f64)> {
+        axes.points(self.corners.iter().map(|c| (c.x, c.y)))
+    }
+
+    fn outline(&self, svg: &mut Svg, axes: &Axes) {
+        let points = self.points(axes);
         for ink in [
             Ink::line("#ffffff", 1.9),
-            Ink::line(BLACK, 0.9).dashed(dash),
+            Ink::line(BLACK, 0.9).dashed(self.dash),
         ] {
-            if closed {
+            if self.closed {
                 svg.polygon(&points, &ink);
             } else {
                 svg.polyline(&points, &ink);
             }
         }
-        let count = points.len().max(1) as f64;
-        let sum = points
+    }
+
+    /// The name at the corner that is highest on the page, a rank in the middle of its area; within the panel.
+    fn write(&self, svg: &mut Svg, axes: &Axes) {
+        let points = self.points(axes);
+        let Some(&highest) = points.iter().min_by(|a, b| a.1.total_cmp(&b.1)) else {
+            return;
+        };
+        let count = points.len() as f64;
+        let middle = points
             .iter()
-            .fold((0.0, 0.0), |s, p| (s.0 + p.0, s.1 + p.1));
+            .fold((0.0, 0.0), |s, p| (s.0 + p.0 / count, s.1 + p.1 / count));
+        let (x, y) = if self.dash.is_empty() {
+            (highest.0, highest.1 - 3.0)
+        } else {
+            (middle.0, middle.1 + 0.36 * SMALL)
+        };
+        let (area, half) = (axes.area, text_width(self.name, SMALL) / 2.0);
+        let within = |v: f64, low: f64, high: f64| v.min(high).max(low);
+        let at = (
+            within(x, area.x + half + 1.0, area.right() - half - 1.0),
+            within(y, area.y + SMALL + 1.0, area.bottom() - 2.0),
+        );
         let style = Lettering {
             halo: Some("#ffffff"),
             ..lettering(SMALL, Anchor::Middle)
         };
-        let at = if closed {
-            (sum.0 / count, sum.1 / count + 0.36 * SMALL)
-        } else {
-            points
-                .first()
-                .map_or((f64::NAN, f64::NAN), |p| (p.0, p.1 - 3.0))
-        };
-        svg.text(at, name, &style);
-    };
-    let details = subject.details;
-    for found in &details.regions {
-        outline(&found.region.corners, "", &found.region.name, true);
-    }
-    for device in &details.devices {
-        let region = &device.found.region;
-        outline(&region.corners, "2.5 1.5", &region.name, true);
-    }
-    for profile in &details.profiles {
-        outline(&profile.ends, "", &profile.name, false);
+        svg.text(at, self.name, &style);
     }
 }
 

@@ -5,7 +5,7 @@ use nalgebra::Vector2;
 
 use super::map::MapSubject;
 use super::map_fields::{noise, shown, sparse};
-use super::map_panel::{Panel, about};
+use super::map_panel::{Panel, Shown, about};
 use super::{Drawing, Figure, map_fields, map_mask};
 use crate::draw::axes::Axes;
 use crate::draw::colormap::ColorMap;
@@ -68,14 +68,19 @@ fn wavelength(subject: &MapSubject) -> Result<Drawing, String> {
     let map = subject.map;
     let plane = &map.wavelengths[0];
     let mut panel = Panel::new(subject.id, map, 0.0)?;
-    panel.values(subject, ("wavelength λ", "nm"), shown(map, plane, 1.0))?;
+    let label = Shown {
+        name: "wavelength λ",
+        unit: "nm",
+        sigma: noise(map, plane),
+    };
+    panel.values(subject, &label, shown(map, plane, 1.0))?;
     let axes = panel.axes;
     panel
         .svg
         .clipped(axes.area, |svg| strokes(svg, &axes, subject));
     Ok(Drawing {
         wide: false,
-        svg: panel.finish(subject, "Wavelength of the stripes"),
+        svg: panel.finish("Wavelength of the stripes"),
         caption: format!(
             "Local wavelength of the stripes (noise of a node {} nm, σ, rms); strokes run along them. {}",
             two_digits(noise(map, plane)),
@@ -99,7 +104,13 @@ fn direction(subject: &MapSubject, stripes: &SampledStripes) -> Result<Drawing, 
         _ => f64::NAN,
     };
     let mut panel = Panel::new(subject.id, map, 0.0)?;
-    panel.values(subject, ("direction − mean of its pattern", "°"), off)?;
+    let sigma = degree * noise(map, &map.orientation);
+    let label = Shown {
+        name: "direction − mean of its pattern",
+        unit: "°",
+        sigma,
+    };
+    panel.values(subject, &label, off)?;
     let axes = panel.axes;
     panel
         .svg
@@ -112,12 +123,12 @@ fn direction(subject: &MapSubject, stripes: &SampledStripes) -> Result<Drawing, 
         .collect();
     Ok(Drawing {
         wide: false,
-        svg: panel.finish(subject, "Direction of the stripes"),
+        svg: panel.finish("Direction of the stripes"),
         caption: format!(
             "Local direction of the stripes less the mean of their pattern ({}; noise of a node {}°, σ, rms); \
              strokes run along them. {}",
             known.join(", "),
-            two_digits(degree * noise(map, &map.orientation)),
+            two_digits(sigma),
             about(map)
         ),
     })

@@ -3,6 +3,7 @@
 //! A figure whose data are absent is left out and says why. Marker and colour of each lattice
 //! vector, and filled symbols for up scans, open ones for down scans, are the same everywhere.
 
+mod amplitude;
 mod budget;
 mod cell;
 mod comparison;
@@ -13,17 +14,21 @@ mod map;
 mod map_domains;
 mod map_fields;
 mod map_histograms;
+mod map_image;
 mod map_mask;
 mod map_panel;
 mod map_profiles;
 mod map_stripes;
 mod parameters;
 mod pulls;
+mod residuals;
 mod scan;
 mod sensor_line;
 mod sets;
+mod survey;
 mod transforms;
 mod twist_strain;
+mod twist_wavelength;
 mod velocities;
 mod wavelengths;
 mod wavelengths_nominal;
@@ -85,8 +90,9 @@ struct Subject<'a> {
 
 type Draw = fn(&Subject) -> Result<Drawing, String>;
 
-const OF_A_SET: [(&str, &str, Draw); 12] = [
+const OF_A_SET: [(&str, &str, Draw); 15] = [
     ("scan", "Scan with intended and actual frame", scan::draw),
+    ("amplitude", "Phase and amplitude", amplitude::draw),
     (
         "transforms",
         "Autocorrelation and spectrum",
@@ -122,18 +128,24 @@ const OF_A_SET: [(&str, &str, Draw); 12] = [
         "Position sensor along one line",
         sensor_line::draw,
     ),
+    (
+        "residuals",
+        "Residual maps of the position sensors",
+        residuals::draw,
+    ),
     ("velocities", "Tip velocities", velocities::draw),
     ("window", "Centre of the scanned window", window::draw),
+    (
+        "twist-wavelength",
+        "Twist against wavelength",
+        twist_wavelength::draw,
+    ),
     (
         "error-relation",
         "Twist error against wavelength error",
         error_relation::draw,
     ),
-    (
-        "estimators",
-        "Autocorrelation against Fourier transform",
-        comparison::draw,
-    ),
+    ("estimators", "Two estimators compared", comparison::draw),
 ];
 
 /// Every figure of an analysis in the order of the report, drawn or with the reason why not.
@@ -150,6 +162,12 @@ pub fn figures(analysis: &Analysis, map: ColorMap) -> Vec<Figure> {
         title: "Uncertainty budget",
         drawing: budget::draw(analysis, "budget"),
     };
+    let survey = Figure {
+        name: "survey".to_owned(),
+        set: None,
+        title: "Survey image with the scanned frames",
+        drawing: survey::draw(analysis, "survey", map),
+    };
     let of_sets = analysis.sets.iter().enumerate().flat_map(|(index, set)| {
         OF_A_SET.iter().map(move |&(name, title, draw)| {
             let name = format!("set{}-{name}", index + 1);
@@ -159,6 +177,11 @@ pub fn figures(analysis: &Analysis, map: ColorMap) -> Vec<Figure> {
                 set,
                 map,
             };
+            let title = if name.ends_with("-estimators") {
+                comparison::title(analysis.settings.method)
+            } else {
+                title
+            };
             Figure {
                 set: Some(index),
                 title,
@@ -167,5 +190,8 @@ pub fn figures(analysis: &Analysis, map: ColorMap) -> Vec<Figure> {
             }
         })
     });
-    [together, budget].into_iter().chain(of_sets).collect()
+    [together, budget, survey]
+        .into_iter()
+        .chain(of_sets)
+        .collect()
 }

@@ -1,4 +1,6 @@
-//! Distributions of twist, strain and axis over the Monte Carlo draws of every scan.
+//! Distributions of twist, strain, its axis and the orientation of the lattice over the Monte Carlo draws of every scan.
+
+use std::f64::consts::FRAC_PI_3;
 
 use moiregauge::analysis::{ScanAnalysis, StrainDraw};
 use moiregauge::estimate::Estimate;
@@ -33,25 +35,25 @@ pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
     let panel = (13.0 * count).clamp(60.0, 430.0);
     let top = layout::LEGEND + layout::ABOVE;
     let mut svg = Svg::new(subject.id, PAGE, top + panel + layout::BELOW);
-    let width = (PAGE - 30.0 - 18.0) / 3.0;
-    for quantity in 0..3 {
+    let width = (PAGE - 30.0 - 9.0) / 4.0;
+    let angle = drawn
+        .first()
+        .and_then(|(_, s)| s.draws.first())
+        .map_or(0.0, |d| d.lattice_angle);
+    let near = [axis, angle];
+    for quantity in 0..4 {
         let values: Vec<Vec<f64>> = drawn
             .iter()
-            .map(|(_, s)| s.draws.iter().map(|d| of_draw(d, quantity, axis)).collect())
+            .map(|(_, s)| s.draws.iter().map(|d| of_draw(d, quantity, near)).collect())
             .collect();
         let range = central(&values.concat(), 0.998).ok_or("no draw is finite")?;
-        let area = Rect::new(
-            30.0 + quantity as f64 * (width + 9.0),
-            top,
-            width - 9.0,
-            panel,
-        );
+        let area = Rect::new(30.0 + quantity as f64 * width, top, width - 11.0, panel);
         let rows = Range::new(0.7, count + 1.1);
         let axes = Axes::new(area, range.padded(0.04, 1e-9), rows);
         ridges(&mut svg, &axes, &drawn, &values);
         for (index, scan) in &drawn {
             let result = scan.twist_strain.or(scan.twist_strain_sensor);
-            if let Some(value) = result.and_then(|t| of_result(&t, quantity, axis)) {
+            if let Some(value) = result.and_then(|t| of_result(&t, quantity, near)) {
                 axes.error_bar_x(&mut svg, value.value, ordinal(*index), value.sigma, BLACK);
                 if axes.x.range.contains(value.value) {
                     let at = axes.at(value.value, ordinal(*index));
@@ -61,7 +63,12 @@ pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
         }
         let labels = Labels {
             letter: LETTERS[quantity],
-            x: ["twist θ (°)", "strain ε (%)", "strain axis φ, from x (°)"][quantity],
+            x: [
+                "twist θ (°)",
+                "strain ε (%)",
+                "strain axis φ, from x (°)",
+                "lattice angle α (°)",
+            ][quantity],
             y: if quantity == 0 { "scan" } else { "" },
             y_ticks: Ticks::scans(quantity == 0),
             ..Labels::default()
@@ -75,25 +82,36 @@ pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
     legend::row(&mut svg, (30.0, 11.0), &keys);
     Ok(Drawing {
         wide: true,
-        svg: svg.finish("Distributions of twist, strain and axis per scan"),
-        caption: "Monte Carlo distributions of twist, strain and axis (modulo 180°) for every scan, the scans from bottom to top. Circles: the estimate with its analytic σ. The drawn strain is the plain length of the strain vector, which noise lengthens; the circle has that bias removed. An axis without circle is not significant (p ≥ 0.01).".to_owned(),
+        svg: svg.finish("Distributions of twist, strain, axis and lattice angle per scan"),
+        caption: "Monte Carlo distributions of twist, strain, its axis (modulo 180°) and the orientation α of layer 1 (modulo 60°) for every scan, the scans from bottom to top. Circles: the estimate with its analytic statistical σ. The drawn strain is the plain length of the strain vector, which noise lengthens; the circle has that bias removed. An axis without circle is not significant (p ≥ 0.01).".to_owned(),
     })
 }
 
-fn of_draw(draw: &StrainDraw, quantity: usize, axis: f64) -> f64 {
+/// `near`: the axis and the orientation about which their values are shown.
+fn of_draw(draw: &StrainDraw, quantity: usize, [axis, angle]: [f64; 2]) -> f64 {
     let e = draw.strain_vector;
     match quantity {
         0 => draw.twist.to_degrees(),
         1 => e.norm() * 100.0,
-        _ => axis_near(e.y.atan2(e.x) / 2.0, axis).to_degrees(),
+        2 => axis_near(e.y.atan2(e.x) / 2.0, axis).to_degrees(),
+        _ => angle_near(draw.lattice_angle, angle).to_degrees(),
     }
 }
 
-fn of_result(result: &TwistStrain, quantity: usize, axis: f64) -> Option<Estimate> {
+/// The orientation modulo 60° that is nearest to `near`, rad.
+fn angle_near(angle: f64, near: f64) -> f64 {
+    angle - FRAC_PI_3 * ((angle - near) / FRAC_PI_3).round()
+}
+
+fn of_result(result: &TwistStrain, quantity: usize, [axis, angle]: [f64; 2]) -> Option<Estimate> {
     let degree = 1_f64.to_degrees();
     match quantity {
         0 => Some(result.twist().scaled(degree)),
         1 => Some(result.heterostrain().scaled(100.0)),
+        3 => {
+            let found = result.lattice_angle();
+            Some(Estimate::new(angle_near(found.value, angle), found.sigma).scaled(degree))
+        }
         _ => result
             .axis_lab()
             .map(|a| Estimate::new(axis_near(a.value, axis), a.sigma).scaled(degree)),

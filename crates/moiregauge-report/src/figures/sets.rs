@@ -1,4 +1,4 @@
-//! All sets side by side: drift, twist and the strain vector, each with its uncertainty.
+//! All sets side by side: drift, twist and the strain vector, each with its statistical uncertainty.
 
 use moiregauge::analysis::{Analysis, SetAnalysis, SetMean};
 use nalgebra::{Matrix2, Vector2};
@@ -78,7 +78,7 @@ pub(super) fn draw(analysis: &Analysis, id: &str) -> Result<Drawing, String> {
     Ok(Drawing {
         wide: true,
         svg: svg.finish("Drift, twist and strain of all sets"),
-        caption: "Every set that was corrected for drift: drift velocity (a) and strain vector in the laboratory (c) with their 1σ and 2σ ellipses, equal scales; twist with its σ (b). Band: all sets together. Dashed: zero. Drift may differ between sets, as it changes with time; twist and strain belong to the sample and should agree.".to_owned(),
+        caption: "Every set that was corrected for drift: drift velocity (a) and strain vector in the laboratory (c) with their 1σ and 2σ ellipses, equal scales; twist with its σ (b). σ is the statistical part alone: calibration and model are the same for all sets of one scanner, and would move them together. Band: all sets together. Dashed: zero. Drift may differ between sets, as it changes with time; twist and strain belong to the sample and should agree.".to_owned(),
     })
 }
 

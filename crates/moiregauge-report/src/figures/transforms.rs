@@ -38,7 +38,7 @@ pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
         wide: true,
         svg: svg.finish("Autocorrelation and spectrum with the lattice marked"),
         caption: format!(
-            "Of {}, {}: (a) autocorrelation against the shift in nm, (b) logarithm of the power spectrum against spatial frequency (cycles per nm), both in sensor coordinates, x to the right, y up, not corrected for drift. Coloured symbols: the three lattice vectors; circles: further points of the fitted lattice (a) and the first two shells of its reciprocal lattice (b).",
+            "Of {}, {}: (a) autocorrelation, relative to that at no shift, against the shift in nm, (b) decimal logarithm of the power spectrum, relative to its highest peak, against spatial frequency (cycles per nm), both in sensor coordinates, x to the right, y up, not corrected for drift. Coloured symbols: the three lattice vectors; circles: further points of the fitted lattice (a) and the first two shells of its reciprocal lattice (b).",
             layout::short(&shown.file),
             layout::line_name(shown.line)
         ),
@@ -57,7 +57,15 @@ fn panel(left: f64, half: f64) -> Axes {
 fn autocorrelation(svg: &mut Svg, subject: &Subject, shown: &Illustration, basis: &Matrix2<f64>) {
     let reach = reach(&shown.autocorrelation, &shown.pixel_to_nm, longest(basis));
     let axes = panel(layout::LEFT, reach);
-    let (image, origin) = visible(&shown.autocorrelation, &shown.pixel_to_nm, &axes);
+    let (mut image, origin) = visible(&shown.autocorrelation, &shown.pixel_to_nm, &axes);
+    // Relative to no shift, where the image agrees with itself and noise with noise.
+    let whole = &shown.autocorrelation;
+    let unshifted = whole
+        .values
+        .get(whole.rows / 2 * whole.columns + whole.columns / 2);
+    if let Some(unshifted) = unshifted.filter(|v| **v > 0.0) {
+        image.values.iter_mut().for_each(|v| *v /= unshifted);
+    }
     let contrast = raster::contrast(&image, 0.005);
     svg.clipped(axes.area, |svg| {
         raster::draw(
@@ -95,7 +103,13 @@ fn autocorrelation(svg: &mut Svg, subject: &Subject, shown: &Illustration, basis
     };
     axes.draw(svg, &labels);
     let bar = Rect::new(axes.area.right() + 5.0, axes.area.y, 6.0, SIDE);
-    colorbar::draw(svg, bar, subject.map, contrast, ("autocorrelation", ""));
+    colorbar::draw(
+        svg,
+        bar,
+        subject.map,
+        contrast,
+        ("autocorrelation over that at no shift", ""),
+    );
 }
 
 fn spectrum(
@@ -109,10 +123,14 @@ fn spectrum(
     let map = to_frequency * Matrix2::new(across, 0.0, 0.0, up);
     let reach = reach(&shown.spectrum, &map, longest(dual));
     let axes = panel(PAGE / 2.0 + layout::LEFT + 2.0, reach);
-    let (image, origin) = visible(&shown.spectrum, &map, &axes);
+    let (mut image, origin) = visible(&shown.spectrum, &map, &axes);
+    // In decades below the highest peak.
+    let highest = Range::of(image.values.iter().copied()).map_or(0.0, |r| r.high);
+    let decades = |v: &mut f64| *v = (*v - highest) / std::f64::consts::LN_10;
+    image.values.iter_mut().for_each(decades);
     // The peaks are a handful of pixels: only the floor may be cut off.
     let floor = raster::contrast(&image, 0.3).low;
-    let top = Range::of(image.values.iter().copied()).map_or(floor, |r| r.high);
+    let top: f64 = 0.0;
     let contrast = Range::new(floor, top.max(floor + 1e-12));
     svg.clipped(axes.area, |svg| {
         raster::draw(
@@ -147,7 +165,13 @@ fn spectrum(
     };
     axes.draw(svg, &labels);
     let bar = Rect::new(axes.area.right() + 5.0, axes.area.y, 6.0, SIDE);
-    colorbar::draw(svg, bar, subject.map, contrast, ("logarithm of power", ""));
+    colorbar::draw(
+        svg,
+        bar,
+        subject.map,
+        contrast,
+        ("log₁₀ of power over the highest", ""),
+    );
 }
 
 /// Half the width of a panel: a few vectors, but not more than the picture holds.

@@ -17,6 +17,15 @@ use crate::tables::COMMON;
 
 const TEMPLATE: &str = include_str!("map.html");
 
+/// Figures before the numbers; a map of stripes has its own.
+const FIRST: [&str; 5] = [
+    "map-image",
+    "map-twist",
+    "map-strain",
+    "map-overlays",
+    "map-direction",
+];
+
 #[derive(Debug, Serialize)]
 struct Page<'a> {
     results: &'a MapResults,
@@ -41,6 +50,8 @@ struct Page<'a> {
     agreement: Option<[String; 3]>,
     /// What the errors of regions leave out.
     common: &'static str,
+    /// The image and the maps that are wanted most.
+    first: Vec<Shown<'a>>,
     figures: Vec<Shown<'a>>,
     missing: Vec<Missing<'a>>,
     conventions: [(&'static str, &'a str); 15],
@@ -150,6 +161,8 @@ pub fn map_page(
 ) -> Result<Vec<u8>, ReportError> {
     let all: usize = results.masks.iter().map(|m| m.nodes).sum();
     let details = &results.details;
+    let shown = numbered(figures).into_iter().map(|(_, shown)| shown);
+    let (first, others) = shown.partition(|shown: &Shown| FIRST.contains(&shown.name));
     let page = Page {
         results,
         layers: layers(&results.settings),
@@ -216,10 +229,8 @@ pub fn map_page(
             [chi2, a.nodes.to_string(), factor]
         }),
         common: COMMON,
-        figures: numbered(figures)
-            .into_iter()
-            .map(|(_, shown)| shown)
-            .collect(),
+        first,
+        figures: others,
         missing: missing(figures, None),
         conventions: conventions(&results.conventions),
         settings: serde_json::to_string_pretty(&results.settings)?,

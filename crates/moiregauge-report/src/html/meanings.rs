@@ -2,19 +2,17 @@
 
 use serde::Serialize;
 
-use super::words::{plain, shown};
+use super::words::{plain, shown, statistical};
 use crate::draw::scale::fixed;
-use crate::format::two_digits;
-use crate::results::{
-    NamesResult, ReadingsResult, SolutionResult, SplitResult, TensorNumbers, TensorSigmas,
-};
+use crate::results::{NamesResult, ReadingsResult, SolutionResult, SplitResult, TensorNumbers};
 
 /// The readings of a lattice.
 #[derive(Debug, Serialize)]
 pub(super) struct Meanings {
     differ: bool,
-    /// What takes the place of the twist in the headline, and why: the tensor's, or all readings.
-    headline: Option<[String; 2]>,
+    /// Why, what takes the place of the twist in the headline (the tensor's, or all readings), and its statistical
+    /// part.
+    headline: Option<[String; 3]>,
     /// Twist, strain and axis of every solution that a user has to choose from.
     choices: Vec<[String; 3]>,
     /// Isotropic strain and what it does to the twist.
@@ -32,11 +30,10 @@ pub(super) struct Meanings {
 #[derive(Debug, Serialize)]
 struct Tensor {
     twist: String,
-    twist_total: String,
     mean: String,
-    mean_total: String,
     shear: String,
-    shear_total: String,
+    /// The same with their statistical σ.
+    statistical: [String; 3],
     axis: String,
     lattice_angle: String,
     /// Uniaxial part, its axis, biaxial part.
@@ -62,18 +59,28 @@ impl Meanings {
         let headline = match &readings.strain_tensor {
             Some(tensor) => {
                 let twist = |e| format!("({})°", shown(e));
-                let first = twist(tensor.found.twist_deg);
+                let part = |e| format!("({})°", statistical(e));
+                let first = tensor.found.twist_deg;
                 Some(match &tensor.other_sense {
-                    None => ["with the orientation of a layer".to_owned(), first],
+                    None => [
+                        "with the orientation of a layer".to_owned(),
+                        twist(first),
+                        part(first),
+                    ],
                     Some(other) => [
                         "with the orientation of a layer; the sense is open".to_owned(),
-                        format!("{first} or {}", twist(other.found.twist_deg)),
+                        format!("{} or {}", twist(first), twist(other.found.twist_deg)),
+                        format!("{} or {}", part(first), part(other.found.twist_deg)),
                     ],
                 })
             }
             None if readings.layers_differ && !choices.is_empty() => {
                 let twists: Vec<&str> = choices.iter().map(|c| c[0].as_str()).collect();
-                Some(["the layers differ".to_owned(), twists.join(" or ")])
+                Some([
+                    "the layers differ".to_owned(),
+                    twists.join(" or "),
+                    "the σ shown".to_owned(),
+                ])
             }
             None => None,
         };
@@ -102,13 +109,13 @@ impl Meanings {
             }),
             tensor: readings.strain_tensor.as_ref().map(|found| Tensor {
                 alternatives: found.alternatives.iter().map(alternative).collect(),
-                ..tensor(&found.found, &found.total, &found.splits)
+                ..tensor(&found.found, &found.splits)
             }),
             other_sense: readings.strain_tensor.as_ref().and_then(|found| {
                 let other = found.other_sense.as_ref()?;
                 let ends = other.twist_interval_deg;
                 Some((
-                    tensor(&other.found, &other.total, &other.splits),
+                    tensor(&other.found, &other.splits),
                     ends.map(|end| format!("{}°", plain(end, 4))),
                 ))
             }),
@@ -151,7 +158,7 @@ fn alternative(found: &TensorNumbers) -> [String; 2] {
     [twist, format!("({}) %", shown(found.mean_strain_percent))]
 }
 
-fn tensor(found: &TensorNumbers, all: &TensorSigmas, splits: &[SplitResult; 2]) -> Tensor {
+fn tensor(found: &TensorNumbers, splits: &[SplitResult; 2]) -> Tensor {
     let &TensorNumbers {
         twist_deg,
         lattice_angle_deg,
@@ -160,16 +167,15 @@ fn tensor(found: &TensorNumbers, all: &TensorSigmas, splits: &[SplitResult; 2]) 
         axis_lab_deg,
         ..
     } = found;
-    let total = |sigma: Option<f64>, unit: &str| {
-        sigma.map_or_else(|| "–".to_owned(), |s| format!("{}{unit}", two_digits(s)))
-    };
     Tensor {
         twist: format!("({})°", shown(twist_deg)),
-        twist_total: total(all.twist_deg, "°"),
         mean: format!("({}) %", shown(mean_strain_percent)),
-        mean_total: total(all.mean_strain_percent, " %"),
         shear: format!("({}) %", shown(shear_percent)),
-        shear_total: total(all.shear_percent, " %"),
+        statistical: [
+            format!("({})°", statistical(twist_deg)),
+            format!("({}) %", statistical(mean_strain_percent)),
+            format!("({}) %", statistical(shear_percent)),
+        ],
         axis: axis_lab_deg.map_or_else(
             || "not significant".to_owned(),
             |a| format!("({})°", shown(a)),

@@ -4,7 +4,9 @@ use moiregauge::settings::{Method, Settings};
 use serde::Serialize;
 
 use super::meanings::Meanings;
-use super::words::{Budgeted, Numbers, consistency, conventions, plain, shown, wavelengths};
+use super::words::{
+    Budgeted, Numbers, consistency, conventions, plain, shown, statistical, wavelengths,
+};
 use crate::draw::base64;
 use crate::error::ReportError;
 use crate::figures::Figure;
@@ -17,6 +19,7 @@ pub(super) struct Page<'a> {
     /// The published method, whose bias the page has to tell, was used.
     paper: bool,
     combined: Option<Numbers>,
+    combined_statistical: Option<Numbers>,
     combined_budget: Option<Budgeted>,
     combined_wavelengths: Option<[String; 3]>,
     combined_meanings: Option<Meanings>,
@@ -43,6 +46,7 @@ struct Set<'a> {
     rate: String,
     drift: Option<Drift>,
     mean: Option<Numbers>,
+    mean_statistical: Option<Numbers>,
     /// Of `mean` or, where there is none, of `uncorrected`.
     budget: Option<Budgeted>,
     mean_wavelengths: Option<[String; 3]>,
@@ -72,6 +76,8 @@ struct Atomic {
 struct Drift {
     x: String,
     y: String,
+    /// With the statistical σ.
+    statistical: [String; 2],
     given: bool,
     fit: Option<DriftFit>,
     draws: Option<DriftDraws>,
@@ -107,7 +113,7 @@ struct Scan<'a> {
 #[derive(Clone, Debug, Serialize)]
 pub(super) struct Shown<'a> {
     number: usize,
-    name: &'a str,
+    pub(super) name: &'a str,
     title: &'a str,
     caption: &'a str,
     svg: &'a str,
@@ -145,7 +151,8 @@ impl<'a> Page<'a> {
             results,
             scans: results.sets.iter().map(used).sum(),
             paper: results.settings.method == Method::Paper,
-            combined: combined.map(|c| Numbers::new(&c.twist_strain)),
+            combined: combined.map(|c| Numbers::in_all(&c.twist_strain, &c.budget)),
+            combined_statistical: combined.map(|c| Numbers::statistical(&c.twist_strain)),
             combined_budget: combined.map(|c| Budgeted::new(&c.budget)),
             combined_wavelengths: combined.map(|c| wavelengths(&c.vectors)),
             combined_meanings: combined.map(|c| Meanings::new(&c.readings)),
@@ -283,11 +290,12 @@ impl<'a> Set<'a> {
                 .line_rate_hz
                 .map_or_else(|| plain(None, 0), |rate| rate.to_string()),
             drift: set.drift.as_ref().map(drift),
-            mean: mean.map(|m| Numbers::new(&m.twist_strain)),
+            mean: mean.map(|m| Numbers::in_all(&m.twist_strain, &m.budget)),
+            mean_statistical: mean.map(|m| Numbers::statistical(&m.twist_strain)),
             budget: mean.or(uncorrected).map(|m| Budgeted::new(&m.budget)),
             mean_wavelengths: mean.map(|m| wavelengths(&m.vectors)),
             meanings: mean.or(uncorrected).map(|m| Meanings::new(&m.readings)),
-            uncorrected: uncorrected.map(|m| Numbers::new(&m.twist_strain)),
+            uncorrected: uncorrected.map(|m| Numbers::statistical(&m.twist_strain)),
             uncorrected_wavelengths: uncorrected.map(|m| wavelengths(&m.vectors)),
             forward_backward: set.forward_backward.as_ref().map(Numbers::new),
             chi2_per_dof: plain(mean.and_then(|m| m.chi2_per_dof), 2),
@@ -314,6 +322,7 @@ fn drift(drift: &DriftResult) -> Drift {
     Drift {
         x: shown(drift.x_nm_per_min),
         y: shown(drift.y_nm_per_min),
+        statistical: [drift.x_nm_per_min, drift.y_nm_per_min].map(statistical),
         given: drift.given,
         fit: drift.fit.as_ref().map(|fit| DriftFit {
             rank: fit.rank,

@@ -4,13 +4,12 @@ use moiregauge::estimate::Estimate;
 use serde::Serialize;
 
 use crate::draw::scale::fixed;
-use crate::format::{plus_minus, two_digits};
+use crate::format::plus_minus;
 use crate::results::{
-    BudgetColumn, BudgetResult, Conventions, LatticeVector, ResultEstimate, Results,
-    TwistStrainResult,
+    BudgetResult, Conventions, LatticeVector, ResultEstimate, Results, TwistStrainResult,
 };
 
-/// Twist and strain in words.
+/// Twist and strain in words: with everything where that is known, otherwise with their statistical σ.
 #[derive(Debug, Serialize)]
 pub(super) struct Numbers {
     twist: String,
@@ -24,6 +23,36 @@ pub(super) struct Numbers {
 }
 
 impl Numbers {
+    /// With the statistical σ alone.
+    pub(super) fn statistical(result: &TwistStrainResult) -> Self {
+        let alone = |e: ResultEstimate| ResultEstimate {
+            sigma_total: None,
+            ..e
+        };
+        Self::new(&TwistStrainResult {
+            twist_deg: alone(result.twist_deg),
+            heterostrain_percent: alone(result.heterostrain_percent),
+            lattice_angle_deg: alone(result.lattice_angle_deg),
+            strain_axis_lab_deg: result.strain_axis_lab_deg.map(alone),
+            strain_axis_lattice_deg: result.strain_axis_lattice_deg.map(alone),
+            strain_vector_sigma_total_percent: None,
+            ..*result
+        })
+    }
+
+    /// With everything in the budget for limits and significance, too.
+    pub(super) fn in_all(result: &TwistStrainResult, budget: &BudgetResult) -> Self {
+        let doubtful = budget.strain_p_value.is_none_or(|p| p >= SIGNIFICANT);
+        Self::new(&TwistStrainResult {
+            strain_axis_lab_deg: result.strain_axis_lab_deg.filter(|_| !doubtful),
+            strain_axis_lattice_deg: result.strain_axis_lattice_deg.filter(|_| !doubtful),
+            strain_p_value: budget.strain_p_value,
+            strain_upper_limit_95_percent: budget.strain_upper_limit_95_percent,
+            strain_interval_95_percent: budget.strain_interval_95_percent,
+            ..*result
+        })
+    }
+
     pub(super) fn new(result: &TwistStrainResult) -> Self {
         let significant = result.strain_axis_lab_deg.is_some();
         let axis = |angle: Option<ResultEstimate>| {
@@ -51,13 +80,12 @@ impl Numbers {
     }
 }
 
-/// What calibration and model make of the uncertainties.
+/// An axis with a larger p-value means nothing.
+const SIGNIFICANT: f64 = 0.01;
+
+/// What calibration and model make of the significance of a strain.
 #[derive(Debug, Serialize)]
 pub(super) struct Budgeted {
-    twist: String,
-    strain: String,
-    axis: Option<String>,
-    interval: String,
     p_value: String,
     /// Whether an axis that stands out of the noise stands out of everything.
     doubtful: bool,
@@ -67,18 +95,10 @@ pub(super) struct Budgeted {
 
 impl Budgeted {
     pub(super) fn new(budget: &BudgetResult) -> Self {
-        let sigma = |column: &BudgetColumn, unit: &str| {
-            let known = column.known();
-            known.map_or_else(|| "–".to_owned(), |s| format!("{}{unit}", two_digits(s)))
-        };
         let axis = budget.strain_axis_lab_deg.as_ref();
         Self {
-            twist: sigma(&budget.twist_deg, "°"),
-            strain: sigma(&budget.heterostrain_percent, " %"),
-            axis: axis.map(|column| sigma(column, "°")),
-            interval: interval(budget.strain_interval_95_percent),
             p_value: plain(budget.strain_p_value, 2),
-            doubtful: axis.is_some() && budget.strain_p_value.is_some_and(|p| p >= 0.01),
+            doubtful: axis.is_some() && budget.strain_p_value.is_some_and(|p| p >= SIGNIFICANT),
             without_drift: budget.twist_deg.drift.is_none(),
         }
     }
@@ -94,7 +114,8 @@ fn vector(result: &TwistStrainResult) -> String {
     let part = |i: usize| {
         let value = result.strain_vector_percent[i].unwrap_or(f64::NAN);
         let variance = result.strain_vector_covariance[i][i].unwrap_or(f64::NAN);
-        plus_minus(Estimate::from_variance(value, variance))
+        let total = result.strain_vector_sigma_total_percent.and_then(|t| t[i]);
+        plus_minus(Estimate::new(value, total.unwrap_or(variance.sqrt())))
     };
     format!("({}, {}) %", part(0), part(1))
 }
@@ -104,8 +125,13 @@ fn bracketed(estimate: ResultEstimate) -> String {
     format!("({})", shown(estimate))
 }
 
-/// `value ± sigma`.
+/// `value ± sigma`, the total one where it is known.
 pub(super) fn shown(estimate: ResultEstimate) -> String {
+    plus_minus(estimate.in_all())
+}
+
+/// `value ± sigma`, the statistical one.
+pub(super) fn statistical(estimate: ResultEstimate) -> String {
     plus_minus(estimate.plain())
 }
 

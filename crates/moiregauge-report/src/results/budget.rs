@@ -11,8 +11,8 @@ use super::convert::{PERCENT, degree, number, square};
 
 /// Standard deviations of one quantity, source by source; `null` where a contribution is not known.
 ///
-/// `image`, `drift` and `sensor` are the parts of the quantity's `sigma`; the sources are independent,
-/// so the squares add up.
+/// `image`, `drift` and `sensor` are the parts of the quantity's `sigma`, the statistical one; `total` is its
+/// `sigma_total`. The sources are independent, so the squares add up.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct BudgetColumn {
     /// Noise of the images, drift and sensors known exactly.
@@ -117,15 +117,6 @@ impl BudgetColumn {
             Source::IsotropicStrain => self.isotropic_strain,
             Source::PoissonRatio => self.poisson_ratio,
         }
-    }
-
-    /// All that is known together: `total`, or without the drift where that was left in.
-    pub(crate) fn known(&self) -> Option<f64> {
-        let squares = Source::ALL
-            .into_iter()
-            .filter(|source| *source != Source::Drift || self.drift.is_some())
-            .map(|source| self.get(source).map(|sigma| sigma * sigma));
-        squares.sum::<Option<f64>>().map(f64::sqrt)
     }
 }
 

@@ -34,7 +34,7 @@ pub struct Conventions {
     pub twist: String,
     /// What the strain tensor is.
     pub strain_tensor: String,
-    /// What σ is.
+    /// What `sigma` and `sigma_total` are.
     pub sigma: String,
     /// What the budget is.
     pub budget: String,
@@ -71,7 +71,7 @@ impl Conventions {
                 "θ > 0 and ε ≥ 0 by choice, where that explains the moiré: the layers differ, and the other entries of readings.solutions are as good; assumes no isotropic heterostrain beside the mismatch of the lattice constants".to_owned()
             },
             strain_tensor: "readings.strain_tensor, where the orientation of a layer is known: mean ½(ε₁+ε₂) and shear part γ = ½(ε₁−ε₂) of the strain of layer 2 against layer 1, of atoms and tension positive in either form of the equation, φ the axis of ε₁ from x; splits: the same as (1+ε_b) diag(1+ε_u, 1−νε_u) in the two ways there are; isotropic strains are those of layer 2".to_owned(),
-            sigma: "one standard deviation of the statistical error: image noise, drift and sensor noise; calibration of the scanner, lattice constant and model are in `budget`".to_owned(),
+            sigma: "`sigma_total`: one standard deviation with everything, what may be published: image noise, drift, sensor noise, calibration of the scanner, lattice constant and model; `sigma`: the statistical part alone, image noise, drift and sensor noise, for comparing results of one scanner and one model; `budget` has every part".to_owned(),
             budget: format!("one standard deviation for each source of error and in all; image, drift and sensor make up sigma; the scanner is taken to be known to {} % in gain, {} % in the ratio of x and y and {} mrad in the angle between them, the lattice constant to {}, the Poisson ratio to {}, an isotropic heterostrain to be {} %; strained_layer is the difference to strain in equal parts in both layers; angles are counted from the x axis of the sensors, so a turned frame is no error", settings.calibration.gain_percent, settings.calibration.mismatch_percent, settings.calibration.orthogonality_mrad, constants(settings), settings.material.poisson_ratio_sigma, settings.isotropic_strain_percent),
         }
     }

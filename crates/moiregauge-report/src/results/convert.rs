@@ -1,6 +1,6 @@
 //! Units of the inside (nm, s, rad) → units of the surface, and NaN → nothing.
 
-use moiregauge::estimate::Estimate;
+use moiregauge::estimate::{Estimate, TotalEstimate};
 use nalgebra::{Matrix2, Vector2};
 
 use super::lattice::ResultEstimate;
@@ -26,6 +26,15 @@ pub(crate) fn estimate(estimate: Estimate, factor: f64) -> ResultEstimate {
     ResultEstimate {
         value: number(scaled.value),
         sigma: number(scaled.sigma),
+        sigma_total: None,
+    }
+}
+
+/// An estimate with its total in another unit.
+pub(crate) fn estimate_in_all(found: TotalEstimate, factor: f64) -> ResultEstimate {
+    ResultEstimate {
+        sigma_total: number(found.scaled(factor).total),
+        ..estimate(found.statistical(), factor)
     }
 }
 

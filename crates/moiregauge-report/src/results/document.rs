@@ -16,7 +16,7 @@ use super::SCHEMA;
 use super::budget::BudgetResult;
 use super::checks::ChecksResult;
 use super::conventions::Conventions;
-use super::convert::{PER_MINUTE, PERCENT, correlation, degree, estimate, number};
+use super::convert::{PER_MINUTE, PERCENT, correlation, degree, estimate, estimate_in_all, number};
 use super::lattice::{LatticeVector, ResultEstimate, TwistStrainResult};
 use super::readings::{AtomicResult, ReadingsResult};
 use super::scan::ScanResult;
@@ -203,15 +203,15 @@ pub struct ConsistencyResult {
 impl Results {
     /// The document for an analysis.
     pub fn new(analysis: &Analysis, provenance: &Provenance) -> Self {
-        let bilayer = analysis.settings.bilayer();
+        let settings = &analysis.settings;
         Self {
             schema: SCHEMA.to_owned(),
             sets: analysis
                 .sets
                 .iter()
-                .map(|set| set_result(set, bilayer))
+                .map(|set| set_result(set, settings))
                 .collect(),
-            combined: analysis.combined.as_ref().map(|c| combined(c, bilayer)),
+            combined: analysis.combined.as_ref().map(|c| combined(c, settings)),
             atomic: analysis.atomic.as_ref().map(Into::into),
             caveats: analysis.caveats.clone(),
             failed: provenance.failed.clone(),
@@ -238,7 +238,8 @@ impl Results {
     }
 }
 
-fn set_result(set: &SetAnalysis, bilayer: Bilayer<'_>) -> SetResult {
+fn set_result(set: &SetAnalysis, settings: &Settings) -> SetResult {
+    let bilayer = settings.bilayer();
     let axis = match set.slow_axis {
         Axis::X => "x",
         Axis::Y => "y",
@@ -248,7 +249,7 @@ fn set_result(set: &SetAnalysis, bilayer: Bilayer<'_>) -> SetResult {
         slow_axis: axis.to_owned(),
         line_rate_hz: number(set.line_rate_hz),
         channel: set.channel.clone(),
-        drift: set.drift.as_ref().map(drift),
+        drift: set.drift.as_ref().map(|d| drift(d, settings)),
         mean: set.mean.as_ref().map(|m| mean(m, bilayer)),
         uncorrected: set.uncorrected.as_ref().map(|m| mean(m, bilayer)),
         forward_backward: set.forward_backward.as_ref().map(Into::into),
@@ -271,8 +272,10 @@ fn velocity(value: Vector2<f64>, covariance: &Matrix2<f64>) -> [ResultEstimate; 
     })
 }
 
-fn drift(drift: &Drift) -> DriftResult {
-    let [x_nm_per_min, y_nm_per_min] = velocity(drift.velocity, &drift.covariance);
+fn drift(drift: &Drift, settings: &Settings) -> DriftResult {
+    let [x_nm_per_min, y_nm_per_min] = drift
+        .velocities(settings)
+        .map(|part| estimate_in_all(part, PER_MINUTE));
     DriftResult {
         x_nm_per_min,
         y_nm_per_min,
@@ -315,10 +318,10 @@ fn mean(mean: &SetMean, bilayer: Bilayer<'_>) -> MeanResult {
         ..*result
     };
     MeanResult {
-        twist_strain: result.into(),
+        twist_strain: TwistStrainResult::of_mean(result, &mean.budget),
         budget: BudgetResult::of(&mean.budget, result),
         readings: (&mean.readings).into(),
-        vectors: LatticeVector::all(&mean.lattice, bilayer),
+        vectors: LatticeVector::of_mean(&mean.lattice, &mean.budget, bilayer),
         twist_scatter_deg: number(mean.twist_scatter * degree()),
         strain_scatter_percent: number(mean.strain_scatter * PERCENT),
         chi2_per_dof: number(mean.chi2_per_dof),
@@ -328,14 +331,15 @@ fn mean(mean: &SetMean, bilayer: Bilayer<'_>) -> MeanResult {
     }
 }
 
-fn combined(combined: &Combined, bilayer: Bilayer<'_>) -> CombinedResult {
+fn combined(combined: &Combined, settings: &Settings) -> CombinedResult {
+    let (budget, bilayer) = (&combined.budget, settings.bilayer());
     CombinedResult {
-        twist_strain: (&combined.twist_strain).into(),
+        twist_strain: TwistStrainResult::of_mean(&combined.twist_strain, budget),
         budget: BudgetResult::of(&combined.budget, &combined.twist_strain),
         readings: (&combined.readings).into(),
-        vectors: LatticeVector::all(&combined.lattice, bilayer),
+        vectors: LatticeVector::of_mean(&combined.lattice, budget, bilayer),
         joint: combined.joint.as_ref().map(Into::into),
-        drift: combined.drift.as_ref().map(drift),
+        drift: combined.drift.as_ref().map(|d| drift(d, settings)),
         checks: combined.checks.as_ref().map(Into::into),
         consistency: combined.consistency.iter().map(consistency).collect(),
     }

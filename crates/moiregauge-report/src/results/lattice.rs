@@ -1,6 +1,7 @@
 //! Estimates, lattice vectors, twist and strain as the document holds them.
 
 use moiregauge::analysis::StrainDraw;
+use moiregauge::budget::Budget;
 use moiregauge::estimate::Estimate;
 use moiregauge::lattice::LatticeVectors;
 use moiregauge::material::Bilayer;
@@ -9,7 +10,7 @@ use nalgebra::{Matrix2, Vector2};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::convert::{PERCENT, degree, estimate, number, pair, square};
+use super::convert::{PERCENT, degree, estimate, estimate_in_all, number, pair, square};
 use crate::stats::mean_and_deviation;
 
 /// Names of the three vectors.
@@ -21,8 +22,13 @@ pub(crate) const NAMES: [&str; 3] = ["L1", "L2", "L3"];
 pub struct ResultEstimate {
     /// The best value.
     pub value: Option<f64>,
-    /// One standard deviation.
+    /// One standard deviation. Where `sigma_total` stands beside it, the statistical part of that: noise of
+    /// images and sensors, and the drift.
     pub sigma: Option<f64>,
+    /// One standard deviation with everything, calibration and model included: what may be published. In the
+    /// means of sets and in `combined`; left out where it is not known, as where the drift was left in.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sigma_total: Option<f64>,
 }
 
 impl ResultEstimate {
@@ -32,6 +38,12 @@ impl ResultEstimate {
             self.value.unwrap_or(f64::NAN),
             self.sigma.unwrap_or(f64::NAN),
         )
+    }
+
+    /// For printing: with the total where it is known, otherwise with the statistical σ.
+    pub(crate) fn in_all(&self) -> Estimate {
+        let sigma = self.sigma_total.or(self.sigma);
+        Estimate::new(self.value.unwrap_or(f64::NAN), sigma.unwrap_or(f64::NAN))
     }
 }
 
@@ -73,6 +85,18 @@ impl LatticeVector {
     pub(crate) fn all(lattice: &LatticeVectors, bilayer: Bilayer<'_>) -> [Self; 3] {
         [0, 1, 2].map(|index| Self::of(lattice, index, bilayer))
     }
+
+    /// The three vectors of a mean lattice.
+    pub(crate) fn of_mean(
+        lattice: &LatticeVectors,
+        budget: &Budget,
+        bilayer: Bilayer<'_>,
+    ) -> [Self; 3] {
+        [0, 1, 2].map(|index| Self {
+            wavelength_nm: estimate_in_all(budget.wavelength(lattice, index), 1.0),
+            ..Self::of(lattice, index, bilayer)
+        })
+    }
 }
 
 /// Twist and heterostrain of one lattice.
@@ -92,6 +116,10 @@ pub struct TwistStrainResult {
     pub strain_vector_percent: [Option<f64>; 2],
     /// Covariance of the strain vector, per cent².
     pub strain_vector_covariance: [[Option<f64>; 2]; 2],
+    /// One standard deviation of each component with everything, calibration and model included, per cent; as
+    /// `sigma_total` of the others.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub strain_vector_sigma_total_percent: Option<[Option<f64>; 2]>,
     /// How often noise alone gives so improbable a strain vector.
     pub strain_p_value: Option<f64>,
     /// The magnitude that the strain does not exceed, with 95 % confidence, per cent.
@@ -112,11 +140,31 @@ impl From<&TwistStrain> for TwistStrainResult {
             strain_axis_lattice_deg: result.axis_lattice().map(axis),
             strain_vector_percent: pair(result.strain_vector, PERCENT),
             strain_vector_covariance: square(&result.strain_covariance(), PERCENT * PERCENT),
+            strain_vector_sigma_total_percent: None,
             strain_p_value: number(result.strain_p_value()),
             strain_upper_limit_95_percent: number(result.strain_upper_limit_95() * PERCENT),
             strain_interval_95_percent: result
                 .strain_interval_95()
                 .map(|end| number(end * PERCENT)),
+        }
+    }
+}
+
+impl TwistStrainResult {
+    /// Twist and strain of a mean lattice, with the totals of its budget.
+    pub fn of_mean(found: &TwistStrain, budget: &Budget) -> Self {
+        let axis = |angle| estimate_in_all(angle, degree());
+        let totals = budget
+            .strain_vector(found)
+            .map(|part| number(part.total * PERCENT));
+        Self {
+            twist_deg: estimate_in_all(budget.twist(found), degree()),
+            heterostrain_percent: estimate_in_all(budget.heterostrain(found), PERCENT),
+            lattice_angle_deg: estimate_in_all(budget.lattice_angle(found), degree()),
+            strain_axis_lab_deg: budget.axis_lab(found).map(axis),
+            strain_axis_lattice_deg: budget.axis_lattice(found).map(axis),
+            strain_vector_sigma_total_percent: totals.iter().any(Option::is_some).then_some(totals),
+            ..found.into()
         }
     }
 }

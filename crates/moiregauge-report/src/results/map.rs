@@ -41,7 +41,7 @@ pub struct MapResults {
     pub masks: Vec<MaskCount>,
     /// Mean and spread of every quantity over the good nodes.
     pub quantities: Vec<QuantityResult>,
-    /// The fit to the whole images, to compare with: twist and strain with all errors.
+    /// The fit to the whole images, to compare with.
     pub whole_image: Option<TwistStrainResult>,
     /// The images behind the map.
     pub images: Vec<MappedImage>,

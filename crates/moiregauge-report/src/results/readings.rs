@@ -267,14 +267,14 @@ impl From<&TensorReading> for StrainTensorResult {
         let all = reading.in_all();
         let interval = reading.magnitudes().unwrap_or([f64::NAN; 2]);
         Self {
-            found: (&reading.best).into(),
+            found: tensor_numbers(&reading.best, &all),
             total: (&all).into(),
             splits: all.splits(reading.poisson_ratio).each_ref().map(Into::into),
             covariance: in_surface_units(&reading.best.covariance),
             other_sense: reading.opposite.as_ref().map(|opposite| {
                 let all = opposite.in_all();
                 OtherSenseResult {
-                    found: (&opposite.found).into(),
+                    found: tensor_numbers(&opposite.found, &all),
                     total: (&all).into(),
                     splits: all.splits(reading.poisson_ratio).each_ref().map(Into::into),
                     covariance: in_surface_units(&opposite.found.covariance),
@@ -313,6 +313,26 @@ impl From<&StrainTensor> for TensorNumbers {
             shear_vector_percent: pair(found.shear, PERCENT),
             axis_lab_deg: found.axis_lab().map(|a| estimate(a, degree())),
         }
+    }
+}
+
+/// A tensor with the errors of `all` as totals.
+fn tensor_numbers(best: &StrainTensor, all: &StrainTensor) -> TensorNumbers {
+    let found = TensorNumbers::from(best);
+    let with = |part: ResultEstimate, total: Estimate, factor: f64| ResultEstimate {
+        sigma_total: number(total.scaled(factor).sigma),
+        ..part
+    };
+    TensorNumbers {
+        twist_deg: with(found.twist_deg, all.twist(), degree()),
+        lattice_angle_deg: with(found.lattice_angle_deg, all.lattice_angle(), degree()),
+        mean_strain_percent: with(found.mean_strain_percent, all.mean(), PERCENT),
+        shear_percent: with(found.shear_percent, all.shear(), PERCENT),
+        axis_lab_deg: found.axis_lab_deg.map(|axis| match all.axis_lab() {
+            Some(total) => with(axis, total, degree()),
+            None => axis,
+        }),
+        ..found
     }
 }
 

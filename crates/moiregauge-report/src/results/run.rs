@@ -26,6 +26,9 @@ pub struct Run {
     /// Images in which the orientation of a layer was to be measured.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub atomic: Option<AtomicImages>,
+    /// An image of a larger area to mark the scans in.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub survey_image: Option<String>,
     /// Which parts of the report were wanted.
     pub report: Choice,
     /// Names of corrected images that were wanted.

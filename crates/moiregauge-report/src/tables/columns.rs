@@ -49,7 +49,7 @@ pub(super) struct VectorRow<'a> {
 }
 
 impl<'a> Row<'a> for VectorRow<'a> {
-    const ABOUT: &'static str = "One row per scan, lattice vector and kind of coordinates.";
+    const ABOUT: &'static str = "One row per scan, lattice vector and kind of coordinates. σ of single scans is the statistical part alone; what calibration and model add is that of the set, see budget.csv.";
     const COLUMNS: &'a [Column<Self>] = columns! {
         "set", "name of the set", |r| r.set.name.clone();
         "scan", "number of the scan in its set, from 1", |r| count(r.number);
@@ -63,11 +63,11 @@ impl<'a> Row<'a> for VectorRow<'a> {
         "variance_y_nm2", "variance of y", |r| number(r.vector.covariance_nm2[1][1]);
         "covariance_xy_nm2", "covariance of x and y", |r| number(r.vector.covariance_nm2[0][1]);
         "wavelength_nm", "length", |r| number(r.vector.wavelength_nm.value);
-        "wavelength_sigma_nm", "its σ", |r| number(r.vector.wavelength_nm.sigma);
+        "wavelength_sigma_nm", "its statistical σ", |r| number(r.vector.wavelength_nm.sigma);
         "polar_angle_ccw_from_x_deg", "direction", |r| number(r.vector.polar_angle_deg);
-        "polar_angle_sigma_deg", "its σ", |r| number(r.vector.polar_angle_sigma_deg);
+        "polar_angle_sigma_deg", "its statistical σ", |r| number(r.vector.polar_angle_sigma_deg);
         "naive_twist_deg", "2 arcsin(a/2λ), the twist without strain", |r| number(r.vector.naive_twist_deg.value);
-        "naive_twist_sigma_deg", "its σ", |r| number(r.vector.naive_twist_deg.sigma);
+        "naive_twist_sigma_deg", "its statistical σ", |r| number(r.vector.naive_twist_deg.sigma);
     };
 
     fn rows(results: &'a Results) -> Vec<Self> {
@@ -115,7 +115,7 @@ pub(super) struct ScanRow<'a> {
 }
 
 impl<'a> Row<'a> for ScanRow<'a> {
-    const ABOUT: &'static str = "One row per scan and kind of coordinates.";
+    const ABOUT: &'static str = "One row per scan and kind of coordinates. σ of single scans is the statistical part alone; what calibration and model add is that of the set, see budget.csv.";
     const COLUMNS: &'a [Column<Self>] = columns! {
         "set", "name of the set", |r| r.set.name.clone();
         "scan", "number of the scan in its set, from 1", |r| count(r.number);
@@ -134,18 +134,18 @@ impl<'a> Row<'a> for ScanRow<'a> {
         "tip_velocity_slow_spread_nm_per_s", "standard deviation", |r| number(r.scan.tip_velocity_nm_per_s.slow.sigma);
         "coordinates", "`sensor`: not corrected; `drift_corrected`: drift removed", |r| r.coordinates.to_owned();
         "twist_deg", "twist θ", |r| value(r.result.map(|t| t.twist_deg));
-        "twist_sigma_deg", "its σ", |r| sigma(r.result.map(|t| t.twist_deg));
+        "twist_sigma_deg", "its statistical σ", |r| sigma(r.result.map(|t| t.twist_deg));
         "heterostrain_percent", "ε, noise bias removed", |r| value(r.result.map(|t| t.heterostrain_percent));
-        "heterostrain_sigma_percent", "its σ", |r| sigma(r.result.map(|t| t.heterostrain_percent));
+        "heterostrain_sigma_percent", "its statistical σ", |r| sigma(r.result.map(|t| t.heterostrain_percent));
         "strain_e1_percent", "ε cos 2φ_lab", |r| number(r.result.and_then(|t| t.strain_vector_percent[0]));
         "strain_e2_percent", "ε sin 2φ_lab", |r| number(r.result.and_then(|t| t.strain_vector_percent[1]));
         "strain_axis_lab_ccw_from_x_deg", "φ_lab; empty unless p < 0.01", |r| value(r.result.and_then(|t| t.strain_axis_lab_deg));
-        "strain_axis_lab_sigma_deg", "its σ", |r| sigma(r.result.and_then(|t| t.strain_axis_lab_deg));
+        "strain_axis_lab_sigma_deg", "its statistical σ", |r| sigma(r.result.and_then(|t| t.strain_axis_lab_deg));
         "strain_axis_lattice_deg", "φ from layer 1; empty unless p < 0.01", |r| value(r.result.and_then(|t| t.strain_axis_lattice_deg));
-        "strain_axis_lattice_sigma_deg", "its σ", |r| sigma(r.result.and_then(|t| t.strain_axis_lattice_deg));
+        "strain_axis_lattice_sigma_deg", "its statistical σ", |r| sigma(r.result.and_then(|t| t.strain_axis_lattice_deg));
         "strain_p_value", "how often noise alone gives such a strain", |r| number(r.result.and_then(|t| t.strain_p_value));
         "lattice_angle_deg", "orientation α of layer 1, modulo 60°", |r| value(r.result.map(|t| t.lattice_angle_deg));
-        "lattice_angle_sigma_deg", "its σ", |r| sigma(r.result.map(|t| t.lattice_angle_deg));
+        "lattice_angle_sigma_deg", "its statistical σ", |r| sigma(r.result.map(|t| t.lattice_angle_deg));
         "residual_chi2", "χ² of the scan against the fit of all others; empty without a joint fit", |r| number(r.scan.residual.and_then(|s| s.chi2));
         "residual_degrees_of_freedom", "its degrees of freedom", |r| r.scan.residual.map_or(String::new(), |s| count(s.degrees_of_freedom));
         "residual_p_value", "how often chance makes so large a χ²", |r| number(r.scan.residual.and_then(|s| s.p_value));
@@ -204,34 +204,38 @@ impl<'a> Row<'a> for SetRow<'a> {
         "channel", "the analysed channel", |r| r.set.channel.clone();
         "scans", "number of scans", |r| count(r.set.scans.len());
         "drift_x_nm_per_min", "drift to the right", |r| value(r.set.drift.as_ref().map(|d| d.x_nm_per_min));
-        "drift_x_sigma_nm_per_min", "its σ", |r| sigma(r.set.drift.as_ref().map(|d| d.x_nm_per_min));
+        "drift_x_sigma_nm_per_min", "its statistical σ", |r| sigma(r.set.drift.as_ref().map(|d| d.x_nm_per_min));
+        "drift_x_total_sigma_nm_per_min", "its total σ: the calibration of the scanner as well", |r| number(r.set.drift.as_ref().and_then(|d| d.x_nm_per_min.sigma_total));
         "drift_y_nm_per_min", "drift up", |r| value(r.set.drift.as_ref().map(|d| d.y_nm_per_min));
-        "drift_y_sigma_nm_per_min", "its σ", |r| sigma(r.set.drift.as_ref().map(|d| d.y_nm_per_min));
+        "drift_y_sigma_nm_per_min", "its statistical σ", |r| sigma(r.set.drift.as_ref().map(|d| d.y_nm_per_min));
+        "drift_y_total_sigma_nm_per_min", "its total σ: the calibration of the scanner as well", |r| number(r.set.drift.as_ref().and_then(|d| d.y_nm_per_min.sigma_total));
         "drift_correlation", "correlation coefficient of the two", |r| number(r.set.drift.as_ref().and_then(|d| d.correlation));
         "drift_given", "whether the user gave the drift", |r| r.set.drift.as_ref().map_or_else(String::new, |d| d.given.to_string());
         "twist_deg", "twist θ", |r| value(r.result().map(|t| t.twist_deg));
-        "twist_sigma_deg", "its σ", |r| sigma(r.result().map(|t| t.twist_deg));
-        "twist_total_sigma_deg", "its σ with calibration and model, see budget.csv", |r| total(r.budget().map(|b| b.twist_deg));
+        "twist_sigma_deg", "its statistical σ: image noise, drift and sensor noise", |r| sigma(r.result().map(|t| t.twist_deg));
+        "twist_total_sigma_deg", "its total σ, calibration and model included, see budget.csv: what may be published", |r| total(r.budget().map(|b| b.twist_deg));
         "twist_scatter_deg", "standard deviation over the scans", |r| number(r.mean().and_then(|m| m.twist_scatter_deg));
         "heterostrain_percent", "ε, noise bias removed", |r| value(r.result().map(|t| t.heterostrain_percent));
-        "heterostrain_sigma_percent", "its σ", |r| sigma(r.result().map(|t| t.heterostrain_percent));
-        "heterostrain_total_sigma_percent", "its σ with calibration and model, see budget.csv", |r| total(r.budget().map(|b| b.heterostrain_percent));
+        "heterostrain_sigma_percent", "its statistical σ", |r| sigma(r.result().map(|t| t.heterostrain_percent));
+        "heterostrain_total_sigma_percent", "its total σ", |r| total(r.budget().map(|b| b.heterostrain_percent));
         "strain_e1_percent", "ε cos 2φ_lab", |r| number(r.result().and_then(|t| t.strain_vector_percent[0]));
         "strain_e2_percent", "ε sin 2φ_lab", |r| number(r.result().and_then(|t| t.strain_vector_percent[1]));
-        "strain_e1_total_sigma_percent", "σ of E₁ with calibration and model, see budget.csv", |r| total(r.budget().map(|b| b.strain_e1_percent));
-        "strain_e2_total_sigma_percent", "σ of E₂ with calibration and model, see budget.csv", |r| total(r.budget().map(|b| b.strain_e2_percent));
-        "strain_variance_e1_percent2", "variance of E₁", |r| number(r.result().and_then(|t| t.strain_vector_covariance[0][0]));
-        "strain_variance_e2_percent2", "variance of E₂", |r| number(r.result().and_then(|t| t.strain_vector_covariance[1][1]));
-        "strain_covariance_e1_e2_percent2", "covariance of E₁ and E₂", |r| number(r.result().and_then(|t| t.strain_vector_covariance[0][1]));
+        "strain_e1_total_sigma_percent", "total σ of E₁", |r| total(r.budget().map(|b| b.strain_e1_percent));
+        "strain_e2_total_sigma_percent", "total σ of E₂", |r| total(r.budget().map(|b| b.strain_e2_percent));
+        "strain_variance_e1_percent2", "statistical variance of E₁", |r| number(r.result().and_then(|t| t.strain_vector_covariance[0][0]));
+        "strain_variance_e2_percent2", "statistical variance of E₂", |r| number(r.result().and_then(|t| t.strain_vector_covariance[1][1]));
+        "strain_covariance_e1_e2_percent2", "statistical covariance of E₁ and E₂", |r| number(r.result().and_then(|t| t.strain_vector_covariance[0][1]));
         "strain_scatter_percent", "deviation per component over the scans", |r| number(r.mean().and_then(|m| m.strain_scatter_percent));
         "strain_axis_lab_ccw_from_x_deg", "φ_lab; empty unless p < 0.01", |r| value(r.result().and_then(|t| t.strain_axis_lab_deg));
-        "strain_axis_lab_sigma_deg", "its σ", |r| sigma(r.result().and_then(|t| t.strain_axis_lab_deg));
-        "strain_axis_lab_total_sigma_deg", "σ of φ_lab with calibration and model, see budget.csv", |r| total(r.budget().and_then(|b| b.strain_axis_lab_deg));
+        "strain_axis_lab_sigma_deg", "its statistical σ", |r| sigma(r.result().and_then(|t| t.strain_axis_lab_deg));
+        "strain_axis_lab_total_sigma_deg", "its total σ", |r| total(r.budget().and_then(|b| b.strain_axis_lab_deg));
         "strain_p_value", "how often noise alone gives such a strain", |r| number(r.result().and_then(|t| t.strain_p_value));
         "strain_interval_95_low_percent", "lower end of the 95 % interval of ε", |r| number(r.result().and_then(|t| t.strain_interval_95_percent[0]));
         "strain_interval_95_high_percent", "its upper end", |r| number(r.result().and_then(|t| t.strain_interval_95_percent[1]));
         "strain_upper_limit_95_percent", "not exceeded with 95 % confidence", |r| number(r.result().and_then(|t| t.strain_upper_limit_95_percent));
         "lattice_angle_deg", "orientation α of layer 1, modulo 60°", |r| value(r.result().map(|t| t.lattice_angle_deg));
+        "lattice_angle_sigma_deg", "its statistical σ", |r| sigma(r.result().map(|t| t.lattice_angle_deg));
+        "lattice_angle_total_sigma_deg", "its total σ", |r| total(r.budget().map(|b| b.lattice_angle_deg));
         "chi2_per_dof", "χ² per degree of freedom of the scans against the common lattice; every σ is enlarged by its square root where it is significantly above 1 (p < 0.05)", |r| number(r.mean().and_then(|m| m.chi2_per_dof));
         "within_one_percent", "whether all wavelengths lie within ±1 % of the common ones", |r| r.mean().map_or_else(String::new, |m| m.within_one_percent.to_string());
     };

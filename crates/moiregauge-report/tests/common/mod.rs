@@ -9,7 +9,7 @@
 mod scan;
 mod sets;
 
-use moiregauge::analysis::{Analysis, Axis, Combined, Consistency};
+use moiregauge::analysis::{Analysis, Axis, Combined, Consistency, Picture};
 use moiregauge::budget::Budget;
 use moiregauge::caveat::Caveat;
 use moiregauge::image::Image;
@@ -63,6 +63,7 @@ pub(crate) fn analysis() -> Analysis {
         settings,
         sets,
         combined,
+        survey: Some(survey()),
         atomic: None,
         caveats: vec![
             Caveat::new(
@@ -76,6 +77,23 @@ pub(crate) fn analysis() -> Analysis {
                 "One direction only: the scans cannot tell drift from strain.",
             ),
         ],
+    }
+}
+
+/// An image of 400 nm × 300 nm around the scans.
+fn survey() -> Picture {
+    let (columns, rows) = (160, 120);
+    let values = (0..rows * columns)
+        .map(|n| ((n % columns) as f64 / 9.0).sin() + ((n / columns) as f64 / 14.0).cos())
+        .collect();
+    Picture {
+        file: "survey.000".to_owned(),
+        channel: "Height Sensor".to_owned(),
+        unit: "nm".to_owned(),
+        image: Image::new(rows, columns, values),
+        pixel_to_nm: Matrix2::identity() * 2.5,
+        origin: Vector2::new(-180.0, -140.0),
+        from_sensors: true,
     }
 }
 

@@ -3,7 +3,8 @@
 use std::f64::consts::TAU;
 
 use moiregauge::analysis::{
-    Axis, Drift, DriftFit, DriftMonteCarlo, Illustration, ScanAnalysis, SetAnalysis, SetMean,
+    Axis, Companion, Drift, DriftFit, DriftMonteCarlo, Illustration, ScanAnalysis, SetAnalysis,
+    SetMean,
 };
 use moiregauge::budget::{Budget, Statistical};
 use moiregauge::image::Image;
@@ -163,6 +164,13 @@ pub(super) fn illustration(scan: &ScanAnalysis, noise: &mut Noise) -> Option<Ill
         slow_velocities: (0..PIXELS)
             .map(|_| scan.slow_velocity.value + 0.02 * noise.normal())
             .collect(),
+        sensor_residuals: Some([0.1, 0.07].map(|a| image(|x, y| a * (x / 40.0 + y / 90.0).sin()))),
+        residual_block: 1,
+        amplitude: Some(Companion {
+            channel: "TR Amplitude".to_owned(),
+            unit: "mV".to_owned(),
+            image: image(|x, y| 2.0 - picture(x, y)),
+        }),
     })
 }
 

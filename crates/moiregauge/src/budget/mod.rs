@@ -18,8 +18,9 @@
 //!   variance is the mean square over a Gaussian prior, `d² + 3c²` for a change `d h/σ + c h²/σ²`.
 
 mod statistical;
+mod totals;
 
-use nalgebra::{Matrix2, Matrix4, Vector4};
+use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
 
 pub use statistical::{Statistical, weighted_mean};
 
@@ -204,19 +205,40 @@ fn lattice_error(
     statistical: &Statistical,
     settings: &Settings,
 ) -> Option<Matrix4<f64>> {
+    match source {
+        Source::Image => Some(statistical.image),
+        Source::Drift => Some(statistical.drift),
+        Source::Sensor => Some(statistical.sensor),
+        _ => {
+            let change = distortion(source, settings)? * lattice.basis;
+            Some(square(&Vector4::from_column_slice(change.as_slice())))
+        }
+    }
+}
+
+/// What the calibration of the scanner does to a velocity (or any other vector that the sensors measure):
+/// covariance in its unit squared.
+pub(crate) fn scanner_covariance(vector: &Vector2<f64>, settings: &Settings) -> Matrix2<f64> {
+    [Source::Gain, Source::Mismatch, Source::Orthogonality]
+        .into_iter()
+        .filter_map(|source| {
+            let change = distortion(source, settings)? * vector;
+            Some(change * change.transpose())
+        })
+        .sum()
+}
+
+/// The relative change of positions by one standard deviation of an error of the scanner; `None` for other sources.
+fn distortion(source: Source, settings: &Settings) -> Option<Matrix2<f64>> {
     if let Source::Gain | Source::Mismatch | Source::Orthogonality = source
         && let Some(scanner) = &settings.scanner
     {
         let error = scanner.independent_errors()[source as usize - Source::Gain as usize];
-        let change = scanner.map()? * error * lattice.basis;
-        return Some(square(&Vector4::from_column_slice(change.as_slice())));
+        return Some(scanner.map()? * error);
     }
     let calibration = &settings.calibration;
     // The whole of a difference between x and y shows as half of it in either.
     let (distortion, sigma) = match source {
-        Source::Image => return Some(statistical.image),
-        Source::Drift => return Some(statistical.drift),
-        Source::Sensor => return Some(statistical.sensor),
         Source::Gain => (Matrix2::identity(), calibration.gain_percent / 100.0),
         Source::Mismatch => (
             Matrix2::new(0.5, 0.0, 0.0, -0.5),
@@ -228,8 +250,7 @@ fn lattice_error(
         ),
         _ => return None,
     };
-    let change = distortion * lattice.basis * sigma;
-    Some(square(&Vector4::from_column_slice(change.as_slice())))
+    Some(distortion * sigma)
 }
 
 /// What a source that leaves the lattice as it is does to `(θ, α, E₁, E₂)`.

@@ -311,3 +311,47 @@ fn statistical_rows_add_up_to_sigma() {
     assert!(budget.total().magnitude.is_nan() && budget.total().axis_lab.is_nan());
     assert!(budget.known().covariance[(0, 0)] > 0.0 && budget.known().wavelengths[0] > 0.0);
 }
+
+/// Nothing is uncertain but the scanner: 1 % of gain is 1 % of every wavelength and of the drift, 4 mrad of shear
+/// half of it times the other component. What the user gave as drift keeps its own error.
+#[test]
+fn totals_hold_what_the_scanner_adds() {
+    let lattice = graphene(1.1, 0.001);
+    let scanner = |gain_percent: f64, orthogonality_mrad: f64| Settings {
+        calibration: Calibration {
+            gain_percent,
+            mismatch_percent: 0.0,
+            orthogonality_mrad,
+        },
+        ..Settings::default()
+    };
+    let gain = scanner(1.0, 0.0);
+    let budget = budget(&lattice, &gain);
+    for index in 0..3 {
+        let found = budget.wavelength(&lattice, index);
+        assert_eq!(found.statistical, 0.0);
+        assert!((found.total / found.value - 0.01).abs() < 1e-12);
+    }
+    let found = inverted(&lattice);
+    let twist = budget.twist(&found);
+    assert_eq!(twist.value, found.twist);
+    assert!(twist.statistical == 0.0 && twist.total > 0.00999 * twist.value);
+
+    let drift = |given: bool| crate::analysis::Drift {
+        velocity: Vector2::new(0.5, -0.15),
+        covariance: Matrix2::new(9e-6, 0.0, 0.0, 1e-6),
+        given,
+        fit: None,
+        monte_carlo: None,
+        joint: None,
+    };
+    let totals = |settings: &Settings| drift(false).velocities(settings).map(|v| v.total);
+    let expected = [9e-6 + 0.005_f64.powi(2), 1e-6 + 0.0015_f64.powi(2)].map(f64::sqrt);
+    for (found, expected) in totals(&gain).into_iter().zip(expected) {
+        assert!((found / expected - 1.0).abs() < 1e-12);
+    }
+    let [x, _] = totals(&scanner(0.0, 4.0));
+    assert!((x - (9e-6 + (0.002_f64 * 0.15).powi(2)).sqrt()).abs() < 1e-12);
+    let [x, y] = drift(true).velocities(&gain);
+    assert!(x.total == x.statistical && y.total == y.statistical);
+}

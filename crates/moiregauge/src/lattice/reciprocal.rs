@@ -39,6 +39,15 @@ pub(crate) fn real_from_reciprocal(k: &LatticeVectors) -> Option<LatticeVectors>
     })
 }
 
+/// As [`real_from_reciprocal`], but not turned by 60°: the real-space pair that [`reciprocal`] made `k` of, so that
+/// L₁, L₂ and L₃ of a map are those of the image.
+pub(crate) fn real_named_alike(k: &LatticeVectors) -> Option<LatticeVectors> {
+    Some(real_from_reciprocal(k)?.relabelled(&TURN))
+}
+
+/// `(a₁, a₂) → (a₂, a₂ − a₁)`: the next names, 60° further.
+const TURN: Matrix2<f64> = Matrix2::new(0.0, -1.0, 1.0, 1.0);
+
 /// The integer change of basis that turns a pair into its shortest one, about 60° apart, second
 /// counter-clockwise of the first (Lagrange–Gauss reduction). `None` for parallel vectors.
 pub(crate) fn shortest_pair(basis: &Matrix2<f64>) -> Option<Matrix2<f64>> {
@@ -112,18 +121,17 @@ pub(crate) fn labelled_like(lattice: &LatticeVectors, reference: &Matrix2<f64>) 
 /// The labelling whose first vector has its polar angle in [0°, 60°): a start for a series, all
 /// further lattices being labelled like the first.
 pub(crate) fn canonical(lattice: &LatticeVectors) -> LatticeVectors {
-    let turn = Matrix2::new(0.0, -1.0, 1.0, 1.0); // (a₁, a₂) → (a₂, a₂ − a₁)
     let mut current = *lattice;
     for _ in 0..6 {
         let angle = current.polar_angle(0).value;
         if (0.0..std::f64::consts::FRAC_PI_3).contains(&angle) {
             return current;
         }
-        current = current.relabelled(&turn);
+        current = current.relabelled(&TURN);
     }
     // A distorted hexagon can have no vector there: the one nearest to 30° then.
     (0..6).fold(*lattice, |best, _| {
-        current = current.relabelled(&turn);
+        current = current.relabelled(&TURN);
         let off = |l: &LatticeVectors| (l.polar_angle(0).value - std::f64::consts::FRAC_PI_6).abs();
         if off(&current) < off(&best) {
             current

@@ -5,7 +5,7 @@ use nalgebra::Vector2;
 use super::defects::Mask;
 use super::sample::{Grid, LatticeMap};
 use crate::estimate::Estimate;
-use crate::lattice::reciprocal::real_from_reciprocal;
+use crate::lattice::reciprocal::real_named_alike;
 use crate::strain::TwistStrain;
 
 /// One quantity on all nodes, row by row; NaN where there is none.
@@ -55,9 +55,9 @@ pub struct TwistStrainMap {
     pub magnitude: Plane,
     /// Axis `φ_lab` of the strain, rad in [0, π); NaN where the strain is not significant (p < 0.01).
     pub axis: Plane,
-    /// Lengths of the real-space vectors a₁, a₂, a₂ − a₁, nm.
+    /// Lengths of the lattice vectors L₁, L₂ and L₃ = L₂ − L₁, named as in the analysis of the whole image, nm.
     pub wavelengths: [Plane; 3],
-    /// Direction of a₁, rad.
+    /// Direction of L₁, rad.
     pub orientation: Plane,
     /// Displacement of the pattern against the mean lattice, nm; NaN where the phase could not be followed.
     pub displacement: [Plane; 2],
@@ -108,7 +108,7 @@ impl TwistStrainMap {
             out.magnitude.push(found.map(|f| f.heterostrain()));
             out.axis.push(found.and_then(|f| f.axis_lab()));
             let known = node.waves.basis.iter().all(|x| x.is_finite());
-            let real = known.then(|| real_from_reciprocal(&node.waves)).flatten();
+            let real = known.then(|| real_named_alike(&node.waves)).flatten();
             for (i, plane) in out.wavelengths.iter_mut().enumerate() {
                 plane.push(real.map(|l| l.wavelength(i)));
             }

@@ -39,7 +39,7 @@ pub use corrected::{CorrectedImage, corrected_images, nominal_geometry, on_grid}
 pub use domain_mapping::domains_of_scan;
 pub use group::natural_order;
 pub use identity::about_repeat;
-pub use illustrate::illustrate;
+pub use illustrate::{amplitude_of, illustrate, picture};
 pub use images::{image_choice, unusual_channels};
 pub use mapping::{LineMap, MapError, MapMethod, map_scan};
 pub use measure::{
@@ -123,6 +123,7 @@ pub fn analyse(scans: Vec<MeasuredScan>, settings: &Settings) -> Analysis {
         sets,
         combined,
         atomic: None,
+        survey: None,
         caveats,
     }
 }

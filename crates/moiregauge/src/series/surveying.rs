@@ -16,7 +16,7 @@ use crate::caveat::Caveat;
 use crate::domains::{Contrast, DomainMap, Mesh, find_nodes};
 use crate::geometry::{Geometry, Timing};
 use crate::image::Image;
-use crate::lattice::reciprocal::{labelled_like, real_from_reciprocal};
+use crate::lattice::reciprocal::{canonical, labelled_like, real_from_reciprocal, reciprocal};
 use crate::lattice::{LatticeError, LatticeVectors, MeasuredLattice, measure};
 use crate::map::{
     FULL_WIDTH, Grid, LatticeMap, Reference, Resolution, ResolutionError, Survey, TwistStrainMap,
@@ -120,6 +120,15 @@ fn block(
     read([columns, rows]).map_err(|why| SurveyError::Lines { from, to, why })
 }
 
+/// The wave vectors (rad/pixel) of the lattice whose vectors have the names that an analysis would give them.
+fn named(waves: &Matrix2<f64>, pixel_to_nm: &Matrix2<f64>) -> Option<Matrix2<f64>> {
+    let real = LatticeVectors {
+        basis: pixel_to_nm * reciprocal(waves)?,
+        covariance: Matrix4::zeros(),
+    };
+    reciprocal(&(pixel_to_nm.try_inverse()? * canonical(&real).basis))
+}
+
 impl SurveyPlan {
     /// Looks at the middle of an image of this geometry, timing known or not. Other images of a survey take the
     /// window and the labelling of the first.
@@ -160,7 +169,7 @@ impl SurveyPlan {
                 };
                 labelled_like(&exact, &(back * first.whole)).basis
             }
-            None => found.reciprocal,
+            None => named(&found.reciprocal, &placed.pixel_to_nm).ok_or(SurveyError::NoMap)?,
         };
         let resolution = &Resolution {
             window_nm: first.map(|f| f.window_nm).or(resolution.window_nm),

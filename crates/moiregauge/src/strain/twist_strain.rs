@@ -98,6 +98,19 @@ impl TwistStrain {
         (gradient.transpose() * error * gradient)[0]
     }
 
+    /// The variance of `φ = φ_lab − α − θ` (rad²) for an error of `(θ, α, E₁, E₂)` with this covariance.
+    pub(crate) fn axis_lattice_variance(&self, error: &Matrix4<f64>) -> f64 {
+        let gradient = self.axis_gradient(1.0);
+        (gradient.transpose() * error * gradient)[0]
+    }
+
+    /// Derivatives of `φ_lab − frame · (α + θ)` by `(θ, α, E₁, E₂)`.
+    fn axis_gradient(&self, frame: f64) -> Vector4<f64> {
+        let e = self.strain_vector;
+        let double = 2.0 * e.norm_squared();
+        Vector4::new(-frame, -frame, -e.y / double, e.x / double)
+    }
+
     /// `φ_lab`, the axis of the strain in the laboratory, rad in [0, π); `None` unless p < 0.01.
     ///
     /// Axis of tension in the real-space form, of compression in the k-space form.
@@ -119,7 +132,7 @@ impl TwistStrain {
             return None;
         }
         let e = self.strain_vector;
-        let gradient = Vector4::new(-frame, -frame, -e.y / (2.0 * square), e.x / (2.0 * square));
+        let gradient = self.axis_gradient(frame);
         let variance = (gradient.transpose() * self.covariance * gradient)[0];
         let axis = e.y.atan2(e.x) / 2.0 - frame * (self.lattice_angle + self.twist);
         Some(Estimate::from_variance(reduce(axis, PI), variance))

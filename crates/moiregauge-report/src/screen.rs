@@ -1,23 +1,31 @@
-//! The few lines on the screen at the end.
+//! An analysis in the few lines that fit on a screen.
+//!
+//! `value ± total`: calibration, lattice constant and model are in it. What noise, drift and sensors make of
+//! that stands behind it as the statistical part.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-use moiregauge::analysis::{Analysis, Combined, ScanAnalysis, SetAnalysis};
+use moiregauge::analysis::{Analysis, Combined, Drift, ScanAnalysis, SetAnalysis, SetMean};
 use moiregauge::budget::Budget;
 use moiregauge::caveat::Caveat;
-use moiregauge::estimate::Estimate;
+use moiregauge::estimate::{Estimate, TotalEstimate};
 use moiregauge::lattice::LatticeVectors;
 use moiregauge::readings::{ChosenBy, NameReading, Naming, Readings};
+use moiregauge::settings::Settings;
 use moiregauge::strain::{StrainTensor, TwistStrain};
-use moiregauge_report::{FailedInput, fixed, layers, plus_minus, two_digits};
 use spmfile::FrameDirection;
 
+use crate::draw::scale::fixed;
+use crate::format::{plus_minus, two_digits, with_statistical};
+use crate::html::layers;
+use crate::provenance::FailedInput;
+
 /// Per set and combined: drift, twist, strain; then what to keep in mind.
-pub(crate) fn summary(analysis: &Analysis) -> String {
+pub fn summary(analysis: &Analysis) -> String {
     let mut text = format!("Layers: {}\n", layers(&analysis.settings));
     for set in &analysis.sets {
-        set_summary(&mut text, set);
+        set_summary(&mut text, set, &analysis.settings);
     }
     if let Some(combined) = analysis
         .combined
@@ -30,7 +38,7 @@ pub(crate) fn summary(analysis: &Analysis) -> String {
     text
 }
 
-fn set_summary(text: &mut String, set: &SetAnalysis) {
+fn set_summary(text: &mut String, set: &SetAnalysis, settings: &Settings) {
     let used = || set.scans.iter().filter(|s| s.excluded.is_none());
     let (count, others) = (used().count(), set.scans.len() - used().count());
     let _ = writeln!(
@@ -46,42 +54,47 @@ fn set_summary(text: &mut String, set: &SetAnalysis) {
         }
     );
     match &set.drift {
-        Some(drift) => {
-            let per_minute = |i: usize| {
-                Estimate::from_variance(drift.velocity[i], drift.covariance[(i, i)]).scaled(60.0)
-            };
-            let _ = writeln!(
-                text,
-                "  drift         x {}, y {} nm/min{}",
-                plus_minus(per_minute(0)),
-                plus_minus(per_minute(1)),
-                if drift.given { " (given)" } else { "" }
-            );
-        }
+        Some(drift) => drift_line(text, drift, settings),
         None => text.push_str("  drift         not determined\n"),
     }
     match (&set.mean, &set.uncorrected) {
-        (Some(mean), _) => {
-            lattice(text, &mean.lattice);
-            twist_strain(text, &mean.twist_strain, &mean.budget, &mean.readings);
-            readings(text, &mean.readings);
-        }
+        (Some(mean), _) => set_mean(text, mean),
         (None, Some(mean)) => {
-            text.push_str(
-                "  not corrected for drift (statistical errors only, drift not included):\n",
-            );
-            lattice(text, &mean.lattice);
-            twist_strain(text, &mean.twist_strain, &mean.budget, &mean.readings);
-            readings(text, &mean.readings);
+            text.push_str("  not corrected for drift; what the drift did is in no error:\n");
+            set_mean(text, mean);
         }
         (None, None) => {
             if let Some(scan) = set.scans.first() {
-                lattice(text, scan.drift_corrected.as_ref().unwrap_or(&scan.sensor));
+                let lattice = scan.drift_corrected.as_ref().unwrap_or(&scan.sensor);
+                let lengths = [0, 1, 2].map(|i| plus_minus(lattice.wavelength(i)));
+                let all = lengths.join(", ");
+                lattice_line(text, lattice, &format!("{all} nm (statistical errors)"));
             }
             text.push_str("  no twist and strain explain this lattice\n");
         }
     }
     text.push('\n');
+}
+
+fn drift_line(text: &mut String, drift: &Drift, settings: &Settings) {
+    let [x, y] = drift
+        .velocities(settings)
+        .map(|v| with_statistical(v.scaled(60.0), " nm/min"));
+    let given = if drift.given { " (given)" } else { "" };
+    let _ = writeln!(text, "  drift         x {x}, y {y}{given}");
+}
+
+fn set_mean(text: &mut String, mean: &SetMean) {
+    let lengths = [0, 1, 2].map(|i| {
+        let variance = mean.budget.known().wavelengths[i];
+        TotalEstimate::new(mean.lattice.wavelength(i), variance)
+    });
+    let totals = lengths.map(|l| plus_minus(l.total())).join(", ");
+    let parts = lengths.map(|l| two_digits(l.statistical)).join(", ");
+    let words = format!("{totals} nm (statistical ± {parts} nm)");
+    lattice_line(text, &mean.lattice, &words);
+    twist_strain(text, &mean.twist_strain, &mean.budget, &mean.readings);
+    readings(text, &mean.readings);
 }
 
 /// How many scans went up, how many down.
@@ -102,32 +115,23 @@ fn directions(scans: &[&ScanAnalysis]) -> String {
     }
 }
 
-/// Lengths and directions of the three vectors.
-fn lattice(text: &mut String, lattice: &LatticeVectors) {
-    let lengths = [0, 1, 2].map(|i| plus_minus(lattice.wavelength(i)));
+/// Lengths, in words, and directions of the three vectors.
+fn lattice_line(text: &mut String, lattice: &LatticeVectors, lengths: &str) {
     let angles = [0, 1, 2].map(|i| fixed(lattice.polar_angle(i).value.to_degrees(), 1));
     let _ = writeln!(
         text,
-        "  lattice       {} nm at {}° to x",
-        lengths.join(", "),
+        "  lattice       {lengths} at {}° to x",
         angles.join(", ")
     );
 }
 
-/// σ of the scans, and in brackets σ with everything in the budget.
+/// Twist and strain with everything in the budget that is known, and the statistical part.
 fn twist_strain(text: &mut String, found: &TwistStrain, budget: &Budget, readings: &Readings) {
-    let degree = 1f64.to_degrees();
-    let degrees = |e: Estimate| plus_minus(e.scaled(degree));
-    let known = budget.known();
-    let all = budget.applied_to(found);
-    let sigma = |variance: f64, factor: f64| {
-        two_digits(factor * Estimate::from_variance(0.0, variance).sigma)
-    };
+    let twist = TotalEstimate::new(found.twist(), budget.known().covariance[(0, 0)]);
     let _ = writeln!(
         text,
-        "  twist         {}° (± {}° with calibration and model{}){}",
-        degrees(found.twist()),
-        sigma(known.covariance[(0, 0)], degree),
+        "  twist         {}{}{}",
+        with_statistical(twist.scaled(1f64.to_degrees()), "°"),
         if budget.drift_known() {
             ""
         } else {
@@ -141,54 +145,59 @@ fn twist_strain(text: &mut String, found: &TwistStrain, budget: &Budget, reading
             ""
         }
     );
-    let percent = |[low, high]: [f64; 2]| format!("{:.4} to {:.4} %", 100.0 * low, 100.0 * high);
+    heterostrain(text, found, budget);
+}
+
+fn heterostrain(text: &mut String, found: &TwistStrain, budget: &Budget) {
+    let degree = 1f64.to_degrees();
+    let (known, all) = (budget.known(), budget.applied_to(found));
     let below = |e: &TwistStrain| format!("{:.4} %", 100.0 * e.strain_upper_limit_95());
-    let (axis, interval, in_all) = (
-        found.axis_lab(),
-        found.strain_interval_95(),
-        all.strain_interval_95(),
-    );
-    match axis {
+    let magnitude = TotalEstimate::new(found.heterostrain(), known.magnitude).scaled(100.0);
+    match found.axis_lab() {
         Some(axis) if all.axis_lab().is_some() => {
+            let axis = TotalEstimate::new(axis, known.axis_lab).scaled(degree);
             let _ = writeln!(
                 text,
-                "  heterostrain  {} % (± {} %), axis {}° (± {}°) to x",
-                plus_minus(found.heterostrain().scaled(100.0)),
-                sigma(known.magnitude, 100.0),
-                degrees(axis),
-                sigma(known.axis_lab, degree)
+                "  heterostrain  {}, axis {} to x",
+                with_statistical(magnitude, " %"),
+                with_statistical(axis, "°")
             );
         }
         Some(axis) => {
             let _ = writeln!(
                 text,
-                "  heterostrain  {} %, axis {}° to x, in the image; with calibration and model below {} \
-                 (95 %), not significant",
-                plus_minus(found.heterostrain().scaled(100.0)),
-                degrees(axis),
-                below(&all)
+                "  heterostrain  below {} (95 %), not significant; the image shows {} % along {}° to x (statistical \
+                 errors), which the calibration alone may make",
+                below(&all),
+                plus_minus(magnitude.statistical()),
+                plus_minus(axis.scaled(degree))
             );
         }
         None => {
             let _ = writeln!(
                 text,
-                "  heterostrain  below {} (95 %; {} with calibration and model), not significant",
-                below(found),
-                below(&all)
+                "  heterostrain  below {} (95 %; by the statistical part below {}), not significant",
+                below(&all),
+                below(found)
             );
         }
     }
-    let part = |i: usize| {
-        let variance = found.strain_covariance()[(i, i)];
-        plus_minus(Estimate::from_variance(found.strain_vector[i], variance).scaled(100.0))
-    };
+    let parts = [0, 1].map(|i| {
+        let part = found.strain_covariance()[(i, i)];
+        let total = known.covariance[(i + 2, i + 2)];
+        let part = Estimate::from_variance(found.strain_vector[i], part);
+        TotalEstimate::new(part, total).scaled(100.0)
+    });
+    let percent = |[low, high]: [f64; 2]| format!("{:.4} to {:.4} %", 100.0 * low, 100.0 * high);
     let _ = writeln!(
         text,
-        "                vector ({}, {}) %; 95 %: {} ({})",
-        part(0),
-        part(1),
-        percent(interval),
-        percent(in_all)
+        "                vector ({}, {}) % (statistical ± {}, {} %); 95 %: {} (statistical {})",
+        plus_minus(parts[0].total()),
+        plus_minus(parts[1].total()),
+        two_digits(parts[0].statistical),
+        two_digits(parts[1].statistical),
+        percent(all.strain_interval_95()),
+        percent(found.strain_interval_95())
     );
 }
 
@@ -202,19 +211,17 @@ fn strain_tensor(
 ) {
     let degrees = |e: Estimate| plus_minus(e.scaled(1f64.to_degrees()));
     let percent = |e: Estimate| plus_minus(e.scaled(100.0));
-    let sigma = |e: Estimate, factor: f64| two_digits(factor * e.sigma);
+    let both = |part: Estimate, all: Estimate, factor: f64, unit: &str| {
+        let found = TotalEstimate::new(part, all.sigma * all.sigma);
+        with_statistical(found.scaled(factor), unit)
+    };
     let _ = writeln!(
         text,
-        "    {word}twist       {}° (± {}° with calibration and constants)\n    \
-         mean strain {} % (± {} %), shear part {} % (± {} %){}",
-        degrees(found.twist()),
-        sigma(all.twist(), 1f64.to_degrees()),
-        percent(found.mean()),
-        sigma(all.mean(), 100.0),
-        percent(found.shear()),
-        sigma(all.shear(), 100.0),
-        found
-            .axis_lab()
+        "    {word}twist       {}\n    mean strain {}, shear part {}{}",
+        both(found.twist(), all.twist(), 1f64.to_degrees(), "°"),
+        both(found.mean(), all.mean(), 100.0, " %"),
+        both(found.shear(), all.shear(), 100.0, " %"),
+        all.axis_lab()
             .map_or_else(String::new, |a| format!(", axis {}°", degrees(a)))
     );
     for (word, split) in ["= uniaxial", "or"].iter().zip(all.splits(poisson_ratio)) {
@@ -268,7 +275,7 @@ fn readings(text: &mut String, readings: &Readings) {
         {
             let _ = writeln!(
                 text,
-                "    the same orientation by symmetry: twist {}°, mean strain {} %",
+                "    the same orientation by symmetry: twist {}°, mean strain {} % (statistical errors)",
                 degrees(other.twist()),
                 percent(other.mean())
             );
@@ -278,7 +285,7 @@ fn readings(text: &mut String, readings: &Readings) {
     if !readings.layers_differ {
         return;
     }
-    text.push_str("  the layers differ: twist and strain trade, and these readings are as good as each other\n");
+    text.push_str("  the layers differ: twist and strain trade, and these readings are as good as each other (statistical errors):\n");
     for (index, branch) in readings.choices().enumerate() {
         let _ = writeln!(
             text,
@@ -341,7 +348,7 @@ fn combined_summary(text: &mut String, combined: &Combined) {
 }
 
 /// One line for each caveat, however many files it concerns.
-pub(crate) fn caveats(text: &mut String, all: &[Caveat]) {
+pub fn caveats(text: &mut String, all: &[Caveat]) {
     let mut by_message: BTreeMap<(&str, &str), Vec<&str>> = BTreeMap::new();
     for caveat in all {
         let places = by_message
@@ -359,7 +366,7 @@ pub(crate) fn caveats(text: &mut String, all: &[Caveat]) {
 }
 
 /// The table of what failed and why; empty if nothing did.
-pub(crate) fn failures(failed: &[FailedInput]) -> String {
+pub fn failures(failed: &[FailedInput]) -> String {
     let mut text = String::new();
     if failed.is_empty() {
         return text;
