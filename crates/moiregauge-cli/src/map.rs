@@ -12,6 +12,7 @@ use std::process::ExitCode;
 
 use anyhow::{Context as _, bail, ensure};
 use clap::ValueEnum;
+use moiregauge::analysis::{Picture, ScanAnalysis};
 use moiregauge::caveat::Caveat;
 use moiregauge::map::{DriftChange, LatticeMap, Resolution, TwistStrainMap, register};
 use moiregauge::series::{
@@ -315,14 +316,7 @@ fn together(
     let how = (args.map_method.into(), resolution);
     let (mut maps, mut shown) = (Vec::new(), None);
     for scan in used() {
-        let mapped = read_again(inputs, &scan.file, settings, known).and_then(|r| {
-            let lines = map_scan(&r.scan, (scan, origin), settings, how)?;
-            shown = shown
-                .take()
-                .or_else(|| picture(&scan.file, &r.scan, settings));
-            Ok(lines)
-        });
-        match mapped {
+        match mapped(scan, inputs, (settings, known), (origin, how), &mut shown) {
             Ok(lines) => maps.extend(lines),
             Err(error) => provenance.failed.push(FailedInput {
                 file: scan.file.clone(),
@@ -341,11 +335,7 @@ fn together(
     let found = lattices
         .twist_strain(&reference, layers, convention)
         .unwrap_or_else(|why| {
-            caveats.push(Caveat::new(
-                "no-twist-strain",
-                "map",
-                format!("{why}: the map has wavelengths and directions only"),
-            ));
+            caveats.push(no_twist_strain(&why));
             vec![None; lattices.nodes.len()]
         });
     doubts(&maps, &mut caveats);
@@ -382,6 +372,28 @@ fn together(
         drift_change,
         caveats,
     })))
+}
+
+/// The maps of one scan, trace and retrace; `origin` is the time that drift is counted from. Its image is shown if none
+/// is yet.
+fn mapped(
+    scan: &ScanAnalysis,
+    inputs: &[PathBuf],
+    (settings, known): (&Settings, &Known),
+    (origin, how): (Option<f64>, (MapMethod, &Resolution)),
+    shown: &mut Option<Picture>,
+) -> anyhow::Result<Vec<LineMap>> {
+    let reading = read_again(inputs, &scan.file, settings, known)?;
+    let lines = map_scan(&reading.scan, (scan, origin), settings, how)?;
+    if shown.is_none() {
+        *shown = picture(&scan.file, &reading.scan, settings);
+    }
+    Ok(lines)
+}
+
+fn no_twist_strain(why: &impl std::fmt::Display) -> Caveat {
+    let words = format!("{why}: the map has wavelengths and directions only");
+    Caveat::new("no-twist-strain", "map", words)
 }
 
 /// Says that the drift changes, where it does.

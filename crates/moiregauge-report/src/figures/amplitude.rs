@@ -34,7 +34,7 @@ pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
             crisp: false,
         };
         svg.clipped(area, |svg| {
-            raster::draw(svg, &axes, image, linear, origin, &shades)
+            raster::draw(svg, &axes, image, linear, origin, &shades);
         });
         let labels = Labels {
             letter: layout::LETTERS[index],

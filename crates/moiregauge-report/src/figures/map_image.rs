@@ -24,7 +24,7 @@ pub(super) fn draw(subject: &MapSubject) -> Result<Drawing, String> {
         crisp: false,
     };
     svg.clipped(area, |svg| {
-        raster::draw(svg, &axes, image, linear, origin, &shades)
+        raster::draw(svg, &axes, image, linear, origin, &shades);
     });
     let labels = Labels {
         x: "x (nm)",

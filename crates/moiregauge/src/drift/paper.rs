@@ -63,6 +63,7 @@ impl PaperScan {
     }
 
     /// The same scan with peaks and velocities drawn from their distributions.
+    #[must_use]
     pub fn drawn(&self, rng: &mut ChaCha8Rng) -> Self {
         let mut new = *self;
         for peak in &mut new.peaks {

@@ -282,7 +282,7 @@ mod tests {
         move |c| -PITCH * columns * (1.0 - 2.0 * (-c / columns).exp())
     }
 
-    /// The time constant and what it does to the slope, −12 (T/T_line)² of it where lines are long, in trace and in
+    /// The time constant and what it does to the slope, −12 (`T/T_line`)² of it where lines are long, in trace and in
     /// retrace; the straight rest has the pitch of the tip.
     #[test]
     fn a_lag_is_measured() {
@@ -315,11 +315,14 @@ mod tests {
         }
     }
 
+    /// A line by column, nm.
+    type Shape = Box<dyn Fn(f64) -> f64>;
+
     /// Noise, bows and creep of scanners, ripples and steps are no lag.
     #[test]
     fn what_is_no_lag_is_not_taken_for_one() {
         let place = |c: f64| 2.0 * c / COLUMNS as f64 - 1.0;
-        let shapes: [(&str, Box<dyn Fn(f64) -> f64>); 6] = [
+        let shapes: [(&str, Shape); 6] = [
             ("noise", Box::new(|_| 0.0)),
             ("bow", Box::new(move |c| 1.5 * place(c).powi(2))),
             (
