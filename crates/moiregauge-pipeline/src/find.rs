@@ -12,6 +12,7 @@ use spmfile::{Format, detect, looks_like_scan, named_like_scan};
 use crate::names::in_words;
 use crate::reading;
 use crate::session::{channels_of_one_frame, one_per_frame};
+use crate::sink::MANIFEST;
 
 /// So many bytes tell the format of a file.
 const HEAD: u64 = 512;
@@ -123,6 +124,8 @@ impl Found {
             match look(file) {
                 Look::Scan => scans.push(file.clone()),
                 Look::Failed(reason) => failed.push((file, reason)),
+                // The list of what the simulator wrote beside its scans.
+                Look::Other if file.file_name().is_some_and(|name| name == MANIFEST) => {}
                 Look::Other => self.left_alone.add(file),
                 Look::Folder => {}
             }

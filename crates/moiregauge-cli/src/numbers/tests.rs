@@ -29,7 +29,9 @@ fn templates(command: &str, option: &str) -> Vec<&'static str> {
         (_, "region") => vec!["a={},0,20,20", "a=0,0,{},20", "a=0,0 20,0 20,{}"],
         (_, "profile") => vec!["a={},0 20,20", "a=0,0 20,{}"],
         (_, "wanted") => vec!["{}±0.1", "1±{}"],
-        ("analyze" | "map" | "moire", "lattice_angle") => vec!["{}±0.1", "10±{}"],
+        ("analyze" | "map" | "moire", "lattice_angle" | "lattice_angle_2") => {
+            vec!["{}±0.1", "10±{}"]
+        }
         (_, "lattice") => vec!["{}nm,0.5nm,90", "0.5nm,{}nm,90", "0.5nm,0.5nm,{}"],
         (_, "wavelengths") => vec!["{},12,11", "13,12,{}"],
         (_, "vectors") => vec!["{},0.4|6,11", "13,0|6,{}"],
@@ -129,7 +131,8 @@ fn is_numeric(option: &Arg) -> bool {
         TypeId::of::<bool>(),
         TypeId::of::<moiregauge::material::Material>(),
     ];
-    let in_text = ["vectors", "lattice_angle"].contains(&option.get_id().as_str());
+    let in_text =
+        ["vectors", "lattice_angle", "lattice_angle_2"].contains(&option.get_id().as_str());
     option.get_action().takes_values()
         && option.get_possible_values().is_empty()
         && (in_text || !texts.iter().any(|text| kind == *text))

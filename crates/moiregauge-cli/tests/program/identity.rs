@@ -67,7 +67,10 @@ fn data_given_twice_count_once() {
         );
     }
     let beside = quick(&[&scans.join("scan.*")], &at("beside"));
-    assert_eq!(numbers(&beside), numbers(&once));
+    // The container of a scan comes first by name: its values are those of the scan, rounded once more on their way through metres.
+    for (found, expected) in numbers(&beside).into_iter().zip(numbers(&once)) {
+        assert!((found / expected - 1.0).abs() < 1e-9, "{found} {expected}");
+    }
     let scans = beside["sets"][0]["scans"].as_array().unwrap();
     let left_out = scans.iter().filter(|s| {
         s["excluded"]
