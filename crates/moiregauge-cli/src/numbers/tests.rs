@@ -59,6 +59,9 @@ fn beside(command: &str, option: &str) -> Vec<&'static str> {
         "strain_axis" => vec!["--strain", "0.1"],
         "device_angles" | "device_count" => vec!["--device", "12nm×12nm"],
         "wavelengths" => vec!["--meaning", "real-space"],
+        "lattice_angle_2" if command == "moire" => {
+            vec!["--lattice-angle", "3±0.1", "--vectors", "13,0.4", "6,11"]
+        }
         _ => Vec::new(),
     }
 }
@@ -91,7 +94,7 @@ fn base(command: &str, option: &str, folder: &Path) -> Option<Vec<OsString>> {
             }
         }
         "convert" => base.extend([scan.into(), out("scan.gwy"), "--force".into(), "-q".into()]),
-        "moire" if !["twist", "wavelengths", "vectors"].contains(&option) => {
+        "moire" if !["twist", "wavelengths", "vectors", "lattice_angle_2"].contains(&option) => {
             base.extend(words("--twist 1.1"));
         }
         "info" => base.push(scan.into()),
