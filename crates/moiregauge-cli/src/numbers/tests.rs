@@ -62,6 +62,11 @@ fn beside(command: &str, option: &str) -> Vec<&'static str> {
         "lattice_angle_2" if command == "moire" => {
             vec!["--lattice-angle", "3±0.1", "--vectors", "13,0.4", "6,11"]
         }
+        of if command == "plan"
+            && (of.starts_with("calibration") || of.starts_with("isotropic")) =>
+        {
+            vec!["--twist-sigma", "0.02"]
+        }
         _ => Vec::new(),
     }
 }
