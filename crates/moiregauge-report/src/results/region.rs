@@ -38,7 +38,8 @@ pub struct RegionMeanResult {
     pub spread: Option<f64>,
     /// The same without what noise adds.
     pub spread_corrected: Option<f64>,
-    /// What the spread does not exceed, 95 %, noise and what the window hides (`spread_widening`) accounted for.
+    /// What the spread does not exceed, 95 %, noise and what the window hides (`spread_widening`) accounted for, where the
+    /// lattice changes over eight windows or more; for shorter changes it may be too small.
     pub spread_below_95: Option<f64>,
     /// Factor by which the window may have made the spread smaller, as the curvature of the map tells.
     pub spread_widening: Option<f64>,
