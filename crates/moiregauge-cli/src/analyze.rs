@@ -12,8 +12,8 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use anyhow::Context as _;
-use moiregauge::analysis::Picture;
-use moiregauge::series::picture;
+use moiregauge::campaign::picture;
+use moiregauge::scan::Picture;
 use moiregauge::settings::Settings;
 
 pub(crate) use args::{AnalyzeArgs, BackgroundArg, ConventionArg, LineArg, MethodArg};
@@ -30,7 +30,7 @@ pub(crate) use task::{Task, out_beside};
 
 use crate::outputs::{commit, write_all};
 use crate::say::say;
-use moiregauge::series::refusal;
+use moiregauge::campaign::refusal;
 use moiregauge_report::{InputFile, write_report};
 
 /// Whether the program can write Parquet.

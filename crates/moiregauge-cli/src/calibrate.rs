@@ -7,10 +7,10 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use anyhow::{Context as _, bail, ensure};
+use heterostrain::material::Material;
 use indicatif::ProgressBar;
 use moiregauge::calibration::KnownLattice;
-use moiregauge::material::Material;
-use moiregauge::series::{MeasureError, MeasuredScan, measure_known};
+use moiregauge::scan::{MeasureError, MeasuredScan, measure_known};
 use moiregauge::settings::{Grouping, MOST_IMAGES, Settings};
 use moiregauge_report::{FailedInput, InputFile};
 use rayon::prelude::*;
@@ -159,7 +159,7 @@ pub(crate) fn run(args: &CalibrateArgs) -> anyhow::Result<ExitCode> {
         lattice.name
     );
     let sigma = args.drift_sigma / 60.0;
-    let mut found = moiregauge::series::calibrate(scans, &lattice, sigma, Grouping::Auto)?;
+    let mut found = moiregauge::campaign::calibrate(scans, &lattice, sigma, Grouping::Auto)?;
     found.caveats.extend(given_again(&repeated));
     if !args.quiet {
         say(&words::summary(&found, &lattice))?;

@@ -4,8 +4,9 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use anyhow::{Context as _, bail, ensure};
-use moiregauge::material::Material;
-use moiregauge::settings::{Method, Settings};
+use heterostrain::material::Material;
+use moiregauge::settings::Settings;
+use moiregauge::spectrum::Method;
 
 use crate::say::say;
 

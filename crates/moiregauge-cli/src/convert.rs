@@ -7,7 +7,7 @@ use std::process::ExitCode;
 use anyhow::{Context as _, anyhow, bail, ensure};
 use clap::ValueEnum;
 use indicatif::{ProgressBar, ProgressStyle};
-use moiregauge::series::{nominal_geometry, on_grid};
+use moiregauge::survey::{nominal_geometry, on_grid};
 use moiregauge_pipeline::sink::{FileSink, SinkError};
 use rayon::prelude::*;
 use spmfile::{ChannelInfo, Scan, WritableFormat, sensor_axis};

@@ -9,7 +9,7 @@ use std::io::{ErrorKind, Write as _};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use moiregauge::series::image_choice;
+use moiregauge::scan::image_choice;
 use moiregauge::settings::Settings;
 use serde::Serialize;
 use spmfile::{

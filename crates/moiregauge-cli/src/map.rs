@@ -12,14 +12,17 @@ use std::process::ExitCode;
 
 use anyhow::{Context as _, bail, ensure};
 use clap::ValueEnum;
-use moiregauge::analysis::{Picture, ScanAnalysis};
+use moiregauge::campaign::ScanAnalysis;
+use moiregauge::campaign::{about_repeat, picture, refusal};
 use moiregauge::caveat::Caveat;
-use moiregauge::map::{DriftChange, LatticeMap, Resolution, TwistStrainMap, register};
-use moiregauge::series::{
-    LineMap, MapMethod, SurveyPlan, about_repeat, average_maps, change_of_drift, domains_of_scan,
-    map_scan, picture, refusal,
-};
+use moiregauge::map::register;
+use moiregauge::map::{DriftChange, LatticeMap, TwistStrainMap};
+use moiregauge::scan::Picture;
 use moiregauge::settings::Settings;
+use moiregauge::survey::{
+    LineMap, MapMethod, SurveyPlan, average_maps, change_of_drift, domains_of_scan, map_scan,
+};
+use moiregauge::window::Resolution;
 use moiregauge_pipeline::sink::FolderSink;
 use moiregauge_report::{FailedInput, Provenance};
 

@@ -6,13 +6,15 @@ mod words;
 use std::process::ExitCode;
 
 use anyhow::{Context as _, bail, ensure};
-use moiregauge::budget::{Budget, Statistical};
-use moiregauge::cell::{MoireCell, WavelengthMeaning, from_wavelengths};
-use moiregauge::lattice::LatticeVectors;
-use moiregauge::material::Material;
-use moiregauge::readings::{Readings, WaveStrengths};
+use heterostrain::lattice::LatticeVectors;
+use heterostrain::lattice::{MoireCell, WavelengthMeaning, from_wavelengths};
+use heterostrain::material::Material;
+use heterostrain::strain::twist_strain;
+use heterostrain::strain::{Stacking, moire_of};
+use moiregauge::drift::Statistical;
+use moiregauge::meaning::Budget;
+use moiregauge::meaning::{Readings, WaveStrengths};
 use moiregauge::settings::Settings;
-use moiregauge::strain::{Stacking, moire_of, twist_strain};
 use moiregauge_report::{CellResult, MoireDocument, cell_figure};
 use nalgebra::{Matrix2, Matrix4};
 
@@ -113,7 +115,7 @@ enum Question {
 fn read(
     lattice: &LatticeVectors,
     settings: &Settings,
-) -> anyhow::Result<(moiregauge::strain::TwistStrain, Readings)> {
+) -> anyhow::Result<(heterostrain::strain::TwistStrain, Readings)> {
     let found = twist_strain(lattice, settings.bilayer(), settings.strain_convention)?;
     let statistical = Statistical {
         image: lattice.covariance,

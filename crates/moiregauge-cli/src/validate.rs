@@ -9,8 +9,8 @@ use std::process::ExitCode;
 
 use anyhow::Context as _;
 use indicatif::{ProgressBar, ProgressStyle};
-use moiregauge::settings::Method;
 use moiregauge::simulate::{MOST_PIXELS, Simulation, Simulator};
+use moiregauge::spectrum::Method;
 use moiregauge_pipeline::sink::Target;
 use rayon::prelude::*;
 

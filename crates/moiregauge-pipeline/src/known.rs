@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use moiregauge::series::natural_order;
+use moiregauge::campaign::natural_order;
 use moiregauge_report::results::{Crop, FrameOrder, Told};
 use spmfile::arrays::ArrayOptions;
 use spmfile::{

@@ -1,6 +1,6 @@
 //! Memory: what can be had, and whether it is enough for an analysis.
 
-use moiregauge::series::BYTES_PER_PIXEL;
+use moiregauge::scan::BYTES_PER_PIXEL;
 use spmfile::Scan;
 
 /// Where the system does not tell, this much is taken for granted.

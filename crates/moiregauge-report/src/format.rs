@@ -1,6 +1,6 @@
 //! Numbers as people read them: rounded to their uncertainty.
 
-use moiregauge::estimate::{Estimate, TotalEstimate};
+use heterostrain::{Estimate, TotalEstimate};
 
 use crate::draw::scale::fixed;
 

@@ -1,6 +1,6 @@
 //! Numbers → pictures, tables and the report. No measuring.
 //!
-//! In: an [`Analysis`](moiregauge::analysis::Analysis) (nm, s, rad) and a [`Provenance`]. Out: files as bytes, in
+//! In: an [`Analysis`](moiregauge::campaign::Analysis) (nm, s, rad) and a [`Provenance`]. Out: files as bytes, in
 //! the units of the surface (°, %, nm/min). Nothing is written to disk here.
 
 mod draw;

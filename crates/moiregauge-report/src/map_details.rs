@@ -1,8 +1,8 @@
 //! What was asked of a map beside the map itself.
 
-use moiregauge::analysis::Picture;
 use moiregauge::domains::{DomainMap, Regime};
 use moiregauge::region::{Device, Profile, RegionStatistics, WantedArea, WantedTwist};
+use moiregauge::scan::Picture;
 
 /// Answers to what was asked of a map.
 #[derive(Clone, Debug, Default)]

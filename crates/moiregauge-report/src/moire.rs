@@ -1,9 +1,9 @@
 //! The answer of the calculator `moiregauge moire` as a document, `moiregauge/moire/1`.
 
-use moiregauge::cell::MoireCell;
-use moiregauge::readings::Readings;
+use heterostrain::lattice::MoireCell;
+use heterostrain::strain::TwistStrain;
+use moiregauge::meaning::Readings;
 use moiregauge::settings::Settings;
-use moiregauge::strain::TwistStrain;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -1,6 +1,6 @@
 //! Everything that a report consists of, as named files in memory.
 
-use moiregauge::analysis::Analysis;
+use moiregauge::campaign::Analysis;
 use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -6,14 +6,14 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-use moiregauge::analysis::{Analysis, Combined, Drift, ScanAnalysis, SetAnalysis, SetMean};
-use moiregauge::budget::Budget;
+use heterostrain::lattice::LatticeVectors;
+use heterostrain::strain::{StrainTensor, TwistStrain};
+use heterostrain::{Estimate, TotalEstimate};
+use moiregauge::campaign::{Analysis, Combined, Drift, ScanAnalysis, SetAnalysis, SetMean};
 use moiregauge::caveat::Caveat;
-use moiregauge::estimate::{Estimate, TotalEstimate};
-use moiregauge::lattice::LatticeVectors;
-use moiregauge::readings::{ChosenBy, NameReading, Naming, Readings};
+use moiregauge::meaning::Budget;
+use moiregauge::meaning::{ChosenBy, NameReading, Naming, Readings};
 use moiregauge::settings::Settings;
-use moiregauge::strain::{StrainTensor, TwistStrain};
 use spmfile::FrameDirection;
 
 use crate::draw::scale::fixed;

@@ -4,7 +4,8 @@ mod common;
 
 use std::sync::Arc;
 
-use moiregauge::map::{Grid, Mask, Plane, TwistStrainMap};
+use moiregauge::map::{Grid, Plane, TwistStrainMap};
+use moiregauge::window::Mask;
 use moiregauge_report::{ColorMap, Figure, MapDetails, figures, map_figures};
 use nalgebra::{Matrix2, Vector2};
 use resvg::usvg::{self, fontdb};
@@ -200,7 +201,7 @@ fn maps_are_clean_and_one_figure_has_the_overlays() {
 /// The names under the axes and the title of the comparison are those of the estimators that were used.
 #[test]
 fn the_comparison_names_its_estimators() {
-    use moiregauge::settings::Method;
+    use moiregauge::spectrum::Method;
     let expected = [
         (Method::Lattice, "Lattice fit against Fourier transform"),
         (Method::Fourier, "Fourier transform against autocorrelation"),

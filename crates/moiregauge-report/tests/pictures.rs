@@ -6,7 +6,7 @@ use moiregauge_report::{Choice, ColorMap, figures, write_report};
 
 type Files = Vec<(String, Vec<u8>)>;
 
-fn report(analysis: &moiregauge::analysis::Analysis, choice: Choice) -> Files {
+fn report(analysis: &moiregauge::campaign::Analysis, choice: Choice) -> Files {
     write_report(analysis, &common::provenance(), &choice).expect("a report")
 }
 
@@ -151,7 +151,7 @@ fn the_page_escapes_and_needs_no_network() {
 #[test]
 fn the_page_says_what_is_wrong_first() {
     let mut analysis = common::analysis();
-    analysis.settings.method = moiregauge::settings::Method::Paper;
+    analysis.settings.method = moiregauge::spectrum::Method::Paper;
     let page = page(&report(&analysis, WITHOUT_PNG));
     let at = |text: &str| {
         page.find(text)

@@ -2,7 +2,7 @@
 
 mod common;
 
-use moiregauge::analysis::Analysis;
+use moiregauge::campaign::Analysis;
 use moiregauge_report::{Choice, Results, map_schema, schema, write_report};
 use serde_json::Value;
 

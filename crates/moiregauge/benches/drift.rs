@@ -3,8 +3,9 @@
 //! `cargo bench -p moiregauge --bench drift`. The published way needs 10,000 minimisations.
 
 use divan::Bencher;
-use moiregauge::drift::{Observation, monte_carlo, solve};
-use moiregauge::lattice::LatticeVectors;
+use heterostrain::lattice::LatticeVectors;
+use moiregauge::drift::monte_carlo;
+use moiregauge::drift::{Observation, solve};
 use nalgebra::{Matrix2, Matrix4, Vector2};
 
 fn main() {

@@ -9,10 +9,11 @@
 use std::f64::consts::TAU;
 
 use divan::Bencher;
-use moiregauge::geometry::Geometry;
-use moiregauge::image::Image;
+use moiregauge::frame::Background;
+use moiregauge::frame::Geometry;
+use moiregauge::frame::Image;
 use moiregauge::lattice::{Start, measure};
-use moiregauge::settings::{Background, Method};
+use moiregauge::spectrum::Method;
 use nalgebra::Vector2;
 use rand_distr::{Distribution, StandardNormal};
 use realfft::RealFftPlanner;
@@ -49,7 +50,7 @@ fn image(side: usize, period: Period) -> Image {
         let (sin, cos) = degrees.to_radians().sin_cos();
         [size * cos, size * sin]
     });
-    let mut rng = moiregauge::rng::stream(1, "bench", 0);
+    let mut rng = moiregauge::numbers::stream(1, "bench", 0);
     let mut values = Vec::with_capacity(side * side);
     for row in 0..side {
         for column in 0..side {
@@ -106,7 +107,7 @@ const HARD: [(usize, f64); 6] = [
 /// offsets of half of it.
 fn hard_image((side, periods): (usize, f64)) -> Image {
     let size = 2.0 * TAU * periods / (3f64.sqrt() * side as f64);
-    let mut rng = moiregauge::rng::stream(1, "hard bench", 0);
+    let mut rng = moiregauge::numbers::stream(1, "hard bench", 0);
     let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
     let mut values: Vec<f64> = Vec::with_capacity(side * side);
     for _ in 0..side {

@@ -7,12 +7,13 @@
 
 use std::time::Instant;
 
-use moiregauge::geometry::Geometry;
-use moiregauge::image::Image;
-use moiregauge::map::{LatticeMap, Reference, Resolution, TwistStrainMap, local_lattices};
-use moiregauge::material::Material;
-use moiregauge::settings::StrainConvention;
+use heterostrain::material::Material;
+use heterostrain::strain::StrainConvention;
+use moiregauge::frame::Geometry;
+use moiregauge::frame::Image;
+use moiregauge::map::{LatticeMap, TwistStrainMap, local_lattices};
 use moiregauge::simulate::FieldScene;
+use moiregauge::window::{Reference, Resolution};
 use nalgebra::Vector2;
 use realfft::RealFftPlanner;
 use rustfft::num_complex::Complex;

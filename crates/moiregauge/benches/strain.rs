@@ -3,10 +3,11 @@
 //! `cargo bench -p moiregauge --bench strain`. The published way needs a minimisation for each draw.
 
 use divan::Bencher;
-use moiregauge::lattice::LatticeVectors;
-use moiregauge::material::Material;
-use moiregauge::settings::StrainConvention;
-use moiregauge::strain::{draws, twist_strain};
+use heterostrain::lattice::LatticeVectors;
+use heterostrain::material::Material;
+use heterostrain::strain::StrainConvention;
+use heterostrain::strain::{draws, twist_strain};
+use moiregauge::numbers::normals;
 use nalgebra::{Matrix2, Matrix4};
 
 fn main() {
@@ -40,8 +41,7 @@ fn a_thousand_draws(bencher: Bencher<'_, '_>) {
             &graphene,
             convention,
             1000,
-            1,
-            0,
+            normals(1, "strain", 0),
         )
     });
 }

@@ -12,8 +12,10 @@
 mod fit_scene;
 
 use fit_scene::{Contrast, Scene};
-use moiregauge::lattice::{LatticeError, MeasuredLattice, measure};
-use moiregauge::settings::{Background, Method};
+use moiregauge::frame::Background;
+use moiregauge::lattice::{MeasuredLattice, measure};
+use moiregauge::spectrum::LatticeError;
+use moiregauge::spectrum::Method;
 use nalgebra::Vector4;
 
 /// Name, pixels, periods, contrast, noise: white, line, 1/f, 1/f from line to line.

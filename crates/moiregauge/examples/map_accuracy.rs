@@ -7,16 +7,16 @@
 use std::f64::consts::{PI, TAU};
 use std::time::Instant;
 
-use moiregauge::geometry::Geometry;
-use moiregauge::image::Image;
-use moiregauge::lattice::LatticeVectors;
-use moiregauge::map::{
-    LatticeMap, Mask, Reference, Resolution, TwistStrainMap, WaveMap, local_lattices,
-};
-use moiregauge::material::Material;
-use moiregauge::settings::StrainConvention;
+use heterostrain::lattice::LatticeVectors;
+use heterostrain::material::Material;
+use heterostrain::strain::StrainConvention;
+use heterostrain::strain::TwistStrain;
+use heterostrain::strain::twist_strain;
+use moiregauge::frame::Geometry;
+use moiregauge::frame::Image;
+use moiregauge::map::{LatticeMap, TwistStrainMap, local_lattices};
 use moiregauge::simulate::{FieldScene, Ripple};
-use moiregauge::strain::{TwistStrain, twist_strain};
+use moiregauge::window::{Mask, Reference, Resolution, WaveMap};
 use nalgebra::{Matrix2, Matrix4, Rotation2, Vector2};
 
 /// Angle between the displacements and the waves in which they come, rad: strain to 0.38 % for twists of 1.06° to 1.22°.

@@ -11,14 +11,13 @@
 //!
 //! What an isotropic or uniaxial strain of the known lattice does is not told from s, g and γ.
 
+use heterostrain::Estimate;
+use heterostrain::lattice::{LatticeVectors, shortest_pair};
+use heterostrain::material::Material;
 use nalgebra::{Matrix2, Matrix3, Matrix3x4, Vector3};
 use serde::{Deserialize, Serialize};
 
-use crate::estimate::Estimate;
-use crate::lattice::LatticeVectors;
-use crate::lattice::known::{names, parts};
-use crate::lattice::reciprocal::shortest_pair;
-use crate::material::Material;
+use crate::spectrum::known::{names, parts};
 
 /// A lattice whose cell is known.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]

@@ -2,32 +2,25 @@
 //!
 //! No files, no clock, no printing. Inside: nm, s, rad; x right, y up, angles counter-clockwise.
 
-pub mod analysis;
-pub mod background;
-pub mod bound;
-pub mod budget;
 pub mod calibration;
+pub mod campaign;
 pub mod caveat;
-pub mod cell;
-mod chi2;
 pub mod domains;
 pub mod drift;
-pub mod estimate;
-pub mod geometry;
-pub mod image;
-pub mod joint;
+pub mod frame;
 pub mod lattice;
 pub mod map;
-pub mod material;
+pub mod meaning;
+pub mod numbers;
 pub mod plan;
-pub mod readings;
 pub mod region;
-pub mod resample;
-pub mod rng;
-pub mod series;
+pub mod scan;
 pub mod settings;
 pub mod simulate;
-pub mod strain;
+pub mod spectrum;
+pub mod stripes;
+pub mod survey;
+pub mod window;
 
 /// The example of the README, compiled.
 #[cfg(doctest)]

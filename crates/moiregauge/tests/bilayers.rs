@@ -4,13 +4,14 @@ mod two_layers;
 
 use std::f64::consts::PI;
 
-use moiregauge::lattice::LatticeVectors;
-use moiregauge::material::{Bilayer, Material};
-use moiregauge::settings::StrainConvention::{self, KSpace, RealSpace};
-use moiregauge::strain::{
-    Orientation, Stacking, StrainTensor, branches, degeneracy, moire_of, strain_tensors,
-    twist_strain,
+use heterostrain::lattice::LatticeVectors;
+use heterostrain::material::{Bilayer, Material};
+use heterostrain::strain::StrainConvention;
+use heterostrain::strain::StrainConvention::{KSpace, RealSpace};
+use heterostrain::strain::{
+    Orientation, Stacking, StrainTensor, branches, moire_of, strain_tensors,
 };
+use heterostrain::strain::{degeneracy, twist_strain};
 use nalgebra::{Matrix2, Matrix5, Vector2, Vector5};
 use proptest::prelude::*;
 use two_layers::{exact, modulo, named, some_covariance};

@@ -2,13 +2,12 @@
 //! known lattice. Twisted by 60° two equal layers have a "moiré" with the lattice constant of the layers:
 //! `λ = a/(2 sin 30°)`, an atomic lattice for the simulator.
 
-use moiregauge::budget::Source;
+use heterostrain::material::Material;
 use moiregauge::calibration::{Calibration, Coordinates, KnownLattice};
-use moiregauge::material::Material;
-use moiregauge::series::{
-    CalibrateError, Calibrated, MeasureError, analyse, atomic_orientation, calibrate,
-    measure_known, measure_scan,
-};
+use moiregauge::campaign::calibrate;
+use moiregauge::campaign::{CalibrateError, Calibrated, analyse, atomic_orientation};
+use moiregauge::meaning::Source;
+use moiregauge::scan::{MeasureError, measure_known, measure_scan};
 use moiregauge::settings::{Grouping, Settings};
 use moiregauge::simulate::{Pattern, Simulation, Simulator};
 use nalgebra::Matrix2;

@@ -1,10 +1,12 @@
 //! The whole chain on simulated sets: invariances, honest errors, and what must be refused.
 
-use moiregauge::analysis::Analysis;
-use moiregauge::budget::Source;
-use moiregauge::series::{MeasuredScan, analyse, measure_scan};
-use moiregauge::settings::{GivenDrift, Method, Settings};
+use moiregauge::campaign::Analysis;
+use moiregauge::campaign::analyse;
+use moiregauge::meaning::Source;
+use moiregauge::scan::{MeasuredScan, measure_scan};
+use moiregauge::settings::{GivenDrift, Settings};
 use moiregauge::simulate::{Simulation, Simulator};
+use moiregauge::spectrum::Method;
 use spmfile::{FrameDirection, Samples, Scan};
 
 /// A small, quick set: 128 × 128 pixels, four scans.

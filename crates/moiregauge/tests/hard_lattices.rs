@@ -5,9 +5,10 @@
 mod fit_scene;
 
 use fit_scene::{Contrast, Scene, Wave};
-use moiregauge::image::Image;
+use moiregauge::frame::Background;
+use moiregauge::frame::Image;
 use moiregauge::lattice::{MeasuredLattice, measure};
-use moiregauge::settings::{Background, Method};
+use moiregauge::spectrum::Method;
 use nalgebra::Vector2;
 
 fn fit(image: &Image, scene: &Scene) -> MeasuredLattice {

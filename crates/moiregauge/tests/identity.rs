@@ -2,12 +2,12 @@
 
 use std::cell::Cell;
 
-use moiregauge::analysis::{Analysis, SetAnalysis};
+use heterostrain::material::Material;
 use moiregauge::calibration::KnownLattice;
-use moiregauge::material::Material;
-use moiregauge::series::{
-    MeasuredScan, analyse, atomic_orientation, calibrate, measure_known, measure_scan, refusal,
-};
+use moiregauge::campaign::calibrate;
+use moiregauge::campaign::{Analysis, SetAnalysis};
+use moiregauge::campaign::{analyse, atomic_orientation, refusal};
+use moiregauge::scan::{MeasuredScan, measure_known, measure_scan};
 use moiregauge::settings::{Grouping, Settings};
 use moiregauge::simulate::{FirstDirection, Simulation, Simulator};
 use spmfile::{FrameDirection, Samples, Scan};

@@ -3,9 +3,10 @@
 mod fit_scene;
 
 use fit_scene::{Contrast, Scene, Wave};
-use moiregauge::image::Image;
+use moiregauge::frame::Background;
+use moiregauge::frame::Image;
 use moiregauge::lattice::{MeasuredLattice, measure};
-use moiregauge::settings::{Background, Method};
+use moiregauge::spectrum::Method;
 use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
 
 fn fit(image: &Image, scene: &Scene) -> MeasuredLattice {

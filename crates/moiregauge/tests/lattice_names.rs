@@ -3,12 +3,15 @@
 
 use std::f64::consts::{PI, TAU};
 
-use moiregauge::budget::{Budget, Statistical};
-use moiregauge::lattice::LatticeVectors;
-use moiregauge::material::{Bilayer, Material};
-use moiregauge::readings::{ChosenBy, NameReading, Readings, Standing, WaveStrengths, caveats};
-use moiregauge::settings::{KnownOrientation, LatticeDirection, Settings, StrainConvention};
-use moiregauge::strain::{LatticeName, solutions, twist_strain};
+use heterostrain::lattice::LatticeVectors;
+use heterostrain::material::{Bilayer, Material};
+use heterostrain::strain::twist_strain;
+use heterostrain::strain::{KnownOrientation, LatticeDirection, StrainConvention};
+use heterostrain::strain::{LatticeName, solutions};
+use moiregauge::drift::Statistical;
+use moiregauge::meaning::Budget;
+use moiregauge::meaning::{ChosenBy, NameReading, Readings, Standing, WaveStrengths, caveats};
+use moiregauge::settings::Settings;
 use nalgebra::{Matrix2, Matrix4, Rotation2};
 
 /// Numbers between 0 and 1 that look random.

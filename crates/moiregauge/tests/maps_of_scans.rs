@@ -1,13 +1,13 @@
 //! Scans that were analysed → maps: where frames of a drifting sample are put, and what cannot be mapped.
 
-use moiregauge::analysis::Analysis;
-use moiregauge::geometry::Geometry;
-use moiregauge::map::{Resolution, ResolutionError};
-use moiregauge::series::{
-    MapError, MapMethod, MeasuredScan, SurveyError, SurveyPlan, analyse, map_scan, measure_scan,
-};
+use moiregauge::campaign::Analysis;
+use moiregauge::campaign::analyse;
+use moiregauge::frame::Geometry;
+use moiregauge::scan::{MeasuredScan, measure_scan};
 use moiregauge::settings::Settings;
 use moiregauge::simulate::{Simulation, Simulator};
+use moiregauge::survey::{MapError, MapMethod, SurveyError, SurveyPlan, map_scan};
+use moiregauge::window::{Resolution, ResolutionError};
 use nalgebra::Vector2;
 use spmfile::Scan;
 

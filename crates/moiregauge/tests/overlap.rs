@@ -1,6 +1,7 @@
 //! Scans of which only a part is used: where it lay, and when it was recorded.
 
-use moiregauge::series::{MeasuredScan, Window, analyse, common_window, measure_scan};
+use moiregauge::campaign::analyse;
+use moiregauge::scan::{MeasuredScan, Window, common_window, measure_scan};
 use moiregauge::settings::Settings;
 use moiregauge::simulate::{Simulation, Simulator};
 use spmfile::{Block, FrameDirection, Scan, crop};

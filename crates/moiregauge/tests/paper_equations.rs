@@ -6,10 +6,11 @@
 
 use std::f64::consts::{FRAC_PI_3, PI};
 
-use moiregauge::lattice::LatticeVectors;
-use moiregauge::material::Material;
-use moiregauge::settings::StrainConvention::KSpace;
-use moiregauge::strain::{moire_lattice, published_draws, twist_strain};
+use heterostrain::lattice::LatticeVectors;
+use heterostrain::material::Material;
+use heterostrain::strain::StrainConvention::KSpace;
+use heterostrain::strain::twist_strain;
+use heterostrain::strain::{moire_lattice, published_draws};
 use nalgebra::{Matrix2, Matrix4, Rotation2, SMatrix, SVector, Vector2, Vector4};
 
 type Equations = SVector<f64, 48>;

@@ -1,7 +1,8 @@
 //! Predictions against simulated sets that are analysed from their pixels.
 
+use moiregauge::campaign::analyse;
 use moiregauge::plan::{Quantity, predict};
-use moiregauge::series::{analyse, measure_scan};
+use moiregauge::scan::measure_scan;
 use moiregauge::settings::Settings;
 use moiregauge::simulate::{Simulation, Simulator};
 use rayon::prelude::*;

@@ -2,11 +2,12 @@
 
 mod two_layers;
 
-use moiregauge::cell::{MoireCell, WavelengthMeaning, from_wavelengths};
-use moiregauge::estimate::Estimate;
-use moiregauge::material::Bilayer;
-use moiregauge::settings::StrainConvention::{KSpace, RealSpace};
-use moiregauge::strain::{Stacking, branches, moire_of, naive_twist, twist_strain};
+use heterostrain::Estimate;
+use heterostrain::lattice::{MoireCell, WavelengthMeaning, from_wavelengths};
+use heterostrain::material::Bilayer;
+use heterostrain::strain::StrainConvention::{KSpace, RealSpace};
+use heterostrain::strain::twist_strain;
+use heterostrain::strain::{Stacking, branches, moire_of, naive_twist};
 use nalgebra::{Matrix2, Rotation2, Vector2};
 use two_layers::{exact, named};
 

@@ -1,7 +1,8 @@
 //! Simulated frames whose position sensors lag behind the tip: what is measured stays right, and the lag is told.
 
-use moiregauge::budget::Source;
-use moiregauge::series::{MeasuredScan, analyse, measure_scan};
+use moiregauge::campaign::analyse;
+use moiregauge::meaning::Source;
+use moiregauge::scan::{MeasuredScan, measure_scan};
 use moiregauge::settings::Settings;
 use moiregauge::simulate::{Simulation, Simulator};
 use spmfile::{LineDirection, Samples, Scan};

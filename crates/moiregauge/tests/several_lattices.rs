@@ -4,8 +4,9 @@
 mod fit_scene;
 
 use fit_scene::{Contrast, Scene};
-use moiregauge::lattice::{LatticeError, MeasuredLattice, measure_several};
-use moiregauge::settings::Background;
+use moiregauge::frame::Background;
+use moiregauge::lattice::{MeasuredLattice, measure_several};
+use moiregauge::spectrum::LatticeError;
 use nalgebra::{Matrix2, Vector4};
 
 /// Size and turn a lattice.

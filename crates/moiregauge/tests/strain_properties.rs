@@ -4,10 +4,12 @@ mod two_layers;
 
 use std::f64::consts::{FRAC_PI_3, PI};
 
-use moiregauge::lattice::LatticeVectors;
-use moiregauge::rng::stream;
-use moiregauge::settings::StrainConvention::{self, KSpace, RealSpace};
-use moiregauge::strain::{Branch, TwistStrain, branches, moire_lattice, three_vectors};
+use heterostrain::lattice::LatticeVectors;
+use heterostrain::lattice::three_vectors;
+use heterostrain::strain::StrainConvention;
+use heterostrain::strain::StrainConvention::{KSpace, RealSpace};
+use heterostrain::strain::{Branch, TwistStrain, branches, moire_lattice};
+use moiregauge::numbers::stream;
 use nalgebra::{
     Complex, DMatrix, DVector, Matrix2, Matrix4, Matrix6, Rotation2, SMatrix, Vector2, Vector4,
 };

@@ -2,11 +2,13 @@
 
 use std::f64::consts::PI;
 
-use moiregauge::estimate::Estimate;
-use moiregauge::lattice::LatticeVectors;
-use moiregauge::material::Material;
-use moiregauge::settings::StrainConvention::{self, KSpace, RealSpace};
-use moiregauge::strain::{Branch, branches, moire_lattice, naive_twist, twist_strain};
+use heterostrain::Estimate;
+use heterostrain::lattice::LatticeVectors;
+use heterostrain::material::Material;
+use heterostrain::strain::StrainConvention;
+use heterostrain::strain::StrainConvention::{KSpace, RealSpace};
+use heterostrain::strain::twist_strain;
+use heterostrain::strain::{Branch, branches, moire_lattice, naive_twist};
 use nalgebra::{Matrix2, Matrix4, Vector2};
 
 fn exact(basis: Matrix2<f64>) -> LatticeVectors {

@@ -4,10 +4,12 @@ mod two_layers;
 
 use std::f64::consts::PI;
 
-use moiregauge::lattice::LatticeVectors;
-use moiregauge::rng::stream;
-use moiregauge::settings::StrainConvention::RealSpace;
-use moiregauge::strain::{TwistStrain, draws, moire_lattice};
+use heterostrain::lattice::LatticeVectors;
+use heterostrain::strain::StrainConvention::RealSpace;
+use heterostrain::strain::draws;
+use heterostrain::strain::{TwistStrain, moire_lattice};
+use moiregauge::numbers::normals;
+use moiregauge::numbers::stream;
 use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
 use rand_distr::{Distribution, StandardNormal};
 use two_layers::{graphene, lattice, solve};
@@ -66,7 +68,13 @@ fn draws_have_the_analytic_covariance() {
     let mut measured = lattice(0.019, 0.003, 0.5, 1.0, RealSpace);
     measured.covariance *= 0.01;
     let found = solve(&measured, RealSpace);
-    let sample = draws(&measured, &graphene(), RealSpace, count, 7, 3);
+    let sample = draws(
+        &measured,
+        &graphene(),
+        RealSpace,
+        count,
+        normals(7, "strain", 3),
+    );
     assert_eq!(sample.len(), count);
     let rows: Vec<Vector4<f64>> = sample
         .iter()
@@ -103,9 +111,21 @@ fn draws_have_the_analytic_covariance() {
             );
         }
     }
-    let again = draws(&measured, &graphene(), RealSpace, count, 7, 3);
+    let again = draws(
+        &measured,
+        &graphene(),
+        RealSpace,
+        count,
+        normals(7, "strain", 3),
+    );
     assert!(sample.iter().zip(&again).all(|(a, b)| a.twist == b.twist));
-    let other = draws(&measured, &graphene(), RealSpace, count, 7, 4);
+    let other = draws(
+        &measured,
+        &graphene(),
+        RealSpace,
+        count,
+        normals(7, "strain", 4),
+    );
     assert!(sample[0].twist != other[0].twist);
 }
 
@@ -115,7 +135,13 @@ fn draws_from_a_singular_covariance() {
     let mut measured = lattice(0.019, 0.003, 0.5, 0.001, RealSpace);
     let direction = Vector4::new(1.0, 2.0, -1.0, 0.5) * 1e-3;
     measured.covariance = direction * direction.transpose();
-    let sample = draws(&measured, &graphene(), RealSpace, 200, 1, 0);
+    let sample = draws(
+        &measured,
+        &graphene(),
+        RealSpace,
+        200,
+        normals(1, "strain", 0),
+    );
     assert_eq!(sample.len(), 200);
     assert!(sample.iter().all(|d| d.twist.is_finite()));
     // α lies at the edge of its range and must not jump by 60°.
@@ -128,7 +154,7 @@ fn draws_from_a_singular_covariance() {
         covariance: Matrix4::zeros(),
         ..measured
     };
-    let exact = draws(&still, &graphene(), RealSpace, 5, 1, 0);
+    let exact = draws(&still, &graphene(), RealSpace, 5, normals(1, "strain", 0));
     assert!(exact.iter().all(|d| (d.twist - 0.019).abs() < 1e-12));
 }
 

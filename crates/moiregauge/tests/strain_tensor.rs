@@ -2,9 +2,9 @@
 
 mod tensor_scene;
 
+use heterostrain::strain::{KnownOrientation, LatticeDirection};
+use moiregauge::campaign::{analyse, atomic_orientation};
 use moiregauge::caveat::Caveat;
-use moiregauge::series::{analyse, atomic_orientation};
-use moiregauge::settings::{KnownOrientation, LatticeDirection};
 use tensor_scene::{atoms, measured, moire, on_hbn, run, settings, truth};
 
 /// χ² of twist, mean strain and shear part over several sets is that of true errors (p > 10⁻³ to either side).
@@ -175,11 +175,11 @@ fn another_lattice_is_refused() {
     let set = moire(1);
     let settings = settings(&set);
     let images = measured(&atoms(&set, 1, 2), &settings);
-    let tungsten = moiregauge::material::Material::named("WSe2").unwrap();
+    let tungsten = heterostrain::material::Material::named("WSe2").unwrap();
     let error = atomic_orientation(&images, &tungsten, 1, &settings.calibration).unwrap_err();
     assert!(error.to_string().contains("WSe2"), "{error}");
     // hBN is 1.8 % larger: within what a scanner may be off, but it is said.
-    let hbn = moiregauge::material::Material::named("hBN").unwrap();
+    let hbn = heterostrain::material::Material::named("hBN").unwrap();
     let mut strict = settings.calibration;
     strict.gain_percent = 0.3;
     let found = atomic_orientation(&images, &hbn, 1, &strict).unwrap();

@@ -1,10 +1,11 @@
 //! What the published method does to a perfect image: the bias of the summed autocorrelation.
 
-use moiregauge::geometry::Geometry;
-use moiregauge::image::Image;
+use moiregauge::frame::Background;
+use moiregauge::frame::Geometry;
+use moiregauge::frame::Image;
 use moiregauge::lattice::measure;
-use moiregauge::rng::stream;
-use moiregauge::settings::{Background, Method};
+use moiregauge::numbers::stream;
+use moiregauge::spectrum::Method;
 use nalgebra::{Matrix2, Vector2};
 use rand::RngExt;
 

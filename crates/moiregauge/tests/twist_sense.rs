@@ -1,14 +1,15 @@
 //! Two equal layers and the orientation of one of them: which sense the twist has is open, and both readings are there.
 //! In: stackings that are put in. Nothing is simulated.
 
-use moiregauge::budget::{Budget, Statistical};
-use moiregauge::lattice::LatticeVectors;
-use moiregauge::material::Material;
-use moiregauge::readings::{Readings, WaveStrengths, caveats};
-use moiregauge::settings::{
-    Calibration, KnownOrientation, LatticeDirection, Settings, StrainConvention, TwistSense,
-};
-use moiregauge::strain::{Stacking, StrainTensor, moire_of, twist_strain};
+use heterostrain::lattice::LatticeVectors;
+use heterostrain::material::Material;
+use heterostrain::strain::twist_strain;
+use heterostrain::strain::{KnownOrientation, LatticeDirection, StrainConvention, TwistSense};
+use heterostrain::strain::{Stacking, StrainTensor, moire_of};
+use moiregauge::drift::Statistical;
+use moiregauge::meaning::Budget;
+use moiregauge::meaning::{Readings, WaveStrengths, caveats};
+use moiregauge::settings::{Calibration, Settings};
 use nalgebra::{Matrix2, Matrix4};
 
 /// Homobilayers, half of them turned clockwise, with isotropic strain.

@@ -3,11 +3,13 @@
 use std::path::PathBuf;
 
 use clap::ValueEnum;
-use moiregauge::material::Material;
+use heterostrain::material::Material;
+use heterostrain::strain::StrainConvention;
+use moiregauge::frame::Background;
 use moiregauge::settings::{
-    Background, GivenDrift, Grouping, Lines, MOST_DRAWS, MOST_IMAGES, Method, MoireLayers,
-    Settings, StrainConvention,
+    GivenDrift, Grouping, Lines, MOST_DRAWS, MOST_IMAGES, MoireLayers, Settings,
 };
+use moiregauge::spectrum::Method;
 use moiregauge_report::results::NamedSet;
 use moiregauge_report::{Choice, ColorMap};
 

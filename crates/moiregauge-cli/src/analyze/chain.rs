@@ -4,11 +4,13 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
 use indicatif::{ProgressBar, ProgressStyle};
-use moiregauge::analysis::Analysis;
+use moiregauge::campaign::Analysis;
+use moiregauge::campaign::illustrate;
+use moiregauge::campaign::{about_repeat, amplitude_of, analyse};
 use moiregauge::caveat::Caveat;
-use moiregauge::series::{
-    MeasureError, MeasuredScan, Window, about_repeat, amplitude_of, analyse, choose_channel,
-    common_window, illustrate, measure_moires, sorted_moires, unusual_channels,
+use moiregauge::scan::{
+    MeasureError, MeasuredScan, Window, choose_channel, common_window, measure_moires,
+    sorted_moires, unusual_channels,
 };
 use moiregauge::settings::Settings;
 use moiregauge_pipeline::{Repeated, distinct, hexadecimal, names, set_of};

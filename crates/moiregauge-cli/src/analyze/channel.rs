@@ -4,7 +4,7 @@ use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 
 use moiregauge::caveat::Caveat;
-use moiregauge::series::{MeasureError, channels_by_preference};
+use moiregauge::scan::{MeasureError, channels_by_preference};
 use moiregauge::settings::Settings;
 use spmfile::{ChannelInfo, ReadError};
 

@@ -4,8 +4,8 @@ use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, ensure};
-use moiregauge::analysis::{Analysis, ScanAnalysis};
-use moiregauge::series::corrected_images;
+use moiregauge::campaign::{Analysis, ScanAnalysis};
+use moiregauge::survey::corrected_images;
 use moiregauge_pipeline::sink::FolderSink;
 use moiregauge_report::FailedInput;
 use rayon::prelude::*;
@@ -130,7 +130,8 @@ fn one(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use moiregauge::series::{analyse, measure_moires};
+    use moiregauge::campaign::analyse;
+    use moiregauge::scan::measure_moires;
     use moiregauge::settings::Settings;
     use moiregauge::simulate::{Simulation, Simulator};
     use moiregauge_pipeline::sink::Target;

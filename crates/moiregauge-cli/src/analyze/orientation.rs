@@ -4,8 +4,10 @@ use std::path::PathBuf;
 
 use anyhow::{Context as _, ensure};
 use clap::ValueEnum;
-use moiregauge::series::{AtomicOrientation, atomic_orientation};
-use moiregauge::settings::{KnownOrientation, LatticeDirection, Method, Settings, TwistSense};
+use heterostrain::strain::{KnownOrientation, LatticeDirection, TwistSense};
+use moiregauge::campaign::{AtomicOrientation, atomic_orientation};
+use moiregauge::settings::Settings;
+use moiregauge::spectrum::Method;
 use moiregauge_report::InputFile;
 use moiregauge_report::results::AtomicImages;
 

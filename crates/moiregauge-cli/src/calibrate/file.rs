@@ -4,8 +4,8 @@ use std::path::Path;
 
 use anyhow::{Context as _, ensure};
 use moiregauge::calibration::{Calibration, KnownLattice};
+use moiregauge::campaign::Calibrated;
 use moiregauge::caveat::Caveat;
-use moiregauge::series::Calibrated;
 use moiregauge_report::InputFile;
 use serde::{Deserialize, Serialize};
 
@@ -74,7 +74,7 @@ pub(super) fn text(
     drift_sigma: f64,
     files: &[InputFile],
 ) -> anyhow::Result<String> {
-    let with_sigma = |e: &moiregauge::estimate::Estimate| [e.value, e.sigma];
+    let with_sigma = |e: &heterostrain::Estimate| [e.value, e.sigma];
     let sets = found.sets.iter().map(|set| Set {
         name: set.name.clone(),
         channel: set.channel.clone(),

@@ -2,9 +2,9 @@
 
 use std::fmt::Write as _;
 
+use heterostrain::Estimate;
 use moiregauge::calibration::{Coordinates, KnownLattice};
-use moiregauge::estimate::Estimate;
-use moiregauge::series::{Calibrated, CalibratedSet};
+use moiregauge::campaign::{Calibrated, CalibratedSet};
 use moiregauge_report::{plus_minus, two_digits};
 
 use crate::analyze::caveat_lines;

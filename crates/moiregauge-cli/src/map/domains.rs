@@ -2,7 +2,8 @@
 
 use clap::ValueEnum;
 use moiregauge::caveat::Caveat;
-use moiregauge::domains::{Contrast, DomainMap, Regime, RegimeChoice, regime};
+use moiregauge::domains::regime;
+use moiregauge::domains::{Contrast, DomainMap, Regime, RegimeChoice};
 use moiregauge::map::TwistStrainMap;
 
 /// Domain structure at small angles.

@@ -4,11 +4,13 @@ use std::fmt::Write as _;
 
 use std::path::PathBuf;
 
-use moiregauge::analysis::{Analysis, Picture};
+use heterostrain::Estimate;
+use moiregauge::campaign::Analysis;
 use moiregauge::caveat::Caveat;
-use moiregauge::estimate::Estimate;
-use moiregauge::map::{Agreement, DriftChange, TwistStrainMap, UsedHarmonic};
+use moiregauge::map::{Agreement, DriftChange, TwistStrainMap};
+use moiregauge::scan::Picture;
 use moiregauge::settings::Settings;
+use moiregauge::window::UsedHarmonic;
 use moiregauge_pipeline::sink::{FolderSink, Target};
 use moiregauge_report::results::{
     Conventions, MapDetailsResult, MapResults, MappedImage, TwistStrainResult, mask_counts,

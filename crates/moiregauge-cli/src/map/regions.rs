@@ -194,7 +194,7 @@ pub(super) fn summary(details: &MapDetailsResult) -> String {
             return "no good node".to_owned();
         };
         let known = |v: Option<f64>| v.unwrap_or(f64::NAN);
-        let mean = moiregauge::estimate::Estimate::new(known(t.mean), known(t.sigma));
+        let mean = heterostrain::Estimate::new(known(t.mean), known(t.sigma));
         format!(
             "twist {}°, varies by {}° (below {}°, 95 %)",
             plus_minus(mean),

@@ -5,7 +5,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, ensure};
-use moiregauge::image::Image;
+use moiregauge::frame::Image;
 use spmfile::{Block, Channel};
 
 /// Where lines come from.

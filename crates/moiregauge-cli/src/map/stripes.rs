@@ -5,9 +5,11 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, ensure};
 use moiregauge::caveat::Caveat;
-use moiregauge::map::{Resolution, SampledStripes};
-use moiregauge::series::{ScanStripes, channels_by_preference, stripes_in_short, stripes_of_scan};
+use moiregauge::scan::channels_by_preference;
 use moiregauge::settings::Settings;
+use moiregauge::stripes::SampledStripes;
+use moiregauge::survey::{ScanStripes, stripes_in_short, stripes_of_scan};
+use moiregauge::window::Resolution;
 use moiregauge_pipeline::sink::FolderSink;
 use moiregauge_report::results::{
     Conventions, MapDetailsResult, MapResults, StripesResult, mask_counts,
@@ -321,10 +323,7 @@ pub(super) fn summary(found: &StripesResult) -> String {
                 || "–".to_owned(),
                 |e| {
                     let known = |v: Option<f64>| v.unwrap_or(f64::NAN);
-                    plus_minus(moiregauge::estimate::Estimate::new(
-                        known(e.value),
-                        known(e.sigma),
-                    ))
+                    plus_minus(heterostrain::Estimate::new(known(e.value), known(e.sigma)))
                 },
             )
         };

@@ -5,9 +5,10 @@ use std::path::PathBuf;
 
 use anyhow::bail;
 use clap::ValueEnum;
-use moiregauge::cell::WavelengthMeaning;
-use moiregauge::settings::{Calibration, KnownOrientation, Settings};
-use moiregauge::strain::{Orientation, Stacking};
+use heterostrain::lattice::WavelengthMeaning;
+use heterostrain::strain::KnownOrientation;
+use heterostrain::strain::{Orientation, Stacking};
+use moiregauge::settings::{Calibration, Settings};
 use nalgebra::Matrix2;
 
 use super::Question;

@@ -2,10 +2,10 @@
 
 use std::fmt::Write as _;
 
-use moiregauge::estimate::Estimate;
-use moiregauge::material::Material;
-use moiregauge::readings::Readings;
-use moiregauge::strain::{Branch, StrainTensor};
+use heterostrain::Estimate;
+use heterostrain::material::Material;
+use heterostrain::strain::{Branch, StrainTensor};
+use moiregauge::meaning::Readings;
 use moiregauge_report::{CellResult, MoireDocument, fixed, plus_minus};
 
 /// Readings by other pairs of waves that are printed.

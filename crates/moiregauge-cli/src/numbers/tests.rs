@@ -137,7 +137,7 @@ fn is_numeric(option: &Arg) -> bool {
         TypeId::of::<String>(),
         TypeId::of::<PathBuf>(),
         TypeId::of::<bool>(),
-        TypeId::of::<moiregauge::material::Material>(),
+        TypeId::of::<heterostrain::material::Material>(),
     ];
     let in_text =
         ["vectors", "lattice_angle", "lattice_angle_2"].contains(&option.get_id().as_str());

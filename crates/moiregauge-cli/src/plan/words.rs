@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use moiregauge::budget::Source;
+use moiregauge::meaning::Source;
 use moiregauge::plan::{Prediction, Quantity};
 use moiregauge::settings::Settings;
 use moiregauge::simulate::Simulation;

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use anyhow::Context as _;
-use moiregauge::material::Material;
+use heterostrain::material::Material;
 use moiregauge::simulate::{FirstDirection, MOST_PIXELS, Pattern, Simulation};
 
 use crate::config::named_layers;

@@ -1,9 +1,11 @@
 //! One simulated set against its truth.
 
-use moiregauge::bound::{Bound, cramer_rao};
-use moiregauge::series::{analyse, measure_scan};
-use moiregauge::settings::{Method, Settings};
+use moiregauge::campaign::analyse;
+use moiregauge::plan::{Bound, cramer_rao};
+use moiregauge::scan::measure_scan;
+use moiregauge::settings::Settings;
 use moiregauge::simulate::{Simulation, Simulator};
+use moiregauge::spectrum::Method;
 
 /// What is compared, with its unit.
 pub(super) const QUANTITIES: [(&str, &str); 5] = [

@@ -3,8 +3,9 @@
 use std::path::PathBuf;
 
 use anyhow::Context as _;
-use moiregauge::analysis::{Analysis, SetAnalysis};
-use moiregauge::series::{MeasuredLine, MeasuredScan, analyse};
+use moiregauge::campaign::analyse;
+use moiregauge::campaign::{Analysis, SetAnalysis};
+use moiregauge::scan::{MeasuredLine, MeasuredScan};
 use moiregauge::settings::Settings;
 use moiregauge::simulate::{Drift, FirstDirection, Noise, Raster, Sample, Simulation, Window};
 use spmfile::FrameDirection;

@@ -2,8 +2,8 @@
 
 use std::fmt::Write as _;
 
-use moiregauge::settings::Method;
 use moiregauge::simulate::Simulation;
+use moiregauge::spectrum::Method;
 use moiregauge_report::pulls;
 use serde::Serialize;
 

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::process::Command;
 
-use moiregauge::image::Image;
+use moiregauge::frame::Image;
 use moiregauge::simulate::{DomainScene, FieldScene};
 use serde_json::Value;
 

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use moiregauge::image::Image;
+use moiregauge::frame::Image;
 use moiregauge::simulate::FieldScene;
 use serde_json::Value;
 

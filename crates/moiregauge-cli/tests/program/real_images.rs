@@ -2,8 +2,9 @@
 
 use std::path::Path;
 
-use moiregauge::lattice::LatticeVectors;
-use moiregauge::series::{analyse, measure_scan};
+use heterostrain::lattice::LatticeVectors;
+use moiregauge::campaign::analyse;
+use moiregauge::scan::measure_scan;
 use moiregauge::settings::Settings;
 use nalgebra::Vector2;
 use serde_json::Value;

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use moiregauge::image::Image;
+use moiregauge::frame::Image;
 use moiregauge::simulate::FieldScene;
 use nalgebra::{Matrix2, Vector2};
 use serde_json::Value;

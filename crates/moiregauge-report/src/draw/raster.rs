@@ -3,7 +3,7 @@
 //! The map pixel → nm is affine and stays so: the image is never resampled to a grid, the viewer
 //! draws its pixels as the parallelograms they are.
 
-use moiregauge::image::Image;
+use moiregauge::frame::Image;
 use nalgebra::{Matrix2, Vector2};
 
 use super::axes::Axes;

@@ -1,6 +1,6 @@
 //! Phase and amplitude of one line of one scan side by side.
 
-use moiregauge::image::Image;
+use moiregauge::frame::Image;
 
 use super::residuals::extent;
 use super::{Drawing, Subject, layout};

@@ -1,8 +1,8 @@
 //! The uncertainty budget: a bar for every source of error, on a logarithmic scale.
 
-use moiregauge::analysis::Analysis;
-use moiregauge::budget::{Budget, Contribution, Source};
-use moiregauge::estimate::Estimate;
+use heterostrain::Estimate;
+use moiregauge::campaign::Analysis;
+use moiregauge::meaning::{Budget, Contribution, Source};
 
 use super::{Drawing, layout};
 use crate::draw::legend::{self, Key};

@@ -1,6 +1,6 @@
 //! The moiré cell: real-space vectors and cell, wave vectors and Brillouin zone.
 
-use moiregauge::cell::MoireCell;
+use heterostrain::lattice::MoireCell;
 use nalgebra::{Matrix2, Vector2};
 
 use super::Drawing;

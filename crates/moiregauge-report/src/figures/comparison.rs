@@ -1,7 +1,7 @@
 //! Wavelengths by the estimator that was used against those by the other one.
 
-use moiregauge::estimate::Estimate;
-use moiregauge::settings::Method;
+use heterostrain::Estimate;
+use moiregauge::spectrum::Method;
 use spmfile::LineDirection;
 
 use super::layout::{counting, ends, is_up, ordinal, point};

@@ -1,8 +1,9 @@
 //! The drift velocity over the Monte Carlo draws: density with the fitted Gaussian, both marginals
 //! and the distribution of the residual.
 
-use moiregauge::analysis::{Drift, DriftMonteCarlo};
-use moiregauge::image::Image;
+use moiregauge::campaign::Drift;
+use moiregauge::drift::DriftMonteCarlo;
+use moiregauge::frame::Image;
 use nalgebra::{Matrix2, Vector2};
 
 use super::{Drawing, Subject, layout};

@@ -1,9 +1,9 @@
 //! The error of the twist against the error of the wavelength: θ = 2 arcsin(a/2λ) gives
 //! |dθ| = θ |dλ|/λ at small angles.
 
-use moiregauge::analysis::ScanAnalysis;
-use moiregauge::lattice::LatticeVectors;
-use moiregauge::strain::{TwistStrain, naive_twist};
+use heterostrain::lattice::LatticeVectors;
+use heterostrain::strain::{TwistStrain, naive_twist};
+use moiregauge::campaign::ScanAnalysis;
 
 use super::layout::{Grid, is_up};
 use super::{Drawing, Subject, layout};

@@ -1,7 +1,8 @@
 //! What several figures need: panels in a grid, scans as points, the sense of a scan.
 
-use moiregauge::analysis::{Illustration, ScanAnalysis, SetAnalysis};
-use moiregauge::estimate::Estimate;
+use heterostrain::Estimate;
+use moiregauge::campaign::{ScanAnalysis, SetAnalysis};
+use moiregauge::scan::Illustration;
 use nalgebra::Matrix2;
 use spmfile::{FrameDirection, LineDirection};
 

@@ -1,6 +1,7 @@
 //! Twist with contour lines, strain with its axes, wavelength, displacement with arrows.
 
-use moiregauge::map::{Mask, Plane, TwistStrainMap};
+use moiregauge::map::{Plane, TwistStrainMap};
+use moiregauge::window::Mask;
 use nalgebra::Vector2;
 
 use super::Drawing;

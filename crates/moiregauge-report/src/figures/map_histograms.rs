@@ -1,6 +1,7 @@
 //! How twist and strain are distributed over the good nodes, and how much of that is noise.
 
-use moiregauge::map::{Mask, Plane, Spread};
+use moiregauge::map::{Plane, Spread};
+use moiregauge::window::Mask;
 
 use super::Drawing;
 use super::layout::{Grid, LETTERS};

@@ -1,6 +1,6 @@
 //! Which nodes are to be believed, and why others are not.
 
-use moiregauge::map::Mask;
+use moiregauge::window::Mask;
 
 use super::Drawing;
 use super::map::MapSubject;

@@ -1,6 +1,6 @@
 //! The panel that all maps share: node values as an image in sample coordinates, scale bar, outlines of what was asked.
 
-use moiregauge::image::Image;
+use moiregauge::frame::Image;
 use moiregauge::map::TwistStrainMap;
 use nalgebra::Vector2;
 

@@ -1,6 +1,6 @@
 //! Twist and strain along lines, with error bands.
 
-use moiregauge::estimate::Estimate;
+use heterostrain::Estimate;
 use moiregauge::region::{Profile, ProfileValues};
 
 use super::Drawing;

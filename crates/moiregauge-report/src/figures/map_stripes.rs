@@ -1,6 +1,7 @@
 //! Stripes: wavelength with strokes along them, and how their direction differs from that of their pattern.
 
-use moiregauge::map::{Mask, SampledStripes};
+use moiregauge::stripes::SampledStripes;
+use moiregauge::window::Mask;
 use nalgebra::Vector2;
 
 use super::map::MapSubject;

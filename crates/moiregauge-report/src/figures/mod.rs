@@ -39,7 +39,7 @@ pub use map::map_figures;
 pub use map_stripes::stripe_figures;
 pub use pulls::pulls;
 
-use moiregauge::analysis::{Analysis, SetAnalysis};
+use moiregauge::campaign::{Analysis, SetAnalysis};
 
 use crate::draw::colormap::ColorMap;
 use crate::draw::png;

@@ -2,9 +2,10 @@
 
 use std::f64::consts::FRAC_PI_3;
 
-use moiregauge::analysis::{ScanAnalysis, StrainDraw};
-use moiregauge::estimate::Estimate;
-use moiregauge::strain::TwistStrain;
+use heterostrain::Estimate;
+use heterostrain::strain::StrainDraw;
+use heterostrain::strain::TwistStrain;
+use moiregauge::campaign::ScanAnalysis;
 
 use super::layout::{LETTERS, is_up, ordinal};
 use super::{Drawing, Subject, layout};

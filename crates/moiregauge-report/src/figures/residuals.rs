@@ -1,6 +1,6 @@
 //! Both position sensors over the whole frame: reading less the affine fit that places the pixels.
 
-use moiregauge::image::Image;
+use moiregauge::frame::Image;
 use nalgebra::Vector2;
 
 use super::{Drawing, Subject, layout};

@@ -1,7 +1,7 @@
 //! The scan in true coordinates: every pixel where the sensors say it was, the frame that was
 //! asked for and the one that was scanned, a scale bar and the lattice vectors.
 
-use moiregauge::analysis::Illustration;
+use moiregauge::scan::Illustration;
 use nalgebra::{Matrix2, Vector2};
 
 use super::{Drawing, Subject, layout};

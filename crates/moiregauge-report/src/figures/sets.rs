@@ -1,6 +1,6 @@
 //! All sets side by side: drift, twist and the strain vector, each with its statistical uncertainty.
 
-use moiregauge::analysis::{Analysis, SetAnalysis, SetMean};
+use moiregauge::campaign::{Analysis, SetAnalysis, SetMean};
 use nalgebra::{Matrix2, Vector2};
 
 use super::{Drawing, layout};
@@ -139,7 +139,7 @@ fn twists(
     analysis: &Analysis,
     sets: &[(&SetAnalysis, &SetMean)],
 ) -> Result<(), String> {
-    let degrees = |t: &moiregauge::strain::TwistStrain| t.twist().scaled(1_f64.to_degrees());
+    let degrees = |t: &heterostrain::strain::TwistStrain| t.twist().scaled(1_f64.to_degrees());
     let values: Vec<_> = sets
         .iter()
         .map(|(_, mean)| degrees(&mean.twist_strain))

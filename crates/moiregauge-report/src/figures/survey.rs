@@ -1,6 +1,6 @@
 //! An image of a larger area with the frames of the scans marked in it.
 
-use moiregauge::analysis::{Analysis, SetAnalysis};
+use moiregauge::campaign::{Analysis, SetAnalysis};
 use nalgebra::{Matrix2, Vector2};
 
 use super::residuals::extent;

@@ -1,7 +1,7 @@
 //! Autocorrelation and power spectrum side by side in true coordinates, the lattice marked.
 
-use moiregauge::analysis::Illustration;
-use moiregauge::image::Image;
+use moiregauge::frame::Image;
+use moiregauge::scan::Illustration;
 use nalgebra::{Matrix2, Vector2};
 
 use super::{Drawing, Subject, layout};

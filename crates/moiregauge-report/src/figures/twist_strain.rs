@@ -1,8 +1,8 @@
 //! Twist, strain and strain axis of every scan before and after drift correction, with the means.
 
-use moiregauge::analysis::ScanAnalysis;
-use moiregauge::estimate::Estimate;
-use moiregauge::strain::TwistStrain;
+use heterostrain::Estimate;
+use heterostrain::strain::TwistStrain;
+use moiregauge::campaign::ScanAnalysis;
 
 use super::layout::{Grid, LETTERS, counting, ends, is_up, ordinal, point};
 use super::{Drawing, Subject, layout};

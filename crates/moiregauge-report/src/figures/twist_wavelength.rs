@@ -1,10 +1,10 @@
 //! The twist that a wavelength would mean without strain, with the uncertainty of scanner and layers, and the measured
 //! wavelengths on that curve.
 
-use moiregauge::analysis::SetMean;
-use moiregauge::estimate::{Estimate, TotalEstimate};
+use heterostrain::strain::naive_twist;
+use heterostrain::{Estimate, TotalEstimate};
+use moiregauge::campaign::SetMean;
 use moiregauge::settings::Settings;
-use moiregauge::strain::naive_twist;
 
 use super::{Drawing, Subject, layout};
 use crate::draw::axes::{Axes, Labels};

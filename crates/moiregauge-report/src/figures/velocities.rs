@@ -9,7 +9,7 @@ use crate::draw::style::{GREY, LINE, ORANGE, PAGE, PALE};
 use crate::draw::svg::{Ink, Svg};
 use crate::format::plus_minus;
 use crate::stats::{Histogram, bins, central, gaussian, mean_and_deviation};
-use moiregauge::estimate::Estimate;
+use heterostrain::Estimate;
 
 pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
     let shown = subject.set.illustration.as_ref();

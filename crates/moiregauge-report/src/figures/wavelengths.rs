@@ -1,7 +1,7 @@
 //! The three wavelengths of every scan before and after drift correction, with the ±1 % band.
 
-use moiregauge::analysis::ScanAnalysis;
-use moiregauge::estimate::Estimate;
+use heterostrain::Estimate;
+use moiregauge::campaign::ScanAnalysis;
 
 use super::layout::{Grid, LETTERS, counting, ends, is_up, ordinal, point};
 use super::{Drawing, Subject, layout};

@@ -1,8 +1,8 @@
 //! Wavelengths and naive twist angles by the nominal size of the scan and by the sensors.
 
-use moiregauge::estimate::Estimate;
-use moiregauge::lattice::LatticeVectors;
-use moiregauge::strain::naive_twist;
+use heterostrain::Estimate;
+use heterostrain::lattice::LatticeVectors;
+use heterostrain::strain::naive_twist;
 
 use super::layout::{Grid, LETTERS, counting, ends, is_up, ordinal, point};
 use super::{Drawing, Subject, layout};

@@ -1,6 +1,6 @@
 //! `report.html` of a map.
 
-use moiregauge::estimate::Estimate;
+use heterostrain::Estimate;
 use serde::Serialize;
 
 use super::page::{Download, Missing, Shown, download, layers, missing, numbered};

@@ -1,6 +1,7 @@
 //! What the page says, as text ready for the template.
 
-use moiregauge::settings::{Method, Settings};
+use moiregauge::settings::Settings;
+use moiregauge::spectrum::Method;
 use serde::Serialize;
 
 use super::meanings::Meanings;
@@ -197,7 +198,7 @@ fn not_combined(results: &Results) -> String {
 /// `graphene (a = 0.246 nm, ν = 0.16)`, or two of them, and whether nobody chose them.
 pub fn layers(settings: &Settings) -> String {
     let bilayer = settings.bilayer();
-    let of = |m: &moiregauge::material::Material| {
+    let of = |m: &heterostrain::material::Material| {
         format!(
             "{} (a = {} nm, ν = {})",
             m.name, m.lattice_constant_nm, m.poisson_ratio

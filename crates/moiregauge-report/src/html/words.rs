@@ -1,6 +1,6 @@
 //! Numbers of the document in words.
 
-use moiregauge::estimate::Estimate;
+use heterostrain::Estimate;
 use serde::Serialize;
 
 use crate::draw::scale::fixed;

@@ -1,8 +1,8 @@
 //! The uncertainty budget as the document holds it: standard deviations, source by source.
 
-use moiregauge::budget::{Budget, Contribution, Source};
-use moiregauge::estimate::Estimate;
-use moiregauge::strain::TwistStrain;
+use heterostrain::Estimate;
+use heterostrain::strain::TwistStrain;
+use moiregauge::meaning::{Budget, Contribution, Source};
 use nalgebra::Matrix2;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

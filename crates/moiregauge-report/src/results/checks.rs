@@ -1,6 +1,6 @@
 //! What the scans themselves say of the errors: residuals, leave-one-out, bootstrap.
 
-use moiregauge::analysis::{Checks, Residual, Scatter};
+use moiregauge::campaign::{Checks, Residual, Scatter};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -1,7 +1,8 @@
 //! The conventions behind the numbers, in words, written beside them.
 
-use moiregauge::material::Material;
-use moiregauge::settings::{Settings, StrainConvention};
+use heterostrain::material::Material;
+use heterostrain::strain::StrainConvention;
+use moiregauge::settings::Settings;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

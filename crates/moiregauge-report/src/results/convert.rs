@@ -1,6 +1,6 @@
 //! Units of the inside (nm, s, rad) → units of the surface, and NaN → nothing.
 
-use moiregauge::estimate::{Estimate, TotalEstimate};
+use heterostrain::{Estimate, TotalEstimate};
 use nalgebra::{Matrix2, Vector2};
 
 use super::lattice::ResultEstimate;

@@ -1,13 +1,15 @@
 //! The document as a whole and its sets.
 
-use moiregauge::analysis::{
-    Analysis, Axis, Combined, Consistency, Drift, DriftFit, DriftMonteCarlo, SetAnalysis, SetMean,
+use heterostrain::Estimate;
+use heterostrain::material::Bilayer;
+use heterostrain::strain::TwistStrain;
+use moiregauge::campaign::{
+    Analysis, Combined, Consistency, Drift, DriftFit, SetAnalysis, SetMean,
 };
 use moiregauge::caveat::Caveat;
-use moiregauge::estimate::Estimate;
-use moiregauge::material::Bilayer;
+use moiregauge::drift::DriftMonteCarlo;
+use moiregauge::frame::Axis;
 use moiregauge::settings::Settings;
-use moiregauge::strain::TwistStrain;
 use nalgebra::{Matrix2, Vector2};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -1,6 +1,6 @@
 //! What a joint fit has beside the lattice and a constant drift.
 
-use moiregauge::analysis::JointTerms;
+use moiregauge::campaign::JointTerms;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -1,11 +1,11 @@
 //! Estimates, lattice vectors, twist and strain as the document holds them.
 
-use moiregauge::analysis::StrainDraw;
-use moiregauge::budget::Budget;
-use moiregauge::estimate::Estimate;
-use moiregauge::lattice::LatticeVectors;
-use moiregauge::material::Bilayer;
-use moiregauge::strain::{TwistStrain, naive_twist};
+use heterostrain::Estimate;
+use heterostrain::lattice::LatticeVectors;
+use heterostrain::material::Bilayer;
+use heterostrain::strain::StrainDraw;
+use heterostrain::strain::{TwistStrain, naive_twist};
+use moiregauge::meaning::Budget;
 use nalgebra::{Matrix2, Vector2};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -1,9 +1,10 @@
 //! The summary of a map as a document, `moiregauge/map/1`: degrees, per cent, nm.
 
 use moiregauge::caveat::Caveat;
-use moiregauge::map::{Agreement, DriftChange, Mask, Plane, Spread, TwistStrainMap, UsedHarmonic};
+use moiregauge::map::{Agreement, DriftChange, Plane, Spread, TwistStrainMap};
 use moiregauge::region::{Trend, Trends};
 use moiregauge::settings::Settings;
+use moiregauge::window::{Mask, UsedHarmonic};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

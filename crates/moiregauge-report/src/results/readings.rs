@@ -1,15 +1,15 @@
 //! What else a lattice can mean, as the document holds it.
 
-use moiregauge::readings::{ChosenBy, NameReading, Naming, Readings, Standing, TensorReading};
-use moiregauge::series::AtomicOrientation;
-use moiregauge::strain::{Branch, Degeneracy, Split, StrainTensor};
+use heterostrain::strain::{Branch, Degeneracy, Split, StrainTensor};
+use moiregauge::campaign::AtomicOrientation;
+use moiregauge::meaning::{ChosenBy, NameReading, Naming, Readings, Standing, TensorReading};
 use nalgebra::Matrix5;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::convert::{PER_MINUTE, PERCENT, degree, estimate, number, pair};
 use super::lattice::ResultEstimate;
-use moiregauge::estimate::Estimate;
+use heterostrain::Estimate;
 
 /// Everything that a lattice can mean beside `twist_deg` and `heterostrain_percent`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]

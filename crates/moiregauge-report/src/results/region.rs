@@ -1,7 +1,7 @@
 //! Regions, uniform areas and wanted areas of a map as parts of its document: degrees, per cent, nm.
 
-use moiregauge::map::Mask;
 use moiregauge::region::{Device, RegionMean, RegionStatistics, WantedArea, WantedTwist};
+use moiregauge::window::Mask;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

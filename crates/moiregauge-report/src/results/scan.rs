@@ -1,7 +1,8 @@
 //! One scan as the document holds it.
 
-use moiregauge::analysis::{Axis, LineAnalysis, ScanAnalysis};
-use moiregauge::material::Bilayer;
+use heterostrain::material::Bilayer;
+use moiregauge::campaign::{LineAnalysis, ScanAnalysis};
+use moiregauge::frame::Axis;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use spmfile::{DateTime, FrameDirection, LineDirection};

@@ -1,8 +1,10 @@
 //! Patterns of stripes in the document of a map.
 
-use moiregauge::estimate::Estimate;
-use moiregauge::map::{Mask, SampledPattern, SampledStripes, Spread};
+use heterostrain::Estimate;
+use moiregauge::map::Spread;
 use moiregauge::region::{Trend, Trends};
+use moiregauge::stripes::{SampledPattern, SampledStripes};
+use moiregauge::window::Mask;
 use nalgebra::Vector2;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

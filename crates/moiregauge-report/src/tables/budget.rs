@@ -1,6 +1,6 @@
 //! What stands in which column of `budget.csv`: one row for each source of error.
 
-use moiregauge::budget::Source;
+use moiregauge::meaning::Source;
 
 use super::columns::{Row, columns};
 use super::csv::{Column, number};

@@ -1,7 +1,7 @@
 //! `domains.csv` and `nodes.csv`: the domain structure of a map.
 
+use heterostrain::strain::TwistStrain;
 use moiregauge::domains::{DomainCell, DomainMap};
-use moiregauge::strain::TwistStrain;
 use nalgebra::{Matrix2, Vector2};
 
 use super::columns::columns;

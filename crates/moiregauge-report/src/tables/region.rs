@@ -174,7 +174,7 @@ const POINT: &[Column<PointRow>] = columns! {
     "distance_nm", "from its start", |r| number(Some(r.1.distance));
     "x_nm", "place", |r| number(Some(r.1.place.x));
     "y_nm", "place", |r| number(Some(r.1.place.y));
-    "mask", "`good`, or why there are no values", |r| r.1.mask.map_or("beyond the map", moiregauge::map::Mask::name).to_owned();
+    "mask", "`good`, or why there are no values", |r| r.1.mask.map_or("beyond the map", moiregauge::window::Mask::name).to_owned();
     "twist_deg", "twist", |r| at(r, |v| v.twist.value, DEGREE);
     "twist_sigma_deg", "its σ; near points share their noise", |r| at(r, |v| v.twist.sigma, DEGREE);
     "strain_percent", "magnitude of the strain, bias of noise removed", |r| at(r, |v| v.magnitude.value, 100.0);

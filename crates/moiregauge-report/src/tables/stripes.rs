@@ -1,6 +1,6 @@
 //! A map of stripes as a scan of many channels: only what stripes have.
 
-use moiregauge::map::SampledStripes;
+use moiregauge::stripes::SampledStripes;
 use spmfile::Scan;
 
 use super::map::{Shown, scan_of};

@@ -9,13 +9,15 @@
 mod scan;
 mod sets;
 
-use moiregauge::analysis::{Analysis, Axis, Combined, Consistency, Picture};
-use moiregauge::budget::Budget;
+use heterostrain::lattice::LatticeVectors;
+use heterostrain::strain;
+use moiregauge::campaign::{Analysis, Combined, Consistency};
 use moiregauge::caveat::Caveat;
-use moiregauge::image::Image;
-use moiregauge::lattice::LatticeVectors;
+use moiregauge::frame::Axis;
+use moiregauge::frame::Image;
+use moiregauge::meaning::Budget;
+use moiregauge::scan::Picture;
 use moiregauge::settings::Settings;
-use moiregauge::strain;
 use moiregauge_report::{FailedInput, InputFile, Provenance};
 use nalgebra::{Matrix2, Matrix4, Vector2};
 

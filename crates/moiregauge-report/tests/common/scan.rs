@@ -2,11 +2,14 @@
 
 use std::f64::consts::TAU;
 
-use moiregauge::analysis::{Axis, LineAnalysis, ScanAnalysis};
-use moiregauge::estimate::Estimate;
-use moiregauge::lattice::LatticeVectors;
-use moiregauge::settings::{Settings, StrainConvention};
-use moiregauge::strain;
+use heterostrain::Estimate;
+use heterostrain::lattice::LatticeVectors;
+use heterostrain::strain;
+use heterostrain::strain::StrainConvention;
+use moiregauge::campaign::{LineAnalysis, ScanAnalysis};
+use moiregauge::frame::Axis;
+use moiregauge::numbers::normals;
+use moiregauge::settings::Settings;
 use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
 use spmfile::{DateTime, FrameDirection, LineDirection};
 
@@ -156,8 +159,7 @@ pub(super) fn scan(
             settings.bilayer(),
             settings.strain_convention,
             1000,
-            settings.seed,
-            (set * 100 + index) as u64,
+            normals(settings.seed, "strain", (set * 100 + index) as u64),
         ),
         residual: None,
         excluded: None,

@@ -2,16 +2,17 @@
 
 use std::f64::consts::TAU;
 
-use moiregauge::analysis::{
-    Axis, Companion, Drift, DriftFit, DriftMonteCarlo, Illustration, ScanAnalysis, SetAnalysis,
-    SetMean,
-};
-use moiregauge::budget::{Budget, Statistical};
-use moiregauge::image::Image;
-use moiregauge::lattice::LatticeVectors;
-use moiregauge::readings::{Readings, WaveStrengths};
+use heterostrain::lattice::LatticeVectors;
+use heterostrain::strain;
+use moiregauge::campaign::{Drift, DriftFit, ScanAnalysis, SetAnalysis, SetMean};
+use moiregauge::drift::DriftMonteCarlo;
+use moiregauge::drift::Statistical;
+use moiregauge::frame::Axis;
+use moiregauge::frame::Image;
+use moiregauge::meaning::Budget;
+use moiregauge::meaning::{Readings, WaveStrengths};
+use moiregauge::scan::{Companion, Illustration};
 use moiregauge::settings::Settings;
-use moiregauge::strain;
 use nalgebra::{Matrix2, Vector2};
 
 use super::scan::{Noise, PIXELS, SIZE_NM, drift_nm_per_s, scan};

@@ -3,15 +3,14 @@
 //! The edges of a triangle are lattice vectors of the moiré there. With integer steps S (2 × 2) of two edges E: the
 //! primitive vectors are `E S⁻¹`, linear in the three places, so that the errors of the nodes are carried on exactly.
 
+use heterostrain::lattice::LatticeVectors;
+use heterostrain::material::Bilayer;
+use heterostrain::strain::{FixedBranch, StrainConvention, StrainError, TwistStrain};
 use nalgebra::{Matrix2, Matrix4, Vector2};
 
-use super::mesh::{Dislocation, Mesh};
-use super::nodes::{Contrast, FoundNodes};
-use crate::geometry::Geometry;
-use crate::lattice::LatticeVectors;
-use crate::material::Bilayer;
-use crate::settings::StrainConvention;
-use crate::strain::{FixedBranch, StrainError, TwistStrain};
+use crate::domains::mesh::{Dislocation, Mesh};
+use crate::domains::nodes::{Contrast, FoundNodes};
+use crate::frame::geometry::Geometry;
 
 /// A triangle on the sample.
 #[derive(Clone, Copy, Debug)]

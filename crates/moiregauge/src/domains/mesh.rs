@@ -380,7 +380,7 @@ fn area(corners: &[Vector2<f64>]) -> f64 {
 }
 
 fn contains(corners: &[Vector2<f64>], place: Vector2<f64>) -> bool {
-    let region = crate::region::Region {
+    let region = crate::region::polygon::Region {
         name: String::new(),
         corners: corners.to_vec(),
     };

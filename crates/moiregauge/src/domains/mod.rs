@@ -7,16 +7,16 @@
 //! In: an image without background and its lattice as a start. Out: places of nodes with covariances (pixels), a
 //! mesh with missing and extra nodes and dislocations, and twist and strain of every triangle on the sample.
 
-mod cells;
-mod mesh;
-mod nodes;
-mod patch;
-mod regime;
+pub(crate) mod cells;
+pub(crate) mod mesh;
+pub(crate) mod nodes;
+pub(crate) mod patch;
+pub(crate) mod regime;
+
+#[cfg(test)]
+mod tests;
 
 pub use cells::{DomainCell, DomainMap};
 pub use mesh::{Dislocation, Mesh, MeshTriangle};
 pub use nodes::{Contrast, FoundNode, FoundNodes, find_nodes};
 pub use regime::{Regime, RegimeChoice, regime};
-
-#[cfg(test)]
-mod tests;

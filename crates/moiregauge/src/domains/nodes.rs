@@ -8,8 +8,9 @@
 use nalgebra::{Matrix2, Vector2};
 use rayon::prelude::*;
 
-use super::patch::{Fit, Template};
-use crate::image::Image;
+use crate::domains::patch::{Fit, Template};
+use crate::frame::image::Image;
+use crate::numbers::median::median;
 
 /// Bins per period.
 const FINE: f64 = 40.0;
@@ -258,7 +259,7 @@ fn peaks(band: &Image, sign: f64, period: [f64; 2], expected: usize) -> Vec<Vect
 }
 
 /// Gaussian means of this width (standard deviation along columns and rows, pixels) over the pixels that are there.
-pub(super) fn blurred(image: &Image, width: [f64; 2]) -> Vec<f64> {
+pub(crate) fn blurred(image: &Image, width: [f64; 2]) -> Vec<f64> {
     let known = image
         .values
         .iter()
@@ -325,12 +326,4 @@ fn skewness(values: &[f64]) -> f64 {
     } else {
         0.0
     }
-}
-
-fn median(values: &mut [f64]) -> f64 {
-    if values.is_empty() {
-        return 0.0;
-    }
-    let half = values.len() / 2;
-    *values.select_nth_unstable_by(half, f64::total_cmp).1
 }

@@ -2,14 +2,14 @@
 
 use nalgebra::{Matrix6, Vector2, Vector6};
 
-use super::nodes::blurred;
-use crate::image::Image;
+use crate::domains::nodes::blurred;
+use crate::frame::image::Image;
 
 /// Smoothing of the mean node (standard deviation), share of the radius of a patch.
 const SMOOTH: f64 = 0.1;
 
 /// An image between its pixels: Catmull–Rom, with slopes. `None` at edges and beside missing pixels.
-pub(super) fn sample(image: &Image, at: Vector2<f64>) -> Option<[f64; 3]> {
+pub(crate) fn sample(image: &Image, at: Vector2<f64>) -> Option<[f64; 3]> {
     let (column, row) = (at.x.floor(), at.y.floor());
     let fits = |first: f64, count: usize| first >= 1.0 && first + 2.0 < count as f64;
     if !(fits(column, image.columns) && fits(row, image.rows)) {
@@ -49,7 +49,7 @@ fn weights(t: f64) -> ([f64; 4], [f64; 4]) {
 }
 
 /// The mean of the image about nodes, and the pixels that are fitted.
-pub(super) struct Template {
+pub(crate) struct Template {
     /// Half a side of the picture, pixels.
     half: usize,
     picture: Image,
@@ -58,28 +58,28 @@ pub(super) struct Template {
     /// Radii of the fitted ellipse along columns and rows, pixels.
     radius: [f64; 2],
     /// Whether every line of a patch has an offset of its own.
-    pub(super) lines: bool,
+    pub(crate) lines: bool,
 }
 
 /// A node fitted to a template.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Fit {
-    pub(super) place: Vector2<f64>,
-    pub(super) amplitude: f64,
+pub(crate) struct Fit {
+    pub(crate) place: Vector2<f64>,
+    pub(crate) amplitude: f64,
     /// Inverse normal matrix: amplitude, place, offset, slopes; times the variance of a pixel it is the covariance.
-    pub(super) inverse: Matrix6<f64>,
-    pub(super) variance: f64,
+    pub(crate) inverse: Matrix6<f64>,
+    pub(crate) variance: f64,
     /// Share of the ellipse that lies within the image.
-    pub(super) share: f64,
+    pub(crate) share: f64,
     /// Variance of the mean residuals of lines over what white noise gives.
-    pub(super) line_excess: f64,
+    pub(crate) line_excess: f64,
     /// Correlation of the residuals of neighbours along columns and rows.
-    pub(super) correlation: [f64; 2],
+    pub(crate) correlation: [f64; 2],
 }
 
 impl Template {
     /// The mean of the image about these places, less its own mean.
-    pub(super) fn mean(image: &Image, places: &[Vector2<f64>], radius: [f64; 2]) -> Option<Self> {
+    pub(crate) fn mean(image: &Image, places: &[Vector2<f64>], radius: [f64; 2]) -> Option<Self> {
         let half = radius[0].max(radius[1]).ceil() as usize + 4;
         let side = 2 * half + 1;
         let (mut sum, mut count) = (vec![0.0; side * side], vec![0.0f64; side * side]);
@@ -111,7 +111,7 @@ impl Template {
     }
 
     /// Moves a node until the template fits: `b + c·(r − r₀) + a T(r − r₀)`, Gauss–Newton.
-    pub(super) fn fit(&self, image: &Image, start: Vector2<f64>) -> Option<Fit> {
+    pub(crate) fn fit(&self, image: &Image, start: Vector2<f64>) -> Option<Fit> {
         let mut place = start;
         let mut amplitude = 1.0;
         let mut last = None;

@@ -1,8 +1,11 @@
 //! Which answer holds where the moiré relaxes: phases under a window, or nodes and triangles.
 
-use super::cells::DomainMap;
-use crate::map::{Mask, TwistStrainMap};
-use crate::strain::TwistStrain;
+use heterostrain::strain::TwistStrain;
+
+use crate::domains::cells::DomainMap;
+use crate::map::quantities::TwistStrainMap;
+use crate::numbers::median::median;
+use crate::window::mask::Mask;
 
 /// Below this twist the layers of most materials relax into domains, rad (0.5°).
 const RELAXED: f64 = 0.5 / 57.295_779_513;
@@ -48,7 +51,7 @@ pub fn regime(map: &TwistStrainMap, domains: Option<&DomainMap>) -> Regime {
     let found: Vec<TwistStrain> = domains.map_or_else(Vec::new, |d| {
         d.cells.iter().filter_map(|c| c.twist_strain).collect()
     });
-    let of_cells = median(found.iter().map(|t| t.twist).collect());
+    let of_cells = median_of(found.iter().map(|t| t.twist).collect());
     let twist = of_cells.or_else(|| map.spread(&map.twist).map(|s| s.mean));
     let variation = domains.map_or(f64::NAN, |d| variation(d, 2.355 * map.window_nm));
     let mut reasons = Vec::new();
@@ -81,7 +84,7 @@ pub fn regime(map: &TwistStrainMap, domains: Option<&DomainMap>) -> Regime {
     }
     let in_doubt = !reasons.is_empty();
     let shares = found.iter().map(|t| t.twist().sigma / t.twist.abs());
-    let noise = median(shares.filter(|s| s.is_finite()).collect());
+    let noise = median_of(shares.filter(|s| s.is_finite()).collect());
     let told = match noise {
         None if in_doubt => Some("no triangles were found or looked for".to_owned()),
         Some(noise) if noise > NOISY => Some(format!(
@@ -134,10 +137,9 @@ fn variation(domains: &DomainMap, width: f64) -> f64 {
         let change = (area(a) / area(b)).ln().powi(2) - noise(a) - noise(b);
         (apart > 0.0).then(|| change.max(0.0).sqrt() * width / apart)
     });
-    median(changes.filter(|c| c.is_finite()).collect()).unwrap_or(f64::NAN)
+    median_of(changes.filter(|c| c.is_finite()).collect()).unwrap_or(f64::NAN)
 }
 
-fn median(mut values: Vec<f64>) -> Option<f64> {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied()
+fn median_of(mut values: Vec<f64>) -> Option<f64> {
+    (!values.is_empty()).then(|| median(&mut values))
 }

@@ -1,14 +1,13 @@
+use heterostrain::lattice::LatticeVectors;
+use heterostrain::material::Material;
+use heterostrain::strain::{StrainConvention, moire_lattice, twist_strain};
 use nalgebra::{Matrix2, Matrix4, Vector2};
 
 use super::*;
-use crate::geometry::Geometry;
-use crate::lattice::LatticeVectors;
-use crate::map::Mask;
-use crate::material::Material;
+use crate::frame::geometry::Geometry;
 use crate::region::tests::made;
-use crate::settings::StrainConvention;
-use crate::simulate::DomainScene;
-use crate::strain::{moire_lattice, twist_strain};
+use crate::simulate::domains::DomainScene;
+use crate::window::mask::Mask;
 
 fn rms(values: &[f64]) -> f64 {
     (values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64).sqrt()

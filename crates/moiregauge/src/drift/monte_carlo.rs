@@ -5,9 +5,9 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 
-use super::{Observation, chi2, least_squares, weights};
-use crate::analysis::DriftMonteCarlo;
-use crate::rng::stream;
+use crate::drift::drawn::DriftMonteCarlo;
+use crate::drift::linear::{Observation, chi2, least_squares, weights};
+use crate::numbers::rng::stream;
 
 /// Draws that share one random stream: enough to make its set-up cheap, and independent of threads.
 const BATCH: usize = 256;
@@ -57,7 +57,7 @@ pub fn monte_carlo(
 }
 
 /// Mean and covariance of draws of the drift (nm/s) with their losses (nm); `None` for fewer than two.
-pub(super) fn distribution(
+pub(crate) fn distribution(
     drawn: impl Iterator<Item = (Vector2<f64>, f64)>,
 ) -> Option<DriftMonteCarlo> {
     let (draws, losses): (Vec<_>, Vec<_>) = drawn.unzip();

@@ -20,9 +20,10 @@ use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 use spmfile::LineDirection;
 
-use super::monte_carlo::distribution;
-use crate::analysis::{Axis, DriftMonteCarlo};
-use crate::rng::stream;
+use crate::drift::drawn::DriftMonteCarlo;
+use crate::drift::monte_carlo::distribution;
+use crate::frame::axis::Axis;
+use crate::numbers::rng::stream;
 
 /// Draws that share one random stream: enough to make its set-up cheap, and independent of threads.
 const BATCH: usize = 256;

@@ -12,13 +12,12 @@
 //! with `W(R) = Σ w(n) w(n+R)`. The lattice through the peaks is fitted by least squares with κ
 //! (plus the noise-with-noise term) as covariance.
 
+use heterostrain::lattice::{LatticeVectors, reciprocal};
 use nalgebra::{DMatrix, Matrix2, Matrix2xX, Matrix4, Matrix6, Vector2, Vector6};
 
-use super::LatticeVectors;
-use super::harmonics::Harmonics;
-use super::reciprocal::reciprocal;
-use super::transform::{Autocorrelation, Spectrum, hann_at};
-use crate::chi2::enlargement;
+use crate::numbers::chi2::enlargement;
+use crate::spectrum::harmonics::Harmonics;
+use crate::spectrum::transform::{Autocorrelation, Spectrum, hann_at};
 
 /// Radius of the patch around a peak, as a share of the shortest lattice vector.
 const PATCH: f64 = 0.22;

@@ -5,12 +5,11 @@
 //! Cramér–Rao bound for one cosine where w = 1). The three are fitted with `K₃ = K₂ − K₁` and turned
 //! into real-space vectors by the full 2×2 inverse.
 
+use heterostrain::lattice::{LatticeVectors, real_from_reciprocal};
 use nalgebra::{Matrix2, Matrix4, Vector2};
 
-use super::LatticeVectors;
-use super::harmonics::{Harmonic, Harmonics};
-use super::reciprocal::real_from_reciprocal;
-use super::transform::hann;
+use crate::spectrum::harmonics::{Harmonic, Harmonics};
+use crate::spectrum::transform::hann;
 
 /// Fits the lattice to the first three wave vectors. `size` is (columns, rows).
 pub(crate) fn measure(

@@ -8,13 +8,12 @@
 //! # References
 //! Tran et al., arXiv:2406.08681.
 
+use heterostrain::lattice::{LatticeVectors, three_vectors};
 use nalgebra::{Matrix2, Matrix6, Vector2};
 
-use super::LatticeVectors;
-use super::transform::Spectrum;
-use crate::geometry::Geometry;
-use crate::image::Image;
-use crate::strain::three_vectors;
+use crate::frame::geometry::Geometry;
+use crate::frame::image::Image;
+use crate::spectrum::transform::Spectrum;
 
 /// The assumed half-width of a peak, pixels; a uniform distribution of that width has σ = w/√3.
 const PEAK_HALF_WIDTH: f64 = 1.5;

@@ -9,13 +9,14 @@
 use std::borrow::Cow;
 use std::f64::consts::PI;
 
+use heterostrain::lattice::LatticeVectors;
 use nalgebra::{Matrix2, Matrix4, Vector2, Vector3, Vector4};
 use rayon::prelude::*;
 
-use super::defects::{Mask, is_improbable};
-use super::sample::{Grid, LatticeMap, LatticeNode};
-use crate::chi2::enlargement;
-use crate::lattice::LatticeVectors;
+use crate::map::defects::is_improbable;
+use crate::map::sample::{Grid, LatticeMap, LatticeNode};
+use crate::numbers::chi2::enlargement;
+use crate::window::mask::Mask;
 
 /// How well maps agree.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -203,19 +204,19 @@ fn common_grid(maps: &[&LatticeMap]) -> Option<Grid> {
 }
 
 /// A map and the way from places to its nodes.
-pub(super) struct View<'a> {
+pub(crate) struct View<'a> {
     map: &'a LatticeMap,
     inverse: Matrix2<f64>,
 }
 
 impl<'a> View<'a> {
-    pub(super) fn new(map: &'a LatticeMap) -> Option<Self> {
+    pub(crate) fn new(map: &'a LatticeMap) -> Option<Self> {
         let inverse = map.grid.step.try_inverse()?;
         Some(Self { map, inverse })
     }
 
     /// The node next to a place within the map, and where it lies.
-    pub(super) fn nearest(&self, place: Vector2<f64>) -> Option<(&'a LatticeNode, Vector2<f64>)> {
+    pub(crate) fn nearest(&self, place: Vector2<f64>) -> Option<(&'a LatticeNode, Vector2<f64>)> {
         let grid = &self.map.grid;
         let t = (self.inverse * (place - grid.origin)).map(f64::round);
         let [columns, rows] = grid.size.map(|n| n as f64);
@@ -227,7 +228,7 @@ impl<'a> View<'a> {
     }
 
     /// The map at a place, between its nodes (bilinear); the mask is the worst of those around.
-    pub(super) fn at(&self, place: Vector2<f64>) -> Option<LatticeNode> {
+    pub(crate) fn at(&self, place: Vector2<f64>) -> Option<LatticeNode> {
         let t = self.inverse * (place - self.map.grid.origin);
         let along = |axis: usize| {
             let last = self.map.grid.size[axis] as f64 - 1.0;

@@ -2,60 +2,11 @@
 
 use nalgebra::{Matrix2, Vector2, Vector4};
 
-use super::smooth::Smoothed;
-use super::waves::{LocalLattice, Nothing};
-use super::window::of_difference;
-
-/// Why a node has no value, or none to be believed; 0 is a good one.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-#[repr(u8)]
-pub enum Mask {
-    /// To be believed.
-    Good = 0,
-    /// So near the edge that the window reaches beyond the frame.
-    Margin = 1,
-    /// Too many pixels are missing under the window.
-    Missing = 2,
-    /// The lattice does not stand out of the noise.
-    Weak = 3,
-    /// The harmonics contradict each other (closure χ²), or a phase winds around a point nearby: a
-    /// dislocation, a domain boundary, an end of the lattice.
-    Defect = 4,
-    /// The lattice turns or stretches so fast that the window blurs it: a boundary of domains.
-    Bent = 5,
-    /// No twist and strain of the layers explain the local lattice.
-    NoSolution = 6,
-    /// Scans that both cover the place contradict each other.
-    Contradiction = 7,
-}
-
-impl Mask {
-    /// All of them, in the order of their numbers.
-    pub const ALL: [Self; 8] = [
-        Self::Good,
-        Self::Margin,
-        Self::Missing,
-        Self::Weak,
-        Self::Defect,
-        Self::Bent,
-        Self::NoSolution,
-        Self::Contradiction,
-    ];
-
-    /// A word for people and files.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Good => "good",
-            Self::Margin => "margin",
-            Self::Missing => "missing pixels",
-            Self::Weak => "weak signal",
-            Self::Defect => "defect",
-            Self::Bent => "bent",
-            Self::NoSolution => "no solution",
-            Self::Contradiction => "contradiction",
-        }
-    }
-}
+use crate::map::waves::{LocalLattice, Nothing};
+use crate::numbers::median::median;
+use crate::window::mask::Mask;
+use crate::window::smooth::Smoothed;
+use crate::window::widths::of_difference;
 
 /// A good χ² exceeds the limit once in some 10⁵ nodes.
 const IMPROBABLE: f64 = 4.26;
@@ -75,36 +26,36 @@ const SHARE: f64 = 0.6;
 const CLEAR: f64 = 6.0;
 
 /// What the masks need to know of the nodes.
-pub(super) struct Setting<'a> {
-    pub(super) smoothed: &'a Smoothed,
+pub(crate) struct Setting<'a> {
+    pub(crate) smoothed: &'a Smoothed,
     /// Place of every node, pixels.
-    pub(super) places: &'a [Vector2<f64>],
+    pub(crate) places: &'a [Vector2<f64>],
     /// Width of the window and margin, pixels.
-    pub(super) width: [f64; 2],
-    pub(super) margin: [f64; 2],
+    pub(crate) width: [f64; 2],
+    pub(crate) margin: [f64; 2],
     /// First and last pixel of the frame.
-    pub(super) frame: [Vector2<f64>; 2],
+    pub(crate) frame: [Vector2<f64>; 2],
     /// Noise amplitude over signal amplitude of each wave, typical of the frame; waves that wind count only
     /// where this is small.
-    pub(super) noise_share: &'a [f64],
+    pub(crate) noise_share: &'a [f64],
     /// What a wider window changes at each node.
-    pub(super) blurs: &'a [Blur],
+    pub(crate) blurs: &'a [Blur],
 }
 
 /// What a window wider by √2 changes at a node.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Blur {
+pub(crate) struct Blur {
     /// χ² of the four components of the change, noise alone being 4.
-    pub(super) chi2: f64,
+    pub(crate) chi2: f64,
     /// The change as a share of the wave vectors.
-    pub(super) share: f64,
+    pub(crate) share: f64,
     /// Variance that noise gives the change, in units of that of the node.
     of_noise: f64,
 }
 
 impl Blur {
     /// The change from one lattice to that under a wider window.
-    pub(super) fn between(narrow: &LocalLattice, wide: &LocalLattice) -> Self {
+    pub(crate) fn between(narrow: &LocalLattice, wide: &LocalLattice) -> Self {
         let change = wide.pair - narrow.pair;
         let share = |i: usize| {
             let (a, b) = (narrow.covariance[(i, i)], wide.covariance[(i, i)]);
@@ -121,7 +72,7 @@ impl Blur {
     }
 
     /// Factor on the variances of a node for what the window blurs, where that is more than chance (p < 0.01).
-    pub(super) fn factor(self) -> f64 {
+    pub(crate) fn factor(self) -> f64 {
         if self.chi2 > 13.3 {
             1.0 + (self.chi2 / 4.0 - 1.0) * self.of_noise
         } else {
@@ -131,7 +82,7 @@ impl Blur {
 }
 
 /// The mask of every node.
-pub(super) fn masks(setting: &Setting, lattices: &[Result<LocalLattice, Nothing>]) -> Vec<Mask> {
+pub(crate) fn masks(setting: &Setting, lattices: &[Result<LocalLattice, Nothing>]) -> Vec<Mask> {
     let nodes = setting.smoothed.nodes;
     let winding = windings(setting);
     let improbable = |node: usize| {
@@ -187,14 +138,14 @@ fn lost(setting: &Setting, lattices: &[Result<LocalLattice, Nothing>]) -> Vec<bo
         .filter(|&n| setting.smoothed.support[n].is_some_and(|s| s.share > SHARE))
         .map(power)
         .collect();
-    let usual = super::median(&mut all);
+    let usual = median(&mut all);
     (0..lattices.len())
         .map(|n| setting.smoothed.support[n].is_some() && power(n) < LOST * usual)
         .collect()
 }
 
 /// Nodes no farther than so many window widths from one for which `is_core` holds.
-pub(super) fn near(setting: &Setting, widths: f64, is_core: impl Fn(usize) -> bool) -> Vec<bool> {
+pub(crate) fn near(setting: &Setting, widths: f64, is_core: impl Fn(usize) -> bool) -> Vec<bool> {
     let [columns, rows] = setting.smoothed.nodes.size;
     let step = |axis: usize, next: usize| {
         let places = (setting.places.get(next), setting.places.first());
@@ -224,7 +175,7 @@ pub(super) fn near(setting: &Setting, widths: f64, is_core: impl Fn(usize) -> bo
 }
 
 /// Whether χ² is beyond chance: Wilson and Hilferty, PNAS 17, 684 (1931).
-pub(super) fn is_improbable(chi2: f64, freedom: usize) -> bool {
+pub(crate) fn is_improbable(chi2: f64, freedom: usize) -> bool {
     if freedom == 0 {
         return false;
     }
@@ -234,7 +185,7 @@ pub(super) fn is_improbable(chi2: f64, freedom: usize) -> bool {
 }
 
 /// How far the phase of the first waves (`pair` of a node) bends over a window width, from differences to the neighbours.
-pub(super) fn bend(
+pub(crate) fn bend(
     setting: &Setting,
     pair: impl Fn(usize) -> Option<Matrix2<f64>>,
     node: usize,

@@ -6,18 +6,19 @@
 
 use nalgebra::{Matrix2, Matrix4, Vector2};
 
-use super::blocks::{Blocks, Place, mix, mix_some};
-use super::carrier::Carrier;
-use super::defects::{Blur, Mask, Setting, masks};
-use super::leaks::clean;
-use super::lines::Levelled;
-use super::median;
-use super::noise::{Beside, Noise};
-use super::smooth::{Nodes, Smoothed, smooth};
-use super::types::{Reference, Resolution, UsedHarmonic, WaveMap, WaveNode};
-use super::waves::{Harmonics, LocalLattice, Nothing, local_lattices};
-use super::window::NARROWEST;
-use crate::image::Image;
+use crate::frame::image::Image;
+use crate::map::defects::{Blur, Setting, masks};
+use crate::map::waves::{Harmonics, LocalLattice, Nothing, local_lattices};
+use crate::numbers::median::median;
+use crate::window::blocks::{Blocks, Place, block_of, mix, mix_some, step_of, stride_of};
+use crate::window::carrier::Carrier;
+use crate::window::leaks::clean;
+use crate::window::lines::Levelled;
+use crate::window::mask::Mask;
+use crate::window::noise::{Beside, Noise};
+use crate::window::smooth::{Nodes, Smoothed, smooth};
+use crate::window::types::{Reference, Resolution, UsedHarmonic, WaveMap, WaveNode};
+use crate::window::widths::NARROWEST;
 
 /// The likely harmonics, half of the first four shells of a pair at 60°.
 const LIKELY: [[i32; 2]; 15] = [
@@ -40,22 +41,21 @@ const LIKELY: [[i32; 2]; 15] = [
 /// Wave vectors beyond this (rad per pixel, each component) are too near the limit of sampling.
 const FASTEST: f64 = 2.6;
 /// Blocks per period.
-const BLOCKS: f64 = 5.0;
-/// The pilot's window in periods.
-pub(super) const PILOT: f64 = 0.65;
+pub(crate) const BLOCKS: f64 = 5.0;
+
 /// Likely harmonics looked at together; and where blocks are single pixels, for the memory's sake.
 const AT_ONCE: [usize; 2] = [6, 1];
 /// Nodes so many windows from the edges say how well the harmonics agree.
 const CLOSURE: f64 = 1.0;
 /// Nodes per width of the window.
-const NODES: f64 = 3.0;
+pub(crate) const NODES: f64 = 3.0;
 /// Nodes are so many pixels apart at least.
-const APART: f64 = 2.0;
+pub(crate) const APART: f64 = 2.0;
 
 /// Demodulates an image whose background is gone. `place` says which part of a larger image it is.
 ///
 /// `None` where the frame is smaller than a few windows, or shows nothing.
-pub(super) fn demodulate(
+pub(crate) fn demodulate(
     image: &Image,
     place: Place,
     reference: &Reference,
@@ -72,43 +72,23 @@ pub(super) fn demodulate(
     Some(work.map(window, resolution))
 }
 
-/// Pixels of a block along columns and rows.
-pub(super) fn block_of(reference: &Reference) -> [usize; 2] {
-    let block = reference.in_pixels(reference.period() / BLOCKS);
-    // Periods of whole pixels come out a hair too short.
-    block.map(|b| ((b + 1e-9) as usize).max(1))
-}
-
-/// Blocks from node to node, `distance_nm` apart.
-pub(super) fn stride_of(reference: &Reference, distance_nm: f64) -> [usize; 2] {
-    let (pixels, block) = (reference.in_pixels(distance_nm), block_of(reference));
-    [0, 1].map(|i| ((pixels[i] / block[i] as f64).round() as usize).max(1))
-}
-
-/// Distance of the nodes, nm, with a window of `window_nm`.
-pub(super) fn step_of(resolution: &Resolution, reference: &Reference, window_nm: f64) -> f64 {
-    let least = APART * reference.pitch[0].max(reference.pitch[1]);
-    let usual = (window_nm / NODES).max(least);
-    resolution.step_nm.unwrap_or(usual)
-}
-
 /// A map under way.
-pub(super) struct Work<'a> {
-    pub(super) image: Levelled<'a>,
-    pub(super) reference: Reference,
+pub(crate) struct Work<'a> {
+    pub(crate) image: Levelled<'a>,
+    pub(crate) reference: Reference,
     place: Place,
     /// nm.
-    pub(super) period: f64,
+    pub(crate) period: f64,
     /// First and last pixel of the part in hand.
-    pub(super) frame: [Vector2<f64>; 2],
-    pub(super) indices: Vec<[i32; 2]>,
-    pub(super) blocks: Blocks,
+    pub(crate) frame: [Vector2<f64>; 2],
+    pub(crate) indices: Vec<[i32; 2]>,
+    pub(crate) blocks: Blocks,
     beside: Beside,
-    pub(super) noise: Noise,
+    pub(crate) noise: Noise,
     /// What has been taken off the blocks.
-    pub(super) carrier: Option<Carrier>,
+    pub(crate) carrier: Option<Carrier>,
     /// Mean |c₀|² of each harmonic in the pilot, noise taken off.
-    pub(super) powers: Vec<f64>,
+    pub(crate) powers: Vec<f64>,
 }
 
 impl<'a> Work<'a> {
@@ -142,13 +122,13 @@ impl<'a> Work<'a> {
     }
 
     /// Smooths all layers with a window of `width` nm.
-    pub(super) fn smoothed(&self, width: f64, stride: [usize; 2]) -> Smoothed {
+    pub(crate) fn smoothed(&self, width: f64, stride: [usize; 2]) -> Smoothed {
         let nodes = self.nodes(stride);
         smooth(&self.blocks, self.reference.in_pixels(width), nodes)
     }
 
     /// Blocks of other harmonics, the carrier off, a few at a time; only the rows of blocks that are `wanted`.
-    pub(super) fn others<'b>(
+    pub(crate) fn others<'b>(
         &'b self,
         indices: &'b [[i32; 2]],
         wanted: impl Fn(usize) -> bool + Sync + 'b,
@@ -166,14 +146,14 @@ impl<'a> Work<'a> {
     }
 
     /// The likely harmonics beyond the first shell that are slow enough to be sampled.
-    pub(super) fn likely(&self) -> Vec<[i32; 2]> {
+    pub(crate) fn likely(&self) -> Vec<[i32; 2]> {
         let slow_enough = |index: &[i32; 2]| self.reference.wave(*index).amax() < FASTEST;
         LIKELY[3..].iter().copied().filter(slow_enough).collect()
     }
 
     /// Nodes in the middle of the blocks; in a part of an image from its first line on, so that those of
     /// neighbouring parts go on.
-    pub(super) fn nodes(&self, stride: [usize; 2]) -> Nodes {
+    pub(crate) fn nodes(&self, stride: [usize; 2]) -> Nodes {
         let mut nodes = Nodes::filling(self.blocks.size, stride);
         if self.place.rows.is_some() {
             nodes.first[1] = 0;
@@ -196,14 +176,14 @@ impl<'a> Work<'a> {
     }
 
     /// What was taken off, as a window of `width` nm sees it.
-    pub(super) fn taken_off(&self, at: Vector2<f64>, width: f64) -> Matrix2<f64> {
+    pub(crate) fn taken_off(&self, at: Vector2<f64>, width: f64) -> Matrix2<f64> {
         let pixels = self.reference.in_pixels(width);
         let slopes = self.carrier.as_ref().map(|c| c.mean_slopes(at, pixels));
         self.reference.pair + slopes.unwrap_or_else(Matrix2::zeros)
     }
 
     /// The local lattices of the harmonics in the blocks.
-    pub(super) fn lattices(
+    pub(crate) fn lattices(
         &self,
         smoothed: &Smoothed,
         width: f64,

@@ -8,15 +8,15 @@ use std::collections::BinaryHeap;
 
 use nalgebra::{Matrix2, Vector2};
 
-use super::defects::Mask;
-use super::types::WaveMap;
+use crate::window::mask::Mask;
+use crate::window::types::WaveMap;
 
 /// (h, k) of the three phases.
 const FIRST: [[f64; 2]; 3] = [[1.0, 0.0], [0.0, 1.0], [-1.0, 1.0]];
 
 /// ψ₁ and ψ₂ of every node against the mean lattice of the good ones, rad, and the covariance of a node's.
 /// `None` where the phase could not be followed: beyond masks, and in parts that they cut off.
-pub(super) fn phases(map: &WaveMap) -> Vec<Option<(Vector2<f64>, Matrix2<f64>)>> {
+pub(crate) fn phases(map: &WaveMap) -> Vec<Option<(Vector2<f64>, Matrix2<f64>)>> {
     let nothing = || vec![None; map.nodes.len()];
     let Some(mean) = mean(map) else {
         return nothing();

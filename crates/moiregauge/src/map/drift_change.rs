@@ -5,12 +5,12 @@
 //! and downward frames may be strain of the sample (or a change of drift common to both); what differs is none:
 //! the slope of the difference along the slow axis gives `A_up − A_down`.
 
+use heterostrain::Estimate;
 use nalgebra::{Matrix2, Vector2};
 
-use super::combine::View;
-use super::defects::Mask;
-use super::sample::LatticeMap;
-use crate::estimate::Estimate;
+use crate::map::combine::View;
+use crate::map::sample::LatticeMap;
+use crate::window::mask::Mask;
 
 /// How the change of drift differs between upward and downward frames.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -2,9 +2,9 @@
 
 use nalgebra::{Matrix2, Vector2};
 
-use super::defects::Mask;
-use super::quantities::TwistStrainMap;
-use super::sample::Grid;
+use crate::map::quantities::TwistStrainMap;
+use crate::map::sample::Grid;
+use crate::window::mask::Mask;
 
 impl TwistStrainMap {
     /// Puts maps side by side on one square grid along the axes of the laboratory, as fine as the first.

@@ -1,12 +1,13 @@
 //! A first look with a narrow window: the carrier, the harmonics that tell something, and how wide the
 //! window may be.
 
-use super::blocks::Layer;
-use super::carrier::{Carrier, MOST_CELLS, Slope};
-use super::demodulate::{PILOT, Work, stride_of};
-use super::smooth::{Envelope, Smoothed, radius, smooth};
-use super::waves::level_of_ridge;
-use super::window::{self, of_difference};
+use crate::map::demodulate::Work;
+use crate::map::waves::level_of_ridge;
+use crate::window::blocks::{Layer, stride_of};
+use crate::window::carrier::{Carrier, MOST_CELLS, PILOT, Slope};
+use crate::window::smooth::{Envelope, Smoothed, radius, smooth};
+use crate::window::widths as window;
+use crate::window::widths::of_difference;
 
 /// A harmonic that adds less than this share to what is known is not worth its time.
 const WORTH: f64 = 0.02;
@@ -24,7 +25,7 @@ const ROWS_LOOKED_AT: usize = 12;
 
 impl Work<'_> {
     /// Fits the carrier to what a narrow window sees, until little is left.
-    pub(super) fn follow(&mut self) {
+    pub(crate) fn follow(&mut self) {
         let width = PILOT * self.period;
         for round in 0..ROUNDS {
             let smoothed = self.smoothed(width, self.sparse(width, FOLLOWED));
@@ -87,7 +88,7 @@ impl Work<'_> {
     }
 
     /// Adds the harmonics that tell something of the lattice to the first three.
-    pub(super) fn choose_harmonics(&mut self) {
+    pub(crate) fn choose_harmonics(&mut self) {
         let width = PILOT * self.period;
         let [along, _] = self.sparse(width, LOOKED_AT);
         let [_, across] = self.sparse(width, ROWS_LOOKED_AT);
@@ -127,7 +128,7 @@ impl Work<'_> {
     }
 
     /// The widest window under which the lattice is straight, nm.
-    pub(super) fn choose_window(&self) -> f64 {
+    pub(crate) fn choose_window(&self) -> f64 {
         let extent = self.frame[1] - self.frame[0];
         let sides = [0, 1].map(|i| extent[i] * self.reference.pitch[i] / self.period);
         let steps = window::ladder(sides[0].min(sides[1]));

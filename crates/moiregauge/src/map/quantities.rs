@@ -1,12 +1,12 @@
 //! What a map shows: every quantity with its error, as planes of single-precision numbers.
 
+use heterostrain::Estimate;
+use heterostrain::lattice::real_named_alike;
+use heterostrain::strain::TwistStrain;
 use nalgebra::Vector2;
 
-use super::defects::Mask;
-use super::sample::{Grid, LatticeMap};
-use crate::estimate::Estimate;
-use crate::lattice::reciprocal::real_named_alike;
-use crate::strain::TwistStrain;
+use crate::map::sample::{Grid, LatticeMap};
+use crate::window::mask::Mask;
 
 /// One quantity on all nodes, row by row; NaN where there is none.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -8,12 +8,12 @@
 
 use std::f64::consts::{PI, TAU};
 
+use heterostrain::Estimate;
 use nalgebra::{Matrix2, Vector2, Vector3};
 
-use super::combine::View;
-use super::defects::Mask;
-use super::sample::LatticeMap;
-use crate::estimate::Estimate;
+use crate::map::combine::View;
+use crate::map::sample::LatticeMap;
+use crate::window::mask::Mask;
 
 /// Nodes that two maps have to share.
 const FEWEST: usize = 9;
@@ -117,9 +117,11 @@ fn shift(fixed: &LatticeMap, map: &LatticeMap) -> Option<(Registration, f64)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Geometry;
-    use crate::map::{Reference, Resolution, combine, local_lattices};
-    use crate::simulate::FieldScene;
+    use crate::frame::geometry::Geometry;
+    use crate::map::combine;
+    use crate::map::local::local_lattices;
+    use crate::simulate::field::FieldScene;
+    use crate::window::types::{Reference, Resolution};
 
     /// A frame of the same pattern, cut out elsewhere and said to lie a little off, in noise of its own.
     fn frame(corner: [usize; 2], said: Vector2<f64>, seed: u64) -> LatticeMap {

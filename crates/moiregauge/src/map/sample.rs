@@ -1,20 +1,18 @@
 //! Local lattices in pixels → in coordinates of the sample at rest, and twist and strain from them.
 //!
 //! One linear map for all: a frame's pixels lie at `r = r₀ + (J − D τᵀ) n` on a sample that drifts with D
-//! (see [`crate::drift`]), so that wave vectors are mapped by the inverse transpose; nm, rad.
+//! (see [`crate::drift::linear`]), so that wave vectors are mapped by the inverse transpose; nm, rad.
 
+use heterostrain::lattice::{LatticeVectors, both, real_from_reciprocal};
+use heterostrain::material::Bilayer;
+use heterostrain::strain::{FixedBranch, StrainConvention, StrainError, TwistStrain};
 use nalgebra::{Matrix2, Matrix4, Vector2, Vector3};
 use rayon::prelude::*;
 
-use super::defects::Mask;
-use super::displacement;
-use super::types::WaveMap;
-use crate::geometry::Geometry;
-use crate::lattice::LatticeVectors;
-use crate::lattice::reciprocal::{both, real_from_reciprocal};
-use crate::material::Bilayer;
-use crate::settings::StrainConvention;
-use crate::strain::{FixedBranch, StrainError, TwistStrain};
+use crate::frame::geometry::Geometry;
+use crate::map::displacement;
+use crate::window::mask::Mask;
+use crate::window::types::WaveMap;
 
 /// Where the nodes of a map lie: `origin + step · (column, row)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -118,7 +116,7 @@ pub struct LatticeMap {
 
 impl LatticeMap {
     /// Takes a map in pixels to the sample. `at_rest` is the geometry of the frame without drift
-    /// ([`crate::resample::at_rest`]), or the geometry itself where the drift is not known.
+    /// ([`crate::frame::resample::at_rest`]), or the geometry itself where the drift is not known.
     ///
     /// `None` where the geometry is singular.
     pub fn new(map: &WaveMap, at_rest: &Geometry) -> Option<Self> {
@@ -175,7 +173,7 @@ impl LatticeMap {
     /// `reference` (wave vectors, rad/nm).
     ///
     /// # Errors
-    /// What [`crate::strain::twist_strain`] says of the reference.
+    /// What [`heterostrain::strain`] says of the reference.
     pub fn twist_strain<'a>(
         &self,
         reference: &Matrix2<f64>,

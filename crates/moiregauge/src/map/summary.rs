@@ -1,7 +1,7 @@
 //! A map in a few numbers: means, and spreads with the noise taken off.
 
-use super::defects::Mask;
-use super::quantities::{Plane, TwistStrainMap};
+use crate::map::quantities::{Plane, TwistStrainMap};
+use crate::window::mask::Mask;
 
 /// Mean and spread of a quantity over the good nodes.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -7,10 +7,10 @@ use std::ops::Range;
 
 use nalgebra::Vector2;
 
-use super::blocks::Place;
-use super::demodulate::{block_of, demodulate, step_of, stride_of};
-use super::types::{Reference, Resolution, WaveMap};
-use crate::image::Image;
+use crate::frame::image::Image;
+use crate::map::demodulate::demodulate;
+use crate::window::blocks::{Place, block_of, step_of, stride_of};
+use crate::window::types::{Reference, Resolution, WaveMap};
 
 /// Windows of halo on either side of a band: the reach of the widest kernel, √2 · 4.5.
 const HALO: f64 = 6.5;

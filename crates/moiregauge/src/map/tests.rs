@@ -1,17 +1,17 @@
 //! Maps against images whose phases are known, and against closed forms.
 
+use heterostrain::lattice::{LatticeVectors, real_from_reciprocal};
+use heterostrain::material::Material;
+use heterostrain::strain::{StrainConvention, twist_strain};
 use nalgebra::{Matrix2, Matrix4, Vector2};
 
 use super::*;
-use crate::geometry::Geometry;
-use crate::lattice::LatticeVectors;
-use crate::lattice::reciprocal::real_from_reciprocal;
-use crate::material::Material;
-use crate::settings::StrainConvention;
-use crate::simulate::{Feature, FieldScene, Ripple};
-use crate::strain::twist_strain;
+use crate::frame::Image;
+use crate::frame::geometry::Geometry;
+use crate::simulate::field::{Feature, FieldScene, Ripple};
+use crate::window::{Mask, Reference, Resolution, WaveMap, WaveNode};
 
-pub(super) fn map_of(scene: &FieldScene, window: Option<f64>) -> WaveMap {
+pub(crate) fn map_of(scene: &FieldScene, window: Option<f64>) -> WaveMap {
     let reference = Reference {
         pair: scene.pair,
         pitch: [1.0; 2],
@@ -29,14 +29,14 @@ fn place(map: &WaveMap, node: usize) -> Vector2<f64> {
 }
 
 /// Good nodes and their places.
-pub(super) fn good(map: &WaveMap) -> impl Iterator<Item = (&WaveNode, Vector2<f64>)> {
+pub(crate) fn good(map: &WaveMap) -> impl Iterator<Item = (&WaveNode, Vector2<f64>)> {
     let all = map.nodes.iter().enumerate();
     all.filter(|(_, node)| node.mask == Mask::Good)
         .map(|(i, node)| (node, place(map, i)))
 }
 
 /// Errors over stated errors of all components at good nodes, and those over `sigma`.
-pub(super) fn pulls(scene: &FieldScene, map: &WaveMap, sigma: f64) -> [Vec<f64>; 2] {
+pub(crate) fn pulls(scene: &FieldScene, map: &WaveMap, sigma: f64) -> [Vec<f64>; 2] {
     let mut out = [Vec::new(), Vec::new()];
     for (node, at) in good(map) {
         let error = node.pair - scene.waves(at);
@@ -49,7 +49,7 @@ pub(super) fn pulls(scene: &FieldScene, map: &WaveMap, sigma: f64) -> [Vec<f64>;
     out
 }
 
-pub(super) fn rms(values: &[f64]) -> f64 {
+pub(crate) fn rms(values: &[f64]) -> f64 {
     (values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64).sqrt()
 }
 

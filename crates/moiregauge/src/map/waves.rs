@@ -3,7 +3,7 @@
 //! Every harmonic (h, k) says `h q₁ + k q₂`; weighted least squares over all of them. For white or locally
 //! white noise of level S the variance of a slope is `S/(2|c₀|²)` in units of the noise Γ of the window: one cosine of
 //! amplitude A = 2|c₀| under a whole window has `σ_g = (σ/A)/(2√π w²)`. Offsets of lines that could not be taken off
-//! (variance R per line, see [`super::lines`]) add to a harmonic g under a window w, in units of the white noise:
+//! (variance R per line, see [`crate::window::lines`]) add to a harmonic g under a window w, in units of the white noise:
 //!
 //! ```text
 //! phase         (R/S) e^{−gₓ²wₓ²} 2√π wₓ
@@ -21,9 +21,9 @@ use std::f64::consts::{E, PI};
 use nalgebra::{Matrix2, Matrix4, Vector2};
 use rayon::prelude::*;
 
-use super::blocks::Blocks;
-use super::noise::Noise;
-use super::smooth::{Smoothed, Support};
+use crate::window::blocks::Blocks;
+use crate::window::noise::Noise;
+use crate::window::smooth::{Smoothed, Support};
 
 /// Harmonics below this many noise units (amplitude) are left out of a node.
 const FAINT: f64 = 3.0;
@@ -38,30 +38,30 @@ const ALIASED: f64 = 3.33;
 
 /// The local lattice at a node, in pixels.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct LocalLattice {
+pub(crate) struct LocalLattice {
     /// q₁, q₂ as columns, rad per pixel.
-    pub(super) pair: Matrix2<f64>,
+    pub(crate) pair: Matrix2<f64>,
     /// Covariance of (q₁x, q₁y, q₂x, q₂y).
-    pub(super) covariance: Matrix4<f64>,
+    pub(crate) covariance: Matrix4<f64>,
     /// Covariance of the phases of q₁ and q₂, rad².
-    pub(super) phase_covariance: Matrix2<f64>,
+    pub(crate) phase_covariance: Matrix2<f64>,
     /// χ² of the closure, and its degrees of freedom.
-    pub(super) chi2: f64,
-    pub(super) freedom: usize,
+    pub(crate) chi2: f64,
+    pub(crate) freedom: usize,
     /// Signal power over noise power of the window, all harmonics.
-    pub(super) signal_to_noise: f64,
+    pub(crate) signal_to_noise: f64,
 }
 
 impl LocalLattice {
     /// Variance of a component (0: x, 1: y) of a wave (0: q₁, 1: q₂).
-    pub(super) fn variance(&self, axis: usize, wave: usize) -> f64 {
+    pub(crate) fn variance(&self, axis: usize, wave: usize) -> f64 {
         self.covariance[(2 * wave + axis, 2 * wave + axis)]
     }
 }
 
 /// Why a node has no lattice of its own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Nothing {
+pub(crate) enum Nothing {
     /// The window holds no pixels.
     NoPixels,
     /// The signal does not stand out.
@@ -69,21 +69,21 @@ pub(super) enum Nothing {
 }
 
 /// What the regression needs beside envelopes.
-pub(super) struct Harmonics<'a> {
+pub(crate) struct Harmonics<'a> {
     /// (h, k) of each envelope.
-    pub(super) indices: &'a [[i32; 2]],
-    pub(super) noise: &'a Noise,
-    /// Variance of the offsets of lines that are left at each, see [`super::lines`].
+    pub(crate) indices: &'a [[i32; 2]],
+    pub(crate) noise: &'a Noise,
+    /// Variance of the offsets of lines that are left at each, see [`crate::window::lines`].
     ridges: Vec<f64>,
     /// Width of the window along x, pixels.
     width: f64,
     /// How far other harmonics that reach through the window can pull each slope, rad per pixel.
-    pub(super) leaks: Vec<f64>,
+    pub(crate) leaks: Vec<f64>,
 }
 
 impl<'a> Harmonics<'a> {
     /// `pair` and the mean amplitudes say what leaks through a window of this width (pixels).
-    pub(super) fn new(
+    pub(crate) fn new(
         (indices, noise): (&'a [[i32; 2]], &'a Noise),
         ridges: Vec<f64>,
         pair: &Matrix2<f64>,
@@ -152,13 +152,13 @@ struct Variances {
 
 /// Power that offsets of lines (variance `ridge`) add to an envelope, as the level of white noise that adds as much;
 /// `turn` is gₓwₓ.
-pub(super) fn level_of_ridge(ridge: f64, turn: f64, width: f64) -> f64 {
+pub(crate) fn level_of_ridge(ridge: f64, turn: f64, width: f64) -> f64 {
     ridge * (-turn * turn).exp() * 2.0 * PI.sqrt() * width
 }
 
 /// The local lattice of every node. `taken` gives what was taken off at a place: the slopes of the carrier and the
 /// mean pair together, rad per pixel.
-pub(super) fn local_lattices(
+pub(crate) fn local_lattices(
     blocks: &Blocks,
     smoothed: &Smoothed,
     harmonics: &Harmonics,
@@ -284,9 +284,11 @@ fn regression(
 
 #[cfg(test)]
 mod tests {
-    use super::super::tests::{pulls, rms};
-    use super::super::{Mask, Reference, Resolution, local_lattices};
-    use crate::simulate::FieldScene;
+    use crate::map::local::local_lattices;
+    use crate::map::tests::{pulls, rms};
+    use crate::simulate::field::FieldScene;
+    use crate::window::mask::Mask;
+    use crate::window::types::{Reference, Resolution};
 
     /// Peaks so sharp that harmonics beyond those used come through the blocks, with little noise: that makes no defects,
     /// nor scatter beyond the errors.

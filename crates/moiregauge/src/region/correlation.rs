@@ -8,7 +8,7 @@
 use nalgebra::Vector2;
 use rayon::prelude::*;
 
-use crate::map::Grid;
+use crate::map::sample::Grid;
 
 /// Beyond this many windows nodes count as independent.
 const REACH: f64 = 7.0;
@@ -16,18 +16,18 @@ const REACH: f64 = 7.0;
 /// Sums over all pairs of nodes of an area, with weights that add up to one: `Σ w_i w_j ρ_ij` is what noise of unit
 /// variance leaves in the mean, `Σ w_i w_j ρ²_ij` how much its variance over the area scatters.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Pairs {
-    pub(super) mean: f64,
-    pub(super) square: f64,
+pub(crate) struct Pairs {
+    pub(crate) mean: f64,
+    pub(crate) square: f64,
 }
 
 /// Correlation of the noise of nodes `d` windows apart, d² given.
-pub(super) fn rho(square: f64) -> f64 {
+pub(crate) fn rho(square: f64) -> f64 {
     (1.0 - square / 4.0) * (-square / 4.0).exp()
 }
 
 /// The sums for these nodes of a grid and their weights, under windows of this width (nm).
-pub(super) fn pairs(grid: &Grid, nodes: &[(usize, f64)], window: f64) -> Pairs {
+pub(crate) fn pairs(grid: &Grid, nodes: &[(usize, f64)], window: f64) -> Pairs {
     if !(window > 0.0) {
         let alone = nodes.iter().map(|(_, w)| w * w).sum();
         return Pairs {

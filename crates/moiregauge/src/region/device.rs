@@ -7,11 +7,13 @@
 use nalgebra::Vector2;
 use rayon::prelude::*;
 
-use super::Region;
-use super::correlation::pairs;
-use super::smoothing::{Bends, Bent};
-use super::statistics::{RegionMean, RegionStatistics};
-use crate::map::{Grid, Mask, TwistStrainMap};
+use crate::map::quantities::TwistStrainMap;
+use crate::map::sample::Grid;
+use crate::region::correlation::pairs;
+use crate::region::polygon::Region;
+use crate::region::smoothing::{Bends, Bent};
+use crate::region::statistics::{RegionMean, RegionStatistics};
+use crate::window::mask::Mask;
 
 /// What is looked for.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -3,123 +3,20 @@
 //! In: a [`TwistStrainMap`]. Out: means with errors that know how noise of neighbouring nodes goes together,
 //! spreads without what noise adds. nm, rad, strain without dimension; places are those of the map, x right, y up.
 
-mod correlation;
-mod device;
-mod profile;
-mod smoothing;
-mod statistics;
-mod trend;
-mod wanted;
+pub(crate) mod correlation;
+pub(crate) mod device;
+pub(crate) mod polygon;
+pub(crate) mod profile;
+pub(crate) mod smoothing;
+pub(crate) mod statistics;
+#[cfg(test)]
+pub(crate) mod tests;
+pub(crate) mod trend;
+pub(crate) mod wanted;
 
 pub use device::{Device, DeviceSearch, uniform_areas};
+pub use polygon::Region;
 pub use profile::{Profile, ProfilePoint, ProfileValues};
 pub use statistics::{RegionMean, RegionStatistics};
 pub use trend::{Trend, Trends};
 pub use wanted::{WantedArea, WantedTwist};
-
-use nalgebra::{Rotation2, Vector2};
-
-use crate::map::{Grid, TwistStrainMap};
-
-/// An area of a map with a name.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Region {
-    /// What the user calls it.
-    pub name: String,
-    /// Corners in order, nm; the last one is joined to the first.
-    pub corners: Vec<Vector2<f64>>,
-}
-
-impl Region {
-    /// A box from its lower left corner, nm.
-    pub fn rectangle(name: &str, corner: Vector2<f64>, size: [f64; 2]) -> Self {
-        let centre = corner + Vector2::from(size) / 2.0;
-        Self::turned_rectangle(name, centre, size, 0.0)
-    }
-
-    /// A box about its centre (nm), its first side at `angle` to x (rad).
-    pub fn turned_rectangle(
-        name: &str,
-        centre: Vector2<f64>,
-        [width, height]: [f64; 2],
-        angle: f64,
-    ) -> Self {
-        let turn = Rotation2::new(angle);
-        let corner = |x: f64, y: f64| centre + turn * Vector2::new(x * width, y * height);
-        Self {
-            name: name.to_owned(),
-            corners: vec![
-                corner(-0.5, -0.5),
-                corner(0.5, -0.5),
-                corner(0.5, 0.5),
-                corner(-0.5, 0.5),
-            ],
-        }
-    }
-
-    /// Its sides.
-    fn sides(&self) -> impl Iterator<Item = (Vector2<f64>, Vector2<f64>)> {
-        let next = self.corners.iter().cycle().skip(1);
-        self.corners.iter().copied().zip(next.copied())
-    }
-
-    /// Area, nm².
-    pub fn area(&self) -> f64 {
-        let twice: f64 = self.sides().map(|(a, b)| a.perp(&b)).sum();
-        (twice / 2.0).abs()
-    }
-
-    /// Whether a place lies within, by the even-odd rule.
-    pub fn contains(&self, place: Vector2<f64>) -> bool {
-        let crossings = self.sides().filter(|(a, b)| {
-            (a.y > place.y) != (b.y > place.y)
-                && place.x < a.x + (place.y - a.y) / (b.y - a.y) * (b.x - a.x)
-        });
-        crossings.count() % 2 == 1
-    }
-
-    /// Whether two sides cross or touch that are no neighbours.
-    pub fn crosses_itself(&self) -> bool {
-        let sides: Vec<_> = self.sides().collect();
-        let side = |a: Vector2<f64>, b: Vector2<f64>, p: Vector2<f64>| (b - a).perp(&(p - a));
-        let apart = |(a, b), (c, d)| {
-            side(a, b, c) * side(a, b, d) > 0.0 || side(c, d, a) * side(c, d, b) > 0.0
-        };
-        (0..sides.len()).any(|i| {
-            let others = i + 2..sides.len() - usize::from(i == 0);
-            others.into_iter().any(|j| !apart(sides[i], sides[j]))
-        })
-    }
-
-    /// The nodes of a grid whose cells it covers, in their order, with the share of the cell (to 4 %).
-    pub fn shares(&self, grid: &Grid) -> Vec<(usize, f64)> {
-        let parts = [-0.4, -0.2, 0.0, 0.2, 0.4];
-        let steps: Vec<Vector2<f64>> = (0..25)
-            .map(|i| grid.step * Vector2::new(parts[i % 5], parts[i / 5]))
-            .collect();
-        let reach = grid.step.abs() * Vector2::repeat(0.5);
-        let first = self.corners.first().copied().unwrap_or_default();
-        let low = self.corners.iter().fold(first, |a, c| a.inf(c)) - reach;
-        let high = self.corners.iter().fold(first, |a, c| a.sup(c)) + reach;
-        let of_node = |node: usize| {
-            let place = grid.place(node);
-            if place.inf(&low) != low || place.sup(&high) != high {
-                return None;
-            }
-            let count = steps.iter().filter(|s| self.contains(place + **s)).count();
-            (count > 0).then_some((node, count as f64 / 25.0))
-        };
-        (0..grid.len()).filter_map(of_node).collect()
-    }
-}
-
-/// The mean of the three wavelengths at a node with an upper limit of its error, nm.
-fn mean_wavelength(map: &TwistStrainMap, node: usize) -> [f64; 2] {
-    let three = map.wavelengths.each_ref().map(|w| w.at(node));
-    let value = three.iter().map(|w| w.value).sum::<f64>() / 3.0;
-    let sigma = three.iter().map(|w| w.sigma).sum::<f64>() / 3.0;
-    [value, sigma]
-}
-
-#[cfg(test)]
-pub(crate) mod tests;

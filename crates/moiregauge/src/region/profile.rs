@@ -1,10 +1,11 @@
 //! A map along a line.
 
+use heterostrain::Estimate;
 use nalgebra::{Matrix2, Vector2};
 
-use super::mean_wavelength;
-use crate::estimate::Estimate;
-use crate::map::{Mask, TwistStrainMap};
+use crate::map::quantities::TwistStrainMap;
+use crate::region::statistics::mean_wavelength;
+use crate::window::mask::Mask;
 
 /// Values along a line, as far as the map reaches.
 #[derive(Clone, Debug)]
@@ -123,7 +124,7 @@ fn values_of(map: &TwistStrainMap, around: &[Beside]) -> ProfileValues {
         });
         Estimate::new(sum[0], sum[1])
     };
-    let plane = |plane: &crate::map::Plane| {
+    let plane = |plane: &crate::map::quantities::Plane| {
         mean(&|n| {
             let e = plane.at(n);
             [e.value, e.sigma]

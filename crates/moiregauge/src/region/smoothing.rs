@@ -7,8 +7,9 @@
 //! has κ = 0. Of what noise covers no curvature is known; it is taken to have κ = 1, a wavelength of 2π windows. Changes
 //! much shorter than that leave nothing in a map, and no number of it can tell them.
 
-use super::correlation::rho;
-use crate::map::{Mask, TwistStrainMap};
+use crate::map::quantities::TwistStrainMap;
+use crate::region::correlation::rho;
+use crate::window::mask::Mask;
 
 /// Curvatures are differences to neighbours so many windows away, or the next node.
 const OVER: f64 = 0.5;
@@ -16,7 +17,7 @@ const OVER: f64 = 0.5;
 const MOST: f64 = 3.0;
 
 /// How curvature is read off a map.
-pub(super) struct Bends {
+pub(crate) struct Bends {
     /// Nodes to either side, along columns and rows.
     apart: [usize; 2],
     /// What makes `w²∂²θ` of differences to both sides.
@@ -30,16 +31,16 @@ pub(super) struct Bends {
 /// Sums over an area that tell κ²: of weights, of `w²∇²θ`, of that times θ, and of what noise makes of the latter. Nodes
 /// without neighbours are left out.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Bent {
-    pub(super) weight: f64,
-    pub(super) bends: f64,
-    pub(super) products: f64,
-    pub(super) noise: f64,
+pub(crate) struct Bent {
+    pub(crate) weight: f64,
+    pub(crate) bends: f64,
+    pub(crate) products: f64,
+    pub(crate) noise: f64,
 }
 
 impl Bent {
     /// With one more node: its weight, value and curvature with its noise.
-    pub(super) fn and(self, weight: f64, value: f64, [bend, noise]: [f64; 2]) -> Self {
+    pub(crate) fn and(self, weight: f64, value: f64, [bend, noise]: [f64; 2]) -> Self {
         Self {
             weight: self.weight + weight,
             bends: self.bends + weight * bend,
@@ -50,7 +51,7 @@ impl Bent {
 }
 
 impl Bends {
-    pub(super) fn new(map: &TwistStrainMap) -> Self {
+    pub(crate) fn new(map: &TwistStrainMap) -> Self {
         let lengths = [0, 1].map(|i| map.grid.step.column(i).norm());
         let apart = lengths.map(|l| (OVER * map.window_nm / l).round().max(1.0));
         // In windows.
@@ -67,7 +68,7 @@ impl Bends {
 
     /// `w²∇²θ` at a node and what noise adds to `−w² θ ∇²θ`; `None` beside edges and masked nodes. Values are given
     /// with their errors.
-    pub(super) fn at(
+    pub(crate) fn at(
         &self,
         map: &TwistStrainMap,
         node: usize,
@@ -95,7 +96,7 @@ impl Bends {
 
     /// By how much the spread may be larger without the window: the factor `e^{κ²/2}`. Given are the variance without
     /// noise and its standard error, the mean and the sums of the area.
-    pub(super) fn widening(&self, [own, doubt]: [f64; 2], mean: f64, bent: &Bent) -> f64 {
+    pub(crate) fn widening(&self, [own, doubt]: [f64; 2], mean: f64, bent: &Bent) -> f64 {
         let moving = if bent.weight > 0.0 {
             let covariance = mean * bent.bends - bent.products;
             ((covariance - bent.noise) / bent.weight).max(0.0)

@@ -1,12 +1,13 @@
 //! Means and spreads over an area.
 
+use heterostrain::strain::TwistStrain;
 use nalgebra::{Matrix2, Matrix4, Vector2};
 
-use super::correlation::{Pairs, pairs};
-use super::smoothing::{Bends, Bent};
-use super::{Region, mean_wavelength};
-use crate::map::{Mask, Plane, TwistStrainMap};
-use crate::strain::TwistStrain;
+use crate::map::quantities::{Plane, TwistStrainMap};
+use crate::region::correlation::{Pairs, pairs};
+use crate::region::polygon::Region;
+use crate::region::smoothing::{Bends, Bent};
+use crate::window::mask::Mask;
 
 /// Mean and spread of a quantity over an area.
 ///
@@ -37,7 +38,7 @@ pub struct RegionMean {
 impl RegionMean {
     /// From sums of weights, values, their squares and variances of their noise, and those of
     /// [`Bends::widening`].
-    pub(super) fn of_sums(
+    pub(crate) fn of_sums(
         [weight, sum, squares, variances]: [f64; 4],
         (bends, bent): (&Bends, &Bent),
         pairs: &Pairs,
@@ -280,4 +281,12 @@ impl RegionStatistics {
             wavelength: area.mean(&|n| mean_wavelength(map, n)),
         }
     }
+}
+
+/// The mean of the three wavelengths at a node with an upper limit of its error, nm.
+pub(crate) fn mean_wavelength(map: &TwistStrainMap, node: usize) -> [f64; 2] {
+    let three = map.wavelengths.each_ref().map(|w| w.at(node));
+    let value = three.iter().map(|w| w.value).sum::<f64>() / 3.0;
+    let sigma = three.iter().map(|w| w.sigma).sum::<f64>() / 3.0;
+    [value, sigma]
 }

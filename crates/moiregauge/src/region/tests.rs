@@ -1,12 +1,17 @@
+use heterostrain::lattice::LatticeVectors;
+use heterostrain::material::Material;
+use heterostrain::strain::StrainConvention;
 use nalgebra::{Matrix2, Matrix4, Vector2};
 
 use super::*;
-use crate::geometry::Geometry;
-use crate::lattice::LatticeVectors;
-use crate::map::{LatticeMap, Mask, Plane, Reference, Resolution, local_lattices};
-use crate::material::Material;
-use crate::settings::StrainConvention;
-use crate::simulate::{FieldScene, Ripple};
+use crate::frame::geometry::Geometry;
+use crate::map::local::local_lattices;
+use crate::map::quantities::Plane;
+use crate::map::sample::LatticeMap;
+use crate::map::{Grid, TwistStrainMap};
+use crate::simulate::field::{FieldScene, Ripple};
+use crate::window::mask::Mask;
+use crate::window::types::{Reference, Resolution};
 
 /// A map with this twist and error everywhere, on a sheared grid of 60 × 50 nodes about 2 nm apart.
 pub(crate) fn made(twist: impl Fn(Vector2<f64>) -> f64, sigma: f64) -> TwistStrainMap {
@@ -230,7 +235,7 @@ fn the_share_of_a_wanted_twist_is_without_noise() {
     assert!((found.measured - found.corrected).abs() < 1e-12);
     // A normal distribution of twists of width v about the wanted one, each measured with noise as wide.
     let mut noisy = made(|_| 0.025, 0.001);
-    let mut rng = crate::rng::stream(5, "wanted", 0);
+    let mut rng = crate::numbers::rng::stream(5, "wanted", 0);
     let mut normal = || -> f64 {
         use rand_distr::{Distribution, StandardNormal};
         StandardNormal.sample(&mut rng)
@@ -314,9 +319,9 @@ fn exact_twist(pair: &Matrix2<f64>) -> f64 {
         basis: pair * 2.0,
         covariance: Matrix4::zeros(),
     };
-    let real = crate::lattice::reciprocal::real_from_reciprocal(&exact).unwrap();
+    let real = heterostrain::lattice::real_from_reciprocal(&exact).unwrap();
     let convention = StrainConvention::RealSpace;
-    let found = crate::strain::twist_strain(&real, &Material::graphene(), convention);
+    let found = heterostrain::strain::twist_strain(&real, &Material::graphene(), convention);
     found.unwrap().twist
 }
 

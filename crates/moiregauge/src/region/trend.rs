@@ -3,13 +3,14 @@
 //! Creep, a drift that changes and a scanner that bows stretch one side of a frame more than the other. A plane fitted to
 //! the good nodes by least squares says how much: `s² = trend² + noise² + rest²`. The mean of a map is that at the middle
 //! of its good nodes; a fit to the whole image weighs the frame evenly about its own middle, where the trend tells the
-//! value of the map. Errors count that neighbouring nodes share their noise (see [`correlation`](super::correlation)).
+//! value of the map. Errors count that neighbouring nodes share their noise (see [`correlation`](crate::region::correlation)).
 
+use heterostrain::Estimate;
 use nalgebra::{Matrix2, Vector2};
 
-use super::correlation::pairs;
-use crate::estimate::Estimate;
-use crate::map::{Mask, Plane, TwistStrainMap};
+use crate::map::quantities::{Plane, TwistStrainMap};
+use crate::region::correlation::pairs;
+use crate::window::mask::Mask;
 
 /// Good nodes that it takes, and how many are used at most.
 const FEWEST: usize = 12;

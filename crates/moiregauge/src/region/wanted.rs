@@ -8,8 +8,9 @@
 
 use std::f64::consts::SQRT_2;
 
-use super::smoothing::{Bends, Bent};
-use crate::map::{Mask, TwistStrainMap};
+use crate::map::quantities::TwistStrainMap;
+use crate::region::smoothing::{Bends, Bent};
+use crate::window::mask::Mask;
 
 /// A twist that a device is to have.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,6 +1,6 @@
 //! Ranges of all numeric settings: what lies outside of them makes no sense, or takes memory and time without end.
 
-use super::Settings;
+use crate::settings::knobs::Settings;
 
 /// More draws than this tell nothing more.
 pub const MOST_DRAWS: usize = 1_000_000;
@@ -101,7 +101,8 @@ impl Settings {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::settings::{GivenDrift, KnownOrientation, LatticeDirection};
+    use crate::settings::knobs::GivenDrift;
+    use heterostrain::strain::{KnownOrientation, LatticeDirection};
 
     fn usual() -> Settings {
         Settings {

@@ -8,7 +8,7 @@ const FIRST_DAY: i64 = 19_737;
 const FIRST_SECOND: i64 = 10 * 3600;
 
 /// The date `seconds` after the start of the clock, in whole seconds.
-pub(super) fn date_after(seconds: f64) -> DateTime {
+pub(crate) fn date_after(seconds: f64) -> DateTime {
     let total = FIRST_DAY * 86_400 + FIRST_SECOND + seconds.round() as i64;
     let (year, month, day) = civil(total.div_euclid(86_400));
     let second = total.rem_euclid(86_400);

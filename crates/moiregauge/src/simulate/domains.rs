@@ -6,8 +6,8 @@
 use nalgebra::{Matrix2, Vector2};
 use rand_distr::{Distribution, StandardNormal};
 
-use crate::image::Image;
-use crate::rng;
+use crate::frame::image::Image;
+use crate::numbers::rng;
 
 /// Nodes, walls and noise.
 #[derive(Clone, Debug)]

@@ -1,6 +1,6 @@
 //! Why a simulation cannot be run.
 
-use crate::strain::StrainError;
+use heterostrain::strain::StrainError;
 
 /// Why a simulation cannot be run.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

@@ -9,8 +9,8 @@ use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 use rustfft::num_complex::Complex64;
 
-use crate::image::Image;
-use crate::rng;
+use crate::frame::image::Image;
+use crate::numbers::rng;
 
 /// A lattice whose wave vectors change from place to place.
 #[derive(Clone, Debug)]

@@ -8,11 +8,11 @@ use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 use spmfile::{Channel, LineDirection, Samples, Scan};
 
-use super::calendar::date_after;
-use super::raster::{FramePlan, PixelTime};
-use super::scene::{Harmonic, Scene};
-use super::{Drift, Simulation};
-use crate::rng;
+use crate::numbers::rng;
+use crate::simulate::calendar::date_after;
+use crate::simulate::raster::{FramePlan, PixelTime};
+use crate::simulate::scene::{Harmonic, Scene};
+use crate::simulate::settings::{Drift, Simulation};
 
 /// Full ranges of the detectors; a count is 2⁻³² of it.
 const COUNTS: f64 = 4_294_967_296.0;
@@ -54,7 +54,7 @@ impl Motion {
 }
 
 /// The frame as the instrument would have written it.
-pub(super) fn record(settings: &Simulation, scene: &Scene, plan: &FramePlan) -> Scan {
+pub(crate) fn record(settings: &Simulation, scene: &Scene, plan: &FramePlan) -> Scan {
     let raster = &settings.raster;
     let mut directions = vec![LineDirection::Trace];
     if raster.retrace {

@@ -7,17 +7,16 @@
 //! A feature of the sample at R is found at `R + d(t)`; a pixel at position r, recorded at time t,
 //! shows the sample at `r − d(t)`. Nothing is approximated: every pixel has its own time.
 
-mod calendar;
-mod domains;
-mod error;
-mod field;
-mod frame;
-mod raster;
-mod scene;
-mod settings;
-mod truth;
-
-use spmfile::Scan;
+pub(crate) mod calendar;
+pub(crate) mod domains;
+pub(crate) mod error;
+pub(crate) mod field;
+pub(crate) mod frame;
+pub(crate) mod raster;
+pub(crate) mod scene;
+pub(crate) mod settings;
+pub(crate) mod simulator;
+pub(crate) mod truth;
 
 pub use domains::DomainScene;
 pub use error::SimulateError;
@@ -25,57 +24,5 @@ pub use field::{Feature, FieldScene, Ripple};
 pub use settings::{
     Drift, FirstDirection, MOST_PIXELS, Noise, Pattern, Raster, Sample, Simulation, Window,
 };
+pub use simulator::Simulator;
 pub use truth::{FrameTruth, Truth};
-
-use raster::FramePlan;
-use scene::Scene;
-
-/// A simulation whose settings have been checked, ready to record frames.
-#[derive(Clone, Debug)]
-pub struct Simulator {
-    settings: Simulation,
-    scene: Scene,
-}
-
-impl Simulator {
-    /// Checks the settings and lays out the sample.
-    ///
-    /// # Errors
-    /// [`SimulateError`] names the setting that makes no sense.
-    pub fn new(settings: Simulation) -> Result<Self, SimulateError> {
-        settings.check()?;
-        let scene = Scene::new(&settings.sample)?;
-        Ok(Self { settings, scene })
-    }
-
-    /// The settings.
-    pub fn settings(&self) -> &Simulation {
-        &self.settings
-    }
-
-    /// Number of frames.
-    pub fn frames(&self) -> usize {
-        self.settings.raster.scans
-    }
-
-    /// Frame `index` as the instrument would have written it.
-    pub fn frame(&self, index: usize) -> Scan {
-        let plan = FramePlan::new(&self.settings, index);
-        frame::record(&self.settings, &self.scene, &plan)
-    }
-
-    /// The wave vectors (rad/nm) and amplitudes (degrees of phase) of one half of the harmonics.
-    pub(crate) fn harmonics(&self) -> impl Iterator<Item = (nalgebra::Vector2<f64>, f64)> {
-        self.scene.harmonics.iter().map(|h| (h.wave, h.amplitude))
-    }
-
-    /// Everything needed to check an analysis of the frames.
-    pub fn truth(&self) -> Truth {
-        truth::truth(&self.settings, &self.scene)
-    }
-
-    /// The name of the file for frame `index`, as in `scan.003.spm`.
-    pub fn file_name(index: usize) -> String {
-        format!("scan.{index:03}.spm")
-    }
-}

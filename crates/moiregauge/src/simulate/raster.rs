@@ -7,36 +7,36 @@
 use nalgebra::{Matrix2, Rotation2, Vector2};
 use spmfile::{FrameDirection, LineDirection};
 
-use super::{FirstDirection, Simulation};
+use crate::simulate::settings::{FirstDirection, Simulation};
 
 /// Time of the pixels of one line direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct PixelTime {
+pub(crate) struct PixelTime {
     /// Of pixel (0, 0), s.
-    pub(super) first: f64,
+    pub(crate) first: f64,
     /// From column to column and from row to row, s.
-    pub(super) step: Vector2<f64>,
+    pub(crate) step: Vector2<f64>,
 }
 
 /// One frame before it is recorded.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct FramePlan {
-    pub(super) index: usize,
-    pub(super) direction: FrameDirection,
+pub(crate) struct FramePlan {
+    pub(crate) index: usize,
+    pub(crate) direction: FrameDirection,
     /// Start and end, s.
-    pub(super) start: f64,
-    pub(super) end: f64,
+    pub(crate) start: f64,
+    pub(crate) end: f64,
     /// J, nm per pixel.
-    pub(super) pixel_to_nm: Matrix2<f64>,
+    pub(crate) pixel_to_nm: Matrix2<f64>,
     /// Position of pixel (0, 0), nm.
-    pub(super) origin: Vector2<f64>,
-    pub(super) centre: Vector2<f64>,
-    pub(super) trace: PixelTime,
-    pub(super) retrace: PixelTime,
+    pub(crate) origin: Vector2<f64>,
+    pub(crate) centre: Vector2<f64>,
+    pub(crate) trace: PixelTime,
+    pub(crate) retrace: PixelTime,
 }
 
 impl FramePlan {
-    pub(super) fn new(settings: &Simulation, index: usize) -> Self {
+    pub(crate) fn new(settings: &Simulation, index: usize) -> Self {
         let raster = &settings.raster;
         let [columns, rows] = raster.pixels.map(|n| n as f64);
         let duration = rows / raster.line_rate_hz;
@@ -81,7 +81,7 @@ impl FramePlan {
         }
     }
 
-    pub(super) fn time(&self, line: LineDirection) -> PixelTime {
+    pub(crate) fn time(&self, line: LineDirection) -> PixelTime {
         match line {
             LineDirection::Trace => self.trace,
             LineDirection::Retrace => self.retrace,

@@ -3,32 +3,33 @@
 //! `I(R) = Σ A_hk cos((h G₁ + k G₂)·(R − R₀) + φ_hk)`, G the reciprocal vectors dual to the moiré
 //! vectors (rad/nm). Amplitudes `s^(N−1)`, N = |hG₁ + kG₂|²/|G|², are those of Gaussian spots.
 
+use heterostrain::strain::{moire_of, moire_pair_of};
 use nalgebra::{Matrix2, Vector2};
 use rand_distr::{Distribution, StandardNormal};
 
-use super::{Pattern, Sample, SimulateError};
-use crate::rng;
-use crate::strain::{moire_of, moire_pair_of};
+use crate::numbers::rng;
+use crate::simulate::error::SimulateError;
+use crate::simulate::settings::{Pattern, Sample};
 
 /// One harmonic of the pattern.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Harmonic {
+pub(crate) struct Harmonic {
     /// rad/nm.
-    pub(super) wave: Vector2<f64>,
+    pub(crate) wave: Vector2<f64>,
     /// Degrees of phase.
-    pub(super) amplitude: f64,
+    pub(crate) amplitude: f64,
     /// At R = 0, rad.
-    pub(super) phase: f64,
+    pub(crate) phase: f64,
 }
 
 /// The pattern.
 #[derive(Clone, Debug)]
-pub(super) struct Scene {
+pub(crate) struct Scene {
     /// Moiré vectors as columns, nm.
-    pub(super) basis: Matrix2<f64>,
+    pub(crate) basis: Matrix2<f64>,
     /// Reciprocal vectors as columns, rad/nm.
-    pub(super) reciprocal: Matrix2<f64>,
-    pub(super) harmonics: Vec<Harmonic>,
+    pub(crate) reciprocal: Matrix2<f64>,
+    pub(crate) harmonics: Vec<Harmonic>,
 }
 
 /// Half of the harmonics (h, k) of the first five shells; G₁ and G₂ are 120° apart, so that
@@ -58,7 +59,7 @@ const SHELLS: [(i32, i32); 18] = [
 const FAINTEST: f64 = 1e-6;
 
 impl Scene {
-    pub(super) fn new(sample: &Sample) -> Result<Self, SimulateError> {
+    pub(crate) fn new(sample: &Sample) -> Result<Self, SimulateError> {
         let (stacking, bilayer) = (sample.stacking(), sample.bilayer());
         let basis = match sample.pattern {
             // The contrast follows the stacking: the waves b₂ − b₁ are the strong ones, whatever the strain.
@@ -73,7 +74,7 @@ impl Scene {
         };
         let inverse = basis
             .try_inverse()
-            .ok_or(crate::strain::StrainError::NoMoire)?;
+            .ok_or(heterostrain::strain::StrainError::NoMoire)?;
         let reciprocal = std::f64::consts::TAU * inverse.transpose();
         let mut rng = rng::stream(sample.seed, "simulate sample", 0);
         let mut spread = || -> f64 {

@@ -1,11 +1,10 @@
 //! Every knob of a simulation. The defaults are the conditions of arXiv 2406.08681.
 
+use heterostrain::material::{Bilayer, Material};
+use heterostrain::strain::{Stacking, StrainConvention};
 use serde::{Deserialize, Serialize};
 
-use super::SimulateError;
-use crate::material::{Bilayer, Material};
-use crate::settings::StrainConvention;
-use crate::strain::Stacking;
+use crate::simulate::error::SimulateError;
 
 /// One set of frames of one sample.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
@@ -274,7 +273,7 @@ pub const MOST_PIXELS: usize = 16_384;
 
 impl Simulation {
     /// Refuses what no instrument can do.
-    pub(super) fn check(&self) -> Result<(), SimulateError> {
+    pub(crate) fn check(&self) -> Result<(), SimulateError> {
         let Self {
             sample,
             drift,

@@ -4,9 +4,10 @@ use nalgebra::{Matrix2, Vector2};
 use serde::{Deserialize, Serialize};
 use spmfile::FrameDirection;
 
-use super::raster::FramePlan;
-use super::scene::Scene;
-use super::{Simulation, Simulator};
+use crate::simulate::raster::FramePlan;
+use crate::simulate::scene::Scene;
+use crate::simulate::settings::Simulation;
+use crate::simulate::simulator::Simulator;
 
 /// The truth about a simulated set.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
@@ -80,7 +81,7 @@ const CONVENTIONS: [&str; 6] = [
     "drift: motion of the sample in the frame of the sensors; a feature at R is found at R + d(t)",
 ];
 
-pub(super) fn truth(settings: &Simulation, scene: &Scene) -> Truth {
+pub(crate) fn truth(settings: &Simulation, scene: &Scene) -> Truth {
     let sample = &settings.sample;
     // α is reduced modulo 60° (the symmetry of layer 1), φ takes up what α loses.
     let period = sample

@@ -1,8 +1,8 @@
 //! Images with a known lattice, made by their definition.
 
-use moiregauge::geometry::Geometry;
-use moiregauge::image::Image;
-use moiregauge::rng::stream;
+use moiregauge::frame::Geometry;
+use moiregauge::frame::Image;
+use moiregauge::numbers::stream;
 use nalgebra::{Matrix2, Vector2};
 use rand_distr::{Distribution, StandardNormal};
 

@@ -2,10 +2,10 @@
 
 use std::f64::consts::TAU;
 
-use moiregauge::geometry::Geometry;
-use moiregauge::image::Image;
+use moiregauge::frame::Geometry;
+use moiregauge::frame::Image;
 use moiregauge::lattice::MeasuredLattice;
-use moiregauge::rng::stream;
+use moiregauge::numbers::stream;
 use nalgebra::{DMatrix, Matrix2, Matrix4, Vector2, Vector4};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};

@@ -1,14 +1,13 @@
 //! Simulated sets with biaxial strain, and atomic images of one layer in the same frame of the scanner.
 
-use moiregauge::analysis::Analysis;
+use heterostrain::material::Material;
+use heterostrain::strain::StrainTensor;
+use moiregauge::campaign::Analysis;
+use moiregauge::campaign::{AtomicOrientation, analyse, atomic_orientation};
 use moiregauge::caveat::Caveat;
-use moiregauge::material::Material;
-use moiregauge::series::{
-    AtomicOrientation, MeasuredScan, analyse, atomic_orientation, measure_scan,
-};
+use moiregauge::scan::{MeasuredScan, measure_scan};
 use moiregauge::settings::Settings;
 use moiregauge::simulate::{Pattern, Simulation, Simulator};
-use moiregauge::strain::StrainTensor;
 use nalgebra::Vector2;
 
 /// What was put in and what came out.

@@ -2,10 +2,11 @@
 
 #![allow(dead_code, reason = "each user takes what it needs")]
 
-use moiregauge::lattice::LatticeVectors;
-use moiregauge::material::Material;
-use moiregauge::settings::StrainConvention;
-use moiregauge::strain::{TwistStrain, moire_lattice, twist_strain};
+use heterostrain::lattice::LatticeVectors;
+use heterostrain::material::Material;
+use heterostrain::strain::StrainConvention;
+use heterostrain::strain::twist_strain;
+use heterostrain::strain::{TwistStrain, moire_lattice};
 use nalgebra::{Matrix2, Matrix4};
 
 /// A layer of the table.

@@ -13,11 +13,11 @@
 
 use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
 
-use super::folded::Bends;
-use super::frame::{BENT, Frame, wave};
-use super::gram::gram;
-use super::model::Model;
-use super::solve;
+use crate::lattice::fit::folded::Bends;
+use crate::lattice::fit::frame::{BENT, Frame, wave};
+use crate::lattice::fit::gram::gram;
+use crate::lattice::fit::model::Model;
+use crate::lattice::fit::solve;
 
 /// χ² with six degrees of freedom exceeds 22.5 once in a thousand; the noise that it is counted in is
 /// known to a tenth, which makes it 27.
@@ -47,7 +47,7 @@ impl Inhomogeneity {
 }
 
 /// Reads the bend off the residual. `noise` is the power around each harmonic along x and along y.
-pub(super) fn inhomogeneity(
+pub(crate) fn inhomogeneity(
     frame: &Frame,
     model: &Model,
     lambda: &[f64],

@@ -2,15 +2,16 @@
 
 use nalgebra::{DMatrix, Vector2};
 
-use super::frame::{Basis, STRAIGHT, wave};
-use super::gram::gram;
-use super::model::{Clip, Tables, look};
-use super::noise::Leverage;
-use super::{FinalNoise, Fit, ROUNDS, solve};
-use crate::lattice::harmonics::{Harmonic, Harmonics};
+use crate::lattice::fit::fit_pixels::{FinalNoise, Fit, ROUNDS};
+use crate::lattice::fit::frame::{Basis, STRAIGHT, wave};
+use crate::lattice::fit::gram::gram;
+use crate::lattice::fit::model::{Clip, Tables, look};
+use crate::lattice::fit::noise::Leverage;
+use crate::lattice::fit::solve;
+use crate::spectrum::harmonics::{Harmonic, Harmonics};
 
 /// The three that make the lattice; always in.
-pub(super) const FIRST_SHELL: [[i32; 2]; 3] = [[1, 0], [0, 1], [-1, 1]];
+pub(crate) const FIRST_SHELL: [[i32; 2]; 3] = [[1, 0], [0, 1], [-1, 1]];
 /// |h|² of the last of the five shells.
 const LAST_SHELL: i32 = 9;
 /// Frames with more pixels have many periods.
@@ -26,7 +27,7 @@ const HIGHEST: f64 = 0.9;
 
 /// What the fit starts with: the first shell, and of the others what the spectrum shows clearly.
 /// `None` where the first shell is not complete (one of it beyond the Nyquist frequency).
-pub(super) fn at_first(start: &Harmonics, pixels: usize) -> Option<Vec<([i32; 2], &Harmonic)>> {
+pub(crate) fn at_first(start: &Harmonics, pixels: usize) -> Option<Vec<([i32; 2], &Harmonic)>> {
     let inverse = start.pair.try_inverse()?;
     let price = (pixels as f64).ln();
     let found = start.list.iter().map(|harmonic| {
@@ -44,7 +45,7 @@ pub(super) fn at_first(start: &Harmonics, pixels: usize) -> Option<Vec<([i32; 2]
 
 impl Fit<'_> {
     /// Whether a few lines of the image are enough to get near the end.
-    pub(super) fn worth_a_sketch(&self, start: &Harmonics) -> bool {
+    pub(crate) fn worth_a_sketch(&self, start: &Harmonics) -> bool {
         let share = SKETCHED as f64 / self.frame.lines().max(1) as f64;
         let first = start.list.iter().take(FIRST_SHELL.len());
         let weakest = first
@@ -55,7 +56,7 @@ impl Fit<'_> {
 
     /// Fits to one line of each of a few stripes. Ends near enough to the lattice of all lines for
     /// one step.
-    pub(super) fn sketch(&mut self) -> Option<()> {
+    pub(crate) fn sketch(&mut self) -> Option<()> {
         let whole = self.frame.clone();
         let count: Vec<usize> = (0..whole.image.rows)
             .filter(|&r| whole.present[r] > 0)
@@ -88,7 +89,7 @@ impl Fit<'_> {
 
     /// Adds harmonics until none earns its place, drops those that lost theirs, and fits anew each
     /// time. Returns the noise that is left.
-    pub(super) fn choose(&mut self) -> Option<FinalNoise> {
+    pub(crate) fn choose(&mut self) -> Option<FinalNoise> {
         if self.sigma.is_infinite() {
             self.converge()?;
         }

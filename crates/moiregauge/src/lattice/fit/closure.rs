@@ -11,9 +11,9 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::model::Model;
-use super::solve;
-use crate::chi2::enlargement_by_estimated_noise;
+use crate::lattice::fit::model::Model;
+use crate::lattice::fit::solve;
+use crate::numbers::chi2::enlargement_by_estimated_noise;
 
 /// Amplitude over noise from which a harmonic has a wave vector of its own: its phase is then good to
 /// 0.14 rad.
@@ -40,7 +40,7 @@ impl Closure {
 
 /// Reads the closure off the last step: `gram` and `gradient` are those of the whole basis, `noise` is the
 /// power around each harmonic along x and along y. `None` with fewer than three strong harmonics.
-pub(super) fn closure(
+pub(crate) fn closure(
     model: &Model,
     gram: &DMatrix<f64>,
     gradient: &DVector<f64>,

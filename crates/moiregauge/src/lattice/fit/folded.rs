@@ -2,11 +2,11 @@
 
 use rustfft::num_complex::Complex64;
 
-use super::frame::Frame;
-use super::model::{Block, LANES, Tables, sum};
+use crate::lattice::fit::frame::Frame;
+use crate::lattice::fit::model::{Block, LANES, Tables, sum};
 
 /// A line folded about its middle: sums and differences of what lies at X and −X, and both times X.
-pub(super) struct Folded {
+pub(crate) struct Folded {
     x: Vec<Block>,
     even: Vec<Block>,
     odd: Vec<Block>,
@@ -18,7 +18,7 @@ pub(super) struct Folded {
 }
 
 impl Folded {
-    pub(super) fn new(frame: &Frame) -> Self {
+    pub(crate) fn new(frame: &Frame) -> Self {
         let mut x = vec![[0.0; LANES]; frame.right().len().div_ceil(LANES)];
         for (value, x) in x.as_flattened_mut().iter_mut().zip(frame.right()) {
             *value = *x;
@@ -35,7 +35,7 @@ impl Folded {
         }
     }
 
-    pub(super) fn take(&mut self, line: &[f64]) {
+    pub(crate) fn take(&mut self, line: &[f64]) {
         let half = line.len().div_ceil(2);
         let (even, odd) = (self.even.as_flattened_mut(), self.odd.as_flattened_mut());
         widest(
@@ -94,7 +94,7 @@ impl Folded {
     }
 
     /// Sums of the line times 1, X, X², X³.
-    pub(super) fn moments(&self, degree: usize) -> [f64; 4] {
+    pub(crate) fn moments(&self, degree: usize) -> [f64; 4] {
         let mut moments = [sum(self.even.as_flattened()), 0.0, 0.0, 0.0];
         moments[1] = sum(self.tilted_odd.as_flattened());
         if degree > 1 {
@@ -145,7 +145,7 @@ impl Folded {
     }
 
     /// The same for all harmonics, two at a time.
-    pub(super) fn all_products(&self, tables: &Tables, mut each: impl FnMut(usize, [f64; 4])) {
+    pub(crate) fn all_products(&self, tables: &Tables, mut each: impl FnMut(usize, [f64; 4])) {
         let harmonics = tables.up.len();
         for i in (0..harmonics - harmonics % 2).step_by(2) {
             let [first, second] = self.products([tables.of(i), tables.of(i + 1)]);
@@ -161,15 +161,15 @@ impl Folded {
 
 /// Correlations of lines with `X² e^{iθ}`, `XY e^{iθ}` and `Y² e^{iθ}` of each harmonic: real parts are
 /// those with cosines, imaginary parts those with sines.
-pub(super) struct Bends(pub(super) Vec<[Complex64; 3]>);
+pub(crate) struct Bends(pub(crate) Vec<[Complex64; 3]>);
 
 impl Bends {
-    pub(super) fn new(harmonics: usize) -> Self {
+    pub(crate) fn new(harmonics: usize) -> Self {
         Self(vec![[Complex64::default(); 3]; harmonics])
     }
 
     /// Adds one line.
-    pub(super) fn add(&mut self, frame: &Frame, tables: &Tables, row: usize, line: &mut Folded) {
+    pub(crate) fn add(&mut self, frame: &Frame, tables: &Tables, row: usize, line: &mut Folded) {
         let y = frame.y[row];
         line.square();
         line.all_products(tables, |i, [c, s, xc, xs]| {
@@ -185,6 +185,6 @@ impl Bends {
 /// Runs a loop that is compiled for the widest vectors that this machine has. Products and sums stay separate
 /// and in their order, so that all machines give the same bits.
 #[inline]
-pub(super) fn widest<R>(work: impl FnOnce() -> R) -> R {
+pub(crate) fn widest<R>(work: impl FnOnce() -> R) -> R {
     pulp::Arch::new().dispatch(work)
 }

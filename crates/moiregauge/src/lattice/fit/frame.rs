@@ -6,23 +6,23 @@
 use nalgebra::{Matrix2, Vector2};
 use rustfft::num_complex::Complex64;
 
-use crate::image::Image;
+use crate::frame::image::Image;
 
 /// An image with the list of what is missing.
 #[derive(Clone)]
-pub(super) struct Frame<'a> {
-    pub(super) image: &'a Image,
+pub(crate) struct Frame<'a> {
+    pub(crate) image: &'a Image,
     /// X of the columns and Y of the rows.
-    pub(super) x: Vec<f64>,
-    pub(super) y: Vec<f64>,
+    pub(crate) x: Vec<f64>,
+    pub(crate) y: Vec<f64>,
     /// Pixels of each line that count; 0 leaves the line out.
-    pub(super) present: Vec<usize>,
+    pub(crate) present: Vec<usize>,
     /// (row, column) of missing pixels in lines that count.
-    pub(super) missing: Vec<[usize; 2]>,
+    pub(crate) missing: Vec<[usize; 2]>,
 }
 
 impl<'a> Frame<'a> {
-    pub(super) fn new(image: &'a Image) -> Self {
+    pub(crate) fn new(image: &'a Image) -> Self {
         let mut frame = Self {
             image,
             x: positions(image.columns),
@@ -35,7 +35,7 @@ impl<'a> Frame<'a> {
     }
 
     /// Counts anew, without the lines for which `bad` holds and those of which half is missing.
-    pub(super) fn leave_out(&mut self, bad: impl Fn(usize) -> bool) {
+    pub(crate) fn leave_out(&mut self, bad: impl Fn(usize) -> bool) {
         self.missing.clear();
         for row in 0..self.image.rows {
             let line = self.image.row(row);
@@ -50,22 +50,22 @@ impl<'a> Frame<'a> {
     }
 
     /// Number of pixels that count.
-    pub(super) fn pixels(&self) -> usize {
+    pub(crate) fn pixels(&self) -> usize {
         self.present.iter().sum()
     }
 
     /// Number of lines that count.
-    pub(super) fn lines(&self) -> usize {
+    pub(crate) fn lines(&self) -> usize {
         self.present.iter().filter(|&&n| n > 0).count()
     }
 
     /// X of the columns to the right of the middle, and of the middle where there is one.
-    pub(super) fn right(&self) -> &[f64] {
+    pub(crate) fn right(&self) -> &[f64] {
         &self.x[self.image.columns / 2..]
     }
 
     /// Wave vector in rad per pixel → phase at the edges.
-    pub(super) fn edge(&self) -> Vector2<f64> {
+    pub(crate) fn edge(&self) -> Vector2<f64> {
         Vector2::new(self.image.columns as f64, self.image.rows as f64) / 2.0
     }
 }
@@ -78,13 +78,13 @@ fn positions(n: usize) -> Vec<f64> {
 }
 
 /// Harmonic (h, k) of the pair: h K₁ + k K₂.
-pub(super) fn wave(pair: &Matrix2<f64>, [h, k]: [i32; 2]) -> Vector2<f64> {
+pub(crate) fn wave(pair: &Matrix2<f64>, [h, k]: [i32; 2]) -> Vector2<f64> {
     pair * Vector2::new(f64::from(h), f64::from(k))
 }
 
 /// `e^{i p X}` at the given positions, which are evenly spaced: sixteen at a time are turned by the
 /// same angles, so that most of them cost a multiplication.
-pub(super) fn turns(p: f64, positions: &[f64]) -> Vec<Complex64> {
+pub(crate) fn turns(p: f64, positions: &[f64]) -> Vec<Complex64> {
     const BLOCK: usize = 16;
     let step = match positions {
         [first, second, ..] => second - first,
@@ -104,24 +104,24 @@ pub(super) fn turns(p: f64, positions: &[f64]) -> Vec<Complex64> {
 /// The order of the basis functions is: background terms; then for each harmonic of phase θ
 /// `cos θ, sin θ, X cos θ, X sin θ, Y cos θ, Y sin θ`, and so on with the powers in `orders`.
 #[derive(Clone, Debug)]
-pub(super) struct Basis {
+pub(crate) struct Basis {
     /// Powers (a, b) of `XᵃYᵇ`.
-    pub(super) terms: Vec<[usize; 2]>,
+    pub(crate) terms: Vec<[usize; 2]>,
     /// Indices (h, k).
-    pub(super) indices: Vec<[i32; 2]>,
+    pub(crate) indices: Vec<[i32; 2]>,
     /// Powers (a, b) by which the waves of each harmonic are multiplied.
-    pub(super) orders: &'static [[usize; 2]],
+    pub(crate) orders: &'static [[usize; 2]],
 }
 
 /// What a change of the wave vectors needs.
-pub(super) const STRAIGHT: &[[usize; 2]] = &[[0, 0], [1, 0], [0, 1]];
+pub(crate) const STRAIGHT: &[[usize; 2]] = &[[0, 0], [1, 0], [0, 1]];
 /// What a bent lattice needs.
-pub(super) const BENT: &[[usize; 2]] = &[[0, 0], [1, 0], [0, 1], [2, 0], [1, 1], [0, 2]];
+pub(crate) const BENT: &[[usize; 2]] = &[[0, 0], [1, 0], [0, 1], [2, 0], [1, 1], [0, 2]];
 
 impl Basis {
     /// A background of total degree `degree`. Where every line has an offset of its own
     /// (`free_lines`), terms that are constant along lines are none of the background's.
-    pub(super) fn new(degree: usize, free_lines: bool, indices: &[[i32; 2]]) -> Self {
+    pub(crate) fn new(degree: usize, free_lines: bool, indices: &[[i32; 2]]) -> Self {
         let terms = (0..=degree)
             .flat_map(|total| (0..=total).map(move |b| [total - b, b]))
             .filter(|[a, _]| *a > 0 || !free_lines)
@@ -134,23 +134,23 @@ impl Basis {
     }
 
     /// Highest power in the background.
-    pub(super) fn degree(&self) -> usize {
+    pub(crate) fn degree(&self) -> usize {
         self.terms.last().map_or(0, |t| t[0] + t[1])
     }
 
     /// Highest power of all.
-    pub(super) fn highest(&self) -> usize {
+    pub(crate) fn highest(&self) -> usize {
         self.degree()
             .max(self.orders.last().map_or(0, |t| t[0] + t[1]))
     }
 
     /// Number of basis functions.
-    pub(super) fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.terms.len() + 2 * self.orders.len() * self.indices.len()
     }
 
     /// Position of `cos θ` of the harmonic `i`.
-    pub(super) fn cosine(&self, i: usize) -> usize {
+    pub(crate) fn cosine(&self, i: usize) -> usize {
         self.terms.len() + 2 * self.orders.len() * i
     }
 }

@@ -11,11 +11,11 @@
 use nalgebra::{DMatrix, Matrix2};
 use rustfft::num_complex::Complex64;
 
-use super::frame::{Basis, Frame, turns, wave};
-use crate::lattice::harmonics::dot;
+use crate::lattice::fit::frame::{Basis, Frame, turns, wave};
+use crate::spectrum::harmonics::dot;
 
 /// `Φᵀ W Φ` of the whole basis. `lambda` holds λ of each line.
-pub(super) fn gram(
+pub(crate) fn gram(
     frame: &Frame,
     basis: &Basis,
     pair: &Matrix2<f64>,
@@ -271,7 +271,7 @@ fn line_sums(frame: &Frame, basis: &Basis, pair: &Matrix2<f64>, lambda: &[f64]) 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::image::Image;
+    use crate::frame::image::Image;
     use crate::lattice::fit::frame::BENT;
     use nalgebra::DVector;
 

@@ -1,8 +1,9 @@
 //! What whole lines do: offsets of their own, and lines that went wrong.
 
-use super::frame::Frame;
-use super::model::{Model, Tables, middle, residuals, sum};
-use crate::lattice::harmonics::dot;
+use crate::lattice::fit::frame::Frame;
+use crate::lattice::fit::model::{Model, Tables, residuals, sum};
+use crate::numbers::median::median;
+use crate::spectrum::harmonics::dot;
 
 /// Whole cycles per line next to zero, where the noise is the same but for the offsets.
 const NEAR: std::ops::RangeInclusive<usize> = 2..=6;
@@ -18,19 +19,19 @@ const BAD: f64 = 6.0;
 const MOST_BAD: f64 = 0.2;
 
 /// Residuals line by line.
-pub(super) struct LineStatistics {
+pub(crate) struct LineStatistics {
     /// Power of the line means over that of the waves of two to six cycles per line; 1 where
     /// lines have no offsets of their own.
-    pub(super) ratio: f64,
+    pub(crate) ratio: f64,
     /// Standard deviation of the offsets.
-    pub(super) sigma: f64,
+    pub(crate) sigma: f64,
     /// Residual of each line about its own mean, root mean square.
     rms: Vec<f64>,
 }
 
 impl LineStatistics {
     /// Reads the residuals of `model`. Medians: a few lines that went wrong do not matter.
-    pub(super) fn new(frame: &Frame, model: &Model) -> Self {
+    pub(crate) fn new(frame: &Frame, model: &Model) -> Self {
         let tables = Tables::new(frame, &model.pair, &model.basis.indices);
         let columns = frame.image.columns;
         let step = std::f64::consts::TAU / columns as f64;
@@ -66,8 +67,8 @@ impl LineStatistics {
                 }
             }
         });
-        let ridge = middle(&mut means) / MEDIAN_CHI2;
-        let adjacent = middle(&mut near) / std::f64::consts::LN_2;
+        let ridge = median(&mut means) / MEDIAN_CHI2;
+        let adjacent = median(&mut near) / std::f64::consts::LN_2;
         Self {
             ratio: ridge / adjacent,
             sigma: ((ridge - adjacent).max(0.0) / columns as f64).sqrt(),
@@ -77,12 +78,12 @@ impl LineStatistics {
 
     /// Whether offsets explain more than chance does. The median of n squares of means scatters by
     /// 2.3/√n; three and a half times that.
-    pub(super) fn offsets_matter(&self, frame: &Frame) -> bool {
+    pub(crate) fn offsets_matter(&self, frame: &Frame) -> bool {
         self.ratio > 1.0 + 8.0 / (frame.lines() as f64).sqrt()
     }
 
     /// λ of each line: `n σ_l²/(σ² + n σ_l²)`.
-    pub(super) fn lambda(&self, frame: &Frame) -> Vec<f64> {
+    pub(crate) fn lambda(&self, frame: &Frame) -> Vec<f64> {
         let columns = frame.image.columns as f64;
         let share = |&n: &usize| {
             let excess = (self.ratio - 1.0) * n as f64 / columns;
@@ -92,15 +93,15 @@ impl LineStatistics {
     }
 
     /// The lines that went wrong.
-    pub(super) fn bad(&self, frame: &Frame) -> Vec<usize> {
+    pub(crate) fn bad(&self, frame: &Frame) -> Vec<usize> {
         let used = |row: &usize| frame.present[*row] > 0;
         let rows = || (0..self.rms.len()).filter(used);
         let mut sizes: Vec<f64> = rows().map(|r| self.rms[r]).collect();
-        let typical = middle(&mut sizes);
+        let typical = median(&mut sizes);
         for size in &mut sizes {
             *size = (*size - typical).abs();
         }
-        let spread = 1.4826 * middle(&mut sizes);
+        let spread = 1.4826 * median(&mut sizes);
         let most = typical + (BAD * spread).max(0.5 * typical);
         let bad: Vec<usize> = rows().filter(|&r| self.rms[r] > most).collect();
         if bad.len() as f64 > MOST_BAD * frame.lines() as f64 {

@@ -21,12 +21,12 @@ use nalgebra::{Matrix3, Vector2, Vector3};
 
 /// One frequency, in whole cycles per frame.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Bin {
-    pub(super) k: Vector2<i64>,
+pub(crate) struct Bin {
+    pub(crate) k: Vector2<i64>,
     /// Power found, per pixel.
-    pub(super) power: f64,
+    pub(crate) power: f64,
     /// Power that white noise of unit variance would have: 1 but where the fit has taken it.
-    pub(super) white: f64,
+    pub(crate) white: f64,
 }
 
 /// Whole lines do what is found at |kx| up to this: the window spreads it by one bin.
@@ -47,7 +47,7 @@ const ROUNDS: usize = 12;
 /// Noise power on the x and on the y component of the wave vector at `k` (cycles per frame), and on the
 /// phase. Line offsets take up the share `lambda` of what whole lines do. `None` where the fit has left
 /// nothing.
-pub(super) fn acting_on(k: Vector2<f64>, lambda: f64, bins: &[Bin]) -> Option<[f64; 3]> {
+pub(crate) fn acting_on(k: Vector2<f64>, lambda: f64, bins: &[Bin]) -> Option<[f64; 3]> {
     let ridge = |k: Vector2<i64>| k.x.abs() <= RIDGE;
     // ln S = a + b ln|kx| off the ridge, and a + b ln|ky| + c [kx = 0] on it.
     let features = |at: Vector2<i64>, on_ridge: bool| {

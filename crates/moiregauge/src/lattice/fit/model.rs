@@ -3,8 +3,9 @@
 use nalgebra::{DVector, Matrix2};
 use rustfft::num_complex::Complex64;
 
-use super::folded::{Folded, widest};
-use super::frame::{Basis, Frame, turns, wave};
+use crate::lattice::fit::folded::{Folded, widest};
+use crate::lattice::fit::frame::{Basis, Frame, turns, wave};
+use crate::numbers::median::median;
 
 /// Residuals beyond this many standard deviations pull no harder (Huber). At 3 the loss of
 /// efficiency with Gaussian noise is below 0.1 %.
@@ -14,42 +15,42 @@ const SAMPLE: usize = 8192;
 
 /// Background and harmonics: `Σ b_t XᵃYᵇ + Σ α cos θ + β sin θ`, θ = p·(X, Y).
 #[derive(Clone, Debug)]
-pub(super) struct Model {
-    pub(super) basis: Basis,
+pub(crate) struct Model {
+    pub(crate) basis: Basis,
     /// One coefficient for each background term.
-    pub(super) background: Vec<f64>,
+    pub(crate) background: Vec<f64>,
     /// (α, β) of each harmonic.
-    pub(super) waves: Vec<[f64; 2]>,
+    pub(crate) waves: Vec<[f64; 2]>,
     /// p₁, p₂ as columns: phase at the edges, rad.
-    pub(super) pair: Matrix2<f64>,
+    pub(crate) pair: Matrix2<f64>,
 }
 
 /// One offset per line: random, with a variance that the image tells.
 #[derive(Clone, Debug)]
-pub(super) struct LineOffsets {
+pub(crate) struct LineOffsets {
     /// What is taken off a line is λ times its mean, `λ = n σ_l²/(σ² + n σ_l²)`.
-    pub(super) lambda: Vec<f64>,
+    pub(crate) lambda: Vec<f64>,
     /// The offsets.
-    pub(super) offset: Vec<f64>,
+    pub(crate) offset: Vec<f64>,
 }
 
 /// Values handled together: as many as the compiler keeps in registers.
-pub(super) const LANES: usize = 8;
-pub(super) type Block = [f64; LANES];
+pub(crate) const LANES: usize = 8;
+pub(crate) type Block = [f64; LANES];
 
 /// `cos θ_x` and `sin θ_x` on the right half of a line, in blocks filled up with zeros; the left half is
 /// their mirror image, which saves half of all products.
-pub(super) struct Tables {
+pub(crate) struct Tables {
     /// The first block of every harmonic, then the second, and so on: for adding them up.
     along: Vec<[Block; 2]>,
     /// The blocks of each harmonic one after the other: for products with one of them.
     each: Vec<[Block; 2]>,
     /// `e^{iθ_y}` of each line.
-    pub(super) up: Vec<Vec<Complex64>>,
+    pub(crate) up: Vec<Vec<Complex64>>,
 }
 
 impl Tables {
-    pub(super) fn new(frame: &Frame, pair: &Matrix2<f64>, indices: &[[i32; 2]]) -> Self {
+    pub(crate) fn new(frame: &Frame, pair: &Matrix2<f64>, indices: &[[i32; 2]]) -> Self {
         let waves: Vec<_> = indices.iter().map(|&i| wave(pair, i)).collect();
         let mut each = Vec::with_capacity(waves.len() * frame.right().len().div_ceil(LANES));
         for p in &waves {
@@ -71,14 +72,14 @@ impl Tables {
     }
 
     /// The blocks of one harmonic.
-    pub(super) fn of(&self, harmonic: usize) -> &[[Block; 2]] {
+    pub(crate) fn of(&self, harmonic: usize) -> &[[Block; 2]] {
         let blocks = self.each.len() / self.up.len();
         &self.each[harmonic * blocks..][..blocks]
     }
 }
 
 /// Calls `each` with every line that counts and its residual; missing pixels are NaN.
-pub(super) fn residuals(
+pub(crate) fn residuals(
     frame: &Frame,
     model: &Model,
     tables: &Tables,
@@ -94,7 +95,7 @@ pub(super) fn residuals(
 }
 
 /// The residual of one line.
-pub(super) fn residual(
+pub(crate) fn residual(
     frame: &Frame,
     model: &Model,
     tables: &Tables,
@@ -174,17 +175,17 @@ fn add_up(factors: &[[f64; 2]], along: &[[Block; 2]], even: &mut [Block], odd: &
 
 /// Where residuals are cut off.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Clip(f64);
+pub(crate) struct Clip(f64);
 
 impl Clip {
     /// For residuals of this standard deviation.
-    pub(super) fn at(sigma: f64) -> Self {
+    pub(crate) fn at(sigma: f64) -> Self {
         Self(CLIP * sigma)
     }
 
     /// The residual as it counts; missing pixels not at all.
     #[inline]
-    pub(super) fn apply(self, value: f64) -> f64 {
+    pub(crate) fn apply(self, value: f64) -> f64 {
         // Comparisons one by one, which the compiler can do for several pixels at once.
         let below = if value > self.0 { self.0 } else { value };
         let within = if below < -self.0 { -self.0 } else { below };
@@ -208,18 +209,18 @@ impl Clip {
 }
 
 /// What one look at all residuals gives.
-pub(super) struct Look {
+pub(crate) struct Look {
     /// `Φᵀ u` for the basis that was asked for, u the residual less line offset, cut off.
-    pub(super) gradient: DVector<f64>,
+    pub(crate) gradient: DVector<f64>,
     /// Standard deviation of the residuals by their median.
-    pub(super) sigma: f64,
+    pub(crate) sigma: f64,
     /// How many residuals were cut off.
-    pub(super) clipped: usize,
+    pub(crate) clipped: usize,
 }
 
 /// Correlates the residuals of `model` with the functions of `basis`, of which `probes` are the
 /// tables. Line offsets are brought up to date on the way.
-pub(super) fn look(
+pub(crate) fn look(
     frame: &Frame,
     model: &Model,
     tables: &Tables,
@@ -243,7 +244,7 @@ pub(super) fn look(
     });
     Look {
         gradient,
-        sigma: middle(&mut sample) / 0.674_489_750_196_081_7,
+        sigma: median(&mut sample) / 0.674_489_750_196_081_7,
         clipped,
     }
 }
@@ -318,7 +319,7 @@ fn add(
 }
 
 /// Sum in eight independent partial sums.
-pub(super) fn sum(values: &[f64]) -> f64 {
+pub(crate) fn sum(values: &[f64]) -> f64 {
     let blocks = values.chunks_exact(8);
     let rest: f64 = blocks.remainder().iter().sum();
     let mut sums = [0.0; 8];
@@ -330,18 +331,9 @@ pub(super) fn sum(values: &[f64]) -> f64 {
     sums.iter().sum::<f64>() + rest
 }
 
-/// The median; 0 of nothing.
-pub(in crate::lattice) fn middle(values: &mut [f64]) -> f64 {
-    if values.is_empty() {
-        return 0.0;
-    }
-    let half = values.len() / 2;
-    *values.select_nth_unstable_by(half, f64::total_cmp).1
-}
-
 /// The residual of one line as it counts, 0 where pixels do not, and what is to be added to all that do
 /// for line means at the level of the other noise (`r − (1 − √(1−λ)) r̄`).
-pub(super) fn settled(
+pub(crate) fn settled(
     (frame, model, tables): (&Frame, &Model, &Tables),
     lines: &mut LineOffsets,
     clip: Clip,

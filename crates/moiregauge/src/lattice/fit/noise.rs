@@ -4,17 +4,18 @@
 //! with few periods that is nearly everywhere; so the power found is divided by the power that white
 //! noise of unit variance would have left in the same bins, `Σw² − vᴴ G⁻¹ v` with v the transform
 //! of the window times each fitted function and G their normal matrix. What that says about the wave
-//! vectors is worked out in [`local`](super::local).
+//! vectors is worked out in [`local`](crate::lattice::fit::local).
 
 use nalgebra::{DMatrix, DVector, Vector2};
 use rustfft::num_complex::Complex64;
 
-use super::frame::{Basis, Frame, wave};
-use super::local::{Bin, acting_on};
-use super::model::{Model, middle};
-use crate::lattice::harmonics::hann_transform;
-use crate::lattice::select::{BLOCK_WIDTH, NoiseMap};
-use crate::lattice::transform::{Spectrum, hann};
+use crate::lattice::fit::frame::{Basis, Frame, wave};
+use crate::lattice::fit::local::{Bin, acting_on};
+use crate::lattice::fit::model::Model;
+use crate::numbers::median::median;
+use crate::spectrum::harmonics::hann_transform;
+use crate::spectrum::select::{BLOCK_WIDTH, NoiseMap};
+use crate::spectrum::transform::{Spectrum, hann};
 
 /// Bins (cycles per frame) on either side of a harmonic that count, along the lines and across.
 const ALONG: i64 = 4;
@@ -33,7 +34,7 @@ const SPREAD: f64 = 4.0;
 const FOREIGN: f64 = 3.0;
 
 /// The periodogram of a residual.
-pub(super) struct ResidualNoise {
+pub(crate) struct ResidualNoise {
     spectrum: Spectrum,
     /// `Σ w²` over the pixels that count.
     window_power: f64,
@@ -60,7 +61,7 @@ impl ForeignWave {
 
 impl ResidualNoise {
     /// `residual` writes a line, 0 where pixels do not count. `free_lines`: line means are gone.
-    pub(super) fn new(
+    pub(crate) fn new(
         frame: &Frame,
         free_lines: bool,
         residual: impl FnMut(usize, &mut [f64]),
@@ -86,7 +87,7 @@ impl ResidualNoise {
     /// Noise power around a harmonic as it acts on the x and on the y component of its wave vector and on
     /// its phase; white noise of variance σ² gives σ². `lambda` is the share of line means that offsets
     /// take up. `None` where the fit has left nothing.
-    pub(super) fn around(
+    pub(crate) fn around(
         &self,
         p: Vector2<f64>,
         lambda: f64,
@@ -100,19 +101,19 @@ impl ResidualNoise {
     }
 
     /// The same by the median: waves that are not fitted yet do not matter.
-    pub(super) fn median_around(&self, p: Vector2<f64>, leverage: &Leverage) -> Option<f64> {
+    pub(crate) fn median_around(&self, p: Vector2<f64>, leverage: &Leverage) -> Option<f64> {
         let mut all = Vec::new();
         self.bins(p, leverage, |_, found, white| {
             if white > 0.3 {
                 all.push(found / white);
             }
         });
-        (!all.is_empty()).then(|| middle(&mut all) / std::f64::consts::LN_2)
+        (!all.is_empty()).then(|| median(&mut all) / std::f64::consts::LN_2)
     }
 
     /// Whether there is a bit more than noise at a place. A wave that is worth its place stands there
     /// at 12 times the noise or more, of which window and grid leave a quarter at worst.
-    pub(super) fn is_promising(&self, p: Vector2<f64>) -> bool {
+    pub(crate) fn is_promising(&self, p: Vector2<f64>) -> bool {
         let centre = (p / std::f64::consts::PI).map(|c| c.round() as i64);
         let mut near = 0.0f64;
         let mut around = Vec::new();
@@ -126,7 +127,7 @@ impl ResidualNoise {
                 }
             }
         }
-        near > 4.0 * middle(&mut around) / std::f64::consts::LN_2
+        near > 4.0 * median(&mut around) / std::f64::consts::LN_2
     }
 
     /// Calls `each` with the frequency, the power found and that of white noise.
@@ -171,7 +172,7 @@ impl ResidualNoise {
 
     /// The transform of the residual across the lines from a harmonic: (columns, rows) in cycles per frame, and
     /// value. `offsets`: offsets take up what whole lines do, so that it is no part of the harmonic's noise.
-    pub(super) fn samples(&self, p: Vector2<f64>, offsets: bool) -> Vec<([i64; 2], Complex64)> {
+    pub(crate) fn samples(&self, p: Vector2<f64>, offsets: bool) -> Vec<([i64; 2], Complex64)> {
         let centre = (p / std::f64::consts::PI).map(|c| c.round() as i64);
         // Noise of whole lines stands at kx = 0 alone, and beside it through the window: what lies at another kx
         // says nothing of it.
@@ -200,7 +201,7 @@ impl ResidualNoise {
     }
 
     /// Noise power per pixel over all frequencies, by the median.
-    pub(super) fn level(&self) -> f64 {
+    pub(crate) fn level(&self) -> f64 {
         let stride = (self.spectrum.values.len() / 65_536).max(1);
         let powers = self
             .spectrum
@@ -209,11 +210,11 @@ impl ResidualNoise {
             .step_by(stride)
             .map(rustfft::num_complex::Complex64::norm_sqr);
         let mut powers: Vec<f64> = powers.collect();
-        middle(&mut powers) / (std::f64::consts::LN_2 * self.window_power)
+        median(&mut powers) / (std::f64::consts::LN_2 * self.window_power)
     }
 
     /// The strongest wave away from the lattice, from slow waves and from the line ridge.
-    pub(super) fn foreign_wave(&self, frame: &Frame, model: &Model) -> Option<ForeignWave> {
+    pub(crate) fn foreign_wave(&self, frame: &Frame, model: &Model) -> Option<ForeignWave> {
         let noise = NoiseMap::new(&self.spectrum);
         let rows = self.spectrum.rows;
         let cycles = model.pair / std::f64::consts::PI;
@@ -254,7 +255,7 @@ impl ResidualNoise {
 }
 
 /// Which part of white noise the fitted functions take up.
-pub(super) struct Leverage<'a> {
+pub(crate) struct Leverage<'a> {
     basis: &'a Basis,
     model: &'a Model,
     /// Inverse of the normal matrix of (cos, sin) of each harmonic and the four derivatives.
@@ -266,7 +267,7 @@ pub(super) struct Leverage<'a> {
 
 /// What the fitted functions take up around one place: those of the waves near by, and the four
 /// derivatives.
-pub(super) struct Taps {
+pub(crate) struct Taps {
     waves: Vec<Tap>,
     /// The part of the inverse that belongs to these functions.
     inverse: DMatrix<f64>,
@@ -285,10 +286,10 @@ struct Tap {
 
 impl<'a> Leverage<'a> {
     /// `normal` is that of the whole model: background, cosines and sines, derivatives.
-    pub(super) fn new(frame: &Frame, model: &'a Model, normal: &DMatrix<f64>) -> Option<Self> {
+    pub(crate) fn new(frame: &Frame, model: &'a Model, normal: &DMatrix<f64>) -> Option<Self> {
         let terms = model.basis.terms.len();
         let rest = normal.nrows() - terms;
-        let inverse = super::solve::inverse(normal)?;
+        let inverse = crate::lattice::fit::solve::inverse(normal)?;
         // The block of the inverse is the inverse with the background projected out.
         let inverse = inverse.view((terms, terms), (rest, rest)).into_owned();
         Some(Self {

@@ -2,14 +2,14 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
-use super::model::Model;
+use crate::lattice::fit::model::Model;
 
 /// Diagonal elements that fall below this share of themselves say that functions are the same.
 const DEGENERATE: f64 = 1e-11;
 
 /// Columns: what the basis functions are to a change of each parameter (background, α and β of each
 /// harmonic, then p₁x, p₁y, p₂x, p₂y), each derivative weighted by `weight(harmonic, axis)`.
-pub(super) fn contraction(model: &Model, weight: impl Fn(usize, usize) -> f64) -> DMatrix<f64> {
+pub(crate) fn contraction(model: &Model, weight: impl Fn(usize, usize) -> f64) -> DMatrix<f64> {
     let basis = &model.basis;
     let terms = basis.terms.len();
     let linear = terms + 2 * basis.indices.len();
@@ -37,7 +37,7 @@ pub(super) fn contraction(model: &Model, weight: impl Fn(usize, usize) -> f64) -
 /// The columns of [`contraction`] with the amplitudes of the `first` harmonics turned into (radius, phase):
 /// columns for background, radii and the amplitudes of the others; then the phases of the first, and the four
 /// derivatives. Every phase is weighted by `weight(harmonic)`.
-pub(super) fn by_phases(
+pub(crate) fn by_phases(
     model: &Model,
     first: usize,
     contraction: &DMatrix<f64>,
@@ -66,7 +66,7 @@ pub(super) fn by_phases(
 }
 
 /// Solves the normal equations; `None` where the parameters cannot be told apart.
-pub(super) fn solve(normal: &DMatrix<f64>, right: &DVector<f64>) -> Option<DVector<f64>> {
+pub(crate) fn solve(normal: &DMatrix<f64>, right: &DVector<f64>) -> Option<DVector<f64>> {
     let (factor, scale) = scaled(normal)?;
     Some(
         factor
@@ -76,7 +76,7 @@ pub(super) fn solve(normal: &DMatrix<f64>, right: &DVector<f64>) -> Option<DVect
 }
 
 /// Inverse of a normal matrix.
-pub(super) fn inverse(normal: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+pub(crate) fn inverse(normal: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let (factor, scale) = scaled(normal)?;
     let scale = DMatrix::from_diagonal(&scale);
     Some(&scale * factor.inverse() * &scale)
@@ -102,7 +102,7 @@ fn scaled(normal: &DMatrix<f64>) -> Option<(Cholesky<f64, nalgebra::Dyn>, DVecto
 
 /// `Dᵀ (W − W Φ (Φᵀ W Φ)⁻¹ Φᵀ W) D` for the derivatives D, the last `count` columns of `map`, weighted
 /// as there: what is left of them when background and amplitudes are free.
-pub(super) fn projected(
+pub(crate) fn projected(
     gram: &DMatrix<f64>,
     map: &DMatrix<f64>,
     count: usize,

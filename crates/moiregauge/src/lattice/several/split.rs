@@ -10,7 +10,7 @@
 use nalgebra::{Matrix2, Vector2};
 use rustfft::num_complex::Complex64;
 
-use crate::image::Image;
+use crate::frame::image::Image;
 
 /// Steps of the grid, and its reach, in cycles per frame.
 const STEP: f64 = 0.25;
@@ -19,9 +19,9 @@ const REACH: i32 = 10;
 const APART: f64 = 0.6;
 
 /// A lattice to start with: its reciprocal pair (rad per pixel) and what it makes of the image.
-pub(super) struct Guess {
-    pub(super) pair: Matrix2<f64>,
-    pub(super) model: Vec<f64>,
+pub(crate) struct Guess {
+    pub(crate) pair: Matrix2<f64>,
+    pub(crate) model: Vec<f64>,
 }
 
 /// One wave: q (rad per pixel) and amplitude, `2 Re c e^{iq·n}` about the middle.
@@ -32,7 +32,7 @@ struct Wave {
 }
 
 /// The two lattices near `pair`; `None` where only one is seen.
-pub(super) fn split(image: &Image, pair: &Matrix2<f64>) -> Option<[Guess; 2]> {
+pub(crate) fn split(image: &Image, pair: &Matrix2<f64>) -> Option<[Guess; 2]> {
     let (k1, k2) = (pair.column(0).into_owned(), pair.column(1).into_owned());
     let waves = [k1, k2, k2 - k1].map(|q| two_waves(image, q));
     let [Some(first), Some(second), Some(third)] = waves else {

@@ -1,0 +1,207 @@
+//! Small algebra of reciprocal lattices: reduction, labelling, real ↔ reciprocal.
+
+use nalgebra::{Matrix2, Matrix4, Vector2};
+
+use crate::lattice::vectors::LatticeVectors;
+
+/// Real-space pair about 60° apart ↔ reciprocal pair about 60° apart, `K₁, K₂ = K₃ + K₁`.
+///
+/// For vectors `a₁, a₂` at 60° the dual pair (`a_i·b_j = 2π δ_ij`) stands at 120°; the pair
+/// returned is `(b₁, b₁ + b₂)`, at 60° again. The function is its own inverse up to a turn by 60°.
+pub fn reciprocal(basis: &Matrix2<f64>) -> Option<Matrix2<f64>> {
+    let dual = basis.try_inverse()?.transpose() * std::f64::consts::TAU;
+    let (b1, b2) = (dual.column(0).into_owned(), dual.column(1).into_owned());
+    Some(Matrix2::from_columns(&[b1, b1 + b2]))
+}
+
+/// Real-space lattice of a reciprocal pair at 60°, with its covariance carried along.
+///
+/// The full inverse, not `λ = 2/(√3|K|)`, which holds for undistorted hexagons only.
+pub fn real_from_reciprocal(k: &LatticeVectors) -> Option<LatticeVectors> {
+    let basis = reciprocal(&k.basis)?;
+    // d(B⁻ᵀ) = −B⁻ᵀ dBᵀ B⁻ᵀ, column by column, then the same recombination of columns.
+    let dual = k.basis.try_inverse()?.transpose();
+    let mut jacobian = Matrix4::zeros();
+    for entry in 0..4 {
+        let mut change = Matrix2::zeros();
+        change[entry] = 1.0;
+        let d = -std::f64::consts::TAU * dual * change.transpose() * dual;
+        let (d1, d2) = (d.column(0).into_owned(), d.column(1).into_owned());
+        let column = Matrix2::from_columns(&[d1, d1 + d2]);
+        jacobian
+            .column_mut(entry)
+            .copy_from_slice(column.as_slice());
+    }
+    Some(LatticeVectors {
+        basis,
+        covariance: jacobian * k.covariance * jacobian.transpose(),
+    })
+}
+
+/// As [`real_from_reciprocal`], but not turned by 60°: the real-space pair that [`reciprocal`] made `k` of, so that
+/// L₁, L₂ and L₃ of a map are those of the image.
+pub fn real_named_alike(k: &LatticeVectors) -> Option<LatticeVectors> {
+    Some(real_from_reciprocal(k)?.relabelled(&TURN))
+}
+
+/// `(a₁, a₂) → (a₂, a₂ − a₁)`: the next names, 60° further.
+const TURN: Matrix2<f64> = Matrix2::new(0.0, -1.0, 1.0, 1.0);
+
+/// The integer change of basis that turns a pair into its shortest one, about 60° apart, second
+/// counter-clockwise of the first (Lagrange–Gauss reduction). `None` for parallel vectors.
+pub fn shortest_pair(basis: &Matrix2<f64>) -> Option<Matrix2<f64>> {
+    if !(basis.determinant().abs() > 1e-9 * basis.column(0).norm() * basis.column(1).norm()) {
+        return None;
+    }
+    let mut change = Matrix2::identity();
+    for _ in 0..64 {
+        let b = basis * change;
+        let (u, v) = (b.column(0), b.column(1));
+        if u.norm_squared() > v.norm_squared() {
+            change.swap_columns(0, 1);
+            continue;
+        }
+        let steps = (u.dot(&v) / u.norm_squared()).round();
+        if steps == 0.0 {
+            break;
+        }
+        let first = change.column(0).into_owned();
+        let second = change.column(1) - first * steps;
+        change.set_column(1, &second);
+    }
+    // Reduced pairs stand at 60° to 120°: take the acute one, counter-clockwise.
+    let b = basis * change;
+    if b.column(0).dot(&b.column(1)) < 0.0 {
+        change.column_mut(1).neg_mut();
+    }
+    if (basis * change).determinant() < 0.0 {
+        change.swap_columns(0, 1);
+    }
+    Some(change)
+}
+
+/// How far a pair at 60° is from a hexagon: `|q|/|p|` of `K_j = p e_j + q ē_j`, 0 for a perfect one.
+///
+/// physics of the split: rotation and size live in p, two-fold distortion in q.
+pub fn distortion(pair: &Matrix2<f64>) -> f64 {
+    let hexagon = Matrix2::new(1.0, 0.5, 0.0, 0.75_f64.sqrt());
+    let Some(inverse) = hexagon.try_inverse() else {
+        return f64::INFINITY;
+    };
+    let m = pair * inverse;
+    let p = Vector2::new(m[(0, 0)] + m[(1, 1)], m[(1, 0)] - m[(0, 1)]).norm();
+    let q = Vector2::new(m[(0, 0)] - m[(1, 1)], m[(1, 0)] + m[(0, 1)]).norm();
+    q / p
+}
+
+/// `lattice` in the labelling (same lattice, same handedness) closest to `reference`.
+pub fn labelled_like(lattice: &LatticeVectors, reference: &Matrix2<f64>) -> LatticeVectors {
+    let entries = [-1.0, 0.0, 1.0];
+    let mut best = (f64::INFINITY, Matrix2::identity());
+    for a in entries {
+        for b in entries {
+            for c in entries {
+                for d in entries {
+                    let change = Matrix2::new(a, b, c, d);
+                    if change.determinant() != 1.0 {
+                        continue;
+                    }
+                    let distance = (lattice.basis * change - reference).norm();
+                    if distance < best.0 {
+                        best = (distance, change);
+                    }
+                }
+            }
+        }
+    }
+    lattice.relabelled(&best.1)
+}
+
+/// The labelling whose first vector has its polar angle in [0°, 60°): a start for a series, all
+/// further lattices being labelled like the first.
+pub fn canonical(lattice: &LatticeVectors) -> LatticeVectors {
+    let mut current = *lattice;
+    for _ in 0..6 {
+        let angle = current.polar_angle(0).value;
+        if (0.0..std::f64::consts::FRAC_PI_3).contains(&angle) {
+            return current;
+        }
+        current = current.relabelled(&TURN);
+    }
+    // A distorted hexagon can have no vector there: the one nearest to 30° then.
+    (0..6).fold(*lattice, |best, _| {
+        current = current.relabelled(&TURN);
+        let off = |l: &LatticeVectors| (l.polar_angle(0).value - std::f64::consts::FRAC_PI_6).abs();
+        if off(&current) < off(&best) {
+            current
+        } else {
+            best
+        }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn pair(a: [f64; 2], b: [f64; 2]) -> Matrix2<f64> {
+        Matrix2::new(a[0], b[0], a[1], b[1])
+    }
+
+    /// Any primitive pair of a lattice reduces to the same six shortest vectors.
+    #[test]
+    fn reduction_finds_the_shortest_vectors() {
+        let hexagon = pair([3.0, 0.2], [1.4, 2.7]);
+        for u in [
+            [1.0, 0.0, 0.0, 1.0],
+            [2.0, 5.0, 1.0, 3.0],
+            [7.0, -3.0, -2.0, 1.0],
+        ] {
+            let skewed = hexagon * Matrix2::new(u[0], u[1], u[2], u[3]);
+            let reduced = skewed * shortest_pair(&skewed).unwrap();
+            assert!(reduced.determinant() > 0.0);
+            let (a, b) = (reduced.column(0), reduced.column(1));
+            assert!(a.dot(&b) > 0.0);
+            let mut lengths = [a.norm(), b.norm(), (b - a).norm()];
+            lengths.sort_by(f64::total_cmp);
+            // Lengths of (3, 0.2), (1.4, 2.7) and their difference (−1.6, 2.5).
+            let expected = [9.04f64.sqrt(), 9.25f64.sqrt(), 8.81f64.sqrt()];
+            for e in expected {
+                assert!(lengths.iter().any(|l| (l - e).abs() < 1e-12), "{lengths:?}");
+            }
+        }
+        assert!(shortest_pair(&pair([1.0, 2.0], [2.0, 4.0])).is_none());
+    }
+
+    /// Real → reciprocal → real is the identity up to labelling, and the covariance follows a
+    /// numerical derivative.
+    #[test]
+    fn real_and_reciprocal_are_inverse() {
+        let k = LatticeVectors {
+            basis: pair([0.5, 0.05], [0.2, 0.47]),
+            covariance: Matrix4::from_diagonal(&[1.0, 2.0, 3.0, 4.0].into()) * 1e-8,
+        };
+        let real = real_from_reciprocal(&k).unwrap();
+        let back = labelled_like(&real_from_reciprocal(&real).unwrap(), &k.basis);
+        assert!((back.basis - k.basis).norm() < 1e-12);
+        assert!((back.covariance - k.covariance).norm() < 1e-6 * k.covariance.norm());
+        let mut jacobian = Matrix4::zeros();
+        for i in 0..4 {
+            let mut moved = k;
+            moved.basis[i] += 1e-7;
+            let d = (real_from_reciprocal(&moved).unwrap().basis - real.basis) / 1e-7;
+            jacobian.column_mut(i).copy_from_slice(d.as_slice());
+        }
+        let numerical = jacobian * k.covariance * jacobian.transpose();
+        assert!((numerical - real.covariance).norm() < 1e-4 * real.covariance.norm());
+    }
+
+    /// The perfect hexagon has no distortion; a uniaxial stretch by s has (s − 1)/(s + 1).
+    #[test]
+    fn distortion_of_a_stretched_hexagon() {
+        let hexagon = pair([1.0, 0.0], [0.5, 0.75f64.sqrt()]);
+        assert!(distortion(&hexagon) < 1e-15);
+        let stretched = Matrix2::new(1.2, 0.0, 0.0, 1.0) * hexagon;
+        assert!((distortion(&stretched) - 0.2 / 2.2).abs() < 1e-12);
+    }
+}

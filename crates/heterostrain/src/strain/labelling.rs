@@ -1,0 +1,159 @@
+//! Which moiré vector belongs to which atomic vector: lattice vectors → strain-free-most labelling.
+//!
+//! The measured primitive pair `L = [a₁ a₂]` is matched with the atomic pair `A⁰` of layer 1, for a
+//! hexagonal layer `a [∠30°, ∠90°]`, whose reciprocal pair lies at 0° and 120°; α is then the
+//! orientation of the reciprocal vectors of layer 1. With `M = 2π L⁻ᵀ` the first moiré harmonics,
+//! `P = M (G⁰)⁻¹ = (A⁰ L⁻¹)ᵀ` has no dimension and needs no 2π.
+//!
+//! Every other primitive pair of the same lattice, `L U` with U in SL(2, Z), is as good a name for
+//! it. For similar layers the one with the smallest anisotropic part |q| of P is used where nothing tells more; as the
+//! determinant is fixed by the area of the cell, it is, for hexagonal layers, the pair with the shortest
+//! reciprocal vectors. For layers of different lattices it is the one that needs the least strain. From ε ≈ 0.46 θ on
+//! the true pair can be another one: all of them are in `names`, and what chooses among them in `readings`.
+
+use nalgebra::{Matrix2, Matrix4, Vector4};
+
+use crate::complex_pair::ComplexPair;
+use crate::lattice::reduce::shortest_pair;
+use crate::lattice::vectors::LatticeVectors;
+use crate::strain::inversion::{ALL_SIGNS, solve};
+use crate::strain::layers::Layers;
+
+/// Largest number in the name of a moiré vector that is tried for layers of different lattices.
+const LARGEST_ENTRY: i32 = 5;
+/// How many of these names are solved.
+const SOLVED: usize = 32;
+/// Orientations at which names are compared.
+const ORIENTATIONS: i32 = 180;
+
+/// `P = (A⁰ L⁻¹)ᵀ`; `None` for a lattice without area.
+pub(crate) fn moire_matrix(basis: &Matrix2<f64>, atoms: &Matrix2<f64>) -> Option<Matrix2<f64>> {
+    let inverse = basis.try_inverse()?;
+    let p = (atoms * inverse).transpose();
+    p.iter().all(|x| x.is_finite()).then_some(p)
+}
+
+/// Derivative of `(Re p, Im p, Re q, Im q)` by `(a1x, a1y, a2x, a2y)`: dP = −L⁻ᵀ dLᵀ P.
+pub(crate) fn moire_matrix_jacobian(
+    basis: &Matrix2<f64>,
+    moire: &Matrix2<f64>,
+) -> Option<Matrix4<f64>> {
+    let inverse_transposed = basis.try_inverse()?.transpose();
+    let mut jacobian = Matrix4::zeros();
+    for component in 0..4 {
+        let mut unit = Matrix2::zeros();
+        unit[component] = 1.0;
+        let change = ComplexPair::from(-inverse_transposed * unit.transpose() * moire);
+        jacobian.set_column(
+            component,
+            &Vector4::new(change.p.re, change.p.im, change.q.re, change.q.im),
+        );
+    }
+    Some(jacobian)
+}
+
+/// The same lattice named by its least strained right-handed pair; `None` without area.
+pub(crate) fn least_strained(lattice: &LatticeVectors, layers: &Layers) -> Option<LatticeVectors> {
+    if layers.ratio().is_none() {
+        return least_strained_by_trial(lattice, layers);
+    }
+    // Only the shape of the atomic cell matters.
+    let atoms = layers.atoms / layers.atoms.norm();
+    let anisotropy =
+        |basis: &Matrix2<f64>| Some(ComplexPair::from(moire_matrix(basis, &atoms)?).q.norm());
+    let mut best = *lattice;
+    if best.basis.determinant() < 0.0 {
+        best = best.relabelled(&Matrix2::new(0.0, 1.0, 1.0, 0.0));
+    }
+    let mut smallest = anisotropy(&best.basis)?;
+    // Each step shortens the reciprocal vectors, so this ends; a pair from an image needs one.
+    loop {
+        let mut step = None;
+        for change in small_changes() {
+            let q = anisotropy(&(best.basis * change))?;
+            // Turning all names by 60° changes nothing: do not follow rounding errors.
+            if q < smallest * (1.0 - 1e-9) {
+                smallest = q;
+                step = Some(change);
+            }
+        }
+        match step {
+            Some(change) => best = best.relabelled(&change),
+            None => return Some(best),
+        }
+    }
+}
+
+/// For layers of different lattices: the names that come nearest to an explanation without strain are
+/// solved, and the one that needs the least is taken.
+fn least_strained_by_trial(lattice: &LatticeVectors, layers: &Layers) -> Option<LatticeVectors> {
+    let likely = likely_names(lattice, layers)?;
+    let mut best = (f64::INFINITY, *likely.first()?);
+    for named in &likely {
+        let moire = ComplexPair::from(moire_matrix(&named.basis, &layers.atoms)?);
+        let strain = ALL_SIGNS
+            .into_iter()
+            .filter_map(|signs| solve(&moire, layers, signs))
+            .map(|solution| solution.strain.abs())
+            .fold(f64::INFINITY, f64::min);
+        if strain < best.0 * (1.0 - 1e-9) {
+            best = (strain, *named);
+        }
+    }
+    Some(best.1)
+}
+
+/// The names that come nearest to an explanation without strain, the nearest first.
+pub(crate) fn likely_names(
+    lattice: &LatticeVectors,
+    layers: &Layers,
+) -> Option<Vec<LatticeVectors>> {
+    let mut scored: Vec<(f64, LatticeVectors)> = names(lattice)?
+        .into_iter()
+        .filter_map(|named| {
+            let moire = ComplexPair::from(moire_matrix(&named.basis, &layers.atoms)?);
+            Some((least_mismatch(&moire, layers), named))
+        })
+        .collect();
+    scored.sort_by(|a, b| a.0.total_cmp(&b.0));
+    Some(scored.into_iter().take(SOLVED).map(|(_, l)| l).collect())
+}
+
+/// The least difference of N from a turn, over all orientations of layer 1.
+fn least_mismatch(moire: &ComplexPair, layers: &Layers) -> f64 {
+    (0..ORIENTATIONS)
+        .map(|k| {
+            let angle = std::f64::consts::TAU * f64::from(k) / f64::from(ORIENTATIONS);
+            let n = layers.stretched(moire, angle);
+            (n.p.norm() - 1.0).hypot(n.q.norm())
+        })
+        .fold(f64::INFINITY, f64::min)
+}
+
+/// The names of a lattice near its shortest pair, of either handedness: a moiré of different lattices can
+/// be far longer one way than the other, and its cell far from the shortest one.
+pub(crate) fn names(lattice: &LatticeVectors) -> Option<Vec<LatticeVectors>> {
+    let shortest = lattice.relabelled(&shortest_pair(&lattice.basis)?);
+    let entries = || (-LARGEST_ENTRY..=LARGEST_ENTRY).map(f64::from);
+    let mut found = Vec::new();
+    for (a, b) in entries().flat_map(|a| entries().map(move |b| (a, b))) {
+        for (c, d) in entries().flat_map(|c| entries().map(move |d| (c, d))) {
+            let change = Matrix2::new(a, b, c, d);
+            // Turning a name by 180° turns the orientation by as much.
+            let first = [a, b, c, d].into_iter().find(|x| *x != 0.0);
+            if change.determinant().abs() == 1.0 && first > Some(0.0) {
+                found.push(shortest.relabelled(&change));
+            }
+        }
+    }
+    Some(found)
+}
+
+/// All matrices of determinant 1 with entries −1, 0, 1.
+pub(crate) fn small_changes() -> impl Iterator<Item = Matrix2<f64>> {
+    (0..81).filter_map(|code: i32| {
+        let entry = |power: u32| f64::from(code / 3_i32.pow(power) % 3 - 1);
+        let change = Matrix2::new(entry(0), entry(1), entry(2), entry(3));
+        (change.determinant() == 1.0).then_some(change)
+    })
+}

@@ -1,0 +1,342 @@
+//! What an analysis finds: sets of scans, their drift, lattices, twist and strain.
+//!
+//! Plain values in nm, s and rad; the surface units (degrees, %, nm/min) belong to the report.
+
+use heterostrain::Estimate;
+use heterostrain::lattice::LatticeVectors;
+use heterostrain::strain::{KnownOrientation, LatticeDirection, StrainDraw, TwistStrain};
+use nalgebra::{Matrix2, Vector2};
+use spmfile::{DateTime, FrameDirection, LineDirection};
+
+use crate::caveat::Caveat;
+use crate::drift::drawn::DriftMonteCarlo;
+use crate::drift::joint::path::DriftPath;
+use crate::drift::joint::solve::TestedTerm;
+use crate::frame::axis::Axis;
+use crate::meaning::budget::Budget;
+use crate::meaning::readings::Readings;
+use crate::scan::picture::{Illustration, Picture};
+use crate::settings::knobs::Settings;
+
+/// Everything found in a number of scans.
+#[derive(Clone, Debug)]
+pub struct Analysis {
+    /// The settings as they were used.
+    pub settings: Settings,
+    /// The sets, in order of time.
+    pub sets: Vec<SetAnalysis>,
+    /// All sets taken together; `None` where no set gave a drift-corrected lattice.
+    pub combined: Option<Combined>,
+    /// The orientation of a layer, where atomically resolved images gave it.
+    pub atomic: Option<AtomicOrientation>,
+    /// An image of a larger area, to show where the scans were made.
+    pub survey: Option<Picture>,
+    /// Doubts, in the order in which they came up.
+    pub caveats: Vec<Caveat>,
+}
+
+impl Analysis {
+    /// The settings with the waves of the lattice that the numbers go with, for what is made from the same scans: maps
+    /// have to read the lattice under the same name.
+    pub fn named_settings(&self) -> Settings {
+        let of_set = |set: &SetAnalysis| set.mean.clone().or(set.uncorrected.clone());
+        let found = self
+            .combined
+            .as_ref()
+            .map(|all| (all.lattice, all.readings.clone()))
+            .or_else(|| {
+                let mean = self.sets.iter().find_map(of_set)?;
+                Some((mean.lattice, mean.readings))
+            });
+        let waves = found.and_then(|(lattice, readings)| {
+            let naming = readings.naming?;
+            let least = naming.names.iter().map(|n| n.strain);
+            let least = least.fold(f64::INFINITY, f64::min);
+            let reported = naming.names.first().filter(|n| n.strain > least)?;
+            reported.name.waves(&lattice.basis)
+        });
+        let mut settings = self.settings.clone();
+        if let Some(waves) = waves {
+            settings.moire_waves = Some([0, 1].map(|i| [waves[(0, i)], waves[(1, i)]]));
+        }
+        settings
+    }
+}
+
+/// Scans of one slow axis, line rate, size and channel, in order of time.
+#[derive(Clone, Debug)]
+pub struct SetAnalysis {
+    /// Name for people, unique within the analysis, as in `slow y, 4 Hz`.
+    pub name: String,
+    /// The laboratory axis along which lines follow each other.
+    pub slow_axis: Axis,
+    /// Lines per second (trace and retrace together).
+    pub line_rate_hz: f64,
+    /// Name of the analysed channel.
+    pub channel: String,
+    /// The scans in order of time.
+    pub scans: Vec<ScanAnalysis>,
+    /// The drift, measured or given; `None` where the scans cannot determine it.
+    pub drift: Option<Drift>,
+    /// Lattice, twist and strain from all scans together, corrected for drift.
+    pub mean: Option<SetMean>,
+    /// The plain mean over the scans in sensor coordinates, not corrected for drift.
+    pub uncorrected: Option<SetMean>,
+    /// Twist and strain from the mean reciprocal lattice of up and down scans, which is free of
+    /// constant drift without knowing it; `None` where there is only one direction.
+    pub forward_backward: Option<TwistStrain>,
+    /// What the scans themselves say of the errors; `None` for other methods than the joint fit.
+    pub checks: Option<Checks>,
+    /// One scan in detail, for the figures.
+    pub illustration: Option<Illustration>,
+}
+
+/// Errors from the scatter of the scans, to compare with those that are stated.
+#[derive(Clone, Debug)]
+pub struct Checks {
+    /// From leaving out one scan at a time (jackknife); `None` for fewer than four scans.
+    pub leave_one_out: Option<Scatter>,
+    /// From a bootstrap over pairs of up and down scans; `None` for fewer than four pairs.
+    pub bootstrap: Option<Scatter>,
+}
+
+/// One standard deviation of each quantity.
+#[derive(Clone, Copy, Debug)]
+pub struct Scatter {
+    /// Drift velocity along x and y, nm/s.
+    pub drift: [f64; 2],
+    /// θ, rad.
+    pub twist: f64,
+    /// Components of the strain vector.
+    pub strain: [f64; 2],
+}
+
+/// How a scan lies against the fit of all others of its set.
+#[derive(Clone, Copy, Debug)]
+pub struct Residual {
+    /// χ² of its wave vectors and phases against what the others predict.
+    pub chi2: f64,
+    /// Degrees of freedom of `chi2`.
+    pub degrees_of_freedom: usize,
+    /// How often chance makes so large a χ², that of the others taken as measure if it exceeds 1.
+    pub p_value: f64,
+    /// Where the scan stands from where the others have it, nm; `None` without linked phases.
+    pub displacement: Option<Vector2<f64>>,
+    /// Whether it stands out: p < 0.001 divided by the number of scans.
+    pub outlying: bool,
+}
+
+/// One lattice for several scans.
+#[derive(Clone, Debug)]
+pub struct SetMean {
+    /// Lattice vectors, nm.
+    pub lattice: LatticeVectors,
+    /// Twist and strain of that lattice.
+    pub twist_strain: TwistStrain,
+    /// What contributes to their uncertainty, calibration and model included.
+    pub budget: Budget,
+    /// What else the lattice can mean.
+    pub readings: Readings,
+    /// Standard deviation of the twist over the scans, rad; NaN for a single scan.
+    pub twist_scatter: f64,
+    /// Root-mean-square deviation per component of the strain vector over the scans; NaN for one scan.
+    pub strain_scatter: f64,
+    /// χ² per degree of freedom of the scans against the common lattice; NaN where there is none.
+    pub chi2_per_dof: f64,
+    /// Factor by which all variances were enlarged for that scatter; 1 where it is not significant.
+    pub enlargement: f64,
+    /// Whether each scan's wavelengths lie within ±1 % of the common ones.
+    pub within_one_percent: bool,
+}
+
+/// All sets taken together.
+#[derive(Clone, Debug)]
+pub struct Combined {
+    /// Weighted mean lattice, nm.
+    pub lattice: LatticeVectors,
+    /// Its twist and strain.
+    pub twist_strain: TwistStrain,
+    /// What contributes to their uncertainty, calibration and model included.
+    pub budget: Budget,
+    /// What else the lattice can mean.
+    pub readings: Readings,
+    /// Whether one joint fit over all scans made them, and with which terms.
+    pub joint: Option<JointTerms>,
+    /// The drift in the middle of the campaign, where one joint fit over all scans describes it.
+    pub drift: Option<Drift>,
+    /// The way of the sample by the fit over all scans, where that made them.
+    pub path: Option<DriftPath>,
+    /// What the scans themselves say of the errors.
+    pub checks: Option<Checks>,
+    /// How far every two sets are apart.
+    pub consistency: Vec<Consistency>,
+}
+
+/// How many standard deviations lie between two sets.
+#[derive(Clone, Debug)]
+pub struct Consistency {
+    /// Names of the two sets.
+    pub sets: [String; 2],
+    /// Difference of the drift velocities: square root of χ² for two components; `None` where unknown.
+    pub drift_sigmas: Option<f64>,
+    /// Difference of the twist angles in units of its σ.
+    pub twist_sigmas: f64,
+    /// Difference of the strain vectors: square root of χ² for two components.
+    pub strain_sigmas: f64,
+}
+
+/// Motion of the sample in the frame of the sensors.
+#[derive(Clone, Debug)]
+pub struct Drift {
+    /// Velocity, nm/s.
+    pub velocity: Vector2<f64>,
+    /// Its covariance, (nm/s)².
+    pub covariance: Matrix2<f64>,
+    /// Whether the user gave it (from an earlier calibration).
+    pub given: bool,
+    /// Quality of the fit; `None` for a given drift.
+    pub fit: Option<DriftFit>,
+    /// The Monte Carlo distribution; `None` for a given drift or where no draws were asked for.
+    pub monte_carlo: Option<DriftMonteCarlo>,
+    /// What the joint fit found beside a constant drift; `None` for other methods.
+    pub joint: Option<JointTerms>,
+}
+
+/// The terms of a joint fit that earned their place, and what they came to.
+#[derive(Clone, Debug)]
+pub struct JointTerms {
+    /// Whether phases link the frames.
+    pub phases: bool,
+    /// Change of the drift velocity, nm/s².
+    pub acceleration: Option<Vector2<f64>>,
+    /// Time constant of an exponential settling, s.
+    pub settling_s: Option<f64>,
+    /// Relative gain error of the fast axis.
+    pub fast_gain: Option<Estimate>,
+    /// Scatter of the positions about the fit beyond the noise of the phases, nm.
+    pub instability_nm: f64,
+    /// The terms that were tried, and what the information criterion said of them.
+    pub tested: Vec<TestedTerm>,
+}
+
+/// How well the scans determine the drift.
+#[derive(Clone, Debug)]
+pub struct DriftFit {
+    /// Rank of the six-parameter problem (two lattice vectors and the drift).
+    pub rank: usize,
+    /// Condition number of its column-scaled design matrix.
+    pub condition: f64,
+    /// Weighted sum of squared residuals.
+    pub chi2: f64,
+    /// Degrees of freedom of `chi2`.
+    pub degrees_of_freedom: usize,
+    /// The published estimate for comparison: approximate matrices, successive scans compared, nm/s.
+    pub paper_velocity: Option<Vector2<f64>>,
+}
+
+/// One frame: its geometry, lattice, twist and strain.
+#[derive(Clone, Debug)]
+pub struct ScanAnalysis {
+    /// The file as the user named it.
+    pub file: String,
+    /// When it was saved, by the instrument's clock.
+    pub acquired: Option<DateTime>,
+    /// Sense of the slow motion; `None` where the file does not tell.
+    pub frame_direction: Option<FrameDirection>,
+    /// The lines that were used, trace and retrace.
+    pub lines: Vec<LineAnalysis>,
+    /// Centre of the scanned window, sensor coordinates, nm.
+    pub window_centre: Vector2<f64>,
+    /// Extent of the window along its fast and slow sides, first to last pixel, nm.
+    pub window_extent: [f64; 2],
+    /// Fast tip velocity, nm/s; σ is the spread over the lines.
+    pub fast_velocity: Estimate,
+    /// Slow tip velocity, nm/s; σ is the spread over the lines.
+    pub slow_velocity: Estimate,
+    /// Lattice vectors in nominal coordinates, nm; `None` where the file gives no size.
+    pub nominal: Option<LatticeVectors>,
+    /// Lattice vectors in sensor coordinates, nm (nominal ones where there are no sensors).
+    pub sensor: LatticeVectors,
+    /// Lattice vectors corrected for drift, nm.
+    pub drift_corrected: Option<LatticeVectors>,
+    /// The drift that was taken off, nm/s: that of its set at its time.
+    pub drift: Option<Vector2<f64>>,
+    /// Its time and the way of the sample; `None` where either is not known.
+    pub motion: Option<Motion>,
+    /// Twist and strain from `sensor`.
+    pub twist_strain_sensor: Option<TwistStrain>,
+    /// Twist and strain from `drift_corrected`.
+    pub twist_strain: Option<TwistStrain>,
+    /// Monte Carlo draws of twist and strain behind `twist_strain` (or `twist_strain_sensor`).
+    pub draws: Vec<StrainDraw>,
+    /// How it lies against the other scans; `None` without a joint fit of at least three scans.
+    pub residual: Option<Residual>,
+    /// Why it was not used for the results of its set; `None` where it was.
+    pub excluded: Option<String>,
+}
+
+/// When a frame was taken, and where the sample was.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Motion {
+    /// Time of the middle of the frame, s from an origin that all scans share.
+    pub middle: f64,
+    /// The way of the sample, by the fit of all sets where there is one, otherwise by that of its set.
+    pub path: DriftPath,
+}
+
+/// What one line direction of a frame gave.
+#[derive(Clone, Debug)]
+pub struct LineAnalysis {
+    /// Trace or retrace.
+    pub line: LineDirection,
+    /// Lattice vectors in pixels (columns, rows).
+    pub pixels: LatticeVectors,
+    /// Lattice vectors in sensor coordinates, nm.
+    pub sensor: LatticeVectors,
+    /// The other estimator's vectors in sensor coordinates, nm, for comparison.
+    pub comparison: Option<LatticeVectors>,
+    /// The published shortcut `4π/(√3|K|)` for the three first wave vectors, nm: right only for
+    /// undistorted hexagons, printed for comparison.
+    pub shortcut_wavelengths: Option<[f64; 3]>,
+    /// Affine map pixel (column, row) → nm, the linear part.
+    pub pixel_to_nm: Matrix2<f64>,
+    /// Position of pixel (0, 0), nm.
+    pub origin: Vector2<f64>,
+    /// Whether position sensors were used.
+    pub from_sensors: bool,
+    /// Number of lattice periods across the shorter side of the frame.
+    pub periods: f64,
+    /// Signal-to-noise ratio of the weakest of the three first harmonics (amplitude).
+    pub signal_to_noise: f64,
+}
+
+/// The orientation of a layer by its atomic lattice.
+#[derive(Clone, Debug, PartialEq)]
+pub struct AtomicOrientation {
+    /// The files.
+    pub files: Vec<String>,
+    /// Layer 1, the reference, or layer 2.
+    pub layer: u8,
+    /// Of a reciprocal vector, rad, modulo the symmetry of the layer.
+    pub angle: Estimate,
+    /// Mean lattice constant that was found over that of the material.
+    pub size: f64,
+    /// How far the lattice found is from the shape of the material's: `|q|/|p|` of F.
+    pub distortion: f64,
+    /// Velocity of the drift, nm/s; `None` where the frames do not tell.
+    pub drift: Option<Vector2<f64>>,
+    /// Doubts.
+    pub caveats: Vec<Caveat>,
+}
+
+impl AtomicOrientation {
+    /// As the user would have given it.
+    pub fn known(&self) -> KnownOrientation {
+        KnownOrientation {
+            angle_deg: self.angle.value.to_degrees(),
+            sigma_deg: self.angle.sigma.to_degrees(),
+            layer: self.layer,
+            of: LatticeDirection::Reciprocal,
+        }
+    }
+}

@@ -1,0 +1,473 @@
+//! Scans of a known lattice → the calibration of the scanner.
+//!
+//! In: scans measured like any others ([`crate::scan::measure::measure_known`]), the cell they have to show. Out: common
+//! gain, mismatch and deviation from a right angle with their covariance.
+//!
+//! Scans are grouped into sets as for a moiré. Up and down frames of a set give the lattice free of drift by
+//! the same linear least squares; its vectors against the known cell are the distortion ([`shown`]). Sets
+//! share the scanner and not the orientation of the sample, so that what is averaged is the distortion.
+//! Frames of one direction do not tell drift from gain: they are taken as they are, and a prior of the drift
+//! enlarges the errors along what it does, `t_j D` for the vector j that takes the time `t_j`.
+//!
+//! Phases of the frames are not used: at atomic distances nobody can tell by how many cells a sample has
+//! moved between two frames.
+
+use heterostrain::Estimate;
+use heterostrain::lattice::LatticeVectors;
+use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
+use spmfile::{FrameDirection, LineDirection};
+
+use crate::calibration::{Calibration, Coordinates, KnownLattice, Shown, shown};
+use crate::campaign::alike::{Alike, alike};
+use crate::campaign::group::{Group, groups};
+use crate::campaign::identity::once;
+use crate::caveat::Caveat;
+use crate::drift::linear::{Observation, common_lattice, solve};
+use crate::frame::axis::Axis;
+use crate::frame::geometry::Timing;
+use crate::numbers::chi2::enlargement;
+use crate::scan::measured::{MeasuredLine, MeasuredScan};
+use crate::settings::knobs::Grouping;
+
+/// Another way of naming the vectors that is not this much more distorted is a doubt.
+const AMBIGUOUS: f64 = 0.1;
+/// Lattices of frames of one direction that differ by more than this share are of different things.
+const SAME: f64 = 0.35;
+/// Frames up and down that a constant drift does not make of one another to this share are not used.
+const LARGEST_MISFIT: f64 = 0.05;
+/// A drift of this share of the speed of the slow axis deserves a word.
+const LARGE_DRIFT: f64 = 0.2;
+/// χ²/dof of a set or between sets beyond which its scatter deserves a word.
+const LARGE_CHI2: f64 = 2.0;
+
+/// What scans of a known lattice say about the scanner.
+#[derive(Clone, Debug)]
+pub struct Calibrated {
+    /// The calibration.
+    pub calibration: Calibration,
+    /// Whether its covariance is known; `false` where frames of one direction have no line rate.
+    pub covariance_known: bool,
+    /// Standard uncertainties of gain, mismatch (per cent) and deviation from a right angle (mrad) from noise and
+    /// scatter alone, without the prior of the drift and the known lattice.
+    pub statistical: [f64; 3],
+    /// The sets, in order of time.
+    pub sets: Vec<CalibratedSet>,
+    /// χ² of the sets against the mean, and its degrees of freedom.
+    pub chi2: f64,
+    /// Degrees of freedom of `chi2`.
+    pub degrees_of_freedom: usize,
+    /// Doubts.
+    pub caveats: Vec<Caveat>,
+}
+
+/// What one set says.
+#[derive(Clone, Debug)]
+pub struct CalibratedSet {
+    /// Its name.
+    pub name: String,
+    /// The channel.
+    pub channel: String,
+    /// Its files.
+    pub files: Vec<String>,
+    /// The laboratory axis along which lines follow each other.
+    pub slow_axis: Axis,
+    /// The lattice as it is shown, free of drift as far as that is known, nm.
+    pub lattice: LatticeVectors,
+    /// Gain, mismatch (per cent) and deviation from a right angle (mrad), errors without that of the known
+    /// lattice.
+    pub estimates: [Estimate; 3],
+    /// Orientation of the known cell's first vector, rad.
+    pub orientation: Estimate,
+    /// Drift velocity in true lengths, nm/s, where frames of both directions tell it: value and σ along x and y.
+    pub drift: Option<[Estimate; 2]>,
+    /// Whether it was used: frames of one direction are not, where there is better.
+    pub used: bool,
+}
+
+/// Why scans give no calibration.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum CalibrateError {
+    /// Nothing to measure.
+    #[error("no scan can be used")]
+    Nothing,
+    /// A cell without area.
+    #[error(
+        "the known lattice has no area: expected two lengths > 0 and an angle between 0° and 180°"
+    )]
+    Cell,
+    /// Sensors in some scans only.
+    #[error(
+        "some scans have position sensors and some have not: a calibration is one or the other; calibrate \
+         them apart"
+    )]
+    Mixed,
+    /// Frames up and down that contradict each other.
+    #[error(
+        "{set}: no constant drift makes the frames upwards and downwards the same lattice (they miss by \
+         {misfit_percent:.0} %): one of them shows another one, or the drift changed within the frames or moved the sample \
+         too far. Faster lines and smaller frames make the drift matter less"
+    )]
+    Drift {
+        /// The set.
+        set: String,
+        /// What the best drift leaves, as a share of the lattice vectors, per cent.
+        misfit_percent: f64,
+    },
+    /// The vectors of a set cannot be used.
+    #[error("{0}: the lattice of these scans cannot be compared with the known one")]
+    Lattice(String),
+}
+
+/// One set on the way.
+struct Seen {
+    group: Group,
+    lattice: LatticeVectors,
+    /// With the prior of the drift where it is needed.
+    found: Shown,
+    /// Without.
+    bare: Shown,
+    /// Velocity as it is shown, nm/s, and its covariance.
+    drift: Option<(Vector2<f64>, Matrix2<f64>)>,
+    /// The prior of the drift could be applied, or was not needed.
+    known: bool,
+}
+
+/// The calibration of the scanner that scans of a lattice `known` tell; `drift_sigma` (nm/s) is the
+/// standard deviation of each component of a drift that the frames cannot tell.
+///
+/// # Errors
+/// [`CalibrateError`]: nothing to measure, sensors and nominal coordinates mixed, or lattices that are none.
+pub fn calibrate(
+    scans: Vec<MeasuredScan>,
+    known: &KnownLattice,
+    drift_sigma: f64,
+    grouping: Grouping,
+) -> Result<Calibrated, CalibrateError> {
+    let cell = known
+        .cell()
+        .filter(|_| known.problem().is_none())
+        .ok_or(CalibrateError::Cell)?;
+    let (scans, repeats) = once(scans);
+    let mut caveats: Vec<Caveat> = scans.iter().flat_map(|s| s.caveats.clone()).collect();
+    caveats.extend(repeats);
+    caveats.retain(|c| c.code != "no-position-sensors" && c.code != "second-lattice");
+    let from_sensors = |line: &MeasuredLine| line.geometry.from_sensors;
+    let lines = || scans.iter().flat_map(|s| &s.lines);
+    let first = from_sensors(lines().next().ok_or(CalibrateError::Nothing)?);
+    if lines().any(|line| from_sensors(line) != first) {
+        return Err(CalibrateError::Mixed);
+    }
+    let mut sizes: Vec<[f64; 2]> = scans.iter().filter_map(|s| s.size_nm).collect();
+    let mut rates: Vec<f64> = scans.iter().filter_map(|s| s.line_rate_hz).collect();
+    sizes.dedup();
+    rates.dedup();
+    let mut sets = Vec::new();
+    for group in groups(scans, grouping) {
+        sets.push(see(group, &cell, drift_sigma, &mut caveats)?);
+    }
+    let separated = sets.iter().any(|s| s.drift.is_some());
+    let used = |s: &Seen| s.drift.is_some() || !separated;
+    let chosen: Vec<&Shown> = sets.iter().filter(|s| used(s)).map(|s| &s.found).collect();
+    let bare: Vec<&Shown> = sets.iter().filter(|s| used(s)).map(|s| &s.bare).collect();
+    let (values, covariance, chi2) =
+        mean(&chosen).ok_or_else(|| CalibrateError::Lattice("all sets".to_owned()))?;
+    let freedom = 3 * (chosen.len() - 1);
+    let scale = enlargement(chi2, freedom);
+    let statistical = mean(&bare).map_or(covariance, |(_, c, _)| c) * scale;
+    if freedom > 0 && chi2 / freedom as f64 > LARGE_CHI2 {
+        caveats.push(Caveat::new(
+            "calibrations-differ",
+            "calibration",
+            format!(
+                "the sets differ {:.1} times more than their errors say: a lag or hysteresis of the fast axis, drift \
+                 that changes, or strain of the sample; errors are enlarged to match",
+                (chi2 / freedom as f64).sqrt()
+            ),
+        ));
+    }
+    // A wrong constant of the known lattice is a wrong size of everything.
+    let size = Vector3::new(1.0 + values[0], values[1], values[2]) * (known.sigma_percent / 100.0);
+    let covariance = covariance * scale + size * size.transpose();
+    let coordinates = if first {
+        Coordinates::Sensors
+    } else {
+        Coordinates::Nominal
+    };
+    let covariance_known = sets.iter().filter(|s| used(s)).all(|s| s.known);
+    let in_units = Calibration::new(&values, &statistical, coordinates).estimates();
+    let calibration = Calibration {
+        sizes_nm: sizes,
+        line_rates_hz: rates,
+        ..Calibration::new(&values, &covariance, coordinates)
+    };
+    about_plausibility(&calibration, covariance_known, &mut caveats);
+    let map = calibration
+        .map()
+        .ok_or_else(|| CalibrateError::Lattice("all sets".to_owned()))?;
+    Ok(Calibrated {
+        covariance_known,
+        statistical: in_units.map(|e| e.sigma),
+        chi2,
+        degrees_of_freedom: freedom,
+        sets: sets
+            .into_iter()
+            .map(|s| {
+                let used = used(&s);
+                summary(s, &map, coordinates, used)
+            })
+            .collect(),
+        calibration,
+        caveats,
+    })
+}
+
+/// The lattice of one set and its distortion.
+fn see(
+    group: Group,
+    cell: &Matrix2<f64>,
+    drift_sigma: f64,
+    caveats: &mut Vec<Caveat>,
+) -> Result<Seen, CalibrateError> {
+    let name = group.name.clone();
+    let unusable = || CalibrateError::Lattice(name.clone());
+    let lines = || {
+        group
+            .scans
+            .iter()
+            .flat_map(|s| s.lines.iter().map(move |l| (s, l)))
+    };
+    let found = alike(lines().map(|(_, l)| l), cell).ok_or(CalibrateError::Nothing)?;
+    about_one_drift(&name, &found, caveats)?;
+    let observations = found.observations;
+    let timed = lines().all(|(_, l)| l.timing.is_some());
+    if timed && let Ok(solution) = solve(&observations) {
+        let scale = enlargement(solution.chi2, solution.degrees_of_freedom);
+        about_scatter(&name, solution.chi2, solution.degrees_of_freedom, caveats);
+        let mut lattice = solution.lattice;
+        lattice.covariance *= scale;
+        let found = shown(&lattice, cell).ok_or_else(unusable)?;
+        about_name(&name, &found, caveats);
+        return Ok(Seen {
+            lattice,
+            bare: found,
+            found,
+            drift: Some((solution.velocity, solution.covariance * scale)),
+            known: true,
+            group,
+        });
+    }
+    // The time that passes between two points is that of the slow axis; its sign does not matter for what a
+    // drift of unknown direction does.
+    let gradients: Vec<Option<Vector2<f64>>> = lines().map(|(s, l)| gradient(s, l)).collect();
+    let known = gradients.iter().all(Option::is_some);
+    let timed: Vec<Observation> = observations
+        .iter()
+        .zip(&gradients)
+        .map(|(o, u)| Observation {
+            time_gradient: u.unwrap_or_else(Vector2::zeros),
+            ..*o
+        })
+        .collect();
+    let none = Vector2::zeros();
+    let prior = Matrix2::identity() * drift_sigma * drift_sigma;
+    let (bare, chi2, freedom) =
+        common_lattice(&timed, &none, &Matrix2::zeros()).map_err(|_| unusable())?;
+    let (drifting, _, _) = common_lattice(&timed, &none, &prior).map_err(|_| unusable())?;
+    let scale = enlargement(chi2, freedom);
+    about_scatter(&name, chi2, freedom, caveats);
+    let lattice = LatticeVectors {
+        covariance: drifting.covariance + bare.covariance * (scale - 1.0),
+        ..drifting
+    };
+    let bare = LatticeVectors {
+        covariance: bare.covariance * scale,
+        ..bare
+    };
+    let found = shown(&lattice, cell).ok_or_else(unusable)?;
+    about_name(&name, &found, caveats);
+    about_drift(
+        &name,
+        gradients.first().copied().flatten(),
+        drift_sigma,
+        caveats,
+    );
+    Ok(Seen {
+        lattice,
+        found,
+        bare: shown(&bare, cell).ok_or_else(unusable)?,
+        drift: None,
+        known,
+        group,
+    })
+}
+
+/// Whether one drift explains the frames: an error where none does, a word where it is large.
+fn about_one_drift(
+    name: &str,
+    found: &Alike,
+    caveats: &mut Vec<Caveat>,
+) -> Result<(), CalibrateError> {
+    let along = found.observations[0].time_gradient;
+    for sense in [1.0, -1.0] {
+        let of_sense = |o: &&Observation| sense * o.time_gradient.dot(&along) >= 0.0;
+        let mut same = found.observations.iter().filter(of_sense);
+        let Some(first) = same.next().map(|o| o.lattice.basis) else {
+            continue;
+        };
+        if same.any(|o| (o.lattice.basis - first).norm() > SAME * first.norm()) {
+            return Err(CalibrateError::Lattice(name.to_owned()));
+        }
+    }
+    if found.misfit > LARGEST_MISFIT {
+        return Err(CalibrateError::Drift {
+            set: name.to_owned(),
+            misfit_percent: 100.0 * found.misfit,
+        });
+    }
+    if found.drift > LARGE_DRIFT {
+        caveats.push(Caveat::new(
+            "large-drift",
+            name,
+            format!(
+                "the sample drifts at {:.0} % of the speed at which lines follow each other. A constant drift is taken \
+                 out exactly, but one that changes by a tenth during a frame makes errors of {:.0} %: faster lines or \
+                 smaller frames make them smaller",
+                100.0 * found.drift,
+                10.0 * found.drift
+            ),
+        ));
+    }
+    Ok(())
+}
+
+/// The time gradient of a line, s/nm; with a line rate alone, that of a frame upwards.
+fn gradient(scan: &MeasuredScan, line: &MeasuredLine) -> Option<Vector2<f64>> {
+    let up = || {
+        let columns = line.geometry.size[0];
+        let rate = scan.line_rate_hz?;
+        Timing::new(columns, rate, 0.0, FrameDirection::Up, LineDirection::Trace)
+    };
+    line.geometry.time_gradient(&line.timing.or_else(up)?)
+}
+
+/// Mean of the distortions, weighted by their covariances, that covariance, and χ².
+fn mean(all: &[&Shown]) -> Option<(Vector3<f64>, Matrix3<f64>, f64)> {
+    let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
+    // A noiseless simulation has no covariance to weigh by.
+    let weight = |one: &Shown| (one.covariance + Matrix3::identity() * 1e-18).try_inverse();
+    for one in all {
+        let w = weight(one)?;
+        normal += w;
+        right += w * one.values;
+    }
+    let covariance = normal.try_inverse()?;
+    let values = covariance * right;
+    let mut chi2 = 0.0;
+    for one in all {
+        let miss = one.values - values;
+        chi2 += (miss.transpose() * weight(one)? * miss)[0];
+    }
+    Some((values, covariance, chi2))
+}
+
+fn summary(seen: Seen, map: &Matrix2<f64>, coordinates: Coordinates, used: bool) -> CalibratedSet {
+    let Seen {
+        group,
+        lattice,
+        found,
+        drift,
+        ..
+    } = seen;
+    CalibratedSet {
+        name: group.name,
+        channel: group.channel,
+        files: group.scans.iter().map(|s| s.file.clone()).collect(),
+        slow_axis: group.slow_axis,
+        lattice,
+        estimates: Calibration::new(&found.values, &found.covariance, coordinates).estimates(),
+        orientation: found.orientation,
+        drift: drift.map(|(velocity, covariance)| {
+            let (velocity, covariance) = (map * velocity, map * covariance * map.transpose());
+            [0, 1].map(|i| Estimate::from_variance(velocity[i], covariance[(i, i)]))
+        }),
+        used,
+    }
+}
+
+/// Whether a scanner can be like that.
+fn about_plausibility(calibration: &Calibration, known: bool, caveats: &mut Vec<Caveat>) {
+    if let Some(problem) = calibration.problem() {
+        caveats.push(Caveat::new(
+            "calibration-implausible",
+            "calibration",
+            format!("no scanner can be like that, and nothing is corrected with it: {problem}"),
+        ));
+    } else if let Some(what) = calibration.unusual().filter(|_| known) {
+        caveats.push(Caveat::new(
+            "calibration-unusual",
+            "calibration",
+            format!(
+                "a scanner rarely has a {what}: make sure that the images show the known lattice and have the right size"
+            ),
+        ));
+    }
+}
+
+fn about_scatter(name: &str, chi2: f64, freedom: usize, caveats: &mut Vec<Caveat>) {
+    if freedom > 0 && chi2 / freedom as f64 > LARGE_CHI2 {
+        caveats.push(Caveat::new(
+            "scatter",
+            name,
+            format!(
+                "the images scatter {:.1} times more than their errors say: drift that changes, creep, or a lattice \
+                 that is not the same everywhere; errors are enlarged to match",
+                (chi2 / freedom as f64).sqrt()
+            ),
+        ));
+    }
+}
+
+fn about_name(name: &str, found: &Shown, caveats: &mut Vec<Caveat>) {
+    if found.next_distortion < found.distortion + AMBIGUOUS {
+        caveats.push(Caveat::new(
+            "calibration-ambiguous",
+            name,
+            format!(
+                "two ways of naming the vectors explain the image with distortions of much the same size ({:.1} % and \
+                 {:.1} % between two axes): the smaller is taken",
+                200.0 * found.distortion,
+                200.0 * found.next_distortion
+            ),
+        ));
+    }
+}
+
+/// Frames of one direction: what drift may have done.
+fn about_drift(
+    name: &str,
+    gradient: Option<Vector2<f64>>,
+    drift_sigma: f64,
+    caveats: &mut Vec<Caveat>,
+) {
+    let per_minute = drift_sigma * 60.0;
+    let size = match gradient {
+        Some(u) => format!(
+            "A drift of 1 nm/min makes {:.2} % along the slow axis, or {:.1} mrad of shear; a drift of 0 ± {per_minute} \
+             nm/min is assumed (--drift-sigma) and is in the errors",
+            100.0 * u.norm() / 60.0,
+            1000.0 * u.norm() / 60.0
+        ),
+        None => "Without a line rate it cannot be said how much: --line-rate would tell, and until then the errors \
+                 are without it"
+            .to_owned(),
+    };
+    caveats.push(Caveat::new(
+        "drift-not-separated",
+        name,
+        format!(
+            "the frames are all of one slow direction: gain of the slow axis and shear cannot be told from drift. {size}. \
+             Frames up and down would separate them"
+        ),
+    ));
+}

@@ -1,0 +1,266 @@
+//! All sets taken together, and how well they agree.
+
+use heterostrain::lattice::LatticeVectors;
+use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
+
+use crate::campaign::analysis::{Combined, Consistency, Drift, SetAnalysis, SetMean};
+use crate::campaign::set::joint::{checks as set_checks, joint_fit, lattice_of, terms};
+use crate::campaign::set::moire::moire;
+use crate::campaign::sightings::middle_of_frame;
+use crate::caveat::Caveat;
+use crate::drift::joint::solve::JointFit;
+use crate::drift::shares::Statistical;
+use crate::meaning::about::caveats as about_readings;
+use crate::meaning::budget::Budget;
+use crate::meaning::readings::Readings;
+use crate::meaning::strengths::WaveStrengths;
+use crate::numbers::chi2::enlargement;
+use crate::scan::measured::MeasuredScan;
+use crate::settings::knobs::Settings;
+
+/// Wavelengths that differ by more than this are not of the same lattice, …
+const SAME_LATTICE: f64 = 0.05;
+/// … nor are those that differ by more than this if their errors do not explain it: χ² of four components beyond
+/// `NO_CHANCE` (p = 4·10⁻¹⁰).
+const NEARLY_SAME: f64 = 0.02;
+const NO_CHANCE: f64 = 50.0;
+/// χ² of two components beyond which the drift of a set is not that of all sets.
+const CONTRADICTION: f64 = 18.4;
+/// χ²/dof of all sets over that of the single ones beyond which they have no drift in common.
+const WORSE: f64 = 3.0;
+/// Sets this many σ apart deserve a word.
+const APART: f64 = 3.0;
+
+/// Weighted mean lattice of all sets that have one; `None` where there is none, or where the sets
+/// show different lattices.
+pub(crate) fn combine(
+    sets: &[SetAnalysis],
+    joint: Option<(&[&MeasuredScan], Matrix2<f64>)>,
+    settings: &Settings,
+    strengths: &WaveStrengths,
+    caveats: &mut Vec<Caveat>,
+) -> Option<Combined> {
+    let means: Vec<&SetMean> = sets.iter().filter_map(|s| s.mean.as_ref()).collect();
+    let first = means.first()?;
+    let others = means.iter().map(|m| &m.lattice);
+    let largest = others
+        .filter(|other| are_different(&first.lattice, other))
+        .map(|other| (other.basis - first.lattice.basis).norm() / first.lattice.basis.norm())
+        .reduce(f64::max);
+    if let Some(largest) = largest {
+        caveats.push(Caveat::new(
+            "different-lattices",
+            "analysis",
+            format!(
+                "the sets show lattices that differ by up to {:.1} %: they are not of the same place or \
+                 sample, and are not combined",
+                100.0 * largest
+            ),
+        ));
+        return None;
+    }
+    let (mut lattice, mut statistical) = weighted_mean(&means)?;
+    let (mut joint_terms, mut drift, mut checks) = (None, None, None);
+    let mut path = None;
+    if let ([one], Some(set)) = (sets, sets.first()) {
+        // Nothing to combine: the set has it all.
+        (lattice, statistical) = (first.lattice, first.budget.statistical);
+        joint_terms = one.drift.as_ref().and_then(|d| d.joint.clone());
+        drift = joint_terms.is_some().then(|| set.drift.clone()).flatten();
+        checks.clone_from(&set.checks);
+    } else if let Some((scans, reference)) = joint.filter(|(scans, _)| !scans.is_empty())
+        && let Some(start) = sets.iter().find_map(|s| s.drift.as_ref())
+    {
+        let start = (&lattice, &start.velocity);
+        match joined(sets, &means, scans, (&reference, start), settings) {
+            Ok(fit) => {
+                if let Some(fitted) = lattice_of(&fit, &reference) {
+                    (lattice, statistical) = fitted;
+                }
+                joint_terms = Some(terms(&fit));
+                path = Some(fit.path());
+                drift = Some(Drift {
+                    velocity: fit.velocity,
+                    covariance: fit.velocity_covariance,
+                    given: false,
+                    fit: None,
+                    monte_carlo: None,
+                    joint: joint_terms.clone(),
+                });
+                let left_out = fit.leave_one_out();
+                checks = Some(set_checks(&fit, &left_out, scans, ("all sets", settings)));
+            }
+            Err(why) => caveats.push(Caveat::new(
+                "drift-not-joined",
+                "analysis",
+                format!(
+                    "no smooth drift describes all sets: {why}; the lattices of the sets, each with its \
+                     own drift, are averaged instead"
+                ),
+            )),
+        }
+    }
+    let consistency = consistency(sets);
+    for pair in &consistency {
+        let drift = pair.drift_sigmas.unwrap_or(0.0);
+        if drift.max(pair.twist_sigmas).max(pair.strain_sigmas) > APART {
+            caveats.push(Caveat::new(
+                "sets-disagree",
+                pair.sets.join(" / "),
+                format!(
+                    "the sets disagree: drift {drift:.1} σ, twist {:.1} σ, strain {:.1} σ apart; a drift \
+                     that changes in time or a scanner whose axes differ would do this; the errors of \
+                     the combined values are enlarged to match",
+                    pair.twist_sigmas, pair.strain_sigmas
+                ),
+            ));
+        }
+    }
+    let twist_strain = moire(&lattice, settings)?;
+    let budget = Budget::new(&lattice, &twist_strain, &statistical, settings);
+    let readings = Readings::new(&lattice, &twist_strain, &budget, strengths, settings);
+    if sets.len() > 1 {
+        let found = about_readings("analysis", &lattice, &twist_strain, &readings, settings);
+        caveats.extend(found);
+    }
+    Some(Combined {
+        readings,
+        budget,
+        lattice,
+        twist_strain,
+        joint: joint_terms,
+        drift,
+        path,
+        checks,
+        consistency,
+    })
+}
+
+/// Whether two lattices are of different samples or places.
+fn are_different(a: &LatticeVectors, b: &LatticeVectors) -> bool {
+    let share = (b.basis - a.basis).norm() / a.basis.norm();
+    let difference = b.flat() - a.flat();
+    let inverse = (a.covariance + b.covariance).try_inverse();
+    let chi2 = inverse.map_or(0.0, |inverse| difference.dot(&(inverse * difference)));
+    share > SAME_LATTICE || (share > NEARLY_SAME && chi2 > NO_CHANCE)
+}
+
+/// The joint fit of all sets, or why it does not describe them.
+fn joined(
+    sets: &[SetAnalysis],
+    means: &[&SetMean],
+    scans: &[&MeasuredScan],
+    (reference, start): (&Matrix2<f64>, (&LatticeVectors, &Vector2<f64>)),
+    settings: &Settings,
+) -> Result<JointFit, String> {
+    let fit = joint_fit(scans, reference, start, settings)
+        .ok_or("their drift cannot be determined together")?;
+    let reduced = fit.chi2 / fit.degrees_of_freedom.max(1) as f64;
+    let usual = means.iter().map(|m| m.chi2_per_dof).fold(1.0, f64::max);
+    if reduced > WORSE * usual {
+        return Err(format!(
+            "together they scatter {:.0} times more than alone",
+            (reduced / usual).sqrt()
+        ));
+    }
+    match contradiction(sets, scans, &fit) {
+        Some(set) => Err(format!("it contradicts that of {set}")),
+        None => Ok(fit),
+    }
+}
+
+/// The first set whose own drift is not that of the joint fit at its time: χ² of two components beyond
+/// 18.4 (p = 10⁻⁴).
+fn contradiction<'a>(
+    sets: &'a [SetAnalysis],
+    scans: &[&MeasuredScan],
+    fit: &JointFit,
+) -> Option<&'a str> {
+    sets.iter()
+        .find(|set| {
+            let times: Vec<f64> = scans
+                .iter()
+                .filter(|scan| set.scans.iter().any(|s| s.file == scan.file))
+                .filter_map(|scan| middle_of_frame(scan))
+                .collect();
+            let Some(drift) = set.drift.as_ref().filter(|_| !times.is_empty()) else {
+                return false;
+            };
+            let first = times.iter().copied().fold(f64::INFINITY, f64::min);
+            let last = times.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+            let (velocity, covariance) = fit.velocity_at(f64::midpoint(first, last));
+            let apart = sigmas(
+                &(drift.velocity - velocity),
+                &(drift.covariance + covariance),
+            );
+            apart.is_some_and(|s| s * s > CONTRADICTION)
+        })
+        .map(|set| set.name.as_str())
+}
+
+/// Generalised mean of the four components, its covariance enlarged where the sets scatter.
+fn weighted_mean(means: &[&SetMean]) -> Option<(LatticeVectors, Statistical)> {
+    let (mut normal, mut right) = (Matrix4::zeros(), Vector4::zeros());
+    let mut weights = Vec::with_capacity(means.len());
+    for mean in means {
+        let w = mean.lattice.covariance.try_inverse()?;
+        normal += w;
+        right += w * mean.lattice.flat();
+        weights.push(w);
+    }
+    let covariance = normal.try_inverse()?;
+    let flat = covariance * right;
+    let chi2: f64 = means
+        .iter()
+        .zip(&weights)
+        .map(|(mean, w)| {
+            let d = mean.lattice.flat() - flat;
+            (d.transpose() * w * d)[0]
+        })
+        .sum();
+    let freedom = 4 * (means.len() - 1);
+    let scale = enlargement(chi2, freedom);
+    let parts: Vec<Statistical> = means.iter().map(|m| m.budget.statistical).collect();
+    let lattice = LatticeVectors {
+        basis: Matrix2::new(flat[0], flat[2], flat[1], flat[3]),
+        covariance: covariance * scale,
+    };
+    Some((lattice, Statistical::of_mean(&parts, scale)?))
+}
+
+fn consistency(sets: &[SetAnalysis]) -> Vec<Consistency> {
+    let mut all = Vec::new();
+    for (i, a) in sets.iter().enumerate() {
+        for b in &sets[i + 1..] {
+            let (Some(ma), Some(mb)) = (&a.mean, &b.mean) else {
+                continue;
+            };
+            let (ta, tb) = (&ma.twist_strain, &mb.twist_strain);
+            let twist = ta.twist().value - tb.twist().value;
+            let drift_sigmas = match (&a.drift, &b.drift) {
+                (Some(da), Some(db)) if !da.given && !db.given => sigmas(
+                    &(da.velocity - db.velocity),
+                    &(da.covariance + db.covariance),
+                ),
+                _ => None,
+            };
+            let strain = sigmas(
+                &(ta.strain_vector - tb.strain_vector),
+                &(ta.strain_covariance() + tb.strain_covariance()),
+            );
+            all.push(Consistency {
+                sets: [a.name.clone(), b.name.clone()],
+                drift_sigmas,
+                twist_sigmas: twist.abs() / ta.twist().sigma.hypot(tb.twist().sigma),
+                strain_sigmas: strain.unwrap_or(f64::INFINITY),
+            });
+        }
+    }
+    all
+}
+
+/// `√(dᵀ C⁻¹ d)`.
+fn sigmas(d: &Vector2<f64>, covariance: &Matrix2<f64>) -> Option<f64> {
+    let inverse = covariance.try_inverse()?;
+    Some((d.transpose() * inverse * d)[0].max(0.0).sqrt())
+}

@@ -1,0 +1,178 @@
+//! One scan in detail, for the figures.
+
+use nalgebra::Vector2;
+use spmfile::{Channel, LineDirection, Scan};
+
+use crate::campaign::analysis::ScanAnalysis;
+use crate::frame::background::remove_background;
+use crate::frame::geometry::Timing;
+use crate::frame::image::Image;
+use crate::frame::sensors::SensorGeometry;
+use crate::scan::channel::{channels, choose_channel, image_of};
+use crate::scan::picture::{Companion, Illustration, Picture};
+use crate::scan::positions::{nominal, sensor_images, usable_sensors};
+use crate::scan::scanner::calibrated;
+use crate::settings::knobs::Settings;
+use crate::spectrum::pictures::pictures;
+
+/// Blocks along the longer side of a map of residuals, at most.
+const RESIDUAL_BLOCKS: usize = 128;
+/// Pixels along the longer side of a picture, at most.
+const MOST_PIXELS: usize = 1024;
+
+/// The pictures behind the numbers of `analysed`, from the pixels of the same scan.
+///
+/// `None` where the scan no longer has what was measured.
+pub fn illustrate(
+    scan: &Scan,
+    analysed: &ScanAnalysis,
+    settings: &Settings,
+) -> Option<Illustration> {
+    let line = analysed.lines.first()?;
+    let channel = channels(scan, settings)
+        .ok()?
+        .into_iter()
+        .find(|c| c.line_direction.unwrap_or(LineDirection::Trace) == line.line)?;
+    let image = remove_background(&image_of(channel), settings.background);
+    let nominal = nominal(scan, channel);
+    let mut ignored = Vec::new();
+    let sensors = usable_sensors("", scan, channel, nominal.as_ref(), &mut ignored);
+    let measured = sensors
+        .as_ref()
+        .and_then(|_| sensor_images("", scan, channel, &mut ignored));
+    let timing = analysed
+        .frame_direction
+        .and_then(|frame| Timing::of_scan(scan, channel.columns, frame, line.line));
+    let velocities = |steps: &[f64], axis: usize| -> Vec<f64> {
+        let seconds = timing.map_or(f64::NAN, |t| t.per_pixel[axis].abs());
+        steps
+            .iter()
+            .map(|s| s / seconds)
+            .filter(|v| v.is_finite())
+            .collect()
+    };
+    let (mut fast, mut slow) = (Vec::new(), Vec::new());
+    let mut sensor_line = Vec::new();
+    let mut pixel_to_nm = line.pixel_to_nm;
+    let mut origin = line.origin;
+    if let (Some(sensors), Some(measured)) = (&sensors, &measured) {
+        let scaled = |steps: &[f64], by: f64| steps.iter().map(|s| s * by).collect::<Vec<f64>>();
+        let (raw, now) = (&sensors.geometry, calibrated(&sensors.geometry, settings));
+        let by = [
+            now.fast_step().norm() / raw.fast_step().norm(),
+            now.slow_step().norm() / raw.slow_step().norm(),
+        ];
+        fast = velocities(&scaled(&sensors.fast_steps, by[0]), 0);
+        slow = velocities(&scaled(&sensors.slow_steps, by[1]), 1);
+        // The whole frame is shown, also where only a part of it was analysed.
+        pixel_to_nm = now.pixel_to_nm;
+        origin = now.origin;
+        let axis = usize::from(pixel_to_nm.m11.abs() < pixel_to_nm.m21.abs());
+        let row = channel.rows / 2;
+        let plane = &sensors.planes[axis];
+        sensor_line = measured[axis]
+            .row(row)
+            .iter()
+            .enumerate()
+            .map(|(c, v)| [c as f64, *v, plane.at(c as f64, row as f64)])
+            .collect();
+    }
+    let residual_block = channel
+        .columns
+        .max(channel.rows)
+        .div_ceil(RESIDUAL_BLOCKS)
+        .max(1);
+    let sensor_residuals = sensors
+        .as_ref()
+        .zip(measured.as_ref())
+        .map(|(sensors, measured)| residuals(sensors, measured).map(|i| i.binned(residual_block)));
+    let (autocorrelation, spectrum, spectrum_step) = pictures(&image, &line.pixels);
+    Some(Illustration {
+        file: analysed.file.clone(),
+        line: line.line,
+        unit: channel.unit.clone(),
+        image,
+        pixel_to_nm,
+        origin,
+        nominal_pixel_to_nm: nominal.map(|n| n.pixel_to_nm),
+        autocorrelation,
+        spectrum,
+        spectrum_step,
+        lattice: line.pixels,
+        sensor_line,
+        fast_velocities: fast,
+        slow_velocities: slow,
+        sensor_residuals,
+        residual_block,
+        amplitude: amplitude(scan, channel, settings),
+    })
+}
+
+/// Readings of both sensors less the planes that place the pixels, nm.
+fn residuals(sensors: &SensorGeometry, measured: &[Image; 2]) -> [Image; 2] {
+    [0, 1].map(|axis| {
+        let (image, plane) = (&measured[axis], &sensors.planes[axis]);
+        let values = image.values.iter().enumerate().map(|(n, v)| {
+            let (row, column) = (n / image.columns, n % image.columns);
+            v - plane.at(column as f64, row as f64)
+        });
+        Image::new(image.rows, image.columns, values.collect())
+    })
+}
+
+/// The name, in small letters, of the channel with the amplitude that belongs to a phase; `None` where `channel` is no
+/// phase.
+pub fn amplitude_of(channel: &str) -> Option<String> {
+    let plain = channel.to_lowercase();
+    plain
+        .contains("phase")
+        .then(|| plain.replace("phase", "amplitude"))
+}
+
+/// The amplitude of the same line as a phase.
+fn amplitude(scan: &Scan, phase: &Channel, settings: &Settings) -> Option<Companion> {
+    let wanted = amplitude_of(&phase.name)?;
+    let found = scan.channels.iter().find(|c| {
+        c.name.to_lowercase() == wanted
+            && c.line_direction == phase.line_direction
+            && (c.rows, c.columns) == (phase.rows, phase.columns)
+    })?;
+    Some(Companion {
+        channel: found.name.clone(),
+        unit: found.unit.clone(),
+        image: remove_background(&image_of(found), settings.background),
+    })
+}
+
+/// The image of a scan in its place: the channel of the settings or the one that would be analysed, by the position
+/// sensors or, without them, by the size and offset that the file states.
+///
+/// `None` for a scan without an image or without a size.
+pub fn picture(file: &str, scan: &Scan, settings: &Settings) -> Option<Picture> {
+    let names: Vec<(&str, &str)> = scan
+        .channels
+        .iter()
+        .map(|c| (c.name.as_str(), c.internal_name.as_str()))
+        .collect();
+    let name = choose_channel(&names, settings.channel.as_deref())
+        .or_else(|| choose_channel(&names, None))?;
+    let channel = scan.channels.iter().find(|c| c.name == name)?;
+    let nominal = nominal(scan, channel);
+    let sensors = usable_sensors(file, scan, channel, nominal.as_ref(), &mut Vec::new());
+    let from_sensors = sensors.is_some();
+    let geometry = sensors.map(|s| s.geometry).or(nominal)?;
+    let geometry = calibrated(&geometry, settings);
+    let image = remove_background(&image_of(channel), settings.background);
+    let block = image.columns.max(image.rows).div_ceil(MOST_PIXELS).max(1);
+    // Pixels that fill no block are left out, as few as they are.
+    let middle = Vector2::repeat((block - 1) as f64 / 2.0);
+    Some(Picture {
+        file: file.to_owned(),
+        channel: channel.name.clone(),
+        unit: channel.unit.clone(),
+        image: image.binned(block),
+        pixel_to_nm: geometry.pixel_to_nm * block as f64,
+        origin: geometry.origin + geometry.pixel_to_nm * middle,
+        from_sensors,
+    })
+}

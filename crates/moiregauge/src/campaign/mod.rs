@@ -1,0 +1,30 @@
+//! All scans together: sets, drift, the joint fit, and what a layer's atoms or a known surface add.
+//!
+//! In: measured scans ([`crate::scan`]). Out: an [`Analysis`]; or the orientation of a layer ([`atomic_orientation`]), or the
+//! calibration of a scanner ([`calibrate`]).
+
+pub(crate) mod alike;
+pub(crate) mod analyse;
+pub(crate) mod analysis;
+pub(crate) mod atomic;
+pub(crate) mod calibrate;
+pub(crate) mod combine;
+pub(crate) mod group;
+pub(crate) mod identity;
+pub(crate) mod illustrate;
+pub(crate) mod naming;
+pub(crate) mod samples;
+pub(crate) mod set;
+pub(crate) mod sightings;
+pub(crate) mod totals;
+
+pub use analyse::{analyse, refusal};
+pub use analysis::{
+    Analysis, AtomicOrientation, Checks, Combined, Consistency, Drift, DriftFit, JointTerms,
+    LineAnalysis, Motion, Residual, ScanAnalysis, Scatter, SetAnalysis, SetMean,
+};
+pub use atomic::{AtomicError, atomic_orientation};
+pub use calibrate::{CalibrateError, Calibrated, CalibratedSet, calibrate};
+pub use group::natural_order;
+pub use identity::about_repeat;
+pub use illustrate::{amplitude_of, illustrate, picture};

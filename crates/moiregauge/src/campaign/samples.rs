@@ -1,0 +1,267 @@
+//! Do the scans of a set show one lattice? Only those that do share a drift and a mean.
+//!
+//! Drift changes a reciprocal lattice along the time gradient alone, `K = G − u (D·G)`, and u is the slow axis but for
+//! parts in a thousand: what a wave vector has along the fast axis is the same in all scans of a sample, up or down,
+//! whatever the drift does. Two numbers of each scan are compared there; along the slow axis lattices may differ by what
+//! a plausible drift makes of them. How the vectors are named does not matter.
+
+use heterostrain::lattice::{LatticeVectors, real_from_reciprocal};
+use nalgebra::{Matrix2, Vector2};
+
+use crate::campaign::group::{Group, folder};
+use crate::caveat::Caveat;
+use crate::scan::measured::MeasuredScan;
+use crate::settings::knobs::Settings;
+
+/// Lattices whose waves differ by more than this share along the fast axis are of different samples, or places: scanners
+/// repeat themselves better. Methods that read peaks off pixels have twice the room and more.
+const APART: f64 = 0.01;
+const APART_ROUGHLY: f64 = 0.03;
+/// Differences below this many σ are noise, however large.
+const SIGMAS: f64 = 5.0;
+/// Drift of the sample over the slow speed of the tip that has to be reckoned with.
+const DRIFT: f64 = 0.25;
+
+/// How one scan shows its lattice.
+struct View {
+    waves: LatticeVectors,
+    /// Unit vector of the fast axis.
+    fast: Vector2<f64>,
+    /// Lines follow each other along this one; unknown directions make zero.
+    slow: Vector2<f64>,
+}
+
+impl View {
+    fn of(scan: &MeasuredScan) -> Option<Self> {
+        let line = scan.lines.first()?;
+        let steps = line.geometry.pixel_to_nm;
+        let gradient = line.timing.and_then(|t| line.geometry.time_gradient(&t));
+        Some(Self {
+            waves: real_from_reciprocal(&line.in_sensor_coordinates())?,
+            fast: steps.column(0).normalize(),
+            slow: gradient.map_or_else(Vector2::zeros, |u| u.normalize()),
+        })
+    }
+
+    /// By how much the waves of another scan differ along the fast axis, as a share of them, where that is more than
+    /// noise and the names are those with which they differ least; 0 for the same lattice under another drift.
+    fn apart(&self, other: &Self, limit: f64) -> f64 {
+        let [a, b] = [0, 1].map(|i| self.waves.vector(i).norm());
+        let size = f64::midpoint(a, b);
+        let across = Vector2::new(-self.fast.y, self.fast.x);
+        // Fast axes that differ see different parts of the drift.
+        let turned = self.fast.perp(&other.fast).abs();
+        let change = if self.slow.dot(&other.slow) > 0.0 {
+            DRIFT
+        } else {
+            2.0 * DRIFT
+        };
+        let mut least = f64::INFINITY;
+        for names in renamings() {
+            let named = other.waves.relabelled(&names);
+            let miss = named.basis - self.waves.basis;
+            let covariance = named.covariance + self.waves.covariance;
+            let mut worst = 0.0_f64;
+            for (i, wave) in miss.column_iter().enumerate() {
+                let spread = covariance.fixed_view::<2, 2>(2 * i, 2 * i);
+                let noise = (self.fast.transpose() * spread * self.fast)[0]
+                    .max(0.0)
+                    .sqrt();
+                let room = (limit + turned * change) * size;
+                let along = wave.dot(&self.fast).abs();
+                if along > room.max(SIGMAS * noise) {
+                    worst = worst.max(along / size);
+                }
+                if wave.dot(&across).abs() > change * size {
+                    worst = f64::INFINITY;
+                }
+            }
+            least = least.min(worst);
+        }
+        least
+    }
+}
+
+/// Other names of the same lattice with the same sense.
+fn renamings() -> impl Iterator<Item = Matrix2<f64>> {
+    (0..81_i32).filter_map(|code| {
+        let entry = |power: u32| f64::from(code / 3_i32.pow(power) % 3 - 1);
+        let change = Matrix2::new(entry(0), entry(1), entry(2), entry(3));
+        (change.determinant() == 1.0).then_some(change)
+    })
+}
+
+/// Scans that show one lattice, by their numbers; each part in order. Those that are not used are in none.
+struct Parts {
+    parts: Vec<Vec<usize>>,
+    /// The least difference between two parts, as a share.
+    apart: f64,
+}
+
+fn parts(scans: &[MeasuredScan], settings: &Settings) -> Parts {
+    let limit = if settings.method.is_joint() {
+        APART
+    } else {
+        APART_ROUGHLY
+    };
+    let views: Vec<(usize, View)> = scans
+        .iter()
+        .enumerate()
+        .filter(|(_, scan)| scan.excluded.is_none())
+        .filter_map(|(i, scan)| Some((i, View::of(scan)?)))
+        .collect();
+    let mut parts: Vec<Vec<usize>> = Vec::new();
+    for new in 0..views.len() {
+        let like = |part: &Vec<usize>| {
+            let mut known = part.iter();
+            known.any(|&k| views[k].1.apart(&views[new].1, limit) == 0.0)
+        };
+        let (alike, mut others): (Vec<_>, Vec<_>) = parts.into_iter().partition(like);
+        let mut joined: Vec<usize> = alike.into_iter().flatten().collect();
+        joined.push(new);
+        others.push(joined);
+        parts = others;
+    }
+    let mut apart = f64::INFINITY;
+    for (i, first) in parts.iter().enumerate() {
+        for second in &parts[i + 1..] {
+            apart = apart.min(views[first[0]].1.apart(&views[second[0]].1, limit));
+        }
+    }
+    for part in &mut parts {
+        for scan in part.iter_mut() {
+            *scan = views[*scan].0;
+        }
+        part.sort_unstable();
+    }
+    parts.sort_unstable();
+    Parts { parts, apart }
+}
+
+/// Makes sets of their own of scans that show different lattices, and says so. Also whether there are such.
+pub(crate) fn separated(
+    groups: Vec<Group>,
+    settings: &Settings,
+    caveats: &mut Vec<Caveat>,
+) -> (Vec<Group>, bool) {
+    let mut all: Vec<Group> = Vec::new();
+    let mut any = false;
+    for group in groups {
+        let Parts { parts, apart } = parts(&group.scans, settings);
+        if parts.len() < 2 {
+            all.push(group);
+            continue;
+        }
+        let names = names(&group, &parts);
+        let by_hand = group.scans.iter().any(|s| s.set.is_some());
+        caveats.push(about(&group, &names, apart, by_hand));
+        if by_hand {
+            all.push(group);
+            continue;
+        }
+        any = true;
+        all.extend(split(group, &parts, names));
+    }
+    for i in 1..all.len() {
+        let (before, rest) = all.split_at_mut(i);
+        let mut count = 1;
+        let name = rest[0].name.clone();
+        while before.iter().any(|g| g.name == rest[0].name) {
+            count += 1;
+            rest[0].name = format!("{name} ({count})");
+        }
+    }
+    (all, any)
+}
+
+fn about(group: &Group, names: &[String], apart: f64, by_hand: bool) -> Caveat {
+    let difference = if apart.is_finite() {
+        format!("by {:.1} % or more along the fast axis", 100.0 * apart)
+    } else {
+        "by more than any plausible drift along the slow axis".to_owned()
+    };
+    let then = if by_hand {
+        "they were put into one set by hand, and their mean is that of neither"
+    } else {
+        "each of them is a set of its own, and nothing is averaged over them"
+    };
+    Caveat::new(
+        if by_hand {
+            "samples-mixed"
+        } else {
+            "samples-separated"
+        },
+        &group.name,
+        format!(
+            "the scans show {} different lattices ({}), which differ {difference}; drift does not change a lattice \
+             there. They are of different samples or places, or something else was taken for the lattice in some: {then}",
+            names.len(),
+            names.join("; ")
+        ),
+    )
+}
+
+/// What tells the parts apart, for people: their folders, or the periods of their lattices.
+fn names(group: &Group, parts: &[Vec<usize>]) -> Vec<String> {
+    let folders: Vec<Vec<Vec<&str>>> = parts
+        .iter()
+        .map(|part| {
+            let all = part.iter().map(|&i| folder(&group.scans[i].file));
+            let mut all: Vec<Vec<&str>> = all.map(|f| f.split(['/', '\\']).collect()).collect();
+            all.sort();
+            all.dedup();
+            all
+        })
+        .collect();
+    let shared = |a: &Vec<Vec<&str>>, b: &Vec<Vec<&str>>| a.iter().any(|f| b.contains(f));
+    let mut pairs = (0..parts.len()).flat_map(|i| (0..i).map(move |k| (i, k)));
+    if pairs.any(|(i, k)| shared(&folders[i], &folders[k])) {
+        let period = |part: &Vec<usize>| {
+            let line = group.scans[part[0]].lines.first()?;
+            let lattice = line.in_sensor_coordinates();
+            let mean = (0..3).map(|i| lattice.wavelength(i).value).sum::<f64>() / 3.0;
+            Some(format!("{mean:.2} nm"))
+        };
+        return parts
+            .iter()
+            .map(|p| period(p).unwrap_or_default())
+            .collect();
+    }
+    let all: Vec<&Vec<&str>> = folders.iter().flatten().collect();
+    let common =
+        (0..).take_while(|&i| all.iter().all(|f| i < f.len() && f.get(i) == all[0].get(i)));
+    let common = common.count();
+    let rest = |f: &Vec<&str>| match f[common..].join("/") {
+        rest if rest.is_empty() => f.last().copied().unwrap_or_default().to_owned(),
+        rest => rest,
+    };
+    let name = |of: &Vec<Vec<&str>>| of.iter().map(rest).collect::<Vec<_>>().join(" + ");
+    folders.iter().map(name).collect()
+}
+
+/// One group for each part; scans that are not used go with the one that they repeat, or with the first.
+fn split(group: Group, parts: &[Vec<usize>], names: Vec<String>) -> Vec<Group> {
+    let of = |i: usize| parts.iter().position(|part| part.contains(&i));
+    let files: Vec<String> = group.scans.iter().map(|s| s.file.clone()).collect();
+    let places: Vec<usize> = (0..group.scans.len())
+        .map(|i| {
+            let repeated = group.scans[i].repeats.as_ref();
+            let original = repeated.and_then(|of| files.iter().position(|f| f == of));
+            of(i).or_else(|| of(original?)).unwrap_or(0)
+        })
+        .collect();
+    let mut all: Vec<Group> = names
+        .into_iter()
+        .map(|name| Group {
+            name: format!("{}, {name}", group.name),
+            slow_axis: group.slow_axis,
+            line_rate_hz: group.line_rate_hz,
+            channel: group.channel.clone(),
+            scans: Vec::new(),
+        })
+        .collect();
+    for (scan, place) in group.scans.into_iter().zip(places) {
+        all[place].scans.push(scan);
+    }
+    all
+}

@@ -1,0 +1,194 @@
+//! Do the headers agree with the images?
+//!
+//! Within a frame a drift D changes wave vectors by `−u (D·G)`, from frame to frame it moves the phases by `−G·D Δt`. A
+//! slow direction that is the other way round, or a line rate that is off by a factor, changes u and with it the D that
+//! the wave vectors tell; the phases, timed by dates, tell the true one. The joint fit is tried with such headers: where
+//! the scans fit together far better, a header says something else than the images. Dates tell of line rates, too.
+
+use heterostrain::lattice::{LatticeVectors, labelled_like, real_from_reciprocal, reciprocal};
+use nalgebra::{Matrix2, Vector2};
+use spmfile::FrameDirection;
+
+use crate::campaign::sightings::{seconds, sightings};
+use crate::caveat::Caveat;
+use crate::drift::joint::sighting::Sighting;
+use crate::drift::joint::solve::{JointFit, fit};
+use crate::scan::measured::MeasuredScan;
+use crate::settings::knobs::Settings;
+
+/// Positions of scans that fit together scatter by less than this, nm.
+const SCATTER: f64 = 0.3;
+/// The information criterion has to fall by this much, with the scatter of the scans as unit: odds of e²⁵.
+const FAR_BETTER: f64 = 50.0;
+/// Below this scatter (nm) a fit needs no other explanation.
+const CLEAN: f64 = 0.01;
+/// Dates are whole seconds, and files are written some time after the frame, s.
+const CLOCK: f64 = 2.0;
+/// Pauses of one frame are as long as that to this share.
+const SHARE: f64 = 0.05;
+
+/// Other headers that are tried: by what they multiply the time gradient, and in words.
+const OTHERS: [(f64, &str); 5] = [
+    (-1.0, "with all slow directions the other way (up is down)"),
+    (2.0, "with half the line rate"),
+    (0.5, "with twice the line rate"),
+    (
+        -2.0,
+        "with half the line rate and all slow directions the other way",
+    ),
+    (
+        -0.5,
+        "with twice the line rate and all slow directions the other way",
+    ),
+];
+
+/// What has to be said of the headers of a set, by its joint fit `found`, which started from `lattice` and `velocity`.
+pub(crate) fn about_headers(
+    name: &str,
+    scans: &[&MeasuredScan],
+    reference: &Matrix2<f64>,
+    lattice: &LatticeVectors,
+    velocity: &Vector2<f64>,
+    found: &JointFit,
+    settings: &Settings,
+) -> Option<Caveat> {
+    let seen = sightings(scans, reference)?;
+    if !linkable(found) || is_clean(found) {
+        return None;
+    }
+    let waves = labelled_like(&real_from_reciprocal(lattice)?, &reciprocal(reference)?);
+    let mut tried: Vec<(&str, Option<JointFit>)> = Vec::new();
+    for (factor, words) in OTHERS {
+        let mut other = seen.clone();
+        for sighting in &mut other {
+            sighting.time_gradient *= factor;
+        }
+        let from = (&waves.basis, &(velocity / factor));
+        tried.push((words, fit(&other, from, settings.frame_time_sigma_s)));
+    }
+    let best = tried
+        .iter()
+        .filter_map(|(words, other)| Some((*words, other.as_ref()?)))
+        .filter(|(_, other)| is_better(other, found))
+        .min_by(|a, b| a.1.criterion().total_cmp(&b.1.criterion()));
+    let troubled = !found.terms.phases || found.instability_nm > SCATTER;
+    if best.is_none() && !troubled {
+        return None;
+    }
+    let evidence: Vec<String> = tried
+        .iter()
+        .map(|(words, other)| format!("{words}: {}", in_words(other.as_ref())))
+        .collect();
+    let evidence = format!(
+        "as the headers say: {}; {}",
+        in_words(Some(found)),
+        evidence.join("; ")
+    );
+    let (code, words) = match best {
+        Some((words, _)) => (
+            "headers-contradict-images",
+            format!(
+                "the scans of this set do not fit together as their headers say, but {words} they do, so that an entry \
+                 of the headers is most likely wrong, and the drift with it ({evidence}). Twist and strain do not depend \
+                 on it as long as the drift does not change"
+            ),
+        ),
+        None => (
+            "frames-do-not-link",
+            format!(
+                "the positions of the lattice from frame to frame contradict the drift within the frames: the drift changes, \
+                 the window moves in a way that the sensors do not see, or headers are wrong: slow direction, line rate or \
+                 date ({evidence}). Do not trust the drift and its error"
+            ),
+        ),
+    };
+    Some(Caveat::new(code, name, words))
+}
+
+/// Whether phases could link frames at all: there are some in two scans of a block.
+fn linkable(found: &JointFit) -> bool {
+    let all = || found.sightings().iter().filter(|s| s.phases.is_some());
+    let mut pairs = all().flat_map(|a| all().map(move |b| (a, b)));
+    pairs.any(|(a, b): (&Sighting, &Sighting)| a.block == b.block && a.scan != b.scan)
+}
+
+fn reduced(found: &JointFit) -> f64 {
+    found.chi2 / found.degrees_of_freedom.max(1) as f64
+}
+
+fn is_clean(found: &JointFit) -> bool {
+    found.terms.phases && found.instability_nm < CLEAN && reduced(found) < 1.5
+}
+
+/// Whether the scans fit together with other headers, and far better than `found`.
+fn is_better(other: &JointFit, found: &JointFit) -> bool {
+    if !other.terms.phases || other.instability_nm > SCATTER {
+        return false;
+    }
+    // Without phases a fit has fewer residuals, which compares with nothing: that the others link is enough.
+    !found.terms.phases
+        || found.criterion() - other.criterion() > FAR_BETTER * reduced(other).max(1.0)
+}
+
+fn in_words(found: Option<&JointFit>) -> String {
+    match found {
+        Some(found) if found.terms.phases => format!(
+            "positions scatter by {:.0} pm, χ²/dof {:.1}, drift ({:.3}, {:.3}) nm/min",
+            1000.0 * found.instability_nm,
+            reduced(found),
+            60.0 * found.velocity.x,
+            60.0 * found.velocity.y
+        ),
+        _ => "phases cannot be linked".to_owned(),
+    }
+}
+
+/// What the dates of consecutive frames say of their line rate.
+pub(crate) fn about_dates(name: &str, scans: &[&MeasuredScan]) -> Option<Caveat> {
+    let pairs: Vec<(f64, f64, bool)> = scans
+        .windows(2)
+        .filter_map(|pair| {
+            let [a, b] = pair else { return None };
+            let interval = seconds(b.acquired?) - seconds(a.acquired?);
+            let turned = matches!(
+                (a.frame_direction, b.frame_direction),
+                (Some(FrameDirection::Up), Some(FrameDirection::Down))
+                    | (Some(FrameDirection::Down), Some(FrameDirection::Up))
+            );
+            Some((interval, duration(a)?.min(duration(b)?), turned))
+        })
+        .collect();
+    let (interval, frame, _) = *pairs.iter().min_by(|a, b| a.0.total_cmp(&b.0))?;
+    let rate = scans.first()?.line_rate_hz?;
+    if interval < (1.0 - SHARE) * frame - CLOCK {
+        return Some(Caveat::new(
+            "dates-contradict-line-rate",
+            name,
+            format!(
+                "two frames are dated {interval:.0} s apart, but the lines of one take {frame:.0} s at {rate} lines per \
+                 second: the line rate is higher than the headers say, or the dates are not those of the frames. The \
+                 drift is wrong by the same factor as the line rate"
+            ),
+        ));
+    }
+    let doubled = |&(interval, frame, turned): &(f64, f64, bool)| {
+        turned && (interval - 2.0 * frame).abs() < 2.0 * SHARE * frame + CLOCK
+    };
+    (pairs.len() > 1 && frame > 4.0 * CLOCK && pairs.iter().all(doubled)).then(|| {
+        Caveat::new(
+            "dates-contradict-line-rate",
+            name,
+            format!(
+                "the frames are dated {interval:.0} s apart, twice the {frame:.0} s that the lines of one take at {rate} \
+                 lines per second: either there was a pause as long as a frame before each of them, or the line rate is \
+                 half of what the headers say, and so is the drift"
+            ),
+        )
+    })
+}
+
+/// How long the lines of a frame take that were surely recorded, s.
+fn duration(scan: &MeasuredScan) -> Option<f64> {
+    let line = scan.lines.first()?;
+    Some((line.geometry.size[1] + line.lines_after) as f64 / scan.line_rate_hz?)
+}

@@ -1,0 +1,10 @@
+//! One set of scans of one sample, size and rate: drift, mean lattice, every scan before and after correction.
+
+pub(crate) mod about;
+pub(crate) mod analyse;
+pub(crate) mod headers;
+pub(crate) mod joint;
+pub(crate) mod moire;
+pub(crate) mod published;
+pub(crate) mod scan;
+pub(crate) mod solved;

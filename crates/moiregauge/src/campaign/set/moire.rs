@@ -1,0 +1,200 @@
+//! Is the lattice a moiré of the layers at all?
+//!
+//! Two hexagonal layers look the same turned by 60°, so no twist is beyond 30° and no moiré of equal layers
+//! is shorter than 1.9 of their lattice constants. A shorter lattice is that of the atoms or of something
+//! else, and however well it is measured, it has no twist. Two hexagonal layers of different constants make no moiré
+//! longer than `a₁a₂/|a₁ − a₂|`, that of aligned ones; a longer one is of other layers.
+
+use std::f64::consts::FRAC_PI_6;
+
+use heterostrain::lattice::LatticeVectors;
+use heterostrain::material::{Bilayer, Material};
+use heterostrain::strain::{TwistStrain, twist_strain};
+use nalgebra::Matrix4;
+
+use crate::calibration::KnownLattice;
+use crate::campaign::analysis::{ScanAnalysis, SetMean};
+use crate::caveat::Caveat;
+use crate::drift::shares::Statistical;
+use crate::settings::knobs::Settings;
+
+/// Heterostrains of layers on each other stay below a few tenths of a per cent, rarely a per cent; more
+/// than this deserves a word.
+const LARGE_STRAIN: f64 = 0.02;
+/// A period this near to that of a known surface may be that of the surface.
+const SURFACE: f64 = 0.04;
+/// Shorter periods (nm) are of atoms or surfaces more often than of twisted layers, nm.
+const SHORT: f64 = 1.5;
+
+/// Twist and strain of a lattice that can be a moiré; `None` where it cannot.
+pub(crate) fn moire(lattice: &LatticeVectors, settings: &Settings) -> Option<TwistStrain> {
+    twist_strain(lattice, settings.bilayer(), settings.strain_convention)
+        .ok()
+        .filter(|found| is_below_30_degrees(found, settings))
+}
+
+/// Layers that are not hexagonal can be turned by more.
+fn is_below_30_degrees(found: &TwistStrain, settings: &Settings) -> bool {
+    let layers = settings.bilayer();
+    let hexagonal = layers.reference.is_hexagonal() && layers.stretched.is_hexagonal();
+    found.twist.abs() <= FRAC_PI_6 || !hexagonal
+}
+
+/// A common lattice with its χ² and degrees of freedom, and where its covariance comes from.
+type Common = (LatticeVectors, f64, usize);
+
+/// The same with variances enlarged by `scale`.
+pub(crate) fn enlarged(
+    (mut lattice, chi2, freedom): Common,
+    statistical: &Statistical,
+    scale: f64,
+) -> (Common, Statistical) {
+    let by = |m: Matrix4<f64>| m * scale;
+    lattice.covariance *= scale;
+    let statistical = Statistical {
+        image: by(statistical.image),
+        drift: by(statistical.drift),
+        sensor: by(statistical.sensor),
+    };
+    ((lattice, chi2, freedom), statistical)
+}
+
+/// Says where a lattice is no moiré, or hardly one.
+pub(crate) fn doubts(
+    name: &str,
+    mean: Option<&SetMean>,
+    scans: &[ScanAnalysis],
+    settings: &Settings,
+    caveats: &mut Vec<Caveat>,
+) {
+    let layers = &settings.material;
+    let assumed = if settings.layers_are_assumed() {
+        ", assumed since no layers were named"
+    } else {
+        ""
+    };
+    let about_layers = format!(
+        "{} ({} nm{assumed})",
+        layers.name, layers.lattice_constant_nm
+    );
+    if let Some(mean) = mean {
+        caveats.extend(about_period(name, &mean.lattice, settings));
+        let [least, _] = mean.twist_strain.strain_interval_95();
+        if least > LARGE_STRAIN {
+            caveats.push(Caveat::new(
+                "large-strain",
+                name,
+                format!(
+                    "a heterostrain of {:.1} % is more than layers on each other are known to have: an image \
+                     that drift or the scanner distorts, other layers than {about_layers}, or a lattice that \
+                     is no moiré would give the same numbers",
+                    100.0 * mean.twist_strain.heterostrain().value
+                ),
+            ));
+        }
+        return;
+    }
+    let used = scans.iter().find(|scan| scan.excluded.is_none());
+    let Some(lattice) = used.map(|scan| scan.drift_corrected.unwrap_or(scan.sensor)) else {
+        return;
+    };
+    let found = twist_strain(&lattice, settings.bilayer(), settings.strain_convention);
+    let found = match found {
+        Ok(found) => found,
+        Err(why) => {
+            caveats.push(no_reading(name, &lattice, settings, &why.to_string()));
+            return;
+        }
+    };
+    if !is_below_30_degrees(&found, settings) {
+        let [a, b, c] = [0, 1, 2].map(|i| lattice.wavelength(i).value);
+        caveats.push(Caveat::new(
+            "no-moire",
+            name,
+            format!(
+                "periods of {a:.4}, {b:.4} and {c:.4} nm are no moiré of {about_layers}: its twist would be {:.0}°, \
+                 and layers of this symmetry have none beyond 30°. This is the lattice of the atoms, or \
+                 another one; its vectors are given, twist and strain are not",
+                found.twist.abs().to_degrees()
+            ),
+        ));
+    }
+}
+
+/// Mean of the three wavelengths, nm.
+fn period(lattice: &LatticeVectors) -> f64 {
+    (0..3).map(|i| lattice.wavelength(i).value).sum::<f64>() / 3.0
+}
+
+/// The period of the longest moiré that hexagonal layers make without strain, nm; `None` where there is no longest.
+fn longest(layers: Bilayer<'_>) -> Option<f64> {
+    let [a, b] =
+        [layers.reference, layers.stretched].map(|layer: &Material| layer.lattice_constant_nm);
+    let hexagonal = layers.reference.is_hexagonal() && layers.stretched.is_hexagonal();
+    (hexagonal && !layers.is_equal()).then(|| a * b / (a - b).abs())
+}
+
+/// Why these layers make no such lattice.
+fn no_reading(name: &str, lattice: &LatticeVectors, settings: &Settings, why: &str) -> Caveat {
+    let (measured, layers) = (period(lattice), settings.bilayer());
+    let words = match longest(layers).filter(|longest| measured > *longest) {
+        Some(longest) => {
+            // |1 − a/b| less what the moiré shows of it.
+            let a = layers
+                .reference
+                .lattice_constant_nm
+                .max(layers.stretched.lattice_constant_nm);
+            format!(
+                "the period is {measured:.1} nm; {} makes at most {longest:.1} nm. Only layers strained by at least \
+                 {:.1} % in all directions could make it: it is a moiré of other layers, or none. Its vectors are given, \
+                 twist and strain are not",
+                layers.name(),
+                100.0 * (a / longest - a / measured)
+            )
+        }
+        None => format!(
+            "no twist and strain of {} explain a lattice with a period of {measured:.1} nm: {why}. Its vectors are given, \
+             twist and strain are not",
+            layers.name()
+        ),
+    };
+    Caveat::new(IMPOSSIBLE, name, words)
+}
+
+/// The code of the caveat that says that the layers cannot make the lattice.
+pub(crate) const IMPOSSIBLE: &str = "layers-cannot-make-it";
+
+/// Asks whether a lattice is a moiré at all that has the period of a surface, or a very short one.
+fn about_period(name: &str, lattice: &LatticeVectors, settings: &Settings) -> Option<Caveat> {
+    let (measured, assumed) = (period(lattice), settings.layers_are_assumed());
+    if !assumed && measured > SHORT {
+        return None;
+    }
+    let surfaces = KnownLattice::all().into_iter().map(|k| (k.name, k.a_nm));
+    let atoms = Material::all()
+        .into_iter()
+        .map(|m| (m.name, m.lattice_constant_nm));
+    let off = |a: f64| (measured / a - 1.0).abs();
+    let known = surfaces
+        .chain(atoms)
+        .filter(|(_, a)| off(*a) < SURFACE)
+        .min_by(|a, b| off(a.1).total_cmp(&off(b.1)));
+    let layers = settings.bilayer().name();
+    let of = if assumed {
+        format!("{layers}, which nobody named and which was assumed")
+    } else {
+        layers
+    };
+    let words = match known {
+        Some((surface, a)) => format!(
+            "the period, {measured:.3} nm, is that of {surface} ({a} nm): if the images show that, there is no twist; the \
+             numbers take it for a moiré of {of}"
+        ),
+        None if measured < SHORT => format!(
+            "a period of {measured:.3} nm is short for a moiré: if the images show atoms or a surface, there is no twist; \
+             the numbers take it for a moiré of {of}"
+        ),
+        None => return None,
+    };
+    Some(Caveat::new("moire-doubtful", name, words))
+}

@@ -1,0 +1,106 @@
+//! One scan of a set, before and after its drift is taken off.
+
+use heterostrain::Estimate;
+use heterostrain::lattice::{LatticeVectors, labelled_like};
+use nalgebra::{Matrix2, Matrix4, Vector2};
+
+use crate::campaign::analysis::{LineAnalysis, ScanAnalysis};
+use crate::campaign::set::moire::moire;
+use crate::drift::linear::{Observation, common_lattice};
+use crate::scan::measured::{MeasuredLine, MeasuredScan};
+use crate::settings::knobs::Settings;
+
+/// Without its motion, which the fit of its set tells.
+pub(crate) fn scan_analysis(
+    scan: &MeasuredScan,
+    seen: &[Observation],
+    reference: &Matrix2<f64>,
+    drift: Option<(Vector2<f64>, Matrix2<f64>)>,
+    settings: &Settings,
+) -> Option<ScanAnalysis> {
+    let (sensor, _, _) = common_lattice(seen, &Vector2::zeros(), &Matrix2::zeros()).ok()?;
+    let drift_corrected = drift
+        .and_then(|(velocity, covariance)| common_lattice(seen, &velocity, &covariance).ok())
+        .map(|(lattice, _, _)| lattice);
+    let nominal: Option<Vec<LatticeVectors>> = scan
+        .lines
+        .iter()
+        .map(|l| Some(labelled_like(&l.in_nominal_coordinates()?, reference)))
+        .collect();
+    let strain = |lattice: &LatticeVectors| moire(lattice, settings);
+    let first = scan.lines.first()?;
+    let mean = |f: &dyn Fn(&MeasuredLine) -> Estimate| {
+        let all: Vec<Estimate> = scan.lines.iter().map(f).collect();
+        let n = all.len() as f64;
+        Estimate::new(
+            all.iter().map(|e| e.value).sum::<f64>() / n,
+            (all.iter().map(|e| e.sigma.powi(2)).sum::<f64>() / n).sqrt(),
+        )
+    };
+    Some(ScanAnalysis {
+        file: scan.file.clone(),
+        acquired: scan.acquired,
+        frame_direction: scan.frame_direction,
+        lines: scan
+            .lines
+            .iter()
+            .zip(seen)
+            .map(|(line, seen)| line_analysis(line, seen, reference))
+            .collect(),
+        window_centre: first.geometry.centre(),
+        window_extent: first.geometry.extent(),
+        fast_velocity: mean(&|l| l.speeds[0]),
+        slow_velocity: mean(&|l| l.speeds[1]),
+        nominal: nominal.and_then(|all| plain_mean(&all)),
+        twist_strain_sensor: strain(&sensor),
+        twist_strain: drift_corrected.as_ref().and_then(strain),
+        sensor,
+        drift: drift.filter(|_| drift_corrected.is_some()).map(|d| d.0),
+        motion: None,
+        drift_corrected,
+        draws: Vec::new(),
+        residual: None,
+        excluded: scan.excluded.clone(),
+    })
+}
+
+fn line_analysis(
+    line: &MeasuredLine,
+    seen: &Observation,
+    reference: &Matrix2<f64>,
+) -> LineAnalysis {
+    let comparison = line
+        .lattice
+        .comparison
+        .map(|pixels| labelled_like(&pixels.mapped(&line.geometry.pixel_to_nm), reference));
+    LineAnalysis {
+        line: line.line,
+        pixels: labelled_pixels(line, seen),
+        sensor: seen.lattice,
+        comparison,
+        shortcut_wavelengths: line.lattice.shortcut_wavelengths,
+        pixel_to_nm: line.geometry.pixel_to_nm,
+        origin: line.geometry.origin,
+        from_sensors: line.geometry.from_sensors,
+        periods: line.lattice.periods,
+        signal_to_noise: line.lattice.signal_to_noise,
+    }
+}
+
+/// The vectors in pixels under the names that they have in sensor coordinates.
+fn labelled_pixels(line: &MeasuredLine, seen: &Observation) -> LatticeVectors {
+    let pixels = &line.lattice.pixels;
+    match line.geometry.pixel_to_nm.try_inverse() {
+        Some(inverse) => labelled_like(pixels, &(inverse * seen.lattice.basis)),
+        None => *pixels,
+    }
+}
+
+/// Unweighted mean of independent lattices.
+pub(crate) fn plain_mean(all: &[LatticeVectors]) -> Option<LatticeVectors> {
+    let n = all.len() as f64;
+    (n > 0.0).then(|| LatticeVectors {
+        basis: all.iter().map(|l| l.basis).sum::<Matrix2<f64>>() / n,
+        covariance: all.iter().map(|l| l.covariance).sum::<Matrix4<f64>>() / (n * n),
+    })
+}

@@ -1,0 +1,17 @@
+//! A set once its drift is known.
+
+use heterostrain::lattice::LatticeVectors;
+
+use crate::campaign::analysis::Drift;
+use crate::drift::shares::Statistical;
+
+/// The drift of a set and the lattice that goes with it.
+pub(crate) struct Solved {
+    pub(crate) drift: Drift,
+    pub(crate) lattice: LatticeVectors,
+    pub(crate) statistical: Statistical,
+    pub(crate) chi2: f64,
+    pub(crate) freedom: usize,
+    /// By which the variances were enlarged for the scatter of the scans.
+    pub(crate) enlargement: f64,
+}

@@ -1,0 +1,107 @@
+//! Where the covariance of the jointly fitted lattice comes from.
+//!
+//! Held at a known motion of the sample (drift, its change, the times of the frames) the lattice would
+//! have the covariance `P = (XᵀX)⁻¹` of the remaining columns of the whitened design X, which is the
+//! Schur complement of the whole; what is left of the whole is due to the motion. The whitened noise of
+//! every row has the variance 1, of which the sensors have a share: their part of the covariance of a
+//! wave vector, the instability of positions in a phase. With that share S, `P XᵀSX P` is the part of
+//! the sensors.
+
+use nalgebra::{DMatrix, DVector, Matrix4};
+
+use crate::drift::joint::evaluate::{factor, linearise};
+use crate::drift::joint::solve::JointFit;
+use crate::drift::shares::Statistical;
+
+impl JointFit {
+    /// The covariance of `waves`, (rad/nm)², as a sum of image noise, drift and sensor noise.
+    pub fn statistical(&self) -> Option<Statistical> {
+        let rows = linearise(
+            &self.sightings,
+            &self.layout,
+            &self.solution,
+            f64::INFINITY,
+            self.instability_nm,
+        );
+        let kept = self.not_motion();
+        let n = kept.len();
+        let design: Vec<DVector<f64>> = rows
+            .jacobian
+            .iter()
+            .map(|row| DVector::from_fn(n, |i, _| row[kept[i]]))
+            .collect();
+        let mut normal = DMatrix::<f64>::zeros(n, n);
+        for row in &design {
+            normal.ger(1.0, row, row, 1.0);
+        }
+        let inverse = inverse(&normal)?;
+
+        let mut shares = DMatrix::<f64>::zeros(n, n);
+        let mut at = 0;
+        for sighting in &self.sightings {
+            let Some(lower) = factor(sighting) else {
+                continue;
+            };
+            let own = DMatrix::from_fn(4, n, |i, j| design[at + i][j]);
+            // L⁻¹ S L⁻ᵀ; S is symmetric.
+            let half = lower.solve_lower_triangular(&sighting.sensor)?;
+            let share = lower.solve_lower_triangular(&half.transpose())?;
+            shares += own.transpose() * DMatrix::from_fn(4, 4, |i, j| share[(i, j)]) * own;
+            at += 4;
+            if rows.phases.iter().any(|p| p.row == at) {
+                at += 3;
+            }
+        }
+        let scatter = self.instability_nm * self.instability_nm;
+        for phases in &rows.phases {
+            let Some(lower) = phases.factor(scatter) else {
+                continue;
+            };
+            let half = lower.solve_lower_triangular(&phases.waves)?;
+            let own = DMatrix::from_fn(3, n, |i, j| design[phases.row + i][j]);
+            let seen = own.transpose() * half;
+            shares += scatter * &seen * seen.transpose();
+        }
+
+        // Enlarged like the covariance of the fit.
+        let scale = self.waves.covariance[(0, 0)] / self.unscaled[(0, 0)];
+        let lattice =
+            |m: &DMatrix<f64>| -> Matrix4<f64> { m.fixed_view::<4, 4>(0, 0).into_owned() };
+        let sensor = lattice(&(&inverse * shares * &inverse));
+        let image = lattice(&inverse) - sensor;
+        Some(Statistical::at_known_drift(
+            [image, sensor],
+            scale,
+            &self.waves.covariance,
+        ))
+    }
+
+    /// The parameters, lattice first, that do not say where the sample was when.
+    fn not_motion(&self) -> Vec<usize> {
+        let motion: Vec<usize> = self
+            .layout
+            .drift_weights(self.layout.origin)
+            .iter()
+            .flat_map(|&(i, _, _)| [i, i + 1])
+            .collect();
+        (0..self.layout.times_at().unwrap_or(self.layout.size))
+            .filter(|i| !motion.contains(i))
+            .collect()
+    }
+}
+
+/// The inverse of a normal matrix whose columns differ in unit; columns that nothing sees are held.
+fn inverse(normal: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let n = normal.nrows();
+    let scale = normal
+        .diagonal()
+        .map(|d| if d > 0.0 { 1.0 / d.sqrt() } else { 1.0 });
+    let scaled = DMatrix::from_fn(n, n, |i, j| {
+        let unseen = i == j && normal[(i, i)] == 0.0;
+        normal[(i, j)] * scale[i] * scale[j] + if unseen { 1.0 } else { 0.0 }
+    });
+    let inverse = scaled.cholesky()?.inverse();
+    Some(DMatrix::from_fn(n, n, |i, j| {
+        inverse[(i, j)] * scale[i] * scale[j]
+    }))
+}

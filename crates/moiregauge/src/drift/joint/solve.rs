@@ -1,0 +1,410 @@
+//! Gauss–Newton over all parameters, phases linked outwards from the middle of the campaign, and the
+//! choice of terms.
+
+use heterostrain::Estimate;
+use heterostrain::lattice::LatticeVectors;
+use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
+
+use crate::drift::joint::choose;
+use crate::drift::joint::evaluate::{DRIFT, Layout, linearise, wrapped};
+use crate::drift::joint::link::number_blocks;
+use crate::drift::joint::path::DriftPath;
+use crate::drift::joint::sighting::{Sighting, Terms};
+use crate::numbers::chi2::enlargement;
+use crate::spectrum::phases::Phases;
+
+/// Gauss–Newton steps; the problem is nearly linear.
+const STEPS: usize = 12;
+/// Rounds of estimating the instability and solving with it.
+const ROUNDS: usize = 5;
+/// Relative damping of the normal equations.
+const DAMPING: f64 = 1e-10;
+/// Phases are believed to be linked if they scatter by less than this share of a wavelength.
+const LINKED: f64 = 0.08;
+/// A drift velocity worse than this (condition number of the scaled normal matrix, squared design) is
+/// not determined.
+const WORST_CONDITION: f64 = 1e4;
+
+/// The result of the fit over all scans.
+#[derive(Clone, Debug)]
+pub struct JointFit {
+    /// Reciprocal pair free of drift, rad/nm.
+    pub waves: LatticeVectors,
+    /// Drift velocity in the middle of the campaign, nm/s, and its covariance.
+    pub velocity: Vector2<f64>,
+    /// Covariance of `velocity`, (nm/s)².
+    pub velocity_covariance: Matrix2<f64>,
+    /// Acceleration, nm/s², where it earned its place.
+    pub acceleration: Option<Vector2<f64>>,
+    /// Relative gain error of the fast axis with its uncertainty, where it earned its place.
+    pub fast_gain: Option<Estimate>,
+    /// The terms that the fit has.
+    pub terms: Terms,
+    /// Standard deviation of positions about the fit beyond the phase noise, nm.
+    pub instability_nm: f64,
+    /// Weighted sum of squared residuals and its degrees of freedom.
+    pub chi2: f64,
+    /// Degrees of freedom of `chi2`.
+    pub degrees_of_freedom: usize,
+    /// What the instability adds to the logarithm of the determinant of the covariance of what was measured.
+    pub(crate) widening: f64,
+    /// The terms that were tried beside a constant drift, and what the criterion said.
+    pub tested: Vec<TestedTerm>,
+    /// What was fitted, with the blocks of linked scans.
+    pub(crate) sightings: Vec<Sighting>,
+    pub(crate) layout: Layout,
+    pub(crate) solution: DVector<f64>,
+    /// Covariance of `solution`, as the errors of the sightings make it.
+    pub(crate) unscaled: DMatrix<f64>,
+    /// The same, enlarged where the scans scatter more.
+    pub(crate) covariance: DMatrix<f64>,
+}
+
+/// A term that was tried.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TestedTerm {
+    /// What it is called.
+    pub name: &'static str,
+    /// By how much it lowers the Bayesian information criterion; it is used if this is positive (and,
+    /// of two that describe a changing drift, the larger).
+    pub gain: f64,
+    /// Whether the fit has it.
+    pub used: bool,
+}
+
+impl JointFit {
+    /// What was fitted, with the blocks of linked scans.
+    pub(crate) fn sightings(&self) -> &[Sighting] {
+        &self.sightings
+    }
+
+    /// Bayesian information criterion, up to a constant that fits of the same data with phases have in common.
+    pub(crate) fn criterion(&self) -> f64 {
+        choose::criterion(self)
+    }
+
+    /// Drift velocity at a time (same origin as the sightings), nm/s, with its covariance.
+    pub fn velocity_at(&self, time: f64) -> (Vector2<f64>, Matrix2<f64>) {
+        motion(&self.layout, &self.solution, &self.covariance, time)
+    }
+
+    /// The way of the sample (times of the same origin as the sightings).
+    pub fn path(&self) -> DriftPath {
+        self.layout.path(&self.solution)
+    }
+}
+
+/// Drift velocity at a time and its covariance.
+fn motion(
+    layout: &Layout,
+    x: &DVector<f64>,
+    covariance: &DMatrix<f64>,
+    time: f64,
+) -> (Vector2<f64>, Matrix2<f64>) {
+    let (_, velocity) = layout.motion(x, time);
+    let weights = layout.drift_weights(time);
+    let mut of_velocity = Matrix2::zeros();
+    for &(i, _, a) in &weights {
+        for &(j, _, b) in &weights {
+            of_velocity += a * b * covariance.fixed_view::<2, 2>(i, j);
+        }
+    }
+    (velocity, of_velocity)
+}
+
+/// Fits all sightings together and adds the terms that earn it by an information criterion.
+///
+/// `start` is the reciprocal pair (rad/nm) and the drift (nm/s) from the linear solution, `time_sigma`
+/// the standard uncertainty of a frame time, s. `None` where the sightings do not determine lattice
+/// and drift.
+pub fn fit(
+    sightings: &[Sighting],
+    start: (&Matrix2<f64>, &Vector2<f64>),
+    time_sigma: f64,
+) -> Option<JointFit> {
+    let (problem, mut best) = Problem::linked(sightings, start, time_sigma)?;
+    let plain = Terms::default();
+    let from = (&best.waves.basis.clone(), &best.velocity.clone());
+    if sightings.iter().any(|s| s.phases.is_some()) {
+        // Over a long campaign a drift that changes can be linked only as what it is.
+        let linked = [false, true].into_iter().find_map(|acceleration| {
+            let terms = Terms {
+                phases: true,
+                acceleration,
+                ..plain
+            };
+            let linked = problem.solve(terms, from, None);
+            linked.filter(|fit| !choose::loosens(fit, &best))
+        });
+        best = linked.unwrap_or(best);
+    }
+    Some(choose::terms(&problem, best))
+}
+
+/// The covariance that a fit with a constant drift has for sightings that are exactly what the model says:
+/// nothing is chosen, nothing scatters. Otherwise as [`fit`].
+pub(crate) fn foreseen(
+    sightings: &[Sighting],
+    start: (&Matrix2<f64>, &Vector2<f64>),
+    time_sigma: f64,
+) -> Option<JointFit> {
+    let (problem, plain) = Problem::linked(sightings, start, time_sigma)?;
+    let with_phases = Terms {
+        phases: sightings.iter().any(|s| s.phases.is_some()),
+        ..Terms::default()
+    };
+    Some(
+        problem
+            .solve(with_phases, start, Some(0.0))
+            .unwrap_or(plain),
+    )
+}
+
+/// What is fitted.
+pub(crate) struct Problem {
+    pub(crate) sightings: Vec<Sighting>,
+    time_sigma: f64,
+}
+
+impl Problem {
+    /// The problem with its scans in blocks whose phases can be linked, and the fit without phases that tells
+    /// the blocks.
+    fn linked(
+        sightings: &[Sighting],
+        start: (&Matrix2<f64>, &Vector2<f64>),
+        time_sigma: f64,
+    ) -> Option<(Self, JointFit)> {
+        let mut problem = Self {
+            sightings: sightings.to_vec(),
+            // Exact times would make the weights infinite; a millisecond is exact enough.
+            time_sigma: time_sigma.max(1e-3),
+        };
+        let plain = problem.solve(Terms::default(), start, None)?;
+        let speeds = plain.velocity_covariance.symmetric_eigenvalues();
+        let sigma = speeds.max().sqrt();
+        number_blocks(&mut problem.sightings, &plain.waves.basis, sigma);
+        Some((problem, plain))
+    }
+
+    /// Solves for one choice of terms. Without a given instability it is estimated from the phases.
+    pub(crate) fn solve(
+        &self,
+        terms: Terms,
+        start: (&Matrix2<f64>, &Vector2<f64>),
+        given: Option<f64>,
+    ) -> Option<JointFit> {
+        let sightings = &self.sightings;
+        let layout = Layout::new(sightings, terms, self.time_sigma);
+        let mut x = DVector::zeros(layout.size);
+        x.rows_mut(0, 4).copy_from_slice(start.0.as_slice());
+        x.rows_mut(DRIFT, 2).copy_from_slice(start.1.as_slice());
+        let mut instability = given.unwrap_or(0.0);
+        if terms.phases {
+            start_phases(sightings, &layout, &mut x)?;
+            link_outwards(sightings, &layout, &mut x, instability.max(0.02))?;
+        }
+        let mut unscaled = iterate(sightings, &layout, &mut x, f64::INFINITY, instability)?;
+        let mut scatter = instability * instability;
+        if terms.phases && given.is_none() {
+            for _ in 0..ROUNDS {
+                let now = linearise(sightings, &layout, &x, f64::INFINITY, instability);
+                instability = crate::drift::joint::instability::instability(
+                    &now,
+                    &unscaled,
+                    scatter,
+                    &|_| true,
+                );
+                scatter = instability * instability;
+                unscaled = iterate(sightings, &layout, &mut x, f64::INFINITY, instability)?;
+            }
+        }
+        let last = linearise(sightings, &layout, &x, f64::INFINITY, instability);
+        if terms.phases {
+            // In units of a whole turn, which is a wavelength.
+            let squares = last.phases.iter().map(|p| p.miss.norm_squared());
+            let rms = (squares.sum::<f64>() / (3 * last.phases.len()) as f64).sqrt();
+            if !(rms < LINKED * std::f64::consts::TAU) {
+                return None;
+            }
+        }
+        let chi2: f64 = last.residuals.iter().map(|r| r * r).sum();
+        let degrees_of_freedom = last.residuals.len().saturating_sub(layout.size);
+        let covariance = &unscaled * enlargement(chi2, degrees_of_freedom);
+        let (velocity, velocity_covariance) = motion(&layout, &x, &covariance, layout.origin);
+        Some(JointFit {
+            waves: LatticeVectors {
+                basis: Matrix2::new(x[0], x[2], x[1], x[3]),
+                covariance: covariance.fixed_view::<4, 4>(0, 0).into_owned(),
+            },
+            velocity,
+            velocity_covariance,
+            acceleration: layout
+                .acceleration_at()
+                .map(|i| Vector2::new(x[i], x[i + 1])),
+            fast_gain: layout
+                .gain_at()
+                .map(|i| Estimate::from_variance(x[i], covariance[(i, i)])),
+            terms,
+            instability_nm: instability,
+            chi2,
+            degrees_of_freedom,
+            widening: last.phases.iter().map(|p| p.widening(scatter)).sum(),
+            tested: Vec::new(),
+            sightings: sightings.clone(),
+            layout,
+            solution: x,
+            unscaled,
+            covariance,
+        })
+    }
+}
+
+/// Outwards from the middle of the campaign: each round predicts the next scans well enough to
+/// unwrap them.
+fn link_outwards(
+    sightings: &[Sighting],
+    layout: &Layout,
+    x: &mut DVector<f64>,
+    instability: f64,
+) -> Option<()> {
+    let distances = || sightings.iter().map(|s| (s.time - layout.origin).abs());
+    let farthest = distances().fold(0.0, f64::max);
+    let mut reach = farthest / 16.0;
+    while reach < farthest {
+        iterate(sightings, layout, x, reach, instability)?;
+        reach *= 1.5;
+    }
+    Some(())
+}
+
+/// φ of the harmonics of each block from its sighting of the lowest class nearest to the middle of the
+/// campaign; then the offset of every other class, modulo the lattice, from its nearest sighting in a
+/// block that another class has begun.
+fn start_phases(sightings: &[Sighting], layout: &Layout, x: &mut DVector<f64>) -> Option<()> {
+    let first = layout.phases?;
+    let distance = |s: &&Sighting| (s.time - layout.origin).abs();
+    let with_phases = || sightings.iter().filter(|s| s.phases.is_some());
+    let (k1, k2) = (Vector2::new(x[0], x[1]), Vector2::new(x[2], x[3]));
+    let unexplained = |s: &Sighting, x: &DVector<f64>| {
+        let (shift, _) = layout.motion(x, s.time);
+        let place = s.position - shift;
+        let miss = |h: usize, k: Vector2<f64>, phases: &Phases| {
+            wrapped(phases.values[h] - k.dot(&place) - x[first + 3 * s.block + h])
+        };
+        s.phases
+            .map(|p| [miss(0, k1, &p), miss(1, k2, &p), miss(2, k2 - k1, &p)])
+    };
+    let blocks = 1 + sightings.iter().map(|s| s.block).max()?;
+    let begun: Vec<Option<usize>> = (0..blocks)
+        .map(|block| {
+            let inside = || with_phases().filter(move |s| s.block == block);
+            let class = inside().map(|s| s.class).min()?;
+            let near = inside()
+                .filter(|s| s.class == class)
+                .min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
+            for (h, phase) in unexplained(near, x)?.into_iter().enumerate() {
+                x[first + 3 * block + h] = phase;
+            }
+            Some(class)
+        })
+        .collect();
+    let from_phases = Matrix2::from_rows(&[k1.transpose(), k2.transpose()]).try_inverse()?;
+    for class in 1.. {
+        let Some(at) = layout.offset_of(class) else {
+            break;
+        };
+        let near = with_phases()
+            .filter(|s| s.class == class && begun[s.block] != Some(class))
+            .min_by(|a, b| distance(a).total_cmp(&distance(b)));
+        let Some(near) = near else { continue };
+        let miss = unexplained(near, x)?;
+        let offset = -from_phases * Vector2::new(miss[0], miss[1]);
+        x[at] = offset.x;
+        x[at + 1] = offset.y;
+    }
+    Some(())
+}
+
+/// Gauss–Newton to convergence; returns the covariance of the parameters.
+fn iterate(
+    sightings: &[Sighting],
+    layout: &Layout,
+    x: &mut DVector<f64>,
+    reach: f64,
+    instability: f64,
+) -> Option<DMatrix<f64>> {
+    let mut covariance = None;
+    for _ in 0..STEPS {
+        let now = linearise(sightings, layout, x, reach, instability);
+        let n = layout.size;
+        let mut normal = DMatrix::<f64>::zeros(n, n);
+        let mut right = DVector::<f64>::zeros(n);
+        for (residual, row) in now.residuals.iter().zip(&now.jacobian) {
+            normal.ger(1.0, row, row, 1.0);
+            right.axpy(*residual, row, 1.0);
+        }
+        // Offsets of classes that have no phase within reach are not seen yet: hold them.
+        for i in 0..n {
+            if normal[(i, i)] == 0.0 {
+                normal[(i, i)] = 1.0;
+            }
+        }
+        let scale = normal.diagonal().map(|d| 1.0 / d.sqrt());
+        if layout.phases.is_none() {
+            let scaled = DMatrix::from_fn(n, n, |i, j| normal[(i, j)] * scale[i] * scale[j]);
+            let values = scaled.symmetric_eigenvalues();
+            if !(values.max() < WORST_CONDITION * values.min()) {
+                return None;
+            }
+        }
+        // Near the middle of the campaign offsets and phases may only be seen together; a little
+        // damping holds what cannot be told apart and leaves the final solution where it is.
+        let inverse = inverse(&normal, &scale, DAMPING)?;
+        let step = &inverse * &right;
+        *x += &step;
+        let size = (0..n)
+            .map(|i| (step[i] / inverse[(i, i)].sqrt()).abs())
+            .fold(0.0, f64::max);
+        covariance = Some(inverse);
+        if !size.is_finite() {
+            return None;
+        }
+        if size < 1e-4 {
+            break;
+        }
+    }
+    covariance
+}
+
+/// `normal⁻¹ right`, as [`inverse`] does it.
+pub(crate) fn solved(
+    normal: &DMatrix<f64>,
+    right: &DVector<f64>,
+    scale: &DVector<f64>,
+    damping: f64,
+) -> Option<DVector<f64>> {
+    let scaled = scaled(normal, scale, damping);
+    let solution = scaled.cholesky()?.solve(&right.component_mul(scale));
+    Some(solution.component_mul(scale))
+}
+
+fn scaled(normal: &DMatrix<f64>, scale: &DVector<f64>, damping: f64) -> DMatrix<f64> {
+    let n = normal.nrows();
+    DMatrix::from_fn(n, n, |i, j| {
+        let held = if i == j { damping } else { 0.0 };
+        normal[(i, j)] * scale[i] * scale[j] + held
+    })
+}
+
+/// Inverse of a normal matrix by way of one with units on its diagonal, a little damped.
+pub(crate) fn inverse(
+    normal: &DMatrix<f64>,
+    scale: &DVector<f64>,
+    damping: f64,
+) -> Option<DMatrix<f64>> {
+    let n = normal.nrows();
+    let inverse = scaled(normal, scale, damping).cholesky()?.inverse();
+    Some(DMatrix::from_fn(n, n, |i, j| {
+        inverse[(i, j)] * scale[i] * scale[j]
+    }))
+}

@@ -1,0 +1,303 @@
+//! Where each pixel really was, and when.
+//!
+//! A frame is an affine map of pixel indices `n = (column, row)`: position `r = r₀ + J n` (nm) and
+//! time `t = t₀ + τ·n` (s). `J` comes from a plane fit to the position sensors, or from the nominal
+//! size and rotation. It may be a sheared, rotated parallelogram.
+//!
+//! # References
+//! Plane fit and tip velocities: Tran et al., arXiv:2406.08681. With N pixels the extent is
+//! `(N − 1)·|column of J|`: positions are those of pixel centres.
+
+use heterostrain::lattice::both;
+use nalgebra::{Matrix2, Matrix4, Vector2};
+use spmfile::{FrameDirection, LineDirection, Scan};
+
+use crate::frame::axis::Axis;
+
+/// The affine map from pixels to nm.
+#[derive(Clone, Debug)]
+pub struct Geometry {
+    /// Number of samples in a line and of lines.
+    pub size: [usize; 2],
+    /// `J`: columns are the steps from column to column and from row to row, nm.
+    pub pixel_to_nm: Matrix2<f64>,
+    /// Position of pixel (0, 0), nm.
+    pub origin: Vector2<f64>,
+    /// Covariance of the entries of `J`, `(J₁₁, J₂₁, J₁₂, J₂₂)`.
+    pub covariance: Matrix4<f64>,
+    /// Whether it comes from position sensors.
+    pub from_sensors: bool,
+}
+
+/// When each pixel was recorded, as a linear function of its index.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Timing {
+    /// τ: signed time from column to column and from row to row, s.
+    pub per_pixel: Vector2<f64>,
+}
+
+impl Geometry {
+    /// The geometry of pixels that are `pitch` (along the lines, across them; nm) apart, rotated.
+    pub fn of_pitch(
+        size: [usize; 2],
+        pitch: [f64; 2],
+        rotation_rad: f64,
+        centre: Vector2<f64>,
+    ) -> Option<Self> {
+        let [columns, rows] = [size[0] as f64, size[1] as f64];
+        let [fast, slow] = pitch;
+        if size[0] < 2 || size[1] < 2 || !(fast > 0.0 && slow > 0.0) {
+            return None;
+        }
+        let (s, c) = rotation_rad.sin_cos();
+        let pixel_to_nm = Matrix2::new(c, -s, s, c) * Matrix2::new(fast, 0.0, 0.0, slow);
+        let middle = Vector2::new((columns - 1.0) / 2.0, (rows - 1.0) / 2.0);
+        Some(Self {
+            size,
+            pixel_to_nm,
+            origin: centre - pixel_to_nm * middle,
+            covariance: Matrix4::zeros(),
+            from_sensors: false,
+        })
+    }
+
+    /// The geometry of a frame whose width is that of the outermost pixel centres, so that the
+    /// pitch is `width/(N − 1)`; lines have the pitch that the nominal aspect ratio gives them,
+    /// also where the frame is unfinished.
+    pub fn nominal(
+        size: [usize; 2],
+        width_nm: f64,
+        height_nm: f64,
+        rotation_rad: f64,
+        centre: Vector2<f64>,
+    ) -> Option<Self> {
+        let [columns, rows] = [size[0] as f64, size[1] as f64];
+        let fast = width_nm / (columns - 1.0);
+        let slow = fast * (height_nm / rows) / (width_nm / columns);
+        Self::of_pitch(size, [fast, slow], rotation_rad, centre)
+    }
+
+    /// Step from column to column, nm.
+    pub fn fast_step(&self) -> Vector2<f64> {
+        self.pixel_to_nm.column(0).into_owned()
+    }
+
+    /// Step from row to row, nm.
+    pub fn slow_step(&self) -> Vector2<f64> {
+        self.pixel_to_nm.column(1).into_owned()
+    }
+
+    /// Position of the middle of the frame, nm.
+    pub fn centre(&self) -> Vector2<f64> {
+        let [columns, rows] = self.size;
+        let middle = Vector2::new((columns as f64 - 1.0) / 2.0, (rows as f64 - 1.0) / 2.0);
+        self.origin + self.pixel_to_nm * middle
+    }
+
+    /// Lengths of the fast and slow sides from first to last pixel centre, nm.
+    pub fn extent(&self) -> [f64; 2] {
+        [
+            (self.size[0].max(1) - 1) as f64 * self.fast_step().norm(),
+            (self.size[1].max(1) - 1) as f64 * self.slow_step().norm(),
+        ]
+    }
+
+    /// The laboratory axis along which lines follow each other.
+    pub fn slow_axis(&self) -> Axis {
+        let slow = self.slow_step();
+        if slow.x.abs() > slow.y.abs() {
+            Axis::X
+        } else {
+            Axis::Y
+        }
+    }
+
+    /// The same map for a block of pixels that starts at (column, row).
+    #[must_use]
+    pub fn cropped(&self, first: [usize; 2], size: [usize; 2]) -> Self {
+        let shift = Vector2::new(first[0] as f64, first[1] as f64);
+        Self {
+            size,
+            origin: self.origin + self.pixel_to_nm * shift,
+            ..self.clone()
+        }
+    }
+
+    /// The same pixels in coordinates that are `map` times these (known exactly).
+    #[must_use]
+    pub fn mapped(&self, map: &Matrix2<f64>) -> Self {
+        let both = both(map);
+        Self {
+            pixel_to_nm: map * self.pixel_to_nm,
+            origin: map * self.origin,
+            covariance: both * self.covariance * both.transpose(),
+            ..self.clone()
+        }
+    }
+
+    /// Tip speeds along the fast and slow axes, nm/s, from the step sizes and pixel times.
+    pub fn speeds(&self, timing: &Timing) -> [f64; 2] {
+        [
+            self.fast_step().norm() / timing.per_pixel.x.abs(),
+            self.slow_step().norm() / timing.per_pixel.y.abs(),
+        ]
+    }
+
+    /// Gradient of acquisition time in the image plane, `u = J^{−T} τ`, s/nm.
+    ///
+    /// `None` where J is singular.
+    pub fn time_gradient(&self, timing: &Timing) -> Option<Vector2<f64>> {
+        Some(self.pixel_to_nm.try_inverse()?.transpose() * timing.per_pixel)
+    }
+}
+
+impl Timing {
+    /// τ of a scan, from the times of its lines where the file gives them, otherwise by [`Timing::new`].
+    ///
+    /// A line that takes `T` from the first to the last pixel has `τ_fast = T/(N − 1)`. Trace and
+    /// retrace may differ; lines follow each other at the line rate, which is `1/(T_trace +
+    /// T_retrace)` unless the file says otherwise. `None` where the file does not tell.
+    pub fn of_scan(
+        scan: &Scan,
+        columns: usize,
+        frame: FrameDirection,
+        line: LineDirection,
+    ) -> Option<Self> {
+        let Some([trace, retrace]) = scan.line_times_s else {
+            return Self::new(
+                columns,
+                scan.line_rate_hz?,
+                scan.rounding.unwrap_or(0.0),
+                frame,
+                line,
+            );
+        };
+        let time = match line {
+            LineDirection::Trace => trace,
+            LineDirection::Retrace => retrace,
+        };
+        let rate = scan.line_rate_hz.unwrap_or(1.0 / (trace + retrace));
+        let mut timing = Self::new(columns, rate, 0.0, frame, line)?;
+        if !(time > 0.0) || time * rate > 1.0 + 1e-6 {
+            return None;
+        }
+        timing.per_pixel.x = (time / (columns - 1) as f64).copysign(timing.per_pixel.x);
+        Some(timing)
+    }
+
+    /// τ of a frame of `columns` samples per line.
+    ///
+    /// A line is acquired in half its period, shortened by the overscan `rounding`; lines follow
+    /// each other at `line_rate_hz`.
+    pub fn new(
+        columns: usize,
+        line_rate_hz: f64,
+        rounding: f64,
+        frame: FrameDirection,
+        line: LineDirection,
+    ) -> Option<Self> {
+        if columns < 2 || !(line_rate_hz > 0.0) || !(rounding >= 0.0) {
+            return None;
+        }
+        let fast = 1.0 / (2.0 * line_rate_hz * (1.0 + rounding) * (columns - 1) as f64);
+        let along = match line {
+            LineDirection::Trace => fast,
+            LineDirection::Retrace => -fast,
+        };
+        let across = match frame {
+            FrameDirection::Up => 1.0 / line_rate_hz,
+            FrameDirection::Down => -1.0 / line_rate_hz,
+        };
+        Some(Self {
+            per_pixel: Vector2::new(along, across),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The velocities `V_fast = 2 f (1+ρ) L_f`, `V_slow = L_s f / N`, and the time gradient of a
+    /// rectangle, `(s_f/V_fast, s_s/V_slow)`, for both slow axes, written out independently.
+    #[test]
+    fn speeds_and_time_gradients_of_a_rectangle() {
+        let (n, f, rounding) = (512, 8.0, 0.1);
+        for rotation in [0.0, std::f64::consts::FRAC_PI_2] {
+            let g = Geometry::nominal([n, n], 55.0, 55.0, rotation, Vector2::zeros()).unwrap();
+            let timing =
+                Timing::new(n, f, rounding, FrameDirection::Down, LineDirection::Retrace).unwrap();
+            let [fast, slow] = g.speeds(&timing);
+            let pitch = 55.0 / 511.0;
+            assert!((fast - 2.0 * f * 1.1 * 55.0).abs() < 1e-9);
+            assert!((slow - f * pitch).abs() < 1e-12);
+            let u = g.time_gradient(&timing).unwrap();
+            let expected = Matrix2::new(
+                rotation.cos(),
+                -rotation.sin(),
+                rotation.sin(),
+                rotation.cos(),
+            ) * Vector2::new(-1.0 / fast, -1.0 / slow);
+            assert!((u - expected).norm() < 1e-12);
+            assert_eq!(
+                g.slow_axis(),
+                if rotation == 0.0 { Axis::Y } else { Axis::X }
+            );
+        }
+    }
+
+    /// 25 s there and 0.2 s back, as a slow instrument does it: each line has its own time.
+    #[test]
+    fn lines_of_different_times() {
+        let scan = Scan {
+            line_times_s: Some([25.0, 0.2]),
+            line_rate_hz: Some(1.0 / 25.2),
+            ..Scan::default()
+        };
+        let of = |line| Timing::of_scan(&scan, 96, FrameDirection::Up, line).unwrap();
+        let (trace, retrace) = (of(LineDirection::Trace), of(LineDirection::Retrace));
+        assert!((trace.per_pixel - Vector2::new(25.0 / 95.0, 25.2)).norm() < 1e-12);
+        assert!((retrace.per_pixel - Vector2::new(-0.2 / 95.0, 25.2)).norm() < 1e-12);
+        // Two equal halves are the same as an overscan of nothing.
+        let halves = Scan {
+            line_times_s: Some([0.25, 0.25]),
+            ..Scan::default()
+        };
+        let down = FrameDirection::Down;
+        assert_eq!(
+            Timing::of_scan(&halves, 512, down, LineDirection::Retrace),
+            Timing::new(512, 2.0, 0.0, down, LineDirection::Retrace)
+        );
+        // A line longer than its period, or no time at all, is no timing.
+        for times in [[3.0, 0.1], [0.0, 1.0], [f64::NAN, 1.0]] {
+            let odd = Scan {
+                line_times_s: Some(times),
+                line_rate_hz: Some(1.0),
+                ..Scan::default()
+            };
+            assert_eq!(
+                Timing::of_scan(&odd, 96, FrameDirection::Up, LineDirection::Trace),
+                None
+            );
+        }
+        assert_eq!(
+            Timing::of_scan(
+                &Scan::default(),
+                96,
+                FrameDirection::Up,
+                LineDirection::Trace
+            ),
+            None
+        );
+    }
+
+    /// An unfinished frame keeps its pitch, and the frame is centred where it should be.
+    #[test]
+    fn nominal_pitch_of_an_unfinished_frame() {
+        let centre = Vector2::new(3.0, -4.0);
+        let g = Geometry::nominal([512, 128], 70.0, 17.5, 0.0, centre).unwrap();
+        assert!((g.fast_step().norm() - 70.0 / 511.0).abs() < 1e-12);
+        assert!((g.slow_step().norm() - 70.0 / 511.0).abs() < 1e-12);
+        assert!((g.centre() - centre).norm() < 1e-12);
+    }
+}

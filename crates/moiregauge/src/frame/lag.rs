@@ -1,0 +1,351 @@
+//! A position sensor that lags behind the tip: lines that bend where they begin.
+//!
+//! A sensor of the first order with the time constant T shows a tip of the speed V late by `V T`, and after each
+//! turn-around it takes some T until it does: `x(t) = V (t − T) + 2 V T e^{−t/T}`. A straight line through the whole
+//! is flatter than V: by `12 (T/T_line)²` of it where the bend lies within the line.
+//!
+//! In: the image of one sensor. Out: the exponential that its mean line has beside a polynomial of the third degree,
+//! which takes the place of creep and hysteresis; nothing where noise or another shape explains the line as well.
+
+use std::ops::Range;
+
+use nalgebra::{DMatrix, DVector, Vector2};
+
+use crate::frame::image::Image;
+use crate::frame::plane::fit_plane;
+use crate::numbers::median::median;
+
+/// Fewer columns show nothing.
+const FEWEST: usize = 32;
+/// The bend decays within this part of a line; a slower one is not told from creep and hysteresis.
+const SLOWEST: f64 = 0.1;
+/// Of what the polynomial leaves of the mean line, the exponential explains at least this share, ...
+const SHARE: f64 = 0.5;
+/// ... and improves χ² by this much, in units of what it leaves.
+const IMPROVEMENT: f64 = 50.0;
+/// A lag that explains whole lines leaves less than this many times the noise, ...
+const EXCESS: f64 = 3.0;
+/// ... or this share of the bend, where there is no noise.
+const NOTHING: f64 = 1e-3;
+/// Steps of the search for the decay, and its shortest one, columns.
+const STEPS: usize = 40;
+const SHORTEST: f64 = 0.5;
+/// A sensor is of the first order no better than to this share of what the bend does to the slope.
+const FIRST_ORDER_TO: f64 = 0.03;
+/// Lines that are looked at, at most about this many.
+const MOST_ROWS: usize = 4096;
+/// The degree of the polynomial, plus one.
+const SMOOTH: usize = 4;
+
+/// The bend at the beginning of the lines of one sensor.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lag {
+    /// Columns in which the bend falls to 1/e: the time constant in units of the time of a pixel.
+    pub columns: f64,
+    /// Whether lines begin at the last column.
+    pub from_last: bool,
+    /// The bend at the first column that was used, nm.
+    pub bend_nm: f64,
+    /// What the bend adds to the step from column to column of a straight line, nm, if it is not taken off.
+    pub slope_nm: f64,
+    /// Variance of that, nm².
+    pub slope_variance: f64,
+}
+
+impl Lag {
+    /// The bend at a column, nm; `used` are the columns that were used.
+    fn at(&self, column: usize, used: &Range<usize>) -> f64 {
+        self.bend_nm * (-from_begin(column, used, self.from_last) / self.columns).exp()
+    }
+
+    /// The image without it; columns outside of `used` are left as they are.
+    pub(crate) fn taken_off(&self, image: &Image, used: &Range<usize>) -> Image {
+        let mut straight = image.clone();
+        let bend: Vec<f64> = used.clone().map(|c| self.at(c, used)).collect();
+        for line in straight.values.chunks_exact_mut(image.columns) {
+            for (value, bend) in line[used.clone()].iter_mut().zip(&bend) {
+                *value -= bend;
+            }
+        }
+        straight
+    }
+}
+
+/// Looks for a lag that explains the whole lines of a sensor, turn-around and all.
+pub(crate) fn find_whole(image: &Image) -> Option<Lag> {
+    let (lag, left, noise) = search(image, &(0..image.columns))?;
+    let exact = NOTHING * lag.bend_nm;
+    (left < EXCESS * noise + exact * exact).then_some(lag)
+}
+
+/// Looks for the lag of a sensor in the columns `used`.
+pub(crate) fn find(image: &Image, used: &Range<usize>) -> Option<Lag> {
+    search(image, used).map(|(lag, ..)| lag)
+}
+
+/// The lag, the variance that it leaves in the mean line, and that of the noise of the mean line, nm².
+fn search(image: &Image, used: &Range<usize>) -> Option<(Lag, f64, f64)> {
+    if used.len() < FEWEST {
+        return None;
+    }
+    let (line, noise) = mean_line(image, used)?;
+    let smooth = polynomials(used.len());
+    let plain = residual(&smooth, &line)?;
+    let mut best: Option<(f64, f64, bool)> = None;
+    for from_last in [false, true] {
+        let left = |columns: f64| {
+            let design = with_bend(&smooth, columns, from_last);
+            residual(&design, &line).unwrap_or(f64::INFINITY)
+        };
+        let columns = best_decay(&left, SLOWEST * used.len() as f64);
+        let chi2 = left(columns);
+        if best.is_none_or(|(least, ..)| chi2 < least) {
+            best = Some((chi2, columns, from_last));
+        }
+    }
+    let (left, columns, from_last) = best?;
+    // Two parameters more than the polynomial has; rounding is all that a sensor without noise leaves.
+    let variance = (left / (used.len() - SMOOTH - 2) as f64).max(f64::MIN_POSITIVE);
+    let explained = plain - left;
+    if !(explained > SHARE * plain && explained > IMPROVEMENT * variance) {
+        return None;
+    }
+    let lag = bend(&line, &smooth, (columns, from_last), variance)?;
+    Some((lag, variance, noise))
+}
+
+/// The bend of the decay that was found, and what it does to the slope.
+fn bend(
+    line: &DVector<f64>,
+    smooth: &DMatrix<f64>,
+    (columns, from_last): (f64, bool),
+    variance: f64,
+) -> Option<Lag> {
+    let design = with_bend(smooth, columns, from_last);
+    let bend_nm = solve(&design, line)?[SMOOTH];
+    let decay = |columns: f64| decay(line.len(), columns, from_last);
+    let step = 1e-3 * columns;
+    let change = (decay(columns + step) - decay(columns - step)) * (bend_nm / (2.0 * step));
+    let both = design.insert_column(SMOOTH + 1, 0.0);
+    let both = with_column(both, SMOOTH + 1, &change);
+    let covariance = (both.transpose() * both).try_inverse()? * variance;
+    let of_bend = covariance.fixed_view::<2, 2>(SMOOTH, SMOOTH).into_owned();
+    let slopes = Vector2::new(slope(&decay(columns)), slope(&change));
+    let slope_nm = slopes.x * bend_nm;
+    let model = FIRST_ORDER_TO * slope_nm;
+    Some(Lag {
+        columns,
+        from_last,
+        bend_nm,
+        slope_nm,
+        slope_variance: slopes.dot(&(of_bend * slopes)) + model * model,
+    })
+}
+
+/// The decay that leaves least: the best of a logarithmic grid, then golden sections about it.
+fn best_decay(left: &dyn Fn(f64) -> f64, longest: f64) -> f64 {
+    let ratio = (longest / SHORTEST).powf(1.0 / STEPS as f64);
+    let grid = (0..=STEPS).map(|i| SHORTEST * ratio.powi(i as i32));
+    let best = grid
+        .map(|c| (left(c), c))
+        .min_by(|a, b| a.0.total_cmp(&b.0));
+    let middle = best.map_or(SHORTEST, |(_, c)| c);
+    let (mut low, mut high) = (middle / ratio, middle * ratio);
+    let golden = 0.618_034;
+    for _ in 0..30 {
+        let (a, b) = (high - golden * (high - low), low + golden * (high - low));
+        if left(a) < left(b) {
+            high = b;
+        } else {
+            low = a;
+        }
+    }
+    f64::midpoint(low, high)
+}
+
+/// Median of each column about the plane of the sensor, nm, and the variance that noise gives it; `None` where a column has
+/// no values.
+fn mean_line(image: &Image, used: &Range<usize>) -> Option<(DVector<f64>, f64)> {
+    let plane = fit_plane(image, used.clone())?;
+    let mut line = DVector::zeros(used.len());
+    let mut noise = 0.0;
+    for (place, column) in used.clone().enumerate() {
+        let mut values: Vec<f64> = (0..image.rows)
+            .step_by(1 + image.rows / MOST_ROWS)
+            .map(|row| image.row(row)[column] - plane.at(column as f64, row as f64))
+            .filter(|v| v.is_finite())
+            .collect();
+        if values.is_empty() {
+            return None;
+        }
+        let middle = median(&mut values);
+        line[place] = middle;
+        let count = values.len() as f64;
+        let mut sizes: Vec<f64> = values.iter().map(|v| (v - middle).abs()).collect();
+        // Of Gaussian noise: σ is 1.4826 of the median size, and the median has π/2 of the variance of the mean.
+        let sigma = 1.4826 * median(&mut sizes);
+        noise += std::f64::consts::FRAC_PI_2 * sigma * sigma / count / used.len() as f64;
+    }
+    Some((line, noise))
+}
+
+/// Columns from where lines begin.
+fn from_begin(column: usize, used: &Range<usize>, from_last: bool) -> f64 {
+    if from_last {
+        (used.end - 1 - column) as f64
+    } else {
+        (column - used.start) as f64
+    }
+}
+
+fn decay(count: usize, columns: f64, from_last: bool) -> DVector<f64> {
+    let used = 0..count;
+    DVector::from_fn(count, |c, _| {
+        (-from_begin(c, &used, from_last) / columns).exp()
+    })
+}
+
+/// Legendre polynomials of the degrees 0 to 3 over the columns.
+fn polynomials(count: usize) -> DMatrix<f64> {
+    DMatrix::from_fn(count, SMOOTH, |c, degree| {
+        let u = (2.0 * c as f64 + 1.0 - count as f64) / count as f64;
+        match degree {
+            0 => 1.0,
+            1 => u,
+            2 => 1.5 * u * u - 0.5,
+            _ => (2.5 * u * u - 1.5) * u,
+        }
+    })
+}
+
+fn with_bend(smooth: &DMatrix<f64>, columns: f64, from_last: bool) -> DMatrix<f64> {
+    let wider = smooth.clone().insert_column(SMOOTH, 0.0);
+    with_column(wider, SMOOTH, &decay(smooth.nrows(), columns, from_last))
+}
+
+fn with_column(mut matrix: DMatrix<f64>, place: usize, column: &DVector<f64>) -> DMatrix<f64> {
+    matrix.set_column(place, column);
+    matrix
+}
+
+/// Least squares.
+fn solve(design: &DMatrix<f64>, line: &DVector<f64>) -> Option<DVector<f64>> {
+    let normal = (design.transpose() * design).cholesky()?;
+    Some(normal.solve(&(design.transpose() * line)))
+}
+
+/// Sum of the squares that least squares leave.
+fn residual(design: &DMatrix<f64>, line: &DVector<f64>) -> Option<f64> {
+    Some((line - design * solve(design, line)?).norm_squared())
+}
+
+/// Slope of the straight line through the values.
+fn slope(values: &DVector<f64>) -> f64 {
+    let n = values.len() as f64;
+    let from_middle = |c: usize| c as f64 - (n - 1.0) / 2.0;
+    let sum: f64 = values
+        .iter()
+        .enumerate()
+        .map(|(c, v)| from_middle(c) * v)
+        .sum();
+    sum / (n * (n * n - 1.0) / 12.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::numbers::rng::stream;
+    use rand_distr::{Distribution, StandardNormal};
+
+    const COLUMNS: usize = 128;
+    const PITCH: f64 = 0.8;
+
+    /// A sensor of 96 lines along the fast axis: `bend` at each column, and white noise, nm.
+    fn sensor(bend: impl Fn(f64) -> f64, noise: f64, seed: u64) -> Image {
+        let mut rng = stream(seed, "lag", 0);
+        let values = (0..96 * COLUMNS)
+            .map(|i| {
+                let column = (i % COLUMNS) as f64;
+                let white: f64 = StandardNormal.sample(&mut rng);
+                PITCH * column + bend(column) + noise * white
+            })
+            .collect();
+        Image::new(96, COLUMNS, values)
+    }
+
+    /// What a sensor of the first order shows of a tip at constant speed that has turned at column 0.
+    fn lagging(columns: f64) -> impl Fn(f64) -> f64 {
+        move |c| -PITCH * columns * (1.0 - 2.0 * (-c / columns).exp())
+    }
+
+    /// Slope of the mean of all lines, nm per column.
+    fn mean_slope(image: &Image) -> f64 {
+        let column = |c: usize| (0..image.rows).map(|r| image.row(r)[c]).sum::<f64>();
+        let mean = DVector::from_fn(image.columns, |c, _| column(c) / image.rows as f64);
+        slope(&mean)
+    }
+
+    /// The time constant and what it does to the slope, −12 (`T/T_line`)² of it where lines are long, in trace and in
+    /// retrace; the straight rest has the pitch of the tip.
+    #[test]
+    fn a_lag_is_measured() {
+        for columns in [0.8, 2.0, 5.0, 9.0] {
+            for mirrored in [false, true] {
+                let bend = |c: f64| {
+                    let bend = lagging(columns);
+                    if mirrored {
+                        -bend(COLUMNS as f64 - 1.0 - c)
+                    } else {
+                        bend(c)
+                    }
+                };
+                let image = sensor(bend, 0.2, 7);
+                let used = 0..COLUMNS;
+                let lag = find(&image, &used).unwrap();
+                assert_eq!(lag.from_last, mirrored);
+                assert!((lag.columns / columns - 1.0).abs() < 0.1, "{lag:?}");
+                // What is taken off changes the slope of plain least squares by exactly that.
+                let straight = lag.taken_off(&image, &used);
+                let change = mean_slope(&image) - mean_slope(&straight);
+                assert!((change - lag.slope_nm).abs() < 1e-9);
+                let rest = fit_plane(&straight, used).unwrap();
+                let sigma = lag.slope_variance.sqrt().hypot(5e-5);
+                let miss = rest.per_column - PITCH;
+                assert!(miss.abs() < 4.0 * sigma, "{columns}: {miss} ± {sigma}");
+                if (2.0..6.0).contains(&columns) {
+                    let share = -12.0 * (columns / COLUMNS as f64).powi(2);
+                    assert!((lag.slope_nm / PITCH / share - 1.0).abs() < 0.3, "{lag:?}");
+                }
+            }
+        }
+    }
+
+    /// A line by column, nm.
+    type Shape = Box<dyn Fn(f64) -> f64>;
+
+    /// Noise, bows and creep of scanners, ripples and steps are no lag.
+    #[test]
+    fn what_is_no_lag_is_not_taken_for_one() {
+        let place = |c: f64| 2.0 * c / COLUMNS as f64 - 1.0;
+        let shapes: [(&str, Shape); 6] = [
+            ("noise", Box::new(|_| 0.0)),
+            ("bow", Box::new(move |c| 1.5 * place(c).powi(2))),
+            (
+                "bend of hysteresis",
+                Box::new(move |c| 0.8 * (1.3 * place(c)).sin()),
+            ),
+            ("creep", Box::new(move |c| 0.8 * (1.6 + place(c)).ln())),
+            ("ripple", Box::new(move |c| 0.05 * (40.0 * place(c)).sin())),
+            (
+                "step",
+                Box::new(move |c| if place(c) > 0.1 { 0.1 } else { 0.0 }),
+            ),
+        ];
+        for (name, shape) in &shapes {
+            for seed in 0..20 {
+                let image = sensor(shape, 0.2, seed);
+                assert_eq!(find(&image, &(0..COLUMNS)), None, "{name} {seed}");
+            }
+        }
+    }
+}

@@ -1,0 +1,315 @@
+//! Both position sensors of a frame → its [`Geometry`].
+
+use std::borrow::Cow;
+
+use nalgebra::{Matrix2, Matrix4, Vector2};
+
+use crate::frame::geometry::Geometry;
+use crate::frame::image::Image;
+use crate::frame::lag;
+use crate::frame::lag::Lag;
+use crate::frame::plane::{PlaneFit, fit_plane};
+
+/// The outer fraction of a line in which turn-around is looked for, on either side.
+const TURN_AROUND: f64 = 0.1;
+
+/// The geometry by the sensors, and how well a plane describes them.
+#[derive(Clone, Debug)]
+pub struct SensorGeometry {
+    /// The affine map.
+    pub geometry: Geometry,
+    /// Plane of the x sensor and of the y sensor, nm.
+    pub planes: [PlaneFit; 2],
+    /// Columns that were used; those outside belong to the turn-around of the tip.
+    pub columns: std::ops::Range<usize>,
+    /// How the x sensor and the y sensor lag behind the tip, where their lines show it; planes and steps are free of it.
+    pub lags: [Option<Lag>; 2],
+    /// Step from column to column along the fast direction, one number per line, nm.
+    pub fast_steps: Vec<f64>,
+    /// Step from row to row along the slow direction, one number per column, nm.
+    pub slow_steps: Vec<f64>,
+}
+
+/// Fits planes to the x and y sensors (nm, same shape).
+///
+/// `None` where the sensors do not span an area: constant, all missing, or moving along one line.
+pub fn from_sensors(x: &Image, y: &Image) -> Option<SensorGeometry> {
+    let (rows, columns) = (x.rows, x.columns);
+    if (y.rows, y.columns) != (rows, columns) {
+        return None;
+    }
+    // A lag that explains whole lines is taken off first; of any other bend what is not straight is left out, and a lag is
+    // looked for in the rest.
+    let whole = [x, y].map(lag::find_whole);
+    let every = 0..columns;
+    let [x, y] = [straight(x, whole[0], &every), straight(y, whole[1], &every)];
+    let used = straight_columns(&x, &y)?;
+    let rest = |sensor, whole: Option<Lag>| match whole {
+        Some(_) => None,
+        None => lag::find(sensor, &used),
+    };
+    let rest = [rest(&x, whole[0]), rest(&y, whole[1])];
+    let lags = [whole[0].or(rest[0]), whole[1].or(rest[1])];
+    let [x, y] = [straight(&x, rest[0], &used), straight(&y, rest[1], &used)];
+    let (x, y) = (x.as_ref(), y.as_ref());
+    let planes = [fit_plane(x, used.clone())?, fit_plane(y, used.clone())?];
+    let pixel_to_nm = Matrix2::new(
+        planes[0].per_column,
+        planes[0].per_row,
+        planes[1].per_column,
+        planes[1].per_row,
+    );
+    let (fast, slow) = (pixel_to_nm.column(0).norm(), pixel_to_nm.column(1).norm());
+    if !(pixel_to_nm.determinant().abs() > 0.2 * fast * slow) {
+        return None;
+    }
+    let (ef, es) = (pixel_to_nm.column(0) / fast, pixel_to_nm.column(1) / slow);
+    let line_slopes: Vec<Vector2<f64>> = (0..rows)
+        .filter_map(|row| {
+            let slope = |image: &Image| slope(used.clone().map(|c| (c, image.row(row)[c])));
+            Some(Vector2::new(slope(x)?, slope(y)?))
+        })
+        .collect();
+    let column_slopes: Vec<Vector2<f64>> = used
+        .clone()
+        .filter_map(|c| {
+            let slope = |image: &Image| slope((0..rows).map(|row| (row, image.row(row)[c])));
+            Some(Vector2::new(slope(x)?, slope(y)?))
+        })
+        .collect();
+    let mut covariance = covariance(&line_slopes, [x, y], &planes, &used);
+    for (axis, lag) in lags.iter().enumerate() {
+        covariance[(axis, axis)] += lag.map_or(0.0, |lag| lag.slope_variance);
+    }
+    Some(SensorGeometry {
+        geometry: Geometry {
+            size: [columns, rows],
+            pixel_to_nm,
+            origin: Vector2::new(planes[0].origin, planes[1].origin),
+            covariance,
+            from_sensors: true,
+        },
+        planes,
+        columns: used,
+        lags,
+        fast_steps: line_slopes.iter().map(|s| s.dot(&ef)).collect(),
+        slow_steps: column_slopes.iter().map(|s| s.dot(&es)).collect(),
+    })
+}
+
+/// A sensor without its lag in the columns `used`.
+fn straight<'a>(
+    sensor: &'a Image,
+    lag: Option<Lag>,
+    used: &std::ops::Range<usize>,
+) -> Cow<'a, Image> {
+    match lag {
+        Some(lag) => Cow::Owned(lag.taken_off(sensor, used)),
+        None => Cow::Borrowed(sensor),
+    }
+}
+
+impl SensorGeometry {
+    /// What the plane leaves of a sensor (0: x, 1: y): curvature, lag, hysteresis, noise; nm.
+    pub fn residual_map(&self, sensor: usize, measured: &Image) -> Image {
+        let plane = &self.planes[sensor];
+        let values = measured
+            .values
+            .iter()
+            .enumerate()
+            .map(|(i, v)| {
+                v - plane.at((i % measured.columns) as f64, (i / measured.columns) as f64)
+            })
+            .collect();
+        Image::new(measured.rows, measured.columns, values)
+    }
+}
+
+/// The columns in which the tip moves straight: the mean line of either sensor follows the line
+/// fitted to its inner part. Turn-around shows as a run of deviating columns at an edge.
+fn straight_columns(x: &Image, y: &Image) -> Option<std::ops::Range<usize>> {
+    let columns = x.columns;
+    let margin = (TURN_AROUND * columns as f64) as usize;
+    let (mut first, mut last) = (0, columns);
+    for image in [x, y] {
+        let inner = fit_plane(image, margin..columns - margin)?;
+        let mut deviation = vec![0.0; columns];
+        for (c, d) in deviation.iter_mut().enumerate() {
+            let values: Vec<f64> = (0..image.rows)
+                .map(|row| image.row(row)[c] - inner.at(c as f64, row as f64))
+                .filter(|r| r.is_finite())
+                .collect();
+            *d = values.iter().sum::<f64>() / values.len().max(1) as f64;
+        }
+        let inside = &deviation[margin..columns - margin];
+        let rms = (inside.iter().map(|d| d * d).sum::<f64>() / inside.len() as f64).sqrt();
+        // Half a pixel of deviation is turn-around even on a sensor without noise.
+        let pitch = inner.per_column.hypot(inner.per_row);
+        let limit = (5.0 * rms).max(0.5 * pitch);
+        let bends = |c: &usize| deviation[*c].abs() > limit;
+        first = first.max((0..margin).take_while(bends).count());
+        last = last.min(columns - (columns - margin..columns).rev().take_while(bends).count());
+    }
+    Some(first..last)
+}
+
+/// Least-squares slope of (index, value) pairs, missing values left out.
+fn slope(points: impl Iterator<Item = (usize, f64)>) -> Option<f64> {
+    let (mut n, mut sx, mut sxx, mut sv, mut sxv) = (0.0, 0.0, 0.0, 0.0, 0.0);
+    for (i, v) in points {
+        if v.is_finite() {
+            let x = i as f64;
+            n += 1.0;
+            sx += x;
+            sxx += x * x;
+            sv += v;
+            sxv += x * v;
+        }
+    }
+    let spread = n * sxx - sx * sx;
+    (n >= 3.0 && spread > 0.0).then(|| (n * sxv - sx * sv) / spread)
+}
+
+/// Covariance of `J` from what repeats: the fast step from line to line, the slow step from the
+/// scatter of the line means, each with an effective number of independent lines.
+fn covariance(
+    line_slopes: &[Vector2<f64>],
+    sensors: [&Image; 2],
+    planes: &[PlaneFit; 2],
+    columns: &std::ops::Range<usize>,
+) -> Matrix4<f64> {
+    let mut c = Matrix4::zeros();
+    for (axis, (image, plane)) in sensors.into_iter().zip(planes).enumerate() {
+        let slopes: Vec<f64> = line_slopes
+            .iter()
+            .map(|s| s[axis] - plane.per_column)
+            .collect();
+        let n = slopes.len() as f64;
+        if n > 1.0 {
+            let variance = slopes.iter().map(|s| s * s).sum::<f64>() / (n - 1.0);
+            c[(axis, axis)] = variance * correlated(&slopes) / n;
+        }
+        let means: Vec<f64> = (0..image.rows)
+            .map(|row| {
+                let values: Vec<f64> = columns
+                    .clone()
+                    .map(|col| image.row(row)[col] - plane.at(col as f64, row as f64))
+                    .filter(|r| r.is_finite())
+                    .collect();
+                values.iter().sum::<f64>() / values.len() as f64
+            })
+            .filter(|m| m.is_finite())
+            .collect();
+        let n = means.len() as f64;
+        if n > 2.0 {
+            let variance = means.iter().map(|m| m * m).sum::<f64>() / (n - 2.0);
+            let spread = n * (n * n - 1.0) / 12.0;
+            c[(2 + axis, 2 + axis)] = variance * correlated(&means) / spread;
+        }
+    }
+    c
+}
+
+/// By how much correlation between successive residuals raises the variance of their mean:
+/// `1 + 2 Σ ρ_k`, summed while the autocorrelation is positive (initial positive sequence).
+fn correlated(residuals: &[f64]) -> f64 {
+    let total: f64 = residuals.iter().map(|r| r * r).sum();
+    if total == 0.0 {
+        return 1.0;
+    }
+    let mut factor = 1.0;
+    for lag in 1..residuals.len() / 4 {
+        let rho = residuals
+            .iter()
+            .zip(&residuals[lag..])
+            .map(|(a, b)| a * b)
+            .sum::<f64>()
+            / total;
+        // Below twice the scatter of ρ for independent residuals it is noise.
+        if rho < 2.0 / (residuals.len() as f64).sqrt() {
+            break;
+        }
+        factor += 2.0 * rho;
+    }
+    factor
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::numbers::rng::stream;
+    use rand_distr::{Distribution, StandardNormal};
+
+    const STEPS: Matrix2<f64> = Matrix2::new(0.21, 0.004, -0.003, 0.22);
+
+    /// Sensors of a sheared frame of 64 lines of 80 samples with white noise (nm).
+    fn sensors(noise: f64, seed: u64) -> [Image; 2] {
+        let mut rng = stream(seed, "sensors", 0);
+        [0, 1].map(|axis| {
+            let values = (0..64 * 80_usize)
+                .map(|i| {
+                    let n = Vector2::new((i % 80) as f64, (i / 80) as f64);
+                    let white: f64 = StandardNormal.sample(&mut rng);
+                    (STEPS * n)[axis] + noise * white
+                })
+                .collect();
+            Image::new(64, 80, values)
+        })
+    }
+
+    /// J comes back within its stated errors: mean square pull of its four entries over 200 frames
+    /// within four times its scatter, √(2/800) = 0.05, of 1.
+    #[test]
+    fn the_plane_fit_has_honest_errors() {
+        let mut pulls = 0.0;
+        for seed in 0..200 {
+            let [x, y] = sensors(0.2, seed);
+            let g = from_sensors(&x, &y).unwrap().geometry;
+            for entry in 0..4 {
+                let miss = g.pixel_to_nm[entry] - STEPS[entry];
+                pulls += miss * miss / g.covariance[(entry, entry)] / 800.0;
+            }
+        }
+        assert!((0.8..1.2).contains(&pulls), "{pulls}");
+    }
+
+    /// Columns in which the tip turns round are left out and do not bend the plane.
+    #[test]
+    fn turn_around_is_left_out() {
+        let [mut x, y] = sensors(0.0, 0);
+        for row in 0..64 {
+            for c in 0..4 {
+                x.values[row * 80 + c] += 0.3 * f64::from(4 - c as i32);
+            }
+        }
+        let found = from_sensors(&x, &y).unwrap();
+        assert_eq!(found.columns, 4..80);
+        assert!((found.geometry.pixel_to_nm - STEPS).norm() < 1e-9);
+    }
+
+    /// What the plane leaves is what was added to it.
+    #[test]
+    fn the_residual_map_shows_hysteresis() {
+        let [mut x, y] = sensors(0.0, 0);
+        // A bow along the lines with zero mean and zero mean slope.
+        let bow = |c: usize| ((c as f64 - 39.5).powi(2) - 533.25) * 1e-5;
+        for (i, v) in x.values.iter_mut().enumerate() {
+            *v += bow(i % 80);
+        }
+        let found = from_sensors(&x, &y).unwrap();
+        assert_eq!(found.columns, 0..80);
+        let map = found.residual_map(0, &x);
+        for (i, v) in map.values.iter().enumerate() {
+            assert!((v - bow(i % 80)).abs() < 1e-9, "{v} at {i}");
+        }
+    }
+
+    /// Constant sensors, or sensors that move along one line only, describe no frame.
+    #[test]
+    fn sensors_without_area_are_refused() {
+        let [x, _] = sensors(0.0, 0);
+        let still = Image::new(64, 80, vec![1.0; 64 * 80]);
+        assert!(from_sensors(&x, &still).is_none());
+        assert!(from_sensors(&x, &x).is_none());
+    }
+}

@@ -1,0 +1,34 @@
+//! The lattice of one image as it was measured.
+
+use heterostrain::lattice::LatticeVectors;
+use nalgebra::{Matrix2, Vector2};
+
+use crate::lattice::fit::fit_pixels::LatticeFit;
+use crate::lattice::paper::PublishedPeaks;
+use crate::spectrum::phases::Phases;
+
+/// The lattice of one image.
+#[derive(Clone, Debug)]
+pub struct MeasuredLattice {
+    /// Vectors in pixels (columns, rows).
+    pub pixels: LatticeVectors,
+    /// What the other estimator found: autocorrelation beside Fourier, Fourier beside all others.
+    pub comparison: Option<LatticeVectors>,
+    /// The shortcut wavelengths `4π/(√3|K|)` of the three first harmonics, nm.
+    pub shortcut_wavelengths: Option<[f64; 3]>,
+    /// Reciprocal pair of the harmonics behind `phases`, rad per pixel, at 60° to each other.
+    pub reciprocal: Matrix2<f64>,
+    /// Phases of the harmonics K₁, K₂ and K₂ − K₁ of `reciprocal` at the pixel position `middle`, rad.
+    /// There they are uncorrelated with the wave vectors.
+    pub phases: Phases,
+    /// Middle of the part of the frame that was used, (column, row), in fractions of pixels.
+    pub middle: Vector2<f64>,
+    /// Lattice periods across the shorter side of the frame.
+    pub periods: f64,
+    /// Amplitude over noise amplitude in one resolution cell, weakest of the first harmonics.
+    pub signal_to_noise: f64,
+    /// The peaks as published; `None` with the other methods.
+    pub published: Option<PublishedPeaks>,
+    /// The fit to the pixels; `None` with the other methods.
+    pub fit: Option<LatticeFit>,
+}

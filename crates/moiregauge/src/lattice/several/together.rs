@@ -1,0 +1,403 @@
+//! Lattices that take turns.
+
+use heterostrain::lattice::real_from_reciprocal;
+use nalgebra::{DMatrix, Matrix2, Matrix3, Matrix4, SMatrix, Vector2};
+
+use crate::frame::background::{Background, remove_background};
+use crate::frame::geometry::Geometry;
+use crate::frame::image::Image;
+use crate::lattice::fit::fit_pixels::LatticeFit;
+use crate::lattice::measure::{Start, measure};
+use crate::lattice::measured::MeasuredLattice;
+use crate::lattice::several::split;
+use crate::spectrum::error::LatticeError;
+use crate::spectrum::method::Method;
+
+/// Rounds of taking turns.
+const ROUNDS: usize = 80;
+/// Nothing moves any more: changes below this part of σ.
+const STILL: f64 = 0.03;
+/// Signal over noise of the weakest first harmonic of a lattice, at least, when all are taken off.
+const WEAKEST: f64 = 5.0;
+/// The same while others are still in the image.
+const ON_TRIAL: f64 = 1.5;
+/// Lattices whose wave vectors lie within this of each other (cycles per frame) are one.
+const SAME: f64 = 0.3;
+/// A lattice whose first harmonics lie so near to higher ones of another (indices of a cell 3, 4 or 7 times as dense) that
+/// they are taken for these shows by its own higher ones: those of a cell that is at least this much denser ...
+const HIDDEN: f64 = 9.0;
+/// ... and whose waves lie within this of the other's: cycles per frame, and as a share of the distance of the points.
+const NEAR_HIDDEN: [f64; 2] = [1.5, 0.2];
+/// Samples per shortest period at which the correlation of lattices is worked out.
+const SAMPLES: f64 = 5.0;
+
+/// Finds and measures `count` lattices, the strongest first.
+///
+/// # Errors
+/// As [`measure`] for the first; [`LatticeError::FewerLattices`] where fewer than `count` stand out, and
+/// [`LatticeError::Entangled`] where two of them cannot be told apart on this frame.
+pub fn measure_several(
+    image: &Image,
+    geometry: &Geometry,
+    background: Background,
+    count: usize,
+) -> Result<Vec<MeasuredLattice>, LatticeError> {
+    let scene = Scene {
+        image,
+        geometry,
+        background,
+    };
+    let mut parts: Vec<Part> = Vec::new();
+    while parts.len() < count {
+        match scene.next(&parts) {
+            Ok(part) => parts.push(part),
+            Err(error) if count == 1 => return Err(error),
+            Err(error) => scene.split_one(&mut parts, count, error)?,
+        }
+        scene.take_turns(&mut parts)?;
+    }
+    let own = |i: usize| !parts[..i].iter().any(|other| parts[i].is(other, image));
+    let found = (0..parts.len())
+        .filter(|&i| parts[i].stands_out() && own(i))
+        .count();
+    if count > 1 && found < count {
+        return Err(LatticeError::FewerLattices {
+            found,
+            wanted: count,
+        });
+    }
+    if count > 1 {
+        beside_each_other(&mut parts, image)?;
+    }
+    Ok(parts.into_iter().map(|part| part.lattice).collect())
+}
+
+/// An image and how it is measured.
+struct Scene<'a> {
+    image: &'a Image,
+    geometry: &'a Geometry,
+    background: Background,
+}
+
+/// One lattice and what it makes of the image.
+struct Part {
+    lattice: MeasuredLattice,
+    fit: LatticeFit,
+    model: Vec<f64>,
+}
+
+impl Part {
+    fn new(lattice: MeasuredLattice, image: &Image) -> Option<Self> {
+        let fit = lattice.fit.clone()?;
+        let model = model(&fit, image);
+        Some(Self {
+            lattice,
+            fit,
+            model,
+        })
+    }
+
+    /// Whether its first harmonics are more than noise.
+    fn stands_out(&self) -> bool {
+        self.lattice.signal_to_noise > WEAKEST
+    }
+
+    /// Whether both are the same lattice: the pair of this one lies on points of the other, as what is left of the
+    /// harmonics of the other does, and as a lattice does whose first harmonics lie so near to those of the other that
+    /// they are taken for them.
+    fn is(&self, other: &Self, image: &Image) -> bool {
+        let frame = Vector2::new(image.columns as f64, image.rows as f64) / std::f64::consts::TAU;
+        let pair = &self.fit.wave_vectors.basis;
+        let theirs = &other.fit.wave_vectors.basis;
+        theirs.try_inverse().is_some_and(|inverse| {
+            let whole = (inverse * pair).map(f64::round);
+            let miss = pair - theirs * whole;
+            let cycles = Matrix2::from_diagonal(&frame) * miss;
+            let apart = cycles.column(0).norm().max(cycles.column(1).norm());
+            let points = Matrix2::from_diagonal(&frame) * theirs;
+            let spacing = points.column(0).norm().min(points.column(1).norm());
+            let near = if whole.determinant().abs() >= HIDDEN - 0.5 {
+                NEAR_HIDDEN[0].min(NEAR_HIDDEN[1] * spacing).max(SAME)
+            } else {
+                SAME
+            };
+            apart < near
+        })
+    }
+}
+
+impl Scene<'_> {
+    /// Another lattice beside the known ones. Those that are still to be found are noise to it: where it does
+    /// not stand out of that, what the spectrum proposes is taken on trial.
+    fn next(&self, parts: &[Part]) -> Result<Part, LatticeError> {
+        let left = self.without(parts, None);
+        let new = |lattice: MeasuredLattice| {
+            let known = |part: &Part| parts.iter().any(|other| part.is(other, self.image));
+            Part::new(lattice, self.image).filter(|part| !known(part))
+        };
+        let error = match measure(&left, self.geometry, self.background, Method::Lattice) {
+            Ok(lattice) => return new(lattice).ok_or(LatticeError::Entangled),
+            Err(error) => error,
+        };
+        Start::proposals(&left, self.geometry, self.background)
+            .iter()
+            .filter_map(|pair| self.near(&left, pair))
+            .filter_map(new)
+            .find(|part| part.lattice.signal_to_noise > ON_TRIAL)
+            .ok_or(error)
+    }
+
+    fn near(&self, image: &Image, pair: &Matrix2<f64>) -> Option<MeasuredLattice> {
+        let start = Start::near(image, self.geometry, self.background, pair)?;
+        start.measure(Method::Lattice).ok()
+    }
+
+    /// Takes one lattice, known or first seen in a part of the frame, for two that look like one.
+    fn split_one(
+        &self,
+        parts: &mut Vec<Part>,
+        wanted: usize,
+        error: LatticeError,
+    ) -> Result<(), LatticeError> {
+        let none = match parts.len() {
+            0 => error,
+            found => LatticeError::FewerLattices { found, wanted },
+        };
+        let left = remove_background(&self.without(parts, None), self.background);
+        let in_pieces = self.pair_in_pieces(&left);
+        let known = (0..parts.len()).map(|i| (Some(i), parts[i].fit.wave_vectors.basis));
+        let candidates: Vec<_> = known.chain(in_pieces.map(|pair| (None, pair))).collect();
+        for (replaced, pair) in candidates {
+            let others: Vec<usize> = (0..parts.len()).filter(|i| Some(*i) != replaced).collect();
+            let mut left = self.image.clone();
+            for &i in &others {
+                take_off(&mut left, &parts[i].model);
+            }
+            let flat = remove_background(&left, self.background);
+            let Some([a, b]) = split::split(&flat, &pair) else {
+                continue;
+            };
+            let near = |model: &[f64], pair: &Matrix2<f64>| {
+                let mut rest = left.clone();
+                take_off(&mut rest, model);
+                Part::new(self.near(&rest, pair)?, self.image)
+            };
+            let Some(first) = near(&b.model, &a.pair) else {
+                continue;
+            };
+            let Some(second) = near(&first.model, &b.pair) else {
+                continue;
+            };
+            if first.is(&second, self.image) || !(first.stands_out() && second.stands_out()) {
+                continue;
+            }
+            if let Some(i) = replaced {
+                parts.remove(i);
+            }
+            parts.extend([first, second]);
+            return Ok(());
+        }
+        Err(none)
+    }
+
+    /// The lattice as a half or a quarter of the frame shows it, where the two beat as one.
+    fn pair_in_pieces(&self, left: &Image) -> Option<Matrix2<f64>> {
+        let (w, h) = (left.columns / 2, left.rows / 2);
+        let corners = [[w / 2, h / 2], [0, 0], [w, 0], [0, h], [w, h]];
+        let found = corners.into_iter().filter_map(|first| {
+            let piece = left.cropped(first, [w, h]);
+            let geometry = self.geometry.cropped(first, [w, h]);
+            let start = Start::find(&piece, &geometry, self.background).ok()?;
+            let lattice = start.measure(Method::Fourier).ok()?;
+            Some((lattice.signal_to_noise, lattice.reciprocal))
+        });
+        found
+            .max_by(|a, b| a.0.total_cmp(&b.0))
+            .map(|(_, pair)| pair)
+    }
+
+    /// The image less the models of all parts but one.
+    fn without(&self, parts: &[Part], but: Option<usize>) -> Image {
+        let mut image = self.image.clone();
+        for (i, part) in parts.iter().enumerate() {
+            if but != Some(i) {
+                take_off(&mut image, &part.model);
+            }
+        }
+        image
+    }
+
+    /// Fits each anew to what the others leave, until none moves.
+    fn take_turns(&self, parts: &mut [Part]) -> Result<(), LatticeError> {
+        for _ in 0..ROUNDS {
+            let mut most = 0.0f64;
+            for i in 0..parts.len() {
+                let left = self.without(parts, Some(i));
+                let pair = parts[i].fit.wave_vectors.basis;
+                let refitted = self
+                    .near(&left, &pair)
+                    .and_then(|l| Part::new(l, self.image));
+                let Some(part) = refitted else {
+                    return Err(LatticeError::Entangled);
+                };
+                let moved = part.fit.wave_vectors.basis - pair;
+                let sigma = part.fit.wave_vectors.covariance.diagonal().map(f64::sqrt);
+                let moved = moved.iter().zip(sigma.iter());
+                most = moved.fold(most, |most, (d, s)| most.max(d.abs() / s));
+                parts[i] = part;
+            }
+            if most < STILL {
+                return Ok(());
+            }
+        }
+        Err(LatticeError::Entangled)
+    }
+}
+
+fn take_off(image: &mut Image, model: &[f64]) {
+    for (value, model) in image.values.iter_mut().zip(model) {
+        *value -= model;
+    }
+}
+
+/// `Σ A cos(q·(n − centre) + φ)` on the pixels of `image`.
+fn model(fit: &LatticeFit, image: &Image) -> Vec<f64> {
+    let mut values = vec![0.0; image.values.len()];
+    for harmonic in &fit.harmonics {
+        let q = fit.wave_vectors.basis * Vector2::from(harmonic.index.map(f64::from));
+        let along: Vec<(f64, f64)> = (0..image.columns)
+            .map(|c| (q.x * (c as f64 - fit.centre.x)).sin_cos())
+            .collect();
+        for (row, line) in values.chunks_exact_mut(image.columns).enumerate() {
+            let angle = q.y * (row as f64 - fit.centre.y) + harmonic.phase;
+            let (sin, cos) = angle.sin_cos();
+            let (a, b) = (harmonic.amplitude * cos, harmonic.amplitude * sin);
+            for (value, (sin, cos)) in line.iter_mut().zip(&along) {
+                *value += a * cos - b * sin;
+            }
+        }
+    }
+    values
+}
+
+/// Enlarges the errors of each part by what the others take of it.
+fn beside_each_other(parts: &mut [Part], image: &Image) -> Result<(), LatticeError> {
+    let columns: Vec<usize> = parts.iter().map(|p| derivatives(&p.fit)).collect();
+    let total: usize = 1 + columns.iter().sum::<usize>();
+    let shortest = parts
+        .iter()
+        .flat_map(|p| {
+            p.fit
+                .harmonics
+                .iter()
+                .map(|h| p.fit.wave_vectors.basis * Vector2::from(h.index.map(f64::from)))
+        })
+        .map(|q| std::f64::consts::TAU / q.norm())
+        .fold(f64::INFINITY, f64::min);
+    let stride = ((shortest / SAMPLES) as usize).max(1);
+    let mut fisher = DMatrix::<f64>::zeros(total, total);
+    let mut design = nalgebra::DVector::<f64>::zeros(total);
+    for row in (0..image.rows).step_by(stride) {
+        for column in (0..image.columns).step_by(stride) {
+            if !image.row(row)[column].is_finite() {
+                continue;
+            }
+            design[0] = 1.0;
+            let mut at = 1;
+            let pixel = Vector2::new(column as f64, row as f64);
+            for part in parts.iter() {
+                at += differentiate(&part.fit, image, pixel, &mut design.as_mut_slice()[at..]);
+            }
+            fisher.ger(1.0, &design, &design, 1.0);
+        }
+    }
+    let whole = fisher.clone().cholesky().ok_or(LatticeError::Entangled)?;
+    let whole = whole.inverse();
+    let mut at = 1;
+    for (part, n) in parts.iter_mut().zip(columns) {
+        let own: Vec<usize> = std::iter::once(0).chain(at..at + n).collect();
+        let alone = fisher.select_rows(&own).select_columns(&own);
+        let alone = alone.cholesky().ok_or(LatticeError::Entangled)?.inverse();
+        // The seven derivatives come first.
+        let beside: SMatrix<f64, 7, 7> = whole.fixed_view::<7, 7>(at, at).into_owned();
+        let alone: SMatrix<f64, 7, 7> = alone.fixed_view::<7, 7>(1, 1).into_owned();
+        part.enlarge(&beside, &alone)
+            .ok_or(LatticeError::Entangled)?;
+        at += n;
+    }
+    Ok(())
+}
+
+/// Number of parameters of a lattice: three phases, four components of wave vectors, amplitudes.
+fn derivatives(fit: &LatticeFit) -> usize {
+    4 + 2 * fit.harmonics.len()
+}
+
+/// Derivatives of the model at a pixel: by the phases of the first three harmonics, by `(q₁, q₂)` in units of
+/// one over the frame, by the amplitudes of the first three, and by both amplitudes of the others. Returns their number.
+fn differentiate(fit: &LatticeFit, image: &Image, pixel: Vector2<f64>, out: &mut [f64]) -> usize {
+    let from_centre = pixel - fit.centre;
+    let place = from_centre.component_div(&Vector2::new(image.columns as f64, image.rows as f64));
+    out[3..7].fill(0.0);
+    let mut next = 10;
+    for (i, harmonic) in fit.harmonics.iter().enumerate() {
+        let index = harmonic.index.map(f64::from);
+        let q = fit.wave_vectors.basis * Vector2::from(index);
+        let (sin, cos) = (q.dot(&from_centre) + harmonic.phase).sin_cos();
+        let by_phase = -harmonic.amplitude * sin;
+        for (vector, n) in index.into_iter().enumerate() {
+            out[3 + 2 * vector] += n * by_phase * place.x;
+            out[4 + 2 * vector] += n * by_phase * place.y;
+        }
+        if i < 3 {
+            out[i] = by_phase;
+            out[7 + i] = cos;
+        } else {
+            out[next] = sin;
+            out[next + 1] = cos;
+            next += 2;
+        }
+    }
+    next
+}
+
+impl Part {
+    /// Takes the covariances through the map that takes `alone` to `beside`.
+    fn enlarge(&mut self, beside: &SMatrix<f64, 7, 7>, alone: &SMatrix<f64, 7, 7>) -> Option<()> {
+        // The scale of the derivatives by wave vectors cancels but for its ratio along x and y, which is kept by
+        // mapping each block by itself.
+        let phases = map::<3>(
+            &beside.fixed_view::<3, 3>(0, 0).into_owned(),
+            &alone.fixed_view::<3, 3>(0, 0).into_owned(),
+        )?;
+        let pair = map::<4>(
+            &beside.fixed_view::<4, 4>(3, 3).into_owned(),
+            &alone.fixed_view::<4, 4>(3, 3).into_owned(),
+        )?;
+        let size = self.lattice.middle.map(|m| 2.0 * m + 1.0);
+        let scale = Matrix4::from_diagonal(&nalgebra::Vector4::new(size.x, size.y, size.x, size.y));
+        let back = scale.map(|s| if s == 0.0 { 0.0 } else { 1.0 / s });
+        let pair: Matrix4<f64> = back * pair * scale;
+        let waves = &mut self.fit.wave_vectors;
+        waves.covariance = pair * waves.covariance * pair.transpose();
+        let covariance: Matrix3<f64> = phases * self.fit.phase_covariance * phases.transpose();
+        self.fit.phase_covariance = covariance;
+        self.lattice.phases.covariance = covariance;
+        // Same pair, same labelling: only the errors change.
+        let real = real_from_reciprocal(waves)?;
+        self.lattice.pixels.covariance = real.covariance;
+        self.lattice.fit = Some(self.fit.clone());
+        Some(())
+    }
+}
+
+/// `L_b L_a⁻¹` of the Cholesky factors: takes the covariance a to b.
+fn map<const N: usize>(
+    beside: &SMatrix<f64, N, N>,
+    alone: &SMatrix<f64, N, N>,
+) -> Option<SMatrix<f64, N, N>> {
+    let [b, a] = [beside, alone].map(|m| DMatrix::from_column_slice(N, N, m.as_slice()));
+    let (b, a) = (b.cholesky()?.l(), a.cholesky()?.l());
+    let inverse = a.solve_lower_triangular(&DMatrix::identity(N, N))?;
+    Some(SMatrix::from_column_slice((b * inverse).as_slice()))
+}

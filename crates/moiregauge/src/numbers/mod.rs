@@ -1,0 +1,8 @@
+//! Small mathematics that every room needs: χ², the median, random numbers.
+
+pub(crate) mod chi2;
+pub(crate) mod median;
+pub(crate) mod rng;
+pub(crate) mod spread;
+
+pub use rng::{normals, stream};

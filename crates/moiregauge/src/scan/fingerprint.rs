@@ -1,0 +1,63 @@
+//! What is kept of an image to know it again.
+
+use std::sync::Arc;
+
+use crate::frame::background::{Background, remove_background};
+use crate::frame::image::Image;
+
+/// What is left of the pixels of an image to know it again.
+#[derive(Clone, Debug)]
+pub(crate) struct Fingerprint {
+    size: [usize; 2],
+    /// Values at pixels spread over the frame, without plane, in standard deviations.
+    samples: Arc<[f32]>,
+}
+
+impl Fingerprint {
+    /// Of the whole image.
+    pub(crate) fn of(image: &Image) -> Self {
+        let flat = remove_background(image, Background::Plane);
+        let (mut squares, mut count) = (0.0, 0_usize);
+        for value in flat.values.iter().filter(|v| v.is_finite()) {
+            squares += value * value;
+            count += 1;
+        }
+        let deviation = (squares / count.max(1) as f64).sqrt();
+        let n = flat.values.len();
+        // Steps of the golden ratio spread evenly and follow no row or column.
+        let at = |i: usize| (i as f64 * 0.618_033_988_749_895).fract() * n as f64;
+        let samples = (0..SAMPLES.min(n)).map(|i| (flat.values[at(i) as usize] / deviation) as f32);
+        Self {
+            size: [image.columns, image.rows],
+            samples: samples.collect(),
+        }
+    }
+
+    /// Root mean square of the difference, in standard deviations of the images; `None` where they cannot be of the
+    /// same pixels.
+    pub(crate) fn difference(&self, other: &Self) -> Option<f64> {
+        if self.size != other.size || self.samples.is_empty() {
+            return None;
+        }
+        let (mut squares, mut count, mut missing) = (0.0, 0_usize, 0_usize);
+        for (a, b) in self.samples.iter().zip(other.samples.iter()) {
+            match (a.is_finite(), b.is_finite()) {
+                (true, true) => {
+                    squares += f64::from(a - b).powi(2);
+                    count += 1;
+                }
+                (false, false) => {}
+                _ => missing += 1,
+            }
+        }
+        let all = self.samples.len() as f64;
+        let comparable = 2 * count > self.samples.len() && missing as f64 <= MISSING * all;
+        comparable.then(|| (squares / count as f64).sqrt())
+    }
+}
+
+/// Pixels that are compared.
+pub(crate) const SAMPLES: usize = 1024;
+
+/// Share of the compared pixels that may be missing in one image only.
+pub(crate) const MISSING: f64 = 0.02;

@@ -1,0 +1,259 @@
+//! One scan: geometry, timing and lattice of each of its lines, trace and retrace.
+
+use nalgebra::Matrix2;
+use spmfile::{Channel, FrameDirection, LineDirection, Scan};
+
+use crate::calibration::Calibration;
+use crate::caveat::Caveat;
+use crate::frame::geometry::{Geometry, Timing};
+use crate::frame::image::Image;
+use crate::lattice::measure::{Start, measure};
+use crate::lattice::measured::MeasuredLattice;
+use crate::lattice::several::together::measure_several;
+use crate::scan::channel::{channels, image_of, line_name};
+use crate::scan::doubts::{about_fit, few_periods, lines_disagree, turned};
+use crate::scan::fingerprint::Fingerprint;
+use crate::scan::images::first_of_several;
+use crate::scan::measured::{MeasureError, MeasuredLine, MeasuredScan};
+use crate::scan::moires::in_order;
+use crate::scan::overlap::Window;
+use crate::scan::positions::{nominal, speeds, usable_sensors};
+use crate::scan::scanner::{about_calibration, calibrated};
+use crate::scan::shared::correlation;
+use crate::settings::knobs::Settings;
+use crate::spectrum::error::LatticeError;
+
+/// Bytes of memory that the analysis of an image takes for each of its pixels at most: measured with 2048 × 2048
+/// single-precision samples and eight pixels per period, where nothing can be binned.
+pub const BYTES_PER_PIXEL: u64 = 105;
+
+/// Measures one scan, restricted to the window if one is given.
+///
+/// # Errors
+/// [`MeasureError`] says what the file lacks, or that its image shows no lattice. With both line
+/// directions asked for, one of them is enough.
+pub fn measure_scan(
+    file: &str,
+    scan: &Scan,
+    settings: &Settings,
+    window: Option<&Window>,
+) -> Result<MeasuredScan, MeasureError> {
+    Ok(measure_moires(file, scan, settings, window)?.swap_remove(0))
+}
+
+/// Measures a scan of a lattice whose cell is known: `cell` is its real-space pair, nm, at any orientation.
+///
+/// # Errors
+/// As [`measure_scan`]; an image that shows another lattice shows none.
+pub fn measure_known(
+    file: &str,
+    scan: &Scan,
+    settings: &Settings,
+    cell: &Matrix2<f64>,
+) -> Result<MeasuredScan, MeasureError> {
+    let find = |image: &Image, geometry: &Geometry| {
+        let start = Start::find_known(image, geometry, settings.background, cell)?;
+        Ok(vec![start.measure(settings.method)?])
+    };
+    Ok(measure_with(file, scan, settings, None, &find)?.swap_remove(0))
+}
+
+/// Measures every moiré of one scan, as many as `settings` say, the largest cell first; otherwise as
+/// [`measure_scan`]. There is at least one.
+///
+/// # Errors
+/// As [`measure_scan`]; also where there are fewer moirés, or two that cannot be told apart.
+pub fn measure_moires(
+    file: &str,
+    scan: &Scan,
+    settings: &Settings,
+    window: Option<&Window>,
+) -> Result<Vec<MeasuredScan>, MeasureError> {
+    if let Some(problem) = settings.out_of_range() {
+        return Err(problem.into());
+    }
+    let (background, method) = (settings.background, settings.method);
+    let find = |image: &Image, geometry: &Geometry| match settings.moires {
+        0 | 1 => measure(image, geometry, background, method).map(|lattice| vec![lattice]),
+        n => measure_several(image, geometry, background, n),
+    };
+    measure_with(file, scan, settings, window, &find)
+}
+
+/// How the lattices of an image are found and measured; at least one.
+type Find<'a> = &'a dyn Fn(&Image, &Geometry) -> Result<Vec<MeasuredLattice>, LatticeError>;
+
+fn measure_with(
+    file: &str,
+    scan: &Scan,
+    settings: &Settings,
+    window: Option<&Window>,
+    find: Find,
+) -> Result<Vec<MeasuredScan>, MeasureError> {
+    let problem = settings.scanner.as_ref().and_then(Calibration::problem);
+    if let Some(problem) = problem {
+        return Err(MeasureError::Calibration(problem));
+    }
+    let channels = channels(scan, settings)?;
+    let several = first_of_several(scan, &channels[0].name, settings);
+    let mut caveats: Vec<Caveat> = several
+        .into_iter()
+        .map(|words| Caveat::new("several-images", file, words))
+        .collect();
+    let mut moires: Vec<Vec<MeasuredLine>> = Vec::new();
+    let mut failures = Vec::new();
+    for channel in &channels {
+        match measure_line(file, scan, channel, settings, (window, find), &mut caveats) {
+            Ok(lines) if moires.is_empty() => {
+                moires = lines.into_iter().map(|line| vec![line]).collect();
+            }
+            Ok(lines) => {
+                let first: Vec<_> = moires
+                    .iter()
+                    .map(|lines| lines[0].in_sensor_coordinates())
+                    .collect();
+                let lines = in_order(&first, lines, |l| Some(l.in_sensor_coordinates()));
+                for (all, line) in moires.iter_mut().zip(lines) {
+                    all.push(line);
+                }
+            }
+            Err(error) => failures.push(error),
+        }
+    }
+    if moires.is_empty() {
+        return Err(failures.swap_remove(0));
+    }
+    for error in failures {
+        caveats.push(Caveat::new(
+            "line-left-out",
+            file,
+            format!("one line direction could not be used: {error}"),
+        ));
+    }
+    about_calibration(file, scan, moires.iter().flatten(), settings, &mut caveats);
+    caveats.dedup_by(|a, b| (&a.code, &a.message) == (&b.code, &b.message));
+    let measured = moires.into_iter().map(|mut lines| {
+        share_noise(&mut lines);
+        let mut caveats = caveats.clone();
+        let excluded = lines_disagree(file, &lines, &mut caveats);
+        MeasuredScan {
+            file: file.to_owned(),
+            acquired: scan.acquired,
+            frame_direction: scan.frame_direction,
+            line_rate_hz: scan.line_rate_hz,
+            channel: channels[0].name.clone(),
+            size_nm: scan.size_nm,
+            set: None,
+            digest: None,
+            lines,
+            excluded,
+            repeats: None,
+            caveats,
+        }
+    });
+    Ok(measured.collect())
+}
+
+/// Enlarges the errors of trace and retrace by what their noise has in common, so that they can be
+/// taken as independent.
+fn share_noise(lines: &mut [MeasuredLine]) {
+    let [first, second] = lines else { return };
+    let (Some(a), Some(b)) = (&first.lattice.fit, &second.lattice.fit) else {
+        return;
+    };
+    let correlations = [correlation(a, b), correlation(b, a)];
+    for (line, correlation) in [first, second].into_iter().zip(correlations) {
+        let (mut weighted, mut weights) = (0.0, 0.0);
+        let variances = line.lattice.phases.covariance.diagonal();
+        for (variance, correlation) in variances.iter().zip(correlation) {
+            weighted += correlation / variance;
+            weights += variance.recip();
+        }
+        line.lattice.phases = line.lattice.phases.enlarged(correlation.map(|c| 1.0 + c));
+        if weights > 0.0 {
+            line.lattice.pixels.covariance *= 1.0 + weighted / weights;
+        }
+    }
+}
+
+fn measure_line(
+    file: &str,
+    scan: &Scan,
+    channel: &Channel,
+    settings: &Settings,
+    (window, find): (Option<&Window>, Find),
+    caveats: &mut Vec<Caveat>,
+) -> Result<Vec<MeasuredLine>, MeasureError> {
+    let line = channel.line_direction.unwrap_or(LineDirection::Trace);
+    let nominal = nominal(scan, channel);
+    let sensors = usable_sensors(file, scan, channel, nominal.as_ref(), caveats);
+    let timing = scan
+        .frame_direction
+        .and_then(|frame| Timing::of_scan(scan, channel.columns, frame, line));
+    let geometry = match (&sensors, &nominal) {
+        (Some(sensors), _) => sensors.geometry.clone(),
+        (None, Some(nominal)) => {
+            turned(file, scan.rotation_rad, caveats);
+            nominal.clone()
+        }
+        (None, None) => return Err(MeasureError::NoSize),
+    };
+    let (speeds, speed_error) = speeds(&geometry, sensors.as_ref(), timing.as_ref());
+    let mut image = image_of(channel);
+    let pixels = Fingerprint::of(&image);
+    let (mut geometry, mut nominal) = (geometry, nominal);
+    let mut lines_after = 0;
+    if let Some(window) = window {
+        let (first, size) = window.pixels(&geometry).ok_or(MeasureError::NoOverlap)?;
+        lines_after = match scan.frame_direction {
+            Some(FrameDirection::Down) => first[1],
+            _ => image.rows - first[1] - size[1],
+        };
+        image = image.cropped(first, size);
+        geometry = geometry.cropped(first, size);
+        nominal = nominal.map(|n| n.cropped(first, size));
+    }
+    let geometry = calibrated(&geometry, settings);
+    let speeds = match (&timing, &settings.scanner) {
+        (Some(timing), Some(_)) => {
+            let now = geometry.speeds(timing);
+            [0, 1].map(|i| speeds[i].scaled(now[i] / speeds[i].value))
+        }
+        _ => speeds,
+    };
+    let mut lattices = find(&image, &geometry).map_err(|error| MeasureError::Lattice {
+        line: line_name(line),
+        channel: channel.name.clone(),
+        error,
+    })?;
+    let cell = |lattice: &MeasuredLattice| lattice.pixels.basis.determinant().abs();
+    lattices.sort_by(|a, b| cell(b).total_cmp(&cell(a)));
+    let lines = lattices.into_iter().map(|lattice| {
+        about_lattice(file, &lattice, &geometry, caveats);
+        MeasuredLine {
+            line,
+            geometry: geometry.clone(),
+            nominal: nominal.clone(),
+            timing,
+            frame_columns: channel.columns,
+            lines_after,
+            lattice,
+            speeds,
+            speed_error,
+            pixels: pixels.clone(),
+        }
+    });
+    Ok(lines.collect())
+}
+
+fn about_lattice(
+    file: &str,
+    lattice: &MeasuredLattice,
+    geometry: &Geometry,
+    caveats: &mut Vec<Caveat>,
+) {
+    few_periods(file, lattice, caveats);
+    if let Some(fit) = &lattice.fit {
+        about_fit(file, fit, geometry, caveats);
+    }
+}

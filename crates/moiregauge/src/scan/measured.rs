@@ -1,0 +1,164 @@
+//! One scan once it is measured: a few numbers, and no pixels.
+
+use heterostrain::Estimate;
+use heterostrain::lattice::{LatticeVectors, block, labelled_like};
+use nalgebra::{Matrix2, Vector2};
+use spmfile::{DateTime, FrameDirection, LineDirection};
+
+use crate::caveat::Caveat;
+use crate::drift::linear::Observation;
+use crate::frame::geometry::{Geometry, Timing};
+use crate::lattice::measured::MeasuredLattice;
+use crate::scan::fingerprint::Fingerprint;
+use crate::settings::ranges::OutOfRange;
+use crate::spectrum::error::LatticeError;
+
+/// What the pixels of one scan gave.
+#[derive(Clone, Debug)]
+pub struct MeasuredScan {
+    /// The file as the user named it.
+    pub file: String,
+    /// When it was saved, by the instrument's clock.
+    pub acquired: Option<DateTime>,
+    /// Sense of the slow motion.
+    pub frame_direction: Option<FrameDirection>,
+    /// Lines per second.
+    pub line_rate_hz: Option<f64>,
+    /// Name of the analysed channel.
+    pub channel: String,
+    /// Nominal size (fast, slow), nm.
+    pub size_nm: Option<[f64; 2]>,
+    /// Name of the set to which the user assigned it by hand.
+    pub set: Option<String>,
+    /// Hash of the bytes of its file, where whoever read it tells it; files of equal bytes are one.
+    pub digest: Option<String>,
+    /// One entry for each line direction that was used.
+    pub lines: Vec<MeasuredLine>,
+    /// Why it is shown but not used; `None` where it is used.
+    pub excluded: Option<String>,
+    /// The file that holds the same data and is used in its place.
+    pub repeats: Option<String>,
+    /// Doubts about this scan.
+    pub caveats: Vec<Caveat>,
+}
+
+/// What the trace or the retrace of one scan gave.
+#[derive(Clone, Debug)]
+pub struct MeasuredLine {
+    /// Trace or retrace.
+    pub line: LineDirection,
+    /// Where the pixels were.
+    pub geometry: Geometry,
+    /// Where they should have been.
+    pub nominal: Option<Geometry>,
+    /// When they were recorded; `None` where the file does not tell.
+    pub timing: Option<Timing>,
+    /// Samples in a line of the whole frame.
+    pub frame_columns: usize,
+    /// Lines that were recorded after the part of the frame that was used.
+    pub lines_after: usize,
+    /// The lattice in pixels.
+    pub lattice: MeasuredLattice,
+    /// Tip speeds along the fast and slow axes, nm/s; σ is the spread over the lines. NaN without timing.
+    pub speeds: [Estimate; 2],
+    /// Relative standard error of the mean speeds.
+    pub speed_error: [f64; 2],
+    /// To know the whole image again.
+    pub(crate) pixels: Fingerprint,
+}
+
+impl MeasuredLine {
+    /// The lattice in sensor coordinates, nm, with the error of the plane fit.
+    pub fn in_sensor_coordinates(&self) -> LatticeVectors {
+        let mut mapped = self.lattice.pixels.mapped(&self.geometry.pixel_to_nm);
+        mapped.covariance += self.sensor_part().covariance;
+        mapped
+    }
+
+    /// The same with the error of the plane fit alone.
+    pub(crate) fn sensor_part(&self) -> LatticeVectors {
+        // r_i = J a_i, so δr_i = (a_ix I, a_iy I) δ(J₁₁, J₂₁, J₁₂, J₂₂).
+        let b = &self.lattice.pixels.basis;
+        let i = Matrix2::identity();
+        let lever = block(&(i * b.m11), &(i * b.m21), &(i * b.m12), &(i * b.m22));
+        LatticeVectors {
+            basis: self.geometry.pixel_to_nm * b,
+            covariance: lever * self.geometry.covariance * lever.transpose(),
+        }
+    }
+
+    /// The lattice in nominal coordinates, nm.
+    pub fn in_nominal_coordinates(&self) -> Option<LatticeVectors> {
+        let nominal = self.nominal.as_ref()?;
+        Some(self.lattice.pixels.mapped(&nominal.pixel_to_nm))
+    }
+
+    /// What the drift problem needs, labelled like `reference` (nm); no time gradient without timing.
+    pub(crate) fn observation(&self, reference: &Matrix2<f64>) -> Observation {
+        let gradient = self
+            .timing
+            .and_then(|timing| self.geometry.time_gradient(&timing));
+        Observation {
+            lattice: labelled_like(&self.in_sensor_coordinates(), reference),
+            time_gradient: gradient.unwrap_or_else(Vector2::zeros),
+            speed_error: self.speed_error,
+            sensor: labelled_like(&self.sensor_part(), reference).covariance,
+        }
+    }
+}
+
+/// Why a scan cannot be measured.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum MeasureError {
+    /// The channel is not there.
+    #[error("no channel {wanted:?}; the file has {present}")]
+    NoChannel {
+        /// What was asked for.
+        wanted: String,
+        /// The channels that are there.
+        present: String,
+    },
+    /// There are not so many images of the channel.
+    #[error("expected image {wanted} of {channel:?}, found {found} in the file")]
+    NoSuchImage {
+        /// The channel.
+        channel: String,
+        /// What was asked for, counted from 1.
+        wanted: usize,
+        /// How many there are.
+        found: usize,
+    },
+    /// The line direction is not there.
+    #[error("channel {channel:?} has no {wanted} lines, only {present}")]
+    NoLine {
+        /// The channel.
+        channel: String,
+        /// What was asked for.
+        wanted: &'static str,
+        /// What is there.
+        present: &'static str,
+    },
+    /// A setting that makes no sense.
+    #[error(transparent)]
+    Settings(#[from] OutOfRange),
+    /// A calibration that no scanner can have.
+    #[error("the calibration of the scanner cannot be used: {0}")]
+    Calibration(String),
+    /// No size.
+    #[error("the file gives neither position sensors nor a scan size")]
+    NoSize,
+    /// Nothing is left of the frame.
+    #[error("the scans have no region in common: this one lies outside the others")]
+    NoOverlap,
+    /// The image shows no lattice.
+    #[error("{line} of {channel:?}: {error}")]
+    Lattice {
+        /// Trace or retrace.
+        line: &'static str,
+        /// The channel.
+        channel: String,
+        /// Why.
+        error: LatticeError,
+    },
+}

@@ -1,0 +1,230 @@
+//! Where the pixels of an image are: by its position sensors, or as the instrument intended.
+
+use heterostrain::Estimate;
+use nalgebra::Vector2;
+use spmfile::{Channel, FrameDirection, LineDirection, Scan};
+
+use crate::caveat::Caveat;
+use crate::frame::geometry::{Geometry, Timing};
+use crate::frame::image::Image;
+use crate::frame::sensors::{SensorGeometry, from_sensors};
+use crate::numbers::spread::mean_and_spread;
+use crate::scan::channel::{image_of, line_name};
+
+/// A sensor whose span differs from the nominal size by more than this factor is not believed.
+const WILD_SPAN: f64 = 2.0;
+/// A lag that changes the fast step by more than this share deserves a word.
+const NOTABLE_LAG: f64 = 1e-4;
+
+/// The geometry that the instrument intended: nominal pitch, rotated.
+pub(crate) fn nominal(scan: &Scan, channel: &Channel) -> Option<Geometry> {
+    Geometry::of_pitch(
+        [channel.columns, channel.rows],
+        channel.pitch_nm()?,
+        scan.rotation_rad,
+        Vector2::from(scan.offset_nm),
+    )
+}
+
+/// The sensors of this line direction as images in nm; `None` where they are absent or levelled.
+pub(crate) fn sensor_images(
+    file: &str,
+    scan: &Scan,
+    channel: &Channel,
+    caveats: &mut Vec<Caveat>,
+) -> Option<[Image; 2]> {
+    let line = channel.line_direction.unwrap_or(LineDirection::Trace);
+    let other = match line {
+        LineDirection::Trace => LineDirection::Retrace,
+        LineDirection::Retrace => LineDirection::Trace,
+    };
+    let found = match spmfile::position_sensors(scan, line) {
+        Ok(sensors) => Ok(sensors),
+        Err(problem) => spmfile::position_sensors(scan, other)
+            .inspect(|_| {
+                caveats.push(Caveat::new(
+                    "sensors-of-other-line",
+                    file,
+                    format!(
+                        "the {} image has no position sensors of its own; those of the {} are used",
+                        line_name(line),
+                        line_name(other)
+                    ),
+                ));
+            })
+            .map_err(|_| problem),
+    };
+    let sensors = match found {
+        Ok(sensors) => sensors,
+        Err(problem) => {
+            caveats.push(Caveat::new(
+                "no-position-sensors",
+                file,
+                format!(
+                    "{problem}: nominal coordinates are used; scanner calibration errors (often 1 % \
+                     and more) go into lengths, twist and strain in full"
+                ),
+            ));
+            return None;
+        }
+    };
+    for sensor in [sensors.x, sensors.y] {
+        if let Some(fit) = &sensor.plane_fit {
+            caveats.push(Caveat::new(
+                "sensor-plane-fitted",
+                file,
+                format!(
+                    "the instrument subtracted a fit ({fit}) from {:?}, so it no longer tells positions; \
+                     nominal coordinates are used",
+                    sensor.name
+                ),
+            ));
+            return None;
+        }
+    }
+    let in_nm = |c: &Channel| {
+        let factor = spmfile::nm_per(&c.unit).unwrap_or(f64::NAN);
+        let mut image = image_of(c);
+        for v in &mut image.values {
+            *v *= factor;
+        }
+        image
+    };
+    Some([in_nm(sensors.x), in_nm(sensors.y)])
+}
+
+/// The geometry by the sensors, if there are any that can be believed; else a caveat.
+pub(crate) fn usable_sensors(
+    file: &str,
+    scan: &Scan,
+    channel: &Channel,
+    nominal: Option<&Geometry>,
+    caveats: &mut Vec<Caveat>,
+) -> Option<SensorGeometry> {
+    let [x, y] = sensor_images(file, scan, channel, caveats)?;
+    if (x.rows, x.columns) != (channel.rows, channel.columns) {
+        caveats.push(Caveat::new(
+            "sensor-shape",
+            file,
+            format!(
+                "the position sensors have {} × {} pixels, {:?} has {} × {}; nominal coordinates are used",
+                x.columns, x.rows, channel.name, channel.columns, channel.rows
+            ),
+        ));
+        return None;
+    }
+    let Some(sensors) = from_sensors(&x, &y) else {
+        caveats.push(Caveat::new(
+            "sensors-flat",
+            file,
+            "the position sensors do not span an area (constant, missing, or along one line); nominal \
+             coordinates are used",
+        ));
+        return None;
+    };
+    if let Some(nominal) = nominal {
+        let (measured, intended) = (sensors.geometry.extent(), nominal.extent());
+        let ratios = [measured[0] / intended[0], measured[1] / intended[1]];
+        if ratios
+            .iter()
+            .any(|r| !(1.0 / WILD_SPAN..=WILD_SPAN).contains(r))
+        {
+            caveats.push(Caveat::new(
+                "sensor-span",
+                file,
+                format!(
+                    "the sensors span {:.1} × {:.1} nm where the scan size is {:.1} × {:.1} nm; their \
+                     calibration cannot be right and nominal coordinates are used",
+                    measured[0], measured[1], intended[0], intended[1]
+                ),
+            ));
+            return None;
+        }
+    }
+    if sensors.geometry.pixel_to_nm.determinant() < 0.0 {
+        caveats.push(Caveat::new(
+            "sensors-mirrored",
+            file,
+            "the sensors describe a mirrored frame: one of them has the wrong sign; the signs of twist \
+             and strain axis follow the sensors",
+        ));
+    }
+    about_lag(file, scan, channel, &sensors, caveats);
+    Some(sensors)
+}
+
+/// Says where the lines of a sensor bend as those of one that lags behind the tip.
+fn about_lag(
+    file: &str,
+    scan: &Scan,
+    channel: &Channel,
+    sensors: &SensorGeometry,
+    caveats: &mut Vec<Caveat>,
+) {
+    let line = channel.line_direction.unwrap_or(LineDirection::Trace);
+    let direction = scan.frame_direction.unwrap_or(FrameDirection::Up);
+    let timing = Timing::of_scan(scan, channel.columns, direction, line);
+    let step = sensors.geometry.fast_step().norm();
+    let each = ["x", "y"]
+        .into_iter()
+        .zip(sensors.lags)
+        .zip(&sensors.planes);
+    for ((name, lag), plane) in each {
+        let Some(lag) = lag.filter(|lag| lag.slope_nm.abs() > NOTABLE_LAG * step) else {
+            continue;
+        };
+        let time = timing.map_or(String::new(), |timing| {
+            let constant = 1000.0 * lag.columns * timing.per_pixel.x.abs();
+            format!(", a time constant of {constant:.2} ms")
+        });
+        caveats.push(Caveat::new(
+            "sensor-lag",
+            file,
+            format!(
+                "in the {} the {name} sensor lags behind the tip: its lines bend by {:.2} nm where they begin and are \
+                 straight again over {:.1} columns{time}. A plane through the whole would make the pixels {:.2} % too \
+                 {} along the fast axis; the bend is taken off, and a part of that stands in the errors. If it is the \
+                 tip that is late there and not its sensor, the first columns of the image are distorted",
+                line_name(line),
+                lag.bend_nm.abs(),
+                lag.columns,
+                100.0 * (lag.slope_nm / step).abs(),
+                if lag.slope_nm * plane.per_column < 0.0 {
+                    "short"
+                } else {
+                    "long"
+                }
+            ),
+        ));
+    }
+}
+
+/// Tip speeds with their spread, and the relative error of their means.
+pub(crate) fn speeds(
+    geometry: &Geometry,
+    sensors: Option<&SensorGeometry>,
+    timing: Option<&Timing>,
+) -> ([Estimate; 2], [f64; 2]) {
+    let unknown = Estimate::new(f64::NAN, f64::NAN);
+    let Some(timing) = timing else {
+        return ([unknown; 2], [0.0; 2]);
+    };
+    let plain = geometry.speeds(timing);
+    let Some(sensors) = sensors else {
+        return (plain.map(|v| Estimate::new(v, 0.0)), [0.0; 2]);
+    };
+    let of = |axis: usize, steps: &[f64]| {
+        let spread = mean_and_spread(steps).sigma;
+        let step = [geometry.fast_step(), geometry.slow_step()][axis].norm();
+        let relative = if spread.is_finite() {
+            spread / step
+        } else {
+            0.0
+        };
+        let speed = Estimate::new(plain[axis], plain[axis] * relative);
+        (speed, relative / (steps.len().max(1) as f64).sqrt())
+    };
+    let (fast, fast_error) = of(0, &sensors.fast_steps);
+    let (slow, slow_error) = of(1, &sensors.slow_steps);
+    ([fast, slow], [fast_error, slow_error])
+}

@@ -1,0 +1,77 @@
+//! A measured calibration of the scanner, applied to the positions of pixels.
+
+use spmfile::Scan;
+
+use crate::calibration::{Calibration, Coordinates};
+use crate::caveat::Caveat;
+use crate::frame::geometry::Geometry;
+use crate::scan::measured::MeasuredLine;
+use crate::settings::knobs::Settings;
+
+/// Sizes and line rates that differ by more than this factor are other conditions.
+const EXTRAPOLATED: f64 = 3.0;
+
+/// The geometry corrected by the calibration of the scanner, if there is one.
+pub(crate) fn calibrated(geometry: &Geometry, settings: &Settings) -> Geometry {
+    let map = settings.scanner.as_ref().and_then(Calibration::map);
+    map.map_or_else(|| geometry.clone(), |map| geometry.mapped(&map))
+}
+
+/// Whether the calibration was measured under the conditions of this scan.
+pub(crate) fn about_calibration<'a>(
+    file: &str,
+    scan: &Scan,
+    mut lines: impl Iterator<Item = &'a MeasuredLine>,
+    settings: &Settings,
+    caveats: &mut Vec<Caveat>,
+) {
+    let Some(scanner) = &settings.scanner else {
+        return;
+    };
+    let from_sensors = scanner.coordinates == Coordinates::Sensors;
+    if lines.any(|l| l.geometry.from_sensors != from_sensors) {
+        let words = |sensors| {
+            if sensors {
+                "position sensors"
+            } else {
+                "nominal coordinates"
+            }
+        };
+        caveats.push(Caveat::new(
+            "calibration-of-other-coordinates",
+            file,
+            format!(
+                "the calibration is one of {}, the scan has {}: it need not hold for them",
+                words(from_sensors),
+                words(!from_sensors)
+            ),
+        ));
+    } else if !from_sensors {
+        caveats.retain(|c| c.code != "no-position-sensors");
+    }
+    let apart = |value: f64, known: Vec<f64>| {
+        let near = |other: &f64| (1.0 / EXTRAPOLATED..=EXTRAPOLATED).contains(&(value / other));
+        !known.is_empty() && !known.iter().any(near)
+    };
+    let sizes = || scanner.sizes_nm.iter().map(|s| s[0]).collect();
+    let rate = scan
+        .line_rate_hz
+        .is_some_and(|hz| apart(hz, scanner.line_rates_hz.clone()));
+    let size = scan.size_nm.is_some_and(|[w, _]| apart(w, sizes()));
+    if rate || size {
+        let what = match (rate, size) {
+            (true, true) => "size and line rate",
+            (true, false) => "line rate",
+            _ => "size",
+        };
+        caveats.push(Caveat::new(
+            "calibration-extrapolated",
+            file,
+            format!(
+                "the {what} of the scan differs by more than a factor of {EXTRAPOLATED} from that of the images \
+                 that the calibration comes from: hysteresis, creep and lag of a scanner change with both, and \
+                 their change is not in the budget"
+            ),
+        ));
+    }
+}

@@ -1,0 +1,97 @@
+//! Why an image gives no lattice.
+
+use crate::spectrum::method::Method;
+use crate::spectrum::prepare;
+
+/// Why an image gives no lattice.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum LatticeError {
+    /// The frame is too small.
+    #[error("the frame has {columns} × {rows} pixels; at least 16 × 16 are needed")]
+    TooSmall {
+        /// Samples in a line.
+        columns: usize,
+        /// Lines.
+        rows: usize,
+    },
+    /// There is nothing in it.
+    #[error("the channel is constant or has no valid pixel")]
+    Constant,
+    /// Too many pixels are missing.
+    #[error("{missing} of {total} pixels are missing; at most half may be")]
+    Missing {
+        /// Missing pixels.
+        missing: usize,
+        /// All pixels.
+        total: usize,
+    },
+    /// There is no lattice in it.
+    #[error("the image shows no lattice: {}", prepare::too_weak(best))]
+    NoLattice {
+        /// Signal-to-noise ratios (amplitude) of the best three wave vectors, largest first; 0 where none were found.
+        best: [f64; 3],
+    },
+    /// The lattice shows in the spectrum, but this method gets no hold of it.
+    #[error(
+        "the spectrum shows a lattice, but the {method:?} method finds too few of its peaks: noise \
+         hides them or the frame is too small for them; --method fourier may do"
+    )]
+    NoPeaks {
+        /// The method.
+        method: Method,
+    },
+    /// Several lattices were asked for.
+    #[error(
+        "{wanted} lattices were asked for, of which {found} can be found: what else stands out is noise or lies on \
+         the waves of these, as their harmonics do and those of a lattice that is nearly commensurate with them; --moires \
+         {found} measures what is there"
+    )]
+    FewerLattices {
+        /// How many there are.
+        found: usize,
+        /// How many were wanted.
+        wanted: usize,
+    },
+    /// Several lattices lie too close to each other.
+    #[error(
+        "the wave vectors of two lattices lie so close to each other that this frame cannot tell them apart; \
+         a larger frame can"
+    )]
+    Entangled,
+}
+
+/// Which of three wave vectors (signal-to-noise ratios, largest first) are too weak for a lattice, and what they need.
+pub(crate) fn too_weak(best: &[f64; 3]) -> String {
+    if best[0] == 0.0 {
+        return "no three wave vectors that add up to zero were found in its spectrum".to_owned();
+    }
+    // Rounded away from each other, so that what falls short never looks equal.
+    let needed = [("second", best[1], SECOND), ("third", best[2], THIRD)]
+        .map(|(name, found, needed)| (name, found, needed.sqrt()));
+    let short: Vec<String> = needed
+        .iter()
+        .filter(|(_, found, needed)| found <= needed)
+        .map(|(name, found, needed)| {
+            let (found, needed) = ((100.0 * found).floor(), (100.0 * needed).ceil());
+            format!(
+                "the {name} has {:.2} of the {:.2} it needs",
+                found / 100.0,
+                needed / 100.0
+            )
+        })
+        .collect();
+    format!(
+        "no three wave vectors that add up to zero stand out of the noise. The best have signal-to-noise ratios of \
+         {:.1}, {:.1} and {:.1}: {}",
+        best[0],
+        best[1],
+        best[2],
+        short.join(", ")
+    )
+}
+
+/// Significance that the second of a shell needs, which was searched like the first, and the third, which was not.
+pub(crate) const SECOND: f64 = 20.0;
+
+pub(crate) const THIRD: f64 = 12.0;

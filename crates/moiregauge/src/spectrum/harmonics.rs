@@ -1,0 +1,417 @@
+//! Amplitudes of the lattice harmonics, and the noise around each of them.
+//!
+//! Model: `I(n) = c₀ + Σ_h [c_h e^{iq_h·n} + c.c.]`, fitted by least squares with the window as
+//! weight. What it leaves behind gives the local noise power `S(q_h)` (white noise of variance σ²
+//! has `S = σ²`), so that coloured and line noise count where they are.
+
+use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
+use rustfft::num_complex::Complex64;
+
+use crate::frame::background::{Background, remove_background};
+use crate::frame::image::Image;
+use crate::spectrum::transform::hann;
+
+/// One harmonic of the lattice.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Harmonic {
+    /// Wave vector, rad per pixel.
+    pub(crate) q: Vector2<f64>,
+    /// Complex amplitude, phase at pixel (0, 0); a cosine of amplitude A has |c| = A/2.
+    pub(crate) amplitude: Complex64,
+    /// Local noise power `S(q)` as it acts along x and along y, units of the image squared.
+    pub(crate) noise: [f64; 2],
+}
+
+/// The harmonics of a lattice in one image.
+#[derive(Clone, Debug)]
+pub(crate) struct Harmonics {
+    /// First shell first (three), then the others.
+    pub(crate) list: Vec<Harmonic>,
+    /// Sum of the squared window weights and of the weights.
+    pub(crate) window_sums: [f64; 2],
+    /// The image that these harmonics make, missing pixels as in the measured one. Its lattice is
+    /// known exactly: what an estimator makes of it is the estimator's bias on this frame.
+    pub(crate) model: Image,
+    /// Reciprocal pair of the model, rad per pixel.
+    pub(crate) pair: Matrix2<f64>,
+}
+
+impl Harmonic {
+    /// Power of the harmonic over the noise power in one resolution cell; exponentially
+    /// distributed with mean 1 where there is no signal.
+    pub(crate) fn significance(&self, window_sums: [f64; 2]) -> f64 {
+        self.amplitude.norm_sqr() * window_sums[1].powi(2)
+            / (window_sums[0] * self.noise[0].max(self.noise[1]))
+    }
+}
+
+/// The image times its window, ready for transforms at arbitrary frequencies.
+pub(crate) struct Windowed {
+    values: Vec<f64>,
+    weights: Vec<f64>,
+    /// Row by row.
+    holes: Vec<Hole>,
+    rows: usize,
+    columns: usize,
+}
+
+/// A missing pixel and the weight that the window would give it.
+struct Hole {
+    row: usize,
+    column: usize,
+    weight: f64,
+}
+
+impl Windowed {
+    /// Missing pixels get no weight.
+    pub(crate) fn new(image: &Image) -> Self {
+        let (wx, wy) = (hann(image.columns), hann(image.rows));
+        let mut values = Vec::with_capacity(image.values.len());
+        let mut weights = Vec::with_capacity(image.values.len());
+        let mut holes = Vec::new();
+        for (row, wy) in wy.iter().enumerate() {
+            for (column, (v, wx)) in image.row(row).iter().zip(&wx).enumerate() {
+                let weight = wx * wy;
+                if v.is_finite() {
+                    weights.push(weight);
+                    values.push(v * weight);
+                } else {
+                    weights.push(0.0);
+                    values.push(0.0);
+                    holes.push(Hole {
+                        row,
+                        column,
+                        weight,
+                    });
+                }
+            }
+        }
+        Self {
+            values,
+            weights,
+            holes,
+            rows: image.rows,
+            columns: image.columns,
+        }
+    }
+
+    /// `Σ w I e^{−iq·n}` and its moments with `n − centre` along columns and rows.
+    fn moments(&self, q: Vector2<f64>) -> [Complex64; 3] {
+        let cx = (self.columns as f64 - 1.0) / 2.0;
+        let cy = (self.rows as f64 - 1.0) / 2.0;
+        let x: Vec<f64> = (0..self.columns).map(|c| c as f64 - cx).collect();
+        let (re, im): (Vec<f64>, Vec<f64>) =
+            x.iter().map(|x| ((q.x * x).cos(), (q.x * x).sin())).unzip();
+        let (xre, xim): (Vec<f64>, Vec<f64>) = x
+            .iter()
+            .zip(re.iter().zip(&im))
+            .map(|(x, (re, im))| (x * re, x * im))
+            .unzip();
+        let mut sums = [Complex64::default(); 3];
+        for row in 0..self.rows {
+            let line = &self.values[row * self.columns..(row + 1) * self.columns];
+            let y = row as f64 - cy;
+            let turn = Complex64::from_polar(1.0, -q.y * y);
+            let plain = turn * Complex64::new(dot(line, &re), -dot(line, &im));
+            sums[0] += plain;
+            sums[1] += turn * Complex64::new(dot(line, &xre), -dot(line, &xim));
+            sums[2] += plain * y;
+        }
+        sums
+    }
+
+    /// The wave vector near `q` at which the transform is largest, in cycles-per-frame accuracy far
+    /// below the grid: at an offset δ, `∂F/∂q = F · δ · W₂/W₀` for a single harmonic.
+    pub(crate) fn refined_peak(&self, mut q: Vector2<f64>) -> Vector2<f64> {
+        let second = |n: usize| {
+            let w = hann(n);
+            let c = (n as f64 - 1.0) / 2.0;
+            let moment: f64 = w
+                .iter()
+                .enumerate()
+                .map(|(i, w)| w * (i as f64 - c).powi(2))
+                .sum();
+            moment / w.iter().sum::<f64>()
+        };
+        let width = Vector2::new(second(self.columns), second(self.rows));
+        for _ in 0..4 {
+            let [f, fx, fy] = self.moments(q);
+            // ∂F/∂q_x = −i Σ x w I e^{−iq·n}.
+            let slope = |m: Complex64| (Complex64::new(0.0, -1.0) * m / f).re;
+            let step = Vector2::new(slope(fx) / width.x, slope(fy) / width.y);
+            if !step.iter().all(|s| s.is_finite()) {
+                break;
+            }
+            // Never farther than half a cycle per frame: beyond it is another peak.
+            let most = std::f64::consts::PI
+                * Vector2::new(1.0 / self.columns as f64, 1.0 / self.rows as f64);
+            q += Vector2::new(step.x.clamp(-most.x, most.x), step.y.clamp(-most.y, most.y));
+        }
+        q
+    }
+
+    /// `Σ w e^{−iq·n}` with the phase at the centre: that of the whole window, which is separable, less what
+    /// the missing pixels would add.
+    fn window_transform(&self, q: Vector2<f64>) -> Complex64 {
+        let separable = hann_transform(q.x, self.columns) * hann_transform(q.y, self.rows);
+        let mut sum = Complex64::new(separable, 0.0);
+        if self.holes.is_empty() {
+            return sum;
+        }
+        let cx = (self.columns as f64 - 1.0) / 2.0;
+        let cy = (self.rows as f64 - 1.0) / 2.0;
+        let along: Vec<Complex64> = (0..self.columns)
+            .map(|c| Complex64::from_polar(1.0, -q.x * (c as f64 - cx)))
+            .collect();
+        for line in self.holes.chunk_by(|a, b| a.row == b.row) {
+            let turn = Complex64::from_polar(1.0, -q.y * (line[0].row as f64 - cy));
+            let missing: Complex64 = line.iter().map(|h| along[h.column] * h.weight).sum();
+            sum -= turn * missing;
+        }
+        sum
+    }
+
+    /// What the window makes of pairs of waves, `Σ w e^{−i(q_a − q_b)·n}`; each difference is summed once.
+    fn gram(&self, pair: &Matrix2<f64>, indices: &[(f64, f64)]) -> DMatrix<Complex64> {
+        let mut known: Vec<((f64, f64), Complex64)> = Vec::new();
+        let mut of = |(h, k): (f64, f64)| {
+            if let Some((_, sum)) = known.iter().find(|(seen, _)| *seen == (h, k)) {
+                return *sum;
+            }
+            let sum = self.window_transform(pair * Vector2::new(h, k));
+            known.push(((h, k), sum));
+            // The weights are real.
+            known.push(((-h, -k), sum.conj()));
+            sum
+        };
+        DMatrix::from_fn(indices.len(), indices.len(), |a, b| {
+            let ((ha, ka), (hb, kb)) = (indices[a], indices[b]);
+            of((ha - hb, ka - kb))
+        })
+    }
+
+    /// Fits the harmonics `pair · (h, k)` of `shells`, which begin with the first one.
+    ///
+    /// `background` is what was taken off the image; it is taken off the model as well, so that the
+    /// model goes through the same mill. `None` where the harmonics cannot be told apart on this frame.
+    pub(crate) fn fit(
+        &self,
+        image: &Image,
+        pair: &Matrix2<f64>,
+        background: Background,
+        shells: &[(f64, f64)],
+    ) -> Option<Harmonics> {
+        let nyquist = 0.9 * std::f64::consts::PI;
+        let wave = |&(h, k): &(f64, f64)| pair * Vector2::new(h, k);
+        let resolved = shells.iter().copied().filter(|index| {
+            let q = wave(index);
+            q.amax() < nyquist && q.amin() > -nyquist
+        });
+        // Basis: 1, e^{iq}, e^{−iq}, …, phases at the centre.
+        let mut indices = vec![(0.0, 0.0)];
+        indices.extend(resolved.flat_map(|(h, k)| [(h, k), (-h, -k)]));
+        let n = indices.len();
+        if n < 7 {
+            return None;
+        }
+        let waves: Vec<Vector2<f64>> = indices.iter().map(wave).collect();
+        let gram = self.gram(pair, &indices);
+        let right = DVector::from_iterator(
+            n,
+            waves.iter().enumerate().map(|(i, &wave)| {
+                // The image is real: the transform at −q is the conjugate of that at q.
+                if i > 0 && i % 2 == 0 {
+                    Complex64::default()
+                } else {
+                    self.moments(wave)[0]
+                }
+            }),
+        );
+        let mut right = right;
+        for i in (2..n).step_by(2) {
+            right[i] = right[i - 1].conj();
+        }
+        let amplitudes = gram.lu().solve(&right)?;
+        let model = remove_background(&self.model(image, &waves, &amplitudes), background);
+        let residual = residual(image, &model);
+        let noise = crate::spectrum::noise::LocalNoise::new(&residual);
+        let centre = Vector2::new(
+            (self.columns as f64 - 1.0) / 2.0,
+            (self.rows as f64 - 1.0) / 2.0,
+        );
+        let list = (1..n)
+            .step_by(2)
+            .map(|i| (waves[i], amplitudes[i]))
+            .map(|(q, amplitude)| Harmonic {
+                q,
+                amplitude: amplitude * Complex64::from_polar(1.0, -q.dot(&centre)),
+                noise: noise.around(q),
+            })
+            .collect();
+        let window_sums = [
+            self.weights.iter().map(|w| w * w).sum(),
+            self.weights.iter().sum(),
+        ];
+        Some(Harmonics {
+            list,
+            window_sums,
+            model,
+            pair: *pair,
+        })
+    }
+
+    /// The sum of the waves, with the shape and the missing pixels of `image`.
+    fn model(
+        &self,
+        image: &Image,
+        waves: &[Vector2<f64>],
+        amplitudes: &DVector<Complex64>,
+    ) -> Image {
+        let cx = (self.columns as f64 - 1.0) / 2.0;
+        let cy = (self.rows as f64 - 1.0) / 2.0;
+        let mut values = vec![amplitudes[0].re; image.values.len()];
+        for i in (1..waves.len()).step_by(2) {
+            let q = waves[i];
+            let (im, re): (Vec<f64>, Vec<f64>) = (0..self.columns)
+                .map(|c| (q.x * (c as f64 - cx)).sin_cos())
+                .unzip();
+            for (row, line) in values.chunks_exact_mut(self.columns).enumerate() {
+                let c = 2.0 * amplitudes[i] * Complex64::from_polar(1.0, q.y * (row as f64 - cy));
+                for ((v, re), im) in line.iter_mut().zip(&re).zip(&im) {
+                    *v += c.re * re - c.im * im;
+                }
+            }
+        }
+        for (v, measured) in values.iter_mut().zip(&image.values) {
+            if !measured.is_finite() {
+                *v = f64::NAN;
+            }
+        }
+        Image::new(image.rows, image.columns, values)
+    }
+}
+
+/// Image minus model; missing pixels become 0.
+fn residual(image: &Image, model: &Image) -> Image {
+    let values = image
+        .values
+        .iter()
+        .zip(&model.values)
+        .map(|(v, m)| if v.is_finite() { v - m } else { 0.0 })
+        .collect();
+    Image::new(image.rows, image.columns, values)
+}
+
+/// Indices of the first three shells, one of each ± pair, in the basis at 60°.
+pub(crate) const SHELLS: [(f64, f64); 9] = [
+    (1.0, 0.0),
+    (0.0, 1.0),
+    (-1.0, 1.0),
+    (1.0, 1.0),
+    (-1.0, 2.0),
+    (-2.0, 1.0),
+    (2.0, 0.0),
+    (0.0, 2.0),
+    (-2.0, 2.0),
+];
+
+/// `Σ w(n) cos(q (n − centre))` of the Hann window of `n` pixels: three Dirichlet kernels.
+pub(crate) fn hann_transform(q: f64, n: usize) -> f64 {
+    let n = n as f64;
+    let dirichlet = |q: f64| {
+        let half = (q / 2.0).sin();
+        if half.abs() < 1e-9 {
+            // At multiples of 2π every cosine is ±1; the sign of an even n alternates with them.
+            n * (n * q / 2.0).cos() / (q / 2.0).cos()
+        } else {
+            (n * q / 2.0).sin() / half
+        }
+    };
+    let step = std::f64::consts::TAU / n;
+    0.5 * dirichlet(q) + 0.25 * (dirichlet(q + step) + dirichlet(q - step))
+}
+
+/// Sum of products in eight independent partial sums, which the compiler can keep in registers.
+pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let mut sums = [0.0; 8];
+    let (a8, b8) = (a.chunks_exact(8), b.chunks_exact(8));
+    let rest: f64 = a8
+        .remainder()
+        .iter()
+        .zip(b8.remainder())
+        .map(|(a, b)| a * b)
+        .sum();
+    for (a, b) in a8.zip(b8) {
+        for i in 0..8 {
+            sums[i] += a[i] * b[i];
+        }
+    }
+    sums.iter().sum::<f64>() + rest
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// An image with holes: one pixel, part of a line, whole lines, a corner.
+    fn torn(rows: usize, columns: usize) -> Image {
+        let mut values: Vec<f64> = (0..rows * columns)
+            .map(|i| (0.7 * i as f64).sin())
+            .collect();
+        let mut lose = |row: usize, columns_lost: std::ops::Range<usize>| {
+            for column in columns_lost {
+                values[row * columns + column] = f64::NAN;
+            }
+        };
+        lose(11, 17..18);
+        lose(20, 5..31);
+        lose(30, 0..columns);
+        for row in 40..rows {
+            lose(row, 33..columns);
+        }
+        Image::new(rows, columns, values)
+    }
+
+    /// The sum over all pixels that are there, as the definition has it.
+    #[test]
+    fn holes_are_taken_off_the_window_exactly() {
+        let (rows, columns) = (52, 47);
+        let image = torn(rows, columns);
+        let windowed = Windowed::new(&image);
+        let (wx, wy) = (hann(columns), hann(rows));
+        for q in [[0.0, 0.0], [0.41, -0.23], [-2.3, 0.02], [5.9, 3.3]] {
+            let q = Vector2::from(q);
+            let mut slow = Complex64::default();
+            for (row, wy) in wy.iter().enumerate() {
+                for (column, wx) in wx.iter().enumerate() {
+                    if image.values[row * columns + column].is_finite() {
+                        let x = column as f64 - (columns as f64 - 1.0) / 2.0;
+                        let y = row as f64 - (rows as f64 - 1.0) / 2.0;
+                        let weight = wx * wy;
+                        slow += Complex64::from_polar(weight, -(q.x * x + q.y * y));
+                    }
+                }
+            }
+            let fast = windowed.window_transform(q);
+            assert!((fast - slow).norm() < 1e-9, "{q}: {fast} {slow}");
+        }
+    }
+
+    /// Every entry of the normal matrix is the transform at the difference of its two waves.
+    #[test]
+    fn equal_differences_share_their_sum() {
+        let windowed = Windowed::new(&torn(52, 47));
+        let pair = Matrix2::new(0.5, 0.17, 0.06, 0.46);
+        let indices: Vec<(f64, f64)> = std::iter::once((0.0, 0.0))
+            .chain(SHELLS.iter().flat_map(|&(h, k)| [(h, k), (-h, -k)]))
+            .collect();
+        let gram = windowed.gram(&pair, &indices);
+        for (a, &(ha, ka)) in indices.iter().enumerate() {
+            for (b, &(hb, kb)) in indices.iter().enumerate() {
+                let q = pair * Vector2::new(ha - hb, ka - kb);
+                let alone = windowed.window_transform(q);
+                assert!((gram[(a, b)] - alone).norm() < 1e-9, "{a} {b}");
+            }
+        }
+    }
+}

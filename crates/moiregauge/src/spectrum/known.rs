@@ -1,0 +1,232 @@
+//! A lattice of known size and shape in a spectrum.
+//!
+//! In: the peaks of the spectrum, the positions of pixels and the cell that has to be there, at any
+//! orientation and distorted by no more than an uncalibrated scanner and drift do it. Out: the lattices
+//! of about that cell, best first. A cell with a large basis (a reconstructed surface) has higher harmonics
+//! that are stronger than its first ones; without its size one of these would be taken for the lattice.
+
+use heterostrain::lattice::{reciprocal, shortest_pair};
+use nalgebra::{Complex, Matrix2, Vector2};
+
+use crate::frame::background::Background;
+use crate::frame::geometry::Geometry;
+use crate::frame::image::Image;
+use crate::spectrum::error::LatticeError;
+use crate::spectrum::harmonics::{SHELLS, Windowed};
+use crate::spectrum::prepare::{Prepared, Verdict, binned, levelled, signal_to_noise, verdict};
+use crate::spectrum::select::{
+    Candidate, Orders, Peak, by_score, frame_cycles, score, spectrum_peaks, well_explained,
+};
+use crate::spectrum::transform::Spectrum;
+
+/// The lattice may be smaller or larger than expected by this factor: less than √3, by which the second
+/// harmonics of a hexagon differ from the first.
+const MOST_SCALE: f64 = 1.6;
+/// Largest distortion `|q|/|p|`: half of the stretch of one axis against the other.
+const MOST_DISTORTION: f64 = 0.25;
+/// The same where no lattice is as little distorted: a drift of half a frame does that.
+const DRIFTING: f64 = 0.45;
+/// Peaks whose wave vectors and differences may be first harmonics.
+const GENERATORS: usize = 24;
+/// Wave vectors closer than this are the same, cycles per frame.
+const SAME: f64 = 0.45;
+/// Harmonics up to this order count.
+const ORDERS: f64 = 8.0;
+
+/// What the spectrum says about a lattice of about the cell `known` (real-space pair, nm).
+pub(crate) fn prepare(
+    image: &Image,
+    geometry: &Geometry,
+    background: Background,
+    known: &Matrix2<f64>,
+) -> Result<Prepared, LatticeError> {
+    let image = levelled(image, background)?;
+    let full = Spectrum::new(&image);
+    let mut best = [0.0; 3];
+    let little = candidates(&full, &geometry.pixel_to_nm, known, MOST_DISTORTION);
+    let drifting = || candidates(&full, &geometry.pixel_to_nm, known, DRIFTING);
+    let all = little
+        .into_iter()
+        .chain(std::iter::once_with(drifting).flatten());
+    for candidate in all {
+        let (binning, binned) = binned(&image, &candidate.pair);
+        // The pair goes through all peaks that it explains; the first harmonics may be faint.
+        let pair = candidate.pair * binning as f64;
+        let Some(harmonics) = Windowed::new(&binned).fit(&binned, &pair, background, &SHELLS)
+        else {
+            continue;
+        };
+        if verdict(&harmonics) != Verdict::Lattice && !well_explained(&candidate) {
+            let ratios = signal_to_noise(&harmonics);
+            if ratios[2] > best[2] {
+                best = ratios;
+            }
+            continue;
+        }
+        let Some(start) = reciprocal(&harmonics.pair) else {
+            continue;
+        };
+        let (a, b) = (pair.column(0).into_owned(), pair.column(1).into_owned());
+        return Ok(Prepared {
+            spectrum: if binning == 1 {
+                full
+            } else {
+                Spectrum::new(&binned)
+            },
+            image,
+            binning,
+            peaks: [a, b, b - a],
+            harmonics,
+            start,
+        });
+    }
+    Err(LatticeError::NoLattice { best })
+}
+
+/// Lattices of about the cell `known`, best first.
+fn candidates(
+    spectrum: &Spectrum,
+    pixel_to_nm: &Matrix2<f64>,
+    known: &Matrix2<f64>,
+    most: f64,
+) -> Vec<Candidate> {
+    let to_physical = pixel_to_nm.try_inverse().map(|m| m.transpose());
+    let (Some(to_physical), Some(wanted)) = (to_physical, reciprocal(known)) else {
+        return Vec::new();
+    };
+    let like = |pair: &Matrix2<f64>| resembles(&(to_physical * pair), &wanted, most);
+    let peaks = spectrum_peaks(spectrum);
+    let generators = generators(&peaks, spectrum, &to_physical, &wanted, most);
+    let mut found = Vec::new();
+    // |p|² − |q|²: what most pairs have wrong is told by their area.
+    let area = (wanted.determinant() / to_physical.determinant()).abs();
+    let areas = area / MOST_SCALE.powi(2) * (1.0 - most.powi(2))..=area * MOST_SCALE.powi(2);
+    for (i, a) in generators.iter().enumerate() {
+        for b in &generators[i + 1..] {
+            let pair = Matrix2::from_columns(&[*a, *b]);
+            if !areas.contains(&pair.determinant().abs()) {
+                continue;
+            }
+            let Some(change) = shortest_pair(&(to_physical * pair)) else {
+                continue;
+            };
+            let pair = pair * change;
+            if like(&pair)
+                && !known_already(&found, &pair, spectrum)
+                && let Some(candidate) = score(&pair, &peaks, spectrum, Orders(ORDERS))
+                && like(&candidate.pair)
+            {
+                found.push(candidate);
+            }
+        }
+    }
+    by_score(found, spectrum)
+}
+
+/// Whether a candidate has the same vectors already, before it was refined or after.
+fn known_already(found: &[Candidate], pair: &Matrix2<f64>, spectrum: &Spectrum) -> bool {
+    let frame = frame_cycles(spectrum);
+    let near = |d: &Matrix2<f64>| {
+        let d = frame * d;
+        d.column(0).norm() < SAME && d.column(1).norm() < SAME
+    };
+    found
+        .iter()
+        .any(|c| near(&(c.pair - pair)) || near(&(c.pair + pair)))
+}
+
+/// Wave vectors that may be first harmonics, rad per pixel: those of peaks, and differences of peaks where
+/// the first harmonics are fainter than higher ones.
+fn generators(
+    peaks: &[Peak],
+    spectrum: &Spectrum,
+    to_physical: &Matrix2<f64>,
+    wanted: &Matrix2<f64>,
+    most: f64,
+) -> Vec<Vector2<f64>> {
+    let (a, b) = (wanted.column(0), wanted.column(1));
+    let lengths = [a.norm(), b.norm(), (b - a).norm()];
+    let stretch = MOST_SCALE * (1.0 + most);
+    let low = lengths.iter().copied().fold(f64::INFINITY, f64::min) / stretch;
+    let high = lengths.iter().copied().fold(0.0, f64::max) * stretch;
+    let frame = frame_cycles(spectrum);
+    let mut kept: Vec<Vector2<f64>> = Vec::new();
+    let mut offer = |q: Vector2<f64>| {
+        let length = (to_physical * q).norm();
+        let near = |other: &Vector2<f64>| {
+            (frame * (q - other)).norm() < SAME || (frame * (q + other)).norm() < SAME
+        };
+        if length > low && length < high && !kept.iter().any(near) {
+            kept.push(q);
+        }
+    };
+    let strong = &peaks[..peaks.len().min(GENERATORS)];
+    for peak in strong {
+        offer(peak.q);
+    }
+    for (i, first) in strong.iter().enumerate() {
+        for second in &strong[..i] {
+            offer(first.q - second.q);
+            offer(first.q + second.q);
+        }
+    }
+    kept
+}
+
+/// Whether `pair` is `wanted`, turned and a little distorted, under any of its names.
+fn resembles(pair: &Matrix2<f64>, wanted: &Matrix2<f64>, most: f64) -> bool {
+    let Some(inverse) = wanted.try_inverse() else {
+        return false;
+    };
+    names().any(|name| {
+        let (p, q) = parts(&(pair * name * inverse));
+        let stretch = q.norm() / p.norm();
+        (1.0 / MOST_SCALE..MOST_SCALE).contains(&p.norm()) && stretch < most
+    })
+}
+
+/// All changes of names with small integers: the lattice is the same, mirror images included.
+pub(crate) fn names() -> impl Iterator<Item = Matrix2<f64>> {
+    let entry = |code: i32, power: u32| f64::from(code / 3_i32.pow(power) % 3 - 1);
+    (0..81_i32)
+        .map(move |code| {
+            Matrix2::new(
+                entry(code, 0),
+                entry(code, 1),
+                entry(code, 2),
+                entry(code, 3),
+            )
+        })
+        .filter(|change| change.determinant().abs() == 1.0)
+}
+
+/// `A z = p z + q z̄`: size and turn, and stretch.
+pub(crate) fn parts(m: &Matrix2<f64>) -> (Complex<f64>, Complex<f64>) {
+    (
+        Complex::new(m.m11 + m.m22, m.m21 - m.m12) / 2.0,
+        Complex::new(m.m11 - m.m22, m.m21 + m.m12) / 2.0,
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A hexagon turned and stretched by 5 % is the lattice, its second shell and a rectangle are not.
+    #[test]
+    fn the_known_cell_is_recognised_at_any_angle() {
+        let hexagon = Matrix2::new(1.0, 0.5, 0.0, 0.75_f64.sqrt());
+        for turn in [0.0, 0.7, 2.1, 4.4] {
+            let turn = nalgebra::Rotation2::new(turn).into_inner();
+            let stretched = Matrix2::new(1.05, 0.02, 0.0, 0.97) * turn * hexagon;
+            assert!(resembles(&stretched, &hexagon, MOST_DISTORTION));
+            assert!(!resembles(
+                &(stretched * 3_f64.sqrt()),
+                &hexagon,
+                MOST_DISTORTION
+            ));
+            let rectangle = turn * Matrix2::new(1.0, 0.0, 0.0, 2.0);
+            assert!(!resembles(&rectangle, &hexagon, MOST_DISTORTION));
+        }
+    }
+}

@@ -1,0 +1,18 @@
+//! Where a lattice is in the spectrum of an image: transform, peaks, and which of them belong together.
+
+pub(crate) mod error;
+pub(crate) mod harmonics;
+pub(crate) mod high_orders;
+pub(crate) mod known;
+pub(crate) mod method;
+pub(crate) mod noise;
+pub(crate) mod phases;
+pub(crate) mod pictures;
+pub(crate) mod prepare;
+pub(crate) mod rescue;
+pub(crate) mod select;
+pub(crate) mod transform;
+
+pub use error::LatticeError;
+pub use method::Method;
+pub use phases::Phases;

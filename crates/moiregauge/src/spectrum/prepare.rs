@@ -1,0 +1,286 @@
+//! An image made ready for measuring, and where its lattice is, roughly.
+
+use heterostrain::lattice as reciprocal;
+use nalgebra::{Matrix2, Vector2};
+
+use crate::frame::background::{Background, remove_background};
+use crate::frame::geometry::Geometry;
+use crate::frame::image::Image;
+use crate::spectrum::harmonics::{Harmonic, Harmonics, SHELLS, Windowed};
+use crate::spectrum::phases::Phases;
+use crate::spectrum::transform::Spectrum;
+use crate::spectrum::{high_orders, select};
+
+pub(crate) use crate::spectrum::error::{LatticeError, SECOND, THIRD, too_weak};
+
+/// What is left of a constant or a plane when it is taken off, as a share of the values.
+const ROUNDING: f64 = 1e-13;
+/// The smallest side of a frame, pixels.
+const SMALLEST_SIDE: usize = 16;
+
+/// An image without background and what its spectrum says: where the lattice is, roughly.
+pub(crate) struct Prepared {
+    /// The image at full resolution.
+    pub(crate) image: Image,
+    /// Pixels of the image per bin. Everything below counts in bins.
+    pub(crate) binning: usize,
+    pub(crate) spectrum: Spectrum,
+    pub(crate) harmonics: Harmonics,
+    /// The first three wave vectors, each by itself, rad per bin.
+    pub(crate) peaks: [Vector2<f64>; 3],
+    /// Real-space pair at 60°.
+    pub(crate) start: Matrix2<f64>,
+}
+
+pub(crate) fn prepare(
+    image: &Image,
+    geometry: &Geometry,
+    background: Background,
+) -> Result<Prepared, LatticeError> {
+    let image = levelled(image, background)?;
+    let full = Spectrum::new(&image);
+    let mut best = [0.0; 3];
+    for candidate in select::candidates(&full, &geometry.pixel_to_nm) {
+        let (binning, binned) = binned(&image, &candidate.pair);
+        let pair = candidate.pair * binning as f64;
+        let Some((mut harmonics, mut peaks)) = refine(&binned, &pair, background) else {
+            continue;
+        };
+        let mut verdict = verdict(&harmonics);
+        if verdict != Verdict::Lattice
+            && let Some(found) = high_orders::refine(&binned, &pair, background)
+        {
+            (harmonics, peaks) = found;
+            verdict = Verdict::Lattice;
+        }
+        if verdict != Verdict::Lattice {
+            let ratios = signal_to_noise(&harmonics);
+            if ratios[2] > best[2] {
+                best = ratios;
+            }
+            // A strong second shell belongs to a lattice whose first shell is hidden; the lattice
+            // of the second shell alone would be a wrong answer.
+            if verdict == Verdict::Doubtful {
+                break;
+            }
+            continue;
+        }
+        let Some(start) = reciprocal::reciprocal(&harmonics.pair) else {
+            continue;
+        };
+        let spectrum = if binning == 1 {
+            full
+        } else {
+            Spectrum::new(&binned)
+        };
+        return Ok(Prepared {
+            image,
+            binning,
+            spectrum,
+            harmonics,
+            peaks,
+            start,
+        });
+    }
+    Err(LatticeError::NoLattice { best })
+}
+
+/// The image without its background, if there is anything in it to measure.
+pub(crate) fn levelled(image: &Image, background: Background) -> Result<Image, LatticeError> {
+    let (rows, columns) = (image.rows, image.columns);
+    if rows < SMALLEST_SIDE || columns < SMALLEST_SIDE {
+        return Err(LatticeError::TooSmall { columns, rows });
+    }
+    let total = image.values.len();
+    let missing = image.values.iter().filter(|v| !v.is_finite()).count();
+    if missing == total {
+        return Err(LatticeError::Constant);
+    }
+    if 2 * missing > total {
+        return Err(LatticeError::Missing { missing, total });
+    }
+    let largest = |image: &Image| {
+        let finite = image.values.iter().filter(|v| v.is_finite());
+        finite.fold(0.0f64, |a, v| a.max(v.abs()))
+    };
+    let before = largest(image);
+    let image = remove_background(image, background);
+    if largest(&image) <= ROUNDING * before {
+        return Err(LatticeError::Constant);
+    }
+    Ok(image)
+}
+
+/// Bins per shortest period of the first harmonics: enough for their second order.
+const BINS_PER_PERIOD: f64 = 16.0;
+
+/// How many pixels may be averaged without touching the lattice: it is band-limited, and what the
+/// mean over a bin does to a harmonic is to its amplitude, not to its wave vector.
+pub(crate) fn binning(pair: &Matrix2<f64>) -> usize {
+    let third = pair.column(1) - pair.column(0);
+    let largest = pair
+        .column(0)
+        .norm()
+        .max(pair.column(1).norm())
+        .max(third.norm());
+    let shortest_period = std::f64::consts::TAU / largest;
+    ((shortest_period / BINS_PER_PERIOD) as usize).max(1)
+}
+
+/// The image with as many pixels averaged as [`binning`] allows, and how many these are along each axis.
+pub(crate) fn binned(image: &Image, pair: &Matrix2<f64>) -> (usize, Image) {
+    match binning(pair) {
+        1 => (1, image.clone()),
+        size => (size, image.binned(size)),
+    }
+}
+
+/// The harmonics and the three first wave vectors, starting from a pair found in the spectrum.
+///
+/// Neighbouring harmonics shift each peak of the transform a little. The shift is measured on the
+/// model image, whose wave vectors are known, and taken off.
+pub(crate) fn refine(
+    image: &Image,
+    pair: &Matrix2<f64>,
+    background: Background,
+) -> Option<(Harmonics, [Vector2<f64>; 3])> {
+    let windowed = Windowed::new(image);
+    let third = pair.column(1) - pair.column(0);
+    let seen = [
+        pair.column(0).into_owned(),
+        pair.column(1).into_owned(),
+        third,
+    ]
+    .map(|q| windowed.refined_peak(q));
+    let first = windowed.fit(image, &common_pair(&seen), background, &SHELLS)?;
+    let model = Windowed::new(&first.model);
+    let mut peaks = seen;
+    for (peak, harmonic) in peaks.iter_mut().zip(&first.list) {
+        *peak -= model.refined_peak(harmonic.q) - harmonic.q;
+    }
+    let second = windowed.fit(image, &common_pair(&peaks), background, &SHELLS)?;
+    Some((second, peaks))
+}
+
+/// K₁, K₂ by least squares with K₃ = K₂ − K₁, equal weights.
+pub(crate) fn common_pair(peaks: &[Vector2<f64>; 3]) -> Matrix2<f64> {
+    let k1 = (2.0 * peaks[0] + peaks[1] - peaks[2]) / 3.0;
+    let k2 = (peaks[0] + 2.0 * peaks[1] + peaks[2]) / 3.0;
+    Matrix2::from_columns(&[k1, k2])
+}
+
+/// The middle of a frame of (columns, rows), as a position among its pixels or bins.
+pub(crate) fn middle(size: [usize; 2]) -> Vector2<f64> {
+    Vector2::new(size[0] as f64 - 1.0, size[1] as f64 - 1.0) / 2.0
+}
+
+/// Phases of the first three harmonics at the middle of the frame.
+///
+/// The variance of a phase is that of the amplitude across it: `S Σw² / (2 |c|² (Σw)²)`.
+pub(crate) fn phases(harmonics: &Harmonics, size: [usize; 2]) -> Phases {
+    let middle = middle(size);
+    let (mut values, mut variances) = ([0.0; 3], [f64::INFINITY; 3]);
+    for (h, harmonic) in harmonics.list.iter().take(3).enumerate() {
+        values[h] = harmonic.amplitude.arg() + harmonic.q.dot(&middle);
+        variances[h] = 1.0 / (2.0 * harmonic.significance(harmonics.window_sums));
+    }
+    Phases::independent(values, variances)
+}
+
+/// Signal-to-noise ratios (amplitude) of the first three harmonics, best first.
+pub(crate) fn signal_to_noise(harmonics: &Harmonics) -> [f64; 3] {
+    let mut best = [0.0; 3];
+    for (b, h) in best.iter_mut().zip(&harmonics.list) {
+        *b = h.significance(harmonics.window_sums).sqrt();
+    }
+    best.sort_by(|a, b| b.total_cmp(a));
+    best
+}
+
+/// What the harmonics of a proposed lattice amount to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Verdict {
+    /// They cannot be chance.
+    Lattice,
+    /// Some of them cannot, but the first shell can.
+    Doubtful,
+    /// They can all be chance.
+    Chance,
+}
+
+/// Whether the harmonics can be chance.
+///
+/// Under noise alone the significance is exponentially distributed. Two members of a shell were
+/// searched among all frequencies, so they have to exceed the expected maximum of that search; the
+/// third was not searched: the sum rule says where it has to be. The second shell may be the strong
+/// one, as long as the first, which makes the lattice, is there at all.
+pub(crate) fn verdict(harmonics: &Harmonics) -> Verdict {
+    let shell = |members: &[Harmonic]| {
+        let mut s = [0.0; 3];
+        for (s, h) in s.iter_mut().zip(members) {
+            *s = h.significance(harmonics.window_sums);
+        }
+        s.sort_by(|a, b| b.total_cmp(a));
+        s
+    };
+    let stands_out = |s: [f64; 3]| s[1] > SECOND && s[2] > THIRD;
+    let first = shell(&harmonics.list[..3]);
+    let second = stands_out(shell(&harmonics.list[3..harmonics.list.len().min(6)]));
+    if stands_out(first) || (second && first[1] > THIRD) {
+        Verdict::Lattice
+    } else if second || first[1] > SECOND {
+        Verdict::Doubtful
+    } else {
+        Verdict::Chance
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The reason is named with what was found and what is needed, and nothing that was met.
+    #[test]
+    fn the_wave_vector_that_falls_short_is_named() {
+        let words = |best| LatticeError::NoLattice { best }.to_string();
+        let second = words([4.7, 4.4, 4.1]);
+        assert!(
+            second.ends_with(": the second has 4.40 of the 4.48 it needs"),
+            "{second}"
+        );
+        let third = words([9.0, 8.0, 3.0]);
+        assert!(
+            third.ends_with(": the third has 3.00 of the 3.47 it needs"),
+            "{third}"
+        );
+        let both = words([4.0, 4.0, 2.0]);
+        assert!(
+            both.contains("second has 4.00") && both.contains("third has 2.00"),
+            "{both}"
+        );
+        let barely = words([4.472, 4.472, 4.1]);
+        assert!(barely.ends_with("4.47 of the 4.48 it needs"), "{barely}");
+        assert!(!words([0.0; 3]).contains("signal-to-noise"));
+    }
+
+    /// What the message asks for is what the verdict asks for.
+    #[test]
+    fn the_limits_of_the_message_are_those_of_the_verdict() {
+        let with = |ratios: [f64; 3]| {
+            let list = ratios.iter().map(|ratio| Harmonic {
+                q: Vector2::x(),
+                amplitude: rustfft::num_complex::Complex64::new(*ratio, 0.0),
+                noise: [1.0; 2],
+            });
+            verdict(&Harmonics {
+                list: list.collect(),
+                window_sums: [1.0; 2],
+                model: Image::new(1, 1, vec![0.0]),
+                pair: Matrix2::identity(),
+            })
+        };
+        assert_eq!(with([9.0, 4.48, 3.47]), Verdict::Lattice);
+        assert_ne!(with([9.0, 4.47, 3.47]), Verdict::Lattice);
+        assert_ne!(with([9.0, 4.48, 3.46]), Verdict::Lattice);
+    }
+}

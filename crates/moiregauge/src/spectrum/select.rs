@@ -1,0 +1,373 @@
+//! Which peaks of the spectrum are the lattice?
+//!
+//! Not the highest ones: line noise, tip events and pick-up make high peaks too. Local maxima are
+//! measured against the noise around them; every pair of them proposes a lattice, and the lattice
+//! wins that explains most of the peaks with the fewest places to put them (sum rule, primitive
+//! cell, small distortion).
+
+use heterostrain::lattice::{distortion, shortest_pair};
+use nalgebra::{Matrix2, Vector2};
+
+use crate::spectrum::transform::Spectrum;
+
+/// Peaks below this many cycles per frame are background.
+const LOWEST_CYCLES: f64 = 1.25;
+/// Peaks beyond this many cycles per pixel are noise: fewer than 2.5 pixels per period.
+const HIGHEST_FREQUENCY: f64 = 0.4;
+/// How many peaks are looked at, and how many of them may span a lattice.
+const PEAKS: usize = 40;
+const GENERATORS: usize = 16;
+/// A peak belongs to a lattice point if it is this close, in cycles per frame.
+const TOLERANCE: f64 = 0.45;
+/// Harmonics up to this order count.
+const ORDERS: f64 = 4.0;
+/// A moiré of hexagonal layers is a hexagon distorted by less than this; see [`distortion`].
+const MOST_DISTORTION: f64 = 0.45;
+
+/// A lattice proposed by the spectrum.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Candidate {
+    /// Reciprocal pair at 60°, rad per pixel.
+    pub(crate) pair: Matrix2<f64>,
+    /// How well it explains the peaks; larger is better.
+    pub(crate) score: f64,
+    /// How many peaks it explains, and how many it would by chance.
+    pub(crate) explained: [f64; 2],
+}
+
+/// Whether more peaks lie on the lattice than chance puts there, were it to try many times.
+pub(crate) fn well_explained(candidate: &Candidate) -> bool {
+    let [found, expected] = candidate.explained;
+    found >= 6.0 && found > 6.0 * expected
+}
+
+/// A local maximum of the spectrum.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Peak {
+    /// rad per pixel, sub-bin.
+    pub(crate) q: Vector2<f64>,
+    /// The same in cycles per frame.
+    cycles: Vector2<f64>,
+    /// Power over the local noise power.
+    significance: f64,
+    /// Power.
+    power: f64,
+}
+
+/// Lattices proposed by the spectrum, best first, each a different one.
+///
+/// `pixel_to_nm` is the metric in which vectors are short and hexagons regular.
+pub(crate) fn candidates(spectrum: &Spectrum, pixel_to_nm: &Matrix2<f64>) -> Vec<Candidate> {
+    let Some(to_physical) = pixel_to_nm.try_inverse().map(|m| m.transpose()) else {
+        return Vec::new();
+    };
+    let peaks = spectrum_peaks(spectrum);
+    let mut found: Vec<Candidate> = Vec::new();
+    let generators = &peaks[..peaks.len().min(GENERATORS)];
+    for (i, a) in generators.iter().enumerate() {
+        for b in &generators[i + 1..] {
+            let pair = Matrix2::from_columns(&[a.q, b.q]);
+            if let Some(candidate) = assess(&pair, &peaks, &to_physical, spectrum) {
+                found.push(candidate);
+            }
+        }
+    }
+    by_score(found, spectrum)
+}
+
+/// The best few that are different lattices.
+pub(crate) fn by_score(mut found: Vec<Candidate>, spectrum: &Spectrum) -> Vec<Candidate> {
+    found.sort_by(|a, b| b.score.total_cmp(&a.score));
+    let mut distinct: Vec<Candidate> = Vec::new();
+    let frame = frame_cycles(spectrum);
+    for candidate in found {
+        let same = |other: &Candidate| {
+            let d = frame * (candidate.pair - other.pair);
+            d.column(0).norm() < TOLERANCE && d.column(1).norm() < TOLERANCE
+        };
+        if !distinct.iter().any(same) {
+            distinct.push(candidate);
+        }
+        if distinct.len() == 4 {
+            break;
+        }
+    }
+    distinct
+}
+
+/// rad per pixel → cycles per frame.
+pub(crate) fn frame_cycles(spectrum: &Spectrum) -> Matrix2<f64> {
+    let [w, h] = spectrum.image_size;
+    Matrix2::from_diagonal(&Vector2::new(w as f64, h as f64)) / std::f64::consts::TAU
+}
+
+/// Labels the pair canonically, refines it with the peaks it explains, and scores it.
+fn assess(
+    pair: &Matrix2<f64>,
+    peaks: &[Peak],
+    to_physical: &Matrix2<f64>,
+    spectrum: &Spectrum,
+) -> Option<Candidate> {
+    let change = shortest_pair(&(to_physical * pair))?;
+    let mut pair = pair * change;
+    // One labelling for each lattice: the first vector upwards-right in pixel space.
+    for _ in 0..6 {
+        let first = pair.column(0);
+        let angle = first.y.atan2(first.x);
+        if (0.0..=std::f64::consts::FRAC_PI_3 + 0.2).contains(&angle) {
+            break;
+        }
+        pair *= Matrix2::new(0.0, -1.0, 1.0, 1.0);
+    }
+    if distortion(&(to_physical * pair)) > MOST_DISTORTION {
+        return None;
+    }
+    let frame = frame_cycles(spectrum);
+    let shortest = |p: &Matrix2<f64>| {
+        let c = frame * p;
+        let third = c.column(1) - c.column(0);
+        c.column(0).norm().min(c.column(1).norm()).min(third.norm())
+    };
+    if shortest(&pair) < LOWEST_CYCLES {
+        return None;
+    }
+    let candidate = score(&pair, peaks, spectrum, Orders(ORDERS))?;
+    Some(Candidate {
+        score: candidate.score * (1.0 - distortion(&(to_physical * candidate.pair)).powi(2)),
+        ..candidate
+    })
+}
+
+/// The highest order of harmonics that count.
+#[derive(Clone, Copy)]
+pub(crate) struct Orders(pub(crate) f64);
+
+/// Refines the pair with the peaks it explains and scores it.
+pub(crate) fn score(
+    pair: &Matrix2<f64>,
+    peaks: &[Peak],
+    spectrum: &Spectrum,
+    orders: Orders,
+) -> Option<Candidate> {
+    let frame = frame_cycles(spectrum);
+    let mut pair = *pair;
+    // Two rounds: the first with peaks near by, the second with all that fit the refined pair.
+    for _ in 0..2 {
+        pair = refined(&pair, peaks, &frame, orders)?;
+    }
+    let cell = (frame * pair).determinant().abs();
+    let chance = (std::f64::consts::PI * TOLERANCE * TOLERANCE / cell).min(1.0);
+    let mut score = 0.0;
+    let mut first_shell = [0.0f64; 3];
+    let mut found = 0.0;
+    for peak in peaks {
+        let Some((h, k)) = explained(peak, &pair, &frame, orders) else {
+            continue;
+        };
+        let weight = (1.0 + peak.significance).ln();
+        score += weight * (1.0 - chance);
+        found += 1.0;
+        let shell = [[1.0, 0.0], [0.0, 1.0], [-1.0, 1.0]];
+        for (best, [sh, sk]) in first_shell.iter_mut().zip(shell) {
+            if (h, k) == (sh, sk) || (h, k) == (-sh, -sk) {
+                *best = best.max(weight);
+            }
+        }
+    }
+    // The sum rule: a lattice is as good as the weakest of its three shortest vectors.
+    first_shell.sort_by(f64::total_cmp);
+    score += 2.0 * first_shell[0] + first_shell[1];
+    Some(Candidate {
+        pair,
+        score,
+        explained: [found, chance * peaks.len() as f64],
+    })
+}
+
+/// The indices of the lattice point on which the peak lies, if it does.
+fn explained(
+    peak: &Peak,
+    pair: &Matrix2<f64>,
+    frame: &Matrix2<f64>,
+    orders: Orders,
+) -> Option<(f64, f64)> {
+    let indices = pair.try_inverse()? * peak.q;
+    let (h, k) = (indices.x.round(), indices.y.round());
+    if (h == 0.0 && k == 0.0) || h.abs().max(k.abs()).max((h + k).abs()) > orders.0 {
+        return None;
+    }
+    let miss = frame * (peak.q - pair * Vector2::new(h, k));
+    (miss.norm() < TOLERANCE).then_some((h, k))
+}
+
+/// Least-squares pair through the peaks it explains, each weighted by its significance.
+fn refined(
+    pair: &Matrix2<f64>,
+    peaks: &[Peak],
+    frame: &Matrix2<f64>,
+    orders: Orders,
+) -> Option<Matrix2<f64>> {
+    let mut normal = Matrix2::zeros();
+    let mut right = Matrix2::zeros();
+    for peak in peaks {
+        if let Some((h, k)) = explained(peak, pair, frame, orders) {
+            let index = Vector2::new(h, k);
+            let weight = peak.significance.min(1e4);
+            normal += weight * index * index.transpose();
+            right += weight * peak.q * index.transpose();
+        }
+    }
+    Some(right * normal.try_inverse()?)
+}
+
+/// The most significant local maxima of the spectrum, best first.
+pub(crate) fn spectrum_peaks(spectrum: &Spectrum) -> Vec<Peak> {
+    let noise = NoiseMap::new(spectrum);
+    let half = spectrum.half();
+    let rows = spectrum.rows;
+    let step = spectrum.step();
+    let frame = frame_cycles(spectrum);
+    let mut found = Vec::new();
+    for ky in 0..rows {
+        let signed = if ky <= rows / 2 {
+            ky as f64
+        } else {
+            ky as f64 - rows as f64
+        };
+        for kx in 0..half - 1 {
+            // On the axis kx = 0 the lower half repeats the upper one.
+            if kx == 0 && signed <= 0.0 {
+                continue;
+            }
+            let power = spectrum.power(kx, ky);
+            let significance = power / noise.at(kx, ky);
+            if significance < 4.0 {
+                continue;
+            }
+            let near = |dx: i64, dy: i64| {
+                let (mut x, mut y) = (kx as i64 + dx, ky as i64 + dy);
+                if x < 0 {
+                    (x, y) = (-x, -y);
+                }
+                spectrum.power(x as usize, y.rem_euclid(rows as i64) as usize)
+            };
+            let highest = (-1..=1)
+                .flat_map(|dy| (-1..=1).map(move |dx| (dx, dy)))
+                .all(|(dx, dy)| (dx, dy) == (0, 0) || near(dx, dy) <= power);
+            if !highest {
+                continue;
+            }
+            let offset = |minus: f64, plus: f64| {
+                let (m, c, p) = (minus.ln(), power.ln(), plus.ln());
+                let curvature = m - 2.0 * c + p;
+                if curvature < 0.0 {
+                    (0.5 * (m - p) / curvature).clamp(-0.5, 0.5)
+                } else {
+                    0.0
+                }
+            };
+            let bin = Vector2::new(
+                kx as f64 + offset(near(-1, 0), near(1, 0)),
+                signed + offset(near(0, -1), near(0, 1)),
+            );
+            let q = bin.component_mul(&step);
+            let cycles = frame * q;
+            if cycles.norm() < LOWEST_CYCLES
+                || q.amax() > std::f64::consts::TAU * HIGHEST_FREQUENCY
+                || q.amin() < -std::f64::consts::TAU * HIGHEST_FREQUENCY
+            {
+                continue;
+            }
+            found.push(Peak {
+                q,
+                cycles,
+                significance,
+                power,
+            });
+        }
+    }
+    found.sort_by(|a, b| b.significance.total_cmp(&a.significance));
+    found.truncate(8 * PEAKS);
+    let all = found.clone();
+    found.retain(|peak| !all.iter().any(|other| is_side_lobe(peak, other)));
+    found.truncate(PEAKS);
+    found
+}
+
+/// Whether `peak` is no higher than what the window spreads there from the stronger `other`.
+fn is_side_lobe(peak: &Peak, other: &Peak) -> bool {
+    if other.power <= peak.power {
+        return false;
+    }
+    // Envelope of the Hann transform: main lobe of ±2 cycles, then falling with the third power.
+    let envelope = |d: f64| {
+        let d = d.abs();
+        if d < 1.0 {
+            1.0
+        } else {
+            1.0 / (d * (d * d - 1.0).max(0.5)) / std::f64::consts::PI * 1.5
+        }
+    };
+    [1.0, -1.0].into_iter().any(|sign| {
+        let d = peak.cycles - sign * other.cycles;
+        let leak = (envelope(d.x) * envelope(d.y)).powi(2);
+        peak.power < 2.0 * other.power * leak.min(0.4)
+    })
+}
+
+/// Noise power, constant over blocks that are narrow along kx and tall along ky, since line noise
+/// is a ridge along ky.
+pub(crate) struct NoiseMap {
+    blocks: usize,
+    values: Vec<f64>,
+    rows: usize,
+}
+
+pub(crate) const BLOCK_WIDTH: usize = 4;
+const BLOCK_HEIGHT: usize = 32;
+
+impl NoiseMap {
+    pub(crate) fn new(spectrum: &Spectrum) -> Self {
+        let half = spectrum.half();
+        let across = half.div_ceil(BLOCK_WIDTH);
+        let down = spectrum.rows.div_ceil(BLOCK_HEIGHT);
+        let mut values = Vec::with_capacity(across * down);
+        let mut sample = Vec::with_capacity(BLOCK_WIDTH * BLOCK_HEIGHT);
+        for by in 0..down {
+            for bx in 0..across {
+                sample.clear();
+                for j in 0..BLOCK_HEIGHT {
+                    // Centred on zero frequency, like the ridge.
+                    let ky =
+                        (by * BLOCK_HEIGHT + j + spectrum.rows - BLOCK_HEIGHT / 2) % spectrum.rows;
+                    for kx in bx * BLOCK_WIDTH..((bx + 1) * BLOCK_WIDTH).min(half) {
+                        sample.push(spectrum.power(kx, ky));
+                    }
+                }
+                let middle = sample.len() / 2;
+                let median = *sample.select_nth_unstable_by(middle, f64::total_cmp).1;
+                // The median of exponentially distributed power is ln 2 of its mean.
+                values.push(median / std::f64::consts::LN_2);
+            }
+        }
+        let floor = values.iter().copied().fold(0.0, f64::max) * 1e-14;
+        for v in &mut values {
+            *v = v.max(floor).max(f64::MIN_POSITIVE);
+        }
+        Self {
+            blocks: across,
+            values,
+            rows: spectrum.rows,
+        }
+    }
+
+    pub(crate) fn at(&self, kx: usize, ky: usize) -> f64 {
+        self.row(ky)[kx / BLOCK_WIDTH]
+    }
+
+    /// The values for `BLOCK_WIDTH` frequencies kx each.
+    pub(crate) fn row(&self, ky: usize) -> &[f64] {
+        let by = ((ky + BLOCK_HEIGHT / 2) % self.rows) / BLOCK_HEIGHT;
+        &self.values[by * self.blocks..(by + 1) * self.blocks]
+    }
+}

@@ -1,0 +1,13 @@
+//! Patterns of one wave: which there are, one wave fitted to each, and maps of them.
+
+pub(crate) mod find;
+pub(crate) mod fit;
+pub(crate) mod maps;
+pub(crate) mod nodes;
+pub(crate) mod pilot;
+pub(crate) mod sample;
+pub(crate) mod wave;
+
+pub use fit::FittedWave;
+pub use maps::{NoStripes, StripeMap, StripeNode, StripePattern, find_stripes, stripe_maps};
+pub use sample::{SampledPattern, SampledStripes};

@@ -1,0 +1,169 @@
+//! Images as they would have been recorded with true positions on a sample at rest.
+
+use nalgebra::Vector2;
+use spmfile::{Channel, LineDirection, Samples, Scan, Span};
+
+use crate::campaign::analysis::ScanAnalysis;
+use crate::frame::geometry::{Geometry, Timing};
+use crate::frame::resample::{at_rest, resample};
+use crate::scan::channel::{channels, image_of};
+use crate::scan::positions::{nominal, usable_sensors};
+use crate::scan::scanner::calibrated;
+use crate::settings::knobs::Settings;
+
+/// One corrected image as a scan of its own, and what was done with it.
+#[derive(Clone, Debug)]
+pub struct CorrectedImage {
+    /// Trace or retrace.
+    pub line: LineDirection,
+    /// A scan of one channel on a square grid along the laboratory axes. It has no rotation and no
+    /// times: neither means anything for it any more.
+    pub scan: Scan,
+    /// What was done, in words.
+    pub log: Vec<String>,
+}
+
+/// The images behind `analysed`, corrected by the position sensors and, where it is known, for the
+/// drift at the time of the scan; whole frames, values as recorded.
+///
+/// Lines without a geometry are left out.
+pub fn corrected_images(
+    scan: &Scan,
+    analysed: &ScanAnalysis,
+    settings: &Settings,
+) -> Vec<CorrectedImage> {
+    let Ok(channels) = channels(scan, settings) else {
+        return Vec::new();
+    };
+    let wanted = |c: &&Channel| {
+        let line = c.line_direction.unwrap_or(LineDirection::Trace);
+        analysed.lines.iter().any(|l| l.line == line)
+    };
+    channels
+        .into_iter()
+        .filter(wanted)
+        .filter_map(|channel| corrected(scan, channel, &analysed.file, analysed.drift, settings))
+        .collect()
+}
+
+fn corrected(
+    scan: &Scan,
+    channel: &Channel,
+    file: &str,
+    drift: Option<Vector2<f64>>,
+    settings: &Settings,
+) -> Option<CorrectedImage> {
+    let line = channel.line_direction.unwrap_or(LineDirection::Trace);
+    let nominal = nominal(scan, channel);
+    let mut doubts = Vec::new();
+    let sensors = usable_sensors(file, scan, channel, nominal.as_ref(), &mut doubts);
+    let geometry = calibrated(&sensors.map(|s| s.geometry).or(nominal)?, settings);
+    let timing = scan
+        .frame_direction
+        .and_then(|frame| Timing::of_scan(scan, channel.columns, frame, line));
+    let mut log = vec![format!("from {file}")];
+    log.push(if geometry.from_sensors {
+        "positions: planes fitted to the X and Y sensors".to_owned()
+    } else {
+        "positions: nominal size and rotation, no position sensors".to_owned()
+    });
+    if settings.scanner.is_some() {
+        log.push("corrected by the calibration of the scanner".to_owned());
+    }
+    let at_rest = match (drift, timing) {
+        (Some(drift), Some(timing)) => {
+            let [x, y] = [drift.x * 60.0, drift.y * 60.0];
+            log.push(format!(
+                "corrected for the drift at its time, {x} nm/min along x and {y} nm/min along y"
+            ));
+            at_rest(&geometry, &timing, drift)
+        }
+        (None, _) => {
+            log.push("not corrected for drift: it is not known".to_owned());
+            geometry.clone()
+        }
+        (Some(_), None) => {
+            log.push("not corrected for drift: the times of the lines are not known".to_owned());
+            geometry.clone()
+        }
+    };
+    let mut out = on_grid(scan, channel, &at_rest)?;
+    out.metadata = about(&at_rest, drift.filter(|_| timing.is_some()));
+    let pitch = out.channels[0].pitch_nm()?[0];
+    log.push(format!(
+        "resampled by cubic convolution on a square grid along the laboratory axes, {pitch} nm"
+    ));
+    Some(CorrectedImage {
+        line,
+        scan: out,
+        log,
+    })
+}
+
+/// A channel on a square grid along the laboratory axes, as a scan without rotation and times.
+///
+/// `None` where the geometry is singular.
+pub fn on_grid(scan: &Scan, channel: &Channel, geometry: &Geometry) -> Option<Scan> {
+    let found = resample(&image_of(channel), &geometry.pixel_to_nm, geometry.origin)?;
+    let centre = found.centre();
+    let (rows, columns) = (found.image.rows, found.image.columns);
+    let size = [columns, rows].map(|count| count as f64 * found.pitch);
+    let channel = Channel {
+        rows,
+        columns,
+        width_nm: Some(size[0]),
+        height_nm: Some(size[1]),
+        span: Span::PixelEdges,
+        scale: 1.0,
+        offset: 0.0,
+        scaling: "resampled".to_owned(),
+        samples: Samples::F64(found.image.values),
+        ..channel.clone()
+    };
+    Some(Scan {
+        format: scan.format.clone(),
+        instrument: scan.instrument.clone(),
+        acquired: scan.acquired,
+        offset_nm: [centre.x, centre.y],
+        size_nm: Some(size),
+        closed_loop: scan.closed_loop,
+        channels: vec![channel],
+        ..Scan::default()
+    })
+}
+
+/// The nominal geometry of a channel: pitch and rotation as the file states them.
+pub fn nominal_geometry(scan: &Scan, channel: &Channel) -> Option<Geometry> {
+    nominal(scan, channel)
+}
+
+/// The numbers of the correction.
+fn about(geometry: &Geometry, drift: Option<Vector2<f64>>) -> Vec<(String, String)> {
+    let m = geometry.pixel_to_nm;
+    let (r, from) = (geometry.origin, geometry.from_sensors);
+    let mut lines = vec![
+        (
+            "moiregauge positions".to_owned(),
+            if from { "sensors" } else { "nominal" }.to_owned(),
+        ),
+        (
+            "moiregauge step per column (nm)".to_owned(),
+            format!("{} {}", m.m11, m.m21),
+        ),
+        (
+            "moiregauge step per row (nm)".to_owned(),
+            format!("{} {}", m.m12, m.m22),
+        ),
+        (
+            "moiregauge first pixel (nm)".to_owned(),
+            format!("{} {}", r.x, r.y),
+        ),
+    ];
+    lines.extend(drift.map(|d| {
+        (
+            "moiregauge drift (nm/min)".to_owned(),
+            format!("{} {}", d.x * 60.0, d.y * 60.0),
+        )
+    }));
+    lines
+}

@@ -1,0 +1,40 @@
+//! Scans that were analysed → their nodes and triangles on the sample, at small angles.
+
+use spmfile::Scan;
+
+use crate::campaign::analysis::ScanAnalysis;
+use crate::domains::cells::DomainMap;
+use crate::domains::mesh::Mesh;
+use crate::domains::nodes::{Contrast, find_nodes};
+use crate::frame::background::remove_background;
+use crate::scan::channel::{channels, image_of};
+use crate::settings::knobs::Settings;
+use crate::survey::mapping::{Frame, drifted, frame, pitch};
+
+/// The domain structure of every image behind `analysed` that shows one, drift and sensors taken into account;
+/// `origin` as for [`crate::survey::mapping::map_scan`].
+pub fn domains_of_scan(
+    scan: &Scan,
+    (analysed, origin): (&ScanAnalysis, Option<f64>),
+    settings: &Settings,
+    contrast: Contrast,
+) -> Vec<DomainMap> {
+    let channels = channels(scan, settings).unwrap_or_default();
+    let of_channel = |channel: &spmfile::Channel| {
+        let Frame {
+            pixels,
+            geometry,
+            still,
+            ..
+        } = frame(scan, channel, analysed, settings)?;
+        let image = remove_background(&image_of(channel), settings.background);
+        let found = find_nodes(&image, &pixels, pitch(&geometry), contrast)?;
+        let places: Vec<_> = found.nodes.iter().map(|n| n.place).collect();
+        let mesh = Mesh::new(&places, &pixels);
+        let mut placed = still.unwrap_or(geometry);
+        placed.origin -= drifted(analysed, origin);
+        let (layers, convention) = (settings.bilayer(), settings.strain_convention);
+        DomainMap::new(&found, &mesh, &placed, layers, convention)?.ok()
+    };
+    channels.into_iter().filter_map(of_channel).collect()
+}

@@ -1,0 +1,217 @@
+//! Scans that were analysed → maps of their local lattice on the sample.
+//!
+//! Places are those on the sample at the time of the first scan: what it drifts until a later scan is taken off.
+
+use heterostrain::lattice::reciprocal;
+use nalgebra::{Matrix2, Vector2};
+use spmfile::{Channel, FrameDirection, LineDirection, Scan};
+
+use crate::campaign::analysis::ScanAnalysis;
+use crate::frame::background::remove_background;
+use crate::frame::geometry::{Geometry, Timing};
+use crate::frame::resample::at_rest;
+use crate::map::local::local_lattices;
+use crate::map::sample::LatticeMap;
+use crate::scan::channel::{channels, image_of};
+use crate::scan::positions::{nominal, usable_sensors};
+use crate::scan::scanner::calibrated;
+use crate::settings::knobs::Settings;
+use crate::survey::tiling::tile_map;
+use crate::window::types::{FULL_WIDTH, Reference, Resolution, ResolutionError, UsedHarmonic};
+
+/// The map of one line direction of a scan.
+#[derive(Clone, Debug)]
+pub struct LineMap {
+    /// The file as the user named it.
+    pub file: String,
+    /// Trace or retrace.
+    pub line: LineDirection,
+    /// Sense of the slow motion.
+    pub frame_direction: Option<FrameDirection>,
+    /// Whether the drift is taken off.
+    pub drift_corrected: bool,
+    /// Time gradient of the frame, s/nm; `None` without timing.
+    pub time_gradient: Option<Vector2<f64>>,
+    /// The harmonics that were used; none by tiles.
+    pub harmonics: Vec<UsedHarmonic>,
+    /// Margin at the edges, in windows; 0 by tiles.
+    pub margin: f64,
+    /// Whether the noise was seen between the harmonics and not guessed.
+    pub noise_measured: bool,
+    /// The lattice of the whole image under the same corrections, wave vectors as columns, rad/nm.
+    pub whole: Matrix2<f64>,
+    /// Local lattices on the sample.
+    pub map: LatticeMap,
+}
+
+/// How local lattices are measured.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum MapMethod {
+    /// Phases under a Gaussian window.
+    #[default]
+    Demodulation,
+    /// The fit of whole images on overlapping tiles.
+    Tiles,
+}
+
+/// Why an image gives no map.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum MapError {
+    /// No image of this size has such a map.
+    #[error(transparent)]
+    Resolution(#[from] ResolutionError),
+    /// Neither trace nor retrace of the scan was analysed, or it has no size.
+    #[error("no analysed image with a size")]
+    NoImage,
+    /// The windows do not fit into the frame.
+    #[error(
+        "the frame is too small for a map, or the lattice shows nowhere in it: windows of 0.6 periods \
+         and margins of two windows have to fit"
+    )]
+    TooSmall,
+}
+
+/// Maps the images behind `analysed`, drift and sensors taken into account as there.
+///
+/// `origin` is the time at which places on the sample are meant, that of the middle of the first frame
+/// ([`crate::campaign::analysis::Motion`]). By tiles, the window of `resolution` is the side of a tile.
+///
+/// # Errors
+/// [`MapError`], where none of its images gives a map.
+pub fn map_scan(
+    scan: &Scan,
+    (analysed, origin): (&ScanAnalysis, Option<f64>),
+    settings: &Settings,
+    (method, resolution): (MapMethod, &Resolution),
+) -> Result<Vec<LineMap>, MapError> {
+    let channels = channels(scan, settings).map_err(|_| MapError::NoImage)?;
+    let (mut maps, mut error) = (Vec::new(), MapError::NoImage);
+    for channel in channels {
+        match map_line(scan, channel, analysed, settings, (method, resolution)) {
+            Ok(mut map) => {
+                map.map.grid.origin -= drifted(analysed, origin);
+                maps.push(map);
+            }
+            Err(why) => error = why,
+        }
+    }
+    if maps.is_empty() {
+        Err(error)
+    } else {
+        Ok(maps)
+    }
+}
+
+/// How far the sample drifted from `origin` until the middle of the scan.
+pub(crate) fn drifted(analysed: &ScanAnalysis, origin: Option<f64>) -> Vector2<f64> {
+    match (analysed.motion, origin) {
+        (Some(motion), Some(then)) => motion.path.between(then, motion.middle),
+        _ => Vector2::zeros(),
+    }
+}
+
+fn map_line(
+    scan: &Scan,
+    channel: &Channel,
+    analysed: &ScanAnalysis,
+    settings: &Settings,
+    (method, resolution): (MapMethod, &Resolution),
+) -> Result<LineMap, MapError> {
+    let Frame {
+        line,
+        pixels,
+        geometry,
+        timing,
+        still,
+    } = frame(scan, channel, analysed, settings).ok_or(MapError::NoImage)?;
+    let reference = Reference {
+        pair: reciprocal(&pixels).ok_or(MapError::NoImage)?,
+        pitch: pitch(&geometry),
+    };
+    let placed = still.as_ref().unwrap_or(&geometry);
+    let widths = match method {
+        MapMethod::Demodulation => FULL_WIDTH,
+        // The window is the side of a tile.
+        MapMethod::Tiles => 1.0,
+    };
+    resolution.fits(geometry.extent(), widths)?;
+    let (map, harmonics, noise_measured, margin) = match method {
+        MapMethod::Demodulation => {
+            let image = remove_background(&image_of(channel), settings.background);
+            let waves = local_lattices(&image, &reference, resolution).ok_or(MapError::TooSmall)?;
+            let map = LatticeMap::new(&waves, placed).ok_or(MapError::NoImage)?;
+            (map, waves.harmonics, waves.noise_measured, waves.margin)
+        }
+        MapMethod::Tiles => {
+            let image = image_of(channel);
+            let sides = (resolution.window_nm, resolution.step_nm);
+            let map = tile_map(&image, (&geometry, placed), &reference, sides, settings);
+            (map.ok_or(MapError::TooSmall)?, Vec::new(), true, 0.0)
+        }
+    };
+    let dual = placed.pixel_to_nm.try_inverse().ok_or(MapError::NoImage)?;
+    Ok(LineMap {
+        file: analysed.file.clone(),
+        line,
+        frame_direction: analysed.frame_direction,
+        drift_corrected: still.is_some(),
+        time_gradient: timing.and_then(|timing| geometry.time_gradient(&timing)),
+        harmonics,
+        margin,
+        noise_measured,
+        whole: dual.transpose() * reference.pair,
+        map,
+    })
+}
+
+/// A channel with its lattice and its place.
+pub(crate) struct Frame {
+    pub(crate) line: LineDirection,
+    /// Lattice of the whole image, pixels.
+    pub(crate) pixels: Matrix2<f64>,
+    pub(crate) geometry: Geometry,
+    pub(crate) timing: Option<Timing>,
+    /// The geometry without drift, where the drift is known.
+    pub(crate) still: Option<Geometry>,
+}
+
+/// `None` for a channel that was not analysed or has no size.
+pub(crate) fn frame(
+    scan: &Scan,
+    channel: &Channel,
+    analysed: &ScanAnalysis,
+    settings: &Settings,
+) -> Option<Frame> {
+    let line = channel.line_direction.unwrap_or(LineDirection::Trace);
+    let found = analysed.lines.iter().find(|l| l.line == line);
+    let pixels = found?.pixels.basis;
+    let nominal = nominal(scan, channel);
+    // Doubts about the sensors are in the analysis already.
+    let sensors = usable_sensors(
+        &analysed.file,
+        scan,
+        channel,
+        nominal.as_ref(),
+        &mut Vec::new(),
+    );
+    let geometry = sensors.map(|s| s.geometry).or(nominal)?;
+    let geometry = calibrated(&geometry, settings);
+    let frame = analysed.frame_direction;
+    let timing = frame.and_then(|frame| Timing::of_scan(scan, channel.columns, frame, line));
+    let still = match (analysed.drift, timing) {
+        (Some(drift), Some(timing)) => Some(at_rest(&geometry, &timing, drift)),
+        _ => None,
+    };
+    Some(Frame {
+        line,
+        pixels,
+        geometry,
+        timing,
+        still,
+    })
+}
+
+pub(crate) fn pitch(geometry: &Geometry) -> [f64; 2] {
+    [geometry.fast_step().norm(), geometry.slow_step().norm()]
+}
