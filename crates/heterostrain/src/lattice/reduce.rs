@@ -140,6 +140,15 @@ pub fn canonical(lattice: &LatticeVectors) -> LatticeVectors {
     })
 }
 
+/// All matrices of determinant 1 with entries −1, 0, 1.
+pub(crate) fn small_changes() -> impl Iterator<Item = Matrix2<f64>> {
+    (0..81).filter_map(|code: i32| {
+        let entry = |power: u32| f64::from(code / 3_i32.pow(power) % 3 - 1);
+        let change = Matrix2::new(entry(0), entry(1), entry(2), entry(3));
+        (change.determinant() == 1.0).then_some(change)
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -9,10 +9,10 @@ use std::f64::consts::PI;
 use nalgebra::{Complex, Matrix4, SMatrix, Vector2, Vector4};
 
 use crate::complex_pair::ComplexPair;
-use crate::strain::closed_form::Labelled;
 use crate::strain::inversion::{cosine, directions, reduce, solution_at};
 use crate::strain::labelling::moire_matrix_jacobian;
 use crate::strain::layers::{Layers, Stretch, strain_side};
+use crate::strain::names::Labelled;
 use crate::strain::twist_strain::TwistStrain;
 
 /// Cosine beyond 1 that is still read as alignment: what a few per cent of calibration and isotropic

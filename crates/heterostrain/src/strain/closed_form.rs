@@ -19,7 +19,7 @@ use crate::strain::error::StrainError;
 use crate::strain::inversion::{ALL_SIGNS, Signs, Solution, reduce, solve, solve_all};
 use crate::strain::labelling::{least_strained, likely_names, moire_matrix, moire_matrix_jacobian};
 use crate::strain::layers::Layers;
-use crate::strain::names::{LatticeName, all_names, change_to};
+use crate::strain::names::{Labelled, LatticeName, all_names, change_to};
 use crate::strain::twist_strain::TwistStrain;
 
 /// Above this |q|/|p| the mirrored labelling (strain makes the moiré, twist distorts it) is listed.
@@ -59,13 +59,6 @@ pub struct Solutions {
     pub branches: Vec<Branch>,
     /// The strain up to which there are no others.
     pub complete_to: f64,
-}
-
-/// A lattice under one of its names, and P of that name.
-pub(crate) struct Labelled {
-    pub(crate) name: LatticeName,
-    pub(crate) lattice: LatticeVectors,
-    pub(crate) moire: Matrix2<f64>,
 }
 
 /// Twist and heterostrain of two layers, with θ > 0 and ε ≥ 0.

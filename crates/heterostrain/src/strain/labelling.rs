@@ -14,10 +14,11 @@
 use nalgebra::{Matrix2, Matrix4, Vector4};
 
 use crate::complex_pair::ComplexPair;
-use crate::lattice::reduce::shortest_pair;
+use crate::lattice::reduce::{shortest_pair, small_changes};
 use crate::lattice::vectors::LatticeVectors;
 use crate::strain::inversion::{ALL_SIGNS, solve};
 use crate::strain::layers::Layers;
+use crate::strain::names::LatticeName;
 
 /// Largest number in the name of a moiré vector that is tried for layers of different lattices.
 const LARGEST_ENTRY: i32 = 5;
@@ -147,13 +148,4 @@ pub(crate) fn names(lattice: &LatticeVectors) -> Option<Vec<LatticeVectors>> {
         }
     }
     Some(found)
-}
-
-/// All matrices of determinant 1 with entries −1, 0, 1.
-pub(crate) fn small_changes() -> impl Iterator<Item = Matrix2<f64>> {
-    (0..81).filter_map(|code: i32| {
-        let entry = |power: u32| f64::from(code / 3_i32.pow(power) % 3 - 1);
-        let change = Matrix2::new(entry(0), entry(1), entry(2), entry(3));
-        (change.determinant() == 1.0).then_some(change)
-    })
 }

@@ -109,7 +109,7 @@ fn most_alike(first: &Matrix2<f64>, second: &Matrix2<f64>) -> Option<ComplexPair
     let pair = |change: &Matrix2<f64>| ComplexPair::from((second * change * inverse).transpose());
     let distortion = |pair: &ComplexPair| pair.q.norm() / pair.p.norm();
     let mut best = pair(&Matrix2::identity());
-    for change in crate::strain::labelling::small_changes() {
+    for change in crate::lattice::reduce::small_changes() {
         let other = pair(&change);
         if distortion(&other) < distortion(&best) - 1e-9 {
             best = other;

@@ -29,6 +29,9 @@ pub struct FixedBranch {
 
 impl FixedBranch {
     /// The default solution of `reference` (nm), for lattices whose vectors have the same names.
+    ///
+    /// # Errors
+    /// As [`crate::strain::twist_strain`].
     pub fn of<'a>(
         reference: &LatticeVectors,
         bilayer: impl Into<Bilayer<'a>>,

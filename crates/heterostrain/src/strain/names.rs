@@ -12,7 +12,7 @@ use nalgebra::{Matrix2, Rotation2, Vector2};
 use crate::complex_pair::ComplexPair;
 use crate::lattice::reduce::shortest_pair;
 use crate::lattice::vectors::LatticeVectors;
-use crate::strain::labelling::moire_matrix;
+use crate::strain::labelling::{moire_matrix, names};
 use crate::strain::layers::Layers;
 
 /// Readings that need more strain are not listed: strains between layers are a few tenths of a per cent, rarely one.
@@ -161,4 +161,11 @@ fn simplest(waves: &Matrix2<f64>, layers: &Layers) -> Option<LatticeName> {
         current *= turn;
     }
     best.map(|(_, name)| name)
+}
+
+/// A lattice under one of its names, and P of that name.
+pub(crate) struct Labelled {
+    pub(crate) name: LatticeName,
+    pub(crate) lattice: LatticeVectors,
+    pub(crate) moire: Matrix2<f64>,
 }

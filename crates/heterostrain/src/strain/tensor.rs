@@ -19,13 +19,14 @@ use crate::complex_pair::ComplexPair;
 use crate::estimate::Estimate;
 use crate::lattice::vectors::LatticeVectors;
 use crate::material::Bilayer;
-use crate::strain::closed_form::{Labelled, labelled};
+use crate::strain::closed_form::labelled;
 use crate::strain::convention::StrainConvention;
 use crate::strain::error::StrainError;
 use crate::strain::inversion::{by_angle, directions, reduce, wrap};
 use crate::strain::known::{KnownOrientation, LatticeDirection};
 use crate::strain::labelling::{moire_matrix, moire_matrix_jacobian, names};
 use crate::strain::layers::Layers;
+use crate::strain::names::Labelled;
 
 /// Readings with more mean strain than this are no alternatives.
 const LARGEST_MEAN_STRAIN: f64 = 0.01;

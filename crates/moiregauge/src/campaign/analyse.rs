@@ -13,7 +13,7 @@ use crate::campaign::set::moire::IMPOSSIBLE;
 use crate::campaign::{combine, group, identity, samples};
 use crate::caveat::Caveat;
 use crate::frame::background::Background;
-use crate::scan::MeasuredScan;
+use crate::scan::measured::MeasuredScan;
 use crate::settings::knobs::Settings;
 use crate::spectrum::method::Method;
 

@@ -40,17 +40,11 @@ const LIKELY: [[i32; 2]; 15] = [
 ];
 /// Wave vectors beyond this (rad per pixel, each component) are too near the limit of sampling.
 const FASTEST: f64 = 2.6;
-/// Blocks per period.
-pub(crate) const BLOCKS: f64 = 5.0;
 
 /// Likely harmonics looked at together; and where blocks are single pixels, for the memory's sake.
 const AT_ONCE: [usize; 2] = [6, 1];
 /// Nodes so many windows from the edges say how well the harmonics agree.
 const CLOSURE: f64 = 1.0;
-/// Nodes per width of the window.
-pub(crate) const NODES: f64 = 3.0;
-/// Nodes are so many pixels apart at least.
-pub(crate) const APART: f64 = 2.0;
 
 /// Demodulates an image whose background is gone. `place` says which part of a larger image it is.
 ///

@@ -5,7 +5,7 @@ use nalgebra::Vector2;
 use crate::frame::image::Image;
 use crate::map::demodulate;
 use crate::window::blocks::Place;
-use crate::window::{Reference, Resolution, WaveMap};
+use crate::window::types::{Reference, Resolution, WaveMap};
 
 /// The local lattices of an image whose background is gone.
 ///

@@ -6,10 +6,11 @@ use heterostrain::strain::{StrainConvention, twist_strain};
 use nalgebra::{Matrix2, Matrix4, Vector2};
 
 use super::*;
-use crate::frame::Image;
 use crate::frame::geometry::Geometry;
+use crate::frame::image::Image;
 use crate::simulate::field::{Feature, FieldScene, Ripple};
-use crate::window::{Mask, Reference, Resolution, WaveMap, WaveNode};
+use crate::window::mask::Mask;
+use crate::window::types::{Reference, Resolution, WaveMap, WaveNode};
 
 pub(crate) fn map_of(scene: &FieldScene, window: Option<f64>) -> WaveMap {
     let reference = Reference {

@@ -7,9 +7,9 @@ use heterostrain::strain::{StrainTensor, TwistStrain};
 
 use crate::caveat::Caveat;
 use crate::meaning::naming::{ChosenBy, NameReading, Naming};
-use crate::meaning::readings::{AllNames, CLEARLY, Readings};
+use crate::meaning::readings::{AllNames, Readings};
 use crate::meaning::strengths::WaveStrengths;
-use crate::meaning::tensor::{SenseReading, TensorReading, known_orientation};
+use crate::meaning::tensor::{CLEARLY, SenseReading, TensorReading, known_orientation};
 use crate::settings::knobs::Settings;
 
 /// A mean strain this large contradicts the orientation.

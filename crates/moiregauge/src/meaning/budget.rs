@@ -22,7 +22,7 @@ use heterostrain::material::Material;
 use heterostrain::strain::{Reference, TwistStrain, twist_strain};
 use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
 
-use crate::drift::Statistical;
+use crate::drift::shares::Statistical;
 use crate::settings::knobs::Settings;
 
 /// Where an error comes from.

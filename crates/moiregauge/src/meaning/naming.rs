@@ -14,9 +14,8 @@ use heterostrain::lattice::LatticeVectors;
 use heterostrain::strain::{LatticeName, Orientation, Solutions, solutions, strain_tensors};
 use nalgebra::{Matrix2, Vector2};
 
-use crate::meaning::readings::CLEARLY;
 use crate::meaning::strengths::WaveStrengths;
-use crate::meaning::tensor::known_orientation;
+use crate::meaning::tensor::{CLEARLY, known_orientation};
 use crate::settings::knobs::Settings;
 
 /// A reading with no more strain than this, or than twice that of the one reported, is plausible.

@@ -7,11 +7,10 @@ use heterostrain::lattice::LatticeVectors;
 use heterostrain::strain::{Branch, Degeneracy, TwistStrain, degeneracy, solutions};
 
 use crate::meaning::budget::Budget;
-use crate::meaning::{Naming, TensorReading, WaveStrengths};
+use crate::meaning::naming::Naming;
+use crate::meaning::strengths::WaveStrengths;
+use crate::meaning::tensor::TensorReading;
 use crate::settings::knobs::Settings;
-
-/// Standard deviations that deserve a word.
-pub(crate) const CLEARLY: f64 = 3.0;
 
 /// All that a lattice can mean.
 #[derive(Clone, Debug)]

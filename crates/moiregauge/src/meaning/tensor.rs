@@ -12,7 +12,6 @@ use heterostrain::strain::{KnownOrientation, Orientation, StrainTensor, strain_t
 use nalgebra::{Matrix5, Vector5};
 
 use crate::meaning::budget::Budget;
-use crate::meaning::readings::CLEARLY;
 use crate::settings::knobs::Settings;
 
 /// Least standard deviation of an orientation, rad: numbers that are typed in have rounding errors.
@@ -257,3 +256,6 @@ fn constants(bilayer: Bilayer<'_>) -> Vec<[Material; 2]> {
         ]
     }
 }
+
+/// Standard deviations that deserve a word.
+pub(crate) const CLEARLY: f64 = 3.0;

@@ -3,7 +3,6 @@
 use spmfile::{Channel, LineDirection, Scan};
 
 use crate::frame::image::Image;
-use crate::scan::images::images_of;
 use crate::scan::measured::MeasureError;
 use crate::settings::knobs::{Lines, Settings};
 
@@ -148,6 +147,21 @@ pub(crate) fn channels<'a>(
         Lines::Both => trace.into_iter().chain(retrace).collect(),
     };
     Ok(chosen)
+}
+
+/// The images of a channel in one line direction, main scan lines where there are any, in the order of the file.
+pub(crate) fn images_of<'a>(
+    scan: &'a Scan,
+    name: &str,
+    direction: LineDirection,
+) -> Vec<&'a Channel> {
+    let wanted = |c: &&Channel| {
+        stem(&c.name) == stem(name) && c.line_direction.unwrap_or(LineDirection::Trace) == direction
+    };
+    let all: Vec<&Channel> = scan.channels.iter().filter(wanted).collect();
+    let main = |c: &&Channel| c.scan_line.as_deref().is_none_or(|s| s == "Main");
+    let mains: Vec<&Channel> = all.iter().copied().filter(main).collect();
+    if mains.is_empty() { all } else { mains }
 }
 
 #[cfg(test)]

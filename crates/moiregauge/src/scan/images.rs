@@ -3,25 +3,10 @@
 //! The channel is chosen by name ([`choose_channel`]). Several images of one name and line direction (pages, frames) are
 //! told apart by their order, and by that alone.
 
-use spmfile::{Channel, LineDirection, Scan, sensor_axis};
+use spmfile::{LineDirection, Scan, sensor_axis};
 
-use crate::scan::channel::{channels_by_preference, choose_channel, is_usual, stem};
+use crate::scan::channel::{channels_by_preference, choose_channel, images_of, is_usual};
 use crate::settings::knobs::Settings;
-
-/// The images of a channel in one line direction, main scan lines where there are any, in the order of the file.
-pub(crate) fn images_of<'a>(
-    scan: &'a Scan,
-    name: &str,
-    direction: LineDirection,
-) -> Vec<&'a Channel> {
-    let wanted = |c: &&Channel| {
-        stem(&c.name) == stem(name) && c.line_direction.unwrap_or(LineDirection::Trace) == direction
-    };
-    let all: Vec<&Channel> = scan.channels.iter().filter(wanted).collect();
-    let main = |c: &&Channel| c.scan_line.as_deref().is_none_or(|s| s == "Main");
-    let mains: Vec<&Channel> = all.iter().copied().filter(main).collect();
-    if mains.is_empty() { all } else { mains }
-}
 
 /// Words where a channel has several images in the file and nobody said which of them is meant.
 pub(crate) fn first_of_several(scan: &Scan, name: &str, settings: &Settings) -> Option<String> {

@@ -112,3 +112,8 @@ fn window_centre(settings: &Simulation, time: f64, direction: FrameDirection) ->
         + Vector2::from(window.creep_nm_per_min) * (time / 60.0)
         + Vector2::from(window.alternation_nm) * side
 }
+
+/// The name of the file for frame `index`, as in `scan.003.spm`.
+pub(crate) fn file_name(index: usize) -> String {
+    format!("scan.{index:03}.spm")
+}

@@ -2,9 +2,12 @@
 
 use spmfile::Scan;
 
-use crate::simulate::raster::FramePlan;
+use crate::simulate::error::SimulateError;
+use crate::simulate::raster::{FramePlan, file_name};
 use crate::simulate::scene::Scene;
-use crate::simulate::{SimulateError, Simulation, Truth, frame, truth};
+use crate::simulate::settings::Simulation;
+use crate::simulate::truth::Truth;
+use crate::simulate::{frame, truth};
 
 /// A simulation whose settings have been checked, ready to record frames.
 #[derive(Clone, Debug)]
@@ -52,6 +55,6 @@ impl Simulator {
 
     /// The name of the file for frame `index`, as in `scan.003.spm`.
     pub fn file_name(index: usize) -> String {
-        format!("scan.{index:03}.spm")
+        file_name(index)
     }
 }

@@ -4,10 +4,9 @@ use nalgebra::{Matrix2, Vector2};
 use serde::{Deserialize, Serialize};
 use spmfile::FrameDirection;
 
-use crate::simulate::raster::FramePlan;
+use crate::simulate::raster::{FramePlan, file_name};
 use crate::simulate::scene::Scene;
 use crate::simulate::settings::Simulation;
-use crate::simulate::simulator::Simulator;
 
 /// The truth about a simulated set.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
@@ -130,7 +129,7 @@ fn frame_truth(settings: &Simulation, index: usize) -> FrameTruth {
     let plan = FramePlan::new(settings, index);
     let j = plan.pixel_to_nm;
     FrameTruth {
-        file: Simulator::file_name(index),
+        file: file_name(index),
         frame_direction: match plan.direction {
             FrameDirection::Up => "up".to_owned(),
             FrameDirection::Down => "down".to_owned(),

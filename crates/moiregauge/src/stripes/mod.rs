@@ -6,8 +6,10 @@ pub(crate) mod maps;
 pub(crate) mod nodes;
 pub(crate) mod pilot;
 pub(crate) mod sample;
+pub(crate) mod types;
 pub(crate) mod wave;
 
 pub use fit::FittedWave;
-pub use maps::{NoStripes, StripeMap, StripeNode, StripePattern, find_stripes, stripe_maps};
+pub use maps::{find_stripes, stripe_maps};
 pub use sample::{SampledPattern, SampledStripes};
+pub use types::{NoStripes, StripeMap, StripeNode, StripePattern};

@@ -7,7 +7,7 @@ use crate::map::defects::{Setting, bend, is_improbable, near};
 use crate::map::displacement;
 use crate::numbers::median::median;
 use crate::stripes::fit;
-use crate::stripes::maps::{NoStripes, StripeMap, StripeNode, StripePattern};
+use crate::stripes::types::{NoStripes, StripeMap, StripeNode, StripePattern};
 use crate::stripes::wave::{Local, Wave};
 use crate::window::mask::Mask;
 use crate::window::smooth::{Envelope, Nodes, Smoothed};

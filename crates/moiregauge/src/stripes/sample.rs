@@ -15,7 +15,7 @@ use crate::map::quantities::{Plane, TwistStrainMap};
 use crate::map::sample::Grid;
 use crate::map::summary::Spread;
 use crate::numbers::chi2::enlargement;
-use crate::stripes::maps::{StripeMap, StripeNode};
+use crate::stripes::types::{StripeMap, StripeNode};
 use crate::window::mask::Mask;
 use crate::window::types::UsedHarmonic;
 

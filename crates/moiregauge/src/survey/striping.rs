@@ -12,8 +12,9 @@ use crate::scan::channel::{channels, image_of};
 use crate::scan::positions::{nominal, usable_sensors};
 use crate::scan::scanner::calibrated;
 use crate::settings::knobs::Settings;
-use crate::stripes::maps::{NoStripes, find_stripes, stripe_maps};
+use crate::stripes::maps::{find_stripes, stripe_maps};
 use crate::stripes::sample::SampledStripes;
+use crate::stripes::types::NoStripes;
 use crate::survey::mapping::pitch;
 use crate::window::types::{FULL_WIDTH, Resolution, ResolutionError};
 

@@ -7,7 +7,6 @@
 use nalgebra::Vector2;
 use rayon::prelude::*;
 
-use crate::map::demodulate::{APART, BLOCKS, NODES};
 use crate::window::lines::Levelled;
 use crate::window::types::{Reference, Resolution};
 
@@ -244,6 +243,15 @@ pub(crate) fn step_of(resolution: &Resolution, reference: &Reference, window_nm:
     let usual = (window_nm / NODES).max(least);
     resolution.step_nm.unwrap_or(usual)
 }
+
+/// Nodes are so many pixels apart at least.
+pub(crate) const APART: f64 = 2.0;
+
+/// Blocks per period.
+pub(crate) const BLOCKS: f64 = 5.0;
+
+/// Nodes per width of the window.
+pub(crate) const NODES: f64 = 3.0;
 
 #[cfg(test)]
 mod tests {

@@ -2,7 +2,7 @@
 
 use crate::campaign::analysis::{Checks, Drift, Residual, SetMean};
 use crate::caveat::Caveat;
-use crate::meaning::caveats;
+use crate::meaning::about::caveats;
 use crate::settings::knobs::Settings;
 
 /// χ²/dof beyond which the scatter of the scans deserves a word.

@@ -5,8 +5,7 @@ use nalgebra::{Matrix2, Vector2};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
-use crate::campaign::analysis::ScanAnalysis;
-use crate::campaign::set::analyse::{Drift, DriftFit};
+use crate::campaign::analysis::{Drift, DriftFit, ScanAnalysis};
 use crate::campaign::set::solved::Solved;
 use crate::caveat::Caveat;
 use crate::drift::linear::{DriftSolution, Observation, at_known_drift, common_lattice};

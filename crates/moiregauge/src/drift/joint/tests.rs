@@ -6,7 +6,7 @@ use rand_distr::{Distribution, StandardNormal};
 
 use super::*;
 use crate::numbers::rng::stream;
-use crate::spectrum::Phases;
+use crate::spectrum::phases::Phases;
 
 /// Of a frame time, s.
 const TIME_SIGMA: f64 = 0.6;

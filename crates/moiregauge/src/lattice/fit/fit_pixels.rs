@@ -6,15 +6,15 @@ use rustfft::num_complex::Complex64;
 
 use crate::frame::background::Background;
 use crate::frame::image::Image;
+use crate::lattice::fit::bend::Inhomogeneity;
+use crate::lattice::fit::closure::Closure;
 use crate::lattice::fit::folded::{Bends, Folded};
 use crate::lattice::fit::frame::{Basis, Frame};
 use crate::lattice::fit::gram::gram;
 use crate::lattice::fit::lines::LineStatistics;
 use crate::lattice::fit::model::{Clip, LineOffsets, Model, Tables, look, settled};
-use crate::lattice::fit::noise::{Leverage, ResidualNoise};
-use crate::lattice::fit::{
-    Closure, ForeignWave, Inhomogeneity, bend, choose, closure, frame, solve,
-};
+use crate::lattice::fit::noise::{ForeignWave, Leverage, ResidualNoise};
+use crate::lattice::fit::{bend, choose, closure, frame, solve};
 use crate::spectrum::harmonics::{Harmonics, dot};
 use crate::spectrum::phases::Phases;
 
