@@ -30,7 +30,7 @@ pub(crate) use task::{Task, out_beside};
 
 use crate::outputs::{commit, write_all};
 use crate::say::say;
-use moiregauge::series::refusal;
+use moiregauge::series::{is_nothing_left, refusal};
 use moiregauge_report::{InputFile, write_report};
 
 /// Whether the program can write Parquet.
@@ -49,11 +49,8 @@ pub(crate) fn run(args: &AnalyzeArgs) -> anyhow::Result<ExitCode> {
     let sink = files::sink((out.as_path(), args.force), &exports, &task.files())?;
     let outcomes = outcomes(&task, args.is_loud())?;
     let refused = outcomes.iter().find_map(|o| refusal(&o.analysis)).cloned();
-    if let Some(why) = refused
-        .as_ref()
-        .filter(|why| why.code == "everything-excluded")
-    {
-        anyhow::bail!("{}", why.message);
+    if let Some(why) = refused.as_ref().filter(|why| is_nothing_left(&why.doubt)) {
+        anyhow::bail!("{}", why.message());
     }
     let (mut failed, mut answers, mut documents) = (Vec::new(), Vec::new(), Vec::new());
     let folders = files::within(outcomes.len());
@@ -101,7 +98,7 @@ pub(crate) fn run(args: &AnalyzeArgs) -> anyhow::Result<ExitCode> {
     }
     eprint!("{}", failures(&failed));
     if let Some(why) = &refused {
-        eprintln!("error: {}: {}", why.place, why.message);
+        eprintln!("error: {}: {}", why.place, why.message());
     }
     Ok(
         if task.is_same(&documents) && failed.is_empty() && refused.is_none() {

@@ -11,6 +11,7 @@ use std::process::ExitCode;
 
 use moiregauge::series::image_choice;
 use moiregauge::settings::Settings;
+use moiregauge::words::line_name;
 use serde::Serialize;
 use spmfile::{
     Channel, DateTime, FrameDirection, LineDirection, ReadError, Scan, position_sensors,
@@ -340,13 +341,6 @@ fn missing_for_analysis(scan: &Scan) -> Vec<String> {
         }
     }
     missing
-}
-
-pub(crate) fn line_name(line: LineDirection) -> &'static str {
-    match line {
-        LineDirection::Trace => "trace",
-        LineDirection::Retrace => "retrace",
-    }
 }
 
 fn iso_date(t: DateTime) -> String {

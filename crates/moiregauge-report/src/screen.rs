@@ -349,10 +349,10 @@ fn combined_summary(text: &mut String, combined: &Combined) {
 
 /// One line for each caveat, however many files it concerns.
 pub fn caveats(text: &mut String, all: &[Caveat]) {
-    let mut by_message: BTreeMap<(&str, &str), Vec<&str>> = BTreeMap::new();
+    let mut by_message: BTreeMap<(&str, String), Vec<&str>> = BTreeMap::new();
     for caveat in all {
         let places = by_message
-            .entry((&caveat.code, &caveat.message))
+            .entry((caveat.code(), caveat.message()))
             .or_default();
         places.push(&caveat.place);
     }

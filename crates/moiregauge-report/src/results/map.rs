@@ -1,13 +1,12 @@
 //! The summary of a map as a document, `moiregauge/map/1`: degrees, per cent, nm.
 
-use moiregauge::caveat::Caveat;
 use moiregauge::map::{Agreement, DriftChange, Mask, Plane, Spread, TwistStrainMap, UsedHarmonic};
 use moiregauge::region::{Trend, Trends};
 use moiregauge::settings::Settings;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{Conventions, TwistStrainResult};
+use super::{Conventions, ResultCaveat, TwistStrainResult};
 use crate::provenance::Provenance;
 
 /// What a map comes to.
@@ -55,7 +54,7 @@ pub struct MapResults {
     /// Regions, uniform areas, wanted twist.
     pub details: super::MapDetailsResult,
     /// Doubts.
-    pub caveats: Vec<Caveat>,
+    pub caveats: Vec<ResultCaveat>,
 }
 
 /// How many nodes have a mask.
