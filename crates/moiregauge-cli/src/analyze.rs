@@ -12,9 +12,14 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use anyhow::Context as _;
-use moiregauge::campaign::picture;
+use moiregauge::campaign::is_nothing_left;
+use moiregauge::campaign::{picture, refusal};
 use moiregauge::scan::Picture;
 use moiregauge::settings::Settings;
+use moiregauge_report::{InputFile, write_report};
+
+use crate::outputs::{commit, write_all};
+use crate::say::say;
 
 pub(crate) use args::{AnalyzeArgs, BackgroundArg, ConventionArg, LineArg, MethodArg};
 pub(crate) use chain::{
@@ -27,11 +32,6 @@ pub(crate) use moiregauge_pipeline::hexadecimal;
 pub(crate) use moiregauge_report::screen::{caveats as caveat_lines, failures, summary};
 pub(crate) use orientation::{Angle, DirectionArg, SenseArg, parse_angle};
 pub(crate) use task::{Task, out_beside};
-
-use crate::outputs::{commit, write_all};
-use crate::say::say;
-use moiregauge::campaign::refusal;
-use moiregauge_report::{InputFile, write_report};
 
 /// Whether the program can write Parquet.
 const PARQUET: bool = cfg!(feature = "parquet");
@@ -49,11 +49,8 @@ pub(crate) fn run(args: &AnalyzeArgs) -> anyhow::Result<ExitCode> {
     let sink = files::sink((out.as_path(), args.force), &exports, &task.files())?;
     let outcomes = outcomes(&task, args.is_loud())?;
     let refused = outcomes.iter().find_map(|o| refusal(&o.analysis)).cloned();
-    if let Some(why) = refused
-        .as_ref()
-        .filter(|why| why.code == "everything-excluded")
-    {
-        anyhow::bail!("{}", why.message);
+    if let Some(why) = refused.as_ref().filter(|why| is_nothing_left(&why.doubt)) {
+        anyhow::bail!("{}", why.message());
     }
     let (mut failed, mut answers, mut documents) = (Vec::new(), Vec::new(), Vec::new());
     let folders = files::within(outcomes.len());
@@ -101,7 +98,7 @@ pub(crate) fn run(args: &AnalyzeArgs) -> anyhow::Result<ExitCode> {
     }
     eprint!("{}", failures(&failed));
     if let Some(why) = &refused {
-        eprintln!("error: {}: {}", why.place, why.message);
+        eprintln!("error: {}: {}", why.place, why.message());
     }
     Ok(
         if task.is_same(&documents) && failed.is_empty() && refused.is_none() {

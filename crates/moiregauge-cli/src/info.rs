@@ -9,6 +9,7 @@ use std::io::{ErrorKind, Write as _};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+use moiregauge::numbers::line_name;
 use moiregauge::scan::image_choice;
 use moiregauge::settings::Settings;
 use serde::Serialize;
@@ -340,13 +341,6 @@ fn missing_for_analysis(scan: &Scan) -> Vec<String> {
         }
     }
     missing
-}
-
-pub(crate) fn line_name(line: LineDirection) -> &'static str {
-    match line {
-        LineDirection::Trace => "trace",
-        LineDirection::Retrace => "retrace",
-    }
 }
 
 fn iso_date(t: DateTime) -> String {

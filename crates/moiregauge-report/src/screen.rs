@@ -11,8 +11,9 @@ use heterostrain::strain::{StrainTensor, TwistStrain};
 use heterostrain::{Estimate, TotalEstimate};
 use moiregauge::campaign::{Analysis, Combined, Drift, ScanAnalysis, SetAnalysis, SetMean};
 use moiregauge::caveat::Caveat;
+use moiregauge::caveat::ChosenBy;
 use moiregauge::meaning::Budget;
-use moiregauge::meaning::{ChosenBy, NameReading, Naming, Readings};
+use moiregauge::meaning::{NameReading, Naming, Readings};
 use moiregauge::settings::Settings;
 use spmfile::FrameDirection;
 
@@ -349,10 +350,10 @@ fn combined_summary(text: &mut String, combined: &Combined) {
 
 /// One line for each caveat, however many files it concerns.
 pub fn caveats(text: &mut String, all: &[Caveat]) {
-    let mut by_message: BTreeMap<(&str, &str), Vec<&str>> = BTreeMap::new();
+    let mut by_message: BTreeMap<(&str, String), Vec<&str>> = BTreeMap::new();
     for caveat in all {
         let places = by_message
-            .entry((&caveat.code, &caveat.message))
+            .entry((caveat.code(), caveat.message()))
             .or_default();
         places.push(&caveat.place);
     }

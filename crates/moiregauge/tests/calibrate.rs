@@ -4,8 +4,8 @@
 
 use heterostrain::material::Material;
 use moiregauge::calibration::{Calibration, Coordinates, KnownLattice};
-use moiregauge::campaign::calibrate;
-use moiregauge::campaign::{CalibrateError, Calibrated, analyse, atomic_orientation};
+use moiregauge::campaign::{CalibrateError, Calibrated, analyse, atomic_orientation, calibrate};
+use moiregauge::caveat::Caveat;
 use moiregauge::meaning::Source;
 use moiregauge::scan::{MeasureError, measure_known, measure_scan};
 use moiregauge::settings::{Grouping, Settings};
@@ -119,7 +119,7 @@ fn a_pair_of_frames_tells_the_scanner() {
             let set = atoms(seed);
             let found = calibrated(&set, 1.0);
             assert!(found.covariance_known && found.sets[0].drift.is_some());
-            let codes: Vec<&str> = found.caveats.iter().map(|c| c.code.as_str()).collect();
+            let codes: Vec<&str> = found.caveats.iter().map(Caveat::code).collect();
             assert!(!codes.contains(&"drift-not-separated"), "{codes:?}");
             pulls(&found.calibration, truth(&set))
         })
@@ -150,7 +150,7 @@ fn one_frame_does_not_tell_drift_from_gain() {
                 found
                     .caveats
                     .iter()
-                    .any(|c| c.code == "drift-not-separated")
+                    .any(|c| c.code() == "drift-not-separated")
             );
             assert!(found.calibration.estimates()[1].sigma > 10.0 * found.statistical[1]);
             pulls(&found.calibration, truth(&set))
@@ -197,7 +197,11 @@ fn a_calibration_takes_the_scanner_out_of_twist_and_strain() {
             100.0 * found.strain_vector.x - strain[0],
             100.0 * found.strain_vector.y - strain[1],
         ];
-        let codes: Vec<String> = analysis.caveats.into_iter().map(|c| c.code).collect();
+        let codes: Vec<String> = analysis
+            .caveats
+            .iter()
+            .map(|c| c.code().to_owned())
+            .collect();
         (errors, mean.budget, codes)
     };
     let (without, priors, codes) = mean(None);

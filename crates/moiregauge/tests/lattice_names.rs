@@ -8,9 +8,10 @@ use heterostrain::material::{Bilayer, Material};
 use heterostrain::strain::twist_strain;
 use heterostrain::strain::{KnownOrientation, LatticeDirection, StrainConvention};
 use heterostrain::strain::{LatticeName, solutions};
+use moiregauge::caveat::ChosenBy;
 use moiregauge::drift::Statistical;
 use moiregauge::meaning::Budget;
-use moiregauge::meaning::{ChosenBy, NameReading, Readings, Standing, WaveStrengths, caveats};
+use moiregauge::meaning::{NameReading, Readings, Standing, WaveStrengths, caveats};
 use moiregauge::settings::Settings;
 use nalgebra::{Matrix2, Matrix4, Rotation2};
 
@@ -160,7 +161,10 @@ fn read(truth: Truth, settings: &Settings) -> (Readings, Vec<String>) {
     let none = WaveStrengths::default();
     let readings = Readings::new(&lattice, &found, &budget, &none, settings);
     let said = caveats("here", &lattice, &found, &readings, settings);
-    (readings, said.into_iter().map(|c| c.code).collect())
+    (
+        readings,
+        said.into_iter().map(|c| c.code().to_owned()).collect(),
+    )
 }
 
 /// Without an image names compete at 0.3° and 0.35 %; they do not in ordinary samples.

@@ -18,7 +18,6 @@ use crate::lattice::reduce::{shortest_pair, small_changes};
 use crate::lattice::vectors::LatticeVectors;
 use crate::strain::inversion::{ALL_SIGNS, solve};
 use crate::strain::layers::Layers;
-use crate::strain::names::LatticeName;
 
 /// Largest number in the name of a moiré vector that is tried for layers of different lattices.
 const LARGEST_ENTRY: i32 = 5;

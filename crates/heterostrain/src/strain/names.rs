@@ -12,7 +12,7 @@ use nalgebra::{Matrix2, Rotation2, Vector2};
 use crate::complex_pair::ComplexPair;
 use crate::lattice::reduce::shortest_pair;
 use crate::lattice::vectors::LatticeVectors;
-use crate::strain::labelling::{moire_matrix, names};
+use crate::strain::labelling::moire_matrix;
 use crate::strain::layers::Layers;
 
 /// Readings that need more strain are not listed: strains between layers are a few tenths of a per cent, rarely one.

@@ -4,10 +4,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
 use indicatif::{ProgressBar, ProgressStyle};
-use moiregauge::campaign::Analysis;
-use moiregauge::campaign::illustrate;
-use moiregauge::campaign::{about_repeat, amplitude_of, analyse};
-use moiregauge::caveat::Caveat;
+use moiregauge::campaign::{Analysis, about_repeat, amplitude_of, analyse, illustrate};
+use moiregauge::caveat::{Caveat, FileDoubt};
 use moiregauge::scan::{
     MeasureError, MeasuredScan, Window, choose_channel, common_window, measure_moires,
     sorted_moires, unusual_channels,
@@ -180,10 +178,6 @@ pub(crate) fn measure_file(
     let mut moires = measure_moires(&input.file, &scan, settings, window).map_err(with_hint)?;
     let set = set_of(sets, path).map(str::to_owned);
     for measured in &mut moires {
-        let several = |c: &&mut Caveat| c.code == "several-images";
-        for caveat in measured.caveats.iter_mut().filter(several) {
-            caveat.message += "; --image N says which one";
-        }
         measured.caveats.extend(caveats.iter().cloned());
         measured.set.clone_from(&set);
         measured.digest = Some(input.sha256.clone());
@@ -256,19 +250,15 @@ fn read_more(
         sha256: hexadecimal(&hash),
         bytes: bytes.len() as u64,
     };
-    let caveat = |code| {
-        let file = input.file.as_str();
-        move |words: String| Caveat::new(code, file, words)
-    };
-    let wanted = settings.channel.as_deref();
-    let several = unusual_channels(&names, wanted).map(|words| {
-        let words = format!("{words}; --channel NAME says which one shows the moiré");
-        Caveat::new("several-images", input.file.as_str(), words)
-    });
-    let doubts = scan.notes.iter().cloned().map(caveat("reader-doubt"));
-    let caveats = replaced.into_iter().map(caveat("given-by-user"));
+    let several = unusual_channels(&names, settings.channel.as_deref());
+    let several = several.map(FileDoubt::SeveralImages);
+    let replaced = replaced.into_iter().map(FileDoubt::GivenByUser);
+    let doubts = scan.notes.iter().cloned().map(FileDoubt::ReaderDoubt);
+    let all = several.into_iter().chain(replaced).chain(doubts);
     Ok(Reading {
-        caveats: several.into_iter().chain(caveats).chain(doubts).collect(),
+        caveats: all
+            .map(|doubt| Caveat::new(doubt, input.file.as_str()))
+            .collect(),
         scan,
         input,
     })

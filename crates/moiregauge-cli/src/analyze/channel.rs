@@ -3,7 +3,7 @@
 use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 
-use moiregauge::caveat::Caveat;
+use moiregauge::caveat::{Caveat, ChannelReason, FileDoubt};
 use moiregauge::scan::{MeasureError, channels_by_preference};
 use moiregauge::settings::Settings;
 use spmfile::{ChannelInfo, ReadError};
@@ -20,13 +20,11 @@ pub(super) struct Other {
 impl Other {
     /// Says so.
     pub(super) fn caveat(&self) -> Caveat {
-        let channel = self.settings.channel.as_deref().unwrap_or_default();
-        let message = format!(
-            "{channel} is analysed, since no scan shows a lattice in {}; --channel NAME says which channel \
-             shows the moiré",
-            self.tried.join(" or ")
-        );
-        Caveat::new("channel-chosen", "analysis", message)
+        let doubt = FileDoubt::ChannelChosen {
+            channel: self.settings.channel.clone().unwrap_or_default(),
+            why: ChannelReason::NoLatticeIn(self.tried.join(" or ")),
+        };
+        Caveat::new(doubt, "analysis")
     }
 }
 

@@ -98,7 +98,7 @@ pub(super) fn write(made: &Made, args: &MapArgs, sink: FolderSink) -> anyhow::Re
     details.regime = Some(made.domains.regime.clone());
     let mut results = results(made, args.method_name());
     results.details = (&details).into();
-    results.caveats.extend(doubts);
+    results.caveats.extend(doubts.iter().map(Into::into));
     let mut files = vec![("map.json".to_owned(), serde_json::to_vec_pretty(&results)?)];
     files.extend(map_tables(&details));
     let choice = args.analyze.choice();
@@ -148,7 +148,7 @@ fn results(made: &Made, method: &str) -> MapResults {
         agreement: made.agreement.map(Into::into),
         drift_change: made.drift_change.map(Into::into),
         details: MapDetailsResult::default(),
-        caveats: made.caveats.clone(),
+        caveats: made.caveats.iter().map(Into::into).collect(),
     }
 }
 

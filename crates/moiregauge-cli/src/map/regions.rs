@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use anyhow::ensure;
-use moiregauge::caveat::Caveat;
+use moiregauge::caveat::{Caveat, MapDoubt};
 use moiregauge::map::TwistStrainMap;
 use moiregauge::region::{
     DeviceSearch, Profile, Region, RegionStatistics, WantedArea, WantedTwist, uniform_areas,
@@ -92,21 +92,14 @@ impl RegionArgs {
         for found in &regions {
             let name = found.region.name.as_str();
             if found.good == 0 {
-                doubts.push(Caveat::new(
-                    "region-empty",
-                    name,
-                    "the region has no good node: it has no values",
-                ));
+                doubts.push(Caveat::new(MapDoubt::RegionEmpty, name));
             } else if found.covered < 0.95 || found.masked_share > 0.05 {
                 doubts.push(Caveat::new(
-                    "region-in-part",
+                    MapDoubt::RegionInPart {
+                        covered: found.covered,
+                        masked: found.masked_share,
+                    },
                     name,
-                    format!(
-                        "the map reaches {:.0} % of the region, and {:.0} % of the nodes there are not to be \
-                         believed: its numbers are those of the rest",
-                        100.0 * found.covered,
-                        100.0 * found.masked_share
-                    ),
                 ));
             }
         }
@@ -119,20 +112,11 @@ impl RegionArgs {
             let [w, h] = size.map(two_digits);
             let place = format!("device {w} nm × {h} nm");
             if size[0].min(size[1]) < 2.355 * map.window_nm {
-                doubts.push(Caveat::new(
-                    "device-below-resolution",
-                    place.as_str(),
-                    "the device is narrower than the map resolves: the twist may vary more within it than the \
-                     map shows",
-                ));
+                doubts.push(Caveat::new(MapDoubt::DeviceBelowResolution, place.as_str()));
             }
             let found = uniform_areas(map, &search);
             if found.is_empty() {
-                doubts.push(Caveat::new(
-                    "device-fits-nowhere",
-                    place,
-                    "no area of this size lies within the map with 95 % of its nodes to be believed",
-                ));
+                doubts.push(Caveat::new(MapDoubt::DeviceFitsNowhere, place));
             }
             found
         });

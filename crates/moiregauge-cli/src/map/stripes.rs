@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, ensure};
-use moiregauge::caveat::Caveat;
+use moiregauge::caveat::{Caveat, ChannelReason, Doubt, FileDoubt, MapDoubt, Mapped, PatternDoubt};
 use moiregauge::scan::channels_by_preference;
 use moiregauge::settings::Settings;
 use moiregauge::stripes::SampledStripes;
@@ -124,12 +124,11 @@ pub(super) fn look(
     let mut caveats = found.caveats.clone();
     if settings.channel.is_none() {
         caveats.push(Caveat::new(
-            "channel-chosen",
+            FileDoubt::ChannelChosen {
+                channel: found.channel.clone(),
+                why: ChannelReason::BestStripes,
+            },
             "map",
-            format!(
-                "{} is mapped, which shows the stripes best; --channel NAME says which channel shows them",
-                found.channel
-            ),
         ));
     }
     doubts(&found, &reading.input.file, &mut caveats);
@@ -154,50 +153,26 @@ pub(super) fn look(
 }
 
 fn doubts(found: &ScanStripes, file: &str, caveats: &mut Vec<Caveat>) {
-    let mut doubt = |code, why: String| caveats.push(Caveat::new(code, file, why));
-    doubt(
-        "stripes-only",
-        "the image shows stripes and no lattice: one wave vector in each pattern, which does not tell twist and \
-         strain. The map has wavelength and direction"
-            .to_owned(),
-    );
+    let mut doubt = |doubt: Doubt| caveats.push(Caveat::new(doubt, file));
+    doubt(PatternDoubt::StripesOnly.into());
     let stripes = &found.stripes;
     let [first, ..] = stripes.patterns.as_slice() else {
         return;
     };
     if stripes.patterns.len() > 1 {
-        let shares: Vec<String> = stripes
-            .patterns
-            .iter()
-            .map(|p| format!("{:.0} %", 100.0 * p.share))
-            .collect();
-        doubt(
-            "stripe-domains",
-            format!(
-                "{} patterns lie side by side ({} of the nodes): each node has the wave of the strongest there; \
-                 nodes within a window of a boundary are bent",
-                stripes.patterns.len(),
-                shares.join(", ")
-            ),
-        );
+        let shares = stripes.patterns.iter().map(|p| p.share).collect();
+        doubt(PatternDoubt::StripeDomains { shares }.into());
     } else if first.share < 0.9 {
-        doubt(
-            "stripes-in-part",
-            format!(
-                "the stripes stand out at {:.0} % of the nodes only",
-                100.0 * first.share
-            ),
-        );
+        doubt(PatternDoubt::StripesInPart { share: first.share }.into());
     }
     for (pattern, number) in stripes.patterns.iter().zip(1..) {
         if pattern.coherence < STRAIGHT {
             doubt(
-                "stripes-vary",
-                format!(
-                    "one wave has only {:.0} % of the power of the stripes of pattern {number}, whose wave vector \
-                     changes across the frame: the mean of the map is the better number",
-                    100.0 * pattern.coherence
-                ),
+                PatternDoubt::StripesVary {
+                    pattern: number,
+                    coherence: pattern.coherence,
+                }
+                .into(),
             );
         }
     }
@@ -210,29 +185,29 @@ fn doubts(found: &ScanStripes, file: &str, caveats: &mut Vec<Caveat>) {
             .any(|e| e.value.abs() > APART * e.sigma)
         {
             doubt(
-                "stripes-map-and-fit",
-                format!(
-                    "pattern {}: at the middle of the pattern the map less the fit to all its pixels is {} nm and {}°: \
-                     it changes by more than a plane across the frame",
-                    pattern.number,
-                    plus_minus(length),
-                    plus_minus(along)
-                ),
+                PatternDoubt::StripesMapAndFit {
+                    pattern: pattern.number,
+                    wavelength: length,
+                    direction: along.scaled(1f64.to_radians()),
+                }
+                .into(),
             );
         }
     }
     if !found.drift_corrected {
         doubt(
-            "map-not-drift-corrected",
-            "the drift is not known: it stretches and shears the map, the same everywhere (--drift)".to_owned(),
+            MapDoubt::NotDriftCorrected {
+                of: Mapped::Stripes,
+            }
+            .into(),
         );
     }
     if !stripes.noise_measured {
         doubt(
-            "map-noise-guessed",
-            "the frame holds too few periods to see noise between the harmonics: the errors of the map are those of \
-             what a single wave in each pattern leaves"
-                .to_owned(),
+            MapDoubt::NoiseGuessed {
+                of: Mapped::Stripes,
+            }
+            .into(),
         );
     }
 }
@@ -310,7 +285,7 @@ fn results(striped: &Striped) -> MapResults {
         agreement: stripes.agreement.map(Into::into),
         drift_change: None,
         details: MapDetailsResult::default(),
-        caveats: striped.caveats.clone(),
+        caveats: striped.caveats.iter().map(Into::into).collect(),
     }
 }
 

@@ -5,14 +5,11 @@ use std::path::Path;
 
 use anyhow::{Context as _, ensure};
 use indicatif::{ProgressBar, ProgressStyle};
-use moiregauge::caveat::Caveat;
+use moiregauge::caveat::{Caveat, FileDoubt};
 use moiregauge::domains::{Contrast, DomainMap};
-use moiregauge::frame::Image;
-use moiregauge::frame::remove_background;
-use moiregauge::frame::{Geometry, Timing};
+use moiregauge::frame::{Geometry, Image, Timing, remove_background};
 use moiregauge::map::TwistStrainMap;
-use moiregauge::scan::Picture;
-use moiregauge::scan::choose_channel;
+use moiregauge::scan::{Picture, choose_channel};
 use moiregauge::settings::Settings;
 use moiregauge::survey::{SurveyPlan, nominal_geometry};
 use moiregauge::window::{Mask, Resolution};
@@ -105,7 +102,7 @@ impl Large {
         let block = known.cut(&mut scan).map_err(with_option)?;
         let input = identity(path, known.place(path))?;
         let channel = scan.channels.first().context("the array holds no image")?;
-        let caveat = |words| Caveat::new("given-by-user", input.file.as_str(), words);
+        let caveat = |words| Caveat::new(FileDoubt::GivenByUser(words), input.file.as_str());
         Ok(Self {
             caveats: replaced.into_iter().map(caveat).collect(),
             geometry: nominal_geometry(&scan, channel)

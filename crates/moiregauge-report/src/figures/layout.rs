@@ -4,12 +4,14 @@ use heterostrain::Estimate;
 use moiregauge::campaign::{ScanAnalysis, SetAnalysis};
 use moiregauge::scan::Illustration;
 use nalgebra::Matrix2;
-use spmfile::{FrameDirection, LineDirection};
+use spmfile::FrameDirection;
 
 use crate::draw::axes::Axes;
 use crate::draw::scale::Range;
 use crate::draw::style::{Marker, marker};
 use crate::draw::svg::{Rect, Svg};
+
+pub(super) use moiregauge::numbers::line_name;
 
 /// Space above the panels for a legend, pt.
 pub(super) const LEGEND: f64 = 16.0;
@@ -66,14 +68,6 @@ pub(super) fn ordinal(index: usize) -> f64 {
 /// Whether the bottom line came first, or nobody knows; decides between filled and open symbols.
 pub(super) fn is_up(scan: &ScanAnalysis) -> bool {
     scan.frame_direction != Some(FrameDirection::Down)
-}
-
-/// `trace` or `retrace`.
-pub(super) fn line_name(line: LineDirection) -> &'static str {
-    match line {
-        LineDirection::Trace => "trace",
-        LineDirection::Retrace => "retrace",
-    }
 }
 
 /// One value with its error bar at the place of its scan.

@@ -11,6 +11,7 @@ mod words;
 use minijinja::syntax::SyntaxConfig;
 use minijinja::value::Serde;
 use minijinja::{Environment, UndefinedBehavior, Value};
+use moiregauge::campaign::Analysis;
 use serde::Serialize;
 
 use crate::error::ReportError;
@@ -28,11 +29,11 @@ pub use page::layers;
 
 /// The page. `downloads` are the files that it carries for saving.
 pub(crate) fn page(
-    results: &Results,
+    of: (&Results, &Analysis),
     figures: &[Figure],
     downloads: &[(String, Vec<u8>)],
 ) -> Result<Vec<u8>, ReportError> {
-    rendered(TEMPLATE, page::Page::new(results, figures, downloads)?)
+    rendered(TEMPLATE, page::Page::new(of, figures, downloads)?)
 }
 
 /// The template filled in.

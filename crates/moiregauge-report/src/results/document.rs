@@ -6,7 +6,6 @@ use heterostrain::strain::TwistStrain;
 use moiregauge::campaign::{
     Analysis, Combined, Consistency, Drift, DriftFit, SetAnalysis, SetMean,
 };
-use moiregauge::caveat::Caveat;
 use moiregauge::drift::DriftMonteCarlo;
 use moiregauge::frame::Axis;
 use moiregauge::settings::Settings;
@@ -16,6 +15,7 @@ use serde::{Deserialize, Serialize};
 
 use super::SCHEMA;
 use super::budget::BudgetResult;
+use super::caveat::ResultCaveat;
 use super::checks::ChecksResult;
 use super::conventions::Conventions;
 use super::convert::{PER_MINUTE, PERCENT, correlation, degree, estimate, estimate_in_all, number};
@@ -38,7 +38,7 @@ pub struct Results {
     /// The orientation of a layer by atomically resolved images; `null` without any.
     pub atomic: Option<AtomicResult>,
     /// Doubts.
-    pub caveats: Vec<Caveat>,
+    pub caveats: Vec<ResultCaveat>,
     /// Inputs that could not be used.
     pub failed: Vec<FailedInput>,
     /// What the numbers mean.
@@ -215,7 +215,7 @@ impl Results {
                 .collect(),
             combined: analysis.combined.as_ref().map(|c| combined(c, settings)),
             atomic: analysis.atomic.as_ref().map(Into::into),
-            caveats: analysis.caveats.clone(),
+            caveats: analysis.caveats.iter().map(Into::into).collect(),
             failed: provenance.failed.clone(),
             conventions: Conventions::of(&analysis.settings),
             settings: analysis.settings.clone(),

@@ -1,6 +1,5 @@
 //! The summary of a map as a document, `moiregauge/map/1`: degrees, per cent, nm.
 
-use moiregauge::caveat::Caveat;
 use moiregauge::map::{Agreement, DriftChange, Plane, Spread, TwistStrainMap};
 use moiregauge::region::{Trend, Trends};
 use moiregauge::settings::Settings;
@@ -8,7 +7,7 @@ use moiregauge::window::{Mask, UsedHarmonic};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{Conventions, TwistStrainResult};
+use super::{Conventions, ResultCaveat, TwistStrainResult};
 use crate::provenance::Provenance;
 
 /// What a map comes to.
@@ -56,7 +55,7 @@ pub struct MapResults {
     /// Regions, uniform areas, wanted twist.
     pub details: super::MapDetailsResult,
     /// Doubts.
-    pub caveats: Vec<Caveat>,
+    pub caveats: Vec<ResultCaveat>,
 }
 
 /// How many nodes have a mask.

@@ -2,7 +2,8 @@
 
 use heterostrain::strain::{Branch, Degeneracy, Split, StrainTensor};
 use moiregauge::campaign::AtomicOrientation;
-use moiregauge::meaning::{ChosenBy, NameReading, Naming, Readings, Standing, TensorReading};
+use moiregauge::caveat::ChosenBy;
+use moiregauge::meaning::{NameReading, Naming, Readings, Standing, TensorReading};
 use nalgebra::Matrix5;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -6,22 +6,20 @@
 
 #![allow(dead_code, reason = "each user takes what it needs")]
 
-mod scan;
-mod sets;
-
 use heterostrain::lattice::LatticeVectors;
 use heterostrain::strain;
 use moiregauge::campaign::{Analysis, Combined, Consistency};
-use moiregauge::caveat::Caveat;
-use moiregauge::frame::Axis;
-use moiregauge::frame::Image;
+use moiregauge::caveat::{Caveat, DriftDoubt, LatticeDoubt};
+use moiregauge::frame::{Axis, Image};
 use moiregauge::meaning::Budget;
 use moiregauge::scan::Picture;
 use moiregauge::settings::Settings;
 use moiregauge_report::{FailedInput, InputFile, Provenance};
 use nalgebra::{Matrix2, Matrix4, Vector2};
-
 use sets::{good_set, mean, poor_set};
+
+mod scan;
+mod sets;
 
 /// Twist of the sample, degrees.
 pub(crate) const TWIST_DEG: f64 = 1.126;
@@ -69,14 +67,18 @@ pub(crate) fn analysis() -> Analysis {
         atomic: None,
         caveats: vec![
             Caveat::new(
-                "few-periods",
+                LatticeDoubt::FewPeriods {
+                    periods: 2.5,
+                    enough: 3.0,
+                },
                 "slow y, 8 Hz",
-                "Only 4.5 moiré periods across the frame.",
             ),
             Caveat::new(
-                "drift-not-determined",
+                DriftDoubt::Undetermined {
+                    reason: "One direction only: the scans cannot tell drift from strain."
+                        .to_owned(),
+                },
                 "slow y, 2 Hz",
-                "One direction only: the scans cannot tell drift from strain.",
             ),
         ],
     }

@@ -23,6 +23,7 @@ use crate::campaign::alike::{Alike, alike};
 use crate::campaign::analysis::AtomicOrientation;
 use crate::campaign::identity::once;
 use crate::caveat::Caveat;
+use crate::caveat::orientation::OrientationDoubt;
 use crate::drift::linear::{Observation, solve};
 use crate::numbers::chi2::enlargement;
 use crate::scan::measured::MeasuredScan;
@@ -141,13 +142,10 @@ pub fn atomic_orientation(
         let scale = enlargement(solution.chi2, solution.degrees_of_freedom);
         if scale > LARGE_SCATTER {
             caveats.push(Caveat::new(
-                "atomic-scatter",
+                OrientationDoubt::AtomicScatter {
+                    times: scale.sqrt(),
+                },
                 &place,
-                format!(
-                    "the atomic images scatter {:.1} times more than their errors say: drift that changes, as \
-                     after a move of the window; the error of the orientation is enlarged to match",
-                    scale.sqrt()
-                ),
             ));
         }
         let lattice = LatticeVectors {
@@ -161,13 +159,7 @@ pub fn atomic_orientation(
             drift: Some(solution.velocity),
         }
     } else {
-        caveats.push(Caveat::new(
-            "atomic-drift-assumed",
-            &place,
-            "the atomic images are all of one frame direction, which does not tell their drift: the \
-             orientation rests on the rows of atoms along the fast axis alone and on the lattice constant; \
-             frames up and down would do better",
-        ));
+        caveats.push(Caveat::new(OrientationDoubt::AtomicDriftAssumed, &place));
         one_direction(&observations, material, calibration)?
     };
     let (off, distortion) = (found.shape.0 - 1.0, found.shape.1);
@@ -186,14 +178,11 @@ pub fn atomic_orientation(
     let allowed = calibration.gain_percent / 100.0;
     if off.abs() > CLEARLY * allowed.max(0.01) {
         caveats.push(Caveat::new(
-            "atomic-size",
+            OrientationDoubt::AtomicSize {
+                larger: off,
+                material: material.name.clone(),
+            },
             &place,
-            format!(
-                "the lattice of the atomic images is {:+.1} % larger than that of {}: the gain of the scanner \
-                 is off by that much, or it is another layer",
-                100.0 * off,
-                material.name
-            ),
         ));
     }
     Ok(AtomicOrientation {

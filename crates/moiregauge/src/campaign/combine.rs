@@ -8,6 +8,8 @@ use crate::campaign::set::joint::{checks as set_checks, joint_fit, lattice_of, t
 use crate::campaign::set::moire::moire;
 use crate::campaign::sightings::middle_of_frame;
 use crate::caveat::Caveat;
+use crate::caveat::drifting::DriftDoubt;
+use crate::caveat::sets::SetDoubt;
 use crate::drift::joint::solve::JointFit;
 use crate::drift::shares::Statistical;
 use crate::meaning::about::caveats as about_readings;
@@ -49,13 +51,8 @@ pub(crate) fn combine(
         .reduce(f64::max);
     if let Some(largest) = largest {
         caveats.push(Caveat::new(
-            "different-lattices",
+            SetDoubt::DifferentLattices { share: largest },
             "analysis",
-            format!(
-                "the sets show lattices that differ by up to {:.1} %: they are not of the same place or \
-                 sample, and are not combined",
-                100.0 * largest
-            ),
         ));
         return None;
     }
@@ -90,14 +87,9 @@ pub(crate) fn combine(
                 let left_out = fit.leave_one_out();
                 checks = Some(set_checks(&fit, &left_out, scans, ("all sets", settings)));
             }
-            Err(why) => caveats.push(Caveat::new(
-                "drift-not-joined",
-                "analysis",
-                format!(
-                    "no smooth drift describes all sets: {why}; the lattices of the sets, each with its \
-                     own drift, are averaged instead"
-                ),
-            )),
+            Err(reason) => {
+                caveats.push(Caveat::new(DriftDoubt::NotJoined { reason }, "analysis"));
+            }
         }
     }
     let consistency = consistency(sets);
@@ -105,14 +97,12 @@ pub(crate) fn combine(
         let drift = pair.drift_sigmas.unwrap_or(0.0);
         if drift.max(pair.twist_sigmas).max(pair.strain_sigmas) > APART {
             caveats.push(Caveat::new(
-                "sets-disagree",
+                SetDoubt::SetsDisagree {
+                    drift,
+                    twist: pair.twist_sigmas,
+                    strain: pair.strain_sigmas,
+                },
                 pair.sets.join(" / "),
-                format!(
-                    "the sets disagree: drift {drift:.1} σ, twist {:.1} σ, strain {:.1} σ apart; a drift \
-                     that changes in time or a scanner whose axes differ would do this; the errors of \
-                     the combined values are enlarged to match",
-                    pair.twist_sigmas, pair.strain_sigmas
-                ),
             ));
         }
     }

@@ -5,6 +5,7 @@
 //! Where there is no noise to tell by (simulations), frames of another direction, time or size are other frames.
 
 use crate::caveat::Caveat;
+use crate::caveat::files::FileDoubt;
 use crate::scan::measured::{MeasuredLine, MeasuredScan};
 
 /// Rounding of formats with single precision or 16 bits, in standard deviations of the image.
@@ -114,16 +115,6 @@ pub(crate) fn once(mut scans: Vec<MeasuredScan>) -> (Vec<MeasuredScan>, Vec<Cave
 
 /// What is said of a file that holds the data of another one, `of`, or is that file.
 pub fn about_repeat(file: &str, of: &str) -> Caveat {
-    let same = if file == of {
-        "the file was given more than once".to_owned()
-    } else {
-        format!("the file holds the same scan as {of}")
-    };
-    Caveat::new(
-        "same-scan-twice",
-        file,
-        format!(
-            "{same}; a scan counts once, since the same noise twice would make errors too small"
-        ),
-    )
+    let of = (file != of).then(|| of.to_owned());
+    Caveat::new(FileDoubt::SameScanTwice { of }, file)
 }

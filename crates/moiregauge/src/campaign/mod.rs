@@ -18,7 +18,7 @@ pub(crate) mod set;
 pub(crate) mod sightings;
 pub(crate) mod totals;
 
-pub use analyse::{analyse, refusal};
+pub use analyse::{analyse, is_nothing_left, refusal};
 pub use analysis::{
     Analysis, AtomicOrientation, Checks, Combined, Consistency, Drift, DriftFit, JointTerms,
     LineAnalysis, Motion, Residual, ScanAnalysis, Scatter, SetAnalysis, SetMean,

@@ -9,7 +9,7 @@ pub(crate) mod tensor;
 
 pub use about::caveats;
 pub use budget::{Budget, Contribution, Source};
-pub use naming::{ChosenBy, NameReading, Naming, Standing};
+pub use naming::{NameReading, Naming, Standing};
 pub use readings::Readings;
 pub use strengths::WaveStrengths;
 pub use tensor::{SenseReading, TensorReading};

@@ -14,6 +14,7 @@ use heterostrain::lattice::LatticeVectors;
 use heterostrain::strain::{LatticeName, Orientation, Solutions, solutions, strain_tensors};
 use nalgebra::{Matrix2, Vector2};
 
+use crate::caveat::readings::ChosenBy;
 use crate::meaning::strengths::WaveStrengths;
 use crate::meaning::tensor::{CLEARLY, known_orientation};
 use crate::settings::knobs::Settings;
@@ -40,19 +41,6 @@ pub enum Standing {
     AgainstOrientation,
     /// It needs much strain.
     Unlikely,
-}
-
-/// What chose the reported name.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ChosenBy {
-    /// It needs the least strain, and nothing speaks against it.
-    LeastStrain,
-    /// The image speaks against the others that are plausible.
-    Image,
-    /// The orientation of a layer does.
-    Orientation,
-    /// The user.
-    User,
 }
 
 /// One name of the lattice.
@@ -149,7 +137,7 @@ pub(crate) fn named_waves(
 }
 
 /// The strain up to which names are plausible beside this one.
-fn plausible(name: &NameReading) -> f64 {
+pub(crate) fn plausible(name: &NameReading) -> f64 {
     PLAUSIBLE_STRAIN.max(2.0 * name.strain.min(PLAUSIBLE_STRAIN))
 }
 

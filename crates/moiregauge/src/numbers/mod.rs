@@ -4,5 +4,7 @@ pub(crate) mod chi2;
 pub(crate) mod median;
 pub(crate) mod rng;
 pub(crate) mod spread;
+pub(crate) mod words;
 
 pub use rng::{normals, stream};
+pub use words::{fixed, line_name, plus_minus, two_digits};

@@ -98,14 +98,6 @@ pub(crate) fn image_of(channel: &Channel) -> Image {
     Image::new(channel.rows, channel.columns, channel.values())
 }
 
-/// `trace` or `retrace`.
-pub(crate) fn line_name(line: LineDirection) -> &'static str {
-    match line {
-        LineDirection::Trace => "trace",
-        LineDirection::Retrace => "retrace",
-    }
-}
-
 /// The images to measure: the chosen channel in the chosen line directions, main scan line first.
 pub(crate) fn channels<'a>(
     scan: &'a Scan,

@@ -5,11 +5,16 @@
 
 use spmfile::{LineDirection, Scan, sensor_axis};
 
+use crate::caveat::files::ImageChoice;
 use crate::scan::channel::{channels_by_preference, choose_channel, images_of, is_usual};
 use crate::settings::knobs::Settings;
 
-/// Words where a channel has several images in the file and nobody said which of them is meant.
-pub(crate) fn first_of_several(scan: &Scan, name: &str, settings: &Settings) -> Option<String> {
+/// Says so where a channel has several images in the file and nobody said which of them is meant.
+pub(crate) fn first_of_several(
+    scan: &Scan,
+    name: &str,
+    settings: &Settings,
+) -> Option<ImageChoice> {
     if settings.image.is_some() {
         return None;
     }
@@ -17,14 +22,15 @@ pub(crate) fn first_of_several(scan: &Scan, name: &str, settings: &Settings) -> 
         .map(|direction| images_of(scan, name, direction).len())
         .into_iter()
         .max()?;
-    (count > 1).then(|| {
-        format!("the file holds {count} images of {name:?}: the first of them is analysed, and the others are not")
+    (count > 1).then(|| ImageChoice::First {
+        channel: name.to_owned(),
+        count,
     })
 }
 
-/// Words where a file holds channels of several names, none of them one of the usual ones, and nobody said which of them
+/// Says so where a file holds channels of several names, none of them one of the usual ones, and nobody said which of them
 /// is meant. `channels` are pairs of the name the user sees and the instrument's own.
-pub fn unusual_channels(channels: &[(&str, &str)], wanted: Option<&str>) -> Option<String> {
+pub fn unusual_channels(channels: &[(&str, &str)], wanted: Option<&str>) -> Option<ImageChoice> {
     let all = channels_by_preference(channels);
     let [first, _, ..] = all[..] else {
         return None;
@@ -34,12 +40,11 @@ pub fn unusual_channels(channels: &[(&str, &str)], wanted: Option<&str>) -> Opti
     }
     let names: Vec<String> = all.iter().take(6).map(|name| format!("{name:?}")).collect();
     let more = if all.len() > names.len() { ", …" } else { "" };
-    Some(format!(
-        "the file holds {} images ({}{more}), none of which has the name of a channel that usually shows a moiré: the \
-         first, {first:?}, is analysed, and the others are not",
-        all.len(),
-        names.join(", ")
-    ))
+    Some(ImageChoice::UnusualNames {
+        count: all.len(),
+        names: format!("{}{more}", names.join(", ")),
+        first: first.to_owned(),
+    })
 }
 
 /// What of a file with several images is analysed, in words; nothing where that is clear.
@@ -56,5 +61,6 @@ pub fn image_choice(scan: &Scan, settings: &Settings) -> Vec<String> {
     unusual_channels(&names, wanted)
         .into_iter()
         .chain(pages)
+        .map(|choice| choice.to_string())
         .collect()
 }

@@ -5,12 +5,14 @@ use spmfile::{Channel, FrameDirection, LineDirection, Scan};
 
 use crate::calibration::Calibration;
 use crate::caveat::Caveat;
+use crate::caveat::files::FileDoubt;
 use crate::frame::geometry::{Geometry, Timing};
 use crate::frame::image::Image;
 use crate::lattice::measure::{Start, measure};
 use crate::lattice::measured::MeasuredLattice;
 use crate::lattice::several::together::measure_several;
-use crate::scan::channel::{channels, image_of, line_name};
+use crate::numbers::words::line_name;
+use crate::scan::channel::{channels, image_of};
 use crate::scan::doubts::{about_fit, few_periods, lines_disagree, turned};
 use crate::scan::fingerprint::Fingerprint;
 use crate::scan::images::first_of_several;
@@ -98,7 +100,7 @@ fn measure_with(
     let several = first_of_several(scan, &channels[0].name, settings);
     let mut caveats: Vec<Caveat> = several
         .into_iter()
-        .map(|words| Caveat::new("several-images", file, words))
+        .map(|choice| Caveat::new(FileDoubt::SeveralImages(choice), file))
         .collect();
     let mut moires: Vec<Vec<MeasuredLine>> = Vec::new();
     let mut failures = Vec::new();
@@ -125,13 +127,14 @@ fn measure_with(
     }
     for error in failures {
         caveats.push(Caveat::new(
-            "line-left-out",
+            FileDoubt::LineLeftOut {
+                reason: error.to_string(),
+            },
             file,
-            format!("one line direction could not be used: {error}"),
         ));
     }
     about_calibration(file, scan, moires.iter().flatten(), settings, &mut caveats);
-    caveats.dedup_by(|a, b| (&a.code, &a.message) == (&b.code, &b.message));
+    caveats.dedup_by(|a, b| a.says_the_same(b));
     let measured = moires.into_iter().map(|mut lines| {
         share_noise(&mut lines);
         let mut caveats = caveats.clone();

@@ -3,6 +3,7 @@
 use spmfile::{LineDirection, Scan};
 
 use crate::caveat::Caveat;
+use crate::caveat::patterns::PatternDoubt;
 use crate::frame::background::remove_background;
 use crate::frame::geometry::{Geometry, Timing};
 use crate::frame::image::Image;
@@ -90,7 +91,7 @@ fn frames(
             });
         }
     }
-    caveats.dedup_by(|a, b| (&a.code, &a.message) == (&b.code, &b.message));
+    caveats.dedup_by(|a, b| a.says_the_same(b));
     Ok((name, frames))
 }
 
@@ -146,12 +147,7 @@ pub fn stripes_of_scan(
     let both: Vec<_> = maps.iter().zip(placed).collect();
     let stripes = SampledStripes::new(&both).ok_or(StripeError::NoImage)?;
     if frames.len() == 1 {
-        caveats.push(Caveat::new(
-            "stripes-of-one-direction",
-            file,
-            "trace or retrace alone: mains pick-up and other interference in time make stripes too, which only the \
-             other line direction can tell",
-        ));
+        caveats.push(Caveat::new(PatternDoubt::StripesOfOneDirection, file));
     }
     Ok(ScanStripes {
         channel,

@@ -14,6 +14,8 @@ use crate::campaign::set::scan::{plain_mean, scan_analysis};
 use crate::campaign::set::solved::Solved;
 use crate::campaign::set::{joint, moire, published};
 use crate::caveat::Caveat;
+use crate::caveat::drifting::DriftDoubt;
+use crate::caveat::sets::SetDoubt;
 use crate::drift::joint::solve::JointFit;
 use crate::drift::linear::{Observation, at_known_drift, common_lattice, solve};
 use crate::drift::monte_carlo;
@@ -224,9 +226,10 @@ fn leave_out(
                       of scans)";
         scan.excluded = Some(reason.to_owned());
         caveats.push(Caveat::new(
-            "scan-left-out",
+            SetDoubt::ScanLeftOut {
+                reason: reason.to_owned(),
+            },
             &scan.file,
-            format!("left out by --exclude-outliers: {reason}"),
         ));
     }
 }
@@ -251,11 +254,7 @@ pub(crate) fn drift(
         .iter()
         .any(|s| s.lines.iter().any(|l| l.timing.is_none()))
     {
-        caveats.push(Caveat::new(
-            "no-timing",
-            name,
-            "not every file tells its line rate and frame direction: nothing is corrected for drift",
-        ));
+        caveats.push(Caveat::new(DriftDoubt::NoTiming, name));
         return None;
     }
     caveats.extend(about_dates(name, scans));
@@ -298,7 +297,8 @@ pub(crate) fn drift(
             })
         }
         Err(error) => {
-            caveats.push(Caveat::new("drift-undetermined", name, error.to_string()));
+            let reason = error.to_string();
+            caveats.push(Caveat::new(DriftDoubt::Undetermined { reason }, name));
             None
         }
     }
@@ -313,11 +313,7 @@ fn given_drift(
     let velocity = given.velocity();
     let sigma = given.sigma_nm_per_min * PER_MINUTE;
     let covariance = Matrix2::identity() * sigma * sigma;
-    caveats.push(Caveat::new(
-        "drift-given",
-        name,
-        "the drift was given by the user and not measured; it is as right as the conditions are the same",
-    ));
+    caveats.push(Caveat::new(DriftDoubt::Given, name));
     let (mut lattice, chi2, freedom) = common_lattice(all, &velocity, &covariance).ok()?;
     // Scatter enlarges what the scans say, not what the user said of the drift.
     let (measured, _, _) = common_lattice(all, &velocity, &Matrix2::zeros()).ok()?;

@@ -8,6 +8,7 @@ use rayon::prelude::*;
 use crate::campaign::analysis::{Drift, DriftFit, ScanAnalysis};
 use crate::campaign::set::solved::Solved;
 use crate::caveat::Caveat;
+use crate::caveat::drifting::DriftDoubt;
 use crate::drift::linear::{DriftSolution, Observation, at_known_drift, common_lattice};
 use crate::drift::paper::{PaperScan, normal_vector, successive_draws, successive_drift};
 use crate::drift::shares::Statistical;
@@ -82,12 +83,10 @@ pub(crate) fn drift(
 ) -> Option<Solved> {
     let minimum = successive_drift(scans);
     if minimum.is_none() {
-        caveats.push(Caveat::new(
-            "drift-undetermined",
-            name,
-            "the published comparison of successive scans has no minimum: there are no two scans of one line \
-             direction in a row, or they contradict each other",
-        ));
+        let reason = "the published comparison of successive scans has no minimum: there are no two scans of one line \
+             direction in a row, or they contradict each other"
+            .to_owned();
+        caveats.push(Caveat::new(DriftDoubt::Undetermined { reason }, name));
     }
     let minimum = minimum?;
     let stream = format!("drift {name}");

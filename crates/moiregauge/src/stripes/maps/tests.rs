@@ -9,7 +9,7 @@ use super::*;
 use crate::frame::background::{Background, remove_background};
 use crate::numbers::rng;
 use crate::simulate::field::{Feature, FieldScene};
-use crate::window::Mask;
+use crate::window::mask::Mask;
 
 /// One wave of amplitude 1 with an overtone, its wave vector changing by ± `share` across the frame.
 fn scene(size: usize, periods: f64, share: f64, seed: u64) -> FieldScene {

@@ -1,0 +1,68 @@
+//! What caveats mean: `moiregauge explain`.
+
+use serde_json::Value;
+
+use crate::common::{program, run, succeed};
+
+fn explain(options: &[&str]) -> String {
+    succeed(program().arg("explain").args(options)).stdout
+}
+
+fn entries(options: &[&str]) -> Vec<Value> {
+    serde_json::from_str(&explain(options)).expect("a list")
+}
+
+/// The codes of all.
+fn codes() -> Vec<String> {
+    let code = |entry: Value| entry["code"].as_str().expect("a code").to_owned();
+    entries(&["--json"]).into_iter().map(code).collect()
+}
+
+#[test]
+fn a_code_is_told_at_length() {
+    let said = explain(&["drift-undetermined"]);
+    for words in [
+        "drift-undetermined: serious.",
+        "Meaning: The scans do not tell the drift",
+        "What to do: Take frames up and down",
+        "Options: --drift X Y",
+    ] {
+        assert!(said.contains(words), "{said}");
+    }
+    assert!(!explain(&["sensor-lag"]).contains("Options"));
+}
+
+#[test]
+fn all_codes_have_one_line_each() {
+    let said = explain(&[]);
+    let codes = codes();
+    assert_eq!(said.lines().count(), codes.len());
+    for (line, code) in said.lines().zip(codes) {
+        assert_eq!(line.split_whitespace().next(), Some(code.as_str()));
+        assert!(line.ends_with('.'), "{line}");
+    }
+}
+
+#[test]
+fn one_or_all_are_told_to_programs() {
+    let one = entries(&["sensor-lag", "--json"]);
+    assert_eq!(one.len(), 1);
+    assert_eq!(one[0]["severity"], "note");
+    let keys: Vec<&String> = one[0].as_object().unwrap().keys().collect();
+    assert_eq!(keys, ["code", "meaning", "severity", "what_to_do"]);
+    let all = entries(&["--json"]);
+    assert!(all.contains(&one[0]) && all.len() > 50);
+}
+
+#[test]
+fn an_unknown_code_is_refused_with_the_nearest_ones() {
+    let refused = run(program().args(["explain", "sensor-lagg"]));
+    assert_eq!(refused.code, Some(1));
+    assert!(
+        refused
+            .stderr
+            .contains("\"sensor-lagg\"; the nearest are sensor-lag,"),
+        "{}",
+        refused.stderr
+    );
+}
