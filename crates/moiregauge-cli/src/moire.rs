@@ -6,7 +6,7 @@ mod words;
 use std::process::ExitCode;
 
 use anyhow::{Context as _, bail, ensure};
-use heterostrain::lattice::LatticeVectors;
+use heterostrain::lattice::Lattice;
 use heterostrain::lattice::{MoireCell, WavelengthMeaning, from_wavelengths};
 use heterostrain::material::Material;
 use heterostrain::strain::twist_strain;
@@ -33,19 +33,18 @@ pub(crate) fn run(args: &MoireArgs) -> anyhow::Result<ExitCode> {
     let file = args.figure.as_deref().map(file).transpose()?;
     let asked = args.question()?;
     let lattice = match &asked {
-        Question::Forward(stacking) => LatticeVectors {
-            basis: moire_of(stacking, settings.bilayer(), settings.strain_convention)?,
-            covariance: Matrix4::zeros(),
-        },
+        Question::Forward(stacking) => Lattice::new(
+            moire_of(stacking, settings.bilayer(), settings.strain_convention)?,
+            Matrix4::zeros(),
+        ),
         Question::Wavelengths {
             lengths,
             sigmas,
             meaning,
         } => from_wavelengths(*lengths, *sigmas, *meaning)?,
-        Question::Vectors { basis, sigma } => LatticeVectors {
-            basis: *basis,
-            covariance: Matrix4::identity() * (sigma * sigma),
-        },
+        Question::Vectors { basis, sigma } => {
+            Lattice::new(*basis, Matrix4::identity() * (sigma * sigma))
+        }
     };
     let cell = MoireCell::new(&lattice.basis).context("the two vectors are parallel")?;
     // Names of waves are those of the vectors that are shown.
@@ -113,7 +112,7 @@ enum Question {
 
 /// All readings of a lattice whose covariance is all that is not known of it.
 fn read(
-    lattice: &LatticeVectors,
+    lattice: &Lattice,
     settings: &Settings,
 ) -> anyhow::Result<(heterostrain::strain::TwistStrain, Readings)> {
     let found = twist_strain(lattice, settings.bilayer(), settings.strain_convention)?;

@@ -6,7 +6,7 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-use heterostrain::lattice::LatticeVectors;
+use heterostrain::lattice::Lattice;
 use heterostrain::strain::{StrainTensor, TwistStrain};
 use heterostrain::{Estimate, TotalEstimate};
 use moiregauge::campaign::{Analysis, Combined, Drift, ScanAnalysis, SetAnalysis, SetMean};
@@ -117,7 +117,7 @@ fn directions(scans: &[&ScanAnalysis]) -> String {
 }
 
 /// Lengths, in words, and directions of the three vectors.
-fn lattice_line(text: &mut String, lattice: &LatticeVectors, lengths: &str) {
+fn lattice_line(text: &mut String, lattice: &Lattice, lengths: &str) {
     let angles = [0, 1, 2].map(|i| fixed(lattice.polar_angle(i).value.to_degrees(), 1));
     let _ = writeln!(
         text,

@@ -3,7 +3,7 @@
 //! `cargo bench -p moiregauge --bench drift`. The published way needs 10,000 minimisations.
 
 use divan::Bencher;
-use heterostrain::lattice::LatticeVectors;
+use heterostrain::lattice::Lattice;
 use moiregauge::drift::monte_carlo;
 use moiregauge::drift::{Observation, solve};
 use nalgebra::{Matrix2, Matrix4, Vector2};
@@ -26,10 +26,10 @@ fn observations() -> Vec<Observation> {
             let error = |k: i32| 0.005 * f64::from((i * 7 + k * 5) % 11 - 5) / 5.0;
             let errors = Matrix2::new(error(0), error(1), error(2), error(3));
             Observation {
-                lattice: LatticeVectors {
-                    basis: map.try_inverse().expect("a slow drift") * basis + errors,
-                    covariance: Matrix4::identity() * 0.005_f64.powi(2),
-                },
+                lattice: Lattice::new(
+                    map.try_inverse().expect("a slow drift") * basis + errors,
+                    Matrix4::identity() * 0.005_f64.powi(2),
+                ),
                 time_gradient,
                 speed_error: [1e-4, 1e-4],
                 sensor: Matrix4::zeros(),

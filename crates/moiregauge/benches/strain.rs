@@ -3,7 +3,7 @@
 //! `cargo bench -p moiregauge --bench strain`. The published way needs a minimisation for each draw.
 
 use divan::Bencher;
-use heterostrain::lattice::LatticeVectors;
+use heterostrain::lattice::Lattice;
 use heterostrain::material::Material;
 use heterostrain::strain::StrainConvention;
 use heterostrain::strain::{draws, twist_strain};
@@ -15,11 +15,11 @@ fn main() {
 }
 
 /// 1.10° and 0.3 % in graphene: the pair of shortest vectors about 60° apart.
-fn lattice() -> LatticeVectors {
-    LatticeVectors {
-        basis: Matrix2::new(-2.887_907_7, 8.552_447_4, 13.756_443_9, 8.752_641_8),
-        covariance: Matrix4::identity() * 0.01_f64.powi(2),
-    }
+fn lattice() -> Lattice {
+    Lattice::new(
+        Matrix2::new(-2.887_907_7, 8.552_447_4, 13.756_443_9, 8.752_641_8),
+        Matrix4::identity() * 0.01_f64.powi(2),
+    )
 }
 
 #[divan::bench]

@@ -7,7 +7,7 @@
 use std::f64::consts::{PI, TAU};
 use std::time::Instant;
 
-use heterostrain::lattice::LatticeVectors;
+use heterostrain::lattice::Lattice;
 use heterostrain::material::Material;
 use heterostrain::strain::StrainConvention;
 use heterostrain::strain::TwistStrain;
@@ -167,10 +167,7 @@ fn map_of(scene: &FieldScene, image: &Image, window_px: Option<f64>) -> WaveMap 
 
 fn truth(waves: &Matrix2<f64>) -> TwistStrain {
     let basis = waves.try_inverse().expect("a lattice").transpose() * TAU;
-    let lattice = LatticeVectors {
-        basis,
-        covariance: Matrix4::identity() * 1e-12,
-    };
+    let lattice = Lattice::new(basis, Matrix4::identity() * 1e-12);
     twist_strain(&lattice, &Material::graphene(), StrainConvention::RealSpace).expect("a moiré")
 }
 

@@ -12,7 +12,7 @@
 //! What an isotropic or uniaxial strain of the known lattice does is not told from s, g and γ.
 
 use heterostrain::Estimate;
-use heterostrain::lattice::{LatticeVectors, shortest_pair};
+use heterostrain::lattice::{Lattice, shortest_pair};
 use heterostrain::material::Material;
 use nalgebra::{Matrix2, Matrix3, Matrix3x4, Vector3};
 use serde::{Deserialize, Serialize};
@@ -403,13 +403,13 @@ pub struct Shown {
 
 /// Compares a lattice, free of drift, with the known `cell` (reduced, nm), under the names of its vectors
 /// that make the distortion smallest. `None` where either has no area.
-pub fn shown(lattice: &LatticeVectors, cell: &Matrix2<f64>) -> Option<Shown> {
+pub fn shown(lattice: &Lattice, cell: &Matrix2<f64>) -> Option<Shown> {
     // The surface may lie either face up.
     let mirror = Matrix2::new(1.0, 0.0, 0.0, -1.0);
     let mut found: Vec<Shown> = Vec::new();
     for known in [*cell, mirror * cell] {
         let inverse = known.try_inverse()?;
-        let same_face = |l: &LatticeVectors| l.basis.determinant() * known.determinant() > 0.0;
+        let same_face = |l: &Lattice| l.basis.determinant() * known.determinant() > 0.0;
         let named = names().map(|name| lattice.relabelled(&name));
         found.extend(named.filter(same_face).map(|l| by_name(&l, &inverse)));
     }
@@ -430,7 +430,7 @@ pub fn shown(lattice: &LatticeVectors, cell: &Matrix2<f64>) -> Option<Shown> {
     })
 }
 
-fn by_name(lattice: &LatticeVectors, inverse: &Matrix2<f64>) -> Shown {
+fn by_name(lattice: &Lattice, inverse: &Matrix2<f64>) -> Shown {
     let (p, q) = parts(&(lattice.basis * inverse));
     let turn = p / p.norm();
     let stretch = 2.0 * q * turn;

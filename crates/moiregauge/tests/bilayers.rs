@@ -4,7 +4,7 @@ mod two_layers;
 
 use std::f64::consts::PI;
 
-use heterostrain::lattice::LatticeVectors;
+use heterostrain::lattice::Lattice;
 use heterostrain::material::{Bilayer, Material};
 use heterostrain::strain::StrainConvention;
 use heterostrain::strain::StrainConvention::{KSpace, RealSpace};
@@ -162,7 +162,7 @@ proptest! {
             if elongated(&basis, layers) {
                 continue;
             }
-            let lattice = LatticeVectors { basis, covariance: some_covariance(0.001) };
+            let lattice = Lattice::new(basis, some_covariance(0.001));
             let values = |basis: Matrix2<f64>| {
                 let found = twist_strain(&exact(basis), layers, RealSpace).ok()?;
                 Some(nalgebra::Vector3::new(found.twist, found.strain_vector.x, found.strain_vector.y))
@@ -193,7 +193,7 @@ proptest! {
                 let angle = made.lattice_angle + if of_reference { 0.0 } else { made.twist };
                 let orientation = Orientation { angle, sigma: 0.003, of_reference };
                 let truth = |t: &StrainTensor| (t.twist - made.twist).abs();
-                let nearest = |lattice: &LatticeVectors, orientation: &Orientation| {
+                let nearest = |lattice: &Lattice, orientation: &Orientation| {
                     let all = strain_tensors(lattice, layers, orientation).unwrap();
                     all.into_iter().min_by(|a, b| truth(a).total_cmp(&truth(b))).unwrap()
                 };
@@ -366,10 +366,7 @@ fn errors_near_alignment() {
         let basis = moire_of(&made, layers, RealSpace).unwrap();
         // A common relative error of the lattice is one of |p|.
         let flat = exact(basis).flat() * 1e-4;
-        let lattice = LatticeVectors {
-            basis,
-            covariance: flat * flat.transpose(),
-        };
+        let lattice = Lattice::new(basis, flat * flat.transpose());
         let found = twist_strain(&lattice, layers, RealSpace).unwrap();
         let p = (1.0 + ratio * ratio - 2.0 * ratio * twist.cos()).sqrt();
         let expected = p * (1e-4 * p) / (ratio * twist.sin());
@@ -382,10 +379,7 @@ fn errors_near_alignment() {
     };
     let basis = moire_of(&aligned, layers, RealSpace).unwrap() * 1.01;
     let flat = exact(basis).flat() * 1e-3;
-    let lattice = LatticeVectors {
-        basis,
-        covariance: flat * flat.transpose(),
-    };
+    let lattice = Lattice::new(basis, flat * flat.transpose());
     let found = twist_strain(&lattice, layers, RealSpace).unwrap();
     assert_eq!(found.twist, 0.0);
     let p = (ratio - 1.0) / 1.01;

@@ -3,7 +3,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use heterostrain::lattice::LatticeVectors;
+use heterostrain::lattice::Lattice;
 use heterostrain::material::{Bilayer, Material};
 use heterostrain::strain::twist_strain;
 use heterostrain::strain::{KnownOrientation, LatticeDirection, StrainConvention};
@@ -53,11 +53,8 @@ fn basis(Truth([twist, strain, axis, angle]): Truth, layers: Bilayer<'_>) -> Mat
     dual(dual(second) - dual(first))
 }
 
-fn exact(basis: Matrix2<f64>) -> LatticeVectors {
-    LatticeVectors {
-        basis,
-        covariance: Matrix4::identity() * 1e-8,
-    }
+fn exact(basis: Matrix2<f64>) -> Lattice {
+    Lattice::new(basis, Matrix4::identity() * 1e-8)
 }
 
 fn modulo(a: f64, period: f64) -> f64 {

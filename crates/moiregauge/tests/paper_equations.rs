@@ -6,7 +6,7 @@
 
 use std::f64::consts::{FRAC_PI_3, PI};
 
-use heterostrain::lattice::LatticeVectors;
+use heterostrain::lattice::Lattice;
 use heterostrain::material::Material;
 use heterostrain::strain::StrainConvention::KSpace;
 use heterostrain::strain::twist_strain;
@@ -93,10 +93,7 @@ fn closed_form_solves_the_published_equations() {
             (basis.column(0).into(), basis.column(1).into());
         let third = second - first;
         let six = [first, second, third, -first, -second, -third];
-        let lattice = LatticeVectors {
-            basis,
-            covariance: Matrix4::zeros(),
-        };
+        let lattice = Lattice::new(basis, Matrix4::zeros());
         let found = twist_strain(&lattice, &graphene, KSpace).unwrap();
 
         // A start within the basin: wrong by a few per cent of each, as a user would guess.
@@ -145,10 +142,7 @@ fn twelve_pairs_of_drawn_peaks_are_solved_at_once() {
         KSpace,
     )
     .unwrap();
-    let lattice = LatticeVectors {
-        basis,
-        covariance: Matrix4::zeros(),
-    };
+    let lattice = Lattice::new(basis, Matrix4::zeros());
     let found = twist_strain(&lattice, &graphene, KSpace).unwrap();
     let (first, second): (Vector2<f64>, Vector2<f64>) =
         (basis.column(0).into(), basis.column(1).into());
@@ -181,10 +175,7 @@ fn twelve_pairs_of_drawn_peaks_are_solved_at_once() {
             "{solved} {drawn:?}"
         );
         // It is not the lattice of two of the six.
-        let two = LatticeVectors {
-            basis: Matrix2::from_columns(&[six[0], six[1]]),
-            covariance: Matrix4::zeros(),
-        };
+        let two = Lattice::new(Matrix2::from_columns(&[six[0], six[1]]), Matrix4::zeros());
         let of_two = twist_strain(&two, &graphene, KSpace).unwrap();
         assert!((of_two.twist - drawn.twist).abs() > 1e-6);
     }

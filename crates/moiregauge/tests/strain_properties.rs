@@ -4,7 +4,7 @@ mod two_layers;
 
 use std::f64::consts::{FRAC_PI_3, PI};
 
-use heterostrain::lattice::LatticeVectors;
+use heterostrain::lattice::Lattice;
 use heterostrain::lattice::three_vectors;
 use heterostrain::strain::StrainConvention;
 use heterostrain::strain::StrainConvention::{KSpace, RealSpace};
@@ -25,7 +25,7 @@ prop_compose! {
         axis in 0.0..PI,
         angle in 0.0..FRAC_PI_3,
         k_space: bool,
-    ) -> (LatticeVectors, [f64; 4], StrainConvention) {
+    ) -> (Lattice, [f64; 4], StrainConvention) {
         let twist = twist.to_radians();
         let form = if k_space { KSpace } else { RealSpace };
         (lattice(twist, share * twist, axis, angle, form), [twist, share * twist, axis, angle], form)
@@ -43,7 +43,7 @@ proptest! {
         let expected = strain * Vector2::new((2.0 * lab).cos(), (2.0 * lab).sin());
         prop_assert!((found.strain_vector - expected).norm() < 1e-11);
         let again = found.moire_lattice(&graphene(), form).unwrap();
-        let again = solve(&LatticeVectors { basis: again, ..lattice }, form);
+        let again = solve(&Lattice::new(again, lattice.covariance), form);
         prop_assert!((again.twist - twist).abs() < 1e-12);
     }
 
@@ -127,7 +127,7 @@ proptest! {
     }
 }
 
-fn numerical_jacobian(lattice: &LatticeVectors, form: StrainConvention) -> Matrix4<f64> {
+fn numerical_jacobian(lattice: &Lattice, form: StrainConvention) -> Matrix4<f64> {
     let step = 1e-5;
     let centre = solve(lattice, form).lattice_angle;
     Matrix4::from_columns(&[0, 1, 2, 3].map(|component| {
@@ -207,7 +207,7 @@ fn strain_dominated_readings_are_listed() {
 
 /// Whether the branch, put into the forward model, makes this lattice: each basis in whole numbers
 /// of the other.
-fn makes(branch: &Branch, lattice: &LatticeVectors, form: StrainConvention) -> bool {
+fn makes(branch: &Branch, lattice: &Lattice, form: StrainConvention) -> bool {
     let Branch {
         twist,
         strain,

@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use heterostrain::Estimate;
-use heterostrain::lattice::LatticeVectors;
+use heterostrain::lattice::Lattice;
 use heterostrain::material::Material;
 use heterostrain::strain::StrainConvention;
 use heterostrain::strain::StrainConvention::{KSpace, RealSpace};
@@ -11,16 +11,13 @@ use heterostrain::strain::twist_strain;
 use heterostrain::strain::{Branch, branches, moire_lattice, naive_twist};
 use nalgebra::{Matrix2, Matrix4, Vector2};
 
-fn exact(basis: Matrix2<f64>) -> LatticeVectors {
-    LatticeVectors {
-        basis,
-        covariance: Matrix4::zeros(),
-    }
+fn exact(basis: Matrix2<f64>) -> Lattice {
+    Lattice::new(basis, Matrix4::zeros())
 }
 
 /// Computed by an independent program: α 37°, θ 1.10°, ε 0.30 %, φ 20°, a 0.246 nm, ν 0.16;
 /// columns dual to the harmonics of the atomic vectors at 0° and 60°.
-fn reference_lattice() -> LatticeVectors {
+fn reference_lattice() -> Lattice {
     exact(Matrix2::new(
         -2.887_907_7,
         -8.552_447_4,

@@ -4,7 +4,7 @@ mod two_layers;
 
 use std::f64::consts::PI;
 
-use heterostrain::lattice::LatticeVectors;
+use heterostrain::lattice::Lattice;
 use heterostrain::strain::StrainConvention::RealSpace;
 use heterostrain::strain::draws;
 use heterostrain::strain::{TwistStrain, moire_lattice};
@@ -46,10 +46,7 @@ fn errors_without_strain_have_their_closed_form() {
     covariance
         .fixed_view_mut::<2, 2>(2, 0)
         .copy_from(&(i2 * cross));
-    let lattice = LatticeVectors {
-        basis,
-        covariance: big * covariance * big.transpose(),
-    };
+    let lattice = Lattice::new(basis, big * covariance * big.transpose());
     let found = solve(&lattice, RealSpace);
     let g = 4.0 * PI / (3.0_f64.sqrt() * a);
     let sigma_p = (v / 3.0).sqrt() / g;
@@ -150,10 +147,7 @@ fn draws_from_a_singular_covariance() {
             .iter()
             .all(|d| (d.lattice_angle - sample[0].lattice_angle).abs() < 0.1)
     );
-    let still = LatticeVectors {
-        covariance: Matrix4::zeros(),
-        ..measured
-    };
+    let still = Lattice::new(measured.basis, Matrix4::zeros());
     let exact = draws(&still, &graphene(), RealSpace, 5, normals(1, "strain", 0));
     assert!(exact.iter().all(|d| (d.twist - 0.019).abs() < 1e-12));
 }

@@ -1,7 +1,7 @@
 //! Two equal layers and the orientation of one of them: which sense the twist has is open, and both readings are there.
 //! In: stackings that are put in. Nothing is simulated.
 
-use heterostrain::lattice::LatticeVectors;
+use heterostrain::lattice::Lattice;
 use heterostrain::material::Material;
 use heterostrain::strain::twist_strain;
 use heterostrain::strain::{KnownOrientation, LatticeDirection, StrainConvention, TwistSense};
@@ -51,10 +51,7 @@ fn settings(made: &Stacking) -> Settings {
 }
 
 fn read(basis: Matrix2<f64>, sigma: f64, settings: &Settings) -> (Readings, Vec<String>) {
-    let lattice = LatticeVectors {
-        basis,
-        covariance: Matrix4::identity() * (sigma * sigma),
-    };
+    let lattice = Lattice::new(basis, Matrix4::identity() * (sigma * sigma));
     let found = twist_strain(&lattice, settings.bilayer(), settings.strain_convention).unwrap();
     let statistical = Statistical {
         image: lattice.covariance,

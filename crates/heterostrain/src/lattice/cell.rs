@@ -8,7 +8,7 @@
 use nalgebra::{Matrix2, Matrix4, SMatrix, Vector2};
 
 use crate::lattice::reduce::{canonical, reciprocal, shortest_pair};
-use crate::lattice::vectors::LatticeVectors;
+use crate::lattice::vectors::{Lattice, Nm};
 
 /// What three wavelengths are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -54,10 +54,7 @@ impl MoireCell {
     pub fn new(basis: &Matrix2<f64>) -> Option<Self> {
         let shortest = basis * shortest_pair(basis)?;
         // L₁ between 0° and 60°, where it can be.
-        let named = canonical(&LatticeVectors {
-            basis: shortest,
-            covariance: Matrix4::zeros(),
-        });
+        let named = canonical(&Lattice::<Nm>::exact(shortest));
         let basis = if shortest_pair(&named.basis)? == Matrix2::identity() {
             named.basis
         } else {
@@ -76,7 +73,7 @@ impl MoireCell {
     }
 
     /// The lattice that the cell was made of, by the first two vectors of the cell.
-    pub fn pair_of(&self, lattice: &LatticeVectors) -> LatticeVectors {
+    pub fn pair_of(&self, lattice: &Lattice) -> Lattice {
         let own = Matrix2::from_columns(&[self.vectors[0], self.vectors[1]]);
         match lattice.basis.try_inverse() {
             Some(inverse) => lattice.relabelled(&(inverse * own).map(f64::round)),
@@ -117,7 +114,7 @@ pub fn from_wavelengths(
     lengths: [f64; 3],
     sigmas: [f64; 3],
     meaning: WavelengthMeaning,
-) -> Result<LatticeVectors, CellError> {
+) -> Result<Lattice, CellError> {
     if !lengths.iter().all(|l| l.is_finite() && *l > 0.0) {
         return Err(CellError::NotPositive(lengths));
     }
@@ -141,7 +138,7 @@ pub fn from_wavelengths(
     }
     let errors = SMatrix::<f64, 3, 3>::from_diagonal(&sigmas.map(|s| s * s).into());
     let covariance: Matrix4<f64> = jacobian * errors * jacobian.transpose();
-    Ok(LatticeVectors { basis, covariance })
+    Ok(Lattice::new(basis, covariance))
 }
 
 /// The pair of real-space vectors; `None` where there is no such triangle.

@@ -1,8 +1,8 @@
 //! Small algebra of reciprocal lattices: reduction, labelling, real ↔ reciprocal.
 
-use nalgebra::{Matrix2, Matrix4, Vector2};
+use nalgebra::{Matrix2, Vector2};
 
-use crate::lattice::vectors::LatticeVectors;
+use crate::lattice::vectors::{Lattice, Pair};
 
 /// Real-space pair about 60° apart ↔ reciprocal pair about 60° apart, `K₁, K₂ = K₃ + K₁`.
 ///
@@ -14,38 +14,8 @@ pub fn reciprocal(basis: &Matrix2<f64>) -> Option<Matrix2<f64>> {
     Some(Matrix2::from_columns(&[b1, b1 + b2]))
 }
 
-/// Real-space lattice of a reciprocal pair at 60°, with its covariance carried along.
-///
-/// The full inverse, not `λ = 2/(√3|K|)`, which holds for undistorted hexagons only.
-pub fn real_from_reciprocal(k: &LatticeVectors) -> Option<LatticeVectors> {
-    let basis = reciprocal(&k.basis)?;
-    // d(B⁻ᵀ) = −B⁻ᵀ dBᵀ B⁻ᵀ, column by column, then the same recombination of columns.
-    let dual = k.basis.try_inverse()?.transpose();
-    let mut jacobian = Matrix4::zeros();
-    for entry in 0..4 {
-        let mut change = Matrix2::zeros();
-        change[entry] = 1.0;
-        let d = -std::f64::consts::TAU * dual * change.transpose() * dual;
-        let (d1, d2) = (d.column(0).into_owned(), d.column(1).into_owned());
-        let column = Matrix2::from_columns(&[d1, d1 + d2]);
-        jacobian
-            .column_mut(entry)
-            .copy_from_slice(column.as_slice());
-    }
-    Some(LatticeVectors {
-        basis,
-        covariance: jacobian * k.covariance * jacobian.transpose(),
-    })
-}
-
-/// As [`real_from_reciprocal`], but not turned by 60°: the real-space pair that [`reciprocal`] made `k` of, so that
-/// L₁, L₂ and L₃ of a map are those of the image.
-pub fn real_named_alike(k: &LatticeVectors) -> Option<LatticeVectors> {
-    Some(real_from_reciprocal(k)?.relabelled(&TURN))
-}
-
 /// `(a₁, a₂) → (a₂, a₂ − a₁)`: the next names, 60° further.
-const TURN: Matrix2<f64> = Matrix2::new(0.0, -1.0, 1.0, 1.0);
+pub(crate) const TURN: Matrix2<f64> = Matrix2::new(0.0, -1.0, 1.0, 1.0);
 
 /// The integer change of basis that turns a pair into its shortest one, about 60° apart, second
 /// counter-clockwise of the first (Lagrange–Gauss reduction). `None` for parallel vectors.
@@ -94,8 +64,11 @@ pub fn distortion(pair: &Matrix2<f64>) -> f64 {
     q / p
 }
 
-/// `lattice` in the labelling (same lattice, same handedness) closest to `reference`.
-pub fn labelled_like(lattice: &LatticeVectors, reference: &Matrix2<f64>) -> LatticeVectors {
+/// `pair` in the labelling (same lattice, same handedness) closest to `reference`.
+pub fn labelled_like<Space: Copy, Unit: Copy>(
+    pair: &Pair<Space, Unit>,
+    reference: &Matrix2<f64>,
+) -> Pair<Space, Unit> {
     let entries = [-1.0, 0.0, 1.0];
     let mut best = (f64::INFINITY, Matrix2::identity());
     for a in entries {
@@ -106,7 +79,7 @@ pub fn labelled_like(lattice: &LatticeVectors, reference: &Matrix2<f64>) -> Latt
                     if change.determinant() != 1.0 {
                         continue;
                     }
-                    let distance = (lattice.basis * change - reference).norm();
+                    let distance = (pair.basis * change - reference).norm();
                     if distance < best.0 {
                         best = (distance, change);
                     }
@@ -114,12 +87,12 @@ pub fn labelled_like(lattice: &LatticeVectors, reference: &Matrix2<f64>) -> Latt
             }
         }
     }
-    lattice.relabelled(&best.1)
+    pair.relabelled(&best.1)
 }
 
 /// The labelling whose first vector has its polar angle in [0°, 60°): a start for a series, all
 /// further lattices being labelled like the first.
-pub fn canonical(lattice: &LatticeVectors) -> LatticeVectors {
+pub fn canonical<Unit: Copy>(lattice: &Lattice<Unit>) -> Lattice<Unit> {
     let mut current = *lattice;
     for _ in 0..6 {
         let angle = current.polar_angle(0).value;
@@ -131,7 +104,7 @@ pub fn canonical(lattice: &LatticeVectors) -> LatticeVectors {
     // A distorted hexagon can have no vector there: the one nearest to 30° then.
     (0..6).fold(*lattice, |best, _| {
         current = current.relabelled(&TURN);
-        let off = |l: &LatticeVectors| (l.polar_angle(0).value - std::f64::consts::FRAC_PI_6).abs();
+        let off = |l: &Lattice<Unit>| (l.polar_angle(0).value - std::f64::consts::FRAC_PI_6).abs();
         if off(&current) < off(&best) {
             current
         } else {
@@ -152,6 +125,7 @@ pub(crate) fn small_changes() -> impl Iterator<Item = Matrix2<f64>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::lattice::vectors::{Nm, Waves};
 
     fn pair(a: [f64; 2], b: [f64; 2]) -> Matrix2<f64> {
         Matrix2::new(a[0], b[0], a[1], b[1])
@@ -186,19 +160,19 @@ mod tests {
     /// numerical derivative.
     #[test]
     fn real_and_reciprocal_are_inverse() {
-        let k = LatticeVectors {
-            basis: pair([0.5, 0.05], [0.2, 0.47]),
-            covariance: Matrix4::from_diagonal(&[1.0, 2.0, 3.0, 4.0].into()) * 1e-8,
-        };
-        let real = real_from_reciprocal(&k).unwrap();
-        let back = labelled_like(&real_from_reciprocal(&real).unwrap(), &k.basis);
+        let k = Waves::<Nm>::new(
+            pair([0.5, 0.05], [0.2, 0.47]),
+            Matrix4::from_diagonal(&[1.0, 2.0, 3.0, 4.0].into()) * 1e-8,
+        );
+        let real = k.lattice().unwrap();
+        let back = labelled_like(&real.waves().unwrap(), &k.basis);
         assert!((back.basis - k.basis).norm() < 1e-12);
         assert!((back.covariance - k.covariance).norm() < 1e-6 * k.covariance.norm());
         let mut jacobian = Matrix4::zeros();
         for i in 0..4 {
             let mut moved = k;
             moved.basis[i] += 1e-7;
-            let d = (real_from_reciprocal(&moved).unwrap().basis - real.basis) / 1e-7;
+            let d = (moved.lattice().unwrap().basis - real.basis) / 1e-7;
             jacobian.column_mut(i).copy_from_slice(d.as_slice());
         }
         let numerical = jacobian * k.covariance * jacobian.transpose();

@@ -5,16 +5,13 @@
 
 use nalgebra::{Matrix2, Matrix2x6, Matrix6, SymmetricEigen, Vector2, Vector6};
 
-use crate::lattice::vectors::LatticeVectors;
+use crate::lattice::vectors::Lattice;
 
 /// The lattice that fits three vectors best (third = second − first) and how badly they close.
 ///
 /// `covariance` is that of the six components in order. The second number is χ² with two degrees
 /// of freedom; infinite where vectors without uncertainty do not close.
-pub fn three_vectors(
-    vectors: &[Vector2<f64>; 3],
-    covariance: &Matrix6<f64>,
-) -> (LatticeVectors, f64) {
+pub fn three_vectors(vectors: &[Vector2<f64>; 3], covariance: &Matrix6<f64>) -> (Lattice, f64) {
     let y = Vector6::from_iterator(vectors.iter().flat_map(|v| [v.x, v.y]));
     #[rustfmt::skip]
     let closure = Matrix2x6::new(
@@ -30,10 +27,10 @@ pub fn three_vectors(
     let gain = covariance * closure.transpose() * weight;
     let best = y - gain * gap;
     let best_covariance = covariance - gain * closure * covariance;
-    let lattice = LatticeVectors {
-        basis: Matrix2::new(best[0], best[2], best[1], best[3]),
-        covariance: best_covariance.fixed_view::<4, 4>(0, 0).into_owned(),
-    };
+    let lattice = Lattice::new(
+        Matrix2::new(best[0], best[2], best[1], best[3]),
+        best_covariance.fixed_view::<4, 4>(0, 0).into_owned(),
+    );
     (lattice, chi2)
 }
 

@@ -11,7 +11,7 @@ use std::f64::consts::PI;
 use nalgebra::{Matrix2, Matrix4, Vector2};
 
 use crate::complex_pair::ComplexPair;
-use crate::lattice::vectors::LatticeVectors;
+use crate::lattice::vectors::Lattice;
 use crate::material::{Bilayer, Material};
 use crate::strain::aligned;
 use crate::strain::convention::StrainConvention;
@@ -76,7 +76,7 @@ pub struct Solutions {
 /// # References
 /// The equation: Kerelsky et al. 2019, arXiv 1812.08776; in k-space Tran et al. 2024, arXiv 2406.08681.
 pub fn twist_strain<'a>(
-    lattice: &LatticeVectors,
+    lattice: &Lattice,
     bilayer: impl Into<Bilayer<'a>>,
     convention: StrainConvention,
 ) -> Result<TwistStrain, StrainError> {
@@ -133,7 +133,7 @@ fn covariance(solution: &Solution, labelled: &Labelled, layers: &Layers) -> Opti
 /// As [`twist_strain`]; where some of the solutions exist they are returned. Aligned layers whose moiré is
 /// too large for any exact solution have none.
 pub fn branches(
-    lattice: &LatticeVectors,
+    lattice: &Lattice,
     reference: &Material,
     stretched: &Material,
     convention: StrainConvention,
@@ -155,7 +155,7 @@ pub fn branches(
 /// # Errors
 /// As [`branches`].
 pub fn solutions<'a>(
-    lattice: &LatticeVectors,
+    lattice: &Lattice,
     bilayer: impl Into<Bilayer<'a>>,
     convention: StrainConvention,
 ) -> Result<Solutions, StrainError> {
@@ -195,7 +195,7 @@ pub fn solutions<'a>(
 }
 
 /// The solutions for layers of dissimilar lattices under every likely name, the least strained first.
-fn branches_by_trial(lattice: &LatticeVectors, layers: &Layers) -> Result<Solutions, StrainError> {
+fn branches_by_trial(lattice: &Lattice, layers: &Layers) -> Result<Solutions, StrainError> {
     let mut found: Vec<Branch> = Vec::new();
     for named in likely_names(lattice, layers).ok_or(no_area(lattice))? {
         let named = under_name(lattice, named, layers).ok_or(no_area(lattice))?;
@@ -292,7 +292,7 @@ fn branch(
 }
 
 /// The name of a lattice that was given, or the least strained one, once its numbers are known to be finite.
-pub(crate) fn labelled(lattice: &LatticeVectors, layers: &Layers) -> Result<Labelled, StrainError> {
+pub(crate) fn labelled(lattice: &Lattice, layers: &Layers) -> Result<Labelled, StrainError> {
     let finite = |values: &[f64]| values.iter().all(|x| x.is_finite());
     if !finite(lattice.basis.as_slice()) || !finite(lattice.covariance.as_slice()) {
         return Err(StrainError::NotFinite {
@@ -310,11 +310,7 @@ pub(crate) fn labelled(lattice: &LatticeVectors, layers: &Layers) -> Result<Labe
 }
 
 /// A lattice under the name of `named`.
-fn under_name(
-    lattice: &LatticeVectors,
-    named: LatticeVectors,
-    layers: &Layers,
-) -> Option<Labelled> {
+fn under_name(lattice: &Lattice, named: Lattice, layers: &Layers) -> Option<Labelled> {
     Some(Labelled {
         name: LatticeName::of(&lattice.basis, &named.basis, layers)?,
         moire: moire_matrix(&named.basis, &layers.atoms)?,
@@ -322,7 +318,7 @@ fn under_name(
     })
 }
 
-fn no_area(lattice: &LatticeVectors) -> StrainError {
+fn no_area(lattice: &Lattice) -> StrainError {
     StrainError::NoArea {
         area: lattice.basis.determinant(),
     }

@@ -5,7 +5,7 @@
 //! about `θη/2 + η²/2θ`; for different ones the shift is of first order, about `−(κ−1)h/θ`.
 
 use crate::estimate::Estimate;
-use crate::lattice::vectors::LatticeVectors;
+use crate::lattice::vectors::Lattice;
 use crate::material::Bilayer;
 use crate::strain::convention::StrainConvention;
 use crate::strain::other_models::Reference;
@@ -33,7 +33,7 @@ pub struct Degeneracy {
 /// The twist–biaxial degeneracy of a lattice; `twist` holds the noise. `None` where nothing explains the
 /// lattice.
 pub fn degeneracy(
-    lattice: &LatticeVectors,
+    lattice: &Lattice,
     bilayer: Bilayer<'_>,
     convention: StrainConvention,
     twist: Estimate,

@@ -5,7 +5,7 @@
 use nalgebra::{Matrix2, Matrix4, SymmetricEigen, Vector2, Vector4};
 
 use crate::complex_pair::ComplexPair;
-use crate::lattice::vectors::LatticeVectors;
+use crate::lattice::vectors::Lattice;
 use crate::material::Bilayer;
 use crate::strain::closed_form::{default_signs, labelled};
 use crate::strain::convention::StrainConvention;
@@ -20,7 +20,7 @@ use crate::strain::layers::Layers;
 /// [`crate::strain::twist_strain`] refuses. `normal` gives independent
 /// numbers of the standard normal distribution; it fixes every digit.
 pub fn draws<'a>(
-    lattice: &LatticeVectors,
+    lattice: &Lattice,
     bilayer: impl Into<Bilayer<'a>>,
     convention: StrainConvention,
     count: usize,
@@ -45,7 +45,7 @@ pub fn draws<'a>(
 pub(crate) struct Around {
     pub(crate) layers: Layers,
     /// The lattice under the names of the solution.
-    pub(crate) lattice: LatticeVectors,
+    pub(crate) lattice: Lattice,
     signs: Signs,
     /// α of the solution, and as it is reported.
     lattice_angle: [f64; 2],
@@ -54,7 +54,7 @@ pub(crate) struct Around {
 impl Around {
     /// `None` for a lattice without a solution.
     pub(crate) fn new(
-        lattice: &LatticeVectors,
+        lattice: &Lattice,
         bilayer: Bilayer<'_>,
         convention: StrainConvention,
     ) -> Option<Self> {

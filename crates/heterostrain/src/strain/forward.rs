@@ -6,7 +6,7 @@
 use nalgebra::{Matrix2, Matrix4, Rotation2};
 
 use crate::estimate::Estimate;
-use crate::lattice::vectors::LatticeVectors;
+use crate::lattice::vectors::Lattice;
 use crate::material::{Bilayer, Material};
 use crate::strain::convention::StrainConvention;
 use crate::strain::error::StrainError;
@@ -109,10 +109,10 @@ pub fn moire_of<'a>(
 ) -> Result<Matrix2<f64>, StrainError> {
     let bilayer = bilayer.into();
     let layers = Layers::new(bilayer, convention)?;
-    let lattice = LatticeVectors {
-        basis: moire_pair_of(stacking, bilayer, convention)?,
-        covariance: Matrix4::zeros(),
-    };
+    let lattice = Lattice::new(
+        moire_pair_of(stacking, bilayer, convention)?,
+        Matrix4::zeros(),
+    );
     Ok(least_strained(&lattice, &layers)
         .ok_or(StrainError::NoMoire)?
         .basis)

@@ -15,7 +15,7 @@ use nalgebra::{Matrix2, Matrix4, Vector4};
 
 use crate::complex_pair::ComplexPair;
 use crate::lattice::reduce::{shortest_pair, small_changes};
-use crate::lattice::vectors::LatticeVectors;
+use crate::lattice::vectors::Lattice;
 use crate::strain::inversion::{ALL_SIGNS, solve};
 use crate::strain::layers::Layers;
 
@@ -53,7 +53,7 @@ pub(crate) fn moire_matrix_jacobian(
 }
 
 /// The same lattice named by its least strained right-handed pair; `None` without area.
-pub(crate) fn least_strained(lattice: &LatticeVectors, layers: &Layers) -> Option<LatticeVectors> {
+pub(crate) fn least_strained(lattice: &Lattice, layers: &Layers) -> Option<Lattice> {
     if layers.ratio().is_none() {
         return least_strained_by_trial(lattice, layers);
     }
@@ -86,7 +86,7 @@ pub(crate) fn least_strained(lattice: &LatticeVectors, layers: &Layers) -> Optio
 
 /// For layers of different lattices: the names that come nearest to an explanation without strain are
 /// solved, and the one that needs the least is taken.
-fn least_strained_by_trial(lattice: &LatticeVectors, layers: &Layers) -> Option<LatticeVectors> {
+fn least_strained_by_trial(lattice: &Lattice, layers: &Layers) -> Option<Lattice> {
     let likely = likely_names(lattice, layers)?;
     let mut best = (f64::INFINITY, *likely.first()?);
     for named in &likely {
@@ -104,11 +104,8 @@ fn least_strained_by_trial(lattice: &LatticeVectors, layers: &Layers) -> Option<
 }
 
 /// The names that come nearest to an explanation without strain, the nearest first.
-pub(crate) fn likely_names(
-    lattice: &LatticeVectors,
-    layers: &Layers,
-) -> Option<Vec<LatticeVectors>> {
-    let mut scored: Vec<(f64, LatticeVectors)> = names(lattice)?
+pub(crate) fn likely_names(lattice: &Lattice, layers: &Layers) -> Option<Vec<Lattice>> {
+    let mut scored: Vec<(f64, Lattice)> = names(lattice)?
         .into_iter()
         .filter_map(|named| {
             let moire = ComplexPair::from(moire_matrix(&named.basis, &layers.atoms)?);
@@ -132,7 +129,7 @@ fn least_mismatch(moire: &ComplexPair, layers: &Layers) -> f64 {
 
 /// The names of a lattice near its shortest pair, of either handedness: a moiré of different lattices can
 /// be far longer one way than the other, and its cell far from the shortest one.
-pub(crate) fn names(lattice: &LatticeVectors) -> Option<Vec<LatticeVectors>> {
+pub(crate) fn names(lattice: &Lattice) -> Option<Vec<Lattice>> {
     let shortest = lattice.relabelled(&shortest_pair(&lattice.basis)?);
     let entries = || (-LARGEST_ENTRY..=LARGEST_ENTRY).map(f64::from);
     let mut found = Vec::new();

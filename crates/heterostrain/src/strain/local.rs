@@ -6,7 +6,7 @@
 use nalgebra::{Matrix2, Vector2};
 
 use crate::complex_pair::ComplexPair;
-use crate::lattice::vectors::LatticeVectors;
+use crate::lattice::vectors::Lattice;
 use crate::material::Bilayer;
 use crate::strain::closed_form::{default_signs, labelled};
 use crate::strain::convention::StrainConvention;
@@ -33,7 +33,7 @@ impl FixedBranch {
     /// # Errors
     /// As [`crate::strain::twist_strain`].
     pub fn of<'a>(
-        reference: &LatticeVectors,
+        reference: &Lattice,
         bilayer: impl Into<Bilayer<'a>>,
         convention: StrainConvention,
     ) -> Result<Self, StrainError> {
@@ -65,7 +65,7 @@ impl FixedBranch {
 
     /// Twist and strain of a lattice; `None` if there is no such solution. α is near that of the reference
     /// and may lie outside [0, 60°).
-    pub fn at(&self, lattice: &LatticeVectors) -> Option<TwistStrain> {
+    pub fn at(&self, lattice: &Lattice) -> Option<TwistStrain> {
         let lattice = lattice.relabelled(&self.change);
         let moire = moire_matrix(&lattice.basis, &self.layers.atoms)?;
         let by_lattice = moire_matrix_jacobian(&lattice.basis, &moire)?;
@@ -97,9 +97,11 @@ mod tests {
     fn neighbours_have_the_general_solution() {
         let material = Material::graphene();
         let convention = StrainConvention::RealSpace;
-        let lattice = |stretch: f64| LatticeVectors {
-            basis: Matrix2::new(-2.888 + stretch, -8.552, 13.756, -8.753),
-            covariance: Matrix4::identity() * 1e-6,
+        let lattice = |stretch: f64| {
+            Lattice::new(
+                Matrix2::new(-2.888 + stretch, -8.552, 13.756, -8.753),
+                Matrix4::identity() * 1e-6,
+            )
         };
         // Another name of the same lattice.
         let names = Matrix2::new(1.0, 1.0, 0.0, 1.0);

@@ -11,7 +11,7 @@ use nalgebra::{Matrix2, Rotation2, Vector2};
 
 use crate::complex_pair::ComplexPair;
 use crate::lattice::reduce::shortest_pair;
-use crate::lattice::vectors::LatticeVectors;
+use crate::lattice::vectors::Lattice;
 use crate::strain::labelling::moire_matrix;
 use crate::strain::layers::Layers;
 
@@ -72,10 +72,7 @@ pub(crate) fn change_to(basis: &Matrix2<f64>, waves: &Matrix2<f64>) -> Option<Ma
 }
 
 /// All names with strains up to a bound, the least strained first, and the bound.
-pub(crate) fn all_names(
-    lattice: &LatticeVectors,
-    layers: &Layers,
-) -> Option<(Vec<LatticeName>, f64)> {
+pub(crate) fn all_names(lattice: &Lattice, layers: &Layers) -> Option<(Vec<LatticeName>, f64)> {
     let ratio = layers.ratio()?;
     let to_short = shortest_pair(&lattice.basis)?;
     let short = lattice.basis * to_short;
@@ -166,6 +163,6 @@ fn simplest(waves: &Matrix2<f64>, layers: &Layers) -> Option<LatticeName> {
 /// A lattice under one of its names, and P of that name.
 pub(crate) struct Labelled {
     pub(crate) name: LatticeName,
-    pub(crate) lattice: LatticeVectors,
+    pub(crate) lattice: Lattice,
     pub(crate) moire: Matrix2<f64>,
 }

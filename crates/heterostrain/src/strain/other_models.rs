@@ -7,7 +7,7 @@
 use nalgebra::{Complex, Vector4};
 
 use crate::complex_pair::ComplexPair;
-use crate::lattice::vectors::LatticeVectors;
+use crate::lattice::vectors::Lattice;
 use crate::material::Bilayer;
 use crate::strain::closed_form::labelled;
 use crate::strain::convention::StrainConvention;
@@ -25,7 +25,7 @@ pub struct Reference {
 impl Reference {
     /// `None` where [`crate::strain::twist_strain`] finds nothing.
     pub fn new(
-        lattice: &LatticeVectors,
+        lattice: &Lattice,
         bilayer: Bilayer<'_>,
         convention: StrainConvention,
     ) -> Option<Self> {
@@ -34,7 +34,7 @@ impl Reference {
 
     /// The default solution, and that with the other sign of the strain; those that there are.
     pub fn both(
-        lattice: &LatticeVectors,
+        lattice: &Lattice,
         bilayer: Bilayer<'_>,
         convention: StrainConvention,
     ) -> Vec<Self> {

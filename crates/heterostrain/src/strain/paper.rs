@@ -14,7 +14,7 @@
 
 use nalgebra::{Matrix2, Vector2};
 
-use crate::lattice::vectors::LatticeVectors;
+use crate::lattice::vectors::Lattice;
 use crate::material::Bilayer;
 use crate::strain::convention::StrainConvention;
 use crate::strain::draws::{Around, StrainDraw};
@@ -25,7 +25,7 @@ use crate::strain::draws::{Around, StrainDraw};
 /// `lattice` is the lattice about which they were drawn: names of vectors and signs are those of its solution. Draws
 /// without a solution are left out; none come back for a lattice that [`crate::strain::twist_strain`] refuses.
 pub fn published_draws<'a>(
-    lattice: &LatticeVectors,
+    lattice: &Lattice,
     bilayer: impl Into<Bilayer<'a>>,
     convention: StrainConvention,
     drawn: &[[Vector2<f64>; 6]],

@@ -17,7 +17,7 @@ use nalgebra::{Complex, Matrix5, SMatrix, Vector2, Vector5};
 
 use crate::complex_pair::ComplexPair;
 use crate::estimate::Estimate;
-use crate::lattice::vectors::LatticeVectors;
+use crate::lattice::vectors::Lattice;
 use crate::material::Bilayer;
 use crate::strain::closed_form::labelled;
 use crate::strain::convention::StrainConvention;
@@ -98,7 +98,7 @@ pub struct Split {
 /// # Errors
 /// As [`crate::strain::twist_strain`]; [`StrainError::NoMoire`] where the orientation fits no reading.
 pub fn strain_tensors<'a>(
-    lattice: &LatticeVectors,
+    lattice: &Lattice,
     bilayer: impl Into<Bilayer<'a>>,
     orientation: &Orientation,
 ) -> Result<Vec<StrainTensor>, StrainError> {
@@ -112,7 +112,7 @@ pub fn strain_tensors<'a>(
         vec![named]
     } else {
         let names = names(lattice).ok_or(StrainError::NoMoire)?;
-        let labelled = |lattice: LatticeVectors| {
+        let labelled = |lattice: Lattice| {
             let moire = moire_matrix(&lattice.basis, &layers.atoms)?;
             Some(Labelled {
                 name,

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use heterostrain::lattice::LatticeVectors;
+use heterostrain::lattice::Lattice;
 use moiregauge::campaign::analyse;
 use moiregauge::scan::measure_scan;
 use moiregauge::settings::Settings;
@@ -13,7 +13,7 @@ use spmfile::{LineDirection, read};
 use crate::common::{analyze, caveats, json, results, succeed, testdata};
 
 /// The lattice of each line direction of a channel, nm, all with the same names.
-fn lattices(file: &Path, channel: &str) -> Vec<(LineDirection, LatticeVectors)> {
+fn lattices(file: &Path, channel: &str) -> Vec<(LineDirection, Lattice)> {
     let settings = Settings {
         channel: Some(channel.to_owned()),
         drift_draws: 0,
@@ -48,7 +48,7 @@ fn recorded(fit: &Value) -> Vec<[f64; 2]> {
 }
 
 /// Every vector of the record is one of the lattice, within the tolerance for lengths (nm) and directions (degrees).
-fn agrees(lattice: &LatticeVectors, recorded: &[[f64; 2]], tolerance: [f64; 2]) {
+fn agrees(lattice: &Lattice, recorded: &[[f64; 2]], tolerance: [f64; 2]) {
     for [length, angle] in recorded {
         let found = (0..3).any(|i| {
             let off = lattice.polar_angle(i).value.to_degrees() - angle;
@@ -60,7 +60,7 @@ fn agrees(lattice: &LatticeVectors, recorded: &[[f64; 2]], tolerance: [f64; 2]) 
 }
 
 /// χ² of the difference of trace and retrace, four degrees of freedom: 18.5 once in a thousand.
-fn forward_and_backward_agree(lines: &[(LineDirection, LatticeVectors)]) {
+fn forward_and_backward_agree(lines: &[(LineDirection, Lattice)]) {
     let [(_, a), (_, b)] = lines else {
         panic!("expected trace and retrace, found {}", lines.len());
     };

@@ -1,7 +1,7 @@
 //! The error of the twist against the error of the wavelength: θ = 2 arcsin(a/2λ) gives
 //! |dθ| = θ |dλ|/λ at small angles.
 
-use heterostrain::lattice::LatticeVectors;
+use heterostrain::lattice::Lattice;
 use heterostrain::strain::{TwistStrain, naive_twist};
 use moiregauge::campaign::ScanAnalysis;
 
@@ -64,11 +64,11 @@ pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
 }
 
 /// Mean length of the three vectors, nm.
-fn mean_wavelength(lattice: &LatticeVectors) -> f64 {
+fn mean_wavelength(lattice: &Lattice) -> f64 {
     (0..3).map(|v| lattice.wavelength(v).value).sum::<f64>() / 3.0
 }
 
-fn best(scan: &ScanAnalysis) -> (LatticeVectors, Option<TwistStrain>) {
+fn best(scan: &ScanAnalysis) -> (Lattice, Option<TwistStrain>) {
     match scan.drift_corrected {
         Some(lattice) => (lattice, scan.twist_strain),
         None => (scan.sensor, scan.twist_strain_sensor),

@@ -1,7 +1,7 @@
 //! Wavelengths and naive twist angles by the nominal size of the scan and by the sensors.
 
 use heterostrain::Estimate;
-use heterostrain::lattice::LatticeVectors;
+use heterostrain::lattice::Lattice;
 use heterostrain::strain::naive_twist;
 
 use super::layout::{Grid, LETTERS, counting, ends, is_up, ordinal, point};
@@ -22,7 +22,7 @@ pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
         let angle = naive_twist(wavelength, bilayer);
         angle.scaled(1_f64.to_degrees())
     };
-    let value = |lattice: &LatticeVectors, vector: usize, row: usize| {
+    let value = |lattice: &Lattice, vector: usize, row: usize| {
         let wavelength = lattice.wavelength(vector);
         if row == 0 {
             wavelength

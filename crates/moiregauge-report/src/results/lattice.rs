@@ -1,7 +1,7 @@
 //! Estimates, lattice vectors, twist and strain as the document holds them.
 
 use heterostrain::Estimate;
-use heterostrain::lattice::LatticeVectors;
+use heterostrain::lattice::Lattice;
 use heterostrain::material::Bilayer;
 use heterostrain::strain::StrainDraw;
 use heterostrain::strain::{TwistStrain, naive_twist};
@@ -67,7 +67,7 @@ pub struct LatticeVector {
 }
 
 impl LatticeVector {
-    pub(crate) fn of(lattice: &LatticeVectors, index: usize, bilayer: Bilayer<'_>) -> Self {
+    pub(crate) fn of(lattice: &Lattice, index: usize, bilayer: Bilayer<'_>) -> Self {
         let vector = lattice.vector(index);
         let wavelength = lattice.wavelength(index);
         let angle = estimate(lattice.polar_angle(index), degree());
@@ -82,16 +82,12 @@ impl LatticeVector {
         }
     }
 
-    pub(crate) fn all(lattice: &LatticeVectors, bilayer: Bilayer<'_>) -> [Self; 3] {
+    pub(crate) fn all(lattice: &Lattice, bilayer: Bilayer<'_>) -> [Self; 3] {
         [0, 1, 2].map(|index| Self::of(lattice, index, bilayer))
     }
 
     /// The three vectors of a mean lattice.
-    pub(crate) fn of_mean(
-        lattice: &LatticeVectors,
-        budget: &Budget,
-        bilayer: Bilayer<'_>,
-    ) -> [Self; 3] {
+    pub(crate) fn of_mean(lattice: &Lattice, budget: &Budget, bilayer: Bilayer<'_>) -> [Self; 3] {
         [0, 1, 2].map(|index| Self {
             wavelength_nm: estimate_in_all(budget.wavelength(lattice, index), 1.0),
             ..Self::of(lattice, index, bilayer)

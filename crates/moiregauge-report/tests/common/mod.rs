@@ -6,7 +6,7 @@
 
 #![allow(dead_code, reason = "each user takes what it needs")]
 
-use heterostrain::lattice::LatticeVectors;
+use heterostrain::lattice::Lattice;
 use heterostrain::strain;
 use moiregauge::campaign::{Analysis, Combined, Consistency};
 use moiregauge::caveat::{Caveat, DriftDoubt, LatticeDoubt};
@@ -130,10 +130,10 @@ pub(crate) fn provenance() -> Provenance {
 /// Every number of `analysis` replaced by NaN, every image by one without pixels.
 pub(crate) fn spoil(analysis: &mut Analysis) {
     let settings = analysis.settings.clone();
-    let nan = LatticeVectors {
-        basis: Matrix2::from_element(f64::NAN),
-        covariance: Matrix4::from_element(f64::NAN),
-    };
+    let nan = Lattice::new(
+        Matrix2::from_element(f64::NAN),
+        Matrix4::from_element(f64::NAN),
+    );
     let nothing = Vector2::new(f64::NAN, f64::NAN);
     let spoil_result = |result: &mut strain::TwistStrain| {
         *result = strain::TwistStrain {

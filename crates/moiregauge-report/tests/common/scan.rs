@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use heterostrain::Estimate;
-use heterostrain::lattice::LatticeVectors;
+use heterostrain::lattice::Lattice;
 use heterostrain::strain;
 use heterostrain::strain::StrainConvention;
 use moiregauge::campaign::{LineAnalysis, ScanAnalysis};
@@ -52,14 +52,11 @@ pub(super) fn truth(settings: &Settings) -> Matrix2<f64> {
     .expect("a lattice")
 }
 
-pub(super) fn lattice(basis: Matrix2<f64>, sigma: f64) -> LatticeVectors {
-    LatticeVectors {
-        basis,
-        covariance: Matrix4::identity() * sigma * sigma,
-    }
+pub(super) fn lattice(basis: Matrix2<f64>, sigma: f64) -> Lattice {
+    Lattice::new(basis, Matrix4::identity() * sigma * sigma)
 }
 
-pub(super) fn measured(basis: &Matrix2<f64>, sigma: f64, noise: &mut Noise) -> LatticeVectors {
+pub(super) fn measured(basis: &Matrix2<f64>, sigma: f64, noise: &mut Noise) -> Lattice {
     let flat = Vector4::from_fn(|_, _| sigma * noise.normal());
     lattice(basis + Matrix2::from_column_slice(flat.as_slice()), sigma)
 }
@@ -101,20 +98,19 @@ pub(super) fn scan(
         .expect("slow drift")
         * truth;
     let sensor = measured(&seen, sigma, noise);
-    let corrected = LatticeVectors {
-        basis: (Matrix2::identity() - d * u.transpose()) * sensor.basis,
-        covariance: sensor.covariance * 1.2,
-    };
+    let corrected = Lattice::new(
+        (Matrix2::identity() - d * u.transpose()) * sensor.basis,
+        sensor.covariance * 1.2,
+    );
     let frame = frame();
     let to_pixels = frame.try_inverse().expect("a frame");
     let nominal = sensor.mapped(&(Matrix2::identity() * SIZE_NM / (PIXELS - 1) as f64 * to_pixels));
-    let twist_strain = |l: &LatticeVectors| {
-        strain::twist_strain(l, settings.bilayer(), settings.strain_convention).ok()
-    };
+    let twist_strain =
+        |l: &Lattice| strain::twist_strain(l, settings.bilayer(), settings.strain_convention).ok();
     let creep = index as f64 * 0.9;
     let line = |line| LineAnalysis {
         line,
-        pixels: sensor.mapped(&to_pixels),
+        pixels: sensor.in_pixels(&to_pixels),
         sensor,
         comparison: Some(measured(&sensor.basis, sigma * 0.8, noise_of(set, index))),
         shortcut_wavelengths: Some([12.46, 12.52, 12.61]),

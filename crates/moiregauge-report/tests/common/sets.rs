@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use heterostrain::lattice::LatticeVectors;
+use heterostrain::lattice::Lattice;
 use heterostrain::strain;
 use moiregauge::campaign::{Drift, DriftFit, ScanAnalysis, SetAnalysis, SetMean};
 use moiregauge::drift::DriftMonteCarlo;
@@ -18,7 +18,7 @@ use nalgebra::{Matrix2, Vector2};
 use super::scan::{Noise, PIXELS, SIZE_NM, drift_nm_per_s, scan};
 
 pub(super) fn mean(
-    lattices: &[LatticeVectors],
+    lattices: &[Lattice],
     settings: &Settings,
     chi2_per_dof: f64,
     drift_known: bool,
@@ -26,10 +26,9 @@ pub(super) fn mean(
     let n = lattices.len() as f64;
     let basis = lattices.iter().map(|l| l.basis).sum::<Matrix2<f64>>() / n;
     let covariance = lattices.first()?.covariance / n;
-    let lattice = LatticeVectors { basis, covariance };
-    let of = |l: &LatticeVectors| {
-        strain::twist_strain(l, settings.bilayer(), settings.strain_convention).ok()
-    };
+    let lattice = Lattice::new(basis, covariance);
+    let of =
+        |l: &Lattice| strain::twist_strain(l, settings.bilayer(), settings.strain_convention).ok();
     let all: Vec<_> = lattices.iter().filter_map(of).collect();
     let twist_strain = of(&lattice)?;
     let scatter = |square: f64| {

@@ -31,17 +31,17 @@ fn a_distortion_that_was_put_in_is_found() {
         (-50.0, [1.0, 0.0, -1.0, 1.0]),
     ] {
         let turn = Rotation2::new(f64::to_radians(degrees)).into_inner();
-        let lattice = LatticeVectors {
-            basis: f * turn * cell * Matrix2::from_row_slice(&name),
-            covariance: Matrix4::identity() * 1e-10,
-        };
+        let lattice = Lattice::new(
+            f * turn * cell * Matrix2::from_row_slice(&name),
+            Matrix4::identity() * 1e-10,
+        );
         let found = shown(&lattice, &cell).unwrap();
         let expected = Vector3::new(0.03, -0.02, 0.015);
         assert!((found.values - expected).norm() < 1e-12, "{found:?}");
-        let sheared = LatticeVectors {
-            basis: Rotation2::new(0.1).into_inner() * lattice.basis,
-            ..lattice
-        };
+        let sheared = Lattice::new(
+            Rotation2::new(0.1).into_inner() * lattice.basis,
+            lattice.covariance,
+        );
         let again = shown(&sheared, &cell).unwrap().values;
         let turned = Rotation2::new(0.1).into_inner() * f * Rotation2::new(-0.1).into_inner();
         let f = Matrix2::new(
@@ -71,10 +71,7 @@ fn oblique_cells_and_their_mirror_images() {
     let turn = Rotation2::new(0.4).into_inner();
     for face in [1.0, -1.0] {
         let mirror = Matrix2::new(1.0, 0.0, 0.0, face);
-        let lattice = LatticeVectors {
-            basis: f * turn * mirror * cell,
-            covariance: Matrix4::zeros(),
-        };
+        let lattice = Lattice::new(f * turn * mirror * cell, Matrix4::zeros());
         let values = shown(&lattice, &cell).unwrap().values;
         assert!(
             (values - Vector3::new(0.01, 0.03, -0.008)).norm() < 1e-12,
@@ -89,10 +86,7 @@ fn errors_follow_the_lattice() {
     let cell = KnownLattice::hexagonal("h", 1.0, 0.0, "").cell().unwrap();
     let f = Matrix2::new(1.1, 0.04, -0.02, 0.93);
     let covariance = Matrix4::from_diagonal(&[1.0, 2.0, 3.0, 4.0].into()) * 1e-8;
-    let lattice = LatticeVectors {
-        basis: f * cell,
-        covariance,
-    };
+    let lattice = Lattice::new(f * cell, covariance);
     let found = shown(&lattice, &cell).unwrap();
     let mut jacobian = Matrix3x4::zeros();
     let mut of_turn = nalgebra::Vector4::zeros();

@@ -3,7 +3,7 @@
 //! Plain values in nm, s and rad; the surface units (degrees, %, nm/min) belong to the report.
 
 use heterostrain::Estimate;
-use heterostrain::lattice::LatticeVectors;
+use heterostrain::lattice::{Lattice, Px};
 use heterostrain::strain::{KnownOrientation, LatticeDirection, StrainDraw, TwistStrain};
 use nalgebra::{Matrix2, Vector2};
 use spmfile::{DateTime, FrameDirection, LineDirection};
@@ -130,7 +130,7 @@ pub struct Residual {
 #[derive(Clone, Debug)]
 pub struct SetMean {
     /// Lattice vectors, nm.
-    pub lattice: LatticeVectors,
+    pub lattice: Lattice,
     /// Twist and strain of that lattice.
     pub twist_strain: TwistStrain,
     /// What contributes to their uncertainty, calibration and model included.
@@ -153,7 +153,7 @@ pub struct SetMean {
 #[derive(Clone, Debug)]
 pub struct Combined {
     /// Weighted mean lattice, nm.
-    pub lattice: LatticeVectors,
+    pub lattice: Lattice,
     /// Its twist and strain.
     pub twist_strain: TwistStrain,
     /// What contributes to their uncertainty, calibration and model included.
@@ -254,11 +254,11 @@ pub struct ScanAnalysis {
     /// Slow tip velocity, nm/s; σ is the spread over the lines.
     pub slow_velocity: Estimate,
     /// Lattice vectors in nominal coordinates, nm; `None` where the file gives no size.
-    pub nominal: Option<LatticeVectors>,
+    pub nominal: Option<Lattice>,
     /// Lattice vectors in sensor coordinates, nm (nominal ones where there are no sensors).
-    pub sensor: LatticeVectors,
+    pub sensor: Lattice,
     /// Lattice vectors corrected for drift, nm.
-    pub drift_corrected: Option<LatticeVectors>,
+    pub drift_corrected: Option<Lattice>,
     /// The drift that was taken off, nm/s: that of its set at its time.
     pub drift: Option<Vector2<f64>>,
     /// Its time and the way of the sample; `None` where either is not known.
@@ -290,11 +290,11 @@ pub struct LineAnalysis {
     /// Trace or retrace.
     pub line: LineDirection,
     /// Lattice vectors in pixels (columns, rows).
-    pub pixels: LatticeVectors,
+    pub pixels: Lattice<Px>,
     /// Lattice vectors in sensor coordinates, nm.
-    pub sensor: LatticeVectors,
+    pub sensor: Lattice,
     /// The other estimator's vectors in sensor coordinates, nm, for comparison.
-    pub comparison: Option<LatticeVectors>,
+    pub comparison: Option<Lattice>,
     /// The published shortcut `4π/(√3|K|)` for the three first wave vectors, nm: right only for
     /// undistorted hexagons, printed for comparison.
     pub shortcut_wavelengths: Option<[f64; 3]>,

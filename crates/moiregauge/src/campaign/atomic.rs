@@ -15,7 +15,7 @@
 //! of the right angle.
 
 use heterostrain::Estimate;
-use heterostrain::lattice::LatticeVectors;
+use heterostrain::lattice::Lattice;
 use heterostrain::material::Material;
 use nalgebra::{Matrix2, Matrix4, RowVector4, Vector2};
 
@@ -148,10 +148,7 @@ pub fn atomic_orientation(
                 &place,
             ));
         }
-        let lattice = LatticeVectors {
-            covariance: solution.lattice.covariance * scale,
-            ..solution.lattice
-        };
+        let lattice = Lattice::new(solution.lattice.basis, solution.lattice.covariance * scale);
         let (shape, angle) = turned(&lattice, &atoms)?;
         Found {
             shape,
@@ -207,10 +204,7 @@ struct Found {
 }
 
 /// `F = L U A⁰⁻¹` for the name L U of the lattice that distorts the material's least.
-fn deformation(
-    lattice: &LatticeVectors,
-    atoms: &Matrix2<f64>,
-) -> Option<(LatticeVectors, Matrix2<f64>)> {
+fn deformation(lattice: &Lattice, atoms: &Matrix2<f64>) -> Option<(Lattice, Matrix2<f64>)> {
     let inverse = atoms.try_inverse()?;
     let distortion = |f: &Matrix2<f64>| {
         let (p, q) = parts(f);
@@ -240,10 +234,7 @@ fn deformation(
 }
 
 /// Size, distortion and turn of a lattice that is free of drift.
-fn turned(
-    lattice: &LatticeVectors,
-    atoms: &Matrix2<f64>,
-) -> Result<((f64, f64), Estimate), AtomicError> {
+fn turned(lattice: &Lattice, atoms: &Matrix2<f64>) -> Result<((f64, f64), Estimate), AtomicError> {
     let (lattice, f) = deformation(lattice, atoms).ok_or(AtomicError::Degenerate)?;
     let inverse = atoms.try_inverse().ok_or(AtomicError::Degenerate)?;
     let (p, q) = parts(&f);
@@ -272,7 +263,7 @@ fn turn_of_fast_axis(f: &Matrix2<f64>, time_gradient: &Vector2<f64>) -> (f64, f6
 
 /// Refuses a lattice that another orientation of the material explains with nearly as little distortion.
 fn unambiguous(
-    lattice: &LatticeVectors,
+    lattice: &Lattice,
     atoms: &Matrix2<f64>,
     time_gradient: &Vector2<f64>,
     period: f64,

@@ -13,7 +13,7 @@
 //! moved between two frames.
 
 use heterostrain::Estimate;
-use heterostrain::lattice::LatticeVectors;
+use heterostrain::lattice::Lattice;
 use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
 use spmfile::{FrameDirection, LineDirection};
 
@@ -77,7 +77,7 @@ pub struct CalibratedSet {
     /// The laboratory axis along which lines follow each other.
     pub slow_axis: Axis,
     /// The lattice as it is shown, free of drift as far as that is known, nm.
-    pub lattice: LatticeVectors,
+    pub lattice: Lattice,
     /// Gain, mismatch (per cent) and deviation from a right angle (mrad), errors without that of the known
     /// lattice.
     pub estimates: [Estimate; 3],
@@ -127,7 +127,7 @@ pub enum CalibrateError {
 /// One set on the way.
 struct Seen {
     group: Group,
-    lattice: LatticeVectors,
+    lattice: Lattice,
     /// With the prior of the drift where it is needed.
     found: Shown,
     /// Without.
@@ -288,14 +288,11 @@ fn see(
     let (drifting, _, _) = common_lattice(&timed, &none, &prior).map_err(|_| unusable())?;
     let scale = enlargement(chi2, freedom);
     about_scatter(&name, chi2, freedom, caveats);
-    let lattice = LatticeVectors {
-        covariance: drifting.covariance + bare.covariance * (scale - 1.0),
-        ..drifting
-    };
-    let bare = LatticeVectors {
-        covariance: bare.covariance * scale,
-        ..bare
-    };
+    let lattice = Lattice::new(
+        drifting.basis,
+        drifting.covariance + bare.covariance * (scale - 1.0),
+    );
+    let bare = Lattice::new(bare.basis, bare.covariance * scale);
     let found = shown(&lattice, cell).ok_or_else(unusable)?;
     about_name(&name, &found, caveats);
     about_drift(

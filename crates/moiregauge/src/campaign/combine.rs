@@ -1,6 +1,6 @@
 //! All sets taken together, and how well they agree.
 
-use heterostrain::lattice::LatticeVectors;
+use heterostrain::lattice::Lattice;
 use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
 
 use crate::campaign::analysis::{Combined, Consistency, Drift, SetAnalysis, SetMean};
@@ -127,7 +127,7 @@ pub(crate) fn combine(
 }
 
 /// Whether two lattices are of different samples or places.
-fn are_different(a: &LatticeVectors, b: &LatticeVectors) -> bool {
+fn are_different(a: &Lattice, b: &Lattice) -> bool {
     let share = (b.basis - a.basis).norm() / a.basis.norm();
     let difference = b.flat() - a.flat();
     let inverse = (a.covariance + b.covariance).try_inverse();
@@ -140,7 +140,7 @@ fn joined(
     sets: &[SetAnalysis],
     means: &[&SetMean],
     scans: &[&MeasuredScan],
-    (reference, start): (&Matrix2<f64>, (&LatticeVectors, &Vector2<f64>)),
+    (reference, start): (&Matrix2<f64>, (&Lattice, &Vector2<f64>)),
     settings: &Settings,
 ) -> Result<JointFit, String> {
     let fit = joint_fit(scans, reference, start, settings)
@@ -189,7 +189,7 @@ fn contradiction<'a>(
 }
 
 /// Generalised mean of the four components, its covariance enlarged where the sets scatter.
-fn weighted_mean(means: &[&SetMean]) -> Option<(LatticeVectors, Statistical)> {
+fn weighted_mean(means: &[&SetMean]) -> Option<(Lattice, Statistical)> {
     let (mut normal, mut right) = (Matrix4::zeros(), Vector4::zeros());
     let mut weights = Vec::with_capacity(means.len());
     for mean in means {
@@ -211,10 +211,10 @@ fn weighted_mean(means: &[&SetMean]) -> Option<(LatticeVectors, Statistical)> {
     let freedom = 4 * (means.len() - 1);
     let scale = enlargement(chi2, freedom);
     let parts: Vec<Statistical> = means.iter().map(|m| m.budget.statistical).collect();
-    let lattice = LatticeVectors {
-        basis: Matrix2::new(flat[0], flat[2], flat[1], flat[3]),
-        covariance: covariance * scale,
-    };
+    let lattice = Lattice::new(
+        Matrix2::new(flat[0], flat[2], flat[1], flat[3]),
+        covariance * scale,
+    );
     Some((lattice, Statistical::of_mean(&parts, scale)?))
 }
 

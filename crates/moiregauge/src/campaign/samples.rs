@@ -5,7 +5,7 @@
 //! whatever the drift does. Two numbers of each scan are compared there; along the slow axis lattices may differ by what
 //! a plausible drift makes of them. How the vectors are named does not matter.
 
-use heterostrain::lattice::{LatticeVectors, real_from_reciprocal};
+use heterostrain::lattice::Waves;
 use nalgebra::{Matrix2, Vector2};
 
 use crate::campaign::group::{Group, folder};
@@ -25,7 +25,7 @@ const DRIFT: f64 = 0.25;
 
 /// How one scan shows its lattice.
 struct View {
-    waves: LatticeVectors,
+    waves: Waves,
     /// Unit vector of the fast axis.
     fast: Vector2<f64>,
     /// Lines follow each other along this one; unknown directions make zero.
@@ -38,7 +38,7 @@ impl View {
         let steps = line.geometry.pixel_to_nm;
         let gradient = line.timing.and_then(|t| line.geometry.time_gradient(&t));
         Some(Self {
-            waves: real_from_reciprocal(&line.in_sensor_coordinates())?,
+            waves: line.in_sensor_coordinates().waves()?,
             fast: steps.column(0).normalize(),
             slow: gradient.map_or_else(Vector2::zeros, |u| u.normalize()),
         })

@@ -1,6 +1,6 @@
 //! Measured scans → what the joint fit wants of them.
 
-use heterostrain::lattice::{labelled_like, real_from_reciprocal, reciprocal};
+use heterostrain::lattice::{labelled_like, reciprocal};
 use nalgebra::{Matrix2, Vector2};
 use spmfile::{DateTime, LineDirection};
 
@@ -28,8 +28,8 @@ pub(crate) fn sightings(
                 classes.push(key);
                 classes.len() - 1
             });
-            let waves = real_from_reciprocal(&line.in_sensor_coordinates())?;
-            let sensor = real_from_reciprocal(&line.sensor_part())?;
+            let waves = line.in_sensor_coordinates().waves()?;
+            let sensor = line.sensor_part().waves()?;
             let j = line.geometry.pixel_to_nm;
             let dual = j.try_inverse()?.transpose();
             let time = middle_of_frame(scan);

@@ -1,6 +1,6 @@
 //! Results with both of their uncertainties: the statistical part, and everything.
 
-use heterostrain::lattice::LatticeVectors;
+use heterostrain::lattice::Lattice;
 use heterostrain::strain::TwistStrain;
 use heterostrain::{Estimate, TotalEstimate};
 
@@ -49,7 +49,7 @@ impl Budget {
     }
 
     /// Length of a vector (0, 1, 2 for L₁, L₂, L₃) of the lattice that the budget is of, nm.
-    pub fn wavelength(&self, lattice: &LatticeVectors, index: usize) -> TotalEstimate {
+    pub fn wavelength(&self, lattice: &Lattice, index: usize) -> TotalEstimate {
         TotalEstimate::new(lattice.wavelength(index), self.total().wavelengths[index])
     }
 }

@@ -3,7 +3,7 @@
 //! The edges of a triangle are lattice vectors of the moiré there. With integer steps S (2 × 2) of two edges E: the
 //! primitive vectors are `E S⁻¹`, linear in the three places, so that the errors of the nodes are carried on exactly.
 
-use heterostrain::lattice::LatticeVectors;
+use heterostrain::lattice::Lattice;
 use heterostrain::material::Bilayer;
 use heterostrain::strain::{FixedBranch, StrainConvention, StrainError, TwistStrain};
 use nalgebra::{Matrix2, Matrix4, Vector2};
@@ -20,7 +20,7 @@ pub struct DomainCell {
     /// Its middle, nm.
     pub centre: Vector2<f64>,
     /// Primitive vectors of the moiré here, 60° apart, nm.
-    pub lattice: LatticeVectors,
+    pub lattice: Lattice,
     /// Twist and strain; `None` if no layers explain the triangle.
     pub twist_strain: Option<TwistStrain>,
 }
@@ -98,10 +98,7 @@ impl DomainMap {
         }
         let sum: Matrix2<f64> = cells.iter().map(|c| c.lattice.basis).sum();
         let mean = sum / cells.len() as f64;
-        let exact = LatticeVectors {
-            basis: mean,
-            covariance: Matrix4::zeros(),
-        };
+        let exact = Lattice::new(mean, Matrix4::zeros());
         let branch = match FixedBranch::of(&exact, bilayer, convention) {
             Ok(branch) => branch,
             Err(why) => return Some(Err(why)),
@@ -136,7 +133,7 @@ fn cell(
     corners: &[Vector2<f64>; 3],
     errors: &[Matrix2<f64>; 3],
     steps: &[[i32; 2]; 3],
-) -> Option<LatticeVectors> {
+) -> Option<Lattice> {
     let [s, t] = [0, 1].map(|i| Vector2::from(steps[i].map(f64::from)));
     let inverse = Matrix2::from_columns(&[s, t]).try_inverse()?;
     let edges = Matrix2::from_columns(&[corners[1] - corners[0], corners[2] - corners[1]]);
@@ -149,8 +146,5 @@ fn cell(
             covariance[(a, b)] += w[a / 2] * w[b / 2] * error[(a % 2, b % 2)];
         }
     }
-    Some(LatticeVectors {
-        basis: edges * inverse,
-        covariance,
-    })
+    Some(Lattice::new(edges * inverse, covariance))
 }

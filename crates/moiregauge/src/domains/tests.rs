@@ -1,4 +1,4 @@
-use heterostrain::lattice::LatticeVectors;
+use heterostrain::lattice::Lattice;
 use heterostrain::material::Material;
 use heterostrain::strain::{StrainConvention, moire_lattice, twist_strain};
 use nalgebra::{Matrix2, Matrix4, Vector2};
@@ -214,10 +214,7 @@ fn triangles_have_the_twist_of_their_nodes() {
             let found = cell.twist_strain.unwrap();
             // Two true edges are lattice vectors; the general solution finds the names by itself.
             let [a, b, c] = cell.nodes.map(|n| truth[n]);
-            let exact = LatticeVectors {
-                basis: Matrix2::from_columns(&[b - a, c - a]),
-                covariance: Matrix4::identity(),
-            };
+            let exact = Lattice::new(Matrix2::from_columns(&[b - a, c - a]), Matrix4::identity());
             let exact = twist_strain(&exact, &material, convention).unwrap();
             twists.push((found.twist - exact.twist) / found.twist().sigma);
             for i in 0..2 {

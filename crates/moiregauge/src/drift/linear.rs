@@ -1,6 +1,6 @@
 //! Lattice and drift as one linear least-squares problem.
 
-use heterostrain::lattice::{LatticeVectors, both};
+use heterostrain::lattice::{Lattice, both};
 use nalgebra::{DMatrix, Matrix2, Matrix4, Matrix4x2, Matrix6, Vector2, Vector4, Vector6};
 
 use crate::drift::shares::weighted_mean;
@@ -15,7 +15,7 @@ const FLOOR: f64 = 1e-12;
 #[derive(Clone, Copy, Debug)]
 pub struct Observation {
     /// Lattice vectors in sensor coordinates, nm, all observations labelled alike.
-    pub lattice: LatticeVectors,
+    pub lattice: Lattice,
     /// Time gradient `u = J^{−T} τ`, s/nm.
     pub time_gradient: Vector2<f64>,
     /// Relative standard error of the tip speed along the fast and slow axes.
@@ -28,7 +28,7 @@ pub struct Observation {
 #[derive(Clone, Debug)]
 pub struct DriftSolution {
     /// Lattice free of drift, nm; its covariance includes that of the drift.
-    pub lattice: LatticeVectors,
+    pub lattice: Lattice,
     /// Drift velocity, nm/s.
     pub velocity: Vector2<f64>,
     /// Its covariance, (nm/s)².
@@ -80,14 +80,14 @@ impl Observation {
     }
 
     /// The lattice as it would be without the drift `velocity ± covariance`: `(I − D uᵀ) r`.
-    pub fn corrected(&self, velocity: &Vector2<f64>, covariance: &Matrix2<f64>) -> LatticeVectors {
+    pub fn corrected(&self, velocity: &Vector2<f64>, covariance: &Matrix2<f64>) -> Lattice {
         let map = Matrix2::identity() - velocity * self.time_gradient.transpose();
         let elapsed = self.elapsed();
-        LatticeVectors {
-            basis: map * self.lattice.basis,
-            covariance: both(&map) * self.lattice.covariance * both(&map).transpose()
+        Lattice::new(
+            map * self.lattice.basis,
+            both(&map) * self.lattice.covariance * both(&map).transpose()
                 + elapsed * covariance * elapsed.transpose(),
-        }
+        )
     }
 }
 
@@ -105,10 +105,10 @@ pub fn solve(observations: &[Observation]) -> Result<DriftSolution, DriftError> 
     let (x, covariance) = least_squares(observations, &weights)
         .ok_or(DriftError::Undetermined { rank, condition })?;
     let velocity = Vector2::new(x[4], x[5]);
-    let lattice = LatticeVectors {
-        basis: Matrix2::new(x[0], x[2], x[1], x[3]),
-        covariance: covariance.fixed_view::<4, 4>(0, 0).into_owned(),
-    };
+    let lattice = Lattice::new(
+        Matrix2::new(x[0], x[2], x[1], x[3]),
+        covariance.fixed_view::<4, 4>(0, 0).into_owned(),
+    );
     let chi2 = chi2(observations, &weights, &lattice.flat(), &velocity);
     Ok(DriftSolution {
         lattice,
@@ -129,7 +129,7 @@ pub fn common_lattice(
     observations: &[Observation],
     velocity: &Vector2<f64>,
     covariance: &Matrix2<f64>,
-) -> Result<(LatticeVectors, f64, usize), DriftError> {
+) -> Result<(Lattice, f64, usize), DriftError> {
     let weights = weights(observations)?;
     let (mut normal, mut right, mut lever) =
         (Matrix4::zeros(), Vector4::zeros(), Matrix4x2::zeros());
@@ -144,10 +144,10 @@ pub fn common_lattice(
         .ok_or(DriftError::Covariance { index: 0 })?;
     let flat = inverse * right;
     let lever = inverse * lever;
-    let lattice = LatticeVectors {
-        basis: Matrix2::new(flat[0], flat[2], flat[1], flat[3]),
-        covariance: inverse + lever * covariance * lever.transpose(),
-    };
+    let lattice = Lattice::new(
+        Matrix2::new(flat[0], flat[2], flat[1], flat[3]),
+        inverse + lever * covariance * lever.transpose(),
+    );
     let chi2 = chi2(observations, &weights, &flat, velocity);
     Ok((lattice, chi2, 4 * (observations.len() - 1)))
 }

@@ -12,7 +12,7 @@
 //! with `W(R) = Σ w(n) w(n+R)`. The lattice through the peaks is fitted by least squares with κ
 //! (plus the noise-with-noise term) as covariance.
 
-use heterostrain::lattice::{LatticeVectors, reciprocal};
+use heterostrain::lattice::{Lattice, Px, reciprocal};
 use nalgebra::{DMatrix, Matrix2, Matrix2xX, Matrix4, Matrix6, Vector2, Vector6};
 
 use crate::numbers::chi2::enlargement;
@@ -33,7 +33,7 @@ pub(crate) fn measure(
     spectrum: &Spectrum,
     harmonics: &Harmonics,
     start: &Matrix2<f64>,
-) -> Option<LatticeVectors> {
+) -> Option<Lattice<Px>> {
     let autocorrelation = spectrum.autocorrelation();
     let frame = Vector2::new(spectrum.image_size[0] as f64, spectrum.image_size[1] as f64);
     let mut basis = *start;
@@ -51,7 +51,7 @@ pub(crate) fn measure(
         return None;
     }
     let (basis, covariance) = fit(&unbiased, frame, Some(harmonics))?;
-    Some(LatticeVectors { basis, covariance })
+    Some(Lattice::new(basis, covariance))
 }
 
 /// Takes off what the frame does to the peaks: the same peaks are measured on the model image,

@@ -5,8 +5,8 @@
 //! Cramér–Rao bound for one cosine where w = 1). The three are fitted with `K₃ = K₂ − K₁` and turned
 //! into real-space vectors by the full 2×2 inverse.
 
-use heterostrain::lattice::{LatticeVectors, real_from_reciprocal};
-use nalgebra::{Matrix2, Matrix4, Vector2};
+use heterostrain::lattice::{Lattice, Px, Waves};
+use nalgebra::{Matrix2, Vector2};
 
 use crate::spectrum::harmonics::{Harmonic, Harmonics};
 use crate::spectrum::transform::hann;
@@ -16,8 +16,8 @@ pub(crate) fn measure(
     harmonics: &Harmonics,
     peaks: &[Vector2<f64>; 3],
     size: [usize; 2],
-) -> Option<LatticeVectors> {
-    real_from_reciprocal(&reciprocal_lattice(harmonics, peaks, size)?)
+) -> Option<Lattice<Px>> {
+    reciprocal_lattice(harmonics, peaks, size)?.lattice()
 }
 
 /// The published shortcut `λ = 4π/(√3 |K|)`, right only for undistorted hexagons, for comparison;
@@ -36,7 +36,7 @@ fn reciprocal_lattice(
     harmonics: &Harmonics,
     peaks: &[Vector2<f64>; 3],
     size: [usize; 2],
-) -> Option<LatticeVectors> {
+) -> Option<Waves<Px>> {
     let moments = size.map(|n| {
         let w = hann(n);
         let c = (n as f64 - 1.0) / 2.0;
@@ -60,10 +60,7 @@ fn reciprocal_lattice(
         h.noise[axis] * m[3] * o[2] / (2.0 * h.amplitude.norm_sqr() * (m[1] * o[0]).powi(2))
     };
     let rows = [[1.0, 0.0], [0.0, 1.0], [-1.0, 1.0]];
-    let mut k = LatticeVectors {
-        basis: Matrix2::zeros(),
-        covariance: Matrix4::zeros(),
-    };
+    let mut k = Waves::exact(Matrix2::zeros());
     for axis in 0..2 {
         let (mut normal, mut right) = (Matrix2::zeros(), Vector2::zeros());
         for ((harmonic, peak), row) in harmonics.list.iter().zip(peaks).zip(rows) {

@@ -1,6 +1,6 @@
 //! Image and geometry → the lattice, by any method.
 
-use heterostrain::lattice::{LatticeVectors, labelled_like, reciprocal};
+use heterostrain::lattice::{Lattice, Px, labelled_like, reciprocal};
 use nalgebra::{Matrix2, Vector2};
 
 use crate::frame::background::{Background, remove_background};
@@ -148,7 +148,7 @@ impl Start {
             ..
         } = &self.prepared;
         let pixels_per_bin = self.prepared.binning as f64;
-        let in_pixels = |l: LatticeVectors| l.mapped(&(Matrix2::identity() * pixels_per_bin));
+        let in_pixels = |l: Lattice<Px>| l.mapped(&(Matrix2::identity() * pixels_per_bin));
         let fourier = || fourier::measure(harmonics, peaks, spectrum.image_size).map(in_pixels);
         let autocorrelation =
             || autocorrelation::measure(spectrum, harmonics, start).map(in_pixels);
@@ -169,7 +169,7 @@ impl Start {
         };
         let fit = fit.map(|(_, fit)| fit);
         let pixels = pixels.ok_or(LatticeError::NoPeaks { method })?;
-        let label = |l: LatticeVectors| labelled_like(&l, &pixels.basis);
+        let label = |l: Lattice<Px>| labelled_like(&l, &pixels.basis);
         let longest = (0..3)
             .map(|i| pixels.vector(i))
             .map(|v| (v.x / self.size[0] as f64).hypot(v.y / self.size[1] as f64));
@@ -199,7 +199,7 @@ impl Start {
 }
 
 /// The lattice fitted to the pixels, in pixels.
-fn fitted(prepared: &Prepared, background: Background) -> Option<(LatticeVectors, LatticeFit)> {
+fn fitted(prepared: &Prepared, background: Background) -> Option<(Lattice<Px>, LatticeFit)> {
     let binning = prepared.binning;
     let start = &prepared.harmonics;
     let (lattice, fit) = if binning == 1 {

@@ -1,6 +1,6 @@
 //! The lattice of one image as it was measured.
 
-use heterostrain::lattice::LatticeVectors;
+use heterostrain::lattice::{Lattice, Px};
 use nalgebra::{Matrix2, Vector2};
 
 use crate::lattice::fit::fit_pixels::LatticeFit;
@@ -11,9 +11,9 @@ use crate::spectrum::phases::Phases;
 #[derive(Clone, Debug)]
 pub struct MeasuredLattice {
     /// Vectors in pixels (columns, rows).
-    pub pixels: LatticeVectors,
+    pub pixels: Lattice<Px>,
     /// What the other estimator found: autocorrelation beside Fourier, Fourier beside all others.
-    pub comparison: Option<LatticeVectors>,
+    pub comparison: Option<Lattice<Px>>,
     /// The shortcut wavelengths `4π/(√3|K|)` of the three first harmonics, nm.
     pub shortcut_wavelengths: Option<[f64; 3]>,
     /// Reciprocal pair of the harmonics behind `phases`, rad per pixel, at 60° to each other.

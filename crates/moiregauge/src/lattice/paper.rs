@@ -8,7 +8,7 @@
 //! # References
 //! Tran et al., arXiv:2406.08681.
 
-use heterostrain::lattice::{LatticeVectors, three_vectors};
+use heterostrain::lattice::{Lattice, Px, three_vectors};
 use nalgebra::{Matrix2, Matrix6, Vector2};
 
 use crate::frame::geometry::Geometry;
@@ -35,7 +35,7 @@ pub(crate) fn measure(
     image: &Image,
     geometry: &Geometry,
     start: &Matrix2<f64>,
-) -> Option<(LatticeVectors, PublishedPeaks)> {
+) -> Option<(Lattice<Px>, PublishedPeaks)> {
     let (grid, pitch) = resampled(image, geometry)?;
     let spectrum = Spectrum::unwindowed(&grid);
     let summed = spectrum.summed_autocorrelation();
@@ -78,7 +78,7 @@ pub(crate) fn measure(
             * Matrix2::from_diagonal(&sigma.component_mul(&sigma))
             * to_pixels.transpose(),
     };
-    Some((lattice.mapped(&to_pixels), peaks))
+    Some((lattice.in_pixels(&to_pixels), peaks))
 }
 
 /// The image on a regular x, y grid over its bounding box, and the pitch of that grid, nm.

@@ -9,7 +9,7 @@
 use std::borrow::Cow;
 use std::f64::consts::PI;
 
-use heterostrain::lattice::LatticeVectors;
+use heterostrain::lattice::Waves;
 use nalgebra::{Matrix2, Matrix4, Vector2, Vector3, Vector4};
 use rayon::prelude::*;
 
@@ -253,10 +253,7 @@ impl<'a> View<'a> {
             }
             let node = self.map.nodes[r * columns + c];
             let scaled = LatticeNode {
-                waves: LatticeVectors {
-                    basis: node.waves.basis * weight,
-                    covariance: node.waves.covariance * weight,
-                },
+                waves: Waves::new(node.waves.basis * weight, node.waves.covariance * weight),
                 chi2: node.chi2 * weight,
                 signal_to_noise: node.signal_to_noise * weight,
                 displacement: node.displacement * weight,
@@ -267,10 +264,10 @@ impl<'a> View<'a> {
                 None => scaled,
                 Some(sum) => LatticeNode {
                     mask: sum.mask.max(node.mask),
-                    waves: LatticeVectors {
-                        basis: sum.waves.basis + scaled.waves.basis,
-                        covariance: sum.waves.covariance + scaled.waves.covariance,
-                    },
+                    waves: Waves::new(
+                        sum.waves.basis + scaled.waves.basis,
+                        sum.waves.covariance + scaled.waves.covariance,
+                    ),
                     chi2: sum.chi2 + scaled.chi2,
                     freedom: sum.freedom.max(node.freedom),
                     signal_to_noise: sum.signal_to_noise + scaled.signal_to_noise,
@@ -319,10 +316,7 @@ fn average(views: &[View], place: Vector2<f64>) -> (LatticeNode, f64, usize) {
     });
     let node = LatticeNode {
         mask: Mask::Good,
-        waves: LatticeVectors {
-            basis: Matrix2::from_column_slice(mean.as_slice()),
-            covariance,
-        },
+        waves: Waves::new(Matrix2::from_column_slice(mean.as_slice()), covariance),
         chi2: good.iter().map(|n| n.chi2).sum(),
         freedom: good.iter().map(|n| n.freedom).sum(),
         signal_to_noise: good.iter().map(|n| n.signal_to_noise).sum(),

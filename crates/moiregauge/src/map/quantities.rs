@@ -1,7 +1,6 @@
 //! What a map shows: every quantity with its error, as planes of single-precision numbers.
 
 use heterostrain::Estimate;
-use heterostrain::lattice::real_named_alike;
 use heterostrain::strain::TwistStrain;
 use nalgebra::Vector2;
 
@@ -108,7 +107,7 @@ impl TwistStrainMap {
             out.magnitude.push(found.map(|f| f.heterostrain()));
             out.axis.push(found.and_then(|f| f.axis_lab()));
             let known = node.waves.basis.iter().all(|x| x.is_finite());
-            let real = known.then(|| real_named_alike(&node.waves)).flatten();
+            let real = known.then(|| node.waves.lattice_named_alike()).flatten();
             for (i, plane) in out.wavelengths.iter_mut().enumerate() {
                 plane.push(real.map(|l| l.wavelength(i)));
             }

@@ -3,7 +3,7 @@
 //! One linear map for all: a frame's pixels lie at `r = r₀ + (J − D τᵀ) n` on a sample that drifts with D
 //! (see [`crate::drift::linear`]), so that wave vectors are mapped by the inverse transpose; nm, rad.
 
-use heterostrain::lattice::{LatticeVectors, both, real_from_reciprocal};
+use heterostrain::lattice::{Waves, both};
 use heterostrain::material::Bilayer;
 use heterostrain::strain::{FixedBranch, StrainConvention, StrainError, TwistStrain};
 use nalgebra::{Matrix2, Matrix4, Vector2, Vector3};
@@ -67,7 +67,7 @@ pub struct LatticeNode {
     /// Whether it is to be believed.
     pub mask: Mask,
     /// q₁, q₂ as columns, rad/nm, with the covariance of (q₁x, q₁y, q₂x, q₂y); NaN where there is none.
-    pub waves: LatticeVectors,
+    pub waves: Waves,
     /// χ² of the closure of all harmonics.
     pub chi2: f64,
     /// Its degrees of freedom.
@@ -89,10 +89,7 @@ impl LatticeNode {
     pub(crate) fn nothing(mask: Mask) -> Self {
         Self {
             mask,
-            waves: LatticeVectors {
-                basis: Matrix2::repeat(f64::NAN),
-                covariance: Matrix4::repeat(f64::NAN),
-            },
+            waves: Waves::new(Matrix2::repeat(f64::NAN), Matrix4::repeat(f64::NAN)),
             chi2: f64::NAN,
             freedom: 0,
             signal_to_noise: 0.0,
@@ -137,10 +134,10 @@ impl LatticeMap {
             let (followed, covariance) = followed.unwrap_or(unknown);
             LatticeNode {
                 mask: node.mask,
-                waves: LatticeVectors {
-                    basis: dual * node.pair,
-                    covariance: of_both * node.covariance * of_both.transpose(),
-                },
+                waves: Waves::new(
+                    dual * node.pair,
+                    of_both * node.covariance * of_both.transpose(),
+                ),
                 chi2: node.chi2,
                 freedom: node.freedom,
                 signal_to_noise: node.signal_to_noise,
@@ -180,20 +177,17 @@ impl LatticeMap {
         bilayer: impl Into<Bilayer<'a>>,
         convention: StrainConvention,
     ) -> Result<Vec<Option<TwistStrain>>, StrainError> {
-        let exact = LatticeVectors {
-            basis: *reference,
-            covariance: Matrix4::zeros(),
-        };
+        let exact = Waves::exact(*reference);
         let no_area = StrainError::NoArea {
             area: reference.determinant(),
         };
-        let real = real_from_reciprocal(&exact).ok_or(no_area)?;
+        let real = exact.lattice().ok_or(no_area)?;
         let branch = FixedBranch::of(&real, bilayer, convention)?;
         let found = self.nodes.par_iter().map(|node| {
             if node.waves.basis.iter().any(|x| x.is_nan()) {
                 return None;
             }
-            branch.at(&real_from_reciprocal(&node.waves)?)
+            branch.at(&node.waves.lattice()?)
         });
         Ok(found.collect())
     }

@@ -1,6 +1,6 @@
 //! Maps against images whose phases are known, and against closed forms.
 
-use heterostrain::lattice::{LatticeVectors, real_from_reciprocal};
+use heterostrain::lattice::{Nm, Waves};
 use heterostrain::material::Material;
 use heterostrain::strain::{StrainConvention, twist_strain};
 use nalgebra::{Matrix2, Matrix4, Vector2};
@@ -312,11 +312,8 @@ fn twist_and_strain_are_those_of_the_local_lattice() {
         let at = place(&map, i);
         let position = geometry.origin + geometry.pixel_to_nm * at;
         assert!((lattices.grid.place(i) - position).norm() < 1e-9);
-        let exact = LatticeVectors {
-            basis: dual * scene.waves(at),
-            covariance: Matrix4::identity(),
-        };
-        let real = real_from_reciprocal(&exact).unwrap();
+        let exact = Waves::<Nm>::new(dual * scene.waves(at), Matrix4::identity());
+        let real = exact.lattice().unwrap();
         let truth = twist_strain(&real, &material, convention).unwrap();
         let here = found[i].unwrap();
         // What the window blurs: some 10⁻³ of the wave vectors.

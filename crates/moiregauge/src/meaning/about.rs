@@ -1,7 +1,7 @@
 //! What has to be said of the readings of a mean lattice.
 
 use heterostrain::Estimate;
-use heterostrain::lattice::LatticeVectors;
+use heterostrain::lattice::Lattice;
 use heterostrain::material::Bilayer;
 use heterostrain::strain::{StrainTensor, TwistStrain};
 
@@ -20,7 +20,7 @@ const CONTRADICTION: f64 = 0.01;
 /// What has to be said of the readings of a mean lattice.
 pub fn caveats(
     place: &str,
-    lattice: &LatticeVectors,
+    lattice: &Lattice,
     found: &TwistStrain,
     readings: &Readings,
     settings: &Settings,
@@ -78,7 +78,7 @@ fn about_different_layers(
 
 /// Near alignment the moiré knows θ² and not θ.
 fn about_alignment(
-    lattice: &LatticeVectors,
+    lattice: &Lattice,
     found: &TwistStrain,
     readings: &Readings,
     bilayer: Bilayer<'_>,
@@ -181,7 +181,7 @@ fn about_sense(tensor: &TensorReading, add: &mut impl FnMut(Doubt)) {
 /// What has to be said of the names of a lattice alone.
 pub(crate) fn name_caveats(
     place: &str,
-    lattice: &LatticeVectors,
+    lattice: &Lattice,
     strengths: &WaveStrengths,
     settings: &Settings,
 ) -> Vec<Caveat> {
@@ -194,7 +194,7 @@ pub(crate) fn name_caveats(
 
 /// Other names of the lattice: which are open, or what chose one that is not the least strained.
 fn about_names(
-    lattice: &LatticeVectors,
+    lattice: &Lattice,
     naming: Option<&Naming>,
     complete_to: f64,
     add: &mut impl FnMut(Doubt),

@@ -17,7 +17,7 @@
 //! - Model: see [`heterostrain::strain`]. An isotropic strain h changes θ at first and second order; its
 //!   variance is the mean square over a Gaussian prior, `d² + 3c²` for a change `d h/σ + c h²/σ²`.
 
-use heterostrain::lattice::LatticeVectors;
+use heterostrain::lattice::Lattice;
 use heterostrain::material::Material;
 use heterostrain::strain::{Reference, TwistStrain, twist_strain};
 use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
@@ -99,7 +99,7 @@ impl Budget {
     /// What cannot be computed (an isotropic strain that no twist goes with, a drift that is not known)
     /// is NaN, and so is the total.
     pub fn new(
-        lattice: &LatticeVectors,
+        lattice: &Lattice,
         found: &TwistStrain,
         statistical: &Statistical,
         settings: &Settings,
@@ -135,7 +135,7 @@ impl Budget {
     /// each source.
     pub(crate) fn calibration_errors(
         &self,
-        lattice: &LatticeVectors,
+        lattice: &Lattice,
         settings: &Settings,
     ) -> [Matrix4<f64>; 3] {
         [Source::Gain, Source::Mismatch, Source::Orthogonality].map(|source| {
@@ -197,7 +197,7 @@ impl Budget {
 /// What a source does to the lattice vectors, nm²; `None` for those that change only its meaning.
 fn lattice_error(
     source: Source,
-    lattice: &LatticeVectors,
+    lattice: &Lattice,
     statistical: &Statistical,
     settings: &Settings,
 ) -> Option<Matrix4<f64>> {
@@ -252,7 +252,7 @@ fn distortion(source: Source, settings: &Settings) -> Option<Matrix2<f64>> {
 /// What a source that leaves the lattice as it is does to `(θ, α, E₁, E₂)`.
 fn model_error(
     source: Source,
-    lattice: &LatticeVectors,
+    lattice: &Lattice,
     reference: Option<&Reference>,
     settings: &Settings,
 ) -> Matrix4<f64> {
@@ -331,22 +331,16 @@ fn square(v: &Vector4<f64>) -> Matrix4<f64> {
 }
 
 /// Covariance of `(θ, α, E₁, E₂)` for one of the lattice vectors, by the analytic Jacobian.
-fn through(lattice: &LatticeVectors, error: &Matrix4<f64>, settings: &Settings) -> Matrix4<f64> {
-    let lattice = LatticeVectors {
-        covariance: *error,
-        ..*lattice
-    };
+fn through(lattice: &Lattice, error: &Matrix4<f64>, settings: &Settings) -> Matrix4<f64> {
+    let lattice = Lattice::new(lattice.basis, *error);
     twist_strain(&lattice, settings.bilayer(), settings.strain_convention).map_or_else(
         |_| Matrix4::from_element(f64::NAN),
         |found| found.covariance,
     )
 }
 
-fn squared_wavelength_sigmas(lattice: &LatticeVectors, error: &Matrix4<f64>) -> [f64; 3] {
-    let lattice = LatticeVectors {
-        covariance: *error,
-        ..*lattice
-    };
+fn squared_wavelength_sigmas(lattice: &Lattice, error: &Matrix4<f64>) -> [f64; 3] {
+    let lattice: Lattice = Lattice::new(lattice.basis, *error);
     [0, 1, 2].map(|i| lattice.wavelength(i).sigma.powi(2))
 }
 

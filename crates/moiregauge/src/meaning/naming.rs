@@ -10,7 +10,7 @@
 //!
 //! Nodes and topology of domains are not used.
 
-use heterostrain::lattice::LatticeVectors;
+use heterostrain::lattice::Lattice;
 use heterostrain::strain::{LatticeName, Orientation, Solutions, solutions, strain_tensors};
 use nalgebra::{Matrix2, Vector2};
 
@@ -74,7 +74,7 @@ impl Naming {
     /// What is thought of the names of `found`, whose first is reported. `None` for layers of dissimilar lattices, whose
     /// readings under all names are of equal rank anyway.
     pub(crate) fn new(
-        lattice: &LatticeVectors,
+        lattice: &Lattice,
         found: &Solutions,
         strengths: &WaveStrengths,
         settings: &Settings,
@@ -107,7 +107,7 @@ impl Naming {
 /// The waves (rad/nm) of the name that the evidence speaks for, where that is not the least strained one; `None` where it
 /// is, or the user named the waves.
 pub(crate) fn named_waves(
-    lattice: &LatticeVectors,
+    lattice: &Lattice,
     strengths: &WaveStrengths,
     settings: &Settings,
 ) -> Option<[[f64; 2]; 2]> {
@@ -161,7 +161,7 @@ fn by_name(found: &Solutions) -> Vec<NameReading> {
 fn judge(
     names: &mut [NameReading],
     limit: f64,
-    lattice: &LatticeVectors,
+    lattice: &Lattice,
     strengths: &WaveStrengths,
     settings: &Settings,
 ) {
@@ -208,7 +208,7 @@ struct Wave {
 /// The first shell of a name in the images; `None` without any, and for layers that are not hexagonal.
 fn first_shell(
     name: LatticeName,
-    lattice: &LatticeVectors,
+    lattice: &Lattice,
     strengths: &WaveStrengths,
     settings: &Settings,
 ) -> Option<[Wave; 3]> {
@@ -247,11 +247,7 @@ fn beats(strong: &[Wave; 3], other: &[Wave; 3]) -> bool {
 
 /// How many σ of noise, orientation and likely isotropic strain the mean strain of a name is off what uniaxial strain makes;
 /// `None` without an orientation.
-fn off_orientation(
-    name: LatticeName,
-    lattice: &LatticeVectors,
-    settings: &Settings,
-) -> Option<f64> {
+fn off_orientation(name: LatticeName, lattice: &Lattice, settings: &Settings) -> Option<f64> {
     let mut bilayer = settings.bilayer();
     bilayer.waves = name.waves(&lattice.basis);
     let orientation = Orientation::of(&known_orientation(settings)?, bilayer);

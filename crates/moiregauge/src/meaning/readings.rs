@@ -3,7 +3,7 @@
 //!
 //! In: a lattice (nm) with its covariance, the settings. Out: rad, no dimension.
 
-use heterostrain::lattice::LatticeVectors;
+use heterostrain::lattice::Lattice;
 use heterostrain::strain::{Branch, Degeneracy, TwistStrain, degeneracy, solutions};
 
 use crate::meaning::budget::Budget;
@@ -33,7 +33,7 @@ pub struct Readings {
 impl Readings {
     /// Everything that the lattice of `found` can mean; `strengths` are those of its waves in the images.
     pub fn new(
-        lattice: &LatticeVectors,
+        lattice: &Lattice,
         found: &TwistStrain,
         budget: &Budget,
         strengths: &WaveStrengths,
@@ -74,11 +74,7 @@ pub(crate) struct AllNames {
 }
 
 impl AllNames {
-    pub(crate) fn new(
-        lattice: &LatticeVectors,
-        strengths: &WaveStrengths,
-        settings: &Settings,
-    ) -> Self {
+    pub(crate) fn new(lattice: &Lattice, strengths: &WaveStrengths, settings: &Settings) -> Self {
         let bilayer = settings.bilayer();
         let Ok(all) = solutions(lattice, bilayer, settings.strain_convention) else {
             return Self {

@@ -6,7 +6,7 @@
 
 use std::f64::consts::FRAC_PI_6;
 
-use heterostrain::lattice::LatticeVectors;
+use heterostrain::lattice::Lattice;
 use heterostrain::material::{Bilayer, Material};
 use heterostrain::strain::{KnownOrientation, Orientation, StrainTensor, strain_tensors};
 use nalgebra::{Matrix5, Vector5};
@@ -66,11 +66,7 @@ pub(crate) fn known_orientation(settings: &Settings) -> Option<KnownOrientation>
 
 impl TensorReading {
     /// `None` without an orientation, and where it goes with no reading.
-    pub(crate) fn new(
-        lattice: &LatticeVectors,
-        budget: &Budget,
-        settings: &Settings,
-    ) -> Option<Self> {
+    pub(crate) fn new(lattice: &Lattice, budget: &Budget, settings: &Settings) -> Option<Self> {
         let bilayer = settings.bilayer();
         let orientation = Orientation::of(&known_orientation(settings)?, bilayer);
         let all = strain_tensors(lattice, bilayer, &orientation).ok()?;
@@ -169,7 +165,7 @@ fn with_other_layer(
 /// The covariance of a reading with calibration and lattice constants as well.
 fn known(
     best: &StrainTensor,
-    lattice: &LatticeVectors,
+    lattice: &Lattice,
     orientation: &Orientation,
     budget: &Budget,
     settings: &Settings,
@@ -180,7 +176,7 @@ fn known(
         sigma: 0.0,
         ..*orientation
     };
-    let near = |lattice: &LatticeVectors, bilayer: Bilayer<'_>| {
+    let near = |lattice: &Lattice, bilayer: Bilayer<'_>| {
         let all = strain_tensors(lattice, bilayer, &exact).ok()?;
         let distance = |t: &StrainTensor| (t.twist - best.twist).abs();
         all.into_iter()
@@ -188,10 +184,7 @@ fn known(
     };
     let mut known = best.covariance;
     for error in budget.calibration_errors(lattice, settings) {
-        let with = LatticeVectors {
-            covariance: error,
-            ..*lattice
-        };
+        let with = Lattice::new(lattice.basis, error);
         known += near(&with, bilayer)?.covariance;
     }
     for changed in constants(bilayer) {
@@ -214,11 +207,7 @@ fn known(
 }
 
 /// The mean strain for an orientation 30° off.
-fn other_vector(
-    lattice: &LatticeVectors,
-    bilayer: Bilayer<'_>,
-    orientation: &Orientation,
-) -> Option<f64> {
+fn other_vector(lattice: &Lattice, bilayer: Bilayer<'_>, orientation: &Orientation) -> Option<f64> {
     let material = if orientation.of_reference {
         bilayer.reference
     } else {

@@ -14,7 +14,7 @@
 //! # References
 //! Rife and Boorstyn, Bell Syst. Tech. J. 55, 1389 (1976), for one wave.
 
-use heterostrain::lattice::{LatticeVectors, real_from_reciprocal, reciprocal};
+use heterostrain::lattice::{Waves, reciprocal};
 use heterostrain::strain::twist_strain;
 use nalgebra::{Matrix2, Matrix4, Vector2};
 
@@ -46,7 +46,7 @@ pub fn cramer_rao(simulator: &Simulator, time_sigma: f64, linked: bool) -> Optio
     let settings = simulator.settings();
     let (sightings, pair, drift) = ideal_sightings(simulator, linked, false)?;
     let found = fit(&sightings, (&pair, &drift), time_sigma)?;
-    let lattice = real_from_reciprocal(&found.waves)?;
+    let lattice = found.waves.lattice()?;
     let sample = &settings.sample;
     let strain = twist_strain(&lattice, sample.bilayer(), sample.strain_convention).ok()?;
     let root = |variance: f64| variance.max(0.0).sqrt();
@@ -163,10 +163,7 @@ fn ideal(
         scan: 0,
         class,
         block: 0,
-        waves: LatticeVectors {
-            basis: map * pair,
-            covariance: information.try_inverse()?,
-        },
+        waves: Waves::new(map * pair, information.try_inverse()?),
         sensor: Matrix4::zeros(),
         time_gradient: u,
         fast_gain: Matrix2::zeros(),

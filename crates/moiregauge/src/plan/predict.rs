@@ -10,7 +10,7 @@
 //!
 //! Left out: drift that changes, and positions that are less stable than their sensors say.
 
-use heterostrain::lattice::{LatticeVectors, real_from_reciprocal};
+use heterostrain::lattice::{Lattice, Waves};
 use heterostrain::strain::twist_strain;
 use nalgebra::{Matrix2, Matrix4};
 
@@ -164,10 +164,7 @@ fn at_one_orientation(sets: &[Simulation], settings: &Settings) -> Option<Predic
             sightings.push(Sighting {
                 scan: image.scan + scan,
                 class: image.class + class,
-                waves: LatticeVectors {
-                    covariance: image.waves.covariance + sensor,
-                    ..image.waves
-                },
+                waves: Waves::new(image.waves.basis, image.waves.covariance + sensor),
                 sensor,
                 ..image
             });
@@ -203,13 +200,8 @@ fn at_one_orientation(sets: &[Simulation], settings: &Settings) -> Option<Predic
 }
 
 /// The lattice of a fit in real space, and where its covariance comes from.
-fn real(fit: &JointFit) -> Option<(LatticeVectors, Statistical)> {
-    let with = |covariance| {
-        real_from_reciprocal(&LatticeVectors {
-            covariance,
-            ..fit.waves
-        })
-    };
+fn real(fit: &JointFit) -> Option<(Lattice, Statistical)> {
+    let with = |covariance| Waves::new(fit.waves.basis, covariance).lattice();
     let parts = fit.statistical()?;
     let statistical = Statistical {
         image: with(parts.image)?.covariance,

@@ -1,4 +1,4 @@
-use heterostrain::lattice::LatticeVectors;
+use heterostrain::lattice::{Nm, Waves};
 use heterostrain::material::Material;
 use heterostrain::strain::StrainConvention;
 use nalgebra::{Matrix2, Matrix4, Vector2};
@@ -314,11 +314,8 @@ fn simulated(seed: u64, amplitudes: [f64; 3]) -> (TwistStrainMap, f64) {
 
 /// The twist of layers whose moiré has these wave vectors, rad per pixel of 0.5 nm.
 fn exact_twist(pair: &Matrix2<f64>) -> f64 {
-    let exact = LatticeVectors {
-        basis: pair * 2.0,
-        covariance: Matrix4::zeros(),
-    };
-    let real = heterostrain::lattice::real_from_reciprocal(&exact).unwrap();
+    let exact = Waves::<Nm>::new(pair * 2.0, Matrix4::zeros());
+    let real = exact.lattice().unwrap();
     let convention = StrainConvention::RealSpace;
     let found = heterostrain::strain::twist_strain(&real, &Material::graphene(), convention);
     found.unwrap().twist

@@ -60,8 +60,7 @@ pub(crate) fn lines_disagree(
     let first = first.in_sensor_coordinates();
     let second = labelled_like(&second.in_sensor_coordinates(), &first.basis);
     let share = (second.basis - first.basis).norm() / first.basis.norm();
-    let lengths =
-        |l: &heterostrain::lattice::LatticeVectors| [0, 1, 2].map(|i| l.wavelength(i).value);
+    let lengths = |l: &heterostrain::lattice::Lattice| [0, 1, 2].map(|i| l.wavelength(i).value);
     let (trace, retrace) = (lengths(&first), lengths(&second));
     if share > ANOTHER_LATTICE {
         let difference = LineDifference::OtherLattices { trace, retrace };

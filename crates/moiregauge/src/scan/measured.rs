@@ -1,7 +1,7 @@
 //! One scan once it is measured: a few numbers, and no pixels.
 
 use heterostrain::Estimate;
-use heterostrain::lattice::{LatticeVectors, block, labelled_like};
+use heterostrain::lattice::{Lattice, block, labelled_like};
 use nalgebra::{Matrix2, Vector2};
 use spmfile::{DateTime, FrameDirection, LineDirection};
 
@@ -69,28 +69,28 @@ pub struct MeasuredLine {
 
 impl MeasuredLine {
     /// The lattice in sensor coordinates, nm, with the error of the plane fit.
-    pub fn in_sensor_coordinates(&self) -> LatticeVectors {
-        let mut mapped = self.lattice.pixels.mapped(&self.geometry.pixel_to_nm);
+    pub fn in_sensor_coordinates(&self) -> Lattice {
+        let mut mapped = self.lattice.pixels.in_nm(&self.geometry.pixel_to_nm);
         mapped.covariance += self.sensor_part().covariance;
         mapped
     }
 
     /// The same with the error of the plane fit alone.
-    pub(crate) fn sensor_part(&self) -> LatticeVectors {
+    pub(crate) fn sensor_part(&self) -> Lattice {
         // r_i = J a_i, so δr_i = (a_ix I, a_iy I) δ(J₁₁, J₂₁, J₁₂, J₂₂).
         let b = &self.lattice.pixels.basis;
         let i = Matrix2::identity();
         let lever = block(&(i * b.m11), &(i * b.m21), &(i * b.m12), &(i * b.m22));
-        LatticeVectors {
-            basis: self.geometry.pixel_to_nm * b,
-            covariance: lever * self.geometry.covariance * lever.transpose(),
-        }
+        Lattice::new(
+            self.geometry.pixel_to_nm * b,
+            lever * self.geometry.covariance * lever.transpose(),
+        )
     }
 
     /// The lattice in nominal coordinates, nm.
-    pub fn in_nominal_coordinates(&self) -> Option<LatticeVectors> {
+    pub fn in_nominal_coordinates(&self) -> Option<Lattice> {
         let nominal = self.nominal.as_ref()?;
-        Some(self.lattice.pixels.mapped(&nominal.pixel_to_nm))
+        Some(self.lattice.pixels.in_nm(&nominal.pixel_to_nm))
     }
 
     /// What the drift problem needs, labelled like `reference` (nm); no time gradient without timing.

@@ -1,6 +1,6 @@
 //! Which of several moirés is which: in trace and retrace of a scan, and from scan to scan.
 
-use heterostrain::lattice::{LatticeVectors, labelled_like};
+use heterostrain::lattice::{Lattice, labelled_like};
 use nalgebra::Matrix2;
 
 use crate::scan::measured::{MeasuredLine, MeasuredScan};
@@ -10,7 +10,7 @@ use crate::scan::measured::{MeasuredLine, MeasuredScan};
 ///
 /// A moiré is the same in two scans if its lattice is nearest; drift changes lattices by a per cent or less.
 pub fn sorted_moires(scans: Vec<Vec<MeasuredScan>>) -> Vec<Vec<MeasuredScan>> {
-    let first: Vec<LatticeVectors> = match scans.first() {
+    let first: Vec<Lattice> = match scans.first() {
         Some(scan) => scan.iter().filter_map(lattice).collect(),
         None => return Vec::new(),
     };
@@ -25,15 +25,15 @@ pub fn sorted_moires(scans: Vec<Vec<MeasuredScan>>) -> Vec<Vec<MeasuredScan>> {
 }
 
 /// Lattice of the first line of a scan, nm.
-fn lattice(scan: &MeasuredScan) -> Option<LatticeVectors> {
+fn lattice(scan: &MeasuredScan) -> Option<Lattice> {
     scan.lines.first().map(MeasuredLine::in_sensor_coordinates)
 }
 
 /// The `found` in the order of the `wanted` lattices to which they are nearest.
 pub(crate) fn in_order<T>(
-    wanted: &[LatticeVectors],
+    wanted: &[Lattice],
     found: Vec<T>,
-    lattice: impl Fn(&T) -> Option<LatticeVectors>,
+    lattice: impl Fn(&T) -> Option<Lattice>,
 ) -> Vec<T> {
     let mut found: Vec<Option<T>> = found.into_iter().map(Some).collect();
     let mut sorted = Vec::new();

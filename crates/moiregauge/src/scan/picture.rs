@@ -1,6 +1,6 @@
 //! Images to be shown beside the numbers.
 
-use heterostrain::lattice::LatticeVectors;
+use heterostrain::lattice::{Lattice, Px};
 use nalgebra::{Matrix2, Vector2};
 use spmfile::LineDirection;
 
@@ -30,7 +30,7 @@ pub struct Illustration {
     /// Step of `spectrum` along columns and rows, cycles per pixel.
     pub spectrum_step: [f64; 2],
     /// The measured lattice in pixels.
-    pub lattice: LatticeVectors,
+    pub lattice: Lattice<Px>,
     /// The sensor of the fast axis along the middle line: column, measured nm, fitted nm.
     pub sensor_line: Vec<[f64; 3]>,
     /// Fast tip velocity of every line, nm/s.

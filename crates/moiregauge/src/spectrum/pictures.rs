@@ -1,6 +1,6 @@
 //! Autocorrelation and spectrum as images, for figures.
 
-use heterostrain::lattice::{LatticeVectors, reciprocal};
+use heterostrain::lattice::{Lattice, Px, reciprocal};
 
 use crate::frame::image::Image;
 use crate::spectrum::transform::Spectrum;
@@ -15,7 +15,7 @@ const FREQUENCIES: f64 = 3.2;
 ///
 /// `image` has its background removed. Both pictures have odd sides and their zero in the middle, at
 /// (rows/2, columns/2).
-pub(crate) fn pictures(image: &Image, lattice: &LatticeVectors) -> (Image, Image, [f64; 2]) {
+pub(crate) fn pictures(image: &Image, lattice: &Lattice<Px>) -> (Image, Image, [f64; 2]) {
     let spectrum = Spectrum::new(image);
     let autocorrelation = spectrum.autocorrelation();
     let longest = (0..3).map(|i| lattice.vector(i).norm()).fold(0.0, f64::max);

@@ -7,11 +7,9 @@
 use std::f64::consts::TAU;
 use std::ops::Range;
 
-use heterostrain::lattice::{
-    LatticeVectors, canonical, labelled_like, real_from_reciprocal, reciprocal,
-};
+use heterostrain::lattice::{Lattice, Nm, Px, Waves, canonical, labelled_like, reciprocal};
 use heterostrain::strain::StrainError;
-use nalgebra::{Matrix2, Matrix4, Vector2};
+use nalgebra::{Matrix2, Vector2};
 
 use crate::caveat::Caveat;
 use crate::domains::cells::DomainMap;
@@ -106,11 +104,7 @@ fn name(
     placed: &Geometry,
     settings: &mut Settings,
 ) -> Vec<Caveat> {
-    let exact = LatticeVectors {
-        basis: *whole,
-        covariance: Matrix4::zeros(),
-    };
-    let Some(real) = real_from_reciprocal(&exact) else {
+    let Some(real) = Waves::exact(*whole).lattice() else {
         return Vec::new();
     };
     let mut strengths = WaveStrengths::new(&real.basis);
@@ -132,10 +126,7 @@ fn block(
 
 /// The wave vectors (rad/pixel) of the lattice whose vectors have the names that an analysis would give them.
 fn named(waves: &Matrix2<f64>, pixel_to_nm: &Matrix2<f64>) -> Option<Matrix2<f64>> {
-    let real = LatticeVectors {
-        basis: pixel_to_nm * reciprocal(waves)?,
-        covariance: Matrix4::zeros(),
-    };
+    let real = Lattice::<Nm>::exact(pixel_to_nm * reciprocal(waves)?);
     reciprocal(&(pixel_to_nm.try_inverse()? * canonical(&real).basis))
 }
 
@@ -173,10 +164,7 @@ impl SurveyPlan {
         let pair = match first {
             Some(first) => {
                 let back = dual.try_inverse().ok_or(SurveyError::NoMap)?;
-                let exact = LatticeVectors {
-                    basis: found.reciprocal,
-                    covariance: Matrix4::zeros(),
-                };
+                let exact = Waves::<Px>::exact(found.reciprocal);
                 labelled_like(&exact, &(back * first.whole)).basis
             }
             None => named(&found.reciprocal, &placed.pixel_to_nm).ok_or(SurveyError::NoMap)?,

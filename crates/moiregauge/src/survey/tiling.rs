@@ -1,7 +1,7 @@
 //! Maps by tiles: the lattice fit of whole images on overlapping tiles. Slower and coarser than demodulation,
 //! and another way to the same numbers.
 
-use heterostrain::lattice::{LatticeVectors, both, labelled_like, real_from_reciprocal};
+use heterostrain::lattice::labelled_like;
 use nalgebra::{Matrix2, Vector2};
 use rayon::prelude::*;
 
@@ -78,7 +78,7 @@ fn node(
     let Ok(found) = measure(tile, geometry, settings.background, Method::Lattice) else {
         return nothing;
     };
-    let Some(waves) = real_from_reciprocal(&found.pixels) else {
+    let Some(waves) = found.pixels.waves() else {
         return nothing;
     };
     let waves = labelled_like(&waves, &reference.pair);
@@ -88,10 +88,7 @@ fn node(
     }
     LatticeNode {
         mask: Mask::Good,
-        waves: LatticeVectors {
-            basis: dual * waves.basis,
-            covariance: both(dual) * waves.covariance * both(dual).transpose(),
-        },
+        waves: waves.in_nm(dual),
         signal_to_noise: found.signal_to_noise.powi(2),
         ..nothing
     }

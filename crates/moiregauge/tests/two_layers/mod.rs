@@ -2,7 +2,7 @@
 
 #![allow(dead_code, reason = "each user takes what it needs")]
 
-use heterostrain::lattice::LatticeVectors;
+use heterostrain::lattice::Lattice;
 use heterostrain::material::Material;
 use heterostrain::strain::StrainConvention;
 use heterostrain::strain::twist_strain;
@@ -19,11 +19,8 @@ pub(crate) fn graphene() -> Material {
 }
 
 /// Vectors without error.
-pub(crate) fn exact(basis: Matrix2<f64>) -> LatticeVectors {
-    LatticeVectors {
-        basis,
-        covariance: Matrix4::zeros(),
-    }
+pub(crate) fn exact(basis: Matrix2<f64>) -> Lattice {
+    Lattice::new(basis, Matrix4::zeros())
 }
 
 /// A covariance without any symmetry, nm²; standard errors are about `size`.
@@ -49,14 +46,14 @@ pub(crate) fn lattice(
     axis: f64,
     angle: f64,
     form: StrainConvention,
-) -> LatticeVectors {
-    LatticeVectors {
-        basis: moire_lattice(twist, strain, axis, angle, &graphene(), form).unwrap(),
-        covariance: some_covariance(0.01),
-    }
+) -> Lattice {
+    Lattice::new(
+        moire_lattice(twist, strain, axis, angle, &graphene(), form).unwrap(),
+        some_covariance(0.01),
+    )
 }
 
 /// What a moiré of twisted graphene means.
-pub(crate) fn solve(lattice: &LatticeVectors, form: StrainConvention) -> TwistStrain {
+pub(crate) fn solve(lattice: &Lattice, form: StrainConvention) -> TwistStrain {
     twist_strain(lattice, &graphene(), form).unwrap()
 }

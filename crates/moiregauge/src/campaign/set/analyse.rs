@@ -1,6 +1,6 @@
 //! One set: drift, and every scan before and after correction.
 
-use heterostrain::lattice::{LatticeVectors, real_from_reciprocal};
+use heterostrain::lattice::{Lattice, Waves};
 use heterostrain::strain::{TwistStrain, draws};
 use nalgebra::{Matrix2, Vector2};
 use rayon::prelude::*;
@@ -339,9 +339,9 @@ fn given_drift(
 
 /// Twist and strain of the common lattice, and how the scans scatter about it.
 fn set_mean(
-    ((lattice, chi2, freedom), enlargement): ((LatticeVectors, f64, usize), f64),
+    ((lattice, chi2, freedom), enlargement): ((Lattice, f64, usize), f64),
     statistical: &Statistical,
-    scans: impl Iterator<Item = (Option<TwistStrain>, LatticeVectors)>,
+    scans: impl Iterator<Item = (Option<TwistStrain>, Lattice)>,
     settings: &Settings,
     strengths: &WaveStrengths,
 ) -> Option<SetMean> {
@@ -379,15 +379,15 @@ fn set_mean(
 /// drift estimate.
 fn forward_backward(scans: &[&ScanAnalysis], settings: &Settings) -> Option<TwistStrain> {
     let mean = |direction: FrameDirection| {
-        let reciprocal: Vec<LatticeVectors> = scans
+        let reciprocal: Vec<Waves> = scans
             .iter()
             .filter(|s| s.frame_direction == Some(direction))
-            .filter_map(|s| real_from_reciprocal(&s.sensor))
+            .filter_map(|s| s.sensor.waves())
             .collect();
         plain_mean(&reciprocal)
     };
     let both = [mean(FrameDirection::Up)?, mean(FrameDirection::Down)?];
-    let lattice = real_from_reciprocal(&plain_mean(&both)?)?;
+    let lattice = plain_mean(&both)?.lattice()?;
     // Back and forth turns the labelling by 60°, which twist and strain do not see.
     moire(&lattice, settings)
 }

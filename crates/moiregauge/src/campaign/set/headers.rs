@@ -5,7 +5,7 @@
 //! the wave vectors tell; the phases, timed by dates, tell the true one. The joint fit is tried with such headers: where
 //! the scans fit together far better, a header says something else than the images. Dates tell of line rates, too.
 
-use heterostrain::lattice::{LatticeVectors, labelled_like, real_from_reciprocal, reciprocal};
+use heterostrain::lattice::{Lattice, labelled_like, reciprocal};
 use nalgebra::{Matrix2, Vector2};
 use spmfile::FrameDirection;
 
@@ -48,7 +48,7 @@ pub(crate) fn about_headers(
     name: &str,
     scans: &[&MeasuredScan],
     reference: &Matrix2<f64>,
-    lattice: &LatticeVectors,
+    lattice: &Lattice,
     velocity: &Vector2<f64>,
     found: &JointFit,
     settings: &Settings,
@@ -57,7 +57,7 @@ pub(crate) fn about_headers(
     if !linkable(found) || is_clean(found) {
         return None;
     }
-    let waves = labelled_like(&real_from_reciprocal(lattice)?, &reciprocal(reference)?);
+    let waves = labelled_like(&lattice.waves()?, &reciprocal(reference)?);
     let mut tried: Vec<(&str, Option<JointFit>)> = Vec::new();
     for (factor, words) in OTHERS {
         let mut other = seen.clone();

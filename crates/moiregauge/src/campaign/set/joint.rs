@@ -1,6 +1,6 @@
 //! The joint fit of the scans of a set, and which of them do not fit.
 
-use heterostrain::lattice::{LatticeVectors, labelled_like, real_from_reciprocal, reciprocal};
+use heterostrain::lattice::{Lattice, Waves, labelled_like, reciprocal};
 use heterostrain::strain::twist_strain;
 use nalgebra::{Matrix2, Vector2};
 use spmfile::FrameDirection;
@@ -62,11 +62,11 @@ pub(crate) fn jointly(
 pub(crate) fn joint_fit(
     scans: &[&MeasuredScan],
     reference: &Matrix2<f64>,
-    (lattice, velocity): (&LatticeVectors, &Vector2<f64>),
+    (lattice, velocity): (&Lattice, &Vector2<f64>),
     settings: &Settings,
 ) -> Option<JointFit> {
     let sightings = sightings(scans, reference)?;
-    let waves = labelled_like(&real_from_reciprocal(lattice)?, &reciprocal(reference)?);
+    let waves = labelled_like(&lattice.waves()?, &reciprocal(reference)?);
     let start = (&waves.basis, velocity);
     fit(&sightings, start, settings.frame_time_sigma_s)
 }
@@ -75,13 +75,10 @@ pub(crate) fn joint_fit(
 pub(crate) fn lattice_of(
     fit: &JointFit,
     reference: &Matrix2<f64>,
-) -> Option<(LatticeVectors, Statistical)> {
+) -> Option<(Lattice, Statistical)> {
     let real = |covariance| {
-        let waves = LatticeVectors {
-            covariance,
-            ..fit.waves
-        };
-        Some(labelled_like(&real_from_reciprocal(&waves)?, reference))
+        let waves = Waves::new(fit.waves.basis, covariance);
+        Some(labelled_like(&waves.lattice()?, reference))
     };
     let parts = fit.statistical()?;
     let statistical = Statistical {
@@ -222,11 +219,8 @@ fn scatter(
     let strains: Vec<_> = all
         .iter()
         .filter_map(|one| {
-            let waves = LatticeVectors {
-                basis: one.waves,
-                covariance: fit.waves.covariance,
-            };
-            let lattice = real_from_reciprocal(&waves)?;
+            let waves = Waves::new(one.waves, fit.waves.covariance);
+            let lattice = waves.lattice()?;
             twist_strain(&lattice, settings.bilayer(), settings.strain_convention).ok()
         })
         .collect();

@@ -7,7 +7,7 @@
 
 use std::f64::consts::FRAC_PI_6;
 
-use heterostrain::lattice::LatticeVectors;
+use heterostrain::lattice::Lattice;
 use heterostrain::material::{Bilayer, Material};
 use heterostrain::strain::{TwistStrain, twist_strain};
 use nalgebra::Matrix4;
@@ -28,7 +28,7 @@ const SURFACE: f64 = 0.04;
 const SHORT: f64 = 1.5;
 
 /// Twist and strain of a lattice that can be a moiré; `None` where it cannot.
-pub(crate) fn moire(lattice: &LatticeVectors, settings: &Settings) -> Option<TwistStrain> {
+pub(crate) fn moire(lattice: &Lattice, settings: &Settings) -> Option<TwistStrain> {
     twist_strain(lattice, settings.bilayer(), settings.strain_convention)
         .ok()
         .filter(|found| is_below_30_degrees(found, settings))
@@ -42,7 +42,7 @@ fn is_below_30_degrees(found: &TwistStrain, settings: &Settings) -> bool {
 }
 
 /// A common lattice with its χ² and degrees of freedom, and where its covariance comes from.
-type Common = (LatticeVectors, f64, usize);
+type Common = (Lattice, f64, usize);
 
 /// The same with variances enlarged by `scale`.
 pub(crate) fn enlarged(
@@ -117,7 +117,7 @@ pub(crate) fn doubts(
 }
 
 /// Mean of the three wavelengths, nm.
-fn period(lattice: &LatticeVectors) -> f64 {
+fn period(lattice: &Lattice) -> f64 {
     (0..3).map(|i| lattice.wavelength(i).value).sum::<f64>() / 3.0
 }
 
@@ -130,7 +130,7 @@ fn longest(layers: Bilayer<'_>) -> Option<f64> {
 }
 
 /// Why these layers make no such lattice.
-fn no_reading(name: &str, lattice: &LatticeVectors, settings: &Settings, why: &str) -> Caveat {
+fn no_reading(name: &str, lattice: &Lattice, settings: &Settings, why: &str) -> Caveat {
     let (measured, bilayer) = (period(lattice), settings.bilayer());
     let layers = bilayer.name();
     let impossible = match longest(bilayer).filter(|longest| measured > *longest) {
@@ -157,7 +157,7 @@ fn no_reading(name: &str, lattice: &LatticeVectors, settings: &Settings, why: &s
 }
 
 /// Asks whether a lattice is a moiré at all that has the period of a surface, or a very short one.
-fn about_period(name: &str, lattice: &LatticeVectors, settings: &Settings) -> Option<Caveat> {
+fn about_period(name: &str, lattice: &Lattice, settings: &Settings) -> Option<Caveat> {
     let (measured, assumed) = (period(lattice), settings.layers_are_assumed());
     if !assumed && measured > SHORT {
         return None;

@@ -1,7 +1,7 @@
 //! One scan of a set, before and after its drift is taken off.
 
 use heterostrain::Estimate;
-use heterostrain::lattice::{LatticeVectors, labelled_like};
+use heterostrain::lattice::{Lattice, Nm, Pair, Px, labelled_like};
 use nalgebra::{Matrix2, Matrix4, Vector2};
 
 use crate::campaign::analysis::{LineAnalysis, ScanAnalysis};
@@ -22,12 +22,12 @@ pub(crate) fn scan_analysis(
     let drift_corrected = drift
         .and_then(|(velocity, covariance)| common_lattice(seen, &velocity, &covariance).ok())
         .map(|(lattice, _, _)| lattice);
-    let nominal: Option<Vec<LatticeVectors>> = scan
+    let nominal: Option<Vec<Lattice>> = scan
         .lines
         .iter()
         .map(|l| Some(labelled_like(&l.in_nominal_coordinates()?, reference)))
         .collect();
-    let strain = |lattice: &LatticeVectors| moire(lattice, settings);
+    let strain = |lattice: &Lattice| moire(lattice, settings);
     let first = scan.lines.first()?;
     let mean = |f: &dyn Fn(&MeasuredLine) -> Estimate| {
         let all: Vec<Estimate> = scan.lines.iter().map(f).collect();
@@ -72,7 +72,7 @@ fn line_analysis(
     let comparison = line
         .lattice
         .comparison
-        .map(|pixels| labelled_like(&pixels.mapped(&line.geometry.pixel_to_nm), reference));
+        .map(|pixels| labelled_like(&pixels.in_nm(&line.geometry.pixel_to_nm), reference));
     LineAnalysis {
         line: line.line,
         pixels: labelled_pixels(line, seen),
@@ -88,7 +88,7 @@ fn line_analysis(
 }
 
 /// The vectors in pixels under the names that they have in sensor coordinates.
-fn labelled_pixels(line: &MeasuredLine, seen: &Observation) -> LatticeVectors {
+fn labelled_pixels(line: &MeasuredLine, seen: &Observation) -> Lattice<Px> {
     let pixels = &line.lattice.pixels;
     match line.geometry.pixel_to_nm.try_inverse() {
         Some(inverse) => labelled_like(pixels, &(inverse * seen.lattice.basis)),
@@ -96,11 +96,13 @@ fn labelled_pixels(line: &MeasuredLine, seen: &Observation) -> LatticeVectors {
     }
 }
 
-/// Unweighted mean of independent lattices.
-pub(crate) fn plain_mean(all: &[LatticeVectors]) -> Option<LatticeVectors> {
+/// Unweighted mean of independent lattices, or of their waves.
+pub(crate) fn plain_mean<Space>(all: &[Pair<Space, Nm>]) -> Option<Pair<Space, Nm>> {
     let n = all.len() as f64;
-    (n > 0.0).then(|| LatticeVectors {
-        basis: all.iter().map(|l| l.basis).sum::<Matrix2<f64>>() / n,
-        covariance: all.iter().map(|l| l.covariance).sum::<Matrix4<f64>>() / (n * n),
+    (n > 0.0).then(|| {
+        Pair::new(
+            all.iter().map(|l| l.basis).sum::<Matrix2<f64>>() / n,
+            all.iter().map(|l| l.covariance).sum::<Matrix4<f64>>() / (n * n),
+        )
     })
 }

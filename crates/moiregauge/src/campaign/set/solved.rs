@@ -1,6 +1,6 @@
 //! A set once its drift is known.
 
-use heterostrain::lattice::LatticeVectors;
+use heterostrain::lattice::Lattice;
 
 use crate::campaign::analysis::Drift;
 use crate::drift::shares::Statistical;
@@ -8,7 +8,7 @@ use crate::drift::shares::Statistical;
 /// The drift of a set and the lattice that goes with it.
 pub(crate) struct Solved {
     pub(crate) drift: Drift,
-    pub(crate) lattice: LatticeVectors,
+    pub(crate) lattice: Lattice,
     pub(crate) statistical: Statistical,
     pub(crate) chi2: f64,
     pub(crate) freedom: usize,

@@ -36,7 +36,7 @@ pub(crate) fn number_blocks(sightings: &mut [Sighting], waves: &Matrix2<f64>, si
 #[cfg(test)]
 mod tests {
     use super::*;
-    use heterostrain::lattice::LatticeVectors;
+
     use nalgebra::Matrix4;
 
     fn at(times: &[f64]) -> Vec<Sighting> {
@@ -44,10 +44,7 @@ mod tests {
             scan,
             class: 0,
             block: 0,
-            waves: LatticeVectors {
-                basis: Matrix2::identity(),
-                covariance: Matrix4::identity(),
-            },
+            waves: heterostrain::lattice::Waves::new(Matrix2::identity(), Matrix4::identity()),
             sensor: Matrix4::zeros(),
             time_gradient: Vector2::zeros(),
             fast_gain: Matrix2::zeros(),

@@ -1,6 +1,6 @@
 //! What one image gives to the joint fit.
 
-use heterostrain::lattice::LatticeVectors;
+use heterostrain::lattice::Waves;
 use nalgebra::{Matrix2, Matrix4, Vector2};
 
 use crate::spectrum::phases::Phases;
@@ -15,7 +15,7 @@ pub struct Sighting {
     /// Block of scans whose phases are linked; [`fit`] finds it.
     pub block: usize,
     /// Reciprocal pair as it appeared, sensor coordinates, rad/nm, all sightings labelled alike.
-    pub waves: LatticeVectors,
+    pub waves: Waves,
     /// The part of their covariance that comes from the position sensors, (rad/nm)².
     pub sensor: Matrix4<f64>,
     /// Time gradient `u`, s/nm.

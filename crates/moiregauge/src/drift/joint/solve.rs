@@ -2,7 +2,7 @@
 //! choice of terms.
 
 use heterostrain::Estimate;
-use heterostrain::lattice::LatticeVectors;
+use heterostrain::lattice::Waves;
 use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
 
 use crate::drift::joint::choose;
@@ -29,7 +29,7 @@ const WORST_CONDITION: f64 = 1e4;
 #[derive(Clone, Debug)]
 pub struct JointFit {
     /// Reciprocal pair free of drift, rad/nm.
-    pub waves: LatticeVectors,
+    pub waves: Waves,
     /// Drift velocity in the middle of the campaign, nm/s, and its covariance.
     pub velocity: Vector2<f64>,
     /// Covariance of `velocity`, (nm/s)².
@@ -232,10 +232,10 @@ impl Problem {
         let covariance = &unscaled * enlargement(chi2, degrees_of_freedom);
         let (velocity, velocity_covariance) = motion(&layout, &x, &covariance, layout.origin);
         Some(JointFit {
-            waves: LatticeVectors {
-                basis: Matrix2::new(x[0], x[2], x[1], x[3]),
-                covariance: covariance.fixed_view::<4, 4>(0, 0).into_owned(),
-            },
+            waves: Waves::new(
+                Matrix2::new(x[0], x[2], x[1], x[3]),
+                covariance.fixed_view::<4, 4>(0, 0).into_owned(),
+            ),
             velocity,
             velocity_covariance,
             acceleration: layout

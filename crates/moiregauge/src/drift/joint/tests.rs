@@ -1,6 +1,6 @@
 //! The joint fit on sightings made from the model by hand.
 
-use heterostrain::lattice::LatticeVectors;
+use heterostrain::lattice::Waves;
 use nalgebra::{Matrix2, Matrix4, Vector2};
 use rand_distr::{Distribution, StandardNormal};
 
@@ -61,10 +61,7 @@ fn sightings(
                 scan,
                 class,
                 block: 0,
-                waves: LatticeVectors {
-                    basis: map * g + noise,
-                    covariance: Matrix4::identity() * sigma * sigma,
-                },
+                waves: Waves::new(map * g + noise, Matrix4::identity() * sigma * sigma),
                 sensor: Matrix4::identity() * SENSOR_SHARE * sigma * sigma,
                 time_gradient: u,
                 fast_gain: Matrix2::new(1.0, 0.0, 0.0, 0.0),

@@ -56,10 +56,7 @@ fn observed(truth: &Matrix2<f64>, u: &Vector2<f64>, drift: &Vector2<f64>) -> Mat
 
 fn observation(basis: Matrix2<f64>, u: Vector2<f64>, sigma: f64) -> Observation {
     Observation {
-        lattice: LatticeVectors {
-            basis,
-            covariance: Matrix4::identity() * sigma * sigma,
-        },
+        lattice: Lattice::new(basis, Matrix4::identity() * sigma * sigma),
         time_gradient: u,
         speed_error: [0.0; 2],
         sensor: Matrix4::zeros(),
@@ -167,10 +164,7 @@ fn drift_error_follows_the_table() {
     let scan = |slow, rate, up| {
         let u = gradient(slow, 0.0, rate, up, true);
         Observation {
-            lattice: LatticeVectors {
-                basis: lattice(),
-                covariance: covariance * sigma * sigma,
-            },
+            lattice: Lattice::new(lattice(), covariance * sigma * sigma),
             time_gradient: u,
             speed_error: [0.0; 2],
             sensor: Matrix4::zeros(),

@@ -1,6 +1,6 @@
 //! The fit itself: Gauss–Newton on two wave vectors, harmonics added where they earn it.
 
-use heterostrain::lattice::{LatticeVectors, real_from_reciprocal};
+use heterostrain::lattice::{Lattice, Px, Waves};
 use nalgebra::{DMatrix, DVector, Matrix2, Matrix3, SMatrix, Vector2};
 use rustfft::num_complex::Complex64;
 
@@ -33,7 +33,7 @@ pub(crate) const ROUNDS: usize = 5;
 #[derive(Clone, Debug)]
 pub struct LatticeFit {
     /// The wave vectors q₁, q₂ (about 60° apart), rad per pixel along columns and rows.
-    pub wave_vectors: LatticeVectors,
+    pub wave_vectors: Waves<Px>,
     /// Where the phases hold, pixels (column, row): the centre of the frame.
     pub centre: Vector2<f64>,
     /// The harmonics, first shell first.
@@ -84,7 +84,7 @@ pub(crate) fn measure(
     image: &Image,
     start: &Harmonics,
     background: Background,
-) -> Option<(LatticeVectors, LatticeFit)> {
+) -> Option<(Lattice<Px>, LatticeFit)> {
     let mut fit = Fit::new(image, start, background)?;
     if fit.worth_a_sketch(start) && fit.sketch().is_none() {
         fit = Fit::new(image, start, background)?;
@@ -330,7 +330,7 @@ impl<'a> Fit<'a> {
         Some(covariance.fixed_view::<7, 7>(0, 0).into_owned())
     }
 
-    fn result(&self, noise: &FinalNoise) -> Option<(LatticeVectors, LatticeFit)> {
+    fn result(&self, noise: &FinalNoise) -> Option<(Lattice<Px>, LatticeFit)> {
         let scale = self.frame.edge().map(|e| 1.0 / e);
         let pixels = self.frame.pixels() as f64;
         let waves = self.model.waves.iter().zip(&self.model.basis.indices);
@@ -356,10 +356,10 @@ impl<'a> Fit<'a> {
         );
         let covariance = self.covariance(noise)?;
         let enlargement = closure.map_or(1.0, |closure| closure.enlargement());
-        let wave_vectors = LatticeVectors {
-            basis: self.model.pair,
-            covariance: covariance.fixed_view::<4, 4>(3, 3) * enlargement,
-        }
+        let wave_vectors = Waves::new(
+            self.model.pair,
+            covariance.fixed_view::<4, 4>(3, 3) * enlargement,
+        )
         .mapped(&Matrix2::from_diagonal(&scale));
         let [columns, rows] = [
             self.frame.image.columns as f64,
@@ -390,7 +390,7 @@ impl<'a> Fit<'a> {
             ),
             closure,
         };
-        Some((real_from_reciprocal(&wave_vectors)?, fit))
+        Some((wave_vectors.lattice()?, fit))
     }
 }
 

@@ -1,6 +1,5 @@
 //! Lattices that take turns.
 
-use heterostrain::lattice::real_from_reciprocal;
 use nalgebra::{DMatrix, Matrix2, Matrix3, Matrix4, SMatrix, Vector2};
 
 use crate::frame::background::{Background, remove_background};
@@ -384,7 +383,7 @@ impl Part {
         self.fit.phase_covariance = covariance;
         self.lattice.phases.covariance = covariance;
         // Same pair, same labelling: only the errors change.
-        let real = real_from_reciprocal(waves)?;
+        let real = waves.lattice()?;
         self.lattice.pixels.covariance = real.covariance;
         self.lattice.fit = Some(self.fit.clone());
         Some(())

@@ -11,14 +11,11 @@ use crate::settings::knobs::Calibration;
 const ALPHA_DEG: f64 = 37.0;
 const AXIS_DEG: f64 = 20.0;
 
-fn exact(basis: Matrix2<f64>) -> LatticeVectors {
-    LatticeVectors {
-        basis,
-        covariance: Matrix4::zeros(),
-    }
+fn exact(basis: Matrix2<f64>) -> Lattice {
+    Lattice::new(basis, Matrix4::zeros())
 }
 
-fn graphene(twist_deg: f64, strain: f64) -> LatticeVectors {
+fn graphene(twist_deg: f64, strain: f64) -> Lattice {
     let made = moire_lattice(
         twist_deg.to_radians(),
         strain,
@@ -31,7 +28,7 @@ fn graphene(twist_deg: f64, strain: f64) -> LatticeVectors {
 }
 
 /// Lattice of the moiré matrix P, `L = P⁻ᵀ A⁰` with the atomic vectors at 30° and 90°.
-fn lattice_of(p: &Matrix2<f64>) -> LatticeVectors {
+fn lattice_of(p: &Matrix2<f64>) -> Lattice {
     let (s, c) = 30_f64.to_radians().sin_cos();
     let atoms = 0.246 * Matrix2::new(c, 0.0, s, 1.0);
     exact(p.transpose().try_inverse().unwrap() * atoms)
@@ -41,11 +38,11 @@ fn turn(angle: f64) -> Matrix2<f64> {
     Rotation2::new(angle).into_inner()
 }
 
-fn inverted(lattice: &LatticeVectors) -> TwistStrain {
+fn inverted(lattice: &Lattice) -> TwistStrain {
     twist_strain(lattice, &Material::graphene(), StrainConvention::RealSpace).unwrap()
 }
 
-fn budget(lattice: &LatticeVectors, settings: &Settings) -> Budget {
+fn budget(lattice: &Lattice, settings: &Settings) -> Budget {
     let none = Matrix4::zeros();
     let statistical = Statistical::at_known_drift([none, none], 1.0, &none);
     Budget::new(lattice, &inverted(lattice), &statistical, settings)
@@ -242,10 +239,7 @@ fn statistical_parts_follow_the_closed_form() {
     let (image, sensor) = (4e-6, 1e-6);
     let seen = |signs: &[f64]| -> Vec<Observation> {
         let one = |&sign: &f64| Observation {
-            lattice: LatticeVectors {
-                basis,
-                covariance: Matrix4::identity() * (image + sensor),
-            },
+            lattice: Lattice::new(basis, Matrix4::identity() * (image + sensor)),
             time_gradient: Vector2::new(sign, 0.0),
             speed_error: [0.0; 2],
             sensor: Matrix4::identity() * sensor,
