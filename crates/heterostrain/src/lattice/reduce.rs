@@ -124,6 +124,8 @@ pub(crate) fn small_changes() -> impl Iterator<Item = Matrix2<f64>> {
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::Matrix4;
+
     use super::*;
     use crate::lattice::vectors::{Nm, Waves};
 
