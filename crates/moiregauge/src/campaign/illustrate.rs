@@ -5,13 +5,12 @@ use spmfile::{Channel, LineDirection, Scan};
 
 use crate::campaign::analysis::ScanAnalysis;
 use crate::frame::background::remove_background;
-use crate::frame::geometry::Timing;
 use crate::frame::image::Image;
 use crate::frame::sensors::SensorGeometry;
 use crate::scan::channel::{channels, choose_channel, image_of};
 use crate::scan::picture::{Companion, Illustration, Picture};
-use crate::scan::positions::{nominal, sensor_images, usable_sensors};
-use crate::scan::scanner::calibrated;
+use crate::scan::place::Place;
+use crate::scan::positions::sensor_images;
 use crate::settings::knobs::Settings;
 use crate::spectrum::pictures::pictures;
 
@@ -34,17 +33,14 @@ pub fn illustrate(
         .into_iter()
         .find(|c| c.line_direction.unwrap_or(LineDirection::Trace) == line.line)?;
     let image = remove_background(&image_of(channel), settings.background);
-    let nominal = nominal(scan, channel);
     let mut ignored = Vec::new();
-    let sensors = usable_sensors("", scan, channel, nominal.as_ref(), &mut ignored);
+    let place = Place::of("", scan, channel, settings, &mut ignored)?;
+    let sensors = place.sensors;
     let measured = sensors
         .as_ref()
         .and_then(|_| sensor_images("", scan, channel, &mut ignored));
-    let timing = analysed
-        .frame_direction
-        .and_then(|frame| Timing::of_scan(scan, channel.columns, frame, line.line));
     let velocities = |steps: &[f64], axis: usize| -> Vec<f64> {
-        let seconds = timing.map_or(f64::NAN, |t| t.per_pixel[axis].abs());
+        let seconds = place.timing.map_or(f64::NAN, |t| t.per_pixel[axis].abs());
         steps
             .iter()
             .map(|s| s / seconds)
@@ -57,7 +53,7 @@ pub fn illustrate(
     let mut origin = line.origin;
     if let (Some(sensors), Some(measured)) = (&sensors, &measured) {
         let scaled = |steps: &[f64], by: f64| steps.iter().map(|s| s * by).collect::<Vec<f64>>();
-        let (raw, now) = (&sensors.geometry, calibrated(&sensors.geometry, settings));
+        let (raw, now) = (&sensors.geometry, &place.geometry);
         let by = [
             now.fast_step().norm() / raw.fast_step().norm(),
             now.slow_step().norm() / raw.slow_step().norm(),
@@ -94,7 +90,7 @@ pub fn illustrate(
         image,
         pixel_to_nm,
         origin,
-        nominal_pixel_to_nm: nominal.map(|n| n.pixel_to_nm),
+        nominal_pixel_to_nm: place.nominal.map(|n| n.pixel_to_nm),
         autocorrelation,
         spectrum,
         spectrum_step,
@@ -157,11 +153,8 @@ pub fn picture(file: &str, scan: &Scan, settings: &Settings) -> Option<Picture> 
     let name = choose_channel(&names, settings.channel.as_deref())
         .or_else(|| choose_channel(&names, None))?;
     let channel = scan.channels.iter().find(|c| c.name == name)?;
-    let nominal = nominal(scan, channel);
-    let sensors = usable_sensors(file, scan, channel, nominal.as_ref(), &mut Vec::new());
-    let from_sensors = sensors.is_some();
-    let geometry = sensors.map(|s| s.geometry).or(nominal)?;
-    let geometry = calibrated(&geometry, settings);
+    let place = Place::of(file, scan, channel, settings, &mut Vec::new())?;
+    let geometry = place.geometry;
     let image = remove_background(&image_of(channel), settings.background);
     let block = image.columns.max(image.rows).div_ceil(MOST_PIXELS).max(1);
     // Pixels that fill no block are left out, as few as they are.
@@ -173,6 +166,6 @@ pub fn picture(file: &str, scan: &Scan, settings: &Settings) -> Option<Picture> 
         image: image.binned(block),
         pixel_to_nm: geometry.pixel_to_nm * block as f64,
         origin: geometry.origin + geometry.pixel_to_nm * middle,
-        from_sensors,
+        from_sensors: place.sensors.is_some(),
     })
 }

@@ -214,6 +214,23 @@ impl Timing {
     }
 }
 
+/// The geometry that a frame would have had on a sample at rest, `R = r − D t`.
+///
+/// `drift` D (nm/s) is the velocity of the sample; the time t counts from the middle of the frame,
+/// where nothing moves. Exact for constant drift: see [`crate::drift::linear`].
+#[must_use]
+pub fn at_rest(geometry: &Geometry, timing: &Timing, drift: Vector2<f64>) -> Geometry {
+    let centre = geometry.centre();
+    let pixel_to_nm = geometry.pixel_to_nm - drift * timing.per_pixel.transpose();
+    let [columns, rows] = geometry.size;
+    let middle = Vector2::new((columns as f64 - 1.0) / 2.0, (rows as f64 - 1.0) / 2.0);
+    Geometry {
+        pixel_to_nm,
+        origin: centre - pixel_to_nm * middle,
+        ..geometry.clone()
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -12,9 +12,10 @@ pub(crate) mod sensors;
 
 pub use axis::Axis;
 pub use background::{Background, remove_background};
+pub use geometry::at_rest;
 pub use geometry::{Geometry, Timing};
 pub use image::Image;
 pub use lag::Lag;
 pub use plane::{PlaneFit, fit_plane};
-pub use resample::{Resampled, at_rest, resample};
+pub use resample::{Resampled, resample};
 pub use sensors::{SensorGeometry, from_sensors};

@@ -16,7 +16,6 @@
 use nalgebra::{Matrix2, Vector2};
 use rayon::prelude::*;
 
-use crate::frame::geometry::{Geometry, Timing};
 use crate::frame::image::Image;
 
 /// So many times the pixels of the image a grid has at most.
@@ -40,23 +39,6 @@ impl Resampled {
     pub fn centre(&self) -> Vector2<f64> {
         let half = |count: usize| 0.5 * self.pitch * (count as f64 - 1.0);
         self.origin + Vector2::new(half(self.image.columns), half(self.image.rows))
-    }
-}
-
-/// The geometry that a frame would have had on a sample at rest, `R = r − D t`.
-///
-/// `drift` D (nm/s) is the velocity of the sample; the time t counts from the middle of the frame,
-/// where nothing moves. Exact for constant drift: see [`crate::drift::linear`].
-#[must_use]
-pub fn at_rest(geometry: &Geometry, timing: &Timing, drift: Vector2<f64>) -> Geometry {
-    let centre = geometry.centre();
-    let pixel_to_nm = geometry.pixel_to_nm - drift * timing.per_pixel.transpose();
-    let [columns, rows] = geometry.size;
-    let middle = Vector2::new((columns as f64 - 1.0) / 2.0, (rows as f64 - 1.0) / 2.0);
-    Geometry {
-        pixel_to_nm,
-        origin: centre - pixel_to_nm * middle,
-        ..geometry.clone()
     }
 }
 
@@ -108,7 +90,7 @@ pub fn resample(
 }
 
 /// The value at a place in pixels (column, row); NaN outside.
-fn at(image: &Image, place: Vector2<f64>) -> f64 {
+pub(crate) fn at(image: &Image, place: Vector2<f64>) -> f64 {
     let Some(((column, u), (row, v))) = cell(place.x, image.columns).zip(cell(place.y, image.rows))
     else {
         return f64::NAN;

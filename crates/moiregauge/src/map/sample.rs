@@ -113,7 +113,7 @@ pub struct LatticeMap {
 
 impl LatticeMap {
     /// Takes a map in pixels to the sample. `at_rest` is the geometry of the frame without drift
-    /// ([`crate::frame::resample::at_rest`]), or the geometry itself where the drift is not known.
+    /// ([`crate::frame::geometry::at_rest`]), or the geometry itself where the drift is not known.
     ///
     /// `None` where the geometry is singular.
     pub fn new(map: &WaveMap, at_rest: &Geometry) -> Option<Self> {

@@ -1,12 +1,12 @@
 //! One scan: geometry, timing and lattice of each of its lines, trace and retrace.
 
 use nalgebra::Matrix2;
-use spmfile::{Channel, FrameDirection, LineDirection, Scan};
+use spmfile::{Channel, FrameDirection, Scan};
 
 use crate::calibration::Calibration;
 use crate::caveat::Caveat;
 use crate::caveat::files::FileDoubt;
-use crate::frame::geometry::{Geometry, Timing};
+use crate::frame::geometry::Geometry;
 use crate::frame::image::Image;
 use crate::lattice::measure::{Start, measure};
 use crate::lattice::measured::MeasuredLattice;
@@ -19,8 +19,8 @@ use crate::scan::images::first_of_several;
 use crate::scan::measured::{MeasureError, MeasuredLine, MeasuredScan};
 use crate::scan::moires::in_order;
 use crate::scan::overlap::Window;
-use crate::scan::positions::{nominal, speeds, usable_sensors};
-use crate::scan::scanner::{about_calibration, calibrated};
+use crate::scan::place::Place;
+use crate::scan::scanner::about_calibration;
 use crate::scan::shared::correlation;
 use crate::settings::knobs::Settings;
 use crate::spectrum::error::LatticeError;
@@ -187,43 +187,32 @@ fn measure_line(
     (window, find): (Option<&Window>, Find),
     caveats: &mut Vec<Caveat>,
 ) -> Result<Vec<MeasuredLine>, MeasureError> {
-    let line = channel.line_direction.unwrap_or(LineDirection::Trace);
-    let nominal = nominal(scan, channel);
-    let sensors = usable_sensors(file, scan, channel, nominal.as_ref(), caveats);
-    let timing = scan
-        .frame_direction
-        .and_then(|frame| Timing::of_scan(scan, channel.columns, frame, line));
-    let geometry = match (&sensors, &nominal) {
-        (Some(sensors), _) => sensors.geometry.clone(),
-        (None, Some(nominal)) => {
-            turned(file, scan.rotation_rad, caveats);
-            nominal.clone()
-        }
-        (None, None) => return Err(MeasureError::NoSize),
-    };
-    let (speeds, speed_error) = speeds(&geometry, sensors.as_ref(), timing.as_ref());
+    let mut place =
+        Place::of(file, scan, channel, settings, caveats).ok_or(MeasureError::NoSize)?;
+    if place.sensors.is_none() {
+        turned(file, scan.rotation_rad, caveats);
+    }
+    let (speeds, speed_error) = place.speeds();
     let mut image = image_of(channel);
     let pixels = Fingerprint::of(&image);
-    let (mut geometry, mut nominal) = (geometry, nominal);
     let mut lines_after = 0;
     if let Some(window) = window {
-        let (first, size) = window.pixels(&geometry).ok_or(MeasureError::NoOverlap)?;
+        let recorded = &place.recorded;
+        let (first, size) = window.pixels(recorded).ok_or(MeasureError::NoOverlap)?;
         lines_after = match scan.frame_direction {
             Some(FrameDirection::Down) => first[1],
             _ => image.rows - first[1] - size[1],
         };
         image = image.cropped(first, size);
-        geometry = geometry.cropped(first, size);
-        nominal = nominal.map(|n| n.cropped(first, size));
+        place = place.cropped(first, size);
     }
-    let geometry = calibrated(&geometry, settings);
-    let speeds = match (&timing, &settings.scanner) {
-        (Some(timing), Some(_)) => {
-            let now = geometry.speeds(timing);
-            [0, 1].map(|i| speeds[i].scaled(now[i] / speeds[i].value))
-        }
-        _ => speeds,
-    };
+    let Place {
+        line,
+        nominal,
+        geometry,
+        timing,
+        ..
+    } = place;
     let mut lattices = find(&image, &geometry).map_err(|error| MeasureError::Lattice {
         line: line_name(line),
         channel: channel.name.clone(),

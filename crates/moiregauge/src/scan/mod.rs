@@ -9,6 +9,7 @@ pub(crate) mod measured;
 pub(crate) mod moires;
 pub(crate) mod overlap;
 pub(crate) mod picture;
+pub(crate) mod place;
 pub(crate) mod positions;
 pub(crate) mod scanner;
 pub(crate) mod shared;

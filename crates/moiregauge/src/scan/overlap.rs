@@ -5,7 +5,7 @@ use spmfile::Scan;
 
 use crate::frame::geometry::Geometry;
 use crate::scan::channel::channels;
-use crate::scan::positions::{nominal, usable_sensors};
+use crate::scan::place::Place;
 use crate::settings::knobs::Settings;
 
 /// A rectangle along the fast and slow directions of the first scan, nm.
@@ -21,12 +21,8 @@ impl Window {
     /// The window of one scan; `None` where it has no geometry.
     pub fn of(scan: &Scan, settings: &Settings) -> Option<Self> {
         let channel = *channels(scan, settings).ok()?.first()?;
-        let nominal = nominal(scan, channel);
-        let mut ignored = Vec::new();
-        let geometry = usable_sensors("", scan, channel, nominal.as_ref(), &mut ignored)
-            .map(|s| s.geometry)
-            .or(nominal)?;
-        Self::around(&geometry)
+        let place = Place::of("", scan, channel, settings, &mut Vec::new())?;
+        Self::around(&place.recorded)
     }
 
     fn around(geometry: &Geometry) -> Option<Self> {

@@ -2,22 +2,15 @@
 
 use spmfile::Scan;
 
-use crate::calibration::{Calibration, Coordinates};
+use crate::calibration::Coordinates;
 use crate::caveat::calibrating::CalibrationDoubt;
 use crate::caveat::positions::PositionDoubt;
 use crate::caveat::{Caveat, Doubt};
-use crate::frame::geometry::Geometry;
 use crate::scan::measured::MeasuredLine;
 use crate::settings::knobs::Settings;
 
 /// Sizes and line rates that differ by more than this factor are other conditions.
 const EXTRAPOLATED: f64 = 3.0;
-
-/// The geometry corrected by the calibration of the scanner, if there is one.
-pub(crate) fn calibrated(geometry: &Geometry, settings: &Settings) -> Geometry {
-    let map = settings.scanner.as_ref().and_then(Calibration::map);
-    map.map_or_else(|| geometry.clone(), |map| geometry.mapped(&map))
-}
 
 /// Whether the calibration was measured under the conditions of this scan.
 pub(crate) fn about_calibration<'a>(

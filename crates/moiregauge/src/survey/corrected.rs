@@ -4,11 +4,11 @@ use nalgebra::Vector2;
 use spmfile::{Channel, LineDirection, Samples, Scan, Span};
 
 use crate::campaign::analysis::ScanAnalysis;
-use crate::frame::geometry::{Geometry, Timing};
-use crate::frame::resample::{at_rest, resample};
+use crate::frame::geometry::Geometry;
+use crate::frame::resample::resample;
 use crate::scan::channel::{channels, image_of};
-use crate::scan::positions::{nominal, usable_sensors};
-use crate::scan::scanner::calibrated;
+use crate::scan::place::Place;
+use crate::scan::positions::nominal;
 use crate::settings::knobs::Settings;
 
 /// One corrected image as a scan of its own, and what was done with it.
@@ -53,14 +53,9 @@ fn corrected(
     drift: Option<Vector2<f64>>,
     settings: &Settings,
 ) -> Option<CorrectedImage> {
-    let line = channel.line_direction.unwrap_or(LineDirection::Trace);
-    let nominal = nominal(scan, channel);
-    let mut doubts = Vec::new();
-    let sensors = usable_sensors(file, scan, channel, nominal.as_ref(), &mut doubts);
-    let geometry = calibrated(&sensors.map(|s| s.geometry).or(nominal)?, settings);
-    let timing = scan
-        .frame_direction
-        .and_then(|frame| Timing::of_scan(scan, channel.columns, frame, line));
+    let place = Place::of(file, scan, channel, settings, &mut Vec::new())?;
+    let still = place.still(drift);
+    let geometry = place.geometry;
     let mut log = vec![format!("from {file}")];
     log.push(if geometry.from_sensors {
         "positions: planes fitted to the X and Y sensors".to_owned()
@@ -70,31 +65,28 @@ fn corrected(
     if settings.scanner.is_some() {
         log.push("corrected by the calibration of the scanner".to_owned());
     }
-    let at_rest = match (drift, timing) {
-        (Some(drift), Some(timing)) => {
+    log.push(match (drift, &still) {
+        (Some(drift), Some(_)) => {
             let [x, y] = [drift.x * 60.0, drift.y * 60.0];
-            log.push(format!(
+            format!(
                 "corrected for the drift at its time, {x} nm/min along x and {y} nm/min along y"
-            ));
-            at_rest(&geometry, &timing, drift)
+            )
         }
-        (None, _) => {
-            log.push("not corrected for drift: it is not known".to_owned());
-            geometry.clone()
-        }
+        (None, _) => "not corrected for drift: it is not known".to_owned(),
         (Some(_), None) => {
-            log.push("not corrected for drift: the times of the lines are not known".to_owned());
-            geometry.clone()
+            "not corrected for drift: the times of the lines are not known".to_owned()
         }
-    };
+    });
+    let corrected = drift.filter(|_| still.is_some());
+    let at_rest = still.unwrap_or(geometry);
     let mut out = on_grid(scan, channel, &at_rest)?;
-    out.metadata = about(&at_rest, drift.filter(|_| timing.is_some()));
+    out.metadata = about(&at_rest, corrected);
     let pitch = out.channels[0].pitch_nm()?[0];
     log.push(format!(
         "resampled by cubic convolution on a square grid along the laboratory axes, {pitch} nm"
     ));
     Some(CorrectedImage {
-        line,
+        line: place.line,
         scan: out,
         log,
     })

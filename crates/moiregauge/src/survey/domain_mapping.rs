@@ -9,7 +9,7 @@ use crate::domains::nodes::{Contrast, find_nodes};
 use crate::frame::background::remove_background;
 use crate::scan::channel::{channels, image_of};
 use crate::settings::knobs::Settings;
-use crate::survey::mapping::{Frame, drifted, frame, pitch};
+use crate::survey::mapping::{drifted, pitch, place_of};
 
 /// The domain structure of every image behind `analysed` that shows one, drift and sensors taken into account;
 /// `origin` as for [`crate::survey::mapping::map_scan`].
@@ -21,17 +21,12 @@ pub fn domains_of_scan(
 ) -> Vec<DomainMap> {
     let channels = channels(scan, settings).unwrap_or_default();
     let of_channel = |channel: &spmfile::Channel| {
-        let Frame {
-            pixels,
-            geometry,
-            still,
-            ..
-        } = frame(scan, channel, analysed, settings)?;
+        let (place, pixels) = place_of(scan, channel, analysed, settings)?;
         let image = remove_background(&image_of(channel), settings.background);
-        let found = find_nodes(&image, &pixels, pitch(&geometry), contrast)?;
+        let found = find_nodes(&image, &pixels, pitch(&place.geometry), contrast)?;
         let places: Vec<_> = found.nodes.iter().map(|n| n.place).collect();
         let mesh = Mesh::new(&places, &pixels);
-        let mut placed = still.unwrap_or(geometry);
+        let mut placed = place.still(analysed.drift).unwrap_or(place.geometry);
         placed.origin -= drifted(analysed, origin);
         let (layers, convention) = (settings.bilayer(), settings.strain_convention);
         DomainMap::new(&found, &mesh, &placed, layers, convention)?.ok()

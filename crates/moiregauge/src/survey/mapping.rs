@@ -8,13 +8,11 @@ use spmfile::{Channel, FrameDirection, LineDirection, Scan};
 
 use crate::campaign::analysis::ScanAnalysis;
 use crate::frame::background::remove_background;
-use crate::frame::geometry::{Geometry, Timing};
-use crate::frame::resample::at_rest;
+use crate::frame::geometry::Geometry;
 use crate::map::local::local_lattices;
 use crate::map::sample::LatticeMap;
 use crate::scan::channel::{channels, image_of};
-use crate::scan::positions::{nominal, usable_sensors};
-use crate::scan::scanner::calibrated;
+use crate::scan::place::Place;
 use crate::settings::knobs::Settings;
 use crate::survey::tiling::tile_map;
 use crate::window::types::{FULL_WIDTH, Reference, Resolution, ResolutionError, UsedHarmonic};
@@ -118,13 +116,9 @@ fn map_line(
     settings: &Settings,
     (method, resolution): (MapMethod, &Resolution),
 ) -> Result<LineMap, MapError> {
-    let Frame {
-        line,
-        pixels,
-        geometry,
-        timing,
-        still,
-    } = frame(scan, channel, analysed, settings).ok_or(MapError::NoImage)?;
+    let (place, pixels) = place_of(scan, channel, analysed, settings).ok_or(MapError::NoImage)?;
+    let still = place.still(analysed.drift);
+    let geometry = place.geometry;
     let reference = Reference {
         pair: reciprocal(&pixels).ok_or(MapError::NoImage)?,
         pitch: pitch(&geometry),
@@ -153,10 +147,12 @@ fn map_line(
     let dual = placed.pixel_to_nm.try_inverse().ok_or(MapError::NoImage)?;
     Ok(LineMap {
         file: analysed.file.clone(),
-        line,
+        line: place.line,
         frame_direction: analysed.frame_direction,
         drift_corrected: still.is_some(),
-        time_gradient: timing.and_then(|timing| geometry.time_gradient(&timing)),
+        time_gradient: place
+            .timing
+            .and_then(|timing| geometry.time_gradient(&timing)),
         harmonics,
         margin,
         noise_measured,
@@ -165,51 +161,17 @@ fn map_line(
     })
 }
 
-/// A channel with its lattice and its place.
-pub(crate) struct Frame {
-    pub(crate) line: LineDirection,
-    /// Lattice of the whole image, pixels.
-    pub(crate) pixels: Matrix2<f64>,
-    pub(crate) geometry: Geometry,
-    pub(crate) timing: Option<Timing>,
-    /// The geometry without drift, where the drift is known.
-    pub(crate) still: Option<Geometry>,
-}
-
-/// `None` for a channel that was not analysed or has no size.
-pub(crate) fn frame(
+/// The place of a channel and the lattice of its whole image, pixels; `None` for one that was not analysed or has no size.
+pub(crate) fn place_of(
     scan: &Scan,
     channel: &Channel,
     analysed: &ScanAnalysis,
     settings: &Settings,
-) -> Option<Frame> {
-    let line = channel.line_direction.unwrap_or(LineDirection::Trace);
-    let found = analysed.lines.iter().find(|l| l.line == line);
-    let pixels = found?.pixels.basis;
-    let nominal = nominal(scan, channel);
+) -> Option<(Place, Matrix2<f64>)> {
     // Doubts about the sensors are in the analysis already.
-    let sensors = usable_sensors(
-        &analysed.file,
-        scan,
-        channel,
-        nominal.as_ref(),
-        &mut Vec::new(),
-    );
-    let geometry = sensors.map(|s| s.geometry).or(nominal)?;
-    let geometry = calibrated(&geometry, settings);
-    let frame = analysed.frame_direction;
-    let timing = frame.and_then(|frame| Timing::of_scan(scan, channel.columns, frame, line));
-    let still = match (analysed.drift, timing) {
-        (Some(drift), Some(timing)) => Some(at_rest(&geometry, &timing, drift)),
-        _ => None,
-    };
-    Some(Frame {
-        line,
-        pixels,
-        geometry,
-        timing,
-        still,
-    })
+    let place = Place::of(&analysed.file, scan, channel, settings, &mut Vec::new())?;
+    let found = analysed.lines.iter().find(|l| l.line == place.line)?;
+    Some((place, found.pixels.basis))
 }
 
 pub(crate) fn pitch(geometry: &Geometry) -> [f64; 2] {

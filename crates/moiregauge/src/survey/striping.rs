@@ -5,13 +5,11 @@ use spmfile::{LineDirection, Scan};
 use crate::caveat::Caveat;
 use crate::caveat::patterns::PatternDoubt;
 use crate::frame::background::remove_background;
-use crate::frame::geometry::{Geometry, Timing};
+use crate::frame::geometry::Geometry;
 use crate::frame::image::Image;
-use crate::frame::resample::at_rest;
 use crate::lattice::measure::Start;
 use crate::scan::channel::{channels, image_of};
-use crate::scan::positions::{nominal, usable_sensors};
-use crate::scan::scanner::calibrated;
+use crate::scan::place::Place;
 use crate::settings::knobs::Settings;
 use crate::stripes::maps::{find_stripes, stripe_maps};
 use crate::stripes::sample::SampledStripes;
@@ -68,25 +66,16 @@ fn frames(
     let name = channels[0].name.clone();
     let mut frames: Vec<Frame> = Vec::new();
     for channel in channels {
-        let nominal = nominal(scan, channel);
-        let sensors = usable_sensors(file, scan, channel, nominal.as_ref(), caveats);
-        let geometry = sensors.map(|s| s.geometry).or(nominal);
-        let geometry = calibrated(&geometry.ok_or(StripeError::NoImage)?, settings);
-        let line = channel.line_direction.unwrap_or(LineDirection::Trace);
-        let timing = scan
-            .frame_direction
-            .and_then(|frame| Timing::of_scan(scan, channel.columns, frame, line));
-        let still = match (settings.drift, timing) {
-            (Some(drift), Some(timing)) => Some(at_rest(&geometry, &timing, drift.velocity())),
-            _ => None,
-        };
+        let place = Place::of(file, scan, channel, settings, caveats);
+        let place = place.ok_or(StripeError::NoImage)?;
+        let still = place.still(settings.drift.map(|d| d.velocity()));
         let flat = remove_background(&image_of(channel), settings.background);
         let same = |f: &Frame| (f.flat.rows, f.flat.columns) == (flat.rows, flat.columns);
         if frames.first().is_none_or(same) {
             frames.push(Frame {
-                line,
+                line: place.line,
                 flat,
-                geometry,
+                geometry: place.geometry,
                 still,
             });
         }

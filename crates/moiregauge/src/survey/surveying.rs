@@ -18,7 +18,6 @@ use crate::domains::nodes::{Contrast, find_nodes};
 use crate::frame::background::remove_background;
 use crate::frame::geometry::{Geometry, Timing};
 use crate::frame::image::Image;
-use crate::frame::resample::at_rest;
 use crate::lattice::measure::measure;
 use crate::lattice::measured::MeasuredLattice;
 use crate::map::local::local_lattices;
@@ -28,7 +27,7 @@ use crate::map::survey::Survey;
 use crate::meaning::about::name_caveats;
 use crate::meaning::naming::named_waves;
 use crate::meaning::strengths::WaveStrengths;
-use crate::scan::scanner::calibrated;
+use crate::scan::place::Place;
 use crate::settings::knobs::Settings;
 use crate::spectrum::error::LatticeError;
 use crate::spectrum::method::Method;
@@ -142,11 +141,9 @@ impl SurveyPlan {
         first: Option<&Self>,
         read: &ReadBlock,
     ) -> Result<Self, SurveyError> {
-        let geometry = &calibrated(geometry, settings);
-        let drift = settings.drift.map(|d| d.velocity());
-        let still = timing
-            .zip(drift)
-            .map(|(timing, d)| at_rest(geometry, timing, d));
+        let place = Place::given(geometry, timing.copied(), settings);
+        let still = place.still(settings.drift.map(|d| d.velocity()));
+        let geometry = &place.geometry;
         let drift_corrected = still.is_some();
         let placed = still.unwrap_or_else(|| geometry.clone());
         let dual = placed.pixel_to_nm.try_inverse().ok_or(SurveyError::NoMap)?;

@@ -1,0 +1,110 @@
+//! Where the pixels of a channel were, and when: the only place that says so.
+//!
+//! Nominal size and rotation → position sensors, where there are any that can be believed → calibration of the scanner →
+//! times of the pixels → the sample at rest.
+
+use heterostrain::Estimate;
+use nalgebra::{Matrix2, Vector2};
+use spmfile::{Channel, LineDirection, Scan};
+
+use crate::calibration::Calibration;
+use crate::caveat::Caveat;
+use crate::frame::geometry::{Geometry, Timing, at_rest};
+use crate::frame::sensors::SensorGeometry;
+use crate::scan::positions::{nominal, speeds, usable_sensors};
+use crate::settings::knobs::Settings;
+
+/// The place of one channel.
+#[derive(Clone, Debug)]
+pub(crate) struct Place {
+    /// Trace or retrace.
+    pub(crate) line: LineDirection,
+    /// As the instrument intended, if the file tells.
+    pub(crate) nominal: Option<Geometry>,
+    /// What the position sensors say, as they were recorded.
+    pub(crate) sensors: Option<SensorGeometry>,
+    /// By the sensors, or nominal where there are none: not corrected by the calibration.
+    pub(crate) recorded: Geometry,
+    /// The same, corrected by the calibration of the scanner if there is one.
+    pub(crate) geometry: Geometry,
+    /// When; `None` where the file does not tell.
+    pub(crate) timing: Option<Timing>,
+    /// The calibration.
+    scanner: Option<Matrix2<f64>>,
+}
+
+impl Place {
+    /// `None` where the file has neither sensors nor a size. Doubts about the sensors are added to `caveats`.
+    pub(crate) fn of(
+        file: &str,
+        scan: &Scan,
+        channel: &Channel,
+        settings: &Settings,
+        caveats: &mut Vec<Caveat>,
+    ) -> Option<Self> {
+        let line = channel.line_direction.unwrap_or(LineDirection::Trace);
+        let nominal = nominal(scan, channel);
+        let sensors = usable_sensors(file, scan, channel, nominal.as_ref(), caveats);
+        let by_sensors = sensors.as_ref().map(|s| s.geometry.clone());
+        let recorded = by_sensors.or_else(|| nominal.clone())?;
+        let timing = scan
+            .frame_direction
+            .and_then(|frame| Timing::of_scan(scan, channel.columns, frame, line));
+        let place = Self::given(&recorded, timing, settings);
+        Some(Self {
+            line,
+            nominal,
+            sensors,
+            ..place
+        })
+    }
+
+    /// Of an image whose positions, before any calibration, and times are known.
+    pub(crate) fn given(recorded: &Geometry, timing: Option<Timing>, settings: &Settings) -> Self {
+        let scanner = settings.scanner.as_ref().and_then(Calibration::map);
+        Self {
+            line: LineDirection::Trace,
+            nominal: None,
+            sensors: None,
+            recorded: recorded.clone(),
+            geometry: calibrated(recorded, scanner.as_ref()),
+            timing,
+            scanner,
+        }
+    }
+
+    /// The place of a block of pixels that starts at (column, row).
+    pub(crate) fn cropped(self, first: [usize; 2], size: [usize; 2]) -> Self {
+        let recorded = self.recorded.cropped(first, size);
+        Self {
+            nominal: self.nominal.map(|n| n.cropped(first, size)),
+            geometry: calibrated(&recorded, self.scanner.as_ref()),
+            recorded,
+            ..self
+        }
+    }
+
+    /// The pixels on the sample, a drift (nm/s) taken off; `None` where drift or times are not known.
+    pub(crate) fn still(&self, drift: Option<Vector2<f64>>) -> Option<Geometry> {
+        let (drift, timing) = (drift?, self.timing?);
+        Some(at_rest(&self.geometry, &timing, drift))
+    }
+
+    /// Tip speeds along the fast and slow axes with their spread, nm/s, and the relative error of their means; NaN
+    /// without times.
+    pub(crate) fn speeds(&self) -> ([Estimate; 2], [f64; 2]) {
+        let (speeds, errors) = speeds(&self.recorded, self.sensors.as_ref(), self.timing.as_ref());
+        let speeds = match (&self.timing, &self.scanner) {
+            (Some(timing), Some(_)) => {
+                let now = self.geometry.speeds(timing);
+                [0, 1].map(|i| speeds[i].scaled(now[i] / speeds[i].value))
+            }
+            _ => speeds,
+        };
+        (speeds, errors)
+    }
+}
+
+fn calibrated(geometry: &Geometry, map: Option<&Matrix2<f64>>) -> Geometry {
+    map.map_or_else(|| geometry.clone(), |map| geometry.mapped(map))
+}
