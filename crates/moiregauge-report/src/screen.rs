@@ -152,7 +152,7 @@ fn twist_strain(text: &mut String, found: &TwistStrain, budget: &Budget, reading
 fn heterostrain(text: &mut String, found: &TwistStrain, budget: &Budget) {
     let degree = 1f64.to_degrees();
     let (known, all) = (budget.known(), budget.applied_to(found));
-    let below = |e: &TwistStrain| format!("{:.4} %", 100.0 * e.strain_upper_limit_95());
+    let below = |e: &TwistStrain| format!("{:.4} %", 100.0 * e.strain().upper_limit_95());
     let magnitude = TotalEstimate::new(found.heterostrain(), known.magnitude).scaled(100.0);
     match found.axis_lab() {
         Some(axis) if all.axis_lab().is_some() => {
@@ -184,7 +184,7 @@ fn heterostrain(text: &mut String, found: &TwistStrain, budget: &Budget) {
         }
     }
     let parts = [0, 1].map(|i| {
-        let part = found.strain_covariance()[(i, i)];
+        let part = found.strain().covariance[(i, i)];
         let total = known.covariance[(i + 2, i + 2)];
         let part = Estimate::from_variance(found.strain_vector[i], part);
         TotalEstimate::new(part, total).scaled(100.0)
@@ -197,8 +197,8 @@ fn heterostrain(text: &mut String, found: &TwistStrain, budget: &Budget) {
         plus_minus(parts[1].total()),
         two_digits(parts[0].statistical),
         two_digits(parts[1].statistical),
-        percent(all.strain_interval_95()),
-        percent(found.strain_interval_95())
+        percent(all.strain().interval_95()),
+        percent(found.strain().interval_95())
     );
 }
 

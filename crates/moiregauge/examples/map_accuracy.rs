@@ -212,7 +212,7 @@ fn errors(scene: &FieldScene, waves: &WaveMap) -> Errors {
         out.count += 1.0;
         out.inside[0] += f64::from(u8::from(twist.abs() < here.twist().sigma));
         for i in 0..2 {
-            let sigma = here.strain_covariance()[(i, i)].sqrt();
+            let sigma = here.strain().covariance[(i, i)].sqrt();
             out.inside[1] += 0.5 * f64::from(u8::from(strain[i].abs() < sigma));
         }
         out.range[0] = out.range[0].min(truth.twist);

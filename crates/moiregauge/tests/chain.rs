@@ -93,7 +93,7 @@ fn stored_order_does_not_matter() {
     let (ta, tb) = (&ma.twist_strain, &mb.twist_strain);
     assert!((ta.twist - tb.twist).abs() < 0.2 * ta.twist().sigma);
     let shift = (ta.strain_vector - tb.strain_vector).norm();
-    assert!(shift < 0.2 * ta.strain_covariance().trace().sqrt());
+    assert!(shift < 0.2 * ta.strain().covariance.trace().sqrt());
 }
 
 /// Over many seeds the errors are what they say: the mean square pull of drift, twist and both strain
@@ -124,9 +124,9 @@ fn errors_cover_the_truth() {
                 (found.twist.to_degrees() - simulation.sample.twist_deg)
                     / found.twist().sigma.to_degrees(),
                 (found.strain_vector.x - strain * (2.0 * axis).cos())
-                    / found.strain_covariance().m11.sqrt(),
+                    / found.strain().covariance.m11.sqrt(),
                 (found.strain_vector.y - strain * (2.0 * axis).sin())
-                    / found.strain_covariance().m22.sqrt(),
+                    / found.strain().covariance.m22.sqrt(),
             ];
             for (sum, pull) in squares.iter_mut().zip(pulls) {
                 *sum += pull * pull / f64::from(trials);

@@ -30,7 +30,7 @@ fn stated(conditions: &Simulation, settings: &Settings, sets: u64) -> [f64; 3] {
             [
                 drift.trace() / 2.0,
                 strained.twist().sigma.powi(2),
-                strained.strain_covariance().trace() / 2.0,
+                strained.strain().covariance.trace() / 2.0,
             ]
         })
         .collect();

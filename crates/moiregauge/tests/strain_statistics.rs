@@ -53,7 +53,7 @@ fn errors_without_strain_have_their_closed_form() {
     assert!((found.twist().sigma / sigma_p - 1.0).abs() < 5e-3);
     let sigma_e = 2.0 * sigma_p / (1.0 + nu);
     for component in 0..2 {
-        let found = found.strain_covariance()[(component, component)].sqrt();
+        let found = found.strain().covariance[(component, component)].sqrt();
         assert!((found / sigma_e - 1.0).abs() < 5e-3, "{found} {sigma_e}");
     }
 }
@@ -197,7 +197,7 @@ fn small_strain_is_not_overstated() {
         // A subset: each limit is a root by bisection.
         let limited = sample[..2000]
             .iter()
-            .filter(|t| t.strain_upper_limit_95() >= length * sigma)
+            .filter(|t| t.strain().upper_limit_95() >= length * sigma)
             .count();
         assert!(limited >= 1880, "{length}: {limited} of 2000");
     }

@@ -28,6 +28,7 @@ pub(crate) mod other_models;
 pub(crate) mod paper;
 pub(crate) mod tensor;
 pub(crate) mod twist_strain;
+pub(crate) mod vector;
 
 pub use closed_form::{Branch, Solutions, branches, solutions, twist_strain};
 pub use convention::StrainConvention;
@@ -42,3 +43,4 @@ pub use other_models::Reference;
 pub use paper::published_draws;
 pub use tensor::{Orientation, Split, StrainTensor, strain_tensors};
 pub use twist_strain::TwistStrain;
+pub use vector::StrainVector;

@@ -27,11 +27,10 @@ use crate::strain::known::{KnownOrientation, LatticeDirection};
 use crate::strain::labelling::{moire_matrix, moire_matrix_jacobian, names};
 use crate::strain::layers::Layers;
 use crate::strain::names::Labelled;
+use crate::strain::vector::StrainVector;
 
 /// Readings with more mean strain than this are no alternatives.
 const LARGEST_MEAN_STRAIN: f64 = 0.01;
-/// The shear part has an axis only if chance makes so large a one less often.
-const SIGNIFICANT: f64 = 0.01;
 
 /// The orientation of one layer.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -258,33 +257,22 @@ impl StrainTensor {
         Estimate::from_variance(self.mean, self.covariance[(2, 2)])
     }
 
-    /// `γ = ½(ε₁ − ε₂)`, noise bias removed as in [`crate::strain::twist_strain::TwistStrain::heterostrain`].
+    /// The shear part with its noise.
+    pub fn shear_vector(&self) -> StrainVector {
+        StrainVector {
+            value: self.shear,
+            covariance: self.covariance.fixed_view::<2, 2>(3, 3).into_owned(),
+        }
+    }
+
+    /// `γ = ½(ε₁ − ε₂)`, noise bias removed as in [`StrainVector::magnitude`].
     pub fn shear(&self) -> Estimate {
-        self.as_uniaxial().heterostrain()
+        self.shear_vector().magnitude()
     }
 
     /// Axis of ε₁ in the laboratory, rad in [0, π); `None` unless γ is significant.
     pub fn axis_lab(&self) -> Option<Estimate> {
-        let found = self.as_uniaxial();
-        (found.strain_p_value() < SIGNIFICANT)
-            .then(|| found.axis_lab())
-            .flatten()
-    }
-
-    /// The shear part in the place of a strain vector, for its statistics.
-    fn as_uniaxial(&self) -> crate::strain::twist_strain::TwistStrain {
-        let mut covariance = nalgebra::Matrix4::zeros();
-        for (i, row) in [0, 1, 3, 4].into_iter().enumerate() {
-            for (j, column) in [0, 1, 3, 4].into_iter().enumerate() {
-                covariance[(i, j)] = self.covariance[(row, column)];
-            }
-        }
-        crate::strain::twist_strain::TwistStrain {
-            twist: self.twist,
-            lattice_angle: self.lattice_angle,
-            strain_vector: self.shear,
-            covariance,
-        }
+        self.shear_vector().axis()
     }
 
     /// The same strain in two ways as uniaxial strain of a layer with the Poisson ratio ν and a rest that is

@@ -73,7 +73,7 @@ pub(super) fn compare(
     };
     let twist = found.twist().scaled(1f64.to_degrees());
     let percent = found.strain_vector * 100.0;
-    let strain_sigma = found.strain_covariance().map(|v| 100.0 * v.max(0.0).sqrt());
+    let strain_sigma = found.strain().covariance.map(|v| 100.0 * v.max(0.0).sqrt());
     let drift_error = |i: usize| 60.0 * drift.velocity[i] - truth.mean_drift_nm_per_min[i];
     let drift_sigma = |i: usize| 60.0 * drift.covariance[(i, i)].sqrt();
     Some([

@@ -49,7 +49,7 @@ pub(super) fn draw(analysis: &Analysis, id: &str) -> Result<Drawing, String> {
         .iter()
         .map(|(_, mean)| {
             let t = &mean.twist_strain;
-            Some((t.strain_vector * 100.0, t.strain_covariance() * 1e4))
+            Some((t.strain_vector * 100.0, t.strain().covariance * 1e4))
         })
         .collect();
     let labels = Labels {

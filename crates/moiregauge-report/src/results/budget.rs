@@ -125,7 +125,7 @@ impl BudgetResult {
         let entry =
             |i: usize, factor: f64| BudgetColumn::of(budget, factor, move |c| c.covariance[(i, i)]);
         let all = budget.applied_to(found);
-        let covariance: Matrix2<f64> = all.strain_covariance();
+        let covariance: Matrix2<f64> = all.strain().covariance;
         Self {
             twist_deg: entry(0, degree()),
             heterostrain_percent: BudgetColumn::of(budget, PERCENT, |c| c.magnitude),
@@ -137,9 +137,9 @@ impl BudgetResult {
             lattice_angle_deg: entry(1, degree()),
             wavelengths_nm: [0, 1, 2].map(|i| BudgetColumn::of(budget, 1.0, |c| c.wavelengths[i])),
             strain_vector_covariance: square(&covariance, PERCENT * PERCENT),
-            strain_p_value: number(all.strain_p_value()),
-            strain_upper_limit_95_percent: number(all.strain_upper_limit_95() * PERCENT),
-            strain_interval_95_percent: all.strain_interval_95().map(|end| number(end * PERCENT)),
+            strain_p_value: number(all.strain().p_value()),
+            strain_upper_limit_95_percent: number(all.strain().upper_limit_95() * PERCENT),
+            strain_interval_95_percent: all.strain().interval_95().map(|end| number(end * PERCENT)),
         }
     }
 }

@@ -135,12 +135,13 @@ impl From<&TwistStrain> for TwistStrainResult {
             strain_axis_lab_deg: result.axis_lab().map(axis),
             strain_axis_lattice_deg: result.axis_lattice().map(axis),
             strain_vector_percent: pair(result.strain_vector, PERCENT),
-            strain_vector_covariance: square(&result.strain_covariance(), PERCENT * PERCENT),
+            strain_vector_covariance: square(&result.strain().covariance, PERCENT * PERCENT),
             strain_vector_sigma_total_percent: None,
-            strain_p_value: number(result.strain_p_value()),
-            strain_upper_limit_95_percent: number(result.strain_upper_limit_95() * PERCENT),
+            strain_p_value: number(result.strain().p_value()),
+            strain_upper_limit_95_percent: number(result.strain().upper_limit_95() * PERCENT),
             strain_interval_95_percent: result
-                .strain_interval_95()
+                .strain()
+                .interval_95()
                 .map(|end| number(end * PERCENT)),
         }
     }

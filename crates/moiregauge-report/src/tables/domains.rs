@@ -55,9 +55,9 @@ pub(super) const CELL: &[Column<CellRow>] = columns! {
     "strain_sigma_percent", "its σ", |r| of(r, |t| t.heterostrain().sigma, 100.0);
     "strain_axis_lab_deg", "axis of the strain from x, where it is significant", |r| of(r, |t| t.axis_lab().map_or(f64::NAN, |a| a.value), DEGREE);
     "strain_1_percent", "ε cos 2φ", |r| of(r, |t| t.strain_vector.x, 100.0);
-    "strain_1_sigma_percent", "its σ", |r| of(r, |t| t.strain_covariance().m11.sqrt(), 100.0);
+    "strain_1_sigma_percent", "its σ", |r| of(r, |t| t.strain().covariance.m11.sqrt(), 100.0);
     "strain_2_percent", "ε sin 2φ", |r| of(r, |t| t.strain_vector.y, 100.0);
-    "strain_2_sigma_percent", "its σ", |r| of(r, |t| t.strain_covariance().m22.sqrt(), 100.0);
+    "strain_2_sigma_percent", "its σ", |r| of(r, |t| t.strain().covariance.m22.sqrt(), 100.0);
 };
 
 /// A node with its number.

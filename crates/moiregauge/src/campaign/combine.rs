@@ -236,7 +236,7 @@ fn consistency(sets: &[SetAnalysis]) -> Vec<Consistency> {
             };
             let strain = sigmas(
                 &(ta.strain_vector - tb.strain_vector),
-                &(ta.strain_covariance() + tb.strain_covariance()),
+                &(ta.strain().covariance + tb.strain().covariance),
             );
             all.push(Consistency {
                 sets: [a.name.clone(), b.name.clone()],

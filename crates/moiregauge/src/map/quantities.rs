@@ -98,11 +98,11 @@ impl TwistStrainMap {
             out.lattice_angle.push(found.map(|f| f.lattice_angle()));
             for (i, plane) in out.strain.iter_mut().enumerate() {
                 let component = |f: TwistStrain| {
-                    Estimate::from_variance(f.strain_vector[i], f.strain_covariance()[(i, i)])
+                    Estimate::from_variance(f.strain_vector[i], f.strain().covariance[(i, i)])
                 };
                 plane.push(found.map(component));
             }
-            let covariance = found.map_or(f64::NAN, |f| f.strain_covariance()[(0, 1)]);
+            let covariance = found.map_or(f64::NAN, |f| f.strain().covariance[(0, 1)]);
             out.strain_covariance.push(covariance as f32);
             out.magnitude.push(found.map(|f| f.heterostrain()));
             out.axis.push(found.and_then(|f| f.axis_lab()));

@@ -120,8 +120,8 @@ impl Budget {
             let strain = covariance.fixed_view::<2, 2>(2, 2).into_owned();
             Contribution {
                 covariance,
-                magnitude: found.magnitude_variance(&strain),
-                axis_lab: found.axis_variance(&strain),
+                magnitude: found.strain().magnitude_variance(&strain),
+                axis_lab: found.strain().axis_variance(&strain),
                 wavelengths,
             }
         };

@@ -50,7 +50,7 @@ pub fn cramer_rao(simulator: &Simulator, time_sigma: f64, linked: bool) -> Optio
     let sample = &settings.sample;
     let strain = twist_strain(&lattice, sample.bilayer(), sample.strain_convention).ok()?;
     let root = |variance: f64| variance.max(0.0).sqrt();
-    let (c, e) = (found.velocity_covariance, strain.strain_covariance());
+    let (c, e) = (found.velocity_covariance, strain.strain().covariance);
     Some(Bound {
         drift: [root(c.m11), root(c.m22)],
         twist: strain.twist().sigma,

@@ -41,16 +41,16 @@ pub(crate) fn about_mean(name: &str, mean: Option<&SetMean>, caveats: &mut Vec<C
     if found.axis_lab().is_none() {
         caveats.push(Caveat::new(
             MoireDoubt::StrainNotSignificant {
-                p_value: found.strain_p_value(),
-                below: found.strain_upper_limit_95(),
+                p_value: found.strain().p_value(),
+                below: found.strain().upper_limit_95(),
             },
             name,
         ));
     } else if in_all.axis_lab().is_none() {
         caveats.push(Caveat::new(
             MoireDoubt::StrainWithinCalibration {
-                p_value: in_all.strain_p_value(),
-                below: in_all.strain_upper_limit_95(),
+                p_value: in_all.strain().p_value(),
+                below: in_all.strain().upper_limit_95(),
             },
             name,
         ));
@@ -94,7 +94,7 @@ pub(crate) fn about_checks(
     else {
         return;
     };
-    let strain = mean.twist_strain.strain_covariance();
+    let strain = mean.twist_strain.strain().covariance;
     let stated = [
         ("drift x", found.drift[0], drift.covariance.m11.sqrt()),
         ("drift y", found.drift[1], drift.covariance.m22.sqrt()),

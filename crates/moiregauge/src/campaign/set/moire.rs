@@ -80,7 +80,7 @@ pub(crate) fn doubts(
     );
     if let Some(mean) = mean {
         caveats.extend(about_period(name, &mean.lattice, settings));
-        let [least, _] = mean.twist_strain.strain_interval_95();
+        let [least, _] = mean.twist_strain.strain().interval_95();
         if least > LARGE_STRAIN {
             caveats.push(Caveat::new(
                 MoireDoubt::LargeStrain {
