@@ -7,22 +7,31 @@ use nalgebra::{Complex, Matrix2};
 
 /// The complex form of a real 2×2 matrix.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct ComplexPair {
-    pub(crate) p: Complex<f64>,
-    pub(crate) q: Complex<f64>,
+pub struct ComplexPair {
+    /// Size and turn.
+    pub p: Complex<f64>,
+    /// Stretch.
+    pub q: Complex<f64>,
 }
 
 impl ComplexPair {
     /// The matrix product `self · right`.
-    pub(crate) fn times(&self, right: &Self) -> Self {
+    #[must_use]
+    pub fn times(&self, right: &Self) -> Self {
         Self {
             p: self.p * right.p + self.q * right.q.conj(),
             q: self.p * right.q + self.q * right.p.conj(),
         }
     }
 
+    /// `|q|/|p|`: how far the matrix is from one that only turns and scales.
+    pub fn distortion(&self) -> f64 {
+        self.q.norm() / self.p.norm()
+    }
+
     /// The matrix times a real number.
-    pub(crate) fn scaled(&self, factor: f64) -> Self {
+    #[must_use]
+    pub fn scaled(&self, factor: f64) -> Self {
         Self {
             p: self.p * factor,
             q: self.q * factor,
@@ -30,13 +39,13 @@ impl ComplexPair {
     }
 
     /// The matrix itself.
-    pub(crate) fn matrix(&self) -> Matrix2<f64> {
+    pub fn matrix(&self) -> Matrix2<f64> {
         let (p, q) = (self.p, self.q);
         Matrix2::new(p.re + q.re, q.im - p.im, q.im + p.im, p.re - q.re)
     }
 
     /// The inverse matrix; `None` without one.
-    pub(crate) fn inverse(&self) -> Option<Self> {
+    pub fn inverse(&self) -> Option<Self> {
         let determinant = self.p.norm_sqr() - self.q.norm_sqr();
         let inverse = Self {
             p: self.p.conj() / determinant,

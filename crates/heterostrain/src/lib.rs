@@ -6,4 +6,5 @@ pub mod lattice;
 pub mod material;
 pub mod strain;
 
+pub use complex_pair::ComplexPair;
 pub use estimate::{Estimate, TotalEstimate};

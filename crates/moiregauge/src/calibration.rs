@@ -11,13 +11,11 @@
 //!
 //! What an isotropic or uniaxial strain of the known lattice does is not told from s, g and γ.
 
-use heterostrain::Estimate;
-use heterostrain::lattice::{Lattice, shortest_pair};
+use heterostrain::lattice::{Lattice, renamings, shortest_pair};
 use heterostrain::material::Material;
+use heterostrain::{ComplexPair, Estimate};
 use nalgebra::{Matrix2, Matrix3, Matrix3x4, Vector3};
 use serde::{Deserialize, Serialize};
-
-use crate::spectrum::known::{names, parts};
 
 /// A lattice whose cell is known.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
@@ -410,7 +408,7 @@ pub fn shown(lattice: &Lattice, cell: &Matrix2<f64>) -> Option<Shown> {
     for known in [*cell, mirror * cell] {
         let inverse = known.try_inverse()?;
         let same_face = |l: &Lattice| l.basis.determinant() * known.determinant() > 0.0;
-        let named = names().map(|name| lattice.relabelled(&name));
+        let named = renamings(1).map(|name| lattice.relabelled(&name));
         found.extend(named.filter(same_face).map(|l| by_name(&l, &inverse)));
     }
     // Of names that a symmetry of the cell makes equal, the one that turns it least.
@@ -431,7 +429,8 @@ pub fn shown(lattice: &Lattice, cell: &Matrix2<f64>) -> Option<Shown> {
 }
 
 fn by_name(lattice: &Lattice, inverse: &Matrix2<f64>) -> Shown {
-    let (p, q) = parts(&(lattice.basis * inverse));
+    let shape = ComplexPair::from(lattice.basis * inverse);
+    let ComplexPair { p, q } = shape;
     let turn = p / p.norm();
     let stretch = 2.0 * q * turn;
     let mut jacobian = Matrix3x4::zeros();
@@ -439,7 +438,7 @@ fn by_name(lattice: &Lattice, inverse: &Matrix2<f64>) -> Shown {
     for component in 0..4 {
         let mut unit = Matrix2::zeros();
         unit[component] = 1.0;
-        let (dp, dq) = parts(&(unit * inverse));
+        let ComplexPair { p: dp, q: dq } = (unit * inverse).into();
         let along = p.conj() * dp / p.norm();
         of_turn[component] = along.im / p.norm();
         let change = 2.0 * turn * (dq + q * nalgebra::Complex::i() * of_turn[component]);
@@ -450,7 +449,7 @@ fn by_name(lattice: &Lattice, inverse: &Matrix2<f64>) -> Shown {
         values: Vector3::new(p.norm() - 1.0, stretch.re, stretch.im),
         covariance: jacobian * lattice.covariance * jacobian.transpose(),
         orientation: Estimate::from_variance(p.arg(), variance),
-        distortion: q.norm() / p.norm(),
+        distortion: shape.distortion(),
         next_distortion: f64::INFINITY,
     }
 }

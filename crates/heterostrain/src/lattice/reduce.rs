@@ -64,30 +64,30 @@ pub fn distortion(pair: &Matrix2<f64>) -> f64 {
     q / p
 }
 
+/// All changes of basis `U` with entries from −`largest` to `largest` and determinant ±1: `basis · U` is the same lattice
+/// under another name, mirror images included.
+pub fn renamings(largest: i32) -> impl Iterator<Item = Matrix2<f64>> {
+    let entries = 2 * largest + 1;
+    let entry =
+        move |code: i32, power: u32| f64::from(code / entries.pow(power) % entries - largest);
+    (0..entries.pow(4))
+        .map(move |code| Matrix2::from_fn(|i, j| entry(code, 2 * i as u32 + j as u32)))
+        .filter(|change| change.determinant().abs() == 1.0)
+}
+
+/// The [`renamings`] of the same handedness.
+pub fn same_handed(largest: i32) -> impl Iterator<Item = Matrix2<f64>> {
+    renamings(largest).filter(|change| change.determinant() == 1.0)
+}
+
 /// `pair` in the labelling (same lattice, same handedness) closest to `reference`.
 pub fn labelled_like<Space: Copy, Unit: Copy>(
     pair: &Pair<Space, Unit>,
     reference: &Matrix2<f64>,
 ) -> Pair<Space, Unit> {
-    let entries = [-1.0, 0.0, 1.0];
-    let mut best = (f64::INFINITY, Matrix2::identity());
-    for a in entries {
-        for b in entries {
-            for c in entries {
-                for d in entries {
-                    let change = Matrix2::new(a, b, c, d);
-                    if change.determinant() != 1.0 {
-                        continue;
-                    }
-                    let distance = (pair.basis * change - reference).norm();
-                    if distance < best.0 {
-                        best = (distance, change);
-                    }
-                }
-            }
-        }
-    }
-    pair.relabelled(&best.1)
+    let distance = |change: &Matrix2<f64>| (pair.basis * change - reference).norm();
+    let nearest = same_handed(1).min_by(|a, b| distance(a).total_cmp(&distance(b)));
+    nearest.map_or(*pair, |change| pair.relabelled(&change))
 }
 
 /// The labelling whose first vector has its polar angle in [0°, 60°): a start for a series, all
@@ -110,15 +110,6 @@ pub fn canonical<Unit: Copy>(lattice: &Lattice<Unit>) -> Lattice<Unit> {
         } else {
             best
         }
-    })
-}
-
-/// All matrices of determinant 1 with entries −1, 0, 1.
-pub(crate) fn small_changes() -> impl Iterator<Item = Matrix2<f64>> {
-    (0..81).filter_map(|code: i32| {
-        let entry = |power: u32| f64::from(code / 3_i32.pow(power) % 3 - 1);
-        let change = Matrix2::new(entry(0), entry(1), entry(2), entry(3));
-        (change.determinant() == 1.0).then_some(change)
     })
 }
 

@@ -14,7 +14,8 @@
 use nalgebra::{Matrix2, Matrix4, Vector4};
 
 use crate::complex_pair::ComplexPair;
-use crate::lattice::reduce::{shortest_pair, small_changes};
+use crate::lattice::reduce::{same_handed, shortest_pair};
+use crate::lattice::renamings;
 use crate::lattice::vectors::Lattice;
 use crate::strain::inversion::{ALL_SIGNS, solve};
 use crate::strain::layers::Layers;
@@ -69,7 +70,7 @@ pub(crate) fn least_strained(lattice: &Lattice, layers: &Layers) -> Option<Latti
     // Each step shortens the reciprocal vectors, so this ends; a pair from an image needs one.
     loop {
         let mut step = None;
-        for change in small_changes() {
+        for change in same_handed(1) {
             let q = anisotropy(&(best.basis * change))?;
             // Turning all names by 60° changes nothing: do not follow rounding errors.
             if q < smallest * (1.0 - 1e-9) {
@@ -131,17 +132,11 @@ fn least_mismatch(moire: &ComplexPair, layers: &Layers) -> f64 {
 /// be far longer one way than the other, and its cell far from the shortest one.
 pub(crate) fn names(lattice: &Lattice) -> Option<Vec<Lattice>> {
     let shortest = lattice.relabelled(&shortest_pair(&lattice.basis)?);
-    let entries = || (-LARGEST_ENTRY..=LARGEST_ENTRY).map(f64::from);
-    let mut found = Vec::new();
-    for (a, b) in entries().flat_map(|a| entries().map(move |b| (a, b))) {
-        for (c, d) in entries().flat_map(|c| entries().map(move |d| (c, d))) {
-            let change = Matrix2::new(a, b, c, d);
-            // Turning a name by 180° turns the orientation by as much.
-            let first = [a, b, c, d].into_iter().find(|x| *x != 0.0);
-            if change.determinant().abs() == 1.0 && first > Some(0.0) {
-                found.push(shortest.relabelled(&change));
-            }
-        }
-    }
-    Some(found)
+    // Turning a name by 180° turns the orientation by as much.
+    let one_of_two = |change: &Matrix2<f64>| {
+        let rows = change.transpose();
+        rows.iter().find(|x| **x != 0.0) > Some(&0.0)
+    };
+    let changes = renamings(LARGEST_ENTRY).filter(one_of_two);
+    Some(changes.map(|c| shortest.relabelled(&c)).collect())
 }

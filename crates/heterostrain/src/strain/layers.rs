@@ -8,6 +8,7 @@
 use nalgebra::Matrix2;
 
 use crate::complex_pair::ComplexPair;
+use crate::lattice::same_handed;
 use crate::material::{Bilayer, Material};
 use crate::strain::convention::StrainConvention;
 use crate::strain::error::StrainError;
@@ -107,11 +108,10 @@ fn check(material: &Material) -> Result<(), StrainError> {
 fn most_alike(first: &Matrix2<f64>, second: &Matrix2<f64>) -> Option<ComplexPair> {
     let inverse = first.try_inverse()?;
     let pair = |change: &Matrix2<f64>| ComplexPair::from((second * change * inverse).transpose());
-    let distortion = |pair: &ComplexPair| pair.q.norm() / pair.p.norm();
     let mut best = pair(&Matrix2::identity());
-    for change in crate::lattice::reduce::small_changes() {
+    for change in same_handed(1) {
         let other = pair(&change);
-        if distortion(&other) < distortion(&best) - 1e-9 {
+        if other.distortion() < best.distortion() - 1e-9 {
             best = other;
         }
     }

@@ -6,12 +6,12 @@
 //! well it does: of all names `(I − D u₀ᵀ) L₀ = (I − D u₁ᵀ) L₁` takes those with the least misfit, the least drift, and the
 //! least distorted cell.
 
-use heterostrain::lattice::canonical;
+use heterostrain::ComplexPair;
+use heterostrain::lattice::{canonical, renamings};
 use nalgebra::{Matrix2, Vector2};
 
 use crate::drift::linear::Observation;
 use crate::scan::measured::MeasuredLine;
-use crate::spectrum::known::{names, parts};
 
 /// What counts as much as one unit of cost: a misfit of the vectors, a drift over the speed of the slow axis, a distortion
 /// of the cell, a wrong size (logarithm).
@@ -81,7 +81,7 @@ struct Named {
 
 fn best_name(first: &Observation, second: &Observation, cell: &Matrix2<f64>) -> Option<Named> {
     let inverse = cell.try_inverse()?;
-    let all: Vec<Matrix2<f64>> = names().collect();
+    let all: Vec<Matrix2<f64>> = renamings(1).collect();
     let twice = all.iter().flat_map(|a| all.iter().map(move |b| a * b));
     twice
         .filter_map(|name| named(first, second, name, &inverse))
@@ -109,10 +109,10 @@ fn named(
     }
     let drift = velocity.norm() * first.time_gradient.norm();
     let free = (Matrix2::identity() - velocity * first.time_gradient.transpose()) * a;
-    let (distortion, size) = names()
+    let (distortion, size) = renamings(1)
         .map(|name| {
-            let (p, q) = parts(&(free * name * inverse));
-            (q.norm() / p.norm(), p.norm())
+            let shape = ComplexPair::from(free * name * inverse);
+            (shape.distortion(), shape.p.norm())
         })
         .min_by(|a, b| a.0.total_cmp(&b.0))?;
     let parts = [

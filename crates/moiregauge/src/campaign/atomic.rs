@@ -14,9 +14,9 @@
 //! rests on one direction, which errors of the calibration turn: by half the mismatch and half the error
 //! of the right angle.
 
-use heterostrain::Estimate;
-use heterostrain::lattice::Lattice;
+use heterostrain::lattice::{Lattice, renamings};
 use heterostrain::material::Material;
+use heterostrain::{ComplexPair, Estimate};
 use nalgebra::{Matrix2, Matrix4, RowVector4, Vector2};
 
 use crate::campaign::alike::{Alike, alike};
@@ -28,7 +28,6 @@ use crate::drift::linear::{Observation, solve};
 use crate::numbers::chi2::enlargement;
 use crate::scan::measured::MeasuredScan;
 use crate::settings::knobs::Calibration;
-use crate::spectrum::known::{names, parts};
 
 /// A lattice whose size differs from that of the material by more is another one.
 const LARGEST_ERROR: f64 = 0.15;
@@ -206,20 +205,12 @@ struct Found {
 /// `F = L U A⁰⁻¹` for the name L U of the lattice that distorts the material's least.
 fn deformation(lattice: &Lattice, atoms: &Matrix2<f64>) -> Option<(Lattice, Matrix2<f64>)> {
     let inverse = atoms.try_inverse()?;
-    let distortion = |f: &Matrix2<f64>| {
-        let (p, q) = parts(f);
-        q.norm() / p.norm()
-    };
+    let distortion = |f: &Matrix2<f64>| ComplexPair::from(*f).distortion();
     // Two rounds reach every name of a pair that is nearly reduced.
     let mut best = *lattice;
     for _ in 0..2 {
         let start = best;
-        for code in 0..81_i32 {
-            let entry = |power: u32| f64::from(code / 3_i32.pow(power) % 3 - 1);
-            let change = Matrix2::new(entry(0), entry(1), entry(2), entry(3));
-            if change.determinant().abs() != 1.0 {
-                continue;
-            }
+        for change in renamings(1) {
             let named = start.relabelled(&change);
             let f = named.basis * inverse;
             if f.determinant() > 0.0
@@ -237,11 +228,11 @@ fn deformation(lattice: &Lattice, atoms: &Matrix2<f64>) -> Option<(Lattice, Matr
 fn turned(lattice: &Lattice, atoms: &Matrix2<f64>) -> Result<((f64, f64), Estimate), AtomicError> {
     let (lattice, f) = deformation(lattice, atoms).ok_or(AtomicError::Degenerate)?;
     let inverse = atoms.try_inverse().ok_or(AtomicError::Degenerate)?;
-    let (p, q) = parts(&f);
+    let ComplexPair { p, q } = f.into();
     let slopes = RowVector4::from_fn(|_, component| {
         let mut unit = Matrix2::zeros();
         unit[component] = 1.0;
-        (p.conj() * parts(&(unit * inverse)).0).im / p.norm_sqr()
+        (p.conj() * ComplexPair::from(unit * inverse).p).im / p.norm_sqr()
     });
     let variance = (slopes * lattice.covariance * slopes.transpose())[0];
     Ok((
@@ -270,15 +261,17 @@ fn unambiguous(
 ) -> Result<(), AtomicError> {
     let inverse = atoms.try_inverse().ok_or(AtomicError::Degenerate)?;
     let of = |f: &Matrix2<f64>| {
-        let (p, q) = parts(f);
-        (q.norm() / p.norm(), turn_of_fast_axis(f, time_gradient))
+        (
+            ComplexPair::from(*f).distortion(),
+            turn_of_fast_axis(f, time_gradient),
+        )
     };
     let (least, (angle, _)) = of(&(lattice.basis * inverse));
     let apart = |other: f64| {
         let turns = (other - angle) / period;
         (turns - turns.round()).abs() * period
     };
-    let others = names()
+    let others = renamings(1)
         .map(|name| lattice.basis * name * inverse)
         .filter(|f| f.determinant() > 0.0)
         .map(|f| of(&f))
@@ -330,7 +323,7 @@ fn one_direction(
         // Names of vectors may differ by a turn that is none for the lattice.
         let period = material.rotation_period();
         let near = turns - period * (turns / period).round();
-        let (p, q) = parts(&f);
+        let ComplexPair { p, q } = f.into();
         weights += variance.recip();
         sum += near / variance;
         size += length / observations.len() as f64;

@@ -5,8 +5,8 @@
 //! whatever the drift does. Two numbers of each scan are compared there; along the slow axis lattices may differ by what
 //! a plausible drift makes of them. How the vectors are named does not matter.
 
-use heterostrain::lattice::Waves;
-use nalgebra::{Matrix2, Vector2};
+use heterostrain::lattice::{Waves, same_handed};
+use nalgebra::Vector2;
 
 use crate::campaign::group::{Group, folder};
 use crate::caveat::Caveat;
@@ -58,7 +58,7 @@ impl View {
             2.0 * DRIFT
         };
         let mut least = f64::INFINITY;
-        for names in renamings() {
+        for names in same_handed(1) {
             let named = other.waves.relabelled(&names);
             let miss = named.basis - self.waves.basis;
             let covariance = named.covariance + self.waves.covariance;
@@ -81,15 +81,6 @@ impl View {
         }
         least
     }
-}
-
-/// Other names of the same lattice with the same sense.
-fn renamings() -> impl Iterator<Item = Matrix2<f64>> {
-    (0..81_i32).filter_map(|code| {
-        let entry = |power: u32| f64::from(code / 3_i32.pow(power) % 3 - 1);
-        let change = Matrix2::new(entry(0), entry(1), entry(2), entry(3));
-        (change.determinant() == 1.0).then_some(change)
-    })
 }
 
 /// Scans that show one lattice, by their numbers; each part in order. Those that are not used are in none.

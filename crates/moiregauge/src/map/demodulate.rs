@@ -10,6 +10,7 @@ use crate::frame::image::Image;
 use crate::map::defects::{Blur, Setting, masks};
 use crate::map::waves::{Harmonics, LocalLattice, Nothing, local_lattices};
 use crate::numbers::median::median;
+use crate::spectrum::shells::{FIRST_SHELL, shells};
 use crate::window::blocks::{Blocks, Place, block_of, mix, mix_some, step_of, stride_of};
 use crate::window::carrier::Carrier;
 use crate::window::leaks::clean;
@@ -20,24 +21,8 @@ use crate::window::smooth::{Nodes, Smoothed, smooth};
 use crate::window::types::{Reference, Resolution, UsedHarmonic, WaveMap, WaveNode};
 use crate::window::widths::NARROWEST;
 
-/// The likely harmonics, half of the first four shells of a pair at 60°.
-const LIKELY: [[i32; 2]; 15] = [
-    [1, 0],
-    [0, 1],
-    [-1, 1],
-    [1, 1],
-    [-1, 2],
-    [-2, 1],
-    [2, 0],
-    [0, 2],
-    [-2, 2],
-    [2, 1],
-    [1, 2],
-    [-1, 3],
-    [-2, 3],
-    [-3, 2],
-    [-3, 1],
-];
+/// The likely harmonics: four shells.
+const LIKELY: &[[i32; 2]] = shells(4);
 /// Wave vectors beyond this (rad per pixel, each component) are too near the limit of sampling.
 const FASTEST: f64 = 2.6;
 
@@ -92,7 +77,7 @@ impl<'a> Work<'a> {
         if image.columns < 4 * block[0] || image.rows < 4 * block[1] {
             return None;
         }
-        let indices = LIKELY[..3].to_vec();
+        let indices = FIRST_SHELL.to_vec();
         let levelled = Levelled::new(image, &reference);
         let beside = Beside::new((&levelled, place), &reference, &indices);
         let noise = Noise::new(&beside, levelled.variance());
@@ -142,7 +127,11 @@ impl<'a> Work<'a> {
     /// The likely harmonics beyond the first shell that are slow enough to be sampled.
     pub(crate) fn likely(&self) -> Vec<[i32; 2]> {
         let slow_enough = |index: &[i32; 2]| self.reference.wave(*index).amax() < FASTEST;
-        LIKELY[3..].iter().copied().filter(slow_enough).collect()
+        LIKELY[FIRST_SHELL.len()..]
+            .iter()
+            .copied()
+            .filter(slow_enough)
+            .collect()
     }
 
     /// Nodes in the middle of the blocks; in a part of an image from its first line on, so that those of

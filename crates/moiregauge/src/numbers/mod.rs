@@ -1,7 +1,8 @@
-//! Small mathematics that every room needs: χ², the median, random numbers.
+//! Small mathematics that every room needs: χ², the median, normal equations, random numbers, words for numbers.
 
 pub(crate) mod chi2;
 pub(crate) mod median;
+pub(crate) mod normal_equations;
 pub(crate) mod rng;
 pub(crate) mod spread;
 pub(crate) mod words;

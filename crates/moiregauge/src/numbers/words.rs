@@ -1,8 +1,7 @@
 //! Numbers and names as people read them.
 
-use spmfile::LineDirection;
-
 use heterostrain::Estimate;
+use spmfile::LineDirection;
 
 /// A number with `decimals` decimals and a true minus sign; never `−0`.
 pub fn fixed(value: f64, decimals: usize) -> String {

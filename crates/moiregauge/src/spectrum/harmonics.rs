@@ -199,11 +199,12 @@ impl Windowed {
         image: &Image,
         pair: &Matrix2<f64>,
         background: Background,
-        shells: &[(f64, f64)],
+        shells: &[[i32; 2]],
     ) -> Option<Harmonics> {
         let nyquist = 0.9 * std::f64::consts::PI;
         let wave = |&(h, k): &(f64, f64)| pair * Vector2::new(h, k);
-        let resolved = shells.iter().copied().filter(|index| {
+        let indices = shells.iter().map(|&[h, k]| (f64::from(h), f64::from(k)));
+        let resolved = indices.filter(|index| {
             let q = wave(index);
             q.amax() < nyquist && q.amin() > -nyquist
         });
@@ -302,19 +303,6 @@ fn residual(image: &Image, model: &Image) -> Image {
     Image::new(image.rows, image.columns, values)
 }
 
-/// Indices of the first three shells, one of each ± pair, in the basis at 60°.
-pub(crate) const SHELLS: [(f64, f64); 9] = [
-    (1.0, 0.0),
-    (0.0, 1.0),
-    (-1.0, 1.0),
-    (1.0, 1.0),
-    (-1.0, 2.0),
-    (-2.0, 1.0),
-    (2.0, 0.0),
-    (0.0, 2.0),
-    (-2.0, 2.0),
-];
-
 /// `Σ w(n) cos(q (n − centre))` of the Hann window of `n` pixels: three Dirichlet kernels.
 pub(crate) fn hann_transform(q: f64, n: usize) -> f64 {
     let n = n as f64;
@@ -352,6 +340,7 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::spectrum::shells::shells;
 
     /// An image with holes: one pixel, part of a line, whole lines, a corner.
     fn torn(rows: usize, columns: usize) -> Image {
@@ -403,7 +392,10 @@ mod tests {
         let windowed = Windowed::new(&torn(52, 47));
         let pair = Matrix2::new(0.5, 0.17, 0.06, 0.46);
         let indices: Vec<(f64, f64)> = std::iter::once((0.0, 0.0))
-            .chain(SHELLS.iter().flat_map(|&(h, k)| [(h, k), (-h, -k)]))
+            .chain(shells(3).iter().flat_map(|&[h, k]| {
+                let (h, k) = (f64::from(h), f64::from(k));
+                [(h, k), (-h, -k)]
+            }))
             .collect();
         let gram = windowed.gram(&pair, &indices);
         for (a, &(ha, ka)) in indices.iter().enumerate() {

@@ -12,9 +12,8 @@ use crate::frame::background::Background;
 use crate::frame::clip::cut_off;
 use crate::frame::image::Image;
 use crate::spectrum::harmonics::{Harmonics, Windowed};
+use crate::spectrum::shells::{FIRST_SHELL, shells};
 
-/// |h|² of the last of the five shells.
-const LAST_SHELL: i32 = 9;
 /// Significance that none of a few thousand frequencies reaches by chance.
 const STANDS_OUT: f64 = 20.0;
 /// So many harmonics that stand out make a lattice of which the first shell may be missing.
@@ -32,7 +31,7 @@ pub(crate) fn refine(
     background: Background,
 ) -> Option<(Harmonics, [Vector2<f64>; 3])> {
     let windowed = Windowed::new(image);
-    let shells = shells();
+    let shells = by_rows();
     let first = windowed.fit(image, pair, background, &shells)?;
     let model = Windowed::new(&first.model);
     let mut chosen = Vec::new();
@@ -69,21 +68,11 @@ pub(crate) fn refine(
     Some((harmonics, [k1, k2, k2 - k1]))
 }
 
-/// The harmonics of five shells, one of each ± pair, the first shell in the order K₁, K₂, K₂ − K₁.
-fn shells() -> Vec<(f64, f64)> {
-    let mut all = vec![(1, 0), (0, 1), (-1, 1)];
-    for k in 0..=3 {
-        for h in -3..=3 {
-            // The pair stands at 60°, so |h K₁ + k K₂|² is h² + hk + k² in units of |K|².
-            let order: i32 = h * h + h * k + k * k;
-            if (k > 0 || h > 0) && (2..=LAST_SHELL).contains(&order) {
-                all.push((h, k));
-            }
-        }
-    }
-    all.into_iter()
-        .map(|(h, k)| (f64::from(h), f64::from(k)))
-        .collect()
+/// The first five shells, the first one first and then by rows.
+fn by_rows() -> Vec<[i32; 2]> {
+    let mut all = shells(5).to_vec();
+    all[FIRST_SHELL.len()..].sort_unstable_by_key(|[h, k]| [*k, *h]);
+    all
 }
 
 /// Whether integer combinations of some indices make all: the determinants of all pairs have no common

@@ -5,18 +5,20 @@
 //! of about that cell, best first. A cell with a large basis (a reconstructed surface) has higher harmonics
 //! that are stronger than its first ones; without its size one of these would be taken for the lattice.
 
-use heterostrain::lattice::{reciprocal, shortest_pair};
-use nalgebra::{Complex, Matrix2, Vector2};
+use heterostrain::ComplexPair;
+use heterostrain::lattice::{reciprocal, renamings, shortest_pair};
+use nalgebra::{Matrix2, Vector2};
 
 use crate::frame::background::Background;
 use crate::frame::geometry::Geometry;
 use crate::frame::image::Image;
 use crate::spectrum::error::LatticeError;
-use crate::spectrum::harmonics::{SHELLS, Windowed};
+use crate::spectrum::harmonics::Windowed;
 use crate::spectrum::prepare::{Prepared, Verdict, binned, levelled, signal_to_noise, verdict};
 use crate::spectrum::select::{
     Candidate, Orders, Peak, by_score, frame_cycles, score, spectrum_peaks, well_explained,
 };
+use crate::spectrum::shells::shells;
 use crate::spectrum::transform::Spectrum;
 
 /// The lattice may be smaller or larger than expected by this factor: less than √3, by which the second
@@ -52,7 +54,7 @@ pub(crate) fn prepare(
         let (binning, binned) = binned(&image, &candidate.pair);
         // The pair goes through all peaks that it explains; the first harmonics may be faint.
         let pair = candidate.pair * binning as f64;
-        let Some(harmonics) = Windowed::new(&binned).fit(&binned, &pair, background, &SHELLS)
+        let Some(harmonics) = Windowed::new(&binned).fit(&binned, &pair, background, shells(3))
         else {
             continue;
         };
@@ -178,34 +180,10 @@ fn resembles(pair: &Matrix2<f64>, wanted: &Matrix2<f64>, most: f64) -> bool {
     let Some(inverse) = wanted.try_inverse() else {
         return false;
     };
-    names().any(|name| {
-        let (p, q) = parts(&(pair * name * inverse));
-        let stretch = q.norm() / p.norm();
-        (1.0 / MOST_SCALE..MOST_SCALE).contains(&p.norm()) && stretch < most
+    renamings(1).any(|name| {
+        let shape = ComplexPair::from(pair * name * inverse);
+        (1.0 / MOST_SCALE..MOST_SCALE).contains(&shape.p.norm()) && shape.distortion() < most
     })
-}
-
-/// All changes of names with small integers: the lattice is the same, mirror images included.
-pub(crate) fn names() -> impl Iterator<Item = Matrix2<f64>> {
-    let entry = |code: i32, power: u32| f64::from(code / 3_i32.pow(power) % 3 - 1);
-    (0..81_i32)
-        .map(move |code| {
-            Matrix2::new(
-                entry(code, 0),
-                entry(code, 1),
-                entry(code, 2),
-                entry(code, 3),
-            )
-        })
-        .filter(|change| change.determinant().abs() == 1.0)
-}
-
-/// `A z = p z + q z̄`: size and turn, and stretch.
-pub(crate) fn parts(m: &Matrix2<f64>) -> (Complex<f64>, Complex<f64>) {
-    (
-        Complex::new(m.m11 + m.m22, m.m21 - m.m12) / 2.0,
-        Complex::new(m.m11 - m.m22, m.m21 + m.m12) / 2.0,
-    )
 }
 
 #[cfg(test)]

@@ -11,6 +11,7 @@ pub(crate) mod pictures;
 pub(crate) mod prepare;
 pub(crate) mod rescue;
 pub(crate) mod select;
+pub(crate) mod shells;
 pub(crate) mod transform;
 
 pub use error::LatticeError;

@@ -6,8 +6,9 @@ use nalgebra::{Matrix2, Vector2};
 use crate::frame::background::{Background, remove_background};
 use crate::frame::geometry::Geometry;
 use crate::frame::image::Image;
-use crate::spectrum::harmonics::{Harmonic, Harmonics, SHELLS, Windowed};
+use crate::spectrum::harmonics::{Harmonic, Harmonics, Windowed};
 use crate::spectrum::phases::Phases;
+use crate::spectrum::shells::shells;
 use crate::spectrum::transform::Spectrum;
 use crate::spectrum::{high_orders, select};
 
@@ -152,13 +153,13 @@ pub(crate) fn refine(
         third,
     ]
     .map(|q| windowed.refined_peak(q));
-    let first = windowed.fit(image, &common_pair(&seen), background, &SHELLS)?;
+    let first = windowed.fit(image, &common_pair(&seen), background, shells(3))?;
     let model = Windowed::new(&first.model);
     let mut peaks = seen;
     for (peak, harmonic) in peaks.iter_mut().zip(&first.list) {
         *peak -= model.refined_peak(harmonic.q) - harmonic.q;
     }
-    let second = windowed.fit(image, &common_pair(&peaks), background, &SHELLS)?;
+    let second = windowed.fit(image, &common_pair(&peaks), background, shells(3))?;
     Some((second, peaks))
 }
 

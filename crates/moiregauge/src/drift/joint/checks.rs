@@ -12,7 +12,8 @@ use rand::RngExt as _;
 
 use crate::drift::joint::evaluate::{Linearised, linearise};
 use crate::drift::joint::instability::instability;
-use crate::drift::joint::solve::{JointFit, inverse, solved};
+use crate::drift::joint::solve::JointFit;
+use crate::numbers::normal_equations::NormalEquations;
 use crate::numbers::rng::stream;
 
 /// Directions in which a scan alone determines a parameter have a residual of zero: below this share
@@ -86,7 +87,7 @@ impl JointFit {
             .fold(DVector::<f64>::zeros(n), |sum, (normal, _)| {
                 sum + normal.diagonal()
             });
-        let scale = diagonal.map(|d| if d > 0.0 { 1.0 / d.sqrt() } else { 1.0 });
+        let scale = NormalEquations::units_of(&diagonal);
         (0..draws)
             .filter_map(|draw| {
                 let mut rng = stream(seed, name, draw as u64);
@@ -97,7 +98,7 @@ impl JointFit {
                     normal += part;
                     right += side;
                 }
-                let step = solved(&normal, &right, &scale, HELD)?;
+                let step = NormalEquations::new(&normal, scale.clone(), |_| HELD)?.solve(&right);
                 Some(self.resampled(&(&self.solution + step)))
             })
             .collect()
@@ -134,10 +135,8 @@ impl<'a> Step<'a> {
     fn new(fit: &'a JointFit, instability: f64) -> Option<Self> {
         let mut rows = fit.rows(&fit.solution, instability);
         let (normal, right) = normal_equations(&rows, fit.solution.len(), |_| true);
-        let scale = normal
-            .diagonal()
-            .map(|d| if d > 0.0 { 1.0 / d.sqrt() } else { 1.0 });
-        let covariance = inverse(&normal, &scale, HELD)?;
+        let units = NormalEquations::units(&normal);
+        let covariance = NormalEquations::new(&normal, units, |_| HELD)?.inverse();
         let step = &covariance * right;
         for (residual, row) in rows.residuals.iter_mut().zip(&rows.jacobian) {
             *residual -= row.dot(&step);

@@ -12,6 +12,7 @@ use nalgebra::{DMatrix, DVector, Matrix4};
 use crate::drift::joint::evaluate::{factor, linearise};
 use crate::drift::joint::solve::JointFit;
 use crate::drift::shares::Statistical;
+use crate::numbers::normal_equations::NormalEquations;
 
 impl JointFit {
     /// The covariance of `waves`, (rad/nm)², as a sum of image noise, drift and sensor noise.
@@ -34,7 +35,10 @@ impl JointFit {
         for row in &design {
             normal.ger(1.0, row, row, 1.0);
         }
-        let inverse = inverse(&normal)?;
+        // Columns that nothing sees are held.
+        let held = |i: usize| if normal[(i, i)] == 0.0 { 1.0 } else { 0.0 };
+        let units = NormalEquations::units(&normal);
+        let inverse = NormalEquations::new(&normal, units, held)?.inverse();
 
         let mut shares = DMatrix::<f64>::zeros(n, n);
         let mut at = 0;
@@ -88,20 +92,4 @@ impl JointFit {
             .filter(|i| !motion.contains(i))
             .collect()
     }
-}
-
-/// The inverse of a normal matrix whose columns differ in unit; columns that nothing sees are held.
-fn inverse(normal: &DMatrix<f64>) -> Option<DMatrix<f64>> {
-    let n = normal.nrows();
-    let scale = normal
-        .diagonal()
-        .map(|d| if d > 0.0 { 1.0 / d.sqrt() } else { 1.0 });
-    let scaled = DMatrix::from_fn(n, n, |i, j| {
-        let unseen = i == j && normal[(i, i)] == 0.0;
-        normal[(i, j)] * scale[i] * scale[j] + if unseen { 1.0 } else { 0.0 }
-    });
-    let inverse = scaled.cholesky()?.inverse();
-    Some(DMatrix::from_fn(n, n, |i, j| {
-        inverse[(i, j)] * scale[i] * scale[j]
-    }))
 }

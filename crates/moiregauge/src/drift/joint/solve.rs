@@ -11,6 +11,7 @@ use crate::drift::joint::link::number_blocks;
 use crate::drift::joint::path::DriftPath;
 use crate::drift::joint::sighting::{Sighting, Terms};
 use crate::numbers::chi2::enlargement;
+use crate::numbers::normal_equations::NormalEquations;
 use crate::spectrum::phases::Phases;
 
 /// Gauss–Newton steps; the problem is nearly linear.
@@ -349,7 +350,7 @@ fn iterate(
                 normal[(i, i)] = 1.0;
             }
         }
-        let scale = normal.diagonal().map(|d| 1.0 / d.sqrt());
+        let scale = NormalEquations::units(&normal);
         if layout.phases.is_none() {
             let scaled = DMatrix::from_fn(n, n, |i, j| normal[(i, j)] * scale[i] * scale[j]);
             let values = scaled.symmetric_eigenvalues();
@@ -359,7 +360,7 @@ fn iterate(
         }
         // Near the middle of the campaign offsets and phases may only be seen together; a little
         // damping holds what cannot be told apart and leaves the final solution where it is.
-        let inverse = inverse(&normal, &scale, DAMPING)?;
+        let inverse = NormalEquations::new(&normal, scale, |_| DAMPING)?.inverse();
         let step = &inverse * &right;
         *x += &step;
         let size = (0..n)
@@ -374,37 +375,4 @@ fn iterate(
         }
     }
     covariance
-}
-
-/// `normal⁻¹ right`, as [`inverse`] does it.
-pub(crate) fn solved(
-    normal: &DMatrix<f64>,
-    right: &DVector<f64>,
-    scale: &DVector<f64>,
-    damping: f64,
-) -> Option<DVector<f64>> {
-    let scaled = scaled(normal, scale, damping);
-    let solution = scaled.cholesky()?.solve(&right.component_mul(scale));
-    Some(solution.component_mul(scale))
-}
-
-fn scaled(normal: &DMatrix<f64>, scale: &DVector<f64>, damping: f64) -> DMatrix<f64> {
-    let n = normal.nrows();
-    DMatrix::from_fn(n, n, |i, j| {
-        let held = if i == j { damping } else { 0.0 };
-        normal[(i, j)] * scale[i] * scale[j] + held
-    })
-}
-
-/// Inverse of a normal matrix by way of one with units on its diagonal, a little damped.
-pub(crate) fn inverse(
-    normal: &DMatrix<f64>,
-    scale: &DVector<f64>,
-    damping: f64,
-) -> Option<DMatrix<f64>> {
-    let n = normal.nrows();
-    let inverse = scaled(normal, scale, damping).cholesky()?.inverse();
-    Some(DMatrix::from_fn(n, n, |i, j| {
-        inverse[(i, j)] * scale[i] * scale[j]
-    }))
 }

@@ -18,6 +18,7 @@ use crate::lattice::fit::frame::{BENT, Frame, wave};
 use crate::lattice::fit::gram::gram;
 use crate::lattice::fit::model::Model;
 use crate::lattice::fit::solve;
+use crate::spectrum::shells::FIRST_SHELL;
 
 /// χ² with six degrees of freedom exceeds 22.5 once in a thousand; the noise that it is counted in is
 /// known to a tenth, which makes it 27.
@@ -135,7 +136,7 @@ fn left(
 fn changes(model: &Model, frame: &Frame, bend: &DVector<f64>) -> [f64; 2] {
     let scale = frame.edge().map(|e| 1.0 / e);
     let mut most = [0.0f64; 2];
-    for index in [[1, 0], [0, 1], [-1, 1]] {
+    for index in FIRST_SHELL {
         let q = wave(&model.pair, index).component_mul(&scale);
         // ψ of this harmonic.
         let [a, b, c] =

@@ -9,11 +9,8 @@ use crate::lattice::fit::model::{Clip, Tables, look};
 use crate::lattice::fit::noise::Leverage;
 use crate::lattice::fit::solve;
 use crate::spectrum::harmonics::{Harmonic, Harmonics};
+use crate::spectrum::shells::{FIRST_SHELL, shells};
 
-/// The three that make the lattice; always in.
-pub(crate) const FIRST_SHELL: [[i32; 2]; 3] = [[1, 0], [0, 1], [-1, 1]];
-/// |h|² of the last of the five shells.
-const LAST_SHELL: i32 = 9;
 /// Frames with more pixels have many periods.
 const MANY_PIXELS: usize = 100_000;
 /// Lines of a sketch.
@@ -219,33 +216,10 @@ impl Fit<'_> {
     }
 }
 
-/// The harmonics of the second to fifth shell, one of each ± pair, near ones first.
+/// The harmonics of the second to fifth shell, near ones first.
 fn candidates() -> Vec<[i32; 2]> {
-    let mut all: Vec<(i32, [i32; 2])> = Vec::new();
-    for k in 0..=3 {
-        for h in -3..=3 {
-            // The pair stands at 60°, so |h q₁ + k q₂|² is h² + hk + k² in units of |q|².
-            let order = h * h + h * k + k * k;
-            if (k > 0 || h > 0) && (2..=LAST_SHELL).contains(&order) {
-                all.push((order, [h, k]));
-            }
-        }
-    }
-    all.sort_unstable();
-    all.into_iter().map(|(_, index)| index).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// A hexagonal lattice has 3 + 3 + 3 + 6 + 3 pairs of harmonics in its first five shells.
-    #[test]
-    fn five_shells_have_eighteen_pairs() {
-        let rest = candidates();
-        assert_eq!(rest.len(), 15);
-        for [h, k] in &rest {
-            assert!(!rest.contains(&[-h, -k]));
-        }
-    }
+    let order = |[h, k]: [i32; 2]| h * h + h * k + k * k;
+    let mut all = shells(5)[FIRST_SHELL.len()..].to_vec();
+    all.sort_unstable_by_key(|index| (order(*index), *index));
+    all
 }

@@ -17,6 +17,7 @@ use crate::lattice::fit::noise::{ForeignWave, Leverage, ResidualNoise};
 use crate::lattice::fit::{bend, choose, closure, frame, solve};
 use crate::spectrum::harmonics::{Harmonics, dot};
 use crate::spectrum::phases::Phases;
+use crate::spectrum::shells::FIRST_SHELL;
 
 /// Steps until the fit has to stand still.
 const MOST_STEPS: usize = 30;
@@ -314,7 +315,7 @@ impl<'a> Fit<'a> {
     /// Covariance of the phases of the first three harmonics and of (p₁, p₂): what the local noise does to
     /// the seven derivatives when background and amplitudes are free.
     fn covariance(&self, noise: &FinalNoise) -> Option<SMatrix<f64, 7, 7>> {
-        const FIRST: usize = choose::FIRST_SHELL.len();
+        const FIRST: usize = FIRST_SHELL.len();
         let model = &self.model;
         let plain = solve::contraction(model, |_, _| 1.0);
         let plain = solve::by_phases(model, FIRST, &plain, |_| 1.0);

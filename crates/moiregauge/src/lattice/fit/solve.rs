@@ -1,8 +1,9 @@
 //! The normal equations of a fit and its covariance.
 
-use nalgebra::{Cholesky, DMatrix, DVector};
+use nalgebra::{DMatrix, DVector};
 
 use crate::lattice::fit::model::Model;
+use crate::numbers::normal_equations::NormalEquations;
 
 /// Diagonal elements that fall below this share of themselves say that functions are the same.
 const DEGENERATE: f64 = 1e-11;
@@ -67,37 +68,20 @@ pub(crate) fn by_phases(
 
 /// Solves the normal equations; `None` where the parameters cannot be told apart.
 pub(crate) fn solve(normal: &DMatrix<f64>, right: &DVector<f64>) -> Option<DVector<f64>> {
-    let (factor, scale) = scaled(normal)?;
-    Some(
-        factor
-            .solve(&right.component_mul(&scale))
-            .component_mul(&scale),
-    )
+    Some(told_apart(normal)?.solve(right))
 }
 
 /// Inverse of a normal matrix.
 pub(crate) fn inverse(normal: &DMatrix<f64>) -> Option<DMatrix<f64>> {
-    let (factor, scale) = scaled(normal)?;
-    let scale = DMatrix::from_diagonal(&scale);
-    Some(&scale * factor.inverse() * &scale)
+    Some(told_apart(normal)?.inverse())
 }
 
-/// Cholesky factor with the diagonal scaled to 1, and the scale.
-fn scaled(normal: &DMatrix<f64>) -> Option<(Cholesky<f64, nalgebra::Dyn>, DVector<f64>)> {
+fn told_apart(normal: &DMatrix<f64>) -> Option<NormalEquations> {
     let scale = normal.diagonal().map(|d| d.max(0.0).sqrt().recip());
     if !scale.iter().all(|s| s.is_finite()) {
         return None;
     }
-    let matrix = DMatrix::from_fn(normal.nrows(), normal.ncols(), |i, j| {
-        normal[(i, j)] * scale[i] * scale[j]
-    });
-    let factor = matrix.cholesky()?;
-    let independent = factor
-        .l_dirty()
-        .diagonal()
-        .iter()
-        .all(|d| d * d > DEGENERATE);
-    independent.then_some((factor, scale))
+    NormalEquations::new(normal, scale, |_| 0.0).filter(|n| n.least_pivot() > DEGENERATE)
 }
 
 /// `Dᵀ (W − W Φ (Φᵀ W Φ)⁻¹ Φᵀ W) D` for the derivatives D, the last `count` columns of `map`, weighted
