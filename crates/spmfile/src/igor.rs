@@ -14,12 +14,11 @@
 //! - The same procedure samples `N` of 2.5 `N` equal steps of a line in each direction: the motion
 //!   exceeds the frame by a quarter ([`Scan::rounding`] is 0.25).
 
-use crate::ChannelInfo;
 use crate::clock;
 use crate::cursor::{Cursor, Endian};
 use crate::error::ReadError;
 use crate::raster::{self, Encoding, Order};
-use crate::scan::{Channel, DateTime, FrameDirection, LineDirection, Scan, Span};
+use crate::scan::{Channel, ChannelInfo, DateTime, FrameDirection, LineDirection, Scan, Span};
 use crate::units::{self, quantity};
 use crate::whole::{Extent, MOST_CHANNELS};
 

@@ -17,12 +17,11 @@
 
 use memchr::memmem;
 
-use crate::ChannelInfo;
 use crate::clock;
 use crate::cursor::Endian;
 use crate::error::ReadError;
 use crate::raster::{self, Encoding, Order};
-use crate::scan::{Channel, DateTime, FrameDirection, LineDirection, Scan, Span};
+use crate::scan::{Channel, ChannelInfo, DateTime, FrameDirection, LineDirection, Scan, Span};
 use crate::units;
 use crate::whole::{Extent, MOST_CHANNELS};
 

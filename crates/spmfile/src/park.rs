@@ -11,12 +11,11 @@
 //!   about their times.
 //! - Files of force curves hold the image on which the curves were placed; it is read.
 
-use crate::ChannelInfo;
 use crate::clock;
 use crate::cursor::{Cursor, Endian};
 use crate::error::ReadError;
 use crate::raster::{self, Encoding, Order};
-use crate::scan::{Channel, DateTime, FrameDirection, LineDirection, Scan, Span};
+use crate::scan::{Channel, ChannelInfo, DateTime, FrameDirection, LineDirection, Scan, Span};
 use crate::tiff_tags::{Directory, directories};
 use crate::whole::Extent;
 

@@ -15,13 +15,12 @@
 //!
 //! Kinds of objects: Gwyddion's `rhk-sm4.c` and spym's `_sm4.py`.
 
-use crate::ChannelInfo;
 use crate::clock;
 use crate::cursor::{Cursor, Endian};
 use crate::error::ReadError;
 use crate::missing::blank_unfilled;
 use crate::raster::{self, Encoding, Order};
-use crate::scan::{Channel, DateTime, FrameDirection, LineDirection, Scan, Span};
+use crate::scan::{Channel, ChannelInfo, DateTime, FrameDirection, LineDirection, Scan, Span};
 use crate::units::{clean, nm_per};
 use crate::whole::{Extent, MOST_CHANNELS};
 

@@ -15,12 +15,13 @@
 
 use memchr::memmem;
 
-use crate::ChannelInfo;
 use crate::clock;
 use crate::cursor::Endian;
 use crate::error::ReadError;
 use crate::raster::{self, Encoding, Order};
-use crate::scan::{Channel, DateTime, FrameDirection, LineDirection, Samples, Scan, Span};
+use crate::scan::{
+    Channel, ChannelInfo, DateTime, FrameDirection, LineDirection, Samples, Scan, Span,
+};
 use crate::units::{self, quantity};
 use crate::whole::Extent;
 

@@ -6,8 +6,10 @@ use moiregauge::analysis::{ScanAnalysis, StrainDraw};
 use moiregauge::estimate::Estimate;
 use moiregauge::strain::TwistStrain;
 
+use super::figure::Drawing;
+use super::layout;
 use super::layout::{LETTERS, is_up, ordinal};
-use super::{Drawing, Subject, layout};
+use super::subject::Subject;
 use crate::draw::axes::{Axes, Labels, Ticks};
 use crate::draw::legend::{self, Key};
 use crate::draw::scale::Range;

@@ -4,6 +4,7 @@ use moiregauge::settings::{Method, Settings};
 use serde::Serialize;
 
 use super::meanings::Meanings;
+use super::template::rendered;
 use super::words::{
     Budgeted, Numbers, consistency, conventions, plain, shown, statistical, wavelengths,
 };
@@ -12,8 +13,19 @@ use crate::error::ReportError;
 use crate::figures::Figure;
 use crate::results::{AtomicResult, DriftResult, Results, ScanResult, SetResult};
 
+const TEMPLATE: &str = include_str!("report.html");
+
+/// The page. `downloads` are the files that it carries for saving.
+pub(crate) fn page(
+    results: &Results,
+    figures: &[Figure],
+    downloads: &[(String, Vec<u8>)],
+) -> Result<Vec<u8>, ReportError> {
+    rendered(TEMPLATE, Page::new(results, figures, downloads)?)
+}
+
 #[derive(Debug, Serialize)]
-pub(super) struct Page<'a> {
+struct Page<'a> {
     results: &'a Results,
     scans: usize,
     /// The published method, whose bias the page has to tell, was used.

@@ -7,7 +7,8 @@ use moiregauge::settings::Settings;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{Conventions, TwistStrainResult};
+use super::conventions::Conventions;
+use super::lattice::TwistStrainResult;
 use crate::provenance::Provenance;
 
 /// What a map comes to.
@@ -47,13 +48,13 @@ pub struct MapResults {
     pub images: Vec<MappedImage>,
     /// Patterns of stripes, in a map of stripes: such a map has no twist and no strain.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub stripes: Option<super::StripesResult>,
+    pub stripes: Option<super::stripes::StripesResult>,
     /// How images of one place agree.
     pub agreement: Option<AgreementResult>,
     /// What differs between upward and downward frames along the slow axis: drift that changes, no strain.
     pub drift_change: Option<DriftChangeResult>,
     /// Regions, uniform areas, wanted twist.
-    pub details: super::MapDetailsResult,
+    pub details: super::region::MapDetailsResult,
     /// Doubts.
     pub caveats: Vec<Caveat>,
 }

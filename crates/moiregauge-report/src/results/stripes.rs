@@ -7,8 +7,8 @@ use nalgebra::Vector2;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::ResultEstimate;
 use super::convert::estimate;
+use super::estimate::ResultEstimate;
 use super::map::{QuantityResult, TrendResult};
 
 /// A map of stripes: patterns with one wave vector each, which say nothing of twist and strain.
