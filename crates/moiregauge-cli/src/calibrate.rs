@@ -7,19 +7,21 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use anyhow::{Context as _, bail, ensure};
-use indicatif::ProgressBar;
 use moiregauge::calibration::KnownLattice;
 use moiregauge::material::Material;
 use moiregauge::series::{MeasureError, MeasuredScan, measure_known};
 use moiregauge::settings::{Grouping, MOST_IMAGES, Settings};
+use moiregauge_report::screen::failures;
 use moiregauge_report::{FailedInput, InputFile};
 use rayon::prelude::*;
 
-use crate::analyze::{BackgroundArg, LineArg, Reading, failures, given_again, read, with_hint};
+use crate::analyze::{BackgroundArg, LineArg, given_again, with_hint};
 use crate::config;
 use crate::info::inputs;
 use crate::input::{Known, KnownArgs};
 use crate::numbers;
+use crate::progress::bar;
+use crate::reading::{Reading, read};
 use crate::say::say;
 
 /// Measure gain, mismatch and orthogonality of a scanner on images of a known lattice
@@ -114,11 +116,7 @@ pub(crate) fn run(args: &CalibrateArgs) -> anyhow::Result<ExitCode> {
     let file = |out| crate::outputs::file(out, args.force, &inputs);
     let file = args.out.as_deref().map(file).transpose()?;
     let known = args.known.of(&inputs);
-    let bar = if args.quiet {
-        ProgressBar::hidden()
-    } else {
-        crate::analyze::progress(inputs.len(), true)
-    };
+    let bar = bar("measuring", "scans", inputs.len(), !args.quiet);
     let measured: Vec<_> = inputs
         .par_iter()
         .map(|path| {

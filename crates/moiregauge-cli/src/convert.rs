@@ -6,8 +6,8 @@ use std::process::ExitCode;
 
 use anyhow::{Context as _, anyhow, bail, ensure};
 use clap::ValueEnum;
-use indicatif::{ProgressBar, ProgressStyle};
 use moiregauge::series::{nominal_geometry, on_grid};
+use moiregauge_pipeline::Content;
 use moiregauge_pipeline::sink::{FileSink, SinkError};
 use rayon::prelude::*;
 use spmfile::{ChannelInfo, Scan, WritableFormat, sensor_axis};
@@ -15,6 +15,7 @@ use spmfile::{ChannelInfo, Scan, WritableFormat, sensor_axis};
 use crate::info::expand;
 use crate::input::{Known, KnownArgs, is_named, with_option};
 use crate::outputs;
+use crate::progress::bar;
 use crate::say::say;
 
 /// Convert scans into formats of other programs: Gwyddion, NumPy, Zarr, TIFF, text
@@ -153,7 +154,7 @@ pub(crate) fn run(args: &ConvertArgs) -> anyhow::Result<ExitCode> {
             (path, stem, new)
         })
         .collect();
-    let progress = progress(inputs.len(), args.quiet);
+    let progress = bar("converting", "files", inputs.len(), !args.quiet);
     let written: Vec<anyhow::Result<Vec<PathBuf>>> = jobs
         .par_iter()
         .map(|(path, stem, new)| {
@@ -229,18 +230,6 @@ fn in_words(out: &Path, scans: usize, files: &[PathBuf]) -> String {
     format!("{scans} written to {}{more}\n", first.display())
 }
 
-fn progress(files: usize, quiet: bool) -> ProgressBar {
-    if quiet {
-        return ProgressBar::hidden();
-    }
-    // Draws on a terminal only.
-    let bar = ProgressBar::new(files as u64);
-    match ProgressStyle::with_template("converting {bar:30} {pos}/{len} files, {eta} left") {
-        Ok(style) => bar.with_style(style),
-        Err(_) => bar,
-    }
-}
-
 /// Where and how files are written.
 struct Target<'a> {
     args: &'a ConvertArgs,
@@ -253,7 +242,7 @@ struct Target<'a> {
 impl Target<'_> {
     /// Converts one file; returns what was written.
     fn convert(&self, path: &Path, stem: &str) -> anyhow::Result<Vec<PathBuf>> {
-        let bytes = moiregauge_pipeline::read(path)?;
+        let content = Content::read(path)?;
         let is_wanted = |info: &ChannelInfo| {
             let points = self.format == WritableFormat::Gxyzf;
             let names = &self.args.channel;
@@ -261,7 +250,7 @@ impl Target<'_> {
                 || names.iter().any(|name| is_named(&info.name, name))
                 || (points && sensor_axis(&info.name, &info.internal_name).is_some())
         };
-        let read = self.known.read(path, &bytes, &is_wanted);
+        let read = self.known.read(path, &content, &is_wanted);
         let (mut scan, replaced) = read.map_err(with_option)?;
         self.channels_are_there(&scan)?;
         let mut log = vec![format!(

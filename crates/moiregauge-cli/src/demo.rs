@@ -5,9 +5,10 @@ use std::process::ExitCode;
 
 use moiregauge::settings::Settings;
 use moiregauge_pipeline::sink::Target;
+use moiregauge_report::screen::summary;
 use moiregauge_report::{Choice, write_report};
 
-use crate::analyze::{Outcome, analyse_files, report_names, summary};
+use crate::analyze::{Outcome, analyse_files, report_names};
 use crate::info::expand;
 use crate::input::Known;
 use crate::outputs;

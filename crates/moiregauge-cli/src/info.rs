@@ -11,6 +11,7 @@ use std::process::ExitCode;
 
 use moiregauge::series::image_choice;
 use moiregauge::settings::Settings;
+use moiregauge_pipeline::Content;
 use serde::Serialize;
 use spmfile::{
     Channel, DateTime, FrameDirection, LineDirection, ReadError, Scan, position_sensors,
@@ -167,9 +168,9 @@ pub(crate) fn run(args: &InfoArgs) -> anyhow::Result<ExitCode> {
 }
 
 fn file_info(path: &Path, at: &[Pixel], known: &Known) -> FileInfo {
-    let (mut scan, mut error) = match moiregauge_pipeline::read(path) {
+    let (mut scan, mut error) = match Content::read(path) {
         Err(error) => (None, Some(error.to_string())),
-        Ok(bytes) => match known.decode(path, &bytes, &|_| true) {
+        Ok(content) => match known.decode(path, &content, &|_| true) {
             Ok(scan) => (Some(scan), None),
             Err(ReadError::Incomplete { reason, readable }) => {
                 let reason = format!("the file is damaged: {reason}");

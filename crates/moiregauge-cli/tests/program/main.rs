@@ -7,6 +7,7 @@ mod figures;
 mod formats;
 mod identity;
 mod inputs;
+mod interrupted;
 mod layers;
 mod maps;
 mod names;
