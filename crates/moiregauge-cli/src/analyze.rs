@@ -3,7 +3,7 @@
 mod again;
 mod args;
 mod arguments;
-mod beside;
+mod atomic;
 mod chain;
 mod channel;
 mod export;
@@ -11,7 +11,10 @@ mod measure;
 mod orientation;
 mod outcomes;
 mod output;
+mod overlap;
 mod run;
+mod shown;
+mod survey;
 mod task;
 
 pub(crate) use args::{AnalyzeArgs, BackgroundArg, ConventionArg, LineArg, MethodArg};

@@ -136,14 +136,8 @@ pub(crate) fn read_again(
     Ok(scan)
 }
 
-/// The same with what is shown beside it, the amplitude of a phase.
-pub(crate) fn read_shown(
-    inputs: &[PathBuf],
-    words: &str,
-    settings: &Settings,
-    known: &Known,
-) -> Option<Scan> {
-    let path = names::with_words(inputs, words)?;
+/// The image of a file, with what is shown beside it: the amplitude of a phase. None where it cannot be read.
+pub(crate) fn read_shown(path: &Path, settings: &Settings, known: &Known) -> Option<Scan> {
     let opened = Opened::new(path, known).ok()?;
     Some(opened.scan(settings, amplitude_of).ok()?.0)
 }

@@ -3,16 +3,17 @@
 use std::path::PathBuf;
 
 use moiregauge::analysis::Analysis;
-use moiregauge::series::{analyse, illustrate, sorted_moires};
+use moiregauge::series::{analyse, sorted_moires};
 use moiregauge::settings::Settings;
 use moiregauge_pipeline::{Known, distinct, names};
 use moiregauge_report::results::NamedSet;
 use moiregauge_report::{FailedInput, Provenance};
-use rayon::prelude::*;
 
 use super::channel::Other;
 use super::measure::{Measured, given_again, measured};
-use crate::reading::read_shown;
+use super::overlap::overlap;
+use super::shown::show;
+use crate::progress::bar;
 
 /// What came out, and of what.
 pub(crate) struct Outcome {
@@ -33,13 +34,18 @@ pub(crate) fn analyse_files(
     loud: bool,
 ) -> Result<Vec<Outcome>, Vec<FailedInput>> {
     let (inputs, repeated) = distinct(inputs);
-    let Measured { files, other } = match measured(&inputs, sets, (settings, known), loud) {
-        Ok(measured) => measured,
-        Err(why) => {
-            failed.push(why);
-            return Err(failed);
-        }
-    };
+    let bar = bar("measuring", "scans", inputs.len(), loud);
+    let window = settings.overlap.then(|| overlap(&inputs, settings, known));
+    if let Some(None) = window {
+        failed.push(FailedInput {
+            file: "--overlap".to_owned(),
+            error: "the scans have no region in common".to_owned(),
+        });
+        return Err(failed);
+    }
+    let window = window.flatten();
+    let with = (settings, known);
+    let Measured { files, other } = measured(&inputs, sets, with, window.as_ref(), &bar);
     let settings = other.as_ref().map_or(settings, |other| &other.settings);
     let (mut scans, mut identities) = (Vec::new(), Vec::new());
     for (path, result) in inputs.iter().zip(files) {
@@ -82,15 +88,4 @@ pub(crate) fn analyse_files(
             }
         });
     Ok(outcomes.collect())
-}
-
-/// Puts the first scan of every set into the analysis as it is shown. Its file is read again for that: no other scan
-/// need stay in memory.
-fn show(analysis: &mut Analysis, inputs: &[PathBuf], (settings, known): (&Settings, &Known)) {
-    analysis.sets.par_iter_mut().for_each(|set| {
-        set.illustration = set.scans.first().and_then(|first| {
-            let scan = read_shown(inputs, &first.file, settings, known)?;
-            illustrate(&scan, first, settings)
-        });
-    });
 }

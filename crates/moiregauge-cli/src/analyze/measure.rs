@@ -2,18 +2,16 @@
 
 use std::path::{Path, PathBuf};
 
+use indicatif::ProgressBar;
 use moiregauge::caveat::Caveat;
-use moiregauge::series::{
-    MeasureError, MeasuredScan, Window, about_repeat, common_window, measure_moires,
-};
+use moiregauge::series::{MeasureError, MeasuredScan, Window, about_repeat, measure_moires};
 use moiregauge::settings::Settings;
 use moiregauge_pipeline::{Known, Repeated, set_of};
+use moiregauge_report::InputFile;
 use moiregauge_report::results::NamedSet;
-use moiregauge_report::{FailedInput, InputFile};
 use rayon::prelude::*;
 
 use super::channel::{Other, others};
-use crate::progress::bar;
 use crate::reading::{Reading, read};
 
 /// What was measured.
@@ -24,37 +22,25 @@ pub(super) struct Measured {
     pub(super) other: Option<Other>,
 }
 
-/// Measures all files, in their common region where that is wanted; in another channel, where none shows a lattice in
+/// Measures all files, in the window if there is one; in another channel, where none shows a lattice in
 /// the usual one.
-///
-/// # Errors
-/// The files have no region in common.
 pub(super) fn measured(
     inputs: &[PathBuf],
     sets: &[NamedSet],
     (settings, known): (&Settings, &Known),
-    loud: bool,
-) -> Result<Measured, FailedInput> {
-    let window = if settings.overlap {
-        let nothing = || FailedInput {
-            file: "--overlap".to_owned(),
-            error: "the scans have no region in common".to_owned(),
-        };
-        Some(overlap(inputs, settings, known).ok_or_else(nothing)?)
-    } else {
-        None
-    };
-    let all =
-        |settings: &Settings| measure_all(inputs, sets, (settings, known), window.as_ref(), loud);
+    window: Option<&Window>,
+    bar: &ProgressBar,
+) -> Measured {
+    let all = |settings: &Settings| measure_all(inputs, sets, (settings, known), window, bar);
     let files = all(settings);
     for other in others(inputs, &files, (settings, known)) {
         let files = all(&other.settings);
         if files.iter().any(Result::is_ok) {
             let other = Some(other);
-            return Ok(Measured { files, other });
+            return Measured { files, other };
         }
     }
-    Ok(Measured { files, other: None })
+    Measured { files, other: None }
 }
 
 /// All files, each its moirés and what identifies it.
@@ -63,18 +49,18 @@ fn measure_all(
     sets: &[NamedSet],
     with: (&Settings, &Known),
     window: Option<&Window>,
-    loud: bool,
+    bar: &ProgressBar,
 ) -> Vec<anyhow::Result<(Vec<MeasuredScan>, InputFile)>> {
-    let progress = bar("measuring", "scans", inputs.len(), loud);
+    bar.reset();
     let measured = inputs
         .par_iter()
         .map(|path| {
             let result = measure_file(path, sets, with, window);
-            progress.inc(1);
+            bar.inc(1);
             result
         })
         .collect();
-    progress.finish_and_clear();
+    bar.finish_and_clear();
     measured
 }
 
@@ -126,14 +112,4 @@ pub(crate) fn given_again(repeated: &[Repeated]) -> Vec<Caveat> {
     let mut caveats: Vec<Caveat> = repeated.iter().map(words).collect();
     caveats.dedup();
     caveats
-}
-
-/// The region common to all files that can be read.
-fn overlap(inputs: &[PathBuf], settings: &Settings, known: &Known) -> Option<Window> {
-    let windows: Vec<Option<Window>> = inputs
-        .par_iter()
-        .map(|path| Window::of(&read(path, settings, known).ok()?.scan, settings))
-        .collect();
-    let windows: Vec<Window> = windows.into_iter().flatten().collect();
-    common_window(&windows)
 }

@@ -1,20 +1,26 @@
-//! The analysis of every moiré, with the record of the run.
+//! Files → the analysis of every moiré, with the record of the run.
 
 use moiregauge::series::refusal;
 use moiregauge_report::screen::failures;
 
-use super::beside::Beside;
+use super::atomic::orientation;
 use super::chain::{Outcome, analyse_files};
+use super::survey::survey_image;
 use super::task::Task;
-use crate::stripes;
+use crate::{config, stripes};
 
 /// Reads what is beside the scans, then these, and analyses them.
 ///
 /// # Errors
 /// Nothing could be analysed, or all of it is excluded.
 pub(super) fn outcomes(task: &Task, loud: bool) -> anyhow::Result<Vec<Outcome>> {
-    let beside = Beside::read(task)?;
-    let settings = beside.settings(task.run.settings.clone())?;
+    let survey = survey_image(task)?;
+    let atomic = orientation(task)?;
+    let mut settings = task.run.settings.clone();
+    if let Some((found, _)) = &atomic {
+        settings.lattice_angle = Some(found.known());
+        config::check(&settings)?;
+    }
     let wanted = task.run.report;
     let outcomes = analyse_files(
         &task.inputs,
@@ -37,9 +43,20 @@ pub(super) fn outcomes(task: &Task, loud: bool) -> anyhow::Result<Vec<Outcome>> 
     }
     // The files are the same for all moirés.
     let mut record = None;
-    for outcome in &mut outcomes {
-        beside.join(outcome);
-        let provenance = &mut outcome.provenance;
+    for Outcome {
+        analysis,
+        provenance,
+    } in &mut outcomes
+    {
+        if let Some((found, files)) = &atomic {
+            analysis.caveats.extend(found.caveats.iter().cloned());
+            analysis.atomic = Some(found.clone());
+            provenance.inputs.extend(files.iter().cloned());
+        }
+        if let Some((picture, file)) = &survey {
+            analysis.survey = Some(picture.clone());
+            provenance.inputs.push(file.clone());
+        }
         let record = record.get_or_insert_with(|| task.record(&provenance.inputs));
         provenance.run = Some(record.clone());
     }

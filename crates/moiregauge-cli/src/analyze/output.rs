@@ -1,6 +1,6 @@
 //! Outcomes → files and words.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use moiregauge::series::refusal;
@@ -92,10 +92,11 @@ impl Output {
             let written = self.report(task, outcome, within)?;
             if self.loud {
                 answers.push(summary(&outcome.analysis));
-                answers.push(format!(
-                    "\nWritten to {}\n",
-                    main_file(&self.out.join(within), &written).display()
-                ));
+                // The file to open first.
+                let page = written.iter().any(|(name, _)| name == "report.html");
+                let first = if page { "report.html" } else { "results.json" };
+                let place = self.out.join(within).join(first);
+                answers.push(format!("\nWritten to {}\n", place.display()));
             }
             let results = written.into_iter().find(|(name, _)| name == "results.json");
             documents.extend(results.map(|(_, bytes)| bytes));
@@ -156,16 +157,6 @@ fn within(moires: usize) -> Vec<String> {
         return vec![String::new()];
     }
     (1..=moires).map(|n| format!("moire-{n}/")).collect()
-}
-
-/// The file to open first.
-fn main_file(out: &Path, files: &[(String, Vec<u8>)]) -> PathBuf {
-    let report = files.iter().any(|(name, _)| name == "report.html");
-    out.join(if report {
-        "report.html"
-    } else {
-        "results.json"
-    })
 }
 
 /// One JSON document: that of the only moiré, or a list of those of all.

@@ -13,6 +13,7 @@ mod estimate;
 mod joint;
 mod lattice;
 mod map;
+mod quantity;
 mod readings;
 mod region;
 mod run;
@@ -34,8 +35,9 @@ pub use joint::{JointResult, TestedResult};
 pub use lattice::{LatticeVector, StrainMonteCarlo, TwistStrainResult};
 pub use map::{
     AgreementResult, DriftChangeResult, HarmonicResult, MapResults, MappedImage, MaskCount,
-    QuantityResult, TrendResult, mask_counts, quantities,
+    mask_counts, quantities,
 };
+pub use quantity::{QuantityResult, TrendResult};
 pub use readings::{
     AtomicResult, IsotropicStrainResult, NameResult, NamesResult, OtherSenseResult, ReadingsResult,
     ShiftResult, SolutionResult, SplitResult, StrainTensorResult, TensorNumbers, TensorSigmas,

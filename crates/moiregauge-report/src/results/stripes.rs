@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use super::convert::estimate;
 use super::estimate::ResultEstimate;
-use super::map::{QuantityResult, TrendResult};
+use super::quantity::{QuantityResult, TrendResult};
 
 /// A map of stripes: patterns with one wave vector each, which say nothing of twist and strain.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
