@@ -3,14 +3,16 @@
 pub(crate) mod file;
 mod words;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::{Context as _, bail, ensure};
+use indicatif::ProgressBar;
 use moiregauge::calibration::KnownLattice;
 use moiregauge::material::Material;
-use moiregauge::series::{MeasureError, MeasuredScan, measure_known};
+use moiregauge::series::{Calibrated, MeasureError, MeasuredScan, measure_known};
 use moiregauge::settings::{Grouping, MOST_IMAGES, Settings};
+use moiregauge_pipeline::sink::OneFile;
 use moiregauge_report::screen::failures;
 use moiregauge_report::{FailedInput, InputFile};
 use rayon::prelude::*;
@@ -117,37 +119,14 @@ pub(crate) fn run(args: &CalibrateArgs) -> anyhow::Result<ExitCode> {
     let file = args.out.as_deref().map(file).transpose()?;
     let known = args.known.of(&inputs);
     let bar = bar("measuring", "scans", inputs.len(), !args.quiet);
-    let measured: Vec<_> = inputs
-        .par_iter()
-        .map(|path| {
-            let result = measured(path, &settings, &known, &cell);
-            bar.inc(1);
-            result
-        })
-        .collect();
-    bar.finish_and_clear();
-    let (mut scans, mut files): (Vec<MeasuredScan>, Vec<InputFile>) = (Vec::new(), Vec::new());
-    // Images in which no lattice was found.
-    let mut looked_at = 0;
-    for (path, result) in inputs.iter().zip(measured) {
-        match result {
-            Ok((scan, file)) => {
-                scans.push(scan);
-                files.push(file);
-            }
-            Err(error) => {
-                let cause = error.downcast_ref();
-                looked_at += usize::from(matches!(cause, Some(MeasureError::Lattice { .. })));
-                failed.push(FailedInput {
-                    file: moiregauge_pipeline::names::in_words(path),
-                    error: format!("{error:#}"),
-                });
-            }
-        }
-    }
+    let all = measured_all(&inputs, &bar, |path| {
+        measured(path, &settings, &known, &cell)
+    });
+    failed.extend(all.failed);
+    let (scans, files) = (all.scans, all.files);
     eprint!("{}", failures(&failed));
     ensure!(
-        !scans.is_empty() || looked_at > 0,
+        !scans.is_empty() || all.looked_at > 0,
         "nothing could be read: there is no image to look for the lattice of {} in",
         lattice.name
     );
@@ -163,18 +142,7 @@ pub(crate) fn run(args: &CalibrateArgs) -> anyhow::Result<ExitCode> {
         say(&words::summary(&found, &lattice))?;
     }
     if let (Some(out), Some(file)) = (&args.out, file) {
-        if !found.covariance_known {
-            bail!(
-                "{} is not written: nobody knows its errors, since the frames do not tell the drift and have no line \
-                 rate; give --line-rate",
-                out.display()
-            );
-        }
-        if let Some(problem) = found.calibration.problem() {
-            bail!("{} is not written: {problem}", out.display());
-        }
-        let text = file::text(&found, &lattice, args.drift_sigma, &files)?;
-        file.write(text.into_bytes())?;
+        write(&found, &lattice, (args.drift_sigma, &files), (out, file))?;
         if !args.quiet {
             say(&format!(
                 "\nWritten to {0}; for moiregauge analyze --calibration {0}\n",
@@ -189,9 +157,74 @@ pub(crate) fn run(args: &CalibrateArgs) -> anyhow::Result<ExitCode> {
     })
 }
 
+/// What the images of the known lattice tell.
+#[derive(Default)]
+struct All {
+    scans: Vec<MeasuredScan>,
+    files: Vec<InputFile>,
+    failed: Vec<FailedInput>,
+    /// Images in which no lattice was found.
+    looked_at: usize,
+}
+
+/// Measures all images.
+fn measured_all(
+    inputs: &[PathBuf],
+    bar: &ProgressBar,
+    measured: impl Fn(&Path) -> anyhow::Result<(MeasuredScan, InputFile)> + Sync,
+) -> All {
+    let results: Vec<_> = inputs
+        .par_iter()
+        .map(|path| {
+            let result = measured(path);
+            bar.inc(1);
+            result
+        })
+        .collect();
+    bar.finish_and_clear();
+    let mut all = All::default();
+    for (path, result) in inputs.iter().zip(results) {
+        match result {
+            Ok((scan, file)) => {
+                all.scans.push(scan);
+                all.files.push(file);
+            }
+            Err(error) => {
+                let cause = error.downcast_ref();
+                all.looked_at += usize::from(matches!(cause, Some(MeasureError::Lattice { .. })));
+                all.failed.push(FailedInput {
+                    file: moiregauge_pipeline::names::in_words(path),
+                    error: format!("{error:#}"),
+                });
+            }
+        }
+    }
+    all
+}
+
+/// Writes the calibration, unless nobody could use it.
+fn write(
+    found: &Calibrated,
+    lattice: &KnownLattice,
+    (drift_sigma, files): (f64, &[InputFile]),
+    (out, file): (&Path, OneFile),
+) -> anyhow::Result<()> {
+    ensure!(
+        found.covariance_known,
+        "{} is not written: nobody knows its errors, since the frames do not tell the drift and have no line \
+         rate; give --line-rate",
+        out.display()
+    );
+    if let Some(problem) = found.calibration.problem() {
+        bail!("{} is not written: {problem}", out.display());
+    }
+    let text = file::text(found, lattice, drift_sigma, files)?;
+    Ok(file.write(text.into_bytes())?)
+}
+
 /// One image of the known cell.
 fn measured(
-    path: &std::path::Path,
+    path: &Path,
     settings: &Settings,
     known: &Known,
     cell: &nalgebra::Matrix2<f64>,

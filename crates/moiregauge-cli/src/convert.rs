@@ -144,34 +144,7 @@ pub(crate) fn run(args: &ConvertArgs) -> anyhow::Result<ExitCode> {
         sink: outputs::files(folder, args.force, &protected)?,
     };
     target.can_be_written()?;
-    // Before anything runs in parallel: which of two files of one name is first must not depend on it.
-    let mut taken = HashSet::new();
-    let jobs: Vec<(&PathBuf, String, bool)> = inputs
-        .iter()
-        .map(|path| {
-            let stem = target.stem(path);
-            let new = taken.insert(stem.to_lowercase());
-            (path, stem, new)
-        })
-        .collect();
-    let progress = bar("converting", "files", inputs.len(), !args.quiet);
-    let written: Vec<anyhow::Result<Vec<PathBuf>>> = jobs
-        .par_iter()
-        .map(|(path, stem, new)| {
-            let result = if *new {
-                target.convert(path, stem)
-            } else {
-                let name = folder.join(stem);
-                Err(anyhow!(
-                    "another file of this run already becomes {}",
-                    name.display()
-                ))
-            };
-            progress.inc(1);
-            result
-        })
-        .collect();
-    progress.finish_and_clear();
+    let written = target.convert_all(&inputs, folder);
     let (mut files, mut scans) = (Vec::new(), 0);
     for (path, result) in inputs.iter().zip(written) {
         match result {
@@ -240,6 +213,39 @@ struct Target<'a> {
 }
 
 impl Target<'_> {
+    /// Converts all files; returns what each became.
+    fn convert_all(&self, inputs: &[PathBuf], folder: &Path) -> Vec<anyhow::Result<Vec<PathBuf>>> {
+        // Before anything runs in parallel: which of two files of one name is first must not depend on it.
+        let mut taken = HashSet::new();
+        let jobs: Vec<(&PathBuf, String, bool)> = inputs
+            .iter()
+            .map(|path| {
+                let stem = self.stem(path);
+                let new = taken.insert(stem.to_lowercase());
+                (path, stem, new)
+            })
+            .collect();
+        let progress = bar("converting", "files", inputs.len(), !self.args.quiet);
+        let written: Vec<anyhow::Result<Vec<PathBuf>>> = jobs
+            .par_iter()
+            .map(|(path, stem, new)| {
+                let result = if *new {
+                    self.convert(path, stem)
+                } else {
+                    let name = folder.join(stem);
+                    Err(anyhow!(
+                        "another file of this run already becomes {}",
+                        name.display()
+                    ))
+                };
+                progress.inc(1);
+                result
+            })
+            .collect();
+        progress.finish_and_clear();
+        written
+    }
+
     /// Converts one file; returns what was written.
     fn convert(&self, path: &Path, stem: &str) -> anyhow::Result<Vec<PathBuf>> {
         let content = Content::read(path)?;

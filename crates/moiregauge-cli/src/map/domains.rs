@@ -84,27 +84,7 @@ impl DomainArgs {
                 "no-domains",
                 "no mesh of nodes could be found in the image".to_owned(),
             ),
-            Some(d) => {
-                if !d.contrast_is_clear && self.nodes.is_none() {
-                    doubt(
-                        "nodes-bright-or-dark",
-                        "the image does not tell whether nodes are bright or dark: triangles may stand on domains \
-                         instead of nodes; say --nodes bright or dark"
-                            .to_owned(),
-                    );
-                }
-                let odd = d.missing.len() + d.extra.len();
-                if odd as f64 > ODD * d.nodes.len() as f64 {
-                    doubt(
-                        "mesh-with-gaps",
-                        format!(
-                            "{odd} of {} nodes are missing or fit into no triangle: the mesh may not be that of the \
-                             lattice",
-                            d.nodes.len()
-                        ),
-                    );
-                }
-            }
+            Some(d) => about_mesh(d, self.nodes.is_none(), &mut doubt),
         }
         if regime.choice == RegimeChoice::Domains {
             let why = format!(
@@ -124,5 +104,28 @@ impl DomainArgs {
             regime,
             caveats,
         }
+    }
+}
+
+/// What is doubtful about a mesh of nodes; `is_open` where nobody said whether nodes are bright or dark.
+fn about_mesh(d: &DomainMap, is_open: bool, doubt: &mut impl FnMut(&'static str, String)) {
+    if !d.contrast_is_clear && is_open {
+        doubt(
+            "nodes-bright-or-dark",
+            "the image does not tell whether nodes are bright or dark: triangles may stand on domains \
+             instead of nodes; say --nodes bright or dark"
+                .to_owned(),
+        );
+    }
+    let odd = d.missing.len() + d.extra.len();
+    if odd as f64 > ODD * d.nodes.len() as f64 {
+        doubt(
+            "mesh-with-gaps",
+            format!(
+                "{odd} of {} nodes are missing or fit into no triangle: the mesh may not be that of the \
+                 lattice",
+                d.nodes.len()
+            ),
+        );
     }
 }

@@ -6,7 +6,7 @@ use anyhow::ensure;
 use moiregauge::caveat::Caveat;
 use moiregauge::map::TwistStrainMap;
 use moiregauge::region::{
-    DeviceSearch, Profile, Region, RegionStatistics, WantedArea, WantedTwist, uniform_areas,
+    Device, DeviceSearch, Profile, Region, RegionStatistics, WantedArea, WantedTwist, uniform_areas,
 };
 use moiregauge_report::results::{MapDetailsResult, RegionMeanResult};
 use moiregauge_report::{MapDetails, plus_minus, two_digits};
@@ -89,53 +89,8 @@ impl RegionArgs {
             .iter()
             .map(|r| RegionStatistics::new(map, r))
             .collect();
-        for found in &regions {
-            let name = found.region.name.as_str();
-            if found.good == 0 {
-                doubts.push(Caveat::new(
-                    "region-empty",
-                    name,
-                    "the region has no good node: it has no values",
-                ));
-            } else if found.covered < 0.95 || found.masked_share > 0.05 {
-                doubts.push(Caveat::new(
-                    "region-in-part",
-                    name,
-                    format!(
-                        "the map reaches {:.0} % of the region, and {:.0} % of the nodes there are not to be \
-                         believed: its numbers are those of the rest",
-                        100.0 * found.covered,
-                        100.0 * found.masked_share
-                    ),
-                ));
-            }
-        }
-        let devices = self.device.map(|size| {
-            let search = DeviceSearch {
-                orientations: usize::from(self.device_angles),
-                most: usize::from(self.device_count),
-                ..DeviceSearch::new(size)
-            };
-            let [w, h] = size.map(two_digits);
-            let place = format!("device {w} nm × {h} nm");
-            if size[0].min(size[1]) < 2.355 * map.window_nm {
-                doubts.push(Caveat::new(
-                    "device-below-resolution",
-                    place.as_str(),
-                    "the device is narrower than the map resolves: the twist may vary more within it than the \
-                     map shows",
-                ));
-            }
-            let found = uniform_areas(map, &search);
-            if found.is_empty() {
-                doubts.push(Caveat::new(
-                    "device-fits-nowhere",
-                    place,
-                    "no area of this size lies within the map with 95 % of its nodes to be believed",
-                ));
-            }
-            found
-        });
+        doubts.extend(regions.iter().filter_map(about_region));
+        let devices = self.device.map(|size| self.devices(map, size, &mut doubts));
         let wanted = self
             .wanted
             .map(|w| (w, WantedArea::new(map, 0..map.grid.len(), &w)));
@@ -154,6 +109,61 @@ impl RegionArgs {
         };
         Ok((details, doubts))
     }
+
+    /// The most uniform areas of a size.
+    fn devices(
+        &self,
+        map: &TwistStrainMap,
+        size: [f64; 2],
+        doubts: &mut Vec<Caveat>,
+    ) -> Vec<Device> {
+        let search = DeviceSearch {
+            orientations: usize::from(self.device_angles),
+            most: usize::from(self.device_count),
+            ..DeviceSearch::new(size)
+        };
+        let [w, h] = size.map(two_digits);
+        let place = format!("device {w} nm × {h} nm");
+        if size[0].min(size[1]) < 2.355 * map.window_nm {
+            doubts.push(Caveat::new(
+                "device-below-resolution",
+                place.as_str(),
+                "the device is narrower than the map resolves: the twist may vary more within it than the \
+                 map shows",
+            ));
+        }
+        let found = uniform_areas(map, &search);
+        if found.is_empty() {
+            doubts.push(Caveat::new(
+                "device-fits-nowhere",
+                place,
+                "no area of this size lies within the map with 95 % of its nodes to be believed",
+            ));
+        }
+        found
+    }
+}
+
+/// Says where a region is not as it was asked for.
+fn about_region(found: &RegionStatistics) -> Option<Caveat> {
+    let name = found.region.name.as_str();
+    if found.good == 0 {
+        return Some(Caveat::new(
+            "region-empty",
+            name,
+            "the region has no good node: it has no values",
+        ));
+    }
+    let in_part = found.covered < 0.95 || found.masked_share > 0.05;
+    let words = || {
+        format!(
+            "the map reaches {:.0} % of the region, and {:.0} % of the nodes there are not to be \
+             believed: its numbers are those of the rest",
+            100.0 * found.covered,
+            100.0 * found.masked_share
+        )
+    };
+    in_part.then(|| Caveat::new("region-in-part", name, words()))
 }
 
 /// An error if none of the places, nor anything between them, can lie in the map.

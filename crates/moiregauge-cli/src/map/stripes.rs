@@ -99,6 +99,7 @@ pub(super) fn look(
     }))
 }
 
+/// What has to be said of the stripes beside their numbers.
 fn doubts(found: &ScanStripes, file: &str, caveats: &mut Vec<Caveat>) {
     let mut doubt = |code, why: String| caveats.push(Caveat::new(code, file, why));
     doubt(
@@ -135,6 +136,25 @@ fn doubts(found: &ScanStripes, file: &str, caveats: &mut Vec<Caveat>) {
             ),
         );
     }
+    about_patterns(stripes, &mut doubt);
+    if !found.drift_corrected {
+        doubt(
+            "map-not-drift-corrected",
+            "the drift is not known: it stretches and shears the map, the same everywhere (--drift)".to_owned(),
+        );
+    }
+    if !stripes.noise_measured {
+        doubt(
+            "map-noise-guessed",
+            "the frame holds too few periods to see noise between the harmonics: the errors of the map are those of \
+             what a single wave in each pattern leaves"
+                .to_owned(),
+        );
+    }
+}
+
+/// What single waves and the map disagree about.
+fn about_patterns(stripes: &SampledStripes, doubt: &mut impl FnMut(&'static str, String)) {
     for (pattern, number) in stripes.patterns.iter().zip(1..) {
         if pattern.coherence < STRAIGHT {
             doubt(
@@ -166,20 +186,6 @@ fn doubts(found: &ScanStripes, file: &str, caveats: &mut Vec<Caveat>) {
                 ),
             );
         }
-    }
-    if !found.drift_corrected {
-        doubt(
-            "map-not-drift-corrected",
-            "the drift is not known: it stretches and shears the map, the same everywhere (--drift)".to_owned(),
-        );
-    }
-    if !stripes.noise_measured {
-        doubt(
-            "map-noise-guessed",
-            "the frame holds too few periods to see noise between the harmonics: the errors of the map are those of \
-             what a single wave in each pattern leaves"
-                .to_owned(),
-        );
     }
 }
 

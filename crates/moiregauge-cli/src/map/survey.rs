@@ -26,18 +26,15 @@ pub(super) fn survey(
         Large::open(path, settings, known, always).with_context(|| path.display().to_string())
     };
     // One large image makes a survey of all. It is opened once.
-    let mut opened = None;
-    if !args.in_bands {
-        for path in &task.inputs {
-            if let Some(large) = open(path, false)? {
-                opened = Some((path, large));
-                break;
-            }
-        }
-        if opened.is_none() {
+    let mut opened = if args.in_bands {
+        None
+    } else {
+        let large = |path| Some((path, open(path, false).transpose()?));
+        let Some((path, large)) = task.inputs.iter().find_map(large) else {
             return Ok(None);
-        }
-    }
+        };
+        Some((path, large?))
+    };
     ensure!(
         args.analyze.sets()?.is_empty(),
         "--set: images that are mapped in bands lie side by side in one map and make no sets"
