@@ -12,9 +12,9 @@ use moiregauge_pipeline::sink::{FileSink, SinkError};
 use rayon::prelude::*;
 use spmfile::{ChannelInfo, Scan, WritableFormat, sensor_axis};
 
-use crate::info::expand;
 use crate::input::{Known, KnownArgs, is_named, with_option};
 use crate::outputs;
+use crate::paths::expand;
 use crate::progress::bar;
 use crate::say::say;
 

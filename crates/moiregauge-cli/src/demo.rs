@@ -9,9 +9,9 @@ use moiregauge_report::screen::summary;
 use moiregauge_report::{Choice, write_report};
 
 use crate::analyze::{Outcome, analyse_files, report_names};
-use crate::info::expand;
 use crate::input::Known;
 use crate::outputs;
+use crate::paths::expand;
 use crate::say::say;
 use crate::simulate::{paper_sets, write_sets};
 

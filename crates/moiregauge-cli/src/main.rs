@@ -11,6 +11,7 @@ mod map;
 mod moire;
 mod numbers;
 mod outputs;
+mod paths;
 mod plan;
 mod progress;
 mod reading;

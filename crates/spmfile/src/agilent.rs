@@ -25,10 +25,7 @@ const MONTHS: [&str; 12] = [
 ];
 
 fn damaged(reason: impl Into<String>) -> ReadError {
-    ReadError::Damaged {
-        format: FORMAT,
-        reason: reason.into(),
-    }
+    ReadError::damaged(FORMAT, reason)
 }
 
 type Lines = Vec<(String, String)>;

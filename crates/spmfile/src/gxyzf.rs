@@ -30,17 +30,11 @@ const KEYS: [&str; 7] = [
 ];
 
 fn damaged(reason: impl Into<String>) -> ReadError {
-    ReadError::Damaged {
-        format: FORMAT,
-        reason: reason.into(),
-    }
+    ReadError::damaged(FORMAT, reason)
 }
 
 fn unsupported(reason: String) -> ReadError {
-    ReadError::Unsupported {
-        format: FORMAT,
-        reason,
-    }
+    ReadError::unsupported(FORMAT, reason)
 }
 
 /// Reads the channels that are wanted.

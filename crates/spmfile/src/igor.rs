@@ -31,17 +31,11 @@ const LABEL: usize = 32;
 const ROUNDING: f64 = 0.25;
 
 fn damaged(reason: impl Into<String>) -> ReadError {
-    ReadError::Damaged {
-        format: FORMAT,
-        reason: reason.into(),
-    }
+    ReadError::damaged(FORMAT, reason)
 }
 
 fn unsupported(reason: impl Into<String>) -> ReadError {
-    ReadError::Unsupported {
-        format: FORMAT,
-        reason: reason.into(),
-    }
+    ReadError::unsupported(FORMAT, reason)
 }
 
 /// What the headers of a version 5 file say.

@@ -29,10 +29,7 @@ const FORMAT: &str = "Nanonis";
 const END: &[u8] = b":SCANIT_END:";
 
 fn damaged(reason: impl Into<String>) -> ReadError {
-    ReadError::Damaged {
-        format: FORMAT,
-        reason: reason.into(),
-    }
+    ReadError::damaged(FORMAT, reason)
 }
 
 /// Reads the channels that are wanted.

@@ -31,10 +31,7 @@ const FORMAT: &str = "Nanosurf";
 const DATA_MARK: &[u8] = b"#!";
 
 fn damaged(reason: impl Into<String>) -> ReadError {
-    ReadError::Damaged {
-        format: FORMAT,
-        reason: reason.into(),
-    }
+    ReadError::damaged(FORMAT, reason)
 }
 
 /// Sections by name, keys in the order of the file.

@@ -32,10 +32,7 @@ const VERSION_2: f64 = 0x0100_0002 as f64;
 const NM_PER_MICROMETRE: f64 = 1e3;
 
 fn damaged(reason: impl Into<String>) -> ReadError {
-    ReadError::Damaged {
-        format: FORMAT,
-        reason: reason.into(),
-    }
+    ReadError::damaged(FORMAT, reason)
 }
 
 /// The structure of the tag [`HEADER`].

@@ -54,10 +54,7 @@ const TOLD: [(usize, &str); 5] = [
 const MOST_TEXTS: usize = 64;
 
 fn damaged(reason: impl Into<String>) -> ReadError {
-    ReadError::Damaged {
-        format: FORMAT,
-        reason: reason.into(),
-    }
+    ReadError::damaged(FORMAT, reason)
 }
 
 /// Reads the channels that are wanted.

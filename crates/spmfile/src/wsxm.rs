@@ -29,10 +29,7 @@ const FORMAT: &str = "WSxM";
 const END: &[u8] = b"[Header end]";
 
 fn damaged(reason: impl Into<String>) -> ReadError {
-    ReadError::Damaged {
-        format: FORMAT,
-        reason: reason.into(),
-    }
+    ReadError::damaged(FORMAT, reason)
 }
 
 /// Reads the channel if it is wanted.

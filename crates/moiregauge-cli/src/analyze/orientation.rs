@@ -6,8 +6,8 @@ use clap::ValueEnum;
 use moiregauge::settings::{KnownOrientation, LatticeDirection, Settings, TwistSense};
 use moiregauge_report::results::AtomicImages;
 
-use crate::info::expand;
 use crate::numbers;
+use crate::paths::expand;
 
 /// The options for it.
 #[derive(clap::Args, Clone, Debug, Default)]

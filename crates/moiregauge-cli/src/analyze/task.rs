@@ -10,7 +10,7 @@ use moiregauge_report::results::{Run, Told};
 use super::again::Again;
 use super::args::AnalyzeArgs;
 use super::arguments::arguments;
-use crate::info::inputs;
+use crate::paths::inputs;
 
 /// A run to be done.
 pub(crate) struct Task {

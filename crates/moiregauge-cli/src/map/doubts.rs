@@ -4,7 +4,7 @@ use moiregauge::caveat::Caveat;
 use moiregauge::map::{DriftChange, LatticeMap, register};
 use moiregauge::series::LineMap;
 
-use crate::info::line_name;
+use crate::say::line_name;
 
 /// Shifts beyond this share of a period may belong to another one.
 const FAR: f64 = 0.3;

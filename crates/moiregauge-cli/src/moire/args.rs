@@ -10,7 +10,7 @@ use moiregauge::settings::{Calibration, KnownOrientation, Settings};
 use moiregauge::strain::{Orientation, Stacking};
 use nalgebra::Matrix2;
 
-use super::Question;
+use super::question::Question;
 use crate::analyze::{Angle, ConventionArg, DirectionArg, SenseArg, parse_angle};
 use crate::config;
 use crate::numbers;

@@ -13,10 +13,7 @@ use crate::whole::MOST_CHANNELS;
 const FORMAT: &str = "Gwyddion";
 
 fn damaged(reason: impl Into<String>) -> ReadError {
-    ReadError::Damaged {
-        format: FORMAT,
-        reason: reason.into(),
-    }
+    ReadError::damaged(FORMAT, reason)
 }
 
 /// One named value within an object; texts, objects and arrays as their bytes.

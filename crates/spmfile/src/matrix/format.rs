@@ -10,15 +10,9 @@ pub(super) const CHANNEL: &[u8] = b"TLKB";
 pub(super) const LOG: &[u8] = b"ATEM";
 
 pub(super) fn damaged(reason: impl Into<String>) -> ReadError {
-    ReadError::Damaged {
-        format: FORMAT,
-        reason: reason.into(),
-    }
+    ReadError::damaged(FORMAT, reason)
 }
 
 pub(super) fn unsupported(reason: impl Into<String>) -> ReadError {
-    ReadError::Unsupported {
-        format: FORMAT,
-        reason: reason.into(),
-    }
+    ReadError::unsupported(FORMAT, reason)
 }
