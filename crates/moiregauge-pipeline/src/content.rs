@@ -21,7 +21,7 @@ impl Content {
     /// Reads a file.
     ///
     /// # Errors
-    /// As [`reading::read`].
+    /// As [`crate::read`].
     pub fn read(place: &Path) -> Result<Self, FileError> {
         Ok(Self::of(reading::read(place)?))
     }

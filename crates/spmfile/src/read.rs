@@ -32,7 +32,7 @@ pub fn read_selected(
     read_as(detect(bytes), bytes, wanted)
 }
 
-/// The same for bytes of which [`detect`] has told the format before.
+/// The same for bytes of which [`detect()`] has told the format before.
 ///
 /// # Errors
 /// As [`read_selected`].

@@ -34,7 +34,7 @@ pub struct ArrayOptions {
     pub sensor_unit: Option<String>,
 }
 
-/// Reads the arrays that are wanted; [`crate::read`] does so without options.
+/// Reads the arrays that are wanted; [`crate::read()`] does so without options.
 ///
 /// # Errors
 /// - The bytes are no array and no picture.
@@ -47,7 +47,7 @@ pub fn read(
     read_as(detect(bytes), bytes, options, wanted)
 }
 
-/// The same for bytes of which [`crate::detect`] has told the format before.
+/// The same for bytes of which [`crate::detect()`] has told the format before.
 ///
 /// # Errors
 /// As [`read`].

@@ -6,7 +6,7 @@
 //! The file of a channel holds raw counts only. Lines, points, size, scale and times stand in the log
 //! of the session, in which the state of the instrument has to be found by playing all changes from
 //! the start to the line that names the file. [`log_file`] tells the name of the log from that of the
-//! file; [`read`] takes the bytes of both.
+//! file; [`read()`] takes the bytes of both.
 //!
 //! - Samples follow each other in time: trace of the first line, its retrace (`X_Retrace`), the next
 //!   line; after the frame upwards that downwards (`Y_Retrace`). The first line upwards is the bottom
