@@ -1,0 +1,38 @@
+//! The table of doubts: every code once, with a meaning and an advice in sentences.
+
+use moiregauge::caveat::{Caveat, FileDoubt, Severity, explained};
+
+#[test]
+fn codes_are_kebab_case_and_unique() {
+    let mut codes: Vec<&str> = explained().map(|e| e.code).collect();
+    let letters = |c: char| c.is_ascii_lowercase() || c == '-';
+    assert!(codes.iter().all(|code| code.chars().all(letters)));
+    let all = codes.len();
+    codes.sort_unstable();
+    codes.dedup();
+    assert_eq!(codes.len(), all);
+}
+
+/// In the terms of the field: options are those of a program.
+#[test]
+fn the_table_is_in_sentences_without_options() {
+    for entry in explained() {
+        for text in [entry.meaning, entry.what_to_do] {
+            assert!(text.ends_with('.'), "{}: {text}", entry.code);
+            assert!(!text.contains("--"), "{}: {text}", entry.code);
+            assert!(!text.contains("  "), "{}: {text}", entry.code);
+            assert!(text.len() > 20, "{}: {text}", entry.code);
+        }
+    }
+}
+
+#[test]
+fn a_doubt_has_the_entry_of_its_own() {
+    let caveat = Caveat::new(FileDoubt::EverythingExcluded { scans: 4 }, "analysis");
+    assert_eq!(caveat.code(), "everything-excluded");
+    assert_eq!(caveat.severity(), Severity::Serious);
+    assert_eq!(
+        caveat.message(),
+        "the user excluded all 4 scans: nothing is left to analyse"
+    );
+}
