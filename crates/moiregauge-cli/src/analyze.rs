@@ -28,6 +28,7 @@ pub(crate) use moiregauge_report::screen::{caveats as caveat_lines, failures, su
 pub(crate) use orientation::{Angle, DirectionArg, SenseArg, parse_angle};
 pub(crate) use task::{Task, out_beside};
 
+use crate::hints;
 use crate::outputs::{commit, write_all};
 use crate::say::say;
 use moiregauge::series::{is_nothing_left, refusal};
@@ -80,7 +81,7 @@ pub(crate) fn run(args: &AnalyzeArgs) -> anyhow::Result<ExitCode> {
                     analysis.settings.bilayer().name()
                 ));
             }
-            answers.push(summary(analysis));
+            answers.push(summary(analysis, hints::of));
             answers.push(format!(
                 "\nWritten to {}\n",
                 files::main_file(&out.join(within), &written).display()
@@ -99,6 +100,9 @@ pub(crate) fn run(args: &AnalyzeArgs) -> anyhow::Result<ExitCode> {
     eprint!("{}", failures(&failed));
     if let Some(why) = &refused {
         eprintln!("error: {}: {}", why.place, why.message());
+        if let Some(option) = hints::of(why.code()) {
+            eprintln!("try {option}");
+        }
     }
     Ok(
         if task.is_same(&documents) && failed.is_empty() && refused.is_none() {

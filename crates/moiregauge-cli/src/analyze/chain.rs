@@ -6,6 +6,7 @@ use anyhow::Context as _;
 use indicatif::{ProgressBar, ProgressStyle};
 use moiregauge::analysis::Analysis;
 use moiregauge::caveat::{Caveat, FileDoubt};
+use moiregauge::lattice::LatticeError;
 use moiregauge::series::{
     MeasureError, MeasuredScan, Window, about_repeat, amplitude_of, analyse, choose_channel,
     common_window, illustrate, measure_moires, sorted_moires, unusual_channels,
@@ -187,8 +188,15 @@ pub(crate) fn measure_file(
 
 /// The error, with the option that helps against it.
 pub(crate) fn with_hint(error: MeasureError) -> anyhow::Error {
-    let hint = match error {
-        MeasureError::NoSize => Some("give the size, as in --size 70nm×70nm"),
+    let hint = match &error {
+        MeasureError::NoSize => Some("give the size, as in --size 70nm×70nm".to_owned()),
+        MeasureError::Lattice { error, .. } => match error {
+            LatticeError::NoPeaks { .. } => Some("try --method fourier".to_owned()),
+            LatticeError::FewerLattices { found, .. } => {
+                Some(format!("--moires {found} measures what is there"))
+            }
+            _ => None,
+        },
         _ => None,
     };
     let error = anyhow::Error::new(error);

@@ -8,6 +8,7 @@ use moiregauge::series::{Calibrated, CalibratedSet};
 use moiregauge_report::{plus_minus, two_digits};
 
 use crate::analyze::caveat_lines;
+use crate::hints;
 
 /// The sets, the calibration, and what to keep in mind.
 pub(super) fn summary(found: &Calibrated, lattice: &KnownLattice) -> String {
@@ -88,7 +89,7 @@ pub(super) fn summary(found: &Calibrated, lattice: &KnownLattice) -> String {
         plus_minus(along(1.0)),
         plus_minus(along(-1.0))
     );
-    caveat_lines(&mut text, &found.caveats);
+    caveat_lines(&mut text, &found.caveats, hints::of);
     text
 }
 

@@ -14,6 +14,7 @@ use moiregauge_report::results::{
     Conventions, MapDetailsResult, MapResults, MappedImage, TwistStrainResult, mask_counts,
     quantities,
 };
+use moiregauge_report::screen::try_option;
 use moiregauge_report::{
     Provenance, figure_files, layers, map_figures, map_page, map_scan, map_scans, map_tables,
     plus_minus, two_digits,
@@ -22,6 +23,7 @@ use spmfile::{LineDirection, WritableFormat};
 
 use super::domains::Domains;
 use super::{MapArgs, regions, stripes};
+use crate::hints;
 use crate::outputs::{self, commit, write_all};
 use crate::say::say;
 
@@ -229,12 +231,16 @@ pub(super) fn summary(results: &MapResults) -> String {
         );
     }
     text.push_str(&regions::summary(&results.details));
-    for caveat in &results.caveats {
+    let mut caveats = results.caveats.iter().peekable();
+    while let Some(caveat) = caveats.next() {
         let _ = writeln!(
             text,
             "caveat {} ({}): {}",
             caveat.code, caveat.place, caveat.message
         );
+        if caveats.peek().is_none_or(|next| next.code != caveat.code) {
+            try_option(&mut text, &caveat.code, hints::of);
+        }
     }
     text
 }
