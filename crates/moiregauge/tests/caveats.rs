@@ -23,7 +23,7 @@ fn the_table_is_in_sentences_without_options() {
             assert!(text.ends_with('.'), "{}: {text}", entry.code);
             assert!(!text.contains("--"), "{}: {text}", entry.code);
             assert!(!text.contains("  "), "{}: {text}", entry.code);
-            assert!(text.len() > 20, "{}: {text}", entry.code);
+            assert!(text.len() > 15, "{}: {text}", entry.code);
         }
     }
 }
