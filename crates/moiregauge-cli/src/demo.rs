@@ -75,7 +75,7 @@ pub(crate) fn run(args: &DemoArgs) -> anyhow::Result<ExitCode> {
     let report = write_report(&analysis, &provenance, &Choice::default())?;
     outputs::write_all(&sink, "", &report)?;
     outputs::commit(sink)?;
-    say(&summary(&analysis))?;
+    say(&summary(&analysis, crate::hints::of))?;
     let truth = &sets[0];
     say(&format!(
         "\nPut in: twist {}°, heterostrain {} %, drift ({}, {}) nm/min\n",

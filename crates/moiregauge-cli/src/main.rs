@@ -5,6 +5,8 @@ mod calibrate;
 mod config;
 mod convert;
 mod demo;
+mod explain;
+mod hints;
 mod info;
 mod input;
 mod map;
@@ -49,6 +51,7 @@ enum Command {
     Validate(validate::ValidateArgs),
     Plan(Box<plan::PlanArgs>),
     Config(config::ConfigArgs),
+    Explain(explain::ExplainArgs),
 }
 
 /// The arguments. A negative number is a value everywhere, so that its option is named where it is refused.
@@ -77,5 +80,6 @@ fn run(command: Command) -> anyhow::Result<ExitCode> {
         Command::Validate(args) => validate::run(&args),
         Command::Plan(args) => plan::run(&args),
         Command::Config(args) => config::run(&args),
+        Command::Explain(args) => explain::run(&args),
     }
 }

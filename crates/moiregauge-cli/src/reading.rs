@@ -4,7 +4,7 @@ use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
-use moiregauge::caveat::Caveat;
+use moiregauge::caveat::{Caveat, FileDoubt};
 use moiregauge::series::{amplitude_of, choose_channel, unusual_channels};
 use moiregauge::settings::Settings;
 use moiregauge_pipeline::{Content, Known, enough_for, names};
@@ -79,19 +79,15 @@ impl<'a> Opened<'a> {
     pub(crate) fn reading(&self, settings: &Settings) -> anyhow::Result<Reading> {
         let (scan, replaced) = self.scan(settings, |_| None)?;
         let input = self.content.identity(self.path);
-        let caveat = |code| {
-            let file = input.file.as_str();
-            move |words: String| Caveat::new(code, file, words)
-        };
-        let wanted = settings.channel.as_deref();
-        let several = unusual_channels(&self.names(), wanted).map(|words| {
-            let words = format!("{words}; --channel NAME says which one shows the moiré");
-            Caveat::new("several-images", input.file.as_str(), words)
-        });
-        let doubts = scan.notes.iter().cloned().map(caveat("reader-doubt"));
-        let caveats = replaced.into_iter().map(caveat("given-by-user"));
+        let several = unusual_channels(&self.names(), settings.channel.as_deref());
+        let several = several.map(FileDoubt::SeveralImages);
+        let replaced = replaced.into_iter().map(FileDoubt::GivenByUser);
+        let doubts = scan.notes.iter().cloned().map(FileDoubt::ReaderDoubt);
+        let all = several.into_iter().chain(replaced).chain(doubts);
         Ok(Reading {
-            caveats: several.into_iter().chain(caveats).chain(doubts).collect(),
+            caveats: all
+                .map(|doubt| Caveat::new(doubt, input.file.as_str()))
+                .collect(),
             scan,
             input,
         })

@@ -1,4 +1,4 @@
-//! What several commands say: to standard output, where the reader may have gone away (`moiregauge … | head`).
+//! Words to standard output, where the reader may have gone away (`moiregauge … | head`).
 
 use std::io::{ErrorKind, Write as _};
 
@@ -8,13 +8,5 @@ pub(crate) fn say(text: &str) -> std::io::Result<()> {
     match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
         Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(()),
         other => other,
-    }
-}
-
-/// `trace` or `retrace`.
-pub(crate) fn line_name(line: spmfile::LineDirection) -> &'static str {
-    match line {
-        spmfile::LineDirection::Trace => "trace",
-        spmfile::LineDirection::Retrace => "retrace",
     }
 }

@@ -1,27 +1,7 @@
 //! Numbers as people read them: rounded to their uncertainty.
 
-use moiregauge::estimate::{Estimate, TotalEstimate};
-
-use crate::draw::scale::fixed;
-
-/// `value ± sigma` with two significant digits of sigma and as many decimals of the value.
-///
-/// Where sigma is unknown the value is printed with four decimals and a question mark, so that
-/// nobody takes it for exact.
-pub fn plus_minus(estimate: Estimate) -> String {
-    let Estimate { value, sigma } = estimate;
-    if !value.is_finite() {
-        return "\u{2013}".to_owned();
-    }
-    if sigma == 0.0 {
-        return format!("{} ± 0", fixed(value, 4));
-    }
-    if !sigma.is_finite() || sigma < 0.0 {
-        return format!("{} ± ?", fixed(value, 4));
-    }
-    let decimals = decimals(sigma);
-    format!("{} ± {}", fixed(value, decimals), fixed(sigma, decimals))
-}
+use moiregauge::estimate::TotalEstimate;
+pub use moiregauge::words::{plus_minus, two_digits};
 
 /// `value ± total unit (statistical ± part unit)`: the total is what may be published.
 pub fn with_statistical(found: TotalEstimate, unit: &str) -> String {
@@ -33,26 +13,10 @@ pub fn with_statistical(found: TotalEstimate, unit: &str) -> String {
     format!("{total}{unit} (statistical ± {part}{unit})")
 }
 
-/// Two significant digits, written out.
-pub fn two_digits(value: f64) -> String {
-    if !value.is_finite() {
-        return "\u{2013}".to_owned();
-    }
-    if value.abs() < 1e-9 {
-        return "0".to_owned();
-    }
-    fixed(value, decimals(value.abs()))
-}
-
-/// Decimals that show two significant digits of `sigma`.
-fn decimals(sigma: f64) -> usize {
-    // 0.0996 becomes 0.10: rounding to two digits may add one before them.
-    let carried = sigma * (1.0 + 0.05 / 9.95);
-    (1.0 - carried.log10().floor()).clamp(0.0, 12.0) as usize
-}
-
 #[cfg(test)]
 mod tests {
+    use moiregauge::estimate::Estimate;
+
     use super::*;
 
     fn shown(value: f64, sigma: f64) -> String {

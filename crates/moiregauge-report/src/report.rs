@@ -73,7 +73,7 @@ pub fn write_report(
     }
     let all = figures(analysis, choice.colormap);
     let page = if choice.html {
-        Some(html::page(&results, &all, &files)?)
+        Some(html::page((&results, analysis), &all, &files)?)
     } else {
         None
     };

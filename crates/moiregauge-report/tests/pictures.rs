@@ -2,6 +2,7 @@
 
 mod common;
 
+use moiregauge::caveat::{Caveat, FileDoubt};
 use moiregauge_report::{Choice, ColorMap, figures, write_report};
 
 type Files = Vec<(String, Vec<u8>)>;
@@ -130,8 +131,7 @@ fn the_page_escapes_and_needs_no_network() {
             shown.unit = bad.to_owned();
         }
     }
-    analysis.caveats[0].message = bad.to_owned();
-    analysis.caveats[0].place = bad.to_owned();
+    analysis.caveats[0] = Caveat::new(FileDoubt::ReaderDoubt(bad.to_owned()), bad);
     let mut provenance = common::provenance();
     provenance.failed[0].file = bad.to_owned();
     provenance.failed[0].error = bad.to_owned();
@@ -158,7 +158,7 @@ fn the_page_says_what_is_wrong_first() {
             .unwrap_or_else(|| panic!("{text} is missing"))
     };
     assert!(at("about one per cent at four to five periods") < at("<svg"));
-    assert!(at("Only 4.5 moiré periods") < at("id=\"set1-scan\""));
+    assert!(at("only 2.5 lattice periods") < at("id=\"set1-scan\""));
     assert!(at("header promises 1048576") < at("id=\"set1-scan\""));
     assert!(at("Not corrected for drift") < at("<svg"));
     assert!(page.contains("no scan of this set could be shown in detail"));

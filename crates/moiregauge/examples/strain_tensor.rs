@@ -57,7 +57,7 @@ fn main() {
             pulls[..6].copy_from_slice(&outcome.pulls());
             all[..6].copy_from_slice(&errors);
             (pulls[6], all[6]) = (off / outcome.atomic.angle.sigma.to_degrees(), off);
-            let scatter = |c: &Caveat| c.code == "atomic-scatter";
+            let scatter = |c: &Caveat| c.code() == "atomic-scatter";
             let scatters = outcome.atomic.caveats.iter().any(scatter);
             (pulls, all, [outcome.is_ambiguous(), scatters])
         })

@@ -28,6 +28,7 @@ pub mod series;
 pub mod settings;
 pub mod simulate;
 pub mod strain;
+pub mod words;
 
 /// The example of the README, compiled.
 #[cfg(doctest)]

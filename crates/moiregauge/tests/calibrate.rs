@@ -4,6 +4,7 @@
 
 use moiregauge::budget::Source;
 use moiregauge::calibration::{Calibration, Coordinates, KnownLattice};
+use moiregauge::caveat::Caveat;
 use moiregauge::material::Material;
 use moiregauge::series::{
     CalibrateError, Calibrated, MeasureError, analyse, atomic_orientation, calibrate,
@@ -120,7 +121,7 @@ fn a_pair_of_frames_tells_the_scanner() {
             let set = atoms(seed);
             let found = calibrated(&set, 1.0);
             assert!(found.covariance_known && found.sets[0].drift.is_some());
-            let codes: Vec<&str> = found.caveats.iter().map(|c| c.code.as_str()).collect();
+            let codes: Vec<&str> = found.caveats.iter().map(Caveat::code).collect();
             assert!(!codes.contains(&"drift-not-separated"), "{codes:?}");
             pulls(&found.calibration, truth(&set))
         })
@@ -151,7 +152,7 @@ fn one_frame_does_not_tell_drift_from_gain() {
                 found
                     .caveats
                     .iter()
-                    .any(|c| c.code == "drift-not-separated")
+                    .any(|c| c.code() == "drift-not-separated")
             );
             assert!(found.calibration.estimates()[1].sigma > 10.0 * found.statistical[1]);
             pulls(&found.calibration, truth(&set))
@@ -198,7 +199,11 @@ fn a_calibration_takes_the_scanner_out_of_twist_and_strain() {
             100.0 * found.strain_vector.x - strain[0],
             100.0 * found.strain_vector.y - strain[1],
         ];
-        let codes: Vec<String> = analysis.caveats.into_iter().map(|c| c.code).collect();
+        let codes: Vec<String> = analysis
+            .caveats
+            .iter()
+            .map(|c| c.code().to_owned())
+            .collect();
         (errors, mean.budget, codes)
     };
     let (without, priors, codes) = mean(None);

@@ -2,6 +2,7 @@
 
 use moiregauge::analysis::Analysis;
 use moiregauge::budget::Source;
+use moiregauge::caveat::Caveat;
 use moiregauge::series::{MeasuredScan, analyse, measure_scan};
 use moiregauge::settings::{GivenDrift, Method, Settings};
 use moiregauge::simulate::{Simulation, Simulator};
@@ -44,7 +45,7 @@ fn analyse_frames(frames: &[Scan], settings: &Settings) -> Analysis {
 }
 
 fn codes(analysis: &Analysis) -> Vec<&str> {
-    analysis.caveats.iter().map(|c| c.code.as_str()).collect()
+    analysis.caveats.iter().map(Caveat::code).collect()
 }
 
 /// Turns samples by 180° in the file and the sensors with them: the same positions hold the same
@@ -245,7 +246,7 @@ fn a_scan_that_does_not_fit_is_pointed_out() {
 
     let (pointed_out, _, with) = of(&settings);
     let places = |analysis: &Analysis, code: &str| -> Vec<String> {
-        let all = analysis.caveats.iter().filter(|c| c.code == code);
+        let all = analysis.caveats.iter().filter(|c| c.code() == code);
         all.map(|c| c.place.clone()).collect()
     };
     assert_eq!(places(&pointed_out, "outlying-scan"), ["scan.002"]);

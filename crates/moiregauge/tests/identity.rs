@@ -4,6 +4,7 @@ use std::cell::Cell;
 
 use moiregauge::analysis::{Analysis, SetAnalysis};
 use moiregauge::calibration::KnownLattice;
+use moiregauge::caveat::Caveat;
 use moiregauge::material::Material;
 use moiregauge::series::{
     MeasuredScan, analyse, atomic_orientation, calibrate, measure_known, measure_scan, refusal,
@@ -50,7 +51,7 @@ fn measured(folder: &str, frames: &[Scan]) -> Vec<MeasuredScan> {
 }
 
 fn count(analysis: &Analysis, code: &str) -> usize {
-    analysis.caveats.iter().filter(|c| c.code == code).count()
+    analysis.caveats.iter().filter(|c| c.code() == code).count()
 }
 
 /// The numbers that people take from a set.
@@ -173,8 +174,11 @@ fn calibration_and_orientation_count_once() {
     let sigmas =
         |scans: &[MeasuredScan]| calibrate(scans.to_vec(), &known, 0.01, Grouping::Auto).unwrap();
     assert_eq!(sigmas(&once).statistical, sigmas(&twice).statistical);
-    let repeats = |codes: &[moiregauge::caveat::Caveat]| {
-        codes.iter().filter(|c| c.code == "same-scan-twice").count()
+    let repeats = |codes: &[Caveat]| {
+        codes
+            .iter()
+            .filter(|c| c.code() == "same-scan-twice")
+            .count()
     };
     assert_eq!(repeats(&sigmas(&twice).caveats), 2);
     let angle = |scans: &[MeasuredScan]| {
@@ -295,8 +299,8 @@ fn headers_that_contradict_the_images_are_named() {
             let all = analysis
                 .caveats
                 .iter()
-                .filter(|c| doubts.contains(&c.code.as_str()));
-            let all: Vec<&str> = all.map(|c| c.message.as_str()).collect();
+                .filter(|c| doubts.contains(&c.code()));
+            let all: Vec<String> = all.map(Caveat::message).collect();
             assert!(!all.is_empty(), "{seed}, {words}");
             let named = format!("but {words} they do");
             told.set(told.get() + usize::from(all.iter().any(|m| m.contains(&named))));
@@ -341,15 +345,15 @@ fn layers_that_cannot_make_the_lattice_are_refused() {
     };
     let found = with(&upper, Some(&lower));
     let why = refusal(&found).unwrap();
-    assert_eq!(why.code, "layers-cannot-make-it");
+    assert_eq!(why.code(), "layers-cannot-make-it");
     assert!(
-        why.message.contains(&format!("at most {longest:.1} nm")),
+        why.message().contains(&format!("at most {longest:.1} nm")),
         "{}",
-        why.message
+        why.message()
     );
     // 0.246/(2 sin θ/2) at 1.13°, with strain and drift some per cent more or less.
-    let measured = why
-        .message
+    let message = why.message();
+    let measured = message
         .split(" nm")
         .next()
         .unwrap()
@@ -373,11 +377,11 @@ fn assumed_layers_are_asked_about() {
     set.raster.nominal_size_nm = [15.0; 2];
     let scans = measured("s", &frames(&set));
     let assumed = analyse(scans.clone(), &quick());
-    let asked: Vec<&str> = assumed
+    let asked: Vec<String> = assumed
         .caveats
         .iter()
-        .filter(|c| c.code == "moire-doubtful")
-        .map(|c| c.message.as_str())
+        .filter(|c| c.code() == "moire-doubtful")
+        .map(Caveat::message)
         .collect();
     assert!(
         asked.len() == 1 && asked[0].contains("si111-7x7") && asked[0].contains("assumed"),
@@ -405,6 +409,6 @@ fn excluding_everything_leaves_nothing() {
     };
     let found = analyse(measured("s", &frames(&small_set(24))), &settings);
     let why = refusal(&found).unwrap();
-    assert_eq!(why.code, "everything-excluded");
-    assert!(why.message.contains("all 4 scans"), "{}", why.message);
+    assert_eq!(why.code(), "everything-excluded");
+    assert!(why.message().contains("all 4 scans"), "{}", why.message());
 }

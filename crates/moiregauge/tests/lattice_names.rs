@@ -157,7 +157,10 @@ fn read(truth: Truth, settings: &Settings) -> (Readings, Vec<String>) {
     let none = WaveStrengths::default();
     let readings = Readings::new(&lattice, &found, &budget, &none, settings);
     let said = caveats("here", &lattice, &found, &readings, settings);
-    (readings, said.into_iter().map(|c| c.code).collect())
+    (
+        readings,
+        said.into_iter().map(|c| c.code().to_owned()).collect(),
+    )
 }
 
 /// Without an image names compete at 0.3° and 0.35 %; they do not in ordinary samples.

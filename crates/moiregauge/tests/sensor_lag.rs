@@ -1,6 +1,7 @@
 //! Simulated frames whose position sensors lag behind the tip: what is measured stays right, and the lag is told.
 
 use moiregauge::budget::Source;
+use moiregauge::caveat::Caveat;
 use moiregauge::series::{MeasuredScan, analyse, measure_scan};
 use moiregauge::settings::Settings;
 use moiregauge::simulate::{Simulation, Simulator};
@@ -69,11 +70,11 @@ fn measured(set: &Simulation, lag_s: Option<f64>) -> Vec<MeasuredScan> {
     frames.collect()
 }
 
-fn told(scans: &[MeasuredScan]) -> Vec<&str> {
+fn told(scans: &[MeasuredScan]) -> Vec<String> {
     let caveats = scans.iter().flat_map(|s| &s.caveats);
     caveats
-        .filter(|c| c.code == "sensor-lag")
-        .map(|c| c.message.as_str())
+        .filter(|c| c.code() == "sensor-lag")
+        .map(Caveat::message)
         .collect()
 }
 

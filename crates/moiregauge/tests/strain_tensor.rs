@@ -57,7 +57,7 @@ fn biaxial_and_uniaxial_strain_with_an_atomic_image() {
 /// Whether the images are said to scatter; they have no other doubts.
 fn scatters(caveats: &[Caveat]) -> usize {
     assert!(
-        caveats.iter().all(|c| c.code == "atomic-scatter"),
+        caveats.iter().all(|c| c.code() == "atomic-scatter"),
         "{caveats:?}"
     );
     caveats.len()
@@ -89,12 +89,7 @@ fn one_atomic_frame_gives_the_orientation_by_its_fast_rows() {
             // Half of 5 mrad at the least.
             assert!(sigma > 0.14 && sigma < 0.5, "{sigma}");
             assert!(off.abs() < 2.0 * sigma, "{off} {sigma}");
-            let codes: Vec<&str> = outcome
-                .atomic
-                .caveats
-                .iter()
-                .map(|c| c.code.as_str())
-                .collect();
+            let codes: Vec<&str> = outcome.atomic.caveats.iter().map(Caveat::code).collect();
             assert!(codes.contains(&"atomic-drift-assumed"), "{codes:?}");
             let pulls = outcome.pulls();
             assert!(pulls[0].abs() < 3.0 && pulls[1].abs() < 3.0, "{pulls:?}");
@@ -125,7 +120,7 @@ fn without_an_orientation_the_interval_holds_the_truth() {
             let told = analysis
                 .caveats
                 .iter()
-                .any(|c| c.code == "twist-trades-with-strain");
+                .any(|c| c.code() == "twist-trades-with-strain");
             assert_eq!(told, set.sample.substrate.is_some());
         }
     }
@@ -157,7 +152,7 @@ fn the_wrong_vector_is_found_out() {
         let told = analysis
             .caveats
             .iter()
-            .any(|c| c.code == "orientation-contradicts");
+            .any(|c| c.code() == "orientation-contradicts");
         (found.best, told)
     };
     let angle = set.sample.lattice_angle_deg;

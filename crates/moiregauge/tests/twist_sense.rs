@@ -69,8 +69,11 @@ fn read(basis: Matrix2<f64>, sigma: f64, settings: &Settings) -> (Readings, Vec<
         settings,
     );
     let said = caveats("here", &lattice, &found, &readings, settings);
-    assert!(said.iter().all(|c| !c.message.contains("is wrong")));
-    (readings, said.into_iter().map(|c| c.code).collect())
+    assert!(said.iter().all(|c| !c.message().contains("is wrong")));
+    (
+        readings,
+        said.into_iter().map(|c| c.code().to_owned()).collect(),
+    )
 }
 
 fn basis(made: &Stacking) -> Matrix2<f64> {

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use moiregauge::caveat::Caveat;
+use moiregauge::caveat::{Caveat, ChannelReason, FileDoubt};
 use moiregauge::series::{MeasureError, channels_by_preference};
 use moiregauge::settings::Settings;
 use moiregauge_pipeline::Known;
@@ -19,13 +19,11 @@ pub(super) struct Other {
 impl Other {
     /// Says so.
     pub(super) fn caveat(&self) -> Caveat {
-        let channel = self.settings.channel.as_deref().unwrap_or_default();
-        let message = format!(
-            "{channel} is analysed, since no scan shows a lattice in {}; --channel NAME says which channel \
-             shows the moiré",
-            self.tried.join(" or ")
-        );
-        Caveat::new("channel-chosen", "analysis", message)
+        let doubt = FileDoubt::ChannelChosen {
+            channel: self.settings.channel.clone().unwrap_or_default(),
+            why: ChannelReason::NoLatticeIn(self.tried.join(" or ")),
+        };
+        Caveat::new(doubt, "analysis")
     }
 }
 

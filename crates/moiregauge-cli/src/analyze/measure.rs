@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use indicatif::ProgressBar;
 use moiregauge::caveat::Caveat;
+use moiregauge::lattice::LatticeError;
 use moiregauge::series::{MeasureError, MeasuredScan, Window, about_repeat, measure_moires};
 use moiregauge::settings::Settings;
 use moiregauge_pipeline::{Known, Repeated, set_of};
@@ -79,10 +80,6 @@ pub(crate) fn measure_file(
     let mut moires = measure_moires(&input.file, &scan, settings, window).map_err(with_hint)?;
     let set = set_of(sets, path).map(str::to_owned);
     for measured in &mut moires {
-        let several = |c: &&mut Caveat| c.code == "several-images";
-        for caveat in measured.caveats.iter_mut().filter(several) {
-            caveat.message += "; --image N says which one";
-        }
         measured.caveats.extend(caveats.iter().cloned());
         measured.set.clone_from(&set);
         measured.digest = Some(input.sha256.clone());
@@ -92,8 +89,15 @@ pub(crate) fn measure_file(
 
 /// The error, with the option that helps against it.
 pub(crate) fn with_hint(error: MeasureError) -> anyhow::Error {
-    let hint = match error {
-        MeasureError::NoSize => Some("give the size, as in --size 70nm×70nm"),
+    let hint = match &error {
+        MeasureError::NoSize => Some("give the size, as in --size 70nm×70nm".to_owned()),
+        MeasureError::Lattice { error, .. } => match error {
+            LatticeError::NoPeaks { .. } => Some("try --method fourier".to_owned()),
+            LatticeError::FewerLattices { found, .. } => {
+                Some(format!("--moires {found} measures what is there"))
+            }
+            _ => None,
+        },
         _ => None,
     };
     let error = anyhow::Error::new(error);

@@ -1,6 +1,6 @@
 //! Files → the analysis of every moiré, with the record of the run.
 
-use moiregauge::series::refusal;
+use moiregauge::series::{is_nothing_left, refusal};
 use moiregauge_report::screen::failures;
 
 use super::atomic::orientation;
@@ -38,8 +38,8 @@ pub(super) fn outcomes(task: &Task, loud: bool) -> anyhow::Result<Vec<Outcome>> 
         anyhow::anyhow!("nothing could be analysed")
     })?;
     let refused = outcomes.iter().find_map(|o| refusal(&o.analysis));
-    if let Some(why) = refused.filter(|why| why.code == "everything-excluded") {
-        anyhow::bail!("{}", why.message);
+    if let Some(why) = refused.filter(|why| is_nothing_left(&why.doubt)) {
+        anyhow::bail!("{}", why.message());
     }
     // The files are the same for all moirés.
     let mut record = None;

@@ -12,6 +12,7 @@ use super::args::AnalyzeArgs;
 use super::chain::Outcome;
 use super::export::{self, Export};
 use super::task::Task;
+use crate::hints;
 use crate::outputs::{commit, folder, write_all};
 use crate::say::say;
 
@@ -91,7 +92,7 @@ impl Output {
             }
             let written = self.report(task, outcome, within)?;
             if self.loud {
-                answers.push(summary(&outcome.analysis));
+                answers.push(summary(&outcome.analysis, hints::of));
                 // The file to open first.
                 let page = written.iter().any(|(name, _)| name == "report.html");
                 let first = if page { "report.html" } else { "results.json" };
@@ -119,7 +120,10 @@ impl Output {
         eprint!("{}", failures(&failed));
         let refused = outcomes.iter().find_map(|o| refusal(&o.analysis));
         if let Some(why) = refused {
-            eprintln!("error: {}: {}", why.place, why.message);
+            eprintln!("error: {}: {}", why.place, why.message());
+            if let Some(option) = hints::of(why.code()) {
+                eprintln!("try {option}");
+            }
         }
         Ok(
             if task.is_same(&documents) && failed.is_empty() && refused.is_none() {

@@ -4,9 +4,9 @@ use std::path::Path;
 
 use anyhow::{Context as _, ensure};
 use moiregauge::calibration::{Calibration, KnownLattice};
-use moiregauge::caveat::Caveat;
 use moiregauge::series::Calibrated;
 use moiregauge_report::InputFile;
+use moiregauge_report::results::ResultCaveat;
 use serde::{Deserialize, Serialize};
 
 /// Name and version of the layout.
@@ -41,7 +41,7 @@ struct CalibrationFile {
     #[serde(default)]
     files: Vec<Input>,
     #[serde(default)]
-    caveats: Vec<Caveat>,
+    caveats: Vec<ResultCaveat>,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -101,7 +101,7 @@ pub(super) fn text(
                 bytes: f.bytes,
             })
             .collect(),
-        caveats: found.caveats.clone(),
+        caveats: found.caveats.iter().map(Into::into).collect(),
     };
     Ok(format!("{HEAD}{}", toml::to_string(&file)?))
 }

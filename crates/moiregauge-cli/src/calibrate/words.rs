@@ -8,6 +8,8 @@ use moiregauge::series::{Calibrated, CalibratedSet};
 use moiregauge_report::screen::caveats;
 use moiregauge_report::{plus_minus, two_digits};
 
+use crate::hints;
+
 /// The sets, the calibration, and what to keep in mind.
 pub(super) fn summary(found: &Calibrated, lattice: &KnownLattice) -> String {
     let mut text = format!(
@@ -87,7 +89,7 @@ pub(super) fn summary(found: &Calibrated, lattice: &KnownLattice) -> String {
         plus_minus(along(1.0)),
         plus_minus(along(-1.0))
     );
-    caveats(&mut text, &found.caveats);
+    caveats(&mut text, &found.caveats, hints::of);
     text
 }
 

@@ -4,12 +4,11 @@
 
 use moiregauge::series::image_choice;
 use moiregauge::settings::Settings;
+use moiregauge::words::line_name;
 use serde::Serialize;
 use spmfile::{
     Channel, DateTime, FrameDirection, LineDirection, Scan, position_sensors, sensor_axis,
 };
-
-use crate::say::line_name;
 
 /// A pixel in display order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,7 +1,7 @@
 //! Whether nodes and triangles are looked for, and what they say.
 
 use clap::ValueEnum;
-use moiregauge::caveat::Caveat;
+use moiregauge::caveat::{Caveat, PatternDoubt};
 use moiregauge::domains::{Contrast, DomainMap, Regime, RegimeChoice, regime};
 use moiregauge::map::TwistStrainMap;
 
@@ -56,8 +56,7 @@ impl DomainArgs {
             When::On => true,
         };
         if !wanted {
-            let doubt = || Caveat::new("phases-in-doubt", "map", before.reasons.join("; "));
-            let caveats = before.in_doubt.then(doubt);
+            let caveats = before.in_doubt.then(|| in_doubt(&before));
             return Domains {
                 map: None,
                 regime: before,
@@ -74,30 +73,19 @@ impl DomainArgs {
         let best = found.into_iter().max_by_key(|d| d.cells.len());
         let regime = regime(map, best.as_ref());
         let mut caveats = Vec::new();
-        let mut doubt = |code, why: String| caveats.push(Caveat::new(code, "domains", why));
+        let mut doubt = |doubt: PatternDoubt| caveats.push(Caveat::new(doubt, "domains"));
         if images > 1 {
-            let why = "images show domains; the triangles are those of the one with most of them";
-            doubt("domains-of-one-image", format!("{images} {why}"));
+            doubt(PatternDoubt::DomainsOfOneImage { images });
         }
         match &best {
-            None => doubt(
-                "no-domains",
-                "no mesh of nodes could be found in the image".to_owned(),
-            ),
+            None => doubt(PatternDoubt::NoDomains),
             Some(d) => about_mesh(d, self.nodes.is_none(), &mut doubt),
         }
         if regime.choice == RegimeChoice::Domains {
-            let why = format!(
-                "use the triangles between nodes and not the maps of phases: {}",
-                regime.reasons.join("; ")
-            );
-            caveats.push(Caveat::new("use-domains", "map", why));
+            let reasons = regime.reasons.join("; ");
+            caveats.push(Caveat::new(PatternDoubt::UseDomains { reasons }, "map"));
         } else if regime.in_doubt {
-            caveats.push(Caveat::new(
-                "phases-in-doubt",
-                "map",
-                regime.reasons.join("; "),
-            ));
+            caveats.push(in_doubt(&regime));
         }
         Domains {
             map: best,
@@ -108,24 +96,19 @@ impl DomainArgs {
 }
 
 /// What is doubtful about a mesh of nodes; `is_open` where nobody said whether nodes are bright or dark.
-fn about_mesh(d: &DomainMap, is_open: bool, doubt: &mut impl FnMut(&'static str, String)) {
+fn about_mesh(d: &DomainMap, is_open: bool, doubt: &mut impl FnMut(PatternDoubt)) {
     if !d.contrast_is_clear && is_open {
-        doubt(
-            "nodes-bright-or-dark",
-            "the image does not tell whether nodes are bright or dark: triangles may stand on domains \
-             instead of nodes; say --nodes bright or dark"
-                .to_owned(),
-        );
+        doubt(PatternDoubt::NodesBrightOrDark);
     }
     let odd = d.missing.len() + d.extra.len();
     if odd as f64 > ODD * d.nodes.len() as f64 {
-        doubt(
-            "mesh-with-gaps",
-            format!(
-                "{odd} of {} nodes are missing or fit into no triangle: the mesh may not be that of the \
-                 lattice",
-                d.nodes.len()
-            ),
-        );
+        let nodes = d.nodes.len();
+        doubt(PatternDoubt::MeshWithGaps { odd, nodes });
     }
+}
+
+/// Says that phases are not to be believed here without more.
+fn in_doubt(regime: &Regime) -> Caveat {
+    let reasons = regime.reasons.join("; ");
+    Caveat::new(PatternDoubt::PhasesInDoubt { reasons }, "map")
 }

@@ -6,7 +6,7 @@ use std::path::Path;
 use anyhow::{Context as _, ensure};
 use moiregauge::analysis::Picture;
 use moiregauge::background::remove_background;
-use moiregauge::caveat::Caveat;
+use moiregauge::caveat::{Caveat, FileDoubt};
 use moiregauge::domains::{Contrast, DomainMap};
 use moiregauge::geometry::{Geometry, Timing};
 use moiregauge::image::Image;
@@ -105,7 +105,7 @@ impl Large {
         let block = known.cut(&mut scan).map_err(with_option)?;
         let input = identity(path, known.place(path))?;
         let channel = scan.channels.first().context("the array holds no image")?;
-        let caveat = |words| Caveat::new("given-by-user", input.file.as_str(), words);
+        let caveat = |words| Caveat::new(FileDoubt::GivenByUser(words), input.file.as_str());
         Ok(Self {
             caveats: replaced.into_iter().map(caveat).collect(),
             geometry: nominal_geometry(&scan, channel)

@@ -4,7 +4,8 @@ use anyhow::{bail, ensure};
 use moiregauge::analysis::{Analysis, Picture, ScanAnalysis};
 use moiregauge::map::TwistStrainMap;
 use moiregauge::series::{
-    LineMap, average_maps, change_of_drift, domains_of_scan, map_scan, picture, refusal,
+    LineMap, average_maps, change_of_drift, domains_of_scan, is_nothing_left, map_scan, picture,
+    refusal,
 };
 use moiregauge::settings::Settings;
 use moiregauge_report::screen::failures;
@@ -51,8 +52,8 @@ pub(super) fn together(args: &MapArgs, task: &Task) -> anyhow::Result<Answer> {
             bail!("nothing could be analysed");
         }
     };
-    if let Some(why) = refusal(&analysis).filter(|why| why.code == "everything-excluded") {
-        bail!("{}", why.message);
+    if let Some(why) = refusal(&analysis).filter(|why| is_nothing_left(&why.doubt)) {
+        bail!("{}", why.message());
     }
     mapped(args, task, &analysis, provenance).map(|made| Answer::Lattice(Box::new(made)))
 }

@@ -73,7 +73,7 @@ pub(super) fn write(made: &Made, args: &MapArgs, sink: FolderSink) -> anyhow::Re
     details.regime = Some(made.domains.regime.clone());
     let mut results = results(made, args.method_name());
     results.details = (&details).into();
-    results.caveats.extend(doubts);
+    results.caveats.extend(doubts.iter().map(Into::into));
     let figures = |colours| map_figures(map, &details, colours);
     finish(&results, map_tables(&details), figures, args, sink)
 }
@@ -86,7 +86,7 @@ fn results(made: &Made, method: &str) -> MapResults {
         images: made.images.clone(),
         agreement: made.agreement.map(Into::into),
         drift_change: made.drift_change.map(Into::into),
-        caveats: made.caveats.clone(),
+        caveats: made.caveats.iter().map(Into::into).collect(),
         ..document(&made.map, about, (method, ERRORS))
     }
 }

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use anyhow::ensure;
-use moiregauge::caveat::Caveat;
+use moiregauge::caveat::{Caveat, MapDoubt};
 use moiregauge::map::TwistStrainMap;
 use moiregauge::region::{
     Device, DeviceSearch, Profile, Region, RegionStatistics, WantedArea, WantedTwist, uniform_areas,
@@ -125,20 +125,11 @@ impl RegionArgs {
         let [w, h] = size.map(two_digits);
         let place = format!("device {w} nm × {h} nm");
         if size[0].min(size[1]) < 2.355 * map.window_nm {
-            doubts.push(Caveat::new(
-                "device-below-resolution",
-                place.as_str(),
-                "the device is narrower than the map resolves: the twist may vary more within it than the \
-                 map shows",
-            ));
+            doubts.push(Caveat::new(MapDoubt::DeviceBelowResolution, place.as_str()));
         }
         let found = uniform_areas(map, &search);
         if found.is_empty() {
-            doubts.push(Caveat::new(
-                "device-fits-nowhere",
-                place,
-                "no area of this size lies within the map with 95 % of its nodes to be believed",
-            ));
+            doubts.push(Caveat::new(MapDoubt::DeviceFitsNowhere, place));
         }
         found
     }
@@ -148,22 +139,14 @@ impl RegionArgs {
 fn about_region(found: &RegionStatistics) -> Option<Caveat> {
     let name = found.region.name.as_str();
     if found.good == 0 {
-        return Some(Caveat::new(
-            "region-empty",
-            name,
-            "the region has no good node: it has no values",
-        ));
+        return Some(Caveat::new(MapDoubt::RegionEmpty, name));
     }
     let in_part = found.covered < 0.95 || found.masked_share > 0.05;
-    let words = || {
-        format!(
-            "the map reaches {:.0} % of the region, and {:.0} % of the nodes there are not to be \
-             believed: its numbers are those of the rest",
-            100.0 * found.covered,
-            100.0 * found.masked_share
-        )
+    let doubt = MapDoubt::RegionInPart {
+        covered: found.covered,
+        masked: found.masked_share,
     };
-    in_part.then(|| Caveat::new("region-in-part", name, words()))
+    in_part.then(|| Caveat::new(doubt, name))
 }
 
 /// An error if none of the places, nor anything between them, can lie in the map.

@@ -3,14 +3,14 @@
 use std::path::PathBuf;
 
 use anyhow::{Context as _, ensure};
-use moiregauge::caveat::Caveat;
+use moiregauge::caveat::{Caveat, ChannelReason, Doubt, FileDoubt, MapDoubt, Mapped, PatternDoubt};
 use moiregauge::map::{Resolution, SampledStripes};
 use moiregauge::series::{ScanStripes, stripes_of_scan};
 use moiregauge::settings::Settings;
 use moiregauge_pipeline::Known;
 use moiregauge_pipeline::sink::FolderSink;
 use moiregauge_report::results::{MapResults, StripesResult};
-use moiregauge_report::{FailedInput, Provenance, plus_minus, stripe_figures, stripe_scan};
+use moiregauge_report::{FailedInput, Provenance, stripe_figures, stripe_scan};
 use spmfile::WritableFormat;
 
 use super::args::{MapArgs, MapMethodArg};
@@ -73,12 +73,11 @@ pub(super) fn look(
     let mut caveats = found.caveats.clone();
     if settings.channel.is_none() {
         caveats.push(Caveat::new(
-            "channel-chosen",
+            FileDoubt::ChannelChosen {
+                channel: found.channel.clone(),
+                why: ChannelReason::BestStripes,
+            },
             "map",
-            format!(
-                "{} is mapped, which shows the stripes best; --channel NAME says which channel shows them",
-                found.channel
-            ),
         ));
     }
     doubts(&found, &reading.input.file, &mut caveats);
@@ -101,69 +100,47 @@ pub(super) fn look(
 
 /// What has to be said of the stripes beside their numbers.
 fn doubts(found: &ScanStripes, file: &str, caveats: &mut Vec<Caveat>) {
-    let mut doubt = |code, why: String| caveats.push(Caveat::new(code, file, why));
-    doubt(
-        "stripes-only",
-        "the image shows stripes and no lattice: one wave vector in each pattern, which does not tell twist and \
-         strain. The map has wavelength and direction"
-            .to_owned(),
-    );
+    let mut doubt = |doubt: Doubt| caveats.push(Caveat::new(doubt, file));
+    doubt(PatternDoubt::StripesOnly.into());
     let stripes = &found.stripes;
     let [first, ..] = stripes.patterns.as_slice() else {
         return;
     };
     if stripes.patterns.len() > 1 {
-        let shares: Vec<String> = stripes
-            .patterns
-            .iter()
-            .map(|p| format!("{:.0} %", 100.0 * p.share))
-            .collect();
-        doubt(
-            "stripe-domains",
-            format!(
-                "{} patterns lie side by side ({} of the nodes): each node has the wave of the strongest there; \
-                 nodes within a window of a boundary are bent",
-                stripes.patterns.len(),
-                shares.join(", ")
-            ),
-        );
+        let shares = stripes.patterns.iter().map(|p| p.share).collect();
+        doubt(PatternDoubt::StripeDomains { shares }.into());
     } else if first.share < 0.9 {
-        doubt(
-            "stripes-in-part",
-            format!(
-                "the stripes stand out at {:.0} % of the nodes only",
-                100.0 * first.share
-            ),
-        );
+        doubt(PatternDoubt::StripesInPart { share: first.share }.into());
     }
     about_patterns(stripes, &mut doubt);
     if !found.drift_corrected {
         doubt(
-            "map-not-drift-corrected",
-            "the drift is not known: it stretches and shears the map, the same everywhere (--drift)".to_owned(),
+            MapDoubt::NotDriftCorrected {
+                of: Mapped::Stripes,
+            }
+            .into(),
         );
     }
     if !stripes.noise_measured {
         doubt(
-            "map-noise-guessed",
-            "the frame holds too few periods to see noise between the harmonics: the errors of the map are those of \
-             what a single wave in each pattern leaves"
-                .to_owned(),
+            MapDoubt::NoiseGuessed {
+                of: Mapped::Stripes,
+            }
+            .into(),
         );
     }
 }
 
 /// What single waves and the map disagree about.
-fn about_patterns(stripes: &SampledStripes, doubt: &mut impl FnMut(&'static str, String)) {
+fn about_patterns(stripes: &SampledStripes, doubt: &mut impl FnMut(Doubt)) {
     for (pattern, number) in stripes.patterns.iter().zip(1..) {
         if pattern.coherence < STRAIGHT {
             doubt(
-                "stripes-vary",
-                format!(
-                    "one wave has only {:.0} % of the power of the stripes of pattern {number}, whose wave vector \
-                     changes across the frame: the mean of the map is the better number",
-                    100.0 * pattern.coherence
-                ),
+                PatternDoubt::StripesVary {
+                    pattern: number,
+                    coherence: pattern.coherence,
+                }
+                .into(),
             );
         }
     }
@@ -176,14 +153,12 @@ fn about_patterns(stripes: &SampledStripes, doubt: &mut impl FnMut(&'static str,
             .any(|e| e.value.abs() > APART * e.sigma)
         {
             doubt(
-                "stripes-map-and-fit",
-                format!(
-                    "pattern {}: at the middle of the pattern the map less the fit to all its pixels is {} nm and {}°: \
-                     it changes by more than a plane across the frame",
-                    pattern.number,
-                    plus_minus(length),
-                    plus_minus(along)
-                ),
+                PatternDoubt::StripesMapAndFit {
+                    pattern: pattern.number,
+                    wavelength: length,
+                    direction: along.scaled(1f64.to_radians()),
+                }
+                .into(),
             );
         }
     }
@@ -220,7 +195,7 @@ fn results(striped: &Striped) -> MapResults {
             .collect(),
         stripes: Some(found),
         agreement: stripes.agreement.map(Into::into),
-        caveats: striped.caveats.clone(),
+        caveats: striped.caveats.iter().map(Into::into).collect(),
         ..output::document(&stripes.map, about, ("stripes", ERRORS))
     }
 }

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use anyhow::{Context as _, ensure};
-use moiregauge::caveat::Caveat;
+use moiregauge::caveat::{Caveat, MapDoubt, SurveyDrift};
 use moiregauge::map::TwistStrainMap;
 use moiregauge::series::{SurveyPlan, about_repeat};
 use moiregauge_pipeline::distinct;
@@ -106,14 +106,11 @@ pub(super) fn survey(
 /// Says how an image was mapped.
 fn in_bands(file: &str, corrected: bool, given: bool) -> Caveat {
     let drift = if corrected {
-        "corrected for the drift that was given"
+        SurveyDrift::Corrected
     } else if given {
-        "not corrected for the drift that was given (the file tells no line rate and frame direction)"
+        SurveyDrift::NoTiming
     } else {
-        "without correction for drift"
+        SurveyDrift::Unknown
     };
-    let words = format!(
-        "the image was mapped in bands, with nominal positions, {drift}, and without displacements"
-    );
-    Caveat::new("survey", file, words)
+    Caveat::new(MapDoubt::Survey { drift }, file)
 }

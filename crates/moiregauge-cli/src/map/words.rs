@@ -4,9 +4,11 @@ use std::fmt::Write as _;
 
 use moiregauge::estimate::Estimate;
 use moiregauge_report::results::{MapResults, ResultEstimate, StripesResult};
+use moiregauge_report::screen::try_option;
 use moiregauge_report::{layers, plus_minus, two_digits};
 
 use super::regions;
+use crate::hints;
 
 /// Quantities whose trend is told on the screen.
 const TRENDS: [&str; 3] = ["twist", "strain vector 1", "strain vector 2"];
@@ -57,12 +59,16 @@ pub(super) fn summary(results: &MapResults) -> String {
         );
     }
     text.push_str(&regions::summary(&results.details));
-    for caveat in &results.caveats {
+    let mut caveats = results.caveats.iter().peekable();
+    while let Some(caveat) = caveats.next() {
         let _ = writeln!(
             text,
             "caveat {} ({}): {}",
             caveat.code, caveat.place, caveat.message
         );
+        if caveats.peek().is_none_or(|next| next.code != caveat.code) {
+            try_option(&mut text, &caveat.code, hints::of);
+        }
     }
     text
 }

@@ -3,6 +3,7 @@
 mod acceptance;
 mod calibration;
 mod common;
+mod explained;
 mod figures;
 mod formats;
 mod identity;

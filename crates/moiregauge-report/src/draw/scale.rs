@@ -1,5 +1,7 @@
 //! Ranges, the map from data to page, and ticks at round numbers.
 
+pub use moiregauge::words::fixed;
+
 /// A closed interval of data values.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Range {
@@ -128,17 +130,6 @@ fn multiples(range: Range, step: f64) -> Vec<Tick> {
             }
         })
         .collect()
-}
-
-/// A number with `decimals` decimals and a true minus sign; never `−0`.
-pub fn fixed(value: f64, decimals: usize) -> String {
-    let text = format!("{value:.decimals$}");
-    let digits = text.trim_start_matches('-');
-    if digits.len() < text.len() && digits.bytes().any(|b| (b'1'..=b'9').contains(&b)) {
-        format!("\u{2212}{digits}")
-    } else {
-        digits.to_owned()
-    }
 }
 
 #[cfg(test)]

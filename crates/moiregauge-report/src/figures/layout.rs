@@ -2,8 +2,9 @@
 
 use moiregauge::analysis::{Illustration, ScanAnalysis, SetAnalysis};
 use moiregauge::estimate::Estimate;
+pub(super) use moiregauge::words::line_name;
 use nalgebra::Matrix2;
-use spmfile::{FrameDirection, LineDirection};
+use spmfile::FrameDirection;
 
 use crate::draw::axes::Axes;
 use crate::draw::scale::Range;
@@ -72,14 +73,6 @@ pub(super) fn ordinal(index: usize) -> f64 {
 /// Whether the bottom line came first, or nobody knows; decides between filled and open symbols.
 pub(super) fn is_up(scan: &ScanAnalysis) -> bool {
     scan.frame_direction != Some(FrameDirection::Down)
-}
-
-/// `trace` or `retrace`.
-pub(super) fn line_name(line: LineDirection) -> &'static str {
-    match line {
-        LineDirection::Trace => "trace",
-        LineDirection::Retrace => "retrace",
-    }
 }
 
 /// One value with its error bar at the place of its scan.

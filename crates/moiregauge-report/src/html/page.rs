@@ -1,5 +1,7 @@
 //! What the page says, as text ready for the template.
 
+use moiregauge::analysis::Analysis;
+use moiregauge::caveat::{Caveat, Doubt, MoireDoubt, SetDoubt};
 use moiregauge::settings::{Method, Settings};
 use serde::Serialize;
 
@@ -17,11 +19,11 @@ const TEMPLATE: &str = include_str!("report.html");
 
 /// The page. `downloads` are the files that it carries for saving.
 pub(crate) fn page(
-    results: &Results,
+    of: (&Results, &Analysis),
     figures: &[Figure],
     downloads: &[(String, Vec<u8>)],
 ) -> Result<Vec<u8>, ReportError> {
-    rendered(TEMPLATE, Page::new(results, figures, downloads)?)
+    rendered(TEMPLATE, Page::new(of, figures, downloads)?)
 }
 
 #[derive(Debug, Serialize)]
@@ -148,7 +150,7 @@ pub(super) struct Download<'a> {
 
 impl<'a> Page<'a> {
     pub(super) fn new(
-        results: &'a Results,
+        (results, analysis): (&'a Results, &Analysis),
         figures: &'a [Figure],
         downloads: &'a [(String, Vec<u8>)],
     ) -> Result<Self, ReportError> {
@@ -168,7 +170,7 @@ impl<'a> Page<'a> {
             combined_budget: combined.map(|c| Budgeted::new(&c.budget)),
             combined_wavelengths: combined.map(|c| wavelengths(&c.vectors)),
             combined_meanings: combined.map(|c| Meanings::new(&c.readings)),
-            not_combined: not_combined(results),
+            not_combined: not_combined(&analysis.caveats),
             layers: layers(&results.settings),
             atomic: results.atomic.as_ref().map(atomic),
             sets: sets
@@ -187,19 +189,16 @@ impl<'a> Page<'a> {
 }
 
 /// Why there is no combined result.
-fn not_combined(results: &Results) -> String {
-    let codes = [
-        "samples-separated",
-        "different-lattices",
-        "layers-cannot-make-it",
-        "no-moire",
-    ];
-    let mut reasons = results
-        .caveats
-        .iter()
-        .filter(|c| codes.contains(&c.code.as_str()));
-    match reasons.next() {
-        Some(why) => format!("There is no combined result: {}.", why.message),
+fn not_combined(caveats: &[Caveat]) -> String {
+    let is_reason = |c: &&Caveat| {
+        matches!(
+            c.doubt,
+            Doubt::Sets(SetDoubt::SamplesSeparated(_) | SetDoubt::DifferentLattices { .. })
+                | Doubt::Moire(MoireDoubt::LayersCannotMakeIt(_) | MoireDoubt::NoMoire { .. })
+        )
+    };
+    match caveats.iter().find(is_reason) {
+        Some(why) => format!("There is no combined result: {}.", why.message()),
         None => "No set could be corrected for drift, so there is no combined result. The numbers below are those of \
                  single sets and contain whatever the drift did to them."
             .to_owned(),

@@ -3,7 +3,6 @@
 use moiregauge::analysis::{
     Analysis, Axis, Combined, Consistency, Drift, DriftFit, DriftMonteCarlo, SetAnalysis, SetMean,
 };
-use moiregauge::caveat::Caveat;
 use moiregauge::estimate::Estimate;
 use moiregauge::material::Bilayer;
 use moiregauge::settings::Settings;
@@ -13,6 +12,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::budget::BudgetResult;
+use super::caveat::ResultCaveat;
 use super::checks::ChecksResult;
 use super::conventions::Conventions;
 use super::convert::{PER_MINUTE, PERCENT, correlation, degree, estimate, estimate_in_all, number};
@@ -39,7 +39,7 @@ pub struct Results {
     /// The orientation of a layer by atomically resolved images; `null` without any.
     pub atomic: Option<AtomicResult>,
     /// Doubts.
-    pub caveats: Vec<Caveat>,
+    pub caveats: Vec<ResultCaveat>,
     /// Inputs that could not be used.
     pub failed: Vec<FailedInput>,
     /// What the numbers mean.
@@ -216,7 +216,7 @@ impl Results {
                 .collect(),
             combined: analysis.combined.as_ref().map(|c| combined(c, settings)),
             atomic: analysis.atomic.as_ref().map(Into::into),
-            caveats: analysis.caveats.clone(),
+            caveats: analysis.caveats.iter().map(Into::into).collect(),
             failed: provenance.failed.clone(),
             conventions: Conventions::of(&analysis.settings),
             settings: analysis.settings.clone(),

@@ -1,12 +1,12 @@
 //! The summary of a map as a document, `moiregauge/map/1`: degrees, per cent, nm.
 
-use moiregauge::caveat::Caveat;
 use moiregauge::map::{Agreement, DriftChange, Mask, Plane, TwistStrainMap, UsedHarmonic};
 use moiregauge::region::Trends;
 use moiregauge::settings::Settings;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::caveat::ResultCaveat;
 use super::conventions::Conventions;
 use super::lattice::TwistStrainResult;
 use super::quantity::{QuantityResult, TrendResult};
@@ -57,7 +57,7 @@ pub struct MapResults {
     /// Regions, uniform areas, wanted twist.
     pub details: super::region::MapDetailsResult,
     /// Doubts.
-    pub caveats: Vec<Caveat>,
+    pub caveats: Vec<ResultCaveat>,
 }
 
 /// How many nodes have a mask.

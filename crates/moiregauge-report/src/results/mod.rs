@@ -4,6 +4,7 @@
 //! `results.json` and is described by [`schema`]. A number that is not known is `null`, never NaN.
 
 mod budget;
+mod caveat;
 mod checks;
 mod conventions;
 mod convert;
@@ -23,6 +24,7 @@ mod stripes;
 
 pub(crate) use budget::source_name;
 pub use budget::{BudgetColumn, BudgetResult};
+pub use caveat::ResultCaveat;
 pub use checks::{ChecksResult, ResidualResult, ScatterResult};
 pub use conventions::Conventions;
 pub use document::{

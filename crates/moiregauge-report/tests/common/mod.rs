@@ -11,7 +11,7 @@ mod sets;
 
 use moiregauge::analysis::{Analysis, Axis, Combined, Consistency, Picture};
 use moiregauge::budget::Budget;
-use moiregauge::caveat::Caveat;
+use moiregauge::caveat::{Caveat, DriftDoubt, LatticeDoubt};
 use moiregauge::image::Image;
 use moiregauge::lattice::LatticeVectors;
 use moiregauge::settings::Settings;
@@ -67,14 +67,18 @@ pub(crate) fn analysis() -> Analysis {
         atomic: None,
         caveats: vec![
             Caveat::new(
-                "few-periods",
+                LatticeDoubt::FewPeriods {
+                    periods: 2.5,
+                    enough: 3.0,
+                },
                 "slow y, 8 Hz",
-                "Only 4.5 moiré periods across the frame.",
             ),
             Caveat::new(
-                "drift-not-determined",
+                DriftDoubt::Undetermined {
+                    reason: "One direction only: the scans cannot tell drift from strain."
+                        .to_owned(),
+                },
                 "slow y, 2 Hz",
-                "One direction only: the scans cannot tell drift from strain.",
             ),
         ],
     }

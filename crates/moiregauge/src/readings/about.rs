@@ -2,7 +2,9 @@
 
 use super::tensor::{SenseReading, TensorReading, known_orientation};
 use super::{AllNames, CLEARLY, ChosenBy, NameReading, Naming, Readings, WaveStrengths};
-use crate::caveat::Caveat;
+use crate::caveat::{
+    Caveat, Doubt, NumbersOfName, OrientationDoubt, ReadingDoubt, SenseNumbers, TwistShift,
+};
 use crate::estimate::Estimate;
 use crate::lattice::LatticeVectors;
 use crate::material::Bilayer;
@@ -21,7 +23,7 @@ pub fn caveats(
     settings: &Settings,
 ) -> Vec<Caveat> {
     let mut caveats = Vec::new();
-    let mut add = |code: &str, message: String| caveats.push(Caveat::new(code, place, message));
+    let mut add = |doubt: Doubt| caveats.push(Caveat::new(doubt, place));
     let bilayer = settings.bilayer();
     let tensor = readings.tensor.as_ref();
     if readings.layers_differ && tensor.is_none() {
@@ -35,18 +37,10 @@ pub fn caveats(
         &mut add,
     );
     if known_orientation(settings).is_some() && tensor.is_none() {
-        add(
-            "orientation-unused",
-            "the orientation of the layer goes with no reading of this moiré".to_owned(),
-        );
+        add(OrientationDoubt::Unused.into());
     }
     if settings.twist_sense.is_some() && tensor.is_none() {
-        add(
-            "twist-sense-unused",
-            "the sense of the twist was given, which tells nothing without the orientation of a layer: the twist is \
-             a magnitude"
-                .to_owned(),
-        );
+        add(OrientationDoubt::SenseUnused.into());
     }
     if let Some(tensor) = tensor {
         about_tensor(found, tensor, settings, &mut add);
@@ -55,54 +49,28 @@ pub fn caveats(
     caveats
 }
 
-fn degrees(angle: f64) -> String {
-    format!("{:.3}°", angle.to_degrees())
-}
-
 fn about_different_layers(
     found: &TwistStrain,
     readings: &Readings,
     bilayer: Bilayer<'_>,
-    add: &mut impl FnMut(&str, String),
+    add: &mut impl FnMut(Doubt),
 ) {
-    let choices: Vec<String> = readings
-        .choices()
-        .map(|b| {
-            format!(
-                "{} with a strain of {:+.3} %",
-                degrees(b.twist),
-                100.0 * b.strain
-            )
-        })
-        .collect();
-    let shift = readings.degeneracy.as_ref().and_then(|d| {
+    let choices: Vec<[f64; 2]> = readings.choices().map(|b| [b.twist, b.strain]).collect();
+    let degeneracy = readings.degeneracy.as_ref();
+    let shift = degeneracy.and_then(|d| {
         let (_, change) = d.shifts.iter().find(|(h, _)| *h == 0.001)?;
-        Some(change.map_or_else(
-            || "no twist at all goes with 0.1 % of isotropic strain".to_owned(),
-            |c| format!("0.1 % of isotropic strain moves it by {}", degrees(c)),
-        ))
-    });
-    let interval = readings.degeneracy.as_ref().map(|d| {
-        format!(
-            "; {} to {} in all",
-            degrees(d.interval[0]),
-            degrees(d.interval[1])
-        )
+        Some(change.map_or(TwistShift::NoTwist, TwistShift::By))
     });
     if choices.is_empty() && found.twist > 0.0 {
         return;
     }
-    add(
-        "twist-trades-with-strain",
-        format!(
-            "the layers of {} differ in size, so that twist and strain trade at first order: the moiré is as \
-             well one of {}; {}{}. The orientation of a layer (--lattice-angle, --atomic) would tell",
-            bilayer.name(),
-            choices.join(" as of "),
-            shift.unwrap_or_default(),
-            interval.unwrap_or_default()
-        ),
-    );
+    add(ReadingDoubt::TwistTradesWithStrain {
+        layers: bilayer.name(),
+        choices,
+        shift,
+        interval: degeneracy.map(|d| d.interval),
+    }
+    .into());
 }
 
 /// Near alignment the moiré knows θ² and not θ.
@@ -111,7 +79,7 @@ fn about_alignment(
     found: &TwistStrain,
     readings: &Readings,
     bilayer: Bilayer<'_>,
-    add: &mut impl FnMut(&str, String),
+    add: &mut impl FnMut(Doubt),
 ) {
     let twist = found.twist();
     // σ of θ², which stays finite; in `aligned` readings σ_θ is its root.
@@ -125,24 +93,13 @@ fn about_alignment(
         let longest = (0..3)
             .map(|i| lattice.wavelength(i).value)
             .fold(0.0, f64::max);
-        add(
-            "larger-than-aligned",
-            format!(
-                "no twist and uniaxial strain of {} make a moiré as large as this one (up to {longest:.3} nm): \
-                 it is read as aligned layers, θ = 0; isotropic strain, the lattice constants or the gain \
-                 of the scanner account for the rest",
-                bilayer.name()
-            ),
-        );
+        add(ReadingDoubt::LargerThanAligned {
+            layers: bilayer.name(),
+            longest,
+        }
+        .into());
     } else if twist.value * twist.value < 1.96 * square_sigma {
-        add(
-            "alignment-within-errors",
-            format!(
-                "the twist cannot be told from zero: near alignment the moiré depends on θ², and σ of a \
-                 small θ means little; θ < {} (95 %, statistical errors alone)",
-                degrees(limit)
-            ),
-        );
+        add(ReadingDoubt::AlignmentWithinErrors { limit }.into());
     }
 }
 
@@ -150,7 +107,7 @@ fn about_tensor(
     found: &TwistStrain,
     tensor: &TensorReading,
     settings: &Settings,
-    add: &mut impl FnMut(&str, String),
+    add: &mut impl FnMut(Doubt),
 ) {
     let tensor_ratio = tensor.poisson_ratio;
     let best = tensor.in_all();
@@ -162,21 +119,11 @@ fn about_tensor(
         && mean.value.abs() > likely.max(CLEARLY * mean.sigma);
     let contradicted = mean.value.abs() > CONTRADICTION || nearer;
     if contradicted {
-        add(
-            "orientation-contradicts",
-            format!(
-                "the orientation that was given would need an isotropic heterostrain of {:+.2} %{}: it is that of \
-                 another vector (30° off for a hexagonal layer; see --lattice-angle-of), another layer or \
-                 another sample",
-                100.0 * mean.value,
-                tensor
-                    .other_vector
-                    .map_or_else(String::new, |other| format!(
-                        ", one 30° further {:+.2} %",
-                        100.0 * other
-                    ))
-            ),
-        );
+        add(OrientationDoubt::Contradicts {
+            strain: mean.value,
+            other: tensor.other_vector,
+        }
+        .into());
     }
     let sizes = |tensor: StrainTensor| tensor.splits(tensor_ratio).map(|split| split.biaxial);
     let beyond = |e: Estimate| {
@@ -188,88 +135,44 @@ fn about_tensor(
         .map(sizes)
         .collect();
     if senses.iter().flatten().all(|e| beyond(*e)) && !contradicted {
-        let shown: Vec<String> = senses
-            .iter()
-            .map(|[a, b]| format!("{:+.3} or {:+.3} %", 100.0 * a.value, 100.0 * b.value))
-            .collect();
-        add(
-            "isotropic-strain-found",
-            format!(
-                "with the orientation of layer {} the layers differ in size by {}, more than uniaxial strain brings \
-                 with it: `twist_deg` assumes that there is none, and differs by {} from the magnitude of the twist of \
-                 `strain_tensor`, which does not",
-                known_orientation(settings).map_or(1, |known| known.layer),
-                shown.join(", or for the other sense of the twist by "),
-                degrees((best.twist.abs() - found.twist.abs()).abs()),
-            ),
-        );
+        add(ReadingDoubt::IsotropicStrainFound {
+            layer: known_orientation(settings).map_or(1, |known| known.layer),
+            sizes: senses.iter().map(|s| s.map(|e| e.value)).collect(),
+            difference: (best.twist.abs() - found.twist.abs()).abs(),
+        }
+        .into());
     }
     if !tensor.alternatives.is_empty() && settings.substrate.is_some() {
-        let others: Vec<String> = tensor
-            .alternatives
-            .iter()
-            .map(|t| format!("{} with {:+.2} %", degrees(t.twist), 100.0 * t.mean))
-            .collect();
-        add(
-            "orientation-ambiguous",
-            format!(
-                "an orientation is known modulo the symmetry of its layer only: {} of mean strain {:+.2} % is \
-                 the reading with the least; others are {}",
-                degrees(tensor.best.twist),
-                100.0 * tensor.best.mean,
-                others.join(", ")
-            ),
-        );
+        let others = tensor.alternatives.iter().map(|t| [t.twist, t.mean]);
+        add(OrientationDoubt::Ambiguous {
+            twist: tensor.best.twist,
+            strain: tensor.best.mean,
+            others: others.collect(),
+        }
+        .into());
     }
 }
 
 /// Equal layers: an orientation does not tell which of the two is turned forward.
-fn about_sense(tensor: &TensorReading, add: &mut impl FnMut(&str, String)) {
+fn about_sense(tensor: &TensorReading, add: &mut impl FnMut(Doubt)) {
     if let Some(sigmas) = tensor.disagreement {
-        add(
-            "orientations-disagree",
-            format!(
-                "the orientations of the two layers differ from what the moiré makes of one of them by {sigmas:.1} σ at \
-                 least: one of them is that of another vector, another layer or another sample, or an error is \
-                 too small"
-            ),
-        );
+        add(OrientationDoubt::Disagree { sigmas }.into());
     }
     if tensor.sense_contradicted {
-        add(
-            "twist-sense-contradicts",
-            "the orientation of the layer goes with no twist of the sense that was given; the other sense is shown"
-                .to_owned(),
-        );
+        add(OrientationDoubt::SenseContradicts.into());
     }
     let Some(opposite) = &tensor.opposite else {
         return;
     };
-    let words = |tensor: StrainTensor| {
-        format!(
-            "{} ± {} with a mean strain of {:+.4} %",
-            degrees(tensor.twist),
-            degrees(tensor.twist().sigma),
-            100.0 * tensor.mean
-        )
+    let numbers = |tensor: StrainTensor| SenseNumbers {
+        twist: Estimate::new(tensor.twist, tensor.twist().sigma),
+        strain: tensor.mean,
     };
-    let interval = tensor.magnitudes().map_or_else(String::new, |[low, high]| {
-        format!(
-            "; magnitudes from {} to {} are open",
-            degrees(low),
-            degrees(high)
-        )
-    });
-    add(
-        "twist-sense-open",
-        format!(
-            "two equal layers: the orientation of one of them goes with twists of either sense, {} and {}, and \
-             none is better than the other{interval}. The sense of the twist, or the orientation of the other layer, \
-             would tell",
-            words(tensor.in_all()),
-            words(opposite.in_all()),
-        ),
-    );
+    add(OrientationDoubt::SenseOpen {
+        senses: [numbers(tensor.in_all()), numbers(opposite.in_all())],
+        magnitudes: tensor.magnitudes(),
+    }
+    .into());
 }
 
 /// What has to be said of the names of a lattice alone.
@@ -280,7 +183,7 @@ pub(crate) fn name_caveats(
     settings: &Settings,
 ) -> Vec<Caveat> {
     let mut caveats = Vec::new();
-    let mut add = |code: &str, message: String| caveats.push(Caveat::new(code, place, message));
+    let mut add = |doubt: Doubt| caveats.push(Caveat::new(doubt, place));
     let all = AllNames::new(lattice, strengths, settings);
     about_names(lattice, all.naming.as_ref(), all.complete_to, &mut add);
     caveats
@@ -291,7 +194,7 @@ fn about_names(
     lattice: &LatticeVectors,
     naming: Option<&Naming>,
     complete_to: f64,
-    add: &mut impl FnMut(&str, String),
+    add: &mut impl FnMut(Doubt),
 ) {
     let Some(naming) = naming else {
         return;
@@ -299,66 +202,37 @@ fn about_names(
     let Some(reported) = naming.names.first() else {
         return;
     };
-    let words = |n: &NameReading| {
-        format!(
-            "{} with {:.3} % of strain",
-            degrees(n.twist),
-            100.0 * n.strain
-        )
+    let numbers = |n: &NameReading| NumbersOfName {
+        twist: n.twist,
+        strain: n.strain,
     };
-    let open: Vec<String> = naming.open().map(words).collect();
+    let open: Vec<NumbersOfName> = naming.open().map(numbers).collect();
     if !open.is_empty() {
-        add(
-            "names-compete",
-            format!(
-                "the same lattice has other pairs of vectors, and the strain that these need is plausible, too: {} is the \
-                 reading that is reported, but it can as well be {}. {} The orientation of a layer may tell; all \
-                 readings with up to {:.2} % are under `readings.solutions`",
-                words(reported),
-                open.join(", or "),
-                if naming.chosen_by == ChosenBy::Image {
-                    "The image speaks against others, not against these."
-                } else {
-                    "The image does not tell them apart: no three waves in it are equally strong while one of each \
-                     other reading is weak, or they were not measured."
-                },
-                100.0 * complete_to,
-            ),
-        );
+        add(ReadingDoubt::NamesCompete {
+            reported: numbers(reported),
+            open,
+            by_image: naming.chosen_by == ChosenBy::Image,
+            complete_to,
+        }
+        .into());
     }
-    let less: Vec<String> = naming.names[1..]
+    let less: Vec<NumbersOfName> = naming.names[1..]
         .iter()
         .filter(|n| n.strain < reported.strain * (1.0 - 1e-9))
-        .map(words)
+        .map(numbers)
         .collect();
     if less.is_empty() {
         return;
     }
-    let [a, b] = reported
+    let waves = reported
         .name
         .waves(&lattice.basis)
         .map_or([[f64::NAN; 2]; 2], |w| [[w.m11, w.m21], [w.m12, w.m22]]);
-    add(
-        "not-the-least-strain",
-        format!(
-            "the reported pair of waves, ({:.4}, {:.4}) and ({:.4}, {:.4}) rad/nm, is not the one that needs the least \
-             strain: {} in place of {}. {}",
-            a[0],
-            a[1],
-            b[0],
-            b[1],
-            words(reported),
-            less.join(" or "),
-            match naming.chosen_by {
-                ChosenBy::Image => {
-                    "The image decided: these waves and their sum are strong, and each of the others has a weak one in \
-                     its first shell"
-                }
-                ChosenBy::Orientation => {
-                    "The orientation of a layer decided: the others need isotropic strain on top"
-                }
-                ChosenBy::User | ChosenBy::LeastStrain => "It was given",
-            }
-        ),
-    );
+    add(ReadingDoubt::NotTheLeastStrain {
+        waves,
+        reported: numbers(reported),
+        less,
+        chosen_by: naming.chosen_by,
+    }
+    .into());
 }

@@ -19,7 +19,7 @@ use nalgebra::{Matrix2, Matrix4, RowVector4, Vector2};
 use super::alike::{Alike, alike};
 use super::identity::once;
 use super::measure::MeasuredScan;
-use crate::caveat::Caveat;
+use crate::caveat::{Caveat, OrientationDoubt};
 use crate::chi2::enlargement;
 use crate::drift::{Observation, solve};
 use crate::estimate::Estimate;
@@ -171,13 +171,10 @@ pub fn atomic_orientation(
         let scale = enlargement(solution.chi2, solution.degrees_of_freedom);
         if scale > LARGE_SCATTER {
             caveats.push(Caveat::new(
-                "atomic-scatter",
+                OrientationDoubt::AtomicScatter {
+                    times: scale.sqrt(),
+                },
                 &place,
-                format!(
-                    "the atomic images scatter {:.1} times more than their errors say: drift that changes, as \
-                     after a move of the window; the error of the orientation is enlarged to match",
-                    scale.sqrt()
-                ),
             ));
         }
         let lattice = LatticeVectors {
@@ -191,13 +188,7 @@ pub fn atomic_orientation(
             drift: Some(solution.velocity),
         }
     } else {
-        caveats.push(Caveat::new(
-            "atomic-drift-assumed",
-            &place,
-            "the atomic images are all of one frame direction, which does not tell their drift: the \
-             orientation rests on the rows of atoms along the fast axis alone and on the lattice constant; \
-             frames up and down would do better",
-        ));
+        caveats.push(Caveat::new(OrientationDoubt::AtomicDriftAssumed, &place));
         one_direction(&observations, material, calibration)?
     };
     let (off, distortion) = (found.shape.0 - 1.0, found.shape.1);
@@ -216,14 +207,11 @@ pub fn atomic_orientation(
     let allowed = calibration.gain_percent / 100.0;
     if off.abs() > CLEARLY * allowed.max(0.01) {
         caveats.push(Caveat::new(
-            "atomic-size",
+            OrientationDoubt::AtomicSize {
+                larger: off,
+                material: material.name.clone(),
+            },
             &place,
-            format!(
-                "the lattice of the atomic images is {:+.1} % larger than that of {}: the gain of the scanner \
-                 is off by that much, or it is another layer",
-                100.0 * off,
-                material.name
-            ),
         ));
     }
     Ok(AtomicOrientation {

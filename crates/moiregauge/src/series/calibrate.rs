@@ -21,7 +21,9 @@ use super::identity::once;
 use super::measure::{MeasuredLine, MeasuredScan};
 use crate::analysis::Axis;
 use crate::calibration::{Calibration, Coordinates, KnownLattice, Shown, shown};
-use crate::caveat::Caveat;
+use crate::caveat::{
+    CalibrationDoubt, Caveat, Doubt, DriftDoubt, LatticeDoubt, PositionDoubt, Scattered, SetDoubt,
+};
 use crate::chi2::enlargement;
 use crate::drift::{Observation, common_lattice, solve};
 use crate::estimate::Estimate;
@@ -151,7 +153,7 @@ pub fn calibrate(
     let (scans, repeats) = once(scans);
     let mut caveats: Vec<Caveat> = scans.iter().flat_map(|s| s.caveats.clone()).collect();
     caveats.extend(repeats);
-    caveats.retain(|c| c.code != "no-position-sensors" && c.code != "second-lattice");
+    caveats.retain(|c| !is_expected(&c.doubt));
     let from_sensors = |line: &MeasuredLine| line.geometry.from_sensors;
     let lines = || scans.iter().flat_map(|s| &s.lines);
     let first = from_sensors(lines().next().ok_or(CalibrateError::Nothing)?);
@@ -177,13 +179,10 @@ pub fn calibrate(
     let statistical = mean(&bare).map_or(covariance, |(_, c, _)| c) * scale;
     if freedom > 0 && chi2 / freedom as f64 > LARGE_CHI2 {
         caveats.push(Caveat::new(
-            "calibrations-differ",
+            CalibrationDoubt::SetsDiffer {
+                times: (chi2 / freedom as f64).sqrt(),
+            },
             "calibration",
-            format!(
-                "the sets differ {:.1} times more than their errors say: a lag or hysteresis of the fast axis, drift \
-                 that changes, or strain of the sample; errors are enlarged to match",
-                (chi2 / freedom as f64).sqrt()
-            ),
         ));
     }
     // A wrong constant of the known lattice is a wrong size of everything.
@@ -220,6 +219,16 @@ pub fn calibrate(
         calibration,
         caveats,
     })
+}
+
+/// Whether a doubt about a scan is none about a calibration: that of nominal coordinates is what is looked for, and atoms
+/// show other waves beside their lattice.
+fn is_expected(doubt: &Doubt) -> bool {
+    matches!(
+        doubt,
+        Doubt::Positions(PositionDoubt::NoPositionSensors { .. })
+            | Doubt::Lattice(LatticeDoubt::SecondLattice { .. })
+    )
 }
 
 /// The lattice of one set and its distortion.
@@ -326,17 +335,7 @@ fn about_one_drift(
         });
     }
     if found.drift > LARGE_DRIFT {
-        caveats.push(Caveat::new(
-            "large-drift",
-            name,
-            format!(
-                "the sample drifts at {:.0} % of the speed at which lines follow each other. A constant drift is taken \
-                 out exactly, but one that changes by a tenth during a frame makes errors of {:.0} %: faster lines or \
-                 smaller frames make them smaller",
-                100.0 * found.drift,
-                10.0 * found.drift
-            ),
-        ));
+        caveats.push(Caveat::new(DriftDoubt::Large { share: found.drift }, name));
     }
     Ok(())
 }
@@ -399,17 +398,13 @@ fn summary(seen: Seen, map: &Matrix2<f64>, coordinates: Coordinates, used: bool)
 fn about_plausibility(calibration: &Calibration, known: bool, caveats: &mut Vec<Caveat>) {
     if let Some(problem) = calibration.problem() {
         caveats.push(Caveat::new(
-            "calibration-implausible",
+            CalibrationDoubt::Implausible { reason: problem },
             "calibration",
-            format!("no scanner can be like that, and nothing is corrected with it: {problem}"),
         ));
     } else if let Some(what) = calibration.unusual().filter(|_| known) {
         caveats.push(Caveat::new(
-            "calibration-unusual",
+            CalibrationDoubt::Unusual { what },
             "calibration",
-            format!(
-                "a scanner rarely has a {what}: make sure that the images show the known lattice and have the right size"
-            ),
         ));
     }
 }
@@ -417,13 +412,11 @@ fn about_plausibility(calibration: &Calibration, known: bool, caveats: &mut Vec<
 fn about_scatter(name: &str, chi2: f64, freedom: usize, caveats: &mut Vec<Caveat>) {
     if freedom > 0 && chi2 / freedom as f64 > LARGE_CHI2 {
         caveats.push(Caveat::new(
-            "scatter",
+            SetDoubt::Scatter {
+                of: Scattered::KnownLattice,
+                chi2_per_dof: chi2 / freedom as f64,
+            },
             name,
-            format!(
-                "the images scatter {:.1} times more than their errors say: drift that changes, creep, or a lattice \
-                 that is not the same everywhere; errors are enlarged to match",
-                (chi2 / freedom as f64).sqrt()
-            ),
         ));
     }
 }
@@ -431,14 +424,11 @@ fn about_scatter(name: &str, chi2: f64, freedom: usize, caveats: &mut Vec<Caveat
 fn about_name(name: &str, found: &Shown, caveats: &mut Vec<Caveat>) {
     if found.next_distortion < found.distortion + AMBIGUOUS {
         caveats.push(Caveat::new(
-            "calibration-ambiguous",
+            CalibrationDoubt::Ambiguous {
+                distortion: found.distortion,
+                next: found.next_distortion,
+            },
             name,
-            format!(
-                "two ways of naming the vectors explain the image with distortions of much the same size ({:.1} % and \
-                 {:.1} % between two axes): the smaller is taken",
-                200.0 * found.distortion,
-                200.0 * found.next_distortion
-            ),
         ));
     }
 }
@@ -450,24 +440,11 @@ fn about_drift(
     drift_sigma: f64,
     caveats: &mut Vec<Caveat>,
 ) {
-    let per_minute = drift_sigma * 60.0;
-    let size = match gradient {
-        Some(u) => format!(
-            "A drift of 1 nm/min makes {:.2} % along the slow axis, or {:.1} mrad of shear; a drift of 0 ± {per_minute} \
-             nm/min is assumed (--drift-sigma) and is in the errors",
-            100.0 * u.norm() / 60.0,
-            1000.0 * u.norm() / 60.0
-        ),
-        None => "Without a line rate it cannot be said how much: --line-rate would tell, and until then the errors \
-                 are without it"
-            .to_owned(),
-    };
     caveats.push(Caveat::new(
-        "drift-not-separated",
+        CalibrationDoubt::DriftNotSeparated {
+            gradient: gradient.map(|u| u.norm()),
+            sigma: drift_sigma,
+        },
         name,
-        format!(
-            "the frames are all of one slow direction: gain of the slow axis and shear cannot be told from drift. {size}. \
-             Frames up and down would separate them"
-        ),
     ));
 }

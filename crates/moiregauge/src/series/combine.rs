@@ -8,7 +8,7 @@ use super::sightings::middle_of_frame;
 
 use crate::analysis::{Combined, Consistency, Drift, SetAnalysis, SetMean};
 use crate::budget::{Budget, Statistical};
-use crate::caveat::Caveat;
+use crate::caveat::{Caveat, DriftDoubt, SetDoubt};
 use crate::chi2::enlargement;
 use crate::joint::JointFit;
 use crate::lattice::LatticeVectors;
@@ -46,13 +46,8 @@ pub(super) fn combine(
         .reduce(f64::max);
     if let Some(largest) = largest {
         caveats.push(Caveat::new(
-            "different-lattices",
+            SetDoubt::DifferentLattices { share: largest },
             "analysis",
-            format!(
-                "the sets show lattices that differ by up to {:.1} %: they are not of the same place or \
-                 sample, and are not combined",
-                100.0 * largest
-            ),
         ));
         return None;
     }
@@ -87,14 +82,9 @@ pub(super) fn combine(
                 let left_out = fit.leave_one_out();
                 checks = Some(set_checks(&fit, &left_out, scans, ("all sets", settings)));
             }
-            Err(why) => caveats.push(Caveat::new(
-                "drift-not-joined",
-                "analysis",
-                format!(
-                    "no smooth drift describes all sets: {why}; the lattices of the sets, each with its \
-                     own drift, are averaged instead"
-                ),
-            )),
+            Err(reason) => {
+                caveats.push(Caveat::new(DriftDoubt::NotJoined { reason }, "analysis"));
+            }
         }
     }
     let consistency = consistency(sets);
@@ -102,14 +92,12 @@ pub(super) fn combine(
         let drift = pair.drift_sigmas.unwrap_or(0.0);
         if drift.max(pair.twist_sigmas).max(pair.strain_sigmas) > APART {
             caveats.push(Caveat::new(
-                "sets-disagree",
+                SetDoubt::SetsDisagree {
+                    drift,
+                    twist: pair.twist_sigmas,
+                    strain: pair.strain_sigmas,
+                },
                 pair.sets.join(" / "),
-                format!(
-                    "the sets disagree: drift {drift:.1} σ, twist {:.1} σ, strain {:.1} σ apart; a drift \
-                     that changes in time or a scanner whose axes differ would do this; the errors of \
-                     the combined values are enlarged to match",
-                    pair.twist_sigmas, pair.strain_sigmas
-                ),
             ));
         }
     }

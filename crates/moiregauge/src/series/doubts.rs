@@ -1,7 +1,7 @@
 //! What the images of one scan make doubtful.
 
 use super::measure::MeasuredLine;
-use crate::caveat::Caveat;
+use crate::caveat::{Caveat, LatticeDoubt, LineDifference, PositionDoubt};
 use crate::chi2;
 use crate::geometry::Geometry;
 use crate::lattice::reciprocal::labelled_like;
@@ -19,13 +19,10 @@ const NOTABLE: f64 = 1e-3;
 pub(super) fn turned(file: &str, rotation_rad: f64, caveats: &mut Vec<Caveat>) {
     if rotation_rad != 0.0 {
         caveats.push(Caveat::new(
-            "frame-turned",
+            PositionDoubt::FrameTurned {
+                rotation: rotation_rad,
+            },
             file,
-            format!(
-                "the frame is turned by {:.4}° against the laboratory axes, in which vectors and angles are given; \
-                 in the axes of the image, which --rotation 0 gives, all angles are smaller by that",
-                rotation_rad.to_degrees()
-            ),
         ));
     }
 }
@@ -34,13 +31,11 @@ pub(super) fn turned(file: &str, rotation_rad: f64, caveats: &mut Vec<Caveat>) {
 pub(super) fn few_periods(file: &str, lattice: &MeasuredLattice, caveats: &mut Vec<Caveat>) {
     if lattice.periods < FEW_PERIODS {
         caveats.push(Caveat::new(
-            "few-periods",
+            LatticeDoubt::FewPeriods {
+                periods: lattice.periods,
+                enough: FEW_PERIODS,
+            },
             file,
-            format!(
-                "only {:.1} lattice periods fit across the frame; vectors from fewer than {FEW_PERIODS} \
-                 are less accurate than their errors say",
-                lattice.periods
-            ),
         ));
     }
 }
@@ -58,41 +53,24 @@ pub(super) fn lines_disagree(
     let first = first.in_sensor_coordinates();
     let second = labelled_like(&second.in_sensor_coordinates(), &first.basis);
     let share = (second.basis - first.basis).norm() / first.basis.norm();
-    let lengths = |l: &crate::lattice::LatticeVectors| {
-        let [a, b, c] = [0, 1, 2].map(|i| l.wavelength(i).value);
-        format!("{a:.4}, {b:.4}, {c:.4} nm")
-    };
-    let both = format!(
-        "{} in trace, {} in retrace",
-        lengths(&first),
-        lengths(&second)
-    );
+    let lengths = |l: &crate::lattice::LatticeVectors| [0, 1, 2].map(|i| l.wavelength(i).value);
+    let (trace, retrace) = (lengths(&first), lengths(&second));
     if share > ANOTHER_LATTICE {
-        let reason = "trace and retrace show different lattices".to_owned();
-        caveats.push(Caveat::new(
-            "lines-disagree",
-            file,
-            format!(
-                "{reason} ({both}): one of them is none of the sample's; the scan is not used, --line says \
-                 which to believe"
-            ),
-        ));
-        return Some(reason);
+        let difference = LineDifference::OtherLattices { trace, retrace };
+        caveats.push(Caveat::new(LatticeDoubt::LinesDisagree(difference), file));
+        return Some(LineDifference::OTHER_LATTICES.to_owned());
     }
     let difference = second.flat() - first.flat();
     let inverse = (first.covariance + second.covariance).try_inverse()?;
-    let chi2 = difference.dot(&(inverse * difference));
-    if chi2::tail(chi2, 4) < NO_CHANCE && share > NOTABLE {
-        caveats.push(Caveat::new(
-            "lines-disagree",
-            file,
-            format!(
-                "trace and retrace differ by {:.2} %, more than their errors say (χ² {chi2:.0} for 4 numbers; \
-                 {both}): creep or hysteresis of the scanner, sensors that lag behind, or a drift that is not \
-                 small against the tip's speed",
-                100.0 * share
-            ),
-        ));
+    let chi_squared = difference.dot(&(inverse * difference));
+    if chi2::tail(chi_squared, 4) < NO_CHANCE && share > NOTABLE {
+        let difference = LineDifference::BeyondErrors {
+            share,
+            chi_squared,
+            trace,
+            retrace,
+        };
+        caveats.push(Caveat::new(LatticeDoubt::LinesDisagree(difference), file));
     }
     None
 }
@@ -106,32 +84,23 @@ pub(super) fn about_fit(
 ) {
     if let Some(change) = fit.inhomogeneity.filter(Inhomogeneity::stands_out) {
         caveats.push(Caveat::new(
-            "inhomogeneous-lattice",
+            LatticeDoubt::Inhomogeneous {
+                wavelength: change.wavelength,
+                angle: change.angle,
+                chi_squared: change.chi_squared,
+                threshold: change.threshold,
+            },
             file,
-            format!(
-                "the lattice is not the same everywhere in the frame: from corner to corner its wavelength \
-                 changes by up to {:.2} % and its direction by up to {:.2}° (χ² {:.0} for 6 numbers; {:.0} can \
-                 be chance). Results are means over the frame. Drift that got faster or slower, and creep, \
-                 look like this along the slow axis",
-                100.0 * change.wavelength,
-                change.angle.to_degrees(),
-                change.chi_squared,
-                change.threshold
-            ),
         ));
     }
     if let Some(closure) = fit.closure.filter(|c: &Closure| c.enlargement() > 1.0) {
         caveats.push(Caveat::new(
-            "harmonics-disagree",
+            LatticeDoubt::HarmonicsDisagree {
+                chi_squared: closure.chi_squared,
+                degrees_of_freedom: closure.degrees_of_freedom,
+                times: closure.enlargement().sqrt(),
+            },
             file,
-            format!(
-                "the harmonics of the image do not agree on one lattice (χ² {:.0} for {} degrees of \
-                 freedom): each of them is the mean over another part of a lattice that is not the same \
-                 everywhere; the errors of the vectors are enlarged {:.1} times",
-                closure.chi_squared,
-                closure.degrees_of_freedom,
-                closure.enlargement().sqrt()
-            ),
         ));
     }
     let Some(wave) = fit.foreign_wave.filter(ForeignWave::stands_out) else {
@@ -142,13 +111,11 @@ pub(super) fn about_fit(
     };
     let period = std::f64::consts::TAU / (inverse.transpose() * wave.wave_vector).norm();
     caveats.push(Caveat::new(
-        "second-lattice",
+        LatticeDoubt::SecondLattice {
+            period,
+            significance: wave.significance,
+            threshold: wave.threshold,
+        },
         file,
-        format!(
-            "beside the lattice a wave with a period of {period:.2} nm stands out of what the fit leaves \
-             ({:.0} times the noise around it; {:.0} can be chance): a second lattice, interference, or a \
-             lattice that is not the same everywhere in the frame",
-            wave.significance, wave.threshold
-        ),
     ));
 }

@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use super::measure::{MeasuredLine, MeasuredScan};
 use crate::background::remove_background;
-use crate::caveat::Caveat;
+use crate::caveat::{Caveat, FileDoubt};
 use crate::image::Image;
 use crate::settings::Background;
 
@@ -174,16 +174,6 @@ pub(super) fn once(mut scans: Vec<MeasuredScan>) -> (Vec<MeasuredScan>, Vec<Cave
 
 /// What is said of a file that holds the data of another one, `of`, or is that file.
 pub fn about_repeat(file: &str, of: &str) -> Caveat {
-    let same = if file == of {
-        "the file was given more than once".to_owned()
-    } else {
-        format!("the file holds the same scan as {of}")
-    };
-    Caveat::new(
-        "same-scan-twice",
-        file,
-        format!(
-            "{same}; a scan counts once, since the same noise twice would make errors too small"
-        ),
-    )
+    let of = (file != of).then(|| of.to_owned());
+    Caveat::new(FileDoubt::SameScanTwice { of }, file)
 }

@@ -6,6 +6,7 @@
 use spmfile::{Channel, LineDirection, Scan, sensor_axis};
 
 use super::channel::{channels_by_preference, choose_channel, is_usual, stem};
+use crate::caveat::ImageChoice;
 use crate::settings::Settings;
 
 /// The images of a channel in one line direction, main scan lines where there are any, in the order of the file.
@@ -23,8 +24,12 @@ pub(super) fn images_of<'a>(
     if mains.is_empty() { all } else { mains }
 }
 
-/// Words where a channel has several images in the file and nobody said which of them is meant.
-pub(super) fn first_of_several(scan: &Scan, name: &str, settings: &Settings) -> Option<String> {
+/// Says so where a channel has several images in the file and nobody said which of them is meant.
+pub(super) fn first_of_several(
+    scan: &Scan,
+    name: &str,
+    settings: &Settings,
+) -> Option<ImageChoice> {
     if settings.image.is_some() {
         return None;
     }
@@ -32,14 +37,15 @@ pub(super) fn first_of_several(scan: &Scan, name: &str, settings: &Settings) -> 
         .map(|direction| images_of(scan, name, direction).len())
         .into_iter()
         .max()?;
-    (count > 1).then(|| {
-        format!("the file holds {count} images of {name:?}: the first of them is analysed, and the others are not")
+    (count > 1).then(|| ImageChoice::First {
+        channel: name.to_owned(),
+        count,
     })
 }
 
-/// Words where a file holds channels of several names, none of them one of the usual ones, and nobody said which of them
+/// Says so where a file holds channels of several names, none of them one of the usual ones, and nobody said which of them
 /// is meant. `channels` are pairs of the name the user sees and the instrument's own.
-pub fn unusual_channels(channels: &[(&str, &str)], wanted: Option<&str>) -> Option<String> {
+pub fn unusual_channels(channels: &[(&str, &str)], wanted: Option<&str>) -> Option<ImageChoice> {
     let all = channels_by_preference(channels);
     let [first, _, ..] = all[..] else {
         return None;
@@ -49,12 +55,11 @@ pub fn unusual_channels(channels: &[(&str, &str)], wanted: Option<&str>) -> Opti
     }
     let names: Vec<String> = all.iter().take(6).map(|name| format!("{name:?}")).collect();
     let more = if all.len() > names.len() { ", …" } else { "" };
-    Some(format!(
-        "the file holds {} images ({}{more}), none of which has the name of a channel that usually shows a moiré: the \
-         first, {first:?}, is analysed, and the others are not",
-        all.len(),
-        names.join(", ")
-    ))
+    Some(ImageChoice::UnusualNames {
+        count: all.len(),
+        names: format!("{}{more}", names.join(", ")),
+        first: first.to_owned(),
+    })
 }
 
 /// What of a file with several images is analysed, in words; nothing where that is clear.
@@ -71,5 +76,6 @@ pub fn image_choice(scan: &Scan, settings: &Settings) -> Vec<String> {
     unusual_channels(&names, wanted)
         .into_iter()
         .chain(pages)
+        .map(|choice| choice.to_string())
         .collect()
 }

@@ -13,7 +13,7 @@ use super::positions::{nominal, speeds, usable_sensors};
 use super::scanner::{about_calibration, calibrated};
 use super::shared::correlation;
 use crate::calibration::Calibration;
-use crate::caveat::Caveat;
+use crate::caveat::{Caveat, FileDoubt};
 use crate::drift::Observation;
 use crate::estimate::Estimate;
 use crate::geometry::{Geometry, Timing};
@@ -23,6 +23,7 @@ use crate::lattice::{
     LatticeError, LatticeVectors, MeasuredLattice, Start, measure, measure_several, vectors,
 };
 use crate::settings::{Lines, OutOfRange, Settings};
+use crate::words::line_name;
 
 /// Bytes of memory that the analysis of an image takes for each of its pixels at most: measured with 2048 × 2048
 /// single-precision samples and eight pixels per period, where nothing can be binned.
@@ -249,7 +250,7 @@ fn measure_with(
     let several = first_of_several(scan, &channels[0].name, settings);
     let mut caveats: Vec<Caveat> = several
         .into_iter()
-        .map(|words| Caveat::new("several-images", file, words))
+        .map(|choice| Caveat::new(FileDoubt::SeveralImages(choice), file))
         .collect();
     let mut moires: Vec<Vec<MeasuredLine>> = Vec::new();
     let mut failures = Vec::new();
@@ -276,13 +277,14 @@ fn measure_with(
     }
     for error in failures {
         caveats.push(Caveat::new(
-            "line-left-out",
+            FileDoubt::LineLeftOut {
+                reason: error.to_string(),
+            },
             file,
-            format!("one line direction could not be used: {error}"),
         ));
     }
     about_calibration(file, scan, moires.iter().flatten(), settings, &mut caveats);
-    caveats.dedup_by(|a, b| (&a.code, &a.message) == (&b.code, &b.message));
+    caveats.dedup_by(|a, b| a.says_the_same(b));
     let measured = moires.into_iter().map(|mut lines| {
         share_noise(&mut lines);
         let mut caveats = caveats.clone();
@@ -449,14 +451,6 @@ fn about_lattice(
     few_periods(file, lattice, caveats);
     if let Some(fit) = &lattice.fit {
         about_fit(file, fit, geometry, caveats);
-    }
-}
-
-/// `trace` or `retrace`.
-pub(super) fn line_name(line: LineDirection) -> &'static str {
-    match line {
-        LineDirection::Trace => "trace",
-        LineDirection::Retrace => "retrace",
     }
 }
 

@@ -56,7 +56,7 @@ use nalgebra::Matrix2;
 use naming::Named;
 
 use crate::analysis::Analysis;
-use crate::caveat::Caveat;
+use crate::caveat::{Caveat, Doubt, FileDoubt, LatticeDoubt, MoireDoubt};
 use crate::lattice::reciprocal::canonical;
 use crate::settings::{Background, Method, Settings};
 
@@ -135,26 +135,27 @@ pub fn refusal(analysis: &Analysis) -> Option<&Caveat> {
     if sets.any(|set| set.mean.is_some() || set.uncorrected.is_some()) {
         return None;
     }
-    let codes = [NOTHING_LEFT, set::IMPOSSIBLE];
-    let of = |code| analysis.caveats.iter().find(|c| c.code == code);
-    codes.into_iter().find_map(of)
+    let all = || analysis.caveats.iter();
+    all()
+        .find(|c| is_nothing_left(&c.doubt))
+        .or_else(|| all().find(|c| is_impossible(&c.doubt)))
 }
 
-/// The code of the caveat that says that every scan was left out.
-const NOTHING_LEFT: &str = "everything-excluded";
+/// Whether a doubt says that every scan was left out.
+pub fn is_nothing_left(doubt: &Doubt) -> bool {
+    matches!(doubt, Doubt::Files(FileDoubt::EverythingExcluded { .. }))
+}
+
+/// Whether a doubt says that the layers cannot make the lattice.
+fn is_impossible(doubt: &Doubt) -> bool {
+    matches!(doubt, Doubt::Moire(MoireDoubt::LayersCannotMakeIt(_)))
+}
 
 fn nothing_left(scans: &[MeasuredScan]) -> Option<Caveat> {
     let by_user = |scan: &MeasuredScan| scan.excluded.as_deref() == Some(EXCLUDED);
-    let which = match scans.len() {
-        0 => return None,
-        1 => "the only scan".to_owned(),
-        n => format!("all {n} scans"),
-    };
-    let words = format!("the user excluded {which}: nothing is left to analyse");
-    scans
-        .iter()
-        .all(by_user)
-        .then(|| Caveat::new(NOTHING_LEFT, "analysis", words))
+    let all = !scans.is_empty() && scans.iter().all(by_user);
+    let doubt = FileDoubt::EverythingExcluded { scans: scans.len() };
+    all.then(|| Caveat::new(doubt, "analysis"))
 }
 
 /// Why a scan is left out that the user does not want.
@@ -169,10 +170,10 @@ fn exclude(scans: &mut [MeasuredScan], settings: &Settings, caveats: &mut Vec<Ca
             found = true;
         }
         if !found {
+            let pattern = pattern.clone();
             caveats.push(Caveat::new(
-                "nothing-excluded",
+                FileDoubt::NothingExcluded { pattern },
                 "analysis",
-                format!("--exclude {pattern:?} fits none of the scans"),
             ));
         }
     }
@@ -199,21 +200,12 @@ fn matches(pattern: &str, text: &str) -> bool {
 /// What the choice of settings does to the numbers.
 fn about_settings(settings: &Settings) -> Vec<Caveat> {
     let mut caveats = Vec::new();
-    let mut add = |code: &str, message: &str| caveats.push(Caveat::new(code, "analysis", message));
+    let mut add = |doubt: LatticeDoubt| caveats.push(Caveat::new(doubt, "analysis"));
     if settings.method == Method::Paper {
-        add(
-            "method-paper-bias",
-            "the published method sums the autocorrelation without dividing by the overlap: lattice \
-             vectors come out too short by about a per cent at four to five periods (twist too large \
-             by the same fraction) and whole-pixel peaks quantise them; it is meant for comparison",
-        );
+        add(LatticeDoubt::MethodPaperBias);
     }
     if settings.background == Background::LineMean {
-        add(
-            "line-levelling",
-            "each line was levelled on its own: harmonics near the fast axis are damaged and lattice \
-             vectors may be biased",
-        );
+        add(LatticeDoubt::LineLevelling);
     }
     caveats
 }

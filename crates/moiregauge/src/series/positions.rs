@@ -3,8 +3,9 @@
 use nalgebra::Vector2;
 use spmfile::{Channel, FrameDirection, LineDirection, Scan};
 
-use super::measure::{image_of, line_name};
-use crate::caveat::Caveat;
+use super::measure::image_of;
+use crate::analysis::Axis;
+use crate::caveat::{Caveat, PositionDoubt};
 use crate::estimate::Estimate;
 use crate::geometry::{Geometry, SensorGeometry, Timing, from_sensors, mean_and_spread};
 use crate::image::Image;
@@ -41,13 +42,8 @@ pub(super) fn sensor_images(
         Err(problem) => spmfile::position_sensors(scan, other)
             .inspect(|_| {
                 caveats.push(Caveat::new(
-                    "sensors-of-other-line",
+                    PositionDoubt::SensorsOfOtherLine { line, other },
                     file,
-                    format!(
-                        "the {} image has no position sensors of its own; those of the {} are used",
-                        line_name(line),
-                        line_name(other)
-                    ),
                 ));
             })
             .map_err(|_| problem),
@@ -56,12 +52,10 @@ pub(super) fn sensor_images(
         Ok(sensors) => sensors,
         Err(problem) => {
             caveats.push(Caveat::new(
-                "no-position-sensors",
+                PositionDoubt::NoPositionSensors {
+                    reason: problem.to_string(),
+                },
                 file,
-                format!(
-                    "{problem}: nominal coordinates are used; scanner calibration errors (often 1 % \
-                     and more) go into lengths, twist and strain in full"
-                ),
             ));
             return None;
         }
@@ -69,13 +63,11 @@ pub(super) fn sensor_images(
     for sensor in [sensors.x, sensors.y] {
         if let Some(fit) = &sensor.plane_fit {
             caveats.push(Caveat::new(
-                "sensor-plane-fitted",
+                PositionDoubt::SensorPlaneFitted {
+                    fit: fit.clone(),
+                    sensor: sensor.name.clone(),
+                },
                 file,
-                format!(
-                    "the instrument subtracted a fit ({fit}) from {:?}, so it no longer tells positions; \
-                     nominal coordinates are used",
-                    sensor.name
-                ),
             ));
             return None;
         }
@@ -102,22 +94,17 @@ pub(super) fn usable_sensors(
     let [x, y] = sensor_images(file, scan, channel, caveats)?;
     if (x.rows, x.columns) != (channel.rows, channel.columns) {
         caveats.push(Caveat::new(
-            "sensor-shape",
+            PositionDoubt::SensorShape {
+                sensors: [x.columns, x.rows],
+                channel: channel.name.clone(),
+                image: [channel.columns, channel.rows],
+            },
             file,
-            format!(
-                "the position sensors have {} × {} pixels, {:?} has {} × {}; nominal coordinates are used",
-                x.columns, x.rows, channel.name, channel.columns, channel.rows
-            ),
         ));
         return None;
     }
     let Some(sensors) = from_sensors(&x, &y) else {
-        caveats.push(Caveat::new(
-            "sensors-flat",
-            file,
-            "the position sensors do not span an area (constant, missing, or along one line); nominal \
-             coordinates are used",
-        ));
+        caveats.push(Caveat::new(PositionDoubt::SensorsFlat, file));
         return None;
     };
     if let Some(nominal) = nominal {
@@ -128,24 +115,17 @@ pub(super) fn usable_sensors(
             .any(|r| !(1.0 / WILD_SPAN..=WILD_SPAN).contains(r))
         {
             caveats.push(Caveat::new(
-                "sensor-span",
+                PositionDoubt::SensorSpan {
+                    measured,
+                    nominal: intended,
+                },
                 file,
-                format!(
-                    "the sensors span {:.1} × {:.1} nm where the scan size is {:.1} × {:.1} nm; their \
-                     calibration cannot be right and nominal coordinates are used",
-                    measured[0], measured[1], intended[0], intended[1]
-                ),
             ));
             return None;
         }
     }
     if sensors.geometry.pixel_to_nm.determinant() < 0.0 {
-        caveats.push(Caveat::new(
-            "sensors-mirrored",
-            file,
-            "the sensors describe a mirrored frame: one of them has the wrong sign; the signs of twist \
-             and strain axis follow the sensors",
-        ));
+        caveats.push(Caveat::new(PositionDoubt::SensorsMirrored, file));
     }
     about_lag(file, scan, channel, &sensors, caveats);
     Some(sensors)
@@ -163,36 +143,25 @@ fn about_lag(
     let direction = scan.frame_direction.unwrap_or(FrameDirection::Up);
     let timing = Timing::of_scan(scan, channel.columns, direction, line);
     let step = sensors.geometry.fast_step().norm();
-    let each = ["x", "y"]
+    let each = [Axis::X, Axis::Y]
         .into_iter()
         .zip(sensors.lags)
         .zip(&sensors.planes);
-    for ((name, lag), plane) in each {
+    for ((sensor, lag), plane) in each {
         let Some(lag) = lag.filter(|lag| lag.slope_nm.abs() > NOTABLE_LAG * step) else {
             continue;
         };
-        let time = timing.map_or(String::new(), |timing| {
-            let constant = 1000.0 * lag.columns * timing.per_pixel.x.abs();
-            format!(", a time constant of {constant:.2} ms")
-        });
         caveats.push(Caveat::new(
-            "sensor-lag",
+            PositionDoubt::SensorLag {
+                line,
+                sensor,
+                bend: lag.bend_nm.abs(),
+                columns: lag.columns,
+                time_constant: timing.map(|timing| lag.columns * timing.per_pixel.x.abs()),
+                share: (lag.slope_nm / step).abs(),
+                short: lag.slope_nm * plane.per_column < 0.0,
+            },
             file,
-            format!(
-                "in the {} the {name} sensor lags behind the tip: its lines bend by {:.2} nm where they begin and are \
-                 straight again over {:.1} columns{time}. A plane through the whole would make the pixels {:.2} % too \
-                 {} along the fast axis; the bend is taken off, and a part of that stands in the errors. If it is the \
-                 tip that is late there and not its sensor, the first columns of the image are distorted",
-                line_name(line),
-                lag.bend_nm.abs(),
-                lag.columns,
-                100.0 * (lag.slope_nm / step).abs(),
-                if lag.slope_nm * plane.per_column < 0.0 {
-                    "short"
-                } else {
-                    "long"
-                }
-            ),
         ));
     }
 }

@@ -9,7 +9,7 @@ use nalgebra::{Matrix2, Vector2};
 
 use super::group::{Group, folder};
 use super::measure::MeasuredScan;
-use crate::caveat::Caveat;
+use crate::caveat::{Caveat, DifferentSamples, SetDoubt};
 use crate::lattice::LatticeVectors;
 use crate::lattice::reciprocal::real_from_reciprocal;
 use crate::settings::Settings;
@@ -176,30 +176,17 @@ pub(super) fn separated(
 }
 
 fn about(group: &Group, names: &[String], apart: f64, by_hand: bool) -> Caveat {
-    let difference = if apart.is_finite() {
-        format!("by {:.1} % or more along the fast axis", 100.0 * apart)
-    } else {
-        "by more than any plausible drift along the slow axis".to_owned()
+    let samples = DifferentSamples {
+        count: names.len(),
+        names: names.join("; "),
+        apart,
     };
-    let then = if by_hand {
-        "they were put into one set by hand, and their mean is that of neither"
+    let doubt = if by_hand {
+        SetDoubt::SamplesMixed(samples)
     } else {
-        "each of them is a set of its own, and nothing is averaged over them"
+        SetDoubt::SamplesSeparated(samples)
     };
-    Caveat::new(
-        if by_hand {
-            "samples-mixed"
-        } else {
-            "samples-separated"
-        },
-        &group.name,
-        format!(
-            "the scans show {} different lattices ({}), which differ {difference}; drift does not change a lattice \
-             there. They are of different samples or places, or something else was taken for the lattice in some: {then}",
-            names.len(),
-            names.join("; ")
-        ),
-    )
+    Caveat::new(doubt, &group.name)
 }
 
 /// What tells the parts apart, for people: their folders, or the periods of their lattices.

@@ -4,7 +4,7 @@ use spmfile::Scan;
 
 use super::measure::MeasuredLine;
 use crate::calibration::{Calibration, Coordinates};
-use crate::caveat::Caveat;
+use crate::caveat::{CalibrationDoubt, Caveat, Doubt, PositionDoubt};
 use crate::geometry::Geometry;
 use crate::settings::Settings;
 
@@ -30,24 +30,20 @@ pub(super) fn about_calibration<'a>(
     };
     let from_sensors = scanner.coordinates == Coordinates::Sensors;
     if lines.any(|l| l.geometry.from_sensors != from_sensors) {
-        let words = |sensors| {
-            if sensors {
-                "position sensors"
-            } else {
-                "nominal coordinates"
-            }
-        };
         caveats.push(Caveat::new(
-            "calibration-of-other-coordinates",
+            CalibrationDoubt::OfOtherCoordinates {
+                calibrated: scanner.coordinates,
+            },
             file,
-            format!(
-                "the calibration is one of {}, the scan has {}: it need not hold for them",
-                words(from_sensors),
-                words(!from_sensors)
-            ),
         ));
     } else if !from_sensors {
-        caveats.retain(|c| c.code != "no-position-sensors");
+        let expected = |doubt: &Doubt| {
+            matches!(
+                doubt,
+                Doubt::Positions(PositionDoubt::NoPositionSensors { .. })
+            )
+        };
+        caveats.retain(|c| !expected(&c.doubt));
     }
     let apart = |value: f64, known: Vec<f64>| {
         let near = |other: &f64| (1.0 / EXTRAPOLATED..=EXTRAPOLATED).contains(&(value / other));
@@ -59,19 +55,13 @@ pub(super) fn about_calibration<'a>(
         .is_some_and(|hz| apart(hz, scanner.line_rates_hz.clone()));
     let size = scan.size_nm.is_some_and(|[w, _]| apart(w, sizes()));
     if rate || size {
-        let what = match (rate, size) {
-            (true, true) => "size and line rate",
-            (true, false) => "line rate",
-            _ => "size",
-        };
         caveats.push(Caveat::new(
-            "calibration-extrapolated",
+            CalibrationDoubt::Extrapolated {
+                size,
+                line_rate: rate,
+                factor: EXTRAPOLATED,
+            },
             file,
-            format!(
-                "the {what} of the scan differs by more than a factor of {EXTRAPOLATED} from that of the images \
-                 that the calibration comes from: hysteresis, creep and lag of a scanner change with both, and \
-                 their change is not in the budget"
-            ),
         ));
     }
 }

@@ -7,7 +7,7 @@ use super::measure::{channels, image_of};
 use super::positions::{nominal, usable_sensors};
 use super::scanner::calibrated;
 use crate::background::remove_background;
-use crate::caveat::Caveat;
+use crate::caveat::{Caveat, PatternDoubt};
 use crate::geometry::{Geometry, Timing};
 use crate::image::Image;
 use crate::lattice::Start;
@@ -89,7 +89,7 @@ fn frames(
             });
         }
     }
-    caveats.dedup_by(|a, b| (&a.code, &a.message) == (&b.code, &b.message));
+    caveats.dedup_by(|a, b| a.says_the_same(b));
     Ok((name, frames))
 }
 
@@ -145,12 +145,7 @@ pub fn stripes_of_scan(
     let both: Vec<_> = maps.iter().zip(placed).collect();
     let stripes = SampledStripes::new(&both).ok_or(StripeError::NoImage)?;
     if frames.len() == 1 {
-        caveats.push(Caveat::new(
-            "stripes-of-one-direction",
-            file,
-            "trace or retrace alone: mains pick-up and other interference in time make stripes too, which only the \
-             other line direction can tell",
-        ));
+        caveats.push(Caveat::new(PatternDoubt::StripesOfOneDirection, file));
     }
     Ok(ScanStripes {
         channel,

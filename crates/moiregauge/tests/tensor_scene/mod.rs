@@ -143,7 +143,7 @@ impl Outcome {
 
     /// Whether different layers have more than one reading, and the analysis says so.
     pub(crate) fn is_ambiguous(&self) -> bool {
-        let told = |c: &Caveat| c.code == "orientation-ambiguous";
+        let told = |c: &Caveat| c.code() == "orientation-ambiguous";
         self.simulation.sample.substrate.is_some() && self.analysis.caveats.iter().any(told)
     }
 

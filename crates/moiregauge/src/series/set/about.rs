@@ -1,7 +1,7 @@
 //! What has to be said of a set: scatter, significance, scans that do not fit, readings.
 
 use crate::analysis::{Checks, Drift, Residual, SetMean};
-use crate::caveat::Caveat;
+use crate::caveat::{Caveat, MoireDoubt, Scattered, SetDoubt};
 use crate::readings;
 use crate::settings::Settings;
 
@@ -24,47 +24,33 @@ pub(super) fn about_mean(name: &str, mean: Option<&SetMean>, caveats: &mut Vec<C
     let Some(mean) = mean else { return };
     if mean.chi2_per_dof > LARGE_CHI2 {
         caveats.push(Caveat::new(
-            "scatter",
+            SetDoubt::Scatter {
+                of: Scattered::Moires,
+                chi2_per_dof: mean.chi2_per_dof,
+            },
             name,
-            format!(
-                "the scans scatter {:.1} times more than their errors say (χ²/dof = {:.1}): drift that \
-                 changes, an inhomogeneous lattice or sensor errors; errors of the set are enlarged to match",
-                mean.chi2_per_dof.sqrt(),
-                mean.chi2_per_dof
-            ),
         ));
     }
     if !mean.within_one_percent {
-        caveats.push(Caveat::new(
-            "outside-one-percent",
-            name,
-            "a wavelength of a single scan differs by more than 1 % from that of the set",
-        ));
+        caveats.push(Caveat::new(SetDoubt::OutsideOnePercent, name));
     }
     let found = &mean.twist_strain;
     let in_all = mean.budget.applied_to(found);
     if found.axis_lab().is_none() {
         caveats.push(Caveat::new(
-            "strain-not-significant",
+            MoireDoubt::StrainNotSignificant {
+                p_value: found.strain_p_value(),
+                below: found.strain_upper_limit_95(),
+            },
             name,
-            format!(
-                "the heterostrain is not significant (p = {:.2}); it is below {:.4} % with 95 % \
-                 confidence and has no axis",
-                found.strain_p_value(),
-                found.strain_upper_limit_95() * 100.0
-            ),
         ));
     } else if in_all.axis_lab().is_none() {
         caveats.push(Caveat::new(
-            "strain-within-calibration",
+            MoireDoubt::StrainWithinCalibration {
+                p_value: in_all.strain_p_value(),
+                below: in_all.strain_upper_limit_95(),
+            },
             name,
-            format!(
-                "the heterostrain stands out of the noise of the scans but not of the calibration of the \
-                 scanner (p = {:.2}): with everything in the budget it is below {:.4} % with 95 % \
-                 confidence; scans of the sample turned by 90° would tell",
-                in_all.strain_p_value(),
-                in_all.strain_upper_limit_95() * 100.0
-            ),
         ));
     }
 }
@@ -78,21 +64,15 @@ pub(super) fn about_residual(
     if !residual.outlying {
         return;
     }
-    let place = residual.displacement.map_or(String::new(), |d| {
-        format!(", {:.3} nm from where the others have it", d.norm())
-    });
-    let then = if settings.exclude_outliers {
-        "more than a fifth of the scans are never left out by rule"
-    } else {
-        "it is used all the same; --exclude NAME or --exclude-outliers leaves it out"
-    };
     caveats.push(Caveat::new(
-        "outlying-scan",
+        SetDoubt::OutlyingScan {
+            chi_squared: residual.chi2,
+            degrees_of_freedom: residual.degrees_of_freedom,
+            p_value: residual.p_value,
+            displacement: residual.displacement.map(|d| d.norm()),
+            by_rule: settings.exclude_outliers,
+        },
         file,
-        format!(
-            "the scan does not fit the others (χ² = {:.0} for {} degrees of freedom, p = {:.0e}{place}); {then}",
-            residual.chi2, residual.degrees_of_freedom, residual.p_value
-        ),
     ));
 }
 
@@ -132,13 +112,10 @@ pub(super) fn about_checks(
         .collect();
     if !large.is_empty() {
         caveats.push(Caveat::new(
-            "scatter-of-scans",
+            SetDoubt::ScatterOfScans {
+                larger: large.join(", "),
+            },
             name,
-            format!(
-                "leaving out one scan at a time makes larger errors than those stated: {}; trust the \
-                 larger ones",
-                large.join(", ")
-            ),
         ));
     }
 }

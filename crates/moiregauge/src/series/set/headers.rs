@@ -8,7 +8,7 @@
 use nalgebra::{Matrix2, Vector2};
 use spmfile::FrameDirection;
 
-use crate::caveat::Caveat;
+use crate::caveat::{Caveat, DriftDoubt, FrameDates};
 use crate::joint::{JointFit, Sighting, fit};
 use crate::lattice::LatticeVectors;
 use crate::lattice::reciprocal::{labelled_like, real_from_reciprocal, reciprocal};
@@ -84,25 +84,14 @@ pub(super) fn about_headers(
         in_words(Some(found)),
         evidence.join("; ")
     );
-    let (code, words) = match best {
-        Some((words, _)) => (
-            "headers-contradict-images",
-            format!(
-                "the scans of this set do not fit together as their headers say, but {words} they do, so that an entry \
-                 of the headers is most likely wrong, and the drift with it ({evidence}). Twist and strain do not depend \
-                 on it as long as the drift does not change"
-            ),
-        ),
-        None => (
-            "frames-do-not-link",
-            format!(
-                "the positions of the lattice from frame to frame contradict the drift within the frames: the drift changes, \
-                 the window moves in a way that the sensors do not see, or headers are wrong: slow direction, line rate or \
-                 date ({evidence}). Do not trust the drift and its error"
-            ),
-        ),
+    let doubt = match best {
+        Some((headers, _)) => DriftDoubt::HeadersContradictImages {
+            headers: headers.to_owned(),
+            evidence,
+        },
+        None => DriftDoubt::FramesDoNotLink { evidence },
     };
-    Some(Caveat::new(code, name, words))
+    Some(Caveat::new(doubt, name))
 }
 
 /// Whether phases could link frames at all: there are some in two scans of a block.
@@ -161,29 +150,26 @@ pub(super) fn about_dates(name: &str, scans: &[&MeasuredScan]) -> Option<Caveat>
     let (interval, frame, _) = *pairs.iter().min_by(|a, b| a.0.total_cmp(&b.0))?;
     let rate = scans.first()?.line_rate_hz?;
     if interval < (1.0 - SHARE) * frame - CLOCK {
+        let dates = FrameDates::TooClose {
+            interval,
+            frame,
+            rate,
+        };
         return Some(Caveat::new(
-            "dates-contradict-line-rate",
+            DriftDoubt::DatesContradictLineRate(dates),
             name,
-            format!(
-                "two frames are dated {interval:.0} s apart, but the lines of one take {frame:.0} s at {rate} lines per \
-                 second: the line rate is higher than the headers say, or the dates are not those of the frames. The \
-                 drift is wrong by the same factor as the line rate"
-            ),
         ));
     }
     let doubled = |&(interval, frame, turned): &(f64, f64, bool)| {
         turned && (interval - 2.0 * frame).abs() < 2.0 * SHARE * frame + CLOCK
     };
     (pairs.len() > 1 && frame > 4.0 * CLOCK && pairs.iter().all(doubled)).then(|| {
-        Caveat::new(
-            "dates-contradict-line-rate",
-            name,
-            format!(
-                "the frames are dated {interval:.0} s apart, twice the {frame:.0} s that the lines of one take at {rate} \
-                 lines per second: either there was a pause as long as a frame before each of them, or the line rate is \
-                 half of what the headers say, and so is the drift"
-            ),
-        )
+        let dates = FrameDates::Doubled {
+            interval,
+            frame,
+            rate,
+        };
+        Caveat::new(DriftDoubt::DatesContradictLineRate(dates), name)
     })
 }
 

@@ -14,14 +14,14 @@ use spmfile::FrameDirection;
 use about::{about_checks, about_mean, about_readings, about_residual};
 use headers::{about_dates, about_headers};
 pub(super) use joint::{checks, joint_fit, lattice_of, terms};
-pub(super) use moire::{IMPOSSIBLE, moire};
+pub(super) use moire::moire;
 use scan::{plain_mean, scan_analysis};
 
 use super::group::Group;
 use super::measure::MeasuredScan;
 use crate::analysis::{Drift, DriftFit, ScanAnalysis, SetAnalysis, SetMean};
 use crate::budget::{Budget, Statistical};
-use crate::caveat::Caveat;
+use crate::caveat::{Caveat, DriftDoubt, SetDoubt};
 use crate::chi2::enlargement;
 use crate::drift::paper::successive_drift;
 use crate::drift::{Observation, at_known_drift, common_lattice, monte_carlo, solve};
@@ -227,9 +227,10 @@ fn leave_out(
                       of scans)";
         scan.excluded = Some(reason.to_owned());
         caveats.push(Caveat::new(
-            "scan-left-out",
+            SetDoubt::ScanLeftOut {
+                reason: reason.to_owned(),
+            },
             &scan.file,
-            format!("left out by --exclude-outliers: {reason}"),
         ));
     }
 }
@@ -265,11 +266,7 @@ fn drift(
         .iter()
         .any(|s| s.lines.iter().any(|l| l.timing.is_none()))
     {
-        caveats.push(Caveat::new(
-            "no-timing",
-            name,
-            "not every file tells its line rate and frame direction: nothing is corrected for drift",
-        ));
+        caveats.push(Caveat::new(DriftDoubt::NoTiming, name));
         return None;
     }
     caveats.extend(about_dates(name, scans));
@@ -312,7 +309,8 @@ fn drift(
             })
         }
         Err(error) => {
-            caveats.push(Caveat::new("drift-undetermined", name, error.to_string()));
+            let reason = error.to_string();
+            caveats.push(Caveat::new(DriftDoubt::Undetermined { reason }, name));
             None
         }
     }
@@ -327,11 +325,7 @@ fn given_drift(
     let velocity = given.velocity();
     let sigma = given.sigma_nm_per_min * PER_MINUTE;
     let covariance = Matrix2::identity() * sigma * sigma;
-    caveats.push(Caveat::new(
-        "drift-given",
-        name,
-        "the drift was given by the user and not measured; it is as right as the conditions are the same",
-    ));
+    caveats.push(Caveat::new(DriftDoubt::Given, name));
     let (mut lattice, chi2, freedom) = common_lattice(all, &velocity, &covariance).ok()?;
     // Scatter enlarges what the scans say, not what the user said of the drift.
     let (measured, _, _) = common_lattice(all, &velocity, &Matrix2::zeros()).ok()?;

@@ -12,7 +12,7 @@ use nalgebra::Matrix4;
 use crate::analysis::{ScanAnalysis, SetMean};
 use crate::budget::Statistical;
 use crate::calibration::KnownLattice;
-use crate::caveat::Caveat;
+use crate::caveat::{Caveat, Impossible, MoireDoubt, PeriodDoubt};
 use crate::lattice::LatticeVectors;
 use crate::material::{Bilayer, Material};
 use crate::settings::Settings;
@@ -85,14 +85,11 @@ pub(super) fn doubts(
         let [least, _] = mean.twist_strain.strain_interval_95();
         if least > LARGE_STRAIN {
             caveats.push(Caveat::new(
-                "large-strain",
+                MoireDoubt::LargeStrain {
+                    strain: mean.twist_strain.heterostrain().value,
+                    layers: about_layers,
+                },
                 name,
-                format!(
-                    "a heterostrain of {:.1} % is more than layers on each other are known to have: an image \
-                     that drift or the scanner distorts, other layers than {about_layers}, or a lattice that \
-                     is no moiré would give the same numbers",
-                    100.0 * mean.twist_strain.heterostrain().value
-                ),
             ));
         }
         return;
@@ -110,16 +107,13 @@ pub(super) fn doubts(
         }
     };
     if !is_below_30_degrees(&found, settings) {
-        let [a, b, c] = [0, 1, 2].map(|i| lattice.wavelength(i).value);
         caveats.push(Caveat::new(
-            "no-moire",
+            MoireDoubt::NoMoire {
+                periods: [0, 1, 2].map(|i| lattice.wavelength(i).value),
+                twist: found.twist.abs(),
+                layers: about_layers,
+            },
             name,
-            format!(
-                "periods of {a:.4}, {b:.4} and {c:.4} nm are no moiré of {about_layers}: its twist would be {:.0}°, \
-                 and layers of this symmetry have none beyond 30°. This is the lattice of the atoms, or \
-                 another one; its vectors are given, twist and strain are not",
-                found.twist.abs().to_degrees()
-            ),
         ));
     }
 }
@@ -139,33 +133,30 @@ fn longest(layers: Bilayer<'_>) -> Option<f64> {
 
 /// Why these layers make no such lattice.
 fn no_reading(name: &str, lattice: &LatticeVectors, settings: &Settings, why: &str) -> Caveat {
-    let (measured, layers) = (period(lattice), settings.bilayer());
-    let words = match longest(layers).filter(|longest| measured > *longest) {
+    let (measured, bilayer) = (period(lattice), settings.bilayer());
+    let layers = bilayer.name();
+    let impossible = match longest(bilayer).filter(|longest| measured > *longest) {
         Some(longest) => {
             // |1 − a/b| less what the moiré shows of it.
-            let a = layers
+            let a = bilayer
                 .reference
                 .lattice_constant_nm
-                .max(layers.stretched.lattice_constant_nm);
-            format!(
-                "the period is {measured:.1} nm; {} makes at most {longest:.1} nm. Only layers strained by at least \
-                 {:.1} % in all directions could make it: it is a moiré of other layers, or none. Its vectors are given, \
-                 twist and strain are not",
-                layers.name(),
-                100.0 * (a / longest - a / measured)
-            )
+                .max(bilayer.stretched.lattice_constant_nm);
+            Impossible::TooLong {
+                period: measured,
+                layers,
+                longest,
+                strain: a / longest - a / measured,
+            }
         }
-        None => format!(
-            "no twist and strain of {} explain a lattice with a period of {measured:.1} nm: {why}. Its vectors are given, \
-             twist and strain are not",
-            layers.name()
-        ),
+        None => Impossible::NoSolution {
+            period: measured,
+            layers,
+            reason: why.to_owned(),
+        },
     };
-    Caveat::new(IMPOSSIBLE, name, words)
+    Caveat::new(MoireDoubt::LayersCannotMakeIt(impossible), name)
 }
-
-/// The code of the caveat that says that the layers cannot make the lattice.
-pub(in crate::series) const IMPOSSIBLE: &str = "layers-cannot-make-it";
 
 /// Asks whether a lattice is a moiré at all that has the period of a surface, or a very short one.
 fn about_period(name: &str, lattice: &LatticeVectors, settings: &Settings) -> Option<Caveat> {
@@ -182,22 +173,22 @@ fn about_period(name: &str, lattice: &LatticeVectors, settings: &Settings) -> Op
         .chain(atoms)
         .filter(|(_, a)| off(*a) < SURFACE)
         .min_by(|a, b| off(a.1).total_cmp(&off(b.1)));
-    let layers = settings.bilayer().name();
-    let of = if assumed {
-        format!("{layers}, which nobody named and which was assumed")
-    } else {
-        layers
-    };
-    let words = match known {
-        Some((surface, a)) => format!(
-            "the period, {measured:.3} nm, is that of {surface} ({a} nm): if the images show that, there is no twist; the \
-             numbers take it for a moiré of {of}"
-        ),
-        None if measured < SHORT => format!(
-            "a period of {measured:.3} nm is short for a moiré: if the images show atoms or a surface, there is no twist; \
-             the numbers take it for a moiré of {of}"
-        ),
+    let mut layers = settings.bilayer().name();
+    if assumed {
+        layers += ", which nobody named and which was assumed";
+    }
+    let doubt = match known {
+        Some((surface, constant)) => PeriodDoubt::OfSurface {
+            period: measured,
+            surface,
+            constant,
+            layers,
+        },
+        None if measured < SHORT => PeriodDoubt::Short {
+            period: measured,
+            layers,
+        },
         None => return None,
     };
-    Some(Caveat::new("moire-doubtful", name, words))
+    Some(Caveat::new(MoireDoubt::Doubtful(doubt), name))
 }

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::{Drift, DriftFit, Solved};
 use crate::analysis::{Axis, ScanAnalysis};
 use crate::budget::Statistical;
-use crate::caveat::Caveat;
+use crate::caveat::{Caveat, DriftDoubt};
 use crate::drift::paper::{PaperScan, normal_vector, successive_draws, successive_drift};
 use crate::drift::{DriftSolution, Observation, at_known_drift, common_lattice};
 use crate::rng;
@@ -81,12 +81,10 @@ pub(super) fn drift(
 ) -> Option<Solved> {
     let minimum = successive_drift(scans);
     if minimum.is_none() {
-        caveats.push(Caveat::new(
-            "drift-undetermined",
-            name,
-            "the published comparison of successive scans has no minimum: there are no two scans of one line \
-             direction in a row, or they contradict each other",
-        ));
+        let reason = "the published comparison of successive scans has no minimum: there are no two scans of one line \
+             direction in a row, or they contradict each other"
+            .to_owned();
+        caveats.push(Caveat::new(DriftDoubt::Undetermined { reason }, name));
     }
     let minimum = minimum?;
     let stream = format!("drift {name}");

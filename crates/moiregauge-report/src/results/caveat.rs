@@ -1,10 +1,13 @@
-//! Named doubts: what a reader of the numbers has to know before trusting them.
+//! Doubts as they stand in documents.
 
+use moiregauge::caveat::Caveat;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// A reason to trust a number less, with a stable code for programs and words for people.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
-pub struct Caveat {
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[schemars(rename = "Caveat")]
+pub struct ResultCaveat {
     /// Stable kebab-case code, as in `no-position-sensors`.
     pub code: String,
     /// What is wrong and what it means for the result.
@@ -14,13 +17,12 @@ pub struct Caveat {
     pub place: String,
 }
 
-impl Caveat {
-    /// A caveat about `place`.
-    pub fn new(code: &str, place: impl Into<String>, message: impl Into<String>) -> Self {
+impl From<&Caveat> for ResultCaveat {
+    fn from(caveat: &Caveat) -> Self {
         Self {
-            code: code.to_owned(),
-            message: message.into(),
-            place: place.into(),
+            code: caveat.code().to_owned(),
+            message: caveat.message(),
+            place: caveat.place.clone(),
         }
     }
 }

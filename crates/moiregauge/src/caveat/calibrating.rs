@@ -1,0 +1,147 @@
+//! Doubts about the calibration of the scanner.
+
+use super::explained::explain;
+use crate::calibration::Coordinates;
+
+/// The calibration of the scanner.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum CalibrationDoubt {
+    /// Sensors were calibrated and nominal coordinates are used, or the other way round.
+    #[error(
+        "the calibration is one of {}, the scan has {}: it need not hold for them",
+        coordinates(*.calibrated), other_than(*.calibrated)
+    )]
+    OfOtherCoordinates {
+        /// What was calibrated.
+        calibrated: Coordinates,
+    },
+    /// The scan is far from the conditions of the calibration.
+    #[error(
+        "the {} of the scan differs by more than a factor of {factor} from that of the images that the calibration comes \
+         from: hysteresis, creep and lag of a scanner change with both, and their change is not in the budget",
+        conditions(*.size, *.line_rate)
+    )]
+    Extrapolated {
+        /// Whether the size is another one.
+        size: bool,
+        /// Whether the line rate is another one.
+        line_rate: bool,
+        /// By more than this factor.
+        factor: f64,
+    },
+    /// The sets of known lattices do not agree.
+    #[error(
+        "the sets differ {times:.1} times more than their errors say: a lag or hysteresis of the fast axis, drift that \
+         changes, or strain of the sample; errors are enlarged to match"
+    )]
+    SetsDiffer {
+        /// Root of χ² per degree of freedom.
+        times: f64,
+    },
+    /// No scanner is like that.
+    #[error("no scanner can be like that, and nothing is corrected with it: {reason}")]
+    Implausible {
+        /// What is beyond all scanners.
+        reason: String,
+    },
+    /// Few scanners are like that.
+    #[error(
+        "a scanner rarely has a {what}: make sure that the images show the known lattice and have the right size"
+    )]
+    Unusual {
+        /// What is rare, with its number.
+        what: String,
+    },
+    /// Two names of the vectors explain the image about as well.
+    #[error(
+        "two ways of naming the vectors explain the image with distortions of much the same size ({:.1} % and {:.1} % \
+         between two axes): the smaller is taken",
+        200.0 * .distortion, 200.0 * .next
+    )]
+    Ambiguous {
+        /// |q|/|p| of the name that is taken.
+        distortion: f64,
+        /// That of the next one.
+        next: f64,
+    },
+    /// Frames of one slow direction do not tell drift from gain.
+    #[error(
+        "the frames are all of one slow direction: gain of the slow axis and shear cannot be told from drift. {}. Frames \
+         up and down would separate them",
+        what_drift_does(*.gradient, *.sigma)
+    )]
+    DriftNotSeparated {
+        /// Size of the time gradient, s/nm; `None` without a line rate.
+        gradient: Option<f64>,
+        /// Standard deviation of the drift that is assumed, nm/s.
+        sigma: f64,
+    },
+}
+
+fn coordinates(of: Coordinates) -> &'static str {
+    match of {
+        Coordinates::Sensors => "position sensors",
+        Coordinates::Nominal => "nominal coordinates",
+    }
+}
+
+fn other_than(of: Coordinates) -> &'static str {
+    coordinates(match of {
+        Coordinates::Sensors => Coordinates::Nominal,
+        Coordinates::Nominal => Coordinates::Sensors,
+    })
+}
+
+fn conditions(size: bool, line_rate: bool) -> &'static str {
+    match (line_rate, size) {
+        (true, true) => "size and line rate",
+        (true, false) => "line rate",
+        _ => "size",
+    }
+}
+
+fn what_drift_does(gradient: Option<f64>, sigma: f64) -> String {
+    let per_minute = sigma * 60.0;
+    match gradient {
+        Some(gradient) => format!(
+            "A drift of 1 nm/min makes {:.2} % along the slow axis, or {:.1} mrad of shear; a drift of 0 ± {per_minute} \
+             nm/min is assumed and is in the errors",
+            100.0 * gradient / 60.0,
+            1000.0 * gradient / 60.0
+        ),
+        None => "Without a line rate it cannot be said how much, and the errors are without it"
+            .to_owned(),
+    }
+}
+
+explain! { CalibrationDoubt:
+    OfOtherCoordinates "calibration-of-other-coordinates" Serious
+        "The scanner was calibrated by its position sensors and the scan has none, or the other way round. The correction \
+         is that of something else, and lengths and strain may be wrong by per cents."
+        "Calibrate with images that have position sensors as the scans have, or that lack them as these do."
+    Extrapolated "calibration-extrapolated" Warning
+        "Size or line rate of the scan is far from that of the calibration. What changes with both (hysteresis, creep, \
+         lag) is not in the errors."
+        "Calibrate with images of about the size and line rate of the scans."
+    SetsDiffer "calibrations-differ" Warning
+        "The sets of images of the known lattice give calibrations that differ by more than their errors. The errors of \
+         the mean were enlarged to match."
+        "Take more sets, at other places and with the axes exchanged, and look for the set that stands out."
+    Implausible "calibration-implausible" Serious
+        "The calibration that came out is beyond what scanners have, or tells too little. No scan is corrected with it."
+        "Make sure that the images show the lattice that was named, that their size is right, and that there are frames \
+         up and down."
+    Unusual "calibration-unusual" Warning
+        "The calibration that came out is possible but rare. Often the images show another lattice, or their size is \
+         wrong."
+        "Compare the period with that of the known lattice, and repeat the calibration at another place."
+    Ambiguous "calibration-ambiguous" Warning
+        "Two ways of naming the lattice vectors distort the known lattice by about as much. The smaller distortion was \
+         taken, and may be the wrong one."
+        "Take frames up and down, or faster and smaller ones, so that drift distorts them less."
+    DriftNotSeparated "drift-not-separated" Warning
+        "All frames have one slow direction, in which drift looks like a wrong gain or a shear of the scanner. A drift \
+         was assumed for the errors, where the line rate is known."
+        "Take frames up and down of the known lattice."
+}

@@ -1,0 +1,166 @@
+//! Doubts about where the pixels are: frame and position sensors.
+
+use spmfile::LineDirection;
+
+use super::explained::explain;
+use crate::analysis::Axis;
+use crate::words::line_name;
+
+/// Where the pixels are.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum PositionDoubt {
+    /// A frame without sensors is turned.
+    #[error(
+        "the frame is turned by {:.4}° against the laboratory axes, in which vectors and angles are given; \
+         in the axes of the image all angles are smaller by that",
+        .rotation.to_degrees()
+    )]
+    FrameTurned {
+        /// By this angle, rad.
+        rotation: f64,
+    },
+    /// The sensors of the other line direction were taken.
+    #[error(
+        "the {} image has no position sensors of its own; those of the {} are used",
+        line_name(*.line), line_name(*.other)
+    )]
+    SensorsOfOtherLine {
+        /// That of the image.
+        line: LineDirection,
+        /// That of the sensors.
+        other: LineDirection,
+    },
+    /// There are no sensors.
+    #[error(
+        "{reason}: nominal coordinates are used; scanner calibration errors (often 1 % and more) go into lengths, twist \
+         and strain in full"
+    )]
+    NoPositionSensors {
+        /// What is not there.
+        reason: String,
+    },
+    /// The instrument levelled the sensors.
+    #[error(
+        "the instrument subtracted a fit ({fit}) from {sensor:?}, so it no longer tells positions; nominal coordinates \
+         are used"
+    )]
+    SensorPlaneFitted {
+        /// What was subtracted.
+        fit: String,
+        /// The sensor.
+        sensor: String,
+    },
+    /// Sensors and image have other numbers of pixels.
+    #[error(
+        "the position sensors have {} × {} pixels, {channel:?} has {} × {}; nominal coordinates are used",
+        .sensors[0], .sensors[1], .image[0], .image[1]
+    )]
+    SensorShape {
+        /// Columns and rows of the sensors.
+        sensors: [usize; 2],
+        /// The image.
+        channel: String,
+        /// Its columns and rows.
+        image: [usize; 2],
+    },
+    /// The sensors span no area.
+    #[error(
+        "the position sensors do not span an area (constant, missing, or along one line); nominal coordinates are used"
+    )]
+    SensorsFlat,
+    /// The sensors span something else than the scan size.
+    #[error(
+        "the sensors span {:.1} × {:.1} nm where the scan size is {:.1} × {:.1} nm; their calibration cannot be right \
+         and nominal coordinates are used",
+        .measured[0], .measured[1], .nominal[0], .nominal[1]
+    )]
+    SensorSpan {
+        /// What they span, nm.
+        measured: [f64; 2],
+        /// The scan size, nm.
+        nominal: [f64; 2],
+    },
+    /// The sensors make a mirror image.
+    #[error(
+        "the sensors describe a mirrored frame: one of them has the wrong sign; the signs of twist and strain axis \
+         follow the sensors"
+    )]
+    SensorsMirrored,
+    /// The lines of a sensor bend as those of one that lags behind the tip.
+    #[error(
+        "in the {} the {} sensor lags behind the tip: its lines bend by {bend:.2} nm where they begin and are straight \
+         again over {columns:.1} columns{}. A plane through the whole would make the pixels {:.2} % too {} along the \
+         fast axis; the bend is taken off, and a part of that stands in the errors. If it is the tip that is late there \
+         and not its sensor, the first columns of the image are distorted",
+        line_name(*.line),
+        axis_name(*.sensor),
+        .time_constant.map_or_else(String::new, |t| format!(", a time constant of {:.2} ms", 1000.0 * t)),
+        100.0 * .share,
+        if *.short { "short" } else { "long" }
+    )]
+    SensorLag {
+        /// Trace or retrace.
+        line: LineDirection,
+        /// The sensor.
+        sensor: Axis,
+        /// How far its lines bend, nm.
+        bend: f64,
+        /// Over how many columns.
+        columns: f64,
+        /// In time, s; `None` where the file does not tell its line rate.
+        time_constant: Option<f64>,
+        /// By how much a plane through the whole would change the pixels.
+        share: f64,
+        /// Whether it would make them shorter.
+        short: bool,
+    },
+}
+
+fn axis_name(axis: Axis) -> &'static str {
+    match axis {
+        Axis::X => "x",
+        Axis::Y => "y",
+    }
+}
+
+explain! { PositionDoubt:
+    FrameTurned "frame-turned" Note
+        "The frame was scanned at an angle. Vectors and angles are given in the axes of the laboratory and not in those \
+         of the image."
+        "Mind it when you compare angles with what you see in the image."
+    SensorsOfOtherLine "sensors-of-other-line" Warning
+        "Positions are those of the other line direction. Where the tip lags or creeps, the two differ by parts of a per \
+         cent."
+        "Record the position sensors in both line directions, or analyse the direction that has them."
+    NoPositionSensors "no-position-sensors" Warning
+        "Lengths are those that the instrument intended. Its calibration error, often 1 % and more, goes into lengths, \
+         twist and strain in full."
+        "Record the position sensors. Otherwise calibrate the scanner with a known lattice, or scan the place again \
+         with the sample turned by 90°."
+    SensorPlaneFitted "sensor-plane-fitted" Warning
+        "The instrument levelled the signal of a position sensor, which takes off the very slope that tells positions. \
+         Nominal coordinates were used, with the calibration error of the scanner in full."
+        "Switch off levelling of the sensor channels and record again."
+    SensorShape "sensor-shape" Warning
+        "The position sensors have another number of pixels than the image and cannot be put on it. Nominal coordinates \
+         were used, with the calibration error of the scanner in full."
+        "Record sensors and image with the same numbers of samples and lines."
+    SensorsFlat "sensors-flat" Warning
+        "The position sensors show no motion over an area: they are constant, missing or the same. Nominal coordinates \
+         were used, with the calibration error of the scanner in full."
+        "Look at the sensor images: each has to rise evenly along its own axis. Record them again."
+    SensorSpan "sensor-span" Warning
+        "The position sensors span more than twice or less than half of the scan size, so that their unit or their \
+         sensitivity is wrong. Nominal coordinates were used."
+        "Correct the sensitivity of the sensors in the instrument, or the scan size if that is what is wrong."
+    SensorsMirrored "sensors-mirrored" Serious
+        "By its sensors the frame is a mirror image, so that one sensor has the wrong sign. Signs of the twist and of the \
+         strain axis are then those of the mirror image."
+        "Find out which sensor has the wrong sign, on a sample with known features, and correct it before signs or \
+         axes are used."
+    SensorLag "sensor-lag" Note
+        "A position sensor follows the tip with a delay where the lines begin. The bend was taken off, and a part of what \
+         that does stands in the errors."
+        "Scan more slowly or with more overscan. If it is the tip that is late, leave the first columns out."
+}

@@ -1,0 +1,170 @@
+//! Doubts about how scans and sets agree.
+
+use super::explained::explain;
+
+/// How scans and sets agree.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum SetDoubt {
+    /// Scans scatter by more than their errors.
+    #[error("{}", scattered(*.of, *.chi2_per_dof))]
+    Scatter {
+        /// Which scans.
+        of: Scattered,
+        /// χ² per degree of freedom.
+        chi2_per_dof: f64,
+    },
+    /// A scan is far from the mean.
+    #[error("a wavelength of a single scan differs by more than 1 % from that of the set")]
+    OutsideOnePercent,
+    /// A scan does not fit the others.
+    #[error(
+        "the scan does not fit the others (χ² = {chi_squared:.0} for {degrees_of_freedom} degrees of freedom, p = \
+         {p_value:.0e}{}); {}",
+        .displacement.map_or_else(String::new, |d| format!(", {d:.3} nm from where the others have it")),
+        if *.by_rule {
+            "more than a fifth of the scans are never left out by rule"
+        } else {
+            "it is used all the same"
+        }
+    )]
+    OutlyingScan {
+        /// χ² of the scan against the others.
+        chi_squared: f64,
+        /// Its degrees of freedom.
+        degrees_of_freedom: usize,
+        /// The chance of more.
+        p_value: f64,
+        /// Its distance from where the others have it, nm.
+        displacement: Option<f64>,
+        /// Whether outliers are left out by rule.
+        by_rule: bool,
+    },
+    /// A scan was left out by rule.
+    #[error("left out by rule: {reason}")]
+    ScanLeftOut {
+        /// Why.
+        reason: String,
+    },
+    /// Leaving out single scans changes results by more than their errors.
+    #[error(
+        "leaving out one scan at a time makes larger errors than those stated: {larger}; trust the larger ones"
+    )]
+    ScatterOfScans {
+        /// Which numbers, and how many times.
+        larger: String,
+    },
+    /// Scans of different lattices were put into one set by hand.
+    #[error("{0}: they were put into one set by hand, and their mean is that of neither")]
+    SamplesMixed(DifferentSamples),
+    /// Scans of different lattices were taken apart.
+    #[error("{0}: each of them is a set of its own, and nothing is averaged over them")]
+    SamplesSeparated(DifferentSamples),
+    /// Sets show different lattices.
+    #[error(
+        "the sets show lattices that differ by up to {:.1} %: they are not of the same place or sample, and are not \
+         combined",
+        100.0 * .share
+    )]
+    DifferentLattices {
+        /// The largest difference, as a share.
+        share: f64,
+    },
+    /// Sets differ by more than their errors. Distances are in standard deviations.
+    #[error(
+        "the sets disagree: drift {drift:.1} σ, twist {twist:.1} σ, strain {strain:.1} σ apart; a drift that changes in \
+         time or a scanner whose axes differ would do this; the errors of the combined values are enlarged to match"
+    )]
+    SetsDisagree {
+        /// Of their drifts.
+        drift: f64,
+        /// Of their twists.
+        twist: f64,
+        /// Of their strains.
+        strain: f64,
+    },
+}
+
+/// Which scans scatter.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Scattered {
+    /// Those of a set of moirés.
+    Moires,
+    /// Those of a known lattice.
+    KnownLattice,
+}
+
+/// Scans that show different lattices.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error(
+    "the scans show {count} different lattices ({names}), which differ {}; drift does not change a lattice there. They are \
+     of different samples or places, or something else was taken for the lattice in some",
+    by_how_much(*.apart)
+)]
+pub struct DifferentSamples {
+    /// How many lattices.
+    pub count: usize,
+    /// What tells them apart.
+    pub names: String,
+    /// By how much they differ along the fast axis, as a share; infinite where it is along the slow axis.
+    pub apart: f64,
+}
+
+fn by_how_much(apart: f64) -> String {
+    if apart.is_finite() {
+        format!("by {:.1} % or more along the fast axis", 100.0 * apart)
+    } else {
+        "by more than any plausible drift along the slow axis".to_owned()
+    }
+}
+
+fn scattered(of: Scattered, chi2_per_dof: f64) -> String {
+    let times = chi2_per_dof.sqrt();
+    match of {
+        Scattered::Moires => format!(
+            "the scans scatter {times:.1} times more than their errors say (χ²/dof = {chi2_per_dof:.1}): drift that \
+             changes, an inhomogeneous lattice or sensor errors; errors of the set are enlarged to match"
+        ),
+        Scattered::KnownLattice => format!(
+            "the images scatter {times:.1} times more than their errors say: drift that changes, creep, or a lattice \
+             that is not the same everywhere; errors are enlarged to match"
+        ),
+    }
+}
+
+explain! { SetDoubt:
+    Scatter "scatter" Warning
+        "The scans of a set differ from each other by more than their errors say. The errors of the set were enlarged to \
+         match."
+        "Look for the scan that stands out, and for a drift that changes. Take more frames."
+    OutsideOnePercent "outside-one-percent" Warning
+        "A wavelength of at least one scan is more than 1 % away from that of the set."
+        "Look at that scan: few periods, a jump or another place."
+    OutlyingScan "outlying-scan" Warning
+        "One scan does not fit the others, by more than chance. It is used all the same, and pulls the mean."
+        "Look at the scan. If it shows a jump, a tip change or another place, leave it out."
+    ScanLeftOut "scan-left-out" Note
+        "A scan did not fit the others and was left out by the rule that was asked for."
+        "Look at the scan, to know why. State the rule together with the result."
+    ScatterOfScans "scatter-of-scans" Warning
+        "Results change by more than their errors when single scans are left out. The errors that leaving out makes are \
+         the ones to trust."
+        "Use the larger errors. More scans, up and down, make both agree if the scatter is chance."
+    SamplesMixed "samples-mixed" Serious
+        "A set that was made by hand holds scans of different lattices. Its mean belongs to none of them."
+        "Make a set of each sample or place."
+    SamplesSeparated "samples-separated" Warning
+        "The scans show different lattices and were taken apart by them. Each is a set of its own, and there is no mean of \
+         all."
+        "Nothing, if there are several samples or places. Otherwise look at the scans for what was taken for the \
+         lattice."
+    DifferentLattices "different-lattices" Serious
+        "The sets show different lattices, so that there is no mean over them. They are of different places or samples, \
+         or a set is wrong."
+        "Analyse each place by itself, or find the set whose scale or line rate is wrong."
+    SetsDisagree "sets-disagree" Warning
+        "Two sets differ in drift, twist or strain by more than three standard deviations. The errors of what combines \
+         them were enlarged to match."
+        "A drift that changed explains different drifts; axes of the scanner with different gains explain different \
+         strains, and a calibration takes them off."
+}
