@@ -299,12 +299,28 @@ pub(crate) fn check(settings: &Settings) -> anyhow::Result<()> {
         clock >= 0.0 && clock.is_finite(),
         "the uncertainty of the frame times (--frame-time-sigma) cannot be negative, found {clock}"
     );
-    let calibration = &settings.calibration;
+    check_uncertainties(settings)?;
+    if let Some(problem) = settings
+        .scanner
+        .as_ref()
+        .and_then(moiregauge::calibration::Calibration::problem)
+    {
+        bail!("the calibration of the scanner makes no sense: {problem}");
+    }
+    if let Some(problem) = settings.out_of_range() {
+        bail!("{problem}");
+    }
+    check_drift(settings)
+}
+
+/// Uncertainties are no wild guesses.
+fn check_uncertainties(settings: &Settings) -> anyhow::Result<()> {
+    let (material, calibration) = (&settings.material, &settings.calibration);
     for (name, value, largest) in [
         (
             "--lattice-constant-sigma",
             material.lattice_constant_sigma_nm,
-            0.1 * a,
+            0.1 * material.lattice_constant_nm,
         ),
         ("--poisson-ratio-sigma", material.poisson_ratio_sigma, 0.5),
         ("--calibration-gain", calibration.gain_percent, 50.0),
@@ -325,16 +341,11 @@ pub(crate) fn check(settings: &Settings) -> anyhow::Result<()> {
             "an uncertainty ({name}) lies between 0 and {largest}, found {value}"
         );
     }
-    if let Some(problem) = settings
-        .scanner
-        .as_ref()
-        .and_then(moiregauge::calibration::Calibration::problem)
-    {
-        bail!("the calibration of the scanner makes no sense: {problem}");
-    }
-    if let Some(problem) = settings.out_of_range() {
-        bail!("{problem}");
-    }
+    Ok(())
+}
+
+/// A drift that is given is two numbers and their uncertainty.
+fn check_drift(settings: &Settings) -> anyhow::Result<()> {
     if let Some(drift) = &settings.drift {
         let (x, y, sigma) = (
             drift.x_nm_per_min,

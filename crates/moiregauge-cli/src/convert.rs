@@ -6,15 +6,16 @@ use std::process::ExitCode;
 
 use anyhow::{Context as _, anyhow, bail, ensure};
 use clap::ValueEnum;
-use indicatif::{ProgressBar, ProgressStyle};
 use moiregauge::survey::{nominal_geometry, on_grid};
+use moiregauge_pipeline::Content;
 use moiregauge_pipeline::sink::{FileSink, SinkError};
 use rayon::prelude::*;
 use spmfile::{ChannelInfo, Scan, WritableFormat, sensor_axis};
 
-use crate::info::expand;
 use crate::input::{Known, KnownArgs, is_named, with_option};
 use crate::outputs;
+use crate::paths::expand;
+use crate::progress::bar;
 use crate::say::say;
 
 /// Convert scans into formats of other programs: Gwyddion, NumPy, Zarr, TIFF, text
@@ -143,34 +144,7 @@ pub(crate) fn run(args: &ConvertArgs) -> anyhow::Result<ExitCode> {
         sink: outputs::files(folder, args.force, &protected)?,
     };
     target.can_be_written()?;
-    // Before anything runs in parallel: which of two files of one name is first must not depend on it.
-    let mut taken = HashSet::new();
-    let jobs: Vec<(&PathBuf, String, bool)> = inputs
-        .iter()
-        .map(|path| {
-            let stem = target.stem(path);
-            let new = taken.insert(stem.to_lowercase());
-            (path, stem, new)
-        })
-        .collect();
-    let progress = progress(inputs.len(), args.quiet);
-    let written: Vec<anyhow::Result<Vec<PathBuf>>> = jobs
-        .par_iter()
-        .map(|(path, stem, new)| {
-            let result = if *new {
-                target.convert(path, stem)
-            } else {
-                let name = folder.join(stem);
-                Err(anyhow!(
-                    "another file of this run already becomes {}",
-                    name.display()
-                ))
-            };
-            progress.inc(1);
-            result
-        })
-        .collect();
-    progress.finish_and_clear();
+    let written = target.convert_all(&inputs, folder);
     let (mut files, mut scans) = (Vec::new(), 0);
     for (path, result) in inputs.iter().zip(written) {
         match result {
@@ -229,18 +203,6 @@ fn in_words(out: &Path, scans: usize, files: &[PathBuf]) -> String {
     format!("{scans} written to {}{more}\n", first.display())
 }
 
-fn progress(files: usize, quiet: bool) -> ProgressBar {
-    if quiet {
-        return ProgressBar::hidden();
-    }
-    // Draws on a terminal only.
-    let bar = ProgressBar::new(files as u64);
-    match ProgressStyle::with_template("converting {bar:30} {pos}/{len} files, {eta} left") {
-        Ok(style) => bar.with_style(style),
-        Err(_) => bar,
-    }
-}
-
 /// Where and how files are written.
 struct Target<'a> {
     args: &'a ConvertArgs,
@@ -251,9 +213,42 @@ struct Target<'a> {
 }
 
 impl Target<'_> {
+    /// Converts all files; returns what each became.
+    fn convert_all(&self, inputs: &[PathBuf], folder: &Path) -> Vec<anyhow::Result<Vec<PathBuf>>> {
+        // Before anything runs in parallel: which of two files of one name is first must not depend on it.
+        let mut taken = HashSet::new();
+        let jobs: Vec<(&PathBuf, String, bool)> = inputs
+            .iter()
+            .map(|path| {
+                let stem = self.stem(path);
+                let new = taken.insert(stem.to_lowercase());
+                (path, stem, new)
+            })
+            .collect();
+        let progress = bar("converting", "files", inputs.len(), !self.args.quiet);
+        let written: Vec<anyhow::Result<Vec<PathBuf>>> = jobs
+            .par_iter()
+            .map(|(path, stem, new)| {
+                let result = if *new {
+                    self.convert(path, stem)
+                } else {
+                    let name = folder.join(stem);
+                    Err(anyhow!(
+                        "another file of this run already becomes {}",
+                        name.display()
+                    ))
+                };
+                progress.inc(1);
+                result
+            })
+            .collect();
+        progress.finish_and_clear();
+        written
+    }
+
     /// Converts one file; returns what was written.
     fn convert(&self, path: &Path, stem: &str) -> anyhow::Result<Vec<PathBuf>> {
-        let bytes = moiregauge_pipeline::read(path)?;
+        let content = Content::read(path)?;
         let is_wanted = |info: &ChannelInfo| {
             let points = self.format == WritableFormat::Gxyzf;
             let names = &self.args.channel;
@@ -261,7 +256,7 @@ impl Target<'_> {
                 || names.iter().any(|name| is_named(&info.name, name))
                 || (points && sensor_axis(&info.name, &info.internal_name).is_some())
         };
-        let read = self.known.read(path, &bytes, &is_wanted);
+        let read = self.known.read(path, &content, &is_wanted);
         let (mut scan, replaced) = read.map_err(with_option)?;
         self.channels_are_there(&scan)?;
         let mut log = vec![format!(

@@ -5,12 +5,13 @@ use std::process::ExitCode;
 
 use moiregauge::settings::Settings;
 use moiregauge_pipeline::sink::Target;
+use moiregauge_report::screen::summary;
 use moiregauge_report::{Choice, write_report};
 
-use crate::analyze::{Outcome, analyse_files, report_names, summary};
-use crate::info::expand;
+use crate::analyze::{Outcome, analyse_files, report_names};
 use crate::input::Known;
 use crate::outputs;
+use crate::paths::expand;
 use crate::say::say;
 use crate::simulate::{paper_sets, write_sets};
 
@@ -74,7 +75,7 @@ pub(crate) fn run(args: &DemoArgs) -> anyhow::Result<ExitCode> {
     let report = write_report(&analysis, &provenance, &Choice::default())?;
     outputs::write_all(&sink, "", &report)?;
     outputs::commit(sink)?;
-    say(&summary(&analysis))?;
+    say(&summary(&analysis, crate::hints::of))?;
     let truth = &sets[0];
     say(&format!(
         "\nPut in: twist {}°, heterostrain {} %, drift ({}, {}) nm/min\n",

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use std::process::ExitCode;
 
 use anyhow::bail;
-use moiregauge::caveat::{Explained, explained};
+use moiregauge::caveat::{Explained, SUBJECTS, Severity, explained};
 
 use crate::hints;
 use crate::say::say;
@@ -27,6 +27,9 @@ pub(crate) struct ExplainArgs {
     /// Print JSON: a list with the code, the severity, the meaning and what to do
     #[arg(long)]
     json: bool,
+    /// Print docs/caveats.md
+    #[arg(long, hide = true, conflicts_with_all = ["code", "json"])]
+    markdown: bool,
 }
 
 /// Codes that are shown where there is none of the name.
@@ -38,7 +41,9 @@ pub(crate) fn run(args: &ExplainArgs) -> anyhow::Result<ExitCode> {
         None => explained().collect(),
         Some(code) => vec![named(code)?],
     };
-    let text = if args.json {
+    let text = if args.markdown {
+        markdown()
+    } else if args.json {
         format!("{}\n", serde_json::to_string_pretty(&entries)?)
     } else if args.code.is_some() {
         at_length(entries[0])
@@ -116,6 +121,38 @@ fn in_short(entries: &[&Explained]) -> String {
             entry.severity.name(),
             first.unwrap_or_default().trim_end()
         );
+    }
+    text
+}
+
+/// The page of the documentation.
+fn markdown() -> String {
+    let mut text = "\
+# Caveats
+
+Results come with caveats: on the screen, in the report and in `results.json` and `map.json`, each with a code, words and
+what it concerns. `moiregauge explain CODE` says the same as this page, which `moiregauge explain --markdown` makes.
+
+"
+    .to_owned();
+    for severity in [Severity::Note, Severity::Warning, Severity::Serious] {
+        let _ = writeln!(text, "- **{}**: {}", severity.name(), severity.meaning());
+    }
+    for (subject, table) in SUBJECTS {
+        let _ = write!(
+            text,
+            "\n## {subject}\n\n| code | grade | what it means | what to do |\n|---|---|---|---|\n"
+        );
+        for entry in table {
+            let _ = writeln!(
+                text,
+                "| `{}` | {} | {} | {} |",
+                entry.code,
+                entry.severity.name(),
+                entry.meaning,
+                entry.what_to_do
+            );
+        }
     }
     text
 }

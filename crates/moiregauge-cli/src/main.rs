@@ -13,10 +13,14 @@ mod map;
 mod moire;
 mod numbers;
 mod outputs;
+mod paths;
 mod plan;
+mod progress;
+mod reading;
 mod say;
 mod scanner;
 mod simulate;
+mod stripes;
 mod validate;
 
 use std::process::ExitCode;
@@ -53,16 +57,6 @@ enum Command {
 /// The arguments. A negative number is a value everywhere, so that its option is named where it is refused.
 fn arguments() -> clap::Command {
     Cli::command().mut_subcommands(|command| command.allow_negative_numbers(true))
-}
-
-/// The command of a command line, its program first, with or without a place for results.
-fn command(given: impl IntoIterator<Item = String>) -> Result<Command, clap::Error> {
-    // Where results go is no part of what was asked.
-    let place = ["--out".to_owned(), ".".to_owned()];
-    let mut given: Vec<String> = given.into_iter().collect();
-    let after = given.len().min(2);
-    given.splice(after..after, place);
-    Ok(Cli::from_arg_matches(&arguments().try_get_matches_from(given)?)?.command)
 }
 
 fn main() -> ExitCode {

@@ -1,4 +1,4 @@
-//! Printing to standard output, where the reader may have gone away (`moiregauge … | head`).
+//! Words to standard output, where the reader may have gone away (`moiregauge … | head`).
 
 use std::io::{ErrorKind, Write as _};
 

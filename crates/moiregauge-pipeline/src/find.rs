@@ -7,7 +7,7 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 
 use moiregauge_report::FailedInput;
-use spmfile::{Format, detect, looks_like_scan, named_like_scan};
+use spmfile::{Format, detect, named_like_scan};
 
 use crate::names::in_words;
 use crate::reading;
@@ -122,7 +122,7 @@ impl Found {
         let mut failed = Vec::new();
         for file in &entries {
             match look(file) {
-                Look::Scan => scans.push(file.clone()),
+                Look::Scan(format) => scans.push((file.clone(), format)),
                 Look::Failed(reason) => failed.push((file, reason)),
                 // The list of what the simulator wrote beside its scans.
                 Look::Other if file.file_name().is_some_and(|name| name == MANIFEST) => {}
@@ -130,9 +130,8 @@ impl Found {
                 Look::Folder => {}
             }
         }
-        let head = |path: &Path| reading::head(path, HEAD).unwrap_or_default();
-        let kept = one_per_frame(scans.clone(), head);
-        for file in scans.iter().filter(|file| !kept.contains(file)) {
+        let kept = one_per_frame(scans.clone());
+        for (file, _) in scans.iter().filter(|(file, _)| !kept.contains(file)) {
             self.left_alone.add(file);
         }
         if kept.is_empty() && failed.is_empty() {
@@ -147,7 +146,7 @@ impl Found {
 
 /// What a file of a folder is.
 enum Look {
-    Scan,
+    Scan(Format),
     /// It should be a scan, and cannot be used.
     Failed(String),
     Other,
@@ -182,14 +181,15 @@ fn look(path: &Path) -> Look {
         // Nobody knows what is in it.
         Err(error) => return Look::Failed(error.to_string()),
     };
+    let format = format_of(path, &head);
     if is_own_result(path, &name) {
         Look::Other
-    } else if looks_like_scan(&head) || is_instrument_tiff(path, &head) {
-        Look::Scan
+    } else if format.is_scan() {
+        Look::Scan(format)
     } else {
         failed_by_name(format!(
             "by its name it should be a scan, but {}",
-            instead(&head)
+            instead(format, &head)
         ))
     }
 }
@@ -199,18 +199,21 @@ fn is_own_result(path: &Path, name: &str) -> bool {
     name == "map.gwy" && path.with_file_name("map.json").is_file()
 }
 
-/// The directory of a TIFF file, which tells the instrument, may lie at its end.
-fn is_instrument_tiff(path: &Path, head: &[u8]) -> bool {
-    detect(head) == Format::Tiff && reading::read(path).is_ok_and(|bytes| looks_like_scan(&bytes))
+/// The format by the first bytes. The directory of a TIFF file, which tells the instrument, may lie at its end.
+fn format_of(path: &Path, head: &[u8]) -> Format {
+    match detect(head) {
+        Format::Tiff => reading::read(path).map_or(Format::Tiff, |bytes| detect(&bytes)),
+        other => other,
+    }
 }
 
 /// What a file holds that should be a scan by its name.
-fn instead(head: &[u8]) -> String {
-    match detect(head) {
+fn instead(format: Format, head: &[u8]) -> String {
+    match format {
         Format::Npy | Format::Npz => "it holds an array".to_owned(),
         Format::Tiff | Format::Png | Format::Jpeg => "it holds a picture".to_owned(),
         Format::TextMatrix => "it holds a matrix of numbers as text".to_owned(),
-        _ => match spmfile::read(head) {
+        other => match spmfile::read_as(other, head, &|_| true) {
             Err(error) => error.to_string(),
             Ok(_) => "it holds something else".to_owned(),
         },
@@ -232,7 +235,9 @@ fn entries(folder: &Path) -> Result<Vec<PathBuf>, String> {
 fn no_scans(entries: &[PathBuf]) -> String {
     let holds_scans = |folder: &&PathBuf| {
         let inside = self::entries(folder).unwrap_or_default();
-        inside.iter().any(|file| matches!(look(file), Look::Scan))
+        inside
+            .iter()
+            .any(|file| matches!(look(file), Look::Scan(_)))
     };
     let folders: Vec<String> = entries
         .iter()

@@ -8,9 +8,10 @@ use moiregauge_report::results::{Crop, FrameOrder, Told};
 use spmfile::arrays::ArrayOptions;
 use spmfile::{
     Block, Channel, ChannelInfo, CropError, Format, FrameDirection, ReadError, Scan, Span, crop,
-    detect, read_selected, sensor_axis,
+    sensor_axis,
 };
 
+use crate::content::Content;
 use crate::session;
 use crate::twice::distinct;
 
@@ -102,10 +103,10 @@ impl Known {
     pub fn read(
         &self,
         path: &Path,
-        bytes: &[u8],
+        content: &Content,
         wanted: &dyn Fn(&ChannelInfo) -> bool,
     ) -> Result<(Scan, Vec<String>), KnownError> {
-        let mut scan = self.decode(path, bytes, wanted)?;
+        let mut scan = self.decode(path, content, wanted)?;
         let replaced = self.complete(path, &mut scan)?;
         Ok((scan, replaced))
     }
@@ -117,17 +118,20 @@ impl Known {
     pub fn decode(
         &self,
         path: &Path,
-        bytes: &[u8],
+        content: &Content,
         wanted: &dyn Fn(&ChannelInfo) -> bool,
     ) -> Result<Scan, ReadError> {
         let wanted =
             |info: &ChannelInfo| wanted(info) || self.names_sensor(&info.name, &info.internal_name);
-        if is_array(bytes) {
-            spmfile::arrays::read(bytes, &self.array_options(path), &wanted)
-        } else if detect(bytes) == Format::OmicronMatrix {
-            session::read(self.place(path), bytes, self.frame_direction(path), &wanted)
-        } else {
-            read_selected(bytes, &wanted)
+        let bytes = content.bytes();
+        match content.format() {
+            array if array.is_array() => {
+                spmfile::arrays::read_as(array, bytes, &self.array_options(path), &wanted)
+            }
+            Format::OmicronMatrix => {
+                session::read(self.place(path), bytes, self.frame_direction(path), &wanted)
+            }
+            other => spmfile::read_as(other, bytes, &wanted),
         }
     }
 
@@ -258,9 +262,9 @@ impl Known {
             reason,
         };
         let path = Path::new(file);
-        let bytes = crate::reading::read(self.place(path)).map_err(|e| refused(e.to_string()))?;
+        let content = Content::read(self.place(path)).map_err(|e| refused(e.to_string()))?;
         let mut second = self
-            .decode(path, &bytes, &|_| true)
+            .decode(path, &content, &|_| true)
             .map_err(|e| refused(e.to_string()))?;
         if let Some(names) = names {
             adopt(&mut second, names).map_err(|e| refused(e.to_string()))?;
@@ -311,14 +315,6 @@ fn put_sensors(scan: &mut Scan, sensors: Vec<Channel>) -> Result<(), String> {
     }
     scan.channels.extend(sensors);
     Ok(())
-}
-
-/// Whether the bytes are those of an array or a picture, which tell nothing of a frame.
-fn is_array(bytes: &[u8]) -> bool {
-    matches!(
-        detect(bytes),
-        Format::Npy | Format::Npz | Format::Tiff | Format::Png | Format::Jpeg | Format::TextMatrix
-    )
 }
 
 /// Names the channels that the user calls position sensors so; others of these names are left out.

@@ -3,6 +3,7 @@
 //! Files and settings, but no arguments of a program, no printing and no physics. Front ends (the program, a
 //! Python package, a page) stand on this crate.
 
+mod content;
 mod find;
 mod hash;
 mod known;
@@ -15,6 +16,7 @@ mod sets;
 pub mod sink;
 mod twice;
 
+pub use content::Content;
 pub use find::{Found, LeftAlone, find};
 pub use hash::{hexadecimal, identity};
 pub use known::{Known, KnownError, Places, is_named};

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use spmfile::matrix::{frame_and_channel, is_curve, log_file};
-use spmfile::{ChannelInfo, Format, FrameDirection, ReadError, Scan, detect};
+use spmfile::{ChannelInfo, Format, FrameDirection, ReadError, Scan};
 
 use crate::reading;
 
@@ -65,15 +65,13 @@ pub fn log_files(path: &Path) -> Vec<PathBuf> {
 
 /// Of the scans found in a folder, sorted by name, those to read: of a frame whose channels are files of
 /// their own one file, that of Z where there is one, and no curves.
-pub fn one_per_frame(files: Vec<PathBuf>, head: impl Fn(&Path) -> Vec<u8>) -> Vec<PathBuf> {
+pub fn one_per_frame(files: Vec<(PathBuf, Format)>) -> Vec<PathBuf> {
     let mut kept = Vec::new();
     let mut places = BTreeMap::new();
-    for file in files {
+    for (file, format) in files {
         let name = file.file_name().unwrap_or_default().to_string_lossy();
         let parts = frame_and_channel(&name);
-        let Some((frame, channel)) =
-            parts.filter(|_| detect(&head(&file)) == Format::OmicronMatrix)
-        else {
+        let Some((frame, channel)) = parts.filter(|_| format == Format::OmicronMatrix) else {
             kept.push(file);
             continue;
         };
@@ -120,12 +118,12 @@ mod tests {
     #[test]
     fn of_a_folder_one_file_of_each_frame() {
         let kept = |names: &[&str]| -> Vec<String> {
-            let files = names.iter().map(PathBuf::from).collect();
-            let head = |path: &Path| match path.extension() {
-                Some(other) if other == "spm" => b"\\*File list\r\n".to_vec(),
-                _ => b"ONTMATRX0101TLKB".to_vec(),
+            let format = |path: &Path| match path.extension() {
+                Some(other) if other == "spm" => Format::NanoScope,
+                _ => Format::OmicronMatrix,
             };
-            let kept = one_per_frame(files, head);
+            let files = names.iter().map(PathBuf::from);
+            let kept = one_per_frame(files.map(|file| (file.clone(), format(&file))).collect());
             kept.iter().map(|f| f.display().to_string()).collect()
         };
         let names = [

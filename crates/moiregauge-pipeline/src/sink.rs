@@ -26,27 +26,16 @@
 //!
 //! Nothing here holds the time of day: the same results make the same manifest.
 
+mod build;
 mod error;
 mod file;
 mod folder;
 mod manifest;
 mod work;
 
+pub use build::build;
 pub use error::SinkError;
 pub use file::{FileSink, OneFile};
 pub use folder::{FolderSink, Part, Target};
 pub use manifest::{Entry, MANIFEST, Manifest};
 pub use work::UNFINISHED;
-
-/// A hash of the program that is running: what it calculates can depend on nothing else but its inputs and settings.
-///
-/// `None` where the executable cannot be read. A front end that is a library inside another program (an interpreter)
-/// has to add a hash of its own to what it keeps.
-pub fn build() -> Option<&'static str> {
-    static BUILD: std::sync::OnceLock<Option<String>> = std::sync::OnceLock::new();
-    let hash = || {
-        let program = std::env::current_exe().ok()?;
-        Some(manifest::hash_file(&program).ok()?.1)
-    };
-    BUILD.get_or_init(hash).as_deref()
-}

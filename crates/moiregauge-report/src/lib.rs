@@ -3,6 +3,7 @@
 //! In: an [`Analysis`](moiregauge::campaign::Analysis) (nm, s, rad) and a [`Provenance`]. Out: files as bytes, in
 //! the units of the surface (°, %, nm/min). Nothing is written to disk here.
 
+mod choice;
 mod draw;
 mod error;
 mod figures;
@@ -17,6 +18,7 @@ pub mod screen;
 mod stats;
 mod tables;
 
+pub use choice::Choice;
 pub use draw::colormap::ColorMap;
 pub use draw::scale::fixed;
 pub use error::ReportError;
@@ -28,6 +30,6 @@ pub use moire::{CellResult, MoireDocument};
 pub use provenance::{FailedInput, InputFile, Provenance};
 #[cfg(feature = "parquet")]
 pub use report::parquet_tables;
-pub use report::{Choice, figure_files, write_report};
+pub use report::{figure_files, write_report};
 pub use results::{Results, map_schema, schema};
 pub use tables::{map_scan, map_scans, map_tables, stripe_scan};

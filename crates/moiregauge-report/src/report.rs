@@ -2,10 +2,8 @@
 
 use moiregauge::campaign::Analysis;
 use rayon::prelude::*;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
-use crate::draw::colormap::ColorMap;
+use crate::choice::Choice;
 use crate::draw::png;
 use crate::error::ReportError;
 use crate::figures::{Figure, figures};
@@ -13,30 +11,6 @@ use crate::html;
 use crate::provenance::Provenance;
 use crate::results::Results;
 use crate::tables::tables;
-
-/// Which parts of a report are wanted. `results.json` and the tables always are.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-pub struct Choice {
-    /// The figures as SVG files.
-    pub figures: bool,
-    /// The figures as PNG files, 300 dots per inch.
-    pub png: bool,
-    /// `report.html`, with the figures inside.
-    pub html: bool,
-    /// Colours of images.
-    pub colormap: ColorMap,
-}
-
-impl Default for Choice {
-    fn default() -> Self {
-        Self {
-            figures: true,
-            png: true,
-            html: true,
-            colormap: ColorMap::default(),
-        }
-    }
-}
 
 /// The figures as files, in the order of the figures on any number of threads.
 ///

@@ -22,8 +22,11 @@ use crate::format::{plus_minus, two_digits, with_statistical};
 use crate::html::layers;
 use crate::provenance::FailedInput;
 
+/// The option that helps against a doubt, by its code.
+pub type Hint = fn(&str) -> Option<&'static str>;
+
 /// Per set and combined: drift, twist, strain; then what to keep in mind.
-pub fn summary(analysis: &Analysis) -> String {
+pub fn summary(analysis: &Analysis, hint: Hint) -> String {
     let mut text = format!("Layers: {}\n", layers(&analysis.settings));
     for set in &analysis.sets {
         set_summary(&mut text, set, &analysis.settings);
@@ -35,7 +38,7 @@ pub fn summary(analysis: &Analysis) -> String {
     {
         combined_summary(&mut text, combined);
     }
-    caveats(&mut text, &analysis.caveats);
+    caveats(&mut text, &analysis.caveats, hint);
     text
 }
 
@@ -348,8 +351,8 @@ fn combined_summary(text: &mut String, combined: &Combined) {
     text.push('\n');
 }
 
-/// One line for each caveat, however many files it concerns.
-pub fn caveats(text: &mut String, all: &[Caveat]) {
+/// One line for each caveat, however many files it concerns; after the last of a code the option that helps.
+pub fn caveats(text: &mut String, all: &[Caveat], hint: Hint) {
     let mut by_message: BTreeMap<(&str, String), Vec<&str>> = BTreeMap::new();
     for caveat in all {
         let places = by_message
@@ -357,12 +360,23 @@ pub fn caveats(text: &mut String, all: &[Caveat]) {
             .or_default();
         places.push(&caveat.place);
     }
-    for ((code, message), places) in by_message {
+    let mut lines = by_message.into_iter().peekable();
+    while let Some(((code, message), places)) = lines.next() {
         let place = match places.as_slice() {
             [one] => (*one).to_owned(),
             many => format!("{} and {} more", many[0], many.len() - 1),
         };
         let _ = writeln!(text, "caveat {code} ({place}): {message}");
+        if lines.peek().is_none_or(|((next, _), _)| *next != code) {
+            try_option(text, code, hint);
+        }
+    }
+}
+
+/// The option that helps against a doubt, on a line of its own.
+pub fn try_option(text: &mut String, code: &str, hint: Hint) {
+    if let Some(option) = hint(code) {
+        let _ = writeln!(text, "  try {option}");
     }
 }
 

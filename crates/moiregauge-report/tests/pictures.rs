@@ -158,7 +158,7 @@ fn the_page_says_what_is_wrong_first() {
             .unwrap_or_else(|| panic!("{text} is missing"))
     };
     assert!(at("about one per cent at four to five periods") < at("<svg"));
-    assert!(at("Only 4.5 moiré periods") < at("id=\"set1-scan\""));
+    assert!(at("only 2.5 lattice periods") < at("id=\"set1-scan\""));
     assert!(at("header promises 1048576") < at("id=\"set1-scan\""));
     assert!(at("Not corrected for drift") < at("<svg"));
     assert!(page.contains("no scan of this set could be shown in detail"));

@@ -393,7 +393,7 @@ fn totals_come_first() {
             .is_none()
     );
 
-    let screen = moiregauge_report::screen::summary(&analysis);
+    let screen = moiregauge_report::screen::summary(&analysis, |_| None);
     let line = screen
         .lines()
         .find(|l| l.starts_with("  twist"))

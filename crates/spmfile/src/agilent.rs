@@ -8,13 +8,12 @@
 //! - Lengths are in m; `scanSpeed` is in lines per second, a line being trace and retrace.
 //! - `scanAngle` is in degrees, taken as counter-clockwise.
 
-use crate::ChannelInfo;
 use crate::clock;
 use crate::cursor::Endian;
 use crate::error::ReadError;
 use crate::raster::{self, Encoding, Order};
 use crate::scan::{
-    Channel, DateTime, FrameDirection, LineDirection, Scan, Span, UnreadableChannel,
+    Channel, ChannelInfo, DateTime, FrameDirection, LineDirection, Scan, Span, UnreadableChannel,
 };
 use crate::units::clean;
 use crate::whole::{Extent, MOST_CHANNELS, some_readable};
@@ -26,10 +25,7 @@ const MONTHS: [&str; 12] = [
 ];
 
 fn damaged(reason: impl Into<String>) -> ReadError {
-    ReadError::Damaged {
-        format: FORMAT,
-        reason: reason.into(),
-    }
+    ReadError::damaged(FORMAT, reason)
 }
 
 type Lines = Vec<(String, String)>;

@@ -146,25 +146,31 @@ pub fn detect(bytes: &[u8]) -> Format {
     }
 }
 
-/// Whether a file that begins like this is meant to be a scan, readable or not.
-///
-/// For picking the scans out of a folder that also holds notes, pictures and arrays: of these the
-/// user has to say that they are scans, by naming them. Logs that go with scans are none.
+/// Whether a file that begins like this is meant to be a scan, readable or not: see [`Format::is_scan`].
 pub fn looks_like_scan(head: &[u8]) -> bool {
-    !matches!(
-        detect(head),
-        Format::OmicronMatrixLog
-            | Format::Npy
-            | Format::Npz
-            | Format::Tiff
-            | Format::Png
-            | Format::Jpeg
-            | Format::TextMatrix
-            | Format::Text
-            | Format::Other(_)
-            | Format::Empty
-            | Format::Unknown
-    )
+    detect(head).is_scan()
+}
+
+impl Format {
+    /// Whether files of this kind are meant to be scans, readable or not.
+    ///
+    /// For picking the scans out of a folder that also holds notes, pictures and arrays: of these the
+    /// user has to say that they are scans, by naming them. Logs that go with scans are none.
+    pub fn is_scan(self) -> bool {
+        let is_none = matches!(
+            self,
+            Self::OmicronMatrixLog | Self::Text | Self::Other(_) | Self::Empty | Self::Unknown
+        );
+        !is_none && !self.is_array()
+    }
+
+    /// Whether files of this kind are arrays or pictures, which tell nothing of a frame: see [`crate::arrays`].
+    pub fn is_array(self) -> bool {
+        matches!(
+            self,
+            Self::Npy | Self::Npz | Self::Tiff | Self::Png | Self::Jpeg | Self::TextMatrix
+        )
+    }
 }
 
 /// Whether a file of this name should be a scan: instruments have extensions of their own, and number files,

@@ -127,3 +127,21 @@ pub enum ReadError {
         reason: String,
     },
 }
+
+impl ReadError {
+    /// The refusal of a file of this format whose bytes contradict it.
+    pub(crate) fn damaged(format: &'static str, reason: impl Into<String>) -> Self {
+        Self::Damaged {
+            format,
+            reason: reason.into(),
+        }
+    }
+
+    /// The refusal of a file of this format that holds what is not read.
+    pub(crate) fn unsupported(format: &'static str, reason: impl Into<String>) -> Self {
+        Self::Unsupported {
+            format,
+            reason: reason.into(),
+        }
+    }
+}

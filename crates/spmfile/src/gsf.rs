@@ -6,14 +6,13 @@
 //! - Row 0 is the top line.
 //! - `XReal` and `YReal` are edge to edge in `XYUnits`; without a unit of length there is no size.
 
-use crate::ChannelInfo;
 use crate::cursor::Endian;
 use crate::error::ReadError;
 use crate::export::{ExportError, base_values};
 use crate::fields;
 use crate::labels;
 use crate::raster::{self, Encoding, Order};
-use crate::scan::{Channel, Scan, Span};
+use crate::scan::{Channel, ChannelInfo, Scan, Span};
 use crate::units;
 use crate::whole::Extent;
 
@@ -23,10 +22,7 @@ const KEYS: [&str; 9] = [
 ];
 
 fn damaged(reason: impl Into<String>) -> ReadError {
-    ReadError::Damaged {
-        format: FORMAT,
-        reason: reason.into(),
-    }
+    ReadError::damaged(FORMAT, reason)
 }
 
 /// Reads the channel if it is wanted.

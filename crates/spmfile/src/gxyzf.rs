@@ -9,13 +9,12 @@
 //! - x to the right, y up. Unless the file was written here: if the lines go down (or the points of a line left), they are turned.
 //! - Without a unit of length in `XYUnits` the positions are of no use, and the file is refused.
 
-use crate::ChannelInfo;
 use crate::cursor::{Cursor, Endian};
 use crate::error::ReadError;
 use crate::export::{ExportError, base_values};
 use crate::fields;
 use crate::labels;
-use crate::scan::{Channel, Samples, Scan, Span};
+use crate::scan::{Channel, ChannelInfo, LineDirection, Samples, Scan, Span};
 use crate::units;
 use crate::whole::MOST_CHANNELS;
 
@@ -31,17 +30,11 @@ const KEYS: [&str; 7] = [
 ];
 
 fn damaged(reason: impl Into<String>) -> ReadError {
-    ReadError::Damaged {
-        format: FORMAT,
-        reason: reason.into(),
-    }
+    ReadError::damaged(FORMAT, reason)
 }
 
 fn unsupported(reason: String) -> ReadError {
-    ReadError::Unsupported {
-        format: FORMAT,
-        reason,
-    }
+    ReadError::unsupported(FORMAT, reason)
 }
 
 /// Reads the channels that are wanted.
@@ -147,7 +140,7 @@ pub(crate) fn read(bytes: &[u8], wanted: &dyn Fn(&ChannelInfo) -> bool) -> Resul
 fn info(
     index: usize,
     fields: &[(String, String)],
-    line_direction: Option<crate::LineDirection>,
+    line_direction: Option<LineDirection>,
 ) -> ChannelInfo {
     let title = match index {
         0 => "X Sensor".to_owned(),

@@ -14,12 +14,11 @@
 //! - The same procedure samples `N` of 2.5 `N` equal steps of a line in each direction: the motion
 //!   exceeds the frame by a quarter ([`Scan::rounding`] is 0.25).
 
-use crate::ChannelInfo;
 use crate::clock;
 use crate::cursor::{Cursor, Endian};
 use crate::error::ReadError;
 use crate::raster::{self, Encoding, Order};
-use crate::scan::{Channel, DateTime, FrameDirection, LineDirection, Scan, Span};
+use crate::scan::{Channel, ChannelInfo, DateTime, FrameDirection, LineDirection, Scan, Span};
 use crate::units::{self, quantity};
 use crate::whole::{Extent, MOST_CHANNELS};
 
@@ -32,17 +31,11 @@ const LABEL: usize = 32;
 const ROUNDING: f64 = 0.25;
 
 fn damaged(reason: impl Into<String>) -> ReadError {
-    ReadError::Damaged {
-        format: FORMAT,
-        reason: reason.into(),
-    }
+    ReadError::damaged(FORMAT, reason)
 }
 
 fn unsupported(reason: impl Into<String>) -> ReadError {
-    ReadError::Unsupported {
-        format: FORMAT,
-        reason: reason.into(),
-    }
+    ReadError::unsupported(FORMAT, reason)
 }
 
 /// What the headers of a version 5 file say.

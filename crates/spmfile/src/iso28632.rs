@@ -11,12 +11,13 @@
 //! - Image programs that export this format invent the scan: where line 7 calls the parameters
 //!   bogus, directions, rate and control are left open.
 
-use crate::ChannelInfo;
 use crate::clock;
 use crate::error::ReadError;
 use crate::labels;
 use crate::raster::{self, Order};
-use crate::scan::{Channel, DateTime, FrameDirection, LineDirection, Samples, Scan, Span};
+use crate::scan::{
+    Channel, ChannelInfo, DateTime, FrameDirection, LineDirection, Samples, Scan, Span,
+};
 use crate::units;
 
 const FORMAT: &str = "ISO 28632";
@@ -33,10 +34,7 @@ const FIXED: [(usize, &str); 6] = [
 ];
 
 fn damaged(reason: impl Into<String>) -> ReadError {
-    ReadError::Damaged {
-        format: FORMAT,
-        reason: reason.into(),
-    }
+    ReadError::damaged(FORMAT, reason)
 }
 
 /// Reads the channels that are wanted.

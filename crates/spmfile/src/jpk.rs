@@ -14,13 +14,12 @@
 //!
 //! Names of the tags: Gwyddion's `jpk.h`, by the maker of the instrument.
 
-use crate::ChannelInfo;
 use crate::archive::Archive;
 use crate::clock;
 use crate::error::ReadError;
 use crate::raster::{self, Order};
 use crate::scan::{
-    Channel, DateTime, FrameDirection, LineDirection, Scan, Span, UnreadableChannel,
+    Channel, ChannelInfo, DateTime, FrameDirection, LineDirection, Scan, Span, UnreadableChannel,
 };
 use crate::tiff_tags::{Directory, directories};
 use crate::whole::{Extent, some_readable};
@@ -81,10 +80,7 @@ const TOLD: [(u16, &str); 16] = [
 ];
 
 fn damaged(reason: impl Into<String>) -> ReadError {
-    ReadError::Damaged {
-        format: FORMAT,
-        reason: reason.into(),
-    }
+    ReadError::damaged(FORMAT, reason)
 }
 
 /// Reads the channels that are wanted.

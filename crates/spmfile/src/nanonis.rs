@@ -17,12 +17,11 @@
 
 use memchr::memmem;
 
-use crate::ChannelInfo;
 use crate::clock;
 use crate::cursor::Endian;
 use crate::error::ReadError;
 use crate::raster::{self, Encoding, Order};
-use crate::scan::{Channel, DateTime, FrameDirection, LineDirection, Scan, Span};
+use crate::scan::{Channel, ChannelInfo, DateTime, FrameDirection, LineDirection, Scan, Span};
 use crate::units;
 use crate::whole::{Extent, MOST_CHANNELS};
 
@@ -30,10 +29,7 @@ const FORMAT: &str = "Nanonis";
 const END: &[u8] = b":SCANIT_END:";
 
 fn damaged(reason: impl Into<String>) -> ReadError {
-    ReadError::Damaged {
-        format: FORMAT,
-        reason: reason.into(),
-    }
+    ReadError::damaged(FORMAT, reason)
 }
 
 /// Reads the channels that are wanted.

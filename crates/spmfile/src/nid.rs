@@ -15,14 +15,14 @@ use std::collections::BTreeMap;
 
 use memchr::memmem;
 
-use crate::ChannelInfo;
 use crate::clock;
 use crate::cursor::Endian;
 use crate::error::ReadError;
 use crate::missing::blank_unfilled;
 use crate::raster::{self, Encoding, Order};
 use crate::scan::{
-    Channel, DateTime, FrameDirection, LineDirection, Samples, Scan, Span, UnreadableChannel,
+    Channel, ChannelInfo, DateTime, FrameDirection, LineDirection, Samples, Scan, Span,
+    UnreadableChannel,
 };
 use crate::units::{clean, nm_per};
 use crate::whole::{Extent, MOST_CHANNELS, some_readable};
@@ -31,10 +31,7 @@ const FORMAT: &str = "Nanosurf";
 const DATA_MARK: &[u8] = b"#!";
 
 fn damaged(reason: impl Into<String>) -> ReadError {
-    ReadError::Damaged {
-        format: FORMAT,
-        reason: reason.into(),
-    }
+    ReadError::damaged(FORMAT, reason)
 }
 
 /// Sections by name, keys in the order of the file.

@@ -11,12 +11,11 @@
 //!   about their times.
 //! - Files of force curves hold the image on which the curves were placed; it is read.
 
-use crate::ChannelInfo;
 use crate::clock;
 use crate::cursor::{Cursor, Endian};
 use crate::error::ReadError;
 use crate::raster::{self, Encoding, Order};
-use crate::scan::{Channel, DateTime, FrameDirection, LineDirection, Scan, Span};
+use crate::scan::{Channel, ChannelInfo, DateTime, FrameDirection, LineDirection, Scan, Span};
 use crate::tiff_tags::{Directory, directories};
 use crate::whole::Extent;
 
@@ -33,10 +32,7 @@ const VERSION_2: f64 = 0x0100_0002 as f64;
 const NM_PER_MICROMETRE: f64 = 1e3;
 
 fn damaged(reason: impl Into<String>) -> ReadError {
-    ReadError::Damaged {
-        format: FORMAT,
-        reason: reason.into(),
-    }
+    ReadError::damaged(FORMAT, reason)
 }
 
 /// The structure of the tag [`HEADER`].

@@ -15,13 +15,12 @@
 //!
 //! Kinds of objects: Gwyddion's `rhk-sm4.c` and spym's `_sm4.py`.
 
-use crate::ChannelInfo;
 use crate::clock;
 use crate::cursor::{Cursor, Endian};
 use crate::error::ReadError;
 use crate::missing::blank_unfilled;
 use crate::raster::{self, Encoding, Order};
-use crate::scan::{Channel, DateTime, FrameDirection, LineDirection, Scan, Span};
+use crate::scan::{Channel, ChannelInfo, DateTime, FrameDirection, LineDirection, Scan, Span};
 use crate::units::{clean, nm_per};
 use crate::whole::{Extent, MOST_CHANNELS};
 
@@ -55,10 +54,7 @@ const TOLD: [(usize, &str); 5] = [
 const MOST_TEXTS: usize = 64;
 
 fn damaged(reason: impl Into<String>) -> ReadError {
-    ReadError::Damaged {
-        format: FORMAT,
-        reason: reason.into(),
-    }
+    ReadError::damaged(FORMAT, reason)
 }
 
 /// Reads the channels that are wanted.

@@ -214,6 +214,19 @@ impl Channel {
     }
 }
 
+/// What is known of a channel before its samples are decoded.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ChannelInfo {
+    /// The name the user sees, as in `TR Phase`.
+    pub name: String,
+    /// The instrument's own name, as in `TRPhase`; empty where there is none.
+    pub internal_name: String,
+    /// Trace or retrace, where the file tells.
+    pub line_direction: Option<LineDirection>,
+    /// `Main`, `Interleave` and the like, where the file tells.
+    pub scan_line: Option<String>,
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

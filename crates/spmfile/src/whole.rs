@@ -112,6 +112,23 @@ pub(crate) fn all_missing(scan: &Scan) -> bool {
     !scan.channels.is_empty() && scan.channels.iter().all(|c| missing(&c.samples))
 }
 
+/// Leaves out what cannot be true, and refuses images without a sample.
+pub(crate) fn checked(scan: Result<Scan, ReadError>) -> Result<Scan, ReadError> {
+    let mut scan = scan.map_err(|mut error| {
+        if let ReadError::Incomplete { readable, .. } = &mut error {
+            tidy(readable);
+        }
+        error
+    })?;
+    tidy(&mut scan);
+    if all_missing(&scan) {
+        return Err(ReadError::AllMissing {
+            channels: scan.channels.len(),
+        });
+    }
+    Ok(scan)
+}
+
 /// Leaves out what cannot be a length, a time, a rate or a scale, as damaged headers hold it.
 pub(crate) fn tidy(scan: &mut Scan) {
     // Lengths in nm, rates in Hz, times in s; beyond, arithmetic fails.

@@ -15,12 +15,13 @@
 
 use memchr::memmem;
 
-use crate::ChannelInfo;
 use crate::clock;
 use crate::cursor::Endian;
 use crate::error::ReadError;
 use crate::raster::{self, Encoding, Order};
-use crate::scan::{Channel, DateTime, FrameDirection, LineDirection, Samples, Scan, Span};
+use crate::scan::{
+    Channel, ChannelInfo, DateTime, FrameDirection, LineDirection, Samples, Scan, Span,
+};
 use crate::units::{self, quantity};
 use crate::whole::Extent;
 
@@ -28,10 +29,7 @@ const FORMAT: &str = "WSxM";
 const END: &[u8] = b"[Header end]";
 
 fn damaged(reason: impl Into<String>) -> ReadError {
-    ReadError::Damaged {
-        format: FORMAT,
-        reason: reason.into(),
-    }
+    ReadError::damaged(FORMAT, reason)
 }
 
 /// Reads the channel if it is wanted.

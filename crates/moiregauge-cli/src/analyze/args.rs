@@ -318,7 +318,7 @@ impl AnalyzeArgs {
     /// The folder for results, that of a repetition where none is given.
     pub(crate) fn results_folder(&self) -> PathBuf {
         let document = self.replay.as_ref().filter(|_| self.out.is_none());
-        document.map_or_else(|| self.out().to_owned(), |d| super::out_beside(d))
+        document.map_or_else(|| self.out().to_owned(), |d| super::again::out_beside(d))
     }
 
     /// Whether an earlier run is to be repeated.

@@ -1,14 +1,13 @@
 //! Another channel, where the usual one shows no lattice in any scan.
 
-use std::cell::RefCell;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use moiregauge::caveat::{Caveat, ChannelReason, FileDoubt};
 use moiregauge::scan::{MeasureError, channels_by_preference};
 use moiregauge::settings::Settings;
-use spmfile::{ChannelInfo, ReadError};
+use moiregauge_pipeline::Known;
 
-use crate::input::Known;
+use crate::reading::Opened;
 
 /// A channel to try instead, as settings that name it.
 pub(super) struct Other {
@@ -29,31 +28,25 @@ impl Other {
 }
 
 /// The other channels of the scans, best first, where the user named none, no scan could be measured, and the
-/// images are to blame.
-pub(super) fn another<T>(
+/// images are to blame; none otherwise.
+pub(super) fn others<T>(
     inputs: &[PathBuf],
     measured: &[anyhow::Result<T>],
     (settings, known): (&Settings, &Known),
-) -> Option<Vec<Other>> {
+) -> Vec<Other> {
     let no_lattice = |result: &anyhow::Result<T>| {
-        let error = result.as_ref().err()?.downcast_ref()?;
-        matches!(error, MeasureError::Lattice { .. }).then_some(())
+        let error = result.as_ref().err().and_then(|e| e.downcast_ref());
+        matches!(error, Some(MeasureError::Lattice { .. }))
     };
     if settings.channel.is_some() || measured.iter().any(Result::is_ok) {
-        return None;
+        return Vec::new();
     }
-    let first = measured.iter().position(|r| no_lattice(r).is_some())?;
-    let path = inputs.get(first)?;
-    let names = names(
-        path,
-        &moiregauge_pipeline::read(known.place(path)).ok()?,
-        known,
-    )
-    .ok()?;
-    let names: Vec<_> = names
-        .iter()
-        .map(|(a, b)| (a.as_str(), b.as_str()))
-        .collect();
+    let mut both = inputs.iter().zip(measured);
+    let first = both.find(|(_, result)| no_lattice(result));
+    let Some(opened) = first.and_then(|(path, _)| Opened::new(path, known).ok()) else {
+        return Vec::new();
+    };
+    let names = opened.names();
     let all = channels_by_preference(&names);
     let others = (1..all.len()).map(|i| Other {
         settings: Settings {
@@ -62,34 +55,5 @@ pub(super) fn another<T>(
         },
         tried: all[..i].iter().map(|&name| name.to_owned()).collect(),
     });
-    Some(others.collect())
-}
-
-/// The same for a file on disk; `None` where it cannot be read.
-pub(crate) fn channel_names(path: &Path, known: &Known) -> Option<Vec<(String, String)>> {
-    names(
-        path,
-        &moiregauge_pipeline::read(known.place(path)).ok()?,
-        known,
-    )
-    .ok()
-}
-
-/// The names of the channels of a file, the user's and the instrument's own, without those that the user
-/// calls position sensors.
-pub(super) fn names(
-    path: &Path,
-    bytes: &[u8],
-    known: &Known,
-) -> Result<Vec<(String, String)>, ReadError> {
-    let channels = RefCell::new(Vec::new());
-    known.decode(path, bytes, &|channel: &ChannelInfo| {
-        channels
-            .borrow_mut()
-            .push((channel.name.clone(), channel.internal_name.clone()));
-        false
-    })?;
-    let mut channels = channels.into_inner();
-    channels.retain(|(name, internal)| !known.names_sensor(name, internal));
-    Ok(channels)
+    others.collect()
 }

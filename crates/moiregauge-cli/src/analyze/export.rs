@@ -6,15 +6,15 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context as _, ensure};
 use moiregauge::campaign::{Analysis, ScanAnalysis};
 use moiregauge::survey::corrected_images;
+use moiregauge_pipeline::Known;
 use moiregauge_pipeline::sink::FolderSink;
 use moiregauge_report::FailedInput;
 use rayon::prelude::*;
 use spmfile::{LineDirection, WritableFormat};
 
-use super::chain;
 use crate::convert::format_of;
-use crate::input::Known;
 use crate::outputs::write_all;
+use crate::reading::read_again;
 
 /// A folder of corrected images and their format.
 #[derive(Clone, Debug)]
@@ -105,8 +105,8 @@ fn one(
     (inputs, known): (&[PathBuf], &Known),
 ) -> anyhow::Result<()> {
     let settings = &analysis.settings;
-    let reading = chain::read_again(inputs, &analysed.file, settings, known)?;
-    let images = corrected_images(&reading.scan, analysed, settings);
+    let scan = read_again(inputs, &analysed.file, settings, known)?;
+    let images = corrected_images(&scan, analysed, settings);
     ensure!(!images.is_empty(), "no image could be corrected");
     for image in images {
         let line = match image.line {

@@ -5,9 +5,10 @@ use std::fmt::Write as _;
 use heterostrain::Estimate;
 use moiregauge::calibration::{Coordinates, KnownLattice};
 use moiregauge::campaign::{Calibrated, CalibratedSet};
+use moiregauge_report::screen::caveats;
 use moiregauge_report::{plus_minus, two_digits};
 
-use crate::analyze::caveat_lines;
+use crate::hints;
 
 /// The sets, the calibration, and what to keep in mind.
 pub(super) fn summary(found: &Calibrated, lattice: &KnownLattice) -> String {
@@ -88,7 +89,7 @@ pub(super) fn summary(found: &Calibrated, lattice: &KnownLattice) -> String {
         plus_minus(along(1.0)),
         plus_minus(along(-1.0))
     );
-    caveat_lines(&mut text, &found.caveats);
+    caveats(&mut text, &found.caveats, hints::of);
     text
 }
 

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::{ChannelInfo, FileInfo, Sample, ScanInfo};
+use super::about::{ChannelInfo, FileInfo, Sample, ScanInfo};
 
 /// The readable form of one file.
 pub(super) fn table(info: &FileInfo) -> String {

@@ -2,7 +2,8 @@
 
 use clap::ValueEnum;
 use moiregauge::caveat::{Caveat, PatternDoubt};
-use moiregauge::domains::{Contrast, DomainMap, Regime, RegimeChoice, regime};
+use moiregauge::domains::regime;
+use moiregauge::domains::{Contrast, DomainMap, Regime, RegimeChoice};
 use moiregauge::map::TwistStrainMap;
 
 /// Domain structure at small angles.
@@ -79,16 +80,7 @@ impl DomainArgs {
         }
         match &best {
             None => doubt(PatternDoubt::NoDomains),
-            Some(d) => {
-                if !d.contrast_is_clear && self.nodes.is_none() {
-                    doubt(PatternDoubt::NodesBrightOrDark);
-                }
-                let odd = d.missing.len() + d.extra.len();
-                if odd as f64 > ODD * d.nodes.len() as f64 {
-                    let nodes = d.nodes.len();
-                    doubt(PatternDoubt::MeshWithGaps { odd, nodes });
-                }
-            }
+            Some(d) => about_mesh(d, self.nodes.is_none(), &mut doubt),
         }
         if regime.choice == RegimeChoice::Domains {
             let reasons = regime.reasons.join("; ");
@@ -104,6 +96,19 @@ impl DomainArgs {
     }
 }
 
+/// What is doubtful about a mesh of nodes; `is_open` where nobody said whether nodes are bright or dark.
+fn about_mesh(d: &DomainMap, is_open: bool, doubt: &mut impl FnMut(PatternDoubt)) {
+    if !d.contrast_is_clear && is_open {
+        doubt(PatternDoubt::NodesBrightOrDark);
+    }
+    let odd = d.missing.len() + d.extra.len();
+    if odd as f64 > ODD * d.nodes.len() as f64 {
+        let nodes = d.nodes.len();
+        doubt(PatternDoubt::MeshWithGaps { odd, nodes });
+    }
+}
+
+/// Says that phases are not to be believed here without more.
 fn in_doubt(regime: &Regime) -> Caveat {
     let reasons = regime.reasons.join("; ");
     Caveat::new(PatternDoubt::PhasesInDoubt { reasons }, "map")

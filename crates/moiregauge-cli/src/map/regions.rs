@@ -6,7 +6,7 @@ use anyhow::ensure;
 use moiregauge::caveat::{Caveat, MapDoubt};
 use moiregauge::map::TwistStrainMap;
 use moiregauge::region::{
-    DeviceSearch, Profile, Region, RegionStatistics, WantedArea, WantedTwist, uniform_areas,
+    Device, DeviceSearch, Profile, Region, RegionStatistics, WantedArea, WantedTwist, uniform_areas,
 };
 use moiregauge_report::results::{MapDetailsResult, RegionMeanResult};
 use moiregauge_report::{MapDetails, plus_minus, two_digits};
@@ -89,37 +89,8 @@ impl RegionArgs {
             .iter()
             .map(|r| RegionStatistics::new(map, r))
             .collect();
-        for found in &regions {
-            let name = found.region.name.as_str();
-            if found.good == 0 {
-                doubts.push(Caveat::new(MapDoubt::RegionEmpty, name));
-            } else if found.covered < 0.95 || found.masked_share > 0.05 {
-                doubts.push(Caveat::new(
-                    MapDoubt::RegionInPart {
-                        covered: found.covered,
-                        masked: found.masked_share,
-                    },
-                    name,
-                ));
-            }
-        }
-        let devices = self.device.map(|size| {
-            let search = DeviceSearch {
-                orientations: usize::from(self.device_angles),
-                most: usize::from(self.device_count),
-                ..DeviceSearch::new(size)
-            };
-            let [w, h] = size.map(two_digits);
-            let place = format!("device {w} nm × {h} nm");
-            if size[0].min(size[1]) < 2.355 * map.window_nm {
-                doubts.push(Caveat::new(MapDoubt::DeviceBelowResolution, place.as_str()));
-            }
-            let found = uniform_areas(map, &search);
-            if found.is_empty() {
-                doubts.push(Caveat::new(MapDoubt::DeviceFitsNowhere, place));
-            }
-            found
-        });
+        doubts.extend(regions.iter().filter_map(about_region));
+        let devices = self.device.map(|size| self.devices(map, size, &mut doubts));
         let wanted = self
             .wanted
             .map(|w| (w, WantedArea::new(map, 0..map.grid.len(), &w)));
@@ -138,6 +109,44 @@ impl RegionArgs {
         };
         Ok((details, doubts))
     }
+
+    /// The most uniform areas of a size.
+    fn devices(
+        &self,
+        map: &TwistStrainMap,
+        size: [f64; 2],
+        doubts: &mut Vec<Caveat>,
+    ) -> Vec<Device> {
+        let search = DeviceSearch {
+            orientations: usize::from(self.device_angles),
+            most: usize::from(self.device_count),
+            ..DeviceSearch::new(size)
+        };
+        let [w, h] = size.map(two_digits);
+        let place = format!("device {w} nm × {h} nm");
+        if size[0].min(size[1]) < 2.355 * map.window_nm {
+            doubts.push(Caveat::new(MapDoubt::DeviceBelowResolution, place.as_str()));
+        }
+        let found = uniform_areas(map, &search);
+        if found.is_empty() {
+            doubts.push(Caveat::new(MapDoubt::DeviceFitsNowhere, place));
+        }
+        found
+    }
+}
+
+/// Says where a region is not as it was asked for.
+fn about_region(found: &RegionStatistics) -> Option<Caveat> {
+    let name = found.region.name.as_str();
+    if found.good == 0 {
+        return Some(Caveat::new(MapDoubt::RegionEmpty, name));
+    }
+    let in_part = found.covered < 0.95 || found.masked_share > 0.05;
+    let doubt = MapDoubt::RegionInPart {
+        covered: found.covered,
+        masked: found.masked_share,
+    };
+    in_part.then(|| Caveat::new(doubt, name))
 }
 
 /// An error if none of the places, nor anything between them, can lie in the map.

@@ -1,307 +1,117 @@
-//! Surveys: images too large for memory, mapped band by band. Finished bands are kept beside the results until the map
-//! is complete, so that an interrupted run goes on where it stopped; one that is damaged is made again.
+//! Surveys: large images, each mapped in bands, side by side in one map.
 
-use std::path::Path;
+use std::path::PathBuf;
 
 use anyhow::{Context as _, ensure};
-use indicatif::{ProgressBar, ProgressStyle};
-use moiregauge::caveat::{Caveat, FileDoubt};
-use moiregauge::domains::{Contrast, DomainMap};
-use moiregauge::frame::{Geometry, Image, Timing, remove_background};
+use moiregauge::campaign::about_repeat;
+use moiregauge::caveat::{Caveat, MapDoubt, SurveyDrift};
 use moiregauge::map::TwistStrainMap;
-use moiregauge::scan::{Picture, choose_channel};
-use moiregauge::settings::Settings;
-use moiregauge::survey::{SurveyPlan, nominal_geometry};
-use moiregauge::window::{Mask, Resolution};
-use moiregauge_pipeline::identity;
-use moiregauge_pipeline::sink::{FolderSink, Part, build};
-use moiregauge_report::InputFile;
-use nalgebra::{Matrix2, Vector2};
-use sha2::{Digest as _, Sha256};
-use spmfile::{Channel, LineDirection, Scan};
+use moiregauge::survey::SurveyPlan;
+use moiregauge_pipeline::distinct;
+use moiregauge_pipeline::sink::FolderSink;
+use moiregauge_report::Provenance;
 
-use super::source::{Array, Source};
-use crate::input::{Known, with_option};
+use super::args::MapArgs;
+use super::large::Large;
+use super::made::{Made, image};
+use crate::analyze::{Task, given_again};
 
-/// Images with more pixels than this are mapped in bands.
-const LARGE: usize = 4096 * 4096 * 5 / 4;
-
-/// A large image that can be mapped.
-pub(super) struct Large {
-    pub(super) input: InputFile,
-    /// What the user's options replaced in it, and what its reader doubts.
-    pub(super) caveats: Vec<Caveat>,
-    geometry: Geometry,
-    /// Name and unit of the channel.
-    channel: String,
-    unit: String,
-    /// Where the file tells its line rate and frame direction.
-    pub(super) timing: Option<Timing>,
-    source: Source,
-}
-
-impl Large {
-    /// Opens a file if its image is large, or `always`; `None` for one that is read as a whole.
-    pub(super) fn open(
-        path: &Path,
-        settings: &Settings,
-        known: &Known,
-        always: bool,
-    ) -> anyhow::Result<Option<Self>> {
-        let large = if always { 0 } else { LARGE };
-        let place = known.place(path);
-        if let Some(array) = Array::open(place) {
-            if array.size[0] * array.size[1] < large {
-                return Ok(None);
-            }
-            no_sensors(known)?;
-            return Self::of_array(path, array, known).map(Some);
-        }
-        // Other files are read as a whole anyway; small ones go the common way.
-        if std::fs::metadata(place)?.len() < large as u64 {
-            return Ok(None);
-        }
-        let reading = crate::analyze::read_any(path, settings, known)?;
-        let names: Vec<(&str, &str)> = reading
-            .scan
-            .channels
-            .iter()
-            .map(|c| (c.name.as_str(), c.internal_name.as_str()))
-            .collect();
-        let chosen = choose_channel(&names, settings.channel.as_deref()).map(str::to_owned);
-        let channel = reading
-            .scan
-            .channels
-            .iter()
-            .find(|c| Some(&c.name) == chosen.as_ref());
-        let Some(channel) = channel.filter(|c| c.rows * c.columns >= large) else {
+/// Maps images that are too large for memory, side by side; `None` where the first is not large.
+pub(super) fn survey(
+    args: &MapArgs,
+    task: &Task,
+    sink: &FolderSink,
+) -> anyhow::Result<Option<Made>> {
+    let (settings, known, resolution) = (&task.run.settings, &task.known, &args.resolution());
+    let open = |path: &PathBuf, always: bool| {
+        Large::open(path, settings, known, always).with_context(|| path.display().to_string())
+    };
+    // One large image makes a survey of all. It is opened once.
+    let mut opened = if args.in_bands {
+        None
+    } else {
+        let large = |path| Some((path, open(path, false).transpose()?));
+        let Some((path, large)) = task.inputs.iter().find_map(large) else {
             return Ok(None);
         };
-        no_sensors(known)?;
-        let geometry =
-            nominal_geometry(&reading.scan, channel).context("the file gives no scan size")?;
-        Ok(Some(Self {
-            input: identity(path, place)?,
-            caveats: reading.caveats,
-            geometry,
-            channel: channel.name.clone(),
-            unit: channel.unit.clone(),
-            timing: timing(&reading.scan, channel),
-            source: Source::Memory(channel.clone()),
-        }))
-    }
-
-    /// An array, of which no more than two lines are read here.
-    fn of_array(path: &Path, array: Array, known: &Known) -> anyhow::Result<Self> {
-        // They tell what is known of the whole: scale, rotation and size; and of the block that is wanted of it.
-        let mut scan = known.decode(path, &array.part(&(0..array.size[0].min(2)))?, &|_| true)?;
-        for channel in &mut scan.channels {
-            channel.rows = array.size[0];
-        }
-        let replaced = known.tell(path, &mut scan);
-        let block = known.cut(&mut scan).map_err(with_option)?;
-        let input = identity(path, known.place(path))?;
-        let channel = scan.channels.first().context("the array holds no image")?;
-        let caveat = |words| Caveat::new(FileDoubt::GivenByUser(words), input.file.as_str());
-        Ok(Self {
-            caveats: replaced.into_iter().map(caveat).collect(),
-            geometry: nominal_geometry(&scan, channel)
-                .context("the array has no size; give it with --size")?,
-            timing: timing(&scan, channel),
-            channel: channel.name.clone(),
-            unit: channel.unit.clone(),
-            source: Source::Array(array.with_block(block)),
-            input,
-        })
-    }
-
-    /// Maps band by band, as `first` of the same survey was. Finished bands are kept until all is written, and those of
-    /// an earlier run of the same program are taken.
-    pub(super) fn map(
-        &self,
-        (settings, resolution): (&Settings, &Resolution),
-        first: Option<&SurveyPlan>,
-        sink: &FolderSink,
-        loud: bool,
-    ) -> anyhow::Result<(TwistStrainMap, SurveyPlan)> {
-        let read = |block| self.source.block(block);
-        let place = (&self.geometry, self.timing.as_ref());
-        let plan = SurveyPlan::new(place, (settings, resolution), first, &read)?;
-        let key = key(self, settings, resolution, &plan)?;
-        let progress = progress(plan.bands(), loud);
-        let mut whole: Option<TwistStrainMap> = None;
-        for band in 0..plan.bands() {
-            let name = format!("{key}-{band:04}");
-            let kept = match sink.kept(&name) {
-                Part::Whole(bytes) => decoded(&bytes, &plan),
-                Part::Absent => None,
-                Part::Damaged => {
-                    eprintln!(
-                        "band {} was damaged on the disk and is mapped again",
-                        band + 1
-                    );
-                    None
-                }
-            };
-            let map = if let Some(kept) = kept {
-                kept
-            } else {
-                let mut map = plan.band(band, &read)?;
-                sink.keep(&name, &encoded(&mut map))?;
-                map
-            };
-            let all = whole.get_or_insert_with(|| plan.start(&map.grid));
-            all.append(map);
-            progress.inc(1);
-        }
-        progress.finish_and_clear();
-        let whole = whole.context("the image has no lines")?;
-        Ok((whole, plan))
-    }
-}
-
-impl Large {
-    /// Nodes and triangles of the image; none where its lines cannot be read.
-    pub(super) fn domains(&self, plan: &SurveyPlan, contrast: Contrast) -> Option<DomainMap> {
-        let read = |block| self.source.block(block);
-        plan.domains(&read, contrast).ok().flatten()
-    }
-}
-
-/// Pixels along the longer side of a picture of a survey, at most.
-const SHOWN: usize = 1024;
-
-impl Large {
-    /// The image in little, to be shown: one line of every block of lines. `None` where its lines cannot be read.
-    pub(super) fn picture(&self, settings: &Settings) -> Option<Picture> {
-        let [columns, rows] = self.geometry.size;
-        let block = columns.max(rows).div_ceil(SHOWN).max(1);
-        let mut values = Vec::new();
-        for row in 0..rows / block {
-            let row = row * block + block / 2;
-            let line = self.source.block([0..columns, row..row + 1]).ok()?;
-            values.extend(line.values.chunks_exact(block).map(|pixels| {
-                let there: Vec<f64> = pixels.iter().copied().filter(|v| v.is_finite()).collect();
-                there.iter().sum::<f64>() / there.len() as f64
-            }));
-        }
-        let image = Image::new(rows / block, columns / block, values);
-        let geometry = &self.geometry;
-        let middle = Vector2::repeat((block - 1) as f64 / 2.0);
-        Some(Picture {
-            file: self.input.file.clone(),
-            channel: self.channel.clone(),
-            unit: self.unit.clone(),
-            image: remove_background(&image, settings.background),
-            pixel_to_nm: geometry.pixel_to_nm * block as f64,
-            origin: geometry.origin + geometry.pixel_to_nm * middle,
-            from_sensors: false,
-        })
-    }
-}
-
-fn timing(scan: &Scan, channel: &Channel) -> Option<Timing> {
-    let line = channel.line_direction.unwrap_or(LineDirection::Trace);
-    Timing::of_scan(scan, channel.columns, scan.frame_direction?, line)
-}
-
-/// Refuses position sensors, which have no use here.
-fn no_sensors(known: &Known) -> anyhow::Result<()> {
-    let told = known.told();
-    ensure!(
-        told.sensors.is_none() && told.x_sensor.is_none(),
-        "--sensors, --x-sensor and --y-sensor: an image that is mapped in bands has nominal positions, and position \
-         sensors are not used"
-    );
-    Ok(())
-}
-
-/// What a band depends on: input, settings, resolution, geometry and times of the image, the first image of the survey
-/// (window and labelling), and the program to its last bit.
-fn key(
-    large: &Large,
-    settings: &Settings,
-    resolution: &Resolution,
-    plan: &SurveyPlan,
-) -> anyhow::Result<String> {
-    let mut hash = Sha256::new();
-    hash.update(&large.input.sha256);
-    hash.update(format!("{:?} {:?}", large.geometry, large.timing));
-    hash.update(format!("{} {}", plan.window_nm, plan.whole));
-    hash.update(serde_json::to_vec(settings)?);
-    let build = build().context("the program cannot read itself: bands cannot be kept")?;
-    hash.update(format!("{resolution:?} {build}"));
-    Ok(crate::analyze::hexadecimal(&hash.finalize())[..16].to_owned())
-}
-
-/// Numbers of a band's head: columns, rows, origin, steps.
-const HEAD: usize = 8;
-
-/// A band as bytes: head in double precision, masks, then all planes in single precision, little endian.
-fn encoded(map: &mut TwistStrainMap) -> Vec<u8> {
-    let grid = map.grid;
-    let head: [f64; HEAD] = [
-        grid.size[0] as f64,
-        grid.size[1] as f64,
-        grid.origin.x,
-        grid.origin.y,
-        grid.step.m11,
-        grid.step.m21,
-        grid.step.m12,
-        grid.step.m22,
-    ];
-    let mut bytes: Vec<u8> = head.iter().flat_map(|v| v.to_le_bytes()).collect();
-    bytes.extend(map.mask.iter().map(|m| *m as u8));
-    for plane in map.planes_mut() {
-        bytes.extend(plane.iter().flat_map(|v| v.to_le_bytes()));
-    }
-    bytes
-}
-
-/// The band; `None` if it is none.
-fn decoded(bytes: &[u8], plan: &SurveyPlan) -> Option<TwistStrainMap> {
-    let (head, rest) = bytes.split_at_checked(8 * HEAD)?;
-    let head: Vec<f64> = head
-        .as_chunks::<8>()
-        .0
-        .iter()
-        .map(|b| f64::from_le_bytes(*b))
-        .collect();
-    let size = [head[0] as usize, head[1] as usize];
-    let nodes = size[0].checked_mul(size[1])?;
-    let grid = moiregauge::map::Grid {
-        size,
-        origin: Vector2::new(head[2], head[3]),
-        step: Matrix2::new(head[4], head[6], head[5], head[7]),
+        Some((path, large?))
     };
-    let mut map = plan.start(&grid);
-    map.grid = grid;
-    let (masks, mut rest) = rest.split_at_checked(nodes)?;
-    map.mask = masks
-        .iter()
-        .map(|m| Mask::ALL.get(usize::from(*m)).copied())
-        .collect::<Option<_>>()?;
-    for plane in map.planes_mut() {
-        let (values, after) = rest.split_at_checked(4 * nodes)?;
-        *plane = values
-            .as_chunks::<4>()
-            .0
-            .iter()
-            .map(|b| f32::from_le_bytes(*b))
-            .collect();
-        rest = after;
+    ensure!(
+        args.analyze.sets()?.is_empty(),
+        "--set: images that are mapped in bands lie side by side in one map and make no sets"
+    );
+    let loud = args.analyze.is_loud();
+    let (inputs, again) = distinct(&task.inputs);
+    let (mut maps, mut images, mut caveats) = (Vec::new(), Vec::new(), given_again(&again));
+    let (mut read, mut plans) = (Vec::new(), Vec::<(Large, SurveyPlan)>::new());
+    for path in &inputs {
+        let large = match opened.take_if(|(large, _)| *large == path) {
+            Some((_, large)) => large,
+            None => open(path, true)?.context("no image")?,
+        };
+        let same = |(known, _): &&(Large, _)| known.input.sha256 == large.input.sha256;
+        if let Some((known, _)) = plans.iter().find(same) {
+            caveats.push(about_repeat(&large.input.file, &known.input.file));
+            continue;
+        }
+        let (map, plan) = large
+            .map(
+                (settings, resolution),
+                plans.first().map(|p| &p.1),
+                sink,
+                loud,
+            )
+            .with_context(|| path.display().to_string())?;
+        let file = large.input.file.clone();
+        caveats.extend(large.caveats.iter().cloned());
+        caveats.extend(plan.caveats.iter().cloned());
+        caveats.push(in_bands(
+            &file,
+            plan.drift_corrected,
+            settings.drift.is_some(),
+        ));
+        images.push(image(&file, None, plan.drift_corrected, &plan.harmonics));
+        maps.push(map);
+        read.push(large.input.clone());
+        plans.push((large, plan));
     }
-    rest.is_empty().then_some(map)
+    let map = TwistStrainMap::side_by_side(maps).context("no image")?;
+    let look = |contrast| {
+        let found = plans
+            .iter()
+            .filter_map(|(large, plan)| large.domains(plan, contrast));
+        found.collect()
+    };
+    let domains = args.domains.answer(&map, look);
+    caveats.extend(domains.caveats.iter().cloned());
+    Ok(Some(Made {
+        caveats,
+        provenance: Provenance {
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            seed: settings.seed,
+            inputs: read,
+            failed: task.run.left_out.clone(),
+            run: None,
+        },
+        settings: settings.clone(),
+        picture: plans.first().and_then(|(large, _)| large.picture(settings)),
+        images,
+        map,
+        whole: None,
+        agreement: None,
+        drift_change: None,
+        domains,
+    }))
 }
 
-fn progress(bands: usize, loud: bool) -> ProgressBar {
-    if !loud {
-        return ProgressBar::hidden();
-    }
-    let style = ProgressStyle::with_template("mapping {bar:30} {pos}/{len} bands, {eta} left");
-    let bar = ProgressBar::new(bands as u64);
-    match style {
-        Ok(style) => bar.with_style(style),
-        Err(_) => bar,
-    }
+/// Says how an image was mapped.
+fn in_bands(file: &str, corrected: bool, given: bool) -> Caveat {
+    let drift = if corrected {
+        SurveyDrift::Corrected
+    } else if given {
+        SurveyDrift::NoTiming
+    } else {
+        SurveyDrift::Unknown
+    };
+    Caveat::new(MapDoubt::Survey { drift }, file)
 }

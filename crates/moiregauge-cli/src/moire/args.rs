@@ -11,7 +11,7 @@ use heterostrain::strain::{Orientation, Stacking};
 use moiregauge::settings::{Calibration, Settings};
 use nalgebra::Matrix2;
 
-use super::Question;
+use super::question::Question;
 use crate::analyze::{Angle, ConventionArg, DirectionArg, SenseArg, parse_angle};
 use crate::config;
 use crate::numbers;

@@ -5,7 +5,7 @@ use moiregauge::settings::Settings;
 use moiregauge::simulate::Simulation;
 use rayon::prelude::*;
 
-use super::Wishes;
+use super::wishes::Wishes;
 
 /// Frame sizes, as multiples of that of the conditions.
 const SIZES: [f64; 5] = [0.7, 1.0, 1.4, 2.0, 2.8];

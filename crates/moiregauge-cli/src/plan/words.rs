@@ -8,8 +8,8 @@ use moiregauge::settings::Settings;
 use moiregauge::simulate::Simulation;
 use moiregauge_report::two_digits;
 
-use super::Wishes;
 use super::search::{Plan, beyond};
+use super::wishes::Wishes;
 
 /// Plans that are shown.
 const SHOWN: usize = 8;

@@ -11,8 +11,8 @@ use moiregauge::simulate::{Drift, FirstDirection, Noise, Raster, Sample, Simulat
 use spmfile::FrameDirection;
 
 use crate::analyze::measure_file;
-use crate::info::expand;
 use crate::input::Known;
+use crate::paths::expand;
 
 /// Contrast of the simulated image, degrees of phase; the noise is scaled along.
 const CONTRAST: f64 = 1.0;

@@ -1,4 +1,6 @@
-//! What caveats mean: `moiregauge explain`.
+//! What caveats mean: `moiregauge explain`, its page, and that there are no others.
+
+use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
@@ -6,6 +8,10 @@ use crate::common::{program, run, succeed};
 
 fn explain(options: &[&str]) -> String {
     succeed(program().arg("explain").args(options)).stdout
+}
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
 }
 
 fn entries(options: &[&str]) -> Vec<Value> {
@@ -48,7 +54,8 @@ fn one_or_all_are_told_to_programs() {
     let one = entries(&["sensor-lag", "--json"]);
     assert_eq!(one.len(), 1);
     assert_eq!(one[0]["severity"], "note");
-    let keys: Vec<&String> = one[0].as_object().unwrap().keys().collect();
+    let mut keys: Vec<&String> = one[0].as_object().unwrap().keys().collect();
+    keys.sort();
     assert_eq!(keys, ["code", "meaning", "severity", "what_to_do"]);
     let all = entries(&["--json"]);
     assert!(all.contains(&one[0]) && all.len() > 50);
@@ -65,4 +72,51 @@ fn an_unknown_code_is_refused_with_the_nearest_ones() {
         "{}",
         refused.stderr
     );
+}
+
+/// `moiregauge explain --markdown > docs/caveats.md` makes it anew.
+#[test]
+fn the_page_of_the_documentation_is_up_to_date() {
+    let page = std::fs::read_to_string(root().join("docs/caveats.md")).expect("the page");
+    assert!(page.replace("\r\n", "\n") == explain(&["--markdown"]));
+}
+
+/// Codes stand in the table, and nowhere else: what a program steers by are the doubts themselves. The options that help
+/// are found by code.
+#[test]
+fn codes_stand_in_the_table_alone() {
+    let mut files = Vec::new();
+    for part in [
+        "moiregauge",
+        "moiregauge-report",
+        "moiregauge-pipeline",
+        "moiregauge-cli",
+    ] {
+        sources(&root().join("crates").join(part).join("src"), &mut files);
+    }
+    assert!(files.len() > 100, "{}", files.len());
+    let codes = codes();
+    for file in files {
+        if file.ends_with("hints.rs") || file.parent().is_some_and(|p| p.ends_with("caveat")) {
+            continue;
+        }
+        let text = std::fs::read_to_string(&file).expect("a source");
+        let text = text.split("#[cfg(test)]").next().unwrap_or_default();
+        // Single words are codes as well as other things.
+        for code in codes.iter().filter(|code| code.contains('-')) {
+            let quoted = format!("\"{code}\"");
+            assert!(!text.contains(&quoted), "{}: {code}", file.display());
+        }
+    }
+}
+
+fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
+    for entry in std::fs::read_dir(folder).expect("a folder") {
+        let path = entry.expect("an entry").path();
+        if path.is_dir() {
+            sources(&path, found);
+        } else if path.extension().is_some_and(|e| e == "rs") {
+            found.push(path);
+        }
+    }
 }

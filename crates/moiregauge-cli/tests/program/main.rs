@@ -8,6 +8,7 @@ mod figures;
 mod formats;
 mod identity;
 mod inputs;
+mod interrupted;
 mod layers;
 mod maps;
 mod names;
@@ -30,5 +31,5 @@ mod stripes;
 mod surveys;
 mod validation;
 /// Made-up sessions of Omicron Matrix, as the tests of the reader have them.
-#[path = "../../../spmfile/src/matrix/tests/writer.rs"]
+#[path = "../../../spmfile/src/matrix/read/tests/writer.rs"]
 mod writer;

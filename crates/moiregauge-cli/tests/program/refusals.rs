@@ -129,7 +129,13 @@ fn one_direction_only() {
     }
     assert_eq!(caveats(&found), ["drift-undetermined"]);
     let message = found["caveats"][0]["message"].as_str().unwrap();
-    assert!(message.contains("--drift"), "{message}");
+    assert!(
+        message.contains("known from elsewhere can be given"),
+        "{message}"
+    );
+    // The document does not speak of options, the screen does.
+    assert!(!message.contains("--"), "{message}");
+    assert!(run.stdout.contains("  try --drift X Y\n"), "{}", run.stdout);
 }
 
 #[test]

@@ -79,16 +79,16 @@ fn pages_of_one_name() {
     let path = file(folder.path(), "pages.gwy", pages.to_vec());
     let out = folder.path().join("out");
     let measured = |options: &[&str]| {
-        succeed(analyze(&path, &out).arg("--force").args(options));
-        found(&results(&out))
+        let said = succeed(analyze(&path, &out).arg("--force").args(options)).stdout;
+        let (wavelength, words) = found(&results(&out));
+        let told = said.contains("  try --channel NAME or --image N\n");
+        assert_eq!(told, words.is_some(), "{said}");
+        (wavelength, words)
     };
     let (wavelength, words) = measured(&[]);
     assert!((wavelength - 13.0).abs() < 0.05, "{wavelength}");
     let words = words.expect("a caveat");
-    assert!(
-        words.contains("3 images of \"Phase\"") && words.contains("--image"),
-        "{words}"
-    );
+    assert!(words.contains("3 images of \"Phase\""), "{words}");
     for (page, expected) in [("1", 13.0), ("2", 10.0), ("3", 16.0)] {
         let (wavelength, words) = measured(&["--image", page]);
         assert!((wavelength - expected).abs() < 0.05, "{page}: {wavelength}");
@@ -127,12 +127,15 @@ fn pages_without_names() {
     std::fs::write(&path, bytes).unwrap();
     let out = folder.path().join("out");
     let measured = |options: &[&str]| {
-        succeed(
+        let ran = succeed(
             analyze(&path, &out)
                 .args(["--force", "--size", "100nm×100nm"])
                 .args(options),
         );
-        found(&results(&out))
+        let (wavelength, words) = found(&results(&out));
+        let told = ran.stdout.contains("  try --channel NAME or --image N\n");
+        assert_eq!(told, words.is_some(), "{}", ran.stdout);
+        (wavelength, words)
     };
     let (wavelength, words) = measured(&[]);
     assert!((wavelength - 13.0).abs() < 0.05, "{wavelength}");
@@ -141,7 +144,6 @@ fn pages_without_names() {
         words.contains("2 images (\"image 1\", \"image 2\")"),
         "{words}"
     );
-    assert!(words.contains("--channel"), "{words}");
     let (wavelength, words) = measured(&["--channel", "image 2"]);
     assert!((wavelength - 10.0).abs() < 0.05, "{wavelength}");
     assert_eq!(words, None);

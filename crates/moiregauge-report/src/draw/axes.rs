@@ -1,7 +1,8 @@
 //! A panel: a frame with ticks, titles and a letter, and the map from data to page.
 
+use super::letters::text_width;
 use super::scale::{Range, Scale, Tick, ticks, whole_ticks};
-use super::style::{BLACK, GREY, HAIR, LETTER, LINE, SMALL, TEXT, lettering, text_width};
+use super::style::{BLACK, GREY, HAIR, LETTER, LINE, SMALL, TEXT, lettering};
 use super::svg::{Anchor, Ink, Lettering, Rect, Svg};
 
 /// Data coordinates (x right, y up) of a rectangle on the page.

@@ -1,9 +1,10 @@
 //! A colour bar beside an image.
 
 use super::colormap::ColorMap;
+use super::letters::{fitted, text_width};
 use super::png::palette_png;
 use super::scale::{Range, Scale, ticks};
-use super::style::{BLACK, HAIR, SMALL, TEXT, fitted, lettering, text_width};
+use super::style::{BLACK, HAIR, SMALL, TEXT, lettering};
 use super::svg::{Anchor, Ink, Lettering, Rect, Svg};
 
 /// Draws the colours of `range` in `bar`, with numbers and a title at its right: what it is and its unit,

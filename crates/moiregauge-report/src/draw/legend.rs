@@ -1,6 +1,7 @@
 //! Legends: one line of keys above the panels, where they cover no data.
 
-use super::style::{BLACK, Marker, SMALL, fitted, lettering, marker, text_width};
+use super::letters::{fitted, text_width};
+use super::style::{BLACK, Marker, SMALL, VECTOR, VECTOR_MARKER, VECTOR_NAME, lettering, marker};
 use super::svg::{Anchor, Ink, Rect, Svg};
 
 /// How a key looks.
@@ -61,4 +62,12 @@ pub(crate) fn directions() -> [(Key<'static>, &'static str); 2] {
         (Key::Point(Marker::Circle, BLACK, true), "up"),
         (Key::Point(Marker::Circle, BLACK, false), "down"),
     ]
+}
+
+/// The keys of the three lattice vectors.
+pub(crate) fn vectors() -> impl Iterator<Item = (Key<'static>, &'static str)> {
+    (0..3).map(|v| {
+        let key = Key::Point(VECTOR_MARKER[v], VECTOR[v], true);
+        (key, VECTOR_NAME[v])
+    })
 }

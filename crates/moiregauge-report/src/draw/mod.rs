@@ -9,6 +9,7 @@ pub(crate) mod colorbar;
 pub(crate) mod colormap;
 pub(crate) mod contour;
 pub(crate) mod legend;
+pub(crate) mod letters;
 pub(crate) mod png;
 pub(crate) mod raster;
 pub(crate) mod scale;

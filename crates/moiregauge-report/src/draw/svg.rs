@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::style::{FONT, text_width};
+use super::letters::{FONT, text_width};
 
 /// Height above and depth below the baseline that the font reserves, em.
 const ASCENT: f64 = 0.93;

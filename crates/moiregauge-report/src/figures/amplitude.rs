@@ -2,50 +2,41 @@
 
 use moiregauge::frame::Image;
 
-use super::residuals::extent;
-use super::{Drawing, Subject, layout};
+use super::figure::Drawing;
+use super::layout;
+use super::picture::{self, IN_NM, Picture, extent};
+use super::subject::Subject;
 use crate::draw::axes::{Axes, Labels};
-use crate::draw::style::PAGE;
-use crate::draw::svg::{Rect, Svg};
-use crate::draw::{colorbar, raster};
-
-const SIDE: f64 = 162.0;
+use crate::draw::raster;
 
 pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
-    let shown = subject.set.illustration.as_ref();
-    let shown = shown.ok_or("no scan of this set could be shown in detail")?;
+    let shown = subject.illustration()?;
     let amplitude = shown.amplitude.as_ref();
     let amplitude = amplitude.ok_or("no amplitude was recorded beside the analysed channel")?;
     let (linear, origin) = (&shown.pixel_to_nm, shown.origin);
     let (x, y) =
         extent(&shown.image, linear, origin).ok_or("the frame of the scan is not finite")?;
-    let mut svg = Svg::new(subject.id, PAGE, 8.0 + layout::ABOVE + SIDE + layout::BELOW);
+    let mut svg = picture::page_of_two(subject.id);
     let both: [(&Image, &str, &str); 2] = [
         (&shown.image, &subject.set.channel, &shown.unit),
         (&amplitude.image, &amplitude.channel, &amplitude.unit),
     ];
     for (index, (image, channel, unit)) in both.into_iter().enumerate() {
-        let left = layout::LEFT + index as f64 * PAGE / 2.0;
-        let area = Rect::new(left, 8.0 + layout::ABOVE, SIDE, SIDE);
-        let axes = Axes::equal(area, x, y);
-        let shades = raster::Shades {
+        let axes = Axes::equal(picture::square(picture::left_of(index)), x, y);
+        let picture = Picture {
+            image,
+            linear,
+            origin,
             map: subject.map,
             range: raster::contrast(image, 0.005),
-            crisp: false,
         };
-        svg.clipped(area, |svg| {
-            raster::draw(svg, &axes, image, linear, origin, &shades);
-        });
+        picture.pixels(&mut svg, &axes, |_| {});
         let labels = Labels {
             letter: layout::LETTERS[index],
             title: channel,
-            x: "x (nm)",
-            y: "y (nm)",
-            ..Labels::default()
+            ..IN_NM
         };
-        axes.draw(&mut svg, &labels);
-        let bar = Rect::new(area.right() + 5.0, area.y, 6.0, SIDE);
-        colorbar::draw(&mut svg, bar, subject.map, shades.range, (channel, unit));
+        picture.frame(&mut svg, &axes, &labels, (channel, unit));
     }
     Ok(Drawing {
         wide: true,

@@ -4,11 +4,13 @@ use heterostrain::Estimate;
 use moiregauge::campaign::Analysis;
 use moiregauge::meaning::{Budget, Contribution, Source};
 
-use super::{Drawing, layout};
+use super::figure::Drawing;
+use super::layout;
 use crate::draw::legend::{self, Key};
+use crate::draw::letters::text_width;
 use crate::draw::scale::{Range, Scale, fixed};
 use crate::draw::style::{
-    BLACK, BLUE, GREY, HAIR, LETTER, ORANGE, PAGE, SMALL, TEXT, VECTOR, lettering, text_width,
+    BLACK, BLUE, GREY, HAIR, LETTER, ORANGE, PAGE, SMALL, TEXT, VECTOR, lettering,
 };
 use crate::draw::svg::{Anchor, Ink, Lettering, Rect, Svg};
 use crate::format::two_digits;

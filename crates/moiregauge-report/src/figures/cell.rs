@@ -3,7 +3,7 @@
 use heterostrain::lattice::MoireCell;
 use nalgebra::{Matrix2, Vector2};
 
-use super::Drawing;
+use super::figure::Drawing;
 use super::layout::{ABOVE, BELOW, LEFT, LEGEND};
 use crate::draw::axes::{Axes, Labels};
 use crate::draw::legend::{self, Key};

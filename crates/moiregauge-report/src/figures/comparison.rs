@@ -4,13 +4,15 @@ use heterostrain::Estimate;
 use moiregauge::spectrum::Method;
 use spmfile::LineDirection;
 
+use super::figure::Drawing;
+use super::layout;
 use super::layout::{counting, ends, is_up, ordinal, point};
-use super::{Drawing, Subject, layout};
+use super::subject::Subject;
 use crate::draw::axes::{Axes, Labels, Ticks, zero_line};
-use crate::draw::legend::{self, Key};
+use crate::draw::legend;
 use crate::draw::scale::Range;
-use crate::draw::style::{GREY, LINE, PAGE, VECTOR, VECTOR_MARKER, VECTOR_NAME};
-use crate::draw::svg::{Ink, Rect, Svg};
+use crate::draw::style::{GREY, LINE, PAGE, VECTOR, VECTOR_MARKER};
+use crate::draw::svg::{Ink, Svg};
 
 const SIDE: f64 = 150.0;
 
@@ -47,9 +49,7 @@ pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
     };
     let top = layout::LEGEND + layout::ABOVE;
     let mut svg = Svg::new(subject.id, PAGE, top + SIDE + layout::BELOW);
-    let square = Rect::new(layout::LEFT, top, SIDE, SIDE);
-    let left = square.right() + 9.0 + layout::LEFT;
-    let beside = Rect::new(left, top, PAGE - left - 9.0, SIDE);
+    let (square, beside) = layout::square_and_rest(top, SIDE);
     let all = pairs.iter().flat_map(|p| [p.used, p.other]);
     let range = Range::of(ends(all))
         .ok_or("no wavelength is finite")?
@@ -100,13 +100,7 @@ pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
         ..Labels::default()
     };
     axes.draw(&mut svg, &labels);
-    let vectors = (0..3).map(|v| {
-        (
-            Key::Point(VECTOR_MARKER[v], VECTOR[v], true),
-            VECTOR_NAME[v],
-        )
-    });
-    let keys: Vec<_> = vectors.chain(legend::directions()).collect();
+    let keys: Vec<_> = legend::vectors().chain(legend::directions()).collect();
     legend::row(&mut svg, (layout::LEFT, 11.0), &keys);
     Ok(Drawing {
         wide: true,

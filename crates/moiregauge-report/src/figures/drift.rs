@@ -6,7 +6,9 @@ use moiregauge::drift::DriftMonteCarlo;
 use moiregauge::frame::Image;
 use nalgebra::{Matrix2, Vector2};
 
-use super::{Drawing, Subject, layout};
+use super::figure::Drawing;
+use super::layout;
+use super::subject::Subject;
 use crate::draw::axes::{Axes, Labels, Ticks};
 use crate::draw::legend::{self, Key};
 use crate::draw::raster;

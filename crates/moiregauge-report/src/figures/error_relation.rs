@@ -5,13 +5,15 @@ use heterostrain::lattice::Lattice;
 use heterostrain::strain::{TwistStrain, naive_twist};
 use moiregauge::campaign::ScanAnalysis;
 
+use super::figure::Drawing;
+use super::layout;
 use super::layout::{Grid, is_up};
-use super::{Drawing, Subject, layout};
+use super::subject::Subject;
 use crate::draw::axes::{Axes, Labels, zero_line};
 use crate::draw::legend::{self, Key};
 use crate::draw::scale::Range;
 use crate::draw::style::{
-    BLACK, BLUE, GREY, LINE, Marker, ORANGE, PAGE, VECTOR, VECTOR_MARKER, VECTOR_NAME, marker,
+    BLACK, BLUE, GREY, LINE, Marker, ORANGE, PAGE, VECTOR, VECTOR_MARKER, marker,
 };
 use crate::draw::svg::{Ink, Svg};
 
@@ -36,13 +38,7 @@ pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
     let slope = twist / wavelength;
     uncertainties(&mut svg, subject, &grid, slope)?;
     deviations(&mut svg, subject, &grid, (wavelength, twist))?;
-    let vectors = (0..3).map(|v| {
-        (
-            Key::Point(VECTOR_MARKER[v], VECTOR[v], true),
-            VECTOR_NAME[v],
-        )
-    });
-    let keys: Vec<_> = vectors
+    let keys: Vec<_> = legend::vectors()
         .chain([
             (Key::Point(Marker::Diamond, BLACK, true), "fit of all three"),
             (Key::Line(GREY, ""), "dθ = θ dλ/λ"),

@@ -8,7 +8,7 @@ use spmfile::FrameDirection;
 
 use crate::draw::axes::Axes;
 use crate::draw::scale::Range;
-use crate::draw::style::{Marker, marker};
+use crate::draw::style::{Marker, PAGE, marker};
 use crate::draw::svg::{Rect, Svg};
 
 pub(super) use moiregauge::numbers::line_name;
@@ -50,6 +50,13 @@ impl Grid {
             self.panel,
         )
     }
+}
+
+/// A square panel at the left of a page, and one beside it that takes the rest.
+pub(super) fn square_and_rest(top: f64, side: f64) -> (Rect, Rect) {
+    let square = Rect::new(LEFT, top, side, side);
+    let left = square.right() + RIGHT + LEFT;
+    (square, Rect::new(left, top, PAGE - left - RIGHT, side))
 }
 
 /// Letters of the panels.

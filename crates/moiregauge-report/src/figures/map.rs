@@ -2,21 +2,13 @@
 
 use moiregauge::map::TwistStrainMap;
 
-use super::{
-    Drawing, Figure, map_domains, map_fields, map_histograms, map_image, map_mask, map_profiles,
-};
+use super::figure::{Drawing, Figure};
+use super::subject::MapSubject;
+use super::{map_domains, map_fields, map_histograms, map_image, map_mask, map_profiles};
 use crate::draw::colormap::ColorMap;
 use crate::map_details::MapDetails;
 
 type Draw = fn(&MapSubject) -> Result<Drawing, String>;
-
-/// What a map figure is drawn from.
-pub(super) struct MapSubject<'a> {
-    pub(super) id: &'a str,
-    pub(super) map: &'a TwistStrainMap,
-    pub(super) details: &'a MapDetails,
-    pub(super) colours: ColorMap,
-}
 
 /// The image first, then the maps; what was asked of them is drawn in a figure of its own.
 const ALL: [(&str, &str, Draw); 11] = [

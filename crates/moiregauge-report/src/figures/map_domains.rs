@@ -1,8 +1,8 @@
 //! Triangles between nodes, coloured by their twist; missing nodes and dislocations marked.
 
-use super::Drawing;
-use super::map::MapSubject;
+use super::figure::Drawing;
 use super::map_panel::Panel;
+use super::subject::MapSubject;
 use crate::draw::colorbar;
 use crate::draw::legend::{self, Key};
 use crate::draw::scale::Range;

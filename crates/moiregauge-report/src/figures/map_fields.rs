@@ -4,9 +4,9 @@ use moiregauge::map::{Plane, TwistStrainMap};
 use moiregauge::window::Mask;
 use nalgebra::Vector2;
 
-use super::Drawing;
-use super::map::MapSubject;
+use super::figure::Drawing;
 use super::map_panel::{Panel, Shown, about};
+use super::subject::MapSubject;
 use crate::draw::axes::Axes;
 use crate::draw::contour::contours;
 use crate::draw::scale::{Range, ticks};

@@ -3,9 +3,9 @@
 use moiregauge::map::{Plane, Spread};
 use moiregauge::window::Mask;
 
-use super::Drawing;
+use super::figure::Drawing;
 use super::layout::{Grid, LETTERS};
-use super::map::MapSubject;
+use super::subject::MapSubject;
 use crate::draw::axes::{Axes, Labels, Ticks};
 use crate::draw::legend::{self, Key};
 use crate::draw::scale::Range;

@@ -2,9 +2,9 @@
 
 use moiregauge::window::Mask;
 
-use super::Drawing;
-use super::map::MapSubject;
+use super::figure::Drawing;
 use super::map_panel::{Panel, about};
+use super::subject::MapSubject;
 use crate::draw::legend::{self, Key};
 use crate::draw::raster;
 use crate::draw::scale::fixed;

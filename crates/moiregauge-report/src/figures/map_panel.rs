@@ -5,10 +5,11 @@ use moiregauge::map::TwistStrainMap;
 use nalgebra::Vector2;
 
 use super::layout;
-use super::map::MapSubject;
+use super::subject::MapSubject;
 use crate::draw::axes::{Axes, Labels};
+use crate::draw::letters::text_width;
 use crate::draw::scale::{Range, fixed, round_step};
-use crate::draw::style::{BLACK, COLUMN, SMALL, TEXT, lettering, text_width};
+use crate::draw::style::{BLACK, COLUMN, SMALL, TEXT, lettering};
 use crate::draw::svg::{Anchor, Ink, Lettering, Rect, Svg};
 use crate::draw::{colorbar, raster};
 use crate::map_details::MapDetails;

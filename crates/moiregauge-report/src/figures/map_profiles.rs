@@ -3,9 +3,9 @@
 use heterostrain::Estimate;
 use moiregauge::region::{Profile, ProfileValues};
 
-use super::Drawing;
+use super::figure::Drawing;
 use super::layout::{self, Grid, shortened};
-use super::map::MapSubject;
+use super::subject::MapSubject;
 use crate::draw::axes::{Axes, Labels, Ticks};
 use crate::draw::legend::{self, Key};
 use crate::draw::scale::Range;

@@ -4,10 +4,11 @@ use moiregauge::stripes::SampledStripes;
 use moiregauge::window::Mask;
 use nalgebra::Vector2;
 
-use super::map::MapSubject;
+use super::figure::{Drawing, Figure};
 use super::map_fields::{noise, shown, sparse};
 use super::map_panel::{Panel, Shown, about};
-use super::{Drawing, Figure, map_fields, map_mask};
+use super::subject::MapSubject;
+use super::{map_fields, map_mask};
 use crate::draw::axes::Axes;
 use crate::draw::colormap::ColorMap;
 use crate::draw::style::BLACK;

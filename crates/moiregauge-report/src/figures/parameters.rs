@@ -7,8 +7,10 @@ use heterostrain::strain::StrainDraw;
 use heterostrain::strain::TwistStrain;
 use moiregauge::campaign::ScanAnalysis;
 
+use super::figure::Drawing;
+use super::layout;
 use super::layout::{LETTERS, is_up, ordinal};
-use super::{Drawing, Subject, layout};
+use super::subject::Subject;
 use crate::draw::axes::{Axes, Labels, Ticks};
 use crate::draw::legend::{self, Key};
 use crate::draw::scale::Range;

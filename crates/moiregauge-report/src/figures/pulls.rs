@@ -1,6 +1,6 @@
 //! Pulls of a validation: errors in units of the stated σ, against the normal distribution.
 
-use super::Drawing;
+use super::figure::Drawing;
 use super::layout::{self, Grid, LETTERS};
 use crate::draw::axes::{Axes, Labels, Ticks};
 use crate::draw::legend::{self, Key};

@@ -3,19 +3,16 @@
 use moiregauge::frame::Image;
 use nalgebra::Vector2;
 
-use super::{Drawing, Subject, layout};
+use super::figure::Drawing;
+use super::layout;
+use super::picture::{self, IN_NM, Picture, extent};
+use super::subject::Subject;
 use crate::draw::axes::{Axes, Labels};
-use crate::draw::scale::Range;
-use crate::draw::style::PAGE;
-use crate::draw::svg::{Rect, Svg};
-use crate::draw::{colorbar, raster};
+use crate::draw::raster;
 use crate::stats::mean_and_deviation;
 
-const SIDE: f64 = 162.0;
-
 pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
-    let shown = subject.set.illustration.as_ref();
-    let shown = shown.ok_or("no scan of this set could be shown in detail")?;
+    let shown = subject.illustration()?;
     let residuals = shown.sensor_residuals.as_ref();
     let residuals = residuals.ok_or("there are no position sensors")?;
     // Picometres keep the numbers short.
@@ -26,21 +23,19 @@ pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
     let block = shown.residual_block as f64;
     let linear = shown.pixel_to_nm * block;
     let origin = shown.origin + shown.pixel_to_nm * Vector2::repeat((block - 1.0) / 2.0);
-    let mut svg = Svg::new(subject.id, PAGE, 8.0 + layout::ABOVE + SIDE + layout::BELOW);
+    let mut svg = picture::page_of_two(subject.id);
     let mut words = Vec::new();
     for (index, image) in picometres.iter().enumerate() {
         let (x, y) = extent(image, &linear, origin).ok_or("the frame of the scan is not finite")?;
-        let left = layout::LEFT + index as f64 * PAGE / 2.0;
-        let area = Rect::new(left, 8.0 + layout::ABOVE, SIDE, SIDE);
-        let axes = Axes::equal(area, x, y);
-        let shades = raster::Shades {
+        let axes = Axes::equal(picture::square(picture::left_of(index)), x, y);
+        let picture = Picture {
+            image,
+            linear: &linear,
+            origin,
             map: subject.map,
             range: raster::contrast(image, 0.01),
-            crisp: false,
         };
-        svg.clipped(area, |svg| {
-            raster::draw(svg, &axes, image, &linear, origin, &shades);
-        });
+        picture.pixels(&mut svg, &axes, |_| {});
         let finite: Vec<f64> = image
             .values
             .iter()
@@ -54,19 +49,9 @@ pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
         let labels = Labels {
             letter: layout::LETTERS[index],
             title: &title,
-            x: "x (nm)",
-            y: "y (nm)",
-            ..Labels::default()
+            ..IN_NM
         };
-        axes.draw(&mut svg, &labels);
-        let bar = Rect::new(area.right() + 5.0, area.y, 6.0, SIDE);
-        colorbar::draw(
-            &mut svg,
-            bar,
-            subject.map,
-            shades.range,
-            ("reading − fit", "pm"),
-        );
+        picture.frame(&mut svg, &axes, &labels, ("reading − fit", "pm"));
     }
     Ok(Drawing {
         wide: true,
@@ -80,18 +65,4 @@ pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
             words.join(", ")
         ),
     })
-}
-
-/// From where to where the pixels of an image reach along x and y.
-pub(super) fn extent(
-    image: &Image,
-    linear: &nalgebra::Matrix2<f64>,
-    origin: Vector2<f64>,
-) -> Option<(Range, Range)> {
-    let (right, top) = (image.columns as f64 - 0.5, image.rows as f64 - 0.5);
-    let corners = [(-0.5, -0.5), (right, -0.5), (right, top), (-0.5, top)]
-        .map(|(c, r)| origin + linear * Vector2::new(c, r));
-    let range =
-        |axis: usize| Range::of(corners.iter().map(|c| c[axis])).filter(|r| r.width() > 0.0);
-    range(0).zip(range(1))
 }

@@ -4,19 +4,20 @@
 use moiregauge::scan::Illustration;
 use nalgebra::{Matrix2, Vector2};
 
-use super::{Drawing, Subject, layout};
-use crate::draw::axes::{Axes, Labels};
+use super::figure::Drawing;
+use super::layout;
+use super::picture::{IN_NM, Picture, column, corners};
+use super::subject::Subject;
+use crate::draw::axes::Axes;
+use crate::draw::letters::text_width;
 use crate::draw::scale::{Range, fixed, round_step};
-use crate::draw::style::{
-    COLUMN, LINE, SMALL, TEXT, VECTOR, VECTOR_MARKER, lettering, outline, text_width,
-};
+use crate::draw::style::{COLUMN, LINE, SMALL, TEXT, VECTOR, VECTOR_MARKER, lettering, outline};
 use crate::draw::svg::{Anchor, Ink, Lettering, Rect, Svg};
-use crate::draw::{colorbar, legend, raster};
+use crate::draw::{legend, raster};
 
 pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
-    let shown = subject.set.illustration.as_ref();
-    let shown = shown.ok_or("no scan of this set could be shown in detail")?;
-    let actual = corners(shown, &shown.pixel_to_nm, shown.origin);
+    let shown = subject.illustration()?;
+    let actual = corners(&shown.image, &shown.pixel_to_nm, shown.origin);
     // Without sensors the frame is the intended one.
     let from_sensors = !shown.sensor_line.is_empty();
     let nominal = shown
@@ -25,7 +26,7 @@ pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
         .map(|map| {
             let middle = middle_pixel(shown);
             corners(
-                shown,
+                &shown.image,
                 &map,
                 shown.origin + (shown.pixel_to_nm - map) * middle,
             )
@@ -42,26 +43,17 @@ pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
     let x = range(points.iter().map(|p| p.0).collect())?;
     let y = range(points.iter().map(|p| p.1).collect())?;
 
-    let side = COLUMN - layout::LEFT - 44.0;
-    let height = (side * y.width() / x.width()).clamp(0.3 * side, 1.6 * side);
-    let area = Rect::new(layout::LEFT, layout::LEGEND + 8.0, side, height);
+    let area = column(x, y, layout::LEGEND + 8.0, 44.0);
     let axes = Axes::equal(area, x, y);
     let mut svg = Svg::new(subject.id, COLUMN, area.bottom() + layout::BELOW);
-    let contrast = raster::contrast(&shown.image, 0.005);
-    svg.clipped(area, |svg| {
-        let place = (&shown.pixel_to_nm, shown.origin);
-        raster::draw(
-            svg,
-            &axes,
-            &shown.image,
-            place.0,
-            place.1,
-            &raster::Shades {
-                map: subject.map,
-                range: contrast,
-                crisp: false,
-            },
-        );
+    let picture = Picture {
+        image: &shown.image,
+        linear: &shown.pixel_to_nm,
+        origin: shown.origin,
+        map: subject.map,
+        range: raster::contrast(&shown.image, 0.005),
+    };
+    picture.pixels(&mut svg, &axes, |svg| {
         svg.polygon(&axes.points(actual), &Ink::line("#222222", LINE));
         if let Some(nominal) = nominal {
             svg.polygon(
@@ -73,16 +65,9 @@ pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
     let basis = layout::shown_lattice(subject.set, shown);
     vectors(&mut svg, &axes, shown, &basis);
     scale_bar(&mut svg, &axes, &actual);
-    let labels = Labels {
-        x: "x (nm)",
-        y: "y (nm)",
-        ..Labels::default()
-    };
-    axes.draw(&mut svg, &labels);
-    let bar = Rect::new(area.right() + 6.0, area.y, 7.0, area.height);
     let channel = &subject.set.channel;
     let what = (channel.as_str(), shown.unit.as_str());
-    colorbar::draw(&mut svg, bar, subject.map, contrast, what);
+    picture.frame(&mut svg, &axes, &IN_NM, what);
     let (scanned, places) = if from_sensors {
         ("scanned (sensors)", "the position sensors place it")
     } else {
@@ -117,18 +102,6 @@ pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
 fn middle_pixel(shown: &Illustration) -> Vector2<f64> {
     let image = &shown.image;
     Vector2::new(image.columns as f64 - 1.0, image.rows as f64 - 1.0) / 2.0
-}
-
-/// The outer edges of the image, counter-clockwise from pixel (0, 0), nm.
-fn corners(shown: &Illustration, map: &Matrix2<f64>, origin: Vector2<f64>) -> [(f64, f64); 4] {
-    let (right, top) = (
-        shown.image.columns as f64 - 0.5,
-        shown.image.rows as f64 - 0.5,
-    );
-    [(-0.5, -0.5), (right, -0.5), (right, top), (-0.5, top)].map(|(column, row)| {
-        let at = origin + map * Vector2::new(column, row);
-        (at.x, at.y)
-    })
 }
 
 /// The three lattice vectors as arrows from the middle of the image.

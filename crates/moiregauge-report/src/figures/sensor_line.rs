@@ -1,6 +1,8 @@
 //! The position sensor of the fast axis along one line: reading, fit and residual.
 
-use super::{Drawing, Subject, layout};
+use super::figure::Drawing;
+use super::layout;
+use super::subject::Subject;
 use crate::draw::axes::{Axes, Labels, Ticks, zero_line};
 use crate::draw::legend::{self, Key};
 use crate::draw::scale::Range;
@@ -9,8 +11,7 @@ use crate::draw::svg::{Ink, Rect, Svg};
 use crate::stats::mean_and_deviation;
 
 pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
-    let shown = subject.set.illustration.as_ref();
-    let shown = shown.ok_or("no scan of this set could be shown in detail")?;
+    let shown = subject.illustration()?;
     let line = &shown.sensor_line;
     let columns = Range::of(line.iter().map(|p| p[0]));
     let positions = Range::of(line.iter().flat_map(|p| [p[1], p[2]]));

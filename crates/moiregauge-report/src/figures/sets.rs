@@ -3,7 +3,8 @@
 use moiregauge::campaign::{Analysis, SetAnalysis, SetMean};
 use nalgebra::{Matrix2, Vector2};
 
-use super::{Drawing, layout};
+use super::figure::Drawing;
+use super::layout;
 use crate::draw::axes::{Axes, Labels, Ticks, mean_band};
 use crate::draw::legend::{self, Key};
 use crate::draw::scale::Range;

@@ -3,15 +3,16 @@
 use moiregauge::campaign::{Analysis, SetAnalysis};
 use nalgebra::{Matrix2, Vector2};
 
-use super::residuals::extent;
-use super::{Drawing, layout};
-use crate::draw::axes::{Axes, Labels};
+use super::figure::Drawing;
+use super::layout;
+use super::picture::{IN_NM, Picture, column, extent};
+use crate::draw::axes::Axes;
 use crate::draw::colormap::ColorMap;
 use crate::draw::legend::{self, Key};
+use crate::draw::raster;
 use crate::draw::scale::Range;
 use crate::draw::style::{COLUMN, SET};
-use crate::draw::svg::{Ink, Rect, Svg};
-use crate::draw::{colorbar, raster};
+use crate::draw::svg::{Ink, Svg};
 
 /// A frame that is drawn smaller than this (pt) gets a ring around it.
 const SMALL_FRAME: f64 = 8.0;
@@ -37,32 +38,24 @@ pub(super) fn draw(analysis: &Analysis, id: &str, map: ColorMap) -> Result<Drawi
             .chain([range.low, range.high]);
         Range::of(kept).unwrap_or(range).padded(0.01, 1e-6)
     };
-    let side = COLUMN - layout::LEFT - 44.0;
     let (x, y) = (near(x, |p| p.0), near(y, |p| p.1));
-    let height = (side * y.width() / x.width()).clamp(0.3 * side, 1.6 * side);
-    let area = Rect::new(layout::LEFT, layout::LEGEND + 8.0, side, height);
+    let area = column(x, y, layout::LEGEND + 8.0, 44.0);
     let axes = Axes::equal(area, x, y);
     let mut svg = Svg::new(id, COLUMN, area.bottom() + layout::BELOW);
-    let shades = raster::Shades {
+    let shown = Picture {
+        image,
+        linear,
+        origin,
         map,
         range: raster::contrast(image, 0.005),
-        crisp: false,
     };
-    svg.clipped(area, |svg| {
-        raster::draw(svg, &axes, image, linear, origin, &shades);
+    shown.pixels(&mut svg, &axes, |svg| {
         for (frame, colour) in frames.iter().zip(SET.iter().cycle()) {
             mark(svg, &axes, frame, colour);
         }
     });
-    let labels = Labels {
-        x: "x (nm)",
-        y: "y (nm)",
-        ..Labels::default()
-    };
-    axes.draw(&mut svg, &labels);
-    let bar = Rect::new(area.right() + 6.0, area.y, 7.0, area.height);
     let what = (picture.channel.as_str(), picture.unit.as_str());
-    colorbar::draw(&mut svg, bar, map, shades.range, what);
+    shown.frame(&mut svg, &axes, &IN_NM, what);
     let keys: Vec<(Key, &str)> = analysis
         .sets
         .iter()

@@ -4,18 +4,18 @@ use moiregauge::frame::Image;
 use moiregauge::scan::Illustration;
 use nalgebra::{Matrix2, Vector2};
 
-use super::{Drawing, Subject, layout};
+use super::figure::Drawing;
+use super::layout;
+use super::picture::{self, Picture};
+use super::subject::Subject;
 use crate::draw::axes::{Axes, Labels};
+use crate::draw::raster;
 use crate::draw::scale::Range;
 use crate::draw::style::{Marker, PAGE, VECTOR, VECTOR_MARKER, outline};
-use crate::draw::svg::{Ink, Rect, Svg};
-use crate::draw::{colorbar, raster};
-
-const SIDE: f64 = 162.0;
+use crate::draw::svg::{Ink, Svg};
 
 pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
-    let shown = subject.set.illustration.as_ref();
-    let shown = shown.ok_or("no scan of this set could be shown in detail")?;
+    let shown = subject.illustration()?;
     let basis = layout::shown_lattice(subject.set, shown);
     let dual = basis.try_inverse().map(|inverse| inverse.transpose());
     let to_frequency = shown
@@ -31,7 +31,7 @@ pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
     {
         return Err("the lattice of the scan is not finite".to_owned());
     }
-    let mut svg = Svg::new(subject.id, PAGE, 8.0 + layout::ABOVE + SIDE + layout::BELOW);
+    let mut svg = picture::page_of_two(subject.id);
     autocorrelation(&mut svg, subject, shown, &basis);
     spectrum(&mut svg, subject, shown, &dual, &to_frequency);
     Ok(Drawing {
@@ -47,11 +47,7 @@ pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
 
 fn panel(left: f64, half: f64) -> Axes {
     let range = Range::new(-half, half);
-    Axes::new(
-        Rect::new(left, 8.0 + layout::ABOVE, SIDE, SIDE),
-        range,
-        range,
-    )
+    Axes::new(picture::square(left), range, range)
 }
 
 fn autocorrelation(svg: &mut Svg, subject: &Subject, shown: &Illustration, basis: &Matrix2<f64>) {
@@ -66,20 +62,14 @@ fn autocorrelation(svg: &mut Svg, subject: &Subject, shown: &Illustration, basis
     if let Some(unshifted) = unshifted.filter(|v| **v > 0.0) {
         image.values.iter_mut().for_each(|v| *v /= unshifted);
     }
-    let contrast = raster::contrast(&image, 0.005);
-    svg.clipped(axes.area, |svg| {
-        raster::draw(
-            svg,
-            &axes,
-            &image,
-            &shown.pixel_to_nm,
-            origin,
-            &raster::Shades {
-                map: subject.map,
-                range: contrast,
-                crisp: false,
-            },
-        );
+    let picture = Picture {
+        image: &image,
+        linear: &shown.pixel_to_nm,
+        origin,
+        map: subject.map,
+        range: raster::contrast(&image, 0.005),
+    };
+    picture.pixels(svg, &axes, |svg| {
         for (i, j, at) in lattice_points(basis, &axes) {
             let ends = [(1, 0), (0, 1), (-1, 1)];
             match ends.iter().position(|&end| end == (i, j)) {
@@ -101,15 +91,8 @@ fn autocorrelation(svg: &mut Svg, subject: &Subject, shown: &Illustration, basis
         y: "shift y (nm)",
         ..Labels::default()
     };
-    axes.draw(svg, &labels);
-    let bar = Rect::new(axes.area.right() + 5.0, axes.area.y, 6.0, SIDE);
-    colorbar::draw(
-        svg,
-        bar,
-        subject.map,
-        contrast,
-        ("autocorrelation over that at no shift", ""),
-    );
+    let what = ("autocorrelation over that at no shift", "");
+    picture.frame(svg, &axes, &labels, what);
 }
 
 fn spectrum(
@@ -131,20 +114,14 @@ fn spectrum(
     // The peaks are a handful of pixels: only the floor may be cut off.
     let floor = raster::contrast(&image, 0.3).low;
     let top: f64 = 0.0;
-    let contrast = Range::new(floor, top.max(floor + 1e-12));
-    svg.clipped(axes.area, |svg| {
-        raster::draw(
-            svg,
-            &axes,
-            &image,
-            &map,
-            origin,
-            &raster::Shades {
-                map: subject.map,
-                range: contrast,
-                crisp: false,
-            },
-        );
+    let picture = Picture {
+        image: &image,
+        linear: &map,
+        origin,
+        map: subject.map,
+        range: Range::new(floor, top.max(floor + 1e-12)),
+    };
+    picture.pixels(svg, &axes, |svg| {
         // 1.8: the first two shells; rings further out would mark noise.
         let near = |i: i32, j: i32| {
             (dual * Vector2::new(f64::from(i), f64::from(j))).norm() < 1.8 * longest(dual)
@@ -163,15 +140,8 @@ fn spectrum(
         y: "frequency y (1/nm)",
         ..Labels::default()
     };
-    axes.draw(svg, &labels);
-    let bar = Rect::new(axes.area.right() + 5.0, axes.area.y, 6.0, SIDE);
-    colorbar::draw(
-        svg,
-        bar,
-        subject.map,
-        contrast,
-        ("log₁₀ of power over the highest", ""),
-    );
+    let what = ("log₁₀ of power over the highest", "");
+    picture.frame(svg, &axes, &labels, what);
 }
 
 /// Half the width of a panel: a few vectors, but not more than the picture holds.

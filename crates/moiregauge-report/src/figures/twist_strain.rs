@@ -4,8 +4,10 @@ use heterostrain::Estimate;
 use heterostrain::strain::TwistStrain;
 use moiregauge::campaign::ScanAnalysis;
 
+use super::figure::Drawing;
+use super::layout;
 use super::layout::{Grid, LETTERS, counting, ends, is_up, ordinal, point};
-use super::{Drawing, Subject, layout};
+use super::subject::Subject;
 use crate::draw::axes::{Axes, Labels, Ticks, mean_band};
 use crate::draw::legend::{self, Key};
 use crate::draw::scale::Range;

@@ -6,13 +6,13 @@ use heterostrain::{Estimate, TotalEstimate};
 use moiregauge::campaign::SetMean;
 use moiregauge::settings::Settings;
 
-use super::{Drawing, Subject, layout};
+use super::figure::Drawing;
+use super::layout;
+use super::subject::Subject;
 use crate::draw::axes::{Axes, Labels};
 use crate::draw::legend::{self, Key};
 use crate::draw::scale::Range;
-use crate::draw::style::{
-    BLUE, COLUMN, LINE, Marker, ORANGE, VECTOR, VECTOR_MARKER, VECTOR_NAME, marker,
-};
+use crate::draw::style::{BLUE, COLUMN, LINE, Marker, ORANGE, VECTOR, VECTOR_MARKER, marker};
 use crate::draw::svg::{Ink, Rect, Svg};
 use crate::format::plus_minus;
 
@@ -22,11 +22,7 @@ const POINTS: usize = 200;
 const REACH: f64 = 1.6;
 
 pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
-    let set = subject.set;
-    let mean = set
-        .mean
-        .as_ref()
-        .ok_or("the drift of this set is not known")?;
+    let mean = subject.mean()?;
     let settings = &subject.analysis.settings;
     let lengths = [0, 1, 2].map(|i| mean.wavelength(i));
     let range = Range::of(lengths.iter().map(|l| l.value)).ok_or("no wavelength is finite")?;
@@ -65,11 +61,7 @@ pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
         ..Labels::default()
     };
     axes.draw(&mut svg, &labels);
-    let vectors = (0..3).map(|v| {
-        let key = Key::Point(VECTOR_MARKER[v], VECTOR[v], true);
-        (key, VECTOR_NAME[v])
-    });
-    let keys: Vec<_> = vectors
+    let keys: Vec<_> = legend::vectors()
         .chain([(
             Key::Point(Marker::Diamond, ORANGE, true),
             "twist of the set",

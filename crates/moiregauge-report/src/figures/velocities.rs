@@ -1,7 +1,9 @@
 //! Distributions of the fast and the slow tip velocity, as fitted line by line.
 
+use super::figure::Drawing;
+use super::layout;
 use super::layout::Grid;
-use super::{Drawing, Subject, layout};
+use super::subject::Subject;
 use crate::draw::axes::{Axes, Labels};
 use crate::draw::legend::{self, Key};
 use crate::draw::scale::Range;
@@ -12,8 +14,7 @@ use crate::stats::{Histogram, bins, central, gaussian, mean_and_deviation};
 use heterostrain::Estimate;
 
 pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
-    let shown = subject.set.illustration.as_ref();
-    let shown = shown.ok_or("no scan of this set could be shown in detail")?;
+    let shown = subject.illustration()?;
     if shown.fast_velocities.len() < 2 || shown.slow_velocities.len() < 2 {
         return Err("there are no position sensors to fit velocities to".to_owned());
     }

@@ -3,8 +3,10 @@
 use heterostrain::Estimate;
 use moiregauge::campaign::ScanAnalysis;
 
+use super::figure::Drawing;
+use super::layout;
 use super::layout::{Grid, LETTERS, counting, ends, is_up, ordinal, point};
-use super::{Drawing, Subject, layout};
+use super::subject::Subject;
 use crate::draw::axes::{Axes, Labels, Ticks};
 use crate::draw::legend::{self, Key};
 use crate::draw::scale::Range;
@@ -13,10 +15,7 @@ use crate::draw::svg::{Ink, Svg};
 
 pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
     let set = subject.set;
-    let mean = set
-        .mean
-        .as_ref()
-        .ok_or("the drift of this set is not known")?;
+    let mean = subject.mean()?;
     let grid = Grid {
         width: PAGE,
         columns: 2,

@@ -4,12 +4,14 @@ use heterostrain::Estimate;
 use heterostrain::lattice::Lattice;
 use heterostrain::strain::naive_twist;
 
+use super::figure::Drawing;
+use super::layout;
 use super::layout::{Grid, LETTERS, counting, ends, is_up, ordinal, point};
-use super::{Drawing, Subject, layout};
+use super::subject::Subject;
 use crate::draw::axes::{Axes, Labels, Ticks};
-use crate::draw::legend::{self, Key};
+use crate::draw::legend;
 use crate::draw::scale::Range;
-use crate::draw::style::{PAGE, VECTOR, VECTOR_MARKER, VECTOR_NAME};
+use crate::draw::style::{PAGE, VECTOR, VECTOR_MARKER};
 use crate::draw::svg::Svg;
 
 pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
@@ -79,13 +81,7 @@ pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
             axes.draw(&mut svg, &labels);
         }
     }
-    let vectors = (0..3).map(|v| {
-        (
-            Key::Point(VECTOR_MARKER[v], VECTOR[v], true),
-            VECTOR_NAME[v],
-        )
-    });
-    let keys: Vec<_> = vectors.chain(legend::directions()).collect();
+    let keys: Vec<_> = legend::vectors().chain(legend::directions()).collect();
     legend::row(&mut svg, (layout::LEFT, 11.0), &keys);
     Ok(Drawing {
         wide: true,

@@ -2,13 +2,15 @@
 
 use nalgebra::Vector2;
 
+use super::figure::Drawing;
+use super::layout;
 use super::layout::{LEFT, counting, is_up, ordinal};
-use super::{Drawing, Subject, layout};
+use super::subject::Subject;
 use crate::draw::axes::{Axes, Labels, Ticks, zero_line};
 use crate::draw::legend::{self, Key};
 use crate::draw::scale::{Range, fixed};
 use crate::draw::style::{BLACK, BLUE, GREY, HAIR, Marker, ORANGE, PAGE, SMALL, lettering, marker};
-use crate::draw::svg::{Anchor, Ink, Lettering, Rect, Svg};
+use crate::draw::svg::{Anchor, Ink, Lettering, Svg};
 
 const SIDE: f64 = 150.0;
 
@@ -31,11 +33,10 @@ pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
     let mut svg = Svg::new(subject.id, PAGE, top + SIDE + layout::BELOW);
     // One picometre: below it the sensors say nothing.
     let (x, y) = (x.padded(0.12, 1e-3), y.padded(0.12, 1e-3));
-    let path = Axes::equal(Rect::new(LEFT, top, SIDE, SIDE), x, y);
+    let (square, area) = layout::square_and_rest(top, SIDE);
+    let path = Axes::equal(square, x, y);
     path_panel(&mut svg, &path, &moved);
 
-    let left = LEFT + SIDE + 9.0 + LEFT;
-    let area = Rect::new(left, top, PAGE - left - 9.0, SIDE);
     let both = Range::new(x.low.min(y.low), x.high.max(y.high));
     let axes = Axes::new(area, counting(scans.len()), both);
     zero_line(&mut svg, &axes);

@@ -4,7 +4,7 @@ use heterostrain::Estimate;
 use serde::Serialize;
 
 use super::page::{Download, Missing, Shown, download, layers, missing, numbered};
-use super::rendered;
+use super::template::rendered;
 use super::words::{Numbers, conventions, plain};
 use crate::error::ReportError;
 use crate::figures::Figure;

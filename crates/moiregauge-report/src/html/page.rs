@@ -7,6 +7,7 @@ use moiregauge::spectrum::Method;
 use serde::Serialize;
 
 use super::meanings::Meanings;
+use super::template::rendered;
 use super::words::{
     Budgeted, Numbers, consistency, conventions, plain, shown, statistical, wavelengths,
 };
@@ -15,8 +16,19 @@ use crate::error::ReportError;
 use crate::figures::Figure;
 use crate::results::{AtomicResult, DriftResult, Results, ScanResult, SetResult};
 
+const TEMPLATE: &str = include_str!("report.html");
+
+/// The page. `downloads` are the files that it carries for saving.
+pub(crate) fn page(
+    of: (&Results, &Analysis),
+    figures: &[Figure],
+    downloads: &[(String, Vec<u8>)],
+) -> Result<Vec<u8>, ReportError> {
+    rendered(TEMPLATE, Page::new(of, figures, downloads)?)
+}
+
 #[derive(Debug, Serialize)]
-pub(super) struct Page<'a> {
+struct Page<'a> {
     results: &'a Results,
     scans: usize,
     /// The published method, whose bias the page has to tell, was used.

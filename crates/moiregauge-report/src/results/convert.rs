@@ -3,7 +3,7 @@
 use heterostrain::{Estimate, TotalEstimate};
 use nalgebra::{Matrix2, Vector2};
 
-use super::lattice::ResultEstimate;
+use super::estimate::ResultEstimate;
 
 /// Seconds in a minute: nm/s → nm/min.
 pub(crate) const PER_MINUTE: f64 = 60.0;

@@ -13,17 +13,20 @@ use nalgebra::{Matrix2, Vector2};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::SCHEMA;
 use super::budget::BudgetResult;
 use super::caveat::ResultCaveat;
 use super::checks::ChecksResult;
 use super::conventions::Conventions;
 use super::convert::{PER_MINUTE, PERCENT, correlation, degree, estimate, estimate_in_all, number};
-use super::lattice::{LatticeVector, ResultEstimate, TwistStrainResult};
+use super::estimate::ResultEstimate;
+use super::lattice::{LatticeVector, TwistStrainResult};
 use super::readings::{AtomicResult, ReadingsResult};
 use super::scan::ScanResult;
 use crate::provenance::{FailedInput, InputFile, Provenance};
 use crate::stats::mean_and_deviation;
+
+/// Name and version of the document.
+pub const SCHEMA: &str = "moiregauge/results/1";
 
 /// Everything that was found, in degrees, per cent, nm and nm/min.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -62,7 +65,7 @@ pub struct InputProvenance {
     pub inputs: Vec<InputFile>,
     /// What was asked, for a repetition.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub run: Option<super::Run>,
+    pub run: Option<super::run::Run>,
 }
 
 /// Scans of one slow axis, line rate, size and channel.
@@ -107,7 +110,7 @@ pub struct DriftResult {
     /// The Monte Carlo distribution.
     pub monte_carlo: Option<DriftMonteCarloResult>,
     /// What a joint fit found; `null` for the other methods.
-    pub joint: Option<super::JointResult>,
+    pub joint: Option<super::joint::JointResult>,
 }
 
 /// How well the scans determine the drift.
@@ -180,7 +183,7 @@ pub struct CombinedResult {
     /// L1, L2 and L3.
     pub vectors: [LatticeVector; 3],
     /// The joint fit over all scans that made them; `null` for the other methods.
-    pub joint: Option<super::JointResult>,
+    pub joint: Option<super::joint::JointResult>,
     /// The drift in the middle of the campaign, where one joint fit over all scans describes it.
     pub drift: Option<DriftResult>,
     /// Errors from the scatter of the scans; `null` without a joint fit.

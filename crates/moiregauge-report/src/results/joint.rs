@@ -5,7 +5,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::convert::{estimate, number, pair};
-use super::lattice::ResultEstimate;
+use super::estimate::ResultEstimate;
 
 /// nm/s² → nm/min².
 const PER_MINUTE2: f64 = 3600.0;

@@ -1,13 +1,16 @@
 //! The summary of a map as a document, `moiregauge/map/1`: degrees, per cent, nm.
 
-use moiregauge::map::{Agreement, DriftChange, Plane, Spread, TwistStrainMap};
-use moiregauge::region::{Trend, Trends};
+use moiregauge::map::{Agreement, DriftChange, Plane, TwistStrainMap};
+use moiregauge::region::Trends;
 use moiregauge::settings::Settings;
 use moiregauge::window::{Mask, UsedHarmonic};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{Conventions, ResultCaveat, TwistStrainResult};
+use super::caveat::ResultCaveat;
+use super::conventions::Conventions;
+use super::lattice::TwistStrainResult;
+use super::quantity::{QuantityResult, TrendResult};
 use crate::provenance::Provenance;
 
 /// What a map comes to.
@@ -47,13 +50,13 @@ pub struct MapResults {
     pub images: Vec<MappedImage>,
     /// Patterns of stripes, in a map of stripes: such a map has no twist and no strain.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub stripes: Option<super::StripesResult>,
+    pub stripes: Option<super::stripes::StripesResult>,
     /// How images of one place agree.
     pub agreement: Option<AgreementResult>,
     /// What differs between upward and downward frames along the slow axis: drift that changes, no strain.
     pub drift_change: Option<DriftChangeResult>,
     /// Regions, uniform areas, wanted twist.
-    pub details: super::MapDetailsResult,
+    pub details: super::region::MapDetailsResult,
     /// Doubts.
     pub caveats: Vec<ResultCaveat>,
 }
@@ -67,80 +70,6 @@ pub struct MaskCount {
     pub name: String,
     /// Nodes.
     pub nodes: usize,
-}
-
-/// Mean and spread of a quantity over the good nodes.
-#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
-pub struct QuantityResult {
-    /// Its name in the files.
-    pub name: String,
-    /// Its unit.
-    pub unit: String,
-    /// Mean.
-    pub mean: f64,
-    /// Upper limit of the standard error of the mean by image noise.
-    pub mean_sigma: f64,
-    /// Standard deviation over the nodes.
-    pub spread: f64,
-    /// The same with the noise taken off.
-    pub spread_corrected: f64,
-    /// Root mean square of the errors of the nodes.
-    pub noise: f64,
-    /// A plane through the good nodes; `null` where they are too few or too near to each other.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub trend: Option<TrendResult>,
-}
-
-/// A plane through the good nodes: how much of the spread is a change across the frame (creep, drift that changes, a
-/// scanner that bows, or the sample).
-#[derive(Clone, Copy, Debug, Serialize, Deserialize, JsonSchema)]
-pub struct TrendResult {
-    /// Change along x and along y, per 100 nm.
-    pub per_100nm: [f64; 2],
-    /// Their standard errors by the noise of the image.
-    pub per_100nm_sigma: [f64; 2],
-    /// Value at the middle of the frame (of stripes: of the nodes of the pattern), where a fit to all its pixels has its
-    /// mean.
-    pub middle: f64,
-    /// Its standard error by the noise of the image.
-    pub middle_sigma: f64,
-    /// Standard deviation over the good nodes that the plane makes.
-    pub of_trend: f64,
-    /// What noise adds to the scatter about the plane.
-    pub noise: f64,
-    /// What neither explains.
-    pub rest: f64,
-}
-
-impl TrendResult {
-    pub(super) fn new(t: &Trend, factor: f64) -> Self {
-        let scaled = t.gradient.map(|g| g.scaled(100.0 * factor));
-        Self {
-            per_100nm: scaled.map(|g| g.value),
-            per_100nm_sigma: scaled.map(|g| g.sigma),
-            middle: factor * t.middle.value,
-            middle_sigma: factor * t.middle.sigma,
-            of_trend: factor * t.of_trend,
-            noise: factor * t.noise,
-            rest: factor * t.rest,
-        }
-    }
-}
-
-impl QuantityResult {
-    /// In another unit, without a trend.
-    pub(super) fn new(name: &str, unit: &str, found: &Spread, factor: f64) -> Self {
-        Self {
-            name: name.to_owned(),
-            unit: unit.to_owned(),
-            mean: factor * found.mean,
-            mean_sigma: factor * found.mean_sigma,
-            spread: factor * found.spread,
-            spread_corrected: factor * found.corrected,
-            noise: factor * found.noise,
-            trend: None,
-        }
-    }
 }
 
 /// One image behind a map.

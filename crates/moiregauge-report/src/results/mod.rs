@@ -10,13 +10,16 @@ mod conventions;
 mod convert;
 mod document;
 mod domains;
+mod estimate;
 mod joint;
 mod lattice;
 mod map;
+mod quantity;
 mod readings;
 mod region;
 mod run;
 mod scan;
+mod schema;
 mod stripes;
 
 pub(crate) use budget::source_name;
@@ -26,15 +29,17 @@ pub use checks::{ChecksResult, ResidualResult, ScatterResult};
 pub use conventions::Conventions;
 pub use document::{
     CombinedResult, ConsistencyResult, DriftFitResult, DriftMonteCarloResult, DriftResult,
-    InputProvenance, MeanResult, Results, SetResult,
+    InputProvenance, MeanResult, Results, SCHEMA, SetResult,
 };
 pub use domains::{DislocationResult, DomainsResult, RegimeResult};
+pub use estimate::ResultEstimate;
 pub use joint::{JointResult, TestedResult};
-pub use lattice::{LatticeVector, ResultEstimate, StrainMonteCarlo, TwistStrainResult};
+pub use lattice::{LatticeVector, StrainMonteCarlo, TwistStrainResult};
 pub use map::{
     AgreementResult, DriftChangeResult, HarmonicResult, MapResults, MappedImage, MaskCount,
-    QuantityResult, TrendResult, mask_counts, quantities,
+    mask_counts, quantities,
 };
+pub use quantity::{QuantityResult, TrendResult};
 pub use readings::{
     AtomicResult, IsotropicStrainResult, NameResult, NamesResult, OtherSenseResult, ReadingsResult,
     ShiftResult, SolutionResult, SplitResult, StrainTensorResult, TensorNumbers, TensorSigmas,
@@ -44,22 +49,5 @@ pub use region::{
 };
 pub use run::{AtomicImages, Crop, FrameOrder, NamedSet, Run, Told};
 pub use scan::{LineResult, ScanResult, ScanTwistStrain, ScanVector, TipVelocity, Window};
+pub use schema::{map_schema, schema};
 pub use stripes::{StripeHarmonicResult, StripePatternResult, StripesResult};
-
-/// Name and version of the document.
-pub const SCHEMA: &str = "moiregauge/results/1";
-
-/// The JSON Schema (draft 2020-12) of [`Results`].
-pub fn schema() -> serde_json::Value {
-    schema_of::<Results>()
-}
-
-/// The JSON Schema (draft 2020-12) of [`MapResults`], `map.json`.
-pub fn map_schema() -> serde_json::Value {
-    schema_of::<MapResults>()
-}
-
-fn schema_of<T: schemars::JsonSchema>() -> serde_json::Value {
-    let settings = schemars::generate::SchemaSettings::draft2020_12().for_serialize();
-    settings.into_generator().into_root_schema_for::<T>().into()
-}

@@ -9,7 +9,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::convert::{PER_MINUTE, PERCENT, degree, estimate, number, pair};
-use super::lattice::ResultEstimate;
+use super::estimate::ResultEstimate;
 use heterostrain::Estimate;
 
 /// Everything that a lattice can mean beside `twist_deg` and `heterostrain_percent`.

@@ -19,9 +19,9 @@ pub struct MapDetailsResult {
     /// How much of the map has the wanted twist.
     pub wanted: Option<WantedResult>,
     /// Domain structure, where it was looked for and found.
-    pub domains: Option<super::DomainsResult>,
+    pub domains: Option<super::domains::DomainsResult>,
     /// Whether the maps or the triangles are to be used.
-    pub regime: Option<super::RegimeResult>,
+    pub regime: Option<super::domains::RegimeResult>,
 }
 
 /// Mean and spread of a quantity over an area.

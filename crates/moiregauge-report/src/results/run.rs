@@ -4,8 +4,8 @@ use moiregauge::settings::Settings;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::choice::Choice;
 use crate::provenance::{FailedInput, InputFile};
-use crate::report::Choice;
 
 /// A run of the program: what a repetition needs beside the files themselves.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]

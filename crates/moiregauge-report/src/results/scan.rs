@@ -9,7 +9,8 @@ use spmfile::{DateTime, FrameDirection, LineDirection};
 
 use super::checks::ResidualResult;
 use super::convert::{estimate, number, pair, square};
-use super::lattice::{LatticeVector, NAMES, ResultEstimate, StrainMonteCarlo, TwistStrainResult};
+use super::estimate::ResultEstimate;
+use super::lattice::{LatticeVector, NAMES, StrainMonteCarlo, TwistStrainResult};
 
 /// One frame.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]

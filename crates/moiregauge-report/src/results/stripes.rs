@@ -9,9 +9,9 @@ use nalgebra::Vector2;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::ResultEstimate;
 use super::convert::estimate;
-use super::map::{QuantityResult, TrendResult};
+use super::estimate::ResultEstimate;
+use super::quantity::{QuantityResult, TrendResult};
 
 /// A map of stripes: patterns with one wave vector each, which say nothing of twist and strain.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]

@@ -106,12 +106,11 @@ fn what_drift_does(gradient: Option<f64>, sigma: f64) -> String {
     match gradient {
         Some(gradient) => format!(
             "A drift of 1 nm/min makes {:.2} % along the slow axis, or {:.1} mrad of shear; a drift of 0 ± {per_minute} \
-             nm/min is assumed (--drift-sigma) and is in the errors",
+             nm/min is assumed and is in the errors",
             100.0 * gradient / 60.0,
             1000.0 * gradient / 60.0
         ),
-        None => "Without a line rate it cannot be said how much: --line-rate would tell, and until then the errors \
-                are without it"
+        None => "Without a line rate it cannot be said how much, and the errors are without it"
             .to_owned(),
     }
 }

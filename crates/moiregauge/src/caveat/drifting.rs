@@ -128,8 +128,7 @@ explain! { DriftDoubt:
     Undetermined "drift-undetermined" Serious
         "The scans do not tell the drift, and nothing is corrected for it. Drift stretches and shears a lattice and looks \
          like strain."
-        "Take frames up and down of the same place, at a moderate distance in time. A drift that is known from elsewhere \
-         can be given."
+        "Take frames up and down of the same place, one after the other. A drift that is known from elsewhere can be given."
     Given "drift-given" Note
         "The drift is the one that was given. Twist and strain are as right as it is: within its stated uncertainty, \
          which is in the errors."

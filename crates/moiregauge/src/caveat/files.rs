@@ -7,10 +7,10 @@ use crate::caveat::explained::explain;
 #[non_exhaustive]
 pub enum FileDoubt {
     /// The file holds other images that may be meant.
-    #[error("{0}{option}", option = .0.option())]
+    #[error(transparent)]
     SeveralImages(ImageChoice),
     /// Another channel than the usual one was taken.
-    #[error("{channel} {why}{option}", option = .why.option())]
+    #[error("{channel} {why}")]
     ChannelChosen {
         /// The channel.
         channel: String,
@@ -33,7 +33,7 @@ pub enum FileDoubt {
         of: Option<String>,
     },
     /// What the user does not want is not there.
-    #[error("--exclude {pattern:?} fits none of the scans")]
+    #[error("no scan has the name {pattern:?}, which was to be left out")]
     NothingExcluded {
         /// As the user said it.
         pattern: String,
@@ -80,15 +80,6 @@ pub enum ImageChoice {
     },
 }
 
-impl ImageChoice {
-    fn option(&self) -> &'static str {
-        match self {
-            Self::First { .. } => "; --image N says which one",
-            Self::UnusualNames { .. } => "; --channel NAME says which one shows the moiré",
-        }
-    }
-}
-
 /// Why a channel was taken.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ChannelReason {
@@ -98,15 +89,6 @@ pub enum ChannelReason {
     /// No channel shows a lattice, and stripes stand out best in this one.
     #[error("is mapped, which shows the stripes best")]
     BestStripes,
-}
-
-impl ChannelReason {
-    fn option(&self) -> &'static str {
-        match self {
-            Self::NoLatticeIn(_) => "; --channel NAME says which channel shows the moiré",
-            Self::BestStripes => "; --channel NAME says which channel shows them",
-        }
-    }
 }
 
 fn repeated(of: Option<&String>) -> String {

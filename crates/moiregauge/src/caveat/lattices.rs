@@ -85,7 +85,7 @@ pub enum LatticeDoubt {
 pub enum LineDifference {
     /// They show different lattices.
     #[error(
-        "{} ({}): one of them is none of the sample's; the scan is not used, --line says which to believe",
+        "{} ({}): one of them is none of the sample's; the scan is not used",
         Self::OTHER_LATTICES, wavelengths(.trace, .retrace)
     )]
     OtherLattices {

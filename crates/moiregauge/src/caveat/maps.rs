@@ -43,7 +43,7 @@ pub enum MapDoubt {
     #[error(
         "the frame is small for its window: the margin is {margin:.2} windows wide and not two. Windows there are cut by \
          the edge; what that does to their noise, and what leaks through them, is in their errors, but they see less of \
-         the outer side (--margin 2 leaves such nodes out)"
+         the outer side"
     )]
     NarrowMargin {
         /// Its width, windows.
@@ -127,7 +127,7 @@ fn not_corrected(of: Mapped) -> &'static str {
             "the drift of some images is not known: it stretches and shears their maps, the same everywhere"
         }
         Mapped::Stripes => {
-            "the drift is not known: it stretches and shears the map, the same everywhere (--drift)"
+            "the drift is not known: it stretches and shears the map, the same everywhere"
         }
     }
 }

@@ -21,7 +21,7 @@ pub enum OrientationDoubt {
     /// The orientation needs too much isotropic strain.
     #[error(
         "the orientation that was given would need an isotropic heterostrain of {:+.2} %{}: it is that of another vector \
-         (30° off for a hexagonal layer; see --lattice-angle-of), another layer or another sample",
+         (30° off for a hexagonal layer), another layer or another sample",
         100.0 * .strain,
         .other.map_or_else(String::new, |other| format!(", one 30° further {:+.2} %", 100.0 * other))
     )]

@@ -86,8 +86,7 @@ pub enum PatternDoubt {
     NoDomains,
     /// The contrast of nodes is open.
     #[error(
-        "the image does not tell whether nodes are bright or dark: triangles may stand on domains instead of nodes; say \
-         --nodes bright or dark"
+        "the image does not tell whether nodes are bright or dark: triangles may stand on domains instead of nodes"
     )]
     NodesBrightOrDark,
     /// The mesh has gaps.

@@ -13,7 +13,7 @@ pub enum PositionDoubt {
     /// A frame without sensors is turned.
     #[error(
         "the frame is turned by {:.4}° against the laboratory axes, in which vectors and angles are given; \
-         in the axes of the image, which --rotation 0 gives, all angles are smaller by that",
+         in the axes of the image all angles are smaller by that",
         .rotation.to_degrees()
     )]
     FrameTurned {

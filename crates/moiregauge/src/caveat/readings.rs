@@ -9,7 +9,7 @@ pub enum ReadingDoubt {
     /// Layers of different size: isotropic strain and twist cannot be told apart.
     #[error(
         "the layers of {layers} differ in size, so that twist and strain trade at first order: the moiré is as well one \
-         of {}; {}{}. The orientation of a layer (--lattice-angle, --atomic) would tell",
+         of {}; {}{}. The orientation of a layer would tell",
         all_choices(.choices), by_shift(*.shift), in_all(*.interval)
     )]
     TwistTradesWithStrain {

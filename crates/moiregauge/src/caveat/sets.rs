@@ -25,7 +25,7 @@ pub enum SetDoubt {
         if *.by_rule {
             "more than a fifth of the scans are never left out by rule"
         } else {
-            "it is used all the same; --exclude NAME or --exclude-outliers leaves it out"
+            "it is used all the same"
         }
     )]
     OutlyingScan {
@@ -41,7 +41,7 @@ pub enum SetDoubt {
         by_rule: bool,
     },
     /// A scan was left out by rule.
-    #[error("left out by --exclude-outliers: {reason}")]
+    #[error("left out by rule: {reason}")]
     ScanLeftOut {
         /// Why.
         reason: String,

@@ -51,7 +51,7 @@ pub enum DriftError {
     #[error(
         "the scans cannot determine the drift (rank {rank} of 6, condition {condition:.0}): scans of \
          both slow directions (up and down), of both slow axes, or of two line rates are needed; a \
-         drift known from elsewhere can be given with --drift"
+         drift known from elsewhere can be given"
     )]
     Undetermined {
         /// Numerical rank of the six-parameter problem.

@@ -35,7 +35,7 @@ pub enum LatticeError {
     /// The lattice shows in the spectrum, but this method gets no hold of it.
     #[error(
         "the spectrum shows a lattice, but the {method:?} method finds too few of its peaks: noise \
-         hides them or the frame is too small for them; --method fourier may do"
+         hides them or the frame is too small for them; the Fourier transform of the image may do"
     )]
     NoPeaks {
         /// The method.
@@ -44,8 +44,7 @@ pub enum LatticeError {
     /// Several lattices were asked for.
     #[error(
         "{wanted} lattices were asked for, of which {found} can be found: what else stands out is noise or lies on \
-         the waves of these, as their harmonics do and those of a lattice that is nearly commensurate with them; --moires \
-         {found} measures what is there"
+         the waves of these, as their harmonics do and those of a lattice that is nearly commensurate with them"
     )]
     FewerLattices {
         /// How many there are.

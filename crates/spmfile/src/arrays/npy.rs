@@ -3,7 +3,7 @@
 //! In: the bytes of a file; out: an image. The header is a Python dictionary of three keys
 //! (`numpy.lib.format`), read here by its keys rather than as Python.
 
-use super::Plane;
+use super::plane::Plane;
 use crate::cursor::{Cursor, Endian};
 use crate::raster::{self, Encoding, Order};
 

@@ -10,7 +10,7 @@ use zune_core::colorspace::ColorSpace;
 use zune_core::options::DecoderOptions;
 use zune_jpeg::JpegDecoder;
 
-use super::{Plane, turn};
+use super::plane::{Plane, turn};
 use crate::archive::unpacked_limit;
 use crate::cursor::Endian;
 use crate::labels;

@@ -6,7 +6,7 @@
 //! Gwyddion writes (`Channel`, `Width`, `Height`, `Value units`) are understood, and the
 //! `key = value` of files written here.
 
-use super::{Plane, Told, turn};
+use super::plane::{Plane, Told, turn};
 use crate::labels;
 use crate::scan::Samples;
 use crate::units::{clean, nm_per};

@@ -2,7 +2,7 @@
 //!
 //! Values are in the unit of the channel. What else is known (unit, size, how the frame was scanned,
 //! what was done with it) goes along as lines `key = value`: in a text beside each array of an
-//! archive, in the description of each picture, in comments above a matrix. [`super::read`] takes it
+//! archive, in the description of each picture, in comments above a matrix. [`super::read()`] takes it
 //! back.
 
 use std::fmt::Write as _;

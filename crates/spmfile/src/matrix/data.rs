@@ -1,7 +1,7 @@
 //! The file of one channel: counts in the order of recording.
 
 use super::blocks::{self, cursor, letters};
-use super::{FORMAT, MAGIC, damaged};
+use super::format::{FORMAT, MAGIC, damaged};
 use crate::error::ReadError;
 
 /// What the file of a channel holds.

@@ -3,15 +3,14 @@
 use std::collections::BTreeSet;
 
 use super::data::Data;
+use super::format::{FORMAT, damaged, unsupported};
 use super::frame::{Shape, Understood};
 use super::log::{self, State};
 use super::names::{Name, parse};
-use super::{FORMAT, damaged, unsupported};
-use crate::ChannelInfo;
 use crate::clock;
 use crate::error::ReadError;
 use crate::scan::{
-    Channel, DateTime, FrameDirection, LineDirection, Scan, Span, UnreadableChannel,
+    Channel, ChannelInfo, DateTime, FrameDirection, LineDirection, Scan, Span, UnreadableChannel,
 };
 
 /// Units, as far as they were met in descriptions.

@@ -6,7 +6,7 @@
 use std::collections::{BTreeMap, HashMap};
 
 use super::blocks::{self, Block, Value, cursor, letters};
-use super::{MAGIC, damaged};
+use super::format::{MAGIC, damaged};
 use crate::cursor::Cursor;
 use crate::error::ReadError;
 

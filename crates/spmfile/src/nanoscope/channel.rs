@@ -3,8 +3,7 @@
 use std::ops::Range;
 
 use super::header::{Section, leading_number};
-use crate::ChannelInfo;
-use crate::scan::{FrameDirection, LineDirection, Samples};
+use crate::scan::{ChannelInfo, FrameDirection, LineDirection, Samples};
 
 /// Where a channel's samples lie in the file.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -1,0 +1,361 @@
+//! The run: images of a known lattice → the calibration, printed and written.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use anyhow::{Context as _, bail, ensure};
+use heterostrain::material::Material;
+use indicatif::ProgressBar;
+use moiregauge::calibration::KnownLattice;
+use moiregauge::campaign::Calibrated;
+use moiregauge::scan::{MeasureError, MeasuredScan, measure_known};
+use moiregauge::settings::{Grouping, MOST_IMAGES, Settings};
+use moiregauge_pipeline::sink::OneFile;
+use moiregauge_report::screen::failures;
+use moiregauge_report::{FailedInput, InputFile};
+use rayon::prelude::*;
+
+use super::{file, words};
+use crate::analyze::{BackgroundArg, LineArg, given_again, with_hint};
+use crate::config;
+use crate::input::{Known, KnownArgs};
+use crate::numbers;
+use crate::paths::inputs;
+use crate::progress::bar;
+use crate::reading::{Reading, read};
+use crate::say::say;
+
+/// Measure gain, mismatch and orthogonality of a scanner on images of a known lattice
+///
+/// The lattice of each image is found from its known size, at any orientation; frames up and down (or of both
+/// slow axes, or of two line rates) separate the drift. What is left against the known lattice is the
+/// distortion of the scanner: of its position sensors, or of its nominal coordinates where there are none. A
+/// turn is not seen. `moiregauge analyze --calibration FILE` corrects positions with it and takes its errors
+/// into the budget. Frames of one direction give the distortion too, but not what of it is drift.
+#[derive(clap::Args, Clone, Debug)]
+#[command(after_long_help = "\
+Examples:
+  moiregauge calibrate hopg_up.spm hopg_down.spm --material graphite --out scanner.toml
+  moiregauge calibrate si/*.sxm --material si111-7x7 --channel Z --out scanner.toml
+  moiregauge calibrate grid/ --lattice 0.5nm,0.62nm,103 --lattice-sigma 0.1
+  moiregauge calibrate one.sxm --material graphite --drift-sigma 0.2
+  moiregauge analyze scans/ --out results --calibration scanner.toml
+
+Lengths are shown (1 + gain) times too long, those along x more than those along y by the mismatch;
+the axes shown enclose a right angle less the orthogonality error.")]
+pub(crate) struct CalibrateArgs {
+    /// Scan files, folders (the scans in them, without subfolders) or names with * and ?
+    #[arg(required = true, value_name = "PATH")]
+    paths: Vec<PathBuf>,
+    /// The lattice that the images show: graphite, mica, si111-7x7, si111, au111 or a layer (graphene, hBN, …)
+    #[arg(long, value_name = "NAME", required_unless_present_any = ["lattice", "lattice_constant"])]
+    material: Option<String>,
+    /// TOML file with layers of your own, one [[layer]] table each, for --material
+    #[arg(long, value_name = "FILE", requires = "material")]
+    materials: Option<PathBuf>,
+    /// Any lattice: two lengths and the angle between them in degrees, as in 0.5nm,0.62nm,103
+    #[arg(long, value_name = "A,B,ANGLE", value_parser = parse_lattice, conflicts_with_all = ["material", "lattice_constant"])]
+    lattice: Option<Cell>,
+    /// A hexagonal lattice by its constant, as in 0.246nm
+    #[arg(long, value_name = "LENGTH", value_parser = parse_length, conflicts_with = "material")]
+    lattice_constant: Option<f64>,
+    /// Standard uncertainty of the known lattice, per cent [default: the material's; 0.1 for one of your own]
+    #[arg(long, value_name = "PERCENT", value_parser = numbers::number([0.0, 10.0]))]
+    lattice_sigma: Option<f64>,
+    /// File for the calibration (TOML)
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Standard deviation of each component of a drift that the frames cannot tell, nm/min
+    #[arg(long, value_name = "NM/MIN", default_value_t = 1.0, value_parser = numbers::number(numbers::NOT_NEGATIVE))]
+    drift_sigma: f64,
+    /// Channel that shows the lattice [default: the first of the usual ones]
+    #[arg(long, value_name = "NAME")]
+    channel: Option<String>,
+    /// Of several images of the channel in one file (pages, frames) this one [default: the first]
+    #[arg(long, value_name = "N", value_parser = numbers::count(1, MOST_IMAGES))]
+    image: Option<usize>,
+    /// Line directions to use [default: both]
+    #[arg(long, value_enum)]
+    line: Option<LineArg>,
+    /// What is subtracted from an image first [default: plane]
+    #[arg(long, value_enum)]
+    background: Option<BackgroundArg>,
+    #[command(flatten)]
+    known: KnownArgs,
+    /// Write over an earlier calibration
+    #[arg(long, requires = "out")]
+    force: bool,
+    /// Print nothing but errors
+    #[arg(long, short)]
+    quiet: bool,
+}
+
+/// A lattice as it is typed in.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Cell {
+    a_nm: f64,
+    b_nm: f64,
+    angle_deg: f64,
+}
+
+/// Measures the images, prints what they say, and writes the file.
+pub(crate) fn run(args: &CalibrateArgs) -> anyhow::Result<ExitCode> {
+    let lattice = args.known_lattice()?;
+    let cell = lattice
+        .cell()
+        .context("the known lattice has no area: expected two vectors that are not parallel")?;
+    let defaults = Settings::default();
+    let settings = Settings {
+        channel: args.channel.clone(),
+        image: args.image,
+        line: args.line.map_or(defaults.line, Into::into),
+        background: args.background.map_or(defaults.background, Into::into),
+        ..defaults
+    };
+    let (inputs, mut failed) = inputs(&args.paths, !args.quiet);
+    let (inputs, repeated) = moiregauge_pipeline::distinct(&inputs);
+    let file = |out| crate::outputs::file(out, args.force, &inputs);
+    let file = args.out.as_deref().map(file).transpose()?;
+    let known = args.known.of(&inputs);
+    let bar = bar("measuring", "scans", inputs.len(), !args.quiet);
+    let all = measured_all(&inputs, &bar, |path| {
+        measured(path, &settings, &known, &cell)
+    });
+    failed.extend(all.failed);
+    let (scans, files) = (all.scans, all.files);
+    eprint!("{}", failures(&failed));
+    ensure!(
+        !scans.is_empty() || all.looked_at > 0,
+        "nothing could be read: there is no image to look for the lattice of {} in",
+        lattice.name
+    );
+    ensure!(
+        !scans.is_empty(),
+        "no image shows the lattice of {}",
+        lattice.name
+    );
+    let sigma = args.drift_sigma / 60.0;
+    let mut found = moiregauge::campaign::calibrate(scans, &lattice, sigma, Grouping::Auto)?;
+    found.caveats.extend(given_again(&repeated));
+    if !args.quiet {
+        say(&words::summary(&found, &lattice))?;
+    }
+    if let (Some(out), Some(file)) = (&args.out, file) {
+        write(&found, &lattice, (args.drift_sigma, &files), (out, file))?;
+        if !args.quiet {
+            say(&format!(
+                "\nWritten to {0}; for moiregauge analyze --calibration {0}\n",
+                out.display()
+            ))?;
+        }
+    }
+    Ok(if failed.is_empty() {
+        ExitCode::SUCCESS
+    } else {
+        ExitCode::FAILURE
+    })
+}
+
+/// What the images of the known lattice tell.
+#[derive(Default)]
+struct All {
+    scans: Vec<MeasuredScan>,
+    files: Vec<InputFile>,
+    failed: Vec<FailedInput>,
+    /// Images in which no lattice was found.
+    looked_at: usize,
+}
+
+/// Measures all images.
+fn measured_all(
+    inputs: &[PathBuf],
+    bar: &ProgressBar,
+    measured: impl Fn(&Path) -> anyhow::Result<(MeasuredScan, InputFile)> + Sync,
+) -> All {
+    let results: Vec<_> = inputs
+        .par_iter()
+        .map(|path| {
+            let result = measured(path);
+            bar.inc(1);
+            result
+        })
+        .collect();
+    bar.finish_and_clear();
+    let mut all = All::default();
+    for (path, result) in inputs.iter().zip(results) {
+        match result {
+            Ok((scan, file)) => {
+                all.scans.push(scan);
+                all.files.push(file);
+            }
+            Err(error) => {
+                let cause = error.downcast_ref();
+                all.looked_at += usize::from(matches!(cause, Some(MeasureError::Lattice { .. })));
+                all.failed.push(FailedInput {
+                    file: moiregauge_pipeline::names::in_words(path),
+                    error: format!("{error:#}"),
+                });
+            }
+        }
+    }
+    all
+}
+
+/// Writes the calibration, unless nobody could use it.
+fn write(
+    found: &Calibrated,
+    lattice: &KnownLattice,
+    (drift_sigma, files): (f64, &[InputFile]),
+    (out, file): (&Path, OneFile),
+) -> anyhow::Result<()> {
+    ensure!(
+        found.covariance_known,
+        "{} is not written: nobody knows its errors, since the frames do not tell the drift and have no line \
+         rate; give --line-rate",
+        out.display()
+    );
+    if let Some(problem) = found.calibration.problem() {
+        bail!("{} is not written: {problem}", out.display());
+    }
+    let text = file::text(found, lattice, drift_sigma, files)?;
+    Ok(file.write(text.into_bytes())?)
+}
+
+/// One image of the known cell.
+fn measured(
+    path: &Path,
+    settings: &Settings,
+    known: &Known,
+    cell: &nalgebra::Matrix2<f64>,
+) -> anyhow::Result<(MeasuredScan, InputFile)> {
+    let Reading {
+        scan,
+        input,
+        caveats,
+    } = read(path, settings, known)?;
+    let measured = measure_known(&input.file, &scan, settings, cell);
+    let mut measured = measured.map_err(|error| {
+        let seen = matches!(error, MeasureError::Lattice { .. });
+        let error = with_hint(error);
+        if seen {
+            return error
+                .context("looking for the known lattice (another --channel may show it better)");
+        }
+        error
+    })?;
+    measured.caveats.extend(caveats);
+    measured.digest = Some(input.sha256.clone());
+    Ok((measured, input))
+}
+
+impl CalibrateArgs {
+    fn known_lattice(&self) -> anyhow::Result<KnownLattice> {
+        let own = self.lattice_sigma.unwrap_or(0.1);
+        let mut lattice = match (self.lattice, self.lattice_constant, &self.material) {
+            (Some(cell), _, _) => KnownLattice {
+                name: format!("{} × {} nm, {}°", cell.a_nm, cell.b_nm, cell.angle_deg),
+                a_nm: cell.a_nm,
+                b_nm: cell.b_nm,
+                angle_deg: cell.angle_deg,
+                sigma_percent: own,
+                source: "given by the user".to_owned(),
+            },
+            (_, Some(a), _) => {
+                KnownLattice::hexagonal(&format!("hexagonal, {a} nm"), a, own, "given by the user")
+            }
+            (_, _, Some(name)) => named(name, &config::own_materials(self.materials.as_deref())?)?,
+            _ => bail!("give --material, --lattice or --lattice-constant"),
+        };
+        if let Some(sigma) = self.lattice_sigma {
+            lattice.sigma_percent = sigma;
+        }
+        Ok(lattice)
+    }
+}
+
+/// A surface or a layer by its name, one of the user's `own` layers first.
+fn named(name: &str, own: &[Material]) -> anyhow::Result<KnownLattice> {
+    let of_user = own.iter().any(|m| m.name.eq_ignore_ascii_case(name.trim()));
+    if let Some(known) = KnownLattice::named(name).filter(|_| !of_user) {
+        return Ok(known);
+    }
+    if let Some(layer) = config::find_material(name, own) {
+        return Ok(KnownLattice::of_layer(&layer));
+    }
+    let surfaces = KnownLattice::all().into_iter().map(|k| k.name);
+    let layers = own.iter().cloned().chain(Material::all()).map(|m| m.name);
+    let all: Vec<String> = surfaces.chain(layers).collect();
+    bail!(
+        "unknown lattice {name:?}; known are {}; any other: --lattice A,B,ANGLE, --lattice-constant A or a layer \
+         of your own (--materials)",
+        all.join(", ")
+    )
+}
+
+/// A length with its unit; a bare number is nm.
+fn parse_length(text: &str) -> Result<f64, String> {
+    let with_unit = spmfile::length_nm(text);
+    let length = with_unit.or_else(|| text.trim().parse().ok());
+    numbers::within([0.01, 1e6], length).ok_or_else(|| {
+        "expected a length with a unit, as in 0.246nm, from 0.01 nm to 1 mm".to_owned()
+    })
+}
+
+fn parse_lattice(text: &str) -> Result<Cell, String> {
+    let parts: Vec<&str> = text.split(',').map(str::trim).collect();
+    let expected = "expected two lengths and an angle in degrees, as in 0.5nm,0.62nm,103";
+    let [a, b, angle] = parts.as_slice() else {
+        return Err(expected.to_owned());
+    };
+    let angle_deg: f64 = angle
+        .trim_end_matches('°')
+        .parse()
+        .map_err(|_| expected.to_owned())?;
+    if !(angle_deg > 5.0 && angle_deg < 175.0) {
+        return Err(format!(
+            "expected an angle between 5° and 175°, found {angle_deg}°"
+        ));
+    }
+    Ok(Cell {
+        a_nm: parse_length(a)?,
+        b_nm: parse_length(b)?,
+        angle_deg,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lattices_are_typed_with_units() {
+        let cell = parse_lattice("5 Å, 0.62nm,103°").unwrap();
+        assert!((cell.a_nm - 0.5).abs() < 1e-12);
+        assert_eq!((cell.b_nm, cell.angle_deg), (0.62, 103.0));
+        assert_eq!(parse_length("0.246"), Ok(0.246));
+        for wrong in ["0.5nm,0.6nm", "0.5nm,0.6V,90", "0.5nm,0.6nm,0", "a,b,c"] {
+            assert!(parse_lattice(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn surfaces_and_layers_have_names() {
+        assert_eq!(named("Si111-7x7", &[]).unwrap().a_nm, 2.688);
+        assert_eq!(named("hbn", &[]).unwrap().a_nm, 0.2504);
+        // Not all layers are hexagonal.
+        let telluride = named("WTe2 1T'", &[]).unwrap();
+        assert_eq!(telluride.angle_deg, 90.0);
+        assert!(telluride.b_nm > 1.7 * telluride.a_nm);
+        let mine = Material {
+            name: "graphite".to_owned(),
+            lattice_constant_nm: 0.2461,
+            ..Material::graphene()
+        };
+        assert_eq!(named("graphite", &[mine]).unwrap().a_nm, 0.2461);
+        let error = named("cheese", &[]).unwrap_err().to_string();
+        assert!(
+            error.contains("graphite") && error.contains("MoS2"),
+            "{error}"
+        );
+    }
+}

@@ -1,0 +1,128 @@
+//! The options of `moiregauge map`.
+
+use anyhow::{Context as _, ensure};
+use clap::{Args as _, FromArgMatches as _, ValueEnum};
+use moiregauge::survey::MapMethod;
+use moiregauge::window::Resolution;
+
+use super::domains::DomainArgs;
+use super::regions::RegionArgs;
+use crate::analyze::{AnalyzeArgs, Task};
+use crate::numbers;
+
+/// Maps of twist, strain, wavelength and orientation across an image, with the error of every node
+///
+/// The scans are analysed first as `moiregauge analyze` does; their drift and sensors correct the maps. Local
+/// wave vectors of all harmonics come from the phases under a Gaussian window; maps of scans of one place are
+/// compared and averaged. Nodes that are not to be believed (edges, weak signal, defects, boundaries) are
+/// marked with the reason.
+#[derive(clap::Args, Clone, Debug)]
+#[command(after_long_help = "\
+Examples:
+  moiregauge map scan.000 --out maps
+  moiregauge map scans/ --out maps --window 12
+  moiregauge map survey.npy --out maps --size 1.5um×1.5um --step 5
+  moiregauge map scan.000 --out maps --device 200nm×100nm --wanted 1.05±0.02
+  moiregauge map scan.000 --out maps --region bar=10,20,80,40 --region 'flake=0,0 1um,10nm 600nm,0.8um'
+  moiregauge map scan.000 --out maps --profile 'cut=0,0 100,80'
+  moiregauge map small_angle.sxm --out maps --domains on --nodes bright
+
+Written: report.html, map.zarr and map.gwy (all quantities, their errors, mask), map.json (summary), figures/,
+and what was asked for: regions.csv, profiles.csv, devices.csv, domains.csv, nodes.csv; columns.md explains them.")]
+pub(crate) struct MapArgs {
+    #[command(flatten)]
+    pub(super) analyze: AnalyzeArgs,
+    /// How local lattices are measured
+    #[arg(help_heading = "Maps", long, value_enum, default_value_t = MapMethodArg::Demodulation)]
+    pub(super) map_method: MapMethodArg,
+    /// Width of the Gaussian window (standard deviation), nm; a point becomes 2.35 of it wide [default: as
+    /// wide as the lattice stays straight, at least 0.6 periods]. By tiles: the side of a tile [default: 6
+    /// periods]
+    #[arg(long, value_name = "NM", value_parser = numbers::number(numbers::LENGTH_NM), help_heading = "Maps")]
+    window: Option<f64>,
+    /// Distance of the nodes, nm [default: a third of the window, two pixels at least; a quarter of a tile]
+    #[arg(long, value_name = "NM", value_parser = numbers::number(numbers::LENGTH_NM), help_heading = "Maps")]
+    step: Option<f64>,
+    /// Map in bands, as images of more than 20 million pixels are; several files are put side by side
+    #[arg(help_heading = "Maps", long)]
+    pub(super) in_bands: bool,
+    /// Margin at the edges, in windows [default: 2, or a quarter of the frame where that is less]
+    #[arg(long, value_name = "WINDOWS", value_parser = numbers::number([0.0, 10.0]), help_heading = "Maps")]
+    pub(super) margin: Option<f64>,
+    #[command(flatten)]
+    pub(super) regions: RegionArgs,
+    #[command(flatten)]
+    pub(super) domains: DomainArgs,
+}
+
+/// How local lattices are measured.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(super) enum MapMethodArg {
+    /// Phases of all harmonics under a Gaussian window
+    Demodulation,
+    /// The fit of whole images on overlapping tiles: slower and coarser, for comparison
+    Tiles,
+}
+
+impl MapMethodArg {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Demodulation => "demodulation",
+            Self::Tiles => "tiles",
+        }
+    }
+}
+
+impl From<MapMethodArg> for MapMethod {
+    fn from(value: MapMethodArg) -> Self {
+        match value {
+            MapMethodArg::Demodulation => Self::Demodulation,
+            MapMethodArg::Tiles => Self::Tiles,
+        }
+    }
+}
+
+impl MapArgs {
+    /// The options of the run to be repeated, with the place and the words of this one.
+    pub(super) fn again(&self, task: &Task) -> anyhow::Result<Self> {
+        let no_map = "--replay: the document does not hold the options of a map";
+        let recorded = task.run.arguments.split_first();
+        let (_, options) = recorded
+            .filter(|(command, _)| *command == "map")
+            .context(no_map)?;
+        // Where results go is no part of what was asked.
+        let place = ["map", "--out", "."].map(str::to_owned);
+        let command = Self::augment_args(clap::Command::new("map")).allow_negative_numbers(true);
+        let given = command.try_get_matches_from(place.iter().chain(options));
+        let mut args = Self::from_arg_matches(&given.context(no_map)?).context(no_map)?;
+        args.analyze = args.analyze.with_place_of(&self.analyze);
+        Ok(args)
+    }
+
+    /// Refuses what a map has no use for, and names that are used twice.
+    pub(super) fn check(&self, task: &Task) -> anyhow::Result<()> {
+        ensure!(
+            task.run.atomic.is_none() && task.run.export.is_empty() && !task.run.parquet,
+            "--atomic, --export and --parquet are for `moiregauge analyze`: a map has no use for them"
+        );
+        self.regions.check()?;
+        ensure!(
+            self.analyze.survey_image().is_none(),
+            "--survey-image is for analyze"
+        );
+        Ok(())
+    }
+
+    pub(super) fn resolution(&self) -> Resolution {
+        Resolution {
+            window_nm: self.window,
+            step_nm: self.step,
+            margin: self.margin,
+        }
+    }
+
+    /// How local lattices are measured, for the results.
+    pub(super) fn method_name(&self) -> &'static str {
+        self.map_method.name()
+    }
+}

@@ -1,0 +1,65 @@
+//! What has to be said of maps beside their numbers.
+
+use moiregauge::caveat::{Caveat, DriftDoubt, MapDoubt, Mapped};
+use moiregauge::map::register;
+use moiregauge::map::{DriftChange, LatticeMap};
+use moiregauge::survey::LineMap;
+
+/// Shifts beyond this share of a period may belong to another one.
+const FAR: f64 = 0.3;
+
+/// Says that no twist and strain go with the map.
+pub(super) fn no_twist_strain(why: &impl std::fmt::Display) -> Caveat {
+    let reason = why.to_string();
+    Caveat::new(MapDoubt::NoTwistStrain { reason }, "map")
+}
+
+/// Says that the drift changes, where it does.
+pub(super) fn about_change(drift_change: Option<DriftChange>, caveats: &mut Vec<Caveat>) {
+    if let Some(found) = drift_change.filter(DriftChange::stands_out) {
+        let acceleration = found.acceleration;
+        caveats.push(Caveat::new(DriftDoubt::Changes { acceleration }, "map"));
+    }
+}
+
+/// Says that the margin is narrower than two windows where nobody asked for that.
+pub(super) fn narrow_margin(margin: f64, file: &str) -> Option<Caveat> {
+    let doubt = MapDoubt::NarrowMargin { margin };
+    (margin > 0.0 && margin < 1.99).then(|| Caveat::new(doubt, file))
+}
+
+/// What is not as good as it could be.
+pub(super) fn of_maps(maps: &[LineMap], caveats: &mut Vec<Caveat>) {
+    if maps.iter().any(|m| !m.drift_corrected) {
+        let doubt = MapDoubt::NotDriftCorrected {
+            of: Mapped::Lattice,
+        };
+        caveats.push(Caveat::new(doubt, "map"));
+    }
+    if let Some(guessed) = maps.iter().find(|m| !m.noise_measured) {
+        let doubt = MapDoubt::NoiseGuessed {
+            of: Mapped::Lattice,
+        };
+        caveats.push(Caveat::new(doubt, guessed.file.as_str()));
+    }
+}
+
+/// Puts the maps on each other by the phases of the pattern.
+pub(super) fn registered(maps: &mut [LineMap], caveats: &mut Vec<Caveat>) {
+    let mut all: Vec<&mut LatticeMap> = maps.iter_mut().map(|m| &mut m.map).collect();
+    let found = register(&mut all);
+    for (map, found) in maps.iter().zip(found) {
+        if found.is_some_and(|f| f.reversed) {
+            let doubt = MapDoubt::ContrastReversed { line: map.line };
+            caveats.push(Caveat::new(doubt, map.file.as_str()));
+        }
+        let Some(found) = found.filter(|f| f.of_period > FAR) else {
+            continue;
+        };
+        let doubt = MapDoubt::Registration {
+            shift: found.shift,
+            of_period: found.of_period,
+        };
+        caveats.push(Caveat::new(doubt, map.file.as_str()));
+    }
+}

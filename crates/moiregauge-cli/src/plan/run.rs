@@ -1,0 +1,138 @@
+//! The run: wishes and conditions → the best plan, printed and written.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use anyhow::{Context as _, ensure};
+use moiregauge::settings::Settings;
+use moiregauge::simulate::{Simulation, Simulator};
+
+use super::search::{self, Limits};
+use super::wishes::Wishes;
+use super::words;
+use crate::numbers;
+use crate::say::say;
+use crate::scanner::ScannerArgs;
+
+/// How many scans, how fast and how large, for the errors that are wanted
+///
+/// For several frame sizes and line rates the smallest number of alternating scans is sought that gives the wanted
+/// standard errors, by the Fisher information of pixel and sensor noise and the covariance of the joint fit;
+/// `moiregauge validate` simulates the same. Beside it stands what no number of scans makes smaller: the
+/// calibration of the scanner, the lattice constant, isotropic strain. A wish below that cannot be reached, and the
+/// plan says what stands in the way.
+#[derive(clap::Args, Clone, Debug)]
+#[command(after_long_help = "\
+Examples:
+  moiregauge plan --twist-sigma 0.02
+  moiregauge plan --twist-sigma 0.001 --strain-sigma 0.005 --like scan.000.spm scan.001.spm
+  moiregauge plan --drift-sigma 0.01 --max-size 100 --max-rate 8 --calibration scanner.toml
+  moiregauge plan --strain-sigma 0.02 --config mine.toml --out plan.toml
+  moiregauge validate --config plan.toml              (simulates the recommended plan)
+
+The wanted errors are meant with calibration and model; one that these alone exceed is held against the
+statistical error of the scans, and said to be out of reach.")]
+pub(crate) struct PlanArgs {
+    /// Wanted standard error of the twist, degrees
+    #[arg(long, value_name = "DEG", required_unless_present_any = ["strain_sigma", "drift_sigma"], value_parser = numbers::number(numbers::WISH))]
+    twist_sigma: Option<f64>,
+    /// Wanted standard error of each component of the strain vector, per cent
+    #[arg(long, value_name = "PERCENT", value_parser = numbers::number(numbers::WISH))]
+    strain_sigma: Option<f64>,
+    /// Wanted standard error of each component of the drift, nm/min
+    #[arg(long, value_name = "NM/MIN", value_parser = numbers::number(numbers::WISH))]
+    drift_sigma: Option<f64>,
+    /// The instrument and the sample: a file as `moiregauge simulate --print-config` prints it
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// The instrument and the sample: those of your own scans of one set
+    #[arg(long, value_name = "FILE", num_args = 1.., conflicts_with = "config")]
+    like: Vec<PathBuf>,
+    /// Largest frame, nm along the longer side [default: twice that of the conditions]
+    #[arg(long, value_name = "NM", value_parser = numbers::number(numbers::LENGTH_NM))]
+    max_size: Option<f64>,
+    /// Largest line rate, Hz [default: twice that of the conditions]
+    #[arg(long, value_name = "HZ", value_parser = numbers::number(numbers::LINE_RATE_HZ))]
+    max_rate: Option<f64>,
+    /// The noise of a pixel does not depend on the time spent on it. Otherwise its square is taken to fall with
+    /// that time, from the line rate of the conditions on
+    #[arg(long)]
+    noise_per_pixel: bool,
+    /// Standard uncertainty of the times of frames, s
+    #[arg(long, value_name = "S", default_value_t = 0.6, value_parser = numbers::number(numbers::TIME_S))]
+    frame_time_sigma: f64,
+    #[command(flatten)]
+    scanner: ScannerArgs,
+    /// Write the recommended plan as conditions for `moiregauge validate` and `simulate`
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Write over an earlier plan
+    #[arg(long, requires = "out")]
+    force: bool,
+}
+
+/// Searches and prints.
+pub(crate) fn run(args: &PlanArgs) -> anyhow::Result<ExitCode> {
+    let inputs: Vec<PathBuf> = args.config.iter().chain(&args.like).cloned().collect();
+    let file = |out| crate::outputs::file(out, args.force, &inputs);
+    let file = args.out.as_deref().map(file).transpose()?;
+    let given = crate::validate::given_conditions(args.config.as_deref(), &args.like)?;
+    let mut conditions = given.unwrap_or_default();
+    // What the header of a file says of its time is rounded to whole seconds: 0.29 s.
+    let clock = args.frame_time_sigma.powi(2) - 1.0 / 12.0;
+    conditions.noise.clock_s = clock.max(0.0).sqrt();
+    Simulator::new(conditions.clone()).context("these conditions make no sense")?;
+    ensure!(
+        conditions.noise.pixel_deg > 0.0,
+        "the conditions have no noise (noise.pixel_deg): every error would be zero"
+    );
+    let settings = args.settings(&conditions)?;
+    let wishes = Wishes {
+        twist_deg: args.twist_sigma,
+        strain_percent: args.strain_sigma,
+        drift_nm_per_min: args.drift_sigma,
+    };
+    let longest = conditions
+        .raster
+        .nominal_size_nm
+        .iter()
+        .zip(conditions.window.gain)
+        .map(|(size, gain)| size * gain)
+        .fold(0.0, f64::max);
+    let limits = Limits {
+        size_nm: args.max_size.unwrap_or(2.0 * longest),
+        rate_hz: args
+            .max_rate
+            .unwrap_or(2.0 * conditions.raster.line_rate_hz),
+        noise_per_pixel: args.noise_per_pixel,
+    };
+    let plans = search::plans(&conditions, &settings, &wishes, &limits);
+    let best = plans.first().context(
+        "no frame within --max-size and --max-rate shows the lattice: at least four periods across it, five pixels \
+         per period, and a signal that stands out of the noise are needed",
+    )?;
+    say(&words::plan(&conditions, &settings, &wishes, &plans))?;
+    if let (Some(out), Some(file)) = (&args.out, file) {
+        file.write(toml::to_string_pretty(&best.set)?.into_bytes())?;
+        say(&format!(
+            "\nWritten to {0}; moiregauge validate --config {0} simulates it\n",
+            out.display()
+        ))?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+impl PlanArgs {
+    /// What is known of scanner and layers.
+    fn settings(&self, conditions: &Simulation) -> anyhow::Result<Settings> {
+        let mut settings = Settings {
+            material: conditions.sample.material.clone(),
+            strain_convention: conditions.sample.strain_convention,
+            frame_time_sigma_s: self.frame_time_sigma,
+            ..Settings::default()
+        };
+        self.scanner.apply(&mut settings)?;
+        crate::config::check(&settings)?;
+        Ok(settings)
+    }
+}

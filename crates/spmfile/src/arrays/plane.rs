@@ -1,0 +1,95 @@
+//! One image of an array or a picture, and what its file says of it.
+
+use crate::labels;
+use crate::scan::Samples;
+
+/// One image, lines from the bottom up.
+pub(super) struct Plane {
+    pub(super) rows: usize,
+    pub(super) columns: usize,
+    pub(super) samples: Samples,
+    /// Whether it is the luminance of a coloured picture.
+    pub(super) rendering: bool,
+    /// What the file says of it; only files written here do.
+    pub(super) carried: Vec<(String, String)>,
+}
+
+/// What a file says beside its numbers; only text files do.
+#[derive(Debug, Default)]
+pub(super) struct Told {
+    pub(super) name: Option<String>,
+    pub(super) unit: Option<String>,
+    pub(super) size_nm: Option<[f64; 2]>,
+    /// How the frame was scanned, as [`labels::describe`] has it.
+    pub(super) lines: Vec<(String, String)>,
+    /// Of the channel: as [`labels::describe_channel`] has it.
+    pub(super) channel: Vec<(String, String)>,
+}
+
+impl Told {
+    /// What a plane carries along.
+    pub(super) fn by(plane: &mut Plane) -> Self {
+        let (lines, channel) = labels::carried(std::mem::take(&mut plane.carried));
+        let value = |key: &str| labels::value(&channel, key).map(str::to_owned);
+        let length = |key: &str| {
+            let nm: f64 = labels::value(&channel, key)?.parse().ok()?;
+            (nm > 0.0 && nm.is_finite()).then_some(nm)
+        };
+        Self {
+            name: value("name"),
+            unit: value("unit"),
+            size_nm: length("width (nm)")
+                .zip(length("height (nm)"))
+                .map(|(width, height)| [width, height]),
+            lines,
+            channel,
+        }
+    }
+
+    /// What is told twice is taken from `self`.
+    pub(super) fn or(self, other: Self) -> Self {
+        if other.name.is_some() || !other.lines.is_empty() {
+            return Self {
+                name: other.name.or(self.name),
+                unit: other.unit.or(self.unit),
+                size_nm: other.size_nm.or(self.size_nm),
+                ..other
+            };
+        }
+        self
+    }
+}
+
+/// Turns lines from the top down into lines from the bottom up, in place.
+pub(super) fn turn<T>(values: &mut [T], columns: usize) {
+    if columns == 0 {
+        return;
+    }
+    let rows = values.len() / columns;
+    let (lower, upper) = values.split_at_mut(rows / 2 * columns);
+    for (low, high) in lower
+        .chunks_exact_mut(columns)
+        .zip(upper.rchunks_exact_mut(columns))
+    {
+        low.swap_with_slice(high);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_are_turned() {
+        for rows in 0..6 {
+            let mut values: Vec<usize> = (0..3 * rows).collect();
+            turn(&mut values, 3);
+            let expected: Vec<usize> = (0..rows)
+                .rev()
+                .flat_map(|row| 3 * row..3 * row + 3)
+                .collect();
+            assert_eq!(values, expected);
+        }
+        turn::<u8>(&mut [], 0);
+    }
+}
