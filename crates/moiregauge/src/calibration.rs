@@ -69,7 +69,7 @@ const SURFACES: [(&str, f64, f64, &str); 5] = [
     ),
 ];
 
-/// Lengths that the vectors of a known lattice can have, nm.
+/// Lengths that the vectors of a known lattice can have, nm: from below any bond of atoms to the coarsest grating.
 const LENGTHS: std::ops::RangeInclusive<f64> = 0.05..=1e5;
 
 impl KnownLattice {
@@ -187,20 +187,21 @@ pub struct Calibration {
     pub line_rates_hz: Vec<f64>,
 }
 
-/// Gain (per cent), mismatch (per cent) and deviation from a right angle (mrad) that no position sensors have: they are
-/// calibrated, if badly.
+/// Gain (per cent), mismatch (per cent) and deviation from a right angle (mrad) that no position sensors have: they
+/// are calibrated, if badly. Twenty or more times what is assumed without a calibration.
 const WORST_SENSORS: [f64; 3] = [20.0, 10.0, 100.0];
 /// The same for nominal coordinates: an open piezo tube makes a frame of 55 nm where 70 nm are asked for.
 const WORST_NOMINAL: [f64; 3] = [40.0, 25.0, 200.0];
-/// Standard uncertainties beyond which a calibration tells less than none.
+/// Standard uncertainties beyond which a calibration tells less than none: five times (gain) and twenty times what is
+/// assumed without one.
 const MOST_UNCERTAIN: [f64; 3] = [5.0, 10.0, 100.0];
-/// What the three numbers are called, and their units.
+/// What the three numbers are called, and their units, for words about wrong settings.
 const NAMES: [(&str, &str); 3] = [
     ("the common gain", "%"),
     ("the mismatch of x and y", "%"),
     ("the deviation from a right angle", "mrad"),
 ];
-/// Units of a calibration: per cent, per cent, mrad.
+/// Units of a calibration: per cent, per cent, mrad, as scanners are specified.
 const UNITS: [f64; 3] = [100.0, 100.0, 1000.0];
 
 /// What common gain, mismatch and deviation from a right angle are as matrices: F − 1 per unit.

@@ -22,11 +22,14 @@ use crate::strain::layers::Layers;
 use crate::strain::names::{Labelled, LatticeName, all_names, change_to};
 use crate::strain::twist_strain::TwistStrain;
 
-/// Above this |q|/|p| the mirrored labelling (strain makes the moiré, twist distorts it) is listed.
+/// Above this |q|/|p| the mirrored labelling (strain makes the moiré, twist distorts it) is listed. Chosen by eye;
+/// see docs/constants.md.
 const MIRRORED_FROM: f64 = 0.3;
-/// Readings of layers of different, dissimilar lattices that need more strain are not listed.
+/// Readings of layers of different, dissimilar lattices that need more strain are not listed: three times the per
+/// cent that layers rarely reach.
 const LIKELY_STRAIN: f64 = 0.03;
-/// Readings of such layers that are listed for either sense of the twist, the least strained ones.
+/// Readings of such layers that are listed for either sense of the twist, the least strained ones: what a table can
+/// show.
 const LISTED: usize = 12;
 
 /// One exact solution of the strain equation.

@@ -19,9 +19,10 @@ use nalgebra::{Complex, Matrix4, Vector4};
 use crate::complex_pair::ComplexPair;
 use crate::strain::layers::{Layers, Stretch, strain_side};
 
-/// Steps of the grid on which roots of f are looked for.
+/// Steps of the grid on which roots of f are looked for: fine against its few turns.
 const GRID: usize = 720;
-/// An f that comes this near to zero touches it, as it does without strain, where `|N_q|` has a corner.
+/// An f that comes this near to zero touches it, as it does without strain, where `|N_q|` has a corner. Any small
+/// number above rounding.
 const TOUCHING: f64 = 1e-10;
 
 /// Which of the four solutions.
@@ -182,6 +183,7 @@ fn bisect(f: &dyn Fn(f64) -> f64, mut a: f64, mut b: f64) -> f64 {
 
 /// The lowest point of f between a and b, by golden section; stops at the first value below zero.
 fn extremum(f: &dyn Fn(f64) -> f64, mut a: f64, mut b: f64) -> f64 {
+    /// Share of an interval that a golden section keeps.
     const GOLDEN: f64 = 0.618_033_988_749_895;
     let mut best = f64::midpoint(a, b);
     for _ in 0..60 {

@@ -20,11 +20,11 @@ use crate::lattice::vectors::Lattice;
 use crate::strain::inversion::{ALL_SIGNS, solve};
 use crate::strain::layers::Layers;
 
-/// Largest number in the name of a moiré vector that is tried for layers of different lattices.
+/// Largest number in the name of a moiré vector that is tried for layers of different lattices. Chosen by eye.
 const LARGEST_ENTRY: i32 = 5;
-/// How many of these names are solved.
+/// How many of these names are solved: more than are listed. Chosen by eye.
 const SOLVED: usize = 32;
-/// Orientations at which names are compared.
+/// Orientations at which names are compared. Chosen by eye.
 const ORIENTATIONS: i32 = 180;
 
 /// `P = (A⁰ L⁻¹)ᵀ`; `None` for a lattice without area.

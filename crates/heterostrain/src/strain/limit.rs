@@ -80,7 +80,7 @@ fn lower_limit(r: f64, tail: f64) -> f64 {
     bisect((0.0, r), |t| 1.0 - probability_within(r, t) < tail)
 }
 
-/// Beyond this many σ a length is as good as normal.
+/// Beyond this many σ a length is as good as normal: its bias is 0.01 σ.
 const FAR: f64 = 50.0;
 
 /// Where r lies `z` deviations above its mean: r is normal about t + 1/2t with the deviation 1 − 1/4t².

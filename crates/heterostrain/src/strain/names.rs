@@ -16,10 +16,11 @@ use crate::strain::labelling::moire_matrix;
 use crate::strain::layers::Layers;
 
 /// Readings that need more strain are not listed: strains between layers are a few tenths of a per cent, rarely one.
+/// See docs/constants.md.
 const LARGEST_STRAIN: f64 = 0.01;
-/// Wave vectors that are tried, at most; the bound is lowered for lattices with more.
+/// Wave vectors that are tried, at most, for the time's sake; the bound is lowered for lattices with more.
 const MOST_WAVES: f64 = 4000.0;
-/// Names that are listed, at most.
+/// Names that are listed, at most. Chosen by eye.
 const MOST_NAMES: usize = 150;
 
 /// A name: the wave vectors `M₁ = h₁ K₁ + k₁ K₂` and `M₂ = h₂ K₁ + k₂ K₂` as `[[h₁, k₁], [h₂, k₂]]`, with

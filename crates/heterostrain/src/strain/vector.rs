@@ -8,7 +8,7 @@ use crate::estimate::Estimate;
 use crate::strain::inversion::reduce;
 use crate::strain::limit::{interval_95, upper_limit_95};
 
-/// The axis of the strain is quoted only if zero strain would give so large a vector less often.
+/// The axis of the strain is quoted only if zero strain would give so large a vector less often: 1 %, a convention.
 const SIGNIFICANT: f64 = 0.01;
 
 /// A strain in the laboratory frame, and its noise.

@@ -13,13 +13,15 @@ use nalgebra::{Matrix2, Vector2};
 use crate::drift::linear::Observation;
 use crate::scan::measured::MeasuredLine;
 
-/// What counts as much as one unit of cost: a misfit of the vectors, a drift over the speed of the slow axis, a distortion
-/// of the cell, a wrong size (logarithm).
+/// What counts as much as one unit of cost, all four by eye: a misfit of the vectors, ...
 const MISFIT: f64 = 0.01;
+/// ... a drift over the speed of the slow axis, ...
 const DRIFT: f64 = 0.5;
+/// ... a distortion of the cell, ...
 const DISTORTION: f64 = 0.1;
+/// ... a wrong size (logarithm).
 const SIZE: f64 = 0.2;
-/// Names with a larger misfit are not compared with the cell.
+/// Names with a larger misfit are not compared with the cell: thirty units of cost.
 const HOPELESS: f64 = 0.3;
 
 /// Lattices under names that one drift explains.

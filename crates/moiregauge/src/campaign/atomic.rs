@@ -29,19 +29,22 @@ use crate::numbers::chi2::enlargement;
 use crate::scan::measured::MeasuredScan;
 use crate::settings::knobs::Calibration;
 
-/// A lattice whose size differs from that of the material by more is another one.
+/// A lattice whose size differs from that of the material by more is another one. Chosen by eye.
 const LARGEST_ERROR: f64 = 0.15;
-/// A lattice free of drift that is further from the shape of the material's (`|q|/|p|`) is another one.
+/// A lattice free of drift that is further from the shape of the material's (`|q|/|p|`) is another one: one axis
+/// stretched by a fifth. Chosen by eye.
 const LARGEST_DISTORTION: f64 = 0.1;
-/// Frames up and down that a constant drift does not make of one another to this share contradict each other.
+/// Frames up and down that a constant drift does not make of one another to this share contradict each other. Chosen
+/// by eye; see docs/constants.md.
 const LARGEST_MISFIT: f64 = 0.05;
 /// With frames of one direction, another orientation with a distortion that is larger by less than this is as good.
+/// Chosen by eye; see docs/constants.md.
 const AMBIGUOUS: f64 = 0.1;
-/// Orientations that differ by less are the same, rad.
+/// Orientations that differ by less are the same, rad: two names of one lattice agree to rounding.
 const SAME_ANGLE: f64 = 1e-3;
-/// χ²/dof beyond which the scatter of the images deserves a word.
+/// χ²/dof beyond which the scatter of the images deserves a word: errors wrong by 1.4.
 const LARGE_SCATTER: f64 = 2.0;
-/// A size off by more than this many per cent of the priors deserves a word.
+/// A size off by more than this many per cent of the priors deserves a word: standard deviations, 3 as everywhere.
 const CLEARLY: f64 = 3.0;
 
 /// Why atomic images give no orientation.

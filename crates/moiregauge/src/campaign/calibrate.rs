@@ -34,15 +34,16 @@ use crate::numbers::chi2::enlargement;
 use crate::scan::measured::{MeasuredLine, MeasuredScan};
 use crate::settings::knobs::Grouping;
 
-/// Another way of naming the vectors that is not this much more distorted is a doubt.
+/// Another way of naming the vectors that is not this much more distorted is a doubt. Chosen by eye.
 const AMBIGUOUS: f64 = 0.1;
-/// Lattices of frames of one direction that differ by more than this share are of different things.
+/// Lattices of frames of one direction that differ by more than this share are of different things. Chosen by eye.
 const SAME: f64 = 0.35;
-/// Frames up and down that a constant drift does not make of one another to this share are not used.
+/// Frames up and down that a constant drift does not make of one another to this share are not used. Chosen by eye;
+/// see docs/constants.md.
 const LARGEST_MISFIT: f64 = 0.05;
-/// A drift of this share of the speed of the slow axis deserves a word.
+/// A drift of this share of the speed of the slow axis deserves a word. Chosen by eye.
 const LARGE_DRIFT: f64 = 0.2;
-/// χ²/dof of a set or between sets beyond which its scatter deserves a word.
+/// χ²/dof of a set or between sets beyond which its scatter deserves a word: errors wrong by 1.4.
 const LARGE_CHI2: f64 = 2.0;
 
 /// What scans of a known lattice say about the scanner.

@@ -20,17 +20,20 @@ use crate::numbers::chi2::enlargement;
 use crate::scan::measured::MeasuredScan;
 use crate::settings::knobs::Settings;
 
-/// Wavelengths that differ by more than this are not of the same lattice, …
+/// Wavelengths that differ by more than this are not of the same lattice: five times the calibration that is assumed,
+/// …
 const SAME_LATTICE: f64 = 0.05;
 /// … nor are those that differ by more than this if their errors do not explain it: χ² of four components beyond
-/// `NO_CHANCE` (p = 4·10⁻¹⁰).
+/// `NO_CHANCE`. Twice the calibration that is assumed.
 const NEARLY_SAME: f64 = 0.02;
+/// χ² of four components that is no chance: p = 4·10⁻¹⁰, since errors may be too small.
 const NO_CHANCE: f64 = 50.0;
-/// χ² of two components beyond which the drift of a set is not that of all sets.
+/// χ² of two components beyond which the drift of a set is not that of all sets: p = 10⁻⁴.
 const CONTRADICTION: f64 = 18.4;
-/// χ²/dof of all sets over that of the single ones beyond which they have no drift in common.
+/// χ²/dof of all sets over that of the single ones beyond which they have no drift in common: errors wrong by 1.7.
+/// Chosen by eye.
 const WORSE: f64 = 3.0;
-/// Sets this many σ apart deserve a word.
+/// Sets this many σ apart deserve a word: 3 as everywhere.
 const APART: f64 = 3.0;
 
 /// Weighted mean lattice of all sets that have one; `None` where there is none, or where the sets

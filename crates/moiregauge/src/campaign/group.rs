@@ -6,6 +6,9 @@ use crate::frame::axis::Axis;
 use crate::scan::measured::MeasuredScan;
 use crate::settings::knobs::Grouping;
 
+/// Line rates and sizes that differ by less than this share are the same: headers round them.
+const SAME: f64 = 0.01;
+
 /// The scans of one set, in order of time; at the end those that repeat others.
 pub(crate) struct Group {
     pub(crate) name: String,
@@ -32,10 +35,10 @@ pub(crate) fn groups(mut scans: Vec<MeasuredScan>, grouping: Grouping) -> Vec<Gr
                 return scan.set == other.set;
             }
             let same_rate = rate == group.line_rate_hz
-                || (rate - group.line_rate_hz).abs() < 0.01 * rate.abs()
+                || (rate - group.line_rate_hz).abs() < SAME * rate.abs()
                 || (rate.is_nan() && group.line_rate_hz.is_nan());
             let same_size = match (scan.size_nm, other.size_nm) {
-                (Some(a), Some(b)) => a.iter().zip(b).all(|(a, b)| (a - b).abs() < 0.01 * b),
+                (Some(a), Some(b)) => a.iter().zip(b).all(|(a, b)| (a - b).abs() < SAME * b),
                 (a, b) => a == b,
             };
             // Unfinished frames have fewer lines and belong to the set all the same.

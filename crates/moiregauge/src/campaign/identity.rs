@@ -16,7 +16,7 @@ const OF_NOISE: f64 = 0.2;
 const CERTAIN: f64 = 0.05;
 /// … and the noise has to be this share of the image: it is no rounding then and no misfit of the lattice.
 const NOISY: f64 = 0.02;
-/// Sizes that differ by more are different.
+/// Sizes that differ by more are different. Chosen by eye.
 const SIZE: f64 = 0.01;
 
 /// Noise of a pixel in standard deviations of the image, as the first harmonics of the fit see it; 0 where unknown.

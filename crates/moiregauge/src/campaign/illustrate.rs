@@ -14,9 +14,9 @@ use crate::scan::positions::sensor_images;
 use crate::settings::knobs::Settings;
 use crate::spectrum::pictures::pictures;
 
-/// Blocks along the longer side of a map of residuals, at most.
+/// Blocks along the longer side of a map of residuals, at most: as fine as a figure shows.
 const RESIDUAL_BLOCKS: usize = 128;
-/// Pixels along the longer side of a picture, at most.
+/// Pixels along the longer side of a picture, at most: as fine as a figure shows.
 const MOST_PIXELS: usize = 1024;
 
 /// The pictures behind the numbers of `analysed`, from the pixels of the same scan.

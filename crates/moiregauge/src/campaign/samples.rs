@@ -14,13 +14,16 @@ use crate::caveat::sets::{DifferentSamples, SetDoubt};
 use crate::scan::measured::MeasuredScan;
 use crate::settings::knobs::Settings;
 
-/// Lattices whose waves differ by more than this share along the fast axis are of different samples, or places: scanners
-/// repeat themselves better. Methods that read peaks off pixels have twice the room and more.
+/// Lattices whose waves differ by more than this share along the fast axis are of different samples, or places:
+/// scanners repeat themselves better. Methods that read peaks off pixels have twice the room and more. See
+/// docs/constants.md.
 const APART: f64 = 0.01;
+/// The same for methods that read peaks off pixels, which are off by a per cent.
 const APART_ROUGHLY: f64 = 0.03;
-/// Differences below this many σ are noise, however large.
+/// Differences below this many σ are noise, however large: none of all pairs of scans exceeds it by chance.
 const SIGMAS: f64 = 5.0;
-/// Drift of the sample over the slow speed of the tip that has to be reckoned with.
+/// Drift of the sample over the slow speed of the tip that has to be reckoned with. Chosen by eye; see
+/// docs/constants.md.
 const DRIFT: f64 = 0.25;
 
 /// How one scan shows its lattice.

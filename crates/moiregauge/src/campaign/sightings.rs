@@ -9,7 +9,8 @@ use crate::frame::axis::Axis;
 use crate::scan::measured::{MeasuredLine, MeasuredScan};
 use crate::spectrum::phases::Phases;
 
-/// A harmonic belongs to a wave vector of the reference if it is nearer than this share of it.
+/// A harmonic belongs to a wave vector of the reference if it is nearer than this share of it: below half, where the
+/// next is as near.
 const SAME_HARMONIC: f64 = 0.2;
 
 /// One sighting for every line of every scan, in order; `reference` is the real-space pair (nm) after

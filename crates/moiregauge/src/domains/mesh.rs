@@ -10,11 +10,13 @@ use std::collections::VecDeque;
 use delaunator::{EMPTY, Point, next_halfedge, triangulate};
 use nalgebra::{Matrix2, Vector2};
 
-/// Longest over shortest edge of a triangle, in coordinates in which the mean lattice is hexagonal.
+/// Longest over shortest edge of a triangle, in coordinates in which the mean lattice is hexagonal: below √3, the
+/// triangle across a missing node.
 const STRETCH: f64 = 1.65;
-/// Area of a triangle against the usual one, at most this factor off.
+/// Area of a triangle against the usual one, at most this factor off: below 3, that of the even triangle across a
+/// missing node.
 const AREA: f64 = 2.5;
-/// Parts of the mesh with fewer triangles are no lattice.
+/// Parts of the mesh with fewer triangles are no lattice: six make the ring around one node.
 const FEW: usize = 6;
 
 /// A triangle of neighbouring nodes.

@@ -13,26 +13,32 @@ use crate::domains::patch::{Fit, Template};
 use crate::frame::image::Image;
 use crate::numbers::median::median;
 
-/// Bins per period.
+/// Bins per period: a node of a tenth of a period is four bins wide, which an interpolation follows.
 const FINE: f64 = 40.0;
-/// Widths of the two Gaussians of the search, and the smallest distance of candidates, periods.
+/// Widths of the Gaussians of the search in periods: that of a sharp node, ...
 const NODE: f64 = 0.1;
+/// ... and one that leaves 4 % of the first harmonics, for the background.
 const CELL: f64 = 0.35;
+/// The smallest distance of candidates, periods: well below that of nodes. Chosen by eye.
 const APART: f64 = 0.45;
-/// Radius of the fitted patch, periods.
+/// Radius of the fitted patch, periods: less than half of the way to the next node, whose slope would pull. Chosen by
+/// eye.
 const RADIUS: f64 = 0.36;
-/// Candidates and nodes this weak against the usual one are none.
+/// Candidates and nodes this weak against the usual one are none. Chosen by eye; see docs/constants.md.
 const WEAK: f64 = 0.4;
-/// Nodes stand out of their noise by this: below, places jump to peaks of the noise.
+/// Nodes stand out of their noise by this: below, places jump to peaks of the noise. See docs/constants.md.
 const CLEAR: f64 = 7.0;
 /// What noise in the curvature of a node adds to the variance of its place, over the squared signal to noise: to second
 /// order `3 (var X_xx + var X_xy)` with X the noise of the curvature over the curvature, 3/S² and 1/S² for a Gaussian.
 const CURVATURE: f64 = 12.0;
-/// So much of a patch has to lie in the frame.
+/// So much of a patch has to lie in the frame: with less the cut node is fitted by its flank. Chosen by eye; see
+/// docs/constants.md.
 const SHARE: f64 = 0.8;
-/// Below this skewness the image does not tell whether nodes are bright or dark.
+/// Below this skewness the image does not tell whether nodes are bright or dark. Chosen by eye; see
+/// docs/constants.md.
 const TELLING: f64 = 0.2;
-/// Residual means of lines beyond this multiple of white noise are offsets of lines.
+/// Residual means of lines beyond this multiple of white noise are offsets of lines. Chosen by eye; see
+/// docs/constants.md.
 const LINES: f64 = 2.0;
 
 /// How nodes look.

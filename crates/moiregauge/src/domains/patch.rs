@@ -5,7 +5,8 @@ use nalgebra::{Matrix6, Vector2, Vector6};
 use crate::domains::blur::blurred;
 use crate::frame::image::Image;
 
-/// Smoothing of the mean node (standard deviation), share of the radius of a patch.
+/// Smoothing of the mean node (standard deviation), share of the radius of a patch: less than a node is wide. Chosen
+/// by eye.
 const SMOOTH: f64 = 0.1;
 
 /// An image between its pixels: Catmull–Rom, with slopes. `None` at edges and beside missing pixels.

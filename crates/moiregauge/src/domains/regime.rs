@@ -7,13 +7,16 @@ use crate::map::quantities::TwistStrainMap;
 use crate::numbers::median::median;
 use crate::window::mask::Mask;
 
-/// Below this twist the layers of most materials relax into domains, rad (0.5°).
+/// Below this twist the layers of most materials relax into domains, rad (0.5°): a round number in a gradual change.
 const RELAXED: f64 = 0.5 / 57.295_779_513;
-/// Share of the inner nodes of a map that the window blurs or whose harmonics contradict each other.
+/// Share of the inner nodes of a map that the window blurs or whose harmonics contradict each other. Chosen by eye;
+/// see docs/constants.md.
 const BLURRED: f64 = 0.3;
-/// Change of the cell's area over one window, as a share of itself.
+/// Change of the cell's area over one window, as a share of itself: a tenth of the twist. Chosen by eye; see
+/// docs/constants.md.
 const VARIED: f64 = 0.2;
-/// Error of the twist of a triangle as a share of it, beyond which triangles tell nothing.
+/// Error of the twist of a triangle as a share of it, beyond which triangles tell nothing: as large as the change
+/// that calls for them.
 const NOISY: f64 = 0.2;
 
 /// What is to be used.

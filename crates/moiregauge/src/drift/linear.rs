@@ -5,8 +5,8 @@ use nalgebra::{DMatrix, Matrix2, Matrix4, Matrix4x2, Matrix6, Vector2, Vector4, 
 
 use crate::drift::shares::weighted_mean;
 
-/// Condition number beyond which the scans are said not to determine the drift. Up and down scans
-/// have 2, two line rates 8, trace and retrace of one scan 2000.
+/// Condition number beyond which the scans are said not to determine the drift. Up and down scans have 2, two line
+/// rates 8, trace and retrace of one scan 2000: a value between them.
 const WORST_CONDITION: f64 = 100.0;
 /// Without any noise there is nothing to weigh by: a femtometre keeps it solvable (nm²).
 const FLOOR: f64 = 1e-12;

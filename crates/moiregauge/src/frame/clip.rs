@@ -3,7 +3,8 @@
 use crate::frame::image::Image;
 use crate::numbers::median::median;
 
-/// Values are cut off at this many standard deviations (by the median) from the median.
+/// Values are cut off at this many standard deviations (by the median) from the median: three cosines, which reach
+/// 2.5 of theirs, stay whole.
 pub(crate) const CLIP: f64 = 3.0;
 
 /// The image with outliers moved to where they are none.

@@ -15,26 +15,28 @@ use crate::frame::image::Image;
 use crate::frame::plane::fit_plane;
 use crate::numbers::median::median;
 
-/// Fewer columns show nothing.
+/// Fewer columns show nothing: the decay takes a tenth of a line, which would be three of them.
 const FEWEST: usize = 32;
 /// The bend decays within this part of a line; a slower one is not told from creep and hysteresis.
 const SLOWEST: f64 = 0.1;
-/// Of what the polynomial leaves of the mean line, the exponential explains at least this share, ...
+/// Of what the polynomial leaves of the mean line, the exponential explains at least this share: more than half is
+/// its own, ...
 const SHARE: f64 = 0.5;
-/// ... and improves χ² by this much, in units of what it leaves.
+/// ... and improves χ² by this much, in units of what it leaves: e⁻²⁵ by chance, the search for the decay included.
 const IMPROVEMENT: f64 = 50.0;
-/// A lag that explains whole lines leaves less than this many times the noise, ...
+/// A lag that explains whole lines leaves less than this many times the noise. Chosen by eye; see docs/constants.md.
 const EXCESS: f64 = 3.0;
-/// ... or this share of the bend, where there is no noise.
+/// The same as a share of the bend, where there is no noise. Chosen by eye.
 const NOTHING: f64 = 1e-3;
-/// Steps of the search for the decay, and its shortest one, columns.
+/// Steps of the search for the decay, ...
 const STEPS: usize = 40;
+/// ... and its shortest one, columns: a shorter one bends a single pixel.
 const SHORTEST: f64 = 0.5;
-/// A sensor is of the first order no better than to this share of what the bend does to the slope.
+/// A sensor is of the first order no better than to this share of what the bend does to the slope. Chosen by eye.
 const FIRST_ORDER_TO: f64 = 0.03;
-/// Lines that are looked at, at most about this many.
+/// Lines that are looked at, at most about this many: their mean is then known to a 64th of the noise.
 const MOST_ROWS: usize = 4096;
-/// The degree of the polynomial, plus one.
+/// The degree of the polynomial, plus one: a cubic, for creep and hysteresis.
 const SMOOTH: usize = 4;
 
 /// The bend at the beginning of the lines of one sensor.

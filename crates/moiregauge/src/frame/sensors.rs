@@ -10,7 +10,11 @@ use crate::frame::lag;
 use crate::frame::lag::Lag;
 use crate::frame::plane::{PlaneFit, fit_plane};
 
-/// The outer fraction of a line in which turn-around is looked for, on either side.
+/// Sine of the angle between fast and slow axis, at least: a frame is no line. Chosen by eye.
+const UPRIGHT: f64 = 0.2;
+/// Deviations of columns beyond this many of those inside are turn-around: none of noise is so large.
+const BENDS: f64 = 5.0;
+/// The outer fraction of a line in which turn-around is looked for, on either side: twice a usual overscan (5 %).
 const TURN_AROUND: f64 = 0.1;
 
 /// The geometry by the sensors, and how well a plane describes them.
@@ -60,7 +64,7 @@ pub fn from_sensors(x: &Image, y: &Image) -> Option<SensorGeometry> {
         planes[1].per_row,
     );
     let (fast, slow) = (pixel_to_nm.column(0).norm(), pixel_to_nm.column(1).norm());
-    if !(pixel_to_nm.determinant().abs() > 0.2 * fast * slow) {
+    if !(pixel_to_nm.determinant().abs() > UPRIGHT * fast * slow) {
         return None;
     }
     let (ef, es) = (pixel_to_nm.column(0) / fast, pixel_to_nm.column(1) / slow);
@@ -145,7 +149,7 @@ fn straight_columns(x: &Image, y: &Image) -> Option<std::ops::Range<usize>> {
         let rms = (inside.iter().map(|d| d * d).sum::<f64>() / inside.len() as f64).sqrt();
         // Half a pixel of deviation is turn-around even on a sensor without noise.
         let pitch = inner.per_column.hypot(inner.per_row);
-        let limit = (5.0 * rms).max(0.5 * pitch);
+        let limit = (BENDS * rms).max(0.5 * pitch);
         let bends = |c: &usize| deviation[*c].abs() > limit;
         first = first.max((0..margin).take_while(bends).count());
         last = last.min(columns - (columns - margin..columns).rev().take_while(bends).count());

@@ -114,7 +114,7 @@ fn average_of(
     (map, agreement)
 }
 
-/// Numbers that a node has.
+/// Numbers that a node has: two wave vectors.
 const COMPONENTS: usize = 4;
 
 /// How maps scatter about their average.

@@ -8,21 +8,26 @@ use crate::window::mask::Mask;
 use crate::window::smooth::Smoothed;
 use crate::window::widths::of_difference;
 
+/// χ² of four numbers that is more than chance (p < 0.01) enlarges the errors of a node: a convention.
+const MORE_THAN_CHANCE: f64 = 13.3;
 /// A good χ² exceeds the limit once in some 10⁵ nodes.
 const IMPROBABLE: f64 = 4.26;
-/// Phase (rad) by which a wave may bend over one window width.
+/// Phase (rad) by which a wave may bend over one window width: what is lost of the amplitude is 0.35²/2 = 6 %.
 const STRAIGHT: f64 = 0.35;
-/// Nodes this near to a winding point, to contradicting harmonics and to lost signal (window widths) see them.
+/// Nodes this near to a winding point, to contradicting harmonics and to lost signal (window widths) see them:
+/// farther off the window has less than e⁻² of its height.
 const NEAR: f64 = 2.0;
-/// Nodes this near to a bent one are bent.
+/// Nodes this near to a bent one are bent: farther off the window has less than 60 % of its height.
 const BESIDE: f64 = 1.0;
-/// Signal is lost, and not just hidden by noise, where its power is below this share of the usual.
+/// Signal is lost, and not just hidden by noise, where its power is below this share of the usual: half of the
+/// amplitude, as at the edge of what has none.
 const LOST: f64 = 0.25;
-/// Blur that matters: a window wider by √2 changes a wave vector by this share of itself.
+/// Blur that matters: a window wider by √2 changes a wave vector by this share of itself. Chosen by eye; see
+/// docs/constants.md.
 const BLURRED: f64 = 0.004;
-/// Less of a window than this is too little.
+/// Less of a window than this is too little: at a straight edge half would be left, and slopes lean.
 const SHARE: f64 = 0.6;
-/// A wave winds only where it usually stands out by so many noise units.
+/// A wave winds only where it usually stands out by so many noise units. Chosen by eye; see docs/constants.md.
 const CLEAR: f64 = 6.0;
 
 /// What the masks need to know of the nodes.
@@ -73,7 +78,7 @@ impl Blur {
 
     /// Factor on the variances of a node for what the window blurs, where that is more than chance (p < 0.01).
     pub(crate) fn factor(self) -> f64 {
-        if self.chi2 > 13.3 {
+        if self.chi2 > MORE_THAN_CHANCE {
             1.0 + (self.chi2 / 4.0 - 1.0) * self.of_noise
         } else {
             1.0

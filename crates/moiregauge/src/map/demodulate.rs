@@ -23,12 +23,12 @@ use crate::window::widths::NARROWEST;
 
 /// The likely harmonics: four shells.
 const LIKELY: &[[i32; 2]] = shells(4);
-/// Wave vectors beyond this (rad per pixel, each component) are too near the limit of sampling.
+/// Wave vectors beyond this (rad per pixel, each component) are too near the limit of sampling, π. Chosen by eye.
 const FASTEST: f64 = 2.6;
 
-/// Likely harmonics looked at together; and where blocks are single pixels, for the memory's sake.
+/// Likely harmonics looked at together, for speed; and where blocks are single pixels, for the memory's sake.
 const AT_ONCE: [usize; 2] = [6, 1];
-/// Nodes so many windows from the edges say how well the harmonics agree.
+/// Nodes so many windows from the edges say how well the harmonics agree: nearer ones hold what edges leak.
 const CLOSURE: f64 = 1.0;
 
 /// Demodulates an image whose background is gone. `place` says which part of a larger image it is.

@@ -12,6 +12,9 @@ use crate::map::combine::View;
 use crate::map::sample::LatticeMap;
 use crate::window::mask::Mask;
 
+/// χ² of two numbers that is more than chance: p < 0.01, a convention.
+const MORE_THAN_CHANCE: f64 = 9.21;
+
 /// How the change of drift differs between upward and downward frames.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DriftChange {
@@ -24,7 +27,7 @@ pub struct DriftChange {
 impl DriftChange {
     /// Whether it is more than chance (p < 0.01).
     pub fn stands_out(&self) -> bool {
-        self.chi2 > 9.21
+        self.chi2 > MORE_THAN_CHANCE
     }
 }
 

@@ -9,16 +9,19 @@ use crate::window::smooth::{Envelope, Smoothed, radius, smooth};
 use crate::window::widths as window;
 use crate::window::widths::of_difference;
 
-/// A harmonic that adds less than this share to what is known is not worth its time.
+/// A harmonic that adds less than this share to what is known is not worth its time: one per cent of the errors.
 const WORTH: f64 = 0.02;
-/// The carrier is near enough when what is left turns by less over a pilot window (rad, root mean square).
+/// The carrier is near enough when what is left turns by less over a pilot window (rad, root mean square): that is
+/// one per cent of the amplitude.
 const NEAR_ENOUGH: f64 = 0.15;
-/// Times the carrier is brought up to date.
+/// Times the carrier is brought up to date: twice as many cells each time, 4, 8, 16.
 const ROUNDS: usize = 3;
-/// Cells of the first carrier along each axis; each round has twice as many.
+/// Cells of the first carrier along each axis; each round has twice as many. Few, since the pilot may be wrong in
+/// places.
 const FIRST_CELLS: usize = 4;
-/// Nodes along each axis to which the carrier is fitted, and by which windows and harmonics are chosen.
+/// Nodes along each axis to which the carrier is fitted: six to each of its cells at most, ...
 const FOLLOWED: usize = 100;
+/// ... and by which windows and harmonics are chosen: 1600 tell a median to some per cent.
 const LOOKED_AT: usize = 40;
 /// Rows of nodes by which harmonics are chosen; no other lines are mixed for that.
 const ROWS_LOOKED_AT: usize = 12;

@@ -15,9 +15,10 @@ use crate::map::combine::View;
 use crate::map::sample::LatticeMap;
 use crate::window::mask::Mask;
 
-/// Nodes that two maps have to share.
+/// Nodes that two maps have to share: three by three, one window.
 const FEWEST: usize = 9;
-/// Below this mean of the phasors the phases contradict each other.
+/// Below this mean of the phasors the phases contradict each other: 0.7 is a scatter of 0.84 rad; uniform phases have
+/// 0.
 const COHERENT: f64 = 0.7;
 
 /// How far a map stood from where the others have the pattern.

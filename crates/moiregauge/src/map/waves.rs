@@ -25,9 +25,10 @@ use crate::window::blocks::Blocks;
 use crate::window::noise::Noise;
 use crate::window::smooth::{Smoothed, Support};
 
-/// Harmonics below this many noise units (amplitude) are left out of a node.
+/// Harmonics below this many noise units (amplitude) are left out of a node: their phases are off by some third of a
+/// rad.
 const FAINT: f64 = 3.0;
-/// Without two harmonics above this many there is no lattice at a node.
+/// Without two harmonics above this many there is no lattice at a node. Chosen by eye; see docs/constants.md.
 const WEAKEST: f64 = 4.0;
 /// Relative error of slopes from single precision, times the inverse of the window.
 const ROUNDING: f64 = 3e-6;

@@ -51,7 +51,7 @@ pub enum Source {
 }
 
 impl Source {
-    /// All of them, in the order of tables and figures.
+    /// All of them, in the order of tables and figures: what averages out first.
     pub const ALL: [Self; 10] = [
         Self::Image,
         Self::Drift,

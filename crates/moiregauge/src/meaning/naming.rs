@@ -19,13 +19,16 @@ use crate::meaning::strengths::WaveStrengths;
 use crate::meaning::tensor::{CLEARLY, known_orientation};
 use crate::settings::knobs::Settings;
 
-/// A reading with no more strain than this, or than twice that of the one reported, is plausible.
+/// A reading with no more strain than this, or than twice that of the one reported, is plausible. Chosen by eye; see
+/// docs/constants.md.
 const PLAUSIBLE_STRAIN: f64 = 0.007;
-/// A wave with less than this share of the amplitude of others is none of the first shell.
+/// A wave with less than this share of the amplitude of others is none of the first shell. Chosen by eye; see
+/// docs/constants.md.
 const WEAK: f64 = 0.5;
-/// The strongest wave of a first shell over the weakest, at most.
+/// The strongest wave of a first shell over the weakest, at most. Chosen by eye; see docs/constants.md.
 const EVEN: f64 = 3.0;
-/// Standard deviation of a round Gaussian that may blur the contrast, nm: spots 7 nm wide.
+/// Standard deviation of a round Gaussian that may blur the contrast, nm: spots 7 nm wide, as of a blunt tip. See
+/// docs/constants.md.
 const BLUR: f64 = 3.0;
 
 /// What is thought of a name.

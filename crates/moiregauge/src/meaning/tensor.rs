@@ -246,5 +246,5 @@ fn constants(bilayer: Bilayer<'_>) -> Vec<[Material; 2]> {
     }
 }
 
-/// Standard deviations that deserve a word.
+/// Standard deviations that deserve a word: one of 400 by chance.
 pub(crate) const CLEARLY: f64 = 3.0;

@@ -1,8 +1,9 @@
 //! The χ² distribution: how probable a scatter is, and what it does to errors.
 
-/// Scatter that chance makes less often than this enlarges the errors.
+/// Scatter that chance makes less often than this enlarges the errors: convention, one of twenty good sets is
+/// enlarged a little.
 const SIGNIFICANT: f64 = 0.05;
-/// The same for tests that are made once for each image.
+/// The same for tests that are made once for each image: there are many of them, and none looks at them together.
 const RARE: f64 = 1e-3;
 
 /// The factor by which variances are enlarged where scans scatter significantly more than their errors

@@ -24,7 +24,7 @@ use crate::simulate::settings::Simulation;
 use crate::simulate::simulator::Simulator;
 
 /// A harmonic has to stand out of the noise of its frame by this much (amplitude over noise amplitude in one
-/// resolution cell) to be found.
+/// resolution cell) to be found: 25 in power, a little more than the 20 that the search asks for.
 pub const FOUND: f64 = 5.0;
 /// The golden angle spreads any number of orientations evenly.
 const GOLDEN_ANGLE: f64 = 137.507_764;

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use crate::map::sample::Grid;
 
-/// Beyond this many windows nodes count as independent.
+/// Beyond this many windows nodes count as independent: e⁻¹² is left.
 const REACH: f64 = 7.0;
 
 /// Sums over all pairs of nodes of an area, with weights that add up to one: `Σ w_i w_j ρ_ij` is what noise of unit

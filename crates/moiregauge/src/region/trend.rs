@@ -12,10 +12,12 @@ use crate::map::quantities::{Plane, TwistStrainMap};
 use crate::region::correlation::pairs;
 use crate::window::mask::Mask;
 
-/// Good nodes that it takes, and how many are used at most.
+/// Good nodes that it takes: four for each number of a plane, ...
 const FEWEST: usize = 12;
+/// ... and how many are used at most: pairs of them are summed, 10⁸.
 const MOST: usize = 10_000;
-/// They have to reach so many windows along both axes (root mean square distance from their middle, times √12).
+/// They have to reach so many windows along both axes (root mean square distance from their middle, times √12): less
+/// is one number.
 const REACH: f64 = 1.0;
 
 /// A plane through a quantity of a map.

@@ -14,12 +14,14 @@ use crate::lattice::measured::MeasuredLattice;
 use crate::numbers::chi2;
 use crate::scan::measured::MeasuredLine;
 
-/// Fewer periods than this across the shorter side deserve a warning.
+/// Fewer periods than this across the shorter side deserve a warning. Chosen by eye; see docs/constants.md.
 const FEW_PERIODS: f64 = 3.0;
-/// Trace and retrace whose lattices differ by more than this share do not show the same one.
+/// Trace and retrace whose lattices differ by more than this share do not show the same one. Chosen by eye; see
+/// docs/constants.md.
 const ANOTHER_LATTICE: f64 = 0.1;
-/// Differences that chance makes less often deserve a word, if they are larger than `NOTABLE`.
+/// Differences that chance makes less often deserve a word: the scans of a session make none, ...
 const NO_CHANCE: f64 = 1e-4;
+/// ... if they are larger than this share: a tenth of the calibration that is assumed.
 const NOTABLE: f64 = 1e-3;
 
 /// Says that a frame without sensors was turned back by the angle that the file states.

@@ -13,9 +13,11 @@ use crate::frame::sensors::{SensorGeometry, from_sensors};
 use crate::numbers::spread::mean_and_spread;
 use crate::scan::channel::image_of;
 
-/// A sensor whose span differs from the nominal size by more than this factor is not believed.
+/// A sensor whose span differs from the nominal size by more than this factor is not believed: open tubes are off by
+/// 1.3.
 const WILD_SPAN: f64 = 2.0;
-/// A lag that changes the fast step by more than this share deserves a word.
+/// A lag that changes the fast step by more than this share deserves a word: a hundredth of the calibration that is
+/// assumed.
 const NOTABLE_LAG: f64 = 1e-4;
 
 /// The geometry that the instrument intended: nominal pitch, rotated.

@@ -9,7 +9,7 @@ use crate::caveat::{Caveat, Doubt};
 use crate::scan::measured::MeasuredLine;
 use crate::settings::knobs::Settings;
 
-/// Sizes and line rates that differ by more than this factor are other conditions.
+/// Sizes and line rates that differ by more than this factor are other conditions. Chosen by eye.
 const EXTRAPOLATED: f64 = 3.0;
 
 /// Whether the calibration was measured under the conditions of this scan.

@@ -11,6 +11,8 @@ use rustfft::num_complex::Complex64;
 
 use crate::lattice::fit::fit_pixels::LatticeFit;
 
+/// A harmonic of the other image is the same one if it is nearer than this share of it: below half, where the next is as near.
+const SAME: f64 = 0.2;
 /// Neighbouring frequencies are correlated by the window: this many count as one.
 const CORRELATED: f64 = 2.0;
 /// Coherence that chance exceeds in one case of two hundred counts, in units of its scatter.
@@ -61,7 +63,7 @@ fn partner<'a>(
         let miss = |(k, sign): &(usize, f64)| (wave(second, *k) * *sign - wanted).norm();
         miss(a).total_cmp(&miss(b))
     })?;
-    if (wave(second, k) * sign - wanted).norm() > 0.2 * wanted.norm() {
+    if (wave(second, k) * sign - wanted).norm() > SAME * wanted.norm() {
         return None;
     }
     let samples = &second.residual[k];

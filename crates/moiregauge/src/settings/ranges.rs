@@ -2,12 +2,12 @@
 
 use crate::settings::knobs::Settings;
 
-/// More draws than this tell nothing more.
+/// More draws than this tell nothing more: errors of a thousandth of σ.
 pub const MOST_DRAWS: usize = 1_000_000;
-/// An image shows no more moirés than this.
+/// An image shows no more moirés than this: those of four layers.
 pub const MOST_MOIRES: usize = 6;
 
-/// A file holds no more images than this.
+/// A file holds no more images than this: a guard against headers that are wrong.
 pub const MOST_IMAGES: usize = 1024;
 
 /// A setting beyond its range.

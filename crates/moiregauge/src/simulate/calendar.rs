@@ -5,6 +5,7 @@ use spmfile::DateTime;
 /// Days from 1970-01-01 to the day on which the simulated clock starts, at ten in the morning:
 /// 15 January 2024.
 const FIRST_DAY: i64 = 19_737;
+/// Seconds of that day before it.
 const FIRST_SECOND: i64 = 10 * 3600;
 
 /// The date `seconds` after the start of the clock, in whole seconds.

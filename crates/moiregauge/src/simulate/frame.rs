@@ -16,13 +16,18 @@ use crate::simulate::settings::{Drift, Simulation};
 
 /// Full ranges of the detectors; a count is 2⁻³² of it.
 const COUNTS: f64 = 4_294_967_296.0;
+/// Full range of the phase: a turn.
 const PHASE_RANGE_DEG: f64 = 360.0;
+/// Full range of the amplitude, mV.
 const AMPLITUDE_RANGE_MV: f64 = 4000.0;
+/// Full range of the x sensor, nm: volts times nm per volt, as in files of the instrument.
 const X_SENSOR_RANGE_NM: f64 = 24.576 * 3410.089;
+/// Full range of the y sensor, nm, likewise.
 const Y_SENSOR_RANGE_NM: f64 = 24.576 * 3641.009;
 
-/// The amplitude image: where the phase is high the amplitude is low.
+/// The amplitude image: where the phase is high the amplitude is low. A usual amplitude, mV, ...
 const MEAN_AMPLITUDE_MV: f64 = 180.0;
+/// ... and a usual slope.
 const MV_PER_DEG: f64 = -2.5;
 
 /// The channels of one line direction, as counts.

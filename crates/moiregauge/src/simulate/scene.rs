@@ -55,7 +55,7 @@ const SHELLS: [(i32, i32); 18] = [
     (3, 3),
 ];
 
-/// Harmonics fainter than this share of the first ones are left out.
+/// Harmonics fainter than this share of the first ones are left out: any small number, below all noise.
 const FAINTEST: f64 = 1e-6;
 
 impl Scene {

@@ -90,7 +90,9 @@ pub(crate) fn too_weak(best: &[f64; 3]) -> String {
     )
 }
 
-/// Significance that the second of a shell needs, which was searched like the first, and the third, which was not.
+/// Significance that the second of a shell needs, which was searched like the first: e⁻²⁰ each, 2·10⁻⁴ for all of 10⁵
+/// frequencies, ...
 pub(crate) const SECOND: f64 = 20.0;
 
+/// ... and the third, which was not searched: e⁻¹² at its place.
 pub(crate) const THIRD: f64 = 12.0;

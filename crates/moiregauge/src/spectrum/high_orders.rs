@@ -14,11 +14,13 @@ use crate::frame::image::Image;
 use crate::spectrum::harmonics::{Harmonics, Windowed};
 use crate::spectrum::shells::{FIRST_SHELL, shells};
 
-/// Significance that none of a few thousand frequencies reaches by chance.
+/// Significance that none of a few thousand frequencies reaches by chance: e⁻²⁰ each, 10⁻⁵ for all.
 const STANDS_OUT: f64 = 20.0;
-/// So many harmonics that stand out make a lattice of which the first shell may be missing.
+/// So many harmonics that stand out make a lattice of which the first shell may be missing. Chosen by eye; see
+/// docs/constants.md.
 const FEWEST: usize = 5;
-/// Share of the power of a lattice that is left when outliers are cut off, at least.
+/// Share of the power of a lattice that is left when outliers are cut off, at least: tip events vanish with them.
+/// Chosen by eye.
 const LEFT: f64 = 0.4;
 /// Weights are capped: beyond, errors are no longer those of noise.
 const MOST_WEIGHT: f64 = 1e3;

@@ -28,11 +28,12 @@ const MOST_SCALE: f64 = 1.6;
 const MOST_DISTORTION: f64 = 0.25;
 /// The same where no lattice is as little distorted: a drift of half a frame does that.
 const DRIFTING: f64 = 0.45;
-/// Peaks whose wave vectors and differences may be first harmonics.
+/// Peaks whose wave vectors and differences may be first harmonics: more than for moirés, since high orders may be
+/// stronger. Chosen by eye.
 const GENERATORS: usize = 24;
-/// Wave vectors closer than this are the same, cycles per frame.
+/// Wave vectors closer than this are the same, cycles per frame: below half a bin, at which two peaks are one.
 const SAME: f64 = 0.45;
-/// Harmonics up to this order count.
+/// Harmonics up to this order count: twice the fourth, which reconstructions show strongest.
 const ORDERS: f64 = 8.0;
 
 /// What the spectrum says about a lattice of about the cell `known` (real-space pair, nm).

@@ -8,6 +8,7 @@ use crate::spectrum::transform::Spectrum;
 /// Noise is read between these distances from a harmonic, in cycles per frame: outside the inner part
 /// of its main lobe, which the fit has emptied, and near enough to be the noise that matters.
 const NEAREST: f64 = 1.0;
+/// The farther of the two.
 const FARTHEST: f64 = 6.0;
 /// The strip along an axis holds some fifteen bins: twice the annulus by chance once in a thousand.
 const RIDGE: f64 = 2.0;

@@ -5,9 +5,9 @@ use heterostrain::lattice::{Lattice, Px, reciprocal};
 use crate::frame::image::Image;
 use crate::spectrum::transform::Spectrum;
 
-/// Lags up to this many times the longest vector are shown.
+/// Lags up to this many times the longest vector are shown: the second ring of peaks, for the eye.
 const LAGS: f64 = 2.3;
-/// Frequencies up to this many times the largest wave vector are shown.
+/// Frequencies up to this many times the largest wave vector are shown: the third shell, for the eye.
 const FREQUENCIES: f64 = 3.2;
 
 /// The autocorrelation and the logarithm of the power spectrum around their centres, and the step of

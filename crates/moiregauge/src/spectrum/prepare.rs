@@ -14,9 +14,10 @@ use crate::spectrum::{high_orders, select};
 
 pub(crate) use crate::spectrum::error::{LatticeError, SECOND, THIRD, too_weak};
 
-/// What is left of a constant or a plane when it is taken off, as a share of the values.
+/// What is left of a constant or a plane when it is taken off, as a share of the values: a few hundred units of
+/// rounding.
 const ROUNDING: f64 = 1e-13;
-/// The smallest side of a frame, pixels.
+/// The smallest side of a frame, pixels: fewer hold no periods that are sampled. Chosen by eye.
 const SMALLEST_SIDE: usize = 16;
 
 /// An image without background and what its spectrum says: where the lattice is, roughly.

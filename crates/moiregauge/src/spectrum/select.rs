@@ -10,18 +10,25 @@ use nalgebra::{Matrix2, Vector2};
 
 use crate::spectrum::transform::Spectrum;
 
-/// Peaks below this many cycles per frame are background.
+/// A lattice is well explained by so many peaks, and by so many times those that chance puts on it. Chosen by eye.
+const EXPLAINED: f64 = 6.0;
+/// Peaks over noise (power) that are looked at: e⁻⁴, so that some of the noise are among them.
+const PEAK: f64 = 4.0;
+/// Peaks below this many cycles per frame are background: a plane or a bow fills the first bin.
 const LOWEST_CYCLES: f64 = 1.25;
 /// Peaks beyond this many cycles per pixel are noise: fewer than 2.5 pixels per period.
 const HIGHEST_FREQUENCY: f64 = 0.4;
-/// How many peaks are looked at, and how many of them may span a lattice.
+/// How many peaks are looked at: more than two shells have, and as many of noise. Chosen by eye.
 const PEAKS: usize = 40;
+/// How many of them may span a lattice: all pairs of them are tried. Chosen by eye.
 const GENERATORS: usize = 16;
-/// A peak belongs to a lattice point if it is this close, in cycles per frame.
+/// A peak belongs to a lattice point if it is this close, in cycles per frame: below half a bin, at which two peaks
+/// are one.
 const TOLERANCE: f64 = 0.45;
-/// Harmonics up to this order count.
+/// Harmonics up to this order count. Chosen by eye.
 const ORDERS: f64 = 4.0;
-/// A moiré of hexagonal layers is a hexagon distorted by less than this; see [`distortion`].
+/// A moiré of hexagonal layers is a hexagon distorted by less than this; see [`distortion`]. Beyond, other pairs of
+/// the lattice are nearer to a hexagon.
 const MOST_DISTORTION: f64 = 0.45;
 
 /// A lattice proposed by the spectrum.
@@ -38,7 +45,7 @@ pub(crate) struct Candidate {
 /// Whether more peaks lie on the lattice than chance puts there, were it to try many times.
 pub(crate) fn well_explained(candidate: &Candidate) -> bool {
     let [found, expected] = candidate.explained;
-    found >= 6.0 && found > 6.0 * expected
+    found >= EXPLAINED && found > EXPLAINED * expected
 }
 
 /// A local maximum of the spectrum.
@@ -241,7 +248,7 @@ pub(crate) fn spectrum_peaks(spectrum: &Spectrum) -> Vec<Peak> {
             }
             let power = spectrum.power(kx, ky);
             let significance = power / noise.at(kx, ky);
-            if significance < 4.0 {
+            if significance < PEAK {
                 continue;
             }
             let near = |dx: i64, dy: i64| {
@@ -323,7 +330,10 @@ pub(crate) struct NoiseMap {
     rows: usize,
 }
 
+/// Blocks of bins in which the noise of a spectrum is read: narrow along kx, on which the noise of a scan depends,
+/// ...
 pub(crate) const BLOCK_WIDTH: usize = 4;
+/// ... and high, so that 128 bins tell it to a tenth.
 const BLOCK_HEIGHT: usize = 32;
 
 impl NoiseMap {

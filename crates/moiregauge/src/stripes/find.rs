@@ -17,35 +17,39 @@ use crate::frame::image::Image;
 use crate::numbers::median::median;
 use crate::spectrum::transform::Spectrum;
 
-/// Fewer periods than this across the frame are terrain, and this many cycles per pixel the limit of sampling.
+/// Fewer periods than this across the frame are terrain. Chosen by eye; see docs/constants.md.
 const FEWEST: f64 = 3.0;
+/// Cycles per pixel at the limit of sampling: 2.5 pixels per period, as for lattices.
 const FASTEST: f64 = 0.4;
-/// Waves with fewer cycles along the lines are offsets of lines.
+/// Waves with fewer cycles along the lines are offsets of lines, which the window spreads to one.
 const ALONG: f64 = 1.25;
-/// Local maxima that are looked at, highest first.
+/// Local maxima that are looked at, highest first: many more than patterns have.
 const MAXIMA: usize = 200;
-/// A maximum has log₁₀ of its chance below this; a pattern has a sum of those below `PATTERN`.
+/// A maximum has log₁₀ of its chance below this (one in thirty): weak overtones count, ...
 const MEMBER: f64 = -1.5;
+/// ... and a pattern has a sum of those below this: one in 10⁵ by chance.
 const PATTERN: f64 = -5.0;
-/// Bins nearer than this are the maximum itself; those around it end here.
+/// Bins nearer than this are the maximum itself: the main lobe of the window and half a bin.
 const OWN: f64 = 2.5;
+/// Bins around a maximum end here. Chosen by eye.
 const AROUND: f64 = 8.0;
-/// Overtones that are looked for.
+/// Overtones that are looked for. Chosen by eye.
 const OVERTONES: i32 = 4;
-/// An overtone may be off by this many cycles, or by this share: stripes bend.
+/// An overtone may be off by this many cycles: one bin, ...
 const OFF: f64 = 1.0;
+/// ... or by this share: stripes bend. Chosen by eye.
 const OFF_SHARE: f64 = 0.12;
-/// Trace and retrace may differ by so many cycles per frame.
+/// Trace and retrace may differ by so many cycles per frame, by drift and hysteresis. Chosen by eye.
 const APART: f64 = 1.5;
-/// Two patterns whose wave vectors differ by less than this share are one that changes.
+/// Two patterns whose wave vectors differ by less than this share are one that changes; 14° of direction.
 const SAME: f64 = 0.25;
 /// Patterns that are told apart: a herringbone has three directions.
 const MOST: usize = 3;
 /// Parts along each axis, one after the other: a pattern that changes across the frame is sharp in its parts.
 const PARTS: [usize; 3] = [1, 2, 4];
-/// Pixels are no more elongated than this.
+/// Pixels are no more elongated than this: a guard against sizes that headers get wrong.
 const THINNEST: f64 = 1e3;
-/// Parts have this many pixels along each axis.
+/// Parts have this many pixels along each axis: a few periods of some pixels. Chosen by eye.
 const SMALLEST: usize = 64;
 
 /// A wave that stands out.

@@ -12,12 +12,15 @@ use crate::frame::image::Image;
 use crate::spectrum::noise::LocalNoise;
 use crate::spectrum::transform::hann;
 
-/// Gauss–Newton steps at most; the wave vector stands when it moves by less than this, in cycles over the frame.
+/// A wave that moves by more than this share of itself is another one. Chosen by eye.
+const ANOTHER: f64 = 0.3;
+/// Gauss–Newton steps at most. Chosen by eye.
 const STEPS: usize = 20;
+/// The wave vector stands when it moves by less than this, in cycles over the frame: far below any error.
 const STANDS: f64 = 1e-6;
-/// Pixels whose sums are made together.
+/// Pixels whose sums are made together: enough for a thread.
 const TOGETHER: usize = 1 << 14;
-/// Pixels that have to show the pattern.
+/// Pixels that have to show the pattern: eight by eight.
 const FEWEST: usize = 64;
 
 /// A wave fitted to pixels.
@@ -100,7 +103,7 @@ pub(crate) fn fit(
         }
     }
     // Not the wave that was looked for.
-    if !settled || (wave - start).norm() > 0.3 * start.norm() {
+    if !settled || (wave - start).norm() > ANOTHER * start.norm() {
         return None;
     }
     let mut left = Image::new(

@@ -15,9 +15,9 @@ use crate::stripes::wave::{BLOCKS, Wave, reference};
 use crate::window::smooth::Nodes;
 use crate::window::types::{Reference, Resolution};
 
-/// Nodes per width of the window.
+/// Nodes per width of the window: nearer ones tell the same.
 const NODES: f64 = 3.0;
-/// Waves nearer to each other than this share of the shorter one are one.
+/// Waves nearer to each other than this share of the shorter one are one: 14° of direction, as in the search.
 const SAME: f64 = 0.25;
 
 /// The patterns of an image and of its other line direction, as wave vectors (rad per pixel) and log₁₀ of the chance

@@ -14,22 +14,26 @@ use crate::window::smooth::{Envelope, Nodes, Smoothed};
 use crate::window::types::{Reference, UsedHarmonic, WaveMap, WaveNode};
 use crate::window::widths::OF_DIFFERENCE;
 
-/// Less of a window than this is too little.
+/// Less of a window than this is too little: as for lattices.
 const SHARE: f64 = 0.6;
-/// Signal is lost where its power is below this share of what is usual for the pattern.
+/// Signal is lost where its power is below this share of what is usual for the pattern: half of the amplitude, as for
+/// lattices.
 const LOST: f64 = 0.25;
 /// Within a window of a boundary between patterns the second has this share of the power of the first or more: half of
 /// the window less its error function there, `(Φ(−1)/Φ(1))²`.
 const BETWEEN: f64 = 0.036;
-/// A second pattern of such strength in so much of the image makes a lattice.
+/// A second pattern of such strength (power over that of the first) makes a lattice. Chosen by eye; see
+/// docs/constants.md.
 const CROSSED: f64 = 0.5;
+/// In so much of the image it has to be there. Chosen by eye.
 const CROSSING: f64 = 0.4;
-/// Nodes this near to a contradiction and to a winding point, and to a bent one (window widths) see them.
+/// Nodes this near to a contradiction and to a winding point (window widths) see them: as for lattices, ...
 const NEAR: f64 = 2.0;
+/// ... and this near to a bent one.
 const BESIDE: f64 = 1.0;
-/// Phase (rad) by which a wave may bend over one window width.
+/// Phase (rad) by which a wave may bend over one window width: as for lattices.
 const STRAIGHT: f64 = 0.35;
-/// Blur that matters, as a share of the wave vector.
+/// Blur that matters, as a share of the wave vector: as for lattices.
 const BLURRED: f64 = 0.004;
 /// χ² of two numbers that is more than chance (p < 0.01).
 const MORE_THAN_CHANCE: f64 = 9.21;

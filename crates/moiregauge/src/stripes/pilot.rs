@@ -11,20 +11,23 @@ use crate::window::lines::Levelled;
 use crate::window::smooth::{Smoothed, smooth};
 use crate::window::widths as window;
 
-/// The pilot's window in wavelengths.
+/// The pilot's window in wavelengths: a little more than for lattices. Chosen by eye.
 const PILOT: f64 = 0.75;
-/// A harmonic that adds less than this share to what is known is left out.
+/// A harmonic that adds less than this share to what is known is left out: one per cent of the errors.
 const WORTH: f64 = 0.02;
-/// The carrier is for frames of so many periods, its cells as long.
+/// The carrier is for frames of so many periods, its cells as long. Chosen by eye.
 const CARRIED: f64 = 12.0;
+/// Times the carrier is brought up to date: as for lattices.
 const ROUNDS: usize = 3;
-/// Nodes along each axis to which the carrier is fitted, and by which windows are chosen.
+/// Nodes along each axis to which the carrier is fitted: as for lattices, ...
 const FOLLOWED: usize = 100;
+/// ... and by which windows are chosen.
 const LOOKED_AT: usize = 40;
-/// Window of the probes for noise in wavelengths; nodes nearer to edges than so many of them are not looked at, and
-/// so many have to be left.
+/// Window of the probes for noise in wavelengths, lest waves reach them.
 const PROBE: f64 = 1.3;
+/// Nodes nearer to edges than so many probes are not looked at, since waves that are cut off reach them, ...
 const AWAY: f64 = 2.5;
+/// ... and so many have to be left: fewer tell no level. Chosen by eye.
 const FEWEST: usize = 12;
 
 impl Wave {

@@ -15,15 +15,17 @@ use crate::window::lines::Levelled;
 use crate::window::smooth::{Nodes, Smoothed, smooth};
 use crate::window::types::Reference;
 
-/// Overtones that may be used, and the limit of their components, rad per pixel.
+/// Overtones that may be used: as many as are looked for, ...
 const ORDERS: i32 = 4;
+/// ... and the limit of their components, rad per pixel: 83 % of π, as for lattices.
 const FASTEST: f64 = 2.6;
 /// Blocks per wavelength: three overtones do not fold onto each other.
 pub(crate) const BLOCKS: f64 = 8.0;
-/// Harmonics below this many noise units (amplitude) are left out of a node, and nodes without one above this many.
+/// Harmonics below this many noise units (amplitude) are left out of a node: as for lattices.
 const FAINT: f64 = 3.0;
+/// Nodes without a harmonic above this many are none. Chosen by eye; see docs/constants.md.
 const WEAKEST: f64 = 4.0;
-/// A change of amplitude of so many noise units is no noise.
+/// A change of amplitude of so many noise units is no noise. Chosen by eye; see docs/constants.md.
 const ENDS: f64 = 4.0;
 /// Relative error of slopes from single precision, times the inverse of the window.
 const ROUNDING: f64 = 3e-6;

@@ -34,16 +34,18 @@ use crate::spectrum::method::Method;
 use crate::survey::mapping::pitch;
 use crate::window::types::{FULL_WIDTH, Reference, Resolution, ResolutionError, UsedHarmonic};
 
-/// Side of the middle block that is looked at first, pixels.
+/// Side of the middle block that is looked at first, pixels. Chosen by eye.
 const MIDDLE: usize = 2048;
-/// Pixels of a band, halo not counted.
+/// Pixels of a band, halo not counted, for the memory's sake.
 const BAND: usize = 1 << 24;
-/// Smaller images are cut into so many bands.
+/// Smaller images are cut into so many bands, so that work can be taken up again.
 const FEWEST_BANDS: usize = 4;
 
-/// Pixels of an image in which domains are looked for, and how many there should be to a period, and at least.
+/// Pixels of an image in which domains are looked for, for the memory's sake.
 const DOMAIN_PIXELS: f64 = (1 << 24) as f64;
+/// How many pixels there should be to a period: nodes are then some two pixels wide.
 const PER_PERIOD: f64 = 24.0;
+/// Pixels to a period at least: below, a node is a pixel.
 const COARSEST: f64 = 8.0;
 
 /// A large image, ready to be mapped band by band.

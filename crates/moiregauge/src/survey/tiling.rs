@@ -14,11 +14,11 @@ use crate::spectrum::method::Method;
 use crate::window::mask::Mask;
 use crate::window::types::Reference;
 
-/// Default side of a tile, periods.
+/// Default side of a tile, periods. Chosen by eye.
 const SIDE: f64 = 6.0;
-/// Tiles along a side that overlap.
+/// Tiles along a side that overlap: nearer nodes tell the same.
 const OVERLAP: f64 = 4.0;
-/// A lattice that differs by more than this share from that of the whole image is another one.
+/// A lattice that differs by more than this share from that of the whole image is another one. Chosen by eye.
 const OTHER: f64 = 0.2;
 
 /// The lattice of every tile. `still` is the geometry without drift, `geometry` the one that was measured.

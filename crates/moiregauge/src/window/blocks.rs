@@ -10,9 +10,9 @@ use rayon::prelude::*;
 use crate::window::lines::Levelled;
 use crate::window::types::{Reference, Resolution};
 
-/// Columns handled together, so that sums stay in the fastest memory.
+/// Columns handled together, so that sums stay in the fastest memory: two kilobytes a sum.
 const CHUNK: usize = 256;
-/// Rows of blocks made together.
+/// Rows of blocks made together: enough to keep all threads busy.
 const TOGETHER: usize = 64;
 
 /// Which part of a larger image the rows in hand are, and where its phases count from.
@@ -244,13 +244,14 @@ pub(crate) fn step_of(resolution: &Resolution, reference: &Reference, window_nm:
     resolution.step_nm.unwrap_or(usual)
 }
 
-/// Nodes are so many pixels apart at least.
+/// Nodes are so many pixels apart at least: nearer ones tell the same.
 pub(crate) const APART: f64 = 2.0;
 
-/// Blocks per period.
+/// Blocks per period: finer ones cost memory by the square, coarser ones fold the first shells; see `ALIASED` of the
+/// waves.
 pub(crate) const BLOCKS: f64 = 5.0;
 
-/// Nodes per width of the window.
+/// Nodes per width of the window: as for lattices.
 pub(crate) const NODES: f64 = 3.0;
 
 #[cfg(test)]

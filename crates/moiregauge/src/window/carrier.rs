@@ -14,9 +14,10 @@ use rustfft::num_complex::Complex32;
 
 use crate::window::blocks::{Blocks, Layer};
 
-/// Weight of the penalty as a share of the mean diagonal element.
+/// Weight of the penalty as a share of the mean diagonal element: any small number, which holds what was not measured
+/// and bends nothing else.
 const STIFFNESS: f64 = 1e-4;
-/// At most so many cells along each axis.
+/// At most so many cells along each axis: the carrier need only be near.
 pub(crate) const MOST_CELLS: usize = 16;
 
 /// Two phases as cubic B-splines on a grid of cells.
@@ -248,7 +249,7 @@ fn power(turn: Complex32, n: i32) -> Complex32 {
     (0..n.abs()).fold(Complex32::new(1.0, 0.0), |product, _| product * base)
 }
 
-/// The pilot's window in periods.
+/// The pilot's window in periods: a little more than the narrowest.
 pub(crate) const PILOT: f64 = 0.65;
 
 #[cfg(test)]

@@ -15,13 +15,14 @@ use rustfft::num_complex::{Complex32, Complex64};
 use crate::window::blocks::Blocks;
 use crate::window::smooth::{Kernel, Smoothed};
 
-/// Windows of which less than this is missing are whole.
+/// Windows of which less than this is missing are whole: any number above rounding in single precision.
 const CUT: f64 = 1e-6;
-/// Times the system of leaks is gone through.
+/// Times the system of leaks is gone through. Chosen by eye.
 const ROUNDS: usize = 3;
 /// A whole window that lets through less than this along one axis lets nothing through.
 const NOTHING: f64 = 1e-7;
-/// Share of what was taken off that may be wrong: amplitudes and wave vectors change under the window.
+/// Share of what was taken off that may be wrong: amplitudes and wave vectors change under the window. Chosen by eye;
+/// see docs/constants.md.
 const UNSURE: f64 = 0.05;
 
 /// What has been taken off at a place: phases of both waves (rad), and their slopes as columns (rad per pixel).

@@ -15,6 +15,9 @@ use crate::numbers::median::median;
 use crate::spectrum::transform::hann;
 use crate::window::types::Reference;
 
+/// Offsets matter beyond this over the root of the number of lines: as in the fit of a whole image.
+const OFFSETS: f64 = 8.0;
+
 /// An image and what is taken off each of its lines.
 pub(crate) struct Levelled<'a> {
     pub(crate) image: &'a Image,
@@ -33,18 +36,19 @@ struct Ridge {
     power: f64,
 }
 
-/// Harmonics (h, k) that are looked after.
+/// Harmonics (h, k) that are looked after. Chosen by eye.
 const ORDERS: i32 = 3;
-/// A harmonic hardly turns along x where its kx is below this share of itself, and so many cycles per line.
+/// A harmonic hardly turns along x where its kx is below this share of itself, ...
 const ON_RIDGE: f64 = 0.15;
+/// ... and so many cycles per line: the nearer wave of `BESIDE`.
 const CYCLES: f64 = 3.0;
-/// Around the ky of such a harmonic, half of what is found is left at this distance, in lengths of q₁.
+/// Around the ky of such a harmonic, half of what is found is left at this distance, in lengths of q₁. Chosen by eye.
 const KEPT: f64 = 0.35;
 /// The waves per line with which the offsets are compared, cycles: the window spreads offsets to 1.
 const BESIDE: [f64; 2] = [3.0, 5.0];
-/// Lines of which less is there have no offset of their own.
+/// Lines of which less is there have no offset of their own: half. Chosen by eye.
 const LEAST: f64 = 0.5;
-/// Powers that a level needs at least.
+/// Powers that a level needs at least: it is good to a third then.
 const FEWEST: usize = 8;
 /// Euler's γ.
 const EULER: f64 = 0.577_215_664_901_532_9;
@@ -76,7 +80,7 @@ impl<'a> Levelled<'a> {
         let [ridge, beside @ ..] =
             [&offsets, &beside_a, &beside_b].map(|p| p.level(within).unwrap_or_default());
         let beside = 0.5 * (beside[0] + beside[1]);
-        let limit = 1.0 + 8.0 / (image.rows as f64).sqrt();
+        let limit = 1.0 + OFFSETS / (image.rows as f64).sqrt();
         if ridge <= limit * beside {
             return plain;
         }

@@ -24,7 +24,7 @@ pub enum Mask {
 }
 
 impl Mask {
-    /// All of them, in the order of their numbers.
+    /// All of them, in the order of their numbers, which files hold.
     pub const ALL: [Self; 8] = [
         Self::Good,
         Self::Margin,

@@ -19,21 +19,21 @@ use crate::window::lines::Levelled;
 use crate::window::smooth::{Nodes, Smoothed, smooth};
 use crate::window::types::Reference;
 
-/// Places tried beside a harmonic, as shares of the length of q₁.
+/// Places tried beside a harmonic, as shares of the length of q₁: about half the way to the next one.
 const TRIED: [f64; 9] = [0.35, 0.4, 0.45, 0.5, 0.55, 0.6, 0.65, 0.7, 0.75];
 /// Window of the probes in periods, lest harmonics reach them.
 const PROBE_WINDOW: f64 = 1.5;
-/// The local ratio is averaged over so many windows.
+/// The local ratio is averaged over so many windows: nine of them in area.
 const AVERAGED: f64 = 3.0;
-/// Windows of which more is missing are not looked at, nor those nearer to the edges than so many widths: harmonics
-/// that are cut off reach the probes.
+/// Windows of which more is missing are not looked at: harmonics that are cut off reach the probes, ...
 const WHOLE: f64 = 0.85;
+/// ... nor those nearer to the edges than so many widths, for the same reason.
 const AWAY: f64 = 2.5;
-/// Nodes that have to be left.
+/// Nodes that have to be left: fewer tell no level. Chosen by eye.
 const FEWEST: usize = 6;
-/// Powers count up to so many times their level.
+/// Powers count up to so many times their level: e⁻⁴ of chance is cut, and allowed for; defects are cut, too.
 const CUT: f64 = 4.0;
-/// Harmonics looked beside at a time.
+/// Harmonics looked beside at a time, for the memory's sake.
 const AT_ONCE: usize = 2;
 
 /// Two wave vectors beside harmonic (h, k) that are as far from the lattice as can be, rad per pixel.

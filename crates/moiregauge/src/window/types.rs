@@ -15,8 +15,9 @@ pub struct Resolution {
     pub margin: Option<f64>,
 }
 
-/// Margin in windows where nobody asks for another, and as a share of the shorter side of small frames.
+/// Margin in windows where nobody asks for another: 2 % of the window lies beyond the frame there, ...
 const MARGIN: f64 = 2.0;
+/// ... and as a share of the shorter side of small frames: a quarter of the area is left.
 const OF_SIDE: f64 = 0.25;
 
 /// What no image can give.

@@ -7,12 +7,13 @@
 
 use crate::numbers::median::median;
 
-/// Bias over noise that is allowed.
+/// Bias over noise that is allowed: a quarter of σ adds 3 % to the error.
 const ALLOWED: f64 = 0.25;
 /// The narrowest window, in periods: neighbouring harmonics leak by 10⁻⁴.
 pub(crate) const NARROWEST: f64 = 0.6;
-/// The widest, in periods; and of the shorter side of the frame.
+/// The widest, in periods. Chosen by eye.
 pub(crate) const WIDEST: f64 = 5.0;
+/// The widest as a share of the shorter side of the frame: margins of two windows leave three quarters of it.
 const OF_FRAME: f64 = 1.0 / 16.0;
 
 /// The windows to try, in periods, each √2 times the one before; `side` is the frame's, in periods.
@@ -26,7 +27,8 @@ pub(crate) fn ladder(side: f64) -> Vec<f64> {
 const CORRELATION: f64 = 8.0 / 9.0;
 /// Variance of the difference of the two in white noise, in units of that of the narrow one: 1 + ¼ − 8/9.
 pub(crate) const OF_DIFFERENCE: f64 = 1.25 - CORRELATION;
-/// Where a defect is, changes beyond this many of these variances say nothing of the window.
+/// Where a defect is, changes beyond this many of these variances say nothing of the window: three standard
+/// deviations.
 const OUTLYING: f64 = 9.0;
 
 /// Variance of the difference of a value under two windows from the variances under each. Offsets of lines are correlated

@@ -7,7 +7,7 @@ use crate::caveat::sets::{Scattered, SetDoubt};
 use crate::meaning::about::caveats;
 use crate::settings::knobs::Settings;
 
-/// χ²/dof beyond which the scatter of the scans deserves a word.
+/// χ²/dof beyond which the scatter of the scans deserves a word: errors wrong by 1.4.
 const LARGE_CHI2: f64 = 2.0;
 /// The scatter of fewer scans is too uncertain itself to doubt the errors.
 const FEWEST_TO_DOUBT: usize = 6;

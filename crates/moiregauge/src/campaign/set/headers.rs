@@ -17,15 +17,17 @@ use crate::drift::joint::solve::{JointFit, fit};
 use crate::scan::measured::MeasuredScan;
 use crate::settings::knobs::Settings;
 
-/// Positions of scans that fit together scatter by less than this, nm.
+/// χ²/dof of such a fit, at most. Chosen by eye.
+const CLEAN_CHI2: f64 = 1.5;
+/// Positions of scans that fit together scatter by less than this, nm. Chosen by eye; see docs/constants.md.
 const SCATTER: f64 = 0.3;
 /// The information criterion has to fall by this much, with the scatter of the scans as unit: odds of e²⁵.
 const FAR_BETTER: f64 = 50.0;
-/// Below this scatter (nm) a fit needs no other explanation.
+/// Below this scatter (nm) a fit needs no other explanation. Chosen by eye; see docs/constants.md.
 const CLEAN: f64 = 0.01;
-/// Dates are whole seconds, and files are written some time after the frame, s.
+/// Dates are whole seconds, and files are written some time after the frame, s: a second for each.
 const CLOCK: f64 = 2.0;
-/// Pauses of one frame are as long as that to this share.
+/// Pauses of one frame are as long as that to this share. Chosen by eye.
 const SHARE: f64 = 0.05;
 
 /// Other headers that are tried: by what they multiply the time gradient, and in words.
@@ -107,7 +109,7 @@ fn reduced(found: &JointFit) -> f64 {
 }
 
 fn is_clean(found: &JointFit) -> bool {
-    found.terms.phases && found.instability_nm < CLEAN && reduced(found) < 1.5
+    found.terms.phases && found.instability_nm < CLEAN && reduced(found) < CLEAN_CHI2
 }
 
 /// Whether the scans fit together with other headers, and far better than `found`.

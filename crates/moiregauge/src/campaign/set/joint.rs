@@ -20,11 +20,12 @@ use crate::numbers::spread::mean_and_spread;
 use crate::scan::measured::MeasuredScan;
 use crate::settings::knobs::Settings;
 
-/// A scan stands out if chance makes its χ² less often than this, divided by the number of scans.
+/// A scan stands out if chance makes its χ² less often than this, divided by the number of scans: one good set in a
+/// thousand has such a one.
 const OUTLYING: f64 = 1e-3;
-/// Fewer scans than this have nobody to tell which of them is odd.
+/// Fewer scans than this have nobody to tell which of them is odd: of three any one may be. See docs/constants.md.
 const FEWEST: usize = 4;
-/// Pairs of up and down scans from which a bootstrap says something.
+/// Pairs of up and down scans from which a bootstrap says something: three have ten different draws only.
 const FEWEST_PAIRS: usize = 4;
 
 /// Refines the linear solution of a set with the phases of its scans; keeps it where they do not help.

@@ -22,9 +22,10 @@ use crate::settings::knobs::Settings;
 /// Heterostrains of layers on each other stay below a few tenths of a per cent, rarely a per cent; more
 /// than this deserves a word.
 const LARGE_STRAIN: f64 = 0.02;
-/// A period this near to that of a known surface may be that of the surface.
+/// A period this near to that of a known surface may be that of the surface: four times the calibration that is
+/// assumed.
 const SURFACE: f64 = 0.04;
-/// Shorter periods (nm) are of atoms or surfaces more often than of twisted layers, nm.
+/// Shorter periods (nm) are of atoms or surfaces more often than of twisted layers, nm: a twist of 9° in graphene.
 const SHORT: f64 = 1.5;
 
 /// Twist and strain of a lattice that can be a moiré; `None` where it cannot.

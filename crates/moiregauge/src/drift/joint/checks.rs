@@ -16,11 +16,12 @@ use crate::drift::joint::solve::JointFit;
 use crate::numbers::normal_equations::NormalEquations;
 use crate::numbers::rng::stream;
 
-/// Directions in which a scan alone determines a parameter have a residual of zero: below this share
-/// of the largest eigenvalue of S they are left out.
+/// Directions in which a scan alone determines a parameter have a residual of zero: below this share of the largest
+/// eigenvalue of S they are left out. Any small number above rounding.
 const NULL: f64 = 1e-6;
 
-/// Damping that holds what nothing determines: times of scans that were not drawn.
+/// Damping that holds what nothing determines: times of scans that were not drawn. Any number far below 1 and above
+/// rounding.
 const HELD: f64 = 1e-10;
 
 /// One scan against all others.

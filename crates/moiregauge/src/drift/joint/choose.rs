@@ -3,11 +3,13 @@
 use crate::drift::joint::sighting::Terms;
 use crate::drift::joint::solve::{JointFit, Problem, TestedTerm};
 
-/// Settling times that are tried, as shares of the duration of the campaign.
+/// Settling times that are tried, as shares of the duration of the campaign: factors of two, between which curves
+/// differ little.
 const SETTLING: [f64; 5] = [0.05, 0.1, 0.2, 0.4, 0.8];
-/// Errors of the lattice that grow by more than this say that a term is not determined.
+/// Errors of the lattice that grow by more than this say that a term is not determined. Chosen by eye; see
+/// docs/constants.md.
 const LOOSE: f64 = 3.0;
-/// Fewer scans than this cannot tell an exponential from a parabola.
+/// Fewer scans than this cannot tell an exponential from a parabola. Chosen by eye.
 const FEWEST_SETTLING: usize = 6;
 
 /// The fit with the terms that earn their place beside those of `best`.
@@ -62,8 +64,11 @@ pub(crate) fn terms(problem: &Problem, best: JointFit) -> JointFit {
     JointFit { tested, ..best }
 }
 
+/// Names of the terms, as results have them: a change of the velocity, ...
 const ACCELERATION: &str = "acceleration";
+/// ... one that dies out, ...
 const EXPONENTIAL: &str = "settling";
+/// ... and a gain of the lines against the frame.
 const FAST_GAIN: &str = "fast-axis gain";
 
 /// Terms that are offered one after the other, each with the scatter of positions that it leaves.

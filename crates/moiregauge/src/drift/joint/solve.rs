@@ -14,16 +14,17 @@ use crate::numbers::chi2::enlargement;
 use crate::numbers::normal_equations::NormalEquations;
 use crate::spectrum::phases::Phases;
 
-/// Gauss–Newton steps; the problem is nearly linear.
+/// Gauss–Newton steps: more than it takes, since the problem is nearly linear.
 const STEPS: usize = 12;
-/// Rounds of estimating the instability and solving with it.
+/// Rounds of estimating the instability and solving with it. Chosen by eye.
 const ROUNDS: usize = 5;
-/// Relative damping of the normal equations.
+/// Relative damping of the normal equations: any number between rounding and what changes an answer.
 const DAMPING: f64 = 1e-10;
-/// Phases are believed to be linked if they scatter by less than this share of a wavelength.
+/// Phases are believed to be linked if they scatter by less than this share of a wavelength: less than a third of
+/// that of phases at random (0.29).
 const LINKED: f64 = 0.08;
-/// A drift velocity worse than this (condition number of the scaled normal matrix, squared design) is
-/// not determined.
+/// A drift velocity worse than this (condition number of the scaled normal matrix, squared design) is not determined:
+/// 100 squared, as in the linear fit.
 const WORST_CONDITION: f64 = 1e4;
 
 /// The result of the fit over all scans.

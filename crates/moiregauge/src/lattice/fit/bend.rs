@@ -23,7 +23,7 @@ use crate::spectrum::shells::FIRST_SHELL;
 /// χ² with six degrees of freedom exceeds 22.5 once in a thousand; the noise that it is counted in is
 /// known to a tenth, which makes it 27.
 const THRESHOLD: f64 = 27.0;
-/// Changes below this share across the frame harm nobody.
+/// Changes below this share across the frame harm nobody: a tenth of the calibration that is assumed.
 const HARMLESS: f64 = 1e-3;
 
 /// How the lattice changes across the frame.

@@ -11,15 +11,20 @@ use crate::lattice::fit::solve;
 use crate::spectrum::harmonics::{Harmonic, Harmonics};
 use crate::spectrum::shells::{FIRST_SHELL, shells};
 
-/// Frames with more pixels have many periods.
+/// A harmonic of which less than this share is left by those that are fitted cannot be told from them. Chosen by eye.
+const TOLD_APART: f64 = 0.05;
+/// A sketch of a larger share of the lines saves nothing. Chosen by eye.
+const WORTH_A_SKETCH: f64 = 0.3;
+/// Frames with more pixels have many periods. Chosen by eye.
 const MANY_PIXELS: usize = 100_000;
-/// Lines of a sketch.
+/// Lines of a sketch: few enough to cost little. Chosen by eye.
 const SKETCHED: usize = 64;
-/// Power over noise of the weakest first harmonic in the lines of a sketch, at least.
+/// Power over noise of the weakest first harmonic in the lines of a sketch, at least: three times what a lattice
+/// needs to be found.
 const SKETCHABLE: f64 = 60.0;
-/// Multiples of it are spread evenly, modulo 1.
+/// Multiples of it are spread evenly, modulo 1: the golden ratio.
 const GOLDEN: f64 = 0.618_033_988_749_895;
-/// Largest wave vector, as a share of the Nyquist frequency.
+/// Largest wave vector, as a share of the Nyquist frequency. Chosen by eye.
 const HIGHEST: f64 = 0.9;
 
 /// What the fit starts with: the first shell, and of the others what the spectrum shows clearly.
@@ -48,7 +53,7 @@ impl Fit<'_> {
         let weakest = first
             .map(|harmonic| harmonic.significance(start.window_sums))
             .fold(f64::INFINITY, f64::min);
-        share < 0.3 && share * weakest > SKETCHABLE
+        share < WORTH_A_SKETCH && share * weakest > SKETCHABLE
     }
 
     /// Fits to one line of each of a few stripes. Ends near enough to the lattice of all lines for
@@ -181,7 +186,8 @@ impl Fit<'_> {
             };
             // Where hardly anything is left of a harmonic, it cannot be told from the others.
             let whole: DMatrix<f64> = gram.view((first, first), (2, 2)).into_owned();
-            if left.trace() > 0.05 * whole.trace() && amplitudes.dot(&score) > self.price() * noise
+            if left.trace() > TOLD_APART * whole.trace()
+                && amplitudes.dot(&score) > self.price() * noise
             {
                 earned.push(index);
             }

@@ -112,6 +112,7 @@ impl Folded {
     /// Sums of the line times `cos`, `sin`, `X cos`, `X sin` of some harmonics, in partial sums that the
     /// compiler can keep in registers.
     fn products<const N: usize>(&self, waves: [&[[Block; 2]]; N]) -> [[f64; 4]; N] {
+        /// Half of the values that are handled together.
         const HALF: usize = LANES / 2;
         widest(
             #[inline(always)]

@@ -85,6 +85,7 @@ pub(crate) fn wave(pair: &Matrix2<f64>, [h, k]: [i32; 2]) -> Vector2<f64> {
 /// `e^{i p X}` at the given positions, which are evenly spaced: sixteen at a time are turned by the
 /// same angles, so that most of them cost a multiplication.
 pub(crate) fn turns(p: f64, positions: &[f64]) -> Vec<Complex64> {
+    /// Pixels whose phases are made from one sine and cosine: rounding grows with their number.
     const BLOCK: usize = 16;
     let step = match positions {
         [first, second, ..] => second - first,

@@ -5,17 +5,20 @@ use crate::lattice::fit::model::{Model, Tables, residuals, sum};
 use crate::numbers::median::median;
 use crate::spectrum::harmonics::dot;
 
-/// Whole cycles per line next to zero, where the noise is the same but for the offsets.
+/// Offsets of lines matter beyond this over the root of the number of lines: 3.5 times the scatter of the ratio, 2.3.
+const OFFSETS: f64 = 8.0;
+/// Whole cycles per line next to zero, where the noise is the same but for the offsets: the window spreads these to
+/// one.
 const NEAR: std::ops::RangeInclusive<usize> = 2..=6;
 /// Lines at which these are looked at; the median of their five times as many numbers is known better
 /// than that of the line means.
 const LOOKED_AT: usize = 128;
 /// Median of χ² with one degree of freedom.
 const MEDIAN_CHI2: f64 = 0.454_936_423_119_572_8;
-/// A line is bad if its residual exceeds the median one by this many standard deviations of such
-/// residuals, and by half.
+/// A line is bad if its residual exceeds the median one by this many standard deviations of such residuals (none is
+/// so by chance), and by half.
 const BAD: f64 = 6.0;
-/// At most this share of the lines is left out; where more are bad the noise is just like that.
+/// At most this share of the lines is left out; where more are bad the noise is just like that. Chosen by eye.
 const MOST_BAD: f64 = 0.2;
 
 /// Residuals line by line.
@@ -79,7 +82,7 @@ impl LineStatistics {
     /// Whether offsets explain more than chance does. The median of n squares of means scatters by
     /// 2.3/√n; three and a half times that.
     pub(crate) fn offsets_matter(&self, frame: &Frame) -> bool {
-        self.ratio > 1.0 + 8.0 / (frame.lines() as f64).sqrt()
+        self.ratio > 1.0 + OFFSETS / (frame.lines() as f64).sqrt()
     }
 
     /// λ of each line: `n σ_l²/(σ² + n σ_l²)`.

@@ -31,17 +31,18 @@ pub(crate) struct Bin {
 
 /// Whole lines do what is found at |kx| up to this: the window spreads it by one bin.
 const RIDGE: i64 = 1;
-/// Bins on either side at which D is looked at, along the lines and across. Along the lines the noise
-/// may rise steeply towards kx = 0.
+/// Bins on either side at which D is looked at, along the lines and across. Along the lines the noise may rise
+/// steeply towards kx = 0. Chosen by eye.
 const LEVER: [i64; 2] = [8, 3];
 /// Bins beside each other are correlated by the window: four count as one.
 const CORRELATED: f64 = 4.0;
-/// Standard deviation of what is known beforehand about exponents, and about the logarithm by which
-/// kx = 0 differs from its neighbours.
+/// Standard deviation of what is known beforehand about exponents: those of noise are 0 to 2, ...
 const EXPONENT: f64 = 1.5;
+/// ... and about the logarithm by which kx = 0 differs from its neighbours: a factor of seven.
 const STEP: f64 = 2.0;
-/// Least number of bins for a fit.
+/// Least number of bins for a fit: hardly more than its parameters.
 const FEWEST: f64 = 6.0;
+/// Newton steps, at most. Chosen by eye.
 const ROUNDS: usize = 12;
 
 /// Noise power on the x and on the y component of the wave vector at `k` (cycles per frame), and on the

@@ -10,7 +10,7 @@ use crate::numbers::median::median;
 /// Residuals beyond this many standard deviations pull no harder (Huber). At 3 the loss of
 /// efficiency with Gaussian noise is below 0.1 %.
 const CLIP: f64 = 3.0;
-/// About as many residuals are looked at for their median.
+/// About as many residuals are looked at for their median: it is good to 1.4 % then.
 const SAMPLE: usize = 8192;
 
 /// Background and harmonics: `Σ b_t XᵃYᵇ + Σ α cos θ + β sin θ`, θ = p·(X, Y).

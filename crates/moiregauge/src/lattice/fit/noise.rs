@@ -17,20 +17,25 @@ use crate::spectrum::harmonics::hann_transform;
 use crate::spectrum::select::{BLOCK_WIDTH, NoiseMap};
 use crate::spectrum::transform::{Spectrum, hann};
 
-/// Bins (cycles per frame) on either side of a harmonic that count, along the lines and across.
+/// Power over noise of the highest bin at a place that is worth a look: a third of what a wave needs to earn its place.
+const PROMISING: f64 = 4.0;
+/// Bins (cycles per frame) on either side of a harmonic that count, along the lines: few, since noise in time is a
+/// function of kx, ...
 const ALONG: i64 = 4;
+/// ... and across, where it is the same: 300 bins, four of which count as one, tell it to about a tenth.
 const ACROSS: i64 = 16;
-/// On small frames at most this share of all lines' frequencies counts.
+/// On small frames at most one in this many of all lines' frequencies counts on either side.
 const SHARE: usize = 6;
-/// The same across where nothing but a wave is looked for.
+/// The same across where nothing but a wave is looked for: half.
 const NEAR: i64 = 8;
-/// Bins nearer to zero frequency belong to the background.
+/// Bins nearer to zero frequency belong to the background: a plane fills the first.
 const BACKGROUND: i64 = 2;
 /// The first column that the window keeps free of what whole lines do.
 const BESIDE: i64 = 2;
 /// A wave reaches no farther through the window (bins): beyond, 10⁻⁴ of its power is left.
 const SPREAD: f64 = 4.0;
-/// Farther than this from a point of the lattice (cycles per frame) a wave is none of its.
+/// Farther than this from a point of the lattice (cycles per frame) a wave is none of its: nearer, it may be that of
+/// a lattice that changes. Chosen by eye; see docs/constants.md.
 const FOREIGN: f64 = 3.0;
 
 /// The periodogram of a residual.
@@ -127,7 +132,7 @@ impl ResidualNoise {
                 }
             }
         }
-        near > 4.0 * median(&mut around) / std::f64::consts::LN_2
+        near > PROMISING * median(&mut around) / std::f64::consts::LN_2
     }
 
     /// Calls `each` with the frequency, the power found and that of white noise.

@@ -5,7 +5,8 @@ use nalgebra::{DMatrix, DVector};
 use crate::lattice::fit::model::Model;
 use crate::numbers::normal_equations::NormalEquations;
 
-/// Diagonal elements that fall below this share of themselves say that functions are the same.
+/// Diagonal elements that fall below this share of themselves say that functions are the same: some way above
+/// rounding.
 const DEGENERATE: f64 = 1e-11;
 
 /// Columns: what the basis functions are to a change of each parameter (background, α and β of each

@@ -12,22 +12,25 @@ use crate::lattice::several::split;
 use crate::spectrum::error::LatticeError;
 use crate::spectrum::method::Method;
 
-/// Rounds of taking turns.
+/// Rounds of taking turns, at most. Chosen by eye.
 const ROUNDS: usize = 80;
-/// Nothing moves any more: changes below this part of σ.
+/// Nothing moves any more: changes below this part of σ. Any small number: each round costs time.
 const STILL: f64 = 0.03;
-/// Signal over noise of the weakest first harmonic of a lattice, at least, when all are taken off.
+/// Signal over noise of the weakest first harmonic of a lattice, at least, when all are taken off: 25 in power, a
+/// little more than the 20 of the search.
 const WEAKEST: f64 = 5.0;
-/// The same while others are still in the image.
+/// The same while others are still in the image and count as noise. Chosen by eye; see docs/constants.md.
 const ON_TRIAL: f64 = 1.5;
-/// Lattices whose wave vectors lie within this of each other (cycles per frame) are one.
+/// Lattices whose wave vectors lie within this of each other (cycles per frame) are one: far less than a main lobe.
 const SAME: f64 = 0.3;
 /// A lattice whose first harmonics lie so near to higher ones of another (indices of a cell 3, 4 or 7 times as dense) that
 /// they are taken for these shows by its own higher ones: those of a cell that is at least this much denser ...
 const HIDDEN: f64 = 9.0;
-/// ... and whose waves lie within this of the other's: cycles per frame, and as a share of the distance of the points.
+/// ... and whose waves lie within this of the other's: cycles per frame, and as a share of the distance of the
+/// points. Chosen by eye.
 const NEAR_HIDDEN: [f64; 2] = [1.5, 0.2];
-/// Samples per shortest period at which the correlation of lattices is worked out.
+/// Samples per shortest period at which the correlation of lattices is worked out: more than two for the second
+/// order.
 const SAMPLES: f64 = 5.0;
 
 /// Finds and measures `count` lattices, the strongest first.
