@@ -35,14 +35,14 @@ fit/noise ACROSS few,noisy,contrast half double
 fit/noise FOREIGN moirés,gradient,grains half double
 fit/model CLIP few,noisy,contrast half double
 fit/lines BAD few,noisy,contrast half double
-several WEAKEST moirés half double
-several ON_TRIAL moirés half double
+several/together WEAKEST moirés half double
+several/together ON_TRIAL moirés half double
 doubts FEW_PERIODS few,noisy,contrast half double
 doubts ANOTHER_LATTICE few,noisy,contrast half double
 doubts NO_CHANCE few,noisy,contrast half double
 shared SIGNIFICANT few,noisy,contrast half double
 shared CORRELATED few,noisy,contrast half double
-drift WORST_CONDITION set: half double
+drift/linear WORST_CONDITION set: half double
 joint/link SHARE set: half double
 joint/link ACCELERATION set: half double
 joint/solve LINKED set: half double
