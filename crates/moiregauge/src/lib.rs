@@ -1,6 +1,56 @@
-//! The strain gauge for moiré superlattices: [`spmfile::Scan`] → numbers.
+//! The strain gauge for moiré superlattices: [`spmfile::Scan`] → drift, moiré lattice, twist angle and heterostrain.
 //!
-//! No files, no clock, no printing. Inside: nm, s, rad; x right, y up, angles counter-clockwise.
+//! ```
+//! use moiregauge::simulate::{Simulation, Simulator};
+//! use moiregauge::{Settings, analyse, measure_scan};
+//!
+//! let mut made = Simulation::default();
+//! made.raster.pixels = [128, 128];
+//! made.raster.scans = 4;
+//! let scans = Simulator::new(made)?;
+//! let settings = Settings::default();
+//! let mut measured = Vec::new();
+//! for index in 0..scans.frames() {
+//!     // What needs the pixels: one scan at a time.
+//!     let name = Simulator::file_name(index);
+//!     measured.push(measure_scan(&name, &scans.frame(index), &settings, None)?);
+//! }
+//! // The rest comes from the few numbers that remain.
+//! let analysis = analyse(measured, &settings);
+//! let mean = analysis.sets[0].mean.as_ref().expect("a drift, and a mean");
+//! let twist = mean.twist();
+//! println!("twist {:.3} ± {:.3}°", twist.value.to_degrees(), twist.total.to_degrees());
+//! for caveat in &analysis.caveats {
+//!     println!("{} ({}): {}", caveat.code(), caveat.place, caveat.message());
+//! }
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! No files, no clock, no printing. Inside: nm, s, rad; x right, y up, angles counter-clockwise. Twist and strain of a given lattice are
+//! the crate [`heterostrain`]; figures and reports are made by `moiregauge-report`.
+//!
+//! # The house
+//!
+//! The modules are rooms on floors: each takes from those below it, never from those above.
+//!
+//! | floor | room | holds |
+//! | --- | --- | --- |
+//! | top | [`survey`] | maps, stripes and domains of whole scans; images too large for memory; images at rest |
+//! | | [`campaign`] | all scans together: sets, drift, joint result, orientation of a layer, calibration runs |
+//! | | [`scan`] | one scan → a few numbers; where its pixels were, and when |
+//! | | [`plan`] | errors before anything is measured |
+//! | | [`meaning`] | what a lattice means: uncertainty budget, other readings, names |
+//! | | [`drift`] | linear, joint and published fits of the motion of the sample |
+//! | | [`domains`], [`region`] | triangles between nodes; questions to finished maps |
+//! | | [`map`], [`stripes`] | local lattices, local stripes |
+//! | | [`window`] | waves under a window: what both kinds of maps stand on |
+//! | | [`simulate`] | scans whose answer is known |
+//! | | [`settings`] | every knob |
+//! | | [`calibration`] | the scanner as a matrix |
+//! | | [`lattice`] | the lattice of one image |
+//! | | [`spectrum`] | where a lattice is in the spectrum |
+//! | | [`frame`] | image, geometry, background |
+//! | ground | [`caveat`], [`numbers`] | doubts; small mathematics |
 
 pub mod calibration;
 pub mod campaign;
@@ -21,6 +71,16 @@ pub mod spectrum;
 pub mod stripes;
 pub mod survey;
 pub mod window;
+
+pub use heterostrain;
+
+pub use campaign::{Analysis, ScanAnalysis, SetAnalysis, SetMean, analyse};
+pub use caveat::Caveat;
+pub use heterostrain::{Estimate, Lattice, Material, TotalEstimate, TwistStrain, Waves};
+pub use scan::{MeasuredScan, measure_scan};
+pub use settings::Settings;
+pub use spectrum::Method;
+pub use survey::map_scan;
 
 /// The example of the README, compiled.
 #[cfg(doctest)]

@@ -1,5 +1,6 @@
 //! Symmetries of the strain equation and its derivatives.
 
+#[path = "../../heterostrain/tests/two_layers/mod.rs"]
 mod two_layers;
 
 use std::f64::consts::{FRAC_PI_3, PI};

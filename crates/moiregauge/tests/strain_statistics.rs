@@ -1,5 +1,6 @@
 //! Errors of twist and strain, and what they do to a strain near zero.
 
+#[path = "../../heterostrain/tests/two_layers/mod.rs"]
 mod two_layers;
 
 use std::f64::consts::PI;

@@ -7,7 +7,8 @@
 
 use nalgebra::{Matrix2, Matrix4, SMatrix, Vector2};
 
-use crate::lattice::reduce::{canonical, reciprocal, shortest_pair};
+use crate::lattice::blocks::reciprocal;
+use crate::lattice::reduce::{canonical, shortest_pair};
 use crate::lattice::vectors::{Lattice, Nm};
 
 /// What three wavelengths are.

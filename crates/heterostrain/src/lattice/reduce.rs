@@ -2,20 +2,8 @@
 
 use nalgebra::{Matrix2, Vector2};
 
+use crate::lattice::blocks::{TURN, reciprocal};
 use crate::lattice::vectors::{Lattice, Pair};
-
-/// Real-space pair about 60° apart ↔ reciprocal pair about 60° apart, `K₁, K₂ = K₃ + K₁`.
-///
-/// For vectors `a₁, a₂` at 60° the dual pair (`a_i·b_j = 2π δ_ij`) stands at 120°; the pair
-/// returned is `(b₁, b₁ + b₂)`, at 60° again. The function is its own inverse up to a turn by 60°.
-pub fn reciprocal(basis: &Matrix2<f64>) -> Option<Matrix2<f64>> {
-    let dual = basis.try_inverse()?.transpose() * std::f64::consts::TAU;
-    let (b1, b2) = (dual.column(0).into_owned(), dual.column(1).into_owned());
-    Some(Matrix2::from_columns(&[b1, b1 + b2]))
-}
-
-/// `(a₁, a₂) → (a₂, a₂ − a₁)`: the next names, 60° further.
-pub(crate) const TURN: Matrix2<f64> = Matrix2::new(0.0, -1.0, 1.0, 1.0);
 
 /// The integer change of basis that turns a pair into its shortest one, about 60° apart, second
 /// counter-clockwise of the first (Lagrange–Gauss reduction). `None` for parallel vectors.

@@ -9,8 +9,7 @@ use std::marker::PhantomData;
 use nalgebra::{Matrix2, Matrix2x4, Matrix4, Vector2, Vector4};
 
 use crate::estimate::Estimate;
-use crate::lattice::blocks::{block, both};
-use crate::lattice::reduce::{TURN, reciprocal};
+use crate::lattice::blocks::{TURN, block, both, reciprocal};
 
 /// Real space.
 #[derive(Clone, Copy, Debug, PartialEq)]

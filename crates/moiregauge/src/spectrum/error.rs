@@ -1,7 +1,6 @@
 //! Why an image gives no lattice.
 
 use crate::spectrum::method::Method;
-use crate::spectrum::prepare;
 
 /// Why an image gives no lattice.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -27,7 +26,7 @@ pub enum LatticeError {
         total: usize,
     },
     /// There is no lattice in it.
-    #[error("the image shows no lattice: {}", prepare::too_weak(best))]
+    #[error("the image shows no lattice: {}", too_weak(best))]
     NoLattice {
         /// Signal-to-noise ratios (amplitude) of the best three wave vectors, largest first; 0 where none were found.
         best: [f64; 3],

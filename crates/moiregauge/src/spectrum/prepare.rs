@@ -1,18 +1,17 @@
 //! An image made ready for measuring, and where its lattice is, roughly.
 
-use heterostrain::lattice as reciprocal;
+use heterostrain::lattice::reciprocal;
 use nalgebra::{Matrix2, Vector2};
 
 use crate::frame::background::{Background, remove_background};
 use crate::frame::geometry::Geometry;
 use crate::frame::image::Image;
+use crate::spectrum::error::{LatticeError, SECOND, THIRD};
 use crate::spectrum::harmonics::{Harmonic, Harmonics, Windowed};
 use crate::spectrum::phases::Phases;
 use crate::spectrum::shells::shells;
 use crate::spectrum::transform::Spectrum;
 use crate::spectrum::{high_orders, select};
-
-pub(crate) use crate::spectrum::error::{LatticeError, SECOND, THIRD, too_weak};
 
 /// What is left of a constant or a plane when it is taken off, as a share of the values: a few hundred units of
 /// rounding.
@@ -67,7 +66,7 @@ pub(crate) fn prepare(
             }
             continue;
         }
-        let Some(start) = reciprocal::reciprocal(&harmonics.pair) else {
+        let Some(start) = reciprocal(&harmonics.pair) else {
             continue;
         };
         let spectrum = if binning == 1 {

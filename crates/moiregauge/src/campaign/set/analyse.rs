@@ -6,6 +6,7 @@ use nalgebra::{Matrix2, Vector2};
 use rayon::prelude::*;
 use spmfile::FrameDirection;
 
+use crate::campaign::analysis::{Drift, DriftFit, ScanAnalysis, SetAnalysis, SetMean};
 use crate::campaign::group::Group;
 use crate::campaign::set::about::{about_checks, about_mean, about_readings, about_residual};
 use crate::campaign::set::headers::{about_dates, about_headers};
@@ -30,8 +31,6 @@ use crate::numbers::spread::mean_and_spread;
 use crate::scan::measured::MeasuredScan;
 use crate::settings::knobs::{GivenDrift, Settings};
 use crate::spectrum::method::Method;
-
-pub(crate) use crate::campaign::analysis::{Drift, DriftFit, ScanAnalysis, SetAnalysis, SetMean};
 
 /// nm/min → nm/s.
 const PER_MINUTE: f64 = 1.0 / 60.0;
