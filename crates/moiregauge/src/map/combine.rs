@@ -13,9 +13,9 @@ use heterostrain::lattice::Waves;
 use nalgebra::{Matrix2, Matrix4, Vector2, Vector3, Vector4};
 use rayon::prelude::*;
 
-use crate::map::defects::is_improbable;
 use crate::map::sample::{Grid, LatticeMap, LatticeNode};
 use crate::numbers::chi2::enlargement;
+use crate::window::blur::is_improbable;
 use crate::window::mask::Mask;
 
 /// How well maps agree.

@@ -1,7 +1,5 @@
 //! Local lattices of an image.
 
-use nalgebra::Vector2;
-
 use crate::frame::image::Image;
 use crate::map::demodulate;
 use crate::window::blocks::Place;
@@ -15,11 +13,5 @@ pub fn local_lattices(
     reference: &Reference,
     resolution: &Resolution,
 ) -> Option<WaveMap> {
-    let centre = Vector2::new(image.columns as f64 - 1.0, image.rows as f64 - 1.0) / 2.0;
-    let place = Place {
-        row: 0,
-        rows: None,
-        centre,
-    };
-    demodulate::demodulate(image, place, reference, resolution)
+    demodulate::demodulate(image, Place::whole(image), reference, resolution)
 }

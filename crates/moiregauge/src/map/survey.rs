@@ -37,8 +37,9 @@ impl Survey {
         window_nm: f64,
         lines: usize,
     ) -> Self {
-        let stride = stride_of(&reference, step_of(&resolution, &reference, window_nm));
-        let step = block_of(&reference)[1] * stride[1];
+        let block = block_of(&reference);
+        let apart = step_of(&resolution, &reference, window_nm);
+        let step = block[1] * stride_of(&reference, block, apart)[1];
         let halo = (HALO * reference.in_pixels(window_nm)[1] / step as f64).ceil() as usize;
         Self {
             size,

@@ -22,16 +22,11 @@ use nalgebra::{Matrix2, Matrix4, Vector2};
 use rayon::prelude::*;
 
 use crate::window::blocks::Blocks;
+use crate::window::leaks::{ROUNDING, pulls};
+use crate::window::lines::Levelled;
+use crate::window::mixed::Mixed;
 use crate::window::noise::Noise;
 use crate::window::smooth::{Smoothed, Support};
-
-/// Harmonics below this many noise units (amplitude) are left out of a node: their phases are off by some third of a
-/// rad.
-const FAINT: f64 = 3.0;
-/// Without two harmonics above this many there is no lattice at a node. Chosen by eye; see docs/constants.md.
-const WEAKEST: f64 = 4.0;
-/// Relative error of slopes from single precision, times the inverse of the window.
-const ROUNDING: f64 = 3e-6;
 
 /// Blocks of a fifth of a period take waves for another that are 2π·5/|q₁|λ = 4.33 lengths of q₁ away: for those of the
 /// first shell, waves of at least this length.
@@ -72,54 +67,41 @@ pub(crate) enum Nothing {
 /// What the regression needs beside envelopes.
 pub(crate) struct Harmonics<'a> {
     /// (h, k) of each envelope.
-    pub(crate) indices: &'a [[i32; 2]],
-    pub(crate) noise: &'a Noise,
+    indices: &'a [[i32; 2]],
+    noise: &'a Noise,
     /// Variance of the offsets of lines that are left at each, see [`crate::window::lines`].
     ridges: Vec<f64>,
     /// Width of the window along x, pixels.
     width: f64,
     /// How far other harmonics that reach through the window can pull each slope, rad per pixel.
-    pub(crate) leaks: Vec<f64>,
+    leaks: Vec<f64>,
 }
 
 impl<'a> Harmonics<'a> {
-    /// `pair` and the mean amplitudes say what leaks through a window of this width (pixels).
-    pub(crate) fn new(
-        (indices, noise): (&'a [[i32; 2]], &'a Noise),
-        ridges: Vec<f64>,
-        pair: &Matrix2<f64>,
-        amplitudes: &[f64],
-        (width, block): ([f64; 2], [usize; 2]),
-    ) -> Self {
-        let beyond = beyond(indices, amplitudes);
+    /// Of an image, under a window of `window` nm.
+    pub(crate) fn new(mixed: &'a Mixed, noise: &'a Noise, image: &Levelled, window: f64) -> Self {
+        let (indices, amplitudes) = (&mixed.indices, mixed.amplitudes());
+        let width = mixed.reference.in_pixels(window);
+        let beyond = beyond(indices, &amplitudes);
         // A wave that is off by δ from one whole turn per block comes through by δb/2π, and pulls by δ e^{−δ²w²/2} of
         // that: 2b/(2πe w²) at most.
-        let pull = |i: usize| match block[i] {
+        let pull = |i: usize| match mixed.blocks.block[i] {
             1 => 0.0,
             b => b as f64 / (PI * E * width[i] * width[i]),
         };
         let aliased = beyond * pull(0).max(pull(1));
-        let vector = |[h, k]: [i32; 2]| pair * Vector2::new(f64::from(h), f64::from(k));
+        let wave = |i: usize| mixed.reference.wave(indices[i]);
         let leak = |i: usize| {
             let own = amplitudes[i].max(f64::MIN_POSITIVE);
-            let mut sum = ROUNDING / width[0].min(width[1]) + aliased / own;
-            for (j, amplitude) in amplitudes.iter().enumerate() {
-                for sign in [1.0, -1.0] {
-                    if i == j && sign > 0.0 {
-                        continue;
-                    }
-                    let apart = vector(indices[i]) - sign * vector(indices[j]);
-                    let in_widths = Vector2::new(apart.x * width[0], apart.y * width[1]);
-                    let share = (-0.5 * in_widths.norm_squared()).exp();
-                    sum += share * apart.norm() * amplitude / own;
-                }
-            }
-            sum
+            let apart = |j: usize, sign: i32| wave(i) - f64::from(sign) * wave(j);
+            let least = ROUNDING / width[0].min(width[1]) + aliased / own;
+            pulls(i, &amplitudes, width, apart).fold(least, |sum, pull| sum + pull)
         };
+        let ridge = |&index: &[i32; 2]| image.ridge(mixed.reference.wave(index));
         Self {
             indices,
             noise,
-            ridges,
+            ridges: indices.iter().map(ridge).collect(),
             width: width[0],
             leaks: (0..indices.len()).map(leak).collect(),
         }
@@ -170,7 +152,9 @@ pub(crate) fn local_lattices(
         .map(|node| {
             let support = smoothed.support[node].ok_or(Nothing::NoPixels)?;
             let at = smoothed.nodes.place(blocks, node);
-            regression((smoothed, node), &support, harmonics, (at, taken(at)))
+            let taken = taken(at);
+            let terms = Terms::new(smoothed, node, harmonics, at, &taken)?;
+            terms.regression(&support, taken)
         })
         .collect()
 }
@@ -182,105 +166,120 @@ struct Term {
     variances: Variances,
 }
 
-fn regression(
-    (smoothed, node): (&Smoothed, usize),
-    support: &Support,
-    harmonics: &Harmonics,
-    (at, taken): (Vector2<f64>, Matrix2<f64>),
-) -> Result<LocalLattice, Nothing> {
-    let ratio = harmonics.noise.ratio(at);
-    let spread = 0.5 * support.slope_noise.trace();
-    let mut terms = Vec::with_capacity(harmonics.indices.len());
-    let mut strong = Vec::with_capacity(harmonics.indices.len());
-    let mut signal_to_noise = 0.0;
-    for (i, envelope) in smoothed.envelopes.iter().enumerate() {
-        let index = Vector2::from(harmonics.indices[i].map(f64::from));
-        let slope = Vector2::from(envelope.slope[node].map(f64::from));
-        let level = harmonics.noise.levels[i] * ratio;
-        let turn = (taken * index).x * harmonics.width;
-        let ridge = level_of_ridge(harmonics.ridges[i], turn, harmonics.width);
-        let power = f64::from(envelope.amplitude[node].norm_sqr());
-        let unit = (level + ridge) * support.amplitude_noise;
-        if power <= FAINT * FAINT * unit || power <= 0.0 {
-            continue;
+/// The harmonics that stand out at a node.
+struct Terms {
+    all: Vec<Term>,
+    signal_to_noise: f64,
+}
+
+impl Terms {
+    /// `taken` has been taken off at the node's place `at`. Two harmonics have to be strong, and not in line.
+    fn new(
+        smoothed: &Smoothed,
+        node: usize,
+        harmonics: &Harmonics,
+        at: Vector2<f64>,
+        taken: &Matrix2<f64>,
+    ) -> Result<Self, Nothing> {
+        let support = smoothed.support[node].ok_or(Nothing::NoPixels)?;
+        let ratio = harmonics.noise.ratio(at);
+        let spread = 0.5 * support.slope_noise.trace();
+        let mut all = Vec::with_capacity(harmonics.indices.len());
+        let mut strong = Vec::with_capacity(harmonics.indices.len());
+        let mut signal_to_noise = 0.0;
+        for (i, envelope) in smoothed.envelopes.iter().enumerate() {
+            let index = Vector2::from(harmonics.indices[i].map(f64::from));
+            let level = harmonics.noise.levels[i] * ratio;
+            let turn = (taken * index).x * harmonics.width;
+            let ridge = level_of_ridge(harmonics.ridges[i], turn, harmonics.width);
+            let unit = (level + ridge) * support.amplitude_noise;
+            let Some(standing) = envelope.standing(node, unit) else {
+                continue;
+            };
+            if standing.is_strong {
+                strong.push(harmonics.indices[i]);
+            }
+            signal_to_noise += standing.to_noise;
+            let leaks = (harmonics.leaks[i].powi(2) + standing.unsure.powi(2)) / spread;
+            let noise = harmonics.noise.disagreement * level / (2.0 * standing.signal);
+            let plain = noise + leaks;
+            let ridge = ridge / (2.0 * standing.signal);
+            all.push(Term {
+                index,
+                slope: standing.slope,
+                variances: Variances {
+                    plain,
+                    phase: plain + ridge,
+                    slope: [plain + 2.0 * turn * turn * ridge, plain + ridge],
+                },
+            });
         }
-        // Noise adds to the power.
-        let signal = power - unit;
-        if power > WEAKEST * WEAKEST * unit {
-            strong.push(harmonics.indices[i]);
+        let in_line = |a: &[i32; 2], b: &[i32; 2]| a[0] * b[1] == a[1] * b[0];
+        if strong.iter().all(|a| strong.iter().all(|b| in_line(a, b))) {
+            return Err(Nothing::Weak);
         }
-        signal_to_noise += if unit > 0.0 {
-            signal / unit
-        } else {
-            f64::INFINITY
-        };
-        let unsure = envelope.unsure.get(node).copied().map_or(0.0, f64::from);
-        let leaks = (harmonics.leaks[i].powi(2) + unsure * unsure) / spread;
-        let plain = harmonics.noise.disagreement * level / (2.0 * signal) + leaks;
-        let ridge = ridge / (2.0 * signal);
-        terms.push(Term {
-            index,
-            slope,
-            variances: Variances {
-                plain,
-                phase: plain + ridge,
-                slope: [plain + 2.0 * turn * turn * ridge, plain + ridge],
-            },
-        });
+        Ok(Self {
+            all,
+            signal_to_noise,
+        })
     }
-    let independent = strong
-        .iter()
-        .any(|a| strong.iter().any(|b| a[0] * b[1] != a[1] * b[0]));
-    if !independent {
-        return Err(Nothing::Weak);
-    }
-    let of_terms = |weight: &dyn Fn(&Variances) -> f64| {
+
+    /// `Σ weight (h, k)(h, k)ᵀ`.
+    fn normal(&self, weight: impl Fn(&Variances) -> f64) -> Matrix2<f64> {
         let outer = |t: &Term| weight(&t.variances) * t.index * t.index.transpose();
-        terms.iter().map(outer).sum::<Matrix2<f64>>()
-    };
-    let inverse = |m: Matrix2<f64>| m.try_inverse().ok_or(Nothing::Weak);
-    let indices = [
-        inverse(of_terms(&|v| 1.0 / v.slope[0]))?,
-        inverse(of_terms(&|v| 1.0 / v.slope[1]))?,
-    ];
-    let mut pair = Matrix2::zeros();
-    for (axis, indices) in indices.iter().enumerate() {
-        let right = terms
-            .iter()
-            .map(|t| t.index * t.slope[axis] / t.variances.slope[axis]);
-        let row: Vector2<f64> = indices * right.sum::<Vector2<f64>>();
-        pair.set_row(axis, &row.transpose());
+        self.all.iter().map(outer).sum()
     }
-    let noise = &support.slope_noise;
-    let both = of_terms(&|v| v.plain / (v.slope[0] * v.slope[1]));
-    let mixed = indices[0] * both * indices[1];
-    let covariance = Matrix4::from_fn(|a, b| match (a % 2, b % 2) {
-        (0, 1) => mixed[(a / 2, b / 2)] * noise[(0, 1)],
-        (1, 0) => mixed[(b / 2, a / 2)] * noise[(0, 1)],
-        (axis, _) => indices[axis][(a / 2, b / 2)] * noise[(axis, axis)],
-    });
-    let mut chi2 = 0.0;
-    for term in &terms {
-        let miss = term.slope - pair * term.index;
-        let Variances { plain, slope, .. } = term.variances;
-        let of_term = Matrix2::new(
-            slope[0] * noise[(0, 0)],
-            plain * noise[(0, 1)],
-            plain * noise[(0, 1)],
-            slope[1] * noise[(1, 1)],
-        );
-        let inverse = of_term.try_inverse().ok_or(Nothing::NoPixels)?;
-        chi2 += (miss.transpose() * inverse * miss)[0];
+
+    /// Weighted least squares over all of them.
+    fn regression(&self, support: &Support, taken: Matrix2<f64>) -> Result<LocalLattice, Nothing> {
+        let inverse = |m: Matrix2<f64>| m.try_inverse().ok_or(Nothing::Weak);
+        let indices = [
+            inverse(self.normal(|v| 1.0 / v.slope[0]))?,
+            inverse(self.normal(|v| 1.0 / v.slope[1]))?,
+        ];
+        let mut pair = Matrix2::zeros();
+        for (axis, indices) in indices.iter().enumerate() {
+            let terms = self.all.iter();
+            let right = terms.map(|t| t.index * t.slope[axis] / t.variances.slope[axis]);
+            let row: Vector2<f64> = indices * right.sum::<Vector2<f64>>();
+            pair.set_row(axis, &row.transpose());
+        }
+        let noise = &support.slope_noise;
+        let both = self.normal(|v| v.plain / (v.slope[0] * v.slope[1]));
+        let mixed = indices[0] * both * indices[1];
+        let covariance = Matrix4::from_fn(|a, b| match (a % 2, b % 2) {
+            (0, 1) => mixed[(a / 2, b / 2)] * noise[(0, 1)],
+            (1, 0) => mixed[(b / 2, a / 2)] * noise[(0, 1)],
+            (axis, _) => indices[axis][(a / 2, b / 2)] * noise[(axis, axis)],
+        });
+        let chi2 = self.closure(&pair, noise).ok_or(Nothing::NoPixels)?;
+        let phases = inverse(self.normal(|v| 1.0 / v.phase))?;
+        Ok(LocalLattice {
+            pair: pair + taken,
+            covariance,
+            phase_covariance: phases * support.amplitude_noise,
+            chi2,
+            freedom: 2 * self.all.len() - 4,
+            signal_to_noise: self.signal_to_noise,
+        })
     }
-    let phases = inverse(of_terms(&|v| 1.0 / v.phase))?;
-    Ok(LocalLattice {
-        pair: pair + taken,
-        covariance,
-        phase_covariance: phases * support.amplitude_noise,
-        chi2,
-        freedom: 2 * terms.len() - 4,
-        signal_to_noise,
-    })
+
+    /// χ² of what a pair leaves of the slopes.
+    fn closure(&self, pair: &Matrix2<f64>, noise: &Matrix2<f64>) -> Option<f64> {
+        let mut chi2 = 0.0;
+        for term in &self.all {
+            let miss = term.slope - pair * term.index;
+            let Variances { plain, slope, .. } = term.variances;
+            let of_term = Matrix2::new(
+                slope[0] * noise[(0, 0)],
+                plain * noise[(0, 1)],
+                plain * noise[(0, 1)],
+                slope[1] * noise[(1, 1)],
+            );
+            chi2 += (miss.transpose() * of_term.try_inverse()? * miss)[0];
+        }
+        Some(chi2)
+    }
 }
 
 #[cfg(test)]

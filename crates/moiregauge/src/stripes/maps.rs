@@ -12,11 +12,11 @@ use crate::stripes::find;
 use crate::stripes::nodes::Work;
 use crate::stripes::types::{NoStripes, StripeMap};
 use crate::stripes::wave::{BLOCKS, Wave, reference};
+use crate::window::blocks::{NODES, block_within, stride_of};
 use crate::window::smooth::Nodes;
 use crate::window::types::{Reference, Resolution};
+use crate::window::widths::NARROWEST;
 
-/// Nodes per width of the window: nearer ones tell the same.
-const NODES: f64 = 3.0;
 /// Waves nearer to each other than this share of the shorter one are one: 14° of direction, as in the search.
 const SAME: f64 = 0.25;
 
@@ -37,41 +37,28 @@ pub fn stripe_maps(
     pitch: [f64; 2],
     resolution: &Resolution,
 ) -> Result<Vec<StripeMap>, NoStripes> {
-    let mut found = find_stripes(images, pitch);
+    let found = find_stripes(images, pitch);
     if found.is_empty() {
         return Err(NoStripes::Nothing);
     }
-    let mut references: Vec<Reference> = found.iter().map(|p| reference(p.0, pitch)).collect();
-    let (mut block, mut all_waves) = ([1; 2], Vec::new());
-    // Windows that a boundary cuts bear no beat: the second time with the mean wave.
-    for round in 0..2 {
-        let shortest = references
-            .iter()
-            .map(|r| 0.75f64.sqrt() * r.period())
-            .fold(f64::INFINITY, f64::min);
-        block = pitch.map(|p| ((shortest / BLOCKS / p + 1e-9) as usize).max(1));
-        let of = |image: &Image| -> Vec<Wave> { all_of(image, &references, block) };
-        if round == 0 {
-            // What a boundary spreads about a wave comes back to it.
-            let mut means: Vec<Vector2<f64>> = Vec::new();
-            for (wave, pattern) in of(images[0]).iter().zip(std::mem::take(&mut found)) {
-                let mean = wave.mean();
-                if !means.iter().any(|known| is_harmonic(mean, *known, pitch)) {
-                    means.push(mean);
-                    found.push((mean, pattern.1));
-                }
-            }
-            references = means
-                .into_iter()
-                .map(|mean| reference(mean, pitch))
-                .collect();
-        } else {
-            all_waves = images.iter().map(|image| of(image)).collect();
+    // Windows that a boundary cuts bear no beat: the second time with the mean wave, for what a boundary spreads about a
+    // wave comes back to it.
+    let mut means: Vec<(Vector2<f64>, f64)> = Vec::new();
+    let (references, block) = references_of(&found, pitch);
+    for (wave, pattern) in all_of(images[0], &references, block).iter().zip(found) {
+        let mean = wave.mean();
+        let known = |known: &(Vector2<f64>, f64)| is_harmonic(mean, known.0, pitch);
+        if !means.iter().any(known) {
+            means.push((mean, pattern.1));
         }
     }
+    let found = means;
+    let (references, block) = references_of(&found, pitch);
+    let of = |image: &&Image| all_of(image, &references, block);
+    let all_waves: Vec<Vec<Wave>> = images.iter().map(of).collect();
     let narrowest = references
         .iter()
-        .map(|r| crate::window::widths::NARROWEST * r.period())
+        .map(|r| NARROWEST * r.period())
         .fold(0.0, f64::max);
     let window = match resolution.window_nm {
         Some(window) => window.max(narrowest),
@@ -79,8 +66,9 @@ pub fn stripe_maps(
     };
     let sides = [images[0].columns, images[0].rows];
     let sides = [0, 1].map(|i| sides[i] as f64 * pitch[i]);
+    // Nodes may be as near as blocks are: no two pixels are asked for as for lattices.
     let step = resolution.step_nm.unwrap_or(window / NODES);
-    let stride = [0, 1].map(|i| ((step / pitch[i] / block[i] as f64).round() as usize).max(1));
+    let stride = stride_of(&references[0], block, step);
     let mut maps = Vec::with_capacity(images.len());
     for (image, waves) in images.iter().zip(all_waves) {
         let mut work = Work {
@@ -93,6 +81,14 @@ pub fn stripe_maps(
         maps.push(work.map(&found)?);
     }
     Ok(maps)
+}
+
+/// The references of patterns, and the pixels of a block for the shortest wave of them.
+fn references_of(found: &[(Vector2<f64>, f64)], pitch: [f64; 2]) -> (Vec<Reference>, [usize; 2]) {
+    let references: Vec<Reference> = found.iter().map(|p| reference(p.0, pitch)).collect();
+    let wavelengths = references.iter().map(|r| 0.75f64.sqrt() * r.period());
+    let shortest = wavelengths.fold(f64::INFINITY, f64::min);
+    (references, block_within(shortest / BLOCKS, pitch))
 }
 
 /// Whether a wave is a harmonic of another, or that one of it.

@@ -3,22 +3,19 @@
 use nalgebra::{Matrix2, Matrix4, Vector2};
 
 use crate::frame::image::Image;
-use crate::map::defects::{Setting, bend, is_improbable, near};
+use crate::map::defects::{Setting, is_improbable};
 use crate::map::displacement;
 use crate::numbers::median::median;
 use crate::stripes::fit;
 use crate::stripes::types::{NoStripes, StripeMap, StripeNode, StripePattern};
 use crate::stripes::wave::{Local, Wave};
+use crate::window::blur::Blur;
 use crate::window::mask::Mask;
+use crate::window::setting::{LOST, NEAR, fours, winds};
 use crate::window::smooth::{Envelope, Nodes, Smoothed};
-use crate::window::types::{Reference, UsedHarmonic, WaveMap, WaveNode};
+use crate::window::types::{Reference, WaveMap, WaveNode};
 use crate::window::widths::OF_DIFFERENCE;
 
-/// Less of a window than this is too little: as for lattices.
-const SHARE: f64 = 0.6;
-/// Signal is lost where its power is below this share of what is usual for the pattern: half of the amplitude, as for
-/// lattices.
-const LOST: f64 = 0.25;
 /// Within a window of a boundary between patterns the second has this share of the power of the first or more: half of
 /// the window less its error function there, `(Φ(−1)/Φ(1))²`.
 const BETWEEN: f64 = 0.036;
@@ -27,16 +24,6 @@ const BETWEEN: f64 = 0.036;
 const CROSSED: f64 = 0.5;
 /// In so much of the image it has to be there. Chosen by eye.
 const CROSSING: f64 = 0.4;
-/// Nodes this near to a contradiction and to a winding point (window widths) see them: as for lattices, ...
-const NEAR: f64 = 2.0;
-/// ... and this near to a bent one.
-const BESIDE: f64 = 1.0;
-/// Phase (rad) by which a wave may bend over one window width: as for lattices.
-const STRAIGHT: f64 = 0.35;
-/// Blur that matters, as a share of the wave vector: as for lattices.
-const BLURRED: f64 = 0.004;
-/// χ² of two numbers that is more than chance (p < 0.01).
-const MORE_THAN_CHANCE: f64 = 9.21;
 
 /// A map under way.
 pub(crate) struct Work<'a> {
@@ -51,7 +38,7 @@ pub(crate) struct Work<'a> {
 
 impl Work<'_> {
     fn place(&self, node: usize) -> Vector2<f64> {
-        self.nodes.place(&self.waves[0].blocks, node)
+        self.nodes.place(&self.waves[0].mixed.blocks, node)
     }
 
     /// The map; `found` has the chances of the patterns.
@@ -60,13 +47,13 @@ impl Work<'_> {
         let smoothed: Vec<Smoothed> = self
             .waves
             .iter()
-            .map(|w| w.smoothed(self.window, self.nodes))
+            .map(|w| w.mixed.cleaned(self.window, self.nodes))
             .collect();
         let mut locals = self.locals(&smoothed);
         let owner = owners(&locals, count);
         self.is_no_lattice(&locals, &owner)?;
         let mut patterns: Vec<StripePattern> = (0..self.waves.len())
-            .map(|p| self.pattern(p, (&locals[p], &owner), found[p].1))
+            .map(|p| self.pattern(p, &locals[p], &owner, found[p].1))
             .collect();
         // Noise that could not be seen is what the fits leave.
         for (wave, pattern) in self.waves.iter_mut().zip(&patterns) {
@@ -82,7 +69,7 @@ impl Work<'_> {
             }
         }
         let blurs = self.blurs(&locals);
-        let masks = self.masks((&smoothed, &locals), &owner, &blurs);
+        let masks = self.masks(&smoothed, &locals, &owner, &blurs);
         let mut nodes: Vec<StripeNode> = (0..count)
             .map(|n| {
                 let local = owner[n].and_then(|p| Some((p, locals[p][n].as_ref()?)));
@@ -92,11 +79,10 @@ impl Work<'_> {
         for (p, smoothed) in smoothed.iter().enumerate() {
             self.follow(p, smoothed, &mut nodes);
         }
-        let blocks = &self.waves[0].blocks;
         Ok(StripeMap {
             size: self.nodes.size,
             first: self.place(0),
-            step: [0, 1].map(|i| (self.nodes.stride[i] * blocks.block[i]) as f64),
+            step: self.nodes.step(&self.waves[0].mixed.blocks),
             window_nm: self.window,
             margin: self.margin,
             patterns,
@@ -135,7 +121,8 @@ impl Work<'_> {
     fn pattern(
         &self,
         p: usize,
-        (locals, owner): (&[Option<Local>], &[Option<usize>]),
+        locals: &[Option<Local>],
+        owner: &[Option<usize>],
         log_chance: f64,
     ) -> StripePattern {
         let wave = &self.waves[p];
@@ -151,7 +138,7 @@ impl Work<'_> {
         // Windows beside boundaries have less: the usual one counts.
         let usual = median(&mut powers);
         let shows = self.pixels(|n| owner[n] == Some(p));
-        let orders: Vec<i32> = wave.indices.iter().map(|i| i[0]).collect();
+        let orders: Vec<i32> = wave.mixed.indices.iter().map(|i| i[0]).collect();
         let fit = (power > 0.0)
             .then(|| fit::fit(self.image, mean / power, &orders, &shows))
             .flatten();
@@ -164,17 +151,7 @@ impl Work<'_> {
             share: own.len() as f64 / owner.len().max(1) as f64,
             log_chance,
             coherence: (fitted / usual).min(1.0),
-            harmonics: wave
-                .indices
-                .iter()
-                .zip(&wave.powers)
-                .zip(&wave.levels)
-                .map(|((&index, power), &noise)| UsedHarmonic {
-                    index,
-                    amplitude: 2.0 * power.sqrt(),
-                    noise,
-                })
-                .collect(),
+            harmonics: wave.mixed.used(&wave.levels),
             noise_measured: wave.noise_measured,
             fit,
         }
@@ -183,10 +160,9 @@ impl Work<'_> {
     /// The pixels whose nearest node passes.
     fn pixels(&self, wanted: impl Fn(usize) -> bool) -> Vec<bool> {
         let first = self.place(0);
-        let blocks = &self.waves[0].blocks;
+        let step = self.nodes.step(&self.waves[0].mixed.blocks);
         let nearest = |axis: usize, pixel: usize| {
-            let step = (self.nodes.stride[axis] * blocks.block[axis]) as f64;
-            let node = ((pixel as f64 - first[axis]) / step).round().max(0.0);
+            let node = ((pixel as f64 - first[axis]) / step[axis]).round().max(0.0);
             (node as usize).min(self.nodes.size[axis] - 1)
         };
         let columns: Vec<usize> = (0..self.image.columns).map(|c| nearest(0, c)).collect();
@@ -197,19 +173,19 @@ impl Work<'_> {
     }
 
     /// What a window √2 wider changes at each node of each pattern.
-    fn blurs(&self, locals: &[Vec<Option<Local>>]) -> Vec<Vec<Change>> {
+    fn blurs(&self, locals: &[Vec<Option<Local>>]) -> Vec<Vec<Blur>> {
         let wider = self.window * std::f64::consts::SQRT_2;
         let smoothed: Vec<Smoothed> = self
             .waves
             .iter()
-            .map(|w| w.smoothed(wider, self.nodes))
+            .map(|w| w.mixed.cleaned(wider, self.nodes))
             .collect();
         let of_wave = |(narrow, wide): (&Vec<Option<Local>>, Vec<Option<Local>>)| {
             let pairs = narrow.iter().zip(&wide);
             pairs
                 .map(|pair| match pair {
                     (Some(a), Some(b)) => blur(a, b),
-                    _ => Change::default(),
+                    _ => Blur::default(),
                 })
                 .collect()
         };
@@ -222,87 +198,60 @@ impl Work<'_> {
 
     fn masks(
         &self,
-        (smoothed, locals): (&[Smoothed], &[Vec<Option<Local>>]),
+        smoothed: &[Smoothed],
+        locals: &[Vec<Option<Local>>],
         owner: &[Option<usize>],
-        blurs: &[Vec<Change>],
+        blurs: &[Vec<Blur>],
     ) -> Vec<Mask> {
-        let count = self.nodes.len();
-        let places: Vec<Vector2<f64>> = (0..count).map(|n| self.place(n)).collect();
-        let width = self.waves[0].reference.in_pixels(self.window);
-        let last = Vector2::new(self.image.columns as f64, self.image.rows as f64);
-        let frame = [Vector2::zeros(), last - Vector2::repeat(1.0)];
+        let mixed = &self.waves[0].mixed;
+        let (count, places) = (self.nodes.len(), mixed.places(self.nodes));
+        let width = mixed.reference.in_pixels(self.window);
         let setting = Setting {
             smoothed: &smoothed[0],
             places: &places,
             width,
             margin: width.map(|w| w * self.margin),
-            frame,
-            noise_share: &[],
-            blurs: &[],
+            frame: mixed.frame,
         };
-        let outside = |n: usize| {
-            (0..2).any(|i| {
-                (places[n] - frame[0])[i].min((frame[1] - places[n])[i]) < setting.margin[i]
-            })
-        };
-        let usual: Vec<f64> = (0..locals.len())
-            .map(|p| {
-                let own = (0..count).filter(|&n| owner[n] == Some(p));
-                let powers = own.filter_map(|n| Some(locals[p][n].as_ref()?.power));
-                median(&mut powers.collect::<Vec<f64>>())
-            })
-            .collect();
+        let usual = usual(locals, owner);
         let strong = |n: usize| {
             let p = owner[n]?;
             let local = locals[p][n].as_ref()?;
             (local.power > LOST * usual[p]).then_some((p, local))
         };
-        let clear = |n: usize| strong(n).is_some() && !outside(n) && !is_between(locals, n);
-        let winding = windings(smoothed, self.nodes, owner, clear);
-        let spoilt = near(&setting, NEAR, |n| {
-            let contradicts = strong(n).is_some_and(|(_, l)| is_improbable(l.chi2, l.freedom));
-            winding[n] || clear(n) && contradicts
+        let clear =
+            |n: usize| strong(n).filter(|_| !setting.is_outside(n) && !is_between(locals, n));
+        let winding = windings(smoothed, self.nodes, owner, |n| clear(n).is_some());
+        let spoilt = setting.near(NEAR, |n| {
+            winding[n] || clear(n).is_some_and(|(_, l)| is_improbable(l.chi2, l.freedom))
         });
-        let pairs: Vec<Option<Matrix2<f64>>> = (0..count)
-            .map(|n| {
-                Some(Matrix2::from_columns(&[
-                    strong(n)?.1.wave,
-                    Vector2::zeros(),
-                ]))
-            })
-            .collect();
-        let bent = near(&setting, BESIDE, |n| {
-            let Some((p, _)) = strong(n).filter(|_| clear(n)) else {
-                return false;
-            };
-            let blurred = is_improbable(blurs[p][n].chi2, 2) && blurs[p][n].share > BLURRED;
-            // Neighbours of another pattern are another wave.
-            let same = |m: usize| pairs[m].filter(|_| owner[m] == Some(p));
-            blurred || bend(&setting, same, n) > STRAIGHT
-        });
-        (0..count)
-            .map(|n| {
-                if outside(n) {
-                    Mask::Margin
-                } else if smoothed[0].support[n].is_none_or(|s| s.share < SHARE) {
-                    Mask::Missing
-                } else if strong(n).is_none() {
-                    Mask::Weak
-                } else if spoilt[n] {
-                    Mask::Defect
-                } else if bent[n] || is_between(locals, n) {
-                    Mask::Bent
-                } else {
-                    Mask::Good
-                }
-            })
-            .collect()
+        // Neighbours of another pattern are another wave.
+        let pair = |of: usize, n: usize| {
+            let (p, local) = strong(n)?;
+            (owner[of] == Some(p)).then(|| only(local.wave))
+        };
+        let bent = setting.bent(pair, |n| clear(n).map(|(p, _)| blurs[p][n]));
+        let of_node = |n: usize| {
+            if setting.is_outside(n) {
+                Mask::Margin
+            } else if setting.is_missing(n) {
+                Mask::Missing
+            } else if strong(n).is_none() {
+                Mask::Weak
+            } else if spoilt[n] {
+                Mask::Defect
+            } else if bent[n] || is_between(locals, n) {
+                Mask::Bent
+            } else {
+                Mask::Good
+            }
+        };
+        (0..count).map(of_node).collect()
     }
 
     /// The phases of a pattern against its mean wave, followed through its good nodes.
     fn follow(&self, p: usize, smoothed: &Smoothed, nodes: &mut [StripeNode]) {
         let wave = &self.waves[p];
-        let only = |v: Vector2<f64>| Matrix2::from_columns(&[v, Vector2::zeros()]);
         let of_node = |n: usize| {
             let own = nodes[n].pattern == Some(p) && nodes[n].mask == Mask::Good;
             let phase = wave.phase(smoothed, n);
@@ -324,12 +273,12 @@ impl Work<'_> {
         let map = WaveMap {
             size: self.nodes.size,
             first: self.place(0),
-            step: [0, 1].map(|i| (self.nodes.stride[i] * wave.blocks.block[i]) as f64),
+            step: self.nodes.step(&wave.mixed.blocks),
             window_nm: self.window,
             margin: self.margin,
             reference: Reference {
-                pair: only(wave.reference.wave([1, 0])),
-                pitch: wave.reference.pitch,
+                pair: only(wave.first()),
+                pitch: wave.mixed.reference.pitch,
             },
             centre: Vector2::zeros(),
             nodes: (0..nodes.len()).map(of_node).collect(),
@@ -345,13 +294,19 @@ impl Work<'_> {
     }
 }
 
-/// What a window √2 wider changes at a node.
-#[derive(Clone, Copy, Debug, Default)]
-struct Change {
-    /// χ² of its two numbers.
-    chi2: f64,
-    /// As a share of the wave vector.
-    share: f64,
+/// A wave as the first of a pair whose second is not there.
+fn only(wave: Vector2<f64>) -> Matrix2<f64> {
+    Matrix2::from_columns(&[wave, Vector2::zeros()])
+}
+
+/// Median power of every pattern where it is the strongest.
+fn usual(locals: &[Vec<Option<Local>>], owner: &[Option<usize>]) -> Vec<f64> {
+    let of_pattern = |p: usize| {
+        let own = (0..owner.len()).filter(|&n| owner[n] == Some(p));
+        let powers = own.filter_map(|n| Some(locals[p][n].as_ref()?.power));
+        median(&mut powers.collect::<Vec<f64>>())
+    };
+    (0..locals.len()).map(of_pattern).collect()
 }
 
 /// The strongest pattern at every node.
@@ -380,22 +335,20 @@ fn is_between(locals: &[Vec<Option<Local>>], node: usize) -> bool {
 }
 
 /// The change from one wave to that under a wider window; χ² of two numbers.
-fn blur(narrow: &Local, wide: &Local) -> Change {
+fn blur(narrow: &Local, wide: &Local) -> Blur {
     let change = wide.wave - narrow.wave;
     let inverse = narrow.slope.try_inverse().unwrap_or_default();
-    let chi2 = change.dot(&(inverse * change)) / (narrow.variance * OF_DIFFERENCE);
-    Change {
-        chi2,
+    Blur {
+        chi2: change.dot(&(inverse * change)) / (narrow.variance * OF_DIFFERENCE),
+        components: 2,
         share: change.norm() / narrow.wave.norm(),
+        of_noise: OF_DIFFERENCE,
     }
 }
 
-/// A node; its error is enlarged by what the window blurs where that is more than chance.
-fn node_of(local: Option<(usize, &Local)>, mask: Mask, blur: Option<Change>) -> StripeNode {
-    let factor = match blur {
-        Some(blur) if blur.chi2 > MORE_THAN_CHANCE => 1.0 + (blur.chi2 / 2.0 - 1.0) * OF_DIFFERENCE,
-        _ => 1.0,
-    };
+/// A node; its error is enlarged by what the window blurs.
+fn node_of(local: Option<(usize, &Local)>, mask: Mask, blur: Option<Blur>) -> StripeNode {
+    let factor = blur.unwrap_or_default().factor();
     let known = local.map(|l| l.1);
     let unknown = f64::NAN;
     StripeNode {
@@ -420,11 +373,8 @@ fn windings(
     owner: &[Option<usize>],
     clear: impl Fn(usize) -> bool,
 ) -> Vec<bool> {
-    let [columns, rows] = nodes.size;
     let mut cores = vec![false; nodes.len()];
-    for (row, column) in (1..rows).flat_map(|r| (1..columns).map(move |c| (r, c))) {
-        let corner = row * columns + column;
-        let around = [corner, corner - 1, corner - 1 - columns, corner - columns];
+    for (corner, around) in fours(nodes) {
         let Some(p) = owner[corner] else { continue };
         if !around.iter().all(|&n| owner[n] == Some(p)) || !around.iter().any(|&n| clear(n)) {
             continue;
@@ -438,11 +388,7 @@ fn windings(
         }) else {
             continue;
         };
-        let turn = |a: usize, b: usize| {
-            f64::from((strongest.amplitude[b] * strongest.amplitude[a].conj()).arg())
-        };
-        let turns: f64 = (0..4).map(|k| turn(around[k], around[(k + 1) % 4])).sum();
-        cores[corner] = turns.abs() > std::f64::consts::PI;
+        cores[corner] = winds(&strongest.amplitude, around);
     }
     cores
 }

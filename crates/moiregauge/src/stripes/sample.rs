@@ -10,12 +10,12 @@ use nalgebra::{Matrix2, Vector2};
 
 use crate::frame::geometry::Geometry;
 use crate::map::combine::Agreement;
-use crate::map::defects::is_improbable;
 use crate::map::quantities::{Plane, TwistStrainMap};
 use crate::map::sample::Grid;
 use crate::map::summary::Spread;
 use crate::numbers::chi2::enlargement;
 use crate::stripes::types::{StripeMap, StripeNode};
+use crate::window::blur::is_improbable;
 use crate::window::mask::Mask;
 use crate::window::types::UsedHarmonic;
 

@@ -7,6 +7,7 @@
 use nalgebra::Vector2;
 use rayon::prelude::*;
 
+use crate::frame::image::Image;
 use crate::window::lines::Levelled;
 use crate::window::types::{Reference, Resolution};
 
@@ -24,6 +25,17 @@ pub(crate) struct Place {
     pub(crate) rows: Option<usize>,
     /// Where all phases are zero, pixels of the whole image.
     pub(crate) centre: Vector2<f64>,
+}
+
+impl Place {
+    /// A whole image, phases from its middle.
+    pub(crate) fn whole(image: &Image) -> Self {
+        Self {
+            row: 0,
+            rows: None,
+            centre: Vector2::new(image.columns as f64 - 1.0, image.rows as f64 - 1.0) / 2.0,
+        }
+    }
 }
 
 /// An image mixed down and averaged over blocks of pixels.
@@ -224,16 +236,20 @@ fn lines(
     (pixels, share)
 }
 
-/// Pixels of a block along columns and rows.
+/// Pixels of a block along columns and rows, for a lattice.
 pub(crate) fn block_of(reference: &Reference) -> [usize; 2] {
-    let block = reference.in_pixels(reference.period() / BLOCKS);
+    block_within(reference.period() / BLOCKS, reference.pitch)
+}
+
+/// Pixels of a block of at most so many nm.
+pub(crate) fn block_within(nm: f64, pitch: [f64; 2]) -> [usize; 2] {
     // Periods of whole pixels come out a hair too short.
-    block.map(|b| ((b + 1e-9) as usize).max(1))
+    pitch.map(|p| ((nm / p + 1e-9) as usize).max(1))
 }
 
 /// Blocks from node to node, `distance_nm` apart.
-pub(crate) fn stride_of(reference: &Reference, distance_nm: f64) -> [usize; 2] {
-    let (pixels, block) = (reference.in_pixels(distance_nm), block_of(reference));
+pub(crate) fn stride_of(reference: &Reference, block: [usize; 2], distance_nm: f64) -> [usize; 2] {
+    let pixels = reference.in_pixels(distance_nm);
     [0, 1].map(|i| ((pixels[i] / block[i] as f64).round() as usize).max(1))
 }
 
@@ -245,11 +261,11 @@ pub(crate) fn step_of(resolution: &Resolution, reference: &Reference, window_nm:
 }
 
 /// Nodes are so many pixels apart at least: nearer ones tell the same.
-pub(crate) const APART: f64 = 2.0;
+const APART: f64 = 2.0;
 
 /// Blocks per period: finer ones cost memory by the square, coarser ones fold the first shells; see `ALIASED` of the
 /// waves.
-pub(crate) const BLOCKS: f64 = 5.0;
+const BLOCKS: f64 = 5.0;
 
 /// Nodes per width of the window: as for lattices.
 pub(crate) const NODES: f64 = 3.0;
@@ -257,7 +273,6 @@ pub(crate) const NODES: f64 = 3.0;
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::frame::image::Image;
     use rustfft::num_complex::Complex64;
 
     /// Against the definition, with a missing pixel, at an offset, on a frame that blocks do not fill.

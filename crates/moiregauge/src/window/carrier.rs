@@ -12,7 +12,7 @@ use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
 use rayon::prelude::*;
 use rustfft::num_complex::Complex32;
 
-use crate::window::blocks::{Blocks, Layer};
+use crate::window::blocks::Blocks;
 
 /// Weight of the penalty as a share of the mean diagonal element: any small number, which holds what was not measured
 /// and bends nothing else.
@@ -62,7 +62,7 @@ impl Carrier {
     /// Fits slopes measured between `low` and `high` (pixels) with so many cells along each axis.
     pub(crate) fn fit(
         slopes: &[Slope],
-        (low, high): (Vector2<f64>, Vector2<f64>),
+        [low, high]: [Vector2<f64>; 2],
         cells: [usize; 2],
     ) -> Option<Self> {
         let mut carrier = Self {
@@ -170,19 +170,20 @@ impl Carrier {
         mean
     }
 
-    /// Takes these phases off the layers, which are those of the harmonics `indices`; `before` is what has
+    /// Takes these phases off the blocks, whose layers are those of the harmonics `indices`; `before` is what has
     /// been taken off already.
     pub(crate) fn take_off(
         &self,
         before: Option<&Self>,
-        (layers, indices): (&mut [Layer], &[[i32; 2]]),
-        places: &Blocks,
+        indices: &[[i32; 2]],
+        blocks: &mut Blocks,
     ) {
-        let columns = places.size[0];
+        let mut layers = std::mem::take(&mut blocks.layers);
+        let (places, columns) = (&*blocks, blocks.size[0]);
         // The same row of all layers together.
         let mut rows: Vec<Vec<(&mut [f32], &mut [f32])>> = Vec::new();
         rows.resize_with(places.size[1], Vec::new);
-        for layer in layers {
+        for layer in &mut layers {
             let lines = layer.re.chunks_exact_mut(columns);
             let lines = lines.zip(layer.im.chunks_exact_mut(columns));
             rows.iter_mut()
@@ -201,6 +202,7 @@ impl Carrier {
                 turn([&first, &second], *index, re, im);
             }
         });
+        blocks.layers = layers;
     }
 
     /// ψ₁ and ψ₂ of a line of blocks.
@@ -271,7 +273,7 @@ mod tests {
                 slopes: Matrix2::from_columns(&[slope(at), -slope(at)]),
             })
             .collect();
-        let carrier = Carrier::fit(&slopes, (low, high), [4, 3]).unwrap();
+        let carrier = Carrier::fit(&slopes, [low, high], [4, 3]).unwrap();
         let middle = Vector2::new(90.0, 55.0);
         for at in [[10.0, 20.0], [140.0, 80.0], [199.0, 99.0]].map(Vector2::from) {
             let found = carrier.at(at).0.x - carrier.at(middle).0.x;

@@ -25,6 +25,9 @@ const NOTHING: f64 = 1e-7;
 /// see docs/constants.md.
 const UNSURE: f64 = 0.05;
 
+/// Relative error of slopes from single precision, times the inverse of the window.
+pub(crate) const ROUNDING: f64 = 3e-6;
+
 /// What has been taken off at a place: phases of both waves (rad), and their slopes as columns (rad per pixel).
 pub(crate) type Taken = (Vector2<f64>, Matrix2<f64>);
 
@@ -37,11 +40,31 @@ struct Passage {
     adds: [Complex64; 3],
 }
 
+/// How far each of the other harmonics that reach through a whole window (`width`, pixels) can pull the slope of the i-th,
+/// rad per pixel. `apart` is the way from the j-th (sign 1) or its mirror image (−1) to the i-th.
+pub(crate) fn pulls(
+    i: usize,
+    amplitudes: &[f64],
+    width: [f64; 2],
+    apart: impl Fn(usize, i32) -> Vector2<f64>,
+) -> impl Iterator<Item = f64> {
+    let own = amplitudes[i].max(f64::MIN_POSITIVE);
+    let all = (0..amplitudes.len()).flat_map(|j| [(j, 1), (j, -1)]);
+    all.filter(move |&other| other != (i, 1))
+        .map(move |(j, sign)| {
+            let apart = apart(j, sign);
+            let in_widths = apart.component_mul(&Vector2::from(width));
+            let share = (-0.5 * in_widths.norm_squared()).exp();
+            share * apart.norm() * amplitudes[j] / own
+        })
+}
+
 /// Takes off what leaks at nodes whose windows are cut. `taken` says what the layers of the harmonics `indices` had
 /// taken off at a place.
 pub(crate) fn clean(
     smoothed: &mut Smoothed,
-    (blocks, width): (&Blocks, [f64; 2]),
+    blocks: &Blocks,
+    width: [f64; 2],
     indices: &[[i32; 2]],
     taken: impl Fn(Vector2<f64>) -> Taken + Sync,
 ) {
@@ -54,7 +77,7 @@ pub(crate) fn clean(
         .par_iter()
         .map(|&node| {
             let taken = taken(nodes.place(blocks, node));
-            of_node(smoothed, (blocks, &kernels), indices, node, &taken)
+            of_node(smoothed, blocks, &kernels, indices, node, &taken)
         })
         .collect();
     for (&node, values) in cut.iter().zip(&cleaned) {
@@ -77,7 +100,8 @@ pub(crate) fn clean(
 /// c₀ and c₁ of all harmonics at a node without what the others leak.
 fn of_node(
     smoothed: &Smoothed,
-    (blocks, kernels): (&Blocks, &[Kernel; 2]),
+    blocks: &Blocks,
+    kernels: &[Kernel; 2],
     indices: &[[i32; 2]],
     node: usize,
     (phases, slopes): &Taken,

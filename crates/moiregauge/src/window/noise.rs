@@ -14,9 +14,9 @@ use std::f64::consts::TAU;
 use nalgebra::{Matrix2, Vector2};
 
 use crate::numbers::median::median;
-use crate::window::blocks::{Blocks, Place, block_of, mix};
+use crate::window::blocks::{Blocks, Place, block_of, mix, stride_of};
 use crate::window::lines::Levelled;
-use crate::window::smooth::{Nodes, Smoothed, smooth};
+use crate::window::smooth::{Envelope, Nodes, Smoothed, Support, smooth};
 use crate::window::types::Reference;
 
 /// Places tried beside a harmonic, as shares of the length of q₁: about half the way to the next one.
@@ -97,13 +97,15 @@ pub(crate) struct Beside {
 impl Beside {
     /// Of harmonics of a lattice; a few at a time, which bounds the memory.
     pub(crate) fn new(
-        (image, place): (&Levelled, Place),
+        image: &Levelled,
+        place: Place,
         reference: &Reference,
         indices: &[[i32; 2]],
     ) -> Self {
         let block = block_of(reference);
-        let width = reference.in_pixels(PROBE_WINDOW * reference.period());
-        let stride = [0, 1].map(|i| ((width[i] / block[i] as f64).round() as usize).max(1));
+        let window = PROBE_WINDOW * reference.period();
+        let width = reference.in_pixels(window);
+        let stride = stride_of(reference, block, window);
         let mut out: Option<Self> = None;
         for some in indices.chunks(AT_ONCE) {
             let of_one = |index: &[i32; 2]| probes(&reference.pair, *index, reference.pitch);
@@ -144,17 +146,7 @@ impl Noise {
         let harmonics = smoothed.envelopes.len() / 2;
         let low = blocks.middle(0.0, 0.0);
         let high = blocks.middle(blocks.size[0] as f64 - 1.0, blocks.size[1] as f64 - 1.0);
-        let whole: Vec<Option<f64>> = smoothed
-            .support
-            .iter()
-            .enumerate()
-            .map(|(node, support)| {
-                let at = nodes.place(blocks, node);
-                let inside = (0..2).all(|i| (at - low)[i].min((high - at)[i]) > AWAY * width[i]);
-                let support = support.filter(|s| inside && s.share > WHOLE)?;
-                Some(support.amplitude_noise)
-            })
-            .collect();
+        let whole = whole(smoothed, blocks, [low, high], *width);
         if whole.iter().flatten().count() < FEWEST {
             return Self {
                 levels: vec![fallback; harmonics],
@@ -162,17 +154,15 @@ impl Noise {
                 disagreement: 1.0,
             };
         }
-        let power = |probe: usize, node: usize| {
-            let noise = whole[node]?;
-            Some(f64::from(smoothed.envelopes[probe].amplitude[node].norm_sqr()) / noise)
-        };
+        let power = |probe: usize, node: usize| power(&smoothed.envelopes[probe], &whole, node);
         let levels: Vec<f64> = (0..harmonics)
             .map(|i| {
                 let both = (0..nodes.len()).flat_map(|n| [power(2 * i, n), power(2 * i + 1, n)]);
                 level_of(&mut both.flatten().collect::<Vec<f64>>())
             })
             .collect();
-        let cell = (0..2).map(|i| (nodes.stride[i] * blocks.block[i]) as f64 / width[i]);
+        let step = nodes.step(blocks);
+        let cell = (0..2).map(|i| step[i] / width[i]);
         let count = 2.0 * whole.iter().flatten().count() as f64;
         // Powers under a Gaussian window have the correlation e^{−d²/2w²}.
         let independent = (count * cell.product::<f64>() / TAU).clamp(2.0, count);
@@ -194,6 +184,28 @@ impl Noise {
     pub(crate) fn ratio(&self, at: Vector2<f64>) -> f64 {
         self.grid.as_ref().map_or(1.0, |grid| grid.at(at))
     }
+}
+
+/// Noise of the amplitude at nodes (white noise of unit variance) where probes see nothing but noise: windows that are
+/// whole, and far from the edges of what is between two pixels.
+pub(crate) fn whole(
+    smoothed: &Smoothed,
+    blocks: &Blocks,
+    [low, high]: [Vector2<f64>; 2],
+    width: [f64; 2],
+) -> Vec<Option<f64>> {
+    let of_node = |(node, support): (usize, &Option<Support>)| {
+        let at = smoothed.nodes.place(blocks, node);
+        let inside = (0..2).all(|i| (at - low)[i].min((high - at)[i]) > AWAY * width[i]);
+        let support = support.filter(|s| inside && s.share > WHOLE)?;
+        Some(support.amplitude_noise)
+    };
+    smoothed.support.iter().enumerate().map(of_node).collect()
+}
+
+/// Power of a probe at a node that is whole, as a level.
+pub(crate) fn power(probe: &Envelope, whole: &[Option<f64>], node: usize) -> Option<f64> {
+    Some(f64::from(probe.amplitude[node].norm_sqr()) / whole[node]?)
 }
 
 /// The level of powers with an exponential distribution. What a defect throws there is cut off.
@@ -267,10 +279,9 @@ impl Ratio {
         };
         let smooth = pass(&pass(&raw, false), true);
         let mean = |[sum, count]: &[f64; 2]| if *count > 0.0 { sum / count } else { 1.0 };
-        let step = |i: usize| (nodes.stride[i] * blocks.block[i]) as f64;
         Self {
             first: nodes.place(blocks, 0),
-            step: Vector2::new(step(0), step(1)),
+            step: Vector2::from(nodes.step(blocks)),
             size: nodes.size,
             values: smooth.iter().map(mean).collect(),
         }

@@ -23,6 +23,11 @@ const REACH: f64 = 4.5;
 /// With less than this share of its window a node is none; masks ask for far more. Chosen by eye; see
 /// docs/constants.md.
 const LEAST_SHARE: f64 = 0.05;
+/// Harmonics below this many noise units (amplitude) are left out of a node: their phases are off by some third of a
+/// rad.
+const FAINT: f64 = 3.0;
+/// Without harmonics above this many a pattern is not seen at a node.
+const WEAKEST: f64 = 4.0;
 /// Products summed side by side, as processors do; it fixes the order of the sums.
 const LANES: usize = 8;
 
@@ -73,6 +78,11 @@ impl Nodes {
         ]
     }
 
+    /// Pixels from node to node.
+    pub(crate) fn step(&self, blocks: &Blocks) -> [f64; 2] {
+        [0, 1].map(|i| (self.stride[i] * blocks.block[i]) as f64)
+    }
+
     /// Place of a node, pixels.
     pub(crate) fn place(&self, blocks: &Blocks, node: usize) -> Vector2<f64> {
         let [column, row] = self.block(node).map(|i| i as f64);
@@ -111,6 +121,42 @@ pub(crate) struct Smoothed {
     /// `None` where nothing is left of the window.
     pub(crate) support: Vec<Option<Support>>,
     pub(crate) envelopes: Vec<Envelope>,
+}
+
+/// A harmonic that stands out at a node.
+pub(crate) struct Standing {
+    /// Power without that of the noise.
+    pub(crate) signal: f64,
+    /// Over that of the noise.
+    pub(crate) to_noise: f64,
+    /// Whether it is enough to see a pattern by.
+    pub(crate) is_strong: bool,
+    /// Slope of the phase, rad per pixel, and what may be left of other harmonics in it.
+    pub(crate) slope: Vector2<f64>,
+    pub(crate) unsure: f64,
+}
+
+impl Envelope {
+    /// What stands out at a node of noise of so much power; `None` where it is too faint.
+    pub(crate) fn standing(&self, node: usize, noise: f64) -> Option<Standing> {
+        let power = f64::from(self.amplitude[node].norm_sqr());
+        if power <= FAINT * FAINT * noise || power <= 0.0 {
+            return None;
+        }
+        // Noise adds to the power.
+        let signal = power - noise;
+        Some(Standing {
+            signal,
+            to_noise: if noise > 0.0 {
+                signal / noise
+            } else {
+                f64::INFINITY
+            },
+            is_strong: power > WEAKEST * WEAKEST * noise,
+            slope: Vector2::from(self.slope[node].map(f64::from)),
+            unsure: self.unsure.get(node).copied().map_or(0.0, f64::from),
+        })
+    }
 }
 
 /// Weights along one axis, and times the distance in pixels, filled up with zeros to whole lanes.
@@ -187,7 +233,7 @@ pub(crate) fn smooth(blocks: &Blocks, width: [f64; 2], nodes: Nodes) -> Smoothed
     let kernels = [0, 1].map(|axis| Kernel::new(width[axis], blocks.block[axis]));
     let fits = fits(blocks, &kernels, nodes);
     let layers = blocks.layers.iter();
-    let envelopes = layers.map(|layer| envelope(blocks, layer, &kernels, (nodes, &fits)));
+    let envelopes = layers.map(|layer| envelope(blocks, layer, &kernels, nodes, &fits));
     let envelopes = envelopes.collect();
     Smoothed {
         nodes,
@@ -301,7 +347,8 @@ fn envelope(
     blocks: &Blocks,
     layer: &Layer,
     kernels: &[Kernel; 2],
-    (nodes, fits): (Nodes, &[Option<Support>]),
+    nodes: Nodes,
+    fits: &[Option<Support>],
 ) -> Envelope {
     let count = nodes.size[0];
     let radius = kernels[1].radius;
