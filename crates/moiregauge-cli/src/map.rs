@@ -349,7 +349,7 @@ fn together(
         let all = used().flat_map(|scan| {
             let reading = read_again(inputs, &scan.file, settings, known).ok();
             reading.map_or_else(Vec::new, |r| {
-                domains_of_scan(&r.scan, (scan, origin), settings, contrast)
+                domains_of_scan(&r.scan, scan, origin, settings, contrast)
             })
         });
         all.collect()
@@ -383,7 +383,8 @@ fn mapped(
     shown: &mut Option<Picture>,
 ) -> anyhow::Result<Vec<LineMap>> {
     let reading = read_again(inputs, &scan.file, settings, known)?;
-    let lines = map_scan(&reading.scan, (scan, origin), settings, how)?;
+    let (method, resolution) = how;
+    let lines = map_scan(&reading.scan, scan, origin, settings, method, resolution)?;
     if shown.is_none() {
         *shown = picture(&scan.file, &reading.scan, settings);
     }

@@ -125,8 +125,8 @@ impl Large {
         loud: bool,
     ) -> anyhow::Result<(TwistStrainMap, SurveyPlan)> {
         let read = |block| self.source.block(block);
-        let place = (&self.geometry, self.timing.as_ref());
-        let plan = SurveyPlan::new(place, (settings, resolution), first, &read)?;
+        let (geometry, timing) = (&self.geometry, self.timing.as_ref());
+        let plan = SurveyPlan::new(geometry, timing, settings, resolution, first, &read)?;
         let key = key(self, settings, resolution, &plan)?;
         let progress = progress(plan.bands(), loud);
         let mut whole: Option<TwistStrainMap> = None;
