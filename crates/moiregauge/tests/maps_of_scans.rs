@@ -70,8 +70,19 @@ fn frames_land_where_a_changing_drift_took_them() {
     assert!(farthest < 0.05 * period, "{farthest} of {period}");
     assert!(steady > 0.5 * period, "{steady} of {period}");
     // That is where its map goes.
-    let how = (MapMethod::Demodulation, &Resolution::default());
-    let map = |origin| map_scan(&frames[19], (&scans[19], origin), &quick(), how).unwrap();
+    let (method, resolution) = (MapMethod::Demodulation, Resolution::default());
+    let map = |origin| {
+        let settings = quick();
+        map_scan(
+            &frames[19],
+            &scans[19],
+            origin,
+            &settings,
+            method,
+            &resolution,
+        )
+        .unwrap()
+    };
     let moved = map(None)[0].map.grid.origin - map(Some(first))[0].map.grid.origin;
     let expected = place(middle(19)) - place(middle(0));
     assert!(
@@ -93,7 +104,7 @@ fn windows_have_to_fit_into_the_image() {
             step_nm,
             margin: None,
         };
-        map_scan(&frames[0], (scan, None), &quick(), (method, &resolution))
+        map_scan(&frames[0], scan, None, &quick(), method, &resolution)
     };
     for window in [
         40.0,
@@ -137,7 +148,7 @@ fn windows_have_to_fit_into_a_survey() {
             margin: None,
         };
         let read = |_: [std::ops::Range<usize>; 2]| Err("nothing is read".to_owned());
-        let plan = SurveyPlan::new((&geometry, None), (&settings, &resolution), None, &read);
+        let plan = SurveyPlan::new(&geometry, None, &settings, &resolution, None, &read);
         assert!(matches!(plan, Err(SurveyError::Resolution(_))));
     }
 }

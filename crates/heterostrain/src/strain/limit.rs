@@ -60,9 +60,7 @@ fn upper_limit(r: f64, tail: f64) -> f64 {
         // The ratio tends to e^{−t²/2}.
         return (-2.0 * tail.ln()).sqrt();
     }
-    bisect((0.0, r + 6.0), |t| {
-        probability_within(r, t) > tail * without
-    })
+    bisect(0.0, r + 6.0, |t| probability_within(r, t) > tail * without)
 }
 
 /// The length t at which a result as long as r has a probability of `tail`; 0 where it is commoner
@@ -77,7 +75,7 @@ fn lower_limit(r: f64, tail: f64) -> f64 {
     if (-r * r / 2.0).exp() > tail {
         return 0.0;
     }
-    bisect((0.0, r), |t| 1.0 - probability_within(r, t) < tail)
+    bisect(0.0, r, |t| 1.0 - probability_within(r, t) < tail)
 }
 
 /// Beyond this many σ a length is as good as normal: its bias is 0.01 σ.
@@ -99,7 +97,7 @@ fn one_sided(tail: f64) -> f64 {
 }
 
 /// Where `below` turns from true to false.
-fn bisect((mut low, mut high): (f64, f64), below: impl Fn(f64) -> bool) -> f64 {
+fn bisect(mut low: f64, mut high: f64, below: impl Fn(f64) -> bool) -> f64 {
     while high - low > 1e-9 {
         let t = f64::midpoint(low, high);
         if below(t) {

@@ -95,16 +95,8 @@ pub(crate) fn all_names(lattice: &Lattice, layers: &Layers) -> Option<(Vec<Latti
             return None;
         }
     };
-    let within = |j: usize| {
-        let reach = reach * dual.column(j).norm();
-        let most = [0, 1].map(|i| (reach * short.column(i).norm()).floor() as i32);
-        let box_of =
-            (-most[0]..=most[0]).flat_map(move |h| (-most[1]..=most[1]).map(move |k| [h, k]));
-        box_of
-            .filter(|[h, k]| (waves * Vector2::new(f64::from(*h), f64::from(*k))).norm() <= reach)
-            .collect::<Vec<_>>()
-    };
-    let (first, second) = (within(0), within(1));
+    let [first, second] =
+        [0, 1].map(|j| waves_within(reach * dual.column(j).norm(), &short, &waves));
     let inverse = dual.try_inverse()?;
     let back = to_short.try_inverse()?.transpose();
     let mut found = BTreeSet::new();
@@ -134,6 +126,15 @@ pub(crate) fn all_names(lattice: &Lattice, layers: &Layers) -> Option<(Vec<Latti
         names.truncate(MOST_NAMES);
     }
     Some((names.into_iter().map(|(_, name)| name).collect(), bound))
+}
+
+/// The waves `h K₁ + k K₂` up to a length (in units of `waves`, which are the K of the pair `short`).
+fn waves_within(reach: f64, short: &Matrix2<f64>, waves: &Matrix2<f64>) -> Vec<[i32; 2]> {
+    let most = [0, 1].map(|i| (reach * short.column(i).norm()).floor() as i32);
+    (-most[0]..=most[0])
+        .flat_map(|h| (-most[1]..=most[1]).map(move |k| [h, k]))
+        .filter(|[h, k]| (waves * Vector2::new(f64::from(*h), f64::from(*k))).norm() <= reach)
+        .collect()
 }
 
 /// Bits of a number that is not negative are in the order of the numbers.

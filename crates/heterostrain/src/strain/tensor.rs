@@ -103,24 +103,8 @@ pub fn strain_tensors<'a>(
 ) -> Result<Vec<StrainTensor>, StrainError> {
     let bilayer = bilayer.into();
     let layers = Layers::new(bilayer, StrainConvention::RealSpace)?;
-    let named = labelled(lattice, &layers)?;
-    let name = named.name;
+    let all = names_to_try(lattice, &layers)?;
     let similar = layers.ratio().is_some();
-    // For similar layers other names are other orientations; for different ones they are tried.
-    let all = if similar {
-        vec![named]
-    } else {
-        let names = names(lattice).ok_or(StrainError::NoMoire)?;
-        let labelled = |lattice: Lattice| {
-            let moire = moire_matrix(&lattice.basis, &layers.atoms)?;
-            Some(Labelled {
-                name,
-                lattice,
-                moire,
-            })
-        };
-        names.into_iter().filter_map(labelled).collect()
-    };
     let period = if orientation.of_reference {
         bilayer.reference.rotation_period()
     } else {
@@ -160,6 +144,24 @@ pub fn strain_tensors<'a>(
     found.retain(|t| *t == best || Some(*t) == opposite || size(t) < LARGEST_MEAN_STRAIN);
     found.dedup_by(|a, b| (a.twist - b.twist).abs() + (a.mean - b.mean).abs() < 1e-12);
     Ok(found)
+}
+
+/// For similar layers other names are other orientations; for different ones they are tried.
+fn names_to_try(lattice: &Lattice, layers: &Layers) -> Result<Vec<Labelled>, StrainError> {
+    let named = labelled(lattice, layers)?;
+    if layers.ratio().is_some() {
+        return Ok(vec![named]);
+    }
+    let labelled = |lattice: Lattice| {
+        let moire = moire_matrix(&lattice.basis, &layers.atoms)?;
+        Some(Labelled {
+            name: named.name,
+            lattice,
+            moire,
+        })
+    };
+    let names = names(lattice).ok_or(StrainError::NoMoire)?;
+    Ok(names.into_iter().filter_map(labelled).collect())
 }
 
 /// The reading for one orientation, taken as it is.
@@ -209,12 +211,7 @@ fn tensor(labelled: &Labelled, layers: &Layers, orientation: &Orientation) -> Op
             &Vector5::new(d_beta - d_alpha, d_alpha, d_mean, d_shear.re, d_shear.im),
         );
     }
-    let by_lattice = moire_matrix_jacobian(&labelled.lattice.basis, &labelled.moire)?;
-    let of_moire = by_lattice * labelled.lattice.covariance * by_lattice.transpose();
-    let mut inputs = Matrix5::zeros();
-    inputs.fixed_view_mut::<4, 4>(0, 0).copy_from(&of_moire);
-    inputs[(4, 4)] = orientation.sigma * orientation.sigma;
-    let covariance = jacobian * inputs * jacobian.transpose();
+    let covariance = jacobian * inputs(labelled, orientation)? * jacobian.transpose();
     let finite = covariance.iter().all(|x| x.is_finite()) && shear.is_finite();
     finite.then_some(StrainTensor {
         twist,
@@ -223,6 +220,16 @@ fn tensor(labelled: &Labelled, layers: &Layers, orientation: &Orientation) -> Op
         shear: Vector2::new(shear.re, shear.im),
         covariance,
     })
+}
+
+/// Covariance of `(Re p, Im p, Re q, Im q)` of the moiré and the orientation.
+fn inputs(labelled: &Labelled, orientation: &Orientation) -> Option<Matrix5<f64>> {
+    let by_lattice = moire_matrix_jacobian(&labelled.lattice.basis, &labelled.moire)?;
+    let of_moire = by_lattice * labelled.lattice.covariance * by_lattice.transpose();
+    let mut inputs = Matrix5::zeros();
+    inputs.fixed_view_mut::<4, 4>(0, 0).copy_from(&of_moire);
+    inputs[(4, 4)] = orientation.sigma * orientation.sigma;
+    Some(inputs)
 }
 
 /// α for a known β: what turns N by β. The angle of N follows α nearly one to one.

@@ -130,8 +130,8 @@ impl Large {
         loud: bool,
     ) -> anyhow::Result<(TwistStrainMap, SurveyPlan)> {
         let read = |block| self.source.block(block);
-        let place = (&self.geometry, self.timing.as_ref());
-        let plan = SurveyPlan::new(place, (settings, resolution), first, &read)?;
+        let (geometry, timing) = (&self.geometry, self.timing.as_ref());
+        let plan = SurveyPlan::new(geometry, timing, settings, resolution, first, &read)?;
         let key = key(&self.in_words(), settings, resolution, &plan)?;
         let progress = bar("mapping", "bands", plan.bands(), loud);
         let mut whole: Option<TwistStrainMap> = None;

@@ -97,7 +97,7 @@ fn mapped(
         let all = used(analysis).flat_map(|scan| {
             let read = read_again(&task.inputs, &scan.file, settings, &task.known).ok();
             read.map_or_else(Vec::new, |read| {
-                domains_of_scan(&read, (scan, origin), settings, contrast)
+                domains_of_scan(&read, scan, origin, settings, contrast)
             })
         });
         all.collect()
@@ -147,7 +147,8 @@ fn maps_of(
     for scan in used(analysis) {
         let mut of_scan = || -> anyhow::Result<Vec<LineMap>> {
             let read = read_again(&task.inputs, &scan.file, settings, &task.known)?;
-            let lines = map_scan(&read, (scan, origin), settings, how)?;
+            let (method, resolution) = how;
+            let lines = map_scan(&read, scan, origin, settings, method, resolution)?;
             shown = shown
                 .take()
                 .or_else(|| picture(&scan.file, &read, settings));

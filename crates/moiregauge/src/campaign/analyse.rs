@@ -38,11 +38,8 @@ pub fn analyse(scans: Vec<MeasuredScan>, settings: &Settings) -> Analysis {
     let mut joint_scans = Vec::new();
     let mut index = 0;
     for mut group in groups {
-        if let Some(line) = group.scans.first().and_then(|s| s.lines.first())
-            && reference.is_none()
-        {
-            reference = Some(canonical(&line.in_sensor_coordinates()).basis);
-        }
+        let line = group.scans.first().and_then(|s| s.lines.first());
+        reference = reference.or_else(|| Some(canonical(&line?.in_sensor_coordinates()).basis));
         for scan in group.scans.iter().filter(|s| s.repeats.is_none()) {
             caveats.extend(scan.caveats.iter().cloned());
         }

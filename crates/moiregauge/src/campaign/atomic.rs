@@ -143,12 +143,9 @@ pub fn atomic_orientation(
     let found = if let Ok(solution) = solve(&observations) {
         let scale = enlargement(solution.chi2, solution.degrees_of_freedom);
         if scale > LARGE_SCATTER {
-            caveats.push(Caveat::new(
-                OrientationDoubt::AtomicScatter {
-                    times: scale.sqrt(),
-                },
-                &place,
-            ));
+            let times = scale.sqrt();
+            let doubt = OrientationDoubt::AtomicScatter { times };
+            caveats.push(Caveat::new(doubt, &place));
         }
         let lattice = Lattice::new(solution.lattice.basis, solution.lattice.covariance * scale);
         let (shape, angle) = turned(&lattice, &atoms)?;
@@ -161,29 +158,8 @@ pub fn atomic_orientation(
         caveats.push(Caveat::new(OrientationDoubt::AtomicDriftAssumed, &place));
         one_direction(&observations, material, calibration)?
     };
-    let (off, distortion) = (found.shape.0 - 1.0, found.shape.1);
-    if found.drift.is_some() && distortion > LARGEST_DISTORTION {
-        return Err(AtomicError::OtherShape {
-            material: material.name.clone(),
-            percent: 200.0 * distortion,
-        });
-    }
-    if off.abs() > LARGEST_ERROR {
-        return Err(AtomicError::OtherLattice {
-            material: material.name.clone(),
-            percent: 100.0 * off,
-        });
-    }
-    let allowed = calibration.gain_percent / 100.0;
-    if off.abs() > CLEARLY * allowed.max(0.01) {
-        caveats.push(Caveat::new(
-            OrientationDoubt::AtomicSize {
-                larger: off,
-                material: material.name.clone(),
-            },
-            &place,
-        ));
-    }
+    let doubt = about_shape(&found, material, calibration)?;
+    caveats.extend(doubt.map(|doubt| Caveat::new(doubt, &place)));
     Ok(AtomicOrientation {
         files,
         layer,
@@ -203,6 +179,30 @@ struct Found {
     shape: (f64, f64),
     angle: Estimate,
     drift: Option<Vector2<f64>>,
+}
+
+/// Whether a lattice can be that of the material: an error where it cannot, a word where its size is off.
+fn about_shape(
+    found: &Found,
+    material: &Material,
+    calibration: &Calibration,
+) -> Result<Option<OrientationDoubt>, AtomicError> {
+    let (off, distortion) = (found.shape.0 - 1.0, found.shape.1);
+    let material = material.name.clone();
+    if found.drift.is_some() && distortion > LARGEST_DISTORTION {
+        let percent = 200.0 * distortion;
+        return Err(AtomicError::OtherShape { material, percent });
+    }
+    if off.abs() > LARGEST_ERROR {
+        let percent = 100.0 * off;
+        return Err(AtomicError::OtherLattice { material, percent });
+    }
+    let allowed = calibration.gain_percent / 100.0;
+    let doubt = OrientationDoubt::AtomicSize {
+        larger: off,
+        material,
+    };
+    Ok((off.abs() > CLEARLY * allowed.max(0.01)).then_some(doubt))
 }
 
 /// `F = L U A⁰⁻¹` for the name L U of the lattice that distorts the material's least.

@@ -158,16 +158,9 @@ pub fn calibrate(
     let mut caveats: Vec<Caveat> = scans.iter().flat_map(|s| s.caveats.clone()).collect();
     caveats.extend(repeats);
     caveats.retain(|c| !is_expected(&c.doubt));
-    let from_sensors = |line: &MeasuredLine| line.geometry.from_sensors;
-    let lines = || scans.iter().flat_map(|s| &s.lines);
-    let first = from_sensors(lines().next().ok_or(CalibrateError::Nothing)?);
-    if lines().any(|line| from_sensors(line) != first) {
-        return Err(CalibrateError::Mixed);
-    }
-    let mut sizes: Vec<[f64; 2]> = scans.iter().filter_map(|s| s.size_nm).collect();
-    let mut rates: Vec<f64> = scans.iter().filter_map(|s| s.line_rate_hz).collect();
-    sizes.dedup();
-    rates.dedup();
+    let coordinates = coordinates_of(&scans)?;
+    let sizes_nm = without_repeats(scans.iter().filter_map(|s| s.size_nm));
+    let line_rates_hz = without_repeats(scans.iter().filter_map(|s| s.line_rate_hz));
     let mut sets = Vec::new();
     for group in groups(scans, grouping) {
         sets.push(see(group, &cell, drift_sigma, &mut caveats)?);
@@ -181,27 +174,15 @@ pub fn calibrate(
     let freedom = 3 * (chosen.len() - 1);
     let scale = enlargement(chi2, freedom);
     let statistical = mean(&bare).map_or(covariance, |(_, c, _)| c) * scale;
-    if freedom > 0 && chi2 / freedom as f64 > LARGE_CHI2 {
-        caveats.push(Caveat::new(
-            CalibrationDoubt::SetsDiffer {
-                times: (chi2 / freedom as f64).sqrt(),
-            },
-            "calibration",
-        ));
-    }
+    about_differences(chi2, freedom, &mut caveats);
     // A wrong constant of the known lattice is a wrong size of everything.
     let size = Vector3::new(1.0 + values[0], values[1], values[2]) * (known.sigma_percent / 100.0);
     let covariance = covariance * scale + size * size.transpose();
-    let coordinates = if first {
-        Coordinates::Sensors
-    } else {
-        Coordinates::Nominal
-    };
     let covariance_known = sets.iter().filter(|s| used(s)).all(|s| s.known);
     let in_units = Calibration::new(&values, &statistical, coordinates).estimates();
     let calibration = Calibration {
-        sizes_nm: sizes,
-        line_rates_hz: rates,
+        sizes_nm,
+        line_rates_hz,
         ..Calibration::new(&values, &covariance, coordinates)
     };
     about_plausibility(&calibration, covariance_known, &mut caveats);
@@ -215,13 +196,32 @@ pub fn calibrate(
         degrees_of_freedom: freedom,
         sets: sets
             .into_iter()
-            .map(|s| {
-                let used = used(&s);
-                summary(s, &map, coordinates, used)
-            })
+            .map(|s| summary(used(&s), s, &map, coordinates))
             .collect(),
         calibration,
         caveats,
+    })
+}
+
+/// Values in their order, each once where it follows itself.
+fn without_repeats<T: PartialEq>(values: impl Iterator<Item = T>) -> Vec<T> {
+    let mut all: Vec<T> = values.collect();
+    all.dedup();
+    all
+}
+
+/// The coordinates that all scans are in.
+fn coordinates_of(scans: &[MeasuredScan]) -> Result<Coordinates, CalibrateError> {
+    let mut lines = scans.iter().flat_map(|s| &s.lines);
+    let first = lines.next().ok_or(CalibrateError::Nothing)?;
+    let first = first.geometry.from_sensors;
+    if lines.any(|line| line.geometry.from_sensors != first) {
+        return Err(CalibrateError::Mixed);
+    }
+    Ok(if first {
+        Coordinates::Sensors
+    } else {
+        Coordinates::Nominal
     })
 }
 
@@ -244,16 +244,11 @@ fn see(
 ) -> Result<Seen, CalibrateError> {
     let name = group.name.clone();
     let unusable = || CalibrateError::Lattice(name.clone());
-    let lines = || {
-        group
-            .scans
-            .iter()
-            .flat_map(|s| s.lines.iter().map(move |l| (s, l)))
-    };
-    let found = alike(lines().map(|(_, l)| l), cell).ok_or(CalibrateError::Nothing)?;
+    let lines = || group.scans.iter().flat_map(|s| &s.lines);
+    let found = alike(lines(), cell).ok_or(CalibrateError::Nothing)?;
     about_one_drift(&name, &found, caveats)?;
     let observations = found.observations;
-    let timed = lines().all(|(_, l)| l.timing.is_some());
+    let timed = lines().all(|l| l.timing.is_some());
     if timed && let Ok(solution) = solve(&observations) {
         let scale = enlargement(solution.chi2, solution.degrees_of_freedom);
         about_scatter(&name, solution.chi2, solution.degrees_of_freedom, caveats);
@@ -270,9 +265,26 @@ fn see(
             group,
         });
     }
+    with_prior(group, &observations, cell, drift_sigma, caveats)
+}
+
+/// The lattice of a set whose frames do not tell the drift, with the prior of the drift.
+fn with_prior(
+    group: Group,
+    observations: &[Observation],
+    cell: &Matrix2<f64>,
+    drift_sigma: f64,
+    caveats: &mut Vec<Caveat>,
+) -> Result<Seen, CalibrateError> {
+    let name = group.name.clone();
+    let unusable = || CalibrateError::Lattice(name.clone());
     // The time that passes between two points is that of the slow axis; its sign does not matter for what a
     // drift of unknown direction does.
-    let gradients: Vec<Option<Vector2<f64>>> = lines().map(|(s, l)| gradient(s, l)).collect();
+    let gradients: Vec<Option<Vector2<f64>>> = group
+        .scans
+        .iter()
+        .flat_map(|s| s.lines.iter().map(move |l| gradient(s, l)))
+        .collect();
     let known = gradients.iter().all(Option::is_some);
     let timed: Vec<Observation> = observations
         .iter()
@@ -371,7 +383,7 @@ fn mean(all: &[&Shown]) -> Option<(Vector3<f64>, Matrix3<f64>, f64)> {
     Some((values, covariance, chi2))
 }
 
-fn summary(seen: Seen, map: &Matrix2<f64>, coordinates: Coordinates, used: bool) -> CalibratedSet {
+fn summary(used: bool, seen: Seen, map: &Matrix2<f64>, coordinates: Coordinates) -> CalibratedSet {
     let Seen {
         group,
         lattice,
@@ -407,6 +419,15 @@ fn about_plausibility(calibration: &Calibration, known: bool, caveats: &mut Vec<
             CalibrationDoubt::Unusual { what },
             "calibration",
         ));
+    }
+}
+
+/// Whether the sets scatter more than their errors say.
+fn about_differences(chi2: f64, freedom: usize, caveats: &mut Vec<Caveat>) {
+    if freedom > 0 && chi2 / freedom as f64 > LARGE_CHI2 {
+        let times = (chi2 / freedom as f64).sqrt();
+        let doubt = CalibrationDoubt::SetsDiffer { times };
+        caveats.push(Caveat::new(doubt, "calibration"));
     }
 }
 

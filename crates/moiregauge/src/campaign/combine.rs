@@ -3,13 +3,16 @@
 use heterostrain::lattice::Lattice;
 use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
 
-use crate::campaign::analysis::{Combined, Consistency, Drift, SetAnalysis, SetMean};
+use crate::campaign::analysis::{
+    Checks, Combined, Consistency, Drift, JointTerms, SetAnalysis, SetMean,
+};
 use crate::campaign::set::joint::{checks as set_checks, joint_fit, lattice_of, terms};
 use crate::campaign::set::moire::moire;
 use crate::campaign::sightings::middle_of_frame;
 use crate::caveat::Caveat;
 use crate::caveat::drifting::DriftDoubt;
 use crate::caveat::sets::SetDoubt;
+use crate::drift::joint::path::DriftPath;
 use crate::drift::joint::solve::JointFit;
 use crate::drift::shares::Statistical;
 use crate::meaning::about::caveats as about_readings;
@@ -46,69 +49,21 @@ pub(crate) fn combine(
     caveats: &mut Vec<Caveat>,
 ) -> Option<Combined> {
     let means: Vec<&SetMean> = sets.iter().filter_map(|s| s.mean.as_ref()).collect();
-    let first = means.first()?;
-    let others = means.iter().map(|m| &m.lattice);
-    let largest = others
-        .filter(|other| are_different(&first.lattice, other))
-        .map(|other| (other.basis - first.lattice.basis).norm() / first.lattice.basis.norm())
-        .reduce(f64::max);
-    if let Some(largest) = largest {
-        caveats.push(Caveat::new(
-            SetDoubt::DifferentLattices { share: largest },
-            "analysis",
-        ));
+    if let Some(share) = difference(&means) {
+        let doubt = SetDoubt::DifferentLattices { share };
+        caveats.push(Caveat::new(doubt, "analysis"));
         return None;
     }
-    let (mut lattice, mut statistical) = weighted_mean(&means)?;
-    let (mut joint_terms, mut drift, mut checks) = (None, None, None);
-    let mut path = None;
-    if let ([one], Some(set)) = (sets, sets.first()) {
-        // Nothing to combine: the set has it all.
-        (lattice, statistical) = (first.lattice, first.budget.statistical);
-        joint_terms = one.drift.as_ref().and_then(|d| d.joint.clone());
-        drift = joint_terms.is_some().then(|| set.drift.clone()).flatten();
-        checks.clone_from(&set.checks);
-    } else if let Some((scans, reference)) = joint.filter(|(scans, _)| !scans.is_empty())
-        && let Some(start) = sets.iter().find_map(|s| s.drift.as_ref())
-    {
-        let start = (&lattice, &start.velocity);
-        match joined(sets, &means, scans, (&reference, start), settings) {
-            Ok(fit) => {
-                if let Some(fitted) = lattice_of(&fit, &reference) {
-                    (lattice, statistical) = fitted;
-                }
-                joint_terms = Some(terms(&fit));
-                path = Some(fit.path());
-                drift = Some(Drift {
-                    velocity: fit.velocity,
-                    covariance: fit.velocity_covariance,
-                    given: false,
-                    fit: None,
-                    monte_carlo: None,
-                    joint: joint_terms.clone(),
-                });
-                let left_out = fit.leave_one_out();
-                checks = Some(set_checks(&fit, &left_out, scans, ("all sets", settings)));
-            }
-            Err(reason) => {
-                caveats.push(Caveat::new(DriftDoubt::NotJoined { reason }, "analysis"));
-            }
-        }
-    }
+    let Together {
+        lattice,
+        statistical,
+        joint,
+        drift,
+        path,
+        checks,
+    } = together(sets, &means, joint, settings, caveats)?;
     let consistency = consistency(sets);
-    for pair in &consistency {
-        let drift = pair.drift_sigmas.unwrap_or(0.0);
-        if drift.max(pair.twist_sigmas).max(pair.strain_sigmas) > APART {
-            caveats.push(Caveat::new(
-                SetDoubt::SetsDisagree {
-                    drift,
-                    twist: pair.twist_sigmas,
-                    strain: pair.strain_sigmas,
-                },
-                pair.sets.join(" / "),
-            ));
-        }
-    }
+    caveats.extend(consistency.iter().filter_map(about_consistency));
     let twist_strain = moire(&lattice, settings)?;
     let budget = Budget::new(&lattice, &twist_strain, &statistical, settings);
     let readings = Readings::new(&lattice, &twist_strain, &budget, strengths, settings);
@@ -117,16 +72,97 @@ pub(crate) fn combine(
         caveats.extend(found);
     }
     Some(Combined {
-        readings,
-        budget,
         lattice,
         twist_strain,
-        joint: joint_terms,
+        budget,
+        readings,
+        joint,
         drift,
         path,
         checks,
         consistency,
     })
+}
+
+/// The lattice of all sets, with what their joint fit tells where there is one.
+struct Together {
+    lattice: Lattice,
+    statistical: Statistical,
+    joint: Option<JointTerms>,
+    drift: Option<Drift>,
+    path: Option<DriftPath>,
+    checks: Option<Checks>,
+}
+
+/// By the joint fit of the scans of all sets and their reference, or else the mean of the sets.
+fn together(
+    sets: &[SetAnalysis],
+    means: &[&SetMean],
+    joint: Option<(&[&MeasuredScan], Matrix2<f64>)>,
+    settings: &Settings,
+    caveats: &mut Vec<Caveat>,
+) -> Option<Together> {
+    let (lattice, statistical) = weighted_mean(means)?;
+    let mean = Together {
+        lattice,
+        statistical,
+        joint: None,
+        drift: None,
+        path: None,
+        checks: None,
+    };
+    if let ([set], [mean]) = (sets, means) {
+        // Nothing to combine: the set has it all.
+        let drift = set.drift.clone().filter(|drift| drift.joint.is_some());
+        return Some(Together {
+            lattice: mean.lattice,
+            statistical: mean.budget.statistical,
+            joint: drift.as_ref().and_then(|drift| drift.joint.clone()),
+            drift,
+            path: None,
+            checks: set.checks.clone(),
+        });
+    }
+    let joint = joint.filter(|(scans, _)| !scans.is_empty());
+    let start = sets.iter().find_map(|s| s.drift.as_ref());
+    let (Some((scans, reference)), Some(start)) = (joint, start) else {
+        return Some(mean);
+    };
+    let fit = match joined(sets, scans, &reference, &lattice, &start.velocity, settings) {
+        Ok(fit) => fit,
+        Err(reason) => {
+            caveats.push(Caveat::new(DriftDoubt::NotJoined { reason }, "analysis"));
+            return Some(mean);
+        }
+    };
+    let (lattice, statistical) = lattice_of(&fit, &reference).unwrap_or((lattice, statistical));
+    let joint = Some(terms(&fit));
+    let left_out = fit.leave_one_out();
+    Some(Together {
+        lattice,
+        statistical,
+        joint: joint.clone(),
+        drift: Some(Drift {
+            velocity: fit.velocity,
+            covariance: fit.velocity_covariance,
+            given: false,
+            fit: None,
+            monte_carlo: None,
+            joint,
+        }),
+        path: Some(fit.path()),
+        checks: Some(set_checks(&fit, &left_out, scans, "all sets", settings)),
+    })
+}
+
+/// By what share the lattices of sets differ at most; `None` where they are of one sample and place.
+fn difference(means: &[&SetMean]) -> Option<f64> {
+    let first = means.first()?.lattice;
+    means
+        .iter()
+        .filter(|other| are_different(&first, &other.lattice))
+        .map(|other| (other.lattice.basis - first.basis).norm() / first.basis.norm())
+        .reduce(f64::max)
 }
 
 /// Whether two lattices are of different samples or places.
@@ -141,15 +177,17 @@ fn are_different(a: &Lattice, b: &Lattice) -> bool {
 /// The joint fit of all sets, or why it does not describe them.
 fn joined(
     sets: &[SetAnalysis],
-    means: &[&SetMean],
     scans: &[&MeasuredScan],
-    (reference, start): (&Matrix2<f64>, (&Lattice, &Vector2<f64>)),
+    reference: &Matrix2<f64>,
+    lattice: &Lattice,
+    velocity: &Vector2<f64>,
     settings: &Settings,
 ) -> Result<JointFit, String> {
-    let fit = joint_fit(scans, reference, start, settings)
+    let fit = joint_fit(scans, reference, lattice, velocity, settings)
         .ok_or("their drift cannot be determined together")?;
     let reduced = fit.chi2 / fit.degrees_of_freedom.max(1) as f64;
-    let usual = means.iter().map(|m| m.chi2_per_dof).fold(1.0, f64::max);
+    let means = sets.iter().filter_map(|s| s.mean.as_ref());
+    let usual = means.map(|m| m.chi2_per_dof).fold(1.0, f64::max);
     if reduced > WORSE * usual {
         return Err(format!(
             "together they scatter {:.0} times more than alone",
@@ -250,6 +288,18 @@ fn consistency(sets: &[SetAnalysis]) -> Vec<Consistency> {
         }
     }
     all
+}
+
+/// Says where two sets are too far apart.
+fn about_consistency(pair: &Consistency) -> Option<Caveat> {
+    let drift = pair.drift_sigmas.unwrap_or(0.0);
+    let (twist, strain) = (pair.twist_sigmas, pair.strain_sigmas);
+    let doubt = SetDoubt::SetsDisagree {
+        drift,
+        twist,
+        strain,
+    };
+    (drift.max(twist).max(strain) > APART).then(|| Caveat::new(doubt, pair.sets.join(" / ")))
 }
 
 /// `√(dᵀ C⁻¹ d)`.

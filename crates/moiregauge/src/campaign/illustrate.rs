@@ -6,6 +6,7 @@ use spmfile::{Channel, LineDirection, Scan};
 use crate::campaign::analysis::ScanAnalysis;
 use crate::frame::background::remove_background;
 use crate::frame::image::Image;
+use crate::frame::plane::PlaneFit;
 use crate::frame::sensors::SensorGeometry;
 use crate::scan::channel::{channels, choose_channel, image_of};
 use crate::scan::picture::{Companion, Illustration, Picture};
@@ -35,53 +36,30 @@ pub fn illustrate(
     let image = remove_background(&image_of(channel), settings.background);
     let mut ignored = Vec::new();
     let place = Place::of("", scan, channel, settings, &mut ignored)?;
-    let sensors = place.sensors;
-    let measured = sensors
+    let measured = place
+        .sensors
         .as_ref()
         .and_then(|_| sensor_images("", scan, channel, &mut ignored));
-    let velocities = |steps: &[f64], axis: usize| -> Vec<f64> {
-        let seconds = place.timing.map_or(f64::NAN, |t| t.per_pixel[axis].abs());
-        steps
-            .iter()
-            .map(|s| s / seconds)
-            .filter(|v| v.is_finite())
-            .collect()
+    let sensors = place.sensors.as_ref().zip(measured.as_ref());
+    // The whole frame is shown, also where only a part of it was analysed.
+    let (pixel_to_nm, origin) = match sensors {
+        Some(_) => (place.geometry.pixel_to_nm, place.geometry.origin),
+        None => (line.pixel_to_nm, line.origin),
     };
-    let (mut fast, mut slow) = (Vec::new(), Vec::new());
-    let mut sensor_line = Vec::new();
-    let mut pixel_to_nm = line.pixel_to_nm;
-    let mut origin = line.origin;
-    if let (Some(sensors), Some(measured)) = (&sensors, &measured) {
-        let scaled = |steps: &[f64], by: f64| steps.iter().map(|s| s * by).collect::<Vec<f64>>();
-        let (raw, now) = (&sensors.geometry, &place.geometry);
-        let by = [
-            now.fast_step().norm() / raw.fast_step().norm(),
-            now.slow_step().norm() / raw.slow_step().norm(),
-        ];
-        fast = velocities(&scaled(&sensors.fast_steps, by[0]), 0);
-        slow = velocities(&scaled(&sensors.slow_steps, by[1]), 1);
-        // The whole frame is shown, also where only a part of it was analysed.
-        pixel_to_nm = now.pixel_to_nm;
-        origin = now.origin;
+    let [fast_velocities, slow_velocities] =
+        sensors.map_or_else(Default::default, |(sensors, _)| velocities(sensors, &place));
+    let sensor_line = sensors.map_or_else(Vec::new, |(sensors, measured)| {
         let axis = usize::from(pixel_to_nm.m11.abs() < pixel_to_nm.m21.abs());
-        let row = channel.rows / 2;
-        let plane = &sensors.planes[axis];
-        sensor_line = measured[axis]
-            .row(row)
-            .iter()
-            .enumerate()
-            .map(|(c, v)| [c as f64, *v, plane.at(c as f64, row as f64)])
-            .collect();
-    }
-    let residual_block = channel
-        .columns
-        .max(channel.rows)
-        .div_ceil(RESIDUAL_BLOCKS)
-        .max(1);
-    let sensor_residuals = sensors
-        .as_ref()
-        .zip(measured.as_ref())
-        .map(|(sensors, measured)| residuals(sensors, measured).map(|i| i.binned(residual_block)));
+        middle_line(&measured[axis], &sensors.planes[axis])
+    });
+    let longer = channel.columns.max(channel.rows);
+    let residual_block = longer.div_ceil(RESIDUAL_BLOCKS).max(1);
+    let sensor_residuals = sensors.map(|(sensors, measured)| {
+        [0, 1].map(|axis| {
+            let left = sensors.residual_map(axis, &measured[axis]);
+            left.binned(residual_block)
+        })
+    });
     let (autocorrelation, spectrum, spectrum_step) = pictures(&image, &line.pixels);
     Some(Illustration {
         file: analysed.file.clone(),
@@ -90,30 +68,43 @@ pub fn illustrate(
         image,
         pixel_to_nm,
         origin,
-        nominal_pixel_to_nm: place.nominal.map(|n| n.pixel_to_nm),
+        nominal_pixel_to_nm: place.nominal.as_ref().map(|n| n.pixel_to_nm),
         autocorrelation,
         spectrum,
         spectrum_step,
         lattice: line.pixels,
         sensor_line,
-        fast_velocities: fast,
-        slow_velocities: slow,
+        fast_velocities,
+        slow_velocities,
         sensor_residuals,
         residual_block,
         amplitude: amplitude(scan, channel, settings),
     })
 }
 
-/// Readings of both sensors less the planes that place the pixels, nm.
-fn residuals(sensors: &SensorGeometry, measured: &[Image; 2]) -> [Image; 2] {
-    [0, 1].map(|axis| {
-        let (image, plane) = (&measured[axis], &sensors.planes[axis]);
-        let values = image.values.iter().enumerate().map(|(n, v)| {
-            let (row, column) = (n / image.columns, n % image.columns);
-            v - plane.at(column as f64, row as f64)
-        });
-        Image::new(image.rows, image.columns, values.collect())
-    })
+/// The velocities of the tip along the fast and the slow axis by the sensors, nm/s.
+fn velocities(sensors: &SensorGeometry, place: &Place) -> [Vec<f64>; 2] {
+    let (raw, now) = (&sensors.geometry, &place.geometry);
+    let of = |steps: &[f64], axis: usize, by: f64| {
+        let seconds = place.timing.map_or(f64::NAN, |t| t.per_pixel[axis].abs());
+        let all = steps.iter().map(|s| s * by / seconds);
+        all.filter(|v| v.is_finite()).collect()
+    };
+    let fast = now.fast_step().norm() / raw.fast_step().norm();
+    let slow = now.slow_step().norm() / raw.slow_step().norm();
+    [
+        of(&sensors.fast_steps, 0, fast),
+        of(&sensors.slow_steps, 1, slow),
+    ]
+}
+
+/// The line of a sensor in the middle of the frame: column, reading and plane.
+fn middle_line(measured: &Image, plane: &PlaneFit) -> Vec<[f64; 3]> {
+    let row = measured.rows / 2;
+    let readings = measured.row(row).iter().enumerate();
+    readings
+        .map(|(c, v)| [c as f64, *v, plane.at(c as f64, row as f64)])
+        .collect()
 }
 
 /// The name, in small letters, of the channel with the amplitude that belongs to a phase; `None` where `channel` is no

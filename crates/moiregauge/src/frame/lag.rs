@@ -112,7 +112,7 @@ fn search(image: &Image, used: &Range<usize>) -> Option<(Lag, f64, f64)> {
     if !(explained > SHARE * plain && explained > IMPROVEMENT * variance) {
         return None;
     }
-    let lag = bend(&line, &smooth, (columns, from_last), variance)?;
+    let lag = bend(&line, &smooth, columns, from_last, variance)?;
     Some((lag, variance, noise))
 }
 
@@ -120,7 +120,8 @@ fn search(image: &Image, used: &Range<usize>) -> Option<(Lag, f64, f64)> {
 fn bend(
     line: &DVector<f64>,
     smooth: &DMatrix<f64>,
-    (columns, from_last): (f64, bool),
+    columns: f64,
+    from_last: bool,
     variance: f64,
 ) -> Option<Lag> {
     let design = with_bend(smooth, columns, from_last);

@@ -42,20 +42,8 @@ pub fn from_sensors(x: &Image, y: &Image) -> Option<SensorGeometry> {
     if (y.rows, y.columns) != (rows, columns) {
         return None;
     }
-    // A lag that explains whole lines is taken off first; of any other bend what is not straight is left out, and a lag is
-    // looked for in the rest.
-    let whole = [x, y].map(lag::find_whole);
-    let every = 0..columns;
-    let [x, y] = [straight(x, whole[0], &every), straight(y, whole[1], &every)];
-    let used = straight_columns(&x, &y)?;
-    let rest = |sensor, whole: Option<Lag>| match whole {
-        Some(_) => None,
-        None => lag::find(sensor, &used),
-    };
-    let rest = [rest(&x, whole[0]), rest(&y, whole[1])];
-    let lags = [whole[0].or(rest[0]), whole[1].or(rest[1])];
-    let [x, y] = [straight(&x, rest[0], &used), straight(&y, rest[1], &used)];
-    let (x, y) = (x.as_ref(), y.as_ref());
+    let (sensors, lags, used) = without_lags(x, y)?;
+    let [x, y] = [sensors[0].as_ref(), sensors[1].as_ref()];
     let planes = [fit_plane(x, used.clone())?, fit_plane(y, used.clone())?];
     let pixel_to_nm = Matrix2::new(
         planes[0].per_column,
@@ -101,15 +89,40 @@ pub fn from_sensors(x: &Image, y: &Image) -> Option<SensorGeometry> {
     })
 }
 
+/// Two sensors without their lags, and the columns in which they are straight.
+type Straight<'a> = (
+    [Cow<'a, Image>; 2],
+    [Option<Lag>; 2],
+    std::ops::Range<usize>,
+);
+
+/// A lag that explains whole lines is taken off first; of any other bend what is not straight is left out, and a lag is
+/// looked for in the rest.
+fn without_lags<'a>(x: &'a Image, y: &'a Image) -> Option<Straight<'a>> {
+    let whole = [x, y].map(lag::find_whole);
+    let every = 0..x.columns;
+    let x = straight(Cow::Borrowed(x), whole[0], &every);
+    let y = straight(Cow::Borrowed(y), whole[1], &every);
+    let used = straight_columns(&x, &y)?;
+    let rest = |sensor, whole: Option<Lag>| match whole {
+        Some(_) => None,
+        None => lag::find(sensor, &used),
+    };
+    let rest = [rest(&x, whole[0]), rest(&y, whole[1])];
+    let lags = [whole[0].or(rest[0]), whole[1].or(rest[1])];
+    let sensors = [straight(x, rest[0], &used), straight(y, rest[1], &used)];
+    Some((sensors, lags, used))
+}
+
 /// A sensor without its lag in the columns `used`.
 fn straight<'a>(
-    sensor: &'a Image,
+    sensor: Cow<'a, Image>,
     lag: Option<Lag>,
     used: &std::ops::Range<usize>,
 ) -> Cow<'a, Image> {
     match lag {
-        Some(lag) => Cow::Owned(lag.taken_off(sensor, used)),
-        None => Cow::Borrowed(sensor),
+        Some(lag) => Cow::Owned(lag.taken_off(&sensor, used)),
+        None => sensor,
     }
 }
 

@@ -45,7 +45,7 @@ pub struct Bound {
 pub fn cramer_rao(simulator: &Simulator, time_sigma: f64, linked: bool) -> Option<Bound> {
     let settings = simulator.settings();
     let (sightings, pair, drift) = ideal_sightings(simulator, linked, false)?;
-    let found = fit(&sightings, (&pair, &drift), time_sigma)?;
+    let found = fit(&sightings, &pair, &drift, time_sigma)?;
     let lattice = found.waves.lattice()?;
     let sample = &settings.sample;
     let strain = twist_strain(&lattice, sample.bilayer(), sample.strain_convention).ok()?;
@@ -84,7 +84,7 @@ pub(crate) fn ideal_sightings(
     for (scan, frame) in truth.frames.iter().enumerate() {
         let lines = [Some(0), settings.raster.retrace.then_some(1)];
         for class in lines.into_iter().flatten() {
-            let image = ideal(simulator, frame, (&pair, &drift), class, &offsets)?;
+            let image = ideal(simulator, frame, &pair, &drift, class, &offsets)?;
             sightings.push(Sighting {
                 scan,
                 phases: image.phases.filter(|_| linked),
@@ -100,15 +100,11 @@ pub(crate) fn ideal_sightings(
 fn ideal(
     simulator: &Simulator,
     frame: &FrameTruth,
-    (pair, drift): (&Matrix2<f64>, &Vector2<f64>),
+    pair: &Matrix2<f64>,
+    drift: &Vector2<f64>,
     class: usize,
     lines: &Lines,
 ) -> Option<Sighting> {
-    let settings = simulator.settings();
-    let noise = settings.noise.pixel_deg;
-    if !(noise > 0.0) {
-        return None;
-    }
     let [[a, b], [c, d]] = frame.pixel_to_nm;
     let j = Matrix2::new(a, b, c, d);
     let tau = Vector2::from(if class == 0 {
@@ -117,6 +113,45 @@ fn ideal(
         frame.retrace_time_per_pixel_s
     });
     let u = j.try_inverse()?.transpose() * tau;
+    let (information, variances) = information(simulator, pair, &j, lines)?;
+    let map = Matrix2::identity() - u * drift.transpose();
+    let time = f64::midpoint(frame.start_s, frame.end_s);
+    let last = Vector2::from(simulator.settings().raster.pixels.map(|n| n as f64 - 1.0));
+    let middle = Vector2::from(frame.origin_nm) + j * last / 2.0;
+    let place = middle - drift * time;
+    let three = [
+        pair.column(0).into_owned(),
+        pair.column(1).into_owned(),
+        pair.column(1) - pair.column(0),
+    ];
+    let phases = Phases::independent(three.map(|g| g.dot(&place)), variances);
+    Some(Sighting {
+        scan: 0,
+        class,
+        block: 0,
+        waves: Waves::new(map * pair, information.try_inverse()?),
+        sensor: Matrix4::zeros(),
+        time_gradient: u,
+        fast_gain: Matrix2::zeros(),
+        time,
+        position: middle,
+        phases: Some(phases).filter(|_| variances.iter().all(|v| v.is_finite())),
+    })
+}
+
+/// What the pixels of a frame with the steps `j` (nm) tell of the pair, and the variances of its three phases. `None`
+/// without noise.
+fn information(
+    simulator: &Simulator,
+    pair: &Matrix2<f64>,
+    j: &Matrix2<f64>,
+    lines: &Lines,
+) -> Option<(Matrix4<f64>, [f64; 3])> {
+    let settings = simulator.settings();
+    let noise = settings.noise.pixel_deg;
+    if !(noise > 0.0) {
+        return None;
+    }
     let [columns, rows] = settings.raster.pixels.map(|n| n as f64);
     let pixels = columns * rows;
     let indices = pair.try_inverse()?;
@@ -149,28 +184,7 @@ fn ideal(
             }
         }
     }
-    let map = Matrix2::identity() - u * drift.transpose();
-    let time = f64::midpoint(frame.start_s, frame.end_s);
-    let middle = Vector2::from(frame.origin_nm) + j * Vector2::new(columns - 1.0, rows - 1.0) / 2.0;
-    let place = middle - drift * time;
-    let three = [
-        pair.column(0).into_owned(),
-        pair.column(1).into_owned(),
-        pair.column(1) - pair.column(0),
-    ];
-    let phases = Phases::independent(three.map(|g| g.dot(&place)), variances);
-    Some(Sighting {
-        scan: 0,
-        class,
-        block: 0,
-        waves: Waves::new(map * pair, information.try_inverse()?),
-        sensor: Matrix4::zeros(),
-        time_gradient: u,
-        fast_gain: Matrix2::zeros(),
-        time,
-        position: middle,
-        phases: Some(phases).filter(|_| variances.iter().all(|v| v.is_finite())),
-    })
+    Some((information, variances))
 }
 
 /// What random offsets of the lines do to the information of a wave.

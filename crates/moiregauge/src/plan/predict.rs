@@ -179,7 +179,7 @@ fn at_one_orientation(sets: &[Simulation], settings: &Settings) -> Option<Predic
         periods = periods.min(shortest / lengths.iter().copied().fold(0.0, f64::max));
     }
     let (pair, drift) = start?;
-    let fit = |time_sigma: f64| foreseen(&sightings, (&pair, &drift), time_sigma);
+    let fit = |time_sigma: f64| foreseen(&sightings, &pair, &drift, time_sigma);
     let found = fit(settings.frame_time_sigma_s)?;
     let exact = fit(0.0)?;
     let (lattice, statistical) = real(&found)?;

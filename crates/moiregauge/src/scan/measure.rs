@@ -105,20 +105,8 @@ fn measure_with(
     let mut moires: Vec<Vec<MeasuredLine>> = Vec::new();
     let mut failures = Vec::new();
     for channel in &channels {
-        match measure_line(file, scan, channel, settings, (window, find), &mut caveats) {
-            Ok(lines) if moires.is_empty() => {
-                moires = lines.into_iter().map(|line| vec![line]).collect();
-            }
-            Ok(lines) => {
-                let first: Vec<_> = moires
-                    .iter()
-                    .map(|lines| lines[0].in_sensor_coordinates())
-                    .collect();
-                let lines = in_order(&first, lines, |l| Some(l.in_sensor_coordinates()));
-                for (all, line) in moires.iter_mut().zip(lines) {
-                    all.push(line);
-                }
-            }
+        match measure_line(file, scan, channel, settings, window, find, &mut caveats) {
+            Ok(lines) => add_lines(&mut moires, lines),
             Err(error) => failures.push(error),
         }
     }
@@ -157,6 +145,22 @@ fn measure_with(
     Ok(measured.collect())
 }
 
+/// Adds the lines of one direction, each to its moiré.
+fn add_lines(moires: &mut Vec<Vec<MeasuredLine>>, lines: Vec<MeasuredLine>) {
+    if moires.is_empty() {
+        moires.extend(lines.into_iter().map(|line| vec![line]));
+        return;
+    }
+    let first: Vec<_> = moires
+        .iter()
+        .map(|lines| lines[0].in_sensor_coordinates())
+        .collect();
+    let lines = in_order(&first, lines, |l| Some(l.in_sensor_coordinates()));
+    for (all, line) in moires.iter_mut().zip(lines) {
+        all.push(line);
+    }
+}
+
 /// Enlarges the errors of trace and retrace by what their noise has in common, so that they can be
 /// taken as independent.
 fn share_noise(lines: &mut [MeasuredLine]) {
@@ -184,7 +188,8 @@ fn measure_line(
     scan: &Scan,
     channel: &Channel,
     settings: &Settings,
-    (window, find): (Option<&Window>, Find),
+    window: Option<&Window>,
+    find: Find,
     caveats: &mut Vec<Caveat>,
 ) -> Result<Vec<MeasuredLine>, MeasureError> {
     let mut place =

@@ -14,16 +14,40 @@ use crate::simulate::raster::{FramePlan, PixelTime};
 use crate::simulate::scene::{Harmonic, Scene};
 use crate::simulate::settings::{Drift, Simulation};
 
-/// Full ranges of the detectors; a count is 2⁻³² of it.
+/// A detector of the instrument.
+struct Detector {
+    name: &'static str,
+    internal_name: &'static str,
+    unit: &'static str,
+    /// Its full range; a count is 2⁻³² of it.
+    range: f64,
+}
+
 const COUNTS: f64 = 4_294_967_296.0;
-/// Full range of the phase: a turn.
-const PHASE_RANGE_DEG: f64 = 360.0;
-/// Full range of the amplitude, mV.
-const AMPLITUDE_RANGE_MV: f64 = 4000.0;
-/// Full range of the x sensor, nm: volts times nm per volt, as in files of the instrument.
-const X_SENSOR_RANGE_NM: f64 = 24.576 * 3410.089;
-/// Full range of the y sensor, nm, likewise.
-const Y_SENSOR_RANGE_NM: f64 = 24.576 * 3641.009;
+const PHASE: Detector = Detector {
+    name: "TR Phase",
+    internal_name: "TRPhase",
+    unit: "°",
+    range: 360.0,
+};
+const AMPLITUDE: Detector = Detector {
+    name: "TR Amplitude",
+    internal_name: "TRAmplitude",
+    unit: "mV",
+    range: 4000.0,
+};
+const X_SENSOR: Detector = Detector {
+    name: "Xsensor",
+    internal_name: "Xsensor",
+    unit: "nm",
+    range: 24.576 * 3410.089,
+};
+const Y_SENSOR: Detector = Detector {
+    name: "Ysensor",
+    internal_name: "Ysensor",
+    unit: "nm",
+    range: 24.576 * 3641.009,
+};
 
 /// The amplitude image: where the phase is high the amplitude is low. A usual amplitude, mV, ...
 const MEAN_AMPLITUDE_MV: f64 = 180.0;
@@ -75,38 +99,11 @@ pub(crate) fn record(settings: &Simulation, scene: &Scene, plan: &FramePlan) -> 
     let mut x = Vec::new();
     let mut y = Vec::new();
     for (direction, line) in lines {
-        let channel = |name, internal, unit, range, counts| {
-            channel(settings, direction, [name, internal, unit], range, counts)
-        };
-        phase.push(channel(
-            "TR Phase",
-            "TRPhase",
-            "°",
-            PHASE_RANGE_DEG,
-            line.phase,
-        ));
-        amplitude.push(channel(
-            "TR Amplitude",
-            "TRAmplitude",
-            "mV",
-            AMPLITUDE_RANGE_MV,
-            line.amplitude,
-        ));
+        phase.push(channel(settings, direction, &PHASE, line.phase));
+        amplitude.push(channel(settings, direction, &AMPLITUDE, line.amplitude));
         if raster.sensors {
-            x.push(channel(
-                "Xsensor",
-                "Xsensor",
-                "nm",
-                X_SENSOR_RANGE_NM,
-                line.x,
-            ));
-            y.push(channel(
-                "Ysensor",
-                "Ysensor",
-                "nm",
-                Y_SENSOR_RANGE_NM,
-                line.y,
-            ));
+            x.push(channel(settings, direction, &X_SENSOR, line.x));
+            y.push(channel(settings, direction, &Y_SENSOR, line.y));
         }
     }
     Scan {
@@ -138,12 +135,17 @@ fn delay(settings: &Simulation, plan: &FramePlan) -> f64 {
 fn channel(
     settings: &Simulation,
     direction: LineDirection,
-    [name, internal_name, unit]: [&str; 3],
-    range: f64,
+    detector: &Detector,
     counts: Vec<i32>,
 ) -> Channel {
     let [columns, rows] = settings.raster.pixels;
     let [width, height] = settings.raster.nominal_size_nm;
+    let &Detector {
+        name,
+        internal_name,
+        unit,
+        range,
+    } = detector;
     Channel {
         name: name.to_owned(),
         internal_name: internal_name.to_owned(),
@@ -229,8 +231,8 @@ impl Recorder<'_> {
             let degrees = value + background + noise.pixel_deg * normal();
             let millivolts =
                 MEAN_AMPLITUDE_MV + MV_PER_DEG * (value + background + noise.pixel_deg * normal());
-            phase[column] = count(degrees, PHASE_RANGE_DEG);
-            amplitude[column] = count(millivolts, AMPLITUDE_RANGE_MV);
+            phase[column] = count(degrees, PHASE.range);
+            amplitude[column] = count(millivolts, AMPLITUDE.range);
         }
     }
 
@@ -275,8 +277,8 @@ impl Recorder<'_> {
         );
         for (column, (x, y)) in x.iter_mut().zip(y).enumerate() {
             let position = start + step.column(0) * column as f64;
-            *x = count(position.x + sigma * normal(), X_SENSOR_RANGE_NM);
-            *y = count(position.y + sigma * normal(), Y_SENSOR_RANGE_NM);
+            *x = count(position.x + sigma * normal(), X_SENSOR.range);
+            *y = count(position.y + sigma * normal(), Y_SENSOR.range);
         }
     }
 }

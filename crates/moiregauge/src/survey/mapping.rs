@@ -79,14 +79,16 @@ pub enum MapError {
 /// [`MapError`], where none of its images gives a map.
 pub fn map_scan(
     scan: &Scan,
-    (analysed, origin): (&ScanAnalysis, Option<f64>),
+    analysed: &ScanAnalysis,
+    origin: Option<f64>,
     settings: &Settings,
-    (method, resolution): (MapMethod, &Resolution),
+    method: MapMethod,
+    resolution: &Resolution,
 ) -> Result<Vec<LineMap>, MapError> {
     let channels = channels(scan, settings).map_err(|_| MapError::NoImage)?;
     let (mut maps, mut error) = (Vec::new(), MapError::NoImage);
     for channel in channels {
-        match map_line(scan, channel, analysed, settings, (method, resolution)) {
+        match map_line(scan, channel, analysed, settings, method, resolution) {
             Ok(mut map) => {
                 map.map.grid.origin -= drifted(analysed, origin);
                 maps.push(map);
@@ -114,7 +116,8 @@ fn map_line(
     channel: &Channel,
     analysed: &ScanAnalysis,
     settings: &Settings,
-    (method, resolution): (MapMethod, &Resolution),
+    method: MapMethod,
+    resolution: &Resolution,
 ) -> Result<LineMap, MapError> {
     let (place, pixels) = place_of(scan, channel, analysed, settings).ok_or(MapError::NoImage)?;
     let still = place.still(analysed.drift);
@@ -139,8 +142,7 @@ fn map_line(
         }
         MapMethod::Tiles => {
             let image = image_of(channel);
-            let sides = (resolution.window_nm, resolution.step_nm);
-            let map = tile_map(&image, (&geometry, placed), &reference, sides, settings);
+            let map = tile_map(&image, &geometry, placed, &reference, resolution, settings);
             (map.ok_or(MapError::TooSmall)?, Vec::new(), true, 0.0)
         }
     };

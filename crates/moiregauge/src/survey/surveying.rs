@@ -13,8 +13,7 @@ use nalgebra::{Matrix2, Vector2};
 
 use crate::caveat::Caveat;
 use crate::domains::cells::DomainMap;
-use crate::domains::mesh::Mesh;
-use crate::domains::nodes::{Contrast, find_nodes};
+use crate::domains::nodes::Contrast;
 use crate::frame::background::remove_background;
 use crate::frame::geometry::{Geometry, Timing};
 use crate::frame::image::Image;
@@ -31,6 +30,7 @@ use crate::scan::place::Place;
 use crate::settings::knobs::Settings;
 use crate::spectrum::error::LatticeError;
 use crate::spectrum::method::Method;
+use crate::survey::domain_mapping::domains_of;
 use crate::survey::mapping::pitch;
 use crate::window::types::{FULL_WIDTH, Reference, Resolution, ResolutionError, UsedHarmonic};
 
@@ -98,6 +98,28 @@ pub enum SurveyError {
 /// The block of an image: columns and rows, the bottom line being row 0.
 pub type ReadBlock<'a> = dyn Fn([Range<usize>; 2]) -> Result<Image, String> + 'a;
 
+/// The columns and rows of the middle block.
+fn middle_of(geometry: &Geometry) -> [Range<usize>; 2] {
+    geometry.size.map(|n| {
+        let side = n.min(MIDDLE);
+        (n - side) / 2..(n - side) / 2 + side
+    })
+}
+
+/// The wave vectors (rad/pixel) of the middle, under the names of the `first` image where there is one.
+fn waves_of(
+    found: &MeasuredLattice,
+    first: Option<&SurveyPlan>,
+    pixel_to_nm: &Matrix2<f64>,
+) -> Option<Matrix2<f64>> {
+    let Some(first) = first else {
+        return named(&found.reciprocal, pixel_to_nm);
+    };
+    let back = pixel_to_nm.try_inverse()?.transpose().try_inverse()?;
+    let exact = Waves::<Px>::exact(found.reciprocal);
+    Some(labelled_like(&exact, &(back * first.whole)).basis)
+}
+
 /// Names the waves of the lattice by their strengths in the middle of the image.
 fn name(
     whole: &Matrix2<f64>,
@@ -138,8 +160,10 @@ impl SurveyPlan {
     /// # Errors
     /// [`SurveyError`]: no lines, or no lattice in the middle.
     pub fn new(
-        (geometry, timing): (&Geometry, Option<&Timing>),
-        (settings, resolution): (&Settings, &Resolution),
+        geometry: &Geometry,
+        timing: Option<&Timing>,
+        settings: &Settings,
+        resolution: &Resolution,
         first: Option<&Self>,
         read: &ReadBlock,
     ) -> Result<Self, SurveyError> {
@@ -150,31 +174,21 @@ impl SurveyPlan {
         let placed = still.unwrap_or_else(|| geometry.clone());
         let dual = placed.pixel_to_nm.try_inverse().ok_or(SurveyError::NoMap)?;
         let dual = dual.transpose();
-        let [columns, rows] = geometry.size.map(|n| {
-            let side = n.min(MIDDLE);
-            (n - side) / 2..(n - side) / 2 + side
-        });
+        let [columns, rows] = middle_of(geometry);
         let corner = [columns.start, rows.start];
         resolution.fits(geometry.extent(), FULL_WIDTH)?;
         let middle = block(read, columns, rows)?;
         let of_middle = geometry.cropped(corner, [middle.columns, middle.rows]);
         let found = measure(&middle, &of_middle, settings.background, Method::Lattice)
             .map_err(SurveyError::Lattice)?;
-        let pair = match first {
-            Some(first) => {
-                let back = dual.try_inverse().ok_or(SurveyError::NoMap)?;
-                let exact = Waves::<Px>::exact(found.reciprocal);
-                labelled_like(&exact, &(back * first.whole)).basis
-            }
-            None => named(&found.reciprocal, &placed.pixel_to_nm).ok_or(SurveyError::NoMap)?,
-        };
+        let pair = waves_of(&found, first, &placed.pixel_to_nm).ok_or(SurveyError::NoMap)?;
         let resolution = &Resolution {
             window_nm: first.map(|f| f.window_nm).or(resolution.window_nm),
             ..*resolution
         };
         let reference = Reference {
             pair,
-            pitch: [geometry.fast_step().norm(), geometry.slow_step().norm()],
+            pitch: pitch(geometry),
         };
         let flat = remove_background(&middle, settings.background);
         let map = local_lattices(&flat, &reference, resolution).ok_or(SurveyError::NoMap)?;
@@ -271,7 +285,6 @@ impl SurveyPlan {
             values.extend(lines.binned(bin).values);
         }
         let image = Image::new(rows / bin, columns / bin, values);
-        let image = remove_background(&image, self.settings.background);
         let share = bin as f64;
         let binned = Geometry {
             size: [image.columns, image.rows],
@@ -280,15 +293,15 @@ impl SurveyPlan {
             covariance: self.placed.covariance * (share * share),
             from_sensors: self.placed.from_sensors,
         };
-        let pixels = pixels / share;
-        let Some(found) = find_nodes(&image, &pixels, pitch(&binned), contrast) else {
-            return Ok(None);
-        };
-        let places: Vec<_> = found.nodes.iter().map(|n| n.place).collect();
-        let mesh = Mesh::new(&places, &pixels);
-        let (layers, convention) = (self.settings.bilayer(), self.settings.strain_convention);
-        let map = DomainMap::new(&found, &mesh, &binned, layers, convention);
-        Ok(map.and_then(Result::ok))
+        let (pixels, pitch) = (pixels / share, pitch(&binned));
+        Ok(domains_of(
+            &image,
+            &pixels,
+            pitch,
+            &binned,
+            &self.settings,
+            contrast,
+        ))
     }
 
     /// A map of this window that has no nodes yet, on the grid of `first`.

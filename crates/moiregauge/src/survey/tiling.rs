@@ -12,7 +12,7 @@ use crate::map::sample::{Grid, LatticeMap, LatticeNode};
 use crate::settings::knobs::Settings;
 use crate::spectrum::method::Method;
 use crate::window::mask::Mask;
-use crate::window::types::Reference;
+use crate::window::types::{Reference, Resolution};
 
 /// Default side of a tile, periods. Chosen by eye.
 const SIDE: f64 = 6.0;
@@ -21,19 +21,21 @@ const OVERLAP: f64 = 4.0;
 /// A lattice that differs by more than this share from that of the whole image is another one. Chosen by eye.
 const OTHER: f64 = 0.2;
 
-/// The lattice of every tile. `still` is the geometry without drift, `geometry` the one that was measured.
+/// The lattice of every tile. `still` is the geometry without drift, `geometry` the one that was measured; the window of
+/// `resolution` is the side of a tile.
 ///
 /// The slopes of a phase in a tile of side T count like `T²/4 − x²`, whose standard deviation `T/√20` stands
 /// for the width of the window.
 pub(crate) fn tile_map(
     image: &Image,
-    (geometry, still): (&Geometry, &Geometry),
+    geometry: &Geometry,
+    still: &Geometry,
     reference: &Reference,
-    (side_nm, step_nm): (Option<f64>, Option<f64>),
+    resolution: &Resolution,
     settings: &Settings,
 ) -> Option<LatticeMap> {
-    let side_nm = side_nm.unwrap_or(SIDE * reference.period());
-    let step_nm = step_nm.unwrap_or(side_nm / OVERLAP);
+    let side_nm = resolution.window_nm.unwrap_or(SIDE * reference.period());
+    let step_nm = resolution.step_nm.unwrap_or(side_nm / OVERLAP);
     let pixels = |nm: f64| reference.pitch.map(|p| ((nm / p).round() as usize).max(1));
     let (side, step) = (pixels(side_nm), pixels(step_nm));
     let whole = [image.columns, image.rows];
@@ -99,7 +101,6 @@ mod tests {
     use super::*;
     use crate::map::local::local_lattices;
     use crate::simulate::field::FieldScene;
-    use crate::window::types::Resolution;
     use heterostrain::lattice::reciprocal;
 
     /// Tiles and demodulation agree within their errors on an image of one lattice, and so do both with the truth.
@@ -114,8 +115,12 @@ mod tests {
             pitch: [1.0; 2],
         };
         let settings = Settings::default();
-        let sides = (Some(90.0), Some(45.0));
-        let tiles = tile_map(&image, (&geometry, &geometry), &reference, sides, &settings).unwrap();
+        let sides = Resolution {
+            window_nm: Some(90.0),
+            step_nm: Some(45.0),
+            ..Resolution::default()
+        };
+        let tiles = tile_map(&image, &geometry, &geometry, &reference, &sides, &settings).unwrap();
         let window = Resolution {
             window_nm: Some(tiles.window_nm),
             ..Resolution::default()

@@ -1,5 +1,9 @@
 //! What a window blurs, read off what a wider one changes.
 
+/// χ² of two numbers that is more than chance (p < 0.01) enlarges the errors of a node: a convention.
+const OF_TWO: f64 = 9.21;
+/// The same of four.
+const OF_FOUR: f64 = 13.3;
 /// A good χ² exceeds the limit once in some 10⁵ nodes.
 const IMPROBABLE: f64 = 4.26;
 /// Blur that matters: a window wider by √2 changes a wave vector by this share of itself. Chosen by eye; see
@@ -22,7 +26,11 @@ pub(crate) struct Blur {
 impl Blur {
     /// Factor on the variances of a node for what the window blurs, where that is more than chance (p < 0.01).
     pub(crate) fn factor(self) -> f64 {
-        let more_than_chance = if self.components == 2 { 9.21 } else { 13.3 };
+        let more_than_chance = if self.components == 2 {
+            OF_TWO
+        } else {
+            OF_FOUR
+        };
         if self.chi2 > more_than_chance {
             1.0 + (self.chi2 / self.components as f64 - 1.0) * self.of_noise
         } else {

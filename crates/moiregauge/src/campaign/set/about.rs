@@ -1,6 +1,6 @@
 //! What has to be said of a set: scatter, significance, scans that do not fit, readings.
 
-use crate::campaign::analysis::{Checks, Drift, Residual, SetMean};
+use crate::campaign::analysis::{Residual, SetAnalysis, SetMean};
 use crate::caveat::Caveat;
 use crate::caveat::moires::MoireDoubt;
 use crate::caveat::sets::{Scattered, SetDoubt};
@@ -80,20 +80,14 @@ pub(crate) fn about_residual(
 
 /// Says where the scatter of `n` scans makes clearly larger errors than those stated: by more than four
 /// times the scatter of such a comparison, 1/√(2(n − 1)).
-pub(crate) fn about_checks(
-    name: &str,
-    (checks, drift, mean): (Option<&Checks>, Option<&Drift>, Option<&SetMean>),
-    n: usize,
-    caveats: &mut Vec<Caveat>,
-) {
+pub(crate) fn about_checks(set: &SetAnalysis, n: usize, caveats: &mut Vec<Caveat>) {
+    let found = set.checks.as_ref().and_then(|c| c.leave_one_out);
+    let (Some(found), Some(drift), Some(mean)) = (found, &set.drift, &set.mean) else {
+        return;
+    };
     if n < FEWEST_TO_DOUBT {
         return;
     }
-    let (Some(found), Some(drift), Some(mean)) =
-        (checks.and_then(|c| c.leave_one_out), drift, mean)
-    else {
-        return;
-    };
     let strain = mean.twist_strain.strain().covariance;
     let stated = [
         ("drift x", found.drift[0], drift.covariance.m11.sqrt()),
@@ -117,7 +111,7 @@ pub(crate) fn about_checks(
             SetDoubt::ScatterOfScans {
                 larger: large.join(", "),
             },
-            name,
+            &set.name,
         ));
     }
 }

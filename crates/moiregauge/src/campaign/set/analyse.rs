@@ -6,6 +6,7 @@ use nalgebra::{Matrix2, Vector2};
 use rayon::prelude::*;
 use spmfile::FrameDirection;
 
+use crate::campaign::Checks;
 use crate::campaign::analysis::{Drift, DriftFit, ScanAnalysis, SetAnalysis, SetMean};
 use crate::campaign::group::Group;
 use crate::campaign::set::about::{about_checks, about_mean, about_readings, about_residual};
@@ -18,7 +19,7 @@ use crate::caveat::Caveat;
 use crate::caveat::drifting::DriftDoubt;
 use crate::caveat::sets::SetDoubt;
 use crate::drift::joint::solve::JointFit;
-use crate::drift::linear::{Observation, at_known_drift, common_lattice, solve};
+use crate::drift::linear::{DriftSolution, Observation, at_known_drift, common_lattice, solve};
 use crate::drift::monte_carlo;
 use crate::drift::paper::successive_drift;
 use crate::drift::shares::Statistical;
@@ -45,100 +46,136 @@ pub(crate) fn analyse_set(
     first_index: u64,
     caveats: &mut Vec<Caveat>,
 ) -> SetAnalysis {
-    let observations: Vec<Vec<Observation>> = group
-        .scans
-        .iter()
-        .map(|scan| observations(scan, reference))
-        .collect();
+    let in_all = group.scans.iter();
+    let seen: Vec<_> = in_all.map(|scan| observations(scan, reference)).collect();
     let joint = settings.method.is_joint() && settings.drift.is_none();
     if joint && settings.exclude_outliers {
-        leave_out(group, &observations, reference, settings, caveats);
+        leave_out(group, &seen, reference, settings, caveats);
     }
-    let kept: Vec<usize> = (0..group.scans.len())
-        .filter(|&i| group.scans[i].excluded.is_none())
-        .collect();
+    let kept = kept(group);
     let used: Vec<&MeasuredScan> = kept.iter().map(|&i| &group.scans[i]).collect();
-    let all: Vec<Observation> = kept
-        .iter()
-        .flat_map(|&i| &observations[i])
-        .copied()
-        .collect();
-    let (solved, fit) = match drift((&group.name, &used), &all, settings, caveats) {
+    let all: Vec<Observation> = kept.iter().flat_map(|&i| &seen[i]).copied().collect();
+    let name = &group.name;
+    let (solved, fit) = match drift(name, &used, &all, settings, caveats) {
         Some(linear) if joint => {
-            let (solved, fit) = refined(&group.name, linear, &used, reference, settings, caveats);
+            let (solved, fit) = refined(name, linear, &used, reference, settings, caveats);
             (Some(solved), fit)
         }
         linear => (linear, None),
     };
-    let mut scans: Vec<ScanAnalysis> = group
-        .scans
-        .iter()
-        .zip(&observations)
-        .filter_map(|(scan, seen)| {
-            let drift = solved.as_ref().map(|s| {
-                let own = fit.as_ref().and_then(|fit| joint::velocity_of(fit, scan));
-                own.unwrap_or((s.drift.velocity, s.drift.covariance))
-            });
-            let found = scan_analysis(scan, seen, reference, drift, settings)?;
-            Some(joint::with_motion(found, fit.as_ref(), scan))
-        })
-        .collect();
-    let checks = fit.as_ref().map(|fit| {
-        let left_out = fit.leave_one_out();
-        let residuals = joint::residuals(&left_out);
-        for (one, residual) in left_out.iter().zip(residuals) {
-            let file = &used[one.scan].file;
-            if let Some(scan) = scans.iter_mut().find(|s| s.file == *file) {
-                scan.residual = Some(residual);
-                about_residual(file, &residual, settings, caveats);
-            }
-        }
-        joint::checks(fit, &left_out, &used, (&group.name, settings))
-    });
+    let of_set = solved.as_ref().map(|solved| &solved.drift);
+    let of_scan = |(scan, seen): (&MeasuredScan, &Vec<Observation>)| {
+        scan_at_drift(scan, seen, reference, of_set, fit.as_ref(), settings)
+    };
+    let pairs = group.scans.iter().zip(&seen);
+    let mut scans: Vec<ScanAnalysis> = pairs.filter_map(of_scan).collect();
+    let checks = fit
+        .as_ref()
+        .map(|fit| checked(fit, &mut scans, &used, name, settings, caveats));
     draw(&mut scans, settings, first_index);
-    if let (Method::Paper, Some(solved)) = (settings.method, &solved) {
-        let drift = (solved.drift.velocity, solved.drift.covariance);
-        let measured = (group.scans.as_slice(), observations.as_slice());
-        published::draw_all(&mut scans, measured, drift, settings, first_index);
+    if let (Method::Paper, Some(drift)) = (settings.method, of_set) {
+        let measured = &group.scans;
+        published::draw_all(&mut scans, measured, &seen, drift, settings, first_index);
     }
-    let of_set = || scans.iter().filter(|s| s.excluded.is_none());
     let uncorrected = without_drift(&all, &scans, kept.len(), settings, strengths);
-    let mean = solved.as_ref().and_then(|s| {
-        let of = |s: &ScanAnalysis| (s.twist_strain, s.drift_corrected.unwrap_or(s.sensor));
-        set_mean(
-            ((s.lattice, s.chi2, s.freedom), s.enlargement),
-            &s.statistical,
-            of_set().map(of),
-            settings,
-            strengths,
-        )
-    });
-    let drift = solved.map(|s| s.drift);
-    about_mean(&group.name, mean.as_ref(), caveats);
-    let shown = mean.as_ref().or(uncorrected.as_ref());
-    if let Some(m) = shown {
-        caveats.extend(about_readings(&group.name, m, settings));
-    }
-    moire::doubts(&group.name, shown, &scans, settings, caveats);
-    about_checks(
-        &group.name,
-        (checks.as_ref(), drift.as_ref(), mean.as_ref()),
-        kept.len(),
-        caveats,
-    );
-    SetAnalysis {
-        name: group.name.clone(),
+    let mean = solved
+        .as_ref()
+        .and_then(|solved| at_drift(solved, &scans, settings, strengths));
+    let set = SetAnalysis {
+        name: name.clone(),
         slow_axis: group.slow_axis,
         line_rate_hz: group.line_rate_hz,
         channel: group.channel.clone(),
-        forward_backward: forward_backward(&of_set().collect::<Vec<_>>(), settings),
+        forward_backward: forward_backward(&scans, settings),
         scans,
-        drift,
+        drift: solved.map(|s| s.drift),
         mean,
         uncorrected,
         checks,
         illustration: None,
+    };
+    about_set(&set, kept.len(), settings, caveats);
+    set
+}
+
+/// What has to be said of a set of which `used` scans count.
+fn about_set(set: &SetAnalysis, used: usize, settings: &Settings, caveats: &mut Vec<Caveat>) {
+    about_mean(&set.name, set.mean.as_ref(), caveats);
+    let shown = set.mean.as_ref().or(set.uncorrected.as_ref());
+    if let Some(mean) = shown {
+        caveats.extend(about_readings(&set.name, mean, settings));
     }
+    moire::doubts(&set.name, shown, &set.scans, settings, caveats);
+    about_checks(set, used, caveats);
+}
+
+/// The scans that are not left out, by their number.
+fn kept(group: &Group) -> Vec<usize> {
+    (0..group.scans.len())
+        .filter(|&i| group.scans[i].excluded.is_none())
+        .collect()
+}
+
+/// The scans that are not left out.
+fn counted(scans: &[ScanAnalysis]) -> impl Iterator<Item = &ScanAnalysis> {
+    scans.iter().filter(|s| s.excluded.is_none())
+}
+
+/// A scan before and after its drift is taken off: its own by the `fit` of the set, or else the mean one.
+fn scan_at_drift(
+    scan: &MeasuredScan,
+    seen: &[Observation],
+    reference: &Matrix2<f64>,
+    drift: Option<&Drift>,
+    fit: Option<&JointFit>,
+    settings: &Settings,
+) -> Option<ScanAnalysis> {
+    let drift = drift.map(|mean| {
+        let own = fit.and_then(|fit| joint::velocity_of(fit, scan));
+        own.unwrap_or((mean.velocity, mean.covariance))
+    });
+    let found = scan_analysis(scan, seen, reference, drift, settings)?;
+    Some(joint::with_motion(found, fit, scan))
+}
+
+/// The errors by the scatter of the `used` scans; tells each of `scans` how it lies against the others.
+fn checked(
+    fit: &JointFit,
+    scans: &mut [ScanAnalysis],
+    used: &[&MeasuredScan],
+    name: &str,
+    settings: &Settings,
+    caveats: &mut Vec<Caveat>,
+) -> Checks {
+    let left_out = fit.leave_one_out();
+    let residuals = joint::residuals(&left_out);
+    for (one, residual) in left_out.iter().zip(residuals) {
+        let file = &used[one.scan].file;
+        if let Some(scan) = scans.iter_mut().find(|s| s.file == *file) {
+            scan.residual = Some(residual);
+            about_residual(file, &residual, settings, caveats);
+        }
+    }
+    joint::checks(fit, &left_out, used, name, settings)
+}
+
+/// The mean of the scans, their drift taken off.
+fn at_drift(
+    solved: &Solved,
+    scans: &[ScanAnalysis],
+    settings: &Settings,
+    strengths: &WaveStrengths,
+) -> Option<SetMean> {
+    let of = |s: &ScanAnalysis| (s.twist_strain, s.drift_corrected.unwrap_or(s.sensor));
+    set_mean(
+        &solved.lattice,
+        &solved.statistical,
+        solved.chi2 / solved.freedom as f64,
+        solved.enlargement,
+        counted(scans).map(of),
+        settings,
+        strengths,
+    )
 }
 
 /// The mean of the `used` scans as if nothing drifted, with the errors that drift adds left out.
@@ -149,23 +186,24 @@ fn without_drift(
     settings: &Settings,
     strengths: &WaveStrengths,
 ) -> Option<SetMean> {
-    let common = common_lattice(all, &Vector2::zeros(), &Matrix2::zeros()).ok()?;
+    let (lattice, chi2, freedom) =
+        common_lattice(all, &Vector2::zeros(), &Matrix2::zeros()).ok()?;
     let [image, sensor] = at_known_drift(all)?;
-    let statistical = Statistical::without_drift(&image, &sensor);
     // The scatter of several scans is that of their drift; that of the two lines of one is not.
-    let (_, chi2, freedom) = common;
     let scale = if used == 1 {
         enlargement(chi2, freedom)
     } else {
         1.0
     };
-    let (common, statistical) = moire::enlarged(common, &statistical, scale);
-    let of_set = scans.iter().filter(|s| s.excluded.is_none());
+    let lattice = Lattice::new(lattice.basis, lattice.covariance * scale);
+    let statistical = Statistical::without_drift(&(image * scale), &(sensor * scale));
     let of = |s: &ScanAnalysis| (s.twist_strain_sensor, s.sensor);
     set_mean(
-        (common, scale),
+        &lattice,
         &statistical,
-        of_set.map(of),
+        chi2 / freedom as f64,
+        scale,
+        counted(scans).map(of),
         settings,
         strengths,
     )
@@ -214,9 +252,7 @@ fn leave_out(
     settings: &Settings,
     caveats: &mut Vec<Caveat>,
 ) {
-    let kept: Vec<usize> = (0..group.scans.len())
-        .filter(|&i| group.scans[i].excluded.is_none())
-        .collect();
+    let kept = kept(group);
     let scans: Vec<&MeasuredScan> = kept.iter().map(|&i| &group.scans[i]).collect();
     let seen: Vec<&[Observation]> = kept.iter().map(|&i| observations[i].as_slice()).collect();
     for i in joint::outliers(&scans, &seen, reference, settings) {
@@ -241,7 +277,8 @@ fn observations(scan: &MeasuredScan, reference: &Matrix2<f64>) -> Vec<Observatio
 }
 
 pub(crate) fn drift(
-    (name, scans): (&str, &[&MeasuredScan]),
+    name: &str,
+    scans: &[&MeasuredScan],
     all: &[Observation],
     settings: &Settings,
     caveats: &mut Vec<Caveat>,
@@ -263,44 +300,51 @@ pub(crate) fn drift(
     match solve(all) {
         Ok(solution) if settings.method == Method::Paper => {
             let scans = published::paper_scans(scans, all);
-            published::drift((name, &scans), all, &solution, settings, caveats)
+            published::drift(name, &scans, all, &solution, settings, caveats)
         }
-        Ok(solution) => {
-            let scale = enlargement(solution.chi2, solution.degrees_of_freedom);
-            let mut lattice = solution.lattice;
-            lattice.covariance *= scale;
-            let statistical =
-                Statistical::at_known_drift(at_known_drift(all)?, scale, &lattice.covariance);
-            let seed = settings.seed;
-            let stream = format!("drift {name}");
-            Some(Solved {
-                drift: Drift {
-                    velocity: solution.velocity,
-                    covariance: solution.covariance * scale,
-                    given: false,
-                    fit: Some(DriftFit {
-                        rank: solution.rank,
-                        condition: solution.condition,
-                        chi2: solution.chi2,
-                        degrees_of_freedom: solution.degrees_of_freedom,
-                        paper_velocity: successive_drift(&published::paper_scans(scans, all)),
-                    }),
-                    monte_carlo: monte_carlo(all, settings.drift_draws, seed, &stream),
-                    joint: None,
-                },
-                lattice,
-                statistical,
-                chi2: solution.chi2,
-                freedom: solution.degrees_of_freedom,
-                enlargement: scale,
-            })
-        }
+        Ok(solution) => linear_drift(name, scans, all, &solution, settings),
         Err(error) => {
             let reason = error.to_string();
             caveats.push(Caveat::new(DriftDoubt::Undetermined { reason }, name));
             None
         }
     }
+}
+
+/// The linear solution, its errors enlarged for scatter.
+fn linear_drift(
+    name: &str,
+    scans: &[&MeasuredScan],
+    all: &[Observation],
+    solution: &DriftSolution,
+    settings: &Settings,
+) -> Option<Solved> {
+    let scale = enlargement(solution.chi2, solution.degrees_of_freedom);
+    let mut lattice = solution.lattice;
+    lattice.covariance *= scale;
+    let statistical = Statistical::at_known_drift(at_known_drift(all)?, scale, &lattice.covariance);
+    let stream = format!("drift {name}");
+    Some(Solved {
+        drift: Drift {
+            velocity: solution.velocity,
+            covariance: solution.covariance * scale,
+            given: false,
+            fit: Some(DriftFit {
+                rank: solution.rank,
+                condition: solution.condition,
+                chi2: solution.chi2,
+                degrees_of_freedom: solution.degrees_of_freedom,
+                paper_velocity: successive_drift(&published::paper_scans(scans, all)),
+            }),
+            monte_carlo: monte_carlo(all, settings.drift_draws, settings.seed, &stream),
+            joint: None,
+        },
+        lattice,
+        statistical,
+        chi2: solution.chi2,
+        freedom: solution.degrees_of_freedom,
+        enlargement: scale,
+    })
 }
 
 fn given_drift(
@@ -336,15 +380,18 @@ fn given_drift(
     })
 }
 
-/// Twist and strain of the common lattice, and how the scans scatter about it.
+/// Twist and strain of the common lattice, whose variances the scatter of the scans enlarged by `enlargement`, and how
+/// they scatter about it.
 fn set_mean(
-    ((lattice, chi2, freedom), enlargement): ((Lattice, f64, usize), f64),
+    lattice: &Lattice,
     statistical: &Statistical,
+    chi2_per_dof: f64,
+    enlargement: f64,
     scans: impl Iterator<Item = (Option<TwistStrain>, Lattice)>,
     settings: &Settings,
     strengths: &WaveStrengths,
 ) -> Option<SetMean> {
-    let twist_strain = moire(&lattice, settings)?;
+    let twist_strain = moire(lattice, settings)?;
     let (singles, lattices): (Vec<_>, Vec<_>) = scans.unzip();
     let singles: Vec<TwistStrain> = singles.into_iter().flatten().collect();
     let twists: Vec<f64> = singles.iter().map(|s| s.twist).collect();
@@ -358,15 +405,15 @@ fn set_mean(
             (ratio - 1.0).abs() <= 0.01
         })
     });
-    let budget = Budget::new(&lattice, &twist_strain, statistical, settings);
+    let budget = Budget::new(lattice, &twist_strain, statistical, settings);
     Some(SetMean {
-        readings: Readings::new(&lattice, &twist_strain, &budget, strengths, settings),
+        readings: Readings::new(lattice, &twist_strain, &budget, strengths, settings),
         budget,
-        lattice,
+        lattice: *lattice,
         twist_strain,
         twist_scatter: mean_and_spread(&twists).sigma,
         strain_scatter: component(0).hypot(component(1)) / std::f64::consts::SQRT_2,
-        chi2_per_dof: chi2 / freedom as f64,
+        chi2_per_dof,
         enlargement,
         within_one_percent: within,
     })
@@ -376,10 +423,9 @@ fn set_mean(
 ///
 /// With opposite time gradients the mean is free of constant drift exactly: a check that needs no
 /// drift estimate.
-fn forward_backward(scans: &[&ScanAnalysis], settings: &Settings) -> Option<TwistStrain> {
+fn forward_backward(scans: &[ScanAnalysis], settings: &Settings) -> Option<TwistStrain> {
     let mean = |direction: FrameDirection| {
-        let reciprocal: Vec<Waves> = scans
-            .iter()
+        let reciprocal: Vec<Waves> = counted(scans)
             .filter(|s| s.frame_direction == Some(direction))
             .filter_map(|s| s.sensor.waves())
             .collect();

@@ -66,8 +66,8 @@ pub(crate) fn about_headers(
         for sighting in &mut other {
             sighting.time_gradient *= factor;
         }
-        let from = (&waves.basis, &(velocity / factor));
-        tried.push((words, fit(&other, from, settings.frame_time_sigma_s)));
+        let (velocity, sigma) = (velocity / factor, settings.frame_time_sigma_s);
+        tried.push((words, fit(&other, &waves.basis, &velocity, sigma)));
     }
     let best = tried
         .iter()

@@ -36,11 +36,10 @@ pub(crate) fn jointly(
     reference: &Matrix2<f64>,
     settings: &Settings,
 ) -> (Solved, Option<JointFit>) {
-    let start = (&linear.lattice, &linear.drift.velocity);
-    let Some(fit) = joint_fit(scans, reference, start, settings) else {
-        return (linear, None);
-    };
-    let Some((lattice, statistical)) = lattice_of(&fit, reference) else {
+    let (lattice, velocity) = (&linear.lattice, &linear.drift.velocity);
+    let found = joint_fit(scans, reference, lattice, velocity, settings)
+        .and_then(|fit| Some((lattice_of(&fit, reference)?, fit)));
+    let Some(((lattice, statistical), fit)) = found else {
         return (linear, None);
     };
     let solved = Solved {
@@ -59,17 +58,18 @@ pub(crate) fn jointly(
     (solved, Some(fit))
 }
 
-/// The joint fit of some scans, numbered as they are given; `None` without timing.
+/// The joint fit of some scans, numbered as they are given, from a lattice and a drift nearby; `None` without timing.
 pub(crate) fn joint_fit(
     scans: &[&MeasuredScan],
     reference: &Matrix2<f64>,
-    (lattice, velocity): (&Lattice, &Vector2<f64>),
+    lattice: &Lattice,
+    velocity: &Vector2<f64>,
     settings: &Settings,
 ) -> Option<JointFit> {
     let sightings = sightings(scans, reference)?;
     let waves = labelled_like(&lattice.waves()?, &reciprocal(reference)?);
-    let start = (&waves.basis, velocity);
-    fit(&sightings, start, settings.frame_time_sigma_s)
+    let time_sigma = settings.frame_time_sigma_s;
+    fit(&sightings, &waves.basis, velocity, time_sigma)
 }
 
 /// The lattice of a joint fit (nm) and where its covariance comes from.
@@ -140,8 +140,8 @@ pub(crate) fn outliers(
             .collect();
         let of: Vec<&MeasuredScan> = kept.iter().map(|&i| scans[i]).collect();
         let Ok(linear) = solve(&all) else { break };
-        let start = (&linear.lattice, &linear.velocity);
-        let Some(fit) = joint_fit(&of, reference, start, settings) else {
+        let (lattice, velocity) = (&linear.lattice, &linear.velocity);
+        let Some(fit) = joint_fit(&of, reference, lattice, velocity, settings) else {
             break;
         };
         let left_out = fit.leave_one_out();
@@ -160,7 +160,8 @@ pub(crate) fn checks(
     fit: &JointFit,
     left_out: &[LeftOut],
     scans: &[&MeasuredScan],
-    (name, settings): (&str, &Settings),
+    name: &str,
+    settings: &Settings,
 ) -> Checks {
     let n = left_out.len() as f64;
     let leave_one_out = (left_out.len() >= FEWEST)

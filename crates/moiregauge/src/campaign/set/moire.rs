@@ -10,13 +10,11 @@ use std::f64::consts::FRAC_PI_6;
 use heterostrain::lattice::Lattice;
 use heterostrain::material::{Bilayer, Material};
 use heterostrain::strain::{TwistStrain, twist_strain};
-use nalgebra::Matrix4;
 
 use crate::calibration::KnownLattice;
 use crate::campaign::analysis::{ScanAnalysis, SetMean};
 use crate::caveat::Caveat;
 use crate::caveat::moires::{Impossible, MoireDoubt, PeriodDoubt};
-use crate::drift::shares::Statistical;
 use crate::settings::knobs::Settings;
 
 /// Heterostrains of layers on each other stay below a few tenths of a per cent, rarely a per cent; more
@@ -40,25 +38,6 @@ fn is_below_30_degrees(found: &TwistStrain, settings: &Settings) -> bool {
     let layers = settings.bilayer();
     let hexagonal = layers.reference.is_hexagonal() && layers.stretched.is_hexagonal();
     found.twist.abs() <= FRAC_PI_6 || !hexagonal
-}
-
-/// A common lattice with its χ² and degrees of freedom, and where its covariance comes from.
-type Common = (Lattice, f64, usize);
-
-/// The same with variances enlarged by `scale`.
-pub(crate) fn enlarged(
-    (mut lattice, chi2, freedom): Common,
-    statistical: &Statistical,
-    scale: f64,
-) -> (Common, Statistical) {
-    let by = |m: Matrix4<f64>| m * scale;
-    lattice.covariance *= scale;
-    let statistical = Statistical {
-        image: by(statistical.image),
-        drift: by(statistical.drift),
-        sensor: by(statistical.sensor),
-    };
-    ((lattice, chi2, freedom), statistical)
 }
 
 /// Says where a lattice is no moiré, or hardly one.

@@ -75,7 +75,8 @@ fn peaks(line: &MeasuredLine, seen: &Observation) -> ([Vector2<f64>; 6], Matrix2
 
 /// The published drift of a set, and the common lattice at that drift. Nothing is enlarged for scatter.
 pub(crate) fn drift(
-    (name, scans): (&str, &[PaperScan]),
+    name: &str,
+    scans: &[PaperScan],
     all: &[Observation],
     linear: &DriftSolution,
     settings: &Settings,
@@ -122,8 +123,9 @@ pub(crate) fn drift(
 /// equations. `first_index` numbers the scans.
 pub(crate) fn draw_all(
     scans: &mut [ScanAnalysis],
-    (measured, observations): (&[MeasuredScan], &[Vec<Observation>]),
-    drift: (Vector2<f64>, Matrix2<f64>),
+    measured: &[MeasuredScan],
+    observations: &[Vec<Observation>],
+    drift: &Drift,
     settings: &Settings,
     first_index: u64,
 ) {
@@ -146,10 +148,10 @@ pub(crate) fn draw_all(
 /// The corrected peaks of one draw, the mean of trace and retrace, nm.
 fn mean_peaks(
     lines: &[PaperScan],
-    (velocity, covariance): (Vector2<f64>, Matrix2<f64>),
+    drift: &Drift,
     rng: &mut ChaCha8Rng,
 ) -> Option<[Vector2<f64>; 6]> {
-    let velocity = velocity + normal_vector(&covariance, rng);
+    let velocity = drift.velocity + normal_vector(&drift.covariance, rng);
     let mut mean = [Vector2::zeros(); 6];
     for line in lines {
         let corrected = line.drawn(rng).corrected(&velocity)?;

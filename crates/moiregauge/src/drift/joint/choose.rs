@@ -81,8 +81,7 @@ struct Choice<'a> {
 
 impl<'a> Choice<'a> {
     fn new(problem: &'a Problem, best: JointFit, base: Terms) -> Self {
-        let start = (&best.waves.basis.clone(), &best.velocity.clone());
-        let plain = problem.solve(base, start, None);
+        let plain = problem.solve(base, &best.waves.basis, &best.velocity, None);
         // Where only a changing drift can be linked there is nothing simpler to compare with.
         let (best, lowest) = match plain {
             Some(fit) => (fit.clone(), criterion(&fit)),
@@ -98,9 +97,9 @@ impl<'a> Choice<'a> {
 
     fn offer(&mut self, candidates: impl Iterator<Item = Terms>) {
         let before = self.lowest;
-        let from = (&self.best.waves.basis.clone(), &self.best.velocity.clone());
+        let (pair, velocity) = (self.best.waves.basis, self.best.velocity);
         for terms in candidates {
-            let Some(fit) = self.problem.solve(terms, from, None) else {
+            let Some(fit) = self.problem.solve(terms, &pair, &velocity, None) else {
                 continue;
             };
             if self.lowest.is_finite() && loosens(&fit, &self.best) {

@@ -1,6 +1,8 @@
 //! The model of a sighting and its derivatives.
 
-use nalgebra::{DMatrix, DVector, Matrix2, Matrix3, Matrix3x2, Matrix4, Vector2, Vector3};
+use nalgebra::{
+    DMatrix, DVector, Matrix2, Matrix3, Matrix3x2, Matrix4, SMatrix, SVector, Vector2, Vector3,
+};
 
 use crate::drift::joint::path::{DriftPath, Settling};
 use crate::drift::joint::sighting::{Sighting, Terms};
@@ -148,6 +150,27 @@ pub(crate) struct Linearised {
     pub(crate) phases: Vec<PhaseMiss>,
 }
 
+impl Linearised {
+    /// Adds residuals of a scan and their derivatives, whitened by the Cholesky factor of their covariance; `None` where
+    /// that has none.
+    fn push<const N: usize>(
+        &mut self,
+        scan: usize,
+        lower: &SMatrix<f64, N, N>,
+        residuals: &SVector<f64, N>,
+        rows: &DMatrix<f64>,
+    ) -> Option<()> {
+        let residuals = lower.solve_lower_triangular(residuals)?;
+        let rows = lower.solve_lower_triangular(rows)?;
+        for i in 0..N {
+            self.residuals.push(residuals[i]);
+            self.jacobian.push(rows.row(i).transpose());
+            self.scans.push(scan);
+        }
+        Some(())
+    }
+}
+
 /// The phases of one sighting against the model.
 pub(crate) struct PhaseMiss {
     /// The first of its three rows.
@@ -255,20 +278,7 @@ fn waves(sighting: &Sighting, layout: &Layout, x: &DVector<f64>, out: &mut Linea
             }
         }
     }
-    let Some(lower) = factor(sighting) else {
-        return;
-    };
-    let (Some(residual), Some(rows)) = (
-        lower.solve_lower_triangular(&residual),
-        lower.solve_lower_triangular(&rows),
-    ) else {
-        return;
-    };
-    for i in 0..4 {
-        out.residuals.push(residual[i]);
-        out.jacobian.push(rows.row(i).transpose());
-        out.scans.push(sighting.scan);
-    }
+    factor(sighting).and_then(|lower| out.push(sighting.scan, &lower, &residual, &rows));
 }
 
 /// The Cholesky factor that whitens the waves; a floor keeps noise-free simulations solvable.
@@ -326,21 +336,13 @@ fn phases(
         }
         rows[(h, constant)] = 1.0;
     }
-    let Some(lower) = found.factor(instability * instability) else {
-        return;
-    };
-    let (Some(residual), Some(rows)) = (
-        lower.solve_lower_triangular(&found.miss),
-        lower.solve_lower_triangular(&rows),
-    ) else {
-        return;
-    };
-    for h in 0..3 {
-        out.residuals.push(residual[h]);
-        out.jacobian.push(rows.row(h).transpose());
-        out.scans.push(sighting.scan);
+    let lower = found.factor(instability * instability);
+    if lower.is_some_and(|lower| {
+        out.push(sighting.scan, &lower, &found.miss, &rows)
+            .is_some()
+    }) {
+        out.phases.push(found);
     }
-    out.phases.push(found);
 }
 
 /// The angle in (−π, π].

@@ -7,6 +7,7 @@ use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
 
 use crate::drift::joint::choose;
 use crate::drift::joint::evaluate::{DRIFT, Layout, linearise, wrapped};
+use crate::drift::joint::instability::instability as estimate;
 use crate::drift::joint::link::number_blocks;
 use crate::drift::joint::path::DriftPath;
 use crate::drift::joint::sighting::{Sighting, Terms};
@@ -116,17 +117,17 @@ fn motion(
 
 /// Fits all sightings together and adds the terms that earn it by an information criterion.
 ///
-/// `start` is the reciprocal pair (rad/nm) and the drift (nm/s) from the linear solution, `time_sigma`
-/// the standard uncertainty of a frame time, s. `None` where the sightings do not determine lattice
+/// The reciprocal `pair` (rad/nm) and the drift `velocity` (nm/s) are those of the linear solution, `time_sigma` is the standard uncertainty of a frame time, s. `None` where the sightings do not determine lattice
 /// and drift.
 pub fn fit(
     sightings: &[Sighting],
-    start: (&Matrix2<f64>, &Vector2<f64>),
+    pair: &Matrix2<f64>,
+    velocity: &Vector2<f64>,
     time_sigma: f64,
 ) -> Option<JointFit> {
-    let (problem, mut best) = Problem::linked(sightings, start, time_sigma)?;
+    let (problem, mut best) = Problem::linked(sightings, pair, velocity, time_sigma)?;
     let plain = Terms::default();
-    let from = (&best.waves.basis.clone(), &best.velocity.clone());
+    let (pair, velocity) = (best.waves.basis, best.velocity);
     if sightings.iter().any(|s| s.phases.is_some()) {
         // Over a long campaign a drift that changes can be linked only as what it is.
         let linked = [false, true].into_iter().find_map(|acceleration| {
@@ -135,7 +136,7 @@ pub fn fit(
                 acceleration,
                 ..plain
             };
-            let linked = problem.solve(terms, from, None);
+            let linked = problem.solve(terms, &pair, &velocity, None);
             linked.filter(|fit| !choose::loosens(fit, &best))
         });
         best = linked.unwrap_or(best);
@@ -147,17 +148,18 @@ pub fn fit(
 /// nothing is chosen, nothing scatters. Otherwise as [`fit`].
 pub(crate) fn foreseen(
     sightings: &[Sighting],
-    start: (&Matrix2<f64>, &Vector2<f64>),
+    pair: &Matrix2<f64>,
+    velocity: &Vector2<f64>,
     time_sigma: f64,
 ) -> Option<JointFit> {
-    let (problem, plain) = Problem::linked(sightings, start, time_sigma)?;
+    let (problem, plain) = Problem::linked(sightings, pair, velocity, time_sigma)?;
     let with_phases = Terms {
         phases: sightings.iter().any(|s| s.phases.is_some()),
         ..Terms::default()
     };
     Some(
         problem
-            .solve(with_phases, start, Some(0.0))
+            .solve(with_phases, pair, velocity, Some(0.0))
             .unwrap_or(plain),
     )
 }
@@ -173,7 +175,8 @@ impl Problem {
     /// the blocks.
     fn linked(
         sightings: &[Sighting],
-        start: (&Matrix2<f64>, &Vector2<f64>),
+        pair: &Matrix2<f64>,
+        velocity: &Vector2<f64>,
         time_sigma: f64,
     ) -> Option<(Self, JointFit)> {
         let mut problem = Self {
@@ -181,7 +184,7 @@ impl Problem {
             // Exact times would make the weights infinite; a millisecond is exact enough.
             time_sigma: time_sigma.max(1e-3),
         };
-        let plain = problem.solve(Terms::default(), start, None)?;
+        let plain = problem.solve(Terms::default(), pair, velocity, None)?;
         let speeds = plain.velocity_covariance.symmetric_eigenvalues();
         let sigma = speeds.max().sqrt();
         number_blocks(&mut problem.sightings, &plain.waves.basis, sigma);
@@ -192,34 +195,16 @@ impl Problem {
     pub(crate) fn solve(
         &self,
         terms: Terms,
-        start: (&Matrix2<f64>, &Vector2<f64>),
+        pair: &Matrix2<f64>,
+        velocity: &Vector2<f64>,
         given: Option<f64>,
     ) -> Option<JointFit> {
         let sightings = &self.sightings;
         let layout = Layout::new(sightings, terms, self.time_sigma);
         let mut x = DVector::zeros(layout.size);
-        x.rows_mut(0, 4).copy_from_slice(start.0.as_slice());
-        x.rows_mut(DRIFT, 2).copy_from_slice(start.1.as_slice());
-        let mut instability = given.unwrap_or(0.0);
-        if terms.phases {
-            start_phases(sightings, &layout, &mut x)?;
-            link_outwards(sightings, &layout, &mut x, instability.max(0.02))?;
-        }
-        let mut unscaled = iterate(sightings, &layout, &mut x, f64::INFINITY, instability)?;
-        let mut scatter = instability * instability;
-        if terms.phases && given.is_none() {
-            for _ in 0..ROUNDS {
-                let now = linearise(sightings, &layout, &x, f64::INFINITY, instability);
-                instability = crate::drift::joint::instability::instability(
-                    &now,
-                    &unscaled,
-                    scatter,
-                    &|_| true,
-                );
-                scatter = instability * instability;
-                unscaled = iterate(sightings, &layout, &mut x, f64::INFINITY, instability)?;
-            }
-        }
+        x.rows_mut(0, 4).copy_from_slice(pair.as_slice());
+        x.rows_mut(DRIFT, 2).copy_from_slice(velocity.as_slice());
+        let (unscaled, instability) = converge(sightings, &layout, &mut x, given)?;
         let last = linearise(sightings, &layout, &x, f64::INFINITY, instability);
         if terms.phases {
             // In units of a whole turn, which is a wavelength.
@@ -229,6 +214,7 @@ impl Problem {
                 return None;
             }
         }
+        let scatter = instability * instability;
         let chi2: f64 = last.residuals.iter().map(|r| r * r).sum();
         let degrees_of_freedom = last.residuals.len().saturating_sub(layout.size);
         let covariance = &unscaled * enlargement(chi2, degrees_of_freedom);
@@ -259,6 +245,30 @@ impl Problem {
             covariance,
         })
     }
+}
+
+/// The covariance of the parameters at the best ones, and the instability: as `given`, or estimated from the phases.
+fn converge(
+    sightings: &[Sighting],
+    layout: &Layout,
+    x: &mut DVector<f64>,
+    given: Option<f64>,
+) -> Option<(DMatrix<f64>, f64)> {
+    let mut instability = given.unwrap_or(0.0);
+    if layout.terms.phases {
+        start_phases(sightings, layout, x)?;
+        link_outwards(sightings, layout, x, instability.max(0.02))?;
+    }
+    let mut unscaled = iterate(sightings, layout, x, f64::INFINITY, instability)?;
+    if layout.terms.phases && given.is_none() {
+        for _ in 0..ROUNDS {
+            let now = linearise(sightings, layout, x, f64::INFINITY, instability);
+            let scatter = instability * instability;
+            instability = estimate(&now, &unscaled, scatter, &|_| true);
+            unscaled = iterate(sightings, layout, x, f64::INFINITY, instability)?;
+        }
+    }
+    Some((unscaled, instability))
 }
 
 /// Outwards from the middle of the campaign: each round predicts the next scans well enough to

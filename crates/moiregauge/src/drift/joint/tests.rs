@@ -105,7 +105,7 @@ fn phases_tighten_the_drift_honestly() {
     let (mut pulls, mut lattice, mut squares) = (0.0, 0.0, 0.0);
     for seed in 0..100 {
         let all = sightings(10, drift, Vector2::zeros(), seed);
-        let with = fit(&all, (&pair(), &drift), TIME_SIGMA).unwrap();
+        let with = fit(&all, &pair(), &drift, TIME_SIGMA).unwrap();
         assert!(with.terms.phases);
         let miss = with.velocity - drift;
         squares += miss.norm_squared() / 100.0;
@@ -140,7 +140,7 @@ fn a_changing_drift_is_no_scatter() {
     let (mut used, mut scatter) = (0, 0);
     for seed in 0..60 {
         let all = sightings(4, drift, acceleration, seed);
-        let found = fit(&all, (&pair(), &drift), TIME_SIGMA).unwrap();
+        let found = fit(&all, &pair(), &drift, TIME_SIGMA).unwrap();
         used += usize::from(found.terms.acceleration);
         scatter += usize::from(found.instability_nm > 0.0);
     }
@@ -159,7 +159,7 @@ fn two_scans_do_not_tell_a_changing_drift() {
         // What would speak for anything that takes it up.
         all[0].waves.basis.m21 += 3e-4;
         all[2].waves.basis.m21 += 3e-4;
-        let found = fit(&all, (&pair(), &drift), TIME_SIGMA).unwrap();
+        let found = fit(&all, &pair(), &drift, TIME_SIGMA).unwrap();
         assert!(!found.terms.acceleration, "{seed}");
         let worst = (0..4).map(|i| found.waves.covariance[(i, i)].sqrt());
         assert!(worst.fold(0.0, f64::max) < 3e-4, "{seed}");
@@ -175,14 +175,13 @@ fn leaving_out_is_fitting_without() {
         .into_iter()
         .map(|s| Sighting { phases: None, ..s })
         .collect();
-    let start = (&pair(), &drift);
-    let fitted = fit(&all, start, TIME_SIGMA).unwrap();
+    let fitted = fit(&all, &pair(), &drift, TIME_SIGMA).unwrap();
     let left_out = fitted.leave_one_out();
     assert_eq!(left_out.len(), 6);
     for (scan, found) in left_out.iter().enumerate() {
         assert_eq!((found.scan, found.degrees_of_freedom), (scan, 8));
         let others: Vec<Sighting> = all.iter().filter(|s| s.scan != scan).cloned().collect();
-        let direct = fit(&others, start, TIME_SIGMA).unwrap();
+        let direct = fit(&others, &pair(), &drift, TIME_SIGMA).unwrap();
         let moved = direct.velocity - fitted.velocity;
         let difference = found.without.velocity - direct.velocity;
         assert!(difference.norm() < 0.03 * moved.norm(), "{scan}");
@@ -202,7 +201,7 @@ fn a_scan_that_does_not_fit_stands_out() {
     let (mut mean, mut worst, mut others) = (0.0, 0, 0);
     for seed in 0..50 {
         let mut all = sightings(10, drift, Vector2::zeros(), seed);
-        let fitted = fit(&all, (&pair(), &drift), TIME_SIGMA).unwrap();
+        let fitted = fit(&all, &pair(), &drift, TIME_SIGMA).unwrap();
         let left_out = fitted.leave_one_out();
         let freedoms: Vec<usize> = left_out.iter().map(|l| l.degrees_of_freedom).collect();
         assert_eq!(freedoms, [14; 10]);
@@ -210,7 +209,7 @@ fn a_scan_that_does_not_fit_stands_out() {
         for sighting in all.iter_mut().filter(|s| s.scan == 3) {
             sighting.position += Vector2::new(0.15, 0.0);
         }
-        let fitted = fit(&all, (&pair(), &drift), TIME_SIGMA).unwrap();
+        let fitted = fit(&all, &pair(), &drift, TIME_SIGMA).unwrap();
         let mut left_out = fitted.leave_one_out();
         left_out.sort_by(|a, b| b.chi2.total_cmp(&a.chi2));
         worst += u32::from(left_out[0].scan == 3);
@@ -230,7 +229,7 @@ fn the_bootstrap_agrees_with_the_fit() {
     let mut ratio = 0.0;
     for seed in 0..20 {
         let all = sightings(20, drift, Vector2::zeros(), seed);
-        let fitted = fit(&all, (&pair(), &drift), TIME_SIGMA).unwrap();
+        let fitted = fit(&all, &pair(), &drift, TIME_SIGMA).unwrap();
         let drawn = fitted.bootstrap(&blocks, 200, 1, "test");
         assert!(drawn.len() > 190);
         let x: Vec<f64> = drawn.iter().map(|d| d.waves[(0, 0)]).collect();
@@ -250,14 +249,16 @@ fn acceleration_earns_its_place() {
     for seed in 0..40 {
         let fitted = fit(
             &sightings(20, drift, acceleration, seed),
-            (&pair(), &drift),
+            &pair(),
+            &drift,
             TIME_SIGMA,
         )
         .unwrap();
         found += u32::from(fitted.terms.acceleration || fitted.terms.settling.is_some());
         let fitted = fit(
             &sightings(20, drift, Vector2::zeros(), seed),
-            (&pair(), &drift),
+            &pair(),
+            &drift,
             TIME_SIGMA,
         )
         .unwrap();
@@ -275,7 +276,7 @@ fn one_direction_is_refused() {
         .into_iter()
         .filter(|s| s.time_gradient.y > 0.0)
         .collect();
-    assert!(fit(&up, (&pair(), &drift), TIME_SIGMA).is_none());
+    assert!(fit(&up, &pair(), &drift, TIME_SIGMA).is_none());
 }
 
 /// Image noise, drift and sensors add up to the covariance of the lattice. At known drift it is the
@@ -293,7 +294,7 @@ fn the_covariance_splits_by_source() {
         })
         .collect();
     for seen in [bare, all] {
-        let fitted = fit(&seen, (&pair(), &drift), TIME_SIGMA).unwrap();
+        let fitted = fit(&seen, &pair(), &drift, TIME_SIGMA).unwrap();
         let parts = fitted.statistical().unwrap();
         let whole = fitted.waves.covariance;
         assert!((parts.whole() - whole).norm() < 1e-9 * whole.norm());

@@ -130,14 +130,9 @@ impl Fit<'_> {
         2.0 * (self.frame.pixels() as f64).ln()
     }
 
-    /// The harmonics outside the model that are `promising` by their wave vector (phase at the edges)
-    /// and significant against the `noise` there.
-    fn earned(
-        &mut self,
-        promising: impl Fn(Vector2<f64>) -> bool,
-        noise: impl Fn(Vector2<f64>, &Leverage) -> Option<f64>,
-    ) -> Option<Vec<[i32; 2]>> {
-        let outside: Vec<[i32; 2]> = candidates()
+    /// The harmonics outside the model that are `promising` by their wave vector (phase at the edges).
+    fn outside(&self, promising: impl Fn(Vector2<f64>) -> bool) -> Vec<[i32; 2]> {
+        candidates()
             .into_iter()
             .filter(|index| !self.model.basis.indices.contains(index))
             .filter(|&index| {
@@ -145,7 +140,17 @@ impl Fit<'_> {
                 p.amax().max(-p.amin()) < HIGHEST * std::f64::consts::PI
             })
             .filter(|&index| promising(wave(&self.model.pair, index)))
-            .collect();
+            .collect()
+    }
+
+    /// The harmonics outside the model that are `promising` by their wave vector (phase at the edges)
+    /// and significant against the `noise` there.
+    fn earned(
+        &mut self,
+        promising: impl Fn(Vector2<f64>) -> bool,
+        noise: impl Fn(Vector2<f64>, &Leverage) -> Option<f64>,
+    ) -> Option<Vec<[i32; 2]>> {
+        let outside = self.outside(promising);
         if outside.is_empty() {
             return Some(outside);
         }
@@ -163,9 +168,9 @@ impl Fit<'_> {
             orders: STRAIGHT,
         };
         let probes = Tables::new(&self.frame, &self.model.pair, &outside);
-        let (frame, clip) = (&self.frame, Clip::at(self.sigma));
-        let probes = (&probed, &probes);
-        let seen = look(frame, &self.model, &tables, probes, &mut self.lines, clip);
+        let (frame, model, clip) = (&self.frame, &self.model, Clip::at(self.sigma));
+        let lines = &mut self.lines;
+        let seen = look(frame, model, &tables, &probed, &probes, lines, clip);
         let gram = gram(frame, &basis, &self.model.pair, &self.lines.lambda);
         let map = solve::contraction(&self.model, |_, _| 1.0).resize_vertically(basis.len(), 0.0);
         let normal = map.transpose() * &gram * &map;

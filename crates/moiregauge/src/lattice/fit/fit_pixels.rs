@@ -204,8 +204,8 @@ impl<'a> Fit<'a> {
         let (model, frame) = (&self.model, &self.frame);
         let tables = Tables::new(frame, &model.pair, &model.basis.indices);
         let clip = Clip::at(self.sigma);
-        let probes = (&model.basis, &tables);
-        let seen = look(frame, model, &tables, probes, &mut self.lines, clip);
+        let lines = &mut self.lines;
+        let seen = look(frame, model, &tables, &model.basis, &tables, lines, clip);
         let gram = gram(frame, &model.basis, &model.pair, &self.lines.lambda);
         let map = solve::contraction(model, |_, _| 1.0);
         let right = map.transpose() * &seen.gradient;
@@ -260,17 +260,17 @@ impl<'a> Fit<'a> {
     pub(crate) fn noise(&mut self) -> Option<FinalNoise> {
         let clip = Clip::at(self.sigma);
         let tables = Tables::new(&self.frame, &self.model.pair, &self.model.basis.indices);
-        let whole = (&self.frame, &self.model, &tables);
+        let (frame, model) = (&self.frame, &self.model);
         let (lines, mut squares) = (&mut self.lines, 0.0);
         let mut folded = Folded::new(&self.frame);
         let mut bends = Bends::new(self.model.waves.len());
         let residual = ResidualNoise::new(&self.frame, self.free_lines, |row, line| {
-            let kept = settled(whole, lines, clip, row, line);
-            if whole.0.present[row] > 0 {
+            let kept = settled(frame, model, &tables, lines, clip, row, line);
+            if frame.present[row] > 0 {
                 folded.take(line);
-                bends.add(whole.0, &tables, row, &mut folded);
+                bends.add(frame, &tables, row, &mut folded);
             }
-            for (value, pixel) in line.iter_mut().zip(whole.0.image.row(row)) {
+            for (value, pixel) in line.iter_mut().zip(frame.image.row(row)) {
                 *value = if pixel.is_finite() {
                     *value + kept
                 } else {
@@ -331,11 +331,10 @@ impl<'a> Fit<'a> {
         Some(covariance.fixed_view::<7, 7>(0, 0).into_owned())
     }
 
-    fn result(&self, noise: &FinalNoise) -> Option<(Lattice<Px>, LatticeFit)> {
-        let scale = self.frame.edge().map(|e| 1.0 / e);
+    fn harmonics(&self, noise: &FinalNoise) -> Vec<FittedHarmonic> {
         let pixels = self.frame.pixels() as f64;
         let waves = self.model.waves.iter().zip(&self.model.basis.indices);
-        let harmonics: Vec<FittedHarmonic> = waves
+        waves
             .zip(&noise.local)
             .map(|((&[alpha, beta], &index), local)| {
                 let amplitude = alpha.hypot(beta);
@@ -346,7 +345,12 @@ impl<'a> Fit<'a> {
                     signal_to_noise: 0.5 * amplitude * (pixels / local[2]).sqrt(),
                 }
             })
-            .collect();
+            .collect()
+    }
+
+    fn result(&self, noise: &FinalNoise) -> Option<(Lattice<Px>, LatticeFit)> {
+        let scale = self.frame.edge().map(|e| 1.0 / e);
+        let harmonics = self.harmonics(noise);
         let strengths: Vec<f64> = harmonics.iter().map(|h| h.signal_to_noise).collect();
         let closure = closure::closure(
             &self.model,
@@ -374,7 +378,7 @@ impl<'a> Fit<'a> {
             goodness: noise.rms / noise.residual.level().sqrt(),
             line_offsets: self.line_sigma,
             lines_left_out: self.frame.image.rows - self.frame.lines(),
-            clipped: self.clipped as f64 / pixels,
+            clipped: self.clipped as f64 / self.frame.pixels() as f64,
             foreign_wave: noise.residual.foreign_wave(&self.frame, &self.model),
             residual: [0, 1, 2].map(|i| {
                 let index = self.model.basis.indices[i];

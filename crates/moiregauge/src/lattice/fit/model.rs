@@ -219,12 +219,13 @@ pub(crate) struct Look {
 }
 
 /// Correlates the residuals of `model` with the functions of `basis`, of which `probes` are the
-/// tables. Line offsets are brought up to date on the way.
+/// tables, as `tables` are those of the model. Line offsets are brought up to date on the way.
 pub(crate) fn look(
     frame: &Frame,
     model: &Model,
     tables: &Tables,
-    (basis, probes): (&Basis, &Tables),
+    basis: &Basis,
+    probes: &Tables,
     lines: &mut LineOffsets,
     clip: Clip,
 ) -> Look {
@@ -240,7 +241,7 @@ pub(crate) fn look(
         sample.extend(picked.filter(|v| v.is_finite()).map(|v| v.abs()));
         clipped += clip.all(line);
         folded.take(line);
-        add(&mut gradient, frame, (basis, probes), row, &folded);
+        add(&mut gradient, frame, basis, probes, row, &folded);
     });
     Look {
         gradient,
@@ -294,7 +295,8 @@ fn clipped_sum(line: &[f64], offset: f64, clip: Clip) -> f64 {
 fn add(
     gradient: &mut DVector<f64>,
     frame: &Frame,
-    (basis, tables): (&Basis, &Tables),
+    basis: &Basis,
+    tables: &Tables,
     row: usize,
     line: &Folded,
 ) {
@@ -334,7 +336,9 @@ pub(crate) fn sum(values: &[f64]) -> f64 {
 /// The residual of one line as it counts, 0 where pixels do not, and what is to be added to all that do
 /// for line means at the level of the other noise (`r − (1 − √(1−λ)) r̄`).
 pub(crate) fn settled(
-    (frame, model, tables): (&Frame, &Model, &Tables),
+    frame: &Frame,
+    model: &Model,
+    tables: &Tables,
     lines: &mut LineOffsets,
     clip: Clip,
     row: usize,
