@@ -134,7 +134,7 @@ impl Scene {
         let how = (MapMethod::Demodulation, &Resolution::default());
         let mut maps = Vec::new();
         for (scan, analysed) in self.scans.iter().zip(&scans) {
-            match map_scan(scan, (analysed, None), &self.settings, how) {
+            match map_scan(scan, analysed, None, &self.settings, how.0, how.1) {
                 Ok(found) => maps.extend(found),
                 Err(error) => println!("{name} | said | no map: {error}"),
             }
@@ -166,7 +166,8 @@ impl Scene {
         );
         let domains = domains_of_scan(
             &self.scans[0],
-            (scans[0], None),
+            scans[0],
+            None,
             &self.settings,
             Contrast::Auto,
         );
