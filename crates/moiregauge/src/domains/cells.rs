@@ -8,7 +8,7 @@ use heterostrain::material::Bilayer;
 use heterostrain::strain::{FixedBranch, StrainConvention, StrainError, TwistStrain};
 use nalgebra::{Matrix2, Matrix4, Vector2};
 
-use crate::domains::mesh::{Dislocation, Mesh};
+use crate::domains::mesh::{Dislocation, Mesh, MeshTriangle};
 use crate::domains::nodes::{Contrast, FoundNodes};
 use crate::frame::geometry::Geometry;
 
@@ -74,18 +74,7 @@ impl DomainMap {
             .iter()
             .map(|n| j * n.covariance * j.transpose())
             .collect();
-        let mut cells: Vec<DomainCell> = Vec::new();
-        for triangle in &mesh.triangles {
-            let corners = triangle.nodes.map(|n| nodes[n]);
-            let errors = triangle.nodes.map(|n| covariances[n]);
-            let lattice = cell(&corners, &errors, &triangle.steps)?;
-            cells.push(DomainCell {
-                nodes: triangle.nodes,
-                centre: corners.iter().sum::<Vector2<f64>>() / 3.0,
-                lattice,
-                twist_strain: None,
-            });
-        }
+        let mut cells = cells(mesh, &nodes, &covariances)?;
         if cells.is_empty() {
             return None;
         }
@@ -126,6 +115,25 @@ impl DomainMap {
             mean,
         }))
     }
+}
+
+/// The triangles of a mesh of nodes on the sample.
+fn cells(
+    mesh: &Mesh,
+    nodes: &[Vector2<f64>],
+    covariances: &[Matrix2<f64>],
+) -> Option<Vec<DomainCell>> {
+    let of_triangle = |triangle: &MeshTriangle| {
+        let corners = triangle.nodes.map(|n| nodes[n]);
+        let errors = triangle.nodes.map(|n| covariances[n]);
+        Some(DomainCell {
+            nodes: triangle.nodes,
+            centre: corners.iter().sum::<Vector2<f64>>() / 3.0,
+            lattice: cell(&corners, &errors, &triangle.steps)?,
+            twist_strain: None,
+        })
+    };
+    mesh.triangles.iter().map(of_triangle).collect()
 }
 
 /// Primitive vectors from the corners of a triangle with their covariances and the steps of its edges.

@@ -98,13 +98,7 @@ pub fn find_nodes(
     let bin = (in_pixels[0].min(in_pixels[1]) / FINE).floor().max(1.0);
     let binned = image.binned(bin as usize);
     let period = in_pixels.map(|p| p / bin);
-    let smooth = |share: f64| blurred(&binned, period.map(|p| share * p));
-    let band: Vec<f64> = smooth(NODE)
-        .iter()
-        .zip(smooth(CELL))
-        .map(|(a, b)| a - b)
-        .collect();
-    let band = Image::new(binned.rows, binned.columns, band);
+    let band = band(&binned, period);
     let skewness = skewness(&band.values);
     let bright = match contrast {
         Contrast::Auto => skewness >= 0.0,
@@ -124,19 +118,7 @@ pub fn find_nodes(
     }
     // Each node is 1/N of the template that it is fitted to.
     let inflation = inflation * (1.0 + 1.0 / kept.len() as f64);
-    let mut nodes: Vec<FoundNode> = kept
-        .iter()
-        .map(|fit| {
-            let noise = fit.variance * inflation;
-            let weak = CURVATURE * fit.inverse[(0, 0)] * noise / fit.amplitude.powi(2);
-            let covariance = fit.inverse.fixed_view::<2, 2>(1, 1) * (noise * (1.0 + weak));
-            FoundNode {
-                place: fit.place * bin + Vector2::repeat((bin - 1.0) / 2.0),
-                covariance: covariance * (bin * bin),
-                amplitude: fit.amplitude,
-            }
-        })
-        .collect();
+    let mut nodes: Vec<FoundNode> = kept.iter().map(|f| f.found(inflation, bin)).collect();
     let order = |n: &FoundNode| [n.place.y, n.place.x];
     nodes.sort_by(|a, b| {
         order(a)
@@ -154,6 +136,28 @@ pub fn find_nodes(
         contrast_is_clear: skewness.abs() > TELLING,
         line_offsets,
     })
+}
+
+/// What is as large as nodes and smaller than cells; `period` in pixels.
+fn band(image: &Image, period: [f64; 2]) -> Image {
+    let smooth = |share: f64| blurred(image, period.map(|p| share * p));
+    let (fine, coarse) = (smooth(NODE), smooth(CELL));
+    let values = fine.iter().zip(coarse).map(|(a, b)| a - b);
+    Image::new(image.rows, image.columns, values.collect())
+}
+
+impl Fit {
+    /// The node in the image, whose pixels were binned by `bin`.
+    fn found(&self, inflation: f64, bin: f64) -> FoundNode {
+        let noise = self.variance * inflation;
+        let weak = CURVATURE * self.inverse[(0, 0)] * noise / self.amplitude.powi(2);
+        let covariance = self.inverse.fixed_view::<2, 2>(1, 1) * (noise * (1.0 + weak));
+        FoundNode {
+            place: self.place * bin + Vector2::repeat((bin - 1.0) / 2.0),
+            covariance: covariance * (bin * bin),
+            amplitude: self.amplitude,
+        }
+    }
 }
 
 /// Fits all nodes to their mean, three times, the mean being made anew of what was found.

@@ -141,33 +141,7 @@ impl Template {
         place: Vector2<f64>,
         amplitude: f64,
     ) -> Option<(Fit, Vector2<f64>)> {
-        let low = (place - Vector2::from(self.radius)).map(f64::ceil);
-        let high = (place + Vector2::from(self.radius)).map(f64::floor);
-        let (mut rows, mut all): (Vec<Vec<Pixel>>, f64) = (Vec::new(), 0.0);
-        let mut row = low.y;
-        while row <= high.y {
-            let mut line = Vec::new();
-            let mut column = low.x;
-            while column <= high.x {
-                let away = Vector2::new(column, row) - place;
-                let inside =
-                    (away.x / self.radius[0]).powi(2) + (away.y / self.radius[1]).powi(2) <= 1.0;
-                if inside {
-                    all += 1.0;
-                    if let Some(pixel) = self.pixel(image, [column, row], away, amplitude) {
-                        line.push(pixel);
-                    }
-                }
-                column += 1.0;
-            }
-            rows.push(line);
-            row += 1.0;
-        }
-        if self.lines {
-            for line in &mut rows {
-                less_mean(line);
-            }
-        }
+        let (rows, all) = self.pixels(image, place, amplitude);
         // Instrumental variables: noise in the slopes of the mean node is not in the probes.
         let (mut normal, mut right, mut count) = (Matrix6::zeros(), Vector6::zeros(), 0.0);
         let mut probes = Matrix6::zeros();
@@ -211,6 +185,38 @@ impl Template {
             correlation,
         };
         Some((fit, Vector2::new(found[1], found[2])))
+    }
+
+    /// The pixels of a patch line by line, less the means of lines that have offsets; and how many there would be.
+    fn pixels(&self, image: &Image, place: Vector2<f64>, amplitude: f64) -> (Vec<Vec<Pixel>>, f64) {
+        let low = (place - Vector2::from(self.radius)).map(f64::ceil);
+        let high = (place + Vector2::from(self.radius)).map(f64::floor);
+        let (mut rows, mut all): (Vec<Vec<Pixel>>, f64) = (Vec::new(), 0.0);
+        let mut row = low.y;
+        while row <= high.y {
+            let mut line = Vec::new();
+            let mut column = low.x;
+            while column <= high.x {
+                let away = Vector2::new(column, row) - place;
+                let inside =
+                    (away.x / self.radius[0]).powi(2) + (away.y / self.radius[1]).powi(2) <= 1.0;
+                if inside {
+                    all += 1.0;
+                    if let Some(pixel) = self.pixel(image, [column, row], away, amplitude) {
+                        line.push(pixel);
+                    }
+                }
+                column += 1.0;
+            }
+            rows.push(line);
+            row += 1.0;
+        }
+        if self.lines {
+            for line in &mut rows {
+                less_mean(line);
+            }
+        }
+        (rows, all)
     }
 
     fn pixel(

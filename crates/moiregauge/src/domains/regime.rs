@@ -57,6 +57,38 @@ pub fn regime(map: &TwistStrainMap, domains: Option<&DomainMap>) -> Regime {
     let of_cells = median_of(found.iter().map(|t| t.twist).collect());
     let twist = of_cells.or_else(|| map.spread(&map.twist).map(|s| s.mean));
     let variation = domains.map_or(f64::NAN, |d| variation(d, 2.355 * map.window_nm));
+    let mut reasons = doubts(map, twist, blurred, variation);
+    let in_doubt = !reasons.is_empty();
+    let shares = found.iter().map(|t| t.twist().sigma / t.twist.abs());
+    let noise = median_of(shares.filter(|s| s.is_finite()).collect());
+    let told = match noise {
+        None if in_doubt => Some("no triangles were found or looked for".to_owned()),
+        Some(noise) if noise > NOISY => Some(format!(
+            "the twists of the triangles are uncertain by {:.0} %",
+            100.0 * noise
+        )),
+        _ => None,
+    };
+    let choice = if in_doubt && told.is_none() {
+        RegimeChoice::Domains
+    } else {
+        RegimeChoice::Phases
+    };
+    reasons.extend(told);
+    if !in_doubt {
+        reasons.push("the lattice changes slowly within the window".to_owned());
+    }
+    Regime {
+        choice,
+        in_doubt,
+        blurred,
+        variation,
+        reasons,
+    }
+}
+
+/// What speaks against phases. `twist` in rad, `blurred` and `variation` as in [`Regime`].
+fn doubts(map: &TwistStrainMap, twist: Option<f64>, blurred: f64, variation: f64) -> Vec<String> {
     let mut reasons = Vec::new();
     let window = 4.0 * std::f64::consts::PI * map.window_nm * map.window_nm;
     if map.good() as f64 * map.node_area() < window {
@@ -85,33 +117,7 @@ pub fn regime(map: &TwistStrainMap, domains: Option<&DomainMap>) -> Regime {
             100.0 * variation
         ));
     }
-    let in_doubt = !reasons.is_empty();
-    let shares = found.iter().map(|t| t.twist().sigma / t.twist.abs());
-    let noise = median_of(shares.filter(|s| s.is_finite()).collect());
-    let told = match noise {
-        None if in_doubt => Some("no triangles were found or looked for".to_owned()),
-        Some(noise) if noise > NOISY => Some(format!(
-            "the twists of the triangles are uncertain by {:.0} %",
-            100.0 * noise
-        )),
-        _ => None,
-    };
-    let choice = if in_doubt && told.is_none() {
-        RegimeChoice::Domains
-    } else {
-        RegimeChoice::Phases
-    };
-    reasons.extend(told);
-    if !in_doubt {
-        reasons.push("the lattice changes slowly within the window".to_owned());
-    }
-    Regime {
-        choice,
-        in_doubt,
-        blurred,
-        variation,
-        reasons,
-    }
+    reasons
 }
 
 /// Median over pairs of neighbouring cells of |ln(area ratio)|, scaled from their distance to `width`, its noise

@@ -50,31 +50,8 @@ pub fn drift_change(
 ) -> Option<DriftChange> {
     let other = View::new(down)?;
     let pair = up.mean()?;
-    let mut seen: Vec<Seen> = Vec::new();
     let norm = time_gradient.norm();
-    let along = time_gradient / norm;
-    for (node, here) in up
-        .nodes
-        .iter()
-        .enumerate()
-        .filter(|(_, n)| n.mask == Mask::Good)
-    {
-        let place = up.grid.place(node);
-        let Some(there) = other.at(place).filter(|n| n.mask == Mask::Good) else {
-            continue;
-        };
-        let change = (here.waves.basis - there.waves.basis).tr_mul(&along);
-        let covariance = here.waves.covariance + there.waves.covariance;
-        let variance = [0, 1].map(|wave| {
-            let block = covariance.fixed_view::<2, 2>(2 * wave, 2 * wave);
-            (along.transpose() * block * along)[0]
-        });
-        seen.push(Seen {
-            time: time_gradient.dot(&place),
-            change: change.into(),
-            variance,
-        });
-    }
+    let seen = seen(up, &other, time_gradient);
     if seen.len() < 10 {
         return None;
     }
@@ -106,4 +83,27 @@ pub fn drift_change(
         acceleration: [0, 1].map(|i| Estimate::from_variance(found[i], covariance[(i, i)])),
         chi2,
     })
+}
+
+/// The differences at good nodes of both maps.
+fn seen(up: &LatticeMap, down: &View, time_gradient: Vector2<f64>) -> Vec<Seen> {
+    let along = time_gradient / time_gradient.norm();
+    let good = up.nodes.iter().enumerate();
+    good.filter(|(_, n)| n.mask == Mask::Good)
+        .filter_map(|(node, here)| {
+            let place = up.grid.place(node);
+            let there = down.at(place).filter(|n| n.mask == Mask::Good)?;
+            let change = (here.waves.basis - there.waves.basis).tr_mul(&along);
+            let covariance = here.waves.covariance + there.waves.covariance;
+            let variance = [0, 1].map(|wave| {
+                let block = covariance.fixed_view::<2, 2>(2 * wave, 2 * wave);
+                (along.transpose() * block * along)[0]
+            });
+            Some(Seen {
+                time: time_gradient.dot(&place),
+                change: change.into(),
+                variance,
+            })
+        })
+        .collect()
 }

@@ -54,69 +54,45 @@ pub struct Device {
 /// The most uniform areas, best first; empty where none fits into the map.
 pub fn uniform_areas(map: &TwistStrainMap, search: &DeviceSearch) -> Vec<Device> {
     let sums = RunningSums::new(map);
-    let mut candidates: Vec<(f64, usize, usize)> = Vec::new();
-    let angles: Vec<f64> = (0..search.orientations.max(1))
-        .map(|i| std::f64::consts::PI * i as f64 / search.orientations.max(1) as f64)
+    let turns = search.orientations.max(1);
+    let angles = (0..turns).map(|i| std::f64::consts::PI * i as f64 / turns as f64);
+    let mut candidates: Vec<Candidate> = angles
+        .flat_map(|angle| sums.candidates(map, search, angle))
         .collect();
-    for (turn, &angle) in angles.iter().enumerate() {
-        let Some(shape) = Shape::new(&map.grid, search.size, angle) else {
-            continue;
-        };
-        let Some(middle) = shape.nodes_about(&map.grid) else {
-            continue;
-        };
-        let pairs = pairs(&map.grid, &evenly(&middle), map.window_nm);
-        let found: Vec<(f64, usize)> = (0..map.grid.len())
-            .into_par_iter()
-            .filter_map(|node| {
-                let (sum, all) = sums.within(&shape, node)?;
-                if sum[0] < search.good * all || sum[0] < 1.0 {
-                    return None;
-                }
-                let [
-                    good,
-                    twist,
-                    squares,
-                    variances,
-                    weight,
-                    bends,
-                    products,
-                    noise,
-                ] = sum;
-                let values = [good, twist, squares, variances];
-                let bent = Bent {
-                    weight,
-                    bends,
-                    products,
-                    noise,
-                };
-                let below = RegionMean::of_sums(values, (&sums.bends, &bent), &pairs)?.below;
-                below.is_finite().then_some((below, node))
-            })
-            .collect();
-        candidates.extend(found.into_iter().map(|(below, node)| (below, turn, node)));
-    }
-    candidates.sort_by(|a, b| a.0.total_cmp(&b.0).then((a.1, a.2).cmp(&(b.1, b.2))));
-    let mut chosen: Vec<Device> = Vec::new();
-    for (_, turn, node) in candidates {
+    candidates.sort_by(|a, b| {
+        let by_place = || a.angle.total_cmp(&b.angle).then(a.node.cmp(&b.node));
+        a.below.total_cmp(&b.below).then_with(by_place)
+    });
+    let mut chosen: Vec<(Region, Device)> = Vec::new();
+    for Candidate { angle, node, .. } in candidates {
         if chosen.len() >= search.most {
             break;
         }
-        let (centre, angle) = (map.grid.place(node), angles[turn]);
-        let free = chosen
-            .iter()
-            .all(|other| apart(search.size, (centre, angle), (other.centre, other.angle)));
-        if free {
-            let name = (chosen.len() + 1).to_string();
-            let region = Region::turned_rectangle(&name, centre, search.size, angle);
-            chosen.push(Device {
+        let centre = map.grid.place(node);
+        let name = (chosen.len() + 1).to_string();
+        let region = Region::turned_rectangle(&name, centre, search.size, angle);
+        let free = |(other, device): &(Region, Device)| {
+            are_apart(&region, other, [angle, device.angle], search.size)
+        };
+        if chosen.iter().all(free) {
+            let found = RegionStatistics::new(map, &region);
+            let device = Device {
                 centre,
                 angle,
-                found: RegionStatistics::new(map, &region),
-            });
+                found,
+            };
+            chosen.push((region, device));
         }
     }
-    chosen
+    chosen.into_iter().map(|(_, device)| device).collect()
+}
+
+/// A place and direction for a device.
+struct Candidate {
+    /// What the twist varies by at most.
+    below: f64,
+    angle: f64,
+    node: usize,
 }
 
 /// Equal weights.
@@ -225,6 +201,40 @@ impl RunningSums {
         Self { size, sums, bends }
     }
 
+    /// Places where a device of this direction may lie; none where it does not fit into the map.
+    fn candidates(
+        &self,
+        map: &TwistStrainMap,
+        search: &DeviceSearch,
+        angle: f64,
+    ) -> Vec<Candidate> {
+        let shape = Shape::new(&map.grid, search.size, angle);
+        let fitting = shape.and_then(|shape| Some((shape.nodes_about(&map.grid)?, shape)));
+        let Some((middle, shape)) = fitting else {
+            return Vec::new();
+        };
+        let pairs = pairs(&map.grid, &evenly(&middle), map.window_nm);
+        let of_node = |node: usize| {
+            let (sum, all) = self.within(&shape, node)?;
+            if sum[0] < search.good * all || sum[0] < 1.0 {
+                return None;
+            }
+            let [values @ .., weight, bends, products, noise] = sum;
+            let bent = Bent {
+                weight,
+                bends,
+                products,
+                noise,
+            };
+            let below = RegionMean::of_sums(values, &self.bends, &bent, &pairs)?.below;
+            below
+                .is_finite()
+                .then_some(Candidate { below, angle, node })
+        };
+        let nodes = (0..map.grid.len()).into_par_iter();
+        nodes.filter_map(of_node).collect()
+    }
+
     /// The sums over a box about a node and the number of its nodes; `None` where it leaves the map.
     fn within(&self, shape: &Shape, node: usize) -> Option<([f64; 8], f64)> {
         let [columns, rows] = self.size.map(|n| n as i64);
@@ -250,14 +260,8 @@ impl RunningSums {
 }
 
 /// Whether two boxes of the same size do not overlap: some side of one separates them.
-fn apart(
-    size: [f64; 2],
-    (a, angle_a): (Vector2<f64>, f64),
-    (b, angle_b): (Vector2<f64>, f64),
-) -> bool {
-    let one = Region::turned_rectangle("", a, size, angle_a).corners;
-    let other = Region::turned_rectangle("", b, size, angle_b).corners;
-    [angle_a, angle_b]
+fn are_apart(one: &Region, other: &Region, angles: [f64; 2], size: [f64; 2]) -> bool {
+    angles
         .into_iter()
         .flat_map(|t| [t, t + std::f64::consts::FRAC_PI_2])
         .any(|t| {
@@ -268,7 +272,7 @@ fn apart(
                     (l.min(x), h.max(x))
                 })
             };
-            let ((low, high), (from, to)) = (ends(&one), ends(&other));
+            let ((low, high), (from, to)) = (ends(&one.corners), ends(&other.corners));
             let slack = 1e-9 * (size[0] + size[1]);
             high <= from + slack || to <= low + slack
         })

@@ -40,7 +40,8 @@ impl RegionMean {
     /// [`Bends::widening`].
     pub(crate) fn of_sums(
         [weight, sum, squares, variances]: [f64; 4],
-        (bends, bent): (&Bends, &Bent),
+        bends: &Bends,
+        bent: &Bent,
         pairs: &Pairs,
     ) -> Option<Self> {
         if !(weight > 0.0) {
@@ -134,7 +135,7 @@ impl<'a> Area<'a> {
                 None => sums,
             }
         });
-        let found = RegionMean::of_sums(sums, (&self.bends, &bent), &self.pairs)?;
+        let found = RegionMean::of_sums(sums, &self.bends, &bent, &self.pairs)?;
         let bend: f64 = self.curvature.iter().map(|&(n, w)| w * value(n)[0]).sum();
         let by_noise = found.noise * found.noise * self.curvature_pairs.mean;
         let blur = (bend * bend - by_noise).max(0.0);

@@ -51,28 +51,69 @@ pub(crate) fn fit(
     if used.len() < FEWEST.max(8 * orders.len()) {
         return None;
     }
-    let place = |i: usize| Vector2::new((i % image.columns) as f64, (i / image.columns) as f64);
-    let count = used.len() as f64;
-    let middle = used.iter().map(|&i| place(i)).sum::<Vector2<f64>>() / count;
+    let sum: Vector2<f64> = used.iter().map(|&i| place(image, i)).sum();
+    let middle = sum / used.len() as f64;
     let reach = image.columns.max(image.rows) as f64;
+    let pixels = Pixels {
+        image,
+        orders,
+        used,
+        middle,
+        reach,
+    };
     let size = 3 + 2 * orders.len();
     let mut wave = start;
     let mut linear = DVector::<f64>::zeros(size);
-    let mut settled = false;
     for step in 0..STEPS {
         // The first step finds the amplitudes alone.
         let all = if step == 0 { size } else { size + 2 };
-        let sums: Vec<(DMatrix<f64>, DVector<f64>)> = used
+        let change = pixels.step(&wave, &linear, all)?;
+        linear += change.rows(0, size);
+        if step == 0 {
+            continue;
+        }
+        let moved = Vector2::new(change[size], change[size + 1]) / reach;
+        wave += moved;
+        let cycles = (moved * reach).norm() / std::f64::consts::TAU;
+        if cycles < STANDS {
+            // Else it is not the wave that was looked for.
+            let near = (wave - start).norm() <= 0.3 * start.norm();
+            return near.then(|| pixels.fitted(wave, &linear)).flatten();
+        }
+        if !cycles.is_finite() {
+            break;
+        }
+    }
+    None
+}
+
+fn place(image: &Image, i: usize) -> Vector2<f64> {
+    Vector2::new((i % image.columns) as f64, (i / image.columns) as f64)
+}
+
+/// The pixels of a fit.
+struct Pixels<'a> {
+    image: &'a Image,
+    orders: &'a [i32],
+    used: Vec<usize>,
+    middle: Vector2<f64>,
+    /// Length of the frame, pixels: changes of the wave vector are per rad over it.
+    reach: f64,
+}
+
+impl Pixels<'_> {
+    /// A step of Gauss–Newton, of the first `all` parameters.
+    fn step(&self, wave: &Vector2<f64>, linear: &DVector<f64>, all: usize) -> Option<DVector<f64>> {
+        let sums: Vec<(DMatrix<f64>, DVector<f64>)> = self
+            .used
             .par_chunks(TOGETHER)
             .map(|some| {
                 let mut normal = DMatrix::<f64>::zeros(all, all);
                 let mut right = DVector::<f64>::zeros(all);
-                let mut row = vec![0.0; size + 2];
+                let mut row = vec![0.0; linear.len() + 2];
                 for &i in some {
-                    let d = place(i) - middle;
-                    terms(&mut row, d, (&wave, orders), &linear, reach);
-                    let model: f64 = (0..size).map(|k| row[k] * linear[k]).sum();
-                    let miss = image.values[i] - model;
+                    self.terms(&mut row, i, wave, linear);
+                    let miss = self.miss(&row, i, linear);
                     for a in 0..all {
                         right[a] += row[a] * miss;
                         for b in 0..=a {
@@ -90,74 +131,62 @@ pub(crate) fn fit(
             right += r;
         }
         normal.fill_upper_triangle_with_lower_triangle();
-        let change = normal.cholesky()?.solve(&right);
-        linear += change.rows(0, size);
-        if step > 0 {
-            let moved = Vector2::new(change[size], change[size + 1]) / reach;
-            wave += moved;
-            let cycles = (moved * reach).norm() / std::f64::consts::TAU;
-            settled = cycles < STANDS;
-            if settled || !cycles.is_finite() {
-                break;
-            }
-        }
+        Some(normal.cholesky()?.solve(&right))
     }
-    // Not the wave that was looked for.
-    if !settled || (wave - start).norm() > ANOTHER * start.norm() {
-        return None;
-    }
-    let mut left = Image::new(
-        image.rows,
-        image.columns,
-        vec![0.0; image.rows * image.columns],
-    );
-    let (mut spread, mut row) = (Matrix2::zeros(), vec![0.0; size + 2]);
-    let windows = [hann(image.columns), hann(image.rows)];
-    let weight = |i: usize| (windows[0][i % image.columns] * windows[1][i / image.columns]).powi(2);
-    for &i in &used {
-        let d = place(i) - middle;
-        terms(&mut row, d, (&wave, orders), &linear, reach);
-        left.values[i] = image.values[i] - (0..size).map(|k| row[k] * linear[k]).sum::<f64>();
-        spread += d * d.transpose();
-    }
-    // The window of the spectrum weighs the pixels in use and the zeros of the others.
-    let share = used.iter().map(|&i| weight(i)).sum::<f64>()
-        / (0..image.values.len()).map(weight).sum::<f64>();
-    let local = LocalNoise::new(&left);
-    let (mut normal, mut amplitudes, mut noise) = (Matrix2::zeros(), Vec::new(), Vec::new());
-    for (k, &n) in orders.iter().enumerate() {
-        let (a, b) = (linear[3 + 2 * k], linear[4 + 2 * k]);
-        let [x, y] = local.around(wave * f64::from(n));
-        let level = x.max(y) / share.max(f64::MIN_POSITIVE);
-        amplitudes.push((n, a.hypot(b)));
-        noise.push(level);
-        normal += spread * (f64::from(n * n) * (a * a + b * b) / (2.0 * level));
-    }
-    Some(FittedWave {
-        wave,
-        covariance: normal.try_inverse()?,
-        amplitudes,
-        noise,
-    })
-}
 
-/// Plane, cosines and sines, and what they change with the wave vector (per rad over `reach`).
-fn terms(
-    row: &mut [f64],
-    d: Vector2<f64>,
-    (wave, orders): (&Vector2<f64>, &[i32]),
-    linear: &DVector<f64>,
-    reach: f64,
-) {
-    let size = 3 + 2 * orders.len();
-    [row[0], row[1], row[2]] = [1.0, d.x / reach, d.y / reach];
-    let turn = Complex64::cis(wave.dot(&d));
-    let mut slope = 0.0;
-    for (k, &n) in orders.iter().enumerate() {
-        let t = turn.powi(n);
-        [row[3 + 2 * k], row[4 + 2 * k]] = [t.re, t.im];
-        slope += f64::from(n) * (linear[4 + 2 * k] * t.re - linear[3 + 2 * k] * t.im);
+    /// What the terms of a pixel leave of it.
+    fn miss(&self, row: &[f64], i: usize, linear: &DVector<f64>) -> f64 {
+        let model: f64 = (0..linear.len()).map(|k| row[k] * linear[k]).sum();
+        self.image.values[i] - model
     }
-    row[size] = slope * d.x / reach;
-    row[size + 1] = slope * d.y / reach;
+
+    /// Plane, cosines and sines, and what they change with the wave vector (per rad over `reach`).
+    fn terms(&self, row: &mut [f64], i: usize, wave: &Vector2<f64>, linear: &DVector<f64>) {
+        let (d, size) = (place(self.image, i) - self.middle, linear.len());
+        [row[0], row[1], row[2]] = [1.0, d.x / self.reach, d.y / self.reach];
+        let turn = Complex64::cis(wave.dot(&d));
+        let mut slope = 0.0;
+        for (k, &n) in self.orders.iter().enumerate() {
+            let t = turn.powi(n);
+            [row[3 + 2 * k], row[4 + 2 * k]] = [t.re, t.im];
+            slope += f64::from(n) * (linear[4 + 2 * k] * t.re - linear[3 + 2 * k] * t.im);
+        }
+        row[size] = slope * d.x / self.reach;
+        row[size + 1] = slope * d.y / self.reach;
+    }
+
+    /// The fit, its errors by the noise that it leaves.
+    fn fitted(&self, wave: Vector2<f64>, linear: &DVector<f64>) -> Option<FittedWave> {
+        let (image, count) = (self.image, self.image.values.len());
+        let mut left = Image::new(image.rows, image.columns, vec![0.0; count]);
+        let (mut spread, mut row) = (Matrix2::zeros(), vec![0.0; linear.len() + 2]);
+        for &i in &self.used {
+            let d = place(image, i) - self.middle;
+            self.terms(&mut row, i, &wave, linear);
+            left.values[i] = self.miss(&row, i, linear);
+            spread += d * d.transpose();
+        }
+        // The window of the spectrum weighs the pixels in use and the zeros of the others.
+        let windows = [hann(image.columns), hann(image.rows)];
+        let weight =
+            |i: usize| (windows[0][i % image.columns] * windows[1][i / image.columns]).powi(2);
+        let share =
+            self.used.iter().map(|&i| weight(i)).sum::<f64>() / (0..count).map(weight).sum::<f64>();
+        let local = LocalNoise::new(&left);
+        let (mut normal, mut amplitudes, mut noise) = (Matrix2::zeros(), Vec::new(), Vec::new());
+        for (k, &n) in self.orders.iter().enumerate() {
+            let (a, b) = (linear[3 + 2 * k], linear[4 + 2 * k]);
+            let [x, y] = local.around(wave * f64::from(n));
+            let level = x.max(y) / share.max(f64::MIN_POSITIVE);
+            amplitudes.push((n, a.hypot(b)));
+            noise.push(level);
+            normal += spread * (f64::from(n * n) * (a * a + b * b) / (2.0 * level));
+        }
+        Some(FittedWave {
+            wave,
+            covariance: normal.try_inverse()?,
+            amplitudes,
+            noise,
+        })
+    }
 }

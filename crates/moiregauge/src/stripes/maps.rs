@@ -66,7 +66,7 @@ pub fn stripe_maps(
     };
     let sides = [images[0].columns, images[0].rows];
     let sides = [0, 1].map(|i| sides[i] as f64 * pitch[i]);
-    // Nodes may be as near as blocks are: no two pixels are asked for as for lattices.
+    // Nodes may be as near as blocks are; those of lattices are two pixels apart at least.
     let step = resolution.step_nm.unwrap_or(window / NODES);
     let stride = stride_of(&references[0], block, step);
     let mut maps = Vec::with_capacity(images.len());

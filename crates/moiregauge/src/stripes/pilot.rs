@@ -12,7 +12,7 @@ use crate::window::noise::{power, whole};
 use crate::window::smooth::{Nodes, Smoothed, smooth};
 use crate::window::widths::OF_DIFFERENCE;
 
-/// The pilot's window in wavelengths, which are 0.87 of the period of a lattice: as wide as its pilot.
+/// The pilot's window in wavelengths, which are 0.87 of the period of a lattice: about as wide as the pilot of that.
 const PILOT: f64 = 0.75;
 /// The carrier is for frames of so many periods, its cells as long. Chosen by eye.
 const CARRIED: f64 = 12.0;
@@ -170,7 +170,9 @@ impl Wave {
         let see = |width: f64, nodes: Nodes| {
             let smoothed = self.mixed.cleaned(width, nodes);
             let mut there = vec![false; nodes.len()];
-            present(&smoothed).into_iter().for_each(|n| there[n] = true);
+            for n in present(&smoothed) {
+                there[n] = true;
+            }
             let locals = self.locals(&smoothed, width, &[]).into_iter().zip(there);
             locals.map(|(local, there)| Some((local?, there))).collect()
         };

@@ -109,27 +109,11 @@ impl SampledStripes {
         };
         let mut map = TwistStrainMap::empty(grid, first.window_nm);
         map.grid = grid;
-        let nothing = Estimate::new(f64::NAN, f64::NAN);
         for Averaged { node, .. } in &nodes {
-            let known = node.pattern.filter(|_| node.wave.x.is_finite());
-            let [wavelength, direction] = known.map_or([nothing; 2], |p| {
-                shown(node.wave, &node.covariance, directions[p])
-            });
-            let length = node.wave.norm();
-            let across = node.wave / length;
-            let moved = |axis: usize| {
-                let share = across[axis] / length;
-                Estimate::new(-node.phase * share, node.phase_sigma * share.abs())
-            };
-            push(
-                &mut map,
-                node.mask,
-                [wavelength, direction, moved(0), moved(1)],
-                node,
-            );
+            push(&mut map, node, &directions);
         }
         let whole: Vec<SampledPattern> = (0..first.patterns.len())
-            .map(|p| pattern(p, (maps, &duals), (&map, &nodes), directions[p]))
+            .map(|p| pattern(p, maps, &duals, &map, &nodes, directions[p]))
             .collect();
         Some(Self {
             pattern: nodes
@@ -260,13 +244,19 @@ fn mean_direction(nodes: &[Averaged], pattern: usize) -> f64 {
     (0.5 * sum.y.atan2(sum.x)).rem_euclid(PI)
 }
 
-/// Adds a node to the planes that stripes have; the others hold nothing.
-fn push(
-    map: &mut TwistStrainMap,
-    mask: Mask,
-    [wavelength, direction, x, y]: [Estimate; 4],
-    node: &StripeNode,
-) {
+/// Adds a node to the planes that stripes have; the others hold nothing. `directions`: those of the patterns.
+fn push(map: &mut TwistStrainMap, node: &StripeNode, directions: &[f64]) {
+    let nothing = Estimate::new(f64::NAN, f64::NAN);
+    let known = node.pattern.filter(|_| node.wave.x.is_finite());
+    let [wavelength, direction] = known.map_or([nothing; 2], |p| {
+        shown(node.wave, &node.covariance, directions[p])
+    });
+    let length = node.wave.norm();
+    let across = node.wave / length;
+    let moved = |axis: usize| {
+        let share = across[axis] / length;
+        Estimate::new(-node.phase * share, node.phase_sigma * share.abs())
+    };
     let closure = node.chi2 / node.freedom as f64;
     for plane in map.planes_mut() {
         plane.push(f32::NAN);
@@ -278,21 +268,23 @@ fn push(
     };
     set(&mut map.wavelengths[0], wavelength);
     set(&mut map.orientation, direction);
-    set(&mut map.displacement[0], x);
-    set(&mut map.displacement[1], y);
+    set(&mut map.displacement[0], moved(0));
+    set(&mut map.displacement[1], moved(1));
     if let Some(last) = map.closure.last_mut().filter(|_| node.freedom > 0) {
         *last = closure as f32;
     }
     if let Some(last) = map.signal_to_noise.last_mut() {
         *last = node.signal_to_noise.sqrt() as f32;
     }
-    map.mask.push(mask);
+    map.mask.push(node.mask);
 }
 
 fn pattern(
     p: usize,
-    (maps, duals): (&[(&StripeMap, &Geometry)], &[Matrix2<f64>]),
-    (map, nodes): (&TwistStrainMap, &[Averaged]),
+    maps: &[(&StripeMap, &Geometry)],
+    duals: &[Matrix2<f64>],
+    map: &TwistStrainMap,
+    nodes: &[Averaged],
     direction: f64,
 ) -> SampledPattern {
     let found = &maps[0].0.patterns[p];

@@ -99,70 +99,24 @@ pub(crate) fn mix_some(
     let image = levelled.image;
     let size = [image.columns / width, image.rows / height];
     let used = size[0] * width;
-    let along: Vec<_> = waves
-        .iter()
-        .map(|g| turns(g.x, 0, used, place.centre.x))
-        .collect();
-    let up: Vec<_> = waves
-        .iter()
-        .map(|g| turns(g.y, place.row, size[1] * height, place.centre.y))
-        .collect();
-    let scale = 1.0 / (width * height) as f32;
-    let chunk = (CHUNK / width).max(1) * width;
-    let mut layers: Vec<Layer> = waves
-        .iter()
-        .map(|_| Layer {
-            re: Vec::with_capacity(size[0] * size[1]),
-            im: Vec::with_capacity(size[0] * size[1]),
-        })
-        .collect();
+    let along = waves.iter().map(|g| turns(g.x, 0, used, place.centre.x));
+    let along: Vec<[Vec<f32>; 2]> = along.collect();
+    let up = |g: &Vector2<f64>| turns(g.y, place.row, size[1] * height, place.centre.y);
+    let up: Vec<[Vec<f32>; 2]> = waves.iter().map(up).collect();
+    let room = || Vec::with_capacity(size[0] * size[1]);
+    let layer = || Layer {
+        re: room(),
+        im: room(),
+    };
+    let mut layers: Vec<Layer> = waves.iter().map(|_| layer()).collect();
     let mut shares = Vec::new();
-    // One entry per row of blocks: every wave's blocks, real and imaginary parts after each other. A few
-    // rows at a time, so that they need no memory to speak of.
+    // A few rows at a time, so that they need no memory to speak of.
     let mut first = 0;
     while first < size[1] {
         let last = (first + TOGETHER).min(size[1]);
         let mixed: Vec<(Vec<f32>, Option<Vec<f32>>)> = (first..last)
             .into_par_iter()
-            .map(|line| {
-                let (pixels, share) = lines(levelled, line * height, [used, height], width);
-                let mut out = vec![0.0; 2 * waves.len() * size[0]];
-                if !wanted(line) {
-                    return (out, share);
-                }
-                let (mut all_re, mut all_im) = (vec![0.0f32; chunk], vec![0.0f32; chunk]);
-                for (i, sums) in out.chunks_exact_mut(2 * size[0].max(1)).enumerate() {
-                    let (re, im) = sums.split_at_mut(size[0]);
-                    let mut start = 0;
-                    while start < used {
-                        let end = (start + chunk).min(used);
-                        let part = start..end;
-                        let (sum_re, sum_im) =
-                            (&mut all_re[..end - start], &mut all_im[..end - start]);
-                        sum_re.fill(0.0);
-                        sum_im.fill(0.0);
-                        for (row, values) in pixels.chunks_exact(used).enumerate() {
-                            let [c, s] =
-                                [up[i][0][line * height + row], up[i][1][line * height + row]];
-                            let sums = sum_re.iter_mut().zip(sum_im.iter_mut());
-                            for ((re, im), value) in sums.zip(&values[part.clone()]) {
-                                *re += c * value;
-                                *im += s * value;
-                            }
-                        }
-                        let turn = along[i][0][part.clone()].iter().zip(&along[i][1][part]);
-                        for ((re, im), (c, s)) in sum_re.iter_mut().zip(sum_im.iter_mut()).zip(turn)
-                        {
-                            (*re, *im) = (*re * c - *im * s, *re * s + *im * c);
-                        }
-                        let first = start / width;
-                        average(sum_re, &mut re[first..], width, scale);
-                        average(sum_im, &mut im[first..], width, scale);
-                        start = end;
-                    }
-                }
-                (out, share)
-            })
+            .map(|row| mix_row(levelled, row, block, &along, &up, wanted(row)))
             .collect();
         for (row, (sums, of_line)) in mixed.into_iter().enumerate() {
             for (layer, sums) in layers.iter_mut().zip(sums.chunks_exact(2 * size[0].max(1))) {
@@ -190,6 +144,71 @@ pub(crate) fn mix_some(
         ),
         layers,
         share,
+    }
+}
+
+/// A row of blocks of every wave, real and imaginary parts after each other (zero if not `wanted`), and the share of
+/// its pixels. `along` and `up`: cosine and sine of each wave at each column and line.
+fn mix_row(
+    levelled: &Levelled,
+    row: usize,
+    block: [usize; 2],
+    along: &[[Vec<f32>; 2]],
+    up: &[[Vec<f32>; 2]],
+    wanted: bool,
+) -> (Vec<f32>, Option<Vec<f32>>) {
+    let [width, height] = block;
+    let columns = levelled.image.columns / width;
+    let used = [columns * width, height];
+    let (pixels, share) = lines(levelled, row * height, used, width);
+    let mut out = vec![0.0; 2 * along.len() * columns];
+    if wanted {
+        let sums = out.chunks_exact_mut(2 * columns.max(1));
+        for ((sums, [c, s]), up) in sums.zip(along).zip(up) {
+            let rows = row * height..(row + 1) * height;
+            let up = [&up[0][rows.clone()], &up[1][rows]];
+            mix_line(&pixels, [c, s], up, block, sums);
+        }
+    }
+    (out, share)
+}
+
+/// Mixes the lines of a row of blocks with one wave; the blocks' real parts, then their imaginary ones, go to `sums`.
+fn mix_line(
+    pixels: &[f32],
+    along: [&[f32]; 2],
+    up: [&[f32]; 2],
+    [width, height]: [usize; 2],
+    sums: &mut [f32],
+) {
+    let used = along[0].len();
+    let scale = 1.0 / (width * height) as f32;
+    let chunk = (CHUNK / width).max(1) * width;
+    let (mut all_re, mut all_im) = (vec![0.0f32; chunk], vec![0.0f32; chunk]);
+    let (re, im) = sums.split_at_mut(sums.len() / 2);
+    let mut start = 0;
+    while start < used {
+        let end = (start + chunk).min(used);
+        let part = start..end;
+        let (sum_re, sum_im) = (&mut all_re[..end - start], &mut all_im[..end - start]);
+        sum_re.fill(0.0);
+        sum_im.fill(0.0);
+        for (row, values) in pixels.chunks_exact(used).enumerate() {
+            let [c, s] = [up[0][row], up[1][row]];
+            let sums = sum_re.iter_mut().zip(sum_im.iter_mut());
+            for ((re, im), value) in sums.zip(&values[part.clone()]) {
+                *re += c * value;
+                *im += s * value;
+            }
+        }
+        let turn = along[0][part.clone()].iter().zip(&along[1][part]);
+        for ((re, im), (c, s)) in sum_re.iter_mut().zip(sum_im.iter_mut()).zip(turn) {
+            (*re, *im) = (*re * c - *im * s, *re * s + *im * c);
+        }
+        let first = start / width;
+        average(sum_re, &mut re[first..], width, scale);
+        average(sum_im, &mut im[first..], width, scale);
+        start = end;
     }
 }
 

@@ -13,7 +13,7 @@ use rayon::prelude::*;
 use rustfft::num_complex::{Complex32, Complex64};
 
 use crate::window::blocks::Blocks;
-use crate::window::smooth::{Kernel, Smoothed};
+use crate::window::smooth::{Kernel, Smoothed, Support};
 
 /// Windows of which less than this is missing are whole: any number above rounding in single precision.
 const CUT: f64 = 1e-6;
@@ -104,55 +104,16 @@ fn of_node(
     kernels: &[Kernel; 2],
     indices: &[[i32; 2]],
     node: usize,
-    (phases, slopes): &Taken,
+    taken: &Taken,
 ) -> Vec<[Complex64; 3]> {
-    let measured: Vec<[Complex64; 3]> = smoothed
-        .envelopes
-        .iter()
-        .map(|envelope| {
-            let amplitude = envelope.amplitude[node];
-            let amplitude = Complex64::new(f64::from(amplitude.re), f64::from(amplitude.im));
-            let [x, y] = [0, 1].map(|i| {
-                let relative = [envelope.growth[node][i], envelope.slope[node][i]].map(f64::from);
-                amplitude * Complex64::new(relative[0], relative[1])
-            });
-            [amplitude, x, y]
-        })
-        .collect();
+    let envelopes = smoothed.envelopes.iter();
+    let measured: Vec<[Complex64; 3]> = envelopes.map(|e| e.fitted(node)).collect();
     let Some(support) = &smoothed.support[node] else {
         return measured;
     };
-    let index = |i: usize| Vector2::from(indices[i].map(f64::from));
     let at = smoothed.nodes.block(node);
-    let mut passages = Vec::new();
-    for (from, [amplitude, x, y]) in measured.iter().enumerate() {
-        let slope = Vector2::new((x / amplitude).im, (y / amplitude).im);
-        if !(slope.x.is_finite() && slope.y.is_finite()) {
-            continue;
-        }
-        for (into, mirrored) in (0..indices.len()).flat_map(|i| [(i, false), (i, true)]) {
-            if into == from && !mirrored {
-                continue;
-            }
-            let sign = if mirrored { -1.0 } else { 1.0 };
-            let between = index(from) * sign - index(into);
-            let delta = slopes * between + slope * sign;
-            let Some(sums) = transform(blocks, kernels, at, delta) else {
-                continue;
-            };
-            let turn = Complex64::cis(phases.dot(&between));
-            let adds = [0, 1, 2].map(|i| {
-                let row = support.inverse.row(i);
-                (sums[0] * row[0] + sums[1] * row[1] + sums[2] * row[2]) * turn
-            });
-            passages.push(Passage {
-                from,
-                into,
-                mirrored,
-                adds,
-            });
-        }
-    }
+    let sums = |delta| transform(blocks, kernels, at, delta);
+    let passages = passages(&measured, indices, support, taken, sums);
     let mut values = measured.clone();
     for _ in 0..ROUNDS {
         let before = values.clone();
@@ -170,6 +131,46 @@ fn of_node(
         }
     }
     values
+}
+
+/// What leaks from where to where at a node; `sums` is [`transform`] there.
+fn passages(
+    measured: &[[Complex64; 3]],
+    indices: &[[i32; 2]],
+    support: &Support,
+    (phases, slopes): &Taken,
+    sums: impl Fn(Vector2<f64>) -> Option<[Complex64; 3]>,
+) -> Vec<Passage> {
+    let index = |i: usize| Vector2::from(indices[i].map(f64::from));
+    let mut passages = Vec::new();
+    for (from, [amplitude, x, y]) in measured.iter().enumerate() {
+        let slope = Vector2::new((x / amplitude).im, (y / amplitude).im);
+        if !(slope.x.is_finite() && slope.y.is_finite()) {
+            continue;
+        }
+        for (into, mirrored) in (0..indices.len()).flat_map(|i| [(i, false), (i, true)]) {
+            if into == from && !mirrored {
+                continue;
+            }
+            let sign = if mirrored { -1.0 } else { 1.0 };
+            let between = index(from) * sign - index(into);
+            let Some(sums) = sums(slopes * between + slope * sign) else {
+                continue;
+            };
+            let turn = Complex64::cis(phases.dot(&between));
+            let adds = [0, 1, 2].map(|i| {
+                let row = support.inverse.row(i);
+                (sums[0] * row[0] + sums[1] * row[1] + sums[2] * row[2]) * turn
+            });
+            passages.push(Passage {
+                from,
+                into,
+                mirrored,
+                adds,
+            });
+        }
+    }
+    passages
 }
 
 /// `Σ w e^{iΔ·d}` and the same tilted along x and y, over the blocks around block `at` that are there; `None`

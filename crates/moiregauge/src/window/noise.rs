@@ -187,7 +187,7 @@ impl Noise {
 }
 
 /// Noise of the amplitude at nodes (white noise of unit variance) where probes see nothing but noise: windows that are
-/// whole, and far from the edges of what is between two pixels.
+/// whole, and far from the edges of a frame between two pixels.
 pub(crate) fn whole(
     smoothed: &Smoothed,
     blocks: &Blocks,

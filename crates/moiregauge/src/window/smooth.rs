@@ -137,6 +137,17 @@ pub(crate) struct Standing {
 }
 
 impl Envelope {
+    /// c₀ and both components of c₁ at a node.
+    pub(crate) fn fitted(&self, node: usize) -> [Complex64; 3] {
+        let amplitude = self.amplitude[node];
+        let amplitude = Complex64::new(f64::from(amplitude.re), f64::from(amplitude.im));
+        let [x, y] = [0, 1].map(|i| {
+            let relative = [self.growth[node][i], self.slope[node][i]].map(f64::from);
+            amplitude * Complex64::new(relative[0], relative[1])
+        });
+        [amplitude, x, y]
+    }
+
     /// What stands out at a node of noise of so much power; `None` where it is too faint.
     pub(crate) fn standing(&self, node: usize, noise: f64) -> Option<Standing> {
         let power = f64::from(self.amplitude[node].norm_sqr());
@@ -258,6 +269,25 @@ impl Support {
             inverse,
         })
     }
+
+    /// c₀ and c₁/c₀ from the sums.
+    fn amplitude_and_slope(&self, [s, x, y]: [Complex64; 3]) -> (Complex32, [Complex32; 2]) {
+        let row = |i: usize| {
+            let m = self.inverse.row(i);
+            s * m[0] + x * m[1] + y * m[2]
+        };
+        let amplitude = row(0);
+        let single = |c: Complex64| Complex32::new(c.re as f32, c.im as f32);
+        let relative = |i: usize| {
+            let relative = single(row(i) / amplitude);
+            if relative.is_finite() {
+                relative
+            } else {
+                Complex32::default()
+            }
+        };
+        (single(amplitude), [relative(1), relative(2)])
+    }
 }
 
 fn fits(blocks: &Blocks, kernels: &[Kernel; 2], nodes: Nodes) -> Vec<Option<Support>> {
@@ -366,50 +396,17 @@ fn envelope(
         .into_par_iter()
         .map(|node_row| {
             let at = nodes.first[1] + node_row * nodes.stride[1];
-            // Plain sums, those tilted along the line, those tilted across.
-            let mut sums = [
-                vec![0.0f32; 2 * count],
-                vec![0.0; 2 * count],
-                vec![0.0; 2 * count],
-            ];
             let first = at.saturating_sub(radius);
             let last = (at + radius + 1).min(blocks.size[1]);
-            for (i, line) in lines[first..last].iter().enumerate() {
-                let i = i + first + radius - at;
-                let (w, wd) = (kernels[1].plain[i], kernels[1].tilted[i]);
-                let (plain, tilted) = line.split_at(2 * count);
-                let [s, x, y] = &mut sums;
-                for ((s, y), value) in s.iter_mut().zip(y.iter_mut()).zip(plain) {
-                    *s += w * value;
-                    *y += wd * value;
-                }
-                for (x, value) in x.iter_mut().zip(tilted) {
-                    *x += w * value;
-                }
-            }
+            let sums = across(&lines[first..last], &kernels[1], first + radius - at, count);
             let of_node = |column: usize| {
                 let Some(fit) = &fits[node_row * count + column] else {
                     return (Complex32::default(), [Complex32::default(); 2]);
                 };
-                let [s, x, y] = [0, 1, 2].map(|i| {
-                    let values = &sums[i];
+                let sums = sums.each_ref().map(|values| {
                     Complex64::new(f64::from(values[column]), f64::from(values[count + column]))
                 });
-                let row = |i: usize| {
-                    let m = fit.inverse.row(i);
-                    s * m[0] + x * m[1] + y * m[2]
-                };
-                let amplitude = row(0);
-                let single = |c: Complex64| Complex32::new(c.re as f32, c.im as f32);
-                let relative = |i: usize| {
-                    let relative = single(row(i) / amplitude);
-                    if relative.is_finite() {
-                        relative
-                    } else {
-                        Complex32::default()
-                    }
-                };
-                (single(amplitude), [relative(1), relative(2)])
+                fit.amplitude_and_slope(sums)
             };
             (0..count).map(of_node).collect()
         })
@@ -426,6 +423,24 @@ fn envelope(
         envelope.growth.push(relative.map(|c| c.re));
     }
     envelope
+}
+
+/// Smoothed lines summed with the weights from `tap` on: plain, tilted along the line, tilted across.
+fn across(lines: &[Vec<f32>], kernel: &Kernel, tap: usize, count: usize) -> [Vec<f32>; 3] {
+    let mut sums = [0; 3].map(|_| vec![0.0f32; 2 * count]);
+    for (i, line) in lines.iter().enumerate() {
+        let (w, wd) = (kernel.plain[tap + i], kernel.tilted[tap + i]);
+        let (plain, tilted) = line.split_at(2 * count);
+        let [s, x, y] = &mut sums;
+        for ((s, y), value) in s.iter_mut().zip(y.iter_mut()).zip(plain) {
+            *s += w * value;
+            *y += wd * value;
+        }
+        for (x, value) in x.iter_mut().zip(tilted) {
+            *x += w * value;
+        }
+    }
+    sums
 }
 
 /// A line of blocks, smoothed, at the columns of the nodes: real, imaginary, and both tilted.
