@@ -77,21 +77,21 @@ moire LARGE_STRAIN set: half double
 atomic AMBIGUOUS set: half double
 atomic LARGEST_MISFIT set: half double
 calibrate LARGEST_MISFIT set: half double
-map/defects IMPROBABLE map half double
-map/defects STRAIGHT map half double
-map/defects NEAR map half double
-map/defects BESIDE map half double
-map/defects LOST map half double
-map/defects BLURRED map half double
-map/defects SHARE map half closer
+window/blur IMPROBABLE map half double
+window/setting STRAIGHT map half double
+window/setting NEAR map half double
+window/setting BESIDE map half double
+window/setting LOST map half double
+window/blur BLURRED map half double
+window/setting SHARE map half closer
 map/defects CLEAR map half double
-map/waves FAINT map half double
-map/waves WEAKEST map half double
+window/smooth FAINT map half double
+window/smooth WEAKEST map half double
 window/widths ALLOWED map half double
 window/leaks UNSURE map half double
 map/register COHERENT map half closer
 window/types MARGIN map half double
-map/pilot WORTH map half double
+window/mixed WORTH map half double
 window/carrier STIFFNESS map half double
 window/smooth LEAST_SHARE map half double
 regime RELAXED domains,boundary half double
@@ -110,11 +110,11 @@ stripes/find PATTERN stripes half double
 stripes/find FEWEST stripes half double
 stripes/find ALONG stripes half double
 stripes/find SAME stripes half double
-stripes/nodes LOST stripes half double
+window/setting LOST stripes half double
 stripes/nodes CROSSED stripes half closer
-stripes/nodes STRAIGHT stripes half double
-stripes/nodes MORE_THAN_CHANCE stripes half double
-stripes/wave WEAKEST stripes half double
+window/setting STRAIGHT stripes half double
+window/blur OF_TWO stripes half double
+window/smooth WEAKEST stripes half double
 stripes/wave ENDS stripes half double
 LIST
 

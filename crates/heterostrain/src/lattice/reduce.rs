@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix2, Vector2};
 
-use crate::lattice::blocks::{TURN, reciprocal};
+use crate::lattice::blocks::TURN;
 use crate::lattice::vectors::{Lattice, Pair};
 
 /// The integer change of basis that turns a pair into its shortest one, about 60° apart, second

@@ -217,7 +217,7 @@ impl Timing {
 /// The geometry that a frame would have had on a sample at rest, `R = r − D t`.
 ///
 /// `drift` D (nm/s) is the velocity of the sample; the time t counts from the middle of the frame,
-/// where nothing moves. Exact for constant drift: see [`crate::drift::linear`].
+/// where nothing moves. Exact for constant drift: see the module `drift`.
 #[must_use]
 pub fn at_rest(geometry: &Geometry, timing: &Timing, drift: Vector2<f64>) -> Geometry {
     let centre = geometry.centre();

@@ -1,6 +1,6 @@
 //! Regions of a map in numbers: boxes and polygons, line profiles, uniform areas, areas of a wanted twist.
 //!
-//! In: a [`TwistStrainMap`]. Out: means with errors that know how noise of neighbouring nodes goes together,
+//! In: a [`TwistStrainMap`](crate::map::TwistStrainMap). Out: means with errors that know how noise of neighbouring nodes goes together,
 //! spreads without what noise adds. nm, rad, strain without dimension; places are those of the map, x right, y up.
 
 pub(crate) mod correlation;

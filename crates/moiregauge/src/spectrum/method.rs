@@ -13,7 +13,7 @@ pub enum Method {
     /// Harmonics of a lattice fitted to the pixels: errors near the Cramér–Rao bound.
     Lattice,
     /// As published: resampled, summed autocorrelation, whole-pixel peaks; drift from successive scans; 48 equations
-    /// for twist and strain. Known to be biased. [`Settings::as_published`] sets what goes with it.
+    /// for twist and strain. Known to be biased. `Settings::as_published` sets what goes with it.
     Paper,
 }
 

@@ -77,7 +77,7 @@ pub(crate) fn fit(
         let cycles = (moved * reach).norm() / std::f64::consts::TAU;
         if cycles < STANDS {
             // Else it is not the wave that was looked for.
-            let near = (wave - start).norm() <= 0.3 * start.norm();
+            let near = (wave - start).norm() <= ANOTHER * start.norm();
             return near.then(|| pixels.fitted(wave, &linear)).flatten();
         }
         if !cycles.is_finite() {

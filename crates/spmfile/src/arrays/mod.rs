@@ -4,7 +4,7 @@
 //! [`ArrayOptions`]; what is not given stays unknown. Files written here ([`npz`], [`tiff()`], [`csv`])
 //! carry along what was known, and it is taken back; options come before it. The first line of an array or a picture is the
 //! top one. A coloured picture is a rendering; it becomes one channel of its luminance, with a note
-//! in [`Scan::metadata`].
+//! in [`crate::Scan::metadata`].
 //!
 //! ```
 //! use spmfile::arrays::{ArrayOptions, read};

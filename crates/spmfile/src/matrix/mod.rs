@@ -1,7 +1,7 @@
 //! Omicron Matrix: files of channels, `.Z_mtrx`, with the log of their session, `_0001.mtrx`.
 //!
 //! **Untested**: written from public descriptions; no file of an instrument was at hand. Every scan
-//! says so in [`Scan::notes`].
+//! says so in [`crate::Scan::notes`].
 //!
 //! The file of a channel holds raw counts only. Lines, points, size, scale and times stand in the log
 //! of the session, in which the state of the instrument has to be found by playing all changes from

@@ -12,7 +12,7 @@ pub struct Sighting {
     pub scan: usize,
     /// Class of scans that share an offset: fast axis and line direction.
     pub class: usize,
-    /// Block of scans whose phases are linked; [`fit`] finds it.
+    /// Block of scans whose phases are linked; `fit` finds it.
     pub block: usize,
     /// Reciprocal pair as it appeared, sensor coordinates, rad/nm, all sightings labelled alike.
     pub waves: Waves,
