@@ -20,7 +20,7 @@ fn codes_are_kebab_case_and_unique() {
 fn the_table_is_in_sentences_without_options() {
     for entry in explained() {
         for text in [entry.meaning, entry.what_to_do] {
-            assert!(text.ends_with('.'), "{}: {text}", entry.code);
+            assert!(text.ends_with(['.', '?']), "{}: {text}", entry.code);
             assert!(!text.contains("--"), "{}: {text}", entry.code);
             assert!(!text.contains("  "), "{}: {text}", entry.code);
             assert!(text.len() > 15, "{}: {text}", entry.code);
