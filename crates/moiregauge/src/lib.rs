@@ -37,20 +37,19 @@
 //! | --- | --- | --- |
 //! | top | [`survey`] | maps, stripes and domains of whole scans; images too large for memory; images at rest |
 //! | | [`campaign`] | all scans together: sets, drift, joint result, orientation of a layer, calibration runs |
-//! | | [`scan`] | one scan → a few numbers; where its pixels were, and when |
 //! | | [`plan`] | errors before anything is measured |
+//! | | [`scan`] | one scan → a few numbers; where its pixels were, and when |
 //! | | [`meaning`] | what a lattice means: uncertainty budget, other readings, names |
-//! | | [`drift`] | linear, joint and published fits of the motion of the sample |
-//! | | [`domains`], [`region`] | triangles between nodes; questions to finished maps |
-//! | | [`map`], [`stripes`] | local lattices, local stripes |
+//! | | [`domains`] | nodes and triangles at small angles |
+//! | | [`region`], [`stripes`] | questions to finished maps; maps of one wave |
+//! | | [`map`] | maps of the local lattice |
 //! | | [`window`] | waves under a window: what both kinds of maps stand on |
-//! | | [`simulate`] | scans whose answer is known |
-//! | | [`settings`] | every knob |
-//! | | [`calibration`] | the scanner as a matrix |
-//! | | [`lattice`] | the lattice of one image |
-//! | | [`spectrum`] | where a lattice is in the spectrum |
+//! | | [`drift`] | linear, joint and published fits of the motion of the sample |
+//! | | [`settings`], [`caveat`] | every knob; every doubt |
+//! | | [`lattice`], [`calibration`] | the lattice of one image; the scanner as a matrix |
+//! | | [`spectrum`], [`simulate`] | where a lattice is in the spectrum; scans whose answer is known |
 //! | | [`frame`] | image, geometry, background |
-//! | ground | [`caveat`], [`numbers`] | doubts; small mathematics |
+//! | ground | [`numbers`] | small mathematics |
 
 pub mod calibration;
 pub mod campaign;
