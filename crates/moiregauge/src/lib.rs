@@ -47,6 +47,7 @@
 //! | | [`drift`] | linear, joint and published fits of the motion of the sample |
 //! | | [`settings`], [`caveat`] | every knob; every doubt |
 //! | | [`lattice`], [`calibration`] | the lattice of one image; the scanner as a matrix |
+//! | | [`coverage`] | where in a frame a lattice is |
 //! | | [`spectrum`], [`simulate`] | where a lattice is in the spectrum; scans whose answer is known |
 //! | | [`frame`] | image, geometry, background |
 //! | ground | [`numbers`] | small mathematics |
@@ -54,6 +55,7 @@
 pub mod calibration;
 pub mod campaign;
 pub mod caveat;
+pub mod coverage;
 pub mod domains;
 pub mod drift;
 pub mod frame;

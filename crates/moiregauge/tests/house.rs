@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 /// From the top floor down, as in DESIGN.md.
-const FLOORS: [&[&str]; 12] = [
+const FLOORS: [&[&str]; 13] = [
     &["survey"],
     &["campaign", "plan"],
     &["scan", "meaning"],
@@ -13,6 +13,7 @@ const FLOORS: [&[&str]; 12] = [
     &["window", "drift"],
     &["settings", "caveat"],
     &["lattice", "calibration"],
+    &["coverage"],
     &["spectrum", "simulate"],
     &["frame"],
     &["numbers"],

@@ -19,15 +19,18 @@ const NOISY: f64 = 0.02;
 /// Sizes that differ by more are different. Chosen by eye.
 const SIZE: f64 = 0.01;
 
-/// Noise of a pixel in standard deviations of the image, as the first harmonics of the fit see it; 0 where unknown.
+/// Noise of a pixel in standard deviations of the image: the lesser of what its neighbours and the first harmonics of
+/// the fit see. What the sample shows beside the lattice is in the latter.
 fn noise(line: &MeasuredLine) -> f64 {
+    let beside = line.pixels.noise();
     if line.lattice.fit.is_none() {
-        return 0.0;
+        return beside;
     }
     let [columns, rows] = line.geometry.size;
     // Three harmonics of amplitude A make a variance of 3A²/2, and σ = A √(N/2)/(√2 · snr).
     let pixels = (columns * rows) as f64;
-    pixels.sqrt() / (2.0 * line.lattice.signal_to_noise) * (2.0_f64 / 3.0).sqrt()
+    let fitted = pixels.sqrt() / (2.0 * line.lattice.signal_to_noise) * (2.0_f64 / 3.0).sqrt();
+    fitted.min(beside)
 }
 
 /// Whether two scans hold the same data.

@@ -38,6 +38,45 @@ pub enum LatticeDoubt {
         /// What can be chance.
         threshold: f64,
     },
+    /// The lattice covers a part of the frame.
+    #[error(
+        "the lattice covers {:.0} % of the frame, {unit_cells:.0} unit cells; the rest shows none and is left out",
+        100.0 * .share
+    )]
+    PartlyCovered {
+        /// Share of the frame.
+        share: f64,
+        /// Unit cells of the lattice in it.
+        unit_cells: f64,
+    },
+    /// The lattice changes, and the result is its mean.
+    #[error(
+        "the lattice changes across {part}: its wavelength by {:.2} % and its direction by {:.2}° (standard deviation over \
+         the area), {} (evidence {evidence:.0}; 20 can be chance). Results are means over the area. Drift that got \
+         faster or slower, and creep, look like this along the slow axis",
+        100.0 * .wavelength, .angle.to_degrees(), if *.evenly { "evenly" } else { "smoothly" }
+    )]
+    Changes {
+        /// The frame, or the part of it that the lattice covers.
+        part: &'static str,
+        /// Standard deviation of the wavelength, as a share of it.
+        wavelength: f64,
+        /// Standard deviation of the direction, rad.
+        angle: f64,
+        /// Whether the wave vectors change in proportion to the place.
+        evenly: bool,
+        /// By how much its evidence exceeds that for a lattice that is the same everywhere.
+        evidence: f64,
+    },
+    /// Several lattices lie side by side.
+    #[error(
+        "the frame shows {} lattices side by side; the numbers are those of the largest. The others: {}",
+        1 + .others.len(), listed(.others)
+    )]
+    SeveralGrains {
+        /// The other grains, as they compare with the largest.
+        others: Vec<OtherGrain>,
+    },
     /// The harmonics are not those of one lattice.
     #[error(
         "the harmonics of the image do not agree on one lattice (χ² {chi_squared:.0} for {degrees_of_freedom} degrees of \
@@ -78,6 +117,29 @@ pub enum LatticeDoubt {
         "each line was levelled on its own: harmonics near the fast axis are damaged and lattice vectors may be biased"
     )]
     LineLevelling,
+}
+
+/// A grain beside the one that is measured.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct OtherGrain {
+    /// Its share of the frame.
+    pub share: f64,
+    /// Its wavelengths, nm.
+    pub wavelengths: [f64; 3],
+    /// By how much its moiré is turned against that of the largest, rad counter-clockwise.
+    pub turned: f64,
+}
+
+fn listed(all: &[OtherGrain]) -> String {
+    let of = |grain: &OtherGrain| {
+        let [a, b, c] = grain.wavelengths;
+        format!(
+            "{a:.2}, {b:.2}, {c:.2} nm on {:.0} % of the frame, turned by {:.1}°",
+            100.0 * grain.share,
+            grain.turned.to_degrees()
+        )
+    };
+    all.iter().map(of).collect::<Vec<_>>().join("; ")
 }
 
 /// How trace and retrace differ. Wavelengths are in nm.
@@ -137,6 +199,18 @@ explain! { LatticeDoubt:
          changed or creep may be a part of the change."
         "Map the lattice to see where it changes. Compare frames up and down: what changes its sign with them is drift \
          or creep."
+    PartlyCovered "partly-covered" Note
+        "The lattice covers a part of the frame only: an edge, a hole, an island. It was measured there, and the rest was \
+         left out."
+        "Look at the figure of the scan: the outline shows where the lattice was measured."
+    Changes "changing-lattice" Warning
+        "The lattice changes across the frame by more than chance. The numbers are means over the area that it covers, \
+         and their errors know how far these means depend on where the area ends."
+        "Map the lattice to see where it changes. Compare frames up and down: what changes its sign with them is drift \
+         or creep."
+    SeveralGrains "several-grains" Warning
+        "Two or more lattices lie side by side in the frame. The numbers are those of the largest grain."
+        "Crop to each grain to measure it by itself, or map the frame."
     HarmonicsDisagree "harmonics-disagree" Warning
         "The harmonics of the image do not agree on one lattice, as where it is not the same everywhere. The errors of \
          the vectors were enlarged to match."

@@ -3,20 +3,34 @@
 use heterostrain::lattice::{Lattice, Px, labelled_like, reciprocal};
 use nalgebra::{Matrix2, Vector2};
 
+use crate::coverage::bend::Mean;
+use crate::coverage::find::{WHOLE, patches, pitch, same};
+use crate::coverage::finer::finer;
+use crate::coverage::settle::{Patch, Settled, settle};
 use crate::frame::background::{Background, remove_background};
 use crate::frame::geometry::Geometry;
 use crate::frame::image::Image;
 use crate::lattice::fit::fit_pixels as fit;
 use crate::lattice::fit::fit_pixels::LatticeFit;
+use crate::lattice::fit::noise::ForeignWave;
+use crate::lattice::measured::Grain;
 use crate::lattice::measured::MeasuredLattice;
 use crate::lattice::{autocorrelation, fourier, paper};
-use crate::spectrum::error::LatticeError;
+use crate::spectrum::error::{LatticeError, THIRD};
+use crate::spectrum::harmonics::Harmonics;
 use crate::spectrum::method::Method;
+use crate::spectrum::phases::Phases;
 use crate::spectrum::prepare::{
-    Prepared, binning, middle, phases, prepare, refine, signal_to_noise,
+    Prepared, Verdict, binning, middle, phases, prepare, refine, signal_to_noise, verdict,
 };
 use crate::spectrum::transform::Spectrum;
 use crate::spectrum::{known, rescue, select};
+
+/// A lattice whose waves bend so much that a transform of the whole patch does not show them has at least so many unit
+/// cells: it is seen by what windows show. Chosen by eye.
+const FEWEST_CELLS: f64 = 12.0;
+/// What a Hann window leaves of the power over noise of a wave: (Σw)² / (N Σw²), along both axes.
+const HANN: f64 = 4.0 / 9.0;
 
 /// Finds and measures the lattice of an image.
 ///
@@ -31,13 +45,62 @@ pub fn measure(
     background: Background,
     method: Method,
 ) -> Result<MeasuredLattice, LatticeError> {
-    let start = match Start::find(image, geometry, background) {
-        Err(error @ LatticeError::NoLattice { .. }) if method == Method::Lattice => {
-            Start::find_again(image, geometry, background).map_err(|_| error)?
-        }
-        other => other?,
+    let found = find_anywhere(image, geometry, background, method)?.measure(method)?;
+    let Some(wave) = beside(&found) else {
+        return Ok(found);
     };
-    start.measure(method)
+    let (pair, size) = (found.reciprocal, [image.columns, image.rows]);
+    let to_physical = geometry.pixel_to_nm.try_inverse().map(|m| m.transpose());
+    let finer = to_physical.and_then(|m| finer(&pair, &wave.wave_vector, size, &m));
+    if finer.is_none() && !is_stronger(&found, &wave) {
+        return Ok(found);
+    }
+    // A finer lattice explains it, or another part of the frame; if not, it is something else beside the lattice.
+    let another = Start::find_patch(image, geometry, background, &[finer, Some(pair)])
+        .and_then(|start| start.measure(method).ok())
+        .filter(|other| beside(other).is_none_or(|wave| !is_stronger(other, &wave)));
+    Ok(another.unwrap_or(found))
+}
+
+/// A wave that stands out beside the lattice.
+fn beside(found: &MeasuredLattice) -> Option<ForeignWave> {
+    found
+        .fit
+        .as_ref()?
+        .foreign_wave
+        .filter(ForeignWave::stands_out)
+}
+
+/// Whether a wave beside the lattice is stronger than the weakest of its first ones.
+fn is_stronger(found: &MeasuredLattice, wave: &ForeignWave) -> bool {
+    wave.significance > HANN * found.signal_to_noise.powi(2)
+}
+
+/// The lattice of the whole frame or, where it does not cover it, of the part that it covers.
+fn find_anywhere(
+    image: &Image,
+    geometry: &Geometry,
+    background: Background,
+    method: Method,
+) -> Result<Start, LatticeError> {
+    let whole = match Start::find(image, geometry, background) {
+        Ok(start) => start.on_the_whole_frame(image),
+        Err(error) => Err((None, error)),
+    };
+    let (first, error) = match whole {
+        Ok(start) => return Ok(start),
+        Err((first, error)) => (first, error),
+    };
+    if first.is_none() && !matches!(error, LatticeError::NoLattice { .. }) {
+        return Err(error);
+    }
+    match Start::find_patch(image, geometry, background, &[first]) {
+        Some(found) => Ok(found),
+        None if method == Method::Lattice => {
+            Start::find_again(image, geometry, background).map_err(|_| error)
+        }
+        None => Err(error),
+    }
 }
 
 /// Where the lattice of an image is, roughly: what every method starts from.
@@ -47,6 +110,12 @@ pub struct Start {
     background: Background,
     /// (columns, rows).
     size: [usize; 2],
+    /// The part of the frame that carries the lattice; `None` for all of it.
+    patch: Option<Patch>,
+    /// The mean lattice, where it changes.
+    mean: Option<Mean>,
+    /// Other grains.
+    others: Vec<Grain>,
 }
 
 impl Start {
@@ -132,7 +201,102 @@ impl Start {
             geometry: geometry.clone(),
             background,
             size: [image.columns, image.rows],
+            patch: None,
+            mean: None,
+            others: Vec::new(),
         }
+    }
+
+    /// The reciprocal pair, rad per pixel.
+    fn pair(&self) -> Matrix2<f64> {
+        self.prepared.harmonics.pair / self.prepared.binning as f64
+    }
+
+    /// The same if the lattice is everywhere in the frame, as far as noise lets that be seen; otherwise its pair and why
+    /// it is none of the whole frame.
+    fn on_the_whole_frame(
+        self,
+        image: &Image,
+    ) -> Result<Self, (Option<Matrix2<f64>>, LatticeError)> {
+        let pair = self.pair();
+        let Some(settled) = settle(&self.prepared.image, &pair, pitch(&self.geometry)) else {
+            return Ok(self);
+        };
+        let patch = &settled.patch;
+        let best = signal_to_noise(&self.prepared.harmonics);
+        let refused = (Some(pair), LatticeError::NoLattice { best });
+        if patch.share > WHOLE && settled.is_plain() && same(self.size, &patch.pair, &pair) {
+            return self.on_patch(image, settled).ok_or(refused);
+        }
+        Err(refused)
+    }
+
+    /// The lattice of a patch, of the largest grain in it, or its mean.
+    ///
+    /// Where it is everywhere and the same the fit to the pixels measures it, which uses all harmonics.
+    fn on_patch(self, image: &Image, settled: Settled) -> Option<Self> {
+        let everywhere = settled.patch.share > WHOLE;
+        let mean = settled.mean();
+        let changes = mean.as_ref().is_some_and(|mean| mean.change.is_some());
+        let grains = if changes { settled.grains() } else { None };
+        let Some([largest, other]) = grains else {
+            return Some(Self {
+                mean: mean.filter(|_| changes || !everywhere),
+                patch: (!everywhere).then_some(settled.patch),
+                ..self
+            });
+        };
+        let (geometry, background) = (self.geometry, self.background);
+        let flat = remove_background(&largest.of(image), background);
+        let mut again = settle(&flat, &largest.pair, pitch(&geometry))?;
+        again.patch.share *= largest.share;
+        let part = again.patch.of(image);
+        let start = Self::near(&part, &geometry, background, &again.patch.pair)?;
+        let mut found = start.on_patch(image, again)?;
+        let flat = remove_background(&other.of(image), background);
+        if let Some(other) = settle(&flat, &other.pair, pitch(&geometry)) {
+            found.others.push(Grain {
+                share: other.patch.share,
+                waves: other
+                    .mean()
+                    .map_or(other.patch.pair, |mean| mean.waves.basis),
+            });
+        }
+        Some(found)
+    }
+
+    /// Looks for the lattices of parts of the frame, those near `first` among them, and takes the one with the most
+    /// evidence.
+    fn find_patch(
+        image: &Image,
+        geometry: &Geometry,
+        background: Background,
+        first: &[Option<Matrix2<f64>>],
+    ) -> Option<Self> {
+        let flat = remove_background(image, background);
+        let mut best: Option<(f64, Settled, Self)> = None;
+        for settled in patches(&flat, geometry, first) {
+            let patch = &settled.patch;
+            let part = patch.of(image);
+            let near = Self::near(&part, geometry, background, &patch.pair);
+            let Some(start) = near else { continue };
+            let coherent = match verdict(&start.prepared.harmonics) {
+                Verdict::Lattice => evidence(&start.prepared.harmonics),
+                _ => 0.0,
+            };
+            let plain = settled.is_plain() && patch.unit_cells > FEWEST_CELLS;
+            let local = if plain {
+                HANN * settled.evidence()
+            } else {
+                0.0
+            };
+            let evidence = f64::max(coherent, local);
+            if evidence > best.as_ref().map_or(0.0, |(most, _, _)| *most) {
+                best = Some((evidence, settled, start));
+            }
+        }
+        let (_, settled, start) = best?;
+        start.on_patch(image, settled)
     }
 
     /// Measures the lattice.
@@ -140,6 +304,11 @@ impl Start {
     /// # Errors
     /// [`LatticeError::NoPeaks`]: the method gets no hold of it.
     pub fn measure(&self, method: Method) -> Result<MeasuredLattice, LatticeError> {
+        if let (Some(mean), Method::Lattice) = (&self.mean, method) {
+            return self
+                .mean_lattice(mean)
+                .ok_or(LatticeError::NoPeaks { method });
+        }
         let Prepared {
             harmonics,
             spectrum,
@@ -170,11 +339,11 @@ impl Start {
         let fit = fit.map(|(_, fit)| fit);
         let pixels = pixels.ok_or(LatticeError::NoPeaks { method })?;
         let label = |l: Lattice<Px>| labelled_like(&l, &pixels.basis);
-        let longest = (0..3)
-            .map(|i| pixels.vector(i))
-            .map(|v| (v.x / self.size[0] as f64).hypot(v.y / self.size[1] as f64));
         let bin_to_nm = self.geometry.pixel_to_nm * pixels_per_bin;
         Ok(MeasuredLattice {
+            patch: self.patch.clone(),
+            grains: self.others.clone(),
+            change: None,
             pixels,
             comparison: comparison.map(label),
             reciprocal: fit.as_ref().map_or(harmonics.pair / pixels_per_bin, |fit| {
@@ -187,7 +356,7 @@ impl Start {
             middle: middle(spectrum.image_size) * pixels_per_bin
                 + Vector2::repeat((pixels_per_bin - 1.0) / 2.0),
             shortcut_wavelengths: fourier::shortcut_wavelengths(peaks, &bin_to_nm),
-            periods: 1.0 / longest.fold(0.0, f64::max),
+            periods: self.periods(&pixels),
             signal_to_noise: fit.as_ref().map_or_else(
                 || signal_to_noise(harmonics)[2],
                 LatticeFit::weakest_signal_to_noise,
@@ -196,6 +365,60 @@ impl Start {
             fit,
         })
     }
+}
+
+impl Start {
+    /// The mean of a lattice that changes.
+    fn mean_lattice(&self, mean: &Mean) -> Option<MeasuredLattice> {
+        let Prepared {
+            harmonics, peaks, ..
+        } = &self.prepared;
+        let bins = self.prepared.binning as f64;
+        let pixels = mean.waves.lattice()?;
+        let fourier = fourier::measure(harmonics, peaks, self.prepared.spectrum.image_size);
+        let bin_to_nm = self.geometry.pixel_to_nm * bins;
+        Some(MeasuredLattice {
+            comparison: fourier
+                .map(|l| labelled_like(&l.mapped(&(Matrix2::identity() * bins)), &pixels.basis)),
+            pixels,
+            patch: self.patch.clone(),
+            grains: self.others.clone(),
+            change: mean.change,
+            reciprocal: mean.waves.basis,
+            phases: Phases {
+                values: mean.phases,
+                covariance: mean.phase_covariance,
+            },
+            middle: mean.middle,
+            shortcut_wavelengths: fourier::shortcut_wavelengths(peaks, &bin_to_nm),
+            periods: self.periods(&pixels),
+            signal_to_noise: mean.signal_to_noise,
+            published: None,
+            fit: None,
+        })
+    }
+
+    /// Periods across the shorter side of the frame, or of the patch.
+    fn periods(&self, pixels: &Lattice<Px>) -> f64 {
+        let size = match &self.patch {
+            Some(patch) => {
+                let [low, high] = patch.corners();
+                high - low
+            }
+            None => Vector2::new(self.size[0] as f64, self.size[1] as f64),
+        };
+        let longest = (0..3)
+            .map(|i| pixels.vector(i))
+            .map(|v| (v.x / size.x).hypot(v.y / size.y));
+        1.0 / longest.fold(0.0, f64::max)
+    }
+}
+
+/// Power over noise of all harmonics that stand out, in sum.
+fn evidence(harmonics: &Harmonics) -> f64 {
+    let all = harmonics.list.iter();
+    let powers = all.map(|harmonic| harmonic.significance(harmonics.window_sums));
+    powers.filter(|power| *power > THIRD).sum()
 }
 
 /// The lattice fitted to the pixels, in pixels.

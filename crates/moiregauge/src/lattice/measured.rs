@@ -3,15 +3,32 @@
 use heterostrain::lattice::{Lattice, Px};
 use nalgebra::{Matrix2, Vector2};
 
+use crate::coverage::bend::Change;
+use crate::coverage::settle::Patch;
 use crate::lattice::fit::fit_pixels::LatticeFit;
 use crate::lattice::paper::PublishedPeaks;
 use crate::spectrum::phases::Phases;
+
+/// A grain beside the one that is measured.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Grain {
+    /// Its share of the frame.
+    pub share: f64,
+    /// Its waves, rad per pixel.
+    pub waves: Matrix2<f64>,
+}
 
 /// The lattice of one image.
 #[derive(Clone, Debug)]
 pub struct MeasuredLattice {
     /// Vectors in pixels (columns, rows).
     pub pixels: Lattice<Px>,
+    /// The part of the frame that carries the lattice; `None` for all of it.
+    pub patch: Option<Patch>,
+    /// How it changes across that part; `None` where it is the same everywhere, as far as can be seen.
+    pub change: Option<Change>,
+    /// The other grains of the frame; this is the largest.
+    pub grains: Vec<Grain>,
     /// What the other estimator found: autocorrelation beside Fourier, Fourier beside all others.
     pub comparison: Option<Lattice<Px>>,
     /// The shortcut wavelengths `4π/(√3|K|)` of the three first harmonics, nm.

@@ -4,6 +4,7 @@ pub(crate) mod chi2;
 pub(crate) mod median;
 pub(crate) mod normal_equations;
 pub(crate) mod rng;
+pub(crate) mod splines;
 pub(crate) mod spread;
 pub(crate) mod words;
 

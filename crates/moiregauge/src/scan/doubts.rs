@@ -1,16 +1,17 @@
 //! What the images of one scan make doubtful.
 
-use heterostrain::lattice::labelled_like;
+use heterostrain::lattice::{Px, Waves, labelled_like};
 
 use crate::caveat::Caveat;
-use crate::caveat::lattices::{LatticeDoubt, LineDifference};
+use crate::caveat::lattices::{LatticeDoubt, LineDifference, OtherGrain};
 use crate::caveat::positions::PositionDoubt;
+use crate::coverage::bend::{Change, ChangeModel};
 use crate::frame::geometry::Geometry;
 use crate::lattice::fit::bend::Inhomogeneity;
 use crate::lattice::fit::closure::Closure;
 use crate::lattice::fit::fit_pixels::LatticeFit;
 use crate::lattice::fit::noise::ForeignWave;
-use crate::lattice::measured::MeasuredLattice;
+use crate::lattice::measured::{Grain, MeasuredLattice};
 use crate::numbers::chi2;
 use crate::scan::measured::MeasuredLine;
 
@@ -23,6 +24,9 @@ const ANOTHER_LATTICE: f64 = 0.1;
 const NO_CHANCE: f64 = 1e-4;
 /// ... if they are larger than this share: a tenth of the calibration that is assumed.
 const NOTABLE: f64 = 1e-3;
+/// Changes of a lattice below this share (or angle) across the frame harm nobody: a tenth of the calibration that is
+/// assumed.
+const HARMLESS: f64 = 1e-3;
 
 /// Says that a frame without sensors was turned back by the angle that the file states.
 pub(crate) fn turned(file: &str, rotation_rad: f64, caveats: &mut Vec<Caveat>) {
@@ -82,6 +86,66 @@ pub(crate) fn lines_disagree(
         caveats.push(Caveat::new(LatticeDoubt::LinesDisagree(difference), file));
     }
     None
+}
+
+/// What part of the frame shows the lattice, whether it is the same everywhere, and what lies beside it.
+pub(crate) fn about_coverage(
+    file: &str,
+    lattice: &MeasuredLattice,
+    geometry: &Geometry,
+    caveats: &mut Vec<Caveat>,
+) {
+    if let Some(patch) = &lattice.patch {
+        let doubt = LatticeDoubt::PartlyCovered {
+            share: patch.share,
+            unit_cells: patch.unit_cells,
+        };
+        caveats.push(Caveat::new(doubt, file));
+    }
+    let harmful = |change: &Change| change.wavelength.max(change.angle) > HARMLESS;
+    if let Some(change) = lattice.change.filter(harmful) {
+        let doubt = LatticeDoubt::Changes {
+            part: match lattice.patch {
+                Some(_) => "the part of the frame that it covers",
+                None => "the frame",
+            },
+            wavelength: change.wavelength,
+            angle: change.angle,
+            evenly: change.model == ChangeModel::Even,
+            evidence: change.evidence,
+        };
+        caveats.push(Caveat::new(doubt, file));
+    }
+    let others: Vec<OtherGrain> = lattice
+        .grains
+        .iter()
+        .filter_map(|grain| other_grain(lattice, grain, geometry))
+        .collect();
+    if !others.is_empty() {
+        caveats.push(Caveat::new(LatticeDoubt::SeveralGrains { others }, file));
+    }
+}
+
+/// A grain as it compares with the one that is measured.
+fn other_grain(
+    lattice: &MeasuredLattice,
+    grain: &Grain,
+    geometry: &Geometry,
+) -> Option<OtherGrain> {
+    let waves = Waves::<Px>::exact(grain.waves).lattice()?;
+    let to_nm = &geometry.pixel_to_nm;
+    let here = to_nm * lattice.pixels.basis;
+    let there = to_nm * labelled_like(&waves, &lattice.pixels.basis).basis;
+    let change = there * here.try_inverse()?;
+    Some(OtherGrain {
+        share: grain.share,
+        wavelengths: [
+            there.column(0).norm(),
+            there.column(1).norm(),
+            (there.column(1) - there.column(0)).norm(),
+        ],
+        turned: (change[(1, 0)] - change[(0, 1)]).atan2(change[(0, 0)] + change[(1, 1)]),
+    })
 }
 
 /// What the fit to the pixels found beside the lattice.

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use crate::frame::background::{Background, remove_background};
 use crate::frame::image::Image;
+use crate::numbers::median::median;
 
 /// What is left of the pixels of an image to know it again.
 #[derive(Clone, Debug)]
@@ -11,6 +12,8 @@ pub(crate) struct Fingerprint {
     size: [usize; 2],
     /// Values at pixels spread over the frame, without plane, in standard deviations.
     samples: Arc<[f32]>,
+    /// Noise of a pixel as its neighbours in the line see it, in standard deviations of the image.
+    noise: f64,
 }
 
 impl Fingerprint {
@@ -30,7 +33,13 @@ impl Fingerprint {
         Self {
             size: [image.columns, image.rows],
             samples: samples.collect(),
+            noise: noise(&flat) / deviation,
         }
+    }
+
+    /// Noise of a pixel beside its neighbours, in standard deviations of the image: no structure of the sample is in it.
+    pub(crate) fn noise(&self) -> f64 {
+        self.noise
     }
 
     /// Root mean square of the difference, in standard deviations of the images; `None` where they cannot be of the
@@ -55,6 +64,23 @@ impl Fingerprint {
         comparable.then(|| (squares / count as f64).sqrt())
     }
 }
+
+/// Standard deviation of white noise by fourth differences along the lines, which take off all that is smooth; 0 where
+/// there are none.
+fn noise(image: &Image) -> f64 {
+    let fourth = |v: &[f64]| (v[0] - 4.0 * v[1] + 6.0 * v[2] - 4.0 * v[3] + v[4]).abs();
+    let stride = (image.rows * image.columns / NOISE_SAMPLES).max(1);
+    let all = (0..image.rows).flat_map(|row| image.row(row).windows(5).map(fourth));
+    let mut all: Vec<f64> = all.step_by(stride).filter(|d| d.is_finite()).collect();
+    if all.is_empty() {
+        return 0.0;
+    }
+    // 1² + 4² + 6² + 4² + 1² = 70; the median of |x| is 0.6745 σ.
+    median(&mut all) / (0.6745 * 70f64.sqrt())
+}
+
+/// Differences by which the noise is read, about: the median is known to a per cent or two.
+const NOISE_SAMPLES: usize = 4096;
 
 /// Pixels that are compared: the mean square of their difference is known to 4 %.
 pub(crate) const SAMPLES: usize = 1024;

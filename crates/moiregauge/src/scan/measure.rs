@@ -13,7 +13,7 @@ use crate::lattice::measured::MeasuredLattice;
 use crate::lattice::several::together::measure_several;
 use crate::numbers::words::line_name;
 use crate::scan::channel::{channels, image_of};
-use crate::scan::doubts::{about_fit, few_periods, lines_disagree, turned};
+use crate::scan::doubts::{about_coverage, about_fit, few_periods, lines_disagree, turned};
 use crate::scan::fingerprint::Fingerprint;
 use crate::scan::images::first_of_several;
 use crate::scan::measured::{MeasureError, MeasuredLine, MeasuredScan};
@@ -250,6 +250,7 @@ fn about_lattice(
     caveats: &mut Vec<Caveat>,
 ) {
     few_periods(file, lattice, caveats);
+    about_coverage(file, lattice, geometry, caveats);
     if let Some(fit) = &lattice.fit {
         about_fit(file, fit, geometry, caveats);
     }

@@ -78,6 +78,31 @@ impl Spectrum {
         }
     }
 
+    /// A spectrum with the mean power of several images of one size; its phases mean nothing.
+    pub(crate) fn mean_of(images: impl Iterator<Item = Image>) -> Option<Self> {
+        let (mut mean, mut count) = (None::<Self>, 0.0);
+        for image in images {
+            let mut other = Self::new(&image);
+            for value in &mut other.values {
+                *value = Complex64::new(value.norm_sqr(), 0.0);
+            }
+            match &mut mean {
+                None => mean = Some(other),
+                Some(mean) => {
+                    for (sum, value) in mean.values.iter_mut().zip(&other.values) {
+                        *sum += value;
+                    }
+                }
+            }
+            count += 1.0;
+        }
+        let mut mean = mean?;
+        for value in &mut mean.values {
+            *value = Complex64::new((value.re / count).sqrt(), 0.0);
+        }
+        Some(mean)
+    }
+
     fn on_grid(
         image: &Image,
         rows: usize,

@@ -12,6 +12,7 @@ use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
 use rayon::prelude::*;
 use rustfft::num_complex::Complex32;
 
+use crate::numbers::splines::{Sixteen, Splines, cubic};
 use crate::window::blocks::Blocks;
 
 /// Weight of the penalty as a share of the mean diagonal element: any small number, which holds what was not measured
@@ -23,10 +24,7 @@ pub(crate) const MOST_CELLS: usize = 16;
 /// Two phases as cubic B-splines on a grid of cells.
 #[derive(Clone, Debug)]
 pub(crate) struct Carrier {
-    low: Vector2<f64>,
-    /// Length of a cell, pixels.
-    cell: Vector2<f64>,
-    cells: [usize; 2],
+    splines: Splines,
     /// (cells + 3)² coefficients of ψ₁ and ψ₂, row by row.
     coefficients: [Vec<f64>; 2],
 }
@@ -39,44 +37,28 @@ pub(crate) struct Slope {
     pub(crate) slopes: Matrix2<f64>,
 }
 
-/// Values and slopes of the four splines over a cell, `t` from 0 to 1.
-fn cubic(t: f64) -> [[f64; 4]; 2] {
-    let s = 1.0 - t;
-    [
-        [
-            s * s * s / 6.0,
-            (4.0 - 6.0 * t * t + 3.0 * t * t * t) / 6.0,
-            (4.0 - 6.0 * s * s + 3.0 * s * s * s) / 6.0,
-            t * t * t / 6.0,
-        ],
-        [
-            -0.5 * s * s,
-            -2.0 * t + 1.5 * t * t,
-            2.0 * s - 1.5 * s * s,
-            0.5 * t * t,
-        ],
-    ]
-}
-
 impl Carrier {
-    /// Fits slopes measured between `low` and `high` (pixels) with so many cells along each axis.
+    /// Fits slopes measured in a `frame` (its lowest and highest corner, pixels) with so many cells along each axis.
     pub(crate) fn fit(
         slopes: &[Slope],
-        [low, high]: [Vector2<f64>; 2],
+        frame: [Vector2<f64>; 2],
         cells: [usize; 2],
     ) -> Option<Self> {
         let mut carrier = Self {
-            low,
-            cell: Vector2::from_fn(|i, _| ((high - low)[i] / cells[i] as f64).max(1.0)),
-            cells,
+            splines: Splines::new(frame, cells),
             coefficients: [Vec::new(), Vec::new()],
         };
-        let [width, height] = cells.map(|n| n + 3);
+        let [width, height] = carrier.splines.size();
         let size = width * height;
         let mut normal = DMatrix::<f64>::zeros(size, size);
         let mut right = [DVector::<f64>::zeros(size), DVector::<f64>::zeros(size)];
         for slope in slopes {
-            let (places, [_, along, across]) = carrier.basis(slope.at);
+            let Sixteen {
+                places,
+                along,
+                across,
+                ..
+            } = carrier.splines.at(slope.at);
             for i in 0..16 {
                 for (rhs, measured) in right.iter_mut().zip(slope.slopes.column_iter()) {
                     rhs[places[i]] += along[i] * measured[0] + across[i] * measured[1];
@@ -89,19 +71,13 @@ impl Carrier {
         }
         normal.fill_upper_triangle_with_lower_triangle();
         let stiffness = STIFFNESS * normal.trace() / size as f64;
-        let mut bend = |places: [usize; 3]| {
+        carrier.splines.in_lines(|places| {
             for (a, x) in places.iter().zip([1.0, -2.0, 1.0]) {
                 for (b, y) in places.iter().zip([1.0, -2.0, 1.0]) {
                     normal[(*a, *b)] += stiffness * x * y;
                 }
             }
-        };
-        for row in 0..height {
-            (2..width).for_each(|c| bend([c - 2, c - 1, c].map(|c| row * width + c)));
-        }
-        for column in 0..width {
-            (2..height).for_each(|r| bend([r - 2, r - 1, r].map(|r| r * width + column)));
-        }
+        });
         // A constant phase is free.
         for i in 0..size {
             normal[(i, i)] += 1e-6 * stiffness.max(f64::MIN_POSITIVE);
@@ -112,34 +88,14 @@ impl Carrier {
         finite.then_some(carrier)
     }
 
-    /// Cell and place within it along one axis; beyond the edges the outermost cell goes on.
-    fn cell_of(&self, axis: usize, at: f64) -> (usize, f64) {
-        let t = (at - self.low[axis]) / self.cell[axis];
-        let cell = t.floor().clamp(0.0, self.cells[axis] as f64 - 1.0);
-        (cell as usize, (t - cell).clamp(-0.5, 1.5))
-    }
-
-    /// The sixteen splines that are not zero at a place: values and slopes along x and y.
-    fn basis(&self, at: Vector2<f64>) -> ([usize; 16], [[f64; 16]; 3]) {
-        let (column, u) = self.cell_of(0, at.x);
-        let (row, v) = self.cell_of(1, at.y);
-        let ([x, dx], [y, dy]) = (cubic(u), cubic(v));
-        let width = self.cells[0] + 3;
-        let mut places = [0; 16];
-        let mut values = [[0.0; 16]; 3];
-        for i in 0..16 {
-            let (a, b) = (i % 4, i / 4);
-            places[i] = (row + b) * width + column + a;
-            values[0][i] = x[a] * y[b];
-            values[1][i] = dx[a] * y[b] / self.cell.x;
-            values[2][i] = x[a] * dy[b] / self.cell.y;
-        }
-        (places, values)
-    }
-
     /// ψ₁, ψ₂ at a place, and their slopes as columns.
     pub(crate) fn at(&self, at: Vector2<f64>) -> (Vector2<f64>, Matrix2<f64>) {
-        let (places, [values, along, across]) = self.basis(at);
+        let Sixteen {
+            places,
+            values,
+            along,
+            across,
+        } = self.splines.at(at);
         let mut phases = Vector2::zeros();
         let mut slopes = Matrix2::zeros();
         for (k, coefficients) in self.coefficients.iter().enumerate() {
@@ -207,9 +163,9 @@ impl Carrier {
 
     /// ψ₁ and ψ₂ of a line of blocks.
     fn line(&self, places: &Blocks, row: usize) -> [Vec<f64>; 2] {
-        let (cell, v) = self.cell_of(1, places.middle(0.0, row as f64).y);
+        let (cell, v) = self.splines.cell_of(1, places.middle(0.0, row as f64).y);
         let across = cubic(v)[0];
-        let width = self.cells[0] + 3;
+        let width = self.splines.size()[0];
         // The coefficients of this line.
         let of_line = [0, 1].map(|k| {
             let sum = |i: usize| -> f64 {
@@ -221,7 +177,7 @@ impl Carrier {
         });
         let mut out = [0, 1].map(|_| Vec::with_capacity(places.size[0]));
         for column in 0..places.size[0] {
-            let (cell, u) = self.cell_of(0, places.middle(column as f64, 0.0).x);
+            let (cell, u) = self.splines.cell_of(0, places.middle(column as f64, 0.0).x);
             let along = cubic(u)[0];
             for (out, of_line) in out.iter_mut().zip(&of_line) {
                 let terms = along.iter().zip(&of_line[cell..]);

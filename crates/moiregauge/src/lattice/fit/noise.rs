@@ -37,6 +37,11 @@ const SPREAD: f64 = 4.0;
 /// Farther than this from a point of the lattice (cycles per frame) a wave is none of its: nearer, it may be that of
 /// a lattice that changes. Chosen by eye; see docs/constants.md.
 const FOREIGN: f64 = 3.0;
+/// Up to this order that holds ...
+const LOW_ORDER: f64 = 4.0;
+/// ... and beyond, where a lattice has more points than it has strong waves, a wave has to lie on the point itself:
+/// the main lobe of the window. Sharp walls make harmonics of any order.
+const HARMONIC: f64 = 1.5;
 
 /// The periodogram of a residual.
 pub(crate) struct ResidualNoise {
@@ -226,7 +231,12 @@ impl ResidualNoise {
         let inverse = cycles.try_inverse()?;
         let ours = |k: Vector2<f64>| {
             let index = (inverse * k).map(f64::round);
-            index.amax() <= 4.0 && (k - cycles * index).norm() < FOREIGN
+            let near = if index.amax() <= LOW_ORDER {
+                FOREIGN
+            } else {
+                HARMONIC
+            };
+            (k - cycles * index).norm() < near
         };
         let half = self.spectrum.half();
         let (mut most, mut best) = (0.0, None);

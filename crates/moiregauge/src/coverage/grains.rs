@@ -1,0 +1,163 @@
+//! Several lattices side by side: grains.
+//!
+//! Where two grains meet, the slopes of the phases take two values and hardly any between them. The nodes of a patch are split in two by
+//! their slopes, and both parts are described by themselves. Two lattices it is if the data pay for that (BIC) against
+//! the best smooth change of one.
+
+use nalgebra::{Matrix2, Vector4};
+
+use crate::coverage::bend::{Node, described, neighbours, nodes};
+use crate::coverage::cells::Cells;
+use crate::coverage::settle::{Patch, Seen};
+
+/// Rounds of means and nearest means. Chosen by eye.
+const ROUNDS: usize = 20;
+/// A part with fewer nodes than this is a defect and no grain.
+const FEWEST_NODES: usize = 6;
+/// By how much the evidence (BIC) of two lattices has to be better than that of one that changes: chance does that once in e¹⁰.
+const BETTER: f64 = 20.0;
+
+/// The patches of two grains, the larger first; `None` where one lattice describes all of the patch as well.
+pub(crate) fn split(cells: &Cells, seen: &Seen, patch: &Patch) -> Option<[Patch; 2]> {
+    let all = nodes(cells, seen, patch);
+    if all.len() < 2 * FEWEST_NODES {
+        return None;
+    }
+    let second = halves(&all)?;
+    let part = |which: bool| -> Vec<Node> {
+        let chosen = all.iter().zip(&second).filter(|(_, s)| **s == which);
+        chosen.map(|(node, _)| node.clone()).collect()
+    };
+    let parts = [part(false), part(true)];
+    if parts.iter().any(|p| p.len() < FEWEST_NODES) {
+        return None;
+    }
+    let one = described(cells, seen, patch, &all)?;
+    let [a, b] = [0, 1].map(|i| described(cells, seen, patch, &parts[i]));
+    let (a, b) = (a?, b?);
+    let price =
+        |[chi2, parameters, count]: [f64; 3]| count * (chi2 / count).ln() + parameters * count.ln();
+    // Nodes at the boundary belong to neither; where it runs costs a number a node of its length, about the root of
+    // all.
+    let boundary = (all.len() as f64).sqrt() * one[2].ln();
+    let two = price([a[0] + b[0], a[1] + b[1], a[2] + b[2]]) + boundary;
+    if price(one) - two < BETTER {
+        return None;
+    }
+    let mut patches = [false, true].map(|which| grain(cells, patch, &all, &second, which));
+    if patches[1].unit_cells > patches[0].unit_cells {
+        patches.swap(0, 1);
+    }
+    Some(patches)
+}
+
+/// Which nodes belong to the second of two lattices, by their slopes.
+fn halves(nodes: &[Node]) -> Option<Vec<bool>> {
+    let slopes = slopes(nodes);
+    let known: Vec<&Vector4<f64>> = slopes.iter().flatten().collect();
+    let mean = known.iter().copied().sum::<Vector4<f64>>() / known.len() as f64;
+    // Starts at the ends of the direction in which they differ most.
+    let spread: nalgebra::Matrix4<f64> = known
+        .iter()
+        .map(|s| (*s - mean) * (*s - mean).transpose())
+        .sum();
+    let eigen = spread.symmetric_eigen();
+    let along = eigen
+        .eigenvectors
+        .column(eigen.eigenvalues.imax())
+        .into_owned();
+    let deviation = (eigen.eigenvalues.max() / known.len() as f64).sqrt();
+    let mut means = [mean - along * deviation, mean + along * deviation];
+    let nearer = |s: &Vector4<f64>, means: &[Vector4<f64>; 2]| {
+        (s - means[1]).norm_squared() < (s - means[0]).norm_squared()
+    };
+    for _ in 0..ROUNDS {
+        let mut sums = [Vector4::zeros(); 2];
+        let mut counts = [0.0; 2];
+        for s in &known {
+            let i = usize::from(nearer(s, &means));
+            sums[i] += **s;
+            counts[i] += 1.0;
+        }
+        if counts.contains(&0.0) {
+            return None;
+        }
+        means = [sums[0] / counts[0], sums[1] / counts[1]];
+    }
+    let raw: Vec<bool> = slopes
+        .iter()
+        .map(|s| s.as_ref().is_some_and(|s| nearer(s, &means)))
+        .collect();
+    // As most of the neighbours say: noise makes single nodes differ.
+    let mut votes: Vec<i32> = raw.iter().map(|r| if *r { 1 } else { -1 }).collect();
+    for (a, b) in neighbours(nodes) {
+        votes[a] += if raw[b] { 1 } else { -1 };
+        votes[b] += if raw[a] { 1 } else { -1 };
+    }
+    Some(votes.into_iter().map(|v| v > 0).collect())
+}
+
+/// Slopes of the phases of the first two waves at each node, turned from node to node, along columns and rows.
+fn slopes(nodes: &[Node]) -> Vec<Option<Vector4<f64>>> {
+    let mut sums = vec![(Vector4::<f64>::zeros(), [0.0; 2]); nodes.len()];
+    for (a, b) in neighbours(nodes) {
+        let apart = nodes[b].at - nodes[a].at;
+        let axis = usize::from(apart.x.abs() < apart.y.abs());
+        let turn = |wave: usize| (nodes[a].envelopes[wave].conj() * nodes[b].envelopes[wave]).arg();
+        // All three waves: what they say of the first two, by least squares.
+        let turns = [turn(0), turn(1), turn(2)];
+        let first = (2.0 * turns[0] + turns[1] - turns[2]) / 3.0;
+        let second = (turns[0] + 2.0 * turns[1] + turns[2]) / 3.0;
+        for node in [a, b] {
+            sums[node].0[axis] += first / apart[axis];
+            sums[node].0[2 + axis] += second / apart[axis];
+            sums[node].1[axis] += 1.0;
+        }
+    }
+    let of = |(sum, counts): (Vector4<f64>, [f64; 2])| {
+        let [x, y] = counts;
+        (x > 0.0 && y > 0.0).then(|| sum.component_div(&Vector4::new(x, y, x, y)))
+    };
+    sums.into_iter().map(of).collect()
+}
+
+/// The cells whose nearest nodes all belong to one grain.
+fn grain(cells: &Cells, patch: &Patch, nodes: &[Node], second: &[bool], which: bool) -> Patch {
+    let pixels = |i: usize| cells.middle_of(i);
+    let mut inside = vec![false; patch.inside.len()];
+    let scale = cells.period;
+    for cell in (0..inside.len()).filter(|&c| patch.inside[c]) {
+        let at = pixels(cell);
+        let distance = |node: &Node| {
+            let d = node.at - at;
+            (d.x / scale[0]).hypot(d.y / scale[1])
+        };
+        let mut nearest = [f64::INFINITY; 2];
+        for (node, s) in nodes.iter().zip(second) {
+            let least = &mut nearest[usize::from(*s)];
+            *least = least.min(distance(node));
+        }
+        let [own, other] = if which {
+            [nearest[1], nearest[0]]
+        } else {
+            nearest
+        };
+        // Two periods off the middle between nodes of both: windows see one grain alone there.
+        inside[cell] = own < other && other > 2.0;
+    }
+    let counts = cells.counts();
+    let there: f64 = inside
+        .iter()
+        .zip(counts)
+        .filter(|(i, _)| **i)
+        .map(|(_, n)| n)
+        .sum();
+    let share = there / counts.iter().sum::<f64>();
+    Patch {
+        unit_cells: there * patch.pair.determinant().abs() / std::f64::consts::TAU.powi(2),
+        share,
+        inside,
+        pair: Matrix2::from(patch.pair),
+        ..patch.clone()
+    }
+}

@@ -1,0 +1,17 @@
+//! Where in a frame a lattice is.
+//!
+//! In: an image without background and a pair of wave vectors, roughly. Out: the part of the frame that carries
+//! the waves of that lattice, and their mean over it. A sample is not covered everywhere: the moiré ends at an edge,
+//! bubbles and holes interrupt it, another grain begins. A transform of the whole frame then shows each wave with
+//! skirts, and a pair of skirts may look like a lattice; under a window that is slid over the frame it does not.
+
+pub(crate) mod bend;
+pub(crate) mod cells;
+pub(crate) mod find;
+pub(crate) mod finer;
+pub(crate) mod grains;
+pub(crate) mod settle;
+pub(crate) mod tiles;
+
+pub use bend::{Change, ChangeModel};
+pub use settle::Patch;

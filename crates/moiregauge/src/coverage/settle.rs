@@ -1,0 +1,491 @@
+//! From a rough pair of waves to the part of the frame that carries them, and their mean over it.
+//!
+//! The envelopes of the three first waves are compared with what is typical of them where they are: the cells where
+//! their weighted sum is more than half of that are the patch. Over the patch the phases of the envelopes say how
+//! far the pair is off; a few rounds of both settle. The skirts that an edge gives to a wave are this wave with a
+//! slope of its phase: they settle on the wave itself.
+
+use nalgebra::{Matrix2, Vector2};
+use rustfft::num_complex::Complex64;
+
+use crate::coverage::bend::{Mean, mean};
+use crate::coverage::cells::{Cells, Window};
+use crate::coverage::grains::split;
+use crate::frame::image::Image;
+use crate::numbers::median::median;
+
+/// Windows that are tried, mean periods: the narrowest that keeps waves a wave vector apart, and wider ones for
+/// noisy images.
+const WIDTHS: [f64; 4] = [0.8, 1.2, 1.8, 2.7];
+/// Wide enough: noise in the weighted sum, which is 1 where the lattice is, is below this. Five times it fits between
+/// half and one.
+const QUIET: f64 = 0.1;
+/// Cells with more than this share of what is typical are the patch: an edge is where the window sees half.
+const INSIDE: f64 = 0.5;
+/// What is typical of a wave is less than in this share of the cells has more of it: half of the windows of a small patch see its
+/// edge, which does not count.
+const TYPICAL: f64 = 0.75;
+/// Cells whose window is missing for the most part tell nothing.
+const SUPPORT: f64 = 0.15;
+/// Power over noise that each wave has under the window, at least: e⁻⁸ by chance, in each of many windows.
+const PLAIN: f64 = 8.0;
+/// Pixels are averaged where the shortest period has twice so many: harmonics need not be seen.
+const BINS_PER_PERIOD: f64 = 8.0;
+/// Rounds of patch and pair, at most. Chosen by eye.
+const ROUNDS: usize = 8;
+/// The pair stands still when it moves by less than this over the patch, cycles.
+const STILL: f64 = 0.02;
+/// The smallest patch, unit cells of the lattice: fewer make no lattice. Chosen by eye.
+const FEWEST_CELLS: f64 = 5.0;
+/// Parts of the patch smaller than this share of the largest part are dropped, and so are those of fewer unit cells
+/// than [`SMALLEST_PART`].
+const PART: f64 = 0.05;
+/// See [`PART`].
+const SMALLEST_PART: f64 = 3.0;
+/// Gaps of fewer unit cells than this are closed: a defect, or noise.
+const SMALLEST_GAP: f64 = 1.5;
+
+/// The part of a frame that carries a lattice.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Patch {
+    /// The mean waves over it, rad per pixel.
+    pub pair: Matrix2<f64>,
+    /// Cells along columns and rows.
+    pub size: [usize; 2],
+    /// Pixels of a cell along columns and rows; the last cells may have fewer.
+    pub pixels: [usize; 2],
+    /// Whether a cell belongs to it, row by row from the bottom.
+    pub inside: Vec<bool>,
+    /// Share of the pixels that are there.
+    pub share: f64,
+    /// Unit cells of the lattice in it.
+    pub unit_cells: f64,
+}
+
+impl Patch {
+    /// Whether the pixel at (column, row) belongs to it.
+    pub fn holds(&self, [column, row]: [usize; 2]) -> bool {
+        let cell = |axis: usize, at: usize| (at / self.pixels[axis]).min(self.size[axis] - 1);
+        self.inside[cell(1, row) * self.size[0] + cell(0, column)]
+    }
+
+    /// The same in pixels of which `bins` make one along each axis.
+    fn in_pixels(&self, bins: usize) -> Self {
+        Self {
+            pair: self.pair / bins as f64,
+            pixels: self.pixels.map(|n| n * bins),
+            ..self.clone()
+        }
+    }
+
+    /// Its lowest and highest corner, pixels.
+    pub(crate) fn corners(&self) -> [Vector2<f64>; 2] {
+        let (mut low, mut high) = (Vector2::repeat(f64::INFINITY), Vector2::repeat(0.0f64));
+        for i in (0..self.inside.len()).filter(|&i| self.inside[i]) {
+            let cell = Vector2::new((i % self.size[0]) as f64, (i / self.size[0]) as f64);
+            low = low.inf(&cell);
+            high = high.sup(&cell);
+        }
+        let pixels = Vector2::from(self.pixels.map(|n| n as f64));
+        [
+            low.component_mul(&pixels),
+            (high + Vector2::repeat(1.0)).component_mul(&pixels),
+        ]
+    }
+
+    /// The mean place of its pixels.
+    pub(crate) fn middle(&self, cells: &Cells) -> Vector2<f64> {
+        let (mut sum, mut count) = (Vector2::zeros(), 0.0);
+        for i in (0..self.inside.len()).filter(|&i| self.inside[i]) {
+            sum += cells.middle_of(i) * cells.counts()[i];
+            count += cells.counts()[i];
+        }
+        sum / count
+    }
+
+    /// The image with the pixels beside the patch missing.
+    pub(crate) fn of(&self, image: &Image) -> Image {
+        let values = image.values.iter().enumerate().map(|(i, value)| {
+            if self.holds([i % image.columns, i / image.columns]) {
+                *value
+            } else {
+                f64::NAN
+            }
+        });
+        Image::new(image.rows, image.columns, values.collect())
+    }
+}
+
+/// Settles a pair of waves (rad per pixel) on the lattice near it. `pitch`: distance of pixels along columns and rows.
+///
+/// `None` where no part of the frame carries the three waves, or where noise hides where they are.
+pub(crate) fn settle(image: &Image, pair: &Matrix2<f64>, pitch: [f64; 2]) -> Option<Settled> {
+    let shortest = waves(pair).map(|q| std::f64::consts::TAU / q.amax());
+    let shortest = shortest.into_iter().fold(f64::INFINITY, f64::min);
+    match ((shortest / BINS_PER_PERIOD) as usize).max(1) {
+        1 => settle_bins(image, pair, pitch, 1),
+        bins => {
+            let pitch = pitch.map(|p| p * bins as f64);
+            settle_bins(&image.binned(bins), &(pair * bins as f64), pitch, bins)
+        }
+    }
+}
+
+/// The same in an image of bins of so many pixels along each axis.
+fn settle_bins(
+    image: &Image,
+    pair: &Matrix2<f64>,
+    pitch: [f64; 2],
+    bins: usize,
+) -> Option<Settled> {
+    let cells = Cells::new(image, pair, pitch)?;
+    if cells.size.iter().any(|n| *n < 4) {
+        return None;
+    }
+    let windows = WIDTHS.map(|width| (width, cells.window(width)));
+    let mut pair = *pair;
+    let mut narrowest = 0;
+    let mut settled = None;
+    for _ in 0..ROUNDS {
+        let sums = waves(&pair).map(|q| cells.mixed(image, q));
+        let quiet = hollows(&pair).map(|q| cells.mixed(image, q));
+        let seen = (narrowest..WIDTHS.len()).find_map(|i| {
+            let (_, window) = &windows[i];
+            Some((i, look(&cells, &sums, &quiet, window, WIDTHS[i])?))
+        });
+        let (width, seen) = seen?;
+        narrowest = width;
+        let mut inside = shrunk(&cells, &tidy(&cells, seen.inside.clone(), &pair));
+        for (inside, count) in inside.iter_mut().zip(cells.counts()) {
+            *inside &= *count > 0.0;
+        }
+        let unit_cells = area(&cells, &inside, &pair);
+        if unit_cells < FEWEST_CELLS {
+            return None;
+        }
+        let (step, turn) = slope(&cells, &seen, &inside)?;
+        let there = inside.iter().zip(cells.counts()).filter(|(i, _)| **i);
+        let share = there.map(|(_, n)| n).sum::<f64>() / cells.counts().iter().sum::<f64>();
+        let patch = Patch {
+            // That of the envelopes.
+            pair,
+            size: cells.size,
+            pixels: cells.pixels,
+            inside,
+            share,
+            unit_cells,
+        };
+        settled = Some((seen, patch));
+        if turn < STILL {
+            break;
+        }
+        pair += step;
+    }
+    let (seen, inner) = settled?;
+    Some(Settled {
+        patch: inner.in_pixels(bins),
+        cells,
+        seen,
+        inner,
+        bins,
+    })
+}
+
+/// A patch and what was seen of it.
+pub(crate) struct Settled {
+    cells: Cells,
+    seen: Seen,
+    /// The patch in bins.
+    inner: Patch,
+    /// Pixels of a bin along each axis.
+    bins: usize,
+    /// The patch in pixels.
+    pub(crate) patch: Patch,
+}
+
+impl Settled {
+    /// Whether its waves are plain to see everywhere in it, whatever their phases do.
+    pub(crate) fn is_plain(&self) -> bool {
+        self.seen.is_plain()
+    }
+
+    /// Power over noise of its waves in one resolution cell, in sum.
+    pub(crate) fn evidence(&self) -> f64 {
+        self.seen.evidence(&self.cells, &self.inner)
+    }
+
+    /// The patches of two grains where it is no single lattice, the larger first.
+    pub(crate) fn grains(&self) -> Option<[Patch; 2]> {
+        let grains = split(&self.cells, &self.seen, &self.inner)?;
+        Some(grains.map(|grain| grain.in_pixels(self.bins)))
+    }
+
+    /// The mean of its lattice; `None` where its phases cannot be described.
+    pub(crate) fn mean(&self) -> Option<Mean> {
+        Some(mean(&self.cells, &self.seen, &self.inner)?.in_pixels(self.bins))
+    }
+}
+
+/// K₁, K₂ and K₂ − K₁.
+fn waves(pair: &Matrix2<f64>) -> [Vector2<f64>; 3] {
+    let (a, b) = (pair.column(0).into_owned(), pair.column(1).into_owned());
+    [a, b, b - a]
+}
+
+/// The places between the waves that are farthest from all of them: noise stands there, and nothing else.
+fn hollows(pair: &Matrix2<f64>) -> [Vector2<f64>; 3] {
+    [[2.0, 2.0], [-2.0, 4.0], [4.0, -2.0]].map(|[h, k]| pair * Vector2::new(h, k) / 3.0)
+}
+
+/// What a window sees.
+pub(crate) struct Seen {
+    pub(crate) envelopes: [Vec<Complex64>; 3],
+    inside: Vec<bool>,
+    /// Power over noise power of each wave where it is.
+    pub(crate) weights: [f64; 3],
+    /// What noise makes of the power of an envelope.
+    pub(crate) unit: f64,
+    /// The window, mean periods.
+    pub(crate) width: f64,
+}
+
+impl Seen {
+    /// Amplitude over noise amplitude in one resolution cell of the patch, weakest of the three waves.
+    pub(crate) fn signal_to_noise(&self, cells: &Cells, patch: &Patch) -> f64 {
+        let weakest = self.weights.iter().copied().fold(f64::INFINITY, f64::min);
+        (weakest * self.windows(cells, patch)).sqrt()
+    }
+
+    /// Independent windows in a patch.
+    fn windows(&self, cells: &Cells, patch: &Patch) -> f64 {
+        let inside = patch.inside.iter().zip(cells.counts());
+        let pixels: f64 = inside.filter(|(i, _)| **i).map(|(_, n)| n).sum();
+        let [a, b] = [0, 1].map(|axis| self.width * cells.period[axis]);
+        pixels / (4.0 * std::f64::consts::PI * a * b)
+    }
+
+    /// Whether each of the three waves stands out of the noise under the window itself.
+    pub(crate) fn is_plain(&self) -> bool {
+        self.weights.iter().all(|w| *w > PLAIN)
+    }
+
+    /// Power over noise of the three waves in one resolution cell of the patch, in sum.
+    pub(crate) fn evidence(&self, cells: &Cells, patch: &Patch) -> f64 {
+        self.weights.iter().sum::<f64>() * self.windows(cells, patch)
+    }
+}
+
+/// `None` where noise makes the window unfit.
+fn look(
+    cells: &Cells,
+    sums: &[Vec<Complex64>; 3],
+    quiet: &[Vec<Complex64>; 3],
+    window: &Window,
+    width: f64,
+) -> Option<Seen> {
+    let envelopes = [0, 1, 2].map(|i| cells.envelope(&sums[i], window));
+    let usable: Vec<usize> = (0..cells.len())
+        .filter(|&i| window.support[i] > SUPPORT)
+        .collect();
+    if usable.is_empty() {
+        return None;
+    }
+    // Per pixel, as the median sees it: edges and steps, which are in few cells, do not count.
+    let noise = quiet.iter().map(|sums| {
+        let envelope = cells.envelope(sums, window);
+        let powers = usable
+            .iter()
+            .map(|&i| envelope[i].norm_sqr() / window.noise[i]);
+        median(&mut powers.collect::<Vec<f64>>()) / std::f64::consts::LN_2
+    });
+    let noise = noise.sum::<f64>() / 3.0;
+    let all: Vec<f64> = usable.iter().map(|&i| window.noise[i]).collect();
+    let unit = noise * median(&mut all.clone());
+    // Typical power of each wave where it is: first by the strong cells, then as the median of the patch.
+    let mut typical = [0, 1, 2].map(|i| {
+        let powers = || usable.iter().map(|&n| envelopes[i][n].norm_sqr());
+        powers().map(|p| p * p).sum::<f64>() / powers().sum::<f64>().max(f64::MIN_POSITIVE)
+    });
+    let mut inside = vec![false; cells.len()];
+    for _ in 0..4 {
+        let total: f64 = typical.iter().sum();
+        let quiet = (unit / (2.0 * total)).sqrt();
+        if !(quiet < QUIET) {
+            return None;
+        }
+        let mut any = false;
+        for &n in &usable {
+            let found = [0, 1, 2].map(|i| envelopes[i][n].norm() * typical[i].sqrt());
+            inside[n] = found.iter().sum::<f64>() > INSIDE * total;
+            any |= inside[n];
+        }
+        if !any {
+            return None;
+        }
+        let before = typical;
+        for i in 0..3 {
+            let powers = usable.iter().filter(|n| inside[**n]);
+            let mut powers: Vec<f64> = powers.map(|&n| envelopes[i][n].norm_sqr()).collect();
+            let place = (TYPICAL * (powers.len() - 1) as f64) as usize;
+            typical[i] = *powers.select_nth_unstable_by(place, f64::total_cmp).1;
+        }
+        let moved = (0..3).map(|i| (typical[i] / before[i] - 1.0).abs());
+        if moved.fold(0.0, f64::max) < 0.02 {
+            break;
+        }
+    }
+    Some(Seen {
+        weights: typical.map(|t| t / unit),
+        envelopes,
+        inside,
+        unit,
+        width,
+    })
+}
+
+/// By how much the phases of the envelopes say that the pair is off, and by how many cycles that turns them over the
+/// patch.
+fn slope(cells: &Cells, seen: &Seen, inside: &[bool]) -> Option<(Matrix2<f64>, f64)> {
+    let [across, up] = cells.size;
+    let at = |x: usize, y: usize| y * across + x;
+    // Far enough apart that noise is not the same, and as far as the patch allows once that is small.
+    let extent = extent(cells, inside);
+    let mut steps = [Vector2::<f64>::zeros(); 3];
+    for axis in 0..2 {
+        let window = (seen.width * cells.period[axis] / cells.pixels[axis] as f64).ceil() as usize;
+        let mut lag = window.max(1);
+        for _ in 0..3 {
+            let (w, h) = if axis == 0 { (lag, 0) } else { (0, lag) };
+            for (step, envelope) in steps.iter_mut().zip(&seen.envelopes) {
+                let turn = step[axis] * (lag * cells.pixels[axis]) as f64;
+                let mut sum = Complex64::default();
+                for y in 0..up.saturating_sub(h) {
+                    for x in 0..across.saturating_sub(w) {
+                        let (a, b) = (at(x, y), at(x + w, y + h));
+                        if inside[a] && inside[b] {
+                            sum += envelope[a].conj() * envelope[b];
+                        }
+                    }
+                }
+                sum *= Complex64::cis(-turn);
+                if sum.norm() > 0.0 {
+                    step[axis] += sum.arg() / (lag * cells.pixels[axis]) as f64;
+                }
+            }
+            lag = (2 * lag).min((extent[axis] / 2).max(window)).max(1);
+        }
+    }
+    // K₁, K₂ by least squares with K₃ = K₂ − K₁.
+    let w = seen.weights;
+    let normal = Matrix2::new(w[0] + w[2], -w[2], -w[2], w[1] + w[2]);
+    let inverse = normal.try_inverse()?;
+    let right = Matrix2::from_columns(&[
+        steps[0] * w[0] - steps[2] * w[2],
+        steps[1] * w[1] + steps[2] * w[2],
+    ]);
+    let step = right * inverse.transpose();
+    let size = Vector2::new(
+        (extent[0] * cells.pixels[0]) as f64,
+        (extent[1] * cells.pixels[1]) as f64,
+    );
+    let turn = waves(&step)
+        .iter()
+        .map(|q| q.component_mul(&size).abs().max())
+        .fold(0.0, f64::max)
+        / std::f64::consts::TAU;
+    step.iter().all(|s| s.is_finite()).then_some((step, turn))
+}
+
+/// Cells from the first to the last of the patch, along columns and rows.
+fn extent(cells: &Cells, inside: &[bool]) -> [usize; 2] {
+    let (mut low, mut high) = ([usize::MAX; 2], [0; 2]);
+    for i in (0..inside.len()).filter(|&i| inside[i]) {
+        for (axis, at) in [i % cells.size[0], i / cells.size[0]]
+            .into_iter()
+            .enumerate()
+        {
+            low[axis] = low[axis].min(at);
+            high[axis] = high[axis].max(at);
+        }
+    }
+    [0, 1].map(|axis| (high[axis] + 1).saturating_sub(low[axis]))
+}
+
+/// Unit cells of the lattice in the patch.
+fn area(cells: &Cells, inside: &[bool], pair: &Matrix2<f64>) -> f64 {
+    let pixels = inside.iter().zip(cells.counts()).filter(|(i, _)| **i);
+    pixels.map(|(_, n)| n).sum::<f64>() * unit_cells_per_pixel(pair)
+}
+
+fn unit_cells_per_pixel(pair: &Matrix2<f64>) -> f64 {
+    pair.determinant().abs() / std::f64::consts::TAU.powi(2)
+}
+
+/// The patch without small gaps and small parts.
+fn tidy(cells: &Cells, mut inside: Vec<bool>, pair: &Matrix2<f64>) -> Vec<bool> {
+    let per_cell = (cells.pixels[0] * cells.pixels[1]) as f64 * unit_cells_per_pixel(pair);
+    for gap in parts(cells.size, &inside, false) {
+        if (gap.len() as f64) * per_cell < SMALLEST_GAP {
+            for i in gap {
+                inside[i] = true;
+            }
+        }
+    }
+    let all = parts(cells.size, &inside, true);
+    let largest = all.iter().map(Vec::len).max().unwrap_or(0) as f64;
+    for part in all {
+        let cells = part.len() as f64;
+        if cells < PART * largest || cells * per_cell < SMALLEST_PART {
+            for i in part {
+                inside[i] = false;
+            }
+        }
+    }
+    inside
+}
+
+/// The patch without the cells at its edges, but for those of the frame: an edge is known to about a cell, and what
+/// lies beyond it is no lattice.
+fn shrunk(cells: &Cells, inside: &[bool]) -> Vec<bool> {
+    let [across, up] = cells.size;
+    let all_around = |i: usize| {
+        let (x, y) = (i % across, i / across);
+        (y.saturating_sub(1)..=(y + 1).min(up - 1)).all(|y| {
+            (x.saturating_sub(1)..=(x + 1).min(across - 1)).all(|x| inside[y * across + x])
+        })
+    };
+    (0..inside.len()).map(all_around).collect()
+}
+
+/// The connected parts of the cells that are `wanted`.
+fn parts(size: [usize; 2], inside: &[bool], wanted: bool) -> Vec<Vec<usize>> {
+    let [across, up] = size;
+    let mut seen = vec![false; inside.len()];
+    let mut all = Vec::new();
+    for start in 0..inside.len() {
+        if seen[start] || inside[start] != wanted {
+            continue;
+        }
+        let mut part = vec![start];
+        seen[start] = true;
+        let mut next = 0;
+        while next < part.len() {
+            let (x, y) = (part[next] % across, part[next] / across);
+            next += 1;
+            let neighbours = [
+                (x > 0).then(|| y * across + x - 1),
+                (x + 1 < across).then(|| y * across + x + 1),
+                (y > 0).then(|| (y - 1) * across + x),
+                (y + 1 < up).then(|| (y + 1) * across + x),
+            ];
+            for i in neighbours.into_iter().flatten() {
+                if !seen[i] && inside[i] == wanted {
+                    seen[i] = true;
+                    part.push(i);
+                }
+            }
+        }
+        all.push(part);
+    }
+    all
+}
