@@ -19,8 +19,16 @@ use crate::coverage::settle::{Patch, Seen};
 use crate::numbers::normal_equations::NormalEquations;
 use crate::numbers::splines::Splines;
 
-/// Distance of nodes in widths of the window: information is kept, and nodes are few.
+/// Distance of nodes in widths of the window: small patches need every place, ...
+const CLOSE: f64 = 1.0;
+/// ... and large ones, of more unit cells than this, few nodes. Information is kept by both.
+const LARGE: f64 = 400.0;
+/// Distance of nodes in large patches.
 const STRIDE: f64 = 2.0;
+/// Independent phases in a node of one window: nodes closer than a window are correlated.
+const INDEPENDENT: f64 = 2.5;
+/// The least degrees of freedom by which an error is enlarged: fewer say nothing of the noise.
+const FREEDOM: f64 = 10.0;
 /// Cells of splines along the longer side of the patch that are tried.
 const SPLINES: [usize; 7] = [1, 2, 3, 4, 6, 9, 13];
 /// A cell of the splines is at least so many windows wide: what is smaller the window does not see.
@@ -33,6 +41,9 @@ const LOST: f64 = 2.0;
 const STIFFNESS: f64 = 1e-6;
 /// By how much the evidence (BIC) of a lattice that changes has to be better: chance does that once in e¹⁰.
 const BETTER: f64 = 20.0;
+
+/// Nodes whose errors are correlated by less than this are independent.
+const UNCORRELATED: f64 = 1e-3;
 
 /// How a lattice changes across its patch.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -91,8 +102,12 @@ pub(crate) struct Node {
     /// Position on the grid of nodes.
     pub(crate) place: [usize; 2],
     pub(crate) envelopes: [Complex64; 3],
-    /// Information on the phase of each wave, 1/rad².
+    /// Information on the phase of each wave, 1/rad²: that of the pixels that belong to this node alone.
     weights: [f64; 3],
+    /// Pixels that belong to this node over those of its window.
+    share: f64,
+    /// Standard deviation of the phases; that of nodes beside each other is correlated.
+    errors: [f64; 3],
 }
 
 /// The functions that describe ψ₁ and ψ₂.
@@ -146,13 +161,62 @@ impl Basis {
 struct Fit {
     basis: Basis,
     coefficients: DVector<f64>,
-    covariance: DMatrix<f64>,
+    /// Inverse of the normal matrix.
+    inverse: DMatrix<f64>,
     /// BIC.
     price: f64,
     /// χ².
     chi2: f64,
-    /// χ² over its degrees of freedom.
-    reduced: f64,
+    /// Independent phases.
+    independent: f64,
+    /// By how much variances are enlarged, since χ² is larger than its degrees of freedom.
+    enlarged: f64,
+}
+
+impl Fit {
+    /// Covariance of sums over the coefficients (a row each): what the errors of all nodes, correlated as they are under the
+    /// window, do to them.
+    fn covariance(&self, sums: &DMatrix<f64>, nodes: &[Node], reach: Vector2<f64>) -> DMatrix<f64> {
+        let gains = sums * &self.inverse;
+        // What each phase does to the sums, times its error.
+        let of_node = |node: &Node| {
+            rows(&self.basis, node.at).map(|row| {
+                let mut gain = DVector::zeros(sums.nrows());
+                for (i, x) in row {
+                    gain += gains.column(i) * x;
+                }
+                gain
+            })
+        };
+        let all: Vec<[DVector<f64>; 3]> = nodes
+            .iter()
+            .map(|node| {
+                let mut gains = of_node(node);
+                for (wave, gain) in gains.iter_mut().enumerate() {
+                    *gain *= node.weights[wave] * node.errors[wave];
+                }
+                gains
+            })
+            .collect();
+        let mut covariance = DMatrix::zeros(sums.nrows(), sums.nrows());
+        for (i, a) in nodes.iter().enumerate() {
+            for (j, b) in nodes.iter().enumerate().skip(i) {
+                let d = (b.at - a.at).component_div(&reach);
+                let correlation = (-0.25 * d.norm_squared()).exp();
+                if correlation < UNCORRELATED {
+                    continue;
+                }
+                for wave in 0..3 {
+                    let product = correlation * &all[i][wave] * all[j][wave].transpose();
+                    covariance += &product;
+                    if i != j {
+                        covariance += product.transpose();
+                    }
+                }
+            }
+        }
+        covariance * self.enlarged
+    }
 }
 
 /// What describes the phases over a patch best.
@@ -166,11 +230,12 @@ struct Chosen {
 
 /// The mean over a patch; `None` where its phases cannot be described.
 pub(crate) fn mean(cells: &Cells, seen: &Seen, patch: &Patch) -> Option<Mean> {
-    let chosen = choose(cells, seen, patch, &nodes(cells, seen, patch))?;
-    Some(summary(&chosen, cells, seen, patch))
+    let nodes = nodes(cells, seen, patch);
+    let chosen = choose(cells, seen, patch, &nodes)?;
+    Some(summary(&chosen, &nodes, cells, seen, patch))
 }
 
-/// χ² of the best description of some nodes, its parameters, and the number of phases that it describes.
+/// χ² of the best description of some nodes, its parameters, and the number of independent phases that it describes.
 pub(crate) fn described(
     cells: &Cells,
     seen: &Seen,
@@ -178,11 +243,7 @@ pub(crate) fn described(
     nodes: &[Node],
 ) -> Option<[f64; 3]> {
     let fit = choose(cells, seen, patch, nodes)?.fit;
-    Some([
-        fit.chi2,
-        fit.coefficients.len() as f64,
-        3.0 * nodes.len() as f64,
-    ])
+    Some([fit.chi2, fit.coefficients.len() as f64, fit.independent])
 }
 
 fn choose(cells: &Cells, seen: &Seen, patch: &Patch, nodes: &[Node]) -> Option<Chosen> {
@@ -237,9 +298,15 @@ fn choose(cells: &Cells, seen: &Seen, patch: &Patch, nodes: &[Node]) -> Option<C
 }
 
 pub(crate) fn nodes(cells: &Cells, seen: &Seen, patch: &Patch) -> Vec<Node> {
+    let window = cells.window(seen.width);
     let width = [0, 1].map(|axis| seen.width * cells.period[axis]);
+    let apart = if patch.unit_cells > LARGE {
+        STRIDE
+    } else {
+        CLOSE
+    };
     let stride = [0, 1]
-        .map(|axis| ((STRIDE * width[axis] / cells.pixels[axis] as f64).round() as usize).max(1));
+        .map(|axis| ((apart * width[axis] / cells.pixels[axis] as f64).round() as usize).max(1));
     let pixels = [0, 1].map(|axis| (stride[axis] * cells.pixels[axis]) as f64);
     // Pixels of a node over those of its window.
     let share = pixels[0] * pixels[1] / (4.0 * std::f64::consts::PI * width[0] * width[1]);
@@ -261,6 +328,9 @@ pub(crate) fn nodes(cells: &Cells, seen: &Seen, patch: &Patch) -> Vec<Node> {
                 at: cells.middle([x, y]),
                 place: [i, j],
                 weights: envelopes.map(|a| 2.0 * a.norm_sqr() / seen.unit * share),
+                share,
+                errors: envelopes
+                    .map(|a| (seen.noise * window.noise[cell] / (2.0 * a.norm_sqr())).sqrt()),
                 envelopes,
             });
         }
@@ -374,15 +444,28 @@ fn fit(basis: Basis, nodes: &[Node]) -> Option<Fit> {
         last = Some((equations, chi2, count));
     }
     let (equations, chi2, count) = last?;
-    let freedom = (count - size as f64).max(1.0);
+    let share = nodes.first()?.share;
+    let independent = count * (INDEPENDENT * share).min(1.0);
+    // The information of all nodes together is that of the pixels, each of them once.
+    let freedom = share * count - size as f64;
     Some(Fit {
-        covariance: equations.inverse(),
+        inverse: equations.inverse(),
         coefficients,
-        price: count * (chi2 / count).ln() + size as f64 * count.ln(),
+        price: price(chi2, size as f64, independent),
         chi2,
-        reduced: chi2 / freedom,
+        independent,
+        enlarged: if freedom > FREEDOM {
+            (chi2 / freedom).max(1.0)
+        } else {
+            1.0
+        },
         basis,
     })
+}
+
+/// BIC of χ² (in units that do not matter), parameters and independent data.
+pub(crate) fn price(chi2: f64, parameters: f64, independent: f64) -> f64 {
+    independent * (chi2 / independent).ln() + parameters * independent.ln()
 }
 
 /// b − a.
@@ -434,8 +517,9 @@ fn align(
     coefficients[2 * n] += third;
 }
 
-fn summary(chosen: &Chosen, cells: &Cells, seen: &Seen, patch: &Patch) -> Mean {
+fn summary(chosen: &Chosen, nodes: &[Node], cells: &Cells, seen: &Seen, patch: &Patch) -> Mean {
     let fit = &chosen.fit;
+    let reach = Vector2::from_fn(|axis, _| seen.width * cells.period[axis]);
     let n = fit.basis.len();
     let size = fit.coefficients.len();
     // Mean slopes of ψ₁ and ψ₂ as sums over the coefficients, and how they spread.
@@ -460,8 +544,7 @@ fn summary(chosen: &Chosen, cells: &Cells, seen: &Seen, patch: &Patch) -> Mean {
     sums /= pixels;
     let step = &sums * &fit.coefficients;
     let step = Matrix2::from_column_slice(step.as_slice());
-    let enlarged = fit.reduced.max(1.0);
-    let covariance = &sums * &fit.covariance * sums.transpose() * enlarged;
+    let covariance = fit.covariance(&sums, nodes, reach);
     let covariance = Matrix4::from_column_slice(covariance.as_slice());
     let covariance = covariance + edges(fit, cells, patch, &step);
     let pair = patch.pair + step;
@@ -475,7 +558,7 @@ fn summary(chosen: &Chosen, cells: &Cells, seen: &Seen, patch: &Patch) -> Mean {
     let waves = [patch.pair.column(0), patch.pair.column(1)].map(|q| q.dot(&middle));
     let carried = [waves[0], waves[1], waves[1] - waves[0]];
     let phases = &at_middle * &fit.coefficients;
-    let phase_covariance = &at_middle * &fit.covariance * at_middle.transpose() * enlarged;
+    let phase_covariance = fit.covariance(&at_middle, nodes, reach);
     let (wavelength, angle) = spread(&pair, &step, &local, pixels);
     Mean {
         waves: Waves::new(pair, covariance),

@@ -6,7 +6,7 @@
 
 use nalgebra::{Matrix2, Vector4};
 
-use crate::coverage::bend::{Node, described, neighbours, nodes};
+use crate::coverage::bend::{Node, described, neighbours, nodes, price};
 use crate::coverage::cells::Cells;
 use crate::coverage::settle::{Patch, Seen};
 
@@ -24,24 +24,30 @@ pub(crate) fn split(cells: &Cells, seen: &Seen, patch: &Patch) -> Option<[Patch;
         return None;
     }
     let second = halves(&all)?;
-    let part = |which: bool| -> Vec<Node> {
-        let chosen = all.iter().zip(&second).filter(|(_, s)| **s == which);
+    // Windows of nodes at the boundary see both.
+    let mut apart = vec![true; all.len()];
+    for (a, b) in neighbours(&all) {
+        if second[a] != second[b] {
+            apart[a] = false;
+            apart[b] = false;
+        }
+    }
+    let part = |wanted: &dyn Fn(bool) -> bool| -> Vec<Node> {
+        let nodes = all.iter().zip(second.iter().zip(&apart));
+        let chosen = nodes.filter(|(_, (which, apart))| **apart && wanted(**which));
         chosen.map(|(node, _)| node.clone()).collect()
     };
-    let parts = [part(false), part(true)];
+    let parts = [part(&|second| !second), part(&|second| second)];
     if parts.iter().any(|p| p.len() < FEWEST_NODES) {
         return None;
     }
-    let one = described(cells, seen, patch, &all)?;
+    let one = described(cells, seen, patch, &part(&|_| true))?;
     let [a, b] = [0, 1].map(|i| described(cells, seen, patch, &parts[i]));
     let (a, b) = (a?, b?);
-    let price =
-        |[chi2, parameters, count]: [f64; 3]| count * (chi2 / count).ln() + parameters * count.ln();
-    // Nodes at the boundary belong to neither; where it runs costs a number a node of its length, about the root of
-    // all.
-    let boundary = (all.len() as f64).sqrt() * one[2].ln();
-    let two = price([a[0] + b[0], a[1] + b[1], a[2] + b[2]]) + boundary;
-    if price(one) - two < BETTER {
+    // Where the boundary runs costs about as many numbers as it is nodes long.
+    let boundary = one[2].sqrt() * one[2].ln() / 2.0;
+    let two = price(a[0] + b[0], a[1] + b[1], a[2] + b[2]) + boundary;
+    if price(one[0], one[1], one[2]) - two < BETTER {
         return None;
     }
     let mut patches = [false, true].map(|which| grain(cells, patch, &all, &second, which));

@@ -243,7 +243,9 @@ pub(crate) struct Seen {
     inside: Vec<bool>,
     /// Power over noise power of each wave where it is.
     pub(crate) weights: [f64; 3],
-    /// What noise makes of the power of an envelope.
+    /// Noise power per pixel.
+    pub(crate) noise: f64,
+    /// What noise makes of the power of an envelope, where nothing is missing.
     pub(crate) unit: f64,
     /// The window, mean periods.
     pub(crate) width: f64,
@@ -338,6 +340,7 @@ fn look(
         weights: typical.map(|t| t / unit),
         envelopes,
         inside,
+        noise,
         unit,
         width,
     })

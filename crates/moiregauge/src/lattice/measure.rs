@@ -52,11 +52,15 @@ pub fn measure(
     let (pair, size) = (found.reciprocal, [image.columns, image.rows]);
     let to_physical = geometry.pixel_to_nm.try_inverse().map(|m| m.transpose());
     let finer = to_physical.and_then(|m| finer(&pair, &wave.wave_vector, size, &m));
-    if finer.is_none() && !is_stronger(&found, &wave) {
+    let finer = finer.and_then(|pair| Start::near(image, geometry, background, &pair));
+    if let Some(start) = finer.filter(|s| verdict(&s.prepared.harmonics) == Verdict::Lattice) {
+        return start.measure(method);
+    }
+    if !is_stronger(&found, &wave) {
         return Ok(found);
     }
-    // A finer lattice explains it, or another part of the frame; if not, it is something else beside the lattice.
-    let another = Start::find_patch(image, geometry, background, &[finer, Some(pair)])
+    // Another part of the frame explains it, or it is something else beside the lattice.
+    let another = Start::find_patch(image, geometry, background, &[Some(pair)])
         .and_then(|start| start.measure(method).ok())
         .filter(|other| beside(other).is_none_or(|wave| !is_stronger(other, &wave)));
     Ok(another.unwrap_or(found))
@@ -254,9 +258,10 @@ impl Start {
         let start = Self::near(&part, &geometry, background, &again.patch.pair)?;
         let mut found = start.on_patch(image, again)?;
         let flat = remove_background(&other.of(image), background);
+        let settled_share = other.share;
         if let Some(other) = settle(&flat, &other.pair, pitch(&geometry)) {
             found.others.push(Grain {
-                share: other.patch.share,
+                share: settled_share,
                 waves: other
                     .mean()
                     .map_or(other.patch.pair, |mean| mean.waves.basis),
@@ -281,7 +286,10 @@ impl Start {
             let near = Self::near(&part, geometry, background, &patch.pair);
             let Some(start) = near else { continue };
             let coherent = match verdict(&start.prepared.harmonics) {
-                Verdict::Lattice => evidence(&start.prepared.harmonics),
+                // A part of the frame is chosen by its waves: they have to be plain to see in it.
+                Verdict::Lattice if patch.share > WHOLE || settled.is_plain() => {
+                    evidence(&start.prepared.harmonics)
+                }
                 _ => 0.0,
             };
             let plain = settled.is_plain() && patch.unit_cells > FEWEST_CELLS;

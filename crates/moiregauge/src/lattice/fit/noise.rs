@@ -41,7 +41,7 @@ const FOREIGN: f64 = 3.0;
 const LOW_ORDER: f64 = 4.0;
 /// ... and beyond, where a lattice has more points than it has strong waves, a wave has to lie on the point itself:
 /// the main lobe of the window. Sharp walls make harmonics of any order.
-const HARMONIC: f64 = 1.5;
+const HARMONIC: f64 = 2.0;
 
 /// The periodogram of a residual.
 pub(crate) struct ResidualNoise {
