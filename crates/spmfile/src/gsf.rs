@@ -10,9 +10,12 @@ use crate::cursor::Endian;
 use crate::error::ReadError;
 use crate::export::{ExportError, base_values};
 use crate::fields;
+use crate::header::ChannelHeader;
 use crate::labels;
+use crate::outline::{Input, Outline};
 use crate::raster::{self, Encoding, Order};
-use crate::scan::{Channel, ChannelInfo, Scan, Span};
+use crate::scan::{Channel, ChannelInfo, Scan};
+use crate::stored::Flat;
 use crate::units;
 use crate::whole::Extent;
 
@@ -25,14 +28,17 @@ fn damaged(reason: impl Into<String>) -> ReadError {
     ReadError::damaged(FORMAT, reason)
 }
 
-/// Reads the channel if it is wanted.
-pub(crate) fn read(bytes: &[u8], wanted: &dyn Fn(&ChannelInfo) -> bool) -> Result<Scan, ReadError> {
+/// Reads the headers and finds the samples.
+pub(crate) fn open<'a>(input: &Input<'a>) -> Result<Outline<'a>, ReadError> {
+    let bytes = input.bytes;
     let (fields, start) = fields::header(bytes, 4).map_err(damaged)?;
     let rows = fields::count(&fields, "YRes").map_err(damaged)?;
     let columns = fields::count(&fields, "XRes").map_err(damaged)?;
     let length = raster::byte_length(rows, columns, Encoding::F32)
         .ok_or_else(|| damaged(format!("its size is {rows} lines of {columns} samples")))?;
-    let beyond = bytes.len().saturating_sub(start.saturating_add(length));
+    let beyond = input
+        .length
+        .saturating_sub(start.saturating_add(length) as u64);
     if beyond > 0 {
         return Err(damaged(format!(
             "{beyond} bytes too many for {rows} lines of {columns} samples"
@@ -63,7 +69,7 @@ pub(crate) fn read(bytes: &[u8], wanted: &dyn Fn(&ChannelInfo) -> bool) -> Resul
             .to_owned(),
         scan_line: labels::value(&fields, "scan line").map(str::to_owned),
     };
-    let unit = units::clean(fields::get(&fields, "ZUnits").unwrap_or(""));
+    let unit = fields::get(&fields, "ZUnits").unwrap_or("").to_owned();
     let plane_fit = labels::value(&fields, "plane fit").map(str::to_owned);
     let mut scan = Scan {
         format: FORMAT.to_owned(),
@@ -73,32 +79,23 @@ pub(crate) fn read(bytes: &[u8], wanted: &dyn Fn(&ChannelInfo) -> bool) -> Resul
         ..Scan::default()
     };
     labels::apply(&mut scan);
+    let mut outline = Outline::of(scan);
     let mut extent = Extent::default();
-    let block = extent.take(bytes, start, length, &info.name);
-    if let Some(block) = block.filter(|_| wanted(&info)) {
+    if extent.take(input.length, start, length, &info.name) {
         let order = Order {
             top_first: true,
             mirrored: false,
         };
-        scan.channels.push(Channel {
-            name: info.name,
-            internal_name: info.internal_name,
-            unit,
-            line_direction: info.line_direction,
-            scan_line: info.scan_line,
-            rows,
-            columns,
+        let header = ChannelHeader {
             width_nm,
             height_nm,
-            span: Span::PixelEdges,
-            scale: 1.0,
-            offset: 0.0,
-            scaling: "values as stored".to_owned(),
             plane_fit,
-            samples: raster::decode(block, columns, Encoding::F32, Endian::Little, order),
-        });
+            ..ChannelHeader::new(info, rows, columns).in_unit(&unit)
+        };
+        let samples = Flat::at(start, Encoding::F32, Endian::Little).in_order(order);
+        outline.add_flat(header, samples);
     }
-    extent.judge(scan, bytes)
+    extent.judge(outline, input.length)
 }
 
 /// The bytes of a `.gsf` file with one channel of `scan`.

@@ -13,8 +13,11 @@ use crate::cursor::{Cursor, Endian};
 use crate::error::ReadError;
 use crate::export::{ExportError, base_values};
 use crate::fields;
+use crate::header::ChannelHeader;
 use crate::labels;
+use crate::outline::{Input, Outline};
 use crate::scan::{Channel, ChannelInfo, LineDirection, Samples, Scan, Span};
+use crate::stored::{Stored, Unpacked};
 use crate::units;
 use crate::whole::MOST_CHANNELS;
 
@@ -37,8 +40,9 @@ fn unsupported(reason: String) -> ReadError {
     ReadError::unsupported(FORMAT, reason)
 }
 
-/// Reads the channels that are wanted.
-pub(crate) fn read(bytes: &[u8], wanted: &dyn Fn(&ChannelInfo) -> bool) -> Result<Scan, ReadError> {
+/// Reads the headers and finds the samples.
+pub(crate) fn open<'a>(input: &Input<'a>) -> Result<Outline<'a>, ReadError> {
+    let bytes = input.bytes;
     let (fields, start) = fields::header(bytes, 8).map_err(damaged)?;
     let channels = fields::count(&fields, "NChannels").map_err(damaged)?;
     if channels > MOST_CHANNELS {
@@ -85,11 +89,6 @@ pub(crate) fn read(bytes: &[u8], wanted: &dyn Fn(&ChannelInfo) -> bool) -> Resul
         },
         None => Turned::of(data, width, columns, rows),
     };
-    let samples = |index: usize| -> Vec<f64> {
-        (0..points)
-            .map(|point| number(data, width, order.place(point, columns, rows), index))
-            .collect()
-    };
     let span = match labels::value(&fields, "size reaches") {
         Some("edges") => Span::PixelEdges,
         Some("frame") => Span::Frame,
@@ -103,37 +102,32 @@ pub(crate) fn read(bytes: &[u8], wanted: &dyn Fn(&ChannelInfo) -> bool) -> Resul
     labels::apply(&mut scan);
     scan.metadata = fields::others(scan.metadata, &KEYS);
     let line_direction = labels::stated_direction(&fields);
+    let size = scan.size_nm;
+    let mut outline = Outline::of(scan);
     for index in 0..channels + 2 {
-        let info = info(index, &fields, line_direction);
-        if !wanted(&info) {
-            continue;
-        }
         let unit = match index {
-            0 | 1 => "nm".to_owned(),
+            0 | 1 => "nm",
             _ => {
                 let own = fields::get(&fields, &format!("ZUnits{}", index - 1));
-                units::clean(own.or(fields::get(&fields, "ZUnits")).unwrap_or(""))
+                own.or(fields::get(&fields, "ZUnits")).unwrap_or("")
             }
         };
-        scan.channels.push(Channel {
-            name: info.name,
-            internal_name: info.internal_name,
-            unit,
-            line_direction: info.line_direction,
-            scan_line: None,
-            rows,
-            columns,
-            width_nm: scan.size_nm.map(|[width, _]| width),
-            height_nm: scan.size_nm.map(|[_, height]| height),
+        let scale = if index < 2 { nm } else { 1.0 };
+        let header = ChannelHeader {
             span,
-            scale: if index < 2 { nm } else { 1.0 },
-            offset: 0.0,
-            scaling: "values as stored".to_owned(),
-            plane_fit: None,
-            samples: Samples::F64(samples(index)),
-        });
+            ..ChannelHeader::new(info(index, &fields, line_direction), rows, columns)
+                .in_unit(unit)
+                .of_size(size)
+                .scaled(scale, 0.0, "values as stored".to_owned())
+        };
+        let samples = move || {
+            let place = |point: usize| order.place(point, columns, rows);
+            let values = (0..points).map(|point| number(data, width, place(point), index));
+            Ok(Unpacked::measured(Samples::F64(values.collect())))
+        };
+        outline.add(header, Stored::Packed(Box::new(samples)));
     }
-    Ok(scan)
+    Ok(outline)
 }
 
 /// The first two columns are the position sensors.
@@ -168,6 +162,7 @@ fn number(data: &[u8], width: usize, point: usize, index: usize) -> f64 {
 }
 
 /// Which way the stored lines and points run against up and right.
+#[derive(Clone, Copy)]
 struct Turned {
     lines: bool,
     points: bool,
@@ -190,7 +185,7 @@ impl Turned {
     }
 
     /// The stored place of a pixel counted from the bottom left.
-    fn place(&self, pixel: usize, columns: usize, rows: usize) -> usize {
+    fn place(self, pixel: usize, columns: usize, rows: usize) -> usize {
         let (row, column) = (pixel / columns, pixel % columns);
         let row = if self.lines { rows - 1 - row } else { row };
         let column = if self.points {

@@ -17,8 +17,11 @@
 use crate::clock;
 use crate::cursor::{Cursor, Endian};
 use crate::error::ReadError;
+use crate::header::ChannelHeader;
+use crate::outline::{Input, Outline};
 use crate::raster::{self, Encoding, Order};
-use crate::scan::{Channel, ChannelInfo, DateTime, FrameDirection, LineDirection, Scan, Span};
+use crate::scan::{ChannelInfo, DateTime, FrameDirection, LineDirection, Scan, Span};
+use crate::stored::Flat;
 use crate::units::{self, quantity};
 use crate::whole::{Extent, MOST_CHANNELS};
 
@@ -36,6 +39,27 @@ fn damaged(reason: impl Into<String>) -> ReadError {
 
 fn unsupported(reason: impl Into<String>) -> ReadError {
     ReadError::unsupported(FORMAT, reason)
+}
+
+/// An Igor binary wave has no signature: a version, and a kind of number that exists.
+pub(crate) fn detect(head: &[u8]) -> bool {
+    let little = matches!(head, [1..=3 | 5, 0, ..]);
+    let big = matches!(head, [0, 1..=3 | 5, ..]);
+    if !little && !big {
+        return false;
+    }
+    let endian = if little { Endian::Little } else { Endian::Big };
+    let cursor = Cursor::new(head, endian);
+    // The place of the wave's type in its header.
+    let place = match cursor.clone().u16() {
+        Ok(1) => 8,
+        Ok(2) => 16,
+        Ok(3) => 20,
+        _ => 80,
+    };
+    let kind = cursor.at(place).u16();
+    // Bits: complex 1, float 2, double 4, 8-, 16-, 32-bit integer 8, 16, 32, unsigned 64; 0 is text.
+    kind.is_ok_and(|kind| kind == 0 || matches!(kind & !0x41, 2 | 4 | 8 | 16 | 32 | 128))
 }
 
 /// What the headers of a version 5 file say.
@@ -58,8 +82,9 @@ struct Wave {
     labels: [usize; 4],
 }
 
-/// Reads the channels that are wanted.
-pub(crate) fn read(bytes: &[u8], wanted: &dyn Fn(&ChannelInfo) -> bool) -> Result<Scan, ReadError> {
+/// Reads the headers and finds the samples.
+pub(crate) fn open<'a>(input: &Input<'a>) -> Result<Outline<'a>, ReadError> {
+    let bytes = input.bytes;
     let endian = if bytes.first() == Some(&0) {
         Endian::Big
     } else {
@@ -98,9 +123,9 @@ pub(crate) fn read(bytes: &[u8], wanted: &dyn Fn(&ChannelInfo) -> bool) -> Resul
         )));
     }
     let note = Note(&tail.note);
-    let mut scan = frame(&note);
+    let mut outline = Outline::of(frame(&note));
     let [width_nm, height_nm] = extent_nm(&wave, &note);
-    scan.size_nm = width_nm
+    outline.scan.size_nm = width_nm
         .zip(height_nm)
         .map(|(width, height)| [width, height]);
     let order = Order {
@@ -121,34 +146,23 @@ pub(crate) fn read(bytes: &[u8], wanted: &dyn Fn(&ChannelInfo) -> bool) -> Resul
             scan_line: None,
         };
         let place = layer.saturating_mul(length).saturating_add(HEADERS);
-        let Some(block) = extent.take(bytes, place, length, &info.name) else {
-            continue;
-        };
-        if !wanted(&info) {
+        if !extent.take(input.length, place, length, &info.name) {
             continue;
         }
-        scan.channels.push(Channel {
-            unit: unit(&wave, &info.name, layers),
-            name: info.name,
-            internal_name: info.internal_name,
-            line_direction: info.line_direction,
-            scan_line: None,
-            rows,
-            columns,
+        let header = ChannelHeader {
             width_nm,
             height_nm,
             span: Span::PixelCentres,
-            scale: 1.0,
-            offset: 0.0,
-            scaling: "values as stored".to_owned(),
             plane_fit: note
                 .get(&format!("Planefit {layer}"))
                 .filter(|fit| !fit.eq_ignore_ascii_case("none"))
                 .map(str::to_owned),
-            samples: raster::decode(block, columns, encoding, endian, order),
-        });
+            ..ChannelHeader::new(info.clone(), rows, columns)
+                .in_unit(&unit(&wave, &info.name, layers))
+        };
+        outline.add_flat(header, Flat::at(place, encoding, endian).in_order(order));
     }
-    extent.judge(scan, bytes)
+    extent.judge(outline, input.length)
 }
 
 /// The reason why a file of an elder version is not read.
@@ -333,7 +347,7 @@ fn unit(wave: &Wave, label: &str, layers: usize) -> String {
     let known = UNITS.iter().find(|(name, _)| label.starts_with(name));
     match known {
         Some((_, unit)) if line_direction(label).is_some() => (*unit).to_owned(),
-        _ if layers == 1 => units::clean(&wave.unit),
+        _ if layers == 1 => wave.unit.clone(),
         _ => String::new(),
     }
 }
