@@ -3,6 +3,9 @@
 //! What the instrument wrote, and nothing else: no interpretation, no numerics.
 //! Images are stored bottom line first (y up), column 0 at the left, whatever the file does.
 //!
+//! [`File::open`] tells what a file holds before any sample is decoded; [`Frame`] decodes channels and rows;
+//! [`read()`] makes a whole scan at once.
+//!
 //! ```no_run
 //! let bytes = std::fs::read("scan.spm")?;
 //! let scan = spmfile::read(&bytes)?;
@@ -117,3 +120,8 @@ pub use source::{Seekable, Source};
 pub use units::{length_nm, nm_per, plain_unit};
 #[cfg(feature = "write")]
 pub use writable::{WritableFormat, write};
+
+/// The examples of the README are tests.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

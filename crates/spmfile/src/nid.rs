@@ -12,7 +12,6 @@
 //! - `CurLine` is the last line of an unfinished frame; lines never filled are missing.
 
 use std::collections::BTreeMap;
-use std::ops::Range;
 
 use memchr::memmem;
 
@@ -93,9 +92,8 @@ pub(crate) fn open<'a>(input: &Input<'a>) -> Result<Outline<'a>, ReadError> {
         }
         match scaling(section, &block) {
             Ok(scaling) => {
-                let unfilled = unfilled(&block, section, outline.scan.frame_direction);
                 let samples = Flat {
-                    check: Check::Unfilled(unfilled),
+                    check: unfilled(&block, section, outline.scan.frame_direction),
                     ..Flat::at(here, block.encoding, block.endian)
                 };
                 outline.add_flat(channel(info, &block, section, scaling), samples);
@@ -290,17 +288,19 @@ fn unfilled(
     block: &Block,
     section: &[(String, String)],
     direction: Option<FrameDirection>,
-) -> Vec<Range<usize>> {
+) -> Check {
     let current = get(section, "CurLine").and_then(|line| line.parse::<usize>().ok());
     let Some(current) = current.filter(|&line| line.saturating_add(1) < block.rows) else {
-        return Vec::new();
+        return Check::Nothing;
     };
     let left = block.rows - 1 - current;
     match direction {
-        Some(FrameDirection::Up) => [current + 1..block.rows].to_vec(),
+        Some(FrameDirection::Up) => Check::unfilled(current + 1..block.rows),
         // Whether it counts lines or tells a place is not known.
-        Some(FrameDirection::Down) => vec![0..left.max(current), 0..left.min(current)],
-        None => Vec::new(),
+        Some(FrameDirection::Down) => {
+            Check::Unfilled(vec![0..left.max(current), 0..left.min(current)])
+        }
+        None => Check::Nothing,
     }
 }
 

@@ -323,8 +323,8 @@ impl Page {
         let completed = self.text(COMPLETED_LINES).parse::<usize>();
         let completed = completed.ok().filter(|&n| n > 0 && n < self.rows);
         let check = match completed {
-            Some(n) if order.top_first => Check::Unfilled([0..self.rows - n].to_vec()),
-            Some(n) => Check::Unfilled([n..self.rows].to_vec()),
+            Some(n) if order.top_first => Check::unfilled(0..self.rows - n),
+            Some(n) => Check::unfilled(n..self.rows),
             None => Check::Nothing,
         };
         Flat {

@@ -36,6 +36,16 @@ impl Source for [u8] {
     }
 }
 
+impl Source for &[u8] {
+    fn length(&self) -> Result<u64> {
+        (**self).length()
+    }
+
+    fn read_at(&self, at: u64, into: &mut [u8]) -> Result<()> {
+        (**self).read_at(at, into)
+    }
+}
+
 /// Whatever can be read and sought, such as [`std::fs::File`]: one reading at a time.
 #[derive(Debug)]
 pub struct Seekable<T>(Mutex<T>);

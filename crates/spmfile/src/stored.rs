@@ -83,7 +83,7 @@ pub(crate) struct Valid {
     pub(crate) columns: Range<usize>,
 }
 
-impl<'a> Stored<'a> {
+impl Stored<'_> {
     /// The same without anything borrowed, if it borrows nothing.
     pub(crate) fn detached(self) -> Option<Stored<'static>> {
         match self {
@@ -136,7 +136,7 @@ impl<'a> Flat<'a> {
     }
 
     /// The same in another place.
-    fn moved<'b>(self, place: Place<'b>) -> Flat<'b> {
+    fn moved(self, place: Place<'_>) -> Flat<'_> {
         Flat {
             place,
             encoding: self.encoding,
@@ -160,9 +160,10 @@ impl<'a> Flat<'a> {
         rows: &Range<usize>,
     ) -> Result<Samples, ReadError> {
         let line = header.columns * self.encoding.width();
-        let first = match self.order.top_first {
-            true => header.rows - rows.end,
-            false => rows.start,
+        let first = if self.order.top_first {
+            header.rows - rows.end
+        } else {
+            rows.start
         };
         let (start, length) = (first * line, rows.len() * line);
         let bytes = match &self.place {

@@ -57,11 +57,11 @@ impl Extent {
     }
 
     /// The outline with what is missing, or the error that the missing bytes call for.
-    pub(crate) fn judge<'a>(
+    pub(crate) fn judge(
         self,
-        mut outline: Outline<'a>,
+        mut outline: Outline<'_>,
         available: u64,
-    ) -> Result<Outline<'a>, ReadError> {
+    ) -> Result<Outline<'_>, ReadError> {
         if self.lost.is_empty() {
             return Ok(outline);
         }

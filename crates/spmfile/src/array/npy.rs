@@ -255,7 +255,7 @@ mod tests {
     fn what_is_not_read_is_said() {
         let error = |descr: &str, shape: &str, n: usize| {
             let bytes = array(1, &header(descr, "False", shape), &vec![0; n]);
-            read(&bytes).err().expect("no image")
+            read(&bytes).expect_err("no image")
         };
         assert!(error("<f8", "(2, 3)", 47).contains("47"));
         assert!(error("<c16", "(2, 3)", 96).contains("c16"));

@@ -203,7 +203,7 @@ mod tests {
         let error = |text: &str| {
             let opened = open(text.as_bytes());
             let read = opened.and_then(|(_, plane)| super::values(text.as_bytes(), plane.columns));
-            read.err().expect("no matrix")
+            read.expect_err("no matrix")
         };
         assert!(error("1 2\n3\n").contains("line 2"));
         assert!(error("1 2\n3 x\n").contains("\"x\""));

@@ -287,7 +287,7 @@ fn size_nm(field: Object<'_>) -> Option<[f64; 2]> {
     Some([length("xreal")?, length("yreal")?])
 }
 
-fn channel<'a>(field: Object<'a>, info: ChannelInfo) -> Result<(ChannelHeader, Flat<'a>), String> {
+fn channel(field: Object<'_>, info: ChannelInfo) -> Result<(ChannelHeader, Flat<'_>), String> {
     let [columns, rows] = resolution(field)?;
     let Some(Value::Doubles(data)) = field.get("data") else {
         return Err("it has no samples".to_owned());
