@@ -1,5 +1,7 @@
 //! A file, opened: what it holds is known, and no sample has been decoded.
 
+use std::sync::Arc;
+
 use crate::detect::detect;
 use crate::error::ReadError;
 use crate::format::Format;
@@ -9,9 +11,10 @@ use crate::outline::{Input, Outline};
 use crate::readers::Reader;
 use crate::source::{Data, Source};
 
-/// Headers at the start of a file are looked for in so many bytes: those of NanoScope files may have
-/// 4 MB.
-const HEAD: u64 = 5 << 20;
+/// Headers at the start of a file are looked for in so many bytes; most have less.
+const HEAD: u64 = 128 << 10;
+/// And then in so many: those of NanoScope files may have 4 MB.
+const LONG_HEAD: u64 = 5 << 20;
 
 /// A file whose headers were read.
 ///
@@ -78,30 +81,51 @@ impl<'a> File<'a> {
     /// - [`ReadError::WholeOnly`] for other formats, and for arrays stored column by column.
     /// - The bytes cannot be read.
     /// - As [`File::open`].
-    pub fn open_source(source: &'a dyn Source, options: &OpenOptions) -> Result<Self, ReadError> {
-        let failed = |error: std::io::Error| ReadError::Source {
+    pub fn open_source(
+        source: Arc<dyn Source + 'a>,
+        options: &OpenOptions,
+    ) -> Result<Self, ReadError> {
+        let length = source.length().map_err(|error| ReadError::Source {
             at: 0,
             length: 0,
             reason: error.to_string(),
-        };
-        let length = source.length().map_err(failed)?;
+        })?;
         let data = Data::Source(source);
-        let head = data.get(0, length.min(HEAD) as usize)?;
-        let format = options.format.unwrap_or_else(|| detect(&head));
-        let reader = Reader::of(format).ok_or_else(|| no_reader(format, &head))?;
-        let whole = ReadError::WholeOnly {
-            format: reader.name,
-        };
-        if !reader.flat {
-            return Err(whole);
+        let (mut format, mut outline) = Self::head(&data, length, HEAD.min(length), options);
+        if outline.is_err() && length > HEAD {
+            (format, outline) = Self::head(&data, length, LONG_HEAD.min(length), options);
         }
-        let input = Input {
-            bytes: &head,
-            length,
-            options: options.array.clone(),
+        Self::of(format, outline?, data, options)
+    }
+
+    /// The format and the outline of a file by its first bytes.
+    fn head(
+        data: &Data<'_>,
+        length: u64,
+        first: u64,
+        options: &OpenOptions,
+    ) -> (Format, Result<Outline<'static>, ReadError>) {
+        let bytes = match data.get(0, first as usize) {
+            Ok(bytes) => bytes,
+            Err(error) => return (Format::Unknown, Err(error)),
         };
-        let outline = (reader.open)(&input)?.detached().ok_or(whole)?;
-        Self::of(format, outline, data, options)
+        let format = options.format.unwrap_or_else(|| detect(&bytes));
+        let outline = || {
+            let reader = Reader::of(format).ok_or_else(|| no_reader(format, &bytes))?;
+            let whole = ReadError::WholeOnly {
+                format: reader.name,
+            };
+            if !reader.flat {
+                return Err(whole);
+            }
+            let input = Input {
+                bytes: &bytes,
+                length,
+                options: options.array.clone(),
+            };
+            (reader.open)(&input)?.detached().ok_or(whole)
+        };
+        (format, outline())
     }
 
     fn of(

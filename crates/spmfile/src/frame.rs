@@ -96,7 +96,7 @@ impl<'a> Frame<'a> {
                 .collect();
             return self.mixed_one(entry, together(&chosen)?);
         }
-        match decoded(entry, self.data) {
+        match decoded(entry, &self.data) {
             Ok((channel, _)) => Ok(channel),
             Err(failure) => Err(failure.of(&entry.header)),
         }
@@ -125,7 +125,20 @@ impl<'a> Frame<'a> {
         };
         let verdict = self.verdict(channel, flat, header)?;
         let scaling = scaling(header, verdict).map_err(|failure| failure.of(header))?;
-        flat.rows(self.data, header, rows, verdict, &scaling)
+        flat.rows(&self.data, header, rows, verdict, &scaling)
+    }
+
+    /// The frame with this channel and none of its samples: for what depends on sizes and times alone.
+    ///
+    /// # Errors
+    /// There is no such channel.
+    pub fn without_samples(&self, channel: usize) -> Result<Scan, ReadError> {
+        let header = &self.outline.channels[self.place(channel)?].header;
+        let scaling = header.scaling.clone().unwrap_or_else(Scaling::as_stored);
+        let mut scan = self.outline.scan.clone();
+        let none = Samples::F64(Vec::new());
+        scan.channels.push(header.with(none, &scaling));
+        Ok(scan)
     }
 
     /// Decodes the channels for which `wanted` returns true.
@@ -167,7 +180,7 @@ impl<'a> Frame<'a> {
                     let samples = Samples::F64(mixed.next().unwrap_or_default());
                     Ok((entry.header.with(samples, &Scaling::as_stored()), None))
                 }
-                _ => decoded(entry, self.data),
+                _ => decoded(entry, &self.data),
             };
             match done {
                 Ok((channel, note)) => {
@@ -223,7 +236,7 @@ impl<'a> Frame<'a> {
         if let Some(verdict) = kept.get() {
             return Ok(verdict);
         }
-        let judged = flat.judged(self.data, header);
+        let judged = flat.judged(&self.data, header);
         let verdict = judged.map_err(|failure| failure.of(header))?;
         Ok(kept.get_or_init(|| verdict))
     }
@@ -244,7 +257,7 @@ impl<'a> Frame<'a> {
 /// A channel with its samples, and what is to be said of it.
 type Decoded = (Channel, Option<(String, String)>);
 
-fn decoded(entry: &Entry<'_>, data: Data<'_>) -> Result<Decoded, Failure> {
+fn decoded(entry: &Entry<'_>, data: &Data<'_>) -> Result<Decoded, Failure> {
     let header = &entry.header;
     let (samples, note, verdict) = match &entry.samples {
         Stored::Flat(flat) => {

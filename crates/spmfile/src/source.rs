@@ -2,12 +2,12 @@
 
 use std::borrow::Cow;
 use std::io::{Error, ErrorKind, Read, Result, Seek, SeekFrom};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::error::ReadError;
 
 /// Bytes that are read where they are wanted: a file on a disk, a part of an archive, an object in a store.
-pub trait Source: Sync {
+pub trait Source: Send + Sync {
     /// Number of bytes.
     ///
     /// # Errors
@@ -71,19 +71,15 @@ impl<T: Read + Seek + Send> Source for Seekable<T> {
 }
 
 /// Where a file's bytes are.
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 pub(crate) enum Data<'a> {
     Bytes(&'a [u8]),
-    Source(&'a dyn Source),
+    Source(Arc<dyn Source + 'a>),
 }
 
-impl<'a> Data<'a> {
+impl Data<'_> {
     /// `length` bytes from `at` on.
-    pub(crate) fn get(
-        self,
-        at: u64,
-        length: usize,
-    ) -> std::result::Result<Cow<'a, [u8]>, ReadError> {
+    pub(crate) fn get(&self, at: u64, length: usize) -> Bytes<'_> {
         let failed = |error: &Error| ReadError::Source {
             at,
             length,
@@ -101,11 +97,13 @@ impl<'a> Data<'a> {
             }
             Data::Source(source) => {
                 let mut buffer = vec![0; length];
-                source
-                    .read_at(at, &mut buffer)
-                    .map_err(|error| failed(&error))?;
+                let read = source.read_at(at, &mut buffer);
+                read.map_err(|error| failed(&error))?;
                 Ok(Cow::Owned(buffer))
             }
         }
     }
 }
+
+/// A part of a file.
+pub(crate) type Bytes<'d> = std::result::Result<Cow<'d, [u8]>, ReadError>;

@@ -155,7 +155,7 @@ impl<'a> Flat<'a> {
     /// The samples of some rows, counted from the bottom, as they are stored.
     fn decode(
         &self,
-        data: Data<'a>,
+        data: &Data<'_>,
         header: &ChannelHeader,
         rows: &Range<usize>,
     ) -> Result<Samples, ReadError> {
@@ -189,7 +189,7 @@ impl<'a> Flat<'a> {
     /// All samples, and what they tell of their own.
     pub(crate) fn whole(
         &self,
-        data: Data<'a>,
+        data: &Data<'_>,
         header: &ChannelHeader,
     ) -> Result<(Samples, Verdict), Failure> {
         let samples = self
@@ -205,7 +205,7 @@ impl<'a> Flat<'a> {
     /// What all samples tell, without keeping them.
     pub(crate) fn judged(
         &self,
-        data: Data<'a>,
+        data: &Data<'_>,
         header: &ChannelHeader,
     ) -> Result<Verdict, Failure> {
         let mut judge = Judge::new(&self.check, header.columns);
@@ -223,7 +223,7 @@ impl<'a> Flat<'a> {
     /// The values of some rows, of which the verdict is known.
     pub(crate) fn rows(
         &self,
-        data: Data<'a>,
+        data: &Data<'_>,
         header: &ChannelHeader,
         rows: Range<usize>,
         verdict: &Verdict,
