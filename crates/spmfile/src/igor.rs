@@ -85,33 +85,9 @@ struct Wave {
 /// Reads the headers and finds the samples.
 pub(crate) fn open<'a>(input: &Input<'a>) -> Result<Outline<'a>, ReadError> {
     let bytes = input.bytes;
-    let endian = if bytes.first() == Some(&0) {
-        Endian::Big
-    } else {
-        Endian::Little
-    };
-    let version = Cursor::new(bytes, endian).u16().map_err(damaged)?;
-    if version != 5 {
-        return Err(refuse_one_dimension(bytes, endian, version));
-    }
-    check_sum(bytes, HEADERS, endian)?;
-    let wave = headers(bytes, endian).map_err(damaged)?;
+    let wave = wave(bytes)?;
     let [columns, rows, layers, _] = wave.size;
-    if rows == 0 {
-        return Err(unsupported(format!(
-            "it holds a one-dimensional wave of {columns} points, no image"
-        )));
-    }
-    if wave.size[3] > 1 {
-        return Err(unsupported("it holds a wave of four dimensions, no image"));
-    }
     let layers = layers.max(1);
-    if layers > MOST_CHANNELS {
-        return Err(ReadError::TooManyChannels {
-            found: layers,
-            limit: MOST_CHANNELS,
-        });
-    }
     let encoding = encoding(wave.kind)?;
     let length = raster::byte_length(rows, columns, encoding)
         .ok_or_else(|| damaged(format!("its size is {rows} lines of {columns} samples")))?;
@@ -160,9 +136,41 @@ pub(crate) fn open<'a>(input: &Input<'a>) -> Result<Outline<'a>, ReadError> {
             ..ChannelHeader::new(info.clone(), rows, columns)
                 .in_unit(&unit(&wave, &info.name, layers))
         };
-        outline.add_flat(header, Flat::at(place, encoding, endian).in_order(order));
+        let samples = Flat::at(place, encoding, wave.endian).in_order(order);
+        outline.add_flat(header, samples);
     }
     extent.judge(outline, input.length)
+}
+
+/// The headers of an image.
+fn wave(bytes: &[u8]) -> Result<Wave, ReadError> {
+    let endian = if bytes.first() == Some(&0) {
+        Endian::Big
+    } else {
+        Endian::Little
+    };
+    let version = Cursor::new(bytes, endian).u16().map_err(damaged)?;
+    if version != 5 {
+        return Err(refuse_one_dimension(bytes, endian, version));
+    }
+    check_sum(bytes, HEADERS, endian)?;
+    let wave = headers(bytes, endian).map_err(damaged)?;
+    let [columns, rows, layers, more] = wave.size;
+    if rows == 0 {
+        return Err(unsupported(format!(
+            "it holds a one-dimensional wave of {columns} points, no image"
+        )));
+    }
+    if more > 1 {
+        return Err(unsupported("it holds a wave of four dimensions, no image"));
+    }
+    if layers > MOST_CHANNELS {
+        return Err(ReadError::TooManyChannels {
+            found: layers,
+            limit: MOST_CHANNELS,
+        });
+    }
+    Ok(wave)
 }
 
 /// The reason why a file of an elder version is not read.

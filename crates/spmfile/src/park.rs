@@ -125,6 +125,8 @@ fn parse(bytes: &[u8], version: f64) -> Result<Header, ReadError> {
 }
 
 /// Kind of the file and its header; the inner error is about values, the outer about length.
+///
+/// As long as the structure has fields, in their order.
 fn structure(c: &mut Cursor<'_>, version: f64) -> Result<(u32, Result<Header, String>), String> {
     let kind = c.u32()?;
     let source = text(c, 32)?;

@@ -104,6 +104,7 @@ pub struct Channel {
 
 /// A channel that the file announces but that could not be read.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct UnreadableChannel {
     /// Its name, or its position in the file where the name is lost.
     pub name: String,
@@ -243,8 +244,9 @@ impl Channel {
     }
 }
 
-/// What is known of a channel before its samples are decoded.
+/// The names and directions of a channel.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct ChannelInfo {
     /// The name the user sees, as in `TR Phase`.
     pub name: String,

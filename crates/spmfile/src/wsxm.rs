@@ -13,6 +13,8 @@
 //! - `X scanning direction` and `Y scanning direction` are those of the acquisition, `Forward` or
 //!   `Backward`, `Up` or `Down`; the samples are in order of position all the same.
 
+use std::borrow::Cow;
+
 use memchr::memmem;
 
 use crate::clock;
@@ -37,23 +39,7 @@ fn damaged(reason: impl Into<String>) -> ReadError {
 /// Reads the headers and finds the samples.
 pub(crate) fn open<'a>(input: &Input<'a>) -> Result<Outline<'a>, ReadError> {
     let bytes = input.bytes;
-    let end = memmem::find(bytes, END).ok_or_else(|| {
-        damaged(format!(
-            "expected [Header end], found none in {} bytes: the file was cut off inside the header",
-            bytes.len()
-        ))
-    });
-    let head = &bytes[..end.as_ref().copied().unwrap_or(bytes.len().min(4096))];
-    let text = units::decode(head);
-    // Before the header's end: tables of numbers have none.
-    let kind = text.lines().nth(1).unwrap_or("").trim();
-    if !kind.eq_ignore_ascii_case("SxM Image file") {
-        return Err(ReadError::Unsupported {
-            format: FORMAT,
-            reason: format!("expected an \"SxM Image file\", found {kind:?}"),
-        });
-    }
-    let end = end?;
+    let (text, end) = text(bytes)?;
     let header = Header::of(&text);
     let rows = header.count("General Info", "Number of rows")?;
     let columns = header.count("General Info", "Number of columns")?;
@@ -103,6 +89,27 @@ pub(crate) fn open<'a>(input: &Input<'a>) -> Result<Outline<'a>, ReadError> {
         outline.add_flat(header, samples);
     }
     extent.judge(outline, input.length)
+}
+
+/// The header of an image, and where it ends.
+fn text(bytes: &[u8]) -> Result<(Cow<'_, str>, usize), ReadError> {
+    let end = memmem::find(bytes, END).ok_or_else(|| {
+        damaged(format!(
+            "expected [Header end], found none in {} bytes: the file was cut off inside the header",
+            bytes.len()
+        ))
+    });
+    let head = &bytes[..end.as_ref().copied().unwrap_or(bytes.len().min(4096))];
+    let text = units::decode(head);
+    // Before the header's end: tables of numbers have none.
+    let kind = text.lines().nth(1).unwrap_or("").trim();
+    if !kind.eq_ignore_ascii_case("SxM Image file") {
+        return Err(ReadError::Unsupported {
+            format: FORMAT,
+            reason: format!("expected an \"SxM Image file\", found {kind:?}"),
+        });
+    }
+    Ok((text, end?))
 }
 
 /// Section, key and value of every line.

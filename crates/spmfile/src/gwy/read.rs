@@ -178,31 +178,12 @@ pub(crate) fn open<'a>(input: &Input<'a>) -> Result<Outline<'a>, ReadError> {
         });
     }
     let (container, cut_off) = container(bytes)?;
-    let mut failure = None;
-    let mut fields = Vec::new();
-    let mut titles = BTreeMap::new();
-    let mut metas = BTreeMap::new();
-    for item in container.items() {
-        let item = match item {
-            Ok(item) => item,
-            Err(error) => {
-                failure = Some(error);
-                break;
-            }
-        };
-        match item.value {
-            Value::Object(object) if object.kind == b"GwyDataField" => {
-                fields.extend(number_of(item.name, "/data").map(|number| (number, object)));
-            }
-            Value::Object(object) => {
-                metas.extend(number_of(item.name, "/meta").map(|number| (number, object)));
-            }
-            Value::Text(title) => {
-                titles.extend(number_of(item.name, "/data/title").map(|number| (number, title)));
-            }
-            _ => {}
-        }
-    }
+    let Found {
+        mut fields,
+        titles,
+        metas,
+        failure,
+    } = Found::of(container);
     if fields.len() > MOST_CHANNELS {
         return Err(ReadError::TooManyChannels {
             found: fields.len(),
@@ -243,6 +224,47 @@ pub(crate) fn open<'a>(input: &Input<'a>) -> Result<Outline<'a>, ReadError> {
             outline.damage = failure;
             Ok(outline)
         }
+    }
+}
+
+/// What the container holds of images, by their numbers.
+#[derive(Default)]
+struct Found<'a> {
+    fields: Vec<(u32, Object<'a>)>,
+    titles: BTreeMap<u32, &'a [u8]>,
+    metas: BTreeMap<u32, Object<'a>>,
+    /// Why its items could not be followed to their end.
+    failure: Option<String>,
+}
+
+impl<'a> Found<'a> {
+    fn of(container: Object<'a>) -> Self {
+        let mut found = Self::default();
+        for item in container.items() {
+            let item = match item {
+                Ok(item) => item,
+                Err(error) => {
+                    found.failure = Some(error);
+                    break;
+                }
+            };
+            let number = |behind: &str| number_of(item.name, behind);
+            match item.value {
+                Value::Object(object) if object.kind == b"GwyDataField" => {
+                    found.fields.extend(number("/data").map(|n| (n, object)));
+                }
+                Value::Object(object) => {
+                    found.metas.extend(number("/meta").map(|n| (n, object)));
+                }
+                Value::Text(title) => {
+                    found
+                        .titles
+                        .extend(number("/data/title").map(|n| (n, title)));
+                }
+                _ => {}
+            }
+        }
+        found
     }
 }
 

@@ -62,7 +62,24 @@ pub(super) fn outline<'a>(
             meanwhile.join(", ")
         ));
     }
-    if let Some(raster) = raster.filter(|_| times.is_empty()) {
+    let steady = raster.filter(|_| times.is_empty());
+    tell_times(&mut scan, data, shape, frame, steady);
+    place(&mut scan, state, geometry.is_empty());
+    let mut outline = Outline::of(scan);
+    channels(&mut outline, data, name, understood, frame);
+    Some(outline)
+}
+
+/// Times of the lines and of the end of the frame; `raster` is the time of a point that did not change.
+fn tell_times(
+    scan: &mut Scan,
+    data: &Data<'_>,
+    shape: Shape,
+    frame: FrameDirection,
+    raster: Option<f64>,
+) {
+    let all = data.counts.len() / 4;
+    if let Some(raster) = raster {
         if shape.retrace {
             let line = raster * shape.points as f64;
             scan.line_times_s = Some([line; 2]);
@@ -81,10 +98,6 @@ pub(super) fn outline<'a>(
     } else if frame == FrameDirection::Down || shape.recorded(FrameDirection::Down, all) == 0 {
         scan.acquired = date(data.time, 0.0);
     }
-    place(&mut scan, state, geometry.is_empty());
-    let mut outline = Outline::of(scan);
-    channels(&mut outline, data, name, understood, frame);
-    Some(outline)
 }
 
 /// Size, rotation and centre.

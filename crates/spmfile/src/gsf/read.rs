@@ -1,26 +1,20 @@
-//! Gwyddion simple fields, `.gsf`: one image of single-precision samples, little endian.
-//!
-//! Gwyddion user guide, "Gwyddion Simple Field": the magic line, lines `Key = value`, one to four
-//! NULs up to a multiple of four bytes, the samples; the file ends with the last sample.
-//!
-//! - Row 0 is the top line.
-//! - `XReal` and `YReal` are edge to edge in `XYUnits`; without a unit of length there is no size.
+//! The file → its channels.
 
 use crate::cursor::Endian;
 use crate::error::ReadError;
-use crate::export::{ExportError, base_values};
 use crate::fields;
 use crate::header::ChannelHeader;
 use crate::labels;
 use crate::outline::{Input, Outline};
 use crate::raster::{self, Encoding, Order};
-use crate::scan::{Channel, ChannelInfo, Scan};
+use crate::scan::{ChannelInfo, Scan};
 use crate::stored::Flat;
 use crate::units;
 use crate::whole::Extent;
 
 const FORMAT: &str = "Gwyddion simple field";
-const KEYS: [&str; 9] = [
+/// Keys of the format; others are metadata.
+pub(super) const KEYS: [&str; 9] = [
     "XRes", "YRes", "XReal", "YReal", "XOffset", "YOffset", "XYUnits", "ZUnits", "Title",
 ];
 
@@ -44,37 +38,14 @@ pub(crate) fn open<'a>(input: &Input<'a>) -> Result<Outline<'a>, ReadError> {
             "{beyond} bytes too many for {rows} lines of {columns} samples"
         )));
     }
-    let title = fields::get(&fields, "Title").unwrap_or("").to_owned();
-    let nm = fields::get(&fields, "XYUnits").and_then(|unit| units::nm_per(&units::clean(unit)));
-    let length_nm = |key: &str| {
-        let size = fields::number(&fields, key)? * nm?;
-        Some(size.abs()).filter(|&size| size > 0.0)
-    };
-    let (width_nm, height_nm) = (length_nm("XReal"), length_nm("YReal"));
-    let size_nm = width_nm
-        .zip(height_nm)
-        .map(|(width, height)| [width, height]);
-    let mut offset_nm = [0.0; 2];
-    for (index, key) in ["XOffset", "YOffset"].into_iter().enumerate() {
-        if let (Some(offset), Some(nm), Some(size)) = (fields::number(&fields, key), nm, size_nm) {
-            offset_nm[index] = offset * nm + 0.5 * size[index];
-        }
-    }
-    let info = ChannelInfo {
-        line_direction: labels::stated_direction(&fields)
-            .or_else(|| labels::line_direction(&title)),
-        name: title,
-        internal_name: labels::value(&fields, "internal name")
-            .unwrap_or("")
-            .to_owned(),
-        scan_line: labels::value(&fields, "scan line").map(str::to_owned),
-    };
+    let size = size(&fields);
+    let info = info(&fields);
     let unit = fields::get(&fields, "ZUnits").unwrap_or("").to_owned();
     let plane_fit = labels::value(&fields, "plane fit").map(str::to_owned);
     let mut scan = Scan {
         format: FORMAT.to_owned(),
-        size_nm,
-        offset_nm,
+        size_nm: size.width.zip(size.height).map(<[f64; 2]>::from),
+        offset_nm: size.centre,
         metadata: fields::others(fields, &KEYS),
         ..Scan::default()
     };
@@ -87,8 +58,8 @@ pub(crate) fn open<'a>(input: &Input<'a>) -> Result<Outline<'a>, ReadError> {
             mirrored: false,
         };
         let header = ChannelHeader {
-            width_nm,
-            height_nm,
+            width_nm: size.width,
+            height_nm: size.height,
             plane_fit,
             ..ChannelHeader::new(info, rows, columns).in_unit(&unit)
         };
@@ -98,48 +69,46 @@ pub(crate) fn open<'a>(input: &Input<'a>) -> Result<Outline<'a>, ReadError> {
     extent.judge(outline, input.length)
 }
 
-/// The bytes of a `.gsf` file with one channel of `scan`.
-///
-/// Values are in SI base units and single precision; the rest of the scan's header and the lines of
-/// `log` (what was done with the data) are kept as further keys.
-///
-/// # Errors
-/// The samples do not fill the lines of the channel.
-pub fn write(scan: &Scan, channel: &Channel, log: &[String]) -> Result<Vec<u8>, ExportError> {
-    let (values, unit) = base_values(channel)?;
-    let mut header = "Gwyddion Simple Field 1.0\n".to_owned();
-    let mut put = |key: &str, value: &str| fields::put(&mut header, key, value);
-    put("XRes", &channel.columns.to_string());
-    put("YRes", &channel.rows.to_string());
-    if let Some([width, height]) = channel.edges_nm() {
-        let metres = |nm: f64| format!("{:e}", nm / 1e9);
-        put("XReal", &metres(width));
-        put("YReal", &metres(height));
-        put("XOffset", &metres(scan.offset_nm[0] - 0.5 * width));
-        put("YOffset", &metres(scan.offset_nm[1] - 0.5 * height));
-        put("XYUnits", "m");
+/// Where the image lies, nm; what has no unit of length is not known.
+struct Size {
+    width: Option<f64>,
+    height: Option<f64>,
+    centre: [f64; 2],
+}
+
+fn size(fields: &[(String, String)]) -> Size {
+    let nm = fields::get(fields, "XYUnits").and_then(|unit| units::nm_per(&units::clean(unit)));
+    let length_of = |key: &str| {
+        let size = fields::number(fields, key)? * nm?;
+        Some(size.abs()).filter(|&size| size > 0.0)
+    };
+    let (width, height) = (length_of("XReal"), length_of("YReal"));
+    let mut centre = [0.0; 2];
+    if let (Some(nm), Some(width), Some(height)) = (nm, width, height) {
+        let axes = [("XOffset", width), ("YOffset", height)];
+        for (centre, (key, length)) in centre.iter_mut().zip(axes) {
+            if let Some(offset) = fields::number(fields, key) {
+                *centre = offset * nm + 0.5 * length;
+            }
+        }
     }
-    put("ZUnits", &unit);
-    put("Title", &channel.name);
-    let lines = [labels::describe(scan), labels::describe_channel(channel)].concat();
-    // Keys of the format in the header of another one would contradict those above.
-    let others = scan.metadata.iter().filter(|(key, _)| {
-        let stem = key.trim_end_matches(|c: char| c.is_ascii_digit());
-        !KEYS.contains(&stem)
-    });
-    for (key, value) in lines.iter().chain(others) {
-        put(key, value);
+    Size {
+        width,
+        height,
+        centre,
     }
-    for (step, text) in log.iter().enumerate() {
-        put(&format!("log {}", step + 1), text);
+}
+
+fn info(fields: &[(String, String)]) -> ChannelInfo {
+    let title = fields::get(fields, "Title").unwrap_or("").to_owned();
+    ChannelInfo {
+        line_direction: labels::stated_direction(fields).or_else(|| labels::line_direction(&title)),
+        name: title,
+        internal_name: labels::value(fields, "internal name")
+            .unwrap_or("")
+            .to_owned(),
+        scan_line: labels::value(fields, "scan line").map(str::to_owned),
     }
-    let mut bytes = header.into_bytes();
-    bytes.resize((bytes.len() / 4 + 1) * 4, 0);
-    // The top line comes first.
-    for line in values.rchunks_exact(channel.columns) {
-        bytes.extend(line.iter().flat_map(|&value| (value as f32).to_le_bytes()));
-    }
-    Ok(bytes)
 }
 
 #[cfg(test)]

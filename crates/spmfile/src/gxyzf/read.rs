@@ -1,28 +1,19 @@
-//! Gwyddion XYZ fields, `.gxyzf`: points with one or more values, double precision, little endian.
-//!
-//! Gwyddion user guide, "Gwyddion XYZ Field": the magic line, lines `Key = value`, one to eight
-//! NULs up to a multiple of eight bytes, then x, y and `NChannels` values for each point.
-//!
-//! Points become a scan where `XRes` and `YRes` tell that they lie line by line: x and y are its
-//! position sensors. A mere cloud does not tell which points were recorded one after the other.
-//!
-//! - x to the right, y up. Unless the file was written here: if the lines go down (or the points of a line left), they are turned.
-//! - Without a unit of length in `XYUnits` the positions are of no use, and the file is refused.
+//! The file → its channels.
 
 use crate::cursor::{Cursor, Endian};
 use crate::error::ReadError;
-use crate::export::{ExportError, base_values};
 use crate::fields;
 use crate::header::ChannelHeader;
 use crate::labels;
 use crate::outline::{Input, Outline};
-use crate::scan::{Channel, ChannelInfo, LineDirection, Samples, Scan, Span};
+use crate::scan::{ChannelInfo, LineDirection, Samples, Scan, Span};
 use crate::stored::{Stored, Unpacked};
 use crate::units;
 use crate::whole::MOST_CHANNELS;
 
 const FORMAT: &str = "Gwyddion XYZ field";
-const KEYS: [&str; 7] = [
+/// Keys of the format; others are metadata.
+pub(super) const KEYS: [&str; 7] = [
     "NChannels",
     "NPoints",
     "XRes",
@@ -42,39 +33,8 @@ fn unsupported(reason: String) -> ReadError {
 
 /// Reads the headers and finds the samples.
 pub(crate) fn open<'a>(input: &Input<'a>) -> Result<Outline<'a>, ReadError> {
-    let bytes = input.bytes;
-    let (fields, start) = fields::header(bytes, 8).map_err(damaged)?;
-    let channels = fields::count(&fields, "NChannels").map_err(damaged)?;
-    if channels > MOST_CHANNELS {
-        return Err(ReadError::TooManyChannels {
-            found: channels,
-            limit: MOST_CHANNELS,
-        });
-    }
-    let data = bytes.get(start..).unwrap_or(&[]);
-    let width = 8 * (channels + 2);
-    let found = data.len() / width;
-    let points = match fields::get(&fields, "NPoints") {
-        Some(_) => fields::count(&fields, "NPoints").map_err(damaged)?,
-        None => found,
-    };
-    if data.len() % width != 0 || points != found {
-        return Err(damaged(format!(
-            "expected {points} points of {width} bytes, found {} bytes",
-            data.len()
-        )));
-    }
-    let size = |key: &str| fields::count(&fields, key).ok();
-    let (Some(columns), Some(rows)) = (size("XRes"), size("YRes")) else {
-        return Err(unsupported(format!(
-            "it holds {points} points without XRes and YRes: which of them make a line is not told"
-        )));
-    };
-    if columns.checked_mul(rows) != Some(points) {
-        return Err(unsupported(format!(
-            "its {points} points are not {rows} lines of {columns}"
-        )));
-    }
+    let (fields, start) = fields::header(input.bytes, 8).map_err(damaged)?;
+    let points = Points::of(&fields, input.bytes.get(start..).unwrap_or(&[]))?;
     let lateral = fields::get(&fields, "XYUnits").unwrap_or("");
     let nm = units::nm_per(&units::clean(lateral)).ok_or_else(|| {
         unsupported(format!(
@@ -87,7 +47,7 @@ pub(crate) fn open<'a>(input: &Input<'a>) -> Result<Outline<'a>, ReadError> {
             lines: false,
             points: false,
         },
-        None => Turned::of(data, width, columns, rows),
+        None => Turned::of(&points),
     };
     let span = match labels::value(&fields, "size reaches") {
         Some("edges") => Span::PixelEdges,
@@ -104,30 +64,92 @@ pub(crate) fn open<'a>(input: &Input<'a>) -> Result<Outline<'a>, ReadError> {
     let line_direction = labels::stated_direction(&fields);
     let size = scan.size_nm;
     let mut outline = Outline::of(scan);
-    for index in 0..channels + 2 {
-        let unit = match index {
-            0 | 1 => "nm",
-            _ => {
-                let own = fields::get(&fields, &format!("ZUnits{}", index - 1));
-                own.or(fields::get(&fields, "ZUnits")).unwrap_or("")
-            }
-        };
+    for index in 0..points.channels + 2 {
+        let info = info(index, &fields, line_direction);
         let scale = if index < 2 { nm } else { 1.0 };
         let header = ChannelHeader {
             span,
-            ..ChannelHeader::new(info(index, &fields, line_direction), rows, columns)
-                .in_unit(unit)
+            ..ChannelHeader::new(info, points.rows, points.columns)
+                .in_unit(unit(index, &fields))
                 .of_size(size)
                 .scaled(scale, 0.0, "values as stored".to_owned())
         };
         let samples = move || {
-            let place = |point: usize| order.place(point, columns, rows);
-            let values = (0..points).map(|point| number(data, width, place(point), index));
+            let all = 0..points.rows * points.columns;
+            let values = all.map(|pixel| points.number(order.place(pixel, &points), index));
             Ok(Unpacked::measured(Samples::F64(values.collect())))
         };
         outline.add(header, Stored::Packed(Box::new(samples)));
     }
     Ok(outline)
+}
+
+/// The points, line by line.
+#[derive(Clone, Copy)]
+struct Points<'a> {
+    data: &'a [u8],
+    /// Values of a point beside its position.
+    channels: usize,
+    rows: usize,
+    columns: usize,
+}
+
+impl<'a> Points<'a> {
+    fn of(fields: &[(String, String)], data: &'a [u8]) -> Result<Self, ReadError> {
+        let channels = fields::count(fields, "NChannels").map_err(damaged)?;
+        if channels > MOST_CHANNELS {
+            return Err(ReadError::TooManyChannels {
+                found: channels,
+                limit: MOST_CHANNELS,
+            });
+        }
+        let width = 8 * (channels + 2);
+        let found = data.len() / width;
+        let points = match fields::get(fields, "NPoints") {
+            Some(_) => fields::count(fields, "NPoints").map_err(damaged)?,
+            None => found,
+        };
+        if !data.len().is_multiple_of(width) || points != found {
+            return Err(damaged(format!(
+                "expected {points} points of {width} bytes, found {} bytes",
+                data.len()
+            )));
+        }
+        let size = |key: &str| fields::count(fields, key).ok();
+        let (Some(columns), Some(rows)) = (size("XRes"), size("YRes")) else {
+            return Err(unsupported(format!(
+                "it holds {points} points without XRes and YRes: which of them make a line is not told"
+            )));
+        };
+        if columns.checked_mul(rows) != Some(points) {
+            return Err(unsupported(format!(
+                "its {points} points are not {rows} lines of {columns}"
+            )));
+        }
+        Ok(Self {
+            data,
+            channels,
+            rows,
+            columns,
+        })
+    }
+
+    /// Value `index` of a point; the first two are its position.
+    fn number(&self, point: usize, index: usize) -> f64 {
+        Cursor::new(self.data, Endian::Little)
+            .at(8 * (point * (self.channels + 2) + index))
+            .f64()
+            .unwrap_or(f64::NAN)
+    }
+}
+
+/// The unit of a column.
+fn unit(index: usize, fields: &[(String, String)]) -> &str {
+    if index < 2 {
+        return "nm";
+    }
+    let own = fields::get(fields, &format!("ZUnits{}", index - 1));
+    own.or(fields::get(fields, "ZUnits")).unwrap_or("")
 }
 
 /// The first two columns are the position sensors.
@@ -153,14 +175,6 @@ fn info(
     }
 }
 
-/// Value `index` of a point; the caller has checked the length.
-fn number(data: &[u8], width: usize, point: usize, index: usize) -> f64 {
-    Cursor::new(data, Endian::Little)
-        .at(point * width + 8 * index)
-        .f64()
-        .unwrap_or(f64::NAN)
-}
-
 /// Which way the stored lines and points run against up and right.
 #[derive(Clone, Copy)]
 struct Turned {
@@ -170,9 +184,10 @@ struct Turned {
 
 impl Turned {
     /// Judged by the ends of the frame; a frame whose lines follow each other sideways is left.
-    fn of(data: &[u8], width: usize, columns: usize, rows: usize) -> Self {
+    fn of(points: &Points<'_>) -> Self {
+        let (rows, columns) = (points.rows, points.columns);
         let at = |row: usize, column: usize| -> [f64; 2] {
-            [0, 1].map(|axis| number(data, width, row * columns + column, axis))
+            [0, 1].map(|axis| points.number(row * columns + column, axis))
         };
         let (first, right, top) = (at(0, 0), at(0, columns - 1), at(rows - 1, 0));
         let fast = [right[0] - first[0], right[1] - first[1]];
@@ -185,7 +200,8 @@ impl Turned {
     }
 
     /// The stored place of a pixel counted from the bottom left.
-    fn place(self, pixel: usize, columns: usize, rows: usize) -> usize {
+    fn place(self, pixel: usize, points: &Points<'_>) -> usize {
+        let (rows, columns) = (points.rows, points.columns);
         let (row, column) = (pixel / columns, pixel % columns);
         let row = if self.lines { rows - 1 - row } else { row };
         let column = if self.points {
@@ -195,80 +211,6 @@ impl Turned {
         };
         row * columns + column
     }
-}
-
-/// The bytes of a `.gxyzf` file: `channels` at the positions that the sensors `x` and `y` recorded.
-///
-/// Values are in SI base units; the points come line by line, the bottom line first.
-///
-/// # Errors
-/// - There is no channel, or one of another shape than the sensors.
-/// - A sensor is not in a unit of length.
-pub fn write(
-    scan: &Scan,
-    [x, y]: [&Channel; 2],
-    channels: &[&Channel],
-    log: &[String],
-) -> Result<Vec<u8>, ExportError> {
-    if channels.is_empty() {
-        return Err(ExportError::NoChannel);
-    }
-    let (rows, columns) = (x.rows, x.columns);
-    let mut values = Vec::new();
-    let mut units = Vec::new();
-    for (index, channel) in [x, y].iter().chain(channels).enumerate() {
-        if (channel.rows, channel.columns) != (rows, columns) {
-            return Err(ExportError::Unlike {
-                name: channel.name.clone(),
-                rows,
-                columns,
-            });
-        }
-        let (of_channel, unit) = base_values(channel)?;
-        if index < 2 && unit != "m" {
-            return Err(ExportError::NotALength {
-                name: channel.name.clone(),
-                unit: channel.unit.clone(),
-            });
-        }
-        values.push(of_channel);
-        units.push(unit);
-    }
-    let mut header = "Gwyddion XYZ Field 1.0\n".to_owned();
-    let mut put = |key: &str, value: &str| fields::put(&mut header, key, value);
-    put("NChannels", &channels.len().to_string());
-    put("NPoints", &(rows * columns).to_string());
-    put("XRes", &columns.to_string());
-    put("YRes", &rows.to_string());
-    put("XYUnits", "m");
-    for (index, channel) in channels.iter().enumerate() {
-        put(&format!("ZUnits{}", index + 1), &units[index + 2]);
-        put(&format!("Title{}", index + 1), &channel.name);
-    }
-    let lines = [labels::describe(scan), labels::describe_channel(x)].concat();
-    // Keys of the format in the header of another one would contradict those above.
-    let others = fields::others(scan.metadata.clone(), &KEYS);
-    for (key, value) in lines.iter().chain(&others) {
-        put(key, value);
-    }
-    let reaches = match x.span {
-        Span::PixelCentres => "centres",
-        Span::Frame => "frame",
-        Span::PixelEdges => "edges",
-    };
-    put("spmfile size reaches", reaches);
-    for (step, text) in log.iter().enumerate() {
-        put(&format!("log {}", step + 1), text);
-    }
-    let mut bytes = header.into_bytes();
-    bytes.resize((bytes.len() / 8 + 1) * 8, 0);
-    bytes.reserve(8 * values.len() * rows * columns);
-    for point in 0..rows * columns {
-        for of_channel in &values {
-            bytes.extend(of_channel[point].to_le_bytes());
-        }
-    }
-    Ok(bytes)
 }
 
 #[cfg(test)]
