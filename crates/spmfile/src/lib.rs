@@ -15,6 +15,14 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 #![doc = include_str!("../FORMATS.md")]
+#![cfg_attr(
+    not(all(feature = "archives", feature = "pictures", feature = "write")),
+    allow(
+        dead_code,
+        unused_imports,
+        reason = "tools of the readers and writers that are left out"
+    )
+)]
 
 mod agilent;
 #[cfg(feature = "archives")]
