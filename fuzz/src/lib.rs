@@ -25,6 +25,15 @@ pub fn check(data: &[u8], format: Format) -> bool {
     if spmfile::detect(data) != format {
         return false;
     }
+    let mut options = spmfile::OpenOptions::default();
+    options.damaged = true;
+    if let Ok(file) = spmfile::File::open_with(data, &options) {
+        let frame = &file.frames()[0];
+        for (number, channel) in frame.channels().enumerate() {
+            let row = frame.rows(number, 0..1);
+            assert!(row.is_err() || row.is_ok_and(|row| row.len() == channel.columns));
+        }
+    }
     match spmfile::read(data) {
         Ok(scan) => plausible(&scan),
         Err(ReadError::Incomplete { readable, .. }) => plausible(&readable),

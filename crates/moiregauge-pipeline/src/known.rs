@@ -143,7 +143,8 @@ impl Known {
             .any(|wanted| is_named(name, wanted) || is_named(internal_name, wanted))
     }
 
-    fn array_options(&self, path: &Path) -> ArrayOptions {
+    /// What the user tells of an array.
+    pub fn array_options(&self, path: &Path) -> ArrayOptions {
         ArrayOptions {
             size_nm: self.told.size_nm,
             frame_direction: self.frame_direction(path),

@@ -11,11 +11,11 @@
 use crate::clock;
 use crate::cursor::Endian;
 use crate::error::ReadError;
-use crate::raster::{self, Encoding, Order};
-use crate::scan::{
-    Channel, ChannelInfo, DateTime, FrameDirection, LineDirection, Scan, Span, UnreadableChannel,
-};
-use crate::units::clean;
+use crate::header::ChannelHeader;
+use crate::outline::{Input, Outline};
+use crate::raster::{self, Encoding};
+use crate::scan::{ChannelInfo, DateTime, FrameDirection, LineDirection, Scan, UnreadableChannel};
+use crate::stored::Flat;
 use crate::whole::{Extent, MOST_CHANNELS, some_readable};
 
 const FORMAT: &str = "Agilent";
@@ -52,8 +52,9 @@ struct Header {
     end: usize,
 }
 
-/// Reads the channels that are wanted.
-pub(crate) fn read(bytes: &[u8], wanted: &dyn Fn(&ChannelInfo) -> bool) -> Result<Scan, ReadError> {
+/// Reads the headers and finds the samples.
+pub(crate) fn open<'a>(input: &Input<'a>) -> Result<Outline<'a>, ReadError> {
+    let bytes = input.bytes;
     let header = header(bytes)?;
     let kind = get(&header.frame, "fileType").unwrap_or("");
     if kind != "Image" {
@@ -84,45 +85,30 @@ pub(crate) fn read(bytes: &[u8], wanted: &dyn Fn(&ChannelInfo) -> bool) -> Resul
         return Err(damaged("its header announces no channel (no bufferLabel)"));
     }
 
-    let mut scan = frame(&header.frame);
+    let mut outline = Outline::of(frame(&header.frame));
     let mut extent = Extent::default();
     for (index, lines) in header.channels.iter().enumerate() {
         let info = info(lines);
         let start = index.saturating_mul(length).saturating_add(header.end);
-        let Some(block) = extent.take(bytes, start, length, &info.name) else {
+        if !extent.take(input.length, start, length, &info.name) {
             continue;
-        };
+        }
         let Some(range) = number(lines, "bufferRange") else {
-            scan.unreadable.push(UnreadableChannel {
+            outline.scan.unreadable.push(UnreadableChannel {
                 name: info.name,
                 error: "expected a number bufferRange, found none".to_owned(),
             });
             continue;
         };
-        if wanted(&info) {
-            let full = 2f64.powi(8 * encoding.width() as i32 - 1);
-            let samples =
-                raster::decode(block, columns, encoding, Endian::Little, Order::default());
-            scan.channels.push(Channel {
-                name: info.name,
-                internal_name: info.internal_name,
-                unit: clean(get(lines, "bufferUnit").unwrap_or("")),
-                line_direction: info.line_direction,
-                scan_line: info.scan_line,
-                rows,
-                columns,
-                width_nm: scan.size_nm.map(|[width, _]| width),
-                height_nm: scan.size_nm.map(|[_, height]| height),
-                span: Span::PixelEdges,
-                scale: range / full,
-                offset: 0.0,
-                scaling: format!("counts × bufferRange {range} / {full}"),
-                plane_fit: None,
-                samples,
-            });
-        }
+        let full = 2f64.powi(8 * encoding.width() as i32 - 1);
+        let words = format!("counts × bufferRange {range} / {full}");
+        let of_channel = ChannelHeader::new(info, rows, columns)
+            .in_unit(get(lines, "bufferUnit").unwrap_or(""))
+            .of_size(outline.scan.size_nm)
+            .scaled(range / full, 0.0, words);
+        outline.add_flat(of_channel, Flat::at(start, encoding, Endian::Little));
     }
-    extent.judge(some_readable(scan, header.channels.len())?, bytes)
+    extent.judge(some_readable(outline, header.channels.len())?, input.length)
 }
 
 fn header(bytes: &[u8]) -> Result<Header, ReadError> {

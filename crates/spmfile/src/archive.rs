@@ -7,17 +7,12 @@ use std::io::{Cursor as Bytes, Read};
 
 use zip::ZipArchive;
 
-/// Up to this many bytes any archive may unpack to: constant arrays shrink a thousandfold.
-const ALWAYS_ALLOWED: u64 = 64 << 20;
-/// Beyond that, the contents of an archive are at most so many times its length.
-const MOST_GAIN: u64 = 20;
+use crate::limits::unpacked_limit;
+
+/// The header of an entry lies within so many bytes: that of an array has two bytes for its length.
+const HEAD: u64 = 1 << 17;
 /// More entries than an archive of scans has; every curve of a map is one or two.
 const MOST_ENTRIES: usize = 1 << 22;
-
-/// How many bytes a compressed file of a length may become.
-pub(crate) fn unpacked_limit(length: usize) -> u64 {
-    ALWAYS_ALLOWED.max(MOST_GAIN.saturating_mul(length as u64))
-}
 
 /// An archive and how much more of it may be unpacked.
 pub(crate) struct Archive<'a> {
@@ -52,16 +47,31 @@ impl<'a> Archive<'a> {
         Some(self.unpack(index, name))
     }
 
+    /// The first bytes of an entry, without counting them.
+    pub(crate) fn head(&mut self, name: &str) -> Result<Vec<u8>, String> {
+        let entry = self.zip.by_name(name);
+        let entry = entry.map_err(|e| format!("{name:?}: {e}"))?;
+        let mut content = Vec::new();
+        let read = entry.take(HEAD).read_to_end(&mut content);
+        read.map_err(|e| format!("{name:?}: {e}"))?;
+        Ok(content)
+    }
+
+    /// Counts the bytes of an entry that is unpacked later.
+    pub(crate) fn reserve(&mut self, name: &str, length: usize) -> Result<(), String> {
+        let length = length as u64;
+        let left = self.left.checked_sub(length);
+        self.left = left.ok_or_else(|| trap(name, length, self.left))?;
+        Ok(())
+    }
+
     fn unpack(&mut self, index: usize, name: &str) -> Result<Vec<u8>, String> {
-        let trap = |length: u64, left: u64| {
-            format!("{name:?} unpacks to {length} bytes or more, {left} are allowed: a trap")
-        };
         let entry = self
             .zip
             .by_index(index)
             .map_err(|e| format!("{name:?}: {e}"))?;
         if entry.size() > self.left {
-            return Err(trap(entry.size(), self.left));
+            return Err(trap(name, entry.size(), self.left));
         }
         // The directory may lie about the length.
         let mut content = Vec::new();
@@ -73,9 +83,13 @@ impl<'a> Archive<'a> {
         self.left = self
             .left
             .checked_sub(length)
-            .ok_or_else(|| trap(length, self.left))?;
+            .ok_or_else(|| trap(name, length, self.left))?;
         Ok(content)
     }
+}
+
+fn trap(name: &str, length: u64, left: u64) -> String {
+    format!("{name:?} unpacks to {length} bytes or more, {left} are allowed: a trap")
 }
 
 /// Makes archives for tests.

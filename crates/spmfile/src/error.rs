@@ -1,5 +1,7 @@
 //! Why a file is not read: what was expected, what was found.
 
+use std::ops::Range;
+
 use crate::scan::Scan;
 
 /// What a user may hand in, for messages about everything else.
@@ -115,6 +117,66 @@ pub enum ReadError {
         /// The channels that lie within the file, to look at; `reason` says whether the data have
         /// moved, in which case their values are wrong.
         readable: Box<Scan>,
+    },
+    /// Damaged, found out before anything was decoded: see [`crate::OpenOptions::damaged`].
+    #[error("the file is damaged: {reason}; {within} of {announced} channels lie within the file")]
+    CutOff {
+        /// What is missing.
+        reason: String,
+        /// Number of channels that lie within the file.
+        within: usize,
+        /// Number of channels announced.
+        announced: usize,
+    },
+    /// One channel cannot be read.
+    #[error("channel {name:?} cannot be read: {reason}")]
+    Channel {
+        /// Its name.
+        name: String,
+        /// What was expected, what was found.
+        reason: String,
+    },
+    /// Fewer channels than that.
+    #[error("expected a channel below {found}, found {channel}: the first one is number 0")]
+    NoSuchChannel {
+        /// The number asked for.
+        channel: usize,
+        /// Number of channels.
+        found: usize,
+    },
+    /// Fewer rows than that.
+    #[error("expected rows within 0..{found}, found {rows:?}")]
+    NoSuchRows {
+        /// The rows asked for.
+        rows: Range<usize>,
+        /// Number of rows.
+        found: usize,
+    },
+    /// The bytes cannot be had.
+    #[error("expected {length} bytes at byte {at}: {reason}")]
+    Source {
+        /// First byte.
+        at: u64,
+        /// Number of bytes.
+        length: usize,
+        /// What the system says.
+        reason: String,
+    },
+    /// A format whose bytes are needed all at once.
+    #[error("a {format} file is read as a whole: give all of its bytes")]
+    WholeOnly {
+        /// The format.
+        format: &'static str,
+    },
+    /// A format that this build leaves out.
+    #[error(
+        "{format} files need the feature `{feature}` of the crate spmfile, which this build leaves out"
+    )]
+    NotBuilt {
+        /// The format.
+        format: &'static str,
+        /// The feature.
+        feature: &'static str,
     },
     /// Nothing in it can be read.
     #[error("none of the {announced} channels can be read; {name}: {reason}")]

@@ -54,9 +54,6 @@ pub enum ExportError {
 
 /// The SI unit without prefix and the factor to it, as Gwyddion wants it.
 pub(crate) fn base_unit(unit: &str) -> (String, f64) {
-    const ROOTS: [&str; 16] = [
-        "V", "A", "Hz", "N", "Pa", "s", "W", "F", "C", "J", "K", "T", "S", "eV", "Ω", "g",
-    ];
     let unit = units::clean(unit);
     if unit == "°" {
         return ("deg".to_owned(), 1.0);
@@ -65,7 +62,7 @@ pub(crate) fn base_unit(unit: &str) -> (String, f64) {
         // Divided, so that 1 nm is exactly the number 1e-9.
         return ("m".to_owned(), nm / 1e9);
     }
-    for root in ROOTS {
+    for root in units::ROOTS {
         if let Some(factor) = units::prefix_ratio(&unit, root) {
             return (root.to_owned(), factor);
         }
@@ -153,15 +150,6 @@ pub(crate) fn unique_names(scan: &Scan) -> Result<Vec<String>, ExportError> {
     Ok(names)
 }
 
-/// A text without line ends and NULs.
-pub(crate) fn one_line(text: &str) -> String {
-    text.chars()
-        .map(|c| if c.is_control() { ' ' } else { c })
-        .collect::<String>()
-        .trim()
-        .to_owned()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -176,10 +164,5 @@ mod tests {
         assert_eq!(base_unit("m"), ("m".to_owned(), 1.0));
         assert_eq!(base_unit("T"), ("T".to_owned(), 1.0));
         assert_eq!(base_unit(""), (String::new(), 1.0));
-    }
-
-    #[test]
-    fn lines_stay_lines() {
-        assert_eq!(one_line(" a\r\nb\0c "), "a  b c");
     }
 }

@@ -1,7 +1,7 @@
 //! The text headers of Gwyddion's simple formats: a magic line, lines `Key = value`, NULs up to
 //! the next multiple of a width, binary samples.
 
-use crate::export::one_line;
+use crate::words::one_line;
 
 /// Keys and values of the header and the byte at which the samples begin.
 ///

@@ -17,8 +17,11 @@
 use crate::clock;
 use crate::cursor::{Cursor, Endian};
 use crate::error::ReadError;
+use crate::header::ChannelHeader;
+use crate::outline::{Input, Outline};
 use crate::raster::{self, Encoding, Order};
-use crate::scan::{Channel, ChannelInfo, DateTime, FrameDirection, LineDirection, Scan, Span};
+use crate::scan::{ChannelInfo, DateTime, FrameDirection, LineDirection, Scan, Span};
+use crate::stored::Flat;
 use crate::units::{self, quantity};
 use crate::whole::{Extent, MOST_CHANNELS};
 
@@ -36,6 +39,27 @@ fn damaged(reason: impl Into<String>) -> ReadError {
 
 fn unsupported(reason: impl Into<String>) -> ReadError {
     ReadError::unsupported(FORMAT, reason)
+}
+
+/// An Igor binary wave has no signature: a version, and a kind of number that exists.
+pub(crate) fn detect(head: &[u8]) -> bool {
+    let little = matches!(head, [1..=3 | 5, 0, ..]);
+    let big = matches!(head, [0, 1..=3 | 5, ..]);
+    if !little && !big {
+        return false;
+    }
+    let endian = if little { Endian::Little } else { Endian::Big };
+    let cursor = Cursor::new(head, endian);
+    // The place of the wave's type in its header.
+    let place = match cursor.clone().u16() {
+        Ok(1) => 8,
+        Ok(2) => 16,
+        Ok(3) => 20,
+        _ => 80,
+    };
+    let kind = cursor.at(place).u16();
+    // Bits: complex 1, float 2, double 4, 8-, 16-, 32-bit integer 8, 16, 32, unsigned 64; 0 is text.
+    kind.is_ok_and(|kind| kind == 0 || matches!(kind & !0x41, 2 | 4 | 8 | 16 | 32 | 128))
 }
 
 /// What the headers of a version 5 file say.
@@ -58,35 +82,12 @@ struct Wave {
     labels: [usize; 4],
 }
 
-/// Reads the channels that are wanted.
-pub(crate) fn read(bytes: &[u8], wanted: &dyn Fn(&ChannelInfo) -> bool) -> Result<Scan, ReadError> {
-    let endian = if bytes.first() == Some(&0) {
-        Endian::Big
-    } else {
-        Endian::Little
-    };
-    let version = Cursor::new(bytes, endian).u16().map_err(damaged)?;
-    if version != 5 {
-        return Err(refuse_one_dimension(bytes, endian, version));
-    }
-    check_sum(bytes, HEADERS, endian)?;
-    let wave = headers(bytes, endian).map_err(damaged)?;
+/// Reads the headers and finds the samples.
+pub(crate) fn open<'a>(input: &Input<'a>) -> Result<Outline<'a>, ReadError> {
+    let bytes = input.bytes;
+    let wave = wave(bytes)?;
     let [columns, rows, layers, _] = wave.size;
-    if rows == 0 {
-        return Err(unsupported(format!(
-            "it holds a one-dimensional wave of {columns} points, no image"
-        )));
-    }
-    if wave.size[3] > 1 {
-        return Err(unsupported("it holds a wave of four dimensions, no image"));
-    }
     let layers = layers.max(1);
-    if layers > MOST_CHANNELS {
-        return Err(ReadError::TooManyChannels {
-            found: layers,
-            limit: MOST_CHANNELS,
-        });
-    }
     let encoding = encoding(wave.kind)?;
     let length = raster::byte_length(rows, columns, encoding)
         .ok_or_else(|| damaged(format!("its size is {rows} lines of {columns} samples")))?;
@@ -98,9 +99,9 @@ pub(crate) fn read(bytes: &[u8], wanted: &dyn Fn(&ChannelInfo) -> bool) -> Resul
         )));
     }
     let note = Note(&tail.note);
-    let mut scan = frame(&note);
+    let mut outline = Outline::of(frame(&note));
     let [width_nm, height_nm] = extent_nm(&wave, &note);
-    scan.size_nm = width_nm
+    outline.scan.size_nm = width_nm
         .zip(height_nm)
         .map(|(width, height)| [width, height]);
     let order = Order {
@@ -121,34 +122,55 @@ pub(crate) fn read(bytes: &[u8], wanted: &dyn Fn(&ChannelInfo) -> bool) -> Resul
             scan_line: None,
         };
         let place = layer.saturating_mul(length).saturating_add(HEADERS);
-        let Some(block) = extent.take(bytes, place, length, &info.name) else {
-            continue;
-        };
-        if !wanted(&info) {
+        if !extent.take(input.length, place, length, &info.name) {
             continue;
         }
-        scan.channels.push(Channel {
-            unit: unit(&wave, &info.name, layers),
-            name: info.name,
-            internal_name: info.internal_name,
-            line_direction: info.line_direction,
-            scan_line: None,
-            rows,
-            columns,
+        let header = ChannelHeader {
             width_nm,
             height_nm,
             span: Span::PixelCentres,
-            scale: 1.0,
-            offset: 0.0,
-            scaling: "values as stored".to_owned(),
             plane_fit: note
                 .get(&format!("Planefit {layer}"))
                 .filter(|fit| !fit.eq_ignore_ascii_case("none"))
                 .map(str::to_owned),
-            samples: raster::decode(block, columns, encoding, endian, order),
+            ..ChannelHeader::new(info.clone(), rows, columns)
+                .in_unit(&unit(&wave, &info.name, layers))
+        };
+        let samples = Flat::at(place, encoding, wave.endian).in_order(order);
+        outline.add_flat(header, samples);
+    }
+    extent.judge(outline, input.length)
+}
+
+/// The headers of an image.
+fn wave(bytes: &[u8]) -> Result<Wave, ReadError> {
+    let endian = if bytes.first() == Some(&0) {
+        Endian::Big
+    } else {
+        Endian::Little
+    };
+    let version = Cursor::new(bytes, endian).u16().map_err(damaged)?;
+    if version != 5 {
+        return Err(refuse_one_dimension(bytes, endian, version));
+    }
+    check_sum(bytes, HEADERS, endian)?;
+    let wave = headers(bytes, endian).map_err(damaged)?;
+    let [columns, rows, layers, more] = wave.size;
+    if rows == 0 {
+        return Err(unsupported(format!(
+            "it holds a one-dimensional wave of {columns} points, no image"
+        )));
+    }
+    if more > 1 {
+        return Err(unsupported("it holds a wave of four dimensions, no image"));
+    }
+    if layers > MOST_CHANNELS {
+        return Err(ReadError::TooManyChannels {
+            found: layers,
+            limit: MOST_CHANNELS,
         });
     }
-    extent.judge(scan, bytes)
+    Ok(wave)
 }
 
 /// The reason why a file of an elder version is not read.
@@ -333,7 +355,7 @@ fn unit(wave: &Wave, label: &str, layers: usize) -> String {
     let known = UNITS.iter().find(|(name, _)| label.starts_with(name));
     match known {
         Some((_, unit)) if line_direction(label).is_some() => (*unit).to_owned(),
-        _ if layers == 1 => units::clean(&wave.unit),
+        _ if layers == 1 => wave.unit.clone(),
         _ => String::new(),
     }
 }

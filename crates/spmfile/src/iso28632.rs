@@ -13,11 +13,12 @@
 
 use crate::clock;
 use crate::error::ReadError;
+use crate::header::ChannelHeader;
 use crate::labels;
+use crate::outline::{Input, Mixed, Outline};
 use crate::raster::{self, Order};
-use crate::scan::{
-    Channel, ChannelInfo, DateTime, FrameDirection, LineDirection, Samples, Scan, Span,
-};
+use crate::scan::{ChannelInfo, DateTime, FrameDirection, LineDirection, Scan};
+use crate::stored::Stored;
 use crate::units;
 
 const FORMAT: &str = "ISO 28632";
@@ -37,8 +38,9 @@ fn damaged(reason: impl Into<String>) -> ReadError {
     ReadError::damaged(FORMAT, reason)
 }
 
-/// Reads the channels that are wanted.
-pub(crate) fn read(bytes: &[u8], wanted: &dyn Fn(&ChannelInfo) -> bool) -> Result<Scan, ReadError> {
+/// Reads the headers and finds the samples.
+pub(crate) fn open<'a>(input: &Input<'a>) -> Result<Outline<'a>, ReadError> {
+    let bytes = input.bytes;
     let (head, body) = split(bytes)?;
     let header = Header::of(&head)?;
     let channels = header.channels()?;
@@ -55,42 +57,26 @@ pub(crate) fn read(bytes: &[u8], wanted: &dyn Fn(&ChannelInfo) -> bool) -> Resul
             ))
         })?;
     let order = header.order()?;
-    let mut scan = header.frame();
-    let infos: Vec<(ChannelInfo, String)> = channels;
-    let chosen: Vec<bool> = infos.iter().map(|(info, _)| wanted(info)).collect();
-    let (values, missing) = values(body, pixels, &chosen)?;
-    let size = scan.size_nm;
-    for (((info, unit), _), values) in infos
-        .into_iter()
-        .zip(chosen)
-        .filter(|(_, chosen)| *chosen)
-        .zip(values)
-    {
-        scan.channels.push(Channel {
-            name: info.name,
-            internal_name: info.internal_name,
-            unit,
-            line_direction: info.line_direction,
-            scan_line: None,
-            rows,
-            columns,
-            width_nm: size.map(|[width, _]| width),
-            height_nm: size.map(|[_, height]| height),
-            span: Span::PixelEdges,
-            scale: 1.0,
-            offset: 0.0,
-            scaling: "values as stored".to_owned(),
+    let mut outline = Outline::of(header.frame());
+    let size = outline.scan.size_nm;
+    for (info, unit) in channels {
+        let of_channel = ChannelHeader {
             plane_fit: header.text(89).map(str::to_owned),
-            samples: Samples::F64(raster::turned(&values, columns, order)),
-        });
+            ..ChannelHeader::new(info, rows, columns)
+                .in_unit(&unit)
+                .of_size(size)
+        };
+        outline.add(of_channel, Stored::Mixed);
     }
-    match missing {
-        None => Ok(scan),
-        Some(reason) => Err(ReadError::Incomplete {
-            reason,
-            readable: Box::new(scan),
-        }),
-    }
+    outline.together = Some(Box::new(move |chosen| {
+        let (values, damage) = values(body, pixels, chosen)?;
+        let turned = |values: Vec<f64>| raster::turned(&values, columns, order);
+        Ok(Mixed {
+            values: values.into_iter().map(turned).collect(),
+            damage,
+        })
+    }));
+    Ok(outline)
 }
 
 /// The header's lines and the bytes behind them.
@@ -202,7 +188,7 @@ impl<'a> Header<'a> {
             };
             let unit = match self.text(unit) {
                 None | Some("n" | "d") => String::new(),
-                Some(unit) => units::clean(unit),
+                Some(unit) => unit.to_owned(),
             };
             (info, unit)
         };

@@ -14,13 +14,16 @@
 //!
 //! Names of the tags: Gwyddion's `jpk.h`, by the maker of the instrument.
 
+#[cfg(feature = "archives")]
 use crate::archive::Archive;
 use crate::clock;
 use crate::error::ReadError;
+use crate::header::ChannelHeader;
+use crate::outline::{Input, Outline};
 use crate::raster::{self, Order};
-use crate::scan::{
-    Channel, ChannelInfo, DateTime, FrameDirection, LineDirection, Scan, Span, UnreadableChannel,
-};
+use crate::scan::{ChannelInfo, DateTime, FrameDirection, LineDirection, Scan, UnreadableChannel};
+use crate::signature::{first_entry, tiff_has};
+use crate::stored::Flat;
 use crate::tiff_tags::{Directory, directories};
 use crate::whole::{Extent, some_readable};
 
@@ -83,20 +86,40 @@ fn damaged(reason: impl Into<String>) -> ReadError {
     ReadError::damaged(FORMAT, reason)
 }
 
-/// Reads the channels that are wanted.
-pub(crate) fn read(bytes: &[u8], wanted: &dyn Fn(&ChannelInfo) -> bool) -> Result<Scan, ReadError> {
+/// A TIFF file with tags of the maker.
+pub(crate) fn detect(bytes: &[u8]) -> bool {
+    tiff_has(bytes, 0x8000, 0x80ff)
+}
+
+/// An archive of the maker.
+pub(crate) fn detect_zip(bytes: &[u8]) -> bool {
+    let name = first_entry(bytes);
+    let folders = [&b"index/"[..], b"segments/", b"shared-data/", b"data-image"];
+    name == b"header.properties"
+        || name.ends_with(b".jpk-qi-image")
+        || folders.iter().any(|folder| name.starts_with(folder))
+}
+
+/// Reads the headers and finds the samples.
+pub(crate) fn open<'a>(input: &Input<'a>) -> Result<Outline<'a>, ReadError> {
+    outline(input.bytes)
+}
+
+fn outline(bytes: &[u8]) -> Result<Outline<'_>, ReadError> {
     let pages = directories(bytes).map_err(damaged)?;
     let first = pages.first().ok_or_else(|| damaged("it holds no image"))?;
-    let mut scan = frame(first);
+    let mut outline = Outline::of(frame(first));
     let mut extent = Extent::default();
     let mut announced = 0;
     let mut bytes_left = bytes.len();
     for page in pages.iter().filter(|page| is_channel(page)) {
         announced += 1;
         let info = info(page);
-        match channel(page, first, &scan, &info, wanted, &mut bytes_left) {
-            Ok(channel) => scan.channels.extend(channel),
-            Err(Trouble::Scaling(error)) => scan.unreadable.push(UnreadableChannel {
+        match channel(page, first, &info, &mut bytes_left) {
+            Ok((header, samples)) => {
+                outline.add_flat(header.of_size(outline.scan.size_nm), samples);
+            }
+            Err(Trouble::Scaling(error)) => outline.scan.unreadable.push(UnreadableChannel {
                 name: info.name,
                 error,
             }),
@@ -109,21 +132,21 @@ pub(crate) fn read(bytes: &[u8], wanted: &dyn Fn(&ChannelInfo) -> bool) -> Resul
             reason: "it holds no channel but a picture at most".to_owned(),
         });
     }
-    extent.judge(some_readable(scan, announced)?, bytes)
+    extent.judge(some_readable(outline, announced)?, bytes.len() as u64)
 }
 
-/// Reads the image of a map from its archive; curves alone are refused.
-pub(crate) fn read_zip(
-    bytes: &[u8],
-    wanted: &dyn Fn(&ChannelInfo) -> bool,
-) -> Result<Scan, ReadError> {
-    let mut archive = Archive::open(bytes).map_err(damaged)?;
+/// Reads the headers of the image of a map in its archive; curves alone are refused.
+#[cfg(feature = "archives")]
+pub(crate) fn open_zip<'a>(input: &Input<'a>) -> Result<Outline<'a>, ReadError> {
+    let mut archive = Archive::open(input.bytes).map_err(damaged)?;
     let names = archive.names();
     let name = names.iter().find(|name| name.starts_with(IMAGE_ENTRY));
-    match name.and_then(|name| archive.entry(name)) {
-        Some(image) => read(&image.map_err(damaged)?, wanted),
-        None => Err(ReadError::ForceCurve),
-    }
+    let Some(image) = name.and_then(|name| archive.entry(name)) else {
+        return Err(ReadError::ForceCurve);
+    };
+    let image = image.map_err(damaged)?;
+    let outline = outline(&image)?.owned();
+    outline.ok_or_else(|| damaged("expected images in its directory, found none"))
 }
 
 /// Everything but the thumbnail: grey, and named.
@@ -174,15 +197,13 @@ enum Trouble {
     Scaling(String),
 }
 
-/// A channel, if it is wanted.
-fn channel(
-    page: &Directory<'_>,
+/// A channel and where its samples are.
+fn channel<'a>(
+    page: &Directory<'a>,
     first: &Directory<'_>,
-    scan: &Scan,
     info: &ChannelInfo,
-    wanted: &dyn Fn(&ChannelInfo) -> bool,
     bytes_left: &mut usize,
-) -> Result<Option<Channel>, Trouble> {
+) -> Result<(ChannelHeader, Flat<'a>), Trouble> {
     let shape = page.shape().map_err(Trouble::Scaling)?;
     let slot = default_slot(page).map_err(Trouble::Scaling)?;
     let length = raster::byte_length(shape.rows, shape.columns, shape.encoding)
@@ -191,33 +212,19 @@ fn channel(
     *bytes_left = bytes_left
         .checked_sub(length)
         .ok_or_else(|| Trouble::Missing("its data overlap with those of others".to_owned()))?;
-    if !wanted(info) {
-        return Ok(None);
-    }
     let order = Order {
         top_first: reflected(page) || reflected(first),
         mirrored: false,
     };
-    Ok(Some(Channel {
-        name: info.name.clone(),
-        internal_name: info.internal_name.clone(),
-        unit: slot.unit,
-        line_direction: info.line_direction,
-        scan_line: None,
-        rows: shape.rows,
-        columns: shape.columns,
-        width_nm: scan.size_nm.map(|[width, _]| width),
-        height_nm: scan.size_nm.map(|[_, height]| height),
-        span: Span::PixelEdges,
-        scale: slot.factor,
-        offset: slot.offset,
-        scaling: format!(
-            "slot {:?}: counts × {} + {}",
-            slot.name, slot.factor, slot.offset
-        ),
-        plane_fit: None,
-        samples: raster::decode(&block, shape.columns, shape.encoding, page.endian, order),
-    }))
+    let words = format!(
+        "slot {:?}: counts × {} + {}",
+        slot.name, slot.factor, slot.offset
+    );
+    let header = ChannelHeader::new(info.clone(), shape.rows, shape.columns)
+        .in_unit(&slot.unit)
+        .scaled(slot.factor, slot.offset, words);
+    let samples = Flat::block(block, shape.encoding, page.endian).in_order(order);
+    Ok((header, samples))
 }
 
 fn reflected(page: &Directory<'_>) -> bool {

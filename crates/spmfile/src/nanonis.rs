@@ -20,8 +20,11 @@ use memchr::memmem;
 use crate::clock;
 use crate::cursor::Endian;
 use crate::error::ReadError;
+use crate::header::ChannelHeader;
+use crate::outline::{Input, Outline};
 use crate::raster::{self, Encoding, Order};
-use crate::scan::{Channel, ChannelInfo, DateTime, FrameDirection, LineDirection, Scan, Span};
+use crate::scan::{ChannelInfo, DateTime, FrameDirection, LineDirection, Scan};
+use crate::stored::Flat;
 use crate::units;
 use crate::whole::{Extent, MOST_CHANNELS};
 
@@ -32,8 +35,9 @@ fn damaged(reason: impl Into<String>) -> ReadError {
     ReadError::damaged(FORMAT, reason)
 }
 
-/// Reads the channels that are wanted.
-pub(crate) fn read(bytes: &[u8], wanted: &dyn Fn(&ChannelInfo) -> bool) -> Result<Scan, ReadError> {
+/// Reads the headers and finds the samples.
+pub(crate) fn open<'a>(input: &Input<'a>) -> Result<Outline<'a>, ReadError> {
+    let bytes = input.bytes;
     let (text, start) = header(bytes)?;
     let fields = fields(&text);
     let endian = sample_kind(&fields)?;
@@ -42,44 +46,31 @@ pub(crate) fn read(bytes: &[u8], wanted: &dyn Fn(&ChannelInfo) -> bool) -> Resul
         .ok_or_else(|| damaged(format!("its size is {rows} lines of {columns} samples")))?;
     let images = images(&fields)?;
 
-    let mut scan = frame(&fields);
+    let scan = frame(&fields);
     let size = scan.size_nm;
     let top_first = match scan.frame_direction {
         Some(direction) => direction == FrameDirection::Down,
         None => return Err(damaged("expected SCAN_DIR up or down, found neither")),
     };
+    let mut outline = Outline::of(scan);
     let mut extent = Extent::default();
     for (index, (info, unit)) in images.into_iter().enumerate() {
-        let offset = index.saturating_mul(length).saturating_add(start);
-        let Some(block) = extent.take(bytes, offset, length, &info.name) else {
-            continue;
-        };
-        if !wanted(&info) {
+        let start = index.saturating_mul(length).saturating_add(start);
+        if !extent.take(input.length, start, length, &info.name) {
             continue;
         }
         let order = Order {
             top_first,
             mirrored: info.line_direction == Some(LineDirection::Retrace),
         };
-        scan.channels.push(Channel {
-            name: info.name,
-            internal_name: info.internal_name,
-            unit,
-            line_direction: info.line_direction,
-            scan_line: None,
-            rows,
-            columns,
-            width_nm: size.map(|[width, _]| width),
-            height_nm: size.map(|[_, height]| height),
-            span: Span::PixelEdges,
-            scale: 1.0,
-            offset: 0.0,
-            scaling: "values as stored".to_owned(),
-            plane_fit: None,
-            samples: raster::decode(block, columns, Encoding::F32, endian, order),
-        });
+        outline.add_flat(
+            ChannelHeader::new(info, rows, columns)
+                .in_unit(&unit)
+                .of_size(size),
+            Flat::at(start, Encoding::F32, endian).in_order(order),
+        );
     }
-    extent.judge(scan, bytes)
+    extent.judge(outline, input.length)
 }
 
 /// The header's text and the byte at which the images begin.
@@ -328,7 +319,7 @@ mod tests {
         assert!(close(scan.offset_nm, [10.0, -20.0]));
         assert!(close(scan.size_nm.expect("a size"), [3.0, 4.0]));
         assert_eq!(scan.acquired, clock::date([2020, 1, 1], [0, 0, 30]));
-        let Channel {
+        let crate::Channel {
             width_nm,
             height_nm,
             ..

@@ -18,12 +18,12 @@ use memchr::memmem;
 use crate::clock;
 use crate::cursor::Endian;
 use crate::error::ReadError;
-use crate::missing::blank_unfilled;
-use crate::raster::{self, Encoding, Order};
-use crate::scan::{
-    Channel, ChannelInfo, DateTime, FrameDirection, LineDirection, Samples, Scan, Span,
-    UnreadableChannel,
-};
+use crate::header::{ChannelHeader, Scaling};
+use crate::judge::Check;
+use crate::outline::{Input, Outline};
+use crate::raster::{self, Encoding};
+use crate::scan::{ChannelInfo, DateTime, FrameDirection, LineDirection, Scan, UnreadableChannel};
+use crate::stored::Flat;
 use crate::units::{clean, nm_per};
 use crate::whole::{Extent, MOST_CHANNELS, some_readable};
 
@@ -56,8 +56,9 @@ fn get<'a>(lines: &'a [(String, String)], key: &str) -> Option<&'a str> {
     Some(value)
 }
 
-/// Reads the channels that are wanted.
-pub(crate) fn read(bytes: &[u8], wanted: &dyn Fn(&ChannelInfo) -> bool) -> Result<Scan, ReadError> {
+/// Reads the headers and finds the samples.
+pub(crate) fn open<'a>(input: &Input<'a>) -> Result<Outline<'a>, ReadError> {
+    let bytes = input.bytes;
     let end = memmem::find(bytes, DATA_MARK).ok_or_else(|| {
         damaged(format!(
             "expected the mark #! behind the header, found none in {} bytes: the file was cut \
@@ -67,7 +68,7 @@ pub(crate) fn read(bytes: &[u8], wanted: &dyn Fn(&ChannelInfo) -> bool) -> Resul
     })?;
     let header = header(&bytes[..end]);
     let names = listed(&header)?;
-    let mut scan = frame(&header);
+    let mut outline = Outline::of(frame(&header));
     let mut extent = Extent::default();
     let mut announced = 0;
     let mut start = end + DATA_MARK.len();
@@ -86,22 +87,18 @@ pub(crate) fn read(bytes: &[u8], wanted: &dyn Fn(&ChannelInfo) -> bool) -> Resul
         }
         announced += 1;
         let info = info(section, &name);
-        let Some(data) = extent.take(bytes, here, block.length, &info.name) else {
+        if !extent.take(input.length, here, block.length, &info.name) {
             continue;
-        };
+        }
         match scaling(section, &block) {
-            Ok(scaling) if wanted(&info) => {
-                scan.channels.push(channel(
-                    info,
-                    data,
-                    &block,
-                    section,
-                    scaling,
-                    scan.frame_direction,
-                ));
+            Ok(scaling) => {
+                let samples = Flat {
+                    check: unfilled(&block, section, outline.scan.frame_direction),
+                    ..Flat::at(here, block.encoding, block.endian)
+                };
+                outline.add_flat(channel(info, &block, section, scaling), samples);
             }
-            Ok(_) => {}
-            Err(error) => scan.unreadable.push(UnreadableChannel {
+            Err(error) => outline.scan.unreadable.push(UnreadableChannel {
                 name: info.name,
                 error,
             }),
@@ -113,12 +110,11 @@ pub(crate) fn read(bytes: &[u8], wanted: &dyn Fn(&ChannelInfo) -> bool) -> Resul
             reason: "it holds no image (curves only)".to_owned(),
         });
     }
-    scan.size_nm = scan
-        .channels
-        .first()
-        .and_then(|c| c.width_nm.zip(c.height_nm))
+    let first = outline.channels.first();
+    outline.scan.size_nm = first
+        .and_then(|c| c.header.width_nm.zip(c.header.height_nm))
         .map(Into::into);
-    extent.judge(some_readable(scan, announced)?, bytes)
+    extent.judge(some_readable(outline, announced)?, input.length)
 }
 
 fn header(bytes: &[u8]) -> Header {
@@ -246,8 +242,8 @@ fn info(section: &[(String, String)], name: &str) -> ChannelInfo {
     }
 }
 
-/// Unit, factor and offset of the counts.
-fn scaling(section: &[(String, String)], block: &Block) -> Result<(String, f64, f64), String> {
+/// How counts become values.
+fn scaling(section: &[(String, String)], block: &Block) -> Result<Scaling, String> {
     let number = |key: &str| {
         let text = get(section, key).unwrap_or("");
         let number = text.parse::<f64>().ok().filter(|n| n.is_finite());
@@ -257,18 +253,20 @@ fn scaling(section: &[(String, String)], block: &Block) -> Result<(String, f64, 
     let counts = 2f64.powi(8 * block.encoding.width() as i32);
     let signed = matches!(block.encoding, Encoding::I8 | Encoding::I16 | Encoding::I32);
     let offset = if signed { least + range / 2.0 } else { least };
-    let unit = clean(get(section, "Dim2Unit").unwrap_or(""));
-    Ok((unit, range / counts, offset))
+    let scale = range / counts;
+    Ok(Scaling {
+        scale,
+        offset,
+        words: format!("counts × {scale} + {offset}: the range of Dim2 over that of the counts"),
+    })
 }
 
 fn channel(
     info: ChannelInfo,
-    data: &[u8],
     block: &Block,
     section: &[(String, String)],
-    (unit, scale, offset): (String, f64, f64),
-    direction: Option<FrameDirection>,
-) -> Channel {
+    scaling: Scaling,
+) -> ChannelHeader {
     let length = |axis: u8| {
         let range = get(section, &format!("Dim{axis}Range"))?
             .parse::<f64>()
@@ -276,53 +274,33 @@ fn channel(
         let nm = nm_per(get(section, &format!("Dim{axis}Unit"))?)?;
         Some((range * nm).abs()).filter(|&length| length > 0.0 && length.is_finite())
     };
-    let samples = raster::decode(
-        data,
-        block.columns,
-        block.encoding,
-        block.endian,
-        Order::default(),
-    );
-    Channel {
-        name: info.name,
-        internal_name: info.internal_name,
-        unit,
-        line_direction: info.line_direction,
-        scan_line: info.scan_line,
-        rows: block.rows,
-        columns: block.columns,
+    ChannelHeader {
         width_nm: length(0),
         height_nm: length(1),
-        span: Span::PixelEdges,
-        scale,
-        offset,
-        scaling: format!("counts × {scale} + {offset}: the range of Dim2 over that of the counts"),
-        plane_fit: None,
-        samples: without_unfilled(samples, block, section, direction),
+        scaling: Some(scaling),
+        ..ChannelHeader::new(info, block.rows, block.columns)
+            .in_unit(get(section, "Dim2Unit").unwrap_or(""))
     }
 }
 
-/// Blanks what an unfinished frame never filled.
-fn without_unfilled(
-    samples: Samples,
+/// Lines that an unfinished frame may never have filled.
+fn unfilled(
     block: &Block,
     section: &[(String, String)],
     direction: Option<FrameDirection>,
-) -> Samples {
+) -> Check {
     let current = get(section, "CurLine").and_then(|line| line.parse::<usize>().ok());
     let Some(current) = current.filter(|&line| line.saturating_add(1) < block.rows) else {
-        return samples;
+        return Check::Nothing;
     };
     let left = block.rows - 1 - current;
     match direction {
-        Some(FrameDirection::Up) => blank_unfilled(samples, block.columns, current + 1..block.rows),
+        Some(FrameDirection::Up) => Check::unfilled(current + 1..block.rows),
         // Whether it counts lines or tells a place is not known.
         Some(FrameDirection::Down) => {
-            let (more, less) = (left.max(current), left.min(current));
-            let samples = blank_unfilled(samples, block.columns, 0..more);
-            blank_unfilled(samples, block.columns, 0..less)
+            Check::Unfilled(vec![0..left.max(current), 0..left.min(current)])
         }
-        None => samples,
+        None => Check::Nothing,
     }
 }
 

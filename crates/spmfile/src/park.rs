@@ -11,11 +11,17 @@
 //!   about their times.
 //! - Files of force curves hold the image on which the curves were placed; it is read.
 
+use std::borrow::Cow;
+
 use crate::clock;
 use crate::cursor::{Cursor, Endian};
 use crate::error::ReadError;
-use crate::raster::{self, Encoding, Order};
-use crate::scan::{Channel, ChannelInfo, DateTime, FrameDirection, LineDirection, Scan, Span};
+use crate::header::ChannelHeader;
+use crate::outline::{Input, Outline};
+use crate::raster::{self, Encoding};
+use crate::scan::{ChannelInfo, DateTime, FrameDirection, LineDirection, Scan};
+use crate::signature::tiff_has;
+use crate::stored::Flat;
 use crate::tiff_tags::{Directory, directories};
 use crate::whole::Extent;
 
@@ -33,6 +39,11 @@ const NM_PER_MICROMETRE: f64 = 1e3;
 
 fn damaged(reason: impl Into<String>) -> ReadError {
     ReadError::damaged(FORMAT, reason)
+}
+
+/// A TIFF file with tags of the maker.
+pub(crate) fn detect(bytes: &[u8]) -> bool {
+    tiff_has(bytes, 50432, 50441)
 }
 
 /// The structure of the tag [`HEADER`].
@@ -57,7 +68,8 @@ struct Header {
 }
 
 /// Reads the image if it is wanted.
-pub(crate) fn read(bytes: &[u8], wanted: &dyn Fn(&ChannelInfo) -> bool) -> Result<Scan, ReadError> {
+pub(crate) fn open<'a>(input: &Input<'a>) -> Result<Outline<'a>, ReadError> {
+    let bytes = input.bytes;
     let pages = directories(bytes).map_err(damaged)?;
     let page = pages
         .iter()
@@ -83,16 +95,16 @@ pub(crate) fn read(bytes: &[u8], wanted: &dyn Fn(&ChannelInfo) -> bool) -> Resul
             let (rows, columns) = (header.rows, header.columns);
             damaged(format!("its size is {rows} lines of {columns} samples"))
         })?;
-    let mut scan = frame(&header, page);
+    let mut outline = Outline::of(frame(&header, page));
     let mut extent = Extent::default();
     let data = page.raw(DATA).unwrap_or_default();
-    if let Some(block) = extent.take(data, 0, length, &info.name)
-        && wanted(&info)
-    {
-        scan.channels
-            .push(channel(&header, info, block, scan.size_nm));
+    if extent.take(data.len() as u64, 0, length, &info.name) {
+        let block = Cow::Borrowed(&data[..length]);
+        let samples = Flat::block(block, header.encoding, Endian::Little);
+        let size = outline.scan.size_nm;
+        outline.add_flat(channel(&header, info).of_size(size), samples);
     }
-    extent.judge(scan, bytes)
+    extent.judge(outline, input.length)
 }
 
 fn parse(bytes: &[u8], version: f64) -> Result<Header, ReadError> {
@@ -113,6 +125,8 @@ fn parse(bytes: &[u8], version: f64) -> Result<Header, ReadError> {
 }
 
 /// Kind of the file and its header; the inner error is about values, the outer about length.
+///
+/// As long as the structure has fields, in their order.
 fn structure(c: &mut Cursor<'_>, version: f64) -> Result<(u32, Result<Header, String>), String> {
     let kind = c.u32()?;
     let source = text(c, 32)?;
@@ -201,34 +215,15 @@ fn text(cursor: &mut Cursor<'_>, units: usize) -> Result<String, String> {
     Ok(text.trim().to_owned())
 }
 
-fn channel(header: &Header, info: ChannelInfo, block: &[u8], size: Option<[f64; 2]>) -> Channel {
+fn channel(header: &Header, info: ChannelInfo) -> ChannelHeader {
+    let words = format!(
+        "gain {} × (scale {} × samples + offset {})",
+        header.gain, header.scale, header.offset
+    );
     let (scale, offset) = (header.gain * header.scale, header.gain * header.offset);
-    Channel {
-        name: info.name,
-        internal_name: info.internal_name,
-        unit: header.unit.clone(),
-        line_direction: info.line_direction,
-        scan_line: None,
-        rows: header.rows,
-        columns: header.columns,
-        width_nm: size.map(|[width, _]| width),
-        height_nm: size.map(|[_, height]| height),
-        span: Span::PixelEdges,
-        scale,
-        offset,
-        scaling: format!(
-            "gain {} × (scale {} × samples + offset {})",
-            header.gain, header.scale, header.offset
-        ),
-        plane_fit: None,
-        samples: raster::decode(
-            block,
-            header.columns,
-            header.encoding,
-            Endian::Little,
-            Order::default(),
-        ),
-    }
+    ChannelHeader::new(info, header.rows, header.columns)
+        .in_unit(&header.unit)
+        .scaled(scale, offset, words)
 }
 
 fn frame(header: &Header, page: &Directory<'_>) -> Scan {

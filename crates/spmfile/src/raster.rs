@@ -7,10 +7,6 @@ use crate::scan::Samples;
 
 /// How one sample is stored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[allow(
-    dead_code,
-    reason = "one variant per kind of sample; formats use what they hold"
-)]
 pub(crate) enum Encoding {
     I8,
     U8,
@@ -20,6 +16,7 @@ pub(crate) enum Encoding {
     U32,
     I64,
     U64,
+    F16,
     F32,
     F64,
 }
@@ -38,7 +35,7 @@ impl Encoding {
     pub(crate) fn width(self) -> usize {
         match self {
             Self::I8 | Self::U8 => 1,
-            Self::I16 | Self::U16 => 2,
+            Self::I16 | Self::U16 | Self::F16 => 2,
             Self::I32 | Self::U32 | Self::F32 => 4,
             Self::I64 | Self::U64 | Self::F64 => 8,
         }
@@ -83,6 +80,10 @@ pub(crate) fn decode(
         Encoding::U32 => samples!(F64, u32, f64),
         Encoding::F32 => samples!(F32, f32, f32),
         Encoding::F64 => samples!(F64, f64, f64),
+        Encoding::F16 => Samples::F32(match endian {
+            Endian::Little => lines(bytes, columns, order, |b| single(u16::from_le_bytes(b))),
+            Endian::Big => lines(bytes, columns, order, |b| single(u16::from_be_bytes(b))),
+        }),
         Encoding::I64 => Samples::F64(match endian {
             Endian::Little => lines(bytes, columns, order, |b| i64::from_le_bytes(b) as f64),
             Endian::Big => lines(bytes, columns, order, |b| i64::from_be_bytes(b) as f64),
@@ -121,8 +122,20 @@ fn lines<T, const N: usize>(
     all
 }
 
+/// Half precision as single precision (IEEE 754).
+fn single(bits: u16) -> f32 {
+    let sign = if bits >> 15 == 1 { -1.0 } else { 1.0 };
+    let exponent = i32::from(bits >> 10 & 0x1f);
+    let fraction = f32::from(bits & 0x3ff);
+    match exponent {
+        0 => sign * fraction * 2f32.powi(-24),
+        31 if fraction == 0.0 => sign * f32::INFINITY,
+        31 => f32::NAN,
+        _ => sign * (1024.0 + fraction) * 2f32.powi(exponent - 25),
+    }
+}
+
 /// Values in order of rows from the top, as text files list them, turned bottom line first.
-#[allow(dead_code, reason = "for formats whose samples are text")]
 pub(crate) fn turned(values: &[f64], columns: usize, order: Order) -> Vec<f64> {
     if columns == 0 {
         return Vec::new();
@@ -190,5 +203,23 @@ mod tests {
         assert_eq!(byte_length(2, 3, Encoding::F64), Some(48));
         assert_eq!(byte_length(0, 3, Encoding::F64), None);
         assert_eq!(byte_length(usize::MAX / 2, 3, Encoding::U8), None);
+    }
+
+    /// Values from the table of examples of binary16 in IEEE 754-2008.
+    #[test]
+    fn half_precision() {
+        for (bits, value) in [
+            (0x0001, 2f32.powi(-24)),
+            (0x03ff, 1023.0 * 2f32.powi(-24)),
+            (0x0400, 2f32.powi(-14)),
+            (0x3555, 0.333_251_95),
+            (0x3c00, 1.0),
+            (0x7bff, 65504.0),
+            (0xc000, -2.0),
+            (0xfc00, f32::NEG_INFINITY),
+        ] {
+            assert_eq!(single(bits), value);
+        }
+        assert!(single(0x7e00).is_nan());
     }
 }

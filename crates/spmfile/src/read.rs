@@ -1,13 +1,10 @@
-//! Bytes of any kind → [`Scan`]: to the reader of their format.
+//! Bytes of any kind → [`Scan`]: opened and decoded at once.
 
-use crate::detect::{Format, detect};
 use crate::error::ReadError;
+use crate::file::{File, OpenOptions};
+use crate::format::Format;
+use crate::options::ArrayOptions;
 use crate::scan::{ChannelInfo, Scan};
-use crate::whole::checked;
-use crate::{
-    agilent, arrays, gsf, gwy, gxyzf, igor, iso28632, jpk, matrix, nanonis, nanoscope, nid, park,
-    rhk, wsxm,
-};
 
 /// Reads every channel of a file held in memory.
 ///
@@ -29,10 +26,10 @@ pub fn read_selected(
     bytes: &[u8],
     wanted: &dyn Fn(&ChannelInfo) -> bool,
 ) -> Result<Scan, ReadError> {
-    read_as(detect(bytes), bytes, wanted)
+    first_frame(bytes, OpenOptions::default(), wanted)
 }
 
-/// The same for bytes of which [`detect()`] has told the format before.
+/// The same for bytes of which [`crate::detect()`] has told the format before.
 ///
 /// # Errors
 /// As [`read_selected`].
@@ -41,53 +38,53 @@ pub fn read_as(
     bytes: &[u8],
     wanted: &dyn Fn(&ChannelInfo) -> bool,
 ) -> Result<Scan, ReadError> {
-    checked(dispatch(format, bytes, wanted))
+    read_array_as(format, bytes, &ArrayOptions::default(), wanted)
 }
 
-/// Hands the bytes to the reader of their format.
-fn dispatch(
-    format: Format,
+/// Reads the wanted channels of a file of any format; options count for arrays and pictures.
+///
+/// # Errors
+/// As [`read_selected`].
+pub fn read_array(
     bytes: &[u8],
+    options: &ArrayOptions,
     wanted: &dyn Fn(&ChannelInfo) -> bool,
 ) -> Result<Scan, ReadError> {
-    #[cfg(test)]
-    crate::seeds::keep(bytes);
-    match format {
-        Format::NanoScope => nanoscope::read(bytes, wanted),
-        Format::NanoScopeForce => Err(nanoscope::refuse_force(bytes)),
-        Format::Nanonis => nanonis::read(bytes, wanted),
-        Format::Gwy => gwy::read(bytes, wanted),
-        Format::Gsf => gsf::read(bytes, wanted),
-        Format::Gxyzf => gxyzf::read(bytes, wanted),
-        Format::Igor => igor::read(bytes, wanted),
-        Format::Wsxm => wsxm::read(bytes, wanted),
-        Format::Iso28632 => iso28632::read(bytes, wanted),
-        Format::Jpk => jpk::read(bytes, wanted),
-        Format::JpkZip => jpk::read_zip(bytes, wanted),
-        Format::Nid => nid::read(bytes, wanted),
-        Format::ParkTiff => park::read(bytes, wanted),
-        Format::Rhk => rhk::read(bytes, wanted),
-        Format::AgilentMi => agilent::read(bytes, wanted),
-        Format::OmicronMatrix | Format::OmicronMatrixLog => Err(matrix::refuse(bytes)),
-        Format::Npy
-        | Format::Npz
-        | Format::Tiff
-        | Format::Png
-        | Format::Jpeg
-        | Format::TextMatrix => {
-            arrays::read_as(format, bytes, &arrays::ArrayOptions::default(), wanted)
-        }
-        Format::Empty => Err(ReadError::Empty),
-        Format::Other(found) => Err(ReadError::OtherFormat { found }),
-        Format::Text => Err(ReadError::Text {
-            start: String::from_utf8_lossy(&bytes[..bytes.len().min(40)])
-                .lines()
-                .next()
-                .unwrap_or("")
-                .to_owned(),
-        }),
-        Format::Unknown => Err(ReadError::Unknown {
-            start: format!("{:02x?}", &bytes[..bytes.len().min(8)]),
-        }),
-    }
+    let options = OpenOptions {
+        array: options.clone(),
+        ..OpenOptions::default()
+    };
+    first_frame(bytes, options, wanted)
+}
+
+/// The same for bytes of which [`crate::detect()`] has told the format before.
+///
+/// # Errors
+/// As [`read_selected`].
+pub fn read_array_as(
+    format: Format,
+    bytes: &[u8],
+    options: &ArrayOptions,
+    wanted: &dyn Fn(&ChannelInfo) -> bool,
+) -> Result<Scan, ReadError> {
+    let options = OpenOptions {
+        format: Some(format),
+        array: options.clone(),
+        ..OpenOptions::default()
+    };
+    first_frame(bytes, options, wanted)
+}
+
+fn first_frame(
+    bytes: &[u8],
+    options: OpenOptions,
+    wanted: &dyn Fn(&ChannelInfo) -> bool,
+) -> Result<Scan, ReadError> {
+    let options = OpenOptions {
+        damaged: true,
+        ..options
+    };
+    let frames = File::open_with(bytes, &options)?.into_frames();
+    let first = frames.into_iter().next().ok_or(ReadError::NoImage)?;
+    first.into_scan(wanted)
 }

@@ -18,9 +18,12 @@
 use crate::clock;
 use crate::cursor::{Cursor, Endian};
 use crate::error::ReadError;
-use crate::missing::blank_unfilled;
+use crate::header::ChannelHeader;
+use crate::judge::Check;
+use crate::outline::{Input, Outline};
 use crate::raster::{self, Encoding, Order};
-use crate::scan::{Channel, ChannelInfo, DateTime, FrameDirection, LineDirection, Scan, Span};
+use crate::scan::{ChannelInfo, DateTime, FrameDirection, LineDirection, Scan};
+use crate::stored::Flat;
 use crate::units::{clean, nm_per};
 use crate::whole::{Extent, MOST_CHANNELS};
 
@@ -57,8 +60,16 @@ fn damaged(reason: impl Into<String>) -> ReadError {
     ReadError::damaged(FORMAT, reason)
 }
 
-/// Reads the channels that are wanted.
-pub(crate) fn read(bytes: &[u8], wanted: &dyn Fn(&ChannelInfo) -> bool) -> Result<Scan, ReadError> {
+/// The text stands behind a length, in UTF-16 since version 4.
+pub(crate) fn detect(bytes: &[u8]) -> bool {
+    let mark = b"STiMage";
+    let wide: Vec<u8> = mark.iter().flat_map(|&b| [b, 0]).collect();
+    bytes.starts_with(mark) || bytes[2.min(bytes.len())..].starts_with(&wide)
+}
+
+/// Reads the headers and finds the samples.
+pub(crate) fn open<'a>(input: &Input<'a>) -> Result<Outline<'a>, ReadError> {
+    let bytes = input.bytes;
     let version = version(bytes).map_err(damaged)?;
     if !version.starts_with("005.") {
         return Err(ReadError::Unsupported {
@@ -67,10 +78,10 @@ pub(crate) fn read(bytes: &[u8], wanted: &dyn Fn(&ChannelInfo) -> bool) -> Resul
         });
     }
     let objects = pages(bytes).map_err(damaged)?;
-    let mut scan = Scan {
+    let mut outline = Outline::of(Scan {
         format: format!("{FORMAT} {version}"),
         ..Scan::default()
-    };
+    });
     let mut extent = Extent::default();
     let mut headers = Vec::new();
     for objects in &objects {
@@ -85,10 +96,8 @@ pub(crate) fn read(bytes: &[u8], wanted: &dyn Fn(&ChannelInfo) -> bool) -> Resul
         let data = find(objects, PAGE_DATA)
             .ok_or_else(|| damaged("expected the samples of a page, found none"))?;
         let info = page.info();
-        if let Some(block) = extent.take(bytes, data.place, length, &info.name)
-            && wanted(&info)
-        {
-            scan.channels.push(page.channel(info, block));
+        if extent.take(input.length, data.place, length, &info.name) {
+            outline.add_flat(page.header(info), page.samples(data.place));
         }
         headers.push(page);
     }
@@ -98,8 +107,8 @@ pub(crate) fn read(bytes: &[u8], wanted: &dyn Fn(&ChannelInfo) -> bool) -> Resul
             reason: "it holds no image (curves only)".to_owned(),
         });
     };
-    tell(&mut scan, first, &headers);
-    extent.judge(scan, bytes)
+    tell(&mut outline.scan, first, &headers);
+    extent.judge(outline, input.length)
 }
 
 /// `005.004` of the mark `STiMage 005.004 1`.
@@ -297,37 +306,30 @@ impl Page {
         (positive(width) && positive(height)).then_some([width, height])
     }
 
-    fn channel(&self, info: ChannelInfo, block: &[u8]) -> Channel {
+    fn header(&self, info: ChannelInfo) -> ChannelHeader {
+        let words = format!("counts × {} + {}", self.z_scale, self.z_offset);
+        ChannelHeader::new(info, self.rows, self.columns)
+            .in_unit(self.text(Z_UNIT))
+            .of_size(self.size_nm())
+            .scaled(self.z_scale, self.z_offset, words)
+    }
+
+    fn samples(&self, place: usize) -> Flat<'static> {
         let order = Order {
             top_first: self.y_step < 0.0,
             mirrored: self.x_step < 0.0,
         };
-        let samples = raster::decode(block, self.columns, Encoding::I32, Endian::Little, order);
         // Files of old or foreign programs count no lines.
         let completed = self.text(COMPLETED_LINES).parse::<usize>();
         let completed = completed.ok().filter(|&n| n > 0 && n < self.rows);
-        let samples = match completed {
-            Some(n) if order.top_first => blank_unfilled(samples, self.columns, 0..self.rows - n),
-            Some(n) => blank_unfilled(samples, self.columns, n..self.rows),
-            None => samples,
+        let check = match completed {
+            Some(n) if order.top_first => Check::unfilled(0..self.rows - n),
+            Some(n) => Check::unfilled(n..self.rows),
+            None => Check::Nothing,
         };
-        let size = self.size_nm();
-        Channel {
-            name: info.name,
-            internal_name: info.internal_name,
-            unit: clean(self.text(Z_UNIT)),
-            line_direction: info.line_direction,
-            scan_line: None,
-            rows: self.rows,
-            columns: self.columns,
-            width_nm: size.map(|[width, _]| width),
-            height_nm: size.map(|[_, height]| height),
-            span: Span::PixelEdges,
-            scale: self.z_scale,
-            offset: self.z_offset,
-            scaling: format!("counts × {} + {}", self.z_scale, self.z_offset),
-            plane_fit: None,
-            samples,
+        Flat {
+            check,
+            ..Flat::at(place, Encoding::I32, Endian::Little).in_order(order)
         }
     }
 

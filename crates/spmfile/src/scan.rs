@@ -3,6 +3,10 @@
 //! Positions: `x` to the right, `y` up. Row 0 is the bottom line (smallest y), column 0 the left
 //! one. Lengths in nm, angles in rad counter-clockwise, times in s.
 
+use std::ops::Range;
+
+use crate::units::plain_unit;
+
 /// Sense of the slow motion: which line of the frame was acquired first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum FrameDirection {
@@ -100,6 +104,7 @@ pub struct Channel {
 
 /// A channel that the file announces but that could not be read.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct UnreadableChannel {
     /// Its name, or its position in the file where the name is lost.
     pub name: String,
@@ -158,31 +163,56 @@ impl Samples {
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
+
+    /// A part of them as values.
+    pub(crate) fn values(&self, part: Range<usize>, scale: f64, offset: f64) -> Vec<f64> {
+        let value = |count: f64| count * scale + offset;
+        match self {
+            Self::I16(v) => v[part].iter().map(|&c| value(f64::from(c))).collect(),
+            Self::I32(v) => v[part].iter().map(|&c| value(f64::from(c))).collect(),
+            Self::F32(v) => v[part].iter().map(|&c| value(f64::from(c))).collect(),
+            Self::F64(v) => v[part].iter().map(|&c| value(c)).collect(),
+        }
+    }
+
+    /// Shows a part of them to `look`, one after the other.
+    pub(crate) fn each(&self, part: Range<usize>, mut look: impl FnMut(f64)) {
+        match self {
+            Self::I16(v) => v[part].iter().for_each(|&n| look(f64::from(n))),
+            Self::I32(v) => v[part].iter().for_each(|&n| look(f64::from(n))),
+            Self::F32(v) => v[part].iter().for_each(|&n| look(f64::from(n))),
+            Self::F64(v) => v[part].iter().for_each(|&n| look(n)),
+        }
+    }
+
+    /// The same in double precision, which knows NaN.
+    pub(crate) fn into_doubles(self) -> Vec<f64> {
+        match self {
+            Self::I16(v) => v.into_iter().map(f64::from).collect(),
+            Self::I32(v) => v.into_iter().map(f64::from).collect(),
+            Self::F32(v) => v.into_iter().map(f64::from).collect(),
+            Self::F64(v) => v,
+        }
+    }
 }
 
 impl Channel {
     /// All values in [`Channel::unit`], row by row from the bottom line; missing ones are NaN.
     pub fn values(&self) -> Vec<f64> {
-        let value = |count: f64| count * self.scale + self.offset;
-        match &self.samples {
-            Samples::I16(v) => v.iter().map(|&c| value(f64::from(c))).collect(),
-            Samples::I32(v) => v.iter().map(|&c| value(f64::from(c))).collect(),
-            Samples::F32(v) => v.iter().map(|&c| value(f64::from(c))).collect(),
-            Samples::F64(v) => v.iter().map(|&c| value(c)).collect(),
-        }
+        self.samples
+            .values(0..self.samples.len(), self.scale, self.offset)
     }
 
     /// The values of the lines `rows`, row by row; empty beyond the last one.
-    pub fn lines(&self, rows: std::ops::Range<usize>) -> Vec<f64> {
+    pub fn lines(&self, rows: Range<usize>) -> Vec<f64> {
         let end = (rows.end * self.columns).min(self.samples.len());
         let part = (rows.start * self.columns).min(end)..end;
-        let value = |count: f64| count * self.scale + self.offset;
-        match &self.samples {
-            Samples::I16(v) => v[part].iter().map(|&c| value(f64::from(c))).collect(),
-            Samples::I32(v) => v[part].iter().map(|&c| value(f64::from(c))).collect(),
-            Samples::F32(v) => v[part].iter().map(|&c| value(f64::from(c))).collect(),
-            Samples::F64(v) => v[part].iter().map(|&c| value(c)).collect(),
-        }
+        self.samples.values(part, self.scale, self.offset)
+    }
+
+    /// [`Channel::unit`] in the signs of the SI: `°` for `deg`, `µm` for `um`; see [`crate::plain_unit`].
+    pub fn plain_unit(&self) -> String {
+        plain_unit(&self.unit)
     }
 
     /// Nominal distance of neighbouring samples along a line and of neighbouring lines, nm.
@@ -214,8 +244,9 @@ impl Channel {
     }
 }
 
-/// What is known of a channel before its samples are decoded.
+/// The names and directions of a channel.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct ChannelInfo {
     /// The name the user sees, as in `TR Phase`.
     pub name: String,

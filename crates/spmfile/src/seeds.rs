@@ -4,7 +4,8 @@
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::PathBuf;
 
-use crate::detect::{Format, detect};
+use crate::detect::detect;
+use crate::format::Format;
 
 /// Longer files only slow the fuzzer down.
 const LONGEST: usize = 1 << 16;

@@ -63,6 +63,44 @@ pub(crate) fn clean(unit: &str) -> String {
         .collect()
 }
 
+/// A unit as the SI writes it, whatever a file wrote: `deg` and `degree` are `°`, `um` and `micron` are `µm`,
+/// `angstrom` is `Å`, `Ohm` is `Ω`, `a.u.` is none. Units that are not known stay as they are.
+///
+/// ```
+/// assert_eq!(spmfile::plain_unit("um"), "µm");
+/// assert_eq!(spmfile::plain_unit("deg"), "°");
+/// assert_eq!(spmfile::plain_unit("log(Pa)"), "log(Pa)");
+/// ```
+pub fn plain_unit(unit: &str) -> String {
+    let unit = clean(unit);
+    let words = match unit.to_ascii_lowercase().as_str() {
+        "deg" | "degree" | "degrees" => "°",
+        "micron" | "microns" | "micrometer" | "micrometre" => "µm",
+        "nanometer" | "nanometre" => "nm",
+        "meter" | "metre" => "m",
+        "angstrom" | "ang" | "\u{212b}" => "Å",
+        "volt" | "volts" => "V",
+        "ampere" | "amp" | "amps" => "A",
+        "hertz" => "Hz",
+        "ohm" | "ohms" | "\u{2126}" => "Ω",
+        "a.u." | "none" => return String::new(),
+        _ => "",
+    };
+    if !words.is_empty() {
+        return words.to_owned();
+    }
+    // A letter u before a unit is the micro of keyboards; `u` alone is the unit of masses.
+    match unit.strip_prefix('u') {
+        Some(root) if ROOTS.contains(&root) => format!("µ{root}"),
+        _ => unit,
+    }
+}
+
+/// Units that files write with a prefix.
+pub(crate) const ROOTS: [&str; 17] = [
+    "m", "V", "A", "Hz", "N", "Pa", "s", "W", "F", "C", "J", "K", "T", "S", "eV", "Ω", "g",
+];
+
 /// Ratio of `unit` to `base` where they differ by an SI prefix at most.
 pub(crate) fn prefix_ratio(unit: &str, base: &str) -> Option<f64> {
     if unit == base {
@@ -128,6 +166,28 @@ mod tests {
         assert_eq!(length_nm("2 Å"), Some(0.2));
         assert_eq!(length_nm("2 V"), None);
         assert_eq!(length_nm("2"), None);
+    }
+
+    #[test]
+    fn plain_units() {
+        for (written, plain) in [
+            ("~m", "µm"),
+            ("um", "µm"),
+            ("μm", "µm"),
+            ("uV", "µV"),
+            ("º", "°"),
+            ("degrees", "°"),
+            ("angstrom", "Å"),
+            ("\u{212b}", "Å"),
+            ("nm", "nm"),
+            ("mV", "mV"),
+            ("u", "u"),
+            ("a.u.", ""),
+            ("Arb", "Arb"),
+            ("", ""),
+        ] {
+            assert_eq!(plain_unit(written), plain, "{written}");
+        }
     }
 
     #[test]

@@ -1,7 +1,8 @@
 //! Does the file hold all that its header promises? The last step of readers of block formats.
 
 use crate::error::ReadError;
-use crate::scan::{Channel, Samples, Scan, UnreadableChannel};
+use crate::outline::Outline;
+use crate::scan::{Samples, Scan, UnreadableChannel};
 
 /// More images than any instrument records at once.
 pub(crate) const MOST_CHANNELS: usize = 1024;
@@ -18,43 +19,35 @@ pub(crate) struct Extent {
     /// Whether any of their bytes are there.
     begun: bool,
     /// Bytes given to channels so far.
-    taken: usize,
+    taken: u64,
 }
 
 impl Extent {
-    /// The bytes of a channel from `start` on; `None`, with a note, where the file ends before.
-    pub(crate) fn take<'a>(
-        &mut self,
-        bytes: &'a [u8],
-        start: usize,
-        length: usize,
-        name: &str,
-    ) -> Option<&'a [u8]> {
+    /// Whether a file of `available` bytes holds the channel from `start` on; a note is kept where it ends before.
+    pub(crate) fn take(&mut self, available: u64, start: usize, length: usize, name: &str) -> bool {
         self.announced += 1;
-        let end = (start as u64).saturating_add(length as u64);
+        let (start, length) = (start as u64, length as u64);
+        let end = start.saturating_add(length);
         self.expected = self.expected.max(end);
-        let found = bytes.len().saturating_sub(start);
+        let found = available.saturating_sub(start);
         self.begun |= found > 0;
-        let block = start
-            .checked_add(length)
-            .and_then(|end| bytes.get(start..end));
-        if block.is_none() {
+        if end > available || end == u64::MAX {
             self.lost.push(UnreadableChannel {
                 name: name.to_owned(),
                 error: format!("it is {found} bytes long but its header promises {length}"),
             });
-            return None;
+            return false;
         }
         // Data that overlap belong to nobody; this also bounds the memory by the file's length.
-        if length > bytes.len() - self.taken {
+        if length > available - self.taken {
             self.lose(
                 name.to_owned(),
                 "its data overlap with those of others".to_owned(),
             );
-            return None;
+            return false;
         }
         self.taken += length;
-        block
+        true
     }
 
     /// Counts a channel as lost that a reader could not find itself.
@@ -63,41 +56,47 @@ impl Extent {
         self.lost.push(UnreadableChannel { name, error });
     }
 
-    /// The scan, or the error that the missing bytes call for.
-    pub(crate) fn judge(self, mut scan: Scan, bytes: &[u8]) -> Result<Scan, ReadError> {
+    /// The outline with what is missing, or the error that the missing bytes call for.
+    pub(crate) fn judge(
+        self,
+        mut outline: Outline<'_>,
+        available: u64,
+    ) -> Result<Outline<'_>, ReadError> {
         if self.lost.is_empty() {
-            return Ok(scan);
+            return Ok(outline);
         }
         if !self.begun {
             return Err(ReadError::HeaderOnly {
                 announced: self.announced,
                 expected: self.expected,
-                found: bytes.len(),
+                found: available as usize,
             });
         }
-        let reason = self
+        let reasons: Vec<String> = self
             .lost
             .iter()
             .map(|lost| format!("channel {:?}: {}", lost.name, lost.error))
-            .collect::<Vec<_>>()
-            .join("; ");
-        scan.unreadable.extend(self.lost);
-        Err(ReadError::Incomplete {
-            reason,
-            readable: Box::new(scan),
-        })
+            .collect();
+        outline.scan.unreadable.extend(self.lost);
+        outline.damage = Some(reasons.join("; "));
+        Ok(outline)
     }
 }
 
-/// The scan, unless every one of its announced channels is scaled in an unknown way.
-pub(crate) fn some_readable(scan: Scan, announced: usize) -> Result<Scan, ReadError> {
-    match scan.unreadable.first() {
-        Some(first) if scan.unreadable.len() == announced => Err(ReadError::NoReadableChannel {
-            announced,
-            name: first.name.clone(),
-            reason: first.error.clone(),
-        }),
-        _ => Ok(scan),
+/// The outline, unless every one of its announced channels is scaled in an unknown way.
+pub(crate) fn some_readable(
+    outline: Outline<'_>,
+    announced: usize,
+) -> Result<Outline<'_>, ReadError> {
+    match outline.scan.unreadable.first() {
+        Some(first) if outline.scan.unreadable.len() == announced => {
+            Err(ReadError::NoReadableChannel {
+                announced,
+                name: first.name.clone(),
+                reason: first.error.clone(),
+            })
+        }
+        _ => Ok(outline),
     }
 }
 
@@ -112,25 +111,9 @@ pub(crate) fn all_missing(scan: &Scan) -> bool {
     !scan.channels.is_empty() && scan.channels.iter().all(|c| missing(&c.samples))
 }
 
-/// Leaves out what cannot be true, and refuses images without a sample.
-pub(crate) fn checked(scan: Result<Scan, ReadError>) -> Result<Scan, ReadError> {
-    let mut scan = scan.map_err(|mut error| {
-        if let ReadError::Incomplete { readable, .. } = &mut error {
-            tidy(readable);
-        }
-        error
-    })?;
-    tidy(&mut scan);
-    if all_missing(&scan) {
-        return Err(ReadError::AllMissing {
-            channels: scan.channels.len(),
-        });
-    }
-    Ok(scan)
-}
-
 /// Leaves out what cannot be a length, a time, a rate or a scale, as damaged headers hold it.
-pub(crate) fn tidy(scan: &mut Scan) {
+pub(crate) fn tidy(outline: &mut Outline<'_>) {
+    let scan = &mut outline.scan;
     // Lengths in nm, rates in Hz, times in s; beyond, arithmetic fails.
     let positive = |n: &f64| (1e-9..=1e12).contains(n);
     scan.size_nm = scan.size_nm.filter(|size| size.iter().all(positive));
@@ -145,20 +128,11 @@ pub(crate) fn tidy(scan: &mut Scan) {
     if !scan.rotation_rad.is_finite() {
         scan.rotation_rad = 0.0;
     }
-    for channel in &mut scan.channels {
-        channel.width_nm = channel.width_nm.filter(positive);
-        channel.height_nm = channel.height_nm.filter(positive);
+    for entry in &mut outline.channels {
+        let header = &mut entry.header;
+        header.width_nm = header.width_nm.filter(positive);
+        header.height_nm = header.height_nm.filter(positive);
     }
-    let scaled = |channel: &Channel| channel.scale.is_finite() && channel.offset.is_finite();
-    let unscaled = scan.channels.extract_if(.., |channel| !scaled(channel));
-    scan.unreadable
-        .extend(unscaled.map(|channel| UnreadableChannel {
-            error: format!(
-                "expected a scale, found {} + {}",
-                channel.scale, channel.offset
-            ),
-            name: channel.name,
-        }));
 }
 
 #[cfg(test)]
@@ -167,7 +141,7 @@ mod tests {
 
     #[test]
     fn nonsense_is_left_out() {
-        let mut scan = Scan {
+        let scan = Scan {
             size_nm: Some([f64::INFINITY, 1.0]),
             line_rate_hz: Some(-1.0),
             line_times_s: Some([1.0, 0.0]),
@@ -175,7 +149,9 @@ mod tests {
             rotation_rad: f64::INFINITY,
             ..Scan::default()
         };
-        tidy(&mut scan);
+        let mut outline = Outline::of(scan);
+        tidy(&mut outline);
+        let scan = outline.scan;
         assert_eq!((scan.size_nm, scan.line_rate_hz), (None, None));
         assert_eq!(scan.line_times_s, Some([1.0, 0.0]));
         assert_eq!((scan.offset_nm, scan.rotation_rad), ([0.0; 2], 0.0));

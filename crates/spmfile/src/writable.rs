@@ -81,8 +81,14 @@ pub fn write(
     let one = |bytes: Vec<u8>| vec![(format!("{stem}.{}", format.extension()), bytes)];
     match format {
         WritableFormat::Gwy => gwy::write(scan, log).map(one),
+        #[cfg(feature = "archives")]
         WritableFormat::Npz => arrays::npz(scan, log).map(one),
+        #[cfg(not(feature = "archives"))]
+        WritableFormat::Npz => Err(left_out("archives")),
+        #[cfg(feature = "pictures")]
         WritableFormat::Tiff => arrays::tiff(scan, log).map(one),
+        #[cfg(not(feature = "pictures"))]
+        WritableFormat::Tiff => Err(left_out("pictures")),
         WritableFormat::Gsf => each(scan, format, stem, |c| gsf::write(scan, c, log)),
         WritableFormat::Csv => each(scan, format, stem, |c| arrays::csv(scan, c, log)),
         WritableFormat::Gxyzf => points(scan, stem, log),
@@ -92,6 +98,14 @@ pub fn write(
             Ok(files.into_iter().map(inside).collect())
         }
     }
+}
+
+/// The refusal of a format that this build leaves out.
+#[cfg(not(all(feature = "archives", feature = "pictures")))]
+fn left_out(feature: &str) -> ExportError {
+    ExportError::Library(format!(
+        "it needs the feature `{feature}` of the crate spmfile, which this build leaves out"
+    ))
 }
 
 /// A file for each channel.

@@ -13,15 +13,19 @@
 //! - `X scanning direction` and `Y scanning direction` are those of the acquisition, `Forward` or
 //!   `Backward`, `Up` or `Down`; the samples are in order of position all the same.
 
+use std::borrow::Cow;
+
 use memchr::memmem;
 
 use crate::clock;
 use crate::cursor::Endian;
 use crate::error::ReadError;
+use crate::header::{ChannelHeader, Scaling};
+use crate::judge::Check;
+use crate::outline::{Input, Outline};
 use crate::raster::{self, Encoding, Order};
-use crate::scan::{
-    Channel, ChannelInfo, DateTime, FrameDirection, LineDirection, Samples, Scan, Span,
-};
+use crate::scan::{ChannelInfo, DateTime, FrameDirection, LineDirection, Scan};
+use crate::stored::Flat;
 use crate::units::{self, quantity};
 use crate::whole::Extent;
 
@@ -32,33 +36,18 @@ fn damaged(reason: impl Into<String>) -> ReadError {
     ReadError::damaged(FORMAT, reason)
 }
 
-/// Reads the channel if it is wanted.
-pub(crate) fn read(bytes: &[u8], wanted: &dyn Fn(&ChannelInfo) -> bool) -> Result<Scan, ReadError> {
-    let end = memmem::find(bytes, END).ok_or_else(|| {
-        damaged(format!(
-            "expected [Header end], found none in {} bytes: the file was cut off inside the header",
-            bytes.len()
-        ))
-    });
-    let head = &bytes[..end.as_ref().copied().unwrap_or(bytes.len().min(4096))];
-    let text = units::decode(head);
-    // Before the header's end: tables of numbers have none.
-    let kind = text.lines().nth(1).unwrap_or("").trim();
-    if !kind.eq_ignore_ascii_case("SxM Image file") {
-        return Err(ReadError::Unsupported {
-            format: FORMAT,
-            reason: format!("expected an \"SxM Image file\", found {kind:?}"),
-        });
-    }
-    let end = end?;
+/// Reads the headers and finds the samples.
+pub(crate) fn open<'a>(input: &Input<'a>) -> Result<Outline<'a>, ReadError> {
+    let bytes = input.bytes;
+    let (text, end) = text(bytes)?;
     let header = Header::of(&text);
     let rows = header.count("General Info", "Number of rows")?;
     let columns = header.count("General Info", "Number of columns")?;
     let start = data_start(bytes, end);
-    let (encoding, start) = layout(bytes, &header, start, rows, columns)?;
+    let (encoding, start) = layout(input.length, &header, start, rows, columns)?;
     let length = raster::byte_length(rows, columns, encoding)
         .ok_or_else(|| damaged(format!("its size is {rows} lines of {columns} samples")))?;
-    let mut scan = frame(&header);
+    let scan = frame(&header);
     let name = header
         .get("General Info", "Acquisition channel")
         .unwrap_or("")
@@ -76,37 +65,51 @@ pub(crate) fn read(bytes: &[u8], wanted: &dyn Fn(&ChannelInfo) -> bool) -> Resul
         },
         scan_line: None,
     };
+    let mut outline = Outline::of(scan);
     let mut extent = Extent::default();
-    let block = extent.take(bytes, start, length, &info.name);
-    if let Some(block) = block.filter(|_| wanted(&info)) {
+    if extent.take(input.length, start, length, &info.name) {
+        let (unit, scaling) = scaling(&header, encoding);
+        let header = ChannelHeader {
+            scaling: None,
+            plane_fit: header
+                .get("General Info", "Image processes")
+                .map(str::to_owned),
+            ..ChannelHeader::new(info, rows, columns)
+                .in_unit(&unit)
+                .of_size(outline.scan.size_nm)
+        };
         let order = Order {
             top_first: false,
             mirrored: true,
         };
-        let samples = raster::decode(block, columns, encoding, Endian::Little, order);
-        let scaling = scaling(&header, &samples);
-        let size = scan.size_nm;
-        scan.channels.push(Channel {
-            name: info.name,
-            internal_name: info.internal_name,
-            unit: scaling.unit,
-            line_direction: info.line_direction,
-            scan_line: None,
-            rows,
-            columns,
-            width_nm: size.map(|[width, _]| width),
-            height_nm: size.map(|[_, height]| height),
-            span: Span::PixelEdges,
-            scale: scaling.scale,
-            offset: scaling.offset,
-            scaling: scaling.words,
-            plane_fit: header
-                .get("General Info", "Image processes")
-                .map(str::to_owned),
-            samples,
+        let samples = Flat {
+            check: Check::Range(scaling),
+            ..Flat::at(start, encoding, Endian::Little).in_order(order)
+        };
+        outline.add_flat(header, samples);
+    }
+    extent.judge(outline, input.length)
+}
+
+/// The header of an image, and where it ends.
+fn text(bytes: &[u8]) -> Result<(Cow<'_, str>, usize), ReadError> {
+    let end = memmem::find(bytes, END).ok_or_else(|| {
+        damaged(format!(
+            "expected [Header end], found none in {} bytes: the file was cut off inside the header",
+            bytes.len()
+        ))
+    });
+    let head = &bytes[..end.as_ref().copied().unwrap_or(bytes.len().min(4096))];
+    let text = units::decode(head);
+    // Before the header's end: tables of numbers have none.
+    let kind = text.lines().nth(1).unwrap_or("").trim();
+    if !kind.eq_ignore_ascii_case("SxM Image file") {
+        return Err(ReadError::Unsupported {
+            format: FORMAT,
+            reason: format!("expected an \"SxM Image file\", found {kind:?}"),
         });
     }
-    extent.judge(scan, bytes)
+    Ok((text, end?))
 }
 
 /// Section, key and value of every line.
@@ -170,7 +173,7 @@ fn data_start(bytes: &[u8], end: usize) -> usize {
 /// The size of the header is written in it, by some programs wrongly or as 0; it is believed where
 /// the file's length agrees.
 fn layout(
-    bytes: &[u8],
+    available: u64,
     header: &Header<'_>,
     after_header: usize,
     rows: usize,
@@ -185,7 +188,7 @@ fn layout(
         pixels
             .checked_mul(encoding.width())
             .and_then(|n| n.checked_add(start))
-            == Some(bytes.len())
+            .is_some_and(|n| n as u64 == available)
     };
     let kinds: &[Encoding] = match header.lower("General Info", "Image Data Type").as_deref() {
         Some("short") => &[Encoding::I16],
@@ -210,76 +213,46 @@ fn layout(
     Ok((kinds[0], after_header))
 }
 
-struct Scaling {
-    scale: f64,
-    offset: f64,
-    unit: String,
-    words: String,
-}
+/// From the distance of the largest and the smallest sample to values.
+type ByRange = Box<dyn Fn(f64) -> Scaling + Send + Sync>;
 
-/// From samples to values.
-fn scaling(header: &Header<'_>, samples: &Samples) -> Scaling {
+/// The unit, and how samples become values.
+fn scaling(header: &Header<'_>, encoding: Encoding) -> (String, ByRange) {
     let (amplitude, unit) = header
         .get("General Info", "Z Amplitude")
         .and_then(quantity)
         .map_or((None, ""), |(n, unit)| (Some(n).filter(|&n| n > 0.0), unit));
     let unit = match unit {
-        "a.u." => String::new(),
-        other => units::clean(other),
+        "a.u." => "",
+        other => other,
     };
-    let made = |scale: f64, offset: f64, words: String| Scaling {
-        scale,
-        offset,
-        unit: unit.clone(),
-        words,
+    let floating = matches!(encoding, Encoding::F32 | Encoding::F64);
+    let number = |key: &str| header.number("Miscellaneous", key);
+    let factor = number("Z Scale Factor").filter(|&f| floating && f != 0.0);
+    let by_range: ByRange = if let Some(factor) = factor {
+        let offset = number("Z Scale Offset").unwrap_or(0.0);
+        Box::new(move |_| Scaling {
+            scale: factor,
+            offset,
+            words: format!("sample × {factor} + {offset} (Z Scale)"),
+        })
+    } else {
+        Box::new(move |range| {
+            // The header rounds to six digits.
+            let values = floating && amplitude.is_none_or(|a| (range - a).abs() <= 1e-4 * a);
+            match amplitude {
+                Some(amplitude) if !values && range > 0.0 && range.is_finite() => Scaling {
+                    scale: amplitude / range,
+                    offset: 0.0,
+                    words: format!(
+                        "sample × Z Amplitude {amplitude} / range of the samples {range}"
+                    ),
+                },
+                _ => Scaling::as_stored(),
+            }
+        })
     };
-    let as_stored = || made(1.0, 0.0, "values as stored".to_owned());
-    let range = range(samples);
-    let floating = matches!(samples, Samples::F32(_) | Samples::F64(_));
-    if floating {
-        if let Some(factor) = header
-            .number("Miscellaneous", "Z Scale Factor")
-            .filter(|&f| f != 0.0)
-        {
-            let offset = header
-                .number("Miscellaneous", "Z Scale Offset")
-                .unwrap_or(0.0);
-            return made(
-                factor,
-                offset,
-                format!("sample × {factor} + {offset} (Z Scale)"),
-            );
-        }
-        // The header rounds to six digits.
-        if amplitude.is_none_or(|a| (range - a).abs() <= 1e-4 * a) {
-            return as_stored();
-        }
-    }
-    match amplitude {
-        Some(amplitude) if range > 0.0 && range.is_finite() => made(
-            amplitude / range,
-            0.0,
-            format!("sample × Z Amplitude {amplitude} / range of the samples {range}"),
-        ),
-        _ => as_stored(),
-    }
-}
-
-/// Largest minus smallest sample.
-fn range(samples: &Samples) -> f64 {
-    fn of(values: impl Iterator<Item = f64>) -> f64 {
-        let finite = values.filter(|v| v.is_finite());
-        let (low, high) = finite.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| {
-            (low.min(v), high.max(v))
-        });
-        high - low
-    }
-    match samples {
-        Samples::I16(v) => of(v.iter().map(|&n| f64::from(n))),
-        Samples::I32(v) => of(v.iter().map(|&n| f64::from(n))),
-        Samples::F32(v) => of(v.iter().map(|&n| f64::from(n))),
-        Samples::F64(v) => of(v.iter().copied()),
-    }
+    (unit.to_owned(), by_range)
 }
 
 /// Everything about the frame but its channel.

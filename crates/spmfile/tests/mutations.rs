@@ -10,8 +10,11 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use mutation::{Dice, Sample, samples, survive};
+use spmfile::{File, OpenOptions};
 
 const MUTATIONS: u64 = 10_000;
+/// Copies that are opened; one in ten of them is read in both ways.
+const OPENED: u64 = 400;
 /// One in so many copies is decoded; in the others only the headers matter.
 const DECODED: u64 = 250;
 /// Reading a damaged file takes milliseconds; a loaded machine makes that more.
@@ -57,4 +60,42 @@ fn no_reader_stumbles() {
         }
     });
     println!("{MUTATIONS} damaged copies of each of {count} files");
+}
+
+/// Channel by channel and row by row, damaged files are as plausible as at once.
+#[test]
+fn damaged_files_are_opened_or_refused() {
+    let Some(data) = common::testdata("damaged_files_are_opened_or_refused") else {
+        return;
+    };
+    let mut options = OpenOptions::default();
+    options.damaged = true;
+    let bits = |values: &[f64]| -> Vec<u64> { values.iter().map(|v| v.to_bits()).collect() };
+    for mut sample in samples(&data) {
+        let name = sample.name.clone();
+        for number in 0..OPENED {
+            sample.damaged(&mut Dice(number), |bytes| {
+                let file = match File::open_with(bytes, &options) {
+                    Ok(file) => file,
+                    Err(error) => return assert!(!error.to_string().is_empty(), "{name}"),
+                };
+                if number % 10 != 0 {
+                    return;
+                }
+                for frame in file.frames() {
+                    for (channel, header) in frame.channels().enumerate() {
+                        let last = header.rows - 1..header.rows;
+                        let whole = frame.read(channel);
+                        match (frame.rows(channel, last.clone()), whole) {
+                            (Ok(row), Ok(whole)) => {
+                                assert_eq!(bits(&row), bits(&whole.lines(last)), "{name}");
+                            }
+                            (Err(error), Err(_)) => assert!(!error.to_string().is_empty()),
+                            (row, whole) => panic!("{name}: {row:?} {whole:?}"),
+                        }
+                    }
+                }
+            });
+        }
+    }
 }

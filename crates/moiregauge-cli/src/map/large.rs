@@ -11,18 +11,18 @@ use moiregauge::frame::remove_background;
 use moiregauge::frame::{Geometry, Timing};
 use moiregauge::map::TwistStrainMap;
 use moiregauge::scan::Picture;
-use moiregauge::scan::choose_channel;
+use moiregauge::scan::{choose_channel, unusual_channels};
 use moiregauge::settings::Settings;
 use moiregauge::survey::{SurveyPlan, nominal_geometry};
 use moiregauge::window::Resolution;
 use moiregauge_pipeline::sink::{FolderSink, Part};
-use moiregauge_pipeline::{Content, Known, identity};
+use moiregauge_pipeline::{Known, identity};
 use moiregauge_report::InputFile;
 use nalgebra::Vector2;
 use spmfile::{Channel, LineDirection, Scan};
 
 use super::kept::{decoded, encoded, key};
-use super::source::{Array, Source};
+use super::source::{Lines, Source};
 use crate::input::with_option;
 use crate::progress::bar;
 use crate::reading::Opened;
@@ -54,12 +54,12 @@ impl Large {
     ) -> anyhow::Result<Option<Self>> {
         let large = if always { 0 } else { LARGE };
         let place = known.place(path);
-        if let Some(array) = Array::open(place) {
-            if array.size[0] * array.size[1] < large {
+        if let Some(lines) = Lines::open(path, known, settings.channel.as_deref()) {
+            if lines.size[0] * lines.size[1] < large {
                 return Ok(None);
             }
             no_sensors(known)?;
-            return Self::of_array(path, array, known).map(Some);
+            return Self::of_lines(path, lines, settings, known).map(Some);
         }
         // Other files are read as a whole anyway; small ones go the common way.
         if std::fs::metadata(place)?.len() < large as u64 {
@@ -95,27 +95,37 @@ impl Large {
         }))
     }
 
-    /// An array, of which no more than two lines are read here.
-    fn of_array(path: &Path, array: Array, known: &Known) -> anyhow::Result<Self> {
-        // They tell what is known of the whole: scale, rotation and size; and of the block that is wanted of it.
-        let part = Content::of(array.part(&(0..array.size[0].min(2)))?);
-        let mut scan = known.decode(path, &part, &|_| true)?;
-        for channel in &mut scan.channels {
-            channel.rows = array.size[0];
-        }
+    /// A file of which no line is read here.
+    fn of_lines(
+        path: &Path,
+        lines: Lines,
+        settings: &Settings,
+        known: &Known,
+    ) -> anyhow::Result<Self> {
+        let mut scan = lines.scan()?;
         let replaced = known.tell(path, &mut scan);
         let block = known.cut(&mut scan).map_err(with_option)?;
         let input = identity(path, known.place(path))?;
-        let channel = scan.channels.first().context("the array holds no image")?;
-        let caveat = |words| Caveat::new(FileDoubt::GivenByUser(words), input.file.as_str());
+        let channel = scan.channels.first().context("the file holds no image")?;
+        let names: Vec<(&str, &str)> = lines.names.iter().map(|(a, b)| (&**a, &**b)).collect();
+        let several = unusual_channels(&names, settings.channel.as_deref());
+        let several = several.map(FileDoubt::SeveralImages);
+        let replaced = replaced.into_iter().map(FileDoubt::GivenByUser);
+        let doubts = scan.notes.iter().cloned().map(FileDoubt::ReaderDoubt);
+        let caveat = |doubt| Caveat::new(doubt, input.file.as_str());
         Ok(Self {
-            caveats: replaced.into_iter().map(caveat).collect(),
+            caveats: several
+                .into_iter()
+                .chain(replaced)
+                .chain(doubts)
+                .map(caveat)
+                .collect(),
             geometry: nominal_geometry(&scan, channel)
-                .context("the array has no size; give it with --size")?,
+                .context("the file gives no scan size; give it with --size")?,
             timing: timing(&scan, channel),
             channel: channel.name.clone(),
             unit: channel.unit.clone(),
-            source: Source::Array(array.with_block(block)),
+            source: Source::Lines(lines.with_block(block)),
             input,
         })
     }

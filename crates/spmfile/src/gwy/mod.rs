@@ -13,7 +13,9 @@
 //! - What a title in brackets tells of the line direction is used (`Z (Backward)`, `Height [Trace]`).
 
 mod read;
+#[cfg(feature = "write")]
 mod write;
 
-pub(crate) use read::read;
+pub(crate) use read::open;
+#[cfg(feature = "write")]
 pub use write::write;

@@ -1,12 +1,16 @@
 //! The container → a scan.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 use crate::cursor::{Cursor, Endian};
 use crate::error::ReadError;
+use crate::header::ChannelHeader;
 use crate::labels;
+use crate::outline::{Input, Outline};
 use crate::raster::{self, Encoding, Order};
-use crate::scan::{Channel, ChannelInfo, Scan, Span};
+use crate::scan::{ChannelInfo, Scan};
+use crate::stored::Flat;
 use crate::units;
 use crate::whole::MOST_CHANNELS;
 
@@ -97,7 +101,7 @@ impl<'a> Object<'a> {
     /// The unit that the object `name` holds.
     fn unit(self, name: &str) -> String {
         match self.object(name).and_then(|unit| unit.get("unitstr")) {
-            Some(Value::Text(unit)) => units::clean(&text(unit)),
+            Some(Value::Text(unit)) => text(unit),
             _ => String::new(),
         }
     }
@@ -164,8 +168,9 @@ fn item<'a>(cursor: &mut Cursor<'a>) -> Result<Item<'a>, String> {
     Ok(Item { name, value })
 }
 
-/// Reads the channels that are wanted.
-pub(crate) fn read(bytes: &[u8], wanted: &dyn Fn(&ChannelInfo) -> bool) -> Result<Scan, ReadError> {
+/// Reads the headers and finds the samples.
+pub(crate) fn open<'a>(input: &Input<'a>) -> Result<Outline<'a>, ReadError> {
+    let bytes = input.bytes;
     if bytes.starts_with(b"GWYO") {
         return Err(ReadError::Unsupported {
             format: FORMAT,
@@ -173,31 +178,12 @@ pub(crate) fn read(bytes: &[u8], wanted: &dyn Fn(&ChannelInfo) -> bool) -> Resul
         });
     }
     let (container, cut_off) = container(bytes)?;
-    let mut failure = None;
-    let mut fields = Vec::new();
-    let mut titles = BTreeMap::new();
-    let mut metas = BTreeMap::new();
-    for item in container.items() {
-        let item = match item {
-            Ok(item) => item,
-            Err(error) => {
-                failure = Some(error);
-                break;
-            }
-        };
-        match item.value {
-            Value::Object(object) if object.kind == b"GwyDataField" => {
-                fields.extend(number_of(item.name, "/data").map(|number| (number, object)));
-            }
-            Value::Object(object) => {
-                metas.extend(number_of(item.name, "/meta").map(|number| (number, object)));
-            }
-            Value::Text(title) => {
-                titles.extend(number_of(item.name, "/data/title").map(|number| (number, title)));
-            }
-            _ => {}
-        }
-    }
+    let Found {
+        mut fields,
+        titles,
+        metas,
+        failure,
+    } = Found::of(container);
     if fields.len() > MOST_CHANNELS {
         return Err(ReadError::TooManyChannels {
             found: fields.len(),
@@ -212,7 +198,7 @@ pub(crate) fn read(bytes: &[u8], wanted: &dyn Fn(&ChannelInfo) -> bool) -> Resul
         });
     }
     let meta = |number: u32| metas.get(&number).copied().map_or_else(Vec::new, texts);
-    let mut scan = frame(&fields, &meta);
+    let mut outline = Outline::of(frame(&fields, &meta));
     for (number, field) in fields {
         let title = titles
             .get(&number)
@@ -226,22 +212,59 @@ pub(crate) fn read(bytes: &[u8], wanted: &dyn Fn(&ChannelInfo) -> bool) -> Resul
             internal_name: own("internal name").unwrap_or_default(),
             scan_line: own("scan line"),
         };
-        if !wanted(&info) {
-            continue;
-        }
         let name = info.name.clone();
-        let mut channel =
+        let (mut header, samples) =
             channel(field, info).map_err(|e| damaged(format!("image {name:?}: {e}")))?;
-        channel.plane_fit = own("plane fit");
-        scan.channels.push(channel);
+        header.plane_fit = own("plane fit");
+        outline.add_flat(header, samples);
     }
     match failure {
-        None => Ok(scan),
-        Some(reason) if cut_off && !scan.channels.is_empty() => Err(ReadError::Incomplete {
-            reason,
-            readable: Box::new(scan),
-        }),
-        Some(reason) => Err(damaged(reason)),
+        Some(reason) if !cut_off || outline.channels.is_empty() => Err(damaged(reason)),
+        failure => {
+            outline.damage = failure;
+            Ok(outline)
+        }
+    }
+}
+
+/// What the container holds of images, by their numbers.
+#[derive(Default)]
+struct Found<'a> {
+    fields: Vec<(u32, Object<'a>)>,
+    titles: BTreeMap<u32, &'a [u8]>,
+    metas: BTreeMap<u32, Object<'a>>,
+    /// Why its items could not be followed to their end.
+    failure: Option<String>,
+}
+
+impl<'a> Found<'a> {
+    fn of(container: Object<'a>) -> Self {
+        let mut found = Self::default();
+        for item in container.items() {
+            let item = match item {
+                Ok(item) => item,
+                Err(error) => {
+                    found.failure = Some(error);
+                    break;
+                }
+            };
+            let number = |behind: &str| number_of(item.name, behind);
+            match item.value {
+                Value::Object(object) if object.kind == b"GwyDataField" => {
+                    found.fields.extend(number("/data").map(|n| (n, object)));
+                }
+                Value::Object(object) => {
+                    found.metas.extend(number("/meta").map(|n| (n, object)));
+                }
+                Value::Text(title) => {
+                    found
+                        .titles
+                        .extend(number("/data/title").map(|n| (n, title)));
+                }
+                _ => {}
+            }
+        }
+        found
     }
 }
 
@@ -281,12 +304,12 @@ fn resolution(field: Object<'_>) -> Result<[usize; 2], String> {
 
 /// Width and height in nm, if the lateral unit is a length.
 fn size_nm(field: Object<'_>) -> Option<[f64; 2]> {
-    let nm = units::nm_per(&field.unit("si_unit_xy"))?;
+    let nm = units::nm_per(&units::clean(&field.unit("si_unit_xy")))?;
     let length = |key: &str| field.double(key).map(|n| n * nm).filter(|&n| n > 0.0);
     Some([length("xreal")?, length("yreal")?])
 }
 
-fn channel(field: Object<'_>, info: ChannelInfo) -> Result<Channel, String> {
+fn channel(field: Object<'_>, info: ChannelInfo) -> Result<(ChannelHeader, Flat<'_>), String> {
     let [columns, rows] = resolution(field)?;
     let Some(Value::Doubles(data)) = field.get("data") else {
         return Err("it has no samples".to_owned());
@@ -298,28 +321,15 @@ fn channel(field: Object<'_>, info: ChannelInfo) -> Result<Channel, String> {
             data.len() / 8
         ));
     }
-    let size = size_nm(field);
     let top_first = Order {
         top_first: true,
         mirrored: false,
     };
-    Ok(Channel {
-        unit: field.unit("si_unit_z"),
-        name: info.name,
-        internal_name: info.internal_name,
-        line_direction: info.line_direction,
-        scan_line: info.scan_line,
-        rows,
-        columns,
-        width_nm: size.map(|[width, _]| width),
-        height_nm: size.map(|[_, height]| height),
-        span: Span::PixelEdges,
-        scale: 1.0,
-        offset: 0.0,
-        scaling: "values as stored".to_owned(),
-        plane_fit: None,
-        samples: raster::decode(data, columns, Encoding::F64, Endian::Little, top_first),
-    })
+    let header = ChannelHeader::new(info, rows, columns)
+        .in_unit(&field.unit("si_unit_z"))
+        .of_size(size_nm(field));
+    let samples = Flat::block(Cow::Borrowed(data), Encoding::F64, Endian::Little);
+    Ok((header, samples.in_order(top_first)))
 }
 
 /// Everything but the channels: the first image's size and place, the header it came with.
@@ -335,9 +345,10 @@ fn frame(fields: &[(u32, Object<'_>)], meta: &dyn Fn(u32) -> Vec<(String, String
     if sizes.iter().all(|size| *size == sizes[0]) {
         scan.size_nm = sizes[0];
     }
-    if let (Some([width, height]), Some(nm)) =
-        (size_nm(first), units::nm_per(&first.unit("si_unit_xy")))
-    {
+    if let (Some([width, height]), Some(nm)) = (
+        size_nm(first),
+        units::nm_per(&units::clean(&first.unit("si_unit_xy"))),
+    ) {
         let offset = |key: &str| first.double(key).unwrap_or(0.0) * nm;
         if first.get("xoff").is_some() || first.get("yoff").is_some() {
             scan.offset_nm = [offset("xoff") + 0.5 * width, offset("yoff") + 0.5 * height];

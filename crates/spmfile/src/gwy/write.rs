@@ -1,8 +1,9 @@
 //! Scans as Gwyddion containers. The layout is in the head of [`super`].
 
-use crate::export::{ExportError, base_values, one_line};
+use crate::export::{ExportError, base_values};
 use crate::labels;
 use crate::scan::{Channel, Scan};
+use crate::words::one_line;
 
 /// The bytes of a `.gwy` file with every channel of `scan`.
 ///

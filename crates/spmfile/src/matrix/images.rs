@@ -3,15 +3,15 @@
 use std::collections::BTreeSet;
 
 use super::data::Data;
-use super::format::{FORMAT, damaged, unsupported};
+use super::format::{FORMAT, damaged};
 use super::frame::{Shape, Understood};
 use super::log::{self, State};
 use super::names::{Name, parse};
 use crate::clock;
-use crate::error::ReadError;
-use crate::scan::{
-    Channel, ChannelInfo, DateTime, FrameDirection, LineDirection, Scan, Span, UnreadableChannel,
-};
+use crate::header::{ChannelHeader, Scaling};
+use crate::outline::Outline;
+use crate::scan::{ChannelInfo, DateTime, FrameDirection, LineDirection, Scan};
+use crate::stored::{Failure, Stored, Unpacked};
 
 /// Units, as far as they were met in descriptions.
 const METRE: [(&str, f64); 2] = [("Meter", 1e9), ("m", 1e9)];
@@ -22,23 +22,18 @@ const RASTER_TIME: [&str; 2] = ["Raster_Time", "Raster_Period_Time"];
 const GEOMETRY: [&str; 5] = ["Width", "Height", "Zoom", "Points", "Lines"];
 const PLACE: [&str; 3] = ["Angle", "X_Offset", "Y_Offset"];
 
-/// The frame, its geometry and its channels.
-pub(super) fn read(
+/// A frame, its geometry and its channels; `None` if nothing of it was recorded.
+pub(super) fn outline<'a>(
     state: &State,
-    data: &Data<'_>,
+    data: &Data<'a>,
     name: &str,
     understood: &Understood<'_>,
-    frame: Option<FrameDirection>,
-    wanted: &dyn Fn(&ChannelInfo) -> bool,
-) -> Result<Scan, ReadError> {
+    frame: FrameDirection,
+) -> Option<Outline<'a>> {
     let shape = understood.shape;
     let all = data.counts.len() / 4;
-    let frame = frame.unwrap_or(FrameDirection::Up);
-    let recorded = shape.recorded(frame, all);
-    if recorded == 0 {
-        return Err(unsupported(
-            "expected a frame downwards, found one upwards only",
-        ));
+    if shape.recorded(frame, all) == 0 {
+        return None;
     }
     let mut scan = Scan {
         format: format!("{FORMAT} {}", state.program).trim().to_owned(),
@@ -67,7 +62,24 @@ pub(super) fn read(
             meanwhile.join(", ")
         ));
     }
-    if let Some(raster) = raster.filter(|_| times.is_empty()) {
+    let steady = raster.filter(|_| times.is_empty());
+    tell_times(&mut scan, data, shape, frame, steady);
+    place(&mut scan, state, geometry.is_empty());
+    let mut outline = Outline::of(scan);
+    channels(&mut outline, data, name, understood, frame);
+    Some(outline)
+}
+
+/// Times of the lines and of the end of the frame; `raster` is the time of a point that did not change.
+fn tell_times(
+    scan: &mut Scan,
+    data: &Data<'_>,
+    shape: Shape,
+    frame: FrameDirection,
+    raster: Option<f64>,
+) {
+    let all = data.counts.len() / 4;
+    if let Some(raster) = raster {
         if shape.retrace {
             let line = raster * shape.points as f64;
             scan.line_times_s = Some([line; 2]);
@@ -86,9 +98,6 @@ pub(super) fn read(
     } else if frame == FrameDirection::Down || shape.recorded(FrameDirection::Down, all) == 0 {
         scan.acquired = date(data.time, 0.0);
     }
-    place(&mut scan, state, geometry.is_empty());
-    channels(&mut scan, data, name, understood, frame, wanted)?;
-    Ok(scan)
 }
 
 /// Size, rotation and centre.
@@ -119,21 +128,15 @@ fn place(scan: &mut Scan, state: &State, steady: bool) {
 }
 
 /// The images of the frame.
-fn channels(
-    scan: &mut Scan,
-    data: &Data<'_>,
+fn channels<'a>(
+    outline: &mut Outline<'a>,
+    data: &Data<'a>,
     name: &str,
     understood: &Understood<'_>,
     frame: FrameDirection,
-    wanted: &dyn Fn(&ChannelInfo) -> bool,
-) -> Result<(), ReadError> {
+) {
     let shape = understood.shape;
-    let Scaling {
-        scale,
-        offset,
-        unit,
-        words,
-    } = scaling(name, understood, &mut scan.notes);
+    let (unit, scaling) = scaling(name, understood, &mut outline.scan.notes);
     let directions = [LineDirection::Trace, LineDirection::Retrace];
     for direction in &directions[..=usize::from(shape.retrace)] {
         let info = ChannelInfo {
@@ -142,51 +145,28 @@ fn channels(
             line_direction: Some(*direction),
             scan_line: None,
         };
-        if !wanted(&info) {
-            continue;
-        }
-        let samples = shape
-            .image(data.counts, frame, *direction)
-            .map_err(damaged)?;
-        let Some(samples) = samples else {
-            scan.unreadable.push(UnreadableChannel {
-                name: format!("{name} (retrace)"),
-                error: "the scan was stopped before its first sample".to_owned(),
-            });
-            continue;
+        let header = ChannelHeader {
+            scaling: Some(scaling.clone()),
+            ..ChannelHeader::new(info, shape.lines, shape.points)
+                .in_unit(&unit)
+                .of_size(outline.scan.size_nm)
         };
-        scan.channels.push(Channel {
-            name: info.name,
-            internal_name: info.internal_name,
-            unit: unit.clone(),
-            line_direction: info.line_direction,
-            scan_line: None,
-            rows: shape.lines,
-            columns: shape.points,
-            width_nm: scan.size_nm.map(|[width, _]| width),
-            height_nm: scan.size_nm.map(|[_, height]| height),
-            span: Span::PixelEdges,
-            scale,
-            offset,
-            scaling: words.clone(),
-            plane_fit: None,
-            samples,
-        });
+        let (counts, line, name) = (data.counts, *direction, name.to_owned());
+        let samples = move || match shape.image(counts, frame, line) {
+            Ok(Some(samples)) => Ok(Unpacked::measured(samples)),
+            Ok(None) => Err(Failure::Channel {
+                name: Some(format!("{name} (retrace)")),
+                error: "the scan was stopped before its first sample".to_owned(),
+            }),
+            Err(reason) => Err(Failure::File(damaged(reason))),
+        };
+        outline.add(header, Stored::Packed(Box::new(samples)));
     }
-    tell_frames(scan, shape, data.counts.len() / 4);
-    Ok(())
+    tell_frames(&mut outline.scan, shape, data.counts.len() / 4);
 }
 
-/// How counts become values.
-struct Scaling {
-    scale: f64,
-    offset: f64,
-    unit: String,
-    words: String,
-}
-
-/// The scaling of a channel; counts, with a note, where it is not known.
-fn scaling(name: &str, understood: &Understood<'_>, notes: &mut Vec<String>) -> Scaling {
+/// Unit and scaling of a channel; counts, with a note, where it is not known.
+fn scaling(name: &str, understood: &Understood<'_>, notes: &mut Vec<String>) -> (String, Scaling) {
     let line = understood.transfer.and_then(|t| Some((t, t.line()?)));
     let Some((transfer, (scale, offset))) = line else {
         notes.push(format!(
@@ -196,12 +176,12 @@ fn scaling(name: &str, understood: &Understood<'_>, notes: &mut Vec<String>) -> 
                 None => "no function in the log is surely its own".to_owned(),
             }
         ));
-        return Scaling {
+        let counts = Scaling {
             scale: 1.0,
             offset: 0.0,
-            unit: String::new(),
             words: "counts".to_owned(),
         };
+        return (String::new(), counts);
     };
     let listed = understood.quantity.map_or("", |q| plain_unit(&q.unit));
     let unit = match (plain_unit(&transfer.unit), listed) {
@@ -214,12 +194,12 @@ fn scaling(name: &str, understood: &Understood<'_>, notes: &mut Vec<String>) -> 
             ""
         }
     };
-    Scaling {
+    let scaling = Scaling {
         scale,
         offset,
-        unit: unit.to_owned(),
         words: format!("{}: counts × {scale} + {offset}", transfer.kind),
-    }
+    };
+    (unit.to_owned(), scaling)
 }
 
 /// Units in signs.

@@ -52,7 +52,8 @@ mod images;
 mod log;
 mod names;
 mod read;
+mod refuse;
 
 pub use names::{frame_and_channel, is_curve, log_file};
-pub use read::read;
-pub(crate) use read::refuse;
+pub use read::{open, read};
+pub(crate) use refuse::open_alone;

@@ -1,29 +1,14 @@
 //! Both files → a scan.
 
-use super::format::{CHANNEL, LOG, MAGIC, damaged, unsupported};
+use super::format::{CHANNEL, LOG, MAGIC, unsupported};
 use super::names::{is_curve, log_file};
+use super::refuse::refuse;
 use super::{data, frame, images, log, names};
 use crate::error::ReadError;
+use crate::frame::Frame;
+use crate::outline::Outline;
 use crate::scan::{ChannelInfo, FrameDirection, Scan};
-use crate::whole::checked;
-
-/// Says what a file that comes alone lacks.
-pub(crate) fn refuse(bytes: &[u8]) -> ReadError {
-    match bytes.get(MAGIC.len()..MAGIC.len() + 4) {
-        Some(LOG) => unsupported(
-            "it is the log of a session and holds no image; give the images beside it, as in \
-             NAME--1_1.Z_mtrx",
-        ),
-        Some(CHANNEL) => unsupported(
-            "it holds counts only; lines, size and scale are in the log of its session, the file beside it \
-             whose name ends in _0001.mtrx, and are found there by the name of this file",
-        ),
-        first => damaged(format!(
-            "expected the mark TLKB or ATEM, found {:02x?}",
-            first.unwrap_or_default()
-        )),
-    }
-}
+use crate::source::Data;
 
 /// Reads a frame from the file of a channel and the parts of the log of its session.
 ///
@@ -43,16 +28,38 @@ pub fn read(
 ) -> Result<Scan, ReadError> {
     #[cfg(test)]
     crate::seeds::keep_session(bytes, log, file_name);
-    checked(frames(bytes, log, file_name, frame, wanted))
+    let [up, down] = outlines(bytes, log, file_name)?;
+    let wanted_one = match frame {
+        Some(FrameDirection::Down) => down,
+        _ => up,
+    };
+    let outline = wanted_one
+        .ok_or_else(|| unsupported("expected a frame downwards, found one upwards only"))?;
+    Frame::new(outline, Data::Bytes(bytes)).into_scan(wanted)
 }
 
-fn frames(
-    bytes: &[u8],
+/// Opens the frames of the file of a channel, the one upwards first, with the parts of the log of its
+/// session.
+///
+/// # Errors
+/// As [`read`], except for what lies in the samples.
+pub fn open<'a>(
+    bytes: &'a [u8],
     log: &[&[u8]],
     file_name: &str,
-    frame: Option<FrameDirection>,
-    wanted: &dyn Fn(&ChannelInfo) -> bool,
-) -> Result<Scan, ReadError> {
+) -> Result<Vec<Frame<'a>>, ReadError> {
+    let outlines = outlines(bytes, log, file_name)?.into_iter().flatten();
+    Ok(outlines
+        .map(|outline| Frame::new(outline, Data::Bytes(bytes)))
+        .collect())
+}
+
+/// The frame upwards and that downwards, as far as any of their samples was recorded.
+fn outlines<'a>(
+    bytes: &'a [u8],
+    log: &[&[u8]],
+    file_name: &str,
+) -> Result<[Option<Outline<'a>>; 2], ReadError> {
     let is = |bytes: &[u8], kind: &[u8]| {
         let rest = bytes.strip_prefix(MAGIC);
         rest.is_some_and(|rest| rest.starts_with(kind))
@@ -88,9 +95,12 @@ fn frames(
         )));
     }
     let understood = frame::understand(&state, &data, name.channel).map_err(unsupported)?;
-    let mut scan = images::read(&state, &data, name.channel, &understood, frame, wanted)?;
-    images::tell(&mut scan, &state, log, &name, file_name);
-    Ok(scan)
+    let of = |frame| {
+        let mut outline = images::outline(&state, &data, name.channel, &understood, frame)?;
+        images::tell(&mut outline.scan, &state, log, &name, file_name);
+        Some(outline)
+    };
+    Ok([FrameDirection::Up, FrameDirection::Down].map(of))
 }
 
 fn not_named(log: &[&[u8]], file_name: &str) -> ReadError {

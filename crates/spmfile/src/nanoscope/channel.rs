@@ -3,7 +3,11 @@
 use std::ops::Range;
 
 use super::header::{Section, leading_number};
-use crate::scan::{ChannelInfo, FrameDirection, LineDirection, Samples};
+use crate::cursor::Endian;
+use crate::judge::Check;
+use crate::raster::Encoding;
+use crate::scan::{ChannelInfo, FrameDirection, LineDirection};
+use crate::stored::{Flat, Valid};
 
 /// Where a channel's samples lie in the file.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -108,36 +112,29 @@ pub(super) fn layout(image: &Section<'_>) -> Result<Layout, String> {
     })
 }
 
-/// Decodes the samples; `bytes` is exactly the channel's data.
-pub(super) fn samples(layout: &Layout, bytes: &[u8]) -> Result<Samples, String> {
-    if layout.stored == 2 {
-        return Ok(Samples::I16(
-            bytes
-                .chunks_exact(2)
-                .map(|b| i16::from_le_bytes([b[0], b[1]]))
-                .collect(),
-        ));
+/// Where the samples lie and how they are stored.
+pub(super) fn samples(image: &Section<'_>, layout: &Layout) -> Flat<'static> {
+    let encoding = match layout.stored {
+        2 => Encoding::I16,
+        _ => Encoding::I32,
+    };
+    let narrow = layout.stored == 4 && layout.label == 2;
+    Flat {
+        valid: valid(image, layout),
+        check: if narrow {
+            Check::Narrow
+        } else {
+            Check::Nothing
+        },
+        ..Flat::at(layout.data.start as usize, encoding, Endian::Little)
     }
-    let counts: Vec<i32> = bytes
-        .chunks_exact(4)
-        .map(|b| i32::from_le_bytes([b[0], b[1], b[2], b[3]]))
-        .collect();
-    // A 16-bit quantity in 32-bit storage keeps to 16 bits; levelling may double its range. Where it
-    // does not, the label is wrong (seen in height maps of force volumes), and with it the divisor.
-    let largest = counts.iter().map(|c| c.unsigned_abs()).max().unwrap_or(0);
-    if layout.label == 2 && largest > 1 << 16 {
-        return Err(format!(
-            "its scale is ambiguous: labelled 2 bytes wide, but its counts reach {largest}"
-        ));
-    }
-    Ok(Samples::I32(counts))
 }
 
-/// The samples with those outside the valid region marked as missing.
+/// The part of the image that was recorded, if it is not all of it.
 ///
 /// `Valid data start/len X/Y` are in stored rows and columns. A region that does not fit the
 /// image is not believed.
-pub(super) fn without_invalid(image: &Section<'_>, layout: &Layout, samples: Samples) -> Samples {
+fn valid(image: &Section<'_>, layout: &Layout) -> Option<Valid> {
     let span = |start: &str, length: &str, all: usize| -> Range<usize> {
         let read = |key| {
             let (n, _) = leading_number(image.get(key)?)?;
@@ -152,18 +149,8 @@ pub(super) fn without_invalid(image: &Section<'_>, layout: &Layout, samples: Sam
     };
     let columns = span("Valid data start X", "Valid data len X", layout.columns);
     let rows = span("Valid data start Y", "Valid data len Y", layout.rows);
-    if columns.len() == layout.columns && rows.len() == layout.rows {
-        return samples;
-    }
-    let valid =
-        |i: usize| rows.contains(&(i / layout.columns)) && columns.contains(&(i % layout.columns));
-    let keep = |(i, count): (usize, f64)| if valid(i) { count } else { f64::NAN };
-    Samples::F64(match samples {
-        Samples::I16(v) => v.into_iter().map(f64::from).enumerate().map(keep).collect(),
-        Samples::I32(v) => v.into_iter().map(f64::from).enumerate().map(keep).collect(),
-        Samples::F32(v) => v.into_iter().map(f64::from).enumerate().map(keep).collect(),
-        Samples::F64(v) => v.into_iter().enumerate().map(keep).collect(),
-    })
+    let all = columns.len() == layout.columns && rows.len() == layout.rows;
+    (!all).then_some(Valid { rows, columns })
 }
 
 /// What the instrument subtracted, as in `Line (realtime), Full (offline)`.

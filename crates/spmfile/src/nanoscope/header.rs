@@ -8,7 +8,7 @@ use std::collections::HashMap;
 
 use memchr::memmem;
 
-use crate::export::one_line;
+use crate::words::one_line;
 
 /// Real headers have 20 to 100 kB; beyond this no header is looked for.
 const LONGEST: usize = 4 << 20;

@@ -9,7 +9,9 @@ mod frame;
 mod header;
 mod read;
 mod scaling;
+#[cfg(feature = "write")]
 mod write;
 
-pub(crate) use read::{read, refuse_force};
+pub(crate) use read::{detect, detect_force, open, refuse_force};
+#[cfg(feature = "write")]
 pub use write::{WriteError, write};

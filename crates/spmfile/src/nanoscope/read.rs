@@ -6,13 +6,36 @@ use super::channel::Layout;
 use super::header::{HeaderText, Section, lookup};
 use super::{channel, frame, header, scaling};
 use crate::error::ReadError;
-use crate::scan::{Channel, ChannelInfo, FrameDirection, Scan, Span, UnreadableChannel};
+use crate::header::ChannelHeader;
+use crate::outline::{Input, Outline};
+use crate::scan::{ChannelInfo, FrameDirection, Scan, Span, UnreadableChannel};
+use crate::signature::head;
+use crate::stored::Stored;
 
 /// More images than any instrument records at once.
 const MOST_CHANNELS: usize = 256;
 
-/// Reads a file that begins with `\*File list`, decoding the channels that are wanted.
-pub(crate) fn read(bytes: &[u8], wanted: &dyn Fn(&ChannelInfo) -> bool) -> Result<Scan, ReadError> {
+/// Whether a file begins with `\*File list`, or with `\*EC File list` and the like.
+pub(crate) fn detect(bytes: &[u8]) -> bool {
+    first_line(bytes).is_some()
+}
+
+/// Whether it begins with `\*Force file list`.
+pub(crate) fn detect_force(bytes: &[u8]) -> bool {
+    first_line(bytes).is_some_and(|line| line.starts_with(b"\\*force"))
+}
+
+/// The first line in lower case, if it is that of such files.
+fn first_line(bytes: &[u8]) -> Option<Vec<u8>> {
+    let head = head(bytes);
+    let end = head.iter().position(|&b| b == b'\n' || b == b'\r');
+    let first = head[..end.unwrap_or(head.len())].to_ascii_lowercase();
+    (first.starts_with(b"\\*") && first.ends_with(b"file list")).then_some(first)
+}
+
+/// Reads the header of a file that begins with `\*File list` and finds the samples.
+pub(crate) fn open<'a>(input: &Input<'a>) -> Result<Outline<'a>, ReadError> {
+    let bytes = input.bytes;
     let header =
         header::header_text(bytes).ok_or(ReadError::HeaderCutOff { found: bytes.len() })?;
     let sections = header::sections(&header.text);
@@ -34,47 +57,64 @@ pub(crate) fn read(bytes: &[u8], wanted: &dyn Fn(&ChannelInfo) -> bool) -> Resul
             ReadError::NoImage
         });
     }
-    let mut reader = Reader {
-        bytes,
-        header: &header,
-        sections: &sections,
+    let mut places = Places {
+        header: header.length as u64,
+        available: input.length,
         taken: Vec::new(),
         damage: orphans(&sections),
     };
-    let mut scan = frame(&sections, &images);
-    scan.metadata = header::all_lines(&header.text);
-    let mut skipped = 0;
-    for orphan in &reader.damage {
-        scan.unreadable.push(orphan.clone());
-    }
+    let mut outline = Outline::of(frame(&sections, &images));
+    outline.announced = Some(images.len());
+    outline.scan.metadata = header::all_lines(&header.text);
+    outline.scan.unreadable.clone_from(&places.damage);
     for (index, image) in images.iter().enumerate() {
         let info = channel::info(image, index + 1);
-        let place = match reader.place(image, &info.name) {
-            Ok(place) => place,
-            Err(error) => {
-                scan.unreadable.push(UnreadableChannel {
-                    name: info.name,
-                    error,
-                });
-                continue;
-            }
-        };
-        if !wanted(&info) {
-            skipped += 1;
-            continue;
-        }
-        let name = info.name.clone();
-        match reader.channel(image, info, &place) {
-            Ok(channel) => scan.channels.push(channel),
-            Err(error) => scan.unreadable.push(UnreadableChannel { name, error }),
+        match places.of(image, &info.name) {
+            Ok(place) => add(&mut outline, image, &sections, info, &place),
+            Err(error) => outline.scan.unreadable.push(UnreadableChannel {
+                name: info.name,
+                error,
+            }),
         }
     }
-    let damage = reader.damage;
-    judge(bytes, &header, &images, &damage, scan, skipped)
+    judge(input, &header, &images, &places.damage, outline)
+}
+
+/// Adds a channel that lies within the file.
+fn add(
+    outline: &mut Outline<'_>,
+    image: &Section<'_>,
+    sections: &[Section<'_>],
+    info: ChannelInfo,
+    place: &Layout,
+) {
+    let size = frame::full_size(Some(image), sections);
+    let mut header = ChannelHeader {
+        width_nm: size.map(|[width, _]| width),
+        height_nm: size.map(|[_, full]| frame::recorded_height(full, place.rows, sections)),
+        span: Span::Frame,
+        plane_fit: channel::plane_fit(image),
+        ..ChannelHeader::new(info, place.rows, place.columns)
+    };
+    let samples = match scaling::scaling(image, sections, place.label) {
+        Ok(scaling) => {
+            header = header
+                .in_unit(&scaling.unit)
+                .scaled(scaling.scale, 0.0, scaling.words);
+            header.unit_as_written = scaling.written;
+            Stored::Flat(channel::samples(image, place))
+        }
+        Err(error) => Stored::Refused(error),
+    };
+    outline.add(header, samples);
 }
 
 /// Which error a file with a force header deserves.
-pub(crate) fn refuse_force(bytes: &[u8]) -> ReadError {
+pub(crate) fn refuse_force<'a>(input: &Input<'a>) -> Result<Outline<'a>, ReadError> {
+    Err(force(input.bytes))
+}
+
+fn force(bytes: &[u8]) -> ReadError {
     let Some(header) = header::header_text(bytes) else {
         return ReadError::HeaderCutOff { found: bytes.len() };
     };
@@ -121,22 +161,23 @@ fn orphan<'a>(section: &Section<'a>) -> Option<&'a str> {
     }
 }
 
-/// Walks the images, keeping account of which bytes belong to whom.
-struct Reader<'a> {
-    bytes: &'a [u8],
-    header: &'a HeaderText<'a>,
-    sections: &'a [Section<'a>],
+/// Keeps account of which bytes belong to whom.
+struct Places {
+    /// Length of the header.
+    header: u64,
+    /// Length of the file.
+    available: u64,
     taken: Vec<(Range<u64>, String)>,
     /// Channels that the file does not hold as its header promises.
     damage: Vec<UnreadableChannel>,
 }
 
-impl Reader<'_> {
+impl Places {
     /// Where a channel lies, if it lies where it may.
-    fn place(&mut self, image: &Section<'_>, name: &str) -> Result<Layout, String> {
+    fn of(&mut self, image: &Section<'_>, name: &str) -> Result<Layout, String> {
         let layout = channel::layout(image)?;
         let data = layout.data.clone();
-        if data.start < self.header.length as u64 {
+        if data.start < self.header {
             return Err(format!(
                 "its data begin at byte {}, inside the header",
                 data.start
@@ -150,8 +191,8 @@ impl Reader<'_> {
         if let Some((_, other)) = other {
             return Err(format!("its data overlap with those of {other:?}"));
         }
-        if data.end > self.bytes.len() as u64 {
-            let found = (self.bytes.len() as u64).saturating_sub(data.start);
+        if data.end > self.available {
+            let found = self.available.saturating_sub(data.start);
             let error = format!(
                 "it is {found} bytes long but its header promises {}",
                 data.end - data.start
@@ -164,40 +205,6 @@ impl Reader<'_> {
         }
         self.taken.push((data, name.to_owned()));
         Ok(layout)
-    }
-
-    fn channel(
-        &self,
-        image: &Section<'_>,
-        info: ChannelInfo,
-        layout: &Layout,
-    ) -> Result<Channel, String> {
-        let scaling = scaling::scaling(image, self.sections, layout.label)?;
-        let bytes = self
-            .bytes
-            .get(layout.data.start as usize..layout.data.end as usize)
-            .ok_or("its data lie outside the file")?;
-        let samples = channel::samples(layout, bytes)?;
-        let samples = channel::without_invalid(image, layout, samples);
-        let size = frame::full_size(Some(image), self.sections);
-        Ok(Channel {
-            name: info.name,
-            internal_name: info.internal_name,
-            unit: scaling.unit,
-            line_direction: info.line_direction,
-            scan_line: info.scan_line,
-            rows: layout.rows,
-            columns: layout.columns,
-            width_nm: size.map(|[width, _]| width),
-            height_nm: size
-                .map(|[_, full]| frame::recorded_height(full, layout.rows, self.sections)),
-            span: Span::Frame,
-            scale: scaling.scale,
-            offset: 0.0,
-            scaling: scaling.words,
-            plane_fit: channel::plane_fit(image),
-            samples,
-        })
     }
 }
 
@@ -257,52 +264,39 @@ fn frame_direction(sections: &[Section<'_>], images: &[&Section<'_>]) -> Option<
 }
 
 /// Read, partly read or refused: see [`ReadError`].
-fn judge(
-    bytes: &[u8],
+fn judge<'a>(
+    input: &Input<'a>,
     header: &HeaderText<'_>,
     images: &[&Section<'_>],
     damage: &[UnreadableChannel],
-    scan: Scan,
-    skipped: usize,
-) -> Result<Scan, ReadError> {
+    mut outline: Outline<'a>,
+) -> Result<Outline<'a>, ReadError> {
     let layouts = || images.iter().filter_map(|i| channel::layout(i).ok());
     let expected = layouts().map(|l| l.data.end).max().unwrap_or(0);
-    let found = bytes.len();
-    if expected > found as u64 {
-        if layouts().all(|l| l.data.start >= found as u64) {
+    let found = input.length;
+    if expected > found {
+        if layouts().all(|l| l.data.start >= found) {
             return Err(ReadError::HeaderOnly {
                 announced: images.len(),
                 expected,
-                found,
+                found: found as usize,
             });
         }
         // Bytes were removed everywhere: the channels that seem whole are shifted.
         if !header.crlf {
+            let found = found as usize;
             return Err(ReadError::LineEndsChanged { expected, found });
         }
     }
     if !damage.is_empty() {
-        let reason = damage
+        let reasons: Vec<String> = damage
             .iter()
             .map(|d| format!("channel {:?}: {}", d.name, d.error))
-            .chain(moved_data(bytes, header))
-            .collect::<Vec<_>>()
-            .join("; ");
-        return Err(ReadError::Incomplete {
-            reason,
-            readable: Box::new(scan),
-        });
+            .chain(moved_data(input.bytes, header))
+            .collect();
+        outline.damage = Some(reasons.join("; "));
     }
-    match scan.unreadable.first() {
-        Some(first) if scan.channels.is_empty() && skipped == 0 => {
-            Err(ReadError::NoReadableChannel {
-                announced: images.len(),
-                name: first.name.clone(),
-                reason: first.error.clone(),
-            })
-        }
-        _ => Ok(scan),
-    }
+    Ok(outline)
 }
 
 /// Words for a header that has lost bytes, so that all data lie before the place it gives for them.

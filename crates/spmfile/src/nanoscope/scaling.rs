@@ -16,6 +16,8 @@ pub(super) struct Scaling {
     pub(super) scale: f64,
     /// Unit of the value.
     pub(super) unit: String,
+    /// The same as the file spells it.
+    pub(super) written: String,
     /// The rule in words.
     pub(super) words: String,
 }
@@ -44,6 +46,7 @@ pub(super) fn scaling(
         match z.sensitivity {
             None => Scaling {
                 scale: count,
+                written: z.hard_unit.to_owned(),
                 unit: hard_unit,
                 words: per_count,
             },
@@ -55,12 +58,17 @@ pub(super) fn scaling(
                     .strip_prefix('V')
                     .and_then(leading_number)
                     .ok_or_else(|| format!("its sensitivity {name:?} is {text:?}, not a number"))?;
+                let written = unit;
                 let (factor, unit) = combined_unit(&hard_unit, &units::clean(unit)).ok_or_else(|| {
                 format!("its Z scale is in {hard_unit:?}, but its sensitivity {name:?} in {unit:?}")
             })?;
                 Scaling {
                     scale: count * value * factor,
                     words: format!("{per_count} × {} ({name})", units::clean(&text[1..])),
+                    written: match written.rsplit_once('/') {
+                        Some((above, _)) => above.to_owned(),
+                        None => z.hard_unit.to_owned(),
+                    },
                     unit,
                 }
             }

@@ -2,15 +2,19 @@
 //!
 //! Values are in the unit of the channel. What else is known (unit, size, how the frame was scanned,
 //! what was done with it) goes along as lines `key = value`: in a text beside each array of an
-//! archive, in the description of each picture, in comments above a matrix. [`super::read()`] takes it
+//! archive, in the description of each picture, in comments above a matrix. [`crate::arrays::read()`] takes it
 //! back.
 
 use std::fmt::Write as _;
 use std::io::{Cursor, Write as _};
 
+#[cfg(feature = "pictures")]
 use tiff::encoder::{Rational, TiffEncoder, colortype::Gray32Float};
+#[cfg(feature = "pictures")]
 use tiff::tags::{ResolutionUnit, Tag};
+#[cfg(feature = "archives")]
 use zip::write::SimpleFileOptions;
+#[cfg(feature = "archives")]
 use zip::{CompressionMethod, ZipWriter};
 
 use crate::export::{ExportError, checked_values, positions, unique_names};
@@ -23,6 +27,7 @@ use crate::scan::{Channel, Scan};
 /// # Errors
 /// - There is no channel.
 /// - A channel's samples do not fill its lines.
+#[cfg(feature = "archives")]
 pub fn npz(scan: &Scan, log: &[String]) -> Result<Vec<u8>, ExportError> {
     let mut zip = ZipWriter::new(Cursor::new(Vec::new()));
     // Without a date, so that the same scan gives the same bytes.
@@ -95,6 +100,7 @@ fn npy(shape: &str, values: &[f64]) -> Vec<u8> {
 /// - There is no channel.
 /// - A channel's samples do not fill its lines.
 /// - The file would be longer than 4 GB.
+#[cfg(feature = "pictures")]
 pub fn tiff(scan: &Scan, log: &[String]) -> Result<Vec<u8>, ExportError> {
     if scan.channels.is_empty() {
         return Err(ExportError::NoChannel);
@@ -136,6 +142,7 @@ pub fn tiff(scan: &Scan, log: &[String]) -> Result<Vec<u8>, ExportError> {
 }
 
 /// 1/pitch as a fraction of 32-bit numbers, as exact as they allow.
+#[cfg(feature = "pictures")]
 fn per_nm(pitch: f64) -> Rational {
     let most = f64::from(u32::MAX);
     // The larger of the two numbers fills its bits.

@@ -1,15 +1,14 @@
 //! One image of an array or a picture, and what its file says of it.
 
 use crate::labels;
-use crate::scan::Samples;
+use crate::stored::Stored;
 
-/// One image, lines from the bottom up.
-pub(super) struct Plane {
+/// One image.
+pub(super) struct Plane<'a> {
     pub(super) rows: usize,
     pub(super) columns: usize,
-    pub(super) samples: Samples,
-    /// Whether it is the luminance of a coloured picture.
-    pub(super) rendering: bool,
+    /// Where its samples are.
+    pub(super) samples: Stored<'a>,
     /// What the file says of it; only files written here do.
     pub(super) carried: Vec<(String, String)>,
 }
@@ -28,7 +27,7 @@ pub(super) struct Told {
 
 impl Told {
     /// What a plane carries along.
-    pub(super) fn by(plane: &mut Plane) -> Self {
+    pub(super) fn by(plane: &mut Plane<'_>) -> Self {
         let (lines, channel) = labels::carried(std::mem::take(&mut plane.carried));
         let value = |key: &str| labels::value(&channel, key).map(str::to_owned);
         let length = |key: &str| {

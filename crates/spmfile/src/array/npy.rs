@@ -1,18 +1,37 @@
 //! The array format of `NumPy`, versions 1 to 3.
 //!
-//! In: the bytes of a file; out: an image. The header is a Python dictionary of three keys
+//! In: the first bytes of a file; out: where its image is. The header is a Python dictionary of three keys
 //! (`numpy.lib.format`), read here by its keys rather than as Python.
 
 use super::plane::Plane;
 use crate::cursor::{Cursor, Endian};
+use crate::outline::Input;
 use crate::raster::{self, Encoding, Order};
+use crate::scan::Samples;
+use crate::stored::{Failure, Flat, Stored, Unpacked};
 
 const MAGIC: &[u8] = b"\x93NUMPY";
+const TOP_FIRST: Order = Order {
+    top_first: true,
+    mirrored: false,
+};
 
-/// Reads an array of two dimensions, not counting those of length 1 where there are more.
-pub(super) fn read(bytes: &[u8]) -> Result<Plane, String> {
-    #[cfg(test)]
-    crate::seeds::keep(bytes);
+/// The header of an array of two dimensions, not counting those of length 1 where there are more.
+pub(super) struct Array {
+    pub(super) rows: usize,
+    pub(super) columns: usize,
+    encoding: Encoding,
+    endian: Endian,
+    /// Whether it is stored column by column.
+    fortran: bool,
+    /// First byte of the samples.
+    start: usize,
+    /// Bytes of the samples.
+    pub(super) length: usize,
+}
+
+/// Reads the header of an array.
+pub(super) fn header(bytes: &[u8]) -> Result<Array, String> {
     let mut cursor = Cursor::new(bytes, Endian::Little);
     if cursor.slice(MAGIC.len(), "the mark of an array")? != MAGIC {
         return Err("expected the mark of an array, found other bytes".to_owned());
@@ -25,52 +44,77 @@ pub(super) fn read(bytes: &[u8]) -> Result<Plane, String> {
         other => return Err(format!("expected version 1, 2 or 3, found {other}")),
     };
     let header = String::from_utf8_lossy(cursor.slice(length, "a header")?);
-    let kind = kind(&header)?;
+    let (encoding, endian) = kind(&header)?;
     let [rows, columns] = shape(&header)?;
-    let fortran = value(&header, "fortran_order")?.starts_with("True");
-    let samples = rows.checked_mul(columns).filter(|&n| n > 0);
-    let length = samples
-        .and_then(|n| n.checked_mul(kind.width))
+    let length = raster::byte_length(rows, columns, encoding)
         .ok_or_else(|| format!("its shape is {rows} × {columns}"))?;
-    let left = cursor.left();
-    let block = cursor.slice(length, "samples").map_err(|_| {
-        format!("it holds {left} bytes of samples but its header promises {length}")
-    })?;
-    let ordered;
-    let block = if fortran {
-        ordered = transposed(block, rows, columns, kind.width);
-        &ordered
+    Ok(Array {
+        rows,
+        columns,
+        encoding,
+        endian,
+        fortran: value(&header, "fortran_order")?.starts_with("True"),
+        start: cursor.position(),
+        length,
+    })
+}
+
+impl Array {
+    /// Whether a file of `available` bytes holds its samples.
+    fn fits(&self, available: u64) -> Result<(), String> {
+        let left = available.saturating_sub(self.start as u64);
+        if left < self.length as u64 {
+            return Err(format!(
+                "it holds {left} bytes of samples but its header promises {}",
+                self.length
+            ));
+        }
+        Ok(())
+    }
+
+    /// Decodes the samples of an array whose bytes are all there.
+    pub(super) fn samples(&self, bytes: &[u8]) -> Result<Samples, String> {
+        self.fits(bytes.len() as u64)?;
+        let block = &bytes[self.start..self.start + self.length];
+        let ordered;
+        let block = if self.fortran {
+            ordered = transposed(block, self.rows, self.columns, self.encoding.width());
+            &ordered
+        } else {
+            block
+        };
+        Ok(raster::decode(
+            block,
+            self.columns,
+            self.encoding,
+            self.endian,
+            TOP_FIRST,
+        ))
+    }
+}
+
+/// Finds the image of a file of which the first bytes are given.
+pub(super) fn open<'a>(input: &Input<'a>) -> Result<Plane<'a>, String> {
+    let array = header(input.bytes)?;
+    array.fits(input.length)?;
+    let (rows, columns) = (array.rows, array.columns);
+    let samples = if array.fortran {
+        let bytes = input.bytes;
+        let samples = move || {
+            let samples = array.samples(bytes).map_err(Failure::channel)?;
+            Ok(Unpacked::measured(samples))
+        };
+        Stored::Packed(Box::new(samples))
     } else {
-        block
-    };
-    let wider;
-    let (block, endian) = if kind.half {
-        wider = singles(block, kind.endian);
-        (&*wider, Endian::Little)
-    } else {
-        (block, kind.endian)
-    };
-    let order = Order {
-        top_first: true,
-        mirrored: false,
+        let flat = Flat::at(array.start, array.encoding, array.endian);
+        Stored::Flat(flat.in_order(TOP_FIRST))
     };
     Ok(Plane {
         rows,
         columns,
-        samples: raster::decode(block, columns, kind.encoding, endian, order),
-        rendering: false,
+        samples,
         carried: Vec::new(),
     })
-}
-
-/// How the samples are stored.
-struct Kind {
-    encoding: Encoding,
-    endian: Endian,
-    /// Bytes per sample in the file.
-    width: usize,
-    /// Half precision, which is widened first.
-    half: bool,
 }
 
 /// The text behind a key of the header.
@@ -83,7 +127,8 @@ fn value<'a>(header: &'a str, key: &str) -> Result<&'a str, String> {
     Ok(value.trim_start())
 }
 
-fn kind(header: &str) -> Result<Kind, String> {
+/// How the samples are stored.
+fn kind(header: &str) -> Result<(Encoding, Endian), String> {
     let value = value(header, "descr")?;
     let descr: String = value
         .strip_prefix(['\'', '"'])
@@ -108,17 +153,12 @@ fn kind(header: &str) -> Result<Kind, String> {
         "u4" => Encoding::U32,
         "i8" => Encoding::I64,
         "u8" => Encoding::U64,
-        "f2" | "f4" => Encoding::F32,
+        "f2" => Encoding::F16,
+        "f4" => Encoding::F32,
         "f8" => Encoding::F64,
         _ => return Err(format!("expected real numbers, found the type {descr:?}")),
     };
-    let half = kind == "f2";
-    Ok(Kind {
-        encoding,
-        endian,
-        width: if half { 2 } else { encoding.width() },
-        half,
-    })
+    Ok((encoding, endian))
 }
 
 /// Lines and samples.
@@ -162,37 +202,15 @@ fn transposed(block: &[u8], rows: usize, columns: usize, width: usize) -> Vec<u8
     lines
 }
 
-/// Half-precision numbers as single-precision ones, little endian (IEEE 754).
-fn singles(block: &[u8], endian: Endian) -> Vec<u8> {
-    let (pairs, _) = block.as_chunks::<2>();
-    pairs
-        .iter()
-        .flat_map(|&pair| {
-            let bits = match endian {
-                Endian::Little => u16::from_le_bytes(pair),
-                Endian::Big => u16::from_be_bytes(pair),
-            };
-            single(bits).to_le_bytes()
-        })
-        .collect()
-}
-
-fn single(bits: u16) -> f32 {
-    let sign = if bits >> 15 == 1 { -1.0 } else { 1.0 };
-    let exponent = i32::from(bits >> 10 & 0x1f);
-    let fraction = f32::from(bits & 0x3ff);
-    match exponent {
-        0 => sign * fraction * 2f32.powi(-24),
-        31 if fraction == 0.0 => sign * f32::INFINITY,
-        31 => f32::NAN,
-        _ => sign * (1024.0 + fraction) * 2f32.powi(exponent - 25),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scan::Samples;
+
+    /// Rows, columns and samples.
+    fn read(bytes: &[u8]) -> Result<(usize, usize, Samples), String> {
+        let array = super::header(bytes)?;
+        Ok((array.rows, array.columns, array.samples(bytes)?))
+    }
 
     fn array(version: u8, header: &str, samples: &[u8]) -> Vec<u8> {
         let mut bytes = [MAGIC, &[version, 0]].concat();
@@ -212,42 +230,23 @@ mod tests {
     fn orders_of_axes_and_bytes() {
         let samples: Vec<u8> = (0..6i16).flat_map(i16::to_be_bytes).collect();
         let plane = read(&array(1, &header(">i2", "False", "(2, 3)"), &samples));
-        let plane = plane.expect("an image");
-        assert_eq!((plane.rows, plane.columns), (2, 3));
-        assert_eq!(plane.samples, Samples::I16(vec![3, 4, 5, 0, 1, 2]));
+        let expected = (2, 3, Samples::I16(vec![3, 4, 5, 0, 1, 2]));
+        assert_eq!(plane.expect("an image"), expected);
         let plane = read(&array(2, &header(">i2", "True", "(2L, 3L)"), &samples));
         assert_eq!(
-            plane.expect("an image").samples,
+            plane.expect("an image").2,
             Samples::I16(vec![1, 3, 5, 0, 2, 4])
         );
         let plane = read(&array(3, &header(">i2", "False", "(1, 3, 2, 1)"), &samples));
-        let plane = plane.expect("an image");
-        assert_eq!((plane.rows, plane.columns), (3, 2));
+        let (rows, columns, _) = plane.expect("an image");
+        assert_eq!((rows, columns), (3, 2));
     }
 
-    /// Values from the table of examples of binary16 in IEEE 754-2008.
     #[test]
     fn half_precision() {
-        for (bits, value) in [
-            (0x0001, 2f32.powi(-24)),
-            (0x03ff, 1023.0 * 2f32.powi(-24)),
-            (0x0400, 2f32.powi(-14)),
-            (0x3555, 0.333_251_95),
-            (0x3c00, 1.0),
-            (0x7bff, 65504.0),
-            (0xc000, -2.0),
-            (0xfc00, f32::NEG_INFINITY),
-        ] {
-            assert_eq!(single(bits), value);
-        }
-        assert!(single(0x7e00).is_nan());
-        let plane = read(&array(
-            1,
-            &header("<f2", "False", "(1, 2)"),
-            &[0, 0x3c, 0, 0xc0],
-        ));
+        let bytes = array(1, &header("<f2", "False", "(1, 2)"), &[0, 0x3c, 0, 0xc0]);
         assert_eq!(
-            plane.expect("an image").samples,
+            read(&bytes).expect("an image").2,
             Samples::F32(vec![1.0, -2.0])
         );
     }
@@ -256,7 +255,7 @@ mod tests {
     fn what_is_not_read_is_said() {
         let error = |descr: &str, shape: &str, n: usize| {
             let bytes = array(1, &header(descr, "False", shape), &vec![0; n]);
-            read(&bytes).err().expect("no image")
+            read(&bytes).expect_err("no image")
         };
         assert!(error("<f8", "(2, 3)", 47).contains("47"));
         assert!(error("<c16", "(2, 3)", 96).contains("c16"));

@@ -7,69 +7,106 @@
 //! `key = value` of files written here.
 
 use super::plane::{Plane, Told, turn};
+use crate::error::ReadError;
 use crate::labels;
 use crate::scan::Samples;
+use crate::stored::{Failure, Stored, Unpacked};
 use crate::units::{clean, nm_per};
 
-/// Reads a matrix and what its comments tell.
-pub(super) fn read(bytes: &[u8]) -> Result<(Told, Plane), String> {
-    #[cfg(test)]
-    crate::seeds::keep(bytes);
+pub(super) const FORMAT: &str = "text matrix";
+
+/// Finds the size of a matrix and what its comments tell; its numbers are not looked at.
+pub(super) fn open(bytes: &[u8]) -> Result<(Told, Plane<'_>), String> {
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     let mut told = Told::default();
     let mut size = [None, None];
     let mut carried = Vec::new();
-    let mut separator = None;
-    let mut values = Vec::new();
-    let mut columns = 0;
-    for (number, line) in bytes.split(|&b| b == b'\n').enumerate() {
-        let line = String::from_utf8_lossy(line);
-        let line = line.trim_matches(['\r', ' ']);
-        if let Some(comment) = line.trim_start().strip_prefix('#') {
-            if comment.contains('=') {
-                carried.extend(labels::lines(comment));
-            } else {
-                tell(comment, &mut told, &mut size);
+    let (mut rows, mut columns) = (0, 0);
+    for (_, line) in lines(bytes) {
+        match line {
+            Line::Comment(comment) if comment.contains('=') => {
+                carried.extend(labels::lines(&comment));
             }
-            continue;
-        }
-        if line.trim().is_empty() {
-            continue;
-        }
-        let separator = *separator.get_or_insert_with(|| separator_of(line));
-        let before = values.len();
-        for field in fields(line, separator) {
-            let value = parse(field, separator).ok_or_else(|| {
-                format!("line {}: expected a number, found {field:?}", number + 1)
-            })?;
-            values.push(value);
-        }
-        let found = values.len() - before;
-        if before == 0 {
-            columns = found;
-        } else if found != columns {
-            return Err(format!(
-                "line {}: expected {columns} numbers as in the first line, found {found}",
-                number + 1
-            ));
+            Line::Comment(comment) => tell(&comment, &mut told, &mut size),
+            Line::Numbers(line) => {
+                if rows == 0 {
+                    let line = String::from_utf8_lossy(line);
+                    columns = fields(line.trim_matches(EDGES), separator_of(&line)).count();
+                }
+                rows += 1;
+            }
         }
     }
     if columns == 0 {
         return Err("expected numbers, found none".to_owned());
     }
-    turn(&mut values, columns);
     if let [Some(width), Some(height)] = size {
         told.size_nm = Some([width, height]);
     }
-    let fits = labels::fits(&carried, [values.len() / columns, columns]);
+    let fits = labels::fits(&carried, [rows, columns]);
+    let samples = move || {
+        let damaged = |reason| Failure::File(ReadError::damaged(FORMAT, reason));
+        let values = values(bytes, columns).map_err(damaged)?;
+        Ok(Unpacked::measured(Samples::F64(values)))
+    };
     let plane = Plane {
-        rows: values.len() / columns,
+        rows,
         columns,
-        samples: Samples::F64(values),
-        rendering: false,
+        samples: Stored::Packed(Box::new(samples)),
         carried: if fits { carried } else { Vec::new() },
     };
     Ok((told, plane))
+}
+
+/// The numbers, the bottom line first.
+fn values(bytes: &[u8], columns: usize) -> Result<Vec<f64>, String> {
+    let mut separator = None;
+    let mut values = Vec::new();
+    for (number, line) in lines(bytes) {
+        let Line::Numbers(line) = line else {
+            continue;
+        };
+        let line = String::from_utf8_lossy(line);
+        let line = line.trim_matches(EDGES);
+        let separator = *separator.get_or_insert_with(|| separator_of(line));
+        let before = values.len();
+        for field in fields(line, separator) {
+            let value = parse(field, separator)
+                .ok_or_else(|| format!("line {number}: expected a number, found {field:?}"))?;
+            values.push(value);
+        }
+        let found = values.len() - before;
+        if found != columns {
+            return Err(format!(
+                "line {number}: expected {columns} numbers as in the first line, found {found}"
+            ));
+        }
+    }
+    turn(&mut values, columns);
+    Ok(values)
+}
+
+/// What may stand at the ends of a line.
+const EDGES: [char; 2] = ['\r', ' '];
+
+enum Line<'a> {
+    /// What stands behind the `#`.
+    Comment(String),
+    Numbers(&'a [u8]),
+}
+
+/// The lines that are not empty, with their numbers from 1.
+fn lines(bytes: &[u8]) -> impl Iterator<Item = (usize, Line<'_>)> {
+    let lines = bytes.split(|&b| b == b'\n').enumerate();
+    lines.filter_map(|(index, line)| {
+        let text = line.trim_ascii();
+        let line = match text.strip_prefix(b"#") {
+            Some(comment) => Line::Comment(String::from_utf8_lossy(comment).into_owned()),
+            None if text.is_empty() => return None,
+            None => Line::Numbers(line),
+        };
+        Some((index + 1, line))
+    })
 }
 
 fn separator_of(line: &str) -> char {
@@ -125,10 +162,9 @@ mod tests {
     use super::*;
 
     fn values(text: &str) -> Vec<f64> {
-        match read(text.as_bytes()).expect("a matrix").1.samples {
-            Samples::F64(values) => values,
-            other => panic!("{other:?}"),
-        }
+        let (_, plane) = open(text.as_bytes()).expect("a matrix");
+        let bytes = text.trim_start_matches('\u{feff}').as_bytes();
+        super::values(bytes, plane.columns).expect("numbers")
     }
 
     #[test]
@@ -153,18 +189,22 @@ mod tests {
     fn comments_tell_size_and_unit() {
         let text =
             "# Channel: Topography\n# Width: 1.5 µm\n# Height: 20 nm\n# Value units: m\n1 2\n";
-        let (told, plane) = read(text.as_bytes()).expect("a matrix");
+        let (told, plane) = open(text.as_bytes()).expect("a matrix");
         assert_eq!(told.name.as_deref(), Some("Topography"));
         assert_eq!(told.unit.as_deref(), Some("m"));
         assert_eq!(told.size_nm, Some([1500.0, 20.0]));
         assert_eq!((plane.rows, plane.columns), (1, 2));
-        let (told, _) = read(b"# Width: 5 V\n# Height: 20 nm\n1 2\n").expect("a matrix");
+        let (told, _) = open(b"# Width: 5 V\n# Height: 20 nm\n1 2\n").expect("a matrix");
         assert_eq!(told.size_nm, None);
     }
 
     #[test]
     fn what_is_wrong_is_said() {
-        let error = |text: &str| read(text.as_bytes()).err().expect("no matrix");
+        let error = |text: &str| {
+            let opened = open(text.as_bytes());
+            let read = opened.and_then(|(_, plane)| super::values(text.as_bytes(), plane.columns));
+            read.expect_err("no matrix")
+        };
         assert!(error("1 2\n3\n").contains("line 2"));
         assert!(error("1 2\n3 x\n").contains("\"x\""));
         // Whether this comma is a decimal one is not known.

@@ -1,0 +1,24 @@
+//! Plain arrays and pictures; their public face is [`crate::arrays`].
+
+#[cfg(feature = "archives")]
+mod archived;
+mod npy;
+#[cfg(feature = "pictures")]
+mod picture;
+mod plane;
+mod read;
+mod text;
+#[cfg(feature = "write")]
+mod write;
+
+#[cfg(feature = "archives")]
+pub(crate) use archived::open as open_npz;
+#[cfg(feature = "pictures")]
+pub(crate) use read::{open_jpeg, open_png, open_tiff};
+pub(crate) use read::{open_npy, open_text};
+#[cfg(feature = "write")]
+pub use write::csv;
+#[cfg(all(feature = "write", feature = "archives"))]
+pub use write::npz;
+#[cfg(all(feature = "write", feature = "pictures"))]
+pub use write::tiff;
