@@ -15,7 +15,9 @@ use nalgebra::{DMatrix, DVector, Matrix2, Matrix3, Matrix4, Vector2};
 use rustfft::num_complex::Complex64;
 
 use crate::coverage::cells::Cells;
-use crate::coverage::settle::{Patch, Seen};
+use crate::coverage::local::{Local, local};
+use crate::coverage::settle::Patch;
+use crate::frame::image::Image;
 use crate::numbers::normal_equations::NormalEquations;
 use crate::numbers::splines::Splines;
 
@@ -28,7 +30,7 @@ const STRIDE: f64 = 2.0;
 /// Independent phases in a node of one window: nodes closer than a window are correlated.
 const INDEPENDENT: f64 = 2.5;
 /// The least degrees of freedom by which an error is enlarged: fewer say nothing of the noise.
-const FREEDOM: f64 = 10.0;
+const FREEDOM: f64 = 4.0;
 /// Cells of splines along the longer side of the patch that are tried.
 const SPLINES: [usize; 7] = [1, 2, 3, 4, 6, 9, 13];
 /// A cell of the splines is at least so many windows wide: what is smaller the window does not see.
@@ -81,9 +83,19 @@ pub(crate) struct Mean {
     pub(crate) middle: Vector2<f64>,
     /// Amplitude over noise amplitude in one resolution cell of the patch, weakest of the three.
     pub(crate) signal_to_noise: f64,
+    /// χ² over its degrees of freedom, 1 at least.
+    reduced: f64,
 }
 
+/// χ² over its degrees of freedom beyond which the phases are not those of one lattice: noise is known far better.
+const POOR: f64 = 9.0;
+
 impl Mean {
+    /// Whether the phases are not those of one lattice that changes smoothly.
+    pub(crate) fn is_poor(&self) -> bool {
+        self.reduced > POOR
+    }
+
     /// The same in pixels of which `bins` make one along each axis.
     pub(crate) fn in_pixels(self, bins: usize) -> Self {
         let size = bins as f64;
@@ -93,6 +105,17 @@ impl Mean {
             ..self
         }
     }
+}
+
+/// What the phases of a patch are read from, all in bins.
+pub(crate) struct View<'a> {
+    pub(crate) image: &'a Image,
+    pub(crate) cells: &'a Cells,
+    /// The window, mean periods.
+    pub(crate) width: f64,
+    /// Noise power per pixel at each wave.
+    pub(crate) noise: [f64; 3],
+    pub(crate) signal_to_noise: f64,
 }
 
 /// One place where the phases are read.
@@ -170,7 +193,7 @@ struct Fit {
     /// Independent phases.
     independent: f64,
     /// By how much variances are enlarged, since χ² is larger than its degrees of freedom.
-    enlarged: f64,
+    pub(crate) enlarged: f64,
 }
 
 impl Fit {
@@ -229,24 +252,31 @@ struct Chosen {
 }
 
 /// The mean over a patch; `None` where its phases cannot be described.
-pub(crate) fn mean(cells: &Cells, seen: &Seen, patch: &Patch) -> Option<Mean> {
-    let nodes = nodes(cells, seen, patch);
-    let chosen = choose(cells, seen, patch, &nodes)?;
-    Some(summary(&chosen, &nodes, cells, seen, patch))
+pub(crate) fn mean(view: &View, patch: &Patch) -> Option<Mean> {
+    let nodes = nodes(view, patch);
+    let chosen = choose(view, patch, &nodes)?;
+    Some(summary(&chosen, &nodes, view, patch))
 }
 
 /// χ² of the best description of some nodes, its parameters, and the number of independent phases that it describes.
-pub(crate) fn described(
-    cells: &Cells,
-    seen: &Seen,
-    patch: &Patch,
-    nodes: &[Node],
-) -> Option<[f64; 3]> {
-    let fit = choose(cells, seen, patch, nodes)?.fit;
+pub(crate) fn described(view: &View, patch: &Patch, nodes: &[Node]) -> Option<[f64; 3]> {
+    let fit = choose(view, patch, nodes)?.fit;
     Some([fit.chi2, fit.coefficients.len() as f64, fit.independent])
 }
 
-fn choose(cells: &Cells, seen: &Seen, patch: &Patch, nodes: &[Node]) -> Option<Chosen> {
+/// The same for one lattice that is the same everywhere; `None` for one that changes.
+pub(crate) fn described_as_straight(
+    view: &View,
+    patch: &Patch,
+    nodes: &[Node],
+) -> Option<[f64; 3]> {
+    let chosen = choose(view, patch, nodes)?;
+    let fit = chosen.fit;
+    let straight = chosen.model.is_none() && fit.enlarged < POOR;
+    straight.then_some([fit.chi2, fit.coefficients.len() as f64, fit.independent])
+}
+
+fn choose(view: &View, patch: &Patch, nodes: &[Node]) -> Option<Chosen> {
     let frame = patch.corners();
     let (middle, half) = ((frame[0] + frame[1]) / 2.0, (frame[1] - frame[0]) / 2.0);
     let powers = |degree| Basis::Powers {
@@ -255,7 +285,7 @@ fn choose(cells: &Cells, seen: &Seen, patch: &Patch, nodes: &[Node]) -> Option<C
         half,
     };
     let straight = fit(powers(1), nodes)?;
-    let window = [0, 1].map(|axis| seen.width * cells.period[axis]);
+    let window = [0, 1].map(|axis| view.width * view.cells.period[axis]);
     let sizes = SPLINES.map(|n| {
         let longer = half.x.max(half.y);
         [0, 1].map(|axis| ((n as f64 * half[axis] / longer).ceil() as usize).max(1))
@@ -297,9 +327,10 @@ fn choose(cells: &Cells, seen: &Seen, patch: &Patch, nodes: &[Node]) -> Option<C
     })
 }
 
-pub(crate) fn nodes(cells: &Cells, seen: &Seen, patch: &Patch) -> Vec<Node> {
-    let window = cells.window(seen.width);
-    let width = [0, 1].map(|axis| seen.width * cells.period[axis]);
+/// The nodes of a patch at which the three waves can be told apart.
+pub(crate) fn nodes(view: &View, patch: &Patch) -> Vec<Node> {
+    let cells = view.cells;
+    let width = [0, 1].map(|axis| view.width * cells.period[axis]);
     let apart = if patch.unit_cells > LARGE {
         STRIDE
     } else {
@@ -308,9 +339,8 @@ pub(crate) fn nodes(cells: &Cells, seen: &Seen, patch: &Patch) -> Vec<Node> {
     let stride = [0, 1]
         .map(|axis| ((apart * width[axis] / cells.pixels[axis] as f64).round() as usize).max(1));
     let pixels = [0, 1].map(|axis| (stride[axis] * cells.pixels[axis]) as f64);
-    // Pixels of a node over those of its window.
     let share = pixels[0] * pixels[1] / (4.0 * std::f64::consts::PI * width[0] * width[1]);
-    let mut nodes = Vec::new();
+    let mut places = Vec::new();
     for (j, y) in (stride[1] / 2..cells.size[1])
         .step_by(stride[1])
         .enumerate()
@@ -319,23 +349,31 @@ pub(crate) fn nodes(cells: &Cells, seen: &Seen, patch: &Patch) -> Vec<Node> {
             .step_by(stride[0])
             .enumerate()
         {
-            let cell = y * cells.size[0] + x;
-            if !patch.inside[cell] {
-                continue;
+            if patch.inside[y * cells.size[0] + x] {
+                places.push(([i, j], [x, y]));
             }
-            let envelopes = [0, 1, 2].map(|wave| seen.envelopes[wave][cell]);
-            nodes.push(Node {
-                at: cells.middle([x, y]),
-                place: [i, j],
-                weights: envelopes.map(|a| 2.0 * a.norm_sqr() / seen.unit * share),
-                share,
-                errors: envelopes
-                    .map(|a| (seen.noise * window.noise[cell] / (2.0 * a.norm_sqr())).sqrt()),
-                envelopes,
-            });
         }
     }
-    nodes
+    let at: Vec<usize> = places
+        .iter()
+        .map(|(_, [x, y])| y * cells.size[0] + x)
+        .collect();
+    let seen = local(cells, &patch.of(view.image), &patch.pair, view.width, &at);
+    let all = places.into_iter().zip(seen);
+    all.filter_map(|((place, cell), local)| {
+        let Local { envelopes, noise } = local?;
+        let errors =
+            [0, 1, 2].map(|i| (view.noise[i] * noise[i] / (2.0 * envelopes[i].norm_sqr())).sqrt());
+        Some(Node {
+            at: cells.middle(cell),
+            place,
+            envelopes,
+            weights: errors.map(|e| share / (e * e)),
+            share,
+            errors,
+        })
+    })
+    .collect()
 }
 
 /// ψ of the three waves as sums over the coefficients: those of ψ₁, of ψ₂ and the last.
@@ -517,9 +555,10 @@ fn align(
     coefficients[2 * n] += third;
 }
 
-fn summary(chosen: &Chosen, nodes: &[Node], cells: &Cells, seen: &Seen, patch: &Patch) -> Mean {
+fn summary(chosen: &Chosen, nodes: &[Node], view: &View, patch: &Patch) -> Mean {
+    let cells = view.cells;
     let fit = &chosen.fit;
-    let reach = Vector2::from_fn(|axis, _| seen.width * cells.period[axis]);
+    let reach = Vector2::from_fn(|axis, _| view.width * view.cells.period[axis]);
     let n = fit.basis.len();
     let size = fit.coefficients.len();
     // Mean slopes of ψ₁ and ψ₂ as sums over the coefficients, and how they spread.
@@ -571,7 +610,8 @@ fn summary(chosen: &Chosen, nodes: &[Node], cells: &Cells, seen: &Seen, patch: &
         phases: [0, 1, 2].map(|i| phases[i] + carried[i]),
         phase_covariance: Matrix3::from_column_slice(phase_covariance.as_slice()),
         middle,
-        signal_to_noise: seen.signal_to_noise(cells, patch),
+        signal_to_noise: view.signal_to_noise,
+        reduced: fit.enlarged,
     }
 }
 

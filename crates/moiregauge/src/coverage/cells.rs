@@ -40,6 +40,18 @@ impl Cells {
             image.columns.div_ceil(pixels[0]),
             image.rows.div_ceil(pixels[1]),
         ];
+        let empty = Self {
+            size,
+            pixels,
+            period,
+            count: vec![0.0; size[0] * size[1]],
+        };
+        Some(empty.of_part(image))
+    }
+
+    /// The same cells for an image of which other pixels are missing.
+    pub(crate) fn of_part(&self, image: &Image) -> Self {
+        let (size, pixels) = (self.size, self.pixels);
         let mut count = vec![0.0; size[0] * size[1]];
         for row in 0..image.rows {
             let cells = &mut count[row / pixels[1] * size[0]..][..size[0]];
@@ -47,12 +59,10 @@ impl Cells {
                 *cell += block.iter().filter(|v| v.is_finite()).count() as f64;
             }
         }
-        Some(Self {
-            size,
-            pixels,
-            period,
+        Self {
             count,
-        })
+            ..self.clone()
+        }
     }
 
     /// Number of cells.
@@ -127,6 +137,11 @@ impl Cells {
             taps,
             weight,
         }
+    }
+
+    /// Sums of cells under the window.
+    pub(crate) fn summed(&self, sums: &[Complex64], window: &Window) -> Vec<Complex64> {
+        self.smoothed(sums, &window.taps)
     }
 
     /// The envelope of a wave: its sums under the window.

@@ -32,7 +32,7 @@ pub(crate) fn finer(
     FINER.into_iter().find_map(|n| {
         let all = (1..=n)
             .filter(|a| n % a == 0)
-            .flat_map(|a| (0..a).map(move |b| (a, b)));
+            .flat_map(|a| (0..n / a).map(move |b| (a, b)));
         let fits = all.filter_map(|(a, b)| {
             let change = Matrix2::new(f64::from(a), f64::from(b), 0.0, f64::from(n / a));
             let finer = pair * change.try_inverse()?;

@@ -6,9 +6,12 @@
 
 use nalgebra::{Matrix2, Vector4};
 
-use crate::coverage::bend::{Node, described, neighbours, nodes, price};
+use crate::coverage::bend::{
+    Node, View, described, described_as_straight, neighbours, nodes, price,
+};
 use crate::coverage::cells::Cells;
-use crate::coverage::settle::{Patch, Seen};
+use crate::coverage::settle::Patch;
+use crate::numbers::median::median;
 
 /// Rounds of means and nearest means. Chosen by eye.
 const ROUNDS: usize = 20;
@@ -18,8 +21,8 @@ const FEWEST_NODES: usize = 6;
 const BETTER: f64 = 20.0;
 
 /// The patches of two grains, the larger first; `None` where one lattice describes all of the patch as well.
-pub(crate) fn split(cells: &Cells, seen: &Seen, patch: &Patch) -> Option<[Patch; 2]> {
-    let all = nodes(cells, seen, patch);
+pub(crate) fn split(view: &View, patch: &Patch) -> Option<[Patch; 2]> {
+    let all = nodes(view, patch);
     if all.len() < 2 * FEWEST_NODES {
         return None;
     }
@@ -41,8 +44,8 @@ pub(crate) fn split(cells: &Cells, seen: &Seen, patch: &Patch) -> Option<[Patch;
     if parts.iter().any(|p| p.len() < FEWEST_NODES) {
         return None;
     }
-    let one = described(cells, seen, patch, &part(&|_| true))?;
-    let [a, b] = [0, 1].map(|i| described(cells, seen, patch, &parts[i]));
+    let one = described(view, patch, &part(&|_| true))?;
+    let [a, b] = [0, 1].map(|i| described_as_straight(view, patch, &parts[i]));
     let (a, b) = (a?, b?);
     // Where the boundary runs costs about as many numbers as it is nodes long.
     let boundary = one[2].sqrt() * one[2].ln() / 2.0;
@@ -50,7 +53,7 @@ pub(crate) fn split(cells: &Cells, seen: &Seen, patch: &Patch) -> Option<[Patch;
     if price(one[0], one[1], one[2]) - two < BETTER {
         return None;
     }
-    let mut patches = [false, true].map(|which| grain(cells, patch, &all, &second, which));
+    let mut patches = [false, true].map(|which| grain(view.cells, patch, &all, &second, which));
     if patches[1].unit_cells > patches[0].unit_cells {
         patches.swap(0, 1);
     }
@@ -59,7 +62,7 @@ pub(crate) fn split(cells: &Cells, seen: &Seen, patch: &Patch) -> Option<[Patch;
 
 /// Which nodes belong to the second of two lattices, by their slopes.
 fn halves(nodes: &[Node]) -> Option<Vec<bool>> {
-    let slopes = slopes(nodes);
+    let slopes = filtered(nodes, &slopes(nodes));
     let known: Vec<&Vector4<f64>> = slopes.iter().flatten().collect();
     let mean = known.iter().copied().sum::<Vector4<f64>>() / known.len() as f64;
     // Starts at the ends of the direction in which they differ most.
@@ -125,6 +128,25 @@ fn slopes(nodes: &[Node]) -> Vec<Option<Vector4<f64>>> {
         (x > 0.0 && y > 0.0).then(|| sum.component_div(&Vector4::new(x, y, x, y)))
     };
     sums.into_iter().map(of).collect()
+}
+
+/// Each slope as the median of its neighbours has it: windows on a boundary see both grains, which makes a line of slopes that
+/// are neither's.
+fn filtered(nodes: &[Node], slopes: &[Option<Vector4<f64>>]) -> Vec<Option<Vector4<f64>>> {
+    let near = |a: &Node, b: &Node| {
+        let apart = |axis: usize| a.place[axis].abs_diff(b.place[axis]);
+        apart(0).max(apart(1)) <= 1
+    };
+    let of = |node: &Node| {
+        let around = nodes
+            .iter()
+            .zip(slopes)
+            .filter(|(other, _)| near(node, other));
+        let around: Vec<Vector4<f64>> = around.filter_map(|(_, slope)| *slope).collect();
+        let middle = |i: usize| median(&mut around.iter().map(|s| s[i]).collect::<Vec<f64>>());
+        (!around.is_empty()).then(|| Vector4::from_fn(|i, _| middle(i)))
+    };
+    nodes.iter().map(of).collect()
 }
 
 /// The cells whose nearest nodes all belong to one grain.

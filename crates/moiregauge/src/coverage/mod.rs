@@ -10,6 +10,7 @@ pub(crate) mod cells;
 pub(crate) mod find;
 pub(crate) mod finer;
 pub(crate) mod grains;
+pub(crate) mod local;
 pub(crate) mod settle;
 pub(crate) mod tiles;
 

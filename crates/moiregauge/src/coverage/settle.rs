@@ -8,7 +8,7 @@
 use nalgebra::{Matrix2, Vector2};
 use rustfft::num_complex::Complex64;
 
-use crate::coverage::bend::{Mean, mean};
+use crate::coverage::bend::{Mean, View, mean};
 use crate::coverage::cells::{Cells, Window};
 use crate::coverage::grains::split;
 use crate::frame::image::Image;
@@ -148,7 +148,7 @@ fn settle_bins(
     let mut settled = None;
     for _ in 0..ROUNDS {
         let sums = waves(&pair).map(|q| cells.mixed(image, q));
-        let quiet = hollows(&pair).map(|q| cells.mixed(image, q));
+        let quiet = hollows(&pair).map(|places| places.map(|q| cells.mixed(image, q)));
         let seen = (narrowest..WIDTHS.len()).find_map(|i| {
             let (_, window) = &windows[i];
             Some((i, look(&cells, &sums, &quiet, window, WIDTHS[i])?))
@@ -184,6 +184,7 @@ fn settle_bins(
     let (seen, inner) = settled?;
     Some(Settled {
         patch: inner.in_pixels(bins),
+        image: image.clone(),
         cells,
         seen,
         inner,
@@ -193,6 +194,8 @@ fn settle_bins(
 
 /// A patch and what was seen of it.
 pub(crate) struct Settled {
+    /// In bins.
+    image: Image,
     cells: Cells,
     seen: Seen,
     /// The patch in bins.
@@ -204,6 +207,16 @@ pub(crate) struct Settled {
 }
 
 impl Settled {
+    fn view(&self) -> View<'_> {
+        View {
+            image: &self.image,
+            cells: &self.cells,
+            width: self.seen.width,
+            noise: self.seen.noise,
+            signal_to_noise: self.seen.signal_to_noise(&self.cells, &self.inner),
+        }
+    }
+
     /// Whether its waves are plain to see everywhere in it, whatever their phases do.
     pub(crate) fn is_plain(&self) -> bool {
         self.seen.is_plain()
@@ -216,13 +229,13 @@ impl Settled {
 
     /// The patches of two grains where it is no single lattice, the larger first.
     pub(crate) fn grains(&self) -> Option<[Patch; 2]> {
-        let grains = split(&self.cells, &self.seen, &self.inner)?;
+        let grains = split(&self.view(), &self.inner)?;
         Some(grains.map(|grain| grain.in_pixels(self.bins)))
     }
 
     /// The mean of its lattice; `None` where its phases cannot be described.
     pub(crate) fn mean(&self) -> Option<Mean> {
-        Some(mean(&self.cells, &self.seen, &self.inner)?.in_pixels(self.bins))
+        Some(mean(&self.view(), &self.inner)?.in_pixels(self.bins))
     }
 }
 
@@ -232,9 +245,25 @@ fn waves(pair: &Matrix2<f64>) -> [Vector2<f64>; 3] {
     [a, b, b - a]
 }
 
-/// The places between the waves that are farthest from all of them: noise stands there, and nothing else.
-fn hollows(pair: &Matrix2<f64>) -> [Vector2<f64>; 3] {
-    [[2.0, 2.0], [-2.0, 4.0], [4.0, -2.0]].map(|[h, k]| pair * Vector2::new(h, k) / 3.0)
+/// Two places for each wave where noise stands and nothing else: of the same frequency along the lines, since the noise of a scan is a
+/// function of time, and as far from all waves as can be.
+fn hollows(pair: &Matrix2<f64>) -> [[Vector2<f64>; 2]; 3] {
+    let inverse = pair.try_inverse().unwrap_or_else(Matrix2::zeros);
+    let length = pair.determinant().abs().sqrt();
+    let clearance = |q: &Vector2<f64>| {
+        let index = (inverse * q).map(f64::floor);
+        let corners = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]];
+        let distances = corners.map(|[h, k]| (q - pair * (index + Vector2::new(h, k))).norm());
+        distances.into_iter().fold(f64::INFINITY, f64::min)
+    };
+    waves(pair).map(|wave| {
+        [1.0, -1.0].map(|side| {
+            let places =
+                (5..=25).map(|i| wave + Vector2::y() * (side * 0.05 * f64::from(i) * length));
+            let farthest = places.max_by(|a, b| clearance(a).total_cmp(&clearance(b)));
+            farthest.unwrap_or(wave)
+        })
+    })
 }
 
 /// What a window sees.
@@ -243,10 +272,8 @@ pub(crate) struct Seen {
     inside: Vec<bool>,
     /// Power over noise power of each wave where it is.
     pub(crate) weights: [f64; 3],
-    /// Noise power per pixel.
-    pub(crate) noise: f64,
-    /// What noise makes of the power of an envelope, where nothing is missing.
-    pub(crate) unit: f64,
+    /// Noise power per pixel at each wave.
+    pub(crate) noise: [f64; 3],
     /// The window, mean periods.
     pub(crate) width: f64,
 }
@@ -281,7 +308,7 @@ impl Seen {
 fn look(
     cells: &Cells,
     sums: &[Vec<Complex64>; 3],
-    quiet: &[Vec<Complex64>; 3],
+    quiet: &[[Vec<Complex64>; 2]; 3],
     window: &Window,
     width: f64,
 ) -> Option<Seen> {
@@ -293,16 +320,17 @@ fn look(
         return None;
     }
     // Per pixel, as the median sees it: edges and steps, which are in few cells, do not count.
-    let noise = quiet.iter().map(|sums| {
+    let level = |sums: &Vec<Complex64>| {
         let envelope = cells.envelope(sums, window);
         let powers = usable
             .iter()
             .map(|&i| envelope[i].norm_sqr() / window.noise[i]);
         median(&mut powers.collect::<Vec<f64>>()) / std::f64::consts::LN_2
-    });
-    let noise = noise.sum::<f64>() / 3.0;
+    };
+    let noise = [0, 1, 2].map(|i| f64::midpoint(level(&quiet[i][0]), level(&quiet[i][1])));
     let all: Vec<f64> = usable.iter().map(|&i| window.noise[i]).collect();
-    let unit = noise * median(&mut all.clone());
+    let one = median(&mut all.clone());
+    let unit = noise.map(|noise| noise * one);
     // Typical power of each wave where it is: first by the strong cells, then as the median of the patch.
     let mut typical = [0, 1, 2].map(|i| {
         let powers = || usable.iter().map(|&n| envelopes[i][n].norm_sqr());
@@ -311,7 +339,8 @@ fn look(
     let mut inside = vec![false; cells.len()];
     for _ in 0..4 {
         let total: f64 = typical.iter().sum();
-        let quiet = (unit / (2.0 * total)).sqrt();
+        let noisy: f64 = (0..3).map(|i| typical[i] * unit[i]).sum();
+        let quiet = (noisy / 2.0).sqrt() / total;
         if !(quiet < QUIET) {
             return None;
         }
@@ -337,11 +366,10 @@ fn look(
         }
     }
     Some(Seen {
-        weights: typical.map(|t| t / unit),
+        weights: [0, 1, 2].map(|i| typical[i] / unit[i]),
         envelopes,
         inside,
         noise,
-        unit,
         width,
     })
 }

@@ -26,6 +26,9 @@ use crate::spectrum::prepare::{
 use crate::spectrum::transform::Spectrum;
 use crate::spectrum::{known, rescue, select};
 
+/// Waves shorter than this share of the shortest lattice vector are those of atoms or of another scale, and may be
+/// stronger than a moiré.
+const ATOMS: f64 = 0.25;
 /// A lattice whose waves bend so much that a transform of the whole patch does not show them has at least so many unit
 /// cells: it is seen by what windows show. Chosen by eye.
 const FEWEST_CELLS: f64 = 12.0;
@@ -63,7 +66,27 @@ pub fn measure(
     let another = Start::find_patch(image, geometry, background, &[Some(pair)])
         .and_then(|start| start.measure(method).ok())
         .filter(|other| beside(other).is_none_or(|wave| !is_stronger(other, &wave)));
-    Ok(another.unwrap_or(found))
+    match another {
+        Some(another) => Ok(another),
+        None if competes(&found, &wave, geometry) => Err(LatticeError::Contradicted {
+            period: period(&wave, geometry),
+        }),
+        None => Ok(found),
+    }
+}
+
+/// Whether a wave can be that of the lattice that was meant: atoms, which are much shorter, are none.
+fn competes(found: &MeasuredLattice, wave: &ForeignWave, geometry: &Geometry) -> bool {
+    let basis = geometry.pixel_to_nm * found.pixels.basis;
+    let shortest = basis.column(0).norm().min(basis.column(1).norm());
+    period(wave, geometry) > ATOMS * shortest
+}
+
+/// Period of a wave, nm.
+fn period(wave: &ForeignWave, geometry: &Geometry) -> f64 {
+    let inverse = geometry.pixel_to_nm.try_inverse();
+    let q = inverse.map_or_else(Vector2::zeros, |m| m.transpose() * wave.wave_vector);
+    std::f64::consts::TAU / q.norm()
 }
 
 /// A wave that stands out beside the lattice.
@@ -242,8 +265,16 @@ impl Start {
         let everywhere = settled.patch.share > WHOLE;
         let mean = settled.mean();
         let changes = mean.as_ref().is_some_and(|mean| mean.change.is_some());
-        let grains = if changes { settled.grains() } else { None };
+        let poor = mean.as_ref().is_some_and(Mean::is_poor);
+        let grains = if changes || poor {
+            settled.grains()
+        } else {
+            None
+        };
         let Some([largest, other]) = grains else {
+            if poor {
+                return None;
+            }
             return Some(Self {
                 mean: mean.filter(|_| changes || !everywhere),
                 patch: (!everywhere).then_some(settled.patch),

@@ -31,6 +31,15 @@ pub enum LatticeError {
         /// Signal-to-noise ratios (amplitude) of the best three wave vectors, largest first; 0 where none were found.
         best: [f64; 3],
     },
+    /// Something else is stronger.
+    #[error(
+        "a wave with a period of {period:.2} nm, which is no harmonic of the lattice that was found, is stronger than the lattice: \
+         it may be another lattice, stripes, or an edge"
+    )]
+    Contradicted {
+        /// Its period, nm.
+        period: f64,
+    },
     /// The lattice shows in the spectrum, but this method gets no hold of it.
     #[error(
         "the spectrum shows a lattice, but the {method:?} method finds too few of its peaks: noise \

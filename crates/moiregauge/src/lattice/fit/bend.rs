@@ -11,7 +11,7 @@
 //! # References
 //! Rao, Proc. Camb. Phil. Soc. 44, 50 (1948), score test.
 
-use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
+use nalgebra::{DMatrix, DVector, Matrix2, Matrix4, Vector2};
 
 use crate::lattice::fit::folded::Bends;
 use crate::lattice::fit::frame::{BENT, Frame, wave};
@@ -40,7 +40,26 @@ pub struct Inhomogeneity {
     pub threshold: f64,
 }
 
+/// What the fit makes of a lattice that changes is no area mean: of a wave vector that goes like `a x + b x²` over −1 … 1, the fit
+/// sees 3b/5 and the mean is b/3. Where b is as large as a, 2/15 of the change from end to end.
+const OF_THE_MEAN: f64 = 2.0 / 15.0;
+
 impl Inhomogeneity {
+    /// How far the waves (columns) may be from their mean over the area: covariance of the four numbers, as
+    /// [`Pair`](heterostrain::lattice::Pair) has them.
+    pub(crate) fn of_the_mean(&self, waves: &Matrix2<f64>) -> Matrix4<f64> {
+        let mut covariance = Matrix4::zeros();
+        for (i, wave) in waves.column_iter().enumerate() {
+            let along = wave * (OF_THE_MEAN * self.wavelength);
+            let across = Vector2::new(-wave.y, wave.x) * (OF_THE_MEAN * self.angle);
+            let block = along * along.transpose() + across * across.transpose();
+            covariance
+                .fixed_view_mut::<2, 2>(2 * i, 2 * i)
+                .copy_from(&block);
+        }
+        covariance
+    }
+
     /// Whether it is more than chance, and enough to matter.
     pub fn stands_out(&self) -> bool {
         self.chi_squared > self.threshold && self.wavelength.max(self.angle) > HARMLESS

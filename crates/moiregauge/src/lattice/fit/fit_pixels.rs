@@ -361,11 +361,21 @@ impl<'a> Fit<'a> {
         );
         let covariance = self.covariance(noise)?;
         let enlargement = closure.map_or(1.0, |closure| closure.enlargement());
-        let wave_vectors = Waves::new(
+        let inhomogeneity = bend::inhomogeneity(
+            &self.frame,
+            &self.model,
+            &self.lines.lambda,
+            &noise.bends,
+            &noise.local,
+        );
+        let mut wave_vectors = Waves::new(
             self.model.pair,
             covariance.fixed_view::<4, 4>(3, 3) * enlargement,
         )
         .mapped(&Matrix2::from_diagonal(&scale));
+        if let Some(change) = inhomogeneity.filter(Inhomogeneity::stands_out) {
+            wave_vectors.covariance += change.of_the_mean(&wave_vectors.basis);
+        }
         let [columns, rows] = [
             self.frame.image.columns as f64,
             self.frame.image.rows as f64,
@@ -386,13 +396,7 @@ impl<'a> Fit<'a> {
                 let p = frame::wave(&self.model.pair, index);
                 noise.residual.samples(p, offsets)
             }),
-            inhomogeneity: bend::inhomogeneity(
-                &self.frame,
-                &self.model,
-                &self.lines.lambda,
-                &noise.bends,
-                &noise.local,
-            ),
+            inhomogeneity,
             closure,
         };
         Some((wave_vectors.lattice()?, fit))

@@ -229,7 +229,7 @@ impl ResidualNoise {
         let rows = self.spectrum.rows;
         let cycles = model.pair / std::f64::consts::PI;
         let inverse = cycles.try_inverse()?;
-        let ours = |k: Vector2<f64>| {
+        let on = |k: Vector2<f64>| {
             let index = (inverse * k).map(f64::round);
             let near = if index.amax() <= LOW_ORDER {
                 FOREIGN
@@ -237,6 +237,14 @@ impl ResidualNoise {
                 HARMONIC
             };
             (k - cycles * index).norm() < near
+        };
+        // Waves beyond the Nyquist frequency are seen a whole turn a pixel away.
+        let turn = Vector2::new(self.spectrum.columns as f64, rows as f64);
+        let ours = |k: Vector2<f64>| {
+            let turns = (-1..=1).flat_map(|x| (-1..=1).map(move |y| Vector2::new(x, y)));
+            turns
+                .map(|t| t.map(f64::from))
+                .any(|t| on(k + t.component_mul(&turn)))
         };
         let half = self.spectrum.half();
         let (mut most, mut best) = (0.0, None);

@@ -1,0 +1,117 @@
+//! The waves of a lattice at one place: least squares under a window.
+//!
+//! `Σ g m |I − c₀ − Σ (c_i e^{iq_i·n} + c.c.)|²` over the pixels of a patch m. A window that an edge cuts off mixes the waves with
+//! each other and with the background, by a tenth and more; the normal equations take that off.
+
+use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
+use rustfft::num_complex::Complex64;
+
+use crate::coverage::cells::Cells;
+use crate::frame::image::Image;
+
+/// The background and the two waves of each of three harmonics, as (h, k).
+const BASIS: [[i32; 2]; 7] = [[0, 0], [1, 0], [0, 1], [-1, 1], [-1, 0], [0, -1], [1, -1]];
+/// Noise is enlarged by no more than this where an edge is near: beyond, the waves cannot be told apart.
+const MOST: f64 = 4.0;
+
+/// The envelopes of K₁, K₂ and K₂ − K₁ at a place, and the variance that white noise of unit power per pixel gives each.
+pub(crate) struct Local {
+    pub(crate) envelopes: [Complex64; 3],
+    pub(crate) noise: [f64; 3],
+}
+
+/// The envelopes at some cells. `part`: the image with all missing that does not count; `width` of the window in mean
+/// periods.
+pub(crate) fn local(
+    cells: &Cells,
+    part: &Image,
+    pair: &Matrix2<f64>,
+    width: f64,
+    at: &[usize],
+) -> Vec<Option<Local>> {
+    let cells = cells.of_part(part);
+    let window = cells.window(width);
+    let wave = |[h, k]: [i32; 2]| pair * Vector2::new(f64::from(h), f64::from(k));
+    let ones = part
+        .values
+        .iter()
+        .map(|v| if v.is_finite() { 1.0 } else { f64::NAN });
+    let ones = Image::new(part.rows, part.columns, ones.collect());
+    let seen = |image: &Image, index: [i32; 2]| {
+        let sums = cells.summed(&cells.mixed(image, wave(index)), &window);
+        at.iter().map(|&i| sums[i]).collect::<Vec<_>>()
+    };
+    let data = [0, 1, 2, 3].map(|i| seen(part, BASIS[i]));
+    // Each difference of two of the basis, one of ± each.
+    let mut known: Vec<([i32; 2], Vec<Complex64>)> = Vec::new();
+    for a in BASIS {
+        for b in BASIS {
+            let d = [a[0] - b[0], a[1] - b[1]];
+            if !known.iter().any(|(k, _)| *k == d || *k == [-d[0], -d[1]]) {
+                known.push((d, seen(&ones, d)));
+            }
+        }
+    }
+    // For each pair of the basis: which difference, and whether its conjugate.
+    let which = BASIS.map(|a| {
+        BASIS.map(|b| {
+            let d = [a[0] - b[0], a[1] - b[1]];
+            let found = known.iter().position(|(k, _)| *k == d);
+            let opposite = || known.iter().position(|(k, _)| *k == [-d[0], -d[1]]);
+            (found.or_else(opposite).unwrap_or(0), found.is_none())
+        })
+    });
+    let solve = |n: usize| {
+        let gram = SMatrix::<Complex64, 7, 7>::from_fn(|a, b| {
+            let (i, conjugate) = which[a][b];
+            let value = known[i].1[n];
+            if conjugate { value.conj() } else { value }
+        });
+        let right = SVector::<Complex64, 7>::from_fn(|a, _| match a {
+            0..4 => data[a][n],
+            _ => data[a - 3][n].conj(),
+        });
+        let inverse = gram.try_inverse()?;
+        let solution = inverse * right;
+        let larger = [1, 2, 3].map(|a| (inverse[(a, a)] * gram[(0, 0)]).re);
+        let usable = larger.iter().all(|l| *l > 0.0 && *l < MOST);
+        usable.then(|| Local {
+            envelopes: [1, 2, 3].map(|a| solution[a]),
+            noise: larger.map(|l| l * window.noise[at[n]]),
+        })
+    };
+    (0..at.len()).map(solve).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Three waves on a background, cut off by an edge: the envelopes beside the edge are theirs all the same.
+    #[test]
+    fn an_edge_does_not_mix_the_waves() {
+        let pair = Matrix2::new(0.4, 0.2, 0.0, 0.35);
+        let waves = [[1.0, 0.0], [0.0, 1.0], [-1.0, 1.0]].map(|[h, k]| pair * Vector2::new(h, k));
+        let values = (0..100 * 120).map(|i| {
+            let at = Vector2::new((i % 120) as f64, (i / 120) as f64);
+            if at.x < 61.0 {
+                let of = |(i, q): (usize, &Vector2<f64>)| {
+                    (1.0 + i as f64) * (q.dot(&at) + i as f64).cos()
+                };
+                5.0 + waves.iter().enumerate().map(of).sum::<f64>()
+            } else {
+                f64::NAN
+            }
+        });
+        let image = Image::new(100, 120, values.collect());
+        let cells = Cells::new(&image, &pair, [1.0, 1.0]).unwrap();
+        let cell = 50 / cells.pixels[1] * cells.size[0] + 58 / cells.pixels[0];
+        let found = local(&cells, &image, &pair, 0.8, &[cell]);
+        let found = found[0].as_ref().unwrap();
+        for (i, c) in found.envelopes.iter().enumerate() {
+            let wanted = Complex64::from_polar(0.5 * (1.0 + i as f64), i as f64);
+            assert!((c - wanted).norm() < 1e-6, "{i}: {c} {wanted}");
+            assert!(found.noise[i] > 0.0);
+        }
+    }
+}
