@@ -4,6 +4,7 @@ pub(crate) mod axis;
 pub(crate) mod background;
 pub(crate) mod clip;
 pub(crate) mod geometry;
+pub(crate) mod glitches;
 pub(crate) mod image;
 pub(crate) mod lag;
 pub(crate) mod plane;

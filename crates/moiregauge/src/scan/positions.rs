@@ -16,6 +16,8 @@ use crate::scan::channel::image_of;
 /// A sensor whose span differs from the nominal size by more than this factor is not believed: open tubes are off by
 /// 1.3.
 const WILD_SPAN: f64 = 2.0;
+/// More samples than this share that are off deserve a word: one in a thousand is no stray one. Chosen by eye.
+const NOTABLE_GLITCHES: f64 = 1e-3;
 /// A lag that changes the fast step by more than this share deserves a word: a hundredth of the calibration that is
 /// assumed.
 const NOTABLE_LAG: f64 = 1e-4;
@@ -28,6 +30,13 @@ pub(crate) fn nominal(scan: &Scan, channel: &Channel) -> Option<Geometry> {
         scan.rotation_rad,
         Vector2::from(scan.offset_nm),
     )
+}
+
+/// Relative standard errors of the nominal pitch along the fast and the slow axis, where the format does not say whether
+/// its size spans N pixels or N − 1: either may be, so that it is off by none or by 1/N.
+pub(crate) fn pitch_sigma(scan: &Scan, channel: &Channel) -> Option<[f64; 2]> {
+    let of = |count: usize| 1.0 / (std::f64::consts::SQRT_2 * count as f64);
+    (!scan.size_is_defined()).then(|| [of(channel.columns), of(channel.rows)])
 }
 
 /// The sensors of this line direction as images in nm; `None` where they are absent or levelled.
@@ -132,8 +141,31 @@ pub(crate) fn usable_sensors(
     if sensors.geometry.pixel_to_nm.determinant() < 0.0 {
         caveats.push(Caveat::new(PositionDoubt::SensorsMirrored, file));
     }
+    about_glitches(file, channel, &sensors, caveats);
     about_lag(file, scan, channel, &sensors, caveats);
     Some(sensors)
+}
+
+/// Says how many samples were left out, where it is more than a stray one.
+fn about_glitches(
+    file: &str,
+    channel: &Channel,
+    sensors: &SensorGeometry,
+    caveats: &mut Vec<Caveat>,
+) {
+    let dropped: usize = sensors.glitches.iter().sum();
+    let samples = 2 * channel.columns * channel.rows;
+    if dropped as f64 > NOTABLE_GLITCHES * samples as f64 {
+        let line = channel.line_direction.unwrap_or(LineDirection::Trace);
+        caveats.push(Caveat::new(
+            PositionDoubt::SensorGlitches {
+                line,
+                dropped,
+                samples,
+            },
+            file,
+        ));
+    }
 }
 
 /// Says where the lines of a sensor bend as those of one that lags behind the tip.
