@@ -86,6 +86,28 @@ fn lags_with_overscan_are_no_bias() {
     assert!(squares < 2.8, "{squares}");
 }
 
+/// Lags of a tenth to a quarter of a line, which no single line shows: seen from trace against retrace, with their time constant.
+#[test]
+fn slow_lags_are_seen_from_trace_against_retrace() {
+    for (lag, seed) in [(8.0, 21), (12.0, 22), (16.0, 23)] {
+        let set = set(&format!("lag:time={lag}"), seed);
+        let scans = measured(&set, |scan| scan);
+        let messages: Vec<String> = told(&scans, "sensor-lag").map(Caveat::message).collect();
+        assert_eq!(messages.len(), 8, "{lag}: {messages:?}");
+        for words in messages {
+            let constant = words.split("a time constant of ").nth(1).unwrap();
+            let constant: f64 = constant.split(' ').next().unwrap().parse().unwrap();
+            assert!((constant / lag - 1.0).abs() < 0.1, "{lag}: {words}");
+        }
+        let analysis = analyse(scans, &settings());
+        let (pull, sigma) = pull(&set, &analysis);
+        assert!(
+            pull.abs() < 4.0 && sigma < 0.02,
+            "{lag} ms: {pull} of {sigma}"
+        );
+    }
+}
+
 /// The same frames without sensors, as a file whose size may span N pixels or N − 1: the doubt is a row of the budget, and
 /// covers both. With sensors, and in formats that define their size, there is none.
 #[test]

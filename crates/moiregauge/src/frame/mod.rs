@@ -7,6 +7,7 @@ pub(crate) mod geometry;
 pub(crate) mod glitches;
 pub(crate) mod image;
 pub(crate) mod lag;
+pub(crate) mod loops;
 pub(crate) mod plane;
 pub(crate) mod resample;
 pub(crate) mod sensors;

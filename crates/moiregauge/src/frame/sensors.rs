@@ -41,12 +41,35 @@ pub struct SensorGeometry {
 ///
 /// `None` where the sensors do not span an area: constant, all missing, or moving along one line.
 pub fn from_sensors(x: &Image, y: &Image) -> Option<SensorGeometry> {
+    fitted(x, y, None)
+}
+
+/// The same for sensors from which these lags were taken off already.
+pub(crate) fn freed_of_lags(
+    x: &Image,
+    y: &Image,
+    lags: [Option<Lag>; 2],
+) -> Option<SensorGeometry> {
+    fitted(x, y, Some(lags))
+}
+
+fn fitted(x: &Image, y: &Image, taken_off: Option<[Option<Lag>; 2]>) -> Option<SensorGeometry> {
     let (rows, columns) = (x.rows, x.columns);
     if (y.rows, y.columns) != (rows, columns) {
         return None;
     }
     let (sensors, glitches) = without_glitches(x, y);
-    let (sensors, lags, used) = without_lags(&sensors[0], &sensors[1])?;
+    let (sensors, lags, used) = match taken_off {
+        Some(lags) => {
+            let used = straight_columns(&sensors[0], &sensors[1])?;
+            (
+                sensors.each_ref().map(|s| Cow::Borrowed(s.as_ref())),
+                lags,
+                used,
+            )
+        }
+        None => without_lags(&sensors[0], &sensors[1])?,
+    };
     let [x, y] = [sensors[0].as_ref(), sensors[1].as_ref()];
     let planes = [fit_plane(x, used.clone())?, fit_plane(y, used.clone())?];
     let pixel_to_nm = Matrix2::new(
