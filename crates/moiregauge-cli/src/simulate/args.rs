@@ -161,8 +161,8 @@ enum First {
 }
 
 impl SimulateArgs {
-    /// The configuration file, if any, and the options on top.
-    pub(super) fn settings(&self) -> anyhow::Result<Simulation> {
+    /// The configuration file, if any, with the classes of the sample, and what is drawn.
+    fn drawn(&self) -> anyhow::Result<Simulation> {
         let mut set = match &self.config {
             Some(path) => {
                 let text = moiregauge_pipeline::read_text(path)
@@ -181,6 +181,12 @@ impl SimulateArgs {
             let seed = self.seed.unwrap_or(set.seed);
             vary(&mut set, seed);
         }
+        Ok(set)
+    }
+
+    /// The configuration file, if any, what is drawn, and the options on top.
+    pub(super) fn settings(&self) -> anyhow::Result<Simulation> {
+        let mut set = self.drawn()?;
         let pair = |values: &[f64]| [values[0], values[1]];
         let change = |value: Option<f64>, setting: &mut f64| {
             if let Some(value) = value {

@@ -83,19 +83,8 @@ fn fitted(x: &Image, y: &Image, taken_off: Option<[Option<Lag>; 2]>) -> Option<S
         return None;
     }
     let (ef, es) = (pixel_to_nm.column(0) / fast, pixel_to_nm.column(1) / slow);
-    let line_slopes: Vec<Vector2<f64>> = (0..rows)
-        .filter_map(|row| {
-            let slope = |image: &Image| slope(used.clone().map(|c| (c, image.row(row)[c])));
-            Some(Vector2::new(slope(x)?, slope(y)?))
-        })
-        .collect();
-    let column_slopes: Vec<Vector2<f64>> = used
-        .clone()
-        .filter_map(|c| {
-            let slope = |image: &Image| slope((0..rows).map(|row| (row, image.row(row)[c])));
-            Some(Vector2::new(slope(x)?, slope(y)?))
-        })
-        .collect();
+    let line_slopes = line_slopes([x, y], &used);
+    let column_slopes = column_slopes([x, y], &used);
     let mut covariance = covariance(&line_slopes, [x, y], &planes, &used);
     for (axis, lag) in lags.iter().enumerate() {
         covariance[(axis, axis)] += lag.map_or(0.0, |lag| lag.slope_variance);
@@ -115,6 +104,24 @@ fn fitted(x: &Image, y: &Image, taken_off: Option<[Option<Lag>; 2]>) -> Option<S
         fast_steps: line_slopes.iter().map(|s| s.dot(&ef)).collect(),
         slow_steps: column_slopes.iter().map(|s| s.dot(&es)).collect(),
     })
+}
+
+/// Step from column to column of each line, nm.
+fn line_slopes([x, y]: [&Image; 2], used: &std::ops::Range<usize>) -> Vec<Vector2<f64>> {
+    let of = |row: usize| {
+        let slope = |image: &Image| slope(used.clone().map(|c| (c, image.row(row)[c])));
+        Some(Vector2::new(slope(x)?, slope(y)?))
+    };
+    (0..x.rows).filter_map(of).collect()
+}
+
+/// Step from row to row of each column, nm.
+fn column_slopes([x, y]: [&Image; 2], used: &std::ops::Range<usize>) -> Vec<Vector2<f64>> {
+    let of = |c: usize| {
+        let slope = |image: &Image| slope((0..x.rows).map(|row| (row, image.row(row)[c])));
+        Some(Vector2::new(slope(x)?, slope(y)?))
+    };
+    used.clone().filter_map(of).collect()
 }
 
 /// Both sensors without the samples that are far off, and how many those are.
