@@ -16,7 +16,7 @@ use crate::frame::plane::fit_plane;
 use crate::numbers::median::median;
 
 /// Fewer columns show nothing: the decay takes a tenth of a line, which would be three of them.
-const FEWEST: usize = 32;
+pub(crate) const FEWEST: usize = 32;
 /// The bend decays within this part of a line; a slower one is not told from creep and hysteresis.
 pub(crate) const SLOWEST: f64 = 0.1;
 /// Of what the polynomial leaves of the mean line, the exponential explains at least this share: more than half is

@@ -15,7 +15,7 @@ use nalgebra::{DMatrix, DVector, Vector2};
 use spmfile::LineDirection;
 
 use crate::frame::image::Image;
-use crate::frame::lag::{FIRST_ORDER_TO, IMPROVEMENT, Lag, SHARE, SLOWEST, slope};
+use crate::frame::lag::{FEWEST, FIRST_ORDER_TO, IMPROVEMENT, Lag, SHARE, SLOWEST, slope};
 use crate::frame::plane::fit_plane;
 use crate::numbers::median::median;
 
@@ -55,6 +55,10 @@ pub(crate) struct SlowLag {
 /// Looks for a slow lag in the x and y sensors of trace and retrace, of the same shape.
 pub(crate) fn find(trace: [&Image; 2], retrace: [&Image; 2], half: HalfLine) -> Option<SlowLag> {
     let count = trace[0].columns;
+    let same = |image: &Image| image.rows == trace[0].rows && image.columns == count;
+    if count < FEWEST || !trace.into_iter().chain(retrace).all(same) || !has_loop(trace, retrace)? {
+        return None;
+    }
     let mean_step = |axis: usize| {
         let step = |image: &Image| Some(fit_plane(image, 0..count)?.per_column);
         Some(f64::midpoint(step(trace[axis])?, step(retrace[axis])?))
@@ -222,25 +226,49 @@ fn flattening(columns: f64, count: usize, half: HalfLine) -> f64 {
     }))
 }
 
+/// Whether trace and retrace lie apart in the middle of the line, more than at its ends, as far as the fastest lag makes
+/// them: three columns tell it of nearly all sensors.
+fn has_loop(trace: [&Image; 2], retrace: [&Image; 2]) -> Option<bool> {
+    let last = trace[0].columns.checked_sub(1)?;
+    let travel = |axis: usize| {
+        let image = trace[axis];
+        let across = |row: usize| image.row(row)[last] - image.row(row)[0];
+        let mut values: Vec<f64> = (0..image.rows)
+            .map(across)
+            .filter(|v| v.is_finite())
+            .collect();
+        median(&mut values)
+    };
+    let travel = Vector2::new(travel(0), travel(1));
+    let along = travel.normalize();
+    let apart = |column: usize| apart(trace, retrace, along, column);
+    let height = apart(last / 2)? - f64::midpoint(apart(0)?, apart(last)?);
+    Some(height.abs() > FASTEST * SLOWEST * travel.norm() / 2.0)
+}
+
+/// Trace minus retrace along a direction, the median of a column, nm.
+fn apart(
+    trace: [&Image; 2],
+    retrace: [&Image; 2],
+    along: Vector2<f64>,
+    column: usize,
+) -> Option<f64> {
+    let rows = trace[0].rows.min(retrace[0].rows);
+    let difference = |row: usize| {
+        let of = |axis: usize| trace[axis].row(row)[column] - retrace[axis].row(row)[column];
+        along.x * of(0) + along.y * of(1)
+    };
+    let lines = (0..rows).step_by(1 + rows / MOST_ROWS);
+    let mut values: Vec<f64> = lines.map(difference).filter(|v| v.is_finite()).collect();
+    (!values.is_empty()).then(|| median(&mut values))
+}
+
 /// Trace minus retrace along the fast direction, the median of each column, nm.
 fn lens(trace: [&Image; 2], retrace: [&Image; 2], along: Vector2<f64>) -> Option<DVector<f64>> {
-    let [rows, count] = [trace[0].rows, trace[0].columns];
-    let same = |image: &Image| image.rows == rows && image.columns == count;
-    if count < 32 || !retrace.into_iter().all(same) {
-        return None;
-    }
+    let count = trace[0].columns;
     let mut lens = DVector::zeros(count);
     for column in 0..count {
-        let difference = |row: usize| {
-            let of = |axis: usize| trace[axis].row(row)[column] - retrace[axis].row(row)[column];
-            along.x * of(0) + along.y * of(1)
-        };
-        let lines = (0..rows).step_by(1 + rows / MOST_ROWS);
-        let mut values: Vec<f64> = lines.map(difference).filter(|v| v.is_finite()).collect();
-        if values.is_empty() {
-            return None;
-        }
-        lens[column] = median(&mut values);
+        lens[column] = apart(trace, retrace, along, column)?;
     }
     Some(lens)
 }
