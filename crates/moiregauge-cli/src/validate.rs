@@ -5,6 +5,7 @@ mod conditions;
 mod like;
 mod output;
 mod run;
+mod samples;
 
 pub(crate) use conditions::given_conditions;
 pub(crate) use run::{ValidateArgs, run};

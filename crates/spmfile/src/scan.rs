@@ -196,6 +196,27 @@ impl Samples {
     }
 }
 
+/// Formats that do not say whether their size spans N pixels or N − 1: see FORMATS.md.
+const SIZE_TAKEN_AS: [&str; 8] = [
+    "NanoScope",
+    "Nanonis",
+    "Nanosurf",
+    "Park",
+    "WSxM",
+    "Agilent",
+    "ISO 28632",
+    "Omicron Matrix",
+];
+
+impl Scan {
+    /// Whether the format defines what its size spans. Otherwise the pitch of the pixels may be off by 1/N of N pixels.
+    pub fn size_is_defined(&self) -> bool {
+        !SIZE_TAKEN_AS
+            .iter()
+            .any(|format| self.format.starts_with(format))
+    }
+}
+
 impl Channel {
     /// All values in [`Channel::unit`], row by row from the bottom line; missing ones are NaN.
     pub fn values(&self) -> Vec<f64> {

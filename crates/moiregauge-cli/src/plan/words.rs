@@ -134,6 +134,7 @@ fn source(source: Source) -> &'static str {
         Source::Gain => "calibration: gain",
         Source::Mismatch => "calibration: mismatch of x and y",
         Source::Orthogonality => "calibration: orthogonality",
+        Source::Pitch => "pitch of the pixels",
         Source::LatticeConstant => "lattice constant",
         Source::StrainedLayer => "which layer is strained",
         Source::IsotropicStrain => "isotropic strain",
@@ -229,6 +230,7 @@ fn remedy(source: Source) -> &'static str {
         Source::Gain | Source::Mismatch | Source::Orthogonality => {
             "`moiregauge calibrate` on a known lattice does"
         }
+        Source::Pitch => "recording the position sensors does",
         Source::LatticeConstant => "a better known lattice constant does",
         Source::IsotropicStrain => "the orientation of one of the layers does",
         Source::PoissonRatio => "a better known Poisson ratio does",

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::Context as _;
 use heterostrain::material::Material;
-use moiregauge::simulate::{FirstDirection, MOST_PIXELS, Pattern, Simulation};
+use moiregauge::simulate::{FirstDirection, MOST_PIXELS, Pattern, SampleFeature, Simulation, vary};
 
 use crate::config::named_layers;
 use crate::numbers;
@@ -25,6 +25,9 @@ Examples:
   moiregauge simulate --out sim --name fast --scans 6 --slow x --rate 4 --drift -0.3 0.6
   moiregauge simulate --out sim --layers graphene/hBN --twist 0.8 --biaxial 0.1
   moiregauge simulate --out sim --name atoms --atoms 1 --size 5 5 --scans 2 --pixels 256
+  moiregauge simulate --out sim --name torn --sample edge:share=0.6,angle=30 --sample hole:share=0.1
+  moiregauge simulate --out sim --name g7 --sample grains --vary --seed 7
+  moiregauge simulate --list-samples                   the classes of samples and their numbers
   moiregauge simulate --print-config > set.toml        every setting, to be edited
   moiregauge simulate --out sim --config set.toml --seed 7
 
@@ -32,7 +35,7 @@ Angles are counter-clockwise. The strain axis is counted from the reciprocal vec
 whose orientation is the lattice angle; in the laboratory it lies at the sum of both and the twist.")]
 pub(crate) struct SimulateArgs {
     /// Folder for the sets; made if it does not exist
-    #[arg(long, value_name = "DIR", required_unless_present = "print_config")]
+    #[arg(long, value_name = "DIR", required_unless_present_any = ["print_config", "list_samples"])]
     pub(super) out: Option<PathBuf>,
     /// Settings from a TOML file; options on the command line come on top of it
     #[arg(long, value_name = "FILE")]
@@ -40,11 +43,22 @@ pub(crate) struct SimulateArgs {
     /// Print all settings as TOML and write nothing
     #[arg(long)]
     pub(super) print_config: bool,
+    /// What the sample has besides a perfect lattice: edge, hole, bump, island, grains, twist-wave, walls, atoms,
+    /// glitches … with numbers as in edge:share=0.6,angle=30; several at once with + or by giving the option again
+    #[arg(long, value_name = "CLASS[:KEY=VALUE,…]", value_parser = parse_sample)]
+    sample: Vec<SampleGiven>,
+    /// List the classes for --sample with their numbers and write nothing
+    #[arg(long)]
+    pub(super) list_samples: bool,
+    /// Draw twist, strain, orientation, drift, noise, size and the numbers that --sample leaves open, by --seed;
+    /// other options come on top of it
+    #[arg(long)]
+    vary: bool,
     /// Write over files of the same names
     #[arg(long)]
     pub(super) force: bool,
     /// Write the three sets of arXiv 2406.08681; of the other options only --seed counts
-    #[arg(long, conflicts_with_all = ["config", "print_config"])]
+    #[arg(long, conflicts_with_all = ["config", "print_config", "sample", "vary"])]
     pub(super) paper: bool,
     /// Name of the set and of its folder
     #[arg(long)]
@@ -126,6 +140,10 @@ pub(crate) struct SimulateArgs {
     no_retrace: bool,
 }
 
+/// Classes with their numbers.
+#[derive(Clone, Debug)]
+struct SampleGiven(Vec<SampleFeature>);
+
 /// Samples in a line, lines in a frame.
 #[derive(Clone, Copy, Debug)]
 struct Pixels([usize; 2]);
@@ -143,8 +161,8 @@ enum First {
 }
 
 impl SimulateArgs {
-    /// The configuration file, if any, and the options on top.
-    pub(super) fn settings(&self) -> anyhow::Result<Simulation> {
+    /// The configuration file, if any, with the classes of the sample, and what is drawn.
+    fn drawn(&self) -> anyhow::Result<Simulation> {
         let mut set = match &self.config {
             Some(path) => {
                 let text = moiregauge_pipeline::read_text(path)
@@ -153,6 +171,22 @@ impl SimulateArgs {
             }
             None => Simulation::default(),
         };
+        for SampleGiven(features) in &self.sample {
+            set.features.extend(features.iter().cloned());
+        }
+        if let Some(Pixels(pixels)) = self.pixels {
+            set.raster.pixels = pixels;
+        }
+        if self.vary {
+            let seed = self.seed.unwrap_or(set.seed);
+            vary(&mut set, seed);
+        }
+        Ok(set)
+    }
+
+    /// The configuration file, if any, what is drawn, and the options on top.
+    pub(super) fn settings(&self) -> anyhow::Result<Simulation> {
+        let mut set = self.drawn()?;
         let pair = |values: &[f64]| [values[0], values[1]];
         let change = |value: Option<f64>, setting: &mut f64| {
             if let Some(value) = value {
@@ -179,9 +213,6 @@ impl SimulateArgs {
         }
         if let Some(scans) = self.scans {
             set.raster.scans = scans;
-        }
-        if let Some(Pixels(pixels)) = self.pixels {
-            set.raster.pixels = pixels;
         }
         if let Some(slow) = self.slow {
             set.raster.rotation_deg = match slow {
@@ -221,6 +252,12 @@ impl SimulateArgs {
         set.raster.retrace &= !self.no_retrace;
         Ok(set)
     }
+}
+
+fn parse_sample(text: &str) -> Result<SampleGiven, String> {
+    SampleFeature::parse(text)
+        .map(SampleGiven)
+        .map_err(|error| error.to_string())
 }
 
 fn parse_pixels(text: &str) -> Result<Pixels, String> {

@@ -1,11 +1,12 @@
 //! The run: settings → sets of scans, written.
 
+use std::fmt::Write as _;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::{Context as _, bail, ensure};
-use moiregauge::simulate::{Simulation, Simulator};
+use moiregauge::simulate::{CLASSES, Simulation, Simulator};
 use moiregauge_pipeline::sink::{FolderSink, Manifest, Target};
 
 use super::args::SimulateArgs;
@@ -16,6 +17,10 @@ pub(crate) fn run(args: &SimulateArgs) -> anyhow::Result<ExitCode> {
     let mut out = std::io::stdout().lock();
     if args.print_config {
         write!(out, "{}", toml::to_string(&args.settings()?)?)?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    if args.list_samples {
+        write!(out, "{}", list_of_samples())?;
         return Ok(ExitCode::SUCCESS);
     }
     let Some(folder) = &args.out else {
@@ -39,6 +44,22 @@ pub(crate) fn run(args: &SimulateArgs) -> anyhow::Result<ExitCode> {
         )?;
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// The classes and their numbers, with the usual values.
+fn list_of_samples() -> String {
+    let mut text = String::from(
+        "Classes for --sample, with the usual values of their numbers. Heights and amplitudes are in degrees of phase\n\
+         (the moiré has an amplitude of 1°), shares are of the frame, angles counter-clockwise.\n",
+    );
+    for class in &CLASSES {
+        let _ = writeln!(text, "\n{:16} {}", class.name, class.what);
+        for key in class.keys {
+            let value = format!("{}={}", key.name, key.usual);
+            let _ = writeln!(text, "  {value:18} {}", key.what);
+        }
+    }
+    text
 }
 
 /// The three sets of arXiv 2406.08681 on one sample, one after the other: slow y at 8 Hz, slow x at

@@ -54,6 +54,7 @@ pub(super) fn conditions(paths: &[PathBuf]) -> anyhow::Result<Simulation> {
         raster: raster(set, &scans, &lines)?,
         window: window(set),
         noise: noise(&lines)?,
+        features: Vec::new(),
     })
 }
 

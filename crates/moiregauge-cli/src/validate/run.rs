@@ -12,6 +12,7 @@ use rayon::prelude::*;
 use super::compare::{Comparison, compare};
 use super::conditions::given_conditions;
 use super::output::{self, Validation};
+use super::samples::{self, Tally};
 use crate::analyze::MethodArg;
 use crate::numbers;
 use crate::outputs;
@@ -30,6 +31,8 @@ Examples:
   moiregauge validate
   moiregauge validate --like scans/*.spm --sets 500 --out validation
   moiregauge validate --method autocorrelation --sets 1000
+  moiregauge validate --sample edge --sample hole:share=0.3 --sets 50
+  moiregauge validate --sample all --sets 20 --pixels 192
   moiregauge simulate --print-config > mine.toml     (put in your size, rate, noise …)
   moiregauge validate --config mine.toml")]
 pub(crate) struct ValidateArgs {
@@ -45,6 +48,10 @@ pub(crate) struct ValidateArgs {
     /// Conditions: those of your own scans of one set (size, rate, contrast, noise, drift, lattice)
     #[arg(long, value_name = "FILE", num_args = 1.., conflicts_with = "config")]
     like: Vec<PathBuf>,
+    /// In place of the table, sets of real samples, as in `moiregauge simulate --sample CLASS --vary`: how many are
+    /// answered, refused, wrong; all for one of each class; may be repeated
+    #[arg(long, value_name = "CLASS[:KEY=VALUE,…]", conflicts_with = "like")]
+    sample: Vec<String>,
     /// Side of the frames, pixels, where no file gives it; small frames are quick
     #[arg(long, default_value_t = 128, value_name = "N", value_parser = numbers::count(2, MOST_PIXELS))]
     pixels: usize,
@@ -67,6 +74,9 @@ pub(crate) struct ValidateArgs {
 
 /// Runs the validation.
 pub(crate) fn run(args: &ValidateArgs) -> anyhow::Result<ExitCode> {
+    if !args.sample.is_empty() {
+        return run_samples(args);
+    }
     let names = output::NAMES.map(str::to_owned);
     let folder = |out| {
         outputs::folder(&Target {
@@ -107,6 +117,52 @@ pub(crate) fn run(args: &ValidateArgs) -> anyhow::Result<ExitCode> {
     }
     Ok(ExitCode::SUCCESS)
 }
+
+/// The table of real samples.
+fn run_samples(args: &ValidateArgs) -> anyhow::Result<ExitCode> {
+    let names = [SAMPLES.to_owned()];
+    let folder = |out| {
+        outputs::folder(&Target {
+            folder: out,
+            kind: "validate",
+            names: &names,
+            inputs: &[],
+            force: args.force,
+        })
+    };
+    let sink = args.out.as_deref().map(folder).transpose()?;
+    let base = conditions(args)?;
+    let given = samples::samples_of(&args.sample)?;
+    let count = args.sets as usize;
+    let progress = bar("validating", "sets", given.len() * count, !args.quiet);
+    let method = Method::from(args.method);
+    let outcomes = (0..given.len() * count).into_par_iter().map(|index| {
+        let seed = args.seed + (index % count) as u64;
+        let outcome = samples::outcome(&base, &given[index / count], method, seed);
+        progress.inc(1);
+        outcome
+    });
+    let outcomes: Vec<samples::Outcome> = outcomes.collect::<anyhow::Result<_>>()?;
+    progress.finish_and_clear();
+    let tallies: Vec<Tally> = given
+        .iter()
+        .zip(outcomes.chunks(count))
+        .map(|(sample, outcomes)| Tally {
+            sample: sample.clone(),
+            outcomes: outcomes.to_vec(),
+        })
+        .collect();
+    say(&samples::table(&tallies))?;
+    if let (Some(out), Some(sink)) = (&args.out, sink) {
+        sink.write(SAMPLES, samples::rows(&tallies).as_bytes())?;
+        outputs::commit(sink)?;
+        say(&format!("Written to {}\n", out.join(SAMPLES).display()))?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Every set of real samples.
+const SAMPLES: &str = "samples.csv";
 
 fn conditions(args: &ValidateArgs) -> anyhow::Result<Simulation> {
     if let Some(given) = given_conditions(args.config.as_deref(), &args.like)? {

@@ -103,3 +103,89 @@ fn like_finds_the_conditions_of_scans() {
     near("/sample/sharpness", 0.3, 0.05);
     near("/drift/velocity_nm_per_min/0", 0.5, 0.1);
 }
+
+/// Real samples: one line for each class, the same on any number of threads, and every set can be made again.
+#[test]
+fn real_samples_are_counted_class_by_class() {
+    let folder = tempfile::tempdir().unwrap();
+    let validate = |name: &str, threads: &str| {
+        let out = folder.path().join(name);
+        let run = succeed(
+            program()
+                .args(["validate", "--sets", "3", "--pixels", "96", "--quiet"])
+                .args(["--sample", "scars:count=3", "--sample", "bare", "--out"])
+                .arg(&out)
+                .env("RAYON_NUM_THREADS", threads),
+        );
+        (
+            run.stdout,
+            std::fs::read_to_string(out.join("samples.csv")).unwrap(),
+        )
+    };
+    let (shown, rows) = validate("a", "1");
+    assert_eq!(validate("b", "2").1, rows);
+    let words = |start: &str| -> Vec<String> {
+        let line = shown
+            .lines()
+            .find(|line| line.starts_with(start))
+            .expect(start);
+        line.split_whitespace().map(str::to_owned).collect()
+    };
+    assert_eq!(words("scars:count=3")[1..5], ["3", "3", "0", "0"]);
+    assert_eq!(words("bare")[1..5], ["3", "0", "3", "0"]);
+    let seeds: Vec<&str> = rows
+        .lines()
+        .filter_map(|row| row.split(',').nth(1))
+        .collect();
+    assert_eq!(seeds, ["seed", "1", "2", "3", "1", "2", "3"]);
+
+    let refused = run(program().args(["validate", "--sample", "edges"]));
+    assert_eq!(refused.code, Some(1));
+    assert!(
+        refused.stderr.contains("one of clean, edge"),
+        "{}",
+        refused.stderr
+    );
+}
+
+/// Samples go through a settings file, as do the numbers that were drawn.
+#[test]
+fn drawn_samples_can_be_printed_and_made_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let sample = [
+        "--sample",
+        "edge:share=0.6+glitches",
+        "--vary",
+        "--seed",
+        "9",
+    ];
+    let config = folder.path().join("set.toml");
+    let printed = succeed(program().args(["simulate", "--print-config"]).args(sample));
+    assert!(
+        printed.stdout.contains("[[features]]"),
+        "{}",
+        printed.stdout
+    );
+    std::fs::write(&config, &printed.stdout).unwrap();
+    let small = ["--pixels", "32", "--scans", "1"];
+    let made = |name: &str, arguments: &[&str]| {
+        let folder = simulate(&folder.path().join(name), &[&small[..], arguments].concat());
+        let scan = std::fs::read(folder.join("scan.000.spm")).unwrap();
+        (scan, json(&folder.join("truth.json")))
+    };
+    let (scan, truth) = made("a", &sample);
+    let (again, same) = made("b", &["--config", config.to_str().unwrap()]);
+    assert_eq!(truth["settings"]["features"], same["settings"]["features"]);
+    assert_eq!(scan, again);
+    let share = number(&truth, "/sample/share_covered");
+    assert!((share - 0.6).abs() < 0.05, "{share}");
+    let refused = run(program().args(["simulate", "--out", "x", "--sample", "edge:share=2"]));
+    assert_eq!(refused.code, Some(2));
+    assert!(
+        refused.stderr.contains("0.02 to 0.98"),
+        "{}",
+        refused.stderr
+    );
+    let listed = succeed(program().args(["simulate", "--list-samples"]));
+    assert!(listed.stdout.contains("twist-wave") && listed.stdout.contains("share=0.5"));
+}

@@ -25,7 +25,7 @@ const RIGHT: f64 = 12.0;
 const DECADES: f64 = 5.0;
 
 /// Rows from top to bottom: name, and the sources that it sums.
-const ROWS: [(&str, Kind, &[Source]); 12] = [
+const ROWS: [(&str, Kind, &[Source]); 13] = [
     ("image noise", Kind::Statistical, &[Source::Image]),
     ("drift", Kind::Statistical, &[Source::Drift]),
     ("sensor noise", Kind::Statistical, &[Source::Sensor]),
@@ -44,6 +44,11 @@ const ROWS: [(&str, Kind, &[Source]); 12] = [
         "calibration: right angle",
         Kind::Calibration,
         &[Source::Orthogonality],
+    ),
+    (
+        "pitch: N or N − 1 pixels",
+        Kind::Calibration,
+        &[Source::Pitch],
     ),
     ("lattice constant", Kind::Model, &[Source::LatticeConstant]),
     (
@@ -82,7 +87,8 @@ impl Kind {
 pub(super) fn draw(analysis: &Analysis, id: &str) -> Result<Drawing, String> {
     let (budget, of) = shown(analysis).ok_or("no set has a common lattice")?;
     let top = layout::LEGEND + layout::ABOVE;
-    let height = ROWS.len() as f64 * ROW;
+    let rows = rows(budget);
+    let height = rows.len() as f64 * ROW;
     let mut svg = Svg::new(id, PAGE, top + height + layout::BELOW);
     let width = (PAGE - NAMES - 3.0 * RIGHT) / 2.0;
     let panel = |i: f64| Rect::new(NAMES + i * (width + 2.0 * RIGHT), top, width, height);
@@ -103,7 +109,7 @@ pub(super) fn draw(analysis: &Analysis, id: &str) -> Result<Drawing, String> {
         ("b", "σ of the heterostrain (%)"),
         strain,
     )?;
-    for (row, (name, kind, _)) in ROWS.iter().enumerate() {
+    for (row, (name, kind, _)) in rows.iter().enumerate() {
         let at = (NAMES - 5.0, middle(top, row) + 0.36 * SMALL);
         let text = Lettering {
             bold: *kind == Kind::Sum,
@@ -157,6 +163,16 @@ fn shown(analysis: &Analysis) -> Option<(&Budget, String)> {
     of_mean(true).or_else(|| of_mean(false))
 }
 
+/// A row: its name, and the sources that it sums.
+type Row = (&'static str, Kind, &'static [Source]);
+
+/// All rows, that of the pitch only where it is in doubt.
+fn rows(budget: &Budget) -> Vec<Row> {
+    let doubtful = budget.pitch.norm() > 0.0;
+    let shown = |sources: &[Source]| doubtful || sources != [Source::Pitch];
+    ROWS.into_iter().filter(|row| shown(row.2)).collect()
+}
+
 fn middle(top: f64, row: usize) -> f64 {
     top + (row as f64 + 0.5) * ROW
 }
@@ -168,13 +184,15 @@ fn bars(
     (letter, title): (&str, &str),
     sigma: impl Fn(&Contribution) -> f64,
 ) -> Result<(), String> {
-    let values = ROWS.map(|(_, _, sources)| {
+    let rows = rows(budget);
+    let found = rows.iter().map(|(_, _, sources)| {
         let missing = !budget.drift_known() && sources.contains(&Source::Drift);
         let known = budget.sum(|s| sources.contains(&s) && !(missing && s == Source::Drift));
         // A sum without its drift is drawn, with a mark; the drift itself is not.
         let nothing = missing && sources.len() == 1;
         (if nothing { f64::NAN } else { sigma(&known) }, missing)
     });
+    let values: Vec<(f64, bool)> = found.collect();
     let largest = values.iter().map(|v| v.0).filter(|v| v.is_finite());
     let largest = largest.fold(0.0, f64::max);
     if largest <= 0.0 {
@@ -184,7 +202,7 @@ fn bars(
     let smallest = smallest.fold(largest, f64::min);
     let high = largest.log10().ceil();
     let low = (smallest.log10() - 0.2).floor().max(high - DECADES);
-    let words = values.map(|(value, incomplete)| number(value, incomplete));
+    let words: Vec<String> = values.iter().map(|v| number(v.0, v.1)).collect();
     // Every bar leaves space for the number at its end.
     let spans = values.iter().zip(&words).filter(|(v, _)| v.0 > 0.0);
     let reach = spans.map(|(v, text)| {
@@ -204,9 +222,9 @@ fn bars(
         svg.text(at, &power(decade), &lettering(SMALL, Anchor::Middle));
         decade += 1.0;
     }
-    for (row, ((_, kind, _), (value, _))) in ROWS.iter().zip(values).enumerate() {
+    for (row, ((_, kind, _), (value, _))) in rows.iter().zip(&values).enumerate() {
         let y = middle(area.y, row);
-        let shown = if value > 0.0 { value.log10() } else { low };
+        let shown = if *value > 0.0 { value.log10() } else { low };
         let end = scale.at(shown.max(low + 0.02));
         let bar = Rect::new(area.x, y - 0.32 * ROW, end - area.x, 0.64 * ROW);
         svg.rect(bar, &Ink::area(kind.colour(), 1.0));

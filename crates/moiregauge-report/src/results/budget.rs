@@ -27,6 +27,9 @@ pub struct BudgetColumn {
     pub calibration_mismatch: Option<f64>,
     /// Axes that do not stand at a right angle.
     pub calibration_orthogonality: Option<f64>,
+    /// Whether the nominal size spans N pixels or N − 1; left out where sensors or the format tell.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pitch_convention: Option<f64>,
     /// Lattice constant of the layers.
     pub lattice_constant: Option<f64>,
     /// Which layer is strained.
@@ -75,6 +78,7 @@ pub(crate) fn source_name(source: Source) -> &'static str {
         Source::Gain => "calibration_gain",
         Source::Mismatch => "calibration_mismatch",
         Source::Orthogonality => "calibration_orthogonality",
+        Source::Pitch => "pitch_convention",
         Source::LatticeConstant => "lattice_constant",
         Source::StrainedLayer => "strained_layer",
         Source::IsotropicStrain => "isotropic_strain",
@@ -95,6 +99,7 @@ impl BudgetColumn {
             calibration_gain: of(Source::Gain),
             calibration_mismatch: of(Source::Mismatch),
             calibration_orthogonality: of(Source::Orthogonality),
+            pitch_convention: of(Source::Pitch).filter(|_| budget.pitch.norm() > 0.0),
             lattice_constant: of(Source::LatticeConstant),
             strained_layer: of(Source::StrainedLayer),
             isotropic_strain: of(Source::IsotropicStrain),
@@ -112,6 +117,7 @@ impl BudgetColumn {
             Source::Gain => self.calibration_gain,
             Source::Mismatch => self.calibration_mismatch,
             Source::Orthogonality => self.calibration_orthogonality,
+            Source::Pitch => self.pitch_convention,
             Source::LatticeConstant => self.lattice_constant,
             Source::StrainedLayer => self.strained_layer,
             Source::IsotropicStrain => self.isotropic_strain,

@@ -58,7 +58,11 @@ impl<'a> Row<'a> for BudgetRow<'a> {
             .map(|c| ("all sets together", "drift_corrected", &c.budget));
         sets.chain(together)
             .flat_map(|(set, coordinates, budget)| {
-                let sources = Source::ALL.into_iter().map(Some).chain([None]);
+                let pitch = budget.twist_deg.pitch_convention.is_some();
+                let shown = Source::ALL
+                    .into_iter()
+                    .filter(move |s| pitch || *s != Source::Pitch);
+                let sources = shown.map(Some).chain([None]);
                 sources.map(move |source| Self {
                     set,
                     coordinates,

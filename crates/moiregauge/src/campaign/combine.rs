@@ -65,7 +65,9 @@ pub(crate) fn combine(
     let consistency = consistency(sets);
     caveats.extend(consistency.iter().filter_map(about_consistency));
     let twist_strain = moire(&lattice, settings)?;
-    let budget = Budget::new(&lattice, &twist_strain, &statistical, settings);
+    // Sets of one instrument have one convention: what it does does not average out.
+    let pitch = means.iter().map(|m| m.budget.pitch).sum::<Matrix2<f64>>() / means.len() as f64;
+    let budget = Budget::with_pitch(&lattice, &twist_strain, &statistical, &pitch, settings);
     let readings = Readings::new(&lattice, &twist_strain, &budget, strengths, settings);
     if sets.len() > 1 {
         let found = about_readings("analysis", &lattice, &twist_strain, &readings, settings);

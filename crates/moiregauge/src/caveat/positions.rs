@@ -87,6 +87,20 @@ pub enum PositionDoubt {
          follow the sensors"
     )]
     SensorsMirrored,
+    /// Samples of the sensors are far off and were left out.
+    #[error(
+        "in the {} {} of {samples} samples of the position sensors ({:.1} %) are far from their neighbours and were left \
+         out: more than eleven times the noise, and more than three pixels",
+        line_name(*.line), .dropped, 100.0 * *.dropped as f64 / *.samples as f64
+    )]
+    SensorGlitches {
+        /// Trace or retrace.
+        line: LineDirection,
+        /// How many.
+        dropped: usize,
+        /// Samples of both sensors.
+        samples: usize,
+    },
     /// The lines of a sensor bend as those of one that lags behind the tip.
     #[error(
         "in the {} the {} sensor lags behind the tip: its lines bend by {bend:.2} nm where they begin and are straight \
@@ -159,6 +173,10 @@ explain! { PositionDoubt:
          strain axis are then those of the mirror image."
         "Find out which sensor has the wrong sign, on a sample with known features, and correct it before signs or \
          axes are used."
+    SensorGlitches "sensor-glitches" Note
+        "Some samples of the position sensors are spikes: no tip jumps by many pixels for one sample. They were left out \
+         when the places of the pixels were fitted, and what is left is as good as that of sound sensors."
+        "Look at the cables and the converter of the sensors. Results need no repair."
     SensorLag "sensor-lag" Note
         "A position sensor follows the tip with a delay where the lines begin. The bend was taken off, and a part of what \
          that does stands in the errors."

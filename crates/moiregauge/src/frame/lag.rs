@@ -16,14 +16,14 @@ use crate::frame::plane::fit_plane;
 use crate::numbers::median::median;
 
 /// Fewer columns show nothing: the decay takes a tenth of a line, which would be three of them.
-const FEWEST: usize = 32;
+pub(crate) const FEWEST: usize = 32;
 /// The bend decays within this part of a line; a slower one is not told from creep and hysteresis.
-const SLOWEST: f64 = 0.1;
+pub(crate) const SLOWEST: f64 = 0.1;
 /// Of what the polynomial leaves of the mean line, the exponential explains at least this share: more than half is
 /// its own, ...
-const SHARE: f64 = 0.5;
+pub(crate) const SHARE: f64 = 0.5;
 /// ... and improves χ² by this much, in units of what it leaves: e⁻²⁵ by chance, the search for the decay included.
-const IMPROVEMENT: f64 = 50.0;
+pub(crate) const IMPROVEMENT: f64 = 50.0;
 /// A lag that explains whole lines leaves less than this many times the noise. Chosen by eye; see docs/constants.md.
 const EXCESS: f64 = 3.0;
 /// The same as a share of the bend, where there is no noise. Chosen by eye.
@@ -33,7 +33,7 @@ const STEPS: usize = 40;
 /// ... and its shortest one, columns: a shorter one bends a single pixel.
 const SHORTEST: f64 = 0.5;
 /// A sensor is of the first order no better than to this share of what the bend does to the slope. Chosen by eye.
-const FIRST_ORDER_TO: f64 = 0.03;
+pub(crate) const FIRST_ORDER_TO: f64 = 0.03;
 /// Lines that are looked at, at most about this many: their mean is then known to a 64th of the noise.
 const MOST_ROWS: usize = 4096;
 /// The degree of the polynomial, plus one: a cubic, for creep and hysteresis.
@@ -243,7 +243,7 @@ fn residual(design: &DMatrix<f64>, line: &DVector<f64>) -> Option<f64> {
 }
 
 /// Slope of the straight line through the values.
-fn slope(values: &DVector<f64>) -> f64 {
+pub(crate) fn slope(values: &DVector<f64>) -> f64 {
     let n = values.len() as f64;
     let from_middle = |c: usize| c as f64 - (n - 1.0) / 2.0;
     let sum: f64 = values

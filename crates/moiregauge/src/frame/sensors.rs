@@ -5,6 +5,7 @@ use std::borrow::Cow;
 use nalgebra::{Matrix2, Matrix4, Vector2};
 
 use crate::frame::geometry::Geometry;
+use crate::frame::glitches;
 use crate::frame::image::Image;
 use crate::frame::lag;
 use crate::frame::lag::Lag;
@@ -26,6 +27,8 @@ pub struct SensorGeometry {
     pub planes: [PlaneFit; 2],
     /// Columns that were used; those outside belong to the turn-around of the tip.
     pub columns: std::ops::Range<usize>,
+    /// Samples of the x sensor and of the y sensor that are far off and were left out.
+    pub glitches: [usize; 2],
     /// How the x sensor and the y sensor lag behind the tip, where their lines show it; planes and steps are free of it.
     pub lags: [Option<Lag>; 2],
     /// Step from column to column along the fast direction, one number per line, nm.
@@ -38,11 +41,35 @@ pub struct SensorGeometry {
 ///
 /// `None` where the sensors do not span an area: constant, all missing, or moving along one line.
 pub fn from_sensors(x: &Image, y: &Image) -> Option<SensorGeometry> {
+    fitted(x, y, None)
+}
+
+/// The same for sensors from which these lags were taken off already.
+pub(crate) fn freed_of_lags(
+    x: &Image,
+    y: &Image,
+    lags: [Option<Lag>; 2],
+) -> Option<SensorGeometry> {
+    fitted(x, y, Some(lags))
+}
+
+fn fitted(x: &Image, y: &Image, taken_off: Option<[Option<Lag>; 2]>) -> Option<SensorGeometry> {
     let (rows, columns) = (x.rows, x.columns);
     if (y.rows, y.columns) != (rows, columns) {
         return None;
     }
-    let (sensors, lags, used) = without_lags(x, y)?;
+    let (sensors, glitches) = without_glitches(x, y);
+    let (sensors, lags, used) = match taken_off {
+        Some(lags) => {
+            let used = straight_columns(&sensors[0], &sensors[1])?;
+            (
+                sensors.each_ref().map(|s| Cow::Borrowed(s.as_ref())),
+                lags,
+                used,
+            )
+        }
+        None => without_lags(&sensors[0], &sensors[1])?,
+    };
     let [x, y] = [sensors[0].as_ref(), sensors[1].as_ref()];
     let planes = [fit_plane(x, used.clone())?, fit_plane(y, used.clone())?];
     let pixel_to_nm = Matrix2::new(
@@ -56,19 +83,8 @@ pub fn from_sensors(x: &Image, y: &Image) -> Option<SensorGeometry> {
         return None;
     }
     let (ef, es) = (pixel_to_nm.column(0) / fast, pixel_to_nm.column(1) / slow);
-    let line_slopes: Vec<Vector2<f64>> = (0..rows)
-        .filter_map(|row| {
-            let slope = |image: &Image| slope(used.clone().map(|c| (c, image.row(row)[c])));
-            Some(Vector2::new(slope(x)?, slope(y)?))
-        })
-        .collect();
-    let column_slopes: Vec<Vector2<f64>> = used
-        .clone()
-        .filter_map(|c| {
-            let slope = |image: &Image| slope((0..rows).map(|row| (row, image.row(row)[c])));
-            Some(Vector2::new(slope(x)?, slope(y)?))
-        })
-        .collect();
+    let line_slopes = line_slopes([x, y], &used);
+    let column_slopes = column_slopes([x, y], &used);
     let mut covariance = covariance(&line_slopes, [x, y], &planes, &used);
     for (axis, lag) in lags.iter().enumerate() {
         covariance[(axis, axis)] += lag.map_or(0.0, |lag| lag.slope_variance);
@@ -83,10 +99,48 @@ pub fn from_sensors(x: &Image, y: &Image) -> Option<SensorGeometry> {
         },
         planes,
         columns: used,
+        glitches,
         lags,
         fast_steps: line_slopes.iter().map(|s| s.dot(&ef)).collect(),
         slow_steps: column_slopes.iter().map(|s| s.dot(&es)).collect(),
     })
+}
+
+/// Step from column to column of each line, nm.
+fn line_slopes([x, y]: [&Image; 2], used: &std::ops::Range<usize>) -> Vec<Vector2<f64>> {
+    let of = |row: usize| {
+        let slope = |image: &Image| slope(used.clone().map(|c| (c, image.row(row)[c])));
+        Some(Vector2::new(slope(x)?, slope(y)?))
+    };
+    (0..x.rows).filter_map(of).collect()
+}
+
+/// Step from row to row of each column, nm.
+fn column_slopes([x, y]: [&Image; 2], used: &std::ops::Range<usize>) -> Vec<Vector2<f64>> {
+    let of = |c: usize| {
+        let slope = |image: &Image| slope((0..x.rows).map(|row| (row, image.row(row)[c])));
+        Some(Vector2::new(slope(x)?, slope(y)?))
+    };
+    used.clone().filter_map(of).collect()
+}
+
+/// Both sensors without the samples that are far off, and how many those are.
+fn without_glitches<'a>(x: &'a Image, y: &'a Image) -> ([Cow<'a, Image>; 2], [usize; 2]) {
+    let sensors = [x, y];
+    let planes = sensors.map(|sensor| fit_plane(sensor, 0..sensor.columns));
+    let steps = planes.iter().flatten();
+    let pitch = steps.fold(0.0f64, |longest, plane| {
+        longest.max(plane.per_column.abs()).max(plane.per_row.abs())
+    });
+    let found = sensors.map(|sensor| glitches::dropped(sensor, pitch));
+    let count = |n: usize| found[n].as_ref().map_or(0, |(_, count)| *count);
+    let counts = [count(0), count(1)];
+    let mut left = found.into_iter();
+    let sound = sensors.map(|sensor| match left.next().flatten() {
+        Some((without, _)) => Cow::Owned(without),
+        None => Cow::Borrowed(sensor),
+    });
+    (sound, counts)
 }
 
 /// Two sensors without their lags, and the columns in which they are straight.

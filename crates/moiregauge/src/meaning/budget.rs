@@ -13,6 +13,9 @@
 //!   calibration ([`crate::calibration`]) takes the place of the priors; where its three errors are correlated,
 //!   what one shares with those before it is counted with them, so that the rows add up. A rotation of
 //!   the sensors' frame has no row: angles are counted from the axis of the x sensor by definition.
+//! - Pitch. Without sensors the pixels are as far apart as the nominal size says; of N pixels it spans N or N − 1, and
+//!   where the format does not say which, both are as likely: lengths along either side are uncertain by 1/(√2 N), the
+//!   root mean square of none and 1/N.
 //! - Lattice constant: θ is proportional to it.
 //! - Model: see [`heterostrain::strain`]. An isotropic strain h changes θ at first and second order; its
 //!   variance is the mean square over a Gaussian prior, `d² + 3c²` for a change `d h/σ + c h²/σ²`.
@@ -40,6 +43,8 @@ pub enum Source {
     Mismatch,
     /// Sensor axes that do not stand at a right angle.
     Orthogonality,
+    /// What the nominal size spans, where the format does not say: N pixels or N − 1.
+    Pitch,
     /// The lattice constant.
     LatticeConstant,
     /// Which layer is strained.
@@ -52,13 +57,14 @@ pub enum Source {
 
 impl Source {
     /// All of them, in the order of tables and figures: what averages out first.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 11] = [
         Self::Image,
         Self::Drift,
         Self::Sensor,
         Self::Gain,
         Self::Mismatch,
         Self::Orthogonality,
+        Self::Pitch,
         Self::LatticeConstant,
         Self::StrainedLayer,
         Self::IsotropicStrain,
@@ -88,7 +94,9 @@ pub struct Contribution {
 #[derive(Clone, Debug)]
 pub struct Budget {
     /// In the order of [`Source::ALL`].
-    contributions: [Contribution; 10],
+    contributions: [Contribution; 11],
+    /// The relative change of positions by one standard deviation of the pitch of the pixels; zero where that is settled.
+    pub pitch: Matrix2<f64>,
     /// The statistical ones as covariances of the lattice.
     pub statistical: Statistical,
 }
@@ -104,10 +112,21 @@ impl Budget {
         statistical: &Statistical,
         settings: &Settings,
     ) -> Self {
+        Self::with_pitch(lattice, found, statistical, &Matrix2::zeros(), settings)
+    }
+
+    /// The same with an error of the pitch of the pixels: the relative change of positions that it makes.
+    pub fn with_pitch(
+        lattice: &Lattice,
+        found: &TwistStrain,
+        statistical: &Statistical,
+        pitch: &Matrix2<f64>,
+        settings: &Settings,
+    ) -> Self {
         let reference = Reference::new(lattice, settings.bilayer(), settings.strain_convention);
         let contribution = |source: Source| {
             let (covariance, wavelengths) =
-                match lattice_error(source, lattice, statistical, settings) {
+                match lattice_error(source, lattice, statistical, pitch, settings) {
                     Some(error) => (
                         through(lattice, &error, settings),
                         squared_wavelength_sigmas(lattice, &error),
@@ -128,6 +147,7 @@ impl Budget {
         Self {
             contributions: Source::ALL.map(contribution),
             statistical: *statistical,
+            pitch: *pitch,
         }
     }
 
@@ -137,9 +157,15 @@ impl Budget {
         &self,
         lattice: &Lattice,
         settings: &Settings,
-    ) -> [Matrix4<f64>; 3] {
-        [Source::Gain, Source::Mismatch, Source::Orthogonality].map(|source| {
-            lattice_error(source, lattice, &self.statistical, settings)
+    ) -> [Matrix4<f64>; 4] {
+        let sources = [
+            Source::Gain,
+            Source::Mismatch,
+            Source::Orthogonality,
+            Source::Pitch,
+        ];
+        sources.map(|source| {
+            lattice_error(source, lattice, &self.statistical, &self.pitch, settings)
                 .unwrap_or_else(Matrix4::zeros)
         })
     }
@@ -199,16 +225,20 @@ fn lattice_error(
     source: Source,
     lattice: &Lattice,
     statistical: &Statistical,
+    pitch: &Matrix2<f64>,
     settings: &Settings,
 ) -> Option<Matrix4<f64>> {
+    let of = |change: Matrix2<f64>| {
+        square(&Vector4::from_column_slice(
+            (change * lattice.basis).as_slice(),
+        ))
+    };
     match source {
         Source::Image => Some(statistical.image),
         Source::Drift => Some(statistical.drift),
         Source::Sensor => Some(statistical.sensor),
-        _ => {
-            let change = distortion(source, settings)? * lattice.basis;
-            Some(square(&Vector4::from_column_slice(change.as_slice())))
-        }
+        Source::Pitch => Some(of(*pitch)),
+        _ => Some(of(distortion(source, settings)?)),
     }
 }
 

@@ -20,6 +20,7 @@ use crate::scan::measured::{MeasureError, MeasuredLine, MeasuredScan};
 use crate::scan::moires::in_order;
 use crate::scan::overlap::Window;
 use crate::scan::place::Place;
+use crate::scan::positions::pitch_sigma;
 use crate::scan::scanner::about_calibration;
 use crate::scan::shared::correlation;
 use crate::settings::knobs::Settings;
@@ -194,8 +195,10 @@ fn measure_line(
 ) -> Result<Vec<MeasuredLine>, MeasureError> {
     let mut place =
         Place::of(file, scan, channel, settings, caveats).ok_or(MeasureError::NoSize)?;
+    let mut pitch = None;
     if place.sensors.is_none() {
         turned(file, scan.rotation_rad, caveats);
+        pitch = pitch_sigma(scan, channel);
     }
     let (speeds, speed_error) = place.speeds();
     let mut image = image_of(channel);
@@ -236,6 +239,7 @@ fn measure_line(
             lines_after,
             lattice,
             speeds,
+            pitch_sigma: pitch,
             speed_error,
             pixels: pixels.clone(),
         }

@@ -61,6 +61,9 @@ pub struct MeasuredLine {
     pub lattice: MeasuredLattice,
     /// Tip speeds along the fast and slow axes, nm/s; σ is the spread over the lines. NaN without timing.
     pub speeds: [Estimate; 2],
+    /// Relative standard errors of the pitch along the fast and the slow axis where nobody knows what the size of the
+    /// frame spans; `None` where sensors or the format tell.
+    pub pitch_sigma: Option<[f64; 2]>,
     /// Relative standard error of the mean speeds.
     pub speed_error: [f64; 2],
     /// To know the whole image again.
@@ -85,6 +88,16 @@ impl MeasuredLine {
             self.geometry.pixel_to_nm * b,
             lever * self.geometry.covariance * lever.transpose(),
         )
+    }
+
+    /// The relative change of positions by one standard deviation of the pitch; zero where that is known.
+    pub(crate) fn pitch_error(&self) -> Matrix2<f64> {
+        let Some(sigma) = self.pitch_sigma else {
+            return Matrix2::zeros();
+        };
+        let j = self.geometry.pixel_to_nm;
+        let inverse = j.try_inverse().unwrap_or_else(Matrix2::zeros);
+        j * Matrix2::from_diagonal(&Vector2::from(sigma)) * inverse
     }
 
     /// The lattice in nominal coordinates, nm.

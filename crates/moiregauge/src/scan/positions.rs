@@ -9,13 +9,18 @@ use crate::caveat::positions::PositionDoubt;
 use crate::frame::axis::Axis;
 use crate::frame::geometry::{Geometry, Timing};
 use crate::frame::image::Image;
-use crate::frame::sensors::{SensorGeometry, from_sensors};
+use crate::frame::loops::{self, HalfLine, SlowLag};
+use crate::frame::sensors::{SensorGeometry, freed_of_lags, from_sensors};
 use crate::numbers::spread::mean_and_spread;
 use crate::scan::channel::image_of;
 
 /// A sensor whose span differs from the nominal size by more than this factor is not believed: open tubes are off by
 /// 1.3.
 const WILD_SPAN: f64 = 2.0;
+/// Trace and retrace of different speeds, by more than headers round, are no loop.
+const SAME_SPEED: f64 = 0.01;
+/// More samples than this share that are off deserve a word: one in a thousand is no stray one. Chosen by eye.
+const NOTABLE_GLITCHES: f64 = 1e-3;
 /// A lag that changes the fast step by more than this share deserves a word: a hundredth of the calibration that is
 /// assumed.
 const NOTABLE_LAG: f64 = 1e-4;
@@ -28,6 +33,13 @@ pub(crate) fn nominal(scan: &Scan, channel: &Channel) -> Option<Geometry> {
         scan.rotation_rad,
         Vector2::from(scan.offset_nm),
     )
+}
+
+/// Relative standard errors of the nominal pitch along the fast and the slow axis, where the format does not say whether
+/// its size spans N pixels or N − 1: either may be, so that it is off by none or by 1/N.
+pub(crate) fn pitch_sigma(scan: &Scan, channel: &Channel) -> Option<[f64; 2]> {
+    let of = |count: usize| 1.0 / (std::f64::consts::SQRT_2 * count as f64);
+    (!scan.size_is_defined()).then(|| [of(channel.columns), of(channel.rows)])
 }
 
 /// The sensors of this line direction as images in nm; `None` where they are absent or levelled.
@@ -77,14 +89,6 @@ pub(crate) fn sensor_images(
             return None;
         }
     }
-    let in_nm = |c: &Channel| {
-        let factor = spmfile::nm_per(&c.unit).unwrap_or(f64::NAN);
-        let mut image = image_of(c);
-        for v in &mut image.values {
-            *v *= factor;
-        }
-        image
-    };
     Some([in_nm(sensors.x), in_nm(sensors.y)])
 }
 
@@ -108,7 +112,15 @@ pub(crate) fn usable_sensors(
         ));
         return None;
     }
-    let Some(sensors) = from_sensors(&x, &y) else {
+    let line = channel.line_direction.unwrap_or(LineDirection::Trace);
+    let found = match slow_lag(scan, channel, [&x, &y]) {
+        Some(lag) => {
+            let [x, y] = [(&x, 0), (&y, 1)].map(|(s, axis)| lag.taken_off(s, axis, line));
+            freed_of_lags(&x, &y, [0, 1].map(|axis| lag.of_sensor(axis, line)))
+        }
+        None => from_sensors(&x, &y),
+    };
+    let Some(sensors) = found else {
         caveats.push(Caveat::new(PositionDoubt::SensorsFlat, file));
         return None;
     };
@@ -132,8 +144,71 @@ pub(crate) fn usable_sensors(
     if sensors.geometry.pixel_to_nm.determinant() < 0.0 {
         caveats.push(Caveat::new(PositionDoubt::SensorsMirrored, file));
     }
+    about_glitches(file, channel, &sensors, caveats);
     about_lag(file, scan, channel, &sensors, caveats);
     Some(sensors)
+}
+
+/// A lag that trace and retrace show together; `None` where one of them was not recorded.
+fn slow_lag(scan: &Scan, channel: &Channel, own: [&Image; 2]) -> Option<SlowLag> {
+    let line = channel.line_direction?;
+    let other = match line {
+        LineDirection::Trace => LineDirection::Retrace,
+        LineDirection::Retrace => LineDirection::Trace,
+    };
+    // The other direction in place of its own would be compared with itself.
+    spmfile::position_sensors(scan, line).ok()?;
+    let sensors = spmfile::position_sensors(scan, other).ok()?;
+    let timing = Timing::of_scan(scan, channel.columns, FrameDirection::Up, line)?;
+    let back = Timing::of_scan(scan, channel.columns, FrameDirection::Up, other)?;
+    let pixel = timing.per_pixel.x.abs();
+    if (back.per_pixel.x.abs() / pixel - 1.0).abs() > SAME_SPEED {
+        return None;
+    }
+    let last = (channel.columns - 1) as f64;
+    let whole = (0.5 * timing.per_pixel.y.abs() / pixel).max(last);
+    let half = HalfLine {
+        whole,
+        run_up: (whole - last) / 2.0,
+    };
+    let other = [in_nm(sensors.x), in_nm(sensors.y)];
+    let other = [&other[0], &other[1]];
+    match line {
+        LineDirection::Trace => loops::find(own, other, half),
+        LineDirection::Retrace => loops::find(other, own, half),
+    }
+}
+
+/// A sensor as an image in nm.
+fn in_nm(sensor: &Channel) -> Image {
+    let factor = spmfile::nm_per(&sensor.unit).unwrap_or(f64::NAN);
+    let mut image = image_of(sensor);
+    for v in &mut image.values {
+        *v *= factor;
+    }
+    image
+}
+
+/// Says how many samples were left out, where it is more than a stray one.
+fn about_glitches(
+    file: &str,
+    channel: &Channel,
+    sensors: &SensorGeometry,
+    caveats: &mut Vec<Caveat>,
+) {
+    let dropped: usize = sensors.glitches.iter().sum();
+    let samples = 2 * channel.columns * channel.rows;
+    if dropped as f64 > NOTABLE_GLITCHES * samples as f64 {
+        let line = channel.line_direction.unwrap_or(LineDirection::Trace);
+        caveats.push(Caveat::new(
+            PositionDoubt::SensorGlitches {
+                line,
+                dropped,
+                samples,
+            },
+            file,
+        ));
+    }
 }
 
 /// Says where the lines of a sensor bend as those of one that lags behind the tip.

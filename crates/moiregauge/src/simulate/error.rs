@@ -16,6 +16,16 @@ pub enum SimulateError {
         /// As given.
         found: String,
     },
+    /// A class of samples, or one of its numbers, that does not exist or is out of its range.
+    #[error("{setting}: expected {expected}, found {found}")]
+    Feature {
+        /// Which, as in `sample edge: share`.
+        setting: String,
+        /// What there is, or the range.
+        expected: String,
+        /// As given.
+        found: String,
+    },
     /// Twist, strain and material make no moiré.
     #[error("the sample has no moiré: {0}")]
     NoMoire(#[from] StrainError),

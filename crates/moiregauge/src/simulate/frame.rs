@@ -3,16 +3,19 @@
 //! The phase of a harmonic along a line is a quadratic in the column, as time is linear in it and
 //! the drift quadratic in time. Its values follow from two complex multiplications per pixel.
 
-use nalgebra::{Complex, Vector2};
+use nalgebra::Complex;
 use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 use spmfile::{Channel, LineDirection, Samples, Scan};
 
 use crate::numbers::rng;
 use crate::simulate::calendar::date_after;
+use crate::simulate::instrument::{Disturbances, glitch_stream};
+use crate::simulate::motion::Motion;
 use crate::simulate::raster::{FramePlan, PixelTime};
 use crate::simulate::scene::{Harmonic, Scene};
-use crate::simulate::settings::{Drift, Simulation};
+use crate::simulate::settings::Simulation;
+use crate::simulate::surface::Surface;
 
 /// A detector of the instrument.
 struct Detector {
@@ -62,28 +65,13 @@ struct Line {
     y: Vec<i32>,
 }
 
-/// The motion of the sample in nm and s.
-#[derive(Clone, Copy)]
-struct Motion {
-    velocity: Vector2<f64>,
-    acceleration: Vector2<f64>,
-}
-
-impl Motion {
-    fn new(drift: &Drift) -> Self {
-        Self {
-            velocity: Vector2::from(drift.velocity_nm_per_min) / 60.0,
-            acceleration: Vector2::from(drift.acceleration_nm_per_min2) / 3600.0,
-        }
-    }
-
-    fn at(&self, time: f64) -> Vector2<f64> {
-        (self.velocity + self.acceleration * (time / 2.0)) * time
-    }
-}
-
 /// The frame as the instrument would have written it.
-pub(crate) fn record(settings: &Simulation, scene: &Scene, plan: &FramePlan) -> Scan {
+pub(crate) fn record(
+    settings: &Simulation,
+    scene: &Scene,
+    surface: Option<&Surface>,
+    plan: &FramePlan,
+) -> Scan {
     let raster = &settings.raster;
     let mut directions = vec![LineDirection::Trace];
     if raster.retrace {
@@ -91,7 +79,10 @@ pub(crate) fn record(settings: &Simulation, scene: &Scene, plan: &FramePlan) -> 
     }
     let lines: Vec<(LineDirection, Line)> = directions
         .into_iter()
-        .map(|direction| (direction, record_line(settings, scene, plan, direction)))
+        .map(|direction| {
+            let sample = Sample { scene, surface };
+            (direction, record_line(settings, sample, plan, direction))
+        })
         .collect();
 
     let mut phase = Vec::new();
@@ -168,7 +159,7 @@ fn channel(
 /// All channels of one line direction; lines in parallel, each with random numbers of its own.
 fn record_line(
     settings: &Simulation,
-    scene: &Scene,
+    sample: Sample,
     plan: &FramePlan,
     direction: LineDirection,
 ) -> Line {
@@ -183,10 +174,12 @@ fn record_line(
     let offsets = line_offsets(settings, plan, direction);
     let recorder = Recorder {
         settings,
-        scene,
+        sample,
         plan,
         direction,
         time: plan.time(direction),
+        disturbances: (!settings.features.is_empty())
+            .then(|| Disturbances::new(settings, plan, direction)),
         motion: Motion::new(&settings.drift),
     };
     (
@@ -206,14 +199,22 @@ fn record_line(
     line
 }
 
+/// The sample: a lattice, or a surface with all that it has.
+#[derive(Clone, Copy)]
+struct Sample<'a> {
+    scene: &'a Scene,
+    surface: Option<&'a Surface>,
+}
+
 /// What does not change from line to line.
 struct Recorder<'a> {
     settings: &'a Simulation,
-    scene: &'a Scene,
+    sample: Sample<'a>,
     plan: &'a FramePlan,
     direction: LineDirection,
     time: PixelTime,
     motion: Motion,
+    disturbances: Option<Disturbances>,
 }
 
 impl Recorder<'_> {
@@ -221,8 +222,24 @@ impl Recorder<'_> {
         let [columns, rows] = self.settings.raster.pixels.map(|n| n as f64 - 1.0);
         let noise = &self.settings.noise;
         let mut pattern = vec![0.0; phase.len()];
-        for harmonic in &self.scene.harmonics {
+        let waves = match self.sample.surface {
+            Some(surface) => {
+                for (column, value) in pattern.iter_mut().enumerate() {
+                    let at = self.plan.place(self.motion, self.direction, [column, row]);
+                    *value = surface.value(at);
+                }
+                &surface.ground
+            }
+            None => &self.sample.scene.harmonics,
+        };
+        for harmonic in waves {
             self.add_harmonic(row, harmonic, &mut pattern);
+        }
+        if let Some(disturbances) = &self.disturbances {
+            for (column, value) in pattern.iter_mut().enumerate() {
+                let time = self.time.at([column, row]);
+                *value += disturbances.on_image(row, column as f64 / columns, time);
+            }
         }
         let mut normal = normals(self.settings.seed, "image", self.plan, self.direction, row);
         let slow = noise.plane_deg[1] * (row as f64 / rows - 0.5) + offset;
@@ -275,8 +292,20 @@ impl Recorder<'_> {
             self.direction,
             row,
         );
+        let mut glitches = glitch_stream(self.settings, self.plan, self.direction, row);
+        let last = x.len() - 1;
         for (column, (x, y)) in x.iter_mut().zip(y).enumerate() {
-            let position = start + step.column(0) * column as f64;
+            let mut position = start + step.column(0) * column as f64;
+            if let Some(disturbances) = &self.disturbances {
+                let passed = match self.direction {
+                    LineDirection::Trace => column,
+                    LineDirection::Retrace => last - column,
+                };
+                let since_start = passed as f64 * self.time.step.x.abs();
+                position -= disturbances.behind(self.plan, self.direction, since_start);
+                position.x += disturbances.glitch(&mut glitches);
+                position.y += disturbances.glitch(&mut glitches);
+            }
             *x = count(position.x + sigma * normal(), X_SENSOR.range);
             *y = count(position.y + sigma * normal(), Y_SENSOR.range);
         }

@@ -7,6 +7,7 @@
 use nalgebra::{Matrix2, Rotation2, Vector2};
 use spmfile::{FrameDirection, LineDirection};
 
+use crate::simulate::motion::Motion;
 use crate::simulate::settings::{FirstDirection, Simulation};
 
 /// Time of the pixels of one line direction.
@@ -16,6 +17,13 @@ pub(crate) struct PixelTime {
     pub(crate) first: f64,
     /// From column to column and from row to row, s.
     pub(crate) step: Vector2<f64>,
+}
+
+impl PixelTime {
+    /// Of a pixel (column, row), s.
+    pub(crate) fn at(&self, [column, row]: [usize; 2]) -> f64 {
+        self.first + self.step.x * column as f64 + self.step.y * row as f64
+    }
 }
 
 /// One frame before it is recorded.
@@ -86,6 +94,18 @@ impl FramePlan {
             LineDirection::Trace => self.trace,
             LineDirection::Retrace => self.retrace,
         }
+    }
+
+    /// The place of the sample that a pixel (column, row) shows, nm.
+    pub(crate) fn place(
+        &self,
+        motion: Motion,
+        line: LineDirection,
+        pixel: [usize; 2],
+    ) -> Vector2<f64> {
+        let [column, row] = pixel.map(|n| n as f64);
+        let time = self.time(line).at(pixel);
+        self.origin + self.pixel_to_nm * Vector2::new(column, row) - motion.at(time)
     }
 }
 

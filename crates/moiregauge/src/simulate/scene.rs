@@ -14,6 +14,8 @@ use crate::simulate::settings::{Pattern, Sample};
 /// One harmonic of the pattern.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Harmonic {
+    /// (h, k); zero for waves that belong to no lattice.
+    pub(crate) index: [i32; 2],
     /// rad/nm.
     pub(crate) wave: Vector2<f64>,
     /// Degrees of phase.
@@ -96,6 +98,7 @@ impl Scene {
                 (0.0, 0.0)
             };
             harmonics.push(Harmonic {
+                index: [h, k],
                 wave,
                 amplitude: sample.contrast_deg * relative * (1.0 + change),
                 phase: shift - wave.dot(&origin),

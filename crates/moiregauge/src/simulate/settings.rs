@@ -5,6 +5,7 @@ use heterostrain::strain::{Stacking, StrainConvention};
 use serde::{Deserialize, Serialize};
 
 use crate::simulate::error::SimulateError;
+use crate::simulate::feature::SampleFeature;
 
 /// One set of frames of one sample.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
@@ -24,6 +25,9 @@ pub struct Simulation {
     pub window: Window,
     /// What the detectors add.
     pub noise: Noise,
+    /// What the sample and the instrument have besides a perfect lattice.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub features: Vec<SampleFeature>,
 }
 
 /// What the pattern is.
@@ -176,6 +180,7 @@ impl Default for Simulation {
             raster: Raster::default(),
             window: Window::default(),
             noise: Noise::default(),
+            features: Vec::new(),
         }
     }
 }
@@ -370,7 +375,7 @@ impl Simulation {
                 &pair,
             )?;
         }
-        Ok(())
+        self.features.iter().try_for_each(SampleFeature::check)
     }
 }
 

@@ -6,6 +6,7 @@ use crate::simulate::error::SimulateError;
 use crate::simulate::raster::{FramePlan, file_name};
 use crate::simulate::scene::Scene;
 use crate::simulate::settings::Simulation;
+use crate::simulate::surface::Surface;
 use crate::simulate::truth::Truth;
 use crate::simulate::{frame, truth};
 
@@ -14,6 +15,7 @@ use crate::simulate::{frame, truth};
 pub struct Simulator {
     settings: Simulation,
     scene: Scene,
+    surface: Option<Surface>,
 }
 
 impl Simulator {
@@ -24,7 +26,12 @@ impl Simulator {
     pub fn new(settings: Simulation) -> Result<Self, SimulateError> {
         settings.check()?;
         let scene = Scene::new(&settings.sample)?;
-        Ok(Self { settings, scene })
+        let surface = Surface::new(&settings)?;
+        Ok(Self {
+            settings,
+            scene,
+            surface,
+        })
     }
 
     /// The settings.
@@ -40,7 +47,7 @@ impl Simulator {
     /// Frame `index` as the instrument would have written it.
     pub fn frame(&self, index: usize) -> Scan {
         let plan = FramePlan::new(&self.settings, index);
-        frame::record(&self.settings, &self.scene, &plan)
+        frame::record(&self.settings, &self.scene, self.surface.as_ref(), &plan)
     }
 
     /// The wave vectors (rad/nm) and amplitudes (degrees of phase) of one half of the harmonics.
@@ -50,7 +57,7 @@ impl Simulator {
 
     /// Everything needed to check an analysis of the frames.
     pub fn truth(&self) -> Truth {
-        truth::truth(&self.settings, &self.scene)
+        truth::truth(&self.settings, &self.scene, self.surface.as_ref())
     }
 
     /// The name of the file for frame `index`, as in `scan.003.spm`.

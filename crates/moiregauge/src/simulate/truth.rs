@@ -6,7 +6,9 @@ use spmfile::FrameDirection;
 
 use crate::simulate::raster::{FramePlan, file_name};
 use crate::simulate::scene::Scene;
+use crate::simulate::seen::{SampleTruth, seen, share_covered};
 use crate::simulate::settings::Simulation;
+use crate::simulate::surface::Surface;
 
 /// The truth about a simulated set.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
@@ -38,6 +40,9 @@ pub struct Truth {
     pub drift_nm_per_min: [f64; 2],
     /// Mean velocity from the start of the first frame to the end of the last one.
     pub mean_drift_nm_per_min: [f64; 2],
+    /// Where the sample is not the same everywhere; what stands above is then that of the first lattice before it is bent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sample: Option<SampleTruth>,
     /// The frames, in order of time.
     pub frames: Vec<FrameTruth>,
     /// Everything that was set.
@@ -69,6 +74,9 @@ pub struct FrameTruth {
     pub retrace_first_pixel_s: f64,
     /// Time from column to column and from row to row, retrace.
     pub retrace_time_per_pixel_s: [f64; 2],
+    /// Share of its pixels with moiré, where the sample is not the same everywhere.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub share_covered: Option<f64>,
 }
 
 const CONVENTIONS: [&str; 6] = [
@@ -80,7 +88,7 @@ const CONVENTIONS: [&str; 6] = [
     "drift: motion of the sample in the frame of the sensors; a feature at R is found at R + d(t)",
 ];
 
-pub(crate) fn truth(settings: &Simulation, scene: &Scene) -> Truth {
+pub(crate) fn truth(settings: &Simulation, scene: &Scene, surface: Option<&Surface>) -> Truth {
     let sample = &settings.sample;
     // α is reduced modulo 60° (the symmetry of layer 1), φ takes up what α loses.
     let period = sample
@@ -95,8 +103,9 @@ pub(crate) fn truth(settings: &Simulation, scene: &Scene) -> Truth {
     let (first, second) = (column(&scene.basis, 0), column(&scene.basis, 1));
     let vectors = [first, second, second - first];
     let frames: Vec<FrameTruth> = (0..settings.raster.scans)
-        .map(|index| frame_truth(settings, index))
+        .map(|index| frame_truth(settings, surface, index))
         .collect();
+    let shares: Vec<f64> = frames.iter().filter_map(|f| f.share_covered).collect();
     Truth {
         schema: "moiregauge/truth/1".to_owned(),
         conventions: CONVENTIONS.map(str::to_owned).to_vec(),
@@ -111,6 +120,7 @@ pub(crate) fn truth(settings: &Simulation, scene: &Scene) -> Truth {
         reciprocal_vectors_rad_per_nm: [0, 1].map(|k| column(&scene.reciprocal, k).into()),
         drift_nm_per_min: settings.drift.velocity_nm_per_min,
         mean_drift_nm_per_min: mean_drift(settings, &frames),
+        sample: surface.map(|surface| seen(settings, surface, &shares)),
         frames,
         settings: settings.clone(),
     }
@@ -125,7 +135,7 @@ fn mean_drift(settings: &Simulation, frames: &[FrameTruth]) -> [f64; 2] {
     [0, 1].map(|k| drift.velocity_nm_per_min[k] + drift.acceleration_nm_per_min2[k] * middle_min)
 }
 
-fn frame_truth(settings: &Simulation, index: usize) -> FrameTruth {
+fn frame_truth(settings: &Simulation, surface: Option<&Surface>, index: usize) -> FrameTruth {
     let plan = FramePlan::new(settings, index);
     let j = plan.pixel_to_nm;
     FrameTruth {
@@ -143,5 +153,6 @@ fn frame_truth(settings: &Simulation, index: usize) -> FrameTruth {
         trace_time_per_pixel_s: plan.trace.step.into(),
         retrace_first_pixel_s: plan.retrace.first,
         retrace_time_per_pixel_s: plan.retrace.step.into(),
+        share_covered: surface.map(|surface| share_covered(settings, surface, &plan)),
     }
 }

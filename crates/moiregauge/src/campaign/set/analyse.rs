@@ -29,7 +29,7 @@ use crate::meaning::strengths::WaveStrengths;
 use crate::numbers::chi2::enlargement;
 use crate::numbers::rng::normals;
 use crate::numbers::spread::mean_and_spread;
-use crate::scan::measured::MeasuredScan;
+use crate::scan::measured::{MeasuredLine, MeasuredScan};
 use crate::settings::knobs::{GivenDrift, Settings};
 use crate::spectrum::method::Method;
 
@@ -77,10 +77,11 @@ pub(crate) fn analyse_set(
         let measured = &group.scans;
         published::draw_all(&mut scans, measured, &seen, drift, settings, first_index);
     }
-    let uncorrected = without_drift(&all, &scans, kept.len(), settings, strengths);
+    let pitch = pitch_error(&used);
+    let uncorrected = without_drift(&all, &scans, kept.len(), &pitch, settings, strengths);
     let mean = solved
         .as_ref()
-        .and_then(|solved| at_drift(solved, &scans, settings, strengths));
+        .and_then(|solved| at_drift(solved, &scans, &pitch, settings, strengths));
     let set = SetAnalysis {
         name: name.clone(),
         slow_axis: group.slow_axis,
@@ -159,10 +160,19 @@ fn checked(
     joint::checks(fit, &left_out, used, name, settings)
 }
 
+/// What an error of the pitch does to the positions of these scans: all of a set have the same size and format.
+fn pitch_error(used: &[&MeasuredScan]) -> Matrix2<f64> {
+    let mut lines = used.iter().flat_map(|scan| &scan.lines);
+    lines
+        .next()
+        .map_or_else(Matrix2::zeros, MeasuredLine::pitch_error)
+}
+
 /// The mean of the scans, their drift taken off.
 fn at_drift(
     solved: &Solved,
     scans: &[ScanAnalysis],
+    pitch: &Matrix2<f64>,
     settings: &Settings,
     strengths: &WaveStrengths,
 ) -> Option<SetMean> {
@@ -170,8 +180,11 @@ fn at_drift(
     set_mean(
         &solved.lattice,
         &solved.statistical,
-        solved.chi2 / solved.freedom as f64,
-        solved.enlargement,
+        pitch,
+        Agreement {
+            chi2_per_dof: solved.chi2 / solved.freedom as f64,
+            enlargement: solved.enlargement,
+        },
         counted(scans).map(of),
         settings,
         strengths,
@@ -183,6 +196,7 @@ fn without_drift(
     all: &[Observation],
     scans: &[ScanAnalysis],
     used: usize,
+    pitch: &Matrix2<f64>,
     settings: &Settings,
     strengths: &WaveStrengths,
 ) -> Option<SetMean> {
@@ -201,8 +215,11 @@ fn without_drift(
     set_mean(
         &lattice,
         &statistical,
-        chi2 / freedom as f64,
-        scale,
+        pitch,
+        Agreement {
+            chi2_per_dof: chi2 / freedom as f64,
+            enlargement: scale,
+        },
         counted(scans).map(of),
         settings,
         strengths,
@@ -380,13 +397,20 @@ fn given_drift(
     })
 }
 
-/// Twist and strain of the common lattice, whose variances the scatter of the scans enlarged by `enlargement`, and how
-/// they scatter about it.
+/// How well scans agree with their common lattice.
+#[derive(Clone, Copy)]
+struct Agreement {
+    chi2_per_dof: f64,
+    /// By how much their scatter enlarged all variances.
+    enlargement: f64,
+}
+
+/// Twist and strain of the common lattice, and how the scans scatter about it.
 fn set_mean(
     lattice: &Lattice,
     statistical: &Statistical,
-    chi2_per_dof: f64,
-    enlargement: f64,
+    pitch: &Matrix2<f64>,
+    agreement: Agreement,
     scans: impl Iterator<Item = (Option<TwistStrain>, Lattice)>,
     settings: &Settings,
     strengths: &WaveStrengths,
@@ -405,7 +429,7 @@ fn set_mean(
             (ratio - 1.0).abs() <= 0.01
         })
     });
-    let budget = Budget::new(lattice, &twist_strain, statistical, settings);
+    let budget = Budget::with_pitch(lattice, &twist_strain, statistical, pitch, settings);
     Some(SetMean {
         readings: Readings::new(lattice, &twist_strain, &budget, strengths, settings),
         budget,
@@ -413,8 +437,8 @@ fn set_mean(
         twist_strain,
         twist_scatter: mean_and_spread(&twists).sigma,
         strain_scatter: component(0).hypot(component(1)) / std::f64::consts::SQRT_2,
-        chi2_per_dof,
-        enlargement,
+        chi2_per_dof: agreement.chi2_per_dof,
+        enlargement: agreement.enlargement,
         within_one_percent: within,
     })
 }

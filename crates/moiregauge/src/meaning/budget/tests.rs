@@ -110,6 +110,33 @@ fn calibration_errors_have_the_known_size() {
     }
 }
 
+/// Both sides off by the same share are a gain: θ times that; one side alone is a mismatch and half a gain.
+#[test]
+fn the_pitch_is_a_gain_of_either_side() {
+    let settings = Settings::default();
+    let lattice = graphene(1.1, 0.003);
+    let share = 1.0 / (std::f64::consts::SQRT_2 * 256.0);
+    let with = |sides: [f64; 2]| {
+        let pitch = Matrix2::from_diagonal(&Vector2::from(sides));
+        let found = inverted(&lattice);
+        let statistical = budget(&lattice, &settings).statistical;
+        Budget::with_pitch(&lattice, &found, &statistical, &pitch, &settings)
+    };
+    let both = with([share; 2]);
+    let expected = 1.1 * share;
+    assert!((twist_deg(both.of(Source::Pitch)) / expected - 1.0).abs() < 0.01);
+    let one = with([share, 0.0]);
+    assert!((twist_deg(one.of(Source::Pitch)) / expected - 0.5).abs() < 0.05);
+    let (with, without) = (both.total(), budget(&lattice, &settings).total());
+    let more = with.wavelengths[0] - without.wavelengths[0];
+    let length = lattice.wavelength(0).value;
+    assert!((more.sqrt() / length / share - 1.0).abs() < 1e-6);
+    assert_eq!(
+        budget(&lattice, &settings).of(Source::Pitch).wavelengths,
+        [0.0; 3]
+    );
+}
+
 /// A turn of the sensors' frame changes the orientation and the axis in the laboratory, nothing else:
 /// it needs no row of its own.
 #[test]
