@@ -4,12 +4,12 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use moiregauge::campaign::refusal;
+use moiregauge_pipeline::campaign::Outcome;
 use moiregauge_pipeline::sink::{FolderSink, Target};
 use moiregauge_report::screen::{failures, summary};
 use moiregauge_report::write_report;
 
 use super::args::AnalyzeArgs;
-use super::chain::Outcome;
 use super::export::{self, Export};
 use super::task::Task;
 use crate::hints;

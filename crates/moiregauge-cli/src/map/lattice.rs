@@ -7,6 +7,8 @@ use moiregauge::map::TwistStrainMap;
 use moiregauge::scan::Picture;
 use moiregauge::settings::Settings;
 use moiregauge::survey::{LineMap, average_maps, change_of_drift, domains_of_scan, map_scan};
+use moiregauge_pipeline::campaign::Outcome;
+use moiregauge_pipeline::{Job, read_again};
 use moiregauge_report::screen::failures;
 use moiregauge_report::{FailedInput, Provenance};
 
@@ -14,8 +16,7 @@ use super::args::MapArgs;
 use super::doubts;
 use super::made::{Made, image, whole_image};
 use super::stripes::{self, Striped};
-use crate::analyze::{Outcome, Task, analyse_files};
-use crate::reading::read_again;
+use crate::analyze::{Task, in_words, with_advice};
 
 /// What scans show.
 pub(super) enum Answer {
@@ -24,7 +25,7 @@ pub(super) enum Answer {
 }
 
 /// Analyses all scans, maps them, and averages; stripes, where none of them shows a lattice.
-pub(super) fn together(args: &MapArgs, task: &Task) -> anyhow::Result<Answer> {
+pub(super) fn together(args: &MapArgs, task: &Task, job: &Job) -> anyhow::Result<Answer> {
     let (inputs, settings, known) = (&task.inputs, &task.run.settings, &task.known);
     let resolution = &args.resolution();
     ensure!(
@@ -32,24 +33,22 @@ pub(super) fn together(args: &MapArgs, task: &Task) -> anyhow::Result<Answer> {
         "maps are made of one moiré; --moires {} is for analyze",
         settings.moires
     );
-    let sets = args.analyze.sets()?;
-    let loud = args.analyze.is_loud();
-    let failed = task.run.left_out.clone();
-    let outcome = analyse_files(inputs, &sets, (settings, known), failed, false, loud);
+    let mut campaign = task.campaign()?.illustrated(false);
     let Outcome {
         analysis,
         provenance,
-    } = match outcome {
+    } = match campaign.analyse(job) {
         Ok(mut outcomes) => outcomes.swap_remove(0),
-        Err(failed) => {
+        Err(error) if error.is_of_scans() => {
             let stripes = stripes::look(args, inputs, (settings, known, resolution));
             if let Ok(Some(found)) = stripes {
                 return Ok(Answer::Stripes(Box::new(found)));
             }
-            eprint!("{}", failures(&failed));
+            let error = in_words(error);
             stripes?;
-            bail!("nothing could be analysed");
+            return Err(error);
         }
+        Err(error) => return Err(in_words(error)),
     };
     if let Some(why) = refusal(&analysis).filter(|why| is_nothing_left(&why.doubt)) {
         bail!("{}", why.message());
@@ -146,7 +145,8 @@ fn maps_of(
     let origin = origin(analysis);
     for scan in used(analysis) {
         let mut of_scan = || -> anyhow::Result<Vec<LineMap>> {
-            let read = read_again(&task.inputs, &scan.file, settings, &task.known)?;
+            let read =
+                read_again(&task.inputs, &scan.file, settings, &task.known).map_err(with_advice)?;
             let (method, resolution) = how;
             let lines = map_scan(&read, scan, origin, settings, method, resolution)?;
             shown = shown

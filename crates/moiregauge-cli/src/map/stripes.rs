@@ -8,8 +8,8 @@ use moiregauge::settings::Settings;
 use moiregauge::stripes::SampledStripes;
 use moiregauge::survey::{ScanStripes, stripes_of_scan};
 use moiregauge::window::Resolution;
-use moiregauge_pipeline::Known;
 use moiregauge_pipeline::sink::FolderSink;
+use moiregauge_pipeline::{Known, Opened};
 use moiregauge_report::results::{MapResults, StripesResult};
 use moiregauge_report::{FailedInput, Provenance, stripe_figures, stripe_scan};
 use spmfile::WritableFormat;
@@ -18,8 +18,8 @@ use super::args::{MapArgs, MapMethodArg};
 use super::doubts::narrow_margin;
 use super::made::image;
 use super::output;
+use crate::analyze::with_advice;
 use crate::outputs::write_all;
-use crate::reading::Opened;
 use crate::stripes::best;
 
 /// Patterns beyond this share of the power of local stripes are one wave.
@@ -68,7 +68,7 @@ pub(super) fn look(
          and strain, and one wave vector has none",
         path.display()
     );
-    let reading = opened.reading(&chosen)?;
+    let reading = opened.reading(&chosen).map_err(with_advice)?;
     let found = stripes_of_scan(&reading.input.file, &reading.scan, &chosen, resolution)
         .with_context(|| path.display().to_string())?;
     let mut caveats = found.caveats.clone();

@@ -7,6 +7,7 @@ use std::sync::mpsc;
 use std::time::Duration;
 
 use clap::{Arg, FromArgMatches as _};
+use moiregauge_pipeline::Job;
 
 use super::*;
 use crate::{Cli, arguments, run};
@@ -156,7 +157,10 @@ fn parsed(words: &[OsString]) -> Result<Cli, String> {
 /// Runs the command on a thread of its own; whether it ended well.
 fn ended(words: &[OsString], cli: Cli) -> Result<bool, String> {
     let (send, receive) = mpsc::channel();
-    std::thread::spawn(move || send.send(run(cli.command).is_ok()));
+    std::thread::spawn(move || {
+        let job = Job::quiet(None).expect("threads");
+        send.send(run(&cli.command, &job).is_ok())
+    });
     receive.recv_timeout(SOON).map_err(|why| match why {
         mpsc::RecvTimeoutError::Timeout => format!("{words:?} does not end"),
         mpsc::RecvTimeoutError::Disconnected => format!("{words:?} panics"),

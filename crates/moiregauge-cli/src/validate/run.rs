@@ -6,6 +6,7 @@ use std::process::ExitCode;
 use anyhow::Context as _;
 use moiregauge::simulate::{MOST_PIXELS, Simulation, Simulator};
 use moiregauge::spectrum::Method;
+use moiregauge_pipeline::Job;
 use moiregauge_pipeline::sink::Target;
 use rayon::prelude::*;
 
@@ -15,7 +16,6 @@ use super::output::{self, Validation};
 use crate::analyze::MethodArg;
 use crate::numbers;
 use crate::outputs;
-use crate::progress::bar;
 use crate::say::say;
 
 /// Simulate many sets, analyse them, and report bias, efficiency and coverage of the errors
@@ -62,11 +62,11 @@ pub(crate) struct ValidateArgs {
     force: bool,
     /// No progress bar
     #[arg(long, short)]
-    quiet: bool,
+    pub(crate) quiet: bool,
 }
 
 /// Runs the validation.
-pub(crate) fn run(args: &ValidateArgs) -> anyhow::Result<ExitCode> {
+pub(crate) fn run(args: &ValidateArgs, job: &Job) -> anyhow::Result<ExitCode> {
     let names = output::NAMES.map(str::to_owned);
     let folder = |out| {
         outputs::folder(&Target {
@@ -80,17 +80,17 @@ pub(crate) fn run(args: &ValidateArgs) -> anyhow::Result<ExitCode> {
     let sink = args.out.as_deref().map(folder).transpose()?;
     let conditions = conditions(args)?;
     Simulator::new(conditions.clone()).context("these conditions cannot be simulated")?;
-    let progress = bar("validating", "sets", args.sets as usize, !args.quiet);
+    let stage = job.stage("validating", "sets", args.sets as usize);
     let method = Method::from(args.method);
     let compared: Vec<Option<Comparison>> = (0..args.sets)
         .into_par_iter()
         .map(|index| {
             let result = compare(&conditions, method, args.seed, index);
-            progress.inc(1);
+            stage.step();
             result
         })
         .collect();
-    progress.finish_and_clear();
+    drop(stage);
     let failed = compared.iter().filter(|c| c.is_none()).count();
     let compared: Vec<Comparison> = compared.into_iter().flatten().collect();
     anyhow::ensure!(

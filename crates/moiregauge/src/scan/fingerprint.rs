@@ -1,12 +1,16 @@
 //! What is kept of an image to know it again.
 
+use std::fmt::Write as _;
 use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
 
 use crate::frame::background::{Background, remove_background};
 use crate::frame::image::Image;
 
 /// What is left of the pixels of an image to know it again.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(try_from = "Written", into = "Written")]
 pub(crate) struct Fingerprint {
     size: [usize; 2],
     /// Values at pixels spread over the frame, without plane, in standard deviations.
@@ -53,6 +57,48 @@ impl Fingerprint {
         let all = self.samples.len() as f64;
         let comparable = 2 * count > self.samples.len() && missing as f64 <= MISSING * all;
         comparable.then(|| (squares / count as f64).sqrt())
+    }
+}
+
+/// A fingerprint as it is written: every sample by the eight hexadecimal digits of its bits.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Written {
+    size: [usize; 2],
+    samples: String,
+}
+
+impl From<Fingerprint> for Written {
+    fn from(known: Fingerprint) -> Self {
+        let mut samples = String::with_capacity(8 * known.samples.len());
+        for sample in known.samples.iter() {
+            // Writing into a string cannot fail.
+            let _ = write!(samples, "{:08x}", sample.to_bits());
+        }
+        Self {
+            size: known.size,
+            samples,
+        }
+    }
+}
+
+impl TryFrom<Written> for Fingerprint {
+    type Error = &'static str;
+
+    fn try_from(written: Written) -> Result<Self, Self::Error> {
+        let (digits, rest) = written.samples.as_bytes().as_chunks::<8>();
+        let sample = |digits: &[u8; 8]| {
+            let bits = u32::from_str_radix(std::str::from_utf8(digits).ok()?, 16).ok()?;
+            Some(f32::from_bits(bits))
+        };
+        let samples: Option<Vec<f32>> = digits.iter().map(sample).collect();
+        match samples {
+            Some(samples) if rest.is_empty() => Ok(Self {
+                size: written.size,
+                samples: samples.into(),
+            }),
+            _ => Err("expected eight hexadecimal digits for each sample"),
+        }
     }
 }
 

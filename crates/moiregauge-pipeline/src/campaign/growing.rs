@@ -1,0 +1,244 @@
+//! A campaign that grows: scans come and go, settings change, and nothing is measured twice.
+
+use std::path::{Path, PathBuf};
+
+use moiregauge::campaign::{Analysis, analyse};
+use moiregauge::scan::sorted_moires;
+use moiregauge::settings::{Settings, SettingsError};
+use moiregauge_report::results::{NamedSet, Run, Told};
+use moiregauge_report::{FailedInput, Provenance};
+
+use super::channel::Other;
+use super::error::AnalyseError;
+use super::kept::Kept;
+use super::measure::{Advice, Inputs, Measured, given_again, measured, no_advice};
+use super::overlap::overlap;
+use super::shown::show;
+use crate::job::Job;
+use crate::known::{Known, Places};
+use crate::names::in_words;
+use crate::twice::distinct;
+
+/// What came out, and of what.
+#[derive(Clone, Debug)]
+pub struct Outcome {
+    /// The numbers.
+    pub analysis: Analysis,
+    /// The files, those that failed among them.
+    pub provenance: Provenance,
+}
+
+/// Scans that are analysed together.
+///
+/// Measuring takes nearly all of the time of an analysis. A file is measured once for each content, settings of
+/// measuring and what is known of it; everything else is done anew in milliseconds a scan.
+#[derive(Clone, Debug)]
+pub struct Campaign {
+    settings: Settings,
+    told: Told,
+    sets: Vec<NamedSet>,
+    inputs: Vec<PathBuf>,
+    places: Places,
+    left_out: Vec<FailedInput>,
+    kept: Kept,
+    illustrated: bool,
+    advice: Advice,
+}
+
+impl Campaign {
+    /// One without scans.
+    ///
+    /// # Errors
+    /// Settings that make no sense.
+    pub fn new(settings: Settings) -> Result<Self, SettingsError> {
+        settings.check()?;
+        Ok(Self {
+            settings,
+            told: Told::default(),
+            sets: Vec::new(),
+            inputs: Vec::new(),
+            places: Places::new(),
+            left_out: Vec::new(),
+            kept: Kept::default(),
+            illustrated: false,
+            advice: no_advice,
+        })
+    }
+
+    /// That of a run, with its scans.
+    ///
+    /// # Errors
+    /// Settings that make no sense.
+    pub fn of_run(
+        run: &Run,
+        inputs: &[PathBuf],
+        places: &Places,
+        advice: Advice,
+    ) -> Result<Self, SettingsError> {
+        let wanted = run.report;
+        let mut campaign = Self::new(run.settings.clone())?;
+        campaign.add(inputs.iter().cloned());
+        Ok(Self {
+            told: run.known.clone(),
+            sets: run.sets.clone(),
+            places: places.clone(),
+            left_out: run.left_out.clone(),
+            illustrated: wanted.figures || wanted.png || wanted.html,
+            advice,
+            ..campaign
+        })
+    }
+
+    /// Adds scans, in order.
+    pub fn add(&mut self, scans: impl IntoIterator<Item = PathBuf>) {
+        self.inputs.extend(scans);
+    }
+
+    /// Removes a scan; whether it was there. What was measured of it is kept.
+    pub fn remove(&mut self, scan: &Path) -> bool {
+        let before = self.inputs.len();
+        self.inputs.retain(|path| path != scan);
+        self.inputs.len() < before
+    }
+
+    /// The same scans with other settings. What was measured stays where they do not change it.
+    ///
+    /// # Errors
+    /// Settings that make no sense.
+    pub fn with_settings(mut self, settings: Settings) -> Result<Self, SettingsError> {
+        settings.check()?;
+        self.settings = settings;
+        Ok(self)
+    }
+
+    /// The same scans with other knowledge of them.
+    #[must_use]
+    pub fn with_told(mut self, told: Told) -> Self {
+        self.told = told;
+        self
+    }
+
+    /// The same scans, some of which lie elsewhere than their names say.
+    #[must_use]
+    pub fn with_places(mut self, places: Places) -> Self {
+        self.places = places;
+        self
+    }
+
+    /// With names that were given and cannot be measured.
+    #[must_use]
+    pub fn with_left_out(mut self, left_out: Vec<FailedInput>) -> Self {
+        self.left_out = left_out;
+        self
+    }
+
+    /// With what a front end says that helps against errors.
+    #[must_use]
+    pub fn with_advice(mut self, advice: Advice) -> Self {
+        self.advice = advice;
+        self
+    }
+
+    /// Whether analyses hold the first image of every set, for figures.
+    #[must_use]
+    pub fn illustrated(mut self, illustrated: bool) -> Self {
+        self.illustrated = illustrated;
+        self
+    }
+
+    /// Takes an orientation that was measured into the settings.
+    pub(super) fn know_orientation(
+        &mut self,
+        known: heterostrain::strain::KnownOrientation,
+    ) -> Result<(), SettingsError> {
+        self.settings.lattice_angle = Some(known);
+        self.settings.check()
+    }
+
+    /// The settings.
+    pub fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    /// The scans.
+    pub fn inputs(&self) -> &[PathBuf] {
+        &self.inputs
+    }
+
+    /// What was measured so far.
+    pub fn kept(&self) -> &Kept {
+        &self.kept
+    }
+
+    /// Takes what was measured by another campaign.
+    pub fn take(&mut self, kept: Kept) {
+        self.kept.extend(kept);
+    }
+
+    /// Analyses the scans, every moiré that they show by itself.
+    ///
+    /// # Errors
+    /// [`AnalyseError`]; after [`AnalyseError::Cancelled`] what was measured is kept, and the next analysis goes on
+    /// from there.
+    pub fn analyse(&mut self, job: &Job) -> Result<Vec<Outcome>, AnalyseError> {
+        let (inputs, repeated) = distinct(&self.inputs);
+        let known = Known::new(&self.told, &inputs).at(&self.places);
+        let mut failed = self.left_out.clone();
+        let common = if self.settings.overlap {
+            job.run(|| Some(overlap(&inputs, &self.settings, &known)))?
+        } else {
+            None
+        };
+        let Some(window) = common.map_or(Some(None), |w| w.map(Some)) else {
+            return Err(AnalyseError::NoCommonRegion { failed });
+        };
+        let from = Inputs {
+            files: &inputs,
+            sets: &self.sets,
+            known: &known,
+            window: window.as_ref(),
+            advice: self.advice,
+        };
+        let Measured { files, other } = measured(&from, &self.settings, &mut self.kept, job)?;
+        let settings = other.as_ref().map_or(&self.settings, |o| &o.settings);
+        let (mut scans, mut identities) = (Vec::new(), Vec::new());
+        for (path, result) in inputs.iter().zip(files) {
+            match result {
+                Ok((moires, file)) => {
+                    scans.push(moires);
+                    identities.push(file);
+                }
+                Err(failure) => failed.push(FailedInput {
+                    file: in_words(path),
+                    error: failure.error,
+                }),
+            }
+        }
+        if scans.is_empty() {
+            return Err(AnalyseError::Nothing { failed });
+        }
+        let provenance = Provenance {
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            seed: settings.seed,
+            inputs: identities,
+            failed,
+            run: None,
+        };
+        let mut caveats = given_again(&repeated);
+        caveats.extend(other.as_ref().map(Other::caveat));
+        let of_moire = |(moire, scans)| {
+            let settings = &settings.of_moire(moire);
+            let mut analysis = analyse(scans, settings);
+            analysis.caveats.extend(caveats.iter().cloned());
+            if self.illustrated {
+                show(&mut analysis, &inputs, settings, &known);
+            }
+            Outcome {
+                analysis,
+                provenance: provenance.clone(),
+            }
+        };
+        let moires = sorted_moires(scans).into_iter().enumerate();
+        Ok(job.run(|| moires.map(of_moire).collect())?)
+    }
+}
