@@ -269,7 +269,7 @@ pub(crate) fn check(settings: &Settings) -> anyhow::Result<()> {
 }
 
 /// Options by the names of settings; the first that the name begins with.
-const OPTIONS: [(&str, &str); 19] = [
+const OPTIONS: [(&str, &str); 24] = [
     ("material.lattice_constant_nm", "--lattice-constant"),
     (
         "material.lattice_constant_sigma_nm",
@@ -298,6 +298,11 @@ const OPTIONS: [(&str, &str); 19] = [
     ("lattice_angle.layer", "--lattice-angle-layer"),
     ("lattice_angle", "--lattice-angle"),
     ("strain_draws", "--strain-draws"),
+    ("size_nm", "--size"),
+    ("line_rate_hz", "--line-rate"),
+    ("rotation_deg", "--rotation"),
+    ("crop", "--crop"),
+    ("x_sensor", "--x-sensor and --y-sensor"),
 ];
 
 /// The error with the options that it is about.

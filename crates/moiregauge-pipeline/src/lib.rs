@@ -9,6 +9,7 @@ mod find;
 mod hash;
 mod job;
 mod known;
+pub mod maps;
 mod memory;
 pub mod names;
 mod opened;
@@ -18,6 +19,7 @@ pub mod samples;
 pub mod session;
 mod sets;
 pub mod sink;
+mod told;
 mod twice;
 
 pub use content::Content;
@@ -30,4 +32,5 @@ pub use opened::{InputError, Opened, Reading, read_again, read_scan, read_shown}
 pub use reading::{FileError, open, read, read_text};
 pub use replay::{Document, ReplayError, record_files, settings_of};
 pub use sets::{SetError, absolute, check_sets, set_of};
+pub use told::check_told;
 pub use twice::{Repeated, distinct};

@@ -35,6 +35,9 @@ const NAMES: [&str; 12] = [
     "figures/",
 ];
 
+/// Named files in memory.
+pub(super) type Files = Vec<(String, Vec<u8>)>;
+
 /// Where results go, and what is said of them.
 pub(super) struct Output {
     out: PathBuf,
@@ -77,11 +80,30 @@ impl Output {
         })
     }
 
-    /// Writes everything, and says what came out; the exit code tells whether all went well.
-    pub(super) fn write(self, task: &Task, outcomes: &[Outcome]) -> anyhow::Result<ExitCode> {
+    /// Where everything is written.
+    pub(super) fn sink(&self) -> &FolderSink {
+        &self.sink
+    }
+
+    /// Makes the reports of all moirés, and writes them beside their places.
+    pub(super) fn reports(&self, task: &Task, outcomes: &[Outcome]) -> anyhow::Result<Vec<Files>> {
+        let folders = within(outcomes.len());
+        let all = outcomes.iter().zip(&folders);
+        all.map(|(outcome, within)| self.report(task, outcome, within))
+            .collect()
+    }
+
+    /// Puts everything in place, and says what came out; the exit code tells whether all went well.
+    pub(super) fn write(
+        self,
+        task: &Task,
+        outcomes: &[Outcome],
+        reports: Vec<Files>,
+    ) -> anyhow::Result<ExitCode> {
         let (mut answers, mut documents) = (Vec::new(), Vec::new());
         let folders = within(outcomes.len());
-        for (number, (outcome, within)) in outcomes.iter().zip(&folders).enumerate() {
+        let all = outcomes.iter().zip(&folders).zip(reports);
+        for (number, ((outcome, within), written)) in all.enumerate() {
             if self.loud && outcomes.len() > 1 {
                 answers.push(format!(
                     "\n== moiré {} of {}: {}\n",
@@ -90,7 +112,6 @@ impl Output {
                     outcome.analysis.settings.bilayer().name()
                 ));
             }
-            let written = self.report(task, outcome, within)?;
             if self.loud {
                 answers.push(summary(&outcome.analysis, hints::of));
                 // The file to open first.
@@ -135,12 +156,7 @@ impl Output {
     }
 
     /// Writes the report of one moiré; returns its files.
-    fn report(
-        &self,
-        task: &Task,
-        outcome: &Outcome,
-        within: &str,
-    ) -> anyhow::Result<Vec<(String, Vec<u8>)>> {
+    fn report(&self, task: &Task, outcome: &Outcome, within: &str) -> anyhow::Result<Files> {
         let written = write_report(&outcome.analysis, &outcome.provenance, &task.run.report)?;
         write_all(&self.sink, within, &written)?;
         if task.run.parquet {

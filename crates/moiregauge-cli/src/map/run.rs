@@ -26,7 +26,7 @@ pub(crate) fn run(args: &MapArgs, job: &Job) -> anyhow::Result<ExitCode> {
     let document = args.analyze.out().join("map.json");
     let mut made = match survey(args, &task, &sink, job)? {
         Some(made) => made,
-        None => match together(args, &task, job)? {
+        None => match together(args, &task, &sink, job)? {
             Answer::Lattice(made) => *made,
             Answer::Stripes(mut found) => {
                 let provenance = &mut found.provenance;

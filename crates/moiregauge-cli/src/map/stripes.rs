@@ -8,6 +8,7 @@ use moiregauge::settings::Settings;
 use moiregauge::stripes::SampledStripes;
 use moiregauge::survey::{ScanStripes, stripes_of_scan};
 use moiregauge::window::Resolution;
+use moiregauge_pipeline::maps::{mapped_image, narrow_margin};
 use moiregauge_pipeline::sink::FolderSink;
 use moiregauge_pipeline::{Known, Opened};
 use moiregauge_report::results::{MapResults, StripesResult};
@@ -15,8 +16,6 @@ use moiregauge_report::{FailedInput, Provenance, stripe_figures, stripe_scan};
 use spmfile::WritableFormat;
 
 use super::args::{MapArgs, MapMethodArg};
-use super::doubts::narrow_margin;
-use super::made::image;
 use super::output;
 use crate::analyze::with_advice;
 use crate::outputs::write_all;
@@ -192,7 +191,7 @@ fn results(striped: &Striped) -> MapResults {
     MapResults {
         quantities: found.patterns.iter().flat_map(|p| p.map.clone()).collect(),
         images: lines
-            .map(|line| image(file, Some(*line), striped.found.drift_corrected, &harmonics))
+            .map(|line| mapped_image(file, Some(*line), striped.found.drift_corrected, &harmonics))
             .collect(),
         stripes: Some(found),
         agreement: stripes.agreement.map(Into::into),

@@ -8,13 +8,14 @@ use moiregauge::caveat::{Caveat, MapDoubt, SurveyDrift};
 use moiregauge::map::TwistStrainMap;
 use moiregauge::survey::SurveyPlan;
 use moiregauge_pipeline::campaign::given_again;
+use moiregauge_pipeline::maps::mapped_image;
 use moiregauge_pipeline::sink::FolderSink;
 use moiregauge_pipeline::{Job, distinct};
 use moiregauge_report::Provenance;
 
 use super::args::MapArgs;
 use super::large::Large;
-use super::made::{Made, image};
+use super::made::Made;
 use crate::analyze::Task;
 
 /// Maps images that are too large for memory, side by side; `None` where the first is not large.
@@ -71,7 +72,12 @@ pub(super) fn survey(
             plan.drift_corrected,
             settings.drift.is_some(),
         ));
-        images.push(image(&file, None, plan.drift_corrected, &plan.harmonics));
+        images.push(mapped_image(
+            &file,
+            None,
+            plan.drift_corrected,
+            &plan.harmonics,
+        ));
         maps.push(map);
         read.push(large.input.clone());
         plans.push((large, plan));

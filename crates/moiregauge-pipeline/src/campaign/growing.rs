@@ -7,6 +7,7 @@ use moiregauge::scan::sorted_moires;
 use moiregauge::settings::{Settings, SettingsError};
 use moiregauge_report::results::{NamedSet, Run, Told};
 use moiregauge_report::{FailedInput, Provenance};
+use serde::{Deserialize, Serialize};
 
 use super::channel::Other;
 use super::error::AnalyseError;
@@ -17,6 +18,7 @@ use super::shown::show;
 use crate::job::Job;
 use crate::known::{Known, Places};
 use crate::names::in_words;
+use crate::told::check_told;
 use crate::twice::distinct;
 
 /// What came out, and of what.
@@ -32,7 +34,8 @@ pub struct Outcome {
 ///
 /// Measuring takes nearly all of the time of an analysis. A file is measured once for each content, settings of
 /// measuring and what is known of it; everything else is done anew in milliseconds a scan.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(try_from = "Written")]
 pub struct Campaign {
     settings: Settings,
     told: Told,
@@ -42,7 +45,49 @@ pub struct Campaign {
     left_out: Vec<FailedInput>,
     kept: Kept,
     illustrated: bool,
-    advice: Advice,
+    #[serde(skip)]
+    advice: Words,
+}
+
+/// A campaign as it is written.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Written {
+    settings: Settings,
+    told: Told,
+    sets: Vec<NamedSet>,
+    inputs: Vec<PathBuf>,
+    places: Places,
+    left_out: Vec<FailedInput>,
+    kept: Kept,
+    illustrated: bool,
+}
+
+impl TryFrom<Written> for Campaign {
+    type Error = SettingsError;
+
+    fn try_from(written: Written) -> Result<Self, Self::Error> {
+        let campaign = Self::new(written.settings)?.with_told(written.told)?;
+        Ok(Self {
+            sets: written.sets,
+            inputs: written.inputs,
+            places: written.places,
+            left_out: written.left_out,
+            kept: written.kept,
+            illustrated: written.illustrated,
+            ..campaign
+        })
+    }
+}
+
+/// What a front end says of errors; it is no part of what is written.
+#[derive(Clone, Copy, Debug)]
+struct Words(Advice);
+
+impl Default for Words {
+    fn default() -> Self {
+        Self(no_advice)
+    }
 }
 
 impl Campaign {
@@ -61,7 +106,7 @@ impl Campaign {
             left_out: Vec::new(),
             kept: Kept::default(),
             illustrated: false,
-            advice: no_advice,
+            advice: Words::default(),
         })
     }
 
@@ -76,15 +121,14 @@ impl Campaign {
         advice: Advice,
     ) -> Result<Self, SettingsError> {
         let wanted = run.report;
-        let mut campaign = Self::new(run.settings.clone())?;
+        let mut campaign = Self::new(run.settings.clone())?.with_told(run.known.clone())?;
         campaign.add(inputs.iter().cloned());
         Ok(Self {
-            told: run.known.clone(),
             sets: run.sets.clone(),
             places: places.clone(),
             left_out: run.left_out.clone(),
             illustrated: wanted.figures || wanted.png || wanted.html,
-            advice,
+            advice: Words(advice),
             ..campaign
         })
     }
@@ -112,10 +156,13 @@ impl Campaign {
     }
 
     /// The same scans with other knowledge of them.
-    #[must_use]
-    pub fn with_told(mut self, told: Told) -> Self {
+    ///
+    /// # Errors
+    /// What no file can be like.
+    pub fn with_told(mut self, told: Told) -> Result<Self, SettingsError> {
+        check_told(&told)?;
         self.told = told;
-        self
+        Ok(self)
     }
 
     /// The same scans, some of which lie elsewhere than their names say.
@@ -135,7 +182,7 @@ impl Campaign {
     /// With what a front end says that helps against errors.
     #[must_use]
     pub fn with_advice(mut self, advice: Advice) -> Self {
-        self.advice = advice;
+        self.advice = Words(advice);
         self
     }
 
@@ -158,6 +205,11 @@ impl Campaign {
     /// The settings.
     pub fn settings(&self) -> &Settings {
         &self.settings
+    }
+
+    /// What is known of the scans.
+    pub fn told(&self) -> &Told {
+        &self.told
     }
 
     /// The scans.
@@ -197,7 +249,7 @@ impl Campaign {
             sets: &self.sets,
             known: &known,
             window: window.as_ref(),
-            advice: self.advice,
+            advice: self.advice.0,
         };
         let Measured { files, other } = measured(&from, &self.settings, &mut self.kept, job)?;
         let settings = other.as_ref().map_or(&self.settings, |o| &o.settings);

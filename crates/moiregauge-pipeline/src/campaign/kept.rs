@@ -5,6 +5,7 @@ use std::path::Path;
 
 use moiregauge::scan::{MeasuredScan, Window};
 use moiregauge::settings::Settings;
+use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
 
 use super::measure::Failure;
@@ -16,7 +17,11 @@ use crate::session;
 pub(crate) const SCHEMA: &str = "moiregauge/measured/1";
 
 /// Measured scans by the hash of their file and of all that measuring depends on.
-#[derive(Clone, Debug, Default)]
+///
+/// As JSON it is a document of its own, `moiregauge/measured/1`: measuring and analysing can happen in different
+/// processes and on different days. Entries of other versions of this crate are never used.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[serde(try_from = "Document", into = "Document")]
 pub struct Kept(BTreeMap<String, Result<Vec<MeasuredScan>, Failure>>);
 
 impl Kept {
@@ -40,6 +45,61 @@ impl Kept {
 
     pub(super) fn put(&mut self, key: String, measured: Result<Vec<MeasuredScan>, Failure>) {
         self.0.insert(key, measured);
+    }
+}
+
+/// Measured scans as they are written.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Document {
+    schema: String,
+    files: BTreeMap<String, OfFile>,
+}
+
+/// What a file gave: its moirés, or why there are none.
+#[derive(Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum OfFile {
+    Moires(Vec<MeasuredScan>),
+    Failed(Failure),
+}
+
+impl From<Kept> for Document {
+    fn from(kept: Kept) -> Self {
+        let files = kept.0.into_iter().map(|(key, measured)| match measured {
+            Ok(moires) => (key, OfFile::Moires(moires)),
+            Err(failure) => (key, OfFile::Failed(failure)),
+        });
+        Self {
+            schema: SCHEMA.to_owned(),
+            files: files.collect(),
+        }
+    }
+}
+
+impl TryFrom<Document> for Kept {
+    type Error = String;
+
+    fn try_from(document: Document) -> Result<Self, Self::Error> {
+        if document.schema != SCHEMA {
+            return Err(format!("expected {SCHEMA:?}, found {:?}", document.schema));
+        }
+        let files = document
+            .files
+            .into_iter()
+            .map(|(key, of_file)| match of_file {
+                // An analysis needs at least one moiré of a file that it takes for measured.
+                OfFile::Moires(moires)
+                    if moires.iter().all(|m| !m.lines.is_empty()) && !moires.is_empty() =>
+                {
+                    Ok((key, Ok(moires)))
+                }
+                OfFile::Moires(_) => {
+                    Err(format!("{key}: expected a lattice of a line, found none"))
+                }
+                OfFile::Failed(failure) => Ok((key, Err(failure))),
+            });
+        Ok(Self(files.collect::<Result<_, _>>()?))
     }
 }
 

@@ -10,6 +10,7 @@ use moiregauge::settings::Settings;
 use moiregauge_report::InputFile;
 use moiregauge_report::results::NamedSet;
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use super::channel::{Other, others};
 use super::kept::{Kept, With};
@@ -29,8 +30,18 @@ pub fn no_advice(_: &InputError) -> Option<String> {
     None
 }
 
+/// An error with what helps against it and with all its causes, in one line.
+pub fn in_words(error: &InputError, advice: Advice) -> String {
+    let words = in_full(error);
+    match advice(error) {
+        Some(advice) => format!("{advice}: {words}"),
+        None => words,
+    }
+}
+
 /// Why a file could not be measured, in words that can be kept.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub(super) struct Failure {
     pub(super) error: String,
     /// Whether it is the image that shows none.
@@ -39,12 +50,8 @@ pub(super) struct Failure {
 
 impl Failure {
     fn of(error: &InputError, advice: Advice) -> Self {
-        let words = in_full(error);
         Self {
-            error: match advice(error) {
-                Some(advice) => format!("{advice}: {words}"),
-                None => words,
-            },
+            error: in_words(error, advice),
             no_lattice: matches!(error, InputError::Measure(MeasureError::Lattice { .. })),
         }
     }

@@ -14,5 +14,5 @@ mod survey;
 pub use error::{AnalyseError, Place};
 pub use growing::{Campaign, Outcome};
 pub use kept::Kept;
-pub use measure::{Advice, given_again, measure_file, no_advice};
+pub use measure::{Advice, given_again, in_words, measure_file, no_advice};
 pub use outcomes::outcomes;

@@ -16,12 +16,13 @@ use super::tables;
 use crate::campaign::{Advice, no_advice};
 use crate::job::Job;
 use crate::sink::FileSink;
+use crate::told::check_told;
 
 /// What is to be done with many samples.
 #[derive(Clone, Debug)]
 pub struct Samples {
     root: PathBuf,
-    samples: Vec<Sample>,
+    all: Vec<Sample>,
     asked: Asked,
     shard: Shard,
     advice: Advice,
@@ -48,15 +49,16 @@ impl Samples {
     /// Settings that make no sense.
     pub fn new(
         root: &Path,
-        mut samples: Vec<Sample>,
+        mut all: Vec<Sample>,
         settings: Settings,
         known: Told,
     ) -> Result<Self, SettingsError> {
         settings.check()?;
-        samples.sort_by(|a, b| a.name.cmp(&b.name));
+        check_told(&known)?;
+        all.sort_by(|a, b| a.name.cmp(&b.name));
         Ok(Self {
             root: root.to_owned(),
-            samples,
+            all,
             asked: Asked {
                 version: env!("CARGO_PKG_VERSION").to_owned(),
                 settings,
@@ -99,7 +101,7 @@ pub fn analyse_samples(
         None
     };
     let parts = FileSink::open(&out.join(PARTS), true, &[])?;
-    let shared = asked.samples.iter().enumerate();
+    let shared = asked.all.iter().enumerate();
     let own: Vec<&Sample> = shared
         .filter(|(place, _)| asked.shard.has(*place))
         .map(|(_, sample)| sample)
@@ -174,22 +176,17 @@ impl Samples {
             picture: found.picture.is_some(),
             rows: found.rows,
         };
-        self.write(parts, &part, found.picture)?;
+        write(parts, &part, found.picture)?;
         Ok((listed, SamplesDone::of(&part.rows)))
     }
+}
 
-    /// The picture first: a part that is there is complete.
-    fn write(
-        &self,
-        parts: &FileSink,
-        part: &Part,
-        picture: Option<Vec<u8>>,
-    ) -> Result<(), SamplesError> {
-        if let Some(picture) = picture {
-            parts.write(&[(PathBuf::from(picture_name(&part.key)), picture)])?;
-        }
-        let bytes = part.bytes().unwrap_or_default();
-        parts.write(&[(PathBuf::from(part_name(&part.key)), bytes)])?;
-        Ok(())
+/// The picture first: a part that is there is complete.
+fn write(parts: &FileSink, part: &Part, picture: Option<Vec<u8>>) -> Result<(), SamplesError> {
+    if let Some(picture) = picture {
+        parts.write(&[(PathBuf::from(picture_name(&part.key)), picture)])?;
     }
+    let bytes = part.bytes().unwrap_or_default();
+    parts.write(&[(PathBuf::from(part_name(&part.key)), bytes)])?;
+    Ok(())
 }

@@ -78,13 +78,15 @@ pub fn samples_page(page: &SamplesPage) -> Result<Vec<u8>, ReportError> {
         ok: count(SampleStatus::Ok),
         doubtful: count(SampleStatus::Doubtful),
         failed: count(SampleStatus::Failed),
-        rows: rows.map(|(row, picture)| shown(row, picture)).collect(),
+        rows: rows
+            .map(|(row, picture)| shown(row, picture.as_ref()))
+            .collect(),
         failures: failures.collect(),
     };
     rendered(include_str!("../html/samples.html"), content)
 }
 
-fn shown(row: &SampleRow, picture: &Option<String>) -> Row {
+fn shown(row: &SampleRow, picture: Option<&String>) -> Row {
     let words = |value: Option<f64>, total: Option<f64>, part: Option<f64>| {
         value.map_or_else(String::new, |value| {
             let sigma = total.or(part).unwrap_or(f64::NAN);
@@ -94,7 +96,7 @@ fn shown(row: &SampleRow, picture: &Option<String>) -> Row {
     let x = words(row.drift_x_nm_per_min, None, row.drift_x_sigma_nm_per_min);
     let y = words(row.drift_y_nm_per_min, None, row.drift_y_sigma_nm_per_min);
     Row {
-        picture: picture.clone(),
+        picture: picture.cloned(),
         sample: row.sample.clone(),
         moire: row.moire,
         status: row.status.name(),

@@ -92,7 +92,7 @@ impl<T: Numbers, const N: usize> Numbers for [T; N] {
     }
 
     fn of(parts: &[f64]) -> Option<Self> {
-        if N == 0 || parts.len() % N != 0 || parts.is_empty() {
+        if parts.is_empty() || N == 0 || !parts.len().is_multiple_of(N) {
             return None;
         }
         let all: Option<Vec<T>> = parts.chunks(parts.len() / N).map(T::of).collect();

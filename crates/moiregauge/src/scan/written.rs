@@ -1,5 +1,8 @@
 //! Values of the reader of files as they are written with a measured scan.
 
+// Serde hands over references.
+#![allow(clippy::ref_option, clippy::trivially_copy_pass_by_ref)]
+
 /// A date and time.
 pub(super) mod date {
     use serde::{Deserialize, Deserializer, Serialize, Serializer};
