@@ -89,6 +89,9 @@ pub(crate) fn run(args: &CampaignArgs, job: &Job) -> anyhow::Result<ExitCode> {
         };
         say(&format!("{}{next}\n", counts(&done)))?;
     }
+    if args.shard.is_none() {
+        analyze.show(&out.join("campaign.html"));
+    }
     Ok(ended(&done))
 }
 

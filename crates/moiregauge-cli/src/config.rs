@@ -7,6 +7,7 @@ use anyhow::{Context as _, bail};
 use heterostrain::material::Material;
 use moiregauge::settings::{Settings, SettingsError};
 
+use crate::nearest::{nearest, nearest_key};
 use crate::say::say;
 
 /// Print a commented settings file with all defaults
@@ -152,7 +153,10 @@ pub(crate) fn read(path: &Path) -> anyhow::Result<Settings> {
         return Ok(moiregauge_pipeline::settings_of(path, text.as_bytes())?);
     }
     let folder = path.parent().unwrap_or(Path::new(""));
-    parse(&text, folder).with_context(|| format!("in the settings file {}", path.display()))
+    parse(&text, folder).map_err(|error| {
+        let meant = nearest_key(&error.to_string());
+        error.context(format!("in the settings file {}{meant}", path.display()))
+    })
 }
 
 fn parse(text: &str, folder: &Path) -> anyhow::Result<Settings> {
@@ -219,8 +223,9 @@ fn material_of(name: &str, own: &[Material]) -> anyhow::Result<Material> {
         .chain(Material::all())
         .map(|m| m.name)
         .collect();
+    let nearest = nearest(name, known.iter().map(String::as_str));
     bail!(
-        "unknown material {name:?}; known are {}; others can be described in a file (--materials) or in a \
+        "unknown material {name:?}{nearest}; known are {}; others can be described in a file (--materials) or in a \
          [material] table of a settings file",
         known.join(", ")
     )

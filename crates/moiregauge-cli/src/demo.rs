@@ -51,7 +51,7 @@ pub(crate) fn run(args: &DemoArgs, job: &Job) -> anyhow::Result<ExitCode> {
         "Simulating three sets of scans in {} …\n",
         out.display()
     ))?;
-    let folders = write_sets(&sets, &out.join("scans"), args.force)?;
+    let folders = write_sets(&sets, &out.join("scans"), args.force, job)?;
     say("Analysing them …\n\n")?;
     let inputs: Vec<PathBuf> = expand(&folders, false).into_iter().flatten().collect();
     let settings = Settings {
@@ -66,7 +66,9 @@ pub(crate) fn run(args: &DemoArgs, job: &Job) -> anyhow::Result<ExitCode> {
         analysis,
         provenance,
     } = analysed.context("the simulated scans could not be analysed")?;
+    let stage = job.stage("writing", "reports", 1);
     let report = write_report(&analysis, &provenance, &Choice::default())?;
+    drop(stage);
     outputs::write_all(&sink, "", &report)?;
     outputs::commit(sink)?;
     say(&summary(&analysis, crate::hints::of))?;

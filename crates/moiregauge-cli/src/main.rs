@@ -14,6 +14,7 @@ mod interrupt;
 mod map;
 mod merge;
 mod moire;
+mod nearest;
 mod numbers;
 mod outputs;
 mod paths;
@@ -21,6 +22,7 @@ mod plan;
 mod progress;
 mod say;
 mod scanner;
+mod shells;
 mod simulate;
 mod stripes;
 mod validate;
@@ -59,6 +61,8 @@ enum Command {
     Plan(Box<plan::PlanArgs>),
     Config(config::ConfigArgs),
     Explain(explain::ExplainArgs),
+    Completions(shells::CompletionsArgs),
+    Man(shells::ManArgs),
 }
 
 /// The arguments. A negative number is a value everywhere, so that its option is named where it is refused.
@@ -114,11 +118,13 @@ fn run(command: &Command, job: &Job) -> anyhow::Result<ExitCode> {
         Command::Convert(args) => convert::run(args, job),
         Command::Moire(args) => moire::run(args),
         Command::Info(args) => info::run(args),
-        Command::Simulate(args) => simulate::run(args),
+        Command::Simulate(args) => simulate::run(args, job),
         Command::Demo(args) => demo::run(args, job),
         Command::Validate(args) => validate::run(args, job),
         Command::Plan(args) => plan::run(args),
         Command::Config(args) => config::run(args),
         Command::Explain(args) => explain::run(args),
+        Command::Completions(args) => shells::completions(args, arguments()),
+        Command::Man(args) => shells::man(args, arguments()),
     }
 }

@@ -23,7 +23,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         known: &Known::new(campaign.told(), &inputs),
         advice: no_advice,
     };
-    let found = map_lattices(&scans, MapMethod::Demodulation, &Resolution::default(), &job)?;
+    let found = map_lattices(
+        &scans,
+        MapMethod::Demodulation,
+        &Resolution::default(),
+        &job,
+    )?;
     let magic = Questions {
         wanted: Some(WantedTwist {
             twist: 1.08_f64.to_radians(),

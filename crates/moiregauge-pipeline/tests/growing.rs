@@ -98,6 +98,35 @@ fn what_is_measured_is_written_and_read_to_the_last_bit() {
     assert!(wrong != written && serde_json::from_str::<Campaign>(&wrong).is_err());
 }
 
+/// What is kept is as its schema says, also where nothing was found and where nothing is known.
+#[test]
+fn what_is_kept_fits_its_schema() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut scans = scans(folder.path(), 2);
+    let blank = folder.path().join("blank.npy");
+    let mut array = b"\x93NUMPY\x01\0\x76\0".to_vec();
+    let header = "{'descr': '|u1', 'fortran_order': False, 'shape': (64, 64), }";
+    array.extend(format!("{header:<117}\n").bytes());
+    array.extend((0..64 * 64).map(|n: u32| (n.wrapping_mul(2_654_435_761) >> 24) as u8));
+    std::fs::write(&blank, array).unwrap();
+    scans.push(blank);
+    let schema = include_str!("../../moiregauge-report/schema/measured-1.schema.json");
+    let schema = jsonschema::validator_for(&serde_json::from_str(schema).unwrap()).unwrap();
+    for method in [moiregauge::Method::Lattice, moiregauge::Method::Paper] {
+        let settings = Settings {
+            method,
+            ..settings()
+        };
+        let mut campaign = campaign(&scans).with_settings(settings).unwrap();
+        campaign.analyse(&Job::quiet(None).unwrap()).unwrap();
+        let kept = serde_json::to_value(campaign.kept()).unwrap();
+        let problems: Vec<String> = schema.iter_errors(&kept).map(|e| e.to_string()).collect();
+        assert_eq!(problems, Vec::<String>::new());
+        let text = kept.to_string();
+        assert!(text.contains("\"moires\"") && text.contains("\"failed\""));
+    }
+}
+
 /// Scans come and go, settings change: the results are those of a new campaign, and nothing is measured twice.
 #[test]
 fn a_growing_campaign_is_a_new_one() {

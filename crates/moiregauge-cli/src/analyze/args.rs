@@ -183,6 +183,9 @@ pub(crate) struct AnalyzeArgs {
     /// Print results.json instead of the summary; with --moires a list of those of all moirés, the largest cell first
     #[arg(long)]
     pub(super) json: bool,
+    /// Show the report when it is written
+    #[arg(long, help_heading = OUTPUT, conflicts_with = "no_report")]
+    open: bool,
     /// Print nothing but errors
     #[arg(long, short)]
     pub(super) quiet: bool,
@@ -355,6 +358,7 @@ impl AnalyzeArgs {
             threads: other.threads,
             force: other.force,
             json: other.json,
+            open: other.open,
             quiet: other.quiet,
             ..self
         }
@@ -363,6 +367,16 @@ impl AnalyzeArgs {
     /// Whether results may be written over.
     pub(crate) fn force(&self) -> bool {
         self.force
+    }
+
+    /// Shows a page that was written, if that is wanted.
+    pub(crate) fn show(&self, page: &std::path::Path) {
+        if !self.open {
+            return;
+        }
+        if let Err(error) = open::that_detached(page) {
+            eprintln!("note: cannot show {}: {error}", page.display());
+        }
     }
 
     /// Whether results go to standard output as JSON.

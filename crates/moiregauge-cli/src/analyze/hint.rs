@@ -8,11 +8,16 @@ use moiregauge_report::FailedInput;
 use moiregauge_report::screen::failures;
 
 use crate::config;
+use crate::nearest::nearest;
 
 /// What helps against an error: an option of this program.
 pub(crate) fn advice(error: &InputError) -> Option<String> {
     let option = match error {
         InputError::Known(error) => return of_known(error).map(str::to_owned),
+        InputError::Measure(MeasureError::NoChannel { wanted, present }) => {
+            let meant = nearest(wanted, present.split(", "));
+            return (!meant.is_empty()).then(|| format!("--channel {wanted:?}{meant}"));
+        }
         InputError::Measure(MeasureError::NoSize) => "give the size, as in --size 70nm×70nm",
         InputError::Measure(MeasureError::Lattice { error, .. }) => match error {
             LatticeError::NoPeaks { .. } => "try --method fourier",

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use moiregauge::campaign::refusal;
+use moiregauge_pipeline::Job;
 use moiregauge_pipeline::campaign::Outcome;
 use moiregauge_pipeline::sink::{FolderSink, Target};
 use moiregauge_report::screen::{failures, summary};
@@ -85,12 +86,28 @@ impl Output {
         &self.sink
     }
 
+    /// The page of the first moiré.
+    pub(super) fn first_page(&self, moires: usize) -> PathBuf {
+        let within = within(moires).swap_remove(0);
+        self.out.join(within).join("report.html")
+    }
+
     /// Makes the reports of all moirés, and writes them beside their places.
-    pub(super) fn reports(&self, task: &Task, outcomes: &[Outcome]) -> anyhow::Result<Vec<Files>> {
+    pub(super) fn reports(
+        &self,
+        task: &Task,
+        outcomes: &[Outcome],
+        job: &Job,
+    ) -> anyhow::Result<Vec<Files>> {
+        let stage = job.stage("writing", "reports", outcomes.len());
         let folders = within(outcomes.len());
         let all = outcomes.iter().zip(&folders);
-        all.map(|(outcome, within)| self.report(task, outcome, within))
-            .collect()
+        all.map(|(outcome, within)| {
+            let written = self.report(task, outcome, within);
+            stage.step();
+            written
+        })
+        .collect()
     }
 
     /// Puts everything in place, and says what came out; the exit code tells whether all went well.

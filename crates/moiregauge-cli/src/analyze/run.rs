@@ -21,10 +21,13 @@ pub(crate) fn run(args: &AnalyzeArgs, job: &Job) -> anyhow::Result<ExitCode> {
     // Two steps that can be stopped. What follows takes no time.
     let outcomes = analysed(&task, &mut campaign, job)
         .map_err(|error| kept_for_next(error, output.sink(), &campaign))?;
-    let reports = job.run(|| output.reports(&task, &outcomes));
+    let reports = job.run(|| output.reports(&task, &outcomes, job));
     let reports = reports.unwrap_or_else(|cancelled| Err(cancelled.into()));
     let reports = reports.map_err(|error| kept_for_next(error, output.sink(), &campaign))?;
-    output.write(&task, &outcomes, reports)
+    let first = output.first_page(outcomes.len());
+    let ended = output.write(&task, &outcomes, reports)?;
+    args.show(&first);
+    Ok(ended)
 }
 
 fn analysed(task: &Task, campaign: &mut Campaign, job: &Job) -> anyhow::Result<Vec<Outcome>> {
