@@ -150,8 +150,10 @@ mod tests {
                 if n == 50 {
                     cancel.cancel();
                 }
-                while n >= 50 {
-                    interrupt::check();
+                if n >= 50 {
+                    loop {
+                        interrupt::check();
+                    }
                 }
             });
         };
