@@ -7,6 +7,7 @@ use anyhow::{Context as _, bail, ensure};
 use heterostrain::material::Material;
 use moiregauge::calibration::KnownLattice;
 use moiregauge::campaign::Calibrated;
+use moiregauge::numbers::interrupt;
 use moiregauge::scan::{MeasureError, MeasuredScan, measure_known};
 use moiregauge::settings::{Grouping, MOST_IMAGES, Settings};
 use moiregauge_pipeline::sink::OneFile;
@@ -174,6 +175,7 @@ fn measured_all(
     let results: Vec<_> = inputs
         .par_iter()
         .map(|path| {
+            interrupt::check();
             let result = measured(path);
             stage.step();
             result

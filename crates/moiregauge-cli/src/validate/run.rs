@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use anyhow::Context as _;
+use moiregauge::numbers::interrupt;
 use moiregauge::simulate::{MOST_PIXELS, Simulation, Simulator};
 use moiregauge::spectrum::Method;
 use moiregauge_pipeline::Job;
@@ -85,6 +86,7 @@ pub(crate) fn run(args: &ValidateArgs, job: &Job) -> anyhow::Result<ExitCode> {
     let compared: Vec<Option<Comparison>> = (0..args.sets)
         .into_par_iter()
         .map(|index| {
+            interrupt::check();
             let result = compare(&conditions, method, args.seed, index);
             stage.step();
             result

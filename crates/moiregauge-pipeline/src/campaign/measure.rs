@@ -5,6 +5,7 @@ use std::sync::{Mutex, PoisonError};
 
 use moiregauge::campaign::about_repeat;
 use moiregauge::caveat::Caveat;
+use moiregauge::numbers::interrupt;
 use moiregauge::scan::{MeasureError, MeasuredScan, Window, measure_moires};
 use moiregauge::settings::Settings;
 use moiregauge_report::InputFile;
@@ -143,6 +144,7 @@ impl Inputs<'_> {
         with: &With,
         kept: &Kept,
     ) -> (Option<String>, OfFile) {
+        interrupt::check();
         let failed = |error: &InputError| Err(Failure::of(error, self.advice));
         let opened = match Opened::new(path, self.known) {
             Ok(opened) => opened,
@@ -153,6 +155,7 @@ impl Inputs<'_> {
         if let Some(known) = kept.get(&key) {
             return (None, known.clone().map(|moires| (moires, input)));
         }
+        interrupt::check();
         let reading = opened.reading(settings);
         let reading = reading.and_then(|r| enough_for(&r.scan).map(|()| r).map_err(Into::into));
         drop(opened);

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use moiregauge::numbers::interrupt;
 use moiregauge::scan::{Window, common_window};
 use moiregauge::settings::Settings;
 use rayon::prelude::*;
@@ -13,7 +14,10 @@ use crate::opened::read_scan;
 pub(super) fn overlap(inputs: &[PathBuf], settings: &Settings, known: &Known) -> Option<Window> {
     let windows: Vec<Option<Window>> = inputs
         .par_iter()
-        .map(|path| Window::of(&read_scan(path, settings, known).ok()?.scan, settings))
+        .map(|path| {
+            interrupt::check();
+            Window::of(&read_scan(path, settings, known).ok()?.scan, settings)
+        })
         .collect();
     let windows: Vec<Window> = windows.into_iter().flatten().collect();
     common_window(&windows)

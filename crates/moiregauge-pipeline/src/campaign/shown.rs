@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use moiregauge::campaign::{Analysis, illustrate};
+use moiregauge::numbers::interrupt;
 use moiregauge::settings::Settings;
 use rayon::prelude::*;
 
@@ -19,6 +20,7 @@ pub(super) fn show(
     known: &Known,
 ) {
     analysis.sets.par_iter_mut().for_each(|set| {
+        interrupt::check();
         set.illustration = set.scans.first().and_then(|first| {
             let path = names::with_words(inputs, &first.file)?;
             let scan = read_shown(path, settings, known)?;
