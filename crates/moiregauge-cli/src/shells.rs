@@ -38,7 +38,8 @@ pub(crate) fn completions(
 }
 
 /// Prints the page.
-pub(crate) fn man(args: &ManArgs, mut program: clap::Command) -> anyhow::Result<ExitCode> {
+pub(crate) fn man(args: &ManArgs, program: clap::Command) -> anyhow::Result<ExitCode> {
+    let mut program = program.name("moiregauge");
     program.build();
     let page = match &args.command {
         None => program,

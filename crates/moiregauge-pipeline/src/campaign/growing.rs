@@ -6,7 +6,7 @@ use moiregauge::campaign::{Analysis, analyse};
 use moiregauge::scan::sorted_moires;
 use moiregauge::settings::{Settings, SettingsError};
 use moiregauge_report::results::{NamedSet, Run, Told};
-use moiregauge_report::{FailedInput, Provenance};
+use moiregauge_report::{FailedInput, InputFile, Provenance};
 use serde::{Deserialize, Serialize};
 
 use super::channel::Other;
@@ -236,14 +236,13 @@ impl Campaign {
         let (inputs, repeated) = distinct(&self.inputs);
         let known = Known::new(&self.told, &inputs).at(&self.places);
         let mut failed = self.left_out.clone();
-        let common = if self.settings.overlap {
-            job.run(|| Some(overlap(&inputs, &self.settings, &known)))?
-        } else {
-            None
-        };
-        let Some(window) = common.map_or(Some(None), |w| w.map(Some)) else {
-            return Err(AnalyseError::NoCommonRegion { failed });
-        };
+        let mut window = None;
+        if self.settings.overlap {
+            window = job.run(|| overlap(&inputs, &self.settings, &known))?;
+            if window.is_none() {
+                return Err(AnalyseError::NoCommonRegion { failed });
+            }
+        }
         let from = Inputs {
             files: &inputs,
             sets: &self.sets,
@@ -269,13 +268,7 @@ impl Campaign {
         if scans.is_empty() {
             return Err(AnalyseError::Nothing { failed });
         }
-        let provenance = Provenance {
-            version: env!("CARGO_PKG_VERSION").to_owned(),
-            seed: settings.seed,
-            inputs: identities,
-            failed,
-            run: None,
-        };
+        let provenance = provenance(settings, identities, failed);
         let mut caveats = given_again(&repeated);
         caveats.extend(other.as_ref().map(Other::caveat));
         let of_moire = |(moire, scans)| {
@@ -292,5 +285,16 @@ impl Campaign {
         };
         let moires = sorted_moires(scans).into_iter().enumerate();
         Ok(job.run(|| moires.map(of_moire).collect())?)
+    }
+}
+
+/// What was analysed; the record of the run comes later.
+fn provenance(settings: &Settings, inputs: Vec<InputFile>, failed: Vec<FailedInput>) -> Provenance {
+    Provenance {
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        seed: settings.seed,
+        inputs,
+        failed,
+        run: None,
     }
 }
