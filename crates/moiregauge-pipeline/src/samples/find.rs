@@ -1,7 +1,7 @@
 //! Which samples there are: one folder each, or as a table says.
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 use moiregauge_report::FailedInput;
 
@@ -33,10 +33,18 @@ impl Sample {
     pub(super) fn files(&self, root: &Path) -> SampleFiles {
         let (files, failed) = find(&self.paths).frames();
         // No place on this machine is in results.
-        let folder = format!("{}/", in_words(root).trim_end_matches('/'));
+        let root_words = in_words(root);
+        let here = root_words.trim_end_matches(['/', '\\']);
+        let inside = |words: &str| {
+            if here.is_empty() {
+                return words.to_owned();
+            }
+            let inside = words.replace(&format!("{here}/"), "");
+            inside.replace(&format!("{here}\\"), "")
+        };
         let failed = failed.into_iter().map(|failed| FailedInput {
-            file: failed.file.replace(&folder, ""),
-            error: failed.error.replace(&folder, ""),
+            file: inside(&failed.file),
+            error: inside(&failed.error),
         });
         SampleFiles {
             files: files.into_iter().map(|f| (name(root, &f), f)).collect(),
@@ -48,8 +56,10 @@ impl Sample {
 /// A path as seen from the folder of all samples, parts divided by `/`; that folder itself is `.`.
 fn name(root: &Path, path: &Path) -> String {
     let inside = path.strip_prefix(root).unwrap_or(path);
+    // What lies elsewhere is named without the way up to it.
     let parts = inside
         .components()
+        .filter(|part| matches!(part, Component::Normal(_)))
         .map(|p| in_words(p.as_os_str().as_ref()));
     let name = parts.collect::<Vec<_>>().join("/");
     if name.is_empty() {
