@@ -3,23 +3,15 @@
 mod again;
 mod args;
 mod arguments;
-mod atomic;
-mod chain;
-mod channel;
 mod export;
-mod measure;
+mod hint;
 mod orientation;
-mod outcomes;
 mod output;
-mod overlap;
 mod run;
-mod shown;
-mod survey;
 mod task;
 
 pub(crate) use args::{AnalyzeArgs, BackgroundArg, ConventionArg, LineArg, MethodArg};
-pub(crate) use chain::{Outcome, analyse_files};
-pub(crate) use measure::{given_again, measure_file, with_hint};
+pub(crate) use hint::{advice, in_words, with_advice};
 pub(crate) use orientation::{Angle, DirectionArg, SenseArg, parse_angle};
 pub(crate) use output::report_names;
 pub(crate) use run::run;

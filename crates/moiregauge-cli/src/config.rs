@@ -3,11 +3,11 @@
 use std::path::Path;
 use std::process::ExitCode;
 
-use anyhow::{Context as _, bail, ensure};
+use anyhow::{Context as _, bail};
 use heterostrain::material::Material;
-use moiregauge::settings::Settings;
-use moiregauge::spectrum::Method;
+use moiregauge::settings::{Settings, SettingsError};
 
+use crate::nearest::{nearest, nearest_key};
 use crate::say::say;
 
 /// Print a commented settings file with all defaults
@@ -153,7 +153,10 @@ pub(crate) fn read(path: &Path) -> anyhow::Result<Settings> {
         return Ok(moiregauge_pipeline::settings_of(path, text.as_bytes())?);
     }
     let folder = path.parent().unwrap_or(Path::new(""));
-    parse(&text, folder).with_context(|| format!("in the settings file {}", path.display()))
+    parse(&text, folder).map_err(|error| {
+        let meant = nearest_key(&error.to_string());
+        error.context(format!("in the settings file {}{meant}", path.display()))
+    })
 }
 
 fn parse(text: &str, folder: &Path) -> anyhow::Result<Settings> {
@@ -220,8 +223,9 @@ fn material_of(name: &str, own: &[Material]) -> anyhow::Result<Material> {
         .chain(Material::all())
         .map(|m| m.name)
         .collect();
+    let nearest = nearest(name, known.iter().map(String::as_str));
     bail!(
-        "unknown material {name:?}; known are {}; others can be described in a file (--materials) or in a \
+        "unknown material {name:?}{nearest}; known are {}; others can be described in a file (--materials) or in a \
          [material] table of a settings file",
         known.join(", ")
     )
@@ -264,157 +268,57 @@ pub(crate) fn own_materials(path: Option<&Path>) -> anyhow::Result<Vec<Material>
     Ok(file.layer)
 }
 
-/// Refuses numbers with which nothing sensible can come out, wherever they were given.
+/// Refuses numbers with which nothing sensible can come out, with the option by which they are given.
 pub(crate) fn check(settings: &Settings) -> anyhow::Result<()> {
-    let substrate = settings.substrate.as_ref();
-    if let Some(problem) = substrate.and_then(Material::problem) {
-        bail!("the substrate: {problem}");
-    }
-    check_orientations(settings)?;
-    let material = &settings.material;
-    let (a, ratio) = (material.lattice_constant_nm, material.poisson_ratio);
-    ensure!(
-        a > 0.0 && a.is_finite(),
-        "the lattice constant (--lattice-constant) must be a positive length in nm, found {a}"
-    );
-    ensure!(
-        ratio > -1.0 && ratio < 1.0,
-        "the Poisson ratio (--poisson-ratio) must lie between −1 and 1, found {ratio}"
-    );
-    let moires = settings.moires;
-    ensure!(
-        (1..=6).contains(&moires),
-        "the number of moirés (--moires) must lie between 1 and 6, found {moires}"
-    );
-    ensure!(
-        moires == 1 || settings.method == Method::Lattice,
-        "several moirés (--moires {moires}) can be measured by --method lattice only"
-    );
-    if let Some(problem) = material.problem() {
-        bail!("{problem}");
-    }
-    check_moire_layers(settings)?;
-    let clock = settings.frame_time_sigma_s;
-    ensure!(
-        clock >= 0.0 && clock.is_finite(),
-        "the uncertainty of the frame times (--frame-time-sigma) cannot be negative, found {clock}"
-    );
-    check_uncertainties(settings)?;
-    if let Some(problem) = settings
-        .scanner
-        .as_ref()
-        .and_then(moiregauge::calibration::Calibration::problem)
-    {
-        bail!("the calibration of the scanner makes no sense: {problem}");
-    }
-    if let Some(problem) = settings.out_of_range() {
-        bail!("{problem}");
-    }
-    check_drift(settings)
+    settings.check().map_err(with_option)
 }
 
-/// Uncertainties are no wild guesses.
-fn check_uncertainties(settings: &Settings) -> anyhow::Result<()> {
-    let (material, calibration) = (&settings.material, &settings.calibration);
-    for (name, value, largest) in [
-        (
-            "--lattice-constant-sigma",
-            material.lattice_constant_sigma_nm,
-            0.1 * material.lattice_constant_nm,
-        ),
-        ("--poisson-ratio-sigma", material.poisson_ratio_sigma, 0.5),
-        ("--calibration-gain", calibration.gain_percent, 50.0),
-        ("--calibration-mismatch", calibration.mismatch_percent, 50.0),
-        (
-            "--calibration-orthogonality",
-            calibration.orthogonality_mrad,
-            500.0,
-        ),
-        (
-            "--isotropic-strain",
-            settings.isotropic_strain_percent,
-            10.0,
-        ),
-    ] {
-        ensure!(
-            value >= 0.0 && value <= largest,
-            "an uncertainty ({name}) lies between 0 and {largest}, found {value}"
-        );
-    }
-    Ok(())
-}
+/// Options by the names of settings; the first that the name begins with.
+const OPTIONS: [(&str, &str); 24] = [
+    ("material.lattice_constant_nm", "--lattice-constant"),
+    (
+        "material.lattice_constant_sigma_nm",
+        "--lattice-constant-sigma",
+    ),
+    ("material.poisson_ratio_sigma", "--poisson-ratio-sigma"),
+    ("material.poisson_ratio", "--poisson-ratio"),
+    ("moires", "--moires, --method lattice"),
+    (
+        "moire_layers",
+        "--moires, --layers, --lattice-angle, --atomic",
+    ),
+    ("frame_time_sigma_s", "--frame-time-sigma"),
+    ("calibration.gain_percent", "--calibration-gain"),
+    ("calibration.mismatch_percent", "--calibration-mismatch"),
+    (
+        "calibration.orthogonality_mrad",
+        "--calibration-orthogonality",
+    ),
+    ("isotropic_strain_percent", "--isotropic-strain"),
+    ("scanner", "--calibration"),
+    ("drift_draws", "--drift-draws"),
+    ("drift.sigma_nm_per_min", "--drift-sigma"),
+    ("drift", "--drift"),
+    ("lattice_angle_2", "--lattice-angle-2"),
+    ("lattice_angle.layer", "--lattice-angle-layer"),
+    ("lattice_angle", "--lattice-angle"),
+    ("strain_draws", "--strain-draws"),
+    ("size_nm", "--size"),
+    ("line_rate_hz", "--line-rate"),
+    ("rotation_deg", "--rotation"),
+    ("crop", "--crop"),
+    ("x_sensor", "--x-sensor and --y-sensor"),
+];
 
-/// A drift that is given is two numbers and their uncertainty.
-fn check_drift(settings: &Settings) -> anyhow::Result<()> {
-    if let Some(drift) = &settings.drift {
-        let (x, y, sigma) = (
-            drift.x_nm_per_min,
-            drift.y_nm_per_min,
-            drift.sigma_nm_per_min,
-        );
-        ensure!(
-            x.is_finite() && y.is_finite(),
-            "the drift (--drift) must be two numbers in nm/min, found {x} and {y}"
-        );
-        ensure!(
-            sigma >= 0.0 && sigma.is_finite(),
-            "the uncertainty of the drift (--drift-sigma) cannot be negative, found {sigma}"
-        );
+/// The error with the options that it is about.
+pub(crate) fn with_option(error: SettingsError) -> anyhow::Error {
+    let found = OPTIONS
+        .iter()
+        .find(|(setting, _)| error.setting.starts_with(setting));
+    match found {
+        Some((_, option)) => anyhow::anyhow!("{error} ({option})"),
+        None => error.into(),
     }
-    Ok(())
-}
-
-/// Orientations are angles of layers that there are.
-fn check_orientations(settings: &Settings) -> anyhow::Result<()> {
-    let both = [&settings.lattice_angle, &settings.lattice_angle_2];
-    for known in both.into_iter().flatten() {
-        let (angle, sigma) = (known.angle_deg, known.sigma_deg);
-        ensure!(
-            angle.is_finite() && sigma >= 0.0 && sigma.is_finite(),
-            "the orientation of a layer (--lattice-angle) must be an angle in degrees and its uncertainty, \
-             found {angle} and {sigma}"
-        );
-        ensure!(
-            known.layer == 1 || known.layer == 2,
-            "the layer of an orientation (--lattice-angle-layer) must be 1, the lower one, or 2, found {}",
-            known.layer
-        );
-    }
-    if let [Some(first), Some(second)] = both {
-        ensure!(
-            first.layer != second.layer,
-            "the two orientations (lattice_angle and lattice_angle_2) must be those of layers 1 and 2, found layer \
-             {} twice",
-            first.layer
-        );
-    }
-    Ok(())
-}
-
-/// As many pairs of layers as moirés, none of them nonsense, and nothing beside them that is of one pair only.
-fn check_moire_layers(settings: &Settings) -> anyhow::Result<()> {
-    let (layers, moires) = (&settings.moire_layers, settings.moires);
-    if layers.is_empty() {
-        return Ok(());
-    }
-    ensure!(
-        layers.len() == moires,
-        "expected one pair of layers (--layers) for all moirés or one for each of the {moires} (--moires), found {}",
-        layers.len()
-    );
-    ensure!(
-        settings.lattice_angle.is_none() && settings.lattice_angle_2.is_none(),
-        "the orientation of a layer (--lattice-angle, --atomic) goes with one pair of layers; the moirés have layers of \
-         their own (--layers), whose layer 1 is not the same: analyse each with --layers of its own"
-    );
-    for layers in layers {
-        for material in std::iter::once(&layers.material).chain(&layers.substrate) {
-            if let Some(problem) = material.problem() {
-                bail!("{problem}");
-            }
-        }
-    }
-    Ok(())
 }
 
 #[cfg(test)]

@@ -6,16 +6,16 @@ use std::process::ExitCode;
 
 use anyhow::{Context as _, anyhow, bail, ensure};
 use clap::ValueEnum;
+use moiregauge::numbers::interrupt;
 use moiregauge::survey::{nominal_geometry, on_grid};
-use moiregauge_pipeline::Content;
 use moiregauge_pipeline::sink::{FileSink, SinkError};
+use moiregauge_pipeline::{Content, Job};
 use rayon::prelude::*;
 use spmfile::{ChannelInfo, Scan, WritableFormat, sensor_axis};
 
 use crate::input::{Known, KnownArgs, is_named, with_option};
 use crate::outputs;
 use crate::paths::expand;
-use crate::progress::bar;
 use crate::say::say;
 
 /// Convert scans into formats of other programs: Gwyddion, NumPy, Zarr, TIFF, text
@@ -62,7 +62,7 @@ pub(crate) struct ConvertArgs {
     force: bool,
     /// Print nothing but errors
     #[arg(long, short)]
-    quiet: bool,
+    pub(crate) quiet: bool,
     #[command(flatten)]
     known: KnownArgs,
 }
@@ -110,7 +110,7 @@ pub(crate) fn format_of(path: &Path) -> anyhow::Result<WritableFormat> {
 }
 
 /// Converts the files.
-pub(crate) fn run(args: &ConvertArgs) -> anyhow::Result<ExitCode> {
+pub(crate) fn run(args: &ConvertArgs, job: &Job) -> anyhow::Result<ExitCode> {
     let Some((out, paths)) = args
         .paths
         .split_last()
@@ -144,7 +144,7 @@ pub(crate) fn run(args: &ConvertArgs) -> anyhow::Result<ExitCode> {
         sink: outputs::files(folder, args.force, &protected)?,
     };
     target.can_be_written()?;
-    let written = target.convert_all(&inputs, folder);
+    let written = target.convert_all(&inputs, folder, job);
     let (mut files, mut scans) = (Vec::new(), 0);
     for (path, result) in inputs.iter().zip(written) {
         match result {
@@ -214,7 +214,12 @@ struct Target<'a> {
 
 impl Target<'_> {
     /// Converts all files; returns what each became.
-    fn convert_all(&self, inputs: &[PathBuf], folder: &Path) -> Vec<anyhow::Result<Vec<PathBuf>>> {
+    fn convert_all(
+        &self,
+        inputs: &[PathBuf],
+        folder: &Path,
+        job: &Job,
+    ) -> Vec<anyhow::Result<Vec<PathBuf>>> {
         // Before anything runs in parallel: which of two files of one name is first must not depend on it.
         let mut taken = HashSet::new();
         let jobs: Vec<(&PathBuf, String, bool)> = inputs
@@ -225,10 +230,11 @@ impl Target<'_> {
                 (path, stem, new)
             })
             .collect();
-        let progress = bar("converting", "files", inputs.len(), !self.args.quiet);
+        let stage = job.stage("converting", "files", inputs.len());
         let written: Vec<anyhow::Result<Vec<PathBuf>>> = jobs
             .par_iter()
             .map(|(path, stem, new)| {
+                interrupt::check();
                 let result = if *new {
                     self.convert(path, stem)
                 } else {
@@ -238,11 +244,11 @@ impl Target<'_> {
                         name.display()
                     ))
                 };
-                progress.inc(1);
+                stage.step();
                 result
             })
             .collect();
-        progress.finish_and_clear();
+        drop(stage);
         written
     }
 

@@ -3,13 +3,15 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+use anyhow::Context as _;
 use moiregauge::settings::Settings;
+use moiregauge_pipeline::Job;
+use moiregauge_pipeline::campaign::{Campaign, Outcome};
 use moiregauge_pipeline::sink::Target;
 use moiregauge_report::screen::summary;
 use moiregauge_report::{Choice, write_report};
 
-use crate::analyze::{Outcome, analyse_files, report_names};
-use crate::input::Known;
+use crate::analyze::{in_words, report_names};
 use crate::outputs;
 use crate::paths::expand;
 use crate::say::say;
@@ -33,7 +35,7 @@ pub(crate) struct DemoArgs {
 }
 
 /// Runs the demonstration.
-pub(crate) fn run(args: &DemoArgs) -> anyhow::Result<ExitCode> {
+pub(crate) fn run(args: &DemoArgs, job: &Job) -> anyhow::Result<ExitCode> {
     let out = args.out.clone().unwrap_or_else(free_folder);
     let sets = paper_sets(args.seed);
     let results = out.join("results");
@@ -49,7 +51,7 @@ pub(crate) fn run(args: &DemoArgs) -> anyhow::Result<ExitCode> {
         "Simulating three sets of scans in {} …\n",
         out.display()
     ))?;
-    let folders = write_sets(&sets, &out.join("scans"), args.force)?;
+    let folders = write_sets(&sets, &out.join("scans"), args.force, job)?;
     say("Analysing them …\n\n")?;
     let inputs: Vec<PathBuf> = expand(&folders, false).into_iter().flatten().collect();
     let settings = Settings {
@@ -57,22 +59,16 @@ pub(crate) fn run(args: &DemoArgs) -> anyhow::Result<ExitCode> {
         layers_chosen: true,
         ..Settings::default()
     };
-    let analysed = analyse_files(
-        &inputs,
-        &[],
-        (&settings, &Known::default()),
-        Vec::new(),
-        true,
-        true,
-    );
-    let Some(Outcome {
+    let mut campaign = Campaign::new(settings)?.illustrated(true);
+    campaign.add(inputs);
+    let analysed = campaign.analyse(job).map_err(in_words)?.pop();
+    let Outcome {
         analysis,
         provenance,
-    }) = analysed.ok().and_then(|mut moires| moires.pop())
-    else {
-        anyhow::bail!("the simulated scans could not be analysed");
-    };
+    } = analysed.context("the simulated scans could not be analysed")?;
+    let stage = job.stage("writing", "reports", 1);
     let report = write_report(&analysis, &provenance, &Choice::default())?;
+    drop(stage);
     outputs::write_all(&sink, "", &report)?;
     outputs::commit(sink)?;
     say(&summary(&analysis, crate::hints::of))?;

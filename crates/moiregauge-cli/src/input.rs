@@ -101,13 +101,7 @@ impl KnownArgs {
 
 /// The error with the option that it is about.
 pub(crate) fn with_option(error: KnownError) -> anyhow::Error {
-    let option = match &error {
-        KnownError::Sensors { .. } => "--sensors",
-        KnownError::NoChannel { .. } => "--x-sensor and --y-sensor",
-        KnownError::Rows { .. } | KnownError::Crop(_) => "--crop",
-        KnownError::Read(_) => return error.into(),
-    };
-    anyhow::Error::new(error).context(option)
+    crate::analyze::with_advice(error.into())
 }
 
 /// `70nm×70nm`, `70x70 nm`: two lengths; the first may leave its unit to the second.

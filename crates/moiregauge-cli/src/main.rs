@@ -2,6 +2,7 @@
 
 mod analyze;
 mod calibrate;
+mod campaign;
 mod config;
 mod convert;
 mod demo;
@@ -9,16 +10,19 @@ mod explain;
 mod hints;
 mod info;
 mod input;
+mod interrupt;
 mod map;
+mod merge;
 mod moire;
+mod nearest;
 mod numbers;
 mod outputs;
 mod paths;
 mod plan;
 mod progress;
-mod reading;
 mod say;
 mod scanner;
+mod shells;
 mod simulate;
 mod stripes;
 mod validate;
@@ -26,6 +30,9 @@ mod validate;
 use std::process::ExitCode;
 
 use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
+use moiregauge_pipeline::Job;
+
+use progress::Bars;
 
 /// The strain gauge for moiré superlattices
 ///
@@ -42,6 +49,8 @@ struct Cli {
 enum Command {
     Analyze(Box<analyze::AnalyzeArgs>),
     Map(Box<map::MapArgs>),
+    Campaign(Box<campaign::CampaignArgs>),
+    Merge(merge::MergeArgs),
     Calibrate(Box<calibrate::CalibrateArgs>),
     Convert(Box<convert::ConvertArgs>),
     Moire(Box<moire::MoireArgs>),
@@ -52,6 +61,8 @@ enum Command {
     Plan(Box<plan::PlanArgs>),
     Config(config::ConfigArgs),
     Explain(explain::ExplainArgs),
+    Completions(shells::CompletionsArgs),
+    Man(shells::ManArgs),
 }
 
 /// The arguments. A negative number is a value everywhere, so that its option is named where it is refused.
@@ -61,25 +72,59 @@ fn arguments() -> clap::Command {
 
 fn main() -> ExitCode {
     let parsed = Cli::from_arg_matches(&arguments().get_matches()).unwrap_or_else(|e| e.exit());
-    run(parsed.command).unwrap_or_else(|error| {
-        eprintln!("error: {error:#}");
-        ExitCode::FAILURE
-    })
+    let command = parsed.command;
+    let bars = Bars::new(command.is_loud());
+    interrupt::stoppable(command.threads(), &bars, |job| run(&command, job)).unwrap_or_else(
+        |error| {
+            eprintln!("error: {error:#}");
+            ExitCode::FAILURE
+        },
+    )
 }
 
-fn run(command: Command) -> anyhow::Result<ExitCode> {
+impl Command {
+    /// How many threads are wanted; `None`: as many as there are processors.
+    fn threads(&self) -> Option<usize> {
+        match self {
+            Self::Analyze(args) => args.threads,
+            Self::Map(args) => args.threads(),
+            Self::Campaign(args) => args.analyze.threads,
+            _ => None,
+        }
+    }
+
+    /// Whether progress is shown.
+    fn is_loud(&self) -> bool {
+        match self {
+            Self::Analyze(args) => args.is_loud(),
+            Self::Map(args) => args.is_loud(),
+            Self::Campaign(args) => args.analyze.is_loud(),
+            Self::Merge(args) => !args.quiet,
+            Self::Calibrate(args) => !args.quiet,
+            Self::Convert(args) => !args.quiet,
+            Self::Validate(args) => !args.quiet,
+            _ => true,
+        }
+    }
+}
+
+fn run(command: &Command, job: &Job) -> anyhow::Result<ExitCode> {
     match command {
-        Command::Analyze(args) => analyze::run(&args),
-        Command::Map(args) => map::run(&args),
-        Command::Calibrate(args) => calibrate::run(&args),
-        Command::Convert(args) => convert::run(&args),
-        Command::Moire(args) => moire::run(&args),
-        Command::Info(args) => info::run(&args),
-        Command::Simulate(args) => simulate::run(&args),
-        Command::Demo(args) => demo::run(&args),
-        Command::Validate(args) => validate::run(&args),
-        Command::Plan(args) => plan::run(&args),
-        Command::Config(args) => config::run(&args),
-        Command::Explain(args) => explain::run(&args),
+        Command::Analyze(args) => analyze::run(args, job),
+        Command::Map(args) => map::run(args, job),
+        Command::Campaign(args) => campaign::run(args, job),
+        Command::Merge(args) => merge::run(args, job),
+        Command::Calibrate(args) => calibrate::run(args, job),
+        Command::Convert(args) => convert::run(args, job),
+        Command::Moire(args) => moire::run(args),
+        Command::Info(args) => info::run(args),
+        Command::Simulate(args) => simulate::run(args, job),
+        Command::Demo(args) => demo::run(args, job),
+        Command::Validate(args) => validate::run(args, job),
+        Command::Plan(args) => plan::run(args),
+        Command::Config(args) => config::run(args),
+        Command::Explain(args) => explain::run(args),
+        Command::Completions(args) => shells::completions(args, arguments()),
+        Command::Man(args) => shells::man(args, arguments()),
     }
 }

@@ -2,7 +2,6 @@
 
 mod args;
 mod domains;
-mod doubts;
 mod kept;
 mod large;
 mod lattice;

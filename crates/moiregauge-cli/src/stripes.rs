@@ -5,9 +5,7 @@ use std::path::{Path, PathBuf};
 use moiregauge::scan::channels_by_preference;
 use moiregauge::settings::Settings;
 use moiregauge::survey::stripes_in_short;
-use moiregauge_pipeline::Known;
-
-use crate::reading::Opened;
+use moiregauge_pipeline::{Known, Opened};
 
 /// The channel in which a file shows stripes best: settings that name it, and its patterns (wavelength in nm, direction
 /// in rad, log₁₀ of the chance of noise).

@@ -83,6 +83,14 @@ pub fn find(paths: &[PathBuf]) -> Found {
     found
 }
 
+/// Whether a folder has a scan, or what should be one.
+pub(crate) fn holds_scans(folder: &Path) -> bool {
+    let inside = entries(folder).unwrap_or_default();
+    inside
+        .iter()
+        .any(|file| matches!(look(file), Look::Scan(_) | Look::Failed(_)))
+}
+
 impl Found {
     /// What is to be measured apart from what cannot be, each frame once.
     pub fn frames(self) -> (Vec<PathBuf>, Vec<FailedInput>) {

@@ -156,7 +156,8 @@ impl Known {
         }
     }
 
-    fn frame_direction(&self, path: &Path) -> Option<FrameDirection> {
+    /// The sense of the slow motion that is told of a file.
+    pub fn frame_direction(&self, path: &Path) -> Option<FrameDirection> {
         let number = self.order.iter().position(|p| p == path).unwrap_or(0);
         let up = match self.told.frame_direction? {
             FrameOrder::Up => true,

@@ -20,6 +20,18 @@ pub fn in_words(path: &Path) -> String {
     words
 }
 
+/// An error with all its causes, in one line.
+pub fn in_full(error: &dyn std::error::Error) -> String {
+    let mut words = error.to_string();
+    let mut cause = error.source();
+    while let Some(error) = cause {
+        // Writing into a string cannot fail.
+        let _ = write!(words, ": {error}");
+        cause = error.source();
+    }
+    words
+}
+
 /// The path among those of a run that has these words.
 pub fn with_words<'a>(paths: &'a [PathBuf], words: &str) -> Option<&'a Path> {
     let found = paths.iter().find(|path| in_words(path) == words);

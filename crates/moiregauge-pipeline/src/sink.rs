@@ -24,6 +24,9 @@
 //! Files are written into a working folder of their own beside their places and renamed; working folders of runs that
 //! were killed are swept up. Nothing is written over without `force`, and inputs of the run never are.
 //!
+//! # Memory and archives: [`MemorySink`], [`ZipSink`]
+//! The same files and the same list, for front ends without a folder. [`Sink`] is what all three have in common.
+//!
 //! Nothing here holds the time of day: the same results make the same manifest.
 
 mod build;
@@ -31,6 +34,7 @@ mod error;
 mod file;
 mod folder;
 mod manifest;
+mod memory;
 mod work;
 
 pub use build::build;
@@ -38,4 +42,5 @@ pub use error::SinkError;
 pub use file::{FileSink, OneFile};
 pub use folder::{FolderSink, Part, Target};
 pub use manifest::{Entry, MANIFEST, Manifest};
+pub use memory::{MemorySink, Sink, ZipSink};
 pub use work::UNFINISHED;

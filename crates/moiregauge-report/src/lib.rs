@@ -14,6 +14,7 @@ mod moire;
 mod provenance;
 mod report;
 pub mod results;
+mod samples;
 pub mod screen;
 mod stats;
 mod tables;
@@ -32,4 +33,9 @@ pub use provenance::{FailedInput, InputFile, Provenance};
 pub use report::parquet_tables;
 pub use report::{figure_files, write_report};
 pub use results::{Results, map_schema, schema};
+#[cfg(feature = "parquet")]
+pub use samples::samples_parquet;
+pub use samples::{
+    SampleRow, SampleStatus, SamplesPage, failed_csv, samples_csv, samples_page, thumbnail,
+};
 pub use tables::{map_scan, map_scans, map_tables, stripe_scan};

@@ -1,6 +1,7 @@
 //! Everything that a report consists of, as named files in memory.
 
 use moiregauge::campaign::Analysis;
+use moiregauge::numbers::interrupt;
 use rayon::prelude::*;
 
 use crate::choice::Choice;
@@ -29,6 +30,7 @@ pub fn figure_files(all: &[Figure], choice: Choice) -> Result<Vec<(String, Vec<u
     let pictures: Vec<Vec<(String, Vec<u8>)>> = drawn
         .par_iter()
         .map(|&(name, svg)| {
+            interrupt::check();
             let mut files = Vec::new();
             if choice.figures {
                 files.push((format!("figures/{name}.svg"), svg.as_bytes().to_vec()));

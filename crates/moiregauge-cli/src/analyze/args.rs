@@ -155,7 +155,7 @@ pub(crate) struct AnalyzeArgs {
     seed: Option<u64>,
     /// Number of threads [default: all processors]; the results do not depend on it
     #[arg(long, value_name = "N", value_parser = numbers::count(1, 1024))]
-    pub(super) threads: Option<usize>,
+    pub(crate) threads: Option<usize>,
     /// Colours of images
     #[arg(long, value_enum, default_value_t = ColorMapArg::Viridis, help_heading = OUTPUT)]
     colormap: ColorMapArg,
@@ -183,6 +183,9 @@ pub(crate) struct AnalyzeArgs {
     /// Print results.json instead of the summary; with --moires a list of those of all moirés, the largest cell first
     #[arg(long)]
     pub(super) json: bool,
+    /// Show the report when it is written
+    #[arg(long, help_heading = OUTPUT, conflicts_with = "no_report")]
+    open: bool,
     /// Print nothing but errors
     #[arg(long, short)]
     pub(super) quiet: bool,
@@ -195,7 +198,7 @@ pub(crate) struct AnalyzeArgs {
     #[command(flatten)]
     scanner: ScannerArgs,
     #[command(flatten)]
-    pub(super) known: KnownArgs,
+    pub(crate) known: KnownArgs,
 }
 
 impl AnalyzeArgs {
@@ -295,12 +298,33 @@ impl AnalyzeArgs {
         Ok(())
     }
 
-    /// Makes the number of threads that is wanted.
-    pub(crate) fn start_threads(&self) -> anyhow::Result<()> {
-        if let Some(threads) = self.threads {
-            rayon::ThreadPoolBuilder::new()
-                .num_threads(threads)
-                .build_global()?;
+    /// Files and folders.
+    pub(crate) fn paths(&self) -> &[PathBuf] {
+        &self.paths
+    }
+
+    /// Refuses what goes with one sample only.
+    ///
+    /// # Errors
+    /// The first option of that kind.
+    pub(crate) fn only_settings(&self) -> anyhow::Result<()> {
+        let atomic = self.orientation.asked()?.is_some();
+        for (option, given) in [
+            ("--replay", self.replay.is_some()),
+            ("--set", !self.sets.is_empty()),
+            ("--survey-image", self.survey_image.is_some()),
+            ("--export", !self.export.is_empty()),
+            ("--parquet", self.parquet),
+            ("--no-report", self.no_report),
+            ("--no-png", self.no_png),
+            ("--json", self.json),
+            ("--force", self.force),
+            ("--atomic", atomic),
+        ] {
+            anyhow::ensure!(
+                !given,
+                "{option} goes with one sample: it is for `moiregauge analyze`"
+            );
         }
         Ok(())
     }
@@ -334,6 +358,7 @@ impl AnalyzeArgs {
             threads: other.threads,
             force: other.force,
             json: other.json,
+            open: other.open,
             quiet: other.quiet,
             ..self
         }
@@ -342,6 +367,16 @@ impl AnalyzeArgs {
     /// Whether results may be written over.
     pub(crate) fn force(&self) -> bool {
         self.force
+    }
+
+    /// Shows a page that was written, if that is wanted.
+    pub(crate) fn show(&self, page: &std::path::Path) {
+        if !self.open {
+            return;
+        }
+        if let Err(error) = open::that_detached(page) {
+            eprintln!("note: cannot show {}: {error}", page.display());
+        }
     }
 
     /// Whether results go to standard output as JSON.

@@ -20,7 +20,7 @@ pub(super) fn arguments(all: impl IntoIterator<Item = OsString>, left_out: &[&st
             kept.extend(all);
             break;
         }
-        let flag = ["--force", "--quiet", "-q", "--json"].contains(&text.as_str());
+        let flag = ["--force", "--quiet", "-q", "--json", "--open"].contains(&text.as_str());
         let joined = text.split_once('=').is_some_and(|(name, _)| valued(name));
         let apart = valued(&text);
         if !(flag || joined || apart) {

@@ -6,15 +6,15 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context as _, ensure};
 use moiregauge::campaign::{Analysis, ScanAnalysis};
 use moiregauge::survey::corrected_images;
-use moiregauge_pipeline::Known;
 use moiregauge_pipeline::sink::FolderSink;
+use moiregauge_pipeline::{Known, read_again};
 use moiregauge_report::FailedInput;
 use rayon::prelude::*;
 use spmfile::{LineDirection, WritableFormat};
 
+use super::hint::with_advice;
 use crate::convert::format_of;
 use crate::outputs::write_all;
-use crate::reading::read_again;
 
 /// A folder of corrected images and their format.
 #[derive(Clone, Debug)]
@@ -105,7 +105,7 @@ fn one(
     (inputs, known): (&[PathBuf], &Known),
 ) -> anyhow::Result<()> {
     let settings = &analysis.settings;
-    let scan = read_again(inputs, &analysed.file, settings, known)?;
+    let scan = read_again(inputs, &analysed.file, settings, known).map_err(with_advice)?;
     let images = corrected_images(&scan, analysed, settings);
     ensure!(!images.is_empty(), "no image could be corrected");
     for image in images {

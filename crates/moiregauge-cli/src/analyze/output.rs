@@ -4,12 +4,13 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use moiregauge::campaign::refusal;
+use moiregauge_pipeline::Job;
+use moiregauge_pipeline::campaign::Outcome;
 use moiregauge_pipeline::sink::{FolderSink, Target};
 use moiregauge_report::screen::{failures, summary};
 use moiregauge_report::write_report;
 
 use super::args::AnalyzeArgs;
-use super::chain::Outcome;
 use super::export::{self, Export};
 use super::task::Task;
 use crate::hints;
@@ -34,6 +35,9 @@ const NAMES: [&str; 12] = [
     "budget.parquet",
     "figures/",
 ];
+
+/// Named files in memory.
+pub(super) type Files = Vec<(String, Vec<u8>)>;
 
 /// Where results go, and what is said of them.
 pub(super) struct Output {
@@ -77,11 +81,46 @@ impl Output {
         })
     }
 
-    /// Writes everything, and says what came out; the exit code tells whether all went well.
-    pub(super) fn write(self, task: &Task, outcomes: &[Outcome]) -> anyhow::Result<ExitCode> {
+    /// Where everything is written.
+    pub(super) fn sink(&self) -> &FolderSink {
+        &self.sink
+    }
+
+    /// The page of the first moiré.
+    pub(super) fn first_page(&self, moires: usize) -> PathBuf {
+        let within = within(moires).swap_remove(0);
+        self.out.join(within).join("report.html")
+    }
+
+    /// Makes the reports of all moirés, and writes them beside their places.
+    pub(super) fn reports(
+        &self,
+        task: &Task,
+        outcomes: &[Outcome],
+        job: &Job,
+    ) -> anyhow::Result<Vec<Files>> {
+        let stage = job.stage("writing", "reports", outcomes.len());
+        let folders = within(outcomes.len());
+        let all = outcomes.iter().zip(&folders);
+        all.map(|(outcome, within)| {
+            let written = self.report(task, outcome, within);
+            stage.step();
+            written
+        })
+        .collect()
+    }
+
+    /// Puts everything in place, and says what came out; the exit code tells whether all went well.
+    pub(super) fn write(
+        self,
+        task: &Task,
+        outcomes: &[Outcome],
+        reports: Vec<Files>,
+    ) -> anyhow::Result<ExitCode> {
         let (mut answers, mut documents) = (Vec::new(), Vec::new());
         let folders = within(outcomes.len());
-        for (number, (outcome, within)) in outcomes.iter().zip(&folders).enumerate() {
+        let all = outcomes.iter().zip(&folders).zip(reports);
+        for (number, ((outcome, within), written)) in all.enumerate() {
             if self.loud && outcomes.len() > 1 {
                 answers.push(format!(
                     "\n== moiré {} of {}: {}\n",
@@ -90,7 +129,6 @@ impl Output {
                     outcome.analysis.settings.bilayer().name()
                 ));
             }
-            let written = self.report(task, outcome, within)?;
             if self.loud {
                 answers.push(summary(&outcome.analysis, hints::of));
                 // The file to open first.
@@ -135,12 +173,7 @@ impl Output {
     }
 
     /// Writes the report of one moiré; returns its files.
-    fn report(
-        &self,
-        task: &Task,
-        outcome: &Outcome,
-        within: &str,
-    ) -> anyhow::Result<Vec<(String, Vec<u8>)>> {
+    fn report(&self, task: &Task, outcome: &Outcome, within: &str) -> anyhow::Result<Files> {
         let written = write_report(&outcome.analysis, &outcome.provenance, &task.run.report)?;
         write_all(&self.sink, within, &written)?;
         if task.run.parquet {

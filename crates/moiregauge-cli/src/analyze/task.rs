@@ -3,13 +3,16 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
+use moiregauge_pipeline::campaign::Campaign;
 use moiregauge_pipeline::{Known, Places, check_sets, record_files};
 use moiregauge_report::InputFile;
-use moiregauge_report::results::{Run, Told};
+use moiregauge_report::results::Run;
 
 use super::again::Again;
 use super::args::AnalyzeArgs;
 use super::arguments::arguments;
+use super::hint::advice;
+use crate::config::with_option;
 use crate::paths::inputs;
 
 /// A run to be done.
@@ -72,14 +75,14 @@ impl Task {
         }
     }
 
-    /// The same for other files: the images of the atoms.
-    pub(crate) fn known_of(&self, files: &[PathBuf]) -> Known {
-        Known::new(&self.run.known, files).at(&self.places)
+    /// Where files lie that are no longer where their names say.
+    pub(crate) fn places(&self) -> &Places {
+        &self.places
     }
 
-    /// A file of which nothing is known but where it lies.
-    pub(crate) fn nothing_known(&self, path: &Path) -> Known {
-        Known::new(&Told::default(), &[path.to_owned()]).at(&self.places)
+    /// Its scans, to be analysed.
+    pub(crate) fn campaign(&self) -> anyhow::Result<Campaign> {
+        Campaign::of_run(&self.run, &self.inputs, &self.places, advice).map_err(with_option)
     }
 
     /// The record of the run for its results, `measured` being the files whose hashes these have anyway.

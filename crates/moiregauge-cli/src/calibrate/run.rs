@@ -5,9 +5,9 @@ use std::process::ExitCode;
 
 use anyhow::{Context as _, bail, ensure};
 use heterostrain::material::Material;
-use indicatif::ProgressBar;
 use moiregauge::calibration::KnownLattice;
 use moiregauge::campaign::Calibrated;
+use moiregauge::numbers::interrupt;
 use moiregauge::scan::{MeasureError, MeasuredScan, measure_known};
 use moiregauge::settings::{Grouping, MOST_IMAGES, Settings};
 use moiregauge_pipeline::sink::OneFile;
@@ -16,14 +16,14 @@ use moiregauge_report::{FailedInput, InputFile};
 use rayon::prelude::*;
 
 use super::{file, words};
-use crate::analyze::{BackgroundArg, LineArg, given_again, with_hint};
+use crate::analyze::{BackgroundArg, LineArg, with_advice};
 use crate::config;
 use crate::input::{Known, KnownArgs};
 use crate::numbers;
 use crate::paths::inputs;
-use crate::progress::bar;
-use crate::reading::{Reading, read};
 use crate::say::say;
+use moiregauge_pipeline::campaign::given_again;
+use moiregauge_pipeline::{InputError, Job, Reading, read_scan};
 
 /// Measure gain, mismatch and orthogonality of a scanner on images of a known lattice
 ///
@@ -87,7 +87,7 @@ pub(crate) struct CalibrateArgs {
     force: bool,
     /// Print nothing but errors
     #[arg(long, short)]
-    quiet: bool,
+    pub(crate) quiet: bool,
 }
 
 /// A lattice as it is typed in.
@@ -99,7 +99,7 @@ struct Cell {
 }
 
 /// Measures the images, prints what they say, and writes the file.
-pub(crate) fn run(args: &CalibrateArgs) -> anyhow::Result<ExitCode> {
+pub(crate) fn run(args: &CalibrateArgs, job: &Job) -> anyhow::Result<ExitCode> {
     let lattice = args.known_lattice()?;
     let cell = lattice
         .cell()
@@ -117,8 +117,7 @@ pub(crate) fn run(args: &CalibrateArgs) -> anyhow::Result<ExitCode> {
     let file = |out| crate::outputs::file(out, args.force, &inputs);
     let file = args.out.as_deref().map(file).transpose()?;
     let known = args.known.of(&inputs);
-    let bar = bar("measuring", "scans", inputs.len(), !args.quiet);
-    let all = measured_all(&inputs, &bar, |path| {
+    let all = measured_all(&inputs, job, |path| {
         measured(path, &settings, &known, &cell)
     });
     failed.extend(all.failed);
@@ -169,18 +168,20 @@ struct All {
 /// Measures all images.
 fn measured_all(
     inputs: &[PathBuf],
-    bar: &ProgressBar,
+    job: &Job,
     measured: impl Fn(&Path) -> anyhow::Result<(MeasuredScan, InputFile)> + Sync,
 ) -> All {
+    let stage = job.stage("measuring", "scans", inputs.len());
     let results: Vec<_> = inputs
         .par_iter()
         .map(|path| {
+            interrupt::check();
             let result = measured(path);
-            bar.inc(1);
+            stage.step();
             result
         })
         .collect();
-    bar.finish_and_clear();
+    drop(stage);
     let mut all = All::default();
     for (path, result) in inputs.iter().zip(results) {
         match result {
@@ -190,7 +191,10 @@ fn measured_all(
             }
             Err(error) => {
                 let cause = error.downcast_ref();
-                all.looked_at += usize::from(matches!(cause, Some(MeasureError::Lattice { .. })));
+                all.looked_at += usize::from(matches!(
+                    cause,
+                    Some(InputError::Measure(MeasureError::Lattice { .. }))
+                ));
                 all.failed.push(FailedInput {
                     file: moiregauge_pipeline::names::in_words(path),
                     error: format!("{error:#}"),
@@ -232,11 +236,11 @@ fn measured(
         scan,
         input,
         caveats,
-    } = read(path, settings, known)?;
+    } = read_scan(path, settings, known).map_err(with_advice)?;
     let measured = measure_known(&input.file, &scan, settings, cell);
     let mut measured = measured.map_err(|error| {
         let seen = matches!(error, MeasureError::Lattice { .. });
-        let error = with_hint(error);
+        let error = with_advice(InputError::Measure(error));
         if seen {
             return error
                 .context("looking for the known lattice (another --channel may show it better)");

@@ -113,6 +113,16 @@ impl MapArgs {
         Ok(())
     }
 
+    /// How many threads are wanted.
+    pub(crate) fn threads(&self) -> Option<usize> {
+        self.analyze.threads
+    }
+
+    /// Whether words for people go to the screen.
+    pub(crate) fn is_loud(&self) -> bool {
+        self.analyze.is_loud()
+    }
+
     pub(super) fn resolution(&self) -> Resolution {
         Resolution {
             window_nm: self.window,

@@ -16,16 +16,15 @@ use moiregauge::settings::Settings;
 use moiregauge::survey::{SurveyPlan, nominal_geometry};
 use moiregauge::window::Resolution;
 use moiregauge_pipeline::sink::{FolderSink, Part};
-use moiregauge_pipeline::{Known, identity};
+use moiregauge_pipeline::{Event, Job, Known, Opened, identity};
 use moiregauge_report::InputFile;
 use nalgebra::Vector2;
 use spmfile::{Channel, LineDirection, Scan};
 
 use super::kept::{decoded, encoded, key};
 use super::source::{Lines, Source};
+use crate::analyze::with_advice;
 use crate::input::with_option;
-use crate::progress::bar;
-use crate::reading::Opened;
 
 /// Images with more pixels than this are mapped in bands.
 const LARGE: usize = 4096 * 4096 * 5 / 4;
@@ -65,7 +64,8 @@ impl Large {
         if std::fs::metadata(place)?.len() < large as u64 {
             return Ok(None);
         }
-        let reading = Opened::new(path, known)?.reading(settings)?;
+        let opened = Opened::new(path, known).map_err(with_advice)?;
+        let reading = opened.reading(settings).map_err(with_advice)?;
         let names: Vec<(&str, &str)> = reading
             .scan
             .channels
@@ -137,13 +137,13 @@ impl Large {
         (settings, resolution): (&Settings, &Resolution),
         first: Option<&SurveyPlan>,
         sink: &FolderSink,
-        loud: bool,
+        job: &Job,
     ) -> anyhow::Result<(TwistStrainMap, SurveyPlan)> {
         let read = |block| self.source.block(block);
         let (geometry, timing) = (&self.geometry, self.timing.as_ref());
         let plan = SurveyPlan::new(geometry, timing, settings, resolution, first, &read)?;
         let key = key(&self.in_words(), settings, resolution, &plan)?;
-        let progress = bar("mapping", "bands", plan.bands(), loud);
+        let stage = job.stage("mapping", "bands", plan.bands());
         let mut whole: Option<TwistStrainMap> = None;
         for band in 0..plan.bands() {
             let name = format!("{key}-{band:04}");
@@ -151,10 +151,11 @@ impl Large {
                 Part::Whole(bytes) => decoded(&bytes, &plan),
                 Part::Absent => None,
                 Part::Damaged => {
-                    eprintln!(
+                    let words = format!(
                         "band {} was damaged on the disk and is mapped again",
                         band + 1
                     );
+                    job.tell(&Event::Note { words: &words });
                     None
                 }
             };
@@ -167,9 +168,9 @@ impl Large {
             };
             let all = whole.get_or_insert_with(|| plan.start(&map.grid));
             all.append(map);
-            progress.inc(1);
+            stage.step();
         }
-        progress.finish_and_clear();
+        drop(stage);
         let whole = whole.context("the image has no lines")?;
         Ok((whole, plan))
     }

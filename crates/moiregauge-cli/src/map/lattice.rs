@@ -1,21 +1,20 @@
 //! Scans that show a lattice → their analysis, their maps, the average of these.
 
 use anyhow::{bail, ensure};
-use moiregauge::campaign::{Analysis, ScanAnalysis};
-use moiregauge::campaign::{is_nothing_left, picture, refusal};
-use moiregauge::map::TwistStrainMap;
-use moiregauge::scan::Picture;
-use moiregauge::settings::Settings;
-use moiregauge::survey::{LineMap, average_maps, change_of_drift, domains_of_scan, map_scan};
+use moiregauge::campaign::Analysis;
+use moiregauge::campaign::{is_nothing_left, refusal};
+use moiregauge_pipeline::Job;
+use moiregauge_pipeline::campaign::Outcome;
+use moiregauge_pipeline::maps::{NoMap, Scans, map_lattices};
+use moiregauge_pipeline::sink::FolderSink;
+use moiregauge_report::Provenance;
 use moiregauge_report::screen::failures;
-use moiregauge_report::{FailedInput, Provenance};
 
 use super::args::MapArgs;
-use super::doubts;
-use super::made::{Made, image, whole_image};
+use super::made::Made;
 use super::stripes::{self, Striped};
-use crate::analyze::{Outcome, Task, analyse_files};
-use crate::reading::read_again;
+use crate::analyze::{Task, advice, in_words};
+use crate::interrupt::{kept_for_next, take};
 
 /// What scans show.
 pub(super) enum Answer {
@@ -24,7 +23,12 @@ pub(super) enum Answer {
 }
 
 /// Analyses all scans, maps them, and averages; stripes, where none of them shows a lattice.
-pub(super) fn together(args: &MapArgs, task: &Task) -> anyhow::Result<Answer> {
+pub(super) fn together(
+    args: &MapArgs,
+    task: &Task,
+    sink: &FolderSink,
+    job: &Job,
+) -> anyhow::Result<Answer> {
     let (inputs, settings, known) = (&task.inputs, &task.run.settings, &task.known);
     let resolution = &args.resolution();
     ensure!(
@@ -32,29 +36,31 @@ pub(super) fn together(args: &MapArgs, task: &Task) -> anyhow::Result<Answer> {
         "maps are made of one moiré; --moires {} is for analyze",
         settings.moires
     );
-    let sets = args.analyze.sets()?;
-    let loud = args.analyze.is_loud();
-    let failed = task.run.left_out.clone();
-    let outcome = analyse_files(inputs, &sets, (settings, known), failed, false, loud);
+    let mut campaign = task.campaign()?.illustrated(false);
+    take(sink, &mut campaign);
     let Outcome {
         analysis,
         provenance,
-    } = match outcome {
+    } = match campaign.analyse(job) {
         Ok(mut outcomes) => outcomes.swap_remove(0),
-        Err(failed) => {
+        Err(error) if error.is_of_scans() => {
             let stripes = stripes::look(args, inputs, (settings, known, resolution));
             if let Ok(Some(found)) = stripes {
                 return Ok(Answer::Stripes(Box::new(found)));
             }
-            eprint!("{}", failures(&failed));
+            let error = in_words(error);
             stripes?;
-            bail!("nothing could be analysed");
+            return Err(error);
         }
+        Err(error) => return Err(kept_for_next(in_words(error), sink, &campaign)),
     };
     if let Some(why) = refusal(&analysis).filter(|why| is_nothing_left(&why.doubt)) {
         bail!("{}", why.message());
     }
-    mapped(args, task, &analysis, provenance).map(|made| Answer::Lattice(Box::new(made)))
+    let made = job.run(|| mapped(args, task, &analysis, provenance, job));
+    let made = made.unwrap_or_else(|cancelled| Err(cancelled.into()));
+    let made = made.map_err(|error| kept_for_next(error, sink, &campaign))?;
+    Ok(Answer::Lattice(Box::new(made)))
 }
 
 /// Maps the scans of an analysis, and averages.
@@ -63,104 +69,39 @@ fn mapped(
     task: &Task,
     analysis: &Analysis,
     mut provenance: Provenance,
+    job: &Job,
 ) -> anyhow::Result<Made> {
-    // The maps read the lattice under the name that the analysis found.
-    let settings = &analysis.named_settings();
-    let (mut maps, shown, failed) = maps_of(args, task, analysis, settings);
-    provenance.failed.extend(failed);
-    let mut caveats = analysis.caveats.clone();
-    doubts::registered(&mut maps, &mut caveats);
-    let Some((lattices, agreement)) = average_maps(&maps) else {
-        eprint!("{}", failures(&provenance.failed));
-        bail!("no image gave a map");
+    let scans = Scans {
+        analysis,
+        inputs: &task.inputs,
+        known: &task.known,
+        advice,
     };
-    let reference = maps[0].whole;
-    let (layers, convention) = (settings.bilayer(), settings.strain_convention);
-    let found = lattices
-        .twist_strain(&reference, layers, convention)
-        .unwrap_or_else(|why| {
-            caveats.push(doubts::no_twist_strain(&why));
-            vec![None; lattices.nodes.len()]
-        });
-    doubts::of_maps(&maps, &mut caveats);
-    if args.margin.is_none() {
-        let narrow = maps
-            .iter()
-            .find_map(|m| doubts::narrow_margin(m.margin, &m.file));
-        caveats.extend(narrow);
-    }
-    let drift_change = change_of_drift(&maps);
-    doubts::about_change(drift_change, &mut caveats);
-    let map = TwistStrainMap::new(&lattices, &found);
-    let origin = origin(analysis);
-    let look = |contrast| {
-        let all = used(analysis).flat_map(|scan| {
-            let read = read_again(&task.inputs, &scan.file, settings, &task.known).ok();
-            read.map_or_else(Vec::new, |read| {
-                domains_of_scan(&read, scan, origin, settings, contrast)
-            })
-        });
-        all.collect()
-    };
-    let domains = args.domains.answer(&map, look);
-    caveats.extend(domains.caveats.iter().cloned());
+    let found = map_lattices(&scans, args.map_method.into(), &args.resolution(), job);
+    let mut found = found.map_err(|why| match why {
+        NoMap::Cancelled(cancelled) => cancelled.into(),
+        NoMap::Nothing { failed } => {
+            let all = [provenance.failed.as_slice(), &failed].concat();
+            eprint!("{}", failures(&all));
+            anyhow::anyhow!("no image gave a map")
+        }
+        other => other.into(),
+    })?;
+    provenance.failed.append(&mut found.failed);
+    let domains = args
+        .domains
+        .answer(&found.map, |contrast| scans.domains(contrast));
+    found.caveats.extend(domains.caveats.iter().cloned());
     Ok(Made {
-        map,
-        picture: shown,
+        map: found.map,
+        picture: found.picture,
         domains,
-        images: maps
-            .iter()
-            .map(|m| image(&m.file, Some(m.line), m.drift_corrected, &m.harmonics))
-            .collect(),
-        whole: whole_image(analysis),
+        images: found.images,
+        whole: found.whole,
         settings: analysis.settings.clone(),
         provenance,
-        agreement,
-        drift_change,
-        caveats,
+        agreement: found.agreement,
+        drift_change: found.drift_change,
+        caveats: found.caveats,
     })
-}
-
-/// The scans that are not excluded.
-fn used(analysis: &Analysis) -> impl Iterator<Item = &ScanAnalysis> {
-    let all = analysis.sets.iter().flat_map(|set| &set.scans);
-    all.filter(|scan| scan.excluded.is_none())
-}
-
-/// The time that drift is counted from.
-fn origin(analysis: &Analysis) -> Option<f64> {
-    used(analysis)
-        .filter_map(|s| s.motion.map(|m| m.middle))
-        .min_by(f64::total_cmp)
-}
-
-/// The maps of all scans, trace and retrace, with the first image, to be shown, and the files that gave none.
-fn maps_of(
-    args: &MapArgs,
-    task: &Task,
-    analysis: &Analysis,
-    settings: &Settings,
-) -> (Vec<LineMap>, Option<Picture>, Vec<FailedInput>) {
-    let (mut maps, mut shown, mut failed) = (Vec::new(), None, Vec::new());
-    let how = (args.map_method.into(), &args.resolution());
-    let origin = origin(analysis);
-    for scan in used(analysis) {
-        let mut of_scan = || -> anyhow::Result<Vec<LineMap>> {
-            let read = read_again(&task.inputs, &scan.file, settings, &task.known)?;
-            let (method, resolution) = how;
-            let lines = map_scan(&read, scan, origin, settings, method, resolution)?;
-            shown = shown
-                .take()
-                .or_else(|| picture(&scan.file, &read, settings));
-            Ok(lines)
-        };
-        match of_scan() {
-            Ok(lines) => maps.extend(lines),
-            Err(error) => failed.push(FailedInput {
-                file: scan.file.clone(),
-                error: format!("{error:#}"),
-            }),
-        }
-    }
-    (maps, shown, failed)
 }

@@ -149,6 +149,7 @@ pub(super) fn finish(
     }
     write_all(&sink, "", &files)?;
     commit(sink)?;
+    args.analyze.show(&args.analyze.out().join("report.html"));
     if args.analyze.json() {
         say(&format!("{}\n", serde_json::to_string_pretty(results)?))?;
     } else if args.analyze.is_loud() {

@@ -3,11 +3,10 @@
 use std::fmt::Write as _;
 
 use anyhow::ensure;
-use moiregauge::caveat::{Caveat, MapDoubt};
+use moiregauge::caveat::Caveat;
 use moiregauge::map::TwistStrainMap;
-use moiregauge::region::{
-    Device, DeviceSearch, Profile, Region, RegionStatistics, WantedArea, WantedTwist, uniform_areas,
-};
+use moiregauge::region::{DeviceSearch, Region, WantedTwist};
+use moiregauge_pipeline::maps::{Line, Questions};
 use moiregauge_report::results::{MapDetailsResult, RegionMeanResult};
 use moiregauge_report::{MapDetails, plus_minus, two_digits};
 use nalgebra::Vector2;
@@ -43,13 +42,6 @@ pub(super) struct RegionArgs {
     wanted: Option<WantedTwist>,
 }
 
-/// A line with a name.
-#[derive(Clone, Debug)]
-struct Line {
-    name: String,
-    ends: [Vector2<f64>; 2],
-}
-
 impl RegionArgs {
     /// Refuses names that are used twice.
     pub(super) fn check(&self) -> anyhow::Result<()> {
@@ -68,8 +60,7 @@ impl RegionArgs {
 
     /// Whether nothing is asked.
     pub(super) fn ask_nothing(&self) -> bool {
-        let places = self.region.is_empty() && self.profile.is_empty();
-        places && self.device.is_none() && self.wanted.is_none()
+        self.questions().is_empty()
     }
 
     /// The answers, and doubts about them.
@@ -77,106 +68,29 @@ impl RegionArgs {
     /// # Errors
     /// Regions and lines beyond the map.
     pub(super) fn answer(&self, map: &TwistStrainMap) -> anyhow::Result<(MapDetails, Vec<Caveat>)> {
-        let mut doubts = Vec::new();
-        for region in &self.region {
-            within(map, "--region", &region.name, &region.corners)?;
-        }
-        for line in &self.profile {
-            within(map, "--profile", &line.name, &line.ends)?;
-        }
-        let regions: Vec<RegionStatistics> = self
-            .region
-            .iter()
-            .map(|r| RegionStatistics::new(map, r))
-            .collect();
-        doubts.extend(regions.iter().filter_map(about_region));
-        let devices = self.device.map(|size| self.devices(map, size, &mut doubts));
-        let wanted = self
-            .wanted
-            .map(|w| (w, WantedArea::new(map, 0..map.grid.len(), &w)));
-        let profiles = self
-            .profile
-            .iter()
-            .map(|l| Profile::new(map, &l.name, l.ends));
-        let details = MapDetails {
-            regions,
-            profiles: profiles.collect(),
-            devices: devices.unwrap_or_default(),
-            wanted,
-            domains: None,
-            regime: None,
-            picture: None,
-        };
-        Ok((details, doubts))
+        self.questions().ask(map).map_err(|outside| {
+            let option = if outside.is_line {
+                "--profile"
+            } else {
+                "--region"
+            };
+            anyhow::anyhow!("{option} {outside}")
+        })
     }
 
-    /// The most uniform areas of a size.
-    fn devices(
-        &self,
-        map: &TwistStrainMap,
-        size: [f64; 2],
-        doubts: &mut Vec<Caveat>,
-    ) -> Vec<Device> {
-        let search = DeviceSearch {
+    fn questions(&self) -> Questions {
+        let search = |size| DeviceSearch {
             orientations: usize::from(self.device_angles),
             most: usize::from(self.device_count),
             ..DeviceSearch::new(size)
         };
-        let [w, h] = size.map(two_digits);
-        let place = format!("device {w} nm × {h} nm");
-        if size[0].min(size[1]) < 2.355 * map.window_nm {
-            doubts.push(Caveat::new(MapDoubt::DeviceBelowResolution, place.as_str()));
+        Questions {
+            regions: self.region.clone(),
+            profiles: self.profile.clone(),
+            device: self.device.map(search),
+            wanted: self.wanted,
         }
-        let found = uniform_areas(map, &search);
-        if found.is_empty() {
-            doubts.push(Caveat::new(MapDoubt::DeviceFitsNowhere, place));
-        }
-        found
     }
-}
-
-/// Says where a region is not as it was asked for.
-fn about_region(found: &RegionStatistics) -> Option<Caveat> {
-    let name = found.region.name.as_str();
-    if found.good == 0 {
-        return Some(Caveat::new(MapDoubt::RegionEmpty, name));
-    }
-    let in_part = found.covered < 0.95 || found.masked_share > 0.05;
-    let doubt = MapDoubt::RegionInPart {
-        covered: found.covered,
-        masked: found.masked_share,
-    };
-    in_part.then(|| Caveat::new(doubt, name))
-}
-
-/// An error if none of the places, nor anything between them, can lie in the map.
-fn within(
-    map: &TwistStrainMap,
-    option: &str,
-    name: &str,
-    places: &[Vector2<f64>],
-) -> anyhow::Result<()> {
-    let [x, y] = map.grid.extent();
-    let [u, v] = [0, 1].map(|axis| {
-        let along = places.iter().map(|p| p[axis]);
-        along.fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], v| {
-            [l.min(v), h.max(v)]
-        })
-    });
-    ensure!(
-        u[0] <= x[1] && u[1] >= x[0] && v[0] <= y[1] && v[1] >= y[0],
-        "{option} {name}: x from {:.1} to {:.1} nm, y from {:.1} to {:.1} nm lies outside of the map, which reaches \
-         from {:.1} to {:.1} nm in x and from {:.1} to {:.1} nm in y",
-        u[0],
-        u[1],
-        v[0],
-        v[1],
-        x[0],
-        x[1],
-        y[0],
-        y[1]
-    );
-    Ok(())
 }
 
 /// What is said of them on the screen.

@@ -8,10 +8,11 @@ use super::lattice::{Answer, together};
 use super::survey::survey;
 use super::{output, stripes};
 use crate::analyze::Task;
+use moiregauge_pipeline::Job;
 use moiregauge_report::screen::failures;
 
 /// Makes the maps and writes them.
-pub(crate) fn run(args: &MapArgs) -> anyhow::Result<ExitCode> {
+pub(crate) fn run(args: &MapArgs, job: &Job) -> anyhow::Result<ExitCode> {
     let task = Task::new(&args.analyze, "map")?;
     let as_before;
     let args = if args.analyze.is_replay() {
@@ -21,12 +22,11 @@ pub(crate) fn run(args: &MapArgs) -> anyhow::Result<ExitCode> {
         args
     };
     args.check(&task)?;
-    args.analyze.start_threads()?;
     let sink = output::sink(args, &task.files())?;
     let document = args.analyze.out().join("map.json");
-    let mut made = match survey(args, &task, &sink)? {
+    let mut made = match survey(args, &task, &sink, job)? {
         Some(made) => made,
-        None => match together(args, &task)? {
+        None => match together(args, &task, &sink, job)? {
             Answer::Lattice(made) => *made,
             Answer::Stripes(mut found) => {
                 let provenance = &mut found.provenance;

@@ -8,18 +8,17 @@ use moiregauge::settings::Settings;
 use moiregauge::stripes::SampledStripes;
 use moiregauge::survey::{ScanStripes, stripes_of_scan};
 use moiregauge::window::Resolution;
-use moiregauge_pipeline::Known;
+use moiregauge_pipeline::maps::{mapped_image, narrow_margin};
 use moiregauge_pipeline::sink::FolderSink;
+use moiregauge_pipeline::{Known, Opened};
 use moiregauge_report::results::{MapResults, StripesResult};
 use moiregauge_report::{FailedInput, Provenance, stripe_figures, stripe_scan};
 use spmfile::WritableFormat;
 
 use super::args::{MapArgs, MapMethodArg};
-use super::doubts::narrow_margin;
-use super::made::image;
 use super::output;
+use crate::analyze::with_advice;
 use crate::outputs::write_all;
-use crate::reading::Opened;
 use crate::stripes::best;
 
 /// Patterns beyond this share of the power of local stripes are one wave.
@@ -68,7 +67,7 @@ pub(super) fn look(
          and strain, and one wave vector has none",
         path.display()
     );
-    let reading = opened.reading(&chosen)?;
+    let reading = opened.reading(&chosen).map_err(with_advice)?;
     let found = stripes_of_scan(&reading.input.file, &reading.scan, &chosen, resolution)
         .with_context(|| path.display().to_string())?;
     let mut caveats = found.caveats.clone();
@@ -192,7 +191,7 @@ fn results(striped: &Striped) -> MapResults {
     MapResults {
         quantities: found.patterns.iter().flat_map(|p| p.map.clone()).collect(),
         images: lines
-            .map(|line| image(file, Some(*line), striped.found.drift_corrected, &harmonics))
+            .map(|line| mapped_image(file, Some(*line), striped.found.drift_corrected, &harmonics))
             .collect(),
         stripes: Some(found),
         agreement: stripes.agreement.map(Into::into),

@@ -7,20 +7,23 @@ use moiregauge::campaign::about_repeat;
 use moiregauge::caveat::{Caveat, MapDoubt, SurveyDrift};
 use moiregauge::map::TwistStrainMap;
 use moiregauge::survey::SurveyPlan;
-use moiregauge_pipeline::distinct;
+use moiregauge_pipeline::campaign::given_again;
+use moiregauge_pipeline::maps::mapped_image;
 use moiregauge_pipeline::sink::FolderSink;
+use moiregauge_pipeline::{Job, distinct};
 use moiregauge_report::Provenance;
 
 use super::args::MapArgs;
 use super::large::Large;
-use super::made::{Made, image};
-use crate::analyze::{Task, given_again};
+use super::made::Made;
+use crate::analyze::Task;
 
 /// Maps images that are too large for memory, side by side; `None` where the first is not large.
 pub(super) fn survey(
     args: &MapArgs,
     task: &Task,
     sink: &FolderSink,
+    job: &Job,
 ) -> anyhow::Result<Option<Made>> {
     let (settings, known, resolution) = (&task.run.settings, &task.known, &args.resolution());
     let open = |path: &PathBuf, always: bool| {
@@ -40,7 +43,6 @@ pub(super) fn survey(
         args.analyze.sets()?.is_empty(),
         "--set: images that are mapped in bands lie side by side in one map and make no sets"
     );
-    let loud = args.analyze.is_loud();
     let (inputs, again) = distinct(&task.inputs);
     let (mut maps, mut images, mut caveats) = (Vec::new(), Vec::new(), given_again(&again));
     let (mut read, mut plans) = (Vec::new(), Vec::<(Large, SurveyPlan)>::new());
@@ -59,7 +61,7 @@ pub(super) fn survey(
                 (settings, resolution),
                 plans.first().map(|p| &p.1),
                 sink,
-                loud,
+                job,
             )
             .with_context(|| path.display().to_string())?;
         let file = large.input.file.clone();
@@ -70,7 +72,12 @@ pub(super) fn survey(
             plan.drift_corrected,
             settings.drift.is_some(),
         ));
-        images.push(image(&file, None, plan.drift_corrected, &plan.harmonics));
+        images.push(mapped_image(
+            &file,
+            None,
+            plan.drift_corrected,
+            &plan.harmonics,
+        ));
         maps.push(map);
         read.push(large.input.clone());
         plans.push((large, plan));

@@ -7,6 +7,7 @@ use std::sync::mpsc;
 use std::time::Duration;
 
 use clap::{Arg, FromArgMatches as _};
+use moiregauge_pipeline::Job;
 
 use super::*;
 use crate::{Cli, arguments, run};
@@ -29,7 +30,8 @@ fn templates(command: &str, option: &str) -> Vec<&'static str> {
         (_, "region") => vec!["a={},0,20,20", "a=0,0,{},20", "a=0,0 20,0 20,{}"],
         (_, "profile") => vec!["a={},0 20,20", "a=0,0 20,{}"],
         (_, "wanted") => vec!["{}±0.1", "1±{}"],
-        ("analyze" | "map" | "moire", "lattice_angle" | "lattice_angle_2") => {
+        ("campaign", "shard") => vec!["{}/3", "1/{}"],
+        ("analyze" | "map" | "campaign" | "moire", "lattice_angle" | "lattice_angle_2") => {
             vec!["{}±0.1", "10±{}"]
         }
         (_, "lattice") => vec!["{}nm,0.5nm,90", "0.5nm,{}nm,90", "0.5nm,0.5nm,{}"],
@@ -55,7 +57,9 @@ fn usual(option: &str) -> &'static str {
 /// What has to be there for the option to mean anything.
 fn beside(command: &str, option: &str) -> Vec<&'static str> {
     match option {
-        "drift_sigma" if ["analyze", "map"].contains(&command) => vec!["--drift", "0", "0"],
+        "drift_sigma" if ["analyze", "map", "campaign"].contains(&command) => {
+            vec!["--drift", "0", "0"]
+        }
         "strain_axis" => vec!["--strain", "0.1"],
         "device_angles" | "device_count" => vec!["--device", "12nm×12nm"],
         "wavelengths" => vec!["--meaning", "real-space"],
@@ -86,6 +90,14 @@ fn base(command: &str, option: &str, folder: &Path) -> Option<Vec<OsString>> {
             let draws = ["drift_draws", "strain_draws"];
             for draws in draws.iter().filter(|draws| **draws != option) {
                 base.extend([format!("--{}", draws.replace('_', "-")).into(), "10".into()]);
+            }
+        }
+        "campaign" => {
+            base.extend([scans.into(), "--out".into(), out("campaign"), "-q".into()]);
+            for draws in ["drift_draws", "strain_draws"] {
+                if draws != option {
+                    base.extend([format!("--{}", draws.replace('_', "-")).into(), "10".into()]);
+                }
             }
         }
         "map" => {
@@ -156,7 +168,10 @@ fn parsed(words: &[OsString]) -> Result<Cli, String> {
 /// Runs the command on a thread of its own; whether it ended well.
 fn ended(words: &[OsString], cli: Cli) -> Result<bool, String> {
     let (send, receive) = mpsc::channel();
-    std::thread::spawn(move || send.send(run(cli.command).is_ok()));
+    std::thread::spawn(move || {
+        let job = Job::quiet(None).expect("threads");
+        send.send(run(&cli.command, &job).is_ok())
+    });
     receive.recv_timeout(SOON).map_err(|why| match why {
         mpsc::RecvTimeoutError::Timeout => format!("{words:?} does not end"),
         mpsc::RecvTimeoutError::Disconnected => format!("{words:?} panics"),

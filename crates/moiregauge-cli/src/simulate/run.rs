@@ -8,12 +8,13 @@ use std::process::ExitCode;
 use anyhow::{Context as _, bail, ensure};
 use moiregauge::simulate::{CLASSES, Simulation, Simulator};
 use moiregauge_pipeline::sink::{FolderSink, Manifest, Target};
+use moiregauge_pipeline::{Job, Stage};
 
 use super::args::SimulateArgs;
 use crate::outputs;
 
 /// Writes the set, or the paper's three.
-pub(crate) fn run(args: &SimulateArgs) -> anyhow::Result<ExitCode> {
+pub(crate) fn run(args: &SimulateArgs, job: &Job) -> anyhow::Result<ExitCode> {
     let mut out = std::io::stdout().lock();
     if args.print_config {
         write!(out, "{}", toml::to_string(&args.settings()?)?)?;
@@ -31,7 +32,7 @@ pub(crate) fn run(args: &SimulateArgs) -> anyhow::Result<ExitCode> {
     } else {
         vec![args.settings()?]
     };
-    for (set, folder) in sets.iter().zip(write_sets(&sets, folder, args.force)?) {
+    for (set, folder) in sets.iter().zip(write_sets(&sets, folder, args.force, job)?) {
         writeln!(
             out,
             "{}: {} scans, twist {}°, strain {} %, drift ({}, {}) nm/min",
@@ -98,6 +99,7 @@ pub(crate) fn write_sets(
     sets: &[Simulation],
     out: &Path,
     force: bool,
+    job: &Job,
 ) -> anyhow::Result<Vec<PathBuf>> {
     let mut ready = Vec::new();
     for set in sets {
@@ -114,18 +116,21 @@ pub(crate) fn write_sets(
         ready.push((simulator, folder, sink));
     }
     let mut written = Vec::new();
+    let frames = ready.iter().map(|(simulator, ..)| simulator.frames());
+    let stage = job.stage("simulating", "scans", frames.sum());
     for (simulator, folder, sink) in ready {
-        write_set(&simulator, &sink)?;
+        write_set(&simulator, &sink, &stage)?;
         outputs::commit(sink)?;
         written.push(folder);
     }
     Ok(written)
 }
 
-fn write_set(simulator: &Simulator, sink: &FolderSink) -> anyhow::Result<()> {
+fn write_set(simulator: &Simulator, sink: &FolderSink, stage: &Stage) -> anyhow::Result<()> {
     for index in 0..simulator.frames() {
         let bytes = spmfile::nanoscope::write(&simulator.frame(index))?;
         sink.write(&Simulator::file_name(index), &bytes)?;
+        stage.step();
     }
     let mut truth = serde_json::to_vec_pretty(&simulator.truth())?;
     truth.push(b'\n');
@@ -170,6 +175,11 @@ fn sink(folder: &Path, frames: usize, force: bool) -> anyhow::Result<FolderSink>
 mod tests {
     use super::*;
 
+    /// On threads of its own.
+    fn written(sets: &[Simulation], out: &Path, force: bool) -> anyhow::Result<Vec<PathBuf>> {
+        write_sets(sets, out, force, &Job::quiet(None)?)
+    }
+
     fn small(name: &str, scans: usize) -> Simulation {
         let mut set = Simulation {
             name: name.to_owned(),
@@ -183,7 +193,7 @@ mod tests {
     #[test]
     fn nothing_is_overwritten_without_force() {
         let out = tempfile::tempdir().unwrap();
-        let folders = write_sets(&[small("a b ü", 2)], out.path(), false).unwrap();
+        let folders = written(&[small("a b ü", 2)], out.path(), false).unwrap();
         let first = std::fs::read(folders[0].join("scan.000.spm")).unwrap();
         let truth = std::fs::read_to_string(folders[0].join(TRUTH)).unwrap();
         assert!(truth.contains("\"twist_deg\": 1.13"));
@@ -192,7 +202,7 @@ mod tests {
         other.seed = 2;
         // A good set next to a refused one is not written either.
         let both = [small("new", 1), other.clone()];
-        let error = write_sets(&both, out.path(), false).unwrap_err();
+        let error = written(&both, out.path(), false).unwrap_err();
         assert!(error.to_string().contains("--force"), "{error}");
         assert!(!out.path().join("new").exists());
         assert_eq!(
@@ -200,7 +210,7 @@ mod tests {
             first
         );
 
-        write_sets(&[other], out.path(), true).unwrap();
+        written(&[other], out.path(), true).unwrap();
         assert_ne!(
             std::fs::read(folders[0].join("scan.000.spm")).unwrap(),
             first
@@ -211,12 +221,12 @@ mod tests {
     #[test]
     fn scans_of_an_older_set_do_not_mix_with_the_new_ones() {
         let out = tempfile::tempdir().unwrap();
-        let folders = write_sets(&[small("set", 3)], out.path(), false).unwrap();
-        write_sets(&[small("set", 2)], out.path(), true).unwrap();
+        let folders = written(&[small("set", 3)], out.path(), false).unwrap();
+        written(&[small("set", 2)], out.path(), true).unwrap();
         let there = |name: &str| folders[0].join(name).exists();
         assert!(there("scan.001.spm") && !there("scan.002.spm"));
         std::fs::write(folders[0].join("mine.spm"), "a scan").unwrap();
-        let error = write_sets(&[small("set", 2)], out.path(), true).unwrap_err();
+        let error = written(&[small("set", 2)], out.path(), true).unwrap_err();
         assert!(error.to_string().contains("mine.spm"), "{error}");
     }
 
@@ -225,7 +235,7 @@ mod tests {
         let out = tempfile::tempdir().unwrap();
         for name in ["", "..", "a/b", "a\\b"] {
             assert!(
-                write_sets(&[small(name, 1)], out.path(), false).is_err(),
+                written(&[small(name, 1)], out.path(), false).is_err(),
                 "{name:?}"
             );
         }

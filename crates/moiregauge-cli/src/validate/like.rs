@@ -10,9 +10,10 @@ use moiregauge::settings::Settings;
 use moiregauge::simulate::{Drift, FirstDirection, Noise, Raster, Sample, Simulation, Window};
 use spmfile::FrameDirection;
 
-use crate::analyze::measure_file;
+use crate::analyze::with_advice;
 use crate::input::Known;
 use crate::paths::expand;
+use moiregauge_pipeline::campaign::measure_file;
 
 /// Contrast of the simulated image, degrees of phase; the noise is scaled along.
 const CONTRAST: f64 = 1.0;
@@ -28,7 +29,8 @@ pub(super) fn conditions(paths: &[PathBuf]) -> anyhow::Result<Simulation> {
     let found = found.map_err(|one| anyhow::anyhow!("{}: {}", one.file, one.error))?;
     let mut scans = Vec::new();
     for path in moiregauge_pipeline::distinct(&found).0 {
-        let (mut moires, _) = measure_file(&path, &[], (&settings, &Known::default()), None)
+        let (mut moires, _) = measure_file(&path, &settings, &Known::default())
+            .map_err(with_advice)
             .with_context(|| format!("{}", path.display()))?;
         scans.push(moires.swap_remove(0));
     }

@@ -4,8 +4,10 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use anyhow::Context as _;
+use moiregauge::numbers::interrupt;
 use moiregauge::simulate::{MOST_PIXELS, Simulation, Simulator};
 use moiregauge::spectrum::Method;
+use moiregauge_pipeline::Job;
 use moiregauge_pipeline::sink::Target;
 use rayon::prelude::*;
 
@@ -16,7 +18,6 @@ use super::samples::{self, Tally};
 use crate::analyze::MethodArg;
 use crate::numbers;
 use crate::outputs;
-use crate::progress::bar;
 use crate::say::say;
 
 /// Simulate many sets, analyse them, and report bias, efficiency and coverage of the errors
@@ -69,13 +70,13 @@ pub(crate) struct ValidateArgs {
     force: bool,
     /// No progress bar
     #[arg(long, short)]
-    quiet: bool,
+    pub(crate) quiet: bool,
 }
 
 /// Runs the validation.
-pub(crate) fn run(args: &ValidateArgs) -> anyhow::Result<ExitCode> {
+pub(crate) fn run(args: &ValidateArgs, job: &Job) -> anyhow::Result<ExitCode> {
     if !args.sample.is_empty() {
-        return run_samples(args);
+        return run_samples(args, job);
     }
     let names = output::NAMES.map(str::to_owned);
     let folder = |out| {
@@ -90,17 +91,18 @@ pub(crate) fn run(args: &ValidateArgs) -> anyhow::Result<ExitCode> {
     let sink = args.out.as_deref().map(folder).transpose()?;
     let conditions = conditions(args)?;
     Simulator::new(conditions.clone()).context("these conditions cannot be simulated")?;
-    let progress = bar("validating", "sets", args.sets as usize, !args.quiet);
+    let stage = job.stage("validating", "sets", args.sets as usize);
     let method = Method::from(args.method);
     let compared: Vec<Option<Comparison>> = (0..args.sets)
         .into_par_iter()
         .map(|index| {
+            interrupt::check();
             let result = compare(&conditions, method, args.seed, index);
-            progress.inc(1);
+            stage.step();
             result
         })
         .collect();
-    progress.finish_and_clear();
+    drop(stage);
     let failed = compared.iter().filter(|c| c.is_none()).count();
     let compared: Vec<Comparison> = compared.into_iter().flatten().collect();
     anyhow::ensure!(
@@ -119,7 +121,7 @@ pub(crate) fn run(args: &ValidateArgs) -> anyhow::Result<ExitCode> {
 }
 
 /// The table of real samples.
-fn run_samples(args: &ValidateArgs) -> anyhow::Result<ExitCode> {
+fn run_samples(args: &ValidateArgs, job: &Job) -> anyhow::Result<ExitCode> {
     let names = [SAMPLES.to_owned()];
     let folder = |out| {
         outputs::folder(&Target {
@@ -134,16 +136,17 @@ fn run_samples(args: &ValidateArgs) -> anyhow::Result<ExitCode> {
     let base = conditions(args)?;
     let given = samples::samples_of(&args.sample)?;
     let count = args.sets as usize;
-    let progress = bar("validating", "sets", given.len() * count, !args.quiet);
+    let stage = job.stage("validating", "sets", given.len() * count);
     let method = Method::from(args.method);
     let outcomes = (0..given.len() * count).into_par_iter().map(|index| {
+        interrupt::check();
         let seed = args.seed + (index % count) as u64;
         let outcome = samples::outcome(&base, &given[index / count], method, seed);
-        progress.inc(1);
+        stage.step();
         outcome
     });
     let outcomes: Vec<samples::Outcome> = outcomes.collect::<anyhow::Result<_>>()?;
-    progress.finish_and_clear();
+    drop(stage);
     let tallies: Vec<Tally> = given
         .iter()
         .zip(outcomes.chunks(count))

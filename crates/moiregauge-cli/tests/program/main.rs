@@ -2,6 +2,7 @@
 
 mod acceptance;
 mod calibration;
+mod campaigns;
 mod common;
 mod explained;
 mod figures;
@@ -27,6 +28,7 @@ mod senses;
 mod sessions;
 mod several;
 mod several_images;
+mod stopped;
 mod stripes;
 mod surveys;
 mod validation;

@@ -12,3 +12,4 @@ mod words;
 pub use map_page::map_page;
 pub use page::layers;
 pub(crate) use page::page;
+pub(crate) use template::rendered;

@@ -12,7 +12,7 @@ const STYLE: &str = include_str!("style.html");
 const END: &str = include_str!("end.html");
 
 /// The template filled in.
-pub(super) fn rendered(
+pub(crate) fn rendered(
     template: &'static str,
     content: impl Serialize,
 ) -> Result<Vec<u8>, ReportError> {

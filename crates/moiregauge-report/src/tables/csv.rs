@@ -3,14 +3,14 @@
 use std::fmt::Write as _;
 
 /// A column: its name, what it holds, and how to get it from a row.
-pub(super) struct Column<R> {
-    pub(super) name: &'static str,
-    pub(super) about: &'static str,
-    pub(super) value: fn(&R) -> String,
+pub(crate) struct Column<R> {
+    pub(crate) name: &'static str,
+    pub(crate) about: &'static str,
+    pub(crate) value: fn(&R) -> String,
 }
 
 /// The table with its header line. Lines end in CR LF, as the RFC has it.
-pub(super) fn text<R>(columns: &[Column<R>], rows: &[R]) -> String {
+pub(crate) fn text<R>(columns: &[Column<R>], rows: &[R]) -> String {
     let mut text = line(columns.iter().map(|c| c.name.to_owned()));
     for row in rows {
         text.push_str(&line(columns.iter().map(|c| (c.value)(row))));
@@ -61,7 +61,7 @@ fn quoted(field: &str) -> String {
 }
 
 /// The shortest text that reads back as the same number; empty where there is none.
-pub(super) fn number(value: Option<f64>) -> String {
+pub(crate) fn number(value: Option<f64>) -> String {
     // `Debug` goes over to 1e-40 where `Display` would print forty zeros.
     value.map_or_else(String::new, |v| format!("{v:?}"))
 }

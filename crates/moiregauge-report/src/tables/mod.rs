@@ -15,9 +15,10 @@ mod region;
 mod results;
 mod stripes;
 
+pub(crate) use csv::{Column, number, text as csv_text};
 pub use map::{map_scan, map_scans};
 #[cfg(feature = "parquet")]
-pub(crate) use parquet::parquet_tables;
+pub(crate) use parquet::{parquet_of, parquet_tables};
 pub(crate) use region::COMMON;
 pub use region::map_tables;
 pub(crate) use results::tables;

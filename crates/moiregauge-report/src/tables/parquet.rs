@@ -16,6 +16,7 @@ use parquet::schema::types::Type;
 
 use super::budget::BudgetRow;
 use super::columns::{Row, ScanRow, SetRow, VectorRow};
+use super::csv::Column;
 use crate::error::ReportError;
 use crate::results::Results;
 
@@ -56,8 +57,9 @@ impl Kind {
     fn of(column: &str) -> Self {
         match column {
             "set" | "file" | "frame_direction" | "vector" | "coordinates" | "acquired"
-            | "slow_axis" | "channel" | "source" | "excluded" => Self::Text,
-            "scan" | "scans" => Self::Count,
+            | "slow_axis" | "channel" | "source" | "excluded" | "sample" | "status" | "caveats"
+            | "error" => Self::Text,
+            "scan" | "scans" | "moire" | "failed_files" => Self::Count,
             "drift_given" | "within_one_percent" => Self::Answer,
             _ => Self::Number,
         }
@@ -74,8 +76,16 @@ impl Kind {
 }
 
 fn table<'a, R: Row<'a>>(results: &'a Results) -> Result<Vec<u8>, ParquetError> {
-    let rows = R::rows(results);
-    let fields = R::COLUMNS
+    of_rows(R::COLUMNS, &R::rows(results))
+}
+
+/// Any table.
+pub(crate) fn parquet_of<R>(columns: &[Column<R>], rows: &[R]) -> Result<Vec<u8>, ReportError> {
+    of_rows(columns, rows).map_err(|error| ReportError::Parquet(error.to_string()))
+}
+
+fn of_rows<R>(columns: &[Column<R>], rows: &[R]) -> Result<Vec<u8>, ParquetError> {
+    let fields = columns
         .iter()
         .map(|column| {
             let kind = Kind::of(column.name);
@@ -90,7 +100,7 @@ fn table<'a, R: Row<'a>>(results: &'a Results) -> Result<Vec<u8>, ParquetError> 
     let schema = Type::group_type_builder("schema")
         .with_fields(fields)
         .build()?;
-    let about = R::COLUMNS
+    let about = columns
         .iter()
         .map(|c| KeyValue::new(c.name.to_owned(), c.about.to_owned()))
         .collect();
@@ -101,7 +111,7 @@ fn table<'a, R: Row<'a>>(results: &'a Results) -> Result<Vec<u8>, ParquetError> 
     let mut bytes = Vec::new();
     let mut writer = SerializedFileWriter::new(&mut bytes, Arc::new(schema), Arc::new(properties))?;
     let mut group = writer.next_row_group()?;
-    for column in R::COLUMNS {
+    for column in columns {
         let Some(mut out) = group.next_column()? else {
             return Err(ParquetError::General("a column is missing".to_owned()));
         };

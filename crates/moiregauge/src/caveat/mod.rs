@@ -14,6 +14,7 @@ pub(crate) mod orientation;
 pub(crate) mod patterns;
 pub(crate) mod positions;
 pub(crate) mod readings;
+mod recorded;
 pub(crate) mod sets;
 
 pub use calibrating::CalibrationDoubt;
@@ -27,6 +28,7 @@ pub use orientation::{OrientationDoubt, SenseNumbers};
 pub use patterns::PatternDoubt;
 pub use positions::PositionDoubt;
 pub use readings::{ChosenBy, NumbersOfName, ReadingDoubt, TwistShift};
+pub use recorded::RecordedDoubt;
 pub use sets::{DifferentSamples, Scattered, SetDoubt};
 
 /// A reason to trust a number less.
@@ -105,6 +107,9 @@ pub enum Doubt {
     /// Stripes and domains.
     #[error(transparent)]
     Patterns(#[from] PatternDoubt),
+    /// Any of these, read from a file.
+    #[error(transparent)]
+    Recorded(#[from] RecordedDoubt),
 }
 
 impl Doubt {
@@ -122,6 +127,7 @@ impl Doubt {
             Self::Orientation(doubt) => doubt.explained(),
             Self::Maps(doubt) => doubt.explained(),
             Self::Patterns(doubt) => doubt.explained(),
+            Self::Recorded(doubt) => doubt.explained(),
         }
     }
 }

@@ -13,11 +13,13 @@
 use heterostrain::lattice::{Px, Waves};
 use nalgebra::{DMatrix, DVector, Matrix2, Matrix3, Matrix4, Vector2};
 use rustfft::num_complex::Complex64;
+use serde::{Deserialize, Serialize};
 
 use crate::coverage::cells::Cells;
 use crate::coverage::local::{Local, local};
 use crate::coverage::settle::Patch;
 use crate::frame::image::Image;
+use crate::numbers::exact;
 use crate::numbers::normal_equations::NormalEquations;
 use crate::numbers::splines::Splines;
 
@@ -48,20 +50,24 @@ const BETTER: f64 = 20.0;
 const UNCORRELATED: f64 = 1e-3;
 
 /// How a lattice changes across its patch.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Change {
     /// What describes it.
     pub model: ChangeModel,
     /// Standard deviation of the wavelengths over the patch as a share of their mean, the most of the three.
+    #[serde(with = "exact")]
     pub wavelength: f64,
     /// Standard deviation of their directions, rad.
+    #[serde(with = "exact")]
     pub angle: f64,
     /// By how much the evidence (BIC) for it exceeds that for a lattice that is the same everywhere.
+    #[serde(with = "exact")]
     pub evidence: f64,
 }
 
 /// What describes the phases of a lattice that changes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum ChangeModel {
     /// The wave vectors change evenly across the patch.

@@ -7,11 +7,13 @@
 
 use nalgebra::{Matrix2, Vector2};
 use rustfft::num_complex::Complex64;
+use serde::{Deserialize, Serialize};
 
 use crate::coverage::bend::{Mean, View, mean};
 use crate::coverage::cells::{Cells, Window};
 use crate::coverage::grains::split;
 use crate::frame::image::Image;
+use crate::numbers::exact;
 use crate::numbers::median::median;
 
 /// Windows that are tried, mean periods: the narrowest that keeps waves a wave vector apart, and wider ones for
@@ -46,9 +48,10 @@ const SMALLEST_PART: f64 = 3.0;
 const SMALLEST_GAP: f64 = 1.5;
 
 /// The part of a frame that carries a lattice.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Patch {
     /// The mean waves over it, rad per pixel.
+    #[serde(with = "exact")]
     pub pair: Matrix2<f64>,
     /// Cells along columns and rows.
     pub size: [usize; 2],
@@ -57,8 +60,10 @@ pub struct Patch {
     /// Whether a cell belongs to it, row by row from the bottom.
     pub inside: Vec<bool>,
     /// Share of the pixels that are there.
+    #[serde(with = "exact")]
     pub share: f64,
     /// Unit cells of the lattice in it.
+    #[serde(with = "exact")]
     pub unit_cells: f64,
 }
 

@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use crate::frame::image::Image;
+use crate::numbers::interrupt;
 
 /// Gaussian means of this width (standard deviation along columns and rows, pixels) over the pixels that are there.
 pub(crate) fn blurred(image: &Image, width: [f64; 2]) -> Vec<f64> {
@@ -37,6 +38,7 @@ pub(crate) fn blur(values: &[f64], image: &Image, width: [f64; 2]) -> Vec<f64> {
         .par_chunks_mut(columns)
         .zip(values.par_chunks(columns))
         .for_each(|(out, line)| {
+            interrupt::check();
             for (c, out) in out.iter_mut().enumerate() {
                 let from = c.saturating_sub(reach);
                 let part = &line[from..(c + reach + 1).min(columns)];

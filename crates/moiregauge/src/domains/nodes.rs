@@ -11,6 +11,7 @@ use rayon::prelude::*;
 use crate::domains::blur::blurred;
 use crate::domains::patch::{Fit, Template};
 use crate::frame::image::Image;
+use crate::numbers::interrupt;
 use crate::numbers::median::median;
 
 /// Bins per period: a node of a tenth of a period is four bins wide, which an interpolation follows.
@@ -170,7 +171,10 @@ fn refined(image: &Image, starts: &[Vector2<f64>], radius: [f64; 2]) -> Option<(
         template.lines = lines;
         let found: Vec<Option<Fit>> = starts
             .par_iter()
-            .map(|start| template.fit(image, *start))
+            .map(|start| {
+                interrupt::check();
+                template.fit(image, *start)
+            })
             .collect();
         fits = found.into_iter().flatten().collect();
         if round == 0 {

@@ -7,6 +7,7 @@ use rayon::prelude::*;
 
 use crate::drift::drawn::DriftMonteCarlo;
 use crate::drift::linear::{Observation, chi2, least_squares, weights};
+use crate::numbers::interrupt;
 use crate::numbers::rng::stream;
 
 /// Draws that share one random stream: enough to make its set-up cheap, and independent of threads.
@@ -36,6 +37,7 @@ pub fn monte_carlo(
     let batches: Vec<Vec<(Vector2<f64>, f64)>> = (0..draws.div_ceil(BATCH))
         .into_par_iter()
         .map(|batch| {
+            interrupt::check();
             let mut rng = stream(seed, name, batch as u64);
             let mut drawn = observations.to_vec();
             let unit = vec![Matrix4::identity(); drawn.len()];

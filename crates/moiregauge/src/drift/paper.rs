@@ -23,6 +23,7 @@ use spmfile::LineDirection;
 use crate::drift::drawn::DriftMonteCarlo;
 use crate::drift::monte_carlo::distribution;
 use crate::frame::axis::Axis;
+use crate::numbers::interrupt;
 use crate::numbers::rng::stream;
 
 /// Draws that share one random stream: enough to make its set-up cheap, and independent of threads.
@@ -169,6 +170,7 @@ pub fn successive_draws(
     let batches: Vec<Vec<(Vector2<f64>, f64)>> = (0..draws.div_ceil(BATCH))
         .into_par_iter()
         .map(|batch| {
+            interrupt::check();
             let mut rng = stream(seed, name, batch as u64);
             (0..BATCH.min(draws - batch * BATCH))
                 .filter_map(|_| {

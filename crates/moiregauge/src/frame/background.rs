@@ -8,6 +8,7 @@ use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
 use crate::frame::image::Image;
+use crate::numbers::interrupt;
 
 /// The image without its background. Missing pixels stay missing.
 pub fn remove_background(image: &Image, background: Background) -> Image {
@@ -50,6 +51,7 @@ fn without_polynomial(image: &Image, degree: usize) -> Image {
     let mut normal = DMatrix::<f64>::zeros(n, n);
     let mut right = DVector::<f64>::zeros(n);
     for row in 0..image.rows {
+        interrupt::check();
         // Moments of this line along x: Σ P_i and Σ P_i P_j over its finite pixels, and Σ P_i I.
         let (mut pp, mut pi) = ([[0.0; 4]; 4], [0.0; 4]);
         for (value, p) in image.row(row).iter().zip(&along) {

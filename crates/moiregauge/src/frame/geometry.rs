@@ -10,29 +10,35 @@
 
 use heterostrain::lattice::both;
 use nalgebra::{Matrix2, Matrix4, Vector2};
+use serde::{Deserialize, Serialize};
 use spmfile::{FrameDirection, LineDirection, Scan};
 
 use crate::frame::axis::Axis;
+use crate::numbers::exact;
 
 /// The affine map from pixels to nm.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Geometry {
     /// Number of samples in a line and of lines.
     pub size: [usize; 2],
     /// `J`: columns are the steps from column to column and from row to row, nm.
+    #[serde(with = "exact")]
     pub pixel_to_nm: Matrix2<f64>,
     /// Position of pixel (0, 0), nm.
+    #[serde(with = "exact")]
     pub origin: Vector2<f64>,
     /// Covariance of the entries of `J`, `(J₁₁, J₂₁, J₁₂, J₂₂)`.
+    #[serde(with = "exact")]
     pub covariance: Matrix4<f64>,
     /// Whether it comes from position sensors.
     pub from_sensors: bool,
 }
 
 /// When each pixel was recorded, as a linear function of its index.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Timing {
     /// τ: signed time from column to column and from row to row, s.
+    #[serde(with = "exact")]
     pub per_pixel: Vector2<f64>,
 }
 

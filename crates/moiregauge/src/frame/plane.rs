@@ -3,6 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use crate::frame::image::Image;
+use crate::numbers::interrupt;
 
 /// A fitted plane.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -88,6 +89,7 @@ fn fit_within(
     let mut right = Vector3::<f64>::zeros();
     let (mut squares, mut count) = (0.0, 0usize);
     for row in 0..image.rows {
+        interrupt::check();
         let y = row as f64 - cy;
         let (mut n, mut sx, mut sxx, mut sv, mut sxv) = (0.0, 0.0, 0.0, 0.0, 0.0);
         let line = &image.row(row)[columns.clone()];

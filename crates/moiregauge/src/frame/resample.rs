@@ -17,6 +17,7 @@ use nalgebra::{Matrix2, Vector2};
 use rayon::prelude::*;
 
 use crate::frame::image::Image;
+use crate::numbers::interrupt;
 
 /// So many times the pixels of the image a grid has at most: finer ones hold nothing new and fill the memory.
 const MOST_POINTS: f64 = 8.0;
@@ -75,6 +76,7 @@ pub fn resample(
     let lines: Vec<Vec<f64>> = (0..rows)
         .into_par_iter()
         .map(|row| {
+            interrupt::check();
             (0..columns)
                 .map(|column| {
                     let point = first + pitch * Vector2::new(column as f64, row as f64);

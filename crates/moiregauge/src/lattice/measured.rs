@@ -2,26 +2,31 @@
 
 use heterostrain::lattice::{Lattice, Px};
 use nalgebra::{Matrix2, Vector2};
+use serde::{Deserialize, Serialize};
 
 use crate::coverage::bend::Change;
 use crate::coverage::settle::Patch;
 use crate::lattice::fit::fit_pixels::LatticeFit;
 use crate::lattice::paper::PublishedPeaks;
+use crate::numbers::exact;
 use crate::spectrum::phases::Phases;
 
 /// A grain beside the one that is measured.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Grain {
     /// Its share of the frame.
+    #[serde(with = "exact")]
     pub share: f64,
     /// Its waves, rad per pixel.
+    #[serde(with = "exact")]
     pub waves: Matrix2<f64>,
 }
 
 /// The lattice of one image.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct MeasuredLattice {
     /// Vectors in pixels (columns, rows).
+    #[serde(with = "exact")]
     pub pixels: Lattice<Px>,
     /// The part of the frame that carries the lattice; `None` for all of it.
     pub patch: Option<Patch>,
@@ -30,19 +35,25 @@ pub struct MeasuredLattice {
     /// The other grains of the frame; this is the largest.
     pub grains: Vec<Grain>,
     /// What the other estimator found: autocorrelation beside Fourier, Fourier beside all others.
+    #[serde(with = "exact")]
     pub comparison: Option<Lattice<Px>>,
     /// The shortcut wavelengths `4π/(√3|K|)` of the three first harmonics, nm.
+    #[serde(with = "exact")]
     pub shortcut_wavelengths: Option<[f64; 3]>,
     /// Reciprocal pair of the harmonics behind `phases`, rad per pixel, at 60° to each other.
+    #[serde(with = "exact")]
     pub reciprocal: Matrix2<f64>,
     /// Phases of the harmonics K₁, K₂ and K₂ − K₁ of `reciprocal` at the pixel position `middle`, rad.
     /// There they are uncorrelated with the wave vectors.
     pub phases: Phases,
     /// Middle of the part of the frame that was used, (column, row), in fractions of pixels.
+    #[serde(with = "exact")]
     pub middle: Vector2<f64>,
     /// Lattice periods across the shorter side of the frame.
+    #[serde(with = "exact")]
     pub periods: f64,
     /// Amplitude over noise amplitude in one resolution cell, weakest of the first harmonics.
+    #[serde(with = "exact")]
     pub signal_to_noise: f64,
     /// The peaks as published; `None` with the other methods.
     pub published: Option<PublishedPeaks>,

@@ -10,20 +10,24 @@
 
 use heterostrain::lattice::{Lattice, Px, three_vectors};
 use nalgebra::{Matrix2, Matrix6, Vector2};
+use serde::{Deserialize, Serialize};
 
 use crate::frame::geometry::Geometry;
 use crate::frame::image::Image;
+use crate::numbers::exact;
 use crate::spectrum::transform::Spectrum;
 
 /// The assumed half-width of a peak, pixels; a uniform distribution of that width has σ = w/√3.
 const PEAK_HALF_WIDTH: f64 = 1.5;
 
 /// Peaks of the autocorrelation as published: each for itself, not made to close.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct PublishedPeaks {
     /// Three of the six peaks, about 60° apart; the others are their opposites. Pixels (columns, rows).
+    #[serde(with = "exact")]
     pub vectors: [Vector2<f64>; 3],
     /// Covariance of each, px²: a uniform distribution over ±1.5 steps of the grid along x and along y.
+    #[serde(with = "exact")]
     pub covariance: Matrix2<f64>,
 }
 

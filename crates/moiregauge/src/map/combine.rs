@@ -15,6 +15,7 @@ use rayon::prelude::*;
 
 use crate::map::sample::{Grid, LatticeMap, LatticeNode};
 use crate::numbers::chi2::enlargement;
+use crate::numbers::interrupt;
 use crate::window::blur::is_improbable;
 use crate::window::mask::Mask;
 
@@ -86,7 +87,10 @@ fn average_of(
     let views: Vec<View> = maps.iter().filter_map(|map| View::new(map)).collect();
     let mut found: Vec<(LatticeNode, f64, usize)> = (0..grid.len())
         .into_par_iter()
-        .map(|node| average(&views, grid.place(node)))
+        .map(|node| {
+            interrupt::check();
+            average(&views, grid.place(node))
+        })
         .collect();
     let window_nm = maps.iter().map(|m| m.window_nm).fold(0.0, f64::max);
     let scatter = Scatter::of(&found, grid, window_nm, shared);

@@ -21,6 +21,7 @@ use std::f64::consts::{E, PI};
 use nalgebra::{Matrix2, Matrix4, Vector2};
 use rayon::prelude::*;
 
+use crate::numbers::interrupt;
 use crate::window::blocks::Blocks;
 use crate::window::leaks::{ROUNDING, pulls};
 use crate::window::lines::Levelled;
@@ -150,6 +151,7 @@ pub(crate) fn local_lattices(
     (0..smoothed.nodes.len())
         .into_par_iter()
         .map(|node| {
+            interrupt::check();
             let support = smoothed.support[node].ok_or(Nothing::NoPixels)?;
             let at = smoothed.nodes.place(blocks, node);
             let taken = taken(at);

@@ -2,6 +2,14 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
+/// Adds the square of a row of a design matrix to the normal matrix. Rows are mostly zeros; leaving these out changes no
+/// bit of the sum.
+pub(crate) fn add_square(normal: &mut DMatrix<f64>, row: &DVector<f64>) {
+    for (j, value) in row.iter().enumerate().filter(|(_, v)| **v != 0.0) {
+        normal.column_mut(j).axpy(*value, row, 1.0);
+    }
+}
+
 /// A scaled and factored normal matrix.
 pub(crate) struct NormalEquations {
     factor: Cholesky<f64, Dyn>,

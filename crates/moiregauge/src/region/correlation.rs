@@ -9,6 +9,7 @@ use nalgebra::Vector2;
 use rayon::prelude::*;
 
 use crate::map::sample::Grid;
+use crate::numbers::interrupt;
 
 /// Beyond this many windows nodes count as independent: e⁻¹² is left.
 const REACH: f64 = 7.0;
@@ -44,6 +45,7 @@ pub(crate) fn pairs(grid: &Grid, nodes: &[(usize, f64)], window: f64) -> Pairs {
     let sums: Vec<[f64; 2]> = nodes
         .par_iter()
         .map(|&(node, weight)| {
+            interrupt::check();
             let (column, row) = (node as i64 % columns, node as i64 / columns);
             let mut sum = [0.0; 2];
             for &([c, r], rho) in &offsets {

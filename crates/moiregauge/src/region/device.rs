@@ -9,6 +9,7 @@ use rayon::prelude::*;
 
 use crate::map::quantities::TwistStrainMap;
 use crate::map::sample::Grid;
+use crate::numbers::interrupt;
 use crate::region::correlation::pairs;
 use crate::region::polygon::Region;
 use crate::region::smoothing::{Bends, Bent};
@@ -215,6 +216,7 @@ impl RunningSums {
         };
         let pairs = pairs(&map.grid, &evenly(&middle), map.window_nm);
         let of_node = |node: usize| {
+            interrupt::check();
             let (sum, all) = self.within(&shape, node)?;
             if sum[0] < search.good * all || sum[0] < 1.0 {
                 return None;

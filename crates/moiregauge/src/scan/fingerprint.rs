@@ -1,13 +1,17 @@
 //! What is kept of an image to know it again.
 
+use std::fmt::Write as _;
 use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
 
 use crate::frame::background::{Background, remove_background};
 use crate::frame::image::Image;
 use crate::numbers::median::median;
 
 /// What is left of the pixels of an image to know it again.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(try_from = "Written", into = "Written")]
 pub(crate) struct Fingerprint {
     size: [usize; 2],
     /// Values at pixels spread over the frame, without plane, in standard deviations.
@@ -33,7 +37,11 @@ impl Fingerprint {
         Self {
             size: [image.columns, image.rows],
             samples: samples.collect(),
-            noise: noise(&flat) / deviation,
+            noise: if deviation > 0.0 {
+                noise(&flat) / deviation
+            } else {
+                0.0
+            },
         }
     }
 
@@ -81,6 +89,52 @@ fn noise(image: &Image) -> f64 {
 
 /// Differences by which the noise is read, about: the median is known to a per cent or two.
 const NOISE_SAMPLES: usize = 4096;
+
+/// A fingerprint as it is written: every sample by the eight hexadecimal digits of its bits.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Written {
+    size: [usize; 2],
+    samples: String,
+    /// Noise of a pixel, in standard deviations of the image.
+    noise: f64,
+}
+
+impl From<Fingerprint> for Written {
+    fn from(known: Fingerprint) -> Self {
+        let mut samples = String::with_capacity(8 * known.samples.len());
+        for sample in known.samples.iter() {
+            // Writing into a string cannot fail.
+            let _ = write!(samples, "{:08x}", sample.to_bits());
+        }
+        Self {
+            size: known.size,
+            samples,
+            noise: known.noise,
+        }
+    }
+}
+
+impl TryFrom<Written> for Fingerprint {
+    type Error = &'static str;
+
+    fn try_from(written: Written) -> Result<Self, Self::Error> {
+        let (digits, rest) = written.samples.as_bytes().as_chunks::<8>();
+        let sample = |digits: &[u8; 8]| {
+            let bits = u32::from_str_radix(std::str::from_utf8(digits).ok()?, 16).ok()?;
+            Some(f32::from_bits(bits))
+        };
+        let samples: Option<Vec<f32>> = digits.iter().map(sample).collect();
+        match samples {
+            Some(samples) if rest.is_empty() => Ok(Self {
+                size: written.size,
+                samples: samples.into(),
+                noise: written.noise,
+            }),
+            _ => Err("expected eight hexadecimal digits for each sample"),
+        }
+    }
+}
 
 /// Pixels that are compared: the mean square of their difference is known to 4 %.
 pub(crate) const SAMPLES: usize = 1024;

@@ -11,6 +11,7 @@ use crate::frame::image::Image;
 use crate::lattice::measure::{Start, measure};
 use crate::lattice::measured::MeasuredLattice;
 use crate::lattice::several::together::measure_several;
+use crate::numbers::interrupt;
 use crate::numbers::words::line_name;
 use crate::scan::channel::{channels, image_of};
 use crate::scan::doubts::{about_coverage, about_fit, few_periods, lines_disagree, turned};
@@ -106,6 +107,7 @@ fn measure_with(
     let mut moires: Vec<Vec<MeasuredLine>> = Vec::new();
     let mut failures = Vec::new();
     for channel in &channels {
+        interrupt::check();
         match measure_line(file, scan, channel, settings, window, find, &mut caveats) {
             Ok(lines) => add_lines(&mut moires, lines),
             Err(error) => failures.push(error),
@@ -200,9 +202,11 @@ fn measure_line(
         turned(file, scan.rotation_rad, caveats);
         pitch = pitch_sigma(scan, channel);
     }
+    interrupt::check();
     let (speeds, speed_error) = place.speeds();
     let mut image = image_of(channel);
     let pixels = Fingerprint::of(&image);
+    interrupt::check();
     let mut lines_after = 0;
     if let Some(window) = window {
         let recorded = &place.recorded;

@@ -3,30 +3,37 @@
 use heterostrain::Estimate;
 use heterostrain::lattice::{Lattice, block, labelled_like};
 use nalgebra::{Matrix2, Vector2};
+use serde::{Deserialize, Serialize};
 use spmfile::{DateTime, FrameDirection, LineDirection};
 
 use crate::caveat::Caveat;
 use crate::drift::linear::Observation;
 use crate::frame::geometry::{Geometry, Timing};
 use crate::lattice::measured::MeasuredLattice;
+use crate::numbers::exact;
 use crate::scan::fingerprint::Fingerprint;
+use crate::scan::written;
 use crate::settings::ranges::OutOfRange;
 use crate::spectrum::error::LatticeError;
 
 /// What the pixels of one scan gave.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct MeasuredScan {
     /// The file as the user named it.
     pub file: String,
     /// When it was saved, by the instrument's clock.
+    #[serde(with = "written::date")]
     pub acquired: Option<DateTime>,
     /// Sense of the slow motion.
+    #[serde(with = "written::frame_direction")]
     pub frame_direction: Option<FrameDirection>,
     /// Lines per second.
+    #[serde(with = "exact")]
     pub line_rate_hz: Option<f64>,
     /// Name of the analysed channel.
     pub channel: String,
     /// Nominal size (fast, slow), nm.
+    #[serde(with = "exact")]
     pub size_nm: Option<[f64; 2]>,
     /// Name of the set to which the user assigned it by hand.
     pub set: Option<String>,
@@ -43,9 +50,10 @@ pub struct MeasuredScan {
 }
 
 /// What the trace or the retrace of one scan gave.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct MeasuredLine {
     /// Trace or retrace.
+    #[serde(with = "written::line")]
     pub line: LineDirection,
     /// Where the pixels were.
     pub geometry: Geometry,
@@ -60,11 +68,13 @@ pub struct MeasuredLine {
     /// The lattice in pixels.
     pub lattice: MeasuredLattice,
     /// Tip speeds along the fast and slow axes, nm/s; σ is the spread over the lines. NaN without timing.
+    #[serde(with = "exact")]
     pub speeds: [Estimate; 2],
     /// Relative standard errors of the pitch along the fast and the slow axis where nobody knows what the size of the
     /// frame spans; `None` where sensors or the format tell.
     pub pitch_sigma: Option<[f64; 2]>,
     /// Relative standard error of the mean speeds.
+    #[serde(with = "exact")]
     pub speed_error: [f64; 2],
     /// To know the whole image again.
     pub(crate) pixels: Fingerprint,

@@ -13,6 +13,7 @@ pub(crate) mod place;
 pub(crate) mod positions;
 pub(crate) mod scanner;
 pub(crate) mod shared;
+pub(crate) mod written;
 
 pub use channel::{channels_by_preference, choose_channel};
 pub use images::{image_choice, unusual_channels};

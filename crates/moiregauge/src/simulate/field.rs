@@ -10,6 +10,7 @@ use rayon::prelude::*;
 use rustfft::num_complex::Complex64;
 
 use crate::frame::image::Image;
+use crate::numbers::interrupt;
 use crate::numbers::rng;
 
 /// A lattice whose wave vectors change from place to place.
@@ -223,7 +224,10 @@ impl FieldScene {
         let [columns, rows] = self.size;
         let lines: Vec<Vec<f64>> = (0..rows)
             .into_par_iter()
-            .map(|row| self.row(row, columns))
+            .map(|row| {
+                interrupt::check();
+                self.row(row, columns)
+            })
             .collect();
         Image::new(rows, columns, lines.concat())
     }

@@ -8,6 +8,7 @@ use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 use spmfile::{Channel, LineDirection, Samples, Scan};
 
+use crate::numbers::interrupt;
 use crate::numbers::rng;
 use crate::simulate::calendar::date_after;
 use crate::simulate::instrument::{Disturbances, glitch_stream};
@@ -191,6 +192,7 @@ fn record_line(
         .into_par_iter()
         .enumerate()
         .for_each(|(row, (phase, amplitude, x, y))| {
+            interrupt::check();
             recorder.image(row, offsets[row], phase, amplitude);
             if settings.raster.sensors {
                 recorder.sensors(row, x, y);

@@ -9,6 +9,7 @@ use rustfft::num_complex::Complex64;
 
 use crate::frame::background::{Background, remove_background};
 use crate::frame::image::Image;
+use crate::numbers::interrupt;
 use crate::spectrum::transform::hann;
 
 /// One harmonic of the lattice.
@@ -109,6 +110,7 @@ impl Windowed {
             .unzip();
         let mut sums = [Complex64::default(); 3];
         for row in 0..self.rows {
+            interrupt::check();
             let line = &self.values[row * self.columns..(row + 1) * self.columns];
             let y = row as f64 - cy;
             let turn = Complex64::from_polar(1.0, -q.y * y);
@@ -277,6 +279,7 @@ impl Windowed {
                 .map(|c| (q.x * (c as f64 - cx)).sin_cos())
                 .unzip();
             for (row, line) in values.chunks_exact_mut(self.columns).enumerate() {
+                interrupt::check();
                 let c = 2.0 * amplitudes[i] * Complex64::from_polar(1.0, q.y * (row as f64 - cy));
                 for ((v, re), im) in line.iter_mut().zip(&re).zip(&im) {
                     *v += c.re * re - c.im * im;

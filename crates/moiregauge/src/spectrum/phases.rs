@@ -1,13 +1,18 @@
 //! Phases of the first three harmonics of a lattice, with what their errors have in common.
 
 use nalgebra::{Matrix3, Vector3};
+use serde::{Deserialize, Serialize};
+
+use crate::numbers::exact;
 
 /// Phases of the harmonics K₁, K₂ and K₂ − K₁, rad.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Phases {
     /// The phases.
+    #[serde(with = "exact")]
     pub values: [f64; 3],
     /// Their covariance, rad².
+    #[serde(with = "exact")]
     pub covariance: Matrix3<f64>,
 }
 

@@ -8,6 +8,7 @@
 use heterostrain::lattice::{distortion, shortest_pair};
 use nalgebra::{Matrix2, Vector2};
 
+use crate::numbers::interrupt;
 use crate::spectrum::transform::Spectrum;
 
 /// A lattice is well explained by so many peaks, and by so many times those that chance puts on it. Chosen by eye.
@@ -236,6 +237,7 @@ pub(crate) fn spectrum_peaks(spectrum: &Spectrum) -> Vec<Peak> {
     let frame = frame_cycles(spectrum);
     let mut found = Vec::new();
     for ky in 0..rows {
+        interrupt::check();
         let signed = if ky <= rows / 2 {
             ky as f64
         } else {

@@ -13,6 +13,7 @@ use rustfft::num_complex::Complex64;
 use rustfft::{Fft, FftPlanner};
 
 use crate::frame::image::Image;
+use crate::numbers::interrupt;
 
 /// Columns transformed together: enough to fill a cache line, few enough to stay in the cache.
 const COLUMN_BLOCK: usize = 8;
@@ -337,6 +338,7 @@ fn forward(
     let mut buffer = real.make_input_vec();
     let lines = values.chunks_exact_mut(half).take(image_size[1]);
     for (row, out) in lines.enumerate() {
+        interrupt::check();
         buffer.fill(0.0);
         line(row, &mut buffer[..image_size[0]]);
         real.process_with_scratch(&mut buffer, out, &mut scratch)
@@ -351,6 +353,7 @@ fn columns_in_place(values: &mut [Complex64], rows: usize, width: usize, plan: &
     let mut block = vec![Complex64::default(); COLUMN_BLOCK * rows];
     let mut scratch = vec![Complex64::default(); plan.get_inplace_scratch_len()];
     for first in (0..width).step_by(COLUMN_BLOCK) {
+        interrupt::check();
         let count = COLUMN_BLOCK.min(width - first);
         for row in 0..rows {
             for c in 0..count {

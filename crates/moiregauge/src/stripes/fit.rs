@@ -9,6 +9,7 @@ use rayon::prelude::*;
 use rustfft::num_complex::Complex64;
 
 use crate::frame::image::Image;
+use crate::numbers::interrupt;
 use crate::spectrum::noise::LocalNoise;
 use crate::spectrum::transform::hann;
 
@@ -108,6 +109,7 @@ impl Pixels<'_> {
             .used
             .par_chunks(TOGETHER)
             .map(|some| {
+                interrupt::check();
                 let mut normal = DMatrix::<f64>::zeros(all, all);
                 let mut right = DVector::<f64>::zeros(all);
                 let mut row = vec![0.0; linear.len() + 2];

@@ -9,6 +9,7 @@ use crate::frame::geometry::Geometry;
 use crate::frame::image::Image;
 use crate::lattice::measure::measure;
 use crate::map::sample::{Grid, LatticeMap, LatticeNode};
+use crate::numbers::interrupt;
 use crate::settings::knobs::Settings;
 use crate::spectrum::method::Method;
 use crate::window::mask::Mask;
@@ -49,6 +50,7 @@ pub(crate) fn tile_map(
     let nodes = (0..size[0] * size[1])
         .into_par_iter()
         .map(|n| {
+            interrupt::check();
             let at = [n % size[0], n / size[0]];
             let corner = [0, 1].map(|i| first[i] + at[i] * step[i]);
             let tile = image.cropped(corner, side);

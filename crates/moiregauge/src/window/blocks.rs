@@ -8,6 +8,7 @@ use nalgebra::Vector2;
 use rayon::prelude::*;
 
 use crate::frame::image::Image;
+use crate::numbers::interrupt;
 use crate::window::lines::Levelled;
 use crate::window::types::{Reference, Resolution};
 
@@ -116,7 +117,10 @@ pub(crate) fn mix_some(
         let last = (first + TOGETHER).min(size[1]);
         let mixed: Vec<(Vec<f32>, Option<Vec<f32>>)> = (first..last)
             .into_par_iter()
-            .map(|row| mix_row(levelled, row, block, &along, &up, wanted(row)))
+            .map(|row| {
+                interrupt::check();
+                mix_row(levelled, row, block, &along, &up, wanted(row))
+            })
             .collect();
         for (row, (sums, of_line)) in mixed.into_iter().enumerate() {
             for (layer, sums) in layers.iter_mut().zip(sums.chunks_exact(2 * size[0].max(1))) {

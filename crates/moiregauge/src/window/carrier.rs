@@ -12,6 +12,7 @@ use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
 use rayon::prelude::*;
 use rustfft::num_complex::Complex32;
 
+use crate::numbers::interrupt;
 use crate::numbers::splines::{Sixteen, Splines, cubic};
 use crate::window::blocks::Blocks;
 
@@ -147,6 +148,7 @@ impl Carrier {
                 .for_each(|(r, line)| r.push(line));
         }
         rows.into_par_iter().enumerate().for_each(|(row, layers)| {
+            interrupt::check();
             let mut phases = self.line(places, row);
             if let Some(before) = before {
                 for (new, old) in phases.iter_mut().zip(before.line(places, row)) {

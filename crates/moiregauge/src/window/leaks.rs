@@ -12,6 +12,7 @@ use nalgebra::{Matrix2, Vector2};
 use rayon::prelude::*;
 use rustfft::num_complex::{Complex32, Complex64};
 
+use crate::numbers::interrupt;
 use crate::window::blocks::Blocks;
 use crate::window::smooth::{Kernel, Smoothed, Support};
 
@@ -76,6 +77,7 @@ pub(crate) fn clean(
     let cleaned: Vec<Vec<[Complex64; 3]>> = cut
         .par_iter()
         .map(|&node| {
+            interrupt::check();
             let taken = taken(nodes.place(blocks, node));
             of_node(smoothed, blocks, &kernels, indices, node, &taken)
         })

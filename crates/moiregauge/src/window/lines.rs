@@ -11,6 +11,7 @@ use rustfft::FftPlanner;
 use rustfft::num_complex::Complex64;
 
 use crate::frame::image::Image;
+use crate::numbers::interrupt;
 use crate::numbers::median::median;
 use crate::spectrum::transform::hann;
 use crate::window::types::Reference;
@@ -115,6 +116,7 @@ impl<'a> Levelled<'a> {
     pub(crate) fn variance(&self) -> f64 {
         let (mut sum, mut count) = (0.0, 0.0f64);
         for row in 0..self.image.rows {
+            interrupt::check();
             let offset = self.offset(row);
             for value in self.image.row(row).iter().filter(|v| v.is_finite()) {
                 sum += (value - offset).powi(2);
@@ -174,7 +176,11 @@ fn line_sums(image: &Image) -> Vec<[Complex64; 3]> {
         }
         sums.map(|s| s / there)
     };
-    (0..image.rows).into_par_iter().map(of_line).collect()
+    let checked = |row| {
+        interrupt::check();
+        of_line(row)
+    };
+    (0..image.rows).into_par_iter().map(checked).collect()
 }
 
 /// Powers of a series over ky, those of white noise being its variance.

@@ -16,6 +16,7 @@ use nalgebra::{Matrix2, Matrix3, Vector2};
 use rayon::prelude::*;
 use rustfft::num_complex::{Complex32, Complex64};
 
+use crate::numbers::interrupt;
 use crate::window::blocks::{Blocks, Layer};
 
 /// Windows end so many widths from their middle: 4·10⁻⁵ of the height.
@@ -333,6 +334,7 @@ fn fits_with_gaps(
     let lines: Vec<Vec<[f64; 6]>> = (0..blocks.size[1])
         .into_par_iter()
         .map(|row| {
+            interrupt::check();
             let line = &share[row * blocks.size[0]..(row + 1) * blocks.size[0]];
             let at = |i: usize| nodes.first[0] + i * nodes.stride[0];
             let moments = |i: usize| {
@@ -385,6 +387,7 @@ fn envelope(
     let lines: Vec<Vec<f32>> = (0..blocks.size[1])
         .into_par_iter()
         .map(|row| {
+            interrupt::check();
             if nodes.see(row, radius) {
                 along(blocks.size[0], layer, &kernels[0], nodes, row)
             } else {
@@ -395,6 +398,7 @@ fn envelope(
     let rows: Vec<Vec<(Complex32, [Complex32; 2])>> = (0..nodes.size[1])
         .into_par_iter()
         .map(|node_row| {
+            interrupt::check();
             let at = nodes.first[1] + node_row * nodes.stride[1];
             let first = at.saturating_sub(radius);
             let last = (at + radius + 1).min(blocks.size[1]);

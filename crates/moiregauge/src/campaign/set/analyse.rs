@@ -27,6 +27,7 @@ use crate::meaning::budget::Budget;
 use crate::meaning::readings::Readings;
 use crate::meaning::strengths::WaveStrengths;
 use crate::numbers::chi2::enlargement;
+use crate::numbers::interrupt;
 use crate::numbers::rng::normals;
 use crate::numbers::spread::mean_and_spread;
 use crate::scan::measured::{MeasuredLine, MeasuredScan};
@@ -229,6 +230,7 @@ fn without_drift(
 /// Draws twist and strain of every scan.
 fn draw(scans: &mut [ScanAnalysis], settings: &Settings, first_index: u64) {
     scans.par_iter_mut().enumerate().for_each(|(i, scan)| {
+        interrupt::check();
         let lattice = scan.drift_corrected.as_ref().unwrap_or(&scan.sensor);
         if moire(lattice, settings).is_none() {
             return;

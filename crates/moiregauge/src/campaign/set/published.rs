@@ -13,6 +13,7 @@ use crate::drift::linear::{DriftSolution, Observation, at_known_drift, common_la
 use crate::drift::paper::{PaperScan, normal_vector, successive_draws, successive_drift};
 use crate::drift::shares::Statistical;
 use crate::frame::axis::Axis;
+use crate::numbers::interrupt;
 use crate::numbers::rng;
 use crate::scan::measured::{MeasuredLine, MeasuredScan};
 use crate::settings::knobs::Settings;
@@ -130,6 +131,7 @@ pub(crate) fn draw_all(
     first_index: u64,
 ) {
     scans.par_iter_mut().enumerate().for_each(|(i, scan)| {
+        interrupt::check();
         let Some(k) = measured.iter().position(|m| m.file == scan.file) else {
             return;
         };

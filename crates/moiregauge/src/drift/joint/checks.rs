@@ -9,11 +9,12 @@
 
 use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
 use rand::RngExt as _;
+use rayon::prelude::*;
 
 use crate::drift::joint::evaluate::{Linearised, linearise};
 use crate::drift::joint::instability::instability;
 use crate::drift::joint::solve::JointFit;
-use crate::numbers::normal_equations::NormalEquations;
+use crate::numbers::normal_equations::{NormalEquations, add_square};
 use crate::numbers::rng::stream;
 
 /// Directions in which a scan alone determines a parameter have a residual of zero: below this share of the largest
@@ -55,9 +56,13 @@ impl JointFit {
     /// from the others, so that a displaced scan does not excuse itself.
     pub fn leave_one_out(&self) -> Vec<LeftOut> {
         let scans = 1 + self.sightings.iter().map(|s| s.scan).max().unwrap_or(0);
+        let Some(all) = Step::new(self, self.instability_nm) else {
+            return Vec::new();
+        };
         (0..scans)
+            .into_par_iter()
             .filter_map(|scan| {
-                let first = Step::new(self, self.instability_nm)?.without(scan)?;
+                let first = all.without(scan)?;
                 if !self.terms.phases {
                     return Some(first);
                 }
@@ -230,7 +235,7 @@ fn normal_equations(
     let mut normal = DMatrix::<f64>::zeros(size, size);
     let mut right = DVector::<f64>::zeros(size);
     for i in (0..rows.scans.len()).filter(|&i| wanted(rows.scans[i])) {
-        normal.ger(1.0, &rows.jacobian[i], &rows.jacobian[i], 1.0);
+        add_square(&mut normal, &rows.jacobian[i]);
         right.axpy(rows.residuals[i], &rows.jacobian[i], 1.0);
     }
     (normal, right)

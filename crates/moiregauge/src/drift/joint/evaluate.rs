@@ -6,6 +6,7 @@ use nalgebra::{
 
 use crate::drift::joint::path::{DriftPath, Settling};
 use crate::drift::joint::sighting::{Sighting, Terms};
+use crate::numbers::interrupt;
 
 /// Where each parameter stands in the vector.
 #[derive(Clone, Debug)]
@@ -221,6 +222,7 @@ pub(crate) fn linearise(
     reach: f64,
     instability: f64,
 ) -> Linearised {
+    interrupt::check();
     let mut out = Linearised {
         residuals: Vec::new(),
         jacobian: Vec::new(),

@@ -12,7 +12,7 @@ use nalgebra::{DMatrix, DVector, Matrix4};
 use crate::drift::joint::evaluate::{factor, linearise};
 use crate::drift::joint::solve::JointFit;
 use crate::drift::shares::Statistical;
-use crate::numbers::normal_equations::NormalEquations;
+use crate::numbers::normal_equations::{NormalEquations, add_square};
 
 impl JointFit {
     /// The covariance of `waves`, (rad/nm)², as a sum of image noise, drift and sensor noise.
@@ -33,7 +33,7 @@ impl JointFit {
             .collect();
         let mut normal = DMatrix::<f64>::zeros(n, n);
         for row in &design {
-            normal.ger(1.0, row, row, 1.0);
+            add_square(&mut normal, row);
         }
         // Columns that nothing sees are held.
         let held = |i: usize| if normal[(i, i)] == 0.0 { 1.0 } else { 0.0 };

@@ -12,7 +12,7 @@ use crate::drift::joint::link::number_blocks;
 use crate::drift::joint::path::DriftPath;
 use crate::drift::joint::sighting::{Sighting, Terms};
 use crate::numbers::chi2::enlargement;
-use crate::numbers::normal_equations::NormalEquations;
+use crate::numbers::normal_equations::{NormalEquations, add_square};
 use crate::spectrum::phases::Phases;
 
 /// Gauss–Newton steps: more than it takes, since the problem is nearly linear.
@@ -352,7 +352,7 @@ fn iterate(
         let mut normal = DMatrix::<f64>::zeros(n, n);
         let mut right = DVector::<f64>::zeros(n);
         for (residual, row) in now.residuals.iter().zip(&now.jacobian) {
-            normal.ger(1.0, row, row, 1.0);
+            add_square(&mut normal, row);
             right.axpy(*residual, row, 1.0);
         }
         // Offsets of classes that have no phase within reach are not seen yet: hold them.

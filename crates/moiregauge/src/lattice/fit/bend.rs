@@ -12,12 +12,14 @@
 //! Rao, Proc. Camb. Phil. Soc. 44, 50 (1948), score test.
 
 use nalgebra::{DMatrix, DVector, Matrix2, Matrix4, Vector2};
+use serde::{Deserialize, Serialize};
 
 use crate::lattice::fit::folded::Bends;
 use crate::lattice::fit::frame::{BENT, Frame, wave};
 use crate::lattice::fit::gram::gram;
 use crate::lattice::fit::model::Model;
 use crate::lattice::fit::solve;
+use crate::numbers::exact;
 use crate::spectrum::shells::FIRST_SHELL;
 
 /// χ² with six degrees of freedom exceeds 22.5 once in a thousand; the noise that it is counted in is
@@ -27,16 +29,20 @@ const THRESHOLD: f64 = 27.0;
 const HARMLESS: f64 = 1e-3;
 
 /// How the lattice changes across the frame.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Inhomogeneity {
     /// By how much the wavelength changes from one corner to the opposite one, as a share of it: the
     /// most of the three first harmonics. Counted in pixels, as the angle.
+    #[serde(with = "exact")]
     pub wavelength: f64,
     /// By how much the direction changes, rad.
+    #[serde(with = "exact")]
     pub angle: f64,
     /// χ² of the six numbers that say so.
+    #[serde(with = "exact")]
     pub chi_squared: f64,
     /// What chance exceeds once in a thousand.
+    #[serde(with = "exact")]
     pub threshold: f64,
 }
 

@@ -10,10 +10,12 @@
 //! background and amplitudes free.
 
 use nalgebra::{DMatrix, DVector};
+use serde::{Deserialize, Serialize};
 
 use crate::lattice::fit::model::Model;
 use crate::lattice::fit::solve;
 use crate::numbers::chi2::enlargement_by_estimated_noise;
+use crate::numbers::exact;
 
 /// Amplitude over noise from which a harmonic has a wave vector of its own: its phase is then good to
 /// 0.14 rad.
@@ -23,9 +25,10 @@ const STRONG: f64 = 5.0;
 const NOISE_KNOWN_TO: f64 = 1.25;
 
 /// How well the harmonics agree on one lattice.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Closure {
     /// χ² of the harmonics' own wave vectors about those of the lattice.
+    #[serde(with = "exact")]
     pub chi_squared: f64,
     /// Its degrees of freedom: two for each strong harmonic, less four.
     pub degrees_of_freedom: usize,

@@ -3,6 +3,7 @@
 use heterostrain::lattice::{Lattice, Px, Waves};
 use nalgebra::{DMatrix, DVector, Matrix2, Matrix3, SMatrix, Vector2};
 use rustfft::num_complex::Complex64;
+use serde::{Deserialize, Serialize};
 
 use crate::frame::background::Background;
 use crate::frame::image::Image;
@@ -15,6 +16,7 @@ use crate::lattice::fit::lines::LineStatistics;
 use crate::lattice::fit::model::{Clip, LineOffsets, Model, Tables, look, settled};
 use crate::lattice::fit::noise::{ForeignWave, Leverage, ResidualNoise};
 use crate::lattice::fit::{bend, choose, closure, frame, solve};
+use crate::numbers::exact;
 use crate::spectrum::harmonics::{Harmonics, dot};
 use crate::spectrum::phases::Phases;
 use crate::spectrum::shells::FIRST_SHELL;
@@ -31,30 +33,37 @@ const LEFT: f64 = 0.01;
 pub(crate) const ROUNDS: usize = 5;
 
 /// A lattice fitted to the pixels of an image.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct LatticeFit {
     /// The wave vectors q₁, q₂ (about 60° apart), rad per pixel along columns and rows.
+    #[serde(with = "exact")]
     pub wave_vectors: Waves<Px>,
     /// Where the phases hold, pixels (column, row): the centre of the frame.
+    #[serde(with = "exact")]
     pub centre: Vector2<f64>,
     /// The harmonics, first shell first.
     pub harmonics: Vec<FittedHarmonic>,
     /// Covariance of the phases of the first three harmonics, rad². Where line offsets or neighbours take
     /// up a part of a harmonic its phase is less certain than its signal and noise say.
+    #[serde(with = "exact")]
     pub phase_covariance: Matrix3<f64>,
     /// Residual over noise, root mean square: 1 for white noise and a model that is complete; more
     /// where the noise is coloured or the lattice is not the same everywhere.
+    #[serde(with = "exact")]
     pub goodness: f64,
     /// Standard deviation of the line offsets, units of the image; `None` where none are used.
+    #[serde(with = "exact")]
     pub line_offsets: Option<f64>,
     /// Lines left out because they went wrong or are mostly missing.
     pub lines_left_out: usize,
     /// Share of the pixels whose residuals are cut off; 0.3 % for Gaussian noise.
+    #[serde(with = "exact")]
     pub clipped: f64,
     /// The strongest wave that is left and none of the lattice's: a second lattice, or pick-up.
     pub foreign_wave: Option<ForeignWave>,
     /// The transform of what is left, across the lines from each of the first three harmonics: (columns, rows) in
     /// cycles per frame and value. Two images of one scan tell by it what noise they share.
+    #[serde(with = "exact")]
     pub(crate) residual: [Vec<([i64; 2], Complex64)>; 3],
     /// How the lattice changes across the frame; `None` where the frame is too small to tell.
     pub inhomogeneity: Option<Inhomogeneity>,
@@ -64,16 +73,19 @@ pub struct LatticeFit {
 }
 
 /// One harmonic of a fitted lattice.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FittedHarmonic {
     /// (h, k): the wave vector is `h q₁ + k q₂`.
     pub index: [i32; 2],
     /// A of `A cos(q·(n − centre) + φ)`, units of the image.
+    #[serde(with = "exact")]
     pub amplitude: f64,
     /// φ, rad. Far from other harmonics and from line offsets its standard error is
     /// `1/(√2 · signal_to_noise)`.
+    #[serde(with = "exact")]
     pub phase: f64,
     /// Amplitude over noise amplitude in one resolution cell.
+    #[serde(with = "exact")]
     pub signal_to_noise: f64,
 }
 

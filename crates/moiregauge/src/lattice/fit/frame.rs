@@ -7,6 +7,7 @@ use nalgebra::{Matrix2, Vector2};
 use rustfft::num_complex::Complex64;
 
 use crate::frame::image::Image;
+use crate::numbers::interrupt;
 
 /// An image with the list of what is missing.
 #[derive(Clone)]
@@ -38,6 +39,7 @@ impl<'a> Frame<'a> {
     pub(crate) fn leave_out(&mut self, bad: impl Fn(usize) -> bool) {
         self.missing.clear();
         for row in 0..self.image.rows {
+            interrupt::check();
             let line = self.image.row(row);
             let count = line.iter().filter(|v| v.is_finite()).count();
             let used = !bad(row) && 2 * count >= line.len();

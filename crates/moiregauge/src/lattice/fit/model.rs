@@ -5,6 +5,7 @@ use rustfft::num_complex::Complex64;
 
 use crate::lattice::fit::folded::{Folded, widest};
 use crate::lattice::fit::frame::{Basis, Frame, turns, wave};
+use crate::numbers::interrupt;
 use crate::numbers::median::median;
 
 /// Residuals beyond this many standard deviations pull no harder (Huber). At 3 the loss of
@@ -87,6 +88,7 @@ pub(crate) fn residuals(
 ) {
     let mut line = vec![0.0; frame.image.columns];
     for row in 0..frame.image.rows {
+        interrupt::check();
         if frame.present[row] > 0 {
             residual(frame, model, tables, row, &mut line);
             each(row, &mut line);

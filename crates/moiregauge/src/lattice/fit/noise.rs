@@ -8,10 +8,12 @@
 
 use nalgebra::{DMatrix, DVector, Vector2};
 use rustfft::num_complex::Complex64;
+use serde::{Deserialize, Serialize};
 
 use crate::lattice::fit::frame::{Basis, Frame, wave};
 use crate::lattice::fit::local::{Bin, acting_on};
 use crate::lattice::fit::model::Model;
+use crate::numbers::exact;
 use crate::numbers::median::median;
 use crate::spectrum::harmonics::hann_transform;
 use crate::spectrum::select::{BLOCK_WIDTH, NoiseMap};
@@ -52,13 +54,16 @@ pub(crate) struct ResidualNoise {
 }
 
 /// The strongest wave in the residual that is none of the lattice's.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ForeignWave {
     /// Its wave vector, rad per pixel.
+    #[serde(with = "exact")]
     pub wave_vector: Vector2<f64>,
     /// Its power over the noise power around it.
+    #[serde(with = "exact")]
     pub significance: f64,
     /// The significance that chance exceeds once in some ten thousand images of this size.
+    #[serde(with = "exact")]
     pub threshold: f64,
 }
 

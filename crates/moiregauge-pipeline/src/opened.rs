@@ -3,28 +3,58 @@
 use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 
-use anyhow::Context as _;
 use moiregauge::campaign::amplitude_of;
 use moiregauge::caveat::{Caveat, FileDoubt};
-use moiregauge::scan::{choose_channel, unusual_channels};
+use moiregauge::scan::{MeasureError, choose_channel, unusual_channels};
 use moiregauge::settings::Settings;
-use moiregauge_pipeline::{Content, Known, enough_for, names};
 use moiregauge_report::InputFile;
 use spmfile::{ChannelInfo, ReadError, Scan, sensor_axis};
 
-use crate::input::with_option;
+use crate::content::Content;
+use crate::known::{Known, KnownError};
+use crate::memory::{NotEnoughMemory, enough_for};
+use crate::names;
+use crate::reading::FileError;
+
+/// Why a file gives no measured scan.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum InputError {
+    /// It cannot be read.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// It is no scan, or a damaged one.
+    #[error(transparent)]
+    Read(#[from] ReadError),
+    /// It does not hold what was told of it.
+    #[error(transparent)]
+    Known(#[from] KnownError),
+    /// Its image is too large.
+    #[error(transparent)]
+    Memory(#[from] NotEnoughMemory),
+    /// Its image cannot be measured.
+    #[error(transparent)]
+    Measure(#[from] MeasureError),
+    /// Results name a file that was not given.
+    #[error("it is none of the inputs")]
+    NotAnInput,
+}
 
 /// A file as the analysis reads it.
-pub(crate) struct Reading {
-    pub(crate) scan: Scan,
-    pub(crate) input: InputFile,
+#[derive(Debug)]
+pub struct Reading {
+    /// The chosen channel and the position sensors.
+    pub scan: Scan,
+    /// What identifies the file.
+    pub input: InputFile,
     /// What the user's options replaced in it, and what its reader doubts.
-    pub(crate) caveats: Vec<Caveat>,
+    pub caveats: Vec<Caveat>,
 }
 
 /// A file in memory, with the names of its channels: the user's and the instrument's own, without those that the user
 /// calls position sensors.
-pub(crate) struct Opened<'a> {
+#[derive(Debug)]
+pub struct Opened<'a> {
     path: &'a Path,
     known: &'a Known,
     content: Content,
@@ -33,7 +63,10 @@ pub(crate) struct Opened<'a> {
 
 impl<'a> Opened<'a> {
     /// Opens a file once, for all that is taken of it.
-    pub(crate) fn new(path: &'a Path, known: &'a Known) -> anyhow::Result<Self> {
+    ///
+    /// # Errors
+    /// It cannot be read, or is no scan.
+    pub fn new(path: &'a Path, known: &'a Known) -> Result<Self, InputError> {
         let content = Content::read(known.place(path))?;
         let channels = channels(path, &content, known)?;
         Ok(Self {
@@ -45,7 +78,7 @@ impl<'a> Opened<'a> {
     }
 
     /// The names of its channels.
-    pub(crate) fn names(&self) -> Vec<(&str, &str)> {
+    pub fn names(&self) -> Vec<(&str, &str)> {
         let both = self.channels.iter();
         both.map(|(name, internal)| (name.as_str(), internal.as_str()))
             .collect()
@@ -56,7 +89,7 @@ impl<'a> Opened<'a> {
         &self,
         settings: &Settings,
         companion: impl Fn(&str) -> Option<String>,
-    ) -> anyhow::Result<(Scan, Vec<String>)> {
+    ) -> Result<(Scan, Vec<String>), InputError> {
         let names = self.names();
         let chosen = choose_channel(&names, settings.channel.as_deref());
         let beside = chosen.and_then(companion);
@@ -65,19 +98,29 @@ impl<'a> Opened<'a> {
                 || beside.as_ref() == Some(&channel.name.to_lowercase())
                 || sensor_axis(&channel.name, &channel.internal_name).is_some()
         };
-        let read = self.known.read(self.path, &self.content, &wanted);
-        read.map_err(with_option)
+        Ok(self.known.read(self.path, &self.content, &wanted)?)
     }
 
     /// The chosen channel and the position sensors alone; not more than the memory holds while it is analysed.
-    pub(crate) fn image(&self, settings: &Settings) -> anyhow::Result<Scan> {
+    ///
+    /// # Errors
+    /// [`InputError`].
+    pub fn image(&self, settings: &Settings) -> Result<Scan, InputError> {
         let (scan, _) = self.scan(settings, |_| None)?;
         enough_for(&scan)?;
         Ok(scan)
     }
 
+    /// Its bytes.
+    pub fn content(&self) -> &Content {
+        &self.content
+    }
+
     /// All that the analysis needs, of an image of any size.
-    pub(crate) fn reading(&self, settings: &Settings) -> anyhow::Result<Reading> {
+    ///
+    /// # Errors
+    /// [`InputError`].
+    pub fn reading(&self, settings: &Settings) -> Result<Reading, InputError> {
         let (scan, replaced) = self.scan(settings, |_| None)?;
         let input = self.content.identity(self.path);
         let several = unusual_channels(&self.names(), settings.channel.as_deref());
@@ -114,27 +157,33 @@ fn channels(
 }
 
 /// Reads what the analysis needs of a file; not more than the memory holds while it is analysed.
-pub(crate) fn read(path: &Path, settings: &Settings, known: &Known) -> anyhow::Result<Reading> {
+///
+/// # Errors
+/// [`InputError`].
+pub fn read_scan(path: &Path, settings: &Settings, known: &Known) -> Result<Reading, InputError> {
     let reading = Opened::new(path, known)?.reading(settings)?;
     enough_for(&reading.scan)?;
     Ok(reading)
 }
 
 /// The image of an input that the results know by the words of its path.
-pub(crate) fn read_again(
+///
+/// # Errors
+/// [`InputError`].
+pub fn read_again(
     inputs: &[PathBuf],
     words: &str,
     settings: &Settings,
     known: &Known,
-) -> anyhow::Result<Scan> {
-    let path = names::with_words(inputs, words).context("it is none of the inputs")?;
+) -> Result<Scan, InputError> {
+    let path = names::with_words(inputs, words).ok_or(InputError::NotAnInput)?;
     let (scan, _) = Opened::new(path, known)?.scan(settings, |_| None)?;
     enough_for(&scan)?;
     Ok(scan)
 }
 
 /// The image of a file, with what is shown beside it: the amplitude of a phase. None where it cannot be read.
-pub(crate) fn read_shown(path: &Path, settings: &Settings, known: &Known) -> Option<Scan> {
+pub fn read_shown(path: &Path, settings: &Settings, known: &Known) -> Option<Scan> {
     let opened = Opened::new(path, known).ok()?;
     Some(opened.scan(settings, amplitude_of).ok()?.0)
 }

@@ -3,11 +3,12 @@
 use std::path::PathBuf;
 
 use moiregauge::caveat::{Caveat, ChannelReason, FileDoubt};
-use moiregauge::scan::{MeasureError, channels_by_preference};
+use moiregauge::scan::channels_by_preference;
 use moiregauge::settings::Settings;
-use moiregauge_pipeline::Known;
 
-use crate::reading::Opened;
+use super::measure::Failure;
+use crate::known::Known;
+use crate::opened::Opened;
 
 /// A channel to try instead, as settings that name it.
 pub(super) struct Other {
@@ -31,13 +32,11 @@ impl Other {
 /// images are to blame; none otherwise.
 pub(super) fn others<T>(
     inputs: &[PathBuf],
-    measured: &[anyhow::Result<T>],
-    (settings, known): (&Settings, &Known),
+    measured: &[Result<T, Failure>],
+    settings: &Settings,
+    known: &Known,
 ) -> Vec<Other> {
-    let no_lattice = |result: &anyhow::Result<T>| {
-        let error = result.as_ref().err().and_then(|e| e.downcast_ref());
-        matches!(error, Some(MeasureError::Lattice { .. }))
-    };
+    let no_lattice = |result: &Result<T, Failure>| result.as_ref().is_err_and(|f| f.no_lattice);
     if settings.channel.is_some() || measured.iter().any(Result::is_ok) {
         return Vec::new();
     }

@@ -1,0 +1,300 @@
+//! A campaign that grows: scans come and go, settings change, and nothing is measured twice.
+
+use std::path::{Path, PathBuf};
+
+use moiregauge::campaign::{Analysis, analyse};
+use moiregauge::scan::sorted_moires;
+use moiregauge::settings::{Settings, SettingsError};
+use moiregauge_report::results::{NamedSet, Run, Told};
+use moiregauge_report::{FailedInput, InputFile, Provenance};
+use serde::{Deserialize, Serialize};
+
+use super::channel::Other;
+use super::error::AnalyseError;
+use super::kept::Kept;
+use super::measure::{Advice, Inputs, Measured, given_again, measured, no_advice};
+use super::overlap::overlap;
+use super::shown::show;
+use crate::job::Job;
+use crate::known::{Known, Places};
+use crate::names::in_words;
+use crate::told::check_told;
+use crate::twice::distinct;
+
+/// What came out, and of what.
+#[derive(Clone, Debug)]
+pub struct Outcome {
+    /// The numbers.
+    pub analysis: Analysis,
+    /// The files, those that failed among them.
+    pub provenance: Provenance,
+}
+
+/// Scans that are analysed together.
+///
+/// Measuring takes nearly all of the time of an analysis. A file is measured once for each content, settings of
+/// measuring and what is known of it; everything else is done anew in milliseconds a scan.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(try_from = "Written")]
+pub struct Campaign {
+    settings: Settings,
+    told: Told,
+    sets: Vec<NamedSet>,
+    inputs: Vec<PathBuf>,
+    places: Places,
+    left_out: Vec<FailedInput>,
+    kept: Kept,
+    illustrated: bool,
+    #[serde(skip)]
+    advice: Words,
+}
+
+/// A campaign as it is written.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Written {
+    settings: Settings,
+    told: Told,
+    sets: Vec<NamedSet>,
+    inputs: Vec<PathBuf>,
+    places: Places,
+    left_out: Vec<FailedInput>,
+    kept: Kept,
+    illustrated: bool,
+}
+
+impl TryFrom<Written> for Campaign {
+    type Error = SettingsError;
+
+    fn try_from(written: Written) -> Result<Self, Self::Error> {
+        let campaign = Self::new(written.settings)?.with_told(written.told)?;
+        Ok(Self {
+            sets: written.sets,
+            inputs: written.inputs,
+            places: written.places,
+            left_out: written.left_out,
+            kept: written.kept,
+            illustrated: written.illustrated,
+            ..campaign
+        })
+    }
+}
+
+/// What a front end says of errors; it is no part of what is written.
+#[derive(Clone, Copy, Debug)]
+struct Words(Advice);
+
+impl Default for Words {
+    fn default() -> Self {
+        Self(no_advice)
+    }
+}
+
+impl Campaign {
+    /// One without scans.
+    ///
+    /// # Errors
+    /// Settings that make no sense.
+    pub fn new(settings: Settings) -> Result<Self, SettingsError> {
+        settings.check()?;
+        Ok(Self {
+            settings,
+            told: Told::default(),
+            sets: Vec::new(),
+            inputs: Vec::new(),
+            places: Places::new(),
+            left_out: Vec::new(),
+            kept: Kept::default(),
+            illustrated: false,
+            advice: Words::default(),
+        })
+    }
+
+    /// That of a run, with its scans.
+    ///
+    /// # Errors
+    /// Settings that make no sense.
+    pub fn of_run(
+        run: &Run,
+        inputs: &[PathBuf],
+        places: &Places,
+        advice: Advice,
+    ) -> Result<Self, SettingsError> {
+        let wanted = run.report;
+        let mut campaign = Self::new(run.settings.clone())?.with_told(run.known.clone())?;
+        campaign.add(inputs.iter().cloned());
+        Ok(Self {
+            sets: run.sets.clone(),
+            places: places.clone(),
+            left_out: run.left_out.clone(),
+            illustrated: wanted.figures || wanted.png || wanted.html,
+            advice: Words(advice),
+            ..campaign
+        })
+    }
+
+    /// Adds scans, in order.
+    pub fn add(&mut self, scans: impl IntoIterator<Item = PathBuf>) {
+        self.inputs.extend(scans);
+    }
+
+    /// Removes a scan; whether it was there. What was measured of it is kept.
+    pub fn remove(&mut self, scan: &Path) -> bool {
+        let before = self.inputs.len();
+        self.inputs.retain(|path| path != scan);
+        self.inputs.len() < before
+    }
+
+    /// The same scans with other settings. What was measured stays where they do not change it.
+    ///
+    /// # Errors
+    /// Settings that make no sense.
+    pub fn with_settings(mut self, settings: Settings) -> Result<Self, SettingsError> {
+        settings.check()?;
+        self.settings = settings;
+        Ok(self)
+    }
+
+    /// The same scans with other knowledge of them.
+    ///
+    /// # Errors
+    /// What no file can be like.
+    pub fn with_told(mut self, told: Told) -> Result<Self, SettingsError> {
+        check_told(&told)?;
+        self.told = told;
+        Ok(self)
+    }
+
+    /// The same scans, some of which lie elsewhere than their names say.
+    #[must_use]
+    pub fn with_places(mut self, places: Places) -> Self {
+        self.places = places;
+        self
+    }
+
+    /// With names that were given and cannot be measured.
+    #[must_use]
+    pub fn with_left_out(mut self, left_out: Vec<FailedInput>) -> Self {
+        self.left_out = left_out;
+        self
+    }
+
+    /// With what a front end says that helps against errors.
+    #[must_use]
+    pub fn with_advice(mut self, advice: Advice) -> Self {
+        self.advice = Words(advice);
+        self
+    }
+
+    /// Whether analyses hold the first image of every set, for figures.
+    #[must_use]
+    pub fn illustrated(mut self, illustrated: bool) -> Self {
+        self.illustrated = illustrated;
+        self
+    }
+
+    /// Takes an orientation that was measured into the settings.
+    pub(super) fn know_orientation(
+        &mut self,
+        known: heterostrain::strain::KnownOrientation,
+    ) -> Result<(), SettingsError> {
+        self.settings.lattice_angle = Some(known);
+        self.settings.check()
+    }
+
+    /// The settings.
+    pub fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    /// What is known of the scans.
+    pub fn told(&self) -> &Told {
+        &self.told
+    }
+
+    /// The scans.
+    pub fn inputs(&self) -> &[PathBuf] {
+        &self.inputs
+    }
+
+    /// What was measured so far.
+    pub fn kept(&self) -> &Kept {
+        &self.kept
+    }
+
+    /// Takes what was measured by another campaign.
+    pub fn take(&mut self, kept: Kept) {
+        self.kept.extend(kept);
+    }
+
+    /// Analyses the scans, every moiré that they show by itself.
+    ///
+    /// # Errors
+    /// [`AnalyseError`]; after [`AnalyseError::Cancelled`] what was measured is kept, and the next analysis goes on
+    /// from there.
+    pub fn analyse(&mut self, job: &Job) -> Result<Vec<Outcome>, AnalyseError> {
+        let (inputs, repeated) = distinct(&self.inputs);
+        let known = Known::new(&self.told, &inputs).at(&self.places);
+        let mut failed = self.left_out.clone();
+        let mut window = None;
+        if self.settings.overlap {
+            window = job.run(|| overlap(&inputs, &self.settings, &known))?;
+            if window.is_none() {
+                return Err(AnalyseError::NoCommonRegion { failed });
+            }
+        }
+        let from = Inputs {
+            files: &inputs,
+            sets: &self.sets,
+            known: &known,
+            window: window.as_ref(),
+            advice: self.advice.0,
+        };
+        let Measured { files, other } = measured(&from, &self.settings, &mut self.kept, job)?;
+        let settings = other.as_ref().map_or(&self.settings, |o| &o.settings);
+        let (mut scans, mut identities) = (Vec::new(), Vec::new());
+        for (path, result) in inputs.iter().zip(files) {
+            match result {
+                Ok((moires, file)) => {
+                    scans.push(moires);
+                    identities.push(file);
+                }
+                Err(failure) => failed.push(FailedInput {
+                    file: in_words(path),
+                    error: failure.error,
+                }),
+            }
+        }
+        if scans.is_empty() {
+            return Err(AnalyseError::Nothing { failed });
+        }
+        let provenance = provenance(settings, identities, failed);
+        let mut caveats = given_again(&repeated);
+        caveats.extend(other.as_ref().map(Other::caveat));
+        let of_moire = |(moire, scans)| {
+            let settings = &settings.of_moire(moire);
+            let mut analysis = analyse(scans, settings);
+            analysis.caveats.extend(caveats.iter().cloned());
+            if self.illustrated {
+                show(&mut analysis, &inputs, settings, &known);
+            }
+            Outcome {
+                analysis,
+                provenance: provenance.clone(),
+            }
+        };
+        let moires = sorted_moires(scans).into_iter().enumerate();
+        Ok(job.run(|| moires.map(of_moire).collect())?)
+    }
+}
+
+/// What was analysed; the record of the run comes later.
+fn provenance(settings: &Settings, inputs: Vec<InputFile>, failed: Vec<FailedInput>) -> Provenance {
+    Provenance {
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        seed: settings.seed,
+        inputs,
+        failed,
+        run: None,
+    }
+}

@@ -1,0 +1,149 @@
+//! What was measured, by what it depends on.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use moiregauge::scan::{MeasuredScan, Window};
+use moiregauge::settings::Settings;
+use serde::{Deserialize, Serialize};
+use sha2::{Digest as _, Sha256};
+
+use super::measure::Failure;
+use crate::hash::{hexadecimal, identity};
+use crate::known::Known;
+use crate::session;
+
+/// Name and version of what is kept; a part of every key.
+pub(crate) const SCHEMA: &str = "moiregauge/measured/1";
+
+/// Measured scans by the hash of their file and of all that measuring depends on.
+///
+/// As JSON it is a document of its own, `moiregauge/measured/1`: measuring and analysing can happen in different
+/// processes and on different days. Entries of other versions of this crate are never used.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[serde(try_from = "Document", into = "Document")]
+pub struct Kept(BTreeMap<String, Result<Vec<MeasuredScan>, Failure>>);
+
+impl Kept {
+    /// How many files are measured.
+    pub fn len(&self) -> usize {
+        self.0.len()
+    }
+
+    /// Whether nothing is measured.
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    pub(super) fn get(&self, key: &str) -> Option<&Result<Vec<MeasuredScan>, Failure>> {
+        self.0.get(key)
+    }
+
+    pub(super) fn extend(&mut self, other: Self) {
+        self.0.extend(other.0);
+    }
+
+    pub(super) fn put(&mut self, key: String, measured: Result<Vec<MeasuredScan>, Failure>) {
+        self.0.insert(key, measured);
+    }
+}
+
+/// Measured scans as they are written.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Document {
+    schema: String,
+    files: BTreeMap<String, OfFile>,
+}
+
+/// What a file gave: its moirés, or why there are none.
+#[derive(Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum OfFile {
+    Moires(Vec<MeasuredScan>),
+    Failed(Failure),
+}
+
+impl From<Kept> for Document {
+    fn from(kept: Kept) -> Self {
+        let files = kept.0.into_iter().map(|(key, measured)| match measured {
+            Ok(moires) => (key, OfFile::Moires(moires)),
+            Err(failure) => (key, OfFile::Failed(failure)),
+        });
+        Self {
+            schema: SCHEMA.to_owned(),
+            files: files.collect(),
+        }
+    }
+}
+
+impl TryFrom<Document> for Kept {
+    type Error = String;
+
+    fn try_from(document: Document) -> Result<Self, Self::Error> {
+        if document.schema != SCHEMA {
+            return Err(format!("expected {SCHEMA:?}, found {:?}", document.schema));
+        }
+        let files = document
+            .files
+            .into_iter()
+            .map(|(key, of_file)| match of_file {
+                // An analysis needs at least one moiré of a file that it takes for measured.
+                OfFile::Moires(moires)
+                    if moires.iter().all(|m| !m.lines.is_empty()) && !moires.is_empty() =>
+                {
+                    Ok((key, Ok(moires)))
+                }
+                OfFile::Moires(_) => {
+                    Err(format!("{key}: expected a lattice of a line, found none"))
+                }
+                OfFile::Failed(failure) => Ok((key, Err(failure))),
+            });
+        Ok(Self(files.collect::<Result<_, _>>()?))
+    }
+}
+
+/// What measuring depends on beside the file: one hash for all files of a campaign.
+pub(super) struct With(Sha256);
+
+impl With {
+    /// Of settings, what is known of all files, and the region.
+    pub(super) fn new(settings: &Settings, known: &Known, window: Option<&Window>) -> Self {
+        // What is chosen after measuring changes no measured scan.
+        let measuring = Settings {
+            channel: settings.channel.clone(),
+            image: settings.image,
+            line: settings.line,
+            method: settings.method,
+            background: settings.background,
+            moires: settings.moires,
+            scanner: settings.scanner.clone(),
+            ..Settings::default()
+        };
+        let mut hash = Sha256::new();
+        let told = known.told();
+        let mut add = |part: &dyn std::fmt::Debug| hash.update(format!("{part:?}\n"));
+        add(&SCHEMA);
+        add(&env!("CARGO_PKG_VERSION"));
+        add(&measuring);
+        add(told);
+        add(&window);
+        if let Some(sensors) = &told.sensors {
+            let sensors = Path::new(sensors);
+            add(&identity(sensors, known.place(sensors)).ok());
+        }
+        Self(hash)
+    }
+
+    /// The key of a file: with its name, its hash, and that of the logs beside it.
+    pub(super) fn key(&self, path: &Path, name: &str, sha256: &str, known: &Known) -> String {
+        let mut hash = self.0.clone();
+        let direction = known.frame_direction(path);
+        hash.update(format!("{name:?} {sha256} {direction:?}\n"));
+        for log in session::log_files(known.place(path)) {
+            let log = identity(&log, &log).ok();
+            hash.update(format!("{:?}\n", log.map(|log| log.sha256)));
+        }
+        hexadecimal(&hash.finalize())
+    }
+}

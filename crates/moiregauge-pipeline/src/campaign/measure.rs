@@ -1,0 +1,217 @@
+//! Files → measured scans, one file in memory per thread.
+
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+
+use moiregauge::campaign::about_repeat;
+use moiregauge::caveat::Caveat;
+use moiregauge::numbers::interrupt;
+use moiregauge::scan::{MeasureError, MeasuredScan, Window, measure_moires};
+use moiregauge::settings::Settings;
+use moiregauge_report::InputFile;
+use moiregauge_report::results::NamedSet;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use super::channel::{Other, others};
+use super::kept::{Kept, With};
+use crate::job::{Cancelled, Job};
+use crate::known::Known;
+use crate::memory::enough_for;
+use crate::names::in_full;
+use crate::opened::{InputError, Opened, Reading, read_scan};
+use crate::sets::set_of;
+use crate::twice::Repeated;
+
+/// What a front end says that helps against an error: its own options.
+pub type Advice = fn(&InputError) -> Option<String>;
+
+/// Nothing.
+pub fn no_advice(_: &InputError) -> Option<String> {
+    None
+}
+
+/// An error with what helps against it and with all its causes, in one line.
+pub fn in_words(error: &InputError, advice: Advice) -> String {
+    let words = in_full(error);
+    match advice(error) {
+        Some(advice) => format!("{advice}: {words}"),
+        None => words,
+    }
+}
+
+/// Why a file could not be measured, in words that can be kept.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Failure {
+    pub(super) error: String,
+    /// Whether it is the image that shows none.
+    pub(super) no_lattice: bool,
+}
+
+impl Failure {
+    fn of(error: &InputError, advice: Advice) -> Self {
+        Self {
+            error: in_words(error, advice),
+            no_lattice: matches!(error, InputError::Measure(MeasureError::Lattice { .. })),
+        }
+    }
+}
+
+/// What is to be measured, and how.
+pub(super) struct Inputs<'a> {
+    pub(super) files: &'a [PathBuf],
+    pub(super) sets: &'a [NamedSet],
+    pub(super) known: &'a Known,
+    pub(super) window: Option<&'a Window>,
+    pub(super) advice: Advice,
+}
+
+/// The moirés of a file and what identifies it, or why there are none.
+pub(super) type OfFile = Result<(Vec<MeasuredScan>, InputFile), Failure>;
+
+/// What was measured.
+pub(super) struct Measured {
+    /// In the order of the files.
+    pub(super) files: Vec<OfFile>,
+    /// Where the usual channel shows no lattice: the one that was measured.
+    pub(super) other: Option<Other>,
+}
+
+/// Measures all files that are not among those kept; in another channel, where none shows a lattice in the usual one.
+///
+/// # Errors
+/// [`Cancelled`]; what was measured until then is kept.
+pub(super) fn measured(
+    inputs: &Inputs,
+    settings: &Settings,
+    kept: &mut Kept,
+    job: &Job,
+) -> Result<Measured, Cancelled> {
+    let files = inputs.measure_all(settings, kept, job)?;
+    for other in others(inputs.files, &files, settings, inputs.known) {
+        let files = inputs.measure_all(&other.settings, kept, job)?;
+        if files.iter().any(Result::is_ok) {
+            let other = Some(other);
+            return Ok(Measured { files, other });
+        }
+    }
+    Ok(Measured { files, other: None })
+}
+
+impl Inputs<'_> {
+    fn measure_all(
+        &self,
+        settings: &Settings,
+        kept: &mut Kept,
+        job: &Job,
+    ) -> Result<Vec<OfFile>, Cancelled> {
+        let with = With::new(settings, self.known, self.window);
+        let stage = job.stage("measuring", "scans", self.files.len());
+        let new = Mutex::new(Vec::new());
+        let known_before = &*kept;
+        let all = job.run(|| {
+            let all = self.files.par_iter().map(|path| {
+                let (key, result) = self.one(path, settings, &with, known_before);
+                if let (Some(key), Ok((moires, _))) = (&key, &result) {
+                    keep(&new, key.clone(), Ok(moires.clone()));
+                } else if let (Some(key), Err(failure)) = (key, &result) {
+                    keep(&new, key, Err(failure.clone()));
+                }
+                stage.step();
+                result
+            });
+            all.collect::<Vec<_>>()
+        });
+        for (key, measured) in new.into_inner().unwrap_or_else(PoisonError::into_inner) {
+            kept.put(key, measured);
+        }
+        let mut all = all?;
+        for (path, result) in self.files.iter().zip(&mut all) {
+            let set = set_of(self.sets, path);
+            for scan in result.iter_mut().flat_map(|(moires, _)| moires) {
+                scan.set = set.map(str::to_owned);
+            }
+        }
+        Ok(all)
+    }
+
+    /// One file: under what it is to be kept, where it was not kept already, and what it gives.
+    fn one(
+        &self,
+        path: &Path,
+        settings: &Settings,
+        with: &With,
+        kept: &Kept,
+    ) -> (Option<String>, OfFile) {
+        interrupt::check();
+        let failed = |error: &InputError| Err(Failure::of(error, self.advice));
+        let opened = match Opened::new(path, self.known) {
+            Ok(opened) => opened,
+            Err(error) => return (None, failed(&error)),
+        };
+        let input = opened.content().identity(path);
+        let key = with.key(path, &input.file, &input.sha256, self.known);
+        if let Some(known) = kept.get(&key) {
+            return (None, known.clone().map(|moires| (moires, input)));
+        }
+        interrupt::check();
+        let reading = opened.reading(settings);
+        let reading = reading.and_then(|r| enough_for(&r.scan).map(|()| r).map_err(Into::into));
+        drop(opened);
+        match reading.and_then(|reading| of_reading(reading, settings, self.window)) {
+            Ok(found) => (Some(key), Ok(found)),
+            // With more memory it may do.
+            Err(error @ InputError::Memory(_)) => (None, failed(&error)),
+            Err(error) => (Some(key), failed(&error)),
+        }
+    }
+}
+
+type New = Mutex<Vec<(String, Result<Vec<MeasuredScan>, Failure>)>>;
+
+fn keep(new: &New, key: String, measured: Result<Vec<MeasuredScan>, Failure>) {
+    let mut new = new.lock().unwrap_or_else(PoisonError::into_inner);
+    new.push((key, measured));
+}
+
+/// One file: its moirés and what identifies it.
+///
+/// # Errors
+/// [`InputError`] says why it has none.
+pub fn measure_file(
+    path: &Path,
+    settings: &Settings,
+    known: &Known,
+) -> Result<(Vec<MeasuredScan>, InputFile), InputError> {
+    of_reading(read_scan(path, settings, known)?, settings, None)
+}
+
+fn of_reading(
+    reading: Reading,
+    settings: &Settings,
+    window: Option<&Window>,
+) -> Result<(Vec<MeasuredScan>, InputFile), InputError> {
+    let Reading {
+        scan,
+        input,
+        caveats,
+    } = reading;
+    let mut moires = measure_moires(&input.file, &scan, settings, window)?;
+    for measured in &mut moires {
+        measured.caveats.extend(caveats.iter().cloned());
+        measured.digest = Some(input.sha256.clone());
+    }
+    Ok((moires, input))
+}
+
+/// What has to be said of files that were named more than once.
+pub fn given_again(repeated: &[Repeated]) -> Vec<Caveat> {
+    let words = |again: &Repeated| {
+        let of = again.of.display().to_string();
+        about_repeat(&again.path.display().to_string(), &of)
+    };
+    let mut caveats: Vec<Caveat> = repeated.iter().map(words).collect();
+    caveats.dedup();
+    caveats
+}

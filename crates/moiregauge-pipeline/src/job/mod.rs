@@ -1,0 +1,9 @@
+//! What every long call takes: threads of its own, a way to stop it, somebody to tell.
+
+mod cancel;
+mod events;
+mod pool;
+
+pub use cancel::{Cancel, Cancelled};
+pub use events::{Event, Events, Quiet, Stage};
+pub use pool::{Job, JobError};

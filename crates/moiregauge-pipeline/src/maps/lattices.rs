@@ -1,0 +1,235 @@
+//! Scans that show a lattice → their maps, and the average of these.
+
+use std::path::PathBuf;
+
+use moiregauge::campaign::{Analysis, ScanAnalysis, picture};
+use moiregauge::caveat::Caveat;
+use moiregauge::domains::{Contrast, DomainMap};
+use moiregauge::map::{Agreement, DriftChange, TwistStrainMap};
+use moiregauge::scan::Picture;
+use moiregauge::settings::Settings;
+use moiregauge::survey::{
+    LineMap, MapError, MapMethod, average_maps, change_of_drift, domains_of_scan, map_scan,
+};
+use moiregauge::window::{Resolution, UsedHarmonic};
+use moiregauge_report::FailedInput;
+use moiregauge_report::results::{MappedImage, TwistStrainResult};
+use spmfile::LineDirection;
+
+use super::doubts;
+use crate::campaign::{Advice, in_words};
+use crate::job::{Cancelled, Job};
+use crate::known::Known;
+use crate::names::in_full;
+use crate::opened::{InputError, read_again};
+
+/// Analysed scans whose pixels can be read again.
+#[derive(Clone, Copy, Debug)]
+pub struct Scans<'a> {
+    /// What was found in them.
+    pub analysis: &'a Analysis,
+    /// The files.
+    pub inputs: &'a [PathBuf],
+    /// What is known of them.
+    pub known: &'a Known,
+    /// What helps against errors.
+    pub advice: Advice,
+}
+
+/// A map and what came with it.
+#[derive(Clone, Debug)]
+pub struct Mapped {
+    /// The map.
+    pub map: TwistStrainMap,
+    /// Twist and strain of the whole images.
+    pub whole: Option<TwistStrainResult>,
+    /// The images behind it.
+    pub images: Vec<MappedImage>,
+    /// The first of them, to be shown.
+    pub picture: Option<Picture>,
+    /// How well maps of several images agree.
+    pub agreement: Option<Agreement>,
+    /// How the drift changes between upward and downward frames.
+    pub drift_change: Option<DriftChange>,
+    /// Doubts, those of the analysis first.
+    pub caveats: Vec<Caveat>,
+    /// Files that gave no map.
+    pub failed: Vec<FailedInput>,
+}
+
+/// Why there is no map.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum NoMap {
+    /// It was stopped.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+    /// No image gave one.
+    #[error("no image gave a map")]
+    Nothing {
+        /// Why not, file by file.
+        failed: Vec<FailedInput>,
+    },
+}
+
+/// Why one scan gave none.
+#[derive(Debug, thiserror::Error)]
+enum OfScan {
+    #[error(transparent)]
+    Input(#[from] InputError),
+    #[error(transparent)]
+    Map(#[from] MapError),
+}
+
+/// Maps the scans of an analysis, trace and retrace, puts the maps on each other and averages.
+///
+/// # Errors
+/// [`NoMap`].
+pub fn map_lattices(
+    scans: &Scans,
+    method: MapMethod,
+    resolution: &Resolution,
+    job: &Job,
+) -> Result<Mapped, NoMap> {
+    job.run(|| scans.mapped(method, resolution, job))?
+}
+
+impl Scans<'_> {
+    fn mapped(
+        &self,
+        method: MapMethod,
+        resolution: &Resolution,
+        job: &Job,
+    ) -> Result<Mapped, NoMap> {
+        // The maps read the lattice under the name that the analysis found.
+        let settings = &self.analysis.named_settings();
+        let (mut maps, picture, failed) = self.maps(settings, method, resolution, job);
+        let mut caveats = self.analysis.caveats.clone();
+        doubts::registered(&mut maps, &mut caveats);
+        let Some((lattices, agreement)) = average_maps(&maps) else {
+            return Err(NoMap::Nothing { failed });
+        };
+        let reference = maps[0].whole;
+        let (layers, convention) = (settings.bilayer(), settings.strain_convention);
+        let found = lattices
+            .twist_strain(&reference, layers, convention)
+            .unwrap_or_else(|why| {
+                caveats.push(doubts::no_twist_strain(&why));
+                vec![None; lattices.nodes.len()]
+            });
+        doubts::of_maps(&maps, &mut caveats);
+        if resolution.margin.is_none() {
+            let narrow = maps
+                .iter()
+                .find_map(|m| doubts::narrow_margin(m.margin, &m.file));
+            caveats.extend(narrow);
+        }
+        let drift_change = change_of_drift(&maps);
+        doubts::about_change(drift_change, &mut caveats);
+        let image =
+            |m: &LineMap| mapped_image(&m.file, Some(m.line), m.drift_corrected, &m.harmonics);
+        Ok(Mapped {
+            map: TwistStrainMap::new(&lattices, &found),
+            whole: whole_image(self.analysis),
+            images: maps.iter().map(image).collect(),
+            picture,
+            agreement,
+            drift_change,
+            caveats,
+            failed,
+        })
+    }
+
+    /// Nodes and triangles of every scan.
+    pub fn domains(&self, contrast: Contrast) -> Vec<DomainMap> {
+        let settings = &self.analysis.named_settings();
+        let origin = self.origin();
+        let of_scan = |scan: &ScanAnalysis| {
+            let read = read_again(self.inputs, &scan.file, settings, self.known).ok();
+            read.map_or_else(Vec::new, |read| {
+                domains_of_scan(&read, scan, origin, settings, contrast)
+            })
+        };
+        self.used().flat_map(of_scan).collect()
+    }
+
+    /// The scans that are not excluded.
+    fn used(&self) -> impl Iterator<Item = &ScanAnalysis> {
+        let all = self.analysis.sets.iter().flat_map(|set| &set.scans);
+        all.filter(|scan| scan.excluded.is_none())
+    }
+
+    /// The time that drift is counted from.
+    fn origin(&self) -> Option<f64> {
+        self.used()
+            .filter_map(|s| s.motion.map(|m| m.middle))
+            .min_by(f64::total_cmp)
+    }
+
+    /// The maps of all scans, trace and retrace, with the first image, to be shown, and the files that gave none.
+    fn maps(
+        &self,
+        settings: &Settings,
+        method: MapMethod,
+        resolution: &Resolution,
+        job: &Job,
+    ) -> (Vec<LineMap>, Option<Picture>, Vec<FailedInput>) {
+        let (mut maps, mut shown, mut failed) = (Vec::new(), None, Vec::new());
+        let origin = self.origin();
+        let stage = job.stage("mapping", "scans", self.used().count());
+        for scan in self.used() {
+            let mut of_scan = || -> Result<Vec<LineMap>, OfScan> {
+                let read = read_again(self.inputs, &scan.file, settings, self.known)?;
+                let lines = map_scan(&read, scan, origin, settings, method, resolution)?;
+                shown = shown
+                    .take()
+                    .or_else(|| picture(&scan.file, &read, settings));
+                Ok(lines)
+            };
+            match of_scan() {
+                Ok(lines) => maps.extend(lines),
+                Err(error) => failed.push(FailedInput {
+                    file: scan.file.clone(),
+                    error: match &error {
+                        OfScan::Input(error) => in_words(error, self.advice),
+                        OfScan::Map(error) => in_full(error),
+                    },
+                }),
+            }
+            stage.step();
+        }
+        (maps, shown, failed)
+    }
+}
+
+/// Twist and strain of the whole images.
+fn whole_image(analysis: &Analysis) -> Option<TwistStrainResult> {
+    if let Some(combined) = &analysis.combined {
+        let found = &combined.twist_strain;
+        return Some(TwistStrainResult::of_mean(found, &combined.budget));
+    }
+    let set = analysis.sets.first()?;
+    let mean = set.mean.as_ref().or(set.uncorrected.as_ref());
+    let scan = set.scans.first();
+    mean.map(|m| TwistStrainResult::of_mean(&m.twist_strain, &m.budget))
+        .or(scan.and_then(|s| s.twist_strain_sensor.as_ref().map(Into::into)))
+}
+
+/// One image behind a map.
+pub fn mapped_image(
+    file: &str,
+    line: Option<LineDirection>,
+    drift_corrected: bool,
+    harmonics: &[UsedHarmonic],
+) -> MappedImage {
+    MappedImage {
+        file: file.to_owned(),
+        line: match line {
+            Some(LineDirection::Retrace) => "retrace",
+            Some(LineDirection::Trace) | None => "trace",
+        }
+        .to_owned(),
+        drift_corrected,
+        harmonics: harmonics.iter().map(Into::into).collect(),
+    }
+}
