@@ -7,6 +7,7 @@ mod common;
 mod explained;
 mod figures;
 mod formats;
+mod hard;
 mod identity;
 mod inputs;
 mod interrupted;

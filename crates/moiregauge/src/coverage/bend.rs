@@ -235,8 +235,8 @@ impl Fit {
                 if correlation < UNCORRELATED {
                     continue;
                 }
-                for wave in 0..3 {
-                    let product = correlation * &all[i][wave] * all[j][wave].transpose();
+                for (first, second) in all[i].iter().zip(&all[j]) {
+                    let product = correlation * first * second.transpose();
                     covariance += &product;
                     if i != j {
                         covariance += product.transpose();
@@ -456,8 +456,8 @@ fn fit(basis: Basis, nodes: &[Node]) -> Option<Fit> {
     for _ in 0..ROUNDS[0] {
         let mut sums = Sums::new(size);
         for &(a, b) in &neighbours {
-            for wave in 0..3 {
-                let row = difference(&rows[b][wave], &rows[a][wave]);
+            for (wave, (before, after)) in rows[a].iter().zip(&rows[b]).enumerate() {
+                let row = difference(after, before);
                 let turn = nodes[a].envelopes[wave].conj() * nodes[b].envelopes[wave];
                 let left = (turn * Complex64::cis(-value(&row, &coefficients))).arg();
                 let weight = nodes[a].weights[wave].min(nodes[b].weights[wave]);

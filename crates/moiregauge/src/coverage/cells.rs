@@ -216,7 +216,7 @@ mod tests {
         let pair = Matrix2::new(0.4, 0.2, 0.0, 0.35);
         let q = pair.column(0).into_owned();
         let values = (0..128 * 160).map(|i| {
-            let (x, y) = ((i % 160) as f64, (i / 160) as f64);
+            let (x, y) = (f64::from(i % 160), f64::from(i / 160));
             if x < 80.0 {
                 3.0 * (q.x * x + q.y * y + 0.7).cos()
             } else {

@@ -93,7 +93,7 @@ mod tests {
         let pair = Matrix2::new(0.4, 0.2, 0.0, 0.35);
         let waves = [[1.0, 0.0], [0.0, 1.0], [-1.0, 1.0]].map(|[h, k]| pair * Vector2::new(h, k));
         let values = (0..100 * 120).map(|i| {
-            let at = Vector2::new((i % 120) as f64, (i / 120) as f64);
+            let at = Vector2::new(f64::from(i % 120), f64::from(i / 120));
             if at.x < 61.0 {
                 let of = |(i, q): (usize, &Vector2<f64>)| {
                     (1.0 + i as f64) * (q.dot(&at) + i as f64).cos()

@@ -1,0 +1,108 @@
+//! Samples that are no perfect lattice, written by an independent generator.
+
+use std::path::Path;
+
+use serde_json::Value;
+
+use crate::common::{analyze, caveats, json, number, results, succeed, testdata};
+
+/// What an analysis of an example makes of it, and its truth.
+fn analysed(data: &Path, name: &str, more: &[&str]) -> (Value, Value) {
+    let folder = tempfile::tempdir().expect("a folder");
+    let input = data.join("hard").join(name);
+    let array = input.join(format!("{name}.npy"));
+    let input = if array.exists() { array } else { input };
+    succeed(analyze(&input, folder.path()).args(more));
+    let truth = json(&data.join("hard").join(name).join("truth.json"));
+    (results(folder.path()), truth)
+}
+
+/// The twist of the first set, and its errors: statistical and in all.
+fn twist(results: &Value, of: &str) -> [f64; 3] {
+    ["value", "sigma", "sigma_total"]
+        .map(|part| number(results, &format!("/sets/0/{of}/twist_deg/{part}")))
+}
+
+/// Half of the frame, all but a hole, a disc of a quarter of it: the lattice is measured where it is, and said to be there.
+#[test]
+fn a_lattice_in_a_part_of_the_frame_is_measured_there() {
+    let Some(data) = testdata("a_lattice_in_a_part_of_the_frame_is_measured_there") else {
+        return;
+    };
+    for name in ["half_covered", "hole", "island"] {
+        let (found, truth) = analysed(&data, name, &[]);
+        assert_eq!(found["sets"].as_array().map(Vec::len), Some(1), "{name}");
+        let [value, sigma, total] = twist(&found, "mean");
+        let wanted = number(&truth, "/theta_deg");
+        // The file gives three decimals.
+        let room = 3.0 * sigma + 0.0005;
+        assert!(
+            (value - wanted).abs() < room,
+            "{name}: {value} ± {sigma}, {wanted}"
+        );
+        assert!(total < 0.02, "{name}: {total}");
+        for (i, axis) in ["x", "y"].iter().enumerate() {
+            let drift = |part| number(&found, &format!("/sets/0/drift/{axis}_nm_per_min/{part}"));
+            let wanted = number(&truth, &format!("/drift_nm_per_min/{i}"));
+            let off = (drift("value") - wanted).abs();
+            assert!(
+                off < 4.0 * drift("sigma") + 0.0005,
+                "{name}: {off} along {axis}"
+            );
+        }
+        let codes = caveats(&found);
+        assert!(codes.contains(&"partly-covered"), "{name}: {codes:?}");
+        assert!(!codes.contains(&"same-scan-twice"), "{name}: {codes:?}");
+    }
+}
+
+/// Sharp walls make harmonics of any order, and a weak first shell is a first shell: one perfect lattice without a doubt.
+#[test]
+fn unusual_contrast_is_no_second_lattice() {
+    let Some(data) = testdata("unusual_contrast_is_no_second_lattice") else {
+        return;
+    };
+    for name in ["walls", "second_shell"] {
+        let (found, truth) = analysed(&data, name, &[]);
+        let [value, sigma, _] = twist(&found, "mean");
+        let wanted = number(&truth, "/theta_deg");
+        assert!(
+            (value - wanted).abs() < 4.0 * sigma + 0.0005,
+            "{name}: {value} ± {sigma}, {wanted}"
+        );
+        let codes = caveats(&found);
+        assert!(!codes.contains(&"second-lattice"), "{name}: {codes:?}");
+    }
+}
+
+/// A lattice that changes gives the mean over the area, with a word.
+#[test]
+fn a_lattice_that_changes_gives_its_mean() {
+    let Some(data) = testdata("a_lattice_that_changes_gives_its_mean") else {
+        return;
+    };
+    let (found, truth) = analysed(&data, "bent", &["--size", "512nmx512nm"]);
+    let [value, sigma, _] = twist(&found, "uncorrected");
+    let wanted = number(&truth, "/mean_theta_deg");
+    assert!(
+        (value - wanted).abs() < 4.0 * sigma,
+        "{value} ± {sigma}, {wanted}"
+    );
+    assert!(sigma < 0.001 * wanted, "{sigma}");
+    assert!(caveats(&found).contains(&"changing-lattice"));
+}
+
+/// Two grains side by side are two lattices: the larger is measured, the other is named, and no mixture comes out.
+#[test]
+fn two_grains_are_not_mixed() {
+    let Some(data) = testdata("two_grains_are_not_mixed") else {
+        return;
+    };
+    let (found, truth) = analysed(&data, "two_grains", &["--size", "256nmx256nm"]);
+    let [value, sigma, _] = twist(&found, "uncorrected");
+    let near =
+        ["/left_theta_deg", "/right_theta_deg"].map(|grain| (value - number(&truth, grain)).abs());
+    let least = near[0].min(near[1]);
+    assert!(least < 5.0 * sigma, "{value} ± {sigma}: {near:?}");
+    assert!(caveats(&found).contains(&"several-grains"));
+}
