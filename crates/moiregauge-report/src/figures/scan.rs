@@ -1,6 +1,7 @@
 //! The scan in true coordinates: every pixel where the sensors say it was, the frame that was
 //! asked for and the one that was scanned, a scale bar and the lattice vectors.
 
+use moiregauge::coverage::Patch;
 use moiregauge::scan::Illustration;
 use nalgebra::{Matrix2, Vector2};
 
@@ -14,6 +15,9 @@ use crate::draw::scale::{Range, fixed, round_step};
 use crate::draw::style::{COLUMN, LINE, SMALL, TEXT, VECTOR, VECTOR_MARKER, lettering, outline};
 use crate::draw::svg::{Anchor, Ink, Lettering, Rect, Svg};
 use crate::draw::{legend, raster};
+
+/// The outline of the part of the frame that carries the lattice.
+const COVERED: &str = "#009e73";
 
 pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
     let shown = subject.illustration()?;
@@ -61,6 +65,14 @@ pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
                 &Ink::line("#d55e00", LINE).dashed("4 2.5"),
             );
         }
+        for [from, to] in shown.patch.iter().flat_map(Patch::outline) {
+            let at = |pixel: Vector2<f64>| {
+                let place = shown.origin + shown.pixel_to_nm * pixel;
+                axes.at(place.x, place.y)
+            };
+            svg.line(at(from), at(to), &Ink::line("#ffffff", 2.2));
+            svg.line(at(from), at(to), &Ink::line(COVERED, 1.1));
+        }
     });
     let basis = layout::shown_lattice(subject.set, shown);
     vectors(&mut svg, &axes, shown, &basis);
@@ -76,6 +88,9 @@ pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
     let mut keys = vec![(legend::Key::Line("#222222", ""), scanned)];
     if nominal.is_some() {
         keys.push((legend::Key::Line("#d55e00", "4 2.5"), "intended (nominal)"));
+    }
+    if shown.patch.is_some() {
+        keys.push((legend::Key::Line(COVERED, ""), "measured here"));
     }
     legend::row(&mut svg, (layout::LEFT, 11.0), &keys);
 

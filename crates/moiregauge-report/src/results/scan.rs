@@ -2,6 +2,7 @@
 
 use heterostrain::material::Bilayer;
 use moiregauge::campaign::{LineAnalysis, ScanAnalysis};
+use moiregauge::coverage::ChangeModel;
 use moiregauge::frame::Axis;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -92,6 +93,11 @@ pub struct LineResult {
     pub periods: Option<f64>,
     /// Amplitude of the weakest first harmonic over its noise.
     pub signal_to_noise: Option<f64>,
+    /// Share of the frame that carries the lattice and was measured.
+    pub share_covered: Option<f64>,
+    /// What describes the lattice there: `constant`, or a mean of one that changes: `even` (wave vectors change in
+    /// proportion to the place) or `smooth`.
+    pub lattice_model: String,
     /// Linear part of the map (column, row) → (x, y), nm per pixel, row by row.
     pub pixel_to_nm: [[Option<f64>; 2]; 2],
     /// Position of pixel (0, 0), the bottom left one, nm.
@@ -165,6 +171,13 @@ fn line_result(line: &LineAnalysis, bilayer: Bilayer<'_>) -> LineResult {
         from_sensors: line.from_sensors,
         periods: number(line.periods),
         signal_to_noise: number(line.signal_to_noise),
+        share_covered: number(line.patch.as_ref().map_or(1.0, |patch| patch.share)),
+        lattice_model: match line.change.map(|change| change.model) {
+            None => "constant",
+            Some(ChangeModel::Even) => "even",
+            Some(_) => "smooth",
+        }
+        .to_owned(),
         pixel_to_nm: square(&line.pixel_to_nm, 1.0),
         origin_nm: pair(line.origin, 1.0),
         vectors: LatticeVector::all(&line.sensor, bilayer),

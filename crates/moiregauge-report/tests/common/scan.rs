@@ -119,6 +119,8 @@ pub(super) fn scan(
         from_sensors: true,
         periods: 4.5,
         signal_to_noise: 11.0,
+        patch: None,
+        change: None,
     };
     ScanAnalysis {
         file: format!("Messung 3 ü/tbg µ-scan_{}.{:03}", set + 1, index + 1),

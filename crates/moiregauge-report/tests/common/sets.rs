@@ -148,6 +148,7 @@ pub(super) fn illustration(scan: &ScanAnalysis, noise: &mut Noise) -> Option<Ill
         }),
         spectrum_step: [step, step],
         lattice: line.pixels,
+        patch: None,
         sensor_line: (0..PIXELS)
             .map(|i| {
                 let (c, fitted) = (i as f64, line.origin.x + frame[(0, 0)] * i as f64);

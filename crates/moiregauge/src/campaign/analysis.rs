@@ -9,6 +9,7 @@ use nalgebra::{Matrix2, Vector2};
 use spmfile::{DateTime, FrameDirection, LineDirection};
 
 use crate::caveat::Caveat;
+use crate::coverage::{Change, Patch};
 use crate::drift::drawn::DriftMonteCarlo;
 use crate::drift::joint::path::DriftPath;
 use crate::drift::joint::solve::TestedTerm;
@@ -308,6 +309,10 @@ pub struct LineAnalysis {
     pub periods: f64,
     /// Signal-to-noise ratio of the weakest of the three first harmonics (amplitude).
     pub signal_to_noise: f64,
+    /// The part of the frame that carries the lattice; `None` for all of it.
+    pub patch: Option<Patch>,
+    /// How the lattice changes across that part; `None` where it is the same everywhere, as far as can be seen.
+    pub change: Option<Change>,
 }
 
 /// The orientation of a layer by its atomic lattice.

@@ -61,6 +61,11 @@ pub fn illustrate(
         })
     });
     let (autocorrelation, spectrum, spectrum_step) = pictures(&image, &line.pixels);
+    // Pixels of a cropped image are others.
+    let patch = line
+        .patch
+        .clone()
+        .filter(|p| p.is_of([image.columns, image.rows]));
     Some(Illustration {
         file: analysed.file.clone(),
         line: line.line,
@@ -73,6 +78,7 @@ pub fn illustrate(
         spectrum,
         spectrum_step,
         lattice: line.pixels,
+        patch,
         sensor_line,
         fast_velocities,
         slow_velocities,

@@ -74,6 +74,56 @@ impl Patch {
         self.inside[cell(1, row) * self.size[0] + cell(0, column)]
     }
 
+    /// Whether its cells are those of an image of so many columns and rows.
+    pub fn is_of(&self, image: [usize; 2]) -> bool {
+        (0..2).all(|i| image[i].abs_diff(self.size[i] * self.pixels[i]) < 2 * self.pixels[i])
+    }
+
+    /// Its outline: the sides of cells beyond which it ends, from point to point (column, row), where pixels lie at whole
+    /// numbers.
+    pub fn outline(&self) -> Vec<[Vector2<f64>; 2]> {
+        let [across, up] = self.size;
+        let holds = |x: Option<usize>, y: Option<usize>| match (x, y) {
+            (Some(x), Some(y)) if x < across && y < up => self.inside[y * across + x],
+            _ => false,
+        };
+        let corner = |x: usize, y: usize| {
+            let at = Vector2::new((x * self.pixels[0]) as f64, (y * self.pixels[1]) as f64);
+            at - Vector2::repeat(0.5)
+        };
+        let mut sides = Vec::new();
+        for (x, y) in (0..self.inside.len()).map(|i| (i % across, i / across)) {
+            if !holds(Some(x), Some(y)) {
+                continue;
+            }
+            let around = [
+                (
+                    holds(x.checked_sub(1), Some(y)),
+                    [corner(x, y), corner(x, y + 1)],
+                ),
+                (
+                    holds(Some(x + 1), Some(y)),
+                    [corner(x + 1, y), corner(x + 1, y + 1)],
+                ),
+                (
+                    holds(Some(x), y.checked_sub(1)),
+                    [corner(x, y), corner(x + 1, y)],
+                ),
+                (
+                    holds(Some(x), Some(y + 1)),
+                    [corner(x, y + 1), corner(x + 1, y + 1)],
+                ),
+            ];
+            sides.extend(
+                around
+                    .into_iter()
+                    .filter(|(goes_on, _)| !goes_on)
+                    .map(|(_, side)| side),
+            );
+        }
+        sides
+    }
+
     /// The same in pixels of which `bins` make one along each axis.
     fn in_pixels(&self, bins: usize) -> Self {
         Self {

@@ -8,6 +8,7 @@ use crate::coverage::find::{WHOLE, patches, pitch, same};
 use crate::coverage::finer::finer;
 use crate::coverage::settle::{Patch, Settled, settle};
 use crate::frame::background::{Background, remove_background};
+use crate::frame::clip::cut_off;
 use crate::frame::geometry::Geometry;
 use crate::frame::image::Image;
 use crate::lattice::fit::fit_pixels as fit;
@@ -87,6 +88,25 @@ fn period(wave: &ForeignWave, geometry: &Geometry) -> f64 {
     let inverse = geometry.pixel_to_nm.try_inverse();
     let q = inverse.map_or_else(Vector2::zeros, |m| m.transpose() * wave.wave_vector);
     std::f64::consts::TAU / q.norm()
+}
+
+/// The same for a lattice that is one of several and everywhere: nothing is asked of what lies beside it.
+///
+/// # Errors
+/// As [`measure`].
+pub(crate) fn measure_whole(
+    image: &Image,
+    geometry: &Geometry,
+    background: Background,
+    method: Method,
+) -> Result<MeasuredLattice, LatticeError> {
+    let start = match Start::find(image, geometry, background) {
+        Err(error @ LatticeError::NoLattice { .. }) if method == Method::Lattice => {
+            Start::find_again(image, geometry, background).map_err(|_| error)?
+        }
+        other => other?,
+    };
+    start.measure(method)
 }
 
 /// A wave that stands out beside the lattice.
@@ -246,7 +266,8 @@ impl Start {
         image: &Image,
     ) -> Result<Self, (Option<Matrix2<f64>>, LatticeError)> {
         let pair = self.pair();
-        let Some(settled) = settle(&self.prepared.image, &pair, pitch(&self.geometry)) else {
+        let clipped = cut_off(&self.prepared.image);
+        let Some(settled) = settle(&clipped, &pair, pitch(&self.geometry)) else {
             return Ok(self);
         };
         let patch = &settled.patch;
@@ -275,8 +296,11 @@ impl Start {
             if poor {
                 return None;
             }
+            // Where waves change little and in proportion to the place, the fit to the pixels gives their mean.
+            let cells = settled.patch.unit_cells;
+            let gentle = mean.as_ref().is_some_and(|mean| mean.is_gentle(cells));
             return Some(Self {
-                mean: mean.filter(|_| changes || !everywhere),
+                mean: mean.filter(|_| !everywhere || (changes && !gentle)),
                 patch: (!everywhere).then_some(settled.patch),
                 ..self
             });
@@ -309,7 +333,7 @@ impl Start {
         background: Background,
         first: &[Option<Matrix2<f64>>],
     ) -> Option<Self> {
-        let flat = remove_background(image, background);
+        let flat = cut_off(&remove_background(image, background));
         let mut best: Option<(f64, Settled, Self)> = None;
         for settled in patches(&flat, geometry, first) {
             let patch = &settled.patch;

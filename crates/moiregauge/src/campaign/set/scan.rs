@@ -84,6 +84,8 @@ fn line_analysis(
         from_sensors: line.geometry.from_sensors,
         periods: line.lattice.periods,
         signal_to_noise: line.lattice.signal_to_noise,
+        patch: line.lattice.patch.clone(),
+        change: line.lattice.change,
     }
 }
 

@@ -6,7 +6,7 @@ use crate::frame::background::{Background, remove_background};
 use crate::frame::geometry::Geometry;
 use crate::frame::image::Image;
 use crate::lattice::fit::fit_pixels::LatticeFit;
-use crate::lattice::measure::{Start, measure};
+use crate::lattice::measure::{Start, measure_whole};
 use crate::lattice::measured::MeasuredLattice;
 use crate::lattice::several::split;
 use crate::spectrum::error::LatticeError;
@@ -137,7 +137,7 @@ impl Scene<'_> {
             let known = |part: &Part| parts.iter().any(|other| part.is(other, self.image));
             Part::new(lattice, self.image).filter(|part| !known(part))
         };
-        let error = match measure(&left, self.geometry, self.background, Method::Lattice) {
+        let error = match measure_whole(&left, self.geometry, self.background, Method::Lattice) {
             Ok(lattice) => return new(lattice).ok_or(LatticeError::Entangled),
             Err(error) => error,
         };
