@@ -153,7 +153,10 @@ fn is_numeric(option: &Arg) -> bool {
     ];
     let in_text =
         ["vectors", "lattice_angle", "lattice_angle_2"].contains(&option.get_id().as_str());
+    // Classes of samples have numbers of their own, which are checked where they are read.
+    let classes = option.get_id().as_str() == "sample";
     option.get_action().takes_values()
+        && !classes
         && option.get_possible_values().is_empty()
         && (in_text || !texts.iter().any(|text| kind == *text))
 }

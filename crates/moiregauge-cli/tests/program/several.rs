@@ -132,7 +132,7 @@ fn a_moire_that_is_not_there_is_named() {
     let other =
         crate::common::run(analyze(&scans, &out).args(["--moires", "2", "--method", "fourier"]));
     assert!(
-        other.stderr.contains("--method lattice only"),
+        other.stderr.contains("by the method \"lattice\" only"),
         "{}",
         other.stderr
     );

@@ -91,17 +91,21 @@ pub(crate) struct Mean {
     pub(crate) signal_to_noise: f64,
     /// χ² over its degrees of freedom, 1 at least.
     reduced: f64,
+    /// What is left of the phases, rad, root mean square.
+    left: f64,
 }
 
 /// Standard deviation of the waves times the periods across: the phase bends by 2π √12/8 times that, half a radian here.
 const GENTLE: f64 = 0.18;
 /// χ² over its degrees of freedom beyond which the phases are not those of one lattice: noise is known far better.
 const POOR: f64 = 9.0;
+/// ..., if so much is left of them, rad, root mean square: half of what two grains leave that are a wave apart across a patch.
+const LEFT: f64 = 0.25;
 
 impl Mean {
     /// Whether the phases are not those of one lattice that changes smoothly.
     pub(crate) fn is_poor(&self) -> bool {
-        self.reduced > POOR
+        self.reduced > POOR && self.left > LEFT
     }
 
     /// Whether the wave vectors change in proportion to the place and bend the phases of so many unit cells so little
@@ -211,7 +215,9 @@ struct Fit {
     /// Independent phases.
     independent: f64,
     /// By how much variances are enlarged, since χ² is larger than its degrees of freedom.
-    pub(crate) enlarged: f64,
+    enlarged: f64,
+    /// What is left of the phases, rad, root mean square.
+    left: f64,
 }
 
 impl Fit {
@@ -282,27 +288,27 @@ pub(crate) fn described(view: &View, patch: &Patch, nodes: &[Node]) -> Option<[f
     Some([fit.chi2, fit.coefficients.len() as f64, fit.independent])
 }
 
-/// The same for one lattice that is the same everywhere; `None` for one that changes.
-pub(crate) fn described_as_straight(
-    view: &View,
-    patch: &Patch,
-    nodes: &[Node],
-) -> Option<[f64; 3]> {
-    let chosen = choose(view, patch, nodes)?;
-    let fit = chosen.fit;
-    let straight = chosen.model.is_none() && fit.enlarged < POOR;
+/// The same for one lattice that is the same everywhere; `None` where the phases are not those of one.
+pub(crate) fn described_as_straight(patch: &Patch, nodes: &[Node]) -> Option<[f64; 3]> {
+    let fit = fit(powers(patch, 1), nodes)?;
+    let straight = fit.left < LEFT;
     straight.then_some([fit.chi2, fit.coefficients.len() as f64, fit.independent])
+}
+
+/// Powers of x and y up to a degree, on the extent of a patch.
+fn powers(patch: &Patch, degree: usize) -> Basis {
+    let [low, high] = patch.corners();
+    Basis::Powers {
+        degree,
+        middle: (low + high) / 2.0,
+        half: (high - low) / 2.0,
+    }
 }
 
 fn choose(view: &View, patch: &Patch, nodes: &[Node]) -> Option<Chosen> {
     let frame = patch.corners();
-    let (middle, half) = ((frame[0] + frame[1]) / 2.0, (frame[1] - frame[0]) / 2.0);
-    let powers = |degree| Basis::Powers {
-        degree,
-        middle,
-        half,
-    };
-    let straight = fit(powers(1), nodes)?;
+    let half = (frame[1] - frame[0]) / 2.0;
+    let straight = fit(powers(patch, 1), nodes)?;
     let window = [0, 1].map(|axis| view.width * view.cells.period[axis]);
     let sizes = SPLINES.map(|n| {
         let longer = half.x.max(half.y);
@@ -312,7 +318,7 @@ fn choose(view: &View, patch: &Patch, nodes: &[Node]) -> Option<Chosen> {
         (0..2)
             .all(|i| size[i] == 1 || 2.0 * half[i] / size[i] as f64 > WINDOWS_PER_CELL * window[i])
     });
-    let even = (ChangeModel::Even, powers(2));
+    let even = (ChangeModel::Even, powers(patch, 2));
     let all = std::iter::once(even).chain(smooth.map(|size| {
         (
             ChangeModel::Smooth(size),
@@ -479,6 +485,7 @@ fn fit(basis: Basis, nodes: &[Node]) -> Option<Fit> {
         coefficients += sums.solved(&basis)?.0;
     }
     align(&basis, nodes, &rows, &mut coefficients);
+    let all: f64 = nodes.iter().flat_map(|node| node.weights).sum();
     let mut last = None;
     for _ in 0..ROUNDS[1] {
         let mut sums = Sums::new(size);
@@ -509,6 +516,7 @@ fn fit(basis: Basis, nodes: &[Node]) -> Option<Fit> {
         coefficients,
         price: price(chi2, size as f64, independent),
         chi2,
+        left: (chi2 / all).sqrt(),
         independent,
         enlarged: if freedom > FREEDOM {
             (chi2 / freedom).max(1.0)
@@ -630,6 +638,7 @@ fn summary(chosen: &Chosen, nodes: &[Node], view: &View, patch: &Patch) -> Mean 
         middle,
         signal_to_noise: view.signal_to_noise,
         reduced: fit.enlarged,
+        left: fit.left,
     }
 }
 

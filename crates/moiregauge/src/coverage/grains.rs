@@ -45,7 +45,7 @@ pub(crate) fn split(view: &View, patch: &Patch) -> Option<[Patch; 2]> {
         return None;
     }
     let one = described(view, patch, &part(&|_| true))?;
-    let [a, b] = [0, 1].map(|i| described_as_straight(view, patch, &parts[i]));
+    let [a, b] = [0, 1].map(|i| described_as_straight(patch, &parts[i]));
     let (a, b) = (a?, b?);
     // Where the boundary runs costs about as many numbers as it is nodes long.
     let boundary = one[2].sqrt() * one[2].ln() / 2.0;

@@ -27,8 +27,8 @@ use crate::spectrum::prepare::{
 use crate::spectrum::transform::Spectrum;
 use crate::spectrum::{known, rescue, select};
 
-/// Waves shorter than this share of the shortest lattice vector are those of atoms or of another scale, and may be
-/// stronger than a moiré.
+/// Waves shorter than this share of the shortest lattice vector are atoms, and those longer by as much are background: both
+/// may be stronger than the lattice.
 const ATOMS: f64 = 0.25;
 /// A lattice whose waves bend so much that a transform of the whole patch does not show them has at least so many unit
 /// cells: it is seen by what windows show. Chosen by eye.
@@ -76,11 +76,11 @@ pub fn measure(
     }
 }
 
-/// Whether a wave can be that of the lattice that was meant: atoms, which are much shorter, are none.
+/// Whether a wave can be that of the lattice that was meant: atoms, which are much shorter, and background are none.
 fn competes(found: &MeasuredLattice, wave: &ForeignWave, geometry: &Geometry) -> bool {
     let basis = geometry.pixel_to_nm * found.pixels.basis;
     let shortest = basis.column(0).norm().min(basis.column(1).norm());
-    period(wave, geometry) > ATOMS * shortest
+    (ATOMS * shortest..shortest / ATOMS).contains(&period(wave, geometry))
 }
 
 /// Period of a wave, nm.

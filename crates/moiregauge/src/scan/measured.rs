@@ -72,6 +72,7 @@ pub struct MeasuredLine {
     pub speeds: [Estimate; 2],
     /// Relative standard errors of the pitch along the fast and the slow axis where nobody knows what the size of the
     /// frame spans; `None` where sensors or the format tell.
+    #[serde(with = "exact")]
     pub pitch_sigma: Option<[f64; 2]>,
     /// Relative standard error of the mean speeds.
     #[serde(with = "exact")]
