@@ -210,7 +210,7 @@ fn settle_bins(
         });
         let (width, seen) = seen?;
         narrowest = width;
-        let mut inside = shrunk(&cells, &tidy(&cells, seen.inside.clone(), &pair));
+        let mut inside = shrunk(&cells, &tidy(&cells, &seen.inside, &pair));
         for (inside, count) in inside.iter_mut().zip(cells.counts()) {
             *inside &= *count > 0.0;
         }
@@ -507,8 +507,11 @@ fn unit_cells_per_pixel(pair: &Matrix2<f64>) -> f64 {
     pair.determinant().abs() / std::f64::consts::TAU.powi(2)
 }
 
-/// The patch without small gaps and small parts.
-fn tidy(cells: &Cells, mut inside: Vec<bool>, pair: &Matrix2<f64>) -> Vec<bool> {
+/// The patch without small gaps and small parts. A gap that is two cells wide, half a period, is a line that went wrong.
+fn tidy(cells: &Cells, inside: &[bool], pair: &Matrix2<f64>) -> Vec<bool> {
+    let outside: Vec<bool> = inside.iter().map(|i| !i).collect();
+    let grown: Vec<bool> = shrunk(cells, &outside).iter().map(|o| !o).collect();
+    let mut inside = shrunk(cells, &grown);
     let per_cell = (cells.pixels[0] * cells.pixels[1]) as f64 * unit_cells_per_pixel(pair);
     for gap in parts(cells.size, &inside, false) {
         if (gap.len() as f64) * per_cell < SMALLEST_GAP {

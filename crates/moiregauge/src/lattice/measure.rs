@@ -293,7 +293,7 @@ impl Start {
             None
         };
         let Some([largest, other]) = grains else {
-            if poor {
+            if poor || (mean.is_none() && !everywhere) {
                 return None;
             }
             // Where waves change little and in proportion to the place, the fit to the pixels gives their mean.
@@ -337,8 +337,8 @@ impl Start {
         let mut best: Option<(f64, Settled, Self)> = None;
         for settled in patches(&flat, geometry, first) {
             let patch = &settled.patch;
-            let part = patch.of(image);
-            let near = Self::near(&part, geometry, background, &patch.pair);
+            // Outliers hide the waves; the fit to the pixels deals with them by itself.
+            let near = Self::near(&patch.of(&flat), geometry, background, &patch.pair);
             let Some(start) = near else { continue };
             let coherent = match verdict(&start.prepared.harmonics) {
                 // A part of the frame is chosen by its waves: they have to be plain to see in it.
@@ -358,7 +358,8 @@ impl Start {
                 best = Some((evidence, settled, start));
             }
         }
-        let (_, settled, start) = best?;
+        let (_, settled, mut start) = best?;
+        start.prepared.image = remove_background(&settled.patch.of(image), background);
         start.on_patch(image, settled)
     }
 

@@ -29,6 +29,8 @@ const STILL: f64 = 0.05;
 /// The share of itself that a step leaves: this, that of the residuals cut off, and the phase by which
 /// it turned the edges (the model is linear in it to that order).
 const LEFT: f64 = 0.01;
+/// Share of residuals that are cut off, at most, for an image without outliers: three times what Gaussian noise has.
+const FEW_OUTLIERS: f64 = 0.01;
 /// Rounds of adding harmonics: as many as there are shells.
 pub(crate) const ROUNDS: usize = 5;
 
@@ -385,7 +387,9 @@ impl<'a> Fit<'a> {
             covariance.fixed_view::<4, 4>(3, 3) * enlargement,
         )
         .mapped(&Matrix2::from_diagonal(&scale));
-        if let Some(change) = inhomogeneity.filter(Inhomogeneity::stands_out) {
+        // Outliers look like a change: what is cut off says whether there are any.
+        let sound = (self.clipped as f64) < FEW_OUTLIERS * self.frame.pixels() as f64;
+        if let Some(change) = inhomogeneity.filter(|change| sound && change.stands_out()) {
             wave_vectors.covariance += change.of_the_mean(&wave_vectors.basis);
         }
         let [columns, rows] = [
