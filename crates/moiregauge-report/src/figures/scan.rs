@@ -90,7 +90,11 @@ pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
         keys.push((legend::Key::Line("#d55e00", "4 2.5"), "intended (nominal)"));
     }
     if shown.patch.is_some() {
-        keys.push((legend::Key::Line(COVERED, ""), "measured here"));
+        keys.push((legend::Key::Line(COVERED, ""), "measured"));
+        // Three keys leave room for a word each.
+        for key in &mut keys {
+            key.1 = key.1.split(' ').next().unwrap_or(key.1);
+        }
     }
     legend::row(&mut svg, (layout::LEFT, 11.0), &keys);
 
