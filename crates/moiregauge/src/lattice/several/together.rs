@@ -36,7 +36,7 @@ const SAMPLES: f64 = 5.0;
 /// Finds and measures `count` lattices, the strongest first.
 ///
 /// # Errors
-/// As [`measure_whole`] for the first; [`LatticeError::FewerLattices`] where fewer than `count` stand out, and
+/// As [`measure`](crate::lattice::measure()) for the first; [`LatticeError::FewerLattices`] where fewer than `count` stand out, and
 /// [`LatticeError::Entangled`] where two of them cannot be told apart on this frame.
 pub fn measure_several(
     image: &Image,
