@@ -95,6 +95,8 @@ pub(crate) struct Mean {
     left: f64,
 }
 
+/// A lattice whose wavelengths or directions change by more than this (standard deviation) is none. Chosen by eye.
+const WILD: f64 = 0.25;
 /// Standard deviation of the waves times the periods across: the phase bends by 2π √12/8 times that, half a radian here.
 const GENTLE: f64 = 0.18;
 /// χ² over its degrees of freedom beyond which the phases are not those of one lattice: noise is known far better.
@@ -105,7 +107,8 @@ const LEFT: f64 = 0.25;
 impl Mean {
     /// Whether the phases are not those of one lattice that changes smoothly.
     pub(crate) fn is_poor(&self) -> bool {
-        self.reduced > POOR && self.left > LEFT
+        let wild = |change: Change| change.wavelength.max(change.angle) > WILD;
+        (self.reduced > POOR && self.left > LEFT) || self.change.is_some_and(wild)
     }
 
     /// Whether the wave vectors change in proportion to the place and bend the phases of so many unit cells so little

@@ -293,9 +293,12 @@ impl Start {
             None
         };
         let Some([largest, other]) = grains else {
-            if poor || (mean.is_none() && !everywhere) {
+            // A cell with many harmonics is none of three waves: on the whole frame the fit to the pixels judges.
+            let told = mean.as_ref().is_some_and(|mean| !mean.is_poor());
+            if !told && !everywhere {
                 return None;
             }
+            let changes = changes && told;
             // Where waves change little and in proportion to the place, the fit to the pixels gives their mean.
             let cells = settled.patch.unit_cells;
             let gentle = mean.as_ref().is_some_and(|mean| mean.is_gentle(cells));
