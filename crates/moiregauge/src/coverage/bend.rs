@@ -5,49 +5,28 @@
 //! for decides (BIC). The mean of the slopes over the patch is the mean lattice: that of its unit cells, which no
 //! transform of the whole patch gives, since there the ends weigh less than the middle.
 //!
-//! Differences of phases over a window come first, which need no unwrapping, then the phases themselves.
-//!
 //! # References
 //! Schwarz, Ann. Stat. 6, 461 (1978), BIC; Eilers and Marx, Statistical Science 11, 89 (1996), splines.
 
 use heterostrain::lattice::{Px, Waves};
-use nalgebra::{DMatrix, DVector, Matrix2, Matrix3, Matrix4, Vector2};
-use rustfft::num_complex::Complex64;
+use nalgebra::{DMatrix, Matrix2, Matrix3, Matrix4, Vector2};
 use serde::{Deserialize, Serialize};
 
 use crate::coverage::cells::Cells;
-use crate::coverage::local::{Local, local};
-use crate::coverage::settle::Patch;
-use crate::frame::image::Image;
+use crate::coverage::nodes::{Node, View, nodes};
+use crate::coverage::patch::Patch;
+use crate::coverage::phases::{Basis, Fit, fit, powers, rows};
 use crate::numbers::exact;
-use crate::numbers::normal_equations::NormalEquations;
 use crate::numbers::splines::Splines;
 
-/// Distance of nodes in widths of the window: small patches need every place, ...
-const CLOSE: f64 = 1.0;
-/// ... and large ones, of more unit cells than this, few nodes. Information is kept by both.
-const LARGE: f64 = 400.0;
-/// Distance of nodes in large patches.
-const STRIDE: f64 = 2.0;
-/// Independent phases in a node of one window: nodes closer than a window are correlated.
-const INDEPENDENT: f64 = 2.5;
-/// The least degrees of freedom by which an error is enlarged: fewer say nothing of the noise.
-const FREEDOM: f64 = 4.0;
 /// Cells of splines along the longer side of the patch that are tried.
 const SPLINES: [usize; 7] = [1, 2, 3, 4, 6, 9, 13];
+
 /// A cell of the splines is at least so many windows wide: what is smaller the window does not see.
 const WINDOWS_PER_CELL: f64 = 2.0;
-/// Rounds of differences and of phases. Chosen by eye.
-const ROUNDS: [usize; 2] = [2, 3];
-/// Phases that are off by more than this are not followed: a dislocation, or nothing, rad.
-const LOST: f64 = 2.0;
-/// What holds coefficients that nothing sees, as a share of the mean of the diagonal.
-const STIFFNESS: f64 = 1e-6;
+
 /// By how much the evidence (BIC) of a lattice that changes has to be better: chance does that once in e¹⁰.
 const BETTER: f64 = 20.0;
-
-/// Nodes whose errors are correlated by less than this are independent.
-const UNCORRELATED: f64 = 1e-3;
 
 /// How a lattice changes across its patch.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -97,10 +76,13 @@ pub(crate) struct Mean {
 
 /// A lattice whose wavelengths or directions change by more than this (standard deviation) is none. Chosen by eye.
 const WILD: f64 = 0.25;
+
 /// Standard deviation of the waves times the periods across: the phase bends by 2π √12/8 times that, half a radian here.
 const GENTLE: f64 = 0.18;
+
 /// χ² over its degrees of freedom beyond which the phases are not those of one lattice: noise is known far better.
 const POOR: f64 = 9.0;
+
 /// ..., if so much is left of them, rad, root mean square: half of what two grains leave that are a wave apart across a patch.
 const LEFT: f64 = 0.25;
 
@@ -132,143 +114,6 @@ impl Mean {
     }
 }
 
-/// What the phases of a patch are read from, all in bins.
-pub(crate) struct View<'a> {
-    pub(crate) image: &'a Image,
-    pub(crate) cells: &'a Cells,
-    /// The window, mean periods.
-    pub(crate) width: f64,
-    /// Noise power per pixel at each wave.
-    pub(crate) noise: [f64; 3],
-    pub(crate) signal_to_noise: f64,
-}
-
-/// One place where the phases are read.
-#[derive(Clone)]
-pub(crate) struct Node {
-    pub(crate) at: Vector2<f64>,
-    /// Position on the grid of nodes.
-    pub(crate) place: [usize; 2],
-    pub(crate) envelopes: [Complex64; 3],
-    /// Information on the phase of each wave, 1/rad²: that of the pixels that belong to this node alone.
-    weights: [f64; 3],
-    /// Pixels that belong to this node over those of its window.
-    share: f64,
-    /// Standard deviation of the phases; that of nodes beside each other is correlated.
-    errors: [f64; 3],
-}
-
-/// The functions that describe ψ₁ and ψ₂.
-enum Basis {
-    /// Powers of x and y up to a degree, on −1 … 1.
-    Powers {
-        degree: usize,
-        middle: Vector2<f64>,
-        half: Vector2<f64>,
-    },
-    Splines(Splines),
-}
-
-impl Basis {
-    fn len(&self) -> usize {
-        match self {
-            Self::Powers { degree, .. } => (degree + 1) * (degree + 2) / 2,
-            Self::Splines(splines) => splines.size().iter().product(),
-        }
-    }
-
-    /// The functions that are not zero at a place: position, value and slopes.
-    fn at(&self, at: Vector2<f64>) -> Vec<(usize, [f64; 3])> {
-        match self {
-            Self::Powers {
-                degree,
-                middle,
-                half,
-            } => {
-                let p = (at - middle).component_div(half);
-                let power = |x: f64, n: usize| [x.powi(n as i32), n as f64 * x.powi(n as i32 - 1)];
-                let of = |[a, b]: [usize; 2]| {
-                    let ([x, dx], [y, dy]) = (power(p.x, a), power(p.y, b));
-                    let slope = |n: usize, value: f64| if n == 0 { 0.0 } else { value };
-                    [x * y, slope(a, dx * y) / half.x, slope(b, x * dy) / half.y]
-                };
-                let all = (0..=*degree).flat_map(|total| (0..=total).map(move |b| [total - b, b]));
-                all.map(of).enumerate().collect()
-            }
-            Self::Splines(splines) => {
-                let s = splines.at(at);
-                (0..16)
-                    .map(|i| (s.places[i], [s.values[i], s.along[i], s.across[i]]))
-                    .collect()
-            }
-        }
-    }
-}
-
-/// A fitted description: coefficients of ψ₁, of ψ₂, and what φ₃ has beside ψ₂ − ψ₁.
-struct Fit {
-    basis: Basis,
-    coefficients: DVector<f64>,
-    /// Inverse of the normal matrix.
-    inverse: DMatrix<f64>,
-    /// BIC.
-    price: f64,
-    /// χ².
-    chi2: f64,
-    /// Independent phases.
-    independent: f64,
-    /// By how much variances are enlarged, since χ² is larger than its degrees of freedom.
-    enlarged: f64,
-    /// What is left of the phases, rad, root mean square.
-    left: f64,
-}
-
-impl Fit {
-    /// Covariance of sums over the coefficients (a row each): what the errors of all nodes, correlated as they are under the
-    /// window, do to them.
-    fn covariance(&self, sums: &DMatrix<f64>, nodes: &[Node], reach: Vector2<f64>) -> DMatrix<f64> {
-        let gains = sums * &self.inverse;
-        // What each phase does to the sums, times its error.
-        let of_node = |node: &Node| {
-            rows(&self.basis, node.at).map(|row| {
-                let mut gain = DVector::zeros(sums.nrows());
-                for (i, x) in row {
-                    gain += gains.column(i) * x;
-                }
-                gain
-            })
-        };
-        let all: Vec<[DVector<f64>; 3]> = nodes
-            .iter()
-            .map(|node| {
-                let mut gains = of_node(node);
-                for (wave, gain) in gains.iter_mut().enumerate() {
-                    *gain *= node.weights[wave] * node.errors[wave];
-                }
-                gains
-            })
-            .collect();
-        let mut covariance = DMatrix::zeros(sums.nrows(), sums.nrows());
-        for (i, a) in nodes.iter().enumerate() {
-            for (j, b) in nodes.iter().enumerate().skip(i) {
-                let d = (b.at - a.at).component_div(&reach);
-                let correlation = (-0.25 * d.norm_squared()).exp();
-                if correlation < UNCORRELATED {
-                    continue;
-                }
-                for (first, second) in all[i].iter().zip(&all[j]) {
-                    let product = correlation * first * second.transpose();
-                    covariance += &product;
-                    if i != j {
-                        covariance += product.transpose();
-                    }
-                }
-            }
-        }
-        covariance * self.enlarged
-    }
-}
-
 /// What describes the phases over a patch best.
 struct Chosen {
     /// `None` for a lattice that is the same everywhere.
@@ -296,16 +141,6 @@ pub(crate) fn described_as_straight(patch: &Patch, nodes: &[Node]) -> Option<[f6
     let fit = fit(powers(patch, 1), nodes)?;
     let straight = fit.left < LEFT;
     straight.then_some([fit.chi2, fit.coefficients.len() as f64, fit.independent])
-}
-
-/// Powers of x and y up to a degree, on the extent of a patch.
-fn powers(patch: &Patch, degree: usize) -> Basis {
-    let [low, high] = patch.corners();
-    Basis::Powers {
-        degree,
-        middle: (low + high) / 2.0,
-        half: (high - low) / 2.0,
-    }
 }
 
 fn choose(view: &View, patch: &Patch, nodes: &[Node]) -> Option<Chosen> {
@@ -352,236 +187,6 @@ fn choose(view: &View, patch: &Patch, nodes: &[Node]) -> Option<Chosen> {
             evidence: 0.0,
         },
     })
-}
-
-/// The nodes of a patch at which the three waves can be told apart.
-pub(crate) fn nodes(view: &View, patch: &Patch) -> Vec<Node> {
-    let cells = view.cells;
-    let width = [0, 1].map(|axis| view.width * cells.period[axis]);
-    let apart = if patch.unit_cells > LARGE {
-        STRIDE
-    } else {
-        CLOSE
-    };
-    let stride = [0, 1]
-        .map(|axis| ((apart * width[axis] / cells.pixels[axis] as f64).round() as usize).max(1));
-    let pixels = [0, 1].map(|axis| (stride[axis] * cells.pixels[axis]) as f64);
-    let share = pixels[0] * pixels[1] / (4.0 * std::f64::consts::PI * width[0] * width[1]);
-    let mut places = Vec::new();
-    for (j, y) in (stride[1] / 2..cells.size[1])
-        .step_by(stride[1])
-        .enumerate()
-    {
-        for (i, x) in (stride[0] / 2..cells.size[0])
-            .step_by(stride[0])
-            .enumerate()
-        {
-            if patch.inside[y * cells.size[0] + x] {
-                places.push(([i, j], [x, y]));
-            }
-        }
-    }
-    let at: Vec<usize> = places
-        .iter()
-        .map(|(_, [x, y])| y * cells.size[0] + x)
-        .collect();
-    let seen = local(cells, &patch.of(view.image), &patch.pair, view.width, &at);
-    let all = places.into_iter().zip(seen);
-    all.filter_map(|((place, cell), local)| {
-        let Local { envelopes, noise } = local?;
-        let errors =
-            [0, 1, 2].map(|i| (view.noise[i] * noise[i] / (2.0 * envelopes[i].norm_sqr())).sqrt());
-        Some(Node {
-            at: cells.middle(cell),
-            place,
-            envelopes,
-            weights: errors.map(|e| share / (e * e)),
-            share,
-            errors,
-        })
-    })
-    .collect()
-}
-
-/// ψ of the three waves as sums over the coefficients: those of ψ₁, of ψ₂ and the last.
-fn rows(basis: &Basis, at: Vector2<f64>) -> [Vec<(usize, f64)>; 3] {
-    let n = basis.len();
-    let functions = basis.at(at);
-    let of = |first: usize, sign: f64| functions.iter().map(move |(i, f)| (first + i, sign * f[0]));
-    [
-        of(0, 1.0).collect(),
-        of(n, 1.0).collect(),
-        of(n, 1.0)
-            .chain(of(0, -1.0))
-            .chain([(2 * n, 1.0)])
-            .collect(),
-    ]
-}
-
-fn value(row: &[(usize, f64)], coefficients: &DVector<f64>) -> f64 {
-    row.iter().map(|(i, x)| coefficients[*i] * x).sum()
-}
-
-/// Normal equations that are filled row by row.
-struct Sums {
-    normal: DMatrix<f64>,
-    right: DVector<f64>,
-}
-
-impl Sums {
-    fn new(size: usize) -> Self {
-        Self {
-            normal: DMatrix::zeros(size, size),
-            right: DVector::zeros(size),
-        }
-    }
-
-    fn add(&mut self, row: &[(usize, f64)], measured: f64, weight: f64) {
-        for (i, x) in row {
-            self.right[*i] += weight * x * measured;
-            for (j, y) in row {
-                self.normal[(*i, *j)] += weight * x * y;
-            }
-        }
-    }
-
-    fn solved(mut self, basis: &Basis) -> Option<(DVector<f64>, NormalEquations)> {
-        let size = self.right.len();
-        let stiffness = STIFFNESS * self.normal.trace() / size as f64;
-        if let Basis::Splines(splines) = basis {
-            for first in [0, basis.len()] {
-                splines.in_lines(|places| {
-                    for (a, x) in places.iter().zip([1.0, -2.0, 1.0]) {
-                        for (b, y) in places.iter().zip([1.0, -2.0, 1.0]) {
-                            self.normal[(first + a, first + b)] += stiffness * x * y;
-                        }
-                    }
-                });
-            }
-        }
-        // Constants are free where only differences are looked at.
-        for i in 0..size {
-            self.normal[(i, i)] += 1e-3 * stiffness;
-        }
-        let units = NormalEquations::units(&self.normal);
-        let equations = NormalEquations::new(&self.normal, units, |_| 0.0)?;
-        Some((equations.solve(&self.right), equations))
-    }
-}
-
-fn fit(basis: Basis, nodes: &[Node]) -> Option<Fit> {
-    let size = 2 * basis.len() + 1;
-    let rows: Vec<[Vec<(usize, f64)>; 3]> = nodes.iter().map(|n| rows(&basis, n.at)).collect();
-    let mut coefficients = DVector::zeros(size);
-    let neighbours = neighbours(nodes);
-    for _ in 0..ROUNDS[0] {
-        let mut sums = Sums::new(size);
-        for &(a, b) in &neighbours {
-            for (wave, (before, after)) in rows[a].iter().zip(&rows[b]).enumerate() {
-                let row = difference(after, before);
-                let turn = nodes[a].envelopes[wave].conj() * nodes[b].envelopes[wave];
-                let left = (turn * Complex64::cis(-value(&row, &coefficients))).arg();
-                let weight = nodes[a].weights[wave].min(nodes[b].weights[wave]);
-                sums.add(&row, left, weight);
-            }
-        }
-        coefficients += sums.solved(&basis)?.0;
-    }
-    align(&basis, nodes, &rows, &mut coefficients);
-    let all: f64 = nodes.iter().flat_map(|node| node.weights).sum();
-    let mut last = None;
-    for _ in 0..ROUNDS[1] {
-        let mut sums = Sums::new(size);
-        let (mut chi2, mut count) = (0.0, 0.0);
-        for (node, rows) in nodes.iter().zip(&rows) {
-            for (wave, row) in rows.iter().enumerate() {
-                let left = node.envelopes[wave] * Complex64::cis(-value(row, &coefficients));
-                let (left, weight) = (left.arg(), node.weights[wave]);
-                // What is lost counts as if it were at the limit, and moves nothing.
-                chi2 += weight * left.clamp(-LOST, LOST).powi(2);
-                count += 1.0;
-                if left.abs() < LOST {
-                    sums.add(row, left, weight);
-                }
-            }
-        }
-        let (step, equations) = sums.solved(&basis)?;
-        coefficients += step;
-        last = Some((equations, chi2, count));
-    }
-    let (equations, chi2, count) = last?;
-    let share = nodes.first()?.share;
-    let independent = count * (INDEPENDENT * share).min(1.0);
-    // The information of all nodes together is that of the pixels, each of them once.
-    let freedom = share * count - size as f64;
-    Some(Fit {
-        inverse: equations.inverse(),
-        coefficients,
-        price: price(chi2, size as f64, independent),
-        chi2,
-        left: (chi2 / all).sqrt(),
-        independent,
-        enlarged: if freedom > FREEDOM {
-            (chi2 / freedom).max(1.0)
-        } else {
-            1.0
-        },
-        basis,
-    })
-}
-
-/// BIC of χ² (in units that do not matter), parameters and independent data.
-pub(crate) fn price(chi2: f64, parameters: f64, independent: f64) -> f64 {
-    independent * (chi2 / independent).ln() + parameters * independent.ln()
-}
-
-/// b − a.
-fn difference(b: &[(usize, f64)], a: &[(usize, f64)]) -> Vec<(usize, f64)> {
-    let minus = a.iter().map(|(i, x)| (*i, -x));
-    b.iter().copied().chain(minus).collect()
-}
-
-/// Pairs of nodes beside each other.
-pub(crate) fn neighbours(nodes: &[Node]) -> Vec<(usize, usize)> {
-    let at: std::collections::HashMap<[usize; 2], usize> = nodes
-        .iter()
-        .enumerate()
-        .map(|(i, n)| (n.place, i))
-        .collect();
-    let mut pairs = Vec::new();
-    for (i, node) in nodes.iter().enumerate() {
-        let [x, y] = node.place;
-        for next in [[x + 1, y], [x, y + 1]] {
-            pairs.extend(at.get(&next).map(|&j| (i, j)));
-        }
-    }
-    pairs
-}
-
-/// Sets the constants to the mean phases.
-fn align(
-    basis: &Basis,
-    nodes: &[Node],
-    rows: &[[Vec<(usize, f64)>; 3]],
-    coefficients: &mut DVector<f64>,
-) {
-    let mean = |wave: usize, coefficients: &DVector<f64>| {
-        let sum = nodes.iter().zip(rows).map(|(node, rows)| {
-            node.envelopes[wave] * Complex64::cis(-value(&rows[wave], coefficients))
-        });
-        sum.sum::<Complex64>().arg()
-    };
-    let n = basis.len();
-    for wave in 0..2 {
-        let constant = mean(wave, coefficients);
-        match basis {
-            Basis::Powers { .. } => coefficients[wave * n] += constant,
-            // The splines add up to one everywhere.
-            Basis::Splines(_) => (0..n).for_each(|i| coefficients[wave * n + i] += constant),
-        }
-    }
-    let third = mean(2, coefficients);
-    coefficients[2 * n] += third;
 }
 
 fn summary(chosen: &Chosen, nodes: &[Node], view: &View, patch: &Patch) -> Mean {

@@ -1,16 +1,16 @@
 //! Several lattices side by side: grains.
 //!
 //! Where two grains meet, the slopes of the phases take two values and hardly any between them. The nodes of a patch are split in two by
-//! their slopes, and both parts are described by themselves. Two lattices it is if the data pay for that (BIC) against
-//! the best smooth change of one.
+//! their slopes, and both parts are described by themselves. Two lattices it is if no smooth change of one describes the phases,
+//! and if the data pay for two (BIC) against the best of these.
 
-use nalgebra::{Matrix2, Vector4};
+use nalgebra::Vector4;
 
-use crate::coverage::bend::{
-    Node, View, described, described_as_straight, neighbours, nodes, price,
-};
+use crate::coverage::bend::{described, described_as_straight};
 use crate::coverage::cells::Cells;
-use crate::coverage::settle::Patch;
+use crate::coverage::nodes::{Node, View, information, neighbours, nodes};
+use crate::coverage::patch::Patch;
+use crate::coverage::phases::price;
 use crate::numbers::median::median;
 
 /// Rounds of means and nearest means. Chosen by eye.
@@ -19,6 +19,10 @@ const ROUNDS: usize = 20;
 const FEWEST_NODES: usize = 6;
 /// By how much the evidence (BIC) of two lattices has to be better than that of one that changes: chance does that once in e¹⁰.
 const BETTER: f64 = 20.0;
+
+/// A smooth change describes phases whose χ² is below this share of their information: those of waves of twist and strain
+/// were below 0.9 of it, those of two grains above 2.
+const MISFIT: f64 = 1.5;
 
 /// The patches of two grains, the larger first; `None` where one lattice describes all of the patch as well.
 pub(crate) fn split(view: &View, patch: &Patch) -> Option<[Patch; 2]> {
@@ -45,6 +49,9 @@ pub(crate) fn split(view: &View, patch: &Patch) -> Option<[Patch; 2]> {
         return None;
     }
     let one = described(view, patch, &part(&|_| true))?;
+    if one[0] < MISFIT * information(&all) {
+        return None;
+    }
     let [a, b] = [0, 1].map(|i| described_as_straight(patch, &parts[i]));
     let (a, b) = (a?, b?);
     // Where the boundary runs costs about as many numbers as it is nodes long.
@@ -151,11 +158,10 @@ fn filtered(nodes: &[Node], slopes: &[Option<Vector4<f64>>]) -> Vec<Option<Vecto
 
 /// The cells whose nearest nodes all belong to one grain.
 fn grain(cells: &Cells, patch: &Patch, nodes: &[Node], second: &[bool], which: bool) -> Patch {
-    let pixels = |i: usize| cells.middle_of(i);
     let mut inside = vec![false; patch.inside.len()];
     let scale = cells.period;
     for cell in (0..inside.len()).filter(|&c| patch.inside[c]) {
-        let at = pixels(cell);
+        let at = cells.middle_of(cell);
         let distance = |node: &Node| {
             let d = node.at - at;
             (d.x / scale[0]).hypot(d.y / scale[1])
@@ -185,7 +191,6 @@ fn grain(cells: &Cells, patch: &Patch, nodes: &[Node], second: &[bool], which: b
         unit_cells: there * patch.pair.determinant().abs() / std::f64::consts::TAU.powi(2),
         share,
         inside,
-        pair: Matrix2::from(patch.pair),
         ..patch.clone()
     }
 }

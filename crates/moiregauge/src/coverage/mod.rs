@@ -11,8 +11,11 @@ pub(crate) mod find;
 pub(crate) mod finer;
 pub(crate) mod grains;
 pub(crate) mod local;
+pub(crate) mod nodes;
+pub(crate) mod patch;
+pub(crate) mod phases;
 pub(crate) mod settle;
 pub(crate) mod tiles;
 
 pub use bend::{Change, ChangeModel};
-pub use settle::Patch;
+pub use patch::Patch;

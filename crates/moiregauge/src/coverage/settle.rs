@@ -7,169 +7,57 @@
 
 use nalgebra::{Matrix2, Vector2};
 use rustfft::num_complex::Complex64;
-use serde::{Deserialize, Serialize};
 
-use crate::coverage::bend::{Mean, View, mean};
+use crate::coverage::bend::{Mean, mean};
 use crate::coverage::cells::{Cells, Window};
 use crate::coverage::grains::split;
+use crate::coverage::nodes::View;
+use crate::coverage::patch::Patch;
 use crate::frame::image::Image;
-use crate::numbers::exact;
 use crate::numbers::median::median;
 
 /// Windows that are tried, mean periods: the narrowest that keeps waves a wave vector apart, and wider ones for
 /// noisy images.
 const WIDTHS: [f64; 4] = [0.8, 1.2, 1.8, 2.7];
+
 /// Wide enough: noise in the weighted sum, which is 1 where the lattice is, is below this. Five times it fits between
 /// half and one.
 const QUIET: f64 = 0.1;
+
 /// Cells with more than this share of what is typical are the patch: an edge is where the window sees half.
 const INSIDE: f64 = 0.5;
+
 /// What is typical of a wave is less than in this share of the cells has more of it: half of the windows of a small patch see its
 /// edge, which does not count.
 const TYPICAL: f64 = 0.75;
+
 /// Cells whose window is missing for the most part tell nothing.
 const SUPPORT: f64 = 0.15;
+
 /// Power over noise that each wave has under the window, at least: e⁻⁸ by chance, in each of many windows.
 const PLAIN: f64 = 8.0;
+
 /// Pixels are averaged where the shortest period has twice so many: harmonics need not be seen.
 const BINS_PER_PERIOD: f64 = 8.0;
+
 /// Rounds of patch and pair, at most. Chosen by eye.
 const ROUNDS: usize = 8;
+
 /// The pair stands still when it moves by less than this over the patch, cycles.
 const STILL: f64 = 0.02;
+
 /// The smallest patch, unit cells of the lattice: fewer make no lattice. Chosen by eye.
 const FEWEST_CELLS: f64 = 5.0;
+
 /// Parts of the patch smaller than this share of the largest part are dropped, and so are those of fewer unit cells
 /// than [`SMALLEST_PART`].
 const PART: f64 = 0.05;
+
 /// See [`PART`].
 const SMALLEST_PART: f64 = 3.0;
+
 /// Gaps of fewer unit cells than this are closed: a defect, or noise.
 const SMALLEST_GAP: f64 = 1.5;
-
-/// The part of a frame that carries a lattice.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Patch {
-    /// The mean waves over it, rad per pixel.
-    #[serde(with = "exact")]
-    pub pair: Matrix2<f64>,
-    /// Cells along columns and rows.
-    pub size: [usize; 2],
-    /// Pixels of a cell along columns and rows; the last cells may have fewer.
-    pub pixels: [usize; 2],
-    /// Whether a cell belongs to it, row by row from the bottom.
-    pub inside: Vec<bool>,
-    /// Share of the pixels that are there.
-    #[serde(with = "exact")]
-    pub share: f64,
-    /// Unit cells of the lattice in it.
-    #[serde(with = "exact")]
-    pub unit_cells: f64,
-}
-
-impl Patch {
-    /// Whether the pixel at (column, row) belongs to it.
-    pub fn holds(&self, [column, row]: [usize; 2]) -> bool {
-        let cell = |axis: usize, at: usize| (at / self.pixels[axis]).min(self.size[axis] - 1);
-        self.inside[cell(1, row) * self.size[0] + cell(0, column)]
-    }
-
-    /// Whether its cells are those of an image of so many columns and rows.
-    pub fn is_of(&self, image: [usize; 2]) -> bool {
-        (0..2).all(|i| image[i].abs_diff(self.size[i] * self.pixels[i]) < 2 * self.pixels[i])
-    }
-
-    /// Its outline: the sides of cells beyond which it ends, from point to point (column, row), where pixels lie at whole
-    /// numbers.
-    pub fn outline(&self) -> Vec<[Vector2<f64>; 2]> {
-        let [across, up] = self.size;
-        let holds = |x: Option<usize>, y: Option<usize>| match (x, y) {
-            (Some(x), Some(y)) if x < across && y < up => self.inside[y * across + x],
-            _ => false,
-        };
-        let corner = |x: usize, y: usize| {
-            let at = Vector2::new((x * self.pixels[0]) as f64, (y * self.pixels[1]) as f64);
-            at - Vector2::repeat(0.5)
-        };
-        let mut sides = Vec::new();
-        for (x, y) in (0..self.inside.len()).map(|i| (i % across, i / across)) {
-            if !holds(Some(x), Some(y)) {
-                continue;
-            }
-            let around = [
-                (
-                    holds(x.checked_sub(1), Some(y)),
-                    [corner(x, y), corner(x, y + 1)],
-                ),
-                (
-                    holds(Some(x + 1), Some(y)),
-                    [corner(x + 1, y), corner(x + 1, y + 1)],
-                ),
-                (
-                    holds(Some(x), y.checked_sub(1)),
-                    [corner(x, y), corner(x + 1, y)],
-                ),
-                (
-                    holds(Some(x), Some(y + 1)),
-                    [corner(x, y + 1), corner(x + 1, y + 1)],
-                ),
-            ];
-            sides.extend(
-                around
-                    .into_iter()
-                    .filter(|(goes_on, _)| !goes_on)
-                    .map(|(_, side)| side),
-            );
-        }
-        sides
-    }
-
-    /// The same in pixels of which `bins` make one along each axis.
-    fn in_pixels(&self, bins: usize) -> Self {
-        Self {
-            pair: self.pair / bins as f64,
-            pixels: self.pixels.map(|n| n * bins),
-            ..self.clone()
-        }
-    }
-
-    /// Its lowest and highest corner, pixels.
-    pub(crate) fn corners(&self) -> [Vector2<f64>; 2] {
-        let (mut low, mut high) = (Vector2::repeat(f64::INFINITY), Vector2::repeat(0.0f64));
-        for i in (0..self.inside.len()).filter(|&i| self.inside[i]) {
-            let cell = Vector2::new((i % self.size[0]) as f64, (i / self.size[0]) as f64);
-            low = low.inf(&cell);
-            high = high.sup(&cell);
-        }
-        let pixels = Vector2::from(self.pixels.map(|n| n as f64));
-        [
-            low.component_mul(&pixels),
-            (high + Vector2::repeat(1.0)).component_mul(&pixels),
-        ]
-    }
-
-    /// The mean place of its pixels.
-    pub(crate) fn middle(&self, cells: &Cells) -> Vector2<f64> {
-        let (mut sum, mut count) = (Vector2::zeros(), 0.0);
-        for i in (0..self.inside.len()).filter(|&i| self.inside[i]) {
-            sum += cells.middle_of(i) * cells.counts()[i];
-            count += cells.counts()[i];
-        }
-        sum / count
-    }
-
-    /// The image with the pixels beside the patch missing.
-    pub(crate) fn of(&self, image: &Image) -> Image {
-        let values = image.values.iter().enumerate().map(|(i, value)| {
-            if self.holds([i % image.columns, i / image.columns]) {
-                *value
-            } else {
-                f64::NAN
-            }
-        });
-        Image::new(image.rows, image.columns, values.collect())
-    }
-}
 
 /// Settles a pair of waves (rad per pixel) on the lattice near it. `pitch`: distance of pixels along columns and rows.
 ///

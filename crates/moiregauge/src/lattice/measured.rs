@@ -5,7 +5,7 @@ use nalgebra::{Matrix2, Vector2};
 use serde::{Deserialize, Serialize};
 
 use crate::coverage::bend::Change;
-use crate::coverage::settle::Patch;
+use crate::coverage::patch::Patch;
 use crate::lattice::fit::fit_pixels::LatticeFit;
 use crate::lattice::paper::PublishedPeaks;
 use crate::numbers::exact;

@@ -11,9 +11,11 @@ pub(crate) mod measure;
 pub(crate) mod measured;
 pub(crate) mod paper;
 pub(crate) mod several;
+pub(crate) mod start;
 
 pub use fit::{Closure, FittedHarmonic, ForeignWave, Inhomogeneity, LatticeFit};
-pub use measure::{Start, measure};
+pub use measure::measure;
 pub use measured::MeasuredLattice;
 pub use paper::PublishedPeaks;
 pub use several::measure_several;
+pub use start::Start;

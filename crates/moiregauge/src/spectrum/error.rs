@@ -31,6 +31,12 @@ pub enum LatticeError {
         /// Signal-to-noise ratios (amplitude) of the best three wave vectors, largest first; 0 where none were found.
         best: [f64; 3],
     },
+    /// The waves of the best lattice are not in one place.
+    #[error(
+        "the spectrum proposes lattices, but no part of the frame carries the three waves of any of them together: they are skirts of an \
+         edge, stripes, or waves of different lattices"
+    )]
+    NowhereTogether,
     /// Something else is stronger.
     #[error(
         "a wave with a period of {period:.2} nm, which is no harmonic of the lattice that was found, is stronger than the lattice: \

@@ -7,7 +7,7 @@ use crate::caveat::patterns::PatternDoubt;
 use crate::frame::background::remove_background;
 use crate::frame::geometry::Geometry;
 use crate::frame::image::Image;
-use crate::lattice::measure::Start;
+use crate::lattice::start::Start;
 use crate::scan::channel::{channels, image_of};
 use crate::scan::place::Place;
 use crate::settings::knobs::Settings;

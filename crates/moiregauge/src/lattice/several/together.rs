@@ -6,9 +6,10 @@ use crate::frame::background::{Background, remove_background};
 use crate::frame::geometry::Geometry;
 use crate::frame::image::Image;
 use crate::lattice::fit::fit_pixels::LatticeFit;
-use crate::lattice::measure::{Start, measure_whole};
+use crate::lattice::measure::measure_whole;
 use crate::lattice::measured::MeasuredLattice;
 use crate::lattice::several::split;
+use crate::lattice::start::Start;
 use crate::spectrum::error::LatticeError;
 use crate::spectrum::method::Method;
 

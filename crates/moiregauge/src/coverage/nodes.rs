@@ -1,0 +1,115 @@
+//! The places of a patch at which the phases of its waves are read.
+
+use nalgebra::Vector2;
+use rustfft::num_complex::Complex64;
+
+use crate::coverage::cells::Cells;
+use crate::coverage::local::{Local, local};
+use crate::coverage::patch::Patch;
+use crate::frame::image::Image;
+
+/// Distance of nodes in widths of the window: small patches need every place, ...
+pub(crate) const CLOSE: f64 = 1.0;
+
+/// ... and large ones, of more unit cells than this, few nodes. Information is kept by both.
+pub(crate) const LARGE: f64 = 400.0;
+
+/// Distance of nodes in large patches.
+pub(crate) const STRIDE: f64 = 2.0;
+
+/// What the phases of a patch are read from, all in bins.
+pub(crate) struct View<'a> {
+    pub(crate) image: &'a Image,
+    pub(crate) cells: &'a Cells,
+    /// The window, mean periods.
+    pub(crate) width: f64,
+    /// Noise power per pixel at each wave.
+    pub(crate) noise: [f64; 3],
+    pub(crate) signal_to_noise: f64,
+}
+
+/// One place where the phases are read.
+#[derive(Clone)]
+pub(crate) struct Node {
+    pub(crate) at: Vector2<f64>,
+    /// Position on the grid of nodes.
+    pub(crate) place: [usize; 2],
+    pub(crate) envelopes: [Complex64; 3],
+    /// Information on the phase of each wave, 1/rad²: that of the pixels that belong to this node alone.
+    pub(crate) weights: [f64; 3],
+    /// Pixels that belong to this node over those of its window.
+    pub(crate) share: f64,
+    /// Standard deviation of the phases; that of nodes beside each other is correlated.
+    pub(crate) errors: [f64; 3],
+}
+
+/// The nodes of a patch at which the three waves can be told apart.
+pub(crate) fn nodes(view: &View, patch: &Patch) -> Vec<Node> {
+    let cells = view.cells;
+    let width = [0, 1].map(|axis| view.width * cells.period[axis]);
+    let apart = if patch.unit_cells > LARGE {
+        STRIDE
+    } else {
+        CLOSE
+    };
+    let stride = [0, 1]
+        .map(|axis| ((apart * width[axis] / cells.pixels[axis] as f64).round() as usize).max(1));
+    let pixels = [0, 1].map(|axis| (stride[axis] * cells.pixels[axis]) as f64);
+    let share = pixels[0] * pixels[1] / (4.0 * std::f64::consts::PI * width[0] * width[1]);
+    let mut places = Vec::new();
+    for (j, y) in (stride[1] / 2..cells.size[1])
+        .step_by(stride[1])
+        .enumerate()
+    {
+        for (i, x) in (stride[0] / 2..cells.size[0])
+            .step_by(stride[0])
+            .enumerate()
+        {
+            if patch.inside[y * cells.size[0] + x] {
+                places.push(([i, j], [x, y]));
+            }
+        }
+    }
+    let at: Vec<usize> = places
+        .iter()
+        .map(|(_, [x, y])| y * cells.size[0] + x)
+        .collect();
+    let seen = local(cells, &patch.of(view.image), &patch.pair, view.width, &at);
+    let all = places.into_iter().zip(seen);
+    all.filter_map(|((place, cell), local)| {
+        let Local { envelopes, noise } = local?;
+        let errors =
+            [0, 1, 2].map(|i| (view.noise[i] * noise[i] / (2.0 * envelopes[i].norm_sqr())).sqrt());
+        Some(Node {
+            at: cells.middle(cell),
+            place,
+            envelopes,
+            weights: errors.map(|e| share / (e * e)),
+            share,
+            errors,
+        })
+    })
+    .collect()
+}
+
+/// How many independent phases the pixels of some nodes tell, each pixel counted once: what χ² is without a description.
+pub(crate) fn information(nodes: &[Node]) -> f64 {
+    nodes.iter().map(|node| 3.0 * node.share).sum()
+}
+
+/// Pairs of nodes beside each other.
+pub(crate) fn neighbours(nodes: &[Node]) -> Vec<(usize, usize)> {
+    let at: std::collections::HashMap<[usize; 2], usize> = nodes
+        .iter()
+        .enumerate()
+        .map(|(i, n)| (n.place, i))
+        .collect();
+    let mut pairs = Vec::new();
+    for (i, node) in nodes.iter().enumerate() {
+        let [x, y] = node.place;
+        for next in [[x + 1, y], [x, y + 1]] {
+            pairs.extend(at.get(&next).map(|&j| (i, j)));
+        }
+    }
+    pairs
+}

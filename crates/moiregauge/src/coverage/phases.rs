@@ -1,0 +1,323 @@
+//! Smooth functions fitted to the phases of three waves: powers of the place, or splines.
+//!
+//! Differences of phases over a window come first, which need no unwrapping, then the phases themselves.
+
+use nalgebra::{DMatrix, DVector, Vector2};
+use rustfft::num_complex::Complex64;
+
+use crate::coverage::nodes::{Node, information, neighbours};
+use crate::coverage::patch::Patch;
+use crate::numbers::normal_equations::NormalEquations;
+use crate::numbers::splines::Splines;
+
+/// Independent phases in a node of one window: nodes closer than a window are correlated.
+pub(crate) const INDEPENDENT: f64 = 2.5;
+
+/// The least degrees of freedom, as a share of the information. Chosen by eye.
+pub(crate) const LEAST_FREEDOM: f64 = 0.25;
+
+/// The least degrees of freedom by which an error is enlarged: fewer say nothing of the noise.
+pub(crate) const FREEDOM: f64 = 4.0;
+
+/// Rounds of differences and of phases. Chosen by eye.
+pub(crate) const ROUNDS: [usize; 2] = [2, 3];
+
+/// Phases that are off by more than this are not followed: a dislocation, or nothing, rad.
+pub(crate) const LOST: f64 = 2.0;
+
+/// What holds coefficients that nothing sees, as a share of the mean of the diagonal.
+pub(crate) const STIFFNESS: f64 = 1e-6;
+
+/// Nodes whose errors are correlated by less than this are independent.
+pub(crate) const UNCORRELATED: f64 = 1e-3;
+
+/// The functions that describe ψ₁ and ψ₂.
+pub(crate) enum Basis {
+    /// Powers of x and y up to a degree, on −1 … 1.
+    Powers {
+        degree: usize,
+        middle: Vector2<f64>,
+        half: Vector2<f64>,
+    },
+    Splines(Splines),
+}
+
+impl Basis {
+    pub(crate) fn len(&self) -> usize {
+        match self {
+            Self::Powers { degree, .. } => (degree + 1) * (degree + 2) / 2,
+            Self::Splines(splines) => splines.size().iter().product(),
+        }
+    }
+
+    /// The functions that are not zero at a place: position, value and slopes.
+    pub(crate) fn at(&self, at: Vector2<f64>) -> Vec<(usize, [f64; 3])> {
+        match self {
+            Self::Powers {
+                degree,
+                middle,
+                half,
+            } => {
+                let p = (at - middle).component_div(half);
+                let power = |x: f64, n: usize| [x.powi(n as i32), n as f64 * x.powi(n as i32 - 1)];
+                let of = |[a, b]: [usize; 2]| {
+                    let ([x, dx], [y, dy]) = (power(p.x, a), power(p.y, b));
+                    let slope = |n: usize, value: f64| if n == 0 { 0.0 } else { value };
+                    [x * y, slope(a, dx * y) / half.x, slope(b, x * dy) / half.y]
+                };
+                let all = (0..=*degree).flat_map(|total| (0..=total).map(move |b| [total - b, b]));
+                all.map(of).enumerate().collect()
+            }
+            Self::Splines(splines) => {
+                let s = splines.at(at);
+                (0..16)
+                    .map(|i| (s.places[i], [s.values[i], s.along[i], s.across[i]]))
+                    .collect()
+            }
+        }
+    }
+}
+
+/// A fitted description: coefficients of ψ₁, of ψ₂, and what φ₃ has beside ψ₂ − ψ₁.
+pub(crate) struct Fit {
+    pub(crate) basis: Basis,
+    pub(crate) coefficients: DVector<f64>,
+    /// Inverse of the normal matrix.
+    pub(crate) inverse: DMatrix<f64>,
+    /// BIC.
+    pub(crate) price: f64,
+    /// χ².
+    pub(crate) chi2: f64,
+    /// Independent phases.
+    pub(crate) independent: f64,
+    /// By how much variances are enlarged, since χ² is larger than its degrees of freedom.
+    pub(crate) enlarged: f64,
+    /// What is left of the phases, rad, root mean square.
+    pub(crate) left: f64,
+}
+
+impl Fit {
+    /// Covariance of sums over the coefficients (a row each): what the errors of all nodes, correlated as they are under the
+    /// window, do to them.
+    pub(crate) fn covariance(
+        &self,
+        sums: &DMatrix<f64>,
+        nodes: &[Node],
+        reach: Vector2<f64>,
+    ) -> DMatrix<f64> {
+        let gains = sums * &self.inverse;
+        // What each phase does to the sums, times its error.
+        let of_node = |node: &Node| {
+            rows(&self.basis, node.at).map(|row| {
+                let mut gain = DVector::zeros(sums.nrows());
+                for (i, x) in row {
+                    gain += gains.column(i) * x;
+                }
+                gain
+            })
+        };
+        let all: Vec<[DVector<f64>; 3]> = nodes
+            .iter()
+            .map(|node| {
+                let mut gains = of_node(node);
+                for (wave, gain) in gains.iter_mut().enumerate() {
+                    *gain *= node.weights[wave] * node.errors[wave];
+                }
+                gains
+            })
+            .collect();
+        let mut covariance = DMatrix::zeros(sums.nrows(), sums.nrows());
+        for (i, a) in nodes.iter().enumerate() {
+            for (j, b) in nodes.iter().enumerate().skip(i) {
+                let d = (b.at - a.at).component_div(&reach);
+                let correlation = (-0.25 * d.norm_squared()).exp();
+                if correlation < UNCORRELATED {
+                    continue;
+                }
+                for (first, second) in all[i].iter().zip(&all[j]) {
+                    let product = correlation * first * second.transpose();
+                    covariance += &product;
+                    if i != j {
+                        covariance += product.transpose();
+                    }
+                }
+            }
+        }
+        covariance * self.enlarged
+    }
+}
+
+/// Powers of x and y up to a degree, on the extent of a patch.
+pub(crate) fn powers(patch: &Patch, degree: usize) -> Basis {
+    let [low, high] = patch.corners();
+    Basis::Powers {
+        degree,
+        middle: (low + high) / 2.0,
+        half: (high - low) / 2.0,
+    }
+}
+
+/// ψ of the three waves as sums over the coefficients: those of ψ₁, of ψ₂ and the last.
+pub(crate) fn rows(basis: &Basis, at: Vector2<f64>) -> [Vec<(usize, f64)>; 3] {
+    let n = basis.len();
+    let functions = basis.at(at);
+    let of = |first: usize, sign: f64| functions.iter().map(move |(i, f)| (first + i, sign * f[0]));
+    [
+        of(0, 1.0).collect(),
+        of(n, 1.0).collect(),
+        of(n, 1.0)
+            .chain(of(0, -1.0))
+            .chain([(2 * n, 1.0)])
+            .collect(),
+    ]
+}
+
+pub(crate) fn value(row: &[(usize, f64)], coefficients: &DVector<f64>) -> f64 {
+    row.iter().map(|(i, x)| coefficients[*i] * x).sum()
+}
+
+/// Normal equations that are filled row by row.
+pub(crate) struct Sums {
+    normal: DMatrix<f64>,
+    right: DVector<f64>,
+}
+
+impl Sums {
+    fn new(size: usize) -> Self {
+        Self {
+            normal: DMatrix::zeros(size, size),
+            right: DVector::zeros(size),
+        }
+    }
+
+    fn add(&mut self, row: &[(usize, f64)], measured: f64, weight: f64) {
+        for (i, x) in row {
+            self.right[*i] += weight * x * measured;
+            for (j, y) in row {
+                self.normal[(*i, *j)] += weight * x * y;
+            }
+        }
+    }
+
+    fn solved(mut self, basis: &Basis) -> Option<(DVector<f64>, NormalEquations)> {
+        let size = self.right.len();
+        let stiffness = STIFFNESS * self.normal.trace() / size as f64;
+        if let Basis::Splines(splines) = basis {
+            for first in [0, basis.len()] {
+                splines.in_lines(|places| {
+                    for (a, x) in places.iter().zip([1.0, -2.0, 1.0]) {
+                        for (b, y) in places.iter().zip([1.0, -2.0, 1.0]) {
+                            self.normal[(first + a, first + b)] += stiffness * x * y;
+                        }
+                    }
+                });
+            }
+        }
+        // Constants are free where only differences are looked at.
+        for i in 0..size {
+            self.normal[(i, i)] += 1e-3 * stiffness;
+        }
+        let units = NormalEquations::units(&self.normal);
+        let equations = NormalEquations::new(&self.normal, units, |_| 0.0)?;
+        Some((equations.solve(&self.right), equations))
+    }
+}
+
+pub(crate) fn fit(basis: Basis, nodes: &[Node]) -> Option<Fit> {
+    let size = 2 * basis.len() + 1;
+    let rows: Vec<[Vec<(usize, f64)>; 3]> = nodes.iter().map(|n| rows(&basis, n.at)).collect();
+    let mut coefficients = DVector::zeros(size);
+    let neighbours = neighbours(nodes);
+    for _ in 0..ROUNDS[0] {
+        let mut sums = Sums::new(size);
+        for &(a, b) in &neighbours {
+            for (wave, (before, after)) in rows[a].iter().zip(&rows[b]).enumerate() {
+                let row = difference(after, before);
+                let turn = nodes[a].envelopes[wave].conj() * nodes[b].envelopes[wave];
+                let left = (turn * Complex64::cis(-value(&row, &coefficients))).arg();
+                let weight = nodes[a].weights[wave].min(nodes[b].weights[wave]);
+                sums.add(&row, left, weight);
+            }
+        }
+        coefficients += sums.solved(&basis)?.0;
+    }
+    align(&basis, nodes, &rows, &mut coefficients);
+    let all: f64 = nodes.iter().flat_map(|node| node.weights).sum();
+    let mut last = None;
+    for _ in 0..ROUNDS[1] {
+        let mut sums = Sums::new(size);
+        let (mut chi2, mut count) = (0.0, 0.0);
+        for (node, rows) in nodes.iter().zip(&rows) {
+            for (wave, row) in rows.iter().enumerate() {
+                let left = node.envelopes[wave] * Complex64::cis(-value(row, &coefficients));
+                let (left, weight) = (left.arg(), node.weights[wave]);
+                // What is lost counts as if it were at the limit, and moves nothing.
+                chi2 += weight * left.clamp(-LOST, LOST).powi(2);
+                count += 1.0;
+                if left.abs() < LOST {
+                    sums.add(row, left, weight);
+                }
+            }
+        }
+        let (step, equations) = sums.solved(&basis)?;
+        coefficients += step;
+        last = Some((equations, chi2, count));
+    }
+    let (equations, chi2, count) = last?;
+    let share = nodes.first()?.share;
+    let independent = count * (INDEPENDENT * share).min(1.0);
+    // Smooth functions of more numbers than there are windows leave a part all the same.
+    let whole = information(nodes);
+    let freedom = (whole - size as f64).max(LEAST_FREEDOM * whole);
+    Some(Fit {
+        inverse: equations.inverse(),
+        coefficients,
+        price: price(chi2, size as f64, independent),
+        chi2,
+        left: (chi2 / all).sqrt(),
+        independent,
+        enlarged: if freedom > FREEDOM {
+            (chi2 / freedom).max(1.0)
+        } else {
+            1.0
+        },
+        basis,
+    })
+}
+
+/// BIC of χ² (in units that do not matter), parameters and independent data.
+pub(crate) fn price(chi2: f64, parameters: f64, independent: f64) -> f64 {
+    independent * (chi2 / independent).ln() + parameters * independent.ln()
+}
+
+/// b − a.
+pub(crate) fn difference(b: &[(usize, f64)], a: &[(usize, f64)]) -> Vec<(usize, f64)> {
+    let minus = a.iter().map(|(i, x)| (*i, -x));
+    b.iter().copied().chain(minus).collect()
+}
+
+/// Sets the constants to the mean phases.
+pub(crate) fn align(
+    basis: &Basis,
+    nodes: &[Node],
+    rows: &[[Vec<(usize, f64)>; 3]],
+    coefficients: &mut DVector<f64>,
+) {
+    let mean = |wave: usize, coefficients: &DVector<f64>| {
+        let sum = nodes.iter().zip(rows).map(|(node, rows)| {
+            node.envelopes[wave] * Complex64::cis(-value(&rows[wave], coefficients))
+        });
+        sum.sum::<Complex64>().arg()
+    };
+    let n = basis.len();
+    for wave in 0..2 {
+        let constant = mean(wave, coefficients);
+        match basis {
+            Basis::Powers { .. } => coefficients[wave * n] += constant,
+            // The splines add up to one everywhere.
+            Basis::Splines(_) => (0..n).for_each(|i| coefficients[wave * n + i] += constant),
+        }
+    }
+    let third = mean(2, coefficients);
+    coefficients[2 * n] += third;
+}

@@ -1,0 +1,391 @@
+//! Where the lattice of an image is, roughly, and the lattice measured from there.
+
+use heterostrain::lattice::{Lattice, Px, labelled_like, reciprocal};
+use nalgebra::{Matrix2, Vector2};
+
+use crate::coverage::bend::Mean;
+use crate::coverage::find::{WHOLE, patches, pitch, same};
+use crate::coverage::patch::Patch;
+use crate::coverage::settle::{Settled, settle};
+use crate::frame::background::{Background, remove_background};
+use crate::frame::clip::cut_off;
+use crate::frame::geometry::Geometry;
+use crate::frame::image::Image;
+use crate::lattice::fit::fit_pixels as fit;
+use crate::lattice::fit::fit_pixels::LatticeFit;
+use crate::lattice::measured::{Grain, MeasuredLattice};
+use crate::lattice::{autocorrelation, fourier, paper};
+use crate::spectrum::error::{LatticeError, THIRD};
+use crate::spectrum::harmonics::Harmonics;
+use crate::spectrum::method::Method;
+use crate::spectrum::phases::Phases;
+use crate::spectrum::prepare::{
+    Prepared, Verdict, binning, middle, phases, prepare, refine, signal_to_noise, verdict,
+};
+use crate::spectrum::transform::Spectrum;
+use crate::spectrum::{known, rescue, select};
+
+/// A lattice whose waves bend so much that a transform of the whole patch does not show them has at least so many unit
+/// cells: it is seen by what windows show. Chosen by eye.
+pub(crate) const FEWEST_CELLS: f64 = 12.0;
+
+/// What a Hann window leaves of the power over noise of a wave: (Σw)² / (N Σw²), along both axes.
+pub(crate) const HANN: f64 = 4.0 / 9.0;
+
+/// Where the lattice of an image is, roughly: what every method starts from.
+pub struct Start {
+    prepared: Prepared,
+    geometry: Geometry,
+    background: Background,
+    /// (columns, rows).
+    size: [usize; 2],
+    /// The part of the frame that carries the lattice; `None` for all of it.
+    patch: Option<Patch>,
+    /// The mean lattice, where it changes.
+    mean: Option<Mean>,
+    /// Other grains.
+    others: Vec<Grain>,
+}
+
+impl Start {
+    /// Looks for the lattice in the spectrum.
+    ///
+    /// # Errors
+    /// As [`measure`], but for [`LatticeError::NoPeaks`].
+    pub fn find(
+        image: &Image,
+        geometry: &Geometry,
+        background: Background,
+    ) -> Result<Self, LatticeError> {
+        let prepared = prepare(image, geometry, background)?;
+        Ok(Self::new(prepared, image, geometry, background))
+    }
+
+    /// Looks for a lattice of about the cell `known` (real-space pair, nm), at any orientation.
+    ///
+    /// # Errors
+    /// As [`Start::find`]: [`LatticeError::NoLattice`] where there is none of that size and shape.
+    pub fn find_known(
+        image: &Image,
+        geometry: &Geometry,
+        background: Background,
+        known: &Matrix2<f64>,
+    ) -> Result<Self, LatticeError> {
+        let prepared = known::prepare(image, geometry, background, known)
+            .or_else(|_| rescue::prepare_known_again(image, geometry, background, known))?;
+        Ok(Self::new(prepared, image, geometry, background))
+    }
+
+    /// The same for an image whose lattice hides under tip events and line noise.
+    pub(crate) fn find_again(
+        image: &Image,
+        geometry: &Geometry,
+        background: Background,
+    ) -> Result<Self, LatticeError> {
+        let prepared = rescue::prepare_again(image, geometry, background)?;
+        Ok(Self::new(prepared, image, geometry, background))
+    }
+
+    /// The reciprocal pairs (rad per pixel) that the spectrum proposes, whether they stand out or not.
+    pub(crate) fn proposals(
+        image: &Image,
+        geometry: &Geometry,
+        background: Background,
+    ) -> Vec<Matrix2<f64>> {
+        let flat = remove_background(image, background);
+        let proposed = select::candidates(&Spectrum::new(&flat), &geometry.pixel_to_nm);
+        proposed.into_iter().map(|c| c.pair).collect()
+    }
+
+    /// Starts from a reciprocal pair (rad per pixel) that is known to within half a cycle over the frame.
+    /// `None` where it cannot be measured.
+    pub(crate) fn near(
+        image: &Image,
+        geometry: &Geometry,
+        background: Background,
+        pair: &Matrix2<f64>,
+    ) -> Option<Self> {
+        let flat = remove_background(image, background);
+        let binning = binning(pair);
+        let binned = if binning == 1 {
+            flat.clone()
+        } else {
+            flat.binned(binning)
+        };
+        let (harmonics, peaks) = refine(&binned, &(pair * binning as f64), background)?;
+        let prepared = Prepared {
+            start: reciprocal(&harmonics.pair)?,
+            spectrum: Spectrum::new(&binned),
+            image: flat,
+            binning,
+            harmonics,
+            peaks,
+        };
+        Some(Self::new(prepared, image, geometry, background))
+    }
+
+    fn new(prepared: Prepared, image: &Image, geometry: &Geometry, background: Background) -> Self {
+        Self {
+            prepared,
+            geometry: geometry.clone(),
+            background,
+            size: [image.columns, image.rows],
+            patch: None,
+            mean: None,
+            others: Vec::new(),
+        }
+    }
+
+    /// Whether its harmonics cannot be chance.
+    pub(crate) fn stands_out(&self) -> bool {
+        verdict(&self.prepared.harmonics) == Verdict::Lattice
+    }
+
+    /// The reciprocal pair, rad per pixel.
+    fn pair(&self) -> Matrix2<f64> {
+        self.prepared.harmonics.pair / self.prepared.binning as f64
+    }
+
+    /// The same if the lattice is everywhere in the frame, as far as noise lets that be seen; otherwise its pair and why
+    /// it is none of the whole frame.
+    pub(crate) fn on_the_whole_frame(
+        self,
+        image: &Image,
+    ) -> Result<Self, (Option<Matrix2<f64>>, LatticeError)> {
+        let pair = self.pair();
+        let clipped = cut_off(&self.prepared.image);
+        let Some(settled) = settle(&clipped, &pair, pitch(&self.geometry)) else {
+            return Ok(self);
+        };
+        let patch = &settled.patch;
+        let refused = (Some(pair), LatticeError::NowhereTogether);
+        if patch.share > WHOLE && settled.is_plain() && same(self.size, &patch.pair, &pair) {
+            return self.on_patch(image, settled).ok_or(refused);
+        }
+        Err(refused)
+    }
+
+    /// The lattice of a patch, of the largest grain in it, or its mean.
+    ///
+    /// Where it is everywhere and the same the fit to the pixels measures it, which uses all harmonics.
+    fn on_patch(self, image: &Image, settled: Settled) -> Option<Self> {
+        let everywhere = settled.patch.share > WHOLE;
+        let mean = settled.mean();
+        let changes = mean.as_ref().is_some_and(|mean| mean.change.is_some());
+        let poor = mean.as_ref().is_some_and(Mean::is_poor);
+        let grains = if changes || poor {
+            settled.grains()
+        } else {
+            None
+        };
+        let Some([largest, other]) = grains else {
+            // A cell with many harmonics is none of three waves: on the whole frame the fit to the pixels judges.
+            let told = mean.as_ref().is_some_and(|mean| !mean.is_poor());
+            if !told && !everywhere {
+                return None;
+            }
+            let changes = changes && told;
+            // Where waves change little and in proportion to the place, the fit to the pixels gives their mean.
+            let cells = settled.patch.unit_cells;
+            let gentle = mean.as_ref().is_some_and(|mean| mean.is_gentle(cells));
+            return Some(Self {
+                mean: mean.filter(|_| !everywhere || (changes && !gentle)),
+                patch: (!everywhere).then_some(settled.patch),
+                ..self
+            });
+        };
+        let (geometry, background) = (self.geometry, self.background);
+        let flat = remove_background(&largest.of(image), background);
+        let mut again = settle(&flat, &largest.pair, pitch(&geometry))?;
+        again.patch.share *= largest.share;
+        let part = again.patch.of(image);
+        let start = Self::near(&part, &geometry, background, &again.patch.pair)?;
+        let mut found = start.on_patch(image, again)?;
+        let flat = remove_background(&other.of(image), background);
+        let settled_share = other.share;
+        if let Some(other) = settle(&flat, &other.pair, pitch(&geometry)) {
+            found.others.push(Grain {
+                share: settled_share,
+                waves: other
+                    .mean()
+                    .map_or(other.patch.pair, |mean| mean.waves.basis),
+            });
+        }
+        Some(found)
+    }
+
+    /// Looks for the lattices of parts of the frame, those near `first` among them, and takes the one with the most
+    /// evidence.
+    pub(crate) fn find_patch(
+        image: &Image,
+        geometry: &Geometry,
+        background: Background,
+        first: &[Option<Matrix2<f64>>],
+    ) -> Option<Self> {
+        let flat = cut_off(&remove_background(image, background));
+        let mut best: Option<(f64, Settled, Self)> = None;
+        for settled in patches(&flat, geometry, first) {
+            let patch = &settled.patch;
+            // Outliers hide the waves; the fit to the pixels deals with them by itself.
+            let near = Self::near(&patch.of(&flat), geometry, background, &patch.pair);
+            let Some(start) = near else { continue };
+            let coherent = match verdict(&start.prepared.harmonics) {
+                // A part of the frame is chosen by its waves: they have to be plain to see in it.
+                Verdict::Lattice if patch.share > WHOLE || settled.is_plain() => {
+                    evidence(&start.prepared.harmonics)
+                }
+                _ => 0.0,
+            };
+            let plain = settled.is_plain() && patch.unit_cells > FEWEST_CELLS;
+            let local = if plain {
+                HANN * settled.evidence()
+            } else {
+                0.0
+            };
+            let evidence = f64::max(coherent, local);
+            if evidence > best.as_ref().map_or(0.0, |(most, _, _)| *most) {
+                best = Some((evidence, settled, start));
+            }
+        }
+        let (_, settled, mut start) = best?;
+        start.prepared.image = remove_background(&settled.patch.of(image), background);
+        start.on_patch(image, settled)
+    }
+
+    /// Measures the lattice.
+    ///
+    /// # Errors
+    /// [`LatticeError::NoPeaks`]: the method gets no hold of it.
+    pub fn measure(&self, method: Method) -> Result<MeasuredLattice, LatticeError> {
+        if let (Some(mean), Method::Lattice) = (&self.mean, method) {
+            return self
+                .mean_lattice(mean)
+                .ok_or(LatticeError::NoPeaks { method });
+        }
+        let Prepared {
+            harmonics,
+            spectrum,
+            peaks,
+            start,
+            ..
+        } = &self.prepared;
+        let pixels_per_bin = self.prepared.binning as f64;
+        let in_pixels = |l: Lattice<Px>| l.mapped(&(Matrix2::identity() * pixels_per_bin));
+        let fourier = || fourier::measure(harmonics, peaks, spectrum.image_size).map(in_pixels);
+        let autocorrelation =
+            || autocorrelation::measure(spectrum, harmonics, start).map(in_pixels);
+        let (mut fit, mut published) = (None, None);
+        let (pixels, comparison) = match method {
+            Method::Autocorrelation => (autocorrelation(), fourier()),
+            Method::Fourier => (fourier(), autocorrelation()),
+            Method::Lattice => {
+                fit = fitted(&self.prepared, self.background);
+                (fit.as_ref().map(|(lattice, _)| *lattice), fourier())
+            }
+            Method::Paper => {
+                let image = &self.prepared.image;
+                let found = paper::measure(image, &self.geometry, &(start * pixels_per_bin));
+                published = found.map(|(_, peaks)| peaks);
+                (found.map(|(lattice, _)| lattice), fourier())
+            }
+        };
+        let fit = fit.map(|(_, fit)| fit);
+        let pixels = pixels.ok_or(LatticeError::NoPeaks { method })?;
+        let label = |l: Lattice<Px>| labelled_like(&l, &pixels.basis);
+        let bin_to_nm = self.geometry.pixel_to_nm * pixels_per_bin;
+        Ok(MeasuredLattice {
+            patch: self.patch.clone(),
+            grains: self.others.clone(),
+            change: None,
+            pixels,
+            comparison: comparison.map(label),
+            reciprocal: fit.as_ref().map_or(harmonics.pair / pixels_per_bin, |fit| {
+                fit.wave_vectors.basis
+            }),
+            phases: fit.as_ref().map_or_else(
+                || phases(harmonics, spectrum.image_size),
+                LatticeFit::first_phases,
+            ),
+            middle: middle(spectrum.image_size) * pixels_per_bin
+                + Vector2::repeat((pixels_per_bin - 1.0) / 2.0),
+            shortcut_wavelengths: fourier::shortcut_wavelengths(peaks, &bin_to_nm),
+            periods: self.periods(&pixels),
+            signal_to_noise: fit.as_ref().map_or_else(
+                || signal_to_noise(harmonics)[2],
+                LatticeFit::weakest_signal_to_noise,
+            ),
+            published,
+            fit,
+        })
+    }
+}
+
+impl Start {
+    /// The mean of a lattice that changes.
+    fn mean_lattice(&self, mean: &Mean) -> Option<MeasuredLattice> {
+        let Prepared {
+            harmonics, peaks, ..
+        } = &self.prepared;
+        let bins = self.prepared.binning as f64;
+        let pixels = mean.waves.lattice()?;
+        let fourier = fourier::measure(harmonics, peaks, self.prepared.spectrum.image_size);
+        let bin_to_nm = self.geometry.pixel_to_nm * bins;
+        Some(MeasuredLattice {
+            comparison: fourier
+                .map(|l| labelled_like(&l.mapped(&(Matrix2::identity() * bins)), &pixels.basis)),
+            pixels,
+            patch: self.patch.clone(),
+            grains: self.others.clone(),
+            change: mean.change,
+            reciprocal: mean.waves.basis,
+            phases: Phases {
+                values: mean.phases,
+                covariance: mean.phase_covariance,
+            },
+            middle: mean.middle,
+            shortcut_wavelengths: fourier::shortcut_wavelengths(peaks, &bin_to_nm),
+            periods: self.periods(&pixels),
+            signal_to_noise: mean.signal_to_noise,
+            published: None,
+            fit: None,
+        })
+    }
+
+    /// Periods across the shorter side of the frame, or of the patch.
+    fn periods(&self, pixels: &Lattice<Px>) -> f64 {
+        let size = match &self.patch {
+            Some(patch) => {
+                let [low, high] = patch.corners();
+                high - low
+            }
+            None => Vector2::new(self.size[0] as f64, self.size[1] as f64),
+        };
+        let longest = (0..3)
+            .map(|i| pixels.vector(i))
+            .map(|v| (v.x / size.x).hypot(v.y / size.y));
+        1.0 / longest.fold(0.0, f64::max)
+    }
+}
+
+/// Power over noise of all harmonics that stand out, in sum.
+pub(crate) fn evidence(harmonics: &Harmonics) -> f64 {
+    let all = harmonics.list.iter();
+    let powers = all.map(|harmonic| harmonic.significance(harmonics.window_sums));
+    powers.filter(|power| *power > THIRD).sum()
+}
+
+/// The lattice fitted to the pixels, in pixels.
+pub(crate) fn fitted(
+    prepared: &Prepared,
+    background: Background,
+) -> Option<(Lattice<Px>, LatticeFit)> {
+    let binning = prepared.binning;
+    let start = &prepared.harmonics;
+    let (lattice, fit) = if binning == 1 {
+        fit::measure(&prepared.image, start, background)?
+    } else {
+        fit::measure(&prepared.image.binned(binning), start, background)?
+    };
+    let to_pixels = Matrix2::identity() * binning as f64;
+    Some((lattice.mapped(&to_pixels), fit.in_pixels(binning)))
+}
