@@ -3,6 +3,7 @@
 mod again;
 mod args;
 mod arguments;
+mod by_hand;
 mod export;
 mod hint;
 mod orientation;

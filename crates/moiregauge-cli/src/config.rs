@@ -46,6 +46,13 @@ method = "lattice"
 # (which damages harmonics along the fast axis).
 background = "plane"
 
+# What was told by hand: about two vectors of the lattice (x and y each, nm) or about its mean wavelength, and the parts
+# of each frame to use (corners of polygons, nm from the lower left corner).
+#   [by_hand]
+#   lattice_nm = [[12.1, 0.4], [6.2, 10.5]]
+#   near_nm = 12.0
+#   regions_nm = [[[0.0, 0.0], [250.0, 0.0], [250.0, 400.0]]]
+
 # The layers: a name (graphene, hBN, MoS2, …; `moiregauge moire --list` has them all) or a table
 #   [material]
 #   name = "mine"

@@ -15,4 +15,5 @@ mod survey;
 mod words;
 
 pub(crate) use args::MapArgs;
+pub(crate) use regions::{length, parse_region};
 pub(crate) use run::run;

@@ -13,6 +13,7 @@ use moiregauge::spectrum::Method;
 use moiregauge_report::results::NamedSet;
 use moiregauge_report::{Choice, ColorMap};
 
+use super::by_hand::HandArgs;
 use super::orientation::OrientationArgs;
 use crate::config;
 use crate::input::KnownArgs;
@@ -45,6 +46,7 @@ Examples:
   moiregauge analyze scans/ --out results --layers graphene/hBN --lattice-angle 12.3±0.2
   moiregauge analyze scans/ --out results --atomic atomic_up.spm atomic_down.spm
   moiregauge analyze scans/ --out results --moires 2 --layers graphene,graphene/hBN
+  moiregauge analyze scans/ --out results --near 12nm --region 0,0,250,400
   moiregauge analyze image.npy --out results --size 70nm×70nm --line-rate 4 --frame-direction up
 
 Angles are counter-clockwise, x to the right and y up, as the position sensors tell.")]
@@ -196,6 +198,8 @@ pub(crate) struct AnalyzeArgs {
     #[command(flatten)]
     pub(super) orientation: OrientationArgs,
     #[command(flatten)]
+    by_hand: HandArgs,
+    #[command(flatten)]
     scanner: ScannerArgs,
     #[command(flatten)]
     pub(crate) known: KnownArgs,
@@ -211,6 +215,7 @@ impl AnalyzeArgs {
         let own = config::own_materials(self.materials.as_deref())?;
         self.layers(&mut s, &own)?;
         self.orientation.apply(&mut s);
+        self.by_hand.apply(&mut s)?;
         let by_user = [self.lattice_constant, self.poisson_ratio];
         if by_user.iter().any(Option::is_some) {
             anyhow::ensure!(

@@ -20,6 +20,9 @@ pub(crate) fn advice(error: &InputError) -> Option<String> {
         }
         InputError::Measure(MeasureError::NoSize) => "give the size, as in --size 70nm×70nm",
         InputError::Measure(MeasureError::Lattice { error, .. }) => match error {
+            LatticeError::Contradicted { .. } | LatticeError::NowhereTogether => {
+                "tell which lattice is meant, or where it is: --near WAVELENGTH, --lattice, --region or --mask"
+            }
             LatticeError::NoPeaks { .. } => "try --method fourier",
             LatticeError::FewerLattices { found, .. } => {
                 return Some(format!("--moires {found} measures what is there"));

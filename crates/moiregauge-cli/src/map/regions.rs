@@ -160,7 +160,7 @@ pub(super) fn summary(details: &MapDetailsResult) -> String {
 }
 
 /// A length in nm, with or without a unit.
-fn length(text: &str) -> Option<f64> {
+pub(crate) fn length(text: &str) -> Option<f64> {
     let text = text.trim();
     let nm = text.parse().ok().or_else(|| length_nm(text))?;
     numbers::within([-1e9, 1e9], Some(nm))
@@ -171,7 +171,7 @@ fn named(text: &str) -> Option<(&str, &str)> {
     (!name.trim().is_empty()).then_some((name.trim(), rest))
 }
 
-fn parse_region(text: &str) -> Result<Region, String> {
+pub(crate) fn parse_region(text: &str) -> Result<Region, String> {
     let expected = "expected a name and, in nm, a box or the corners of a polygon, as in bar=10,20,80,40 (lower left \
                     corner, width, height) or 'flake=0,0 100,10 60,80'";
     let (name, rest) = named(text).ok_or(expected)?;

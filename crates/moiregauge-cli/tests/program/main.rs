@@ -1,6 +1,7 @@
 //! The program from outside: what a user types, what comes out, what it says when it cannot.
 
 mod acceptance;
+mod by_hand;
 mod calibration;
 mod campaigns;
 mod common;

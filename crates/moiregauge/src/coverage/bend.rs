@@ -13,9 +13,11 @@ use nalgebra::{DMatrix, Matrix2, Matrix3, Matrix4, Vector2};
 use serde::{Deserialize, Serialize};
 
 use crate::coverage::cells::Cells;
+use crate::coverage::higher;
 use crate::coverage::nodes::{Node, View, nodes};
 use crate::coverage::patch::Patch;
 use crate::coverage::phases::{Basis, Fit, fit, powers, rows};
+use crate::coverage::settle::hollows;
 use crate::numbers::exact;
 use crate::numbers::splines::Splines;
 
@@ -24,6 +26,12 @@ const SPLINES: [usize; 7] = [1, 2, 3, 4, 6, 9, 13];
 
 /// A cell of the splines is at least so many windows wide: what is smaller the window does not see.
 const WINDOWS_PER_CELL: f64 = 2.0;
+
+/// An edge cuts a window off that makes the variance of a phase larger than this, times the least.
+const WHOLE_WINDOW: f64 = 1.5;
+
+/// Fewer nodes than this tell nothing of a lattice. Chosen by eye.
+const FEWEST_INNER: usize = 6;
 
 /// By how much the evidence (BIC) of a lattice that changes has to be better: chance does that once in e¹⁰.
 const BETTER: f64 = 20.0;
@@ -121,6 +129,8 @@ struct Chosen {
     fit: Fit,
     /// By how much its evidence exceeds that for a lattice that is the same everywhere.
     evidence: f64,
+    /// The description that comes next, with more numbers or, where it has the most, with fewer.
+    next: Option<Fit>,
 }
 
 /// The mean over a patch; `None` where its phases cannot be described.
@@ -128,6 +138,18 @@ pub(crate) fn mean(view: &View, patch: &Patch) -> Option<Mean> {
     let nodes = nodes(view, patch);
     let chosen = choose(view, patch, &nodes)?;
     Some(summary(&chosen, &nodes, view, patch))
+}
+
+/// The same without what higher harmonics put into the windows.
+pub(crate) fn refined(view: &View, patch: &Patch) -> Option<Mean> {
+    let rough = choose(view, patch, &nodes(view, patch))?;
+    let parts = higher::parts(view.image, patch, &rough.fit)?;
+    let view = View {
+        image: &parts.first,
+        noise: parts.noise(view.cells, patch, view.width, &hollows(&patch.pair)),
+        ..*view
+    };
+    mean(&view, patch)
 }
 
 /// χ² of the best description of some nodes, its parameters, and the number of independent phases that it describes.
@@ -163,40 +185,55 @@ fn choose(view: &View, patch: &Patch, nodes: &[Node]) -> Option<Chosen> {
             Basis::Splines(Splines::new(frame, size)),
         )
     }));
-    let mut best: Option<(ChangeModel, Fit)> = None;
+    let mut fits: Vec<(ChangeModel, Fit)> = Vec::new();
     for (model, basis) in all {
         if 2 * basis.len() + 1 > nodes.len() {
             break;
         }
-        let Some(fit) = fit(basis, nodes) else {
-            continue;
-        };
-        if best.as_ref().is_none_or(|(_, best)| fit.price < best.price) {
-            best = Some((model, fit));
-        }
+        fits.extend(fit(basis, nodes).map(|fit| (model, fit)));
     }
-    Some(match best {
-        Some((model, fit)) if straight.price - fit.price > BETTER => Chosen {
-            model: Some(model),
-            evidence: straight.price - fit.price,
-            fit,
-        },
-        _ => Chosen {
+    let by_price = |a: &usize, b: &usize| fits[*a].1.price.total_cmp(&fits[*b].1.price);
+    let best = (0..fits.len()).min_by(by_price);
+    let best = best.filter(|best| straight.price - fits[*best].1.price > BETTER);
+    let Some(best) = best else {
+        return Some(Chosen {
             model: None,
             fit: straight,
             evidence: 0.0,
-        },
+            next: None,
+        });
+    };
+    let beside = if best + 1 < fits.len() {
+        Some(best + 1)
+    } else {
+        best.checked_sub(1)
+    };
+    let mut fits: Vec<_> = fits.into_iter().map(Some).collect();
+    let (model, chosen) = fits[best].take()?;
+    let next = beside.and_then(|i| fits[i].take());
+    Some(Chosen {
+        model: Some(model),
+        evidence: straight.price - chosen.price,
+        fit: chosen,
+        next: next.map(|(_, fit)| fit),
     })
 }
 
-fn summary(chosen: &Chosen, nodes: &[Node], view: &View, patch: &Patch) -> Mean {
-    let cells = view.cells;
-    let fit = &chosen.fit;
-    let reach = Vector2::from_fn(|axis, _| view.width * view.cells.period[axis]);
+/// The slopes of ψ₁ and ψ₂ over a patch.
+struct Slopes {
+    /// Their means as sums over the coefficients, a row each.
+    sums: DMatrix<f64>,
+    /// Their means, a column each.
+    mean: Matrix2<f64>,
+    /// Those of each cell, with its pixels.
+    local: Vec<(f64, Matrix2<f64>)>,
+    /// Pixels of the patch.
+    pixels: f64,
+}
+
+fn slopes(fit: &Fit, cells: &Cells, patch: &Patch) -> Slopes {
     let n = fit.basis.len();
-    let size = fit.coefficients.len();
-    // Mean slopes of ψ₁ and ψ₂ as sums over the coefficients, and how they spread.
-    let mut sums = DMatrix::zeros(4, size);
+    let mut sums = DMatrix::zeros(4, fit.coefficients.len());
     let mut local = Vec::new();
     let mut pixels = 0.0;
     for cell in (0..cells.len()).filter(|&c| patch.inside[c]) {
@@ -215,11 +252,56 @@ fn summary(chosen: &Chosen, nodes: &[Node], view: &View, patch: &Patch) -> Mean 
         pixels += count;
     }
     sums /= pixels;
-    let step = &sums * &fit.coefficients;
-    let step = Matrix2::from_column_slice(step.as_slice());
+    let mean = &sums * &fit.coefficients;
+    Slopes {
+        mean: Matrix2::from_column_slice(mean.as_slice()),
+        sums,
+        local,
+        pixels,
+    }
+}
+
+/// What the mean owes to the choice of the description: by how much the next one differs, or, where the lattice is the same everywhere,
+/// the nodes whose windows no edge cuts off.
+fn doubt(chosen: &Chosen, nodes: &[Node], view: &View, patch: &Patch) -> Matrix4<f64> {
+    let inner = || {
+        let least = nodes.iter().map(|n| n.gain).fold(f64::INFINITY, f64::min);
+        let inner: Vec<Node> = (nodes.iter())
+            .filter(|node| node.gain < WHOLE_WINDOW * least)
+            .cloned()
+            .collect();
+        let enough = inner.len() >= FEWEST_INNER && inner.len() < nodes.len();
+        enough.then(|| fit(powers(patch, 1), &inner)).flatten()
+    };
+    let again = if chosen.model.is_none() {
+        inner()
+    } else {
+        None
+    };
+    let Some(other) = chosen.next.as_ref().or(again.as_ref()) else {
+        return Matrix4::zeros();
+    };
+    let mean = |fit: &Fit| slopes(fit, view.cells, patch).mean;
+    let off = mean(other) - mean(&chosen.fit);
+    let off = nalgebra::Vector4::from_column_slice(off.as_slice());
+    off * off.transpose()
+}
+
+fn summary(chosen: &Chosen, nodes: &[Node], view: &View, patch: &Patch) -> Mean {
+    let cells = view.cells;
+    let fit = &chosen.fit;
+    let reach = Vector2::from_fn(|axis, _| view.width * view.cells.period[axis]);
+    let size = fit.coefficients.len();
+    let Slopes {
+        sums,
+        mean: step,
+        local,
+        pixels,
+    } = slopes(fit, cells, patch);
     let covariance = fit.covariance(&sums, nodes, reach);
     let covariance = Matrix4::from_column_slice(covariance.as_slice());
-    let covariance = covariance + edges(fit, cells, patch, &step);
+    let covariance =
+        covariance + edges(fit, cells, patch, &step) + doubt(chosen, nodes, view, patch);
     let pair = patch.pair + step;
     let middle = patch.middle(cells);
     let mut at_middle = DMatrix::zeros(3, size);

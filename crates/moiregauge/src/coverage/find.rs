@@ -19,12 +19,17 @@ pub(crate) const WHOLE: f64 = 0.95;
 /// Lattices with less than this share of the power of the strongest one are its harmonics, or skirts. Chosen by eye.
 const WORTH: f64 = 0.1;
 
+/// ... and so are those that hold less than this share of its power, however little noise there is: an edge leaks some hundredths of an
+/// amplitude into a window, on a strip of the frame.
+const LEAK: f64 = 1e-3;
+
 /// The patches, the strongest first, on which the lattices settle that the spectra of the frame and of its tiles propose. `flat`: without
-/// background.
+/// background; `is_meant`: whether a pair may be the lattice that is looked for.
 pub(crate) fn patches(
     flat: &Image,
     geometry: &Geometry,
-    first: &[Option<Matrix2<f64>>],
+    first: Option<Matrix2<f64>>,
+    is_meant: &dyn Fn(&Matrix2<f64>) -> bool,
 ) -> Vec<Settled> {
     let of = |spectrum: &Spectrum| {
         let found = select::candidates(spectrum, &geometry.pixel_to_nm);
@@ -33,13 +38,13 @@ pub(crate) fn patches(
     let size = [flat.columns, flat.rows];
     let whole = std::iter::once_with(|| of(&Spectrum::new(flat)));
     let tiles = tiles::spectra(flat).map(|spectrum| of(&spectrum));
-    let given = first.iter().copied().flatten().collect();
+    let given = first.into_iter().collect();
     let mut found: Vec<Settled> = Vec::new();
     let mut tried: Vec<Matrix2<f64>> = Vec::new();
     let all = std::iter::once(given).chain(whole).chain(tiles);
     for (stage, proposed) in all.enumerate() {
         for pair in proposed {
-            if tried.iter().any(|other| same(size, other, &pair)) {
+            if !is_meant(&pair) || tried.iter().any(|other| same(size, other, &pair)) {
                 continue;
             }
             tried.push(pair);
@@ -47,7 +52,7 @@ pub(crate) fn patches(
                 continue;
             };
             let known = |other: &Settled| same(size, &other.patch.pair, &settled.patch.pair);
-            if !found.iter().any(known) {
+            if is_meant(&settled.patch.pair) && !found.iter().any(known) {
                 found.push(settled);
             }
         }
@@ -57,6 +62,8 @@ pub(crate) fn patches(
             break;
         }
     }
+    let strongest = found.iter().map(Settled::power).fold(0.0, f64::max);
+    found.retain(|settled| settled.power() > LEAK * strongest);
     found.sort_by(|a, b| b.evidence().total_cmp(&a.evidence()));
     let most = found.first().map_or(0.0, Settled::evidence);
     found.retain(|settled| settled.evidence() > WORTH * most);

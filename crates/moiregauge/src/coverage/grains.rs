@@ -5,12 +5,13 @@
 //! and if the data pay for two (BIC) against the best of these.
 
 use nalgebra::Vector4;
+use rustfft::num_complex::Complex64;
 
 use crate::coverage::bend::{described, described_as_straight};
 use crate::coverage::cells::Cells;
 use crate::coverage::nodes::{Node, View, information, neighbours, nodes};
 use crate::coverage::patch::Patch;
-use crate::coverage::phases::price;
+use crate::coverage::phases::{Fit, fit, powers, price, rows, value};
 use crate::numbers::median::median;
 
 /// Rounds of means and nearest means. Chosen by eye.
@@ -24,31 +25,39 @@ const BETTER: f64 = 20.0;
 /// were below 0.9 of it, those of two grains above 2.
 const MISFIT: f64 = 1.5;
 
+/// Rounds of fits to both grains and of nodes given to the nearer one. Chosen by eye.
+const REFINED: usize = 4;
+
+/// Phases that are off by more than this from both lattices (rad, root mean square of three) are of neither: by chance those of
+/// three waves that have nothing to do with a lattice are nearer once in ten.
+const NEITHER: f64 = 0.8;
+
 /// The patches of two grains, the larger first; `None` where one lattice describes all of the patch as well.
 pub(crate) fn split(view: &View, patch: &Patch) -> Option<[Patch; 2]> {
     let all = nodes(view, patch);
     if all.len() < 2 * FEWEST_NODES {
         return None;
     }
-    let second = halves(&all)?;
-    // Windows of nodes at the boundary see both.
-    let mut apart = vec![true; all.len()];
-    for (a, b) in neighbours(&all) {
-        if second[a] != second[b] {
-            apart[a] = false;
-            apart[b] = false;
+    let mut owner: Vec<Option<usize>> = halves(&all)?
+        .into_iter()
+        .map(|second| Some(usize::from(second)))
+        .collect();
+    for _ in 0..REFINED {
+        let parts = [0, 1].map(|which| part(&all, &owner, Some(which)));
+        if parts.iter().any(|p| p.len() < FEWEST_NODES) {
+            return None;
         }
+        let fits = parts.map(|part| fit(powers(patch, 1), &part));
+        let [Some(a), Some(b)] = fits else {
+            return None;
+        };
+        owner = all.iter().map(|node| nearer(node, [&a, &b])).collect();
     }
-    let part = |wanted: &dyn Fn(bool) -> bool| -> Vec<Node> {
-        let nodes = all.iter().zip(second.iter().zip(&apart));
-        let chosen = nodes.filter(|(_, (which, apart))| **apart && wanted(**which));
-        chosen.map(|(node, _)| node.clone()).collect()
-    };
-    let parts = [part(&|second| !second), part(&|second| second)];
+    let parts = [0, 1].map(|which| part(&all, &owner, Some(which)));
     if parts.iter().any(|p| p.len() < FEWEST_NODES) {
         return None;
     }
-    let one = described(view, patch, &part(&|_| true))?;
+    let one = described(view, patch, &part(&all, &owner, None))?;
     if one[0] < MISFIT * information(&all) {
         return None;
     }
@@ -60,11 +69,41 @@ pub(crate) fn split(view: &View, patch: &Patch) -> Option<[Patch; 2]> {
     if price(one[0], one[1], one[2]) - two < BETTER {
         return None;
     }
-    let mut patches = [false, true].map(|which| grain(view.cells, patch, &all, &second, which));
+    let mut patches = [0, 1].map(|which| grain(view.cells, patch, &all, &owner, which));
     if patches[1].unit_cells > patches[0].unit_cells {
         patches.swap(0, 1);
     }
     Some(patches)
+}
+
+/// The nodes of one grain, or of both, but for those beside a node of another or of none: their windows see both.
+fn part(all: &[Node], owner: &[Option<usize>], which: Option<usize>) -> Vec<Node> {
+    let mut apart = vec![true; all.len()];
+    for (a, b) in neighbours(all) {
+        if owner[a] != owner[b] {
+            apart[a] = false;
+            apart[b] = false;
+        }
+    }
+    let wanted = |i: &usize| {
+        apart[*i] && owner[*i].is_some_and(|own| which.is_none_or(|which| which == own))
+    };
+    let chosen = (0..all.len()).filter(wanted);
+    chosen.map(|i| all[i].clone()).collect()
+}
+
+/// To which of two lattices the phases at a node belong; `None` where they are neither's.
+fn nearer(node: &Node, fits: [&Fit; 2]) -> Option<usize> {
+    let misses = fits.map(|fit| {
+        let rows = rows(&fit.basis, node.at).into_iter().enumerate();
+        let squares = rows.map(|(wave, row)| {
+            let turn = Complex64::cis(-value(&row, &fit.coefficients));
+            (node.envelopes[wave] * turn).arg().powi(2)
+        });
+        (squares.sum::<f64>() / 3.0).sqrt()
+    });
+    let which = usize::from(misses[1] < misses[0]);
+    (misses[which] < NEITHER).then_some(which)
 }
 
 /// Which nodes belong to the second of two lattices, by their slopes.
@@ -157,7 +196,13 @@ fn filtered(nodes: &[Node], slopes: &[Option<Vector4<f64>>]) -> Vec<Option<Vecto
 }
 
 /// The cells whose nearest nodes all belong to one grain.
-fn grain(cells: &Cells, patch: &Patch, nodes: &[Node], second: &[bool], which: bool) -> Patch {
+fn grain(
+    cells: &Cells,
+    patch: &Patch,
+    nodes: &[Node],
+    owner: &[Option<usize>],
+    which: usize,
+) -> Patch {
     let mut inside = vec![false; patch.inside.len()];
     let scale = cells.period;
     for cell in (0..inside.len()).filter(|&c| patch.inside[c]) {
@@ -166,16 +211,15 @@ fn grain(cells: &Cells, patch: &Patch, nodes: &[Node], second: &[bool], which: b
             let d = node.at - at;
             (d.x / scale[0]).hypot(d.y / scale[1])
         };
-        let mut nearest = [f64::INFINITY; 2];
-        for (node, s) in nodes.iter().zip(second) {
-            let least = &mut nearest[usize::from(*s)];
+        let (mut own, mut other) = (f64::INFINITY, f64::INFINITY);
+        for (node, owner) in nodes.iter().zip(owner) {
+            let least = if *owner == Some(which) {
+                &mut own
+            } else {
+                &mut other
+            };
             *least = least.min(distance(node));
         }
-        let [own, other] = if which {
-            [nearest[1], nearest[0]]
-        } else {
-            nearest
-        };
         // Two periods off the middle between nodes of both: windows see one grain alone there.
         inside[cell] = own < other && other > 2.0;
     }

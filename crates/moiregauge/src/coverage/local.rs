@@ -16,6 +16,8 @@ const MOST: f64 = 4.0;
 
 /// The envelopes of K₁, K₂ and K₂ − K₁ at a place, and the variance that white noise of unit power per pixel gives each.
 pub(crate) struct Local {
+    /// The middle of what the window sees, pixels: beside an edge that is not its own middle.
+    pub(crate) at: Vector2<f64>,
     pub(crate) envelopes: [Complex64; 3],
     pub(crate) noise: [f64; 3],
 }
@@ -32,6 +34,13 @@ pub(crate) fn local(
     let cells = cells.of_part(part);
     let window = cells.window(width);
     let wave = |[h, k]: [i32; 2]| pair * Vector2::new(f64::from(h), f64::from(k));
+    let places = (0..cells.len()).map(|cell| {
+        let (at, count) = (cells.middle_of(cell), cells.counts()[cell]);
+        Complex64::new(at.x, at.y) * count
+    });
+    let places = cells.summed(&places.collect::<Vec<_>>(), &window);
+    let counts = cells.counts().iter().map(|n| Complex64::from(*n));
+    let counts = cells.summed(&counts.collect::<Vec<_>>(), &window);
     let ones = part
         .values
         .iter()
@@ -75,7 +84,9 @@ pub(crate) fn local(
         let solution = inverse * right;
         let larger = [1, 2, 3].map(|a| (inverse[(a, a)] * gram[(0, 0)]).re);
         let usable = larger.iter().all(|l| *l > 0.0 && *l < MOST);
+        let middle = places[at[n]] / counts[at[n]].re;
         usable.then(|| Local {
+            at: Vector2::new(middle.re, middle.im),
             envelopes: [1, 2, 3].map(|a| solution[a]),
             noise: larger.map(|l| l * window.noise[at[n]]),
         })

@@ -10,6 +10,7 @@ pub(crate) mod cells;
 pub(crate) mod find;
 pub(crate) mod finer;
 pub(crate) mod grains;
+pub(crate) mod higher;
 pub(crate) mod local;
 pub(crate) mod nodes;
 pub(crate) mod patch;

@@ -31,6 +31,7 @@ pub(crate) struct View<'a> {
 /// One place where the phases are read.
 #[derive(Clone)]
 pub(crate) struct Node {
+    /// Where the phases hold: the middle of what the window sees, pixels.
     pub(crate) at: Vector2<f64>,
     /// Position on the grid of nodes.
     pub(crate) place: [usize; 2],
@@ -41,6 +42,8 @@ pub(crate) struct Node {
     pub(crate) share: f64,
     /// Standard deviation of the phases; that of nodes beside each other is correlated.
     pub(crate) errors: [f64; 3],
+    /// Variance that white noise gives the envelope of the first wave: larger where an edge cuts the window off.
+    pub(crate) gain: f64,
 }
 
 /// The nodes of a patch at which the three waves can be told apart.
@@ -76,17 +79,22 @@ pub(crate) fn nodes(view: &View, patch: &Patch) -> Vec<Node> {
         .collect();
     let seen = local(cells, &patch.of(view.image), &patch.pair, view.width, &at);
     let all = places.into_iter().zip(seen);
-    all.filter_map(|((place, cell), local)| {
-        let Local { envelopes, noise } = local?;
+    all.filter_map(|((place, _), local)| {
+        let Local {
+            at,
+            envelopes,
+            noise,
+        } = local?;
         let errors =
             [0, 1, 2].map(|i| (view.noise[i] * noise[i] / (2.0 * envelopes[i].norm_sqr())).sqrt());
         Some(Node {
-            at: cells.middle(cell),
+            at,
             place,
             envelopes,
             weights: errors.map(|e| share / (e * e)),
             share,
             errors,
+            gain: noise[0],
         })
     })
     .collect()

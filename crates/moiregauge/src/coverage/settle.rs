@@ -8,7 +8,7 @@
 use nalgebra::{Matrix2, Vector2};
 use rustfft::num_complex::Complex64;
 
-use crate::coverage::bend::{Mean, mean};
+use crate::coverage::bend::{Mean, mean, refined};
 use crate::coverage::cells::{Cells, Window};
 use crate::coverage::grains::split;
 use crate::coverage::nodes::View;
@@ -170,6 +170,14 @@ impl Settled {
         self.seen.evidence(&self.cells, &self.inner)
     }
 
+    /// Power of its waves over the patch, in sum.
+    pub(crate) fn power(&self) -> f64 {
+        let waves = self.seen.weights.iter().zip(&self.seen.noise);
+        waves.map(|(weight, noise)| weight * noise).sum::<f64>()
+            * self.seen.windows(&self.cells, &self.inner)
+            / (self.bins * self.bins) as f64
+    }
+
     /// The patches of two grains where it is no single lattice, the larger first.
     pub(crate) fn grains(&self) -> Option<[Patch; 2]> {
         let grains = split(&self.view(), &self.inner)?;
@@ -179,6 +187,11 @@ impl Settled {
     /// The mean of its lattice; `None` where its phases cannot be described.
     pub(crate) fn mean(&self) -> Option<Mean> {
         Some(mean(&self.view(), &self.inner)?.in_pixels(self.bins))
+    }
+
+    /// The same without what higher harmonics put into the windows.
+    pub(crate) fn refined(&self) -> Option<Mean> {
+        Some(refined(&self.view(), &self.inner)?.in_pixels(self.bins))
     }
 }
 
@@ -190,7 +203,7 @@ fn waves(pair: &Matrix2<f64>) -> [Vector2<f64>; 3] {
 
 /// Two places for each wave where noise stands and nothing else: of the same frequency along the lines, since the noise of a scan is a
 /// function of time, and as far from all waves as can be.
-fn hollows(pair: &Matrix2<f64>) -> [[Vector2<f64>; 2]; 3] {
+pub(crate) fn hollows(pair: &Matrix2<f64>) -> [[Vector2<f64>; 2]; 3] {
     let inverse = pair.try_inverse().unwrap_or_else(Matrix2::zeros);
     let length = pair.determinant().abs().sqrt();
     let clearance = |q: &Vector2<f64>| {

@@ -9,6 +9,7 @@ pub(crate) mod image;
 pub(crate) mod lag;
 pub(crate) mod loops;
 pub(crate) mod plane;
+pub(crate) mod polygon;
 pub(crate) mod resample;
 pub(crate) mod sensors;
 

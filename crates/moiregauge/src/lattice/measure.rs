@@ -44,7 +44,7 @@ pub fn measure(
         return Ok(found);
     }
     // Another part of the frame explains it, or it is something else beside the lattice.
-    let another = Start::find_patch(image, geometry, background, &[Some(pair)])
+    let another = Start::find_patch(image, geometry, background, Some(pair))
         .and_then(|start| start.measure(method).ok())
         .filter(|other| beside(other).is_none_or(|wave| !is_stronger(other, &wave)));
     match another {
@@ -121,7 +121,7 @@ fn find_anywhere(
     if first.is_none() && !matches!(error, LatticeError::NoLattice { .. }) {
         return Err(error);
     }
-    match Start::find_patch(image, geometry, background, &[first]) {
+    match Start::find_patch(image, geometry, background, first) {
         Some(found) => Ok(found),
         None if method == Method::Lattice => {
             Start::find_again(image, geometry, background).map_err(|_| error)

@@ -5,6 +5,7 @@
 //! vectors are mapped; nothing is resampled (but by the published method, for reproduction).
 
 pub(crate) mod autocorrelation;
+pub(crate) mod by_hand;
 pub(crate) mod fit;
 pub(crate) mod fourier;
 pub(crate) mod measure;

@@ -185,11 +185,9 @@ impl Start {
                 return None;
             }
             let changes = changes && told;
-            // Where waves change little and in proportion to the place, the fit to the pixels gives their mean.
-            let cells = settled.patch.unit_cells;
-            let gentle = mean.as_ref().is_some_and(|mean| mean.is_gentle(cells));
+            let mean = mean.filter(|_| !everywhere || changes);
             return Some(Self {
-                mean: mean.filter(|_| !everywhere || (changes && !gentle)),
+                mean: mean.map(|rough| settled.refined().unwrap_or(rough)),
                 patch: (!everywhere).then_some(settled.patch),
                 ..self
             });
@@ -214,17 +212,31 @@ impl Start {
         Some(found)
     }
 
-    /// Looks for the lattices of parts of the frame, those near `first` among them, and takes the one with the most
+    /// Looks for the lattices of parts of the frame, that near `first` among them, and takes the one with the most
     /// evidence.
     pub(crate) fn find_patch(
         image: &Image,
         geometry: &Geometry,
         background: Background,
-        first: &[Option<Matrix2<f64>>],
+        first: Option<Matrix2<f64>>,
+    ) -> Option<Self> {
+        Self::find_meant(image, geometry, background, first, &|_| true)
+    }
+
+    /// The same among those lattices that are meant. Where much of the frame is missing the lattice is one of a part.
+    pub(crate) fn find_meant(
+        image: &Image,
+        geometry: &Geometry,
+        background: Background,
+        first: Option<Matrix2<f64>>,
+        is_meant: &dyn Fn(&Matrix2<f64>) -> bool,
     ) -> Option<Self> {
         let flat = cut_off(&remove_background(image, background));
+        let there = image.values.iter().filter(|v| v.is_finite()).count();
+        let recorded = there as f64 / image.values.len() as f64;
         let mut best: Option<(f64, Settled, Self)> = None;
-        for settled in patches(&flat, geometry, first) {
+        for mut settled in patches(&flat, geometry, first, is_meant) {
+            settled.patch.share *= recorded;
             let patch = &settled.patch;
             // Outliers hide the waves; the fit to the pixels deals with them by itself.
             let near = Self::near(&patch.of(&flat), geometry, background, &patch.pair);

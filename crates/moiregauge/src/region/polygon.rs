@@ -2,6 +2,7 @@
 
 use nalgebra::{Rotation2, Vector2};
 
+use crate::frame::polygon;
 use crate::map::sample::Grid;
 
 /// An area of a map with a name.
@@ -40,30 +41,19 @@ impl Region {
         }
     }
 
-    /// Its sides.
-    fn sides(&self) -> impl Iterator<Item = (Vector2<f64>, Vector2<f64>)> {
-        let next = self.corners.iter().cycle().skip(1);
-        self.corners.iter().copied().zip(next.copied())
-    }
-
     /// Area, nm².
     pub fn area(&self) -> f64 {
-        let twice: f64 = self.sides().map(|(a, b)| a.perp(&b)).sum();
-        (twice / 2.0).abs()
+        polygon::area(&self.corners)
     }
 
     /// Whether a place lies within, by the even-odd rule.
     pub fn contains(&self, place: Vector2<f64>) -> bool {
-        let crossings = self.sides().filter(|(a, b)| {
-            (a.y > place.y) != (b.y > place.y)
-                && place.x < a.x + (place.y - a.y) / (b.y - a.y) * (b.x - a.x)
-        });
-        crossings.count() % 2 == 1
+        polygon::contains(&self.corners, place)
     }
 
     /// Whether two sides cross or touch that are no neighbours.
     pub fn crosses_itself(&self) -> bool {
-        let sides: Vec<_> = self.sides().collect();
+        let sides: Vec<_> = polygon::sides(&self.corners).collect();
         let side = |a: Vector2<f64>, b: Vector2<f64>, p: Vector2<f64>| (b - a).perp(&(p - a));
         let apart = |(a, b), (c, d)| {
             side(a, b, c) * side(a, b, d) > 0.0 || side(c, d, a) * side(c, d, b) > 0.0

@@ -1,6 +1,6 @@
 //! One scan: geometry, timing and lattice of each of its lines, trace and retrace.
 
-use nalgebra::Matrix2;
+use nalgebra::{Matrix2, Vector2};
 use spmfile::{Channel, FrameDirection, Scan};
 
 use crate::calibration::Calibration;
@@ -8,6 +8,8 @@ use crate::caveat::Caveat;
 use crate::caveat::files::FileDoubt;
 use crate::frame::geometry::Geometry;
 use crate::frame::image::Image;
+use crate::frame::polygon;
+use crate::lattice::by_hand::{Meant, measure_by_hand};
 use crate::lattice::measure::measure;
 use crate::lattice::measured::MeasuredLattice;
 use crate::lattice::several::together::measure_several;
@@ -25,6 +27,7 @@ use crate::scan::place::Place;
 use crate::scan::positions::pitch_sigma;
 use crate::scan::scanner::about_calibration;
 use crate::scan::shared::correlation;
+use crate::settings::by_hand::ByHand;
 use crate::settings::knobs::Settings;
 use crate::spectrum::error::LatticeError;
 
@@ -78,7 +81,12 @@ pub fn measure_moires(
         return Err(problem.into());
     }
     let (background, method) = (settings.background, settings.method);
+    let told = &settings.by_hand;
     let find = |image: &Image, geometry: &Geometry| match settings.moires {
+        0 | 1 if !told.is_nothing() => {
+            let lattice = measure_by_hand(image, geometry, background, method, meant(told))?;
+            Ok(vec![lattice])
+        }
         0 | 1 => measure(image, geometry, background, method).map(|lattice| vec![lattice]),
         n => measure_several(image, geometry, background, n),
     };
@@ -207,6 +215,7 @@ fn measure_line(
     let (speeds, speed_error) = place.speeds();
     let mut image = image_of(channel);
     let pixels = Fingerprint::of(&image);
+    leave_out(&mut image, scan.size_nm, &settings.by_hand)?;
     interrupt::check();
     let mut lines_after = 0;
     if let Some(window) = window {
@@ -250,6 +259,54 @@ fn measure_line(
         }
     });
     Ok(lines.collect())
+}
+
+fn meant(told: &ByHand) -> Meant {
+    match (told.lattice(), told.near_nm) {
+        (Some(basis), _) => Meant::Vectors(basis),
+        (None, Some(near)) => Meant::Wavelength(near),
+        (None, None) => Meant::Any,
+    }
+}
+
+/// Takes the pixels out that are not to be used.
+fn leave_out(
+    image: &mut Image,
+    size_nm: Option<[f64; 2]>,
+    told: &ByHand,
+) -> Result<(), MeasureError> {
+    let (columns, rows) = (image.columns, image.rows);
+    if let Some(mask) = &told.mask {
+        if (mask.columns, mask.rows) != (columns, rows) {
+            return Err(MeasureError::OtherMask {
+                mask: [mask.columns, mask.rows],
+                image: [columns, rows],
+            });
+        }
+        for (value, used) in image.values.iter_mut().zip(mask.used()) {
+            if !used {
+                *value = f64::NAN;
+            }
+        }
+    }
+    if told.regions_nm.is_empty() {
+        return Ok(());
+    }
+    let size = size_nm.ok_or(MeasureError::NoSize)?;
+    let regions: Vec<Vec<Vector2<f64>>> = (told.regions_nm.iter())
+        .map(|corners| corners.iter().map(|c| Vector2::from(*c)).collect())
+        .collect();
+    for (i, value) in image.values.iter_mut().enumerate() {
+        let middle = Vector2::new((i % columns) as f64 + 0.5, (i / columns) as f64 + 0.5);
+        let place = Vector2::new(
+            middle.x * size[0] / columns as f64,
+            middle.y * size[1] / rows as f64,
+        );
+        if !regions.iter().any(|r| polygon::contains(r, place)) {
+            *value = f64::NAN;
+        }
+    }
+    Ok(())
 }
 
 fn about_lattice(

@@ -175,6 +175,17 @@ pub enum MeasureError {
     /// Nothing is left of the frame.
     #[error("the scans have no region in common: this one lies outside the others")]
     NoOverlap,
+    /// A mask for images of another size.
+    #[error(
+        "the mask has {} × {} pixels (columns × rows), the image {} × {}",
+        mask[0], mask[1], image[0], image[1]
+    )]
+    OtherMask {
+        /// Columns and rows of the mask.
+        mask: [usize; 2],
+        /// Those of the image.
+        image: [usize; 2],
+    },
     /// The image shows no lattice.
     #[error("{line} of {channel:?}: {error}")]
     Lattice {

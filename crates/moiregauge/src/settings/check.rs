@@ -70,6 +70,10 @@ impl Settings {
                 )
             },
         )?;
+        none(self.by_hand.problem(), "by_hand")?;
+        ensure(moires == 1 || !self.by_hand.says_which(), "by_hand", || {
+            format!("a lattice can be told by hand where there is one moiré, found {moires}")
+        })?;
         none(self.material.problem(), "material")?;
         self.check_moire_layers()?;
         let clock = self.frame_time_sigma_s;

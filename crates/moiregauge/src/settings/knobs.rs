@@ -5,6 +5,7 @@ use heterostrain::strain::{KnownOrientation, StrainConvention, TwistSense};
 use serde::{Deserialize, Serialize};
 
 use crate::frame::background::Background;
+use crate::settings::by_hand::ByHand;
 use crate::spectrum::method::Method;
 
 /// Which line directions are used.
@@ -101,6 +102,9 @@ pub struct Settings {
     pub method: Method,
     /// What is subtracted beforehand.
     pub background: Background,
+    /// What was told by hand: which lattice is meant, and where it is.
+    #[serde(skip_serializing_if = "ByHand::is_nothing")]
+    pub by_hand: ByHand,
     /// The layers: both, or the upper one (layer 2) where there is a `substrate`.
     pub material: Material,
     /// How many moirés every image shows; each is fitted with the others taken off.
@@ -212,6 +216,7 @@ impl Default for Settings {
             line: Lines::Both,
             method: Method::Lattice,
             background: Background::Plane,
+            by_hand: ByHand::default(),
             material: Material::graphene(),
             moires: 1,
             substrate: None,

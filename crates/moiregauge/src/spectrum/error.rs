@@ -46,6 +46,11 @@ pub enum LatticeError {
         /// Its period, nm.
         period: f64,
     },
+    /// The lattice that was told by hand is not there.
+    #[error(
+        "no lattice like the one that was told stands out of the noise in the part of the image that is used"
+    )]
+    NotThere,
     /// The lattice shows in the spectrum, but this method gets no hold of it.
     #[error(
         "the spectrum shows a lattice, but the {method:?} method finds too few of its peaks: noise \

@@ -1,0 +1,102 @@
+//! What the eye knows better than the search: the options for it.
+
+use std::path::PathBuf;
+
+use anyhow::Context as _;
+use moiregauge::settings::Settings;
+use moiregauge_pipeline::read_mask;
+use nalgebra::Vector2;
+
+use crate::map::{length, parse_region};
+
+/// The options for it.
+#[derive(clap::Args, Clone, Debug, Default)]
+#[command(next_help_heading = "By hand: which lattice is meant, and where it is")]
+pub(crate) struct HandArgs {
+    /// About two vectors of the lattice, as the results give them: x and y of the first, x and y of the second; nm, or with a
+    /// unit. Of several lattices this one is measured; 5 % off and 3° will do
+    #[arg(long, value_name = "L1X,L1Y,L2X,L2Y", value_parser = parse_lattice, allow_hyphen_values = true, conflicts_with = "near")]
+    lattice: Option<[[f64; 2]; 2]>,
+    /// About the mean wavelength of the lattice (12nm): of several lattices this one is measured; 15 % off will do
+    #[arg(long, value_name = "WAVELENGTH", value_parser = parse_length)]
+    near: Option<f64>,
+    /// Use this part of each frame only: a box, as lower left corner, width and height, or the corners of a polygon apart by
+    /// blanks ('0,0 100,10 60,80'); nm from the lower left corner of the frame, along the lines and across them, or with a
+    /// unit; may be repeated, all parts are used
+    #[arg(long, value_name = "X,Y,W,H", value_parser = parse_part, allow_hyphen_values = true)]
+    region: Vec<Vec<[f64; 2]>>,
+    /// Use the pixels of each frame only that are not black in this picture, or above zero in this array, of the same size
+    #[arg(long, value_name = "FILE")]
+    mask: Option<PathBuf>,
+}
+
+impl HandArgs {
+    /// Puts them on top of the settings.
+    ///
+    /// # Errors
+    /// The mask cannot be read.
+    pub(super) fn apply(&self, settings: &mut Settings) -> anyhow::Result<()> {
+        let told = &mut settings.by_hand;
+        if self.lattice.is_some() {
+            (told.lattice_nm, told.near_nm) = (self.lattice, None);
+        }
+        if self.near.is_some() {
+            (told.lattice_nm, told.near_nm) = (None, self.near);
+        }
+        told.regions_nm.extend(self.region.iter().cloned());
+        if let Some(path) = &self.mask {
+            let mask = read_mask(path);
+            told.mask =
+                Some(mask.with_context(|| format!("cannot read the mask {}", path.display()))?);
+        }
+        Ok(())
+    }
+}
+
+fn parse_lattice(text: &str) -> Result<[[f64; 2]; 2], String> {
+    let numbers: Option<Vec<f64>> = text.split(',').map(length).collect();
+    match numbers.as_deref() {
+        Some(&[ax, ay, bx, by]) => Ok([[ax, ay], [bx, by]]),
+        _ => Err("expected two vectors in nm, as in 12.1,0.4,6.2,10.5".to_owned()),
+    }
+}
+
+fn parse_length(text: &str) -> Result<f64, String> {
+    length(text)
+        .filter(|nm| *nm > 0.0)
+        .ok_or_else(|| "expected a wavelength in nm, as in 12nm".to_owned())
+}
+
+fn parse_part(text: &str) -> Result<Vec<[f64; 2]>, String> {
+    let named = format!("part={text}");
+    let region = parse_region(&named).map_err(|error| {
+        error
+            .replace("a name and, in nm, a box", "in nm a box")
+            .replace("bar=", "")
+            .replace("flake=", "")
+    })?;
+    Ok(region
+        .corners
+        .iter()
+        .map(|c: &Vector2<f64>| [c.x, c.y])
+        .collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn vectors_and_parts() {
+        assert_eq!(
+            parse_lattice("12.1,-0.4,6.2nm,0.0105um"),
+            Ok([[12.1, -0.4], [6.2, 10.5]])
+        );
+        assert!(parse_lattice("12,0,6").is_err());
+        assert_eq!(parse_part("1,2,3,4").unwrap()[0], [1.0, 2.0]);
+        assert_eq!(parse_part("0,0 4,0 0,2").unwrap().len(), 3);
+        let error = parse_part("1,2,3").unwrap_err();
+        assert!(error.contains("expected in nm a box"), "{error}");
+        assert!(parse_length("0").is_err() && parse_length("1.2um") == Ok(1200.0));
+    }
+}
