@@ -1,18 +1,10 @@
 //! The page of constants says of each the value that the sources have.
 
+mod sources;
+
 use std::path::{Path, PathBuf};
 
-/// All sources below a folder.
-fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
-    for entry in std::fs::read_dir(folder).expect("a folder") {
-        let path = entry.expect("an entry").path();
-        if path.is_dir() {
-            sources(&path, found);
-        } else if path.extension().is_some_and(|e| e == "rs") {
-            found.push(path);
-        }
-    }
-}
+use sources::sources;
 
 /// The values of all definitions of a constant in a source.
 fn values<'a>(text: &'a str, name: &str) -> impl Iterator<Item = &'a str> {
@@ -37,9 +29,8 @@ fn is_at(source: &Path, place: &str) -> bool {
 fn the_page_has_the_values_of_the_sources() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let page = std::fs::read_to_string(root.join("../../docs/constants.md")).expect("the page");
-    let mut all = Vec::new();
-    sources(&root.join("src"), &mut all);
-    sources(&root.join("../heterostrain/src"), &mut all);
+    let mut all = sources(&root.join("src"));
+    all.extend(sources(&root.join("../heterostrain/src")));
     let texts: Vec<(&PathBuf, String)> = all
         .iter()
         .map(|path| (path, std::fs::read_to_string(path).expect("a source")))

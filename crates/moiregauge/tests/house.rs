@@ -1,6 +1,10 @@
 //! The rooms of the core stand on floors: each takes from those below it, never from those above.
 
-use std::path::{Path, PathBuf};
+mod sources;
+
+use std::path::Path;
+
+use sources::sources;
 
 /// From the top floor down, as in DESIGN.md.
 const FLOORS: [&[&str]; 13] = [
@@ -26,18 +30,6 @@ fn floor(room: &str) -> usize {
     })
 }
 
-/// All sources below a folder.
-fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
-    for entry in std::fs::read_dir(folder).expect("a folder") {
-        let path = entry.expect("an entry").path();
-        if path.is_dir() {
-            sources(&path, found);
-        } else if path.extension().is_some_and(|e| e == "rs") {
-            found.push(path);
-        }
-    }
-}
-
 /// The rooms that the code of a source names, but for its tests and comments.
 fn named(text: &str) -> Vec<&str> {
     let code = text.split("#[cfg(test)]\nmod").next().unwrap_or_default();
@@ -58,8 +50,7 @@ fn named(text: &str) -> Vec<&str> {
 #[test]
 fn no_room_takes_from_one_above_it() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
-    let mut all = Vec::new();
-    sources(&root, &mut all);
+    let all = sources(&root);
     let (mut seen, mut wrong) = (0, Vec::new());
     for path in all.iter().filter(|path| !path.ends_with("tests.rs")) {
         let inside = path

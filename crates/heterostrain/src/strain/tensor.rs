@@ -92,6 +92,10 @@ pub struct Split {
 
 /// Every reading of a moiré lattice for one orientation, the best one first: see the module.
 ///
+/// For layers of one shape these are the readings of one name of the lattice: that of [`Bilayer::waves`], else the least
+/// strained one, which strain can make another than that of the atoms (from 0.46 of the twist on for hexagonal layers,
+/// from 0.23 for the 1T′ phase of `WTe₂`).
+///
 /// The covariance holds that of the lattice and of the orientation, taken as independent.
 ///
 /// # Errors
@@ -146,7 +150,7 @@ pub fn strain_tensors<'a>(
     Ok(found)
 }
 
-/// For similar layers other names are other orientations; for different ones they are tried.
+/// For similar layers the name that is given, or the least strained one; for different ones all near the shortest pair.
 fn names_to_try(lattice: &Lattice, layers: &Layers) -> Result<Vec<Labelled>, StrainError> {
     let named = labelled(lattice, layers)?;
     if layers.ratio().is_some() {

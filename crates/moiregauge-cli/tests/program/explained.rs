@@ -1,9 +1,13 @@
 //! What caveats mean: `moiregauge explain`, its page, and that there are no others.
 
+#[path = "../../../moiregauge/tests/sources/mod.rs"]
+mod sources;
+
 use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
+use self::sources::sources;
 use crate::common::{program, run, succeed};
 
 fn explain(options: &[&str]) -> String {
@@ -92,7 +96,7 @@ fn codes_stand_in_the_table_alone() {
         "moiregauge-pipeline",
         "moiregauge-cli",
     ] {
-        sources(&root().join("crates").join(part).join("src"), &mut files);
+        files.extend(sources(&root().join("crates").join(part).join("src")));
     }
     assert!(files.len() > 100, "{}", files.len());
     let codes = codes();
@@ -106,17 +110,6 @@ fn codes_stand_in_the_table_alone() {
         for code in codes.iter().filter(|code| code.contains('-')) {
             let quoted = format!("\"{code}\"");
             assert!(!text.contains(&quoted), "{}: {code}", file.display());
-        }
-    }
-}
-
-fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
-    for entry in std::fs::read_dir(folder).expect("a folder") {
-        let path = entry.expect("an entry").path();
-        if path.is_dir() {
-            sources(&path, found);
-        } else if path.extension().is_some_and(|e| e == "rs") {
-            found.push(path);
         }
     }
 }

@@ -15,7 +15,7 @@ const MISSING: &str = "#d55e00";
 
 pub(super) fn draw(subject: &MapSubject) -> Result<Drawing, String> {
     let domains = subject.details.domains.as_ref();
-    let domains = domains.ok_or("no domains were looked for or found (--domains)")?;
+    let domains = domains.ok_or("no domains were looked for or found")?;
     let degree = 1f64.to_degrees();
     let twists: Vec<f64> = domains
         .cells

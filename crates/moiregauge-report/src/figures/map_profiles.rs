@@ -17,7 +17,7 @@ type Value = fn(&ProfileValues) -> Estimate;
 pub(super) fn draw(subject: &MapSubject) -> Result<Drawing, String> {
     let profiles = &subject.details.profiles;
     if profiles.is_empty() {
-        return Err("no line was asked for (--profile)".to_owned());
+        return Err("no line was asked for".to_owned());
     }
     let grid = Grid {
         width: COLUMN,

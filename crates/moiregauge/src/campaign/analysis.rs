@@ -94,6 +94,7 @@ pub struct SetAnalysis {
 
 /// Errors from the scatter of the scans, to compare with those that are stated.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct Checks {
     /// From leaving out one scan at a time (jackknife); `None` for fewer than four scans.
     pub leave_one_out: Option<Scatter>,
@@ -103,6 +104,7 @@ pub struct Checks {
 
 /// One standard deviation of each quantity.
 #[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
 pub struct Scatter {
     /// Drift velocity along x and y, nm/s.
     pub drift: [f64; 2],
@@ -114,6 +116,7 @@ pub struct Scatter {
 
 /// How a scan lies against the fit of all others of its set.
 #[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
 pub struct Residual {
     /// χ² of its wave vectors and phases against what the others predict.
     pub chi2: f64,
@@ -205,6 +208,7 @@ pub struct Drift {
 
 /// The terms of a joint fit that earned their place, and what they came to.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct JointTerms {
     /// Whether phases link the frames.
     pub phases: bool,
@@ -278,6 +282,7 @@ pub struct ScanAnalysis {
 
 /// When a frame was taken, and where the sample was.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Motion {
     /// Time of the middle of the frame, s from an origin that all scans share.
     pub middle: f64,
@@ -317,6 +322,7 @@ pub struct LineAnalysis {
 
 /// The orientation of a layer by its atomic lattice.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct AtomicOrientation {
     /// The files.
     pub files: Vec<String>,

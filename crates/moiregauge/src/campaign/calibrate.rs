@@ -68,6 +68,7 @@ pub struct Calibrated {
 
 /// What one set says.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct CalibratedSet {
     /// Its name.
     pub name: String,

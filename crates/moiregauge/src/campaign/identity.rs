@@ -36,12 +36,12 @@ fn noise(line: &MeasuredLine) -> f64 {
 /// Whether two scans hold the same data.
 pub(crate) fn same(a: &MeasuredScan, b: &MeasuredScan) -> bool {
     let both = |a: &MeasuredLine, b: &MeasuredLine| {
-        let difference = a
-            .pixels
-            .difference(&b.pixels)
-            .filter(|_| a.line == b.line)?;
+        if a.line != b.line {
+            return None;
+        }
         let noise = noise(a).min(noise(b));
-        (difference < ROUNDING.max(OF_NOISE * noise)).then_some((difference, noise))
+        let limit = ROUNDING.max(OF_NOISE * noise);
+        Some((a.pixels.difference(&b.pixels, limit)?, noise))
     };
     let pairs = a
         .lines

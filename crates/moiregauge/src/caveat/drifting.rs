@@ -85,6 +85,7 @@ pub enum DriftDoubt {
 
 /// How dates contradict a line rate. Times are in s, rates in lines per second.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum FrameDates {
     /// Frames follow each other faster than their lines.
     #[error(

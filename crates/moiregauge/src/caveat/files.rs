@@ -54,6 +54,7 @@ pub enum FileDoubt {
 
 /// Which of several images was taken, where nobody said which.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum ImageChoice {
     /// The first of several of one channel.
     #[error(
@@ -82,6 +83,7 @@ pub enum ImageChoice {
 
 /// Why a channel was taken.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum ChannelReason {
     /// These channels, which come before it, show no lattice.
     #[error("is analysed, since no scan shows a lattice in {0}")]

@@ -121,6 +121,7 @@ pub enum LatticeDoubt {
 
 /// A grain beside the one that is measured.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct OtherGrain {
     /// Its share of the frame.
     pub share: f64,
@@ -144,6 +145,7 @@ fn listed(all: &[OtherGrain]) -> String {
 
 /// How trace and retrace differ. Wavelengths are in nm.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum LineDifference {
     /// They show different lattices.
     #[error(

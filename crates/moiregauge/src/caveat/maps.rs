@@ -98,6 +98,7 @@ pub enum MapDoubt {
 
 /// What a map shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Mapped {
     /// Lattices.
     Lattice,
@@ -107,6 +108,7 @@ pub enum Mapped {
 
 /// What was done about the drift of a large image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum SurveyDrift {
     /// It was taken off.
     #[error("corrected for the drift that was given")]

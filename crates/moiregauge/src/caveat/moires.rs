@@ -67,6 +67,7 @@ pub enum MoireDoubt {
 
 /// Why layers make no such lattice.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum Impossible {
     /// Its period is beyond that of aligned layers.
     #[error(
@@ -100,6 +101,7 @@ pub enum Impossible {
 
 /// Why a period may be that of something else.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum PeriodDoubt {
     /// A surface has it.
     #[error(

@@ -109,6 +109,7 @@ pub enum OrientationDoubt {
     "{} ± {} with a mean strain of {:+.4} %",
     degrees(.twist.value), degrees(.twist.sigma), 100.0 * .strain
 )]
+#[non_exhaustive]
 pub struct SenseNumbers {
     /// The twist, rad.
     pub twist: Estimate,

@@ -104,6 +104,7 @@ pub enum ReadingDoubt {
 /// Twist and strain of a lattice under one name of its vectors.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error("{} with {:.3} % of strain", degrees(*.twist), 100.0 * .strain)]
+#[non_exhaustive]
 pub struct NumbersOfName {
     /// The twist, rad.
     pub twist: f64,
@@ -113,6 +114,7 @@ pub struct NumbersOfName {
 
 /// What 0.1 % of isotropic strain does to the twist.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum TwistShift {
     /// It leaves none.
     #[error("no twist at all goes with 0.1 % of isotropic strain")]

@@ -87,6 +87,7 @@ pub enum SetDoubt {
 
 /// Which scans scatter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Scattered {
     /// Those of a set of moirés.
     Moires,
@@ -101,6 +102,7 @@ pub enum Scattered {
      of different samples or places, or something else was taken for the lattice in some",
     by_how_much(*.apart)
 )]
+#[non_exhaustive]
 pub struct DifferentSamples {
     /// How many lattices.
     pub count: usize,

@@ -38,6 +38,7 @@ const BETTER: f64 = 20.0;
 
 /// How a lattice changes across its patch.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct Change {
     /// What describes it.
     pub model: ChangeModel,

@@ -9,6 +9,7 @@ use crate::numbers::exact;
 
 /// The part of a frame that carries a lattice.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct Patch {
     /// The mean waves over it, rad per pixel.
     #[serde(with = "exact")]

@@ -14,6 +14,7 @@ use crate::frame::geometry::Geometry;
 
 /// A triangle on the sample.
 #[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
 pub struct DomainCell {
     /// Its nodes.
     pub nodes: [usize; 3],
@@ -27,6 +28,7 @@ pub struct DomainCell {
 
 /// The domain structure on the sample, nm.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct DomainMap {
     /// Places of the nodes.
     pub nodes: Vec<Vector2<f64>>,

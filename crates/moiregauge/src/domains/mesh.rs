@@ -21,6 +21,7 @@ const FEW: usize = 6;
 
 /// A triangle of neighbouring nodes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct MeshTriangle {
     /// Its nodes, counter-clockwise in pixels (columns right, rows up).
     pub nodes: [usize; 3],
@@ -30,6 +31,7 @@ pub struct MeshTriangle {
 
 /// A line along which the lattice does not close.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Dislocation {
     /// The middle of the hole in the mesh around it, pixels.
     pub place: Vector2<f64>,
@@ -39,6 +41,7 @@ pub struct Dislocation {
 
 /// Nodes connected.
 #[derive(Clone, Debug, Default)]
+#[non_exhaustive]
 pub struct Mesh {
     /// Triangles that are cells of the lattice.
     pub triangles: Vec<MeshTriangle>,

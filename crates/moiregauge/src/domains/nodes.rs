@@ -56,6 +56,7 @@ pub enum Contrast {
 
 /// A node in the image.
 #[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
 pub struct FoundNode {
     /// Where (column, row), pixels.
     pub place: Vector2<f64>,
@@ -67,6 +68,7 @@ pub struct FoundNode {
 
 /// The nodes of an image. All places share one offset, that of the mean node: edges do not know it.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct FoundNodes {
     /// From the bottom to the top, from left to right.
     pub nodes: Vec<FoundNode>,

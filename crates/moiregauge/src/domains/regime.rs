@@ -30,6 +30,7 @@ pub enum RegimeChoice {
 
 /// Which regime applies, and what says so.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Regime {
     /// What is to be used.
     pub choice: RegimeChoice,

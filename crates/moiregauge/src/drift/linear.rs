@@ -26,6 +26,7 @@ pub struct Observation {
 
 /// Lattice and drift common to all observations.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct DriftSolution {
     /// Lattice free of drift, nm; its covariance includes that of the drift.
     pub lattice: Lattice,

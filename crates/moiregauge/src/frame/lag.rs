@@ -13,6 +13,7 @@ use nalgebra::{DMatrix, DVector, Vector2};
 
 use crate::frame::image::Image;
 use crate::frame::plane::fit_plane;
+use crate::numbers::least_squares::{lowest, residual, solve};
 use crate::numbers::median::median;
 
 /// Fewer columns show nothing: the decay takes a tenth of a line, which would be three of them.
@@ -99,7 +100,7 @@ fn search(image: &Image, used: &Range<usize>) -> Option<(Lag, f64, f64)> {
             let design = with_bend(&smooth, columns, from_last);
             residual(&design, &line).unwrap_or(f64::INFINITY)
         };
-        let columns = best_decay(&left, SLOWEST * used.len() as f64);
+        let columns = lowest(left, [SHORTEST, SLOWEST * used.len() as f64], STEPS);
         let chi2 = left(columns);
         if best.is_none_or(|(least, ..)| chi2 < least) {
             best = Some((chi2, columns, from_last));
@@ -143,27 +144,6 @@ fn bend(
         slope_nm,
         slope_variance: slopes.dot(&(of_bend * slopes)) + model * model,
     })
-}
-
-/// The decay that leaves least: the best of a logarithmic grid, then golden sections about it.
-fn best_decay(left: &dyn Fn(f64) -> f64, longest: f64) -> f64 {
-    let ratio = (longest / SHORTEST).powf(1.0 / STEPS as f64);
-    let grid = (0..=STEPS).map(|i| SHORTEST * ratio.powi(i as i32));
-    let best = grid
-        .map(|c| (left(c), c))
-        .min_by(|a, b| a.0.total_cmp(&b.0));
-    let middle = best.map_or(SHORTEST, |(_, c)| c);
-    let (mut low, mut high) = (middle / ratio, middle * ratio);
-    let golden = 0.618_034;
-    for _ in 0..30 {
-        let (a, b) = (high - golden * (high - low), low + golden * (high - low));
-        if left(a) < left(b) {
-            high = b;
-        } else {
-            low = a;
-        }
-    }
-    f64::midpoint(low, high)
 }
 
 /// Median of each column about the plane of the sensor, nm, and the variance that noise gives it; `None` where a column has
@@ -229,17 +209,6 @@ fn with_bend(smooth: &DMatrix<f64>, columns: f64, from_last: bool) -> DMatrix<f6
 fn with_column(mut matrix: DMatrix<f64>, place: usize, column: &DVector<f64>) -> DMatrix<f64> {
     matrix.set_column(place, column);
     matrix
-}
-
-/// Least squares.
-fn solve(design: &DMatrix<f64>, line: &DVector<f64>) -> Option<DVector<f64>> {
-    let normal = (design.transpose() * design).cholesky()?;
-    Some(normal.solve(&(design.transpose() * line)))
-}
-
-/// Sum of the squares that least squares leave.
-fn residual(design: &DMatrix<f64>, line: &DVector<f64>) -> Option<f64> {
-    Some((line - design * solve(design, line)?).norm_squared())
 }
 
 /// Slope of the straight line through the values.

@@ -17,6 +17,7 @@ use spmfile::LineDirection;
 use crate::frame::image::Image;
 use crate::frame::lag::{FEWEST, FIRST_ORDER_TO, IMPROVEMENT, Lag, SHARE, SLOWEST, slope};
 use crate::frame::plane::fit_plane;
+use crate::numbers::least_squares::{lowest, residual, solve};
 use crate::numbers::median::median;
 
 /// A bend that is faster than this share of what single lines show is left to them.
@@ -191,25 +192,7 @@ impl Fit {
     fn best(&self, left: impl Fn(&Self, f64) -> Option<f64>) -> f64 {
         let left = |columns: f64| left(self, columns).unwrap_or(f64::INFINITY);
         let (low, high) = (0.02 * self.lens.len() as f64, 1.2 * self.lens.len() as f64);
-        let ratio = (high / low).powf(1.0 / STEPS as f64);
-        let grid = (0..=STEPS).map(|i| low * ratio.powi(i as i32));
-        let best = grid
-            .map(|columns| (left(columns), columns))
-            .min_by(|a, b| a.0.total_cmp(&b.0));
-        let middle = best.map_or(low, |(_, columns)| columns);
-        let (mut low, mut high) = (middle / ratio, middle * ratio);
-        for _ in 0..30 {
-            let (a, b) = (
-                high - 0.618_034 * (high - low),
-                low + 0.618_034 * (high - low),
-            );
-            if left(a) < left(b) {
-                high = b;
-            } else {
-                low = a;
-            }
-        }
-        f64::midpoint(low, high)
+        lowest(left, [low, high], STEPS)
     }
 }
 
@@ -278,15 +261,6 @@ fn parabola(count: usize) -> DMatrix<f64> {
         let u = (2.0 * c as f64 + 1.0 - count as f64) / count as f64;
         u.powi(degree as i32)
     })
-}
-
-fn solve(design: &DMatrix<f64>, line: &DVector<f64>) -> Option<DVector<f64>> {
-    let normal = (design.transpose() * design).cholesky()?;
-    Some(normal.solve(&(design.transpose() * line)))
-}
-
-fn residual(design: &DMatrix<f64>, line: &DVector<f64>) -> Option<f64> {
-    Some((line - design * solve(design, line)?).norm_squared())
 }
 
 #[cfg(test)]

@@ -27,6 +27,7 @@ const ON_EDGE: f64 = 1e-9;
 
 /// An image on a square grid along the laboratory axes.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct Resampled {
     /// The image; points outside the frame and beside missing pixels are NaN.
     pub image: Image,

@@ -20,6 +20,7 @@ const TURN_AROUND: f64 = 0.1;
 
 /// The geometry by the sensors, and how well a plane describes them.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct SensorGeometry {
     /// The affine map.
     pub geometry: Geometry,

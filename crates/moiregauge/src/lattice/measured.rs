@@ -13,6 +13,7 @@ use crate::spectrum::phases::Phases;
 
 /// A grain beside the one that is measured.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct Grain {
     /// Its share of the frame.
     #[serde(with = "exact")]

@@ -22,6 +22,7 @@ const PEAK_HALF_WIDTH: f64 = 1.5;
 
 /// Peaks of the autocorrelation as published: each for itself, not made to close.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct PublishedPeaks {
     /// Three of the six peaks, about 60° apart; the others are their opposites. Pixels (columns, rows).
     #[serde(with = "exact")]

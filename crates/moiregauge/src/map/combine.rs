@@ -21,6 +21,7 @@ use crate::window::mask::Mask;
 
 /// How well maps agree.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Agreement {
     /// χ² per degree of freedom of the single maps about their average, over all nodes that two or more cover.
     pub chi2_per_dof: f64,
@@ -331,3 +332,6 @@ fn average(views: &[View], place: Vector2<f64>) -> (LatticeNode, f64, usize) {
     };
     (node, chi2.sum(), COMPONENTS * (good.len() - 1))
 }
+
+#[cfg(test)]
+mod tests;

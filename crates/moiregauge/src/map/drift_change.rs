@@ -17,6 +17,7 @@ const MORE_THAN_CHANCE: f64 = 9.21;
 
 /// How the change of drift differs between upward and downward frames.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct DriftChange {
     /// `A_up − A_down` along x and y, nm/s².
     pub acceleration: [Estimate; 2],

@@ -23,6 +23,7 @@ const COHERENT: f64 = 0.7;
 
 /// How far a map stood from where the others have the pattern.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Registration {
     /// What was taken off its places, along x and y, nm.
     pub shift: [Estimate; 2],

@@ -63,6 +63,7 @@ impl Grid {
 
 /// A local lattice on the sample.
 #[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
 pub struct LatticeNode {
     /// Whether it is to be believed.
     pub mask: Mask,
@@ -102,6 +103,7 @@ impl LatticeNode {
 
 /// Local lattices on the sample, in nm.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct LatticeMap {
     /// Where the nodes are.
     pub grid: Grid,

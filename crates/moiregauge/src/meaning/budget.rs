@@ -79,6 +79,7 @@ impl Source {
 
 /// Variances that one source, or several together, bring about; NaN where they are not known.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Contribution {
     /// Covariance of `(θ, α, E₁, E₂)`.
     pub covariance: Matrix4<f64>,

@@ -48,6 +48,7 @@ pub enum Standing {
 
 /// One name of the lattice.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct NameReading {
     /// Which waves.
     pub name: LatticeName,
@@ -61,6 +62,7 @@ pub struct NameReading {
 
 /// All names and the choice among them.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Naming {
     /// The reported one first, then the least strained ones.
     pub names: Vec<NameReading>,

@@ -14,6 +14,7 @@ use crate::settings::knobs::Settings;
 
 /// All that a lattice can mean.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct Readings {
     /// Whether the layers differ, so that twist and strain trade at first order.
     pub layers_differ: bool,

@@ -19,6 +19,7 @@ const ROUNDING: f64 = 1e-6;
 
 /// The strain tensor for the orientation that is known.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct TensorReading {
     /// The best reading; its covariance holds noise, drift, sensors and the orientation.
     pub best: StrainTensor,
@@ -42,6 +43,7 @@ pub struct TensorReading {
 
 /// The reading for one sense of the twist.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct SenseReading {
     /// Its covariance holds noise, drift, sensors and the orientation.
     pub found: StrainTensor,

@@ -1,9 +1,10 @@
-//! Small mathematics that every room needs: χ², the median, normal equations, random numbers, words for numbers; the way out of
+//! Small mathematics that every room needs: χ², the median, least squares, normal equations, random numbers, words for numbers; the way out of
 //! a calculation that nobody wants any more.
 
 pub(crate) mod chi2;
 pub(crate) mod exact;
 pub mod interrupt;
+pub(crate) mod least_squares;
 pub(crate) mod median;
 pub(crate) mod normal_equations;
 pub(crate) mod rng;

@@ -2,14 +2,6 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-/// Adds the square of a row of a design matrix to the normal matrix. Rows are mostly zeros; leaving these out changes no
-/// bit of the sum.
-pub(crate) fn add_square(normal: &mut DMatrix<f64>, row: &DVector<f64>) {
-    for (j, value) in row.iter().enumerate().filter(|(_, v)| **v != 0.0) {
-        normal.column_mut(j).axpy(*value, row, 1.0);
-    }
-}
-
 /// A scaled and factored normal matrix.
 pub(crate) struct NormalEquations {
     factor: Cholesky<f64, Dyn>,
@@ -34,11 +26,7 @@ impl NormalEquations {
 
     /// One over the square root of what each parameter has on the diagonal; 1 for those that nothing sees.
     pub(crate) fn units(normal: &DMatrix<f64>) -> DVector<f64> {
-        Self::units_of(&normal.diagonal())
-    }
-
-    /// The same for a diagonal.
-    pub(crate) fn units_of(diagonal: &DVector<f64>) -> DVector<f64> {
+        let diagonal = normal.diagonal();
         diagonal.map(|d| if d > 0.0 { 1.0 / d.sqrt() } else { 1.0 })
     }
 

@@ -27,6 +27,7 @@ use crate::spectrum::phases::Phases;
 
 /// The smallest possible standard errors of a set.
 #[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
 pub struct Bound {
     /// Of the drift along x and y, nm/s.
     pub drift: [f64; 2],

@@ -43,6 +43,7 @@ impl DeviceSearch {
 
 /// An area for a device.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct Device {
     /// Centre, nm.
     pub centre: Vector2<f64>,

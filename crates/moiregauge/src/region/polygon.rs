@@ -85,3 +85,6 @@ impl Region {
         (0..grid.len()).filter_map(of_node).collect()
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -9,6 +9,7 @@ use crate::window::mask::Mask;
 
 /// Values along a line, as far as the map reaches.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct Profile {
     /// What the user calls it.
     pub name: String,
@@ -21,6 +22,7 @@ pub struct Profile {
 /// The map at a point of a line, between its nodes (bilinear). The errors of points nearer than the window
 /// are not independent.
 #[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
 pub struct ProfilePoint {
     /// From the start of the line, nm.
     pub distance: f64,
@@ -34,6 +36,7 @@ pub struct ProfilePoint {
 
 /// What a profile shows.
 #[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
 pub struct ProfileValues {
     /// θ, rad.
     pub twist: Estimate,

@@ -15,6 +15,7 @@ use crate::window::mask::Mask;
 /// `var(mean) = ⟨σ²⟩ Σ w_i w_j ρ_ij`, and the expected square scatter about the mean is
 /// `v + ⟨σ²⟩(1 − Σ w_i w_j ρ_ij)` with v that of the quantity itself.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct RegionMean {
     /// Mean over the area of the good nodes.
     pub mean: f64,
@@ -204,6 +205,7 @@ fn curvature(map: &TwistStrainMap, nodes: &[(usize, f64)]) -> Vec<(usize, f64)> 
 /// A region of a map in numbers. Errors are those of image noise and of what the window smooths; what all nodes have in
 /// common (drift, calibration, lattice constant, model) is not in them.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct RegionStatistics {
     /// The region.
     pub region: Region,

@@ -22,6 +22,7 @@ const REACH: f64 = 1.0;
 
 /// A plane through a quantity of a map.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Trend {
     /// Change per nm along x and along y.
     pub gradient: [Estimate; 2],

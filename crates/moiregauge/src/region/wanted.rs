@@ -23,6 +23,7 @@ pub struct WantedTwist {
 
 /// Shares of an area, 0 to 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct WantedArea {
     /// Good nodes that it is about.
     pub nodes: usize,

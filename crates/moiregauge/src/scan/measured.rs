@@ -18,6 +18,7 @@ use crate::spectrum::error::LatticeError;
 
 /// What the pixels of one scan gave.
 #[derive(Clone, Debug, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct MeasuredScan {
     /// The file as the user named it.
     pub file: String,

@@ -18,22 +18,40 @@ pub(crate) enum Bend {
         amplitude: Vector2<f64>,
         middle: Vector2<f64>,
     },
-    /// Bent in the plane like a beam along e with the curvature κ: with `s` along e and `t` across,
-    /// `u = κ (−s t, (s² + ν t²)/2)`: the twist is κ s, the strain −κ t along e and νκ t across.
-    Beam {
-        direction: Vector2<f64>,
-        curvature: f64,
-        poisson_ratio: f64,
-        middle: Vector2<f64>,
-    },
-    /// Stretched along e more and more: `u = g ((s² + ν t²)/2, −ν s t)`: the strain is g s along e and −νg s across, the
-    /// twist −νg t.
-    Pull {
-        direction: Vector2<f64>,
-        growth: f64,
-        poisson_ratio: f64,
-        middle: Vector2<f64>,
-    },
+    /// Bent in the plane like a beam with the curvature κ as rate: `u = κ (−s t, (s² + ν t²)/2)`; the twist is κ s, the
+    /// strain −κ t along e and νκ t across.
+    Beam(Growth),
+    /// Stretched along e more and more: `u = g ((s² + ν t²)/2, −ν s t)` with the rate g; the strain is g s along e and
+    /// −νg s across, the twist −νg t.
+    Pull(Growth),
+}
+
+/// What grows evenly from the middle on, with `s` along the direction e and `t` across.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Growth {
+    direction: Vector2<f64>,
+    /// 1/nm.
+    rate: f64,
+    poisson_ratio: f64,
+    middle: Vector2<f64>,
+}
+
+impl Growth {
+    /// `(s, t)` and ν.
+    fn place(&self, at: Vector2<f64>) -> (f64, f64, f64) {
+        let (s, t) = components(at - self.middle, self.direction);
+        (s, t, self.poisson_ratio)
+    }
+
+    /// A displacement along and across, both over the rate.
+    fn displacement(&self, along: f64, over: f64) -> Vector2<f64> {
+        (self.direction * along + across(self.direction) * over) * self.rate
+    }
+
+    /// The matrix of the axes (direction, across), over the rate, in those of the laboratory.
+    fn gradient(&self, own: Matrix2<f64>) -> Matrix2<f64> {
+        turned(own * self.rate, self.direction)
+    }
 }
 
 impl Bend {
@@ -47,6 +65,12 @@ impl Bend {
         let direction = || Vector2::new(angle().cos(), angle().sin());
         let middle = reference.centre;
         let wave = || std::f64::consts::TAU / feature.value("wavelength");
+        let growth = |change: f64| Growth {
+            direction: direction(),
+            rate: change / reference.side(),
+            poisson_ratio,
+            middle,
+        };
         Some(match feature.class.as_str() {
             // The twist is half the curl: ½ u k cos, with a shear of the same size.
             "twist-wave" => Self::Wave {
@@ -62,18 +86,8 @@ impl Bend {
                 amplitude: direction() * feature.value("amplitude") / 100.0 / wave(),
                 middle,
             },
-            "twist-gradient" => Self::Beam {
-                direction: direction(),
-                curvature: feature.value("change").to_radians() / reference.side(),
-                poisson_ratio,
-                middle,
-            },
-            "strain-gradient" => Self::Pull {
-                direction: direction(),
-                growth: feature.value("change") / 100.0 / reference.side(),
-                poisson_ratio,
-                middle,
-            },
+            "twist-gradient" => Self::Beam(growth(feature.value("change").to_radians())),
+            "strain-gradient" => Self::Pull(growth(feature.value("change") / 100.0)),
             _ => return None,
         })
     }
@@ -87,27 +101,13 @@ impl Bend {
                 amplitude,
                 middle,
             } => amplitude * (wave.dot(&(at - middle)) + phase).sin(),
-            Self::Beam {
-                direction,
-                curvature,
-                poisson_ratio,
-                middle,
-            } => {
-                let (s, t) = components(at - middle, direction);
-                let along = -s * t;
-                let over = 0.5 * (s * s + poisson_ratio * t * t);
-                (direction * along + across(direction) * over) * curvature
+            Self::Beam(growth) => {
+                let (s, t, nu) = growth.place(at);
+                growth.displacement(-s * t, 0.5 * (s * s + nu * t * t))
             }
-            Self::Pull {
-                direction,
-                growth,
-                poisson_ratio,
-                middle,
-            } => {
-                let (s, t) = components(at - middle, direction);
-                let along = 0.5 * (s * s + poisson_ratio * t * t);
-                let over = -poisson_ratio * s * t;
-                (direction * along + across(direction) * over) * growth
+            Self::Pull(growth) => {
+                let (s, t, nu) = growth.place(at);
+                growth.displacement(0.5 * (s * s + nu * t * t), -nu * s * t)
             }
         }
     }
@@ -121,26 +121,13 @@ impl Bend {
                 amplitude,
                 middle,
             } => amplitude * wave.transpose() * (wave.dot(&(at - middle)) + phase).cos(),
-            Self::Beam {
-                direction,
-                curvature,
-                poisson_ratio,
-                middle,
-            } => {
-                let (s, t) = components(at - middle, direction);
-                let own = Matrix2::new(-t, -s, s, poisson_ratio * t) * curvature;
-                turned(own, direction)
+            Self::Beam(growth) => {
+                let (s, t, nu) = growth.place(at);
+                growth.gradient(Matrix2::new(-t, -s, s, nu * t))
             }
-            Self::Pull {
-                direction,
-                growth,
-                poisson_ratio,
-                middle,
-            } => {
-                let (s, t) = components(at - middle, direction);
-                let nu = poisson_ratio;
-                let own = Matrix2::new(s, nu * t, -nu * t, -nu * s) * growth;
-                turned(own, direction)
+            Self::Pull(growth) => {
+                let (s, t, nu) = growth.place(at);
+                growth.gradient(Matrix2::new(s, nu * t, -nu * t, -nu * s))
             }
         }
     }

@@ -80,6 +80,7 @@ const WAVE_PHASE: Key = key(
     [0.0, 360.0],
     TURN,
 );
+const WAVE_HEIGHT: Key = key("amplitude", "°", 1.0, [0.5, 2.0], [0.0, 1000.0]);
 const WAVELENGTH: Key = key("wavelength", "nm", 125.0, [80.0, 250.0], [1.0, 1e6]);
 
 /// All classes.
@@ -361,7 +362,7 @@ pub const CLASSES: [SampleClass; 22] = [
         "ripples",
         "irregular ripples around one direction and wavelength",
         &[
-            key("amplitude", "°", 1.0, [0.5, 2.0], [0.0, 1000.0]),
+            WAVE_HEIGHT,
             key("wavelength", "nm", 12.0, [6.0, 25.0], [0.1, 1e6]),
             key(
                 "spread",
@@ -377,7 +378,7 @@ pub const CLASSES: [SampleClass; 22] = [
         "stripes",
         "a perfect wave with harmonics",
         &[
-            key("amplitude", "°", 1.0, [0.5, 2.0], [0.0, 1000.0]),
+            WAVE_HEIGHT,
             key("wavelength", "nm", 10.0, [6.0, 25.0], [0.1, 1e6]),
             key(
                 "sharpness",

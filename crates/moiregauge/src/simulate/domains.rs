@@ -11,6 +11,7 @@ use crate::numbers::rng;
 
 /// Nodes, walls and noise.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct DomainScene {
     /// Columns and rows.
     pub size: [usize; 2],

@@ -10,6 +10,7 @@ use crate::simulate::error::SimulateError;
 
 /// A class of the table [`CLASSES`] and the numbers that differ from the usual ones.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[non_exhaustive]
 pub struct SampleFeature {
     /// Name of the class.
     pub class: String,

@@ -11,6 +11,7 @@ use crate::simulate::surface::Surface;
 
 /// The truth about a sample that is not the same everywhere.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[non_exhaustive]
 pub struct SampleTruth {
     /// Share of the pixels of all frames with moiré (at least half of its contrast).
     pub share_covered: f64,
@@ -24,6 +25,7 @@ pub struct SampleTruth {
 
 /// Area means of the local twist and strain: what the uniaxial reading of the local lattice gives.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[non_exhaustive]
 pub struct MeanTruth {
     /// Degrees.
     pub twist_deg: f64,
@@ -41,6 +43,7 @@ pub struct MeanTruth {
 
 /// One lattice.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[non_exhaustive]
 pub struct GrainTruth {
     /// Share of the pixels of all frames.
     pub share: f64,
@@ -54,6 +57,7 @@ pub struct GrainTruth {
 
 /// One place.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[non_exhaustive]
 pub struct PlaceTruth {
     /// In the frame of the sample: where the drift is zero.
     pub place_nm: [f64; 2],

@@ -51,6 +51,7 @@ pub struct Truth {
 
 /// The truth about one frame.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[non_exhaustive]
 pub struct FrameTruth {
     /// Name of the file.
     pub file: String,

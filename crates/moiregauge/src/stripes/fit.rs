@@ -26,6 +26,7 @@ const FEWEST: usize = 64;
 
 /// A wave fitted to pixels.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct FittedWave {
     /// Wave vector, rad per pixel.
     pub wave: Vector2<f64>,

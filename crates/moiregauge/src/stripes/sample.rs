@@ -24,6 +24,7 @@ const NO_CHANCE: f64 = 13.8;
 
 /// Stripes on the sample.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct SampledStripes {
     /// The map: `wavelengths[0]`, `orientation` (along the stripes, in [0, 180°) for the mean of each pattern),
     /// `displacement`, `closure`, `signal_to_noise` and the mask. Twist, strain and the other wavelengths are NaN.
@@ -42,6 +43,7 @@ pub struct SampledStripes {
 
 /// A pattern on the sample.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct SampledPattern {
     /// Wavelength of the one wave fitted to its pixels, nm, and direction of its stripes, rad.
     pub fit: Option<[Estimate; 2]>,

@@ -26,6 +26,7 @@ pub enum NoStripes {
 
 /// A pattern of stripes in an image.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct StripePattern {
     /// One wave fitted to the pixels where the pattern is; `None` where that fails.
     pub fit: Option<FittedWave>,
@@ -43,6 +44,7 @@ pub struct StripePattern {
 
 /// The stripes at a node.
 #[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
 pub struct StripeNode {
     /// Whether it is to be believed.
     pub mask: Mask,
@@ -66,6 +68,7 @@ pub struct StripeNode {
 
 /// The local stripes of an image, in pixels.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct StripeMap {
     /// Columns and rows of nodes.
     pub size: [usize; 2],

@@ -13,6 +13,7 @@ use crate::settings::knobs::Settings;
 
 /// One corrected image as a scan of its own, and what was done with it.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct CorrectedImage {
     /// Trace or retrace.
     pub line: LineDirection,

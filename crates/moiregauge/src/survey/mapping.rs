@@ -19,6 +19,7 @@ use crate::window::types::{FULL_WIDTH, Reference, Resolution, ResolutionError, U
 
 /// The map of one line direction of a scan.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct LineMap {
     /// The file as the user named it.
     pub file: String,

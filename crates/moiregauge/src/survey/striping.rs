@@ -19,6 +19,7 @@ use crate::window::types::{FULL_WIDTH, Resolution, ResolutionError};
 
 /// The stripes of a scan.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct ScanStripes {
     /// The channel that shows them.
     pub channel: String,

@@ -22,6 +22,7 @@ const OF_SIDE: f64 = 0.25;
 
 /// What no image can give.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum ResolutionError {
     /// The window is wider than the image.
     #[error(
@@ -114,6 +115,7 @@ impl Reference {
 
 /// The local lattice at a node, or why there is none.
 #[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
 pub struct WaveNode {
     /// Whether it is to be believed.
     pub mask: Mask,
@@ -135,6 +137,7 @@ pub struct WaveNode {
 
 /// A harmonic that the map used.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct UsedHarmonic {
     /// (h, k).
     pub index: [i32; 2],

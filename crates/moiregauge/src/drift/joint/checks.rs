@@ -6,15 +6,16 @@
 //!   against the fit of all others;
 //!   without scan i the solution moves by `−C X_iᵀ S⁺ e_i`;
 //!   with weights `w_i` of the scans it moves by `(Σ w_i N_i)⁻¹ Σ w_i X_iᵀ e_i`.
+//! N has the shape of an arrow, so that each of these takes a few products.
 
-use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
+use nalgebra::{DMatrix, DVector, Matrix, Matrix2, RowDVector, Vector2};
 use rand::RngExt as _;
 use rayon::prelude::*;
 
-use crate::drift::joint::evaluate::{Linearised, linearise};
+use crate::drift::joint::arrow::{Arrow, BlockSums, ScanSums};
+use crate::drift::joint::evaluate::{Linearised, PhaseMiss, linearise, phases};
 use crate::drift::joint::instability::instability;
 use crate::drift::joint::solve::JointFit;
-use crate::numbers::normal_equations::{NormalEquations, add_square};
 use crate::numbers::rng::stream;
 
 /// Directions in which a scan alone determines a parameter have a residual of zero: below this share of the largest
@@ -27,6 +28,7 @@ const HELD: f64 = 1e-10;
 
 /// One scan against all others.
 #[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
 pub struct LeftOut {
     /// The scan.
     pub scan: usize,
@@ -44,6 +46,7 @@ pub struct LeftOut {
 
 /// A result of other scans or other weights.
 #[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
 pub struct Resampled {
     /// Reciprocal pair, rad/nm.
     pub waves: Matrix2<f64>,
@@ -55,19 +58,23 @@ impl JointFit {
     /// Every scan against the fit of all others. The instability of the positions is estimated anew
     /// from the others, so that a displaced scan does not excuse itself.
     pub fn leave_one_out(&self) -> Vec<LeftOut> {
-        let scans = 1 + self.sightings.iter().map(|s| s.scan).max().unwrap_or(0);
-        let Some(all) = Step::new(self, self.instability_nm) else {
+        let all = Solved::new(self);
+        let Some(first) = Step::new(&all, self.instability_nm) else {
             return Vec::new();
         };
-        (0..scans)
+        let locals = self.unscaled.locals();
+        (0..self.layout.shape.blocks.len())
             .into_par_iter()
             .filter_map(|scan| {
-                let first = all.without(scan)?;
+                let alone = first.without(scan)?;
                 if !self.terms.phases {
-                    return Some(first);
+                    return Some(alone);
                 }
-                let others = self.instability_without(scan, &first.solution);
-                Step::new(self, others)?.without(scan)
+                let others = self.instability_without(scan, &alone.solution, &locals);
+                if others.to_bits() == self.instability_nm.to_bits() {
+                    return Some(alone);
+                }
+                Step::new(&all, others)?.without(scan)
             })
             .map(|step| step.left_out)
             .collect()
@@ -82,53 +89,75 @@ impl JointFit {
         seed: u64,
         name: &str,
     ) -> Vec<Resampled> {
-        let rows = self.rows(&self.solution, self.instability_nm);
-        let n = self.solution.len();
-        let parts: Vec<(DMatrix<f64>, DVector<f64>)> = blocks
-            .iter()
-            .map(|block| normal_equations(&rows, n, |scan| block.contains(&scan)))
-            .collect();
-        let diagonal = parts
-            .iter()
-            .fold(DVector::<f64>::zeros(n), |sum, (normal, _)| {
-                sum + normal.diagonal()
-            });
-        let scale = NormalEquations::units_of(&diagonal);
+        let shape = &self.layout.shape;
+        let rows = linearise(&self.sightings, &self.layout, &self.solution, f64::INFINITY);
+        let sums = rows.sums(shape, self.instability_nm);
+        let held = held(&sums);
+        let Some(parts) = sums.without_clocks(&held) else {
+            return Vec::new();
+        };
         (0..draws)
+            .into_par_iter()
             .filter_map(|draw| {
                 let mut rng = stream(seed, name, draw as u64);
-                let mut normal = DMatrix::<f64>::zeros(n, n);
-                let mut right = DVector::<f64>::zeros(n);
+                let mut times = vec![0.0; parts.len()];
                 for _ in blocks {
-                    let (part, side) = &parts[rng.random_range(0..parts.len())];
-                    normal += part;
-                    right += side;
+                    for &scan in &blocks[rng.random_range(0..blocks.len())] {
+                        times[scan] += 1.0;
+                    }
                 }
-                let step = NormalEquations::new(&normal, scale.clone(), |_| HELD)?.solve(&right);
-                Some(self.resampled(&(&self.solution + step)))
+                let mut drawn = BlockSums::new(shape);
+                for (scan, part) in parts.iter().enumerate().filter(|(i, _)| times[*i] > 0.0) {
+                    drawn.add(scan, part, times[scan]);
+                }
+                let mut x = self.solution.clone();
+                let mut shared = x.rows_mut(0, shape.shared);
+                shared += drawn.solve_shared(&held)?;
+                Some(self.resampled(&x))
             })
             .collect()
     }
 
-    fn rows(&self, x: &DVector<f64>, instability: f64) -> Linearised {
-        linearise(&self.sightings, &self.layout, x, f64::INFINITY, instability)
-    }
-
     /// The instability that the phases of all other scans show at the solution `x` without `scan`.
-    fn instability_without(&self, scan: usize, x: &DVector<f64>) -> f64 {
-        let rows = self.rows(x, self.instability_nm);
-        let others = |row: usize| rows.scans[row] != scan;
+    fn instability_without(&self, scan: usize, x: &DVector<f64>, locals: &[DMatrix<f64>]) -> f64 {
+        let others = self.sightings.iter().filter(|s| s.scan != scan);
+        let seen: Vec<PhaseMiss> = others
+            .filter_map(|sighting| phases(sighting, &self.layout, x))
+            .collect();
         let scatter = self.instability_nm * self.instability_nm;
-        instability(&rows, &self.unscaled, scatter, &others)
+        instability(seen.iter(), locals, scatter)
     }
 }
 
-/// A Gauss–Newton step from the solution with other weights; at its end the gradient is zero.
-struct Step<'a> {
+/// What holds the parameters that nothing determines, on the diagonal.
+fn held(sums: &ScanSums) -> DVector<f64> {
+    sums.diagonal()
+        .map(|d| if d > 0.0 { HELD * d } else { HELD })
+}
+
+/// The sightings at the solution, and the part of their normal equations that does not depend on how positions scatter.
+struct Solved<'a> {
     fit: &'a JointFit,
     rows: Linearised,
-    covariance: DMatrix<f64>,
-    solution: DVector<f64>,
+    waves: ScanSums,
+}
+
+impl<'a> Solved<'a> {
+    fn new(fit: &'a JointFit) -> Self {
+        let rows = linearise(&fit.sightings, &fit.layout, &fit.solution, f64::INFINITY);
+        let waves = rows.sums_without_phases(&fit.layout.shape);
+        Self { fit, rows, waves }
+    }
+}
+
+/// A Gauss–Newton step from the solution with another scatter of positions; at its end the gradient is zero.
+struct Step<'a> {
+    of: &'a Solved<'a>,
+    instability: f64,
+    inverse: Arrow,
+    change: DVector<f64>,
+    /// `eᵀe` at its end.
+    squares: f64,
 }
 
 /// A scan left out, and the whole solution without it.
@@ -138,36 +167,57 @@ struct Without {
 }
 
 impl<'a> Step<'a> {
-    fn new(fit: &'a JointFit, instability: f64) -> Option<Self> {
-        let mut rows = fit.rows(&fit.solution, instability);
-        let (normal, right) = normal_equations(&rows, fit.solution.len(), |_| true);
-        let units = NormalEquations::units(&normal);
-        let covariance = NormalEquations::new(&normal, units, |_| HELD)?.inverse();
-        let step = &covariance * right;
-        for (residual, row) in rows.residuals.iter_mut().zip(&rows.jacobian) {
-            *residual -= row.dot(&step);
-        }
+    fn new(of: &'a Solved<'a>, instability: f64) -> Option<Self> {
+        let mut sums = of.waves.clone();
+        of.rows.add_phases(&mut sums, instability);
+        let held = held(&sums);
+        let inverse = Arrow::new(&sums, &held)?;
+        let right = sums.right();
+        let step = inverse.solve(&right);
+        let damped = step.component_mul(&step).dot(&held);
         Some(Self {
-            fit,
-            rows,
-            covariance,
-            solution: &fit.solution + step,
+            of,
+            instability,
+            inverse,
+            squares: sums.squares - step.dot(&right) - damped,
+            change: step,
         })
     }
 
+    /// The residuals of a scan at the end of the step, and their derivatives by its local parameters.
+    fn own(&self, scan: usize) -> (DVector<f64>, DMatrix<f64>) {
+        let (shape, rows) = (&self.of.fit.layout.shape, &self.of.rows);
+        let (mut residuals, mut slopes) = (Vec::new(), Vec::new());
+        for waves in rows.waves.iter().filter(|waves| waves.scan == scan) {
+            residuals.extend(waves.rows.residuals.iter());
+            slopes.extend(waves.rows.slopes.row_iter().map(Matrix::into_owned));
+        }
+        let scatter = self.instability * self.instability;
+        for phases in rows.phases.iter().filter(|phases| phases.scan == scan) {
+            if let Some(rows) = phases.whitened(scatter) {
+                residuals.extend(rows.residuals.iter());
+                slopes.extend(rows.slopes.row_iter().map(Matrix::into_owned));
+            }
+        }
+        if let Some([residual, slope]) = rows.clock(scan) {
+            let mut row = RowDVector::zeros(shape.width());
+            row[shape.width() - 1] = slope;
+            residuals.push(residual);
+            slopes.push(row);
+        }
+        let design = DMatrix::from_rows(&slopes);
+        let moved = &design * shape.local(scan, &self.change);
+        (DVector::from_vec(residuals) - moved, design)
+    }
+
     fn without(&self, scan: usize) -> Option<Without> {
-        let rows = &self.rows;
-        let own: Vec<usize> = (0..rows.scans.len())
-            .filter(|&i| rows.scans[i] == scan)
-            .collect();
-        let n = self.solution.len();
-        let design = DMatrix::from_fn(own.len(), n, |i, j| rows.jacobian[own[i]][j]);
-        let residual = DVector::from_fn(own.len(), |i, _| rows.residuals[own[i]]);
-        let seen = &design * &self.covariance;
-        let s = DMatrix::identity(own.len(), own.len()) - &seen * design.transpose();
+        let fit = self.of.fit;
+        let (residual, design) = self.own(scan);
+        let seen = &design * self.inverse.local(scan);
+        let s = DMatrix::identity(residual.len(), residual.len()) - &seen * design.transpose();
         let eigen = s.symmetric_eigen();
         let largest = eigen.eigenvalues.max();
-        let mut solved = DVector::<f64>::zeros(own.len());
+        let mut solved = DVector::<f64>::zeros(residual.len());
         let (mut chi2, mut freedom) = (0.0, 0);
         for (value, vector) in eigen
             .eigenvalues
@@ -181,18 +231,20 @@ impl<'a> Step<'a> {
                 freedom += 1;
             }
         }
-        let all: f64 = rows.residuals.iter().map(|r| r * r).sum();
-        let solution = &self.solution - seen.transpose() * solved;
+        let mut right = DVector::zeros(fit.solution.len());
+        let shape = &fit.layout.shape;
+        shape.scatter(scan, &design.tr_mul(&solved), &mut right);
+        let solution = &fit.solution + &self.change - self.inverse.solve(&right);
         let left_out = LeftOut {
             scan,
             chi2,
             degrees_of_freedom: freedom,
             rest: (
-                all - chi2,
-                self.fit.degrees_of_freedom.saturating_sub(freedom),
+                self.squares - chi2,
+                fit.degrees_of_freedom.saturating_sub(freedom),
             ),
-            displacement: self.fit.displacement(scan, &solution),
-            without: self.fit.resampled(&solution),
+            displacement: fit.displacement(scan, &solution),
+            without: fit.resampled(&solution),
         };
         (freedom > 0).then_some(Without { left_out, solution })
     }
@@ -214,29 +266,13 @@ impl JointFit {
         if let Some(first) = self.layout.times_at() {
             x[first + scan] = 0.0;
         }
-        let rows = self.rows(&x, self.instability_nm);
-        let of_scan = rows.phases.iter().filter(|p| rows.scans[p.row] == scan);
+        let of_scan = self.sightings.iter().filter(|s| s.scan == scan);
         let (mut normal, mut right) = (Matrix2::zeros(), Vector2::zeros());
-        for phases in of_scan {
+        for phases in of_scan.filter_map(|s| phases(s, &self.layout, &x)) {
             let g = &phases.waves;
             normal += g.transpose() * g;
             right += g.transpose() * phases.miss;
         }
         Some(normal.try_inverse()? * right)
     }
-}
-
-/// `XᵀX` and `Xᵀe` of the scans that are wanted.
-fn normal_equations(
-    rows: &Linearised,
-    size: usize,
-    wanted: impl Fn(usize) -> bool,
-) -> (DMatrix<f64>, DVector<f64>) {
-    let mut normal = DMatrix::<f64>::zeros(size, size);
-    let mut right = DVector::<f64>::zeros(size);
-    for i in (0..rows.scans.len()).filter(|&i| wanted(rows.scans[i])) {
-        add_square(&mut normal, &rows.jacobian[i]);
-        right.axpy(rows.residuals[i], &rows.jacobian[i], 1.0);
-    }
-    (normal, right)
 }

@@ -133,14 +133,15 @@ impl<'a> Choice<'a> {
 /// Whether a fit knows the lattice much worse than a simpler one: its terms cannot be told from the lattice (two scans
 /// do not tell a drift that changes), so that no χ² speaks for them.
 pub(crate) fn loosens(fit: &JointFit, simpler: &JointFit) -> bool {
-    (0..4).any(|i| fit.unscaled[(i, i)] > LOOSE * LOOSE * simpler.unscaled[(i, i)])
+    let variance = |fit: &JointFit, i: usize| fit.unscaled.shared[(i, i)];
+    (0..4).any(|i| variance(fit, i) > LOOSE * LOOSE * variance(simpler, i))
 }
 
 /// Bayesian information criterion, up to a constant: −2 ln L and ln n for each parameter. A settling time is a
 /// parameter as well, and so is the scatter of positions, which lowers χ² at the cost of wider distributions: a
 /// drift that changes must not pass for scatter.
 pub(crate) fn criterion(fit: &JointFit) -> f64 {
-    let n = (fit.degrees_of_freedom + fit.layout.size) as f64;
+    let n = (fit.degrees_of_freedom + fit.layout.size()) as f64;
     let settling = usize::from(fit.terms.settling.is_some());
     let scatter = usize::from(fit.instability_nm > 0.0);
     let parameters = fit.layout.count() + settling + scatter;

@@ -1,9 +1,10 @@
 //! The model of a sighting and its derivatives.
 
 use nalgebra::{
-    DMatrix, DVector, Matrix2, Matrix3, Matrix3x2, Matrix4, SMatrix, SVector, Vector2, Vector3,
+    DVector, Matrix2, Matrix3, Matrix3x2, Matrix3xX, Matrix4, Matrix4xX, Vector2, Vector3, Vector4,
 };
 
+use crate::drift::joint::arrow::{ScanSums, Shape, Whitened};
 use crate::drift::joint::path::{DriftPath, Settling};
 use crate::drift::joint::sighting::{Sighting, Terms};
 use crate::numbers::interrupt;
@@ -21,13 +22,10 @@ pub(crate) struct Layout {
     acceleration: Option<usize>,
     settling: Option<usize>,
     gain: Option<usize>,
-    /// φ of the three harmonics, for every block.
-    pub(crate) phases: Option<usize>,
     /// Offsets of the classes after the first.
     offsets: Option<usize>,
-    /// Errors of the frame times.
-    times: Option<usize>,
-    pub(crate) size: usize,
+    /// Which scan sees which parameters.
+    pub(crate) shape: Shape,
 }
 
 /// Lattice 0..4 (K₁, K₂), drift 4..6, then what the terms add.
@@ -43,14 +41,21 @@ impl Layout {
             })
         };
         let classes = 1 + sightings.iter().map(|s| s.class).max().unwrap_or(0);
-        let blocks = 1 + sightings.iter().map(|s| s.block).max().unwrap_or(0);
         let scans = 1 + sightings.iter().map(|s| s.scan).max().unwrap_or(0);
+        let mut blocks = vec![0; scans];
+        for sighting in sightings {
+            blocks[sighting.scan] = sighting.block;
+        }
         let acceleration = take(terms.acceleration, 2);
         let settling = take(terms.settling.is_some(), 2);
         let gain = take(terms.fast_gain, 1);
-        let phases = take(terms.phases, 3 * blocks);
         let offsets = take(terms.phases, 2 * (classes - 1));
-        let times = take(terms.phases, scans);
+        let with_phases = 1 + sightings.iter().map(|s| s.block).max().unwrap_or(0);
+        let shape = Shape {
+            shared: size,
+            blocks,
+            with_phases: if terms.phases { with_phases } else { 0 },
+        };
         let times_of = || sightings.iter().map(|s| s.time);
         let first = times_of().fold(f64::INFINITY, f64::min);
         let last = times_of().fold(f64::NEG_INFINITY, f64::max);
@@ -62,27 +67,35 @@ impl Layout {
             acceleration,
             settling,
             gain,
-            phases,
             offsets,
-            times,
-            size,
+            shape,
         }
     }
 
-    /// The parameters that are results; the others are nuisance for phases.
+    /// How many parameters there are.
+    pub(crate) fn size(&self) -> usize {
+        self.shape.size()
+    }
+
+    /// How many of them are results; the others are nuisance for phases.
     pub(crate) fn count(&self) -> usize {
-        self.phases.unwrap_or(self.size)
+        self.offsets.unwrap_or(self.shape.shared)
     }
 
     /// Where the offset of a class stands; `None` for the first class and beyond the last.
     pub(crate) fn offset_of(&self, class: usize) -> Option<usize> {
         let at = self.offsets? + 2 * class.checked_sub(1)?;
-        (at < self.times?).then_some(at)
+        (at < self.shape.shared).then_some(at)
+    }
+
+    /// Where the phases of a block start; `None` of a fit without phases.
+    pub(crate) fn phases_of(&self, block: usize) -> Option<usize> {
+        self.terms.phases.then(|| self.shape.phases_at(block))
     }
 
     /// Where the errors of the frame times start.
     pub(crate) fn times_at(&self) -> Option<usize> {
-        self.times
+        self.terms.phases.then(|| self.shape.clocks_at())
     }
 
     pub(crate) fn acceleration_at(&self) -> Option<usize> {
@@ -93,20 +106,19 @@ impl Layout {
         self.gain
     }
 
-    /// How much each drift parameter moves the sample at a time, and its velocity: pairs of
-    /// (parameter index of the x component, weight in d, weight in d').
-    pub(crate) fn drift_weights(&self, time: f64) -> Vec<(usize, f64, f64)> {
+    /// How much each drift parameter moves the sample at a time, and its velocity: (parameter index of the x component,
+    /// weight in d, weight in d').
+    pub(crate) fn drift_weights(&self, time: f64) -> impl Iterator<Item = (usize, f64, f64)> {
         let t = time - self.origin;
-        let mut weights = vec![(DRIFT, t, 1.0)];
-        if let Some(i) = self.acceleration {
-            weights.push((i, 0.5 * t * t, t));
-        }
-        if let (Some(i), Some(tau)) = (self.settling, self.terms.settling) {
+        let settling = self.settling.zip(self.terms.settling).map(|(i, tau)| {
             let decay = (-(time - self.start) / tau).exp();
             let at_origin = (-(self.origin - self.start) / tau).exp();
-            weights.push((i, at_origin - decay, decay / tau));
-        }
-        weights
+            (i, at_origin - decay, decay / tau)
+        });
+        let acceleration = self.acceleration.map(|i| (i, 0.5 * t * t, t));
+        [Some((DRIFT, t, 1.0)), acceleration, settling]
+            .into_iter()
+            .flatten()
     }
 
     /// The way of the sample.
@@ -141,50 +153,91 @@ impl Layout {
 /// The three harmonics as combinations of K₁ and K₂.
 const HARMONICS: [(f64, f64); 3] = [(1.0, 0.0), (0.0, 1.0), (-1.0, 1.0)];
 
-/// Whitened residuals (measured − model) and their derivatives with respect to the parameters.
+/// Sightings against the model, with derivatives by the local parameters of their scans.
 pub(crate) struct Linearised {
-    pub(crate) residuals: Vec<f64>,
-    pub(crate) jacobian: Vec<DVector<f64>>,
-    /// The scan to which each residual belongs.
-    pub(crate) scans: Vec<usize>,
-    /// The phases, which have three rows each.
+    /// The waves, whitened.
+    pub(crate) waves: Vec<WavesMiss>,
+    /// The phases.
     pub(crate) phases: Vec<PhaseMiss>,
+    /// Errors of the clocks, s; none without phases.
+    clocks: Vec<f64>,
+    /// Their standard uncertainty, s.
+    time_sigma: f64,
 }
 
 impl Linearised {
-    /// Adds residuals of a scan and their derivatives, whitened by the Cholesky factor of their covariance; `None` where
-    /// that has none.
-    fn push<const N: usize>(
-        &mut self,
-        scan: usize,
-        lower: &SMatrix<f64, N, N>,
-        residuals: &SVector<f64, N>,
-        rows: &DMatrix<f64>,
-    ) -> Option<()> {
-        let residuals = lower.solve_lower_triangular(residuals)?;
-        let rows = lower.solve_lower_triangular(rows)?;
-        for i in 0..N {
-            self.residuals.push(residuals[i]);
-            self.jacobian.push(rows.row(i).transpose());
-            self.scans.push(scan);
-        }
-        Some(())
+    /// The normal equations, with positions that scatter by `instability`, nm.
+    pub(crate) fn sums(&self, shape: &Shape, instability: f64) -> ScanSums {
+        let mut sums = self.sums_without_phases(shape);
+        self.add_phases(&mut sums, instability);
+        sums
     }
+
+    /// The normal equations of waves and clocks.
+    pub(crate) fn sums_without_phases(&self, shape: &Shape) -> ScanSums {
+        let mut sums = ScanSums::new(shape);
+        for waves in &self.waves {
+            sums.add(waves.scan, &waves.rows);
+        }
+        for scan in 0..self.clocks.len() {
+            if let Some([residual, slope]) = self.clock(scan) {
+                sums.add_clock(scan, residual, slope);
+            }
+        }
+        sums
+    }
+
+    /// Adds the phases, with positions that scatter by `instability`, nm.
+    pub(crate) fn add_phases(&self, sums: &mut ScanSums, instability: f64) {
+        for phases in &self.phases {
+            if let Some(rows) = phases.whitened(instability * instability) {
+                sums.add(phases.scan, &rows);
+            }
+        }
+    }
+
+    /// What is known of the clock of a scan: the whitened residual and its slope.
+    pub(crate) fn clock(&self, scan: usize) -> Option<[f64; 2]> {
+        let late = self.clocks.get(scan)?;
+        Some([-late / self.time_sigma, 1.0 / self.time_sigma])
+    }
+}
+
+/// The waves of one sighting against the model.
+pub(crate) struct WavesMiss {
+    /// Its number.
+    pub(crate) sighting: usize,
+    pub(crate) scan: usize,
+    pub(crate) rows: Whitened<4>,
 }
 
 /// The phases of one sighting against the model.
 pub(crate) struct PhaseMiss {
-    /// The first of its three rows.
-    pub(crate) row: usize,
+    pub(crate) scan: usize,
     /// Measured − model, rad.
     pub(crate) miss: Vector3<f64>,
     /// Covariance of what noise does to the measured ones, rad².
     pub(crate) noise: Matrix3<f64>,
     /// The three wave vectors as rows, rad/nm: what a displacement does.
     pub(crate) waves: Matrix3x2<f64>,
+    /// Derivatives of the model by the local parameters of the scan.
+    pub(crate) slopes: Matrix3xX<f64>,
 }
 
 impl PhaseMiss {
+    /// The three rows, whitened where positions have the variance `scatter`, nm²; `None` where their covariance is none.
+    pub(crate) fn whitened(&self, scatter: f64) -> Option<Whitened<3>> {
+        let lower = self.factor(scatter)?;
+        let mut slopes = self.slopes.clone();
+        lower
+            .solve_lower_triangular_mut(&mut slopes)
+            .then_some(())?;
+        Some(Whitened {
+            residuals: lower.solve_lower_triangular(&self.miss)?,
+            slopes,
+        })
+    }
+
     /// The Cholesky factor that whitens the phases where positions have the variance `scatter`, nm².
     pub(crate) fn factor(&self, scatter: f64) -> Option<Matrix3<f64>> {
         let shaken = self.waves * self.waves.transpose() * scatter;
@@ -213,74 +266,83 @@ impl PhaseMiss {
 }
 
 /// Evaluates the model at `x` for the sightings within `reach` of the origin of time (phases beyond
-/// it may be off by a whole turn and are left out). `instability` is the standard deviation of a
-/// position, nm.
+/// it may be off by a whole turn and are left out).
 pub(crate) fn linearise(
     sightings: &[Sighting],
     layout: &Layout,
     x: &DVector<f64>,
     reach: f64,
-    instability: f64,
 ) -> Linearised {
     interrupt::check();
-    let mut out = Linearised {
-        residuals: Vec::new(),
-        jacobian: Vec::new(),
-        scans: Vec::new(),
-        phases: Vec::new(),
-    };
-    for sighting in sightings {
-        waves(sighting, layout, x, &mut out);
-        if (sighting.time - layout.origin).abs() <= reach {
-            phases(sighting, layout, x, instability, &mut out);
-        }
+    let near = |s: &&Sighting| (s.time - layout.origin).abs() <= reach;
+    Linearised {
+        waves: sightings
+            .iter()
+            .enumerate()
+            .filter_map(|(i, sighting)| waves(i, sighting, layout, x))
+            .collect(),
+        phases: sightings
+            .iter()
+            .filter(near)
+            .filter_map(|sighting| phases(sighting, layout, x))
+            .collect(),
+        clocks: layout
+            .times_at()
+            .map_or_else(Vec::new, |first| x.as_slice()[first..].to_vec()),
+        time_sigma: layout.time_sigma,
     }
-    if let Some(first) = layout.times {
-        for i in first..layout.size {
-            let mut row = DVector::zeros(layout.size);
-            row[i] = 1.0 / layout.time_sigma;
-            out.residuals.push(-x[i] / layout.time_sigma);
-            out.jacobian.push(row);
-            out.scans.push(i - first);
-        }
-    }
-    out
 }
 
 /// `K = (1 + g F)(G − u (D·G))`, two vectors.
-fn waves(sighting: &Sighting, layout: &Layout, x: &DVector<f64>, out: &mut Linearised) {
+fn waves(
+    number: usize,
+    sighting: &Sighting,
+    layout: &Layout,
+    x: &DVector<f64>,
+) -> Option<WavesMiss> {
     let u = &sighting.time_gradient;
     let (_, velocity) = layout.motion(x, sighting.time);
     let gain = layout.gain.map_or(0.0, |i| x[i]);
     let stretch = Matrix2::identity() + gain * sighting.fast_gain;
     let map = stretch * (Matrix2::identity() - u * velocity.transpose());
-    let mut rows = DMatrix::<f64>::zeros(4, layout.size);
-    let mut residual = nalgebra::Vector4::zeros();
+    let su = stretch * u;
+    let mut slopes = Matrix4xX::<f64>::zeros(layout.shape.width());
+    let mut residual = Vector4::zeros();
     for vector in 0..2 {
         let g = Vector2::new(x[2 * vector], x[2 * vector + 1]);
         let miss = sighting.waves.basis.column(vector) - map * g;
         for i in 0..2 {
             residual[2 * vector + i] = miss[i];
             for j in 0..2 {
-                rows[(2 * vector + i, 2 * vector + j)] = map[(i, j)];
+                slopes[(2 * vector + i, 2 * vector + j)] = map[(i, j)];
             }
         }
-        let su = stretch * u;
         for (parameter, _, speed) in layout.drift_weights(sighting.time) {
             for axis in 0..2 {
                 for i in 0..2 {
-                    rows[(2 * vector + i, parameter + axis)] = -su[i] * g[axis] * speed;
+                    slopes[(2 * vector + i, parameter + axis)] = -su[i] * g[axis] * speed;
                 }
             }
         }
         if let Some(parameter) = layout.gain {
             let change = sighting.fast_gain * (g - u * velocity.dot(&g));
             for i in 0..2 {
-                rows[(2 * vector + i, parameter)] = change[i];
+                slopes[(2 * vector + i, parameter)] = change[i];
             }
         }
     }
-    factor(sighting).and_then(|lower| out.push(sighting.scan, &lower, &residual, &rows));
+    let lower = factor(sighting)?;
+    lower
+        .solve_lower_triangular_mut(&mut slopes)
+        .then_some(())?;
+    Some(WavesMiss {
+        sighting: number,
+        scan: sighting.scan,
+        rows: Whitened {
+            residuals: lower.solve_lower_triangular(&residual)?,
+            slopes,
+        },
+    })
 }
 
 /// The Cholesky factor that whitens the waves; a floor keeps noise-free simulations solvable.
@@ -289,62 +351,45 @@ pub(crate) fn factor(sighting: &Sighting) -> Option<Matrix4<f64>> {
     Some((sighting.waves.covariance + floor).cholesky()?.l())
 }
 
-/// `Φ_h = G_h·(r − d(t + δt) − o) + φ_h`, wrapped.
-fn phases(
-    sighting: &Sighting,
-    layout: &Layout,
-    x: &DVector<f64>,
-    instability: f64,
-    out: &mut Linearised,
-) {
-    let (Some(first), Some(measured)) = (layout.phases, &sighting.phases) else {
-        return;
-    };
-    let late = layout.times.map(|i| i + sighting.scan);
+/// The phases of a sighting that has some, `Φ_h = G_h·(r − d(t + δt) − o) + φ_h`, wrapped.
+pub(crate) fn phases(sighting: &Sighting, layout: &Layout, x: &DVector<f64>) -> Option<PhaseMiss> {
+    let first = layout.phases_of(sighting.block)?;
+    let late = layout.times_at()? + sighting.scan;
+    let measured = sighting.phases.as_ref()?;
     let (shift, velocity) = layout.motion(x, sighting.time);
     let offset = layout.offset_of(sighting.class);
-    let mut place = sighting.position - shift;
-    if let Some(i) = late {
-        place -= velocity * x[i];
-    }
+    let mut place = sighting.position - shift - velocity * x[late];
     if let Some(i) = offset {
         place -= Vector2::new(x[i], x[i + 1]);
     }
-    let mut rows = DMatrix::<f64>::zeros(3, layout.size);
+    let (own, clock) = (layout.shape.shared, layout.shape.width() - 1);
     let mut found = PhaseMiss {
-        row: out.residuals.len(),
+        scan: sighting.scan,
         miss: Vector3::zeros(),
         noise: measured.covariance,
         waves: Matrix3x2::zeros(),
+        slopes: Matrix3xX::zeros(layout.shape.width()),
     };
     for (h, (a, b)) in HARMONICS.into_iter().enumerate() {
         let g = a * Vector2::new(x[0], x[1]) + b * Vector2::new(x[2], x[3]);
-        let constant = first + 3 * sighting.block + h;
-        let model = g.dot(&place) + x[constant];
+        let model = g.dot(&place) + x[first + h];
         found.miss[h] = wrapped(measured.values[h] - model);
         found.waves.set_row(h, &g.transpose());
+        let slopes = &mut found.slopes;
         for axis in 0..2 {
-            rows[(h, axis)] = a * place[axis];
-            rows[(h, 2 + axis)] = b * place[axis];
+            slopes[(h, axis)] = a * place[axis];
+            slopes[(h, 2 + axis)] = b * place[axis];
             for (parameter, weight, _) in layout.drift_weights(sighting.time) {
-                rows[(h, parameter + axis)] = -g[axis] * weight;
+                slopes[(h, parameter + axis)] = -g[axis] * weight;
             }
             if let Some(i) = offset {
-                rows[(h, i + axis)] = -g[axis];
+                slopes[(h, i + axis)] = -g[axis];
             }
         }
-        if let Some(i) = late {
-            rows[(h, i)] = -g.dot(&velocity);
-        }
-        rows[(h, constant)] = 1.0;
+        slopes[(h, clock)] = -g.dot(&velocity);
+        slopes[(h, own + h)] = 1.0;
     }
-    let lower = found.factor(instability * instability);
-    if lower.is_some_and(|lower| {
-        out.push(sighting.scan, &lower, &found.miss, &rows)
-            .is_some()
-    }) {
-        out.phases.push(found);
-    }
+    found.factor(0.0).map(|_| found)
 }
 
 /// The angle in (−π, π].

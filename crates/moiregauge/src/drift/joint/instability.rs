@@ -1,37 +1,37 @@
 //! How far the positions of frames scatter beyond what noise does to their phases.
 
-use nalgebra::{DMatrix, DVector, Matrix2};
+use nalgebra::{DMatrix, Matrix2};
 
-use crate::drift::joint::evaluate::Linearised;
+use crate::drift::joint::evaluate::PhaseMiss;
 use crate::numbers::chi2::is_significant;
 
-/// The position scatter s that makes the phases of the wanted rows fit: `Σ δᵀ(P + s²)⁻¹ δ` of the displacements
+/// The position scatter s that makes the phases fit: `Σ δᵀ(P + s²)⁻¹ δ` of the displacements
 /// δ that they show, with covariance P, becomes the number of components less what the fit has taken up (Paule
 /// and Mandel 1982, J. Res. NBS 87, 377). Zero where the noise alone explains them: where chance makes as much in
-/// more than 5 % of cases, as with all enlarged errors. `scatter` is the s² (nm²) that `now` and `covariance` were
-/// made with.
-pub(crate) fn instability(
-    now: &Linearised,
-    covariance: &DMatrix<f64>,
+/// more than 5 % of cases, as with all enlarged errors. `scatter` is the s² (nm²) that the fit was made with, `locals` the
+/// covariance that it gives the local parameters of each scan.
+pub(crate) fn instability<'a>(
+    phases: impl Iterator<Item = &'a PhaseMiss>,
+    locals: &[DMatrix<f64>],
     scatter: f64,
-    wanted: &dyn Fn(usize) -> bool,
 ) -> f64 {
     let mut freedom = 0.0;
     let mut displacements = Vec::new();
-    for phases in now.phases.iter().filter(|p| wanted(p.row)) {
+    for phases in phases {
         let known = phases.displacement().zip(phases.factor(scatter));
         let Some((displacement, lower)) = known else {
             continue;
         };
-        let Some(plane) = lower.solve_lower_triangular(&phases.waves) else {
+        let (Some(plane), Some(rows)) = (
+            lower.solve_lower_triangular(&phases.waves),
+            phases.whitened(scatter),
+        ) else {
             continue;
         };
         // What of the two displacements, whitened, is left free by the fit.
-        for unit in plane.qr().q().column_iter() {
-            let rows = now.jacobian[phases.row..phases.row + 3].iter();
-            let seen: DVector<f64> = rows.zip(&unit).map(|(row, u)| row * *u).sum();
-            freedom += 1.0 - seen.dot(&(covariance * &seen));
-        }
+        let seen = plane.qr().q().tr_mul(&rows.slopes);
+        let known = &seen * &locals[phases.scan];
+        freedom += 2.0 - known.dot(&seen);
         displacements.push(displacement);
     }
     let excess = |variance: f64| {

@@ -16,6 +16,7 @@
 //!
 //! Units nm, s, rad. Reciprocal pairs stand at 60°: harmonics K₁, K₂, K₂ − K₁.
 
+pub(crate) mod arrow;
 pub(crate) mod checks;
 pub(crate) mod choose;
 pub(crate) mod evaluate;

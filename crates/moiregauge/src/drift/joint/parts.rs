@@ -7,72 +7,63 @@
 //! wave vector, the instability of positions in a phase. With that share S, `P XᵀSX P` is the part of
 //! the sensors.
 
-use nalgebra::{DMatrix, DVector, Matrix4};
+use nalgebra::{DVector, Matrix4, Matrix4xX};
 
+use crate::drift::joint::arrow::{Arrow, ScanSums, Whitened};
 use crate::drift::joint::evaluate::{factor, linearise};
 use crate::drift::joint::solve::JointFit;
 use crate::drift::shares::Statistical;
-use crate::numbers::normal_equations::{NormalEquations, add_square};
 
 impl JointFit {
     /// The covariance of `waves`, (rad/nm)², as a sum of image noise, drift and sensor noise.
     pub fn statistical(&self) -> Option<Statistical> {
-        let rows = linearise(
-            &self.sightings,
-            &self.layout,
-            &self.solution,
-            f64::INFINITY,
-            self.instability_nm,
-        );
-        let kept = self.not_motion();
-        let n = kept.len();
-        let design: Vec<DVector<f64>> = rows
-            .jacobian
-            .iter()
-            .map(|row| DVector::from_fn(n, |i, _| row[kept[i]]))
-            .collect();
-        let mut normal = DMatrix::<f64>::zeros(n, n);
-        for row in &design {
-            add_square(&mut normal, row);
+        let layout = &self.layout;
+        let rows = linearise(&self.sightings, layout, &self.solution, f64::INFINITY);
+        let scatter = self.instability_nm * self.instability_nm;
+        let still = self
+            .is_motion()
+            .map(|motion| if motion { 0.0 } else { 1.0 });
+        let mut sums = ScanSums::new(&layout.shape);
+        for waves in &rows.waves {
+            sums.add(waves.scan, &at_rest(&waves.rows, &still));
         }
-        // Columns that nothing sees are held.
-        let held = |i: usize| if normal[(i, i)] == 0.0 { 1.0 } else { 0.0 };
-        let units = NormalEquations::units(&normal);
-        let inverse = NormalEquations::new(&normal, units, held)?.inverse();
+        for phases in &rows.phases {
+            if let Some(whitened) = phases.whitened(scatter) {
+                sums.add(phases.scan, &at_rest(&whitened, &still));
+            }
+        }
+        // What nothing sees is held: the motion, and columns of zeros.
+        let held = |d: f64| if d == 0.0 { 1.0 } else { 0.0 };
+        let inverse = Arrow::new(&sums, &sums.diagonal().map(held))?;
 
-        let mut shares = DMatrix::<f64>::zeros(n, n);
-        let mut at = 0;
-        for sighting in &self.sightings {
-            let Some(lower) = factor(sighting) else {
-                continue;
-            };
-            let own = DMatrix::from_fn(4, n, |i, j| design[at + i][j]);
+        let locals = inverse.locals();
+        let lattice = |scan: usize| locals[scan].columns(0, 4);
+        let mut sensor = Matrix4::zeros();
+        for waves in &rows.waves {
+            let sighting = &self.sightings[waves.sighting];
+            let lower = factor(sighting)?;
             // L⁻¹ S L⁻ᵀ; S is symmetric.
             let half = lower.solve_lower_triangular(&sighting.sensor)?;
             let share = lower.solve_lower_triangular(&half.transpose())?;
-            shares += own.transpose() * DMatrix::from_fn(4, 4, |i, j| share[(i, j)]) * own;
-            at += 4;
-            if rows.phases.iter().any(|p| p.row == at) {
-                at += 3;
-            }
+            let own: Matrix4<f64> =
+                fixed(&(at_rest(&waves.rows, &still).slopes * lattice(waves.scan)));
+            sensor += own.transpose() * share * own;
         }
-        let scatter = self.instability_nm * self.instability_nm;
         for phases in &rows.phases {
-            let Some(lower) = phases.factor(scatter) else {
+            let (Some(lower), Some(whitened)) = (phases.factor(scatter), phases.whitened(scatter))
+            else {
                 continue;
             };
             let half = lower.solve_lower_triangular(&phases.waves)?;
-            let own = DMatrix::from_fn(3, n, |i, j| design[phases.row + i][j]);
+            let own = at_rest(&whitened, &still).slopes * lattice(phases.scan);
             let seen = own.transpose() * half;
-            shares += scatter * &seen * seen.transpose();
+            let of_phases = scatter * &seen * seen.transpose();
+            sensor += of_phases.fixed_view::<4, 4>(0, 0);
         }
 
         // Enlarged like the covariance of the fit.
-        let scale = self.waves.covariance[(0, 0)] / self.unscaled[(0, 0)];
-        let lattice =
-            |m: &DMatrix<f64>| -> Matrix4<f64> { m.fixed_view::<4, 4>(0, 0).into_owned() };
-        let sensor = lattice(&(&inverse * shares * &inverse));
-        let image = lattice(&inverse) - sensor;
+        let scale = self.waves.covariance[(0, 0)] / self.unscaled.shared[(0, 0)];
+        let image = inverse.shared.fixed_view::<4, 4>(0, 0) - sensor;
         Some(Statistical::at_known_drift(
             [image, sensor],
             scale,
@@ -80,16 +71,33 @@ impl JointFit {
         ))
     }
 
-    /// The parameters, lattice first, that do not say where the sample was when.
-    fn not_motion(&self) -> Vec<usize> {
-        let motion: Vec<usize> = self
-            .layout
-            .drift_weights(self.layout.origin)
-            .iter()
-            .flat_map(|&(i, _, _)| [i, i + 1])
-            .collect();
-        (0..self.layout.times_at().unwrap_or(self.layout.size))
-            .filter(|i| !motion.contains(i))
-            .collect()
+    /// Which of the local parameters of a scan say where the sample was when.
+    fn is_motion(&self) -> DVector<bool> {
+        let layout = &self.layout;
+        let mut motion = DVector::repeat(layout.shape.width(), false);
+        for (i, _, _) in layout.drift_weights(layout.origin) {
+            motion[i] = true;
+            motion[i + 1] = true;
+        }
+        if layout.times_at().is_some() {
+            motion[layout.shape.width() - 1] = true;
+        }
+        motion
     }
+}
+
+/// The rows without the derivatives by the motion.
+fn at_rest<const N: usize>(rows: &Whitened<N>, still: &DVector<f64>) -> Whitened<N> {
+    let mut slopes = rows.slopes.clone();
+    for (mut column, still) in slopes.column_iter_mut().zip(still.iter()) {
+        column *= *still;
+    }
+    Whitened {
+        residuals: rows.residuals,
+        slopes,
+    }
+}
+
+fn fixed(four: &Matrix4xX<f64>) -> Matrix4<f64> {
+    four.fixed_columns::<4>(0).into_owned()
 }

@@ -5,6 +5,7 @@ use heterostrain::Estimate;
 use heterostrain::lattice::Waves;
 use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
 
+use crate::drift::joint::arrow::{Arrow, ScanSums};
 use crate::drift::joint::choose;
 use crate::drift::joint::evaluate::{DRIFT, Layout, linearise, wrapped};
 use crate::drift::joint::instability::instability as estimate;
@@ -12,7 +13,7 @@ use crate::drift::joint::link::number_blocks;
 use crate::drift::joint::path::DriftPath;
 use crate::drift::joint::sighting::{Sighting, Terms};
 use crate::numbers::chi2::enlargement;
-use crate::numbers::normal_equations::{NormalEquations, add_square};
+use crate::numbers::normal_equations::NormalEquations;
 use crate::spectrum::phases::Phases;
 
 /// Gauss–Newton steps: more than it takes, since the problem is nearly linear.
@@ -58,13 +59,14 @@ pub struct JointFit {
     pub(crate) layout: Layout,
     pub(crate) solution: DVector<f64>,
     /// Covariance of `solution`, as the errors of the sightings make it.
-    pub(crate) unscaled: DMatrix<f64>,
-    /// The same, enlarged where the scans scatter more.
+    pub(crate) unscaled: Arrow,
+    /// That of the parameters that all scans share, enlarged where the scans scatter more.
     pub(crate) covariance: DMatrix<f64>,
 }
 
 /// A term that was tried.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct TestedTerm {
     /// What it is called.
     pub name: &'static str,
@@ -105,10 +107,9 @@ fn motion(
     time: f64,
 ) -> (Vector2<f64>, Matrix2<f64>) {
     let (_, velocity) = layout.motion(x, time);
-    let weights = layout.drift_weights(time);
     let mut of_velocity = Matrix2::zeros();
-    for &(i, _, a) in &weights {
-        for &(j, _, b) in &weights {
+    for (i, _, a) in layout.drift_weights(time) {
+        for (j, _, b) in layout.drift_weights(time) {
             of_velocity += a * b * covariance.fixed_view::<2, 2>(i, j);
         }
     }
@@ -201,11 +202,11 @@ impl Problem {
     ) -> Option<JointFit> {
         let sightings = &self.sightings;
         let layout = Layout::new(sightings, terms, self.time_sigma);
-        let mut x = DVector::zeros(layout.size);
+        let mut x = DVector::zeros(layout.size());
         x.rows_mut(0, 4).copy_from_slice(pair.as_slice());
         x.rows_mut(DRIFT, 2).copy_from_slice(velocity.as_slice());
         let (unscaled, instability) = converge(sightings, &layout, &mut x, given)?;
-        let last = linearise(sightings, &layout, &x, f64::INFINITY, instability);
+        let last = linearise(sightings, &layout, &x, f64::INFINITY);
         if terms.phases {
             // In units of a whole turn, which is a wavelength.
             let squares = last.phases.iter().map(|p| p.miss.norm_squared());
@@ -215,9 +216,9 @@ impl Problem {
             }
         }
         let scatter = instability * instability;
-        let chi2: f64 = last.residuals.iter().map(|r| r * r).sum();
-        let degrees_of_freedom = last.residuals.len().saturating_sub(layout.size);
-        let covariance = &unscaled * enlargement(chi2, degrees_of_freedom);
+        let ScanSums { squares, rows, .. } = last.sums(&layout.shape, instability);
+        let degrees_of_freedom = rows.saturating_sub(layout.size());
+        let covariance = &unscaled.shared * enlargement(squares, degrees_of_freedom);
         let (velocity, velocity_covariance) = motion(&layout, &x, &covariance, layout.origin);
         Some(JointFit {
             waves: Waves::new(
@@ -234,7 +235,7 @@ impl Problem {
                 .map(|i| Estimate::from_variance(x[i], covariance[(i, i)])),
             terms,
             instability_nm: instability,
-            chi2,
+            chi2: squares,
             degrees_of_freedom,
             widening: last.phases.iter().map(|p| p.widening(scatter)).sum(),
             tested: Vec::new(),
@@ -253,7 +254,7 @@ fn converge(
     layout: &Layout,
     x: &mut DVector<f64>,
     given: Option<f64>,
-) -> Option<(DMatrix<f64>, f64)> {
+) -> Option<(Arrow, f64)> {
     let mut instability = given.unwrap_or(0.0);
     if layout.terms.phases {
         start_phases(sightings, layout, x)?;
@@ -262,9 +263,9 @@ fn converge(
     let mut unscaled = iterate(sightings, layout, x, f64::INFINITY, instability)?;
     if layout.terms.phases && given.is_none() {
         for _ in 0..ROUNDS {
-            let now = linearise(sightings, layout, x, f64::INFINITY, instability);
+            let now = linearise(sightings, layout, x, f64::INFINITY);
             let scatter = instability * instability;
-            instability = estimate(&now, &unscaled, scatter, &|_| true);
+            instability = estimate(now.phases.iter(), &unscaled.locals(), scatter);
             unscaled = iterate(sightings, layout, x, f64::INFINITY, instability)?;
         }
     }
@@ -293,7 +294,7 @@ fn link_outwards(
 /// campaign; then the offset of every other class, modulo the lattice, from its nearest sighting in a
 /// block that another class has begun.
 fn start_phases(sightings: &[Sighting], layout: &Layout, x: &mut DVector<f64>) -> Option<()> {
-    let first = layout.phases?;
+    let first = layout.phases_of(0)?;
     let distance = |s: &&Sighting| (s.time - layout.origin).abs();
     let with_phases = || sightings.iter().filter(|s| s.phases.is_some());
     let (k1, k2) = (Vector2::new(x[0], x[1]), Vector2::new(x[2], x[3]));
@@ -344,39 +345,25 @@ fn iterate(
     x: &mut DVector<f64>,
     reach: f64,
     instability: f64,
-) -> Option<DMatrix<f64>> {
+) -> Option<Arrow> {
     let mut covariance = None;
     for _ in 0..STEPS {
-        let now = linearise(sightings, layout, x, reach, instability);
-        let n = layout.size;
-        let mut normal = DMatrix::<f64>::zeros(n, n);
-        let mut right = DVector::<f64>::zeros(n);
-        for (residual, row) in now.residuals.iter().zip(&now.jacobian) {
-            add_square(&mut normal, row);
-            right.axpy(*residual, row, 1.0);
+        let now = linearise(sightings, layout, x, reach);
+        let sums = now.sums(&layout.shape, instability);
+        if !layout.terms.phases && !is_determined(&sums.shared()) {
+            return None;
         }
-        // Offsets of classes that have no phase within reach are not seen yet: hold them.
-        for i in 0..n {
-            if normal[(i, i)] == 0.0 {
-                normal[(i, i)] = 1.0;
-            }
-        }
-        let scale = NormalEquations::units(&normal);
-        if layout.phases.is_none() {
-            let scaled = DMatrix::from_fn(n, n, |i, j| normal[(i, j)] * scale[i] * scale[j]);
-            let values = scaled.symmetric_eigenvalues();
-            if !(values.max() < WORST_CONDITION * values.min()) {
-                return None;
-            }
-        }
-        // Near the middle of the campaign offsets and phases may only be seen together; a little
-        // damping holds what cannot be told apart and leaves the final solution where it is.
-        let inverse = NormalEquations::new(&normal, scale, |_| DAMPING)?.inverse();
-        let step = &inverse * &right;
+        // Near the middle of the campaign offsets and phases may only be seen together; a little damping holds what
+        // cannot be told apart and leaves the final solution where it is. Offsets of classes that have no phase within
+        // reach are not seen yet at all: hold them.
+        let held = |d: f64| if d == 0.0 { 1.0 } else { DAMPING * d };
+        let inverse = Arrow::new(&sums, &sums.diagonal().map(held))?;
+        let step = inverse.solve(&sums.right());
         *x += &step;
-        let size = (0..n)
-            .map(|i| (step[i] / inverse[(i, i)].sqrt()).abs())
-            .fold(0.0, f64::max);
+        let in_sigmas = step.zip_map(&inverse.variances(), |step, variance| {
+            (step / variance.sqrt()).abs()
+        });
+        let size = in_sigmas.iter().copied().fold(0.0, f64::max);
         covariance = Some(inverse);
         if !size.is_finite() {
             return None;
@@ -386,4 +373,21 @@ fn iterate(
         }
     }
     covariance
+}
+
+/// Whether a normal matrix tells its parameters apart.
+fn is_determined(normal: &DMatrix<f64>) -> bool {
+    let scale = NormalEquations::units(normal);
+    let (rows, columns) = normal.shape();
+    let scaled = DMatrix::from_fn(rows, columns, |i, j| {
+        // Parameters that nothing sees are held.
+        let held = i == j && normal[(i, j)] == 0.0;
+        if held {
+            1.0
+        } else {
+            normal[(i, j)] * scale[i] * scale[j]
+        }
+    });
+    let values = scaled.symmetric_eigenvalues();
+    values.max() < WORST_CONDITION * values.min()
 }

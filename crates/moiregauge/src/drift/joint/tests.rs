@@ -1,7 +1,7 @@
 //! The joint fit on sightings made from the model by hand.
 
 use heterostrain::lattice::Waves;
-use nalgebra::{Matrix2, Matrix4, Vector2};
+use nalgebra::{DVector, Matrix2, Matrix4, Vector2};
 use rand_distr::{Distribution, StandardNormal};
 
 use super::*;
@@ -299,20 +299,27 @@ fn the_covariance_splits_by_source() {
         let whole = fitted.waves.covariance;
         assert!((parts.whole() - whole).norm() < 1e-9 * whole.norm());
 
-        let n = fitted.unscaled.nrows();
+        let n = fitted.layout.size();
+        let columns: Vec<DVector<f64>> = (0..n)
+            .map(|i| {
+                let unit = DVector::from_fn(n, |j, _| if i == j { 1.0 } else { 0.0 });
+                fitted.unscaled.solve(&unit)
+            })
+            .collect();
+        let unscaled = nalgebra::DMatrix::from_columns(&columns);
         let fixed: Vec<usize> = (4..6)
             .chain(fitted.layout.times_at().unwrap_or(n)..n)
             .collect();
         let block = |rows: &[usize], columns: &[usize]| {
             nalgebra::DMatrix::from_fn(rows.len(), columns.len(), |i, j| {
-                fitted.unscaled[(rows[i], columns[j])]
+                unscaled[(rows[i], columns[j])]
             })
         };
         let lattice = [0, 1, 2, 3];
         let across = block(&lattice, &fixed);
         let inside = block(&fixed, &fixed).try_inverse().unwrap();
         let schur = block(&lattice, &lattice) - &across * inside * across.transpose();
-        let scale = whole[(0, 0)] / fitted.unscaled[(0, 0)];
+        let scale = whole[(0, 0)] / unscaled[(0, 0)];
         let known = (parts.image + parts.sensor) / scale;
         for i in 0..16 {
             assert!((known[i] - schur[i]).abs() < 1e-6 * schur.norm(), "{i}");

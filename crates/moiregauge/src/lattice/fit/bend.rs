@@ -30,6 +30,7 @@ const HARMLESS: f64 = 1e-3;
 
 /// How the lattice changes across the frame.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct Inhomogeneity {
     /// By how much the wavelength changes from one corner to the opposite one, as a share of it: the
     /// most of the three first harmonics. Counted in pixels, as the angle.

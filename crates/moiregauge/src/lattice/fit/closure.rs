@@ -26,6 +26,7 @@ const NOISE_KNOWN_TO: f64 = 1.25;
 
 /// How well the harmonics agree on one lattice.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct Closure {
     /// χ² of the harmonics' own wave vectors about those of the lattice.
     #[serde(with = "exact")]

@@ -76,6 +76,7 @@ pub struct LatticeFit {
 
 /// One harmonic of a fitted lattice.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct FittedHarmonic {
     /// (h, k): the wave vector is `h q₁ + k q₂`.
     pub index: [i32; 2],

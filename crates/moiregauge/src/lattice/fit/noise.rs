@@ -55,6 +55,7 @@ pub(crate) struct ResidualNoise {
 
 /// The strongest wave in the residual that is none of the lattice's.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct ForeignWave {
     /// Its wave vector, rad per pixel.
     #[serde(with = "exact")]

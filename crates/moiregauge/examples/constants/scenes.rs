@@ -1,384 +1,20 @@
-//! A small corpus of scenes and all that is decided about them, one result a line: what `docs/constants.sh` compares when it
-//! changes a constant.
-//!
-//! `cargo run --release -p moiregauge --example constants [DATA [WORD…]]`. DATA holds recorded frames (`sets`, `hard`); with
-//! words only the scenes whose names have one of them. A line is `scene | what | value | σ`, or `scene | said | code`.
+//! Frames that are simulated and recorded.
 
 use std::path::Path;
 
 use heterostrain::material::Material;
 use moiregauge::calibration::KnownLattice;
+use moiregauge::campaign::atomic_orientation;
 use moiregauge::campaign::calibrate;
-use moiregauge::campaign::{Analysis, SetMean};
-use moiregauge::campaign::{analyse, atomic_orientation};
-use moiregauge::caveat::Caveat;
-use moiregauge::domains::Contrast;
-use moiregauge::domains::regime;
 use moiregauge::frame::Image;
-use moiregauge::map::TwistStrainMap;
-use moiregauge::meaning::Readings;
-use moiregauge::region::Trends;
-use moiregauge::scan::{MeasuredScan, measure_known, measure_moires, sorted_moires};
+use moiregauge::scan::{MeasuredScan, measure_known};
 use moiregauge::settings::{Grouping, Settings};
 use moiregauge::simulate::{DomainScene, Feature, FieldScene, Pattern, Simulation, Simulator};
-use moiregauge::survey::{
-    MapMethod, average_maps, change_of_drift, domains_of_scan, map_scan, stripes_in_short,
-    stripes_of_scan,
-};
-use moiregauge::window::{Mask, Resolution};
 use nalgebra::Vector2;
 use spmfile::{Channel, Samples, Scan, Span};
 
-/// A named scene: its frames, and how they are looked at.
-struct Scene {
-    name: String,
-    scans: Vec<Scan>,
-    settings: Settings,
-    /// Whether maps are made, too.
-    map: bool,
-}
-
-fn main() {
-    let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let data = arguments.first().map_or("../shared/data", String::as_str);
-    let words = arguments.get(1..).unwrap_or_default();
-    let wanted = |name: &str| words.is_empty() || words.iter().any(|word| name.contains(word));
-    let mut scenes = sets();
-    scenes.extend(faint());
-    scenes.extend(two_moires());
-    scenes.extend(fields());
-    scenes.extend(nodes());
-    scenes.extend(stripes());
-    scenes.extend(recorded(Path::new(data)));
-    for scene in scenes.into_iter().filter(|s| wanted(&s.name)) {
-        scene.report();
-    }
-    if wanted("set: atoms") {
-        atoms();
-    }
-}
-
-impl Scene {
-    fn new(name: &str, scans: Vec<Scan>) -> Self {
-        Self {
-            name: name.to_owned(),
-            scans,
-            settings: Settings {
-                drift_draws: 0,
-                strain_draws: 0,
-                ..Settings::default()
-            },
-            map: false,
-        }
-    }
-
-    fn mapped(mut self) -> Self {
-        self.map = true;
-        self.name = self.name.replace("set:", "set with map:");
-        self
-    }
-
-    fn with(mut self, change: impl FnOnce(&mut Settings)) -> Self {
-        change(&mut self.settings);
-        self
-    }
-
-    fn report(&self) {
-        let name = &self.name;
-        let mut found = Vec::new();
-        for (i, scan) in self.scans.iter().enumerate() {
-            match measure_moires(&format!("{i:03}"), scan, &self.settings, None) {
-                Ok(moires) => found.push(moires),
-                Err(error) => println!("{name} | said | frame {i} refused: {error}"),
-            }
-        }
-        if found.is_empty() {
-            return self.stripes();
-        }
-        let moires = sorted_moires(found);
-        let several = moires.len() > 1;
-        for (m, measured) in moires.into_iter().enumerate() {
-            let name = if several {
-                format!("{name}, moiré {m}")
-            } else {
-                name.clone()
-            };
-            self.analysed(&name, measured);
-        }
-    }
-
-    fn analysed(&self, name: &str, measured: Vec<MeasuredScan>) {
-        for scan in &measured {
-            for line in &scan.lines {
-                let harmonics = line
-                    .lattice
-                    .fit
-                    .as_ref()
-                    .map_or(0, |fit| fit.harmonics.len());
-                number(
-                    name,
-                    &format!("frame {} harmonics", scan.file),
-                    harmonics as f64,
-                );
-            }
-        }
-        let analysis = analyse(measured, &self.settings);
-        self::analysed(name, &analysis);
-        if self.map {
-            self.maps(name, &analysis);
-        }
-    }
-
-    fn maps(&self, name: &str, analysis: &Analysis) {
-        let scans: Vec<_> = analysis.sets.iter().flat_map(|set| &set.scans).collect();
-        let how = (MapMethod::Demodulation, &Resolution::default());
-        let mut maps = Vec::new();
-        for (scan, analysed) in self.scans.iter().zip(&scans) {
-            match map_scan(scan, analysed, None, &self.settings, how.0, how.1) {
-                Ok(found) => maps.extend(found),
-                Err(error) => println!("{name} | said | no map: {error}"),
-            }
-        }
-        for map in &maps {
-            number(name, "map harmonics", map.harmonics.len() as f64);
-            number(
-                name,
-                "map noise measured",
-                f64::from(u8::from(map.noise_measured)),
-            );
-        }
-        let Some((average, agreement)) = average_maps(&maps) else {
-            return;
-        };
-        if let Some(agreement) = agreement {
-            number(name, "map error factor", agreement.factor);
-        }
-        let (layers, convention) = (self.settings.bilayer(), self.settings.strain_convention);
-        let Ok(found) = average.twist_strain(&maps[0].whole, layers, convention) else {
-            return println!("{name} | said | map without twist");
-        };
-        let map = TwistStrainMap::new(&average, &found);
-        local(name, &map);
-        let change = change_of_drift(&maps);
-        println!(
-            "{name} | said | change of drift looked for: {}",
-            change.is_some()
-        );
-        let domains = domains_of_scan(
-            &self.scans[0],
-            scans[0],
-            None,
-            &self.settings,
-            Contrast::Auto,
-        );
-        let domains = domains.first();
-        let regime = regime(&map, domains);
-        println!(
-            "{name} | said | {:?}, in doubt: {}",
-            regime.choice, regime.in_doubt
-        );
-        number(name, "regime blurred", regime.blurred);
-        number(name, "regime variation", regime.variation);
-        let Some(domains) = domains else { return };
-        number(name, "nodes", domains.nodes.len() as f64);
-        number(name, "cells", domains.cells.len() as f64);
-        number(name, "missing nodes", domains.missing.len() as f64);
-        number(name, "extra nodes", domains.extra.len() as f64);
-        number(name, "dislocations", domains.dislocations.len() as f64);
-        println!(
-            "{name} | said | nodes are {:?}, clear: {}",
-            domains.contrast, domains.contrast_is_clear
-        );
-        let twists = domains.cells.iter().filter_map(|c| c.twist_strain);
-        let (sum, variance, count) = twists.fold((0.0, 0.0, 0.0), |(s, v, n), t| {
-            (s + t.twist, v + t.twist().sigma.powi(2), n + 1.0)
-        });
-        line(
-            name,
-            "mean twist of cells (°)",
-            (sum / count).to_degrees(),
-            f64::sqrt(variance / count).to_degrees(),
-        );
-    }
-
-    fn stripes(&self) {
-        let (name, settings) = (&self.name, &self.settings);
-        for [wavelength, along, log_chance] in stripes_in_short(&self.scans[0], settings) {
-            number(name, "stripes: wavelength (nm)", wavelength);
-            number(name, "stripes: direction (°)", along.to_degrees());
-            number(name, "stripes: log₁₀ of the chance", log_chance);
-        }
-        match stripes_of_scan("000", &self.scans[0], settings, &Resolution::default()) {
-            Ok(found) => {
-                for pattern in &found.stripes.patterns {
-                    number(name, "stripes: good nodes", pattern.good as f64);
-                    if let Some([wavelength, along]) = pattern.fit {
-                        line(
-                            name,
-                            "stripes: fitted wavelength (nm)",
-                            wavelength.value,
-                            wavelength.sigma,
-                        );
-                        line(
-                            name,
-                            "stripes: fitted direction (°)",
-                            along.value.to_degrees(),
-                            along.sigma.to_degrees(),
-                        );
-                    }
-                }
-                masks(name, &found.stripes.map);
-                said(name, &found.caveats);
-            }
-            Err(error) => println!("{name} | said | no stripes: {error}"),
-        }
-    }
-}
-
-fn line(scene: &str, what: &str, value: f64, sigma: f64) {
-    println!("{scene} | {what} | {value:.9e} | {sigma:.6e}");
-}
-
-/// A number without an error.
-fn number(scene: &str, what: &str, value: f64) {
-    println!("{scene} | {what} | {value:.9e} |");
-}
-
-fn said(scene: &str, caveats: &[Caveat]) {
-    for caveat in caveats {
-        println!("{scene} | said | {} ({})", caveat.code(), caveat.place);
-    }
-}
-
-fn analysed(name: &str, analysis: &Analysis) {
-    said(name, &analysis.caveats);
-    number(name, "sets", analysis.sets.len() as f64);
-    for (i, set) in analysis.sets.iter().enumerate() {
-        let of = format!("{name}, set {i}");
-        if let Some(drift) = &set.drift {
-            for axis in 0..2 {
-                let sigma = drift.covariance[(axis, axis)].sqrt();
-                line(
-                    &of,
-                    &format!("drift {axis} (nm/min)"),
-                    60.0 * drift.velocity[axis],
-                    60.0 * sigma,
-                );
-            }
-            if let Some(joint) = &drift.joint {
-                println!("{of} | said | phases linked: {}", joint.phases);
-                println!(
-                    "{of} | said | acceleration: {}",
-                    joint.acceleration.is_some()
-                );
-                println!("{of} | said | settling: {}", joint.settling_s.is_some());
-                println!("{of} | said | fast gain: {}", joint.fast_gain.is_some());
-                number(&of, "instability (nm)", joint.instability_nm);
-            }
-        }
-        if let Some(mean) = set.mean.as_ref().or(set.uncorrected.as_ref()) {
-            println!("{of} | said | corrected: {}", set.mean.is_some());
-            of_mean(&of, mean);
-        }
-        for scan in &set.scans {
-            if let Some(twist) = scan.twist_strain {
-                let twist = twist.twist().scaled(180.0 / std::f64::consts::PI);
-                line(
-                    &of,
-                    &format!("frame {} twist (°)", scan.file),
-                    twist.value,
-                    twist.sigma,
-                );
-            }
-        }
-    }
-    if let Some(all) = &analysis.combined {
-        let of = format!("{name}, all");
-        println!("{of} | said | joint: {}", all.joint.is_some());
-        let total = all.budget.applied_to(&all.twist_strain);
-        twist_and_strain(&of, &all.twist_strain, &total);
-        read(&of, &all.readings);
-    }
-}
-
-fn of_mean(name: &str, mean: &SetMean) {
-    twist_and_strain(
-        name,
-        &mean.twist_strain,
-        &mean.budget.applied_to(&mean.twist_strain),
-    );
-    number(name, "enlargement", mean.enlargement);
-    read(name, &mean.readings);
-}
-
-fn twist_and_strain(
-    name: &str,
-    found: &heterostrain::strain::TwistStrain,
-    total: &heterostrain::strain::TwistStrain,
-) {
-    let degrees = 180.0 / std::f64::consts::PI;
-    let twist = found.twist().scaled(degrees);
-    line(name, "twist (°)", twist.value, twist.sigma);
-    for i in 0..2 {
-        let sigma = found.strain().covariance[(i, i)].sqrt();
-        line(
-            name,
-            &format!("strain {i} (%)"),
-            100.0 * found.strain_vector[i],
-            100.0 * sigma,
-        );
-    }
-    number(
-        name,
-        "σ of the twist with calibration (°)",
-        total.twist().sigma * degrees,
-    );
-    println!("{name} | said | axis: {}", found.axis_lab().is_some());
-}
-
-fn read(name: &str, readings: &Readings) {
-    number(name, "readings", readings.solutions.len() as f64);
-    if let Some(naming) = &readings.naming {
-        number(name, "names", naming.names.len() as f64);
-    }
-}
-
-fn masks(name: &str, map: &TwistStrainMap) {
-    for mask in Mask::ALL {
-        number(
-            name,
-            &format!("nodes, {}", mask.name()),
-            map.count(mask) as f64,
-        );
-    }
-    number(name, "window (nm)", map.window_nm);
-}
-
-fn local(name: &str, map: &TwistStrainMap) {
-    masks(name, map);
-    if let Some(spread) = map.spread(&map.twist) {
-        line(
-            name,
-            "map: mean twist (°)",
-            spread.mean.to_degrees(),
-            spread.mean_sigma.to_degrees(),
-        );
-        line(
-            name,
-            "map: spread of the twist (°)",
-            spread.spread.to_degrees(),
-            spread.noise.to_degrees(),
-        );
-    }
-    if let Some(trend) = Trends::new(map).and_then(|trends| trends.of(&map.twist)) {
-        line(
-            name,
-            "map: twist in the middle (°)",
-            trend.middle.value.to_degrees(),
-            trend.middle.sigma.to_degrees(),
-        );
-    }
-}
+use crate::Scene;
+use crate::lines::{line, number, said};
 
 /// Frames of one sample, 96 × 96 pixels, four of them.
 fn simulation(change: impl FnOnce(&mut Simulation)) -> Vec<Scan> {
@@ -393,7 +29,7 @@ fn simulation(change: impl FnOnce(&mut Simulation)) -> Vec<Scan> {
 }
 
 /// Whole sets, as an analysis meets them.
-fn sets() -> Vec<Scene> {
+pub(crate) fn sets() -> Vec<Scene> {
     let of = |name: &str, change: fn(&mut Simulation)| {
         Scene::new(&format!("set: {name}"), simulation(change))
     };
@@ -464,7 +100,7 @@ fn sets() -> Vec<Scene> {
 }
 
 /// One frame with less and less contrast: where it is found no more.
-fn faint() -> Vec<Scene> {
+pub(crate) fn faint() -> Vec<Scene> {
     let one = |(i, contrast): (usize, f64)| {
         let frames = simulation(|s| {
             (s.sample.contrast_deg, s.raster.scans) = (contrast, 1);
@@ -478,7 +114,7 @@ fn faint() -> Vec<Scene> {
 }
 
 /// Two moirés in one image, asked for both and for one.
-fn two_moires() -> Vec<Scene> {
+pub(crate) fn two_moires() -> Vec<Scene> {
     let large = |s: &mut Simulation| {
         (s.raster.nominal_size_nm, s.raster.scans) = ([110.0, 110.0], 2);
         s.raster.pixels = [128, 128];
@@ -533,7 +169,7 @@ fn array(image: Image, pitch: f64) -> Scan {
 }
 
 /// Lattices that are not the same everywhere; 12.5 nm from spot to spot.
-fn fields() -> Vec<Scene> {
+pub(crate) fn fields() -> Vec<Scene> {
     let at = Vector2::new(100.0, 90.0);
     let with = |name: &str, feature: Feature| {
         let mut scene = FieldScene::rippled(192, 12.0, 0.01);
@@ -573,7 +209,7 @@ fn fields() -> Vec<Scene> {
 }
 
 /// Networks of walls with nodes; 60 nm from node to node.
-fn nodes() -> Vec<Scene> {
+pub(crate) fn nodes() -> Vec<Scene> {
     let base = || {
         let mut scene = DomainScene::hexagonal([192, 192], 24.0, 0.2);
         (scene.disorder, scene.white, scene.line) = (1.0, 0.15, 0.05);
@@ -602,7 +238,7 @@ fn nodes() -> Vec<Scene> {
 }
 
 /// Images of one wave, of two in different places, and of none.
-fn stripes() -> Vec<Scene> {
+pub(crate) fn stripes() -> Vec<Scene> {
     let wave = |white: f64, share: f64, seed: u64| {
         let mut scene = FieldScene::rippled(256, 12.0, share);
         scene.harmonics = vec![([1, 0], 1.0)];
@@ -644,7 +280,7 @@ fn stripes() -> Vec<Scene> {
 }
 
 /// Atoms of known size: orientation of a layer and calibration of the scanner.
-fn atoms() {
+pub(crate) fn atoms() {
     let settings = Settings::default();
     let graphene = Material::graphene();
     let known = KnownLattice::of_layer(&graphene);
@@ -693,7 +329,7 @@ fn atoms() {
 }
 
 /// The recorded frames, where they are: those of `hard` by their folders, of `sets` both together.
-fn recorded(data: &Path) -> Vec<Scene> {
+pub(crate) fn recorded(data: &Path) -> Vec<Scene> {
     let mut scenes = Vec::new();
     for folder in entries(&data.join("hard")) {
         // An image of a million pixels without a lattice takes as long as all others.
