@@ -20,6 +20,7 @@ mod replay;
 pub mod samples;
 pub mod session;
 mod sets;
+pub mod simulate;
 pub mod sink;
 mod told;
 mod twice;
@@ -36,5 +37,6 @@ pub use opened::{InputError, Opened, Reading, read_again, read_scan, read_shown}
 pub use reading::{FileError, open, read, read_text};
 pub use replay::{Document, ReplayError, record_files, settings_of};
 pub use sets::{SetError, absolute, check_sets, set_of};
+pub use simulate::simulate;
 pub use told::check_told;
 pub use twice::{Repeated, distinct};
