@@ -5,6 +5,7 @@
 
 pub mod campaign;
 mod content;
+pub mod convert;
 mod find;
 mod hash;
 pub mod inspect;
@@ -28,6 +29,7 @@ mod twice;
 pub mod validate;
 
 pub use content::Content;
+pub use convert::convert;
 pub use find::{Found, LeftAlone, find};
 pub use hash::{hexadecimal, identity};
 pub use inspect::inspect;
