@@ -3,6 +3,7 @@
 //! Files and settings, but no arguments of a program, no printing and no physics. Front ends (the program, a
 //! Python package, a page) stand on this crate.
 
+pub mod calibrate;
 pub mod campaign;
 mod content;
 pub mod convert;
@@ -28,6 +29,7 @@ mod told;
 mod twice;
 pub mod validate;
 
+pub use calibrate::calibrate;
 pub use content::Content;
 pub use convert::convert;
 pub use find::{Found, LeftAlone, find};
