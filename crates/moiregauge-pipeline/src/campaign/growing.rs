@@ -16,8 +16,9 @@ use super::measure::{Advice, Inputs, Measured, given_again, measured, no_advice}
 use super::overlap::overlap;
 use super::shown::show;
 use crate::job::Job;
-use crate::known::{Known, Places};
+use crate::known::Known;
 use crate::names::in_words;
+use crate::source::Places;
 use crate::told::check_told;
 use crate::twice::distinct;
 
@@ -215,6 +216,27 @@ impl Campaign {
     /// The scans.
     pub fn inputs(&self) -> &[PathBuf] {
         &self.inputs
+    }
+
+    /// Sets made by hand.
+    pub fn sets(&self) -> &[NamedSet] {
+        &self.sets
+    }
+
+    /// Names that were given and cannot be measured.
+    pub fn left_out(&self) -> &[FailedInput] {
+        &self.left_out
+    }
+
+    /// What is known of the scans, and where they lie.
+    #[must_use]
+    pub fn known(&self) -> Known {
+        Known::new(&self.told, &self.inputs).at(&self.places)
+    }
+
+    /// What helps against errors.
+    pub(crate) fn advice(&self) -> Advice {
+        self.advice.0
     }
 
     /// What was measured so far.
