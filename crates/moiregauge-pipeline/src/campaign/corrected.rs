@@ -1,74 +1,60 @@
-//! `analyze --export`: the images behind the numbers, corrected, in formats of other programs.
+//! The images behind the numbers of an analysis, corrected, in formats of other programs.
 
 use std::collections::HashSet;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use anyhow::{Context as _, ensure};
-use moiregauge::campaign::{Analysis, ScanAnalysis};
+use moiregauge::campaign::ScanAnalysis;
+use moiregauge::numbers::interrupt;
 use moiregauge::survey::corrected_images;
-use moiregauge_pipeline::sink::FolderSink;
-use moiregauge_pipeline::{Known, read_again};
 use moiregauge_report::FailedInput;
 use rayon::prelude::*;
-use spmfile::{LineDirection, WritableFormat};
+use spmfile::{ExportError, LineDirection, WritableFormat};
 
-use super::hint::with_advice;
-use crate::convert::format_of;
-use crate::outputs::write_all;
+use super::measure::in_words;
+use crate::job::{Cancelled, Job};
+use crate::maps::Scans;
+use crate::opened::{InputError, read_again};
+use crate::sink::{Sink, SinkError};
 
-/// A folder of corrected images and their format.
-#[derive(Clone, Debug)]
-pub(super) struct Export {
-    folder: String,
-    format: WritableFormat,
+/// A folder of corrected images, and their format.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Export {
+    /// The folder within the sink.
+    pub folder: String,
+    /// The format.
+    pub format: WritableFormat,
 }
 
-/// All that are wanted.
-pub(super) fn all(names: &[String]) -> anyhow::Result<Vec<Export>> {
-    names.iter().map(|name| parse(name)).collect()
+/// Why a scan has no corrected image.
+#[derive(Debug, thiserror::Error)]
+enum NotCorrected {
+    #[error(transparent)]
+    Input(#[from] InputError),
+    #[error("no image could be corrected")]
+    Nothing,
+    #[error(transparent)]
+    Export(#[from] ExportError),
+    #[error(transparent)]
+    Sink(#[from] SinkError),
 }
 
-impl Export {
-    pub(super) fn folder(&self) -> &str {
-        &self.folder
-    }
-}
-
-/// `corrected.gwy` as the folder `corrected` and the format.
-fn parse(name: &str) -> anyhow::Result<Export> {
-    let path = Path::new(name);
-    let format = format_of(path).context("--export")?;
-    ensure!(
-        format != WritableFormat::Gxyzf,
-        "--export {name}: a corrected image is no cloud of points; `moiregauge convert` writes those"
-    );
-    ensure!(
-        path.parent().is_none_or(|p| p == Path::new("")),
-        "--export {name}: expected a name without folders; it goes into --out"
-    );
-    Ok(Export {
-        folder: path
-            .file_stem()
-            .unwrap_or_default()
-            .to_string_lossy()
-            .into_owned(),
-        format,
-    })
-}
-
-/// Writes one image for each scan and line direction; what failed comes back. Files are read again for that, and only
-/// for that.
-pub(super) fn write(
-    sink: &FolderSink,
+/// Writes one image for each scan and line direction: in nm, at rest, turned into laboratory axes. What failed comes
+/// back. Files are read again for that, and only for that.
+///
+/// # Errors
+/// [`Cancelled`].
+pub fn write_corrected(
+    scans: &Scans,
     exports: &[Export],
-    analysis: &Analysis,
-    from: (&[PathBuf], &Known),
-) -> Vec<FailedInput> {
+    sink: &dyn Sink,
+    job: &Job,
+) -> Result<Vec<FailedInput>, Cancelled> {
     if exports.is_empty() {
-        return Vec::new();
+        return Ok(Vec::new());
     }
     let mut names = HashSet::new();
-    let scans: Vec<(String, &ScanAnalysis)> = analysis
+    let all: Vec<(String, &ScanAnalysis)> = scans
+        .analysis
         .sets
         .iter()
         .flat_map(|set| &set.scans)
@@ -85,29 +71,32 @@ pub(super) fn write(
             (name, scan)
         })
         .collect();
-    scans
-        .par_iter()
-        .filter_map(|(name, scan)| {
-            let result = one(sink, exports, (name, scan), analysis, from);
-            result.err().map(|error| FailedInput {
-                file: scan.file.clone(),
-                error: format!("--export: {error:#}"),
-            })
+    let failed = |(name, scan): &(String, &ScanAnalysis)| {
+        interrupt::check();
+        let error = one(scans, exports, (name, scan), sink).err()?;
+        Some(FailedInput {
+            file: scan.file.clone(),
+            error: match &error {
+                NotCorrected::Input(error) => in_words(error, scans.advice),
+                other => other.to_string(),
+            },
         })
-        .collect()
+    };
+    job.run(|| all.par_iter().filter_map(failed).collect())
 }
 
 fn one(
-    sink: &FolderSink,
+    scans: &Scans,
     exports: &[Export],
     (name, analysed): (&str, &ScanAnalysis),
-    analysis: &Analysis,
-    (inputs, known): (&[PathBuf], &Known),
-) -> anyhow::Result<()> {
-    let settings = &analysis.settings;
-    let scan = read_again(inputs, &analysed.file, settings, known).map_err(with_advice)?;
+    sink: &dyn Sink,
+) -> Result<(), NotCorrected> {
+    let settings = &scans.analysis.settings;
+    let scan = read_again(scans.inputs, &analysed.file, settings, scans.known)?;
     let images = corrected_images(&scan, analysed, settings);
-    ensure!(!images.is_empty(), "no image could be corrected");
+    if images.is_empty() {
+        return Err(NotCorrected::Nothing);
+    }
     for image in images {
         let line = match image.line {
             LineDirection::Trace => "trace",
@@ -117,11 +106,9 @@ fn one(
         log.insert(0, format!("moiregauge {}", env!("CARGO_PKG_VERSION")));
         for Export { folder, format } in exports {
             let stem = format!("{folder}/{name}-{line}");
-            write_all(
-                sink,
-                "",
-                &spmfile::write(&image.scan, *format, &stem, &log)?,
-            )?;
+            for (file, bytes) in spmfile::write(&image.scan, *format, &stem, &log)? {
+                sink.write(&file, &bytes)?;
+            }
         }
     }
     Ok(())
@@ -129,12 +116,16 @@ fn one(
 
 #[cfg(test)]
 mod tests {
+    use std::path::PathBuf;
+
     use super::*;
+    use crate::campaign::no_advice;
+    use crate::known::Known;
+    use crate::sink::MemorySink;
     use moiregauge::campaign::analyse;
     use moiregauge::scan::measure_moires;
     use moiregauge::settings::Settings;
     use moiregauge::simulate::{Simulation, Simulator};
-    use moiregauge_pipeline::sink::Target;
 
     /// The files are gone after they were measured: that is noticed where an export needs them, and not otherwise.
     #[test]
@@ -157,17 +148,19 @@ mod tests {
                 .remove(0)
         });
         let analysis = analyse(measured.collect(), &settings);
-        let out = tempfile::tempdir().unwrap();
-        let sink = crate::outputs::folder(&Target {
-            folder: out.path(),
-            kind: "analyze",
-            names: &[],
-            inputs: &[],
-            force: false,
-        });
-        let (sink, known) = (sink.unwrap(), Known::default());
-        let failed = |exports: &[Export]| write(&sink, exports, &analysis, (&files, &known)).len();
-        assert_eq!(failed(&[]), 0);
-        assert_eq!(failed(&[parse("corrected.gwy").unwrap()]), 2);
+        let (sink, job) = (MemorySink::new(), Job::quiet(Some(1)).unwrap());
+        let scans = Scans {
+            analysis: &analysis,
+            inputs: &files,
+            known: &Known::default(),
+            advice: no_advice,
+        };
+        let failed = |exports: &[Export]| write_corrected(&scans, exports, &sink, &job).unwrap();
+        assert!(failed(&[]).is_empty());
+        let gwy = Export {
+            folder: "corrected".to_owned(),
+            format: WritableFormat::Gwy,
+        };
+        assert_eq!(failed(&[gwy]).len(), 2);
     }
 }
