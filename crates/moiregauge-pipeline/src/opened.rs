@@ -67,7 +67,7 @@ impl<'a> Opened<'a> {
     /// # Errors
     /// It cannot be read, or is no scan.
     pub fn new(path: &'a Path, known: &'a Known) -> Result<Self, InputError> {
-        let content = Content::read(known.place(path))?;
+        let content = known.source(path).content()?;
         let channels = channels(path, &content, known)?;
         Ok(Self {
             path,

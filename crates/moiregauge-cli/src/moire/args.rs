@@ -1,17 +1,13 @@
 //! The options of `moiregauge moire`.
 
-use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use anyhow::bail;
 use clap::ValueEnum;
-use heterostrain::lattice::WavelengthMeaning;
 use heterostrain::strain::KnownOrientation;
-use heterostrain::strain::{Orientation, Stacking};
-use moiregauge::settings::{Calibration, Settings};
-use nalgebra::Matrix2;
+use moiregauge::settings::Settings;
+use moiregauge_pipeline::moire::{Direction, Given, MoireQuestion};
 
-use super::question::Question;
 use crate::analyze::{Angle, ConventionArg, DirectionArg, SenseArg, parse_angle};
 use crate::config;
 use crate::numbers;
@@ -35,69 +31,89 @@ Examples:
 Angles are degrees counter-clockwise from x; strains per cent.")]
 pub(crate) struct MoireArgs {
     /// The layers: graphene for two equal ones, graphene/hBN for graphene (layer 2) on hBN (layer 1)
-    #[arg(long, value_name = "UPPER/LOWER", default_value = "graphene")]
+    #[arg(
+        help_heading = "Layers",
+        long,
+        value_name = "UPPER/LOWER",
+        default_value = "graphene"
+    )]
     layers: String,
     /// TOML file with layers of your own, one [[layer]] table each
-    #[arg(long, value_name = "FILE")]
+    #[arg(help_heading = "Layers", long, value_name = "FILE")]
     materials: Option<PathBuf>,
     /// Twist of layer 2 against layer 1, degrees
-    #[arg(long, value_name = "DEG", allow_negative_numbers = true, conflicts_with_all = ["wavelengths", "vectors"], value_parser = numbers::number(numbers::ANGLE_DEG))]
+    #[arg(help_heading = "Forwards: the moiré of two layers", long, value_name = "DEG", allow_negative_numbers = true, conflicts_with_all = ["wavelengths", "vectors"], value_parser = numbers::number(numbers::ANGLE_DEG))]
     twist: Option<f64>,
     /// Uniaxial strain of layer 2, per cent: that much along the axis, −ν times as much across
-    #[arg(long, value_name = "PERCENT", allow_negative_numbers = true, conflicts_with_all = ["wavelengths", "vectors"], value_parser = numbers::number(numbers::STRAIN_PERCENT))]
+    #[arg(help_heading = "Forwards: the moiré of two layers", long, value_name = "PERCENT", allow_negative_numbers = true, conflicts_with_all = ["wavelengths", "vectors"], value_parser = numbers::number(numbers::STRAIN_PERCENT))]
     strain: Option<f64>,
     /// Axis of the strain, degrees, counted from the reciprocal vectors of layer 1 (φ)
-    #[arg(
+    #[arg(help_heading = "Forwards: the moiré of two layers", 
         long,
         value_name = "DEG",
         allow_negative_numbers = true,
         requires = "strain", value_parser = numbers::number(numbers::ANGLE_DEG))]
     strain_axis: Option<f64>,
     /// Strain of layer 2 that is the same in all directions, per cent, on top
-    #[arg(long, value_name = "PERCENT", allow_negative_numbers = true, conflicts_with_all = ["wavelengths", "vectors"], value_parser = numbers::number(numbers::STRAIN_PERCENT))]
+    #[arg(help_heading = "Forwards: the moiré of two layers", long, value_name = "PERCENT", allow_negative_numbers = true, conflicts_with_all = ["wavelengths", "vectors"], value_parser = numbers::number(numbers::STRAIN_PERCENT))]
     biaxial: Option<f64>,
     /// Orientation of layer 1, degrees; backwards with its standard uncertainty, as in 11.2±0.3, and it
     /// gives the whole strain tensor
-    #[arg(long, value_name = "DEG[±SIGMA]", allow_hyphen_values = true)]
+    #[arg(
+        help_heading = "Layers",
+        long,
+        value_name = "DEG[±SIGMA]",
+        allow_hyphen_values = true
+    )]
     lattice_angle: Option<String>,
     /// The layer it is that of, backwards
-    #[arg(long, value_name = "1|2", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=2))]
+    #[arg(help_heading = "Layers", long, value_name = "1|2", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=2))]
     lattice_angle_layer: u8,
     /// The vector it is that of
-    #[arg(long, value_enum, default_value_t = DirectionArg::Atomic)]
+    #[arg(help_heading = "Layers", long, value_enum, default_value_t = DirectionArg::Atomic)]
     lattice_angle_of: DirectionArg,
     /// Backwards: orientation of the other layer with its standard uncertainty; of two equal layers one orientation
     /// leaves the sense of the twist open
-    #[arg(long, value_name = "DEG±SIGMA", allow_hyphen_values = true, value_parser = parse_angle, requires_all = ["lattice_angle", "vectors"])]
+    #[arg(help_heading = "Backwards: the layers behind a moiré", long, value_name = "DEG±SIGMA", allow_hyphen_values = true, value_parser = parse_angle, requires_all = ["lattice_angle", "vectors"])]
     lattice_angle_2: Option<Angle>,
     /// Backwards: the sense of the twist, if it is known
-    #[arg(long, value_enum, requires = "lattice_angle", conflicts_with = "twist")]
+    #[arg(
+        help_heading = "Backwards: the layers behind a moiré",
+        long,
+        value_enum,
+        requires = "lattice_angle",
+        conflicts_with = "twist"
+    )]
     twist_sense: Option<SenseArg>,
     /// Three wavelengths, nm; --meaning has to say what they are
-    #[arg(
+    #[arg(help_heading = "Backwards: the layers behind a moiré", 
         long,
         value_name = "A,B,C",
         value_delimiter = ',',
         conflicts_with = "vectors", value_parser = numbers::number(numbers::LENGTH_NM))]
     wavelengths: Vec<f64>,
     /// What the three wavelengths are: they differ as soon as there is strain
-    #[arg(long, value_enum)]
+    #[arg(
+        help_heading = "Backwards: the layers behind a moiré",
+        long,
+        value_enum
+    )]
     meaning: Option<MeaningArg>,
     /// Two moiré vectors, nm
-    #[arg(long, num_args = 2, value_names = ["X,Y", "X,Y"], allow_hyphen_values = true)]
+    #[arg(help_heading = "Backwards: the layers behind a moiré", long, num_args = 2, value_names = ["X,Y", "X,Y"], allow_hyphen_values = true)]
     vectors: Vec<String>,
     /// Standard uncertainty of each wavelength, or of each component of the vectors, nm
-    #[arg(long, value_name = "NM", default_value_t = 0.0, value_parser = numbers::number(numbers::NOT_NEGATIVE))]
+    #[arg(help_heading = "Backwards: the layers behind a moiré", long, value_name = "NM", default_value_t = 0.0, value_parser = numbers::number(numbers::NOT_NEGATIVE))]
     sigma: f64,
     /// Standard deviation of the isotropic strain that the layers may have, per cent
-    #[arg(long, value_name = "PERCENT", default_value_t = Settings::default().isotropic_strain_percent, value_parser = numbers::number([0.0, 10.0]))]
+    #[arg(help_heading = "Backwards: the layers behind a moiré", long, value_name = "PERCENT", default_value_t = Settings::default().isotropic_strain_percent, value_parser = numbers::number([0.0, 10.0]))]
     isotropic_strain: f64,
     /// Form of the strain equation [default: real-space]
-    #[arg(long, value_enum)]
+    #[arg(help_heading = "Layers", long, value_enum)]
     strain_convention: Option<ConventionArg>,
     /// Electrons per cell at full filling: 4 in graphene (two spins, two valleys)
-    #[arg(long, value_name = "G", default_value_t = 4.0, value_parser = numbers::number([1e-3, 1e6]))]
-    pub(super) band_degeneracy: f64,
+    #[arg(help_heading = "Layers", long, value_name = "G", default_value_t = 4.0, value_parser = numbers::number([1e-3, 1e6]))]
+    band_degeneracy: f64,
     /// Draw the cell: a name that ends in .svg or .png
     #[arg(long, value_name = "FILE")]
     pub(super) figure: Option<PathBuf>,
@@ -123,7 +139,7 @@ enum MeaningArg {
 
 impl MoireArgs {
     /// Layers, conventions and priors.
-    pub(super) fn settings(&self) -> anyhow::Result<Settings> {
+    fn settings(&self) -> anyhow::Result<Settings> {
         let own = config::own_materials(self.materials.as_deref())?;
         let (material, substrate) = config::named_layers(&self.layers, &own)?;
         let settings = Settings {
@@ -143,13 +159,7 @@ impl MoireArgs {
                 .strain_convention
                 .map_or(Settings::default().strain_convention, Into::into),
             isotropic_strain_percent: self.isotropic_strain,
-            // What is typed in has the uncertainty that is typed in.
-            calibration: Calibration {
-                gain_percent: 0.0,
-                mismatch_percent: 0.0,
-                orthogonality_mrad: 0.0,
-            },
-            ..Settings::default()
+            ..MoireQuestion::default().settings
         };
         config::check(&settings)?;
         Ok(settings)
@@ -175,17 +185,23 @@ impl MoireArgs {
     }
 
     /// What is asked.
-    pub(super) fn question(&self) -> anyhow::Result<Question> {
-        if !self.vectors.is_empty() {
-            let [a, b] = [&self.vectors[0], &self.vectors[1]].map(|text| vector(text));
-            let (a, b) = (a?, b?);
-            return Ok(Question::Vectors {
-                basis: Matrix2::new(a[0], b[0], a[1], b[1]),
-                sigma: self.sigma,
+    pub(super) fn question(&self) -> anyhow::Result<MoireQuestion> {
+        Ok(MoireQuestion {
+            settings: self.settings()?,
+            given: self.given()?,
+            band_degeneracy: self.band_degeneracy,
+        })
+    }
+
+    fn given(&self) -> anyhow::Result<Given> {
+        if let [a, b] = self.vectors.as_slice() {
+            return Ok(Given::Vectors {
+                vectors_nm: [vector(a)?, vector(b)?],
+                sigma_nm: self.sigma,
             });
         }
         if !self.wavelengths.is_empty() {
-            let Ok(lengths) = <[f64; 3]>::try_from(self.wavelengths.clone()) else {
+            let Ok(lengths_nm) = <[f64; 3]>::try_from(self.wavelengths.clone()) else {
                 bail!(
                     "--wavelengths: expected three lengths in nm, as in 13.72,12.7,10.18, found {}",
                     self.wavelengths.len()
@@ -199,74 +215,46 @@ impl MoireArgs {
                      10.18 nm mean a twist of 1.190° or of 1.152°"
                 );
             };
-            return Ok(Question::Wavelengths {
-                lengths,
-                sigmas: [self.sigma; 3],
-                meaning: match meaning {
-                    MeaningArg::RealSpace => WavelengthMeaning::RealSpace,
-                    MeaningArg::KSpace => WavelengthMeaning::KSpace,
-                },
+            return Ok(Given::Wavelengths {
+                lengths_nm,
+                sigma_nm: self.sigma,
+                k_space: matches!(meaning, MeaningArg::KSpace),
             });
         }
-        let Some(twist) = self.twist else {
+        let Some(twist_deg) = self.twist else {
             bail!("expected --twist, --wavelengths or --vectors; see moiregauge moire --help");
         };
-        Ok(Question::Forward(Stacking {
-            twist: twist.to_radians(),
-            lattice_angle: self.reference_angle()?,
-            strain: self.strain.unwrap_or(0.0) / 100.0,
-            axis_lattice: self.strain_axis.unwrap_or(0.0).to_radians(),
-            biaxial: self.biaxial.unwrap_or(0.0) / 100.0,
-        }))
+        Ok(Given::Layers {
+            twist_deg,
+            strain_percent: self.strain,
+            strain_axis_deg: self.strain_axis,
+            biaxial_percent: self.biaxial,
+            lattice_angle: self.direction()?,
+        })
     }
 
-    /// α for the forward question: of the reciprocal vectors of layer 1, rad.
-    fn reference_angle(&self) -> anyhow::Result<f64> {
+    /// The orientation of layer 1 for layers that are given.
+    fn direction(&self) -> anyhow::Result<Option<Direction>> {
         let Some(text) = &self.lattice_angle else {
-            return Ok(0.0);
+            return Ok(None);
         };
         let plain: Option<f64> = text.trim().trim_end_matches('°').parse().ok();
         let Some(angle_deg) = numbers::within(numbers::ANGLE_DEG, plain) else {
             bail!("--lattice-angle: expected degrees from −3600 to 3600, found {text:?}");
         };
-        let own = config::own_materials(self.materials.as_deref())?;
-        let (material, substrate) = config::named_layers(&self.layers, &own)?;
-        let known = KnownOrientation {
+        Ok(Some(Direction {
             angle_deg,
-            sigma_deg: 0.0,
-            layer: 1,
             of: self.lattice_angle_of.into(),
-        };
-        let reference = substrate.unwrap_or(material);
-        Ok(Orientation::of(&known, (&reference).into()).angle)
+        }))
     }
 
-    /// What is asked, in words.
-    pub(super) fn in_words(&self) -> String {
-        // Numbers as they were typed, with true minus signs.
-        let typed = |value: f64| value.to_string().replace('-', "−");
-        let mut text = String::new();
-        if let [a, b, c] = self.wavelengths.as_slice() {
-            let meaning = match self.meaning {
-                Some(MeaningArg::KSpace) => "4π/(√3|K|) of the wave vectors",
-                _ => "lengths of the real-space vectors",
-            };
-            let _ = write!(text, "wavelengths {a}, {b}, {c} nm, {meaning}");
-        } else if let [a, b] = self.vectors.as_slice() {
-            let plain = |v: &str| v.trim_matches(['(', ')', ' ']).replace('-', "−");
-            let _ = write!(text, "vectors ({}) and ({}) nm", plain(a), plain(b));
-        } else {
-            let _ = write!(text, "twist {}°", typed(self.twist.unwrap_or(0.0)));
-            if let Some(strain) = self.strain {
-                let axis = typed(self.strain_axis.unwrap_or(0.0));
-                let strain = typed(strain);
-                let _ = write!(text, ", strain {strain} % along {axis}° from layer 1");
-            }
-            if let Some(biaxial) = self.biaxial {
-                let _ = write!(text, ", biaxial strain {} %", typed(biaxial));
-            }
-        }
-        text
+    /// Vectors as they were typed, with true minus signs.
+    pub(super) fn vectors_in_words(&self) -> Option<String> {
+        let [a, b] = self.vectors.as_slice() else {
+            return None;
+        };
+        let plain = |v: &str| v.trim_matches(['(', ')', ' ']).replace('-', "−");
+        Some(format!("vectors ({}) and ({}) nm", plain(a), plain(b)))
     }
 }
 
