@@ -55,7 +55,7 @@ pub(crate) fn measure_by_hand(
             let wavelength = cell.map_or(0.0, |area| (area.abs() / 0.75f64.sqrt()).sqrt());
             (wavelength / near - 1.0).abs() < NEAR_WAVELENGTH
         }
-        Meant::Vectors(_) => first.and_then(|q| q.try_inverse()).is_some_and(|inverse| {
+        Meant::Vectors(_) => first.and_then(Matrix2::try_inverse).is_some_and(|inverse| {
             let names = inverse * pair;
             let whole = names.map(f64::round);
             whole.determinant().abs() == 1.0 && (names - whole).amax() < NEAR
