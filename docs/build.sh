@@ -5,7 +5,7 @@
 #
 # MOIREGAUGE names the program that pages of reference and the gallery are made with; without it a release build is made.
 # A Python environment is made beside the compiled files (or in MOIREGAUGE_DOCS_PYTHON, a folder that may exist already).
-# Ends with 77, having said so, where Python or the packages cannot be had.
+# SPHINXOPTS=-Dplot_gallery=0 leaves out the pictures of the gallery, to look at text quickly. Ends with 77, having said so, where Python or the packages cannot be had.
 set -euo pipefail
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 root=$(dirname "$here")
@@ -49,7 +49,7 @@ ln -s "$root/packaging" "$scratch/site/packaging"
 
 MOIREGAUGE_PROGRAM=$program MOIREGAUGE_VERSION=$("$program" --version | awk '{ print $2 }') \
   SOURCE_DATE_EPOCH=${SOURCE_DATE_EPOCH:-$(git -C "$root" log -1 --format=%ct 2> /dev/null || date +%s)} \
-  "$venv/bin/python" -m sphinx -W --keep-going -n -q -b html -d "$scratch/doctrees" "$scratch/site/docs" "$scratch/html"
+  "$venv/bin/python" -m sphinx -W --keep-going -n -q ${SPHINXOPTS:-} -b html -d "$scratch/doctrees" "$scratch/site/docs" "$scratch/html"
 "$venv/bin/python" "$here/check_site.py" "$scratch/html" "$program" "$root"
 rm -rf "${out:?}"/*
 cp -r "$scratch/html/." "$out/"

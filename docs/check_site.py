@@ -25,7 +25,7 @@ def main(site, program, root):
     for page in pages:
         content = page.read_text(encoding="utf-8")
         wrong += [f"{page.relative_to(site)} loads {found}" for found in LOADED.findall(content)]
-        text.append(html.unescape(re.sub(r"<[^>]+>", "", content)))
+        text.append(html.unescape(re.sub(r"<[^>]+>", " ", content)))
     for style in site.rglob("*.css"):
         wrong += [f"{style.relative_to(site)} loads {found}" for found in LOADED_BY_STYLE.findall(style.read_text(encoding="utf-8"))]
     text = "\n".join(text)

@@ -4,9 +4,15 @@ import os
 import sys
 from pathlib import Path
 
+from pygments.lexers.rust import RustLexer
+from sphinx.highlighting import lexers
+
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE / "_ext"))
 sys.path.insert(0, str(HERE / "gallery"))
+
+# Examples that are compiled by `cargo test` and not run say so behind the name of their language.
+lexers["rust,no_run"] = RustLexer()
 
 project = "moiregauge"
 author = "the moiregauge authors"
