@@ -48,6 +48,7 @@ sphinx_gallery_conf = {
     "filename_pattern": r"plot_.*\.py$",
     "ignore_pattern": r"(mg|readme_picture)\.py$",
     "remove_config_comments": True,
+    "reset_modules": (),
     "show_memory": False,
     "show_signature": False,
     "download_all_examples": False,

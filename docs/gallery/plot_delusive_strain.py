@@ -16,7 +16,7 @@ mg.simulate(
     "--noise", 0.3, "--sample", "atoms:ratio=1",
 )
 said = mg.run("map", "scans", "--out", "maps", "--drift", 0, 0, "--drift-sigma", 0.01, "--no-png", folder=work, fails=True)
-print("\n".join(line for line in said.splitlines() if line.startswith(("  good", "  twist", "  strain "))))
+print("\n".join(line for line in said.splitlines() if line.startswith(("  good", "  twist            3", "  strain           "))))
 image = mg.arrays(work, "scans/scan.000.spm")
 found = mg.arrays(work, "maps/map.gwy")
 figure, axes = plt.subplots(1, 2, figsize=(8, 3.4), layout="constrained")
