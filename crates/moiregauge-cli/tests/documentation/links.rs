@@ -41,7 +41,6 @@ fn exists(path: &Path) -> bool {
 fn links_lead_somewhere() {
     let mut checked = 0;
     for page in pages() {
-        // Included elsewhere, with links from the root.
         let (prose, _) = parts(&read(&page));
         for target in targets(&prose) {
             if target.contains("://") || target.starts_with("mailto:") {
@@ -95,7 +94,7 @@ fn named_functions_and_tests_are_there() {
                     between = part.to_owned();
                 } else if part.starts_with("crates/")
                     && part.ends_with(".rs")
-                    && !part.contains('…')
+                    && !part.contains("NAME")
                 {
                     let path = root().join(part);
                     assert!(path.exists(), "{}: {part}", page.display());
