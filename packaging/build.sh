@@ -16,6 +16,8 @@ out=$(cd "$1" && pwd)
 cd "$root"
 target=${CARGO_TARGET_DIR:-$root/target}
 largest=$((20 * 1000 * 1000))
+scratch=$(mktemp -d)
+trap 'rm -rf "$scratch"' EXIT
 
 # The same sources give the same bytes, wherever they lie.
 export SOURCE_DATE_EPOCH=${SOURCE_DATE_EPOCH:-$(git log -1 --format=%ct 2> /dev/null || echo 0)}
@@ -29,13 +31,14 @@ small_enough() {
   echo "$(basename "$1"): $bytes bytes"
   [ "$bytes" -lt "$largest" ]
 }
-# NAME PROGRAM: an archive with the program, the licences and the words about it.
+# NAME PROGRAM: an archive with the program, the documentation, the licences and the words about it.
 archive() {
   local folder=$out/$1
   rm -rf "$folder"
   mkdir -p "$folder"
   cp "$2" README.md CHANGELOG.md CITATION.cff LICENSE-MIT LICENSE-APACHE "$folder/"
   cp -r licenses "$folder/"
+  if [ -d "$scratch/docs" ]; then cp -r "$scratch/docs" "$folder/docs"; fi
   case $1 in
     *windows*) (cd "$out" && python3 -m zipfile -c "$1.zip" "$1") ;;
     *) tar -C "$out" --sort=name --owner=0 --group=0 --mtime="@$SOURCE_DATE_EPOCH" -czf "$out/$1.tar.gz" "$1" ;;
@@ -52,7 +55,10 @@ linux_program() {
   # Static: no library of the system is asked for, so that it starts on old distributions.
   if readelf -d "$program" | grep -q NEEDED; then echo "the program asks for libraries" >&2; return 1; fi
   if readelf -V "$program" | grep -q GLIBC_; then echo "the program asks for a version of glibc" >&2; return 1; fi
-  "$program" --version && archive "moiregauge-$triple" "$program"
+  "$program" --version || return 1
+  # The documentation goes along: it opens from the file system.
+  MOIREGAUGE=$program docs/build.sh "$scratch/docs" || { rm -rf "$scratch/docs"; missing "the documentation in the archives"; }
+  archive "moiregauge-$triple" "$program"
 }
 
 windows_program() {
