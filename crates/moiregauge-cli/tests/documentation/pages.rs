@@ -95,10 +95,11 @@ pub(crate) fn commands() -> Vec<String> {
 /// The options of a command: the names at the beginning of the entries of its help.
 pub(crate) fn options(command: &str) -> BTreeSet<String> {
     let help = says(&[command, "--help"]);
-    let entries = help
-        .lines()
-        .map(str::trim_start)
-        .filter(|line| line.starts_with('-'));
+    // Descriptions stand further to the right.
+    let entries = help.lines().filter(|line| {
+        let entry = line.trim_start();
+        entry.starts_with('-') && line.len() - entry.len() <= 6
+    });
     entries
         .filter_map(|line| long_options(line).next())
         .collect()
