@@ -5,7 +5,7 @@
 #   packaging/build.sh OUT
 #
 # Needs a Rust toolchain. The Windows program needs gcc-mingw-w64-x86-64, and the target x86_64-pc-windows-gnu or the sources of
-# the standard library (RUST_SRC, or the component rust-src; `-Z build-std`); it is started under wine64 where there is one. The wheel
+# the standard library (the component rust-src, or Debian's rustc-web with rust-web-src; `-Z build-std`); it is started under wine64 where there is one. The wheel
 # needs Python 3.11 or later; maturin is installed in an environment of its own.
 set -euo pipefail
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
@@ -61,12 +61,24 @@ linux_program() {
   archive "moiregauge-$triple" "$program"
 }
 
+# A compiler that has the standard library for Windows, or its source to make it of.
+windows_compiler() {
+  local compiler library
+  for compiler in rustc /usr/bin/rustc; do
+    command -v "$compiler" > /dev/null || continue
+    library=$("$compiler" --print sysroot)/lib/rustlib
+    if [ -d "$library/$1" ] || [ -d "$library/src/rust/library" ]; then echo "$compiler"; return; fi
+  done
+  echo "there is neither the standard library for $1 nor its source (rust-src, or rust-web-src of Debian)" >&2
+  return 1
+}
+
 windows_program() {
   local triple=x86_64-pc-windows-gnu std=() program
   command -v x86_64-w64-mingw32-gcc > /dev/null || { echo "there is no x86_64-w64-mingw32-gcc" >&2; return 1; }
-  if [ ! -d "$(rustc --print sysroot)/lib/rustlib/$triple" ]; then
-    [ -d "$(rustc --print sysroot)/lib/rustlib/src/rust/library" ] ||
-      { echo "there is neither the target $triple nor the source of the standard library" >&2; return 1; }
+  RUSTC=$(windows_compiler "$triple") || return 1
+  export RUSTC
+  if [ ! -d "$("$RUSTC" --print sysroot)/lib/rustlib/$triple" ]; then
     std=(-Z build-std=std,panic_unwind)
     export RUSTC_BOOTSTRAP=1
   fi
@@ -85,7 +97,7 @@ windows_program() {
 wheel() {
   local python=$target/packaging-python
   [ -d crates/moiregauge-python ] || { echo "there is no crates/moiregauge-python" >&2; return 1; }
-  python3 -m venv "$python" && "$python/bin/python" -m pip install --quiet --disable-pip-version-check 'maturin>=1.9,<2' || return 1
+  python3 -m venv "$python" && "$python/bin/python" -m pip install --quiet --disable-pip-version-check 'maturin>=1.16,<2' || return 1
   (cd crates/moiregauge-python && "$python/bin/maturin" build --release --locked --out "$out") || return 1
 }
 

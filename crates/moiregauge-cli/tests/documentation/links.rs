@@ -93,7 +93,7 @@ fn named_functions_and_tests_are_there() {
                 if i % 2 == 0 {
                     between = part.to_owned();
                 } else if part.starts_with("crates/")
-                    && part.ends_with(".rs")
+                    && Path::new(part).extension().is_some_and(|e| e == "rs")
                     && !part.contains("NAME")
                 {
                     let path = root().join(part);
