@@ -3,7 +3,7 @@ What strain does to a cell
 ==========================
 
 ``moiregauge moire --figure`` draws the cell of a twist and a strain. A heterostrain of 0.3 % at 1.1° makes the three wavelengths differ by a
-third: the moiré magnifies strain by one over the twist.
+quarter: the moiré magnifies strain by one over the twist.
 """
 
 import matplotlib.pyplot as plt
