@@ -17,7 +17,7 @@ mg.simulate(
     "--noise", 1.5, "--sample", "twist-wave:amplitude=0.03,wavelength=90,angle=0",
 )
 figure, axes = plt.subplots(1, 3, figsize=(9.5, 3.2), layout="constrained", sharey=True)
-for ax, window in zip(axes, (5, 7, 10)):
+for ax, window in zip(axes, (7, 8.5, 10)):
     mg.run("map", "scans", "--out", f"w{window}", "--window", window, "--margin", 1, "--drift", 0, 0, "--drift-sigma", 0.01, "--no-png",
            "--quiet", folder=work)
     found = mg.arrays(work, f"w{window}/map.gwy")
