@@ -198,6 +198,24 @@ def choice(entry):
     return kind(entry)
 
 
+# What is looked for most often, and where it is.
+OFTEN = """## What is looked for most often
+
+| what | where |
+| --- | --- |
+| twist of a set, with its uncertainties | `sets[0].mean.twist_deg` |
+| heterostrain, and the 95 % interval | `sets[0].mean.heterostrain_percent`, `sets[0].mean.strain_interval_95_percent` |
+| drift | `sets[0].drift.x_nm_per_min`, `sets[0].drift.y_nm_per_min` |
+| moiré vectors, free of drift | `sets[0].mean.vectors` |
+| all sets together | `combined.twist_deg` |
+| where the uncertainty comes from | `sets[0].mean.budget` |
+| every reading of the lattice | `sets[0].mean.readings.solutions` |
+| single scans, before and after the drift is removed | `sets[0].scans[0].twist_strain.sensor`, `sets[0].scans[0].twist_strain.drift_corrected` |
+| doubts | `caveats[0].code` |
+| which files, which settings, which version | `provenance`, `settings` |
+"""
+
+
 def schema_page(root, name, document, words):
     """All keys of a document."""
     path = f"crates/moiregauge-report/schema/{name}-1.schema.json"
@@ -206,6 +224,7 @@ def schema_page(root, name, document, words):
         f"# Keys of `{document}`\n",
         words + "\n",
         f"The JSON Schema is [{name}-1.schema.json](../../{path}). Numbers that could not be determined are `null`.\n",
+        *([OFTEN] if name == "results" else []),
         "## The document\n",
         table_of(schema["title"], schema),
         "## Its parts\n",
