@@ -73,6 +73,25 @@ windows_compiler() {
   return 1
 }
 
+# Starts the Windows program where there is a wine, and analyses a folder with an umlaut and a trailing backslash.
+under_wine() {
+  local wine folder=$scratch/wine-test
+  for wine in "$(command -v wine64 || true)" /usr/lib/wine/wine64 ""; do if [ -x "$wine" ]; then break; fi; done
+  [ -n "$wine" ] || { echo "there is no wine64: the Windows program was not started"; return; }
+  export WINEPREFIX=$scratch/wine WINEDEBUG=-all
+  mkdir -p "$folder"
+  cp "$1" "$folder/"
+  # Wine 8 has no bcryptprimitives.dll, which Windows has: one for this test.
+  printf '%s\n' '#include <windows.h>' 'BOOLEAN NTAPI SystemFunction036(PVOID, ULONG);' \
+    '__declspec(dllexport) BOOL ProcessPrng(PBYTE to, SIZE_T n) { return SystemFunction036(to, (ULONG)n); }' > "$folder/prng.c"
+  x86_64-w64-mingw32-gcc -shared -o "$folder/bcryptprimitives.dll" "$folder/prng.c" -ladvapi32 || return 1
+  cd "$folder" || return 1
+  "$wine" moiregauge.exe --version &&
+    "$wine" moiregauge.exe simulate --out 'mit Übung' --name scans --scans 2 --pixels 128 &&
+    "$wine" moiregauge.exe analyze 'mit Übung\scans\' --out 'mit Übung\out' --quiet --no-png &&
+    test -s 'mit Übung/out/report.html' && cd "$root"
+}
+
 windows_program() {
   local triple=x86_64-pc-windows-gnu std=() program
   command -v x86_64-w64-mingw32-gcc > /dev/null || { echo "there is no x86_64-w64-mingw32-gcc" >&2; return 1; }
@@ -86,11 +105,7 @@ windows_program() {
     cargo build "${std[@]}" --profile dist --locked --package moiregauge-cli --target "$triple" || return 1
   program=$target/$triple/dist/moiregauge.exe
   small_enough "$program" || return 1
-  if command -v wine64 > /dev/null; then
-    WINEDEBUG=-all wine64 "$program" --version || return 1
-  else
-    echo "there is no wine64: the Windows program was not started"
-  fi
+  under_wine "$program" || return 1
   archive "moiregauge-$triple" "$program"
 }
 
