@@ -40,6 +40,7 @@ program=$(cd "$(dirname "$program")" && pwd)/$(basename "$program")
 # The pages as they are kept, and those that the program and the schemas make.
 mkdir "$scratch/site"
 cp -r "$here" "$scratch/site/docs"
+export PYTHONDONTWRITEBYTECODE=1
 ln -s "$root/crates" "$scratch/site/crates"
 for file in README.md DESIGN.md CONTRIBUTING.md CHANGELOG.md CITATION.cff LICENSE-MIT LICENSE-APACHE CODE_OF_CONDUCT.md deny.toml; do
   if [ -e "$root/$file" ]; then cp "$root/$file" "$scratch/site/"; fi
