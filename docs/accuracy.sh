@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Repeats the accuracy table of README.md: simulates ten-scan sets, analyses them and prints the
+# Repeats the accuracy table of docs/accuracy.md: simulates ten-scan sets, analyses them and prints the
 # root-mean-square error against the truth and, in brackets, the rms of error/σ (1 for honest σ).
 #
 #   docs/accuracy.sh [SEEDS] [METHOD…]      (10 seeds and all methods: a minute or two)

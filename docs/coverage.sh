@@ -10,7 +10,7 @@ program=${CARGO_TARGET_DIR:-target}/release/moiregauge
   printf '# Coverage of the errors\n\n'
   printf '%s simulated sets of four frames of 128 × 128 pixels for each row, every set with noise and lattice\n' "$sets"
   printf 'orientation of its own; frame times in the headers are whole seconds and scatter by 0.6 s in all, as the\ndefault settings assume.\n'
-  printf '`docs/coverage.sh` makes this page; [docs/coverage](coverage) has the conditions.\n\n'
+  printf '`docs/coverage.sh` makes this page; the folder `docs/coverage` has the conditions.\n\n'
   printf '| noise, drift | quantity | rms error | mean σ | rms error / bound | rms pull | within 1 σ (%%) | within 2 σ (%%) |\n'
   printf '| --- | --- | --- | --- | --- | --- | --- | --- |\n'
   for conditions in docs/coverage/*.toml; do

@@ -83,7 +83,7 @@ pub use settings::Settings;
 pub use spectrum::Method;
 pub use survey::map_scan;
 
-/// The example of the README, compiled.
+/// The example of the documentation, compiled.
 #[cfg(doctest)]
-#[doc = include_str!("../../../README.md")]
+#[doc = include_str!("../../../docs/reference/library.md")]
 struct Readme;
