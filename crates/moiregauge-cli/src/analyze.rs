@@ -4,6 +4,7 @@ mod again;
 mod args;
 mod arguments;
 mod by_hand;
+mod command;
 mod export;
 mod hint;
 mod orientation;
@@ -12,6 +13,7 @@ mod run;
 mod task;
 
 pub(crate) use args::{AnalyzeArgs, BackgroundArg, ConventionArg, LineArg, MethodArg};
+pub(crate) use command::AnalyzeCommand;
 pub(crate) use hint::{advice, in_words, with_advice};
 pub(crate) use orientation::{Angle, DirectionArg, SenseArg, parse_angle};
 pub(crate) use output::report_names;

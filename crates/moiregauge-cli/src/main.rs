@@ -47,7 +47,7 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
-    Analyze(Box<analyze::AnalyzeArgs>),
+    Analyze(Box<analyze::AnalyzeCommand>),
     Map(Box<map::MapArgs>),
     Campaign(Box<campaign::CampaignArgs>),
     Merge(merge::MergeArgs),
@@ -86,7 +86,7 @@ impl Command {
     /// How many threads are wanted; `None`: as many as there are processors.
     fn threads(&self) -> Option<usize> {
         match self {
-            Self::Analyze(args) => args.threads,
+            Self::Analyze(args) => args.args().threads,
             Self::Map(args) => args.threads(),
             Self::Campaign(args) => args.analyze.threads,
             _ => None,
@@ -96,7 +96,7 @@ impl Command {
     /// Whether progress is shown.
     fn is_loud(&self) -> bool {
         match self {
-            Self::Analyze(args) => args.is_loud(),
+            Self::Analyze(args) => args.args().is_loud(),
             Self::Map(args) => args.is_loud(),
             Self::Campaign(args) => args.analyze.is_loud(),
             Self::Merge(args) => !args.quiet,
@@ -110,7 +110,7 @@ impl Command {
 
 fn run(command: &Command, job: &Job) -> anyhow::Result<ExitCode> {
     match command {
-        Command::Analyze(args) => analyze::run(args, job),
+        Command::Analyze(args) => analyze::run(&args.args(), job),
         Command::Map(args) => map::run(args, job),
         Command::Campaign(args) => campaign::run(args, job),
         Command::Merge(args) => merge::run(args, job),

@@ -26,30 +26,10 @@ const METHOD: &str = "Method";
 const LAYERS: &str = "Layers";
 const OUTPUT: &str = "Output";
 
-/// From scans to drift, moiré vectors, twist and heterostrain, with figures and a report
-///
-/// Scans are grouped into sets by slow axis, line rate, size and channel and ordered by time. Each set
-/// gives its drift velocity (from scans of alternating slow direction), the drift-corrected moiré
-/// lattice, twist and heterostrain; the sets are compared and combined. A file that cannot be used is
-/// reported and skipped, and the exit code tells.
+/// What an analysis asks, for every command that begins with one.
 #[derive(clap::Args, Clone, Debug)]
 // Each is a switch of its own on the command line.
 #[allow(clippy::struct_excessive_bools)]
-#[command(after_long_help = "\
-Examples:
-  moiregauge analyze scans/ --out results
-  moiregauge analyze slow_y/ slow_x/ --out results --channel 'TR Amplitude'
-  moiregauge analyze scan.0_00007.spm --out one --drift 0.62 -0.35 --drift-sigma 0.05
-  moiregauge analyze scans/ --out as-published --method paper --strain-convention k-space
-  moiregauge analyze a/ b/ --out results --set before=a --set after=b
-  moiregauge analyze scans/ --out results --export corrected.gwy
-  moiregauge analyze scans/ --out results --layers graphene/hBN --lattice-angle 12.3±0.2
-  moiregauge analyze scans/ --out results --atomic atomic_up.spm atomic_down.spm
-  moiregauge analyze scans/ --out results --moires 2 --layers graphene,graphene/hBN
-  moiregauge analyze scans/ --out results --near 12nm --region 0,0,250,400
-  moiregauge analyze image.npy --out results --size 70nm×70nm --line-rate 4 --frame-direction up
-
-Angles are counter-clockwise, x to the right and y up, as the position sensors tell.")]
 pub(crate) struct AnalyzeArgs {
     /// Scan files, folders (the scans in them, without subfolders) or names with * and ?
     #[arg(required_unless_present = "replay", value_name = "PATH")]
@@ -198,7 +178,7 @@ pub(crate) struct AnalyzeArgs {
     #[command(flatten)]
     pub(super) orientation: OrientationArgs,
     #[command(flatten)]
-    by_hand: HandArgs,
+    pub(super) by_hand: HandArgs,
     #[command(flatten)]
     scanner: ScannerArgs,
     #[command(flatten)]

@@ -20,14 +20,12 @@ pub(crate) struct HandArgs {
     /// About the mean wavelength of the lattice (12nm): of several lattices this one is measured; 15 % off will do
     #[arg(long, value_name = "WAVELENGTH", value_parser = parse_length)]
     near: Option<f64>,
-    /// Use this part of each frame only: a box, as lower left corner, width and height, or the corners of a polygon apart by
-    /// blanks ('0,0 100,10 60,80'); nm from the lower left corner of the frame, along the lines and across them, or with a
-    /// unit; may be repeated, all parts are used
-    #[arg(long, value_name = "X,Y,W,H", value_parser = parse_part, allow_hyphen_values = true)]
-    region: Vec<Vec<[f64; 2]>>,
     /// Use the pixels of each frame only that are not black in this picture, or above zero in this array, of the same size
     #[arg(long, value_name = "FILE")]
     mask: Option<PathBuf>,
+    /// The parts of each frame to use, where a command asks for them.
+    #[arg(skip)]
+    pub(super) parts: Vec<Vec<[f64; 2]>>,
 }
 
 impl HandArgs {
@@ -43,7 +41,7 @@ impl HandArgs {
         if self.near.is_some() {
             (told.lattice_nm, told.near_nm) = (None, self.near);
         }
-        told.regions_nm.extend(self.region.iter().cloned());
+        told.regions_nm.extend(self.parts.iter().cloned());
         if let Some(path) = &self.mask {
             let mask = read_mask(path);
             told.mask =
@@ -67,7 +65,7 @@ fn parse_length(text: &str) -> Result<f64, String> {
         .ok_or_else(|| "expected a wavelength in nm, as in 12nm".to_owned())
 }
 
-fn parse_part(text: &str) -> Result<Vec<[f64; 2]>, String> {
+pub(super) fn parse_part(text: &str) -> Result<Vec<[f64; 2]>, String> {
     let named = format!("part={text}");
     let region = parse_region(&named).map_err(|error| {
         error
