@@ -12,6 +12,7 @@ use spmfile::{
 };
 
 use crate::content::Content;
+use crate::held::{Held, InMemory};
 use crate::session;
 use crate::twice::distinct;
 
@@ -63,6 +64,7 @@ pub struct Known {
     told: Told,
     order: Vec<PathBuf>,
     places: Places,
+    held: InMemory,
 }
 
 impl Known {
@@ -74,6 +76,7 @@ impl Known {
             told: told.clone(),
             order,
             places: Places::new(),
+            held: InMemory::default(),
         }
     }
 
@@ -82,6 +85,18 @@ impl Known {
     pub fn at(mut self, places: &Places) -> Self {
         self.places.clone_from(places);
         self
+    }
+
+    /// The same, where some of the files are in memory.
+    #[must_use]
+    pub fn holding(mut self, held: &InMemory) -> Self {
+        self.held = InMemory::clone(held);
+        self
+    }
+
+    /// The input of this name, if it is in memory.
+    pub fn held(&self, path: &Path) -> Option<&Held> {
+        self.held.get(path)
     }
 
     /// What is told.

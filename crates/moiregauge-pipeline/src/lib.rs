@@ -7,6 +7,7 @@ pub mod campaign;
 mod content;
 mod find;
 mod hash;
+mod held;
 mod job;
 mod known;
 pub mod maps;
@@ -24,6 +25,7 @@ mod twice;
 
 pub use content::Content;
 pub use find::{Found, LeftAlone, find};
+pub use held::{Held, InMemory};
 pub use hash::{hexadecimal, identity};
 pub use job::{Cancel, Cancelled, Event, Events, Job, JobError, Quiet, Stage};
 pub use known::{Known, KnownError, Places, is_named};

@@ -226,7 +226,12 @@ pub fn record_files(run: &mut Run, known: &Known, inputs: &[PathBuf], measured: 
     };
     for path in inputs {
         let file = in_words(path);
-        match add(path, known.place(path)) {
+        // What is in memory is never looked for on the disk.
+        let added = match known.held(path) {
+            Some(_) => Ok(()),
+            None => add(path, known.place(path)),
+        };
+        match added {
             Ok(()) => run.inputs.push(file),
             Err(error) => run.left_out.push(FailedInput {
                 file,

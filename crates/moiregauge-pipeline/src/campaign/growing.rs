@@ -16,6 +16,7 @@ use super::measure::{Advice, Inputs, Measured, given_again, measured, no_advice}
 use super::overlap::overlap;
 use super::shown::show;
 use crate::job::Job;
+use crate::held::InMemory;
 use crate::known::{Known, Places};
 use crate::names::in_words;
 use crate::told::check_told;
@@ -47,6 +48,8 @@ pub struct Campaign {
     illustrated: bool,
     #[serde(skip)]
     advice: Words,
+    #[serde(skip)]
+    held: InMemory,
 }
 
 /// A campaign as it is written.
@@ -107,6 +110,7 @@ impl Campaign {
             kept: Kept::default(),
             illustrated: false,
             advice: Words::default(),
+            held: InMemory::default(),
         })
     }
 
@@ -172,6 +176,13 @@ impl Campaign {
         self
     }
 
+    /// The same scans, some of which are in memory. They are no part of what is written.
+    #[must_use]
+    pub fn holding(mut self, held: &InMemory) -> Self {
+        self.held = InMemory::clone(held);
+        self
+    }
+
     /// With names that were given and cannot be measured.
     #[must_use]
     pub fn with_left_out(mut self, left_out: Vec<FailedInput>) -> Self {
@@ -234,7 +245,9 @@ impl Campaign {
     /// from there.
     pub fn analyse(&mut self, job: &Job) -> Result<Vec<Outcome>, AnalyseError> {
         let (inputs, repeated) = distinct(&self.inputs);
-        let known = Known::new(&self.told, &inputs).at(&self.places);
+        let known = Known::new(&self.told, &inputs)
+            .at(&self.places)
+            .holding(&self.held);
         let mut failed = self.left_out.clone();
         let mut window = None;
         if self.settings.overlap {

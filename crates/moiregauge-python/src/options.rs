@@ -1,0 +1,123 @@
+//! Keyword arguments → settings, and what is known of files. Names, defaults and checks are those of the settings.
+
+use heterostrain::material::Material;
+use moiregauge::settings::Settings;
+use moiregauge_report::results::Told;
+use pyo3::PyResult;
+use serde_json::{Map, Value};
+
+use crate::errors::wrong;
+
+/// Options of an analysis as JSON: any settings, `layers` as `"graphene/hBN"`, materials by name, `drift` as `[x, y]`.
+///
+/// # Errors
+/// `ValueError` names the option.
+pub(crate) fn settings(options: &str) -> PyResult<Settings> {
+    let mut options: Map<String, Value> = serde_json::from_str(options).map_err(wrong)?;
+    let base: Settings = match options.remove("settings") {
+        Some(given) => serde_json::from_value(given).map_err(|e| wrong(format!("settings: {e}")))?,
+        None => Settings::default(),
+    };
+    let published = options.get("method").and_then(Value::as_str) == Some("paper");
+    let base = if published { base.as_published() } else { base };
+    let Value::Object(mut all) = serde_json::to_value(base).map_err(wrong)? else {
+        return Err(wrong("settings: expected names and values"));
+    };
+    if let Some(Value::String(layers)) = options.remove("layers") {
+        let (upper, lower) = layers.split_once('/').unwrap_or((&layers, &layers));
+        options.insert("material".to_owned(), upper.trim().into());
+        if upper.trim() != lower.trim() {
+            options.insert("substrate".to_owned(), lower.trim().into());
+        }
+    }
+    let chosen = ["material", "substrate", "moire_layers"];
+    if chosen.iter().any(|name| options.contains_key(*name)) {
+        all.insert("layers_chosen".to_owned(), true.into());
+    }
+    for (name, mut value) in options {
+        match (name.as_str(), &mut value) {
+            ("material" | "substrate", given) => *given = material(given.take())?,
+            ("moire_layers", Value::Array(moires)) => {
+                for layers in moires {
+                    *layers = both(layers.take())?;
+                }
+            }
+            ("drift", Value::Array(xy)) if xy.len() == 2 => {
+                value = serde_json::json!({"x_nm_per_min": xy[0], "y_nm_per_min": xy[1]});
+            }
+            _ => {}
+        }
+        if let (Some(Value::Object(known)), Value::Object(given)) = (all.get_mut(&name), &value) {
+            // A part of a table leaves the rest as it is.
+            known.extend(given.clone());
+        } else {
+            all.insert(name, value);
+        }
+    }
+    // One by one, lest the error not tell which.
+    for (name, value) in &all {
+        let one = Map::from_iter([(name.clone(), value.clone())]);
+        serde_json::from_value::<Settings>(one.into()).map_err(|e| wrong(format!("{name}: {e}")))?;
+    }
+    let settings: Settings = serde_json::from_value(all.into()).map_err(wrong)?;
+    settings.check().map_err(wrong)?;
+    Ok(settings)
+}
+
+/// The layers of a moiré: `"graphene/hBN"`, or a table of both.
+fn both(given: Value) -> PyResult<Value> {
+    match given {
+        Value::String(layers) => {
+            let (upper, lower) = layers.split_once('/').unwrap_or((&layers, &layers));
+            let mut table = Map::new();
+            table.insert("material".to_owned(), material(upper.trim().into())?);
+            if upper.trim() != lower.trim() {
+                table.insert("substrate".to_owned(), material(lower.trim().into())?);
+            }
+            Ok(table.into())
+        }
+        other => Ok(other),
+    }
+}
+
+/// A material by name; a table with the name of a known one changes that.
+fn material(given: Value) -> PyResult<Value> {
+    let named = |name: &str| -> PyResult<Value> {
+        let found = Material::named(name).ok_or_else(|| {
+            let all: Vec<String> = Material::all().into_iter().map(|m| m.name).collect();
+            wrong(format!(
+                "unknown material {name:?}; known are {}",
+                all.join(", ")
+            ))
+        })?;
+        serde_json::to_value(found).map_err(wrong)
+    };
+    match given {
+        Value::String(name) => named(&name),
+        Value::Object(table) if table.contains_key("name") && !table.contains_key("source") => {
+            let mut whole = named(table["name"].as_str().unwrap_or_default())?;
+            if let Value::Object(known) = &mut whole {
+                let source = format!("{}, changed by the user", known["name"].as_str().unwrap_or(""));
+                known.extend(table);
+                known.insert("source".to_owned(), source.into());
+            }
+            Ok(whole)
+        }
+        other => Ok(other),
+    }
+}
+
+/// What is known of files, as JSON.
+///
+/// # Errors
+/// `ValueError` names what makes no sense.
+pub(crate) fn told(known: &str) -> PyResult<Told> {
+    let told: Told = serde_json::from_str(known).map_err(wrong)?;
+    moiregauge_pipeline::check_told(&told).map_err(wrong)?;
+    Ok(told)
+}
+
+/// All settings with their defaults, as JSON.
+pub(crate) fn defaults() -> PyResult<String> {
+    serde_json::to_string(&Settings::default()).map_err(wrong)
+}
