@@ -3,7 +3,8 @@
 # Leaves with 77 where there is no Python 3.11 or newer, or no package can be installed. Further arguments go to pytest.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")"
-export CARGO_TARGET_DIR="${CARGO_TARGET_DIR:-$PWD/../../target}/python"
+# That of the workspace: versions and profiles are the same, and most of it is built there already.
+export CARGO_TARGET_DIR="${CARGO_TARGET_DIR:-$PWD/../../target}"
 
 python=${PYTHON:-python3}
 "$python" -c 'import sys; sys.exit(sys.version_info < (3, 11))' || exit 77

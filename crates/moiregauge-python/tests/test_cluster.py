@@ -8,10 +8,9 @@ import threading
 import time
 from pathlib import Path
 
+import moiregauge as mg
 import pytest
 from conftest import program
-
-import moiregauge as mg
 
 FAST = {"drift_draws": 0, "strain_draws": 0}
 
@@ -42,13 +41,13 @@ def test_without_a_cluster_it_runs_here(samples: Path, expected: dict[str, bytes
 @pytest.fixture(scope="module")
 def cluster() -> object:
     distributed = pytest.importorskip("distributed")
-    with distributed.LocalCluster(
-        n_workers=2, threads_per_worker=1, dashboard_address=None, processes=True
-    ) as cluster:
+    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None, processes=True) as cluster:
         yield cluster
 
 
-def test_killed_workers_lose_nothing(cluster: object, samples: Path, expected: dict[str, bytes], tmp_path: Path) -> None:
+def test_killed_workers_lose_nothing(
+    cluster: object, samples: Path, expected: dict[str, bytes], tmp_path: Path
+) -> None:
     from distributed import Client
 
     with Client(cluster) as client:
@@ -76,7 +75,6 @@ def test_a_sample_that_ends_its_workers_is_recorded(
     cluster: object, samples: Path, expected: dict[str, bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from distributed import Client
-
     from moiregauge import campaign
 
     monkeypatch.setattr(campaign, "_task", deadly)

@@ -7,11 +7,10 @@ import pickle
 import warnings
 from pathlib import Path
 
+import moiregauge as mg
 import numpy as np
 import pytest
 from conftest import PROGRAM, program
-
-import moiregauge as mg
 
 pytestmark = pytest.mark.filterwarnings("ignore::moiregauge.CaveatWarning")
 

@@ -5,10 +5,9 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import moiregauge as mg
 import numpy as np
 import pytest
-
-import moiregauge as mg
 
 pytestmark = pytest.mark.filterwarnings("ignore::moiregauge.CaveatWarning")
 pandas = pytest.importorskip("pandas")

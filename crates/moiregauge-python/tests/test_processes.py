@@ -13,9 +13,8 @@ import threading
 import time
 from pathlib import Path
 
-import pytest
-
 import moiregauge as mg
+import pytest
 
 pytestmark = pytest.mark.filterwarnings(
     "ignore::moiregauge.CaveatWarning", "ignore:.*multi-threaded.*:DeprecationWarning"

@@ -5,10 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import moiregauge as mg
 import numpy as np
 import pytest
-
-import moiregauge as mg
 
 pytestmark = pytest.mark.filterwarnings("ignore::moiregauge.CaveatWarning")
 

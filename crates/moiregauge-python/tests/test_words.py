@@ -7,9 +7,8 @@ import sys
 from html.parser import HTMLParser
 from pathlib import Path
 
-import pytest
-
 import moiregauge as mg
+import pytest
 
 pytestmark = pytest.mark.filterwarnings("ignore::moiregauge.CaveatWarning")
 HERE = Path(__file__).resolve().parent.parent
@@ -66,7 +65,5 @@ def test_types_are_right() -> None:
 
     out, errors, code = api.run(["--strict", "--config-file", str(HERE / "pyproject.toml"), str(package)])
     assert code == 0, out + errors
-    done = subprocess.run(
-        [sys.executable, "-m", "mypy.stubtest", "moiregauge._core"], capture_output=True, text=True
-    )
+    done = subprocess.run([sys.executable, "-m", "mypy.stubtest", "moiregauge._core"], capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr

@@ -7,7 +7,7 @@ import os
 import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, Unpack
+from typing import TYPE_CHECKING, Any, Literal, Unpack, cast
 
 from moiregauge import _core
 from moiregauge._arguments import Asked, Input, Progress, asked, words
@@ -34,7 +34,7 @@ def read(file: Input, **told: Unpack[Options]) -> Scan:
 
         name, content = name_of(file, 0), content_of(file)
     else:
-        name = os.fspath(file)
+        name = os.fspath(cast("str", file))
     about, values = _core.read(name, content, words(told))
     return scan(json.loads(about), values)
 
@@ -141,7 +141,6 @@ def analyze(
 
 
 def analyze_moires(
-    moires: int,
     paths: Input | Sequence[Input] | None = None,
     *,
     arrays: Sequence[Any] | None = None,
@@ -155,8 +154,7 @@ def analyze_moires(
     progress: Progress = None,
     **options: Unpack[Options],
 ) -> list[Results]:
-    """As `analyze` of images that show several moirés each: the results of all, the largest cell first."""
-    options["moires"] = moires
+    """As `analyze` with `moires=N`, of images that show several moirés each: the results of all, the largest cell first."""
     found = asked(paths, arrays, pixel_nm, names, options)
     run = run_of(found, options, sets, atomic, atomic_layer, survey_image)
     all_of_them = results_of(run, threads, progress)

@@ -7,7 +7,7 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, BinaryIO, TypeAlias, Union
+from typing import Any, BinaryIO, TypeAlias, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from moiregauge._options import TOLD
 from moiregauge._scan import Scan, grid_of_labelled, is_labelled
 
-Progress: TypeAlias = Union[bool, Callable[[str, int, int], None], None]
+Progress: TypeAlias = bool | Callable[[str, int, int], None] | None
 """`True` for a bar, or a function of what is being done, how much of it is done, and how much there is."""
 PathLike: TypeAlias = "str | os.PathLike[str]"
 # Arrays are objects here, since xarray need not be installed.
@@ -131,7 +131,9 @@ def name_of(file: Any, number: int) -> str:
 def content_of(file: Any) -> bytes:
     content = file.read()
     if not isinstance(content, bytes):
-        raise ValueError(f'expected a file opened for bytes, as in open(path, "rb"), found one of {type(content).__name__}')
+        raise ValueError(
+            f'expected a file opened for bytes, as in open(path, "rb"), found one of {type(content).__name__}'
+        )
     return content
 
 
@@ -139,7 +141,9 @@ def frame(told: Mapping[str, Any], pixel_nm: Any, number: int, count: int) -> Fr
     """What is told of one of several arrays."""
     for name in ("crop", "x_sensor", "y_sensor", "sensors"):
         if name in told:
-            raise ValueError(f"{name} goes with files; of arrays take a slice, or a dictionary with x_sensor and y_sensor")
+            raise ValueError(
+                f"{name} goes with files; of arrays take a slice, or a dictionary with x_sensor and y_sensor"
+            )
     size = told.get("size_nm")
     if size is not None and pixel_nm is not None:
         raise ValueError("expected pixel_nm or size_nm, found both")
@@ -195,7 +199,12 @@ def scan_of(given: Any, about: Frame, name: str) -> tuple[str, list[NDArray[Any]
             elif line in ("trace", "retrace"):
                 add(array, stem or "image", about.unit, line)
             else:
-                add(array, "image" if key in ("trace", "retrace") else key, about.unit, key if key in ("trace", "retrace") else None)
+                add(
+                    array,
+                    "image" if key in ("trace", "retrace") else key,
+                    about.unit,
+                    key if key in ("trace", "retrace") else None,
+                )
     else:
         add(given, "image", about.unit, None)
     if about.size_nm is None:
@@ -215,7 +224,7 @@ def scan_of(given: Any, about: Frame, name: str) -> tuple[str, list[NDArray[Any]
 def checked(array: Any, name: str) -> NDArray[Any]:
     """A 2-D array of numbers that the compiled half can take; copied only where it has to be converted."""
     if isinstance(array, np.ma.MaskedArray):
-        array = array.astype(float).filled(np.nan)
+        array = np.ma.filled(array.astype(float), np.nan)
     array = np.asarray(array)
     if array.ndim != 2:
         raise ValueError(f"{name}: expected a 2-D array (rows, columns), found one of shape {array.shape}")
@@ -227,4 +236,4 @@ def checked(array: Any, name: str) -> NDArray[Any]:
         raise ValueError(f"{name}: expected an image, found nothing but NaN and infinity")
     if array.dtype.name not in TAKEN or not array.dtype.isnative or not array.flags.aligned:
         array = array.astype("float64")
-    return array
+    return cast("NDArray[Any]", array)

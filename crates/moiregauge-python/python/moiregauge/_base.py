@@ -70,7 +70,7 @@ class Document:
         known = {field.name for field in dataclasses.fields(cast(Any, cls))}
         if unknown := set(document) - known:
             raise ValueError(f"{cls.__name__}: expected {sorted(known)}, found also {sorted(unknown)}")
-        wanted = _types(cls)
+        wanted = _types(cast(Any, cls))
         return cls(**{name: _decoded(wanted[name], value) for name, value in document.items()})
 
     def to_dict(self) -> dict[str, Any]:
@@ -189,15 +189,11 @@ class MapBase(Document):
     if TYPE_CHECKING:
         # Name → (unit, values of rows × columns of nodes, row 0 at the bottom). Compared and pickled.
         _arrays: Mapping[str, tuple[str, NDArray[Any]]]
-        # What a report needs; not pickled.
-        _map: _core.Map | None
     else:
-        _arrays, _map = types.MappingProxyType({}), None
+        _arrays = types.MappingProxyType({})
 
     def __getstate__(self) -> dict[str, Any]:
-        state = {**self.__dict__, "_arrays": dict(self._arrays)}
-        state.pop("_map", None)
-        return state
+        return {**self.__dict__, "_arrays": dict(self._arrays)}
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, MapBase):

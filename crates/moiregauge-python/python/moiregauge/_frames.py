@@ -18,7 +18,19 @@ if TYPE_CHECKING:
 
     from moiregauge.results import MapResults, Results
 
-WORDS = {"set", "file", "acquired", "frame_direction", "slow_axis", "coordinates", "excluded", "channel", "vector", "quantity", "source"}
+WORDS = {
+    "set",
+    "file",
+    "acquired",
+    "frame_direction",
+    "slow_axis",
+    "coordinates",
+    "excluded",
+    "channel",
+    "vector",
+    "quantity",
+    "source",
+}
 UNITS = {
     "_nm_per_min": "nm min-1",
     "_nm_per_s": "nm s-1",
@@ -116,13 +128,20 @@ def to_xarray(results: Results) -> xarray.Dataset:
         for sigma in (_sigma_of(name), _sigma_of(name).replace("_sigma", "_spread")):
             if sigma != name and sigma in data and name in data:
                 data[name].attrs["ancillary_variables"] = sigma
-    data.coords["scan"] = ("scan", np.arange(1, len(rows) + 1), {"long_name": "number of the scan, in order of sets and time"})
+    data.coords["scan"] = (
+        "scan",
+        np.arange(1, len(rows) + 1),
+        {"long_name": "number of the scan, in order of sets and time"},
+    )
     document = results.to_dict()
     data.attrs = {
         "Conventions": "CF-1.11",
         "title": "Twist and strain of a moiré superlattice, scan by scan",
         "source": f"moiregauge {results.provenance.version}",
-        **{name: json.dumps(document[name], ensure_ascii=False) for name in ("settings", "provenance", "conventions", "caveats")},
+        **{
+            name: json.dumps(document[name], ensure_ascii=False)
+            for name in ("settings", "provenance", "conventions", "caveats")
+        },
     }
     return data
 
@@ -147,7 +166,15 @@ def map_to_xarray(found: MapResults) -> xarray.Dataset:
     where = "from the left" if straight else "along the rows of nodes, from the first"
     data = xarray.Dataset(
         coords={
-            "y": ("y", y, {"units": "nm", "long_name": f"place, {where.replace('left', 'bottom').replace('rows', 'columns')}", "axis": "Y"}),
+            "y": (
+                "y",
+                y,
+                {
+                    "units": "nm",
+                    "long_name": f"place, {where.replace('left', 'bottom').replace('rows', 'columns')}",
+                    "axis": "Y",
+                },
+            ),
             "x": ("x", x, {"units": "nm", "long_name": f"place, {where}", "axis": "X"}),
         }
     )

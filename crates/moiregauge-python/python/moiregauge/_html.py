@@ -51,9 +51,7 @@ def _row(name: str, scans: int, mean: MeanResult | CombinedResult | None, drift:
 def _caveats(caveats: tuple[Caveat, ...]) -> str:
     if not caveats:
         return ""
-    items = "".join(
-        f"<li><code>{escape(c.code)}</code> {escape(c.where)}: {escape(c.message)}</li>" for c in caveats
-    )
+    items = "".join(f"<li><code>{escape(c.code)}</code> {escape(c.where)}: {escape(c.message)}</li>" for c in caveats)
     return f'<details><summary>{len(caveats)} to keep in mind</summary><ul class="mg-c">{items}</ul></details>'
 
 
@@ -73,7 +71,11 @@ def results(found: Results) -> str:
 
 
 def _failed(count: int) -> str:
-    return f"<p>{count} {'file' if count == 1 else 'files'} could not be used: see <code>failed</code></p>" if count else ""
+    return (
+        f"<p>{count} {'file' if count == 1 else 'files'} could not be used: see <code>failed</code></p>"
+        if count
+        else ""
+    )
 
 
 def map_results(found: MapResults) -> str:

@@ -127,9 +127,9 @@ def _all(client: Client, asked: Any, tasks: list[list[int]], window: int, told: 
     from dask.distributed import KilledWorker, as_completed
 
     waiting, killed = list(reversed(tasks)), []
-    places: dict[str, list[int]] = {}
+    places: dict[Any, list[int]] = {}
 
-    def start() -> Future:
+    def start() -> Future[int]:
         task = waiting.pop()
         future = client.submit(_task, asked, task, pure=False, retries=1)
         places[future.key] = task

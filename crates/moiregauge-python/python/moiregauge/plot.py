@@ -37,16 +37,16 @@ def _scans(results: Results) -> list[tuple[SetResult, ScanResult]]:
     return [(group, one) for group in results.sets for one in group.scans]
 
 
-def scan(
-    results: Results, which: int | str = 0, ax: Axes | None = None, *, lattice: bool = True, **image: Any
-) -> Axes:
+def scan(results: Results, which: int | str = 0, ax: Axes | None = None, *, lattice: bool = True, **image: Any) -> Axes:
     """The image of a scan where the tip was, background removed, with the cell of its moiré lattice in the middle.
 
     which: number of the scan, in order of sets and time, or the name of its file. Keywords go to `Axes.pcolormesh`.
     """
     run = results._run
     if run is None:
-        raise ValueError("these results were pickled or read from a document and have no images: analyze the scans again")
+        raise ValueError(
+            "these results were pickled or read from a document and have no images: analyze the scans again"
+        )
     scans = [one for _, one in _scans(results)]
     if isinstance(which, str):
         found = next((one for one in scans if one.file == which), None)

@@ -1,0 +1,1 @@
+//! Requests of the pipeline, as JSON in and JSON out.
