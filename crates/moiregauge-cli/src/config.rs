@@ -175,7 +175,9 @@ fn parse(text: &str, folder: &Path) -> anyhow::Result<Settings> {
         }
     }
     if let Some(toml::Value::String(file)) = table.get("scanner") {
-        let scanner = toml::Value::try_from(crate::calibrate::file::read(&folder.join(file))?)?;
+        let scanner = toml::Value::try_from(moiregauge_pipeline::calibrate::read_calibration(
+            &folder.join(file),
+        )?)?;
         table.insert("scanner".to_owned(), scanner);
         changed = true;
     }

@@ -1,20 +1,18 @@
 //! `moiregauge convert`: scans from any readable into any writable format.
 
-use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use anyhow::{Context as _, anyhow, bail, ensure};
+use anyhow::{Context as _, bail, ensure};
 use clap::ValueEnum;
-use moiregauge::numbers::interrupt;
-use moiregauge::survey::{nominal_geometry, on_grid};
-use moiregauge_pipeline::sink::{FileSink, SinkError};
-use moiregauge_pipeline::{Content, Job};
-use rayon::prelude::*;
-use spmfile::{ChannelInfo, Scan, WritableFormat, sensor_axis};
+use moiregauge_pipeline::Job;
+use moiregauge_pipeline::convert::{
+    ConvertError, ConvertRequest, ConvertSink, ConvertTo, convert_files,
+};
+use spmfile::WritableFormat;
 
-use crate::input::{Known, KnownArgs, is_named, with_option};
-use crate::outputs;
+use crate::input::{KnownArgs, with_option};
+use crate::outputs::hinted;
 use crate::paths::expand;
 use crate::say::say;
 
@@ -126,25 +124,23 @@ pub(crate) fn run(args: &ConvertArgs, job: &Job) -> anyhow::Result<ExitCode> {
         }
     }
     let format = format(args, out, inputs.len() + failed.len())?;
-    let folder = if args.to.is_some() {
-        out
+    let to = if args.to.is_some() {
+        ConvertTo::Folder(out.clone())
     } else {
-        out.parent().unwrap_or(Path::new(""))
+        ConvertTo::File(out.clone())
     };
     let protected: Vec<PathBuf> = inputs
         .iter()
         .chain(args.known.second_file())
         .cloned()
         .collect();
-    let target = Target {
-        args,
-        out,
+    let sink = ConvertSink::open(&to, format, args.force, &protected).map_err(hinted)?;
+    let request = ConvertRequest {
         format,
-        known: args.known.of(&inputs),
-        sink: outputs::files(folder, args.force, &protected)?,
+        channels: args.channel.clone(),
+        rotate_to_lab: args.rotate_to_lab,
     };
-    target.can_be_written()?;
-    let written = target.convert_all(&inputs, folder, job);
+    let written = convert_files(&inputs, &args.known.of(&inputs), &request, &sink, job)?;
     let (mut files, mut scans) = (Vec::new(), 0);
     for (path, result) in inputs.iter().zip(written) {
         match result {
@@ -152,7 +148,7 @@ pub(crate) fn run(args: &ConvertArgs, job: &Job) -> anyhow::Result<ExitCode> {
                 scans += 1;
                 files.extend(names);
             }
-            Err(error) => failed.push(format!("{}: {error:#}", path.display())),
+            Err(error) => failed.push(format!("{}: {:#}", path.display(), with_hint(error))),
         }
     }
     if !args.quiet && scans > 0 {
@@ -203,172 +199,14 @@ fn in_words(out: &Path, scans: usize, files: &[PathBuf]) -> String {
     format!("{scans} written to {}{more}\n", first.display())
 }
 
-/// Where and how files are written.
-struct Target<'a> {
-    args: &'a ConvertArgs,
-    out: &'a Path,
-    format: WritableFormat,
-    known: Known,
-    sink: FileSink,
-}
-
-impl Target<'_> {
-    /// Converts all files; returns what each became.
-    fn convert_all(
-        &self,
-        inputs: &[PathBuf],
-        folder: &Path,
-        job: &Job,
-    ) -> Vec<anyhow::Result<Vec<PathBuf>>> {
-        // Before anything runs in parallel: which of two files of one name is first must not depend on it.
-        let mut taken = HashSet::new();
-        let jobs: Vec<(&PathBuf, String, bool)> = inputs
-            .iter()
-            .map(|path| {
-                let stem = self.stem(path);
-                let new = taken.insert(stem.to_lowercase());
-                (path, stem, new)
-            })
-            .collect();
-        let stage = job.stage("converting", "files", inputs.len());
-        let written: Vec<anyhow::Result<Vec<PathBuf>>> = jobs
-            .par_iter()
-            .map(|(path, stem, new)| {
-                interrupt::check();
-                let result = if *new {
-                    self.convert(path, stem)
-                } else {
-                    let name = folder.join(stem);
-                    Err(anyhow!(
-                        "another file of this run already becomes {}",
-                        name.display()
-                    ))
-                };
-                stage.step();
-                result
-            })
-            .collect();
-        drop(stage);
-        written
-    }
-
-    /// Converts one file; returns what was written.
-    fn convert(&self, path: &Path, stem: &str) -> anyhow::Result<Vec<PathBuf>> {
-        let content = Content::read(path)?;
-        let is_wanted = |info: &ChannelInfo| {
-            let points = self.format == WritableFormat::Gxyzf;
-            let names = &self.args.channel;
-            names.is_empty()
-                || names.iter().any(|name| is_named(&info.name, name))
-                || (points && sensor_axis(&info.name, &info.internal_name).is_some())
-        };
-        let read = self.known.read(path, &content, &is_wanted);
-        let (mut scan, replaced) = read.map_err(with_option)?;
-        self.channels_are_there(&scan)?;
-        let mut log = vec![format!(
-            "converted by moiregauge {} from {}",
-            env!("CARGO_PKG_VERSION"),
-            path.file_name().unwrap_or_default().to_string_lossy()
-        )];
-        log.extend(replaced);
-        log.extend(scan.notes.iter().cloned());
-        if self.args.rotate_to_lab {
-            scan = turned(&scan)?;
-            log.push("turned into laboratory axes by cubic convolution".to_owned());
+/// The error, with the option that helps against it.
+fn with_hint(error: ConvertError) -> anyhow::Error {
+    match error {
+        ConvertError::Known(error) => with_option(error),
+        ConvertError::Sink(error) => hinted(error),
+        ConvertError::NoSize => {
+            anyhow::anyhow!("--rotate-to-lab needs the size of the image; give it with --size")
         }
-        let files = spmfile::write(&scan, self.format, stem, &log)?;
-        self.write(stem, files).map_err(outputs::hinted)
+        other => other.into(),
     }
-
-    /// Stem of what a file becomes.
-    fn stem(&self, path: &Path) -> String {
-        if self.args.to.is_some() {
-            return stem_of(path);
-        }
-        let stem = self.out.file_stem().unwrap_or_default();
-        stem.to_string_lossy().into_owned()
-    }
-
-    /// Finds out before the work whether the one file that was asked for may be written.
-    fn can_be_written(&self) -> anyhow::Result<()> {
-        let Some(name) = self.out.file_name().filter(|_| self.args.to.is_none()) else {
-            return Ok(());
-        };
-        let checked = match self.format {
-            WritableFormat::Zarr => self.sink.check_group(Path::new(name)),
-            // Named by their channels or lines.
-            WritableFormat::Gsf | WritableFormat::Csv | WritableFormat::Gxyzf => Ok(()),
-            _ => self.sink.check(Path::new(name)),
-        };
-        checked.map_err(outputs::hinted)
-    }
-
-    fn channels_are_there(&self, scan: &Scan) -> anyhow::Result<()> {
-        for name in &self.args.channel {
-            let there = scan.channels.iter().any(|c| is_named(&c.name, name));
-            ensure!(there, "no channel {name:?}");
-        }
-        Ok(())
-    }
-
-    fn write(&self, stem: &str, files: Vec<(String, Vec<u8>)>) -> Result<Vec<PathBuf>, SinkError> {
-        let plain = format!("{stem}.{}", self.format.extension());
-        // `OUT.tif` is written as it was asked for.
-        let asked = self.out.file_name().filter(|_| self.args.to.is_none());
-        let named = |name: String| match asked {
-            Some(asked) if name == plain => PathBuf::from(asked),
-            _ => PathBuf::from(name),
-        };
-        if self.format != WritableFormat::Zarr {
-            let files = files.into_iter().map(|(name, bytes)| (named(name), bytes));
-            return self.sink.write(&files.collect::<Vec<_>>());
-        }
-        let inside = |name: String| name[plain.len() + 1..].to_owned();
-        let files = files.into_iter().map(|(name, bytes)| (inside(name), bytes));
-        let group = named(plain.clone());
-        let written = self.sink.write_group(&group, &files.collect::<Vec<_>>())?;
-        Ok(vec![written])
-    }
-}
-
-/// The name of a file without its extension, unless that is a number, `scan.012` being one of many, or that of
-/// a channel, as in `scan.Z_mtrx`.
-pub(crate) fn stem_of(path: &Path) -> String {
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
-    if let Some(channel) = name.strip_suffix("_mtrx") {
-        return channel.to_owned();
-    }
-    match name.rsplit_once('.') {
-        Some((stem, extension))
-            if !stem.is_empty() && !extension.bytes().all(|b| b.is_ascii_digit()) =>
-        {
-            stem.to_owned()
-        }
-        _ => name.into_owned(),
-    }
-}
-
-/// Every image in laboratory axes.
-fn turned(scan: &Scan) -> anyhow::Result<Scan> {
-    let mut out: Option<Scan> = None;
-    for channel in &scan.channels {
-        if sensor_axis(&channel.name, &channel.internal_name).is_some() {
-            continue;
-        }
-        let geometry = nominal_geometry(scan, channel)
-            .context("--rotate-to-lab needs the size of the image; give it with --size")?;
-        let turned = on_grid(scan, channel, &geometry)
-            .with_context(|| format!("channel {:?} cannot be turned", channel.name))?;
-        match &mut out {
-            Some(out) => out.channels.extend(turned.channels),
-            None => {
-                out = Some(Scan {
-                    notes: scan.notes.clone(),
-                    metadata: scan.metadata.clone(),
-                    ..turned
-                });
-            }
-        }
-    }
-    out.context("there is no channel but the position sensors")
 }

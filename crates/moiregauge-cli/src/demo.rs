@@ -7,6 +7,7 @@ use anyhow::Context as _;
 use moiregauge::settings::Settings;
 use moiregauge_pipeline::Job;
 use moiregauge_pipeline::campaign::{Campaign, Outcome};
+use moiregauge_pipeline::simulate::paper_sets;
 use moiregauge_pipeline::sink::Target;
 use moiregauge_report::screen::summary;
 use moiregauge_report::{Choice, write_report};
@@ -15,7 +16,7 @@ use crate::analyze::{in_words, report_names};
 use crate::outputs;
 use crate::paths::expand;
 use crate::say::say;
-use crate::simulate::{paper_sets, write_sets};
+use crate::simulate::write_sets;
 
 /// Simulate the three sets of arXiv 2406.08681, analyse them and show where the report is
 ///

@@ -1,6 +1,5 @@
 //! `moiregauge info`: what scan files hold, how it is scaled, what the analysis would miss.
 
-mod about;
 mod run;
 mod table;
 

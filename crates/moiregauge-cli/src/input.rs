@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use clap::ValueEnum;
+pub(crate) use moiregauge_pipeline::Known;
 use moiregauge_pipeline::KnownError;
-pub(crate) use moiregauge_pipeline::{Known, is_named};
 use moiregauge_report::results::{Crop, FrameOrder, Told};
 use spmfile::length_nm;
 

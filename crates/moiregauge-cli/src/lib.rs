@@ -135,7 +135,7 @@ fn run(command: &Command, job: &Job) -> anyhow::Result<ExitCode> {
         Command::Simulate(args) => simulate::run(args, job),
         Command::Demo(args) => demo::run(args, job),
         Command::Validate(args) => validate::run(args, job),
-        Command::Plan(args) => plan::run(args),
+        Command::Plan(args) => plan::run(args, job),
         Command::Config(args) => config::run(args),
         Command::Explain(args) => explain::run(args),
         Command::Completions(args) => shells::completions(args, arguments()),

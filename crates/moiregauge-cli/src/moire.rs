@@ -1,7 +1,6 @@
 //! `moiregauge moire`: layers, twist and strain → the moiré they make; and a moiré → what it means.
 
 mod args;
-mod question;
 mod run;
 mod words;
 

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use moiregauge_pipeline::sink::{FileSink, FolderSink, OneFile, SinkError, Target};
+use moiregauge_pipeline::sink::{FolderSink, OneFile, SinkError, Target};
 
 /// Makes a folder of results ready, before the work.
 pub(crate) fn folder(target: &Target) -> anyhow::Result<FolderSink> {
@@ -12,11 +12,6 @@ pub(crate) fn folder(target: &Target) -> anyhow::Result<FolderSink> {
 /// Puts everything in place.
 pub(crate) fn commit(sink: FolderSink) -> anyhow::Result<()> {
     sink.commit().map_err(hinted)
-}
-
-/// Makes a folder for single files ready, before the work.
-pub(crate) fn files(folder: &Path, force: bool, inputs: &[PathBuf]) -> anyhow::Result<FileSink> {
-    FileSink::open(folder, force, inputs).map_err(hinted)
 }
 
 /// Makes sure that a file can be written, before the work.

@@ -1,8 +1,6 @@
 //! `moiregauge plan`: wanted errors and an instrument → how to scan, how long, and what limits.
 
 mod run;
-mod search;
-mod wishes;
 mod words;
 
 pub(crate) use run::{PlanArgs, run};

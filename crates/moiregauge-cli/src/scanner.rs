@@ -47,7 +47,7 @@ impl ScannerArgs {
             *setting = given.unwrap_or(*setting);
         }
         if let Some(path) = &self.calibration {
-            settings.scanner = Some(crate::calibrate::file::read(path)?);
+            settings.scanner = Some(moiregauge_pipeline::calibrate::read_calibration(path)?);
         }
         Ok(())
     }

@@ -4,4 +4,4 @@ mod args;
 mod run;
 
 pub(crate) use args::SimulateArgs;
-pub(crate) use run::{paper_sets, run, write_sets};
+pub(crate) use run::{run, write_sets};

@@ -1,11 +1,8 @@
 //! `moiregauge validate`: are the errors true? Many simulated sets, analysed and compared.
 
-mod compare;
 mod conditions;
-mod like;
-mod output;
 mod run;
-mod samples;
+mod words;
 
 pub(crate) use conditions::given_conditions;
 pub(crate) use run::{ValidateArgs, run};

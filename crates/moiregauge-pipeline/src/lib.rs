@@ -3,36 +3,50 @@
 //! Files and settings, but no arguments of a program, no printing and no physics. Front ends (the program, a
 //! Python package, a page) stand on this crate.
 
+pub mod calibrate;
 pub mod campaign;
 mod content;
+pub mod convert;
 mod find;
 mod hash;
 mod held;
+pub mod inspect;
 mod job;
 mod known;
 pub mod maps;
 mod memory;
+pub mod moire;
 pub mod names;
 mod opened;
+pub mod plan;
 mod reading;
 mod replay;
 pub mod samples;
 pub mod session;
 mod sets;
+pub mod simulate;
 pub mod sink;
 mod told;
 mod twice;
+pub mod validate;
 
+pub use calibrate::calibrate;
 pub use content::Content;
+pub use convert::convert;
 pub use find::{Found, LeftAlone, find};
 pub use held::{Held, InMemory};
 pub use hash::{hexadecimal, identity};
+pub use inspect::inspect;
 pub use job::{Cancel, Cancelled, Event, Events, Job, JobError, Quiet, Stage};
 pub use known::{Known, KnownError, Places, is_named};
 pub use memory::{NotEnoughMemory, available, enough_for};
+pub use moire::moire;
 pub use opened::{InputError, Opened, Reading, read_again, read_scan, read_shown};
+pub use plan::plan;
 pub use reading::{FileError, open, read, read_text};
 pub use replay::{Document, ReplayError, record_files, settings_of};
 pub use sets::{SetError, absolute, check_sets, set_of};
+pub use simulate::simulate;
 pub use told::check_told;
 pub use twice::{Repeated, distinct};
+pub use validate::validate;

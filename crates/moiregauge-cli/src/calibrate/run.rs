@@ -1,29 +1,30 @@
 //! The run: images of a known lattice → the calibration, printed and written.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
-use anyhow::{Context as _, bail, ensure};
+use anyhow::{Context as _, bail};
 use heterostrain::material::Material;
 use moiregauge::calibration::KnownLattice;
-use moiregauge::campaign::Calibrated;
-use moiregauge::numbers::interrupt;
-use moiregauge::scan::{MeasureError, MeasuredScan, measure_known};
-use moiregauge::settings::{Grouping, MOST_IMAGES, Settings};
-use moiregauge_pipeline::sink::OneFile;
+use moiregauge::settings::{MOST_IMAGES, Settings};
+use moiregauge_pipeline::Job;
+use moiregauge_pipeline::calibrate::{
+    CalibrateRequest, NotCalibrated, NotMeasured, Unusable, WhyNotCalibrated, known_lattice,
+};
+use moiregauge_pipeline::names::in_words;
+use moiregauge_report::FailedInput;
 use moiregauge_report::screen::failures;
-use moiregauge_report::{FailedInput, InputFile};
-use rayon::prelude::*;
 
-use super::{file, words};
+use super::words;
 use crate::analyze::{BackgroundArg, LineArg, with_advice};
 use crate::config;
-use crate::input::{Known, KnownArgs};
+use crate::input::KnownArgs;
 use crate::numbers;
 use crate::paths::inputs;
 use crate::say::say;
-use moiregauge_pipeline::campaign::given_again;
-use moiregauge_pipeline::{InputError, Job, Reading, read_scan};
+
+/// The first line of the file.
+const TITLE: &str = "Calibration of a scanner, for `moiregauge analyze --calibration FILE`.";
 
 /// Measure gain, mismatch and orthogonality of a scanner on images of a known lattice
 ///
@@ -100,47 +101,38 @@ struct Cell {
 
 /// Measures the images, prints what they say, and writes the file.
 pub(crate) fn run(args: &CalibrateArgs, job: &Job) -> anyhow::Result<ExitCode> {
-    let lattice = args.known_lattice()?;
-    let cell = lattice
-        .cell()
-        .context("the known lattice has no area: expected two vectors that are not parallel")?;
-    let defaults = Settings::default();
-    let settings = Settings {
-        channel: args.channel.clone(),
-        image: args.image,
-        line: args.line.map_or(defaults.line, Into::into),
-        background: args.background.map_or(defaults.background, Into::into),
-        ..defaults
-    };
+    let request = args.request()?;
     let (inputs, mut failed) = inputs(&args.paths, !args.quiet);
-    let (inputs, repeated) = moiregauge_pipeline::distinct(&inputs);
     let file = |out| crate::outputs::file(out, args.force, &inputs);
     let file = args.out.as_deref().map(file).transpose()?;
     let known = args.known.of(&inputs);
-    let all = measured_all(&inputs, job, |path| {
-        measured(path, &settings, &known, &cell)
-    });
-    failed.extend(all.failed);
-    let (scans, files) = (all.scans, all.files);
-    eprint!("{}", failures(&failed));
-    ensure!(
-        !scans.is_empty() || all.looked_at > 0,
-        "nothing could be read: there is no image to look for the lattice of {} in",
-        lattice.name
-    );
-    ensure!(
-        !scans.is_empty(),
-        "no image shows the lattice of {}",
-        lattice.name
-    );
-    let sigma = args.drift_sigma / 60.0;
-    let mut found = moiregauge::campaign::calibrate(scans, &lattice, sigma, Grouping::Auto)?;
-    found.caveats.extend(given_again(&repeated));
+    let found = match moiregauge_pipeline::calibrate(&inputs, &known, &request, job) {
+        Ok((found, lost)) => {
+            failed.extend(lost.into_iter().map(with_hint));
+            eprint!("{}", failures(&failed));
+            found
+        }
+        Err(NotCalibrated { why, failed: lost }) => {
+            failed.extend(lost.into_iter().map(with_hint));
+            eprint!("{}", failures(&failed));
+            return Err(match why {
+                WhyNotCalibrated::Cancelled(cancelled) => cancelled.into(),
+                other => other.into(),
+            });
+        }
+    };
     if !args.quiet {
-        say(&words::summary(&found, &lattice))?;
+        say(&words::summary(&found.found, &found.lattice))?;
     }
     if let (Some(out), Some(file)) = (&args.out, file) {
-        write(&found, &lattice, (args.drift_sigma, &files), (out, file))?;
+        let document = found.document().map_err(|why| {
+            let help = match why {
+                Unusable::NoErrors => "; give --line-rate",
+                _ => "",
+            };
+            anyhow::anyhow!("{} is not written: {why}{help}", out.display())
+        })?;
+        file.write(document.to_toml(TITLE)?.into_bytes())?;
         if !args.quiet {
             say(&format!(
                 "\nWritten to {0}; for moiregauge analyze --calibration {0}\n",
@@ -155,104 +147,40 @@ pub(crate) fn run(args: &CalibrateArgs, job: &Job) -> anyhow::Result<ExitCode> {
     })
 }
 
-/// What the images of the known lattice tell.
-#[derive(Default)]
-struct All {
-    scans: Vec<MeasuredScan>,
-    files: Vec<InputFile>,
-    failed: Vec<FailedInput>,
-    /// Images in which no lattice was found.
-    looked_at: usize,
-}
-
-/// Measures all images.
-fn measured_all(
-    inputs: &[PathBuf],
-    job: &Job,
-    measured: impl Fn(&Path) -> anyhow::Result<(MeasuredScan, InputFile)> + Sync,
-) -> All {
-    let stage = job.stage("measuring", "scans", inputs.len());
-    let results: Vec<_> = inputs
-        .par_iter()
-        .map(|path| {
-            interrupt::check();
-            let result = measured(path);
-            stage.step();
-            result
-        })
-        .collect();
-    drop(stage);
-    let mut all = All::default();
-    for (path, result) in inputs.iter().zip(results) {
-        match result {
-            Ok((scan, file)) => {
-                all.scans.push(scan);
-                all.files.push(file);
-            }
-            Err(error) => {
-                let cause = error.downcast_ref();
-                all.looked_at += usize::from(matches!(
-                    cause,
-                    Some(InputError::Measure(MeasureError::Lattice { .. }))
-                ));
-                all.failed.push(FailedInput {
-                    file: moiregauge_pipeline::names::in_words(path),
-                    error: format!("{error:#}"),
-                });
-            }
-        }
+/// The error with the options that help against it.
+fn with_hint(lost: NotMeasured) -> FailedInput {
+    let seen = lost.shows_none();
+    let mut error = with_advice(lost.error);
+    if seen {
+        error =
+            error.context("looking for the known lattice (another --channel may show it better)");
     }
-    all
-}
-
-/// Writes the calibration, unless nobody could use it.
-fn write(
-    found: &Calibrated,
-    lattice: &KnownLattice,
-    (drift_sigma, files): (f64, &[InputFile]),
-    (out, file): (&Path, OneFile),
-) -> anyhow::Result<()> {
-    ensure!(
-        found.covariance_known,
-        "{} is not written: nobody knows its errors, since the frames do not tell the drift and have no line \
-         rate; give --line-rate",
-        out.display()
-    );
-    if let Some(problem) = found.calibration.problem() {
-        bail!("{} is not written: {problem}", out.display());
+    FailedInput {
+        file: in_words(&lost.file),
+        error: format!("{error:#}"),
     }
-    let text = file::text(found, lattice, drift_sigma, files)?;
-    Ok(file.write(text.into_bytes())?)
-}
-
-/// One image of the known cell.
-fn measured(
-    path: &Path,
-    settings: &Settings,
-    known: &Known,
-    cell: &nalgebra::Matrix2<f64>,
-) -> anyhow::Result<(MeasuredScan, InputFile)> {
-    let Reading {
-        scan,
-        input,
-        caveats,
-    } = read_scan(path, settings, known).map_err(with_advice)?;
-    let measured = measure_known(&input.file, &scan, settings, cell);
-    let mut measured = measured.map_err(|error| {
-        let seen = matches!(error, MeasureError::Lattice { .. });
-        let error = with_advice(InputError::Measure(error));
-        if seen {
-            return error
-                .context("looking for the known lattice (another --channel may show it better)");
-        }
-        error
-    })?;
-    measured.caveats.extend(caveats);
-    measured.digest = Some(input.sha256.clone());
-    Ok((measured, input))
 }
 
 impl CalibrateArgs {
+    fn request(&self) -> anyhow::Result<CalibrateRequest> {
+        let lattice = self.known_lattice()?;
+        lattice
+            .cell()
+            .context("the known lattice has no area: expected two vectors that are not parallel")?;
+        let defaults = Settings::default();
+        Ok(CalibrateRequest {
+            lattice,
+            drift_sigma_nm_per_min: self.drift_sigma,
+            settings: Settings {
+                channel: self.channel.clone(),
+                image: self.image,
+                line: self.line.map_or(defaults.line, Into::into),
+                background: self.background.map_or(defaults.background, Into::into),
+                ..defaults
+            },
+        })
+    }
+
     fn known_lattice(&self) -> anyhow::Result<KnownLattice> {
         let own = self.lattice_sigma.unwrap_or(0.1);
         let mut lattice = match (self.lattice, self.lattice_constant, &self.material) {
@@ -279,12 +207,8 @@ impl CalibrateArgs {
 
 /// A surface or a layer by its name, one of the user's `own` layers first.
 fn named(name: &str, own: &[Material]) -> anyhow::Result<KnownLattice> {
-    let of_user = own.iter().any(|m| m.name.eq_ignore_ascii_case(name.trim()));
-    if let Some(known) = KnownLattice::named(name).filter(|_| !of_user) {
+    if let Some(known) = known_lattice(name, own) {
         return Ok(known);
-    }
-    if let Some(layer) = config::find_material(name, own) {
-        return Ok(KnownLattice::of_layer(&layer));
     }
     let surfaces = KnownLattice::all().into_iter().map(|k| k.name);
     let layers = own.iter().cloned().chain(Material::all()).map(|m| m.name);
@@ -343,19 +267,7 @@ mod tests {
     }
 
     #[test]
-    fn surfaces_and_layers_have_names() {
-        assert_eq!(named("Si111-7x7", &[]).unwrap().a_nm, 2.688);
-        assert_eq!(named("hbn", &[]).unwrap().a_nm, 0.2504);
-        // Not all layers are hexagonal.
-        let telluride = named("WTe2 1T'", &[]).unwrap();
-        assert_eq!(telluride.angle_deg, 90.0);
-        assert!(telluride.b_nm > 1.7 * telluride.a_nm);
-        let mine = Material {
-            name: "graphite".to_owned(),
-            lattice_constant_nm: 0.2461,
-            ..Material::graphene()
-        };
-        assert_eq!(named("graphite", &[mine]).unwrap().a_nm, 0.2461);
+    fn unknown_surfaces_are_refused_with_what_is_known() {
         let error = named("cheese", &[]).unwrap_err().to_string();
         assert!(
             error.contains("graphite") && error.contains("MoS2"),

@@ -4,13 +4,13 @@ use std::io::{ErrorKind, Write as _};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use moiregauge_pipeline::Content;
-use spmfile::ReadError;
+use moiregauge_pipeline::inspect::{FileInfo, Pixel};
+use moiregauge_pipeline::{Known, inspect};
 
-use super::about::{FileInfo, Pixel, outside, scan_info};
 use super::table::table;
 
-use crate::input::{Known, KnownArgs, with_option};
+use crate::analyze::advice;
+use crate::input::KnownArgs;
 use crate::paths::expand;
 
 /// Show what scan files hold: channels, units, sizes, directions, scaling
@@ -83,29 +83,17 @@ pub(crate) fn run(args: &InfoArgs) -> anyhow::Result<ExitCode> {
     })
 }
 
+/// What a file holds, with the options that help.
 fn file_info(path: &Path, at: &[Pixel], known: &Known) -> FileInfo {
-    let (mut scan, mut error) = match Content::read(path) {
-        Err(error) => (None, Some(error.to_string())),
-        Ok(content) => match known.decode(path, &content, &|_| true) {
-            Ok(scan) => (Some(scan), None),
-            Err(ReadError::Incomplete { reason, readable }) => {
-                let reason = format!("the file is damaged: {reason}");
-                (Some(*readable), Some(reason))
-            }
-            Err(error) => (None, Some(error.to_string())),
-        },
-    };
-    if let Some(scan) = &mut scan
-        && let Err(problem) = known.complete(path, scan)
-    {
-        error = error.or(Some(format!("{:#}", with_option(problem))));
+    let mut info = inspect(path, known, at, advice);
+    if let Some(scan) = &mut info.scan {
+        let outside = scan.outside(at).map(|outside| format!("--at {outside}"));
+        info.error = info.error.or(outside);
+        for note in scan.notes.iter_mut().rev().take(scan.notes_on_choice) {
+            *note += " (--channel NAME and --image N of analyze say which one is)";
+        }
     }
-    error = error.or_else(|| outside(scan.as_ref()?, at));
-    FileInfo {
-        file: path.to_string_lossy().into_owned(),
-        error,
-        scan: scan.as_ref().map(|scan| scan_info(scan, at)),
-    }
+    info
 }
 
 fn parse_pixel(text: &str) -> Result<Pixel, String> {

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::about::{ChannelInfo, FileInfo, Sample, ScanInfo};
+use moiregauge_pipeline::inspect::{ChannelInfo, FileInfo, Sample, ScanInfo};
 
 /// The readable form of one file.
 pub(super) fn table(info: &FileInfo) -> String {

@@ -1,17 +1,13 @@
 //! The options of `moiregauge moire`.
 
-use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use anyhow::bail;
 use clap::ValueEnum;
-use heterostrain::lattice::WavelengthMeaning;
 use heterostrain::strain::KnownOrientation;
-use heterostrain::strain::{Orientation, Stacking};
-use moiregauge::settings::{Calibration, Settings};
-use nalgebra::Matrix2;
+use moiregauge::settings::Settings;
+use moiregauge_pipeline::moire::{Direction, Given, MoireQuestion};
 
-use super::question::Question;
 use crate::analyze::{Angle, ConventionArg, DirectionArg, SenseArg, parse_angle};
 use crate::config;
 use crate::numbers;
@@ -97,7 +93,7 @@ pub(crate) struct MoireArgs {
     strain_convention: Option<ConventionArg>,
     /// Electrons per cell at full filling: 4 in graphene (two spins, two valleys)
     #[arg(long, value_name = "G", default_value_t = 4.0, value_parser = numbers::number([1e-3, 1e6]))]
-    pub(super) band_degeneracy: f64,
+    band_degeneracy: f64,
     /// Draw the cell: a name that ends in .svg or .png
     #[arg(long, value_name = "FILE")]
     pub(super) figure: Option<PathBuf>,
@@ -123,7 +119,7 @@ enum MeaningArg {
 
 impl MoireArgs {
     /// Layers, conventions and priors.
-    pub(super) fn settings(&self) -> anyhow::Result<Settings> {
+    fn settings(&self) -> anyhow::Result<Settings> {
         let own = config::own_materials(self.materials.as_deref())?;
         let (material, substrate) = config::named_layers(&self.layers, &own)?;
         let settings = Settings {
@@ -143,13 +139,7 @@ impl MoireArgs {
                 .strain_convention
                 .map_or(Settings::default().strain_convention, Into::into),
             isotropic_strain_percent: self.isotropic_strain,
-            // What is typed in has the uncertainty that is typed in.
-            calibration: Calibration {
-                gain_percent: 0.0,
-                mismatch_percent: 0.0,
-                orthogonality_mrad: 0.0,
-            },
-            ..Settings::default()
+            ..MoireQuestion::default().settings
         };
         config::check(&settings)?;
         Ok(settings)
@@ -175,17 +165,23 @@ impl MoireArgs {
     }
 
     /// What is asked.
-    pub(super) fn question(&self) -> anyhow::Result<Question> {
-        if !self.vectors.is_empty() {
-            let [a, b] = [&self.vectors[0], &self.vectors[1]].map(|text| vector(text));
-            let (a, b) = (a?, b?);
-            return Ok(Question::Vectors {
-                basis: Matrix2::new(a[0], b[0], a[1], b[1]),
-                sigma: self.sigma,
+    pub(super) fn question(&self) -> anyhow::Result<MoireQuestion> {
+        Ok(MoireQuestion {
+            settings: self.settings()?,
+            given: self.given()?,
+            band_degeneracy: self.band_degeneracy,
+        })
+    }
+
+    fn given(&self) -> anyhow::Result<Given> {
+        if let [a, b] = self.vectors.as_slice() {
+            return Ok(Given::Vectors {
+                vectors_nm: [vector(a)?, vector(b)?],
+                sigma_nm: self.sigma,
             });
         }
         if !self.wavelengths.is_empty() {
-            let Ok(lengths) = <[f64; 3]>::try_from(self.wavelengths.clone()) else {
+            let Ok(lengths_nm) = <[f64; 3]>::try_from(self.wavelengths.clone()) else {
                 bail!(
                     "--wavelengths: expected three lengths in nm, as in 13.72,12.7,10.18, found {}",
                     self.wavelengths.len()
@@ -199,74 +195,46 @@ impl MoireArgs {
                      10.18 nm mean a twist of 1.190° or of 1.152°"
                 );
             };
-            return Ok(Question::Wavelengths {
-                lengths,
-                sigmas: [self.sigma; 3],
-                meaning: match meaning {
-                    MeaningArg::RealSpace => WavelengthMeaning::RealSpace,
-                    MeaningArg::KSpace => WavelengthMeaning::KSpace,
-                },
+            return Ok(Given::Wavelengths {
+                lengths_nm,
+                sigma_nm: self.sigma,
+                k_space: matches!(meaning, MeaningArg::KSpace),
             });
         }
-        let Some(twist) = self.twist else {
+        let Some(twist_deg) = self.twist else {
             bail!("expected --twist, --wavelengths or --vectors; see moiregauge moire --help");
         };
-        Ok(Question::Forward(Stacking {
-            twist: twist.to_radians(),
-            lattice_angle: self.reference_angle()?,
-            strain: self.strain.unwrap_or(0.0) / 100.0,
-            axis_lattice: self.strain_axis.unwrap_or(0.0).to_radians(),
-            biaxial: self.biaxial.unwrap_or(0.0) / 100.0,
-        }))
+        Ok(Given::Layers {
+            twist_deg,
+            strain_percent: self.strain,
+            strain_axis_deg: self.strain_axis,
+            biaxial_percent: self.biaxial,
+            lattice_angle: self.direction()?,
+        })
     }
 
-    /// α for the forward question: of the reciprocal vectors of layer 1, rad.
-    fn reference_angle(&self) -> anyhow::Result<f64> {
+    /// The orientation of layer 1 for layers that are given.
+    fn direction(&self) -> anyhow::Result<Option<Direction>> {
         let Some(text) = &self.lattice_angle else {
-            return Ok(0.0);
+            return Ok(None);
         };
         let plain: Option<f64> = text.trim().trim_end_matches('°').parse().ok();
         let Some(angle_deg) = numbers::within(numbers::ANGLE_DEG, plain) else {
             bail!("--lattice-angle: expected degrees from −3600 to 3600, found {text:?}");
         };
-        let own = config::own_materials(self.materials.as_deref())?;
-        let (material, substrate) = config::named_layers(&self.layers, &own)?;
-        let known = KnownOrientation {
+        Ok(Some(Direction {
             angle_deg,
-            sigma_deg: 0.0,
-            layer: 1,
             of: self.lattice_angle_of.into(),
-        };
-        let reference = substrate.unwrap_or(material);
-        Ok(Orientation::of(&known, (&reference).into()).angle)
+        }))
     }
 
-    /// What is asked, in words.
-    pub(super) fn in_words(&self) -> String {
-        // Numbers as they were typed, with true minus signs.
-        let typed = |value: f64| value.to_string().replace('-', "−");
-        let mut text = String::new();
-        if let [a, b, c] = self.wavelengths.as_slice() {
-            let meaning = match self.meaning {
-                Some(MeaningArg::KSpace) => "4π/(√3|K|) of the wave vectors",
-                _ => "lengths of the real-space vectors",
-            };
-            let _ = write!(text, "wavelengths {a}, {b}, {c} nm, {meaning}");
-        } else if let [a, b] = self.vectors.as_slice() {
-            let plain = |v: &str| v.trim_matches(['(', ')', ' ']).replace('-', "−");
-            let _ = write!(text, "vectors ({}) and ({}) nm", plain(a), plain(b));
-        } else {
-            let _ = write!(text, "twist {}°", typed(self.twist.unwrap_or(0.0)));
-            if let Some(strain) = self.strain {
-                let axis = typed(self.strain_axis.unwrap_or(0.0));
-                let strain = typed(strain);
-                let _ = write!(text, ", strain {strain} % along {axis}° from layer 1");
-            }
-            if let Some(biaxial) = self.biaxial {
-                let _ = write!(text, ", biaxial strain {} %", typed(biaxial));
-            }
-        }
-        text
+    /// Vectors as they were typed, with true minus signs.
+    pub(super) fn vectors_in_words(&self) -> Option<String> {
+        let [a, b] = self.vectors.as_slice() else {
+            return None;
+        };
+        let plain = |v: &str| v.trim_matches(['(', ')', ' ']).replace('-', "−");
+        Some(format!("vectors ({}) and ({}) nm", plain(a), plain(b)))
     }
 }
 

@@ -3,12 +3,11 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use anyhow::{Context as _, ensure};
 use moiregauge::settings::Settings;
-use moiregauge::simulate::{Simulation, Simulator};
+use moiregauge::simulate::Simulation;
+use moiregauge_pipeline::Job;
+use moiregauge_pipeline::plan::{PlanError, PlanRequest, Wishes};
 
-use super::search::{self, Limits};
-use super::wishes::Wishes;
 use super::words;
 use crate::numbers;
 use crate::say::say;
@@ -72,48 +71,36 @@ pub(crate) struct PlanArgs {
 }
 
 /// Searches and prints.
-pub(crate) fn run(args: &PlanArgs) -> anyhow::Result<ExitCode> {
+pub(crate) fn run(args: &PlanArgs, job: &Job) -> anyhow::Result<ExitCode> {
     let inputs: Vec<PathBuf> = args.config.iter().chain(&args.like).cloned().collect();
     let file = |out| crate::outputs::file(out, args.force, &inputs);
     let file = args.out.as_deref().map(file).transpose()?;
-    let given = crate::validate::given_conditions(args.config.as_deref(), &args.like)?;
-    let mut conditions = given.unwrap_or_default();
-    // What the header of a file says of its time is rounded to whole seconds: 0.29 s.
-    let clock = args.frame_time_sigma.powi(2) - 1.0 / 12.0;
-    conditions.noise.clock_s = clock.max(0.0).sqrt();
-    Simulator::new(conditions.clone()).context("these conditions make no sense")?;
-    ensure!(
-        conditions.noise.pixel_deg > 0.0,
-        "the conditions have no noise (noise.pixel_deg): every error would be zero"
-    );
-    let settings = args.settings(&conditions)?;
-    let wishes = Wishes {
-        twist_deg: args.twist_sigma,
-        strain_percent: args.strain_sigma,
-        drift_nm_per_min: args.drift_sigma,
-    };
-    let longest = conditions
-        .raster
-        .nominal_size_nm
-        .iter()
-        .zip(conditions.window.gain)
-        .map(|(size, gain)| size * gain)
-        .fold(0.0, f64::max);
-    let limits = Limits {
-        size_nm: args.max_size.unwrap_or(2.0 * longest),
-        rate_hz: args
-            .max_rate
-            .unwrap_or(2.0 * conditions.raster.line_rate_hz),
+    let given = crate::validate::given_conditions(args.config.as_deref(), &args.like, job)?;
+    let conditions = given.unwrap_or_default();
+    let request = PlanRequest {
+        wishes: Wishes {
+            twist_deg: args.twist_sigma,
+            strain_percent: args.strain_sigma,
+            drift_nm_per_min: args.drift_sigma,
+        },
+        settings: args.settings(&conditions)?,
+        conditions,
+        max_size_nm: args.max_size,
+        max_rate_hz: args.max_rate,
         noise_per_pixel: args.noise_per_pixel,
     };
-    let plans = search::plans(&conditions, &settings, &wishes, &limits);
-    let best = plans.first().context(
-        "no frame within --max-size and --max-rate shows the lattice: at least four periods across it, five pixels \
-         per period, and a signal that stands out of the noise are needed",
-    )?;
-    say(&words::plan(&conditions, &settings, &wishes, &plans))?;
+    let found = moiregauge_pipeline::plan(&request, job).map_err(|error| match error {
+        PlanError::Cancelled(cancelled) => cancelled.into(),
+        PlanError::Settings(error) => crate::config::with_option(error),
+        PlanError::NoFrame => anyhow::anyhow!(
+            "no frame within --max-size and --max-rate shows the lattice: at least four periods across it, five pixels \
+             per period, and a signal that stands out of the noise are needed"
+        ),
+        other => other.into(),
+    })?;
+    say(&words::plan(&found))?;
     if let (Some(out), Some(file)) = (&args.out, file) {
-        file.write(toml::to_string_pretty(&best.set)?.into_bytes())?;
+        file.write(toml::to_string_pretty(&found.plans[0].set)?.into_bytes())?;
         say(&format!(
             "\nWritten to {0}; moiregauge validate --config {0} simulates it\n",
             out.display()

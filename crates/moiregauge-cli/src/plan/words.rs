@@ -2,26 +2,16 @@
 
 use std::fmt::Write as _;
 
-use moiregauge::meaning::Source;
-use moiregauge::plan::{Prediction, Quantity};
-use moiregauge::settings::Settings;
-use moiregauge::simulate::Simulation;
+use moiregauge_pipeline::plan::{Expected, Limit, OutOfReach, Plan, Plans};
 use moiregauge_report::two_digits;
-
-use super::search::{Plan, beyond};
-use super::wishes::Wishes;
 
 /// Plans that are shown.
 const SHOWN: usize = 8;
 
 /// Conditions, wishes, the table, and what limits.
-pub(super) fn plan(
-    conditions: &Simulation,
-    settings: &Settings,
-    wishes: &Wishes,
-    plans: &[Plan],
-) -> String {
+pub(super) fn plan(found: &Plans) -> String {
     let mut text = String::new();
+    let (conditions, wishes, plans) = (&found.conditions, &found.wishes, &found.plans);
     let raster = &conditions.raster;
     let _ = writeln!(
         text,
@@ -41,7 +31,7 @@ pub(super) fn plan(
         } else {
             ", no position sensors"
         },
-        settings.frame_time_sigma_s
+        found.settings.frame_time_sigma_s
     );
     let wish =
         |value: Option<f64>, name: &str, unit: &str| value.map(|v| format!("{name} ± {v}{unit}"));
@@ -65,12 +55,14 @@ pub(super) fn plan(
             (_, true) => " ",
             (_, false) => "✗",
         };
-        row(&mut text, mark, plan, wishes);
+        row(&mut text, mark, plan);
     }
     if let Some(best) = plans.first() {
         text.push('\n');
         recommendation(&mut text, best);
-        limits(&mut text, best, wishes);
+        for one in &best.out_of_reach {
+            limit(&mut text, one);
+        }
     }
     text
 }
@@ -79,15 +71,14 @@ fn two_digits_or_more(value: f64) -> String {
     format!("{}", (value * 1e4).round() / 1e4)
 }
 
-fn row(text: &mut String, mark: &str, plan: &Plan, wishes: &Wishes) {
-    let p = &plan.prediction;
+fn row(text: &mut String, mark: &str, plan: &Plan) {
     let raster = &plan.set.raster;
-    let [width, height] = plan.size_nm();
-    let pair = |quantity: Quantity, unit: f64| {
+    let [width, height] = plan.size_nm;
+    let pair = |sigma: Expected| {
         format!(
             "{} ({})",
-            two_digits(unit * p.statistical(quantity)),
-            two_digits(unit * p.sigma(quantity, |_| true))
+            two_digits(sigma.statistical),
+            two_digits(sigma.total)
         )
     };
     let _ = writeln!(
@@ -96,66 +87,36 @@ fn row(text: &mut String, mark: &str, plan: &Plan, wishes: &Wishes) {
         raster.scans,
         two_digits_or_more(raster.line_rate_hz),
         format!("{width:.0} × {height:.0}"),
-        plan.duration_s() / 60.0,
-        two_digits(60.0 * p.drift_sigma()),
-        pair(Quantity::Twist, 1f64.to_degrees()),
-        pair(Quantity::Strain, 100.0),
-        limit(p, wishes)
+        plan.duration_s / 60.0,
+        two_digits(plan.drift_sigma_nm_per_min),
+        pair(plan.twist_sigma_deg),
+        pair(plan.strain_sigma_percent),
+        plan.limited_by.map_or("", source)
     );
 }
 
-/// What makes most of the error that is nearest to its wish, or farthest beyond it.
-fn limit(p: &Prediction, wishes: &Wishes) -> &'static str {
-    let twist = wishes.twist_deg.map(|w| {
-        (
-            p.sigma(Quantity::Twist, |_| true) / w.to_radians(),
-            source(p.largest(Quantity::Twist)),
-        )
-    });
-    let strain = wishes.strain_percent.map(|w| {
-        (
-            100.0 * p.sigma(Quantity::Strain, |_| true) / w,
-            source(p.largest(Quantity::Strain)),
-        )
-    });
-    let drift = wishes
-        .drift_nm_per_min
-        .map(|w| (60.0 * p.drift_sigma() / w, of_drift(p)));
-    let all = [twist, strain, drift];
-    let worst = all.into_iter().flatten().max_by(|a, b| a.0.total_cmp(&b.0));
-    worst.map_or("", |(_, name)| name)
-}
-
-fn source(source: Source) -> &'static str {
-    match source {
-        Source::Image => "noise of the images",
-        Source::Drift => "drift",
-        Source::Sensor => "noise of the sensors",
-        Source::Gain => "calibration: gain",
-        Source::Mismatch => "calibration: mismatch of x and y",
-        Source::Orthogonality => "calibration: orthogonality",
-        Source::Pitch => "pitch of the pixels",
-        Source::LatticeConstant => "lattice constant",
-        Source::StrainedLayer => "which layer is strained",
-        Source::IsotropicStrain => "isotropic strain",
-        Source::PoissonRatio => "Poisson ratio",
-    }
-}
-
-/// Exact times would make a clearly smaller error, or phases would.
-fn of_drift(p: &Prediction) -> &'static str {
-    if !p.linked {
-        "frames that cannot be linked by phases"
-    } else if p.drift_sigma_with_clock() < 0.7 * p.drift_sigma() {
-        "times of the frames"
-    } else {
-        "noise of the images"
+fn source(limit: Limit) -> &'static str {
+    match limit {
+        Limit::ImageNoise => "noise of the images",
+        Limit::Drift => "drift",
+        Limit::SensorNoise => "noise of the sensors",
+        Limit::Gain => "calibration: gain",
+        Limit::Mismatch => "calibration: mismatch of x and y",
+        Limit::Orthogonality => "calibration: orthogonality",
+        Limit::Pitch => "pitch of the pixels",
+        Limit::LatticeConstant => "lattice constant",
+        Limit::StrainedLayer => "which layer is strained",
+        Limit::IsotropicStrain => "isotropic strain",
+        Limit::PoissonRatio => "Poisson ratio",
+        Limit::Unlinked => "frames that cannot be linked by phases",
+        Limit::FrameTimes => "times of the frames",
+        _ => "",
     }
 }
 
 fn recommendation(text: &mut String, best: &Plan) {
     let raster = &best.set.raster;
-    let [width, height] = best.size_nm();
+    let [width, height] = best.size_nm;
     let _ = writeln!(
         text,
         "{}: {} scans, up and down in turn, {width:.0} nm × {height:.0} nm in {} × {} pixels at {} Hz: {:.1} minutes. \
@@ -170,9 +131,9 @@ fn recommendation(text: &mut String, best: &Plan) {
         raster.pixels[0],
         raster.pixels[1],
         two_digits_or_more(raster.line_rate_hz),
-        best.duration_s() / 60.0
+        best.duration_s / 60.0
     );
-    if !best.prediction.linked {
+    if !best.linked {
         text.push_str(
             "phases of the frames cannot be linked (no position sensors, pauses that are too long, or a drift that is \
              not known well enough): the drift comes from wave vectors alone\n",
@@ -180,61 +141,35 @@ fn recommendation(text: &mut String, best: &Plan) {
     }
 }
 
-/// Which wishes no number of scans fulfils, and what would.
-fn limits(text: &mut String, best: &Plan, wishes: &Wishes) {
-    let p = &best.prediction;
-    let wanted = [
-        (
-            Quantity::Twist,
-            "twist",
-            wishes.twist_deg,
-            1f64.to_degrees(),
-            "°",
-        ),
-        (
-            Quantity::Strain,
-            "strain",
-            wishes.strain_percent,
-            100.0,
-            " %",
-        ),
-    ];
-    for (quantity, name, wish, unit, sign) in wanted {
-        let Some(wish) = wish else { continue };
-        if !beyond(p, quantity, wish / unit) {
-            continue;
-        }
-        let floor = unit * p.sigma(quantity, |s| !s.is_statistical());
-        let largest = Source::ALL
-            .into_iter()
-            .filter(|s| !s.is_statistical())
-            .max_by(|a, b| {
-                let of = |source: &Source| p.sigma(quantity, |s| s == *source);
-                of(a).total_cmp(&of(b))
-            })
-            .unwrap_or(Source::Gain);
-        let _ = writeln!(
-            text,
-            "out of reach: {name} ± {wish}{sign}. Calibration and model alone make ± {}{sign}, most of it {} (± {}{sign}), and \
-             no scan of this sample makes that smaller; {}. The plan has the statistical error that is wanted",
-            two_digits(floor),
-            source(largest),
-            two_digits(unit * p.sigma(quantity, |s| s == largest)),
-            remedy(largest)
-        );
-    }
+/// A wish that no number of scans fulfils, and what would.
+fn limit(text: &mut String, one: &OutOfReach) {
+    let (name, sign) = if one.is_twist {
+        ("twist", "°")
+    } else {
+        ("strain", " %")
+    };
+    let _ = writeln!(
+        text,
+        "out of reach: {name} ± {}{sign}. Calibration and model alone make ± {}{sign}, most of it {} (± {}{sign}), and \
+         no scan of this sample makes that smaller; {}. The plan has the statistical error that is wanted",
+        one.wish,
+        two_digits(one.floor),
+        source(one.largest),
+        two_digits(one.largest_sigma),
+        remedy(one.largest)
+    );
 }
 
-fn remedy(source: Source) -> &'static str {
-    match source {
-        Source::Gain | Source::Mismatch | Source::Orthogonality => {
+fn remedy(limit: Limit) -> &'static str {
+    match limit {
+        Limit::Gain | Limit::Mismatch | Limit::Orthogonality => {
             "`moiregauge calibrate` on a known lattice does"
         }
-        Source::Pitch => "recording the position sensors does",
-        Source::LatticeConstant => "a better known lattice constant does",
-        Source::IsotropicStrain => "the orientation of one of the layers does",
-        Source::PoissonRatio => "a better known Poisson ratio does",
-        Source::StrainedLayer => "knowing which layer is strained does",
-        Source::Image | Source::Drift | Source::Sensor => "more scans do",
+        Limit::Pitch => "recording the position sensors does",
+        Limit::LatticeConstant => "a better known lattice constant does",
+        Limit::IsotropicStrain => "the orientation of one of the layers does",
+        Limit::PoissonRatio => "a better known Poisson ratio does",
+        Limit::StrainedLayer => "knowing which layer is strained does",
+        _ => "more scans do",
     }
 }

@@ -3,18 +3,16 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use anyhow::Context as _;
-use moiregauge::numbers::interrupt;
-use moiregauge::simulate::{MOST_PIXELS, Simulation, Simulator};
-use moiregauge::spectrum::Method;
+use moiregauge::simulate::{MOST_PIXELS, Simulation};
 use moiregauge_pipeline::Job;
-use moiregauge_pipeline::sink::Target;
-use rayon::prelude::*;
+use moiregauge_pipeline::sink::{FolderSink, Target};
+use moiregauge_pipeline::validate::{
+    SAMPLES_FILE, SamplesRequest, VALIDATION_FILES, ValidateError, ValidateRequest,
+    validate_samples,
+};
 
-use super::compare::{Comparison, compare};
 use super::conditions::given_conditions;
-use super::output::{self, Validation};
-use super::samples::{self, Tally};
+use super::words;
 use crate::analyze::MethodArg;
 use crate::numbers;
 use crate::outputs;
@@ -78,7 +76,49 @@ pub(crate) fn run(args: &ValidateArgs, job: &Job) -> anyhow::Result<ExitCode> {
     if !args.sample.is_empty() {
         return run_samples(args, job);
     }
-    let names = output::NAMES.map(str::to_owned);
+    let sink = sink(args, &VALIDATION_FILES)?;
+    let request = ValidateRequest {
+        conditions: conditions(args, job)?,
+        method: args.method.into(),
+        sets: args.sets,
+        seed: args.seed,
+    };
+    let found = moiregauge_pipeline::validate(&request, job).map_err(stopped)?;
+    say(&words::table(&found))?;
+    if let (Some(out), Some(sink)) = (&args.out, sink) {
+        found.write(&sink)?;
+        outputs::commit(sink)?;
+        say(&format!("Written to {}\n", out.join("pulls.png").display()))?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The table of real samples.
+fn run_samples(args: &ValidateArgs, job: &Job) -> anyhow::Result<ExitCode> {
+    let sink = sink(args, &[SAMPLES_FILE])?;
+    let request = SamplesRequest {
+        samples: args.sample.clone(),
+        conditions: conditions(args, job)?,
+        method: args.method.into(),
+        sets: args.sets,
+        seed: args.seed,
+    };
+    let found = validate_samples(&request, job).map_err(stopped)?;
+    say(&words::samples(&found.samples))?;
+    if let (Some(out), Some(sink)) = (&args.out, sink) {
+        found.write(&sink)?;
+        outputs::commit(sink)?;
+        say(&format!(
+            "Written to {}\n",
+            out.join(SAMPLES_FILE).display()
+        ))?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The folder, if one is wanted.
+fn sink(args: &ValidateArgs, names: &[&str]) -> anyhow::Result<Option<FolderSink>> {
+    let names: Vec<String> = names.iter().map(|name| (*name).to_owned()).collect();
     let folder = |out| {
         outputs::folder(&Target {
             folder: out,
@@ -88,87 +128,18 @@ pub(crate) fn run(args: &ValidateArgs, job: &Job) -> anyhow::Result<ExitCode> {
             force: args.force,
         })
     };
-    let sink = args.out.as_deref().map(folder).transpose()?;
-    let conditions = conditions(args)?;
-    Simulator::new(conditions.clone()).context("these conditions cannot be simulated")?;
-    let stage = job.stage("validating", "sets", args.sets as usize);
-    let method = Method::from(args.method);
-    let compared: Vec<Option<Comparison>> = (0..args.sets)
-        .into_par_iter()
-        .map(|index| {
-            interrupt::check();
-            let result = compare(&conditions, method, args.seed, index);
-            stage.step();
-            result
-        })
-        .collect();
-    drop(stage);
-    let failed = compared.iter().filter(|c| c.is_none()).count();
-    let compared: Vec<Comparison> = compared.into_iter().flatten().collect();
-    anyhow::ensure!(
-        compared.len() >= 2,
-        "{failed} of {} sets gave no drift and twist: nothing to compare",
-        args.sets
-    );
-    let validation = Validation::new(method, args.seed, failed, &compared, conditions);
-    say(&validation.table())?;
-    if let (Some(out), Some(sink)) = (&args.out, sink) {
-        outputs::write_all(&sink, "", &validation.files(&compared)?)?;
-        outputs::commit(sink)?;
-        say(&format!("Written to {}\n", out.join("pulls.png").display()))?;
-    }
-    Ok(ExitCode::SUCCESS)
+    args.out.as_deref().map(folder).transpose()
 }
 
-/// The table of real samples.
-fn run_samples(args: &ValidateArgs, job: &Job) -> anyhow::Result<ExitCode> {
-    let names = [SAMPLES.to_owned()];
-    let folder = |out| {
-        outputs::folder(&Target {
-            folder: out,
-            kind: "validate",
-            names: &names,
-            inputs: &[],
-            force: args.force,
-        })
-    };
-    let sink = args.out.as_deref().map(folder).transpose()?;
-    let base = conditions(args)?;
-    let given = samples::samples_of(&args.sample)?;
-    let count = args.sets as usize;
-    let stage = job.stage("validating", "sets", given.len() * count);
-    let method = Method::from(args.method);
-    let outcomes = (0..given.len() * count).into_par_iter().map(|index| {
-        interrupt::check();
-        let seed = args.seed + (index % count) as u64;
-        let outcome = samples::outcome(&base, &given[index / count], method, seed);
-        stage.step();
-        outcome
-    });
-    let outcomes: Vec<samples::Outcome> = outcomes.collect::<anyhow::Result<_>>()?;
-    drop(stage);
-    let tallies: Vec<Tally> = given
-        .iter()
-        .zip(outcomes.chunks(count))
-        .map(|(sample, outcomes)| Tally {
-            sample: sample.clone(),
-            outcomes: outcomes.to_vec(),
-        })
-        .collect();
-    say(&samples::table(&tallies))?;
-    if let (Some(out), Some(sink)) = (&args.out, sink) {
-        sink.write(SAMPLES, samples::rows(&tallies).as_bytes())?;
-        outputs::commit(sink)?;
-        say(&format!("Written to {}\n", out.join(SAMPLES).display()))?;
+fn stopped(error: ValidateError) -> anyhow::Error {
+    match error {
+        ValidateError::Cancelled(cancelled) => cancelled.into(),
+        other => other.into(),
     }
-    Ok(ExitCode::SUCCESS)
 }
 
-/// Every set of real samples.
-const SAMPLES: &str = "samples.csv";
-
-fn conditions(args: &ValidateArgs) -> anyhow::Result<Simulation> {
-    if let Some(given) = given_conditions(args.config.as_deref(), &args.like)? {
+fn conditions(args: &ValidateArgs, job: &Job) -> anyhow::Result<Simulation> {
+    if let Some(given) = given_conditions(args.config.as_deref(), &args.like, job)? {
         return Ok(given);
     }
     let mut conditions = Simulation::default();

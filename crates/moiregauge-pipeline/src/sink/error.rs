@@ -73,6 +73,14 @@ pub enum SinkError {
         /// What is wrong with it.
         reason: &'static str,
     },
+    /// What is to be written cannot be made into files.
+    #[error("cannot make the files of the {what}")]
+    Made {
+        /// What it is.
+        what: &'static str,
+        /// Why it cannot.
+        source: Box<dyn std::error::Error + Send + Sync>,
+    },
     /// Everything is written, but not everything could be moved to its place.
     #[error(
         "cannot replace {}: what is new waits in {}, and the next run into this folder puts it in place",
@@ -90,6 +98,15 @@ pub enum SinkError {
 }
 
 impl SinkError {
+    /// That files of something cannot be made.
+    pub(crate) fn made(
+        what: &'static str,
+        source: impl Into<Box<dyn std::error::Error + Send + Sync>>,
+    ) -> Self {
+        let source = source.into();
+        Self::Made { what, source }
+    }
+
     /// Whether the same would be written if it were forced.
     pub fn can_be_forced(&self) -> bool {
         matches!(self, Self::Exists(_) | Self::Holds { .. })

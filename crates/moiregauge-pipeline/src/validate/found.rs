@@ -1,4 +1,4 @@
-//! What a validation found: a table, a document, a figure.
+//! What a validation found: a document, a table of all sets, a figure.
 
 use std::fmt::Write as _;
 
@@ -8,9 +8,14 @@ use moiregauge_report::pulls;
 use serde::Serialize;
 
 use super::compare::{Compared, Comparison, QUANTITIES};
+use super::run::ValidateRequest;
+use crate::sink::{Sink, SinkError};
+
+/// Whatever a figure or a document cannot be made for.
+type AnyError = Box<dyn std::error::Error + Send + Sync>;
 
 /// What is written.
-pub(super) const NAMES: [&str; 5] = [
+pub const VALIDATION_FILES: [&str; 5] = [
     "validation.json",
     "sets.csv",
     "conditions.toml",
@@ -19,47 +24,58 @@ pub(super) const NAMES: [&str; 5] = [
 ];
 
 /// The document `validation.json`.
-#[derive(Serialize)]
-pub(super) struct Validation {
-    schema: &'static str,
-    version: &'static str,
-    seed: u64,
-    method: Method,
+#[derive(Clone, Debug, Serialize)]
+pub struct Validation {
+    /// `moiregauge/validation/1`.
+    pub schema: &'static str,
+    /// Version of the library.
+    pub version: &'static str,
+    /// Seed of all noise.
+    pub seed: u64,
+    /// Estimator of the lattice vectors.
+    pub method: Method,
     /// Sets that gave drift, twist and strain.
-    sets: usize,
+    pub sets: usize,
     /// Sets that did not.
-    failed: usize,
-    quantities: Vec<Quantity>,
+    pub failed: usize,
+    /// Drift, twist, strain.
+    pub quantities: Vec<QuantityFound>,
     /// What true errors would give: the binomial scatter of the coverages, per cent.
-    coverage_scatter_percent: [f64; 2],
-    conditions: Simulation,
+    pub coverage_scatter_percent: [f64; 2],
+    /// Instrument and sample.
+    pub conditions: Simulation,
+    /// Set by set.
+    #[serde(skip)]
+    pub compared: Vec<Comparison>,
 }
 
 /// One quantity over all sets, in its unit.
-#[derive(Serialize)]
-struct Quantity {
-    name: &'static str,
-    unit: &'static str,
-    mean_error: f64,
-    rms_error: f64,
-    mean_sigma: f64,
+#[derive(Clone, Debug, Serialize)]
+pub struct QuantityFound {
+    /// Its name.
+    pub name: &'static str,
+    /// Its unit.
+    pub unit: &'static str,
+    /// Found minus true.
+    pub mean_error: f64,
+    /// Root mean square.
+    pub rms_error: f64,
+    /// Mean of the stated σ.
+    pub mean_sigma: f64,
     /// Root mean square of the Cramér–Rao bounds for white pixel noise; null without any.
-    cramer_rao: Option<f64>,
+    pub cramer_rao: Option<f64>,
     /// `rms_error / cramer_rao`.
-    error_over_bound: Option<f64>,
-    rms_pull: f64,
-    within_1_sigma_percent: f64,
-    within_2_sigma_percent: f64,
+    pub error_over_bound: Option<f64>,
+    /// Root mean square of errors over their stated σ.
+    pub rms_pull: f64,
+    /// Share of errors up to σ.
+    pub within_1_sigma_percent: f64,
+    /// Share of errors up to 2 σ.
+    pub within_2_sigma_percent: f64,
 }
 
 impl Validation {
-    pub(super) fn new(
-        method: Method,
-        seed: u64,
-        failed: usize,
-        compared: &[Comparison],
-        conditions: Simulation,
-    ) -> Self {
+    pub(super) fn new(request: &ValidateRequest, failed: usize, compared: Vec<Comparison>) -> Self {
         let n = compared.len() as f64;
         let quantities = QUANTITIES
             .iter()
@@ -72,71 +88,43 @@ impl Validation {
         Self {
             schema: "moiregauge/validation/1",
             version: env!("CARGO_PKG_VERSION"),
-            seed,
-            method,
+            seed: request.seed,
+            method: request.method,
             sets: compared.len(),
             failed,
             quantities,
             coverage_scatter_percent: [0.683, 0.954].map(|p| 100.0 * (p * (1.0 - p) / n).sqrt()),
-            conditions,
+            conditions: request.conditions.clone(),
+            compared,
         }
     }
 
-    /// The table, one line for each quantity.
-    pub(super) fn table(&self) -> String {
-        let mut text = format!(
-            "{} sets\n{:18} {:>11} {:>11} {:>11} {:>11} {:>9} {:>9} {:>9} {:>9}\n",
-            self.sets,
-            "",
-            "mean error",
-            "rms error",
-            "mean σ",
-            "bound",
-            "rms/bound",
-            "rms pull",
-            "in 1 σ %",
-            "in 2 σ %"
-        );
-        for q in &self.quantities {
-            let name = format!("{} ({})", q.name, q.unit);
-            let _ = writeln!(
-                text,
-                "{name:18} {:11.6} {:11.6} {:11.6} {:>11} {:>9} {:9.2} {:9.1} {:9.1}",
-                q.mean_error,
-                q.rms_error,
-                q.mean_sigma,
-                q.cramer_rao.map_or("–".to_owned(), |b| format!("{b:.6}")),
-                q.error_over_bound
-                    .map_or("–".to_owned(), |r| format!("{r:.2}")),
-                q.rms_pull,
-                q.within_1_sigma_percent,
-                q.within_2_sigma_percent
-            );
+    /// Writes all files.
+    ///
+    /// # Errors
+    /// [`SinkError`].
+    pub fn write(&self, sink: &dyn Sink) -> Result<(), SinkError> {
+        for (name, bytes) in self
+            .files()
+            .map_err(|why| SinkError::made("validation", why))?
+        {
+            sink.write(&name, &bytes)?;
         }
-        let [one, two] = self.coverage_scatter_percent;
-        let _ = writeln!(
-            text,
-            "true errors would give 68.3 ± {one:.1} % and 95.4 ± {two:.1} %"
-        );
-        if self.failed > 0 {
-            let _ = writeln!(
-                text,
-                "{} of {} sets gave no drift or no lattice",
-                self.failed,
-                self.failed + self.sets
-            );
-        }
-        text
+        Ok(())
     }
 
     /// The files of a validation.
-    pub(super) fn files(&self, compared: &[Comparison]) -> anyhow::Result<Vec<(String, Vec<u8>)>> {
+    fn files(&self) -> Result<Vec<(String, Vec<u8>)>, AnyError> {
         let of = |i: usize| {
-            let pulls = compared.iter().map(|c| c[i].error / c[i].sigma).collect();
+            let pulls = self
+                .compared
+                .iter()
+                .map(|c| c[i].error / c[i].sigma)
+                .collect();
             (QUANTITIES[i].0, pulls)
         };
         let quantities: Vec<(&str, Vec<f64>)> = (0..QUANTITIES.len()).map(of).collect();
-        let figure = pulls(&quantities).map_err(anyhow::Error::msg)?;
+        let figure = pulls(&quantities)?;
         let mut table = String::from("set");
         for (name, unit) in QUANTITIES {
             let plain = name.replace(' ', "_").replace('₁', "1").replace('₂', "2");
@@ -147,7 +135,7 @@ impl Validation {
             );
         }
         table.push('\n');
-        for (index, set) in compared.iter().enumerate() {
+        for (index, set) in self.compared.iter().enumerate() {
             let _ = write!(table, "{}", index + 1);
             for Compared { error, sigma, .. } in set {
                 let _ = write!(table, ",{error},{sigma}");
@@ -177,13 +165,13 @@ fn plain_unit(unit: &str) -> &'static str {
     }
 }
 
-fn quantity(name: &'static str, unit: &'static str, all: &[Compared]) -> Quantity {
+fn quantity(name: &'static str, unit: &'static str, all: &[Compared]) -> QuantityFound {
     let n = all.len() as f64;
     let mean = |f: &dyn Fn(Compared) -> f64| all.iter().map(|c| f(*c)).sum::<f64>() / n;
     let within = |k: f64| 100.0 * mean(&|c| f64::from(u8::from(c.error.abs() <= k * c.sigma)));
     let rms_error = mean(&|c| c.error * c.error).sqrt();
     let bound = Some(mean(&|c| c.bound * c.bound).sqrt()).filter(|b| b.is_finite());
-    Quantity {
+    QuantityFound {
         name,
         unit,
         mean_error: mean(&|c| c.error),
@@ -213,8 +201,7 @@ mod tests {
             }; 5]
         };
         let compared = vec![of(0.5, 0.5), of(-1.5, 1.0)];
-        let conditions = Simulation::default();
-        let found = Validation::new(Method::Lattice, 1, 3, &compared, conditions);
+        let found = Validation::new(&ValidateRequest::default(), 3, compared);
         let twist = &found.quantities[2];
         assert_eq!(
             (twist.name, twist.mean_error, twist.mean_sigma),
@@ -226,6 +213,6 @@ mod tests {
             (twist.within_1_sigma_percent, twist.within_2_sigma_percent),
             (50.0, 100.0)
         );
-        assert!(found.table().contains("3 of 5 sets gave no drift"));
+        assert_eq!((found.sets, found.failed), (2, 3));
     }
 }

@@ -1,11 +1,14 @@
 //! Frame sizes and line rates, and the smallest number of scans that will do for each.
 
+use moiregauge::numbers::interrupt;
 use moiregauge::plan::{FOUND, Prediction, Quantity, predict};
 use moiregauge::settings::Settings;
 use moiregauge::simulate::Simulation;
 use rayon::prelude::*;
 
-use super::wishes::Wishes;
+use super::found::{Plan, Plans, beyond};
+use super::request::{PlanError, PlanRequest, Wishes};
+use crate::job::Job;
 
 /// Frame sizes, as multiples of that of the conditions.
 const SIZES: [f64; 5] = [0.7, 1.0, 1.4, 2.0, 2.8];
@@ -19,93 +22,93 @@ const ORIENTATIONS: usize = 4;
 const FEWEST_PERIODS: f64 = 4.0;
 const FEWEST_PIXELS: f64 = 5.0;
 
-/// What the instrument can do.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Limits {
-    /// Largest side of a frame, nm.
-    pub(super) size_nm: f64,
-    /// Largest line rate, Hz.
-    pub(super) rate_hz: f64,
-    /// The noise of a pixel does not depend on the line rate.
-    pub(super) noise_per_pixel: bool,
-}
-
-/// One way of doing it.
-#[derive(Clone, Debug)]
-pub(super) struct Plan {
-    /// The scans, as conditions of a simulation.
-    pub(super) set: Simulation,
-    /// What they will tell.
-    pub(super) prediction: Prediction,
-    /// Whether the wishes are met, as far as scans can.
-    pub(super) met: bool,
-}
-
-impl Plan {
-    /// From the first line to the last, s.
-    pub(super) fn duration_s(&self) -> f64 {
-        let raster = &self.set.raster;
-        let frame = raster.pixels[1] as f64 / raster.line_rate_hz;
-        raster.scans as f64 * (frame + raster.gap_s) - raster.gap_s
-    }
-
-    /// Sides of a frame, nm.
-    pub(super) fn size_nm(&self) -> [f64; 2] {
-        let (size, gain) = (self.set.raster.nominal_size_nm, self.set.window.gain);
-        [size[0] * gain[0], size[1] * gain[1]]
-    }
-}
-
-/// The best plan first: those that meet the wishes, by their duration; then the others.
-pub(super) fn plans(
-    conditions: &Simulation,
-    settings: &Settings,
-    wishes: &Wishes,
-    limits: &Limits,
-) -> Vec<Plan> {
-    let longest = (0..2)
-        .map(|i| conditions.raster.nominal_size_nm[i] * conditions.window.gain[i])
-        .fold(0.0, f64::max);
-    let within = |value: f64, limit: f64| value <= limit * (1.0 + 1e-9);
-    let frames: Vec<(f64, f64)> = SIZES
-        .into_iter()
-        .filter(|s| within(s * longest, limits.size_nm))
-        .flat_map(|s| RATES.map(|r| (s, r)))
-        .filter(|(_, r)| within(r * conditions.raster.line_rate_hz, limits.rate_hz))
-        .collect();
-    let mut plans: Vec<Plan> = frames
-        .par_iter()
-        .filter_map(|&(size, rate)| {
-            let mut set = conditions.clone();
-            set.raster.nominal_size_nm = set.raster.nominal_size_nm.map(|s| s * size);
-            set.raster.line_rate_hz *= rate;
-            set.raster.alternating = true;
-            if !limits.noise_per_pixel {
-                set.noise.pixel_deg *= rate.sqrt();
-            }
-            fewest_scans(&set, settings, wishes)
-        })
-        .collect();
-    plans.sort_by(|a, b| {
-        let times = a.duration_s().total_cmp(&b.duration_s());
-        let error = |p: &Plan| p.prediction.statistical(Quantity::Twist);
+/// For several frame sizes and line rates the smallest number of alternating scans that gives the wanted errors.
+///
+/// # Errors
+/// [`PlanError`].
+///
+/// ```
+/// use moiregauge_pipeline::Job;
+/// use moiregauge_pipeline::plan::{PlanRequest, Wishes, plan};
+///
+/// let wishes = Wishes { drift_nm_per_min: Some(0.1), ..Wishes::default() };
+/// let request = PlanRequest { wishes, ..PlanRequest::default() };
+/// let best = &plan(&request, &Job::quiet(None)?)?.plans[0];
+/// assert!(best.met && best.drift_sigma_nm_per_min < 0.1);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn plan(request: &PlanRequest, job: &Job) -> Result<Plans, PlanError> {
+    request.check()?;
+    let request = request.completed();
+    let mut found = job.run(|| candidates(&request))?;
+    found.sort_by(|(a, a_error), (b, b_error)| {
+        let times = a.duration_s.total_cmp(&b.duration_s);
         b.met.cmp(&a.met).then(if a.met {
             times
         } else {
-            error(a).total_cmp(&error(b))
+            a_error.total_cmp(b_error)
         })
     });
-    plans
+    let plans: Vec<Plan> = found.into_iter().map(|(plan, _)| plan).collect();
+    if plans.is_empty() {
+        return Err(PlanError::NoFrame);
+    }
+    Ok(Plans {
+        conditions: request.conditions,
+        settings: request.settings,
+        wishes: request.wishes,
+        plans,
+    })
+}
+
+/// A plan for each size and rate that would do, with the statistical error of the twist, rad.
+fn candidates(request: &PlanRequest) -> Vec<(Plan, f64)> {
+    let (conditions, wishes) = (&request.conditions, &request.wishes);
+    let raster = &conditions.raster;
+    let longest = (0..2)
+        .map(|i| raster.nominal_size_nm[i] * conditions.window.gain[i])
+        .fold(0.0, f64::max);
+    let largest = request.max_size_nm.unwrap_or(2.0 * longest);
+    let fastest = request.max_rate_hz.unwrap_or(2.0 * raster.line_rate_hz);
+    let within = |value: f64, limit: f64| value <= limit * (1.0 + 1e-9);
+    let frames: Vec<(f64, f64)> = SIZES
+        .into_iter()
+        .filter(|s| within(s * longest, largest))
+        .flat_map(|s| RATES.map(|r| (s, r)))
+        .filter(|(_, r)| within(r * raster.line_rate_hz, fastest))
+        .collect();
+    let of_frame = |&(size, rate): &(f64, f64)| {
+        interrupt::check();
+        let mut set = conditions.clone();
+        set.raster.nominal_size_nm = set.raster.nominal_size_nm.map(|s| s * size);
+        set.raster.line_rate_hz *= rate;
+        set.raster.alternating = true;
+        if !request.noise_per_pixel {
+            set.noise.pixel_deg *= rate.sqrt();
+        }
+        let found = fewest_scans(&set, &request.settings, wishes)?;
+        let error = found.prediction.statistical(Quantity::Twist);
+        let plan = Plan::new(found.set, &found.prediction, found.met, wishes);
+        Some((plan, error))
+    };
+    frames.par_iter().filter_map(of_frame).collect()
+}
+
+/// A number of scans, and what they will tell.
+struct Candidate {
+    set: Simulation,
+    prediction: Prediction,
+    met: bool,
 }
 
 /// The smallest number of scans that meets the wishes, or the largest there is.
-fn fewest_scans(set: &Simulation, settings: &Settings, wishes: &Wishes) -> Option<Plan> {
+fn fewest_scans(set: &Simulation, settings: &Settings, wishes: &Wishes) -> Option<Candidate> {
     let with = |scans: usize| {
         let mut set = set.clone();
         set.raster.scans = scans;
         let prediction = predict(&[set.clone()], settings, ORIENTATIONS)?;
         let met = meets(&prediction, wishes);
-        Some(Plan {
+        Some(Candidate {
             set,
             prediction,
             met,
@@ -155,9 +158,4 @@ fn meets(prediction: &Prediction, wishes: &Wishes) -> bool {
     drift
         && small(Quantity::Twist, wishes.twist_deg.map(f64::to_radians))
         && small(Quantity::Strain, wishes.strain_percent.map(|p| p / 100.0))
-}
-
-/// Whether what no scan shows is more than the wish (rad, or strain).
-pub(super) fn beyond(prediction: &Prediction, quantity: Quantity, wish: f64) -> bool {
-    prediction.sigma(quantity, |s| !s.is_statistical()) >= wish
 }

@@ -17,18 +17,19 @@ pub(super) const QUANTITIES: [(&str, &str); 5] = [
 ];
 
 /// One quantity of one set, in its unit.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Compared {
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct Compared {
     /// Found minus true.
-    pub(super) error: f64,
+    pub error: f64,
     /// The stated σ.
-    pub(super) sigma: f64,
+    pub sigma: f64,
     /// The Cramér–Rao bound; NaN where there is none.
-    pub(super) bound: f64,
+    pub bound: f64,
 }
 
-/// All quantities of one set.
-pub(super) type Comparison = [Compared; 5];
+/// All quantities of one set: both components of the drift (nm/min), twist (degrees), both components of the strain
+/// vector (per cent).
+pub type Comparison = [Compared; 5];
 
 /// One set with noise and orientation of its own; `None` where nothing could be determined.
 pub(super) fn compare(

@@ -2,44 +2,83 @@
 
 use std::path::PathBuf;
 
-use anyhow::Context as _;
 use moiregauge::campaign::analyse;
 use moiregauge::campaign::{Analysis, SetAnalysis};
+use moiregauge::numbers::interrupt;
 use moiregauge::scan::{MeasuredLine, MeasuredScan};
 use moiregauge::settings::Settings;
 use moiregauge::simulate::{Drift, FirstDirection, Noise, Raster, Sample, Simulation, Window};
 use spmfile::FrameDirection;
 
-use crate::analyze::with_advice;
-use crate::input::Known;
-use crate::paths::expand;
-use moiregauge_pipeline::campaign::measure_file;
+use crate::campaign::measure_file;
+use crate::job::{Cancelled, Job};
+use crate::known::Known;
+use crate::opened::InputError;
+use crate::twice::distinct;
 
 /// Contrast of the simulated image, degrees of phase; the noise is scaled along.
 const CONTRAST: f64 = 1.0;
 
-/// Measures the scans and describes them.
-pub(super) fn conditions(paths: &[PathBuf]) -> anyhow::Result<Simulation> {
+/// Why scans cannot be described.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum LikeError {
+    /// It was stopped.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+    /// One of them.
+    #[error("{}", file.display())]
+    File {
+        /// Which.
+        file: PathBuf,
+        /// Why not.
+        source: InputError,
+    },
+    /// They do not belong together.
+    #[error(
+        "expected the scans of one set, found {0} sets (slow axis, line rate, size and channel have to agree)"
+    )]
+    Sets(usize),
+    /// What they do not tell.
+    #[error("{0}")]
+    Unknown(&'static str),
+}
+
+/// Instrument and sample of the user's own scans of one set, as settings of the simulator: size, rate, contrast, noise,
+/// drift, lattice.
+///
+/// # Errors
+/// [`LikeError`].
+pub fn conditions_like(
+    files: &[PathBuf],
+    known: &Known,
+    job: &Job,
+) -> Result<Simulation, LikeError> {
+    let (files, _) = distinct(files);
+    let stage = job.stage("measuring", "scans", files.len());
+    let mut scans = Vec::new();
     let settings = Settings {
         drift_draws: 0,
         strain_draws: 0,
         ..Settings::default()
     };
-    let found: Result<Vec<PathBuf>, _> = expand(paths, true).into_iter().collect();
-    let found = found.map_err(|one| anyhow::anyhow!("{}: {}", one.file, one.error))?;
-    let mut scans = Vec::new();
-    for path in moiregauge_pipeline::distinct(&found).0 {
-        let (mut moires, _) = measure_file(&path, &settings, &Known::default())
-            .map_err(with_advice)
-            .with_context(|| format!("{}", path.display()))?;
+    for file in files {
+        let measured = job.run(|| {
+            interrupt::check();
+            measure_file(&file, &settings, known)
+        })?;
+        let (mut moires, _) = measured.map_err(|source| LikeError::File { file, source })?;
         scans.push(moires.swap_remove(0));
+        stage.step();
     }
-    let analysis = analyse(scans.clone(), &settings);
+    drop(stage);
+    job.run(|| described(&scans, &settings))?
+}
+
+fn described(scans: &[MeasuredScan], settings: &Settings) -> Result<Simulation, LikeError> {
+    let analysis = analyse(scans.to_vec(), settings);
     let [set] = analysis.sets.as_slice() else {
-        anyhow::bail!(
-            "--like expects the scans of one set, found {} sets (slow axis, line rate, size and channel have to agree)",
-            analysis.sets.len()
-        );
+        return Err(LikeError::Sets(analysis.sets.len()));
     };
     let scans: Vec<&MeasuredScan> = set
         .scans
@@ -64,10 +103,12 @@ fn sample(
     analysis: &Analysis,
     set: &SetAnalysis,
     lines: &[&MeasuredLine],
-) -> anyhow::Result<Sample> {
+) -> Result<Sample, LikeError> {
     let mean = set.mean.as_ref().or(set.uncorrected.as_ref());
     let found = &mean
-        .context("no twist and strain explain the lattice of these scans")?
+        .ok_or(LikeError::Unknown(
+            "no twist and strain explain the lattice of these scans",
+        ))?
         .twist_strain;
     let e = found.strain_vector;
     let settings = &analysis.settings;
@@ -119,17 +160,17 @@ fn raster(
     set: &SetAnalysis,
     scans: &[&MeasuredScan],
     lines: &[&MeasuredLine],
-) -> anyhow::Result<Raster> {
+) -> Result<Raster, LikeError> {
     let line = lines
         .first()
-        .context("no line of these scans can be used")?;
-    let rate = scans[0]
-        .line_rate_hz
-        .context("the files give no line rate: the scans cannot be simulated")?;
+        .ok_or(LikeError::Unknown("no line of these scans can be used"))?;
+    let rate = scans[0].line_rate_hz.ok_or(LikeError::Unknown(
+        "the files give no line rate: the scans cannot be simulated",
+    ))?;
     let [columns, rows] = line.geometry.size;
-    let timing = line
-        .timing
-        .context("the files do not tell their frame direction")?;
+    let timing = line.timing.ok_or(LikeError::Unknown(
+        "the files do not tell their frame direction",
+    ))?;
     let half_line = 0.5 / rate;
     let rounding = half_line / (timing.per_pixel.x.abs() * (columns as f64 - 1.0)) - 1.0;
     let fast = line.geometry.fast_step();
@@ -192,7 +233,7 @@ fn window(set: &SetAnalysis) -> Window {
 }
 
 /// Noise at the harmonics, as white noise of the pixels would make it, in units of the contrast.
-fn noise(lines: &[&MeasuredLine]) -> anyhow::Result<Noise> {
+fn noise(lines: &[&MeasuredLine]) -> Result<Noise, LikeError> {
     let fits = || {
         lines
             .iter()
@@ -230,7 +271,8 @@ fn noise(lines: &[&MeasuredLine]) -> anyhow::Result<Noise> {
     );
     Ok(Noise {
         sensor_nm: sensor.unwrap_or(0.0),
-        pixel_deg: CONTRAST * pixel.context("the lattice fit gave no harmonics")?,
+        pixel_deg: CONTRAST
+            * pixel.ok_or(LikeError::Unknown("the lattice fit gave no harmonics"))?,
         line_deg: CONTRAST * offsets.unwrap_or(0.0),
         flicker_deg: 0.0,
         plane_deg: [0.0; 2],

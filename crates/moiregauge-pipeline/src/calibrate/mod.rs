@@ -1,0 +1,13 @@
+//! Images of a known lattice → gain, mismatch and orthogonality of the scanner.
+
+mod document;
+mod run;
+
+pub use document::{
+    CalibratedInput, CalibratedSetResult, CalibrationDocument, CalibrationFileError, Unusable,
+    read_calibration,
+};
+pub use run::{
+    CalibrateRequest, CalibrationFound, NotCalibrated, NotMeasured, WhyNotCalibrated, calibrate,
+    known_lattice,
+};
