@@ -5,6 +5,7 @@
 
 mod analysis;
 mod arrays;
+mod asks;
 mod errors;
 mod maps;
 mod options;
@@ -21,6 +22,8 @@ use pyo3::prelude::*;
 mod _core {
     #[pymodule_export]
     use crate::analysis::Analysis;
+    #[pymodule_export]
+    use crate::asks::{calibrate, convert, inspect, moire, plan, simulate, validate};
     #[pymodule_export]
     use crate::maps::map;
     #[pymodule_export]

@@ -1,7 +1,11 @@
 //! Keyword arguments → settings, and what is known of files. Names, defaults and checks are those of the settings.
 
+use std::path::Path;
+
 use heterostrain::material::Material;
 use moiregauge::settings::Settings;
+use moiregauge::simulate::Simulation;
+use moiregauge_pipeline::calibrate::read_calibration;
 use moiregauge_report::results::Told;
 use pyo3::PyResult;
 use serde_json::{Map, Value};
@@ -13,10 +17,18 @@ use crate::errors::wrong;
 /// # Errors
 /// `ValueError` names the option.
 pub(crate) fn settings(options: &str) -> PyResult<Settings> {
+    settings_on(Settings::default(), options)
+}
+
+/// The same, on top of these settings.
+///
+/// # Errors
+/// `ValueError` names the option.
+pub(crate) fn settings_on(base: Settings, options: &str) -> PyResult<Settings> {
     let mut options: Map<String, Value> = serde_json::from_str(options).map_err(wrong)?;
-    let base: Settings = match options.remove("settings") {
+    let base = match options.remove("settings") {
         Some(given) => serde_json::from_value(given).map_err(|e| wrong(format!("settings: {e}")))?,
-        None => Settings::default(),
+        None => base,
     };
     let published = options.get("method").and_then(Value::as_str) == Some("paper");
     let base = if published { base.as_published() } else { base };
@@ -41,6 +53,10 @@ pub(crate) fn settings(options: &str) -> PyResult<Settings> {
                 for layers in moires {
                     *layers = both(layers.take())?;
                 }
+            }
+            ("scanner", Value::String(file)) => {
+                let read = read_calibration(Path::new(file.as_str())).map_err(wrong)?;
+                value = serde_json::to_value(read).map_err(wrong)?;
             }
             ("drift", Value::Array(xy)) if xy.len() == 2 => {
                 value = serde_json::json!({"x_nm_per_min": xy[0], "y_nm_per_min": xy[1]});
@@ -104,6 +120,41 @@ fn material(given: Value) -> PyResult<Value> {
             Ok(whole)
         }
         other => Ok(other),
+    }
+}
+
+/// Instrument and sample as JSON: any part of it, the rest as in `base`, materials by name.
+///
+/// # Errors
+/// `ValueError` names what makes no sense.
+pub(crate) fn conditions(base: &Simulation, mut given: Value) -> PyResult<Simulation> {
+    if let Some(Value::Object(sample)) = given.get_mut("sample") {
+        if let Some(Value::String(layers)) = sample.remove("layers") {
+            let Value::Object(both) = both(layers.into())? else {
+                return Err(wrong("layers"));
+            };
+            sample.extend(both);
+        }
+        for layer in ["material", "substrate"] {
+            if let Some(one) = sample.get_mut(layer) {
+                *one = material(one.take())?;
+            }
+        }
+    }
+    let mut all = serde_json::to_value(base).map_err(wrong)?;
+    put(&mut all, given);
+    serde_json::from_value(all).map_err(wrong)
+}
+
+/// Puts what is given in the place of what was, table by table.
+fn put(all: &mut Value, given: Value) {
+    match (all, given) {
+        (Value::Object(all), Value::Object(given)) => {
+            for (name, value) in given {
+                put(all.entry(name).or_insert(Value::Null), value);
+            }
+        }
+        (all, given) => *all = given,
     }
 }
 

@@ -13,6 +13,7 @@ its bottom line.
 
 from moiregauge import campaign, results
 from moiregauge._analyze import Campaign, analyze, analyze_moires, map, measure, read
+from moiregauge._asks import calibrate, convert, inspect, moire, plan, simulate, validate
 from moiregauge._core import __version__
 from moiregauge._errors import CaveatWarning, FailedFileWarning, MeasureError, ReadError
 from moiregauge._scan import Channel, Scan
@@ -32,9 +33,16 @@ __all__ = [
     "__version__",
     "analyze",
     "analyze_moires",
+    "calibrate",
     "campaign",
+    "convert",
+    "inspect",
     "map",
     "measure",
+    "moire",
+    "plan",
     "read",
     "results",
+    "simulate",
+    "validate",
 ]
