@@ -140,6 +140,7 @@ GIVEN = {
     "drift": "tuple[float, float] | Mapping[str, float]",
     "frame_direction": "FrameOrder | Sequence[Literal['up', 'down']]",
     "sensors": "str",
+    "scanner": "str | Mapping[str, Any]",
 }
 # Not for people.
 HIDDEN = {"layers_chosen"}
@@ -171,11 +172,12 @@ def options() -> str:
     out = [OPTIONS_HEAD + "".join(f"{name} = {aliases[name]}\n" for name in used)]
     out.append(f"\nTOLD = {known!r}\n".replace("'", '"'))
     out.append("\nclass Options(TypedDict, total=False):")
-    out.append('    """Keyword arguments of `analyze`, `measure`, `map`, `Campaign` and `campaign.run`."""\n')
+    out.append('    """Keyword arguments of `analyze`, `measure`, `map`, `Campaign` and `campaign.run`.\n')
     for name in sorted(entries):
-        annotation, words = entries[name]
-        out.append(f"    {name}: {annotation}")
-        out.append(doc(words, "    "))
+        words = " ".join(f"{name}: {entries[name][1]}".split())
+        out.append(textwrap.fill(words, 110, initial_indent="    ", subsequent_indent="        "))
+    out.append('    """\n')
+    out += [f"    {name}: {entries[name][0]}" for name in sorted(entries)]
     return "\n".join(out) + "\n"
 
 

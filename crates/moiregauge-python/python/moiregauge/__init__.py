@@ -16,6 +16,7 @@ from moiregauge._analyze import Campaign, analyze, analyze_moires, map, measure,
 from moiregauge._asks import calibrate, convert, inspect, moire, plan, simulate, validate
 from moiregauge._core import __version__
 from moiregauge._errors import CaveatWarning, FailedFileWarning, MeasureError, ReadError
+from moiregauge._options import Options
 from moiregauge._scan import Channel, Scan
 from moiregauge.results import Estimate, MapResults, Results
 
@@ -27,6 +28,7 @@ __all__ = [
     "FailedFileWarning",
     "MapResults",
     "MeasureError",
+    "Options",
     "ReadError",
     "Results",
     "Scan",

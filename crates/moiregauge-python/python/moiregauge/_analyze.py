@@ -127,6 +127,8 @@ def analyze(
     survey_image: an image of a larger area; a figure of the report marks the scans in it.
     threads: at most so many; all processors without.
     progress: `True`, or a function of what is being done, how much is done, and how much there is.
+    options: settings of the program and what files do not tell, such as `seed`, `channel`, `layers`, `drift`, `size_nm`:
+        see `help(moiregauge.Options)`.
 
     Doubts are in `caveats` and warned of once for each kind (`CaveatWarning`). Raises `ReadError` where nothing can be
     read, `MeasureError` where nothing shows a lattice, `ValueError` for options that make no sense.

@@ -186,7 +186,7 @@ def map_to_xarray(found: MapResults) -> xarray.Dataset:
             names = {mask.value: mask.name for mask in found.masks}
             attrs = {
                 "long_name": "why a node is not to be believed",
-                "flag_values": np.array(sorted(names), dtype="uint8"),
+                "flag_values": sorted(names),
                 "flag_meanings": " ".join(names[value].replace(" ", "_") for value in sorted(names)),
             }
             values = values.astype("uint8")

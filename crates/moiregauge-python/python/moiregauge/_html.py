@@ -29,7 +29,7 @@ STYLE = (
 def _shown(estimate: Estimate | None, unit: str) -> str:
     if estimate is None or estimate.value is None:
         return "–"
-    return f"{escape(str(estimate))} {unit}" if estimate.sigma_total is None else escape(str(estimate)) + f" {unit}"
+    return f"{escape(str(estimate))} {unit}".strip()
 
 
 def _drift(drift: DriftResult | None) -> str:
