@@ -27,16 +27,21 @@ pub(crate) fn stoppable(
     };
     ctrlc::set_handler(handler).context("cannot listen to Ctrl-C")?;
     match job.run(|| command(&job)) {
-        Ok(Err(error)) if error.is::<Cancelled>() => {
+        // With words on what is kept.
+        Ok(Err(error)) if error.is::<Cancelled>() && error.chain().len() > 1 => {
             eprintln!("{error:#}");
             Ok(ExitCode::from(INTERRUPTED))
         }
+        Ok(Err(error)) if error.is::<Cancelled>() => Ok(stopped()),
         Ok(ended) => ended,
-        Err(Cancelled) => {
-            eprintln!("{Cancelled}; nothing was written but what is complete");
-            Ok(ExitCode::from(INTERRUPTED))
-        }
+        Err(Cancelled) => Ok(stopped()),
     }
+}
+
+/// Says that nothing is left of the run.
+fn stopped() -> ExitCode {
+    eprintln!("{Cancelled}; nothing was written but what is complete");
+    ExitCode::from(INTERRUPTED)
 }
 
 /// The name of what is kept of a run that was stopped: measured scans belong to a build, as bands do.

@@ -2,16 +2,9 @@
 
 mod args;
 mod domains;
-mod kept;
-mod large;
-mod lattice;
-mod made;
-mod output;
+mod hint;
 mod regions;
 mod run;
-mod source;
-mod stripes;
-mod survey;
 mod words;
 
 pub(crate) use args::MapArgs;

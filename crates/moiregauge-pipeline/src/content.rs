@@ -1,6 +1,7 @@
 //! The bytes of a file and their format: read once, told once, however often channels are taken of them.
 
 use std::path::Path;
+use std::sync::{Arc, OnceLock};
 
 use moiregauge_report::InputFile;
 use sha2::{Digest as _, Sha256};
@@ -13,8 +14,9 @@ use crate::reading::{self, FileError};
 /// A file in memory.
 #[derive(Clone, Debug)]
 pub struct Content {
-    bytes: Vec<u8>,
+    bytes: Arc<Vec<u8>>,
     format: Format,
+    sha256: OnceLock<String>,
 }
 
 impl Content {
@@ -29,8 +31,16 @@ impl Content {
     /// These bytes.
     #[must_use]
     pub fn of(bytes: Vec<u8>) -> Self {
-        let format = detect(&bytes);
-        Self { bytes, format }
+        Self::shared(Arc::new(bytes))
+    }
+
+    /// Bytes that others hold, too.
+    pub(crate) fn shared(bytes: Arc<Vec<u8>>) -> Self {
+        Self {
+            format: detect(&bytes),
+            sha256: OnceLock::new(),
+            bytes,
+        }
     }
 
     /// What the file holds.
@@ -43,11 +53,17 @@ impl Content {
         self.format
     }
 
+    /// Their hash, calculated once.
+    fn sha256(&self) -> &str {
+        let hash = || hexadecimal(&Sha256::digest(self.bytes.as_slice()));
+        self.sha256.get_or_init(hash)
+    }
+
     /// What identifies the file; `name` is what the user calls it.
     pub fn identity(&self, name: &Path) -> InputFile {
         InputFile {
             file: in_words(name),
-            sha256: hexadecimal(&Sha256::digest(&self.bytes)),
+            sha256: self.sha256().to_owned(),
             bytes: self.bytes.len() as u64,
         }
     }

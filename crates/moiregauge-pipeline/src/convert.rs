@@ -9,7 +9,6 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use spmfile::{ChannelInfo, ExportError, Scan, WritableFormat, sensor_axis};
 
-use crate::content::Content;
 use crate::job::{Cancelled, Job};
 use crate::known::{Known, KnownError, is_named};
 use crate::reading::FileError;
@@ -134,7 +133,7 @@ pub fn convert(
     request: &ConvertRequest,
     stem: &str,
 ) -> Result<Vec<(String, Vec<u8>)>, ConvertError> {
-    let content = Content::read(known.place(path))?;
+    let content = known.source(path).content()?;
     let is_wanted = |info: &ChannelInfo| {
         let points = request.format == WritableFormat::Gxyzf;
         let names = &request.channels;

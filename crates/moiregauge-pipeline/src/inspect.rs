@@ -15,7 +15,6 @@ use spmfile::{
 };
 
 use crate::campaign::{Advice, in_words};
-use crate::content::Content;
 use crate::known::Known;
 use crate::names;
 use crate::opened::InputError;
@@ -174,7 +173,7 @@ impl fmt::Display for OutsideOfChannels {
 /// assert!(info.error.is_some() && info.scan.is_none());
 /// ```
 pub fn inspect(path: &Path, known: &Known, at: &[Pixel], advice: Advice) -> FileInfo {
-    let (mut scan, mut error) = match Content::read(known.place(path)) {
+    let (mut scan, mut error) = match known.source(path).content() {
         Err(error) => (None, Some(error.to_string())),
         Ok(content) => match known.decode(path, &content, &|_| true) {
             Ok(scan) => (Some(scan), None),

@@ -1,6 +1,5 @@
 //! Scans completed by what their files do not tell and the user knows.
 
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use moiregauge::campaign::natural_order;
@@ -12,8 +11,10 @@ use spmfile::{
 };
 
 use crate::content::Content;
+use crate::in_memory::ScanInMemory;
 use crate::held::{Held, InMemory};
 use crate::session;
+use crate::source::{Places, Source};
 use crate::twice::distinct;
 
 /// Why a file cannot be read as the user knows it.
@@ -54,9 +55,6 @@ pub enum KnownError {
     #[error(transparent)]
     Crop(#[from] CropError),
 }
-
-/// Where files lie that are no longer where their names say.
-pub type Places = BTreeMap<PathBuf, PathBuf>;
 
 /// What the user tells, the order of the files for those that alternate, and where they lie.
 #[derive(Clone, Debug, Default)]
@@ -106,7 +104,23 @@ impl Known {
 
     /// Where a file lies.
     pub fn place<'a>(&'a self, path: &'a Path) -> &'a Path {
-        self.places.get(path).map_or(path, PathBuf::as_path)
+        self.places.place(path)
+    }
+
+    /// A file, on the disk or in memory.
+    pub fn source<'a>(&'a self, path: &'a Path) -> Source<'a> {
+        self.places.source(path)
+    }
+
+    /// The scan of this name, if it is in memory and no file.
+    pub fn in_memory(&self, path: &Path) -> Option<&ScanInMemory> {
+        self.places.scan(path)
+    }
+
+    /// The parts of the log beside a file, by their names.
+    pub(crate) fn logs(&self, path: &Path) -> Vec<PathBuf> {
+        let logs = self.places.named(path).logs();
+        logs.iter().map(|log| log.path().to_owned()).collect()
     }
 
     /// Reads the wanted channels of a file and its position sensors, completed by what is known.
@@ -144,7 +158,8 @@ impl Known {
                 spmfile::arrays::read_as(array, bytes, &self.array_options(path), &wanted)
             }
             Format::OmicronMatrix => {
-                session::read(self.place(path), bytes, self.frame_direction(path), &wanted)
+                let direction = self.frame_direction(path);
+                session::read(&self.source(path), bytes, direction, &wanted)
             }
             other => spmfile::read_as(other, bytes, &wanted),
         }
@@ -279,7 +294,8 @@ impl Known {
             reason,
         };
         let path = Path::new(file);
-        let content = Content::read(self.place(path)).map_err(|e| refused(e.to_string()))?;
+        let content = self.source(path).content();
+        let content = content.map_err(|e| refused(e.to_string()))?;
         let mut second = self
             .decode(path, &content, &|_| true)
             .map_err(|e| refused(e.to_string()))?;

@@ -12,7 +12,7 @@ use moiregauge_report::InputFile;
 use spmfile::{ChannelInfo, ReadError, Scan, sensor_axis};
 
 use crate::content::Content;
-use crate::held::Held;
+use crate::in_memory::ScanInMemory;
 use crate::known::{Known, KnownError};
 use crate::memory::{NotEnoughMemory, enough_for};
 use crate::names;
@@ -59,8 +59,15 @@ pub struct Reading {
 pub struct Opened<'a> {
     path: &'a Path,
     known: &'a Known,
-    content: Held,
+    held: Held<'a>,
     channels: Vec<(String, String)>,
+}
+
+/// What is opened.
+#[derive(Debug)]
+enum Held<'a> {
+    File(Content),
+    Scan(&'a ScanInMemory),
 }
 
 impl<'a> Opened<'a> {
@@ -69,18 +76,17 @@ impl<'a> Opened<'a> {
     /// # Errors
     /// It cannot be read, or is no scan.
     pub fn new(path: &'a Path, known: &'a Known) -> Result<Self, InputError> {
-        let content = match known.held(path) {
-            Some(held) => held.clone(),
-            None => Held::Bytes(Arc::new(Content::read(known.place(path))?)),
-        };
-        let channels = match &content {
-            Held::Bytes(content) => channels(path, content, known)?,
-            Held::Scan { scan, .. } => names_of(scan),
+        let (held, channels) = if let Some(scan) = known.in_memory(path) {
+            (Held::Scan(scan), names_of(&scan.scan()))
+        } else {
+            let content = known.source(path).content()?;
+            let channels = channels(path, &content, known)?;
+            (Held::File(content), channels)
         };
         Ok(Self {
             path,
             known,
-            content,
+            held,
             channels,
         })
     }
@@ -98,9 +104,9 @@ impl<'a> Opened<'a> {
         settings: &Settings,
         companion: impl Fn(&str) -> Option<String>,
     ) -> Result<(Arc<Scan>, Vec<String>), InputError> {
-        let content = match &self.content {
-            Held::Bytes(content) => content,
-            Held::Scan { scan, .. } => return Ok((Arc::clone(scan), Vec::new())),
+        let content = match &self.held {
+            Held::File(content) => content,
+            Held::Scan(held) => return Ok((held.scan(), Vec::new())),
         };
         let names = self.names();
         let chosen = choose_channel(&names, settings.channel.as_deref());
@@ -126,7 +132,10 @@ impl<'a> Opened<'a> {
 
     /// What identifies it.
     pub fn identity(&self) -> InputFile {
-        self.content.identity(self.path)
+        match &self.held {
+            Held::File(content) => content.identity(self.path),
+            Held::Scan(held) => held.identity(names::in_words(self.path)),
+        }
     }
 
     /// All that the analysis needs, of an image of any size.

@@ -10,9 +10,9 @@ use moiregauge_report::{FailedInput, InputFile};
 use serde::Deserialize;
 
 use crate::hash::identity;
-use crate::known::{Known, Places};
+use crate::known::Known;
 use crate::names::in_words;
-use crate::session;
+use crate::source::Places;
 
 /// Why a run cannot be repeated.
 #[derive(Debug, thiserror::Error)]
@@ -217,20 +217,17 @@ fn by_content(file: &InputFile, folder: &Path) -> Option<PathBuf> {
 /// Puts into the record of a run which files it read; `measured` are those whose hashes the document has anyway.
 pub fn record_files(run: &mut Run, known: &Known, inputs: &[PathBuf], measured: &[InputFile]) {
     let mut others = BTreeMap::new();
-    let mut add = |name: &Path, place: &Path| -> Result<(), crate::reading::FileError> {
+    let mut add = |name: &Path| -> Result<(), crate::reading::FileError> {
         let file = in_words(name);
         if !measured.iter().any(|m| m.file == file) && !others.contains_key(&file) {
-            others.insert(file, identity(name, place)?);
+            others.insert(file, known.source(name).identity(name)?);
         }
         Ok(())
     };
     for path in inputs {
         let file = in_words(path);
-        // What is in memory is never looked for on the disk.
-        let added = match known.held(path) {
-            Some(_) => Ok(()),
-            None => add(path, known.place(path)),
-        };
+        // A scan in memory is never looked for on the disk.
+        let added = known.in_memory(path).map_or_else(|| add(path), |_| Ok(()));
         match added {
             Ok(()) => run.inputs.push(file),
             Err(error) => run.left_out.push(FailedInput {
@@ -242,10 +239,10 @@ pub fn record_files(run: &mut Run, known: &Known, inputs: &[PathBuf], measured: 
     let sensors = run.known.sensors.as_ref().map(PathBuf::from);
     let atomic = run.atomic.iter().flat_map(|a| a.files.iter());
     let beside = inputs.iter().cloned().chain(atomic.map(PathBuf::from));
-    let logs = beside.flat_map(|path| session::log_files(&path));
+    let logs = beside.flat_map(|path| known.logs(&path));
     for path in logs.chain(sensors) {
         // What cannot be read was no part of it.
-        let _ = add(&path, known.place(&path));
+        let _ = add(&path);
     }
     run.other_files = others.into_values().collect();
 }

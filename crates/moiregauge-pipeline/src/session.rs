@@ -6,7 +6,8 @@ use std::path::{Path, PathBuf};
 use spmfile::matrix::{frame_and_channel, is_curve, log_file};
 use spmfile::{ChannelInfo, Format, FrameDirection, ReadError, Scan};
 
-use crate::reading;
+use crate::content::Content;
+use crate::source::Source;
 
 fn refused(reason: String) -> ReadError {
     ReadError::Unsupported {
@@ -20,26 +21,27 @@ fn refused(reason: String) -> ReadError {
 /// # Errors
 /// As [`spmfile::matrix::read`], and where there is no log.
 pub fn read(
-    path: &Path,
+    file: &Source,
     bytes: &[u8],
     frame: Option<FrameDirection>,
     wanted: &dyn Fn(&ChannelInfo) -> bool,
 ) -> Result<Scan, ReadError> {
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
-    let parts = log(path, &name)?;
-    let parts: Vec<&[u8]> = parts.iter().map(Vec::as_slice).collect();
+    let name = file.path().file_name().unwrap_or_default();
+    let name = name.to_string_lossy();
+    let parts = log(file, &name)?;
+    let parts: Vec<&[u8]> = parts.iter().map(Content::bytes).collect();
     spmfile::matrix::read(bytes, &parts, &name, frame, wanted)
 }
 
 /// The parts of the log, as many as there are.
-fn log(path: &Path, name: &str) -> Result<Vec<Vec<u8>>, ReadError> {
+fn log(file: &Source, name: &str) -> Result<Vec<Content>, ReadError> {
     let mut parts = Vec::new();
     for number in 1.. {
         // A name that tells no log is refused by the reader, in its words.
         let Some(log) = log_file(name, number) else {
             break;
         };
-        match reading::read(&path.with_file_name(&log)) {
+        match file.beside(&log).content() {
             Ok(bytes) => parts.push(bytes),
             Err(error) if error.is_missing() && number > 1 => break,
             Err(error) if error.is_missing() => {
@@ -54,13 +56,10 @@ fn log(path: &Path, name: &str) -> Result<Vec<Vec<u8>>, ReadError> {
     Ok(parts)
 }
 
-/// The parts of the log beside a file of a session; none beside any other file.
+/// The parts of the log beside a file of a session on the disk; none beside any other file.
 pub fn log_files(path: &Path) -> Vec<PathBuf> {
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
-    (1..)
-        .map_while(|number| Some(path.with_file_name(log_file(&name, number)?)))
-        .take_while(|log| log.is_file())
-        .collect()
+    let logs = Source::disk(path).logs();
+    logs.iter().map(|log| log.path().to_owned()).collect()
 }
 
 /// Of the scans found in a folder, sorted by name, those to read: of a frame whose channels are files of

@@ -1,14 +1,14 @@
 //! Scans that are analysed together, and what came out.
 
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Mutex, PoisonError};
 
 use moiregauge::campaign::picture;
 use moiregauge_pipeline::campaign::{AnalyseError, Campaign, Kept, Outcome, no_advice, outcomes};
-use moiregauge_pipeline::sink::{FolderSink, Target};
+use moiregauge_pipeline::maps::{MapFound, MapRequest, NotMapped};
+use moiregauge_pipeline::sink::{FolderSink, Forget, Target};
 use moiregauge_pipeline::{
-    Content, Held, InMemory, Job, Known, Opened, Places, check_sets, find, read_again, record_files,
+    Job, Known, Opened, Places, ScanInMemory, check_sets, find, read_again, record_files,
 };
 use moiregauge_report::results::{AtomicImages, NamedSet, Results, Run};
 use moiregauge_report::screen::summary;
@@ -44,7 +44,7 @@ enum InPython<'py> {
 pub(crate) struct Analysis {
     run: Run,
     inputs: Vec<PathBuf>,
-    held: InMemory,
+    places: Places,
     campaign: Mutex<Campaign>,
     outcomes: Mutex<Vec<Outcome>>,
 }
@@ -55,6 +55,7 @@ impl Analysis {
     #[new]
     #[pyo3(signature = (paths, options, known, beside, held))]
     fn new(
+        py: Python<'_>,
         paths: Vec<PathBuf>,
         options: &str,
         known: &str,
@@ -62,14 +63,16 @@ impl Analysis {
         held: Vec<(PathBuf, InPython<'_>)>,
     ) -> PyResult<Self> {
         let (mut inputs, left_out) = find(&paths).frames();
-        let mut in_memory = BTreeMap::new();
+        let mut places = Places::new();
         for (name, given) in held {
-            let one = match given {
-                InPython::Bytes(bytes) => Held::Bytes(Arc::new(Content::of(bytes))),
-                InPython::Scan((about, arrays)) => Held::scan(arrays::scan(&about, &arrays)?),
-            };
             inputs.push(name.clone());
-            in_memory.insert(name, one);
+            match given {
+                InPython::Bytes(bytes) => places.hold(name, bytes),
+                InPython::Scan((about, arrays)) => {
+                    let scan = arrays::scan(&about, &arrays)?;
+                    places.hold_scan(name, py.detach(|| ScanInMemory::new(scan)));
+                }
+            }
         }
         if inputs.is_empty() {
             return Err(nothing("no scans", &left_out, false));
@@ -96,12 +99,11 @@ impl Analysis {
             other_files: Vec::new(),
             left_out,
         };
-        let held: InMemory = Arc::new(in_memory);
-        let campaign = campaign(&run, &inputs, &held)?;
+        let campaign = Campaign::of_run(&run, &inputs, &places, no_advice).map_err(wrong)?;
         Ok(Self {
             run,
             inputs,
-            held,
+            places,
             campaign: Mutex::new(campaign),
             outcomes: Mutex::default(),
         })
@@ -188,33 +190,45 @@ impl Analysis {
 
 impl Analysis {
     pub(crate) fn known(&self) -> Known {
-        Known::new(&self.run.known, &self.inputs).holding(&self.held)
+        Known::new(&self.run.known, &self.inputs).at(&self.places)
     }
 
+    /// Maps the scans; what was measured is kept.
+    pub(crate) fn map(&self, request: &MapRequest, job: &Job) -> PyResult<MapFound> {
+        let mut campaign = lock(&self.campaign).clone();
+        let found = moiregauge_pipeline::map(&mut campaign, request, &Forget, job);
+        lock(&self.campaign).take(campaign.kept().clone());
+        let mut found = found.map_err(|error| self.not_mapped(error))?;
+        let mut run = Run {
+            command: "map".to_owned(),
+            ..self.run.clone()
+        };
+        record_files(&mut run, &self.known(), &self.inputs, &found.provenance.inputs);
+        found.provenance.run = Some(run);
+        Ok(found)
+    }
+
+    /// The files that are never written over.
     pub(crate) fn inputs(&self) -> &[PathBuf] {
         &self.inputs
     }
 
-    pub(crate) fn run(&self) -> &Run {
-        &self.run
-    }
-
-    /// What came out last; measured first where that was not done.
-    pub(crate) fn first_outcome(&self, job: &Job) -> PyResult<Outcome> {
-        if let Some(found) = lock(&self.outcomes).first() {
-            return Ok(found.clone());
+    fn not_mapped(&self, error: NotMapped) -> PyErr {
+        let words = moiregauge_pipeline::names::in_full(&error);
+        match error {
+            NotMapped::Cancelled(_) => stopped(),
+            NotMapped::Analyse(why) | NotMapped::NoLattice { why, .. } => self.refused(&why),
+            NotMapped::Nothing { failed } => nothing(&words, &failed, true),
+            NotMapped::NothingLeft(_) => nothing(&words, &[], true),
+            NotMapped::Band { file, .. } => unreadable(&file.display().to_string(), &words),
+            _ => wrong(words),
         }
-        let found = self.outcomes(&self.run, job)?;
-        let first = found.first().cloned();
-        *lock(&self.outcomes) = found;
-        first.ok_or_else(|| nothing("nothing could be analysed", &[], true))
     }
 
     fn outcomes(&self, run: &Run, job: &Job) -> PyResult<Vec<Outcome>> {
         let drawn = run.report.figures || run.report.png || run.report.html;
         let mut campaign = lock(&self.campaign).clone().illustrated(drawn);
-        let places = Places::new();
-        let found = outcomes(run, &places, &mut campaign, job, |measured| {
+        let found = outcomes(run, &self.places, &mut campaign, job, |measured| {
             let mut recorded = run.clone();
             record_files(&mut recorded, &self.known(), &self.inputs, measured);
             recorded
@@ -250,12 +264,11 @@ impl Analysis {
     }
 
     fn write(&self, run: &Run, folder: &Path, force: bool, job: &Job) -> PyResult<usize> {
-        let places: Vec<PathBuf> = self.inputs.clone();
         let sink = FolderSink::open(&Target {
             folder,
             kind: "analyze",
             names: &["results.json".to_owned(), "report.html".to_owned(), "figures/".to_owned()],
-            inputs: &places,
+            inputs: &self.inputs,
             force,
         })
         .map_err(|e| unwritten(&e))?;
@@ -280,11 +293,6 @@ impl Analysis {
         sink.commit().map_err(|e| unwritten(&e))?;
         Ok(found.len())
     }
-}
-
-fn campaign(run: &Run, inputs: &[PathBuf], held: &InMemory) -> PyResult<Campaign> {
-    let campaign = Campaign::of_run(run, inputs, &Places::new(), no_advice);
-    Ok(campaign.map_err(wrong)?.holding(held))
 }
 
 fn document(outcome: &Outcome) -> PyResult<(String, String)> {

@@ -25,7 +25,7 @@ mod _core {
     #[pymodule_export]
     use crate::asks::{calibrate, convert, inspect, moire, plan, simulate, validate};
     #[pymodule_export]
-    use crate::maps::map;
+    use crate::maps::{Map, map};
     #[pymodule_export]
     use crate::program::{calculated_by, program};
     #[pymodule_export]

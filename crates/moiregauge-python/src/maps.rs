@@ -1,45 +1,27 @@
 //! Maps of twist and strain.
 
-use moiregauge::domains::regime;
-use moiregauge::survey::MapMethod;
-use moiregauge::window::Resolution;
-use moiregauge_pipeline::Job;
-use moiregauge_pipeline::campaign::{Outcome, no_advice};
-use moiregauge_pipeline::maps::{Mapped, NoMap, Scans, map_lattices};
-use moiregauge_report::results::{Conventions, MapResults, mask_counts, quantities};
-use moiregauge_report::{MapDetails, map_scan};
+use std::path::PathBuf;
+
+use moiregauge_pipeline::maps::{MAP_FILES, MapFound, MapRequest, Shown};
+use moiregauge_pipeline::sink::{FolderSink, MemorySink, Sink, Target};
+use moiregauge_report::{Choice, ColorMap, map_scan};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use serde::Deserialize;
 
 use crate::analysis::Analysis;
 use crate::arrays;
-use crate::errors::{nothing, stopped, wrong};
+use crate::errors::{unwritten, wrong};
 use crate::work::work;
 
-/// What is asked of a map.
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Asked {
-    method: String,
-    window_nm: Option<f64>,
-    step_nm: Option<f64>,
-    margin: Option<f64>,
+/// A map as it was made.
+#[pyclass(frozen, module = "moiregauge._core")]
+pub(crate) struct Map {
+    found: MapFound,
+    request: MapRequest,
+    inputs: Vec<PathBuf>,
 }
 
-impl Asked {
-    fn method(&self) -> PyResult<MapMethod> {
-        match self.method.as_str() {
-            "demodulation" => Ok(MapMethod::Demodulation),
-            "tiles" => Ok(MapMethod::Tiles),
-            other => Err(wrong(format!(
-                "map_method: expected \"demodulation\" or \"tiles\", found {other:?}"
-            ))),
-        }
-    }
-}
-
-/// Maps the scans of an analysis: the document, and every quantity with its unit and values.
+/// Maps the scans of an analysis: the map, its document, and every quantity with its unit and values.
 #[pyfunction]
 #[pyo3(signature = (analysis, asked, threads, progress))]
 pub(crate) fn map<'py>(
@@ -48,15 +30,27 @@ pub(crate) fn map<'py>(
     asked: &str,
     threads: Option<usize>,
     progress: Option<Py<PyAny>>,
-) -> PyResult<(String, Bound<'py, PyDict>)> {
-    let asked: Asked = serde_json::from_str(asked).map_err(wrong)?;
-    asked.method()?;
-    let (document, planes) = work(py, threads, progress.as_ref(), |job| {
-        let outcome = analysis.first_outcome(job)?;
-        let found = mapped(analysis, &outcome, &asked, job)?;
-        let planes = map_scan(&found.map).channels;
-        let document = document(found, outcome, &asked);
-        Ok((serde_json::to_string(&document).map_err(wrong)?, planes))
+) -> PyResult<(Map, String, Bound<'py, PyDict>)> {
+    let request: MapRequest = serde_json::from_str(asked).map_err(wrong)?;
+    let (map, document, planes) = work(py, threads, progress.as_ref(), |job| {
+        let found = analysis.map(&request, job)?;
+        let map = Map {
+            found,
+            request,
+            inputs: analysis.inputs().to_vec(),
+        };
+        let nothing_drawn = Choice {
+            figures: false,
+            png: false,
+            html: false,
+            colormap: ColorMap::default(),
+        };
+        let document = map.write(nothing_drawn, &MemorySink::new())?;
+        let planes = match &map.found.shown {
+            Shown::Lattice(found) => map_scan(&found.map).channels,
+            Shown::Stripes(found) => moiregauge_report::stripe_scan(&found.stripes).channels,
+        };
+        Ok((map, document, planes))
     })?;
     let all = PyDict::new(py);
     for plane in planes {
@@ -64,58 +58,47 @@ pub(crate) fn map<'py>(
         let values = arrays::values(py, plane.values(), shape)?;
         all.set_item(&plane.name, (&plane.unit, values))?;
     }
-    Ok((document, all))
+    Ok((map, document, all))
 }
 
-fn mapped(analysis: &Analysis, outcome: &Outcome, asked: &Asked, job: &Job) -> PyResult<Mapped> {
-    let scans = Scans {
-        analysis: &outcome.analysis,
-        inputs: analysis.inputs(),
-        known: &analysis.known(),
-        advice: no_advice,
-    };
-    let resolution = Resolution {
-        window_nm: asked.window_nm,
-        step_nm: asked.step_nm,
-        margin: asked.margin,
-    };
-    map_lattices(&scans, asked.method()?, &resolution, job).map_err(|error| match error {
-        NoMap::Cancelled(_) => stopped(),
-        NoMap::Nothing { failed } => nothing("no image gave a map", &failed, true),
-        other => wrong(other),
-    })
+#[pymethods]
+impl Map {
+    /// Writes what the program writes.
+    #[pyo3(signature = (folder, force, choice, threads, progress))]
+    fn report(
+        &self,
+        py: Python<'_>,
+        folder: PathBuf,
+        force: bool,
+        choice: &str,
+        threads: Option<usize>,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<()> {
+        let choice: Choice = serde_json::from_str(choice).map_err(wrong)?;
+        work(py, threads, progress.as_ref(), |_| {
+            let sink = FolderSink::open(&Target {
+                folder: &folder,
+                kind: "map",
+                names: &MAP_FILES.map(str::to_owned),
+                inputs: &self.inputs,
+                force,
+            });
+            let sink = sink.map_err(|e| unwritten(&e))?;
+            self.write(choice, &sink)?;
+            sink.commit().map_err(|e| unwritten(&e))
+        })
+    }
 }
 
-fn document(found: Mapped, outcome: Outcome, asked: &Asked) -> MapResults {
-    let (map, settings) = (&found.map, outcome.analysis.settings);
-    let mut provenance = outcome.provenance;
-    provenance.failed.extend(found.failed);
-    let [columns, rows] = [0, 1].map(|i| map.grid.step.column(i).into_owned());
-    let details = MapDetails {
-        regime: Some(regime(map, None)),
-        ..MapDetails::default()
-    };
-    MapResults {
-        schema: "moiregauge/map/1".to_owned(),
-        provenance,
-        conventions: Conventions::of(&settings),
-        errors: String::new(),
-        method: asked.method.clone(),
-        window_nm: map.window_nm,
-        resolution_nm: 2.355 * map.window_nm,
-        nodes: map.grid.size,
-        origin_nm: map.grid.origin.into(),
-        step_nm: [columns.into(), rows.into()],
-        extent_nm: map.grid.extent(),
-        masks: mask_counts(map),
-        quantities: quantities(map),
-        whole_image: found.whole,
-        stripes: None,
-        images: found.images,
-        agreement: found.agreement.map(Into::into),
-        drift_change: found.drift_change.map(Into::into),
-        details: (&details).into(),
-        caveats: found.caveats.iter().map(Into::into).collect(),
-        settings,
+impl Map {
+    /// Asks the questions and writes everything; returns the document.
+    fn write(&self, choice: Choice, sink: &dyn Sink) -> PyResult<String> {
+        let mut found = self.found.clone();
+        if let Some(run) = &mut found.provenance.run {
+            run.report = choice;
+        }
+        let results = found.write(&self.request, choice, sink);
+        let results = results.map_err(|e| wrong(moiregauge_pipeline::names::in_full(&e)))?;
+        serde_json::to_string(&results).map_err(wrong)
     }
 }

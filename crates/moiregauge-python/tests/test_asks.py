@@ -6,10 +6,9 @@ import json
 import pickle
 from pathlib import Path
 
+import moiregauge as mg
 import pytest
 from conftest import program
-
-import moiregauge as mg
 
 pytestmark = pytest.mark.filterwarnings("ignore::moiregauge.CaveatWarning")
 

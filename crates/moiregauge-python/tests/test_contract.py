@@ -154,3 +154,34 @@ def test_one_scan_is_measured(image: Path, scans: Path) -> None:
     assert found.vectors[0].sensor.wavelength_nm.value > 10
     with pytest.raises(ValueError, match="expected one scan, found 4"):
         mg.measure(scans)
+
+
+def test_maps_answer_and_report_as_the_program(image: Path, tmp_path: Path) -> None:
+    low, high = mg.map(image).extent_nm[0]
+    middle = (low + high) / 2
+    found = mg.map(
+        image,
+        regions={"all": [(low, low), (high, low), (high, high), (low, high)]},
+        wanted_deg=(1.13, 0.05),
+        device_nm=(15.0, 15.0),
+    )
+    assert found.details.regions[0].name == "all" and found.details.wanted.twist_deg == 1.13
+    assert found.details.devices
+    with pytest.raises(ValueError, match="outside"):
+        mg.map(image, regions={"far": [(1e5, 0), (1e5 + 1, 0), (1e5, 1)]})
+    with pytest.raises(ValueError, match="window_nm"):
+        mg.map(image, window_nm=-1.0)
+    plain = mg.map(image)
+    plain.report(tmp_path / "python")
+    program("map", image, "--out", tmp_path / "program", ok=False)
+    names = {p.relative_to(tmp_path / "program") for p in (tmp_path / "program").rglob("*") if p.is_file()}
+    assert names == {p.relative_to(tmp_path / "python") for p in (tmp_path / "python").rglob("*") if p.is_file()}
+    asked = {"map.json", "report.html", ".moiregauge.json"}
+    for name in names:
+        if name.name not in asked and "manifest" not in name.name:
+            assert (tmp_path / "program" / name).read_bytes() == (tmp_path / "python" / name).read_bytes(), name
+    written = json.loads((tmp_path / "program" / "map.json").read_text())
+    assert without_run(plain.to_dict()) == without_run(written)
+    assert middle > low
+    with pytest.raises(ValueError, match="map the scans again"):
+        pickle.loads(pickle.dumps(plain)).report(tmp_path / "again")

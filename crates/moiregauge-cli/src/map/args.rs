@@ -3,9 +3,10 @@
 use anyhow::{Context as _, ensure};
 use clap::{Args as _, FromArgMatches as _, ValueEnum};
 use moiregauge::survey::MapMethod;
-use moiregauge::window::Resolution;
+use moiregauge_pipeline::maps::MapRequest;
 
 use super::domains::DomainArgs;
+use super::hint::in_words;
 use super::regions::RegionArgs;
 use crate::analyze::{AnalyzeArgs, Task};
 use crate::numbers;
@@ -34,7 +35,7 @@ pub(crate) struct MapArgs {
     pub(super) analyze: AnalyzeArgs,
     /// How local lattices are measured
     #[arg(help_heading = "Maps", long, value_enum, default_value_t = MapMethodArg::Demodulation)]
-    pub(super) map_method: MapMethodArg,
+    map_method: MapMethodArg,
     /// Width of the Gaussian window (standard deviation), nm; a point becomes 2.35 of it wide [default: as
     /// wide as the lattice stays straight, at least 0.6 periods]. By tiles: the side of a tile [default: 6
     /// periods]
@@ -45,14 +46,14 @@ pub(crate) struct MapArgs {
     step: Option<f64>,
     /// Map in bands, as images of more than 20 million pixels are; several files are put side by side
     #[arg(help_heading = "Maps", long)]
-    pub(super) in_bands: bool,
+    in_bands: bool,
     /// Margin at the edges, in windows [default: 2, or a quarter of the frame where that is less]
     #[arg(long, value_name = "WINDOWS", value_parser = numbers::number([0.0, 10.0]), help_heading = "Maps")]
-    pub(super) margin: Option<f64>,
+    margin: Option<f64>,
     #[command(flatten)]
-    pub(super) regions: RegionArgs,
+    regions: RegionArgs,
     #[command(flatten)]
-    pub(super) domains: DomainArgs,
+    domains: DomainArgs,
 }
 
 /// How local lattices are measured.
@@ -62,15 +63,6 @@ pub(super) enum MapMethodArg {
     Demodulation,
     /// The fit of whole images on overlapping tiles: slower and coarser, for comparison
     Tiles,
-}
-
-impl MapMethodArg {
-    fn name(self) -> &'static str {
-        match self {
-            Self::Demodulation => "demodulation",
-            Self::Tiles => "tiles",
-        }
-    }
 }
 
 impl From<MapMethodArg> for MapMethod {
@@ -105,7 +97,7 @@ impl MapArgs {
             task.run.atomic.is_none() && task.run.export.is_empty() && !task.run.parquet,
             "--atomic, --export and --parquet are for `moiregauge analyze`: a map has no use for them"
         );
-        self.regions.check()?;
+        self.request().check().map_err(in_words)?;
         ensure!(
             self.analyze.survey_image().is_none(),
             "--survey-image is for analyze"
@@ -123,16 +115,16 @@ impl MapArgs {
         self.analyze.is_loud()
     }
 
-    pub(super) fn resolution(&self) -> Resolution {
-        Resolution {
+    /// What map is wanted.
+    pub(super) fn request(&self) -> MapRequest {
+        MapRequest {
+            method: self.map_method.into(),
             window_nm: self.window,
             step_nm: self.step,
             margin: self.margin,
+            in_bands: self.in_bands,
+            questions: self.regions.questions(),
+            domains: self.domains.search(),
         }
-    }
-
-    /// How local lattices are measured, for the results.
-    pub(super) fn method_name(&self) -> &'static str {
-        self.map_method.name()
     }
 }

@@ -1,10 +1,8 @@
-//! Whether nodes and triangles are looked for, and what they say.
+//! Whether nodes and triangles are looked for.
 
 use clap::ValueEnum;
-use moiregauge::caveat::{Caveat, PatternDoubt};
-use moiregauge::domains::regime;
-use moiregauge::domains::{Contrast, DomainMap, Regime, RegimeChoice};
-use moiregauge::map::TwistStrainMap;
+use moiregauge::domains::Contrast;
+use moiregauge_pipeline::maps::{self, DomainSearch};
 
 /// Domain structure at small angles.
 #[derive(clap::Args, Clone, Debug)]
@@ -32,84 +30,20 @@ enum Look {
     Dark,
 }
 
-/// What was found, and which regime applies.
-#[derive(Clone, Debug)]
-pub(super) struct Domains {
-    pub(super) map: Option<DomainMap>,
-    pub(super) regime: Regime,
-    pub(super) caveats: Vec<Caveat>,
-}
-
-/// Missing and extra nodes beyond this share of all make the mesh doubtful.
-const ODD: f64 = 0.15;
-
 impl DomainArgs {
-    /// Which regime applies; looks for domains if they are wanted. `find` gives those of all images.
-    pub(super) fn answer(
-        &self,
-        map: &TwistStrainMap,
-        find: impl FnOnce(Contrast) -> Vec<DomainMap>,
-    ) -> Domains {
-        let before = regime(map, None);
-        let wanted = match self.domains {
-            When::Off => false,
-            When::Auto => before.in_doubt,
-            When::On => true,
-        };
-        if !wanted {
-            let caveats = before.in_doubt.then(|| in_doubt(&before));
-            return Domains {
-                map: None,
-                regime: before,
-                caveats: caveats.into_iter().collect(),
-            };
-        }
-        let contrast = match self.nodes {
-            None => Contrast::Auto,
-            Some(Look::Bright) => Contrast::Bright,
-            Some(Look::Dark) => Contrast::Dark,
-        };
-        let found = find(contrast);
-        let images = found.len();
-        let best = found.into_iter().max_by_key(|d| d.cells.len());
-        let regime = regime(map, best.as_ref());
-        let mut caveats = Vec::new();
-        let mut doubt = |doubt: PatternDoubt| caveats.push(Caveat::new(doubt, "domains"));
-        if images > 1 {
-            doubt(PatternDoubt::DomainsOfOneImage { images });
-        }
-        match &best {
-            None => doubt(PatternDoubt::NoDomains),
-            Some(d) => about_mesh(d, self.nodes.is_none(), &mut doubt),
-        }
-        if regime.choice == RegimeChoice::Domains {
-            let reasons = regime.reasons.join("; ");
-            caveats.push(Caveat::new(PatternDoubt::UseDomains { reasons }, "map"));
-        } else if regime.in_doubt {
-            caveats.push(in_doubt(&regime));
-        }
-        Domains {
-            map: best,
-            regime,
-            caveats,
+    /// What is looked for.
+    pub(super) fn search(&self) -> DomainSearch {
+        DomainSearch {
+            when: match self.domains {
+                When::Auto => maps::When::Auto,
+                When::On => maps::When::On,
+                When::Off => maps::When::Off,
+            },
+            nodes: match self.nodes {
+                None => Contrast::Auto,
+                Some(Look::Bright) => Contrast::Bright,
+                Some(Look::Dark) => Contrast::Dark,
+            },
         }
     }
-}
-
-/// What is doubtful about a mesh of nodes; `is_open` where nobody said whether nodes are bright or dark.
-fn about_mesh(d: &DomainMap, is_open: bool, doubt: &mut impl FnMut(PatternDoubt)) {
-    if !d.contrast_is_clear && is_open {
-        doubt(PatternDoubt::NodesBrightOrDark);
-    }
-    let odd = d.missing.len() + d.extra.len();
-    if odd as f64 > ODD * d.nodes.len() as f64 {
-        let nodes = d.nodes.len();
-        doubt(PatternDoubt::MeshWithGaps { odd, nodes });
-    }
-}
-
-/// Says that phases are not to be believed here without more.
-fn in_doubt(regime: &Regime) -> Caveat {
-    let reasons = regime.reasons.join("; ");
-    Caveat::new(PatternDoubt::PhasesInDoubt { reasons }, "map")
 }

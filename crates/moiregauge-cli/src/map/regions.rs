@@ -2,13 +2,10 @@
 
 use std::fmt::Write as _;
 
-use anyhow::ensure;
-use moiregauge::caveat::Caveat;
-use moiregauge::map::TwistStrainMap;
 use moiregauge::region::{DeviceSearch, Region, WantedTwist};
 use moiregauge_pipeline::maps::{Line, Questions};
 use moiregauge_report::results::{MapDetailsResult, RegionMeanResult};
-use moiregauge_report::{MapDetails, plus_minus, two_digits};
+use moiregauge_report::{plus_minus, two_digits};
 use nalgebra::Vector2;
 use spmfile::length_nm;
 
@@ -43,42 +40,8 @@ pub(super) struct RegionArgs {
 }
 
 impl RegionArgs {
-    /// Refuses names that are used twice.
-    pub(super) fn check(&self) -> anyhow::Result<()> {
-        let regions: Vec<&str> = self.region.iter().map(|r| r.name.as_str()).collect();
-        let lines: Vec<&str> = self.profile.iter().map(|l| l.name.as_str()).collect();
-        for (option, names) in [("--region", regions), ("--profile", lines)] {
-            for (n, name) in names.iter().enumerate() {
-                ensure!(
-                    !names[..n].contains(name),
-                    "{option}: the name {name:?} is used twice"
-                );
-            }
-        }
-        Ok(())
-    }
-
-    /// Whether nothing is asked.
-    pub(super) fn ask_nothing(&self) -> bool {
-        self.questions().is_empty()
-    }
-
-    /// The answers, and doubts about them.
-    ///
-    /// # Errors
-    /// Regions and lines beyond the map.
-    pub(super) fn answer(&self, map: &TwistStrainMap) -> anyhow::Result<(MapDetails, Vec<Caveat>)> {
-        self.questions().ask(map).map_err(|outside| {
-            let option = if outside.is_line {
-                "--profile"
-            } else {
-                "--region"
-            };
-            anyhow::anyhow!("{option} {outside}")
-        })
-    }
-
-    fn questions(&self) -> Questions {
+    /// What is asked.
+    pub(super) fn questions(&self) -> Questions {
         let search = |size| DeviceSearch {
             orientations: usize::from(self.device_angles),
             most: usize::from(self.device_count),

@@ -11,8 +11,9 @@ use moiregauge_report::results::AtomicImages;
 use super::error::{AnalyseError, Place};
 use super::measure::{given_again, measure_file};
 use crate::job::Job;
-use crate::known::{Known, Places};
+use crate::known::Known;
 use crate::names::in_words;
+use crate::source::Places;
 use crate::twice::distinct;
 
 /// The orientation measured in the atomic images, and these.

@@ -16,9 +16,9 @@ use super::measure::{Advice, Inputs, Measured, given_again, measured, no_advice}
 use super::overlap::overlap;
 use super::shown::show;
 use crate::job::Job;
-use crate::held::InMemory;
-use crate::known::{Known, Places};
+use crate::known::Known;
 use crate::names::in_words;
+use crate::source::Places;
 use crate::told::check_told;
 use crate::twice::distinct;
 
@@ -48,8 +48,6 @@ pub struct Campaign {
     illustrated: bool,
     #[serde(skip)]
     advice: Words,
-    #[serde(skip)]
-    held: InMemory,
 }
 
 /// A campaign as it is written.
@@ -110,7 +108,6 @@ impl Campaign {
             kept: Kept::default(),
             illustrated: false,
             advice: Words::default(),
-            held: InMemory::default(),
         })
     }
 
@@ -176,13 +173,6 @@ impl Campaign {
         self
     }
 
-    /// The same scans, some of which are in memory. They are no part of what is written.
-    #[must_use]
-    pub fn holding(mut self, held: &InMemory) -> Self {
-        self.held = InMemory::clone(held);
-        self
-    }
-
     /// With names that were given and cannot be measured.
     #[must_use]
     pub fn with_left_out(mut self, left_out: Vec<FailedInput>) -> Self {
@@ -228,6 +218,27 @@ impl Campaign {
         &self.inputs
     }
 
+    /// Sets made by hand.
+    pub fn sets(&self) -> &[NamedSet] {
+        &self.sets
+    }
+
+    /// Names that were given and cannot be measured.
+    pub fn left_out(&self) -> &[FailedInput] {
+        &self.left_out
+    }
+
+    /// What is known of the scans, and where they lie.
+    #[must_use]
+    pub fn known(&self) -> Known {
+        Known::new(&self.told, &self.inputs).at(&self.places)
+    }
+
+    /// What helps against errors.
+    pub(crate) fn advice(&self) -> Advice {
+        self.advice.0
+    }
+
     /// What was measured so far.
     pub fn kept(&self) -> &Kept {
         &self.kept
@@ -245,9 +256,7 @@ impl Campaign {
     /// from there.
     pub fn analyse(&mut self, job: &Job) -> Result<Vec<Outcome>, AnalyseError> {
         let (inputs, repeated) = distinct(&self.inputs);
-        let known = Known::new(&self.told, &inputs)
-            .at(&self.places)
-            .holding(&self.held);
+        let known = Known::new(&self.told, &inputs).at(&self.places);
         let mut failed = self.left_out.clone();
         let mut window = None;
         if self.settings.overlap {

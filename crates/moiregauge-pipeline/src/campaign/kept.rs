@@ -9,9 +9,8 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
 
 use super::measure::Failure;
-use crate::hash::{hexadecimal, identity};
+use crate::hash::hexadecimal;
 use crate::known::Known;
-use crate::session;
 
 /// Name and version of what is kept; a part of every key.
 pub(crate) const SCHEMA: &str = "moiregauge/measured/1";
@@ -130,7 +129,7 @@ impl With {
         add(&window);
         if let Some(sensors) = &told.sensors {
             let sensors = Path::new(sensors);
-            add(&identity(sensors, known.place(sensors)).ok());
+            add(&known.source(sensors).identity(sensors).ok());
         }
         Self(hash)
     }
@@ -140,8 +139,8 @@ impl With {
         let mut hash = self.0.clone();
         let direction = known.frame_direction(path);
         hash.update(format!("{name:?} {sha256} {direction:?}\n"));
-        for log in session::log_files(known.place(path)) {
-            let log = identity(&log, &log).ok();
+        for log in known.source(path).logs() {
+            let log = log.identity(log.path()).ok();
             hash.update(format!("{:?}\n", log.map(|log| log.sha256)));
         }
         hexadecimal(&hash.finalize())

@@ -8,7 +8,8 @@ use super::error::AnalyseError;
 use super::growing::{Campaign, Outcome};
 use super::survey::survey_image;
 use crate::job::Job;
-use crate::known::{Known, Places};
+use crate::known::Known;
+use crate::source::Places;
 
 /// Reads what is beside the scans of a run, then these, and analyses them. `record` makes the record of the run from
 /// the files that were measured.

@@ -9,8 +9,9 @@ use moiregauge_report::InputFile;
 use moiregauge_report::results::Told;
 
 use super::error::{AnalyseError, Place};
-use crate::known::{Known, Places};
+use crate::known::Known;
 use crate::opened::read_scan;
+use crate::source::Places;
 
 /// The image of a larger area, read before the work.
 pub(super) fn survey_image(

@@ -8,9 +8,13 @@ use moiregauge::region::{
 };
 use moiregauge_report::MapDetails;
 use nalgebra::Vector2;
+use serde::{Deserialize, Serialize};
+
+use super::asked::Asked;
 
 /// Questions to a map. Places are those of the map: x right, y up, nm.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(from = "Asked", into = "Asked")]
 pub struct Questions {
     /// Mean, spread and errors within these.
     pub regions: Vec<Region>,
@@ -49,7 +53,34 @@ pub struct OutsideOfMap {
     pub map: [[f64; 2]; 2],
 }
 
+/// Two regions or two lines of one name.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("the name {name:?} is used twice")]
+pub struct NameTwice {
+    /// The name.
+    pub name: String,
+    /// Whether they are lines.
+    pub is_line: bool,
+}
+
 impl Questions {
+    /// Refuses names that are used twice.
+    ///
+    /// # Errors
+    /// The first of them.
+    pub fn check(&self) -> Result<(), NameTwice> {
+        let regions: Vec<&String> = self.regions.iter().map(|r| &r.name).collect();
+        let lines: Vec<&String> = self.profiles.iter().map(|l| &l.name).collect();
+        for (is_line, names) in [(false, regions), (true, lines)] {
+            let twice = |n: usize| names[..n].contains(&names[n]);
+            if let Some(n) = (0..names.len()).find(|&n| twice(n)) {
+                let name = names[n].clone();
+                return Err(NameTwice { name, is_line });
+            }
+        }
+        Ok(())
+    }
+
     /// Whether nothing is asked.
     pub fn is_empty(&self) -> bool {
         let places = self.regions.is_empty() && self.profiles.is_empty();

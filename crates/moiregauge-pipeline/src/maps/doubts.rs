@@ -23,7 +23,7 @@ pub(super) fn about_change(drift_change: Option<DriftChange>, caveats: &mut Vec<
 }
 
 /// Says that the margin is narrower than two windows where nobody asked for that.
-pub fn narrow_margin(margin: f64, file: &str) -> Option<Caveat> {
+pub(super) fn narrow_margin(margin: f64, file: &str) -> Option<Caveat> {
     let doubt = MapDoubt::NarrowMargin { margin };
     (margin > 0.0 && margin < 1.99).then(|| Caveat::new(doubt, file))
 }

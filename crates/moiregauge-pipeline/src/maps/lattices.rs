@@ -59,7 +59,6 @@ pub struct Mapped {
 
 /// Why there is no map.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum NoMap {
     /// It was stopped.
     #[error(transparent)]
@@ -216,7 +215,7 @@ fn whole_image(analysis: &Analysis) -> Option<TwistStrainResult> {
 }
 
 /// One image behind a map.
-pub fn mapped_image(
+pub(super) fn mapped_image(
     file: &str,
     line: Option<LineDirection>,
     drift_corrected: bool,

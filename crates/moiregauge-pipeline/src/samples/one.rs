@@ -10,8 +10,8 @@ use super::find::SampleFiles;
 use super::list::Asked;
 use crate::campaign::{Advice, AnalyseError, Campaign, Outcome};
 use crate::job::{Cancelled, Job};
-use crate::known::Places;
 use crate::names::in_full;
+use crate::source::Places;
 
 /// What a sample is analysed with.
 pub(super) struct With<'a> {

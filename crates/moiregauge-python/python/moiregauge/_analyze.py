@@ -291,6 +291,15 @@ def map(  # noqa: A001
     window_nm: float | None = None,
     step_nm: float | None = None,
     margin: float | None = None,
+    in_bands: bool = False,
+    regions: Mapping[str, Sequence[tuple[float, float]]] | None = None,
+    profiles: Mapping[str, tuple[tuple[float, float], tuple[float, float]]] | None = None,
+    device_nm: tuple[float, float] | None = None,
+    device_angles: int = 1,
+    device_count: int = 10,
+    wanted_deg: tuple[float, float] | None = None,
+    domains: Literal["auto", "on", "off"] = "auto",
+    nodes: Literal["auto", "bright", "dark"] = "auto",
     threads: int | None = None,
     progress: Progress = None,
     **options: Unpack[Options],
@@ -299,22 +308,45 @@ def map(  # noqa: A001
 
     Does what `moiregauge map` does: scans are analysed first, their drift and sensors correct the maps; local wave
     vectors of all harmonics come from the phases under a Gaussian window; maps of scans of one place are averaged.
-    Nodes that are not to be believed are masked, with the reason.
+    Nodes that are not to be believed are masked, with the reason. Places are x to the right, y up, nm.
 
-    paths, arrays, pixel_nm, names, sets: as in `analyze`.
+    paths, arrays, pixel_nm, names, sets, threads, progress, options: as in `analyze`.
     map_method: phases under a window, or fits on overlapping tiles.
     window_nm: standard deviation of the window; a point becomes 2.35 of it wide. By itself as wide as the lattice stays
         straight, at least 0.6 periods.
     step_nm: distance of the nodes; by itself a third of the window.
     margin: at the edges, in windows; by itself 2, or a quarter of the frame where that is less.
+    in_bands: map in bands, as images of more than 20 million pixels are.
+    regions: mean, spread and errors within polygons: name → corners. In `details.regions`.
+    profiles: names → two ends of a line; `profiles.csv` of the report has them.
+    device_nm: the most uniform areas of this size, at so many `device_angles`, so many of them: `details.devices`.
+    wanted_deg: how much of the map has this twist, within so much: `details.wanted`.
+    domains, nodes: whether triangles between nodes are looked for at small angles, and how nodes look.
 
     Raises as `analyze`, and `MeasureError` where no image gives a map.
     """
     found = asked(paths, arrays, pixel_nm, names, options)
     run = run_of(found, options, sets)
-    wanted = {"method": map_method, "window_nm": window_nm, "step_nm": step_nm, "margin": margin}
-    document, planes = _core.map(run, json.dumps(wanted), threads, teller(progress))
+    questions: dict[str, Any] = {
+        "regions": [{"name": name, "corners_nm": list(corners)} for name, corners in (regions or {}).items()],
+        "profiles": [{"name": name, "ends_nm": list(ends)} for name, ends in (profiles or {}).items()],
+    }
+    if device_nm is not None:
+        questions["device"] = {"size_nm": list(device_nm), "orientations": device_angles, "most": device_count}
+    if wanted_deg is not None:
+        questions["wanted"] = {"twist_deg": wanted_deg[0], "within_deg": wanted_deg[1]}
+    request = {
+        "method": map_method,
+        "window_nm": window_nm,
+        "step_nm": step_nm,
+        "margin": margin,
+        "in_bands": in_bands,
+        "questions": questions,
+        "domains": {"when": domains, "nodes": nodes},
+    }
+    made, document, planes = _core.map(run, words(request), threads, teller(progress))
     results = MapResults.from_dict(json.loads(document))
     object.__setattr__(results, "_arrays", planes)
+    object.__setattr__(results, "_map", made)
     warn(results.caveats, results.provenance.failed)
     return results

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import json
 import types
 import typing
 from collections.abc import Mapping
@@ -189,11 +190,15 @@ class MapBase(Document):
     if TYPE_CHECKING:
         # Name → (unit, values of rows × columns of nodes, row 0 at the bottom). Compared and pickled.
         _arrays: Mapping[str, tuple[str, NDArray[Any]]]
+        # What a report needs; not pickled.
+        _map: _core.Map | None
     else:
-        _arrays = types.MappingProxyType({})
+        _arrays, _map = types.MappingProxyType({}), None
 
     def __getstate__(self) -> dict[str, Any]:
-        return {**self.__dict__, "_arrays": dict(self._arrays)}
+        state = {**self.__dict__, "_arrays": dict(self._arrays)}
+        state.pop("_map", None)
+        return state
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, MapBase):
@@ -212,6 +217,29 @@ class MapBase(Document):
         `mask` is 0 where values are to be believed; `masks` tells the other numbers.
         """
         return {name: values for name, (_, values) in self._arrays.items()}
+
+    def report(
+        self,
+        folder: str | os.PathLike[str],
+        *,
+        force: bool = False,
+        figures: bool = True,
+        png: bool = True,
+        html: bool = True,
+        colormap: Literal["viridis", "grey", "nanoscope", "gwyddion"] = "viridis",
+        threads: int | None = None,
+        progress: Progress = None,
+    ) -> Path:
+        """Writes what `moiregauge map` writes into a folder: the document, `map.zarr`, `map.gwy`, tables, figures,
+        `report.html`. Returns the page, or `map.json` where none was wanted. Maps that were pickled cannot be reported.
+        """
+        from moiregauge._progress import teller
+
+        if self._map is None:
+            raise ValueError("this map was pickled or read from a document: map the scans again to report it")
+        choice = {"figures": figures, "png": png, "html": html, "colormap": colormap}
+        self._map.report(folder, force, json.dumps(choice), threads, teller(progress))
+        return Path(folder) / ("report.html" if html else "map.json")
 
     def to_xarray(self) -> xarray.Dataset:
         """The map as an `xarray.Dataset` with the dimensions `y` and `x` (nm, row 0 at the bottom): every quantity with

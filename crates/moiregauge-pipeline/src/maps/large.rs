@@ -3,7 +3,6 @@
 
 use std::path::Path;
 
-use anyhow::{Context as _, ensure};
 use moiregauge::caveat::{Caveat, FileDoubt};
 use moiregauge::domains::{Contrast, DomainMap};
 use moiregauge::frame::Image;
@@ -15,16 +14,17 @@ use moiregauge::scan::{choose_channel, unusual_channels};
 use moiregauge::settings::Settings;
 use moiregauge::survey::{SurveyPlan, nominal_geometry};
 use moiregauge::window::Resolution;
-use moiregauge_pipeline::sink::{FolderSink, Part};
-use moiregauge_pipeline::{Event, Job, Known, Opened, identity};
 use moiregauge_report::InputFile;
 use nalgebra::Vector2;
 use spmfile::{Channel, LineDirection, Scan};
 
-use super::kept::{decoded, encoded, key};
-use super::source::{Lines, Source};
-use crate::analyze::with_advice;
-use crate::input::with_option;
+use super::bytes::{decoded, encoded, key};
+use super::error::NoBands;
+use super::lines::{Lines, Pixels};
+use crate::job::{Event, Job};
+use crate::known::Known;
+use crate::opened::Opened;
+use crate::sink::{Keep, Part};
 
 /// Images with more pixels than this are mapped in bands.
 const LARGE: usize = 4096 * 4096 * 5 / 4;
@@ -40,7 +40,7 @@ pub(super) struct Large {
     unit: String,
     /// Where the file tells its line rate and frame direction.
     timing: Option<Timing>,
-    source: Source,
+    pixels: Pixels,
 }
 
 impl Large {
@@ -50,10 +50,15 @@ impl Large {
         settings: &Settings,
         known: &Known,
         always: bool,
-    ) -> anyhow::Result<Option<Self>> {
+    ) -> Result<Option<Self>, NoBands> {
         let large = if always { 0 } else { LARGE };
-        let place = known.place(path);
-        if let Some(lines) = Lines::open(path, known, settings.channel.as_deref()) {
+        // It is in memory as a whole; only who asks for bands gets them.
+        let in_memory = known.in_memory(path).is_some();
+        if in_memory && !always {
+            return Ok(None);
+        }
+        let lines = || Lines::open(path, known, settings.channel.as_deref());
+        if let Some(lines) = Some(lines).filter(|_| !in_memory).and_then(|open| open()) {
             if lines.size[0] * lines.size[1] < large {
                 return Ok(None);
             }
@@ -61,11 +66,11 @@ impl Large {
             return Self::of_lines(path, lines, settings, known).map(Some);
         }
         // Other files are read as a whole anyway; small ones go the common way.
-        if std::fs::metadata(place)?.len() < large as u64 {
+        if !in_memory && known.source(path).length()? < large as u64 {
             return Ok(None);
         }
-        let opened = Opened::new(path, known).map_err(with_advice)?;
-        let reading = opened.reading(settings).map_err(with_advice)?;
+        let opened = Opened::new(path, known)?;
+        let reading = opened.reading(settings)?;
         let names: Vec<(&str, &str)> = reading
             .scan
             .channels
@@ -82,8 +87,7 @@ impl Large {
             return Ok(None);
         };
         no_sensors(known)?;
-        let geometry =
-            nominal_geometry(&reading.scan, channel).context("the file gives no scan size")?;
+        let geometry = nominal_geometry(&reading.scan, channel).ok_or(NoBands::NoSize)?;
         Ok(Some(Self {
             input: reading.input,
             caveats: reading.caveats,
@@ -91,7 +95,7 @@ impl Large {
             channel: channel.name.clone(),
             unit: channel.unit.clone(),
             timing: timing(&reading.scan, channel),
-            source: Source::Memory(channel.clone()),
+            pixels: Pixels::Memory(channel.clone()),
         }))
     }
 
@@ -101,12 +105,15 @@ impl Large {
         lines: Lines,
         settings: &Settings,
         known: &Known,
-    ) -> anyhow::Result<Self> {
+    ) -> Result<Self, NoBands> {
         let mut scan = lines.scan()?;
         let replaced = known.tell(path, &mut scan);
-        let block = known.cut(&mut scan).map_err(with_option)?;
-        let input = identity(path, known.place(path))?;
-        let channel = scan.channels.first().context("the file holds no image")?;
+        let block = known.cut(&mut scan)?;
+        let input = known.source(path).identity(path)?;
+        let channel = scan
+            .channels
+            .first()
+            .ok_or(NoBands::Nothing("the file holds no image"))?;
         let names: Vec<(&str, &str)> = lines.names.iter().map(|(a, b)| (&**a, &**b)).collect();
         let several = unusual_channels(&names, settings.channel.as_deref());
         let several = several.map(FileDoubt::SeveralImages);
@@ -120,12 +127,11 @@ impl Large {
                 .chain(doubts)
                 .map(caveat)
                 .collect(),
-            geometry: nominal_geometry(&scan, channel)
-                .context("the file gives no scan size; give it with --size")?,
+            geometry: nominal_geometry(&scan, channel).ok_or(NoBands::NoSize)?,
             timing: timing(&scan, channel),
             channel: channel.name.clone(),
             unit: channel.unit.clone(),
-            source: Source::Lines(lines.with_block(block)),
+            pixels: Pixels::Lines(lines.with_block(block)),
             input,
         })
     }
@@ -136,10 +142,10 @@ impl Large {
         &self,
         (settings, resolution): (&Settings, &Resolution),
         first: Option<&SurveyPlan>,
-        sink: &FolderSink,
+        keep: &dyn Keep,
         job: &Job,
-    ) -> anyhow::Result<(TwistStrainMap, SurveyPlan)> {
-        let read = |block| self.source.block(block);
+    ) -> Result<(TwistStrainMap, SurveyPlan), NoBands> {
+        let read = |block| self.pixels.block(block);
         let (geometry, timing) = (&self.geometry, self.timing.as_ref());
         let plan = SurveyPlan::new(geometry, timing, settings, resolution, first, &read)?;
         let key = key(&self.in_words(), settings, resolution, &plan)?;
@@ -147,7 +153,7 @@ impl Large {
         let mut whole: Option<TwistStrainMap> = None;
         for band in 0..plan.bands() {
             let name = format!("{key}-{band:04}");
-            let kept = match sink.kept(&name) {
+            let kept = match keep.kept(&name) {
                 Part::Whole(bytes) => decoded(&bytes, &plan),
                 Part::Absent => None,
                 Part::Damaged => {
@@ -163,7 +169,7 @@ impl Large {
                 kept
             } else {
                 let mut map = plan.band(band, &read)?;
-                sink.keep(&name, &encoded(&mut map))?;
+                keep.keep(&name, &encoded(&mut map))?;
                 map
             };
             let all = whole.get_or_insert_with(|| plan.start(&map.grid));
@@ -171,7 +177,7 @@ impl Large {
             stage.step();
         }
         drop(stage);
-        let whole = whole.context("the image has no lines")?;
+        let whole = whole.ok_or(NoBands::Nothing("the image has no lines"))?;
         Ok((whole, plan))
     }
 }
@@ -184,7 +190,7 @@ impl Large {
 
     /// Nodes and triangles of the image; none where its lines cannot be read.
     pub(super) fn domains(&self, plan: &SurveyPlan, contrast: Contrast) -> Option<DomainMap> {
-        let read = |block| self.source.block(block);
+        let read = |block| self.pixels.block(block);
         plan.domains(&read, contrast).ok().flatten()
     }
 }
@@ -200,7 +206,7 @@ impl Large {
         let mut values = Vec::new();
         for row in 0..rows / block {
             let row = row * block + block / 2;
-            let line = self.source.block([0..columns, row..row + 1]).ok()?;
+            let line = self.pixels.block([0..columns, row..row + 1]).ok()?;
             values.extend(line.values.chunks_exact(block).map(|pixels| {
                 let there: Vec<f64> = pixels.iter().copied().filter(|v| v.is_finite()).collect();
                 there.iter().sum::<f64>() / there.len() as f64
@@ -227,12 +233,10 @@ fn timing(scan: &Scan, channel: &Channel) -> Option<Timing> {
 }
 
 /// Refuses position sensors, which have no use here.
-fn no_sensors(known: &Known) -> anyhow::Result<()> {
+fn no_sensors(known: &Known) -> Result<(), NoBands> {
     let told = known.told();
-    ensure!(
-        told.sensors.is_none() && told.x_sensor.is_none(),
-        "--sensors, --x-sensor and --y-sensor: an image that is mapped in bands has nominal positions, and position \
-         sensors are not used"
-    );
+    if told.sensors.is_some() || told.x_sensor.is_some() {
+        return Err(NoBands::Sensors);
+    }
     Ok(())
 }

@@ -2,15 +2,15 @@
 
 use std::ops::Range;
 use std::path::Path;
-use std::sync::Arc;
 
 use moiregauge::frame::Image;
 use moiregauge::scan::choose_channel;
-use moiregauge_pipeline::Known;
-use spmfile::{Block, Channel, File, OpenOptions, ReadError, Scan, Seekable};
+use spmfile::{Block, Channel, File, OpenOptions, ReadError, Scan};
+
+use crate::known::Known;
 
 /// Where lines come from.
-pub(super) enum Source {
+pub(super) enum Pixels {
     /// A channel in memory.
     Memory(Channel),
     /// A channel on disk.
@@ -29,7 +29,7 @@ pub(super) struct Lines {
     block: Option<Block>,
 }
 
-impl Source {
+impl Pixels {
     /// Reads a block of columns and rows, the bottom line being row 0.
     pub(super) fn block(&self, [columns, rows]: [Range<usize>; 2]) -> Result<Image, String> {
         let (width, count) = (self.width(), rows.len());
@@ -64,10 +64,10 @@ impl Lines {
     /// Opens the chosen channel of a file, of which no line is read here; `None` where the file has to be read as a
     /// whole, if only to say what is wrong with it.
     pub(super) fn open(path: &Path, known: &Known, wanted: Option<&str>) -> Option<Self> {
-        let source = Seekable::new(moiregauge_pipeline::open(known.place(path)).ok()?);
+        let source = known.source(path).pieces().ok()?;
         let mut options = OpenOptions::default();
         options.array = known.array_options(path);
-        let file = File::open_source(Arc::new(source), &options).ok()?;
+        let file = File::open_source(source, &options).ok()?;
         let frame = file.frames().first()?;
         let infos = || frame.channels().map(|c| &c.info);
         let names: Vec<(String, String)> = infos()

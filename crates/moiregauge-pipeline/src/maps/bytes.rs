@@ -1,14 +1,15 @@
 //! Bands of a survey as they are kept: their names and their bytes.
 
-use anyhow::Context as _;
 use moiregauge::map::{Grid, TwistStrainMap};
 use moiregauge::settings::Settings;
 use moiregauge::survey::SurveyPlan;
 use moiregauge::window::{Mask, Resolution};
-use moiregauge_pipeline::hexadecimal;
-use moiregauge_pipeline::sink::build;
 use nalgebra::{Matrix2, Vector2};
 use sha2::{Digest as _, Sha256};
+
+use super::error::NoBands;
+use crate::hash::hexadecimal;
+use crate::sink::{SinkError, build};
 
 /// What a band depends on: the image, settings, resolution, the first image of the survey (window and labelling), and
 /// the program to its last bit.
@@ -17,12 +18,14 @@ pub(super) fn key(
     settings: &Settings,
     resolution: &Resolution,
     plan: &SurveyPlan,
-) -> anyhow::Result<String> {
+) -> Result<String, NoBands> {
     let mut hash = Sha256::new();
     hash.update(image);
     hash.update(format!("{} {}", plan.window_nm, plan.whole));
-    hash.update(serde_json::to_vec(settings)?);
-    let build = build().context("the program cannot read itself: bands cannot be kept")?;
+    let settings = serde_json::to_vec(settings);
+    hash.update(settings.map_err(|why| SinkError::made("bands", why))?);
+    let unknown = NoBands::Nothing("the program cannot read itself: bands cannot be kept");
+    let build = build().ok_or(unknown)?;
     hash.update(format!("{resolution:?} {build}"));
     Ok(hexadecimal(&hash.finalize())[..16].to_owned())
 }
