@@ -12,7 +12,6 @@ use spmfile::{
 
 use crate::content::Content;
 use crate::in_memory::ScanInMemory;
-use crate::held::{Held, InMemory};
 use crate::session;
 use crate::source::{Places, Source};
 use crate::twice::distinct;
@@ -62,7 +61,6 @@ pub struct Known {
     told: Told,
     order: Vec<PathBuf>,
     places: Places,
-    held: InMemory,
 }
 
 impl Known {
@@ -74,7 +72,6 @@ impl Known {
             told: told.clone(),
             order,
             places: Places::new(),
-            held: InMemory::default(),
         }
     }
 
@@ -83,18 +80,6 @@ impl Known {
     pub fn at(mut self, places: &Places) -> Self {
         self.places.clone_from(places);
         self
-    }
-
-    /// The same, where some of the files are in memory.
-    #[must_use]
-    pub fn holding(mut self, held: &InMemory) -> Self {
-        self.held = InMemory::clone(held);
-        self
-    }
-
-    /// The input of this name, if it is in memory.
-    pub fn held(&self, path: &Path) -> Option<&Held> {
-        self.held.get(path)
     }
 
     /// What is told.

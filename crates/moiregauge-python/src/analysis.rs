@@ -172,18 +172,30 @@ impl Analysis {
         &self,
         py: Python<'py>,
         file: &str,
-    ) -> PyResult<(Bound<'py, PyArray2<f64>>, [[f64; 2]; 2], [f64; 2], String, String)> {
+    ) -> PyResult<(
+        Bound<'py, PyArray2<f64>>,
+        [[f64; 2]; 2],
+        [f64; 2],
+        String,
+        String,
+    )> {
         let found = work(py, Some(1), None, |_| {
             let first = lock(&self.outcomes);
-            let settings = first.first().map_or(&self.run.settings, |o| &o.analysis.settings);
+            let settings = first
+                .first()
+                .map_or(&self.run.settings, |o| &o.analysis.settings);
             let scan = read_again(&self.inputs, file, settings, &self.known())
                 .map_err(|error| of_input(file, &error))?;
-            picture(file, &scan, settings).ok_or_else(|| unreadable(file, "it has no image with a size"))
+            picture(file, &scan, settings)
+                .ok_or_else(|| unreadable(file, "it has no image with a size"))
         })?;
         let shape = [found.image.rows, found.image.columns];
         let matrix = found.pixel_to_nm;
         let values = arrays::values(py, found.image.values, shape)?;
-        let rows = [[matrix[(0, 0)], matrix[(0, 1)]], [matrix[(1, 0)], matrix[(1, 1)]]];
+        let rows = [
+            [matrix[(0, 0)], matrix[(0, 1)]],
+            [matrix[(1, 0)], matrix[(1, 1)]],
+        ];
         Ok((values, rows, found.origin.into(), found.channel, found.unit))
     }
 }
@@ -203,7 +215,12 @@ impl Analysis {
             command: "map".to_owned(),
             ..self.run.clone()
         };
-        record_files(&mut run, &self.known(), &self.inputs, &found.provenance.inputs);
+        record_files(
+            &mut run,
+            &self.known(),
+            &self.inputs,
+            &found.provenance.inputs,
+        );
         found.provenance.run = Some(run);
         Ok(found)
     }
@@ -255,7 +272,10 @@ impl Analysis {
             _ => nothing(
                 &words,
                 &[FailedInput {
-                    file: self.inputs.first().map_or_else(String::new, |p| p.display().to_string()),
+                    file: self
+                        .inputs
+                        .first()
+                        .map_or_else(String::new, |p| p.display().to_string()),
                     error: words.clone(),
                 }],
                 true,
@@ -267,7 +287,11 @@ impl Analysis {
         let sink = FolderSink::open(&Target {
             folder,
             kind: "analyze",
-            names: &["results.json".to_owned(), "report.html".to_owned(), "figures/".to_owned()],
+            names: &[
+                "results.json".to_owned(),
+                "report.html".to_owned(),
+                "figures/".to_owned(),
+            ],
             inputs: &self.inputs,
             force,
         })

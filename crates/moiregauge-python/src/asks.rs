@@ -3,7 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use moiregauge::simulate::Simulation;
-use moiregauge_pipeline::calibrate::{CalibrateRequest, NotCalibrated, WhyNotCalibrated, known_lattice};
+use moiregauge_pipeline::calibrate::{
+    CalibrateRequest, NotCalibrated, WhyNotCalibrated, known_lattice,
+};
 use moiregauge_pipeline::campaign::no_advice;
 use moiregauge_pipeline::convert::{ConvertRequest, ConvertSink, ConvertTo, convert_files};
 use moiregauge_pipeline::moire::{Given, MoireQuestion};
@@ -54,7 +56,8 @@ pub(crate) fn moire(
         ..plain
     };
     py.detach(|| {
-        let found = moiregauge_pipeline::moire::moire(&question).map_err(|e| wrong(names::in_full(&e)))?;
+        let found =
+            moiregauge_pipeline::moire::moire(&question).map_err(|e| wrong(names::in_full(&e)))?;
         let document = serde_json::to_string(&found.document).map_err(wrong)?;
         Ok((document, found.figure().svg))
     })
@@ -70,7 +73,9 @@ pub(crate) fn plan(
     progress: Tell,
 ) -> PyResult<String> {
     let mut request: Value = serde_json::from_str(request).map_err(wrong)?;
-    let given = request.as_object_mut().and_then(|all| all.remove("conditions"));
+    let given = request
+        .as_object_mut()
+        .and_then(|all| all.remove("conditions"));
     let instrument = given.unwrap_or_else(|| serde_json::json!({}));
     let request: PlanRequest = serde_json::from_value(request).map_err(wrong)?;
     let request = PlanRequest {
@@ -79,10 +84,11 @@ pub(crate) fn plan(
         ..request
     };
     work(py, threads, progress.as_ref(), |job| {
-        let found = moiregauge_pipeline::plan::plan(&request, job).map_err(|error| match error {
-            PlanError::Cancelled(_) => stopped(),
-            other => wrong(names::in_full(&other)),
-        })?;
+        let found =
+            moiregauge_pipeline::plan::plan(&request, job).map_err(|error| match error {
+                PlanError::Cancelled(_) => stopped(),
+                other => wrong(names::in_full(&other)),
+            })?;
         serde_json::to_string(&found).map_err(wrong)
     })
 }
@@ -132,14 +138,21 @@ pub(crate) fn convert(
     let known = told(known)?;
     let request: ConvertRequest = serde_json::from_str(request).map_err(wrong)?;
     let (to, is_file) = to;
-    let to = if is_file { ConvertTo::File(to) } else { ConvertTo::Folder(to) };
+    let to = if is_file {
+        ConvertTo::File(to)
+    } else {
+        ConvertTo::Folder(to)
+    };
     work(py, threads, progress.as_ref(), |job| {
         let (files, failed) = find(&paths).frames();
         if files.is_empty() {
             return Err(nothing("no scans", &failed, false));
         }
         if is_file && files.len() > 1 {
-            return Err(wrong(format!("one file cannot hold {} scans: give a folder", files.len())));
+            return Err(wrong(format!(
+                "one file cannot hold {} scans: give a folder",
+                files.len()
+            )));
         }
         let known = Known::new(&known, &files);
         let sink = ConvertSink::open(&to, request.format, force, &files);
@@ -154,7 +167,10 @@ pub(crate) fn convert(
             }
         }
         if written.is_empty() {
-            let all: Vec<_> = failed.into_iter().map(|(file, error)| FailedInput { file, error }).collect();
+            let all: Vec<_> = failed
+                .into_iter()
+                .map(|(file, error)| FailedInput { file, error })
+                .collect();
             return Err(nothing("nothing could be converted", &all, false));
         }
         Ok((written, failed))
@@ -175,8 +191,11 @@ pub(crate) fn calibrate(
     progress: Tell,
 ) -> PyResult<(String, String, Vec<(String, String)>)> {
     let known = told(known)?;
-    let lattice = known_lattice(lattice, &[])
-        .ok_or_else(|| wrong(format!("unknown lattice {lattice:?}: expected a surface or layer, as graphite")))?;
+    let lattice = known_lattice(lattice, &[]).ok_or_else(|| {
+        wrong(format!(
+            "unknown lattice {lattice:?}: expected a surface or layer, as graphite"
+        ))
+    })?;
     let request = CalibrateRequest {
         lattice,
         drift_sigma_nm_per_min,
@@ -188,12 +207,21 @@ pub(crate) fn calibrate(
             return Err(nothing("no scans", &failed, false));
         }
         let known = Known::new(&known, &files);
-        let (found, lost) = moiregauge_pipeline::calibrate(&files, &known, &request, job).map_err(not_calibrated)?;
+        let (found, lost) = moiregauge_pipeline::calibrate(&files, &known, &request, job)
+            .map_err(not_calibrated)?;
         let document = found.document().map_err(|e| wrong(names::in_full(&e)))?;
-        let toml = document.to_toml("Calibration of a scanner by moiregauge.").map_err(wrong)?;
+        let toml = document
+            .to_toml("Calibration of a scanner by moiregauge.")
+            .map_err(wrong)?;
         let failed = failed.into_iter().map(|f| (f.file, f.error));
-        let lost = lost.iter().map(|f| (words(&f.file), names::in_full(&f.error)));
-        Ok((serde_json::to_string(&document).map_err(wrong)?, toml, failed.chain(lost).collect()))
+        let lost = lost
+            .iter()
+            .map(|f| (words(&f.file), names::in_full(&f.error)));
+        Ok((
+            serde_json::to_string(&document).map_err(wrong)?,
+            toml,
+            failed.chain(lost).collect(),
+        ))
     })
 }
 
@@ -209,7 +237,9 @@ fn not_calibrated(error: NotCalibrated) -> PyErr {
     let failed: Vec<_> = failed.collect();
     match &error.why {
         WhyNotCalibrated::Cancelled(_) => stopped(),
-        WhyNotCalibrated::Settings(_) | WhyNotCalibrated::NoArea => wrong(names::in_full(&error.why)),
+        WhyNotCalibrated::Settings(_) | WhyNotCalibrated::NoArea => {
+            wrong(names::in_full(&error.why))
+        }
         WhyNotCalibrated::NothingRead(_) => match failed.as_slice() {
             [one] => unreadable(&one.file, &one.error),
             _ => nothing(&error.why.to_string(), &failed, false),
@@ -227,7 +257,9 @@ pub(crate) fn validate(
     progress: Tell,
 ) -> PyResult<String> {
     let mut request: Value = serde_json::from_str(request).map_err(wrong)?;
-    let given = request.as_object_mut().and_then(|all| all.remove("conditions"));
+    let given = request
+        .as_object_mut()
+        .and_then(|all| all.remove("conditions"));
     let request: ValidateRequest = serde_json::from_value(request).map_err(wrong)?;
     let request = match given {
         Some(given) => ValidateRequest {
@@ -237,10 +269,13 @@ pub(crate) fn validate(
         None => request,
     };
     work(py, threads, progress.as_ref(), |job| {
-        let found = moiregauge_pipeline::validate::validate(&request, job).map_err(|error| match error {
-            ValidateError::Cancelled(_) => stopped(),
-            other => wrong(names::in_full(&other)),
-        })?;
+        let found =
+            moiregauge_pipeline::validate::validate(&request, job).map_err(
+                |error| match error {
+                    ValidateError::Cancelled(_) => stopped(),
+                    other => wrong(names::in_full(&other)),
+                },
+            )?;
         serde_json::to_string(&found).map_err(wrong)
     })
 }

@@ -27,7 +27,9 @@ pub(crate) fn settings(options: &str) -> PyResult<Settings> {
 pub(crate) fn settings_on(base: Settings, options: &str) -> PyResult<Settings> {
     let mut options: Map<String, Value> = serde_json::from_str(options).map_err(wrong)?;
     let base = match options.remove("settings") {
-        Some(given) => serde_json::from_value(given).map_err(|e| wrong(format!("settings: {e}")))?,
+        Some(given) => {
+            serde_json::from_value(given).map_err(|e| wrong(format!("settings: {e}")))?
+        }
         None => base,
     };
     let published = options.get("method").and_then(Value::as_str) == Some("paper");
@@ -73,7 +75,8 @@ pub(crate) fn settings_on(base: Settings, options: &str) -> PyResult<Settings> {
     // One by one, lest the error not tell which.
     for (name, value) in &all {
         let one = Map::from_iter([(name.clone(), value.clone())]);
-        serde_json::from_value::<Settings>(one.into()).map_err(|e| wrong(format!("{name}: {e}")))?;
+        serde_json::from_value::<Settings>(one.into())
+            .map_err(|e| wrong(format!("{name}: {e}")))?;
     }
     let settings: Settings = serde_json::from_value(all.into()).map_err(wrong)?;
     settings.check().map_err(wrong)?;
@@ -113,7 +116,10 @@ fn material(given: Value) -> PyResult<Value> {
         Value::Object(table) if table.contains_key("name") && !table.contains_key("source") => {
             let mut whole = named(table["name"].as_str().unwrap_or_default())?;
             if let Value::Object(known) = &mut whole {
-                let source = format!("{}, changed by the user", known["name"].as_str().unwrap_or(""));
+                let source = format!(
+                    "{}, changed by the user",
+                    known["name"].as_str().unwrap_or("")
+                );
                 known.extend(table);
                 known.insert("source".to_owned(), source.into());
             }

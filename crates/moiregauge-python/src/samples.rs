@@ -90,7 +90,9 @@ fn counts(done: SamplesDone) -> Counts {
 fn refused(error: SamplesError) -> PyErr {
     match error {
         SamplesError::Cancelled(_) => stopped(),
-        SamplesError::Table { .. } | SamplesError::TableLine { .. } | SamplesError::NoSamples(_) => {
+        SamplesError::Table { .. }
+        | SamplesError::TableLine { .. }
+        | SamplesError::NoSamples(_) => {
             PyValueError::new_err(moiregauge_pipeline::names::in_full(&error))
         }
         _ => PyOSError::new_err(moiregauge_pipeline::names::in_full(&error)),

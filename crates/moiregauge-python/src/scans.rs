@@ -52,7 +52,10 @@ fn of_file(name: &Path, content: Option<Vec<u8>>, known: &Known) -> PyResult<Sca
 fn about(name: &Path, scan: &Scan) -> serde_json::Value {
     let date = scan.acquired.map(|t| {
         let (y, mo, d) = (t.year, t.month, t.day);
-        format!("{y:04}-{mo:02}-{d:02}T{:02}:{:02}:{:02}", t.hour, t.minute, t.second)
+        format!(
+            "{y:04}-{mo:02}-{d:02}T{:02}:{:02}:{:02}",
+            t.hour, t.minute, t.second
+        )
     });
     let unreadable = scan.unreadable.iter();
     json!({

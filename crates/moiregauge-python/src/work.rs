@@ -30,7 +30,10 @@ struct Told(Mutex<Progress>);
 
 impl Told {
     fn now(&self) -> Progress {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner).clone()
+        self.0
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .clone()
     }
 }
 

@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use moiregauge::settings::{Settings, SettingsError};
-use moiregauge_report::{ColorMap, FailedInput, SampleRow};
 use moiregauge_report::results::Told;
+use moiregauge_report::{ColorMap, FailedInput, SampleRow};
 use rayon::prelude::*;
 
 use super::error::SamplesError;

@@ -6,7 +6,7 @@ import json
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, Unpack
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias, Unpack
 
 from moiregauge import _core
 from moiregauge._analyze import warn
@@ -19,7 +19,7 @@ from moiregauge.results import Caveat, FailedInput
 if TYPE_CHECKING:
     from moiregauge._options import Options
 
-Paths = PathLike | Sequence[PathLike]
+Paths: TypeAlias = "PathLike | Sequence[PathLike]"
 
 
 def _paths(paths: Paths) -> list[str]:
