@@ -20,7 +20,8 @@ cargo clippy --locked -- -D warnings
 pip uninstall --yes maturin
 ls -l "$scratch"/wheel/*.whl
 
-run() { "$scratch/venv/bin/python" -m pytest -q -p no:cacheprovider tests "$@"; }
+# What hangs fails.
+run() { timeout 900 "$scratch/venv/bin/python" -m pytest -q -p no:cacheprovider tests "$@"; }
 pip install "$scratch"/wheel/*.whl pytest
 # Nothing but numpy comes along.
 test "$(pip list --format freeze | grep -civE '^(moiregauge|numpy|pip|setuptools|pytest|pluggy|iniconfig|packaging|pygments)=')" -eq 0

@@ -40,6 +40,7 @@ class Frame:
     """What is told of an array."""
 
     size_nm: tuple[float, float] | None
+    pixel_nm: tuple[float, float] | None = None
     offset_nm: tuple[float, float] = (0.0, 0.0)
     line_rate_hz: float | None = None
     frame_direction: str | None = None
@@ -164,9 +165,8 @@ def frame(told: Mapping[str, Any], pixel_nm: Any, number: int, count: int) -> Fr
         sensor_unit=told.get("sensor_unit", "nm"),
     )
     if pixel_nm is not None:
-        # The size follows from the shape.
-        about.size_nm = tuple(np.broadcast_to(np.asarray(pixel_nm, dtype=float), 2).tolist())
-        about.size_nm = (-about.size_nm[0], -about.size_nm[1])
+        along, across = np.broadcast_to(np.asarray(pixel_nm, dtype=float), 2).tolist()
+        about.pixel_nm = (along, across)
     return about
 
 
@@ -207,17 +207,17 @@ def scan_of(given: Any, about: Frame, name: str) -> tuple[str, list[NDArray[Any]
                 )
     else:
         add(given, "image", about.unit, None)
+    rows, columns = arrays[0].shape
+    if about.pixel_nm is not None:
+        about.size_nm = (about.pixel_nm[0] * columns, about.pixel_nm[1] * rows)
     if about.size_nm is None:
         raise ValueError(f"{name}: expected pixel_nm or size_nm: an array does not tell how large its pixels are")
-    rows, columns = arrays[0].shape
-    if about.size_nm[0] < 0:
-        about.size_nm = (-about.size_nm[0] * columns, -about.size_nm[1] * rows)
     if not (np.isfinite(about.size_nm).all() and min(about.size_nm) > 0):
         raise ValueError(f"{name}: expected a size above 0 nm, found {about.size_nm}")
     for array in arrays:
         if array.shape != arrays[0].shape:
             raise ValueError(f"{name}: expected arrays of one shape, found {arrays[0].shape} and {array.shape}")
-    told = {key: value for key, value in vars(about).items() if key not in ("unit", "sensor_unit")}
+    told = {key: value for key, value in vars(about).items() if key not in ("unit", "sensor_unit", "pixel_nm")}
     return words({**told, "channels": channels}), arrays
 
 

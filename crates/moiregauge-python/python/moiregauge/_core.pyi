@@ -5,6 +5,27 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import NDArray
 
+__all__ = [
+    "Analysis",
+    "ManySamples",
+    "Map",
+    "SETTINGS",
+    "__version__",
+    "calculated_by",
+    "calibrate",
+    "convert",
+    "inspect",
+    "map",
+    "moire",
+    "plan",
+    "plus_minus",
+    "program",
+    "read",
+    "simulate",
+    "tables",
+    "validate",
+]
+
 __version__: str
 SETTINGS: str
 
