@@ -3,9 +3,11 @@
 use std::path::Path;
 use std::process::ExitCode;
 
-use anyhow::{Context as _, bail};
 use heterostrain::material::Material;
 use moiregauge::settings::{Settings, SettingsError};
+use moiregauge_pipeline::{
+    NotSettings, SettingsFileError, UnknownMaterial, read_layers, read_settings,
+};
 
 use crate::nearest::{nearest, nearest_key};
 use crate::say::say;
@@ -146,87 +148,27 @@ pub(crate) fn run(_args: &ConfigArgs) -> anyhow::Result<ExitCode> {
 
 /// Reads a settings file, in which `material` may be a name, or the settings that results hold.
 pub(crate) fn read(path: &Path) -> anyhow::Result<Settings> {
-    let text = moiregauge_pipeline::read_text(path)
-        .with_context(|| format!("cannot read the settings file {}", path.display()))?;
-    // No TOML file begins so.
-    if text.trim_start().starts_with('{') {
-        return Ok(moiregauge_pipeline::settings_of(path, text.as_bytes())?);
-    }
-    let folder = path.parent().unwrap_or(Path::new(""));
-    parse(&text, folder).map_err(|error| {
-        let meant = nearest_key(&error.to_string());
-        error.context(format!("in the settings file {}{meant}", path.display()))
-    })
+    read_settings(path).map_err(in_words)
 }
 
-fn parse(text: &str, folder: &Path) -> anyhow::Result<Settings> {
-    let mut table: toml::Table = toml::from_str(text)?;
-    let mut changed = false;
-    // Who names layers has chosen them.
-    let layers = ["material", "substrate", "moire_layers"];
-    if layers.iter().any(|key| table.contains_key(*key)) && !table.contains_key("layers_chosen") {
-        table.insert("layers_chosen".to_owned(), toml::Value::Boolean(true));
-        changed = true;
-    }
-    changed |= name_materials(&mut table)?;
-    if let Some(toml::Value::Array(moires)) = table.get_mut("moire_layers") {
-        for layers in moires.iter_mut().filter_map(toml::Value::as_table_mut) {
-            changed |= name_materials(layers)?;
-        }
-    }
-    if let Some(toml::Value::String(file)) = table.get("scanner") {
-        let scanner = toml::Value::try_from(moiregauge_pipeline::calibrate::read_calibration(
-            &folder.join(file),
-        )?)?;
-        table.insert("scanner".to_owned(), scanner);
-        changed = true;
-    }
-    if changed {
-        return Ok(table.try_into()?);
-    }
-    // Straight from the text: errors then show the line.
-    Ok(toml::from_str(text)?)
+/// The error with what may have been meant.
+fn in_words(error: SettingsFileError) -> anyhow::Error {
+    let SettingsFileError::Content { what, file, source } = error else {
+        return error.into();
+    };
+    let meant = nearest_key(&source.to_string());
+    let source = match *source {
+        NotSettings::Material(unknown) => known_materials(&unknown),
+        other => other.into(),
+    };
+    source.context(format!("in {what} {file}{meant}"))
 }
 
-/// Puts materials in the place of their names; whether there were any.
-fn name_materials(table: &mut toml::Table) -> anyhow::Result<bool> {
-    let mut changed = false;
-    for key in ["material", "substrate"] {
-        if let Some(toml::Value::String(name)) = table.get(key) {
-            let material = toml::Value::try_from(named_material(name)?)?;
-            table.insert(key.to_owned(), material);
-            changed = true;
-        }
-    }
-    Ok(changed)
-}
-
-/// A material by name, or an error that lists the names.
-pub(crate) fn named_material(name: &str) -> anyhow::Result<Material> {
-    material_of(name, &[])
-}
-
-/// A material by name, one of the user's own first.
-pub(crate) fn find_material(name: &str, own: &[Material]) -> Option<Material> {
-    let of_user = own
-        .iter()
-        .find(|m| m.name.eq_ignore_ascii_case(name.trim()));
-    of_user.cloned().or_else(|| Material::named(name))
-}
-
-/// A material by name, one of the user's own first, or an error that lists the names.
-fn material_of(name: &str, own: &[Material]) -> anyhow::Result<Material> {
-    if let Some(material) = find_material(name, own) {
-        return Ok(material);
-    }
-    let known: Vec<String> = own
-        .iter()
-        .cloned()
-        .chain(Material::all())
-        .map(|m| m.name)
-        .collect();
+/// What is known in place of a material that is not.
+fn known_materials(unknown: &UnknownMaterial) -> anyhow::Error {
+    let UnknownMaterial { name, known } = unknown;
     let nearest = nearest(name, known.iter().map(String::as_str));
-    bail!(
+    anyhow::anyhow!(
         "unknown material {name:?}{nearest}; known are {}; others can be described in a file (--materials) or in a \
          [material] table of a settings file",
         known.join(", ")
@@ -238,36 +180,12 @@ pub(crate) fn named_layers(
     text: &str,
     own: &[Material],
 ) -> anyhow::Result<(Material, Option<Material>)> {
-    match text.split_once('/') {
-        None => Ok((material_of(text, own)?, None)),
-        Some((upper, lower)) => {
-            let (upper, lower) = (material_of(upper, own)?, material_of(lower, own)?);
-            let substrate = (upper != lower).then_some(lower);
-            Ok((upper, substrate))
-        }
-    }
+    moiregauge_pipeline::named_layers(text, own).map_err(|unknown| known_materials(&unknown))
 }
 
 /// The layers that the user describes in a file: `[[layer]]` tables.
 pub(crate) fn own_materials(path: Option<&Path>) -> anyhow::Result<Vec<Material>> {
-    #[derive(serde::Deserialize)]
-    #[serde(deny_unknown_fields)]
-    struct File {
-        layer: Vec<Material>,
-    }
-    let Some(path) = path else {
-        return Ok(Vec::new());
-    };
-    let about = || format!("in the layers of {}", path.display());
-    let text = moiregauge_pipeline::read_text(path)
-        .with_context(|| format!("cannot read the layers of {}", path.display()))?;
-    let file: File = toml::from_str(&text).with_context(about)?;
-    for layer in &file.layer {
-        if let Some(problem) = layer.problem() {
-            return Err(anyhow::anyhow!(problem)).with_context(about);
-        }
-    }
-    Ok(file.layer)
+    path.map_or(Ok(Vec::new()), |path| read_layers(path).map_err(in_words))
 }
 
 /// Refuses numbers with which nothing sensible can come out, with the option by which they are given.
@@ -327,45 +245,11 @@ pub(crate) fn with_option(error: SettingsError) -> anyhow::Error {
 mod tests {
     use super::*;
 
-    /// Layers of each moiré by name; as many as there are moirés.
-    #[test]
-    fn moires_have_layers_of_their_own() {
-        let text = "moires = 2\n[[moire_layers]]\nmaterial = \"graphene\"\n[[moire_layers]]\n\
-                    material = \"graphene\"\nsubstrate = \"hBN\"\n";
-        let settings = parse(text, Path::new("")).unwrap();
-        check(&settings).unwrap();
-        assert_eq!(settings.of_moire(0).bilayer().name(), "graphene");
-        assert_eq!(settings.of_moire(1).bilayer().name(), "graphene/hBN");
-        let three = Settings {
-            moires: 3,
-            ..settings
-        };
-        let error = check(&three).unwrap_err().to_string();
-        assert!(
-            error.contains("each of the 3") && error.contains("found 2"),
-            "{error}"
-        );
-    }
-
     #[test]
     fn the_commented_file_holds_the_defaults() {
         assert_eq!(
-            parse(COMMENTED, Path::new("")).unwrap(),
+            moiregauge_pipeline::parse_settings(COMMENTED, Path::new("")).unwrap(),
             Settings::default()
         );
-    }
-
-    #[test]
-    fn unknown_keys_and_materials_are_refused_with_what_is_known() {
-        assert!(
-            parse("metod = \"fourier\"", Path::new(""))
-                .unwrap_err()
-                .to_string()
-                .contains("metod")
-        );
-        let error = parse("material = \"unobtainium\"", Path::new(""))
-            .unwrap_err()
-            .to_string();
-        assert!(error.contains("graphene"), "{error}");
     }
 }

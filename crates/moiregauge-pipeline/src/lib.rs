@@ -24,6 +24,7 @@ mod replay;
 pub mod samples;
 pub mod session;
 mod sets;
+mod settings_file;
 pub mod simulate;
 pub mod sink;
 mod source;
@@ -48,6 +49,10 @@ pub use plan::plan;
 pub use reading::{FileError, open, read, read_text};
 pub use replay::{Document, ReplayError, record_files, settings_of};
 pub use sets::{SetError, absolute, check_sets, set_of};
+pub use settings_file::{
+    NotSettings, SettingsFileError, UnknownMaterial, named_layers, named_material, parse_settings,
+    read_layers, read_settings,
+};
 pub use simulate::simulate;
 pub use source::{Places, Source};
 pub use told::check_told;

@@ -1,60 +1,15 @@
 //! A campaign that grows, is written, read again, cancelled, on any number of threads.
 
-use std::path::{Path, PathBuf};
+mod small;
+
+use std::path::PathBuf;
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
 use moiregauge::settings::Settings;
-use moiregauge::simulate::{Simulation, Simulator};
-use moiregauge_pipeline::campaign::{AnalyseError, Campaign, Outcome};
+use moiregauge_pipeline::campaign::{AnalyseError, Campaign};
 use moiregauge_pipeline::{Cancel, Event, Events, Job, Quiet};
-use moiregauge_report::Results;
-
-/// Frames of one simulated set, as files.
-fn scans(folder: &Path, count: usize) -> Vec<PathBuf> {
-    let mut made = Simulation::default();
-    made.raster.pixels = [64; 2];
-    made.raster.scans = count;
-    let simulator = Simulator::new(made).unwrap();
-    let write = |index: usize| {
-        let path = folder.join(Simulator::file_name(index));
-        std::fs::write(
-            &path,
-            spmfile::nanoscope::write(&simulator.frame(index)).unwrap(),
-        )
-        .unwrap();
-        path
-    };
-    (0..count).map(write).collect()
-}
-
-fn settings() -> Settings {
-    Settings {
-        drift_draws: 10,
-        strain_draws: 10,
-        ..Settings::default()
-    }
-}
-
-fn campaign(scans: &[PathBuf]) -> Campaign {
-    let mut campaign = Campaign::new(settings()).unwrap();
-    campaign.add(scans.iter().cloned());
-    campaign
-}
-
-/// The document, which has every number.
-fn document(outcomes: &[Outcome]) -> String {
-    let [
-        Outcome {
-            analysis,
-            provenance,
-        },
-    ] = outcomes
-    else {
-        panic!("one moiré");
-    };
-    String::from_utf8(Results::new(analysis, provenance).to_json().unwrap()).unwrap()
-}
+use small::{campaign, document, scans, settings};
 
 /// Counts the files that were measured, or cancels at one of them.
 struct Watch {

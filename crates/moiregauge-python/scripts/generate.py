@@ -144,7 +144,13 @@ GIVEN = {
 }
 # Not for people.
 HIDDEN = {"layers_chosen"}
-MORE = {"layers": ("str", "The layers by name: `graphene`, or `graphene/hBN` for graphene on hBN.")}
+MORE = {
+    "layers": ("str", "The layers by name: `graphene`, or `graphene/hBN` for graphene on hBN."),
+    "settings": (
+        "str | Mapping[str, Any]",
+        "A file of settings (TOML), one of results, or settings that results hold; other options come on top of it.",
+    ),
+}
 
 
 def loose(annotation: str, classes: set[str]) -> str:

@@ -2,10 +2,11 @@
 
 use std::path::Path;
 
-use heterostrain::material::Material;
-use moiregauge::settings::Settings;
+use moiregauge::settings::{MoireLayers, Settings};
 use moiregauge::simulate::Simulation;
 use moiregauge_pipeline::calibrate::read_calibration;
+use moiregauge_pipeline::names::in_full;
+use moiregauge_pipeline::{named_layers, named_material, read_settings};
 use moiregauge_report::results::Told;
 use pyo3::PyResult;
 use serde_json::{Map, Value};
@@ -37,12 +38,10 @@ pub(crate) fn settings_on(base: Settings, options: &str) -> PyResult<Settings> {
     let Value::Object(mut all) = serde_json::to_value(base).map_err(wrong)? else {
         return Err(wrong("settings: expected names and values"));
     };
-    if let Some(Value::String(layers)) = options.remove("layers") {
-        let (upper, lower) = layers.split_once('/').unwrap_or((&layers, &layers));
-        options.insert("material".to_owned(), upper.trim().into());
-        if upper.trim() != lower.trim() {
-            options.insert("substrate".to_owned(), lower.trim().into());
-        }
+    if let Some(layers) = options.remove("layers")
+        && let Value::Object(both) = both(layers)?
+    {
+        options.extend(both);
     }
     let chosen = ["material", "substrate", "moire_layers"];
     if chosen.iter().any(|name| options.contains_key(*name)) {
@@ -57,7 +56,8 @@ pub(crate) fn settings_on(base: Settings, options: &str) -> PyResult<Settings> {
                 }
             }
             ("scanner", Value::String(file)) => {
-                let read = read_calibration(Path::new(file.as_str())).map_err(wrong)?;
+                let read = read_calibration(Path::new(file.as_str()));
+                let read = read.map_err(|e| wrong(in_full(&e)))?;
                 value = serde_json::to_value(read).map_err(wrong)?;
             }
             ("drift", Value::Array(xy)) if xy.len() == 2 => {
@@ -85,44 +85,31 @@ pub(crate) fn settings_on(base: Settings, options: &str) -> PyResult<Settings> {
 
 /// The layers of a moiré: `"graphene/hBN"`, or a table of both.
 fn both(given: Value) -> PyResult<Value> {
-    match given {
-        Value::String(layers) => {
-            let (upper, lower) = layers.split_once('/').unwrap_or((&layers, &layers));
-            let mut table = Map::new();
-            table.insert("material".to_owned(), material(upper.trim().into())?);
-            if upper.trim() != lower.trim() {
-                table.insert("substrate".to_owned(), material(lower.trim().into())?);
-            }
-            Ok(table.into())
-        }
-        other => Ok(other),
-    }
+    let Value::String(layers) = given else {
+        return Ok(given);
+    };
+    let (material, substrate) = named_layers(&layers, &[]).map_err(wrong)?;
+    serde_json::to_value(MoireLayers {
+        material,
+        substrate,
+    })
+    .map_err(wrong)
 }
 
 /// A material by name; a table with the name of a known one changes that.
 fn material(given: Value) -> PyResult<Value> {
-    let named = |name: &str| -> PyResult<Value> {
-        let found = Material::named(name).ok_or_else(|| {
-            let all: Vec<String> = Material::all().into_iter().map(|m| m.name).collect();
-            wrong(format!(
-                "unknown material {name:?}; known are {}",
-                all.join(", ")
-            ))
-        })?;
-        serde_json::to_value(found).map_err(wrong)
-    };
+    let named =
+        |name: &str| serde_json::to_value(named_material(name, &[]).map_err(wrong)?).map_err(wrong);
     match given {
         Value::String(name) => named(&name),
         Value::Object(table) if table.contains_key("name") && !table.contains_key("source") => {
             let mut whole = named(table["name"].as_str().unwrap_or_default())?;
-            if let Value::Object(known) = &mut whole {
-                let source = format!(
-                    "{}, changed by the user",
-                    known["name"].as_str().unwrap_or("")
-                );
-                known.extend(table);
-                known.insert("source".to_owned(), source.into());
-            }
+            let source = format!(
+                "{}, changed by the user",
+                whole["name"].as_str().unwrap_or_default()
+            );
+            put(&mut whole, table.into());
+            whole["source"] = source.into();
             Ok(whole)
         }
         other => Ok(other),
@@ -135,10 +122,9 @@ fn material(given: Value) -> PyResult<Value> {
 /// `ValueError` names what makes no sense.
 pub(crate) fn conditions(base: &Simulation, mut given: Value) -> PyResult<Simulation> {
     if let Some(Value::Object(sample)) = given.get_mut("sample") {
-        if let Some(Value::String(layers)) = sample.remove("layers") {
-            let Value::Object(both) = both(layers.into())? else {
-                return Err(wrong("layers"));
-            };
+        if let Some(layers) = sample.remove("layers")
+            && let Value::Object(both) = both(layers)?
+        {
             sample.extend(both);
         }
         for layer in ["material", "substrate"] {

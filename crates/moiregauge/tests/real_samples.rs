@@ -1,10 +1,14 @@
 //! Simulated samples that are no perfect lattice, against closed forms and against counting.
 
+mod noiseless;
+
 use heterostrain::lattice::Lattice;
 use heterostrain::strain::twist_strain;
 use moiregauge::simulate::{SampleFeature, Simulation, Simulator, Truth};
 use nalgebra::{Matrix2, Matrix4, Vector2};
 use spmfile::{LineDirection, Scan};
+
+use noiseless::noiseless;
 
 /// Noiseless frames of one channel whose window goes where it is told.
 fn quiet(sample: &str) -> Simulation {
@@ -14,12 +18,7 @@ fn quiet(sample: &str) -> Simulation {
     };
     set.raster.pixels = [64, 48];
     set.raster.scans = 2;
-    set.sample.sharpness = 0.0;
-    set.noise.sensor_nm = 0.0;
-    set.noise.pixel_deg = 0.0;
-    set.noise.line_deg = 0.0;
-    set.noise.flicker_deg = 0.0;
-    set.noise.plane_deg = [0.0; 2];
+    noiseless(&mut set);
     set
 }
 

@@ -1,10 +1,14 @@
 //! The simulator against its definition, pixel by pixel, and against its own record of the truth.
 
+mod noiseless;
+
 use std::f64::consts::PI;
 
 use moiregauge::simulate::{FirstDirection, SimulateError, Simulation, Simulator};
 use nalgebra::{Matrix2, Matrix3, Rotation2, Vector2, Vector3};
 use spmfile::{Channel, FrameDirection, LineDirection, Scan};
+
+use noiseless::noiseless;
 
 /// Small, noiseless, everything else as far from symmetric as it gets.
 fn quiet() -> Simulation {
@@ -13,15 +17,10 @@ fn quiet() -> Simulation {
     settings.raster.scans = 4;
     settings.raster.nominal_size_nm = [70.0, 43.0];
     settings.raster.start_s = 37.0;
-    settings.sample.sharpness = 0.0;
     settings.drift.velocity_nm_per_min = [1.3, -4.7];
     settings.drift.acceleration_nm_per_min2 = [0.31, 0.17];
     settings.window.shear_mrad = 11.0;
-    settings.noise.sensor_nm = 0.0;
-    settings.noise.pixel_deg = 0.0;
-    settings.noise.line_deg = 0.0;
-    settings.noise.flicker_deg = 0.0;
-    settings.noise.plane_deg = [0.0; 2];
+    noiseless(&mut settings);
     settings
 }
 

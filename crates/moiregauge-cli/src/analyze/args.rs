@@ -74,7 +74,7 @@ pub(crate) struct AnalyzeArgs {
     #[arg(long, value_name = "NAME", help_heading = SCANS)]
     channel: Option<String>,
     /// Of several images of the channel in one file (pages, frames) this one [default: the first]
-    #[arg(long, value_name = "N", value_parser = numbers::count(1, MOST_IMAGES))]
+    #[arg(long, value_name = "N", value_parser = numbers::count(1, MOST_IMAGES), help_heading = SCANS)]
     image: Option<usize>,
     /// Line directions to use [default: both]
     #[arg(long, value_enum, help_heading = SCANS)]

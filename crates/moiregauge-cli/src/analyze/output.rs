@@ -5,13 +5,15 @@ use std::process::ExitCode;
 
 use moiregauge::campaign::refusal;
 use moiregauge_pipeline::Job;
-use moiregauge_pipeline::campaign::Outcome;
+use moiregauge_pipeline::campaign::{Export, Outcome, write_corrected};
+use moiregauge_pipeline::maps::Scans;
 use moiregauge_pipeline::sink::{FolderSink, Target};
 use moiregauge_report::screen::{failures, summary};
-use moiregauge_report::write_report;
+use moiregauge_report::{FailedInput, write_report};
 
 use super::args::AnalyzeArgs;
-use super::export::{self, Export};
+use super::export;
+use super::hint::advice;
 use super::task::Task;
 use crate::hints;
 use crate::outputs::{commit, folder, write_all};
@@ -62,7 +64,7 @@ impl Output {
             "--parquet: this program was built without it"
         );
         let moires = (1..=6).map(|n| format!("moire-{n}/"));
-        let exported = exports.iter().map(|e| format!("{}/", e.folder()));
+        let exported = exports.iter().map(|e| format!("{}/", e.folder));
         let names: Vec<String> = report_names().chain(moires).chain(exported).collect();
         let out = args.results_folder();
         let sink = folder(&Target {
@@ -116,6 +118,7 @@ impl Output {
         task: &Task,
         outcomes: &[Outcome],
         reports: Vec<Files>,
+        job: &Job,
     ) -> anyhow::Result<ExitCode> {
         let (mut answers, mut documents) = (Vec::new(), Vec::new());
         let folders = within(outcomes.len());
@@ -147,9 +150,17 @@ impl Output {
         let mut failed = Vec::new();
         if let Some(first) = outcomes.first() {
             failed.clone_from(&first.provenance.failed);
-            let from = (task.inputs.as_slice(), &task.known);
-            let lost = export::write(&self.sink, &self.exports, &first.analysis, from);
-            failed.extend(lost);
+            let scans = Scans {
+                analysis: &first.analysis,
+                inputs: &task.inputs,
+                known: &task.known,
+                advice,
+            };
+            let lost = write_corrected(&scans, &self.exports, &self.sink, job)?;
+            failed.extend(lost.into_iter().map(|lost| FailedInput {
+                error: format!("--export: {}", lost.error),
+                ..lost
+            }));
         }
         commit(self.sink)?;
         for answer in answers {

@@ -25,7 +25,7 @@ pub(crate) fn run(args: &AnalyzeArgs, job: &Job) -> anyhow::Result<ExitCode> {
     let reports = reports.unwrap_or_else(|cancelled| Err(cancelled.into()));
     let reports = reports.map_err(|error| kept_for_next(error, output.sink(), &campaign))?;
     let first = output.first_page(outcomes.len());
-    let ended = output.write(&task, &outcomes, reports)?;
+    let ended = output.write(&task, &outcomes, reports, job)?;
     args.show(&first);
     Ok(ended)
 }

@@ -122,7 +122,7 @@ pub(crate) fn run(args: &CalibrateArgs, job: &Job) -> anyhow::Result<ExitCode> {
         }
     };
     if !args.quiet {
-        say(&words::summary(&found.found, &found.lattice))?;
+        say(&words::summary(&found))?;
     }
     if let (Some(out), Some(file)) = (&args.out, file) {
         let document = found.document().map_err(|why| {

@@ -2,16 +2,17 @@
 
 use std::fmt::Write as _;
 
-use heterostrain::Estimate;
-use moiregauge::calibration::{Coordinates, KnownLattice};
-use moiregauge::campaign::{Calibrated, CalibratedSet};
+use moiregauge::calibration::Coordinates;
+use moiregauge::campaign::CalibratedSet;
+use moiregauge_pipeline::calibrate::CalibrationFound;
 use moiregauge_report::screen::caveats;
 use moiregauge_report::{plus_minus, two_digits};
 
 use crate::hints;
 
 /// The sets, the calibration, and what to keep in mind.
-pub(super) fn summary(found: &Calibrated, lattice: &KnownLattice) -> String {
+pub(super) fn summary(calibration: &CalibrationFound) -> String {
+    let (found, lattice) = (&calibration.found, &calibration.lattice);
     let mut text = format!(
         "known lattice: {}, {} × {} nm, {}° (± {} %; {})\n\n",
         lattice.name,
@@ -34,15 +35,7 @@ pub(super) fn summary(found: &Calibrated, lattice: &KnownLattice) -> String {
     } else {
         format!("{sets} sets")
     };
-    let all = found.calibration.estimates();
-    let unknown = |e: Estimate| {
-        if found.covariance_known {
-            e
-        } else {
-            Estimate::new(e.value, f64::NAN)
-        }
-    };
-    let [gain, mismatch, right] = all.map(unknown);
+    let [gain, mismatch, right] = calibration.estimates();
     let noise = found.statistical.map(two_digits);
     let _ = writeln!(text, "calibration of the {coordinates}, {of}");
     let rows = [
@@ -75,20 +68,8 @@ pub(super) fn summary(found: &Calibrated, lattice: &KnownLattice) -> String {
             plus_minus(value)
         );
     }
-    let c = &found.calibration.covariance;
-    let along = |sign: f64| {
-        let variance = c[0][0] + c[1][1] / 4.0 + sign * c[0][1];
-        unknown(Estimate::from_variance(
-            all[0].value + sign * all[1].value / 2.0,
-            variance,
-        ))
-    };
-    let _ = writeln!(
-        text,
-        "  which is      x {} %, y {} %\n",
-        plus_minus(along(1.0)),
-        plus_minus(along(-1.0))
-    );
+    let [x, y] = calibration.gains().map(plus_minus);
+    let _ = writeln!(text, "  which is      x {x} %, y {y} %\n");
     caveats(&mut text, &found.caveats, hints::of);
     text
 }

@@ -31,68 +31,88 @@ Examples:
 Angles are degrees counter-clockwise from x; strains per cent.")]
 pub(crate) struct MoireArgs {
     /// The layers: graphene for two equal ones, graphene/hBN for graphene (layer 2) on hBN (layer 1)
-    #[arg(long, value_name = "UPPER/LOWER", default_value = "graphene")]
+    #[arg(
+        help_heading = "Layers",
+        long,
+        value_name = "UPPER/LOWER",
+        default_value = "graphene"
+    )]
     layers: String,
     /// TOML file with layers of your own, one [[layer]] table each
-    #[arg(long, value_name = "FILE")]
+    #[arg(help_heading = "Layers", long, value_name = "FILE")]
     materials: Option<PathBuf>,
     /// Twist of layer 2 against layer 1, degrees
-    #[arg(long, value_name = "DEG", allow_negative_numbers = true, conflicts_with_all = ["wavelengths", "vectors"], value_parser = numbers::number(numbers::ANGLE_DEG))]
+    #[arg(help_heading = "Forwards: the moiré of two layers", long, value_name = "DEG", allow_negative_numbers = true, conflicts_with_all = ["wavelengths", "vectors"], value_parser = numbers::number(numbers::ANGLE_DEG))]
     twist: Option<f64>,
     /// Uniaxial strain of layer 2, per cent: that much along the axis, −ν times as much across
-    #[arg(long, value_name = "PERCENT", allow_negative_numbers = true, conflicts_with_all = ["wavelengths", "vectors"], value_parser = numbers::number(numbers::STRAIN_PERCENT))]
+    #[arg(help_heading = "Forwards: the moiré of two layers", long, value_name = "PERCENT", allow_negative_numbers = true, conflicts_with_all = ["wavelengths", "vectors"], value_parser = numbers::number(numbers::STRAIN_PERCENT))]
     strain: Option<f64>,
     /// Axis of the strain, degrees, counted from the reciprocal vectors of layer 1 (φ)
-    #[arg(
+    #[arg(help_heading = "Forwards: the moiré of two layers", 
         long,
         value_name = "DEG",
         allow_negative_numbers = true,
         requires = "strain", value_parser = numbers::number(numbers::ANGLE_DEG))]
     strain_axis: Option<f64>,
     /// Strain of layer 2 that is the same in all directions, per cent, on top
-    #[arg(long, value_name = "PERCENT", allow_negative_numbers = true, conflicts_with_all = ["wavelengths", "vectors"], value_parser = numbers::number(numbers::STRAIN_PERCENT))]
+    #[arg(help_heading = "Forwards: the moiré of two layers", long, value_name = "PERCENT", allow_negative_numbers = true, conflicts_with_all = ["wavelengths", "vectors"], value_parser = numbers::number(numbers::STRAIN_PERCENT))]
     biaxial: Option<f64>,
     /// Orientation of layer 1, degrees; backwards with its standard uncertainty, as in 11.2±0.3, and it
     /// gives the whole strain tensor
-    #[arg(long, value_name = "DEG[±SIGMA]", allow_hyphen_values = true)]
+    #[arg(
+        help_heading = "Layers",
+        long,
+        value_name = "DEG[±SIGMA]",
+        allow_hyphen_values = true
+    )]
     lattice_angle: Option<String>,
     /// The layer it is that of, backwards
-    #[arg(long, value_name = "1|2", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=2))]
+    #[arg(help_heading = "Layers", long, value_name = "1|2", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=2))]
     lattice_angle_layer: u8,
     /// The vector it is that of
-    #[arg(long, value_enum, default_value_t = DirectionArg::Atomic)]
+    #[arg(help_heading = "Layers", long, value_enum, default_value_t = DirectionArg::Atomic)]
     lattice_angle_of: DirectionArg,
     /// Backwards: orientation of the other layer with its standard uncertainty; of two equal layers one orientation
     /// leaves the sense of the twist open
-    #[arg(long, value_name = "DEG±SIGMA", allow_hyphen_values = true, value_parser = parse_angle, requires_all = ["lattice_angle", "vectors"])]
+    #[arg(help_heading = "Backwards: the layers behind a moiré", long, value_name = "DEG±SIGMA", allow_hyphen_values = true, value_parser = parse_angle, requires_all = ["lattice_angle", "vectors"])]
     lattice_angle_2: Option<Angle>,
     /// Backwards: the sense of the twist, if it is known
-    #[arg(long, value_enum, requires = "lattice_angle", conflicts_with = "twist")]
+    #[arg(
+        help_heading = "Backwards: the layers behind a moiré",
+        long,
+        value_enum,
+        requires = "lattice_angle",
+        conflicts_with = "twist"
+    )]
     twist_sense: Option<SenseArg>,
     /// Three wavelengths, nm; --meaning has to say what they are
-    #[arg(
+    #[arg(help_heading = "Backwards: the layers behind a moiré", 
         long,
         value_name = "A,B,C",
         value_delimiter = ',',
         conflicts_with = "vectors", value_parser = numbers::number(numbers::LENGTH_NM))]
     wavelengths: Vec<f64>,
     /// What the three wavelengths are: they differ as soon as there is strain
-    #[arg(long, value_enum)]
+    #[arg(
+        help_heading = "Backwards: the layers behind a moiré",
+        long,
+        value_enum
+    )]
     meaning: Option<MeaningArg>,
     /// Two moiré vectors, nm
-    #[arg(long, num_args = 2, value_names = ["X,Y", "X,Y"], allow_hyphen_values = true)]
+    #[arg(help_heading = "Backwards: the layers behind a moiré", long, num_args = 2, value_names = ["X,Y", "X,Y"], allow_hyphen_values = true)]
     vectors: Vec<String>,
     /// Standard uncertainty of each wavelength, or of each component of the vectors, nm
-    #[arg(long, value_name = "NM", default_value_t = 0.0, value_parser = numbers::number(numbers::NOT_NEGATIVE))]
+    #[arg(help_heading = "Backwards: the layers behind a moiré", long, value_name = "NM", default_value_t = 0.0, value_parser = numbers::number(numbers::NOT_NEGATIVE))]
     sigma: f64,
     /// Standard deviation of the isotropic strain that the layers may have, per cent
-    #[arg(long, value_name = "PERCENT", default_value_t = Settings::default().isotropic_strain_percent, value_parser = numbers::number([0.0, 10.0]))]
+    #[arg(help_heading = "Backwards: the layers behind a moiré", long, value_name = "PERCENT", default_value_t = Settings::default().isotropic_strain_percent, value_parser = numbers::number([0.0, 10.0]))]
     isotropic_strain: f64,
     /// Form of the strain equation [default: real-space]
-    #[arg(long, value_enum)]
+    #[arg(help_heading = "Layers", long, value_enum)]
     strain_convention: Option<ConventionArg>,
     /// Electrons per cell at full filling: 4 in graphene (two spins, two valleys)
-    #[arg(long, value_name = "G", default_value_t = 4.0, value_parser = numbers::number([1e-3, 1e6]))]
+    #[arg(help_heading = "Layers", long, value_name = "G", default_value_t = 4.0, value_parser = numbers::number([1e-3, 1e6]))]
     band_degeneracy: f64,
     /// Draw the cell: a name that ends in .svg or .png
     #[arg(long, value_name = "FILE")]

@@ -45,14 +45,14 @@ pub(crate) struct SimulateArgs {
     pub(super) print_config: bool,
     /// What the sample has besides a perfect lattice: edge, hole, bump, island, grains, twist-wave, walls, atoms,
     /// glitches … with numbers as in edge:share=0.6,angle=30; several at once with + or by giving the option again
-    #[arg(long, value_name = "CLASS[:KEY=VALUE,…]", value_parser = parse_sample)]
+    #[arg(help_heading = "Sample", long, value_name = "CLASS[:KEY=VALUE,…]", value_parser = parse_sample)]
     sample: Vec<SampleGiven>,
     /// List the classes for --sample with their numbers and write nothing
     #[arg(long)]
     pub(super) list_samples: bool,
     /// Draw twist, strain, orientation, drift, noise, size and the numbers that --sample leaves open, by --seed;
     /// other options come on top of it
-    #[arg(long)]
+    #[arg(help_heading = "Sample", long)]
     vary: bool,
     /// Write over files of the same names
     #[arg(long)]
@@ -64,79 +64,84 @@ pub(crate) struct SimulateArgs {
     #[arg(long)]
     name: Option<String>,
     /// Seed of all noise
-    #[arg(long)]
+    #[arg(help_heading = "Drift and noise", long)]
     pub(super) seed: Option<u64>,
     /// Number of scans
-    #[arg(long, value_parser = numbers::count(1, 9999))]
+    #[arg(help_heading = "Scans", long, value_parser = numbers::count(1, 9999))]
     scans: Option<usize>,
     /// Samples per line and lines, as in 512 or 512x256
-    #[arg(long, value_name = "N[xM]", value_parser = parse_pixels)]
+    #[arg(help_heading = "Scans", long, value_name = "N[xM]", value_parser = parse_pixels)]
     pixels: Option<Pixels>,
     /// Lines per second
-    #[arg(long, value_name = "HZ", value_parser = numbers::number(numbers::LINE_RATE_HZ))]
+    #[arg(help_heading = "Scans", long, value_name = "HZ", value_parser = numbers::number(numbers::LINE_RATE_HZ))]
     rate: Option<f64>,
     /// Slow axis: y, or x for a frame turned by 90°
-    #[arg(long, value_enum)]
+    #[arg(help_heading = "Scans", long, value_enum)]
     slow: Option<SlowAxis>,
     /// Direction of the first scan; the following ones alternate
-    #[arg(long, value_enum)]
+    #[arg(help_heading = "Scans", long, value_enum)]
     first: Option<First>,
     /// Nominal size along the fast and the slow axis, nm
-    #[arg(long, num_args = 2, value_names = ["FAST", "SLOW"], value_parser = numbers::number(numbers::LENGTH_NM))]
+    #[arg(help_heading = "Scans", long, num_args = 2, value_names = ["FAST", "SLOW"], value_parser = numbers::number(numbers::LENGTH_NM))]
     size: Option<Vec<f64>>,
     /// Start of the first scan, s on the clock of the drift
-    #[arg(long, value_name = "S", value_parser = numbers::number(numbers::NOT_NEGATIVE))]
+    #[arg(help_heading = "Scans", long, value_name = "S", value_parser = numbers::number(numbers::NOT_NEGATIVE))]
     start: Option<f64>,
     /// Material of both layers
-    #[arg(long, value_parser = parse_material)]
+    #[arg(help_heading = "Sample", long, value_parser = parse_material)]
     material: Option<Material>,
     /// The layers: graphene for two equal ones, graphene/hBN for graphene (layer 2) on hBN (layer 1)
-    #[arg(long, value_name = "UPPER/LOWER", conflicts_with = "material")]
+    #[arg(
+        help_heading = "Sample",
+        long,
+        value_name = "UPPER/LOWER",
+        conflicts_with = "material"
+    )]
     layers: Option<String>,
     /// Show the atoms of this layer in place of the moiré: 1, the lower one, or 2
-    #[arg(long, value_name = "1|2", value_parser = clap::value_parser!(u8).range(1..=2))]
+    #[arg(help_heading = "Sample", long, value_name = "1|2", value_parser = clap::value_parser!(u8).range(1..=2))]
     atoms: Option<u8>,
     /// Twist, degrees
-    #[arg(long, value_name = "DEG", allow_negative_numbers = true, value_parser = numbers::number(numbers::ANGLE_DEG))]
+    #[arg(help_heading = "Sample", long, value_name = "DEG", allow_negative_numbers = true, value_parser = numbers::number(numbers::ANGLE_DEG))]
     twist: Option<f64>,
     /// Uniaxial strain of layer 2, per cent
-    #[arg(long, value_name = "PERCENT", allow_negative_numbers = true, value_parser = numbers::number(numbers::STRAIN_PERCENT))]
+    #[arg(help_heading = "Sample", long, value_name = "PERCENT", allow_negative_numbers = true, value_parser = numbers::number(numbers::STRAIN_PERCENT))]
     strain: Option<f64>,
     /// Strain of layer 2 that is the same in all directions, on top of the uniaxial one, per cent
-    #[arg(long, value_name = "PERCENT", allow_negative_numbers = true, value_parser = numbers::number(numbers::STRAIN_PERCENT))]
+    #[arg(help_heading = "Sample", long, value_name = "PERCENT", allow_negative_numbers = true, value_parser = numbers::number(numbers::STRAIN_PERCENT))]
     biaxial: Option<f64>,
     /// Axis of the strain, counted from layer 1, degrees
-    #[arg(long, value_name = "DEG", allow_negative_numbers = true, value_parser = numbers::number(numbers::ANGLE_DEG))]
+    #[arg(help_heading = "Sample", long, value_name = "DEG", allow_negative_numbers = true, value_parser = numbers::number(numbers::ANGLE_DEG))]
     strain_axis: Option<f64>,
     /// Orientation of the reciprocal vectors of layer 1, degrees
-    #[arg(long, value_name = "DEG", allow_negative_numbers = true, value_parser = numbers::number(numbers::ANGLE_DEG))]
+    #[arg(help_heading = "Sample", long, value_name = "DEG", allow_negative_numbers = true, value_parser = numbers::number(numbers::ANGLE_DEG))]
     lattice_angle: Option<f64>,
     /// Strength of the higher harmonics, 0 (three cosines) to below 1 (small spots)
-    #[arg(long, value_name = "S", value_parser = numbers::number([0.0, 0.999]))]
+    #[arg(help_heading = "Sample", long, value_name = "S", value_parser = numbers::number([0.0, 0.999]))]
     sharpness: Option<f64>,
     /// Drift velocity, nm/min
-    #[arg(long, num_args = 2, value_names = ["X", "Y"], allow_negative_numbers = true, value_parser = numbers::number(numbers::DRIFT))]
+    #[arg(help_heading = "Drift and noise", long, num_args = 2, value_names = ["X", "Y"], allow_negative_numbers = true, value_parser = numbers::number(numbers::DRIFT))]
     drift: Option<Vec<f64>>,
     /// Change of the drift velocity, nm/min²
-    #[arg(long, num_args = 2, value_names = ["X", "Y"], allow_negative_numbers = true, value_parser = numbers::number(numbers::DRIFT))]
+    #[arg(help_heading = "Drift and noise", long, num_args = 2, value_names = ["X", "Y"], allow_negative_numbers = true, value_parser = numbers::number(numbers::DRIFT))]
     acceleration: Option<Vec<f64>>,
     /// Noise of each pixel, degrees of phase (the moiré has an amplitude of 1°)
-    #[arg(long, value_name = "DEG", value_parser = numbers::number(numbers::NOT_NEGATIVE))]
+    #[arg(help_heading = "Drift and noise", long, value_name = "DEG", value_parser = numbers::number(numbers::NOT_NEGATIVE))]
     noise: Option<f64>,
     /// Noise of each line, degrees of phase
-    #[arg(long, value_name = "DEG", value_parser = numbers::number(numbers::NOT_NEGATIVE))]
+    #[arg(help_heading = "Drift and noise", long, value_name = "DEG", value_parser = numbers::number(numbers::NOT_NEGATIVE))]
     line_noise: Option<f64>,
     /// Noise of lines with a 1/f spectrum, degrees of phase
-    #[arg(long, value_name = "DEG", value_parser = numbers::number(numbers::NOT_NEGATIVE))]
+    #[arg(help_heading = "Drift and noise", long, value_name = "DEG", value_parser = numbers::number(numbers::NOT_NEGATIVE))]
     flicker: Option<f64>,
     /// Noise of the position sensors, nm
-    #[arg(long, value_name = "NM", value_parser = numbers::number(numbers::NOT_NEGATIVE))]
+    #[arg(help_heading = "Drift and noise", long, value_name = "NM", value_parser = numbers::number(numbers::NOT_NEGATIVE))]
     sensor_noise: Option<f64>,
     /// Record no position sensors
-    #[arg(long)]
+    #[arg(help_heading = "Scans", long)]
     no_sensors: bool,
     /// Record no retrace
-    #[arg(long)]
+    #[arg(help_heading = "Scans", long)]
     no_retrace: bool,
 }
 

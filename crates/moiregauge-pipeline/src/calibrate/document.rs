@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use heterostrain::Estimate;
 use moiregauge::calibration::{Calibration, KnownLattice};
 use moiregauge_report::results::ResultCaveat;
 use serde::{Deserialize, Serialize};
@@ -132,6 +133,30 @@ pub enum CalibrationFileError {
 }
 
 impl CalibrationFound {
+    /// Gain, mismatch (per cent) and deviation from a right angle (mrad); σ is NaN where nobody knows it.
+    pub fn estimates(&self) -> [Estimate; 3] {
+        self.found.calibration.estimates().map(|e| self.known(e))
+    }
+
+    /// By how much lengths are shown too long along x and y, per cent; σ is NaN where nobody knows it.
+    pub fn gains(&self) -> [Estimate; 2] {
+        let calibration = &self.found.calibration;
+        let ([gain, mismatch, _], c) = (calibration.estimates(), &calibration.covariance);
+        [1.0, -1.0].map(|sign| {
+            let variance = c[0][0] + c[1][1] / 4.0 + sign * c[0][1];
+            let value = gain.value + sign * mismatch.value / 2.0;
+            self.known(Estimate::from_variance(value, variance))
+        })
+    }
+
+    fn known(&self, e: Estimate) -> Estimate {
+        if self.found.covariance_known {
+            e
+        } else {
+            Estimate::new(e.value, f64::NAN)
+        }
+    }
+
     /// What is to be kept of it.
     ///
     /// # Errors
@@ -144,7 +169,7 @@ impl CalibrationFound {
         if let Some(problem) = found.calibration.problem() {
             return Err(Unusable::Numbers(problem));
         }
-        let with_sigma = |e: &heterostrain::Estimate| [e.value, e.sigma];
+        let with_sigma = |e: &Estimate| [e.value, e.sigma];
         let sets = found.sets.iter().map(|set| CalibratedSetResult {
             name: set.name.clone(),
             channel: set.channel.clone(),

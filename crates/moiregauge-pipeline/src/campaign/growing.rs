@@ -7,7 +7,7 @@ use moiregauge::scan::sorted_moires;
 use moiregauge::settings::{Settings, SettingsError};
 use moiregauge_report::results::{NamedSet, Run, Told};
 use moiregauge_report::{FailedInput, InputFile, Provenance};
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Serialize, Serializer};
 
 use super::channel::Other;
 use super::error::AnalyseError;
@@ -35,23 +35,16 @@ pub struct Outcome {
 ///
 /// Measuring takes nearly all of the time of an analysis. A file is measured once for each content, settings of
 /// measuring and what is known of it; everything else is done anew in milliseconds a scan.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, Deserialize)]
 #[serde(try_from = "Written")]
 pub struct Campaign {
-    settings: Settings,
-    told: Told,
-    sets: Vec<NamedSet>,
-    inputs: Vec<PathBuf>,
-    places: Places,
-    left_out: Vec<FailedInput>,
-    kept: Kept,
-    illustrated: bool,
-    #[serde(skip)]
+    /// All that is written.
+    of: Written,
     advice: Words,
 }
 
 /// A campaign as it is written.
-#[derive(Deserialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Written {
     settings: Settings,
@@ -64,20 +57,20 @@ struct Written {
     illustrated: bool,
 }
 
+impl Serialize for Campaign {
+    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        self.of.serialize(to)
+    }
+}
+
 impl TryFrom<Written> for Campaign {
     type Error = SettingsError;
 
-    fn try_from(written: Written) -> Result<Self, Self::Error> {
-        let campaign = Self::new(written.settings)?.with_told(written.told)?;
-        Ok(Self {
-            sets: written.sets,
-            inputs: written.inputs,
-            places: written.places,
-            left_out: written.left_out,
-            kept: written.kept,
-            illustrated: written.illustrated,
-            ..campaign
-        })
+    fn try_from(of: Written) -> Result<Self, Self::Error> {
+        of.settings.check()?;
+        check_told(&of.told)?;
+        let advice = Words::default();
+        Ok(Self { of, advice })
     }
 }
 
@@ -97,8 +90,7 @@ impl Campaign {
     /// # Errors
     /// Settings that make no sense.
     pub fn new(settings: Settings) -> Result<Self, SettingsError> {
-        settings.check()?;
-        Ok(Self {
+        Self::try_from(Written {
             settings,
             told: Told::default(),
             sets: Vec::new(),
@@ -107,7 +99,6 @@ impl Campaign {
             left_out: Vec::new(),
             kept: Kept::default(),
             illustrated: false,
-            advice: Words::default(),
         })
     }
 
@@ -122,28 +113,27 @@ impl Campaign {
         advice: Advice,
     ) -> Result<Self, SettingsError> {
         let wanted = run.report;
-        let mut campaign = Self::new(run.settings.clone())?.with_told(run.known.clone())?;
+        let mut campaign = Self::new(run.settings.clone())?
+            .with_told(run.known.clone())?
+            .with_places(places.clone())
+            .with_left_out(run.left_out.clone())
+            .with_advice(advice)
+            .illustrated(wanted.figures || wanted.png || wanted.html);
+        campaign.of.sets.clone_from(&run.sets);
         campaign.add(inputs.iter().cloned());
-        Ok(Self {
-            sets: run.sets.clone(),
-            places: places.clone(),
-            left_out: run.left_out.clone(),
-            illustrated: wanted.figures || wanted.png || wanted.html,
-            advice: Words(advice),
-            ..campaign
-        })
+        Ok(campaign)
     }
 
     /// Adds scans, in order.
     pub fn add(&mut self, scans: impl IntoIterator<Item = PathBuf>) {
-        self.inputs.extend(scans);
+        self.of.inputs.extend(scans);
     }
 
     /// Removes a scan; whether it was there. What was measured of it is kept.
     pub fn remove(&mut self, scan: &Path) -> bool {
-        let before = self.inputs.len();
-        self.inputs.retain(|path| path != scan);
-        self.inputs.len() < before
+        let before = self.of.inputs.len();
+        self.of.inputs.retain(|path| path != scan);
+        self.of.inputs.len() < before
     }
 
     /// The same scans with other settings. What was measured stays where they do not change it.
@@ -152,7 +142,7 @@ impl Campaign {
     /// Settings that make no sense.
     pub fn with_settings(mut self, settings: Settings) -> Result<Self, SettingsError> {
         settings.check()?;
-        self.settings = settings;
+        self.of.settings = settings;
         Ok(self)
     }
 
@@ -162,21 +152,21 @@ impl Campaign {
     /// What no file can be like.
     pub fn with_told(mut self, told: Told) -> Result<Self, SettingsError> {
         check_told(&told)?;
-        self.told = told;
+        self.of.told = told;
         Ok(self)
     }
 
     /// The same scans, some of which lie elsewhere than their names say.
     #[must_use]
     pub fn with_places(mut self, places: Places) -> Self {
-        self.places = places;
+        self.of.places = places;
         self
     }
 
     /// With names that were given and cannot be measured.
     #[must_use]
     pub fn with_left_out(mut self, left_out: Vec<FailedInput>) -> Self {
-        self.left_out = left_out;
+        self.of.left_out = left_out;
         self
     }
 
@@ -190,7 +180,7 @@ impl Campaign {
     /// Whether analyses hold the first image of every set, for figures.
     #[must_use]
     pub fn illustrated(mut self, illustrated: bool) -> Self {
-        self.illustrated = illustrated;
+        self.of.illustrated = illustrated;
         self
     }
 
@@ -199,39 +189,39 @@ impl Campaign {
         &mut self,
         known: heterostrain::strain::KnownOrientation,
     ) -> Result<(), SettingsError> {
-        self.settings.lattice_angle = Some(known);
-        self.settings.check()
+        self.of.settings.lattice_angle = Some(known);
+        self.of.settings.check()
     }
 
     /// The settings.
     pub fn settings(&self) -> &Settings {
-        &self.settings
+        &self.of.settings
     }
 
     /// What is known of the scans.
     pub fn told(&self) -> &Told {
-        &self.told
+        &self.of.told
     }
 
     /// The scans.
     pub fn inputs(&self) -> &[PathBuf] {
-        &self.inputs
+        &self.of.inputs
     }
 
     /// Sets made by hand.
     pub fn sets(&self) -> &[NamedSet] {
-        &self.sets
+        &self.of.sets
     }
 
     /// Names that were given and cannot be measured.
     pub fn left_out(&self) -> &[FailedInput] {
-        &self.left_out
+        &self.of.left_out
     }
 
     /// What is known of the scans, and where they lie.
     #[must_use]
     pub fn known(&self) -> Known {
-        Known::new(&self.told, &self.inputs).at(&self.places)
+        Known::new(&self.of.told, &self.of.inputs).at(&self.of.places)
     }
 
     /// What helps against errors.
@@ -241,12 +231,12 @@ impl Campaign {
 
     /// What was measured so far.
     pub fn kept(&self) -> &Kept {
-        &self.kept
+        &self.of.kept
     }
 
     /// Takes what was measured by another campaign.
     pub fn take(&mut self, kept: Kept) {
-        self.kept.extend(kept);
+        self.of.kept.extend(kept);
     }
 
     /// Analyses the scans, every moiré that they show by itself.
@@ -255,25 +245,25 @@ impl Campaign {
     /// [`AnalyseError`]; after [`AnalyseError::Cancelled`] what was measured is kept, and the next analysis goes on
     /// from there.
     pub fn analyse(&mut self, job: &Job) -> Result<Vec<Outcome>, AnalyseError> {
-        let (inputs, repeated) = distinct(&self.inputs);
-        let known = Known::new(&self.told, &inputs).at(&self.places);
-        let mut failed = self.left_out.clone();
+        let (inputs, repeated) = distinct(&self.of.inputs);
+        let known = Known::new(&self.of.told, &inputs).at(&self.of.places);
+        let mut failed = self.of.left_out.clone();
         let mut window = None;
-        if self.settings.overlap {
-            window = job.run(|| overlap(&inputs, &self.settings, &known))?;
+        if self.of.settings.overlap {
+            window = job.run(|| overlap(&inputs, &self.of.settings, &known))?;
             if window.is_none() {
                 return Err(AnalyseError::NoCommonRegion { failed });
             }
         }
         let from = Inputs {
             files: &inputs,
-            sets: &self.sets,
+            sets: &self.of.sets,
             known: &known,
             window: window.as_ref(),
             advice: self.advice.0,
         };
-        let Measured { files, other } = measured(&from, &self.settings, &mut self.kept, job)?;
-        let settings = other.as_ref().map_or(&self.settings, |o| &o.settings);
+        let Measured { files, other } = measured(&from, &self.of.settings, &mut self.of.kept, job)?;
+        let settings = other.as_ref().map_or(&self.of.settings, |o| &o.settings);
         let (mut scans, mut identities) = (Vec::new(), Vec::new());
         for (path, result) in inputs.iter().zip(files) {
             match result {
@@ -297,7 +287,7 @@ impl Campaign {
             let settings = &settings.of_moire(moire);
             let mut analysis = analyse(scans, settings);
             analysis.caveats.extend(caveats.iter().cloned());
-            if self.illustrated {
+            if self.of.illustrated {
                 show(&mut analysis, &inputs, settings, &known);
             }
             Outcome {

@@ -2,6 +2,7 @@
 
 mod atomic;
 mod channel;
+mod corrected;
 mod error;
 mod growing;
 mod kept;
@@ -11,6 +12,7 @@ mod overlap;
 mod shown;
 mod survey;
 
+pub use corrected::{Export, write_corrected};
 pub use error::{AnalyseError, Place};
 pub use growing::{Campaign, Outcome};
 pub use kept::Kept;

@@ -62,6 +62,8 @@ class Options(TypedDict, total=False):
     seed: Seed of all random numbers.
     sensor_unit: Unit of the position sensors of arrays.
     sensors: File that holds the position sensors.
+    settings: A file of settings (TOML), one of results, or settings that results hold; other options come on
+        top of it.
     size_nm: Width and height of the image from edge to edge, nm.
     strain_convention: Form of the strain equation.
     strain_draws: Monte Carlo draws for twist and strain, per scan.
@@ -102,6 +104,7 @@ class Options(TypedDict, total=False):
     seed: int
     sensor_unit: str
     sensors: str
+    settings: str | Mapping[str, Any]
     size_nm: tuple[float, float]
     strain_convention: StrainConvention
     strain_draws: int

@@ -5,94 +5,72 @@ use crate::tables::{Column, csv_text, number};
 
 /// The columns of `samples.csv`.
 const COLUMNS: [Column<SampleRow>; 17] = [
-    Column {
-        name: "sample",
-        about: "name of the sample: its folder, or as the table of samples says",
-        value: |r| r.sample.clone(),
-    },
-    Column {
-        name: "moire",
-        about: "number of the moiré, from 1",
-        value: |r| r.moire.to_string(),
-    },
-    Column {
-        name: "status",
-        about: "`ok`; `doubtful`: a serious caveat, no drift, or a file that could not be used; `failed`",
-        value: |r| r.status.name().to_owned(),
-    },
-    Column {
-        name: "scans",
-        about: "scans that were used",
-        value: |r| r.scans.to_string(),
-    },
-    Column {
-        name: "twist_deg",
-        about: "twist θ",
-        value: |r| number(r.twist_deg),
-    },
-    Column {
-        name: "twist_sigma_deg",
-        about: "its statistical σ",
-        value: |r| number(r.twist_sigma_deg),
-    },
-    Column {
-        name: "twist_sigma_total_deg",
-        about: "its σ with everything, calibration and model included",
-        value: |r| number(r.twist_sigma_total_deg),
-    },
-    Column {
-        name: "heterostrain_percent",
-        about: "ε, noise bias removed",
-        value: |r| number(r.heterostrain_percent),
-    },
-    Column {
-        name: "heterostrain_sigma_percent",
-        about: "its statistical σ",
-        value: |r| number(r.heterostrain_sigma_percent),
-    },
-    Column {
-        name: "heterostrain_sigma_total_percent",
-        about: "its σ with everything",
-        value: |r| number(r.heterostrain_sigma_total_percent),
-    },
-    Column {
-        name: "drift_x_nm_per_min",
-        about: "drift of the first set to the right",
-        value: |r| number(r.drift_x_nm_per_min),
-    },
-    Column {
-        name: "drift_x_sigma_nm_per_min",
-        about: "its σ",
-        value: |r| number(r.drift_x_sigma_nm_per_min),
-    },
-    Column {
-        name: "drift_y_nm_per_min",
-        about: "drift of the first set upwards",
-        value: |r| number(r.drift_y_nm_per_min),
-    },
-    Column {
-        name: "drift_y_sigma_nm_per_min",
-        about: "its σ",
-        value: |r| number(r.drift_y_sigma_nm_per_min),
-    },
-    Column {
-        name: "caveats",
-        about: "codes of the caveats, divided by blanks",
-        value: |r| r.caveats.join(" "),
-    },
-    Column {
-        name: "failed_files",
-        about: "files that could not be used",
-        value: |r| match r.status {
+    Column::new(
+        "sample",
+        "name of the sample: its folder, or as the table of samples says",
+        |r| r.sample.clone(),
+    ),
+    Column::new("moire", "number of the moiré, from 1", |r| {
+        r.moire.to_string()
+    }),
+    Column::new(
+        "status",
+        "`ok`; `doubtful`: a serious caveat, no drift, or a file that could not be used; `failed`",
+        |r| r.status.name().to_owned(),
+    ),
+    Column::new("scans", "scans that were used", |r| r.scans.to_string()),
+    Column::new("twist_deg", "twist θ", |r| number(r.twist_deg)),
+    Column::new("twist_sigma_deg", "its statistical σ", |r| {
+        number(r.twist_sigma_deg)
+    }),
+    Column::new(
+        "twist_sigma_total_deg",
+        "its σ with everything, calibration and model included",
+        |r| number(r.twist_sigma_total_deg),
+    ),
+    Column::new("heterostrain_percent", "ε, noise bias removed", |r| {
+        number(r.heterostrain_percent)
+    }),
+    Column::new("heterostrain_sigma_percent", "its statistical σ", |r| {
+        number(r.heterostrain_sigma_percent)
+    }),
+    Column::new(
+        "heterostrain_sigma_total_percent",
+        "its σ with everything",
+        |r| number(r.heterostrain_sigma_total_percent),
+    ),
+    Column::new(
+        "drift_x_nm_per_min",
+        "drift of the first set to the right",
+        |r| number(r.drift_x_nm_per_min),
+    ),
+    Column::new("drift_x_sigma_nm_per_min", "its σ", |r| {
+        number(r.drift_x_sigma_nm_per_min)
+    }),
+    Column::new(
+        "drift_y_nm_per_min",
+        "drift of the first set upwards",
+        |r| number(r.drift_y_nm_per_min),
+    ),
+    Column::new("drift_y_sigma_nm_per_min", "its σ", |r| {
+        number(r.drift_y_sigma_nm_per_min)
+    }),
+    Column::new("caveats", "codes of the caveats, divided by blanks", |r| {
+        r.caveats.join(" ")
+    }),
+    Column::new(
+        "failed_files",
+        "files that could not be used",
+        |r| match r.status {
             SampleStatus::Failed => String::new(),
             _ => r.failed.len().to_string(),
         },
-    },
-    Column {
-        name: "error",
-        about: "why there are no numbers, or why files could not be used",
-        value: SampleRow::error,
-    },
+    ),
+    Column::new(
+        "error",
+        "why there are no numbers, or why files could not be used",
+        SampleRow::error,
+    ),
 ];
 
 /// `samples.csv`: one row for each moiré of each sample.
@@ -119,21 +97,13 @@ struct Failed<'a> {
 /// `failed.csv`: what failed and why, one row for each file or sample.
 pub fn failed_csv(rows: &[SampleRow]) -> Vec<u8> {
     let columns: [Column<Failed<'_>>; 3] = [
-        Column {
-            name: "sample",
-            about: "name of the sample",
-            value: |f| f.sample.to_owned(),
-        },
-        Column {
-            name: "file",
-            about: "the file, or the sample where all of it failed",
-            value: |f| f.file.to_owned(),
-        },
-        Column {
-            name: "error",
-            about: "why",
-            value: |f| f.error.to_owned(),
-        },
+        Column::new("sample", "name of the sample", |f| f.sample.to_owned()),
+        Column::new(
+            "file",
+            "the file, or the sample where all of it failed",
+            |f| f.file.to_owned(),
+        ),
+        Column::new("error", "why", |f| f.error.to_owned()),
     ];
     // The files of a sample are the same for all its moirés.
     let firsts = rows.iter().filter(|row| row.moire == 1);

@@ -9,6 +9,17 @@ pub(crate) struct Column<R> {
     pub(crate) value: fn(&R) -> String,
 }
 
+impl<R> Column<R> {
+    /// A column of this name, what it holds, and how.
+    pub(crate) const fn new(
+        name: &'static str,
+        about: &'static str,
+        value: fn(&R) -> String,
+    ) -> Self {
+        Self { name, about, value }
+    }
+}
+
 /// The table with its header line. Lines end in CR LF, as the RFC has it.
 pub(crate) fn text<R>(columns: &[Column<R>], rows: &[R]) -> String {
     let mut text = line(columns.iter().map(|c| c.name.to_owned()));
