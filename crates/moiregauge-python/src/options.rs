@@ -28,6 +28,9 @@ pub(crate) fn settings(options: &str) -> PyResult<Settings> {
 pub(crate) fn settings_on(base: Settings, options: &str) -> PyResult<Settings> {
     let mut options: Map<String, Value> = serde_json::from_str(options).map_err(wrong)?;
     let base = match options.remove("settings") {
+        Some(Value::String(file)) => {
+            read_settings(Path::new(&file)).map_err(|e| wrong(in_full(&e)))?
+        }
         Some(given) => {
             serde_json::from_value(given).map_err(|e| wrong(format!("settings: {e}")))?
         }
@@ -46,6 +49,11 @@ pub(crate) fn settings_on(base: Settings, options: &str) -> PyResult<Settings> {
     let chosen = ["material", "substrate", "moire_layers"];
     if chosen.iter().any(|name| options.contains_key(*name)) {
         all.insert("layers_chosen".to_owned(), true.into());
+    }
+    if options.contains_key("material") {
+        // Who names layers names all of them.
+        all.remove("substrate");
+        all.remove("moire_layers");
     }
     for (name, mut value) in options {
         match (name.as_str(), &mut value) {

@@ -93,3 +93,16 @@ def test_estimators_are_validated() -> None:
     assert found.sets + found.failed == 4
     assert {quantity.name for quantity in found.quantities} >= {"twist"}
     assert found.conditions.raster.scans == 4
+
+
+def test_layers_and_settings_files(image: Path, tmp_path: Path) -> None:
+    file = tmp_path / "settings.toml"
+    file.write_text('material = "graphene"\nsubstrate = "hBN"\nseed = 7\n')
+    fast = {"drift_draws": 0, "strain_draws": 0}
+    of_file = mg.analyze(image, settings=file, **fast).settings
+    assert (of_file.substrate.name, of_file.seed) == ("hBN", 7)
+    assert mg.analyze(image, layers="graphene/hBN", seed=7, **fast).settings == of_file
+    # Options come on top.
+    assert mg.analyze(image, settings=of_file, layers="graphene", **fast).settings.substrate is None
+    own = mg.analyze(image, material={"name": "graphene", "lattice_constant_nm": 0.25}, **fast).settings.material
+    assert own.lattice_constant_nm == 0.25 and "changed by the user" in own.source and own.poisson_ratio > 0

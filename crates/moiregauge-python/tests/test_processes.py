@@ -126,3 +126,23 @@ def test_the_program_is_stopped_by_ctrl_c(scans: Path, tmp_path: Path) -> None:
     _, words = child.communicate(timeout=WATCHDOG_S)
     assert child.returncode == 130, words
     assert not os.path.exists(tmp_path / "out" / "results.json")
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="memory is counted as Linux does")
+def test_arrays_are_copied_once() -> None:
+    code = """
+        import resource
+        import numpy as np
+        from moiregauge._analyze import run_of
+        from moiregauge._arguments import asked
+        array = np.ones((4096, 4096))
+        peak = lambda: 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+        before = peak()
+        run = run_of(asked(array, None, 0.1, None, {}), {})
+        print((peak() - before) / array.nbytes)
+    """
+    done = subprocess.run(
+        [sys.executable, "-c", textwrap.dedent(code)], capture_output=True, text=True, timeout=WATCHDOG_S
+    )
+    assert done.returncode == 0, done.stderr
+    assert 0.5 < float(done.stdout) < 1.2, done.stdout
