@@ -34,7 +34,7 @@ print(done.ok, "well,", done.doubtful, "doubtful,", done.failed, "failed")
 
 # %%
 table = done.to_pandas()
-print(table[["sample", "twist_deg", "twist_total_sigma_deg"]])
+print(table[["sample", "twist_deg", "twist_sigma_total_deg"]])
 
 # %% [markdown]
 # At an instrument scans come one by one: a `Campaign` measures each once.

@@ -35,7 +35,9 @@ impl ScanInMemory {
             for row in 0..channel.rows {
                 let line = channel.lines(row..row + 1);
                 bytes += 8 * line.len() as u64;
-                line.iter().for_each(|v| hash.update(v.to_le_bytes()));
+                for value in line {
+                    hash.update(value.to_le_bytes());
+                }
             }
         }
         let bare = |channel: &Channel| Channel {

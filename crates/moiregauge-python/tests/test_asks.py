@@ -82,7 +82,7 @@ def test_scanners_are_calibrated(tmp_path: Path) -> None:
     image = next(folder.glob("*.spm"))
     for scanner in (found.calibration.to_dict(), tmp_path / "scanner.toml"):
         # It is understood: what is refused is the channel.
-        with pytest.raises(mg.ReadError, match="no channel"):
+        with pytest.raises(mg.MeasureError, match="no channel"):
             mg.analyze(image, scanner=scanner, channel="nothing")
     with pytest.raises(ValueError, match="unobtainium"):
         mg.calibrate(folder, lattice="unobtainium")

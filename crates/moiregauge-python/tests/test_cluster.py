@@ -46,21 +46,27 @@ def cluster() -> object:
 
 
 def test_killed_workers_lose_nothing(
-    cluster: object, samples: Path, expected: dict[str, bytes], tmp_path: Path
+    cluster: object, samples: Path, expected: dict[str, bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from distributed import Client, Status
+    from distributed import Client
+    from moiregauge import campaign
 
+    # Many tasks, so that some are under way whenever a worker dies.
+    monkeypatch.setattr(campaign, "SAMPLES", 2)
     with Client(cluster) as client:
         stop, killed = threading.Event(), []
+        born: dict[int, float] = {}
 
         def kill() -> None:
-            while not stop.wait(0.4) and len(killed) < 6:
-                # One that is just starting would not come back.
-                running = [nanny.process for nanny in cluster.workers.values() if nanny.process]
-                pids = [one.process.pid for one in running if one.status == Status.running]
-                if pids:
-                    os.kill(pids[len(killed) % len(pids)], signal.SIGKILL)
-                    killed.append(time.monotonic())
+            while not stop.wait(0.1) and len(killed) < 6:
+                alive = [nanny.process.pid for nanny in cluster.workers.values() if nanny.process and nanny.process.pid]
+                now = time.monotonic()
+                for pid in alive:
+                    # One that is killed while it starts is not started again.
+                    if now - born.setdefault(pid, now) > 1.5 and client.nthreads() and pid not in killed:
+                        os.kill(pid, signal.SIGKILL)
+                        killed.append(pid)
+                        break
 
         thread = threading.Thread(target=kill)
         thread.start()
