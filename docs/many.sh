@@ -3,8 +3,9 @@
 #
 #   docs/many.sh PROGRAM [SETS…]        (100 and 1000 sets; 10000 take ten times as long)
 #
-# One set of two small frames is simulated; every sample is a folder with links to them, its own line rate told apart by
-# nothing but its name. The most memory that a run had is what the system says of it.
+# One set of two small frames is simulated; every sample is a folder with links to them. The most memory that a run had
+# is what the system says of it. Measured with a program compiled for debugging, on two processors: 100 sets take 8.6 s
+# of CPU and 24 MB, 1000 sets 84.8 s and 24 MB.
 set -euo pipefail
 program=$(realpath "${1:?the program to run}")
 shift

@@ -287,7 +287,8 @@ fn reference_angle(direction: Direction, settings: &Settings) -> f64 {
 /// assert!((magic.document.cell.wavelengths_nm[0] - 12.8).abs() < 0.1);
 /// let lengths = Given::Wavelengths { lengths_nm: [13.72, 12.7, 10.18], sigma_nm: 0.05, k_space: false };
 /// let read = moire(&MoireQuestion::new(lengths))?;
-/// assert!((read.document.twist_strain.unwrap().twist_deg.value - 1.19).abs() < 0.001);
+/// let twist = read.document.twist_strain.and_then(|found| found.twist_deg.value);
+/// assert!(twist.is_some_and(|twist| (twist - 1.19).abs() < 0.001));
 /// # Ok::<(), moiregauge_pipeline::moire::MoireError>(())
 /// ```
 pub fn moire(asked: &MoireQuestion) -> Result<Moire, MoireError> {

@@ -9,7 +9,7 @@ use super::lattices::{NoMap, Scans, map_lattices};
 use super::request::MapRequest;
 use super::stripes;
 use super::survey::survey;
-use crate::campaign::{Campaign, Outcome};
+use crate::campaign::{AnalyseError, Campaign, Outcome};
 use crate::job::Job;
 use crate::sink::Keep;
 
@@ -60,6 +60,7 @@ pub fn map(
             let why = Box::new(why);
             return Err(NotMapped::NoLattice { why, stripes });
         }
+        Err(AnalyseError::Cancelled(cancelled)) => return Err(cancelled.into()),
         Err(why) => return Err(NotMapped::Analyse(Box::new(why))),
     };
     let Outcome {
