@@ -143,7 +143,6 @@ impl Analysis {
 
     /// Writes what the program writes; returns how many moirés there are.
     #[pyo3(signature = (folder, force, choice, parquet, threads, progress))]
-    #[allow(clippy::too_many_arguments, reason = "named in Python")]
     fn report(
         &self,
         py: Python<'_>,
@@ -167,7 +166,6 @@ impl Analysis {
 
     /// An image as it was measured, background removed: values, the way to the next pixel in x and y and from line to
     /// line (columns of a matrix), the place of the first, its unit.
-    #[allow(clippy::type_complexity, reason = "a tuple in Python")]
     fn image<'py>(
         &self,
         py: Python<'py>,

@@ -109,10 +109,10 @@ fn samples(array: &Bound<'_, PyAny>) -> PyResult<(Samples, usize, usize)> {
 }
 
 /// Values of a channel as an array that owns them.
-pub(crate) fn values<'py>(
-    py: Python<'py>,
+pub(crate) fn values(
+    py: Python<'_>,
     values: Vec<f64>,
     [rows, columns]: [usize; 2],
-) -> PyResult<Bound<'py, PyArray2<f64>>> {
+) -> PyResult<Bound<'_, PyArray2<f64>>> {
     numpy::PyArray1::from_vec(py, values).reshape([rows, columns])
 }

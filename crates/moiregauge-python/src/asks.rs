@@ -124,7 +124,6 @@ pub(crate) fn simulate(
 
 /// Converts scans into a file or a folder; returns the files, and what failed.
 #[pyfunction]
-#[allow(clippy::type_complexity, reason = "tuples in Python")]
 pub(crate) fn convert(
     py: Python<'_>,
     paths: Vec<PathBuf>,
@@ -179,7 +178,6 @@ pub(crate) fn convert(
 
 /// Calibrates a scanner: the document, its file as TOML, and what failed.
 #[pyfunction]
-#[allow(clippy::type_complexity, reason = "tuples in Python")]
 pub(crate) fn calibrate(
     py: Python<'_>,
     paths: Vec<PathBuf>,

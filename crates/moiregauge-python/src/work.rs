@@ -93,13 +93,11 @@ pub(crate) fn work<T: Send>(
             let result = worker
                 .join()
                 .unwrap_or_else(|cause| Err(fault(&in_words(&*cause))));
-            match failed {
-                Some(error) => Err(error),
-                None => {
-                    Python::attach(|py| look(py, progress, told, &mut shown))?;
-                    result
-                }
+            if let Some(error) = failed {
+                return Err(error);
             }
+            Python::attach(|py| look(py, progress, told, &mut shown))?;
+            result
         })
     })
 }
