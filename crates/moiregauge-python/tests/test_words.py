@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+import tomllib
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -58,11 +59,27 @@ def test_generated_files_are_current() -> None:
     subprocess.run([sys.executable, HERE / "scripts" / "generate.py", "--check"], check=True)
 
 
+def test_versions_are_those_of_the_workspace() -> None:
+    """The same versions of everything: the numbers are equal, and what is built for the workspace is used."""
+
+    def versions(lock: Path) -> set[tuple[str, str]]:
+        return {(one["name"], one["version"]) for one in tomllib.loads(lock.read_text())["package"]}
+
+    workspace = HERE.parent.parent / "Cargo.lock"
+    if not workspace.is_file():
+        pytest.skip("the workspace is not there")
+    known, own = versions(workspace), versions(HERE / "Cargo.lock")
+    names = {name for name, _ in known}
+    assert not {one for one in own - known if one[0] in names}
+
+
 def test_types_are_right() -> None:
     pytest.importorskip("mypy")
     from mypy import api
 
-    out, errors, code = api.run(["--strict", "--config-file", str(HERE / "pyproject.toml"), str(HERE / "python" / "moiregauge")])
+    out, errors, code = api.run(
+        ["--strict", "--config-file", str(HERE / "pyproject.toml"), str(HERE / "python" / "moiregauge")]
+    )
     assert code == 0, out + errors
     done = subprocess.run([sys.executable, "-m", "mypy.stubtest", "moiregauge._core"], capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr

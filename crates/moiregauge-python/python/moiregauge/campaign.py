@@ -43,10 +43,9 @@ ALONE = 2
 
 @dataclass(frozen=True)
 class Done:
-    """How the samples of a campaign ended."""
+    """How the samples of a campaign ended; `out` has `samples.csv`, `samples.parquet`, `failed.csv`, `campaign.html`."""
 
     out: Path
-    """Where `samples.csv`, `samples.parquet`, `failed.csv` and `campaign.html` are."""
     ok: int
     doubtful: int
     failed: int
@@ -85,8 +84,7 @@ def run(
     if client is not None:
         _on_cluster(client, asked, many, tell)
     # What the workers have done is found by its hash: this makes the tables.
-    ok, doubtful, failed, _ = many.all(threads, None if client is not None else tell)
-    return Done(Path(out), ok, doubtful, failed)
+    return Done(Path(out), *many.all(threads, None if client is not None else tell)[:3])
 
 
 @functools.lru_cache(maxsize=1)
@@ -101,10 +99,9 @@ def _task(asked: tuple[Any, ...], places: list[int]) -> int:
 
 
 def _on_cluster(client: Client, asked: tuple[Any, ...], many: _core.ManySamples, tell: Any) -> None:
-    count = len(many)
     # Neighbours are often alike: every n-th sample is in one task.
+    count, done = len(many), 0
     tasks = -(-count // SAMPLES)
-    done = 0
 
     def told(places: list[int]) -> None:
         nonlocal done
@@ -135,9 +132,8 @@ def _all(client: Client, asked: Any, tasks: list[list[int]], window: int, told: 
         places[future.key] = task
         return future
 
-    workers = max(1, len(client.nthreads()))
-    first = [start() for _ in range(min(len(waiting), max(1, window * workers)))]
-    running = as_completed(first)
+    at_once = min(len(waiting), max(1, window * len(client.nthreads())))
+    running = as_completed([start() for _ in range(at_once)])
     for future in running:
         task = places.pop(future.key)
         error = future.exception()
@@ -147,6 +143,8 @@ def _all(client: Client, asked: Any, tasks: list[list[int]], window: int, told: 
             killed.append(task)
         else:
             raise error
+        # Nobody needs the answer: it is not worked out again when its worker dies.
+        future.release()
         if waiting:
             running.add(start())
     return killed
