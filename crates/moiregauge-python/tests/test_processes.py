@@ -148,3 +148,11 @@ def test_arrays_are_copied_once() -> None:
     )
     assert done.returncode == 0, done.stderr
     assert 0.5 < float(done.stdout) < 1.2, done.stdout
+
+
+def test_a_bar_is_shown(scans: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    mg.analyze([scans], progress=True)
+    shown = capsys.readouterr().err
+    assert "measuring" in shown and "4/4" in shown and shown.endswith("\n")
+    with pytest.raises(TypeError, match="progress"):
+        mg.analyze([scans], progress="yes")

@@ -12,19 +12,15 @@ class Bar:
     """One line that is written over: what is being done, how much of it is."""
 
     def __init__(self) -> None:
-        self._doing = ""
+        self._open = False
 
     def __call__(self, doing: str, done: int, count: int) -> None:
-        if doing != self._doing and self._doing:
-            sys.stderr.write("\n")
-        self._doing = doing
         full = WIDTH if count == 0 else WIDTH * min(done, count) // count
-        sys.stderr.write(f"\r{doing:<12}{'█' * full}{'·' * (WIDTH - full)} {done}/{count}")
+        begin = "\r" if self._open else ""
+        self._open = done < count
+        end = "" if self._open else "\n"
+        sys.stderr.write(f"{begin}{doing:<12}{'█' * full}{'·' * (WIDTH - full)} {done}/{count}{end}")
         sys.stderr.flush()
-
-    def close(self) -> None:
-        if self._doing:
-            sys.stderr.write("\n")
 
 
 def teller(progress: object) -> Callable[[str, int, int], None] | None:
