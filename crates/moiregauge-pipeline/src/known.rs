@@ -11,6 +11,7 @@ use spmfile::{
 };
 
 use crate::content::Content;
+use crate::in_memory::ScanInMemory;
 use crate::session;
 use crate::source::{Places, Source};
 use crate::twice::distinct;
@@ -94,6 +95,11 @@ impl Known {
     /// A file, on the disk or in memory.
     pub fn source<'a>(&'a self, path: &'a Path) -> Source<'a> {
         self.places.source(path)
+    }
+
+    /// The scan of this name, if it is in memory and no file.
+    pub fn in_memory(&self, path: &Path) -> Option<&ScanInMemory> {
+        self.places.scan(path)
     }
 
     /// The parts of the log beside a file, by their names.

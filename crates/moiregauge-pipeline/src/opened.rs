@@ -2,6 +2,7 @@
 
 use std::cell::RefCell;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use moiregauge::campaign::amplitude_of;
 use moiregauge::caveat::{Caveat, FileDoubt};
@@ -11,6 +12,7 @@ use moiregauge_report::InputFile;
 use spmfile::{ChannelInfo, ReadError, Scan, sensor_axis};
 
 use crate::content::Content;
+use crate::in_memory::ScanInMemory;
 use crate::known::{Known, KnownError};
 use crate::memory::{NotEnoughMemory, enough_for};
 use crate::names;
@@ -43,8 +45,8 @@ pub enum InputError {
 /// A file as the analysis reads it.
 #[derive(Debug)]
 pub struct Reading {
-    /// The chosen channel and the position sensors.
-    pub scan: Scan,
+    /// The chosen channel and the position sensors; of a scan in memory all channels.
+    pub scan: Arc<Scan>,
     /// What identifies the file.
     pub input: InputFile,
     /// What the user's options replaced in it, and what its reader doubts.
@@ -57,8 +59,15 @@ pub struct Reading {
 pub struct Opened<'a> {
     path: &'a Path,
     known: &'a Known,
-    content: Content,
+    held: Held<'a>,
     channels: Vec<(String, String)>,
+}
+
+/// What is opened.
+#[derive(Debug)]
+enum Held<'a> {
+    File(Content),
+    Scan(&'a ScanInMemory),
 }
 
 impl<'a> Opened<'a> {
@@ -67,12 +76,17 @@ impl<'a> Opened<'a> {
     /// # Errors
     /// It cannot be read, or is no scan.
     pub fn new(path: &'a Path, known: &'a Known) -> Result<Self, InputError> {
-        let content = known.source(path).content()?;
-        let channels = channels(path, &content, known)?;
+        let (held, channels) = if let Some(scan) = known.in_memory(path) {
+            (Held::Scan(scan), names_of(&scan.scan()))
+        } else {
+            let content = known.source(path).content()?;
+            let channels = channels(path, &content, known)?;
+            (Held::File(content), channels)
+        };
         Ok(Self {
             path,
             known,
-            content,
+            held,
             channels,
         })
     }
@@ -89,7 +103,11 @@ impl<'a> Opened<'a> {
         &self,
         settings: &Settings,
         companion: impl Fn(&str) -> Option<String>,
-    ) -> Result<(Scan, Vec<String>), InputError> {
+    ) -> Result<(Arc<Scan>, Vec<String>), InputError> {
+        let content = match &self.held {
+            Held::File(content) => content,
+            Held::Scan(held) => return Ok((held.scan(), Vec::new())),
+        };
         let names = self.names();
         let chosen = choose_channel(&names, settings.channel.as_deref());
         let beside = chosen.and_then(companion);
@@ -98,22 +116,26 @@ impl<'a> Opened<'a> {
                 || beside.as_ref() == Some(&channel.name.to_lowercase())
                 || sensor_axis(&channel.name, &channel.internal_name).is_some()
         };
-        Ok(self.known.read(self.path, &self.content, &wanted)?)
+        let (scan, replaced) = self.known.read(self.path, content, &wanted)?;
+        Ok((Arc::new(scan), replaced))
     }
 
     /// The chosen channel and the position sensors alone; not more than the memory holds while it is analysed.
     ///
     /// # Errors
     /// [`InputError`].
-    pub fn image(&self, settings: &Settings) -> Result<Scan, InputError> {
+    pub fn image(&self, settings: &Settings) -> Result<Arc<Scan>, InputError> {
         let (scan, _) = self.scan(settings, |_| None)?;
         enough_for(&scan)?;
         Ok(scan)
     }
 
-    /// Its bytes.
-    pub fn content(&self) -> &Content {
-        &self.content
+    /// What identifies it.
+    pub fn identity(&self) -> InputFile {
+        match &self.held {
+            Held::File(content) => content.identity(self.path),
+            Held::Scan(held) => held.identity(names::in_words(self.path)),
+        }
     }
 
     /// All that the analysis needs, of an image of any size.
@@ -122,7 +144,7 @@ impl<'a> Opened<'a> {
     /// [`InputError`].
     pub fn reading(&self, settings: &Settings) -> Result<Reading, InputError> {
         let (scan, replaced) = self.scan(settings, |_| None)?;
-        let input = self.content.identity(self.path);
+        let input = self.identity();
         let several = unusual_channels(&self.names(), settings.channel.as_deref());
         let several = several.map(FileDoubt::SeveralImages);
         let replaced = replaced.into_iter().map(FileDoubt::GivenByUser);
@@ -156,6 +178,13 @@ fn channels(
     Ok(channels)
 }
 
+/// The names of the channels of a scan, in its order.
+fn names_of(scan: &Scan) -> Vec<(String, String)> {
+    let all = scan.channels.iter();
+    all.map(|c| (c.name.clone(), c.internal_name.clone()))
+        .collect()
+}
+
 /// Reads what the analysis needs of a file; not more than the memory holds while it is analysed.
 ///
 /// # Errors
@@ -175,7 +204,7 @@ pub fn read_again(
     words: &str,
     settings: &Settings,
     known: &Known,
-) -> Result<Scan, InputError> {
+) -> Result<Arc<Scan>, InputError> {
     let path = names::with_words(inputs, words).ok_or(InputError::NotAnInput)?;
     let (scan, _) = Opened::new(path, known)?.scan(settings, |_| None)?;
     enough_for(&scan)?;
@@ -183,7 +212,7 @@ pub fn read_again(
 }
 
 /// The image of a file, with what is shown beside it: the amplitude of a phase. None where it cannot be read.
-pub fn read_shown(path: &Path, settings: &Settings, known: &Known) -> Option<Scan> {
+pub fn read_shown(path: &Path, settings: &Settings, known: &Known) -> Option<Arc<Scan>> {
     let opened = Opened::new(path, known).ok()?;
     Some(opened.scan(settings, amplitude_of).ok()?.0)
 }

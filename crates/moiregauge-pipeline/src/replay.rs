@@ -226,7 +226,9 @@ pub fn record_files(run: &mut Run, known: &Known, inputs: &[PathBuf], measured: 
     };
     for path in inputs {
         let file = in_words(path);
-        match add(path) {
+        // A scan in memory is never looked for on the disk.
+        let added = known.in_memory(path).map_or_else(|| add(path), |_| Ok(()));
+        match added {
             Ok(()) => run.inputs.push(file),
             Err(error) => run.left_out.push(FailedInput {
                 file,

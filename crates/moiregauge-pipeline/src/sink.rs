@@ -38,7 +38,7 @@ mod manifest;
 mod memory;
 mod work;
 
-pub use build::build;
+pub use build::{build, calculated_by};
 pub use error::SinkError;
 pub use file::{FileSink, OneFile};
 pub use folder::{FolderSink, Part, Target};

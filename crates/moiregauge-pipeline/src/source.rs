@@ -13,6 +13,7 @@ use spmfile::matrix::log_file;
 
 use crate::content::Content;
 use crate::hash;
+use crate::in_memory::ScanInMemory;
 use crate::reading::{self, FileError};
 
 /// Where files are that are not where their names say: elsewhere on the disk, or in memory (uploads, arrays).
@@ -24,6 +25,8 @@ pub struct Places {
     moved: BTreeMap<PathBuf, PathBuf>,
     #[serde(skip)]
     held: BTreeMap<PathBuf, Arc<Vec<u8>>>,
+    #[serde(skip)]
+    scans: BTreeMap<PathBuf, ScanInMemory>,
 }
 
 impl Places {
@@ -42,6 +45,16 @@ impl Places {
     /// held, too, and never on the disk.
     pub fn hold(&mut self, name: PathBuf, bytes: Vec<u8>) {
         self.held.insert(name, Arc::new(bytes));
+    }
+
+    /// What this name stands for is no file but a scan in memory.
+    pub fn hold_scan(&mut self, name: PathBuf, scan: ScanInMemory) {
+        self.scans.insert(name, scan);
+    }
+
+    /// The scan in memory of this name.
+    pub fn scan(&self, name: &Path) -> Option<&ScanInMemory> {
+        self.scans.get(name)
     }
 
     /// Where a file lies on the disk, if it is not held.

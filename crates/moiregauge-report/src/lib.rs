@@ -38,4 +38,4 @@ pub use samples::samples_parquet;
 pub use samples::{
     SampleRow, SampleStatus, SamplesPage, failed_csv, samples_csv, samples_page, thumbnail,
 };
-pub use tables::{map_scan, map_scans, map_tables, stripe_scan};
+pub use tables::{map_scan, map_scans, map_tables, stripe_scan, tables};

@@ -22,7 +22,7 @@ impl Again {
         folders: &[PathBuf],
         command: &str,
     ) -> anyhow::Result<(Self, Places)> {
-        let others = arguments(std::env::args_os(), &["--replay", "--data"]);
+        let others = arguments(crate::typed(), &["--replay", "--data"]);
         ensure!(
             others.len() == 1,
             "--replay takes files, settings and options from the document; found also {}",

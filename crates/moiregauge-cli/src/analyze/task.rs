@@ -48,7 +48,7 @@ impl Task {
         }
         let run = Run {
             command: command.to_owned(),
-            arguments: arguments(std::env::args_os(), &[]),
+            arguments: arguments(crate::typed(), &[]),
             settings,
             known: args.known.told(),
             sets,

@@ -150,7 +150,7 @@ impl Inputs<'_> {
             Ok(opened) => opened,
             Err(error) => return (None, failed(&error)),
         };
-        let input = opened.content().identity(path);
+        let input = opened.identity();
         let key = with.key(path, &input.file, &input.sha256, self.known);
         if let Some(known) = kept.get(&key) {
             return (None, known.clone().map(|moires| (moires, input)));

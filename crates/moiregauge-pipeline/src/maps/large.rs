@@ -52,7 +52,13 @@ impl Large {
         always: bool,
     ) -> Result<Option<Self>, NoBands> {
         let large = if always { 0 } else { LARGE };
-        if let Some(lines) = Lines::open(path, known, settings.channel.as_deref()) {
+        // It is in memory as a whole; only who asks for bands gets them.
+        let in_memory = known.in_memory(path).is_some();
+        if in_memory && !always {
+            return Ok(None);
+        }
+        let lines = || Lines::open(path, known, settings.channel.as_deref());
+        if let Some(lines) = Some(lines).filter(|_| !in_memory).and_then(|open| open()) {
             if lines.size[0] * lines.size[1] < large {
                 return Ok(None);
             }
@@ -60,7 +66,7 @@ impl Large {
             return Self::of_lines(path, lines, settings, known).map(Some);
         }
         // Other files are read as a whole anyway; small ones go the common way.
-        if known.source(path).length()? < large as u64 {
+        if !in_memory && known.source(path).length()? < large as u64 {
             return Ok(None);
         }
         let opened = Opened::new(path, known)?;

@@ -23,4 +23,4 @@ pub use error::SamplesError;
 pub use find::{Sample, samples_in, samples_of_table};
 pub use list::Shard;
 pub use merge::{Merge, merge};
-pub use run::{Samples, SamplesDone, analyse_samples};
+pub use run::{Samples, SamplesDone, analyse_samples, analyse_some, give_up};

@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use moiregauge::settings::{Settings, SettingsError};
-use moiregauge_report::ColorMap;
 use moiregauge_report::results::Told;
+use moiregauge_report::{ColorMap, FailedInput, SampleRow};
 use rayon::prelude::*;
 
 use super::error::SamplesError;
@@ -106,27 +106,7 @@ pub fn analyse_samples(
         .filter(|(place, _)| asked.shard.has(*place))
         .map(|(_, sample)| sample)
         .collect();
-    let stage = job.stage("analysing", "samples", own.len());
-    let silent = job.silent();
-    let done: Vec<(Listed, SamplesDone)> = job.run(|| {
-        own.par_iter()
-            .map(|sample| {
-                let done = asked.one(sample, out, &parts, &silent);
-                stage.step();
-                done
-            })
-            .collect::<Result<_, SamplesError>>()
-    })??;
-    drop(stage);
-    let mut counts = SamplesDone::default();
-    let mut listed = Vec::new();
-    for (one, done) in done {
-        counts.ok += done.ok;
-        counts.doubtful += done.doubtful;
-        counts.failed += done.failed;
-        counts.done_before += done.done_before;
-        listed.push(one);
-    }
+    let (listed, counts) = asked.each(&own, out, &parts, job)?;
     let list = List::new(asked.asked.clone(), asked.shard, listed);
     parts.write(&[(PathBuf::from(asked.shard.list_name()), list.bytes())])?;
     drop(parts);
@@ -136,7 +116,92 @@ pub fn analyse_samples(
     Ok(counts)
 }
 
+/// Analyses the samples at these places of the sorted list, and writes their parts and no list: the work of a scheduler
+/// that has shares of its own. [`analyse_samples`] afterwards finds them done.
+///
+/// # Errors
+/// As [`analyse_samples`].
+pub fn analyse_some(
+    asked: &Samples,
+    places: &[usize],
+    out: &Path,
+    job: &Job,
+) -> Result<SamplesDone, SamplesError> {
+    let parts = FileSink::open(&out.join(PARTS), true, &[])?;
+    let own: Vec<&Sample> = places.iter().filter_map(|&n| asked.all.get(n)).collect();
+    Ok(asked.each(&own, out, &parts, job)?.1)
+}
+
+/// Writes that the sample at this place failed, for these reasons, where its part is not there: a sample that ends every
+/// process that looks at it.
+///
+/// # Errors
+/// The part cannot be written.
+pub fn give_up(asked: &Samples, place: usize, why: &str, out: &Path) -> Result<(), SamplesError> {
+    let Some(sample) = asked.all.get(place) else {
+        return Ok(());
+    };
+    let key = key(&asked.asked, &sample.name, &sample.files(&asked.root));
+    let folder = out.join(PARTS);
+    if matches!(Part::read(&folder, &key), Ok(Some(_))) {
+        return Ok(());
+    }
+    let failed = FailedInput {
+        file: sample.name.clone(),
+        error: why.to_owned(),
+    };
+    let part = Part {
+        sample: sample.name.clone(),
+        key,
+        picture: false,
+        rows: vec![SampleRow::without_numbers(&sample.name, vec![failed])],
+    };
+    write(&FileSink::open(&folder, true, &[])?, &part, None)
+}
+
 impl Samples {
+    /// How many samples there are, in all shards.
+    pub fn len(&self) -> usize {
+        self.all.len()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.all.is_empty()
+    }
+
+    /// These samples in parallel.
+    fn each(
+        &self,
+        own: &[&Sample],
+        out: &Path,
+        parts: &FileSink,
+        job: &Job,
+    ) -> Result<(Vec<Listed>, SamplesDone), SamplesError> {
+        let stage = job.stage("analysing", "samples", own.len());
+        let silent = job.silent();
+        let done: Vec<(Listed, SamplesDone)> = job.run(|| {
+            own.par_iter()
+                .map(|sample| {
+                    let done = self.one(sample, out, parts, &silent);
+                    stage.step();
+                    done
+                })
+                .collect::<Result<_, SamplesError>>()
+        })??;
+        drop(stage);
+        let mut counts = SamplesDone::default();
+        let mut listed = Vec::new();
+        for (one, done) in done {
+            counts.ok += done.ok;
+            counts.doubtful += done.doubtful;
+            counts.failed += done.failed;
+            counts.done_before += done.done_before;
+            listed.push(one);
+        }
+        Ok((listed, counts))
+    }
+
     /// One sample, unless it is done already: under which key it is kept, and how it ended.
     fn one(
         &self,

@@ -21,5 +21,5 @@ pub use map::{map_scan, map_scans};
 pub(crate) use parquet::{parquet_of, parquet_tables};
 pub(crate) use region::COMMON;
 pub use region::map_tables;
-pub(crate) use results::tables;
+pub use results::tables;
 pub use stripes::stripe_scan;

@@ -6,7 +6,7 @@ use super::csv;
 use crate::results::Results;
 
 /// All tables as named files.
-pub(crate) fn tables(results: &Results) -> Vec<(String, Vec<u8>)> {
+pub fn tables(results: &Results) -> Vec<(String, Vec<u8>)> {
     let (vectors, scans, sets, budgets) = (
         VectorRow::rows(results),
         ScanRow::rows(results),

@@ -1,0 +1,34 @@
+"""A bar on the screen, where nobody brings a better one."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+
+WIDTH = 30
+
+
+class Bar:
+    """One line that is written over: what is being done, how much of it is."""
+
+    def __init__(self) -> None:
+        self._open = False
+
+    def __call__(self, doing: str, done: int, count: int) -> None:
+        full = WIDTH if count == 0 else WIDTH * min(done, count) // count
+        begin = "\r" if self._open else ""
+        self._open = done < count
+        end = "" if self._open else "\n"
+        sys.stderr.write(f"{begin}{doing:<12}{'█' * full}{'·' * (WIDTH - full)} {done}/{count}{end}")
+        sys.stderr.flush()
+
+
+def teller(progress: object) -> Callable[[str, int, int], None] | None:
+    """The function to call, if any."""
+    if progress is None or progress is False:
+        return None
+    if progress is True:
+        return Bar()
+    if not callable(progress):
+        raise TypeError(f"progress: expected True or a function of (doing, done, count), found {progress!r}")
+    return progress

@@ -1,0 +1,150 @@
+"""Many samples, one table: here, or on a Dask cluster.
+
+    from dask.distributed import Client
+    import moiregauge as mg
+
+    if __name__ == "__main__":
+        done = mg.campaign.run("samples/", "out/", client=Client("scheduler:8786"))
+        table = done.to_pandas()
+
+Every sample (a folder with scans) leaves a part in `out/parts`, named by a hash of all that it depends on: the files of
+`moiregauge campaign --shard`. Nothing else is remembered. A run that is killed, here or on the cluster, goes on when it is
+started again. Paths have to mean the same folders on all workers.
+"""
+
+from __future__ import annotations
+
+import functools
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Unpack
+
+from moiregauge import _core
+from moiregauge._arguments import Progress, words
+from moiregauge._options import TOLD
+from moiregauge._progress import teller
+
+if TYPE_CHECKING:
+    import pandas
+    from dask.distributed import Client, Future
+
+    from moiregauge._options import Options
+
+__all__ = ["Done", "run"]
+
+# So many samples are one task: a scheduler needs about a millisecond for each.
+SAMPLES = 16
+# Tasks that wait at a worker die with it, and count as its victims: so many at each.
+WINDOW = 2
+# A sample that has ended its worker so often while it was alone on the cluster is to blame.
+ALONE = 2
+
+
+@dataclass(frozen=True)
+class Done:
+    """How the samples of a campaign ended; `out` has `samples.csv`, `samples.parquet`, `failed.csv`, `campaign.html`."""
+
+    out: Path
+    ok: int
+    doubtful: int
+    failed: int
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """The table of all samples, one row for each moiré of a sample."""
+        import pandas
+
+        return pandas.read_csv(self.out / "samples.csv")
+
+
+def run(
+    root: str | os.PathLike[str],
+    out: str | os.PathLike[str],
+    *,
+    client: Client | None = None,
+    samples: str | os.PathLike[str] | None = None,
+    threads: int | None = None,
+    progress: Progress = None,
+    **options: Unpack[Options],
+) -> Done:
+    """Analyses every folder below `root` that holds scans, as `moiregauge campaign` does: the same files, byte for byte.
+
+    client: of a Dask cluster, whose workers analyse on one thread each; without one it runs here on `threads`.
+    samples: a table (CSV, columns `sample` and `path`) that says which files are which sample.
+    progress: `True`, or a function of what is being done, how much is done, and how much there is.
+
+    A sample that fails does not stop the others; one that ends every worker that looks at it is recorded as failed.
+    """
+    told = {name: value for name, value in options.items() if name in TOLD and value is not None}
+    settings = {name: value for name, value in options.items() if name not in TOLD and value is not None}
+    table = None if samples is None else os.path.abspath(samples)
+    asked = (os.path.abspath(root), table, words(settings), words(told), os.path.abspath(out))
+    many = _core.ManySamples(*asked)
+    tell = teller(progress)
+    if client is not None:
+        _on_cluster(client, asked, many, tell)
+    # What the workers have done is found by its hash: this makes the tables.
+    return Done(Path(out), *many.all(threads, None if client is not None else tell)[:3])
+
+
+@functools.lru_cache(maxsize=1)
+def _many(asked: tuple[Any, ...]) -> _core.ManySamples:
+    return _core.ManySamples(*asked)
+
+
+def _task(asked: tuple[Any, ...], places: list[int]) -> int:
+    """What a worker does: parts are whole on the disk before it returns."""
+    _many(asked).some(places, 1)
+    return len(places)
+
+
+def _on_cluster(client: Client, asked: tuple[Any, ...], many: _core.ManySamples, tell: Any) -> None:
+    # Neighbours are often alike: every n-th sample is in one task.
+    count, done = len(many), 0
+    tasks = -(-count // SAMPLES)
+
+    def told(places: list[int]) -> None:
+        nonlocal done
+        done += len(places)
+        if tell is not None:
+            tell("analysing", done, count)
+
+    suspects = _all(client, asked, [list(range(n, count, tasks)) for n in range(tasks)], WINDOW, told)
+    suspects = _all(client, asked, [[place] for places in suspects for place in places], WINDOW, told)
+    # Others may have ended the workers of these.
+    for _ in range(ALONE):
+        suspects = _all(client, asked, suspects, 0, told)
+    for (place,) in suspects:
+        many.give_up(place, "every process that looked at these files was ended by the system")
+        told([place])
+
+
+def _all(client: Client, asked: Any, tasks: list[list[int]], window: int, told: Any) -> list[list[int]]:
+    """Does the tasks, so many at a time for each worker (0: one in all); returns those that ended their workers."""
+    from dask.distributed import KilledWorker, as_completed
+
+    waiting, killed = list(reversed(tasks)), []
+    places: dict[Any, list[int]] = {}
+
+    def start() -> Future[int]:
+        task = waiting.pop()
+        future = client.submit(_task, asked, task, pure=False, retries=1)
+        places[future.key] = task
+        return future
+
+    at_once = min(len(waiting), max(1, window * len(client.nthreads())))
+    running = as_completed([start() for _ in range(at_once)])
+    for future in running:
+        task = places.pop(future.key)
+        error = future.exception()
+        if error is None:
+            told(task)
+        elif isinstance(error, KilledWorker):
+            killed.append(task)
+        else:
+            raise error
+        # Nobody needs the answer: it is not worked out again when its worker dies.
+        future.release()
+        if waiting:
+            running.add(start())
+    return killed

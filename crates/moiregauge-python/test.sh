@@ -1,0 +1,30 @@
+#!/usr/bin/env bash
+# Builds the wheel, installs it into an empty environment and runs its tests there: with numpy alone, then with all extras.
+# Leaves with 77 where there is no Python 3.11 or newer, or no package can be installed. Further arguments go to pytest.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")"
+# That of the workspace: versions and profiles are the same, and most of it is built there already.
+export CARGO_TARGET_DIR="${CARGO_TARGET_DIR:-$PWD/../../target}"
+
+python=${PYTHON:-python3}
+"$python" -c 'import sys; sys.exit(sys.version_info < (3, 11))' || exit 77
+scratch=$(mktemp -d)
+trap 'rm -rf "$scratch"' EXIT
+"$python" -m venv "$scratch/venv" || exit 77
+pip() { "$scratch/venv/bin/python" -m pip --quiet --disable-pip-version-check "$@"; }
+pip install "maturin>=1.16,<2" || exit 77
+
+"$scratch/venv/bin/maturin" build --profile "${MOIREGAUGE_PROFILE:-dev}" --locked --out "$scratch/wheel"
+cargo fmt --check
+cargo clippy --locked -- -D warnings
+pip uninstall --yes maturin
+ls -l "$scratch"/wheel/*.whl
+
+# What hangs fails.
+run() { timeout 900 "$scratch/venv/bin/python" -m pytest -q -p no:cacheprovider tests "$@"; }
+pip install "$scratch"/wheel/*.whl pytest
+# Nothing but numpy comes along.
+test "$(pip list --format freeze | grep -civE '^(moiregauge|numpy|pip|setuptools|pytest|pluggy|iniconfig|packaging|pygments)=')" -eq 0
+run "$@"
+pip install "$(ls "$scratch"/wheel/*.whl)[all]" mypy
+run "$@"

@@ -1,0 +1,47 @@
+"""Simulated scans, made once by the program in the wheel."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sysconfig
+from pathlib import Path
+
+import pytest
+
+PROGRAM = Path(sysconfig.get_path("scripts")) / "moiregauge"
+
+
+def program(*arguments: object, ok: bool = True) -> subprocess.CompletedProcess[str]:
+    done = subprocess.run([str(PROGRAM), *map(str, arguments)], capture_output=True, text=True, timeout=300)
+    assert not ok or done.returncode == 0, done.stderr
+    return done
+
+
+@pytest.fixture(scope="session")
+def scans(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A set of four scans, up and down in turn."""
+    out = tmp_path_factory.mktemp("simulated")
+    program("simulate", "--out", out, "--name", "set", "--scans", 4, "--pixels", 128, "--seed", 3)
+    return out / "set"
+
+
+@pytest.fixture(scope="session")
+def image(scans: Path) -> Path:
+    return scans / "scan.000.spm"
+
+
+@pytest.fixture(scope="session")
+def samples(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Forty samples of two small scans each, one of them broken."""
+    out = tmp_path_factory.mktemp("samples")
+    program("simulate", "--out", out, "--name", "s000", "--scans", 2, "--pixels", 128, "--seed", 1)
+    for number in range(1, 40):
+        shutil.copytree(out / "s000", out / f"s{number:03}")
+        # Other bytes: another sample.
+        for scan in (out / f"s{number:03}").glob("*.spm"):
+            content = bytearray(scan.read_bytes())
+            content[-2:] = number.to_bytes(2, "little")
+            scan.write_bytes(content)
+    (out / "s007" / "scan.000.spm").write_bytes(b"\\*File list\r\n")
+    return out

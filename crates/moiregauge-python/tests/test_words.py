@@ -1,0 +1,85 @@
+"""What notebooks and terminals show, and that generated files are current."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import tomllib
+from html.parser import HTMLParser
+from pathlib import Path
+
+import moiregauge as mg
+import pytest
+
+pytestmark = pytest.mark.filterwarnings("ignore::moiregauge.CaveatWarning")
+HERE = Path(__file__).resolve().parent.parent
+
+
+class Tags(HTMLParser):
+    """Every tag that is opened is closed."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.seen: set[str] = set()
+
+    def handle_starttag(self, tag: str, attrs: object) -> None:
+        self.open.append(tag)
+        self.seen.add(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+
+@pytest.mark.parametrize("of", ["results", "map"])
+def test_notebooks_show_a_table(of: str, scans: Path, image: Path) -> None:
+    found = mg.analyze([scans]) if of == "results" else mg.map(image)
+    html = found._repr_html_()
+    tags = Tags()
+    tags.feed(html)
+    assert tags.open == [] and "table" in tags.seen and "script" not in tags.seen
+    # Colours are those of the page, light or dark.
+    assert "#" not in html.split("</style>")[0] and "currentColor" in html
+    if of == "results":
+        assert str(found.sets[0].mean.twist_deg) in html
+        assert "Twist" in str(found) or "twist" in str(found)
+        assert repr(found).startswith("<Results: 4 scans in 1 sets")
+
+
+def test_names_are_no_html(scans: Path, tmp_path: Path) -> None:
+    odd = tmp_path / "<script>alert(1)<" / "x.spm"
+    odd.parent.mkdir(parents=True)
+    odd.write_bytes((scans / "scan.000.spm").read_bytes())
+    assert "<script" not in mg.analyze(odd)._repr_html_()
+
+
+def test_generated_files_are_current() -> None:
+    if not (HERE.parent / "moiregauge-report" / "schema").is_dir():
+        pytest.skip("the schemas are not there")
+    subprocess.run([sys.executable, HERE / "scripts" / "generate.py", "--check"], check=True)
+
+
+def test_versions_are_those_of_the_workspace() -> None:
+    """The same versions of everything: the numbers are equal, and what is built for the workspace is used."""
+
+    def versions(lock: Path) -> set[tuple[str, str]]:
+        return {(one["name"], one["version"]) for one in tomllib.loads(lock.read_text())["package"]}
+
+    workspace = HERE.parent.parent / "Cargo.lock"
+    if not workspace.is_file():
+        pytest.skip("the workspace is not there")
+    known, own = versions(workspace), versions(HERE / "Cargo.lock")
+    names = {name for name, _ in known}
+    assert not {one for one in own - known if one[0] in names}
+
+
+def test_types_are_right() -> None:
+    pytest.importorskip("mypy")
+    from mypy import api
+
+    out, errors, code = api.run(
+        ["--strict", "--config-file", str(HERE / "pyproject.toml"), str(HERE / "python" / "moiregauge")]
+    )
+    assert code == 0, out + errors
+    done = subprocess.run([sys.executable, "-m", "mypy.stubtest", "moiregauge._core"], capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
