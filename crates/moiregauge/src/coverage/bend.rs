@@ -132,9 +132,16 @@ pub(crate) fn mean(view: &View, patch: &Patch) -> Option<Mean> {
 pub(crate) fn refined(view: &View, patch: &Patch) -> Option<Mean> {
     let rough = choose(view, patch, &nodes(view, patch))?;
     let parts = higher::parts(view.image, patch, &rough.fit)?;
+    // Waves that the envelopes stand still against: where exactly a phase holds does not matter then.
+    let patch = &Patch {
+        pair: patch.pair + slopes(&rough.fit, view.cells, patch).mean,
+        ..patch.clone()
+    };
+    // What the windows see beside the waves with all that leaks into them stands for what still does.
+    let left = parts.noise(view.cells, patch, view.width, &hollows(&patch.pair));
     let view = View {
         image: &parts.first,
-        noise: parts.noise(view.cells, patch, view.width, &hollows(&patch.pair)),
+        noise: [0, 1, 2].map(|i| view.noise[i].max(left[i])),
         ..*view
     };
     mean(&view, patch)
