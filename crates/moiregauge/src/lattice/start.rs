@@ -51,7 +51,7 @@ impl Start {
     /// Looks for the lattice in the spectrum.
     ///
     /// # Errors
-    /// As [`measure`], but for [`LatticeError::NoPeaks`].
+    /// As [`measure`](crate::lattice::measure), but for [`LatticeError::NoPeaks`].
     pub fn find(
         image: &Image,
         geometry: &Geometry,
