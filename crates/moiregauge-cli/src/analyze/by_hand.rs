@@ -66,18 +66,16 @@ fn parse_length(text: &str) -> Result<f64, String> {
 }
 
 pub(super) fn parse_part(text: &str) -> Result<Vec<[f64; 2]>, String> {
-    let named = format!("part={text}");
-    let region = parse_region(&named).map_err(|error| {
+    // A name, as the regions of a map have one, does no harm.
+    let (_, part) = text.split_once('=').unwrap_or(("", text));
+    let region = parse_region(&format!("part={part}")).map_err(|error| {
         error
             .replace("a name and, in nm, a box", "in nm a box")
             .replace("bar=", "")
             .replace("flake=", "")
     })?;
-    Ok(region
-        .corners
-        .iter()
-        .map(|c: &Vector2<f64>| [c.x, c.y])
-        .collect())
+    let corners = region.corners.iter();
+    Ok(corners.map(|c: &Vector2<f64>| [c.x, c.y]).collect())
 }
 
 #[cfg(test)]
@@ -92,7 +90,7 @@ mod tests {
         );
         assert!(parse_lattice("12,0,6").is_err());
         assert_eq!(parse_part("1,2,3,4").unwrap()[0], [1.0, 2.0]);
-        assert_eq!(parse_part("0,0 4,0 0,2").unwrap().len(), 3);
+        assert_eq!(parse_part("left=0,0 4,0 0,2").unwrap().len(), 3);
         let error = parse_part("1,2,3").unwrap_err();
         assert!(error.contains("expected in nm a box"), "{error}");
         assert!(parse_length("0").is_err() && parse_length("1.2um") == Ok(1200.0));

@@ -34,6 +34,7 @@ fn templates(command: &str, option: &str) -> Vec<&'static str> {
         ("analyze" | "map" | "campaign" | "moire", "lattice_angle" | "lattice_angle_2") => {
             vec!["{}±0.1", "10±{}"]
         }
+        ("analyze" | "map" | "campaign", "lattice") => vec!["{},0.4,6,10.5", "12,0.4,6,{}"],
         (_, "lattice") => vec!["{}nm,0.5nm,90", "0.5nm,{}nm,90", "0.5nm,0.5nm,{}"],
         (_, "wavelengths") => vec!["{},12,11", "13,12,{}"],
         (_, "vectors") => vec!["{},0.4|6,11", "13,0|6,{}"],
