@@ -5,7 +5,7 @@ mod fit_scene;
 use fit_scene::{Contrast, Scene, Wave};
 use moiregauge::frame::Background;
 use moiregauge::frame::Image;
-use moiregauge::lattice::{MeasuredLattice, Start, measure};
+use moiregauge::lattice::{MeasuredLattice, measure};
 use moiregauge::spectrum::Method;
 use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
 
@@ -328,11 +328,7 @@ fn a_changing_lattice_is_pointed_out() {
         let mut scene = Scene::new([256, 256], 10.0, angle, Contrast::Cosines, seed);
         let white = if seed % 2 == 0 { 0.5 } else { 0.1 };
         (scene.white, scene.line, scene.change) = (white, 0.5 * white, 0.01);
-        let image = scene.image();
-        assert!(fit(&image, &scene).change.is_some(), "seed {seed}");
-        // What the fit to the pixels says of it, which takes the lattice for one that is the same everywhere.
-        let start = Start::find(&image, &scene.geometry(), Background::Plane).unwrap();
-        let fit = start.measure(Method::Lattice).unwrap().fit.unwrap();
+        let fit = fit(&scene.image(), &scene).fit.unwrap();
         let found = fit.inhomogeneity.unwrap();
         assert!(found.stands_out(), "seed {seed}: {found:?}");
         // q along x changes by 1 %: of |q| that is the square of its cosine, of its direction the

@@ -21,11 +21,11 @@ fn twist(results: &Value) -> [f64; 2] {
 }
 
 /// A mask of columns, as an array of bytes.
-fn mask(folder: &Path, used: impl Fn(usize) -> bool) -> PathBuf {
+fn mask(folder: &Path, name: &str, used: impl Fn(usize) -> bool) -> PathBuf {
     let mut header = "{'descr': '|u1', 'fortran_order': False, 'shape': (512, 512), }".to_owned();
     header.push_str(&" ".repeat(117 - header.len()));
     header.push('\n');
-    let path = folder.join("mask ü.npy");
+    let path = folder.join(format!("{name} für die Maske.npy"));
     let mut file = std::fs::File::create(&path).expect("a file");
     file.write_all(b"\x93NUMPY\x01\x00").expect("a header");
     let length = u16::try_from(header.len()).expect("short");
@@ -44,8 +44,8 @@ fn a_part_of_the_frame_is_measured_alone() {
     };
     let truth = json(&data.join("hard/two_grains/truth.json"));
     let folder = tempfile::tempdir().expect("a folder");
-    let left = mask(folder.path(), |column| column < 200);
-    let right = mask(folder.path(), |column| column >= 320);
+    let left = mask(folder.path(), "left", |column| column < 200);
+    let right = mask(folder.path(), "right", |column| column >= 320);
     for (name, options) in [
         ("left", ["--region", "0,0,100nm,0.256um"]),
         ("right", ["--region", "160,0 256,0 256,256 160,256"]),
@@ -94,7 +94,7 @@ fn what_was_told_wrongly_is_refused() {
     };
     let folder = tempfile::tempdir().expect("a folder");
     let image = data.join("hard/hole");
-    let other = mask(folder.path(), |_| true);
+    let other = mask(folder.path(), "other", |_| true);
     for (options, expected) in [
         (["--near", "300nm"], "no lattice like the one that was told"),
         (["--mask", other.to_str().expect("a name")], "512 × 512"),

@@ -86,6 +86,9 @@ pub(crate) struct Mean {
 /// A lattice whose wavelengths or directions change by more than this (standard deviation) is none. Chosen by eye.
 const WILD: f64 = 0.25;
 
+/// Standard deviation of the waves times the periods across: the phase bends by 2π √12/8 times that, half a radian here.
+const GENTLE: f64 = 0.18;
+
 /// χ² over its degrees of freedom beyond which the phases are not those of one lattice: noise is known far better.
 const POOR: f64 = 9.0;
 
@@ -97,6 +100,16 @@ impl Mean {
     pub(crate) fn is_poor(&self) -> bool {
         let wild = |change: Change| change.wavelength.max(change.angle) > WILD;
         (self.reduced > POOR && self.left > LEFT) || self.change.is_some_and(wild)
+    }
+
+    /// Whether the wave vectors change in proportion to the place and bend the phases of so many unit cells so little
+    /// that a straight wave still fits.
+    pub(crate) fn is_gentle(&self, unit_cells: f64) -> bool {
+        let bent = |change: &Change| change.wavelength.max(change.angle) * unit_cells.sqrt();
+        let even = self
+            .change
+            .filter(|change| change.model == ChangeModel::Even);
+        even.is_some_and(|change| bent(&change) < GENTLE)
     }
 
     /// The same in pixels of which `bins` make one along each axis.

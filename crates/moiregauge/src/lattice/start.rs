@@ -185,7 +185,10 @@ impl Start {
                 return None;
             }
             let changes = changes && told;
-            let mean = mean.filter(|_| !everywhere || changes);
+            // Where waves change little and in proportion to the place, the fit to the pixels gives their mean.
+            let cells = settled.patch.unit_cells;
+            let gentle = mean.as_ref().is_some_and(|mean| mean.is_gentle(cells));
+            let mean = mean.filter(|_| !everywhere || (changes && !gentle));
             return Some(Self {
                 mean: mean.map(|rough| settled.refined().unwrap_or(rough)),
                 patch: (!everywhere).then_some(settled.patch),
