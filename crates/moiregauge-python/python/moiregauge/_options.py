@@ -24,6 +24,7 @@ class Options(TypedDict, total=False):
     """Keyword arguments of `analyze`, `measure`, `map`, `Campaign` and `campaign.run`.
 
     background: What is subtracted beforehand.
+    by_hand: What was told by hand: which lattice is meant, and where it is.
     calibration: How well the scanner is calibrated, for the uncertainty budget.
     channel: Channel that shows the moiré; `None`: the first of the usual ones that is present.
     crop: The block of the image to use.
@@ -76,6 +77,7 @@ class Options(TypedDict, total=False):
     """
 
     background: Background
+    by_hand: Mapping[str, Any]
     calibration: Mapping[str, Any]
     channel: str
     crop: Mapping[str, Any]

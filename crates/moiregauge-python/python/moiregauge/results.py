@@ -17,6 +17,7 @@ __all__ = [
     "Background",
     "BudgetColumn",
     "BudgetResult",
+    "ByHand",
     "Calibration",
     "Caveat",
     "ChecksResult",
@@ -52,6 +53,7 @@ __all__ = [
     "MapDetailsResult",
     "MapResults",
     "MappedImage",
+    "Mask",
     "MaskCount",
     "MaskShare",
     "Material",
@@ -231,6 +233,24 @@ class BudgetResult(Document):
     """Of `twist_deg`."""
     wavelengths_nm: tuple[BudgetColumn, BudgetColumn, BudgetColumn]
     """Of the lengths of the three vectors."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ByHand(Document):
+    """What the eye knows better than the search. Nothing by default."""
+
+    lattice_nm: tuple[tuple[float, float], tuple[float, float]] | None = None
+    """Two vectors of the lattice, x and y in nm, in the axes of the results and before drift is taken out; 5
+    % off and 3° will do.
+    """
+    mask: Mask | None = None
+    """The pixels to use."""
+    near_nm: float | None = None
+    """The mean wavelength of the lattice, nm, to 15 %."""
+    regions_nm: tuple[tuple[tuple[float, float], ...], ...] = ()
+    """The parts of the frame to use: the corners of polygons, nm from its lower left corner, along the lines
+    and across them.
+    """
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -771,6 +791,18 @@ class MappedImage(Document):
 
 
 @dataclass(frozen=True, kw_only=True)
+class Mask(Document):
+    """Which pixels of a frame are used."""
+
+    columns: int
+    """Samples in a line."""
+    rows: int
+    """Lines."""
+    runs: tuple[int, ...]
+    """Row by row from the bottom: how many pixels are left out, then how many are used, and so on in turn."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class MaskCount(Document):
     """How many nodes have a mask."""
 
@@ -1272,6 +1304,8 @@ class Settings(Document):
 
     background: Background
     """What is subtracted beforehand."""
+    by_hand: ByHand | None = None
+    """What was told by hand: which lattice is meant, and where it is."""
     calibration: Calibration
     """How well the scanner is calibrated, for the uncertainty budget."""
     channel: str | None
