@@ -19,10 +19,6 @@ pub(crate) const WHOLE: f64 = 0.95;
 /// Lattices with less than this share of the power of the strongest one are its harmonics, or skirts. Chosen by eye.
 const WORTH: f64 = 0.1;
 
-/// ... and so are those that hold less than this share of its power, however little noise there is: an edge leaks some hundredths of an
-/// amplitude into a window, on a strip of the frame.
-const LEAK: f64 = 1e-3;
-
 /// The patches, the strongest first, on which the lattices settle that the spectra of the frame and of its tiles propose. `flat`: without
 /// background; `is_meant`: whether a pair may be the lattice that is looked for.
 pub(crate) fn patches(
@@ -62,8 +58,6 @@ pub(crate) fn patches(
             break;
         }
     }
-    let strongest = found.iter().map(Settled::power).fold(0.0, f64::max);
-    found.retain(|settled| settled.power() > LEAK * strongest);
     found.sort_by(|a, b| b.evidence().total_cmp(&a.evidence()));
     let most = found.first().map_or(0.0, Settled::evidence);
     found.retain(|settled| settled.evidence() > WORTH * most);

@@ -170,14 +170,6 @@ impl Settled {
         self.seen.evidence(&self.cells, &self.inner)
     }
 
-    /// Power of its waves over the patch, in sum.
-    pub(crate) fn power(&self) -> f64 {
-        let waves = self.seen.weights.iter().zip(&self.seen.noise);
-        waves.map(|(weight, noise)| weight * noise).sum::<f64>()
-            * self.seen.windows(&self.cells, &self.inner)
-            / (self.bins * self.bins) as f64
-    }
-
     /// The patches of two grains where it is no single lattice, the larger first.
     pub(crate) fn grains(&self) -> Option<[Patch; 2]> {
         let grains = split(&self.view(), &self.inner)?;
