@@ -40,20 +40,16 @@ pub fn measure(
     if let Some(start) = finer.filter(Start::stands_out) {
         return start.measure(method);
     }
-    if !is_stronger(&found, &wave) {
+    if !is_stronger(&found, &wave) || !competes(&found, &wave, geometry) {
         return Ok(found);
     }
     // Another part of the frame explains it, or it is something else beside the lattice.
     let another = Start::find_patch(image, geometry, background, Some(pair))
         .and_then(|start| start.measure(method).ok())
         .filter(|other| beside(other).is_none_or(|wave| !is_stronger(other, &wave)));
-    match another {
-        Some(another) => Ok(another),
-        None if competes(&found, &wave, geometry) => Err(LatticeError::Contradicted {
-            period: period(&wave, geometry),
-        }),
-        None => Ok(found),
-    }
+    another.ok_or_else(|| LatticeError::Contradicted {
+        period: period(&wave, geometry),
+    })
 }
 
 /// Whether a wave can be that of the lattice that was meant: atoms, which are much shorter, and background are none.

@@ -178,38 +178,43 @@ impl Start {
         } else {
             None
         };
-        let Some([largest, other]) = grains else {
-            // A cell with many harmonics is none of three waves: on the whole frame the fit to the pixels judges.
-            let told = mean.as_ref().is_some_and(|mean| !mean.is_poor());
-            if !told && !everywhere {
-                return None;
-            }
-            let changes = changes && told;
-            // Where waves change little and in proportion to the place, the fit to the pixels gives their mean.
-            let cells = settled.patch.unit_cells;
-            let gentle = mean.as_ref().is_some_and(|mean| mean.is_gentle(cells));
-            let mean = mean.filter(|_| !everywhere || (changes && !gentle));
-            return Some(Self {
-                mean: mean.map(|rough| settled.refined().unwrap_or(rough)),
-                patch: (!everywhere).then_some(settled.patch),
-                ..self
-            });
-        };
-        let (geometry, background) = (self.geometry, self.background);
+        let grain = grains.and_then(|grains| self.grain(image, grains));
+        if grain.is_some() {
+            return grain;
+        }
+        // A cell with many harmonics is none of three waves: on the whole frame the fit to the pixels judges.
+        let told = mean.as_ref().is_some_and(|mean| !mean.is_poor());
+        if !told && !everywhere {
+            return None;
+        }
+        let changes = changes && told;
+        // Where waves change little and in proportion to the place, the fit to the pixels gives their mean.
+        let cells = settled.patch.unit_cells;
+        let gentle = mean.as_ref().is_some_and(|mean| mean.is_gentle(cells));
+        let mean = mean.filter(|_| !everywhere || (changes && !gentle));
+        Some(Self {
+            mean: mean.map(|rough| settled.refined().unwrap_or(rough)),
+            patch: (!everywhere).then_some(settled.patch),
+            ..self
+        })
+    }
+
+    /// The lattice of the first of two grains; the other is named.
+    fn grain(&self, image: &Image, [largest, other]: [Patch; 2]) -> Option<Self> {
+        let (geometry, background) = (&self.geometry, self.background);
         let flat = remove_background(&largest.of(image), background);
-        let mut again = settle(&flat, &largest.pair, pitch(&geometry))?;
+        let mut again = settle(&flat, &largest.pair, pitch(geometry))?;
         again.patch.share *= largest.share;
         let part = again.patch.of(image);
-        let start = Self::near(&part, &geometry, background, &again.patch.pair)?;
+        let start = Self::near(&part, geometry, background, &again.patch.pair)?;
         let mut found = start.on_patch(image, again)?;
         let flat = remove_background(&other.of(image), background);
-        let settled_share = other.share;
-        if let Some(other) = settle(&flat, &other.pair, pitch(&geometry)) {
+        if let Some(settled) = settle(&flat, &other.pair, pitch(geometry)) {
             found.others.push(Grain {
-                share: settled_share,
-                waves: other
+                share: other.share,
+                waves: settled
                     .mean()
-                    .map_or(other.patch.pair, |mean| mean.waves.basis),
+                    .map_or(settled.patch.pair, |mean| mean.waves.basis),
             });
         }
         Some(found)
