@@ -22,3 +22,22 @@ pub fn read_mask(path: &Path) -> Result<Mask, InputError> {
     let used: Vec<bool> = channel.values().iter().map(|v| *v > 0.0).collect();
     Ok(Mask::new(channel.columns, channel.rows, &used))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The first line of an array is the top one, as in images; masks begin at the bottom.
+    #[test]
+    fn masks_have_the_rows_of_their_images() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("mask.txt");
+        let top = "1 1 0\n";
+        std::fs::write(&path, format!("{top}{}", "0 0 0\n".repeat(3))).unwrap();
+        let mask = read_mask(&path).unwrap();
+        assert_eq!((mask.columns, mask.rows), (3, 4));
+        let mut expected = vec![false; 12];
+        expected[9..11].fill(true);
+        assert_eq!(mask.used(), expected);
+    }
+}

@@ -121,7 +121,11 @@ def test_the_program_is_stopped_by_ctrl_c(scans: Path, tmp_path: Path) -> None:
 
     arguments = [str(PROGRAM), "analyze", str(scans), "--out", str(tmp_path / "out"), "--strain-draws", "1000000"]
     child = subprocess.Popen(arguments, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    time.sleep(1.0)
+    # The interpreter has its own way of stopping until the program has begun.
+    begun = time.monotonic()
+    while not any(tmp_path.iterdir()) and time.monotonic() - begun < WATCHDOG_S:
+        time.sleep(0.05)
+    time.sleep(0.2)
     child.send_signal(signal.SIGINT)
     _, words = child.communicate(timeout=WATCHDOG_S)
     assert child.returncode == 130, words

@@ -321,3 +321,34 @@ fn about_lattice(
         about_fit(file, fit, geometry, caveats);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What of a frame of two columns and three rows, 20 nm × 60 nm, is used; row 0 is the bottom line.
+    fn used(told: &ByHand) -> Vec<bool> {
+        let mut image = Image::new(3, 2, vec![1.0; 6]);
+        leave_out(&mut image, Some([20.0, 60.0]), told).unwrap();
+        image.values.iter().map(|v| v.is_finite()).collect()
+    }
+
+    /// Regions are counted from the lower left corner, x along the lines; masks row by row from the bottom.
+    #[test]
+    fn parts_lie_where_they_were_told() {
+        let region = |corners: [[f64; 2]; 4]| ByHand {
+            regions_nm: vec![corners.to_vec()],
+            ..ByHand::default()
+        };
+        let lowest = region([[0.0, 0.0], [20.0, 0.0], [20.0, 20.0], [0.0, 20.0]]);
+        assert_eq!(used(&lowest), [true, true, false, false, false, false]);
+        let right = region([[10.0, 0.0], [20.0, 0.0], [20.0, 60.0], [10.0, 60.0]]);
+        assert_eq!(used(&right), [false, true, false, true, false, true]);
+        let pixels = [false, false, false, true, true, true];
+        let masked = ByHand {
+            mask: Some(crate::settings::Mask::new(2, 3, &pixels)),
+            ..ByHand::default()
+        };
+        assert_eq!(used(&masked), pixels);
+    }
+}
