@@ -27,19 +27,23 @@ const ROUNDS: usize = 3;
 /// sound. `pitch` is the longer step from pixel to pixel, nm.
 pub(crate) fn dropped(sensor: &Image, pitch: f64) -> Option<(Image, usize)> {
     let limit = limit(sensor, pitch)?;
+    let mut places = off(sensor, limit);
+    if places.is_empty() {
+        return None;
+    }
     let mut left = sensor.clone();
     let mut count = 0;
     for _ in 0..ROUNDS {
-        let off = off(&left, limit);
-        if off.is_empty() {
-            break;
-        }
-        count += off.len();
-        for place in off {
+        count += places.len();
+        for place in places {
             left.values[place] = f64::NAN;
         }
+        places = off(&left, limit);
+        if places.is_empty() {
+            break;
+        }
     }
-    (count > 0).then_some((left, count))
+    Some((left, count))
 }
 
 /// From how far on a sample is off, nm.

@@ -12,8 +12,8 @@ use std::ops::Range;
 use nalgebra::{DMatrix, DVector, Vector2};
 
 use crate::frame::image::Image;
-use crate::frame::plane::fit_plane;
-use crate::numbers::least_squares::{lowest, residual, solve};
+use crate::frame::plane::PlaneFit;
+use crate::numbers::least_squares::{lowest, solve};
 use crate::numbers::median::median;
 
 /// Fewer columns show nothing: the decay takes a tenth of a line, which would be three of them.
@@ -37,6 +37,8 @@ const SHORTEST: f64 = 0.5;
 pub(crate) const FIRST_ORDER_TO: f64 = 0.03;
 /// Lines that are looked at, at most about this many: their mean is then known to a 64th of the noise.
 const MOST_ROWS: usize = 4096;
+/// Columns that are read together: the values of a line lie side by side.
+const PIECE: usize = 8;
 /// The degree of the polynomial, plus one: a cubic, for creep and hysteresis.
 const SMOOTH: usize = 4;
 
@@ -74,32 +76,36 @@ impl Lag {
     }
 }
 
-/// Looks for a lag that explains the whole lines of a sensor, turn-around and all.
-pub(crate) fn find_whole(image: &Image) -> Option<Lag> {
-    let (lag, left, noise) = search(image, &(0..image.columns))?;
-    let exact = NOTHING * lag.bend_nm;
-    (left < EXCESS * noise + exact * exact).then_some(lag)
+/// A lag that was found in some columns, and how well it describes them.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Found {
+    pub(crate) lag: Lag,
+    /// The variance that it leaves in the mean line, nm².
+    left: f64,
+    /// That of the noise of the mean line, nm².
+    noise: f64,
 }
 
-/// Looks for the lag of a sensor in the columns `used`.
-pub(crate) fn find(image: &Image, used: &Range<usize>) -> Option<Lag> {
-    search(image, used).map(|(lag, ..)| lag)
+impl Found {
+    /// Whether it leaves no more than noise: in whole lines it explains the turn-around and all.
+    pub(crate) fn explains_all(&self) -> bool {
+        let exact = NOTHING * self.lag.bend_nm;
+        self.left < EXCESS * self.noise + exact * exact
+    }
 }
 
-/// The lag, the variance that it leaves in the mean line, and that of the noise of the mean line, nm².
-fn search(image: &Image, used: &Range<usize>) -> Option<(Lag, f64, f64)> {
+/// Looks for the lag of a sensor in the columns `used`, whose plane is known.
+pub(crate) fn find(image: &Image, used: &Range<usize>, plane: &PlaneFit) -> Option<Found> {
     if used.len() < FEWEST {
         return None;
     }
-    let (line, noise) = mean_line(image, used)?;
-    let smooth = polynomials(used.len());
-    let plain = residual(&smooth, &line)?;
+    let (line, noise) = mean_line(image, used, plane)?;
+    let smooth = orthonormal(polynomials(used.len()))?;
+    let rest = &line - &smooth * smooth.tr_mul(&line);
+    let plain = rest.norm_squared();
     let mut best: Option<(f64, f64, bool)> = None;
     for from_last in [false, true] {
-        let left = |columns: f64| {
-            let design = with_bend(&smooth, columns, from_last);
-            residual(&design, &line).unwrap_or(f64::INFINITY)
-        };
+        let left = |columns: f64| beside(&smooth, &rest, columns, from_last);
         let columns = lowest(left, [SHORTEST, SLOWEST * used.len() as f64], STEPS);
         let chi2 = left(columns);
         if best.is_none_or(|(least, ..)| chi2 < least) {
@@ -108,13 +114,36 @@ fn search(image: &Image, used: &Range<usize>) -> Option<(Lag, f64, f64)> {
     }
     let (left, columns, from_last) = best?;
     // Two parameters more than the polynomial has; rounding is all that a sensor without noise leaves.
-    let variance = (left / (used.len() - SMOOTH - 2) as f64).max(f64::MIN_POSITIVE);
+    let left_variance = (left / (used.len() - SMOOTH - 2) as f64).max(f64::MIN_POSITIVE);
     let explained = plain - left;
-    if !(explained > SHARE * plain && explained > IMPROVEMENT * variance) {
+    if !(explained > SHARE * plain && explained > IMPROVEMENT * left_variance) {
         return None;
     }
-    let lag = bend(&line, &smooth, columns, from_last, variance)?;
-    Some((lag, variance, noise))
+    let lag = bend(&line, &smooth, columns, from_last, left_variance)?;
+    Some(Found {
+        lag,
+        left: left_variance,
+        noise,
+    })
+}
+
+/// The same columns, upright on each other and of length one; `None` where they cannot be told apart.
+fn orthonormal(columns: DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let width = columns.ncols();
+    let found = columns.qr();
+    (found.r().rank(f64::EPSILON) == width).then(|| found.q())
+}
+
+/// Sum of squares that a bend leaves of a line from which the smooth part was taken.
+fn beside(smooth: &DMatrix<f64>, rest: &DVector<f64>, columns: f64, from_last: bool) -> f64 {
+    let decay = decay(rest.len(), columns, from_last);
+    let own = &decay - smooth * smooth.tr_mul(&decay);
+    let height = own.dot(rest) / own.norm_squared();
+    if height.is_finite() {
+        (rest - own * height).norm_squared()
+    } else {
+        f64::INFINITY
+    }
 }
 
 /// The bend of the decay that was found, and what it does to the slope.
@@ -148,28 +177,44 @@ fn bend(
 
 /// Median of each column about the plane of the sensor, nm, and the variance that noise gives it; `None` where a column has
 /// no values.
-fn mean_line(image: &Image, used: &Range<usize>) -> Option<(DVector<f64>, f64)> {
-    let plane = fit_plane(image, used.clone())?;
+fn mean_line(image: &Image, used: &Range<usize>, plane: &PlaneFit) -> Option<(DVector<f64>, f64)> {
     let mut line = DVector::zeros(used.len());
     let mut noise = 0.0;
-    for (place, column) in used.clone().enumerate() {
-        let mut values: Vec<f64> = (0..image.rows)
-            .step_by(1 + image.rows / MOST_ROWS)
-            .map(|row| image.row(row)[column] - plane.at(column as f64, row as f64))
-            .filter(|v| v.is_finite())
-            .collect();
-        if values.is_empty() {
-            return None;
+    // Lines are read in pieces, and a piece of them is turned into columns.
+    let mut piece: Vec<Vec<f64>> = vec![Vec::new(); PIECE];
+    for first in used.clone().step_by(PIECE) {
+        let last = (first + PIECE).min(used.end);
+        piece.iter_mut().for_each(Vec::clear);
+        for row in (0..image.rows).step_by(1 + image.rows / MOST_ROWS) {
+            let values = &image.row(row)[first..last];
+            for ((column, value), values) in (first..last).zip(values).zip(&mut piece) {
+                let rest = value - plane.at(column as f64, row as f64);
+                if rest.is_finite() {
+                    values.push(rest);
+                }
+            }
         }
-        let middle = median(&mut values);
-        line[place] = middle;
-        let count = values.len() as f64;
-        let mut sizes: Vec<f64> = values.iter().map(|v| (v - middle).abs()).collect();
-        // Of Gaussian noise: σ is 1.4826 of the median size, and the median has π/2 of the variance of the mean.
-        let sigma = 1.4826 * median(&mut sizes);
-        noise += std::f64::consts::FRAC_PI_2 * sigma * sigma / count / used.len() as f64;
+        for (column, values) in (first..last).zip(&mut piece) {
+            if values.is_empty() {
+                return None;
+            }
+            line[column - used.start] = median(values);
+        }
+        // One column of each piece tells the noise.
+        noise += variance_of_median(&mut piece[0]) * (last - first) as f64 / used.len() as f64;
     }
     Some((line, noise))
+}
+
+/// The variance of the median of some values, from their scatter.
+fn variance_of_median(values: &mut [f64]) -> f64 {
+    let middle = median(values);
+    for value in values.iter_mut() {
+        *value = (*value - middle).abs();
+    }
+    // Of Gaussian noise: σ is 1.4826 of the median size, and the median has π/2 of the variance of the mean.
+    let sigma = 1.4826 * median(values);
+    std::f64::consts::FRAC_PI_2 * sigma * sigma / values.len() as f64
 }
 
 /// Columns from where lines begin.
@@ -226,8 +271,14 @@ pub(crate) fn slope(values: &DVector<f64>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::frame::plane::fit_plane;
     use crate::numbers::rng::stream;
     use rand_distr::{Distribution, StandardNormal};
+
+    fn found(image: &Image, used: &Range<usize>) -> Option<Lag> {
+        let plane = fit_plane(image, used.clone())?;
+        find(image, used, &plane).map(|found| found.lag)
+    }
 
     const COLUMNS: usize = 128;
     const PITCH: f64 = 0.8;
@@ -273,7 +324,7 @@ mod tests {
                 };
                 let image = sensor(bend, 0.2, 7);
                 let used = 0..COLUMNS;
-                let lag = find(&image, &used).unwrap();
+                let lag = found(&image, &used).unwrap();
                 assert_eq!(lag.from_last, mirrored);
                 assert!((lag.columns / columns - 1.0).abs() < 0.1, "{lag:?}");
                 // What is taken off changes the slope of plain least squares by exactly that.
@@ -316,7 +367,7 @@ mod tests {
         for (name, shape) in &shapes {
             for seed in 0..20 {
                 let image = sensor(shape, 0.2, seed);
-                assert_eq!(find(&image, &(0..COLUMNS)), None, "{name} {seed}");
+                assert_eq!(found(&image, &(0..COLUMNS)), None, "{name} {seed}");
             }
         }
     }

@@ -1,6 +1,7 @@
 //! Both position sensors of a frame → its [`Geometry`].
 
 use std::borrow::Cow;
+use std::ops::Range;
 
 use nalgebra::{Matrix2, Matrix4, Vector2};
 
@@ -27,7 +28,7 @@ pub struct SensorGeometry {
     /// Plane of the x sensor and of the y sensor, nm.
     pub planes: [PlaneFit; 2],
     /// Columns that were used; those outside belong to the turn-around of the tip.
-    pub columns: std::ops::Range<usize>,
+    pub columns: Range<usize>,
     /// Samples of the x sensor and of the y sensor that are far off and were left out.
     pub glitches: [usize; 2],
     /// How the x sensor and the y sensor lag behind the tip, where their lines show it; planes and steps are free of it.
@@ -62,17 +63,13 @@ fn fitted(x: &Image, y: &Image, taken_off: Option<[Option<Lag>; 2]>) -> Option<S
     let (sensors, glitches) = without_glitches(x, y);
     let (sensors, lags, used) = match taken_off {
         Some(lags) => {
-            let used = straight_columns(&sensors[0], &sensors[1])?;
-            (
-                sensors.each_ref().map(|s| Cow::Borrowed(s.as_ref())),
-                lags,
-                used,
-            )
+            let used = straight_columns(&sensors)?;
+            (sensors, lags, used)
         }
-        None => without_lags(&sensors[0], &sensors[1])?,
+        None => without_lags(sensors)?,
     };
-    let [x, y] = [sensors[0].as_ref(), sensors[1].as_ref()];
-    let planes = [fit_plane(x, used.clone())?, fit_plane(y, used.clone())?];
+    let planes = [sensors[0].plane(&used)?, sensors[1].plane(&used)?];
+    let [x, y] = sensors.each_ref().map(|sensor| sensor.image.as_ref());
     let pixel_to_nm = Matrix2::new(
         planes[0].per_column,
         planes[0].per_row,
@@ -108,77 +105,110 @@ fn fitted(x: &Image, y: &Image, taken_off: Option<[Option<Lag>; 2]>) -> Option<S
 }
 
 /// Step from column to column of each line, nm.
-fn line_slopes([x, y]: [&Image; 2], used: &std::ops::Range<usize>) -> Vec<Vector2<f64>> {
+fn line_slopes([x, y]: [&Image; 2], used: &Range<usize>) -> Vec<Vector2<f64>> {
     let of = |row: usize| {
-        let slope = |image: &Image| slope(used.clone().map(|c| (c, image.row(row)[c])));
+        let slope = |image: &Image| {
+            let mut slope = Slope::default();
+            let values = used.clone().zip(&image.row(row)[used.clone()]);
+            values.for_each(|(column, &value)| slope.add(column, value));
+            slope.value()
+        };
         Some(Vector2::new(slope(x)?, slope(y)?))
     };
     (0..x.rows).filter_map(of).collect()
 }
 
 /// Step from row to row of each column, nm.
-fn column_slopes([x, y]: [&Image; 2], used: &std::ops::Range<usize>) -> Vec<Vector2<f64>> {
-    let of = |c: usize| {
-        let slope = |image: &Image| slope((0..x.rows).map(|row| (row, image.row(row)[c])));
-        Some(Vector2::new(slope(x)?, slope(y)?))
+fn column_slopes([x, y]: [&Image; 2], used: &Range<usize>) -> Vec<Vector2<f64>> {
+    let of = |image: &Image| {
+        let mut sums = vec![Slope::default(); used.len()];
+        for row in 0..image.rows {
+            for (sum, &value) in sums.iter_mut().zip(&image.row(row)[used.clone()]) {
+                sum.add(row, value);
+            }
+        }
+        sums
     };
-    used.clone().filter_map(of).collect()
+    let pairs = of(x).into_iter().zip(of(y));
+    pairs
+        .filter_map(|(x, y)| Some(Vector2::new(x.value()?, y.value()?)))
+        .collect()
+}
+
+/// A sensor, and the plane through all of it.
+struct Sensor<'a> {
+    image: Cow<'a, Image>,
+    whole: Option<PlaneFit>,
+}
+
+impl<'a> Sensor<'a> {
+    fn new(image: Cow<'a, Image>) -> Self {
+        let whole = fit_plane(&image, 0..image.columns);
+        Self { image, whole }
+    }
+
+    /// The plane through the columns `used`.
+    fn plane(&self, used: &Range<usize>) -> Option<PlaneFit> {
+        if *used == (0..self.image.columns) {
+            self.whole
+        } else {
+            fit_plane(&self.image, used.clone())
+        }
+    }
+
+    /// What it is without its lag in the columns `used`.
+    fn without(self, lag: Option<Lag>, used: &Range<usize>) -> Self {
+        match lag {
+            Some(lag) => Self::new(Cow::Owned(lag.taken_off(&self.image, used))),
+            None => self,
+        }
+    }
 }
 
 /// Both sensors without the samples that are far off, and how many those are.
-fn without_glitches<'a>(x: &'a Image, y: &'a Image) -> ([Cow<'a, Image>; 2], [usize; 2]) {
-    let sensors = [x, y];
-    let planes = sensors.map(|sensor| fit_plane(sensor, 0..sensor.columns));
-    let steps = planes.iter().flatten();
-    let pitch = steps.fold(0.0f64, |longest, plane| {
+fn without_glitches<'a>(x: &'a Image, y: &'a Image) -> ([Sensor<'a>; 2], [usize; 2]) {
+    let sensors = [x, y].map(|sensor| Sensor::new(Cow::Borrowed(sensor)));
+    let planes = sensors.iter().filter_map(|sensor| sensor.whole);
+    let pitch = planes.fold(0.0f64, |longest, plane| {
         longest.max(plane.per_column.abs()).max(plane.per_row.abs())
     });
-    let found = sensors.map(|sensor| glitches::dropped(sensor, pitch));
-    let count = |n: usize| found[n].as_ref().map_or(0, |(_, count)| *count);
-    let counts = [count(0), count(1)];
-    let mut left = found.into_iter();
-    let sound = sensors.map(|sensor| match left.next().flatten() {
-        Some((without, _)) => Cow::Owned(without),
-        None => Cow::Borrowed(sensor),
+    let mut counts = [0; 2];
+    let mut each = counts.iter_mut();
+    let sound = sensors.map(|sensor| {
+        let found = glitches::dropped(&sensor.image, pitch);
+        match (found, each.next()) {
+            (Some((without, dropped)), Some(count)) => {
+                *count = dropped;
+                Sensor::new(Cow::Owned(without))
+            }
+            _ => sensor,
+        }
     });
     (sound, counts)
 }
 
 /// Two sensors without their lags, and the columns in which they are straight.
-type Straight<'a> = (
-    [Cow<'a, Image>; 2],
-    [Option<Lag>; 2],
-    std::ops::Range<usize>,
-);
+type Straight<'a> = ([Sensor<'a>; 2], [Option<Lag>; 2], Range<usize>);
 
 /// A lag that explains whole lines is taken off first; of any other bend what is not straight is left out, and a lag is
 /// looked for in the rest.
-fn without_lags<'a>(x: &'a Image, y: &'a Image) -> Option<Straight<'a>> {
-    let whole = [x, y].map(lag::find_whole);
-    let every = 0..x.columns;
-    let x = straight(Cow::Borrowed(x), whole[0], &every);
-    let y = straight(Cow::Borrowed(y), whole[1], &every);
-    let used = straight_columns(&x, &y)?;
-    let rest = |sensor, whole: Option<Lag>| match whole {
+fn without_lags(sensors: [Sensor<'_>; 2]) -> Option<Straight<'_>> {
+    let every = 0..sensors[0].image.columns;
+    let find = |sensor: &Sensor<'_>, used| lag::find(&sensor.image, used, &sensor.plane(used)?);
+    let seen = sensors.each_ref().map(|sensor| find(sensor, &every));
+    let whole = seen.map(|seen| seen.filter(lag::Found::explains_all).map(|seen| seen.lag));
+    let [x, y] = sensors;
+    let sensors = [x.without(whole[0], &every), y.without(whole[1], &every)];
+    let used = straight_columns(&sensors)?;
+    let rest = [0, 1].map(|axis| match whole[axis] {
         Some(_) => None,
-        None => lag::find(sensor, &used),
-    };
-    let rest = [rest(&x, whole[0]), rest(&y, whole[1])];
+        None if used == every => seen[axis].map(|seen| seen.lag),
+        None => find(&sensors[axis], &used).map(|found| found.lag),
+    });
     let lags = [whole[0].or(rest[0]), whole[1].or(rest[1])];
-    let sensors = [straight(x, rest[0], &used), straight(y, rest[1], &used)];
+    let [x, y] = sensors;
+    let sensors = [x.without(rest[0], &used), y.without(rest[1], &used)];
     Some((sensors, lags, used))
-}
-
-/// A sensor without its lag in the columns `used`.
-fn straight<'a>(
-    sensor: Cow<'a, Image>,
-    lag: Option<Lag>,
-    used: &std::ops::Range<usize>,
-) -> Cow<'a, Image> {
-    match lag {
-        Some(lag) => Cow::Owned(lag.taken_off(&sensor, used)),
-        None => sensor,
-    }
 }
 
 impl SensorGeometry {
@@ -199,20 +229,13 @@ impl SensorGeometry {
 
 /// The columns in which the tip moves straight: the mean line of either sensor follows the line
 /// fitted to its inner part. Turn-around shows as a run of deviating columns at an edge.
-fn straight_columns(x: &Image, y: &Image) -> Option<std::ops::Range<usize>> {
-    let columns = x.columns;
+fn straight_columns(sensors: &[Sensor<'_>; 2]) -> Option<Range<usize>> {
+    let columns = sensors[0].image.columns;
     let margin = (TURN_AROUND * columns as f64) as usize;
     let (mut first, mut last) = (0, columns);
-    for image in [x, y] {
-        let inner = fit_plane(image, margin..columns - margin)?;
-        let mut deviation = vec![0.0; columns];
-        for (c, d) in deviation.iter_mut().enumerate() {
-            let values: Vec<f64> = (0..image.rows)
-                .map(|row| image.row(row)[c] - inner.at(c as f64, row as f64))
-                .filter(|r| r.is_finite())
-                .collect();
-            *d = values.iter().sum::<f64>() / values.len().max(1) as f64;
-        }
+    for sensor in sensors {
+        let inner = fit_plane(&sensor.image, margin..columns - margin)?;
+        let deviation = column_means(&sensor.image, &inner);
         let inside = &deviation[margin..columns - margin];
         let rms = (inside.iter().map(|d| d * d).sum::<f64>() / inside.len() as f64).sqrt();
         // Half a pixel of deviation is turn-around even on a sensor without noise.
@@ -225,21 +248,52 @@ fn straight_columns(x: &Image, y: &Image) -> Option<std::ops::Range<usize>> {
     Some(first..last)
 }
 
-/// Least-squares slope of (index, value) pairs, missing values left out.
-fn slope(points: impl Iterator<Item = (usize, f64)>) -> Option<f64> {
-    let (mut n, mut sx, mut sxx, mut sv, mut sxv) = (0.0, 0.0, 0.0, 0.0, 0.0);
-    for (i, v) in points {
-        if v.is_finite() {
-            let x = i as f64;
-            n += 1.0;
-            sx += x;
-            sxx += x * x;
-            sv += v;
-            sxv += x * v;
+/// The mean of each column about a plane; 0 of a column without values.
+fn column_means(image: &Image, plane: &PlaneFit) -> Vec<f64> {
+    let mut sums = vec![0.0; image.columns];
+    let mut counts = vec![0usize; image.columns];
+    for row in 0..image.rows {
+        let places = sums.iter_mut().zip(&mut counts).zip(image.row(row));
+        for (column, ((sum, count), value)) in places.enumerate() {
+            let rest = value - plane.at(column as f64, row as f64);
+            if rest.is_finite() {
+                *sum += rest;
+                *count += 1;
+            }
         }
     }
-    let spread = n * sxx - sx * sx;
-    (n >= 3.0 && spread > 0.0).then(|| (n * sxv - sx * sv) / spread)
+    let counts = counts.iter().map(|&count| count.max(1) as f64);
+    sums.iter().zip(counts).map(|(sum, n)| sum / n).collect()
+}
+
+/// Least-squares slope of values over their indices; missing values are left out.
+#[derive(Clone, Copy, Default)]
+struct Slope {
+    count: f64,
+    x: f64,
+    xx: f64,
+    v: f64,
+    xv: f64,
+}
+
+impl Slope {
+    fn add(&mut self, index: usize, v: f64) {
+        if v.is_finite() {
+            let x = index as f64;
+            self.count += 1.0;
+            self.x += x;
+            self.xx += x * x;
+            self.v += v;
+            self.xv += x * v;
+        }
+    }
+
+    /// `None` of fewer than three values.
+    fn value(&self) -> Option<f64> {
+        let spread = self.count * self.xx - self.x * self.x;
+        let known = self.count >= 3.0 && spread > 0.0;
+        known.then(|| (self.count * self.xv - self.x * self.v) / spread)
+    }
 }
 
 /// Covariance of `J` from what repeats: the fast step from line to line, the slow step from the
@@ -248,7 +302,7 @@ fn covariance(
     line_slopes: &[Vector2<f64>],
     sensors: [&Image; 2],
     planes: &[PlaneFit; 2],
-    columns: &std::ops::Range<usize>,
+    columns: &Range<usize>,
 ) -> Matrix4<f64> {
     let mut c = Matrix4::zeros();
     for (axis, (image, plane)) in sensors.into_iter().zip(planes).enumerate() {
@@ -262,14 +316,7 @@ fn covariance(
             c[(axis, axis)] = variance * correlated(&slopes) / n;
         }
         let means: Vec<f64> = (0..image.rows)
-            .map(|row| {
-                let values: Vec<f64> = columns
-                    .clone()
-                    .map(|col| image.row(row)[col] - plane.at(col as f64, row as f64))
-                    .filter(|r| r.is_finite())
-                    .collect();
-                values.iter().sum::<f64>() / values.len() as f64
-            })
+            .map(|row| line_mean(image, plane, columns, row))
             .filter(|m| m.is_finite())
             .collect();
         let n = means.len() as f64;
@@ -280,6 +327,19 @@ fn covariance(
         }
     }
     c
+}
+
+/// The mean of a line about a plane; NaN of a line without values.
+fn line_mean(image: &Image, plane: &PlaneFit, columns: &Range<usize>, row: usize) -> f64 {
+    let (mut sum, mut count) = (0.0, 0usize);
+    for (column, value) in columns.clone().zip(&image.row(row)[columns.clone()]) {
+        let rest = value - plane.at(column as f64, row as f64);
+        if rest.is_finite() {
+            sum += rest;
+            count += 1;
+        }
+    }
+    sum / count as f64
 }
 
 /// By how much correlation between successive residuals raises the variance of their mean:
