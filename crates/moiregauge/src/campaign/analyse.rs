@@ -13,6 +13,7 @@ use crate::campaign::{combine, group, identity, samples};
 use crate::caveat::files::FileDoubt;
 use crate::caveat::lattices::LatticeDoubt;
 use crate::caveat::moires::MoireDoubt;
+use crate::caveat::sets::SetDoubt;
 use crate::caveat::{Caveat, Doubt};
 use crate::frame::background::Background;
 use crate::scan::measured::MeasuredScan;
@@ -95,11 +96,17 @@ pub fn refusal(analysis: &Analysis) -> Option<&Caveat> {
     all()
         .find(|c| is_nothing_left(&c.doubt))
         .or_else(|| all().find(|c| is_impossible(&c.doubt)))
+        .or_else(|| all().find(|c| is_doubtful(&c.doubt)))
 }
 
 /// Whether a doubt says that every scan was left out.
 pub fn is_nothing_left(doubt: &Doubt) -> bool {
     matches!(doubt, Doubt::Files(FileDoubt::EverythingExcluded { .. }))
+}
+
+/// Whether a doubt says that the lattice may be none.
+fn is_doubtful(doubt: &Doubt) -> bool {
+    matches!(doubt, Doubt::Sets(SetDoubt::LatticeDoubtful { .. }))
 }
 
 /// Whether a doubt says that the layers cannot make the lattice.

@@ -6,6 +6,17 @@ use crate::caveat::explained::explain;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SetDoubt {
+    /// A lattice so faint that it may be none.
+    #[error(
+        "the lattice is so faint (signal-to-noise ratio {signal_to_noise:.1}) that terrain or noise may look like it, and {scans} \
+         of 3 frames that could confirm each other show it: its vectors are given, twist and strain of the set are not"
+    )]
+    LatticeDoubtful {
+        /// Amplitude over noise of the weakest first wave, in the plainest image.
+        signal_to_noise: f64,
+        /// Frames that show it.
+        scans: usize,
+    },
     /// Scans scatter by more than their errors.
     #[error("{}", scattered(*.of, *.chi2_per_dof))]
     Scatter {
@@ -135,6 +146,11 @@ fn scattered(of: Scattered, chi2_per_dof: f64) -> String {
 }
 
 explain! { SetDoubt:
+    LatticeDoubtful "lattice-doubtful" Serious
+        "The lattice that was found is so faint that rough terrain or noise may look like it, and fewer than three frames \
+         show it. There is no result for the set."
+        "Look at the figure of the scan: is there a lattice? Then say which (its wavelength is enough), or take more \
+         frames. Otherwise there is none."
     Scatter "scatter" Warning
         "The scans of a set differ from each other by more than their errors say. The errors of the set were enlarged to \
          match."

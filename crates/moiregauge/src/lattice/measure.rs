@@ -2,8 +2,11 @@
 
 use nalgebra::Vector2;
 
+use crate::coverage::find::{WHOLE, pitch, same};
 use crate::coverage::finer::finer;
-use crate::frame::background::Background;
+use crate::coverage::settle::settle;
+use crate::frame::background::{Background, remove_background};
+use crate::frame::clip::cut_off;
 use crate::frame::geometry::Geometry;
 use crate::frame::image::Image;
 use crate::lattice::fit::noise::ForeignWave;
@@ -47,9 +50,31 @@ pub fn measure(
     let another = Start::find_patch(image, geometry, background, Some(pair))
         .and_then(|start| start.measure(method).ok())
         .filter(|other| beside(other).is_none_or(|wave| !is_stronger(other, &wave)));
-    another.ok_or_else(|| LatticeError::Contradicted {
-        period: period(&wave, geometry),
-    })
+    match another {
+        Some(other) => Ok(other),
+        // A step, a slope or stripes below a lattice that every part of the frame shows.
+        None if is_plain_everywhere(&found, image, geometry, background) => Ok(found),
+        None => Err(LatticeError::Contradicted {
+            period: period(&wave, geometry),
+        }),
+    }
+}
+
+/// Whether every part of the frame shows the waves of a lattice, each far above the noise.
+fn is_plain_everywhere(
+    found: &MeasuredLattice,
+    image: &Image,
+    geometry: &Geometry,
+    background: Background,
+) -> bool {
+    let flat = cut_off(&remove_background(image, background));
+    let size = [image.columns, image.rows];
+    found.patch.is_none()
+        && settle(&flat, &found.reciprocal, pitch(geometry)).is_some_and(|settled| {
+            let patch = &settled.patch;
+            let there = same(size, &patch.pair, &found.reciprocal);
+            there && patch.share > WHOLE && settled.is_plain()
+        })
 }
 
 /// Whether a wave can be that of the lattice that was meant: atoms, which are much shorter, and background are none.

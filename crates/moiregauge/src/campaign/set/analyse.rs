@@ -10,6 +10,7 @@ use crate::campaign::Checks;
 use crate::campaign::analysis::{Drift, DriftFit, ScanAnalysis, SetAnalysis, SetMean};
 use crate::campaign::group::Group;
 use crate::campaign::set::about::{about_checks, about_mean, about_readings, about_residual};
+use crate::campaign::set::faint::too_faint;
 use crate::campaign::set::headers::{about_dates, about_headers};
 use crate::campaign::set::moire::moire;
 use crate::campaign::set::scan::{plain_mean, scan_analysis};
@@ -79,10 +80,22 @@ pub(crate) fn analyse_set(
         published::draw_all(&mut scans, measured, &seen, drift, settings, first_index);
     }
     let pitch = pitch_error(&used);
-    let uncorrected = without_drift(&all, &scans, kept.len(), &pitch, settings, strengths);
-    let mean = solved
-        .as_ref()
-        .and_then(|solved| at_drift(solved, &scans, &pitch, settings, strengths));
+    // What is told by hand is known to be there.
+    let faint = too_faint(&used).filter(|_| !settings.by_hand.says_which());
+    let (mut uncorrected, mut mean) = (None, None);
+    if let Some(signal_to_noise) = faint {
+        let scans = used.len();
+        let doubt = SetDoubt::LatticeDoubtful {
+            signal_to_noise,
+            scans,
+        };
+        caveats.push(Caveat::new(doubt, name));
+    } else {
+        uncorrected = without_drift(&all, &scans, kept.len(), &pitch, settings, strengths);
+        mean = solved
+            .as_ref()
+            .and_then(|solved| at_drift(solved, &scans, &pitch, settings, strengths));
+    }
     let set = SetAnalysis {
         name: name.clone(),
         slow_axis: group.slow_axis,
