@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
-use moiregauge::settings::Settings;
+use moiregauge::settings::{ByHand, Settings};
 use moiregauge_pipeline::campaign::{AnalyseError, Campaign};
 use moiregauge_pipeline::{Cancel, Event, Events, Job, Quiet};
 use small::{campaign, document, scans, settings};
@@ -130,6 +130,26 @@ fn a_growing_campaign_is_a_new_one() {
         fresh(&scans[1..], &method)
     );
     assert_eq!(growing.kept().len(), 9);
+    // So is what was told by hand: where the lattice is.
+    let half = vec![
+        [-500.0, -500.0],
+        [0.0, -500.0],
+        [0.0, 500.0],
+        [-500.0, 500.0],
+    ];
+    let region = Settings {
+        by_hand: ByHand {
+            regions_nm: vec![half],
+            ..ByHand::default()
+        },
+        ..method.clone()
+    };
+    let mut told = growing.clone().with_settings(region.clone()).unwrap();
+    assert_eq!(
+        document(&told.analyse(&job).unwrap()),
+        fresh(&scans[1..], &region)
+    );
+    assert_eq!(told.kept().len(), 13);
     // A file that was replaced is another one.
     std::fs::copy(&scans[2], &scans[1]).unwrap();
     assert_eq!(

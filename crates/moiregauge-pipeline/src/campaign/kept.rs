@@ -102,29 +102,63 @@ impl TryFrom<Document> for Kept {
     }
 }
 
+/// The settings that measuring depends on. Every one is named here, so that a new one is not forgotten.
+fn measuring(settings: &Settings) -> Settings {
+    let Settings {
+        channel,
+        image,
+        line,
+        method,
+        background,
+        by_hand,
+        moires,
+        scanner,
+        // What is chosen after measuring changes no measured scan.
+        material: _,
+        substrate: _,
+        moire_layers: _,
+        layers_chosen: _,
+        lattice_angle: _,
+        twist_sense: _,
+        moire_waves: _,
+        strain_convention: _,
+        grouping: _,
+        frame_time_sigma_s: _,
+        exclude: _,
+        exclude_outliers: _,
+        overlap: _,
+        drift: _,
+        calibration: _,
+        isotropic_strain_percent: _,
+        drift_draws: _,
+        strain_draws: _,
+        seed: _,
+    } = settings;
+    Settings {
+        channel: channel.clone(),
+        image: *image,
+        line: *line,
+        method: *method,
+        background: *background,
+        by_hand: by_hand.clone(),
+        moires: *moires,
+        scanner: scanner.clone(),
+        ..Settings::default()
+    }
+}
+
 /// What measuring depends on beside the file: one hash for all files of a campaign.
 pub(super) struct With(Sha256);
 
 impl With {
     /// Of settings, what is known of all files, and the region.
     pub(super) fn new(settings: &Settings, known: &Known, window: Option<&Window>) -> Self {
-        // What is chosen after measuring changes no measured scan.
-        let measuring = Settings {
-            channel: settings.channel.clone(),
-            image: settings.image,
-            line: settings.line,
-            method: settings.method,
-            background: settings.background,
-            moires: settings.moires,
-            scanner: settings.scanner.clone(),
-            ..Settings::default()
-        };
         let mut hash = Sha256::new();
         let told = known.told();
         let mut add = |part: &dyn std::fmt::Debug| hash.update(format!("{part:?}\n"));
         add(&SCHEMA);
         add(&env!("CARGO_PKG_VERSION"));
-        add(&measuring);
+        add(&measuring(settings));
         add(told);
         add(&window);
         if let Some(sensors) = &told.sensors {
