@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use anyhow::ensure;
+use clap::builder::Resettable;
 use moiregauge_pipeline::watch::{Until, WatchRequest};
 
 use super::duration;
@@ -41,7 +42,8 @@ const NOT_HERE: [&str; 15] = [
 #[command(
     override_usage = "moiregauge watch [OPTIONS] <PATH>",
     mut_args(hidden),
-    mut_arg("paths", |path| path.help("The folder into which the microscope saves").long_help(None)),
+    mut_arg("paths", |path| path.help("The folder into which the microscope saves").long_help(None)
+        .required_unless_present(Resettable::Reset).required(true).num_args(1)),
     mut_arg("json", |json| json.help("Print one JSON object a line for each new result, and nothing else, on standard \
         output; what is not known is null").long_help(None)),
     after_long_help = "\
@@ -84,7 +86,7 @@ pub(crate) struct WatchArgs {
 fn hidden(arg: clap::Arg) -> clap::Arg {
     let is_not_here = NOT_HERE.iter().any(|name| arg.get_id() == name);
     if is_not_here {
-        arg.hide(true).required(false)
+        arg.hide(true).required_unless_present(Resettable::Reset)
     } else {
         arg
     }

@@ -11,6 +11,9 @@ use super::next::Next;
 use super::until::UntilState;
 use super::warnings::Warning;
 
+/// Name and version of a line.
+pub(super) const SCHEMA: &str = "moiregauge/watch/1";
+
 /// What happened to a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -106,6 +109,8 @@ impl LineDrift {
 /// The state after something happened to files: the numbers of the set to which the file belongs, by all its frames.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Line {
+    /// `moiregauge/watch/1`.
+    pub schema: String,
     /// What happened.
     pub event: Happened,
     /// The file, the last by time of several; as in `results.json`. `null` where it is about the folder.
@@ -152,6 +157,7 @@ pub struct Line {
 impl Line {
     pub(super) fn empty(event: Happened, files: Vec<String>) -> Self {
         Self {
+            schema: SCHEMA.to_owned(),
             event,
             file: files.last().cloned(),
             files,
