@@ -6,12 +6,10 @@ use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
 
-use moiregauge::settings::Settings;
 use moiregauge::simulate::{Simulation, Simulator};
-use moiregauge_pipeline::campaign::Campaign;
 use moiregauge_pipeline::watch::{Happened, Line, Until, Watch, WatchRequest};
 use moiregauge_pipeline::{Job, find};
-use small::{document, scans, settings};
+use small::{campaign, document, scans, settings};
 use tempfile::TempDir;
 
 /// A folder that is watched, and another one with the frames that come into it.
@@ -76,19 +74,12 @@ impl Scene {
         (0..3).flat_map(|_| self.look()).collect()
     }
 
-    /// The document of an analysis of the folder.
-    fn analysed(&self, settings: &Settings) -> String {
-        let (inputs, left_out) = find(&[self.folder.path().to_owned()]).frames();
-        let mut campaign = Campaign::new(settings.clone())
-            .unwrap()
-            .with_left_out(left_out);
-        campaign.add(inputs);
-        document(&campaign.analyse(&self.job).unwrap())
-    }
-
     /// The numbers are those of an analysis of the folder as it is, to the last bit.
     fn is_as_analysed(&self) {
-        assert_eq!(document(self.watch.outcomes()), self.analysed(&settings()));
+        let (inputs, left_out) = find(&[self.folder.path().to_owned()]).frames();
+        let mut fresh = campaign(&inputs).with_left_out(left_out);
+        let fresh = document(&fresh.analyse(&self.job).unwrap());
+        assert_eq!(document(self.watch.outcomes()), fresh);
     }
 }
 
@@ -321,7 +312,7 @@ fn own_results_are_left_alone_and_a_new_watch_goes_on() {
     scene.settle();
     let results = scene.folder.path().join("results");
     std::fs::create_dir(&results).unwrap();
-    std::fs::copy(&scene.frames[3], results.join("corrected.spm")).unwrap();
+    std::fs::copy(&scene.frames[3], results.join("aligned.spm")).unwrap();
     assert!(scene.settle().is_empty());
     let kept = serde_json::to_string(scene.watch.kept()).unwrap();
     let before = document(scene.watch.outcomes());
@@ -336,7 +327,7 @@ fn own_results_are_left_alone_and_a_new_watch_goes_on() {
     );
     assert_eq!(document(scene.watch.outcomes()), before);
     assert_eq!(scene.watch.kept().len(), count);
-    assert!(!serde_json::to_string(&lines).unwrap().contains("corrected"));
+    assert!(!serde_json::to_string(&lines).unwrap().contains("aligned"));
 }
 
 /// The line is of the set that got the frame, and says what changed.

@@ -182,17 +182,16 @@ fn files_change_and_the_watch_goes_on() {
     (0..3).for_each(|number| arrive(&made, &watched, number));
     let watching = Watching::json(&watched, &["--patience", "500ms"]);
     assert_eq!(watching.next()["frames"], 3);
+    // Results beside the scans are none.
+    let out = watched.join("results");
+    succeed(analyze(&watched, &out).args(["--export", "corrected.gwy"]));
     // Truncated, then written again with another frame.
     let place = watched.join(name(2));
     std::fs::write(&place, "").expect("written");
     std::thread::sleep(Duration::from_millis(150));
     std::fs::copy(made.join(name(3)), &place).expect("copied");
-    let again = loop {
-        let line = watching.next();
-        if line["event"] == "again" {
-            break line;
-        }
-    };
+    let again = watching.next();
+    assert_eq!(again["event"], "again");
     assert_eq!(again["frames"], 3);
     std::fs::write(watched.join("bad.spm"), "x").expect("written");
     let bad = watching.next();

@@ -22,7 +22,7 @@ pub(super) type Whole<'a> = &'a (dyn Fn(&Path) -> Result<(), String> + Sync);
 pub(super) struct Files {
     folder: PathBuf,
     patience: usize,
-    files: BTreeMap<PathBuf, File>,
+    listed: BTreeMap<PathBuf, File>,
     /// Why the folder could not be listed, if it could not.
     lost: Option<String>,
 }
@@ -73,7 +73,7 @@ impl Files {
         Self {
             folder: folder.to_owned(),
             patience: patience.max(1),
-            files: BTreeMap::new(),
+            listed: BTreeMap::new(),
             lost: None,
         }
     }
@@ -104,7 +104,7 @@ impl Files {
 
     /// Files that are listed no more.
     fn forget(&mut self, listed: &BTreeMap<PathBuf, Stamp>, seen: &mut Seen) {
-        self.files.retain(|path, file| {
+        self.listed.retain(|path, file| {
             file.missing = if listed.contains_key(path) {
                 0
             } else {
@@ -120,8 +120,8 @@ impl Files {
 
     /// A file that is listed.
     fn one(&mut self, path: PathBuf, stamp: Stamp, whole: Whole, seen: &mut Seen) {
-        let Some(file) = self.files.get_mut(&path).filter(|f| f.stamp == stamp) else {
-            let again = self.files.get(&path);
+        let Some(file) = self.listed.get_mut(&path).filter(|f| f.stamp == stamp) else {
+            let again = self.listed.get(&path);
             let was_scan = again.is_some_and(|f| !matches!(f.state, State::Other));
             let words = if was_scan {
                 "it is being written anew"
@@ -134,7 +134,7 @@ impl Files {
                 missing: 0,
                 state: State::Waiting(words.to_owned()),
             };
-            self.files.insert(path, new);
+            self.listed.insert(path, new);
             return;
         };
         file.unchanged += 1;
@@ -168,14 +168,14 @@ impl Files {
     /// What is there after the step.
     fn collect(&self, seen: &mut Seen) {
         let mut scans = Vec::new();
-        for (path, file) in &self.files {
+        for (path, file) in &self.listed {
             match &file.state {
                 State::Whole(format) | State::GivenUp(Some(format), _) => {
-                    scans.push((path.clone(), *format))
+                    scans.push((path.clone(), *format));
                 }
                 State::GivenUp(None, reason) => seen.left_out.push(failed(path, reason.clone())),
                 State::Waiting(reason) if might_be_scan(path, file) => {
-                    seen.waiting.push(failed(path, reason.clone()))
+                    seen.waiting.push(failed(path, reason.clone()));
                 }
                 State::Waiting(_) | State::Other => {}
             }

@@ -153,8 +153,8 @@ pub struct Line {
     pub error: Option<String>,
 }
 
-/// A line without numbers.
 impl Line {
+    /// A line without numbers.
     pub(super) fn empty(event: Happened, files: Vec<String>) -> Self {
         Self {
             schema: SCHEMA.to_owned(),

@@ -14,8 +14,9 @@ use super::until::UntilState;
 use super::warnings;
 use crate::campaign::{Advice, AnalyseError, Campaign, Kept, Outcome, in_words as error_in_words};
 use crate::job::{Cancelled, Job};
+use crate::known::Known;
 use crate::names::{in_full, in_words};
-use crate::opened::{InputError, Opened};
+use crate::opened::Opened;
 
 /// Errors that two more frames make smaller by less than this share are hardly worth the time of two frames.
 const HARDLY: f64 = 0.05;
@@ -114,7 +115,13 @@ impl Watch {
         job.check()?;
         let mut seen = {
             let (files, campaign, advice) = (&mut self.files, &self.campaign, self.advice);
-            let whole = |path: &Path| is_whole(path, campaign, advice);
+            // Whether all is there depends on no other file.
+            let known = Known::new(campaign.told(), &[]);
+            let whole = |path: &Path| {
+                let read = Opened::new(path, &known).and_then(|o| o.reading(campaign.settings()));
+                read.map(drop)
+                    .map_err(|error| error_in_words(&error, advice))
+            };
             job.run(|| files.look(&whole))?
         };
         if let Some(before) = self.untold.take() {
@@ -252,16 +259,6 @@ fn nothing(happened: &Happenings, seen: &Seen, error: &AnalyseError) -> Vec<Line
         line
     };
     happened.iter().map(of).collect()
-}
-
-/// Whether all is there that an analysis reads.
-fn is_whole(path: &Path, campaign: &Campaign, advice: Advice) -> Result<(), String> {
-    let known = campaign.known();
-    let read = || -> Result<(), InputError> {
-        Opened::new(path, &known)?.reading(campaign.settings())?;
-        Ok(())
-    };
-    read().map_err(|error| error_in_words(&error, advice))
 }
 
 impl Seen {
