@@ -29,9 +29,11 @@ mod settings_file;
 pub mod simulate;
 pub mod sink;
 mod source;
+mod stamp;
 mod told;
 mod twice;
 pub mod validate;
+pub mod watch;
 
 pub use calibrate::calibrate;
 pub use content::Content;
