@@ -155,6 +155,7 @@ fn measuring(settings: &Settings) -> Settings {
         moire_layers: _,
         layers_chosen: _,
         lattice_angle: _,
+        lattice_angle_2: _,
         twist_sense: _,
         moire_waves: _,
         strain_convention: _,
