@@ -1,0 +1,192 @@
+//! What files hold, to be looked at: channels in little, blocks of their pixels, their spectrum.
+
+use std::path::Path;
+
+use moiregauge::frame::{Background, Image, remove_background};
+use moiregauge_report::{ColorMap, ReportError, thumbnail};
+use spmfile::{Channel, ReadError, Scan};
+
+use crate::known::{Known, KnownError};
+use crate::opened::InputError;
+
+/// Values of an image as they are shown, in single precision.
+#[derive(Clone, Debug, PartialEq)]
+pub struct View {
+    /// Number of columns.
+    pub columns: usize,
+    /// Number of rows.
+    pub rows: usize,
+    /// Row by row from the bottom; NaN where nothing was recorded.
+    pub values: Vec<f32>,
+    /// Unit of the values.
+    pub unit: String,
+    /// From one value to the next along a row and along a column, nm; none without a size.
+    pub pixel_nm: Option<[f64; 2]>,
+}
+
+/// A part of an image, pixels from the lower left corner.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Part {
+    /// First column.
+    pub column: usize,
+    /// First row, from the bottom.
+    pub row: usize,
+    /// Number of columns; none: to the right edge.
+    pub columns: Option<usize>,
+    /// Number of rows; none: to the top.
+    pub rows: Option<usize>,
+    /// Pixels along the side of the blocks that are averaged; 0 is 1.
+    pub step: usize,
+}
+
+/// Everything that a file holds, as [`crate::inspect`] lists it: of a damaged file what can be read.
+///
+/// # Errors
+/// It cannot be read, or is no scan.
+pub fn whole(path: &Path, known: &Known) -> Result<Scan, InputError> {
+    if let Some(held) = known.in_memory(path) {
+        return Ok((*held.scan()).clone());
+    }
+    let content = known.source(path).content()?;
+    let mut scan = match known.decode(path, &content, &|_| true) {
+        Err(ReadError::Incomplete { readable, .. }) => *readable,
+        other => other?,
+    };
+    // What is wrong with that is told beside the channels.
+    let _: Result<_, KnownError> = known.complete(path, &mut scan);
+    Ok(scan)
+}
+
+/// Means over blocks of a part of a channel. Blocks at the right and upper edge may hold less; one of which less than
+/// half is there is missing.
+pub fn blocks(channel: &Channel, part: &Part) -> View {
+    let step = part.step.max(1);
+    let end = |first: usize, wanted: Option<usize>, all: usize| {
+        wanted.map_or(all, |n| first.saturating_add(n)).min(all)
+    };
+    let [left, bottom] = [part.column.min(channel.columns), part.row.min(channel.rows)];
+    let right = end(left, part.columns, channel.columns);
+    let top = end(bottom, part.rows, channel.rows);
+    let columns = (right - left).div_ceil(step);
+    let rows = (top - bottom).div_ceil(step);
+    let mut values = Vec::with_capacity(columns * rows);
+    for first in (bottom..top).step_by(step) {
+        let lines = first..(first + step).min(top);
+        let all = channel.lines(lines);
+        let lines: Vec<&[f64]> = all
+            .chunks(channel.columns)
+            .map(|l| &l[left..right])
+            .collect();
+        values.extend((0..columns).map(|block| mean(&lines, block * step, step)));
+    }
+    View {
+        columns,
+        rows,
+        values,
+        unit: channel.plain_unit(),
+        pixel_nm: channel.pitch_nm().map(|p| p.map(|nm| nm * step as f64)),
+    }
+}
+
+fn mean(lines: &[&[f64]], from: usize, step: usize) -> f32 {
+    let (mut sum, mut count, mut all) = (0.0, 0_usize, 0_usize);
+    for line in lines {
+        let block = &line[from..(from + step).min(line.len())];
+        all += block.len();
+        for value in block.iter().filter(|v| v.is_finite()) {
+            sum += value;
+            count += 1;
+        }
+    }
+    if 2 * count >= all && count > 0 {
+        (sum / count as f64) as f32
+    } else {
+        f32::NAN
+    }
+}
+
+/// A channel in little, a plane taken off, as PNG; `side` is the number of pixels along the longer side.
+///
+/// # Errors
+/// None in practice: everything is written into memory.
+pub fn little(channel: &Channel, side: usize, colours: ColorMap) -> Result<Vec<u8>, ReportError> {
+    let longer = channel.rows.max(channel.columns);
+    let view = blocks(
+        channel,
+        &Part {
+            step: longer.div_ceil(side.max(1)),
+            ..Part::default()
+        },
+    );
+    let values = view.values.iter().map(|v| f64::from(*v)).collect();
+    let image = Image::new(view.rows, view.columns, values);
+    let level = remove_background(&image, Background::Plane);
+    thumbnail(&level, side, colours)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use spmfile::Samples;
+
+    fn channel(columns: usize, rows: usize) -> Channel {
+        let text = vec!["0 0"; 2].join("\n");
+        let options = spmfile::arrays::ArrayOptions::default();
+        let read = spmfile::arrays::read(text.as_bytes(), &options, &|_| true);
+        let mut channel = read.unwrap().channels.remove(0);
+        (channel.columns, channel.rows) = (columns, rows);
+        channel.width_nm = Some(columns as f64);
+        channel.height_nm = Some(rows as f64);
+        let values = (0..columns * rows).map(|n| n as f64).collect();
+        channel.samples = Samples::F64(values);
+        channel
+    }
+
+    #[test]
+    fn blocks_are_means_and_parts_are_parts() {
+        let mut channel = channel(5, 3);
+        let view = blocks(&channel, &Part::default());
+        assert_eq!(
+            (view.columns, view.rows, view.pixel_nm),
+            (5, 3, Some([1.0; 2]))
+        );
+        assert_eq!(view.values[7], 7.0);
+        let two = Part {
+            step: 2,
+            ..Part::default()
+        };
+        let view = blocks(&channel, &two);
+        assert_eq!(
+            (view.columns, view.rows, view.pixel_nm),
+            (3, 2, Some([2.0; 2]))
+        );
+        assert_eq!(view.values, [3.0, 5.0, 6.5, 10.5, 12.5, 14.0]);
+        let part = Part {
+            column: 3,
+            row: 1,
+            columns: Some(9),
+            rows: Some(1),
+            step: 0,
+        };
+        assert_eq!(blocks(&channel, &part).values, [8.0, 9.0]);
+        let beyond = Part { column: 99, ..part };
+        assert!(blocks(&channel, &beyond).values.is_empty());
+        let Samples::F64(values) = &mut channel.samples else {
+            panic!("doubles");
+        };
+        values[0] = f64::NAN;
+        (values[3], values[8]) = (f64::NAN, f64::NAN);
+        values[2] = f64::NAN;
+        let view = blocks(&channel, &two);
+        assert_eq!(view.values[0], 4.0);
+        assert!(view.values[1].is_nan());
+    }
+
+    #[test]
+    fn channels_in_little_are_pictures() {
+        let png = little(&channel(50, 20), 16, ColorMap::default()).unwrap();
+        assert_eq!(png[1..4], *b"PNG");
+        // Width and height.
+        assert_eq!((png[19], png[23]), (13, 5));
+    }
+}

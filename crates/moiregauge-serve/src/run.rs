@@ -1,0 +1,128 @@
+//! A server from its start to its end.
+
+use std::net::SocketAddr;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::Duration;
+
+use moiregauge_pipeline::Cancel;
+use tempfile::TempDir;
+use tokio::net::TcpListener;
+use tokio::sync::watch;
+
+use crate::api::routes;
+use crate::app::{App, Scans};
+use crate::connection::accept;
+use crate::error::ServeError;
+use crate::events::Hub;
+use crate::options::Options;
+use crate::page::Page;
+use crate::roots::Roots;
+use crate::token::Secret;
+
+/// How often the wish to stop is looked for.
+const OFTEN: Duration = Duration::from_millis(100);
+/// How long files that are being read may hold up the end.
+const LAST: Duration = Duration::from_millis(300);
+/// Threads that answer. What takes long has others.
+const THREADS: usize = 2;
+/// Threads that read files.
+const READING: usize = 8;
+
+/// Answers until it is cancelled. `ready` hears the address, with the token, as soon as it answers.
+///
+/// # Errors
+/// [`ServeError`].
+pub fn serve(
+    options: &Options,
+    cancel: &Cancel,
+    ready: &mut dyn FnMut(&str),
+) -> Result<(), ServeError> {
+    let token = token(options)?;
+    // Removed in the end, with what was dropped.
+    let temporary = TempDir::with_prefix("moiregauge-").map_err(ServeError::System)?;
+    let roots = Roots::new(&options.roots, temporary.path())?;
+    let page = page(options)?;
+    let runtime = tokio::runtime::Builder::new_multi_thread()
+        .worker_threads(THREADS)
+        .max_blocking_threads(READING)
+        .enable_all()
+        .build()
+        .map_err(ServeError::System)?;
+    let (stopping, stop) = watch::channel(false);
+    let served = runtime.block_on(async {
+        let address = SocketAddr::new(options.address, options.port);
+        let refused = |source| ServeError::Listen { address, source };
+        let listener = TcpListener::bind(address).await.map_err(refused)?;
+        let here = listener.local_addr().map_err(refused)?;
+        let session = Secret::random()?;
+        let run = Secret::random()?;
+        let app = Arc::new(App {
+            options: options.clone(),
+            port: here.port(),
+            session,
+            roots,
+            page,
+            scans: Scans::default(),
+            events: Arc::new(Hub::new(&run.text()[..8])),
+            stop,
+            token,
+        });
+        let shown = url(&app, here);
+        let accepting = tokio::spawn(accept(listener, routes(&app)));
+        ready(&shown);
+        if options.browser {
+            open(shown);
+        }
+        while !cancel.is_cancelled() {
+            tokio::time::sleep(OFTEN).await;
+        }
+        accepting.abort();
+        Ok(app)
+    });
+    // Streams of events end with it.
+    stopping.send_replace(true);
+    runtime.shutdown_timeout(LAST);
+    served.map(drop)
+}
+
+/// The token: that of the file, or a new one.
+fn token(options: &Options) -> Result<Secret, ServeError> {
+    match &options.token_file {
+        Some(file) => Secret::of_file(file),
+        None if options.address.is_loopback() => Secret::random(),
+        None => Err(ServeError::NotAlone(options.address)),
+    }
+}
+
+fn page(options: &Options) -> Result<Page, ServeError> {
+    let Some(folder) = &options.page else {
+        return Ok(Page::Within);
+    };
+    let real: std::io::Result<PathBuf> = folder.canonicalize();
+    let refused = |reason: String| ServeError::Folder {
+        folder: folder.clone(),
+        reason,
+    };
+    let real = real.map_err(|e| refused(format!("found none: {e}")))?;
+    if !real.join("index.html").is_file() {
+        return Err(refused("found none with index.html".to_owned()));
+    }
+    Ok(Page::Folder(real))
+}
+
+/// The address for a browser. What follows the # is never sent to any server.
+fn url(app: &App, here: SocketAddr) -> String {
+    let mut shown = here;
+    if here.ip().is_unspecified() {
+        shown.set_ip(std::net::Ipv4Addr::LOCALHOST.into());
+    }
+    format!("http://{shown}/#token={}", app.token.text())
+}
+
+/// Opens the page; without a browser the address is on the screen.
+fn open(shown: String) {
+    std::thread::spawn(move || {
+        let _ = webbrowser::open(&shown);
+    });
+}
