@@ -30,7 +30,10 @@ fn wrong(error: impl std::fmt::Display) -> OptionError {
 /// assert_eq!((settings.bilayer().name().as_str(), settings.seed), ("graphene/hBN", 7));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub fn settings_on(base: Settings, mut options: Map<String, Value>) -> Result<Settings, OptionError> {
+pub fn settings_on(
+    base: Settings,
+    mut options: Map<String, Value>,
+) -> Result<Settings, OptionError> {
     let published = options.get("method").and_then(Value::as_str) == Some("paper");
     let base = if published { base.as_published() } else { base };
     let Value::Object(mut all) = serde_json::to_value(base).map_err(wrong)? else {
@@ -159,7 +162,10 @@ mod tests {
 
     #[test]
     fn settings_are_read_back_as_they_are_written() {
-        let changed = settings(r#"{"layers": "graphene/hBN", "drift": [0.5, 1], "by_hand": {"near_nm": 12}}"#).unwrap();
+        let changed = settings(
+            r#"{"layers": "graphene/hBN", "drift": [0.5, 1], "by_hand": {"near_nm": 12}}"#,
+        )
+        .unwrap();
         assert!(changed.layers_chosen && changed.by_hand.near_nm == Some(12.0));
         for all in [Settings::default(), changed] {
             let text = serde_json::to_string(&all).unwrap();
@@ -171,8 +177,16 @@ mod tests {
     fn what_makes_no_sense_is_named_and_no_file_is_opened() {
         assert!(settings(r#"{"metod": 1}"#).unwrap_err().contains("metod"));
         assert!(settings(r#"{"seed": "x"}"#).unwrap_err().contains("seed"));
-        assert!(settings(r#"{"scanner": "/etc/passwd"}"#).unwrap_err().contains("scanner"));
-        assert!(settings(r#"{"material": "unobtainium"}"#).unwrap_err().contains("graphene"));
+        assert!(
+            settings(r#"{"scanner": "/etc/passwd"}"#)
+                .unwrap_err()
+                .contains("scanner")
+        );
+        assert!(
+            settings(r#"{"material": "unobtainium"}"#)
+                .unwrap_err()
+                .contains("graphene")
+        );
     }
 
     #[test]

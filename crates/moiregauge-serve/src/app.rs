@@ -12,6 +12,7 @@ use crate::options::Options;
 use crate::page::Page;
 use crate::roots::Roots;
 use crate::token::Secret;
+use crate::work::Works;
 
 /// Bytes of decoded files that are kept for the next look.
 const KEPT_BYTES: usize = 256 << 20;
@@ -29,6 +30,7 @@ pub(crate) struct App {
     pub(crate) page: Page,
     pub(crate) scans: Scans,
     pub(crate) events: Arc<Hub>,
+    pub(crate) works: Works,
     /// Becomes true when the server ends.
     pub(crate) stop: watch::Receiver<bool>,
 }

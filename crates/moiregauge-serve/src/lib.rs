@@ -23,6 +23,7 @@ mod problem;
 mod roots;
 mod run;
 mod token;
+mod work;
 
 pub use error::ServeError;
 pub use options::{Options, Words};

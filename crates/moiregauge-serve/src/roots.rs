@@ -178,6 +178,14 @@ impl Roots {
         Some(file)
     }
 
+    /// Takes note of a file that an earlier server had shown, if it lies below a root that is named now.
+    pub(crate) fn show_again(&self, file: &File) {
+        let all = self.named.iter().chain([&self.dropped]);
+        for root in all.filter(|root| file.place.starts_with(&root.real)) {
+            self.show(&root.id, &file.place);
+        }
+    }
+
     /// A file that was shown, if it still lies below its root.
     pub(crate) fn file(&self, id: &str) -> Answer<File> {
         let gone = || Problem::missing("no such file").at(id);

@@ -19,6 +19,7 @@ use crate::options::Options;
 use crate::page::Page;
 use crate::roots::Roots;
 use crate::token::Secret;
+use crate::work::Works;
 
 /// How often the wish to stop is looked for.
 const OFTEN: Duration = Duration::from_millis(100);
@@ -41,7 +42,12 @@ pub fn serve(
     let token = token(options)?;
     // Removed in the end, with what was dropped.
     let temporary = TempDir::with_prefix("moiregauge-").map_err(ServeError::System)?;
-    let roots = Roots::new(&options.roots, temporary.path())?;
+    let dropped = match &options.keep {
+        Some(keep) => keep.join("dropped"),
+        None => temporary.path().to_owned(),
+    };
+    std::fs::create_dir_all(&dropped).map_err(ServeError::System)?;
+    let roots = Roots::new(&options.roots, &dropped)?;
     let page = page(options)?;
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .worker_threads(THREADS)
@@ -57,6 +63,8 @@ pub fn serve(
         let here = listener.local_addr().map_err(refused)?;
         let session = Secret::random()?;
         let run = Secret::random()?;
+        let hub = Arc::new(Hub::new(&run.text()[..8]));
+        let works = Works::new(&hub, options.words, options.keep.as_deref(), &roots);
         let app = Arc::new(App {
             options: options.clone(),
             port: here.port(),
@@ -64,7 +72,8 @@ pub fn serve(
             roots,
             page,
             scans: Scans::default(),
-            events: Arc::new(Hub::new(&run.text()[..8])),
+            events: hub,
+            works,
             stop,
             token,
         });
@@ -78,6 +87,7 @@ pub fn serve(
             tokio::time::sleep(OFTEN).await;
         }
         accepting.abort();
+        app.works.cancel();
         Ok(app)
     });
     // Streams of events end with it.

@@ -5,6 +5,9 @@ mod files;
 mod images;
 mod session;
 mod upload;
+mod works;
+
+pub(crate) use files::places;
 
 use std::sync::Arc;
 
@@ -30,6 +33,7 @@ pub(crate) fn routes(app: &Arc<App>) -> Router {
         .route("/thumb", get(images::thumb))
         .route("/image", get(images::image))
         .route("/upload", post(upload::upload))
+        .merge(works::routes())
         .fallback(nothing);
     Router::new()
         .route(

@@ -44,7 +44,8 @@ pub(super) async fn state(State(app): Shared) -> Json<Value> {
         "version": env!("CARGO_PKG_VERSION"),
         "roots": roots,
         "upload_limit_bytes": app.options.upload_limit,
-        "works": [],
+        "saves": app.options.keep.is_some(),
+        "works": app.works.ids(),
         "maps": [],
         "watches": [],
     }))

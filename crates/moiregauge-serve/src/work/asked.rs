@@ -210,8 +210,16 @@ mod tests {
 
     #[test]
     fn files_of_one_name_are_told_apart() {
-        let all = [file("1", "a"), file("2", "a"), file("1", "a"), file("3", "b")];
-        let names: Vec<_> = told_apart(all.to_vec()).into_iter().map(|f| f.name).collect();
+        let all = [
+            file("1", "a"),
+            file("2", "a"),
+            file("1", "a"),
+            file("3", "b"),
+        ];
+        let names: Vec<_> = told_apart(all.to_vec())
+            .into_iter()
+            .map(|f| f.name)
+            .collect();
         assert_eq!(names, ["a", "drop-2/a", "b"].map(PathBuf::from));
     }
 
@@ -230,9 +238,17 @@ mod tests {
         let options = serde_json::from_str(options).unwrap();
         asked.settings = settings_on(Settings::default(), options).unwrap();
         let text = asked.settings_file().unwrap().unwrap();
-        assert!(!text.contains("strain_draws") && text.contains("exclude"), "{text}");
+        assert!(
+            !text.contains("strain_draws") && text.contains("exclude"),
+            "{text}"
+        );
         let read = moiregauge_pipeline::parse_settings(&text, "".as_ref()).unwrap();
         assert_eq!(read, asked.effective());
-        assert!(asked.arguments(&words).unwrap().ends_with(&["--config".to_owned(), SETTINGS_FILE.to_owned()]));
+        assert!(
+            asked
+                .arguments(&words)
+                .unwrap()
+                .ends_with(&["--config".to_owned(), SETTINGS_FILE.to_owned()])
+        );
     }
 }

@@ -75,7 +75,10 @@ mod tests {
         let mut history = History::new(0);
         assert!(!history.undo() && !history.redo() && !history.change(0));
         assert!(history.change(1) && history.change(2) && history.undo() && history.undo());
-        assert_eq!((*history.now(), history.can_undo(), history.can_redo()), (0, false, true));
+        assert_eq!(
+            (*history.now(), history.can_undo(), history.can_redo()),
+            (0, false, true)
+        );
         assert!(history.redo());
         assert!(history.change(3) && !history.can_redo());
         for step in 10..1000 {

@@ -8,6 +8,6 @@ mod task;
 mod works;
 
 pub(crate) use asked::{Asked, Change};
-pub(crate) use done::Done;
-pub(crate) use task::{Progress, run_beside};
+pub(crate) use done::{Done, command};
+pub(crate) use task::{NoResult, Progress, run_beside};
 pub(crate) use works::{Work, Works};

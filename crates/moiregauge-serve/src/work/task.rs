@@ -63,7 +63,11 @@ impl Events for Progress {
     fn tell(&self, event: &Event<'_>) {
         let mut now = lock(&self.now);
         match event {
-            Event::Stage { doing, things, count } => {
+            Event::Stage {
+                doing,
+                things,
+                count,
+            } => {
                 now.stage = Some(format!("{doing} {things}"));
                 (now.done, now.of) = (0, *count);
                 self.step(&mut now);
