@@ -27,6 +27,7 @@ mod shells;
 mod simulate;
 mod stripes;
 mod validate;
+mod watch;
 
 use std::ffi::OsString;
 use std::process::ExitCode;
@@ -52,6 +53,7 @@ struct Cli {
 enum Command {
     Analyze(Box<analyze::AnalyzeCommand>),
     Map(Box<map::MapArgs>),
+    Watch(Box<watch::WatchArgs>),
     Campaign(Box<campaign::CampaignArgs>),
     Merge(merge::MergeArgs),
     Calibrate(Box<calibrate::CalibrateArgs>),
@@ -104,6 +106,7 @@ impl Command {
         match self {
             Self::Analyze(args) => args.args().threads,
             Self::Map(args) => args.threads(),
+            Self::Watch(args) => args.analyze.threads,
             Self::Campaign(args) => args.analyze.threads,
             _ => None,
         }
@@ -114,6 +117,7 @@ impl Command {
         match self {
             Self::Analyze(args) => args.args().is_loud(),
             Self::Map(args) => args.is_loud(),
+            Self::Watch(args) => args.analyze.is_loud(),
             Self::Campaign(args) => args.analyze.is_loud(),
             Self::Merge(args) => !args.quiet,
             Self::Calibrate(args) => !args.quiet,
@@ -128,6 +132,7 @@ fn run(command: &Command, job: &Job) -> anyhow::Result<ExitCode> {
     match command {
         Command::Analyze(args) => analyze::run(&args.args(), job),
         Command::Map(args) => map::run(args, job),
+        Command::Watch(args) => watch::run(args, job),
         Command::Campaign(args) => campaign::run(args, job),
         Command::Merge(args) => merge::run(args, job),
         Command::Calibrate(args) => calibrate::run(args, job),

@@ -153,15 +153,19 @@ impl Found {
 }
 
 /// What a file of a folder is.
-enum Look {
+pub(crate) enum Look {
+    /// By its first bytes.
     Scan(Format),
     /// It should be a scan, and cannot be used.
     Failed(String),
+    /// A file that is left alone.
     Other,
+    /// A folder, which is not searched.
     Folder,
 }
 
-fn look(path: &Path) -> Look {
+/// Looks at the name and the first bytes of a file.
+pub(crate) fn look(path: &Path) -> Look {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     if name.starts_with('.') {
         return Look::Other;

@@ -30,10 +30,12 @@ mod settings_file;
 pub mod simulate;
 pub mod sink;
 mod source;
+mod stamp;
 mod told;
 mod twice;
 pub mod validate;
 pub mod view;
+pub mod watch;
 
 pub use calibrate::calibrate;
 pub use content::Content;

@@ -293,6 +293,22 @@ impl AnalyzeArgs {
     /// # Errors
     /// The first option of that kind.
     pub(crate) fn only_settings(&self) -> anyhow::Result<()> {
+        self.refuse("goes with one sample: it is for `moiregauge analyze`", &[])
+    }
+
+    /// Refuses what goes with results that are written once.
+    ///
+    /// # Errors
+    /// The first option of that kind.
+    pub(crate) fn only_numbers(&self) -> anyhow::Result<()> {
+        for (option, given) in [("--out", self.out.is_some()), ("--open", self.open)] {
+            anyhow::ensure!(!given, "{option} is for `moiregauge analyze`");
+        }
+        self.refuse("is for `moiregauge analyze`", &["--json"])
+    }
+
+    /// Refuses options that make or describe the results of one sample, but for those `allowed`.
+    fn refuse(&self, why: &str, allowed: &[&str]) -> anyhow::Result<()> {
         let atomic = self.orientation.asked()?.is_some();
         for (option, given) in [
             ("--replay", self.replay.is_some()),
@@ -306,10 +322,7 @@ impl AnalyzeArgs {
             ("--force", self.force),
             ("--atomic", atomic),
         ] {
-            anyhow::ensure!(
-                !given,
-                "{option} goes with one sample: it is for `moiregauge analyze`"
-            );
+            anyhow::ensure!(!given || allowed.contains(&option), "{option} {why}");
         }
         Ok(())
     }

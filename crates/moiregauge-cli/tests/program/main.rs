@@ -34,6 +34,7 @@ mod stopped;
 mod stripes;
 mod surveys;
 mod validation;
+mod watching;
 /// Made-up sessions of Omicron Matrix, as the tests of the reader have them.
 #[path = "../../../spmfile/src/matrix/read/tests/writer.rs"]
 mod writer;

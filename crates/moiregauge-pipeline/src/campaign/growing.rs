@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use moiregauge::campaign::{Analysis, analyse};
-use moiregauge::scan::sorted_moires;
+use moiregauge::scan::{MeasuredScan, sorted_moires};
 use moiregauge::settings::{Settings, SettingsError};
 use moiregauge_report::results::{NamedSet, Run, Told};
 use moiregauge_report::{FailedInput, InputFile, Provenance};
@@ -11,13 +11,13 @@ use serde::{Deserialize, Serialize, Serializer};
 
 use super::channel::Other;
 use super::error::AnalyseError;
-use super::kept::Kept;
+use super::kept::{Kept, With};
 use super::measure::{Advice, Inputs, Measured, given_again, measured, no_advice};
 use super::overlap::overlap;
 use super::shown::show;
 use crate::job::Job;
 use crate::known::Known;
-use crate::names::in_words;
+use crate::names::{in_words, with_words};
 use crate::source::Places;
 use crate::told::check_told;
 use crate::twice::distinct;
@@ -182,6 +182,32 @@ impl Campaign {
     pub fn illustrated(mut self, illustrated: bool) -> Self {
         self.of.illustrated = illustrated;
         self
+    }
+
+    /// The same scans, whose files are not read again as long as their size and date are those of the last analysis:
+    /// for folders that are watched.
+    #[must_use]
+    pub fn trusting_dates(mut self) -> Self {
+        self.of.kept.trust_dates();
+        self
+    }
+
+    /// Puts these scans, and names that cannot be measured, in the place of those before. What was measured is kept.
+    pub(crate) fn replace(&mut self, scans: Vec<PathBuf>, left_out: Vec<FailedInput>) {
+        self.of.inputs = scans;
+        self.of.left_out = left_out;
+    }
+
+    /// The measured scans behind an outcome with one moiré, all of the frame being used.
+    pub(crate) fn behind(&self, outcome: &Outcome) -> Vec<&MeasuredScan> {
+        let known = self.known();
+        let with = With::new(&outcome.analysis.settings, &known, None);
+        let of = |input: &InputFile| {
+            let path = with_words(&self.of.inputs, &input.file)?;
+            let key = with.key(path, &input.file, &input.sha256, &known);
+            self.of.kept.get(&key)?.as_ref().ok()?.first()
+        };
+        outcome.provenance.inputs.iter().filter_map(of).collect()
     }
 
     /// Takes an orientation that was measured into the settings.

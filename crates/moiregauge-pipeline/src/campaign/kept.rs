@@ -1,16 +1,18 @@
 //! What was measured, by what it depends on.
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use moiregauge::scan::{MeasuredScan, Window};
 use moiregauge::settings::Settings;
+use moiregauge_report::InputFile;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
 
 use super::measure::Failure;
 use crate::hash::hexadecimal;
 use crate::known::Known;
+use crate::stamp::Stamp;
 
 /// Name and version of what is kept; a part of every key.
 pub(crate) const SCHEMA: &str = "moiregauge/measured/1";
@@ -21,29 +23,57 @@ pub(crate) const SCHEMA: &str = "moiregauge/measured/1";
 /// processes and on different days. Entries of other versions of this crate are never used.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 #[serde(try_from = "Document", into = "Document")]
-pub struct Kept(BTreeMap<String, Result<Vec<MeasuredScan>, Failure>>);
+pub struct Kept {
+    files: BTreeMap<String, Result<Vec<MeasuredScan>, Failure>>,
+    /// What identified files when they were read last, where their dates are trusted. It is not written.
+    read: Option<BTreeMap<PathBuf, (Stamp, InputFile)>>,
+}
 
 impl Kept {
     /// How many files are measured.
     pub fn len(&self) -> usize {
-        self.0.len()
+        self.files.len()
     }
 
     /// Whether nothing is measured.
     pub fn is_empty(&self) -> bool {
-        self.0.is_empty()
+        self.files.is_empty()
     }
 
     pub(super) fn get(&self, key: &str) -> Option<&Result<Vec<MeasuredScan>, Failure>> {
-        self.0.get(key)
+        self.files.get(key)
     }
 
     pub(super) fn extend(&mut self, other: Self) {
-        self.0.extend(other.0);
+        self.files.extend(other.files);
+    }
+
+    /// Believes from now on that a file of the same size and date is the same.
+    pub(super) fn trust_dates(&mut self) {
+        self.read.get_or_insert_default();
+    }
+
+    /// The size and date of a file, where they are trusted.
+    pub(super) fn stamp(&self, place: &Path) -> Option<Stamp> {
+        self.read.as_ref()?;
+        Stamp::of(place)
+    }
+
+    /// What identified a file that has not changed since.
+    pub(super) fn identity(&self, path: &Path, now: Stamp) -> Option<&InputFile> {
+        let (then, input) = self.read.as_ref()?.get(path)?;
+        (*then == now).then_some(input)
+    }
+
+    /// A file of this size and date was read.
+    pub(super) fn was_read(&mut self, path: PathBuf, stamp: Stamp, input: InputFile) {
+        if let Some(read) = &mut self.read {
+            read.insert(path, (stamp, input));
+        }
     }
 
     pub(super) fn put(&mut self, key: String, measured: Result<Vec<MeasuredScan>, Failure>) {
-        self.0.insert(key, measured);
+        self.files.insert(key, measured);
     }
 }
 
@@ -65,10 +95,13 @@ enum OfFile {
 
 impl From<Kept> for Document {
     fn from(kept: Kept) -> Self {
-        let files = kept.0.into_iter().map(|(key, measured)| match measured {
-            Ok(moires) => (key, OfFile::Moires(moires)),
-            Err(failure) => (key, OfFile::Failed(failure)),
-        });
+        let files = kept
+            .files
+            .into_iter()
+            .map(|(key, measured)| match measured {
+                Ok(moires) => (key, OfFile::Moires(moires)),
+                Err(failure) => (key, OfFile::Failed(failure)),
+            });
         Self {
             schema: SCHEMA.to_owned(),
             files: files.collect(),
@@ -98,7 +131,10 @@ impl TryFrom<Document> for Kept {
                 }
                 OfFile::Failed(failure) => Ok((key, Err(failure))),
             });
-        Ok(Self(files.collect::<Result<_, _>>()?))
+        Ok(Self {
+            files: files.collect::<Result<_, _>>()?,
+            read: None,
+        })
     }
 }
 

@@ -21,6 +21,7 @@ use crate::memory::enough_for;
 use crate::names::in_full;
 use crate::opened::{InputError, Opened, Reading, read_scan};
 use crate::sets::set_of;
+use crate::stamp::Stamp;
 use crate::twice::Repeated;
 
 /// What a front end says that helps against an error: its own options.
@@ -108,11 +109,11 @@ impl Inputs<'_> {
     ) -> Result<Vec<OfFile>, Cancelled> {
         let with = With::new(settings, self.known, self.window);
         let stage = job.stage("measuring", "scans", self.files.len());
-        let new = Mutex::new(Vec::new());
+        let (new, read) = (Mutex::new(Vec::new()), Mutex::new(Vec::new()));
         let known_before = &*kept;
         let all = job.run(|| {
             let all = self.files.par_iter().map(|path| {
-                let (key, result) = self.one(path, settings, &with, known_before);
+                let (key, result) = self.one(path, settings, &with, known_before, &read);
                 if let (Some(key), Ok((moires, _))) = (&key, &result) {
                     keep(&new, key.clone(), Ok(moires.clone()));
                 } else if let (Some(key), Err(failure)) = (key, &result) {
@@ -125,6 +126,9 @@ impl Inputs<'_> {
         });
         for (key, measured) in new.into_inner().unwrap_or_else(PoisonError::into_inner) {
             kept.put(key, measured);
+        }
+        for (path, stamp, input) in read.into_inner().unwrap_or_else(PoisonError::into_inner) {
+            kept.was_read(path, stamp, input);
         }
         let mut all = all?;
         for (path, result) in self.files.iter().zip(&mut all) {
@@ -143,14 +147,27 @@ impl Inputs<'_> {
         settings: &Settings,
         with: &With,
         kept: &Kept,
+        read: &Read,
     ) -> (Option<String>, OfFile) {
         interrupt::check();
+        let stamp = kept.stamp(self.known.place(path));
+        if let Some(input) = stamp.and_then(|stamp| kept.identity(path, stamp)) {
+            let key = with.key(path, &input.file, &input.sha256, self.known);
+            if let Some(known) = kept.get(&key) {
+                let measured = known.clone().map(|moires| (moires, input.clone()));
+                return (None, measured);
+            }
+        }
         let failed = |error: &InputError| Err(Failure::of(error, self.advice));
         let opened = match Opened::new(path, self.known) {
             Ok(opened) => opened,
             Err(error) => return (None, failed(&error)),
         };
         let input = opened.identity();
+        if let Some(stamp) = stamp {
+            let mut read = read.lock().unwrap_or_else(PoisonError::into_inner);
+            read.push((path.to_owned(), stamp, input.clone()));
+        }
         let key = with.key(path, &input.file, &input.sha256, self.known);
         if let Some(known) = kept.get(&key) {
             return (None, known.clone().map(|moires| (moires, input)));
@@ -168,6 +185,8 @@ impl Inputs<'_> {
     }
 }
 
+/// Files that were read, with what they were like before.
+type Read = Mutex<Vec<(PathBuf, Stamp, InputFile)>>;
 type New = Mutex<Vec<(String, Result<Vec<MeasuredScan>, Failure>)>>;
 
 fn keep(new: &New, key: String, measured: Result<Vec<MeasuredScan>, Failure>) {

@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
+use moiregauge::campaign::SetAnalysis;
 use moiregauge::campaign::analyse;
-use moiregauge::campaign::{Analysis, SetAnalysis};
 use moiregauge::numbers::interrupt;
 use moiregauge::scan::{MeasuredLine, MeasuredScan};
 use moiregauge::settings::Settings;
@@ -80,17 +80,29 @@ fn described(scans: &[MeasuredScan], settings: &Settings) -> Result<Simulation, 
     let [set] = analysis.sets.as_slice() else {
         return Err(LikeError::Sets(analysis.sets.len()));
     };
+    conditions_of(set, &scans.iter().collect::<Vec<_>>(), settings)
+}
+
+/// Instrument and sample of a set that was analysed, by the measured scans that it has among these.
+///
+/// # Errors
+/// [`LikeError::Unknown`].
+pub(crate) fn conditions_of(
+    set: &SetAnalysis,
+    scans: &[&MeasuredScan],
+    settings: &Settings,
+) -> Result<Simulation, LikeError> {
     let scans: Vec<&MeasuredScan> = set
         .scans
         .iter()
         .filter(|s| s.excluded.is_none())
-        .filter_map(|s| scans.iter().find(|m| m.file == s.file))
+        .filter_map(|s| scans.iter().find(|m| m.file == s.file).copied())
         .collect();
     let lines: Vec<&MeasuredLine> = scans.iter().flat_map(|s| &s.lines).collect();
     Ok(Simulation {
         name: "like".to_owned(),
         seed: 1,
-        sample: sample(&analysis, set, &lines)?,
+        sample: sample(settings, set, &lines)?,
         drift: drift(set),
         raster: raster(set, &scans, &lines)?,
         window: window(set),
@@ -100,7 +112,7 @@ fn described(scans: &[MeasuredScan], settings: &Settings) -> Result<Simulation, 
 }
 
 fn sample(
-    analysis: &Analysis,
+    settings: &Settings,
     set: &SetAnalysis,
     lines: &[&MeasuredLine],
 ) -> Result<Sample, LikeError> {
@@ -111,7 +123,6 @@ fn sample(
         ))?
         .twist_strain;
     let e = found.strain_vector;
-    let settings = &analysis.settings;
     let axis_lab = e.y.atan2(e.x) / 2.0;
     // Second over first shell: s² for Gaussian spots.
     let ratio = median(lines.iter().filter_map(|line| {

@@ -10,6 +10,7 @@ mod samples;
 pub use compare::{Compared, Comparison};
 pub use error::ValidateError;
 pub use found::{QuantityFound, VALIDATION_FILES, Validation};
+pub(crate) use like::conditions_of;
 pub use like::{LikeError, conditions_like};
 pub use run::{ValidateRequest, validate};
 pub use samples::{

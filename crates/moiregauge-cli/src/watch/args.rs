@@ -1,0 +1,128 @@
+//! The options of `moiregauge watch`.
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use anyhow::ensure;
+use clap::builder::Resettable;
+use moiregauge_pipeline::watch::{Until, WatchRequest};
+
+use super::duration;
+use crate::analyze::AnalyzeArgs;
+
+/// Options of an analysis that make or describe results that are written once.
+const NOT_HERE: [&str; 15] = [
+    "out",
+    "replay",
+    "data",
+    "sets",
+    "colormap",
+    "survey_image",
+    "no_report",
+    "no_png",
+    "export",
+    "parquet",
+    "open",
+    "force",
+    "atomic",
+    "atomic_channel",
+    "rotate_to_lab",
+];
+
+/// Watch a folder while it fills: after each frame twist, strain and drift with their errors
+///
+/// Looks into PATH again and again. A frame that is whole is analysed together with all before it, and one line says
+/// what is known by now, what two more frames would bring, and what is wrong with the way of scanning. The numbers are at
+/// every moment those that `moiregauge analyze PATH` gives. Files may come late, in pieces and in any order; one that
+/// cannot be read is told and ends nothing. A file that is written anew replaces its frame, and one that is deleted takes
+/// it away. Nothing is written into the folder; its subfolders are not searched.
+///
+/// Ctrl-C or SIGTERM end the watch, and --until does; the exit code is 0. Started again, it takes what is there.
+#[derive(clap::Args, Clone, Debug)]
+#[command(
+    override_usage = "moiregauge watch [OPTIONS] <PATH>",
+    mut_args(hidden),
+    mut_arg("paths", |path| path.help("The folder into which the microscope saves").long_help(None)
+        .required_unless_present(Resettable::Reset).required(true).num_args(1)),
+    mut_arg("json", |json| json.help("Print one JSON object a line for each new result, and nothing else, on standard \
+        output; what is not known is null").long_help(None)),
+    after_long_help = "\
+Examples:
+  moiregauge watch scans/
+  moiregauge watch scans/ --until twist=0.01,strain=0.02
+  moiregauge watch scans/ --channel 'TR Amplitude' --layers graphene/hBN --keep ~/watched.json
+  moiregauge watch //server/tonight --poll 5s --json >> tonight.jsonl
+  moiregauge watch scans/ --exec 'python3 next_frame.py'
+
+COMMAND gets one line of JSON on its standard input, the same that --json prints. Commands run one after the other beside
+the watch, which never waits for them; one that takes longer than --exec-timeout is killed, with all that it started. What
+a command prints goes to standard error."
+)]
+pub(crate) struct WatchArgs {
+    /// End when the total standard errors are this small: twist in degrees, strain in per cent, as in twist=0.01 or
+    /// twist=0.01,strain=0.02
+    #[arg(long, value_name = "NAME=ERROR,…")]
+    until: Option<Until>,
+    /// Time between two looks into the folder
+    #[arg(long, value_name = "TIME", default_value = "2s", value_parser = duration::parse)]
+    poll: Duration,
+    /// Run this command with the shell for each new result, the line as JSON on its standard input
+    #[arg(long, value_name = "COMMAND")]
+    exec: Option<String>,
+    /// Kill a command of --exec that takes longer
+    #[arg(long, value_name = "TIME", default_value = "60s", value_parser = duration::parse, requires = "exec")]
+    exec_timeout: Duration,
+    /// Tell a file that cannot be read after so long without a change
+    #[arg(long, value_name = "TIME", default_value = "60s", value_parser = duration::parse)]
+    patience: Duration,
+    /// Keep what is measured in this file outside the folder: a watch that is started again with it measures nothing twice
+    #[arg(long, value_name = "FILE")]
+    keep: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) analyze: AnalyzeArgs,
+}
+
+/// Leaves options of an analysis out of the help; they are refused with words.
+fn hidden(arg: clap::Arg) -> clap::Arg {
+    let is_not_here = NOT_HERE.iter().any(|name| arg.get_id() == name);
+    if is_not_here {
+        arg.hide(true).required_unless_present(Resettable::Reset)
+    } else {
+        arg
+    }
+}
+
+impl WatchArgs {
+    /// What is to be watched.
+    pub(super) fn request(&self) -> anyhow::Result<WatchRequest> {
+        let [folder] = self.analyze.paths() else {
+            anyhow::bail!(
+                "watch takes one folder, found {}",
+                self.analyze.paths().len()
+            );
+        };
+        ensure!(folder.is_dir(), "{}: expected a folder", folder.display());
+        self.analyze.only_numbers()?;
+        let steps = self.patience.as_secs_f64() / self.poll.as_secs_f64();
+        Ok(WatchRequest {
+            folder: folder.clone(),
+            settings: self.analyze.settings()?,
+            told: self.analyze.known.told(),
+            until: self.until.unwrap_or_default(),
+            patience: (steps.ceil() as usize).max(2),
+        })
+    }
+
+    pub(super) fn poll(&self) -> Duration {
+        self.poll
+    }
+
+    /// The command for each result, and how long it may take.
+    pub(super) fn exec(&self) -> Option<(&str, Duration)> {
+        Some((self.exec.as_deref()?, self.exec_timeout))
+    }
+
+    pub(super) fn keep(&self) -> Option<&std::path::Path> {
+        self.keep.as_deref()
+    }
+}

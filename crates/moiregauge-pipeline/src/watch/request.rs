@@ -1,0 +1,53 @@
+//! What is to be watched, and how.
+
+use std::path::PathBuf;
+
+use moiregauge::settings::{Settings, SettingsError};
+use moiregauge_report::results::Told;
+use serde::{Deserialize, Serialize};
+
+use super::until::Until;
+
+/// A file that cannot be read is told after so many steps without a change: a minute at two seconds a step. Writing
+/// pauses for less, and somebody who waits for a frame should not wait longer for the reason.
+const PATIENCE: usize = 30;
+
+/// What is to be watched.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct WatchRequest {
+    /// The folder; its subfolders are not searched.
+    pub folder: PathBuf,
+    /// Settings of the analysis.
+    pub settings: Settings,
+    /// What the files do not tell.
+    pub told: Told,
+    /// The errors that are wished for.
+    pub until: Until,
+    /// So many steps without a change and a file that cannot be read is given up.
+    pub patience: usize,
+}
+
+impl Default for WatchRequest {
+    fn default() -> Self {
+        Self {
+            folder: PathBuf::new(),
+            settings: Settings::default(),
+            told: Told::default(),
+            until: Until::default(),
+            patience: PATIENCE,
+        }
+    }
+}
+
+/// Why a folder cannot be watched.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum WatchError {
+    /// Settings, or what is told of the files.
+    #[error(transparent)]
+    Settings(#[from] SettingsError),
+    /// There is no such folder.
+    #[error("{}: expected a folder", .0.display())]
+    NoFolder(PathBuf),
+}

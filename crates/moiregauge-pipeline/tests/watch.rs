@@ -1,0 +1,426 @@
+//! A folder that fills: files come late, in pieces, in any order, anew, and go.
+
+mod small;
+
+use std::fs::File;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, SystemTime};
+
+use moiregauge::simulate::{Simulation, Simulator};
+use moiregauge_pipeline::watch::{Happened, Line, Until, Watch, WatchRequest};
+use moiregauge_pipeline::{Job, find};
+use small::{campaign, document, scans, settings};
+use tempfile::TempDir;
+
+/// A folder that is watched, and another one with the frames that come into it.
+struct Scene {
+    source: TempDir,
+    folder: TempDir,
+    watch: Watch,
+    job: Job<'static>,
+    frames: Vec<PathBuf>,
+    /// Dates of files: clocks of file systems may be slower than tests.
+    clock: SystemTime,
+}
+
+impl Scene {
+    fn new(count: usize) -> Self {
+        Self::with(count, |request| request)
+    }
+
+    fn with(count: usize, change: impl FnOnce(WatchRequest) -> WatchRequest) -> Self {
+        let (source, folder) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+        let request = change(WatchRequest {
+            folder: folder.path().to_owned(),
+            settings: settings(),
+            patience: 3,
+            ..WatchRequest::default()
+        });
+        Self {
+            frames: scans(source.path(), count),
+            watch: Watch::new(request).unwrap(),
+            job: Job::quiet(Some(2)).unwrap(),
+            clock: SystemTime::UNIX_EPOCH + Duration::from_secs(1_000_000),
+            source,
+            folder,
+        }
+    }
+
+    fn bytes(&self, frame: usize) -> Vec<u8> {
+        std::fs::read(&self.frames[frame]).unwrap()
+    }
+
+    fn write(&mut self, name: &str, bytes: &[u8]) -> PathBuf {
+        let path = self.folder.path().join(name);
+        std::fs::write(&path, bytes).unwrap();
+        self.clock += Duration::from_secs(2);
+        let file = File::options().append(true).open(&path).unwrap();
+        file.set_modified(self.clock).unwrap();
+        path
+    }
+
+    fn arrive(&mut self, frame: usize) {
+        let name = self.frames[frame].file_name().unwrap().to_owned();
+        let bytes = self.bytes(frame);
+        self.write(name.to_str().unwrap(), &bytes);
+    }
+
+    fn look(&mut self) -> Vec<Line> {
+        self.watch.look(&self.job).unwrap()
+    }
+
+    /// The lines of as many steps as it takes to see that nothing changes.
+    fn settle(&mut self) -> Vec<Line> {
+        (0..3).flat_map(|_| self.look()).collect()
+    }
+
+    /// The numbers are those of an analysis of the folder as it is, to the last bit.
+    fn is_as_analysed(&self) {
+        let (inputs, left_out) = find(&[self.folder.path().to_owned()]).frames();
+        let mut fresh = campaign(&inputs).with_left_out(left_out);
+        let fresh = document(&fresh.analyse(&self.job).unwrap());
+        assert_eq!(document(self.watch.outcomes()), fresh);
+    }
+}
+
+fn names(line: &Line) -> Vec<&str> {
+    let name = |file: &String| {
+        Path::new(file.as_str())
+            .file_name()
+            .unwrap()
+            .to_str()
+            .unwrap()
+            .to_owned()
+    };
+    line.files
+        .iter()
+        .map(|f| &f[f.len() - name(f).len()..])
+        .collect()
+}
+
+fn codes(line: &Line) -> Vec<&str> {
+    line.warnings.iter().map(|w| w.code.as_str()).collect()
+}
+
+#[test]
+fn frames_in_any_order_come_to_the_numbers_of_an_analysis() {
+    let mut scene = Scene::new(6);
+    scene.arrive(4);
+    let lines = scene.settle();
+    let [start] = lines.as_slice() else {
+        panic!("one line: {lines:?}");
+    };
+    // One frame tells no drift.
+    assert_eq!(
+        (start.event, start.frames, names(start)),
+        (Happened::Start, 1, vec!["scan.004.spm"])
+    );
+    assert_eq!(
+        (start.twist_deg.value, start.heterostrain_percent.sigma),
+        (None, None)
+    );
+    assert!(start.uncorrected.is_some());
+    assert!(start.caveats.iter().any(|c| c.code == "drift-undetermined"));
+    assert!(start.advice.contains("no drift yet"), "{}", start.advice);
+    let json = serde_json::to_value(start).unwrap();
+    assert!(
+        json["twist_deg"]["value"].is_null() && json["drift"]["x_nm_per_min"]["value"].is_null()
+    );
+    scene.arrive(1);
+    let lines = scene.settle();
+    assert_eq!(
+        (lines.len(), lines[0].frames, lines[0].event),
+        (1, 2, Happened::New)
+    );
+    assert!(lines[0].twist_deg.sigma_total.unwrap() > lines[0].twist_deg.sigma.unwrap());
+    // Several at once are one result, in order of time.
+    for frame in [5, 0, 3] {
+        scene.arrive(frame);
+    }
+    let lines = scene.settle();
+    assert_eq!((lines.len(), lines[0].frames), (1, 5));
+    assert_eq!(
+        names(&lines[0]),
+        ["scan.000.spm", "scan.003.spm", "scan.005.spm"]
+    );
+    assert_eq!(lines[0].file.as_ref(), lines[0].files.last());
+    // Frame 2 is missing still: 1 and 3 went the same way, but the last two did not.
+    assert!(codes(&lines[0]).is_empty(), "{:?}", lines[0].warnings);
+    scene.arrive(2);
+    let lines = scene.settle();
+    assert_eq!((lines.len(), lines[0].frames, lines[0].sets), (1, 6, 1));
+    scene.is_as_analysed();
+    assert!(scene.settle().is_empty());
+    assert_eq!(scene.watch.history().len(), 4);
+    let next = lines[0].next.unwrap();
+    assert!(next.twist_sigma_deg.unwrap() < lines[0].twist_deg.sigma.unwrap());
+    assert!(next.twist_sigma_total_deg.unwrap() <= lines[0].twist_deg.sigma_total.unwrap());
+}
+
+/// What two more frames would bring is what they bring.
+#[test]
+fn the_outlook_comes_true() {
+    let mut scene = Scene::new(6);
+    let mut lines = Vec::new();
+    for frame in 0..6 {
+        scene.arrive(frame);
+        lines.extend(scene.settle());
+    }
+    for frames in [2, 4] {
+        let foreseen = lines[frames - 1].next.unwrap().twist_sigma_deg.unwrap();
+        let found = lines[frames + 1].twist_deg.sigma.unwrap();
+        assert!(
+            (foreseen / found - 1.0).abs() < 0.3,
+            "{frames}: {foreseen} {found}"
+        );
+    }
+}
+
+#[test]
+fn what_is_half_written_waits() {
+    let mut scene = Scene::new(3);
+    scene.arrive(0);
+    scene.arrive(1);
+    assert_eq!(scene.settle().len(), 1);
+    // In pieces, with pauses that are longer than a step.
+    let bytes = scene.bytes(2);
+    for end in [0, 100, bytes.len() / 2, bytes.len() - 1] {
+        scene.write("scan.002.spm", &bytes[..end]);
+        assert!(scene.look().is_empty() && scene.look().is_empty(), "{end}");
+    }
+    scene.write("scan.002.spm", &bytes);
+    let lines = scene.settle();
+    assert_eq!(
+        (lines.len(), lines[0].frames, lines[0].error.as_ref()),
+        (1, 3, None)
+    );
+    scene.is_as_analysed();
+    // Truncated and written again, with other results between: the frame is away until it is whole.
+    scene.write("scan.002.spm", b"");
+    assert!(scene.look().is_empty());
+    let first = scene.bytes(0);
+    scene.write("copy.spm", &first);
+    let lines: Vec<Line> = (0..2).flat_map(|_| scene.look()).collect();
+    assert_eq!((lines.len(), lines[0].frames), (1, 2));
+    assert_eq!(codes(&lines[0]), ["not-whole-yet"]);
+    scene.write("scan.002.spm", &bytes);
+    let lines = scene.settle();
+    assert_eq!(
+        (lines.len(), lines[0].frames, lines[0].event),
+        (1, 3, Happened::New)
+    );
+    scene.is_as_analysed();
+}
+
+#[test]
+fn a_file_written_anew_is_another_frame_and_a_deleted_one_none() {
+    let mut scene = Scene::new(5);
+    (0..4).for_each(|frame| scene.arrive(frame));
+    scene.settle();
+    let kept = scene.watch.kept().len();
+    // As long as before: the date tells.
+    let other = scene.bytes(4);
+    assert_eq!(other.len(), scene.bytes(3).len());
+    scene.write("scan.003.spm", &other);
+    let lines = scene.settle();
+    assert_eq!(
+        (lines.len(), lines[0].event, lines[0].frames),
+        (1, Happened::Again, 4)
+    );
+    scene.is_as_analysed();
+    // Nothing else was measured again.
+    assert_eq!(scene.watch.kept().len(), kept + 1);
+    std::fs::remove_file(scene.folder.path().join("scan.003.spm")).unwrap();
+    let lines = scene.settle();
+    assert_eq!(
+        (lines.len(), lines[0].event, lines[0].frames),
+        (1, Happened::Gone, 3)
+    );
+    scene.is_as_analysed();
+    // It comes back and is known.
+    scene.write("scan.003.spm", &other);
+    assert_eq!(scene.settle()[0].frames, 4);
+    assert_eq!(scene.watch.kept().len(), kept + 1);
+}
+
+#[test]
+fn what_is_no_scan_is_left_alone_and_what_is_bad_is_told_once() {
+    let mut scene = Scene::new(3);
+    scene.write("bad.spm", b"x");
+    let damaged = scene.bytes(2)[..5000].to_vec();
+    scene.write("cut.spm", &damaged);
+    scene.write("notes.txt", b"dear diary");
+    scene.write("scan.png", b"\x89PNG\r\n\x1a\n");
+    let lines: Vec<Line> = (0..8).flat_map(|_| scene.look()).collect();
+    assert_eq!(lines.len(), 2, "{lines:?}");
+    for line in &lines {
+        assert_eq!(
+            (line.event, line.frames, line.set.as_ref()),
+            (Happened::Unreadable, 0, None)
+        );
+        assert!(line.error.is_some() && line.twist_deg.value.is_none());
+    }
+    assert_eq!(names(&lines[0]), ["bad.spm"]);
+    scene.arrive(0);
+    scene.arrive(1);
+    let lines = scene.settle();
+    assert_eq!(
+        (lines.len(), lines[0].frames, lines[0].failed.len()),
+        (1, 2, 2)
+    );
+    scene.is_as_analysed();
+    // Now it is a scan after all.
+    let bytes = scene.bytes(2);
+    scene.write("bad.spm", &bytes);
+    let lines = scene.settle();
+    assert_eq!(
+        (lines.len(), lines[0].frames, lines[0].failed.len()),
+        (1, 3, 1)
+    );
+    scene.is_as_analysed();
+}
+
+/// A file that is a scan and shows no lattice gives no number, and takes none away.
+#[test]
+fn frames_without_a_lattice_say_why() {
+    let mut scene = Scene::new(2);
+    scene.arrive(0);
+    scene.arrive(1);
+    scene.settle();
+    // A flat image, read and refused.
+    let mut flat = b"Gwyddion Simple Field 1.0\nXRes = 64\nYRes = 64\nXReal = 7e-08\nYReal = 7e-08\nTitle = TR Phase\n".to_vec();
+    // At least one zero byte, up to a multiple of four.
+    flat.resize((flat.len() / 4 + 1) * 4, 0);
+    flat.resize(flat.len() + 4 * 64 * 64, 0);
+    scene.write("flat.gsf", &flat);
+    let lines = scene.settle();
+    let line = lines
+        .iter()
+        .find(|line| names(line) == ["flat.gsf"])
+        .unwrap();
+    assert!(
+        line.error.is_some() && line.frames == 2 && line.twist_deg.value.is_some(),
+        "{line:?}"
+    );
+}
+
+/// Results in a subfolder, and what the watch kept, are none of its business.
+#[test]
+fn own_results_are_left_alone_and_a_new_watch_goes_on() {
+    let mut scene = Scene::new(4);
+    (0..3).for_each(|frame| scene.arrive(frame));
+    scene.settle();
+    let results = scene.folder.path().join("results");
+    std::fs::create_dir(&results).unwrap();
+    std::fs::copy(&scene.frames[3], results.join("aligned.spm")).unwrap();
+    assert!(scene.settle().is_empty());
+    let kept = serde_json::to_string(scene.watch.kept()).unwrap();
+    let before = document(scene.watch.outcomes());
+    let mut again = Watch::new(scene.watch.request().clone()).unwrap();
+    again.take(serde_json::from_str(&kept).unwrap());
+    let count = again.kept().len();
+    scene.watch = again;
+    let lines = scene.settle();
+    assert_eq!(
+        (lines.len(), lines[0].event, lines[0].frames),
+        (1, Happened::Start, 3)
+    );
+    assert_eq!(document(scene.watch.outcomes()), before);
+    assert_eq!(scene.watch.kept().len(), count);
+    assert!(!serde_json::to_string(&lines).unwrap().contains("aligned"));
+}
+
+/// The line is of the set that got the frame, and says what changed.
+#[test]
+fn a_change_of_the_way_of_scanning_is_told() {
+    let mut scene = Scene::new(3);
+    (0..3).for_each(|frame| scene.arrive(frame));
+    scene.settle();
+    let mut other = Simulation::default();
+    other.raster.pixels = [96; 2];
+    other.raster.scans = 4;
+    other.raster.start_s = 600.0;
+    other.raster.alternating = false;
+    other.raster.nominal_size_nm = other.raster.nominal_size_nm.map(|s| 1.3 * s);
+    let simulator = Simulator::new(other).unwrap();
+    let made = |index: usize| spmfile::nanoscope::write(&simulator.frame(index)).unwrap();
+    scene.write("big.000.spm", &made(0));
+    let lines = scene.settle();
+    assert_eq!(
+        (lines.len(), lines[0].sets, lines[0].frames),
+        (1, 2, 1),
+        "{lines:?}"
+    );
+    let found = codes(&lines[0]);
+    assert!(
+        found.contains(&"size-changed") && found.contains(&"pixels-changed"),
+        "{found:?}"
+    );
+    assert!(lines[0].twist_deg.value.is_none());
+    scene.write("big.001.spm", &made(1));
+    let lines = scene.settle();
+    assert_eq!(codes(&lines[0]), ["directions-do-not-alternate"]);
+    assert_eq!(lines[0].frames, 2);
+    // Two sets that get frames at once make a line each.
+    scene.write("big.002.spm", &made(2));
+    let first = scene.bytes(1);
+    scene.write("scan.009.spm", &first);
+    std::fs::remove_file(scene.folder.path().join("scan.001.spm")).unwrap();
+    let lines = scene.settle();
+    assert!(
+        lines
+            .iter()
+            .any(|l| l.frames == 3 && names(l) == ["big.002.spm"]),
+        "{lines:?}"
+    );
+    scene.is_as_analysed();
+}
+
+#[test]
+fn a_wish_is_reached_or_out_of_reach() {
+    let wish = |twist| {
+        move |request| WatchRequest {
+            until: Until {
+                twist_deg: Some(twist),
+                strain_percent: None,
+            },
+            ..request
+        }
+    };
+    let mut scene = Scene::with(2, wish(0.02));
+    scene.arrive(0);
+    let until = scene.settle()[0].until.unwrap();
+    assert!(!until.reached && !scene.watch.is_reached());
+    assert_eq!(until.frames_needed, Some(2));
+    scene.arrive(1);
+    let line = scene.settle().remove(0);
+    assert!(line.until.unwrap().reached && scene.watch.is_reached());
+    assert!(line.twist_deg.sigma_total.unwrap() <= 0.02 && line.advice.contains("stop now"));
+    let mut scene = Scene::with(2, wish(1e-5));
+    scene.arrive(0);
+    scene.arrive(1);
+    let line = scene.settle().remove(0);
+    let until = line.until.unwrap();
+    assert!(!until.reached && until.out_of_reach && until.frames_needed.is_none());
+    assert!(!scene.watch.is_reached() && line.advice.contains("out of reach"));
+}
+
+/// A step that is stopped tells nothing, and the next one all of it.
+#[test]
+fn a_stopped_step_loses_nothing() {
+    let mut scene = Scene::new(3);
+    scene.arrive(0);
+    scene.arrive(1);
+    scene.settle();
+    scene.arrive(2);
+    scene.look();
+    let stopped = Job::quiet(Some(1)).unwrap();
+    stopped.cancel().cancel();
+    assert!(scene.watch.look(&stopped).is_err());
+    let lines = scene.settle();
+    assert_eq!(
+        (lines.len(), lines[0].frames, lines[0].event),
+        (1, 3, Happened::New)
+    );
+    assert!(scene.source.path().is_dir());
+}
