@@ -9,6 +9,7 @@ use moiregauge_serve::{Options, Words};
 
 use crate::analyze::advice;
 use crate::input::told_as_options;
+use crate::map::as_options as map_as_options;
 use crate::say::say;
 
 /// Open a page to look at scans, analyse them, correct by hand and map
@@ -65,6 +66,7 @@ pub(crate) fn run(args: &ServeArgs, job: &Job) -> anyhow::Result<ExitCode> {
         words: Words {
             advice,
             told: told_as_options,
+            map: map_as_options,
         },
         ..Options::default()
     };

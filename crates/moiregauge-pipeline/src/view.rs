@@ -2,12 +2,19 @@
 
 use std::path::Path;
 
+use heterostrain::lattice::reciprocal;
+use moiregauge::campaign::Analysis;
 use moiregauge::frame::{Background, Image, remove_background};
+use moiregauge::spectrum::log_power;
 use moiregauge_report::{ColorMap, ReportError, thumbnail};
+use serde::Serialize;
 use spmfile::{Channel, ReadError, Scan};
 
 use crate::known::{Known, KnownError};
 use crate::opened::InputError;
+
+/// Pixels along the longer side of an image that is transformed.
+const MOST: usize = 1024;
 
 /// Values of an image as they are shown, in single precision.
 #[derive(Clone, Debug, PartialEq)]
@@ -37,6 +44,89 @@ pub struct Part {
     pub rows: Option<usize>,
     /// Pixels along the side of the blocks that are averaged; 0 is 1.
     pub step: usize,
+}
+
+/// What is drawn on an image: the lattice that was measured in it, and where.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Overlay {
+    /// `trace` or `retrace`.
+    pub line: &'static str,
+    /// Two vectors of the lattice, columns and rows.
+    pub lattice_px: [[f64; 2]; 2],
+    /// The same, nm, in the axes of the results, before drift is taken out: what can be told by hand.
+    pub lattice_nm: [[f64; 2]; 2],
+    /// Wave vectors, periods per pixel.
+    pub spots_per_px: [[f64; 2]; 2],
+    /// Wave vectors, periods per nm.
+    pub spots_per_nm: [[f64; 2]; 2],
+    /// The sides of the part that carries the lattice, from point to point (column, row), pixels at whole numbers; none
+    /// where it is the whole image.
+    pub outline_px: Vec<[[f64; 2]; 2]>,
+    /// nm for a column and for a row.
+    pub pixel_to_nm: [[f64; 2]; 2],
+    /// The place of the first pixel, nm.
+    pub origin_nm: [f64; 2],
+    /// Why the scan is shown and not used.
+    pub excluded: Option<String>,
+}
+
+/// What was measured in a file, by its words: one for each line direction.
+pub fn overlays(analysis: &Analysis, file: &str) -> Vec<Overlay> {
+    let scans = analysis.sets.iter().flat_map(|set| &set.scans);
+    let scans = scans.filter(|scan| scan.file == file);
+    let pairs = |m: &nalgebra::Matrix2<f64>| [0, 1].map(|i| [m[(0, i)], m[(1, i)]]);
+    let periods = |m: &nalgebra::Matrix2<f64>| {
+        let waves = reciprocal(m).unwrap_or_default();
+        pairs(&(waves / std::f64::consts::TAU))
+    };
+    let of = |(scan, line): (
+        &moiregauge::ScanAnalysis,
+        &moiregauge::campaign::LineAnalysis,
+    )| {
+        let outline = line
+            .patch
+            .as_ref()
+            .map(moiregauge::coverage::Patch::outline);
+        let outline = outline.unwrap_or_default().into_iter();
+        Overlay {
+            line: moiregauge::numbers::line_name(line.line),
+            lattice_px: pairs(&line.pixels.basis),
+            lattice_nm: pairs(&line.sensor.basis),
+            spots_per_px: periods(&line.pixels.basis),
+            spots_per_nm: periods(&line.sensor.basis),
+            outline_px: outline.map(|side| side.map(Into::into)).collect(),
+            pixel_to_nm: pairs(&line.pixel_to_nm),
+            origin_nm: line.origin.into(),
+            excluded: scan.excluded.clone(),
+        }
+    };
+    let lines = scans.flat_map(|scan| scan.lines.iter().map(move |line| (scan, line)));
+    lines.map(of).collect()
+}
+
+/// The logarithm (base 10) of the power of a channel, a plane taken off, periods per pixel zero in the middle; and the
+/// step of its columns and rows, periods per pixel. Large images are averaged over blocks first.
+pub fn spectrum(channel: &Channel) -> (View, [f64; 2]) {
+    let longer = channel.rows.max(channel.columns);
+    let step = longer.div_ceil(MOST).max(1);
+    let view = blocks(
+        channel,
+        &Part {
+            step,
+            ..Part::default()
+        },
+    );
+    let values = view.values.iter().map(|v| f64::from(*v)).collect();
+    let image = Image::new(view.rows, view.columns, values);
+    let (power, cycles) = log_power(&remove_background(&image, Background::Plane));
+    let view = View {
+        columns: power.columns,
+        rows: power.rows,
+        values: power.values.iter().map(|v| *v as f32).collect(),
+        unit: String::new(),
+        pixel_nm: view.pixel_nm,
+    };
+    (view, cycles.map(|c| c / step as f64))
 }
 
 /// Everything that a file holds, as [`crate::inspect`] lists it: of a damaged file what can be read.
@@ -180,6 +270,29 @@ mod tests {
         let view = blocks(&channel, &two);
         assert_eq!(view.values[0], 4.0);
         assert!(view.values[1].is_nan());
+    }
+
+    /// A wave of 4 periods along x and 3 along y in 64 pixels.
+    #[test]
+    fn spectra_show_waves_where_they_are() {
+        let side = 64;
+        let mut channel = channel(side, side);
+        let wave = |n: usize| {
+            let (x, y) = ((n % side) as f64, (n / side) as f64);
+            (std::f64::consts::TAU * (4.0 * x + 3.0 * y) / side as f64).cos()
+        };
+        channel.samples = Samples::F64((0..side * side).map(wave).collect());
+        let (view, step) = spectrum(&channel);
+        let (mx, my) = (view.columns / 2, view.rows / 2);
+        let power = |x: f64, y: f64| {
+            let at = |middle: usize, f: f64, step: f64| {
+                (middle as f64 + f / 64.0 / step).round() as usize
+            };
+            view.values[at(my, y, step[1]) * view.columns + at(mx, x, step[0])]
+        };
+        for (x, y) in [(4.0, 3.0), (-4.0, -3.0)] {
+            assert!(power(x, y) > power(x, -y) + 3.0, "{x} {y}");
+        }
     }
 
     #[test]

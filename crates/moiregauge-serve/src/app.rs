@@ -12,7 +12,7 @@ use crate::options::Options;
 use crate::page::Page;
 use crate::roots::Roots;
 use crate::token::Secret;
-use crate::work::Works;
+use crate::work::{Maps, Watches, Works};
 
 /// Bytes of decoded files that are kept for the next look.
 const KEPT_BYTES: usize = 256 << 20;
@@ -31,6 +31,8 @@ pub(crate) struct App {
     pub(crate) scans: Scans,
     pub(crate) events: Arc<Hub>,
     pub(crate) works: Works,
+    pub(crate) maps: Maps,
+    pub(crate) watches: Watches,
     /// Becomes true when the server ends.
     pub(crate) stop: watch::Receiver<bool>,
 }

@@ -15,6 +15,7 @@ mod body;
 mod connection;
 mod error;
 mod events;
+mod feed;
 mod guard;
 mod options;
 mod page;
@@ -26,5 +27,6 @@ mod token;
 mod work;
 
 pub use error::ServeError;
+pub use feed::Feed;
 pub use options::{Options, Words};
 pub use run::serve;

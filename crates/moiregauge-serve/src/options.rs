@@ -4,7 +4,10 @@ use std::net::{IpAddr, Ipv4Addr};
 use std::path::PathBuf;
 
 use moiregauge_pipeline::campaign::{Advice, no_advice};
+use moiregauge_pipeline::maps::MapRequest;
 use moiregauge_report::results::Told;
+
+use crate::feed::Feed;
 
 /// Bytes of one uploaded file, at most.
 const UPLOAD_LIMIT: u64 = 4 << 30;
@@ -16,6 +19,8 @@ pub struct Words {
     pub advice: Advice,
     /// The options that tell the program what is known of files.
     pub told: fn(&Told) -> Vec<String>,
+    /// The options that tell the program what map is wanted.
+    pub map: fn(&MapRequest) -> Vec<String>,
 }
 
 impl Default for Words {
@@ -23,6 +28,7 @@ impl Default for Words {
         Self {
             advice: no_advice,
             told: |_| Vec::new(),
+            map: |_| Vec::new(),
         }
     }
 }
@@ -42,6 +48,8 @@ pub struct Options {
     pub page: Option<PathBuf>,
     /// Where works are kept.
     pub keep: Option<PathBuf>,
+    /// A watch that somebody else drives.
+    pub feed: Option<Feed>,
     /// Whether a browser is opened.
     pub browser: bool,
     /// Bytes of one uploaded file, at most.
@@ -59,6 +67,7 @@ impl Default for Options {
             token_file: None,
             page: None,
             keep: None,
+            feed: None,
             browser: false,
             upload_limit: UPLOAD_LIMIT,
             words: Words::default(),

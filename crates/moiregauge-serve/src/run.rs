@@ -19,7 +19,7 @@ use crate::options::Options;
 use crate::page::Page;
 use crate::roots::Roots;
 use crate::token::Secret;
-use crate::work::Works;
+use crate::work::{Maps, Watches, Works};
 
 /// How often the wish to stop is looked for.
 const OFTEN: Duration = Duration::from_millis(100);
@@ -65,6 +65,9 @@ pub fn serve(
         let run = Secret::random()?;
         let hub = Arc::new(Hub::new(&run.text()[..8]));
         let works = Works::new(&hub, options.words, options.keep.as_deref(), &roots);
+        let maps = Maps::new(&hub, options.words);
+        let watches = Watches::new(&hub, options.words);
+        options.feed.iter().for_each(|feed| watches.listen(feed));
         let app = Arc::new(App {
             options: options.clone(),
             port: here.port(),
@@ -74,6 +77,8 @@ pub fn serve(
             scans: Scans::default(),
             events: hub,
             works,
+            maps,
+            watches,
             stop,
             token,
         });
@@ -88,6 +93,8 @@ pub fn serve(
         }
         accepting.abort();
         app.works.cancel();
+        app.maps.cancel();
+        app.watches.cancel();
         Ok(app)
     });
     // Streams of events end with it.

@@ -12,6 +12,9 @@ const UNIT: HeaderName = HeaderName::from_static("x-unit");
 const PIXEL_X: HeaderName = HeaderName::from_static("x-pixel-nm-x");
 const PIXEL_Y: HeaderName = HeaderName::from_static("x-pixel-nm-y");
 
+const STEP_PER_PIXEL: HeaderName = HeaderName::from_static("x-step-per-px");
+const STEP_PER_NM: HeaderName = HeaderName::from_static("x-step-per-nm");
+
 /// An image: 32-bit numbers, the lowest byte first, row by row from the bottom; its sizes stand in headers. The unit is
 /// percent-encoded.
 pub(super) fn image(view: &View) -> Answer {
@@ -31,6 +34,22 @@ pub(super) fn image(view: &View) -> Answer {
     if let Some([x, y]) = view.pixel_nm {
         put(PIXEL_X, x.to_string())?;
         put(PIXEL_Y, y.to_string())?;
+    }
+    Ok(response)
+}
+
+/// A spectrum: the same, with the step of its columns and rows, periods per pixel and, with a size, per nm.
+pub(super) fn spectrum(view: &View, per_pixel: [f64; 2], pixel_nm: Option<[f64; 2]>) -> Answer {
+    let mut response = image(&View {
+        pixel_nm: None,
+        ..view.clone()
+    })?;
+    let pair = |[x, y]: [f64; 2]| HeaderValue::try_from(format!("{x} {y}")).map_err(Problem::fault);
+    let headers = response.headers_mut();
+    headers.insert(STEP_PER_PIXEL, pair(per_pixel)?);
+    if let Some([x, y]) = pixel_nm {
+        let per_nm = [per_pixel[0] / x, per_pixel[1] / y];
+        headers.insert(STEP_PER_NM, pair(per_nm)?);
     }
     Ok(response)
 }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use axum::extract::{Query, State};
 use axum::http::header;
 use axum::response::{IntoResponse as _, Response};
-use moiregauge_pipeline::view::{Part, blocks, little, whole};
+use moiregauge_pipeline::view::{self, Part, blocks, little, whole};
 use moiregauge_report::ColorMap;
 use serde::Deserialize;
 use spmfile::{Channel, Scan};
@@ -93,6 +93,17 @@ pub(super) async fn image(State(app): Shared, Query(asked): Query<OfImage>) -> A
             step: asked.step,
         };
         binary::image(&blocks(channel(&scan, asked.channel)?, &part))
+    })
+    .await
+}
+
+/// The power of a channel.
+pub(super) async fn spectrum(State(app): Shared, Query(asked): Query<OfThumb>) -> Answer {
+    beside(move || {
+        let scan = scan(&app, &asked.file, asked.known.as_deref())?;
+        let channel = channel(&scan, asked.channel)?;
+        let (view, per_pixel) = view::spectrum(channel);
+        binary::spectrum(&view, per_pixel, channel.pitch_nm())
     })
     .await
 }

@@ -1,10 +1,13 @@
 //! The routes.
 
+mod asks;
 mod binary;
 mod files;
 mod images;
+mod maps;
 mod session;
 mod upload;
+mod watches;
 mod works;
 
 pub(crate) use files::places;
@@ -32,8 +35,12 @@ pub(crate) fn routes(app: &Arc<App>) -> Router {
         .route("/inspect", get(files::inspect))
         .route("/thumb", get(images::thumb))
         .route("/image", get(images::image))
+        .route("/spectrum", get(images::spectrum))
         .route("/upload", post(upload::upload))
         .merge(works::routes())
+        .merge(maps::routes())
+        .merge(asks::routes())
+        .merge(watches::routes())
         .fallback(nothing);
     Router::new()
         .route(

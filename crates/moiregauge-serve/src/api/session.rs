@@ -46,7 +46,7 @@ pub(super) async fn state(State(app): Shared) -> Json<Value> {
         "upload_limit_bytes": app.options.upload_limit,
         "saves": app.options.keep.is_some(),
         "works": app.works.ids(),
-        "maps": [],
-        "watches": [],
+        "maps": app.maps.ids(),
+        "watches": app.watches.ids(),
     }))
 }

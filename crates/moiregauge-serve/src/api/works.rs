@@ -9,6 +9,7 @@ use axum::response::{IntoResponse as _, Response};
 use axum::routing::{get, post};
 use axum::{Json, Router};
 use moiregauge_pipeline::sink::archive;
+use moiregauge_pipeline::view::overlays;
 use serde::Deserialize;
 use serde_json::{Value, json};
 
@@ -32,6 +33,7 @@ pub(super) fn routes() -> Router<Arc<App>> {
         .route("/works/{work}/cancel", post(cancel))
         .route("/works/{work}/results.json", get(results))
         .route("/works/{work}/summary", get(summary))
+        .route("/works/{work}/overlay", get(overlay))
         .route("/works/{work}/outputs", get(outputs))
         .route("/works/{work}/outputs/{*name}", get(output))
         .route("/works/{work}/archive.zip", get(zip))
@@ -137,6 +139,28 @@ async fn summary(State(app): Shared, Path(id): Id, Query(moire): Query<OfMoire>)
     Ok(([(header::CONTENT_TYPE, "text/plain; charset=utf-8")], text).into_response())
 }
 
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct OfFile {
+    file: String,
+    moire: Option<usize>,
+}
+
+/// What is drawn on a scan: one for each line direction.
+async fn overlay(
+    State(app): Shared,
+    Path(id): Id,
+    Query(of): Query<OfFile>,
+) -> Answer<Json<Value>> {
+    let (done, _) = app.works.get(&id)?.done()?;
+    let file = done.asked.files.iter().find(|file| file.id == of.file);
+    let file = file.ok_or_else(|| Problem::missing("no such file in this work").at("file"))?;
+    let name = moiregauge_pipeline::names::in_words(&file.name);
+    let outcome = OfMoire { moire: of.moire }.of(&done.outcomes)?;
+    let lines = overlays(&outcome.analysis, &name);
+    Ok(Json(json!({"file": of.file, "lines": lines})))
+}
+
 async fn outputs(State(app): Shared, Path(id): Id) -> Answer<Json<Value>> {
     beside(move || {
         let (done, kept) = app.works.get(&id)?.done()?;
@@ -161,7 +185,7 @@ async fn output(State(app): Shared, Path((id, name)): Path<(String, String)>) ->
 }
 
 /// A file of results.
-fn of_results(name: &str, bytes: Vec<u8>) -> Response {
+pub(super) fn of_results(name: &str, bytes: Vec<u8>) -> Response {
     let extension = name.rsplit_once('.').map_or("", |(_, extension)| extension);
     let kind = match extension {
         "html" => "text/html; charset=utf-8",

@@ -4,10 +4,13 @@ mod asked;
 mod done;
 mod history;
 mod keep;
+mod maps;
 mod task;
+mod watches;
 mod works;
 
 pub(crate) use asked::{Asked, Change};
-pub(crate) use done::{Done, command};
-pub(crate) use task::{NoResult, Progress, run_beside};
+pub(crate) use done::command;
+pub(crate) use maps::Maps;
+pub(crate) use watches::Watches;
 pub(crate) use works::{Work, Works};

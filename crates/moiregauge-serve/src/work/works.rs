@@ -195,6 +195,11 @@ impl Work {
         lock(&self.inner).history.now().clone()
     }
 
+    /// What was measured.
+    pub(crate) fn kept(&self) -> Kept {
+        lock(&self.inner).kept.clone()
+    }
+
     /// What came out last, and what was measured.
     pub(crate) fn done(&self) -> Answer<(Arc<Done>, Kept)> {
         let inner = lock(&self.inner);
