@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use moiregauge_pipeline::Job;
-use moiregauge_serve::{Options, Words};
+use moiregauge_serve::{Options, ServeError, Words};
 
 use crate::analyze::advice;
 use crate::input::told_as_options;
@@ -53,6 +53,15 @@ pub(crate) struct ServeArgs {
     token_file: Option<PathBuf>,
 }
 
+/// What the page says of the options of the program.
+pub(crate) fn words() -> Words {
+    Words {
+        advice,
+        told: told_as_options,
+        map: map_as_options,
+    }
+}
+
 /// Answers until Ctrl-C.
 pub(crate) fn run(args: &ServeArgs, job: &Job) -> anyhow::Result<ExitCode> {
     let options = Options {
@@ -63,17 +72,25 @@ pub(crate) fn run(args: &ServeArgs, job: &Job) -> anyhow::Result<ExitCode> {
         page: args.page.clone(),
         keep: args.keep.clone(),
         browser: !args.no_browser,
-        words: Words {
-            advice,
-            told: told_as_options,
-            map: map_as_options,
-        },
+        words: words(),
         ..Options::default()
     };
     let mut told = Ok(());
-    moiregauge_serve::serve(&options, job.cancel(), &mut |address| {
+    let served = moiregauge_serve::serve(&options, job.cancel(), &mut |address| {
         told = say(&format!("{address}\n"));
-    })?;
+    });
+    served.map_err(with_option)?;
     told?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// The error with the option that it is about.
+fn with_option(error: ServeError) -> anyhow::Error {
+    let option = match &error {
+        ServeError::NotAlone(_) => "--address needs --token-file",
+        ServeError::Token { .. } => "--token-file",
+        ServeError::Listen { .. } => "--port, --address",
+        _ => return error.into(),
+    };
+    anyhow::Error::new(error).context(option)
 }

@@ -5,13 +5,15 @@ use std::path::Path;
 use heterostrain::lattice::reciprocal;
 use moiregauge::campaign::Analysis;
 use moiregauge::frame::{Background, Image, remove_background};
+use moiregauge::scan::{fitted, measure_moires};
+use moiregauge::settings::Settings;
 use moiregauge::spectrum::log_power;
 use moiregauge_report::{ColorMap, ReportError, thumbnail};
 use serde::Serialize;
-use spmfile::{Channel, ReadError, Scan};
+use spmfile::{Channel, LineDirection, ReadError, Scan};
 
 use crate::known::{Known, KnownError};
-use crate::opened::InputError;
+use crate::opened::{InputError, read_scan};
 
 /// Pixels along the longer side of an image that is transformed.
 const MOST: usize = 1024;
@@ -119,14 +121,54 @@ pub fn spectrum(channel: &Channel) -> (View, [f64; 2]) {
     let values = view.values.iter().map(|v| f64::from(*v)).collect();
     let image = Image::new(view.rows, view.columns, values);
     let (power, cycles) = log_power(&remove_background(&image, Background::Plane));
-    let view = View {
-        columns: power.columns,
-        rows: power.rows,
-        values: power.values.iter().map(|v| *v as f32).collect(),
-        unit: String::new(),
-        pixel_nm: view.pixel_nm,
-    };
+    let view = of_image(&power, "", view.pixel_nm);
     (view, cycles.map(|c| c / step as f64))
+}
+
+/// What is left of the image of a file when the fit is taken off, and the mean cell of its lattice: measured again with
+/// these settings.
+///
+/// # Errors
+/// It cannot be read or measured, or has no such line.
+pub fn fit_of(
+    path: &Path,
+    settings: &Settings,
+    known: &Known,
+    line: LineDirection,
+) -> Result<Option<FitView>, InputError> {
+    let reading = read_scan(path, settings, known)?;
+    let scan = &reading.scan;
+    let moires = measure_moires(&reading.input.file, scan, settings, None)?;
+    let shown = moires.first().and_then(|m| fitted(scan, m, settings, line));
+    Ok(shown.map(|shown| FitView {
+        residual: shown
+            .residual
+            .map(|image| of_image(&image, &shown.unit, shown.pixel_nm)),
+        cell: of_image(
+            &shown.cell,
+            &shown.unit,
+            shown.pixel_nm.map(|p| p.map(|nm| nm * shown.cell_step)),
+        ),
+    }))
+}
+
+/// What a fit leaves, and what it found.
+#[derive(Clone, Debug)]
+pub struct FitView {
+    /// The image less the fit; none where the method fits no waves.
+    pub residual: Option<View>,
+    /// The mean cell, repeated over two cells.
+    pub cell: View,
+}
+
+fn of_image(image: &Image, unit: &str, pixel_nm: Option<[f64; 2]>) -> View {
+    View {
+        columns: image.columns,
+        rows: image.rows,
+        values: image.values.iter().map(|v| *v as f32).collect(),
+        unit: unit.to_owned(),
+        pixel_nm,
+    }
 }
 
 /// Everything that a file holds, as [`crate::inspect`] lists it: of a damaged file what can be read.
@@ -220,7 +262,7 @@ mod tests {
     use spmfile::Samples;
 
     fn channel(columns: usize, rows: usize) -> Channel {
-        let text = vec!["0 0"; 2].join("\n");
+        let text = ["0 0"; 2].join("\n");
         let options = spmfile::arrays::ArrayOptions::default();
         let read = spmfile::arrays::read(text.as_bytes(), &options, &|_| true);
         let mut channel = read.unwrap().channels.remove(0);

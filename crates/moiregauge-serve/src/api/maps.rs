@@ -8,6 +8,7 @@ use axum::http::{HeaderMap, header};
 use axum::response::IntoResponse as _;
 use axum::routing::{get, post};
 use axum::{Json, Router};
+use moiregauge_pipeline::campaign::Kept;
 use moiregauge_pipeline::maps::{MapRequest, Questions, Shown};
 use moiregauge_pipeline::sink::archive;
 use moiregauge_pipeline::view::{Part, blocks};
@@ -57,7 +58,7 @@ async fn add(State(app): Shared, headers: HeaderMap, body: Body) -> Answer<Json<
                 let work = app.works.get(id)?;
                 (work.asked(), work.kept())
             }
-            None => (Asked::nothing(), Default::default()),
+            None => (Asked::nothing(), Kept::default()),
         };
         let mut change = Map::new();
         let files = wanted.files.or_else(|| Some(vec![wanted.file?]));

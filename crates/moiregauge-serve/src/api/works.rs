@@ -9,11 +9,13 @@ use axum::response::{IntoResponse as _, Response};
 use axum::routing::{get, post};
 use axum::{Json, Router};
 use moiregauge_pipeline::sink::archive;
-use moiregauge_pipeline::view::overlays;
+use moiregauge_pipeline::view::{FitView, fit_of, overlays};
 use serde::Deserialize;
 use serde_json::{Value, json};
+use spmfile::LineDirection;
 
-use super::beside;
+use super::files::known;
+use super::{beside, binary};
 use crate::app::{App, Shared};
 use crate::body::document;
 use crate::problem::{Answer, Problem};
@@ -34,6 +36,8 @@ pub(super) fn routes() -> Router<Arc<App>> {
         .route("/works/{work}/results.json", get(results))
         .route("/works/{work}/summary", get(summary))
         .route("/works/{work}/overlay", get(overlay))
+        .route("/works/{work}/residual", get(residual))
+        .route("/works/{work}/cell", get(cell))
         .route("/works/{work}/outputs", get(outputs))
         .route("/works/{work}/outputs/{*name}", get(output))
         .route("/works/{work}/archive.zip", get(zip))
@@ -144,6 +148,42 @@ async fn summary(State(app): Shared, Path(id): Id, Query(moire): Query<OfMoire>)
 struct OfFile {
     file: String,
     moire: Option<usize>,
+    /// `trace` or `retrace`.
+    line: Option<String>,
+}
+
+async fn residual(State(app): Shared, Path(id): Id, Query(of): Query<OfFile>) -> Answer {
+    let shown = fit_shown(app, id, of).await?;
+    let residual = shown.residual;
+    binary::image(&residual.ok_or_else(|| Problem::missing("this method fits no waves"))?)
+}
+
+async fn cell(State(app): Shared, Path(id): Id, Query(of): Query<OfFile>) -> Answer {
+    binary::image(&fit_shown(app, id, of).await?.cell)
+}
+
+/// The fit of a scan of the last result, made again.
+async fn fit_shown(app: Arc<App>, id: String, of: OfFile) -> Answer<FitView> {
+    beside(move || {
+        let (done, _) = app.works.get(&id)?.done()?;
+        let all = &done.asked.files;
+        let named = all.iter().find(|file| file.id == of.file);
+        let named =
+            named.ok_or_else(|| Problem::missing("no such file in this work").at("file"))?;
+        app.roots.file(&named.id)?;
+        let known = known(all, &done.asked.known)?;
+        let line = match of.line.as_deref() {
+            Some("retrace") => LineDirection::Retrace,
+            _ => LineDirection::Trace,
+        };
+        // The channel that was chosen in the end.
+        let settings = done.outcomes.first();
+        let settings = settings.map_or(&done.asked.settings, |o| &o.analysis.settings);
+        let shown = fit_of(&named.name, settings, &known, line);
+        let shown = shown.map_err(|e| Problem::unusable(&e).at("file"))?;
+        shown.ok_or_else(|| Problem::missing("nothing was measured in this line").at("line"))
+    })
+    .await
 }
 
 /// What is drawn on a scan: one for each line direction.

@@ -29,7 +29,7 @@ pub(crate) struct Done {
 }
 
 /// Files by their names.
-type Written = BTreeMap<String, Vec<u8>>;
+pub(crate) type Written = BTreeMap<String, Vec<u8>>;
 
 /// Why nothing came out.
 #[derive(Debug)]
@@ -132,7 +132,8 @@ fn analysed(
     let campaign = Campaign::of_run(&run, &inputs, &places, words.advice);
     let mut campaign = campaign
         .map_err(|e| NotDone::Other(Problem::wrong(e)))?
-        .illustrated(illustrated);
+        .illustrated(illustrated)
+        .trusting_dates();
     campaign.take(std::mem::take(kept));
     let found = outcomes(&run, &places, &mut campaign, job, |measured| {
         let mut recorded = run.clone();

@@ -13,6 +13,7 @@ use serde_json::{Value, json};
 use spmfile::Channel;
 
 use super::asked::Asked;
+use super::done::Written;
 use super::task::{NoResult, Progress, run_beside};
 use crate::api::places;
 use crate::app::lock;
@@ -30,7 +31,7 @@ const STACK: usize = 8 << 20;
 pub(crate) struct Maps {
     hub: Arc<Hub>,
     words: Words,
-    maps: Mutex<BTreeMap<usize, Arc<MapWork>>>,
+    all: Mutex<BTreeMap<usize, Arc<MapWork>>>,
     /// The number of the last one.
     last: Mutex<usize>,
 }
@@ -62,7 +63,7 @@ pub(crate) struct Mapped {
     /// All quantities.
     pub(crate) planes: Vec<Channel>,
     request: MapRequest,
-    written: Mutex<Option<Arc<BTreeMap<String, Vec<u8>>>>>,
+    written: Mutex<Option<Arc<Written>>>,
 }
 
 impl Maps {
@@ -70,20 +71,17 @@ impl Maps {
         Self {
             hub: Arc::clone(hub),
             words,
-            maps: Mutex::default(),
+            all: Mutex::default(),
             last: Mutex::default(),
         }
     }
 
     pub(crate) fn ids(&self) -> Vec<String> {
-        lock(&self.maps)
-            .values()
-            .map(|map| map.id.clone())
-            .collect()
+        lock(&self.all).values().map(|map| map.id.clone()).collect()
     }
 
     pub(crate) fn get(&self, id: &str) -> Answer<Arc<MapWork>> {
-        let maps = lock(&self.maps);
+        let maps = lock(&self.all);
         let found = maps.values().find(|map| map.id == id);
         found
             .cloned()
@@ -118,7 +116,7 @@ impl Maps {
             }),
         });
         {
-            let mut maps = lock(&self.maps);
+            let mut maps = lock(&self.all);
             while maps.len() >= MOST
                 && let Some((_, old)) = maps.pop_first()
             {
@@ -136,7 +134,7 @@ impl Maps {
 
     /// Stops all, for the end.
     pub(crate) fn cancel(&self) {
-        for map in lock(&self.maps).values() {
+        for map in lock(&self.all).values() {
             map.cancel.cancel();
         }
     }
@@ -270,7 +268,7 @@ impl MapWork {
 
 impl Mapped {
     /// Everything that the program would write.
-    pub(crate) fn written(&self) -> Answer<Arc<BTreeMap<String, Vec<u8>>>> {
+    pub(crate) fn written(&self) -> Answer<Arc<Written>> {
         // Whoever asks meanwhile waits for the same.
         let mut written = lock(&self.written);
         if let Some(files) = &*written {

@@ -29,7 +29,7 @@ const STACK: usize = 8 << 20;
 pub(crate) struct Watches {
     hub: Arc<Hub>,
     words: Words,
-    watches: Mutex<BTreeMap<usize, Arc<Watched>>>,
+    all: Mutex<BTreeMap<usize, Arc<Watched>>>,
     last: Mutex<usize>,
 }
 
@@ -55,17 +55,17 @@ impl Watches {
         Self {
             hub: Arc::clone(hub),
             words,
-            watches: Mutex::default(),
+            all: Mutex::default(),
             last: Mutex::default(),
         }
     }
 
     pub(crate) fn ids(&self) -> Vec<String> {
-        lock(&self.watches).values().map(|w| w.id.clone()).collect()
+        lock(&self.all).values().map(|w| w.id.clone()).collect()
     }
 
     pub(crate) fn get(&self, id: &str) -> Answer<Arc<Watched>> {
-        let watches = lock(&self.watches);
+        let watches = lock(&self.all);
         let found = watches.values().find(|watch| watch.id == id);
         found
             .cloned()
@@ -73,7 +73,7 @@ impl Watches {
     }
 
     fn insert(&self, folder: &std::path::Path) -> Answer<Arc<Watched>> {
-        let mut watches = lock(&self.watches);
+        let mut watches = lock(&self.all);
         if watches.len() >= MOST {
             return Err(Problem::conflict(format!(
                 "{MOST} folders are watched already"
@@ -119,20 +119,20 @@ impl Watches {
     /// One that somebody else drives.
     pub(crate) fn listen(&self, feed: &Feed) {
         if let Ok(watched) = self.insert(feed.folder()) {
-            feed.listen(Box::new(move |line| watched.tell(line.clone())));
+            feed.listen(Box::new(move |line| watched.tell(line)));
         }
     }
 
     pub(crate) fn remove(&self, id: &str) -> Answer<()> {
         let watched = self.get(id)?;
         watched.cancel.cancel();
-        lock(&self.watches).retain(|_, watch| watch.id != id);
+        lock(&self.all).retain(|_, watch| watch.id != id);
         Ok(())
     }
 
     /// Stops all, for the end.
     pub(crate) fn cancel(&self) {
-        for watch in lock(&self.watches).values() {
+        for watch in lock(&self.all).values() {
             watch.cancel.cancel();
         }
     }
@@ -154,7 +154,7 @@ impl Watched {
         })
     }
 
-    fn tell(&self, line: Value) {
+    fn tell(&self, line: &Value) {
         let mut inner = lock(&self.inner);
         inner.lines.push_back(line.clone());
         if inner.lines.len() > LINES {
@@ -181,7 +181,7 @@ impl Watched {
                 return self.ended("cancelled");
             };
             for line in lines {
-                self.tell(serde_json::to_value(line).unwrap_or_default());
+                self.tell(&serde_json::to_value(line).unwrap_or_default());
             }
             if watch.is_reached() {
                 return self.ended("done");

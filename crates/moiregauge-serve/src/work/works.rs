@@ -32,7 +32,7 @@ pub(crate) struct Works {
     hub: Arc<Hub>,
     words: Words,
     keeper: Option<Keeper>,
-    works: Mutex<BTreeMap<usize, Arc<Work>>>,
+    all: Mutex<BTreeMap<usize, Arc<Work>>>,
 }
 
 /// Files that are analysed together.
@@ -68,7 +68,7 @@ impl Works {
             hub: Arc::clone(hub),
             words,
             keeper: keep.map(Keeper::new),
-            works: Mutex::default(),
+            all: Mutex::default(),
         };
         let kept = works.keeper.iter().flat_map(Keeper::all);
         for (id, on_disk, documents, kept) in kept {
@@ -90,7 +90,7 @@ impl Works {
                     ..Inner::new(on_disk.history)
                 },
             );
-            lock(&works.works).insert(number, work);
+            lock(&works.all).insert(number, work);
         }
         works
     }
@@ -107,7 +107,7 @@ impl Works {
 
     /// Their ids.
     pub(crate) fn ids(&self) -> Vec<String> {
-        lock(&self.works)
+        lock(&self.all)
             .values()
             .map(|work| work.id.clone())
             .collect()
@@ -115,7 +115,7 @@ impl Works {
 
     /// One of them.
     pub(crate) fn get(&self, id: &str) -> Answer<Arc<Work>> {
-        let works = lock(&self.works);
+        let works = lock(&self.all);
         let found = works.values().find(|work| work.id == id);
         found
             .cloned()
@@ -124,7 +124,7 @@ impl Works {
 
     /// A new one.
     pub(crate) fn add(&self, asked: Asked) -> Answer<Arc<Work>> {
-        let mut works = lock(&self.works);
+        let mut works = lock(&self.all);
         if works.len() >= MOST {
             return Err(Problem::conflict(format!("there are {MOST} works already")));
         }
@@ -138,7 +138,7 @@ impl Works {
 
     /// Stops all, for the end.
     pub(crate) fn cancel(&self) {
-        for work in lock(&self.works).values() {
+        for work in lock(&self.all).values() {
             work.cancel();
         }
     }

@@ -82,7 +82,7 @@ impl Server {
         );
         assert_eq!(answer.status, 204, "{answer:?}");
         let cookie = answer.header("set-cookie").unwrap();
-        server.cookie = cookie.split(';').next().unwrap().to_owned();
+        server.cookie = cookie.split(';').next().unwrap_or_default().into();
         server
     }
 
@@ -102,18 +102,19 @@ impl Server {
     pub(crate) fn raw(&self, method: &str, path: &str, headers: &[&str], body: &[u8]) -> Answer {
         let mut stream = self.connect();
         let has = |name: &str| headers.iter().any(|h| h.to_lowercase().starts_with(name));
-        let mut head = format!("{method} {path} HTTP/1.1\r\nconnection: close\r\n");
+        let mut lines = vec![
+            format!("{method} {path} HTTP/1.1"),
+            "connection: close".to_owned(),
+        ];
         if !has("host:") {
-            head += &format!("host: {}\r\n", self.host());
+            lines.push(format!("host: {}", self.host()));
         }
         if !has("content-length:") && !body.is_empty() {
-            head += &format!("content-length: {}\r\n", body.len());
+            lines.push(format!("content-length: {}", body.len()));
         }
-        for header in headers {
-            head += header;
-            head += "\r\n";
-        }
-        stream.write_all(format!("{head}\r\n").as_bytes()).unwrap();
+        lines.extend(headers.iter().map(|h| (*h).to_owned()));
+        let head = lines.join("\r\n") + "\r\n\r\n";
+        stream.write_all(head.as_bytes()).unwrap();
         // A server that refuses a body may close before all of it is there.
         let _ = stream.write_all(body);
         read(stream)

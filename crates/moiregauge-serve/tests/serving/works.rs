@@ -86,7 +86,7 @@ fn nonsense_is_refused_by_its_name() {
         ),
         (
             json!({"files": files, "settings": {"moires": 99}}),
-            "moires",
+            "settings",
         ),
         (
             json!({"files": files, "known": {"size_nm": [-1, 1]}}),
