@@ -24,6 +24,8 @@ pub(crate) struct App {
     /// The port it listens at.
     pub(crate) port: u16,
     pub(crate) token: Secret,
+    /// What lets the browser in that is opened at the start, once.
+    pub(crate) ticket: Mutex<Option<Secret>>,
     /// What the cookie holds.
     pub(crate) session: Secret,
     pub(crate) roots: Roots,

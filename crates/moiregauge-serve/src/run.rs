@@ -2,7 +2,7 @@
 
 use std::net::SocketAddr;
 use std::path::PathBuf;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use moiregauge_pipeline::Cancel;
@@ -11,7 +11,7 @@ use tokio::net::TcpListener;
 use tokio::sync::watch;
 
 use crate::api::routes;
-use crate::app::{App, Scans};
+use crate::app::{App, Scans, lock};
 use crate::connection::accept;
 use crate::error::ServeError;
 use crate::events::Hub;
@@ -63,6 +63,7 @@ pub fn serve(
         let here = listener.local_addr().map_err(refused)?;
         let session = Secret::random()?;
         let run = Secret::random()?;
+        let ticket = Secret::random()?;
         let hub = Arc::new(Hub::new(&run.text()[..8]));
         let works = Works::new(&hub, options.words, options.keep.as_deref(), &roots);
         let maps = Maps::new(&hub, options.words);
@@ -81,12 +82,15 @@ pub fn serve(
             watches,
             stop,
             token,
+            ticket: Mutex::default(),
         });
-        let shown = url(&app, here);
+        let shown = url(here, &app.token);
         let accepting = tokio::spawn(accept(listener, routes(&app)));
         ready(&shown);
         if options.browser {
-            open(shown);
+            let address = url(here, &ticket);
+            *lock(&app.ticket) = Some(ticket);
+            open(address);
         }
         while !cancel.is_cancelled() {
             tokio::time::sleep(OFTEN).await;
@@ -129,17 +133,16 @@ fn page(options: &Options) -> Result<Page, ServeError> {
 }
 
 /// The address for a browser. What follows the # is never sent to any server.
-fn url(app: &App, here: SocketAddr) -> String {
+fn url(here: SocketAddr, secret: &Secret) -> String {
     let mut shown = here;
     if here.ip().is_unspecified() {
         shown.set_ip(std::net::Ipv4Addr::LOCALHOST.into());
     }
-    format!("http://{shown}/#token={}", app.token.text())
+    format!("http://{shown}/#token={}", secret.text())
 }
 
-/// Opens the page; without a browser the address is on the screen.
-fn open(shown: String) {
-    std::thread::spawn(move || {
-        let _ = webbrowser::open(&shown);
-    });
+/// Opens the page; without a browser the address is on the screen. Other users of the computer may see what a browser is
+/// started with: its secret lets one page in, once.
+fn open(address: String) {
+    std::thread::spawn(move || drop(open::that_detached(address)));
 }

@@ -237,7 +237,8 @@ fn maps_are_the_bytes_of_the_program() {
     let asked = json!({"regions": [{"name": "bar", "corners_nm": [[10, 10], [40, 10], [40, 40]]}]});
     let answer = serving.json("POST", &format!("{path}/ask"), &asked);
     let written: Value = serde_json::from_slice(&written).expect("JSON");
-    assert_eq!(answer["regions"], written["regions"]);
+    assert_eq!(answer["regions"], written["details"]["regions"]);
+    assert!(answer["regions"].is_array());
 }
 
 /// Ctrl-C and SIGTERM end it at once although streams of events are open; nothing that it says but the first line holds the
@@ -264,6 +265,48 @@ fn signals_end_it_at_once_and_the_token_is_in_no_log() {
         assert_eq!(code, Some(0), "{words}");
         assert!(!words.contains(&token), "{words}");
     }
+}
+
+/// The browser is started with a secret that lets it in once: command lines can be seen by others.
+#[cfg(target_os = "linux")]
+#[test]
+fn browsers_are_let_in_once() {
+    use std::os::unix::fs::PermissionsExt as _;
+    let folder = tempfile::tempdir().expect("a folder");
+    let browser = folder.path().join("xdg-open");
+    let opened = folder.path().join("opened");
+    let script = format!(
+        "#!/bin/sh\necho \"$1\" > '{0}.part' && /bin/mv '{0}.part' '{0}'\n",
+        opened.display()
+    );
+    std::fs::write(&browser, script).expect("written");
+    std::fs::set_permissions(&browser, std::fs::Permissions::from_mode(0o755)).expect("set");
+    let mut command = program();
+    command
+        .arg("serve")
+        .arg(folder.path())
+        .env("PATH", folder.path());
+    let serving = Serving::start(&mut command);
+    let begun = Instant::now();
+    let address = loop {
+        if let Ok(address) = std::fs::read_to_string(&opened) {
+            break address;
+        }
+        assert!(begun.elapsed() < LIMIT, "no browser was started");
+        std::thread::sleep(Duration::from_millis(20));
+    };
+    let (_, ticket) = address.trim().split_once("/#token=").expect("an address");
+    assert_ne!(ticket, serving.token);
+    let status = || {
+        let (head, _) = serving.ask(
+            "POST",
+            "/api/session",
+            &json!({"token": ticket}).to_string(),
+        );
+        head[9..12].to_owned()
+    };
+    assert_eq!(status(), "204");
+    assert_eq!(status(), "401");
 }
 
 /// What was shown as saved is there after `kill -9`.

@@ -8,7 +8,7 @@ use axum::response::{IntoResponse as _, Response};
 use serde::Deserialize;
 use serde_json::{Value, json};
 
-use crate::app::Shared;
+use crate::app::{Shared, lock};
 use crate::body::document;
 use crate::problem::{Answer, Problem};
 
@@ -21,7 +21,10 @@ struct Given {
 /// The cookie for the token.
 pub(super) async fn open(State(app): Shared, headers: HeaderMap, body: Body) -> Answer {
     let given: Given = document(&headers, body).await?;
-    if !app.token.is(&given.token) {
+    let has_ticket = lock(&app.ticket)
+        .take_if(|ticket| ticket.is(&given.token))
+        .is_some();
+    if !has_ticket && !app.token.is(&given.token) {
         return Err(Problem::new(
             StatusCode::UNAUTHORIZED,
             "the token is not that of the server: open the address that the terminal shows",
