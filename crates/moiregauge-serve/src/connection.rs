@@ -18,7 +18,7 @@ use crate::app::lock;
 
 /// How long a connection may take for the head of a request, the pause before it included. Pages that are open ask
 /// anew when a connection was closed.
-const HEAD_TIME: Duration = Duration::from_secs(20);
+const HEAD_TIME: Duration = Duration::from_secs(60);
 /// Connections at the same time: beyond that the oldest ones without the cookie are closed, and with less than a process
 /// may have open on any system.
 const MOST: usize = 200;

@@ -28,6 +28,9 @@ pub enum ServeError {
         /// What was found.
         reason: String,
     },
+    /// The folder of works.
+    #[error("{}: another server keeps its works there", .0.display())]
+    InUse(PathBuf),
     /// The address cannot be had.
     #[error("cannot listen at {address}: {source}")]
     Listen {

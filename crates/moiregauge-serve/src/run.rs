@@ -1,7 +1,8 @@
 //! A server from its start to its end.
 
+use std::fs::{File, TryLockError};
 use std::net::SocketAddr;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
@@ -47,6 +48,7 @@ pub fn serve(
         None => temporary.path().to_owned(),
     };
     std::fs::create_dir_all(&dropped).map_err(ServeError::System)?;
+    let _kept = options.keep.as_deref().map(locked).transpose()?;
     let roots = Roots::new(&options.roots, &dropped)?;
     let page = page(options)?;
     let runtime = tokio::runtime::Builder::new_multi_thread()
@@ -105,6 +107,16 @@ pub fn serve(
     stopping.send_replace(true);
     runtime.shutdown_timeout(LAST);
     served.map(drop)
+}
+
+/// The folder of works, for this server alone as long as it runs, however it ends. Where a file system has no locks
+/// nothing is refused.
+fn locked(keep: &Path) -> Result<File, ServeError> {
+    let lock = File::create(keep.join("lock")).map_err(ServeError::System)?;
+    match lock.try_lock() {
+        Err(TryLockError::WouldBlock) => Err(ServeError::InUse(keep.to_owned())),
+        _ => Ok(lock),
+    }
 }
 
 /// The token: that of the file, or a new one.

@@ -1,5 +1,6 @@
 //! A server from outside: requests as bytes over TCP, of the page and of those who may not ask.
 
+mod asks;
 mod common;
 mod connections;
 mod guard;

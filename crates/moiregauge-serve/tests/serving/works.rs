@@ -204,6 +204,10 @@ fn works_are_kept_where_the_user_wants_it() {
         )
     };
     let server = Server::start(keeping());
+    // Two servers would write over each other's works.
+    let second =
+        moiregauge_serve::serve(&keeping(), &moiregauge_pipeline::Cancel::new(), &mut |_| {});
+    assert!(second.unwrap_err().to_string().contains("another server"));
     let again = server.get(&path).good();
     assert_eq!(
         (&again["settings"]["seed"], &again["result"]["current"]),
