@@ -241,6 +241,17 @@ fn a_file_written_anew_is_another_frame_and_a_deleted_one_none() {
     scene.write("scan.003.spm", &other);
     assert_eq!(scene.settle()[0].frames, 4);
     assert_eq!(scene.watch.kept().len(), kept + 1);
+    // A scan that becomes a note is gone, too.
+    let bytes = scene.bytes(3);
+    scene.write("frame", &bytes);
+    assert_eq!(scene.settle()[0].frames, 5);
+    scene.write("frame", b"dear diary");
+    let lines = scene.settle();
+    assert_eq!(
+        (lines.len(), lines[0].event, lines[0].frames),
+        (1, Happened::Gone, 4)
+    );
+    scene.is_as_analysed();
 }
 
 #[test]

@@ -136,7 +136,7 @@ fn kill(child: &mut Child) {
         others
     } else {
         let mut others = Command::new("sh");
-        others.arg("-c").arg(format!("kill -KILL -- -{number}"));
+        others.arg("-c").arg(format!("kill -s KILL -- -{number}"));
         others
     };
     let quiet = others

@@ -84,7 +84,8 @@ impl Table {
             } else {
                 String::new()
             };
-            let _ = writeln!(text, "\n{name}{moire}");
+            let apart = if self.set.is_some() { "\n" } else { "" };
+            let _ = writeln!(text, "{apart}{name}{moire}");
         }
         let _ = writeln!(
             text,

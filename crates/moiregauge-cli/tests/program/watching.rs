@@ -4,7 +4,7 @@
 
 use std::io::{BufRead as _, BufReader, Write as _};
 use std::path::{Path, PathBuf};
-use std::process::{Child, ChildStderr, Command, Stdio};
+use std::process::{Child, Command, Stdio};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
@@ -28,7 +28,8 @@ const QUICK: [&str; 6] = [
 struct Watching {
     child: Child,
     lines: Receiver<String>,
-    stderr: Option<ChildStderr>,
+    /// What is said beside them, once nobody has the pipe any more.
+    words: Receiver<String>,
 }
 
 impl Watching {
@@ -46,11 +47,13 @@ impl Watching {
                 }
             }
         });
-        let stderr = child.stderr.take();
+        let (to, words) = channel();
+        let err = child.stderr.take().expect("a pipe");
+        std::thread::spawn(move || to.send(std::io::read_to_string(err).expect("UTF-8")));
         Self {
             child,
             lines,
-            stderr,
+            words,
         }
     }
 
@@ -85,11 +88,9 @@ impl Watching {
         let begun = Instant::now();
         while begun.elapsed() < LIMIT {
             if let Some(status) = self.child.try_wait().expect("a status") {
-                let words = self.stderr.take().expect("a pipe");
-                return (
-                    status.code(),
-                    std::io::read_to_string(words).expect("UTF-8"),
-                );
+                // Whatever a command has started would have it, too.
+                let words = self.words.recv_timeout(LIMIT).expect("all have ended");
+                return (status.code(), words);
             }
             std::thread::sleep(Duration::from_millis(20));
         }

@@ -39,7 +39,9 @@ struct File {
 
 #[derive(Clone, Debug)]
 enum State {
-    /// It may still be written.
+    /// It has just come.
+    New,
+    /// It should be a scan and may still be written.
     Waiting(String),
     /// No scan.
     Other,
@@ -62,7 +64,7 @@ pub(super) struct Seen {
     pub(super) fresh: Vec<PathBuf>,
     /// What was given up in this step.
     pub(super) given_up: Vec<FailedInput>,
-    /// What is no longer there since this step.
+    /// What is no longer there since this step, or no scan any more.
     pub(super) gone: Vec<PathBuf>,
     /// Why the folder cannot be listed, or that it can be again, where that is new.
     pub(super) folder: Option<String>,
@@ -111,7 +113,7 @@ impl Files {
                 file.missing + 1
             };
             let stays = file.missing < MISSING;
-            if !stays && !matches!(file.state, State::Other) {
+            if !stays && !matches!(file.state, State::Other | State::New) {
                 seen.gone.push(path.clone());
             }
             stays
@@ -122,17 +124,16 @@ impl Files {
     fn one(&mut self, path: PathBuf, stamp: Stamp, whole: Whole, seen: &mut Seen) {
         let Some(file) = self.listed.get_mut(&path).filter(|f| f.stamp == stamp) else {
             let again = self.listed.get(&path);
-            let was_scan = again.is_some_and(|f| !matches!(f.state, State::Other));
-            let words = if was_scan {
-                "it is being written anew"
-            } else {
-                "it has just come"
-            };
+            let was_scan = again.is_some_and(|f| !matches!(f.state, State::Other | State::New));
             let new = File {
                 stamp,
                 unchanged: 0,
                 missing: 0,
-                state: State::Waiting(words.to_owned()),
+                state: if was_scan {
+                    State::Waiting("it is being written anew".to_owned())
+                } else {
+                    State::New
+                },
             };
             self.listed.insert(path, new);
             return;
@@ -140,7 +141,7 @@ impl Files {
         file.unchanged += 1;
         let give_up = file.unchanged >= self.patience;
         let try_now = match file.state {
-            State::Waiting(_) => true,
+            State::New | State::Waiting(_) => true,
             // A lock may have gone, or a log may have come, without a change of the file.
             State::GivenUp(..) => file.unchanged.is_multiple_of(self.patience),
             State::Other | State::Whole(_) => false,
@@ -149,8 +150,14 @@ impl Files {
             return;
         }
         let was_given_up = matches!(file.state, State::GivenUp(..));
+        let was_new = matches!(file.state, State::New);
         file.state = match judged(&path, whole) {
-            Judged::Other => State::Other,
+            Judged::Other => {
+                if !was_new {
+                    seen.gone.push(path);
+                }
+                State::Other
+            }
             Judged::Whole(format) => {
                 seen.fresh.push(path);
                 State::Whole(format)
@@ -174,19 +181,12 @@ impl Files {
                     scans.push((path.clone(), *format));
                 }
                 State::GivenUp(None, reason) => seen.left_out.push(failed(path, reason.clone())),
-                State::Waiting(reason) if might_be_scan(path, file) => {
-                    seen.waiting.push(failed(path, reason.clone()));
-                }
-                State::Waiting(_) | State::Other => {}
+                State::Waiting(reason) => seen.waiting.push(failed(path, reason.clone())),
+                State::New | State::Other => {}
             }
         }
         seen.scans = one_per_frame(scans);
     }
-}
-
-/// Whether something that was not looked at yet deserves a word. A note beside the scans does not.
-fn might_be_scan(path: &Path, file: &File) -> bool {
-    file.unchanged > 0 || !matches!(find::look(path), Look::Other | Look::Folder)
 }
 
 fn failed(path: &Path, error: String) -> FailedInput {
@@ -268,7 +268,7 @@ mod tests {
         let mut look = || files.look(&whole);
         write(&scan, HEAD);
         std::fs::write(folder.path().join("notes.txt"), b"x").unwrap();
-        assert_eq!(look().waiting.len(), 1);
+        assert!(look().waiting.is_empty());
         let seen = look();
         assert!(seen.fresh.is_empty() && seen.waiting[0].error == "cut off");
         write(&scan, &[HEAD, b"END"].concat());

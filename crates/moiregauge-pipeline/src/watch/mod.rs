@@ -17,6 +17,7 @@ mod line;
 mod next;
 mod request;
 mod run;
+mod tell;
 mod until;
 mod warnings;
 
