@@ -99,6 +99,38 @@ impl KnownArgs {
     }
 }
 
+/// The options that tell what is told.
+pub(crate) fn told_as_options(told: &Told) -> Vec<String> {
+    let frame = told.frame_direction.map(|order| {
+        let name = match order {
+            FrameOrder::Up => "up",
+            FrameOrder::Down => "down",
+            FrameOrder::AlternatingUp => "alternating-up",
+            FrameOrder::AlternatingDown => "alternating-down",
+        };
+        name.to_owned()
+    });
+    let block = |c: Crop| format!("{},{},{},{}", c.column, c.top, c.columns, c.rows);
+    let all = [
+        ("--size", told.size_nm.map(|[w, h]| format!("{w}nm×{h}nm"))),
+        ("--unit", told.unit.clone()),
+        ("--line-rate", told.line_rate_hz.map(|hz| hz.to_string())),
+        ("--frame-direction", frame),
+        ("--rotation", told.rotation_deg.map(|deg| deg.to_string())),
+        ("--x-sensor", told.x_sensor.clone()),
+        ("--y-sensor", told.y_sensor.clone()),
+        ("--sensor-unit", told.sensor_unit.clone()),
+        ("--sensors", told.sensors.clone()),
+        ("--crop", told.crop.map(block)),
+    ];
+    let given = all
+        .into_iter()
+        .filter_map(|(option, value)| Some((option, value?)));
+    given
+        .flat_map(|(option, value)| [option.to_owned(), value])
+        .collect()
+}
+
 /// The error with the option that it is about.
 pub(crate) fn with_option(error: KnownError) -> anyhow::Error {
     crate::analyze::with_advice(error.into())
@@ -158,6 +190,32 @@ mod tests {
         for wrong in ["70×70", "70nm", "-1nm×2nm", "0nm×2nm", "1V×2V", "", "nm×nm"] {
             assert!(parse_size(wrong).is_err(), "{wrong}");
         }
+    }
+
+    #[test]
+    fn what_is_told_becomes_options_and_is_told_again() {
+        use clap::Parser as _;
+        #[derive(clap::Parser)]
+        struct Typed {
+            #[command(flatten)]
+            known: KnownArgs,
+        }
+        let told = Told {
+            size_nm: Some([70.0, 35.5]),
+            unit: Some("a b".to_owned()),
+            line_rate_hz: Some(0.1 + 0.2),
+            frame_direction: Some(FrameOrder::AlternatingDown),
+            rotation_deg: Some(-12.5),
+            x_sensor: Some("x".to_owned()),
+            y_sensor: Some("y".to_owned()),
+            sensor_unit: Some("V".to_owned()),
+            sensors: Some("s.npy".to_owned()),
+            crop: parse_crop("1,2,3,4").ok(),
+        };
+        let typed = ["program".to_owned()].into_iter();
+        let typed = Typed::parse_from(typed.chain(told_as_options(&told)));
+        assert_eq!(typed.known.told(), told);
+        assert!(told_as_options(&Told::default()).is_empty());
     }
 
     #[test]

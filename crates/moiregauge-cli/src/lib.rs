@@ -22,6 +22,7 @@ mod plan;
 mod progress;
 mod say;
 mod scanner;
+mod serve;
 mod shells;
 mod simulate;
 mod stripes;
@@ -63,6 +64,7 @@ enum Command {
     Demo(demo::DemoArgs),
     Validate(validate::ValidateArgs),
     Plan(Box<plan::PlanArgs>),
+    Serve(serve::ServeArgs),
     Config(config::ConfigArgs),
     Explain(explain::ExplainArgs),
     Completions(shells::CompletionsArgs),
@@ -141,6 +143,7 @@ fn run(command: &Command, job: &Job) -> anyhow::Result<ExitCode> {
         Command::Demo(args) => demo::run(args, job),
         Command::Validate(args) => validate::run(args, job),
         Command::Plan(args) => plan::run(args, job),
+        Command::Serve(args) => serve::run(args, job),
         Command::Config(args) => config::run(args),
         Command::Explain(args) => explain::run(args),
         Command::Completions(args) => shells::completions(args, arguments()),

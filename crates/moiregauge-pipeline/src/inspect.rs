@@ -76,6 +76,9 @@ pub struct ScanInfo {
     /// choose another one.
     #[serde(skip)]
     pub notes_on_choice: usize,
+    /// What else the header says, as names and values, in the order of the file.
+    #[serde(skip)]
+    pub header: Vec<(String, String)>,
 }
 
 /// What is told of a channel.
@@ -240,6 +243,7 @@ fn scan_info(scan: &Scan, at: &[Pixel]) -> ScanInfo {
             })
             .collect(),
         notes_on_choice: choice.len(),
+        header: scan.metadata.clone(),
         notes: scan.notes.iter().cloned().chain(choice).collect(),
         missing_for_analysis: missing_for_analysis(scan),
     }

@@ -44,5 +44,5 @@ pub use file::{FileSink, OneFile};
 pub use folder::{FolderSink, Part, Target};
 pub use keep::{Forget, Keep};
 pub use manifest::{Entry, MANIFEST, Manifest};
-pub use memory::{MemorySink, Sink, ZipSink};
+pub use memory::{MemorySink, Sink, ZipSink, archive};
 pub use work::UNFINISHED;

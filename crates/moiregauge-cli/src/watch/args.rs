@@ -7,8 +7,11 @@ use anyhow::ensure;
 use clap::builder::Resettable;
 use moiregauge_pipeline::watch::{Until, WatchRequest};
 
+use moiregauge_serve::{Feed, Options};
+
 use super::duration;
 use crate::analyze::AnalyzeArgs;
+use crate::serve::words;
 
 /// Options of an analysis that make or describe results that are written once.
 const NOT_HERE: [&str; 15] = [
@@ -53,6 +56,7 @@ Examples:
   moiregauge watch scans/ --channel 'TR Amplitude' --layers graphene/hBN --keep ~/watched.json
   moiregauge watch //server/tonight --poll 5s --json >> tonight.jsonl
   moiregauge watch scans/ --exec 'python3 next_frame.py'
+  moiregauge watch scans/ --serve
 
 COMMAND gets one line of JSON on its standard input, the same that --json prints. Commands run one after the other beside
 the watch, which never waits for them; one that takes longer than --exec-timeout is killed, with all that it started. What
@@ -78,6 +82,21 @@ pub(crate) struct WatchArgs {
     /// Keep what is measured in this file outside the folder: a watch that is started again with it measures nothing twice
     #[arg(long, value_name = "FILE")]
     keep: Option<PathBuf>,
+    /// Show the watch on a page, too, as `moiregauge serve` does
+    #[arg(long)]
+    serve: bool,
+    /// Port of the page [default: one that is free]
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 0,
+        hide_default_value = true,
+        requires = "serve"
+    )]
+    port: u16,
+    /// Open no browser on the page: its address is printed
+    #[arg(long, requires = "serve")]
+    no_browser: bool,
     #[command(flatten)]
     pub(crate) analyze: AnalyzeArgs,
 }
@@ -120,6 +139,20 @@ impl WatchArgs {
     /// The command for each result, and how long it may take.
     pub(super) fn exec(&self) -> Option<(&str, Duration)> {
         Some((self.exec.as_deref()?, self.exec_timeout))
+    }
+
+    /// The page on which the watch is shown, too.
+    pub(super) fn page(&self, folder: &std::path::Path) -> Option<(Options, Feed)> {
+        let feed = Feed::new(folder.to_owned());
+        let options = Options {
+            roots: vec![folder.to_owned()],
+            port: self.port,
+            browser: !self.no_browser,
+            feed: Some(feed.clone()),
+            words: words(),
+            ..Options::default()
+        };
+        self.serve.then_some((options, feed))
     }
 
     pub(super) fn keep(&self) -> Option<&std::path::Path> {

@@ -2,10 +2,14 @@
 
 use std::io::{ErrorKind, Write as _};
 use std::process::ExitCode;
+use std::sync::mpsc::channel;
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use moiregauge_pipeline::Job;
+use anyhow::Context as _;
 use moiregauge_pipeline::watch::{Line, Watch, WatchError};
+use moiregauge_pipeline::{Cancel, Job};
+use moiregauge_serve::{Feed, Options};
 
 use super::args::WatchArgs;
 use super::exec::Exec;
@@ -13,6 +17,7 @@ use super::keep::Keep;
 use super::table::Table;
 use crate::analyze::advice;
 use crate::config::with_option;
+use crate::say::say;
 
 /// Between two looks whether the watch is to stop.
 const STEP: Duration = Duration::from_millis(50);
@@ -35,12 +40,18 @@ pub(crate) fn run(args: &WatchArgs, job: &Job) -> anyhow::Result<ExitCode> {
     if args.analyze.is_loud() {
         eprintln!("watching {}; Ctrl-C ends", watch.request().folder.display());
     }
+    let page = args.page(&watch.request().folder);
+    let page = page.map(|(options, feed)| Page::open(options, feed, args.analyze.json()));
+    let page = page.transpose()?;
     let mut shown = Shown::new(args);
     let ended = watched(&mut watch, job, args.poll(), |watch, lines| {
         for line in lines {
             let json = serde_json::to_string(line)?;
             if let Some(exec) = &exec {
                 exec.give(&json);
+            }
+            if let Some(page) = &page {
+                page.feed.tell(line);
             }
             shown.show(line, &json)?;
         }
@@ -56,6 +67,46 @@ pub(crate) fn run(args: &WatchArgs, job: &Job) -> anyhow::Result<ExitCode> {
     match ended {
         Err(error) if is_closed(&error) => Ok(ExitCode::SUCCESS),
         other => other.map(|()| ExitCode::SUCCESS),
+    }
+}
+
+/// The page beside the watch; it ends with it.
+struct Page {
+    feed: Feed,
+    cancel: Cancel,
+    server: Option<JoinHandle<()>>,
+}
+
+impl Page {
+    /// Starts the server, and prints its address: on standard error where standard output is for programs.
+    fn open(options: Options, feed: Feed, json: bool) -> anyhow::Result<Self> {
+        let (cancel, (told, hears)) = (Cancel::new(), channel());
+        let stop = cancel.clone();
+        let server = std::thread::spawn(move || {
+            let mut ready = |address: &str| drop(told.send(Ok(address.to_owned())));
+            let ended = moiregauge_serve::serve(&options, &stop, &mut ready);
+            if let Err(error) = ended {
+                drop(told.send(Err(error)));
+            }
+        });
+        let address = hears.recv().context("the page does not begin")??;
+        if json {
+            eprintln!("{address}");
+        } else {
+            say(&format!("{address}\n"))?;
+        }
+        Ok(Self {
+            feed,
+            cancel,
+            server: Some(server),
+        })
+    }
+}
+
+impl Drop for Page {
+    fn drop(&mut self) {
+        self.cancel.cancel();
+        let _ = self.server.take().map(JoinHandle::join);
     }
 }
 

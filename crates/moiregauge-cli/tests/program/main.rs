@@ -27,6 +27,7 @@ mod round_trip;
 mod same_bytes;
 mod scanner;
 mod senses;
+mod serving;
 mod sessions;
 mod several;
 mod several_images;

@@ -46,6 +46,10 @@ impl Kept {
 
     pub(super) fn extend(&mut self, other: Self) {
         self.files.extend(other.files);
+        // Where dates are not trusted, files are read again.
+        if let (Some(read), Some(others)) = (&mut self.read, other.read) {
+            read.extend(others);
+        }
     }
 
     /// Believes from now on that a file of the same size and date is the same.

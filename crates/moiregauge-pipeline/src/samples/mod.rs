@@ -17,6 +17,7 @@ mod merge;
 mod one;
 mod part;
 mod run;
+mod shown;
 mod tables;
 
 pub use error::SamplesError;
@@ -24,3 +25,4 @@ pub use find::{Sample, samples_in, samples_of_table};
 pub use list::Shard;
 pub use merge::{Merge, merge};
 pub use run::{Samples, SamplesDone, analyse_samples, analyse_some, give_up};
+pub use shown::{SamplesShown, samples_shown};

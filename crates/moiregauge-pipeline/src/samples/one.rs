@@ -13,6 +13,9 @@ use crate::job::{Cancelled, Job};
 use crate::names::in_full;
 use crate::source::Places;
 
+/// Pixels along the longer side of a picture.
+const SIDE: usize = 96;
+
 /// What a sample is analysed with.
 pub(super) struct With<'a> {
     pub(super) asked: &'a Asked,
@@ -67,7 +70,7 @@ pub(super) fn analysed(
     let mut shown = outcomes.iter().flat_map(|o| &o.analysis.sets);
     let image = shown.find_map(|set| set.illustration.as_ref());
     Ok(Analysed {
-        picture: image.and_then(|i| thumbnail(&i.image, with.colours).ok()),
+        picture: image.and_then(|i| thumbnail(&i.image, SIDE, with.colours).ok()),
         rows: rows.collect(),
     })
 }

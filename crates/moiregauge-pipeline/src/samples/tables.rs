@@ -38,22 +38,7 @@ pub(super) fn write(
     list: &List,
     sink: FolderSink,
 ) -> Result<SamplesDone, SamplesError> {
-    let parts = folder.join(PARTS);
-    let (mut rows, mut pictures) = (Vec::<SampleRow>::new(), Vec::new());
-    for listed in &list.samples {
-        let part = Part::read(&parts, &listed.key)?.ok_or_else(|| SamplesError::Damaged {
-            path: parts.join(super::part::part_name(&listed.key)),
-            reason: "it is in a list and not there".to_owned(),
-        })?;
-        let picture = part
-            .picture
-            .then(|| format!("{PARTS}/{}", picture_name(&listed.key)));
-        let count = part.rows.len();
-        rows.extend(part.rows);
-        pictures.push(picture);
-        // The first moiré has the picture of all.
-        pictures.resize(pictures.len() + count - 1, None);
-    }
+    let (rows, pictures) = read(folder, list)?;
     sink.write("samples.csv", &samples_csv(&rows))?;
     sink.write("failed.csv", &failed_csv(&rows))?;
     #[cfg(feature = "parquet")]
@@ -70,6 +55,30 @@ pub(super) fn write(
     sink.write("campaign.html", &page)?;
     sink.commit()?;
     Ok(SamplesDone::of(&rows))
+}
+
+/// The rows of a list, and for each the name of its picture within the folder.
+pub(super) fn read(
+    folder: &Path,
+    list: &List,
+) -> Result<(Vec<SampleRow>, Vec<Option<String>>), SamplesError> {
+    let parts = folder.join(PARTS);
+    let (mut rows, mut pictures) = (Vec::<SampleRow>::new(), Vec::new());
+    for listed in &list.samples {
+        let part = Part::read(&parts, &listed.key)?.ok_or_else(|| SamplesError::Damaged {
+            path: parts.join(super::part::part_name(&listed.key)),
+            reason: "it is in a list and not there".to_owned(),
+        })?;
+        let picture = part
+            .picture
+            .then(|| format!("{PARTS}/{}", picture_name(&listed.key)));
+        let count = part.rows.len();
+        rows.extend(part.rows);
+        pictures.push(picture);
+        // The first moiré has the picture of all.
+        pictures.resize(pictures.len() + count - 1, None);
+    }
+    Ok((rows, pictures))
 }
 
 impl SamplesDone {

@@ -95,7 +95,7 @@ impl ZipSink {
     /// [`SinkError`] if it cannot be written.
     pub fn commit(self, kind: &str) -> Result<(), SinkError> {
         let files = self.files.commit(kind)?;
-        let bytes = archive(&files).map_err(|e| at(&self.path)(std::io::Error::other(e)))?;
+        let bytes = archive(&files).map_err(at(&self.path))?;
         self.file.write(bytes)
     }
 }
@@ -106,7 +106,15 @@ impl Sink for ZipSink {
     }
 }
 
-fn archive(files: &BTreeMap<String, Vec<u8>>) -> zip::result::ZipResult<Vec<u8>> {
+/// Files as one ZIP archive: the same files make the same bytes.
+///
+/// # Errors
+/// None in practice: everything is written into memory.
+pub fn archive(files: &BTreeMap<String, Vec<u8>>) -> std::io::Result<Vec<u8>> {
+    packed(files).map_err(std::io::Error::other)
+}
+
+fn packed(files: &BTreeMap<String, Vec<u8>>) -> zip::result::ZipResult<Vec<u8>> {
     let mut zip = ZipWriter::new(Cursor::new(Vec::new()));
     // The earliest date that the format has.
     let options = SimpleFileOptions::default()

@@ -8,18 +8,17 @@ use crate::error::ReportError;
 
 /// The colour of missing pixels.
 const MISSING: u8 = 255;
-/// Pixels along the longer side.
-const SIDE: usize = 96;
 /// Share of the pixels that may be darker or brighter than the colours.
 const BEYOND: f64 = 0.01;
 
-/// An image as a small PNG, top line first: the pixels nearest to an even grid. Missing ones are white.
+/// An image as a small PNG, top line first: the pixels nearest to an even grid, at most `most`
+/// along the longer side. Missing ones are white.
 ///
 /// # Errors
 /// None in practice: everything is written into memory.
-pub fn thumbnail(image: &Image, colours: ColorMap) -> Result<Vec<u8>, ReportError> {
+pub fn thumbnail(image: &Image, most: usize, colours: ColorMap) -> Result<Vec<u8>, ReportError> {
     let longer = image.rows.max(image.columns).max(1);
-    let side = |length: usize| (length * SIDE.min(longer)).div_ceil(longer).max(1);
+    let side = |length: usize| (length * most.min(longer)).div_ceil(longer).max(1);
     let [columns, rows] = [side(image.columns), side(image.rows)];
     let range = contrast(image, BEYOND);
     let mut pixels = Vec::with_capacity(columns * rows);

@@ -3,6 +3,7 @@
 pub(crate) mod channel;
 pub(crate) mod doubts;
 pub(crate) mod fingerprint;
+pub(crate) mod fitted;
 pub(crate) mod images;
 pub(crate) mod measure;
 pub(crate) mod measured;
@@ -16,6 +17,7 @@ pub(crate) mod shared;
 pub(crate) mod written;
 
 pub use channel::{channels_by_preference, choose_channel};
+pub use fitted::{Fitted, fitted};
 pub use images::{image_choice, unusual_channels};
 pub use measure::{BYTES_PER_PIXEL, measure_known, measure_moires, measure_scan};
 pub use measured::{MeasureError, MeasuredLine, MeasuredScan};

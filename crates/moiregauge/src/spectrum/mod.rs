@@ -17,3 +17,4 @@ pub(crate) mod transform;
 pub use error::LatticeError;
 pub use method::Method;
 pub use phases::Phases;
+pub use pictures::log_power;

@@ -43,6 +43,25 @@ pub(crate) fn pictures(image: &Image, lattice: &Lattice<Px>) -> (Image, Image, [
     (lags, power, [cycles.x, cycles.y])
 }
 
+/// The logarithm (base 10) of the power of an image under the window of the analysis, zero in the middle, at (rows/2,
+/// columns/2); and the step along columns and rows, cycles per pixel.
+///
+/// `image` has its background removed.
+pub fn log_power(image: &Image) -> (Image, [f64; 2]) {
+    let spectrum = Spectrum::new(image);
+    let rows = spectrum.rows as i64;
+    let reach = [spectrum.columns, spectrum.rows].map(|n| n as i64 / 2 - 1);
+    let power = centred(reach, |x, y| {
+        let (x, y) = if x < 0 { (-x, -y) } else { (x, y) };
+        spectrum
+            .power(x as usize, y.rem_euclid(rows) as usize)
+            .max(f64::MIN_POSITIVE)
+            .log10()
+    });
+    let cycles = spectrum.step() / std::f64::consts::TAU;
+    (power, [cycles.x, cycles.y])
+}
+
 /// The image of `value(x, y)` for |x| and |y| up to `reach`.
 fn centred(reach: [i64; 2], value: impl Fn(i64, i64) -> f64) -> Image {
     let [mx, my] = reach;

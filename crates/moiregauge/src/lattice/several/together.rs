@@ -264,7 +264,7 @@ fn take_off(image: &mut Image, model: &[f64]) {
 }
 
 /// `Σ A cos(q·(n − centre) + φ)` on the pixels of `image`.
-fn model(fit: &LatticeFit, image: &Image) -> Vec<f64> {
+pub(crate) fn model(fit: &LatticeFit, image: &Image) -> Vec<f64> {
     let mut values = vec![0.0; image.values.len()];
     for harmonic in &fit.harmonics {
         let q = fit.wave_vectors.basis * Vector2::from(harmonic.index.map(f64::from));

@@ -1,0 +1,284 @@
+//! Works: made, changed, analysed, taken away.
+
+use std::sync::Arc;
+
+use axum::body::Body;
+use axum::extract::{Path, Query, State};
+use axum::http::{HeaderMap, HeaderName, HeaderValue, header};
+use axum::response::{IntoResponse as _, Response};
+use axum::routing::{get, post};
+use axum::{Json, Router};
+use moiregauge_pipeline::sink::archive;
+use moiregauge_pipeline::view::{FitView, fit_of, overlays};
+use serde::Deserialize;
+use serde_json::{Value, json};
+use spmfile::LineDirection;
+
+use super::files::known;
+use super::{beside, binary};
+use crate::app::{App, Shared};
+use crate::body::document;
+use crate::problem::{Answer, Problem};
+use crate::work::{Asked, Change, Work, command};
+
+/// Pages and pictures of results: their own styles, and nothing else that runs or loads.
+const OF_RESULTS: &str = "sandbox; default-src 'none'; img-src data:; style-src 'unsafe-inline'; font-src data:; \
+                          frame-ancestors 'none'";
+
+pub(super) fn routes() -> Router<Arc<App>> {
+    Router::new()
+        .route("/works", post(add))
+        .route("/works/{work}", get(shown).patch(change))
+        .route("/works/{work}/undo", post(undo))
+        .route("/works/{work}/redo", post(redo))
+        .route("/works/{work}/run", post(run))
+        .route("/works/{work}/cancel", post(cancel))
+        .route("/works/{work}/results.json", get(results))
+        .route("/works/{work}/summary", get(summary))
+        .route("/works/{work}/overlay", get(overlay))
+        .route("/works/{work}/residual", get(residual))
+        .route("/works/{work}/cell", get(cell))
+        .route("/works/{work}/outputs", get(outputs))
+        .route("/works/{work}/outputs/{*name}", get(output))
+        .route("/works/{work}/archive.zip", get(zip))
+        .route("/works/{work}/command", get(command_line))
+        .route("/works/{work}/settings.toml", get(settings))
+}
+
+type Id = Path<String>;
+
+async fn add(State(app): Shared, headers: HeaderMap, body: Body) -> Answer<Json<Value>> {
+    let change: Change = document(&headers, body).await?;
+    beside(move || {
+        let run = change.run;
+        let work = app.works.add(Asked::nothing().with(change, &app.roots)?)?;
+        if run {
+            work.run(&app.roots)?;
+        }
+        Ok(Json(work.shown()))
+    })
+    .await
+}
+
+/// Does something with a work and shows it.
+async fn with(
+    app: Arc<App>,
+    id: String,
+    what: impl FnOnce(&Arc<Work>, &App) -> Answer<()> + Send + 'static,
+) -> Answer<Json<Value>> {
+    beside(move || {
+        let work = app.works.get(&id)?;
+        what(&work, &app)?;
+        Ok(Json(work.shown()))
+    })
+    .await
+}
+
+async fn shown(State(app): Shared, Path(id): Id) -> Answer<Json<Value>> {
+    with(app, id, |_, _| Ok(())).await
+}
+
+async fn change(
+    State(app): Shared,
+    Path(id): Id,
+    headers: HeaderMap,
+    body: Body,
+) -> Answer<Json<Value>> {
+    let change: Change = document(&headers, body).await?;
+    with(app, id, |work, app| work.change(change, &app.roots)).await
+}
+
+async fn undo(State(app): Shared, Path(id): Id) -> Answer<Json<Value>> {
+    with(app, id, |work, app| work.step(true, &app.roots)).await
+}
+
+async fn redo(State(app): Shared, Path(id): Id) -> Answer<Json<Value>> {
+    with(app, id, |work, app| work.step(false, &app.roots)).await
+}
+
+async fn run(State(app): Shared, Path(id): Id) -> Answer<Json<Value>> {
+    with(app, id, |work, app| work.run(&app.roots)).await
+}
+
+async fn cancel(State(app): Shared, Path(id): Id) -> Answer<Json<Value>> {
+    with(app, id, |work, _| {
+        work.cancel();
+        Ok(())
+    })
+    .await
+}
+
+/// Which of several moirés, counted from 1, the largest cell first.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct OfMoire {
+    moire: Option<usize>,
+}
+
+impl OfMoire {
+    fn of<T>(self, all: &[T]) -> Answer<&T> {
+        let found = self
+            .moire
+            .unwrap_or(1)
+            .checked_sub(1)
+            .and_then(|n| all.get(n));
+        found.ok_or_else(|| {
+            Problem::missing("no such moiré")
+                .what(format!("found {}, counted from 1", all.len()))
+                .at("moire")
+        })
+    }
+}
+
+async fn results(State(app): Shared, Path(id): Id, Query(moire): Query<OfMoire>) -> Answer {
+    let (done, _) = app.works.get(&id)?.done()?;
+    let bytes = moire.of(&done.documents)?.clone();
+    Ok(([(header::CONTENT_TYPE, "application/json")], bytes).into_response())
+}
+
+async fn summary(State(app): Shared, Path(id): Id, Query(moire): Query<OfMoire>) -> Answer {
+    let (done, _) = app.works.get(&id)?.done()?;
+    let outcome = moire.of(&done.outcomes)?;
+    let text = moiregauge_report::screen::summary(&outcome.analysis, |_| None);
+    Ok(([(header::CONTENT_TYPE, "text/plain; charset=utf-8")], text).into_response())
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct OfFile {
+    file: String,
+    moire: Option<usize>,
+    /// `trace` or `retrace`.
+    line: Option<String>,
+}
+
+async fn residual(State(app): Shared, Path(id): Id, Query(of): Query<OfFile>) -> Answer {
+    let shown = fit_shown(app, id, of).await?;
+    let residual = shown.residual;
+    binary::image(&residual.ok_or_else(|| Problem::missing("this method fits no waves"))?)
+}
+
+async fn cell(State(app): Shared, Path(id): Id, Query(of): Query<OfFile>) -> Answer {
+    binary::image(&fit_shown(app, id, of).await?.cell)
+}
+
+/// The fit of a scan of the last result, made again.
+async fn fit_shown(app: Arc<App>, id: String, of: OfFile) -> Answer<FitView> {
+    beside(move || {
+        let (done, _) = app.works.get(&id)?.done()?;
+        let all = &done.asked.files;
+        let named = all.iter().find(|file| file.id == of.file);
+        let named =
+            named.ok_or_else(|| Problem::missing("no such file in this work").at("file"))?;
+        app.roots.file(&named.id)?;
+        let known = known(all, &done.asked.known)?;
+        let line = match of.line.as_deref() {
+            Some("retrace") => LineDirection::Retrace,
+            _ => LineDirection::Trace,
+        };
+        // The channel that was chosen in the end.
+        let settings = done.outcomes.first();
+        let settings = settings.map_or(&done.asked.settings, |o| &o.analysis.settings);
+        let shown = fit_of(&named.name, settings, &known, line);
+        let shown = shown.map_err(|e| Problem::unusable(&e).at("file"))?;
+        shown.ok_or_else(|| Problem::missing("nothing was measured in this line").at("line"))
+    })
+    .await
+}
+
+/// What is drawn on a scan: one for each line direction.
+async fn overlay(
+    State(app): Shared,
+    Path(id): Id,
+    Query(of): Query<OfFile>,
+) -> Answer<Json<Value>> {
+    let (done, _) = app.works.get(&id)?.done()?;
+    let file = done.asked.files.iter().find(|file| file.id == of.file);
+    let file = file.ok_or_else(|| Problem::missing("no such file in this work").at("file"))?;
+    let name = moiregauge_pipeline::names::in_words(&file.name);
+    let outcome = OfMoire { moire: of.moire }.of(&done.outcomes)?;
+    let lines = overlays(&outcome.analysis, &name);
+    Ok(Json(json!({"file": of.file, "lines": lines})))
+}
+
+async fn outputs(State(app): Shared, Path(id): Id) -> Answer<Json<Value>> {
+    beside(move || {
+        let (done, kept) = app.works.get(&id)?.done()?;
+        let all = done.written(&app.options.words, &kept)?;
+        let all = all
+            .iter()
+            .map(|(name, bytes)| json!({"name": name, "bytes": bytes.len()}));
+        Ok(Json(all.collect()))
+    })
+    .await
+}
+
+async fn output(State(app): Shared, Path((id, name)): Path<(String, String)>) -> Answer {
+    beside(move || {
+        let (done, kept) = app.works.get(&id)?.done()?;
+        let all = done.written(&app.options.words, &kept)?;
+        let bytes = all.get(&name).cloned();
+        let bytes = bytes.ok_or_else(|| Problem::missing("no such file of results").at(&name))?;
+        Ok(of_results(&name, bytes))
+    })
+    .await
+}
+
+/// A file of results.
+pub(super) fn of_results(name: &str, bytes: Vec<u8>) -> Response {
+    let extension = name.rsplit_once('.').map_or("", |(_, extension)| extension);
+    let kind = match extension {
+        "html" => "text/html; charset=utf-8",
+        "svg" => "image/svg+xml",
+        "png" => "image/png",
+        "json" => "application/json",
+        "csv" => "text/csv; charset=utf-8",
+        "md" | "toml" | "txt" => "text/plain; charset=utf-8",
+        _ => "application/octet-stream",
+    };
+    let policy = HeaderValue::from_static(OF_RESULTS);
+    let headers: [(HeaderName, HeaderValue); 2] = [
+        (header::CONTENT_TYPE, HeaderValue::from_static(kind)),
+        (header::CONTENT_SECURITY_POLICY, policy),
+    ];
+    (headers, bytes).into_response()
+}
+
+async fn zip(State(app): Shared, Path(id): Id) -> Answer {
+    beside(move || {
+        let (done, kept) = app.works.get(&id)?.done()?;
+        let all = done.written(&app.options.words, &kept)?;
+        let bytes = archive(&all).map_err(Problem::fault)?;
+        let headers = [
+            (header::CONTENT_TYPE, "application/zip"),
+            (
+                header::CONTENT_DISPOSITION,
+                "attachment; filename=\"moiregauge.zip\"",
+            ),
+        ];
+        Ok((headers, bytes).into_response())
+    })
+    .await
+}
+
+async fn command_line(State(app): Shared, Path(id): Id) -> Answer<Json<Value>> {
+    let asked = app.works.get(&id)?.asked();
+    let command = command(&asked, &app.options.words)?;
+    Ok(Json(json!({
+        "command": command.trim_end(),
+        "settings": asked.settings_file()?,
+    })))
+}
+
+async fn settings(State(app): Shared, Path(id): Id) -> Answer {
+    let asked = app.works.get(&id)?.asked();
+    let text = asked.settings_file()?.unwrap_or_default();
+    let headers = [
+        (header::CONTENT_TYPE, "application/toml"),
+        (
+            header::CONTENT_DISPOSITION,
+            "attachment; filename=\"settings.toml\"",
+        ),
+    ];
+    Ok((headers, text).into_response())
+}

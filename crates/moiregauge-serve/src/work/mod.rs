@@ -1,0 +1,16 @@
+//! Works: files that are analysed together, what is asked of them, its history, and what came out.
+
+mod asked;
+mod done;
+mod history;
+mod keep;
+mod maps;
+mod task;
+mod watches;
+mod works;
+
+pub(crate) use asked::{Asked, Change};
+pub(crate) use done::command;
+pub(crate) use maps::Maps;
+pub(crate) use watches::Watches;
+pub(crate) use works::{Work, Works};

@@ -1,0 +1,197 @@
+//! Folders that are watched, and what was told of them.
+
+use std::collections::{BTreeMap, VecDeque};
+use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
+
+use moiregauge_pipeline::watch::{Watch, WatchRequest};
+use moiregauge_pipeline::{Cancel, Job, Quiet};
+use serde_json::{Value, json};
+
+use crate::app::lock;
+use crate::events::Hub;
+use crate::feed::Feed;
+use crate::options::Words;
+use crate::problem::{Answer, Problem};
+
+/// Lines that are kept for pages that come later.
+const LINES: usize = 2000;
+/// Folders that are watched at a time.
+const MOST: usize = 10;
+/// Between two looks into the folder.
+const POLL: Duration = Duration::from_secs(2);
+/// Between two looks whether the watch is to stop.
+const STEP: Duration = Duration::from_millis(100);
+const STACK: usize = 8 << 20;
+
+/// All watches.
+#[derive(Debug)]
+pub(crate) struct Watches {
+    hub: Arc<Hub>,
+    words: Words,
+    all: Mutex<BTreeMap<usize, Arc<Watched>>>,
+    last: Mutex<usize>,
+}
+
+/// A folder that is watched.
+#[derive(Debug)]
+pub(crate) struct Watched {
+    id: String,
+    folder: String,
+    hub: Arc<Hub>,
+    cancel: Cancel,
+    inner: Mutex<Inner>,
+}
+
+#[derive(Debug)]
+struct Inner {
+    state: &'static str,
+    error: Option<String>,
+    lines: VecDeque<Value>,
+}
+
+impl Watches {
+    pub(crate) fn new(hub: &Arc<Hub>, words: Words) -> Self {
+        Self {
+            hub: Arc::clone(hub),
+            words,
+            all: Mutex::default(),
+            last: Mutex::default(),
+        }
+    }
+
+    pub(crate) fn ids(&self) -> Vec<String> {
+        lock(&self.all).values().map(|w| w.id.clone()).collect()
+    }
+
+    pub(crate) fn get(&self, id: &str) -> Answer<Arc<Watched>> {
+        let watches = lock(&self.all);
+        let found = watches.values().find(|watch| watch.id == id);
+        found
+            .cloned()
+            .ok_or_else(|| Problem::missing("no such watch").at(id))
+    }
+
+    fn insert(&self, folder: &std::path::Path) -> Answer<Arc<Watched>> {
+        let mut watches = lock(&self.all);
+        if watches.len() >= MOST {
+            return Err(Problem::conflict(format!(
+                "{MOST} folders are watched already"
+            )));
+        }
+        let mut last = lock(&self.last);
+        *last += 1;
+        let watched = Arc::new(Watched {
+            id: format!("x{last}"),
+            folder: moiregauge_pipeline::names::in_words(folder),
+            hub: Arc::clone(&self.hub),
+            cancel: Cancel::new(),
+            inner: Mutex::new(Inner {
+                state: "running",
+                error: None,
+                lines: VecDeque::new(),
+            }),
+        });
+        watches.insert(*last, Arc::clone(&watched));
+        Ok(watched)
+    }
+
+    /// Begins one.
+    pub(crate) fn add(&self, request: WatchRequest) -> Answer<Arc<Watched>> {
+        let folder = request.folder.clone();
+        let watch = Watch::new(request).map_err(Problem::wrong)?;
+        let mut watch = watch.with_advice(self.words.advice);
+        let watched = self.insert(&folder)?;
+        let of_thread = Arc::clone(&watched);
+        let thread = std::thread::Builder::new().stack_size(STACK);
+        let thread = thread.spawn(move || {
+            let driven = std::panic::AssertUnwindSafe(|| of_thread.drive(&mut watch));
+            if std::panic::catch_unwind(driven).is_err() {
+                lock(&of_thread.inner).error =
+                    Some("a fault of moiregauge, please report it".to_owned());
+                of_thread.ended("failed");
+            }
+        });
+        thread.map_err(Problem::fault)?;
+        Ok(watched)
+    }
+
+    /// One that somebody else drives.
+    pub(crate) fn listen(&self, feed: &Feed) {
+        if let Ok(watched) = self.insert(feed.folder()) {
+            feed.listen(Box::new(move |line| watched.tell(line)));
+        }
+    }
+
+    pub(crate) fn remove(&self, id: &str) -> Answer<()> {
+        let watched = self.get(id)?;
+        watched.cancel.cancel();
+        lock(&self.all).retain(|_, watch| watch.id != id);
+        Ok(())
+    }
+
+    /// Stops all, for the end.
+    pub(crate) fn cancel(&self) {
+        for watch in lock(&self.all).values() {
+            watch.cancel.cancel();
+        }
+    }
+}
+
+impl Watched {
+    /// What there is to tell of it.
+    pub(crate) fn shown(&self) -> Value {
+        let inner = lock(&self.inner);
+        let last = inner.lines.back();
+        json!({
+            "watch": self.id,
+            "folder": self.folder,
+            "state": inner.state,
+            "error": inner.error,
+            "frames": inner.lines,
+            "advice": last.map(|line| line["advice"].clone()),
+            "warnings": last.map(|line| line["warnings"].clone()),
+        })
+    }
+
+    fn tell(&self, line: &Value) {
+        let mut inner = lock(&self.inner);
+        inner.lines.push_back(line.clone());
+        if inner.lines.len() > LINES {
+            inner.lines.pop_front();
+        }
+        drop(inner);
+        let event = json!({"watch": self.id, "state": "running", "line": line});
+        self.hub.tell("watch", event);
+    }
+
+    fn ended(&self, state: &'static str) {
+        lock(&self.inner).state = state;
+        let event = json!({"watch": self.id, "state": state});
+        self.hub.tell("watch", event);
+    }
+
+    fn drive(&self, watch: &mut Watch) {
+        let Ok(job) = Job::new(None, self.cancel.clone(), &Quiet) else {
+            return self.ended("failed");
+        };
+        loop {
+            let begun = Instant::now();
+            let Ok(lines) = watch.look(&job) else {
+                return self.ended("cancelled");
+            };
+            for line in lines {
+                self.tell(&serde_json::to_value(line).unwrap_or_default());
+            }
+            if watch.is_reached() {
+                return self.ended("done");
+            }
+            while begun.elapsed() < POLL {
+                if self.cancel.is_cancelled() {
+                    return self.ended("cancelled");
+                }
+                std::thread::sleep(STEP);
+            }
+        }
+    }
+}

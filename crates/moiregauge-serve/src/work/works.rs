@@ -1,0 +1,343 @@
+//! All works of a server.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::{Arc, Mutex};
+use std::thread::JoinHandle;
+
+use moiregauge_pipeline::Cancel;
+use moiregauge_pipeline::campaign::Kept;
+use moiregauge_report::FailedInput;
+use serde_json::{Value, json};
+
+use super::asked::{Asked, Change};
+use super::done::Done;
+use super::history::History;
+use super::keep::{Keeper, OnDisk};
+use super::task::{NoResult, Progress, run_beside};
+use crate::app::lock;
+use crate::events::Hub;
+use crate::options::Words;
+use crate::problem::{Answer, Problem};
+use crate::roots::Roots;
+
+/// Works at a time.
+const MOST: usize = 500;
+/// Room on the stack of the thread that waits for a job.
+const STACK: usize = 8 << 20;
+
+/// All works.
+#[derive(Debug)]
+pub(crate) struct Works {
+    hub: Arc<Hub>,
+    words: Words,
+    keeper: Option<Keeper>,
+    all: Mutex<BTreeMap<usize, Arc<Work>>>,
+}
+
+/// Files that are analysed together.
+#[derive(Debug)]
+pub(crate) struct Work {
+    pub(crate) id: String,
+    hub: Arc<Hub>,
+    words: Words,
+    keeper: Option<Keeper>,
+    inner: Mutex<Inner>,
+}
+
+#[derive(Debug)]
+struct Inner {
+    history: History<Asked>,
+    state: &'static str,
+    error: Option<String>,
+    failed: Vec<FailedInput>,
+    kept: Kept,
+    done: Option<Arc<Done>>,
+    /// Whether the result is on the disk.
+    saved: bool,
+    cancel: Cancel,
+    /// The number of the last run: earlier ones tell nothing any more.
+    run: u64,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Works {
+    /// Those of an earlier server among them.
+    pub(crate) fn new(hub: &Arc<Hub>, words: Words, keep: Option<&Path>, roots: &Roots) -> Self {
+        let works = Self {
+            hub: Arc::clone(hub),
+            words,
+            keeper: keep.map(Keeper::new),
+            all: Mutex::default(),
+        };
+        let kept = works.keeper.iter().flat_map(Keeper::all);
+        for (id, on_disk, documents, kept) in kept {
+            let Some(number) = id.strip_prefix('w').and_then(|n| n.parse().ok()) else {
+                continue;
+            };
+            for file in &on_disk.history.now().files {
+                roots.show_again(file);
+            }
+            let answered = on_disk.answered;
+            let done = answered.map(|asked| Arc::new(Done::read(asked, documents)));
+            let work = works.work(
+                number,
+                Inner {
+                    state: if done.is_some() { "done" } else { "idle" },
+                    saved: done.is_some(),
+                    done,
+                    kept,
+                    ..Inner::new(on_disk.history)
+                },
+            );
+            lock(&works.all).insert(number, work);
+        }
+        works
+    }
+
+    fn work(&self, number: usize, inner: Inner) -> Arc<Work> {
+        Arc::new(Work {
+            id: format!("w{number}"),
+            hub: Arc::clone(&self.hub),
+            words: self.words,
+            keeper: self.keeper.clone(),
+            inner: Mutex::new(inner),
+        })
+    }
+
+    /// Their ids.
+    pub(crate) fn ids(&self) -> Vec<String> {
+        lock(&self.all)
+            .values()
+            .map(|work| work.id.clone())
+            .collect()
+    }
+
+    /// One of them.
+    pub(crate) fn get(&self, id: &str) -> Answer<Arc<Work>> {
+        let works = lock(&self.all);
+        let found = works.values().find(|work| work.id == id);
+        found
+            .cloned()
+            .ok_or_else(|| Problem::missing("no such work").at(id))
+    }
+
+    /// A new one.
+    pub(crate) fn add(&self, asked: Asked) -> Answer<Arc<Work>> {
+        let mut works = lock(&self.all);
+        if works.len() >= MOST {
+            return Err(Problem::conflict(format!("there are {MOST} works already")));
+        }
+        let number = works.keys().next_back().map_or(1, |last| last + 1);
+        let work = self.work(number, Inner::new(History::new(asked)));
+        works.insert(number, Arc::clone(&work));
+        drop(works);
+        work.save(&mut lock(&work.inner), false);
+        Ok(work)
+    }
+
+    /// Stops all, for the end.
+    pub(crate) fn cancel(&self) {
+        for work in lock(&self.all).values() {
+            work.cancel();
+        }
+    }
+}
+
+impl Inner {
+    fn new(history: History<Asked>) -> Self {
+        Self {
+            history,
+            state: "idle",
+            error: None,
+            failed: Vec::new(),
+            kept: Kept::default(),
+            done: None,
+            saved: false,
+            cancel: Cancel::new(),
+            run: 0,
+            thread: None,
+        }
+    }
+}
+
+impl Work {
+    /// What there is to tell of it.
+    pub(crate) fn shown(&self) -> Value {
+        let inner = lock(&self.inner);
+        let asked = inner.history.now();
+        let files: Vec<&str> = asked.files.iter().map(|f| f.id.as_str()).collect();
+        let names = asked.files.iter().map(|file| {
+            let name = moiregauge_pipeline::names::in_words(&file.name);
+            (file.id.clone(), Value::from(name))
+        });
+        let result = inner.done.as_ref().map(|done| {
+            json!({"moires": done.documents.len(), "current": done.asked == *asked, "saved": inner.saved})
+        });
+        json!({
+            "work": self.id,
+            "files": files,
+            "names": names.collect::<serde_json::Map<_, _>>(),
+            "excluded": asked.excluded,
+            "settings": asked.settings,
+            "known": asked.known,
+            "state": inner.state,
+            "can_undo": inner.history.can_undo(),
+            "can_redo": inner.history.can_redo(),
+            "error": inner.error,
+            "failed": inner.failed,
+            "result": result,
+        })
+    }
+
+    /// What is asked now.
+    pub(crate) fn asked(&self) -> Asked {
+        lock(&self.inner).history.now().clone()
+    }
+
+    /// What was measured.
+    pub(crate) fn kept(&self) -> Kept {
+        lock(&self.inner).kept.clone()
+    }
+
+    /// What came out last, and what was measured.
+    pub(crate) fn done(&self) -> Answer<(Arc<Done>, Kept)> {
+        let inner = lock(&self.inner);
+        let done = inner.done.clone();
+        let done = done.ok_or_else(|| Problem::conflict("there is no result yet"))?;
+        Ok((done, inner.kept.clone()))
+    }
+
+    /// Asks something else.
+    pub(crate) fn change(self: &Arc<Self>, change: Change, roots: &Roots) -> Answer<()> {
+        let run = change.run;
+        let asked = self.asked().with(change, roots)?;
+        {
+            let mut inner = lock(&self.inner);
+            if inner.history.change(asked) {
+                self.save(&mut inner, false);
+            }
+        }
+        self.told(run, roots)
+    }
+
+    /// Asks what was asked before, or again what was undone; analyses it where there is a result already.
+    pub(crate) fn step(self: &Arc<Self>, back: bool, roots: &Roots) -> Answer<()> {
+        let run = {
+            let mut inner = lock(&self.inner);
+            let moved = if back {
+                inner.history.undo()
+            } else {
+                inner.history.redo()
+            };
+            if !moved {
+                let what = if back { "undo" } else { "redo" };
+                return Err(Problem::conflict(format!("there is nothing to {what}")));
+            }
+            self.save(&mut inner, false);
+            inner.done.is_some()
+        };
+        self.told(run, roots)
+    }
+
+    fn told(self: &Arc<Self>, run: bool, roots: &Roots) -> Answer<()> {
+        if run {
+            return self.run(roots);
+        }
+        let state = lock(&self.inner).state;
+        Progress::new(&self.hub, "work", &self.id).state(state);
+        Ok(())
+    }
+
+    /// Stops what is under way.
+    pub(crate) fn cancel(&self) {
+        lock(&self.inner).cancel.cancel();
+    }
+
+    /// Analyses what is asked now; what was under way is stopped.
+    pub(crate) fn run(self: &Arc<Self>, roots: &Roots) -> Answer<()> {
+        let mut inner = lock(&self.inner);
+        for file in &inner.history.now().files {
+            roots.file(&file.id)?;
+        }
+        inner.cancel.cancel();
+        inner.cancel = Cancel::new();
+        inner.run += 1;
+        (inner.state, inner.error) = ("running", None);
+        inner.failed.clear();
+        let (work, run, before) = (Arc::clone(self), inner.run, inner.thread.take());
+        let thread = std::thread::Builder::new()
+            .stack_size(STACK)
+            .spawn(move || {
+                // It has measured something, perhaps.
+                let _ = before.map(JoinHandle::join);
+                work.analyse(run);
+            });
+        inner.thread = Some(thread.map_err(Problem::fault)?);
+        drop(inner);
+        Progress::new(&self.hub, "work", &self.id).state("running");
+        Ok(())
+    }
+
+    fn analyse(&self, run: u64) {
+        let (asked, mut kept, cancel) = {
+            let inner = lock(&self.inner);
+            (
+                inner.history.now().clone(),
+                inner.kept.clone(),
+                inner.cancel.clone(),
+            )
+        };
+        let progress = Progress::new(&self.hub, "work", &self.id);
+        let found = run_beside(&cancel, &progress, |job| {
+            Done::of(&asked, &self.words, &mut kept, job)
+        });
+        let mut inner = lock(&self.inner);
+        // Nothing that was measured is lost by a panic.
+        if !kept.is_empty() {
+            inner.kept = kept;
+        }
+        if inner.run != run {
+            return;
+        }
+        match found {
+            Ok(done) => {
+                inner.done = Some(Arc::new(done));
+                inner.state = "done";
+                self.save(&mut inner, true);
+            }
+            Err(NoResult::Cancelled) => inner.state = "cancelled",
+            Err(NoResult::Fault(words)) => {
+                inner.state = "failed";
+                inner.error = Some(format!("a fault of moiregauge, please report it: {words}"));
+            }
+            Err(NoResult::Refused(why)) => {
+                let (words, failed) = why.in_words();
+                (inner.state, inner.error, inner.failed) = ("failed", Some(words), failed);
+            }
+        }
+        let state = inner.state;
+        drop(inner);
+        progress.state(state);
+    }
+
+    /// Keeps it on the disk, if that is wished; `result`: with what just came out.
+    fn save(&self, inner: &mut Inner, result: bool) {
+        let Some(keeper) = &self.keeper else {
+            return;
+        };
+        let done = inner.done.as_ref();
+        let on_disk = OnDisk {
+            history: inner.history.clone(),
+            answered: done.map(|done| done.asked.clone()),
+            moires: done.map_or(0, |done| done.documents.len()),
+        };
+        let new = done.filter(|_| result);
+        let new = new.map(|done| (done.documents.as_slice(), &inner.kept));
+        match keeper.save(&self.id, &on_disk, new) {
+            Ok(()) => inner.saved |= result,
+            // It is not shown as saved.
+            Err(_) => inner.saved = false,
+        }
+    }
+}
