@@ -5,7 +5,7 @@ import { COLOUR_MAPS } from "./colours.js";
 import { Contrast } from "./contrast.js";
 import { empty, field, fill, h, say, select } from "./dom.js";
 import { FileTree } from "./files.js";
-import { quantity } from "./format.js";
+import { minus } from "./format.js";
 import { background, LEVELLINGS, without } from "./levels.js";
 import { Measure } from "./measure.js";
 import { savePng, saveSvg } from "./picture.js";
@@ -133,6 +133,7 @@ export class LookView {
     const about = this.info.channels[channel];
     this.channel = channel;
     this.channelName = channelWords(about);
+    this.filterHeader(this.search?.value ?? "");
     for (const b of this.thumbs.children) b.setAttribute("aria-pressed", String(/** @type {HTMLElement} */ (b).dataset.channel === String(channel)));
     const step = Math.max(1, Math.ceil(Math.max(about.columns, about.rows) / WHOLE));
     this.viewer.canvas.setAttribute("aria-label", `${store.name(file)}, ${this.channelName}`);
@@ -195,14 +196,22 @@ export class LookView {
   showHeader(info) {
     /** @type {[string, string][]} */
     this.header = [];
-    flatten(info, "", this.header);
+    const { channels, ...rest } = info;
+    flatten(rest, "", this.header);
+    channels.forEach((/** @type {any} */ c) => {
+      const { name, line_direction: _, ...about } = c;
+      flatten(about, channelWords({ ...c, name }), this.header ?? []);
+    });
     this.filterHeader(this.search?.value ?? "");
   }
 
   /** @param {string} wanted */
   filterHeader(wanted) {
     const low = wanted.toLowerCase();
-    const rows = (this.header ?? []).filter(([k, v]) => `${k} ${v}`.toLowerCase().includes(low));
+    // Without a question the other channels are left out.
+    const others = (this.info?.channels ?? []).map(channelWords).filter((/** @type {string} */ w) => w !== this.channelName);
+    const here = (/** @type {string} */ k) => !others.some((/** @type {string} */ w) => k.startsWith(`${w} · `));
+    const rows = (this.header ?? []).filter(([k, v]) => (low === "" ? here(k) : `${k} ${v}`.toLowerCase().includes(low)));
     if (rows.length === 0) fill(this.headerHost, empty(this.header ? "Nothing of that." : "The header of the file stands here."));
     else fill(this.headerHost, h("table", {}, h("caption", { class: "away", text: "Header" }),
       h("tbody", {}, rows.map(([k, v]) => h("tr", {}, h("th", { scope: "row", text: k }), h("td", { text: v }))))));
@@ -243,5 +252,5 @@ function flatten(value, name, rows) {
   } else if (Array.isArray(value)) value.forEach((v, i) => flatten(v, `${name} ${i + 1}`, rows));
   else if (typeof value === "object") {
     for (const [k, v] of Object.entries(value)) flatten(v, name ? `${name} · ${k.replace(/_/g, " ")}` : k.replace(/_/g, " "), rows);
-  } else rows.push([name, typeof value === "number" ? quantity(value, "", 6) : String(value)]);
+  } else rows.push([name, typeof value === "number" ? minus(String(Number(value.toPrecision(7)))) : String(value)]);
 }

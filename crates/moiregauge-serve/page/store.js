@@ -1,6 +1,7 @@
 // What the views share: files by name, those chosen for an analysis, the one that is looked at.
 
 import { get, query } from "./api.js";
+import { baseName } from "./dom.js";
 
 /** @typedef {{file: string, name: string, bytes: number, folder: string}} FileEntry */
 
@@ -9,6 +10,8 @@ class Store extends EventTarget {
     super();
     /** @type {Map<string, FileEntry>} */
     this.files = new Map();
+    /** What the program calls a file in its results. @type {Map<string, string>} */
+    this.paths = new Map();
     /** Chosen for an analysis, in the order of their names. @type {Set<string>} */
     this.chosen = new Set();
     /** @type {string | null} */
@@ -49,6 +52,13 @@ class Store extends EventTarget {
     this.tell("current");
   }
 
+  /** @param {string} file @param {any} info */
+  found(file, info) {
+    this.paths.set(file, info.file);
+    if (!this.files.has(file)) this.learn({ file, name: baseName(info.file), bytes: 0, folder: "" });
+    return info;
+  }
+
   /**
    * What a file holds, asked once.
    * @param {string} file
@@ -57,7 +67,7 @@ class Store extends EventTarget {
   inspect(file) {
     let known = this.inspected.get(file);
     if (!known) {
-      known = get(`inspect${query({ file })}`).then((found) => (Array.isArray(found) ? found[0] : found));
+      known = get(`inspect${query({ file })}`).then((found) => this.found(file, Array.isArray(found) ? found[0] : found));
       known.catch(() => this.inspected.delete(file));
       this.inspected.set(file, known);
     }

@@ -1,0 +1,127 @@
+// What was found, drawn over images as SVG: the lattice, its spots, the region that carries it.
+
+import { fill, s } from "./dom.js";
+
+/** @typedef {import("./viewer.js").Viewer} Viewer */
+/** @typedef {[number, number]} Pair */
+/** @typedef {{origin_px: Pair, lattice_px: [Pair, Pair], lattice_nm?: [Pair, Pair], spots_per_nm?: Pair[],
+ *   outline_px?: Pair[] | Pair[][] | null}} Overlay */
+
+/** At most this many cells are drawn; more would hide the image. */
+const MOST = 4000;
+
+/**
+ * The lattice over an image: a circle on every lattice point, one cell, and the outline of the region.
+ * @param {SVGGElement} group
+ * @param {Viewer} viewer
+ * @param {Overlay | null} overlay
+ * @param {{cell?: boolean}} [options]
+ */
+export function drawLattice(group, viewer, overlay, options = {}) {
+  fill(group);
+  if (!overlay?.lattice_px || !viewer.image) return;
+  group.append(dots(viewer, overlay));
+  if (options.cell !== false) group.append(...cell(viewer, overlay));
+  for (const ring of rings(overlay.outline_px)) {
+    const points = ring.map(([x, y]) => place(viewer, x, y)).join(" ");
+    group.append(s("polygon", { points, class: "cell-halo" }), s("polygon", { points, class: "outline" }));
+  }
+}
+
+/** @param {Viewer} viewer @param {number} x @param {number} y */
+function place(viewer, x, y) {
+  const at = viewer.toScreen(x, y);
+  return `${at.x.toFixed(1)},${at.y.toFixed(1)}`;
+}
+
+/** One outline or several. @param {any} outline @returns {Pair[][]} */
+function rings(outline) {
+  if (!Array.isArray(outline) || outline.length === 0) return [];
+  return Array.isArray(outline[0][0]) ? outline : [outline];
+}
+
+/** The lattice point nearest to the middle of what is seen. @param {Viewer} viewer @param {Overlay} overlay @returns {Pair} */
+export function nearMiddle(viewer, { origin_px: o, lattice_px: [a, b] }) {
+  const det = a[0] * b[1] - a[1] * b[0];
+  const [x, y] = [viewer.columns / 2 - o[0], viewer.rows / 2 - o[1]];
+  const m = Math.round((x * b[1] - y * b[0]) / det);
+  const n = Math.round((a[0] * y - a[1] * x) / det);
+  return [o[0] + m * a[0] + n * b[0], o[1] + m * a[1] + n * b[1]];
+}
+
+/** @param {Viewer} viewer @param {Overlay} overlay */
+function dots(viewer, overlay) {
+  const group = s("g", { class: "dots" });
+  const [a, b] = overlay.lattice_px;
+  const o = nearMiddle(viewer, overlay);
+  const area = Math.abs(a[0] * b[1] - a[1] * b[0]);
+  if (!(area > 0) || (viewer.columns * viewer.rows) / area > MOST) return group;
+  const shortest = Math.min(Math.hypot(...a), Math.hypot(...b), Math.hypot(b[0] - a[0], b[1] - a[1]), Math.hypot(b[0] + a[0], b[1] + a[1]));
+  const radius = Math.max(2, Math.min(9, 0.14 * shortest * viewer.pixelX * viewer.view.scale));
+  const reach = Math.ceil(Math.hypot(viewer.columns, viewer.rows) * Math.max(Math.hypot(...a), Math.hypot(...b)) / area) + 1;
+  for (let m = -reach; m <= reach; m++) {
+    for (let n = -reach; n <= reach; n++) {
+      const [x, y] = [o[0] + m * a[0] + n * b[0], o[1] + m * a[1] + n * b[1]];
+      if (x < -0.5 || y < -0.5 || x > viewer.columns - 0.5 || y > viewer.rows - 0.5) continue;
+      const at = viewer.toScreen(x, y);
+      if (at.x < -20 || at.y < -20 || at.x > viewer.stage.clientWidth + 20 || at.y > viewer.stage.clientHeight + 20) continue;
+      group.append(s("circle", { cx: at.x.toFixed(1), cy: at.y.toFixed(1), r: radius, class: "halo" }), s("circle", { cx: at.x.toFixed(1), cy: at.y.toFixed(1), r: radius }));
+    }
+  }
+  return group;
+}
+
+/** @param {Viewer} viewer @param {Overlay} overlay */
+function cell(viewer, overlay) {
+  const o = nearMiddle(viewer, overlay);
+  const [a, b] = overlay.lattice_px;
+  const corners = [o, [o[0] + a[0], o[1] + a[1]], [o[0] + a[0] + b[0], o[1] + a[1] + b[1]], [o[0] + b[0], o[1] + b[1]]];
+  const points = corners.map(([x, y]) => place(viewer, x, y)).join(" ");
+  return [s("polygon", { points, class: "cell-halo" }), s("polygon", { points, class: "cell" })];
+}
+
+/**
+ * Where a wave vector lies in a transform whose zero is in the middle.
+ * @param {import("./api.js").Floats} image
+ * @param {Pair} k per nm
+ */
+export function spotPlace(image, k) {
+  return { x: Math.floor(image.width / 2) + k[0] / image.stepPerNm, y: Math.floor(image.height / 2) + k[1] / image.stepPerNm };
+}
+
+/**
+ * Circles about the spots of a lattice in its transform, and those opposite to them.
+ * @param {SVGGElement} group
+ * @param {Viewer} viewer
+ * @param {Overlay | null} overlay
+ */
+export function drawSpots(group, viewer, overlay) {
+  fill(group);
+  if (!overlay?.spots_per_nm || !viewer.image) return;
+  const all = s("g", { class: "dots" });
+  const both = overlay.spots_per_nm.flatMap((k) => /** @type {Pair[]} */ ([k, [-k[0], -k[1]]]));
+  for (const k of both) {
+    const p = spotPlace(viewer.image, k);
+    const at = viewer.toScreen(p.x, p.y);
+    all.append(s("circle", { cx: at.x, cy: at.y, r: 9, class: "halo" }), s("circle", { cx: at.x, cy: at.y, r: 9 }));
+  }
+  group.append(all);
+}
+
+/**
+ * Shows the part of a transform where the spots are.
+ * @param {Viewer} viewer
+ * @param {Overlay | null} overlay
+ */
+export function frameSpots(viewer, overlay) {
+  viewer.fit();
+  const image = viewer.image;
+  if (!image || !overlay?.spots_per_nm?.length) return;
+  const farthest = Math.max(...overlay.spots_per_nm.map((k) => Math.hypot(...k))) / image.stepPerNm;
+  const factor = image.width / (2 * 2.6 * farthest);
+  if (factor > 1) {
+    viewer.zoom(factor);
+    const middle = viewer.toScreen(Math.floor(image.width / 2), Math.floor(image.height / 2));
+    viewer.pan(viewer.stage.clientWidth / 2 - middle.x, viewer.stage.clientHeight / 2 - middle.y);
+  }
+}
