@@ -57,9 +57,18 @@ export function headline(found) {
     item("Twist θ", total(mean?.twist_deg, "°"), statistical(mean?.twist_deg, "°")),
     item("Heterostrain ε", total(mean?.heterostrain_percent, "%"), interval ? `95 %: ${number(interval[0])} to ${number(interval[1])} % (statistical)` : statistical(mean?.heterostrain_percent, "%")),
     item("Axis of tension, to x", axis ? total(axis, "°") : "not significant", axis ? statistical(axis, "°") : null),
-    drift ? item("Drift x, y", `${total(drift.x_nm_per_min)}, ${total(drift.y_nm_per_min)}`, drift.given ? "nm/min, as given" : "nm/min", true)
+    drift ? lines(drift.given ? "Drift, as given" : "Drift", [["x", total(drift.x_nm_per_min, "nm/min")], ["y", total(drift.y_nm_per_min, "nm/min")]])
       : item("Drift", "not determined", "Twist and strain are not corrected for it", true),
-    item("Wavelengths", (mean?.vectors ?? []).map((/** @type {any} */ v) => total(v.wavelength_nm)).join(", "), `nm, at ${(mean?.vectors ?? []).map((/** @type {any} */ v) => number(v.polar_angle_deg, 4)).join(", ")}° to x`, true));
+    lines("Wavelengths, and directions to x", (mean?.vectors ?? []).map((/** @type {any} */ v) => [total(v.wavelength_nm, "nm"), `at ${number(v.polar_angle_deg, 4)}°`])));
+}
+
+/**
+ * Several numbers under one name.
+ * @param {string} name
+ * @param {[string, string][]} rows
+ */
+function lines(name, rows) {
+  return h("div", {}, h("span", { class: "name", text: name }), h("div", { class: "lines" }, rows.flatMap(([a, b]) => [h("span", { text: a }), h("span", { text: b })])));
 }
 
 /** What contributes how much to the error. @param {any} mean */
@@ -93,11 +102,16 @@ export async function caveatList(caveats) {
   known.sort((a, b) => order.indexOf(a.about.severity) - order.indexOf(b.about.severity));
   return h("ul", { class: "caveats" }, known.map(({ code, all, about }) =>
     h("li", { class: `caveat ${about.severity}` },
-      h("p", {}, h("span", { class: "code", text: words(code.replace(/-/g, " ")) }), h("span", { class: "soft", text: `  ${about.severity}` })),
-      all.slice(0, 3).map((c) => h("p", {}, `${c.message}. `, h("span", { class: "where", text: c.where }))),
+      h("p", {}, h("span", { class: "code", text: first(code.replace(/-/g, " ")) }), h("span", { class: "soft", text: `  ${about.severity}` })),
+      all.slice(0, 3).map((c) => h("p", {}, `${first(c.message)}. `, h("span", { class: "where", text: c.where }))),
       all.length > 3 ? h("p", { class: "where", text: `and ${all.length - 3} more: ${all.slice(3).map((c) => c.where).join(", ")}` }) : null,
       about.what_to_do ? h("p", {}, h("b", { text: "What to do: " }), about.what_to_do) : null,
       about.meaning ? h("details", {}, h("summary", { text: "What it means" }), h("p", { text: about.meaning })) : null)));
+}
+
+/** With a capital letter. @param {string} text */
+function first(text) {
+  return text.charAt(0).toUpperCase() + text.slice(1);
 }
 
 /** Files that could not be used. @param {any[]} failed */
