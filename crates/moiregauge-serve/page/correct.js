@@ -23,6 +23,10 @@ export class CorrectView {
     this.overlay = null;
     /** What is drawn while something is moved. @type {import("./overlay.js").Overlay | null} */
     this.draft = null;
+    /** Regions while a corner is being moved, px. @type {{x: number, y: number}[][] | null} */
+    this.movedRegions = null;
+    this.body = h("div", {});
+    this.none = empty("Analyse scans first; what was found can then be corrected here.");
     /** @type {Marker[]} */
     this.markers = [];
     /** Corners of a region that is being drawn, px. @type {{x: number, y: number}[] | null} */
@@ -63,11 +67,10 @@ export class CorrectView {
 
   middle() {
     const panel = (/** @type {string} */ title, /** @type {Viewer} */ viewer) => h("figure", { class: "panel" }, h("figcaption", { text: title }), viewer.element);
-    this.body = h("div", {},
+    fill(this.body,
       h("div", { class: "bar" }, h("h2", { text: "Lattice and regions" }), this.regionTools),
       h("div", { class: "panels" }, panel("Drag the yellow ends of the two vectors", this.image),
         h("div", {}, panel("Or the spots of the transform", this.spectrum), this.result, this.help)));
-    this.none = empty("Analyse scans first; what was found can then be corrected here.");
     return h("section", { class: "middle", "aria-label": "Corrections" }, this.none, this.body);
   }
 
@@ -126,7 +129,7 @@ export class CorrectView {
   showState() {
     const is = work.is;
     this.none.hidden = !!is;
-    if (this.body) this.body.hidden = !is;
+    this.body.hidden = !is;
     this.list.element.hidden = !is;
     this.undo.disabled = !is?.can_undo;
     this.redo.disabled = !is?.can_redo;
@@ -175,7 +178,7 @@ export class CorrectView {
     if (this.drawing) this.regions.append(s("polyline", { points: this.drawing.map(at).join(" "), class: "outline" }));
   }
 
-  /** Regions as they stand, with those corners that are being moved. */
+  /** Regions as they stand, with those corners that are being moved. @returns {{x: number, y: number}[][]} */
   regionsPx() {
     return this.movedRegions ?? (work.is?.settings?.by_hand?.regions_nm ?? []).map((/** @type {Pair[]} */ ring) => ring.map((c) => cornerPx(this.image, c)));
   }

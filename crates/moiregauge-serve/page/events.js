@@ -48,6 +48,11 @@ export function listen() {
     tell(false);
     if (stream?.readyState === EventSource.CLOSED) again();
   };
+  // The program was started anew, or too much was missed: views ask for everything again.
+  stream.addEventListener("reset", () => {
+    tell(false);
+    tell(true);
+  });
   for (const kind of ["work", "map", "watch"]) {
     stream.addEventListener(kind, (event) => {
       const detail = { kind, ...JSON.parse(/** @type {MessageEvent} */ (event).data) };

@@ -1,7 +1,7 @@
 // The folders of the program's roots as a tree, and the place to drop files.
 
 import { ask, get, query } from "./api.js";
-import { fill, h, say } from "./dom.js";
+import { baseName, fill, h, say } from "./dom.js";
 import { size } from "./format.js";
 import { store } from "./store.js";
 
@@ -32,7 +32,7 @@ export class FileTree {
     const roots = [...store.state.roots];
     if (!roots.some((r) => r.root === DROPPED)) roots.push({ root: DROPPED, name: "Dropped" });
     const shown = [];
-    for (const [i, root] of roots.entries()) shown.push(this.folder(root.root, "", root.name, root.root !== DROPPED && i === 0));
+    for (const [i, root] of roots.entries()) shown.push(this.folder(root.root, "", root.root === DROPPED ? "Dropped" : baseName(root.name) || root.name, root.root !== DROPPED && i === 0, root.name));
     fill(this.list, shown);
   }
 
@@ -42,10 +42,11 @@ export class FileTree {
    * @param {string} under
    * @param {string} name
    * @param {boolean} open
+   * @param {string} [title]
    */
-  folder(root, under, name, open) {
+  folder(root, under, name, open, title = name) {
     const inside = h("ul", { hidden: true });
-    const button = h("button", { type: "button", class: "folder", "aria-expanded": "false" }, h("span", { class: "twist", "aria-hidden": "true" }), h("span", { class: "file-name", text: name, title: name }));
+    const button = h("button", { type: "button", class: "folder", "aria-expanded": "false" }, h("span", { class: "twist", "aria-hidden": "true" }), h("span", { class: "file-name", text: name, title }));
     const all = h("input", { type: "checkbox", "aria-label": `Use all scans of ${name}`, title: "Use all scans of this folder" });
     let read = false;
     const toggle = async (/** @type {boolean} */ on) => {
@@ -74,7 +75,7 @@ export class FileTree {
       const found = await get(`folder${query({ root, under })}`);
       const below = (/** @type {string} */ name) => (under ? `${under}/${name}` : name);
       const folders = found.folders.map((/** @type {string} */ name) => this.folder(root, below(name), name, false));
-      const files = found.files.map((/** @type {any} */ f) => this.file({ ...f, folder: `${root}/${under}` }));
+      const files = found.files.map((/** @type {any} */ f) => (f.file ? this.file({ ...f, folder: `${root}/${under}` }) : unreadable(f)));
       fill(inside, folders, files);
       if (folders.length + files.length === 0) fill(inside, h("li", { class: "hint", text: root === DROPPED ? "Nothing was dropped yet." : "No files." }));
       this.showChosen();
@@ -171,6 +172,11 @@ export class FileTree {
     this.showChosen();
     this.markCurrent();
   }
+}
+
+/** A file that should be a scan and cannot be read. @param {{name: string, error?: string}} entry */
+function unreadable(entry) {
+  return h("li", { class: "unreadable" }, h("details", {}, h("summary", { text: `${entry.name}: cannot be read` }), String(entry.error ?? "")));
 }
 
 /**

@@ -196,12 +196,14 @@ export class LookView {
   showHeader(info) {
     /** @type {[string, string][]} */
     this.header = [];
-    const { channels, ...rest } = info;
+    const { channels, header, ...rest } = info;
     flatten(rest, "", this.header);
     channels.forEach((/** @type {any} */ c) => {
       const { name, line_direction: _, ...about } = c;
       flatten(about, channelWords({ ...c, name }), this.header ?? []);
     });
+    // What the file itself says comes last.
+    for (const pair of header ?? []) if (Array.isArray(pair)) this.header.push([String(pair[0]), pair.slice(1).map(String).join(", ")]);
     this.filterHeader(this.search?.value ?? "");
   }
 

@@ -28,6 +28,8 @@ export class Asked {
     /** @type {ReturnType<typeof setTimeout> | undefined} */
     this.wait = undefined;
     this.count = 0;
+    /** What is being drawn, nodes. @type {{x: number, y: number}[] | null} */
+    this.draft = null;
     this.drawing = s("g", {});
     view.main.overlay.insertBefore(this.drawing, view.main.ruler);
     view.main.addEventListener("view", () => this.draw());

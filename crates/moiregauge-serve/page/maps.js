@@ -35,7 +35,22 @@ export class MapsView {
     this.sigmas = null;
     /** @type {import("./api.js").Floats | null} */
     this.mask = null;
-    this.makeViewers();
+    const make = (/** @type {string} */ label) => new Viewer(label, { readout: false });
+    this.main = make("Map");
+    this.error = make("Error of the map");
+    this.masked = make("Mask of the map");
+    this.viewers = [this.main, this.error, this.masked];
+    /** @type {{x: number, y: number} | null} */
+    this.cursor = null;
+    /** @type {Marker | null} */
+    this.keyCursor = null;
+    this.linking = false;
+    this.titles = ["Map", "One standard deviation", "Mask"].map((text) => h("figcaption", { text }));
+    this.errorBar = h("div", { class: "colourbar" });
+    this.legend = h("div", { class: "legend" });
+    this.none = empty("A map of twist and strain across a scan stands here. Choose a scan and make it.");
+    this.body = h("div", {});
+    this.linkViewers();
     this.contrast = new Contrast((range) => this.main.setLook(range), "colours");
     this.asked = new Asked(this, failed);
     this.file = select([], "", () => undefined);
@@ -58,12 +73,7 @@ export class MapsView {
     this.restore();
   }
 
-  makeViewers() {
-    const make = (/** @type {string} */ label) => new Viewer(label, { readout: false });
-    this.main = make("Map");
-    this.error = make("Error of the map");
-    this.masked = make("Mask of the map");
-    this.viewers = [this.main, this.error, this.masked];
+  linkViewers() {
     for (const viewer of this.viewers) {
       viewer.clear("");
       const cross = s("g", {});
@@ -74,9 +84,6 @@ export class MapsView {
         this.drawCross(viewer, cross);
       });
     }
-    /** @type {{x: number, y: number} | null} */
-    this.cursor = null;
-    this.linking = false;
   }
 
   left() {
@@ -91,11 +98,7 @@ export class MapsView {
       this.main.setLook({ colours: name });
       this.contrast.setColours(name);
     });
-    this.titles = ["Map", "One standard deviation", "Mask"].map((text) => h("figcaption", { text }));
-    this.errorBar = h("div", { class: "colourbar" });
-    this.legend = h("div", { class: "legend" });
-    this.none = empty("A map of twist and strain across a scan stands here. Choose a scan and make it.");
-    this.body = h("div", {},
+    fill(this.body,
       h("div", { class: "bar" }, h("div", { class: "toolbar" }, field("Quantity", this.choice), field("Colours", colours)), this.asked.tools),
       h("div", { class: "panels three" },
         h("figure", { class: "panel" }, this.titles[0], this.main.element, this.contrast.element),
@@ -179,7 +182,7 @@ export class MapsView {
     else if (!this.state.textContent) this.state.textContent = "Running";
     const there = !!this.document && this.document.of === this.map?.map;
     this.none.hidden = there;
-    if (this.body) this.body.hidden = !there;
+    this.body.hidden = !there;
     this.asked.element.hidden = !there;
   }
 
@@ -271,16 +274,16 @@ export class MapsView {
     }
     this.main.show(this.values, { keepView: true });
     this.contrast.take(this.values.data, found.unit);
-    if (this.titles) this.titles[0].textContent = `${found.name.replace(/_/g, " ")}${found.unit ? ` (${found.unit})` : ""}`;
+    this.titles[0].textContent = `${found.name.replace(/_/g, " ")}${found.unit ? ` (${found.unit})` : ""}`;
     if (this.sigmas) {
       const { low, high } = histogram(this.sigmas.data);
       this.error.setLook({ low: 0, high, colours: "cividis" });
       this.error.show(this.sigmas, { keepView: true });
-      fill(this.errorBar ?? h("div"), number(0), bar("cividis"), withUnit(high, found.unit, 2));
+      fill(this.errorBar, number(0), bar("cividis"), withUnit(high, found.unit, 2));
       if (low === high) this.error.setLook({ low: low - 1, high: high + 1 });
     } else {
       this.error.clear("No error of its own");
-      fill(this.errorBar ?? h("div"));
+      fill(this.errorBar);
     }
     this.placeCursor();
   }
@@ -297,7 +300,7 @@ export class MapsView {
   follow(leader) {
     if (this.linking || !leader.image) return;
     this.linking = true;
-    for (const viewer of this.viewers ?? []) {
+    for (const viewer of this.viewers) {
       if (viewer === leader || !viewer.image) continue;
       const { scale, x, y } = leader.view;
       if (viewer.view.scale === scale && viewer.view.x === x && viewer.view.y === y) continue;
@@ -319,7 +322,7 @@ export class MapsView {
   /** The same place in all three. @param {{x: number, y: number} | null} at */
   point(at) {
     this.cursor = at;
-    for (const viewer of this.viewers ?? []) viewer.redraw();
+    for (const viewer of this.viewers) viewer.redraw();
     if (!at || !this.values || !this.quantity) {
       this.readout.textContent = "";
       return;

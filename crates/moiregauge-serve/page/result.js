@@ -81,6 +81,7 @@ export function budgetTable(mean) {
     h("div", { class: "share-bar", css: { width: `${Math.max(0.5, (100 * b[k]) / greatest(b))}%` } });
   const digits = (/** @type {number} */ v) => (v === 0 ? "0" : number(v, 2));
   const { twist_deg: t, heterostrain_percent: e } = budget;
+  /** @type {import("./dom.js").Child[][]} */
   const rows = sources.map((k) => [words(k), share(t, k), digits(t[k]), share(e, k), digits(e[k])]);
   rows.push([h("b", { text: "all together" }), "", h("b", { text: digits(t.total) }), "", h("b", { text: digits(e.total) })]);
   const made = table("One standard deviation for each source of error", ["Source", "", "Twist (°)", "", "Heterostrain (%)"], rows, { numbers: [2, 4], class: "bars" });
