@@ -1,7 +1,7 @@
 // Analyse: from chosen scans to twist, heterostrain and drift.
 
 import { get } from "./api.js";
-import { baseName, empty, field, fill, h, say, select } from "./dom.js";
+import { baseName, empty, field, fill, h, say, scroll, select } from "./dom.js";
 import { total } from "./format.js";
 import { drawLattice, drawSpots, frameSpots } from "./overlay.js";
 import { overlayOf, showPart, showScan, showSpectrum } from "./pictures.js";
@@ -135,7 +135,7 @@ export class AnalyseView {
     this.latticeShown = true;
     const panel = (/** @type {string} */ title, /** @type {Viewer} */ viewer) => h("figure", { class: "panel" }, h("figcaption", { text: title }), viewer.element);
     this.scanName = h("h2", {});
-    this.scanNumbers = h("div", { class: "scroll" });
+    this.scanNumbers = scroll("Numbers of this scan");
     const toggle = h("input", { type: "checkbox" });
     toggle.checked = true;
     toggle.addEventListener("change", () => {
@@ -182,7 +182,7 @@ export class AnalyseView {
       results.caveats?.length ? h("section", { "aria-label": "Caveats" }, h("h3", { text: `${results.caveats.length} ${results.caveats.length === 1 ? "caveat" : "caveats"}` }), caveats) : null,
       this.pictures,
       h("section", { class: "section" }, h("h2", { text: "Scan by scan" }), this.plots.element),
-      found ? h("section", { class: "section" }, h("h2", { text: "Where the error comes from" }), h("div", { class: "scroll" }, budgetTable(found.mean))) : null,
+      found ? h("section", { class: "section" }, h("h2", { text: "Where the error comes from" }), scroll("Budget of errors", budgetTable(found.mean))) : null,
       h("section", { class: "section" }, h("h2", { text: "Figures of the report" }), this.figures()));
     this.plots.show(scans);
     this.list.show(this.picked);

@@ -70,7 +70,7 @@ export class CorrectView {
     fill(this.body,
       h("div", { class: "bar" }, h("h2", { text: "Lattice and regions" }), this.regionTools),
       h("div", { class: "panels" }, panel("Drag the yellow ends of the two vectors", this.image),
-        h("div", {}, panel("Or the spots of the transform", this.spectrum), this.result, this.help)));
+        panel("Or the spots of the transform", this.spectrum), h("div", { class: "outcome" }, this.result, this.help)));
     return h("section", { class: "middle", "aria-label": "Corrections" }, this.none, this.body);
   }
 

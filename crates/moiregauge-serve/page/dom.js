@@ -118,6 +118,15 @@ export function table(caption, head, rows, options = {}) {
 }
 
 /**
+ * What may be wider than its place: scrolled with the mouse or, since it takes the focus, with the arrow keys.
+ * @param {string} label
+ * @param {...(Child | Child[])} children
+ */
+export function scroll(label, ...children) {
+  return h("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": label }, ...children);
+}
+
+/**
  * A message in place of something that is not there.
  * @param {string} words
  * @param {...Child} more

@@ -37,7 +37,7 @@ export class LookView {
     this.reading = h("p", { class: "reading", "aria-live": "polite" });
     this.profile = new Plot({ title: "Profile", x: [], xLabel: "Distance", series: [] });
     this.profile.element.hidden = true;
-    this.headerHost = h("div", { class: "scroll header-table" });
+    this.headerHost = h("div", { class: "header-table" });
     this.element = h("div", { class: "columns look-columns" }, this.tree.element, this.middle(), this.side());
     store.addEventListener("state", () => this.tree.load());
     store.addEventListener("current", () => this.open());

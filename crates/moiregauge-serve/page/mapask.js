@@ -1,7 +1,7 @@
 // Questions to a map: regions, profiles, the most uniform areas for a device, a wanted twist.
 
 import { send } from "./api.js";
-import { field, fill, h, s, table } from "./dom.js";
+import { field, fill, h, s, scroll, table } from "./dom.js";
 import { number, total, withError } from "./format.js";
 import { Marker } from "./markers.js";
 import { Plot } from "./plot.js";
@@ -188,9 +188,9 @@ export class Asked {
     const rows = regions.map((/** @type {any} */ r) => [r.name, total(r.mean?.twist_deg ?? estimate(r.twist_deg)), total(r.mean?.heterostrain_percent),
       number(r.twist_deg?.spread_corrected, 2), withError(r.wavelength_nm?.mean, r.wavelength_nm?.sigma), number(r.area_nm2, 4), `${number(r.masked_percent, 3)} %`]);
     fill(this.answers,
-      regions.length > 0 ? h("div", { class: "scroll" }, table("Regions", ["Region", "Twist (°)", "Heterostrain (%)", "Spread of twist (°)", "Wavelength (nm)", "Area (nm²)", "Masked"], rows, { numbers: [1, 2, 3, 4, 5, 6], shown: true })) : null,
-      devices.length > 0 ? h("div", { class: "scroll" }, this.deviceTable(devices)) : null,
-      answer.wanted ? h("div", { class: "scroll" }, table("Area with the wanted twist", ["Number", "Value"], Object.entries(answer.wanted).filter(([, v]) => typeof v === "number").map(([k, v]) => [k.replace(/_/g, " "), number(/** @type {number} */ (v))]), { shown: true })) : null,
+      regions.length > 0 ? scroll("Regions", table("Regions", ["Region", "Twist (°)", "Heterostrain (%)", "Spread of twist (°)", "Wavelength (nm)", "Area (nm²)", "Masked"], rows, { numbers: [1, 2, 3, 4, 5, 6], shown: true })) : null,
+      devices.length > 0 ? scroll("Most uniform areas", this.deviceTable(devices)) : null,
+      answer.wanted ? scroll("Area with the wanted twist", table("Area with the wanted twist", ["Number", "Value"], Object.entries(answer.wanted).filter(([, v]) => typeof v === "number").map(([k, v]) => [k.replace(/_/g, " "), number(/** @type {number} */ (v))]), { shown: true })) : null,
       (answer.profiles ?? []).length > 0 ? this.profilePlot.element : null);
     if ((answer.profiles ?? []).length > 0) this.showProfile(answer.profiles);
   }

@@ -3,7 +3,7 @@
 import { floats, get, query, send } from "./api.js";
 import { bar, COLOUR_MAPS } from "./colours.js";
 import { Contrast } from "./contrast.js";
-import { empty, field, fill, h, s, say, select } from "./dom.js";
+import { empty, field, fill, h, s, say, scroll, select } from "./dom.js";
 import { onHappening } from "./events.js";
 import { number, quantity as withUnit, withError } from "./format.js";
 import { histogram } from "./levels.js";
@@ -291,7 +291,7 @@ export class MapsView {
   async showInfo() {
     const d = this.document;
     const q = (d.quantities ?? []).map((/** @type {any} */ x) => h("tr", {}, h("th", { scope: "row", text: x.name }), h("td", { class: "number", text: withError(x.mean, x.mean_sigma) }), h("td", { text: x.unit })));
-    fill(this.info, h("h3", { text: "Means of the good nodes" }), h("div", { class: "scroll" }, h("table", {}, h("caption", { class: "away", text: "Means over the good nodes, noise of the images only" }), h("tbody", {}, q))),
+    fill(this.info, h("h3", { text: "Means of the good nodes" }), scroll("Means of the good nodes", h("table", {}, h("caption", { class: "away", text: "Means over the good nodes, noise of the images only" }), h("tbody", {}, q))),
       h("p", { class: "hint", text: `Window σ ${number(d.window_nm, 3)} nm, resolution ${number(d.resolution_nm, 3)} nm, ${d.nodes?.join(" × ") ?? ""} nodes.` }),
       d.caveats?.length ? h("h3", { text: `${d.caveats.length} caveats` }) : null, d.caveats?.length ? await caveatList(d.caveats) : null);
   }

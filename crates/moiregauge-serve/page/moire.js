@@ -1,7 +1,7 @@
 // Moiré and plan: layers, twist and strain give the cell; wished errors give a plan.
 
 import { send } from "./api.js";
-import { empty, field, fill, h, s, select, table } from "./dom.js";
+import { empty, field, fill, h, s, scroll, select, table } from "./dom.js";
 import { number, power, quantity } from "./format.js";
 
 /** @type {[string, string][]} */
@@ -123,7 +123,7 @@ export class MoireView {
     }
     const columns = Object.keys(list[0]).filter((k) => typeof list[0][k] !== "object" || Array.isArray(list[0][k]) || list[0][k] === null);
     fill(this.plan, h("h2", { text: "Plan" }), answer.words ? h("p", { text: answer.words }) : null,
-      h("div", { class: "scroll" }, table("Plans, the recommended one first", columns.map((c) => c.replace(/_/g, " ")), list.map((/** @type {any} */ p) => columns.map((c) => cell(p[c]))), { numbers: columns.map((_, i) => i).slice(1) })));
+      scroll("Plans", table("Plans, the recommended one first", columns.map((c) => c.replace(/_/g, " ")), list.map((/** @type {any} */ p) => columns.map((c) => cell(p[c]))), { numbers: columns.map((_, i) => i).slice(1) })));
   }
 }
 

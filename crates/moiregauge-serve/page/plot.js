@@ -1,7 +1,7 @@
 // Plots with errors, values under the pointer, points to click, and the same numbers as a table.
 
 import uPlot from "./uPlot.esm.js";
-import { fill, h, table } from "./dom.js";
+import { fill, h, scroll, table } from "./dom.js";
 import { number, withError } from "./format.js";
 
 /** @typedef {{label: string, unit: string, y: (number | null)[], sigma?: (number | null)[], colour?: number,
@@ -28,7 +28,7 @@ export class Plot {
     this.is = is;
     this.host = h("div", { class: "plot-host", "aria-hidden": "true" });
     this.readout = h("div", { class: "plot-readout", "aria-hidden": "true" });
-    this.tableHost = h("div", { class: "scroll" });
+    this.tableHost = scroll(`Table: ${is.title}`);
     this.details = h("details", { class: "figure-table" }, h("summary", { text: "Table" }), this.tableHost);
     this.details.addEventListener("toggle", () => this.fillTable());
     this.caption = h("figcaption", { text: is.title });

@@ -59,7 +59,7 @@ export function headline(found) {
     item("Axis of tension, to x", axis ? total(axis, "°") : "not significant", axis ? statistical(axis, "°") : null),
     drift ? lines(drift.given ? "Drift, as given" : "Drift", [["x", total(drift.x_nm_per_min, "nm/min")], ["y", total(drift.y_nm_per_min, "nm/min")]])
       : item("Drift", "not determined", "Twist and strain are not corrected for it", true),
-    lines("Wavelengths, and directions to x", (mean?.vectors ?? []).map((/** @type {any} */ v) => [total(v.wavelength_nm, "nm"), `at ${number(v.polar_angle_deg, 4)}°`])));
+    lines("Wavelengths, angles to x", (mean?.vectors ?? []).map((/** @type {any} */ v) => [total(v.wavelength_nm, "nm"), `at ${number(v.polar_angle_deg, 4)}°`])));
 }
 
 /**
@@ -84,7 +84,7 @@ export function budgetTable(mean) {
   /** @type {import("./dom.js").Child[][]} */
   const rows = sources.map((k) => [words(k), share(t, k), digits(t[k]), share(e, k), digits(e[k])]);
   rows.push([h("b", { text: "all together" }), "", h("b", { text: digits(t.total) }), "", h("b", { text: digits(e.total) })]);
-  const made = table("One standard deviation for each source of error", ["Source", "", "Twist (°)", "", "Heterostrain (%)"], rows, { numbers: [2, 4], class: "bars" });
+  const made = table("One standard deviation for each source of error", ["Source", "Share", "Twist (°)", "Share", "Heterostrain (%)"], rows, { numbers: [2, 4], class: "bars" });
   for (const cell of made.querySelectorAll("td:nth-child(2), td:nth-child(4)")) cell.classList.add("share");
   return made;
 }

@@ -1,7 +1,7 @@
 // Samples: the table of a campaign, two of them side by side, trends.
 
 import { get, query } from "./api.js";
-import { baseName, empty, field, fill, h, select } from "./dom.js";
+import { baseName, empty, field, fill, h, scroll, select } from "./dom.js";
 import { number, withError } from "./format.js";
 import { Plot } from "./plot.js";
 import { store } from "./store.js";
@@ -21,7 +21,7 @@ export class SamplesView {
     /** @type {Set<string>} */
     this.pair = new Set();
     this.folder = select([["", "reading the folders …"]], "", () => this.load());
-    this.host = h("div", { class: "scroll" });
+    this.host = scroll("Table of samples");
     this.compare = h("div", { class: "compare" });
     this.trend = new Plot({ title: "Trend", x: [], xLabel: "Sample", series: [] });
     this.trend.element.hidden = true;
@@ -30,7 +30,7 @@ export class SamplesView {
     this.element = h("div", { class: "columns" },
       h("section", { "aria-label": "Campaign" }, h("h2", { text: "Samples" }), field("Folder of results", this.folder), this.trendBar,
         h("p", { class: "hint", text: "Columns sort by their heads. Tick two samples to see them side by side." })),
-      h("section", { class: "middle", "aria-label": "Table of samples" }, this.host, this.trend.element, this.compare));
+      h("section", { class: "middle", "aria-label": "Samples" }, this.host, this.trend.element, this.compare));
     fill(this.host, empty("Choose the folder that moiregauge campaign wrote its results to: one row for each sample, with a picture."));
   }
 

@@ -1,7 +1,7 @@
 // Watch: a folder at the microscope, frame by frame.
 
 import { get, query, send } from "./api.js";
-import { baseName, empty, field, fill, h, say, select, table } from "./dom.js";
+import { baseName, empty, field, fill, h, say, scroll, select, table } from "./dom.js";
 import { onHappening } from "./events.js";
 import { total } from "./format.js";
 import { Plot } from "./plot.js";
@@ -23,7 +23,7 @@ export class WatchView {
     this.body = h("section", { class: "middle", "aria-label": "Live result" });
     this.head = h("div", { "aria-live": "polite" });
     this.plots = { twist: plot("Twist"), strain: plot("Heterostrain"), drift: plot("Drift") };
-    this.frames = h("div", { class: "scroll" });
+    this.frames = scroll("Results of all frames");
     this.advice = h("div", {});
     this.element = h("div", { class: "columns" },
       h("section", { "aria-label": "Folder to watch" }, h("h2", { text: "Watch a folder" }), field("Folder", this.folder),
