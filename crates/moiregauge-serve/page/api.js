@@ -68,7 +68,8 @@ export async function send(method, path, body) {
 }
 
 /** @typedef {{data: Float32Array, width: number, height: number, unit: string, pixelX: number, pixelY: number,
- *   stepPerNm: number}} Floats row 0 is the bottom; pixelX and pixelY are those of the samples sent, nm */
+ *   steps: [number, number]}} Floats row 0 is the bottom; pixelX and pixelY are those of the samples sent, nm; steps of
+ *   a transform in periods per pixel of the image */
 
 /**
  * Numbers of an image.
@@ -80,6 +81,7 @@ export async function floats(path, signal) {
   const answer = await ask(path, { signal });
   const head = (/** @type {string} */ name) => Number(answer.headers.get(name) ?? NaN);
   const data = new Float32Array(await answer.arrayBuffer());
+  const steps = (answer.headers.get("x-step-per-pixel") ?? "").split(" ").filter((text) => text !== "");
   const unit = unitOf(answer.headers.get("x-unit") ?? "");
   return {
     data,
@@ -88,7 +90,7 @@ export async function floats(path, signal) {
     unit,
     pixelX: head("x-pixel-nm-x"),
     pixelY: head("x-pixel-nm-y"),
-    stepPerNm: head("x-step-per-nm"),
+    steps: [Number(steps[0] ?? NaN), Number(steps[1] ?? steps[0] ?? NaN)],
   };
 }
 
