@@ -3,20 +3,18 @@
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import { createRequire } from "node:module";
-import { after, before, test } from "node:test";
+import { after, afterEach, beforeEach, test } from "node:test";
 import { analyse, closeBrowser, open, openFolder, rootWith, serve, simulated, view } from "./harness.mjs";
 
 const axe = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
 /** @type {Awaited<ReturnType<typeof serve>>} */
 let server;
 
-before(async () => {
+beforeEach(async () => {
   server = await serve([rootWith("plain", simulated("plain"))]);
 });
-after(async () => {
-  await closeBrowser();
-  await server.stop();
-});
+afterEach(() => server.stop());
+after(closeBrowser);
 
 /** What axe-core calls serious or critical. @param {import("playwright-core").Page} page */
 async function serious(page) {

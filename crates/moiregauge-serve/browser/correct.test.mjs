@@ -1,19 +1,17 @@
 // Correct: the lattice by drag and by keyboard, regions, scans left out, steps back.
 
 import assert from "node:assert/strict";
-import { after, before, test } from "node:test";
+import { after, afterEach, beforeEach, test } from "node:test";
 import { analyse, api, closeBrowser, nextResult, open, rootWith, serve, simulated, view } from "./harness.mjs";
 
 /** @type {Awaited<ReturnType<typeof serve>>} */
 let server;
 
-before(async () => {
+beforeEach(async () => {
   server = await serve([rootWith("plain", simulated("plain"))]);
 });
-after(async () => {
-  await closeBrowser();
-  await server.stop();
-});
+afterEach(() => server.stop());
+after(closeBrowser);
 
 async function start() {
   const page = await open(server.url);

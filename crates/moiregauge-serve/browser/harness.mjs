@@ -127,7 +127,7 @@ export async function openFolder(page, folder) {
 /** Chooses all scans of a folder, and analyses them. @param {import("playwright-core").Page} page @param {string} folder */
 export async function analyse(page, folder) {
   await view(page, "Look");
-  await page.getByRole("checkbox", { name: `Use all scans of ${folder}` }).check();
+  await page.getByRole("checkbox", { name: `Use all scans of ${folder}`, exact: true }).check();
   await page.getByText("scans chosen").first().waitFor();
   await view(page, "Analyse");
   await page.getByRole("button", { name: /^Analyse/ }).click();

@@ -1,19 +1,17 @@
 // Maps: run, linked cursor, region and profile by mouse and keyboard.
 
 import assert from "node:assert/strict";
-import { after, before, test } from "node:test";
+import { after, afterEach, beforeEach, test } from "node:test";
 import { closeBrowser, open, openFolder, rootWith, serve, simulated, view } from "./harness.mjs";
 
 /** @type {Awaited<ReturnType<typeof serve>>} */
 let server;
 
-before(async () => {
+beforeEach(async () => {
   server = await serve([rootWith("wide", simulated("wide", ["--scans", "1", "--pixels", "512", "--size", "160", "160"]))]);
 });
-after(async () => {
-  await closeBrowser();
-  await server.stop();
-});
+afterEach(() => server.stop());
+after(closeBrowser);
 
 test("a map is made, read with the keyboard, and asked about a region", async () => {
   const page = await open(server.url);

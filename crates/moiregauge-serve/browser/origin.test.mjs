@@ -2,19 +2,17 @@
 
 import assert from "node:assert/strict";
 import { createServer } from "node:http";
-import { after, before, test } from "node:test";
+import { after, afterEach, beforeEach, test } from "node:test";
 import { api, closeBrowser, open, rootWith, serve, simulated } from "./harness.mjs";
 
 /** @type {Awaited<ReturnType<typeof serve>>} */
 let server;
 
-before(async () => {
+beforeEach(async () => {
   server = await serve([rootWith("plain", simulated("plain"))]);
 });
-after(async () => {
-  await closeBrowser();
-  await server.stop();
-});
+afterEach(() => server.stop());
+after(closeBrowser);
 
 test("a page of another origin that posts changes nothing, though the browser has the cookie", async () => {
   const page = await open(server.url);

@@ -29,4 +29,4 @@ mkdir -p "$work/tests"
 cp "$here"/*.mjs "$work/tests/"
 ln -s "$modules/node_modules" "$work/tests/node_modules"
 PROGRAM=$program CHROMIUM=$chromium PAGE=$(cd "$here/../page" && pwd) WORK=$work \
-  node --test --test-concurrency=1 --test-timeout=120000 ${2:+--test-name-pattern="$2"} "$work"/tests/*.test.mjs
+  node --test --test-concurrency=1 --test-timeout=400000 ${2:+--test-name-pattern="$2"} "$work"/tests/*.test.mjs

@@ -82,8 +82,12 @@ export class AnalyseView {
         this.picked = "";
         await Promise.all(files.map((f) => store.inspect(f).catch(() => null)));
         await work.create(files, settings);
+        this.form.write(work.is?.settings ?? {});
         await work.do("run");
-      } else if (JSON.stringify(settings) !== JSON.stringify(work.is?.settings ?? {})) await work.change({ settings });
+      } else if (this.form.isChanged) {
+        await work.change({ settings });
+        this.form.write(work.is?.settings ?? {});
+      }
       else await work.do("run");
     } catch (error) {
       this.failed(/** @type {Error} */ (error).message);
@@ -110,16 +114,13 @@ export class AnalyseView {
     const share = p?.of ? Math.min(1, (p.done ?? 0) / p.of) : 0;
     this.bar.style.width = `${100 * share}%`;
     this.bar.setAttribute("aria-valuenow", String(Math.round(100 * share)));
-    const words = { running: p?.stage ? `${p.stage}${p.of ? `, ${p.done} of ${p.of}` : ""}` : "Running", cancelled: "Cancelled.", done: "Done.", idle: "" }[state ?? "idle"];
+    const words = { running: p?.stage ? `${p.stage}${p.of ? `, ${p.done} of ${p.of}` : ""}` : "Running", cancelled: "Cancelled.", done: work.is?.result?.saved ? "Done and saved." : "Done.", idle: "" }[state ?? "idle"];
     this.stage.textContent = state === "failed" ? "" : words ?? "";
     if (state === "failed") this.showFailure();
   }
 
   showFailure() {
-    const e = work.is?.error;
-    const words = typeof e === "string" ? e : e?.error ?? e?.message ?? "The analysis failed.";
-    fill(this.results, h("div", { class: "caveat serious", role: "alert" }, h("p", {}, h("b", { text: "No result. " }), words), e?.what ? h("p", { text: e.what }) : null, e?.where ? h("p", { class: "where", text: e.where }) : null));
-    this.failureShown = true;
+    fill(this.results, h("div", { class: "caveat serious", role: "alert" }, h("p", {}, h("b", { text: "No result. " }), work.is?.error ?? "")), failedList(work.is?.failed ?? []));
   }
 
   makePictures() {
@@ -176,7 +177,7 @@ export class AnalyseView {
     const caveats = await caveatList(results.caveats ?? []);
     if (results !== work.results) return;
     fill(this.results,
-      h("div", { class: "bar" }, h("h2", { text: found ? title(results, found) : "No result" }), chooser),
+      h("div", { class: "bar" }, h("h2", { text: found ? title(results, found) : "No result" }), h("div", { class: "toolbar" }, this.moireChooser(), chooser)),
       found ? headline(found) : null,
       results.failed?.length ? failedList(results.failed) : null,
       results.caveats?.length ? h("section", { "aria-label": "Caveats" }, h("h3", { text: `${results.caveats.length} ${results.caveats.length === 1 ? "caveat" : "caveats"}` }), caveats) : null,
@@ -189,6 +190,17 @@ export class AnalyseView {
     if (found) say(`New result: twist ${total(found.mean?.twist_deg, "°")}, heterostrain ${total(found.mean?.heterostrain_percent, "%")}`);
     document.documentElement.dataset.result = String(work.version);
     await this.showPictures();
+  }
+
+  /** Where images show several moirés. */
+  moireChooser() {
+    const n = work.is?.result?.moires ?? 1;
+    if (n < 2) return null;
+    const options = /** @type {[string, string][]} */ (Array.from({ length: n }, (_, i) => [String(i + 1), `${i + 1} of ${n}`]));
+    return field("Moiré", select(options, String(work.moire), (value) => {
+      work.moire = Number(value);
+      this.guard(work.load());
+    }));
   }
 
   /** All figures, asked when they are opened. */
@@ -233,13 +245,18 @@ export class AnalyseView {
       const overlay = await overlayOf(file);
       if (file !== this.picked) return;
       this.overlay = overlay;
-      const number = await showScan(this.image, file, channel);
+      const number = await showScan(this.image, file, channel, overlay);
       await showSpectrum(this.spectrum, file, number);
       frameSpots(this.spectrum, overlay);
     } catch (error) {
       this.image.clear(/** @type {Error} */ (error).message);
     }
-    await Promise.all(rest);
+    const made = await Promise.all(rest);
+    [this.residual, this.cellImage].forEach((viewer, i) => {
+      const panel = viewer.element.parentElement;
+      if (panel) panel.hidden = !made[i];
+    });
+    this.pictures.querySelector(".panels")?.classList.toggle("four", made.some(Boolean));
   }
 }
 

@@ -14,6 +14,11 @@ export class ApiError extends Error {
     this.where = where;
   }
 
+  /** Whether the program does not know this page. */
+  get stranger() {
+    return this.status === 401 || this.status === 403;
+  }
+
   /** Whether this program does not have the route at all. */
   get missing() {
     return this.status === 404 || this.status === 405 || this.status === 501;
@@ -81,7 +86,7 @@ export async function floats(path, signal) {
   const answer = await ask(path, { signal });
   const head = (/** @type {string} */ name) => Number(answer.headers.get(name) ?? NaN);
   const data = new Float32Array(await answer.arrayBuffer());
-  const steps = (answer.headers.get("x-step-per-pixel") ?? "").split(" ").filter((text) => text !== "");
+  const steps = (answer.headers.get("x-step-per-px") ?? "").split(" ").filter((text) => text !== "");
   const unit = unitOf(answer.headers.get("x-unit") ?? "");
   return {
     data,
@@ -116,13 +121,18 @@ export function query(values) {
   return "?" + given.map(([k, v]) => `${k}=${encodeURIComponent(String(v))}`).join("&");
 }
 
+/** As long as the page lives: a program that was started anew with the same token asks for it again. */
+let token = "";
+
 /**
- * Exchanges the token in the address for a cookie, and forgets it.
+ * Exchanges the token in the address for a cookie, and takes it out of the address.
  * @returns {Promise<void>}
  */
 export async function openSession() {
-  const token = /(?:^#|&)token=([0-9a-fA-F]+)/.exec(location.hash)?.[1];
-  if (!token) return;
-  history.replaceState(null, "", location.pathname);
-  await send("POST", "session", { token });
+  const found = /(?:^#|&)token=([0-9a-zA-Z]+)/.exec(location.hash)?.[1];
+  if (found) {
+    token = found;
+    history.replaceState(null, "", location.pathname);
+  }
+  if (token) await send("POST", "session", { token });
 }

@@ -5,7 +5,7 @@ import { cornerNm, cornerPx, reciprocal, someLattice, toNm, withByHand } from ".
 import { empty, field, fill, h, s, say } from "./dom.js";
 import { total } from "./format.js";
 import { Marker } from "./markers.js";
-import { drawLattice, drawSpots, frameSpots, nearMiddle, spotPlace } from "./overlay.js";
+import { brightPlace, drawLattice, drawSpots, firstShell, frameSpots, nearMiddle, spotPlace, waveAt } from "./overlay.js";
 import { overlayOf, showScan, showSpectrum } from "./pictures.js";
 import { headline, meanOf } from "./result.js";
 import { ScanList } from "./scanlist.js";
@@ -39,7 +39,7 @@ export class CorrectView {
     this.regions = s("g", {});
     this.image.overlay.insertBefore(this.regions, this.image.ruler);
     this.image.addEventListener("view", () => this.draw());
-    this.spectrum.addEventListener("view", () => drawSpots(this.spectrum.drawing, this.spectrum, this.spotsOf(this.draft ?? this.overlay)));
+    this.spectrum.addEventListener("view", () => drawSpots(this.spectrum.drawing, this.spectrum, this.draft ?? this.overlay));
     this.list = new ScanList((file) => this.pick(file), failed);
     this.undo = h("button", { type: "button", text: "Undo", onclick: () => this.guard(work.do("undo")) });
     this.redo = h("button", { type: "button", text: "Redo", onclick: () => this.guard(work.do("redo")) });
@@ -110,11 +110,12 @@ export class CorrectView {
       this.draft = null;
       if (!keep) {
         const entry = work.scans().find((x) => x.file === file);
-        const channel = await showScan(this.image, file, entry?.set?.channel ?? work.is?.settings?.channel);
+        const channel = await showScan(this.image, file, entry?.set?.channel ?? work.is?.settings?.channel, this.overlay);
         await showSpectrum(this.spectrum, file, channel);
         this.frame();
       }
       if (file !== this.picked) return;
+      if (this.overlay && !this.overlay.origin_px) this.overlay.origin_px = brightPlace(this.image, this.overlay.lattice_px);
       this.place();
       document.documentElement.dataset.correct = `${file} ${work.version}`;
     } catch (error) {
@@ -123,7 +124,7 @@ export class CorrectView {
   }
 
   frame() {
-    frameSpots(this.spectrum, this.spotsOf(this.overlay ?? someLattice(this.image)));
+    frameSpots(this.spectrum, this.overlay ?? someLattice(this.image));
   }
 
   showState() {
@@ -133,7 +134,7 @@ export class CorrectView {
     this.list.element.hidden = !is;
     this.undo.disabled = !is?.can_undo;
     this.redo.disabled = !is?.can_redo;
-    this.state.textContent = is?.state === "running" ? `${work.progress?.stage ?? "Calculating"} …` : is?.state === "failed" ? "No result with this: " + (is.error?.error ?? is.error ?? "") : "";
+    this.state.textContent = is?.state === "running" ? `${work.progress?.stage ?? "Calculating"} …` : is?.state === "failed" ? `No result with this: ${is.error ?? ""}` : "";
     if (!is) return;
     this.list.show(this.picked);
     if (document.activeElement !== this.near) this.near.value = String(is.settings?.by_hand?.near_nm ?? "");
@@ -149,21 +150,6 @@ export class CorrectView {
     if (now) this.before = now;
     // A handle that is being moved stays under the hand.
     if (this.picked && !this.wait) this.load(true);
-  }
-
-  /** @param {import("./overlay.js").Overlay | null} overlay */
-  spotsOf(overlay) {
-    if (!overlay) return null;
-    return { ...overlay, spots_per_nm: this.waves(overlay.lattice_px) };
-  }
-
-  /** The wave vectors of lattice vectors on the image, per nm, with their sum or difference: the first shell.
-   * @param {[Pair, Pair]} vectors @returns {Pair[]} */
-  waves(vectors) {
-    const size = (/** @type {Pair} */ v) => /** @type {Pair} */ ([v[0] * this.image.pixelX, v[1] * this.image.pixelY]);
-    const [g, k] = reciprocal([size(vectors[0]), size(vectors[1])]);
-    const sign = g[0] * k[0] + g[1] * k[1] > 0 ? -1 : 1;
-    return [g, k, [g[0] + sign * k[0], g[1] + sign * k[1]]];
   }
 
   draw() {
@@ -216,22 +202,16 @@ export class CorrectView {
   /** @param {import("./overlay.js").Overlay} lattice */
   placeSpots(lattice) {
     const image = this.spectrum.image;
-    if (!image || !(image.stepPerNm > 0)) return;
-    const waves = this.waves(lattice.lattice_px).slice(0, 2);
+    if (!image || !(image.steps[0] > 0)) return;
+    const waves = firstShell(lattice.lattice_px).slice(0, 2);
     waves.forEach((k, i) => this.markers.push(new Marker(this.spectrum, {
       label: `Spot ${i + 1} of the transform`, kind: "spot", at: spotPlace(image, k),
       moved: (to) => {
-        waves[i] = [(to.x - Math.floor(image.width / 2)) * image.stepPerNm, (to.y - Math.floor(image.height / 2)) * image.stepPerNm];
-        this.preview({ ...lattice, lattice_px: this.fromWaves(waves) });
+        waves[i] = waveAt(image, to);
+        this.preview({ ...lattice, lattice_px: reciprocal([waves[0], waves[1]]) });
       },
-      done: () => this.tellLattice(this.fromWaves(waves)),
+      done: () => this.tellLattice(reciprocal([waves[0], waves[1]])),
     })));
-  }
-
-  /** @param {Pair[]} waves @returns {[Pair, Pair]} */
-  fromWaves(waves) {
-    const [a, b] = reciprocal([waves[0], waves[1]]);
-    return [[a[0] / this.image.pixelX, a[1] / this.image.pixelY], [b[0] / this.image.pixelX, b[1] / this.image.pixelY]];
   }
 
   /** @param {import("./overlay.js").Overlay} draft */

@@ -1,8 +1,8 @@
 // What happens in the program, as it happens: one stream of events for the page, taken up again by itself.
 
-import { get } from "./api.js";
+import { ApiError, get, openSession } from "./api.js";
 
-/** @typedef {{kind: string, id: string, state?: string, stage?: string, done?: number, of?: number}} Happening */
+/** @typedef {{kind: string, id: string, state?: string, stage?: string, done?: number, of?: number, line?: any}} Happening */
 
 const target = new EventTarget();
 /** @type {EventSource | null} */
@@ -27,6 +27,11 @@ export function onHappening(kind, callback) {
  */
 export function onConnection(callback) {
   target.addEventListener("connection", (e) => callback(/** @type {CustomEvent} */ (e).detail));
+}
+
+/** Calls back when the program is another one than that which this page was opened with. @param {() => void} callback */
+export function onStranger(callback) {
+  target.addEventListener("stranger", callback);
 }
 
 /** @param {boolean} up */
@@ -55,7 +60,8 @@ export function listen() {
   });
   for (const kind of ["work", "map", "watch"]) {
     stream.addEventListener(kind, (event) => {
-      const detail = { kind, ...JSON.parse(/** @type {MessageEvent} */ (event).data) };
+      const said = JSON.parse(/** @type {MessageEvent} */ (event).data);
+      const detail = { ...said, kind, id: said[kind] ?? said.id };
       target.dispatchEvent(new CustomEvent(kind, { detail }));
     });
   }
@@ -68,7 +74,8 @@ function again() {
     try {
       await get("state");
       listen();
-    } catch {
+    } catch (error) {
+      if (error instanceof ApiError && error.stranger) await openSession().catch(() => target.dispatchEvent(new CustomEvent("stranger")));
       waits = Math.min(5000, waits * 1.5);
       again();
     }

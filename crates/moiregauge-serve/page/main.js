@@ -2,7 +2,7 @@
 
 import { ApiError, get, openSession } from "./api.js";
 import { h } from "./dom.js";
-import { listen, onConnection } from "./events.js";
+import { listen, onConnection, onStranger } from "./events.js";
 import { recolour } from "./plot.js";
 import { store } from "./store.js";
 import { LookView } from "./look.js";
@@ -100,6 +100,7 @@ function followConnection() {
   const shown = /** @type {HTMLElement} */ (document.getElementById("connection"));
   let was = false;
   onConnection(async (up) => {
+    if (up) complain("");
     shown.textContent = up ? "" : "The program does not answer; trying again …";
     shown.classList.toggle("down", !up);
     if (up && was) {
@@ -112,11 +113,12 @@ function followConnection() {
     }
     was = was || up;
   });
+  onStranger(() => complain("The program was started anew. Open the address that it printed, with everything after the #."));
 }
 
 /** @param {unknown} error */
 function explain(error) {
-  if (error instanceof ApiError && (error.status === 401 || error.status === 403)) {
+  if (error instanceof ApiError && error.stranger) {
     complain("This page is not signed in to the program. Open the address that moiregauge serve printed, with everything after the #.");
   } else complain(error instanceof Error ? error.message : String(error));
 }

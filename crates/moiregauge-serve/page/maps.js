@@ -16,6 +16,9 @@ import { work } from "./work.js";
 
 /** @typedef {{name: string, unit: string, sigma?: string | null}} Quantity */
 
+/** In place of one scan. */
+const ALL = "all";
+
 /** Colours of the reasons of a mask: good first. */
 const REASONS = ["#2f9e6b", "#c9ced3", "#e3a33b", "#c2570c", "#8c4799", "#a61b1b", "#0a6aa8", "#6b5b3e", "#444c54"];
 
@@ -123,8 +126,9 @@ export class MapsView {
   offerFiles() {
     const files = [...new Set([...(work.is?.files ?? []), ...store.chosen, ...(store.current ? [store.current] : [])])];
     const value = this.file.value || store.current || "";
-    fill(this.file, files.map((f) => h("option", { value: f, text: store.name(f) })));
-    if (files.includes(value)) this.file.value = value;
+    const all = work.id && (work.is?.files.length ?? 0) > 1 ? [h("option", { value: ALL, text: `all ${work.is?.files.length} scans of the analysis` })] : [];
+    fill(this.file, all, files.map((f) => h("option", { value: f, text: store.name(f) })));
+    if (files.includes(value) || (value === ALL && all.length > 0)) this.file.value = value;
     this.run.disabled = files.length === 0 || this.map?.state === "running";
     if (files.length === 0) fill(this.file, h("option", { value: "", text: "choose a scan in Look" }));
   }
@@ -140,7 +144,8 @@ export class MapsView {
     const given = Object.fromEntries(Object.entries(map).filter(([, v]) => v !== undefined));
     const settings = work.is?.settings ?? {};
     try {
-      const body = { file: this.file.value, settings, ...(Object.keys(given).length > 0 ? { map: given } : {}) };
+      const one = { file: this.file.value, settings: Object.fromEntries(Object.entries(settings).filter(([, v]) => v !== null)) };
+      const body = { ...(this.file.value === ALL ? { work: work.id } : one), request: given };
       const { map: id } = await send("POST", "maps", body);
       await this.take(id);
     } catch (error) {
@@ -177,7 +182,7 @@ export class MapsView {
     this.barBox.hidden = state !== "running";
     this.cancel.disabled = state !== "running";
     this.offerFiles();
-    if (state === "failed") this.state.textContent = `No map. ${e?.error ?? e ?? ""}`;
+    if (state === "failed") this.state.textContent = `No map. ${e ?? ""} ${(this.map.failed ?? []).map((/** @type {any} */ f) => f.error ?? f.message ?? "").join(" ")}`;
     else if (state !== "running") this.state.textContent = state === "cancelled" ? "Cancelled." : "";
     else if (!this.state.textContent) this.state.textContent = "Running";
     const there = !!this.document && this.document.of === this.map?.map;
@@ -191,7 +196,8 @@ export class MapsView {
     try {
       this.document = { ...(await get(`maps/${id}/result.json`)), of: id };
       this.show();
-      const quantities = /** @type {Quantity[]} */ (this.map.quantities ?? []);
+      const all = /** @type {Quantity[]} */ (this.map.quantities ?? []);
+      const quantities = all.filter((q) => !q.name.endsWith(" sigma") && !/^(mask|position)/.test(q.name));
       fill(this.choice, quantities.map((q) => h("option", { value: q.name, text: q.name.replace(/_/g, " ") })));
       await this.showMask(id);
       await this.showQuantity(quantities[0]?.name ?? "");

@@ -110,20 +110,16 @@ export class MoireView {
     }
   }
 
-  /** The plans as the program lists them, the recommended one first. @param {any} answer */
+  /** The plans as the program ranks them. @param {any} answer */
   showPlan(answer) {
     const plans = answer.plans ?? [];
-    const best = answer.recommended ?? answer.best ?? plans[0];
-    /** @type {(v: any) => string} */
-    const cell = (v) => /** @type {string} */ (typeof v === "number" ? number(v, 3) : Array.isArray(v) ? v.map(cell).join(" × ") : v === null || v === undefined ? "–" : typeof v === "object" ? number(v.total ?? v.sigma ?? v.value, 3) : String(v));
-    const list = plans.length > 0 ? plans : best ? [best] : [];
-    if (list.length === 0) {
-      fill(this.plan, h("h2", { text: "Plan" }), empty(typeof answer === "string" ? answer : "No plan within these limits."));
-      return;
-    }
-    const columns = Object.keys(list[0]).filter((k) => typeof list[0][k] !== "object" || Array.isArray(list[0][k]) || list[0][k] === null);
-    fill(this.plan, h("h2", { text: "Plan" }), answer.words ? h("p", { text: answer.words }) : null,
-      scroll("Plans", table("Plans, the recommended one first", columns.map((c) => c.replace(/_/g, " ")), list.map((/** @type {any} */ p) => columns.map((c) => cell(p[c]))), { numbers: columns.map((_, i) => i).slice(1) })));
+    const expected = (/** @type {any} */ e) => `${number(e.statistical, 2)} (${number(e.total, 2)})`;
+    const rows = plans.map((/** @type {any} */ p, /** @type {number} */ i) => [
+      i === 0 && p.met ? "recommended" : p.met ? "" : "misses a wish", String(p.set.raster.scans), number(p.set.raster.line_rate_hz, 3), p.size_nm.map((/** @type {number} */ x) => number(x, 3)).join(" × "),
+      number(p.duration_s / 60, 3), number(p.drift_sigma_nm_per_min, 2), expected(p.twist_sigma_deg), expected(p.strain_sigma_percent), (p.limited_by ?? "").replace(/-/g, " ")]);
+    const beyond = (plans[0]?.out_of_reach ?? []).map((/** @type {any} */ o) => h("p", { class: "caveat warning", text: `The wish for the ${o.is_twist ? "twist" : "strain"} cannot be reached by scans: ${o.largest.replace(/-/g, " ")} and the like alone make ${number(o.floor, 2)} ${o.is_twist ? "°" : "%"}.` }));
+    fill(this.plan, h("h2", { text: "Plan" }), beyond,
+      rows.length > 0 ? scroll("Plans", table("Errors are statistical, and in brackets with calibration and model", ["Plan", "Scans", "Hz", "Frame (nm)", "Minutes", "σ drift (nm/min)", "σ twist (°)", "σ strain (%)", "Limited by"], rows, { numbers: [1, 2, 3, 4, 5, 6, 7], shown: true })) : empty("No plan within these limits."));
   }
 }
 

@@ -1,11 +1,12 @@
 // What was found, drawn over images as SVG: the lattice, its spots, the region that carries it.
 
+import { reciprocal } from "./byhand.js";
 import { fill, s } from "./dom.js";
 
 /** @typedef {import("./viewer.js").Viewer} Viewer */
 /** @typedef {[number, number]} Pair */
-/** @typedef {{origin_px: Pair, lattice_px: [Pair, Pair], lattice_nm?: [Pair, Pair], spots_per_nm?: Pair[],
- *   outline_px?: Pair[] | Pair[][] | null}} Overlay */
+/** @typedef {{line?: string, origin_px?: Pair, lattice_px: [Pair, Pair], lattice_nm?: [Pair, Pair],
+ *   outline_px?: [Pair, Pair][]}} Overlay the outline is a set of sides; the origin is that of the drawing */
 
 /** At most this many cells are drawn; more would hide the image. */
 const MOST = 4000;
@@ -22,10 +23,8 @@ export function drawLattice(group, viewer, overlay, options = {}) {
   if (!overlay?.lattice_px || !viewer.image) return;
   group.append(dots(viewer, overlay));
   if (options.cell !== false) group.append(...cell(viewer, overlay));
-  for (const ring of rings(overlay.outline_px)) {
-    const points = ring.map(([x, y]) => place(viewer, x, y)).join(" ");
-    group.append(s("polygon", { points, class: "cell-halo" }), s("polygon", { points, class: "outline" }));
-  }
+  const sides = (overlay.outline_px ?? []).map(([a, b]) => `M${place(viewer, a[0], a[1])}L${place(viewer, b[0], b[1])}`).join("");
+  if (sides) group.append(s("path", { d: sides, class: "cell-halo" }), s("path", { d: sides, class: "outline" }));
 }
 
 /** @param {Viewer} viewer @param {number} x @param {number} y */
@@ -34,14 +33,50 @@ function place(viewer, x, y) {
   return `${at.x.toFixed(1)},${at.y.toFixed(1)}`;
 }
 
-/** One outline or several. @param {any} outline @returns {Pair[][]} */
-function rings(outline) {
-  if (!Array.isArray(outline) || outline.length === 0) return [];
-  return Array.isArray(outline[0][0]) ? outline : [outline];
+/**
+ * Where circles are put: on the brightest place of the image folded into one cell. It is for the eye; nothing is
+ * measured with it.
+ * @param {Viewer} viewer
+ * @param {[Pair, Pair]} lattice px
+ * @returns {Pair}
+ */
+export function brightPlace(viewer, [a, b]) {
+  const { image, shown, step } = viewer;
+  const det = a[0] * b[1] - a[1] * b[0];
+  const bins = 16;
+  if (!image || !shown || !(Math.abs(det) > 0)) return [0, 0];
+  const sums = new Float64Array(bins * bins);
+  const counts = new Float64Array(bins * bins);
+  for (let j = 0, n = 0; j < image.height; j++) {
+    for (let i = 0; i < image.width; i++, n++) {
+      const z = shown[n];
+      if (Number.isNaN(z)) continue;
+      const [x, y] = [(i + 0.5) * step - 0.5, (j + 0.5) * step - 0.5];
+      const u = (x * b[1] - y * b[0]) / det;
+      const v = (a[0] * y - a[1] * x) / det;
+      const bin = Math.floor((v - Math.floor(v)) * bins) * bins + Math.floor((u - Math.floor(u)) * bins);
+      sums[bin] += z;
+      counts[bin]++;
+    }
+  }
+  const mean = (/** @type {number} */ i, /** @type {number} */ j) => {
+    const bin = ((j + bins) % bins) * bins + ((i + bins) % bins);
+    return counts[bin] > 0 ? sums[bin] / counts[bin] : 0;
+  };
+  let best = -Infinity;
+  let at = [0, 0];
+  for (let j = 0; j < bins; j++) {
+    for (let i = 0; i < bins; i++) {
+      let sum = 0;
+      for (let k = -2; k <= 2; k++) for (let l = -2; l <= 2; l++) sum += mean(i + k, j + l);
+      if (sum > best) [best, at] = [sum, [(i + 0.5) / bins, (j + 0.5) / bins]];
+    }
+  }
+  return [at[0] * a[0] + at[1] * b[0], at[0] * a[1] + at[1] * b[1]];
 }
 
 /** The lattice point nearest to the middle of what is seen. @param {Viewer} viewer @param {Overlay} overlay @returns {Pair} */
-export function nearMiddle(viewer, { origin_px: o, lattice_px: [a, b] }) {
+export function nearMiddle(viewer, { origin_px: o = [0, 0], lattice_px: [a, b] }) {
   const det = a[0] * b[1] - a[1] * b[0];
   const [x, y] = [viewer.columns / 2 - o[0], viewer.rows / 2 - o[1]];
   const m = Math.round((x * b[1] - y * b[0]) / det);
@@ -83,10 +118,31 @@ function cell(viewer, overlay) {
 /**
  * Where a wave vector lies in a transform whose zero is in the middle.
  * @param {import("./api.js").Floats} image
- * @param {Pair} k per nm
+ * @param {Pair} k periods per pixel
  */
 export function spotPlace(image, k) {
-  return { x: Math.floor(image.width / 2) + k[0] / image.stepPerNm, y: Math.floor(image.height / 2) + k[1] / image.stepPerNm };
+  return { x: Math.floor(image.width / 2) + k[0] / image.steps[0], y: Math.floor(image.height / 2) + k[1] / image.steps[1] };
+}
+
+/**
+ * The wave vector of a place.
+ * @param {import("./api.js").Floats} image
+ * @param {{x: number, y: number}} at
+ * @returns {Pair} periods per pixel
+ */
+export function waveAt(image, at) {
+  return [(at.x - Math.floor(image.width / 2)) * image.steps[0], (at.y - Math.floor(image.height / 2)) * image.steps[1]];
+}
+
+/**
+ * The first shell of a lattice on the image: two wave vectors and the third that closes the triangle.
+ * @param {[Pair, Pair]} vectors px
+ * @returns {Pair[]} periods per pixel
+ */
+export function firstShell(vectors) {
+  const [g, k] = reciprocal(vectors);
+  const sign = g[0] * k[0] + g[1] * k[1] > 0 ? -1 : 1;
+  return [g, k, [g[0] + sign * k[0], g[1] + sign * k[1]]];
 }
 
 /**
@@ -97,9 +153,9 @@ export function spotPlace(image, k) {
  */
 export function drawSpots(group, viewer, overlay) {
   fill(group);
-  if (!overlay?.spots_per_nm || !viewer.image) return;
+  if (!overlay?.lattice_px || !viewer.image || !(viewer.image.steps[0] > 0)) return;
   const all = s("g", { class: "dots" });
-  const both = overlay.spots_per_nm.flatMap((k) => /** @type {Pair[]} */ ([k, [-k[0], -k[1]]]));
+  const both = firstShell(overlay.lattice_px).flatMap((k) => /** @type {Pair[]} */ ([k, [-k[0], -k[1]]]));
   for (const k of both) {
     const p = spotPlace(viewer.image, k);
     const at = viewer.toScreen(p.x, p.y);
@@ -116,8 +172,8 @@ export function drawSpots(group, viewer, overlay) {
 export function frameSpots(viewer, overlay) {
   viewer.fit();
   const image = viewer.image;
-  if (!image || !overlay?.spots_per_nm?.length) return;
-  const farthest = Math.max(...overlay.spots_per_nm.map((k) => Math.hypot(...k))) / image.stepPerNm;
+  if (!image || !overlay?.lattice_px || !(image.steps[0] > 0)) return;
+  const farthest = Math.max(...firstShell(overlay.lattice_px).map((k) => Math.hypot(k[0] / image.steps[0], k[1] / image.steps[1])));
   const factor = image.width / (2 * 2.6 * farthest);
   if (factor > 1) {
     viewer.zoom(factor);

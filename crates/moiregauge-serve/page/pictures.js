@@ -2,6 +2,7 @@
 
 import { floats, get, query } from "./api.js";
 import { background, histogram, without } from "./levels.js";
+import { brightPlace } from "./overlay.js";
 import { store } from "./store.js";
 import { work } from "./work.js";
 
@@ -17,7 +18,7 @@ const ENOUGH = 1024;
  */
 async function channelOf(file, name) {
   const info = await store.inspect(file);
-  const hit = info.channels.findIndex((/** @type {any} */ c) => c.name === name || c.internal_name === name);
+  const hit = info.channels.findIndex((/** @type {any} */ c) => c.name === name);
   return { info, channel: Math.max(0, hit) };
 }
 
@@ -26,9 +27,9 @@ async function channelOf(file, name) {
  * @param {Viewer} viewer
  * @param {string} file
  * @param {string | null | undefined} channelName
- * @param {boolean} [keepView]
+ * @param {import("./overlay.js").Overlay | null} overlay is given its place on the image
  */
-export async function showScan(viewer, file, channelName, keepView = false) {
+export async function showScan(viewer, file, channelName, overlay) {
   const { info, channel } = await channelOf(file, channelName);
   const about = info.channels[channel];
   const step = Math.max(1, Math.ceil(Math.max(about.columns, about.rows) / ENOUGH));
@@ -37,7 +38,8 @@ export async function showScan(viewer, file, channelName, keepView = false) {
   const shown = without(image, background(image, "plane"));
   const { from, to } = histogram(shown);
   viewer.setLook({ low: from, high: to, colours: localStorage.getItem("colours") ?? "viridis" });
-  viewer.show(image, { step, shown, keepView, full: { columns: about.columns, rows: about.rows } });
+  viewer.show(image, { step, shown, full: { columns: about.columns, rows: about.rows } });
+  if (overlay?.lattice_px && !overlay.origin_px) overlay.origin_px = brightPlace(viewer, overlay.lattice_px);
   return channel;
 }
 
@@ -51,14 +53,15 @@ export async function showSpectrum(viewer, file, channel) {
   const image = await floats(`spectrum${query({ file, channel })}`);
   // The background of noise is dark, the strongest spots are bright.
   const { low, high } = histogram(image.data);
-  image.pixelX = NaN;
-  image.pixelY = NaN;
+  // Places on the screen are those of wave vectors: as square as they are.
+  image.pixelX = 1;
+  image.pixelY = image.steps[0] > 0 ? image.steps[1] / image.steps[0] : 1;
   viewer.setLook({ low: low + 0.35 * (high - low), high, colours: "magma" });
   viewer.show(image);
 }
 
 /**
- * A picture of the results: "residual" or "cell".
+ * A picture of the results: "residual" or "cell". Says whether the program makes such pictures.
  * @param {Viewer} viewer
  * @param {"residual" | "cell"} what
  * @param {string} file
@@ -70,9 +73,11 @@ export async function showPart(viewer, what, file) {
     const most = Math.max(Math.abs(from), Math.abs(to));
     viewer.setLook(what === "residual" ? { low: -most, high: most, colours: "blue-red" } : { low: from, high: to, colours: localStorage.getItem("colours") ?? "viridis" });
     viewer.show(image);
+    return true;
   } catch (error) {
     const e = /** @type {import("./api.js").ApiError} */ (error);
-    viewer.clear(e.missing ? "There is none for this scan." : e.message);
+    viewer.clear(e.message);
+    return !e.missing;
   }
 }
 
@@ -83,7 +88,8 @@ export async function showPart(viewer, what, file) {
  */
 export async function overlayOf(file) {
   try {
-    return await get(work.picture("overlay", file));
+    const { lines } = await get(work.picture("overlay", file));
+    return lines.find((/** @type {any} */ l) => l.line === "trace") ?? lines[0] ?? null;
   } catch {
     return null;
   }

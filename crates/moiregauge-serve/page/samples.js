@@ -15,8 +15,8 @@ export class SamplesView {
   /** @param {(words: string) => void} failed */
   constructor(failed) {
     this.failed = failed;
-    /** @type {{columns: string[], rows: any[], thumbs: any}} */
-    this.table = { columns: [], rows: [], thumbs: {} };
+    /** @type {{columns: string[], rows: any[], thumbs: (string | null)[], root: string, under: string}} */
+    this.table = { columns: [], rows: [], thumbs: [], root: "", under: "" };
     this.sorted = { column: "sample", down: false };
     /** @type {Set<string>} */
     this.pair = new Set();
@@ -62,11 +62,11 @@ export class SamplesView {
       const found = await get(`samples${query({ root, under })}`);
       const columns = found.columns.map((/** @type {any} */ c) => (typeof c === "string" ? c : c.name));
       const rows = found.rows.map((/** @type {any} */ r) => (Array.isArray(r) ? Object.fromEntries(columns.map((/** @type {string} */ c, /** @type {number} */ i) => [c, r[i]])) : r));
-      this.table = { columns, rows, thumbs: found.thumbs ?? {} };
+      this.table = { columns, rows, thumbs: found.pictures ?? [], root, under };
     } catch (error) {
       const e = /** @type {import("./api.js").ApiError} */ (error);
-      this.table = { columns: [], rows: [], thumbs: {} };
-      fill(this.host, empty(e.status === 404 && e.message === "there is nothing at this address" ? "This version of the program does not serve campaigns." : e.message));
+      this.table = { columns: [], rows: [], thumbs: [], root, under };
+      fill(this.host, empty(e.missing ? "This version of the program does not serve campaigns." : [e.message, e.what].filter(Boolean).join(" ")));
     }
     if (this.table.rows.length > 0) this.show();
     fill(this.compare);
@@ -114,12 +114,9 @@ export class SamplesView {
 
   /** @param {any} row */
   thumb(row) {
-    const thumbs = this.table.thumbs;
-    const source = Array.isArray(thumbs) ? thumbs[this.table.rows.indexOf(row)] : thumbs?.[row.sample];
-    if (!source) return "";
-    const own = typeof source === "string" ? source : source.url ?? source.png ?? "";
-    const safe = own.startsWith("/api/") || own.startsWith("data:image/png;base64,");
-    return safe ? h("img", { src: own, alt: "", loading: "lazy", width: 64, height: 64 }) : "";
+    const { root, under, thumbs, rows } = this.table;
+    const name = thumbs[rows.indexOf(row)];
+    return name ? h("img", { src: `/api/samples/picture${query({ root, under, name })}`, alt: "", loading: "lazy", width: 64, height: 64 }) : "";
   }
 
   /** @param {string} name @param {boolean} on */

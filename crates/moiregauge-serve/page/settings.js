@@ -31,6 +31,8 @@ export class SettingsForm {
   constructor(changed) {
     /** Settings that the form has no control for go through unchanged. @type {any} */
     this.others = {};
+    /** What the controls said when settings were written into them. @type {Map<string, any>} */
+    this.written = new Map(ENTRIES.map((e) => [e.key, e.usual]));
     /** @type {Map<string, HTMLInputElement | HTMLSelectElement>} */
     this.controls = new Map();
     const make = (/** @type {Entry} */ entry) => this.control(entry, changed);
@@ -67,17 +69,31 @@ export class SettingsForm {
     }
   }
 
-  /** @returns {any} */
+  /** What a control says. @param {Entry} entry */
+  valueOf(entry) {
+    const control = /** @type {HTMLInputElement | HTMLSelectElement} */ (this.controls.get(entry.key));
+    if (entry.kind === "check") return /** @type {HTMLInputElement} */ (control).checked;
+    return entry.kind === "number" ? Number(control.value) : control.value;
+  }
+
+  /** Whether something was changed since the settings were written into the form. */
+  get isChanged() {
+    return ENTRIES.some((entry) => this.valueOf(entry) !== this.written.get(entry.key));
+  }
+
+  /** The settings with what was changed in the form. @returns {any} */
   read() {
     /** @type {any} */
     const settings = { ...this.others };
     for (const entry of ENTRIES) {
-      const control = this.controls.get(entry.key);
-      if (!control) continue;
-      const value = entry.kind === "check" ? /** @type {HTMLInputElement} */ (control).checked : entry.kind === "number" ? Number(control.value) : control.value;
+      const value = this.valueOf(entry);
+      if (value === this.written.get(entry.key)) continue;
       if (value !== entry.usual) settings[entry.key] = value;
       else delete settings[entry.key];
+      // Who names layers names them; who does not, leaves them to the program.
+      if (entry.key === "material" || entry.key === "substrate") delete settings.layers_chosen;
     }
+    for (const [key, value] of Object.entries(settings)) if (value === null) delete settings[key];
     return settings;
   }
 
@@ -86,7 +102,8 @@ export class SettingsForm {
     this.others = { ...settings };
     for (const entry of ENTRIES) {
       const control = this.controls.get(entry.key);
-      const given = settings?.[entry.key];
+      const assumed = entry.key === "material" && settings?.layers_chosen === false;
+      const given = assumed ? null : settings?.[entry.key];
       const value = given === null || given === undefined ? entry.usual : given;
       if (!control) continue;
       if (entry.kind === "check") /** @type {HTMLInputElement} */ (control).checked = !!value;
@@ -95,6 +112,7 @@ export class SettingsForm {
         if (control instanceof HTMLSelectElement && ![...control.options].some((o) => o.value === words)) control.append(h("option", { value: words, text: words }));
         control.value = words;
       }
+      this.written.set(entry.key, this.valueOf(entry));
     }
   }
 }

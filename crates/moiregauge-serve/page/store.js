@@ -52,11 +52,10 @@ class Store extends EventTarget {
     this.tell("current");
   }
 
-  /** @param {string} file @param {any} info */
-  found(file, info) {
-    this.paths.set(file, info.file);
-    if (!this.files.has(file)) this.learn({ file, name: baseName(info.file), bytes: 0, folder: "" });
-    return info;
+  /** What the program calls a file. @param {string} file @param {string} path */
+  call(file, path) {
+    this.paths.set(file, path);
+    if (!this.files.has(file)) this.learn({ file, name: baseName(path), bytes: 0, folder: "" });
   }
 
   /**
@@ -67,7 +66,7 @@ class Store extends EventTarget {
   inspect(file) {
     let known = this.inspected.get(file);
     if (!known) {
-      known = get(`inspect${query({ file })}`).then((found) => this.found(file, Array.isArray(found) ? found[0] : found));
+      known = get(`inspect${query({ file })}`).then((found) => (Array.isArray(found) ? found[0] : found));
       known.catch(() => this.inspected.delete(file));
       this.inspected.set(file, known);
     }

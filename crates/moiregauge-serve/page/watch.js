@@ -3,10 +3,13 @@
 import { get, query, send } from "./api.js";
 import { baseName, empty, field, fill, h, say, scroll, select, table } from "./dom.js";
 import { onHappening } from "./events.js";
-import { total } from "./format.js";
+import { plusMinus, total } from "./format.js";
 import { Plot } from "./plot.js";
 import { caveatList } from "./result.js";
 import { store } from "./store.js";
+
+/** Results that are held; earlier ones are let go. */
+const MOST = 2000;
 
 export class WatchView {
   /** @param {(words: string) => void} failed */
@@ -16,7 +19,7 @@ export class WatchView {
     this.watch = null;
     this.folder = select([["", "reading the folders …"]], "", () => undefined);
     this.until = h("input", { type: "number", min: 0, step: "any", placeholder: "none" });
-    this.of = select([["twist", "twist, °"], ["strain", "heterostrain, %"], ["drift", "drift, nm/min"]], "twist", () => undefined);
+    this.of = select([["twist_deg", "twist (°)"], ["strain_percent", "heterostrain (%)"]], "twist_deg", () => undefined);
     this.start = h("button", { type: "button", class: "main", text: "Watch", onclick: () => this.begin() });
     this.stop = h("button", { type: "button", text: "Stop", onclick: () => this.end() });
     this.state = h("p", { class: "stage-words", role: "status" });
@@ -30,7 +33,7 @@ export class WatchView {
         field("Stop at an error of", this.of), field("Wished error", this.until), h("div", { class: "buttons" }, this.start, this.stop), this.state,
         h("p", { class: "hint", text: "New scans are taken as soon as their files are whole. Nothing is written into the folder." })),
       this.body);
-    onHappening("watch", (event) => event.id === this.watch?.watch && this.refresh());
+    onHappening("watch", (event) => this.happened(event));
     this.show();
     this.restore();
   }
@@ -41,6 +44,26 @@ export class WatchView {
 
   refresh() {
     if (this.watch) this.take(this.watch.watch).catch((e) => this.failed(e.message));
+  }
+
+  /** A line comes with its event, so that nothing is asked anew. @param {import("./events.js").Happening} event */
+  happened(event) {
+    if (event.id !== this.watch?.watch) return;
+    const frames = this.watch.frames ?? [];
+    if (event.line) {
+      frames.push(event.line);
+      if (frames.length > MOST) frames.splice(0, frames.length - MOST);
+      this.watch = { ...this.watch, frames, advice: event.line.advice, warnings: event.line.warnings };
+      this.tell(event.line);
+    }
+    this.watch.state = event.state ?? this.watch.state;
+    this.show();
+  }
+
+  /** @param {any} line */
+  tell(line) {
+    say(`${baseName(line.file ?? "")}: twist ${total(twistOf(line), "°")}`);
+    document.documentElement.dataset.watched = String(line.frames ?? 0);
   }
 
   async restore() {
@@ -93,21 +116,18 @@ export class WatchView {
 
   /** @param {string} id */
   async take(id) {
-    const before = this.watch?.frames?.length ?? 0;
     this.watch = { watch: id, ...(await get(`watches/${id}`)) };
-    const frames = this.watch.frames ?? [];
-    const last = frames[frames.length - 1];
-    if (frames.length > before && last) say(`${baseName(last.file ?? "")}: twist ${total(last.twist_deg, "°")}`);
+    const last = this.watch.frames?.at(-1);
+    if (last) this.tell(last);
     this.show();
-    document.documentElement.dataset.watched = String(frames.length);
   }
 
   show() {
-    const going = this.watch && !["ended", "done", "failed", "stopped"].includes(this.watch.state);
+    const going = this.watch && !["ended", "done", "failed", "cancelled"].includes(this.watch.state);
     this.start.disabled = !!going;
     this.stop.disabled = !going;
     const frames = this.watch?.frames ?? [];
-    this.state.textContent = !this.watch ? "" : going ? `Watching; ${frames.length} ${frames.length === 1 ? "result" : "results"}` : `${words(this.watch.error) || "Ended."}`;
+    this.state.textContent = !this.watch ? "" : going ? `Watching; ${frames.length} ${frames.length === 1 ? "result" : "results"}` : words(this.watch.error) || (this.watch.state === "done" ? "The wished error is reached." : "Ended.");
     if (!this.watch) {
       fill(this.body, empty("Choose the folder that the microscope writes to. After each frame twist, heterostrain and drift stand here with their errors, what the next frames would bring, and when to stop."));
       return;
@@ -123,7 +143,7 @@ export class WatchView {
   /** @param {any} last */
   async showAdvice(last) {
     const advice = list(this.watch.advice);
-    const warnings = list(this.watch.warnings);
+    const warnings = [...list(this.watch.warnings), ...(last?.error ? [last.error] : []), ...(last?.failed ?? [])];
     const caveats = last?.caveats?.length && typeof last.caveats[0] === "object" ? await caveatList(last.caveats) : null;
     fill(this.advice,
       advice.length > 0 ? h("section", { "aria-label": "Advice" }, h("h3", { text: "Advice" }), h("ul", { class: "advice" }, advice.map((a) => h("li", { text: words(a) })))) : null,
@@ -158,9 +178,19 @@ function plot(title) {
 function liveHeadline(f) {
   const item = (/** @type {string} */ name, /** @type {string} */ value, /** @type {string} */ more) => h("div", {}, h("span", { class: "name", text: name }), h("span", { class: "value", text: value }), h("span", { class: "more", text: more }));
   return h("div", { class: "headline" },
-    item("Twist θ", total(f.twist_deg, "°"), `after ${f.frames} ${f.frames === 1 ? "frame" : "frames"}`),
-    item("Heterostrain ε", total(f.heterostrain_percent, "%"), ""),
+    item("Twist θ", total(twistOf(f), "°"), `after ${f.frames} ${f.frames === 1 ? "frame" : "frames"}${isKnown(f.twist_deg) ? "" : ", not corrected for drift"}`),
+    item("Heterostrain ε", total(isKnown(f.heterostrain_percent) ? f.heterostrain_percent : f.uncorrected?.heterostrain_percent, "%"), f.next?.strain_sigma_total_percent ? `two more frames: ${plusMinus(f.next.strain_sigma_total_percent, "%")}` : ""),
     item("Drift x", total(f.drift?.x_nm_per_min, "nm/min"), ""), item("Drift y", total(f.drift?.y_nm_per_min, "nm/min"), baseName(f.file ?? "")));
+}
+
+/** @param {any} estimate */
+function isKnown(estimate) {
+  return typeof estimate?.value === "number";
+}
+
+/** Corrected for drift where that is known. @param {any} f */
+function twistOf(f) {
+  return isKnown(f.twist_deg) ? f.twist_deg : f.uncorrected?.twist_deg;
 }
 
 /** @param {any} value @returns {any[]} */

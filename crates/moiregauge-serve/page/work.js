@@ -4,8 +4,9 @@ import { get, query, send } from "./api.js";
 import { onConnection, onHappening } from "./events.js";
 import { store } from "./store.js";
 
-/** @typedef {{work: string, files: string[], excluded: string[], settings: any, state: string, can_undo: boolean,
- *   can_redo: boolean, error?: any}} WorkState */
+/** @typedef {{work: string, files: string[], names?: Record<string, string>, excluded: string[], settings: any,
+ *   state: string, can_undo: boolean, can_redo: boolean, error?: string | null, failed?: any[],
+ *   result?: {moires: number, current: boolean, saved: boolean} | null}} WorkState */
 
 class Work extends EventTarget {
   constructor() {
@@ -16,6 +17,8 @@ class Work extends EventTarget {
     this.results = null;
     /** Counts results, so that pictures of them are asked anew. */
     this.version = 0;
+    /** Which of several moirés, the largest cell first. */
+    this.moire = 1;
     /** @type {{stage?: string, done?: number, of?: number} | null} */
     this.progress = null;
     this.busy = Promise.resolve();
@@ -93,6 +96,7 @@ class Work extends EventTarget {
     const other = this.is?.work !== state.work;
     const was = this.is?.state;
     this.is = state;
+    for (const [file, path] of Object.entries(state.names ?? {})) store.call(file, path);
     sessionStorage.setItem("work", state.work);
     if (state.state !== "running") this.progress = null;
     this.tell("state");
@@ -101,7 +105,9 @@ class Work extends EventTarget {
 
   async load() {
     const id = this.id;
-    const results = await get(this.path("results.json"));
+    const most = this.is?.result?.moires ?? 1;
+    this.moire = Math.min(this.moire, most);
+    const results = await get(this.path(`results.json${this.moire > 1 ? query({ moire: this.moire }) : ""}`));
     if (id !== this.id) return;
     this.results = results;
     this.version++;
@@ -139,7 +145,7 @@ class Work extends EventTarget {
 
   /** The place of a picture of this work's results. @param {string} what @param {string} file */
   picture(what, file) {
-    return `${this.path(what)}${query({ file, v: this.version })}`;
+    return `${this.path(what)}${query({ file, moire: this.moire > 1 ? this.moire : null })}`;
   }
 }
 
