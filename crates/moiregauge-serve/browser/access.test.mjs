@@ -71,6 +71,7 @@ test("from a file to a corrected result with the keyboard alone", async () => {
     await tabTo(/^(Look|Analyse|Correct|Maps|Watch|Moiré and plan|Samples|Take away)$/);
     for (let n = 0; n < 8 && (await focused()) !== name; n++) await page.keyboard.press("ArrowRight");
     assert.equal(await focused(), name);
+    await page.waitForFunction(() => (document.querySelector("[role=tabpanel]:not([hidden])")?.childElementCount ?? 0) > 0);
   };
   await tabTo(/^plain$/);
   await page.keyboard.press("Enter");

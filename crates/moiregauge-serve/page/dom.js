@@ -82,6 +82,8 @@ export function fill(parent, ...children) {
  * @param {string} [hint]
  */
 export function field(label, control, hint) {
+  // The text of a label would take in the options of a select.
+  if (!control.hasAttribute("aria-label")) control.setAttribute("aria-label", label);
   return h("label", { class: "field" }, h("span", { class: "label", text: label }), control,
     hint ? h("span", { class: "hint", text: hint }) : null);
 }

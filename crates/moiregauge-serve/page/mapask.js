@@ -28,6 +28,8 @@ export class Asked {
     /** @type {ReturnType<typeof setTimeout> | undefined} */
     this.wait = undefined;
     this.count = 0;
+    /** The areas that were found. @type {Region[]} */
+    this.devices = [];
     /** What is being drawn, nodes. @type {{x: number, y: number}[] | null} */
     this.draft = null;
     this.drawing = s("g", {});
@@ -37,8 +39,10 @@ export class Asked {
     this.list = h("ul", { class: "byhand" });
     this.device = [h("input", { type: "number", min: 0, step: "any", "aria-label": "Width of the device, nm" }), h("input", { type: "number", min: 0, step: "any", "aria-label": "Height of the device, nm" })];
     this.wanted = [h("input", { type: "number", step: "any", "aria-label": "Wanted twist, degrees" }), h("input", { type: "number", min: 0, step: "any", "aria-label": "Within, degrees" })];
-    this.answers = h("div", { class: "section" });
+    this.table = h("div", {});
     this.profilePlot = new Plot({ title: "Profile", x: [], xLabel: "Distance", series: [] });
+    this.profilePlot.element.hidden = true;
+    this.answers = h("div", { class: "section", "aria-live": "polite" }, this.table, this.profilePlot.element);
     this.element = h("div", {}, h("h3", { text: "Regions and profiles" }), h("p", { class: "hint", text: "Choose Region or Profile and drag on the map. Corners move with the mouse or the arrow keys." }), this.list,
       h("h3", { text: "Most uniform areas" }), h("div", { class: "pair" }, field("Width (nm)", this.device[0]), field("Height (nm)", this.device[1])),
       h("h3", { text: "Area with a twist" }), h("div", { class: "pair" }, field("Twist (°)", this.wanted[0]), field("Within (°)", this.wanted[1])),
@@ -58,7 +62,8 @@ export class Asked {
 
   /** Another map: the questions are asked anew. */
   fresh() {
-    fill(this.answers);
+    fill(this.table);
+    this.devices = [];
     this.place();
     if (this.regions.length + this.profiles.length > 0) this.ask();
   }
@@ -159,6 +164,10 @@ export class Asked {
       const at = l.ends_nm.map((c) => this.view.node(c));
       this.drawing.append(s("polyline", { points: points(at), class: "halo" }), s("polyline", { points: points(at), class: "line" }), words(l.name, at[0]));
     }
+    for (const d of this.devices) {
+      const at = d.corners_nm.map((c) => this.view.node(c));
+      this.drawing.append(s("polygon", { points: points(at), class: "halo" }), s("polygon", { points: points(at), class: "line" }), words(d.name, at[0]));
+    }
     if (this.draft) this.drawing.append(s("polygon", { points: points(this.draft), class: "outline" }));
   }
 
@@ -171,9 +180,11 @@ export class Asked {
     const [w, t] = this.device.map((i) => Number(i.value));
     const [twist, within] = this.wanted.map((i) => Number(i.value));
     /** @type {any} */
-    const questions = { regions: this.regions, profiles: this.profiles };
+    const questions = { regions: this.regions };
     if (w > 0 && t > 0) questions.device = { size_nm: [w, t] };
     if (twist !== 0 && within > 0) questions.wanted = { twist_deg: twist, within_deg: within };
+    this.showProfile();
+    if (this.regions.length === 0 && Object.keys(questions).length === 1) return this.show({});
     try {
       this.show(await send("POST", `maps/${this.view.map.map}/ask`, questions));
     } catch (error) {
@@ -187,27 +198,46 @@ export class Asked {
     const devices = answer.devices ?? [];
     const rows = regions.map((/** @type {any} */ r) => [r.name, total(r.mean?.twist_deg ?? estimate(r.twist_deg)), total(r.mean?.heterostrain_percent),
       number(r.twist_deg?.spread_corrected, 2), withError(r.wavelength_nm?.mean, r.wavelength_nm?.sigma), number(r.area_nm2, 4), `${number(r.masked_percent, 3)} %`]);
-    fill(this.answers,
+    fill(this.table,
       regions.length > 0 ? scroll("Regions", table("Regions", ["Region", "Twist (°)", "Heterostrain (%)", "Spread of twist (°)", "Wavelength (nm)", "Area (nm²)", "Masked"], rows, { numbers: [1, 2, 3, 4, 5, 6], shown: true })) : null,
       devices.length > 0 ? scroll("Most uniform areas", this.deviceTable(devices)) : null,
-      answer.wanted ? scroll("Area with the wanted twist", table("Area with the wanted twist", ["Number", "Value"], Object.entries(answer.wanted).filter(([, v]) => typeof v === "number").map(([k, v]) => [k.replace(/_/g, " "), number(/** @type {number} */ (v))]), { shown: true })) : null,
-      (answer.profiles ?? []).length > 0 ? this.profilePlot.element : null);
-    if ((answer.profiles ?? []).length > 0) this.showProfile(answer.profiles);
+      answer.wanted ? scroll("Area with the wanted twist", table("Area with the wanted twist", ["Number", "Value"], Object.entries(answer.wanted).filter(([, v]) => typeof v === "number").map(([k, v]) => [k.replace(/_percent$/, " (%)").replace(/_deg$/, " (°)").replace(/_/g, " "), number(/** @type {number} */ (v))]), { shown: true })) : null,
+      (answer.caveats ?? []).map((/** @type {any} */ c) => h("p", { class: "caveat warning" }, `${c.message}. `, h("span", { class: "where", text: c.where }))));
+    this.devices = devices.map((/** @type {any} */ d) => ({ name: String(d.rank), corners_nm: d.area.corners_nm }));
+    this.draw();
   }
 
   /** @param {any[]} devices */
   deviceTable(devices) {
-    const columns = Object.keys(devices[0]).filter((k) => typeof devices[0][k] === "number").slice(0, 7);
-    return table("Most uniform areas", ["Rank", ...columns.map((c) => c.replace(/_/g, " "))], devices.map((d, i) => [String(i + 1), ...columns.map((c) => number(d[c]))]), { numbers: columns.map((_, i) => i + 1), shown: true });
+    const rows = devices.map((d) => [String(d.rank), d.centre_nm.map((/** @type {number} */ x) => number(x, 4)).join(", "), number(d.angle_deg, 3),
+      total(d.area.mean?.twist_deg ?? estimate(d.area.twist_deg)), number(d.area.twist_deg?.spread_below_95, 2), `${number(d.area.masked_percent, 3)} %`]);
+    return table("Most uniform areas", ["Rank", "Middle (nm)", "Angle (°)", "Twist (°)", "Spread below, 95 % (°)", "Masked"], rows, { numbers: [2, 3, 4, 5], shown: true });
   }
 
-  /** @param {any[]} profiles */
-  showProfile(profiles) {
-    const p = profiles[profiles.length - 1];
-    const points = p.points ?? p.samples ?? p.rows ?? [];
-    const column = (/** @type {string} */ k) => points.map((/** @type {any} */ x) => (typeof x[k] === "number" ? x[k] : null));
-    this.profilePlot.set({ title: `Twist along ${p.name}`, x: points.map((/** @type {any} */ x) => x.distance_nm), xLabel: "Distance", xUnit: "nm",
-      series: [{ label: "θ", unit: "°", y: column("twist_deg"), sigma: column("twist_sigma_deg") }] });
+  /** The nodes below the last line: what the map shows there, nothing in between. */
+  showProfile() {
+    const line = this.profiles.at(-1);
+    const { values, sigmas, quantity } = this.view;
+    this.profilePlot.element.hidden = !line;
+    if (!line || !values || !quantity) return;
+    const [a, b] = line.ends_nm.map((end) => this.view.node(end));
+    const length = Math.hypot(line.ends_nm[1][0] - line.ends_nm[0][0], line.ends_nm[1][1] - line.ends_nm[0][1]);
+    const steps = Math.max(1, Math.round(Math.max(Math.abs(b.x - a.x), Math.abs(b.y - a.y))));
+    const x = [];
+    /** @type {(number | null)[]} */
+    const y = [];
+    /** @type {(number | null)[]} */
+    const sigma = [];
+    for (let n = 0; n <= steps; n++) {
+      const [i, j] = [Math.round(a.x + ((b.x - a.x) * n) / steps), Math.round(a.y + ((b.y - a.y) * n) / steps)];
+      const inside = i >= 0 && j >= 0 && i < values.width && j < values.height;
+      const value = inside ? values.data[j * values.width + i] : NaN;
+      const error = inside && sigmas ? sigmas.data[j * values.width + i] : NaN;
+      x.push((length * n) / steps);
+      y.push(Number.isNaN(value) ? null : value);
+      sigma.push(Number.isNaN(error) ? null : error);
+    }
+    this.profilePlot.set({ title: `Nodes along ${line.name}: ${quantity.name}`, x, xLabel: "Distance", xUnit: "nm", series: [{ label: quantity.name, unit: quantity.unit, y, sigma }] });
   }
 }
 

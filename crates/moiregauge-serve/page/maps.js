@@ -292,6 +292,7 @@ export class MapsView {
       fill(this.errorBar);
     }
     this.placeCursor();
+    this.asked.showProfile();
   }
 
   async showInfo() {
