@@ -27,6 +27,12 @@ async function settings(page) {
   return (await api(page, `works/${works.at(-1)}`)).settings;
 }
 
+/** Its statistical error. @param {import("playwright-core").Page} page */
+async function twistSigma(page) {
+  const { works } = await api(page, "state");
+  return (await api(page, `works/${works.at(-1)}/results.json`)).sets[0].mean.twist_deg.sigma;
+}
+
 test("a lattice vector that is dragged is told by hand, and undone", async () => {
   const page = await start();
   const handle = page.getByRole("button", { name: "Lattice vector 1" });
@@ -71,13 +77,16 @@ test("vectors and spots move with the arrow keys", async () => {
 
 test("a region is drawn with the mouse and moved with the keyboard", async () => {
   const page = await start();
+  const whole = await twistSigma(page);
   await page.getByRole("button", { name: "Draw region" }).click();
   const box = await page.locator("#view-correct canvas").first().boundingBox();
   assert.ok(box);
-  const corners = [[0.1, 0.1], [0.9, 0.1], [0.9, 0.9], [0.1, 0.9]];
+  const corners = [[0.15, 0.15], [0.85, 0.15], [0.85, 0.85], [0.15, 0.85]];
   for (const [x, y] of corners) await page.mouse.click(box.x + x * box.width, box.y + y * box.height);
   await nextResult(page, () => page.getByRole("button", { name: "Finish region" }).click());
   const regions = (await settings(page)).by_hand.regions_nm;
+  // Less of the frame tells less: the result is of the region and not of what was measured before.
+  assert.ok((await twistSigma(page)) > 1.05 * whole, "the error grows with less area");
   assert.equal(regions.length, 1);
   assert.equal(regions[0].length, 4);
   const corner = page.getByRole("button", { name: "Region 1, corner 1" });

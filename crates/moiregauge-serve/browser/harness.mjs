@@ -34,6 +34,16 @@ export function rootWith(name, from) {
   return root;
 }
 
+/** Results of a campaign of three samples. */
+export function campaign() {
+  const [root, out] = [join(WORK, "samples"), join(WORK, "campaign")];
+  if (existsSync(out)) return out;
+  mkdirSync(root, { recursive: true });
+  ["first", "second", "third"].forEach((name, n) => cpSync(simulated(name, ["--scans", "2", "--pixels", "128", "--twist", String(1.1 + 0.2 * n)]), join(root, name), { recursive: true }));
+  execFileSync(PROGRAM, ["campaign", root, "--out", out, "-q"]);
+  return out;
+}
+
 /** @returns {Promise<number>} */
 export async function freePort() {
   return new Promise((done) => {

@@ -3,7 +3,7 @@
 import { mkdirSync } from "node:fs";
 import { join } from "node:path";
 import { after, before, test } from "node:test";
-import { analyse, closeBrowser, open, openFolder, rootWith, serve, simulated, view } from "./harness.mjs";
+import { analyse, campaign, closeBrowser, open, openFolder, rootWith, serve, simulated, view } from "./harness.mjs";
 
 const folder = process.env.SCREENSHOTS;
 /** @type {Awaited<ReturnType<typeof serve>>} */
@@ -12,7 +12,7 @@ let server;
 before(async () => {
   if (!folder) return;
   mkdirSync(folder, { recursive: true });
-  server = await serve([rootWith("plain", simulated("plain")), rootWith("wide", simulated("wide", ["--scans", "1", "--pixels", "512", "--size", "160", "160"]))]);
+  server = await serve([rootWith("plain", simulated("plain")), rootWith("wide", simulated("wide", ["--scans", "1", "--pixels", "512", "--size", "160", "160"])), campaign()]);
 });
 after(async () => {
   await closeBrowser();
@@ -27,7 +27,7 @@ for (const width of [1440, 800]) {
         await page.waitForTimeout(700);
         await page.screenshot({ path: join(folder ?? "", `${name}-${width}-${theme}.png`), fullPage: false });
       };
-      await openFolder(page, "wide");
+      await openFolder(page, "root-wide");
       await openFolder(page, "plain");
       await page.getByRole("button", { name: /^scan\.001\.spm/ }).click();
       await page.waitForSelector("html[data-picture]");
@@ -44,7 +44,12 @@ for (const width of [1440, 800]) {
       await page.waitForTimeout(2500);
       await shoot("correct");
       await view(page, "Maps");
-      await page.getByLabel("Scan", { exact: true }).selectOption({ index: 0 });
+      await view(page, "Look");
+      await page.getByRole("button", { name: "wide", exact: true }).click();
+      await page.waitForTimeout(600);
+      await page.getByRole("button", { name: /^scan\.000\.spm/ }).last().click();
+      await view(page, "Maps");
+      await page.getByLabel("Scan", { exact: true }).selectOption({ index: 5 });
       await page.getByRole("button", { name: "Make the map" }).click();
       await page.waitForSelector("html[data-map]", { timeout: 60000 }).catch(() => undefined);
       await page.getByRole("button", { name: "Add region" }).click({ timeout: 3000 }).catch(() => undefined);
@@ -61,6 +66,8 @@ for (const width of [1440, 800]) {
       await page.waitForTimeout(1500);
       await shoot("moire");
       await view(page, "Samples");
+      await page.getByLabel("Folder of results").selectOption({ label: "campaign" });
+      for (const name of ["first", "second"]) await page.getByRole("checkbox", { name: `Compare ${name}` }).check();
       await shoot("samples");
       await view(page, "Take away");
       await shoot("take");

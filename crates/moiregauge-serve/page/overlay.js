@@ -72,6 +72,20 @@ export function brightPlace(viewer, [a, b]) {
       if (sum > best) [best, at] = [sum, [(i + 0.5) / bins, (j + 0.5) / bins]];
     }
   }
+  // The middle of what is bright about it.
+  const [bi, bj] = [Math.floor(at[0] * bins), Math.floor(at[1] * bins)];
+  let low = Infinity;
+  for (let j = -3; j <= 3; j++) for (let i = -3; i <= 3; i++) low = Math.min(low, mean(bi + i, bj + j));
+  let [weight, u, v] = [0, 0, 0];
+  for (let j = -3; j <= 3; j++) {
+    for (let i = -3; i <= 3; i++) {
+      const w = (mean(bi + i, bj + j) - low) ** 2;
+      weight += w;
+      u += w * i;
+      v += w * j;
+    }
+  }
+  if (weight > 0) at = [at[0] + u / weight / bins, at[1] + v / weight / bins];
   return [at[0] * a[0] + at[1] * b[0], at[0] * a[1] + at[1] * b[1]];
 }
 
