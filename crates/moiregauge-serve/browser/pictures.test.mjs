@@ -2,22 +2,20 @@
 
 import { mkdirSync } from "node:fs";
 import { join } from "node:path";
-import { after, before, test } from "node:test";
+import { after, afterEach, beforeEach, test } from "node:test";
 import { analyse, campaign, closeBrowser, open, openFolder, rootWith, serve, simulated, view } from "./harness.mjs";
 
 const folder = process.env.SCREENSHOTS;
 /** @type {Awaited<ReturnType<typeof serve>>} */
 let server;
 
-before(async () => {
+beforeEach(async () => {
   if (!folder) return;
   mkdirSync(folder, { recursive: true });
   server = await serve([rootWith("plain", simulated("plain")), rootWith("wide", simulated("wide", ["--scans", "1", "--pixels", "512", "--size", "160", "160"])), campaign()]);
 });
-after(async () => {
-  await closeBrowser();
-  await server?.stop();
-});
+afterEach(() => server?.stop());
+after(closeBrowser);
 
 for (const width of [1440, 800]) {
   for (const theme of /** @type {("light" | "dark")[]} */ (["light", "dark"])) {

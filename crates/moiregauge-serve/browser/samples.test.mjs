@@ -18,9 +18,9 @@ test("the table of samples is sorted, and two stand side by side", async () => {
   await view(page, "Samples");
   await page.getByLabel("Folder of results").selectOption({ label: "campaign" });
   const names = () => page.locator("#view-samples table").first().locator("tbody th").allInnerTexts();
-  await page.getByRole("button", { name: /^twist deg/ }).click();
+  await page.getByRole("button", { name: /^Twist/ }).click();
   assert.deepEqual(await names(), ["first", "second", "third"]);
-  await page.getByRole("button", { name: /^twist deg/ }).click();
+  await page.getByRole("button", { name: /^Twist/ }).click();
   assert.deepEqual(await names(), ["third", "second", "first"]);
   await page.waitForFunction(() => [...document.querySelectorAll("#view-samples img")].some((i) => /** @type {HTMLImageElement} */ (i).naturalWidth > 0));
   for (const name of ["first", "third"]) await page.getByRole("checkbox", { name: `Compare ${name}` }).check();

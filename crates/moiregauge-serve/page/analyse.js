@@ -251,12 +251,7 @@ export class AnalyseView {
     } catch (error) {
       this.image.clear(/** @type {Error} */ (error).message);
     }
-    const made = await Promise.all(rest);
-    [this.residual, this.cellImage].forEach((viewer, i) => {
-      const panel = viewer.element.parentElement;
-      if (panel) panel.hidden = !made[i];
-    });
-    this.pictures.querySelector(".panels")?.classList.toggle("four", made.some(Boolean));
+    await Promise.all(rest);
   }
 }
 

@@ -142,7 +142,9 @@ export class MapsView {
     const positive = (/** @type {HTMLInputElement} */ input) => (Number(input.value) > 0 ? Number(input.value) : undefined);
     const map = { window_nm: positive(this.windowNm), step_nm: positive(this.stepNm), method: this.method.value === "demodulation" ? undefined : this.method.value };
     const given = Object.fromEntries(Object.entries(map).filter(([, v]) => v !== undefined));
-    const settings = work.is?.settings ?? {};
+    // What was told by hand of the scans of the analysis holds for these.
+    const { by_hand, ...others } = work.is?.settings ?? {};
+    const settings = by_hand && work.is?.files.includes(this.file.value) ? { ...others, by_hand } : others;
     try {
       const one = { file: this.file.value, settings: Object.fromEntries(Object.entries(settings).filter(([, v]) => v !== null)) };
       const body = { ...(this.file.value === ALL ? { work: work.id } : one), request: given };
@@ -182,7 +184,7 @@ export class MapsView {
     this.barBox.hidden = state !== "running";
     this.cancel.disabled = state !== "running";
     this.offerFiles();
-    if (state === "failed") this.state.textContent = `No map. ${e ?? ""} ${(this.map.failed ?? []).map((/** @type {any} */ f) => f.error ?? f.message ?? "").join(" ")}`;
+    if (state === "failed") this.state.textContent = `No map: ${(this.map.failed ?? []).map((/** @type {any} */ f) => f.error).join(" ") || e}`;
     else if (state !== "running") this.state.textContent = state === "cancelled" ? "Cancelled." : "";
     else if (!this.state.textContent) this.state.textContent = "Running";
     const there = !!this.document && this.document.of === this.map?.map;

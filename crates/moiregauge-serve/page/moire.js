@@ -91,7 +91,7 @@ export class MoireView {
       ["One electron per cell", power(c.density_per_electron_cm2), "cm⁻²"],
       [`Full filling, ${c.band_degeneracy} electrons`, power(c.density_full_cm2), "cm⁻²"],
     ];
-    fill(this.cell, h("h2", { text: answer.layers ? `Moiré of ${answer.layers}` : "Moiré" }), h("p", { class: "soft", text: answer.input ?? "" }), cellFigure(c.vectors_nm), table("The cell", ["Quantity", "Value", "Unit"], rows, { numbers: [1] }));
+    fill(this.cell, h("h2", { text: answer.layers ? `Moiré of ${answer.layers}` : "Moiré" }), h("p", { class: "soft", text: answer.input ?? "" }), h("div", { class: "cell-and-table" }, cellFigure(c.vectors_nm), table("The cell", ["Quantity", "Value", "Unit"], rows, { numbers: [1] })));
   }
 
   async askPlan() {

@@ -61,7 +61,7 @@ export async function showSpectrum(viewer, file, channel) {
 }
 
 /**
- * A picture of the results: "residual" or "cell". Says whether the program makes such pictures.
+ * A picture of the results: "residual" or "cell".
  * @param {Viewer} viewer
  * @param {"residual" | "cell"} what
  * @param {string} file
@@ -73,11 +73,9 @@ export async function showPart(viewer, what, file) {
     const most = Math.max(Math.abs(from), Math.abs(to));
     viewer.setLook(what === "residual" ? { low: -most, high: most, colours: "blue-red" } : { low: from, high: to, colours: localStorage.getItem("colours") ?? "viridis" });
     viewer.show(image);
-    return true;
   } catch (error) {
     const e = /** @type {import("./api.js").ApiError} */ (error);
-    viewer.clear(e.message);
-    return !e.missing;
+    viewer.clear(e.message.charAt(0).toUpperCase() + e.message.slice(1));
   }
 }
 

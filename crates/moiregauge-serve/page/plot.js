@@ -64,7 +64,9 @@ export class Plot {
     const grid = { stroke: token("--hair"), width: 1 };
     const axis = { stroke: ink, grid, ticks: { ...grid, size: 4 }, font: "11px system-ui, sans-serif", labelFont: "11px system-ui, sans-serif", labelSize: 18, labelGap: 0 };
     const unit = this.is.series[0]?.unit;
-    const label = (/** @type {string} */ words, /** @type {string | undefined} */ u) => (u ? `${words} (${u})` : words);
+    const label = (/** @type {string} */ words, /** @type {string | undefined} */ u) => (u && words ? `${words} (${u})` : words || u || "");
+    // Numbers of scans are whole.
+    const whole = this.is.x.every(Number.isInteger) ? { incrs: [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000] } : {};
     const shared = this.is.series.length > 1 ? "" : this.is.series[0].label;
     const plain = (/** @type {any} */ _u, /** @type {number[]} */ ticks) => ticks.map((t) => String(Number(t.toPrecision(9))).replace("-", "\u2212"));
     this.chart = new uPlot({
@@ -75,7 +77,7 @@ export class Plot {
       cursor: { y: false, points: { size: 8 }, drag: { x: true, y: false } },
       scales: { x: { time: false, range: (/** @type {any} */ _u, /** @type {number} */ a, /** @type {number} */ b) => this.rangeX(a, b) }, y: { range: () => this.rangeY() } },
       axes: [
-        { ...axis, label: label(this.is.xLabel, this.is.xUnit), size: 28, values: plain },
+        { ...axis, ...whole, label: label(this.is.xLabel, this.is.xUnit), size: 28, values: plain },
         { ...axis, label: label(shared, unit), size: 62, values: plain },
       ],
       series: [{}, ...this.is.series.map((sr, i) => this.lineOf(sr, i))],
@@ -105,7 +107,7 @@ export class Plot {
 
   /** @param {number} low @param {number} high @returns {[number, number]} */
   rangeX(low, high) {
-    const gap = this.is.fine ? 0 : (high - low || 1) * 0.03;
+    const gap = this.is.fine ? 0 : high > low ? (high - low) * 0.03 : 1;
     return [low - gap, high + gap];
   }
 

@@ -67,7 +67,7 @@ export function headline(found) {
  * @param {string} name
  * @param {[string, string][]} rows
  */
-function lines(name, rows) {
+export function lines(name, rows) {
   return h("div", {}, h("span", { class: "name", text: name }), h("div", { class: "lines" }, rows.flatMap(([a, b]) => [h("span", { text: a }), h("span", { text: b })])));
 }
 
@@ -111,7 +111,7 @@ export async function caveatList(caveats) {
 }
 
 /** With a capital letter. @param {string} text */
-function first(text) {
+export function first(text) {
   return text.charAt(0).toUpperCase() + text.slice(1);
 }
 

@@ -11,6 +11,15 @@ const PAIRS = /** @type {Record<string, string>} */ ({
   twist_deg: "twist_sigma_total_deg", heterostrain_percent: "heterostrain_sigma_total_percent", drift_x_nm_per_min: "drift_x_sigma_nm_per_min", drift_y_nm_per_min: "drift_y_sigma_nm_per_min",
 });
 
+/** Columns in words. @type {Record<string, string>} */
+const HEADS = { sample: "Sample", moire: "Moiré", status: "Status", scans: "Scans", twist_deg: "Twist (°)", heterostrain_percent: "Heterostrain (%)",
+  drift_x_nm_per_min: "Drift x (nm/min)", drift_y_nm_per_min: "Drift y (nm/min)", caveats: "Caveats", failed_files: "Failed files", error: "Error" };
+
+/** @param {string} column */
+function head(column) {
+  return HEADS[column] ?? column.replace(/_/g, " ");
+}
+
 export class SamplesView {
   /** @param {(words: string) => void} failed */
   constructor(failed) {
@@ -76,7 +85,10 @@ export class SamplesView {
   /** Columns that are shown: errors stand beside their values. */
   get shownColumns() {
     const hidden = new Set([...Object.values(PAIRS), "twist_sigma_deg", "heterostrain_sigma_percent"]);
-    return this.table.columns.filter((c) => !hidden.has(c));
+    // What is empty for all says nothing.
+    const empty = (/** @type {any} */ v) => v === "" || v === null || v === undefined || (Array.isArray(v) && v.length === 0);
+    const one = this.table.rows.every((r) => Number(r.moire) === 1);
+    return this.table.columns.filter((c) => !hidden.has(c) && !(c === "moire" && one) && (c === "sample" || this.table.rows.some((r) => !empty(r[c]))));
   }
 
   /** @param {any} row @param {string} column */
@@ -85,7 +97,8 @@ export class SamplesView {
     if (value === "" || value === null || value === undefined) return "–";
     const n = Number(value);
     if (PAIRS[column] && Number.isFinite(n)) return withError(n, Number(row[PAIRS[column]]));
-    return typeof value === "number" || (value !== "" && Number.isFinite(n) && column !== "sample") ? number(n, 5) : String(value);
+    if (Array.isArray(value)) return value.length > 0 ? value.join(", ") : "–";
+    return Number.isFinite(n) && !Number.isInteger(n) && column !== "sample" ? number(n, 5) : String(value);
   }
 
   show() {
@@ -97,8 +110,8 @@ export class SamplesView {
       const c = typeof x === "number" && typeof y === "number" ? x - y : String(x).localeCompare(String(y), "en", { numeric: true });
       return this.sorted.down ? -c : c;
     });
-    const head = columns.map((c) => h("th", { scope: "col", "aria-sort": c === key ? (this.sorted.down ? "descending" : "ascending") : null },
-      h("button", { type: "button", class: "sort", text: `${c.replace(/_/g, " ")}${c === key ? (this.sorted.down ? " ↓" : " ↑") : ""}`, onclick: () => {
+    const heads = columns.map((c) => h("th", { scope: "col", "aria-sort": c === key ? (this.sorted.down ? "descending" : "ascending") : null },
+      h("button", { type: "button", class: "sort", text: `${head(c)}${c === key ? (this.sorted.down ? " ↓" : " ↑") : ""}`, onclick: () => {
         this.sorted = { column: c, down: c === key ? !this.sorted.down : false };
         this.show();
       } })));
@@ -109,7 +122,7 @@ export class SamplesView {
       box.addEventListener("change", () => this.choose(name, box.checked));
       return h("tr", { class: this.pair.has(name) ? "chosen" : null }, h("td", {}, box), h("td", {}, this.thumb(row)), columns.map((c, i) => (i === 0 ? h("th", { scope: "row", text: this.cell(row, c) }) : h("td", { text: this.cell(row, c) }))));
     });
-    fill(this.host, h("table", {}, h("caption", { text: `${rows.length} samples` }), h("thead", {}, h("tr", {}, h("th", { scope: "col", text: "Compare" }), h("th", { scope: "col", text: "Picture" }), head)), h("tbody", {}, rows)));
+    fill(this.host, h("table", {}, h("caption", { text: `${rows.length} samples` }), h("thead", {}, h("tr", {}, h("th", { scope: "col", text: "Compare" }), h("th", { scope: "col", text: "Picture" }), heads)), h("tbody", {}, rows)));
   }
 
   /** @param {any} row */
@@ -131,7 +144,7 @@ export class SamplesView {
       return;
     }
     fill(this.compare, rows.map((row) => h("section", { class: "section", "aria-label": String(row.sample) }, h("h2", { text: row.sample }), this.thumb(row),
-      h("table", {}, h("caption", { class: "away", text: `Numbers of ${row.sample}` }), h("tbody", {}, this.shownColumns.slice(1).map((c) => h("tr", {}, h("th", { scope: "row", text: c.replace(/_/g, " ") }), h("td", { text: this.cell(row, c) }))))))));
+      h("table", {}, h("caption", { class: "away", text: `Numbers of ${row.sample}` }), h("tbody", {}, this.shownColumns.slice(1).map((c) => h("tr", {}, h("th", { scope: "row", text: head(c) }), h("td", { text: this.cell(row, c) }))))))));
   }
 
   showTrend() {

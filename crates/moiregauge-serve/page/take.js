@@ -26,11 +26,13 @@ export class TakeView {
       fill(this.body, empty("There is no result yet. Analyse scans first."));
       return;
     }
-    const parts = await Promise.all([this.command(), this.settings(), this.outputs()]);
+    const files = h("section", {}, h("h3", { text: "Files" }), h("p", { class: "hint", role: "status", text: "Figures are being drawn …" }));
+    const parts = await Promise.all([this.command(), this.settings()]);
     if (mine !== this.asked) return;
     fill(this.body,
       h("p", { class: "buttons" }, h("a", { class: "button", href: `/api/${work.path("archive.zip")}`, download: "moiregauge-result.zip", text: "Everything as zip" }),
-        h("span", { class: "hint", text: "results.json, tables, figures and report: what the program would write" })), parts);
+        h("span", { class: "hint", text: "results.json, tables, figures and report: what the program would write" })), parts, files);
+    this.outputs().then((found) => mine === this.asked && files.replaceWith(found));
   }
 
   /**
@@ -64,7 +66,8 @@ export class TakeView {
 
   async settings() {
     try {
-      return this.text("Settings", await (await ask(work.path("settings.toml"))).text(), "settings.toml, for moiregauge analyze --config settings.toml");
+      const text = await (await ask(work.path("settings.toml"))).text();
+      return text.trim() === "" ? h("section", {}, h("h3", { text: "Settings" }), h("p", { class: "hint", text: "All as usual: no file is needed." })) : this.text("Settings", text, "As settings.toml, for --config settings.toml.");
     } catch (error) {
       return h("section", {}, h("h3", { text: "Settings" }), empty(/** @type {Error} */ (error).message));
     }

@@ -5,7 +5,7 @@ import { baseName, empty, field, fill, h, say, scroll, select, table } from "./d
 import { onHappening } from "./events.js";
 import { plusMinus, total } from "./format.js";
 import { Plot } from "./plot.js";
-import { caveatList } from "./result.js";
+import { caveatList, first, lines } from "./result.js";
 import { store } from "./store.js";
 
 /** Results that are held; earlier ones are let go. */
@@ -146,8 +146,8 @@ export class WatchView {
     const warnings = [...list(this.watch.warnings), ...(last?.error ? [last.error] : []), ...(last?.failed ?? [])];
     const caveats = last?.caveats?.length && typeof last.caveats[0] === "object" ? await caveatList(last.caveats) : null;
     fill(this.advice,
-      advice.length > 0 ? h("section", { "aria-label": "Advice" }, h("h3", { text: "Advice" }), h("ul", { class: "advice" }, advice.map((a) => h("li", { text: words(a) })))) : null,
-      warnings.length > 0 ? h("section", { "aria-label": "Warnings" }, h("h3", { text: "Warnings" }), h("ul", { class: "warnings" }, warnings.map((w) => h("li", { text: words(w) })))) : null,
+      advice.length > 0 ? h("section", { "aria-label": "Advice" }, h("h3", { text: "Advice" }), h("ul", { class: "advice" }, advice.map((a) => h("li", { text: first(words(a)) })))) : null,
+      warnings.length > 0 ? h("section", { "aria-label": "Warnings" }, h("h3", { text: "Warnings" }), h("ul", { class: "warnings" }, warnings.map((w) => h("li", { text: first(words(w)) })))) : null,
       caveats);
   }
 
@@ -180,7 +180,8 @@ function liveHeadline(f) {
   return h("div", { class: "headline" },
     item("Twist θ", total(twistOf(f), "°"), `after ${f.frames} ${f.frames === 1 ? "frame" : "frames"}${isKnown(f.twist_deg) ? "" : ", not corrected for drift"}`),
     item("Heterostrain ε", total(isKnown(f.heterostrain_percent) ? f.heterostrain_percent : f.uncorrected?.heterostrain_percent, "%"), f.next?.strain_sigma_total_percent ? `two more frames: ${plusMinus(f.next.strain_sigma_total_percent, "%")}` : ""),
-    item("Drift x", total(f.drift?.x_nm_per_min, "nm/min"), ""), item("Drift y", total(f.drift?.y_nm_per_min, "nm/min"), baseName(f.file ?? "")));
+    lines("Drift", [["x", total(f.drift?.x_nm_per_min, "nm/min")], ["y", total(f.drift?.y_nm_per_min, "nm/min")]]),
+    lines("Last frame", [["", baseName(f.file ?? "")], ["", (f.acquired ?? "").replace("T", " ")]]));
 }
 
 /** @param {any} estimate */
