@@ -61,8 +61,10 @@ export function number(value, significant = 4) {
   if (value === null || value === undefined || !Number.isFinite(value)) return "–";
   if (value === 0) return "0";
   const size = Math.abs(value);
-  if (size >= 1e6 || size < 1e-4) return power(value, significant - 1);
-  const text = size >= 10 ** significant ? value.toFixed(0) : value.toPrecision(significant);
+  if (size >= 1e6 || size < 1e-6) return power(value, significant - 1);
+  // JavaScript writes 1e-7 for what the program writes 0.0000001.
+  const after = Math.max(0, significant - 1 - Math.floor(Math.log10(size)));
+  const text = value.toFixed(Math.min(20, after));
   return minus(text);
 }
 

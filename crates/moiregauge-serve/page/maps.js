@@ -284,7 +284,8 @@ export class MapsView {
     this.contrast.take(this.values.data, found.unit);
     this.titles[0].textContent = `${found.name.replace(/_/g, " ")}${found.unit ? ` (${found.unit})` : ""}`;
     if (this.sigmas) {
-      const { low, high } = histogram(this.sigmas.data);
+      // The few nodes at the rim with errors beyond all others do not decide the colours.
+      const { low, to: high } = histogram(this.sigmas.data);
       this.error.setLook({ low: 0, high, colours: "cividis" });
       this.error.show(this.sigmas, { keepView: true });
       fill(this.errorBar, number(0), bar("cividis"), withUnit(high, found.unit, 2));

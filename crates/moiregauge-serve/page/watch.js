@@ -181,7 +181,7 @@ function liveHeadline(f) {
     item("Twist θ", total(twistOf(f), "°"), `after ${f.frames} ${f.frames === 1 ? "frame" : "frames"}${isKnown(f.twist_deg) ? "" : ", not corrected for drift"}`),
     item("Heterostrain ε", total(isKnown(f.heterostrain_percent) ? f.heterostrain_percent : f.uncorrected?.heterostrain_percent, "%"), f.next?.strain_sigma_total_percent ? `two more frames: ${plusMinus(f.next.strain_sigma_total_percent, "%")}` : ""),
     lines("Drift", [["x", total(f.drift?.x_nm_per_min, "nm/min")], ["y", total(f.drift?.y_nm_per_min, "nm/min")]]),
-    lines("Last frame", [["", baseName(f.file ?? "")], ["", (f.acquired ?? "").replace("T", " ")]]));
+    h("div", {}, h("span", { class: "name", text: "Last frame" }), h("span", { class: "value small", text: baseName(f.file ?? "") }), h("span", { class: "more", text: (f.acquired ?? "").replace("T", " ") })));
 }
 
 /** @param {any} estimate */
