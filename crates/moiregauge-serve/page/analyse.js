@@ -3,9 +3,10 @@
 import { get } from "./api.js";
 import { baseName, empty, field, fill, h, say, scroll, select } from "./dom.js";
 import { total } from "./format.js";
+import { KnownForm } from "./known.js";
 import { drawLattice, drawSpots, frameSpots } from "./overlay.js";
 import { overlayOf, showPart, showScan, showSpectrum } from "./pictures.js";
-import { budgetTable, caveatList, failedList, headline, meanOf, scanTable } from "./result.js";
+import { budgetTable, caveatList, failedList, first, headline, meanOf, scanTable } from "./result.js";
 import { ScanList } from "./scanlist.js";
 import { ScanPlots } from "./scanplots.js";
 import { SettingsForm } from "./settings.js";
@@ -24,6 +25,7 @@ export class AnalyseView {
     this.picked = "";
     this.set = "";
     this.form = new SettingsForm(() => this.showState());
+    this.known = new KnownForm();
     this.list = new ScanList((file) => this.pick(file), failed);
     this.plots = new ScanPlots((file) => this.pick(file, true));
     this.run = h("button", { type: "button", class: "main", text: "Analyse", onclick: () => this.start() });
@@ -36,7 +38,7 @@ export class AnalyseView {
     this.pictures = this.makePictures();
     this.left = h("section", { "aria-label": "Scans and settings" },
       h("h2", { text: "Scans" }), this.chosen, this.list.element,
-      h("h3", { text: "Settings" }), this.form.element,
+      h("h3", { text: "Settings" }), this.form.element, this.known.element,
       h("div", { class: "buttons" }, this.run, this.cancel), this.barBox, this.stage);
     this.middle = h("section", { class: "middle", "aria-label": "Results" }, this.results);
     this.element = h("div", { class: "columns" }, this.left, this.middle);
@@ -50,7 +52,9 @@ export class AnalyseView {
 
   shown() {
     this.showState();
-    if (!work.id) this.form.offerChannels([...store.chosen]);
+    const files = work.id && !this.otherScans ? work.is?.files ?? [] : [...store.chosen];
+    this.form.offerChannels(files);
+    this.known.about(files[0]);
   }
 
   refresh() {
@@ -62,9 +66,14 @@ export class AnalyseView {
     if (!work.is) return;
     await Promise.all(work.is.files.map((f) => store.inspect(f).catch(() => null)));
     await this.form.offerChannels(work.is.files);
-    this.form.write(work.is.settings);
+    this.writeForms();
     this.showState();
     if (work.results) this.showResults();
+  }
+
+  writeForms() {
+    this.form.write(work.is?.settings ?? {});
+    this.known.write(work.is?.known ?? {});
   }
 
   /** Whether other scans are chosen than those of the work. */
@@ -81,12 +90,12 @@ export class AnalyseView {
         const files = [...store.chosen].sort((a, b) => order(a).localeCompare(order(b), "en", { numeric: true }));
         this.picked = "";
         await Promise.all(files.map((f) => store.inspect(f).catch(() => null)));
-        await work.create(files, settings);
-        this.form.write(work.is?.settings ?? {});
+        await work.create(files, settings, this.known.read());
+        this.writeForms();
         await work.do("run");
-      } else if (this.form.isChanged) {
-        await work.change({ settings });
-        this.form.write(work.is?.settings ?? {});
+      } else if (this.form.isChanged || this.known.isChanged) {
+        await work.change({ settings, known: this.known.read() });
+        this.writeForms();
       }
       else await work.do("run");
     } catch (error) {
@@ -114,7 +123,7 @@ export class AnalyseView {
     const share = p?.of ? Math.min(1, (p.done ?? 0) / p.of) : 0;
     this.bar.style.width = `${100 * share}%`;
     this.bar.setAttribute("aria-valuenow", String(Math.round(100 * share)));
-    const words = { running: p?.stage ? `${p.stage}${p.of ? `, ${p.done} of ${p.of}` : ""}` : "Running", cancelled: "Cancelled.", done: work.is?.result?.saved ? "Done and saved." : "Done.", idle: "" }[state ?? "idle"];
+    const words = { running: p?.stage ? `${first(p.stage)}${p.of ? `, ${p.done} of ${p.of}` : ""}` : "Running", cancelled: "Cancelled.", done: work.is?.result?.saved ? "Done and saved." : "Done.", idle: "" }[state ?? "idle"];
     this.stage.textContent = state === "failed" ? "" : words ?? "";
     if (state === "failed") this.showFailure();
   }

@@ -4,7 +4,7 @@ import { get, query, send } from "./api.js";
 import { onConnection, onHappening } from "./events.js";
 import { store } from "./store.js";
 
-/** @typedef {{work: string, files: string[], names?: Record<string, string>, excluded: string[], settings: any,
+/** @typedef {{work: string, files: string[], names?: Record<string, string>, excluded: string[], settings: any, known?: any,
  *   state: string, can_undo: boolean, can_redo: boolean, error?: string | null, failed?: any[],
  *   result?: {moires: number, current: boolean, saved: boolean} | null}} WorkState */
 
@@ -69,9 +69,10 @@ class Work extends EventTarget {
    * A new work.
    * @param {string[]} files
    * @param {any} settings
+   * @param {any} known
    */
-  async create(files, settings) {
-    const { work } = await send("POST", "works", { files, settings });
+  async create(files, settings, known) {
+    const { work } = await send("POST", "works", { files, settings, known });
     this.results = null;
     await this.take(await get(`works/${work}`));
   }
