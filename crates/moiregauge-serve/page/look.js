@@ -16,6 +16,9 @@ import { Viewer } from "./viewer.js";
 /** Images are held whole up to this many samples along a side; larger ones come as blocks and tiles. */
 const WHOLE = 2048;
 
+/** Files with fewer bytes are small. */
+const EARLY = 16e6;
+
 export class LookView {
   /** @param {(words: string) => void} failed */
   constructor(failed) {
@@ -94,6 +97,10 @@ export class LookView {
     const file = store.current;
     if (!file) return;
     this.title.textContent = store.name(file);
+    // The image of a small file is asked for before it is known what else the file holds.
+    const guess = this.channel;
+    const bytes = store.files.get(file)?.bytes ?? 0;
+    const early = bytes > 0 && bytes < EARLY ? floats(`image${query({ file, channel: guess })}`).catch(() => null) : null;
     try {
       const info = await store.inspect(file);
       if (store.current !== file) return;
@@ -106,7 +113,8 @@ export class LookView {
         fill(this.thumbs, (info.unreadable ?? []).map((/** @type {any} */ u) => h("p", { class: "hint", text: typeof u === "string" ? u : JSON.stringify(u) })));
         return;
       }
-      const load = this.load(file, Math.max(0, same));
+      const channel = Math.max(0, same);
+      const load = this.load(file, channel, channel === guess ? early : null);
       this.showThumbs(file, info);
       await load;
     } catch (error) {
@@ -126,8 +134,9 @@ export class LookView {
    * One channel, large.
    * @param {string} file
    * @param {number} channel
+   * @param {Promise<import("./api.js").Floats | null> | null} [early] the image, if it was asked for already
    */
-  async load(file, channel) {
+  async load(file, channel, early = null) {
     this.loading?.abort();
     const loading = (this.loading = new AbortController());
     const about = this.info.channels[channel];
@@ -138,7 +147,8 @@ export class LookView {
     const step = Math.max(1, Math.ceil(Math.max(about.columns, about.rows) / WHOLE));
     this.viewer.canvas.setAttribute("aria-label", `${store.name(file)}, ${this.channelName}`);
     try {
-      const image = await floats(`image${query({ file, channel, step: step > 1 ? step : null })}`, loading.signal);
+      const asked = step === 1 ? await early : null;
+      const image = asked ?? (await floats(`image${query({ file, channel, step: step > 1 ? step : null })}`, loading.signal));
       if (loading.signal.aborted) return;
       image.unit ||= about.unit ?? "";
       this.raw = image;
