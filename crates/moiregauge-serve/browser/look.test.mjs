@@ -60,7 +60,7 @@ test("a scan is shown, and contrast, colours and profile follow", async () => {
   await page.keyboard.press("Shift+ArrowUp");
   assert.notEqual(await page.locator(".reading").innerText(), reading);
   await page.locator(".look .plot summary").click();
-  assert.ok(await page.locator(".look .plot tbody tr").count() > 50);
+  await page.locator(".look .plot tbody tr").nth(50).waitFor();
   await page.getByRole("searchbox").fill("line rate");
   const rows = await page.locator(".header-table tr").allInnerTexts();
   assert.ok(rows.length > 0 && rows.every((r) => /line rate/i.test(r)), `${rows}`);

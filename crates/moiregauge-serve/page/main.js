@@ -135,7 +135,8 @@ async function start() {
   }
   followConnection();
   listen();
-  const last = sessionStorage.getItem("view") ?? "look";
+  // The page of `moiregauge watch --serve` begins with what is watched.
+  const last = sessionStorage.getItem("view") ?? (store.state.watches?.length > 0 ? "watch" : "look");
   await show(VIEWS.some(([name]) => name === last) ? last : "look");
   document.documentElement.dataset.ready = "true";
   performance.mark("ready");
