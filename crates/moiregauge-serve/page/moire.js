@@ -27,8 +27,8 @@ export class MoireView {
     this.plan = h("section", { "aria-label": "Plan" });
     /** @type {[string, HTMLInputElement][]} */
     this.wishes = [["twist_deg", "Twist (°)"], ["strain_percent", "Strain (%)"], ["drift_nm_per_min", "Drift (nm/min)"]].map(([key, label]) => [key, h("input", { type: "number", min: 0, step: "any", "aria-label": `Wished error of the ${label}`, placeholder: "any", value: key === "twist_deg" ? 0.02 : "" })]);
-    this.maxSize = h("input", { type: "number", min: 0, step: "any", placeholder: "twice the usual" });
-    this.maxRate = h("input", { type: "number", min: 0, step: "any", placeholder: "twice the usual" });
+    this.maxSize = h("input", { type: "number", min: 0, step: "any", placeholder: "as usual" });
+    this.maxRate = h("input", { type: "number", min: 0, step: "any", placeholder: "as usual" });
     this.planState = h("p", { class: "stage-words", role: "status" });
     this.element = h("div", { class: "columns" },
       h("section", { "aria-label": "Layers and wishes" }, h("h2", { text: "Layers" }),
