@@ -1,0 +1,49 @@
+// Maps: run, linked cursor, region and profile by mouse and keyboard.
+
+import assert from "node:assert/strict";
+import { after, afterEach, beforeEach, test } from "node:test";
+import { closeBrowser, open, openFolder, rootWith, serve, simulated, view } from "./harness.mjs";
+
+/** @type {Awaited<ReturnType<typeof serve>>} */
+let server;
+
+beforeEach(async () => {
+  server = await serve([rootWith("wide", simulated("wide", ["--scans", "1", "--pixels", "512", "--size", "160", "160"]))]);
+});
+afterEach(() => server.stop());
+after(closeBrowser);
+
+test("a map is made, read with the keyboard, and asked about a region", async () => {
+  const page = await open(server.url);
+  await openFolder(page, "wide");
+  await page.getByRole("button", { name: /^scan\.000\.spm/ }).click();
+  await page.waitForSelector("html[data-picture]");
+  await view(page, "Maps");
+  await page.getByRole("button", { name: "Make the map" }).click();
+  await page.waitForSelector("html[data-map]", { timeout: 60000 });
+  const cursor = page.getByRole("button", { name: /^Cursor/ });
+  await cursor.focus();
+  await page.keyboard.press("ArrowRight");
+  assert.match(await page.locator("#view-maps .middle > div > .readout").innerText(), /twist .*\d ± .*\d°/);
+  assert.equal(await page.locator("#view-maps .overlay .cross").count(), 6);
+  await page.getByRole("button", { name: "Region", exact: true }).click();
+  const box = await page.locator("#view-maps canvas").first().boundingBox();
+  assert.ok(box);
+  await page.mouse.move(box.x + box.width * 0.35, box.y + box.height * 0.35);
+  await page.mouse.down();
+  await page.mouse.move(box.x + box.width * 0.65, box.y + box.height * 0.65, { steps: 5 });
+  await page.mouse.up();
+  const row = page.getByRole("row", { name: /region 1/ });
+  await row.waitFor();
+  const before = await row.innerText();
+  assert.match(before, /\d ± /);
+  const corner = page.getByRole("button", { name: "region 1, corner 1" });
+  await corner.focus();
+  await page.keyboard.press("Shift+ArrowRight");
+  await page.waitForFunction((text) => [...document.querySelectorAll("#view-maps tr")].some((r) => /** @type {HTMLElement} */ (r).innerText.startsWith("region 1") && /** @type {HTMLElement} */ (r).innerText !== text), before);
+  await page.getByRole("button", { name: "Add profile" }).click();
+  await page.getByText("Nodes along profile").waitFor();
+  await page.getByLabel("Quantity").selectOption({ index: 1 });
+  assert.deepEqual(page.wrong, []);
+  await page.leave();
+});

@@ -1,0 +1,331 @@
+// Correct: say by hand which lattice is meant, where it is, and which scans count. The result follows.
+
+import { byHandList } from "./handlist.js";
+import { cornerNm, cornerPx, reciprocal, someLattice, toNm, withByHand } from "./byhand.js";
+import { empty, field, fill, h, s, say } from "./dom.js";
+import { total } from "./format.js";
+import { Marker } from "./markers.js";
+import { brightPlace, drawLattice, drawSpots, firstShell, frameSpots, nearMiddle, spotPlace, waveAt } from "./overlay.js";
+import { overlayOf, showScan, showSpectrum } from "./pictures.js";
+import { headline, meanOf } from "./result.js";
+import { ScanList } from "./scanlist.js";
+import { Viewer } from "./viewer.js";
+import { work } from "./work.js";
+
+/** @typedef {[number, number]} Pair */
+
+export class CorrectView {
+  /** @param {(words: string) => void} failed */
+  constructor(failed) {
+    this.failed = failed;
+    this.picked = "";
+    /** @type {import("./overlay.js").Overlay | null} */
+    this.overlay = null;
+    /** What is drawn while something is moved. @type {import("./overlay.js").Overlay | null} */
+    this.draft = null;
+    /** Regions while a corner is being moved, px. @type {{x: number, y: number}[][] | null} */
+    this.movedRegions = null;
+    this.body = h("div", {});
+    this.none = empty("Analyse scans first; what was found can then be corrected here.");
+    /** @type {Marker[]} */
+    this.markers = [];
+    /** Corners of a region that is being drawn, px. @type {{x: number, y: number}[] | null} */
+    this.drawing = null;
+    /** @type {ReturnType<typeof setTimeout> | undefined} */
+    this.wait = undefined;
+    this.before = "";
+    this.image = new Viewer("Scan, with the lattice that can be moved");
+    this.spectrum = new Viewer("Transform, with the spots that can be moved", { scaleBar: false });
+    this.regions = s("g", {});
+    this.image.overlay.insertBefore(this.regions, this.image.ruler);
+    this.image.addEventListener("view", () => this.draw());
+    this.spectrum.addEventListener("view", () => drawSpots(this.spectrum.drawing, this.spectrum, this.draft ?? this.overlay));
+    this.list = new ScanList((file) => this.pick(file), failed);
+    this.undo = h("button", { type: "button", text: "Undo", onclick: () => this.guard(work.do("undo")) });
+    this.redo = h("button", { type: "button", text: "Redo", onclick: () => this.guard(work.do("redo")) });
+    this.hand = h("ul", { class: "byhand" });
+    this.near = h("input", { type: "number", min: 0, step: "any", onchange: () => this.tell({ near_nm: Number(this.near.value) > 0 ? Number(this.near.value) : null }, "Mean wavelength set") });
+    this.result = h("div", { "aria-live": "polite" });
+    this.state = h("p", { class: "stage-words", role: "status" });
+    this.regionTools = h("div", { class: "toolbar", role: "toolbar", "aria-label": "Regions" });
+    this.help = h("p", { class: "hint" });
+    this.element = h("div", { class: "columns" }, this.left(), this.middle());
+    this.element.addEventListener("keydown", (event) => this.keys(event));
+    work.addEventListener("state", () => this.showState());
+    work.addEventListener("results", () => this.showResult());
+    this.showState();
+    if (work.results) this.showResult();
+  }
+
+  left() {
+    return h("section", { "aria-label": "What was done by hand" },
+      h("h2", { text: "Scans" }), this.list.element,
+      h("h3", { text: "Done by hand" }), this.hand,
+      h("div", { class: "buttons" }, this.undo, this.redo),
+      field("Mean wavelength about (nm)", this.near), this.state);
+  }
+
+  middle() {
+    const panel = (/** @type {string} */ title, /** @type {Viewer} */ viewer) => h("figure", { class: "panel" }, h("figcaption", { text: title }), viewer.element);
+    fill(this.body,
+      h("div", { class: "bar" }, h("h2", { text: "Lattice and regions" }), this.regionTools),
+      h("div", { class: "panels" }, panel("Drag the yellow ends of the two vectors", this.image),
+        panel("Or the spots of the transform", this.spectrum), h("div", { class: "outcome" }, this.result, this.help)));
+    return h("section", { class: "middle", "aria-label": "Corrections" }, this.none, this.body);
+  }
+
+  shown() {
+    this.showState();
+    if (work.id && !this.picked) this.pick(work.is?.files[0] ?? "");
+  }
+
+  /** @param {Promise<any>} promise */
+  guard(promise) {
+    promise.catch((error) => this.failed(error.message));
+  }
+
+  /** @param {KeyboardEvent} event */
+  keys(event) {
+    if (!(event.ctrlKey || event.metaKey) || event.target instanceof HTMLInputElement) return;
+    const key = event.key.toLowerCase();
+    if (key !== "z" && key !== "y") return;
+    event.preventDefault();
+    const redo = key === "y" || event.shiftKey;
+    if (redo ? work.is?.can_redo : work.is?.can_undo) this.guard(work.do(redo ? "redo" : "undo"));
+  }
+
+  /** @param {string} file */
+  async pick(file) {
+    if (!file) return;
+    this.picked = file;
+    this.list.show(file);
+    await this.load(false);
+  }
+
+  /** @param {boolean} keep the view of the image */
+  async load(keep) {
+    const file = this.picked;
+    try {
+      this.overlay = await overlayOf(file);
+      this.draft = null;
+      if (!keep) {
+        const entry = work.scans().find((x) => x.file === file);
+        const channel = await showScan(this.image, file, entry?.set?.channel ?? work.is?.settings?.channel, this.overlay);
+        await showSpectrum(this.spectrum, file, channel);
+        this.frame();
+      }
+      if (file !== this.picked) return;
+      if (this.overlay && !this.overlay.origin_px) this.overlay.origin_px = brightPlace(this.image, this.overlay.lattice_px);
+      this.place();
+      document.documentElement.dataset.correct = `${file} ${work.version}`;
+    } catch (error) {
+      this.image.clear(/** @type {Error} */ (error).message);
+    }
+  }
+
+  frame() {
+    frameSpots(this.spectrum, this.overlay ?? someLattice(this.image));
+  }
+
+  showState() {
+    const is = work.is;
+    this.none.hidden = !!is;
+    this.body.hidden = !is;
+    this.list.element.hidden = !is;
+    this.undo.disabled = !is?.can_undo;
+    this.redo.disabled = !is?.can_redo;
+    this.state.textContent = is?.state === "running" ? `${work.progress?.stage ?? "Calculating"} …` : is?.state === "failed" ? `No result with this: ${is.error ?? ""}` : "";
+    if (!is) return;
+    this.list.show(this.picked);
+    if (document.activeElement !== this.near) this.near.value = String(is.settings?.by_hand?.near_nm ?? "");
+    fill(this.hand, byHandList(is, (change, words) => this.tell(change, words), (excluded) => this.guard(work.change({ excluded }))));
+    this.showRegionTools();
+    this.draw();
+  }
+
+  showResult() {
+    const found = work.results ? meanOf(work.results) : null;
+    const now = found ? `twist ${total(found.mean?.twist_deg, "°")}, heterostrain ${total(found.mean?.heterostrain_percent, "%")}` : "";
+    fill(this.result, found ? headline(found) : null, this.before && this.before !== now ? h("p", { class: "change", text: `Before: ${this.before}` }) : null);
+    if (now) this.before = now;
+    // A handle that is being moved stays under the hand.
+    if (this.picked && !this.wait) this.load(true);
+  }
+
+  draw() {
+    drawLattice(this.image.drawing, this.image, this.draft ?? this.overlay);
+    fill(this.regions);
+    const rings = this.regionsPx();
+    const at = (/** @type {{x: number, y: number}} */ p) => {
+      const q = this.image.toScreen(p.x, p.y);
+      return `${q.x},${q.y}`;
+    };
+    for (const ring of rings) this.regions.append(s("polygon", { points: ring.map(at).join(" "), class: "region" }));
+    if (this.drawing) this.regions.append(s("polyline", { points: this.drawing.map(at).join(" "), class: "outline" }));
+  }
+
+  /** Regions as they stand, with those corners that are being moved. @returns {{x: number, y: number}[][]} */
+  regionsPx() {
+    return this.movedRegions ?? (work.is?.settings?.by_hand?.regions_nm ?? []).map((/** @type {Pair[]} */ ring) => ring.map((c) => cornerPx(this.image, c)));
+  }
+
+  /** Handles where the lattice and the regions are now. */
+  place() {
+    const focused = document.activeElement instanceof HTMLElement ? document.activeElement.getAttribute("aria-label") : null;
+    for (const m of this.markers) m.remove();
+    this.markers = [];
+    this.movedRegions = null;
+    const lattice = this.overlay?.lattice_px ? this.overlay : someLattice(this.image);
+    if (!this.overlay?.lattice_px) this.draft = lattice;
+    this.placeVectors(lattice);
+    this.placeSpots(lattice);
+    this.placeCorners();
+    this.draw();
+    this.spectrum.redraw();
+    if (focused) this.markers.find((m) => m.is.label === focused)?.button.focus();
+  }
+
+  /** @param {import("./overlay.js").Overlay} lattice */
+  placeVectors(lattice) {
+    const o = nearMiddle(this.image, lattice);
+    const vectors = /** @type {[Pair, Pair]} */ (lattice.lattice_px.map((v) => [...v]));
+    vectors.forEach((v, i) => this.markers.push(new Marker(this.image, {
+      label: `Lattice vector ${i + 1}`, kind: "vector", at: { x: o[0] + v[0], y: o[1] + v[1] },
+      moved: (to) => {
+        vectors[i] = [to.x - o[0], to.y - o[1]];
+        this.preview({ ...lattice, origin_px: o, lattice_px: vectors });
+      },
+      done: () => this.tellLattice(vectors),
+    })));
+  }
+
+  /** @param {import("./overlay.js").Overlay} lattice */
+  placeSpots(lattice) {
+    const image = this.spectrum.image;
+    if (!image || !(image.steps[0] > 0)) return;
+    const waves = firstShell(lattice.lattice_px).slice(0, 2);
+    waves.forEach((k, i) => this.markers.push(new Marker(this.spectrum, {
+      label: `Spot ${i + 1} of the transform`, kind: "spot", at: spotPlace(image, k),
+      moved: (to) => {
+        waves[i] = waveAt(image, to);
+        this.preview({ ...lattice, lattice_px: reciprocal([waves[0], waves[1]]) });
+      },
+      done: () => this.tellLattice(reciprocal([waves[0], waves[1]])),
+    })));
+  }
+
+  /** @param {import("./overlay.js").Overlay} draft */
+  preview(draft) {
+    this.draft = draft;
+    this.draw();
+    this.spectrum.redraw();
+  }
+
+  /** Waits for the last of several key strokes. @param {[Pair, Pair]} vectors px */
+  tellLattice(vectors) {
+    const lattice_nm = vectors.map((v) => toNm(this.image, this.overlay, v).map((x) => Number(x.toPrecision(7))));
+    this.later(() => this.tell({ lattice_nm }, "Lattice told by hand"));
+  }
+
+  /** @param {() => void} action */
+  later(action) {
+    clearTimeout(this.wait);
+    this.wait = setTimeout(() => {
+      this.wait = undefined;
+      action();
+    }, 150);
+  }
+
+  /**
+   * Tells the program; it calculates anew.
+   * @param {any} change
+   * @param {string} words
+   */
+  tell(change, words) {
+    say(words);
+    this.guard(work.change({ settings: withByHand(work.is?.settings, change) }));
+  }
+
+  placeCorners() {
+    const rings = this.regionsPx();
+    rings.forEach((ring, r) => ring.forEach((corner, c) => this.markers.push(new Marker(this.image, {
+      label: `Region ${r + 1}, corner ${c + 1}`, kind: "corner", at: corner,
+      moved: (to) => {
+        rings[r][c] = to;
+        this.movedRegions = rings;
+        this.draw();
+      },
+      done: () => this.later(() => this.tellRegions(rings)),
+      removed: () => ring.length > 3 && this.tellRegions(rings.map((x, k) => (k === r ? x.filter((_, n) => n !== c) : x))),
+    }))));
+  }
+
+  /** @param {{x: number, y: number}[][]} rings */
+  tellRegions(rings) {
+    this.movedRegions = null;
+    const regions_nm = rings.map((ring) => ring.map((p) => cornerNm(this.image, p).map((x) => Number(x.toPrecision(6)))));
+    this.tell({ regions_nm }, `${rings.length} ${rings.length === 1 ? "region" : "regions"}`);
+  }
+
+  showRegionTools() {
+    const n = (work.is?.settings?.by_hand?.regions_nm ?? []).length;
+    if (this.drawing) {
+      const ready = this.drawing.length > 2;
+      const finish = h("button", { type: "button", text: "Finish region", onclick: () => this.finish() });
+      finish.disabled = !ready;
+      fill(this.regionTools, finish, h("button", { type: "button", text: "Stop", onclick: () => this.stopDrawing() }));
+      this.help.textContent = "Click the corners of the region; the first corner again, or Enter, closes it.";
+      return;
+    }
+    fill(this.regionTools,
+      h("button", { type: "button", text: "Draw region", onclick: () => this.startDrawing() }),
+      h("button", { type: "button", text: "Add rectangle", onclick: () => this.addRectangle() }),
+      n > 0 ? h("button", { type: "button", text: "Remove regions", onclick: () => this.tell({ regions_nm: null }, "Regions removed") }) : null);
+    this.help.textContent = "Handles move with the mouse or, once they have the focus, with the arrow keys (Shift: ten times as far). Delete removes a corner. Ctrl+Z takes a step back.";
+  }
+
+  /** A region for those who use no mouse: the middle of the frame, whose corners move with the arrow keys. */
+  addRectangle() {
+    const [w, t] = [this.image.columns, this.image.rows];
+    const ring = [[0.2, 0.2], [0.8, 0.2], [0.8, 0.8], [0.2, 0.8]].map(([x, y]) => ({ x: x * w, y: y * t }));
+    this.tellRegions([...this.regionsPx(), ring]);
+  }
+
+  startDrawing() {
+    this.drawing = [];
+    this.image.tool = {
+      down: (at) => {
+        const corners = this.drawing ?? [];
+        const first = corners[0] && this.image.toScreen(corners[0].x, corners[0].y);
+        const here = this.image.toScreen(at.x, at.y);
+        if (first && corners.length > 2 && Math.hypot(first.x - here.x, first.y - here.y) < 10) this.finish();
+        else this.drawing = [...corners, at];
+        this.showRegionTools();
+        this.draw();
+        return true;
+      },
+    };
+    this.image.canvas.onkeydown = (event) => {
+      if (event.key === "Enter") this.finish();
+      if (event.key === "Escape") this.stopDrawing();
+    };
+    this.showRegionTools();
+    this.image.canvas.focus();
+  }
+
+  finish() {
+    const ring = this.drawing ?? [];
+    if (ring.length < 3) return;
+    const rings = [...this.regionsPx(), ring];
+    this.stopDrawing();
+    this.tellRegions(rings);
+  }
+
+  stopDrawing() {
+    this.drawing = null;
+    this.image.tool = null;
+    this.image.canvas.onkeydown = null;
+    this.showRegionTools();
+    this.draw();
+  }
+}
