@@ -131,15 +131,15 @@ fn a_growing_campaign_is_a_new_one() {
     );
     assert_eq!(growing.kept().len(), 9);
     // So is what was told by hand: where the lattice is.
-    let half = vec![
+    let left = vec![
         [-500.0, -500.0],
-        [0.0, -500.0],
-        [0.0, 500.0],
+        [40.0, -500.0],
+        [40.0, 500.0],
         [-500.0, 500.0],
     ];
     let region = Settings {
         by_hand: ByHand {
-            regions_nm: vec![half],
+            regions_nm: vec![left],
             ..ByHand::default()
         },
         ..method.clone()
