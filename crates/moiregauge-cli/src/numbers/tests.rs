@@ -31,10 +31,17 @@ fn templates(command: &str, option: &str) -> Vec<&'static str> {
         (_, "profile") => vec!["a={},0 20,20", "a=0,0 20,{}"],
         (_, "wanted") => vec!["{}±0.1", "1±{}"],
         ("campaign", "shard") => vec!["{}/3", "1/{}"],
-        ("analyze" | "map" | "campaign" | "moire", "lattice_angle" | "lattice_angle_2") => {
+        ("serve", "address") => vec!["127.0.0.{}"],
+        ("watch", "until") => vec!["twist={}", "twist=1,strain={}"],
+        (
+            "analyze" | "map" | "campaign" | "watch" | "moire",
+            "lattice_angle" | "lattice_angle_2",
+        ) => {
             vec!["{}±0.1", "10±{}"]
         }
-        ("analyze" | "map" | "campaign", "lattice") => vec!["{},0.4,6,10.5", "12,0.4,6,{}"],
+        ("analyze" | "map" | "campaign" | "watch", "lattice") => {
+            vec!["{},0.4,6,10.5", "12,0.4,6,{}"]
+        }
         (_, "lattice") => vec!["{}nm,0.5nm,90", "0.5nm,{}nm,90", "0.5nm,0.5nm,{}"],
         (_, "wavelengths") => vec!["{},12,11", "13,12,{}"],
         (_, "vectors") => vec!["{},0.4|6,11", "13,0|6,{}"],
@@ -58,7 +65,9 @@ fn usual(option: &str) -> &'static str {
 /// What has to be there for the option to mean anything.
 fn beside(command: &str, option: &str) -> Vec<&'static str> {
     match option {
-        "drift_sigma" if ["analyze", "map", "campaign"].contains(&command) => {
+        "exec_timeout" => vec!["--exec", "true"],
+        "port" if command == "watch" => vec!["--serve"],
+        "drift_sigma" if ["analyze", "map", "campaign", "watch"].contains(&command) => {
             vec!["--drift", "0", "0"]
         }
         "strain_axis" => vec!["--strain", "0.1"],
@@ -210,9 +219,14 @@ fn try_option(command: &str, option: &Arg, folder: &Path) -> Vec<String> {
     let id = option.get_id().as_str();
     let long = format!("--{}", option.get_long().unwrap_or_default());
     let runs = base(command, id, folder);
-    let start = runs
-        .clone()
-        .unwrap_or_else(|| vec!["moiregauge".into(), command.into()]);
+    let start = runs.clone().unwrap_or_else(|| {
+        let mut start = vec!["moiregauge".into(), command.into()];
+        // It does not end by itself.
+        if command == "watch" {
+            start.push(folder.into());
+        }
+        start
+    });
     let mut wrong = Vec::new();
     for template in templates(command, id) {
         let with = |number: &str| {
