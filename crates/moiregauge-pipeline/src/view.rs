@@ -171,7 +171,7 @@ fn of_image(image: &Image, unit: &str, pixel_nm: Option<[f64; 2]>) -> View {
     }
 }
 
-/// Everything that a file holds, as [`crate::inspect`] lists it: of a damaged file what can be read.
+/// Everything that a file holds, as [`crate::inspect()`] lists it: of a damaged file what can be read.
 ///
 /// # Errors
 /// It cannot be read, or is no scan.
