@@ -48,7 +48,8 @@ archive() {
 
 linux_program() {
   local triple=x86_64-unknown-linux-gnu program
-  RUSTFLAGS="-C target-feature=+crt-static $remap" \
+  # At a fixed address: tables of what is to be moved would be a megabyte.
+  RUSTFLAGS="-C target-feature=+crt-static -C relocation-model=static $remap" \
     cargo build --profile dist --locked --package moiregauge-cli --target "$triple" || return 1
   program=$target/$triple/dist/moiregauge
   small_enough "$program" || { echo "the program is too large" >&2; return 1; }

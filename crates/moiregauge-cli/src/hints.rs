@@ -1,7 +1,7 @@
 //! Options of this program that help against what is doubtful.
 
 /// By the code of a caveat.
-const HINTS: [(&str, &str); 40] = [
+const HINTS: [(&str, &str); 41] = [
     ("several-images", "--channel NAME or --image N"),
     ("channel-chosen", "--channel NAME"),
     ("nothing-excluded", "--exclude NAME with the name of a file"),
@@ -34,6 +34,7 @@ const HINTS: [(&str, &str); 40] = [
         "--drift-sigma NM/MIN or --line-rate HZ",
     ),
     ("lattice-doubtful", "--near WAVELENGTH or --lattice"),
+    ("shell-for-lattice", "--near WAVELENGTH or --lattice"),
     ("outlying-scan", "--exclude NAME or --exclude-outliers"),
     ("samples-mixed", "--set NAME=PATH"),
     ("large-strain", "--layers UPPER/LOWER or --size W×H"),

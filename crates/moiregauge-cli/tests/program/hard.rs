@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use crate::common::{analyze, caveats, json, number, results, succeed, testdata};
+use crate::common::{analyze, caveats, json, number, program, results, succeed, testdata};
 
 /// What an analysis of an example makes of it, and its truth.
 fn analysed(data: &Path, name: &str, more: &[&str]) -> (Value, Value) {
@@ -52,6 +52,37 @@ fn a_lattice_in_a_part_of_the_frame_is_measured_there() {
         let codes = caveats(&found);
         assert!(codes.contains(&"partly-covered"), "{name}: {codes:?}");
         assert!(!codes.contains(&"same-scan-twice"), "{name}: {codes:?}");
+    }
+}
+
+/// Rough ground whose spectrum has three waves in one frame, and a first shell that noise hides in most images: there are vectors, and
+/// no twist that could be taken for a result.
+#[test]
+fn what_may_be_no_lattice_has_no_twist() {
+    let cases = [
+        ("bare+terrain", "2", "lattice-doubtful"),
+        ("second-shell", "13", "shell-for-lattice"),
+    ];
+    for (sample, seed, code) in cases {
+        let folder = tempfile::tempdir().expect("a folder");
+        let name = ["--name", "set", "--scans", "4", "--pixels", "192", "--vary"];
+        let mut simulate = program();
+        simulate.args(["simulate", "--out"]).arg(folder.path());
+        succeed(
+            simulate
+                .args(name)
+                .args(["--sample", sample, "--seed", seed]),
+        );
+        let out = folder.path().join("results");
+        let run = analyze(&folder.path().join("set"), &out)
+            .output()
+            .expect("the program runs");
+        assert!(!run.status.success(), "{sample}");
+        let found = results(&out);
+        assert!(caveats(&found).contains(&code), "{sample}");
+        for mean in ["/sets/0/mean", "/sets/0/uncorrected", "/combined"] {
+            assert!(found.pointer(mean).is_some_and(Value::is_null), "{mean}");
+        }
     }
 }
 

@@ -23,6 +23,8 @@ pub(crate) fn render(svg: &str) -> Result<Vec<u8>, ReportError> {
     let mut encoder = png::Encoder::new(&mut bytes, picture.width(), picture.height());
     encoder.set_color(png::ColorType::Rgb);
     encoder.set_depth(png::BitDepth::Eight);
+    // A third of the time of the best compression, and files a little larger.
+    encoder.set_compression(png::Compression::Fast);
     let per_metre = (DPI / 0.0254).round() as u32;
     encoder.set_pixel_dims(Some(png::PixelDimensions {
         xppu: per_metre,

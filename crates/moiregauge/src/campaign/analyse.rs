@@ -104,9 +104,12 @@ pub fn is_nothing_left(doubt: &Doubt) -> bool {
     matches!(doubt, Doubt::Files(FileDoubt::EverythingExcluded { .. }))
 }
 
-/// Whether a doubt says that the lattice may be none.
+/// Whether a doubt says that the lattice may be none, or another one.
 fn is_doubtful(doubt: &Doubt) -> bool {
-    matches!(doubt, Doubt::Sets(SetDoubt::LatticeDoubtful { .. }))
+    matches!(
+        doubt,
+        Doubt::Sets(SetDoubt::LatticeDoubtful { .. } | SetDoubt::ShellForLattice { .. })
+    )
 }
 
 /// Whether a doubt says that the layers cannot make the lattice.

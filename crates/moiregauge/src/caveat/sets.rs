@@ -17,6 +17,16 @@ pub enum SetDoubt {
         /// Frames that show it.
         scans: usize,
     },
+    /// Two images of one scan show a lattice and a harmonic shell of it.
+    #[error(
+        "trace and retrace of one scan show two lattices, and the cell of one is {times} times that of the other: where noise hides the \
+         first waves, a harmonic shell looks like a lattice of its own. Which one the other scans show is not known: their vectors are given, \
+         twist and strain of the set are not"
+    )]
+    ShellForLattice {
+        /// How many times the cell.
+        times: i32,
+    },
     /// Scans scatter by more than their errors.
     #[error("{}", scattered(*.of, *.chi2_per_dof))]
     Scatter {
@@ -151,6 +161,11 @@ explain! { SetDoubt:
          show it. There is no result for the set."
         "Look at the figure of the scan: is there a lattice? Then say which (its wavelength is enough), or take more \
          frames. Otherwise there is none."
+    ShellForLattice "shell-for-lattice" Serious
+        "One image shows a lattice whose cell is two to four times that of the others. The first waves of the lattice are weak, and where noise \
+         hides them a harmonic shell is taken for the lattice. There is no result for the set."
+        "Look at the figures of both line directions. Say which lattice is meant (its wavelength is enough), or choose the channel with the \
+         stronger first waves."
     Scatter "scatter" Warning
         "The scans of a set differ from each other by more than their errors say. The errors of the set were enlarged to \
          match."

@@ -14,6 +14,7 @@ use crate::campaign::set::faint::too_faint;
 use crate::campaign::set::headers::{about_dates, about_headers};
 use crate::campaign::set::moire::moire;
 use crate::campaign::set::scan::{plain_mean, scan_analysis};
+use crate::campaign::set::shells::of_other_shell;
 use crate::campaign::set::solved::Solved;
 use crate::campaign::set::{joint, moire, published};
 use crate::caveat::Caveat;
@@ -81,14 +82,9 @@ pub(crate) fn analyse_set(
     }
     let pitch = pitch_error(&used);
     // What is told by hand is known to be there.
-    let faint = too_faint(&used).filter(|_| !settings.by_hand.says_which());
+    let doubt = no_result(group, &used).filter(|_| !settings.by_hand.says_which());
     let (mut uncorrected, mut mean) = (None, None);
-    if let Some(signal_to_noise) = faint {
-        let scans = used.len();
-        let doubt = SetDoubt::LatticeDoubtful {
-            signal_to_noise,
-            scans,
-        };
+    if let Some(doubt) = doubt {
         caveats.push(Caveat::new(doubt, name));
     } else {
         uncorrected = without_drift(&all, &scans, kept.len(), &pitch, settings, strengths);
@@ -111,6 +107,19 @@ pub(crate) fn analyse_set(
     };
     about_set(&set, kept.len(), settings, caveats);
     set
+}
+
+/// Why the lattice of a set may be another one, so that the set has no result.
+fn no_result(group: &Group, used: &[&MeasuredScan]) -> Option<SetDoubt> {
+    let hidden = of_other_shell(group).map(|times| SetDoubt::ShellForLattice { times });
+    let scans = used.len();
+    let faint = || {
+        too_faint(used).map(|signal_to_noise| SetDoubt::LatticeDoubtful {
+            signal_to_noise,
+            scans,
+        })
+    };
+    hidden.or_else(faint)
 }
 
 /// What has to be said of a set of which `used` scans count.

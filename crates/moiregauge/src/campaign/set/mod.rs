@@ -8,4 +8,5 @@ pub(crate) mod joint;
 pub(crate) mod moire;
 pub(crate) mod published;
 pub(crate) mod scan;
+pub(crate) mod shells;
 pub(crate) mod solved;
