@@ -13,13 +13,11 @@ const AGREE: f64 = 0.1;
 pub(crate) fn of_other_shell(group: &Group) -> Option<i32> {
     let differs = |reason: &String| reason == LineDifference::OTHER_LATTICES;
     let scans = group.scans.iter();
-    let differing = scans.filter(|scan| scan.excluded.as_ref().is_some_and(differs));
-    differing
-        .filter_map(|scan| match scan.lines.as_slice() {
-            [one, other] => times(one, other).or_else(|| times(other, one)),
-            _ => None,
-        })
-        .next()
+    let mut differing = scans.filter(|scan| scan.excluded.as_ref().is_some_and(differs));
+    differing.find_map(|scan| match scan.lines.as_slice() {
+        [one, other] => times(one, other).or_else(|| times(other, one)),
+        _ => None,
+    })
 }
 
 /// The cells of `small` in one of `large`, if all of its points are points of `small`.
