@@ -6,8 +6,8 @@
 use crate::lattice::measured::MeasuredLattice;
 use crate::scan::measured::MeasuredScan;
 
-/// Amplitude over noise of the weakest first wave; a lattice with more is none of terrain, whose largest were 6 in some 200
-/// simulated images.
+/// Amplitude over noise of the weakest first wave; a lattice with more is none of terrain, whose two in 96
+/// simulated images had 4 and 6.
 const FAINT: f64 = 8.0;
 /// Power over noise of all waves together: more are not faint, though the first ones be. Three waves of [`FAINT`] have 192.
 const TOTAL: f64 = 300.0;
