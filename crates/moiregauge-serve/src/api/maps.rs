@@ -16,7 +16,7 @@ use moiregauge_report::results::{MapDetailsResult, ResultCaveat};
 use serde::Deserialize;
 use serde_json::{Map, Value, json};
 
-use super::works::of_results;
+use super::works::{of_results, zipped};
 use super::{beside, binary};
 use crate::app::{App, Shared};
 use crate::body::document;
@@ -172,14 +172,7 @@ async fn zip(State(app): Shared, Path(id): Path<String>) -> Answer {
     beside(move || {
         let all = app.maps.get(&id)?.mapped()?.written()?;
         let bytes = archive(&all).map_err(Problem::fault)?;
-        let headers = [
-            (header::CONTENT_TYPE, "application/zip"),
-            (
-                header::CONTENT_DISPOSITION,
-                "attachment; filename=\"map.zip\"",
-            ),
-        ];
-        Ok((headers, bytes).into_response())
+        Ok(zipped("attachment; filename=\"map.zip\"", bytes))
     })
     .await
 }

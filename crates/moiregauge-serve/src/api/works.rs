@@ -244,19 +244,21 @@ pub(super) fn of_results(name: &str, bytes: Vec<u8>) -> Response {
     (headers, bytes).into_response()
 }
 
+/// An archive to be kept, under the name in `disposition`.
+pub(super) fn zipped(disposition: &'static str, bytes: Vec<u8>) -> Response {
+    let headers = [
+        (header::CONTENT_TYPE, "application/zip"),
+        (header::CONTENT_DISPOSITION, disposition),
+    ];
+    (headers, bytes).into_response()
+}
+
 async fn zip(State(app): Shared, Path(id): Id) -> Answer {
     beside(move || {
         let (done, kept) = app.works.get(&id)?.done()?;
         let all = done.written(&app.options.words, &kept)?;
         let bytes = archive(&all).map_err(Problem::fault)?;
-        let headers = [
-            (header::CONTENT_TYPE, "application/zip"),
-            (
-                header::CONTENT_DISPOSITION,
-                "attachment; filename=\"moiregauge.zip\"",
-            ),
-        ];
-        Ok((headers, bytes).into_response())
+        Ok(zipped("attachment; filename=\"moiregauge.zip\"", bytes))
     })
     .await
 }
