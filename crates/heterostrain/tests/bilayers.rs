@@ -75,6 +75,45 @@ fn bilayer(pair: &[Material; 2]) -> Bilayer<'_> {
     }
 }
 
+/// Who names the waves of layers of different shapes has the readings of that name and no others.
+#[test]
+fn waves_that_are_given_name_layers_of_different_shapes() {
+    let made = Stacking {
+        twist: 0.02,
+        lattice_angle: 0.3,
+        strain: 0.002,
+        axis_lattice: 0.5,
+        biaxial: 0.0,
+    };
+    let pair = [oblique(0.31, 0.42, 75.0), oblique(0.312, 0.417, 74.6)];
+    let layers = bilayer(&pair);
+    let basis = moire_of(&made, layers, RealSpace).unwrap();
+    let orientation = Orientation {
+        angle: made.lattice_angle,
+        sigma: 0.0,
+        of_reference: true,
+    };
+    let of = |waves: Option<Matrix2<f64>>| {
+        let layers = Bilayer { waves, ..layers };
+        strain_tensors(&exact(basis), layers, &orientation).unwrap()
+    };
+    let (all, given) = (of(None), of(Some(true_waves(&made, layers))));
+    assert!(given.len() < all.len(), "{} of {}", given.len(), all.len());
+    assert!(
+        given
+            .iter()
+            .all(|t| all.iter().any(|of_all| same(t, of_all)))
+    );
+    assert!((given[0].twist - made.twist).abs() < 1e-10, "{given:#?}");
+    // Waves that are none of this lattice name nothing.
+    assert_eq!(of(Some(Matrix2::new(1.0, 2.0, 2.0, 4.0))).len(), all.len());
+}
+
+/// Whether two readings are one, but for rounding.
+fn same(a: &StrainTensor, b: &StrainTensor) -> bool {
+    (a.twist - b.twist).abs() < 1e-9 && (a.mean - b.mean).abs() < 1e-9
+}
+
 prop_compose! {
     fn stacking()(
         twist in 0.6_f64..3.0,

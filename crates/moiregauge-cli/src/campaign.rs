@@ -16,10 +16,10 @@ use crate::say::say;
 
 /// Analyse many samples, one folder each, into one table and one page
 ///
-/// Goes through the folders below PATH; every folder that holds scans is a sample. One that fails does not stop the
-/// others, and the exit code tells. A run that is stopped or killed goes on where it was when it is started again, and
-/// a second run does only what is missing. DIR gets samples.csv (one row for each sample), failed.csv (what failed and
-/// why) and campaign.html (a picture and the numbers of each).
+/// Goes through the folders below PATH; every folder that holds scans is a sample. A sample that fails does not stop
+/// the others; the exit code is then not 0. If a run is stopped or killed, start it again: only the missing samples are
+/// analysed. DIR gets samples.csv (one row for each sample), failed.csv (what failed and why) and campaign.html (a
+/// picture and the numbers of each).
 #[derive(clap::Args, Clone, Debug)]
 #[command(
     override_usage = "moiregauge campaign [OPTIONS] <PATH> --out <DIR>",
@@ -31,11 +31,12 @@ Examples:
   moiregauge merge /shared/all --out all"
 )]
 pub(crate) struct CampaignArgs {
-    /// Which files are which sample: a table (CSV) with the columns sample and path, paths seen from PATH [default:
-    /// every folder with scans is a sample]
+    /// Table (CSV) that says which files belong to which sample: columns sample and path, paths relative to PATH
+    /// [default: every folder with scans is a sample]
     #[arg(long, value_name = "FILE")]
     samples: Option<PathBuf>,
-    /// Only the I-th of N equal shares of the samples, without tables; `moiregauge merge` makes these of all shares
+    /// Analyse only the I-th of N equal shares of the samples, without tables; `moiregauge merge` makes the tables of
+    /// all shares
     #[arg(long, value_name = "I/N")]
     shard: Option<Shard>,
     #[command(flatten)]
@@ -47,14 +48,14 @@ pub(crate) fn run(args: &CampaignArgs, job: &Job) -> anyhow::Result<ExitCode> {
     let analyze = &args.analyze;
     let [root] = analyze.paths() else {
         anyhow::bail!(
-            "campaign takes one folder with those of all samples, found {}; --samples FILE says which files are which \
-             sample",
+            "campaign takes one folder that holds all samples, found {}. --samples FILE says which files belong to \
+             which sample",
             analyze.paths().len()
         );
     };
     ensure!(
         root.is_dir(),
-        "{}: expected a folder with those of all samples",
+        "{}: expected a folder that holds all samples",
         root.display()
     );
     analyze.only_settings()?;
@@ -72,7 +73,7 @@ pub(crate) fn run(args: &CampaignArgs, job: &Job) -> anyhow::Result<ExitCode> {
         Ok(done) => done,
         Err(SamplesError::Cancelled(cancelled)) => {
             return Err(anyhow::Error::new(cancelled))
-                .context("finished samples are kept; the same command goes on from there");
+                .context("finished samples are kept; run the same command again to continue");
         }
         Err(error) => return Err(in_words(error)),
     };
@@ -121,9 +122,9 @@ pub(crate) fn ended(done: &SamplesDone) -> ExitCode {
 /// The error, with the option that helps against it.
 pub(crate) fn in_words(error: SamplesError) -> anyhow::Error {
     let hint = match &error {
-        SamplesError::MissingShards { .. } => "--incomplete does without them",
+        SamplesError::MissingShards { .. } => "--incomplete merges without them",
         SamplesError::OtherVersion { .. } | SamplesError::OtherSettings { .. } => {
-            "--mixed merges them all the same"
+            "--mixed merges them nevertheless"
         }
         SamplesError::Sink(_) => {
             return match error {

@@ -15,8 +15,7 @@ use crate::say::say;
 /// Print a commented settings file with all defaults
 ///
 /// Save it, change what you need, and give it to `moiregauge analyze --config FILE`. Options on the
-/// command line come on top of the file. A results.json does as well: `--config results.json` takes the
-/// settings that it holds.
+/// command line override the file. A results.json can be used too: `--config results.json` takes its settings.
 #[derive(clap::Args, Clone, Debug)]
 #[command(after_long_help = "\
 Example:
@@ -31,24 +30,24 @@ const COMMENTED: &str = r#"# Settings of `moiregauge analyze`. Every line shows 
 # comes first.
 # channel = "TR Phase"
 
-# Of several images of the channel in one file (pages, frames) this one, counted from 1. Without it: the first.
+# Number of the image, if a file holds several images of the channel (pages, frames), from 1. Without it: the first.
 # image = 2
 
 # Line directions to use: "trace", "retrace" or "both".
 line = "both"
 
 # Estimator of the lattice vectors:
-#   "lattice"          harmonics fitted to the pixels, one joint fit over all scans, phases included
+#   "lattice"          harmonics fitted to the pixels, then one joint fit to all scans, phases included
 #   "autocorrelation"  divided by the overlap, sub-pixel peaks, several shells
-#   "fourier"          Hann window, sub-pixel peaks, full inverse
-#   "paper"            as published in arXiv 2406.08681, for comparison: known to be biased
+#   "fourier"          peaks of the Fourier transform with a Hann window, sub-pixel, exact inverse
+#   "paper"            as published in arXiv 2406.08681, for comparison only: it is biased
 method = "lattice"
 
 # What is subtracted from an image first: "mean", "plane", "quadratic", "cubic", or "line-mean"
-# (which damages harmonics along the fast axis).
+# (which damages harmonics whose crests run along the fast axis).
 background = "plane"
 
-# What was told by hand: about two vectors of the lattice (x and y each, nm) or about its mean wavelength, and the parts
+# Choices made by hand: about two vectors of the lattice (x and y each, nm), or about its mean wavelength, and the parts
 # of each frame to use (corners of polygons, nm from the lower left corner).
 #   [by_hand]
 #   lattice_nm = [[12.1, 0.4], [6.2, 10.5]]
@@ -65,19 +64,18 @@ background = "plane"
 #   lattice_constant_sigma_nm = 0.0001
 #   poisson_ratio_sigma = 0.03
 #   source = "where the numbers come from"
-# Without it graphene is assumed, and results say so.
+# Without it graphene is assumed, and the results say so.
 # material = "graphene"
 
 # How many moirés every image shows (a twisted trilayer, twisted graphene on aligned hBN); each is fitted
-# with the others taken off and has results of its own.
+# after the others are subtracted and has its own results.
 moires = 1
 
-# The lower layer, where it is another one; `material` is then the upper one: a name or a table
-# [substrate].
+# The lower layer, if it differs: a name or a table [substrate]; `material` is then the upper layer.
 # substrate = "hBN"
 
-# The layers of each moiré, the largest cell first, where they are not all of the same layers: one such table for
-# each of them, in place of `material` and `substrate`.
+# The layers of each moiré, the largest cell first, if not all moirés have the same layers: one such table for
+# each of them, instead of `material` and `substrate`.
 #   [[moire_layers]]
 #   material = "graphene"
 #   [[moire_layers]]
@@ -86,16 +84,20 @@ moires = 1
 
 # The orientation of one of the layers in the frame of the scans, if it is known: of layer 1 (the lower
 # one, the reference) or 2, of its atomic vector ("atomic": a row of atoms, a zigzag edge) or of its
-# reciprocal vector ("reciprocal": an armchair edge). It tells isotropic strain from twist.
+# reciprocal vector ("reciprocal": an armchair edge). It separates isotropic strain from twist.
 # lattice_angle = { angle_deg = 12.0, sigma_deg = 0.2, layer = 1, of = "atomic" }
 
 # Of two equal layers one orientation leaves the sense of the twist open. The orientation of the other layer
-# tells it, or you: "positive" (layer 2 is turned counter-clockwise against layer 1) or "negative".
+# decides, or this entry: "positive" (layer 2 is turned counter-clockwise against layer 1) or "negative".
 # lattice_angle_2 = { angle_deg = 13.1, sigma_deg = 0.2, layer = 2, of = "atomic" }
 # twist_sense = "positive"
 
+# Which grain to use of scans that show several, as their sets are named (grain 1, grain 2). Without this entry each is a
+# set of its own.
+# grain = 2
+
 # Two wave vectors of the moiré, x and y in rad/nm, that belong to the reciprocal vectors of the atoms at 0° and 120°.
-# A strained lattice can be read by several pairs; without this the image, an orientation or the least strain chooses.
+# A strained lattice has several such pairs; without this the image, an orientation or the least strain chooses.
 # moire_waves = [[0.24, 0.01], [-0.11, 0.21]]
 
 # Form of the strain equation: "real-space" (the stretch acts on atomic positions, positive is
@@ -120,23 +122,23 @@ exclude_outliers = false
 # Use only the region that all scans of an analysis have in common.
 overlap = false
 
-# A drift known beforehand, instead of measuring it.
+# A known drift, to be used instead of measuring it.
 # [drift]
 # x_nm_per_min = 0.5
 # y_nm_per_min = -0.15
 # sigma_nm_per_min = 0.05
 
-# What the scans do not tell, for the uncertainty budget; standard uncertainties. Calibration of the
+# Standard uncertainties that the scans do not show, for the uncertainty budget. Calibration of the
 # position sensors (or of the scanner, without sensors): gain common to x and y, difference of the two,
-# deviation from a right angle. Better: the values from your own calibration.
+# deviation from a right angle. Values from your own calibration are better.
 calibration = { gain_percent = 1.0, mismatch_percent = 0.5, orthogonality_mrad = 5.0 }
 
-# A calibration of the scanner that `moiregauge calibrate` wrote: a file, seen from the folder of this one.
-# Positions are corrected with it, and its errors take the place of those above.
+# A calibration of the scanner, written by `moiregauge calibrate`: path of the file, relative to this one.
+# It corrects positions, and its errors replace those above.
 # scanner = "scanner.toml"
 
-# Isotropic heterostrain that the layers may have beside the uniaxial one, per cent. The moiré does not
-# show it; 0.06 % still leave the twist within 0.001°.
+# Isotropic heterostrain that the layers may have besides the uniaxial one, per cent. The moiré does not
+# show it; up to 0.06 % changes the twist by less than 0.001°.
 isotropic_strain_percent = 0.05
 
 # Monte Carlo draws for the drift (per set) and for twist and strain (per scan).
@@ -176,8 +178,8 @@ fn known_materials(unknown: &UnknownMaterial) -> anyhow::Error {
     let UnknownMaterial { name, known } = unknown;
     let nearest = nearest(name, known.iter().map(String::as_str));
     anyhow::anyhow!(
-        "unknown material {name:?}{nearest}; known are {}; others can be described in a file (--materials) or in a \
-         [material] table of a settings file",
+        "unknown material {name:?}{nearest}; known are {}. Describe others in a file (--materials) or in a [material] \
+         table of a settings file",
         known.join(", ")
     )
 }

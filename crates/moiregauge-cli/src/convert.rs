@@ -18,9 +18,8 @@ use crate::say::say;
 
 /// Convert scans into formats of other programs: Gwyddion, NumPy, Zarr, TIFF, text
 ///
-/// Everything the file tells is kept as far as the format can: channels, units, sizes, directions,
-/// times, the header. One bad file never stops the others; the exit code tells. Nothing is written
-/// over without --force.
+/// All that the file holds is kept as far as the format allows: channels, units, sizes, directions, times, the header.
+/// A bad file does not stop the others; the exit code is then not 0. Existing files are replaced only with --force.
 #[derive(clap::Args, Clone, Debug)]
 #[command(
     override_usage = "moiregauge convert [OPTIONS] <IN>... <OUT>",
@@ -41,21 +40,21 @@ Examples:
   moiregauge convert picture.png picture.gwy --size 70nm×70nm"
 )]
 pub(crate) struct ConvertArgs {
-    /// Files, folders or names with * and ?; the last one is what is written: a file whose extension
-    /// tells the format, or with --to a folder
+    /// Files, folders or names with * and ?. The last one is the output: a file whose extension gives the format, or
+    /// with --to a folder
     #[arg(required = true, num_args = 2.., value_name = "PATH")]
     paths: Vec<PathBuf>,
-    /// Format; OUT is then a folder, made if it does not exist, for any number of files
+    /// Format; OUT is then a folder for any number of files, created if it does not exist
     #[arg(long, value_enum, value_name = "FORMAT")]
     to: Option<FormatArg>,
     /// Only this channel, by name; may be repeated
     #[arg(long, value_name = "NAME")]
     channel: Vec<String>,
-    /// Turn images into laboratory axes by the rotation of the frame: resampled by cubic convolution,
-    /// missing outside the frame; position sensors are left out
+    /// Turn images into laboratory axes by the rotation of the frame. They are resampled by cubic convolution; pixels
+    /// outside the frame are missing; position sensors are left out
     #[arg(long)]
     rotate_to_lab: bool,
-    /// Write over files that exist
+    /// Replace files that exist
     #[arg(long)]
     force: bool,
     /// Print nothing but errors
@@ -114,7 +113,7 @@ pub(crate) fn run(args: &ConvertArgs, job: &Job) -> anyhow::Result<ExitCode> {
         .split_last()
         .filter(|(_, paths)| !paths.is_empty())
     else {
-        bail!("expected files to convert and what to write");
+        bail!("expected the files to convert and the file to write");
     };
     let (mut inputs, mut failed) = (Vec::new(), Vec::new());
     for path in expand(paths, !args.quiet) {

@@ -21,7 +21,7 @@ use crate::simulate::write_sets;
 /// Simulate the three sets of arXiv 2406.08681, analyse them and show where the report is
 ///
 /// Needs no data: writes 26 simulated scans with their truth, runs the whole analysis on them and
-/// prints what was found beside what was put in.
+/// prints the results beside the true values.
 #[derive(clap::Args, Clone, Debug)]
 pub(crate) struct DemoArgs {
     /// Folder for scans and results [default: moiregauge-demo, or the next free number]
@@ -30,7 +30,7 @@ pub(crate) struct DemoArgs {
     /// Seed of all noise
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Write over files of the same names
+    /// Replace files of the same names
     #[arg(long)]
     force: bool,
 }
@@ -75,7 +75,7 @@ pub(crate) fn run(args: &DemoArgs, job: &Job) -> anyhow::Result<ExitCode> {
     say(&summary(&analysis, crate::hints::of))?;
     let truth = &sets[0];
     say(&format!(
-        "\nPut in: twist {}°, heterostrain {} %, drift ({}, {}) nm/min\n",
+        "\nTrue values of the simulation: twist {}°, heterostrain {} %, drift ({}, {}) nm/min\n",
         truth.sample.twist_deg,
         truth.sample.strain_percent,
         truth.drift.velocity_nm_per_min[0],

@@ -12,9 +12,9 @@ use crate::say::say;
 
 /// What a caveat means and what to do
 ///
-/// Results come with caveats, each with a code: what has to be known before the numbers are trusted. There are three
-/// grades of them. note: how a number was made, or what was assumed for it. warning: a number is less certain than its
-/// error says, or can mean something else. serious: a result is probably wrong, or was left out.
+/// Caveats are doubts that you should know before you trust the numbers. Each has a code and one of three grades. note:
+/// how a number was made, or what was assumed for it. warning: a number is less certain than its error says, or can
+/// mean something else. serious: a result is probably wrong, or was left out.
 #[derive(clap::Args, Clone, Debug)]
 #[command(after_long_help = "\
 Examples:
@@ -130,8 +130,9 @@ fn markdown() -> String {
     let mut text = "\
 # Caveats
 
-Results come with caveats: on the screen, in the report and in `results.json` and `map.json`, each with a code, words and
-what it concerns. `moiregauge explain CODE` says the same as this page, which `moiregauge explain --markdown` makes.
+Caveats are doubts that you should know before you trust the numbers. They are shown on the screen, in the report, in
+`results.json` and in `map.json`. Each has a code, a message, and what it concerns. `moiregauge explain CODE` says the
+same as this page, which `moiregauge explain --markdown` makes.
 
 "
     .to_owned();

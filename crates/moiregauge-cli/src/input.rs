@@ -15,7 +15,7 @@ use crate::numbers;
 #[command(next_help_heading = "What the files do not tell")]
 pub(crate) struct KnownArgs {
     /// Width and height of the image from edge to edge, as in 70nm×70nm, 1.5umx1.5um or 70x35nm;
-    /// arrays and pictures need it, other files obey it in place of their own
+    /// arrays and pictures need it; in other files it replaces their own size
     #[arg(long, value_name = "W×H", value_parser = parse_size)]
     size: Option<[f64; 2]>,
     /// Unit of the values of arrays and pictures
@@ -24,18 +24,18 @@ pub(crate) struct KnownArgs {
     /// Lines per second, trace and retrace together
     #[arg(long, value_name = "HZ", value_parser = numbers::number(numbers::LINE_RATE_HZ))]
     line_rate: Option<f64>,
-    /// Which line was first: up is the bottom one. The alternating ones begin with the first file by
-    /// name, numbers in names counting as numbers. Of files that hold a frame of each (Omicron Matrix)
-    /// that one is read, otherwise up
+    /// Direction of the slow scan: up means that the bottom line was scanned first. alternating-… starts with the first
+    /// file by name (numbers in names are sorted as numbers). Of files that hold a frame of each direction (Omicron
+    /// Matrix) this frame is read [default there: up]
     #[arg(long, value_enum)]
     frame_direction: Option<FrameArg>,
-    /// Angle by which the fast axis is turned against x, degrees, counter-clockwise
+    /// Angle of the fast axis against x, degrees counter-clockwise
     #[arg(long, value_name = "DEG", allow_negative_numbers = true, value_parser = numbers::number(numbers::ANGLE_DEG))]
     rotation: Option<f64>,
-    /// Channel that is the position sensor along x, by name
+    /// Name of the channel of the position sensor along x
     #[arg(long, value_name = "NAME", requires = "y_sensor")]
     x_sensor: Option<String>,
-    /// Channel that is the position sensor along y, by name
+    /// Name of the channel of the position sensor along y
     #[arg(long, value_name = "NAME", requires = "x_sensor")]
     y_sensor: Option<String>,
     /// Unit of the position sensors of arrays
@@ -44,8 +44,7 @@ pub(crate) struct KnownArgs {
     /// File that holds the position sensors, of the same shape as the images; for all scans
     #[arg(long, value_name = "FILE")]
     sensors: Option<PathBuf>,
-    /// Use this block only: first column, first row, columns and rows, as the screen shows them:
-    /// rows are counted from the top
+    /// Use only this block: first column, first row, columns and rows; rows are counted from the top
     #[arg(long, value_name = "X,Y,W,H", value_parser = parse_crop)]
     crop: Option<Crop>,
 }

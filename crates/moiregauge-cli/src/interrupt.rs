@@ -23,7 +23,7 @@ pub(crate) fn stoppable(
             std::process::exit(INTERRUPTED.into());
         }
         cancel.cancel();
-        eprintln!("stopping; once more to stop at once");
+        eprintln!("stopping; press Ctrl-C again to stop at once");
     };
     ctrlc::set_handler(handler).context("cannot listen to Ctrl-C")?;
     match job.run(|| command(&job)) {
@@ -40,7 +40,7 @@ pub(crate) fn stoppable(
 
 /// Says that nothing is left of the run.
 fn stopped() -> ExitCode {
-    eprintln!("{Cancelled}; nothing was written but what is complete");
+    eprintln!("{Cancelled}; every file that was written is complete");
     ExitCode::from(INTERRUPTED)
 }
 
@@ -51,6 +51,10 @@ fn name() -> Option<String> {
 
 /// Takes what a run into the same folder had measured when it was stopped.
 pub(crate) fn take(sink: &FolderSink, campaign: &mut Campaign) {
+    // The name takes a hash of the program, which takes as long as a small image.
+    if !sink.keeps_parts() {
+        return;
+    }
     let Some(Part::Whole(bytes)) = name().map(|name| sink.kept(&name)) else {
         return;
     };
@@ -83,9 +87,9 @@ pub(crate) fn kept_for_next(
                 "scans are"
             };
             error.context(format!(
-                "{measured} {scans} measured and kept; the same command goes on from there"
+                "{measured} {scans} measured and kept; run the same command again to continue"
             ))
         }
-        Err(why) => error.context(format!("what was measured cannot be kept: {why:#}")),
+        Err(why) => error.context(format!("the measured scans cannot be kept: {why:#}")),
     }
 }

@@ -12,8 +12,8 @@ use crate::say::say;
 /// Join the shares of a campaign into one table and one page
 ///
 /// Reads the folders into which `moiregauge campaign --shard` wrote, and writes what one run over all samples would
-/// have written, byte for byte. Refuses shares of different settings or of another version, and tells which shares are
-/// missing.
+/// have written, byte for byte. Refuses shares with different settings or from another version, and names shares that
+/// are missing.
 #[derive(clap::Args, Clone, Debug)]
 #[command(after_long_help = "\
 Examples:
@@ -26,10 +26,10 @@ pub(crate) struct MergeArgs {
     /// Folder for samples.csv, failed.csv and campaign.html; may be one of the others
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Merge shares of different versions or settings, too
+    /// Merge shares of different versions or settings too
     #[arg(long)]
     mixed: bool,
-    /// Do without shares that are missing
+    /// Merge even if shares are missing
     #[arg(long)]
     incomplete: bool,
     /// Print nothing but errors

@@ -10,8 +10,8 @@ use crate::numbers::number;
 #[derive(clap::Args, Clone, Debug)]
 #[command(next_help_heading = "Scanner and uncertainty budget")]
 pub(crate) struct ScannerArgs {
-    /// Calibration of the scanner, as `moiregauge calibrate` writes it: corrects positions, and its errors take
-    /// the place of the three below
+    /// Calibration of the scanner, as `moiregauge calibrate` writes it: corrects positions; its errors replace the
+    /// three below
     #[arg(long, value_name = "FILE", conflicts_with_all = ["calibration_gain", "calibration_mismatch", "calibration_orthogonality"])]
     calibration: Option<PathBuf>,
     /// Gain error of the scanner, common to x and y, per cent, for the budget [default: 1]

@@ -14,9 +14,9 @@ use crate::say::say;
 
 /// Open a page to look at scans, analyse them, correct by hand and map
 ///
-/// Starts a server for this computer alone and opens a browser on it. Scans are chosen below the folders that are named,
-/// or dropped on the page; nothing else is opened, and nothing needs a network. The address, with the token that lets a
-/// browser in, is printed as soon as the page can be opened. Ctrl-C ends it.
+/// Starts a server for this computer alone and opens a browser on it. Choose scans from the folders that are named, or
+/// drop files on the page. Other files are never opened, and no network is needed. The address, with the token that
+/// gives access, is printed when the page is ready. Ctrl-C ends the server.
 #[derive(clap::Args, Clone, Debug)]
 #[command(after_long_help = "\
 Examples:
@@ -35,16 +35,16 @@ pub(crate) struct ServeArgs {
     /// Port [default: one that is free]
     #[arg(long, value_name = "N", default_value_t = 0, hide_default_value = true)]
     port: u16,
-    /// Open no browser: the address that is printed is opened by hand
+    /// Do not open a browser; open the printed address yourself
     #[arg(long)]
     no_browser: bool,
-    /// Keep works (files, settings, what was measured) in this folder; without it nothing is left when the server ends
+    /// Keep works (files, settings, measured scans) in this folder; without it nothing is saved when the server ends
     #[arg(long, value_name = "DIR")]
     keep: Option<PathBuf>,
-    /// Serve the page from this folder in place of the one within the program
+    /// Serve the page from this folder instead of the one inside the program
     #[arg(long, value_name = "DIR")]
     page: Option<PathBuf>,
-    /// Address to listen at; another one than that of this computer for itself needs --token-file
+    /// Address to listen on; any address other computers can reach needs --token-file
     #[arg(long, value_name = "ADDR", default_value_t = IpAddr::V4(Ipv4Addr::LOCALHOST))]
     address: IpAddr,
     /// File with the token, at least 32 letters and digits in its first line, that only its owner can read [default: a

@@ -8,8 +8,8 @@ use crate::say::say;
 
 /// Print the completions of a shell
 ///
-/// With bash: `moiregauge completions bash > ~/.local/share/bash-completion/completions/moiregauge`; with other shells
-/// where these look for them.
+/// With bash: `moiregauge completions bash > ~/.local/share/bash-completion/completions/moiregauge`; with other shells,
+/// save them where the shell looks for completions.
 #[derive(clap::Args, Clone, Debug)]
 pub(crate) struct CompletionsArgs {
     /// The shell

@@ -15,7 +15,7 @@ pub(crate) fn in_words(inputs: &[PathBuf], settings: &Settings, known: &Known) -
         .map(|[length, along]| format!("about {length:.1} nm along {:.0}°", along.to_degrees()))
         .collect();
     Some(format!(
-        "{} shows stripes in {}: {}. One wave vector says nothing of twist and strain; `moiregauge map` maps \
+        "{} shows stripes in {}: {}. One wave vector does not determine twist and strain. `moiregauge map` maps \
          wavelength and direction",
         seen.file.display(),
         seen.channel,

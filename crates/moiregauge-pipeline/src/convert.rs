@@ -80,13 +80,13 @@ pub enum ConvertError {
     #[error("no channel {0:?}")]
     NoChannel(String),
     /// It has no size.
-    #[error("to be turned, an image needs its size")]
+    #[error("an image can be turned only if its size is known")]
     NoSize,
     /// It has no area.
     #[error("channel {0:?} cannot be turned")]
     NotTurned(String),
     /// There is nothing to be turned.
-    #[error("there is no channel but the position sensors")]
+    #[error("there is no channel except the position sensors")]
     NoImage,
     /// The format cannot hold it.
     #[error(transparent)]
@@ -158,7 +158,8 @@ pub fn convert(
         scan = turned(&scan)?;
         log.push("turned into laboratory axes by cubic convolution".to_owned());
     }
-    Ok(spmfile::write(&scan, request.format, stem, &log)?)
+    let files = spmfile::write_between(&scan, request.format, stem, &log, &interrupt::check)?;
+    Ok(files)
 }
 
 /// Converts scans, and writes what they become. One bad scan does not stop the others: the answers, in the order of the

@@ -105,8 +105,8 @@ impl Found {
         failed.extend(others.into_iter().map(|(file, first)| FailedInput {
             file: in_words(&file),
             error: format!(
-                "another channel of the frame of {}, which is measured already; give the files of one channel, as in \
-                 '*.Z_mtrx'",
+                "this is another channel of the frame of {}, which was measured already. Give the files of one \
+                 channel, as in '*.Z_mtrx'",
                 first.display()
             ),
         }));
@@ -200,7 +200,7 @@ pub(crate) fn look(path: &Path) -> Look {
         Look::Scan(format)
     } else {
         failed_by_name(format!(
-            "by its name it should be a scan, but {}",
+            "the name is that of a scan, but {}",
             instead(format, &head)
         ))
     }
@@ -291,7 +291,7 @@ fn matching(path: &Path) -> Result<Vec<PathBuf>, String> {
         !file.is_dir() && fits(&pattern, &name.chars().collect::<Vec<_>>())
     });
     if files.is_empty() {
-        return Err("no file fits this name".to_owned());
+        return Err("no file matches this name".to_owned());
     }
     Ok(files)
 }
@@ -421,7 +421,7 @@ mod tests {
         );
         assert_eq!(
             error(&folder.path().join("*.spm")),
-            "no file fits this name"
+            "no file matches this name"
         );
     }
 

@@ -159,7 +159,7 @@ impl fmt::Display for OutsideOfChannels {
         let Pixel { row, column } = self.pixel;
         write!(
             f,
-            "{row},{column} lies outside of all channels; the largest, {:?}, has {} rows and {} columns",
+            "{row},{column} lies outside all channels. The largest, {:?}, has {} rows and {} columns",
             self.largest, self.rows, self.columns
         )
     }
@@ -249,17 +249,80 @@ fn scan_info(scan: &Scan, at: &[Pixel]) -> ScanInfo {
     }
 }
 
+/// Lines that are looked at together, about so many samples: they stay in the fastest memory.
+const AT_ONCE: usize = 1 << 14;
+/// Samples that are summed side by side, so that every vector width gives the same bits.
+const LANES: usize = 8;
+
+/// What the finite ones of some samples amount to.
+#[derive(Clone, Copy)]
+struct Statistics {
+    count: usize,
+    sums: [f64; LANES],
+    min: f64,
+    max: f64,
+}
+
+impl Statistics {
+    /// Of all samples of a channel, each as `of` says.
+    fn of(channel: &Channel, of: impl Fn(f64) -> f64) -> Self {
+        let mut all = Self {
+            count: 0,
+            sums: [0.0; LANES],
+            min: f64::INFINITY,
+            max: f64::NEG_INFINITY,
+        };
+        let lines = (AT_ONCE / channel.columns.max(1)).max(1);
+        for first in (0..channel.rows).step_by(lines) {
+            all.add(
+                &channel.lines(first..(first + lines).min(channel.rows)),
+                &of,
+            );
+        }
+        all
+    }
+
+    fn add(&mut self, values: &[f64], of: impl Fn(f64) -> f64) {
+        let (mut low, mut high) = ([f64::INFINITY; LANES], [f64::NEG_INFINITY; LANES]);
+        let mut counts = [0u64; LANES];
+        for eight in values.chunks(LANES) {
+            for (lane, value) in eight.iter().enumerate() {
+                let there = value.is_finite();
+                counts[lane] += u64::from(there);
+                self.sums[lane] += if there { of(*value) } else { 0.0 };
+                low[lane] = if there && *value < low[lane] {
+                    *value
+                } else {
+                    low[lane]
+                };
+                high[lane] = if there && *value > high[lane] {
+                    *value
+                } else {
+                    high[lane]
+                };
+            }
+        }
+        self.count += counts.iter().sum::<u64>() as usize;
+        self.min = low.into_iter().fold(self.min, f64::min);
+        self.max = high.into_iter().fold(self.max, f64::max);
+    }
+
+    /// NaN of none.
+    fn mean(&self) -> f64 {
+        self.sums.iter().sum::<f64>() / self.count as f64
+    }
+}
+
 fn channel_info(channel: &Channel, at: &[Pixel]) -> ChannelInfo {
-    let values = channel.values();
-    let finite = || values.iter().copied().filter(|v| v.is_finite());
-    let n = finite().count();
-    let mean = finite().sum::<f64>() / n as f64;
-    let variance = finite().map(|v| (v - mean).powi(2)).sum::<f64>() / n as f64;
+    let found = Statistics::of(channel, |v| v);
+    let mean = found.mean();
+    let variance = Statistics::of(channel, |v| (v - mean).powi(2)).mean();
+    let none = found.count == 0;
     let sample = |pixel: &Pixel| {
         let inside = pixel.row < channel.rows && pixel.column < channel.columns;
         let value = inside.then(|| {
             let row = channel.rows - 1 - pixel.row;
-            values[row * channel.columns + pixel.column]
+            channel.lines(row..row + 1)[pixel.column]
         });
         Sample {
             row: pixel.row,
@@ -277,12 +340,11 @@ fn channel_info(channel: &Channel, at: &[Pixel]) -> ChannelInfo {
         columns: channel.columns,
         width_nm: channel.width_nm,
         height_nm: channel.height_nm,
-        // Folding from NaN: `min` and `max` prefer the other operand.
-        min: finite().fold(f64::NAN, f64::min),
-        max: finite().fold(f64::NAN, f64::max),
+        min: if none { f64::NAN } else { found.min },
+        max: if none { f64::NAN } else { found.max },
         mean,
         std: variance.sqrt(),
-        missing: values.len() - n,
+        missing: channel.samples.len() - found.count,
         scaling: channel.scaling.clone(),
         plane_fit: channel.plane_fit.clone(),
         samples: at.iter().map(sample).collect(),
@@ -305,11 +367,11 @@ fn missing_for_analysis(scan: &Scan) -> Vec<String> {
     lack(scan.size_nm.is_none(), "no scan size");
     lack(
         scan.line_rate_hz.is_none(),
-        "no line rate: no drift without the time of each line",
+        "no line rate: without the time of each line the drift cannot be measured",
     );
     lack(
         scan.frame_direction.is_none(),
-        "no frame direction, or images that contradict each other: the sign of the drift is unknown",
+        "no frame direction, or images with different ones: the sign of the drift is unknown",
     );
     lack(
         scan.acquired.is_none(),
@@ -317,7 +379,7 @@ fn missing_for_analysis(scan: &Scan) -> Vec<String> {
     );
     lack(
         !scan.channels.iter().any(|c| is_image(&c)),
-        "no channel but the position sensors",
+        "no channel except the position sensors",
     );
     lack(!has(LineDirection::Trace), "no trace");
     lack(!has(LineDirection::Retrace), "no retrace");

@@ -140,7 +140,10 @@ impl Known {
         let bytes = content.bytes();
         match content.format() {
             array if array.is_array() => {
-                spmfile::arrays::read_as(array, bytes, &self.array_options(path), &wanted)
+                let options = self.array_options(path);
+                let mut scan = spmfile::arrays::read_as(array, bytes, &options, &wanted)?;
+                self.tell_sensor_unit(&mut scan);
+                Ok(scan)
             }
             Format::OmicronMatrix => {
                 let direction = self.frame_direction(path);
@@ -156,6 +159,18 @@ impl Known {
         both.into_iter()
             .flatten()
             .any(|wanted| is_named(name, wanted) || is_named(internal_name, wanted))
+    }
+
+    /// Arrays that only the user calls position sensors were read as images: the unit that is told of sensors is theirs.
+    fn tell_sensor_unit(&self, scan: &mut Scan) {
+        let Some(unit) = &self.told.sensor_unit else {
+            return;
+        };
+        for channel in &mut scan.channels {
+            if self.names_sensor(&channel.name, &channel.internal_name) {
+                channel.unit.clone_from(unit);
+            }
+        }
     }
 
     /// What the user tells of an array.
@@ -204,7 +219,7 @@ impl Known {
         let mut replaced = Vec::new();
         let mut note = |what: &str, old: Option<String>, new: String| {
             if let Some(old) = old.filter(|old| *old != new) {
-                replaced.push(format!("{what} {new} in place of the file's {old}"));
+                replaced.push(format!("{what} {new} instead of {old} of the file"));
             }
         };
         if let Some(size @ [width, height]) = self.told.size_nm {
@@ -313,7 +328,7 @@ fn put_sensors(scan: &mut Scan, sensors: Vec<Channel>) -> Result<(), String> {
             .any(|c| sensor_axis(&c.name, &c.internal_name) == Some(axis));
         if !found {
             return Err(format!(
-                "expected a channel like \"{axis} Sensor\", found none; the channels of both sensors can be named"
+                "expected a channel like \"{axis} Sensor\", found none. Name the channels of both sensors"
             ));
         }
     }
@@ -397,6 +412,52 @@ mod tests {
         assert!(is_named("Phase_Retrace", "phase") && is_named("TR Phase", "tr_phase"));
         assert!(!is_named("Phase 2", "phase") && !is_named("TR Phase", "phase"));
         assert!(!is_named("", ""));
+    }
+
+    /// Arrays of any name become sensors in the unit that is told of sensors; others keep that of images.
+    #[test]
+    fn arrays_become_sensors_in_their_unit() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("scan.npz");
+        let channel = |name: &str| Channel {
+            name: name.to_owned(),
+            internal_name: String::new(),
+            unit: String::new(),
+            line_direction: None,
+            scan_line: None,
+            rows: 2,
+            columns: 3,
+            width_nm: None,
+            height_nm: None,
+            span: Span::PixelEdges,
+            scale: 1.0,
+            offset: 0.0,
+            scaling: String::new(),
+            plane_fit: None,
+            samples: spmfile::Samples::F64(vec![0.0, 1.0, 2.0, 0.0, 1.0, 2.0]),
+        };
+        let scan = Scan {
+            channels: ["image", "stage x", "stage y"].map(channel).to_vec(),
+            ..Scan::default()
+        };
+        std::fs::write(&path, spmfile::arrays::npz(&scan, &[]).unwrap()).unwrap();
+        let told = Told {
+            x_sensor: Some("stage x".to_owned()),
+            y_sensor: Some("stage y".to_owned()),
+            sensor_unit: Some("um".to_owned()),
+            unit: Some("V".to_owned()),
+            ..Told::default()
+        };
+        let known = Known::new(&told, std::slice::from_ref(&path));
+        let content = known.source(&path).content().unwrap();
+        let (read, _) = known.read(&path, &content, &|_| true).unwrap();
+        let units: Vec<(&str, &str)> = (read.channels.iter())
+            .map(|c| (c.name.as_str(), c.unit.as_str()))
+            .collect();
+        let expected = [("image", "V"), ("X Sensor", "um"), ("Y Sensor", "um")];
+        assert_eq!(units, expected);
+        let sensors = spmfile::position_sensors(&read, spmfile::LineDirection::Trace);
+        assert!(sensors.is_ok(), "{:?}", sensors.err());
     }
 
     #[test]

@@ -5,6 +5,7 @@
 
 pub mod calibrate;
 pub mod campaign;
+pub mod choices;
 mod content;
 pub mod convert;
 mod find;

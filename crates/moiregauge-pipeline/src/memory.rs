@@ -9,8 +9,8 @@ const ASSUMED: u64 = 16 << 30;
 /// An image that the memory does not hold.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "the analysis of {columns} × {rows} samples takes {} of memory, and {} can be had: analyse a part of the \
-     image (a crop), or make a map, which goes through large images in bands",
+    "the analysis of {columns} × {rows} samples needs {} of memory, but only {} are free. Analyse a part of the image \
+     (a crop), or make a map: maps read large images in bands",
     in_words(*needed), in_words(*available)
 )]
 pub struct NotEnoughMemory {

@@ -102,7 +102,7 @@ pub enum MoireError {
     #[error("the two vectors are parallel")]
     Parallel,
     /// An orientation beside wavelengths.
-    #[error("three wavelengths do not tell how the moiré lies in the laboratory")]
+    #[error("three wavelengths do not give the direction of the moiré in laboratory axes")]
     NoOrientation,
 }
 

@@ -38,7 +38,7 @@ pub enum InputError {
     #[error(transparent)]
     Measure(#[from] MeasureError),
     /// Results name a file that was not given.
-    #[error("it is none of the inputs")]
+    #[error("it is not one of the inputs")]
     NotAnInput,
 }
 
@@ -143,8 +143,9 @@ impl<'a> Opened<'a> {
     /// # Errors
     /// [`InputError`].
     pub fn reading(&self, settings: &Settings) -> Result<Reading, InputError> {
-        let (scan, replaced) = self.scan(settings, |_| None)?;
-        let input = self.identity();
+        // Hashing takes as long as decoding.
+        let (scan, input) = rayon::join(|| self.scan(settings, |_| None), || self.identity());
+        let (scan, replaced) = scan?;
         let several = unusual_channels(&self.names(), settings.channel.as_deref());
         let several = several.map(FileDoubt::SeveralImages);
         let replaced = replaced.into_iter().map(FileDoubt::GivenByUser);

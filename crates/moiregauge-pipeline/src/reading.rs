@@ -24,7 +24,7 @@ pub enum FileError {
     #[error("expected a file, found {0}")]
     NotAFile(&'static str),
     /// Larger than is read at once.
-    #[error("the file has {}; at most {} are read at once", memory::in_words(*found), memory::in_words(*limit))]
+    #[error("the file has {}, but at most {} are read at once", memory::in_words(*found), memory::in_words(*limit))]
     TooLarge {
         /// Its bytes.
         found: u64,
@@ -32,7 +32,7 @@ pub enum FileError {
         limit: u64,
     },
     /// Larger than the memory that is left.
-    #[error("the file has {}, and {} of memory can be had", memory::in_words(*found), memory::in_words(*available))]
+    #[error("the file has {}, but only {} of memory are free", memory::in_words(*found), memory::in_words(*available))]
     NoMemory {
         /// Its bytes.
         found: u64,

@@ -27,8 +27,7 @@ pub enum ReplayError {
     },
     /// The document is older than records of runs.
     #[error(
-        "{file} does not record what was asked: version {version} wrote it, before runs were recorded; its settings can \
-         be used for a new run"
+        "{file} does not record its run, because version {version} did not do so. Use its settings for a new run"
     )]
     NoRun {
         /// Its name.
@@ -148,7 +147,7 @@ impl Document {
             return Ok(places);
         }
         let mut words = format!(
-            "{} of the {} files of the run are not as they were:",
+            "{} of the {} files of the run are missing or have changed:",
             problems.len(),
             self.files.len()
         );

@@ -46,8 +46,8 @@ fn log(file: &Source, name: &str) -> Result<Vec<Content>, ReadError> {
             Err(error) if error.is_missing() && number > 1 => break,
             Err(error) if error.is_missing() => {
                 return Err(refused(format!(
-                    "its lines, size and scale are in the log of its session: expected the file {log} beside \
-                     it, found none"
+                    "its lines, size and scale are in the log of its session: expected the file {log} beside it, found \
+                     none"
                 )));
             }
             Err(error) => return Err(refused(format!("{log} beside it: {error}"))),

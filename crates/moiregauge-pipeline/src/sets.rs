@@ -9,7 +9,7 @@ use moiregauge_report::results::NamedSet;
 pub enum SetError {
     /// Nothing lies under its path.
     #[error(
-        "the set {name:?} is to hold the files under {path}, and none of the {inputs} inputs lies there{}",
+        "the set {name:?} should hold the files under {path}, but none of the {inputs} inputs lies there{}",
         .first.as_ref().map_or(String::new(), |first| format!(": expected a folder or file among them, the first of which is {first}"))
     )]
     Empty {
@@ -23,7 +23,7 @@ pub enum SetError {
         first: Option<String>,
     },
     /// All its files belong to sets named before.
-    #[error("the set {name:?} has no file left: all under {path} belong to sets named before it")]
+    #[error("the set {name:?} has no files: all files under {path} belong to sets named before it")]
     Taken {
         /// Its name.
         name: String,

@@ -27,10 +27,10 @@ pub enum SimulationError {
         source: SimulateError,
     },
     /// The name is no name of a folder.
-    #[error("the name of a set becomes a folder: expected a plain name, found {0:?}")]
+    #[error("the name of a set is also the name of its folder: expected a plain name, found {0:?}")]
     Name(String),
     /// A scan that would be taken for part of the set.
-    #[error("{} is no part of the new set: remove it or choose another name", .0.display())]
+    #[error("{} is not part of the new set. Remove it or choose another name", .0.display())]
     InTheWay(PathBuf),
     /// The folder cannot be read.
     #[error("cannot list {}", folder.display())]

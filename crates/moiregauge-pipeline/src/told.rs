@@ -25,7 +25,7 @@ pub fn check_told(told: &Told) -> Result<(), SettingsError> {
         if let Some(value) = value.filter(|value| !(low..=high).contains(value)) {
             return Err(SettingsError {
                 setting,
-                reason: format!("{setting} lies between {low} and {high}, found {value}"),
+                reason: format!("{setting} must lie between {low} and {high}, found {value}"),
             });
         }
     }
@@ -35,13 +35,14 @@ pub fn check_told(told: &Told) -> Result<(), SettingsError> {
     {
         return Err(SettingsError {
             setting: "crop",
-            reason: "expected a block of at least one column and one row, found none".to_owned(),
+            reason: "expected a block of at least one column and one row, found an empty one"
+                .to_owned(),
         });
     }
     if told.x_sensor.is_some() != told.y_sensor.is_some() {
         return Err(SettingsError {
             setting: "x_sensor",
-            reason: "expected the names of both position sensors, found that of one".to_owned(),
+            reason: "expected the names of both position sensors, found only one".to_owned(),
         });
     }
     Ok(())

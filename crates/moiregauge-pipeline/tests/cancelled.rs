@@ -4,19 +4,21 @@
 mod small;
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
 use moiregauge_pipeline::campaign::AnalyseError;
+use moiregauge_pipeline::convert::{ConvertRequest, convert};
 use moiregauge_pipeline::maps::{MapRequest, NotMapped};
 use moiregauge_pipeline::samples::{Samples, SamplesError, analyse_samples, samples_in};
-use moiregauge_pipeline::sink::{Forget, Keep, MemorySink, Part, SinkError};
+use moiregauge_pipeline::sink::{FileSink, Forget, Keep, MemorySink, Part, SinkError};
 use moiregauge_pipeline::validate::{ValidateError, ValidateRequest};
-use moiregauge_pipeline::{Cancel, Job, Quiet, map, validate};
+use moiregauge_pipeline::{Cancel, Cancelled, Job, Known, Quiet, map, validate};
 use moiregauge_report::Choice;
 use moiregauge_report::results::Told;
 use small::{campaign, document, scans, settings};
+use spmfile::WritableFormat;
 
 /// Ten times what is promised: the processors may be busy.
 const SOON: Duration = Duration::from_secs(3);
@@ -224,4 +226,34 @@ fn campaigns_keep_their_samples() {
     };
     let (alone, out) = (folder.path().join("alone"), folder.path().join("out"));
     at_random_moments(&mut |job| work(&alone, job), &mut |job| work(&out, job));
+}
+
+/// Writing is stopped, too: what comes after the reading of a scan takes seconds where images are large.
+#[test]
+fn conversions_are_stopped_while_they_write() {
+    let folder = tempfile::tempdir().unwrap();
+    let scan = &scans(folder.path(), 1)[0];
+    let out = folder.path().join("out");
+    for format in WritableFormat::ALL {
+        let request = ConvertRequest::new(format);
+        let stopped = |work: &(dyn Fn() + Sync)| {
+            let cancel = Cancel::new();
+            let job = Job::new(Some(1), cancel.clone(), &Quiet).unwrap();
+            job.run(|| {
+                cancel.cancel();
+                work();
+            })
+        };
+        let known = Known::default();
+        let made = convert(scan, &known, &request, "scan").unwrap();
+        let convert = || drop(convert(scan, &known, &request, "scan"));
+        assert_eq!(stopped(&convert), Err(Cancelled), "{format:?}");
+        let sink = FileSink::open(&out, false, &[]).unwrap();
+        let named = made.into_iter().map(|(name, bytes)| (name.into(), bytes));
+        let named: Vec<(PathBuf, Vec<u8>)> = named.collect();
+        let write = || drop(sink.write(&named));
+        assert_eq!(stopped(&write), Err(Cancelled), "{format:?}");
+        drop(sink);
+        assert!(!out.exists(), "{format:?}");
+    }
 }

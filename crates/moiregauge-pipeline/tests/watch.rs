@@ -7,8 +7,9 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
 
 use moiregauge::simulate::{Simulation, Simulator};
-use moiregauge_pipeline::watch::{Happened, Line, Until, Watch, WatchRequest};
+use moiregauge_pipeline::watch::{Happened, Line, Until, Watch, WatchRequest, line_schema};
 use moiregauge_pipeline::{Job, find};
+use moiregauge_report::Results;
 use small::{campaign, document, scans, settings};
 use tempfile::TempDir;
 
@@ -75,11 +76,11 @@ impl Scene {
     }
 
     /// The numbers are those of an analysis of the folder as it is, to the last bit.
-    fn is_as_analysed(&self) {
+    fn is_as_analysed(&mut self) {
         let (inputs, left_out) = find(&[self.folder.path().to_owned()]).frames();
         let mut fresh = campaign(&inputs).with_left_out(left_out);
         let fresh = document(&fresh.analyse(&self.job).unwrap());
-        assert_eq!(document(self.watch.outcomes()), fresh);
+        assert_eq!(document(&self.watch.outcomes(&self.job).unwrap()), fresh);
     }
 }
 
@@ -100,6 +101,38 @@ fn names(line: &Line) -> Vec<&str> {
 
 fn codes(line: &Line) -> Vec<&str> {
     line.warnings.iter().map(|w| w.code.as_str()).collect()
+}
+
+/// A watch draws nothing at random for its lines, and an analysis of the folder has the same numbers with all draws.
+#[test]
+fn lines_tell_the_numbers_of_an_analysis_with_draws() {
+    let mut scene = Scene::with(8, |mut request| {
+        request.settings.drift_draws = 200;
+        request.settings.strain_draws = 100;
+        request
+    });
+    (0..8).for_each(|frame| scene.arrive(frame));
+    let lines = scene.settle();
+    let outcomes = scene.watch.outcomes(&scene.job).unwrap();
+    let all = Results::new(&outcomes[0].analysis, &outcomes[0].provenance);
+    let set = &all.sets[0];
+    let (mean, drift) = (set.mean.as_ref().unwrap(), set.drift.as_ref().unwrap());
+    assert!(drift.monte_carlo.is_some() && set.scans[0].monte_carlo.is_some());
+    assert!(!outcomes[0].analysis.sets[0].scans[0].draws.is_empty());
+    let line = lines.last().unwrap();
+    let pairs = [
+        (line.twist_deg, mean.twist_strain.twist_deg),
+        (
+            line.heterostrain_percent,
+            mean.twist_strain.heterostrain_percent,
+        ),
+        (line.drift.x_nm_per_min, drift.x_nm_per_min),
+        (line.drift.y_nm_per_min, drift.y_nm_per_min),
+    ];
+    for (told, found) in pairs {
+        assert!(told.sigma.is_some());
+        assert_eq!(told, found.into());
+    }
 }
 
 #[test]
@@ -326,7 +359,7 @@ fn own_results_are_left_alone_and_a_new_watch_goes_on() {
     std::fs::copy(&scene.frames[3], results.join("aligned.spm")).unwrap();
     assert!(scene.settle().is_empty());
     let kept = serde_json::to_string(scene.watch.kept()).unwrap();
-    let before = document(scene.watch.outcomes());
+    let before = document(&scene.watch.outcomes(&scene.job).unwrap());
     let mut again = Watch::new(scene.watch.request().clone()).unwrap();
     again.take(serde_json::from_str(&kept).unwrap());
     let count = again.kept().len();
@@ -336,7 +369,7 @@ fn own_results_are_left_alone_and_a_new_watch_goes_on() {
         (lines.len(), lines[0].event, lines[0].frames),
         (1, Happened::Start, 3)
     );
-    assert_eq!(document(scene.watch.outcomes()), before);
+    assert_eq!(document(&scene.watch.outcomes(&scene.job).unwrap()), before);
     assert_eq!(scene.watch.kept().len(), count);
     assert!(!serde_json::to_string(&lines).unwrap().contains("aligned"));
 }
@@ -434,4 +467,48 @@ fn a_stopped_step_loses_nothing() {
         (1, 3, Happened::New)
     );
     assert!(scene.source.path().is_dir());
+}
+
+/// The published schema is that of the lines, and lines with numbers, without any, and about the folder follow it.
+#[test]
+fn lines_follow_the_published_schema() {
+    let path = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../moiregauge-report/schema/watch-1.schema.json"
+    );
+    let published: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(path).unwrap_or_default()).unwrap_or_default();
+    assert_eq!(
+        published,
+        line_schema(),
+        "renew it: cargo run -p moiregauge-pipeline --example schema watch > \
+         crates/moiregauge-report/schema/watch-1.schema.json"
+    );
+    let validator = jsonschema::validator_for(&published).expect("a valid schema");
+    let mut scene = Scene::with(4, |request| WatchRequest {
+        until: "twist=0.001".parse::<Until>().unwrap(),
+        ..request
+    });
+    scene.write("bad.spm", b"\\*File list\r\n");
+    (0..4).for_each(|frame| scene.arrive(frame));
+    let mut lines: Vec<Line> = (0..6).flat_map(|_| scene.look()).collect();
+    let away = scene.source.path().join("away");
+    std::fs::rename(scene.folder.path(), &away).unwrap();
+    let lost = scene.look();
+    std::fs::rename(&away, scene.folder.path()).unwrap();
+    let last = lines.iter().rev().find(|line| line.set.is_some()).unwrap();
+    assert_eq!(
+        (lost[0].event, lost[0].twist_deg, &lost[0].file),
+        (Happened::Folder, last.twist_deg, &None)
+    );
+    lines.extend(lost);
+    assert!(lines.iter().any(|line| line.event == Happened::Unreadable));
+    for line in &lines {
+        let line = serde_json::to_value(line).unwrap();
+        let wrong: Vec<String> = validator
+            .iter_errors(&line)
+            .map(|e| e.to_string())
+            .collect();
+        assert!(wrong.is_empty(), "{wrong:?} in {line}");
+    }
 }

@@ -64,7 +64,9 @@ fn set_summary(text: &mut String, set: &SetAnalysis, settings: &Settings) {
     match (&set.mean, &set.uncorrected) {
         (Some(mean), _) => set_mean(text, mean),
         (None, Some(mean)) => {
-            text.push_str("  not corrected for drift; what the drift did is in no error:\n");
+            text.push_str(
+                "  not corrected for drift; the errors do not include the effect of the drift:\n",
+            );
             set_mean(text, mean);
         }
         (None, None) => {
@@ -142,7 +144,7 @@ fn twist_strain(text: &mut String, found: &TwistStrain, budget: &Budget, reading
             ", without drift"
         },
         if readings.tensor.is_some() {
-            ", if nothing is strained in all directions"
+            ", without isotropic strain"
         } else if readings.layers_differ {
             ", one reading of several"
         } else {
@@ -171,7 +173,7 @@ fn heterostrain(text: &mut String, found: &TwistStrain, budget: &Budget) {
             let _ = writeln!(
                 text,
                 "  heterostrain  below {} (95 %), not significant; the image shows {} % along {}° to x (statistical \
-                 errors), which the calibration alone may make",
+                 errors), which the calibration error alone can explain",
                 below(&all),
                 plus_minus(magnitude.statistical()),
                 plus_minus(axis.scaled(degree))
@@ -257,8 +259,8 @@ fn readings(text: &mut String, readings: &Readings) {
             }
             Some(opposite) => {
                 text.push_str(
-                    "  with the orientation of a layer, the sense of the twist open: these readings are as good as each \
-                     other\n",
+                    "  with the orientation of a layer; the sense of the twist is open, and both readings fit equally \
+                     well:\n",
                 );
                 strain_tensor(text, "either ", &tensor.best, &tensor.in_all(), ratio);
                 strain_tensor(text, "or     ", &opposite.found, &opposite.in_all(), ratio);
@@ -289,7 +291,7 @@ fn readings(text: &mut String, readings: &Readings) {
     if !readings.layers_differ {
         return;
     }
-    text.push_str("  the layers differ: twist and strain trade, and these readings are as good as each other (statistical errors):\n");
+    text.push_str("  the layers differ: these pairs of twist and strain fit equally well (statistical errors):\n");
     for (index, branch) in readings.choices().enumerate() {
         let _ = writeln!(
             text,
@@ -317,7 +319,9 @@ fn names(text: &mut String, naming: &Naming) {
     };
     let by = match naming.chosen_by {
         ChosenBy::LeastStrain => None,
-        ChosenBy::Image => Some("the image: of each other plausible pair one wave is too weak"),
+        ChosenBy::Image => {
+            Some("the image: every other plausible pair has a wave that is too weak")
+        }
         ChosenBy::Orientation => Some("the orientation of a layer"),
         ChosenBy::User => Some("the user"),
     };

@@ -36,7 +36,7 @@ fn the_published_schemas_are_up_to_date() {
         let published: Value = serde_json::from_str(&text).unwrap_or_default();
         assert_eq!(
             published, now,
-            "renew it: cargo run -p moiregauge-report --example schema {name} > \
+            "renew it: cargo run -p moiregauge-pipeline --example schema {name} > \
              crates/moiregauge-report/schema/{name}-1.schema.json"
         );
     }
@@ -347,7 +347,7 @@ fn tables_hold_nothing_that_runs() {
     }
     assert!(marked > 3 && negative > 100, "{marked} {negative}");
     let about = file(&analysis, "columns.md");
-    assert!(about.contains("has an apostrophe before it: take one off"));
+    assert!(about.contains("gets an apostrophe in front"));
 }
 
 #[test]

@@ -4,7 +4,7 @@ import { execFileSync, spawn } from "node:child_process";
 import { cpSync, existsSync, mkdirSync, readdirSync, writeFileSync } from "node:fs";
 import { createServer } from "node:net";
 import { join } from "node:path";
-import { chromium } from "playwright-core";
+import { chromium, firefox } from "playwright-core";
 
 export const PROGRAM = process.env.PROGRAM ?? "moiregauge";
 export const WORK = process.env.WORK ?? "/tmp";
@@ -85,6 +85,8 @@ export async function serve(folders, options = {}) {
 let browser = null;
 
 export async function theBrowser() {
+  // A Firefox as it is, by WebDriver BiDi: the newest playwright-core asks for more than the long-term version of Firefox knows.
+  if (process.env.FIREFOX) return (browser ??= await firefox.launch({ channel: "moz-firefox", executablePath: process.env.FIREFOX }));
   browser ??= await chromium.launch({ executablePath: process.env.CHROMIUM, args: ["--no-sandbox", "--disable-dev-shm-usage"] });
   return browser;
 }

@@ -42,7 +42,7 @@ test("a map is made, read with the keyboard, and asked about a region", async ()
   await page.keyboard.press("Shift+ArrowRight");
   await page.waitForFunction((text) => [...document.querySelectorAll("#view-maps tr")].some((r) => /** @type {HTMLElement} */ (r).innerText.startsWith("region 1") && /** @type {HTMLElement} */ (r).innerText !== text), before);
   await page.getByRole("button", { name: "Add profile" }).click();
-  await page.getByText("Nodes along profile").waitFor();
+  await page.getByText("Along profile").waitFor();
   await page.getByLabel("Quantity").selectOption({ index: 1 });
   assert.deepEqual(page.wrong, []);
   await page.leave();

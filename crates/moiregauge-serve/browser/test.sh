@@ -2,9 +2,11 @@
 # Tests of the page in a real browser: test.sh PROGRAM [FILTER]
 #
 # PROGRAM is moiregauge. Libraries go into a temporary folder (kept in $BROWSER_MODULES if that is set), the browser
-# is Debian's chromium ($CHROMIUM names another one). Screenshots of all views go to $SCREENSHOTS if it is set.
+# is Debian's chromium ($CHROMIUM names another one). Where there is Debian's Firefox ($FIREFOX), the views are tried in it,
+# too; what needs downloads or emulation is not, since these are not to be had of a Firefox as it is. Screenshots of all views go to $SCREENSHOTS if it is set.
 # Ends with 77 where something is missing that is no part of the project.
 set -eu
+IN_FIREFOX='a scan is shown|scans are analysed|that is dragged|arrow keys|painted|a map is made'
 [ $# -ge 1 ] || { echo "usage: test.sh PROGRAM [FILTER]" >&2; exit 2; }
 program=$(realpath "$1")
 here=$(cd "$(dirname "$0")" && pwd)
@@ -28,5 +30,18 @@ fi
 mkdir -p "$work/tests"
 cp "$here"/*.mjs "$work/tests/"
 ln -s "$modules/node_modules" "$work/tests/node_modules"
-PROGRAM=$program CHROMIUM=$chromium PAGE=$(cd "$here/../page" && pwd) WORK=$work \
-  node --test --test-concurrency=1 --test-timeout=400000 ${2:+--test-name-pattern="$2"} "$work"/tests/*.test.mjs
+firefox=${FIREFOX:-$(command -v firefox-esr || true)}
+PROGRAM=$program CHROMIUM=$chromium PAGE=$(cd "$here/../page" && pwd) WORK=$work
+export PROGRAM CHROMIUM PAGE WORK
+unset FIREFOX
+run() {
+  node --test --test-concurrency=1 --test-timeout=400000 ${1:+--test-name-pattern="$1"} "$work"/tests/*.test.mjs
+}
+run "${2:-}"
+if [ -n "$firefox" ] && [ $# -eq 1 ]; then
+  echo "# in Firefox"
+  FIREFOX=$firefox WORK=$work/firefox
+  export FIREFOX
+  mkdir "$WORK"
+  run "$IN_FIREFOX"
+fi

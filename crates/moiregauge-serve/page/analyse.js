@@ -123,7 +123,7 @@ export class AnalyseView {
     const share = p?.of ? Math.min(1, (p.done ?? 0) / p.of) : 0;
     this.bar.style.width = `${100 * share}%`;
     this.bar.setAttribute("aria-valuenow", String(Math.round(100 * share)));
-    const words = { running: p?.stage ? `${first(p.stage)}${p.of ? `, ${p.done} of ${p.of}` : ""}` : "Running", cancelled: "Cancelled.", done: work.is?.result?.saved ? "Done and saved." : "Done.", idle: "" }[state ?? "idle"];
+    const words = { running: p?.stage ? `${first(p.stage)}${p.of ? `, ${p.done} of ${p.of}` : ""}` : "Running", cancelled: "Cancelled.", done: work.is?.result?.unsaved ? `Done, but ${work.is.result.unsaved}` : work.is?.result?.saved ? "Done and saved." : "Done.", idle: "" }[state ?? "idle"];
     this.stage.textContent = state === "failed" ? "" : words ?? "";
     if (state === "failed") this.showFailure();
   }
@@ -171,7 +171,7 @@ export class AnalyseView {
   async showResults() {
     const results = work.results;
     if (!results) {
-      fill(this.results, empty("Results stand here after an analysis: twist, heterostrain and drift with their errors, what contributes to them, and what to doubt."));
+      fill(this.results, empty("Results appear here after an analysis: twist, heterostrain and drift with their errors, the uncertainty budget, and caveats."));
       return;
     }
     const found = meanOf(results, this.set);
@@ -192,7 +192,7 @@ export class AnalyseView {
       results.caveats?.length ? h("section", { "aria-label": "Caveats" }, h("h3", { text: `${results.caveats.length} ${results.caveats.length === 1 ? "caveat" : "caveats"}` }), caveats) : null,
       this.pictures,
       h("section", { class: "section" }, h("h2", { text: "Scan by scan" }), this.plots.element),
-      found ? h("section", { class: "section" }, h("h2", { text: "Where the error comes from" }), scroll("Budget of errors", budgetTable(found.mean))) : null,
+      found ? h("section", { class: "section" }, h("h2", { text: "Where the error comes from" }), scroll("Uncertainty budget", budgetTable(found.mean))) : null,
       h("section", { class: "section" }, h("h2", { text: "Figures of the report" }), this.figures()));
     this.plots.show(scans);
     this.list.show(this.picked);

@@ -1,9 +1,12 @@
 // Correct: say by hand which lattice is meant, where it is, and which scans count. The result follows.
 
+import { get, query } from "./api.js";
 import { byHandList } from "./handlist.js";
 import { cornerNm, cornerPx, reciprocal, someLattice, toNm, withByHand } from "./byhand.js";
+import { grainList, grainSets, readingList } from "./choices.js";
 import { empty, field, fill, h, s, say } from "./dom.js";
 import { total } from "./format.js";
+import { maskOf, maskPath, paint, usedOf } from "./mask.js";
 import { Marker } from "./markers.js";
 import { brightPlace, drawLattice, drawSpots, firstShell, frameSpots, nearMiddle, spotPlace, waveAt } from "./overlay.js";
 import { overlayOf, showScan, showSpectrum } from "./pictures.js";
@@ -26,16 +29,22 @@ export class CorrectView {
     /** Regions while a corner is being moved, px. @type {{x: number, y: number}[][] | null} */
     this.movedRegions = null;
     this.body = h("div", {});
-    this.none = empty("Analyse scans first; what was found can then be corrected here.");
+    this.none = empty("Analyse scans first. Then you can correct the lattice here.");
     /** @type {Marker[]} */
     this.markers = [];
     /** Corners of a region that is being drawn, px. @type {{x: number, y: number}[] | null} */
     this.drawing = null;
+    /** Pixels that are used, from the first stroke until the program has answered to the last. @type {Uint8Array | null} */
+    this.painted = null;
+    /** Counts strokes: an answer to one may come while the next is painted. */
+    this.strokes = 0;
+    /** What the brush does: leave out, use again. @type {0 | 1 | null} */
+    this.brush = null;
     /** @type {ReturnType<typeof setTimeout> | undefined} */
     this.wait = undefined;
     this.before = "";
-    this.image = new Viewer("Scan, with the lattice that can be moved");
-    this.spectrum = new Viewer("Transform, with the spots that can be moved", { scaleBar: false });
+    this.image = new Viewer("Scan with the lattice, which you can move");
+    this.spectrum = new Viewer("Transform with the spots, which you can move", { scaleBar: false });
     this.regions = s("g", {});
     this.image.overlay.insertBefore(this.regions, this.image.ruler);
     this.image.addEventListener("view", () => this.draw());
@@ -46,6 +55,8 @@ export class CorrectView {
     this.hand = h("ul", { class: "byhand" });
     this.near = h("input", { type: "number", min: 0, step: "any", onchange: () => this.tell({ near_nm: Number(this.near.value) > 0 ? Number(this.near.value) : null }, "Mean wavelength set") });
     this.result = h("div", { "aria-live": "polite" });
+    this.choices = h("div", {});
+    this.brushNm = h("input", { type: "number", min: 0, step: "any", "aria-label": "Width of the brush (nm)" });
     this.state = h("p", { class: "stage-words", role: "status" });
     this.regionTools = h("div", { class: "toolbar", role: "toolbar", "aria-label": "Regions" });
     this.help = h("p", { class: "hint" });
@@ -58,7 +69,7 @@ export class CorrectView {
   }
 
   left() {
-    return h("section", { "aria-label": "What was done by hand" },
+    return h("section", { "aria-label": "Choices made by hand" },
       h("h2", { text: "Scans" }), this.list.element,
       h("h3", { text: "Done by hand" }), this.hand,
       h("div", { class: "buttons" }, this.undo, this.redo),
@@ -70,7 +81,7 @@ export class CorrectView {
     fill(this.body,
       h("div", { class: "bar" }, h("h2", { text: "Lattice and regions" }), this.regionTools),
       h("div", { class: "panels" }, panel("Drag the yellow ends of the two vectors", this.image),
-        panel("Or the spots of the transform", this.spectrum), h("div", { class: "outcome" }, this.result, this.help)));
+        panel("Or the spots of the transform", this.spectrum), h("div", { class: "outcome" }, this.result, this.choices, this.help)));
     return h("section", { class: "middle", "aria-label": "Corrections" }, this.none, this.body);
   }
 
@@ -117,6 +128,7 @@ export class CorrectView {
       if (file !== this.picked) return;
       if (this.overlay && !this.overlay.origin_px) this.overlay.origin_px = brightPlace(this.image, this.overlay.lattice_px);
       this.place();
+      this.showChoices();
       document.documentElement.dataset.correct = `${file} ${work.version}`;
     } catch (error) {
       this.image.clear(/** @type {Error} */ (error).message);
@@ -134,11 +146,11 @@ export class CorrectView {
     this.list.element.hidden = !is;
     this.undo.disabled = !is?.can_undo;
     this.redo.disabled = !is?.can_redo;
-    this.state.textContent = is?.state === "running" ? `${work.progress?.stage ?? "Calculating"} …` : is?.state === "failed" ? `No result with this: ${is.error ?? ""}` : "";
+    this.state.textContent = is?.state === "running" ? `${work.progress?.stage ?? "Calculating"} …` : is?.state === "failed" ? `No result with these choices: ${is.error ?? ""}` : "";
     if (!is) return;
     this.list.show(this.picked);
     if (document.activeElement !== this.near) this.near.value = String(is.settings?.by_hand?.near_nm ?? "");
-    fill(this.hand, byHandList(is, (change, words) => this.tell(change, words), (excluded) => this.guard(work.change({ excluded }))));
+    fill(this.hand, byHandList(is, (change, words) => this.tell(change, words), (excluded) => this.guard(work.change({ excluded })), () => this.chooseReading(null), () => this.chooseGrain(null)));
     this.showRegionTools();
     this.draw();
   }
@@ -148,13 +160,49 @@ export class CorrectView {
     const now = found ? `twist ${total(found.mean?.twist_deg, "°")}, heterostrain ${total(found.mean?.heterostrain_percent, "%")}` : "";
     fill(this.result, found ? headline(found) : null, this.before && this.before !== now ? h("p", { class: "change", text: `Before: ${this.before}` }) : null);
     if (now) this.before = now;
+    this.showChoices();
     // A handle that is being moved stays under the hand.
     if (this.picked && !this.wait) this.load(true);
+  }
+
+  /** Other readings of the lattice, and other grains of the scan. */
+  async showChoices() {
+    const [file, version] = [this.picked, work.version];
+    const names = work.id ? await get(`works/${work.id}/names${work.moire > 1 ? query({ moire: work.moire }) : ""}`).catch(() => []) : [];
+    const grains = this.overlay?.grains ?? [];
+    if (file !== this.picked || version !== work.version) return;
+    const open = this.choices.querySelector("details")?.open ?? false;
+    fill(this.choices, grainSets(work.results?.sets ?? [], (grain) => this.chooseGrain(grain)), grainList(grains, () => this.startDrawing()), readingList(names, (waves) => this.chooseReading(waves)));
+    const list = this.choices.querySelector("details");
+    if (list) list.open = open;
+  }
+
+  /** @param {number[][] | null} waves */
+  chooseReading(waves) {
+    say(waves ? "Reading chosen" : "Reading left to the program");
+    this.choose("moire_waves", waves);
+  }
+
+  /** @param {number | null} grain */
+  chooseGrain(grain) {
+    say(grain ? `Grain ${grain} alone` : "All grains");
+    this.choose("grain", grain);
+  }
+
+  /** A setting that is chosen, or left to the program. @param {string} key @param {any} value */
+  choose(key, value) {
+    this.guard(work.change((/** @type {any} */ settings) => {
+      const { [key]: _, ...rest } = settings ?? {};
+      return { settings: value === null ? rest : { ...rest, [key]: value } };
+    }));
   }
 
   draw() {
     drawLattice(this.image.drawing, this.image, this.draft ?? this.overlay);
     fill(this.regions);
+    const size = this.size();
+    const mask = work.is?.settings?.by_hand?.mask;
+    if (this.image.image && (mask || this.painted)) this.regions.append(s("path", { d: maskPath(this.image, this.painted ?? usedOf(mask, ...size), size), class: "left-out" }));
     const rings = this.regionsPx();
     const at = (/** @type {{x: number, y: number}} */ p) => {
       const q = this.image.toScreen(p.x, p.y);
@@ -162,6 +210,11 @@ export class CorrectView {
     };
     for (const ring of rings) this.regions.append(s("polygon", { points: ring.map(at).join(" "), class: "region" }));
     if (this.drawing) this.regions.append(s("polyline", { points: this.drawing.map(at).join(" "), class: "outline" }));
+  }
+
+  /** Columns and rows of the scan. @returns {[number, number]} */
+  size() {
+    return [this.image.columns, this.image.rows];
   }
 
   /** Regions as they stand, with those corners that are being moved. @returns {{x: number, y: number}[][]} */
@@ -224,7 +277,7 @@ export class CorrectView {
   /** Waits for the last of several key strokes. @param {[Pair, Pair]} vectors px */
   tellLattice(vectors) {
     const lattice_nm = vectors.map((v) => toNm(this.image, this.overlay, v).map((x) => Number(x.toPrecision(7))));
-    this.later(() => this.tell({ lattice_nm }, "Lattice told by hand"));
+    this.later(() => this.tell({ lattice_nm }, "Lattice given by hand"));
   }
 
   /** @param {() => void} action */
@@ -243,7 +296,7 @@ export class CorrectView {
    */
   tell(change, words) {
     say(words);
-    this.guard(work.change({ settings: withByHand(work.is?.settings, change) }));
+    this.guard(work.change((/** @type {any} */ settings) => ({ settings: withByHand(settings, change) })));
   }
 
   placeCorners() {
@@ -277,11 +330,19 @@ export class CorrectView {
       this.help.textContent = "Click the corners of the region; the first corner again, or Enter, closes it.";
       return;
     }
+    if (this.brush !== null) {
+      const other = /** @type {0 | 1} */ (1 - this.brush);
+      fill(this.regionTools, h("span", { class: "soft", text: this.brush === 0 ? "Painting out" : "Painting back" }), this.brushNm,
+        h("button", { type: "button", text: other === 0 ? "Paint out" : "Paint back", onclick: () => this.startPainting(other) }), h("button", { type: "button", text: "Stop painting", onclick: () => this.stopDrawing() }));
+      this.help.textContent = "Drag over what is not to be used; the field is the width of the brush in nm. Every stroke is told to the program. Without a mouse, a rectangle says what to use.";
+      return;
+    }
     fill(this.regionTools,
+      h("button", { type: "button", text: "Paint a mask", onclick: () => this.startPainting(0) }),
       h("button", { type: "button", text: "Draw region", onclick: () => this.startDrawing() }),
       h("button", { type: "button", text: "Add rectangle", onclick: () => this.addRectangle() }),
       n > 0 ? h("button", { type: "button", text: "Remove regions", onclick: () => this.tell({ regions_nm: null }, "Regions removed") }) : null);
-    this.help.textContent = "Handles move with the mouse or, once they have the focus, with the arrow keys (Shift: ten times as far). Delete removes a corner. Ctrl+Z takes a step back.";
+    this.help.textContent = "Move handles with the mouse, or select one and use the arrow keys (Shift: ten times as far). Delete removes a corner. Ctrl+Z undoes the last step.";
   }
 
   /** A region for those who use no mouse: the middle of the frame, whose corners move with the arrow keys. */
@@ -289,6 +350,50 @@ export class CorrectView {
     const [w, t] = [this.image.columns, this.image.rows];
     const ring = [[0.2, 0.2], [0.8, 0.2], [0.8, 0.8], [0.2, 0.8]].map(([x, y]) => ({ x: x * w, y: y * t }));
     this.tellRegions([...this.regionsPx(), ring]);
+  }
+
+  /** @param {0 | 1} value */
+  startPainting(value) {
+    this.brush = value;
+    const size = this.size();
+    if (!(Number(this.brushNm.value) > 0)) this.brushNm.value = String(Number(((size[0] * this.image.pixelX) / 12).toPrecision(2)));
+    /** @type {{x: number, y: number}} */
+    let last = { x: 0, y: 0 };
+    const dab = (/** @type {{x: number, y: number}} */ at) => {
+      const used = (this.painted ??= usedOf(work.is?.settings?.by_hand?.mask, ...size));
+      paint(used, size, last, at, Math.max(0.5, Number(this.brushNm.value) / this.image.pixelX / 2), value);
+      last = at;
+      this.draw();
+    };
+    this.image.tool = {
+      down: (at) => {
+        this.strokes++;
+        last = at;
+        dab(at);
+        return true;
+      },
+      move: (at) => dab(at),
+      up: () => this.tellMask(size, value === 0 ? "Painted out" : "Painted back"),
+    };
+    this.showRegionTools();
+    this.image.canvas.focus();
+  }
+
+  /**
+   * Tells what is painted. It stays until the answer is there, unless the next stroke goes on with it.
+   * @param {[number, number]} size columns and rows
+   * @param {string} words
+   */
+  tellMask(size, words) {
+    if (!this.painted) return;
+    const [mask, stroke] = [maskOf(this.painted, ...size), this.strokes];
+    say(words);
+    const told = work.change((/** @type {any} */ settings) => ({ settings: withByHand(settings, { mask }) }));
+    this.guard(told.finally(() => {
+      if (stroke !== this.strokes) return;
+      this.painted = null;
+      this.draw();
+    }));
   }
 
   startDrawing() {
@@ -323,6 +428,7 @@ export class CorrectView {
 
   stopDrawing() {
     this.drawing = null;
+    this.brush = null;
     this.image.tool = null;
     this.image.canvas.onkeydown = null;
     this.showRegionTools();

@@ -77,7 +77,7 @@ export class FileTree {
       const folders = found.folders.map((/** @type {string} */ name) => this.folder(root, below(name), name, false));
       const files = found.files.map((/** @type {any} */ f) => (f.file ? this.file({ ...f, folder: `${root}/${under}` }) : unreadable(f)));
       fill(inside, folders, files);
-      if (folders.length + files.length === 0) fill(inside, h("li", { class: "hint", text: root === DROPPED ? "Nothing was dropped yet." : "No files." }));
+      if (folders.length + files.length === 0) fill(inside, h("li", { class: "hint", text: root === DROPPED ? "No files were dropped yet." : "No files." }));
       this.showChosen();
       return true;
     } catch (error) {

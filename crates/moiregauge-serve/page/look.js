@@ -82,7 +82,7 @@ export class LookView {
       h("div", { class: "buttons" },
         h("button", { type: "button", text: "Auto", onclick: () => this.contrast.auto() }),
         h("button", { type: "button", text: "Full range", onclick: () => this.contrast.full() })),
-      h("div", { class: "pair" }, field("Colours", colours), field("Level for the eye", level)),
+      h("div", { class: "pair" }, field("Colours", colours), field("Level for display", level)),
       h("h3", { text: "Header" }), search, this.headerHost);
   }
 
@@ -224,7 +224,7 @@ export class LookView {
     const others = (this.info?.channels ?? []).map(channelWords).filter((/** @type {string} */ w) => w !== this.channelName);
     const here = (/** @type {string} */ k) => !others.some((/** @type {string} */ w) => k.startsWith(`${w} · `));
     const rows = (this.header ?? []).filter(([k, v]) => (low === "" ? here(k) : `${k} ${v}`.toLowerCase().includes(low)));
-    if (rows.length === 0) fill(this.headerHost, empty(this.header ? "Nothing of that." : "The header of the file stands here."));
+    if (rows.length === 0) fill(this.headerHost, empty(this.header ? "Nothing found." : "The header of the file appears here."));
     else fill(this.headerHost, h("table", {}, h("caption", { class: "away", text: "Header" }),
       h("tbody", {}, rows.map(([k, v]) => h("tr", {}, h("th", { scope: "row", text: k }), h("td", { text: v }))))));
   }

@@ -113,7 +113,7 @@ function followConnection() {
     }
     was = was || up;
   });
-  onStranger(() => complain("The program was started anew. Open the address that it printed, with everything after the #."));
+  onStranger(() => complain("The program was started again. Open the new address that it printed, with everything after the #."));
 }
 
 /** @param {unknown} error */

@@ -11,6 +11,9 @@ import { Plot } from "./plot.js";
 /** @typedef {{name: string, corners_nm: Pair[]}} Region */
 /** @typedef {{name: string, ends_nm: [Pair, Pair]}} Line */
 
+/** What a line tells: its key in the answer, how the quantity of the map begins, the unit. @type {[string, string, string][]} */
+const PROFILED = [["twist_deg", "twist", "°"], ["heterostrain_percent", "strain", "%"], ["wavelength_nm", "wavelength", "nm"]];
+
 export class Asked {
   /**
    * @param {MapsView} view
@@ -23,6 +26,8 @@ export class Asked {
     this.regions = [];
     /** @type {Line[]} */
     this.profiles = [];
+    /** What the program answers of them. @type {any[]} */
+    this.lines = [];
     /** @type {Marker[]} */
     this.markers = [];
     /** @type {ReturnType<typeof setTimeout> | undefined} */
@@ -180,11 +185,10 @@ export class Asked {
     const [w, t] = this.device.map((i) => Number(i.value));
     const [twist, within] = this.wanted.map((i) => Number(i.value));
     /** @type {any} */
-    const questions = { regions: this.regions };
+    const questions = { regions: this.regions, profiles: this.profiles };
     if (w > 0 && t > 0) questions.device = { size_nm: [w, t] };
     if (twist !== 0 && within > 0) questions.wanted = { twist_deg: twist, within_deg: within };
-    this.showProfile();
-    if (this.regions.length === 0 && Object.keys(questions).length === 1) return this.show({});
+    if (this.regions.length + this.profiles.length === 0 && Object.keys(questions).length === 2) return this.show({});
     try {
       this.show(await send("POST", `maps/${this.view.map.map}/ask`, questions));
     } catch (error) {
@@ -203,6 +207,8 @@ export class Asked {
       devices.length > 0 ? scroll("Most uniform areas", this.deviceTable(devices)) : null,
       answer.wanted ? scroll("Area with the wanted twist", table("Area with the wanted twist", ["Number", "Value"], Object.entries(answer.wanted).filter(([, v]) => typeof v === "number").map(([k, v]) => [k.replace(/_percent$/, " (%)").replace(/_deg$/, " (°)").replace(/_/g, " "), number(/** @type {number} */ (v))]), { shown: true })) : null,
       (answer.caveats ?? []).map((/** @type {any} */ c) => h("p", { class: "caveat warning" }, `${c.message}. `, h("span", { class: "where", text: c.where }))));
+    this.lines = answer.profiles ?? [];
+    this.showProfile();
     this.devices = devices.map((/** @type {any} */ d) => ({ name: String(d.rank), corners_nm: d.area.corners_nm }));
     this.draw();
   }
@@ -214,30 +220,16 @@ export class Asked {
     return table("Most uniform areas", ["Rank", "Middle (nm)", "Angle (°)", "Twist (°)", "Spread below, 95 % (°)", "Masked"], rows, { numbers: [2, 3, 4, 5], shown: true });
   }
 
-  /** The nodes below the last line: what the map shows there, nothing in between. */
+  /** The last line, as the program tells it: between nodes, and empty where one of them is masked. */
   showProfile() {
-    const line = this.profiles.at(-1);
-    const { values, sigmas, quantity } = this.view;
+    const line = this.lines.at(-1);
     this.profilePlot.element.hidden = !line;
-    if (!line || !values || !quantity) return;
-    const [a, b] = line.ends_nm.map((end) => this.view.node(end));
-    const length = Math.hypot(line.ends_nm[1][0] - line.ends_nm[0][0], line.ends_nm[1][1] - line.ends_nm[0][1]);
-    const steps = Math.max(1, Math.round(Math.max(Math.abs(b.x - a.x), Math.abs(b.y - a.y))));
-    const x = [];
-    /** @type {(number | null)[]} */
-    const y = [];
-    /** @type {(number | null)[]} */
-    const sigma = [];
-    for (let n = 0; n <= steps; n++) {
-      const [i, j] = [Math.round(a.x + ((b.x - a.x) * n) / steps), Math.round(a.y + ((b.y - a.y) * n) / steps)];
-      const inside = i >= 0 && j >= 0 && i < values.width && j < values.height;
-      const value = inside ? values.data[j * values.width + i] : NaN;
-      const error = inside && sigmas ? sigmas.data[j * values.width + i] : NaN;
-      x.push((length * n) / steps);
-      y.push(Number.isNaN(value) ? null : value);
-      sigma.push(Number.isNaN(error) ? null : error);
-    }
-    this.profilePlot.set({ title: `Nodes along ${line.name}: ${quantity.name}`, x, xLabel: "Distance", xUnit: "nm", series: [{ label: quantity.name, unit: quantity.unit, y, sigma }] });
+    if (!line) return;
+    const { name } = this.view.quantity ?? { name: "" };
+    const [key, label, unit] = PROFILED.find(([, words]) => name.startsWith(words)) ?? PROFILED[0];
+    const of = (/** @type {"value" | "sigma"} */ part) => line.points.map((/** @type {any} */ p) => p[key]?.[part] ?? null);
+    this.profilePlot.set({ title: `Along ${line.name}: ${label}`, x: line.points.map((/** @type {any} */ p) => p.distance_nm), xLabel: "Distance", xUnit: "nm",
+      series: [{ label, unit, y: of("value"), sigma: of("sigma") }] });
   }
 }
 

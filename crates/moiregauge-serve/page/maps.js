@@ -51,7 +51,7 @@ export class MapsView {
     this.titles = ["Map", "One standard deviation", "Mask"].map((text) => h("figcaption", { text }));
     this.errorBar = h("div", { class: "colourbar" });
     this.legend = h("div", { class: "legend" });
-    this.none = empty("A map of twist and strain across a scan stands here. Choose a scan and make it.");
+    this.none = empty("The map of twist and strain across a scan appears here. Choose a scan and make the map.");
     this.body = h("div", {});
     this.linkViewers();
     this.contrast = new Contrast((range) => this.main.setLook(range), "colours");
@@ -92,7 +92,7 @@ export class MapsView {
   left() {
     return h("section", { "aria-label": "Map to make" }, h("h2", { text: "Map" }), field("Scan", this.file),
       h("div", { class: "pair" }, field("Window σ (nm)", this.windowNm), field("Distance of nodes (nm)", this.stepNm)), field("Method", this.method),
-      h("p", { class: "hint", text: "Layers, channel and seed are those of Analyse." }),
+      h("p", { class: "hint", text: "Layers, channel and seed are taken from Analyse." }),
       h("div", { class: "buttons" }, this.run, this.cancel), this.barBox, this.state, this.info);
   }
 
@@ -291,7 +291,7 @@ export class MapsView {
       fill(this.errorBar, number(0), bar("cividis"), withUnit(high, found.unit, 2));
       if (low === high) this.error.setLook({ low: low - 1, high: high + 1 });
     } else {
-      this.error.clear("No error of its own");
+      this.error.clear("This quantity has no error");
       fill(this.errorBar);
     }
     this.placeCursor();

@@ -26,19 +26,19 @@ export class MoireView {
     this.cell = h("section", { "aria-label": "Moiré", "aria-live": "polite" });
     this.plan = h("section", { "aria-label": "Plan" });
     /** @type {[string, HTMLInputElement][]} */
-    this.wishes = [["twist_deg", "Twist (°)"], ["strain_percent", "Strain (%)"], ["drift_nm_per_min", "Drift (nm/min)"]].map(([key, label]) => [key, h("input", { type: "number", min: 0, step: "any", "aria-label": `Wished error of the ${label}`, placeholder: "any", value: key === "twist_deg" ? 0.02 : "" })]);
+    this.wishes = [["twist_deg", "Twist (°)"], ["strain_percent", "Strain (%)"], ["drift_nm_per_min", "Drift (nm/min)"]].map(([key, label]) => [key, h("input", { type: "number", min: 0, step: "any", "aria-label": `Wanted error of the ${label}`, placeholder: "any", value: key === "twist_deg" ? 0.02 : "" })]);
     this.maxSize = h("input", { type: "number", min: 0, step: "any", placeholder: "as usual" });
     this.maxRate = h("input", { type: "number", min: 0, step: "any", placeholder: "as usual" });
     this.planState = h("p", { class: "stage-words", role: "status" });
     this.element = h("div", { class: "columns" },
-      h("section", { "aria-label": "Layers and wishes" }, h("h2", { text: "Layers" }),
+      h("section", { "aria-label": "Layers and plan" }, h("h2", { text: "Layers" }),
         h("div", { class: "pair" }, field("Upper layer (2)", this.upper), field("Lower layer (1)", this.lower)), SLIDERS.map((x) => this.slider(x)),
-        h("h2", { text: "Plan" }), h("p", { class: "hint", text: "Errors that are wished, with the sample above and the usual instrument." }),
+        h("h2", { text: "Plan" }), h("p", { class: "hint", text: "Errors that you want, for the sample above and the default instrument." }),
         this.wishes.map(([key, input]) => field({ twist_deg: "σ of the twist (°)", strain_percent: "σ of the strain (%)", drift_nm_per_min: "σ of the drift (nm/min)" }[key] ?? key, input)),
         h("div", { class: "pair" }, field("Largest frame (nm)", this.maxSize), field("Fastest (Hz)", this.maxRate)),
         h("div", { class: "buttons" }, h("button", { type: "button", class: "main", text: "Plan", onclick: () => this.askPlan() })), this.planState),
       h("section", { class: "middle" }, this.cell, this.plan));
-    fill(this.plan, empty("A plan stands here: how many scans, how fast and how large."));
+    fill(this.plan, empty("The plan appears here: how many scans, how fast and how large."));
     this.asked = 0;
     this.ask();
   }
@@ -99,7 +99,7 @@ export class MoireView {
     const wishes = Object.fromEntries(this.wishes.map(([key, input]) => [key, positive(input)]));
     const { twist_deg, strain_percent, strain_axis_deg, biaxial_percent } = this.values;
     const sample = { ...this.layers(), twist_deg, strain_percent, strain_axis_deg, biaxial_percent };
-    this.planState.textContent = "Looking for frames …";
+    this.planState.textContent = "Searching for a plan …";
     try {
       this.showPlan(await send("POST", "plan", { wishes, conditions: { sample }, max_size_nm: positive(this.maxSize), max_rate_hz: positive(this.maxRate) }));
       this.planState.textContent = "";
@@ -115,9 +115,9 @@ export class MoireView {
     const plans = answer.plans ?? [];
     const expected = (/** @type {any} */ e) => `${number(e.statistical, 2)} (${number(e.total, 2)})`;
     const rows = plans.map((/** @type {any} */ p, /** @type {number} */ i) => [
-      i === 0 && p.met ? "recommended" : p.met ? "" : "misses a wish", String(p.set.raster.scans), number(p.set.raster.line_rate_hz, 3), p.size_nm.map((/** @type {number} */ x) => number(x, 3)).join(" × "),
+      i === 0 && p.met ? "recommended" : p.met ? "" : "misses a wanted error", String(p.set.raster.scans), number(p.set.raster.line_rate_hz, 3), p.size_nm.map((/** @type {number} */ x) => number(x, 3)).join(" × "),
       number(p.duration_s / 60, 3), number(p.drift_sigma_nm_per_min, 2), expected(p.twist_sigma_deg), expected(p.strain_sigma_percent), (p.limited_by ?? "").replace(/-/g, " ")]);
-    const beyond = (plans[0]?.out_of_reach ?? []).map((/** @type {any} */ o) => h("p", { class: "caveat warning", text: `The wish for the ${o.is_twist ? "twist" : "strain"} cannot be reached by scans: ${o.largest.replace(/-/g, " ")} and the like alone make ${number(o.floor, 2)} ${o.is_twist ? "°" : "%"}.` }));
+    const beyond = (plans[0]?.out_of_reach ?? []).map((/** @type {any} */ o) => h("p", { class: "caveat warning", text: `The wanted error of the ${o.is_twist ? "twist" : "strain"} is out of reach: calibration and model alone, mostly ${o.largest.replace(/-/g, " ")}, give ${number(o.floor, 2)} ${o.is_twist ? "°" : "%"}.` }));
     fill(this.plan, h("h2", { text: "Plan" }), beyond,
       rows.length > 0 ? scroll("Plans", table("Errors are statistical, and in brackets with calibration and model", ["Plan", "Scans", "Hz", "Frame (nm)", "Minutes", "σ drift (nm/min)", "σ twist (°)", "σ strain (%)", "Limited by"], rows, { numbers: [1, 2, 3, 4, 5, 6, 7], shown: true })) : empty("No plan within these limits."));
   }

@@ -6,7 +6,7 @@ import { fill, s } from "./dom.js";
 /** @typedef {import("./viewer.js").Viewer} Viewer */
 /** @typedef {[number, number]} Pair */
 /** @typedef {{line?: string, origin_px?: Pair, lattice_px: [Pair, Pair], lattice_nm?: [Pair, Pair],
- *   outline_px?: [Pair, Pair][]}} Overlay the outline is a set of sides; the origin is that of the drawing */
+ *   outline_px?: [Pair, Pair][], grains?: {share: number, lattice_nm: number[][]}[]}} Overlay the outline is a set of sides; the origin is that of the drawing */
 
 /** At most this many cells are drawn; more would hide the image. */
 const MOST = 4000;

@@ -86,8 +86,9 @@ export async function showPart(viewer, what, file) {
  */
 export async function overlayOf(file) {
   try {
-    const { lines } = await get(work.picture("overlay", file));
-    return lines.find((/** @type {any} */ l) => l.line === "trace") ?? lines[0] ?? null;
+    const { lines, grains } = await get(work.picture("overlay", file));
+    const line = lines.find((/** @type {any} */ l) => l.line === "trace") ?? lines[0];
+    return line ? { ...line, grains } : null;
   } catch {
     return null;
   }

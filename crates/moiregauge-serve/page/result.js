@@ -58,7 +58,7 @@ export function headline(found) {
     item("Heterostrain ε", total(mean?.heterostrain_percent, "%"), interval ? `95 %: ${number(interval[0])} to ${number(interval[1])} % (statistical)` : statistical(mean?.heterostrain_percent, "%")),
     item("Axis of tension, to x", axis ? total(axis, "°") : "not significant", axis ? statistical(axis, "°") : null),
     drift ? lines(drift.given ? "Drift, as given" : "Drift", [["x", total(drift.x_nm_per_min, "nm/min")], ["y", total(drift.y_nm_per_min, "nm/min")]])
-      : item("Drift", "not determined", "Twist and strain are not corrected for it", true),
+      : item("Drift", "not determined", "Twist and strain are not corrected for drift", true),
     lines("Wavelengths, angles to x", (mean?.vectors ?? []).map((/** @type {any} */ v) => [total(v.wavelength_nm, "nm"), `at ${number(v.polar_angle_deg, 4)}°`])));
 }
 

@@ -38,9 +38,9 @@ export class SamplesView {
     this.trendBar = h("div", { hidden: true }, field("Trend of", this.quantity));
     this.element = h("div", { class: "columns" },
       h("section", { "aria-label": "Campaign" }, h("h2", { text: "Samples" }), field("Folder of results", this.folder), this.trendBar,
-        h("p", { class: "hint", text: "Columns sort by their heads. Tick two samples to see them side by side." })),
+        h("p", { class: "hint", text: "Click the head of a column to sort. Tick two samples to see them side by side." })),
       h("section", { class: "middle", "aria-label": "Samples" }, this.host, this.trend.element, this.compare));
-    fill(this.host, empty("Choose the folder that moiregauge campaign wrote its results to: one row for each sample, with a picture."));
+    fill(this.host, empty("Choose the folder with the results of moiregauge campaign. You see one row for each sample, with a picture."));
   }
 
   async shown() {
@@ -75,7 +75,7 @@ export class SamplesView {
     } catch (error) {
       const e = /** @type {import("./api.js").ApiError} */ (error);
       this.table = { columns: [], rows: [], thumbs: [], root, under };
-      fill(this.host, empty(e.missing ? "This version of the program does not serve campaigns." : [e.message, e.what].filter(Boolean).join(" ")));
+      fill(this.host, empty(e.missing ? "This version of the program cannot show campaigns." : [e.message, e.what].filter(Boolean).join(" ")));
     }
     if (this.table.rows.length > 0) this.show();
     fill(this.compare);
@@ -140,7 +140,7 @@ export class SamplesView {
     this.show();
     const rows = [...this.pair].map((n) => this.table.rows.find((r) => r.sample === n)).filter(Boolean);
     if (rows.length < 2) {
-      fill(this.compare, rows.length === 1 ? empty("Choose one more to see the two side by side.") : null);
+      fill(this.compare, rows.length === 1 ? empty("Choose one more sample to see the two side by side.") : null);
       return;
     }
     fill(this.compare, rows.map((row) => h("section", { class: "section", "aria-label": String(row.sample) }, h("h2", { text: row.sample }), this.thumb(row),

@@ -31,15 +31,15 @@ export class ScanPlots {
     };
     const usual = { x, names, xLabel: "Scan", pick, height: 180 };
     const vectors = [0, 1, 2].map((k) => ({ label: `L${k + 1}`, unit: "nm", ...of((s) => (s.vectors?.[k]?.drift_corrected ?? s.vectors?.[k]?.sensor ?? s.vectors?.[k]?.nominal)?.wavelength_nm) }));
-    this.put("twist", { ...usual, title: "Twist of each scan, drift taken out", series: [{ label: "θ", unit: "°", ...of((s) => strain(s)?.twist_deg) }] });
-    this.put("strain", { ...usual, title: "Heterostrain of each scan, drift taken out", series: [{ label: "ε", unit: "%", ...of((s) => strain(s)?.heterostrain_percent) }] });
-    this.put("raw", { ...usual, title: "Twist as scanned and with drift taken out", series: [
+    this.put("twist", { ...usual, title: "Twist of each scan, drift removed", series: [{ label: "θ", unit: "°", ...of((s) => strain(s)?.twist_deg) }] });
+    this.put("strain", { ...usual, title: "Heterostrain of each scan, drift removed", series: [{ label: "ε", unit: "%", ...of((s) => strain(s)?.heterostrain_percent) }] });
+    this.put("raw", { ...usual, title: "Twist before and after the drift is removed", series: [
       { label: "as scanned", unit: "°", ...of((s) => (s.twist_strain?.sensor ?? s.twist_strain?.nominal)?.twist_deg) },
       { label: "corrected", unit: "°", ...of((s) => s.twist_strain?.drift_corrected?.twist_deg) }] });
     this.put("wavelengths", { ...usual, title: "Wavelengths of each scan", series: vectors });
     const off = (/** @type {number} */ k) => scans.map((s) => (s.scan.residual?.displacement_nm?.[k] ?? null) === null ? null : 1000 * s.scan.residual.displacement_nm[k]);
     if (scans.some((s) => s.scan.residual)) {
-      this.put("residual", { ...usual, title: "What the joint fit leaves", series: [{ label: "x", unit: "pm", y: off(0) }, { label: "y", unit: "pm", y: off(1) }] });
+      this.put("residual", { ...usual, title: "Residuals of the joint fit", series: [{ label: "x", unit: "pm", y: off(0) }, { label: "y", unit: "pm", y: off(1) }] });
     }
     const noise = (/** @type {number} */ k) => scans.map((s) => s.scan.lines?.[k]?.signal_to_noise ?? null);
     const lines = [...new Set(scans.flatMap((s) => (s.scan.lines ?? []).map((/** @type {any} */ l) => l.line)))];

@@ -31,7 +31,7 @@ export class TakeView {
     if (mine !== this.asked) return;
     fill(this.body,
       h("p", { class: "buttons" }, h("a", { class: "button", href: `/api/${work.path("archive.zip")}`, download: "moiregauge-result.zip", text: "Everything as zip" }),
-        h("span", { class: "hint", text: "results.json, tables, figures and report: what the program would write" })), parts, files);
+        h("span", { class: "hint", text: "results.json, tables, figures and report, as the program writes them" })), parts, files);
     this.outputs().then((found) => mine === this.asked && files.replaceWith(found));
   }
 
@@ -49,7 +49,7 @@ export class TakeView {
         copy.textContent = "Copied";
         setTimeout(() => (copy.textContent = "Copy"), 1500);
       } catch {
-        this.failed("The browser does not let the page copy; select the text instead.");
+        this.failed("The browser does not allow copying; select the text instead.");
       }
     } });
     return h("section", {}, h("div", { class: "bar" }, h("h3", { text: title }), copy), h("p", { class: "hint", text: hint }), h("pre", { tabindex: 0, "aria-label": title }, text));
@@ -58,7 +58,7 @@ export class TakeView {
   async command() {
     try {
       const { command } = await get(work.path("command"));
-      return this.text("Command", command, "Gives the same bytes in a terminal.");
+      return this.text("Command", command, "This command gives the same files in a terminal.");
     } catch (error) {
       return h("section", {}, h("h3", { text: "Command" }), empty(/** @type {Error} */ (error).message));
     }
@@ -67,7 +67,7 @@ export class TakeView {
   async settings() {
     try {
       const text = await (await ask(work.path("settings.toml"))).text();
-      return text.trim() === "" ? h("section", {}, h("h3", { text: "Settings" }), h("p", { class: "hint", text: "All as usual: no file is needed." })) : this.text("Settings", text, "As settings.toml, for --config settings.toml.");
+      return text.trim() === "" ? h("section", {}, h("h3", { text: "Settings" }), h("p", { class: "hint", text: "All settings have their defaults: no file is needed." })) : this.text("Settings", text, "As settings.toml, for --config settings.toml.");
     } catch (error) {
       return h("section", {}, h("h3", { text: "Settings" }), empty(/** @type {Error} */ (error).message));
     }

@@ -30,8 +30,8 @@ export class WatchView {
     this.advice = h("div", {});
     this.element = h("div", { class: "columns" },
       h("section", { "aria-label": "Folder to watch" }, h("h2", { text: "Watch a folder" }), field("Folder", this.folder),
-        field("Stop at an error of", this.of), field("Wished error", this.until), h("div", { class: "buttons" }, this.start, this.stop), this.state,
-        h("p", { class: "hint", text: "New scans are taken as soon as their files are whole. Nothing is written into the folder." })),
+        field("Stop at an error of", this.of), field("Wanted error", this.until), h("div", { class: "buttons" }, this.start, this.stop), this.state,
+        h("p", { class: "hint", text: "New scans are analysed as soon as their files are complete. Nothing is written into the folder." })),
       this.body);
     onHappening("watch", (event) => this.happened(event));
     this.show();
@@ -127,9 +127,9 @@ export class WatchView {
     this.start.disabled = !!going;
     this.stop.disabled = !going;
     const frames = this.watch?.frames ?? [];
-    this.state.textContent = !this.watch ? "" : going ? `Watching; ${frames.length} ${frames.length === 1 ? "result" : "results"}` : words(this.watch.error) || (this.watch.state === "done" ? "The wished error is reached." : "Ended.");
+    this.state.textContent = !this.watch ? "" : going ? `Watching; ${frames.length} ${frames.length === 1 ? "result" : "results"}` : words(this.watch.error) || (this.watch.state === "done" ? "The wanted error is reached." : "Ended.");
     if (!this.watch) {
-      fill(this.body, empty("Choose the folder that the microscope writes to. After each frame twist, heterostrain and drift stand here with their errors, what the next frames would bring, and when to stop."));
+      fill(this.body, empty("Choose the folder that the microscope writes to. After each frame you see twist, heterostrain and drift with their errors, what the next frames would give, and when to stop."));
       return;
     }
     if (this.head.parentElement !== this.body) fill(this.body, this.head, this.advice, h("div", { class: "watch-plots" }, Object.values(this.plots).map((p) => p.element)), h("h3", { text: "Frames" }), this.frames);

@@ -6,7 +6,7 @@ import { store } from "./store.js";
 
 /** @typedef {{work: string, files: string[], names?: Record<string, string>, excluded: string[], settings: any, known?: any,
  *   state: string, can_undo: boolean, can_redo: boolean, error?: string | null, failed?: any[],
- *   result?: {moires: number, current: boolean, saved: boolean} | null}} WorkState */
+ *   result?: {moires: number, current: boolean, saved: boolean, unsaved?: string | null} | null}} WorkState */
 
 class Work extends EventTarget {
   constructor() {
@@ -77,9 +77,15 @@ class Work extends EventTarget {
     await this.take(await get(`works/${work}`));
   }
 
-  /** @param {any} change */
+  /**
+   * Tells a change; one that is made from the settings is a function of them, since a change before it may be under way.
+   * @param {any | ((settings: any) => any)} change
+   */
   change(change) {
-    return this.inTurn(async () => this.take(await send("PATCH", `works/${this.id}`, { run: true, ...change })));
+    return this.inTurn(async () => {
+      const told = typeof change === "function" ? change(this.is?.settings) : change;
+      await this.take(await send("PATCH", `works/${this.id}`, { run: true, ...told }));
+    });
   }
 
   /** @param {"run" | "cancel" | "undo" | "redo"} what */
@@ -88,8 +94,11 @@ class Work extends EventTarget {
     return what === "cancel" ? request() : this.inTurn(request);
   }
 
-  async refresh() {
-    if (this.id) await this.take(await get(`works/${this.id}`));
+  /** In turn, lest an answer to a change that was made before comes later. */
+  refresh() {
+    return this.inTurn(async () => {
+      if (this.id) await this.take(await get(`works/${this.id}`));
+    });
   }
 
   /** @param {WorkState} state */

@@ -16,7 +16,7 @@ const PIECE_TIME: Duration = Duration::from_secs(20);
 
 /// Too much.
 pub(crate) fn too_long(limit: u64) -> Problem {
-    let words = "the body is longer than it may be";
+    let words = "the body is too long";
     Problem::new(StatusCode::PAYLOAD_TOO_LARGE, words).what(format!("at most {limit} bytes"))
 }
 
@@ -34,7 +34,7 @@ pub(crate) async fn pieces(
         let Some(piece) = next.map_err(slow)? else {
             return Ok(length);
         };
-        let piece = piece.map_err(|e| Problem::wrong(format!("the body broke off: {e}")))?;
+        let piece = piece.map_err(|e| Problem::wrong(format!("the body ended too early: {e}")))?;
         length += piece.len() as u64;
         if length > limit {
             return Err(too_long(limit));
@@ -58,5 +58,5 @@ pub(crate) async fn document<T: DeserializeOwned>(headers: &HeaderMap, body: Bod
     })
     .await?;
     serde_json::from_slice(&bytes)
-        .map_err(|e| Problem::wrong(format!("not the document expected: {e}")))
+        .map_err(|e| Problem::wrong(format!("not the expected document: {e}")))
 }

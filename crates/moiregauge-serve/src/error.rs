@@ -9,7 +9,8 @@ use std::path::PathBuf;
 pub enum ServeError {
     /// Others than this computer could connect.
     #[error(
-        "{0} can be reached by others: expected an address of this computer alone (127.0.0.1, ::1), or a file with a token"
+        "other computers can reach {0}: expected an address of this computer alone (127.0.0.1, ::1), or a file with a \
+         token"
     )]
     NotAlone(std::net::IpAddr),
     /// The file with the token.
@@ -29,7 +30,7 @@ pub enum ServeError {
         reason: String,
     },
     /// The folder of works.
-    #[error("{}: another server keeps its works there", .0.display())]
+    #[error("{}: another running server keeps its works there", .0.display())]
     InUse(PathBuf),
     /// The address cannot be had.
     #[error("cannot listen at {address}: {source}")]

@@ -57,7 +57,13 @@ fn refusal(app: &App, request: &Request) -> Option<Problem> {
         return Some(Problem::new(StatusCode::MISDIRECTED_REQUEST, words).at("Host"));
     };
     let forbidden = |place: &str| {
-        Some(Problem::new(StatusCode::FORBIDDEN, "pages of others may not ask").at(place))
+        Some(
+            Problem::new(
+                StatusCode::FORBIDDEN,
+                "requests from other pages are refused",
+            )
+            .at(place),
+        )
     };
     let is_read = [Method::GET, Method::HEAD].contains(request.method());
     let path = request.uri().path();

@@ -32,7 +32,7 @@ pub(crate) fn below(text: &str) -> Result<PathBuf, String> {
 fn check(part: &str) -> Result<(), String> {
     let refused = |why: &str| Err(format!("{part:?} {why}"));
     if part.is_empty() || part == "." || part == ".." {
-        return refused("is no name below the folder");
+        return refused("is not a name below the folder");
     }
     if part.len() > LONGEST {
         return Err(format!("a name is longer than {LONGEST} bytes"));
@@ -41,7 +41,7 @@ fn check(part: &str) -> Result<(), String> {
         .chars()
         .any(|c| c.is_control() || "\\:<>\"|?*".contains(c))
     {
-        return refused("has a sign that names of files cannot have everywhere");
+        return refused("has a character that is not allowed in file names on all systems");
     }
     if part.ends_with([' ', '.']) {
         return refused("ends with a blank or a dot");

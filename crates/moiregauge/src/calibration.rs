@@ -165,15 +165,15 @@ pub enum Coordinates {
     Nominal,
 }
 
-/// A measured calibration: what is shown is `F` times what is true, see [`crate::calibration`].
+/// A measured calibration: lengths in the image are `F` times the true ones, see [`crate::calibration`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Calibration {
-    /// s: how much too long lengths are shown, mean of x and y, per cent.
+    /// s: by how much lengths in the image are too long, mean of x and y, per cent.
     pub gain_percent: f64,
-    /// g: how much longer lengths are shown along x than along y, per cent.
+    /// g: by how much lengths along x are too long compared with y, per cent.
     pub mismatch_percent: f64,
-    /// γ: by how much less than a right angle the axes shown enclose, mrad.
+    /// γ: a right angle minus the angle between the axes in the image, mrad.
     pub orthogonality_mrad: f64,
     /// Covariance of the three, in their units.
     pub covariance: [[f64; 3]; 3],

@@ -1,10 +1,11 @@
 //! Lattices that cover a part of the frame, or change across it: right, with errors that say so, over many draws.
 
+use moiregauge::caveat::{Doubt, LatticeDoubt};
 use moiregauge::simulate::{SampleFeature, Simulation, Simulator};
-use moiregauge::{Settings, analyse, measure_scan};
+use moiregauge::{Analysis, SetMean, Settings, analyse, measure_scan};
 
-/// Twist of a drawn sample as it is found, its error and its truths (that of each grain, and the mean), degrees; `None` where it is refused.
-fn twist(sample: &str, seed: u64) -> Option<(f64, f64, Vec<f64>)> {
+/// A drawn sample: its scans, and what the analysis says.
+fn analysed(sample: &str, seed: u64) -> (Simulator, Analysis) {
     let mut set = Simulation {
         features: SampleFeature::parse(sample).expect("a sample"),
         seed,
@@ -25,6 +26,12 @@ fn twist(sample: &str, seed: u64) -> Option<(f64, f64, Vec<f64>)> {
         measure_scan(&Simulator::file_name(i), &scans.frame(i), &settings, None).ok()
     });
     let analysis = analyse(measured.collect(), &settings);
+    (scans, analysis)
+}
+
+/// Twist of a drawn sample as it is found, its error and its truths (that of each grain, and the mean), degrees; `None` where it is refused.
+fn twist(sample: &str, seed: u64) -> Option<(f64, f64, Vec<f64>)> {
+    let (scans, analysis) = analysed(sample, seed);
     let found = analysis.sets.first()?.mean.as_ref()?.twist();
     let truth = scans.truth();
     let sample = truth.sample.as_ref().expect("a sample");
@@ -60,5 +67,73 @@ fn errors_of_partly_covered_frames_cover() {
         println!("{sample}: {answers} answers, rms pull {rms:.2}, largest {largest:.1}");
         assert!(answers >= 9, "{sample}: {answers}");
         assert!(rms < 1.7, "{sample}: {rms}");
+    }
+}
+
+/// Two grains are two results, each of all scans that show it, and neither is a mixture.
+#[test]
+fn grains_are_results_of_their_own() {
+    let mut complete = 0;
+    for seed in 1..=5 {
+        let (scans, analysis) = analysed("grains", seed);
+        let sample = scans.truth().sample.clone().expect("a sample");
+        let truths = sample.grains.iter().filter_map(|grain| grain.mean);
+        let truths: Vec<f64> = truths.map(|mean| mean.twist_deg).collect();
+        let mut seen = vec![false; truths.len()];
+        for set in &analysis.sets {
+            let twist = set.mean.as_ref().or(set.uncorrected.as_ref());
+            let Some(twist) = twist.map(SetMean::twist) else {
+                continue;
+            };
+            let off = |i: usize| (twist.value.to_degrees() - truths[i]).abs();
+            let (near, least) = if off(0) < off(1) {
+                (0, off(0))
+            } else {
+                (1, off(1))
+            };
+            let limit = 5.0 * twist.statistical.to_degrees();
+            println!(
+                "{seed}, {}: off by {least:.5}°, {limit:.5}° allowed",
+                set.name
+            );
+            assert!(least < limit, "{seed}, {}: {least} {limit}", set.name);
+            seen[near] = true;
+        }
+        let names: Vec<&str> = analysis.sets.iter().map(|set| set.name.as_str()).collect();
+        let both = names.len() == 2 && names.iter().all(|name| name.contains("grain"));
+        complete += usize::from(both && seen.iter().all(|seen| *seen));
+    }
+    // The smaller one may be too small.
+    assert!(complete >= 4, "{complete}");
+}
+
+/// A straight boundary through the middle of the frame, 30° to an axis, is `side / cos 30°` long.
+#[test]
+fn boundaries_have_their_length() {
+    let (scans, analysis) = analysed("grains:share=0.5,angle=30", 2);
+    let frame = scans.frame(0).channels[0].clone();
+    let found = measure_scan("scan", &scans.frame(0), &Settings::default(), None).expect("a scan");
+    let geometry = &found.lines[0].geometry;
+    let sides = [
+        geometry.fast_step().norm() * frame.columns as f64,
+        geometry.slow_step().norm() * frame.rows as f64,
+    ];
+    let [shorter, longer] = [sides[0].min(sides[1]), sides[0].max(sides[1])];
+    let lengths: Vec<f64> = (analysis.caveats.iter())
+        .filter_map(|caveat| match &caveat.doubt {
+            Doubt::Lattice(LatticeDoubt::SeveralGrains { others }) => Some(others[0].boundary),
+            _ => None,
+        })
+        .collect();
+    assert!(!lengths.is_empty());
+    let cosine = 30.0_f64.to_radians().cos();
+    for length in lengths {
+        println!(
+            "{length:.1} nm, {:.1} to {:.1} wanted",
+            shorter / cosine,
+            longer / cosine
+        );
+        let wanted = 0.9 * shorter / cosine..1.1 * longer / cosine;
+        assert!(wanted.contains(&length), "{length}, {wanted:?}");
     }
 }

@@ -89,7 +89,9 @@ impl<'a> Archive<'a> {
 }
 
 fn trap(name: &str, length: u64, left: u64) -> String {
-    format!("{name:?} unpacks to {length} bytes or more, {left} are allowed: a trap")
+    format!(
+        "{name:?} unpacks to {length} bytes or more, but {left} are allowed: the archive may be an attack"
+    )
 }
 
 /// Makes archives for tests.

@@ -170,7 +170,7 @@ pub enum ReadError {
     },
     /// A format that this build leaves out.
     #[error(
-        "{format} files need the feature `{feature}` of the crate spmfile, which this build leaves out"
+        "{format} files need the feature `{feature}` of the crate spmfile, which this build does not have"
     )]
     NotBuilt {
         /// The format.

@@ -9,7 +9,7 @@ use crate::units;
 #[non_exhaustive]
 pub enum ExportError {
     /// Nothing to write.
-    #[error("there is no channel to write")]
+    #[error("no channel to write")]
     NoChannel,
     /// The number of samples is not lines × samples.
     #[error("channel {name:?} has {found} samples; its {rows} lines of {columns} need {expected}", expected = .rows * .columns)]
@@ -94,6 +94,17 @@ pub(crate) fn checked_values(channel: &Channel) -> Result<Vec<f64>, ExportError>
         });
     }
     Ok(values)
+}
+
+/// The lines of an image, the top one first; `between` is called before each.
+pub(crate) fn from_the_top<'a>(
+    values: &'a [f64],
+    channel: &Channel,
+    between: &'a dyn Fn(),
+) -> impl Iterator<Item = &'a [f64]> {
+    values
+        .rchunks_exact(channel.columns)
+        .inspect(move |_| between())
 }
 
 /// Positions of the columns and of the lines from the bottom, nm: pixel centres in a frame about

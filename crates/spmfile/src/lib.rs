@@ -127,7 +127,7 @@ pub use sensors::{PositionSensors, SensorProblem, position_sensors, sensor_axis}
 pub use source::{Seekable, Source};
 pub use units::{length_nm, nm_per, plain_unit};
 #[cfg(feature = "write")]
-pub use writable::{WritableFormat, write};
+pub use writable::{WritableFormat, write, write_between};
 
 /// The examples of the README are tests.
 #[cfg(doctest)]

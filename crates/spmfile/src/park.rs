@@ -168,7 +168,7 @@ fn structure(c: &mut Cursor<'_>, version: f64) -> Result<(u32, Result<Header, St
     if compressed != 0 {
         return Ok((
             kind,
-            Err("its samples are compressed, which is not known how".to_owned()),
+            Err("its samples are compressed in an unknown way".to_owned()),
         ));
     }
     let finite = |numbers: &[f64]| numbers.iter().all(|number| number.is_finite());

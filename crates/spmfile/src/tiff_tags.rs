@@ -196,7 +196,7 @@ impl<'a> Directory<'a> {
     /// them lie within the file. No more is taken than the file is long.
     pub(crate) fn image(&self, length: usize) -> Result<Cow<'a, [u8]>, String> {
         let missing =
-            |found: usize| format!("it is {found} bytes long but its header promises {length}");
+            |found: usize| format!("it is {found} bytes long, but its header promises {length}");
         if length > self.bytes.len() {
             return Err(missing(0));
         }

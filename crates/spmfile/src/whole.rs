@@ -34,7 +34,7 @@ impl Extent {
         if end > available || end == u64::MAX {
             self.lost.push(UnreadableChannel {
                 name: name.to_owned(),
-                error: format!("it is {found} bytes long but its header promises {length}"),
+                error: format!("it is {found} bytes long, but its header promises {length}"),
             });
             return false;
         }

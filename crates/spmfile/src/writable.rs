@@ -1,10 +1,9 @@
 //! The formats that are written, and a scan as the files of one of them.
 
-use crate::arrays;
 use crate::export::{ExportError, unique_names};
 use crate::scan::{Channel, LineDirection, Scan};
 use crate::sensors::{position_sensors, sensor_axis};
-use crate::{gsf, gwy, gxyzf, zarr};
+use crate::{array, gsf, gwy, gxyzf, zarr};
 
 /// A format that scans are written in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -78,22 +77,41 @@ pub fn write(
     stem: &str,
     log: &[String],
 ) -> Result<Vec<(String, Vec<u8>)>, ExportError> {
+    write_between(scan, format, stem, log, &|| ())
+}
+
+/// As [`write()`], which takes seconds for large images as text: `between` is called before each line or megabyte. It ends the
+/// work by unwinding.
+///
+/// # Errors
+/// As [`write()`].
+pub fn write_between(
+    scan: &Scan,
+    format: WritableFormat,
+    stem: &str,
+    log: &[String],
+    between: &dyn Fn(),
+) -> Result<Vec<(String, Vec<u8>)>, ExportError> {
     let one = |bytes: Vec<u8>| vec![(format!("{stem}.{}", format.extension()), bytes)];
     match format {
-        WritableFormat::Gwy => gwy::write(scan, log).map(one),
+        WritableFormat::Gwy => gwy::write_between(scan, log, between).map(one),
         #[cfg(feature = "archives")]
-        WritableFormat::Npz => arrays::npz(scan, log).map(one),
+        WritableFormat::Npz => array::npz_between(scan, log, between).map(one),
         #[cfg(not(feature = "archives"))]
         WritableFormat::Npz => Err(left_out("archives")),
         #[cfg(feature = "pictures")]
-        WritableFormat::Tiff => arrays::tiff(scan, log).map(one),
+        WritableFormat::Tiff => array::tiff_between(scan, log, between).map(one),
         #[cfg(not(feature = "pictures"))]
         WritableFormat::Tiff => Err(left_out("pictures")),
-        WritableFormat::Gsf => each(scan, format, stem, |c| gsf::write(scan, c, log)),
-        WritableFormat::Csv => each(scan, format, stem, |c| arrays::csv(scan, c, log)),
-        WritableFormat::Gxyzf => points(scan, stem, log),
+        WritableFormat::Gsf => each(scan, format, stem, |c| {
+            gsf::write_between(scan, c, log, between)
+        }),
+        WritableFormat::Csv => each(scan, format, stem, |c| {
+            array::csv_between(scan, c, log, between)
+        }),
+        WritableFormat::Gxyzf => points(scan, stem, log, between),
         WritableFormat::Zarr => {
-            let files = zarr::write(scan, log)?;
+            let files = zarr::write_between(scan, log, between)?;
             let inside = |(name, bytes)| (format!("{stem}.zarr/{name}"), bytes);
             Ok(files.into_iter().map(inside).collect())
         }
@@ -104,7 +122,7 @@ pub fn write(
 #[cfg(not(all(feature = "archives", feature = "pictures")))]
 fn left_out(feature: &str) -> ExportError {
     ExportError::Library(format!(
-        "it needs the feature `{feature}` of the crate spmfile, which this build leaves out"
+        "it needs the feature `{feature}` of the crate spmfile, which this build does not have"
     ))
 }
 
@@ -133,7 +151,12 @@ fn each(
 }
 
 /// The points of each line direction that has position sensors.
-fn points(scan: &Scan, stem: &str, log: &[String]) -> Result<Vec<(String, Vec<u8>)>, ExportError> {
+fn points(
+    scan: &Scan,
+    stem: &str,
+    log: &[String],
+    between: &dyn Fn(),
+) -> Result<Vec<(String, Vec<u8>)>, ExportError> {
     let mut files = Vec::new();
     let mut problem = None;
     for (line, name) in [
@@ -151,7 +174,8 @@ fn points(scan: &Scan, stem: &str, log: &[String]) -> Result<Vec<(String, Vec<u8
         }
         match position_sensors(scan, line) {
             Ok(sensors) => {
-                let bytes = gxyzf::write(scan, [sensors.x, sensors.y], &channels, log)?;
+                let bytes =
+                    gxyzf::write_between(scan, [sensors.x, sensors.y], &channels, log, between)?;
                 files.push((name, bytes));
             }
             Err(error) => problem = Some(ExportError::NoPositions(error)),

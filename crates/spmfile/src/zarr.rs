@@ -22,6 +22,15 @@ const CHUNK: usize = 1 << 20;
 /// - There is no channel.
 /// - A channel's samples do not fill its lines.
 pub fn write(scan: &Scan, log: &[String]) -> Result<Vec<(String, Vec<u8>)>, ExportError> {
+    write_between(scan, log, &|| ())
+}
+
+/// The same; `between` is called before each chunk.
+pub(crate) fn write_between(
+    scan: &Scan,
+    log: &[String],
+    between: &dyn Fn(),
+) -> Result<Vec<(String, Vec<u8>)>, ExportError> {
     let mut attributes = Map::new();
     for (key, value) in labels::describe(scan)
         .into_iter()
@@ -57,7 +66,15 @@ pub fn write(scan: &Scan, log: &[String]) -> Result<Vec<(String, Vec<u8>)>, Expo
             name
         };
         let shape = [channel.rows, channel.columns];
-        array(&mut files, &name, &shape, &dimensions, &about, &values)?;
+        array(
+            &mut files,
+            &name,
+            &shape,
+            &dimensions,
+            &about,
+            &values,
+            between,
+        )?;
     }
     for (index, grid) in grids.iter().enumerate() {
         let Some([x, y]) = &grid.positions else {
@@ -67,7 +84,15 @@ pub fn write(scan: &Scan, log: &[String]) -> Result<Vec<(String, Vec<u8>)>, Expo
             let mut about = Map::new();
             about.insert("units".to_owned(), json!("nm"));
             let names = [name.clone()];
-            array(&mut files, name, &[values.len()], &names, &about, values)?;
+            array(
+                &mut files,
+                name,
+                &[values.len()],
+                &names,
+                &about,
+                values,
+                between,
+            )?;
         }
     }
     Ok(files)
@@ -97,6 +122,7 @@ fn array(
     dimensions: &[String],
     attributes: &Map<String, Value>,
     values: &[f64],
+    between: &dyn Fn(),
 ) -> Result<(), ExportError> {
     let width: usize = shape[1..].iter().product();
     let lines = (CHUNK / width.max(1)).clamp(1, shape[0]);
@@ -116,6 +142,7 @@ fn array(
     });
     files.push((format!("{name}/zarr.json"), text(&description)?));
     for (index, block) in values.chunks(lines * width).enumerate() {
+        between();
         let mut bytes: Vec<u8> = block.iter().flat_map(|v| v.to_le_bytes()).collect();
         // Every chunk is stored whole.
         for _ in block.len()..lines * width {

@@ -1,8 +1,8 @@
 //! What is written for Gwyddion is read back: values, units, sizes, and how the frame was scanned.
 
 use spmfile::{
-    Channel, DateTime, ExportError, FrameDirection, LineDirection, Samples, Scan, Span, gsf, gwy,
-    gxyzf, position_sensors, read,
+    Channel, DateTime, ExportError, FrameDirection, LineDirection, Samples, Scan, Span,
+    WritableFormat, gsf, gwy, gxyzf, position_sensors, read, write, write_between,
 };
 
 fn channel(name: &str, unit: &str, line: LineDirection, samples: Vec<f64>) -> Channel {
@@ -240,4 +240,26 @@ fn what_cannot_be_written_is_said() {
         gsf::write(&scan, &scan.channels[1], &[]),
         Err(ExportError::Shape { found: 6, .. })
     ));
+}
+
+/// Whoever writes large images can stop it: between the lines of each format, or between its chunks, somebody is asked.
+#[test]
+fn writing_asks_between_lines() {
+    let scan = scan();
+    for format in WritableFormat::ALL {
+        let asked = std::cell::Cell::new(0);
+        let between = || asked.set(asked.get() + 1);
+        let files = write_between(&scan, format, "scan", &log(), &between).expect("written");
+        assert_eq!(
+            files,
+            write(&scan, format, "scan", &log()).expect("written")
+        );
+        // Points come line by line for all channels of a line direction; a small channel is one chunk.
+        let least = match format {
+            WritableFormat::Gxyzf => scan.channels[0].rows,
+            WritableFormat::Zarr => scan.channels.len(),
+            _ => scan.channels.iter().map(|c| c.rows).sum(),
+        };
+        assert!(asked.get() >= least, "{format:?}: {}", asked.get());
+    }
 }

@@ -13,7 +13,7 @@
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-use nalgebra::{Complex, Matrix5, SMatrix, Vector2, Vector5};
+use nalgebra::{Complex, Matrix2, Matrix5, SMatrix, Vector2, Vector5};
 
 use crate::complex_pair::ComplexPair;
 use crate::estimate::Estimate;
@@ -26,7 +26,7 @@ use crate::strain::inversion::{by_angle, directions, reduce, wrap};
 use crate::strain::known::{KnownOrientation, LatticeDirection};
 use crate::strain::labelling::{moire_matrix, moire_matrix_jacobian, names};
 use crate::strain::layers::Layers;
-use crate::strain::names::Labelled;
+use crate::strain::names::{Labelled, change_to};
 use crate::strain::vector::StrainVector;
 
 /// Readings with more mean strain than this are no alternatives: layers on each other stay far below one per cent.
@@ -92,8 +92,8 @@ pub struct Split {
 
 /// Every reading of a moiré lattice for one orientation, the best one first: see the module.
 ///
-/// For layers of one shape these are the readings of one name of the lattice: that of [`Bilayer::waves`], else the least
-/// strained one, which strain can make another than that of the atoms (from 0.46 of the twist on for hexagonal layers,
+/// With [`Bilayer::waves`] these are the readings of that name of the lattice. Without, they are for layers of different shapes those of
+/// all names near the shortest pair, and for layers of one shape those of the least strained one, which strain can make another than that of the atoms (from 0.46 of the twist on for hexagonal layers,
 /// from 0.23 for the 1T′ phase of `WTe₂`).
 ///
 /// The covariance holds that of the lattice and of the orientation, taken as independent.
@@ -150,10 +150,12 @@ pub fn strain_tensors<'a>(
     Ok(found)
 }
 
-/// For similar layers the name that is given, or the least strained one; for different ones all near the shortest pair.
+/// The name that is given; without one, for similar layers the least strained one, for different ones all near the
+/// shortest pair.
 fn names_to_try(lattice: &Lattice, layers: &Layers) -> Result<Vec<Labelled>, StrainError> {
     let named = labelled(lattice, layers)?;
-    if layers.ratio().is_some() {
+    let is_pair = |waves: Matrix2<f64>| change_to(&lattice.basis, &waves).is_some();
+    if layers.ratio().is_some() || layers.waves.is_some_and(is_pair) {
         return Ok(vec![named]);
     }
     let labelled = |lattice: Lattice| {

@@ -25,7 +25,7 @@ impl Again {
         let others = arguments(crate::typed(), &["--replay", "--data"]);
         ensure!(
             others.len() == 1,
-            "--replay takes files, settings and options from the document; found also {}",
+            "--replay takes files, settings and options from the document; leave out {}",
             others[1..].join(" ")
         );
         let document = Document::read(path).context("--replay")?;
@@ -39,7 +39,7 @@ impl Again {
         config::check(&document.run.settings).context("--replay")?;
         if document.is_of_another_version() {
             eprintln!(
-                "note: version {} wrote {}, and this is {}: numbers may differ; CHANGELOG.md says which",
+                "note: version {} wrote {}, and this is version {}. Numbers may differ; CHANGELOG.md says which",
                 document.version,
                 path.display(),
                 env!("CARGO_PKG_VERSION")
@@ -60,8 +60,8 @@ impl Again {
             return true;
         }
         eprintln!(
-            "note: the results are not those of {}, byte for byte: another version or another kind of processor may \
-             change last digits",
+            "note: the results differ from {} in some bytes. Another version or another kind of processor may change \
+             the last digits",
             self.path.display()
         );
         self.document.is_of_another_version()

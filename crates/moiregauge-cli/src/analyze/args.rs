@@ -34,28 +34,27 @@ pub(crate) struct AnalyzeArgs {
     /// Scan files, folders (the scans in them, without subfolders) or names with * and ?
     #[arg(required_unless_present = "replay", value_name = "PATH")]
     pub(super) paths: Vec<PathBuf>,
-    /// Folder for results.json, tables, figures and report.html; made if it does not exist [default with --replay:
+    /// Folder for results.json, tables, figures and report.html; created if it does not exist [default with --replay:
     /// beside the folder of the document]
     #[arg(long, value_name = "DIR", required_unless_present = "replay")]
     pub(super) out: Option<PathBuf>,
-    /// Repeat the run that a results.json (or a map.json, with `map`) records: the same files, settings and options
-    /// give the same bytes. The files are looked for by name and by content, and checked first; other options are
-    /// refused
+    /// Repeat the run recorded in a results.json (or in a map.json, with `map`): the same files, settings and options
+    /// give the same bytes. The files are found by name and content and checked first; other options are refused
     #[arg(long, value_name = "FILE")]
     pub(super) replay: Option<PathBuf>,
-    /// A folder to look for the files of --replay in; may be repeated [default: the current one by name; that of the
-    /// document and the one above it]
+    /// Folder in which --replay looks for the files; may be repeated [default: the current folder; that of the document
+    /// and the one above it]
     #[arg(long, value_name = "DIR", requires = "replay")]
     pub(super) data: Vec<PathBuf>,
-    /// Settings from a TOML file (see `moiregauge config`), or those that a results.json or map.json holds; options
-    /// here come on top of it
+    /// Settings from a TOML file (see `moiregauge config`), or from a results.json or map.json; options on the command
+    /// line override them
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
-    /// Channel that shows the moiré [default: TR Phase, TR Amplitude, Phase, … the first there is; if no
+    /// Channel that shows the moiré [default: the first of TR Phase, TR Amplitude, Phase, … that the files have; if no
     /// scan shows a lattice in it, the next]
     #[arg(long, value_name = "NAME", help_heading = SCANS)]
     channel: Option<String>,
-    /// Of several images of the channel in one file (pages, frames) this one [default: the first]
+    /// Number of the image, if a file holds several images of the channel (pages, frames) [default: the first]
     #[arg(long, value_name = "N", value_parser = numbers::count(1, MOST_IMAGES), help_heading = SCANS)]
     image: Option<usize>,
     /// Line directions to use [default: both]
@@ -67,9 +66,9 @@ pub(crate) struct AnalyzeArgs {
     /// The layers: graphene, hBN, MoS2, … [default: graphene]
     #[arg(long, value_name = "NAME", help_heading = LAYERS)]
     material: Option<String>,
-    /// The layers: graphene for two equal ones, graphene/hBN for graphene (layer 2) on hBN (layer 1, the
-    /// reference); names of --materials too. With --moires N one for all, or one for each moiré, the largest
-    /// cell first: graphene,graphene/hBN
+    /// The layers: graphene for two equal ones, graphene/hBN for graphene (layer 2) on hBN (layer 1, the reference);
+    /// names from --materials too. With --moires N: one pair for all moirés, or one for each, the largest cell first:
+    /// graphene,graphene/hBN
     #[arg(
         long,
         value_name = "UPPER/LOWER[,…]",
@@ -80,10 +79,10 @@ pub(crate) struct AnalyzeArgs {
     /// TOML file with layers of your own, one [[layer]] table each (see `moiregauge config`)
     #[arg(long, value_name = "FILE", help_heading = LAYERS)]
     pub(super) materials: Option<PathBuf>,
-    /// Lattice constant of the layers, nm, in place of the material's
+    /// Lattice constant of the layers, nm, instead of that of the material
     #[arg(long, value_name = "NM", value_parser = numbers::number([0.01, 100.0]), help_heading = LAYERS)]
     lattice_constant: Option<f64>,
-    /// Poisson ratio of the layers, in place of the material's
+    /// Poisson ratio of the layers, instead of that of the material
     #[arg(long, value_name = "RATIO", value_parser = numbers::number([-1.0, 1.0]), help_heading = LAYERS)]
     poisson_ratio: Option<f64>,
     /// Standard uncertainty of the lattice constant, nm, for the budget [default: the material's]
@@ -107,20 +106,20 @@ pub(crate) struct AnalyzeArgs {
     /// Show these scans but do not use them: names of files, * for any characters; may be repeated
     #[arg(long, value_name = "NAME", help_heading = SCANS)]
     exclude: Vec<String>,
-    /// Leave out scans that do not fit the others (leave-one-out χ², p < 0.001 divided by their number)
+    /// Leave out scans that do not fit the others (leave-one-out χ², p < 0.001 divided by the number of scans)
     #[arg(long, help_heading = SCANS)]
     exclude_outliers: bool,
     /// Standard uncertainty of the frame times in the files, s [default: 0.6]
     #[arg(long, value_name = "S", value_parser = numbers::number(numbers::TIME_S), help_heading = METHOD)]
     frame_time_sigma: Option<f64>,
-    /// How many moirés every image shows; each is fitted with the others taken off, and has a folder of
-    /// results of its own [default: 1]
+    /// Number of moirés that every image shows; each is fitted after the others are subtracted and has its own folder
+    /// of results [default: 1]
     #[arg(long, value_name = "N", value_parser = numbers::count(1, 6), help_heading = SCANS)]
     moires: Option<usize>,
     /// Use only the region that all scans have in common
     #[arg(long, help_heading = SCANS)]
     overlap: bool,
-    /// A drift known beforehand, nm/min, instead of measuring it
+    /// Use this known drift, nm/min, instead of measuring it
     #[arg(long, num_args = 2, value_names = ["X", "Y"], allow_negative_numbers = true, value_parser = numbers::number(numbers::DRIFT), help_heading = METHOD)]
     drift: Option<Vec<f64>>,
     /// Standard uncertainty of each component of --drift, nm/min
@@ -158,20 +157,21 @@ pub(crate) struct AnalyzeArgs {
     /// Write vectors, scans, sets and budget as Parquet too
     #[arg(long, help_heading = OUTPUT)]
     pub(super) parquet: bool,
-    /// Laboratory axes for vectors, angles, drift, figures and exported images: a frame that is turned by
-    /// its scan angle is turned back. This is the default; `--rotation 0` gives the axes of the image
+    /// Give vectors, angles, drift, figures and exported images in laboratory axes: a frame that was scanned at an
+    /// angle is turned back. This is the default; `--rotation 0` gives the axes of the image
     #[arg(long, help_heading = OUTPUT)]
     rotate_to_lab: bool,
-    /// Print results.json instead of the summary; with --moires a list of those of all moirés, the largest cell first
+    /// Print results.json instead of the summary; with --moires a list with one entry for each moiré, the largest cell
+    /// first
     #[arg(long)]
     pub(super) json: bool,
-    /// Show the report when it is written
+    /// Open the report when it is written
     #[arg(long, help_heading = OUTPUT, conflicts_with = "no_report")]
     open: bool,
     /// Print nothing but errors
     #[arg(long, short)]
     pub(super) quiet: bool,
-    /// Write over the results of an earlier analysis
+    /// Replace the results of an earlier analysis
     #[arg(long)]
     pub(super) force: bool,
     // Last, since a heading holds for all that follows.
@@ -200,8 +200,8 @@ impl AnalyzeArgs {
         if by_user.iter().any(Option::is_some) {
             anyhow::ensure!(
                 s.substrate.is_none() && s.moire_layers.is_empty(),
-                "--lattice-constant and --poisson-ratio describe two equal layers; describe different ones in \
-                 a file (--materials)"
+                "--lattice-constant and --poisson-ratio are for two equal layers. Describe different layers in a file \
+                 (--materials)"
             );
             s.material.source = format!("{}, changed by the user", s.material.name);
         }
@@ -293,7 +293,7 @@ impl AnalyzeArgs {
     /// # Errors
     /// The first option of that kind.
     pub(crate) fn only_settings(&self) -> anyhow::Result<()> {
-        self.refuse("goes with one sample: it is for `moiregauge analyze`", &[])
+        self.refuse("is for one sample: use it with `moiregauge analyze`", &[])
     }
 
     /// Refuses what goes with results that are written once.
@@ -440,13 +440,13 @@ macro_rules! mirror {
 
 mirror!(LineArg => Lines { Trace, Retrace, Both });
 mirror!(MethodArg => Method {
-    /// Harmonics fitted to the pixels, one joint fit over all scans: errors near the Cramér–Rao bound
+    /// Harmonics fitted to the pixels, then one joint fit to all scans: errors near the Cramér–Rao bound
     Lattice,
-    /// Divided by the overlap, sub-pixel peaks, several shells
+    /// Autocorrelation divided by the overlap, sub-pixel peaks, several shells
     Autocorrelation,
-    /// Hann window, sub-pixel peaks, full inverse
+    /// Peaks of the Fourier transform with a Hann window, sub-pixel, exact inverse
     Fourier,
-    /// As published in arXiv 2406.08681, for comparison: known to be biased
+    /// As published in arXiv 2406.08681, for comparison only: it is biased
     Paper,
 });
 mirror!(ConventionArg => StrainConvention {
@@ -457,13 +457,13 @@ mirror!(ConventionArg => StrainConvention {
 });
 mirror!(BackgroundArg => Background {
     Mean, Plane, Quadratic, Cubic,
-    /// Each line by itself: damages harmonics along the fast axis
+    /// The mean of each line: damages harmonics whose crests run along the fast axis
     LineMean,
 });
 mirror!(GroupingArg => Grouping {
     /// By slow axis, line rate, size and channel
     Auto,
-    /// The same, and files of different folders never share a set
+    /// As auto, but files of different folders are never in one set
     Folder,
     /// Every file by itself
     File,

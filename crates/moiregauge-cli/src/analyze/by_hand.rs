@@ -3,26 +3,31 @@
 use std::path::PathBuf;
 
 use anyhow::Context as _;
-use moiregauge::settings::Settings;
+use moiregauge::settings::{MOST_GRAINS, Settings};
 use moiregauge_pipeline::read_mask;
 use nalgebra::Vector2;
 
 use crate::map::{length, parse_region};
+use crate::numbers;
 
 /// The options for it.
 #[derive(clap::Args, Clone, Debug, Default)]
-#[command(next_help_heading = "By hand: which lattice is meant, and where it is")]
+#[command(next_help_heading = "By hand: which lattice to measure, and where it is")]
 pub(crate) struct HandArgs {
-    /// About two vectors of the lattice, as the results give them: x and y of the first, x and y of the second; nm, or with a
-    /// unit. Of several lattices this one is measured; 5 % off and 3° will do
+    /// Measure the lattice with about these two vectors: x and y of the first, x and y of the second, as in the
+    /// results; nm, or with a unit. They may be wrong by 5 % and 3°
     #[arg(long, value_name = "L1X,L1Y,L2X,L2Y", value_parser = parse_lattice, allow_hyphen_values = true, conflicts_with = "near")]
     lattice: Option<[[f64; 2]; 2]>,
-    /// About the mean wavelength of the lattice (12nm): of several lattices this one is measured; 15 % off will do
+    /// Measure the lattice with about this mean wavelength (12nm); it may be wrong by 15 %
     #[arg(long, value_name = "WAVELENGTH", value_parser = parse_length)]
     near: Option<f64>,
-    /// Use the pixels of each frame only that are not black in this picture, or above zero in this array, of the same size
+    /// Use only some pixels of each frame: those that are not black in this picture, or above zero in this array, of
+    /// the same size
     #[arg(long, value_name = "FILE")]
     mask: Option<PathBuf>,
+    /// Of scans that show several grains use only this one; sets are named by them: grain 1, grain 2
+    #[arg(long, value_name = "N", value_parser = numbers::count(1, MOST_GRAINS))]
+    grain: Option<usize>,
     /// The parts of each frame to use, where a command asks for them.
     #[arg(skip)]
     pub(super) parts: Vec<Vec<[f64; 2]>>,
@@ -34,6 +39,7 @@ impl HandArgs {
     /// # Errors
     /// The mask cannot be read.
     pub(super) fn apply(&self, settings: &mut Settings) -> anyhow::Result<()> {
+        settings.grain = self.grain.or(settings.grain);
         let told = &mut settings.by_hand;
         if self.lattice.is_some() {
             (told.lattice_nm, told.near_nm) = (self.lattice, None);

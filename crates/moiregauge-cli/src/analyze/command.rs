@@ -8,7 +8,7 @@ use super::by_hand::parse_part;
 /// Scans are grouped into sets by slow axis, line rate, size and channel and ordered by time. Each set
 /// gives its drift velocity (from scans of alternating slow direction), the drift-corrected moiré
 /// lattice, twist and heterostrain; the sets are compared and combined. A file that cannot be used is
-/// reported and skipped, and the exit code tells.
+/// reported and skipped, and the exit code is then not 0.
 #[derive(clap::Args, Clone, Debug)]
 #[command(after_long_help = "\
 Examples:
@@ -28,10 +28,10 @@ Angles are counter-clockwise, x to the right and y up, as the position sensors t
 pub(crate) struct AnalyzeCommand {
     #[command(flatten)]
     analyze: AnalyzeArgs,
-    /// Use this part of each frame only: a box, as lower left corner, width and height, or the corners of a polygon apart by
-    /// blanks ('0,0 100,10 60,80'); nm from the lower left corner of the frame, along the lines and across them, or with a
-    /// unit; may be repeated, all parts are used
-    #[arg(long, value_name = "X,Y,W,H", help_heading = "By hand: which lattice is meant, and where it is", value_parser = parse_part, allow_hyphen_values = true)]
+    /// Use only this part of each frame: a box (lower left corner, width, height) or the corners of a polygon separated
+    /// by blanks ('0,0 100,10 60,80'). In nm, or with a unit, from the lower left corner of the frame, along and across
+    /// the lines; may be repeated: all parts are used
+    #[arg(long, value_name = "X,Y,W,H", help_heading = "By hand: which lattice to measure, and where it is", value_parser = parse_part, allow_hyphen_values = true)]
     region: Vec<Vec<[f64; 2]>>,
 }
 

@@ -19,11 +19,11 @@ fn parse(name: &str) -> anyhow::Result<Export> {
     let format = format_of(path).context("--export")?;
     ensure!(
         format != WritableFormat::Gxyzf,
-        "--export {name}: a corrected image is no cloud of points; `moiregauge convert` writes those"
+        "--export {name}: corrected images cannot be written as points. `moiregauge convert` writes points"
     );
     ensure!(
         path.parent().is_none_or(|p| p == Path::new("")),
-        "--export {name}: expected a name without folders; it goes into --out"
+        "--export {name}: expected a name without folders; the file is written into --out"
     );
     Ok(Export {
         folder: path

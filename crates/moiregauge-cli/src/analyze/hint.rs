@@ -21,11 +21,11 @@ pub(crate) fn advice(error: &InputError) -> Option<String> {
         InputError::Measure(MeasureError::NoSize) => "give the size, as in --size 70nm×70nm",
         InputError::Measure(MeasureError::Lattice { error, .. }) => match error {
             LatticeError::Contradicted { .. } | LatticeError::NowhereTogether => {
-                "tell which lattice is meant, or where it is: --near WAVELENGTH, --lattice, --region or --mask"
+                "say which lattice to measure, or where it is: --near WAVELENGTH, --lattice, --region or --mask"
             }
             LatticeError::NoPeaks { .. } => "try --method fourier",
             LatticeError::FewerLattices { found, .. } => {
-                return Some(format!("--moires {found} measures what is there"));
+                return Some(format!("--moires {found} measures those that were found"));
             }
             _ => return None,
         },

@@ -12,26 +12,26 @@ use crate::paths::expand;
 
 /// The options for it.
 #[derive(clap::Args, Clone, Debug, Default)]
-#[command(next_help_heading = "Orientation of a layer: tells isotropic strain from twist")]
+#[command(next_help_heading = "Orientation of a layer: separates isotropic strain from twist")]
 pub(crate) struct OrientationArgs {
-    /// Orientation of the atomic lattice or of a crystal edge in the frame of the scans, degrees
-    /// counter-clockwise from x, and its standard uncertainty, as in 12.3±0.2 or 12.3+-0.2; any of the
-    /// equivalent directions will do
+    /// Orientation of the atomic lattice or of a crystal edge in the frame of the scans, degrees counter-clockwise from
+    /// x, and its standard uncertainty, as in 12.3±0.2 or 12.3+-0.2; any of the equivalent directions may be given
     #[arg(long, value_name = "DEG±SIGMA", allow_hyphen_values = true, value_parser = parse_angle)]
     lattice_angle: Option<Angle>,
-    /// The layer it is that of: 1, the lower one and the reference (of equal layers, the one that counts
-    /// as unstrained), or 2. Of a strained layer 2 the mean over its three directions is meant
+    /// The layer that --lattice-angle belongs to: 1, the lower one and the reference (with equal layers, the one taken
+    /// as unstrained), or 2. For a strained layer 2, give the mean over its three directions
     #[arg(long, value_name = "1|2", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=2))]
     lattice_angle_layer: u8,
-    /// The vector it is that of
+    /// The vector that --lattice-angle belongs to
     #[arg(long, value_enum, default_value_t = DirectionArg::Atomic)]
     lattice_angle_of: DirectionArg,
-    /// Atomically resolved images of the layer --lattice-angle-layer, taken with the frame and the sensors of
-    /// the scans: the program measures the orientation. Best up and down, which takes out their own drift
+    /// Atomically resolved images of the layer --lattice-angle-layer, taken with the same scan angle and sensors as the
+    /// scans: the program measures the orientation. Frames up and down are best, because their drift can then be
+    /// removed
     #[arg(long, value_name = "FILE", num_args = 1.., conflicts_with_all = ["lattice_angle", "lattice_angle_of"])]
     atomic: Vec<PathBuf>,
-    /// Orientation of the other layer, as --lattice-angle: of two equal layers, one orientation leaves the sense
-    /// of the twist open, both tell it
+    /// Orientation of the other layer, as --lattice-angle. With two equal layers one orientation leaves the sense of
+    /// the twist open; two determine it
     #[arg(long, value_name = "DEG±SIGMA", allow_hyphen_values = true, value_parser = parse_angle)]
     lattice_angle_2: Option<Angle>,
     /// The sense of the twist of layer 2 against layer 1, if it is known: positive is counter-clockwise

@@ -61,7 +61,7 @@ impl Output {
         let exports = export::all(&task.run.export)?;
         anyhow::ensure!(
             PARQUET || !task.run.parquet,
-            "--parquet: this program was built without it"
+            "--parquet: this program was built without Parquet"
         );
         let moires = (1..=6).map(|n| format!("moire-{n}/"));
         let exported = exports.iter().map(|e| format!("{}/", e.folder));

@@ -26,13 +26,14 @@ use crate::say::say;
 /// The first line of the file.
 const TITLE: &str = "Calibration of a scanner, for `moiregauge analyze --calibration FILE`.";
 
-/// Measure gain, mismatch and orthogonality of a scanner on images of a known lattice
+/// Measure gain, mismatch and orthogonality of a scanner from images of a known lattice
 ///
-/// The lattice of each image is found from its known size, at any orientation; frames up and down (or of both
-/// slow axes, or of two line rates) separate the drift. What is left against the known lattice is the
-/// distortion of the scanner: of its position sensors, or of its nominal coordinates where there are none. A
-/// turn is not seen. `moiregauge analyze --calibration FILE` corrects positions with it and takes its errors
-/// into the budget. Frames of one direction give the distortion too, but not what of it is drift.
+/// The lattice of each image is found from its known size, at any orientation; frames up and down (or of both slow
+/// axes, or of two line rates) separate the drift. The remaining difference from the known lattice is the distortion of
+/// the scanner: of its position sensors, or of its nominal coordinates if there are none. A rotation of the axes cannot
+/// be measured, because the orientation of the known lattice is not known. `moiregauge analyze --calibration FILE`
+/// corrects positions with the result and takes its errors into the budget. With frames of one direction only, drift
+/// cannot be separated from the distortion.
 #[derive(clap::Args, Clone, Debug)]
 #[command(after_long_help = "\
 Examples:
@@ -66,13 +67,13 @@ pub(crate) struct CalibrateArgs {
     /// File for the calibration (TOML)
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Standard deviation of each component of a drift that the frames cannot tell, nm/min
+    /// Standard deviation of each component of the drift, nm/min, where the frames do not determine it
     #[arg(long, value_name = "NM/MIN", default_value_t = 1.0, value_parser = numbers::number(numbers::NOT_NEGATIVE))]
     drift_sigma: f64,
     /// Channel that shows the lattice [default: the first of the usual ones]
     #[arg(long, value_name = "NAME")]
     channel: Option<String>,
-    /// Of several images of the channel in one file (pages, frames) this one [default: the first]
+    /// Number of the image, if a file holds several images of the channel (pages, frames) [default: the first]
     #[arg(long, value_name = "N", value_parser = numbers::count(1, MOST_IMAGES))]
     image: Option<usize>,
     /// Line directions to use [default: both]
@@ -83,7 +84,7 @@ pub(crate) struct CalibrateArgs {
     background: Option<BackgroundArg>,
     #[command(flatten)]
     known: KnownArgs,
-    /// Write over an earlier calibration
+    /// Replace an earlier calibration
     #[arg(long, requires = "out")]
     force: bool,
     /// Print nothing but errors
@@ -130,7 +131,7 @@ pub(crate) fn run(args: &CalibrateArgs, job: &Job) -> anyhow::Result<ExitCode> {
                 Unusable::NoErrors => "; give --line-rate",
                 _ => "",
             };
-            anyhow::anyhow!("{} is not written: {why}{help}", out.display())
+            anyhow::anyhow!("{} was not written: {why}{help}", out.display())
         })?;
         file.write(document.to_toml(TITLE)?.into_bytes())?;
         if !args.quiet {
@@ -153,7 +154,7 @@ fn with_hint(lost: NotMeasured) -> FailedInput {
     let mut error = with_advice(lost.error);
     if seen {
         error =
-            error.context("looking for the known lattice (another --channel may show it better)");
+            error.context("the known lattice was not found (another --channel may show it better)");
     }
     FailedInput {
         file: in_words(&lost.file),
@@ -164,9 +165,9 @@ fn with_hint(lost: NotMeasured) -> FailedInput {
 impl CalibrateArgs {
     fn request(&self) -> anyhow::Result<CalibrateRequest> {
         let lattice = self.known_lattice()?;
-        lattice
-            .cell()
-            .context("the known lattice has no area: expected two vectors that are not parallel")?;
+        lattice.cell().context(
+            "the vectors of the known lattice are parallel; expected two different directions",
+        )?;
         let defaults = Settings::default();
         Ok(CalibrateRequest {
             lattice,

@@ -44,21 +44,21 @@ pub(super) fn summary(calibration: &CalibrationFound) -> String {
             gain,
             "%",
             &noise[0],
-            "lengths are shown too long by this, mean of x and y",
+            "lengths in the image are too long by this, mean of x and y",
         ),
         (
             "mismatch",
             mismatch,
             "%",
             &noise[1],
-            "along x by this much more than along y",
+            "lengths along x are too long by this much more than along y",
         ),
         (
             "orthogonality",
             right,
             "mrad",
             &noise[2],
-            "the axes shown enclose a right angle less this",
+            "the angle between the axes in the image is 90° less this",
         ),
     ];
     for (name, value, unit, noise, words) in rows {
@@ -92,7 +92,7 @@ fn one_set(text: &mut String, set: &CalibratedSet) {
         None => text.push_str("  drift         not separated from gain and shear\n"),
     }
     if !set.used {
-        text.push_str("  not used: other sets tell their drift\n");
+        text.push_str("  not used: the drift of other sets is known better\n");
     }
     text.push('\n');
 }

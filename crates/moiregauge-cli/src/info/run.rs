@@ -16,8 +16,7 @@ use crate::paths::expand;
 /// Show what scan files hold: channels, units, sizes, directions, scaling
 ///
 /// Reads each file and prints its channels with their statistics, how counts become values, and
-/// what is missing for the moiré analysis. Of a damaged file the rest is shown; the exit code tells
-/// of the failure.
+/// what is missing for the moiré analysis. Of a damaged file the readable part is shown; the exit code is then not 0.
 #[derive(clap::Args, Clone, Debug)]
 #[command(after_long_help = "\
 Examples:

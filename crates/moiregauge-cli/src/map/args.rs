@@ -15,7 +15,7 @@ use crate::numbers;
 ///
 /// The scans are analysed first as `moiregauge analyze` does; their drift and sensors correct the maps. Local
 /// wave vectors of all harmonics come from the phases under a Gaussian window; maps of scans of one place are
-/// compared and averaged. Nodes that are not to be believed (edges, weak signal, defects, boundaries) are
+/// compared and averaged. Bad nodes (edges, weak signal, defects, boundaries) are
 /// marked with the reason.
 #[derive(clap::Args, Clone, Debug)]
 #[command(after_long_help = "\
@@ -36,15 +36,14 @@ pub(crate) struct MapArgs {
     /// How local lattices are measured
     #[arg(help_heading = "Maps", long, value_enum, default_value_t = MapMethodArg::Demodulation)]
     map_method: MapMethodArg,
-    /// Width of the Gaussian window (standard deviation), nm; a point becomes 2.35 of it wide [default: as
-    /// wide as the lattice stays straight, at least 0.6 periods]. By tiles: the side of a tile [default: 6
-    /// periods]
+    /// Width of the Gaussian window (standard deviation), nm; the resolution is 2.35 times this [default: as wide as
+    /// the lattice stays straight, at least 0.6 periods]. With tiles: the side of a tile [default: 6 periods]
     #[arg(long, value_name = "NM", value_parser = numbers::number(numbers::LENGTH_NM), help_heading = "Maps")]
     window: Option<f64>,
-    /// Distance of the nodes, nm [default: a third of the window, two pixels at least; a quarter of a tile]
+    /// Distance of the nodes, nm [default: a third of the window, at least two pixels; a quarter of a tile]
     #[arg(long, value_name = "NM", value_parser = numbers::number(numbers::LENGTH_NM), help_heading = "Maps")]
     step: Option<f64>,
-    /// Map in bands, as images of more than 20 million pixels are; several files are put side by side
+    /// Map in bands, as is always done for images of more than 20 million pixels; several files are put side by side
     #[arg(help_heading = "Maps", long)]
     in_bands: bool,
     /// Margin at the edges, in windows [default: 2, or a quarter of the frame where that is less]
@@ -77,7 +76,7 @@ impl From<MapMethodArg> for MapMethod {
 impl MapArgs {
     /// The options of the run to be repeated, with the place and the words of this one.
     pub(super) fn again(&self, task: &Task) -> anyhow::Result<Self> {
-        let no_map = "--replay: the document does not hold the options of a map";
+        let no_map = "--replay: the document has no options of a map";
         let recorded = task.run.arguments.split_first();
         let (_, options) = recorded
             .filter(|(command, _)| *command == "map")
@@ -95,12 +94,12 @@ impl MapArgs {
     pub(super) fn check(&self, task: &Task) -> anyhow::Result<()> {
         ensure!(
             task.run.atomic.is_none() && task.run.export.is_empty() && !task.run.parquet,
-            "--atomic, --export and --parquet are for `moiregauge analyze`: a map has no use for them"
+            "--atomic, --export and --parquet belong to `moiregauge analyze`; a map does not use them"
         );
         self.request().check().map_err(in_words)?;
         ensure!(
             self.analyze.survey_image().is_none(),
-            "--survey-image is for analyze"
+            "--survey-image belongs to `moiregauge analyze`"
         );
         Ok(())
     }

@@ -8,11 +8,11 @@ use moiregauge_pipeline::maps::{self, DomainSearch};
 #[derive(clap::Args, Clone, Debug)]
 #[command(next_help_heading = "Domains at small angles")]
 pub(super) struct DomainArgs {
-    /// Look for nodes and the triangles between them: twist and strain of each where the lattice relaxes into
-    /// domains. auto: only where maps of phases are in doubt (twist below 0.5°, fast changes, no good node)
+    /// Find the nodes and the triangles between them, with twist and strain of each triangle, where the lattice relaxes
+    /// into domains. auto: only where maps of phases are in doubt (twist below 0.5°, fast changes, no good node)
     #[arg(long, value_enum, default_value_t = When::Auto)]
     domains: When,
-    /// Whether nodes are bright or dark [default: what the image tells]
+    /// Whether nodes are bright or dark [default: found from the image]
     #[arg(long, value_enum)]
     nodes: Option<Look>,
 }

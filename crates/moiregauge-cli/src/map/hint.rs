@@ -18,7 +18,9 @@ pub(super) fn in_words(error: NotMapped) -> anyhow::Error {
             anyhow::anyhow!("{} {outside}", place(outside.is_line, ""))
         }
         NotMapped::SeveralMoires(count) => {
-            anyhow::anyhow!("maps are made of one moiré; --moires {count} is for analyze")
+            anyhow::anyhow!(
+                "a map is made of one moiré; --moires {count} belongs to `moiregauge analyze`"
+            )
         }
         NotMapped::NoLattice { why, stripes } => {
             let words = analyze::in_words(*why);
@@ -56,8 +58,8 @@ fn of_bands(error: NoBands) -> anyhow::Error {
 fn of_stripes(error: NoStripes) -> anyhow::Error {
     match error {
         NoStripes::NoTwist(file) => anyhow::anyhow!(
-            "{} shows stripes and no lattice: --region, --profile, --device, --wanted and --map-method tiles need twist \
-             and strain, and one wave vector has none",
+            "{} shows stripes and no lattice. --region, --profile, --device, --wanted and --map-method tiles need \
+             twist and strain, which one wave vector does not determine",
             file.display()
         ),
         NoStripes::Input(error) => with_advice(error),

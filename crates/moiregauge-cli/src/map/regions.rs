@@ -16,8 +16,8 @@ use crate::numbers;
 #[derive(clap::Args, Clone, Debug)]
 #[command(next_help_heading = "Regions of the map")]
 pub(super) struct RegionArgs {
-    /// Mean, spread and errors within a box: lower left corner, width, height; or within a polygon, its corners
-    /// apart by blanks (flake='0,0 100,10 60,80'); nm, or with a unit (bar=0.1um,0.2um,1um,500nm); may be repeated
+    /// Mean, spread and errors within a box (lower left corner, width, height) or within a polygon (its corners
+    /// separated by blanks: flake='0,0 100,10 60,80'); nm, or with a unit (bar=0.1um,0.2um,1um,500nm); may be repeated
     #[arg(long, value_name = "NAME=X,Y,W,H", value_parser = parse_region, allow_hyphen_values = true)]
     region: Vec<Region>,
     /// Twist, strain and wavelength along a line; nm, or with a unit; may be repeated
@@ -26,15 +26,15 @@ pub(super) struct RegionArgs {
     /// The most uniform areas of this size (200nm×100nm): where the twist varies least, ranked
     #[arg(long, value_name = "W×H", value_parser = parse_size)]
     device: Option<[f64; 2]>,
-    /// Orientations of the device to try, evenly over half a turn; 1: along x only
+    /// Number of orientations of the device to try, evenly over half a turn; 1: along x only
     #[arg(long, value_name = "N", default_value_t = 1, requires = "device",
         value_parser = clap::value_parser!(u16).range(1..=180))]
     device_angles: u16,
-    /// How many areas to list
+    /// Number of areas to list
     #[arg(long, value_name = "N", default_value_t = 10, requires = "device",
         value_parser = clap::value_parser!(u16).range(1..=1000))]
     device_count: u16,
-    /// How much of the map has this twist, degrees: 1.05±0.02 or 1.05+-0.02
+    /// Find how much of the map has this twist, degrees: 1.05±0.02 or 1.05+-0.02
     #[arg(long, value_name = "TWIST±DEG", value_parser = parse_wanted)]
     wanted: Option<WantedTwist>,
 }
@@ -142,7 +142,7 @@ pub(crate) fn parse_region(text: &str) -> Result<Region, String> {
     if let Some(&[x, y, w, h]) = numbers.as_deref() {
         if !(w > 0.0 && h > 0.0) {
             return Err(format!(
-                "width and height of a box are above 0, found {w} and {h} nm"
+                "width and height of a box must be above 0, found {w} and {h} nm"
             ));
         }
         return Ok(Region::rectangle(name, Vector2::new(x, y), [w, h]));
@@ -150,7 +150,7 @@ pub(crate) fn parse_region(text: &str) -> Result<Region, String> {
     let corners = places(rest).ok_or(expected)?;
     if corners.len() < 3 {
         return Err(format!(
-            "a polygon has three corners or more, found {}; {expected}",
+            "a polygon needs at least three corners, found {}; {expected}",
             corners.len()
         ));
     }
@@ -160,7 +160,7 @@ pub(crate) fn parse_region(text: &str) -> Result<Region, String> {
     };
     if region.crosses_itself() || !(region.area() > 0.0) {
         return Err(
-            "the sides of the polygon cross each other, or it has no area: give its corners in order"
+            "the polygon has no area, or its sides cross each other. Give its corners in order"
                 .to_owned(),
         );
     }
@@ -249,7 +249,7 @@ mod tests {
             assert!(parse_region(wrong).is_err(), "{wrong}");
         }
         let error = parse_region("t=0,0 1,1").unwrap_err();
-        assert!(error.contains("three corners or more, found 2"), "{error}");
+        assert!(error.contains("at least three corners, found 2"), "{error}");
         assert!(parse_line("l=0,0 0,0").is_err() && parse_line("l=0,0").is_err());
         assert!(parse_wanted("1.05").is_err() && parse_wanted("1±0").is_err());
     }

@@ -14,10 +14,9 @@ use crate::numbers;
 
 /// The moiré of two layers, or the layers behind a moiré
 ///
-/// Forwards: layers, twist and strain give the moiré vectors, wavelengths, angles, cell area and carrier
-/// density. Backwards: three wavelengths or two vectors give twist and strain, all solutions, and what
-/// isotropic strain does to them. Layer 1 is the lower one and the reference; layer 2 lies on it, is stretched
-/// and then turned by the twist.
+/// Forwards: layers, twist and strain give the moiré vectors, wavelengths, angles, cell area and carrier density.
+/// Backwards: three wavelengths or two vectors give twist and strain, with all solutions and the effect of isotropic
+/// strain. Layer 1 is the lower one and the reference; layer 2 lies on it, is stretched and then turned by the twist.
 #[derive(clap::Args, Clone, Debug)]
 #[command(after_long_help = "\
 Examples:
@@ -44,7 +43,7 @@ pub(crate) struct MoireArgs {
     /// Twist of layer 2 against layer 1, degrees
     #[arg(help_heading = "Forwards: the moiré of two layers", long, value_name = "DEG", allow_negative_numbers = true, conflicts_with_all = ["wavelengths", "vectors"], value_parser = numbers::number(numbers::ANGLE_DEG))]
     twist: Option<f64>,
-    /// Uniaxial strain of layer 2, per cent: that much along the axis, −ν times as much across
+    /// Uniaxial strain of layer 2, per cent: ε along the axis, −ν ε across
     #[arg(help_heading = "Forwards: the moiré of two layers", long, value_name = "PERCENT", allow_negative_numbers = true, conflicts_with_all = ["wavelengths", "vectors"], value_parser = numbers::number(numbers::STRAIN_PERCENT))]
     strain: Option<f64>,
     /// Axis of the strain, degrees, counted from the reciprocal vectors of layer 1 (φ)
@@ -54,11 +53,11 @@ pub(crate) struct MoireArgs {
         allow_negative_numbers = true,
         requires = "strain", value_parser = numbers::number(numbers::ANGLE_DEG))]
     strain_axis: Option<f64>,
-    /// Strain of layer 2 that is the same in all directions, per cent, on top
+    /// Isotropic (biaxial) strain of layer 2, per cent, added to the uniaxial one
     #[arg(help_heading = "Forwards: the moiré of two layers", long, value_name = "PERCENT", allow_negative_numbers = true, conflicts_with_all = ["wavelengths", "vectors"], value_parser = numbers::number(numbers::STRAIN_PERCENT))]
     biaxial: Option<f64>,
-    /// Orientation of layer 1, degrees; backwards with its standard uncertainty, as in 11.2±0.3, and it
-    /// gives the whole strain tensor
+    /// Orientation of layer 1, degrees. Backwards: give its standard uncertainty too, as in 11.2±0.3, to get the whole
+    /// strain tensor
     #[arg(
         help_heading = "Layers",
         long,
@@ -66,13 +65,13 @@ pub(crate) struct MoireArgs {
         allow_hyphen_values = true
     )]
     lattice_angle: Option<String>,
-    /// The layer it is that of, backwards
+    /// Backwards: the layer that --lattice-angle belongs to
     #[arg(help_heading = "Layers", long, value_name = "1|2", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=2))]
     lattice_angle_layer: u8,
-    /// The vector it is that of
+    /// The vector that --lattice-angle belongs to
     #[arg(help_heading = "Layers", long, value_enum, default_value_t = DirectionArg::Atomic)]
     lattice_angle_of: DirectionArg,
-    /// Backwards: orientation of the other layer with its standard uncertainty; of two equal layers one orientation
+    /// Backwards: orientation of the other layer with its standard uncertainty; with two equal layers one orientation
     /// leaves the sense of the twist open
     #[arg(help_heading = "Backwards: the layers behind a moiré", long, value_name = "DEG±SIGMA", allow_hyphen_values = true, value_parser = parse_angle, requires_all = ["lattice_angle", "vectors"])]
     lattice_angle_2: Option<Angle>,
@@ -92,7 +91,7 @@ pub(crate) struct MoireArgs {
         value_delimiter = ',',
         conflicts_with = "vectors", value_parser = numbers::number(numbers::LENGTH_NM))]
     wavelengths: Vec<f64>,
-    /// What the three wavelengths are: they differ as soon as there is strain
+    /// How the three wavelengths were measured; the two ways differ if there is strain
     #[arg(
         help_heading = "Backwards: the layers behind a moiré",
         long,
@@ -117,7 +116,7 @@ pub(crate) struct MoireArgs {
     /// Draw the cell: a name that ends in .svg or .png
     #[arg(long, value_name = "FILE")]
     pub(super) figure: Option<PathBuf>,
-    /// Write over a figure that exists
+    /// Replace a figure that exists
     #[arg(long, requires = "figure")]
     pub(super) force: bool,
     /// Print JSON
@@ -209,10 +208,10 @@ impl MoireArgs {
             };
             let Some(meaning) = self.meaning else {
                 bail!(
-                    "three wavelengths have two meanings: the lengths of the vectors between neighbouring \
-                     spots of the image (--meaning real-space), or 4π/(√3|K|) of the three spots of its \
-                     Fourier transform (--meaning k-space). They are equal without strain only; 13.72, 12.7 and \
-                     10.18 nm mean a twist of 1.190° or of 1.152°"
+                    "how were the three wavelengths measured? As distances between neighbouring spots of the image: \
+                     add --meaning real-space. As 4π/(√3|K|) from the spots of its Fourier transform: add --meaning \
+                     k-space. The two differ if there is strain: 13.72, 12.7 and 10.18 nm give a twist of 1.190° \
+                     (real-space) or 1.152° (k-space)"
                 );
             };
             return Ok(Given::Wavelengths {

@@ -79,7 +79,8 @@ fn meaning(text: &mut String, document: &MoireDocument, readings: &Readings, axe
         let sigma = document.twist_strain.and_then(|t| t.twist_deg.sigma);
         let _ = writeln!(
             text,
-            "  none: the moiré is larger than any twist makes it; the nearest is that of aligned layers, twist 0 ± {:.3}°",
+            "  none: the moiré is larger than any twist can make it; the nearest reading is aligned layers, twist 0 ± \
+             {:.3}°",
             sigma.unwrap_or(f64::INFINITY)
         );
     }
@@ -95,7 +96,8 @@ fn meaning(text: &mut String, document: &MoireDocument, readings: &Readings, axe
     if !others.is_empty() {
         let _ = writeln!(
             text,
-            "the same lattice by other pairs of its waves (θ > 0; all with up to {:.2} % of strain are in --json):",
+            "other readings of the same lattice, by other pairs of its waves (θ > 0; --json lists all with up to {:.2} \
+             % of strain):",
             100.0 * readings.complete_to
         );
     }
@@ -114,7 +116,7 @@ fn meaning(text: &mut String, document: &MoireDocument, readings: &Readings, axe
         let [low, high] = found.interval;
         let _ = writeln!(
             text,
-            "\n  {}° to {}° are open for isotropic strains of {:.3} % (1 σ) and either sign of the strain (95 %)",
+            "\n  {}° to {}° are possible (95 %) with isotropic strains of {:.3} % (1 σ) and either sign of the strain",
             fixed(low * degree, 4),
             fixed(high * degree, 4),
             100.0 * found.prior
@@ -125,7 +127,7 @@ fn meaning(text: &mut String, document: &MoireDocument, readings: &Readings, axe
         text.push_str("with the orientation of the layer:\n");
         strain_tensor(text, &tensor.best, tensor.poisson_ratio);
         if let Some(opposite) = &tensor.opposite {
-            text.push_str("  as good, with the other sense of the twist:\n");
+            text.push_str("  equally good, with the other sense of the twist:\n");
             strain_tensor(text, &opposite.found, tensor.poisson_ratio);
         }
         for other in &tensor.alternatives {

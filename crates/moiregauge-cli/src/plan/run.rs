@@ -13,13 +13,13 @@ use crate::numbers;
 use crate::say::say;
 use crate::scanner::ScannerArgs;
 
-/// How many scans, how fast and how large, for the errors that are wanted
+/// Find how many scans, how fast and how large, give the errors you want
 ///
-/// For several frame sizes and line rates the smallest number of alternating scans is sought that gives the wanted
-/// standard errors, by the Fisher information of pixel and sensor noise and the covariance of the joint fit;
-/// `moiregauge validate` simulates the same. Beside it stands what no number of scans makes smaller: the
-/// calibration of the scanner, the lattice constant, isotropic strain. A wish below that cannot be reached, and the
-/// plan says what stands in the way.
+/// For several frame sizes and line rates the program finds the smallest number of alternating scans that gives the
+/// wanted standard errors. It uses the Fisher information of pixel and sensor noise and the covariance of the joint
+/// fit; `moiregauge validate` checks the same by simulation. Calibration of the scanner, lattice constant and isotropic
+/// strain add errors that more scans do not make smaller. If these alone exceed what you want, the plan says so and
+/// names the largest.
 #[derive(clap::Args, Clone, Debug)]
 #[command(after_long_help = "\
 Examples:
@@ -29,8 +29,8 @@ Examples:
   moiregauge plan --strain-sigma 0.02 --config mine.toml --out plan.toml
   moiregauge validate --config plan.toml              (simulates the recommended plan)
 
-The wanted errors are meant with calibration and model; one that these alone exceed is held against the
-statistical error of the scans, and said to be out of reach.")]
+The wanted errors include calibration and model. If these alone exceed a wanted error, it is reported as out of
+reach, and the plan reaches it with the statistical error of the scans alone.")]
 pub(crate) struct PlanArgs {
     /// Wanted standard error of the twist, degrees
     #[arg(long, value_name = "DEG", required_unless_present_any = ["strain_sigma", "drift_sigma"], value_parser = numbers::number(numbers::WISH))]
@@ -41,10 +41,10 @@ pub(crate) struct PlanArgs {
     /// Wanted standard error of each component of the drift, nm/min
     #[arg(long, value_name = "NM/MIN", value_parser = numbers::number(numbers::WISH))]
     drift_sigma: Option<f64>,
-    /// The instrument and the sample: a file as `moiregauge simulate --print-config` prints it
+    /// Instrument and sample, from a file in the form of `moiregauge simulate --print-config`
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
-    /// The instrument and the sample: those of your own scans of one set
+    /// Instrument and sample, from your own scans of one set
     #[arg(long, value_name = "FILE", num_args = 1.., conflicts_with = "config")]
     like: Vec<PathBuf>,
     /// Largest frame, nm along the longer side [default: twice that of the conditions]
@@ -53,8 +53,8 @@ pub(crate) struct PlanArgs {
     /// Largest line rate, Hz [default: twice that of the conditions]
     #[arg(long, value_name = "HZ", value_parser = numbers::number(numbers::LINE_RATE_HZ))]
     max_rate: Option<f64>,
-    /// The noise of a pixel does not depend on the time spent on it. Otherwise its square is taken to fall with
-    /// that time, from the line rate of the conditions on
+    /// Assume that the noise of a pixel does not depend on the time per pixel. By default its variance is inversely
+    /// proportional to this time
     #[arg(long)]
     noise_per_pixel: bool,
     /// Standard uncertainty of the times of frames, s
@@ -65,7 +65,7 @@ pub(crate) struct PlanArgs {
     /// Write the recommended plan as conditions for `moiregauge validate` and `simulate`
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Write over an earlier plan
+    /// Replace an earlier plan
     #[arg(long, requires = "out")]
     force: bool,
 }
@@ -93,8 +93,8 @@ pub(crate) fn run(args: &PlanArgs, job: &Job) -> anyhow::Result<ExitCode> {
         PlanError::Cancelled(cancelled) => cancelled.into(),
         PlanError::Settings(error) => crate::config::with_option(error),
         PlanError::NoFrame => anyhow::anyhow!(
-            "no frame within --max-size and --max-rate shows the lattice: at least four periods across it, five pixels \
-             per period, and a signal that stands out of the noise are needed"
+            "no frame within --max-size and --max-rate shows the lattice. Needed are at least four periods across the \
+             frame, five pixels per period, and a signal above the noise"
         ),
         other => other.into(),
     })?;

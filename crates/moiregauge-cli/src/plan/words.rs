@@ -120,12 +120,12 @@ fn recommendation(text: &mut String, best: &Plan) {
     let _ = writeln!(
         text,
         "{}: {} scans, up and down in turn, {width:.0} nm × {height:.0} nm in {} × {} pixels at {} Hz: {:.1} minutes. \
-         One slow axis will do; as many scans of the other one, the frame turned by 90°, show besides whether the fast \
+         One slow axis is enough. The same number of scans with the frame turned by 90° also shows whether the fast \
          axis lags",
         if best.met {
             "recommended"
         } else {
-            "nothing in the table will do; nearest to it"
+            "no row of the table reaches it; the nearest is"
         },
         raster.scans,
         raster.pixels[0],
@@ -135,8 +135,8 @@ fn recommendation(text: &mut String, best: &Plan) {
     );
     if !best.linked {
         text.push_str(
-            "phases of the frames cannot be linked (no position sensors, pauses that are too long, or a drift that is \
-             not known well enough): the drift comes from wave vectors alone\n",
+            "the phases of the frames cannot be linked, so the drift comes from wave vectors alone. Reasons can be \
+             missing position sensors, long pauses, or a drift that is not known well enough\n",
         );
     }
 }
@@ -150,8 +150,8 @@ fn limit(text: &mut String, one: &OutOfReach) {
     };
     let _ = writeln!(
         text,
-        "out of reach: {name} ± {}{sign}. Calibration and model alone make ± {}{sign}, most of it {} (± {}{sign}), and \
-         no scan of this sample makes that smaller; {}. The plan has the statistical error that is wanted",
+        "out of reach: {name} ± {}{sign}. Calibration and model alone give ± {}{sign}, most of it {} (± {}{sign}), and \
+         more scans do not make this smaller; {}. The plan reaches the wanted value with its statistical error alone",
         one.wish,
         two_digits(one.floor),
         source(one.largest),
@@ -163,7 +163,7 @@ fn limit(text: &mut String, one: &OutOfReach) {
 fn remedy(limit: Limit) -> &'static str {
     match limit {
         Limit::Gain | Limit::Mismatch | Limit::Orthogonality => {
-            "`moiregauge calibrate` on a known lattice does"
+            "`moiregauge calibrate` with a known lattice does"
         }
         Limit::Pitch => "recording the position sensors does",
         Limit::LatticeConstant => "a better known lattice constant does",

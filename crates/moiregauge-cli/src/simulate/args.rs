@@ -9,7 +9,7 @@ use moiregauge::simulate::{FirstDirection, MOST_PIXELS, Pattern, SampleFeature, 
 use crate::config::named_layers;
 use crate::numbers;
 
-/// Write simulated NanoScope sets and the truth about them
+/// Write simulated NanoScope sets together with their true values
 ///
 /// Twisted, strained layers are scanned by a drifting, noisy instrument with position sensors. Each
 /// set goes into a folder of its own: scan.000.spm, scan.001.spm … and truth.json, which holds the
@@ -37,7 +37,7 @@ pub(crate) struct SimulateArgs {
     /// Folder for the sets; made if it does not exist
     #[arg(long, value_name = "DIR", required_unless_present_any = ["print_config", "list_samples"])]
     pub(super) out: Option<PathBuf>,
-    /// Settings from a TOML file; options on the command line come on top of it
+    /// Settings from a TOML file; options on the command line override them
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
     /// Print all settings as TOML and write nothing
@@ -50,14 +50,14 @@ pub(crate) struct SimulateArgs {
     /// List the classes for --sample with their numbers and write nothing
     #[arg(long)]
     pub(super) list_samples: bool,
-    /// Draw twist, strain, orientation, drift, noise, size and the numbers that --sample leaves open, by --seed;
-    /// other options come on top of it
+    /// Draw at random (by --seed) twist, strain, orientation, drift, noise, size and the numbers that --sample leaves
+    /// open; other options override these
     #[arg(help_heading = "Sample", long)]
     vary: bool,
-    /// Write over files of the same names
+    /// Replace files of the same names
     #[arg(long)]
     pub(super) force: bool,
-    /// Write the three sets of arXiv 2406.08681; of the other options only --seed counts
+    /// Write the three sets of arXiv 2406.08681; of the other options only --seed has an effect
     #[arg(long, conflicts_with_all = ["config", "print_config", "sample", "vary"])]
     pub(super) paper: bool,
     /// Name of the set and of its folder
@@ -98,7 +98,7 @@ pub(crate) struct SimulateArgs {
         conflicts_with = "material"
     )]
     layers: Option<String>,
-    /// Show the atoms of this layer in place of the moiré: 1, the lower one, or 2
+    /// Show the atoms of this layer instead of the moiré: 1 (the lower one) or 2
     #[arg(help_heading = "Sample", long, value_name = "1|2", value_parser = clap::value_parser!(u8).range(1..=2))]
     atoms: Option<u8>,
     /// Twist, degrees
@@ -107,7 +107,7 @@ pub(crate) struct SimulateArgs {
     /// Uniaxial strain of layer 2, per cent
     #[arg(help_heading = "Sample", long, value_name = "PERCENT", allow_negative_numbers = true, value_parser = numbers::number(numbers::STRAIN_PERCENT))]
     strain: Option<f64>,
-    /// Strain of layer 2 that is the same in all directions, on top of the uniaxial one, per cent
+    /// Isotropic (biaxial) strain of layer 2, added to the uniaxial one, per cent
     #[arg(help_heading = "Sample", long, value_name = "PERCENT", allow_negative_numbers = true, value_parser = numbers::number(numbers::STRAIN_PERCENT))]
     biaxial: Option<f64>,
     /// Axis of the strain, counted from layer 1, degrees
@@ -172,7 +172,9 @@ impl SimulateArgs {
             Some(path) => {
                 let text = moiregauge_pipeline::read_text(path)
                     .with_context(|| format!("cannot read {}", path.display()))?;
-                toml::from_str(&text).with_context(|| format!("{} is no set", path.display()))?
+                toml::from_str(&text).with_context(|| {
+                    format!("{} does not describe a set of scans", path.display())
+                })?
             }
             None => Simulation::default(),
         };

@@ -25,7 +25,7 @@ pub(crate) fn run(args: &SimulateArgs, job: &Job) -> anyhow::Result<ExitCode> {
         return Ok(ExitCode::SUCCESS);
     }
     let Some(folder) = &args.out else {
-        bail!("no folder to write to: give --out DIR");
+        bail!("no output folder: give --out DIR");
     };
     let sets = if args.paper {
         paper_sets(args.seed.unwrap_or(Simulation::default().seed))
@@ -33,11 +33,14 @@ pub(crate) fn run(args: &SimulateArgs, job: &Job) -> anyhow::Result<ExitCode> {
         vec![args.settings()?]
     };
     for (set, folder) in sets.iter().zip(write_sets(&sets, folder, args.force, job)?) {
+        let scans = match set.raster.scans {
+            1 => "1 scan".to_owned(),
+            n => format!("{n} scans"),
+        };
         writeln!(
             out,
-            "{}: {} scans, twist {}°, strain {} %, drift ({}, {}) nm/min",
+            "{}: {scans}, twist {}°, strain {} %, drift ({}, {}) nm/min",
             folder.display(),
-            set.raster.scans,
             set.sample.twist_deg,
             set.sample.strain_percent,
             set.drift.velocity_nm_per_min[0],
@@ -74,7 +77,7 @@ pub(crate) fn write_sets(
         SimulationError::Cancelled(cancelled) => cancelled.into(),
         SimulationError::Sink(error) => hinted(error),
         SimulationError::InTheWay(path) => anyhow::anyhow!(
-            "{} is no part of the new set: remove it or choose another --name",
+            "{} is not part of the new set. Remove it or choose another --name",
             path.display()
         ),
         other => other.into(),

@@ -32,7 +32,7 @@ Examples:
   moiregauge validate --method autocorrelation --sets 1000
   moiregauge validate --sample edge --sample hole:share=0.3 --sets 50
   moiregauge validate --sample all --sets 20 --pixels 192
-  moiregauge simulate --print-config > mine.toml     (put in your size, rate, noise …)
+  moiregauge simulate --print-config > mine.toml     (then edit size, rate, noise …)
   moiregauge validate --config mine.toml")]
 pub(crate) struct ValidateArgs {
     /// Number of simulated sets
@@ -41,20 +41,20 @@ pub(crate) struct ValidateArgs {
     /// Estimator of the lattice vectors
     #[arg(long, value_enum, default_value = "lattice")]
     method: MethodArg,
-    /// Conditions: a file as `moiregauge simulate --print-config` prints it
+    /// Conditions, from a file in the form of `moiregauge simulate --print-config`
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
-    /// Conditions: those of your own scans of one set (size, rate, contrast, noise, drift, lattice)
+    /// Conditions, from your own scans of one set (size, rate, contrast, noise, drift, lattice)
     #[arg(long, value_name = "FILE", num_args = 1.., conflicts_with = "config")]
     like: Vec<PathBuf>,
-    /// In place of the table, sets of real samples, as in `moiregauge simulate --sample CLASS --vary`: how many are
-    /// answered, refused, wrong; all for one of each class; may be repeated
+    /// Simulate real samples instead, as in `moiregauge simulate --sample CLASS --vary`, and count how many are
+    /// answered, refused and wrong; all: one of each class; may be repeated
     #[arg(long, value_name = "CLASS[:KEY=VALUE,…]", conflicts_with = "like")]
     sample: Vec<String>,
-    /// Side of the frames, pixels, where no file gives it; small frames are quick
+    /// Side of the frames, pixels, if no file gives it; small frames are faster
     #[arg(long, default_value_t = 128, value_name = "N", value_parser = numbers::count(2, MOST_PIXELS))]
     pixels: usize,
-    /// Scans per set, where no file gives it
+    /// Scans per set, if no file gives it
     #[arg(long, default_value_t = 4, value_name = "N", value_parser = numbers::count(1, 9999))]
     scans: usize,
     /// Seed of all noise

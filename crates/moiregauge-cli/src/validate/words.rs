@@ -38,7 +38,7 @@ pub(super) fn table(found: &Validation) -> String {
     let [one, two] = found.coverage_scatter_percent;
     let _ = writeln!(
         text,
-        "true errors would give 68.3 ± {one:.1} % and 95.4 ± {two:.1} %"
+        "correct errors would give 68.3 ± {one:.1} % and 95.4 ± {two:.1} %"
     );
     if found.failed > 0 {
         let _ = writeln!(
@@ -67,8 +67,8 @@ pub(super) fn samples(tallies: &[Tally]) -> String {
     for tally in tallies {
         text += &line(tally);
     }
-    text += "beyond 5 σ: of the total σ of the twist; without moiré every answer. Pulls are of the statistical σ.\n\
-             Of grains, the one that is nearest to the answer is taken for the truth.\n";
+    text += "beyond 5 σ: more than five total σ of the twist from the truth; without a moiré, every answer.\n\
+             Pulls use the statistical σ. With several grains, the one nearest to the answer counts as the truth.\n";
     text
 }
 

@@ -32,23 +32,24 @@ const NOT_HERE: [&str; 15] = [
     "rotate_to_lab",
 ];
 
-/// Watch a folder while it fills: after each frame twist, strain and drift with their errors
+/// Watch a folder while it fills: after each frame, twist, strain and drift with their errors
 ///
-/// Looks into PATH again and again. A frame that is whole is analysed together with all before it, and one line says
-/// what is known by now, what two more frames would bring, and what is wrong with the way of scanning. The numbers are at
-/// every moment those that `moiregauge analyze PATH` gives. Files may come late, in pieces and in any order; one that
-/// cannot be read is told and ends nothing. A file that is written anew replaces its frame, and one that is deleted takes
-/// it away. Nothing is written into the folder; its subfolders are not searched.
+/// Looks into PATH at regular times. Each complete frame is analysed together with all frames before it. One line shows
+/// the results so far, what two more frames would give, and errors in the way of scanning. At every moment the numbers
+/// are those of `moiregauge analyze PATH`. Files may come late, in pieces and in any order; a file that cannot be read
+/// is reported, and the watch goes on. A file that is written again replaces its frame; a file that is deleted removes
+/// it. Nothing is written into the folder, and its subfolders are not searched.
 ///
-/// Ctrl-C or SIGTERM end the watch, and --until does; the exit code is 0. Started again, it takes what is there.
+/// Ctrl-C, SIGTERM or --until end the watch, with exit code 0. When it is started again, it takes the files that are
+/// there.
 #[derive(clap::Args, Clone, Debug)]
 #[command(
     override_usage = "moiregauge watch [OPTIONS] <PATH>",
     mut_args(hidden),
     mut_arg("paths", |path| path.help("The folder into which the microscope saves").long_help(None)
         .required_unless_present(Resettable::Reset).required(true).num_args(1)),
-    mut_arg("json", |json| json.help("Print one JSON object a line for each new result, and nothing else, on standard \
-        output; what is not known is null").long_help(None)),
+    mut_arg("json", |json| json.help("Print only JSON on standard output: one object on one line for each new result. \
+                                      Values that are not known are null").long_help(None)),
     after_long_help = "\
 Examples:
   moiregauge watch scans/
@@ -67,22 +68,23 @@ pub(crate) struct WatchArgs {
     /// twist=0.01,strain=0.02
     #[arg(long, value_name = "NAME=ERROR,…")]
     until: Option<Until>,
-    /// Time between two looks into the folder
+    /// Time between two readings of the folder
     #[arg(long, value_name = "TIME", default_value = "2s", value_parser = duration::parse)]
     poll: Duration,
-    /// Run this command with the shell for each new result, the line as JSON on its standard input
+    /// Run this shell command for each new result; it gets the line as JSON on its standard input
     #[arg(long, value_name = "COMMAND")]
     exec: Option<String>,
-    /// Kill a command of --exec that takes longer
+    /// Kill a command of --exec that takes longer than this
     #[arg(long, value_name = "TIME", default_value = "60s", value_parser = duration::parse, requires = "exec")]
     exec_timeout: Duration,
-    /// Tell a file that cannot be read after so long without a change
+    /// Report a file that cannot be read and has not changed for this long
     #[arg(long, value_name = "TIME", default_value = "60s", value_parser = duration::parse)]
     patience: Duration,
-    /// Keep what is measured in this file outside the folder: a watch that is started again with it measures nothing twice
+    /// Keep the measured scans in this file outside the folder; a watch that is started again with it measures no scan
+    /// twice
     #[arg(long, value_name = "FILE")]
     keep: Option<PathBuf>,
-    /// Show the watch on a page, too, as `moiregauge serve` does
+    /// Show the watch on a page too, as `moiregauge serve` does
     #[arg(long)]
     serve: bool,
     /// Port of the page [default: one that is free]
@@ -94,7 +96,7 @@ pub(crate) struct WatchArgs {
         requires = "serve"
     )]
     port: u16,
-    /// Open no browser on the page: its address is printed
+    /// Do not open a browser; the address of the page is printed
     #[arg(long, requires = "serve")]
     no_browser: bool,
     #[command(flatten)]

@@ -31,13 +31,16 @@ impl Keep {
             .unwrap_or(Path::new("."));
         ensure!(
             whole(parent) != folder,
-            "{}: nothing is written into the folder that is watched; give a place outside of it",
+            "{}: this is inside the watched folder, where nothing is written. Give a place outside of it",
             option()
         );
         if path.exists() {
             let bytes = moiregauge_pipeline::read(path).with_context(option)?;
             let kept: Kept = serde_json::from_slice(&bytes).with_context(|| {
-                format!("{}: expected what an earlier watch has kept", option())
+                format!(
+                    "{}: expected a file that an earlier watch wrote (--keep)",
+                    option()
+                )
             })?;
             watch.take(kept);
         }

@@ -89,7 +89,7 @@ impl Page {
                 drop(told.send(Err(error)));
             }
         });
-        let address = hears.recv().context("the page does not begin")??;
+        let address = hears.recv().context("the page cannot be started")??;
         if json {
             eprintln!("{address}");
         } else {

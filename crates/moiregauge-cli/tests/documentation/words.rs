@@ -69,7 +69,7 @@ fn keys(schema: &Value) -> BTreeSet<String> {
 
 #[test]
 fn every_key_of_the_documents_is_on_their_pages() {
-    for name in ["results", "map"] {
+    for name in ["results", "map", "watch"] {
         let schema: Value = serde_json::from_str(&read(&schema_of(name))).expect("a schema");
         let page = read(&root().join(format!("docs/reference/{name}.md")));
         let rows = page.lines().filter_map(|line| line.strip_prefix("| `"));
@@ -176,7 +176,7 @@ fn pages_name_no_caveat_that_does_not_exist() {
         reference += &says(&[&command, "--help"]);
     }
     reference += &says(&["config"]);
-    for name in ["results", "map"] {
+    for name in ["results", "map", "watch"] {
         reference += &read(&schema_of(name));
     }
     let is_code = |span: &str| {
@@ -200,6 +200,22 @@ fn pages_name_no_caveat_that_does_not_exist() {
         }
     }
     assert!(seen > codes.len(), "{seen}");
+}
+
+/// The site takes a line that begins with a per cent sign for a comment, and leaves it out.
+#[test]
+fn no_line_begins_as_a_comment() {
+    for page in pages() {
+        let text = read(&page);
+        let (prose, _) = parts(&text);
+        for line in prose.lines() {
+            assert!(
+                !line.trim_start().starts_with('%'),
+                "{}: {line}",
+                page.display()
+            );
+        }
+    }
 }
 
 #[test]

@@ -5,7 +5,9 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-use crate::common::{analyze, caveats, json, number, results, succeed, testdata};
+use crate::common::{
+    analyze, caveats, json, number, program, results, simulate, succeed, testdata,
+};
 
 /// The two grains of an independent example, 256 nm wide with the boundary near the middle, as they are measured with some options.
 fn grain(data: &Path, options: &[&str]) -> Value {
@@ -86,6 +88,57 @@ fn the_lattice_that_was_told_is_measured() {
     assert!(off < 4.0 * sigma + 0.0005, "{value} ± {sigma}");
 }
 
+/// Each grain alone by its number, with the numbers that it has beside the other; the record of the run repeats it.
+#[test]
+fn a_grain_is_chosen_by_its_number() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let place = folder.path();
+    let sample = [
+        "--size",
+        "160",
+        "160",
+        "--sample",
+        "grains:share=0.6,turn=8",
+    ];
+    let scans = simulate(
+        place,
+        &[&["--pixels", "256", "--scans", "2"], &sample[..]].concat(),
+    );
+    let found = |name: &str, options: &[&str]| {
+        let out = place.join(name);
+        let mut command = analyze(&scans, &out);
+        succeed(command.args(["--strain-draws", "0"]).args(options));
+        results(&out)
+    };
+    let both = found("both", &[]);
+    assert_eq!(both["sets"].as_array().expect("sets").len(), 2);
+    for (index, grain) in ["1", "2"].into_iter().enumerate() {
+        let alone = found(grain, &["--grain", grain]);
+        let sets = alone["sets"].as_array().expect("sets");
+        assert_eq!(sets.len(), 1);
+        let name = sets[0]["name"].as_str().expect("a name");
+        assert!(name.ends_with(&format!("grain {grain}")), "{name}");
+        assert_eq!(sets[0]["mean"], both["sets"][index]["mean"]);
+        assert_eq!(alone["settings"]["grain"].to_string(), grain);
+    }
+    let record = place.join("2/results.json");
+    let again = place.join("again");
+    let mut replay = program();
+    replay.args(["analyze", "--replay"]).arg(&record);
+    succeed(replay.arg("--out").arg(&again));
+    assert_eq!(results(&again)["sets"], json(&record)["sets"]);
+    for (grain, expected) in [("3", "no scan shows a grain 3"), ("0", "from 1 to 16")] {
+        let mut command = analyze(&scans, &place.join("none"));
+        let run = command
+            .args(["--grain", grain])
+            .output()
+            .expect("the program runs");
+        assert!(!run.status.success());
+        let words = String::from_utf8_lossy(&run.stderr);
+        assert!(words.contains(expected), "{words}");
+    }
+}
+
 /// What is not there is refused with the reason, and so is a mask of another size.
 #[test]
 fn what_was_told_wrongly_is_refused() {
@@ -96,9 +149,9 @@ fn what_was_told_wrongly_is_refused() {
     let image = data.join("hard/hole");
     let other = mask(folder.path(), "other", |_| true);
     for (options, expected) in [
-        (["--near", "300nm"], "no lattice like the one that was told"),
+        (["--near", "300nm"], "no lattice like the given one"),
         (["--mask", other.to_str().expect("a name")], "512 × 512"),
-        (["--lattice", "10,0,20,0"], "not parallel"),
+        (["--lattice", "10,0,20,0"], "must not be parallel"),
         (["--region", "0,0 1,1"], "three corners"),
     ] {
         let mut command = analyze(&image, &folder.path().join("out"));

@@ -162,7 +162,7 @@ fn nothing_to_look_at_is_no_missing_lattice() {
         let run = run(&mut calibrate(input, &["--material", "graphite"]));
         assert_eq!(run.code, Some(1));
         assert!(
-            run.stderr.contains("nothing could be read"),
+            run.stderr.contains("no image could be read"),
             "{}",
             run.stderr
         );

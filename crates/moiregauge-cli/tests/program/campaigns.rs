@@ -231,7 +231,7 @@ fn what_goes_with_one_sample_is_refused() {
     let root = samples(folder.path());
     let out = folder.path().join("out");
     for (options, words) in [
-        (&["--export", "a.gwy"][..], "--export goes with one sample"),
+        (&["--export", "a.gwy"][..], "--export is for one sample"),
         (&["--shard", "3/2"], "expected a shard"),
         (&["--drift", "NaN", "0"], "--drift"),
     ] {

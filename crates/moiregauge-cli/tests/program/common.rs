@@ -17,6 +17,15 @@ pub(crate) fn program() -> Command {
     Command::new(env!("CARGO_BIN_EXE_moiregauge"))
 }
 
+/// The program where no file can be longer than so many blocks of 512 bytes, as where a disk is full.
+#[cfg(unix)]
+pub(crate) fn with_files_up_to(blocks: usize) -> Command {
+    let mut command = Command::new("sh");
+    let limited = format!("trap '' XFSZ; ulimit -f {blocks}; exec \"$@\"");
+    command.args(["-c", &limited, "sh", env!("CARGO_BIN_EXE_moiregauge")]);
+    command
+}
+
 /// Runs it to the end.
 pub(crate) fn run(command: &mut Command) -> Run {
     let output = command.output().expect("the program starts");

@@ -33,7 +33,7 @@ fn a_code_is_told_at_length() {
     let said = explain(&["drift-undetermined"]);
     for words in [
         "drift-undetermined: serious.",
-        "Meaning: The scans do not tell the drift",
+        "Meaning: The drift cannot be determined from these scans",
         "What to do: Take frames up and down",
         "Options: --drift X Y",
     ] {

@@ -122,7 +122,7 @@ fn a_lattice_that_changes_gives_its_mean() {
     assert!(caveats(&found).contains(&"changing-lattice"));
 }
 
-/// Two grains side by side are two lattices: the larger is measured, the other is named, and no mixture comes out.
+/// Two grains side by side are two results, and no mixture comes out.
 #[test]
 fn two_grains_are_not_mixed() {
     let Some(data) = testdata("two_grains_are_not_mixed") else {
@@ -135,4 +135,15 @@ fn two_grains_are_not_mixed() {
     let least = near[0].min(near[1]);
     assert!(least < 5.0 * sigma, "{value} ± {sigma}: {near:?}");
     assert!(caveats(&found).contains(&"several-grains"));
+    let sets = found["sets"].as_array().unwrap();
+    assert_eq!(sets.len(), 2);
+    let mut twists: Vec<f64> = (sets.iter())
+        .map(|set| number(set, "/uncorrected/twist_deg/value"))
+        .collect();
+    let mut wanted = ["/left_theta_deg", "/right_theta_deg"].map(|grain| number(&truth, grain));
+    twists.sort_by(f64::total_cmp);
+    wanted.sort_by(f64::total_cmp);
+    for (twist, wanted) in twists.iter().zip(wanted) {
+        assert!((twist / wanted - 1.0).abs() < 0.002, "{twist} {wanted}");
+    }
 }

@@ -131,9 +131,9 @@ fn headers_of_another_generator() {
     for (case, words) in [
         (
             "flags_swapped",
-            "but with all slow directions the other way",
+            "but they do with all slow directions the other way",
         ),
-        ("rate_doubled", "but with half the line rate"),
+        ("rate_doubled", "but they do with half the line rate"),
     ] {
         let found = quick(&[&data.join("hard").join(case)], &folder.path().join(case));
         let all = found["caveats"].as_array().unwrap();

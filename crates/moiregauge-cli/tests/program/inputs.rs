@@ -179,7 +179,7 @@ fn images_beyond_memory_are_refused_before_the_work() {
     assert_eq!(ran.code, Some(1), "{}", ran.stderr);
     assert!(
         ran.stderr
-            .contains("16384 × 16384 samples takes 28.2 GB of memory"),
+            .contains("16384 × 16384 samples needs 28.2 GB of memory"),
         "{}",
         ran.stderr
     );

@@ -213,11 +213,11 @@ fn questions_beyond_the_map_are_refused() {
         ),
         (
             ["--profile", "far=0,300 10,400"],
-            "lies outside of the map, which reaches from",
+            "lies outside the map, which reaches from",
         ),
         (
             ["--region", "two=0,0 10,10"],
-            "three corners or more, found 2",
+            "at least three corners, found 2",
         ),
         (["--region", "bow=0,0 20,20 20,0 0,20"], "cross each other"),
         (["--wanted", "1.1"], "as in 1.05±0.02"),

@@ -149,7 +149,7 @@ fn names_that_are_taken_are_found_out_before_the_work() {
             if kind == "analyze" {
                 command.args(few);
             }
-            refused(&mut command, &[top, "in the way"]);
+            refused(&mut command, &[top, "not written by an earlier run"]);
             assert_eq!(names(&taken), [top]);
             std::fs::remove_dir_all(&taken).expect("removed");
         }
@@ -209,7 +209,7 @@ fn a_map_leaves_folders_of_others_alone() {
     std::fs::write(group.join("data"), "mine").expect("written");
     for options in [&[][..], &["--force"]] {
         let mut command = maps::command(folder.path(), "taken", options);
-        refused(&mut command, &["map.zarr", "in the way"]);
+        refused(&mut command, &["map.zarr", "not written by an earlier run"]);
         assert_eq!(names(&group), ["data", "zarr.json"]);
     }
 }
@@ -355,4 +355,13 @@ fn names_that_are_not_unicode() {
         .arg(&odd)
         .args(["--no-report", "--quiet", "--out"]);
     succeed(map.arg(folder.path().join("map")));
+}
+
+#[test]
+fn one_scan_is_told_as_one() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut simulate = program();
+    simulate.arg("simulate").arg("--out").arg(folder.path());
+    let said = succeed(simulate.args(["--scans", "1", "--pixels", "32"])).stdout;
+    assert!(said.contains(": 1 scan, twist"), "{said}");
 }

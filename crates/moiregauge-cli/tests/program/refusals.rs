@@ -130,7 +130,7 @@ fn one_direction_only() {
     assert_eq!(caveats(&found), ["drift-undetermined"]);
     let message = found["caveats"][0]["message"].as_str().unwrap();
     assert!(
-        message.contains("known from elsewhere can be given"),
+        message.contains("known from another measurement can be given"),
         "{message}"
     );
     // The document does not speak of options, the screen does.
@@ -280,7 +280,7 @@ fn numbers_that_make_no_sense() {
     );
     let sigma = ["--lattice-constant-sigma", "1"];
     let run_of_sigma = run(analyze(&scans, &out).args(sigma));
-    refuse(&run_of_sigma, &["an uncertainty"]);
+    refuse(&run_of_sigma, &["the uncertainty"]);
     // The same from a file.
     let config = folder.path().join("settings.toml");
     std::fs::write(&config, "[drift]\nx_nm_per_min = nan\ny_nm_per_min = 0.1").unwrap();

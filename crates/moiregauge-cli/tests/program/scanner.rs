@@ -149,7 +149,7 @@ fn one_moire_is_no_stripes() {
     let refused = run(analyze(&scans, &folder.path().join("out")).args(["--moires", "2"]));
     assert_eq!(refused.code, Some(1));
     assert!(
-        refused.stderr.contains("of which 1 can be found"),
+        refused.stderr.contains("but only 1 can be found"),
         "{}",
         refused.stderr
     );

@@ -24,6 +24,15 @@ struct Serving {
     cookie: String,
 }
 
+/// No server stays behind, whatever became of the test.
+impl Drop for Serving {
+    fn drop(&mut self) {
+        // It may have ended.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
 impl Serving {
     fn start(command: &mut Command) -> Self {
         command.stdout(Stdio::piped()).stderr(Stdio::piped());
@@ -343,6 +352,41 @@ fn killed_servers_lose_nothing_that_was_saved() {
         let (_, bytes) = again.ask("GET", &format!("{path}/results.json"), "");
         assert!(bytes == results, "other bytes");
     }
+}
+
+/// Where nothing can be written, as on a full disk: the result is shown, and that it is not saved is said.
+#[test]
+fn a_full_disk_stops_no_server() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let scans = small_set(folder.path());
+    let keep = folder.path().join("works");
+    let mut command = crate::common::with_files_up_to(16);
+    command.arg("serve").arg(&scans).arg("--no-browser");
+    let serving = Serving::start(command.arg("--keep").arg(&keep));
+    let asked = json!({"files": serving.files(), "run": true});
+    let work = serving.json("POST", "/api/works", &asked);
+    let path = format!("/api/works/{}", work["work"].as_str().expect("an id"));
+    let done = serving.done(&path);
+    assert_eq!(
+        (&done["state"], &done["result"]["saved"]),
+        (&json!("done"), &json!(false))
+    );
+    let words = done["result"]["unsaved"].as_str().expect("words");
+    assert!(
+        words.contains("not saved") && words.contains("too large"),
+        "{words}"
+    );
+    assert!(serving.get(&format!("{path}/results.json"))["sets"].is_array());
+    serving.signal("-TERM");
+    assert_eq!(serving.end().0, Some(0));
+    // The next one knows what was asked, and saves what comes out.
+    let again = Serving::start(&mut serve(
+        &scans,
+        &["--keep", keep.to_str().expect("UTF-8")],
+    ));
+    assert!(again.get(&path)["result"].is_null());
+    again.json("POST", &format!("{path}/run"), &json!({}));
+    assert_eq!(again.done(&path)["result"]["saved"], true);
 }
 
 #[test]

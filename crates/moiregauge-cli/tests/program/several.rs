@@ -101,7 +101,7 @@ fn two_moires_have_two_results() {
                 "--lattice-angle",
                 "12±0.1",
             ],
-            "layers of their own",
+            "one pair of layers for all moirés",
         ),
     ] {
         let refused = run(analyze(&scans, &folder.path().join("no")).args(arguments));
@@ -125,14 +125,14 @@ fn a_moire_that_is_not_there_is_named() {
     let run = run(analyze(&scans, &out).args(["--moires", "2"]));
     assert_eq!(run.code, Some(1));
     assert!(
-        run.stderr.contains("of which 1 can be found"),
+        run.stderr.contains("but only 1 can be found"),
         "{}",
         run.stderr
     );
     let other =
         crate::common::run(analyze(&scans, &out).args(["--moires", "2", "--method", "fourier"]));
     assert!(
-        other.stderr.contains("by the method \"lattice\" only"),
+        other.stderr.contains("only with the method \"lattice\""),
         "{}",
         other.stderr
     );

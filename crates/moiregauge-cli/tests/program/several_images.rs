@@ -187,7 +187,7 @@ fn pixels_beyond_one_of_several_channels() {
     let ran = at("0,128");
     assert_eq!(ran.code, Some(1));
     assert!(
-        ran.stderr.contains("outside of all channels"),
+        ran.stderr.contains("outside all channels"),
         "{}",
         ran.stderr
     );

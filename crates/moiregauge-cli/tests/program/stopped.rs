@@ -86,7 +86,7 @@ fn analyses_go_on_with_what_is_measured() {
     let said = at_many_moments("analyze", &scans, folder.path(), &[]);
     let kept = said
         .iter()
-        .filter(|words| words.contains("measured and kept; the same command goes on"));
+        .filter(|words| words.contains("measured and kept; run the same command again"));
     assert!(kept.count() > 1, "{said:?}");
 }
 

@@ -34,7 +34,11 @@ struct Watching {
 
 impl Watching {
     fn start(folder: &Path, options: &[&str]) -> Self {
-        let mut command = program();
+        Self::by(program(), folder, options)
+    }
+
+    /// By the program, or by what starts it.
+    fn by(mut command: Command, folder: &Path, options: &[&str]) -> Self {
         command.arg("watch").arg(folder).args(QUICK).args(options);
         command.stdout(Stdio::piped()).stderr(Stdio::piped());
         let mut child = command.spawn().expect("the program starts");
@@ -64,7 +68,9 @@ impl Watching {
     /// The next line.
     fn next(&self) -> Value {
         let line = self.lines.recv_timeout(LIMIT).expect("a line");
-        serde_json::from_str(&line).unwrap_or_else(|why| panic!("{why}: {line}"))
+        let value = serde_json::from_str(&line).unwrap_or_else(|why| panic!("{why}: {line}"));
+        follows_schema(&value);
+        value
     }
 
     /// The first line of so many frames.
@@ -97,6 +103,15 @@ impl Watching {
         self.child.kill().expect("killed");
         panic!("it does not end");
     }
+}
+
+/// Every line is what the published schema says.
+fn follows_schema(line: &Value) {
+    let schema = include_str!("../../../moiregauge-report/schema/watch-1.schema.json");
+    let schema = serde_json::from_str(schema).expect("JSON");
+    let validator = jsonschema::validator_for(&schema).expect("a valid schema");
+    let wrong: Vec<String> = validator.iter_errors(line).map(|e| e.to_string()).collect();
+    assert!(wrong.is_empty(), "{wrong:?} in {line}");
 }
 
 /// Scans, and an empty folder beside them.
@@ -201,7 +216,7 @@ fn files_change_and_the_watch_goes_on() {
         bad["error"]
             .as_str()
             .expect("words")
-            .contains("should be a scan")
+            .contains("the name is that of a scan")
     );
     assert_eq!(bad["twist_deg"], again["twist_deg"]);
     std::fs::remove_file(&place).expect("removed");
@@ -328,6 +343,56 @@ fn it_goes_on_where_it_was() {
         &mut watch(&made.join(name(0))),
         &["--keep", "earlier watch"],
     );
+}
+
+/// Where no more can be written, as on a full disk: the numbers come all the same, it is said, what was kept before stays,
+/// and the next watch goes on from there.
+#[test]
+fn a_full_disk_stops_no_watch() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (made, watched) = scene(folder.path(), "2");
+    let kept = folder.path().join("kept");
+    std::fs::create_dir(&kept).expect("a folder");
+    let keep = kept.join("kept.json");
+    let options = ["--keep", keep.to_str().expect("a name")];
+    arrive(&made, &watched, 0);
+    // Room for the first frame and half of the second.
+    let watching = Watching::json(&watched, &options);
+    watching.of(1);
+    watching.signal("-TERM");
+    assert_eq!(watching.end().0, Some(0));
+    let one = std::fs::metadata(&keep).expect("a file").len();
+    std::fs::remove_file(&keep).expect("a file");
+    let watching = Watching::by(
+        crate::common::with_files_up_to(one as usize * 3 / 2 / 512),
+        &watched,
+        &[&["--json"], &options[..]].concat(),
+    );
+    watching.of(1);
+    let begun = Instant::now();
+    while !keep.exists() || std::fs::metadata(&keep).expect("a file").len() == 0 {
+        assert!(begun.elapsed() < LIMIT, "nothing is kept");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    let before = std::fs::read(&keep).expect("a file");
+    arrive(&made, &watched, 1);
+    let told = watching.of(2);
+    assert!(number(&told, "/twist_deg/value").is_finite());
+    watching.signal("-TERM");
+    let (code, words) = watching.end();
+    assert_eq!(code, Some(0));
+    assert!(
+        words.contains("--keep: ") && words.contains("too large"),
+        "{words}"
+    );
+    assert!(std::fs::read(&keep).expect("a file") == before);
+    let left = std::fs::read_dir(&kept).expect("a folder");
+    assert_eq!(left.count(), 1, "something half-written is left");
+    let watching = Watching::json(&watched, &options);
+    assert_eq!(watching.of(2)["twist_deg"], told["twist_deg"]);
+    watching.signal("-TERM");
+    assert_eq!(watching.end().0, Some(0));
+    assert!(std::fs::metadata(&keep).expect("a file").len() > before.len() as u64);
 }
 
 #[test]

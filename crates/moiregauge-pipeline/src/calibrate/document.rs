@@ -17,8 +17,8 @@ const HEAD: &str = "\
 #
 # What is shown is F times what is true, F = [[1 + s + g/2, c/2], [c/2, 1 + s - g/2]], x to the right, y up:
 #   s  gain_percent        lengths are shown too long by this much, mean of x and y
-#   g  mismatch_percent    along x by this much more than along y
-#   c  orthogonality_mrad  the axes shown enclose a right angle less this
+#   g  mismatch_percent    lengths along x are too long by this much more than along y
+#   c  orthogonality_mrad  the angle between the axes in the image is 90° less this
 # F is symmetric by definition: a known lattice of unknown orientation does not show a turn.
 # covariance is that of (s, g, c) in these units. It holds for scans under the same conditions.
 
@@ -94,7 +94,7 @@ pub struct CalibratedInput {
 pub enum Unusable {
     /// Frames of one direction without a line rate.
     #[error(
-        "nobody knows its errors, since the frames do not tell the drift and have no line rate"
+        "its errors are not known, because the drift cannot be determined from the frames and they have no line rate"
     )]
     NoErrors,
     /// Numbers that make no sense.

@@ -138,10 +138,10 @@ pub enum WhyNotCalibrated {
     #[error(transparent)]
     Settings(#[from] SettingsError),
     /// Its two vectors are parallel.
-    #[error("the known lattice has no area: expected two vectors that are not parallel")]
+    #[error("the vectors of the known lattice are parallel; expected two different directions")]
     NoArea,
     /// No file.
-    #[error("nothing could be read: there is no image to look for the lattice of {0} in")]
+    #[error("no image could be read, so the lattice of {0} cannot be found")]
     NothingRead(String),
     /// No lattice.
     #[error("no image shows the lattice of {0}")]

@@ -106,7 +106,9 @@ fn one(
         log.insert(0, format!("moiregauge {}", env!("CARGO_PKG_VERSION")));
         for Export { folder, format } in exports {
             let stem = format!("{folder}/{name}-{line}");
-            for (file, bytes) in spmfile::write(&image.scan, *format, &stem, &log)? {
+            for (file, bytes) in
+                spmfile::write_between(&image.scan, *format, &stem, &log, &interrupt::check)?
+            {
                 sink.write(&file, &bytes)?;
             }
         }

@@ -41,7 +41,7 @@ pub enum AnalyseError {
         source: InputError,
     },
     /// The image of a larger area.
-    #[error("{file}: it has no image with a size and a place")]
+    #[error("{file}: it has no image with a size and a position")]
     NoPicture {
         /// Its name.
         file: String,
@@ -50,7 +50,7 @@ pub enum AnalyseError {
     #[error(transparent)]
     Atomic(#[from] AtomicError),
     /// The images of the atoms have no error that could be known.
-    #[error("the images do not tell the orientation")]
+    #[error("the images do not show the orientation")]
     NoOrientation,
     /// The settings, with what the images of the atoms told.
     #[error(transparent)]

@@ -265,6 +265,22 @@ impl Campaign {
         self.of.kept.extend(kept);
     }
 
+    /// As [`Campaign::analyse`], without what is drawn at random where no estimate and no error depends on it: half of the
+    /// time of many scans.
+    pub(crate) fn analyse_without_draws(
+        &mut self,
+        job: &Job,
+    ) -> Result<Vec<Outcome>, AnalyseError> {
+        let asked = self.of.settings.clone();
+        if asked.method.is_joint() {
+            self.of.settings.drift_draws = 0;
+            self.of.settings.strain_draws = 0;
+        }
+        let found = self.analyse(job);
+        self.of.settings = asked;
+        found
+    }
+
     /// Analyses the scans, every moiré that they show by itself.
     ///
     /// # Errors
@@ -322,7 +338,16 @@ impl Campaign {
             }
         };
         let moires = sorted_moires(scans).into_iter().enumerate();
-        Ok(job.run(|| moires.map(of_moire).collect())?)
+        let outcomes: Vec<Outcome> = job.run(|| moires.map(of_moire).collect())?;
+        match settings.grain {
+            Some(grain) if outcomes.iter().all(|o| o.analysis.sets.is_empty()) => {
+                let words = format!(
+                    "no scan shows a grain {grain}: expected the number of one that has a set of its own"
+                );
+                Err(AnalyseError::NothingLeft(words))
+            }
+            _ => Ok(outcomes),
+        }
     }
 }
 

@@ -154,6 +154,7 @@ fn measuring(settings: &Settings) -> Settings {
         moires,
         scanner,
         // What is chosen after measuring changes no measured scan.
+        grain: _,
         material: _,
         substrate: _,
         moire_layers: _,

@@ -38,7 +38,7 @@ pub struct Line {
 /// A region or line that does not touch the map.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error(
-    "{name}: x from {:.1} to {:.1} nm, y from {:.1} to {:.1} nm lies outside of the map, which reaches from {:.1} to \
+    "{name}: x from {:.1} to {:.1} nm, y from {:.1} to {:.1} nm lies outside the map, which reaches from {:.1} to \
      {:.1} nm in x and from {:.1} to {:.1} nm in y",
     asked[0][0], asked[0][1], asked[1][0], asked[1][1], map[0][0], map[0][1], map[1][0], map[1][1]
 )]

@@ -56,7 +56,7 @@ pub enum NotMapped {
         failed: Vec<FailedInput>,
     },
     /// Sets beside images that lie side by side.
-    #[error("images that are mapped in bands lie side by side in one map and make no sets")]
+    #[error("images that are mapped in bands lie side by side in one map and form no sets")]
     SetsInBands,
     /// A large image.
     #[error("{}", file.display())]
@@ -89,7 +89,7 @@ pub enum NoBands {
     File(#[from] FileError),
     /// Position sensors were given.
     #[error(
-        "an image that is mapped in bands has nominal positions, and position sensors are not used"
+        "an image that is mapped in bands has nominal positions; position sensors are not used"
     )]
     Sensors,
     /// It has no size.
@@ -111,14 +111,12 @@ pub enum NoBands {
 #[non_exhaustive]
 pub enum NoStripes {
     /// There are several files.
-    #[error(
-        "no scan shows a lattice, and maps of stripes are made of one file at a time, found {0}"
-    )]
+    #[error("no scan shows a lattice. A map of stripes is made from one file, found {0} files")]
     SeveralFiles(usize),
     /// Questions that need twist and strain.
     #[error(
-        "{} shows stripes and no lattice: questions to the map and tiles need twist and strain, and one wave vector has \
-         none",
+        "{} shows stripes and no lattice. Regions, profiles, devices and tiles need twist and strain, which one wave \
+         vector does not determine",
         .0.display()
     )]
     NoTwist(PathBuf),

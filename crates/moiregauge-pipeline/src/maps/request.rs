@@ -87,7 +87,7 @@ impl MapRequest {
             ("margin", self.margin, MARGIN),
         ] {
             if let Some(value) = value.filter(|value| !(low..=high).contains(value)) {
-                let reason = format!("{setting} lies between {low} and {high}, found {value}");
+                let reason = format!("{setting} must lie between {low} and {high}, found {value}");
                 return Err(SettingsError { setting, reason }.into());
             }
         }

@@ -1,6 +1,7 @@
 //! A finished map → files, of a lattice or of stripes.
 
 use moiregauge::map::TwistStrainMap;
+use moiregauge::numbers::interrupt;
 use moiregauge::settings::Settings;
 use moiregauge_report::results::{
     Conventions, MapDetailsResult, MapResults, StripesResult, mask_counts, quantities,
@@ -19,14 +20,16 @@ use crate::sink::{Sink, SinkError};
 /// With more nodes than this there is no `.gwy` file: it would not fit into memory beside the map.
 const MANY: usize = 1_500_000;
 
-const ERRORS: &str = "one standard deviation by the noise of the images, node by node, neighbouring nodes not \
-     independent, enlarged where the window visibly blurs; what all nodes share (drift, calibration, lattice \
-     constant, model) is in whole_image and in the budget of `moiregauge analyze`; smoothing by the window adds a \
-     bias, about a quarter of the noise where the window was chosen by itself";
+const ERRORS: &str = "one standard deviation from the noise of the images, for each node; neighbouring nodes are not \
+                      independent; enlarged where the window visibly blurs. Errors that all nodes share (drift, \
+                      calibration, lattice constant, model) are in whole_image and in the budget of `moiregauge \
+                      analyze`. Smoothing by the window adds a bias, about a quarter of the noise with the default \
+                      window";
 
-const ERRORS_OF_STRIPES: &str = "one standard deviation by the noise of the images, node by node, neighbouring nodes not \
-     independent, enlarged where the window visibly blurs and near boundaries of patterns; calibration and drift, which \
-     all nodes share, are not in them";
+const ERRORS_OF_STRIPES: &str = "one standard deviation from the noise of the images, for each node; neighbouring \
+                                 nodes are not independent; enlarged where the window visibly blurs and near \
+                                 boundaries of patterns. Errors that all nodes share (calibration, drift) are not \
+                                 included";
 
 /// What may be written at the top of the folder; folders of which others may have files, too, end with a slash.
 pub const MAP_FILES: [&str; 11] = [
@@ -144,7 +147,7 @@ impl MapFound {
 fn write_scan(scan: &Scan, format: WritableFormat, sink: &dyn Sink) -> Result<(), SinkError> {
     // The first line of the history of what is written.
     let log = [format!("moiregauge {} map", env!("CARGO_PKG_VERSION"))];
-    let files = spmfile::write(scan, format, "map", &log);
+    let files = spmfile::write_between(scan, format, "map", &log, &interrupt::check);
     write_all(&files.map_err(|why| SinkError::made("map", why))?, sink)
 }
 

@@ -54,15 +54,15 @@ pub enum PlanError {
     #[error(transparent)]
     Settings(#[from] SettingsError),
     /// Conditions that cannot be simulated.
-    #[error("these conditions make no sense")]
+    #[error("these conditions are not possible")]
     Conditions(#[source] SimulateError),
     /// Nothing disturbs the images.
-    #[error("the conditions have no noise (noise.pixel_deg): every error would be zero")]
+    #[error("the conditions have no noise (noise.pixel_deg), so every error would be zero")]
     NoNoise,
     /// No frame would do.
     #[error(
-        "no frame within the largest size and line rate shows the lattice: at least four periods across it, five pixels \
-         per period, and a signal that stands out of the noise are needed"
+        "no frame within the largest size and line rate shows the lattice. Needed are at least four periods across the \
+         frame, five pixels per period, and a signal above the noise"
     )]
     NoFrame,
 }

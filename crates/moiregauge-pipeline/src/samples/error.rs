@@ -66,7 +66,7 @@ pub enum SamplesError {
         reason: String,
     },
     /// Parts of another version.
-    #[error("{}: made by version {found}, and this is {expected}", path.display())]
+    #[error("{}: made by version {found}, but this is version {expected}", path.display())]
     OtherVersion {
         /// The list.
         path: PathBuf,
@@ -84,7 +84,7 @@ pub enum SamplesError {
         other: PathBuf,
     },
     /// Shards of differently divided runs.
-    #[error("{} and {} are of runs that were divided differently", first.display(), other.display())]
+    #[error("{} and {} come from runs with different numbers of shards", first.display(), other.display())]
     OtherDivision {
         /// A list.
         first: PathBuf,

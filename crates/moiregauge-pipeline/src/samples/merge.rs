@@ -153,7 +153,8 @@ fn copy(
         path: path.clone(),
         reason: reason.to_owned(),
     };
-    let part = Part::read(from, key)?.ok_or_else(|| damaged("it is in a list and not there"))?;
+    let part =
+        Part::read(from, key)?.ok_or_else(|| damaged("a list names it, but it does not exist"))?;
     if part.sample != sample {
         return Err(damaged("it is the part of another sample"));
     }

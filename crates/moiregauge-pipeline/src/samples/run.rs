@@ -165,6 +165,15 @@ impl Samples {
         self.all.len()
     }
 
+    /// The sample at this place of the sorted list: its name, the hash of all that its results depend on, its files.
+    pub fn sample(&self, place: usize) -> Option<(String, String, Vec<PathBuf>)> {
+        let sample = self.all.get(place)?;
+        let found = sample.files(&self.root);
+        let key = key(&self.asked, &sample.name, &found);
+        let files = found.files.into_iter().map(|(_, path)| path);
+        Some((sample.name.clone(), key, files.collect()))
+    }
+
     /// Whether there are none.
     pub fn is_empty(&self) -> bool {
         self.all.is_empty()

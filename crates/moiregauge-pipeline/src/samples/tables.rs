@@ -67,7 +67,7 @@ pub(super) fn read(
     for listed in &list.samples {
         let part = Part::read(&parts, &listed.key)?.ok_or_else(|| SamplesError::Damaged {
             path: parts.join(super::part::part_name(&listed.key)),
-            reason: "it is in a list and not there".to_owned(),
+            reason: "a list names it, but it does not exist".to_owned(),
         })?;
         let picture = part
             .picture

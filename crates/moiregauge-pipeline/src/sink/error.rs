@@ -15,7 +15,7 @@ pub enum SinkError {
         source: std::io::Error,
     },
     /// The list of files of an earlier run cannot be understood.
-    #[error("{}: cannot be understood as a list of the files of an earlier run: {reason}", path.display())]
+    #[error("{}: this is not a valid list of the files of an earlier run: {reason}", path.display())]
     Manifest {
         /// The list.
         path: PathBuf,
@@ -26,7 +26,7 @@ pub enum SinkError {
     #[error("{} is a file; a folder is expected", .0.display())]
     NoFolder(PathBuf),
     /// A folder, a link or a device where a file is expected.
-    #[error("{} is there and is no plain file", .0.display())]
+    #[error("{} exists and is not a plain file", .0.display())]
     NoFile(PathBuf),
     /// The file is there; `force` writes over it.
     #[error("{} exists already", .0.display())]
@@ -41,8 +41,8 @@ pub enum SinkError {
     },
     /// The folder holds results of another kind.
     #[error(
-        "{} holds results of `{found}`, and those of `{wanted}` do not go into the same folder: some of their files \
-         have the same names",
+        "{} holds results of `{found}`. Those of `{wanted}` cannot go into the same folder, because some of their \
+         files have the same names",
         folder.display()
     )]
     OtherKind {
@@ -54,16 +54,16 @@ pub enum SinkError {
         wanted: String,
     },
     /// Another run is writing there.
-    #[error("another run is writing into {} at this moment", .0.display())]
+    #[error("another run is writing into {} now", .0.display())]
     Running(PathBuf),
     /// A file of somebody else has the name of one of ours.
-    #[error("{} is in the way: it was not written by an earlier run, and is left as it is", .0.display())]
+    #[error("{} was not written by an earlier run, so it is not replaced", .0.display())]
     Foreign(PathBuf),
     /// A file of an earlier run was changed since.
-    #[error("{} was changed since it was written, and is left as it is: move it to another place", .0.display())]
+    #[error("{} was changed since it was written, so it is not replaced. Move it to another place", .0.display())]
     Changed(PathBuf),
     /// An input of this run would be replaced.
-    #[error("{} is an input of this run and is never written over", .0.display())]
+    #[error("{} is an input of this run, so it is not replaced", .0.display())]
     Input(PathBuf),
     /// The name cannot be that of a file.
     #[error("{name:?} cannot be the name of a file: {reason}")]
@@ -83,7 +83,7 @@ pub enum SinkError {
     },
     /// Everything is written, but not everything could be moved to its place.
     #[error(
-        "cannot replace {}: what is new waits in {}, and the next run into this folder puts it in place",
+        "cannot replace {}. The new files are kept in {}, and the next run into this folder puts them in place",
         path.display(),
         work.display()
     )]

@@ -3,6 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use moiregauge::numbers::interrupt;
+
 use super::SinkError;
 use super::error::at;
 use super::folder::canonical;
@@ -59,17 +61,28 @@ impl FileSink {
         }
     }
 
-    /// Writes files that belong together: all are whole before the first is moved to its place.
+    /// Writes files that belong together: all are whole before the first is moved to its place. Where the thread is to stop before, none is.
     ///
     /// # Errors
     /// [`SinkError`] if one cannot be written.
     pub fn write(&self, files: &[(PathBuf, Vec<u8>)]) -> Result<Vec<PathBuf>, SinkError> {
+        self.put(files, &interrupt::check)
+    }
+
+    /// The same; `between` is called before each file and within large ones.
+    fn put(
+        &self,
+        files: &[(PathBuf, Vec<u8>)],
+        between: &dyn Fn(),
+    ) -> Result<Vec<PathBuf>, SinkError> {
         for (name, _) in files {
             self.check(name)?;
         }
         let staged = files.iter().map(|(_, bytes)| {
+            // What is stopped here has moved nothing.
+            between();
             let number = self.next.fetch_add(1, Ordering::Relaxed);
-            self.work.stage(&number.to_string(), bytes)
+            (self.work).stage_between(&number.to_string(), bytes, between)
         });
         let staged: Vec<PathBuf> = staged.collect::<Result<_, _>>()?;
         let mut written = Vec::new();
@@ -119,6 +132,7 @@ impl FileSink {
         let number = self.next.fetch_add(1, Ordering::Relaxed).to_string();
         for (inner, bytes) in files {
             super::manifest::check_name(inner)?;
+            interrupt::check();
             self.work.stage(&format!("{number}/{inner}"), bytes)?;
         }
         self.check_group(name)?;
@@ -161,12 +175,13 @@ impl OneFile {
         Ok(one)
     }
 
-    /// Writes it.
+    /// Writes it, also where the thread is to stop: what a watch keeps is what it has measured until then.
     ///
     /// # Errors
     /// [`SinkError`] if it cannot be written.
     pub fn write(self, bytes: Vec<u8>) -> Result<(), SinkError> {
-        self.sink.write(&[(self.name.clone(), bytes)]).map(|_| ())
+        let files = [(self.name.clone(), bytes)];
+        self.sink.put(&files, &|| ()).map(|_| ())
     }
 }
 
@@ -200,4 +215,30 @@ fn is_our_group(path: &Path) -> bool {
         Some(plain && log.iter().any(ours))
     };
     read().unwrap_or(false)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+    use std::sync::atomic::AtomicBool;
+
+    use super::*;
+
+    /// Several files are given up where the thread is to stop; a single one, what a watch keeps, is not.
+    #[test]
+    fn a_single_file_is_written_by_a_thread_that_is_to_stop() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("kept.json");
+        let before = interrupt::watch(Some(Arc::new(AtomicBool::new(true))));
+        let one = OneFile::open(&path, false, &[]).unwrap();
+        let written = one.write(b"kept".to_vec());
+        let sink = FileSink::open(folder.path(), false, &[]).unwrap();
+        let files = [(PathBuf::from("other"), Vec::new())];
+        let stopped = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| sink.write(&files)));
+        interrupt::watch(before);
+        written.unwrap();
+        assert_eq!(std::fs::read(&path).unwrap(), b"kept");
+        assert!(stopped.unwrap_err().is::<interrupt::Interrupted>());
+        assert!(!folder.path().join("other").exists());
+    }
 }

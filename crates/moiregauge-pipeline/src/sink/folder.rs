@@ -153,6 +153,12 @@ impl FolderSink {
         write_whole(&whole, &hashed)
     }
 
+    /// Whether an earlier run has kept any parts.
+    pub fn keeps_parts(&self) -> bool {
+        let parts = std::fs::read_dir(self.work.path(PARTS));
+        parts.is_ok_and(|mut parts| parts.next().is_some())
+    }
+
     /// A part that an earlier run has kept.
     pub fn kept(&self, name: &str) -> Part {
         let Ok(mut hashed) = std::fs::read(self.work.path(PARTS).join(name)) else {

@@ -192,7 +192,7 @@ pub(super) fn check_name(name: &str) -> Result<(), SinkError> {
     } else if name.contains('\0') {
         "it holds a zero byte"
     } else if cfg!(windows) && name.split('/').any(is_device) {
-        "it is that of a device, or has signs that names here cannot have"
+        "it is the name of a device, or has characters that are not allowed in names here"
     } else {
         return Ok(());
     };

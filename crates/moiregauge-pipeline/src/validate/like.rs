@@ -179,9 +179,9 @@ fn raster(
         "the files give no line rate: the scans cannot be simulated",
     ))?;
     let [columns, rows] = line.geometry.size;
-    let timing = line.timing.ok_or(LikeError::Unknown(
-        "the files do not tell their frame direction",
-    ))?;
+    let timing = line
+        .timing
+        .ok_or(LikeError::Unknown("the files have no frame direction"))?;
     let half_line = 0.5 / rate;
     let rounding = half_line / (timing.per_pixel.x.abs() * (columns as f64 - 1.0)) - 1.0;
     let fast = line.geometry.fast_step();

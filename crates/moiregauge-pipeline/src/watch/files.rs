@@ -130,7 +130,7 @@ impl Files {
                 unchanged: 0,
                 missing: 0,
                 state: if was_scan {
-                    State::Waiting("it is being written anew".to_owned())
+                    State::Waiting("it is being written again".to_owned())
                 } else {
                     State::New
                 },
@@ -281,7 +281,7 @@ mod tests {
         write(&scan, b"");
         let seen = look();
         assert!(seen.scans.is_empty() && seen.gone.is_empty());
-        assert_eq!(seen.waiting[0].error, "it is being written anew");
+        assert_eq!(seen.waiting[0].error, "it is being written again");
         write(&scan, &[HEAD, b"more END"].concat());
         look();
         assert_eq!(names(&look().fresh), ["a.sxm"]);

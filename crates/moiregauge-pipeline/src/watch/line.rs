@@ -5,6 +5,7 @@ use moiregauge_report::FailedInput;
 use moiregauge_report::results::{
     DriftResult, ResultCaveat, ResultEstimate, SetResult, TwistStrainResult,
 };
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::next::Next;
@@ -15,7 +16,7 @@ use super::warnings::Warning;
 pub(super) const SCHEMA: &str = "moiregauge/watch/1";
 
 /// What happened to a file.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Happened {
@@ -34,7 +35,7 @@ pub enum Happened {
 }
 
 /// A value with its errors; `null` where unknown, never NaN.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Number {
     /// The best value.
     pub value: Option<f64>,
@@ -55,7 +56,7 @@ impl From<ResultEstimate> for Number {
 }
 
 /// Twist and strain.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Mean {
     /// Twist, degrees.
     pub twist_deg: Number,
@@ -73,7 +74,7 @@ impl From<&TwistStrainResult> for Mean {
 }
 
 /// Velocity of the sample in the frame of the sensors, nm/min.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct LineDrift {
     /// To the right, in the middle of the set.
     pub x_nm_per_min: Number,
@@ -107,7 +108,7 @@ impl LineDrift {
 }
 
 /// The state after something happened to files: the numbers of the set to which the file belongs, by all its frames.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Line {
     /// `moiregauge/watch/1`.
     pub schema: String,
@@ -151,6 +152,13 @@ pub struct Line {
     pub failed: Vec<FailedInput>,
     /// Why the file gives no number, or why there is none at all.
     pub error: Option<String>,
+}
+
+/// The JSON Schema (draft 2020-12) of [`Line`].
+pub fn line_schema() -> serde_json::Value {
+    let settings = schemars::generate::SchemaSettings::draft2020_12().for_serialize();
+    let generator = settings.into_generator();
+    generator.into_root_schema_for::<Line>().into()
 }
 
 impl Line {

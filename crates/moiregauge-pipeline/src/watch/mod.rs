@@ -21,7 +21,7 @@ mod tell;
 mod until;
 mod warnings;
 
-pub use line::{Happened, Line, LineDrift, Mean, Number, Point};
+pub use line::{Happened, Line, LineDrift, Mean, Number, Point, line_schema};
 pub use next::Next;
 pub use request::{WatchError, WatchRequest};
 pub use run::Watch;

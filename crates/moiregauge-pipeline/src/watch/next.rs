@@ -5,6 +5,7 @@ use moiregauge::plan::{Prediction, Quantity, predict};
 use moiregauge::scan::MeasuredScan;
 use moiregauge::settings::Settings;
 use moiregauge::simulate::Simulation;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::line::{Mean, Number};
@@ -19,7 +20,7 @@ const MOST: usize = 1000;
 const LONG: usize = 40;
 
 /// Errors after two more frames like those before, the slow axis up and down in turn.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Next {
     /// Of the twist, degrees.
     pub twist_sigma_deg: Option<f64>,

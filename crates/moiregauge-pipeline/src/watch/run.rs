@@ -20,8 +20,9 @@ pub struct Watch {
     files: Files,
     pub(super) campaign: Campaign,
     advice: Advice,
-    outcomes: Vec<Outcome>,
     history: Vec<Point>,
+    /// The last line with numbers of each moiré, for what happens to the folder.
+    told: Vec<Line>,
     /// Steps so far.
     steps: usize,
     /// The file of the last line about a set, for events that belong to none.
@@ -50,8 +51,8 @@ impl Watch {
             files: Files::new(&request.folder, request.patience),
             campaign,
             advice: crate::campaign::no_advice,
-            outcomes: Vec::new(),
             history: Vec::new(),
+            told: Vec::new(),
             steps: 0,
             last: None,
             reached: false,
@@ -83,9 +84,13 @@ impl Watch {
         &self.request
     }
 
-    /// The last analysis, one for each moiré; empty before the first frame.
-    pub fn outcomes(&self) -> &[Outcome] {
-        &self.outcomes
+    /// What the lines told last, with all numbers, one for each moiré; analysed again, since a long watch would fill the
+    /// memory with what nobody looks at.
+    ///
+    /// # Errors
+    /// As [`Campaign::analyse`]: before the first frame there is nothing.
+    pub fn outcomes(&mut self, job: &Job) -> Result<Vec<Outcome>, AnalyseError> {
+        self.campaign.analyse(job)
     }
 
     /// What was told so far, without words.
@@ -127,7 +132,7 @@ impl Watch {
         let only_folder = happened
             .iter()
             .all(|(event, ..)| *event == Happened::Folder);
-        let mut error = None;
+        let (mut outcomes, mut error) = (Vec::new(), None);
         if !only_folder {
             let before = (
                 self.campaign.inputs().to_vec(),
@@ -135,27 +140,28 @@ impl Watch {
             );
             self.campaign
                 .replace(seen.scans.clone(), seen.left_out.clone());
-            match self.campaign.analyse(job) {
-                Ok(outcomes) => self.outcomes = outcomes,
+            match self.campaign.analyse_without_draws(job) {
+                Ok(found) => outcomes = found,
                 Err(AnalyseError::Cancelled(cancelled)) => {
                     self.steps -= 1;
                     self.campaign.replace(before.0, before.1);
                     self.untold = Some(seen);
                     return Err(cancelled);
                 }
-                Err(other) => {
-                    self.outcomes.clear();
-                    error = Some(other);
-                }
+                Err(other) => error = Some(other),
             }
         }
         let lines = match &error {
-            None => job.run(|| self.lines(&happened, &seen))?,
+            None => job.run(|| self.lines(&outcomes, &happened, &seen))?,
             Some(error) => nothing(&happened, &seen, error),
         };
         self.history.extend(lines.iter().map(Point::from));
         if let Some(line) = lines.iter().rev().find(|line| line.set.is_some()) {
-            self.last.clone_from(&line.file);
+            if !only_folder {
+                self.last.clone_from(&line.file);
+            }
+            let last_of = |moire| lines.iter().rev().find(|line| line.moire == moire);
+            self.told = (1..=line.moire).filter_map(last_of).cloned().collect();
         }
         let states = || lines.iter().filter_map(|line| line.until);
         self.reached = states().next().is_some() && states().all(|state| state.reached);
@@ -206,9 +212,9 @@ impl Watch {
     }
 
     /// The lines of a step, moiré by moiré.
-    fn lines(&self, happened: &Happenings, seen: &Seen) -> Vec<Line> {
+    fn lines(&self, outcomes: &[Outcome], happened: &Happenings, seen: &Seen) -> Vec<Line> {
         let mut lines = Vec::new();
-        for (number, outcome) in self.outcomes.iter().enumerate() {
+        for (number, outcome) in outcomes.iter().enumerate() {
             let mut of = OfMoire::new(self, outcome, seen);
             for (event, files, error) in happened {
                 let names: Vec<String> = files.iter().map(|path| in_words(path)).collect();
@@ -219,11 +225,21 @@ impl Watch {
                 }
             }
         }
-        if self.outcomes.is_empty() {
-            lines.extend(happened.iter().map(|(event, files, error)| Line {
-                error: error.clone(),
-                ..Line::empty(*event, files.iter().map(|path| in_words(path)).collect())
-            }));
+        if outcomes.is_empty() {
+            let of_folder = happened.iter().flat_map(|(event, _, error)| {
+                let plain = || vec![Line::empty(*event, Vec::new())];
+                let before = Some(self.told.clone()).filter(|told| !told.is_empty());
+                let lines = before.unwrap_or_else(plain).into_iter();
+                lines.map(|line| Line {
+                    event: *event,
+                    file: None,
+                    files: Vec::new(),
+                    acquired: None,
+                    error: error.clone(),
+                    ..line
+                })
+            });
+            lines.extend(of_folder);
         }
         lines
     }

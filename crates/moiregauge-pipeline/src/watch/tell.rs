@@ -177,38 +177,36 @@ fn caveats(all: &[ResultCaveat], set: &SetResult) -> Vec<ResultCaveat> {
 /// What to do now.
 fn advice(line: &Line, best: &Mean) -> String {
     if line.until.is_some_and(|until| until.reached) {
-        return "what was wished for is reached: stop now".to_owned();
+        return "the wanted errors are reached: stop now".to_owned();
     }
     let Some(next) = line.next else {
         return if best.twist_deg.value.is_some() {
             String::new()
         } else {
-            "no drift yet: take frames with the slow axis up and down in turn".to_owned()
+            "no drift yet. Take frames up and down in turn".to_owned()
         };
     };
     let bring = brought(&next);
     if best.twist_deg.value.is_none() {
-        return format!(
-            "no drift yet; with two more frames, the slow axis up and down in turn: {bring}"
-        );
+        return format!("no drift yet. With two more frames, up and down in turn: {bring}");
     }
     let wish = match line.until {
         Some(until) if until.out_of_reach => {
-            "; what is wished for is out of reach, since calibration and model alone make more"
+            "; the wanted errors are out of reach, because calibration and model alone exceed them"
                 .to_owned()
         }
         Some(until) => until.frames_needed.map_or_else(
-            || "; what is wished for is far away".to_owned(),
-            |n| format!("; {n} more may reach what is wished for"),
+            || "; many more frames are needed to reach the wanted errors".to_owned(),
+            |n| format!("; {n} more frames may reach the wanted errors"),
         ),
         None => String::new(),
     };
     if wish.is_empty() && is_hardly_less(&next, best) {
         return format!(
-            "two more frames bring {bring}, hardly less than now, most of which is calibration and model: stop now"
+            "two more frames give {bring}, hardly less than now. Most of this error is calibration and model: stop now"
         );
     }
-    format!("two more frames bring {bring}{wish}")
+    format!("two more frames give {bring}{wish}")
 }
 
 fn brought(next: &Next) -> String {

@@ -2,6 +2,7 @@
 
 use std::str::FromStr;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::line::Mean;
@@ -10,7 +11,7 @@ use super::line::Mean;
 const WISH: [f64; 2] = [1e-9, 1e6];
 
 /// Total standard errors at which enough is measured; none of them: never.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Until {
     /// Of the twist, degrees.
@@ -52,7 +53,7 @@ impl FromStr for Until {
 }
 
 /// How far the wish is.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct UntilState {
     /// The wish.
     pub wanted: Until,

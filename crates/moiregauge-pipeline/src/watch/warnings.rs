@@ -3,6 +3,7 @@
 use moiregauge::campaign::{Analysis, ScanAnalysis, SetAnalysis};
 use moiregauge::scan::MeasuredScan;
 use moiregauge_report::{FailedInput, two_digits};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use spmfile::FrameDirection;
 
@@ -15,7 +16,7 @@ const WEAKER: f64 = 0.5;
 const USUAL: usize = 3;
 
 /// One thing that is wrong.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct Warning {
     /// Stable code, as in `directions-do-not-alternate`.
     pub code: String,
@@ -52,7 +53,7 @@ pub(super) fn of_set(
         let apart = scan.residual.and_then(|r| r.displacement);
         let apart = apart.map_or_else(String::new, |d| {
             format!(
-                "; it stands {} nm from where they have it",
+                "; its lattice lies {} nm from the predicted place",
                 two_digits(d.norm())
             )
         });
@@ -60,8 +61,8 @@ pub(super) fn of_set(
             "frame-out-of-line",
             &scan.file,
             format!(
-                "the frame does not fit the others{apart}: look at it for a jump, a tip change or another place, and \
-                 take another one"
+                "the frame does not fit the others{apart}. Look for a jump, a tip change or another place, and take \
+                 the frame again"
             ),
         ));
     }
@@ -90,8 +91,8 @@ fn same_direction(used: &[&ScanAnalysis]) -> Option<Warning> {
         FrameDirection::Down => "down",
     };
     let message = format!(
-        "this frame and the one before it both went {way}: let the slow axis go up and down in turn, which tells drift \
-         from strain"
+        "this frame and the one before it were both scanned {way}. Scan up and down in turn: this separates drift from \
+         strain"
     );
     Some(warning("directions-do-not-alternate", &last.file, message))
 }
@@ -113,7 +114,7 @@ fn changed(analysis: &Analysis, scans: &[&MeasuredScan]) -> Vec<Warning> {
     let mut found = Vec::new();
     let mut add = |code: &str, what: &str, from: &str, to: &str| {
         let message = format!(
-            "{what} changed from {from} to {to}: a new set begins, and its frames are counted anew"
+            "{what} changed from {from} to {to}. A new set begins, and its frames are counted from one"
         );
         found.push(warning(code, &last.file, message));
     };
@@ -174,8 +175,8 @@ fn weaker(used: &[&ScanAnalysis]) -> Option<Warning> {
     let (now, usual) = (strength(last), usual[usual.len() / 2]);
     (now < WEAKER * usual).then(|| {
         let message = format!(
-            "the lattice stands out {} times above the noise, usual in this set is {}: look for a tip change or for a \
-             frame beside the moiré",
+            "the signal-to-noise ratio of the lattice is {}; the usual value of this set is {}. Look for a tip change, \
+             or for a frame beside the moiré",
             two_digits(now),
             two_digits(usual)
         );
@@ -188,14 +189,14 @@ fn moving(set: &SetAnalysis) -> Option<Warning> {
     let joint = set.drift.as_ref()?.joint.as_ref()?;
     if let Some(time) = joint.settling_s {
         let message = format!(
-            "the drift settles with a time constant of {} min: frames taken later are worth more",
+            "the drift settles with a time constant of {} min. Later frames are more accurate",
             two_digits(time / 60.0)
         );
         return Some(warning("drift-settles", &set.name, message));
     }
     let change = 3600.0 * joint.acceleration?.norm();
     let message = format!(
-        "the drift changes by {} nm/min²: the sample or the scanner has not settled",
+        "the drift changes by {} nm/min². The sample or the scanner has not settled",
         two_digits(change)
     );
     Some(warning("drift-not-constant", &set.name, message))

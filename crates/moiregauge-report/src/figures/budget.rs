@@ -128,7 +128,12 @@ pub(super) fn draw(analysis: &Analysis, id: &str) -> Result<Drawing, String> {
         wide: true,
         svg: svg.finish("Uncertainty budget"),
         caption: format!(
-            "What contributes to the uncertainty of twist (a) and heterostrain (b) of {of}; one standard deviation each, logarithmic scale. The squares add up: image noise, drift and sensor noise to that of the statistical σ, all of them to that of the total, which is quoted first with every result. More scans make the first three smaller; the others are the same in every scan, and only a better calibration or other knowledge of the layers makes them smaller. Calibration, lattice constant and model are as certain as the settings say."
+            "Contributions to the uncertainty of twist (a) and heterostrain (b) of {of}: one standard deviation each, \
+             logarithmic scale. The squares of image noise, drift and sensor noise add up to the square of the \
+             statistical σ; the squares of all contributions add up to that of the total, which every result quotes \
+             first. More scans reduce the first three. The others are the same in every scan; only a better \
+             calibration or better knowledge of the layers reduces them. The uncertainties of calibration, lattice \
+             constant and model come from the settings."
         ),
     })
 }

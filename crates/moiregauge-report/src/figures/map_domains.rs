@@ -93,8 +93,8 @@ pub(super) fn draw(subject: &MapSubject) -> Result<Drawing, String> {
         wide: false,
         svg: panel.finish("Domains"),
         caption: format!(
-            "Twist of every triangle of neighbouring nodes, from its three edges (median σ {}°). {} nodes, {} \
-             missing, {} that fit into no triangle, {} dislocations (⊥). x to the right, y up.",
+            "Twist of every triangle of neighbouring nodes, from its three edges (median σ {}°). {} nodes, {} missing, \
+             {} that fit into no triangle, {} dislocations (⊥). x to the right, y up.",
             two_digits(sigma),
             domains.nodes.len(),
             domains.missing.len(),

@@ -71,7 +71,7 @@ fn lines(
     let levels = ticks(range, 4);
     let apart = levels.windows(2).map(|w| w[1].value - w[0].value);
     if apart.fold(f64::INFINITY, f64::min) < 3.0 * sigma {
-        return "No contour lines: their distance would be less than 3 σ of the noise.";
+        return "No contour lines, because their distance would be less than 3 σ of the noise.";
     }
     let values: Vec<f64> = (0..map.grid.len()).map(value).collect();
     let axes = panel.axes;
@@ -153,7 +153,7 @@ pub(super) fn strain(subject: &MapSubject) -> Result<Drawing, String> {
         wide: false,
         svg: panel.finish("Heterostrain"),
         caption: format!(
-            "Magnitude of the heterostrain, the bias of noise removed (σ of a component {} %, rms), and its axis \
+            "Magnitude of the heterostrain with the noise bias removed (σ of a component {} %, rms). Strokes: its axis \
              in the laboratory where it is significant (p < 0.01). {}",
             two_digits(sigma),
             about(map)
@@ -232,7 +232,7 @@ pub(super) fn twist_sigma(subject: &MapSubject) -> Result<Drawing, String> {
         wide: false,
         svg: panel.finish("Error of the twist"),
         caption: format!(
-            "Standard error of the twist of each node by the noise of the image. {}",
+            "Standard error of the twist of each node, from the noise of the image. {}",
             about(map)
         ),
     })
@@ -263,8 +263,8 @@ pub(super) fn displacement(subject: &MapSubject) -> Result<Drawing, String> {
         wide: false,
         svg: panel.finish("Displacement"),
         caption: format!(
-            "Displacement of the pattern against the mean lattice of the good nodes, where its phase could be \
-             followed; arrows are scaled to be seen, colours have the length. {}",
+            "Displacement of the pattern from the mean lattice of the good nodes, where its phase could be followed. \
+             Arrows show the direction and are enlarged; colours show the length. {}",
             about(map)
         ),
     })

@@ -31,9 +31,7 @@ pub(super) fn draw(subject: &MapSubject) -> Result<Drawing, String> {
     let mut svg = Svg::new(subject.id, grid.width, grid.height());
     let mut words = Vec::new();
     for (i, (plane, factor, label, unit)) in shown.into_iter().enumerate() {
-        let spread = map
-            .spread(plane)
-            .ok_or("no node of the map is to be believed")?;
+        let spread = map.spread(plane).ok_or("the map has no good node")?;
         let values: Vec<f64> = (0..map.grid.len())
             .filter(|&n| map.mask[n] == Mask::Good)
             .map(|n| factor * f64::from(plane.value[n]))

@@ -67,10 +67,10 @@ pub(super) fn draw(subject: &MapSubject) -> Result<Drawing, String> {
         wide: false,
         svg: panel.finish("Mask"),
         caption: format!(
-            "Which nodes are to be believed, and why others are not (share of all nodes): margin, the window \
-             reaches beyond the frame; weak signal, the lattice does not stand out; defect, harmonics contradict \
-             each other or a phase winds around a point; bent, the lattice changes faster than the window \
-             resolves; contradiction, scans differ. {}",
+            "Good nodes, and the reasons why others are bad (share of all nodes). Margin: the window reaches beyond \
+             the frame. Weak signal: the lattice is not above the noise. Defect: harmonics contradict each other, or a \
+             phase winds around a point. Bent: the lattice changes faster than the window resolves. Contradiction: \
+             scans differ. {}",
             about(map)
         ),
     })

@@ -67,7 +67,7 @@ impl Panel {
         let grid = &subject.map.grid;
         let values: Vec<f64> = (0..grid.len()).map(value).collect();
         if !values.iter().any(|v| v.is_finite()) {
-            return Err("no node of the map is to be believed".to_owned());
+            return Err("the map has no good node".to_owned());
         }
         let image = Image::new(grid.size[1], grid.size[0], values);
         let shades = raster::Shades {
@@ -228,8 +228,8 @@ impl Asked<'_> {
 /// The words under every map.
 pub(super) fn about(map: &TwistStrainMap) -> String {
     format!(
-        "Gaussian window of {:.2} nm (standard deviation): a point becomes {:.2} nm wide (full width at half \
-         maximum). Nodes that are not to be believed are blank. x to the right, y up.",
+        "Gaussian window of {:.2} nm (standard deviation); resolution {:.2} nm (full width at half maximum). Bad nodes \
+         are blank. x to the right, y up.",
         map.window_nm,
         2.355 * map.window_nm
     )

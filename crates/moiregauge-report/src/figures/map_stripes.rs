@@ -127,8 +127,8 @@ fn direction(subject: &MapSubject, stripes: &SampledStripes) -> Result<Drawing, 
         wide: false,
         svg: panel.finish("Direction of the stripes"),
         caption: format!(
-            "Local direction of the stripes less the mean of their pattern ({}; noise of a node {}°, σ, rms); \
-             strokes run along them. {}",
+            "Local direction of the stripes minus the mean of their pattern ({}; noise of a node {}°, σ, rms); strokes \
+             run along them. {}",
             known.join(", "),
             two_digits(sigma),
             about(map)

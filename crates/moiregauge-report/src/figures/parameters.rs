@@ -86,7 +86,10 @@ pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
     Ok(Drawing {
         wide: true,
         svg: svg.finish("Distributions of twist, strain, axis and lattice angle per scan"),
-        caption: "Monte Carlo distributions of twist, strain, its axis (modulo 180°) and the orientation α of layer 1 (modulo 60°) for every scan, the scans from bottom to top. Circles: the estimate with its analytic statistical σ. The drawn strain is the plain length of the strain vector, which noise lengthens; the circle has that bias removed. An axis without circle is not significant (p ≥ 0.01).".to_owned(),
+        caption: "Monte Carlo distributions of twist, strain, its axis (modulo 180°) and the orientation α of layer 1 \
+                  (modulo 60°) for every scan, the scans from bottom to top. Circles: the estimate with its analytic \
+                  statistical σ. The strain of the draws is the length of the strain vector, which noise makes longer; \
+                  in the circle this bias is removed. An axis without a circle is not significant (p ≥ 0.01).".to_owned(),
     })
 }
 

@@ -87,7 +87,9 @@ pub fn pulls(quantities: &[(&str, Vec<f64>)]) -> Result<Drawing, String> {
     Ok(Drawing {
         wide: true,
         svg: svg.finish("Pulls: errors in units of their stated standard deviations"),
-        caption: "Errors of the simulated sets in units of the σ that each set states. True errors follow the curve: 68.3 % within 1, 95.4 % within 2. The outermost bins hold what lies further out.".to_owned(),
+        caption: "Errors of the simulated sets in units of the σ that each set states. If the stated σ are correct, \
+                  the histogram follows the curve: 68.3 % within 1, 95.4 % within 2. The outermost bins also hold all \
+                  values further out.".to_owned(),
     })
 }
 

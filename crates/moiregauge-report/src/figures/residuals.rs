@@ -57,7 +57,10 @@ pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
         wide: true,
         svg: svg.finish("Residual maps of both position sensors"),
         caption: format!(
-            "Reading of the x sensor (a) and of the y sensor (b) less the affine fit that places the pixels, for {} ({}), means over blocks of {} × {} pixels; standard deviation {}. Structure that is the same in every scan (hysteresis of the scanner, columns where the tip turns round) is no noise. Colours from the 1 % to the 99 % quantile.",
+            "Reading of the x sensor (a) and of the y sensor (b) less the affine fit that places the pixels, for {} \
+             ({}), means over blocks of {} × {} pixels; standard deviation {}. Structure that is the same in every \
+             scan (hysteresis of the scanner, columns where the tip turns round) is not noise. Colours from the 1 % to \
+             the 99 % quantile.",
             layout::short(&shown.file),
             layout::line_name(shown.line),
             shown.residual_block,

@@ -109,7 +109,9 @@ pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
         wide: false,
         svg: svg.finish("Scan with intended and actual frame"),
         caption: format!(
-            "{}, {} of {}, background removed. Every pixel is drawn where {places}, without resampling; x to the right, y up. Arrows: the measured lattice vectors L₁, L₂ and L₃ = L₂ − L₁, not corrected for drift.{nominal_note} Colours from the 0.5 % to the 99.5 % quantile.",
+            "{}, {} of {}, background removed. Every pixel is drawn where {places}, without resampling; x to the \
+             right, y up. Arrows: the measured lattice vectors L₁, L₂ and L₃ = L₂ − L₁, not corrected for \
+             drift.{nominal_note} Colours from the 0.5 % to the 99.5 % quantile.",
             channel,
             layout::line_name(shown.line),
             layout::short(&shown.file),

@@ -79,7 +79,11 @@ pub(super) fn draw(analysis: &Analysis, id: &str) -> Result<Drawing, String> {
     Ok(Drawing {
         wide: true,
         svg: svg.finish("Drift, twist and strain of all sets"),
-        caption: "Every set that was corrected for drift: drift velocity (a) and strain vector in the laboratory (c) with their 1σ and 2σ ellipses, equal scales; twist with its σ (b). σ is the statistical part alone: calibration and model are the same for all sets of one scanner, and would move them together. Band: all sets together. Dashed: zero. Drift may differ between sets, as it changes with time; twist and strain belong to the sample and should agree.".to_owned(),
+        caption: "Every set that was corrected for drift: drift velocity (a) and strain vector in the laboratory (c) \
+                  with their 1σ and 2σ ellipses, equal scales; twist with its σ (b). σ is the statistical part alone, \
+                  because calibration and model change all sets of one scanner by the same amount. Band: all sets \
+                  together. Dashed: zero. The drift may differ between sets, because it changes with time. Twist and \
+                  strain belong to the sample and should agree.".to_owned(),
     })
 }
 

@@ -76,7 +76,8 @@ pub(super) fn draw(analysis: &Analysis, id: &str, map: ColorMap) -> Result<Drawi
         wide: false,
         svg: svg.finish("Survey image with the scanned frames"),
         caption: format!(
-            "{} of {}, background removed, placed by {places}. Frames: the first scan of every set, where its own positions put it; the two agree as far as offsets of the scanner and drift between the images allow.{missing}",
+            "{} of {}, background removed, placed by {places}. Frames: the first scan of every set, at its own \
+             positions. Offsets of the scanner and drift between the images can shift them.{missing}",
             picture.channel,
             layout::short(&picture.file)
         ),

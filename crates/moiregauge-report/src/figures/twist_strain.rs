@@ -121,6 +121,11 @@ pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
     Ok(Drawing {
         wide: true,
         svg: svg.finish("Twist and strain per scan before and after drift correction"),
-        caption: "Twist angle, heterostrain and axis of the strain in the laboratory (counter-clockwise from x, modulo 180°) of every scan before (left) and after (right) the drift was removed. Line and band: the result from all scans together and its statistical σ (calibration and model move all scans together). The strain is the length of the strain vector with the noise bias removed, so that it is zero where noise alone explains it; axes are shown only where the strain is significant (p < 0.01). Filled symbols: up scans; open: down scans.".to_owned(),
+        caption: "Twist angle, heterostrain and axis of the strain in the laboratory (counter-clockwise from x, modulo \
+                  180°) of every scan before (left) and after (right) the drift was removed. Line and band: the result \
+                  from all scans together and its statistical σ (calibration and model change all scans by the same \
+                  amount). The strain is the length of the strain vector with the noise bias removed: it is zero where \
+                  noise alone explains it. Axes are shown only where the strain is significant (p < 0.01). Filled \
+                  symbols: up scans; open: down scans.".to_owned(),
     })
 }

@@ -36,7 +36,7 @@ pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
         .collect();
     let y = Range::of(layout::ends(curve.iter().map(|(_, twist)| *twist)));
     let y = y
-        .ok_or("no twist goes with these wavelengths")?
+        .ok_or("no twist gives these wavelengths")?
         .padded(0.05, 1e-6);
 
     let area = Rect::new(
@@ -73,7 +73,10 @@ pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
         wide: false,
         svg: svg.finish("Twist against wavelength"),
         caption: format!(
-            "The twist that a moiré wavelength means where nothing is strained, for equal layers θ = 2 arcsin(a/2λ). Band: one standard deviation by the lattice constants and by a wavelength known to {} %, as those of this set are with everything (at {} nm: {}°). Points: the three wavelengths of the set on the curve; diamond: its twist, strain taken into account, at the mean wavelength, with its total σ.",
+            "Curve: twist of an unstrained moiré against its wavelength; for equal layers θ = 2 arcsin(a/2λ). Band: \
+             one standard deviation from the lattice constants and from a wavelength known to {} %, the total \
+             uncertainty in this set (at {} nm: {}°). Points: the three wavelengths of the set on the curve. Diamond: \
+             its twist with strain taken into account, at the mean wavelength, with its total σ.",
             crate::format::two_digits(100.0 * relative),
             crate::draw::scale::fixed(middle, 2),
             plus_minus(at_middle)

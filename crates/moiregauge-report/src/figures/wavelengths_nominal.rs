@@ -86,6 +86,9 @@ pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
     Ok(Drawing {
         wide: true,
         svg: svg.finish("Wavelengths and naive twist, nominal against sensor"),
-        caption: "Lengths of the three lattice vectors (a, b) and the twist each of them suggests by θ = 2 arcsin(a/2λ), which holds only for undistorted lattices (c, d). Left: pixels placed by the nominal size of the scan; right: by the position sensors. Nothing is corrected for drift. Filled symbols: up scans; open: down scans. Error bars: one σ.".to_owned(),
+        caption: "Lengths of the three lattice vectors (a, b) and the twist that follows from each of them by θ = 2 \
+                  arcsin(a/2λ), which holds only for undistorted lattices (c, d). Left: pixels placed by the nominal \
+                  size of the scan; right: by the position sensors. Nothing is corrected for drift. Filled symbols: up \
+                  scans; open: down scans. Error bars: one σ.".to_owned(),
     })
 }

@@ -137,7 +137,7 @@ fn names(found: &NamesResult) -> Option<(String, Vec<[String; 2]>)> {
         })
         .collect();
     let chosen_by = match found.chosen_by.as_str() {
-        "image" => "the image: of each other plausible pair one wave is too weak",
+        "image" => "the image: every other plausible pair has a wave that is too weak",
         "orientation" => "the orientation of a layer: other pairs need isotropic strain",
         "user" => "the user",
         _ => "the least strain",

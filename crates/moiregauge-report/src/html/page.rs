@@ -200,8 +200,8 @@ fn not_combined(caveats: &[Caveat]) -> String {
     };
     match caveats.iter().find(is_reason) {
         Some(why) => format!("There is no combined result: {}.", why.message()),
-        None => "No set could be corrected for drift, so there is no combined result. The numbers below are those of \
-                 single sets and contain whatever the drift did to them."
+        None => "No set could be corrected for drift, so there is no combined result. The numbers below belong to \
+                 single sets and include the distortion by drift."
             .to_owned(),
     }
 }

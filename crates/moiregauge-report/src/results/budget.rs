@@ -17,7 +17,7 @@ use super::convert::{PERCENT, degree, number, square};
 pub struct BudgetColumn {
     /// Noise of the images, drift and sensors known exactly.
     pub image: Option<f64>,
-    /// The drift as far as it is not known; `null` where it was left in.
+    /// Uncertainty of the drift; `null` where the drift was not removed.
     pub drift: Option<f64>,
     /// Noise of the position sensors.
     pub sensor: Option<f64>,
@@ -42,7 +42,7 @@ pub struct BudgetColumn {
     pub total: Option<f64>,
 }
 
-/// What contributes to the uncertainty of a lattice and all that follows from it.
+/// Contributions to the uncertainty of a lattice and of all that follows from it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct BudgetResult {
     /// Of `twist_deg`.
@@ -61,9 +61,9 @@ pub struct BudgetResult {
     pub wavelengths_nm: [BudgetColumn; 3],
     /// Covariance of the strain vector from all sources that are known, per cent².
     pub strain_vector_covariance: [[Option<f64>; 2]; 2],
-    /// How often these errors alone give so improbable a strain vector.
+    /// Probability that these errors alone give such a strain vector.
     pub strain_p_value: Option<f64>,
-    /// The magnitude that the strain does not exceed, with 95 % confidence, by these errors, per cent.
+    /// Upper limit of the magnitude of the strain from these errors, 95 % confidence, per cent.
     pub strain_upper_limit_95_percent: Option<f64>,
     /// The interval that holds the magnitude, with 95 % confidence, by these errors, per cent.
     pub strain_interval_95_percent: [Option<f64>; 2],

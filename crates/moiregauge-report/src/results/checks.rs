@@ -33,9 +33,9 @@ pub struct ResidualResult {
     pub chi2: Option<f64>,
     /// Degrees of freedom of `chi2`.
     pub degrees_of_freedom: usize,
-    /// How often chance makes so large a χ², that of the others taken as measure if it exceeds 1.
+    /// Probability of so large a χ² by chance, relative to that of the other scans if this exceeds 1.
     pub p_value: Option<f64>,
-    /// Where the scan stands from where the others have it, x and y; `null` without linked phases.
+    /// Distance of the lattice from the place that the other scans predict, x and y; `null` without linked phases.
     pub displacement_nm: Option<[Option<f64>; 2]>,
     /// Whether it stands out: `p_value` < 0.001 divided by the number of scans.
     pub outlying: bool,

@@ -31,7 +31,7 @@ pub struct Conventions {
     pub strain_vector: String,
     /// What the magnitude of the strain is.
     pub heterostrain: String,
-    /// What a twist does not know.
+    /// What the twist does not contain: its sign, and isotropic strain.
     pub twist: String,
     /// What the strain tensor is.
     pub strain_tensor: String,
@@ -62,18 +62,33 @@ impl Conventions {
             drift: "velocity of the sample in the frame of the sensors".to_owned(),
             strain: strain.to_owned(),
             layers: layers(settings),
-            strained_layer: "layer 2 is stretched and then turned by θ against layer 1; the moiré cannot tell which layer is strained".to_owned(),
+            strained_layer: "layer 2 is stretched and then turned by θ against layer 1; the moiré does not show which \
+                             layer is strained".to_owned(),
             strain_axis: format!("axis of {axis}; strain_axis_lab_deg φ_lab from x, strain_axis_lattice_deg φ = φ_lab − α − θ from layer 1 of orientation α; null unless the strain is significant (p < 0.01)"),
             strain_vector: "E = (ε cos 2φ_lab, ε sin 2φ_lab) in per cent, its covariance in per cent²".to_owned(),
             heterostrain: "length of the strain vector with the noise bias removed; zero where noise alone explains it".to_owned(),
             twist: if settings.bilayer().is_equal() {
                 "θ > 0 by choice: the moiré alone does not show the sign; assumes no isotropic heterostrain".to_owned()
             } else {
-                "θ > 0 and ε ≥ 0 by choice, where that explains the moiré: the layers differ, and the other entries of readings.solutions are as good; assumes no isotropic heterostrain beside the mismatch of the lattice constants".to_owned()
+                "θ > 0 and ε ≥ 0 by choice, where that explains the moiré: the layers differ, and the other entries of \
+                 readings.solutions fit equally well; assumes no isotropic heterostrain beside the mismatch of the \
+                 lattice constants".to_owned()
             },
-            strain_tensor: "readings.strain_tensor, where the orientation of a layer is known: mean ½(ε₁+ε₂) and shear part γ = ½(ε₁−ε₂) of the strain of layer 2 against layer 1, of atoms and tension positive in either form of the equation, φ the axis of ε₁ from x; splits: the same as (1+ε_b) diag(1+ε_u, 1−νε_u) in the two ways there are; isotropic strains are those of layer 2".to_owned(),
-            sigma: "`sigma_total`: one standard deviation with everything, what may be published: image noise, drift, sensor noise, calibration of the scanner, lattice constant and model; `sigma`: the statistical part alone, image noise, drift and sensor noise, for comparing results of one scanner and one model; `budget` has every part".to_owned(),
-            budget: format!("one standard deviation for each source of error and in all; image, drift and sensor make up sigma; the scanner is taken to be known to {} % in gain, {} % in the ratio of x and y and {} mrad in the angle between them, the lattice constant to {}, the Poisson ratio to {}, an isotropic heterostrain to be {} %; strained_layer is the difference to strain in equal parts in both layers; angles are counted from the x axis of the sensors, so a turned frame is no error", settings.calibration.gain_percent, settings.calibration.mismatch_percent, settings.calibration.orthogonality_mrad, constants(settings), settings.material.poisson_ratio_sigma, settings.isotropic_strain_percent),
+            strain_tensor: "readings.strain_tensor, where the orientation of a layer is known: mean ½(ε₁+ε₂) and shear \
+                            part γ = ½(ε₁−ε₂) of the strain of layer 2 against layer 1, of atoms and tension positive \
+                            in either form of the equation, φ the axis of ε₁ from x; splits: the same strain as \
+                            (1+ε_b) diag(1+ε_u, 1−νε_u), which is possible in two ways; isotropic strains are those of \
+                            layer 2".to_owned(),
+            sigma: "`sigma_total`: one standard deviation with everything (publish this one): image noise, drift, \
+                    sensor noise, calibration of the scanner, lattice constant and model; `sigma`: the statistical \
+                    part alone, image noise, drift and sensor noise, for comparing results of one scanner and one \
+                    model; `budget` has every part".to_owned(),
+            budget: format!("one standard deviation for each source of error and for all together; image, drift and \
+                             sensor make up sigma; the scanner is assumed to be known to {} % in gain, {} % in the \
+                             ratio of x and y and {} mrad in the angle between them, the lattice constant to {}, the \
+                             Poisson ratio to {}, an isotropic heterostrain to be {} %; strained_layer is the \
+                             difference to strain in equal parts in both layers; angles are counted from the x axis of \
+                             the sensors, so a turned frame is no error", settings.calibration.gain_percent, settings.calibration.mismatch_percent, settings.calibration.orthogonality_mrad, constants(settings), settings.material.poisson_ratio_sigma, settings.isotropic_strain_percent),
         }
     }
 }

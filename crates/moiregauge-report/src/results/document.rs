@@ -86,7 +86,7 @@ pub struct SetResult {
     /// The plain mean over the scans, not corrected for drift.
     pub uncorrected: Option<MeanResult>,
     /// From the mean reciprocal lattice of up and down scans: free of constant drift without
-    /// knowing it. The check on `mean`.
+    /// knowing it. A check of `mean`.
     pub forward_backward: Option<TwistStrainResult>,
     /// Errors from the scatter of the scans; `null` without a joint fit.
     pub checks: Option<ChecksResult>,

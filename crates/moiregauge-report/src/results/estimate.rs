@@ -13,8 +13,8 @@ pub struct ResultEstimate {
     /// One standard deviation. Where `sigma_total` stands beside it, the statistical part of that: noise of
     /// images and sensors, and the drift.
     pub sigma: Option<f64>,
-    /// One standard deviation with everything, calibration and model included: what may be published. In the
-    /// means of sets and in `combined`; left out where it is not known, as where the drift was left in.
+    /// One standard deviation with everything, calibration and model included: publish this one. Present in the means
+    /// of sets and in `combined`; left out where it is not known, as when the drift was not removed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sigma_total: Option<f64>,
 }

@@ -10,7 +10,7 @@ use super::estimate::ResultEstimate;
 /// nm/s² → nm/min².
 const PER_MINUTE2: f64 = 3600.0;
 
-/// Terms of a joint fit; those that are `null` did not earn their place by the information criterion.
+/// Terms of a joint fit; those that are `null` were not used, by the information criterion.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct JointResult {
     /// Whether phases link the frames, which tightens the drift by an order of magnitude.
@@ -32,7 +32,7 @@ pub struct JointResult {
 pub struct TestedResult {
     /// `acceleration`, `settling` or `fast-axis gain`.
     pub term: String,
-    /// By how much it lowers the Bayesian information criterion; below 0 it does not pay.
+    /// By how much it lowers the Bayesian information criterion; below 0 the term is not used.
     pub criterion_gain: Option<f64>,
     /// Whether the fit has it.
     pub used: bool,

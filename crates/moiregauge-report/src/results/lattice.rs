@@ -86,9 +86,9 @@ pub struct TwistStrainResult {
     /// `sigma_total` of the others.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub strain_vector_sigma_total_percent: Option<[Option<f64>; 2]>,
-    /// How often noise alone gives so improbable a strain vector.
+    /// Probability that noise alone gives such a strain vector.
     pub strain_p_value: Option<f64>,
-    /// The magnitude that the strain does not exceed, with 95 % confidence, per cent.
+    /// Upper limit of the magnitude of the strain, 95 % confidence, per cent.
     pub strain_upper_limit_95_percent: Option<f64>,
     /// The interval that holds the magnitude of the strain with 95 % confidence, or more, per cent; it
     /// begins at 0 where noise alone may explain the strain.

@@ -30,7 +30,7 @@ pub struct MapResults {
     pub method: String,
     /// Width of the window, standard deviation of the Gaussian, nm.
     pub window_nm: f64,
-    /// Full width at half maximum of what a point becomes, nm.
+    /// Resolution: full width at half maximum of the window, nm.
     pub resolution_nm: f64,
     /// Columns and rows of nodes.
     pub nodes: [usize; 2],
@@ -53,7 +53,7 @@ pub struct MapResults {
     pub stripes: Option<super::stripes::StripesResult>,
     /// How images of one place agree.
     pub agreement: Option<AgreementResult>,
-    /// What differs between upward and downward frames along the slow axis: drift that changes, no strain.
+    /// Difference between upward and downward frames along the slow axis: a drift that changes, not strain.
     pub drift_change: Option<DriftChangeResult>,
     /// Regions, uniform areas, wanted twist.
     pub details: super::region::MapDetailsResult,

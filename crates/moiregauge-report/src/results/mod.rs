@@ -14,6 +14,7 @@ mod estimate;
 mod joint;
 mod lattice;
 mod map;
+mod profile;
 mod quantity;
 mod readings;
 mod region;
@@ -39,6 +40,7 @@ pub use map::{
     AgreementResult, DriftChangeResult, HarmonicResult, MapResults, MappedImage, MaskCount,
     mask_counts, quantities,
 };
+pub use profile::{ProfilePointResult, ProfileResult};
 pub use quantity::{QuantityResult, TrendResult};
 pub use readings::{
     AtomicResult, IsotropicStrainResult, NameResult, NamesResult, OtherSenseResult, ReadingsResult,

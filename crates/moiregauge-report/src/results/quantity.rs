@@ -40,11 +40,11 @@ pub struct TrendResult {
     pub middle: f64,
     /// Its standard error by the noise of the image.
     pub middle_sigma: f64,
-    /// Standard deviation over the good nodes that the plane makes.
+    /// Standard deviation over the good nodes due to the plane.
     pub of_trend: f64,
-    /// What noise adds to the scatter about the plane.
+    /// Standard deviation due to noise.
     pub noise: f64,
-    /// What neither explains.
+    /// Standard deviation that neither trend nor noise explains.
     pub rest: f64,
 }
 

@@ -12,16 +12,16 @@ use super::convert::{PER_MINUTE, PERCENT, degree, estimate, number, pair};
 use super::estimate::ResultEstimate;
 use heterostrain::Estimate;
 
-/// Everything that a lattice can mean beside `twist_deg` and `heterostrain_percent`.
+/// Everything that a lattice can mean besides `twist_deg` and `heterostrain_percent`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ReadingsResult {
-    /// Whether the layers differ: twist and strain then trade at first order, and every entry of
-    /// `solutions` with `twist_deg` > 0 and the waves of the first is as good as another.
+    /// Whether the layers differ. Then several pairs of twist and strain explain the moiré: every entry of `solutions`
+    /// with `twist_deg` > 0 and the waves of the first fits equally well.
     pub layers_differ: bool,
     /// Every exact solution with uniaxial strain alone, under every name of the lattice: those of the reported name
     /// first, then the least strained names.
     pub solutions: Vec<SolutionResult>,
-    /// `solutions` holds all that have no more strain than this.
+    /// `solutions` holds all solutions with at most this strain.
     #[serde(default)]
     pub solutions_complete_to_percent: f64,
     /// The names of the lattice, that is which of its waves belong to the atoms, and the choice among them; `null` for
@@ -56,8 +56,8 @@ pub struct SolutionResult {
 /// The names of a lattice and the choice among them.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct NamesResult {
-    /// What chose the reported name: `least-strain` (nothing tells more), `image` (of each other plausible name one wave is
-    /// too weak), `orientation` (the others need isotropic strain) or `user`.
+    /// What chose the reported name: `image` (every other plausible name has a wave that is too weak), `orientation`
+    /// (the others need isotropic strain), `user`, or `least-strain` (none of these).
     pub chosen_by: String,
     /// The reported name first.
     pub names: Vec<NameResult>,
@@ -70,7 +70,7 @@ pub struct NameResult {
     pub waves: [[i32; 2]; 2],
     /// The strain of its first solution with θ > 0.
     pub strain_percent: f64,
-    /// The twist that goes with it.
+    /// The twist of this reading.
     pub twist_deg: f64,
     /// `reported`, `open` (as plausible as the reported one), `against-image`, `against-orientation` or `unlikely` (much
     /// strain).
@@ -84,8 +84,8 @@ pub struct IsotropicStrainResult {
     pub shifts: Vec<ShiftResult>,
     /// The standard deviation of the isotropic strain, from the settings.
     pub prior_percent: f64,
-    /// The magnitudes of twist that isotropic strains within 1.96 times the prior, either sign of the
-    /// uniaxial strain and 1.96 σ leave open.
+    /// Range of the twist that is possible with isotropic strains within 1.96 times the prior, either sign of the
+    /// uniaxial strain, and 1.96 σ.
     pub twist_interval_deg: [Option<f64>; 2],
 }
 
@@ -94,7 +94,7 @@ pub struct IsotropicStrainResult {
 pub struct ShiftResult {
     /// The strain of layer 2, the same in all directions.
     pub isotropic_strain_percent: f64,
-    /// The change of the twist; `null` where no twist goes with it.
+    /// The change of the twist; `null` where no twist explains the moiré.
     pub twist_change_deg: Option<f64>,
 }
 
@@ -110,8 +110,8 @@ pub struct StrainTensorResult {
     pub splits: [SplitResult; 2],
     /// Covariance of (twist, lattice angle, mean strain, shear₁, shear₂) in degrees and per cent.
     pub covariance: [[Option<f64>; 5]; 5],
-    /// Two equal layers whose sense of twist is open: the reading for the other sense, which is as good; `null`
-    /// otherwise.
+    /// For two equal layers whose sense of twist is open: the reading for the other sense, which fits equally well;
+    /// `null` otherwise.
     #[serde(default)]
     pub other_sense: Option<OtherSenseResult>,
     /// Other readings of the same orientation with less than 1 % of mean strain.
@@ -130,7 +130,7 @@ pub struct OtherSenseResult {
     pub splits: [SplitResult; 2],
     /// Covariance of (twist, lattice angle, mean strain, shear₁, shear₂) in degrees and per cent.
     pub covariance: [[Option<f64>; 5]; 5],
-    /// The magnitudes of twist that both readings leave open, with 1.96 σ of `total` on either side.
+    /// Range of the magnitude of the twist from both readings, with 1.96 σ of `total` on either side.
     pub twist_interval_deg: [Option<f64>; 2],
 }
 
@@ -167,9 +167,9 @@ pub struct TensorSigmas {
 /// Uniaxial and isotropic part; σ as of `total`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct SplitResult {
-    /// Along the axis; −ν times as much across.
+    /// Along the axis; −ν times this across.
     pub uniaxial_percent: ResultEstimate,
-    /// In all directions on top of it.
+    /// The isotropic strain added to it.
     pub biaxial_percent: ResultEstimate,
     /// Axis of the uniaxial part in the laboratory.
     pub axis_lab_deg: Option<ResultEstimate>,
@@ -188,7 +188,7 @@ pub struct AtomicResult {
     pub size: Option<f64>,
     /// How far the lattice is from the shape of the material's, relative.
     pub distortion: Option<f64>,
-    /// Drift in these images, x and y; `null` where they do not tell.
+    /// Drift in these images, x and y; `null` where it cannot be determined.
     pub drift_nm_per_min: Option<[Option<f64>; 2]>,
 }
 

@@ -29,19 +29,19 @@ pub struct MapDetailsResult {
 pub struct RegionMeanResult {
     /// Mean over the area of the good nodes.
     pub mean: Option<f64>,
-    /// Its standard error by image noise, with what neighbouring nodes share, and by `blur`. What all nodes have in
-    /// common (drift, calibration, lattice constant, model) is not in it.
+    /// Its standard error from image noise (neighbouring nodes are correlated) and from `blur`. Errors that all nodes
+    /// share (drift, calibration, lattice constant, model) are not included.
     pub sigma: Option<f64>,
-    /// How far smoothing by the window has moved the mean, as the curvature of the map tells.
+    /// Shift of the mean by smoothing with the window, from the curvature of the map.
     pub blur: Option<f64>,
     /// Standard deviation over the nodes.
     pub spread: Option<f64>,
     /// The same without what noise adds.
     pub spread_corrected: Option<f64>,
-    /// What the spread does not exceed, 95 %, noise and what the window hides (`spread_widening`) accounted for, where the
-    /// lattice changes over eight windows or more; for shorter changes it may be too small.
+    /// Upper limit of the spread (95 %), with noise and smoothing (`spread_widening`) taken into account. It holds
+    /// where the lattice changes over eight windows or more; for shorter changes it may be too small.
     pub spread_below_95: Option<f64>,
-    /// Factor by which the window may have made the spread smaller, as the curvature of the map tells.
+    /// Factor by which smoothing with the window may have reduced the spread, from the curvature of the map.
     pub spread_widening: Option<f64>,
     /// Root mean square of the errors of the nodes.
     pub noise: Option<f64>,
@@ -72,11 +72,11 @@ pub struct RegionResult {
     pub corners_nm: Vec<[f64; 2]>,
     /// Area, nm².
     pub area_nm2: f64,
-    /// Share of the area that the map reaches, %.
+    /// Share of the area that the map covers, %.
     pub covered_percent: f64,
-    /// Nodes whose cells it covers at least in part.
+    /// Nodes whose cells the area covers at least in part.
     pub nodes: usize,
-    /// Those to be believed.
+    /// Good nodes.
     pub good_nodes: usize,
     /// Share of masked nodes, %.
     pub masked_percent: f64,
@@ -155,11 +155,11 @@ pub struct WantedResult {
     pub measured_percent: Option<f64>,
     /// Share expected without noise.
     pub corrected_percent: Option<f64>,
-    /// How far the window may have moved that share, as the curvature of the map tells.
+    /// Shift of this share by smoothing with the window, from the curvature of the map.
     pub blur_percent: Option<f64>,
-    /// Share that is within by two σ of its own.
+    /// Share of nodes that are within the limits by at least two of their σ.
     pub certain_percent: Option<f64>,
-    /// Share that is not beyond by two σ.
+    /// Share of nodes that are not outside the limits by two of their σ.
     pub possible_percent: Option<f64>,
 }
 

@@ -17,7 +17,7 @@ pub struct Run {
     pub arguments: Vec<String>,
     /// The settings that were asked for: before a channel was chosen or an orientation measured.
     pub settings: Settings,
-    /// What the user told of the files.
+    /// What the user said about the files.
     #[serde(default)]
     pub known: Told,
     /// Sets made by hand.

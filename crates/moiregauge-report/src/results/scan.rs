@@ -24,7 +24,7 @@ pub struct ScanResult {
     pub frame_direction: String,
     /// Where the tip was.
     pub window: Window,
-    /// How fast it moved, nm/s; σ is the spread over the lines.
+    /// Speed of the tip, nm/s; σ is the spread over the lines.
     pub tip_velocity_nm_per_s: TipVelocity,
     /// The three lattice vectors.
     pub vectors: [ScanVector; 3],
@@ -32,7 +32,7 @@ pub struct ScanResult {
     pub twist_strain: ScanTwistStrain,
     /// Mean and spread of the Monte Carlo draws behind the best of `twist_strain`.
     pub monte_carlo: Option<StrainMonteCarlo>,
-    /// How it lies against the other scans; `null` without a joint fit.
+    /// How it agrees with the other scans; `null` without a joint fit.
     pub residual: Option<ResidualResult>,
     /// Why it was not used for the results of its set; `null` where it was.
     pub excluded: Option<String>,

@@ -7,7 +7,7 @@ use crate::tables::{Column, csv_text, number};
 const COLUMNS: [Column<SampleRow>; 17] = [
     Column::new(
         "sample",
-        "name of the sample: its folder, or as the table of samples says",
+        "name of the sample: its folder, or the name in the table of samples",
         |r| r.sample.clone(),
     ),
     Column::new("moire", "number of the moiré, from 1", |r| {
@@ -68,7 +68,7 @@ const COLUMNS: [Column<SampleRow>; 17] = [
     ),
     Column::new(
         "error",
-        "why there are no numbers, or why files could not be used",
+        "reason why there are no numbers, or why files could not be used",
         SampleRow::error,
     ),
 ];

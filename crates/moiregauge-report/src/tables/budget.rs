@@ -25,10 +25,13 @@ impl BudgetRow<'_> {
 }
 
 impl<'a> Row<'a> for BudgetRow<'a> {
-    const ABOUT: &'static str = "One row per set and source of error, the last of each set being `total`: what the source contributes, one standard deviation each. The squares of `image`, `drift` and `sensor` add up to that of σ, those of all to that of `total`.";
+    const ABOUT: &'static str = "One row per set and source of error, the last row of each set is `total`. Each number \
+                                 is one standard deviation. The squares of `image`, `drift` and `sensor` add up to the \
+                                 square of σ; the squares of all sources add up to the square of `total`.";
     const COLUMNS: &'a [Column<Self>] = columns! {
         "set", "name of the set, or `all sets together`", |r| r.set.to_owned();
-        "coordinates", "`sensor`: not corrected for drift, whose contribution is not known; `drift_corrected`: drift removed", |r| r.coordinates.to_owned();
+        "coordinates", "`sensor`: not corrected for drift, the contribution of the drift is not known; \
+                        `drift_corrected`: drift removed", |r| r.coordinates.to_owned();
         "source", "where the error comes from", |r| r.source.map_or("total", source_name).to_owned();
         "twist_sigma_deg", "of the twist", |r| r.of(&r.budget.twist_deg);
         "heterostrain_sigma_percent", "of the magnitude of the strain", |r| r.of(&r.budget.heterostrain_percent);

@@ -49,7 +49,8 @@ pub(super) struct VectorRow<'a> {
 }
 
 impl<'a> Row<'a> for VectorRow<'a> {
-    const ABOUT: &'static str = "One row per scan, lattice vector and kind of coordinates. σ of single scans is the statistical part alone; what calibration and model add is that of the set, see budget.csv.";
+    const ABOUT: &'static str = "One row per scan, lattice vector and kind of coordinates. σ of single scans is the \
+                                 statistical part alone; calibration and model add what budget.csv lists for the set.";
     const COLUMNS: &'a [Column<Self>] = columns! {
         "set", "name of the set", |r| r.set.name.clone();
         "scan", "number of the scan in its set, from 1", |r| count(r.number);
@@ -115,7 +116,8 @@ pub(super) struct ScanRow<'a> {
 }
 
 impl<'a> Row<'a> for ScanRow<'a> {
-    const ABOUT: &'static str = "One row per scan and kind of coordinates. σ of single scans is the statistical part alone; what calibration and model add is that of the set, see budget.csv.";
+    const ABOUT: &'static str = "One row per scan and kind of coordinates. σ of single scans is the statistical part \
+                                 alone; calibration and model add what budget.csv lists for the set.";
     const COLUMNS: &'a [Column<Self>] = columns! {
         "set", "name of the set", |r| r.set.name.clone();
         "scan", "number of the scan in its set, from 1", |r| count(r.number);
@@ -143,13 +145,13 @@ impl<'a> Row<'a> for ScanRow<'a> {
         "strain_axis_lab_sigma_deg", "its statistical σ", |r| sigma(r.result.and_then(|t| t.strain_axis_lab_deg));
         "strain_axis_lattice_deg", "φ from layer 1; empty unless p < 0.01", |r| value(r.result.and_then(|t| t.strain_axis_lattice_deg));
         "strain_axis_lattice_sigma_deg", "its statistical σ", |r| sigma(r.result.and_then(|t| t.strain_axis_lattice_deg));
-        "strain_p_value", "how often noise alone gives such a strain", |r| number(r.result.and_then(|t| t.strain_p_value));
+        "strain_p_value", "probability that noise alone gives such a strain", |r| number(r.result.and_then(|t| t.strain_p_value));
         "lattice_angle_deg", "orientation α of layer 1, modulo 60°", |r| value(r.result.map(|t| t.lattice_angle_deg));
         "lattice_angle_sigma_deg", "its statistical σ", |r| sigma(r.result.map(|t| t.lattice_angle_deg));
         "residual_chi2", "χ² of the scan against the fit of all others; empty without a joint fit", |r| number(r.scan.residual.and_then(|s| s.chi2));
         "residual_degrees_of_freedom", "its degrees of freedom", |r| r.scan.residual.map_or(String::new(), |s| count(s.degrees_of_freedom));
-        "residual_p_value", "how often chance makes so large a χ²", |r| number(r.scan.residual.and_then(|s| s.p_value));
-        "displacement_x_nm", "where the scan stands from where the others have it", |r| number(r.scan.residual.and_then(|s| s.displacement_nm?[0]));
+        "residual_p_value", "probability of so large a χ² by chance", |r| number(r.scan.residual.and_then(|s| s.p_value));
+        "displacement_x_nm", "distance of the lattice in this scan from the place that the other scans predict", |r| number(r.scan.residual.and_then(|s| s.displacement_nm?[0]));
         "displacement_y_nm", "the same along y", |r| number(r.scan.residual.and_then(|s| s.displacement_nm?[1]));
         "excluded", "why the scan was not used for its set; empty where it was", |r| r.scan.excluded.clone().unwrap_or_default();
     };
@@ -205,15 +207,15 @@ impl<'a> Row<'a> for SetRow<'a> {
         "scans", "number of scans", |r| count(r.set.scans.len());
         "drift_x_nm_per_min", "drift to the right", |r| value(r.set.drift.as_ref().map(|d| d.x_nm_per_min));
         "drift_x_sigma_nm_per_min", "its statistical σ", |r| sigma(r.set.drift.as_ref().map(|d| d.x_nm_per_min));
-        "drift_x_total_sigma_nm_per_min", "its total σ: the calibration of the scanner as well", |r| number(r.set.drift.as_ref().and_then(|d| d.x_nm_per_min.sigma_total));
+        "drift_x_total_sigma_nm_per_min", "its total σ, with the calibration of the scanner", |r| number(r.set.drift.as_ref().and_then(|d| d.x_nm_per_min.sigma_total));
         "drift_y_nm_per_min", "drift up", |r| value(r.set.drift.as_ref().map(|d| d.y_nm_per_min));
         "drift_y_sigma_nm_per_min", "its statistical σ", |r| sigma(r.set.drift.as_ref().map(|d| d.y_nm_per_min));
-        "drift_y_total_sigma_nm_per_min", "its total σ: the calibration of the scanner as well", |r| number(r.set.drift.as_ref().and_then(|d| d.y_nm_per_min.sigma_total));
+        "drift_y_total_sigma_nm_per_min", "its total σ, with the calibration of the scanner", |r| number(r.set.drift.as_ref().and_then(|d| d.y_nm_per_min.sigma_total));
         "drift_correlation", "correlation coefficient of the two", |r| number(r.set.drift.as_ref().and_then(|d| d.correlation));
         "drift_given", "whether the user gave the drift", |r| r.set.drift.as_ref().map_or_else(String::new, |d| d.given.to_string());
         "twist_deg", "twist θ", |r| value(r.result().map(|t| t.twist_deg));
         "twist_sigma_deg", "its statistical σ: image noise, drift and sensor noise", |r| sigma(r.result().map(|t| t.twist_deg));
-        "twist_total_sigma_deg", "its total σ, calibration and model included, see budget.csv: what may be published", |r| total(r.budget().map(|b| b.twist_deg));
+        "twist_total_sigma_deg", "its total σ, calibration and model included, see budget.csv (publish this one)", |r| total(r.budget().map(|b| b.twist_deg));
         "twist_scatter_deg", "standard deviation over the scans", |r| number(r.mean().and_then(|m| m.twist_scatter_deg));
         "heterostrain_percent", "ε, noise bias removed", |r| value(r.result().map(|t| t.heterostrain_percent));
         "heterostrain_sigma_percent", "its statistical σ", |r| sigma(r.result().map(|t| t.heterostrain_percent));
@@ -229,7 +231,7 @@ impl<'a> Row<'a> for SetRow<'a> {
         "strain_axis_lab_ccw_from_x_deg", "φ_lab; empty unless p < 0.01", |r| value(r.result().and_then(|t| t.strain_axis_lab_deg));
         "strain_axis_lab_sigma_deg", "its statistical σ", |r| sigma(r.result().and_then(|t| t.strain_axis_lab_deg));
         "strain_axis_lab_total_sigma_deg", "its total σ", |r| total(r.budget().and_then(|b| b.strain_axis_lab_deg));
-        "strain_p_value", "how often noise alone gives such a strain", |r| number(r.result().and_then(|t| t.strain_p_value));
+        "strain_p_value", "probability that noise alone gives such a strain", |r| number(r.result().and_then(|t| t.strain_p_value));
         "strain_interval_95_low_percent", "lower end of the 95 % interval of ε", |r| number(r.result().and_then(|t| t.strain_interval_95_percent[0]));
         "strain_interval_95_high_percent", "its upper end", |r| number(r.result().and_then(|t| t.strain_interval_95_percent[1]));
         "strain_upper_limit_95_percent", "not exceeded with 95 % confidence", |r| number(r.result().and_then(|t| t.strain_upper_limit_95_percent));

@@ -44,8 +44,9 @@ fn line(fields: impl Iterator<Item = String>) -> String {
 }
 
 /// For the reader of a table: what [`harmless`] does, and how to undo it.
-pub(super) const APOSTROPHE: &str = "Text that a spreadsheet would run (it begins with `=`, `+`, `-`, `@` or a control \
-    character) or that begins with an apostrophe has an apostrophe before it: take one off. Numbers are as they are.";
+pub(super) const APOSTROPHE: &str = "Text that a spreadsheet could run as a formula (it begins with `=`, `+`, `-`, `@` \
+                                     or a control character), or that begins with an apostrophe, gets an apostrophe in \
+                                     front. Remove it when you read the file. Numbers are unchanged.";
 
 /// A text that begins like a formula, or already with an apostrophe, with one before it; a number as it is.
 ///

@@ -50,7 +50,7 @@ pub(super) const CELL: &[Column<CellRow>] = columns! {
     "node_3_x_nm", "place of the third node", |r| corner(r, 2, 0);
     "node_3_y_nm", "place of the third node", |r| corner(r, 2, 1);
     "twist_deg", "twist", |r| of(r, |t| t.twist, DEGREE);
-    "twist_sigma_deg", "its σ; triangles that share a node share its error", |r| of(r, |t| t.twist().sigma, DEGREE);
+    "twist_sigma_deg", "its σ; triangles with a common node have correlated errors", |r| of(r, |t| t.twist().sigma, DEGREE);
     "strain_percent", "magnitude of the strain, bias of noise removed", |r| of(r, |t| t.heterostrain().value, 100.0);
     "strain_sigma_percent", "its σ", |r| of(r, |t| t.heterostrain().sigma, 100.0);
     "strain_axis_lab_deg", "axis of the strain from x, where it is significant", |r| of(r, |t| t.axis_lab().map_or(f64::NAN, |a| a.value), DEGREE);
@@ -89,10 +89,10 @@ pub(super) const NODE: &[Column<NodeRow>] = columns! {
     "node", "number, as in `domains.csv`", |r| r.number.to_string();
     "x_nm", "place", |r| number(Some(r.place.x));
     "y_nm", "place", |r| number(Some(r.place.y));
-    "x_sigma_nm", "its σ; an offset that all nodes share is not in it", |r| number(Some(r.covariance.m11.sqrt()));
+    "x_sigma_nm", "its σ, without any offset that all nodes share", |r| number(Some(r.covariance.m11.sqrt()));
     "y_sigma_nm", "its σ", |r| number(Some(r.covariance.m22.sqrt()));
     "covariance_xy_nm2", "covariance of x and y", |r| number(Some(r.covariance.m12));
     "h", "index on the lattice, from a node of its part of the mesh; empty for nodes in no triangle", |r| index(r, 0);
     "k", "index on the lattice", |r| index(r, 1);
-    "extra", "`yes`: within the mesh, and fits into no triangle", |r| if r.extra { "yes" } else { "no" }.to_owned();
+    "extra", "`yes`: inside the mesh, but fits into no triangle", |r| if r.extra { "yes" } else { "no" }.to_owned();
 };

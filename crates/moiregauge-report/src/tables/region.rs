@@ -82,15 +82,16 @@ fn add<R>(
 const ABOUT: &str = "# Columns of the tables of a map
 
 Comma-separated, UTF-8, RFC 4180; the unit is the end of the name (`_nm`, `_deg`, `_percent`); `_sigma` is one
-standard deviation by image noise. An empty field is not known. Places are those of the map: x to the right, y up.
+standard deviation by image noise. An empty field means: not known. Places are those of the map: x to the right, y up.
 Twist, strain ε and its axis φ (from x, counter-clockwise) are defined under `conventions` in `map.json`.
 
 ";
 
 /// What the errors of tables leave out.
 pub(crate) const COMMON: &str = "Errors are those of image noise; means of regions take into account that neighbouring \
-    nodes share theirs, and how far smoothing by the window has moved them. What all places have in common is not in \
-    them: drift, calibration of the scanner, lattice constant and model (the budget of `moiregauge analyze` has them).";
+                                 nodes are correlated, and how far smoothing by the window moved them. Errors that all \
+                                 places share are not included: drift, calibration of the scanner, lattice constant \
+                                 and model (see the budget of `moiregauge analyze`).";
 
 fn of(mean: Option<RegionMeanResult>, value: fn(&RegionMeanResult) -> Option<f64>) -> String {
     number(mean.as_ref().and_then(value))
@@ -103,17 +104,17 @@ fn component(r: &RegionResult, i: usize) -> Option<RegionMeanResult> {
 const REGION: &[Column<RegionResult>] = columns! {
     "region", "name of the region", |r| r.name.clone();
     "area_nm2", "its area", |r| number(Some(r.area_nm2));
-    "covered_percent", "share of the area that the map reaches", |r| number(Some(r.covered_percent));
-    "nodes", "nodes of the map whose cells it covers at least in part", |r| r.nodes.to_string();
-    "good_nodes", "those to be believed", |r| r.good_nodes.to_string();
-    "masked_percent", "share of nodes that are not", |r| number(Some(r.masked_percent));
+    "covered_percent", "share of the area that the map covers", |r| number(Some(r.covered_percent));
+    "nodes", "nodes of the map whose cells the region covers at least in part", |r| r.nodes.to_string();
+    "good_nodes", "good nodes", |r| r.good_nodes.to_string();
+    "masked_percent", "share of bad nodes", |r| number(Some(r.masked_percent));
     "masked_by", "reasons, in % of the nodes", masked_by;
     "twist_deg", "mean twist", |r| of(r.twist_deg, |t| t.mean);
-    "twist_sigma_deg", "standard error of the mean: noise, with what neighbours share, and blur", |r| of(r.twist_deg, |t| t.sigma);
-    "twist_blur_deg", "how far smoothing by the window has moved the mean, as the curvature of the map tells", |r| of(r.twist_deg, |t| t.blur);
+    "twist_sigma_deg", "standard error of the mean: noise (neighbouring nodes are correlated) and blur", |r| of(r.twist_deg, |t| t.sigma);
+    "twist_blur_deg", "shift of the mean by smoothing with the window, from the curvature of the map", |r| of(r.twist_deg, |t| t.blur);
     "twist_spread_deg", "standard deviation over the nodes", |r| of(r.twist_deg, |t| t.spread);
     "twist_spread_corrected_deg", "the same without noise", |r| of(r.twist_deg, |t| t.spread_corrected);
-    "twist_spread_below_deg", "what the spread does not exceed, noise and smoothing accounted for, 95 %", |r| of(r.twist_deg, |t| t.spread_below_95);
+    "twist_spread_below_deg", "upper limit of the spread (95 %), noise and smoothing taken into account", |r| of(r.twist_deg, |t| t.spread_below_95);
     "twist_noise_deg", "rms error of the nodes", |r| of(r.twist_deg, |t| t.noise);
     "strain_percent", "magnitude of the mean strain vector, bias of noise removed", |r| number(r.mean.as_ref().and_then(|m| m.heterostrain_percent.value));
     "strain_sigma_percent", "its σ", |r| number(r.mean.as_ref().and_then(|m| m.heterostrain_percent.sigma));
@@ -147,12 +148,12 @@ const DEVICE: &[Column<DeviceRow>] = columns! {
     "centre_x_nm", "centre", |r| number(Some(r.0.centre_nm[0]));
     "centre_y_nm", "centre", |r| number(Some(r.0.centre_nm[1]));
     "angle_deg", "direction of the first side from x, counter-clockwise", |r| number(Some(r.0.angle_deg));
-    "masked_percent", "share of nodes that are not to be believed", |r| number(Some(r.0.area.masked_percent));
+    "masked_percent", "share of bad nodes to be believed", |r| number(Some(r.0.area.masked_percent));
     "twist_deg", "mean twist", |r| of(r.0.area.twist_deg, |t| t.mean);
-    "twist_sigma_deg", "standard error of the mean: noise, with what neighbours share, and blur", |r| of(r.0.area.twist_deg, |t| t.sigma);
+    "twist_sigma_deg", "standard error of the mean: noise (neighbouring nodes are correlated) and blur", |r| of(r.0.area.twist_deg, |t| t.sigma);
     "twist_spread_deg", "standard deviation over the nodes", |r| of(r.0.area.twist_deg, |t| t.spread);
     "twist_spread_corrected_deg", "the same without noise", |r| of(r.0.area.twist_deg, |t| t.spread_corrected);
-    "twist_spread_below_deg", "what the spread does not exceed, noise and smoothing accounted for, 95 %", |r| of(r.0.area.twist_deg, |t| t.spread_below_95);
+    "twist_spread_below_deg", "upper limit of the spread (95 %), noise and smoothing taken into account", |r| of(r.0.area.twist_deg, |t| t.spread_below_95);
     "strain_percent", "magnitude of the mean strain vector", |r| number(r.0.area.mean.as_ref().and_then(|m| m.heterostrain_percent.value));
     "strain_sigma_percent", "its σ", |r| number(r.0.area.mean.as_ref().and_then(|m| m.heterostrain_percent.sigma));
     "strain_rms_percent", "root mean square of the local strain without noise", |r| number(r.0.area.strain_rms_percent);
@@ -176,7 +177,7 @@ const POINT: &[Column<PointRow>] = columns! {
     "y_nm", "place", |r| number(Some(r.1.place.y));
     "mask", "`good`, or why there are no values", |r| r.1.mask.map_or("beyond the map", moiregauge::window::Mask::name).to_owned();
     "twist_deg", "twist", |r| at(r, |v| v.twist.value, DEGREE);
-    "twist_sigma_deg", "its σ; near points share their noise", |r| at(r, |v| v.twist.sigma, DEGREE);
+    "twist_sigma_deg", "its σ; neighbouring points are correlated", |r| at(r, |v| v.twist.sigma, DEGREE);
     "strain_percent", "magnitude of the strain, bias of noise removed", |r| at(r, |v| v.magnitude.value, 100.0);
     "strain_sigma_percent", "its σ", |r| at(r, |v| v.magnitude.sigma, 100.0);
     "strain_1_percent", "ε cos 2φ", |r| at(r, |v| v.strain[0].value, 100.0);

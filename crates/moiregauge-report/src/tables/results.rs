@@ -59,6 +59,6 @@ const ABOUT: &str = "# Columns of the tables
 
 Comma-separated, UTF-8, RFC 4180; the unit is the end of the name (`_nm`, `_deg`, `_percent`,
 `_nm_per_min`, `_hz`); `_sigma` is one standard deviation of the statistical error (noise and drift), `_total_sigma`
-one with everything, calibration and model included: what may be published. An empty field is not known.
+one with everything, calibration and model included (publish this one). An empty field means: not known.
 x to the right, y up; angles counter-clockwise from x. `results.json` holds the same and more.
 ";

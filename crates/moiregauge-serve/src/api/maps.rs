@@ -12,7 +12,7 @@ use moiregauge_pipeline::campaign::Kept;
 use moiregauge_pipeline::maps::{MapRequest, Questions, Shown};
 use moiregauge_pipeline::sink::archive;
 use moiregauge_pipeline::view::{Part, blocks};
-use moiregauge_report::results::{MapDetailsResult, ResultCaveat};
+use moiregauge_report::results::{MapDetailsResult, ProfileResult, ResultCaveat};
 use serde::Deserialize;
 use serde_json::{Map, Value, json};
 
@@ -123,7 +123,7 @@ async fn quantity(
     .await
 }
 
-/// Answers as they stand in `map.json`, and doubts about them.
+/// Answers as they stand in `map.json`, the lines of `profiles.csv`, and doubts about them.
 async fn ask(
     State(app): Shared,
     Path(id): Path<String>,
@@ -135,12 +135,14 @@ async fn ask(
         let mapped = app.maps.get(&id)?.mapped()?;
         questions.check().map_err(Problem::wrong)?;
         let Shown::Lattice(found) = &mapped.found.shown else {
-            return Err(Problem::wrong("stripes have no twist to be asked for"));
+            return Err(Problem::wrong("a map of stripes has no twist"));
         };
         let (details, doubts) = questions.ask(&found.map).map_err(Problem::wrong)?;
+        let profiles: Vec<ProfileResult> = details.profiles.iter().map(Into::into).collect();
         let details = MapDetailsResult::from(&details);
         let caveats: Vec<ResultCaveat> = doubts.iter().map(Into::into).collect();
         let mut answer = serde_json::to_value(details).map_err(Problem::fault)?;
+        answer["profiles"] = json!(profiles);
         answer["caveats"] = json!(caveats);
         Ok(Json(answer))
     })

@@ -48,7 +48,7 @@ pub(super) async fn upload(
     beside(move || {
         keep(file, &place)?;
         let shown = app.roots.show(DROPPED, &place);
-        let shown = shown.ok_or_else(|| Problem::fault("the file is gone again"))?;
+        let shown = shown.ok_or_else(|| Problem::fault("the file was deleted"))?;
         Ok(Json(
             json!({"file": shown.id, "name": asked.name, "bytes": bytes}),
         ))

@@ -44,7 +44,9 @@ async fn add(State(app): Shared, headers: HeaderMap, body: Body) -> Answer<Json<
     let wanted: Wanted = document(&headers, body).await?;
     beside(move || {
         if wanted.root == DROPPED {
-            return Err(Problem::wrong("no microscope saves there").at("root"));
+            return Err(
+                Problem::wrong("a microscope cannot save into a folder of the page").at("root"),
+            );
         }
         if wanted.known.sensors.is_some() {
             return Err(Problem::wrong("a second file cannot be named here").at("known.sensors"));

@@ -8,6 +8,7 @@ use axum::http::{HeaderMap, HeaderName, HeaderValue, header};
 use axum::response::{IntoResponse as _, Response};
 use axum::routing::{get, post};
 use axum::{Json, Router};
+use moiregauge_pipeline::choices::{self, grains};
 use moiregauge_pipeline::sink::archive;
 use moiregauge_pipeline::view::{FitView, fit_of, overlays};
 use serde::Deserialize;
@@ -35,6 +36,7 @@ pub(super) fn routes() -> Router<Arc<App>> {
         .route("/works/{work}/cancel", post(cancel))
         .route("/works/{work}/results.json", get(results))
         .route("/works/{work}/summary", get(summary))
+        .route("/works/{work}/names", get(names))
         .route("/works/{work}/overlay", get(overlay))
         .route("/works/{work}/residual", get(residual))
         .route("/works/{work}/cell", get(cell))
@@ -137,10 +139,13 @@ async fn results(State(app): Shared, Path(id): Id, Query(moire): Query<OfMoire>)
 }
 
 async fn summary(State(app): Shared, Path(id): Id, Query(moire): Query<OfMoire>) -> Answer {
-    let (done, _) = app.works.get(&id)?.done()?;
-    let outcome = moire.of(&done.outcomes)?;
-    let text = moiregauge_report::screen::summary(&outcome.analysis, |_| None);
-    Ok(([(header::CONTENT_TYPE, "text/plain; charset=utf-8")], text).into_response())
+    beside(move || {
+        let (_, outcomes) = app.works.get(&id)?.outcomes()?;
+        let outcome = moire.of(&outcomes)?;
+        let text = moiregauge_report::screen::summary(&outcome.analysis, |_| None);
+        Ok(([(header::CONTENT_TYPE, "text/plain; charset=utf-8")], text).into_response())
+    })
+    .await
 }
 
 #[derive(Deserialize)]
@@ -165,7 +170,7 @@ async fn cell(State(app): Shared, Path(id): Id, Query(of): Query<OfFile>) -> Ans
 /// The fit of a scan of the last result, made again.
 async fn fit_shown(app: Arc<App>, id: String, of: OfFile) -> Answer<FitView> {
     beside(move || {
-        let (done, _) = app.works.get(&id)?.done()?;
+        let (done, outcomes) = app.works.get(&id)?.outcomes()?;
         let all = &done.asked.files;
         let named = all.iter().find(|file| file.id == of.file);
         let named =
@@ -177,7 +182,7 @@ async fn fit_shown(app: Arc<App>, id: String, of: OfFile) -> Answer<FitView> {
             _ => LineDirection::Trace,
         };
         // The channel that was chosen in the end.
-        let settings = done.outcomes.first();
+        let settings = outcomes.first();
         let settings = settings.map_or(&done.asked.settings, |o| &o.analysis.settings);
         let shown = fit_of(&named.name, settings, &known, line);
         let shown = shown.map_err(|e| Problem::unusable(&e).at("file"))?;
@@ -186,19 +191,39 @@ async fn fit_shown(app: Arc<App>, id: String, of: OfFile) -> Answer<FitView> {
     .await
 }
 
-/// What is drawn on a scan: one for each line direction.
+/// The names under which the lattice can be read, with the setting that chooses each.
+async fn names(
+    State(app): Shared,
+    Path(id): Id,
+    Query(moire): Query<OfMoire>,
+) -> Answer<Json<Value>> {
+    beside(move || {
+        let (_, outcomes) = app.works.get(&id)?.outcomes()?;
+        let outcome = moire.of(&outcomes)?;
+        Ok(Json(json!(choices::names(&outcome.analysis))))
+    })
+    .await
+}
+
+/// What is drawn on a scan: one for each line direction; and the grains beside the one that was measured.
 async fn overlay(
     State(app): Shared,
     Path(id): Id,
     Query(of): Query<OfFile>,
 ) -> Answer<Json<Value>> {
-    let (done, _) = app.works.get(&id)?.done()?;
-    let file = done.asked.files.iter().find(|file| file.id == of.file);
-    let file = file.ok_or_else(|| Problem::missing("no such file in this work").at("file"))?;
-    let name = moiregauge_pipeline::names::in_words(&file.name);
-    let outcome = OfMoire { moire: of.moire }.of(&done.outcomes)?;
-    let lines = overlays(&outcome.analysis, &name);
-    Ok(Json(json!({"file": of.file, "lines": lines})))
+    beside(move || {
+        let (done, outcomes) = app.works.get(&id)?.outcomes()?;
+        let file = done.asked.files.iter().find(|file| file.id == of.file);
+        let file = file.ok_or_else(|| Problem::missing("no such file in this work").at("file"))?;
+        let name = moiregauge_pipeline::names::in_words(&file.name);
+        let outcome = OfMoire { moire: of.moire }.of(&outcomes)?;
+        let lines = overlays(&outcome.analysis, &name);
+        let grains = grains(&outcome.analysis, &name);
+        Ok(Json(
+            json!({"file": of.file, "lines": lines, "grains": grains}),
+        ))
+    })
+    .await
 }
 
 async fn outputs(State(app): Shared, Path(id): Id) -> Answer<Json<Value>> {

@@ -123,7 +123,7 @@ impl Asked {
         let now = serde_json::to_value(self.effective()).map_err(Problem::fault)?;
         let usual = serde_json::to_value(Settings::default()).map_err(Problem::fault)?;
         let (Value::Object(now), Value::Object(usual)) = (now, usual) else {
-            return Err(Problem::fault("settings are no table"));
+            return Err(Problem::fault("settings must be a table"));
         };
         let differs = |name: &str| now.get(name) != usual.get(name);
         let layers = ["material", "substrate", "moire_layers", "layers_chosen"];

@@ -20,8 +20,8 @@ use crate::problem::{Answer, Problem};
 #[derive(Debug)]
 pub(crate) struct Done {
     pub(crate) asked: Asked,
-    /// The moirés, the largest cell first; empty where the result was read from the disk.
-    pub(crate) outcomes: Vec<Outcome>,
+    /// The moirés, the largest cell first; of a result that was read from the disk they are made when they are wanted.
+    outcomes: Mutex<Option<Arc<Vec<Outcome>>>>,
     /// The `results.json` of each of them.
     pub(crate) documents: Vec<Vec<u8>>,
     /// Made when they are wanted.
@@ -62,7 +62,7 @@ impl Done {
     pub(crate) fn read(asked: Asked, documents: Vec<Vec<u8>>) -> Self {
         Self {
             asked,
-            outcomes: Vec::new(),
+            outcomes: Mutex::default(),
             documents,
             written: Mutex::default(),
         }
@@ -84,9 +84,31 @@ impl Done {
         Ok(Self {
             asked: asked.clone(),
             documents: documents.collect::<Result<_, _>>()?,
-            outcomes,
+            outcomes: Mutex::new(Some(Arc::new(outcomes))),
             written: Mutex::default(),
         })
+    }
+
+    /// The moirés behind the documents; those of a result that an earlier server left are analysed again of what was measured.
+    pub(crate) fn outcomes(&self, words: &Words, kept: &Kept) -> Answer<Arc<Vec<Outcome>>> {
+        // Whoever asks meanwhile waits for the same.
+        let mut outcomes = lock(&self.outcomes);
+        if let Some(found) = &*outcomes {
+            return Ok(Arc::clone(found));
+        }
+        let mut kept = kept.clone();
+        let again = run_beside(&Cancel::new(), &Quiet, |job| {
+            Self::of(&self.asked, words, &mut kept, job)
+                .map_err(|e| Problem::conflict(e.in_words().0))
+        });
+        let again = again.map_err(no_result)?;
+        if again.documents != self.documents {
+            let words = "the files are not as they were when this result was saved: analyse again";
+            return Err(Problem::conflict(words));
+        }
+        let found = lock(&again.outcomes).take().unwrap_or_default();
+        *outcomes = Some(Arc::clone(&found));
+        Ok(found)
     }
 
     /// Everything that the program would write, with the settings and the command.
@@ -102,13 +124,17 @@ impl Done {
             let outcomes = outcomes.map_err(|e| Problem::wrong(e.in_words().0))?;
             files(&self.asked, words, &outcomes)
         });
-        let made = Arc::new(made.map_err(|error| match error {
-            NoResult::Refused(problem) => problem,
-            NoResult::Fault(words) => Problem::fault(words),
-            NoResult::Cancelled => Problem::conflict("stopped before the end"),
-        })?);
+        let made = Arc::new(made.map_err(no_result)?);
         *written = Some(Arc::clone(&made));
         Ok(made)
+    }
+}
+
+fn no_result(error: NoResult<Problem>) -> Problem {
+    match error {
+        NoResult::Refused(problem) => problem,
+        NoResult::Fault(words) => Problem::fault(words),
+        NoResult::Cancelled => Problem::conflict("stopped before the end"),
     }
 }
 

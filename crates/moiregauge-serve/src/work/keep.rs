@@ -10,16 +10,26 @@ use tempfile::NamedTempFile;
 use super::asked::Asked;
 use super::history::History;
 
+/// What says which other files count; it is written last.
 const WORK: &str = "work.json";
-const MEASURED: &str = "measured.json";
 
 /// A work as it is kept.
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct OnDisk {
     pub(super) history: History<Asked>,
-    /// What the results that are kept answer.
-    pub(super) answered: Option<Asked>,
+    /// The results that lie beside it.
+    pub(super) results: Option<Results>,
+}
+
+/// Results that are kept.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Results {
+    /// Counts results; a part of the names of their files.
+    pub(super) version: u64,
+    /// What they answer.
+    pub(super) answered: Asked,
     /// How many moirés they are of.
     pub(super) moires: usize,
 }
@@ -40,21 +50,22 @@ impl Keeper {
             let id = folder.file_name()?.to_str()?.to_owned();
             let work: OnDisk =
                 serde_json::from_slice(&std::fs::read(folder.join(WORK)).ok()?).ok()?;
-            let documents = (1..=work.moires).map(|n| std::fs::read(folder.join(document(n))).ok());
-            let measured = std::fs::read(folder.join(MEASURED)).ok();
+            let Some(results) = &work.results else {
+                return Some((id, work, Vec::new(), Kept::default()));
+            };
+            let names = (1..=results.moires).map(|n| document(results.version, n));
+            let documents = names.map(|name| std::fs::read(folder.join(name)).ok());
+            let documents = documents.collect::<Option<_>>()?;
+            let measured = std::fs::read(folder.join(measured_of(results.version))).ok();
             // What cannot be understood is measured again.
             let measured = measured.and_then(|bytes| serde_json::from_slice(&bytes).ok());
-            Some((
-                id,
-                work,
-                documents.collect::<Option<_>>()?,
-                measured.unwrap_or_default(),
-            ))
+            Some((id, work, documents, measured.unwrap_or_default()))
         };
         folders.filter_map(|entry| one(entry.path())).collect()
     }
 
-    /// Writes a work, the list of what there is last.
+    /// Writes a work. Results have names of their own for each version, so that what was kept before counts until all of
+    /// the new is on the disk.
     pub(super) fn save(
         &self,
         id: &str,
@@ -63,18 +74,43 @@ impl Keeper {
     ) -> std::io::Result<()> {
         let folder = self.0.join(id);
         std::fs::create_dir_all(&folder)?;
-        if let Some((documents, kept)) = new {
-            for (number, bytes) in (1..).zip(documents) {
-                put(&folder, &document(number), bytes)?;
-            }
-            put(&folder, MEASURED, &serde_json::to_vec(kept)?)?;
+        let Some((results, (documents, kept))) = work.results.as_ref().zip(new) else {
+            return put(&folder, WORK, &serde_json::to_vec(work)?);
+        };
+        for (number, bytes) in (1..).zip(documents) {
+            put(&folder, &document(results.version, number), bytes)?;
         }
-        put(&folder, WORK, &serde_json::to_vec(work)?)
+        let measured = serde_json::to_vec(kept)?;
+        put(&folder, &measured_of(results.version), &measured)?;
+        put(&folder, WORK, &serde_json::to_vec(work)?)?;
+        forget(&folder, results);
+        Ok(())
     }
 }
 
-fn document(moire: usize) -> String {
-    format!("results-{moire}.json")
+fn document(version: u64, moire: usize) -> String {
+    format!("results-{version}-{moire}.json")
+}
+
+fn measured_of(version: u64) -> String {
+    format!("measured-{version}.json")
+}
+
+/// Removes results of other versions; what cannot be removed does no harm.
+fn forget(folder: &Path, results: &Results) {
+    let documents = (1..=results.moires).map(|n| document(results.version, n));
+    let mut own: Vec<String> = documents.collect();
+    own.push(measured_of(results.version));
+    for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+        let name = entry.file_name();
+        let is_result = |name: &str| name.starts_with("results-") || name.starts_with("measured-");
+        if let Some(name) = name.to_str()
+            && is_result(name)
+            && !own.iter().any(|one| one == name)
+        {
+            let _ = std::fs::remove_file(entry.path());
+        }
+    }
 }
 
 /// A file, whole and on the disk when this comes back.
@@ -86,4 +122,45 @@ fn put(folder: &Path, name: &str, bytes: &[u8]) -> std::io::Result<()> {
     #[cfg(unix)]
     std::fs::File::open(folder)?.sync_all()?;
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn on_disk(version: u64) -> OnDisk {
+        OnDisk {
+            history: History::new(Asked::nothing()),
+            results: Some(Results {
+                version,
+                answered: Asked::nothing(),
+                moires: 1,
+            }),
+        }
+    }
+
+    /// Wherever a new result cannot be written, as on a full disk, the one before is there, all of it.
+    #[test]
+    fn what_cannot_be_saved_leaves_what_was() {
+        let folder = tempfile::tempdir().unwrap();
+        let keeper = Keeper::new(folder.path());
+        let result = |text: &str| vec![text.as_bytes().to_vec()];
+        let kept = Kept::default();
+        let save = |version, text: &str| {
+            keeper.save("w1", &on_disk(version), Some((&result(text), &kept)))
+        };
+        save(1, "one").unwrap();
+        let here = folder.path().join("works/w1");
+        for (version, name) in [(2, "results-2-1.json"), (3, "measured-3.json")] {
+            std::fs::create_dir(here.join(name)).unwrap();
+            assert!(save(version, "two").is_err());
+            let all = keeper.all();
+            assert_eq!(all[0].2, result("one"));
+        }
+        save(4, "four").unwrap();
+        assert_eq!(keeper.all()[0].2, result("four"));
+        let left = std::fs::read_dir(&here).unwrap().flatten();
+        let left: Vec<_> = left.filter(|e| e.path().is_file()).collect();
+        assert_eq!(left.len(), 3, "{left:?}");
+    }
 }

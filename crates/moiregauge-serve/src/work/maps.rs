@@ -1,6 +1,5 @@
 //! Maps: made in a thread, asked as often as wanted.
 
-use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex};
 
 use moiregauge_pipeline::campaign::{Campaign, Kept};
@@ -14,6 +13,7 @@ use spmfile::Channel;
 
 use super::asked::Asked;
 use super::done::Written;
+use super::table::Table;
 use super::task::{NoResult, Progress, run_beside};
 use crate::api::places;
 use crate::app::lock;
@@ -31,9 +31,7 @@ const STACK: usize = 8 << 20;
 pub(crate) struct Maps {
     hub: Arc<Hub>,
     words: Words,
-    all: Mutex<BTreeMap<usize, Arc<MapWork>>>,
-    /// The number of the last one.
-    last: Mutex<usize>,
+    all: Table<MapWork>,
 }
 
 /// A map that is made, or was.
@@ -71,21 +69,16 @@ impl Maps {
         Self {
             hub: Arc::clone(hub),
             words,
-            all: Mutex::default(),
-            last: Mutex::default(),
+            all: Table::new('m', "map"),
         }
     }
 
     pub(crate) fn ids(&self) -> Vec<String> {
-        lock(&self.all).values().map(|map| map.id.clone()).collect()
+        self.all.ids()
     }
 
     pub(crate) fn get(&self, id: &str) -> Answer<Arc<MapWork>> {
-        let maps = lock(&self.all);
-        let found = maps.values().find(|map| map.id == id);
-        found
-            .cloned()
-            .ok_or_else(|| Problem::missing("no such map").at(id))
+        self.all.get(id)
     }
 
     /// Begins a map; the oldest one goes where there are too many. `kept` is what was measured of the files already.
@@ -98,13 +91,11 @@ impl Maps {
         request
             .check()
             .map_err(|e| Problem::wrong(e).at("request"))?;
-        let number = {
-            let mut last = lock(&self.last);
-            *last += 1;
-            *last
-        };
-        let map = Arc::new(MapWork {
-            id: format!("m{number}"),
+        for old in self.all.make_room(MOST) {
+            old.cancel.cancel();
+        }
+        let map = self.all.add(usize::MAX, "", |id| MapWork {
+            id,
             asked,
             request,
             cancel: Cancel::new(),
@@ -114,16 +105,7 @@ impl Maps {
                 failed: Vec::new(),
                 found: None,
             }),
-        });
-        {
-            let mut maps = lock(&self.all);
-            while maps.len() >= MOST
-                && let Some((_, old)) = maps.pop_first()
-            {
-                old.cancel.cancel();
-            }
-            maps.insert(number, Arc::clone(&map));
-        }
+        })?;
         let (made, words) = (Arc::clone(&map), self.words);
         let progress = Progress::new(&self.hub, "map", &map.id);
         let thread = std::thread::Builder::new().stack_size(STACK);
@@ -134,7 +116,7 @@ impl Maps {
 
     /// Stops all, for the end.
     pub(crate) fn cancel(&self) {
-        for map in lock(&self.all).values() {
+        for map in self.all.all() {
             map.cancel.cancel();
         }
     }

@@ -5,6 +5,7 @@ mod done;
 mod history;
 mod keep;
 mod maps;
+mod table;
 mod task;
 mod watches;
 mod works;

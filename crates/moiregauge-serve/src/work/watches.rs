@@ -1,6 +1,6 @@
 //! Folders that are watched, and what was told of them.
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::VecDeque;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
@@ -8,6 +8,7 @@ use moiregauge_pipeline::watch::{Watch, WatchRequest};
 use moiregauge_pipeline::{Cancel, Job, Quiet};
 use serde_json::{Value, json};
 
+use super::table::Table;
 use crate::app::lock;
 use crate::events::Hub;
 use crate::feed::Feed;
@@ -29,8 +30,7 @@ const STACK: usize = 8 << 20;
 pub(crate) struct Watches {
     hub: Arc<Hub>,
     words: Words,
-    all: Mutex<BTreeMap<usize, Arc<Watched>>>,
-    last: Mutex<usize>,
+    all: Table<Watched>,
 }
 
 /// A folder that is watched.
@@ -55,34 +55,22 @@ impl Watches {
         Self {
             hub: Arc::clone(hub),
             words,
-            all: Mutex::default(),
-            last: Mutex::default(),
+            all: Table::new('x', "watch"),
         }
     }
 
     pub(crate) fn ids(&self) -> Vec<String> {
-        lock(&self.all).values().map(|w| w.id.clone()).collect()
+        self.all.ids()
     }
 
     pub(crate) fn get(&self, id: &str) -> Answer<Arc<Watched>> {
-        let watches = lock(&self.all);
-        let found = watches.values().find(|watch| watch.id == id);
-        found
-            .cloned()
-            .ok_or_else(|| Problem::missing("no such watch").at(id))
+        self.all.get(id)
     }
 
     fn insert(&self, folder: &std::path::Path) -> Answer<Arc<Watched>> {
-        let mut watches = lock(&self.all);
-        if watches.len() >= MOST {
-            return Err(Problem::conflict(format!(
-                "{MOST} folders are watched already"
-            )));
-        }
-        let mut last = lock(&self.last);
-        *last += 1;
-        let watched = Arc::new(Watched {
-            id: format!("x{last}"),
+        let too_many = format!("{MOST} folders are watched already");
+        self.all.add(MOST, &too_many, |id| Watched {
+            id,
             folder: moiregauge_pipeline::names::in_words(folder),
             hub: Arc::clone(&self.hub),
             cancel: Cancel::new(),
@@ -91,9 +79,7 @@ impl Watches {
                 error: None,
                 lines: VecDeque::new(),
             }),
-        });
-        watches.insert(*last, Arc::clone(&watched));
-        Ok(watched)
+        })
     }
 
     /// Begins one.
@@ -126,13 +112,13 @@ impl Watches {
     pub(crate) fn remove(&self, id: &str) -> Answer<()> {
         let watched = self.get(id)?;
         watched.cancel.cancel();
-        lock(&self.all).retain(|_, watch| watch.id != id);
+        self.all.remove(id);
         Ok(())
     }
 
     /// Stops all, for the end.
     pub(crate) fn cancel(&self) {
-        for watch in lock(&self.all).values() {
+        for watch in self.all.all() {
             watch.cancel.cancel();
         }
     }

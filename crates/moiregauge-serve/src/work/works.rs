@@ -1,19 +1,19 @@
 //! All works of a server.
 
-use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 
 use moiregauge_pipeline::Cancel;
-use moiregauge_pipeline::campaign::Kept;
+use moiregauge_pipeline::campaign::{Kept, Outcome};
 use moiregauge_report::FailedInput;
 use serde_json::{Value, json};
 
 use super::asked::{Asked, Change};
 use super::done::Done;
 use super::history::History;
-use super::keep::{Keeper, OnDisk};
+use super::keep::{Keeper, OnDisk, Results};
+use super::table::Table;
 use super::task::{NoResult, Progress, run_beside};
 use crate::app::lock;
 use crate::events::Hub;
@@ -32,7 +32,7 @@ pub(crate) struct Works {
     hub: Arc<Hub>,
     words: Words,
     keeper: Option<Keeper>,
-    all: Mutex<BTreeMap<usize, Arc<Work>>>,
+    all: Table<Work>,
 }
 
 /// Files that are analysed together.
@@ -45,6 +45,15 @@ pub(crate) struct Work {
     inner: Mutex<Inner>,
 }
 
+/// Whether a result is on the disk.
+#[derive(Clone, Debug, PartialEq, Eq)]
+enum Saved {
+    Yes,
+    No,
+    /// It should be. Why not.
+    Not(String),
+}
+
 #[derive(Debug)]
 struct Inner {
     history: History<Asked>,
@@ -54,7 +63,11 @@ struct Inner {
     kept: Kept,
     done: Option<Arc<Done>>,
     /// Whether the result is on the disk.
-    saved: bool,
+    saved: Saved,
+    /// The result that is on the disk, which may be one before the last.
+    on_disk: Option<Results>,
+    /// The number of the last result that was to be kept.
+    version: u64,
     cancel: Cancel,
     /// The number of the last run: earlier ones tell nothing any more.
     run: u64,
@@ -68,77 +81,65 @@ impl Works {
             hub: Arc::clone(hub),
             words,
             keeper: keep.map(Keeper::new),
-            all: Mutex::default(),
+            all: Table::new('w', "work"),
         };
         let kept = works.keeper.iter().flat_map(Keeper::all);
         for (id, on_disk, documents, kept) in kept {
-            let Some(number) = id.strip_prefix('w').and_then(|n| n.parse().ok()) else {
-                continue;
-            };
             for file in &on_disk.history.now().files {
                 roots.show_again(file);
             }
-            let answered = on_disk.answered;
+            let answered = on_disk.results.as_ref().map(|r| r.answered.clone());
             let done = answered.map(|asked| Arc::new(Done::read(asked, documents)));
-            let work = works.work(
-                number,
-                Inner {
-                    state: if done.is_some() { "done" } else { "idle" },
-                    saved: done.is_some(),
-                    done,
-                    kept,
-                    ..Inner::new(on_disk.history)
+            let inner = Inner {
+                state: if done.is_some() { "done" } else { "idle" },
+                saved: if done.is_some() {
+                    Saved::Yes
+                } else {
+                    Saved::No
                 },
-            );
-            lock(&works.all).insert(number, work);
+                version: on_disk.results.as_ref().map_or(0, |r| r.version),
+                on_disk: on_disk.results,
+                done,
+                kept,
+                ..Inner::new(on_disk.history)
+            };
+            works.all.put(&id, works.work(id.clone(), inner));
         }
         works
     }
 
-    fn work(&self, number: usize, inner: Inner) -> Arc<Work> {
-        Arc::new(Work {
-            id: format!("w{number}"),
+    fn work(&self, id: String, inner: Inner) -> Work {
+        Work {
+            id,
             hub: Arc::clone(&self.hub),
             words: self.words,
             keeper: self.keeper.clone(),
             inner: Mutex::new(inner),
-        })
+        }
     }
 
     /// Their ids.
     pub(crate) fn ids(&self) -> Vec<String> {
-        lock(&self.all)
-            .values()
-            .map(|work| work.id.clone())
-            .collect()
+        self.all.ids()
     }
 
     /// One of them.
     pub(crate) fn get(&self, id: &str) -> Answer<Arc<Work>> {
-        let works = lock(&self.all);
-        let found = works.values().find(|work| work.id == id);
-        found
-            .cloned()
-            .ok_or_else(|| Problem::missing("no such work").at(id))
+        self.all.get(id)
     }
 
     /// A new one.
     pub(crate) fn add(&self, asked: Asked) -> Answer<Arc<Work>> {
-        let mut works = lock(&self.all);
-        if works.len() >= MOST {
-            return Err(Problem::conflict(format!("there are {MOST} works already")));
-        }
-        let number = works.keys().next_back().map_or(1, |last| last + 1);
-        let work = self.work(number, Inner::new(History::new(asked)));
-        works.insert(number, Arc::clone(&work));
-        drop(works);
+        let too_many = format!("there are {MOST} works already");
+        let inner = Inner::new(History::new(asked));
+        let work = self.all.add(MOST, &too_many, |id| self.work(id, inner))?;
         work.save(&mut lock(&work.inner), false);
         Ok(work)
     }
 
     /// Stops all, for the end.
     pub(crate) fn cancel(&self) {
-        for work in lock(&self.all).values() {
+        for work in self.all.all() {
             work.cancel();
         }
     }
@@ -153,7 +154,9 @@ impl Inner {
             failed: Vec::new(),
             kept: Kept::default(),
             done: None,
-            saved: false,
+            saved: Saved::No,
+            on_disk: None,
+            version: 0,
             cancel: Cancel::new(),
             run: 0,
             thread: None,
@@ -172,7 +175,13 @@ impl Work {
             (file.id.clone(), Value::from(name))
         });
         let result = inner.done.as_ref().map(|done| {
-            json!({"moires": done.documents.len(), "current": done.asked == *asked, "saved": inner.saved})
+            let unsaved = match &inner.saved {
+                Saved::Not(why) => Some(why),
+                _ => None,
+            };
+            let saved = inner.saved == Saved::Yes;
+            let current = done.asked == *asked;
+            json!({"moires": done.documents.len(), "current": current, "saved": saved, "unsaved": unsaved})
         });
         json!({
             "work": self.id,
@@ -198,6 +207,13 @@ impl Work {
     /// What was measured.
     pub(crate) fn kept(&self) -> Kept {
         lock(&self.inner).kept.clone()
+    }
+
+    /// The moirés that came out last, the largest cell first.
+    pub(crate) fn outcomes(&self) -> Answer<(Arc<Done>, Arc<Vec<Outcome>>)> {
+        let (done, kept) = self.done()?;
+        let outcomes = done.outcomes(&self.words, &kept)?;
+        Ok((done, outcomes))
     }
 
     /// What came out last, and what was measured.
@@ -232,7 +248,7 @@ impl Work {
             };
             if !moved {
                 let what = if back { "undo" } else { "redo" };
-                return Err(Problem::conflict(format!("there is nothing to {what}")));
+                return Err(Problem::conflict(format!("nothing to {what}")));
             }
             self.save(&mut inner, false);
             inner.done.is_some()
@@ -326,18 +342,34 @@ impl Work {
         let Some(keeper) = &self.keeper else {
             return;
         };
-        let done = inner.done.as_ref();
-        let on_disk = OnDisk {
-            history: inner.history.clone(),
-            answered: done.map(|done| done.asked.clone()),
-            moires: done.map_or(0, |done| done.documents.len()),
+        // What could not be saved before may be now.
+        let result = result || matches!(inner.saved, Saved::Not(_));
+        let new = inner.done.clone().filter(|_| result);
+        let results = match &new {
+            Some(done) => {
+                inner.version += 1;
+                Some(Results {
+                    version: inner.version,
+                    answered: done.asked.clone(),
+                    moires: done.documents.len(),
+                })
+            }
+            None => inner.on_disk.clone(),
         };
-        let new = done.filter(|_| result);
-        let new = new.map(|done| (done.documents.as_slice(), &inner.kept));
-        match keeper.save(&self.id, &on_disk, new) {
-            Ok(()) => inner.saved |= result,
-            // It is not shown as saved.
-            Err(_) => inner.saved = false,
+        let history = inner.history.clone();
+        let on_disk = OnDisk { history, results };
+        let with = new
+            .as_ref()
+            .map(|done| (done.documents.as_slice(), &inner.kept));
+        let saved = keeper.save(&self.id, &on_disk, with);
+        match saved {
+            Ok(()) if new.is_some() => {
+                inner.saved = Saved::Yes;
+                inner.on_disk = on_disk.results;
+            }
+            Ok(()) => {}
+            // What was kept before is there still.
+            Err(error) => inner.saved = Saved::Not(format!("not saved: {error}")),
         }
     }
 }

@@ -6,7 +6,7 @@ use moiregauge_pipeline::samples::{Samples, analyse_samples, samples_in};
 use moiregauge_report::results::Told;
 use serde_json::json;
 
-use super::common::{Server, options, scans};
+use super::common::{Server, options, scans, scans_of};
 
 #[test]
 fn moires_and_plans_are_answered() {
@@ -125,4 +125,56 @@ fn spectra_residuals_and_cells_are_images() {
     }
     size(&server.get(&format!("{path}/cell?file={file}")));
     assert_eq!(server.get(&format!("{path}/cell?file=0")).status, 404);
+}
+
+/// What is asked of a map along a line is what the program writes into `profiles.csv`.
+#[test]
+fn profiles_of_maps_are_answered() {
+    let folder = tempfile::tempdir().unwrap();
+    scans_of(folder.path(), 1, |set| {
+        set.raster.pixels = [192; 2];
+        set.raster.nominal_size_nm = [160.0; 2];
+    });
+    let server = Server::start(options(&[folder.path()]));
+    let questions =
+        json!({"profiles": [{"name": "cut", "ends_nm": [[-30.0, -20.0], [30.0, 20.0]]}]});
+    let wanted = json!({"files": server.files(""), "request": {"questions": questions}});
+    let map = server.post("/api/maps", &wanted).good();
+    let path = format!("/api/maps/{}", map["map"].as_str().unwrap());
+    assert_eq!(server.wait(&path)["state"], "done");
+    let answer = server.post(&format!("{path}/ask"), &questions).good();
+    let line = &answer["profiles"][0];
+    assert_eq!(
+        (&line["name"], &line["ends_nm"]),
+        (&json!("cut"), &questions["profiles"][0]["ends_nm"])
+    );
+    let points = line["points"].as_array().unwrap();
+    let table = server.get(&format!("{path}/outputs/profiles.csv")).body;
+    let table = String::from_utf8(table).unwrap();
+    let mut rows = table.lines().map(|row| row.split(',').collect::<Vec<_>>());
+    let head = rows.next().unwrap();
+    let rows: Vec<_> = rows.collect();
+    assert_eq!(rows.len(), points.len());
+    let mut good = 0;
+    for (row, point) in rows.iter().zip(points) {
+        let cell = |name: &str| row[head.iter().position(|h| h.ends_with(name)).unwrap()];
+        assert_eq!(cell("mask"), point["mask"].as_str().unwrap());
+        for (name, number) in [
+            ("distance_nm", &point["distance_nm"]),
+            ("twist_deg", &point["twist_deg"]["value"]),
+            ("twist_sigma_deg", &point["twist_deg"]["sigma"]),
+            ("wavelength_nm", &point["wavelength_nm"]["value"]),
+        ] {
+            let (told, written) = (number.as_f64(), cell(name).parse::<f64>().ok());
+            assert_eq!(told.is_some(), written.is_some(), "{name}");
+            if let Some((told, written)) = told.zip(written) {
+                assert!(
+                    (told - written).abs() <= 1e-6 * written.abs(),
+                    "{name}: {told} {written}"
+                );
+            }
+        }
+        good += usize::from(point["mask"] == "good");
+    }
+    assert!(good > 3, "{line}");
 }

@@ -215,9 +215,19 @@ pub(crate) fn read(stream: TcpStream) -> Answer {
 
 /// A few small scans in a folder.
 pub(crate) fn scans(folder: &Path, count: usize) {
+    scans_of(folder, count, |_| ());
+}
+
+/// The same under other conditions.
+pub(crate) fn scans_of(
+    folder: &Path,
+    count: usize,
+    change: impl FnOnce(&mut moiregauge::simulate::Simulation),
+) {
     let mut set = moiregauge::simulate::Simulation::default();
     set.raster.pixels = [128; 2];
     set.raster.scans = count;
+    change(&mut set);
     let job = moiregauge_pipeline::Job::quiet(Some(2)).unwrap();
     let sink = MemorySink::new();
     moiregauge_pipeline::simulate(&set, &sink, &job).unwrap();

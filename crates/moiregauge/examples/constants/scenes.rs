@@ -9,7 +9,9 @@ use moiregauge::campaign::calibrate;
 use moiregauge::frame::Image;
 use moiregauge::scan::{MeasuredScan, measure_known};
 use moiregauge::settings::{Grouping, Settings};
-use moiregauge::simulate::{DomainScene, Feature, FieldScene, Pattern, Simulation, Simulator};
+use moiregauge::simulate::{
+    DomainScene, Feature, FieldScene, Pattern, SampleFeature, Simulation, Simulator, vary,
+};
 use nalgebra::Vector2;
 use spmfile::{Channel, Samples, Scan, Span};
 
@@ -97,6 +99,31 @@ pub(crate) fn sets() -> Vec<Scene> {
         Scene::new("set: one odd frame", outlier).with(|s| s.exclude_outliers = true),
         Scene::new("set: two samples, 2 % apart", samples(1.153)),
     ]
+}
+
+/// Samples that are covered in part, change, have grains, a weak first shell, or no moiré: with the seed of each.
+pub(crate) fn samples() -> Vec<Scene> {
+    let classes = [
+        ("edge", 1),
+        ("hole:count=8", 2),
+        ("island", 3),
+        ("grains", 4),
+        ("grains", 5),
+        ("twist-wave", 6),
+        ("second-shell", 13),
+        ("bare+terrain", 1),
+        ("bare+terrain", 2),
+        ("bare+terrain", 3),
+    ];
+    let one = |(class, seed): (&str, u64)| {
+        let frames = simulation(|s| {
+            s.raster.pixels = [160, 160];
+            s.features = SampleFeature::parse(class).expect("a class");
+            vary(s, seed);
+        });
+        Scene::new(&format!("sample: {class} {seed}"), frames)
+    };
+    classes.into_iter().map(one).collect()
 }
 
 /// One frame with less and less contrast: where it is found no more.

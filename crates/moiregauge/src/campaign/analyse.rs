@@ -16,6 +16,7 @@ use crate::caveat::moires::MoireDoubt;
 use crate::caveat::sets::SetDoubt;
 use crate::caveat::{Caveat, Doubt};
 use crate::frame::background::Background;
+use crate::scan::grains;
 use crate::scan::measured::MeasuredScan;
 use crate::settings::knobs::Settings;
 use crate::spectrum::method::Method;
@@ -30,6 +31,7 @@ pub fn analyse(scans: Vec<MeasuredScan>, settings: &Settings) -> Analysis {
     exclude(&mut scans, settings, &mut caveats);
     caveats.extend(nothing_left(&scans));
     identity::mark_repeats(&mut scans, &mut caveats);
+    grains::each(&mut scans);
     let groups = group::groups(scans, settings.grouping);
     let (groups, separated) = samples::separated(groups, settings, &mut caveats);
     let used: Vec<&MeasuredScan> = groups.iter().flat_map(|group| &group.scans).collect();

@@ -122,7 +122,7 @@ pub struct Residual {
     pub chi2: f64,
     /// Degrees of freedom of `chi2`.
     pub degrees_of_freedom: usize,
-    /// How often chance makes so large a χ², that of the others taken as measure if it exceeds 1.
+    /// Probability of so large a χ² by chance, relative to that of the other scans if this exceeds 1.
     pub p_value: f64,
     /// Where the scan stands from where the others have it, nm; `None` without linked phases.
     pub displacement: Option<Vector2<f64>>,

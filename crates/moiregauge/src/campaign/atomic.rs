@@ -55,9 +55,7 @@ pub enum AtomicError {
     #[error("no atomic image could be used")]
     Nothing,
     /// Frames without a time gradient.
-    #[error(
-        "{0}: the file does not tell line rate and frame direction, so that its drift is unknown"
-    )]
+    #[error("{0}: the file gives no line rate or no frame direction, so its drift is unknown")]
     NoTiming(String),
     /// Another lattice.
     #[error(
@@ -84,9 +82,9 @@ pub enum AtomicError {
     },
     /// Frames up and down that contradict each other.
     #[error(
-        "no constant drift makes the atomic frames upwards and downwards the same lattice (they miss by \
-         {misfit_percent:.0} %): one of them shows another one, or the drift changed or moved the sample too far within a \
-         frame. Faster lines and smaller frames make the drift matter less"
+        "with no constant drift do the atomic frames up and down show the same lattice (they differ by \
+         {misfit_percent:.0} %). Either one of them shows another lattice, or the drift changed or was too large \
+         within a frame. Scan faster lines or smaller frames"
     )]
     Drift {
         /// What the best drift leaves, as a share of the lattice vectors, per cent.
@@ -94,8 +92,8 @@ pub enum AtomicError {
     },
     /// Frames of one direction, too distorted.
     #[error(
-        "the atomic images are all of one frame direction, and drift distorts them so much that orientations of \
-         {first_deg:.1}° and of {second_deg:.1}° explain them as well: frames up and down tell, and so do faster lines and \
+        "all atomic images have the same frame direction, and drift distorts them so much that orientations of \
+         {first_deg:.1}° and {second_deg:.1}° explain them equally well. Take frames up and down, or faster lines and \
          smaller frames"
     )]
     Ambiguous {

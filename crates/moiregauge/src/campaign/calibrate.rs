@@ -105,15 +105,15 @@ pub enum CalibrateError {
     Cell,
     /// Sensors in some scans only.
     #[error(
-        "some scans have position sensors and some have not: a calibration is one or the other; calibrate \
-         them apart"
+        "some scans have position sensors and some have not. Calibrate them in two runs: a calibration holds for one \
+         kind only"
     )]
     Mixed,
     /// Frames up and down that contradict each other.
     #[error(
-        "{set}: no constant drift makes the frames upwards and downwards the same lattice (they miss by \
-         {misfit_percent:.0} %): one of them shows another one, or the drift changed within the frames or moved the sample \
-         too far. Faster lines and smaller frames make the drift matter less"
+        "{set}: with no constant drift do the frames up and down show the same lattice (they differ by \
+         {misfit_percent:.0} %). Either one of them shows another lattice, or the drift changed or was too large \
+         within a frame. Scan faster lines or smaller frames"
     )]
     Drift {
         /// The set.

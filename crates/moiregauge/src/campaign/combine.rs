@@ -6,6 +6,7 @@ use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
 use crate::campaign::analysis::{
     Checks, Combined, Consistency, Drift, JointTerms, SetAnalysis, SetMean,
 };
+use crate::campaign::set::common::common;
 use crate::campaign::set::joint::{checks as set_checks, joint_fit, lattice_of, terms};
 use crate::campaign::set::moire::moire;
 use crate::campaign::sightings::middle_of_frame;
@@ -137,7 +138,11 @@ fn together(
             return Some(mean);
         }
     };
-    let (lattice, statistical) = lattice_of(&fit, &reference).unwrap_or((lattice, statistical));
+    let (mut lattice, mut statistical) =
+        lattice_of(&fit, &reference).unwrap_or((lattice, statistical));
+    let shared = common(scans, &reference);
+    lattice.covariance += shared;
+    statistical.image += shared;
     let joint = Some(terms(&fit));
     let left_out = fit.leave_one_out();
     Some(Together {
@@ -197,7 +202,7 @@ fn joined(
         ));
     }
     match contradiction(sets, scans, &fit) {
-        Some(set) => Err(format!("it contradicts that of {set}")),
+        Some(set) => Err(format!("this drift contradicts that of {set}")),
         None => Ok(fit),
     }
 }

@@ -106,14 +106,25 @@ fn parts(scans: &[MeasuredScan], settings: &Settings) -> Parts {
         .filter_map(|(i, scan)| Some((i, View::of(scan)?)))
         .collect();
     let mut parts: Vec<Vec<usize>> = Vec::new();
+    let file = |view: usize| scans[views[view].0].file.as_str();
     for new in 0..views.len() {
         let like = |part: &Vec<usize>| {
             let mut known = part.iter();
             known.any(|&k| views[k].1.apart(&views[new].1, limit) == 0.0)
         };
-        let (alike, mut others): (Vec<_>, Vec<_>) = parts.into_iter().partition(like);
-        let mut joined: Vec<usize> = alike.into_iter().flatten().collect();
-        joined.push(new);
+        let mut joined = vec![new];
+        let mut others = Vec::new();
+        for part in parts {
+            // Grains of one scan are never one lattice, however little is known of them.
+            let apart = joined
+                .iter()
+                .any(|&a| part.iter().any(|&b| file(a) == file(b)));
+            if like(&part) && !apart {
+                joined.extend(part);
+            } else {
+                others.push(part);
+            }
+        }
         others.push(joined);
         parts = others;
     }
@@ -133,7 +144,8 @@ fn parts(scans: &[MeasuredScan], settings: &Settings) -> Parts {
     Parts { parts, apart }
 }
 
-/// Makes sets of their own of scans that show different lattices, and says so. Also whether there are such.
+/// Makes sets of their own of scans that show different lattices, and says so; of grains those that are not wanted go. Also
+/// whether there are such.
 pub(crate) fn separated(
     groups: Vec<Group>,
     settings: &Settings,
@@ -141,21 +153,31 @@ pub(crate) fn separated(
 ) -> (Vec<Group>, bool) {
     let mut all: Vec<Group> = Vec::new();
     let mut any = false;
+    let wanted = |grain: usize| settings.grain.is_none_or(|wanted| wanted == grain);
     for group in groups {
         let Parts { parts, apart } = parts(&group.scans, settings);
+        let grains = are_grains(&group, &parts);
+        // Scans that show one lattice show one grain.
+        if !grains && !wanted(1) {
+            continue;
+        }
         if parts.len() < 2 {
             all.push(group);
             continue;
         }
         let names = names(&group, &parts);
         let by_hand = group.scans.iter().any(|s| s.set.is_some());
-        caveats.push(about(&group, &names, apart, by_hand));
+        // Of grains the scans have said it themselves.
+        if !grains {
+            caveats.push(about(&group, &names, apart, by_hand));
+        }
         if by_hand {
             all.push(group);
             continue;
         }
         any = true;
-        all.extend(split(group, &parts, names));
+        let split = (1..).zip(split(group, &parts, names));
+        all.extend(split.filter(|(i, _)| !grains || wanted(*i)).map(|(_, g)| g));
     }
     for i in 1..all.len() {
         let (before, rest) = all.split_at_mut(i);
@@ -183,8 +205,21 @@ fn about(group: &Group, names: &[String], apart: f64, by_hand: bool) -> Caveat {
     Caveat::new(doubt, &group.name)
 }
 
-/// What tells the parts apart, for people: their folders, or the periods of their lattices.
+/// Whether some scan is in several parts: they are grains that lie side by side.
+fn are_grains(group: &Group, parts: &[Vec<usize>]) -> bool {
+    let file = |i: &usize| group.scans[*i].file.as_str();
+    let mut seen: Vec<&str> = parts.iter().flatten().map(file).collect();
+    let all = seen.len();
+    seen.sort_unstable();
+    seen.dedup();
+    seen.len() < all
+}
+
+/// What tells the parts apart, for people: their folders, the number of the grain, or the periods of their lattices.
 fn names(group: &Group, parts: &[Vec<usize>]) -> Vec<String> {
+    if are_grains(group, parts) {
+        return (1..=parts.len()).map(|i| format!("grain {i}")).collect();
+    }
     let folders: Vec<Vec<Vec<&str>>> = parts
         .iter()
         .map(|part| {

@@ -9,7 +9,7 @@ use crate::caveat::explained::explain;
 pub enum CalibrationDoubt {
     /// Sensors were calibrated and nominal coordinates are used, or the other way round.
     #[error(
-        "the calibration is one of {}, the scan has {}: it need not hold for them",
+        "the calibration was made with {}, but the scan has {}. The correction may not hold for this scan",
         coordinates(*.calibrated), other_than(*.calibrated)
     )]
     OfOtherCoordinates {
@@ -18,8 +18,8 @@ pub enum CalibrationDoubt {
     },
     /// The scan is far from the conditions of the calibration.
     #[error(
-        "the {} of the scan differs by more than a factor of {factor} from that of the images that the calibration comes \
-         from: hysteresis, creep and lag of a scanner change with both, and their change is not in the budget",
+        "the {} of the scan differs by more than a factor of {factor} from that of the calibration images. Hysteresis, \
+         creep and lag of a scanner change with size and rate; this change is not in the budget",
         conditions(*.size, *.line_rate)
     )]
     Extrapolated {
@@ -32,22 +32,22 @@ pub enum CalibrationDoubt {
     },
     /// The sets of known lattices do not agree.
     #[error(
-        "the sets differ {times:.1} times more than their errors say: a lag or hysteresis of the fast axis, drift that \
-         changes, or strain of the sample; errors are enlarged to match"
+        "the sets differ {times:.1} times more than their errors allow. Possible causes: lag or hysteresis of the fast \
+         axis, a drift that changes, strain of the sample. The errors were enlarged to match"
     )]
     SetsDiffer {
         /// Root of χ² per degree of freedom.
         times: f64,
     },
     /// No scanner is like that.
-    #[error("no scanner can be like that, and nothing is corrected with it: {reason}")]
+    #[error("the calibration is not plausible for a scanner and was not used: {reason}")]
     Implausible {
         /// What is beyond all scanners.
         reason: String,
     },
     /// Few scanners are like that.
     #[error(
-        "a scanner rarely has a {what}: make sure that the images show the known lattice and have the right size"
+        "a scanner rarely has a {what}. Check that the images show the known lattice and that their size is right"
     )]
     Unusual {
         /// What is rare, with its number.
@@ -55,8 +55,8 @@ pub enum CalibrationDoubt {
     },
     /// Two names of the vectors explain the image about as well.
     #[error(
-        "two ways of naming the vectors explain the image with distortions of much the same size ({:.1} % and {:.1} % \
-         between two axes): the smaller is taken",
+        "two assignments of the lattice vectors explain the image, with similar distortions ({:.1} % and {:.1} % \
+         between two axes). The smaller one was taken",
         200.0 * .distortion, 200.0 * .next
     )]
     Ambiguous {
@@ -67,8 +67,8 @@ pub enum CalibrationDoubt {
     },
     /// Frames of one slow direction do not tell drift from gain.
     #[error(
-        "the frames are all of one slow direction: gain of the slow axis and shear cannot be told from drift. {}. Frames \
-         up and down would separate them",
+        "all frames have the same slow direction, so drift cannot be separated from the gain of the slow axis and the \
+         shear. {}. Frames up and down separate them",
         what_drift_does(*.gradient, *.sigma)
     )]
     DriftNotSeparated {
@@ -105,43 +105,43 @@ fn what_drift_does(gradient: Option<f64>, sigma: f64) -> String {
     let per_minute = sigma * 60.0;
     match gradient {
         Some(gradient) => format!(
-            "A drift of 1 nm/min makes {:.2} % along the slow axis, or {:.1} mrad of shear; a drift of 0 ± {per_minute} \
-             nm/min is assumed and is in the errors",
+            "A drift of 1 nm/min makes {:.2} % along the slow axis, or {:.1} mrad of shear. The errors assume a drift \
+             of 0 ± {per_minute} nm/min",
             100.0 * gradient / 60.0,
             1000.0 * gradient / 60.0
         ),
-        None => "Without a line rate it cannot be said how much, and the errors are without it"
+        None => "The line rate is not known, so the size of this effect is not known, and it is not in the errors"
             .to_owned(),
     }
 }
 
 explain! { CalibrationDoubt:
     OfOtherCoordinates "calibration-of-other-coordinates" Serious
-        "The scanner was calibrated by its position sensors and the scan has none, or the other way round. The correction \
-         is that of something else, and lengths and strain may be wrong by per cents."
-        "Calibrate with images that have position sensors as the scans have, or that lack them as these do."
+        "The scanner was calibrated by its position sensors and the scan has none, or the other way round. The \
+         correction does not apply to this scan. Lengths and strain may be wrong by several per cent."
+        "Calibrate with images of the same kind as the scans: both with position sensors, or both without."
     Extrapolated "calibration-extrapolated" Warning
-        "Size or line rate of the scan is far from that of the calibration. What changes with both (hysteresis, creep, \
-         lag) is not in the errors."
+        "The size or line rate of the scan is far from that of the calibration. Hysteresis, creep and lag change with \
+         size and rate; this change is not in the errors."
         "Calibrate with images of about the size and line rate of the scans."
     SetsDiffer "calibrations-differ" Warning
         "The sets of images of the known lattice give calibrations that differ by more than their errors. The errors of \
          the mean were enlarged to match."
         "Take more sets, at other places and with the axes exchanged, and look for the set that stands out."
     Implausible "calibration-implausible" Serious
-        "The calibration that came out is beyond what scanners have, or tells too little. No scan is corrected with it."
-        "Make sure that the images show the lattice that was named, that their size is right, and that there are frames \
-         up and down."
+        "The calibration is not plausible for a scanner, or too uncertain. It is not used."
+        "Check that the images show the lattice that was named, that their size is right, and that there are frames up \
+         and down."
     Unusual "calibration-unusual" Warning
-        "The calibration that came out is possible but rare. Often the images show another lattice, or their size is \
-         wrong."
+        "The calibration is possible but unusual. Often the reason is that the images show another lattice, or that \
+         their size is wrong."
         "Compare the period with that of the known lattice, and repeat the calibration at another place."
     Ambiguous "calibration-ambiguous" Warning
-        "Two ways of naming the lattice vectors distort the known lattice by about as much. The smaller distortion was \
-         taken, and may be the wrong one."
+        "Two assignments of the lattice vectors explain the images, with similar distortions. The smaller distortion \
+         was taken. It may be the wrong one."
         "Take frames up and down, or faster and smaller ones, so that drift distorts them less."
     DriftNotSeparated "drift-not-separated" Warning
-        "All frames have one slow direction, in which drift looks like a wrong gain or a shear of the scanner. A drift \
-         was assumed for the errors, where the line rate is known."
+        "All frames have the same slow direction. There, drift looks like a wrong gain or a shear of the scanner. If \
+         the line rate is known, the errors include an assumed drift."
         "Take frames up and down of the known lattice."
 }

@@ -11,7 +11,7 @@ use crate::numbers::words::plus_minus;
 pub enum DriftDoubt {
     /// The files do not tell their times.
     #[error(
-        "not every file tells its line rate and frame direction: nothing is corrected for drift"
+        "at least one file has no line rate or no frame direction. Nothing was corrected for drift"
     )]
     NoTiming,
     /// The scans do not tell the drift.
@@ -22,14 +22,14 @@ pub enum DriftDoubt {
     },
     /// The user gave the drift.
     #[error(
-        "the drift was given by the user and not measured; it is as right as the conditions are the same"
+        "the drift was given by the user, not measured. It is correct only if the sample still drifts in the same way"
     )]
     Given,
     /// With other headers the scans fit together, with theirs they do not.
     #[error(
-        "the scans of this set do not fit together as their headers say, but {headers} they do, so that an entry of the \
-         headers is most likely wrong, and the drift with it ({evidence}). Twist and strain do not depend on it as long \
-         as the drift does not change"
+        "the scans of this set do not fit together with the line rate and slow direction of their headers, but they do \
+         {headers} ({evidence}). Most likely an entry of the headers is wrong, and then the drift is wrong too. Twist \
+         and strain are not affected as long as the drift is constant"
     )]
     HeadersContradictImages {
         /// The headers with which they do.
@@ -39,9 +39,9 @@ pub enum DriftDoubt {
     },
     /// Positions from frame to frame are not those of the drift within frames.
     #[error(
-        "the positions of the lattice from frame to frame contradict the drift within the frames: the drift changes, the \
-         window moves in a way that the sensors do not see, or headers are wrong: slow direction, line rate or date \
-         ({evidence}). Do not trust the drift and its error"
+        "the motion of the lattice from frame to frame contradicts the drift within the frames ({evidence}). Possible \
+         causes: the drift changes, the scan window moves unseen by the sensors, or a header is wrong (slow direction, \
+         line rate or date). Do not trust the drift and its error"
     )]
     FramesDoNotLink {
         /// How well they fit together with other headers.
@@ -52,8 +52,8 @@ pub enum DriftDoubt {
     DatesContradictLineRate(FrameDates),
     /// The sets have no drift in common.
     #[error(
-        "no smooth drift describes all sets: {reason}; the lattices of the sets, each with its own drift, are averaged \
-         instead"
+        "no smooth drift describes all sets: {reason}. Instead each set has its own drift, and the lattices of the \
+         sets are averaged"
     )]
     NotJoined {
         /// Why.
@@ -62,8 +62,8 @@ pub enum DriftDoubt {
     /// Frames up and down differ as if the drift changed within them.
     #[error(
         "upward and downward frames differ along their slow axis as if the drift changed within a frame, by ({}, {}) \
-         nm/min² more upwards than downwards: that is no strain, and the average of both is free of it. A change of \
-         drift common to both directions looks like strain",
+         nm/min² more upwards than downwards. The mean of both directions is free of this difference. A change of the \
+         drift that is the same in both directions would look like strain",
         per_minute(.acceleration[0]), per_minute(.acceleration[1])
     )]
     Changes {
@@ -72,9 +72,9 @@ pub enum DriftDoubt {
     },
     /// The sample moves nearly as fast as the lines.
     #[error(
-        "the sample drifts at {:.0} % of the speed at which lines follow each other. A constant drift is taken out \
-         exactly, but one that changes by a tenth during a frame makes errors of {:.0} %: faster lines or smaller \
-         frames make them smaller",
+        "the sample drifts at {:.0} % of the speed at which lines follow each other. A constant drift is removed \
+         exactly, but a drift that changes by a tenth during a frame leaves errors of {:.0} %. Scan faster lines or \
+         smaller frames to make them smaller",
         100.0 * .share, 10.0 * .share
     )]
     Large {
@@ -89,9 +89,9 @@ pub enum DriftDoubt {
 pub enum FrameDates {
     /// Frames follow each other faster than their lines.
     #[error(
-        "two frames are dated {interval:.0} s apart, but the lines of one take {frame:.0} s at {rate} lines per second: \
-         the line rate is higher than the headers say, or the dates are not those of the frames. The drift is wrong by \
-         the same factor as the line rate"
+        "the dates of two frames are {interval:.0} s apart, but the lines of one frame take {frame:.0} s at {rate} \
+         lines per second. Either the line rate is higher than the headers say, or the dates are wrong. If the line \
+         rate is wrong, the drift is wrong by the same factor"
     )]
     TooClose {
         /// Between the dates.
@@ -103,9 +103,9 @@ pub enum FrameDates {
     },
     /// Frames follow each other after twice their time.
     #[error(
-        "the frames are dated {interval:.0} s apart, twice the {frame:.0} s that the lines of one take at {rate} lines \
-         per second: either there was a pause as long as a frame before each of them, or the line rate is half of what \
-         the headers say, and so is the drift"
+        "the dates of the frames are {interval:.0} s apart, twice the {frame:.0} s that the lines of one frame take at \
+         {rate} lines per second. Either there was a pause as long as a frame before each frame, or the line rate is \
+         half of what the headers say. Then the drift is also half of what is given"
     )]
     Doubled {
         /// Between the dates.
@@ -123,40 +123,42 @@ fn per_minute(acceleration: Estimate) -> String {
 
 explain! { DriftDoubt:
     NoTiming "no-timing" Serious
-        "The files do not tell when their lines were scanned, so that nothing is corrected for drift. Drift stretches and \
+        "The files do not say when their lines were scanned. Nothing was corrected for drift. Drift stretches and \
          shears a lattice and looks like strain."
         "Give line rate and frame direction, from the log of the measurement."
     Undetermined "drift-undetermined" Serious
-        "The scans do not tell the drift, and nothing is corrected for it. Drift stretches and shears a lattice and looks \
-         like strain."
-        "Take frames up and down of the same place, one after the other. A drift that is known from elsewhere can be given."
+        "The drift cannot be determined from these scans. Nothing was corrected for drift. Drift stretches and shears \
+         a lattice and looks like strain."
+        "Take frames up and down of the same place, one after the other. If the drift is known from another \
+         measurement, give it."
     Given "drift-given" Note
-        "The drift is the one that was given. Twist and strain are as right as it is: within its stated uncertainty, \
-         which is in the errors."
-        "Take frames up and down, which tell the drift of the scans themselves."
+        "The drift was given by the user, not measured. If it is wrong by more than its stated uncertainty, twist and \
+         strain are wrong too."
+        "Take frames up and down: from these the program measures the drift."
     HeadersContradictImages "headers-contradict-images" Serious
-        "With another line rate or slow direction than the headers state, the scans fit together far better. An entry of \
-         the headers is probably wrong, and the drift with it."
+        "The scans fit together far better with another line rate or slow direction than the headers state. Probably \
+         an entry of the headers is wrong, and then the drift is wrong too."
         "Compare line rate and frame direction with the log of the measurement, and give the right ones."
     FramesDoNotLink "frames-do-not-link" Serious
-        "The lattice moves from frame to frame in a way that the drift within the frames does not explain. Drift and its \
-         error are probably wrong; twist and strain suffer if the drift changed within frames."
+        "The lattice moves from frame to frame in a way that the drift within the frames does not explain. The drift \
+         and its error are probably wrong. Twist and strain are also wrong if the drift changed within frames."
         "Look for a move of the window, a jump or a pause between frames, and leave out the scans next to it. Check line \
          rate, dates and frame directions."
     DatesContradictLineRate "dates-contradict-line-rate" Warning
-        "By their dates the frames took another time than their lines at the stated rate. If the line rate is wrong, the \
-         drift is wrong by the same factor."
+        "The dates of the frames and the line rate do not agree on how long a frame took. If the line rate is wrong, \
+         the drift is wrong by the same factor."
         "Compare the line rate with the log of the measurement. Trace and retrace may have been counted as two lines."
     NotJoined "drift-not-joined" Warning
-        "No smooth drift goes through all sets. Their lattices, each with its own drift, were averaged, which tells less \
-         than a fit to all."
-        "Nothing, if hours or a move lie between the sets. Otherwise look for the set whose drift stands out."
+        "No smooth drift describes all sets. Each set has its own drift, and the lattices of the sets were averaged. \
+         This is less accurate than one fit to all scans."
+        "Nothing, if the sets are hours apart or the window was moved between them. Otherwise look for the set with a \
+         different drift."
     Changes "drift-changes" Warning
-        "Frames up and down differ as if the drift changed within a frame. Their mean is free of what differs, but not of \
-         what both have in common, and that looks like strain."
+        "Frames up and down differ as if the drift changed within a frame. The mean of both is free of this \
+         difference. A change of the drift that is the same in both directions remains, and looks like strain."
         "Wait until the instrument has settled, or scan faster and smaller frames."
     Large "large-drift" Warning
-        "The sample moves at a good part of the speed at which lines follow each other. A constant drift is taken off, \
-         but a small change of it within a frame makes large errors."
-        "Scan faster lines or smaller frames, or wait until the drift is less."
+        "The drift is not small against the speed of the slow scan. A constant drift is removed, but even a small \
+         change of it within a frame makes large errors."
+        "Scan faster lines or smaller frames, or wait until the drift is smaller."
 }

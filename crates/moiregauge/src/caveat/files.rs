@@ -25,7 +25,7 @@ pub enum FileDoubt {
     GivenByUser(String),
     /// The data of another file, or the same file once more.
     #[error(
-        "{}; a scan counts once, since the same noise twice would make errors too small",
+        "{}. Each scan counts once; counted twice, its noise would make the errors too small",
         repeated(.of.as_ref())
     )]
     SameScanTwice {
@@ -33,13 +33,13 @@ pub enum FileDoubt {
         of: Option<String>,
     },
     /// What the user does not want is not there.
-    #[error("no scan has the name {pattern:?}, which was to be left out")]
+    #[error("the name {pattern:?} was to be left out, but no scan has this name")]
     NothingExcluded {
         /// As the user said it.
         pattern: String,
     },
     /// The user wants none of the scans.
-    #[error("the user excluded {}: nothing is left to analyse", all(*.scans))]
+    #[error("the user excluded {}. No scan is left to analyse", all(*.scans))]
     EverythingExcluded {
         /// How many there are.
         scans: usize,
@@ -57,9 +57,7 @@ pub enum FileDoubt {
 #[non_exhaustive]
 pub enum ImageChoice {
     /// The first of several of one channel.
-    #[error(
-        "the file holds {count} images of {channel:?}: the first of them is analysed, and the others are not"
-    )]
+    #[error("the file holds {count} images of {channel:?}. Only the first of them is analysed")]
     First {
         /// The channel.
         channel: String,
@@ -68,8 +66,8 @@ pub enum ImageChoice {
     },
     /// The first of several channels, none of which has a usual name.
     #[error(
-        "the file holds {count} images ({names}), none of which has the name of a channel that usually shows a moiré: \
-         the first, {first:?}, is analysed, and the others are not"
+        "the file holds {count} images ({names}), and none has the name of a channel that usually shows a moiré. Only \
+         the first, {first:?}, is analysed"
     )]
     UnusualNames {
         /// How many there are.
@@ -86,10 +84,10 @@ pub enum ImageChoice {
 #[non_exhaustive]
 pub enum ChannelReason {
     /// These channels, which come before it, show no lattice.
-    #[error("is analysed, since no scan shows a lattice in {0}")]
+    #[error("is analysed, because no scan shows a lattice in {0}")]
     NoLatticeIn(String),
     /// No channel shows a lattice, and stripes stand out best in this one.
-    #[error("is mapped, which shows the stripes best")]
+    #[error("is mapped, because it shows the stripes best")]
     BestStripes,
 }
 
@@ -109,32 +107,33 @@ fn all(scans: usize) -> String {
 
 explain! { FileDoubt:
     SeveralImages "several-images" Warning
-        "The file holds several images, and the first of them was taken. The numbers are those of that image alone."
-        "Look at the images of the file, and say which of them shows the moiré."
+        "The file holds several images. Only the first one was analysed."
+        "Look at the images in the file and select the one that shows the moiré."
     ChannelChosen "channel-chosen" Warning
-        "The channel that usually shows the moiré shows none, so that another one was taken. What it shows need not be \
-         the moiré."
-        "Look at the image that was taken, and say which channel shows the moiré."
+        "No scan shows a lattice in the channel that usually shows the moiré. Another channel was taken. The lattice \
+         in it may not be the moiré."
+        "Look at the image that was taken, and select the channel that shows the moiré."
     ReaderDoubt "reader-doubt" Warning
-        "The file is damaged, contradicts itself, or leaves something open that its reader had to assume. What is said \
-         of it tells which numbers depend on that."
-        "Compare size, line rate and frame direction with the log of the measurement, and give those that are wrong. \
-         Export the scan again if the file is damaged."
+        "The file is damaged, contradicts itself, or lacks an entry that had to be assumed. The message says which \
+         numbers depend on it."
+        "Compare size, line rate and frame direction with the log of the measurement, and give the correct values for \
+         those that are wrong. If the file is damaged, export the scan again."
     GivenByUser "given-by-user" Note
-        "A size, a time or another entry of the file was replaced by what the user said. The numbers are as right as \
-         that."
-        "Make sure that it holds for every file that it was given for."
+        "A size, a time or another entry of the file was replaced by a value that the user gave. If the value is \
+         wrong, the results are wrong."
+        "Check that the value holds for every file it was given for."
     SameScanTwice "same-scan-twice" Note
-        "The same data were given twice, and count once: the same noise twice would make the errors too small."
+        "The same data were given twice. They count once; counted twice, their noise would make the errors too small."
         "Nothing, if the files are copies on purpose. Otherwise look for the scan that is missing."
     NothingExcluded "nothing-excluded" Warning
-        "The name of a scan to leave out fits none of the scans, so that one that was not wanted may be among those used."
+        "A name of a scan to leave out matches none of the scans. A scan that you wanted to leave out may have been \
+         used."
         "Compare the name with the list of scans and correct it."
     EverythingExcluded "everything-excluded" Serious
         "Every scan was left out by name. There is no result."
         "Leave out fewer scans."
     LineLeftOut "line-left-out" Note
-        "Trace or retrace could not be measured, and the numbers of this scan rest on the other one. The two cannot be \
-         compared, which would show creep and a lag of the sensors."
+        "Trace or retrace could not be measured. The numbers of this scan come from the other line direction alone. \
+         Creep and a lag of the sensors, which show as a difference of the two, cannot be checked."
         "Look at the image that was left out. If it shows no lattice, nothing is lost but the comparison."
 }

@@ -8,8 +8,8 @@ use crate::caveat::explained::explain;
 pub enum LatticeDoubt {
     /// The frame holds few periods.
     #[error(
-        "only {periods:.1} lattice periods fit across the frame; vectors from fewer than {enough} are less accurate than \
-         their errors say"
+        "only {periods:.1} lattice periods fit across the frame. With fewer than {enough}, vectors are less accurate \
+         than their errors say"
     )]
     FewPeriods {
         /// How many across the shorter side.
@@ -23,9 +23,8 @@ pub enum LatticeDoubt {
     /// The lattice changes across the frame.
     #[error(
         "the lattice is not the same everywhere in the frame: from corner to corner its wavelength changes by up to \
-         {:.2} % and its direction by up to {:.2}° (χ² {chi_squared:.0} for 6 numbers; {threshold:.0} can be chance). \
-         Results are means over the frame. Drift that got faster or slower, and creep, look like this along the slow \
-         axis",
+         {:.2} % and its direction by up to {:.2}° (χ² {chi_squared:.0} for 14 numbers; {threshold:.0} can be chance). \
+         The results are means over the frame. A drift that changes, and creep, look like this along the slow axis",
         100.0 * .wavelength, .angle.to_degrees()
     )]
     Inhomogeneous {
@@ -40,7 +39,7 @@ pub enum LatticeDoubt {
     },
     /// The lattice covers a part of the frame.
     #[error(
-        "the lattice covers {:.0} % of the frame, {unit_cells:.0} unit cells; the rest shows none and is left out",
+        "the lattice covers {:.0} % of the frame, {unit_cells:.0} unit cells. The rest is left out",
         100.0 * .share
     )]
     PartlyCovered {
@@ -51,9 +50,9 @@ pub enum LatticeDoubt {
     },
     /// The lattice changes, and the result is its mean.
     #[error(
-        "the lattice changes across {part}: its wavelength by {:.2} % and its direction by {:.2}° (standard deviation over \
-         the area), {} (evidence {evidence:.0}; 20 can be chance). Results are means over the area. Drift that got \
-         faster or slower, and creep, look like this along the slow axis",
+        "the lattice changes across {part}: its wavelength by {:.2} % and its direction by {:.2}° (standard deviation \
+         over the area), {} (evidence {evidence:.0}; 20 can be chance). The results are means over the area. A drift \
+         that changes, and creep, look like this along the slow axis",
         100.0 * .wavelength, .angle.to_degrees(), if *.evenly { "evenly" } else { "smoothly" }
     )]
     Changes {
@@ -70,7 +69,7 @@ pub enum LatticeDoubt {
     },
     /// Several lattices lie side by side.
     #[error(
-        "the frame shows {} lattices side by side; the numbers are those of the largest. The others: {}",
+        "the frame shows {} lattices side by side. Each that could be measured has its own results. Beside the largest: {}",
         1 + .others.len(), listed(.others)
     )]
     SeveralGrains {
@@ -79,9 +78,9 @@ pub enum LatticeDoubt {
     },
     /// The harmonics are not those of one lattice.
     #[error(
-        "the harmonics of the image do not agree on one lattice (χ² {chi_squared:.0} for {degrees_of_freedom} degrees of \
-         freedom): each of them is the mean over another part of a lattice that is not the same everywhere; the errors \
-         of the vectors are enlarged {times:.1} times"
+        "the harmonics of the image do not agree on one lattice (χ² {chi_squared:.0} for {degrees_of_freedom} degrees \
+         of freedom). This happens where the lattice is not the same everywhere in the frame. The errors of the \
+         vectors were enlarged {times:.1} times"
     )]
     HarmonicsDisagree {
         /// χ² of the harmonics against one lattice.
@@ -93,9 +92,9 @@ pub enum LatticeDoubt {
     },
     /// There is another wave.
     #[error(
-        "beside the lattice a wave with a period of {period:.2} nm stands out of what the fit leaves ({significance:.0} \
-         times the noise around it; {threshold:.0} can be chance): a second lattice, interference, or a lattice that is \
-         not the same everywhere in the frame"
+        "the residual of the fit shows another wave, with a period of {period:.2} nm ({significance:.0} times the \
+         noise around it; {threshold:.0} can be chance). Possible causes: a second lattice, interference, or a lattice \
+         that is not the same everywhere in the frame"
     )]
     SecondLattice {
         /// Its period, nm.
@@ -107,14 +106,15 @@ pub enum LatticeDoubt {
     },
     /// The published method was asked for.
     #[error(
-        "the published method sums the autocorrelation without dividing by the overlap: lattice vectors come out too \
-         short by about a per cent at four to five periods (twist too large by the same fraction) and whole-pixel peaks \
-         quantise them; it is meant for comparison"
+        "the published method does not divide the autocorrelation by the overlap, and takes peaks at whole pixels. \
+         With four to five periods its lattice vectors are too short by about one per cent, and the twist too large by \
+         the same fraction. Use it for comparison only"
     )]
     MethodPaperBias,
     /// Lines were levelled one by one.
     #[error(
-        "each line was levelled on its own: harmonics near the fast axis are damaged and lattice vectors may be biased"
+        "each line was levelled by itself. This damages harmonics whose crests run along the fast axis, and lattice \
+         vectors may be biased"
     )]
     LineLevelling,
 }
@@ -129,15 +129,18 @@ pub struct OtherGrain {
     pub wavelengths: [f64; 3],
     /// By how much its moiré is turned against that of the largest, rad counter-clockwise.
     pub turned: f64,
+    /// Length of the boundary at which it was told apart, nm.
+    pub boundary: f64,
 }
 
 fn listed(all: &[OtherGrain]) -> String {
     let of = |grain: &OtherGrain| {
         let [a, b, c] = grain.wavelengths;
         format!(
-            "{a:.2}, {b:.2}, {c:.2} nm on {:.0} % of the frame, turned by {:.1}°",
+            "{a:.2}, {b:.2}, {c:.2} nm on {:.0} % of the frame, turned by {:.1}°, behind a boundary of {:.0} nm",
             100.0 * grain.share,
-            grain.turned.to_degrees()
+            grain.turned.to_degrees(),
+            grain.boundary
         )
     };
     all.iter().map(of).collect::<Vec<_>>().join("; ")
@@ -149,7 +152,7 @@ fn listed(all: &[OtherGrain]) -> String {
 pub enum LineDifference {
     /// They show different lattices.
     #[error(
-        "{} ({}): one of them is none of the sample's; the scan is not used",
+        "{} ({}). At least one of them is not the lattice of the sample. The scan is not used",
         Self::OTHER_LATTICES, wavelengths(.trace, .retrace)
     )]
     OtherLattices {
@@ -160,8 +163,9 @@ pub enum LineDifference {
     },
     /// They differ by more than their errors.
     #[error(
-        "trace and retrace differ by {:.2} %, more than their errors say (χ² {chi_squared:.0} for 4 numbers; {}): creep \
-         or hysteresis of the scanner, sensors that lag behind, or a drift that is not small against the tip's speed",
+        "trace and retrace differ by {:.2} %, more than their errors allow (χ² {chi_squared:.0} for 4 numbers; {}). \
+         Possible causes: creep or hysteresis of the scanner, a lag of the sensors, or a drift that is not small \
+         against the speed of the tip",
         100.0 * .share, wavelengths(.trace, .retrace)
     )]
     BeyondErrors {
@@ -188,45 +192,46 @@ fn wavelengths(trace: &[f64; 3], retrace: &[f64; 3]) -> String {
 
 explain! { LatticeDoubt:
     FewPeriods "few-periods" Warning
-        "The frame holds so few periods that the lattice, harmonics and background are hard to tell apart. The vectors \
-         are less accurate than their errors say."
+        "The frame holds only a few periods. Lattice, harmonics and background are then hard to separate, and the \
+         vectors are less accurate than their errors say."
         "Scan a larger frame."
     LinesDisagree "lines-disagree" Warning
-        "Trace and retrace of one scan give lattices that differ by more than their errors; scans whose line directions \
-         show different lattices are not used. Creep, hysteresis or a lag of the sensors do this."
-        "Look at both images, and use the line direction that you believe. Slower lines and more overscan make the \
+        "Trace and retrace of one scan give lattices that differ by more than their errors. The usual causes are \
+         creep, hysteresis or a lag of the sensors. If the two show different lattices, the scan is not used."
+        "Look at both images, and use the line direction that is right. Slower lines and more overscan make the \
          difference smaller."
     Inhomogeneous "inhomogeneous-lattice" Warning
-        "The lattice changes across the frame by more than chance. The numbers are means over the frame, and a drift that \
-         changed or creep may be a part of the change."
-        "Map the lattice to see where it changes. Compare frames up and down: what changes its sign with them is drift \
-         or creep."
+        "The lattice changes across the frame by more than chance. The results are means over the frame. A part of the \
+         change may come from creep or from a drift that changed."
+        "Map the lattice to see where it changes. Compare frames up and down: a change that has opposite signs in the \
+         two is drift or creep."
     PartlyCovered "partly-covered" Note
-        "The lattice covers a part of the frame only: an edge, a hole, an island. It was measured there, and the rest was \
-         left out."
+        "The lattice covers only a part of the frame, as at an edge, around a hole or on an island. It was measured in \
+         this part, and the rest was left out."
         "Look at the figure of the scan: the outline shows where the lattice was measured."
     Changes "changing-lattice" Warning
-        "The lattice changes across the frame by more than chance. The numbers are means over the area that it covers, \
-         and their errors know how far these means depend on where the area ends."
-        "Map the lattice to see where it changes. Compare frames up and down: what changes its sign with them is drift \
-         or creep."
+        "The lattice changes across the frame by more than chance. The results are means over the area that it covers. \
+         Their errors include how far the means depend on where this area ends."
+        "Map the lattice to see where it changes. Compare frames up and down: a change that has opposite signs in the \
+         two is drift or creep."
     SeveralGrains "several-grains" Warning
-        "Two or more lattices lie side by side in the frame. The numbers are those of the largest grain."
-        "Crop to each grain to measure it by itself, or map the frame."
+        "Two or more lattices lie side by side in the frame. Each of them that could be measured is a set of its own, \
+         together with the other scans that show it. There is no mean of all."
+        "Look at the outlines in the figures of the scans, or map the frame."
     HarmonicsDisagree "harmonics-disagree" Warning
-        "The harmonics of the image do not agree on one lattice, as where it is not the same everywhere. The errors of \
-         the vectors were enlarged to match."
+        "The harmonics of the image do not agree on one lattice. This happens where the lattice is not the same \
+         everywhere. The errors of the vectors were enlarged to match."
         "Map the lattice, or analyse a smaller part of the frame."
     SecondLattice "second-lattice" Warning
-        "A wave that does not belong to the lattice stands out of the noise. It can be a second moiré, interference, or a \
-         lattice that changes across the frame."
-        "Look at the Fourier transform of the image. If there are two moirés, measure both."
+        "The image shows a wave, well above the noise, that does not belong to the lattice. It may come from a second \
+         moiré, from interference, or from a lattice that changes across the frame."
+        "Look at the Fourier transform of the image. If the image shows two moirés, measure both."
     MethodPaperBias "method-paper-bias" Warning
-        "The published method makes lattice vectors too short, and the twist too large, by about a per cent. It is there \
-         for comparison."
-        "Use the fit of the lattice for results."
+        "The published method gives lattice vectors that are about one per cent too short, and a twist that is too \
+         large by the same fraction. It is meant for comparison."
+        "Use the fit of the lattice (the default method) for results."
     LineLevelling "line-levelling" Warning
-        "Levelling of single lines takes off what varies along the slow axis alone, and with it a part of the harmonics \
-         near the fast axis. The vectors may be biased."
-        "Subtract a plane and not line means, unless the image cannot be measured otherwise."
+        "Each line was levelled by itself. This removes a part of the harmonics whose crests run along the fast axis. \
+         The vectors may be biased."
+        "Subtract a plane, and level single lines only if the image cannot be measured otherwise."
 }

@@ -32,7 +32,8 @@ pub enum MapDoubt {
     },
     /// The noise could not be measured.
     #[error(
-        "the frame holds too few periods to see noise between the harmonics: the errors of the map are those of what {}",
+        "the frame holds too few periods to measure the noise between the harmonics. Instead, the errors of the map \
+         come from what {}",
         noise_of(*.of)
     )]
     NoiseGuessed {
@@ -41,9 +42,9 @@ pub enum MapDoubt {
     },
     /// The margin is narrower than two windows.
     #[error(
-        "the frame is small for its window: the margin is {margin:.2} windows wide and not two. Windows there are cut by \
-         the edge; what that does to their noise, and what leaks through them, is in their errors, but they see less of \
-         the outer side"
+        "the frame is small for its window: the margin is {margin:.2} windows wide instead of two. The edge of the \
+         frame cuts the windows there. Their errors include the noise and the leakage that follow from this, but such \
+         nodes average over the inner side more than over the outer side"
     )]
     NarrowMargin {
         /// Its width, windows.
@@ -51,8 +52,8 @@ pub enum MapDoubt {
     },
     /// An image has the contrast of an error signal.
     #[error(
-        "the contrast of the {} is the other way round than in the images before, as that of error signals is: half a \
-         period between them is taken for that and not for a shift",
+        "the contrast of the {} is opposite to that of the images before, as in error signals. A shift of half a \
+         period between them was taken for reversed contrast",
         line_name(*.line)
     )]
     ContrastReversed {
@@ -61,8 +62,8 @@ pub enum MapDoubt {
     },
     /// The pattern stands far from where it should.
     #[error(
-        "by its phases the pattern stands ({}, {}) nm from where time and drift put it, {} of a period: it may have been \
-         put on the wrong period",
+        "the pattern lies ({}, {}) nm, or {} of a period, from the place predicted by time and drift. It may have been \
+         aligned with the wrong period",
         plus_minus(.shift[0]), plus_minus(.shift[1]), two_digits(*.of_period)
     )]
     Registration {
@@ -72,12 +73,12 @@ pub enum MapDoubt {
         of_period: f64,
     },
     /// A region without good nodes.
-    #[error("the region has no good node: it has no values")]
+    #[error("the region has no good node, so it has no values")]
     RegionEmpty,
     /// A region that the map covers in part.
     #[error(
-        "the map reaches {:.0} % of the region, and {:.0} % of the nodes there are not to be believed: its numbers are \
-         those of the rest",
+        "the map covers {:.0} % of the region, and {:.0} % of the nodes there are bad. The numbers of the region come \
+         from the rest",
         100.0 * .covered, 100.0 * .masked
     )]
     RegionInPart {
@@ -88,11 +89,11 @@ pub enum MapDoubt {
     },
     /// A device narrower than the resolution.
     #[error(
-        "the device is narrower than the map resolves: the twist may vary more within it than the map shows"
+        "the device is narrower than the resolution of the map. The twist may vary more within it than the map shows"
     )]
     DeviceBelowResolution,
     /// No place for a device.
-    #[error("no area of this size lies within the map with 95 % of its nodes to be believed")]
+    #[error("no area of this size within the map has 95 % good nodes")]
     DeviceFitsNowhere,
 }
 
@@ -113,7 +114,7 @@ pub enum SurveyDrift {
     /// It was taken off.
     #[error("corrected for the drift that was given")]
     Corrected,
-    /// It was given, but the file does not tell its times.
+    /// The user chose it, but the file does not tell its times.
     #[error(
         "not corrected for the drift that was given (the file tells no line rate and frame direction)"
     )]
@@ -126,10 +127,10 @@ pub enum SurveyDrift {
 fn not_corrected(of: Mapped) -> &'static str {
     match of {
         Mapped::Lattice => {
-            "the drift of some images is not known: it stretches and shears their maps, the same everywhere"
+            "the drift of some images is not known. It stretches and shears their maps, by the same amount everywhere"
         }
         Mapped::Stripes => {
-            "the drift is not known: it stretches and shears the map, the same everywhere"
+            "the drift is not known. It stretches and shears the map, by the same amount everywhere"
         }
     }
 }
@@ -145,43 +146,44 @@ fn noise_of(of: Mapped) -> &'static str {
 
 explain! { MapDoubt:
     Survey "survey" Note
-        "A large image was mapped band by band. Positions are those that the instrument intended, drift is taken off only \
-         if it was given, and there are no displacements."
-        "Scale and shear of the whole map are those of the scanner and its drift. Compare with small scans that have \
-         sensors and frames up and down."
+        "A large image was mapped band by band. Positions are the nominal ones. Drift is removed only if it was given. \
+         There are no displacements."
+        "The errors of the scanner and the drift scale and shear the whole map. Compare it with small scans that have \
+         position sensors and frames up and down."
     NoTwistStrain "no-twist-strain" Serious
         "No twist and strain of the layers explain the lattice of the map. It has wavelengths and directions only."
         "Name the layers that the sample has."
     NotDriftCorrected "map-not-drift-corrected" Warning
-        "The drift is not known and is in the map: it stretches and shears all of it by the same amount. Differences \
-         within the map are hardly changed, mean values are."
+        "The drift is not known. It stretches and shears the whole map by the same amount. Mean values are wrong by \
+         this; differences within the map hardly change."
         "Take frames up and down, or give the drift."
     NoiseGuessed "map-noise-guessed" Warning
-        "The frame is too small to see the noise between the harmonics. The errors of the map were estimated from what the \
-         lattice leaves, and may be off."
+        "The frame is too small to measure the noise between the harmonics. The errors of the map were estimated from \
+         the residual of the lattice fit, and may be wrong."
         "Scan a larger frame."
     NarrowMargin "map-narrow-margin" Note
-        "The frame is small for the window, and nodes closer to the edge than usual were kept. They see less of the outer \
-         side."
-        "Leave out the outer nodes for a clean map of fewer nodes, use a narrower window, or scan a larger frame."
+        "The frame is small for the window, and nodes closer to the edge than usual were kept. They average over the \
+         inner side more than over the outer side."
+        "Use a wider margin (fewer nodes), use a narrower window, or scan a larger frame."
     ContrastReversed "contrast-reversed" Note
-        "One image has the opposite contrast of those before it, as the error signals of trace and retrace have. A shift of \
-         half a period was taken for that."
-        "Map a channel with the same contrast in both directions, as topography, to be sure."
+        "One image has the opposite contrast of those before it, as in the error signals of trace and retrace. A shift \
+         of half a period was taken for reversed contrast."
+        "To be sure, map a channel with the same contrast in both directions, such as topography."
     Registration "map-registration" Warning
-        "The pattern of one image stands far from where time and drift put it. It may have been put on the next period, \
-         and then the average mixes different places."
+        "The pattern of one image lies far from the place predicted by time and drift. It may have been aligned with \
+         the wrong period. Then the average mixes different places."
         "Look for a move or a jump between the scans, and leave the scan out."
     RegionEmpty "region-empty" Serious
-        "No node in the region is to be believed. It has no values."
+        "The region has no good node, so it has no values."
         "Move the region into the map, or away from edges and defects."
     RegionInPart "region-in-part" Warning
-        "A part of the region is outside of the map or not to be believed. Its numbers are those of the rest."
-        "Move the region, or quote the numbers with the share that they stand for."
+        "A part of the region is outside of the map, or its nodes are bad. The numbers of the region come from the \
+         rest."
+        "Move the region, or quote the share that was used together with the numbers."
     DeviceBelowResolution "device-below-resolution" Warning
         "The device is narrower than what the map resolves. The twist may vary more within it than the map shows."
         "Use a narrower window, which needs a better image, or a larger device."
     DeviceFitsNowhere "device-fits-nowhere" Serious
-        "No place within the map has room for the device. There is no answer for it."
+        "The device fits nowhere in the good part of the map. No area is listed."
         "Ask for a smaller device, or map a larger image."
 }

@@ -21,7 +21,7 @@ pub use calibrating::CalibrationDoubt;
 pub use drifting::{DriftDoubt, FrameDates};
 pub use explained::{Explained, Severity};
 pub use files::{ChannelReason, FileDoubt, ImageChoice};
-pub use lattices::{LatticeDoubt, LineDifference};
+pub use lattices::{LatticeDoubt, LineDifference, OtherGrain};
 pub use maps::{MapDoubt, Mapped, SurveyDrift};
 pub use moires::{Impossible, MoireDoubt, PeriodDoubt};
 pub use orientation::{OrientationDoubt, SenseNumbers};

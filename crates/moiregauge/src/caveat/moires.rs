@@ -8,8 +8,8 @@ use crate::caveat::explained::explain;
 pub enum MoireDoubt {
     /// More strain than layers have.
     #[error(
-        "a heterostrain of {:.1} % is more than layers on each other are known to have: an image that drift or the \
-         scanner distorts, other layers than {layers}, or a lattice that is no moiré would give the same numbers",
+        "a heterostrain of {:.1} % is larger than any known between stacked layers. An image distorted by drift or by \
+         the scanner, other layers than {layers}, or a lattice that is no moiré would give the same numbers",
         100.0 * .strain
     )]
     LargeStrain {
@@ -20,9 +20,9 @@ pub enum MoireDoubt {
     },
     /// The lattice would need more twist than the layers have.
     #[error(
-        "periods of {:.4}, {:.4} and {:.4} nm are no moiré of {layers}: its twist would be {:.0}°, and layers of this \
-         symmetry have none beyond 30°. This is the lattice of the atoms, or another one; its vectors are given, twist \
-         and strain are not",
+        "periods of {:.4}, {:.4} and {:.4} nm cannot be a moiré of {layers}: the twist would be {:.0}°, but layers of \
+         this symmetry have no twist beyond 30°. The image shows the atoms or another lattice. Only the vectors are \
+         given, no twist and strain",
         .periods[0], .periods[1], .periods[2], .twist.to_degrees()
     )]
     NoMoire {
@@ -34,14 +34,15 @@ pub enum MoireDoubt {
         layers: String,
     },
     /// No twist and strain of the layers make the lattice.
-    #[error("{0}. Its vectors are given, twist and strain are not")]
+    #[error("{0}. Only the vectors are given, no twist and strain")]
     LayersCannotMakeIt(Impossible),
     /// The lattice may be that of atoms or of a surface.
     #[error(transparent)]
     Doubtful(PeriodDoubt),
     /// The strain may be noise.
     #[error(
-        "the heterostrain is not significant (p = {p_value:.2}); it is below {:.4} % with 95 % confidence and has no axis",
+        "the heterostrain is not significant (p = {p_value:.2}). It is below {:.4} % with 95 % confidence, and its \
+         axis is not known",
         .below * 100.0
     )]
     StrainNotSignificant {
@@ -52,9 +53,9 @@ pub enum MoireDoubt {
     },
     /// The strain may be the scanner's.
     #[error(
-        "the heterostrain stands out of the noise of the scans but not of the calibration of the scanner (p = \
-         {p_value:.2}): with everything in the budget it is below {:.4} % with 95 % confidence; scans of the sample \
-         turned by 90° would tell",
+        "the heterostrain is significant against the noise of the scans, but not against the calibration of the \
+         scanner (p = {p_value:.2}). With the whole budget it is below {:.4} % with 95 % confidence. Scans of the \
+         sample turned by 90° can decide",
         .below * 100.0
     )]
     StrainWithinCalibration {
@@ -71,8 +72,8 @@ pub enum MoireDoubt {
 pub enum Impossible {
     /// Its period is beyond that of aligned layers.
     #[error(
-        "the period is {period:.1} nm; {layers} makes at most {longest:.1} nm. Only layers strained by at least {:.1} % \
-         in all directions could make it: it is a moiré of other layers, or none",
+        "the period is {period:.1} nm; {layers} makes at most {longest:.1} nm. Only an isotropic strain of at least \
+         {:.1} % could make it longer. It is a moiré of other layers, or no moiré",
         100.0 * .strain
     )]
     TooLong {
@@ -105,8 +106,8 @@ pub enum Impossible {
 pub enum PeriodDoubt {
     /// A surface has it.
     #[error(
-        "the period, {period:.3} nm, is that of {surface} ({constant} nm): if the images show that, there is no twist; \
-         the numbers take it for a moiré of {layers}"
+        "the period, {period:.3} nm, is that of {surface} ({constant} nm): If the images show this surface, twist and \
+         strain mean nothing. The numbers assume a moiré of {layers}"
     )]
     OfSurface {
         /// Mean of the wavelengths, nm.
@@ -120,8 +121,8 @@ pub enum PeriodDoubt {
     },
     /// Few moirés are so short.
     #[error(
-        "a period of {period:.3} nm is short for a moiré: if the images show atoms or a surface, there is no twist; the \
-         numbers take it for a moiré of {layers}"
+        "a period of {period:.3} nm is short for a moiré. If the images show atoms or a surface, twist and strain mean \
+         nothing. The numbers assume a moiré of {layers}"
     )]
     Short {
         /// Mean of the wavelengths, nm.
@@ -133,25 +134,26 @@ pub enum PeriodDoubt {
 
 explain! { MoireDoubt:
     LargeStrain "large-strain" Serious
-        "The strain is larger than layers on each other are known to have. A distorted image, other layers, or a lattice \
+        "The strain is larger than any known between stacked layers. A distorted image, other layers, or a lattice \
          that is no moiré are more likely than such a strain."
-        "Make sure of the layers, of the scan size and of the drift. Look at the image: is it a moiré?"
+        "Check the layers, the scan size and the drift. Look at the image: does it show a moiré?"
     NoMoire "no-moire" Serious
-        "The periods are too short for a moiré of the layers. Vectors are given, twist and strain are not."
-        "Name the layers that the sample has. If the image shows atoms, take a larger frame of the moiré."
+        "The periods are too short for a moiré of the layers. Only the vectors are given, no twist and strain."
+        "Name the layers of the sample. If the image shows atoms, scan a larger frame that shows the moiré."
     LayersCannotMakeIt "layers-cannot-make-it" Serious
-        "No twist and strain of the layers that were named or assumed make this lattice. Vectors are given, twist and \
-         strain are not."
-        "Name the layers that the sample has, and check the scan size."
+        "No twist and strain of the named or assumed layers can make this lattice. Only the vectors are given, no \
+         twist and strain."
+        "Name the layers of the sample, and check the scan size."
     Doubtful "moire-doubtful" Warning
-        "The period is that of atoms or of a known surface, or very short for a moiré. If that is what the images show, \
+        "The period is that of a known surface, or very short for a moiré. If the images show atoms or a surface, \
          twist and strain mean nothing."
-        "Look at the image. If it is a moiré, name its layers."
+        "Look at the image. If it shows a moiré, name its layers."
     StrainNotSignificant "strain-not-significant" Note
-        "The heterostrain cannot be told from none. Its upper limit is the result, and it has no axis."
+        "The heterostrain is not significantly different from zero. The result is its upper limit. Its axis is not \
+         known."
         "Quote the upper limit. More scans make it smaller."
     StrainWithinCalibration "strain-within-calibration" Warning
-        "The images agree on a strain, but the scanner may have made it: gains of its axes that differ look the same. With \
-         everything in the budget only an upper limit is left."
+        "The images agree on a strain, but the scanner may have caused it: a difference of the gains of its axes looks \
+         the same. With the whole budget only an upper limit remains."
         "Calibrate the scanner with a known lattice, or scan the place again with the sample turned by 90°."
 }

@@ -10,18 +10,17 @@ use crate::caveat::readings::degrees;
 #[non_exhaustive]
 pub enum OrientationDoubt {
     /// The orientation goes with no reading.
-    #[error("the orientation of the layer goes with no reading of this moiré")]
+    #[error("the orientation of the layer fits no reading of this moiré")]
     Unused,
     /// A sense without an orientation.
     #[error(
-        "the sense of the twist was given, which tells nothing without the orientation of a layer: the twist is a \
-         magnitude"
+        "the sense of the twist was given without the orientation of a layer. It was not used: the twist is a magnitude"
     )]
     SenseUnused,
     /// The orientation needs too much isotropic strain.
     #[error(
-        "the orientation that was given would need an isotropic heterostrain of {:+.2} %{}: it is that of another vector \
-         (30° off for a hexagonal layer), another layer or another sample",
+        "the orientation that was given needs an isotropic heterostrain of {:+.2} %{}. It probably belongs to another \
+         vector (30° off for a hexagonal layer), another layer or another sample",
         100.0 * .strain,
         .other.map_or_else(String::new, |other| format!(", one 30° further {:+.2} %", 100.0 * other))
     )]
@@ -33,8 +32,8 @@ pub enum OrientationDoubt {
     },
     /// Orientations that the symmetry does not tell apart.
     #[error(
-        "an orientation is known modulo the symmetry of its layer only: {} of mean strain {:+.2} % is the reading with \
-         the least; others are {}",
+        "the symmetry of the layer leaves several readings open. The one with the least mean strain is reported: {} of \
+         mean strain {:+.2} %. Others are {}",
         degrees(*.twist), 100.0 * .strain, other_readings(.others)
     )]
     Ambiguous {
@@ -47,8 +46,8 @@ pub enum OrientationDoubt {
     },
     /// The orientations of both layers contradict each other.
     #[error(
-        "the orientations of the two layers differ from what the moiré makes of one of them by {sigmas:.1} σ at least: \
-         one of them is that of another vector, another layer or another sample, or an error is too small"
+        "the orientations of the two layers contradict the moiré by at least {sigmas:.1} σ. One of them belongs to \
+         another vector, another layer or another sample, or its error is too small"
     )]
     Disagree {
         /// By so many standard deviations.
@@ -56,13 +55,13 @@ pub enum OrientationDoubt {
     },
     /// The orientation goes with the other sense.
     #[error(
-        "the orientation of the layer goes with no twist of the sense that was given; the other sense is shown"
+        "no twist of the sense that was given fits the orientation of the layer. The other sense is shown"
     )]
     SenseContradicts,
     /// Two equal layers: both senses explain the moiré.
     #[error(
-        "two equal layers: the orientation of one of them goes with twists of either sense, {} and {}, and none is better \
-         than the other{}. The sense of the twist, or the orientation of the other layer, would tell",
+        "the two layers are equal, and the orientation of one of them fits a twist of either sense equally well: {} \
+         and {}{}. Give the sense of the twist or the orientation of the other layer to decide",
         .senses[0], .senses[1],
         .magnitudes.map_or_else(String::new, |[low, high]| format!(
             "; magnitudes from {} to {} are open", degrees(low), degrees(high)
@@ -76,8 +75,8 @@ pub enum OrientationDoubt {
     },
     /// Atomic images scatter.
     #[error(
-        "the atomic images scatter {times:.1} times more than their errors say: drift that changes, as after a move of \
-         the window; the error of the orientation is enlarged to match"
+        "the atomic images scatter {times:.1} times more than their errors allow. A drift that changes, as after a \
+         move of the window, does this. The error of the orientation was enlarged to match"
     )]
     AtomicScatter {
         /// So many times more.
@@ -85,14 +84,14 @@ pub enum OrientationDoubt {
     },
     /// Atomic images of one frame direction.
     #[error(
-        "the atomic images are all of one frame direction, which does not tell their drift: the orientation rests on the \
-         rows of atoms along the fast axis alone and on the lattice constant; frames up and down would do better"
+        "all atomic images have the same frame direction, so their drift cannot be determined. The orientation comes \
+         from the rows of atoms along the fast axis and from the lattice constant. Frames up and down are better"
     )]
     AtomicDriftAssumed,
     /// The lattice of the atomic images has another size.
     #[error(
-        "the lattice of the atomic images is {:+.1} % larger than that of {material}: the gain of the scanner is off by \
-         that much, or it is another layer",
+        "the lattice of the atomic images is {:+.1} % larger than that of {material}. Either the gain of the scanner \
+         is wrong by this much, or the images show another layer",
         100.0 * .larger
     )]
     AtomicSize {
@@ -126,40 +125,40 @@ fn other_readings(all: &[[f64; 2]]) -> String {
 
 explain! { OrientationDoubt:
     Unused "orientation-unused" Warning
-        "The orientation that was given fits no reading of the moiré and was not used."
-        "Make sure that the orientation is that of a layer of this moiré, in the axes of the laboratory."
+        "The orientation that was given fits no reading of the moiré. It was not used."
+        "Check that the orientation belongs to a layer of this moiré, and that it is given in laboratory axes."
     SenseUnused "twist-sense-unused" Note
-        "The sense of the twist was given without the orientation of a layer, where it tells nothing. The twist is a \
+        "The sense of the twist was given without the orientation of a layer. It was not used: the twist is a \
          magnitude."
-        "Give the orientation of a layer as well, if the strain tensor is wanted."
+        "If you need the strain tensor, give the orientation of a layer too."
     Contradicts "orientation-contradicts" Serious
-        "With this orientation the layers would differ in size by more than they do. The orientation is most likely that \
-         of another direction or layer, and the strain tensor is wrong."
+        "With this orientation the layers need a large isotropic strain. Most likely the orientation belongs to \
+         another direction or layer. Then the strain tensor is wrong."
         "Check whether the angle is that of a lattice row or of a reciprocal vector (30° apart in hexagonal layers), and \
          to which layer it belongs."
     Ambiguous "orientation-ambiguous" Warning
         "The symmetry of the layer leaves several orientations, and each gives another reading. The one with the least \
          strain is reported."
-        "Tell the orientation within the symmetry by the edges of the flake or by the record of the stacking."
+        "Use the edges of the flake or the record of the stacking to choose among the equivalent directions."
     Disagree "orientations-disagree" Serious
-        "The orientations of the two layers contradict the moiré. One of them is wrong, or an error is too small."
+        "The orientations of the two layers contradict the moiré. One of them is wrong, or its error is too small."
         "Check both angles: direction, layer and sample."
     SenseContradicts "twist-sense-contradicts" Serious
-        "No twist of the sense that was given goes with the orientation of the layer. The other sense is shown."
-        "Check the sense of the twist, and whether the orientation is that of this layer."
+        "No twist of the sense that was given fits the orientation of the layer. The other sense is shown."
+        "Check the sense of the twist, and whether the orientation belongs to this layer."
     SenseOpen "twist-sense-open" Warning
-        "Two equal layers and the orientation of one of them leave the sense of the twist open. Both readings are as good, \
-         and differ in the strain tensor."
-        "Give the sense of the twist, as known from the stacking, or the orientation of the other layer."
+        "The two layers are equal, and the orientation of one of them does not determine the sense of the twist. Both \
+         readings fit equally well and have different strain tensors."
+        "Give the sense of the twist (from the record of the stacking) or the orientation of the other layer."
     AtomicScatter "atomic-scatter" Warning
         "The atomic images scatter by more than their errors. The error of the orientation was enlarged to match."
         "Wait after a move of the window until the drift is constant, and take more frames."
     AtomicDriftAssumed "atomic-drift-assumed" Warning
-        "All atomic images have one frame direction, which does not tell their drift. The orientation rests on the rows of \
-         atoms along the fast axis alone."
+        "All atomic images have the same frame direction, so their drift cannot be determined. The orientation comes \
+         from the rows of atoms along the fast axis alone."
         "Take atomic frames up and down."
     AtomicSize "atomic-size" Warning
-        "The atomic lattice is clearly larger or smaller than that of the layer. The scanner is off by that much, or it is \
-         another layer."
-        "Make sure which layer the images show, and calibrate the scanner."
+        "The atomic lattice is clearly larger or smaller than that of the layer. Either the gain of the scanner is \
+         wrong by this much, or the images show another layer."
+        "Check which layer the images show, and calibrate the scanner."
 }

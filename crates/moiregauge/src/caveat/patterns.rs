@@ -11,14 +11,14 @@ use crate::numbers::words::plus_minus;
 pub enum PatternDoubt {
     /// There is no lattice.
     #[error(
-        "the image shows stripes and no lattice: one wave vector in each pattern, which does not tell twist and strain. \
-         The map has wavelength and direction"
+        "the image shows stripes and no lattice. Each pattern has one wave vector, which does not determine twist and \
+         strain. The map gives wavelength and direction"
     )]
     StripesOnly,
     /// Several patterns of stripes.
     #[error(
-        "{} patterns lie side by side ({} of the nodes): each node has the wave of the strongest there; nodes within a \
-         window of a boundary are bent",
+        "{} patterns lie side by side ({} of the nodes). Each node has the wave of the pattern that is strongest \
+         there. Nodes within one window of a boundary are marked as bent",
         .shares.len(), percents(.shares)
     )]
     StripeDomains {
@@ -33,8 +33,8 @@ pub enum PatternDoubt {
     },
     /// Stripes that bend or change.
     #[error(
-        "one wave has only {:.0} % of the power of the stripes of pattern {pattern}, whose wave vector changes across the \
-         frame: the mean of the map is the better number",
+        "the wave vector of pattern {pattern} changes across the frame: one wave has only {:.0} % of the power of its \
+         stripes. The mean of the map is the better number",
         100.0 * .coherence
     )]
     StripesVary {
@@ -45,8 +45,8 @@ pub enum PatternDoubt {
     },
     /// Map and fit contradict each other.
     #[error(
-        "pattern {pattern}: at the middle of the pattern the map less the fit to all its pixels is {} nm and {}°: it \
-         changes by more than a plane across the frame",
+        "at the middle of pattern {pattern} the map and the fit to all pixels differ by {} nm and {}°. The pattern \
+         changes across the frame by more than a plane",
         plus_minus(*.wavelength), plus_minus(.direction.scaled(1f64.to_degrees()))
     )]
     StripesMapAndFit {
@@ -59,8 +59,8 @@ pub enum PatternDoubt {
     },
     /// One line direction cannot tell stripes from interference.
     #[error(
-        "trace or retrace alone: mains pick-up and other interference in time make stripes too, which only the other \
-         line direction can tell"
+        "only trace or only retrace was measured. Mains pick-up and other interference make stripes too; only a \
+         comparison with the other line direction can show this"
     )]
     StripesOfOneDirection,
     /// The maps of phases may not hold.
@@ -70,13 +70,15 @@ pub enum PatternDoubt {
         reasons: String,
     },
     /// The triangles are the answer.
-    #[error("use the triangles between nodes and not the maps of phases: {reasons}")]
+    #[error("use the triangles between nodes instead of the maps of phases: {reasons}")]
     UseDomains {
         /// Why.
         reasons: String,
     },
     /// Several images show domains.
-    #[error("{images} images show domains; the triangles are those of the one with most of them")]
+    #[error(
+        "{images} images show domains. The triangles come from the image that has most of them"
+    )]
     DomainsOfOneImage {
         /// How many.
         images: usize,
@@ -86,12 +88,13 @@ pub enum PatternDoubt {
     NoDomains,
     /// The contrast of nodes is open.
     #[error(
-        "the image does not tell whether nodes are bright or dark: triangles may stand on domains instead of nodes"
+        "the image does not show whether nodes are bright or dark. The corners of the triangles may be domains instead \
+         of nodes"
     )]
     NodesBrightOrDark,
     /// The mesh has gaps.
     #[error(
-        "{odd} of {nodes} nodes are missing or fit into no triangle: the mesh may not be that of the lattice"
+        "{odd} of {nodes} nodes are missing or fit into no triangle. The mesh may not be that of the lattice"
     )]
     MeshWithGaps {
         /// Missing and extra ones.
@@ -111,44 +114,43 @@ fn percents(shares: &[f64]) -> String {
 
 explain! { PatternDoubt:
     StripesOnly "stripes-only" Warning
-        "The image shows stripes and no lattice. One wave vector does not tell twist and strain; the map has wavelength and \
-         direction."
+        "The image shows stripes and no lattice. One wave vector does not determine twist and strain. The map gives \
+         wavelength and direction."
         "If the sample should show a lattice, look at other channels, or scan a larger frame with a better tip."
     StripeDomains "stripe-domains" Note
-        "Several patterns of stripes lie side by side. Each node has the wave of the strongest there, and those near \
-         boundaries are marked as bent."
+        "Several patterns of stripes lie side by side. Each node has the wave of the pattern that is strongest there. \
+         Nodes near boundaries are marked as bent."
         "Read the numbers of each pattern by itself."
     StripesInPart "stripes-in-part" Warning
-        "The stripes stand out in a part of the image only. The numbers are those of that part."
-        "Look at the map for where the stripes are, and scan there."
+        "The stripes are above the noise in only a part of the image. The numbers come from this part."
+        "Look at the map to see where the stripes are, and scan there."
     StripesVary "stripes-vary" Warning
-        "The stripes change across the frame, so that one wave fitted to all of it has a part of their power only."
-        "Use the mean of the map in place of the fit of one wave."
+        "The stripes change across the frame. One wave fitted to the whole frame has only a part of their power."
+        "Use the mean of the map instead of the fit of one wave."
     StripesMapAndFit "stripes-map-and-fit" Warning
-        "At the middle of a pattern the map and the fit to all pixels differ by more than their errors. The pattern changes \
-         in a way that neither single number describes."
+        "At the middle of a pattern the map and the fit to all pixels differ by more than their errors. The pattern \
+         changes across the frame in a way that no single number describes."
         "Use the map itself, or regions of it."
     StripesOfOneDirection "stripes-of-one-direction" Warning
-        "Only trace or retrace was measured. Mains pick-up and other interference make stripes, too, and cannot be told \
-         from those of the sample."
+        "Only trace or only retrace was measured. Mains pick-up and other interference make stripes too, and one line \
+         direction alone cannot distinguish them from stripes of the sample."
         "Use trace and retrace: stripes of the sample are the same in both."
     PhasesInDoubt "phases-in-doubt" Warning
         "The lattice relaxes into domains or changes faster than the window of the map resolves. Twist and strain of the map \
          are blurred there."
         "Look for the nodes of the domains and use the triangles between them, or use a narrower window."
     UseDomains "use-domains" Warning
-        "The lattice relaxes into domains. Twist and strain of the triangles between nodes are the numbers to use, and not \
-         the maps of phases."
+        "The lattice relaxes into domains. Use twist and strain of the triangles between nodes, not the maps of phases."
         "Use the twist and strain of the triangles."
     DomainsOfOneImage "domains-of-one-image" Note
-        "Several images show domains, and the triangles are those of one of them: the one with most."
+        "Several images show domains. The triangles come from the image that has most of them."
         "Map the images one by one to compare their triangles."
     NoDomains "no-domains" Serious
         "No mesh of nodes was found in the image. There are no triangles."
         "Say whether nodes are bright or dark, or use a channel that shows them better."
     NodesBrightOrDark "nodes-bright-or-dark" Warning
-        "Nodes and domains cannot be told apart by their brightness. If the wrong ones were taken, twist and strain of the \
-         triangles are those of the neighbours."
+        "Nodes and domains have similar brightness. If the wrong ones were taken for nodes, twist and strain of the \
+         triangles are wrong."
         "Look at the image, and say whether nodes are bright or dark."
     MeshWithGaps "mesh-with-gaps" Warning
         "Many nodes are missing or fit into no triangle. The mesh may not be that of the lattice."

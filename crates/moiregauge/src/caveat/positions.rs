@@ -12,8 +12,8 @@ use crate::numbers::words::line_name;
 pub enum PositionDoubt {
     /// A frame without sensors is turned.
     #[error(
-        "the frame is turned by {:.4}° against the laboratory axes, in which vectors and angles are given; \
-         in the axes of the image all angles are smaller by that",
+        "the frame is turned by {:.4}°. Vectors and angles are given in laboratory axes; in the axes of the image all \
+         angles are smaller by this much",
         .rotation.to_degrees()
     )]
     FrameTurned {
@@ -22,7 +22,7 @@ pub enum PositionDoubt {
     },
     /// The sensors of the other line direction were taken.
     #[error(
-        "the {} image has no position sensors of its own; those of the {} are used",
+        "the {} image has no position sensors of its own. Those of the {} are used",
         line_name(*.line), line_name(*.other)
     )]
     SensorsOfOtherLine {
@@ -33,8 +33,8 @@ pub enum PositionDoubt {
     },
     /// There are no sensors.
     #[error(
-        "{reason}: nominal coordinates are used; scanner calibration errors (often 1 % and more) go into lengths, twist \
-         and strain in full"
+        "{reason}. Nominal coordinates are used: the calibration error of the scanner (often 1 % and more) goes fully \
+         into lengths, twist and strain"
     )]
     NoPositionSensors {
         /// What is not there.
@@ -42,8 +42,8 @@ pub enum PositionDoubt {
     },
     /// The instrument levelled the sensors.
     #[error(
-        "the instrument subtracted a fit ({fit}) from {sensor:?}, so it no longer tells positions; nominal coordinates \
-         are used"
+        "the instrument subtracted a fit ({fit}) from {sensor:?}, which no longer contains positions. Nominal \
+         coordinates are used"
     )]
     SensorPlaneFitted {
         /// What was subtracted.
@@ -53,7 +53,7 @@ pub enum PositionDoubt {
     },
     /// Sensors and image have other numbers of pixels.
     #[error(
-        "the position sensors have {} × {} pixels, {channel:?} has {} × {}; nominal coordinates are used",
+        "the position sensors have {} × {} pixels, but {channel:?} has {} × {}. Nominal coordinates are used",
         .sensors[0], .sensors[1], .image[0], .image[1]
     )]
     SensorShape {
@@ -66,13 +66,13 @@ pub enum PositionDoubt {
     },
     /// The sensors span no area.
     #[error(
-        "the position sensors do not span an area (constant, missing, or along one line); nominal coordinates are used"
+        "the position sensors do not span an area (constant, missing, or along one line). Nominal coordinates are used"
     )]
     SensorsFlat,
     /// The sensors span something else than the scan size.
     #[error(
-        "the sensors span {:.1} × {:.1} nm where the scan size is {:.1} × {:.1} nm; their calibration cannot be right \
-         and nominal coordinates are used",
+        "the sensors span {:.1} × {:.1} nm, but the scan size is {:.1} × {:.1} nm. The calibration of the sensors \
+         cannot be right. Nominal coordinates are used",
         .measured[0], .measured[1], .nominal[0], .nominal[1]
     )]
     SensorSpan {
@@ -83,14 +83,14 @@ pub enum PositionDoubt {
     },
     /// The sensors make a mirror image.
     #[error(
-        "the sensors describe a mirrored frame: one of them has the wrong sign; the signs of twist and strain axis \
-         follow the sensors"
+        "the sensors describe a mirrored frame, so one of them has the wrong sign. The signs of the twist and of the \
+         strain axis follow the sensors"
     )]
     SensorsMirrored,
     /// Samples of the sensors are far off and were left out.
     #[error(
-        "in the {} {} of {samples} samples of the position sensors ({:.1} %) are far from their neighbours and were left \
-         out: more than eleven times the noise, and more than three pixels",
+        "in the {} {} of {samples} samples of the position sensors ({:.1} %) are spikes and were left out. Each is \
+         away from its neighbours by more than eleven times the noise and more than three pixels",
         line_name(*.line), .dropped, 100.0 * *.dropped as f64 / *.samples as f64
     )]
     SensorGlitches {
@@ -103,10 +103,10 @@ pub enum PositionDoubt {
     },
     /// The lines of a sensor bend as those of one that lags behind the tip.
     #[error(
-        "in the {} the {} sensor lags behind the tip: its lines bend by {bend:.2} nm where they begin and are straight \
-         again over {columns:.1} columns{}. A plane through the whole would make the pixels {:.2} % too {} along the \
-         fast axis; the bend is taken off, and a part of that stands in the errors. If it is the tip that is late there \
-         and not its sensor, the first columns of the image are distorted",
+        "in the {} the {} sensor lags behind the tip: its lines are bent by {bend:.2} nm at their beginning, and \
+         straight after about {columns:.1} columns{}. Uncorrected, the pixels would be {:.2} % too {} along the fast \
+         axis. The bend was removed, and a part of its effect is in the errors. If the tip itself lags there, the \
+         first columns of the image are distorted",
         line_name(*.line),
         axis_name(*.sensor),
         .time_constant.map_or_else(String::new, |t| format!(", a time constant of {:.2} ms", 1000.0 * t)),
@@ -140,45 +140,45 @@ fn axis_name(axis: Axis) -> &'static str {
 
 explain! { PositionDoubt:
     FrameTurned "frame-turned" Note
-        "The frame was scanned at an angle. Vectors and angles are given in the axes of the laboratory and not in those \
-         of the image."
-        "Mind it when you compare angles with what you see in the image."
+        "The frame was scanned at an angle. Vectors and angles are given in laboratory axes, not in the axes of the \
+         image."
+        "An angle in the image plus the angle of the frame is the angle in laboratory axes."
     SensorsOfOtherLine "sensors-of-other-line" Warning
-        "Positions are those of the other line direction. Where the tip lags or creeps, the two differ by parts of a per \
-         cent."
+        "The positions come from the other line direction. Where the tip lags or creeps, the two directions differ by \
+         some tenths of a per cent."
         "Record the position sensors in both line directions, or analyse the direction that has them."
     NoPositionSensors "no-position-sensors" Warning
-        "Lengths are those that the instrument intended. Its calibration error, often 1 % and more, goes into lengths, \
-         twist and strain in full."
+        "Positions are the nominal ones. The calibration error of the scanner, often 1 % and more, goes fully into \
+         lengths, twist and strain."
         "Record the position sensors. Otherwise calibrate the scanner with a known lattice, or scan the place again \
          with the sample turned by 90°."
     SensorPlaneFitted "sensor-plane-fitted" Warning
-        "The instrument levelled the signal of a position sensor, which takes off the very slope that tells positions. \
-         Nominal coordinates were used, with the calibration error of the scanner in full."
+        "The instrument levelled the signal of a position sensor. This removes the slope that holds the positions. \
+         Nominal coordinates were used, with the full calibration error of the scanner."
         "Switch off levelling of the sensor channels and record again."
     SensorShape "sensor-shape" Warning
-        "The position sensors have another number of pixels than the image and cannot be put on it. Nominal coordinates \
-         were used, with the calibration error of the scanner in full."
+        "The position sensors and the image have different numbers of pixels. Nominal coordinates were used, with the \
+         full calibration error of the scanner."
         "Record sensors and image with the same numbers of samples and lines."
     SensorsFlat "sensors-flat" Warning
         "The position sensors show no motion over an area: they are constant, missing or the same. Nominal coordinates \
-         were used, with the calibration error of the scanner in full."
+         were used, with the full calibration error of the scanner."
         "Look at the sensor images: each has to rise evenly along its own axis. Record them again."
     SensorSpan "sensor-span" Warning
-        "The position sensors span more than twice or less than half of the scan size, so that their unit or their \
-         sensitivity is wrong. Nominal coordinates were used."
+        "The position sensors span more than twice or less than half of the scan size. Their unit or their sensitivity \
+         is wrong. Nominal coordinates were used."
         "Correct the sensitivity of the sensors in the instrument, or the scan size if that is what is wrong."
     SensorsMirrored "sensors-mirrored" Serious
-        "By its sensors the frame is a mirror image, so that one sensor has the wrong sign. Signs of the twist and of the \
-         strain axis are then those of the mirror image."
-        "Find out which sensor has the wrong sign, on a sample with known features, and correct it before signs or \
-         axes are used."
+        "According to the sensors the frame is a mirror image, so one sensor has the wrong sign. The signs of the \
+         twist and of the strain axis are then wrong."
+        "Scan a sample with known features to find out which sensor has the wrong sign. Correct it before you use \
+         signs or axes."
     SensorGlitches "sensor-glitches" Note
-        "Some samples of the position sensors are spikes: no tip jumps by many pixels for one sample. They were left out \
-         when the places of the pixels were fitted, and what is left is as good as that of sound sensors."
+        "Some samples of the position sensors are spikes. They were left out of the fit of the pixel positions. The \
+         results are not affected."
         "Look at the cables and the converter of the sensors. Results need no repair."
     SensorLag "sensor-lag" Note
-        "A position sensor follows the tip with a delay where the lines begin. The bend was taken off, and a part of what \
-         that does stands in the errors."
-        "Scan more slowly or with more overscan. If it is the tip that is late, leave the first columns out."
+        "At the beginning of the lines a position sensor follows the tip with a delay. The effect was removed, and a \
+         part of it is in the errors."
+        "Scan more slowly or with more overscan. If the tip itself lags, crop the first columns."
 }

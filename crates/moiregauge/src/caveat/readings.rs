@@ -8,8 +8,8 @@ use crate::caveat::explained::explain;
 pub enum ReadingDoubt {
     /// Layers of different size: isotropic strain and twist cannot be told apart.
     #[error(
-        "the layers of {layers} differ in size, so that twist and strain trade at first order: the moiré is as well one \
-         of {}; {}{}. The orientation of a layer would tell",
+        "the layers of {layers} differ in lattice constant, so several pairs of twist and strain explain the moiré. \
+         Another one is {}; {}{}. The orientation of a layer decides",
         all_choices(.choices), by_shift(*.shift), in_all(*.interval)
     )]
     TwistTradesWithStrain {
@@ -24,8 +24,8 @@ pub enum ReadingDoubt {
     },
     /// Larger than aligned layers make it.
     #[error(
-        "no twist and uniaxial strain of {layers} make a moiré as large as this one (up to {longest:.3} nm): it is read \
-         as aligned layers, θ = 0; isotropic strain, the lattice constants or the gain of the scanner account for the \
+        "the moiré is larger than any that twist and uniaxial strain of {layers} can make ({longest:.3} nm). It is \
+         read as aligned layers, θ = 0. Isotropic strain, the lattice constants or the gain of the scanner explain the \
          rest"
     )]
     LargerThanAligned {
@@ -36,8 +36,8 @@ pub enum ReadingDoubt {
     },
     /// The twist may be zero.
     #[error(
-        "the twist cannot be told from zero: near alignment the moiré depends on θ², and σ of a small θ means little; \
-         θ < {} (95 %, statistical errors alone)",
+        "the twist is not significantly different from zero: θ < {} (95 %, statistical errors only). Near alignment \
+         the moiré depends on θ², so quote this limit instead of σ",
         degrees(*.limit)
     )]
     AlignmentWithinErrors {
@@ -46,9 +46,9 @@ pub enum ReadingDoubt {
     },
     /// The layers differ in size by more than uniaxial strain does.
     #[error(
-        "with the orientation of layer {layer} the layers differ in size by {}, more than uniaxial strain brings with it: \
-         `twist_deg` assumes that there is none, and differs by {} from the magnitude of the twist of `strain_tensor`, \
-         which does not",
+        "with the orientation of layer {layer} the strain has an isotropic part: the layers differ in size by {}, more \
+         than uniaxial strain explains. `twist_deg` assumes no isotropic strain and differs by {} from the magnitude \
+         of the twist of `strain_tensor`, which allows for it",
         all_sizes(.sizes), degrees(*.difference)
     )]
     IsotropicStrainFound {
@@ -61,15 +61,15 @@ pub enum ReadingDoubt {
     },
     /// Other pairs of vectors are as plausible.
     #[error(
-        "the same lattice has other pairs of vectors, and the strain that these need is plausible, too: {reported} is \
-         the reading that is reported, but it can as well be {}. {} The orientation of a layer may tell; all readings \
-         with up to {:.2} % are under `readings.solutions`",
+        "other pairs of vectors of the same lattice need a plausible strain too. The reading that is reported is \
+         {reported}; another is {}. {} The orientation of a layer may decide. `readings.solutions` lists all readings \
+         with up to {:.2} %",
         joined(.open, ", or "),
         if *.by_image {
-            "The image speaks against others, not against these."
+            "The image rules out other readings, but not these."
         } else {
-            "The image does not tell them apart: no three waves in it are equally strong while one of each other reading \
-             is weak, or they were not measured."
+            "The image does not decide between them: the strengths of its waves fit more than one reading, or were not \
+             measured."
         },
         100.0 * .complete_to
     )]
@@ -85,8 +85,8 @@ pub enum ReadingDoubt {
     },
     /// The reading that is reported needs more strain than others.
     #[error(
-        "the reported pair of waves, ({:.4}, {:.4}) and ({:.4}, {:.4}) rad/nm, is not the one that needs the least \
-         strain: {reported} in place of {}. {}",
+        "the reported pair of waves, ({:.4}, {:.4}) and ({:.4}, {:.4}) rad/nm, is not the one with the least strain: \
+         {reported} instead of {}. {}",
         .waves[0][0], .waves[0][1], .waves[1][0], .waves[1][1], joined(.less, " or "), decided_by(*.chosen_by)
     )]
     NotTheLeastStrain {
@@ -117,10 +117,10 @@ pub struct NumbersOfName {
 #[non_exhaustive]
 pub enum TwistShift {
     /// It leaves none.
-    #[error("no twist at all goes with 0.1 % of isotropic strain")]
+    #[error("with 0.1 % of isotropic strain no twist explains the moiré")]
     NoTwist,
     /// It moves it, rad.
-    #[error("0.1 % of isotropic strain moves it by {}", degrees(*.0))]
+    #[error("0.1 % of isotropic strain changes the twist by {}", degrees(*.0))]
     By(f64),
 }
 
@@ -164,39 +164,40 @@ fn joined(all: &[NumbersOfName], by: &str) -> String {
 fn decided_by(what: ChosenBy) -> &'static str {
     match what {
         ChosenBy::Image => {
-            "The image decided: these waves and their sum are strong, and each of the others has a weak one in its first \
-             shell"
+            "The image decided: the waves of this reading are strong, and every other reading has a weak wave in its \
+             first shell"
         }
         ChosenBy::Orientation => {
-            "The orientation of a layer decided: the others need isotropic strain on top"
+            "The orientation of a layer decided: the other readings need isotropic strain as well"
         }
-        ChosenBy::User | ChosenBy::LeastStrain => "It was given",
+        ChosenBy::User | ChosenBy::LeastStrain => "The user chose it",
     }
 }
 
 explain! { ReadingDoubt:
     TwistTradesWithStrain "twist-trades-with-strain" Warning
-        "The layers differ in lattice constant, so that a moiré is explained by more than one pair of twist and strain. \
-         Isotropic strain moves the twist on top of that."
-        "Measure the orientation of a layer, by an image of its atoms or by its edges."
+        "The layers differ in lattice constant. Then more than one pair of twist and strain explains a moiré, and \
+         isotropic strain changes the twist further."
+        "Measure the orientation of a layer, from an image of its atoms or from its edges."
     LargerThanAligned "larger-than-aligned" Warning
-        "The moiré is larger than aligned layers make it, and is read as θ = 0. Isotropic strain, the lattice constants or \
-         the gain of the scanner make up for the rest."
-        "Calibrate the scanner, and make sure of the lattice constants."
+        "The moiré is larger than that of aligned layers. It is read as θ = 0. Isotropic strain, the lattice constants \
+         or the gain of the scanner explain the rest."
+        "Calibrate the scanner, and check the lattice constants."
     AlignmentWithinErrors "alignment-within-errors" Warning
-        "The twist cannot be told from zero. Near alignment the upper limit of the twist means more than its error."
+        "The twist is not significantly different from zero. Near alignment the upper limit of the twist means more \
+         than its error."
         "Quote the upper limit."
     IsotropicStrainFound "isotropic-strain-found" Warning
-        "With the orientation of a layer the strain has an isotropic part. The twist of the usual reading assumes that \
-         there is none."
-        "Use twist and strain of the tensor. Make sure of the gain of the scanner, which looks like isotropic strain."
+        "According to the orientation of a layer, the strain has an isotropic part. The twist of the usual reading \
+         assumes that there is none."
+        "Use twist and strain of the tensor. Calibrate the scanner: a wrong gain looks like isotropic strain."
     NamesCompete "names-compete" Warning
-        "The same lattice, read with another pair of vectors, gives another twist and strain that are as plausible."
+        "With another pair of its vectors the same lattice gives another twist and strain, which are equally plausible."
         "Quote all open readings, or measure the orientation of a layer."
     NotTheLeastStrain "not-the-least-strain" Note
-        "The reading that is reported is not the one with the least strain. The image, an orientation or the user chose \
-         it."
-        "Nothing, if you trust what chose it. The other readings are in the results."
+        "The reading that is reported is not the one with the least strain. It was chosen by the image, by an \
+         orientation or by the user."
+        "Nothing, if you trust this choice. The results list the other readings."
 }
 
 /// What chose the reported name.

@@ -8,8 +8,9 @@ use crate::caveat::explained::explain;
 pub enum SetDoubt {
     /// A lattice so faint that it may be none.
     #[error(
-        "the lattice is so faint (signal-to-noise ratio {signal_to_noise:.1}) that terrain or noise may look like it, and {scans} \
-         of 3 frames that could confirm each other show it: its vectors are given, twist and strain of the set are not"
+        "the lattice is very faint (signal-to-noise ratio {signal_to_noise:.1}), so terrain or noise may look the \
+         same. Three frames would confirm it, but only {scans} show it. Only the vectors are given, no twist and \
+         strain of the set"
     )]
     LatticeDoubtful {
         /// Amplitude over noise of the weakest first wave, in the plainest image.
@@ -19,9 +20,9 @@ pub enum SetDoubt {
     },
     /// Two images of one scan show a lattice and a harmonic shell of it.
     #[error(
-        "trace and retrace of one scan show two lattices, and the cell of one is {times} times that of the other: where noise hides the \
-         first waves, a harmonic shell looks like a lattice of its own. Which one the other scans show is not known: their vectors are given, \
-         twist and strain of the set are not"
+        "trace and retrace of one scan show two lattices, and the cell of one is {times} times that of the other. \
+         Where noise hides the first waves, a harmonic shell looks like a lattice of its own. It is not known which of \
+         the two the other scans show. Only the vectors are given, no twist and strain of the set"
     )]
     ShellForLattice {
         /// How many times the cell.
@@ -44,9 +45,9 @@ pub enum SetDoubt {
          {p_value:.0e}{}); {}",
         .displacement.map_or_else(String::new, |d| format!(", {d:.3} nm from where the others have it")),
         if *.by_rule {
-            "more than a fifth of the scans are never left out by rule"
+            "the rule never leaves out more than a fifth of the scans"
         } else {
-            "it is used all the same"
+            "it is used nevertheless"
         }
     )]
     OutlyingScan {
@@ -62,28 +63,28 @@ pub enum SetDoubt {
         by_rule: bool,
     },
     /// A scan was left out by rule.
-    #[error("left out by rule: {reason}")]
+    #[error("left out by the rule for outliers: {reason}")]
     ScanLeftOut {
         /// Why.
         reason: String,
     },
     /// Leaving out single scans changes results by more than their errors.
     #[error(
-        "leaving out one scan at a time makes larger errors than those stated: {larger}; trust the larger ones"
+        "leaving out one scan at a time gives larger errors than those stated: {larger}. Trust the larger ones"
     )]
     ScatterOfScans {
         /// Which numbers, and how many times.
         larger: String,
     },
     /// Scans of different lattices were put into one set by hand.
-    #[error("{0}: they were put into one set by hand, and their mean is that of neither")]
+    #[error("{0}. They were put into one set by hand; its mean belongs to no sample")]
     SamplesMixed(DifferentSamples),
     /// Scans of different lattices were taken apart.
-    #[error("{0}: each of them is a set of its own, and nothing is averaged over them")]
+    #[error("{0}. Each lattice became a set of its own, and there is no mean over them")]
     SamplesSeparated(DifferentSamples),
     /// Sets show different lattices.
     #[error(
-        "the sets show lattices that differ by up to {:.1} %: they are not of the same place or sample, and are not \
+        "the sets show lattices that differ by up to {:.1} %. They come from different places or samples and were not \
          combined",
         100.0 * .share
     )]
@@ -93,8 +94,9 @@ pub enum SetDoubt {
     },
     /// Sets differ by more than their errors. Distances are in standard deviations.
     #[error(
-        "the sets disagree: drift {drift:.1} σ, twist {twist:.1} σ, strain {strain:.1} σ apart; a drift that changes in \
-         time or a scanner whose axes differ would do this; the errors of the combined values are enlarged to match"
+        "the sets disagree: drift {drift:.1} σ, twist {twist:.1} σ, strain {strain:.1} σ apart. Possible causes: a \
+         drift that changes in time, or a scanner whose axes have different gains. The errors of the combined values \
+         were enlarged to match"
     )]
     SetsDisagree {
         /// Of their drifts.
@@ -119,8 +121,8 @@ pub enum Scattered {
 /// Scans that show different lattices.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error(
-    "the scans show {count} different lattices ({names}), which differ {}; drift does not change a lattice there. They are \
-     of different samples or places, or something else was taken for the lattice in some",
+    "the scans show {count} different lattices ({names}), which differ {}; drift cannot change a lattice in this way. \
+     The scans come from different samples or places, or some of them show something else than the lattice",
     by_how_much(*.apart)
 )]
 #[non_exhaustive]
@@ -145,27 +147,27 @@ fn scattered(of: Scattered, chi2_per_dof: f64) -> String {
     let times = chi2_per_dof.sqrt();
     match of {
         Scattered::Moires => format!(
-            "the scans scatter {times:.1} times more than their errors say (χ²/dof = {chi2_per_dof:.1}): drift that \
-             changes, an inhomogeneous lattice or sensor errors; errors of the set are enlarged to match"
+            "the scans scatter {times:.1} times more than their errors allow (χ²/dof = {chi2_per_dof:.1}). Possible \
+             causes: a drift that changes, an inhomogeneous lattice, errors of the sensors. The errors of the set were \
+             enlarged to match"
         ),
         Scattered::KnownLattice => format!(
-            "the images scatter {times:.1} times more than their errors say: drift that changes, creep, or a lattice \
-             that is not the same everywhere; errors are enlarged to match"
+            "the images scatter {times:.1} times more than their errors allow. Possible causes: a drift that changes, \
+             creep, or a lattice that is not the same everywhere. The errors were enlarged to match"
         ),
     }
 }
 
 explain! { SetDoubt:
     LatticeDoubtful "lattice-doubtful" Serious
-        "The lattice that was found is so faint that rough terrain or noise may look like it, and fewer than three frames \
-         show it. There is no result for the set."
-        "Look at the figure of the scan: is there a lattice? Then say which (its wavelength is enough), or take more \
-         frames. Otherwise there is none."
+        "The lattice is very faint, and fewer than three frames show it. Rough terrain or noise may look the same. \
+         There is no result for the set."
+        "Look at the figure of the scan. If you see a lattice, give its approximate wavelength, or take more frames."
     ShellForLattice "shell-for-lattice" Serious
-        "One image shows a lattice whose cell is two to four times that of the others. The first waves of the lattice are weak, and where noise \
-         hides them a harmonic shell is taken for the lattice. There is no result for the set."
-        "Look at the figures of both line directions. Say which lattice is meant (its wavelength is enough), or choose the channel with the \
-         stronger first waves."
+        "One image shows a lattice whose cell is two to four times that of the others. The first waves of the lattice \
+         are weak. Where noise hides them, a harmonic shell is taken for the lattice. There is no result for the set."
+        "Look at the figures of both line directions. Give the approximate wavelength of the right lattice, or choose \
+         the channel with the stronger first waves."
     Scatter "scatter" Warning
         "The scans of a set differ from each other by more than their errors say. The errors of the set were enlarged to \
          match."
@@ -174,30 +176,29 @@ explain! { SetDoubt:
         "A wavelength of at least one scan is more than 1 % away from that of the set."
         "Look at that scan: few periods, a jump or another place."
     OutlyingScan "outlying-scan" Warning
-        "One scan does not fit the others, by more than chance. It is used all the same, and pulls the mean."
-        "Look at the scan. If it shows a jump, a tip change or another place, leave it out."
+        "One scan does not fit the others, by more than chance. It is used nevertheless and affects the mean."
+        "Look at the scan. If it shows a jump, a tip change or another place, exclude it."
     ScanLeftOut "scan-left-out" Note
         "A scan did not fit the others and was left out by the rule that was asked for."
-        "Look at the scan, to know why. State the rule together with the result."
+        "Look at the scan to find the reason. State the rule together with the result."
     ScatterOfScans "scatter-of-scans" Warning
-        "Results change by more than their errors when single scans are left out. The errors that leaving out makes are \
-         the ones to trust."
-        "Use the larger errors. More scans, up and down, make both agree if the scatter is chance."
+        "Results change by more than their errors when single scans are left out. The errors from leaving out scans \
+         are more reliable."
+        "Use the larger errors. If the scatter is chance, more scans up and down make both errors agree."
     SamplesMixed "samples-mixed" Serious
-        "A set that was made by hand holds scans of different lattices. Its mean belongs to none of them."
-        "Make a set of each sample or place."
+        "A set that was made by hand holds scans of different lattices. Its mean belongs to no sample."
+        "Make one set for each sample or place."
     SamplesSeparated "samples-separated" Warning
-        "The scans show different lattices and were taken apart by them. Each is a set of its own, and there is no mean of \
-         all."
-        "Nothing, if there are several samples or places. Otherwise look at the scans for what was taken for the \
-         lattice."
+        "The scans show different lattices. Each lattice became a set of its own, and there is no mean over all scans."
+        "Nothing, if the scans come from several samples or places. Otherwise look at the figures: in some scans \
+         something else was taken for the lattice."
     DifferentLattices "different-lattices" Serious
-        "The sets show different lattices, so that there is no mean over them. They are of different places or samples, \
-         or a set is wrong."
+        "The sets show different lattices, so there is no mean over them. They come from different places or samples, \
+         or one set is wrong."
         "Analyse each place by itself, or find the set whose scale or line rate is wrong."
     SetsDisagree "sets-disagree" Warning
-        "Two sets differ in drift, twist or strain by more than three standard deviations. The errors of what combines \
-         them were enlarged to match."
-        "A drift that changed explains different drifts; axes of the scanner with different gains explain different \
-         strains, and a calibration takes them off."
+        "Two sets differ in drift, twist or strain by more than three standard deviations. The errors of their mean \
+         were enlarged to match."
+        "If the drifts differ, the drift changed in time. If the strains differ, the axes of the scanner may have \
+         different gains: calibrate the scanner."
 }

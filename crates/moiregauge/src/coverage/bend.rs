@@ -9,7 +9,8 @@
 //! Schwarz, Ann. Stat. 6, 461 (1978), BIC; Eilers and Marx, Statistical Science 11, 89 (1996), splines.
 
 use heterostrain::lattice::{Px, Waves};
-use nalgebra::{DMatrix, Matrix2, Matrix3, Matrix4, Vector2};
+use nalgebra::{DMatrix, Matrix2, Matrix3, Matrix4, Vector2, Vector4};
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::coverage::cells::Cells;
@@ -18,6 +19,7 @@ use crate::coverage::nodes::{Node, View, nodes};
 use crate::coverage::patch::Patch;
 use crate::coverage::phases::{Basis, Fit, fit, powers, rows};
 use crate::coverage::settle::hollows;
+use crate::coverage::windows::straightened;
 use crate::numbers::exact;
 use crate::numbers::splines::Splines;
 
@@ -32,6 +34,9 @@ const WHOLE_WINDOW: f64 = 1.5;
 
 /// Fewer nodes than this tell nothing of a lattice. Chosen by eye.
 const FEWEST_INNER: usize = 6;
+
+/// Rounds in which what windows make of a description is taken off: each leaves a tenth or two of what the one before left.
+const STRAIGHTENED: usize = 3;
 
 /// By how much the evidence (BIC) of a lattice that changes has to be better: chance does that once in e¹⁰.
 const BETTER: f64 = 20.0;
@@ -68,6 +73,10 @@ pub enum ChangeModel {
 pub(crate) struct Mean {
     /// Rad per pixel.
     pub(crate) waves: Waves<Px>,
+    /// What they would be with the finest description.
+    pub(crate) other: Matrix2<f64>,
+    /// The part of their covariance that comes from where the patch ends.
+    pub(crate) edges: Matrix4<f64>,
     /// `None` where it is the same everywhere, as far as can be seen.
     pub(crate) change: Option<Change>,
     /// Phases of the three first waves at `middle` and their covariance.
@@ -117,6 +126,8 @@ impl Mean {
         let size = bins as f64;
         Self {
             waves: self.waves.mapped(&(Matrix2::identity() / size)),
+            other: self.other / size,
+            edges: self.edges / (size * size),
             middle: self.middle * size + Vector2::repeat((size - 1.0) / 2.0),
             ..self
         }
@@ -132,6 +143,8 @@ struct Chosen {
     evidence: f64,
     /// The description that comes next, with more numbers or, where it has the most, with fewer.
     next: Option<Fit>,
+    /// The description with the most numbers, where there is one with more than the next.
+    finest: Option<Fit>,
 }
 
 /// The mean over a patch; `None` where its phases cannot be described.
@@ -141,7 +154,7 @@ pub(crate) fn mean(view: &View, patch: &Patch) -> Option<Mean> {
     Some(summary(&chosen, &nodes, view, patch))
 }
 
-/// The same without what higher harmonics put into the windows.
+/// The same without what higher harmonics put into the windows, and without what windows make of waves that bend.
 pub(crate) fn refined(view: &View, patch: &Patch) -> Option<Mean> {
     let rough = choose(view, patch, &nodes(view, patch))?;
     let parts = higher::parts(view.image, patch, &rough.fit)?;
@@ -157,7 +170,17 @@ pub(crate) fn refined(view: &View, patch: &Patch) -> Option<Mean> {
         noise: [0, 1, 2].map(|i| view.noise[i].max(left[i])),
         ..*view
     };
-    mean(&view, patch)
+    let read = nodes(&view, patch);
+    let mut nodes = read.clone();
+    let mut chosen = choose(&view, patch, &nodes)?;
+    for _ in 0..STRAIGHTENED {
+        if chosen.model.is_none() {
+            break;
+        }
+        nodes = straightened(&view, patch, &read, &chosen.fit);
+        chosen = choose(&view, patch, &nodes)?;
+    }
+    Some(summary(&chosen, &nodes, &view, patch))
 }
 
 /// χ² of the best description of some nodes, its parameters, and the number of independent phases that it describes.
@@ -193,13 +216,13 @@ fn choose(view: &View, patch: &Patch, nodes: &[Node]) -> Option<Chosen> {
             Basis::Splines(Splines::new(frame, size)),
         )
     }));
-    let mut fits: Vec<(ChangeModel, Fit)> = Vec::new();
-    for (model, basis) in all {
-        if 2 * basis.len() + 1 > nodes.len() {
-            break;
-        }
-        fits.extend(fit(basis, nodes).map(|fit| (model, fit)));
-    }
+    let all = all.take_while(|(_, basis)| 2 * basis.len() < nodes.len());
+    let all: Vec<(ChangeModel, Basis)> = all.collect();
+    let fits = all
+        .into_par_iter()
+        .map(|(model, basis)| Some((model, fit(basis, nodes)?)));
+    let fits: Vec<Option<(ChangeModel, Fit)>> = fits.collect();
+    let fits: Vec<(ChangeModel, Fit)> = fits.into_iter().flatten().collect();
     let by_price = |a: &usize, b: &usize| fits[*a].1.price.total_cmp(&fits[*b].1.price);
     let best = (0..fits.len()).min_by(by_price);
     let best = best.filter(|best| straight.price - fits[*best].1.price > BETTER);
@@ -209,6 +232,7 @@ fn choose(view: &View, patch: &Patch, nodes: &[Node]) -> Option<Chosen> {
             fit: straight,
             evidence: 0.0,
             next: None,
+            finest: None,
         });
     };
     let beside = if best + 1 < fits.len() {
@@ -219,11 +243,13 @@ fn choose(view: &View, patch: &Patch, nodes: &[Node]) -> Option<Chosen> {
     let mut fits: Vec<_> = fits.into_iter().map(Some).collect();
     let (model, chosen) = fits[best].take()?;
     let next = beside.and_then(|i| fits[i].take());
+    let finest = fits.pop().flatten();
     Some(Chosen {
         model: Some(model),
         evidence: straight.price - chosen.price,
         fit: chosen,
         next: next.map(|(_, fit)| fit),
+        finest: finest.map(|(_, fit)| fit),
     })
 }
 
@@ -241,24 +267,34 @@ struct Slopes {
 
 fn slopes(fit: &Fit, cells: &Cells, patch: &Patch) -> Slopes {
     let n = fit.basis.len();
-    let mut sums = DMatrix::zeros(4, fit.coefficients.len());
-    let mut local = Vec::new();
-    let mut pixels = 0.0;
-    for cell in (0..cells.len()).filter(|&c| patch.inside[c]) {
-        let count = cells.counts()[cell];
-        let mut slopes = Matrix2::zeros();
-        for (i, [_, along, across]) in fit.basis.at(cells.middle_of(cell)) {
-            for wave in 0..2 {
-                let c = fit.coefficients[wave * n + i];
-                for (axis, slope) in [along, across].into_iter().enumerate() {
-                    sums[(2 * wave + axis, wave * n + i)] += count * slope;
-                    slopes[(axis, wave)] += c * slope;
+    let lines = (0..cells.size[1]).into_par_iter().map(|row| {
+        let mut sums = DMatrix::zeros(4, fit.coefficients.len());
+        let mut local = Vec::new();
+        let first = row * cells.size[0];
+        for cell in (first..first + cells.size[0]).filter(|&c| patch.inside[c]) {
+            let count = cells.counts()[cell];
+            let mut slopes = Matrix2::zeros();
+            for (i, [_, along, across]) in fit.basis.at(cells.middle_of(cell)) {
+                for wave in 0..2 {
+                    let c = fit.coefficients[wave * n + i];
+                    for (axis, slope) in [along, across].into_iter().enumerate() {
+                        sums[(2 * wave + axis, wave * n + i)] += count * slope;
+                        slopes[(axis, wave)] += c * slope;
+                    }
                 }
             }
+            local.push((count, slopes));
         }
-        local.push((count, slopes));
-        pixels += count;
+        (sums, local)
+    });
+    let lines: Vec<_> = lines.collect();
+    let mut sums = DMatrix::zeros(4, fit.coefficients.len());
+    let mut local = Vec::with_capacity(cells.len());
+    for (of_line, cells) in lines {
+        sums += of_line;
+        local.extend(cells);
     }
+    let pixels = local.iter().map(|(count, _)| count).sum::<f64>();
     sums /= pixels;
     let mean = &sums * &fit.coefficients;
     Slopes {
@@ -269,9 +305,15 @@ fn slopes(fit: &Fit, cells: &Cells, patch: &Patch) -> Slopes {
     }
 }
 
-/// What the mean owes to the choice of the description: by how much the next one differs, or, where the lattice is the same everywhere,
-/// the nodes whose windows no edge cuts off.
-fn doubt(chosen: &Chosen, nodes: &[Node], view: &View, patch: &Patch) -> Matrix4<f64> {
+/// By how much the mean (ψ₁ and ψ₂, a column each) would differ with another choice.
+struct Otherwise {
+    /// By the next description or, where the lattice is the same everywhere, by the nodes whose windows no edge cuts off.
+    next: Matrix2<f64>,
+    /// By the finest description, where that is another one.
+    finest: Option<Matrix2<f64>>,
+}
+
+fn otherwise(chosen: &Chosen, nodes: &[Node], view: &View, patch: &Patch) -> Otherwise {
     let inner = || {
         let least = nodes.iter().map(|n| n.gain).fold(f64::INFINITY, f64::min);
         let inner: Vec<Node> = (nodes.iter())
@@ -286,13 +328,13 @@ fn doubt(chosen: &Chosen, nodes: &[Node], view: &View, patch: &Patch) -> Matrix4
     } else {
         None
     };
-    let Some(other) = chosen.next.as_ref().or(again.as_ref()) else {
-        return Matrix4::zeros();
-    };
     let mean = |fit: &Fit| slopes(fit, view.cells, patch).mean;
-    let off = mean(other) - mean(&chosen.fit);
-    let off = nalgebra::Vector4::from_column_slice(off.as_slice());
-    off * off.transpose()
+    let off = |other: &Fit| mean(other) - mean(&chosen.fit);
+    let next = chosen.next.as_ref().or(again.as_ref());
+    Otherwise {
+        next: next.map_or_else(Matrix2::zeros, off),
+        finest: chosen.finest.as_ref().map(off),
+    }
 }
 
 fn summary(chosen: &Chosen, nodes: &[Node], view: &View, patch: &Patch) -> Mean {
@@ -308,8 +350,14 @@ fn summary(chosen: &Chosen, nodes: &[Node], view: &View, patch: &Patch) -> Mean 
     } = slopes(fit, cells, patch);
     let covariance = fit.covariance(&sums, nodes, reach);
     let covariance = Matrix4::from_column_slice(covariance.as_slice());
-    let covariance =
-        covariance + edges(fit, cells, patch, &step) + doubt(chosen, nodes, view, patch);
+    let edges = edges(fit, cells, patch, &step);
+    let Otherwise { next, finest } = otherwise(chosen, nodes, view, patch);
+    let square = |off: &Matrix2<f64>| {
+        let off = Vector4::from_column_slice(off.as_slice());
+        off * off.transpose()
+    };
+    let doubt = square(&next) + finest.as_ref().map_or_else(Matrix4::zeros, square);
+    let covariance = covariance + edges + doubt;
     let pair = patch.pair + step;
     let middle = patch.middle(cells);
     let mut at_middle = DMatrix::zeros(3, size);
@@ -325,6 +373,8 @@ fn summary(chosen: &Chosen, nodes: &[Node], view: &View, patch: &Patch) -> Mean 
     let (wavelength, angle) = spread(&pair, &step, &local, pixels);
     Mean {
         waves: Waves::new(pair, covariance),
+        other: pair + finest.unwrap_or(next),
+        edges,
         change: chosen.model.map(|model| Change {
             model,
             wavelength,
@@ -386,7 +436,7 @@ fn edges(fit: &Fit, cells: &Cells, patch: &Patch, mean: &Matrix2<f64>) -> Matrix
     let mut covariance = Matrix4::zeros();
     for (axis, sum) in sums.iter().enumerate() {
         let moved = cells.period[axis] / cells.pixels[axis] as f64 / 12f64.sqrt();
-        let change = nalgebra::Vector4::from_column_slice((sum * (moved / count)).as_slice());
+        let change = Vector4::from_column_slice((sum * (moved / count)).as_slice());
         covariance += change * change.transpose();
     }
     covariance

@@ -5,14 +5,19 @@
 
 use heterostrain::lattice::reciprocal;
 use nalgebra::{Matrix2, Vector2};
+use rayon::prelude::*;
 use rustfft::num_complex::Complex64;
 
 use crate::frame::image::Image;
+use crate::numbers::widest::widest;
 
 /// Cells per period: what the sums over a cell take off a wave at the distance of a wave vector is then a tenth.
 const CELLS_PER_PERIOD: f64 = 4.0;
 /// A window reaches so many of its widths: what is left out is a thousandth.
 const REACH: f64 = 3.0;
+
+/// Cells that a thread takes at once, at least: fewer are not worth handing out.
+const FEWEST: usize = 4096;
 
 /// The cells of a frame.
 #[derive(Clone, Debug, PartialEq)]
@@ -90,28 +95,35 @@ impl Cells {
 
     /// `Σ I e^{−iq·n}` over each cell, pixels counted from (0, 0).
     pub(crate) fn mixed(&self, image: &Image, q: Vector2<f64>) -> Vec<Complex64> {
-        let along: Vec<Complex64> = (0..image.columns)
-            .map(|c| Complex64::cis(-q.x * c as f64))
-            .collect();
+        let turns = |axis: usize, count: usize| -> Vec<Complex64> {
+            (0..count)
+                .map(|i| Complex64::cis(-q[axis] * i as f64))
+                .collect()
+        };
+        let (along, up) = (turns(0, image.columns), turns(1, image.rows));
         let mut sums = vec![Complex64::default(); self.len()];
-        for row in 0..image.rows {
-            let turn = Complex64::cis(-q.y * row as f64);
-            let cells = &mut sums[row / self.pixels[1] * self.size[0]..][..self.size[0]];
-            let blocks = image.row(row).chunks(self.pixels[0]);
-            for ((cell, block), turns) in cells
-                .iter_mut()
-                .zip(blocks)
-                .zip(along.chunks(self.pixels[0]))
-            {
-                let mut sum = Complex64::default();
-                for (value, turn) in block.iter().zip(turns) {
-                    if value.is_finite() {
-                        sum += turn * *value;
-                    }
-                }
-                *cell += sum * turn;
+        let [width, height] = self.pixels;
+        let bands = sums
+            .par_chunks_mut(self.size[0])
+            .with_min_len(FEWEST.div_ceil(self.size[0]));
+        bands.enumerate().for_each(|(band, cells)| {
+            // All lines of the cells first, column by column.
+            let mut parts = [vec![0.0; image.columns], vec![0.0; image.columns]];
+            let first = band * height;
+            for (row, turn) in (first..).zip(up[first..].iter().take(height)) {
+                add_turned(&mut parts, image.row(row), *turn);
             }
-        }
+            let [re, im] = &parts;
+            let columns = re
+                .chunks(width)
+                .zip(im.chunks(width))
+                .zip(along.chunks(width));
+            for (cell, ((re, im), along)) in cells.iter_mut().zip(columns) {
+                for ((re, im), turn) in re.iter().zip(im).zip(along) {
+                    *cell += Complex64::new(*re, *im) * turn;
+                }
+            }
+        });
         sums
     }
 
@@ -139,9 +151,55 @@ impl Cells {
         }
     }
 
-    /// Sums of cells under the window.
-    pub(crate) fn summed(&self, sums: &[Complex64], window: &Window) -> Vec<Complex64> {
-        self.smoothed(sums, &window.taps)
+    /// Sums of cells under the window at some of them.
+    pub(crate) fn summed_at(
+        &self,
+        sums: &[Complex64],
+        window: &Window,
+        at: &[usize],
+    ) -> Vec<Complex64> {
+        let [across, up] = self.size;
+        let mut columns: Vec<usize> = at.iter().map(|i| i % across).collect();
+        columns.sort_unstable();
+        columns.dedup();
+        let mut lines = Vec::with_capacity(up * columns.len());
+        for line in sums.chunks_exact(across) {
+            lines.extend(
+                columns
+                    .iter()
+                    .map(|&x| under(&window.taps[0], x, across, |i| line[i])),
+            );
+        }
+        let of = |&i: &usize| {
+            let column = columns.partition_point(|x| *x < i % across);
+            let line = |y: usize| lines[y * columns.len() + column];
+            under(&window.taps[1], i / across, up, line)
+        };
+        at.iter().map(of).collect()
+    }
+
+    /// `Σ e^{−iq·n}` of all pixels of an image without missing ones, under the window at some cells: a product of sums
+    /// along columns and along rows.
+    pub(crate) fn of_whole(
+        &self,
+        image_size: [usize; 2],
+        q: Vector2<f64>,
+        window: &Window,
+        at: &[usize],
+    ) -> Vec<Complex64> {
+        let [x, y] = [0, 1].map(|axis| {
+            let turns: Vec<Complex64> = (0..image_size[axis])
+                .map(|i| Complex64::cis(-q[axis] * i as f64))
+                .collect();
+            let cells: Vec<Complex64> = (turns.chunks(self.pixels[axis]))
+                .map(|c| c.iter().sum())
+                .collect();
+            let count = cells.len();
+            let at = |i: usize| under(&window.taps[axis], i, count, |j| cells[j]);
+            (0..count).map(at).collect::<Vec<Complex64>>()
+        });
+        let across = self.size[0];
+        at.iter().map(|i| x[i % across] * y[i / across]).collect()
     }
 
     /// The envelope of a wave: its sums under the window.
@@ -162,37 +220,78 @@ impl Cells {
     /// Convolution with the taps along columns, then along rows.
     fn smoothed<T>(&self, values: &[T], taps: &[Vec<f64>; 2]) -> Vec<T>
     where
-        T: Copy + Default + std::ops::AddAssign + std::ops::Mul<f64, Output = T>,
+        T: Copy + Default + Send + Sync + std::ops::AddAssign + std::ops::Mul<f64, Output = T>,
     {
         let [across, up] = self.size;
+        let at_once = FEWEST.div_ceil(across);
         let mut lines = vec![T::default(); values.len()];
-        let reach = (taps[0].len() / 2) as i64;
-        for (line, out) in values
+        let reach = taps[0].len() / 2;
+        let all = values
             .chunks_exact(across)
-            .zip(lines.chunks_exact_mut(across))
-        {
-            for (x, out) in out.iter_mut().enumerate() {
-                let first = (x as i64 - reach).max(0);
-                let last = (x as i64 + reach).min(across as i64 - 1);
-                for other in first..=last {
-                    *out += line[other as usize] * taps[0][(other - x as i64 + reach) as usize];
+            .zip(lines.chunks_exact_mut(across));
+        for (line, out) in all {
+            for (i, tap) in taps[0].iter().enumerate() {
+                // Values at x + i − reach.
+                let (before, after) = (reach.saturating_sub(i), i.saturating_sub(reach));
+                if before.max(after) < across {
+                    add(
+                        &mut out[before..across - after],
+                        &line[after..across - before],
+                        *tap,
+                    );
                 }
             }
         }
         let mut out = vec![T::default(); values.len()];
-        let reach = (taps[1].len() / 2) as i64;
-        for y in 0..up as i64 {
-            let target = &mut out[y as usize * across..][..across];
-            for other in (y - reach).max(0)..=(y + reach).min(up as i64 - 1) {
-                let tap = taps[1][(other - y + reach) as usize];
-                let line = &lines[other as usize * across..][..across];
-                for (out, value) in target.iter_mut().zip(line) {
-                    *out += *value * tap;
-                }
+        let reach = taps[1].len() / 2;
+        let targets = out.par_chunks_exact_mut(across).with_min_len(at_once);
+        targets.enumerate().for_each(|(y, target)| {
+            for other in y.saturating_sub(reach)..=(y + reach).min(up - 1) {
+                let line = &lines[other * across..][..across];
+                add(target, line, taps[1][other + reach - y]);
             }
-        }
+        });
         out
     }
+}
+
+/// Adds a line turned by a phase; missing pixels count as 0.
+fn add_turned([re, im]: &mut [Vec<f64>; 2], line: &[f64], turn: Complex64) {
+    widest(
+        #[inline(always)]
+        || {
+            for ((re, im), value) in re.iter_mut().zip(im.iter_mut()).zip(line) {
+                let value = if value.is_finite() { *value } else { 0.0 };
+                *re += turn.re * value;
+                *im += turn.im * value;
+            }
+        },
+    );
+}
+
+/// Adds values times a tap.
+fn add<T>(sums: &mut [T], values: &[T], tap: f64)
+where
+    T: Copy + std::ops::AddAssign + std::ops::Mul<f64, Output = T>,
+{
+    widest(
+        #[inline(always)]
+        || {
+            for (sum, value) in sums.iter_mut().zip(values) {
+                *sum += *value * tap;
+            }
+        },
+    );
+}
+
+/// The sum under a window at one of `count` values in a line.
+fn under(taps: &[f64], at: usize, count: usize, value: impl Fn(usize) -> Complex64) -> Complex64 {
+    let reach = taps.len() / 2;
+    let mut sum = Complex64::default();
+    for other in at.saturating_sub(reach)..=(at + reach).min(count - 1) {
+        sum += value(other) * taps[other + reach - at];
+    }
+    sum
 }
 
 /// A Gaussian window at all cells.
@@ -234,5 +333,27 @@ mod tests {
         assert!((at(30, 60).arg() - 0.7).abs() < 0.03, "{}", at(30, 60));
         assert!(at(130, 60).norm() < 0.03, "{}", at(130, 60));
         assert!((at(80, 60).norm() - 0.75).abs() < 0.2, "{}", at(80, 60));
+    }
+
+    /// Sums at some cells are those at all cells, and those of a whole image are products.
+    #[test]
+    fn shortcuts_sum_the_same() {
+        let pair = Matrix2::new(0.4, 0.2, 0.0, 0.35);
+        let image = Image::new(70, 90, vec![1.0; 70 * 90]);
+        let cells = Cells::new(&image, &pair, [1.0, 1.0]).unwrap();
+        let window = cells.window(0.8);
+        let q = Vector2::new(0.3, -0.21);
+        let sums = cells.mixed(&image, q);
+        let all = cells.smoothed(&sums, &window.taps);
+        let at: Vec<usize> = (0..cells.len()).step_by(7).collect();
+        let some = cells.summed_at(&sums, &window, &at);
+        let whole = cells.of_whole([90, 70], q, &window, &at);
+        for ((i, some), whole) in at.iter().zip(some).zip(whole) {
+            assert_eq!(some, all[*i]);
+            assert!(
+                (whole - some).norm() < 1e-10 * cells.pixels[0] as f64,
+                "{whole} {some}"
+            );
+        }
     }
 }

@@ -1,29 +1,33 @@
 //! Several lattices side by side: grains.
 //!
-//! Where two grains meet, the slopes of the phases take two values and hardly any between them. The nodes of a patch are split in two by
-//! their slopes, and both parts are described by themselves. Two lattices it is if no smooth change of one describes the phases,
+//! Where two grains meet, the phases run along one plane in each of them. A lattice is followed from many nodes into its surroundings as
+//! far as these are of it; the two that describe most nodes together are fitted to theirs. Two lattices it is if no smooth change of one describes the phases,
 //! and if the data pay for two (BIC) against the best of these.
 
-use nalgebra::Vector4;
 use rustfft::num_complex::Complex64;
 
 use crate::coverage::bend::{described, described_as_straight};
 use crate::coverage::cells::Cells;
 use crate::coverage::nodes::{Node, View, information, neighbours, nodes};
 use crate::coverage::patch::Patch;
-use crate::coverage::phases::{Fit, fit, powers, price, rows, value};
-use crate::numbers::median::median;
+use crate::coverage::phases::{Fit, fit, freedom, powers, price, rows, value};
 
-/// Rounds of means and nearest means. Chosen by eye.
-const ROUNDS: usize = 20;
+/// Nodes from which lattices are followed, about.
+const SEEDS: f64 = 36.0;
+/// How far a lattice is followed from its node, in nodes: a slope that eight neighbours tell holds for a few more.
+const REACHES: [usize; 5] = [2, 3, 5, 9, usize::MAX];
 /// A part with fewer nodes than this is a defect and no grain.
 const FEWEST_NODES: usize = 6;
 /// By how much the evidence (BIC) of two lattices has to be better than that of one that changes: chance does that once in e¹⁰.
 const BETTER: f64 = 20.0;
 
-/// A smooth change describes phases whose χ² is below this share of their information: those of waves of twist and strain
-/// were below 0.9 of it, those of two grains above 2.
+/// A smooth change describes phases whose χ² is below this, times its degrees of freedom: those of waves of twist and strain
+/// were below 0.6 of them, those of two grains above 3.
 const MISFIT: f64 = 1.5;
+
+/// Phases that are off by less than this from a lattice (rad, root mean square of three) may be of it when two are chosen: half of what is
+/// asked of a neighbour, so that no lattice between two is taken for either.
+const NEAR: f64 = 0.4;
 
 /// Rounds of fits to both grains and of nodes given to the nearer one. Chosen by eye.
 const REFINED: usize = 4;
@@ -32,16 +36,21 @@ const REFINED: usize = 4;
 /// three waves that have nothing to do with a lattice are nearer once in ten.
 const NEITHER: f64 = 0.8;
 
-/// The patches of two grains, the larger first; `None` where one lattice describes all of the patch as well.
-pub(crate) fn split(view: &View, patch: &Patch) -> Option<[Patch; 2]> {
+/// Two lattices side by side.
+pub(crate) struct Grains {
+    /// The larger first.
+    pub(crate) patches: [Patch; 2],
+    /// Length of the boundary between them along columns and along rows, pixels: the legs of a straight line.
+    pub(crate) boundary: [f64; 2],
+}
+
+/// The two grains of a patch; `None` where one lattice describes all of the patch as well.
+pub(crate) fn split(view: &View, patch: &Patch) -> Option<Grains> {
     let all = nodes(view, patch);
     if all.len() < 2 * FEWEST_NODES {
         return None;
     }
-    let mut owner: Vec<Option<usize>> = halves(&all)?
-        .into_iter()
-        .map(|second| Some(usize::from(second)))
-        .collect();
+    let mut owner = halves(patch, &all)?;
     for _ in 0..REFINED {
         let parts = [0, 1].map(|which| part(&all, &owner, Some(which)));
         if parts.iter().any(|p| p.len() < FEWEST_NODES) {
@@ -58,14 +67,14 @@ pub(crate) fn split(view: &View, patch: &Patch) -> Option<[Patch; 2]> {
         return None;
     }
     let one = described(view, patch, &part(&all, &owner, None))?;
-    if one[0] < MISFIT * information(&all) {
+    if one[0] < MISFIT * freedom(information(&all), one[1]) {
         return None;
     }
     let [a, b] = [0, 1].map(|i| described_as_straight(patch, &parts[i]));
     let (a, b) = (a?, b?);
     // Where the boundary runs costs about as many numbers as it is nodes long.
-    let boundary = one[2].sqrt() * one[2].ln() / 2.0;
-    let two = price(a[0] + b[0], a[1] + b[1], a[2] + b[2]) + boundary;
+    let shape = one[2].sqrt() * one[2].ln() / 2.0;
+    let two = price(a[0] + b[0], a[1] + b[1], a[2] + b[2]) + shape;
     if price(one[0], one[1], one[2]) - two < BETTER {
         return None;
     }
@@ -73,7 +82,10 @@ pub(crate) fn split(view: &View, patch: &Patch) -> Option<[Patch; 2]> {
     if patches[1].unit_cells > patches[0].unit_cells {
         patches.swap(0, 1);
     }
-    Some(patches)
+    Some(Grains {
+        patches,
+        boundary: boundary(view.cells, patch, &all, &owner),
+    })
 }
 
 /// The nodes of one grain, or of both, but for those beside a node of another or of none: their windows see both.
@@ -92,107 +104,99 @@ fn part(all: &[Node], owner: &[Option<usize>], which: Option<usize>) -> Vec<Node
     chosen.map(|i| all[i].clone()).collect()
 }
 
+/// By how much the phases at a node are off a lattice, rad, root mean square of the three.
+fn miss(node: &Node, fit: &Fit) -> f64 {
+    let rows = rows(&fit.basis, node.at).into_iter().enumerate();
+    let squares = rows.map(|(wave, row)| {
+        let turn = Complex64::cis(-value(&row, &fit.coefficients));
+        (node.envelopes[wave] * turn).arg().powi(2)
+    });
+    (squares.sum::<f64>() / 3.0).sqrt()
+}
+
 /// To which of two lattices the phases at a node belong; `None` where they are neither's.
 fn nearer(node: &Node, fits: [&Fit; 2]) -> Option<usize> {
-    let misses = fits.map(|fit| {
-        let rows = rows(&fit.basis, node.at).into_iter().enumerate();
-        let squares = rows.map(|(wave, row)| {
-            let turn = Complex64::cis(-value(&row, &fit.coefficients));
-            (node.envelopes[wave] * turn).arg().powi(2)
-        });
-        (squares.sum::<f64>() / 3.0).sqrt()
-    });
+    let misses = fits.map(|fit| miss(node, fit));
     let which = usize::from(misses[1] < misses[0]);
     (misses[which] < NEITHER).then_some(which)
 }
 
-/// Which nodes belong to the second of two lattices, by their slopes.
-fn halves(nodes: &[Node]) -> Option<Vec<bool>> {
-    let slopes = filtered(nodes, &slopes(nodes));
-    let known: Vec<&Vector4<f64>> = slopes.iter().flatten().collect();
-    let mean = known.iter().copied().sum::<Vector4<f64>>() / known.len() as f64;
-    // Starts at the ends of the direction in which they differ most.
-    let spread: nalgebra::Matrix4<f64> = known
+/// To which of two lattices each node belongs: of all that are found from nodes, the two that describe most nodes together.
+fn halves(patch: &Patch, nodes: &[Node]) -> Option<Vec<Option<usize>>> {
+    let stride = ((nodes.len() as f64 / SEEDS).sqrt().round() as usize).max(1);
+    let seeds = nodes
         .iter()
-        .map(|s| (*s - mean) * (*s - mean).transpose())
-        .sum();
-    let eigen = spread.symmetric_eigen();
-    let along = eigen
-        .eigenvectors
-        .column(eigen.eigenvalues.imax())
-        .into_owned();
-    let deviation = (eigen.eigenvalues.max() / known.len() as f64).sqrt();
-    let mut means = [mean - along * deviation, mean + along * deviation];
-    let nearer = |s: &Vector4<f64>, means: &[Vector4<f64>; 2]| {
-        (s - means[1]).norm_squared() < (s - means[0]).norm_squared()
+        .filter(|node| node.place.iter().all(|place| place % stride == 0));
+    let found: Vec<Fit> = seeds
+        .filter_map(|seed| grown(patch, nodes, seed.place))
+        .collect();
+    // A node counts the more the better a lattice describes it.
+    let near = |fit: &Fit| {
+        let miss = |node| (1.0 - (miss(node, fit) / NEAR).powi(2)).max(0.0);
+        nodes.iter().map(miss).collect::<Vec<f64>>()
     };
-    for _ in 0..ROUNDS {
-        let mut sums = [Vector4::zeros(); 2];
-        let mut counts = [0.0; 2];
-        for s in &known {
-            let i = usize::from(nearer(s, &means));
-            sums[i] += **s;
-            counts[i] += 1.0;
-        }
-        if counts.contains(&0.0) {
+    let near: Vec<Vec<f64>> = found.iter().map(near).collect();
+    let described = |[a, b]: [usize; 2]| {
+        let both = near[a].iter().zip(&near[b]);
+        both.map(|(a, b)| a.max(*b)).sum::<f64>()
+    };
+    let pairs = (0..found.len()).flat_map(|a| (0..a).map(move |b| [a, b]));
+    let [first, second] = pairs.max_by(|a, b| described(*a).total_cmp(&described(*b)))?;
+    let fits = [&found[first], &found[second]];
+    Some(nodes.iter().map(|node| nearer(node, fits)).collect())
+}
+
+/// The lattice at a node, from ever wider surroundings as far as they are of it.
+fn grown(patch: &Patch, nodes: &[Node], seed: [usize; 2]) -> Option<Fit> {
+    let far = |node: &Node| (0..2).map(|i| node.place[i].abs_diff(seed[i])).max();
+    let within = |reach: usize| nodes.iter().filter(move |node| far(node) <= Some(reach));
+    let around: Vec<Node> = within(1).cloned().collect();
+    if around.len() < FEWEST_NODES {
+        return None;
+    }
+    let mut found = fit(powers(patch, 1), &around)?;
+    for reach in REACHES {
+        let near = within(reach).filter(|node| miss(node, &found) < NEITHER);
+        let near: Vec<Node> = near.cloned().collect();
+        if near.len() < FEWEST_NODES {
             return None;
         }
-        means = [sums[0] / counts[0], sums[1] / counts[1]];
+        found = fit(powers(patch, 1), &near)?;
     }
-    let raw: Vec<bool> = slopes
-        .iter()
-        .map(|s| s.as_ref().is_some_and(|s| nearer(s, &means)))
-        .collect();
-    // As most of the neighbours say: noise makes single nodes differ.
-    let mut votes: Vec<i32> = raw.iter().map(|r| if *r { 1 } else { -1 }).collect();
-    for (a, b) in neighbours(nodes) {
-        votes[a] += if raw[b] { 1 } else { -1 };
-        votes[b] += if raw[a] { 1 } else { -1 };
-    }
-    Some(votes.into_iter().map(|v| v > 0).collect())
+    Some(found)
 }
 
-/// Slopes of the phases of the first two waves at each node, turned from node to node, along columns and rows.
-fn slopes(nodes: &[Node]) -> Vec<Option<Vector4<f64>>> {
-    let mut sums = vec![(Vector4::<f64>::zeros(), [0.0; 2]); nodes.len()];
-    for (a, b) in neighbours(nodes) {
-        let apart = nodes[b].at - nodes[a].at;
-        let axis = usize::from(apart.x.abs() < apart.y.abs());
-        let turn = |wave: usize| (nodes[a].envelopes[wave].conj() * nodes[b].envelopes[wave]).arg();
-        // All three waves: what they say of the first two, by least squares.
-        let turns = [turn(0), turn(1), turn(2)];
-        let first = (2.0 * turns[0] + turns[1] - turns[2]) / 3.0;
-        let second = (turns[0] + 2.0 * turns[1] + turns[2]) / 3.0;
-        for node in [a, b] {
-            sums[node].0[axis] += first / apart[axis];
-            sums[node].0[2 + axis] += second / apart[axis];
-            sums[node].1[axis] += 1.0;
+/// Length of the sides of cells (along columns, along rows; pixels) between those nearest to nodes of one and of the other grain.
+fn boundary(cells: &Cells, patch: &Patch, nodes: &[Node], owner: &[Option<usize>]) -> [f64; 2] {
+    let [across, up] = cells.size;
+    let nearest = |cell: usize| {
+        let at = cells.middle_of(cell);
+        let owned = nodes
+            .iter()
+            .zip(owner)
+            .filter_map(|(n, o)| Some((n, (*o)?)));
+        let distance = |node: &Node| {
+            let d = node.at - at;
+            (d.x / cells.period[0]).hypot(d.y / cells.period[1])
+        };
+        let nearest = owned.min_by(|a, b| distance(a.0).total_cmp(&distance(b.0)));
+        nearest.map(|(_, owner)| owner)
+    };
+    let of: Vec<Option<usize>> = (0..cells.len())
+        .map(|cell| patch.inside[cell].then(|| nearest(cell)).flatten())
+        .collect();
+    let differ = |a: usize, b: usize| of[a].is_some() && of[b].is_some() && of[a] != of[b];
+    let mut lengths = [0.0; 2];
+    for (x, y) in (0..cells.len()).map(|i| (i % across, i / across)) {
+        let here = y * across + x;
+        if x + 1 < across && differ(here, here + 1) {
+            lengths[1] += cells.pixels[1] as f64;
+        }
+        if y + 1 < up && differ(here, here + across) {
+            lengths[0] += cells.pixels[0] as f64;
         }
     }
-    let of = |(sum, counts): (Vector4<f64>, [f64; 2])| {
-        let [x, y] = counts;
-        (x > 0.0 && y > 0.0).then(|| sum.component_div(&Vector4::new(x, y, x, y)))
-    };
-    sums.into_iter().map(of).collect()
-}
-
-/// Each slope as the median of its neighbours has it: windows on a boundary see both grains, which makes a line of slopes that
-/// are neither's.
-fn filtered(nodes: &[Node], slopes: &[Option<Vector4<f64>>]) -> Vec<Option<Vector4<f64>>> {
-    let near = |a: &Node, b: &Node| {
-        let apart = |axis: usize| a.place[axis].abs_diff(b.place[axis]);
-        apart(0).max(apart(1)) <= 1
-    };
-    let of = |node: &Node| {
-        let around = nodes
-            .iter()
-            .zip(slopes)
-            .filter(|(other, _)| near(node, other));
-        let around: Vec<Vector4<f64>> = around.filter_map(|(_, slope)| *slope).collect();
-        let middle = |i: usize| median(&mut around.iter().map(|s| s[i]).collect::<Vec<f64>>());
-        (!around.is_empty()).then(|| Vector4::from_fn(|i, _| middle(i)))
-    };
-    nodes.iter().map(of).collect()
+    lengths
 }
 
 /// The cells whose nearest nodes all belong to one grain.

@@ -38,17 +38,16 @@ pub(crate) fn local(
         let (at, count) = (cells.middle_of(cell), cells.counts()[cell]);
         Complex64::new(at.x, at.y) * count
     });
-    let places = cells.summed(&places.collect::<Vec<_>>(), &window);
+    let places = cells.summed_at(&places.collect::<Vec<_>>(), &window, at);
     let counts = cells.counts().iter().map(|n| Complex64::from(*n));
-    let counts = cells.summed(&counts.collect::<Vec<_>>(), &window);
-    let ones = part
-        .values
-        .iter()
-        .map(|v| if v.is_finite() { 1.0 } else { f64::NAN });
-    let ones = Image::new(part.rows, part.columns, ones.collect());
+    let counts = cells.summed_at(&counts.collect::<Vec<_>>(), &window, at);
     let seen = |image: &Image, index: [i32; 2]| {
-        let sums = cells.summed(&cells.mixed(image, wave(index)), &window);
-        at.iter().map(|&i| sums[i]).collect::<Vec<_>>()
+        cells.summed_at(&cells.mixed(image, wave(index)), &window, at)
+    };
+    let ones = ones(part);
+    let of_ones = |index: [i32; 2]| match &ones {
+        Some(ones) => seen(ones, index),
+        None => cells.of_whole([part.columns, part.rows], wave(index), &window, at),
     };
     let data = [0, 1, 2, 3].map(|i| seen(part, BASIS[i]));
     // Each difference of two of the basis, one of ± each.
@@ -57,7 +56,7 @@ pub(crate) fn local(
         for b in BASIS {
             let d = [a[0] - b[0], a[1] - b[1]];
             if !known.iter().any(|(k, _)| *k == d || *k == [-d[0], -d[1]]) {
-                known.push((d, seen(&ones, d)));
+                known.push((d, of_ones(d)));
             }
         }
     }
@@ -84,7 +83,7 @@ pub(crate) fn local(
         let solution = inverse * right;
         let larger = [1, 2, 3].map(|a| (inverse[(a, a)] * gram[(0, 0)]).re);
         let usable = larger.iter().all(|l| *l > 0.0 && *l < MOST);
-        let middle = places[at[n]] / counts[at[n]].re;
+        let middle = places[n] / counts[n].re;
         usable.then(|| Local {
             at: Vector2::new(middle.re, middle.im),
             envelopes: [1, 2, 3].map(|a| solution[a]),
@@ -92,6 +91,18 @@ pub(crate) fn local(
         })
     };
     (0..at.len()).map(solve).collect()
+}
+
+/// 1 where a pixel is; `None` if all are there.
+fn ones(part: &Image) -> Option<Image> {
+    if part.values.iter().all(|v| v.is_finite()) {
+        return None;
+    }
+    let ones = part
+        .values
+        .iter()
+        .map(|v| if v.is_finite() { 1.0 } else { f64::NAN });
+    Some(Image::new(part.rows, part.columns, ones.collect()))
 }
 
 #[cfg(test)]

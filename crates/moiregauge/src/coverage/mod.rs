@@ -17,6 +17,7 @@ pub(crate) mod patch;
 pub(crate) mod phases;
 pub(crate) mod settle;
 pub(crate) mod tiles;
+pub(crate) mod windows;
 
 pub use bend::{Change, ChangeModel};
 pub use patch::Patch;

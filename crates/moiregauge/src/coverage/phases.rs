@@ -2,6 +2,8 @@
 //!
 //! Differences of phases over a window come first, which need no unwrapping, then the phases themselves.
 
+use std::collections::HashMap;
+
 use nalgebra::{DMatrix, DVector, Vector2};
 use rustfft::num_complex::Complex64;
 
@@ -82,8 +84,8 @@ impl Basis {
 pub(crate) struct Fit {
     pub(crate) basis: Basis,
     pub(crate) coefficients: DVector<f64>,
-    /// Inverse of the normal matrix.
-    pub(crate) inverse: DMatrix<f64>,
+    /// The normal equations of the last round.
+    equations: NormalEquations,
     /// BIC.
     pub(crate) price: f64,
     /// χ².
@@ -105,7 +107,10 @@ impl Fit {
         nodes: &[Node],
         reach: Vector2<f64>,
     ) -> DMatrix<f64> {
-        let gains = sums * &self.inverse;
+        let mut gains = DMatrix::zeros(sums.nrows(), sums.ncols());
+        for (mut gain, sum) in gains.row_iter_mut().zip(sums.row_iter()) {
+            gain.tr_copy_from(&self.equations.solve(&sum.transpose()));
+        }
         // What each phase does to the sums, times its error.
         let of_node = |node: &Node| {
             rows(&self.basis, node.at).map(|row| {
@@ -127,9 +132,10 @@ impl Fit {
             })
             .collect();
         let mut covariance = DMatrix::zeros(sums.nrows(), sums.nrows());
+        let near = Near::new(nodes, reach);
         for (i, a) in nodes.iter().enumerate() {
-            for (j, b) in nodes.iter().enumerate().skip(i) {
-                let d = (b.at - a.at).component_div(&reach);
+            for j in near.from(i) {
+                let d = (nodes[j].at - a.at).component_div(&reach);
                 let correlation = (-0.25 * d.norm_squared()).exp();
                 if correlation < UNCORRELATED {
                     continue;
@@ -144,6 +150,40 @@ impl Fit {
             }
         }
         covariance * self.enlarged
+    }
+}
+
+/// Which nodes are so near each other that their errors may be correlated.
+struct Near {
+    /// The square of each node, a reach beyond which nothing is correlated wide.
+    squares: Vec<[i64; 2]>,
+    /// The nodes in each square, in order.
+    members: HashMap<[i64; 2], Vec<usize>>,
+}
+
+impl Near {
+    fn new(nodes: &[Node], reach: Vector2<f64>) -> Self {
+        let side = reach * (-4.0 * UNCORRELATED.ln()).sqrt();
+        let square = |node: &Node| {
+            let at = node.at.component_div(&side);
+            [at.x.floor() as i64, at.y.floor() as i64]
+        };
+        let squares: Vec<[i64; 2]> = nodes.iter().map(square).collect();
+        let mut members: HashMap<[i64; 2], Vec<usize>> = HashMap::new();
+        for (i, square) in squares.iter().enumerate() {
+            members.entry(*square).or_default().push(i);
+        }
+        Self { squares, members }
+    }
+
+    /// A node and those after it that may be near, in order.
+    fn from(&self, i: usize) -> Vec<usize> {
+        let [x, y] = self.squares[i];
+        let around = (y - 1..=y + 1).flat_map(|y| (x - 1..=x + 1).map(move |x| [x, y]));
+        let members = around.filter_map(|square| self.members.get(&square));
+        let mut near: Vec<usize> = members.flatten().copied().filter(|&j| j >= i).collect();
+        near.sort_unstable();
+        near
     }
 }
 
@@ -165,8 +205,8 @@ pub(crate) fn rows(basis: &Basis, at: Vector2<f64>) -> [Vec<(usize, f64)>; 3] {
     [
         of(0, 1.0).collect(),
         of(n, 1.0).collect(),
-        of(n, 1.0)
-            .chain(of(0, -1.0))
+        of(0, -1.0)
+            .chain(of(n, 1.0))
             .chain([(2 * n, 1.0)])
             .collect(),
     ]
@@ -176,8 +216,8 @@ pub(crate) fn value(row: &[(usize, f64)], coefficients: &DVector<f64>) -> f64 {
     row.iter().map(|(i, x)| coefficients[*i] * x).sum()
 }
 
-/// Normal equations that are filled row by row.
-pub(crate) struct Sums {
+/// Normal equations that are filled row by row, in the lower triangle.
+struct Sums {
     normal: DMatrix<f64>,
     right: DVector<f64>,
 }
@@ -190,24 +230,36 @@ impl Sums {
         }
     }
 
-    fn add(&mut self, row: &[(usize, f64)], measured: f64, weight: f64) {
-        for (i, x) in row {
-            self.right[*i] += weight * x * measured;
-            for (j, y) in row {
-                self.normal[(*i, *j)] += weight * x * y;
+    /// A row, ordered by coefficients.
+    fn add(&mut self, row: &[(usize, f64)], weight: f64) {
+        let size = self.normal.nrows();
+        for (n, (j, y)) in row.iter().enumerate() {
+            let column = &mut self.normal.as_mut_slice()[j * size..(j + 1) * size];
+            let y = weight * y;
+            for (i, x) in &row[n..] {
+                column[*i] += x * y;
             }
         }
     }
 
-    fn solved(mut self, basis: &Basis) -> Option<(DVector<f64>, NormalEquations)> {
+    /// What was measured of a row.
+    fn add_right(&mut self, row: &[(usize, f64)], measured: f64, weight: f64) {
+        for (i, x) in row {
+            self.right[*i] += weight * x * measured;
+        }
+    }
+
+    fn equations(&self, basis: &Basis) -> Option<NormalEquations> {
+        let mut normal = self.normal.clone();
         let size = self.right.len();
-        let stiffness = STIFFNESS * self.normal.trace() / size as f64;
+        let stiffness = STIFFNESS * normal.trace() / size as f64;
+        normal.fill_upper_triangle_with_lower_triangle();
         if let Basis::Splines(splines) = basis {
             for first in [0, basis.len()] {
                 splines.in_lines(|places| {
                     for (a, x) in places.iter().zip([1.0, -2.0, 1.0]) {
                         for (b, y) in places.iter().zip([1.0, -2.0, 1.0]) {
-                            self.normal[(first + a, first + b)] += stiffness * x * y;
+                            normal[(first + a, first + b)] += stiffness * x * y;
                         }
                     }
                 });
@@ -215,62 +267,106 @@ impl Sums {
         }
         // Constants are free where only differences are looked at.
         for i in 0..size {
-            self.normal[(i, i)] += 1e-3 * stiffness;
+            normal[(i, i)] += 1e-3 * stiffness;
         }
-        let units = NormalEquations::units(&self.normal);
-        let equations = NormalEquations::new(&self.normal, units, |_| 0.0)?;
-        Some((equations.solve(&self.right), equations))
+        let units = NormalEquations::units(&normal);
+        NormalEquations::new(&normal, units, |_| 0.0)
     }
+}
+
+/// The coefficients by what changes from node to node, which needs no unwrapping.
+fn by_differences(
+    basis: &Basis,
+    nodes: &[Node],
+    rows: &[[Vec<(usize, f64)>; 3]],
+) -> Option<DVector<f64>> {
+    let size = 2 * basis.len() + 1;
+    let mut coefficients = DVector::zeros(size);
+    let neighbours = neighbours(nodes);
+    let weight =
+        |a: usize, b: usize, wave: usize| f64::min(nodes[a].weights[wave], nodes[b].weights[wave]);
+    let mut sums = Sums::new(size);
+    let mut differences = Vec::with_capacity(neighbours.len());
+    for &(a, b) in &neighbours {
+        let each = [0, 1, 2].map(|wave| difference(&rows[b][wave], &rows[a][wave]));
+        for (wave, row) in each.iter().enumerate() {
+            sums.add(row, weight(a, b, wave));
+        }
+        differences.push(each);
+    }
+    let equations = sums.equations(basis)?;
+    for _ in 0..ROUNDS[0] {
+        sums.right.fill(0.0);
+        for (&(a, b), each) in neighbours.iter().zip(&differences) {
+            for (wave, row) in each.iter().enumerate() {
+                let turn = nodes[a].envelopes[wave].conj() * nodes[b].envelopes[wave];
+                let left = (turn * Complex64::cis(-value(row, &coefficients))).arg();
+                sums.add_right(row, left, weight(a, b, wave));
+            }
+        }
+        coefficients += equations.solve(&sums.right);
+    }
+    Some(coefficients)
+}
+
+/// Improves the coefficients by the phases themselves; the equations and χ² of the last round.
+fn by_phases(
+    basis: &Basis,
+    nodes: &[Node],
+    rows: &[[Vec<(usize, f64)>; 3]],
+    coefficients: &mut DVector<f64>,
+) -> Option<(NormalEquations, f64)> {
+    let mut chi2 = 0.0;
+    // What is followed, and the equations for that.
+    let mut last: Option<(Vec<bool>, NormalEquations)> = None;
+    for _ in 0..ROUNDS[1] {
+        let mut sums = Sums::new(coefficients.len());
+        let mut followed = Vec::with_capacity(3 * nodes.len());
+        chi2 = 0.0;
+        for (node, rows) in nodes.iter().zip(rows) {
+            for (wave, row) in rows.iter().enumerate() {
+                let left = node.envelopes[wave] * Complex64::cis(-value(row, coefficients));
+                let (left, weight) = (left.arg(), node.weights[wave]);
+                // What is lost counts as if it were at the limit, and moves nothing.
+                chi2 += weight * left.clamp(-LOST, LOST).powi(2);
+                let follows = left.abs() < LOST;
+                followed.push(follows);
+                if follows {
+                    sums.add_right(row, left, weight);
+                }
+            }
+        }
+        let known = last.take().filter(|(before, _)| *before == followed);
+        let (followed, equations) = if let Some(known) = known {
+            known
+        } else {
+            for (n, (node, rows)) in nodes.iter().zip(rows).enumerate() {
+                for (wave, row) in rows.iter().enumerate().filter(|(i, _)| followed[3 * n + i]) {
+                    sums.add(row, node.weights[wave]);
+                }
+            }
+            let equations = sums.equations(basis)?;
+            (followed, equations)
+        };
+        *coefficients += equations.solve(&sums.right);
+        last = Some((followed, equations));
+    }
+    last.map(|(_, equations)| (equations, chi2))
 }
 
 pub(crate) fn fit(basis: Basis, nodes: &[Node]) -> Option<Fit> {
     let size = 2 * basis.len() + 1;
     let rows: Vec<[Vec<(usize, f64)>; 3]> = nodes.iter().map(|n| rows(&basis, n.at)).collect();
-    let mut coefficients = DVector::zeros(size);
-    let neighbours = neighbours(nodes);
-    for _ in 0..ROUNDS[0] {
-        let mut sums = Sums::new(size);
-        for &(a, b) in &neighbours {
-            for (wave, (before, after)) in rows[a].iter().zip(&rows[b]).enumerate() {
-                let row = difference(after, before);
-                let turn = nodes[a].envelopes[wave].conj() * nodes[b].envelopes[wave];
-                let left = (turn * Complex64::cis(-value(&row, &coefficients))).arg();
-                let weight = nodes[a].weights[wave].min(nodes[b].weights[wave]);
-                sums.add(&row, left, weight);
-            }
-        }
-        coefficients += sums.solved(&basis)?.0;
-    }
+    let mut coefficients = by_differences(&basis, nodes, &rows)?;
     align(&basis, nodes, &rows, &mut coefficients);
+    let (equations, chi2) = by_phases(&basis, nodes, &rows, &mut coefficients)?;
     let all: f64 = nodes.iter().flat_map(|node| node.weights).sum();
-    let mut last = None;
-    for _ in 0..ROUNDS[1] {
-        let mut sums = Sums::new(size);
-        let (mut chi2, mut count) = (0.0, 0.0);
-        for (node, rows) in nodes.iter().zip(&rows) {
-            for (wave, row) in rows.iter().enumerate() {
-                let left = node.envelopes[wave] * Complex64::cis(-value(row, &coefficients));
-                let (left, weight) = (left.arg(), node.weights[wave]);
-                // What is lost counts as if it were at the limit, and moves nothing.
-                chi2 += weight * left.clamp(-LOST, LOST).powi(2);
-                count += 1.0;
-                if left.abs() < LOST {
-                    sums.add(row, left, weight);
-                }
-            }
-        }
-        let (step, equations) = sums.solved(&basis)?;
-        coefficients += step;
-        last = Some((equations, chi2, count));
-    }
-    let (equations, chi2, count) = last?;
+    let count = 3.0 * nodes.len() as f64;
     let share = nodes.first()?.share;
     let independent = count * (INDEPENDENT * share).min(1.0);
-    // Smooth functions of more numbers than there are windows leave a part all the same.
-    let whole = information(nodes);
-    let freedom = (whole - size as f64).max(LEAST_FREEDOM * whole);
+    let freedom = freedom(information(nodes), size as f64);
     Some(Fit {
-        inverse: equations.inverse(),
+        equations,
         coefficients,
         price: price(chi2, size as f64, independent),
         chi2,
@@ -285,15 +381,38 @@ pub(crate) fn fit(basis: Basis, nodes: &[Node]) -> Option<Fit> {
     })
 }
 
+/// Degrees of freedom: smooth functions of more numbers than there are windows leave a part all the same.
+pub(crate) fn freedom(information: f64, parameters: f64) -> f64 {
+    (information - parameters).max(LEAST_FREEDOM * information)
+}
+
 /// BIC of χ² (in units that do not matter), parameters and independent data.
 pub(crate) fn price(chi2: f64, parameters: f64, independent: f64) -> f64 {
     independent * (chi2 / independent).ln() + parameters * independent.ln()
 }
 
-/// b − a.
-pub(crate) fn difference(b: &[(usize, f64)], a: &[(usize, f64)]) -> Vec<(usize, f64)> {
-    let minus = a.iter().map(|(i, x)| (*i, -x));
-    b.iter().copied().chain(minus).collect()
+/// b − a, of rows that are ordered by coefficients.
+fn difference(b: &[(usize, f64)], a: &[(usize, f64)]) -> Vec<(usize, f64)> {
+    let mut both = Vec::with_capacity(a.len() + b.len());
+    let (mut a, mut b) = (a.iter().peekable(), b.iter().peekable());
+    loop {
+        match (a.peek(), b.peek()) {
+            (Some((i, x)), Some((j, y))) if i == j => {
+                both.push((*i, y - x));
+                a.next();
+                b.next();
+            }
+            (Some((i, x)), other) if other.is_none_or(|(j, _)| i < j) => {
+                both.push((*i, -x));
+                a.next();
+            }
+            (_, Some((j, y))) => {
+                both.push((*j, *y));
+                b.next();
+            }
+            _ => return both,
+        }
+    }
 }
 
 /// Sets the constants to the mean phases.

@@ -10,7 +10,7 @@ use rustfft::num_complex::Complex64;
 
 use crate::coverage::bend::{Mean, mean, refined};
 use crate::coverage::cells::{Cells, Window};
-use crate::coverage::grains::split;
+use crate::coverage::grains::{Grains, split};
 use crate::coverage::nodes::View;
 use crate::coverage::patch::Patch;
 use crate::frame::image::Image;
@@ -63,14 +63,24 @@ const SMALLEST_GAP: f64 = 1.5;
 ///
 /// `None` where no part of the frame carries the three waves, or where noise hides where they are.
 pub(crate) fn settle(image: &Image, pair: &Matrix2<f64>, pitch: [f64; 2]) -> Option<Settled> {
-    let shortest = waves(pair).map(|q| std::f64::consts::TAU / q.amax());
+    settle_in_bins(image, 1, pair, pitch)
+}
+
+/// The same in an image that has been averaged over `bins` pixels along each axis.
+pub(crate) fn settle_in_bins(
+    image: &Image,
+    bins: usize,
+    pair: &Matrix2<f64>,
+    pitch: [f64; 2],
+) -> Option<Settled> {
+    let shortest = waves(pair).map(|q| std::f64::consts::TAU / (q.amax() * bins as f64));
     let shortest = shortest.into_iter().fold(f64::INFINITY, f64::min);
-    match ((shortest / BINS_PER_PERIOD) as usize).max(1) {
-        1 => settle_bins(image, pair, pitch, 1),
-        bins => {
-            let pitch = pitch.map(|p| p * bins as f64);
-            settle_bins(&image.binned(bins), &(pair * bins as f64), pitch, bins)
-        }
+    let more = ((shortest / BINS_PER_PERIOD) as usize).max(1);
+    let bins = bins * more;
+    let (pair, pitch) = (pair * bins as f64, pitch.map(|p| p * bins as f64));
+    match more {
+        1 => settle_bins(image, &pair, pitch, bins),
+        _ => settle_bins(&image.binned(more), &pair, pitch, bins),
     }
 }
 
@@ -170,10 +180,13 @@ impl Settled {
         self.seen.evidence(&self.cells, &self.inner)
     }
 
-    /// The patches of two grains where it is no single lattice, the larger first.
-    pub(crate) fn grains(&self) -> Option<[Patch; 2]> {
-        let grains = split(&self.view(), &self.inner)?;
-        Some(grains.map(|grain| grain.in_pixels(self.bins)))
+    /// Two grains where it is no single lattice.
+    pub(crate) fn grains(&self) -> Option<Grains> {
+        let Grains { patches, boundary } = split(&self.view(), &self.inner)?;
+        Some(Grains {
+            patches: patches.map(|grain| grain.in_pixels(self.bins)),
+            boundary: boundary.map(|length| length * self.bins as f64),
+        })
     }
 
     /// The mean of its lattice; `None` where its phases cannot be described.

@@ -94,8 +94,8 @@ fn doubts(map: &TwistStrainMap, twist: Option<f64>, blurred: f64, variation: f64
     let window = 4.0 * std::f64::consts::PI * map.window_nm * map.window_nm;
     if map.good() as f64 * map.node_area() < window {
         reasons.push(format!(
-            "{} of {} nodes of the map of phases are to be believed, less than the area of one window: too few \
-             periods lie within the margins, or the lattice changes too fast",
+            "{} of {} nodes of the map of phases are good, less than the area of one window: too few periods lie \
+             within the margins, or the lattice changes too fast",
             map.good(),
             map.grid.len()
         ));

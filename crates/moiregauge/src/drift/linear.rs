@@ -50,9 +50,9 @@ pub struct DriftSolution {
 pub enum DriftError {
     /// All scans saw the same time gradient, or nearly.
     #[error(
-        "the scans cannot determine the drift (rank {rank} of 6, condition {condition:.0}): scans of \
-         both slow directions (up and down), of both slow axes, or of two line rates are needed; a \
-         drift known from elsewhere can be given"
+        "the scans cannot determine the drift (rank {rank} of 6, condition {condition:.0}). Needed are scans of both \
+         slow directions (up and down), of both slow axes, or of two line rates. A drift known from another \
+         measurement can be given"
     )]
     Undetermined {
         /// Numerical rank of the six-parameter problem.
@@ -126,7 +126,7 @@ pub fn solve(observations: &[Observation]) -> Result<DriftSolution, DriftError> 
 ///
 /// # Errors
 /// [`DriftError::Covariance`] for an unusable input covariance.
-pub fn common_lattice(
+pub(crate) fn common_lattice(
     observations: &[Observation],
     velocity: &Vector2<f64>,
     covariance: &Matrix2<f64>,
@@ -155,7 +155,7 @@ pub fn common_lattice(
 
 /// The covariance that the common lattice would have if the drift were known, split into what images
 /// and what sensors make of it, nm².
-pub fn at_known_drift(observations: &[Observation]) -> Option<[Matrix4<f64>; 2]> {
+pub(crate) fn at_known_drift(observations: &[Observation]) -> Option<[Matrix4<f64>; 2]> {
     let parts: Vec<_> = observations
         .iter()
         .map(|o| (o.lattice.covariance, o.sensor))

@@ -18,9 +18,6 @@ pub(crate) mod shares;
 
 pub use drawn::DriftMonteCarlo;
 pub use joint::{DriftPath, JointFit, LeftOut, Resampled, Sighting, Terms, TestedTerm, fit};
-pub use linear::{DriftError, DriftSolution, Observation, at_known_drift, common_lattice, solve};
+pub use linear::{DriftError, DriftSolution, Observation, solve};
 pub use monte_carlo::monte_carlo;
-pub use paper::{
-    PaperScan, matrix, normal_vector, successive_draws, successive_drift, successive_objective,
-};
-pub use shares::{Statistical, weighted_mean};
+pub use shares::Statistical;

@@ -31,27 +31,27 @@ const BATCH: usize = 256;
 
 /// One line direction of one scan as the published method sees it.
 #[derive(Clone, Copy, Debug)]
-pub struct PaperScan {
+pub(crate) struct PaperScan {
     /// The six peaks around the middle of the autocorrelation, 60° apart in order of their angle, sensor
     /// coordinates, nm; the same order in all scans.
-    pub peaks: [Vector2<f64>; 6],
+    pub(crate) peaks: [Vector2<f64>; 6],
     /// Covariance of each of them, nm².
-    pub peak_covariance: Matrix2<f64>,
+    pub(crate) peak_covariance: Matrix2<f64>,
     /// Slow axis.
-    pub slow_axis: Axis,
+    pub(crate) slow_axis: Axis,
     /// Signed tip velocity along the fast axis, nm/s (laboratory sense).
-    pub fast_velocity: f64,
+    pub(crate) fast_velocity: f64,
     /// Signed velocity along the slow axis, nm/s (laboratory sense; negative is "backward").
-    pub slow_velocity: f64,
+    pub(crate) slow_velocity: f64,
     /// Spread of the fast and slow velocities over the lines, nm/s.
-    pub velocity_sigmas: [f64; 2],
+    pub(crate) velocity_sigmas: [f64; 2],
     /// Trace or retrace: each is compared with its like.
-    pub line: LineDirection,
+    pub(crate) line: LineDirection,
 }
 
 impl PaperScan {
     /// The six peaks of a lattice of two vectors: these, their difference, and the opposites.
-    pub fn six(basis: &Matrix2<f64>) -> [Vector2<f64>; 6] {
+    pub(crate) fn six(basis: &Matrix2<f64>) -> [Vector2<f64>; 6] {
         let (first, second): (Vector2<f64>, Vector2<f64>) =
             (basis.column(0).into(), basis.column(1).into());
         let third = second - first;
@@ -59,14 +59,14 @@ impl PaperScan {
     }
 
     /// The peaks without the drift (nm/s); `None` where the sample outruns the slow scan.
-    pub fn corrected(&self, drift: &Vector2<f64>) -> Option<[Vector2<f64>; 6]> {
+    pub(crate) fn corrected(&self, drift: &Vector2<f64>) -> Option<[Vector2<f64>; 6]> {
         let inverse = matrix(self, drift).try_inverse()?;
         Some(self.peaks.map(|peak| inverse * peak))
     }
 
     /// The same scan with peaks and velocities drawn from their distributions.
     #[must_use]
-    pub fn drawn(&self, rng: &mut ChaCha8Rng) -> Self {
+    pub(crate) fn drawn(&self, rng: &mut ChaCha8Rng) -> Self {
         let mut new = *self;
         for peak in &mut new.peaks {
             *peak += normal_vector(&self.peak_covariance, rng);
@@ -79,7 +79,7 @@ impl PaperScan {
 }
 
 /// A normally distributed vector of mean zero.
-pub fn normal_vector(covariance: &Matrix2<f64>, rng: &mut ChaCha8Rng) -> Vector2<f64> {
+pub(crate) fn normal_vector(covariance: &Matrix2<f64>, rng: &mut ChaCha8Rng) -> Vector2<f64> {
     let mut normal = || -> f64 { StandardNormal.sample(rng) };
     let white = Vector2::new(normal(), normal());
     covariance
@@ -90,7 +90,7 @@ pub fn normal_vector(covariance: &Matrix2<f64>, rng: &mut ChaCha8Rng) -> Vector2
 /// The matrix that takes true to observed vectors: `r = T R`.
 ///
 /// With signed velocities the published forward and backward matrices are one expression.
-pub fn matrix(scan: &PaperScan, drift: &Vector2<f64>) -> Matrix2<f64> {
+pub(crate) fn matrix(scan: &PaperScan, drift: &Vector2<f64>) -> Matrix2<f64> {
     let (vf, vs) = (scan.fast_velocity, scan.slow_velocity);
     match scan.slow_axis {
         Axis::X => {
@@ -115,7 +115,7 @@ pub fn matrix(scan: &PaperScan, drift: &Vector2<f64>) -> Matrix2<f64> {
 }
 
 /// Mean squared distance between the corrected peaks of successive scans, nm²; scans are in order of time.
-pub fn successive_objective(scans: &[PaperScan], drift: &Vector2<f64>) -> f64 {
+pub(crate) fn successive_objective(scans: &[PaperScan], drift: &Vector2<f64>) -> f64 {
     let Some(differences) = differences(scans, drift).filter(|d| !d.is_empty()) else {
         return f64::INFINITY;
     };
@@ -124,7 +124,7 @@ pub fn successive_objective(scans: &[PaperScan], drift: &Vector2<f64>) -> f64 {
 }
 
 /// The drift that minimises the published objective, nm/s; `None` where it has no minimum.
-pub fn successive_drift(scans: &[PaperScan]) -> Option<Vector2<f64>> {
+pub(crate) fn successive_drift(scans: &[PaperScan]) -> Option<Vector2<f64>> {
     let mut drift = Vector2::zeros();
     let scale = scans
         .iter()
@@ -161,7 +161,7 @@ pub fn successive_drift(scans: &[PaperScan]) -> Option<Vector2<f64>> {
 ///
 /// The loss of a draw is the root-mean-square distance of its corrected peaks between successive scans, nm.
 /// `None` without draws. Draws without a minimum are left out.
-pub fn successive_draws(
+pub(crate) fn successive_draws(
     scans: &[PaperScan],
     draws: usize,
     seed: u64,

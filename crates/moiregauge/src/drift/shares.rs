@@ -62,7 +62,7 @@ impl Statistical {
 
 /// Covariance of the weighted mean of observations, and the part of it that comes from a part of each
 /// of their covariances: pairs of (whole, part). `floor` is a variance that is added to each whole.
-pub fn weighted_mean(
+pub(crate) fn weighted_mean(
     observed: &[(Matrix4<f64>, Matrix4<f64>)],
     floor: f64,
 ) -> Option<(Matrix4<f64>, Matrix4<f64>)> {

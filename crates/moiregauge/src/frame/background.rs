@@ -4,20 +4,35 @@
 //! to all finite pixels in a basis of Legendre polynomials, which stays well conditioned on any
 //! frame. Per-line levelling removes harmonics near the fast axis, so it is never the default.
 
+use std::ops::Range;
+
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::frame::image::Image;
+use crate::numbers::dot::dot;
 use crate::numbers::interrupt;
+use crate::numbers::widest::widest;
 
 /// The image without its background. Missing pixels stay missing.
 pub fn remove_background(image: &Image, background: Background) -> Image {
+    let mut flat = image.clone();
+    take_background_off(&mut flat, background);
+    flat
+}
+
+/// Takes the background off an image in its place.
+pub(crate) fn take_background_off(image: &mut Image, background: Background) {
     match background {
-        Background::Mean => without_polynomial(image, 0),
-        Background::Plane => without_polynomial(image, 1),
-        Background::Quadratic => without_polynomial(image, 2),
-        Background::Cubic => without_polynomial(image, 3),
-        Background::LineMean => without_line_means(without_polynomial(image, 1)),
+        Background::Mean => take_polynomial_off(image, 0),
+        Background::Plane => take_polynomial_off(image, 1),
+        Background::Quadratic => take_polynomial_off(image, 2),
+        Background::Cubic => take_polynomial_off(image, 3),
+        Background::LineMean => {
+            take_polynomial_off(image, 1);
+            take_line_means_off(image);
+        }
     }
 }
 
@@ -40,61 +55,128 @@ fn position(i: usize, n: usize) -> f64 {
     }
 }
 
-fn without_polynomial(image: &Image, degree: usize) -> Image {
-    let terms: Vec<[usize; 2]> = (0..=degree)
-        .flat_map(|total| (0..=total).map(move |y| [total - y, y]))
-        .collect();
-    let along: Vec<[f64; 4]> = (0..image.columns)
-        .map(|c| legendre(position(c, image.columns)))
-        .collect();
-    let n = terms.len();
-    let mut normal = DMatrix::<f64>::zeros(n, n);
-    let mut right = DVector::<f64>::zeros(n);
-    for row in 0..image.rows {
-        interrupt::check();
-        // Moments of this line along x: Σ P_i and Σ P_i P_j over its finite pixels, and Σ P_i I.
-        let (mut pp, mut pi) = ([[0.0; 4]; 4], [0.0; 4]);
-        for (value, p) in image.row(row).iter().zip(&along) {
-            if !value.is_finite() {
-                continue;
+/// A polynomial over an image, by least squares.
+pub(crate) struct Surface {
+    terms: Vec<[usize; 2]>,
+    coefficients: DVector<f64>,
+    along: Along,
+    rows: usize,
+}
+
+/// The polynomials at each column, degree by degree.
+type Along = [Vec<f64>; 4];
+
+/// Moments of a line along x: `Σ P_i P_j` and `Σ P_i` over its finite pixels, and `Σ P_i I`.
+#[derive(Clone, Copy, Default)]
+struct Moments {
+    pp: [[f64; 4]; 4],
+    pi: [f64; 4],
+}
+
+impl Moments {
+    fn of(line: &[f64], along: &Along, degree: usize, whole: &[[f64; 4]; 4]) -> Self {
+        if line.iter().all(|v| v.is_finite()) {
+            let mut pi = [0.0; 4];
+            for (sum, polynomial) in pi.iter_mut().zip(along).take(degree + 1) {
+                *sum = dot(line, polynomial);
             }
-            for i in 0..=degree {
-                pi[i] += p[i] * value;
-                for j in 0..=i {
-                    pp[i][j] += p[i] * p[j];
+            return Self { pp: *whole, pi };
+        }
+        let mut moments = Self::default();
+        for (column, value) in line.iter().enumerate().filter(|(_, v)| v.is_finite()) {
+            moments.add(along, column, *value, degree);
+        }
+        moments
+    }
+
+    fn add(&mut self, along: &Along, column: usize, value: f64, degree: usize) {
+        for i in 0..=degree {
+            self.pi[i] += along[i][column] * value;
+            for j in 0..=i {
+                self.pp[i][j] += along[i][column] * along[j][column];
+            }
+        }
+    }
+}
+
+impl Surface {
+    /// Fits a polynomial to all finite pixels; `None` where that cannot be done.
+    pub(crate) fn fitted(image: &Image, degree: usize) -> Option<Self> {
+        let terms: Vec<[usize; 2]> = (0..=degree)
+            .flat_map(|total| (0..=total).map(move |y| [total - y, y]))
+            .collect();
+        let mut along = Along::default();
+        for column in 0..image.columns {
+            let values = legendre(position(column, image.columns));
+            for (polynomial, value) in along.iter_mut().zip(values) {
+                polynomial.push(value);
+            }
+        }
+        let mut whole = Moments::default();
+        for column in 0..image.columns {
+            whole.add(&along, column, 0.0, degree);
+        }
+        let lines = (0..image.rows).into_par_iter().map(|row| {
+            interrupt::check();
+            Moments::of(image.row(row), &along, degree, &whole.pp)
+        });
+        let lines: Vec<Moments> = lines.collect();
+        let n = terms.len();
+        let mut normal = DMatrix::<f64>::zeros(n, n);
+        let mut right = DVector::<f64>::zeros(n);
+        for (row, Moments { pp, pi }) in lines.iter().enumerate() {
+            let across = legendre(position(row, image.rows));
+            for (a, &[ax, ay]) in terms.iter().enumerate() {
+                right[a] += across[ay] * pi[ax];
+                for (b, &[bx, by]) in terms.iter().enumerate() {
+                    normal[(a, b)] += across[ay] * across[by] * pp[ax.max(bx)][ax.min(bx)];
                 }
             }
         }
-        let across = legendre(position(row, image.rows));
-        for (a, &[ax, ay]) in terms.iter().enumerate() {
-            right[a] += across[ay] * pi[ax];
-            for (b, &[bx, by]) in terms.iter().enumerate() {
-                normal[(a, b)] += across[ay] * across[by] * pp[ax.max(bx)][ax.min(bx)];
-            }
-        }
+        // The pseudo-inverse copes with frames of a single line or no finite pixel at all.
+        let scale = normal.amax();
+        let inverse = normal.pseudo_inverse(1e-12 * scale.max(f64::MIN_POSITIVE));
+        Some(Self {
+            coefficients: inverse.ok()? * right,
+            terms,
+            along,
+            rows: image.rows,
+        })
     }
-    // The pseudo-inverse copes with frames of a single line or no finite pixel at all.
-    let scale = normal.amax();
-    let Ok(inverse) = normal.pseudo_inverse(1e-12 * scale.max(f64::MIN_POSITIVE)) else {
-        return image.clone();
-    };
-    let coefficients = inverse * right;
-    let mut out = image.clone();
-    for row in 0..image.rows {
-        let across = legendre(position(row, image.rows));
+
+    /// Takes the polynomial off the values of some columns of a line.
+    pub(crate) fn take_off(&self, row: usize, columns: Range<usize>, values: &mut [f64]) {
+        let across = legendre(position(row, self.rows));
         let mut line = [0.0; 4];
-        for (c, &[x, y]) in coefficients.iter().zip(&terms) {
+        for (c, &[x, y]) in self.coefficients.iter().zip(&self.terms) {
             line[x] += c * across[y];
         }
-        let values = &mut out.values[row * image.columns..(row + 1) * image.columns];
-        for (value, p) in values.iter_mut().zip(&along) {
-            *value -= line[0] * p[0] + line[1] * p[1] + line[2] * p[2] + line[3] * p[3];
-        }
+        let [p0, p1, p2, p3] = self.along.each_ref().map(|p| &p[columns.clone()]);
+        widest(
+            #[inline(always)]
+            || {
+                let polynomials = p0.iter().zip(p1).zip(p2.iter().zip(p3));
+                for (value, ((p0, p1), (p2, p3))) in values.iter_mut().zip(polynomials) {
+                    *value -= line[0] * p0 + line[1] * p1 + line[2] * p2 + line[3] * p3;
+                }
+            },
+        );
     }
-    out
 }
 
-fn without_line_means(mut image: Image) -> Image {
+fn take_polynomial_off(image: &mut Image, degree: usize) {
+    let Some(surface) = Surface::fitted(image, degree) else {
+        return;
+    };
+    let columns = image.columns;
+    let lines = image.values.par_chunks_mut(columns.max(1)).enumerate();
+    lines.for_each(|(row, line)| {
+        interrupt::check();
+        surface.take_off(row, 0..columns, line);
+    });
+}
+
+fn take_line_means_off(image: &mut Image) {
     let columns = image.columns;
     for line in image.values.chunks_exact_mut(columns) {
         let (sum, count) = line
@@ -106,7 +188,6 @@ fn without_line_means(mut image: Image) -> Image {
             *value -= mean;
         }
     }
-    image
 }
 
 /// What is subtracted from an image before its lattice is measured.

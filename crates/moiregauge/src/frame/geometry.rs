@@ -225,7 +225,7 @@ impl Timing {
 /// `drift` D (nm/s) is the velocity of the sample; the time t counts from the middle of the frame,
 /// where nothing moves. Exact for constant drift: see the module `drift`.
 #[must_use]
-pub fn at_rest(geometry: &Geometry, timing: &Timing, drift: Vector2<f64>) -> Geometry {
+pub(crate) fn at_rest(geometry: &Geometry, timing: &Timing, drift: Vector2<f64>) -> Geometry {
     let centre = geometry.centre();
     let pixel_to_nm = geometry.pixel_to_nm - drift * timing.per_pixel.transpose();
     let [columns, rows] = geometry.size;

@@ -11,9 +11,10 @@ use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector, Vector2};
 
+use crate::frame::column_sums::ColumnSums;
 use crate::frame::image::Image;
 use crate::frame::plane::PlaneFit;
-use crate::numbers::least_squares::{lowest, solve};
+use crate::numbers::least_squares::{lowest_below, solve};
 use crate::numbers::median::median;
 
 /// Fewer columns show nothing: the decay takes a tenth of a line, which would be three of them.
@@ -37,6 +38,12 @@ const SHORTEST: f64 = 0.5;
 pub(crate) const FIRST_ORDER_TO: f64 = 0.03;
 /// Lines that are looked at, at most about this many: their mean is then known to a 64th of the noise.
 const MOST_ROWS: usize = 4096;
+/// The median of a column is looked for this many of its standard deviations, times 1/√n, about the mean: four of its own for
+/// Gaussian noise. Where it lies elsewhere all values are looked at.
+const MEDIAN_WITHIN: f64 = 5.0;
+/// Where the best decay of the grid leaves more than this share there is no lag: one between two steps of the grid, which
+/// are 6 % off at most, explains hardly more.
+const HOPELESS: f64 = 0.6;
 /// Columns that are read together: the values of a line lie side by side.
 const PIECE: usize = 8;
 /// The degree of the polynomial, plus one: a cubic, for creep and hysteresis.
@@ -95,18 +102,26 @@ impl Found {
 }
 
 /// Looks for the lag of a sensor in the columns `used`, whose plane is known.
-pub(crate) fn find(image: &Image, used: &Range<usize>, plane: &PlaneFit) -> Option<Found> {
+pub(crate) fn find(
+    image: &Image,
+    sums: &ColumnSums,
+    used: &Range<usize>,
+    plane: &PlaneFit,
+) -> Option<Found> {
     if used.len() < FEWEST {
         return None;
     }
-    let (line, noise) = mean_line(image, used, plane)?;
+    let line = mean_line(image, sums, used, plane)?;
     let smooth = orthonormal(polynomials(used.len()))?;
     let rest = &line - &smooth * smooth.tr_mul(&line);
     let plain = rest.norm_squared();
     let mut best: Option<(f64, f64, bool)> = None;
     for from_last in [false, true] {
         let left = |columns: f64| beside(&smooth, &rest, columns, from_last);
-        let columns = lowest(left, [SHORTEST, SLOWEST * used.len() as f64], STEPS);
+        let among = [SHORTEST, SLOWEST * used.len() as f64];
+        let Some(columns) = lowest_below(left, among, STEPS, HOPELESS * plain) else {
+            continue;
+        };
         let chi2 = left(columns);
         if best.is_none_or(|(least, ..)| chi2 < least) {
             best = Some((chi2, columns, from_last));
@@ -123,7 +138,7 @@ pub(crate) fn find(image: &Image, used: &Range<usize>, plane: &PlaneFit) -> Opti
     Some(Found {
         lag,
         left: left_variance,
-        noise,
+        noise: noise(image, used, plane),
     })
 }
 
@@ -175,35 +190,107 @@ fn bend(
     })
 }
 
-/// Median of each column about the plane of the sensor, nm, and the variance that noise gives it; `None` where a column has
-/// no values.
-fn mean_line(image: &Image, used: &Range<usize>, plane: &PlaneFit) -> Option<(DVector<f64>, f64)> {
+/// Median of each column about the plane of the sensor, nm; `None` where a column has no values.
+fn mean_line(
+    image: &Image,
+    sums: &ColumnSums,
+    used: &Range<usize>,
+    plane: &PlaneFit,
+) -> Option<DVector<f64>> {
     let mut line = DVector::zeros(used.len());
-    let mut noise = 0.0;
+    let rows = image.rows.div_ceil(step(image)) as f64;
+    let mut kept: Vec<Near> = vec![Near::default(); PIECE];
     // Lines are read in pieces, and a piece of them is turned into columns.
-    let mut piece: Vec<Vec<f64>> = vec![Vec::new(); PIECE];
     for first in used.clone().step_by(PIECE) {
         let last = (first + PIECE).min(used.end);
-        piece.iter_mut().for_each(Vec::clear);
-        for row in (0..image.rows).step_by(1 + image.rows / MOST_ROWS) {
-            let values = &image.row(row)[first..last];
-            for ((column, value), values) in (first..last).zip(values).zip(&mut piece) {
-                let rest = value - plane.at(column as f64, row as f64);
-                if rest.is_finite() {
-                    values.push(rest);
-                }
-            }
+        for (near, column) in kept.iter_mut().zip(first..last) {
+            let [mean, sigma] = sums.about(column, plane)?;
+            let reach = MEDIAN_WITHIN * sigma / rows.sqrt();
+            near.start([mean - reach, mean + reach], image.rows);
         }
-        for (column, values) in (first..last).zip(&mut piece) {
-            if values.is_empty() {
-                return None;
-            }
-            line[column - used.start] = median(values);
+        each_left(image, plane, first..last, |lane, rest| kept[lane].add(rest));
+        for (near, column) in kept.iter_mut().zip(first..last) {
+            line[column - used.start] = match near.median() {
+                Some(median) => median,
+                None => median(&mut column_left(image, plane, column)),
+            };
         }
-        // One column of each piece tells the noise.
-        noise += variance_of_median(&mut piece[0]) * (last - first) as f64 / used.len() as f64;
     }
-    Some((line, noise))
+    Some(line)
+}
+
+/// Values of a column near where their median is expected, and how many there are below them: the rest need not be
+/// sorted.
+#[derive(Clone, Default)]
+struct Near {
+    within: [f64; 2],
+    values: Vec<f64>,
+    kept: usize,
+    below: usize,
+    count: usize,
+}
+
+impl Near {
+    fn start(&mut self, within: [f64; 2], most: usize) {
+        self.values.resize(most + 1, 0.0);
+        (self.within, self.kept, self.below, self.count) = (within, 0, 0, 0);
+    }
+
+    /// Without branches: whether a value is near is a matter of chance.
+    fn add(&mut self, value: f64) {
+        let [low, high] = self.within;
+        self.count += usize::from(value.is_finite());
+        self.below += usize::from(value < low && value > f64::NEG_INFINITY);
+        self.values[self.kept] = value;
+        self.kept += usize::from(value >= low && value <= high);
+    }
+
+    /// The median of all values, as [`median`] has it; `None` where it is not among those kept.
+    fn median(&mut self) -> Option<f64> {
+        let rank = (self.count / 2).checked_sub(self.below)?;
+        let kept = &mut self.values[..self.kept];
+        (rank < kept.len()).then(|| *kept.select_nth_unstable_by(rank, f64::total_cmp).1)
+    }
+}
+
+/// From line to line that is looked at.
+fn step(image: &Image) -> usize {
+    1 + image.rows / MOST_ROWS
+}
+
+/// Shows what a plane leaves of the pixels of some columns, line by line, each with the number of its column.
+fn each_left(
+    image: &Image,
+    plane: &PlaneFit,
+    columns: Range<usize>,
+    mut each: impl FnMut(usize, f64),
+) {
+    for row in (0..image.rows).step_by(step(image)) {
+        let values = &image.row(row)[columns.clone()];
+        for (lane, (column, value)) in columns.clone().zip(values).enumerate() {
+            each(lane, value - plane.at(column as f64, row as f64));
+        }
+    }
+}
+
+/// What a plane leaves of a column, without missing values.
+fn column_left(image: &Image, plane: &PlaneFit, column: usize) -> Vec<f64> {
+    let mut left = Vec::with_capacity(image.rows);
+    each_left(image, plane, column..column + 1, |_, rest| {
+        if rest.is_finite() {
+            left.push(rest);
+        }
+    });
+    left
+}
+
+/// The variance that noise gives to the medians of columns, nm²: one column of each piece tells it.
+fn noise(image: &Image, used: &Range<usize>, plane: &PlaneFit) -> f64 {
+    let of_piece = |first: usize| {
+        let columns = PIECE.min(used.end - first) as f64;
+        variance_of_median(&mut column_left(image, plane, first)) * columns / used.len() as f64
+    };
+    used.clone().step_by(PIECE).map(of_piece).sum()
 }
 
 /// The variance of the median of some values, from their scatter.
@@ -227,10 +314,14 @@ fn from_begin(column: usize, used: &Range<usize>, from_last: bool) -> f64 {
 }
 
 fn decay(count: usize, columns: f64, from_last: bool) -> DVector<f64> {
-    let used = 0..count;
-    DVector::from_fn(count, |c, _| {
-        (-from_begin(c, &used, from_last) / columns).exp()
-    })
+    let ratio = (-1.0 / columns).exp();
+    let mut decay = DVector::zeros(count);
+    let mut left = 1.0;
+    for c in 0..count {
+        decay[if from_last { count - 1 - c } else { c }] = left;
+        left *= ratio;
+    }
+    decay
 }
 
 /// Legendre polynomials of the degrees 0 to 3 over the columns.
@@ -271,13 +362,13 @@ pub(crate) fn slope(values: &DVector<f64>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::frame::plane::fit_plane;
+    use crate::frame::fit_plane::fit_plane;
     use crate::numbers::rng::stream;
     use rand_distr::{Distribution, StandardNormal};
 
     fn found(image: &Image, used: &Range<usize>) -> Option<Lag> {
         let plane = fit_plane(image, used.clone())?;
-        find(image, used, &plane).map(|found| found.lag)
+        find(image, &ColumnSums::of(image), used, &plane).map(|found| found.lag)
     }
 
     const COLUMNS: usize = 128;

@@ -14,9 +14,9 @@
 use nalgebra::{DMatrix, DVector, Vector2};
 use spmfile::LineDirection;
 
+use crate::frame::fit_plane::fit_plane;
 use crate::frame::image::Image;
 use crate::frame::lag::{FEWEST, FIRST_ORDER_TO, IMPROVEMENT, Lag, SHARE, SLOWEST, slope};
-use crate::frame::plane::fit_plane;
 use crate::numbers::least_squares::{lowest, residual, solve};
 use crate::numbers::median::median;
 

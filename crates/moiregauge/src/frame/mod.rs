@@ -3,6 +3,8 @@
 pub(crate) mod axis;
 pub(crate) mod background;
 pub(crate) mod clip;
+pub(crate) mod column_sums;
+pub(crate) mod fit_plane;
 pub(crate) mod geometry;
 pub(crate) mod glitches;
 pub(crate) mod image;
@@ -12,13 +14,13 @@ pub(crate) mod plane;
 pub(crate) mod polygon;
 pub(crate) mod resample;
 pub(crate) mod sensors;
+pub(crate) mod smaller;
 
 pub use axis::Axis;
 pub use background::{Background, remove_background};
-pub use geometry::at_rest;
 pub use geometry::{Geometry, Timing};
 pub use image::Image;
 pub use lag::Lag;
-pub use plane::{PlaneFit, fit_plane};
+pub use plane::PlaneFit;
 pub use resample::{Resampled, resample};
 pub use sensors::{SensorGeometry, from_sensors};

@@ -5,12 +5,14 @@ use std::ops::Range;
 
 use nalgebra::{Matrix2, Matrix4, Vector2};
 
+use crate::frame::column_sums::ColumnSums;
+use crate::frame::fit_plane::through;
 use crate::frame::geometry::Geometry;
 use crate::frame::glitches;
 use crate::frame::image::Image;
 use crate::frame::lag;
 use crate::frame::lag::Lag;
-use crate::frame::plane::{PlaneFit, fit_plane};
+use crate::frame::plane::{PlaneFit, line_sums};
 
 /// Sine of the angle between fast and slow axis, at least: a frame is no line. Chosen by eye.
 const UPRIGHT: f64 = 0.2;
@@ -18,6 +20,8 @@ const UPRIGHT: f64 = 0.2;
 const BENDS: f64 = 5.0;
 /// The outer fraction of a line in which turn-around is looked for, on either side: twice a usual overscan (5 %).
 const TURN_AROUND: f64 = 0.1;
+/// A line with fewer values has no slope.
+const FEWEST: f64 = 3.0;
 
 /// The geometry by the sensors, and how well a plane describes them.
 #[derive(Clone, Debug)]
@@ -81,9 +85,13 @@ fn fitted(x: &Image, y: &Image, taken_off: Option<[Option<Lag>; 2]>) -> Option<S
         return None;
     }
     let (ef, es) = (pixel_to_nm.column(0) / fast, pixel_to_nm.column(1) / slow);
-    let line_slopes = line_slopes([x, y], &used);
-    let column_slopes = column_slopes([x, y], &used);
-    let mut covariance = covariance(&line_slopes, [x, y], &planes, &used);
+    let lines = [lines(x, &planes[0], &used), lines(y, &planes[1], &used)];
+    let line_slopes = both(|axis| lines[axis].iter().map(|line| line.slope));
+    let column_slopes = both(|axis| {
+        let sums = &sensors[axis].sums;
+        used.clone().map(|column| sums.slope(column))
+    });
+    let mut covariance = covariance(&line_slopes, &lines, &planes);
     for (axis, lag) in lags.iter().enumerate() {
         covariance[(axis, axis)] += lag.map_or(0.0, |lag| lag.slope_variance);
     }
@@ -104,47 +112,49 @@ fn fitted(x: &Image, y: &Image, taken_off: Option<[Option<Lag>; 2]>) -> Option<S
     })
 }
 
-/// Step from column to column of each line, nm.
-fn line_slopes([x, y]: [&Image; 2], used: &Range<usize>) -> Vec<Vector2<f64>> {
-    let of = |row: usize| {
-        let slope = |image: &Image| {
-            let mut slope = Slope::default();
-            let values = used.clone().zip(&image.row(row)[used.clone()]);
-            values.for_each(|(column, &value)| slope.add(column, value));
-            slope.value()
-        };
-        Some(Vector2::new(slope(x)?, slope(y)?))
-    };
-    (0..x.rows).filter_map(of).collect()
+/// What a plane leaves of a line of a sensor, nm.
+struct LineLeft {
+    /// Step from column to column, that of the plane included; `None` of fewer than three values.
+    slope: Option<f64>,
+    /// The mean; NaN of a line without values.
+    mean: f64,
 }
 
-/// Step from row to row of each column, nm.
-fn column_slopes([x, y]: [&Image; 2], used: &Range<usize>) -> Vec<Vector2<f64>> {
-    let of = |image: &Image| {
-        let mut sums = vec![Slope::default(); used.len()];
-        for row in 0..image.rows {
-            for (sum, &value) in sums.iter_mut().zip(&image.row(row)[used.clone()]) {
-                sum.add(row, value);
-            }
-        }
-        sums
+/// Looks at every line of a sensor.
+fn lines(image: &Image, plane: &PlaneFit, used: &Range<usize>) -> Vec<LineLeft> {
+    let mut lines = Vec::with_capacity(image.rows);
+    let add = |_, [n, x, xx, v, xv, _]: [f64; 6]| {
+        let spread = n * xx - x * x;
+        let known = n >= FEWEST && spread > 0.0;
+        lines.push(LineLeft {
+            slope: known.then(|| plane.per_column + (n * xv - x * v) / spread),
+            mean: v / n,
+        });
     };
-    let pairs = of(x).into_iter().zip(of(y));
+    line_sums(image, used.clone(), plane, f64::INFINITY, 1, add);
+    lines
+}
+
+/// Steps of the x and of the y sensor, where both are known.
+fn both<I: Iterator<Item = Option<f64>>>(of: impl Fn(usize) -> I) -> Vec<Vector2<f64>> {
+    let pairs = of(0).zip(of(1));
     pairs
-        .filter_map(|(x, y)| Some(Vector2::new(x.value()?, y.value()?)))
+        .filter_map(|(x, y)| Some(Vector2::new(x?, y?)))
         .collect()
 }
 
-/// A sensor, and the plane through all of it.
+/// A sensor, the sums over its columns, and the plane through all of it.
 struct Sensor<'a> {
     image: Cow<'a, Image>,
+    sums: ColumnSums,
     whole: Option<PlaneFit>,
 }
 
 impl<'a> Sensor<'a> {
     fn new(image: Cow<'a, Image>) -> Self {
-        let whole = fit_plane(&image, 0..image.columns);
-        Self { image, whole }
+        let sums = ColumnSums::of(&image);
+        let whole = through(&sums, &image, 0..image.columns);
+        Self { image, sums, whole }
     }
 
     /// The plane through the columns `used`.
@@ -152,7 +162,7 @@ impl<'a> Sensor<'a> {
         if *used == (0..self.image.columns) {
             self.whole
         } else {
-            fit_plane(&self.image, used.clone())
+            through(&self.sums, &self.image, used.clone())
         }
     }
 
@@ -194,7 +204,9 @@ type Straight<'a> = ([Sensor<'a>; 2], [Option<Lag>; 2], Range<usize>);
 /// looked for in the rest.
 fn without_lags(sensors: [Sensor<'_>; 2]) -> Option<Straight<'_>> {
     let every = 0..sensors[0].image.columns;
-    let find = |sensor: &Sensor<'_>, used| lag::find(&sensor.image, used, &sensor.plane(used)?);
+    let find = |sensor: &Sensor<'_>, used| {
+        lag::find(&sensor.image, &sensor.sums, used, &sensor.plane(used)?)
+    };
     let seen = sensors.each_ref().map(|sensor| find(sensor, &every));
     let whole = seen.map(|seen| seen.filter(lag::Found::explains_all).map(|seen| seen.lag));
     let [x, y] = sensors;
@@ -234,8 +246,10 @@ fn straight_columns(sensors: &[Sensor<'_>; 2]) -> Option<Range<usize>> {
     let margin = (TURN_AROUND * columns as f64) as usize;
     let (mut first, mut last) = (0, columns);
     for sensor in sensors {
-        let inner = fit_plane(&sensor.image, margin..columns - margin)?;
-        let deviation = column_means(&sensor.image, &inner);
+        let inner = sensor.plane(&(margin..columns - margin))?;
+        // 0 of a column without values.
+        let mean = |c: usize| sensor.sums.about(c, &inner).map_or(0.0, |[mean, _]| mean);
+        let deviation: Vec<f64> = (0..columns).map(mean).collect();
         let inside = &deviation[margin..columns - margin];
         let rms = (inside.iter().map(|d| d * d).sum::<f64>() / inside.len() as f64).sqrt();
         // Half a pixel of deviation is turn-around even on a sensor without noise.
@@ -248,64 +262,15 @@ fn straight_columns(sensors: &[Sensor<'_>; 2]) -> Option<Range<usize>> {
     Some(first..last)
 }
 
-/// The mean of each column about a plane; 0 of a column without values.
-fn column_means(image: &Image, plane: &PlaneFit) -> Vec<f64> {
-    let mut sums = vec![0.0; image.columns];
-    let mut counts = vec![0usize; image.columns];
-    for row in 0..image.rows {
-        let places = sums.iter_mut().zip(&mut counts).zip(image.row(row));
-        for (column, ((sum, count), value)) in places.enumerate() {
-            let rest = value - plane.at(column as f64, row as f64);
-            if rest.is_finite() {
-                *sum += rest;
-                *count += 1;
-            }
-        }
-    }
-    let counts = counts.iter().map(|&count| count.max(1) as f64);
-    sums.iter().zip(counts).map(|(sum, n)| sum / n).collect()
-}
-
-/// Least-squares slope of values over their indices; missing values are left out.
-#[derive(Clone, Copy, Default)]
-struct Slope {
-    count: f64,
-    x: f64,
-    xx: f64,
-    v: f64,
-    xv: f64,
-}
-
-impl Slope {
-    fn add(&mut self, index: usize, v: f64) {
-        if v.is_finite() {
-            let x = index as f64;
-            self.count += 1.0;
-            self.x += x;
-            self.xx += x * x;
-            self.v += v;
-            self.xv += x * v;
-        }
-    }
-
-    /// `None` of fewer than three values.
-    fn value(&self) -> Option<f64> {
-        let spread = self.count * self.xx - self.x * self.x;
-        let known = self.count >= 3.0 && spread > 0.0;
-        known.then(|| (self.count * self.xv - self.x * self.v) / spread)
-    }
-}
-
 /// Covariance of `J` from what repeats: the fast step from line to line, the slow step from the
 /// scatter of the line means, each with an effective number of independent lines.
 fn covariance(
     line_slopes: &[Vector2<f64>],
-    sensors: [&Image; 2],
+    lines: &[Vec<LineLeft>; 2],
     planes: &[PlaneFit; 2],
-    columns: &Range<usize>,
 ) -> Matrix4<f64> {
     let mut c = Matrix4::zeros();
-    for (axis, (image, plane)) in sensors.into_iter().zip(planes).enumerate() {
+    for (axis, (lines, plane)) in lines.iter().zip(planes).enumerate() {
         let slopes: Vec<f64> = line_slopes
             .iter()
             .map(|s| s[axis] - plane.per_column)
@@ -315,10 +280,8 @@ fn covariance(
             let variance = slopes.iter().map(|s| s * s).sum::<f64>() / (n - 1.0);
             c[(axis, axis)] = variance * correlated(&slopes) / n;
         }
-        let means: Vec<f64> = (0..image.rows)
-            .map(|row| line_mean(image, plane, columns, row))
-            .filter(|m| m.is_finite())
-            .collect();
+        let means = lines.iter().map(|line| line.mean);
+        let means: Vec<f64> = means.filter(|m| m.is_finite()).collect();
         let n = means.len() as f64;
         if n > 2.0 {
             let variance = means.iter().map(|m| m * m).sum::<f64>() / (n - 2.0);
@@ -327,19 +290,6 @@ fn covariance(
         }
     }
     c
-}
-
-/// The mean of a line about a plane; NaN of a line without values.
-fn line_mean(image: &Image, plane: &PlaneFit, columns: &Range<usize>, row: usize) -> f64 {
-    let (mut sum, mut count) = (0.0, 0usize);
-    for (column, value) in columns.clone().zip(&image.row(row)[columns.clone()]) {
-        let rest = value - plane.at(column as f64, row as f64);
-        if rest.is_finite() {
-            sum += rest;
-            count += 1;
-        }
-    }
-    sum / count as f64
 }
 
 /// By how much correlation between successive residuals raises the variance of their mean:

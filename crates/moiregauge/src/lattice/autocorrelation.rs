@@ -15,6 +15,8 @@
 use heterostrain::lattice::{Lattice, Px, reciprocal};
 use nalgebra::{DMatrix, Matrix2, Matrix2xX, Matrix4, Matrix6, Vector2, Vector6};
 
+use crate::frame::background::Background;
+use crate::frame::image::Image;
 use crate::numbers::chi2::enlargement;
 use crate::spectrum::harmonics::Harmonics;
 use crate::spectrum::transform::{Autocorrelation, Spectrum, hann_at};
@@ -27,14 +29,16 @@ const FARTHEST: f64 = 0.45;
 /// Most peaks used: the nearest ones to find the lattice, far ones to pin it down. Chosen by eye.
 const MOST_PEAKS: usize = 30;
 
-/// Fits the lattice to the peaks of the autocorrelation, starting from `start` (px).
+/// Fits the lattice to the peaks of the autocorrelation of an image without its `background`, starting from `start` (px).
 ///
 /// `None` where fewer than three peaks lie within the frame.
 pub(crate) fn measure(
-    spectrum: &Spectrum,
+    image: &Image,
+    background: Background,
     harmonics: &Harmonics,
     start: &Matrix2<f64>,
 ) -> Option<Lattice<Px>> {
+    let spectrum = Spectrum::new(image);
     let autocorrelation = spectrum.autocorrelation();
     let frame = Vector2::new(spectrum.image_size[0] as f64, spectrum.image_size[1] as f64);
     let mut basis = *start;
@@ -47,7 +51,8 @@ pub(crate) fn measure(
     }
     let places = places(&basis, FARTHEST * frame);
     let measured = peaks(&autocorrelation, &basis, &places);
-    let unbiased = unbiased(measured, harmonics, &places)?;
+    let model = harmonics.model(image, background);
+    let unbiased = unbiased(measured, &model, &harmonics.pair, &places)?;
     if unbiased.len() < 3 {
         return None;
     }
@@ -59,11 +64,12 @@ pub(crate) fn measure(
 /// whose lattice is known. Thousandths of a wavelength at four periods become some 10⁻⁵.
 fn unbiased(
     measured: Vec<Peak>,
-    harmonics: &Harmonics,
+    model: &Image,
+    pair: &Matrix2<f64>,
     places: &[Vector2<f64>],
 ) -> Option<Vec<Peak>> {
-    let basis = reciprocal(&harmonics.pair)?;
-    let autocorrelation = Spectrum::new(&harmonics.model).autocorrelation();
+    let basis = reciprocal(pair)?;
+    let autocorrelation = Spectrum::new(model).autocorrelation();
     let modelled = peaks(&autocorrelation, &basis, places);
     let corrected = measured.into_iter().filter_map(|mut peak| {
         let model = modelled.iter().find(|m| m.index == peak.index)?;

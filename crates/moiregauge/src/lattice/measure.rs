@@ -1,5 +1,7 @@
 //! Image and geometry → the lattice, by any method.
 
+use std::sync::Arc;
+
 use nalgebra::Vector2;
 
 use crate::coverage::find::{WHOLE, pitch, same};
@@ -14,6 +16,7 @@ use crate::lattice::measured::MeasuredLattice;
 use crate::lattice::start::{HANN, Start};
 use crate::spectrum::error::LatticeError;
 use crate::spectrum::method::Method;
+use crate::spectrum::prepare::levelled;
 
 /// Waves shorter than this share of the shortest lattice vector are atoms, and those longer by as much are background: both
 /// may be stronger than the lattice.
@@ -32,6 +35,20 @@ pub fn measure(
     background: Background,
     method: Method,
 ) -> Result<MeasuredLattice, LatticeError> {
+    measure_own(image.clone(), geometry, background, method)
+}
+
+/// The same of an image that nobody needs any more: its background is taken off in its place.
+///
+/// # Errors
+/// As [`measure`].
+pub(crate) fn measure_own(
+    image: Image,
+    geometry: &Geometry,
+    background: Background,
+    method: Method,
+) -> Result<MeasuredLattice, LatticeError> {
+    let image = &Arc::new(levelled(image, background)?);
     let found = find_anywhere(image, geometry, background, method)?.measure(method)?;
     let Some(wave) = beside(&found) else {
         return Ok(found);
@@ -124,14 +141,14 @@ fn is_stronger(found: &MeasuredLattice, wave: &ForeignWave) -> bool {
     wave.significance > HANN * found.signal_to_noise.powi(2)
 }
 
-/// The lattice of the whole frame or, where it does not cover it, of the part that it covers.
+/// The lattice of the whole frame or, where it does not cover it, of the part that it covers. The background is off already.
 fn find_anywhere(
-    image: &Image,
+    image: &Arc<Image>,
     geometry: &Geometry,
     background: Background,
     method: Method,
 ) -> Result<Start, LatticeError> {
-    let whole = match Start::find(image, geometry, background) {
+    let whole = match Start::find_in_levelled(image, geometry, background) {
         Ok(start) => start.on_the_whole_frame(image),
         Err(error) => Err((None, error)),
     };

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::coverage::bend::Change;
 use crate::coverage::patch::Patch;
+use crate::lattice::common::Common;
 use crate::lattice::fit::fit_pixels::LatticeFit;
 use crate::lattice::paper::PublishedPeaks;
 use crate::numbers::exact;
@@ -21,6 +22,9 @@ pub struct Grain {
     /// Its waves, rad per pixel.
     #[serde(with = "exact")]
     pub waves: Matrix2<f64>,
+    /// Length of the boundary at which it was told apart, along columns and along rows, pixels.
+    #[serde(with = "exact", default)]
+    pub boundary: [f64; 2],
 }
 
 /// The lattice of one image.
@@ -33,8 +37,14 @@ pub struct MeasuredLattice {
     pub patch: Option<Patch>,
     /// How it changes across that part; `None` where it is the same everywhere, as far as can be seen.
     pub change: Option<Change>,
+    /// What of its errors all images of the sample share; `None` where there is nothing of the kind.
+    #[serde(default)]
+    pub common: Option<Common>,
     /// The other grains of the frame; this is the largest.
     pub grains: Vec<Grain>,
+    /// The lattices of those that could be measured, until the scan is put together.
+    #[serde(skip)]
+    pub(crate) beside: Vec<MeasuredLattice>,
     /// What the other estimator found: autocorrelation beside Fourier, Fourier beside all others.
     #[serde(with = "exact")]
     pub comparison: Option<Lattice<Px>>,

@@ -6,6 +6,7 @@
 
 pub(crate) mod autocorrelation;
 pub(crate) mod by_hand;
+pub(crate) mod common;
 pub(crate) mod fit;
 pub(crate) mod fourier;
 pub(crate) mod measure;
@@ -14,6 +15,7 @@ pub(crate) mod paper;
 pub(crate) mod several;
 pub(crate) mod start;
 
+pub use common::Common;
 pub use fit::{Closure, FittedHarmonic, ForeignWave, Inhomogeneity, LatticeFit};
 pub use measure::measure;
 pub use measured::MeasuredLattice;

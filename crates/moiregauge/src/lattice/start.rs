@@ -1,26 +1,32 @@
 //! Where the lattice of an image is, roughly, and the lattice measured from there.
 
+use std::sync::Arc;
+
 use heterostrain::lattice::{Lattice, Px, labelled_like, reciprocal};
 use nalgebra::{Matrix2, Vector2};
 
 use crate::coverage::bend::Mean;
 use crate::coverage::find::{WHOLE, patches, pitch, same};
+use crate::coverage::grains::Grains;
 use crate::coverage::patch::Patch;
-use crate::coverage::settle::{Settled, settle};
+use crate::coverage::settle::{Settled, settle, settle_in_bins};
 use crate::frame::background::{Background, remove_background};
 use crate::frame::clip::cut_off;
 use crate::frame::geometry::Geometry;
 use crate::frame::image::Image;
+use crate::lattice::common::Common;
 use crate::lattice::fit::fit_pixels as fit;
 use crate::lattice::fit::fit_pixels::LatticeFit;
 use crate::lattice::measured::{Grain, MeasuredLattice};
 use crate::lattice::{autocorrelation, fourier, paper};
 use crate::spectrum::error::{LatticeError, THIRD};
 use crate::spectrum::harmonics::Harmonics;
+use crate::spectrum::look::bins_for;
 use crate::spectrum::method::Method;
 use crate::spectrum::phases::Phases;
 use crate::spectrum::prepare::{
-    Prepared, Verdict, binning, middle, phases, prepare, refine, signal_to_noise, verdict,
+    Prepared, Verdict, binned, middle, phases, prepare, prepare_levelled, refine, signal_to_noise,
+    verdict,
 };
 use crate::spectrum::transform::Spectrum;
 use crate::spectrum::{known, rescue, select};
@@ -45,6 +51,8 @@ pub struct Start {
     mean: Option<Mean>,
     /// Other grains.
     others: Vec<Grain>,
+    /// Where their lattices are, of those that can be measured.
+    beside: Vec<Start>,
 }
 
 impl Start {
@@ -58,6 +66,16 @@ impl Start {
         background: Background,
     ) -> Result<Self, LatticeError> {
         let prepared = prepare(image, geometry, background)?;
+        Ok(Self::new(prepared, image, geometry, background))
+    }
+
+    /// The same in an image without its background.
+    pub(crate) fn find_in_levelled(
+        image: &Arc<Image>,
+        geometry: &Geometry,
+        background: Background,
+    ) -> Result<Self, LatticeError> {
+        let prepared = prepare_levelled(Arc::clone(image), geometry, background)?;
         Ok(Self::new(prepared, image, geometry, background))
     }
 
@@ -106,18 +124,14 @@ impl Start {
         pair: &Matrix2<f64>,
     ) -> Option<Self> {
         let flat = remove_background(image, background);
-        let binning = binning(pair);
-        let binned = if binning == 1 {
-            flat.clone()
-        } else {
-            flat.binned(binning)
-        };
+        let (binning, binned) = binned(&flat, pair);
         let (harmonics, peaks) = refine(&binned, &(pair * binning as f64), background)?;
+        drop(binned);
         let prepared = Prepared {
             start: reciprocal(&harmonics.pair)?,
-            spectrum: Spectrum::new(&binned),
-            image: flat,
+            image: Arc::new(flat),
             binning,
+            look: None,
             harmonics,
             peaks,
         };
@@ -133,6 +147,7 @@ impl Start {
             patch: None,
             mean: None,
             others: Vec::new(),
+            beside: Vec::new(),
         }
     }
 
@@ -153,8 +168,7 @@ impl Start {
         image: &Image,
     ) -> Result<Self, (Option<Matrix2<f64>>, LatticeError)> {
         let pair = self.pair();
-        let clipped = cut_off(&self.prepared.image);
-        let Some(settled) = settle(&clipped, &pair, pitch(&self.geometry)) else {
+        let Some(settled) = self.settled() else {
             return Ok(self);
         };
         let patch = &settled.patch;
@@ -163,6 +177,27 @@ impl Start {
             return self.on_patch(image, settled).ok_or(refused);
         }
         Err(refused)
+    }
+
+    /// Where its waves are.
+    fn settled(&self) -> Option<Settled> {
+        let (pair, pitch) = (self.pair(), pitch(&self.geometry));
+        let Some(look) = &self.prepared.look else {
+            return settle(&cut_off(&self.prepared.image), &pair, pitch);
+        };
+        let bins = bins_for(&pair);
+        let image = look.in_bins(&self.prepared.image, bins);
+        settle_in_bins(&cut_off(&image), bins, &pair, pitch)
+    }
+
+    /// The mean of a lattice that bends more than the fit to the pixels can describe.
+    fn bent(&self, fit: &LatticeFit) -> Option<MeasuredLattice> {
+        if self.patch.is_some() || !fit.may_bend_more() {
+            return None;
+        }
+        let mean = self.settled()?.refined()?;
+        let bends = mean.change.is_some() && !mean.is_poor();
+        bends.then(|| self.mean_lattice(&mean)).flatten()
     }
 
     /// The lattice of a patch, of the largest grain in it, or its mean.
@@ -199,25 +234,40 @@ impl Start {
         })
     }
 
-    /// The lattice of the first of two grains; the other is named.
-    fn grain(&self, image: &Image, [largest, other]: [Patch; 2]) -> Option<Self> {
+    /// The lattice of the first of two grains; the other is beside it.
+    fn grain(&self, image: &Image, grains: Grains) -> Option<Self> {
+        let [largest, other] = grains.patches;
+        let mut found = self.of_grain(image, &largest)?;
+        let mut beside = self.of_grain(image, &other);
+        let waves = beside.as_ref().map_or(other.pair, Self::waves);
+        found.others.push(Grain {
+            share: other.share,
+            waves,
+            boundary: grains.boundary,
+        });
+        if let Some(beside) = &mut beside {
+            found.others.append(&mut beside.others);
+            found.beside.append(&mut beside.beside);
+        }
+        found.beside.extend(beside);
+        Some(found)
+    }
+
+    /// The lattice of one grain.
+    fn of_grain(&self, image: &Image, grain: &Patch) -> Option<Self> {
         let (geometry, background) = (&self.geometry, self.background);
-        let flat = remove_background(&largest.of(image), background);
-        let mut again = settle(&flat, &largest.pair, pitch(geometry))?;
-        again.patch.share *= largest.share;
+        let flat = remove_background(&grain.of(image), background);
+        let mut again = settle(&flat, &grain.pair, pitch(geometry))?;
+        again.patch.share *= grain.share;
         let part = again.patch.of(image);
         let start = Self::near(&part, geometry, background, &again.patch.pair)?;
-        let mut found = start.on_patch(image, again)?;
-        let flat = remove_background(&other.of(image), background);
-        if let Some(settled) = settle(&flat, &other.pair, pitch(geometry)) {
-            found.others.push(Grain {
-                share: other.share,
-                waves: settled
-                    .mean()
-                    .map_or(settled.patch.pair, |mean| mean.waves.basis),
-            });
-        }
-        Some(found)
+        start.on_patch(image, again)
+    }
+
+    /// The waves of its lattice, rad per pixel.
+    fn waves(&self) -> Matrix2<f64> {
+        let mean = self.mean.as_ref().map(|mean| mean.waves.basis);
+        mean.unwrap_or_else(|| self.pair())
     }
 
     /// Looks for the lattices of parts of the frame, that near `first` among them, and takes the one with the most
@@ -268,7 +318,8 @@ impl Start {
             }
         }
         let (_, settled, mut start) = best?;
-        start.prepared.image = remove_background(&settled.patch.of(image), background);
+        let flat = remove_background(&settled.patch.of(image), background);
+        start.prepared.image = Arc::new(flat);
         start.on_patch(image, settled)
     }
 
@@ -277,29 +328,47 @@ impl Start {
     /// # Errors
     /// [`LatticeError::NoPeaks`]: the method gets no hold of it.
     pub fn measure(&self, method: Method) -> Result<MeasuredLattice, LatticeError> {
+        let mut found = self.measure_this(method)?;
+        let beside = self.beside.iter().map(|start| start.measure(method));
+        found.beside = beside.filter_map(Result::ok).collect();
+        Ok(found)
+    }
+
+    /// The same without the grains beside it.
+    fn measure_this(&self, method: Method) -> Result<MeasuredLattice, LatticeError> {
         if let (Some(mean), Method::Lattice) = (&self.mean, method) {
             return self
                 .mean_lattice(mean)
                 .ok_or(LatticeError::NoPeaks { method });
         }
-        let Prepared {
-            harmonics,
-            spectrum,
-            peaks,
-            start,
-            ..
-        } = &self.prepared;
-        let pixels_per_bin = self.prepared.binning as f64;
+        let (prepared, size) = (&self.prepared, self.prepared.size());
+        let refined = match method {
+            Method::Lattice => None,
+            _ => prepared.refined(self.background),
+        };
+        let (harmonics, peaks) = match &refined {
+            Some((harmonics, peaks)) => (harmonics, peaks),
+            None => (&prepared.harmonics, &prepared.peaks),
+        };
+        let start = &prepared.start;
+        let pixels_per_bin = prepared.binning as f64;
         let in_pixels = |l: Lattice<Px>| l.mapped(&(Matrix2::identity() * pixels_per_bin));
-        let fourier = || fourier::measure(harmonics, peaks, spectrum.image_size).map(in_pixels);
-        let autocorrelation =
-            || autocorrelation::measure(spectrum, harmonics, start).map(in_pixels);
+        let fourier = || fourier::measure(harmonics, peaks, size).map(in_pixels);
+        let autocorrelation = || {
+            let found =
+                autocorrelation::measure(&prepared.binned(), self.background, harmonics, start);
+            found.map(in_pixels)
+        };
         let (mut fit, mut published) = (None, None);
         let (pixels, comparison) = match method {
             Method::Autocorrelation => (autocorrelation(), fourier()),
             Method::Fourier => (fourier(), autocorrelation()),
             Method::Lattice => {
                 fit = fitted(&self.prepared, self.background);
+                let bent = fit.as_ref().and_then(|(_, fit)| self.bent(fit));
+                if let Some(bent) = bent {
+                    return Ok(bent);
+                }
                 (fit.as_ref().map(|(lattice, _)| *lattice), fourier())
             }
             Method::Paper => {
@@ -316,18 +385,18 @@ impl Start {
         Ok(MeasuredLattice {
             patch: self.patch.clone(),
             grains: self.others.clone(),
+            beside: Vec::new(),
             change: None,
+            common: fit.as_ref().and_then(|fit| Common::of_fit(fit, &pixels)),
             pixels,
             comparison: comparison.map(label),
             reciprocal: fit.as_ref().map_or(harmonics.pair / pixels_per_bin, |fit| {
                 fit.wave_vectors.basis
             }),
-            phases: fit.as_ref().map_or_else(
-                || phases(harmonics, spectrum.image_size),
-                LatticeFit::first_phases,
-            ),
-            middle: middle(spectrum.image_size) * pixels_per_bin
-                + Vector2::repeat((pixels_per_bin - 1.0) / 2.0),
+            phases: fit
+                .as_ref()
+                .map_or_else(|| phases(harmonics, size), LatticeFit::first_phases),
+            middle: middle(size) * pixels_per_bin + Vector2::repeat((pixels_per_bin - 1.0) / 2.0),
             shortcut_wavelengths: fourier::shortcut_wavelengths(peaks, &bin_to_nm),
             periods: self.periods(&pixels),
             signal_to_noise: fit.as_ref().map_or_else(
@@ -348,7 +417,7 @@ impl Start {
         } = &self.prepared;
         let bins = self.prepared.binning as f64;
         let pixels = mean.waves.lattice()?;
-        let fourier = fourier::measure(harmonics, peaks, self.prepared.spectrum.image_size);
+        let fourier = fourier::measure(harmonics, peaks, self.prepared.size());
         let bin_to_nm = self.geometry.pixel_to_nm * bins;
         Some(MeasuredLattice {
             comparison: fourier
@@ -356,7 +425,9 @@ impl Start {
             pixels,
             patch: self.patch.clone(),
             grains: self.others.clone(),
+            beside: Vec::new(),
             change: mean.change,
+            common: Common::of(mean, &pixels),
             reciprocal: mean.waves.basis,
             phases: Phases {
                 values: mean.phases,
@@ -400,12 +471,7 @@ pub(crate) fn fitted(
     background: Background,
 ) -> Option<(Lattice<Px>, LatticeFit)> {
     let binning = prepared.binning;
-    let start = &prepared.harmonics;
-    let (lattice, fit) = if binning == 1 {
-        fit::measure(&prepared.image, start, background)?
-    } else {
-        fit::measure(&prepared.image.binned(binning), start, background)?
-    };
+    let (lattice, fit) = fit::measure(&prepared.binned(), &prepared.harmonics, background)?;
     let to_pixels = Matrix2::identity() * binning as f64;
     Some((lattice.mapped(&to_pixels), fit.in_pixels(binning)))
 }

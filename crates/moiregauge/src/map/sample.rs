@@ -114,8 +114,8 @@ pub struct LatticeMap {
 }
 
 impl LatticeMap {
-    /// Takes a map in pixels to the sample. `at_rest` is the geometry of the frame without drift
-    /// ([`crate::frame::geometry::at_rest`]), or the geometry itself where the drift is not known.
+    /// Takes a map in pixels to the sample. `at_rest` is the geometry of the frame without drift,
+    /// or the geometry itself where the drift is not known.
     ///
     /// `None` where the geometry is singular.
     pub fn new(map: &WaveMap, at_rest: &Geometry) -> Option<Self> {

@@ -7,20 +7,31 @@ use nalgebra::{Matrix2, Matrix4, Vector2};
 
 use super::*;
 use crate::frame::geometry::Geometry;
+use crate::frame::image::Image;
 use crate::simulate::field::{Feature, FieldScene, Ripple};
 use crate::window::mask::Mask;
 use crate::window::types::{Reference, Resolution, WaveMap, WaveNode};
 
 pub(crate) fn map_of(scene: &FieldScene, window: Option<f64>) -> WaveMap {
+    map_of_image(&scene.image(), &scene.pair, window)
+}
+
+/// The map of an image with pixels of 1 nm about a pair of waves.
+pub(crate) fn map_of_image(image: &Image, pair: &Matrix2<f64>, window: Option<f64>) -> WaveMap {
+    let (reference, resolution) = asked(pair, window);
+    local_lattices(image, &reference, &resolution).expect("a map")
+}
+
+fn asked(pair: &Matrix2<f64>, window_nm: Option<f64>) -> (Reference, Resolution) {
     let reference = Reference {
-        pair: scene.pair,
+        pair: *pair,
         pitch: [1.0; 2],
     };
     let resolution = Resolution {
-        window_nm: window,
+        window_nm,
         ..Resolution::default()
     };
-    local_lattices(&scene.image(), &reference, &resolution).expect("a map")
+    (reference, resolution)
 }
 
 fn place(map: &WaveMap, node: usize) -> Vector2<f64> {
@@ -371,14 +382,7 @@ fn bands_go_on_where_others_end() {
     let mut scene = FieldScene::rippled(512, 40.0, 0.03);
     scene.white = 0.7;
     let image = scene.image();
-    let reference = Reference {
-        pair: scene.pair,
-        pitch: [1.0; 2],
-    };
-    let resolution = Resolution {
-        window_nm: Some(14.0),
-        ..Resolution::default()
-    };
+    let (reference, resolution) = asked(&scene.pair, Some(14.0));
     let survey = Survey::new([512, 512], reference, resolution, 14.0, 150);
     assert!(survey.bands() >= 3);
     let mut nodes = 0;

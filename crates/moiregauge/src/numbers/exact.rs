@@ -6,7 +6,6 @@
 use heterostrain::Estimate;
 use heterostrain::lattice::Pair;
 use nalgebra::SMatrix;
-use rustfft::num_complex::Complex64;
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
@@ -147,34 +146,6 @@ impl Numbers for Estimate {
     }
 }
 
-/// What a fit leaves around a wave: places in the transform, and values.
-pub(crate) type Residual = Vec<([i64; 2], Complex64)>;
-
-impl Numbers for [Residual; 3] {
-    /// The three lengths, then four numbers for each place.
-    fn parts(&self) -> Vec<f64> {
-        let lengths = self.iter().map(|wave| wave.len() as f64);
-        let places = self.iter().flatten();
-        let places = places.flat_map(|([x, y], z)| [*x as f64, *y as f64, z.re, z.im]);
-        lengths.chain(places).collect()
-    }
-
-    fn of(parts: &[f64]) -> Option<Self> {
-        let (lengths, mut rest) = parts.split_at_checked(3)?;
-        let mut waves = Vec::new();
-        for length in lengths {
-            let (own, after) = rest.split_at_checked((*length as usize).checked_mul(4)?)?;
-            let places = own.as_chunks::<4>().0.iter();
-            let place =
-                |[x, y, re, im]: &[f64; 4]| ([*x as i64, *y as i64], Complex64::new(*re, *im));
-            waves.push(places.map(place).collect());
-            rest = after;
-        }
-        rest.is_empty().then_some(())?;
-        waves.try_into().ok()
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -188,18 +159,14 @@ mod tests {
         none: Option<f64>,
         #[serde(with = "super")]
         matrix: Matrix2<f64>,
-        #[serde(with = "super")]
-        residual: [Residual; 3],
     }
 
     #[test]
     fn numbers_read_back_to_the_last_bit() {
-        let place = ([-3, 7], Complex64::new(1e-300, -0.0));
         let all = All {
             number: f64::INFINITY,
             none: None,
             matrix: Matrix2::new(0.1 + 0.2, -0.0, f64::NEG_INFINITY, 5e-324),
-            residual: [vec![place, place], Vec::new(), vec![place]],
         };
         let text = serde_json::to_string(&all).unwrap();
         let back: All = serde_json::from_str(&text).unwrap();

@@ -19,13 +19,26 @@ pub(crate) fn residual(design: &DMatrix<f64>, line: &DVector<f64>) -> Option<f64
 }
 
 /// The number between two for which `left` is least: the best of `steps` in equal ratios, then golden sections about it.
-pub(crate) fn lowest(left: impl Fn(f64) -> f64, [low, high]: [f64; 2], steps: usize) -> f64 {
+pub(crate) fn lowest(left: impl Fn(f64) -> f64, among: [f64; 2], steps: usize) -> f64 {
+    lowest_below(left, among, steps, f64::INFINITY).unwrap_or(among[0])
+}
+
+/// The same, if the best of the steps leaves less than `limit`.
+pub(crate) fn lowest_below(
+    left: impl Fn(f64) -> f64,
+    [low, high]: [f64; 2],
+    steps: usize,
+    limit: f64,
+) -> Option<f64> {
     let ratio = (high / low).powf(1.0 / steps as f64);
     let grid = (0..=steps).map(|i| low * ratio.powi(i as i32));
     let best = grid
         .map(|x| (left(x), x))
         .min_by(|a, b| a.0.total_cmp(&b.0));
-    let middle = best.map_or(low, |(_, x)| x);
+    let (least, middle) = best?;
+    if least > limit {
+        return None;
+    }
     let (mut low, mut high) = (middle / ratio, middle * ratio);
     for _ in 0..SECTIONS {
         let (a, b) = (high - GOLDEN * (high - low), low + GOLDEN * (high - low));
@@ -35,7 +48,7 @@ pub(crate) fn lowest(left: impl Fn(f64) -> f64, [low, high]: [f64; 2], steps: us
             low = a;
         }
     }
-    f64::midpoint(low, high)
+    Some(f64::midpoint(low, high))
 }
 
 #[cfg(test)]

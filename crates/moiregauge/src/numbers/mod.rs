@@ -1,7 +1,8 @@
-//! Small mathematics that every room needs: χ², the median, least squares, normal equations, random numbers, words for numbers; the way out of
+//! Small mathematics that every room needs: χ², the median, sums of products, least squares, normal equations, random numbers, words for numbers; the way out of
 //! a calculation that nobody wants any more.
 
 pub(crate) mod chi2;
+pub(crate) mod dot;
 pub(crate) mod exact;
 pub mod interrupt;
 pub(crate) mod least_squares;
@@ -10,6 +11,7 @@ pub(crate) mod normal_equations;
 pub(crate) mod rng;
 pub(crate) mod splines;
 pub(crate) mod spread;
+pub(crate) mod widest;
 pub(crate) mod words;
 
 pub use rng::{normals, stream};

@@ -30,7 +30,7 @@ pub struct RegionMean {
     /// What the spread of the lattice does not exceed, with 95 % confidence as far as noise goes, for changes over no
     /// less than some eight windows: noise and `widening` are in it.
     pub below: f64,
-    /// Factor by which the window may have made the spread smaller, as the curvature of the map tells.
+    /// Factor by which smoothing with the window may have reduced the spread, from the curvature of the map.
     pub widening: f64,
     /// Root mean square of the errors of the nodes.
     pub noise: f64,
@@ -209,9 +209,9 @@ fn curvature(map: &TwistStrainMap, nodes: &[(usize, f64)]) -> Vec<(usize, f64)> 
 pub struct RegionStatistics {
     /// The region.
     pub region: Region,
-    /// Nodes whose cells it covers at least in part.
+    /// Nodes whose cells the area covers at least in part.
     pub nodes: usize,
-    /// Those to be believed.
+    /// Good nodes.
     pub good: usize,
     /// The others by reason, in the order of [`Mask::ALL`].
     pub masked: Vec<(Mask, usize)>,

@@ -28,11 +28,11 @@ pub struct Trend {
     pub gradient: [Estimate; 2],
     /// Value of the plane at the middle of the frame, or at the place that was asked for.
     pub middle: Estimate,
-    /// Standard deviation over the good nodes that the plane makes.
+    /// Standard deviation over the good nodes due to the plane.
     pub of_trend: f64,
-    /// What noise adds to the scatter about the plane.
+    /// Standard deviation due to noise.
     pub noise: f64,
-    /// What neither explains.
+    /// Standard deviation that neither trend nor noise explains.
     pub rest: f64,
 }
 

@@ -1,5 +1,6 @@
 //! Which channel shows the moiré.
 
+use rayon::prelude::*;
 use spmfile::{Channel, LineDirection, Scan};
 
 use crate::frame::image::Image;
@@ -23,6 +24,9 @@ const USUAL: [&str; 14] = [
     "Z-Axis",
     "Z",
 ];
+
+/// Lines that are converted together.
+const LINES: usize = 32;
 
 /// The channel to analyse: the one asked for, or the first usual one, or the first that is no
 /// position sensor. `None` where there is no such channel.
@@ -95,7 +99,14 @@ pub(crate) fn stem(name: &str) -> String {
 
 /// The values of a channel as an image.
 pub(crate) fn image_of(channel: &Channel) -> Image {
-    Image::new(channel.rows, channel.columns, channel.values())
+    let (rows, columns) = (channel.rows, channel.columns);
+    let mut values = vec![0.0; rows * columns];
+    let parts = values.par_chunks_mut((LINES * columns).max(1)).enumerate();
+    parts.for_each(|(part, values)| {
+        let first = part * LINES;
+        values.copy_from_slice(&channel.lines(first..(first + LINES).min(rows)));
+    });
+    Image::new(rows, columns, values)
 }
 
 /// The images to measure: the chosen channel in the chosen line directions, main scan line first.

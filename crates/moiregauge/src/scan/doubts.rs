@@ -126,6 +126,12 @@ pub(crate) fn about_coverage(
     }
 }
 
+/// Length of a boundary that is told in sides of cells, nm: right for a straight line, a tenth too short for a circle.
+fn boundary(grain: &Grain, geometry: &Geometry) -> f64 {
+    let [along, across] = grain.boundary;
+    (along * geometry.fast_step().norm()).hypot(across * geometry.slow_step().norm())
+}
+
 /// A grain as it compares with the one that is measured.
 fn other_grain(
     lattice: &MeasuredLattice,
@@ -145,6 +151,7 @@ fn other_grain(
             (there.column(1) - there.column(0)).norm(),
         ],
         turned: (change[(1, 0)] - change[(0, 1)]).atan2(change[(0, 0)] + change[(1, 1)]),
+        boundary: boundary(grain, geometry),
     })
 }
 

@@ -1,12 +1,15 @@
 //! What is kept of an image to know it again.
 
 use std::fmt::Write as _;
+use std::ops::Range;
 use std::sync::Arc;
 
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::frame::background::{Background, remove_background};
+use crate::frame::background::Surface;
 use crate::frame::image::Image;
+use crate::numbers::dot::dot;
 use crate::numbers::median::median;
 
 /// What is left of the pixels of an image to know it again.
@@ -23,22 +26,42 @@ pub(crate) struct Fingerprint {
 impl Fingerprint {
     /// Of the whole image.
     pub(crate) fn of(image: &Image) -> Self {
-        let flat = remove_background(image, Background::Plane);
-        let (mut squares, mut count) = (0.0, 0_usize);
-        for value in flat.values.iter().filter(|v| v.is_finite()) {
-            squares += value * value;
-            count += 1;
-        }
+        let surface = Surface::fitted(image, 1);
+        let flat = |row: usize, columns: Range<usize>, left: &mut Vec<f64>| {
+            let values = &image.row(row)[columns.clone()];
+            left.clear();
+            left.extend_from_slice(values);
+            if let Some(surface) = &surface {
+                surface.take_off(row, columns, left);
+            }
+        };
+        let of_line = |line: &mut Vec<f64>, row: usize| {
+            flat(row, 0..image.columns, line);
+            let missing = line.iter_mut().filter(|v| !v.is_finite());
+            let missing = missing.map(|value| *value = 0.0).count();
+            (dot(line, line), line.len() - missing)
+        };
+        let lines = (0..image.rows).into_par_iter().with_min_len(LINES);
+        let lines: Vec<(f64, usize)> = lines.map_init(Vec::new, of_line).collect();
+        let squares: f64 = lines.iter().map(|(squares, _)| squares).sum();
+        let count: usize = lines.iter().map(|(_, count)| count).sum();
         let deviation = (squares / count.max(1) as f64).sqrt();
-        let n = flat.values.len();
+        let mut line = Vec::new();
+        let n = image.values.len();
         // Steps of the golden ratio spread evenly and follow no row or column.
         let at = |i: usize| (i as f64 * 0.618_033_988_749_895).fract() * n as f64;
-        let samples = (0..SAMPLES.min(n)).map(|i| (flat.values[at(i) as usize] / deviation) as f32);
+        let mut one = |i: usize| {
+            let (row, column) = (i / image.columns, i % image.columns);
+            flat(row, column..column + 1, &mut line);
+            line[0]
+        };
+        let samples = (0..SAMPLES.min(n)).map(|i| (one(at(i) as usize) / deviation) as f32);
+        let samples = samples.collect();
         Self {
             size: [image.columns, image.rows],
-            samples: samples.collect(),
+            samples,
             noise: if deviation > 0.0 {
-                noise(&flat) / deviation
+                noise(image, &flat) / deviation
             } else {
                 0.0
             },
@@ -81,13 +104,20 @@ impl Fingerprint {
     }
 }
 
-/// Standard deviation of white noise by fourth differences along the lines, which take off all that is smooth; 0 where
-/// there are none.
-fn noise(image: &Image) -> f64 {
+/// Standard deviation of white noise by fourth differences along the lines of an image without its plane, which take off
+/// all that is smooth; 0 where there are none.
+fn noise(image: &Image, flat: &impl Fn(usize, Range<usize>, &mut Vec<f64>)) -> f64 {
     let fourth = |v: &[f64]| (v[0] - 4.0 * v[1] + 6.0 * v[2] - 4.0 * v[3] + v[4]).abs();
     let stride = (image.rows * image.columns / NOISE_SAMPLES).max(1);
-    let all = (0..image.rows).flat_map(|row| image.row(row).windows(5).map(fourth));
-    let mut all: Vec<f64> = all.step_by(stride).filter(|d| d.is_finite()).collect();
+    let in_line = (image.columns + 1).saturating_sub(5);
+    let mut five = Vec::new();
+    let difference = |i: usize| {
+        let (row, column) = (i / in_line, i % in_line);
+        flat(row, column..column + 5, &mut five);
+        fourth(&five)
+    };
+    let all = (0..image.rows * in_line).step_by(stride).map(difference);
+    let mut all: Vec<f64> = all.filter(|d| d.is_finite()).collect();
     if all.is_empty() {
         return 0.0;
     }
@@ -143,6 +173,9 @@ impl TryFrom<Written> for Fingerprint {
         }
     }
 }
+
+/// Lines that a thread looks at together, at least.
+const LINES: usize = 64;
 
 /// Pixels that are compared before asking whether it is enough: any number far below [`SAMPLES`].
 const AT_ONCE: usize = 16;

@@ -4,13 +4,14 @@ use nalgebra::{Matrix2, Vector2};
 use spmfile::{Channel, FrameDirection, Scan};
 
 use crate::calibration::Calibration;
-use crate::caveat::Caveat;
 use crate::caveat::files::FileDoubt;
+use crate::caveat::lattices::LatticeDoubt;
+use crate::caveat::{Caveat, Doubt};
 use crate::frame::geometry::Geometry;
 use crate::frame::image::Image;
 use crate::frame::polygon;
 use crate::lattice::by_hand::{Meant, measure_by_hand};
-use crate::lattice::measure::measure;
+use crate::lattice::measure::measure_own;
 use crate::lattice::measured::MeasuredLattice;
 use crate::lattice::several::together::measure_several;
 use crate::lattice::start::Start;
@@ -19,6 +20,7 @@ use crate::numbers::words::line_name;
 use crate::scan::channel::{channels, image_of};
 use crate::scan::doubts::{about_coverage, about_fit, few_periods, lines_disagree, turned};
 use crate::scan::fingerprint::Fingerprint;
+use crate::scan::grains::{beside, grains};
 use crate::scan::images::first_of_several;
 use crate::scan::measured::{MeasureError, MeasuredLine, MeasuredScan};
 use crate::scan::moires::in_order;
@@ -59,8 +61,8 @@ pub fn measure_known(
     settings: &Settings,
     cell: &Matrix2<f64>,
 ) -> Result<MeasuredScan, MeasureError> {
-    let find = |image: &Image, geometry: &Geometry| {
-        let start = Start::find_known(image, geometry, settings.background, cell)?;
+    let find = |image: Image, geometry: &Geometry| {
+        let start = Start::find_known(&image, geometry, settings.background, cell)?;
         Ok(vec![start.measure(settings.method)?])
     };
     Ok(measure_with(file, scan, settings, None, &find)?.swap_remove(0))
@@ -82,19 +84,19 @@ pub fn measure_moires(
     }
     let (background, method) = (settings.background, settings.method);
     let told = &settings.by_hand;
-    let find = |image: &Image, geometry: &Geometry| match settings.moires {
+    let find = |image: Image, geometry: &Geometry| match settings.moires {
         0 | 1 if !told.is_nothing() => {
-            let lattice = measure_by_hand(image, geometry, background, method, meant(told))?;
+            let lattice = measure_by_hand(&image, geometry, background, method, meant(told))?;
             Ok(vec![lattice])
         }
-        0 | 1 => measure(image, geometry, background, method).map(|lattice| vec![lattice]),
-        n => measure_several(image, geometry, background, n),
+        0 | 1 => measure_own(image, geometry, background, method).map(|lattice| vec![lattice]),
+        n => measure_several(&image, geometry, background, n),
     };
     measure_with(file, scan, settings, window, &find)
 }
 
 /// How the lattices of an image are found and measured; at least one.
-type Find<'a> = &'a dyn Fn(&Image, &Geometry) -> Result<Vec<MeasuredLattice>, LatticeError>;
+type Find<'a> = &'a dyn Fn(Image, &Geometry) -> Result<Vec<MeasuredLattice>, LatticeError>;
 
 fn measure_with(
     file: &str,
@@ -135,11 +137,17 @@ fn measure_with(
     }
     about_calibration(file, scan, moires.iter().flatten(), settings, &mut caveats);
     caveats.dedup_by(|a, b| a.says_the_same(b));
-    let measured = moires.into_iter().map(|mut lines| {
-        share_noise(&mut lines);
+    once(&mut caveats);
+    let measured = moires.into_iter().map(|lines| {
+        let mut grains = grains(lines);
+        for lines in &mut grains {
+            share_noise(lines);
+            forget_residuals(lines);
+        }
+        let lines = grains.remove(0);
         let mut caveats = caveats.clone();
         let excluded = lines_disagree(file, &lines, &mut caveats);
-        MeasuredScan {
+        let largest = MeasuredScan {
             file: file.to_owned(),
             acquired: scan.acquired,
             frame_direction: scan.frame_direction,
@@ -152,9 +160,24 @@ fn measure_with(
             excluded,
             repeats: None,
             caveats,
+            grains: Vec::new(),
+        };
+        let others = grains.into_iter().map(|lines| beside(&largest, lines));
+        MeasuredScan {
+            grains: others.collect(),
+            ..largest
         }
     });
     Ok(measured.collect())
+}
+
+/// Trace and retrace say the same of the grains beside the largest: once is enough.
+fn once(caveats: &mut Vec<Caveat>) {
+    let mut said = false;
+    caveats.retain(|caveat| match &caveat.doubt {
+        Doubt::Lattice(LatticeDoubt::SeveralGrains { .. }) => !std::mem::replace(&mut said, true),
+        _ => true,
+    });
 }
 
 /// Adds the lines of one direction, each to its moiré.
@@ -192,6 +215,13 @@ fn share_noise(lines: &mut [MeasuredLine]) {
         if weights > 0.0 {
             line.lattice.pixels.covariance *= 1.0 + weighted / weights;
         }
+    }
+}
+
+/// Nobody asks again for what the fits have left: half of what is kept of a scan.
+fn forget_residuals(lines: &mut [MeasuredLine]) {
+    for fit in lines.iter_mut().filter_map(|l| l.lattice.fit.as_mut()) {
+        fit.residual = Default::default();
     }
 }
 
@@ -235,7 +265,7 @@ fn measure_line(
         timing,
         ..
     } = place;
-    let mut lattices = find(&image, &geometry).map_err(|error| MeasureError::Lattice {
+    let mut lattices = find(image, &geometry).map_err(|error| MeasureError::Lattice {
         line: line_name(line),
         channel: channel.name.clone(),
         error,

@@ -1,8 +1,8 @@
 //! One scan once it is measured: a few numbers, and no pixels.
 
 use heterostrain::Estimate;
-use heterostrain::lattice::{Lattice, block, labelled_like};
-use nalgebra::{Matrix2, Vector2};
+use heterostrain::lattice::{Lattice, Px, block, labelled_like};
+use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
 use serde::{Deserialize, Serialize};
 use spmfile::{DateTime, FrameDirection, LineDirection};
 
@@ -48,6 +48,9 @@ pub struct MeasuredScan {
     pub repeats: Option<String>,
     /// Doubts about this scan.
     pub caveats: Vec<Caveat>,
+    /// The same scan in the other grains that it shows: the analysis makes a set of each grain.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub grains: Vec<MeasuredScan>,
 }
 
 /// What the trace or the retrace of one scan gave.
@@ -100,6 +103,19 @@ impl MeasuredLine {
             self.geometry.pixel_to_nm * b,
             lever * self.geometry.covariance * lever.transpose(),
         )
+    }
+
+    /// What it has in common with the other images of its sample (nm), labelled like `reference`: by how much its vectors would differ with the finest
+    /// description of their change, and their covariance from where the area ends.
+    pub(crate) fn common(&self, reference: &Matrix2<f64>) -> Option<(Vector4<f64>, Matrix4<f64>)> {
+        let common = self.lattice.common.as_ref()?;
+        let named = |basis: Matrix2<f64>, covariance: Matrix4<f64>| {
+            let lattice = Lattice::<Px>::new(basis, covariance);
+            labelled_like(&lattice.in_nm(&self.geometry.pixel_to_nm), reference)
+        };
+        let own = named(self.lattice.pixels.basis, common.edges);
+        let off = named(common.other, Matrix4::zeros()).basis - own.basis;
+        Some((Vector4::from_column_slice(off.as_slice()), own.covariance))
     }
 
     /// The relative change of positions by one standard deviation of the pitch; zero where that is known.
@@ -171,7 +187,7 @@ pub enum MeasureError {
     #[error("the calibration of the scanner cannot be used: {0}")]
     Calibration(String),
     /// No size.
-    #[error("the file gives neither position sensors nor a scan size")]
+    #[error("the file has neither position sensors nor a scan size")]
     NoSize,
     /// Nothing is left of the frame.
     #[error("the scans have no region in common: this one lies outside the others")]

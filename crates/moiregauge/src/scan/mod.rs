@@ -4,6 +4,7 @@ pub(crate) mod channel;
 pub(crate) mod doubts;
 pub(crate) mod fingerprint;
 pub(crate) mod fitted;
+pub(crate) mod grains;
 pub(crate) mod images;
 pub(crate) mod measure;
 pub(crate) mod measured;

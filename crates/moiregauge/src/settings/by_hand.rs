@@ -1,11 +1,11 @@
-//! What was told by hand: which lattice is meant, and where it is.
+//! Choices made by hand: which lattice to measure, and where it is.
 
 use nalgebra::{Matrix2, Vector2};
 use serde::{Deserialize, Serialize};
 
 use crate::frame::polygon;
 
-/// What the eye knows better than the search. Nothing by default.
+/// Choices made by hand. Nothing by default.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct ByHand {
@@ -104,14 +104,14 @@ impl ByHand {
     /// What makes no sense in it.
     pub fn problem(&self) -> Option<String> {
         if self.lattice_nm.is_some() && self.near_nm.is_some() {
-            return Some("the lattice or its wavelength is told, not both".to_owned());
+            return Some("give either the lattice or its wavelength, not both".to_owned());
         }
         if let Some(lattice) = self.lattice() {
             let area = lattice.determinant().abs();
             let sides = lattice.column(0).norm() * lattice.column(1).norm();
             if !(area > 0.1 * sides) {
                 return Some(format!(
-                    "two vectors of a lattice are not parallel, nor zero, found {:?} nm",
+                    "the two vectors of a lattice must not be parallel or zero, found {:?} nm",
                     self.lattice_nm
                 ));
             }
@@ -119,13 +119,13 @@ impl ByHand {
         if let Some(near) = self.near_nm
             && !(near > 0.0 && near.is_finite())
         {
-            return Some(format!("a wavelength is a length above 0 nm, found {near}"));
+            return Some(format!("the wavelength must be above 0 nm, found {near}"));
         }
         for corners in &self.regions_nm {
             let corners: Vec<Vector2<f64>> = corners.iter().map(|c| Vector2::from(*c)).collect();
             if corners.len() < 3 || !(polygon::area(&corners) > 0.0) {
                 return Some(format!(
-                    "a part of the frame is a polygon of three corners or more, found {}",
+                    "a part of the frame must be a polygon with at least three corners, found {}",
                     corners.len()
                 ));
             }

@@ -66,13 +66,14 @@ impl Settings {
             "moires",
             || {
                 format!(
-                    "several moirés can be measured by the method \"lattice\" only, found {moires} and another method"
+                    "several moirés can be measured only with the method \"lattice\", found {moires} moirés and \
+                     another method"
                 )
             },
         )?;
         none(self.by_hand.problem(), "by_hand")?;
         ensure(moires == 1 || !self.by_hand.says_which(), "by_hand", || {
-            format!("a lattice can be told by hand where there is one moiré, found {moires}")
+            format!("a lattice can be given by hand only for one moiré, found {moires} moirés")
         })?;
         none(self.material.problem(), "material")?;
         self.check_moire_layers()?;
@@ -85,7 +86,7 @@ impl Settings {
         self.check_uncertainties()?;
         let scanner = self.scanner.as_ref().and_then(Calibration::problem);
         let scanner =
-            scanner.map(|p| format!("the calibration of the scanner makes no sense: {p}"));
+            scanner.map(|p| format!("the calibration of the scanner cannot be used: {p}"));
         none(scanner, "scanner")?;
         if let Some(beyond) = self.out_of_range() {
             return Err(beyond.into());
@@ -144,7 +145,7 @@ impl Settings {
             ),
         ] {
             ensure(value >= 0.0 && value <= largest, setting, || {
-                format!("an uncertainty ({setting}) lies between 0 and {largest}, found {value}")
+                format!("the uncertainty {setting} must lie between 0 and {largest}, found {value}")
             })?;
         }
         Ok(())
@@ -205,7 +206,7 @@ impl Settings {
                 "lattice_angle.layer",
                 || {
                     format!(
-                        "the layer of an orientation must be 1, the lower one, or 2, found {}",
+                        "the layer of an orientation must be 1 (the lower one) or 2, found {}",
                         known.layer
                     )
                 },
@@ -239,8 +240,8 @@ impl Settings {
             self.lattice_angle.is_none() && self.lattice_angle_2.is_none(),
             "moire_layers",
             || {
-                "the orientation of a layer goes with one pair of layers; the moirés have layers of their own, whose \
-                 layer 1 is not the same: analyse each with layers of its own"
+                "the orientation of a layer needs one pair of layers for all moirés, but layer 1 of the moirés \
+                 differs. Analyse each moiré in a run of its own"
                     .to_owned()
             },
         )?;

@@ -53,8 +53,7 @@ impl GivenDrift {
 }
 
 /// How well the position sensors (or the scanner, where there are none) are calibrated: standard
-/// uncertainties, which every scan shares. The defaults are common values; a calibration of your own
-/// scanner tells better.
+/// uncertainties, which every scan shares. The defaults are common values; a calibration of your own scanner is better.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Calibration {
@@ -102,12 +101,15 @@ pub struct Settings {
     pub method: Method,
     /// What is subtracted beforehand.
     pub background: Background,
-    /// What was told by hand: which lattice is meant, and where it is.
+    /// Choices made by hand: which lattice to measure, and where it is.
     #[serde(skip_serializing_if = "ByHand::is_nothing")]
     pub by_hand: ByHand,
+    /// Which grain to use of scans that show several, as their sets are named: `grain 1` is number 1; `None`: each is a set of its own.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub grain: Option<usize>,
     /// The layers: both, or the upper one (layer 2) where there is a `substrate`.
     pub material: Material,
-    /// How many moirés every image shows; each is fitted with the others taken off.
+    /// How many moirés every image shows; each is fitted after the others are subtracted.
     pub moires: usize,
     /// The lower layer (layer 1, the reference) where it is another one.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -116,7 +118,7 @@ pub struct Settings {
     /// `material` and `substrate`.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub moire_layers: Vec<MoireLayers>,
-    /// Whether somebody chose the layers; what nobody chose is said to be assumed.
+    /// Whether the user chose the layers; otherwise a caveat says that they were assumed.
     pub layers_chosen: bool,
     /// The orientation of one of the layers, if it is known: tells isotropic strain from twist.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -217,6 +219,7 @@ impl Default for Settings {
             method: Method::Lattice,
             background: Background::Plane,
             by_hand: ByHand::default(),
+            grain: None,
             material: Material::graphene(),
             moires: 1,
             substrate: None,

@@ -10,9 +10,12 @@ pub const MOST_MOIRES: usize = 6;
 /// A file holds no more images than this: a guard against headers that are wrong.
 pub const MOST_IMAGES: usize = 1024;
 
+/// A scan shows no more grains than this: a guard against numbers that are meant for something else.
+pub const MOST_GRAINS: usize = 16;
+
 /// A setting beyond its range.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("the setting {setting} lies between {low} and {high}, found {found}")]
+#[error("the setting {setting} must lie between {low} and {high}, found {found}")]
 pub struct OutOfRange {
     /// Its name, as in a settings file.
     pub setting: &'static str,
@@ -71,6 +74,9 @@ impl Settings {
         ];
         if let Some(image) = self.image {
             ranges.push(("image", image as f64, 1.0, MOST_IMAGES as f64));
+        }
+        if let Some(grain) = self.grain {
+            ranges.push(("grain", grain as f64, 1.0, MOST_GRAINS as f64));
         }
         if let Some(drift) = &self.drift {
             ranges.extend([
@@ -156,7 +162,7 @@ mod tests {
         let words = settings.out_of_range().unwrap().to_string();
         assert_eq!(
             words,
-            "the setting frame_time_sigma_s lies between 0 and 86400, found NaN"
+            "the setting frame_time_sigma_s must lie between 0 and 86400, found NaN"
         );
     }
 

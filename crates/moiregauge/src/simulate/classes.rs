@@ -85,7 +85,7 @@ const WAVELENGTH: Key = key("wavelength", "nm", 125.0, [80.0, 250.0], [1.0, 1e6]
 
 /// All classes.
 pub const CLASSES: [SampleClass; 22] = [
-    class("clean", "nothing but the lattice", &[]),
+    class("clean", "only the lattice", &[]),
     class(
         "edge",
         "part of the frame without moiré, beyond a straight edge",
@@ -114,7 +114,7 @@ pub const CLASSES: [SampleClass; 22] = [
             ),
             key(
                 "count",
-                "how many; more than one lie at random",
+                "number of bumps; several lie at random places",
                 1.0,
                 [1.0, 1.0],
                 [1.0, 1000.0],
@@ -126,7 +126,7 @@ pub const CLASSES: [SampleClass; 22] = [
     ),
     class(
         "bump",
-        "a smooth bump: a bubble, bright and round",
+        "a smooth bump, as of a bubble: bright and round",
         &[
             key("height", "°", 5.0, [2.0, 10.0], HEIGHT),
             key(
@@ -159,7 +159,7 @@ pub const CLASSES: [SampleClass; 22] = [
     ),
     class(
         "grains",
-        "another lattice beyond a straight boundary; once more for a third grain",
+        "another lattice beyond a straight boundary; give it twice for three grains",
         &[
             key(
                 "share",
@@ -184,7 +184,7 @@ pub const CLASSES: [SampleClass; 22] = [
             ),
             key(
                 "turn",
-                "by which the second is turned as a whole, °",
+                "rotation of the second as a whole, °",
                 2.0,
                 [1.0, 4.0],
                 TURN,
@@ -253,7 +253,7 @@ pub const CLASSES: [SampleClass; 22] = [
     ),
     class(
         "strain-gradient",
-        "layer 2 stretched more and more: the strain changes along, the twist across",
+        "layer 2 stretched by a growing amount: the strain changes along, the twist across",
         &[
             key(
                 "change",
@@ -267,7 +267,7 @@ pub const CLASSES: [SampleClass; 22] = [
     ),
     class(
         "walls",
-        "relaxed: triangular domains, sharp walls and nodes in place of smooth waves",
+        "relaxed: triangular domains, sharp walls and nodes instead of smooth waves",
         &[
             key(
                 "width",
@@ -314,7 +314,7 @@ pub const CLASSES: [SampleClass; 22] = [
     ),
     class(
         "atoms",
-        "atoms of layer 2 shine through; asks for pixels below 0.1 nm",
+        "atoms of layer 2 are visible too; needs pixels below 0.1 nm",
         &[key(
             "ratio",
             "amplitude over that of the moiré",
@@ -325,7 +325,7 @@ pub const CLASSES: [SampleClass; 22] = [
     ),
     class(
         "step",
-        "a step of the substrate across the frame, the moiré goes on",
+        "a step of the substrate across the frame; the moiré continues on both sides",
         &[
             key("height", "°", 3.0, [1.0, 8.0], HEIGHT),
             key(
@@ -351,7 +351,7 @@ pub const CLASSES: [SampleClass; 22] = [
             key("rms", "°", 1.5, [0.5, 2.5], [0.0, 1000.0]),
             key(
                 "exponent",
-                "power of waves of length Λ goes with Λ to this",
+                "exponent of Λ in the power of waves of length Λ",
                 3.0,
                 [2.0, 4.0],
                 [0.0, 8.0],
@@ -382,7 +382,7 @@ pub const CLASSES: [SampleClass; 22] = [
             key("wavelength", "nm", 10.0, [6.0, 25.0], [0.1, 1e6]),
             key(
                 "sharpness",
-                "the n-th harmonic has this to the power n²−1",
+                "the n-th harmonic has this number to the power n²−1",
                 0.3,
                 [0.0, 0.6],
                 [0.0, 0.99],
@@ -400,7 +400,7 @@ pub const CLASSES: [SampleClass; 22] = [
     ),
     class(
         "scars",
-        "lines along which the tip jumped, for a while",
+        "lines in which the tip jumped for a part of the line",
         &[
             key("count", "in a frame", 10.0, [5.0, 40.0], [0.0, 1e5]),
             key(
@@ -415,7 +415,7 @@ pub const CLASSES: [SampleClass; 22] = [
     ),
     class(
         "glitches",
-        "samples of the position sensors that are far off",
+        "samples of the position sensors that are wrong (spikes)",
         &[
             key(
                 "share",
@@ -426,7 +426,7 @@ pub const CLASSES: [SampleClass; 22] = [
             ),
             key(
                 "size",
-                "by which they are off, nm",
+                "height of the spikes, nm",
                 1000.0,
                 [20.0, 2000.0],
                 [0.0, 1e5],
@@ -440,7 +440,7 @@ pub const CLASSES: [SampleClass; 22] = [
     ),
     class(
         "bare",
-        "no moiré at all: what else there is, and noise",
+        "no moiré: only noise and the other classes that are given",
         &[],
     ),
 ];

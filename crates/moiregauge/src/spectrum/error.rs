@@ -33,14 +33,14 @@ pub enum LatticeError {
     },
     /// The waves of the best lattice are not in one place.
     #[error(
-        "the spectrum proposes lattices, but no part of the frame carries the three waves of any of them together: they are skirts of an \
-         edge, stripes, or waves of different lattices"
+        "the spectrum has peaks that could be a lattice, but no part of the frame shows the three waves of any lattice \
+         together. The peaks come from an edge, from stripes, or from different lattices"
     )]
     NowhereTogether,
     /// Something else is stronger.
     #[error(
-        "a wave with a period of {period:.2} nm, which is no harmonic of the lattice that was found, is stronger than the lattice: \
-         it may be another lattice, stripes, or an edge"
+        "a wave with a period of {period:.2} nm is stronger than the lattice that was found, and is not one of its \
+         harmonics. It may come from another lattice, from stripes, or from an edge"
     )]
     Contradicted {
         /// Its period, nm.
@@ -48,13 +48,13 @@ pub enum LatticeError {
     },
     /// The lattice that was told by hand is not there.
     #[error(
-        "no lattice like the one that was told stands out of the noise in the part of the image that is used"
+        "in the part of the image that is used, no lattice like the given one exceeds the noise"
     )]
     NotThere,
     /// The lattice shows in the spectrum, but this method gets no hold of it.
     #[error(
-        "the spectrum shows a lattice, but the {method:?} method finds too few of its peaks: noise \
-         hides them or the frame is too small for them; the Fourier transform of the image may do"
+        "the spectrum shows a lattice, but the {method:?} method finds too few of its peaks. Noise hides them, or the \
+         frame is too small. Try the method \"fourier\""
     )]
     NoPeaks {
         /// The method.
@@ -62,8 +62,8 @@ pub enum LatticeError {
     },
     /// Several lattices were asked for.
     #[error(
-        "{wanted} lattices were asked for, of which {found} can be found: what else stands out is noise or lies on \
-         the waves of these, as their harmonics do and those of a lattice that is nearly commensurate with them"
+        "{wanted} lattices were asked for, but only {found} can be found. All other peaks are noise or lie on the \
+         waves of these: they are their harmonics, or those of a nearly commensurate lattice"
     )]
     FewerLattices {
         /// How many there are.
@@ -73,8 +73,7 @@ pub enum LatticeError {
     },
     /// Several lattices lie too close to each other.
     #[error(
-        "the wave vectors of two lattices lie so close to each other that this frame cannot tell them apart; \
-         a larger frame can"
+        "the wave vectors of two lattices are too close to be resolved in this frame. Scan a larger frame"
     )]
     Entangled,
 }
@@ -93,15 +92,15 @@ pub(crate) fn too_weak(best: &[f64; 3]) -> String {
         .map(|(name, found, needed)| {
             let (found, needed) = ((100.0 * found).floor(), (100.0 * needed).ceil());
             format!(
-                "the {name} has {:.2} of the {:.2} it needs",
+                "the {name} has {:.2} but needs {:.2}",
                 found / 100.0,
                 needed / 100.0
             )
         })
         .collect();
     format!(
-        "no three wave vectors that add up to zero stand out of the noise. The best have signal-to-noise ratios of \
-         {:.1}, {:.1} and {:.1}: {}",
+        "no three wave vectors that add up to zero exceed the noise. The best have signal-to-noise ratios of {:.1}, \
+         {:.1} and {:.1}: {}",
         best[0],
         best[1],
         best[2],

@@ -7,9 +7,11 @@
 use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
 use rustfft::num_complex::Complex64;
 
-use crate::frame::background::{Background, remove_background};
+use crate::frame::background::{Background, take_background_off};
 use crate::frame::image::Image;
+use crate::numbers::dot::dot;
 use crate::numbers::interrupt;
+use crate::numbers::widest::widest;
 use crate::spectrum::transform::hann;
 
 /// One harmonic of the lattice.
@@ -30,11 +32,31 @@ pub(crate) struct Harmonics {
     pub(crate) list: Vec<Harmonic>,
     /// Sum of the squared window weights and of the weights.
     pub(crate) window_sums: [f64; 2],
-    /// The image that these harmonics make, missing pixels as in the measured one. Its lattice is
-    /// known exactly: what an estimator makes of it is the estimator's bias on this frame.
-    pub(crate) model: Image,
-    /// Reciprocal pair of the model, rad per pixel.
+    /// What the image has beside them everywhere.
+    pub(crate) constant: f64,
+    /// Their reciprocal pair, rad per pixel.
     pub(crate) pair: Matrix2<f64>,
+}
+
+impl Harmonics {
+    /// The image that these harmonics make, with the shape and the missing pixels of the measured one, whose
+    /// `background` is taken off as well, so that it goes through the same mill. Its lattice is known exactly: what an
+    /// estimator makes of it is the estimator's bias on this frame.
+    pub(crate) fn model(&self, image: &Image, background: Background) -> Image {
+        let centre = centre(image.columns, image.rows);
+        let waves = self
+            .list
+            .iter()
+            .map(|h| (h.q, h.amplitude * Complex64::cis(h.q.dot(&centre))));
+        let mut model = summed(image, self.constant, waves);
+        take_background_off(&mut model, background);
+        model
+    }
+}
+
+/// The middle of the pixels of a frame.
+fn centre(columns: usize, rows: usize) -> Vector2<f64> {
+    Vector2::new((columns as f64 - 1.0) / 2.0, (rows as f64 - 1.0) / 2.0)
 }
 
 impl Harmonic {
@@ -94,6 +116,20 @@ impl Windowed {
             rows: image.rows,
             columns: image.columns,
         }
+    }
+
+    /// `Σ w I e^{−iq·n}`, with the phase at the centre.
+    pub(crate) fn transform(&self, q: Vector2<f64>) -> Complex64 {
+        let centre = centre(self.columns, self.rows);
+        let turns = (0..self.columns).map(|c| q.x * (c as f64 - centre.x));
+        let (re, im): (Vec<f64>, Vec<f64>) = turns.map(|x| (x.cos(), x.sin())).unzip();
+        let mut sum = Complex64::default();
+        for (row, line) in self.values.chunks_exact(self.columns).enumerate() {
+            interrupt::check();
+            let turn = Complex64::from_polar(1.0, -q.y * (row as f64 - centre.y));
+            sum += turn * Complex64::new(dot(line, &re), -dot(line, &im));
+        }
+        sum
     }
 
     /// `Σ w I e^{−iq·n}` and its moments with `n − centre` along columns and rows.
@@ -194,8 +230,7 @@ impl Windowed {
 
     /// Fits the harmonics `pair · (h, k)` of `shells`, which begin with the first one.
     ///
-    /// `background` is what was taken off the image; it is taken off the model as well, so that the
-    /// model goes through the same mill. `None` where the harmonics cannot be told apart on this frame.
+    /// `background` is what was taken off the image. `None` where the harmonics cannot be told apart on this frame.
     pub(crate) fn fit(
         &self,
         image: &Image,
@@ -203,6 +238,29 @@ impl Windowed {
         background: Background,
         shells: &[[i32; 2]],
     ) -> Option<Harmonics> {
+        let sum = self.amplitudes(pair, shells)?;
+        let model = sum.model(image, background);
+        let noise = crate::spectrum::noise::LocalNoise::new(&residual(image, &model));
+        let centre = centre(self.columns, self.rows);
+        let list = sum.waves.iter().map(|&(q, amplitude)| Harmonic {
+            q,
+            amplitude: amplitude * Complex64::from_polar(1.0, -q.dot(&centre)),
+            noise: noise.around(q),
+        });
+        let window_sums = [
+            self.weights.iter().map(|w| w * w).sum(),
+            self.weights.iter().sum(),
+        ];
+        Some(Harmonics {
+            list: list.collect(),
+            window_sums,
+            constant: sum.constant,
+            pair: *pair,
+        })
+    }
+
+    /// The amplitudes of the harmonics alone.
+    pub(crate) fn amplitudes(&self, pair: &Matrix2<f64>, shells: &[[i32; 2]]) -> Option<Sum> {
         let nyquist = 0.9 * std::f64::consts::PI;
         let wave = |&(h, k): &(f64, f64)| pair * Vector2::new(h, k);
         let indices = shells.iter().map(|&[h, k]| (f64::from(h), f64::from(k)));
@@ -219,80 +277,81 @@ impl Windowed {
         }
         let waves: Vec<Vector2<f64>> = indices.iter().map(wave).collect();
         let gram = self.gram(pair, &indices);
-        let right = DVector::from_iterator(
+        let mut right = DVector::from_iterator(
             n,
             waves.iter().enumerate().map(|(i, &wave)| {
                 // The image is real: the transform at −q is the conjugate of that at q.
                 if i > 0 && i % 2 == 0 {
                     Complex64::default()
                 } else {
-                    self.moments(wave)[0]
+                    self.transform(wave)
                 }
             }),
         );
-        let mut right = right;
         for i in (2..n).step_by(2) {
             right[i] = right[i - 1].conj();
         }
         let amplitudes = gram.lu().solve(&right)?;
-        let model = remove_background(&self.model(image, &waves, &amplitudes), background);
-        let residual = residual(image, &model);
-        let noise = crate::spectrum::noise::LocalNoise::new(&residual);
-        let centre = Vector2::new(
-            (self.columns as f64 - 1.0) / 2.0,
-            (self.rows as f64 - 1.0) / 2.0,
-        );
-        let list = (1..n)
-            .step_by(2)
-            .map(|i| (waves[i], amplitudes[i]))
-            .map(|(q, amplitude)| Harmonic {
-                q,
-                amplitude: amplitude * Complex64::from_polar(1.0, -q.dot(&centre)),
-                noise: noise.around(q),
-            })
-            .collect();
-        let window_sums = [
-            self.weights.iter().map(|w| w * w).sum(),
-            self.weights.iter().sum(),
-        ];
-        Some(Harmonics {
-            list,
-            window_sums,
-            model,
-            pair: *pair,
+        let of = |i: usize| (waves[i], amplitudes[i]);
+        Some(Sum {
+            constant: amplitudes[0].re,
+            waves: (1..n).step_by(2).map(of).collect(),
         })
     }
+}
 
-    /// The sum of the waves, with the shape and the missing pixels of `image`.
-    fn model(
-        &self,
-        image: &Image,
-        waves: &[Vector2<f64>],
-        amplitudes: &DVector<Complex64>,
-    ) -> Image {
-        let cx = (self.columns as f64 - 1.0) / 2.0;
-        let cy = (self.rows as f64 - 1.0) / 2.0;
-        let mut values = vec![amplitudes[0].re; image.values.len()];
-        for i in (1..waves.len()).step_by(2) {
-            let q = waves[i];
-            let (im, re): (Vec<f64>, Vec<f64>) = (0..self.columns)
-                .map(|c| (q.x * (c as f64 - cx)).sin_cos())
-                .unzip();
-            for (row, line) in values.chunks_exact_mut(self.columns).enumerate() {
-                interrupt::check();
-                let c = 2.0 * amplitudes[i] * Complex64::from_polar(1.0, q.y * (row as f64 - cy));
-                for ((v, re), im) in line.iter_mut().zip(&re).zip(&im) {
-                    *v += c.re * re - c.im * im;
-                }
-            }
-        }
-        for (v, measured) in values.iter_mut().zip(&image.values) {
-            if !measured.is_finite() {
-                *v = f64::NAN;
-            }
-        }
-        Image::new(image.rows, image.columns, values)
+/// Waves in sum.
+pub(crate) struct Sum {
+    constant: f64,
+    /// Wave vectors (rad per pixel) and amplitudes, phases at the centre.
+    pub(crate) waves: Vec<(Vector2<f64>, Complex64)>,
+}
+
+impl Sum {
+    /// As [`Harmonics::model`].
+    pub(crate) fn model(&self, image: &Image, background: Background) -> Image {
+        let mut model = summed(image, self.constant, self.waves.iter().copied());
+        take_background_off(&mut model, background);
+        model
     }
+}
+
+/// The sum of waves, phases at the centre, with the shape and the missing pixels of `image`.
+fn summed(
+    image: &Image,
+    constant: f64,
+    waves: impl Iterator<Item = (Vector2<f64>, Complex64)>,
+) -> Image {
+    let centre = centre(image.columns, image.rows);
+    let mut values = vec![constant; image.values.len()];
+    for (q, amplitude) in waves {
+        let (im, re): (Vec<f64>, Vec<f64>) = (0..image.columns)
+            .map(|c| (q.x * (c as f64 - centre.x)).sin_cos())
+            .unzip();
+        for (row, line) in values.chunks_exact_mut(image.columns).enumerate() {
+            interrupt::check();
+            let c = 2.0 * amplitude * Complex64::from_polar(1.0, q.y * (row as f64 - centre.y));
+            add_wave(line, c, [&re, &im]);
+        }
+    }
+    for (v, measured) in values.iter_mut().zip(&image.values) {
+        if !measured.is_finite() {
+            *v = f64::NAN;
+        }
+    }
+    Image::new(image.rows, image.columns, values)
+}
+
+/// Adds a wave to a line: `Re(c (re + i im))`.
+fn add_wave(line: &mut [f64], c: Complex64, [re, im]: [&[f64]; 2]) {
+    widest(
+        #[inline(always)]
+        || {
+            for ((v, re), im) in line.iter_mut().zip(re).zip(im) {
+                *v += c.re * re - c.im * im;
+            }
+        },
+    );
 }
 
 /// Image minus model; missing pixels become 0.
@@ -308,36 +367,24 @@ fn residual(image: &Image, model: &Image) -> Image {
 
 /// `Σ w(n) cos(q (n − centre))` of the Hann window of `n` pixels: three Dirichlet kernels.
 pub(crate) fn hann_transform(q: f64, n: usize) -> f64 {
+    /// Nearer to a peak of a kernel both of its sines are calculated there: their ratio is exact then.
+    const NEAR: f64 = 1e-3;
     let n = n as f64;
-    let dirichlet = |q: f64| {
+    let step = std::f64::consts::TAU / n;
+    // Half a turn from kernel to kernel.
+    let sin = (n * q / 2.0).sin();
+    let dirichlet = |q: f64, sin: f64| {
         let half = (q / 2.0).sin();
         if half.abs() < 1e-9 {
             // At multiples of 2π every cosine is ±1; the sign of an even n alternates with them.
             n * (n * q / 2.0).cos() / (q / 2.0).cos()
-        } else {
+        } else if half.abs() < NEAR {
             (n * q / 2.0).sin() / half
+        } else {
+            sin / half
         }
     };
-    let step = std::f64::consts::TAU / n;
-    0.5 * dirichlet(q) + 0.25 * (dirichlet(q + step) + dirichlet(q - step))
-}
-
-/// Sum of products in eight independent partial sums, which the compiler can keep in registers.
-pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let mut sums = [0.0; 8];
-    let (a8, b8) = (a.chunks_exact(8), b.chunks_exact(8));
-    let rest: f64 = a8
-        .remainder()
-        .iter()
-        .zip(b8.remainder())
-        .map(|(a, b)| a * b)
-        .sum();
-    for (a, b) in a8.zip(b8) {
-        for i in 0..8 {
-            sums[i] += a[i] * b[i];
-        }
-    }
-    sums.iter().sum::<f64>() + rest
+    0.5 * dirichlet(q, sin) + 0.25 * (dirichlet(q + step, -sin) + dirichlet(q - step, -sin))
 }
 
 #[cfg(test)]

@@ -35,7 +35,7 @@ pub(crate) fn refine(
     let windowed = Windowed::new(image);
     let shells = by_rows();
     let first = windowed.fit(image, pair, background, &shells)?;
-    let model = Windowed::new(&first.model);
+    let model = Windowed::new(&first.model(image, background));
     let mut chosen = Vec::new();
     let (mut normal, mut right) = (Matrix2::zeros(), Matrix2::zeros());
     for harmonic in &first.list {

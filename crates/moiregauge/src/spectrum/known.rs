@@ -5,6 +5,8 @@
 //! of about that cell, best first. A cell with a large basis (a reconstructed surface) has higher harmonics
 //! that are stronger than its first ones; without its size one of these would be taken for the lattice.
 
+use std::sync::Arc;
+
 use heterostrain::ComplexPair;
 use heterostrain::lattice::{reciprocal, renamings, shortest_pair};
 use nalgebra::{Matrix2, Vector2};
@@ -43,7 +45,7 @@ pub(crate) fn prepare(
     background: Background,
     known: &Matrix2<f64>,
 ) -> Result<Prepared, LatticeError> {
-    let image = levelled(image, background)?;
+    let image = levelled(image.clone(), background)?;
     let full = Spectrum::new(&image);
     let mut best = [0.0; 3];
     let little = candidates(&full, &geometry.pixel_to_nm, known, MOST_DISTORTION);
@@ -71,13 +73,9 @@ pub(crate) fn prepare(
         };
         let (a, b) = (pair.column(0).into_owned(), pair.column(1).into_owned());
         return Ok(Prepared {
-            spectrum: if binning == 1 {
-                full
-            } else {
-                Spectrum::new(&binned)
-            },
-            image,
+            image: Arc::new(image),
             binning,
+            look: None,
             peaks: [a, b, b - a],
             harmonics,
             start,

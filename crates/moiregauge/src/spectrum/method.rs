@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// How the lattice vectors are read off an image.
+/// How the lattice vectors are measured in an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Method {

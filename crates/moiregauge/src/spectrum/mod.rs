@@ -1,9 +1,11 @@
 //! Where a lattice is in the spectrum of an image: transform, peaks, and which of them belong together.
 
 pub(crate) mod error;
+pub(crate) mod fourier;
 pub(crate) mod harmonics;
 pub(crate) mod high_orders;
 pub(crate) mod known;
+pub(crate) mod look;
 pub(crate) mod method;
 pub(crate) mod noise;
 pub(crate) mod phases;

@@ -55,7 +55,6 @@ impl LocalNoise {
 
     /// Mean over the bins whose distance from `centre` (in bins, a cycle per frame each) passes.
     fn mean(&self, centre: Vector2<f64>, wanted: impl Fn(Vector2<f64>) -> bool) -> f64 {
-        let (rows, columns) = (self.spectrum.rows as i64, self.spectrum.columns as i64);
         let reach = FARTHEST.ceil() as i64;
         let (mut sum, mut count) = (0.0, 0usize);
         for dy in -reach..=reach {
@@ -64,16 +63,8 @@ impl LocalNoise {
                 if !wanted(Vector2::new(x as f64, y as f64) - centre) {
                     continue;
                 }
-                let (x, y) = if x < 0 || x > columns / 2 {
-                    (-x, -y)
-                } else {
-                    (x, y)
-                };
-                let x = x.rem_euclid(columns);
-                if x <= columns / 2 {
-                    sum += self.spectrum.power(x as usize, y.rem_euclid(rows) as usize);
-                    count += 1;
-                }
+                sum += self.spectrum.at(x, y).norm_sqr();
+                count += 1;
             }
         }
         sum / (count.max(1) as f64 * self.window_power)

@@ -1,13 +1,18 @@
 //! An image made ready for measuring, and where its lattice is, roughly.
 
+use std::borrow::Cow;
+use std::sync::Arc;
+
 use heterostrain::lattice::reciprocal;
 use nalgebra::{Matrix2, Vector2};
+use rayon::prelude::*;
 
-use crate::frame::background::{Background, remove_background};
+use crate::frame::background::{Background, take_background_off};
 use crate::frame::geometry::Geometry;
 use crate::frame::image::Image;
 use crate::spectrum::error::{LatticeError, SECOND, THIRD};
 use crate::spectrum::harmonics::{Harmonic, Harmonics, Windowed};
+use crate::spectrum::look::{Look, in_other_bins};
 use crate::spectrum::phases::Phases;
 use crate::spectrum::shells::shells;
 use crate::spectrum::transform::Spectrum;
@@ -22,10 +27,11 @@ const SMALLEST_SIDE: usize = 16;
 /// An image without background and what its spectrum says: where the lattice is, roughly.
 pub(crate) struct Prepared {
     /// The image at full resolution.
-    pub(crate) image: Image,
+    pub(crate) image: Arc<Image>,
     /// Pixels of the image per bin. Everything below counts in bins.
     pub(crate) binning: usize,
-    pub(crate) spectrum: Spectrum,
+    /// The first look that showed harmonics and peaks; they are then good enough to start a fit from.
+    pub(crate) look: Option<Look>,
     pub(crate) harmonics: Harmonics,
     /// The first three wave vectors, each by itself, rad per bin.
     pub(crate) peaks: [Vector2<f64>; 3],
@@ -33,15 +39,85 @@ pub(crate) struct Prepared {
     pub(crate) start: Matrix2<f64>,
 }
 
+impl Prepared {
+    /// The image in bins.
+    pub(crate) fn binned(&self) -> Cow<'_, Image> {
+        match self.binning {
+            1 => Cow::Borrowed(&self.image),
+            size => Cow::Owned(self.image.binned(size)),
+        }
+    }
+
+    /// Bins along columns and rows.
+    pub(crate) fn size(&self) -> [usize; 2] {
+        [self.image.columns, self.image.rows].map(|n| n / self.binning)
+    }
+
+    /// Harmonics and peaks by the bins themselves, where a first look is not enough.
+    pub(crate) fn refined(&self, background: Background) -> Option<(Harmonics, [Vector2<f64>; 3])> {
+        if self.look.is_some() {
+            refine(&self.binned(), &self.harmonics.pair, background)
+        } else {
+            Some((self.harmonics.clone(), self.peaks))
+        }
+    }
+}
+
+/// What a first look at a large image finds.
+fn looked_at(
+    look: &Look,
+    image: &Arc<Image>,
+    geometry: &Geometry,
+    background: Background,
+) -> Option<Prepared> {
+    let found = look.lattice(image, geometry, background)?;
+    let binning = binning(&(found.harmonics.pair / look.bins as f64));
+    let harmonics = in_other_bins(&found.harmonics, look.bins, binning);
+    let ratio = binning as f64 / look.bins as f64;
+    let start = reciprocal(&harmonics.pair)?;
+    Some(Prepared {
+        image: Arc::clone(image),
+        binning,
+        look: Some(look.clone()),
+        start,
+        peaks: found.peaks.map(|q| q * ratio),
+        harmonics,
+    })
+}
+
 pub(crate) fn prepare(
     image: &Image,
     geometry: &Geometry,
     background: Background,
 ) -> Result<Prepared, LatticeError> {
-    let image = levelled(image, background)?;
+    let image = levelled(image.clone(), background)?;
+    prepare_levelled(Arc::new(image), geometry, background)
+}
+
+/// The same for an image without its background.
+pub(crate) fn prepare_levelled(
+    image: Arc<Image>,
+    geometry: &Geometry,
+    background: Background,
+) -> Result<Prepared, LatticeError> {
+    let look = Look::at(&image);
+    let looked = look
+        .as_ref()
+        .and_then(|look| looked_at(look, &image, geometry, background));
+    if let Some(found) = looked {
+        return Ok(found);
+    }
     let full = Spectrum::new(&image);
     let mut best = [0.0; 3];
     for candidate in select::candidates(&full, &geometry.pixel_to_nm) {
+        let look = look.as_ref();
+        let roughly = look.and_then(|look| look.verdict(&image, &candidate.pair, background));
+        if let Some((Verdict::Chance, ratios)) = roughly {
+            if ratios[2] > best[2] {
+                best = ratios;
+            }
+            continue;
+        }
         let (binning, binned) = binned(&image, &candidate.pair);
         let pair = candidate.pair * binning as f64;
         let Some((mut harmonics, mut peaks)) = refine(&binned, &pair, background) else {
@@ -69,15 +145,10 @@ pub(crate) fn prepare(
         let Some(start) = reciprocal(&harmonics.pair) else {
             continue;
         };
-        let spectrum = if binning == 1 {
-            full
-        } else {
-            Spectrum::new(&binned)
-        };
         return Ok(Prepared {
             image,
             binning,
-            spectrum,
+            look: None,
             harmonics,
             peaks,
             start,
@@ -87,13 +158,13 @@ pub(crate) fn prepare(
 }
 
 /// The image without its background, if there is anything in it to measure.
-pub(crate) fn levelled(image: &Image, background: Background) -> Result<Image, LatticeError> {
+pub(crate) fn levelled(mut image: Image, background: Background) -> Result<Image, LatticeError> {
     let (rows, columns) = (image.rows, image.columns);
     if rows < SMALLEST_SIDE || columns < SMALLEST_SIDE {
         return Err(LatticeError::TooSmall { columns, rows });
     }
     let total = image.values.len();
-    let missing = image.values.iter().filter(|v| !v.is_finite()).count();
+    let missing = image.values.par_iter().filter(|v| !v.is_finite()).count();
     if missing == total {
         return Err(LatticeError::Constant);
     }
@@ -101,11 +172,15 @@ pub(crate) fn levelled(image: &Image, background: Background) -> Result<Image, L
         return Err(LatticeError::Missing { missing, total });
     }
     let largest = |image: &Image| {
-        let finite = image.values.iter().filter(|v| v.is_finite());
-        finite.fold(0.0f64, |a, v| a.max(v.abs()))
+        let lines = image.values.par_chunks(image.columns);
+        let of_line = |line: &[f64]| {
+            let finite = line.iter().filter(|v| v.is_finite());
+            finite.fold(0.0f64, |a, v| a.max(v.abs()))
+        };
+        lines.map(of_line).reduce(|| 0.0, f64::max)
     };
-    let before = largest(image);
-    let image = remove_background(image, background);
+    let before = largest(&image);
+    take_background_off(&mut image, background);
     if largest(&image) <= ROUNDING * before {
         return Err(LatticeError::Constant);
     }
@@ -129,10 +204,10 @@ pub(crate) fn binning(pair: &Matrix2<f64>) -> usize {
 }
 
 /// The image with as many pixels averaged as [`binning`] allows, and how many these are along each axis.
-pub(crate) fn binned(image: &Image, pair: &Matrix2<f64>) -> (usize, Image) {
+pub(crate) fn binned<'a>(image: &'a Image, pair: &Matrix2<f64>) -> (usize, Cow<'a, Image>) {
     match binning(pair) {
-        1 => (1, image.clone()),
-        size => (size, image.binned(size)),
+        1 => (1, Cow::Borrowed(image)),
+        size => (size, Cow::Owned(image.binned(size))),
     }
 }
 
@@ -153,11 +228,11 @@ pub(crate) fn refine(
         third,
     ]
     .map(|q| windowed.refined_peak(q));
-    let first = windowed.fit(image, &common_pair(&seen), background, shells(3))?;
-    let model = Windowed::new(&first.model);
+    let first = windowed.amplitudes(&common_pair(&seen), shells(3))?;
+    let model = Windowed::new(&first.model(image, background));
     let mut peaks = seen;
-    for (peak, harmonic) in peaks.iter_mut().zip(&first.list) {
-        *peak -= model.refined_peak(harmonic.q) - harmonic.q;
+    for (peak, (q, _)) in peaks.iter_mut().zip(&first.waves) {
+        *peak -= model.refined_peak(*q) - q;
     }
     let second = windowed.fit(image, &common_pair(&peaks), background, shells(3))?;
     Some((second, peaks))
@@ -246,12 +321,12 @@ mod tests {
         let words = |best| LatticeError::NoLattice { best }.to_string();
         let second = words([4.7, 4.4, 4.1]);
         assert!(
-            second.ends_with(": the second has 4.40 of the 4.48 it needs"),
+            second.ends_with(": the second has 4.40 but needs 4.48"),
             "{second}"
         );
         let third = words([9.0, 8.0, 3.0]);
         assert!(
-            third.ends_with(": the third has 3.00 of the 3.47 it needs"),
+            third.ends_with(": the third has 3.00 but needs 3.47"),
             "{third}"
         );
         let both = words([4.0, 4.0, 2.0]);
@@ -260,7 +335,7 @@ mod tests {
             "{both}"
         );
         let barely = words([4.472, 4.472, 4.1]);
-        assert!(barely.ends_with("4.47 of the 4.48 it needs"), "{barely}");
+        assert!(barely.ends_with("4.47 but needs 4.48"), "{barely}");
         assert!(!words([0.0; 3]).contains("signal-to-noise"));
     }
 
@@ -276,7 +351,7 @@ mod tests {
             verdict(&Harmonics {
                 list: list.collect(),
                 window_sums: [1.0; 2],
-                model: Image::new(1, 1, vec![0.0]),
+                constant: 0.0,
                 pair: Matrix2::identity(),
             })
         };

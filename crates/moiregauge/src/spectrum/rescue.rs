@@ -4,6 +4,8 @@
 //! with both by itself once it knows where to look. The other estimators have no such means and are
 //! not offered this.
 
+use std::sync::Arc;
+
 use nalgebra::Matrix2;
 
 use crate::frame::background::{Background, remove_background};
@@ -28,7 +30,7 @@ pub(crate) fn prepare_again(
         other => other,
     };
     found.map(|prepared| Prepared {
-        image: flat,
+        image: Arc::new(flat),
         ..prepared
     })
 }
@@ -40,7 +42,7 @@ pub(crate) fn prepare_known_again(
     background: Background,
     known: &Matrix2<f64>,
 ) -> Result<Prepared, LatticeError> {
-    let flat = levelled(image, background)?;
+    let flat = levelled(image.clone(), background)?;
     let clipped = cut_off(&flat);
     let found = match known::prepare(&clipped, geometry, background, known) {
         Err(LatticeError::NoLattice { .. }) => {
@@ -49,7 +51,7 @@ pub(crate) fn prepare_known_again(
         other => other,
     };
     found.map(|prepared| Prepared {
-        image: flat,
+        image: Arc::new(flat),
         ..prepared
     })
 }

@@ -7,8 +7,12 @@
 
 use heterostrain::lattice::{distortion, shortest_pair};
 use nalgebra::{Matrix2, Vector2};
+use rayon::prelude::*;
+use rustfft::num_complex::Complex;
 
 use crate::numbers::interrupt;
+use crate::numbers::median::median;
+use crate::spectrum::fourier::{Kept, wide};
 use crate::spectrum::transform::Spectrum;
 
 /// A lattice is well explained by so many peaks, and by so many times those that chance puts on it. Chosen by eye.
@@ -243,16 +247,14 @@ pub(crate) fn spectrum_peaks(spectrum: &Spectrum) -> Vec<Peak> {
         } else {
             ky as f64 - rows as f64
         };
-        for kx in 0..half - 1 {
+        let (line, noise) = (&spectrum.values[ky * half..][..half - 1], noise.row(ky));
+        for (kx, value) in line.iter().enumerate() {
+            let (power, noise) = (value.norm_sqr(), noise[kx / BLOCK_WIDTH]);
             // On the axis kx = 0 the lower half repeats the upper one.
-            if kx == 0 && signed <= 0.0 {
+            if power < PEAK * noise || (kx == 0 && signed <= 0.0) {
                 continue;
             }
-            let power = spectrum.power(kx, ky);
-            let significance = power / noise.at(kx, ky);
-            if significance < PEAK {
-                continue;
-            }
+            let significance = power / noise;
             let near = |dx: i64, dy: i64| {
                 let (mut x, mut y) = (kx as i64 + dx, ky as i64 + dy);
                 if x < 0 {
@@ -339,29 +341,31 @@ pub(crate) const BLOCK_WIDTH: usize = 4;
 const BLOCK_HEIGHT: usize = 32;
 
 impl NoiseMap {
-    pub(crate) fn new(spectrum: &Spectrum) -> Self {
+    pub(crate) fn new<T: Kept>(spectrum: &Spectrum<T>) -> Self {
         let half = spectrum.half();
         let across = half.div_ceil(BLOCK_WIDTH);
         let down = spectrum.rows.div_ceil(BLOCK_HEIGHT);
-        let mut values = Vec::with_capacity(across * down);
-        let mut sample = Vec::with_capacity(BLOCK_WIDTH * BLOCK_HEIGHT);
-        for by in 0..down {
-            for bx in 0..across {
+        let blocks = (0..down).into_par_iter().map(|by| {
+            interrupt::check();
+            // Centred on zero frequency, like the ridge.
+            let first = by * BLOCK_HEIGHT + spectrum.rows - BLOCK_HEIGHT / 2;
+            let lines = (first..first + BLOCK_HEIGHT).map(|ky| ky % spectrum.rows);
+            let lines = lines.map(|ky| &spectrum.values[ky * half..][..half]);
+            let lines: Vec<&[Complex<T>]> = lines.collect();
+            let mut sample = Vec::with_capacity(BLOCK_WIDTH * BLOCK_HEIGHT);
+            let mut block = |bx: usize| {
+                let columns = bx * BLOCK_WIDTH..((bx + 1) * BLOCK_WIDTH).min(half);
                 sample.clear();
-                for j in 0..BLOCK_HEIGHT {
-                    // Centred on zero frequency, like the ridge.
-                    let ky =
-                        (by * BLOCK_HEIGHT + j + spectrum.rows - BLOCK_HEIGHT / 2) % spectrum.rows;
-                    for kx in bx * BLOCK_WIDTH..((bx + 1) * BLOCK_WIDTH).min(half) {
-                        sample.push(spectrum.power(kx, ky));
-                    }
+                for line in &lines {
+                    let values = line[columns.clone()].iter();
+                    sample.extend(values.map(|value| wide(*value).norm_sqr()));
                 }
-                let middle = sample.len() / 2;
-                let median = *sample.select_nth_unstable_by(middle, f64::total_cmp).1;
                 // The median of exponentially distributed power is ln 2 of its mean.
-                values.push(median / std::f64::consts::LN_2);
-            }
-        }
+                median(&mut sample) / std::f64::consts::LN_2
+            };
+            (0..across).map(&mut block).collect::<Vec<f64>>()
+        });
+        let mut values = blocks.collect::<Vec<_>>().concat();
         let floor = values.iter().copied().fold(0.0, f64::max) * 1e-14;
         for v in &mut values {
             *v = v.max(floor).max(f64::MIN_POSITIVE);
@@ -371,10 +375,6 @@ impl NoiseMap {
             values,
             rows: spectrum.rows,
         }
-    }
-
-    pub(crate) fn at(&self, kx: usize, ky: usize) -> f64 {
-        self.row(ky)[kx / BLOCK_WIDTH]
     }
 
     /// The values for `BLOCK_WIDTH` frequencies kx each.

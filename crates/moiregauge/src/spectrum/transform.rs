@@ -5,21 +5,14 @@
 //! Hann window `w`; missing pixels weigh nothing. Pixel coordinates `n = (column, row)`,
 //! frequencies in rad per pixel.
 
-use std::cell::RefCell;
-
 use nalgebra::Vector2;
-use realfft::RealFftPlanner;
-use rustfft::num_complex::Complex64;
-use rustfft::{Fft, FftPlanner};
+use rustfft::num_complex::{Complex, Complex64};
 
 use crate::frame::image::Image;
-use crate::numbers::interrupt;
-
-/// Columns transformed together: enough to fill a cache line, few enough to stay in the cache.
-const COLUMN_BLOCK: usize = 8;
+use crate::spectrum::fourier::{Grid, Kept, columns_in_place, forward, inverses, wide};
 
 /// Spectrum `F(k) = Σ w(n) I(n) e^{−ik·n}` on the padded grid, for non-negative column frequencies.
-pub(crate) struct Spectrum {
+pub(crate) struct Spectrum<T = f64> {
     /// Padded height.
     pub(crate) rows: usize,
     /// Padded width.
@@ -27,7 +20,7 @@ pub(crate) struct Spectrum {
     /// Size of the image, (columns, rows).
     pub(crate) image_size: [usize; 2],
     /// `rows × (columns/2 + 1)` values, row by row.
-    pub(crate) values: Vec<Complex64>,
+    pub(crate) values: Vec<Complex<T>>,
     /// The window along columns and along rows.
     pub(crate) window: [Vec<f64>; 2],
     /// Weights including missing pixels; `None` where none are missing.
@@ -54,29 +47,6 @@ impl Spectrum {
     /// The same without padding: frequencies are whole cycles per frame.
     pub(crate) fn unpadded(image: &Image) -> Self {
         Self::on_grid(image, image.rows, image.columns, hann)
-    }
-
-    /// The same for values that `line` writes line by line, none of them missing.
-    pub(crate) fn of_lines(
-        image_size: [usize; 2],
-        mut line: impl FnMut(usize, &mut [f64]),
-    ) -> Self {
-        let [columns, rows] = image_size;
-        let window = image_size.map(hann);
-        let values = forward(image_size, rows, columns, |row, out: &mut [f64]| {
-            line(row, out);
-            for (value, w) in out.iter_mut().zip(&window[0]) {
-                *value *= w * window[1][row];
-            }
-        });
-        Self {
-            rows,
-            columns,
-            image_size,
-            values,
-            window,
-            weights: None,
-        }
     }
 
     /// A spectrum with the mean power of several images of one size; its phases mean nothing.
@@ -122,13 +92,17 @@ impl Spectrum {
             Image::new(image.rows, image.columns, values)
         });
         let image_size = [image.columns, image.rows];
-        let line = |row: usize, out: &mut [f64]| {
+        let line = |(): &mut (), row: usize, out: &mut [f64]| {
             let wr = window[1][row];
             for ((o, &v), w) in out.iter_mut().zip(image.row(row)).zip(&window[0]) {
                 *o = if v.is_finite() { v * w * wr } else { 0.0 };
             }
         };
-        let values = forward(image_size, rows, columns, line);
+        let grid = Grid {
+            image: image_size,
+            padded: [columns, rows],
+        };
+        let (values, _) = forward(grid, || (), line);
         Self {
             rows,
             columns,
@@ -137,21 +111,6 @@ impl Spectrum {
             window,
             weights,
         }
-    }
-
-    /// Number of stored column frequencies.
-    pub(crate) fn half(&self) -> usize {
-        self.columns / 2 + 1
-    }
-
-    /// Squared modulus at the grid point (column frequency `kx ≥ 0`, row frequency `ky` mod rows).
-    pub(crate) fn power(&self, kx: usize, ky: usize) -> f64 {
-        self.values[ky * self.half() + kx].norm_sqr()
-    }
-
-    /// Value at the grid point (column frequency `kx ≥ 0`, row frequency `ky` mod rows).
-    pub(crate) fn value(&self, kx: usize, ky: usize) -> Complex64 {
-        self.values[ky * self.half() + kx]
     }
 
     /// Grid step, rad per pixel, along columns and rows.
@@ -187,8 +146,14 @@ impl Spectrum {
                 Overlap::Separable(x, y)
             }
             Some(weights) => {
-                let line = |row: usize, out: &mut [f64]| out.copy_from_slice(weights.row(row));
-                let spectrum = forward(self.image_size, self.rows, self.columns, line);
+                let grid = Grid {
+                    image: self.image_size,
+                    padded: [self.columns, self.rows],
+                };
+                let line = |(): &mut (), row: usize, out: &mut [f64]| {
+                    out.copy_from_slice(weights.row(row));
+                };
+                let (spectrum, _) = forward(grid, || (), line);
                 Overlap::Full(self.summed(&spectrum, max_lag))
             }
         };
@@ -214,12 +179,7 @@ impl Spectrum {
             .iter()
             .map(|v| Complex64::new(v.norm_sqr(), 0.0))
             .collect();
-        let (plan, inverse) = PLANNERS.with_borrow_mut(|(real, complex)| {
-            (
-                real.plan_fft_inverse(self.columns),
-                complex.plan_fft_inverse(self.rows),
-            )
-        });
+        let (plan, inverse) = inverses(self.rows, self.columns);
         columns_in_place(&mut power, self.rows, half, &*inverse);
         let mut scratch = plan.make_scratch_vec();
         let mut line = plan.make_output_vec();
@@ -235,6 +195,66 @@ impl Spectrum {
             out.extend(negative.iter().chain(positive).map(|v| v * scale));
         }
         out
+    }
+}
+
+impl<T: Kept> Spectrum<T> {
+    /// The transform of values that `line` writes line by line, none of them missing, under the window and without padding,
+    /// and what it says of each line. `room` makes what it needs, once for many lines.
+    pub(crate) fn of_lines<S, R: Send>(
+        image_size: [usize; 2],
+        room: impl Fn() -> S + Sync,
+        line: impl Fn(&mut S, usize, &mut [f64]) -> R + Sync,
+    ) -> (Self, Vec<R>) {
+        let [columns, rows] = image_size;
+        let window = image_size.map(hann);
+        let grid = Grid {
+            image: image_size,
+            padded: image_size,
+        };
+        let (values, said) = forward(grid, room, |room, row, out: &mut [f64]| {
+            let said = line(room, row, out);
+            for (value, w) in out.iter_mut().zip(&window[0]) {
+                *value *= w * window[1][row];
+            }
+            said
+        });
+        let spectrum = Self {
+            rows,
+            columns,
+            image_size,
+            values,
+            window,
+            weights: None,
+        };
+        (spectrum, said)
+    }
+
+    /// Number of stored column frequencies.
+    pub(crate) fn half(&self) -> usize {
+        self.columns / 2 + 1
+    }
+
+    /// Value at any frequency of the grid, of either sign.
+    pub(crate) fn at(&self, x: i64, y: i64) -> Complex64 {
+        let (rows, columns) = (self.rows as i64, self.columns as i64);
+        let x = x.rem_euclid(columns);
+        if x > columns / 2 {
+            let (x, y) = ((columns - x) as usize, (-y).rem_euclid(rows) as usize);
+            self.value(x, y).conj()
+        } else {
+            self.value(x as usize, y.rem_euclid(rows) as usize)
+        }
+    }
+
+    /// Squared modulus at the grid point (column frequency `kx ≥ 0`, row frequency `ky` mod rows).
+    pub(crate) fn power(&self, kx: usize, ky: usize) -> f64 {
+        self.value(kx, ky).norm_sqr()
+    }
+
+    /// Value at the grid point (column frequency `kx ≥ 0`, row frequency `ky` mod rows).
+    pub(crate) fn value(&self, kx: usize, ky: usize) -> Complex64 {
+        wide(self.values[ky * self.half() + kx])
     }
 }
 
@@ -309,64 +329,6 @@ fn padded(n: usize) -> usize {
         m += 1;
     }
     m
-}
-
-thread_local! {
-    /// Planners keep the plans they made: planning costs as much as a small transform.
-    static PLANNERS: RefCell<(RealFftPlanner<f64>, FftPlanner<f64>)> =
-        RefCell::new((RealFftPlanner::new(), FftPlanner::new()));
-}
-
-/// Real-to-complex transform of `image_rows` lines, zero-padded to `rows × columns`.
-///
-/// `line` fills in one line; the padding of the buffer it is given is zero already.
-fn forward(
-    image_size: [usize; 2],
-    rows: usize,
-    columns: usize,
-    mut line: impl FnMut(usize, &mut [f64]),
-) -> Vec<Complex64> {
-    let half = columns / 2 + 1;
-    let (real, complex) = PLANNERS.with_borrow_mut(|(real, complex)| {
-        (
-            real.plan_fft_forward(columns),
-            complex.plan_fft_forward(rows),
-        )
-    });
-    let mut values = vec![Complex64::default(); rows * half];
-    let mut scratch = real.make_scratch_vec();
-    let mut buffer = real.make_input_vec();
-    let lines = values.chunks_exact_mut(half).take(image_size[1]);
-    for (row, out) in lines.enumerate() {
-        interrupt::check();
-        buffer.fill(0.0);
-        line(row, &mut buffer[..image_size[0]]);
-        real.process_with_scratch(&mut buffer, out, &mut scratch)
-            .unwrap_or_else(|e| unreachable!("row buffers fit their plan: {e}"));
-    }
-    columns_in_place(&mut values, rows, half, &*complex);
-    values
-}
-
-/// Transforms every column of a `rows × width` matrix in place, a few columns at a time.
-fn columns_in_place(values: &mut [Complex64], rows: usize, width: usize, plan: &dyn Fft<f64>) {
-    let mut block = vec![Complex64::default(); COLUMN_BLOCK * rows];
-    let mut scratch = vec![Complex64::default(); plan.get_inplace_scratch_len()];
-    for first in (0..width).step_by(COLUMN_BLOCK) {
-        interrupt::check();
-        let count = COLUMN_BLOCK.min(width - first);
-        for row in 0..rows {
-            for c in 0..count {
-                block[c * rows + row] = values[row * width + first + c];
-            }
-        }
-        plan.process_with_scratch(&mut block[..count * rows], &mut scratch);
-        for row in 0..rows {
-            for c in 0..count {
-                values[row * width + first + c] = block[c * rows + row];
-            }
-        }
-    }
 }
 
 #[cfg(test)]

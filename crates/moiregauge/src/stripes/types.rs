@@ -12,14 +12,14 @@ use crate::window::types::UsedHarmonic;
 pub enum NoStripes {
     /// There are none.
     #[error(
-        "no stripes either: no wave of three periods or more with a wave vector off the slow axis stands out of the \
-         noise in all its images"
+        "the scan shows no stripes either: in none of its images does a wave of three or more periods, with a wave \
+         vector off the slow axis, exceed the noise"
     )]
     Nothing,
     /// Waves of several directions lie on each other.
     #[error(
-        "waves of {0} directions cross in most of the image: that is a lattice, too weak or too distorted to be \
-         measured, and no stripes"
+        "waves of {0} directions cross in most of the image. This is a lattice, not stripes, but it is too weak or too \
+         distorted to be measured"
     )]
     Crossing(usize),
 }

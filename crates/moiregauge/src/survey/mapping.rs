@@ -65,8 +65,8 @@ pub enum MapError {
     NoImage,
     /// The windows do not fit into the frame.
     #[error(
-        "the frame is too small for a map, or the lattice shows nowhere in it: windows of 0.6 periods \
-         and margins of two windows have to fit"
+        "the frame is too small for a map (windows of 0.6 periods with margins of two windows must fit), or it shows a \
+         lattice nowhere"
     )]
     TooSmall,
 }

@@ -268,7 +268,7 @@ mod tests {
 
     use super::*;
     use crate::map::local::local_lattices;
-    use crate::map::tests::{map_of, pulls, rms};
+    use crate::map::tests::{map_of, map_of_image, pulls, rms};
     use crate::numbers::rng;
     use crate::simulate::field::FieldScene;
     use crate::window::mask::Mask;
@@ -392,15 +392,7 @@ mod tests {
                     let noise = one_over_f(0.4, q, seed, row as u64);
                     line.iter_mut().zip(noise).for_each(|(v, n)| *v += n);
                 }
-                let reference = Reference {
-                    pair: scene.pair,
-                    pitch: [1.0; 2],
-                };
-                let resolution = Resolution {
-                    window_nm: window,
-                    ..Resolution::default()
-                };
-                let map = local_lattices(&image, &reference, &resolution).unwrap();
+                let map = map_of_image(&image, &scene.pair, window);
                 let [stated, _] = pulls(&scene, &map, 1.0);
                 assert!(
                     rms(&stated) < 1.3,

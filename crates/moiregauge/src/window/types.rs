@@ -26,8 +26,8 @@ const OF_SIDE: f64 = 0.25;
 pub enum ResolutionError {
     /// The window is wider than the image.
     #[error(
-        "a window of {window_nm} nm does not fit into this image: its width has to be positive, and {widths} times that \
-         has to fit into the shorter side, {side_nm:.1} nm"
+        "a window of {window_nm} nm does not fit into this image. Its width must be positive, and {widths} times the \
+         width must fit into the shorter side, {side_nm:.1} nm"
     )]
     Window {
         /// What was asked for.
@@ -39,8 +39,8 @@ pub enum ResolutionError {
     },
     /// The nodes are farther from each other than the image is wide.
     #[error(
-        "nodes {step_nm} nm apart do not fit into this image: their distance has to be positive and no more than the \
-         shorter side, {side_nm:.1} nm"
+        "nodes {step_nm} nm apart do not fit into this image. Their distance must be positive and at most the shorter \
+         side, {side_nm:.1} nm"
     )]
     Step {
         /// What was asked for.

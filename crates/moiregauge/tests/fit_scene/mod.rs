@@ -34,6 +34,9 @@ pub(crate) struct Scene {
     pub(crate) line_flicker: f64,
     /// By how much the wavelength along x changes from the left edge to the right one, as a share.
     pub(crate) change: f64,
+    /// By how much the wave vector along x is smaller in the middle column than its mean, as a share; at the edges it is larger by twice
+    /// that.
+    pub(crate) bow: f64,
     pub(crate) seed: u64,
 }
 
@@ -73,6 +76,7 @@ impl Scene {
             flicker: 0.0,
             line_flicker: 0.0,
             change: 0.0,
+            bow: 0.0,
             seed,
         };
         let pair = scene.pair();
@@ -117,11 +121,14 @@ impl Scene {
     pub(crate) fn image(&self) -> Image {
         let [columns, rows] = self.size;
         let mut values = vec![0.0; columns * rows];
-        // Where a position of the lattice without change ends up: x − change · (x − middle)²/2 columns.
+        // Where a position of the lattice without change ends up: x − change · (x − middle)²/2 columns, and a cubic that is 0 at the edges.
         let position = |c: usize| {
             let x = c as f64;
             let middle = 0.5 * (columns as f64 - 1.0);
+            let half = 0.5 * columns as f64;
+            let edge = (x - middle) / half;
             x - 0.5 * self.change * (x - middle).powi(2) / columns as f64
+                + self.bow * half * (edge.powi(3) - edge)
         };
         for wave in &self.waves {
             let along: Vec<(f64, f64)> = (0..columns)

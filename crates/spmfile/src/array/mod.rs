@@ -18,7 +18,13 @@ pub(crate) use read::{open_jpeg, open_png, open_tiff};
 pub(crate) use read::{open_npy, open_text};
 #[cfg(feature = "write")]
 pub use write::csv;
+#[cfg(feature = "write")]
+pub(crate) use write::csv_between;
 #[cfg(all(feature = "write", feature = "archives"))]
 pub use write::npz;
+#[cfg(all(feature = "write", feature = "archives"))]
+pub(crate) use write::npz_between;
 #[cfg(all(feature = "write", feature = "pictures"))]
 pub use write::tiff;
+#[cfg(all(feature = "write", feature = "pictures"))]
+pub(crate) use write::tiff_between;

@@ -17,9 +17,13 @@ use zip::write::SimpleFileOptions;
 #[cfg(feature = "archives")]
 use zip::{CompressionMethod, ZipWriter};
 
-use crate::export::{ExportError, checked_values, positions, unique_names};
+use crate::export::{ExportError, checked_values, from_the_top, positions, unique_names};
 use crate::labels;
 use crate::scan::{Channel, Scan};
+
+/// Bytes that are put into an archive at a time.
+#[cfg(feature = "archives")]
+const PIECE: usize = 1 << 20;
 
 /// The bytes of a `.npz` archive: one array of doubles per channel, with a text of the same name;
 /// `x_nm` and `y_nm`, the positions of columns and lines, where all channels share them.
@@ -29,6 +33,16 @@ use crate::scan::{Channel, Scan};
 /// - A channel's samples do not fill its lines.
 #[cfg(feature = "archives")]
 pub fn npz(scan: &Scan, log: &[String]) -> Result<Vec<u8>, ExportError> {
+    npz_between(scan, log, &|| ())
+}
+
+/// The same; `between` is called before each line and each array.
+#[cfg(feature = "archives")]
+pub(crate) fn npz_between(
+    scan: &Scan,
+    log: &[String],
+    between: &dyn Fn(),
+) -> Result<Vec<u8>, ExportError> {
     let mut zip = ZipWriter::new(Cursor::new(Vec::new()));
     // Without a date, so that the same scan gives the same bytes.
     let options = SimpleFileOptions::default()
@@ -39,11 +53,8 @@ pub fn npz(scan: &Scan, log: &[String]) -> Result<Vec<u8>, ExportError> {
     let mut texts = Vec::new();
     for (name, channel) in unique_names(scan)?.into_iter().zip(&scan.channels) {
         let values = checked_values(channel)?;
-        let top_first: Vec<f64> = values
-            .rchunks_exact(channel.columns)
-            .flatten()
-            .copied()
-            .collect();
+        let lines = from_the_top(&values, channel, between);
+        let top_first: Vec<f64> = lines.flatten().copied().collect();
         let shape = format!("({}, {})", channel.rows, channel.columns);
         entries.push((format!("{name}.npy"), npy(&shape, &top_first)));
         texts.push((
@@ -61,8 +72,11 @@ pub fn npz(scan: &Scan, log: &[String]) -> Result<Vec<u8>, ExportError> {
     for (name, content) in entries.iter().chain(&texts) {
         zip.start_file(name.as_str(), options)
             .map_err(|e| ExportError::Library(e.to_string()))?;
-        zip.write_all(content)
-            .map_err(|e| ExportError::Library(e.to_string()))?;
+        for piece in content.chunks(PIECE) {
+            between();
+            zip.write_all(piece)
+                .map_err(|e| ExportError::Library(e.to_string()))?;
+        }
     }
     let finished = zip.finish();
     Ok(finished
@@ -102,6 +116,16 @@ fn npy(shape: &str, values: &[f64]) -> Vec<u8> {
 /// - The file would be longer than 4 GB.
 #[cfg(feature = "pictures")]
 pub fn tiff(scan: &Scan, log: &[String]) -> Result<Vec<u8>, ExportError> {
+    tiff_between(scan, log, &|| ())
+}
+
+/// The same; `between` is called before each line.
+#[cfg(feature = "pictures")]
+pub(crate) fn tiff_between(
+    scan: &Scan,
+    log: &[String],
+    between: &dyn Fn(),
+) -> Result<Vec<u8>, ExportError> {
     if scan.channels.is_empty() {
         return Err(ExportError::NoChannel);
     }
@@ -111,11 +135,8 @@ pub fn tiff(scan: &Scan, log: &[String]) -> Result<Vec<u8>, ExportError> {
     let pictures = scan.channels.len();
     for channel in &scan.channels {
         let values = checked_values(channel)?;
-        let top_first: Vec<f32> = values
-            .rchunks_exact(channel.columns)
-            .flatten()
-            .map(|&value| value as f32)
-            .collect();
+        let lines = from_the_top(&values, channel, between);
+        let top_first: Vec<f32> = lines.flatten().map(|&value| value as f32).collect();
         let count = |n: usize| u32::try_from(n).map_err(|_| ExportError::TooLong);
         let mut image = encoder
             .new_image::<Gray32Float>(count(channel.columns)?, count(channel.rows)?)
@@ -164,13 +185,23 @@ fn per_nm(pitch: f64) -> Rational {
 /// # Errors
 /// A channel's samples do not fill its lines.
 pub fn csv(scan: &Scan, channel: &Channel, log: &[String]) -> Result<Vec<u8>, ExportError> {
+    csv_between(scan, channel, log, &|| ())
+}
+
+/// The same; `between` is called before each line.
+pub(crate) fn csv_between(
+    scan: &Scan,
+    channel: &Channel,
+    log: &[String],
+    between: &dyn Fn(),
+) -> Result<Vec<u8>, ExportError> {
     let values = checked_values(channel)?;
     let mut text = String::new();
     // Writing to a string cannot fail.
     for line in labels::text(scan, channel, log).lines() {
         let _ = writeln!(text, "# {line}");
     }
-    for row in values.rchunks_exact(channel.columns) {
+    for row in from_the_top(&values, channel, between) {
         for (index, value) in row.iter().enumerate() {
             let comma = if index > 0 { "," } else { "" };
             let _ = if value.is_nan() {

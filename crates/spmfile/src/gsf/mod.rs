@@ -13,3 +13,5 @@ mod write;
 pub(crate) use read::open;
 #[cfg(feature = "write")]
 pub use write::write;
+#[cfg(feature = "write")]
+pub(crate) use write::write_between;

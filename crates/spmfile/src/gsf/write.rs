@@ -1,7 +1,7 @@
 //! A scan → the bytes of a file.
 
 use super::read::KEYS;
-use crate::export::{ExportError, base_values};
+use crate::export::{ExportError, base_values, from_the_top};
 use crate::fields;
 use crate::labels;
 use crate::scan::{Channel, Scan};
@@ -14,6 +14,16 @@ use crate::scan::{Channel, Scan};
 /// # Errors
 /// The samples do not fill the lines of the channel.
 pub fn write(scan: &Scan, channel: &Channel, log: &[String]) -> Result<Vec<u8>, ExportError> {
+    write_between(scan, channel, log, &|| ())
+}
+
+/// The same; `between` is called before each line.
+pub(crate) fn write_between(
+    scan: &Scan,
+    channel: &Channel,
+    log: &[String],
+    between: &dyn Fn(),
+) -> Result<Vec<u8>, ExportError> {
     let (values, unit) = base_values(channel)?;
     let mut header = "Gwyddion Simple Field 1.0\n".to_owned();
     let mut put = |key: &str, value: &str| fields::put(&mut header, key, value);
@@ -43,8 +53,7 @@ pub fn write(scan: &Scan, channel: &Channel, log: &[String]) -> Result<Vec<u8>, 
     }
     let mut bytes = header.into_bytes();
     bytes.resize((bytes.len() / 4 + 1) * 4, 0);
-    // The top line comes first.
-    for line in values.rchunks_exact(channel.columns) {
+    for line in from_the_top(&values, channel, between) {
         bytes.extend(line.iter().flat_map(|&value| (value as f32).to_le_bytes()));
     }
     Ok(bytes)

@@ -1,6 +1,6 @@
 //! Scans as Gwyddion containers. The layout is in the head of [`super`].
 
-use crate::export::{ExportError, base_values};
+use crate::export::{ExportError, base_values, from_the_top};
 use crate::labels;
 use crate::scan::{Channel, Scan};
 use crate::words::one_line;
@@ -14,6 +14,15 @@ use crate::words::one_line;
 /// - A channel's samples do not fill its lines.
 /// - The file would be longer than 4 GB.
 pub fn write(scan: &Scan, log: &[String]) -> Result<Vec<u8>, ExportError> {
+    write_between(scan, log, &|| ())
+}
+
+/// The same; `between` is called before each line.
+pub(crate) fn write_between(
+    scan: &Scan,
+    log: &[String],
+    between: &dyn Fn(),
+) -> Result<Vec<u8>, ExportError> {
     if scan.channels.is_empty() {
         return Err(ExportError::NoChannel);
     }
@@ -23,7 +32,7 @@ pub fn write(scan: &Scan, log: &[String]) -> Result<Vec<u8>, ExportError> {
             &mut items,
             &format!("/{number}/data"),
             "GwyDataField",
-            |o| data_field(o, scan, channel),
+            |o| data_field(o, scan, channel, between),
         )?;
         put_text(&mut items, &format!("/{number}/data/title"), &channel.name);
         let mut lines = labels::describe(scan);
@@ -48,7 +57,12 @@ pub fn write(scan: &Scan, log: &[String]) -> Result<Vec<u8>, ExportError> {
     Ok(bytes)
 }
 
-fn data_field(out: &mut Vec<u8>, scan: &Scan, channel: &Channel) -> Result<(), ExportError> {
+fn data_field(
+    out: &mut Vec<u8>,
+    scan: &Scan,
+    channel: &Channel,
+    between: &dyn Fn(),
+) -> Result<(), ExportError> {
     let (values, unit) = base_values(channel)?;
     let count = |n: usize| i32::try_from(n).map_err(|_| ExportError::TooLong);
     let (columns, rows) = (count(channel.columns)?, count(channel.rows)?);
@@ -77,8 +91,7 @@ fn data_field(out: &mut Vec<u8>, scan: &Scan, channel: &Channel) -> Result<(), E
     let length = u32::try_from(values.len()).map_err(|_| ExportError::TooLong)?;
     head(out, "data", b'D');
     out.extend(length.to_le_bytes());
-    // The top line comes first.
-    for line in values.rchunks_exact(channel.columns) {
+    for line in from_the_top(&values, channel, between) {
         out.extend(line.iter().flat_map(|value| value.to_le_bytes()));
     }
     Ok(())

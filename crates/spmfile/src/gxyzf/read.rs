@@ -118,7 +118,7 @@ impl<'a> Points<'a> {
         let size = |key: &str| fields::count(fields, key).ok();
         let (Some(columns), Some(rows)) = (size("XRes"), size("YRes")) else {
             return Err(unsupported(format!(
-                "it holds {points} points without XRes and YRes: which of them make a line is not told"
+                "it holds {points} points without XRes and YRes, so it is not known which of them make a line"
             )));
         };
         if columns.checked_mul(rows) != Some(points) {

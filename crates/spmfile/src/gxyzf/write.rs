@@ -6,7 +6,7 @@ use crate::fields;
 use crate::labels;
 use crate::scan::{Channel, Scan, Span};
 
-/// The bytes of a `.gxyzf` file: `channels` at the positions that the sensors `x` and `y` recorded.
+/// The bytes of a `.gxyzf` file: `channels` at the positions that the `sensors` of x and y recorded.
 ///
 /// Values are in SI base units; the points come line by line, the bottom line first.
 ///
@@ -15,9 +15,20 @@ use crate::scan::{Channel, Scan, Span};
 /// - A sensor is not in a unit of length.
 pub fn write(
     scan: &Scan,
+    sensors: [&Channel; 2],
+    channels: &[&Channel],
+    log: &[String],
+) -> Result<Vec<u8>, ExportError> {
+    write_between(scan, sensors, channels, log, &|| ())
+}
+
+/// The same; `between` is called before each line.
+pub(crate) fn write_between(
+    scan: &Scan,
     [x, y]: [&Channel; 2],
     channels: &[&Channel],
     log: &[String],
+    between: &dyn Fn(),
 ) -> Result<Vec<u8>, ExportError> {
     if channels.is_empty() {
         return Err(ExportError::NoChannel);
@@ -54,6 +65,9 @@ pub fn write(
     bytes.resize((bytes.len() / 8 + 1) * 8, 0);
     bytes.reserve(8 * values.len() * rows * columns);
     for point in 0..rows * columns {
+        if point % columns == 0 {
+            between();
+        }
         for of_channel in &values {
             bytes.extend(of_channel[point].to_le_bytes());
         }

@@ -58,7 +58,7 @@ pub(super) fn outline<'a>(
     let meanwhile = [&geometry[..], &times, &changed(&PLACE)].concat();
     if !meanwhile.is_empty() {
         scan.notes.push(format!(
-            "changed while the file was recorded, so that parts of it may lie elsewhere: {}",
+            "changed while the file was recorded, so parts of it may have another position: {}",
             meanwhile.join(", ")
         ));
     }
@@ -111,7 +111,7 @@ fn place(scan: &mut Scan, state: &State, steady: bool) {
     if let Some(zoom) = zoom.filter(|zoom| zoom.number() != Some(1.0)) {
         scan.size_nm = None;
         scan.notes.push(format!(
-            "the size is left out, since descriptions differ on what a zoom of {zoom} means for it"
+            "the size is left out, because descriptions differ on how a zoom of {zoom} changes it"
         ));
     }
     let angle = state.quantity(&["Angle"], &DEGREE);
@@ -173,7 +173,7 @@ fn scaling(name: &str, understood: &Understood<'_>, notes: &mut Vec<String>) -> 
             "channel {name} is in counts: {}",
             match understood.transfer {
                 Some(transfer) => format!("its function {} is not known", transfer.kind),
-                None => "no function in the log is surely its own".to_owned(),
+                None => "no function in the log certainly belongs to it".to_owned(),
             }
         ));
         let counts = Scaling {

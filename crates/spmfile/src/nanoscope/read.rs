@@ -194,7 +194,7 @@ impl Places {
         if data.end > self.available {
             let found = self.available.saturating_sub(data.start);
             let error = format!(
-                "it is {found} bytes long but its header promises {}",
+                "it is {found} bytes long, but its header promises {}",
                 data.end - data.start
             );
             self.damage.push(UnreadableChannel {
@@ -309,8 +309,8 @@ fn moved_data(bytes: &[u8], header: &HeaderText<'_>) -> Option<String> {
     let filling = |b: &u8| matches!(b, 0 | 0x1a | b'\r' | b'\n');
     let first = padding.iter().position(|b| !filling(b))?;
     Some(format!(
-        "the data begin {} bytes or more before the place the header gives: bytes of the header are \
-         lost, and the values of the other channels must not be trusted",
+        "the data begin {} bytes or more before the place the header gives: bytes of the header are lost, and the \
+         values of the other channels cannot be trusted",
         padding.len() - first
     ))
 }

@@ -2,7 +2,7 @@
 
 use heterostrain::lattice::{Lattice, Waves};
 use heterostrain::strain::{TwistStrain, draws};
-use nalgebra::{Matrix2, Vector2};
+use nalgebra::{Matrix2, Matrix4, Vector2};
 use rayon::prelude::*;
 use spmfile::FrameDirection;
 
@@ -10,6 +10,7 @@ use crate::campaign::Checks;
 use crate::campaign::analysis::{Drift, DriftFit, ScanAnalysis, SetAnalysis, SetMean};
 use crate::campaign::group::Group;
 use crate::campaign::set::about::{about_checks, about_mean, about_readings, about_residual};
+use crate::campaign::set::common::common;
 use crate::campaign::set::faint::too_faint;
 use crate::campaign::set::headers::{about_dates, about_headers};
 use crate::campaign::set::moire::moire;
@@ -87,10 +88,12 @@ pub(crate) fn analyse_set(
     if let Some(doubt) = doubt {
         caveats.push(Caveat::new(doubt, name));
     } else {
-        uncorrected = without_drift(&all, &scans, kept.len(), &pitch, settings, strengths);
+        let shared = common(&used, reference);
+        let alone = kept.len() == 1;
+        uncorrected = without_drift(&all, &scans, alone, &shared, &pitch, settings, strengths);
         mean = solved
             .as_ref()
-            .and_then(|solved| at_drift(solved, &scans, &pitch, settings, strengths));
+            .and_then(|solved| at_drift(solved, &scans, &shared, &pitch, settings, strengths));
     }
     let set = SetAnalysis {
         name: name.clone(),
@@ -191,18 +194,24 @@ fn pitch_error(used: &[&MeasuredScan]) -> Matrix2<f64> {
         .map_or_else(Matrix2::zeros, MeasuredLine::pitch_error)
 }
 
-/// The mean of the scans, their drift taken off.
+/// The mean of the scans, their drift taken off; `shared` is the covariance that they have in common.
 fn at_drift(
     solved: &Solved,
     scans: &[ScanAnalysis],
+    shared: &Matrix4<f64>,
     pitch: &Matrix2<f64>,
     settings: &Settings,
     strengths: &WaveStrengths,
 ) -> Option<SetMean> {
     let of = |s: &ScanAnalysis| (s.twist_strain, s.drift_corrected.unwrap_or(s.sensor));
+    let lattice = &solved.lattice;
+    let statistical = Statistical {
+        image: solved.statistical.image + shared,
+        ..solved.statistical
+    };
     set_mean(
-        &solved.lattice,
-        &solved.statistical,
+        &Lattice::new(lattice.basis, lattice.covariance + shared),
+        &statistical,
         pitch,
         Agreement {
             chi2_per_dof: solved.chi2 / solved.freedom as f64,
@@ -214,11 +223,12 @@ fn at_drift(
     )
 }
 
-/// The mean of the `used` scans as if nothing drifted, with the errors that drift adds left out.
+/// The mean of the scans as if nothing drifted, with the errors that drift adds left out; `alone`: there is one scan.
 fn without_drift(
     all: &[Observation],
     scans: &[ScanAnalysis],
-    used: usize,
+    alone: bool,
+    shared: &Matrix4<f64>,
     pitch: &Matrix2<f64>,
     settings: &Settings,
     strengths: &WaveStrengths,
@@ -227,13 +237,13 @@ fn without_drift(
         common_lattice(all, &Vector2::zeros(), &Matrix2::zeros()).ok()?;
     let [image, sensor] = at_known_drift(all)?;
     // The scatter of several scans is that of their drift; that of the two lines of one is not.
-    let scale = if used == 1 {
+    let scale = if alone {
         enlargement(chi2, freedom)
     } else {
         1.0
     };
-    let lattice = Lattice::new(lattice.basis, lattice.covariance * scale);
-    let statistical = Statistical::without_drift(&(image * scale), &(sensor * scale));
+    let lattice = Lattice::new(lattice.basis, lattice.covariance * scale + shared);
+    let statistical = Statistical::without_drift(&(image * scale + shared), &(sensor * scale));
     let of = |s: &ScanAnalysis| (s.twist_strain_sensor, s.sensor);
     set_mean(
         &lattice,

@@ -83,7 +83,7 @@ pub(crate) fn about_headers(
         .map(|(words, other)| format!("{words}: {}", in_words(other.as_ref())))
         .collect();
     let evidence = format!(
-        "as the headers say: {}; {}",
+        "with the headers: {}; {}",
         in_words(Some(found)),
         evidence.join("; ")
     );

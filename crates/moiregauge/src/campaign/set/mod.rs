@@ -2,6 +2,7 @@
 
 pub(crate) mod about;
 pub(crate) mod analyse;
+pub(crate) mod common;
 pub(crate) mod faint;
 pub(crate) mod headers;
 pub(crate) mod joint;

@@ -50,7 +50,7 @@ pub(crate) fn doubts(
 ) {
     let layers = &settings.material;
     let assumed = if settings.layers_are_assumed() {
-        ", assumed since no layers were named"
+        ", assumed because no layers were named"
     } else {
         ""
     };
@@ -153,7 +153,7 @@ fn about_period(name: &str, lattice: &Lattice, settings: &Settings) -> Option<Ca
         .min_by(|a, b| off(a.1).total_cmp(&off(b.1)));
     let mut layers = settings.bilayer().name();
     if assumed {
-        layers += ", which nobody named and which was assumed";
+        layers += ", which was assumed because no layers were named";
     }
     let doubt = match known {
         Some((surface, constant)) => PeriodDoubt::OfSurface {

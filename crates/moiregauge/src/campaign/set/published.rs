@@ -85,8 +85,8 @@ pub(crate) fn drift(
 ) -> Option<Solved> {
     let minimum = successive_drift(scans);
     if minimum.is_none() {
-        let reason = "the published comparison of successive scans has no minimum: there are no two scans of one line \
-             direction in a row, or they contradict each other"
+        let reason = "the published comparison of successive scans has no minimum. Either no two successive scans have \
+                      the same line direction, or the scans contradict each other"
             .to_owned();
         caveats.push(Caveat::new(DriftDoubt::Undetermined { reason }, name));
     }

@@ -1,30 +1,35 @@
-//! Is the lattice the same everywhere in the frame?
+//! Is the lattice the same everywhere in the frame, and if not, what is its mean?
 //!
 //! In: a finished fit, its residual and the noise around each harmonic. Out: by how much the wave vectors
-//! change across the frame, and whether that is more than noise.
+//! change across the frame, whether that is more than noise, and how far their mean over the area is from what the fit says.
 //!
 //! A lattice that changes smoothly is a lattice with a bent phase, `θ_hk = (h p₁ + k p₂)·(X, Y) + h ψ₁ +
-//! k ψ₂` with `ψ = a X² + b XY + c Y²`. The six numbers are not fitted; how the residual correlates with
-//! them is enough (score test): χ² with six degrees of freedom, and one Gauss–Newton step for their size.
+//! k ψ₂` with `ψ = a X² + b XY + c Y² + d X³ + e X²Y + f XY² + g Y³`. The fourteen numbers are not fitted; how the residual
+//! correlates with them is enough (score test): χ² with fourteen degrees of freedom, and one Gauss–Newton step for their size.
 //! A drift that gets faster or slower bends the phase along the slow axis just so.
+//!
+//! Of `p X + d X³` the fit sees `p + 3d/5`, since the slope in the middle weighs more in it than that at the ends, and the mean of the
+//! slope over the area is `p + d`. The step has both.
 //!
 //! # References
 //! Rao, Proc. Camb. Phil. Soc. 44, 50 (1948), score test.
 
-use nalgebra::{DMatrix, DVector, Matrix2, Matrix4, Vector2};
+use nalgebra::{DMatrix, DVector, Matrix2, Matrix4, Vector2, Vector4};
 use serde::{Deserialize, Serialize};
 
 use crate::lattice::fit::folded::Bends;
-use crate::lattice::fit::frame::{BENT, Frame, wave};
+use crate::lattice::fit::frame::{BENDS, BENT, Frame, wave};
 use crate::lattice::fit::gram::gram;
 use crate::lattice::fit::model::Model;
 use crate::lattice::fit::solve;
 use crate::numbers::exact;
 use crate::spectrum::shells::FIRST_SHELL;
 
-/// χ² with six degrees of freedom exceeds 22.5 once in a thousand; the noise that it is counted in is
-/// known to a tenth, which makes it 27.
-const THRESHOLD: f64 = 27.0;
+/// χ² with fourteen degrees of freedom exceeds 36.1 once in a thousand; the noise that it is counted in is
+/// known to a tenth, which makes it 43.
+const THRESHOLD: f64 = 43.0;
+/// The same for the eight numbers of the cubic terms: 26.1.
+const CUBIC: f64 = 31.0;
 /// Changes below this share across the frame harm nobody: a tenth of the calibration that is assumed.
 const HARMLESS: f64 = 1e-3;
 
@@ -45,31 +50,57 @@ pub struct Inhomogeneity {
     /// What chance exceeds once in a thousand.
     #[serde(with = "exact")]
     pub threshold: f64,
+    /// By how much the wave vectors' mean over the area exceeds that of the fit, rad per pixel, a column each.
+    #[serde(with = "exact")]
+    pub mean: Matrix2<f64>,
+    /// What noise adds to the covariance of the wave vectors when that is added to them, as
+    /// [`Pair`](heterostrain::lattice::Pair) has them.
+    #[serde(with = "exact")]
+    pub noise: Matrix4<f64>,
+    /// χ² of the eight numbers of the third order, of which the mean is made.
+    #[serde(with = "exact")]
+    pub cubic: f64,
 }
 
-/// What the fit makes of a lattice that changes is no area mean: of a wave vector that goes like `a x + b x²` over −1 … 1, the fit
-/// sees 3b/5 and the mean is b/3. Where b is as large as a, 2/15 of the change from end to end.
-const OF_THE_MEAN: f64 = 2.0 / 15.0;
+/// Where fewer residuals than this share are cut off, three times what Gaussian noise has, the fit follows a lattice that bends, and
+/// it is no matter of outliers.
+pub(crate) const FOLLOWED: f64 = 0.01;
+/// What powers beyond the third do to the mean, as a share of what the third does: a wave of the lattice one and a half times as long
+/// as the frame makes it 0.08, one as long as the frame 0.19, one of two thirds of it 0.6.
+const BEYOND: f64 = 0.2;
 
 impl Inhomogeneity {
-    /// How far the waves (columns) may be from their mean over the area: covariance of the four numbers, as
-    /// [`Pair`](heterostrain::lattice::Pair) has them.
-    pub(crate) fn of_the_mean(&self, waves: &Matrix2<f64>) -> Matrix4<f64> {
-        let mut covariance = Matrix4::zeros();
-        for (i, wave) in waves.column_iter().enumerate() {
-            let along = wave * (OF_THE_MEAN * self.wavelength);
-            let across = Vector2::new(-wave.y, wave.x) * (OF_THE_MEAN * self.angle);
-            let block = along * along.transpose() + across * across.transpose();
-            covariance
-                .fixed_view_mut::<2, 2>(2 * i, 2 * i)
-                .copy_from(&block);
-        }
-        covariance
-    }
-
     /// Whether it is more than chance, and enough to matter.
     pub fn stands_out(&self) -> bool {
         self.chi_squared > self.threshold && self.wavelength.max(self.angle) > HARMLESS
+    }
+
+    /// Whether the mean over the area is to be added: it is more than chance, and the fit follows the lattice. `clipped`: the share of
+    /// the pixels whose residuals are cut off. Of a lattice that bends more than the fit can follow, and of outliers, many are.
+    fn tells_the_mean(&self, clipped: f64) -> bool {
+        clipped < FOLLOWED && self.cubic > CUBIC
+    }
+
+    /// What is to be added to the wave vectors (rad per pixel, a column each), and to their covariance.
+    pub(crate) fn of_the_mean(&self, clipped: f64) -> (Matrix2<f64>, Matrix4<f64>) {
+        let doubt = self.beyond(clipped);
+        if self.tells_the_mean(clipped) {
+            (self.mean, self.noise + doubt)
+        } else {
+            (Matrix2::zeros(), doubt)
+        }
+    }
+
+    /// How far the mean of the waves may be from what is told of it: covariance of the four numbers. All of what the third order says, where
+    /// that is not added.
+    pub(crate) fn beyond(&self, clipped: f64) -> Matrix4<f64> {
+        let share = if self.tells_the_mean(clipped) {
+            BEYOND
+        } else {
+            1.0
+        };
+        let off = Vector4::from_column_slice(self.mean.as_slice()) * share;
+        off * off.transpose()
     }
 }
 
@@ -92,39 +123,112 @@ pub(crate) fn inhomogeneity(
     })?;
     // The four derivatives are free.
     let of_pair = bread.view((0, 0), (4, 4)).into_owned().try_inverse()?;
-    let mut free = DMatrix::zeros(6, 10);
-    free.view_mut((0, 0), (6, 4))
-        .copy_from(&(-bread.view((4, 0), (6, 4)) * of_pair));
-    free.view_mut((0, 4), (6, 6)).fill_with_identity();
+    let coupling = bread.view((4, 0), (2 * BENDS, 4)) * of_pair;
+    let mut free = DMatrix::zeros(2 * BENDS, 4 + 2 * BENDS);
+    free.view_mut((0, 0), (2 * BENDS, 4)).copy_from(&-&coupling);
+    free.view_mut((0, 4), (2 * BENDS, 2 * BENDS))
+        .fill_with_identity();
     let information = &free * bread * free.transpose();
     let variance = &free * meat * free.transpose();
     let score = score(model, bends);
     let chi_squared = score.dot(&solve::solve(&variance, &score)?);
-    let bend = solve::solve(&information, &score)?;
-    let [wavelength, angle] = changes(model, frame, &bend);
+    let inverse = solve::inverse(&information)?;
+    let bend = &inverse * &score;
+    let cubic = cubic_chi_squared(&score, &variance)?;
+    let [wavelength, angle] = changes(model, frame, &told(&bend, cubic));
+    // The fit would be another one with the bends, and they have a mean slope.
+    let scale = frame.edge().map(|e| 1.0 / e);
+    let to_pixels = Matrix4::from_diagonal(&Vector4::new(scale.x, scale.y, scale.x, scale.y));
+    let of_mean = to_pixels * (mean_slopes() - coupling.transpose());
+    let shift = &of_mean * bend;
+    let noise = &of_mean * &inverse * variance * inverse * of_mean.transpose();
     Some(Inhomogeneity {
         wavelength,
         angle,
         chi_squared,
         threshold: THRESHOLD,
+        mean: Matrix2::from_column_slice(shift.as_slice()),
+        noise: Matrix4::from_column_slice(noise.as_slice()),
+        cubic,
     })
+}
+
+/// Which of the bends are of the third order.
+fn cubic() -> Vec<usize> {
+    let is_cubic = |i: &usize| powers()[i % BENDS].iter().sum::<usize>() == 3;
+    (0..2 * BENDS).filter(is_cubic).collect()
+}
+
+/// χ² of those bends.
+fn cubic_chi_squared(score: &DVector<f64>, variance: &DMatrix<f64>) -> Option<f64> {
+    let score = score.select_rows(&cubic());
+    let variance = variance.select_rows(&cubic()).select_columns(&cubic());
+    Some(score.dot(&solve::solve(&variance, &score)?))
+}
+
+/// The bends of which a change is told: those of the third order only where they are more than chance themselves, since they are largest at
+/// the corners and noise alone makes some.
+fn told(bend: &DVector<f64>, chi_squared: f64) -> DVector<f64> {
+    let mut told = bend.clone();
+    if chi_squared < CUBIC {
+        for i in cubic() {
+            told[i] = 0.0;
+        }
+    }
+    told
+}
+
+/// The powers of a bend.
+fn powers() -> &'static [[usize; 2]] {
+    &BENT[BENT.len() - BENDS..]
+}
+
+/// Slopes of `XᵃYᵇ` at a place.
+fn slopes([a, b]: [usize; 2], at: Vector2<f64>) -> Vector2<f64> {
+    let power = |x: f64, n: usize| x.powi(n as i32);
+    let slope = |x: f64, n: usize| match n {
+        0 => 0.0,
+        _ => n as f64 * power(x, n - 1),
+    };
+    Vector2::new(
+        slope(at.x, a) * power(at.y, b),
+        power(at.x, a) * slope(at.y, b),
+    )
+}
+
+/// Means over the frame of the slopes along X and Y of ψ₁, then of ψ₂, for each of the bends.
+fn mean_slopes() -> DMatrix<f64> {
+    // Simpson's rule is exact for cubics.
+    const NODES: [[f64; 2]; 3] = [[-1.0, 1.0 / 6.0], [0.0, 4.0 / 6.0], [1.0, 1.0 / 6.0]];
+    let mut means = DMatrix::zeros(4, 2 * BENDS);
+    for (j, &powers) in powers().iter().enumerate() {
+        let places = NODES.iter().flat_map(|x| NODES.iter().map(move |y| (x, y)));
+        let mean: Vector2<f64> = places
+            .map(|([x, p], [y, q])| slopes(powers, Vector2::new(*x, *y)) * (p * q))
+            .sum();
+        for vector in 0..2 {
+            means[(2 * vector, BENDS * vector + j)] = mean.x;
+            means[(2 * vector + 1, BENDS * vector + j)] = mean.y;
+        }
+    }
+    means
 }
 
 /// `Σ D u` for the derivatives by the bends of ψ₁, then of ψ₂.
 fn score(model: &Model, bends: &Bends) -> DVector<f64> {
-    let mut score = DVector::zeros(6);
+    let mut score = DVector::zeros(2 * BENDS);
     for (i, sums) in bends.0.iter().enumerate() {
         let [alpha, beta] = model.waves[i];
         for (vector, index) in model.basis.indices[i].into_iter().enumerate() {
             for (j, sum) in sums.iter().enumerate() {
-                score[3 * vector + j] += f64::from(index) * (beta * sum.re - alpha * sum.im);
+                score[BENDS * vector + j] += f64::from(index) * (beta * sum.re - alpha * sum.im);
             }
         }
     }
     score
 }
 
-/// What is left of the ten derivatives (pair, then bends), each weighted by `weight(harmonic, powers)`,
+/// What is left of the derivatives (pair, then bends), each weighted by `weight(harmonic, powers)`,
 /// when background and amplitudes are free.
 fn left(
     gram: &DMatrix<f64>,
@@ -133,7 +237,7 @@ fn left(
 ) -> Option<DMatrix<f64>> {
     let terms = model.basis.terms.len();
     let linear = terms + 2 * model.waves.len();
-    let mut map = DMatrix::zeros(gram.nrows(), linear + 10);
+    let mut map = DMatrix::zeros(gram.nrows(), linear + 4 + 2 * BENDS);
     for t in 0..terms {
         map[(t, t)] = 1.0;
     }
@@ -144,38 +248,43 @@ fn left(
         for (vector, index) in model.basis.indices[i].into_iter().enumerate() {
             for (j, &powers) in BENT.iter().enumerate().skip(1) {
                 let factor = f64::from(index) * weight(i, powers);
-                // Two derivatives for each vector, then three bends for each.
+                // Two derivatives for each vector, then its bends.
                 let column = match j {
                     1 | 2 => linear + 2 * vector + j - 1,
-                    _ => linear + 4 + 3 * vector + j - 3,
+                    _ => linear + 4 + BENDS * vector + j - 3,
                 };
                 map[(first + 2 * j, column)] = factor * beta;
                 map[(first + 2 * j + 1, column)] = -factor * alpha;
             }
         }
     }
-    solve::projected(gram, &map, 10)
+    solve::projected(gram, &map, 4 + 2 * BENDS)
 }
 
-/// The largest change of wavelength (share) and direction (rad) of the first harmonics from corner to
-/// corner.
+/// The largest change of wavelength (share) and direction (rad) of the first harmonics between two of nine places: the corners, the
+/// middles of the edges and that of the frame.
 fn changes(model: &Model, frame: &Frame, bend: &DVector<f64>) -> [f64; 2] {
     let scale = frame.edge().map(|e| 1.0 / e);
+    let places = [-1.0, 0.0, 1.0].map(|x| [-1.0, 0.0, 1.0].map(|y| Vector2::new(x, y)));
     let mut most = [0.0f64; 2];
     for index in FIRST_SHELL {
         let q = wave(&model.pair, index).component_mul(&scale);
-        // ψ of this harmonic.
-        let [a, b, c] =
-            [0, 1, 2].map(|j| f64::from(index[0]) * bend[j] + f64::from(index[1]) * bend[3 + j]);
-        // Columns: how q changes with X and with Y.
-        let slope = Matrix2::from_diagonal(&scale) * Matrix2::new(2.0 * a, b, b, 2.0 * c);
         let along = q / q.norm_squared();
-        for (most, direction) in most
-            .iter_mut()
-            .zip([along, Vector2::new(-along.y, along.x)])
-        {
-            let change = slope.tr_mul(&direction);
-            *most = most.max(2.0 * (change.x.abs() + change.y.abs()));
+        let directions = [along, Vector2::new(-along.y, along.x)];
+        let mut range = [[f64::INFINITY, f64::NEG_INFINITY]; 2];
+        for &at in places.as_flattened() {
+            let of_place = |(j, powers): (usize, &[usize; 2])| {
+                let size = f64::from(index[0]) * bend[j] + f64::from(index[1]) * bend[BENDS + j];
+                slopes(*powers, at).component_mul(&scale) * size
+            };
+            let change: Vector2<f64> = powers().iter().enumerate().map(of_place).sum();
+            for ([low, high], direction) in range.iter_mut().zip(&directions) {
+                *low = low.min(change.dot(direction));
+                *high = high.max(change.dot(direction));
+            }
+        }
+        for (most, [low, high]) in most.iter_mut().zip(range) {
+            *most = most.max(high - low);
         }
     }
     most

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::frame::background::Background;
 use crate::frame::image::Image;
-use crate::lattice::fit::bend::Inhomogeneity;
+use crate::lattice::fit::bend::{FOLLOWED, Inhomogeneity};
 use crate::lattice::fit::closure::Closure;
 use crate::lattice::fit::folded::{Bends, Folded};
 use crate::lattice::fit::frame::{Basis, Frame};
@@ -16,8 +16,9 @@ use crate::lattice::fit::lines::LineStatistics;
 use crate::lattice::fit::model::{Clip, LineOffsets, Model, Tables, look, settled};
 use crate::lattice::fit::noise::{ForeignWave, Leverage, ResidualNoise};
 use crate::lattice::fit::{bend, choose, closure, frame, solve};
+use crate::numbers::dot::dot;
 use crate::numbers::exact;
-use crate::spectrum::harmonics::{Harmonics, dot};
+use crate::spectrum::harmonics::Harmonics;
 use crate::spectrum::phases::Phases;
 use crate::spectrum::shells::FIRST_SHELL;
 
@@ -29,8 +30,6 @@ const STILL: f64 = 0.05;
 /// The share of itself that a step leaves: this, that of the residuals cut off, and the phase by which
 /// it turned the edges (the model is linear in it to that order).
 const LEFT: f64 = 0.01;
-/// Share of residuals that are cut off, at most, for an image without outliers: three times what Gaussian noise has.
-const FEW_OUTLIERS: f64 = 0.01;
 /// Rounds of adding harmonics: as many as there are shells.
 pub(crate) const ROUNDS: usize = 5;
 
@@ -64,8 +63,8 @@ pub struct LatticeFit {
     /// The strongest wave that is left and none of the lattice's: a second lattice, or pick-up.
     pub foreign_wave: Option<ForeignWave>,
     /// The transform of what is left, across the lines from each of the first three harmonics: (columns, rows) in
-    /// cycles per frame and value. Two images of one scan tell by it what noise they share.
-    #[serde(with = "exact")]
+    /// cycles per frame and value. Two images of one scan tell by it what noise they share; then it is forgotten.
+    #[serde(skip)]
     pub(crate) residual: [Vec<([i64; 2], Complex64)>; 3],
     /// How the lattice changes across the frame; `None` where the frame is too small to tell.
     pub inhomogeneity: Option<Inhomogeneity>,
@@ -276,24 +275,32 @@ impl<'a> Fit<'a> {
         let clip = Clip::at(self.sigma);
         let tables = Tables::new(&self.frame, &self.model.pair, &self.model.basis.indices);
         let (frame, model) = (&self.frame, &self.model);
-        let (lines, mut squares) = (&mut self.lines, 0.0);
-        let mut folded = Folded::new(&self.frame);
-        let mut bends = Bends::new(self.model.waves.len());
-        let residual = ResidualNoise::new(&self.frame, self.free_lines, |row, line| {
-            let kept = settled(frame, model, &tables, lines, clip, row, line);
-            if frame.present[row] > 0 {
+        let lines = &self.lines;
+        let residual = |folded: &mut Folded, row: usize, line: &mut [f64]| {
+            let settled = settled(frame, model, &tables, lines, clip, row, line);
+            let bends = (frame.present[row] > 0).then(|| {
                 folded.take(line);
-                bends.add(frame, &tables, row, &mut folded);
-            }
+                Bends::of_line(frame, &tables, row, folded)
+            });
             for (value, pixel) in line.iter_mut().zip(frame.image.row(row)) {
                 *value = if pixel.is_finite() {
-                    *value + kept
+                    *value + settled.kept
                 } else {
                     0.0
                 };
             }
-            squares += dot(line, line);
-        });
+            (settled.offset, bends, dot(line, line))
+        };
+        let room = || Folded::new(frame);
+        let (residual, seen) = ResidualNoise::new(frame, self.free_lines, room, residual);
+        let (mut bends, mut squares) = (Bends::new(model.waves.len()), 0.0);
+        for (row, (offset, of_line, square)) in seen.into_iter().enumerate() {
+            self.lines.offset[row] = offset;
+            squares += square;
+            if let Some(of_line) = of_line {
+                bends.add(&of_line);
+            }
+        }
         let parameters = self.model.background.len() + 2 * self.model.waves.len() + 4;
         let lost = if self.free_lines {
             self.frame.lines()
@@ -388,10 +395,11 @@ impl<'a> Fit<'a> {
             covariance.fixed_view::<4, 4>(3, 3) * enlargement,
         )
         .mapped(&Matrix2::from_diagonal(&scale));
-        // Outliers look like a change: what is cut off says whether there are any.
-        let sound = (self.clipped as f64) < FEW_OUTLIERS * self.frame.pixels() as f64;
-        if let Some(change) = inhomogeneity.filter(|change| sound && change.stands_out()) {
-            wave_vectors.covariance += change.of_the_mean(&wave_vectors.basis);
+        let clipped = self.clipped as f64 / self.frame.pixels() as f64;
+        if let Some(change) = inhomogeneity.filter(Inhomogeneity::stands_out) {
+            let (mean, covariance) = change.of_the_mean(clipped);
+            wave_vectors.basis += mean;
+            wave_vectors.covariance += covariance;
         }
         let [columns, rows] = [
             self.frame.image.columns as f64,
@@ -405,7 +413,7 @@ impl<'a> Fit<'a> {
             goodness: noise.rms / noise.residual.level().sqrt(),
             line_offsets: self.line_sigma,
             lines_left_out: self.frame.image.rows - self.frame.lines(),
-            clipped: self.clipped as f64 / self.frame.pixels() as f64,
+            clipped,
             foreign_wave: noise.residual.foreign_wave(&self.frame, &self.model),
             residual: [0, 1, 2].map(|i| {
                 let index = self.model.basis.indices[i];
@@ -429,6 +437,16 @@ impl LatticeFit {
         }
     }
 
+    /// How the lattice changes, where that is more than chance.
+    pub(crate) fn change(&self) -> Option<&Inhomogeneity> {
+        self.inhomogeneity.as_ref().filter(|c| c.stands_out())
+    }
+
+    /// Whether the lattice may bend more than the fit can follow.
+    pub(crate) fn may_bend_more(&self) -> bool {
+        self.change().is_some() && self.clipped >= FOLLOWED
+    }
+
     /// Of the first shell.
     pub(crate) fn weakest_signal_to_noise(&self) -> f64 {
         let first = self.harmonics.iter().take(3);
@@ -447,6 +465,10 @@ impl LatticeFit {
         }
         if let Some(foreign) = &mut self.foreign_wave {
             foreign.wave_vector /= size;
+        }
+        if let Some(change) = &mut self.inhomogeneity {
+            change.mean /= size;
+            change.noise /= size * size;
         }
         self
     }

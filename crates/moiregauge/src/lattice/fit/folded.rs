@@ -2,8 +2,9 @@
 
 use rustfft::num_complex::Complex64;
 
-use crate::lattice::fit::frame::Frame;
+use crate::lattice::fit::frame::{BENDS, BENT, Frame};
 use crate::lattice::fit::model::{Block, LANES, Tables, sum};
+use crate::numbers::widest::widest;
 
 /// A line folded about its middle: sums and differences of what lies at X and −X, and both times X.
 pub(crate) struct Folded {
@@ -12,9 +13,11 @@ pub(crate) struct Folded {
     odd: Vec<Block>,
     tilted_even: Vec<Block>,
     tilted_odd: Vec<Block>,
-    /// Times X², on request.
+    /// Times X² and X³, on request.
     squared_even: Vec<Block>,
     squared_odd: Vec<Block>,
+    cubed_even: Vec<Block>,
+    cubed_odd: Vec<Block>,
 }
 
 impl Folded {
@@ -31,7 +34,9 @@ impl Folded {
             tilted_even: zeros.clone(),
             tilted_odd: zeros.clone(),
             squared_even: zeros.clone(),
-            squared_odd: zeros,
+            squared_odd: zeros.clone(),
+            cubed_even: zeros.clone(),
+            cubed_odd: zeros,
         }
     }
 
@@ -62,30 +67,37 @@ impl Folded {
         }
     }
 
-    fn square(&mut self) {
+    fn raise(&mut self) {
         let squared = self.squared_even.iter_mut().zip(&mut self.squared_odd);
+        let cubed = self.cubed_even.iter_mut().zip(&mut self.cubed_odd);
         let tilted = self.tilted_even.iter().zip(&self.tilted_odd);
-        for ((se, so), (x, (te, to))) in squared.zip(self.x.iter().zip(tilted)) {
+        let tilted = self.x.iter().zip(tilted);
+        for (((se, so), (ce, co)), (x, (te, to))) in squared.zip(cubed).zip(tilted) {
             for i in 0..LANES {
                 se[i] = x[i] * te[i];
                 so[i] = x[i] * to[i];
+                ce[i] = x[i] * se[i];
+                co[i] = x[i] * so[i];
             }
         }
     }
 
-    /// Sums of the line times `X² cos` and `X² sin`.
-    fn squared_products(&self, waves: &[[Block; 2]]) -> [f64; 2] {
+    /// Sums of the line times `X² cos`, `X² sin`, `X³ cos` and `X³ sin`.
+    fn raised_products(&self, waves: &[[Block; 2]]) -> [f64; 4] {
         widest(
             #[inline(always)]
             || {
-                let mut sums = [[0.0; LANES]; 2];
+                let mut sums = [[0.0; LANES]; 4];
                 let squared = self.squared_even.iter().zip(&self.squared_odd);
-                for ((se, so), [cos, sin]) in squared.zip(waves) {
-                    for (sum, (a, b)) in sums[0].iter_mut().zip(se.iter().zip(cos)) {
-                        *sum += a * b;
-                    }
-                    for (sum, (a, b)) in sums[1].iter_mut().zip(so.iter().zip(sin)) {
-                        *sum += a * b;
+                let cubed = self.cubed_even.iter().zip(&self.cubed_odd);
+                for (((se, so), (ce, co)), [cos, sin]) in squared.zip(cubed).zip(waves) {
+                    // What is even in X goes with the cosine: X³ makes even of odd.
+                    for (sum, (a, b)) in
+                        (sums.iter_mut()).zip([(se, cos), (so, sin), (co, cos), (ce, sin)])
+                    {
+                        for i in 0..LANES {
+                            sum[i] += a[i] * b[i];
+                        }
                     }
                 }
                 sums.map(|s| s.iter().sum())
@@ -160,32 +172,38 @@ impl Folded {
     }
 }
 
-/// Correlations of lines with `X² e^{iθ}`, `XY e^{iθ}` and `Y² e^{iθ}` of each harmonic: real parts are
-/// those with cosines, imaginary parts those with sines.
-pub(crate) struct Bends(pub(crate) Vec<[Complex64; 3]>);
+/// Correlations of lines with `XᵃYᵇ e^{iθ}` of each harmonic, for the powers that bend a lattice: real parts are those with
+/// cosines, imaginary parts those with sines.
+pub(crate) struct Bends(pub(crate) Vec<[Complex64; BENDS]>);
 
 impl Bends {
     pub(crate) fn new(harmonics: usize) -> Self {
-        Self(vec![[Complex64::default(); 3]; harmonics])
+        Self(vec![[Complex64::default(); BENDS]; harmonics])
     }
 
-    /// Adds one line.
-    pub(crate) fn add(&mut self, frame: &Frame, tables: &Tables, row: usize, line: &mut Folded) {
+    /// Those of one line.
+    pub(crate) fn of_line(frame: &Frame, tables: &Tables, row: usize, line: &mut Folded) -> Self {
+        let mut bends = Self::new(tables.up.len());
         let y = frame.y[row];
-        line.square();
+        line.raise();
         line.all_products(tables, |i, [c, s, xc, xs]| {
-            let [xxc, xxs] = line.squared_products(tables.of(i));
-            let (turn, sums) = (tables.up[i][row], &mut self.0[i]);
-            sums[0] += Complex64::new(xxc, xxs) * turn;
-            sums[1] += Complex64::new(xc, xs) * turn * y;
-            sums[2] += Complex64::new(c, s) * turn * (y * y);
+            let [xxc, xxs, xxxc, xxxs] = line.raised_products(tables.of(i));
+            let turn = tables.up[i][row];
+            let along = [[c, s], [xc, xs], [xxc, xxs], [xxxc, xxxs]]
+                .map(|[re, im]| Complex64::new(re, im) * turn);
+            for (sum, [a, b]) in bends.0[i].iter_mut().zip(&BENT[BENT.len() - BENDS..]) {
+                *sum = along[*a] * y.powi(*b as i32);
+            }
         });
+        bends
     }
-}
 
-/// Runs a loop that is compiled for the widest vectors that this machine has. Products and sums stay separate
-/// and in their order, so that all machines give the same bits.
-#[inline]
-pub(crate) fn widest<R>(work: impl FnOnce() -> R) -> R {
-    pulp::Arch::new().dispatch(work)
+    /// Adds those of other lines.
+    pub(crate) fn add(&mut self, other: &Self) {
+        for (sums, others) in self.0.iter_mut().zip(&other.0) {
+            for (sum, other) in sums.iter_mut().zip(others) {
+                *sum += other;
+            }
+        }
+    }
 }

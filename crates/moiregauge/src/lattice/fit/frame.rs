@@ -4,10 +4,14 @@
 //! rows, so that a wave vector is the phase (rad) at the edge and every parameter is of order one.
 
 use nalgebra::{Matrix2, Vector2};
+use rayon::prelude::*;
 use rustfft::num_complex::Complex64;
 
 use crate::frame::image::Image;
 use crate::numbers::interrupt;
+
+/// Lines that a thread counts together, at least.
+const AT_ONCE: usize = 64;
 
 /// An image with the list of what is missing.
 #[derive(Clone)]
@@ -37,14 +41,19 @@ impl<'a> Frame<'a> {
 
     /// Counts anew, without the lines for which `bad` holds and those of which half is missing.
     pub(crate) fn leave_out(&mut self, bad: impl Fn(usize) -> bool) {
-        self.missing.clear();
-        for row in 0..self.image.rows {
+        let image = self.image;
+        let there = |row: usize| {
             interrupt::check();
-            let line = self.image.row(row);
-            let count = line.iter().filter(|v| v.is_finite()).count();
-            let used = !bad(row) && 2 * count >= line.len();
-            self.present[row] = if used { count } else { 0 };
-            if used && count < line.len() {
+            image.row(row).iter().filter(|v| v.is_finite()).count()
+        };
+        let rows = (0..image.rows).into_par_iter().with_min_len(AT_ONCE);
+        self.present = rows.map(there).collect();
+        self.missing.clear();
+        for (row, count) in self.present.iter_mut().enumerate() {
+            let line = image.row(row);
+            if bad(row) || 2 * *count < line.len() {
+                *count = 0;
+            } else if *count < line.len() {
                 let gone = line.iter().enumerate().filter(|(_, v)| !v.is_finite());
                 self.missing.extend(gone.map(|(column, _)| [row, column]));
             }
@@ -119,7 +128,20 @@ pub(crate) struct Basis {
 /// What a change of the wave vectors needs.
 pub(crate) const STRAIGHT: &[[usize; 2]] = &[[0, 0], [1, 0], [0, 1]];
 /// What a bent lattice needs.
-pub(crate) const BENT: &[[usize; 2]] = &[[0, 0], [1, 0], [0, 1], [2, 0], [1, 1], [0, 2]];
+pub(crate) const BENT: &[[usize; 2]] = &[
+    [0, 0],
+    [1, 0],
+    [0, 1],
+    [2, 0],
+    [1, 1],
+    [0, 2],
+    [3, 0],
+    [2, 1],
+    [1, 2],
+    [0, 3],
+];
+/// Those of them that bend it.
+pub(crate) const BENDS: usize = 7;
 
 impl Basis {
     /// A background of total degree `degree`. Where every line has an offset of its own

@@ -12,7 +12,7 @@ use nalgebra::{DMatrix, Matrix2};
 use rustfft::num_complex::Complex64;
 
 use crate::lattice::fit::frame::{Basis, Frame, turns, wave};
-use crate::spectrum::harmonics::dot;
+use crate::numbers::dot::dot;
 
 /// `Φᵀ W Φ` of the whole basis. `lambda` holds λ of each line.
 pub(crate) fn gram(
@@ -313,7 +313,9 @@ mod tests {
                         f64::from(h) * (2.1 * x + 0.4 * y) + f64::from(k) * (0.7 * x + 3.3 * y);
                     let (s, c) = theta.sin_cos();
                     v.extend([c, s, x * c, x * s, y * c, y * s]);
-                    v.extend([x * x, x * y, y * y].iter().flat_map(|xy| [xy * c, xy * s]));
+                    let cubes = [x * x * x, x * x * y, x * y * y, y * y * y];
+                    let bends = [x * x, x * y, y * y].into_iter().chain(cubes);
+                    v.extend(bends.flat_map(|xy| [xy * c, xy * s]));
                 }
                 let v = DVector::from_vec(v);
                 expected += &v * v.transpose();

@@ -2,8 +2,8 @@
 
 use crate::lattice::fit::frame::Frame;
 use crate::lattice::fit::model::{Model, Tables, residuals, sum};
+use crate::numbers::dot::dot;
 use crate::numbers::median::median;
-use crate::spectrum::harmonics::dot;
 
 /// Offsets of lines matter beyond this over the root of the number of lines: 3.5 times the scatter of the ratio, 2.3.
 const OFFSETS: f64 = 8.0;

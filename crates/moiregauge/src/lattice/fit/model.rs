@@ -1,12 +1,14 @@
 //! The model of an image, what it leaves of the image, and how the harmonics correlate with that.
 
 use nalgebra::{DVector, Matrix2};
+use rayon::prelude::*;
 use rustfft::num_complex::Complex64;
 
-use crate::lattice::fit::folded::{Folded, widest};
+use crate::lattice::fit::folded::Folded;
 use crate::lattice::fit::frame::{Basis, Frame, turns, wave};
 use crate::numbers::interrupt;
 use crate::numbers::median::median;
+use crate::numbers::widest::widest;
 
 /// Residuals beyond this many standard deviations pull no harder (Huber). At 3 the loss of
 /// efficiency with Gaussian noise is below 0.1 %.
@@ -231,20 +233,36 @@ pub(crate) fn look(
     lines: &mut LineOffsets,
     clip: Clip,
 ) -> Look {
-    let mut gradient = DVector::zeros(basis.len());
     let stride = (frame.pixels() / SAMPLE).max(1);
+    let rows = (0..frame.image.rows).filter(|&row| frame.present[row] > 0);
+    let rows: Vec<usize> = rows.collect();
+    let before = &*lines;
+    let seen = rows.par_iter().with_min_len(AT_ONCE).map_init(
+        || (vec![0.0; frame.image.columns], Folded::new(frame)),
+        |(line, folded), &row| {
+            interrupt::check();
+            residual(frame, model, tables, row, line);
+            let offset = settle(line, row, frame, before, clip);
+            // Every line starts elsewhere, lest the sample sees one column only.
+            let picked = line.iter().skip((row * 7) % stride).step_by(stride);
+            let sample: Vec<f64> = picked.filter(|v| v.is_finite()).map(|v| v.abs()).collect();
+            let clipped = clip.all(line);
+            folded.take(line);
+            let mut gradient = DVector::zeros(basis.len());
+            add(&mut gradient, frame, basis, probes, row, folded);
+            (gradient, offset, sample, clipped)
+        },
+    );
+    let seen: Vec<_> = seen.collect();
+    let mut gradient = DVector::zeros(basis.len());
     let mut sample = Vec::with_capacity(2 * SAMPLE);
     let mut clipped = 0;
-    let mut folded = Folded::new(frame);
-    residuals(frame, model, tables, |row, line| {
-        settle(line, row, frame, lines, clip);
-        // Every line starts elsewhere, lest the sample sees one column only.
-        let picked = line.iter().skip((row * 7) % stride).step_by(stride);
-        sample.extend(picked.filter(|v| v.is_finite()).map(|v| v.abs()));
-        clipped += clip.all(line);
-        folded.take(line);
-        add(&mut gradient, frame, basis, probes, row, &folded);
-    });
+    for (row, (of_line, offset, picked, cut)) in rows.into_iter().zip(seen) {
+        gradient += of_line;
+        lines.offset[row] = offset;
+        sample.extend(picked);
+        clipped += cut;
+    }
     Look {
         gradient,
         sigma: median(&mut sample) / 0.674_489_750_196_081_7,
@@ -252,13 +270,16 @@ pub(crate) fn look(
     }
 }
 
-/// Takes the best offset off a line: `o = λ (o + mean ψ(r − o))`.
-fn settle(line: &mut [f64], row: usize, frame: &Frame, lines: &mut LineOffsets, clip: Clip) {
+/// Lines that a thread looks at together, at least.
+const AT_ONCE: usize = 32;
+
+/// Takes the best offset off a line, `o = λ (o + mean ψ(r − o))`, and returns it.
+fn settle(line: &mut [f64], row: usize, frame: &Frame, lines: &LineOffsets, clip: Clip) -> f64 {
     let lambda = lines.lambda[row];
-    if lambda == 0.0 {
-        return;
-    }
     let mut offset = lines.offset[row];
+    if lambda == 0.0 {
+        return offset;
+    }
     let count = frame.present[row] as f64;
     for _ in 0..4 {
         let before = offset;
@@ -268,10 +289,10 @@ fn settle(line: &mut [f64], row: usize, frame: &Frame, lines: &mut LineOffsets, 
             break;
         }
     }
-    lines.offset[row] = offset;
     for value in line {
         *value -= offset;
     }
+    offset
 }
 
 /// Sum of what counts of the residuals less `offset`, in eight partial sums.
@@ -335,30 +356,39 @@ pub(crate) fn sum(values: &[f64]) -> f64 {
     sums.iter().sum::<f64>() + rest
 }
 
-/// The residual of one line as it counts, 0 where pixels do not, and what is to be added to all that do
-/// for line means at the level of the other noise (`r − (1 − √(1−λ)) r̄`).
+/// What is to be known of a line whose residual is settled.
+#[derive(Clone, Copy, Default)]
+pub(crate) struct SettledLine {
+    /// Its offset.
+    pub(crate) offset: f64,
+    /// What is to be added to its pixels for line means at the level of the other noise (`r − (1 − √(1−λ)) r̄`).
+    pub(crate) kept: f64,
+}
+
+/// The residual of one line as it counts, 0 where pixels do not.
 pub(crate) fn settled(
     frame: &Frame,
     model: &Model,
     tables: &Tables,
-    lines: &mut LineOffsets,
+    lines: &LineOffsets,
     clip: Clip,
     row: usize,
     line: &mut [f64],
-) -> f64 {
+) -> SettledLine {
     if frame.present[row] == 0 {
         line.fill(0.0);
-        return 0.0;
+        let offset = lines.offset[row];
+        return SettledLine { offset, kept: 0.0 };
     }
     residual(frame, model, tables, row, line);
-    settle(line, row, frame, lines, clip);
+    let offset = settle(line, row, frame, lines, clip);
     clip.all(line);
     let lambda = lines.lambda[row];
-    if lambda > 0.0 {
+    let kept = if lambda > 0.0 {
         // The mean is o/λ, of which o is off already.
-        let mean = lines.offset[row] / lambda;
-        lines.offset[row] - (1.0 - (1.0 - lambda).sqrt()) * mean
+        offset - (1.0 - (1.0 - lambda).sqrt()) * (offset / lambda)
     } else {
         0.0
-    }
+    };
+    SettledLine { offset, kept }
 }

@@ -6,6 +6,9 @@
 //! of the window times each fitted function and G their normal matrix. What that says about the wave
 //! vectors is worked out in [`local`](crate::lattice::fit::local).
 
+use std::f64::consts::PI;
+use std::ops::RangeInclusive;
+
 use nalgebra::{DMatrix, DVector, Vector2};
 use rustfft::num_complex::Complex64;
 use serde::{Deserialize, Serialize};
@@ -15,7 +18,7 @@ use crate::lattice::fit::local::{Bin, acting_on};
 use crate::lattice::fit::model::Model;
 use crate::numbers::exact;
 use crate::numbers::median::median;
-use crate::spectrum::harmonics::hann_transform;
+use crate::spectrum::fourier::wide;
 use crate::spectrum::select::{BLOCK_WIDTH, NoiseMap};
 use crate::spectrum::transform::{Spectrum, hann};
 
@@ -47,7 +50,8 @@ const HARMONIC: f64 = 2.0;
 
 /// The periodogram of a residual.
 pub(crate) struct ResidualNoise {
-    spectrum: Spectrum,
+    /// In single precision: noise is known to a few per cent.
+    spectrum: Spectrum<f32>,
     /// `Σ w²` over the pixels that count.
     window_power: f64,
     free_lines: bool,
@@ -76,14 +80,15 @@ impl ForeignWave {
 }
 
 impl ResidualNoise {
-    /// `residual` writes a line, 0 where pixels do not count. `free_lines`: line means are gone.
-    pub(crate) fn new(
+    /// `residual` writes a line, 0 where pixels do not count, and says something of it. `free_lines`: line means are gone.
+    pub(crate) fn new<S, R: Send>(
         frame: &Frame,
         free_lines: bool,
-        residual: impl FnMut(usize, &mut [f64]),
-    ) -> Self {
+        room: impl Fn() -> S + Sync,
+        residual: impl Fn(&mut S, usize, &mut [f64]) -> R + Sync,
+    ) -> (Self, Vec<R>) {
         let (columns, rows) = (frame.image.columns, frame.image.rows);
-        let spectrum = Spectrum::of_lines([columns, rows], residual);
+        let (spectrum, said) = Spectrum::of_lines([columns, rows], room, residual);
         let squares = |n: usize| hann(n).iter().map(|w| w * w).collect::<Vec<_>>();
         let (x, y) = (squares(columns), squares(rows));
         let lines: f64 = y
@@ -93,11 +98,12 @@ impl ResidualNoise {
             .map(|(w, _)| w)
             .sum();
         let missing: f64 = frame.missing.iter().map(|&[r, c]| y[r] * x[c]).sum();
-        Self {
+        let noise = Self {
             window_power: x.iter().sum::<f64>() * lines - missing,
             spectrum,
             free_lines,
-        }
+        };
+        (noise, said)
     }
 
     /// Noise power around a harmonic as it acts on the x and on the y component of its wave vector and on
@@ -113,7 +119,7 @@ impl ResidualNoise {
         self.bins(p, leverage, |k, power, white| {
             bins.push(Bin { k, power, white });
         });
-        acting_on(p / std::f64::consts::PI, lambda, &bins)
+        acting_on(p / PI, lambda, &bins)
     }
 
     /// The same by the median: waves that are not fitted yet do not matter.
@@ -130,7 +136,7 @@ impl ResidualNoise {
     /// Whether there is a bit more than noise at a place. A wave that is worth its place stands there
     /// at 12 times the noise or more, of which window and grid leave a quarter at worst.
     pub(crate) fn is_promising(&self, p: Vector2<f64>) -> bool {
-        let centre = (p / std::f64::consts::PI).map(|c| c.round() as i64);
+        let centre = (p / PI).map(|c| c.round() as i64);
         let mut near = 0.0f64;
         let mut around = Vec::new();
         for dy in -NEAR..=NEAR {
@@ -153,8 +159,8 @@ impl ResidualNoise {
         leverage: &Leverage,
         mut each: impl FnMut(Vector2<i64>, f64, f64),
     ) {
-        let centre = (p / std::f64::consts::PI).map(|c| c.round() as i64);
-        let taps = leverage.taps(centre);
+        let centre = (p / PI).map(|c| c.round() as i64);
+        let mut taps = leverage.taps(centre);
         let across = leverage.across;
         for dx in -ALONG..=ALONG {
             let x = centre.x + dx;
@@ -166,7 +172,7 @@ impl ResidualNoise {
                 if x.abs() < BACKGROUND && y.abs() < BACKGROUND {
                     continue;
                 }
-                let white = 1.0 - leverage.at(&taps, dx, dy) / self.window_power;
+                let white = 1.0 - leverage.at(&mut taps, dx, dy) / self.window_power;
                 if white > 0.02 {
                     each(Vector2::new(x, y), self.power(x, y), white);
                 }
@@ -176,20 +182,13 @@ impl ResidualNoise {
 
     /// Power per pixel at (x, y) cycles per frame.
     fn power(&self, x: i64, y: i64) -> f64 {
-        let (rows, columns) = (self.spectrum.rows as i64, self.spectrum.columns as i64);
-        let x = x.rem_euclid(columns);
-        let (x, y) = if x > columns / 2 {
-            (columns - x, -y)
-        } else {
-            (x, y)
-        };
-        self.spectrum.power(x as usize, y.rem_euclid(rows) as usize) / self.window_power
+        self.spectrum.at(x, y).norm_sqr() / self.window_power
     }
 
     /// The transform of the residual across the lines from a harmonic: (columns, rows) in cycles per frame, and
     /// value. `offsets`: offsets take up what whole lines do, so that it is no part of the harmonic's noise.
     pub(crate) fn samples(&self, p: Vector2<f64>, offsets: bool) -> Vec<([i64; 2], Complex64)> {
-        let centre = (p / std::f64::consts::PI).map(|c| c.round() as i64);
+        let centre = (p / PI).map(|c| c.round() as i64);
         // Noise of whole lines stands at kx = 0 alone, and beside it through the window: what lies at another kx
         // says nothing of it.
         let columns = if offsets && centre.x.abs() < BESIDE {
@@ -201,19 +200,8 @@ impl ResidualNoise {
         columns
             .into_iter()
             .flat_map(|x| rows().map(move |y| [x, y]))
-            .map(|[x, y]| ([x, y], self.value(x, y)))
+            .map(|[x, y]| ([x, y], self.spectrum.at(x, y)))
             .collect()
-    }
-
-    fn value(&self, x: i64, y: i64) -> Complex64 {
-        let (rows, columns) = (self.spectrum.rows as i64, self.spectrum.columns as i64);
-        let x = x.rem_euclid(columns);
-        if x > columns / 2 {
-            let (x, y) = ((columns - x) as usize, (-y).rem_euclid(rows) as usize);
-            self.spectrum.value(x, y).conj()
-        } else {
-            self.spectrum.value(x as usize, y.rem_euclid(rows) as usize)
-        }
     }
 
     /// Noise power per pixel over all frequencies, by the median.
@@ -224,7 +212,7 @@ impl ResidualNoise {
             .values
             .iter()
             .step_by(stride)
-            .map(rustfft::num_complex::Complex64::norm_sqr);
+            .map(|value| wide(*value).norm_sqr());
         let mut powers: Vec<f64> = powers.collect();
         median(&mut powers) / (std::f64::consts::LN_2 * self.window_power)
     }
@@ -233,7 +221,7 @@ impl ResidualNoise {
     pub(crate) fn foreign_wave(&self, frame: &Frame, model: &Model) -> Option<ForeignWave> {
         let noise = NoiseMap::new(&self.spectrum);
         let rows = self.spectrum.rows;
-        let cycles = model.pair / std::f64::consts::PI;
+        let cycles = model.pair / PI;
         let inverse = cycles.try_inverse()?;
         let on = |k: Vector2<f64>| {
             let index = (inverse * k).map(f64::round);
@@ -262,10 +250,11 @@ impl ResidualNoise {
             };
             for (b, (block, noise)) in line.chunks(BLOCK_WIDTH).zip(noise.row(y)).enumerate() {
                 for (i, value) in block.iter().enumerate() {
-                    if value.norm_sqr() > most * noise && (b > 0 || i > 1) {
+                    let power = wide(*value).norm_sqr();
+                    if power > most * noise && (b > 0 || i > 1) {
                         let k = Vector2::new((b * BLOCK_WIDTH + i) as f64, signed);
                         if !ours(k) {
-                            most = value.norm_sqr() / noise;
+                            most = power / noise;
                             best = Some(k);
                         }
                     }
@@ -275,7 +264,7 @@ impl ResidualNoise {
         let k = best?;
         let bins = self.spectrum.values.len() as f64;
         Some(ForeignWave {
-            wave_vector: (k * std::f64::consts::PI).component_div(&frame.edge()),
+            wave_vector: (k * PI).component_div(&frame.edge()),
             significance: most,
             // The local noise is known to a fifth or so, hence the factor.
             threshold: 1.3 * (bins.ln() + 9.0),
@@ -298,10 +287,13 @@ pub(crate) struct Leverage<'a> {
 /// derivatives.
 pub(crate) struct Taps {
     waves: Vec<Tap>,
-    /// The part of the inverse that belongs to these functions.
-    inverse: DMatrix<f64>,
-    /// Position of a harmonic's cosine in that part.
+    /// The transform of a cosine is real, that of a sine imaginary: the parts of the inverse that belong to the cosines and to
+    /// the sines near by, each with the four derivatives, which have both.
+    inverse: [DMatrix<f64>; 2],
+    /// Position of a harmonic in these parts.
     places: Vec<Option<usize>>,
+    /// The transform of the window times each of these functions, real and imaginary part: room for it.
+    seen: [DVector<f64>; 2],
 }
 
 /// One of the two waves of a harmonic.
@@ -335,22 +327,19 @@ impl<'a> Leverage<'a> {
         let count = self.basis.indices.len();
         let mut waves = Vec::new();
         let mut places = vec![None; count];
-        let mut used = Vec::new();
+        let mut near = Vec::new();
         for (i, &index) in self.basis.indices.iter().enumerate() {
             for sign in [1.0, -1.0] {
                 let p = sign * wave(&self.model.pair, index);
-                let cycles = p / std::f64::consts::PI;
+                let cycles = p / PI;
                 let apart = |axis: usize| (cycles[axis] - centre[axis] as f64).abs();
                 let reaches = |axis: usize| apart(axis) < half[axis] as f64 + SPREAD;
                 if !(reaches(0) && reaches(1)) {
                     continue;
                 }
                 let transform = [0, 1].map(|axis| {
-                    let at = |d: i64| {
-                        let bin = std::f64::consts::PI * (centre[axis] + d) as f64;
-                        window_transform(p[axis] - bin, self.size[axis])
-                    };
-                    (-half[axis]..=half[axis]).map(at).collect()
+                    let bins = centre[axis] - half[axis]..=centre[axis] + half[axis];
+                    window_transforms(p[axis], bins, self.size[axis])
                 });
                 waves.push(Tap {
                     harmonic: i,
@@ -358,31 +347,38 @@ impl<'a> Leverage<'a> {
                     transform,
                 });
                 if places[i].is_none() {
-                    places[i] = Some(used.len());
-                    used.extend([2 * i, 2 * i + 1]);
+                    places[i] = Some(near.len());
+                    near.push(i);
                 }
             }
         }
-        used.extend(2 * count..2 * count + 4);
+        let room = || DVector::zeros(near.len() + 4);
+        let part = |first: usize| {
+            let waves = near.iter().map(|i| 2 * i + first);
+            let used: Vec<usize> = waves.chain(2 * count..2 * count + 4).collect();
+            self.inverse.select_rows(&used).select_columns(&used)
+        };
         Taps {
             waves,
-            inverse: self.inverse.select_rows(&used).select_columns(&used),
+            seen: [room(), room()],
+            inverse: [part(0), part(1)],
             places,
         }
     }
 
     /// `vᴴ G⁻¹ v` for the bin at (dx, dy) from the centre of the taps.
-    fn at(&self, taps: &Taps, dx: i64, dy: i64) -> f64 {
-        let n = taps.inverse.nrows();
-        let mut re = DVector::zeros(n);
-        let mut im = DVector::zeros(n);
+    fn at(&self, taps: &mut Taps, dx: i64, dy: i64) -> f64 {
+        let [re, im] = &mut taps.seen;
+        let n = re.len();
+        re.fill(0.0);
+        im.fill(0.0);
         for tap in &taps.waves {
             let (i, sign, [along, across]) = (tap.harmonic, tap.sign, &tap.transform);
             let [x, slope_x] = along[(dx + ALONG) as usize];
             let [y, slope_y] = across[(dy + self.across) as usize];
             if let Some(place) = taps.places[i] {
                 re[place] += 0.5 * x * y;
-                im[place + 1] -= 0.5 * sign * x * y;
+                im[place] -= 0.5 * sign * x * y;
             }
             let [alpha, beta] = self.model.waves[i];
             for (axis, slope) in [slope_x * y, x * slope_y].into_iter().enumerate() {
@@ -395,18 +391,78 @@ impl<'a> Leverage<'a> {
                 }
             }
         }
-        let form = |v: &DVector<f64>| {
-            let rows = taps.inverse.column_iter().zip(v.iter());
-            rows.map(|(column, value)| value * column.dot(v))
+        let form = |inverse: &DMatrix<f64>, v: &DVector<f64>| {
+            let columns = inverse.column_iter().zip(v.iter());
+            columns
+                .map(|(column, value)| value * column.dot(v))
                 .sum::<f64>()
         };
-        form(&re) + form(&im)
+        form(&taps.inverse[0], re) + form(&taps.inverse[1], im)
     }
 }
 
-/// `Σ w cos(p X)` over the Hann window and its slope.
-fn window_transform(p: f64, n: usize) -> [f64; 2] {
-    const STEP: f64 = 1e-4;
-    let at = |p: f64| hann_transform(p * 2.0 / n as f64, n);
-    [at(p), (at(p + STEP) - at(p - STEP)) / (2.0 * STEP)]
+/// `Σ w cos((p − π bin) X)` over the Hann window of `n` pixels and its slope, for a run of bins.
+///
+/// The window is three Dirichlet kernels, `sin u / sin(u/n)` at a bin and at its neighbours. From bin to bin u is π less, so that
+/// one sine is that of all of them.
+fn window_transforms(p: f64, bins: RangeInclusive<i64>, n: usize) -> Vec<[f64; 2]> {
+    let nearest = (p / PI).round();
+    let offset = p - PI * nearest;
+    let (sin, cos) = offset.sin_cos();
+    let kernel = |bin: i64| {
+        let from_nearest = bin - nearest as i64;
+        let sign = if from_nearest % 2 == 0 { 1.0 } else { -1.0 };
+        dirichlet(
+            offset - PI * from_nearest as f64,
+            [sign * sin, sign * cos],
+            n as f64,
+        )
+    };
+    let (first, last) = (*bins.start(), *bins.end());
+    let kernels: Vec<[f64; 2]> = (first - 1..=last + 1).map(kernel).collect();
+    let window =
+        |three: &[[f64; 2]]| [0, 1].map(|i| 0.5 * three[1][i] + 0.25 * (three[0][i] + three[2][i]));
+    kernels.windows(3).map(window).collect()
+}
+
+/// `sin u / sin(u/n)` and its slope, from (sin u, cos u).
+fn dirichlet(u: f64, [sin, cos]: [f64; 2], n: f64) -> [f64; 2] {
+    /// Nearer to 0 the first terms of the series are exact.
+    const SMALL: f64 = 1e-4;
+    if u.abs() < SMALL {
+        let curvature = (n * n - 1.0) / (3.0 * n);
+        return [n - 0.5 * curvature * u * u, -curvature * u];
+    }
+    let (below, slope) = (u / n).sin_cos();
+    [sin / below, (cos - sin * slope / (n * below)) / below]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::spectrum::harmonics::hann_transform;
+
+    /// The transforms of a run of bins are those by themselves, also at the bins, and slopes are their differences.
+    #[test]
+    fn bins_have_the_transform_of_the_window() {
+        for (p, n) in [
+            (40.3, 64),
+            (7.0 * PI, 33),
+            (7.0 * PI + 3e-5, 128),
+            (-2.2, 16),
+        ] {
+            let centre = (p / PI).round() as i64;
+            let found = window_transforms(p, centre - 4..=centre + 4, n);
+            for (bin, [value, slope]) in (centre - 4..).zip(&found) {
+                let at = |p: f64| hann_transform(2.0 * (p - PI * bin as f64) / n as f64, n);
+                assert!((value - at(p)).abs() < 1e-9, "{p} {n} {bin}: {value}");
+                let wanted = (at(p + 1e-4) - at(p - 1e-4)) / 2e-4;
+                assert!(
+                    (slope - wanted).abs() < 1e-6,
+                    "{p} {n} {bin}: {slope} {wanted}"
+                );
+            }
+            assert_eq!(found.len(), 9);
+        }
+    }
 }

@@ -3,10 +3,8 @@
 use super::*;
 use crate::frame::geometry::Geometry;
 use crate::frame::image::Image;
-use crate::map::local::local_lattices;
-use crate::map::tests::{map_of, rms};
+use crate::map::tests::{map_of, map_of_image, rms};
 use crate::simulate::field::FieldScene;
-use crate::window::types::{Reference, Resolution};
 
 /// Two halves of the noise average to less, and what they share is found.
 #[test]
@@ -81,15 +79,7 @@ fn pulls_of_averages([sample, frame, own]: [f64; 3], campaigns: u64) -> f64 {
                     let of_line = noise_alone(size, own, seed + 10 * (f + 1) + l);
                     let sum = |i: usize| clean[i] + common[i] + of_frame[i] + of_line[i];
                     let image = Image::new(size, size, (0..size * size).map(sum).collect());
-                    let reference = Reference {
-                        pair: scene.pair,
-                        pitch: [1.0; 2],
-                    };
-                    let resolution = Resolution {
-                        window_nm: Some(14.0),
-                        ..Resolution::default()
-                    };
-                    let map = local_lattices(&image, &reference, &resolution).unwrap();
+                    let map = map_of_image(&image, &scene.pair, Some(14.0));
                     let still = Geometry::of_pitch([size, size], [1.0; 2], 0.0, Vector2::zeros());
                     let still = Geometry {
                         origin: Vector2::zeros(),
