@@ -34,16 +34,11 @@ struct AboutChannel {
 /// `ValueError` for numbers and words that make no sense.
 pub(crate) fn scan(about: &str, arrays: &[Bound<'_, PyAny>]) -> PyResult<Scan> {
     let about: About = serde_json::from_str(about).map_err(wrong)?;
-    let frame_direction = match about.frame_direction.as_deref() {
-        None => None,
-        Some("up") => Some(FrameDirection::Up),
-        Some("down") => Some(FrameDirection::Down),
-        Some(other) => {
-            return Err(wrong(format!(
-                "frame_direction: expected \"up\" or \"down\", found {other:?}"
-            )));
-        }
-    };
+    let frame_direction = one_of(
+        "frame_direction",
+        about.frame_direction.as_deref(),
+        [("up", FrameDirection::Up), ("down", FrameDirection::Down)],
+    )?;
     let all = about.channels.into_iter().zip(arrays);
     let channels = all.map(|(about_it, array)| channel(about_it, about.size_nm, array));
     Ok(Scan {
@@ -60,16 +55,14 @@ pub(crate) fn scan(about: &str, arrays: &[Bound<'_, PyAny>]) -> PyResult<Scan> {
 
 fn channel(about: AboutChannel, size: [f64; 2], array: &Bound<'_, PyAny>) -> PyResult<Channel> {
     let (samples, rows, columns) = samples(array)?;
-    let line_direction = match about.line_direction.as_deref() {
-        None => None,
-        Some("trace") => Some(LineDirection::Trace),
-        Some("retrace") => Some(LineDirection::Retrace),
-        Some(other) => {
-            return Err(wrong(format!(
-                "line: expected \"trace\" or \"retrace\", found {other:?}"
-            )));
-        }
-    };
+    let line_direction = one_of(
+        "line",
+        about.line_direction.as_deref(),
+        [
+            ("trace", LineDirection::Trace),
+            ("retrace", LineDirection::Retrace),
+        ],
+    )?;
     Ok(Channel {
         name: about.name,
         internal_name: String::new(),
@@ -87,6 +80,17 @@ fn channel(about: AboutChannel, size: [f64; 2], array: &Bound<'_, PyAny>) -> PyR
         plane_fit: None,
         samples,
     })
+}
+
+/// What one of two words says, if any is told.
+fn one_of<T: Copy>(what: &str, told: Option<&str>, words: [(&str, T); 2]) -> PyResult<Option<T>> {
+    let Some(told) = told else {
+        return Ok(None);
+    };
+    let found = words.iter().find(|(word, _)| *word == told);
+    let [a, b] = words.map(|(word, _)| word);
+    let refused = || wrong(format!("{what}: expected {a:?} or {b:?}, found {told:?}"));
+    found.map(|(_, value)| Some(*value)).ok_or_else(refused)
 }
 
 /// The values in their own width, and how many rows and columns they have.

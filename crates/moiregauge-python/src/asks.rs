@@ -15,6 +15,7 @@ use moiregauge_pipeline::validate::{ValidateError, ValidateRequest};
 use moiregauge_pipeline::{Known, find, names};
 use moiregauge_report::FailedInput;
 use pyo3::prelude::*;
+use serde::de::DeserializeOwned;
 use serde_json::Value;
 
 use crate::errors::{nothing, stopped, unreadable, unwritten, wrong};
@@ -72,12 +73,8 @@ pub(crate) fn plan(
     threads: Option<usize>,
     progress: Tell,
 ) -> PyResult<String> {
-    let mut request: Value = serde_json::from_str(request).map_err(wrong)?;
-    let given = request
-        .as_object_mut()
-        .and_then(|all| all.remove("conditions"));
+    let (request, given): (PlanRequest, _) = with_conditions(request)?;
     let instrument = given.unwrap_or_else(|| serde_json::json!({}));
-    let request: PlanRequest = serde_json::from_value(request).map_err(wrong)?;
     let request = PlanRequest {
         conditions: conditions(&Simulation::default(), instrument)?,
         settings: settings(options)?,
@@ -91,6 +88,15 @@ pub(crate) fn plan(
             })?;
         serde_json::to_string(&found).map_err(wrong)
     })
+}
+
+/// A request, and the conditions in it, which may be given in part.
+fn with_conditions<T: DeserializeOwned>(request: &str) -> PyResult<(T, Option<Value>)> {
+    let mut request: Value = serde_json::from_str(request).map_err(wrong)?;
+    let conditions = request
+        .as_object_mut()
+        .and_then(|all| all.remove("conditions"));
+    Ok((serde_json::from_value(request).map_err(wrong)?, conditions))
 }
 
 /// Writes simulated sets, or those of the paper with this seed; returns their folders.
@@ -254,11 +260,7 @@ pub(crate) fn validate(
     threads: Option<usize>,
     progress: Tell,
 ) -> PyResult<String> {
-    let mut request: Value = serde_json::from_str(request).map_err(wrong)?;
-    let given = request
-        .as_object_mut()
-        .and_then(|all| all.remove("conditions"));
-    let request: ValidateRequest = serde_json::from_value(request).map_err(wrong)?;
+    let (request, given): (ValidateRequest, _) = with_conditions(request)?;
     let request = match given {
         Some(given) => ValidateRequest {
             conditions: conditions(&request.conditions, given)?,

@@ -77,6 +77,12 @@ impl ManySamples {
         })
     }
 
+    /// The sample at this place: its name, a hash of all that its results depend on, and its files.
+    fn sample(&self, py: Python<'_>, place: usize) -> PyResult<(String, String, Vec<PathBuf>)> {
+        let found = py.detach(|| self.asked.sample(place));
+        found.ok_or_else(|| PyValueError::new_err(format!("there is no sample {place}")))
+    }
+
     /// Writes that the sample at this place failed, and why.
     fn give_up(&self, py: Python<'_>, place: usize, why: &str) -> PyResult<()> {
         py.detach(|| give_up(&self.asked, place, why, &self.out).map_err(refused))

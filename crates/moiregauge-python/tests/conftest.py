@@ -6,6 +6,7 @@ import shutil
 import subprocess
 import sysconfig
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -32,6 +33,20 @@ def image(scans: Path) -> Path:
 
 
 @pytest.fixture(scope="session")
+def results(scans: Path) -> Any:
+    import moiregauge as mg
+
+    return mg.analyze([scans])
+
+
+@pytest.fixture(scope="session")
+def mapped(image: Path) -> Any:
+    import moiregauge as mg
+
+    return mg.map(image)
+
+
+@pytest.fixture(scope="session")
 def samples(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Forty samples of two small scans each, one of them broken."""
     out = tmp_path_factory.mktemp("samples")
@@ -44,4 +59,15 @@ def samples(tmp_path_factory: pytest.TempPathFactory) -> Path:
             content[-2:] = number.to_bytes(2, "little")
             scan.write_bytes(content)
     (out / "s007" / "scan.000.spm").write_bytes(b"\\*File list\r\n")
+    return out
+
+
+@pytest.fixture(scope="session")
+def sets(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Two hundred simulated sets of two small scans each, no two alike."""
+    import moiregauge as mg
+
+    out = tmp_path_factory.mktemp("sets")
+    raster = {"scans": 2, "pixels": [64, 64]}
+    mg.simulate(out, sets=[{"name": f"s{number:03}", "seed": number, "raster": raster} for number in range(200)])
     return out

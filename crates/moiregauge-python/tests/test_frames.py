@@ -14,16 +14,6 @@ pandas = pytest.importorskip("pandas")
 xarray = pytest.importorskip("xarray")
 
 
-@pytest.fixture(scope="module")
-def results(scans: Path) -> mg.Results:
-    return mg.analyze([scans])
-
-
-@pytest.fixture(scope="module")
-def mapped(image: Path) -> mg.MapResults:
-    return mg.map(image)
-
-
 def test_one_row_a_scan(results: mg.Results) -> None:
     table = results.to_pandas()
     assert len(table) == 4 and table["scan"].tolist() == [1, 2, 3, 4]

@@ -16,16 +16,6 @@ pytestmark = pytest.mark.filterwarnings("ignore::moiregauge.CaveatWarning")
 OF_RESULTS = ["scan", "wavelengths", "drift", "twist_strain", "budget"]
 
 
-@pytest.fixture(scope="module")
-def results(scans: Path) -> mg.Results:
-    return mg.analyze([scans])
-
-
-@pytest.fixture(scope="module")
-def mapped(image: Path) -> mg.MapResults:
-    return mg.map(image)
-
-
 def keep(figure: object, name: str) -> None:
     if folder := os.environ.get("MOIREGAUGE_PLOTS"):
         figure.savefig(Path(folder) / f"{name}.png", dpi=110)

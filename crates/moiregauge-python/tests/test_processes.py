@@ -16,9 +16,7 @@ from pathlib import Path
 import moiregauge as mg
 import pytest
 
-pytestmark = pytest.mark.filterwarnings(
-    "ignore::moiregauge.CaveatWarning", "ignore:.*multi-threaded.*:DeprecationWarning"
-)
+pytestmark = pytest.mark.filterwarnings("ignore::moiregauge.CaveatWarning", "ignore:.*multi-threaded.*:DeprecationWarning")
 
 # A child that is not done by then hangs.
 WATCHDOG_S = 120
@@ -90,30 +88,40 @@ def test_progress_is_told_and_may_stop(scans: Path) -> None:
 
 
 def test_ctrl_c_stops_within_a_moment(scans: Path, tmp_path: Path) -> None:
-    """In a process of its own, in the middle of the work; the session goes on after it."""
+    """In a process of its own, at a dozen moments from beginning to end; the session goes on after each."""
     code = f"""
-        import signal, sys, threading, time, os, warnings
+        import os, signal, sys, threading, time, warnings
         warnings.simplefilter("ignore")
         import moiregauge as mg
-        sent = []
-        def send(doing, done, count):
-            if not sent:
+
+        waited = []
+        for n in range(12):
+            # A campaign of its own measures again: moments are in the search, the fit, and the draws.
+            sent = []
+
+            def send(after):
+                time.sleep(after)
                 sent.append(time.monotonic())
                 os.kill(os.getpid(), signal.SIGINT)
-        try:
-            mg.analyze({str(scans)!r}, strain_draws=200000, drift_draws=200000, progress=send)
-        except KeyboardInterrupt:
-            print(time.monotonic() - sent[0])
-        else:
-            sys.exit("it was not stopped")
+
+            thread = threading.Thread(target=send, args=(0.03 + 0.06 * n,))
+            try:
+                thread.start()
+                mg.analyze({str(scans)!r}, strain_draws=1000000, drift_draws=100000, threads=2)
+                thread.join()
+                time.sleep(0.2)
+            except KeyboardInterrupt:
+                waited.append(time.monotonic() - sent[0])
+            thread.join()
         mg.analyze({str(scans / "scan.000.spm")!r})
+        print(*waited)
     """
-    done = subprocess.run(
-        [sys.executable, "-c", textwrap.dedent(code)], capture_output=True, text=True, timeout=WATCHDOG_S
-    )
+    done = subprocess.run([sys.executable, "-c", textwrap.dedent(code)], capture_output=True, text=True, timeout=WATCHDOG_S)
     assert done.returncode == 0, done.stderr
-    # 0.3 s on a machine of its own; tests share theirs.
-    assert float(done.stdout) < 1.5, done.stdout
+    waited = sorted(float(word) for word in done.stdout.split())
+    # 0.3 s of work. Tests share their machine, and its clock counts what others do: most of the dozen are within it, and none waits for
+    # the end of a stage, which takes seconds here.
+    assert len(waited) >= 8 and waited[len(waited) // 2] < 0.3 and waited[-1] < 1.5, waited
 
 
 def test_the_program_is_stopped_by_ctrl_c(scans: Path, tmp_path: Path) -> None:
@@ -147,9 +155,7 @@ def test_arrays_are_copied_once() -> None:
         run = run_of(asked(array, None, 0.1, None, {}), {})
         print((peak() - before) / array.nbytes)
     """
-    done = subprocess.run(
-        [sys.executable, "-c", textwrap.dedent(code)], capture_output=True, text=True, timeout=WATCHDOG_S
-    )
+    done = subprocess.run([sys.executable, "-c", textwrap.dedent(code)], capture_output=True, text=True, timeout=WATCHDOG_S)
     assert done.returncode == 0, done.stderr
     assert 0.5 < float(done.stdout) < 1.2, done.stdout
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
+import sysconfig
 import tomllib
 from html.parser import HTMLParser
 from pathlib import Path
@@ -56,7 +58,8 @@ def test_names_are_no_html(scans: Path, tmp_path: Path) -> None:
 def test_generated_files_are_current() -> None:
     if not (HERE.parent / "moiregauge-report" / "schema").is_dir():
         pytest.skip("the schemas are not there")
-    subprocess.run([sys.executable, HERE / "scripts" / "generate.py", "--check"], check=True)
+    for script in ("generate.py", "reference.py"):
+        subprocess.run([sys.executable, HERE / "scripts" / script, "--check"], check=True)
 
 
 def test_versions_are_those_of_the_workspace() -> None:
@@ -77,9 +80,18 @@ def test_types_are_right() -> None:
     pytest.importorskip("mypy")
     from mypy import api
 
-    out, errors, code = api.run(
-        ["--strict", "--config-file", str(HERE / "pyproject.toml"), str(HERE / "python" / "moiregauge")]
-    )
+    out, errors, code = api.run(["--strict", "--config-file", str(HERE / "pyproject.toml"), str(HERE / "python" / "moiregauge")])
     assert code == 0, out + errors
     done = subprocess.run([sys.executable, "-m", "mypy.stubtest", "moiregauge._core"], capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_types_are_right_for_pyright() -> None:
+    """The package by itself, and what users see of it."""
+    pytest.importorskip("pyright")
+    scripts = sysconfig.get_path("scripts")
+    # It looks for packages where an environment is active.
+    here = {**os.environ, "VIRTUAL_ENV": sys.prefix, "PATH": f"{scripts}{os.pathsep}{os.environ['PATH']}"}
+    for arguments in (["--project", str(HERE)], ["--ignoreexternal", "--verifytypes", "moiregauge"]):
+        done = subprocess.run(["pyright", *arguments], capture_output=True, text=True, env=here, cwd=scripts)
+        assert done.returncode == 0, done.stdout + done.stderr

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 def read(file: Input, **told: Unpack[Options]) -> Scan:
     """Reads a scan: a path, or a file opened for bytes.
 
-    `told` is what the file does not tell: `size_nm`, `line_rate_hz`, `frame_direction`, `rotation_deg`, `unit`, `crop`.
+    `told` is what the file does not say: `size_nm`, `line_rate_hz`, `frame_direction`, `rotation_deg`, `unit`, `crop`.
     Row 0 of `values` is the bottom line.
 
     Raises `ReadError` for what is no scan or is damaged.
@@ -120,14 +120,14 @@ def analyze(
     arrays: 2-D arrays (rows × columns, **row 0 at the bottom**) of any real type; `xarray.DataArray` with places in nm
         (or with `units`); or dictionaries such as `{"phase_trace": a, "phase_retrace": b, "x_sensor": x, "y_sensor": y}`
         with positions in nm (`sensor_unit`). NaN and masked pixels are missing. Each is copied once.
-    pixel_nm: distance of neighbouring pixels of arrays, or that along and across the lines.
+    pixel_nm: distance of neighbouring pixels of arrays, or that along and across the lines, nm.
     names: of the arrays in results.
     sets: sets made by hand, name → folder or file.
     atomic: images of the atoms of layer `atomic_layer` (1: the lower one), which tell its orientation.
     survey_image: an image of a larger area; a figure of the report marks the scans in it.
     threads: at most so many; all processors without.
     progress: `True`, or a function of what is being done, how much is done, and how much there is.
-    options: settings of the program and what files do not tell, such as `seed`, `channel`, `layers`, `drift`, `size_nm`:
+    options: settings of the program and what files do not say, such as `seed`, `channel`, `layers`, `drift`, `size_nm`:
         see `help(moiregauge.Options)`.
 
     Doubts are in `caveats` and warned of once for each kind (`CaveatWarning`). Raises `ReadError` where nothing can be
@@ -186,7 +186,7 @@ def measure(
 
 
 class Campaign:
-    """Scans that come and go: each is measured once, everything else is done anew in milliseconds.
+    """Scans that come and go: each is measured once, everything else is repeated in milliseconds.
 
     Options are those of `analyze`. A campaign can be pickled with all that it has measured, unless it holds arrays.
     """
@@ -308,19 +308,19 @@ def map(  # noqa: A001
 
     Does what `moiregauge map` does: scans are analysed first, their drift and sensors correct the maps; local wave
     vectors of all harmonics come from the phases under a Gaussian window; maps of scans of one place are averaged.
-    Nodes that are not to be believed are masked, with the reason. Places are x to the right, y up, nm.
+    Bad nodes are masked, with the reason. Places are x to the right, y up, nm.
 
     paths, arrays, pixel_nm, names, sets, threads, progress, options: as in `analyze`.
     map_method: phases under a window, or fits on overlapping tiles.
-    window_nm: standard deviation of the window; a point becomes 2.35 of it wide. By itself as wide as the lattice stays
+    window_nm: standard deviation of the window, nm; a point becomes 2.35 of it wide. By itself as wide as the lattice stays
         straight, at least 0.6 periods.
-    step_nm: distance of the nodes; by itself a third of the window.
+    step_nm: distance of the nodes, nm; by itself a third of the window.
     margin: at the edges, in windows; by itself 2, or a quarter of the frame where that is less.
     in_bands: map in bands, as images of more than 20 million pixels are.
-    regions: mean, spread and errors within polygons: name → corners. In `details.regions`.
-    profiles: names → two ends of a line; `profiles.csv` of the report has them.
-    device_nm: the most uniform areas of this size, at so many `device_angles`, so many of them: `details.devices`.
-    wanted_deg: how much of the map has this twist, within so much: `details.wanted`.
+    regions: mean, spread and errors within polygons: name → corners (x, y), nm. In `details.regions`.
+    profiles: names → two ends (x, y) of a line, nm; `profiles.csv` of the report has them.
+    device_nm: the most uniform areas of this width and height, at so many `device_angles`, so many of them: `details.devices`.
+    wanted_deg: how much of the map has this twist, within so much, degrees: `details.wanted`.
     domains, nodes: whether triangles between nodes are looked for at small angles, and how nodes look.
 
     Raises as `analyze`, and `MeasureError` where no image gives a map.

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from moiregauge._options import TOLD
 from moiregauge._scan import Scan, grid_of_labelled, is_labelled
 
-Progress: TypeAlias = bool | Callable[[str, int, int], None] | None
+Progress: TypeAlias = bool | Callable[[str, int, int], object] | None
 """`True` for a bar, or a function of what is being done, how much of it is done, and how much there is."""
 PathLike: TypeAlias = "str | os.PathLike[str]"
 # Arrays are objects here, since xarray need not be installed.
@@ -63,7 +63,7 @@ def listed(given: Any) -> list[Any]:
             f"expected a 2-D array or a list of them, found one of shape {given.shape}: "
             "a stack of images is given as arrays=list(stack)"
         )
-    return [given] if single else list(given)
+    return [given] if single else list(cast(Any, given))
 
 
 def asked(

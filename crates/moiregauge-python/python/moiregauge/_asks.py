@@ -27,7 +27,7 @@ def _paths(paths: Paths) -> list[str]:
 
 
 def _split(options: Mapping[str, Any]) -> tuple[str, str]:
-    """Settings, and what files do not tell."""
+    """Settings, and what files do not say."""
     given = {name: value for name, value in options.items() if value is not None}
     told = {name: given.pop(name) for name in TOLD if name in given}
     return words(given), words(told)
@@ -81,7 +81,7 @@ def moire(
     """The moiré of layers, or the layers behind a moiré, as `moiregauge moire`.
 
     Either `twist_deg` of layer 2 against layer 1, with uniaxial strain of layer 2 along an axis counted from the reciprocal
-    vectors of layer 1, and strain that is the same in all directions; or three `wavelengths_nm` (lengths between
+    vectors of layer 1, and isotropic strain; or three `wavelengths_nm` (lengths between
     neighbouring spots, or of wave vectors where `k_space`); or two `vectors_nm`. `layers` and other settings are options.
     `band_degeneracy` is the number of electrons per cell at full filling.
 
@@ -125,7 +125,7 @@ def plan(
 ) -> Record:
     """How many scans, how large, how fast, for wanted standard errors of twist, strain and drift, as `moiregauge plan`.
 
-    conditions: instrument and sample as in `simulate`; the number, size and rate of the scans are what is sought.
+    conditions: instrument and sample as in `simulate`; the number, size and rate of the scans are searched for.
     max_size_nm, max_rate_hz: without them twice those of the conditions.
     noise_per_pixel: the noise of a pixel does not depend on the time spent on it.
 
@@ -155,7 +155,7 @@ def simulate(
 
     conditions: those of one set, any part of what `moiregauge simulate --print-config` shows: `name`, `seed` and the tables
         `sample` (`twist_deg`, `layers`, …), `drift`, `raster` (`scans`, `pixels`, `line_rate_hz`, …), `window`, `noise`,
-        `features`; the rest is as usual, which is as in arXiv 2406.08681.
+        `features`; the rest has its defaults, the conditions of arXiv 2406.08681.
     sets: the conditions of several sets.
     paper: the three sets of arXiv 2406.08681, with this seed.
     force: replaces sets of the same names.

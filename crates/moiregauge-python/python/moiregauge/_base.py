@@ -7,9 +7,9 @@ import functools
 import json
 import types
 import typing
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, TypeVar, Union, cast
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, TypeAlias, TypeVar, Union, cast
 
 import numpy as np
 
@@ -22,14 +22,9 @@ if TYPE_CHECKING:
 
     from moiregauge import _core
     from moiregauge._arguments import Progress
-    from moiregauge.results import MapResults, Results
+    from moiregauge.results import Estimate, MapResults, Results
 
 T = TypeVar("T", bound="Document")
-
-
-@functools.cache
-def _types(of: type[Any]) -> dict[str, Any]:
-    return typing.get_type_hints(of)
 
 
 def _encoded(value: Any) -> Any:
@@ -40,23 +35,40 @@ def _encoded(value: Any) -> Any:
     return value
 
 
-def _decoded(wanted: Any, value: Any) -> Any:
-    if value is None:
-        return None
+# What makes a value of a document one of ours; `None` where it stays as it is.
+Decoder: TypeAlias = "Callable[[Any], Any] | None"
+
+
+@functools.cache
+def _decoders(of: type[Any]) -> dict[str, Decoder]:
+    """Those of the fields of a class, made once."""
+    return {name: _decoder(wanted) for name, wanted in typing.get_type_hints(of).items()}
+
+
+@functools.cache
+def _decoder(wanted: Any) -> Decoder:
     origin = typing.get_origin(wanted)
     if origin in (Union, types.UnionType):
-        wanted = next(one for one in typing.get_args(wanted) if one is not type(None))
-        return _decoded(wanted, value)
+        return _decoder(next(one for one in typing.get_args(wanted) if one is not type(None)))
     if origin is tuple:
         inner = typing.get_args(wanted)
         if inner[-1] is Ellipsis:
-            return tuple(_decoded(inner[0], one) for one in value)
-        return tuple(_decoded(of, one) for of, one in zip(inner, value, strict=True))
+            return functools.partial(_tuple, _decoder(inner[0]))
+        return functools.partial(_tuple_of, [_decoder(of) for of in inner])
     if isinstance(wanted, type) and issubclass(wanted, Document):
-        return wanted.from_dict(value)
-    if wanted is float:
-        return float(value)
-    return value
+        return wanted.from_dict
+    return float if wanted is float else None
+
+
+def _tuple(decoder: Decoder, values: list[Any]) -> tuple[Any, ...]:
+    if decoder is None:
+        return tuple(values)
+    return tuple([None if value is None else decoder(value) for value in values])
+
+
+def _tuple_of(decoders: list[Decoder], values: list[Any]) -> tuple[Any, ...]:
+    both = zip(decoders, values, strict=True)
+    return tuple([value if value is None or decoder is None else decoder(value) for decoder, value in both])
 
 
 class Document:
@@ -68,11 +80,15 @@ class Document:
 
         Raises `ValueError` for names that this version does not know.
         """
-        known = {field.name for field in dataclasses.fields(cast(Any, cls))}
-        if unknown := set(document) - known:
-            raise ValueError(f"{cls.__name__}: expected {sorted(known)}, found also {sorted(unknown)}")
-        wanted = _types(cast(Any, cls))
-        return cls(**{name: _decoded(wanted[name], value) for name, value in document.items()})
+        decoders = _decoders(cast(Any, cls))
+        if not document.keys() <= decoders.keys():
+            known = {field.name for field in dataclasses.fields(cast(Any, cls))}
+            raise ValueError(f"{cls.__name__}: expected {sorted(known)}, found also {sorted(document.keys() - known)}")
+        given = {}
+        for name, value in document.items():
+            decoder = decoders[name]
+            given[name] = value if value is None or decoder is None else decoder(value)
+        return cls(**given)
 
     def to_dict(self) -> dict[str, Any]:
         """The document as plain dictionaries, lists, numbers and words: that of `results.json` or `map.json`."""
@@ -89,22 +105,14 @@ class Document:
 class EstimateBase(Document):
     """A value with its errors."""
 
-    if TYPE_CHECKING:
-
-        @property
-        def value(self) -> float | None: ...
-        @property
-        def sigma(self) -> float | None: ...
-        @property
-        def sigma_total(self) -> float | None: ...
-
     def __str__(self) -> str:
         from moiregauge import _core
 
         def known(value: float | None) -> float:
             return float("nan") if value is None else value
 
-        return _core.plus_minus(known(self.value), known(self.sigma), self.sigma_total)
+        own = cast("Estimate", self)
+        return _core.plus_minus(known(own.value), known(own.sigma), own.sigma_total)
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self})"
@@ -208,13 +216,13 @@ class MapBase(Document):
         both = ((self._arrays[name], other._arrays[name]) for name in self._arrays)
         return all(a[0] == b[0] and np.array_equal(a[1], b[1], equal_nan=True) for a, b in both)
 
-    __hash__ = None  # type: ignore[assignment]
+    __hash__: ClassVar[None]  # type: ignore[assignment]
 
     @property
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Every quantity by its name: rows × columns of nodes, row 0 at the bottom; °, %, nm as in `quantities`.
 
-        `mask` is 0 where values are to be believed; `masks` tells the other numbers.
+        `mask` is 0 at good nodes; `masks` explains the other numbers.
         """
         return {name: values for name, (_, values) in self._arrays.items()}
 

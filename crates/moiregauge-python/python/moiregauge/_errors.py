@@ -6,11 +6,13 @@ from collections.abc import Sequence
 
 
 class _FileError(ValueError):
+    """An error about files."""
+
     def __init__(self, message: str, failed: Sequence[tuple[str, str]] = ()) -> None:
         super().__init__(message)
-        self.failed = [tuple(one) for one in failed]
+        self.failed: list[tuple[str, ...]] = [tuple(one) for one in failed]
         """Every file that failed, and why."""
-        self.file = self.failed[0][0] if self.failed else None
+        self.file: str | None = self.failed[0][0] if self.failed else None
         """The file it is about; the first of `failed`."""
 
     def __reduce__(self) -> tuple[type[_FileError], tuple[str, list[tuple[str, ...]]]]:

@@ -24,7 +24,7 @@ class Options(TypedDict, total=False):
     """Keyword arguments of `analyze`, `measure`, `map`, `Campaign` and `campaign.run`.
 
     background: What is subtracted beforehand.
-    by_hand: What was told by hand: which lattice is meant, and where it is.
+    by_hand: Choices made by hand: which lattice to measure, and where it is.
     calibration: How well the scanner is calibrated, for the uncertainty budget.
     channel: Channel that shows the moiré; `None`: the first of the usual ones that is present.
     crop: The block of the image to use.
@@ -36,6 +36,8 @@ class Options(TypedDict, total=False):
     frame_direction: Sense of the slow motion.
     frame_time_sigma_s: Standard uncertainty of the time of a frame, s: headers hold whole seconds (0.29 s)
         and are written some time after the end of the frame.
+    grain: Which grain to use of scans that show several, as their sets are named: `grain 1` is number 1;
+        `None`: each is a set of its own.
     grouping: How files become sets.
     image: Which of several images of the channel in one file, counted from 1; `None`: the first.
     isotropic_strain_percent: Standard deviation of the isotropic heterostrain that the layers may have beside
@@ -55,7 +57,7 @@ class Options(TypedDict, total=False):
         the atoms at 0° and (hexagonal layers) 120°; about will do. The lattice of a strained moiré has other
         pairs that can be meant; without this, image and orientation choose where they can, and else the least
         strain.
-    moires: How many moirés every image shows; each is fitted with the others taken off.
+    moires: How many moirés every image shows; each is fitted after the others are subtracted.
     overlap: Use only the region that all scans of a set have in common.
     rotation_deg: Angle by which the fast axis is turned against x, degrees, counter-clockwise.
     scanner: A measured calibration of the scanner: positions are corrected with it, and its covariance takes
@@ -87,6 +89,7 @@ class Options(TypedDict, total=False):
     exclude_outliers: bool
     frame_direction: FrameOrder | Sequence[Literal['up', 'down']]
     frame_time_sigma_s: float
+    grain: int
     grouping: Grouping
     image: int
     isotropic_strain_percent: float

@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
+from typing import TypeAlias
 
 WIDTH = 30
+
+Tell: TypeAlias = Callable[[str, int, int], object]
+"""What is being done, how much of it is done, how much there is."""
 
 
 class Bar:
@@ -23,7 +27,7 @@ class Bar:
         sys.stderr.flush()
 
 
-def teller(progress: object) -> Callable[[str, int, int], None] | None:
+def teller(progress: bool | Tell | None) -> Tell | None:
     """The function to call, if any."""
     if progress is None or progress is False:
         return None

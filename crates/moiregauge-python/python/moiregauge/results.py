@@ -123,7 +123,7 @@ Lines = Literal["trace", "retrace", "both"]
 """Which line directions are used."""
 
 Method = Literal["autocorrelation", "fourier", "lattice", "paper"]
-"""How the lattice vectors are read off an image."""
+"""How the lattice vectors are measured in an image."""
 
 StrainConvention = Literal["real-space", "k-space"]
 """Which form of the strain equation is meant (physics of the two: they differ at second order)."""
@@ -163,7 +163,7 @@ class AtomicResult(Document):
     distortion: float | None
     """How far the lattice is from the shape of the material's, relative."""
     drift_nm_per_min: tuple[float | None, float | None] | None
-    """Drift in these images, x and y; `null` where they do not tell."""
+    """Drift in these images, x and y; `null` where it cannot be determined."""
     files: tuple[str, ...]
     """The images."""
     lattice_angle_deg: Estimate
@@ -188,7 +188,7 @@ class BudgetColumn(Document):
     calibration_orthogonality: float | None
     """Axes that do not stand at a right angle."""
     drift: float | None
-    """The drift as far as it is not known; `null` where it was left in."""
+    """Uncertainty of the drift; `null` where the drift was not removed."""
     image: float | None
     """Noise of the images, drift and sensors known exactly."""
     isotropic_strain: float | None
@@ -209,7 +209,7 @@ class BudgetColumn(Document):
 
 @dataclass(frozen=True, kw_only=True)
 class BudgetResult(Document):
-    """What contributes to the uncertainty of a lattice and all that follows from it."""
+    """Contributions to the uncertainty of a lattice and of all that follows from it."""
 
     heterostrain_percent: BudgetColumn
     """Of `heterostrain_percent`."""
@@ -224,9 +224,9 @@ class BudgetResult(Document):
     strain_interval_95_percent: tuple[float | None, float | None]
     """The interval that holds the magnitude, with 95 % confidence, by these errors, per cent."""
     strain_p_value: float | None
-    """How often these errors alone give so improbable a strain vector."""
+    """Probability that these errors alone give such a strain vector."""
     strain_upper_limit_95_percent: float | None
-    """The magnitude that the strain does not exceed, with 95 % confidence, by these errors, per cent."""
+    """Upper limit of the magnitude of the strain from these errors, 95 % confidence, per cent."""
     strain_vector_covariance: tuple[tuple[float | None, float | None], tuple[float | None, float | None]]
     """Covariance of the strain vector from all sources that are known, per cent²."""
     twist_deg: BudgetColumn
@@ -237,7 +237,7 @@ class BudgetResult(Document):
 
 @dataclass(frozen=True, kw_only=True)
 class ByHand(Document):
-    """What the eye knows better than the search. Nothing by default."""
+    """Choices made by hand. Nothing by default."""
 
     lattice_nm: tuple[tuple[float, float], tuple[float, float]] | None = None
     """Two vectors of the lattice, x and y in nm, in the axes of the results and before drift is taken out; 5
@@ -257,7 +257,7 @@ class ByHand(Document):
 class Calibration(Document):
     """How well the position sensors (or the scanner, where there are none) are calibrated: standard
     uncertainties, which every scan shares. The defaults are common values; a calibration of your own
-    scanner tells better.
+    scanner is better.
     """
 
     gain_percent: float
@@ -333,9 +333,9 @@ class CombinedResult(Document):
     at 0 where noise alone may explain the strain.
     """
     strain_p_value: float | None
-    """How often noise alone gives so improbable a strain vector."""
+    """Probability that noise alone gives such a strain vector."""
     strain_upper_limit_95_percent: float | None
-    """The magnitude that the strain does not exceed, with 95 % confidence, per cent."""
+    """Upper limit of the magnitude of the strain, 95 % confidence, per cent."""
     strain_vector_covariance: tuple[tuple[float | None, float | None], tuple[float | None, float | None]]
     """Covariance of the strain vector, per cent²."""
     strain_vector_percent: tuple[float | None, float | None]
@@ -397,7 +397,7 @@ class Conventions(Document):
     strained_layer: str
     """Which layer carries the strain."""
     twist: str
-    """What a twist does not know."""
+    """What the twist does not contain: its sign, and isotropic strain."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -541,8 +541,8 @@ class Estimate(EstimateBase):
     images and sensors, and the drift.
     """
     sigma_total: float | None = None
-    """One standard deviation with everything, calibration and model included: what may be published. In the
-    means of sets and in `combined`; left out where it is not known, as where the drift was left in.
+    """One standard deviation with everything, calibration and model included: publish this one. Present in
+    the means of sets and in `combined`; left out where it is not known, as when the drift was not removed.
     """
     value: float | None
     """The best value."""
@@ -619,14 +619,14 @@ class IsotropicStrainResult(Document):
     shifts: tuple[ShiftResult, ...]
     """By how much isotropic strains of layer 2 (tension positive) change `twist_deg`."""
     twist_interval_deg: tuple[float | None, float | None]
-    """The magnitudes of twist that isotropic strains within 1.96 times the prior, either sign of the uniaxial
-    strain and 1.96 σ leave open.
+    """Range of the twist that is possible with isotropic strains within 1.96 times the prior, either sign of
+    the uniaxial strain, and 1.96 σ.
     """
 
 
 @dataclass(frozen=True, kw_only=True)
 class JointResult(Document):
-    """Terms of a joint fit; those that are `null` did not earn their place by the information criterion."""
+    """Terms of a joint fit; those that are `null` were not used, by the information criterion."""
 
     acceleration_nm_per_min2: tuple[float | None, float | None] | None
     """Change of the drift velocity, x and y."""
@@ -741,7 +741,7 @@ class MapResults(MapBase):
     details: MapDetailsResult
     """Regions, uniform areas, wanted twist."""
     drift_change: DriftChangeResult | None
-    """What differs between upward and downward frames along the slow axis: drift that changes, no strain."""
+    """Difference between upward and downward frames along the slow axis: a drift that changes, not strain."""
     errors: str
     """What the errors of the maps are and what they leave out."""
     extent_nm: tuple[tuple[float, float], tuple[float, float]]
@@ -761,7 +761,7 @@ class MapResults(MapBase):
     quantities: tuple[QuantityResult, ...]
     """Mean and spread of every quantity over the good nodes."""
     resolution_nm: float
-    """Full width at half maximum of what a point becomes, nm."""
+    """Resolution: full width at half maximum of the window, nm."""
     schema: str
     """Name and version of this document."""
     settings: Settings
@@ -873,11 +873,11 @@ class MeanResult(Document):
     at 0 where noise alone may explain the strain.
     """
     strain_p_value: float | None
-    """How often noise alone gives so improbable a strain vector."""
+    """Probability that noise alone gives such a strain vector."""
     strain_scatter_percent: float | None
     """Root-mean-square deviation per component of the strain vector over the scans, per cent."""
     strain_upper_limit_95_percent: float | None
-    """The magnitude that the strain does not exceed, with 95 % confidence, per cent."""
+    """Upper limit of the magnitude of the strain, 95 % confidence, per cent."""
     strain_vector_covariance: tuple[tuple[float | None, float | None], tuple[float | None, float | None]]
     """Covariance of the strain vector, per cent²."""
     strain_vector_percent: tuple[float | None, float | None]
@@ -919,7 +919,7 @@ class NameResult(Document):
     strain_percent: float
     """The strain of its first solution with θ > 0."""
     twist_deg: float
-    """The twist that goes with it."""
+    """The twist of this reading."""
     waves: tuple[tuple[int, int], tuple[int, int]]
     """As of the solutions."""
 
@@ -939,8 +939,8 @@ class NamesResult(Document):
     """The names of a lattice and the choice among them."""
 
     chosen_by: str
-    """What chose the reported name: `least-strain` (nothing tells more), `image` (of each other plausible
-    name one wave is too weak), `orientation` (the others need isotropic strain) or `user`.
+    """What chose the reported name: `image` (every other plausible name has a wave that is too weak),
+    `orientation` (the others need isotropic strain), `user`, or `least-strain` (none of these).
     """
     names: tuple[NameResult, ...]
     """The reported name first."""
@@ -969,7 +969,7 @@ class OtherSenseResult(Document):
     twist_deg: Estimate
     """Twist of layer 2 against layer 1."""
     twist_interval_deg: tuple[float | None, float | None]
-    """The magnitudes of twist that both readings leave open, with 1.96 σ of `total` on either side."""
+    """Range of the magnitude of the twist from both readings, with 1.96 σ of `total` on either side."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -1012,13 +1012,13 @@ class QuantityResult(Document):
 
 @dataclass(frozen=True, kw_only=True)
 class ReadingsResult(Document):
-    """Everything that a lattice can mean beside `twist_deg` and `heterostrain_percent`."""
+    """Everything that a lattice can mean besides `twist_deg` and `heterostrain_percent`."""
 
     isotropic_strain: IsotropicStrainResult | None
     """What an isotropic heterostrain does to the twist; `null` where no solution is exact."""
     layers_differ: bool
-    """Whether the layers differ: twist and strain then trade at first order, and every entry of `solutions`
-    with `twist_deg` > 0 and the waves of the first is as good as another.
+    """Whether the layers differ. Then several pairs of twist and strain explain the moiré: every entry of
+    `solutions` with `twist_deg` > 0 and the waves of the first fits equally well.
     """
     names: NamesResult | None
     """The names of the lattice, that is which of its waves belong to the atoms, and the choice among them;
@@ -1029,7 +1029,7 @@ class ReadingsResult(Document):
     name first, then the least strained names.
     """
     solutions_complete_to_percent: float
-    """`solutions` holds all that have no more strain than this."""
+    """`solutions` holds all solutions with at most this strain."""
     strain_tensor: StrainTensorResult | None
     """Twist and the whole relative strain; `null` unless the orientation of a layer is known."""
 
@@ -1055,25 +1055,26 @@ class RegionMeanResult(Document):
     """Mean and spread of a quantity over an area."""
 
     blur: float | None
-    """How far smoothing by the window has moved the mean, as the curvature of the map tells."""
+    """Shift of the mean by smoothing with the window, from the curvature of the map."""
     mean: float | None
     """Mean over the area of the good nodes."""
     noise: float | None
     """Root mean square of the errors of the nodes."""
     sigma: float | None
-    """Its standard error by image noise, with what neighbouring nodes share, and by `blur`. What all nodes
-    have in common (drift, calibration, lattice constant, model) is not in it.
+    """Its standard error from image noise (neighbouring nodes are correlated) and from `blur`. Errors that
+    all nodes share (drift, calibration, lattice constant, model) are not included.
     """
     spread: float | None
     """Standard deviation over the nodes."""
     spread_below_95: float | None
-    """What the spread does not exceed, 95 %, noise and what the window hides (`spread_widening`) accounted
-    for, where the lattice changes over eight windows or more; for shorter changes it may be too small.
+    """Upper limit of the spread (95 %), with noise and smoothing (`spread_widening`) taken into account. It
+    holds where the lattice changes over eight windows or more; for shorter changes it may be too small.
     """
     spread_corrected: float | None
     """The same without what noise adds."""
     spread_widening: float | None
-    """Factor by which the window may have made the spread smaller, as the curvature of the map tells."""
+    """Factor by which smoothing with the window may have reduced the spread, from the curvature of the map.
+    """
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -1085,9 +1086,9 @@ class RegionResult(Document):
     corners_nm: tuple[tuple[float, float], ...]
     """Corners in order, nm."""
     covered_percent: float
-    """Share of the area that the map reaches, %."""
+    """Share of the area that the map covers, %."""
     good_nodes: int
-    """Those to be believed."""
+    """Good nodes."""
     masked_by_percent: tuple[MaskShare, ...]
     """Masked nodes by reason, % of the nodes within."""
     masked_percent: float
@@ -1097,7 +1098,7 @@ class RegionResult(Document):
     name: str
     """Its name."""
     nodes: int
-    """Nodes whose cells it covers at least in part."""
+    """Nodes whose cells the area covers at least in part."""
     strain_rms_percent: float | None
     """Root mean square of the local strain without noise, %."""
     strain_vector_percent: tuple[RegionMeanResult, RegionMeanResult] | None
@@ -1117,11 +1118,13 @@ class ResidualResult(Document):
     degrees_of_freedom: int
     """Degrees of freedom of `chi2`."""
     displacement_nm: tuple[float | None, float | None] | None
-    """Where the scan stands from where the others have it, x and y; `null` without linked phases."""
+    """Distance of the lattice from the place that the other scans predict, x and y; `null` without linked
+    phases.
+    """
     outlying: bool
     """Whether it stands out: `p_value` < 0.001 divided by the number of scans."""
     p_value: float | None
-    """How often chance makes so large a χ², that of the others taken as measure if it exceeds 1."""
+    """Probability of so large a χ² by chance, relative to that of the other scans if this exceeds 1."""
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -1165,7 +1168,7 @@ class Run(Document):
     inputs: tuple[str, ...]
     """The files to measure as they were named, in order, those that could not be used among them."""
     known: Told
-    """What the user told of the files."""
+    """What the user said about the files."""
     left_out: tuple[FailedInput, ...] = ()
     """Names that were given and not measured: no file, or one that could not be read."""
     other_files: tuple[InputFile, ...] = ()
@@ -1201,9 +1204,9 @@ class ScanResult(Document):
     monte_carlo: StrainMonteCarlo | None
     """Mean and spread of the Monte Carlo draws behind the best of `twist_strain`."""
     residual: ResidualResult | None
-    """How it lies against the other scans; `null` without a joint fit."""
+    """How it agrees with the other scans; `null` without a joint fit."""
     tip_velocity_nm_per_s: TipVelocity
-    """How fast it moved, nm/s; σ is the spread over the lines."""
+    """Speed of the tip, nm/s; σ is the spread over the lines."""
     twist_strain: ScanTwistStrain
     """Twist and strain before and after the drift was removed."""
     vectors: tuple[ScanVector, ScanVector, ScanVector]
@@ -1240,20 +1243,21 @@ class ScanVector(Document):
 
 @dataclass(frozen=True, kw_only=True)
 class ScannerCalibration(Document):
-    """A measured calibration: what is shown is `F` times what is true, see [`crate::calibration`]."""
+    """A measured calibration: lengths in the image are `F` times the true ones, see [`crate::calibration`].
+    """
 
     coordinates: Coordinates
     """Whether it is that of position sensors."""
     covariance: tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]]
     """Covariance of the three, in their units."""
     gain_percent: float
-    """s: how much too long lengths are shown, mean of x and y, per cent."""
+    """s: by how much lengths in the image are too long, mean of x and y, per cent."""
     line_rates_hz: tuple[float, ...]
     """Line rates of those frames, Hz."""
     mismatch_percent: float
-    """g: how much longer lengths are shown along x than along y, per cent."""
+    """g: by how much lengths along x are too long compared with y, per cent."""
     orthogonality_mrad: float
-    """γ: by how much less than a right angle the axes shown enclose, mrad."""
+    """γ: a right angle minus the angle between the axes in the image, mrad."""
     sizes_nm: tuple[tuple[float, float], ...]
     """Sizes of the frames it was measured with, nm (fast, slow)."""
 
@@ -1281,8 +1285,8 @@ class SetResult(Document):
     drift: DriftResult | None
     """The drift; `null` where the scans cannot determine it."""
     forward_backward: TwistStrainResult | None
-    """From the mean reciprocal lattice of up and down scans: free of constant drift without knowing it. The
-    check on `mean`.
+    """From the mean reciprocal lattice of up and down scans: free of constant drift without knowing it. A
+    check of `mean`.
     """
     line_rate_hz: float | None
     """Lines per second (trace and retrace together)."""
@@ -1305,7 +1309,7 @@ class Settings(Document):
     background: Background
     """What is subtracted beforehand."""
     by_hand: ByHand | None = None
-    """What was told by hand: which lattice is meant, and where it is."""
+    """Choices made by hand: which lattice to measure, and where it is."""
     calibration: Calibration
     """How well the scanner is calibrated, for the uncertainty budget."""
     channel: str | None
@@ -1324,6 +1328,10 @@ class Settings(Document):
     """Standard uncertainty of the time of a frame, s: headers hold whole seconds (0.29 s) and are written
     some time after the end of the frame.
     """
+    grain: int | None = None
+    """Which grain to use of scans that show several, as their sets are named: `grain 1` is number 1; `None`:
+    each is a set of its own.
+    """
     grouping: Grouping
     """How files become sets."""
     image: int | None = None
@@ -1340,7 +1348,7 @@ class Settings(Document):
     layers.
     """
     layers_chosen: bool
-    """Whether somebody chose the layers; what nobody chose is said to be assumed."""
+    """Whether the user chose the layers; otherwise a caveat says that they were assumed."""
     line: Lines
     """Line directions to use."""
     material: Material
@@ -1357,7 +1365,7 @@ class Settings(Document):
     be meant; without this, image and orientation choose where they can, and else the least strain.
     """
     moires: int
-    """How many moirés every image shows; each is fitted with the others taken off."""
+    """How many moirés every image shows; each is fitted after the others are subtracted."""
     overlap: bool
     """Use only the region that all scans of a set have in common."""
     scanner: ScannerCalibration | None = None
@@ -1383,7 +1391,7 @@ class ShiftResult(Document):
     isotropic_strain_percent: float
     """The strain of layer 2, the same in all directions."""
     twist_change_deg: float | None
-    """The change of the twist; `null` where no twist goes with it."""
+    """The change of the twist; `null` where no twist explains the moiré."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -1414,9 +1422,9 @@ class SplitResult(Document):
     axis_lab_deg: Estimate | None
     """Axis of the uniaxial part in the laboratory."""
     biaxial_percent: Estimate
-    """In all directions on top of it."""
+    """The isotropic strain added to it."""
     uniaxial_percent: Estimate
-    """Along the axis; −ν times as much across."""
+    """Along the axis; −ν times this across."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -1450,8 +1458,8 @@ class StrainTensorResult(Document):
     mean_strain_percent: Estimate
     """½(ε₁ + ε₂)."""
     other_sense: OtherSenseResult | None
-    """Two equal layers whose sense of twist is open: the reading for the other sense, which is as good;
-    `null` otherwise.
+    """For two equal layers whose sense of twist is open: the reading for the other sense, which fits equally
+    well; `null` otherwise.
     """
     shear_percent: Estimate
     """γ = ½(ε₁ − ε₂), the noise bias removed."""
@@ -1548,7 +1556,7 @@ class TestedResult(Document):
     """A term that was tried."""
 
     criterion_gain: float | None
-    """By how much it lowers the Bayesian information criterion; below 0 it does not pay."""
+    """By how much it lowers the Bayesian information criterion; below 0 the term is not used."""
     term: str
     """`acceleration`, `settling` or `fast-axis gain`."""
     used: bool
@@ -1604,15 +1612,15 @@ class TrendResult(Document):
     middle_sigma: float
     """Its standard error by the noise of the image."""
     noise: float
-    """What noise adds to the scatter about the plane."""
+    """Standard deviation due to noise."""
     of_trend: float
-    """Standard deviation over the good nodes that the plane makes."""
+    """Standard deviation over the good nodes due to the plane."""
     per_100nm: tuple[float, float]
     """Change along x and along y, per 100 nm."""
     per_100nm_sigma: tuple[float, float]
     """Their standard errors by the noise of the image."""
     rest: float
-    """What neither explains."""
+    """Standard deviation that neither trend nor noise explains."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -1632,9 +1640,9 @@ class TwistStrainResult(Document):
     at 0 where noise alone may explain the strain.
     """
     strain_p_value: float | None
-    """How often noise alone gives so improbable a strain vector."""
+    """Probability that noise alone gives such a strain vector."""
     strain_upper_limit_95_percent: float | None
-    """The magnitude that the strain does not exceed, with 95 % confidence, per cent."""
+    """Upper limit of the magnitude of the strain, 95 % confidence, per cent."""
     strain_vector_covariance: tuple[tuple[float | None, float | None], tuple[float | None, float | None]]
     """Covariance of the strain vector, per cent²."""
     strain_vector_percent: tuple[float | None, float | None]
@@ -1652,9 +1660,9 @@ class WantedResult(Document):
     """How much of a map has a wanted twist, % of the good nodes."""
 
     blur_percent: float | None
-    """How far the window may have moved that share, as the curvature of the map tells."""
+    """Shift of this share by smoothing with the window, from the curvature of the map."""
     certain_percent: float | None
-    """Share that is within by two σ of its own."""
+    """Share of nodes that are within the limits by at least two of their σ."""
     corrected_percent: float | None
     """Share expected without noise."""
     measured_percent: float | None
@@ -1662,7 +1670,7 @@ class WantedResult(Document):
     nodes: int
     """Good nodes."""
     possible_percent: float | None
-    """Share that is not beyond by two σ."""
+    """Share of nodes that are not outside the limits by two of their σ."""
     twist_deg: float
     """The wanted twist, degrees."""
     within_deg: float
