@@ -199,7 +199,7 @@ def choice(entry):
 
 
 # What is looked for most often, and where it is.
-OFTEN = """## What is looked for most often
+OFTEN = """## Where to find the usual numbers
 
 | what | where |
 | --- | --- |
@@ -211,7 +211,7 @@ OFTEN = """## What is looked for most often
 | where the uncertainty comes from | `sets[0].mean.budget` |
 | every reading of the lattice | `sets[0].mean.readings.solutions` |
 | single scans, before and after the drift is removed | `sets[0].scans[0].twist_strain.sensor`, `sets[0].scans[0].twist_strain.drift_corrected` |
-| doubts | `caveats[0].code` |
+| caveats | `caveats[0].code` |
 | which files, which settings, which version | `provenance`, `settings` |
 """
 
@@ -268,12 +268,16 @@ def main(path, root, docs):
         "reference/map.md": schema_page(
             root, "map", "map.json", "`moiregauge map` writes this document beside the arrays of `map.zarr`; units as in `results.json`."
         ),
+        "reference/watch.md": schema_page(
+            root, "watch", "moiregauge watch --json", "`moiregauge watch --json` prints one such object as a line for each new result, "
+            "and gives it to `--exec`; units as in `results.json`.",
+        ),
         "reference/settings.md": text_page(
             "Settings", "Every setting with its default, as `moiregauge config` prints it. Save it, change what you need, and give it to "
             "`moiregauge analyze --config FILE`. Options on the command line come on top.", "toml", program.says("config"),
         ),
         "reference/classes.md": text_page(
-            "Classes of samples", "What `moiregauge simulate --sample CLASS[:KEY=VALUE,…]` can put into a sample, as "
+            "Classes of samples", "What `moiregauge simulate --sample CLASS[:KEY=VALUE,…]` can add to a sample, as "
             "`moiregauge simulate --list-samples` lists it. What becomes of each is measured in [Real samples](../samples.md).",
             "text", program.says("simulate", "--list-samples"),
         ),

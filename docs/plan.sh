@@ -10,10 +10,10 @@ work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 "$program" simulate --print-config | sed 's/^pixels = .*/pixels = [128, 128]/' > "$work/base.toml"
 {
-  printf '# What `moiregauge plan` foresees and what simulated sets give\n\n'
-  printf 'The recommended plan for each wish, and the root-mean-square error over %s simulated sets of just such scans\n' "$sets"
+  printf '# Plans compared with simulated sets\n\n'
+  printf 'For each target: the recommended plan, and the root-mean-square error over %s simulated sets of such scans\n' "$sets"
   printf '(mean of x and y, and of both strain components). `docs/plan.sh` makes this page.\n\n'
-  printf '| wish, conditions | scans | Hz | size (nm) | minutes | quantity | foreseen σ | rms error | ratio |\n'
+  printf '| target, conditions | scans | Hz | size (nm) | minutes | quantity | predicted σ | rms error | ratio |\n'
   printf '| --- | --- | --- | --- | --- | --- | --- | --- | --- |\n'
   while IFS='|' read -r name wishes change; do
     sed "$change" "$work/base.toml" > "$work/conditions.toml"
@@ -42,6 +42,6 @@ drift ± 0.001 nm/min, frames no larger than 60 nm, 8 Hz|--drift-sigma 0.001 --m
 strain ± 0.0095 %, noise twice the signal|--strain-sigma 0.0095 --max-size 60 --max-rate 8|s/^pixel_deg = .*/pixel_deg = 2.0/
 drift ± 0.01 nm/min, no position sensors|--drift-sigma 0.01 --max-size 80 --max-rate 8|s/^sensors = .*/sensors = false/;s/^gain = .*/gain = [1.0, 1.0]/;s/^shear_mrad = .*/shear_mrad = 0.0/
 WISHES
-  printf '\nAn rms over %s sets scatters by some %.0f %%.\n' "$sets" "$(awk -v n="$sets" 'BEGIN { print 100 / sqrt(2 * n) }')"
+  printf '\nAn rms over %s sets has an uncertainty of about %.0f %%.\n' "$sets" "$(awk -v n="$sets" 'BEGIN { print 100 / sqrt(2 * n) }')"
 } > docs/plan.md
 cat docs/plan.md

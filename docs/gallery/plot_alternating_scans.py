@@ -1,9 +1,9 @@
 """
-Frames up and down tell the drift
+Frames up and down show the drift
 =================================
 
-A drift stretches frames scanned upwards and compresses those scanned downwards. Before it is removed, twist and strain jump from
-frame to frame; after, they agree.
+A drift stretches frames scanned upwards and compresses those scanned downwards. Before it is removed, twist and strain jump from frame
+to frame; after, they agree.
 """
 
 import matplotlib.pyplot as plt

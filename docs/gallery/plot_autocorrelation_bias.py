@@ -3,8 +3,8 @@ Pitfall: the autocorrelation that is not divided by the overlap
 ===============================================================
 
 A summed autocorrelation weighs its peaks with the overlap of the image with itself, which moves them towards the middle. Lengths come
-out too short and the twist too large; comparing frames up and down does not show it, since all share it. The error bars of the
-published protocol (``--method paper``) know nothing of it. The default method has no such bias.
+out too short and the twist too large; comparing frames up and down does not show it, because all have the same bias. The error bars of
+the published protocol (``--method paper``) do not include it. The default method has no such bias.
 """
 
 import matplotlib.pyplot as plt
@@ -26,6 +26,6 @@ for method, colour, label in (("paper", mg.DOWN, "summed autocorrelation"), ("la
     sigma = [estimate["sigma"] for estimate in found[method]]
     ax.errorbar([0.8 * s for s in sizes], error, sigma, fmt="o-", color=colour, capsize=3, label=label)
 ax.axhline(0, color=mg.LINE, lw=0.8)
-ax.set(xlabel="side of the frame (nm)", ylabel="twist found − twist put in (°)")
+ax.set(xlabel="side of the frame (nm)", ylabel="measured − true twist (°)")
 ax.legend(frameon=False)
 plt.show()

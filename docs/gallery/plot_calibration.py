@@ -2,8 +2,8 @@
 A scanner that is wrong, calibrated
 ===================================
 
-This scanner has no position sensors. Its frames are 3.1 % wider than it says, 1.2 % less high, and 6 mrad from a right angle, so that
-lengths are shown too short along x and too long along y. Graphite, scanned with the same scanner, tells the distortion.
+This scanner has no position sensors. Its frames are 3.1 % wider than it says, 1.2 % less high, and 6 mrad from a right angle, so
+lengths appear too short along x and too long along y. An image of graphite from the same scanner gives the distortion.
 """
 
 import re

@@ -2,8 +2,8 @@
 What strain does to a cell
 ==========================
 
-``moiregauge moire --figure`` draws the cell of a twist and a strain. A heterostrain of 0.3 % at 1.1° makes the three wavelengths differ by a
-quarter: the moiré magnifies strain by one over the twist.
+``moiregauge moire --figure`` draws the cell of a twist and a strain. A heterostrain of 0.3 % at 1.1° makes the three wavelengths
+differ by a quarter: the moiré magnifies strain by one over the twist.
 """
 
 import matplotlib.pyplot as plt

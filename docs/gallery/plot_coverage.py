@@ -2,8 +2,8 @@
 Do the errors hold?
 ===================
 
-``moiregauge validate`` simulates sets, analyses them, and compares with the truth. The pulls, error over stated σ, have to be normal
-with a width of one.
+``moiregauge validate`` simulates sets, analyses them, and compares with the truth. The pulls (error divided by stated σ) should be
+normally distributed with a width of one.
 """
 
 import matplotlib.pyplot as plt

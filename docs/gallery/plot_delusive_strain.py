@@ -2,8 +2,8 @@
 Pitfall: atoms and moiré in one image
 =====================================
 
-STM images show the atoms and the moiré. Phase analysis of the atoms can then make a strain that is not there ("delusive"
-strain, arXiv:2309.01584). Here layers that are rigid and perfect are seen with atoms as strong as the moiré: the map of the moiré has to be flat.
+STM images show the atoms and the moiré. Phase analysis of the atoms can then show a strain that does not exist ("delusive" strain,
+arXiv:2309.01584). Here the layers are rigid and perfect, with atoms as strong as the moiré: the map of the moiré must be flat.
 """
 
 import matplotlib.pyplot as plt
@@ -25,5 +25,5 @@ axes[0].set(title="atoms and moiré (part of the frame)", xticks=[], yticks=[])
 twist = found["twist"][found["mask"] == 0]
 axes[1].hist(twist[np.isfinite(twist)] - 3, bins=30, color=mg.UP)
 axes[1].axvline(0, color=mg.LINE, lw=0.8)
-axes[1].set(title="map: twist of the nodes", xlabel="found − put in (°)", yticks=[])
+axes[1].set(title="map: twist of the nodes", xlabel="twist of a node − true twist (°)", yticks=[])
 plt.show()

@@ -2,7 +2,7 @@
 Where to put a device
 =====================
 
-``map --device`` tries a box at every node and in all orientations, and ranks by the spread of the twist that it does not exceed.
+``map --device`` tries a box at every node and in all orientations. The boxes are ranked by the upper limit of the spread of the twist.
 """
 
 import matplotlib.pyplot as plt

@@ -2,7 +2,8 @@
 Small angles: nodes and triangles
 =================================
 
-At 0.25° the layers relax into triangular domains. The program finds the nodes, joins them to triangles, and gives twist and strain of each.
+At 0.25° the layers relax into triangular domains. The program finds the nodes, joins them to triangles, and gives twist and strain of
+each.
 """
 
 import matplotlib.pyplot as plt

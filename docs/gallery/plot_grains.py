@@ -2,8 +2,8 @@
 Two grains in one frame
 =======================
 
-Two lattices lie side by side. The numbers are those of the larger grain; the caveat ``several-grains`` says so, and the map masks the boundary and
-what lies beyond it.
+Two lattices lie side by side. Each grain is a set of its own. The caveat ``several-grains`` says how they compare. The map masks the
+boundary and what lies beyond it.
 """
 
 import matplotlib.pyplot as plt
@@ -16,7 +16,8 @@ mg.simulate(
 )
 found = mg.analyze(work, "scans")
 print("caveats:", ", ".join(mg.codes(found)))
-print("twist:", found["sets"][0]["mean"]["twist_deg"]["value"])
+for each in found["sets"]:
+    print(each["name"], "twist:", each["mean"]["twist_deg"]["value"])
 mg.run("map", "scans", "--out", "maps", "--quiet", folder=work, fails=True)
 figure, axes = plt.subplots(1, 2, figsize=(9, 4), layout="constrained")
 mg.show(work / "maps/figures/map-image.png", axes[0], "the first scan")

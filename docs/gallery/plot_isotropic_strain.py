@@ -2,9 +2,9 @@
 Pitfall: a strain that the moiré does not show
 ==============================================
 
-A strain that is the same in all directions leaves the moiré as it is if the twist changes a little with it. For equal layers the
-change is of second order, for different ones of first order. A twist quoted to 0.001° is conditional on the isotropic strain;
-the orientation of one layer settles it.
+With an isotropic strain and a slightly different twist the moiré stays the same. For equal layers the change of the twist is of second
+order, for different layers of first order. So a twist to 0.001° holds only for a known isotropic strain. The orientation of one layer
+determines both.
 """
 
 import matplotlib.pyplot as plt
@@ -23,5 +23,5 @@ for ax, layers in zip(axes, ("graphene", "graphene/hBN")):
         found.append(back["twist_strain"]["twist_deg"]["value"])
     ax.plot(strains, np.array(found) - 1.1, "o-", color=mg.UP)
     ax.axhline(0, color=mg.LINE, lw=0.8)
-    ax.set(title=layers, xlabel="isotropic strain put in (%)", ylabel="twist read − twist put in (°)")
+    ax.set(title=layers, xlabel="true isotropic strain (%)", ylabel="reading − true twist (°)")
 plt.show()

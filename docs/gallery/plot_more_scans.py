@@ -1,9 +1,9 @@
 """
-What more scans buy
-===================
+What more scans improve
+=======================
 
-The statistical uncertainty falls with every frame, that of the drift fastest, since phases link the frames. The total hardly moves: the
-calibration of the scanner is in it, and no scan knows it.
+The statistical uncertainty falls with every frame. That of the drift falls fastest, because phases link the frames. The total hardly
+changes: it contains the calibration of the scanner, which more scans do not improve.
 """
 
 import matplotlib.pyplot as plt

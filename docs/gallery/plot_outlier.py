@@ -2,8 +2,8 @@
 A scan that does not fit
 ========================
 
-One of six frames is of another place, where the twist differs by 0.004°. Leaving each scan out in turn shows which one it is; it is named and
-used all the same, since leaving out data is your decision.
+One of six frames is of another place, where the twist differs by 0.004°. Leaving each scan out in turn shows which one it is; it is
+named but still used, because leaving out data is your decision.
 """
 
 import shutil

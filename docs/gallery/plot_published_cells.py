@@ -2,8 +2,9 @@
 Published cells
 ===============
 
-Periods and densities that the literature quotes, calculated from its own twists: magic-angle graphene (2.7·10¹² /cm² at 1.08°, arXiv:1802.00553),
-12.8 nm at 1.1°, 13.4 nm at 1.05° and 17.8 nm at 0.79° for twisted graphene, 13.9 nm for aligned graphene on hBN with a mismatch of 1.8 %.
+Periods and densities that the literature quotes, calculated from its own twists: magic-angle graphene (2.7·10¹² /cm² at 1.08°,
+arXiv:1802.00553), 12.8 nm at 1.1°, 13.4 nm at 1.05° and 17.8 nm at 0.79° for twisted graphene, 13.9 nm for aligned graphene on hBN
+with a mismatch of 1.8 %.
 """
 
 import matplotlib.pyplot as plt

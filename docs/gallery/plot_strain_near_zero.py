@@ -2,8 +2,9 @@
 Pitfall: the strain of an unstrained sample
 ===========================================
 
-The strain is a vector; its length is never negative. Where there is no strain, the lengths of noisy vectors scatter about 1.25 σ and look
-like a result. So the vectors are averaged, the magnitude is freed of that bias, and there is an upper limit instead of an axis.
+The strain is a vector; its length is never negative. Where there is no strain, the lengths of noisy vectors scatter about 1.25 σ and
+look like a result. So the program averages the vectors, removes this bias from the magnitude, and gives an upper limit instead of an
+axis.
 """
 
 import matplotlib.pyplot as plt
@@ -22,6 +23,7 @@ axes[0].plot(*mean["strain_vector_percent"], "+", ms=14, mew=2, color=mg.DOWN, l
 axes[0].axhline(0, color=mg.FAINT, lw=0.6)
 axes[0].axvline(0, color=mg.FAINT, lw=0.6)
 axes[0].set(aspect="equal", xlabel="E₁ (%)", ylabel="E₂ (%)")
+axes[0].locator_params(nbins=3)
 axes[0].legend(frameon=False)
 axes[1].hist(np.hypot(*vectors.T), bins=10, color=mg.UP)
 low, high = mean["strain_interval_95_percent"]

@@ -2,7 +2,8 @@
 Stripes have a wavelength and no twist
 ======================================
 
-One wave vector is not enough for twist and strain. The map gives wavelength and direction of the stripes, and the caveat ``stripes-only``.
+One wave vector is not enough for twist and strain. The map gives wavelength and direction of the stripes, and the caveat
+``stripes-only``.
 """
 
 import matplotlib.pyplot as plt

@@ -2,8 +2,8 @@
 Pitfall: one moiré, two readings
 ================================
 
-Graphene on hBN. The layers differ, so that twist and strain trade at first order: a moiré of one twist with tension is exactly that of
-another twist with compression. Both readings are results of equal rank, and the program prints both.
+Graphene on hBN. The layers differ in lattice constant. Then one twist with tension and another twist with compression give exactly the
+same moiré. Both readings fit equally well, and the program prints both.
 """
 
 import matplotlib.pyplot as plt
@@ -21,6 +21,6 @@ for twist, colour in ((0.7, mg.DOWN), (1.1, mg.UP)):
             theta, epsilon = reading["twist_deg"]["value"], reading["strain_percent"]["value"]
             if theta > 0 and abs(epsilon) < 0.5:
                 ax.plot(strain, theta, "o" if epsilon > 0 else "s", color=colour, mfc=colour if epsilon > 0 else "none")
-ax.set(xlabel="strain put in (%)", ylabel="twist of the reading (°)", ylim=(0.3, 1.3))
-ax.set_title("full: tension, the one put in; open: compression, the same image", fontsize=9)
+ax.set(xlabel="true strain (%)", ylabel="twist of the reading (°)", ylim=(0.3, 1.3))
+ax.set_title("full: tension, the true reading; open: compression, same image", fontsize=9)
 plt.show()

@@ -2,9 +2,9 @@
 Window, noise and blur
 ======================
 
-A narrow window follows the sample and the noise, a wide one neither. Halving the width costs a factor of four in noise. Nodes where the
-window blurs the lattice too much are masked. Without ``--window``
-the program takes the widest one whose blur stays near a quarter of the noise.
+A narrow window follows the sample but also the noise; a wide one smooths both. Halving the width costs a factor of four in noise.
+Nodes where the window blurs the lattice too much are masked. Without ``--window`` the program takes the widest one whose blur stays
+near a quarter of the noise.
 """
 
 import matplotlib.pyplot as plt
