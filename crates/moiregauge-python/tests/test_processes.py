@@ -53,11 +53,12 @@ def test_threads_work_beside_each_other(scans: Path) -> None:
 
 
 def test_the_interpreter_is_free_meanwhile(scans: Path) -> None:
+    """Measured in processor time of the process: the clock on the wall counts what other programs do."""
     ticks, stop = [], threading.Event()
 
     def tick() -> None:
         while not stop.wait(0.005):
-            ticks.append(time.monotonic())
+            ticks.append(time.process_time())
 
     thread = threading.Thread(target=tick)
     thread.start()
@@ -87,41 +88,40 @@ def test_progress_is_told_and_may_stop(scans: Path) -> None:
         mg.analyze([scans], progress=stop)
 
 
-def test_ctrl_c_stops_within_a_moment(scans: Path, tmp_path: Path) -> None:
+def test_ctrl_c_stops_within_a_moment(scans: Path) -> None:
     """In a process of its own, at a dozen moments from beginning to end; the session goes on after each."""
     code = f"""
         import os, signal, sys, threading, time, warnings
         warnings.simplefilter("ignore")
         import moiregauge as mg
 
-        waited = []
+        worked = []
         for n in range(12):
             # A campaign of its own measures again: moments are in the search, the fit, and the draws.
             sent = []
 
             def send(after):
                 time.sleep(after)
-                sent.append(time.monotonic())
+                sent.append(time.process_time())
                 os.kill(os.getpid(), signal.SIGINT)
 
             thread = threading.Thread(target=send, args=(0.03 + 0.06 * n,))
             try:
                 thread.start()
-                mg.analyze({str(scans)!r}, strain_draws=1000000, drift_draws=100000, threads=2)
+                mg.analyze({str(scans)!r}, strain_draws=1000000, drift_draws=100000, threads=1)
                 thread.join()
                 time.sleep(0.2)
             except KeyboardInterrupt:
-                waited.append(time.monotonic() - sent[0])
+                worked.append(time.process_time() - sent[0])
             thread.join()
         mg.analyze({str(scans / "scan.000.spm")!r})
-        print(*waited)
+        print(*worked)
     """
     done = subprocess.run([sys.executable, "-c", textwrap.dedent(code)], capture_output=True, text=True, timeout=WATCHDOG_S)
     assert done.returncode == 0, done.stderr
-    waited = sorted(float(word) for word in done.stdout.split())
-    # 0.3 s of work. Tests share their machine, and its clock counts what others do: most of the dozen are within it, and none waits for
-    # the end of a stage, which takes seconds here.
-    assert len(waited) >= 8 and waited[len(waited) // 2] < 0.3 and waited[-1] < 1.5, waited
+    worked = sorted(float(word) for word in done.stdout.split())
+    # Work is processor time of the one thread: the clock on the wall counts what other programs do. A stage takes seconds here.
+    assert len(worked) >= 8 and worked[-1] < 0.3, worked
 
 
 def test_the_program_is_stopped_by_ctrl_c(scans: Path, tmp_path: Path) -> None:
