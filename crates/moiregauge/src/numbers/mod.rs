@@ -1,6 +1,7 @@
 //! Small mathematics that every room needs: χ², the median, sums of products, least squares, normal equations, random numbers, words for numbers; the way out of
 //! a calculation that nobody wants any more.
 
+pub(crate) mod bits;
 pub(crate) mod chi2;
 pub(crate) mod dot;
 pub(crate) mod exact;

@@ -1,6 +1,5 @@
 //! What is kept of an image to know it again.
 
-use std::fmt::Write as _;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -9,6 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::frame::background::Surface;
 use crate::frame::image::Image;
+use crate::numbers::bits;
 use crate::numbers::dot::dot;
 use crate::numbers::median::median;
 
@@ -140,14 +140,9 @@ struct Written {
 
 impl From<Fingerprint> for Written {
     fn from(known: Fingerprint) -> Self {
-        let mut samples = String::with_capacity(8 * known.samples.len());
-        for sample in known.samples.iter() {
-            // Writing into a string cannot fail.
-            let _ = write!(samples, "{:08x}", sample.to_bits());
-        }
         Self {
             size: known.size,
-            samples,
+            samples: bits::to_text(known.samples.iter().copied()),
             noise: known.noise,
         }
     }
@@ -157,20 +152,13 @@ impl TryFrom<Written> for Fingerprint {
     type Error = &'static str;
 
     fn try_from(written: Written) -> Result<Self, Self::Error> {
-        let (digits, rest) = written.samples.as_bytes().as_chunks::<8>();
-        let sample = |digits: &[u8; 8]| {
-            let bits = u32::from_str_radix(std::str::from_utf8(digits).ok()?, 16).ok()?;
-            Some(f32::from_bits(bits))
-        };
-        let samples: Option<Vec<f32>> = digits.iter().map(sample).collect();
-        match samples {
-            Some(samples) if rest.is_empty() => Ok(Self {
-                size: written.size,
-                samples: samples.into(),
-                noise: written.noise,
-            }),
-            _ => Err("expected eight hexadecimal digits for each sample"),
-        }
+        let samples = bits::from_text(&written.samples)
+            .ok_or("expected eight hexadecimal digits for each sample")?;
+        Ok(Self {
+            size: written.size,
+            samples: samples.into(),
+            noise: written.noise,
+        })
     }
 }
 

@@ -142,7 +142,6 @@ fn measure_with(
         let mut grains = grains(lines);
         for lines in &mut grains {
             share_noise(lines);
-            forget_residuals(lines);
         }
         let lines = grains.remove(0);
         let mut caveats = caveats.clone();
@@ -215,13 +214,6 @@ fn share_noise(lines: &mut [MeasuredLine]) {
         if weights > 0.0 {
             line.lattice.pixels.covariance *= 1.0 + weighted / weights;
         }
-    }
-}
-
-/// Nobody asks again for what the fits have left: half of what is kept of a scan.
-fn forget_residuals(lines: &mut [MeasuredLine]) {
-    for fit in lines.iter_mut().filter_map(|l| l.lattice.fit.as_mut()) {
-        fit.residual = Default::default();
     }
 }
 

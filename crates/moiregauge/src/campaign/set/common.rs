@@ -2,6 +2,7 @@
 
 use nalgebra::{Matrix2, Matrix4, Vector4};
 
+use crate::campaign::set::ground::of_ground;
 use crate::scan::measured::{MeasuredLine, MeasuredScan};
 
 /// The covariance (nm²) that the lattice of a set has beside that of its fit, in which the errors of images are independent.
@@ -14,7 +15,7 @@ pub(crate) fn common(used: &[&MeasuredScan], reference: &Matrix2<f64>) -> Matrix
     let edges = found.iter().map(|(_, edges)| edges).sum::<Matrix4<f64>>() / n;
     let off = off * off.transpose() * beyond_chance(&off, found.iter().map(|(off, _)| off));
     // Each image has it once; the mean of n keeps one part in n of that.
-    (off + edges) * (1.0 - 1.0 / n)
+    (off + edges) * (1.0 - 1.0 / n) + of_ground(used, reference)
 }
 
 /// The share of the square of a mean that its scatter does not explain; all of it where there is none.

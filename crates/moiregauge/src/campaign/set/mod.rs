@@ -4,6 +4,7 @@ pub(crate) mod about;
 pub(crate) mod analyse;
 pub(crate) mod common;
 pub(crate) mod faint;
+pub(crate) mod ground;
 pub(crate) mod headers;
 pub(crate) mod joint;
 pub(crate) mod moire;

@@ -12,6 +12,7 @@ use crate::lattice::fit::closure::Closure;
 use crate::lattice::fit::folded::{Bends, Folded};
 use crate::lattice::fit::frame::{Basis, Frame};
 use crate::lattice::fit::gram::gram;
+use crate::lattice::fit::left::LeftOver;
 use crate::lattice::fit::lines::LineStatistics;
 use crate::lattice::fit::model::{Clip, LineOffsets, Model, Tables, look, settled};
 use crate::lattice::fit::noise::{ForeignWave, Leverage, ResidualNoise};
@@ -62,10 +63,10 @@ pub struct LatticeFit {
     pub clipped: f64,
     /// The strongest wave that is left and none of the lattice's: a second lattice, or pick-up.
     pub foreign_wave: Option<ForeignWave>,
-    /// The transform of what is left, across the lines from each of the first three harmonics: (columns, rows) in
-    /// cycles per frame and value. Two images of one scan tell by it what noise they share; then it is forgotten.
-    #[serde(skip)]
-    pub(crate) residual: [Vec<([i64; 2], Complex64)>; 3],
+    /// The transform of what is left, across the lines from each of the first three harmonics: two images tell by it what noise they
+    /// share.
+    #[serde(default)]
+    pub(crate) residual: [LeftOver; 3],
     /// How the lattice changes across the frame; `None` where the frame is too small to tell.
     pub inhomogeneity: Option<Inhomogeneity>,
     /// Whether the harmonics agree on one lattice; `None` where too few of them are strong. The

@@ -28,6 +28,7 @@ pub(crate) mod fit_pixels;
 pub(crate) mod folded;
 pub(crate) mod frame;
 pub(crate) mod gram;
+pub(crate) mod left;
 pub(crate) mod lines;
 pub(crate) mod local;
 pub(crate) mod model;

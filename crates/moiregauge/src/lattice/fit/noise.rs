@@ -10,10 +10,10 @@ use std::f64::consts::PI;
 use std::ops::RangeInclusive;
 
 use nalgebra::{DMatrix, DVector, Vector2};
-use rustfft::num_complex::Complex64;
 use serde::{Deserialize, Serialize};
 
 use crate::lattice::fit::frame::{Basis, Frame, wave};
+use crate::lattice::fit::left::LeftOver;
 use crate::lattice::fit::local::{Bin, acting_on};
 use crate::lattice::fit::model::Model;
 use crate::numbers::exact;
@@ -185,9 +185,9 @@ impl ResidualNoise {
         self.spectrum.at(x, y).norm_sqr() / self.window_power
     }
 
-    /// The transform of the residual across the lines from a harmonic: (columns, rows) in cycles per frame, and
-    /// value. `offsets`: offsets take up what whole lines do, so that it is no part of the harmonic's noise.
-    pub(crate) fn samples(&self, p: Vector2<f64>, offsets: bool) -> Vec<([i64; 2], Complex64)> {
+    /// The transform of the residual across the lines from a harmonic. `offsets`: offsets take up what whole lines do, so that it is no
+    /// part of the harmonic's noise.
+    pub(crate) fn samples(&self, p: Vector2<f64>, offsets: bool) -> LeftOver {
         let centre = (p / PI).map(|c| c.round() as i64);
         // Noise of whole lines stands at kx = 0 alone, and beside it through the window: what lies at another kx
         // says nothing of it.
@@ -196,12 +196,8 @@ impl ResidualNoise {
         } else {
             vec![centre.x]
         };
-        let rows = || (-ACROSS..=ACROSS).map(|dy| centre.y + dy);
-        columns
-            .into_iter()
-            .flat_map(|x| rows().map(move |y| [x, y]))
-            .map(|[x, y]| ([x, y], self.spectrum.at(x, y)))
-            .collect()
+        let rows = centre.y - ACROSS..=centre.y + ACROSS;
+        LeftOver::new(columns, rows, |x, y| self.spectrum.at(x, y))
     }
 
     /// Noise power per pixel over all frequencies, by the median.
