@@ -144,7 +144,12 @@ fn killed(mut command: Command, after: Duration) {
     running.wait().expect("it ends");
 }
 
-/// Campaigns killed at 24 moments, whole and in shards, come to the bytes of the one that was left alone.
+/// Shares of a run, spread over it without a pattern: steps of the golden ratio.
+fn moments() -> impl Iterator<Item = f64> {
+    (1..).map(|n| (f64::from(n) * 0.618_033_988_749_895).fract())
+}
+
+/// Campaigns killed at 50 moments, whole and in shards, come to the bytes of the one that was left alone.
 #[test]
 fn killed_campaigns_come_to_the_same_bytes() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -154,10 +159,11 @@ fn killed_campaigns_come_to_the_same_bytes() {
     ended(&mut campaign(&root, &alone, &[]));
     let length = started.elapsed();
     let alone = contents(&alone);
-    for round in 0..2 {
-        for moment in 0..6 {
-            let moment = 2 * moment + round;
-            killed(campaign(&root, &out, &[]), length * moment / 12);
+    let mut moments = moments();
+    let mut moment = move || length.mul_f64(moments.next().expect("no end"));
+    for _ in 0..2 {
+        for _ in 0..13 {
+            killed(campaign(&root, &out, &[]), moment());
         }
         ended(&mut campaign(&root, &out, &[]));
         assert!(contents(&out) == alone);
@@ -171,9 +177,10 @@ fn killed_campaigns_come_to_the_same_bytes() {
             (shard, folder.path().join(name))
         });
         for (shard, into) in &shards {
-            for moment in 1..4 {
+            // A shard takes half of the time.
+            for _ in 0..6 {
                 let command = campaign(&root, into, &["--shard", shard]);
-                killed(command, length * moment / 8);
+                killed(command, moment() / 2);
             }
             run(&mut campaign(&root, into, &["--shard", shard]));
             assert!(!into.join("samples.csv").exists());

@@ -39,7 +39,11 @@ pub(crate) fn correlation(first: &LatticeFit, second: &LatticeFit) -> [f64; 3] {
         };
         let mut sums = Sums::default();
         for (bin, a) in first.residual[h].bins() {
-            let at = if partner.opposite { bin.map(|k| -k) } else { bin };
+            let at = if partner.opposite {
+                bin.map(|k| -k)
+            } else {
+                bin
+            };
             let Some(b) = second.residual[partner.number].at(at) else {
                 continue;
             };
@@ -70,9 +74,10 @@ pub(crate) fn correlation_of_frames(first: &LatticeFit, second: &LatticeFit) -> 
         for ([x, y], a) in ours.bins() {
             let column = ours.columns.iter().position(|column| *column == x);
             let (column, off) = (column.unwrap_or_default(), y - ours.middle());
-            let (column, off_there) = match partner.opposite {
-                true => (ours.columns.len() - 1 - column, -off),
-                false => (column, off),
+            let (column, off_there) = if partner.opposite {
+                (ours.columns.len() - 1 - column, -off)
+            } else {
+                (column, off)
             };
             let Some(b) = others.within(column, others.middle() + off_there) else {
                 continue;
@@ -140,12 +145,10 @@ impl Partner {
             fit.wave_vectors.basis * nalgebra::Vector2::new(a, b)
         };
         let wanted = wave(first, h);
-        let (number, sign) = (0..3)
-            .flat_map(|k| [(k, 1.0), (k, -1.0)])
-            .min_by(|a, b| {
-                let miss = |(k, sign): &(usize, f64)| (wave(second, *k) * *sign - wanted).norm();
-                miss(a).total_cmp(&miss(b))
-            })?;
+        let (number, sign) = (0..3).flat_map(|k| [(k, 1.0), (k, -1.0)]).min_by(|a, b| {
+            let miss = |(k, sign): &(usize, f64)| (wave(second, *k) * *sign - wanted).norm();
+            miss(a).total_cmp(&miss(b))
+        })?;
         if (wave(second, number) * sign - wanted).norm() > SAME * wanted.norm() {
             return None;
         }

@@ -24,7 +24,11 @@ pub(crate) fn of_ground(used: &[&MeasuredScan], reference: &Matrix2<f64>) -> Mat
     }
     for scan in used {
         // Errors of trace and retrace are enlarged already by what they share, which is this as well.
-        let alone = if scan.lines.len() > 1 { 1.0 + share } else { 1.0 };
+        let alone = if scan.lines.len() > 1 {
+            1.0 + share
+        } else {
+            1.0
+        };
         for line in &scan.lines {
             let pixels = &line.lattice.pixels;
             let common = Lattice::<Px>::new(pixels.basis, pixels.covariance * (share / alone));

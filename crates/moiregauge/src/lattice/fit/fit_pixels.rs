@@ -14,9 +14,9 @@ use crate::lattice::fit::frame::{Basis, Frame};
 use crate::lattice::fit::gram::gram;
 use crate::lattice::fit::left::LeftOver;
 use crate::lattice::fit::lines::LineStatistics;
-use crate::lattice::fit::model::{Clip, LineOffsets, Model, Tables, look, settled};
+use crate::lattice::fit::model::{Clip, LineOffsets, Model, Tables, look, residuals, settled};
 use crate::lattice::fit::noise::{ForeignWave, Leverage, ResidualNoise};
-use crate::lattice::fit::{bend, choose, closure, frame, solve};
+use crate::lattice::fit::{bend, beside, choose, closure, frame, solve};
 use crate::numbers::dot::dot;
 use crate::numbers::exact;
 use crate::spectrum::harmonics::Harmonics;
@@ -101,12 +101,24 @@ pub(crate) fn measure(
     start: &Harmonics,
     background: Background,
 ) -> Option<(Lattice<Px>, LatticeFit)> {
+    let (fit, noise) = finished(image, start, background)?;
+    let foreign = noise.residual.foreign_wave(&fit.frame, &fit.model);
+    let again = foreign.and_then(|wave| fit.again_without(&wave, &noise, start, background));
+    again.or_else(|| fit.result(&noise, foreign))
+}
+
+/// The fit with all harmonics that earn their place, and the noise that it leaves.
+fn finished<'a>(
+    image: &'a Image,
+    start: &Harmonics,
+    background: Background,
+) -> Option<(Fit<'a>, FinalNoise)> {
     let mut fit = Fit::new(image, start, background)?;
     if fit.worth_a_sketch(start) && fit.sketch().is_none() {
         fit = Fit::new(image, start, background)?;
     }
     let noise = fit.choose()?;
-    fit.result(&noise)
+    Some((fit, noise))
 }
 
 /// A fit under way.
@@ -335,6 +347,45 @@ impl<'a> Fit<'a> {
         )
     }
 
+    /// The same in the image without perfect waves beside the lattice, of which `strongest` is one; `None` where there are none. What is
+    /// told of it is how it stands out of the noise that is then left.
+    fn again_without(
+        &self,
+        strongest: &ForeignWave,
+        noise: &FinalNoise,
+        start: &Harmonics,
+        background: Background,
+    ) -> Option<(Lattice<Px>, LatticeFit)> {
+        if !beside::is_strong(strongest) {
+            return None;
+        }
+        let (frame, model) = (&self.frame, &self.model);
+        let seen = |seen: &ResidualNoise| seen.foreign_wave(frame, model);
+        let image = beside::without_waves(frame, &model.pair, self.left(), seen)?;
+        let (fit, left) = finished(&image, start, background)?;
+        let k = strongest.wave_vector.component_mul(&frame.edge()) / std::f64::consts::PI;
+        let quieter = noise.residual.noise_near(k) / left.residual.noise_near(k);
+        let told = ForeignWave {
+            significance: strongest.significance * quieter.max(1.0),
+            ..*strongest
+        };
+        fit.result(&left, Some(told))
+    }
+
+    /// What is left of all pixels, 0 where they do not count; offsets of lines are in it.
+    fn left(&self) -> Vec<f64> {
+        let (frame, model) = (&self.frame, &self.model);
+        let tables = Tables::new(frame, &model.pair, &model.basis.indices);
+        let mut left = vec![0.0; frame.image.values.len()];
+        residuals(frame, model, &tables, |row, line| {
+            let there = left[row * line.len()..].iter_mut().zip(line.iter());
+            for (left, value) in there.filter(|(_, value)| value.is_finite()) {
+                *left = *value;
+            }
+        });
+        left
+    }
+
     /// Covariance of the phases of the first three harmonics and of (p₁, p₂): what the local noise does to
     /// the seven derivatives when background and amplitudes are free.
     fn covariance(&self, noise: &FinalNoise) -> Option<SMatrix<f64, 7, 7>> {
@@ -371,7 +422,11 @@ impl<'a> Fit<'a> {
             .collect()
     }
 
-    fn result(&self, noise: &FinalNoise) -> Option<(Lattice<Px>, LatticeFit)> {
+    fn result(
+        &self,
+        noise: &FinalNoise,
+        foreign_wave: Option<ForeignWave>,
+    ) -> Option<(Lattice<Px>, LatticeFit)> {
         let scale = self.frame.edge().map(|e| 1.0 / e);
         let harmonics = self.harmonics(noise);
         let strengths: Vec<f64> = harmonics.iter().map(|h| h.signal_to_noise).collect();
@@ -415,7 +470,7 @@ impl<'a> Fit<'a> {
             line_offsets: self.line_sigma,
             lines_left_out: self.frame.image.rows - self.frame.lines(),
             clipped,
-            foreign_wave: noise.residual.foreign_wave(&self.frame, &self.model),
+            foreign_wave,
             residual: [0, 1, 2].map(|i| {
                 let index = self.model.basis.indices[i];
                 let offsets = self.free_lines || self.line_sigma.is_some();

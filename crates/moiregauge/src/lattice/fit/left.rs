@@ -105,7 +105,10 @@ impl TryFrom<Written> for LeftOver {
         Ok(Self {
             columns: written.columns,
             first: written.first,
-            values: pairs.iter().map(|[re, im]| Complex32::new(*re, *im)).collect(),
+            values: pairs
+                .iter()
+                .map(|[re, im]| Complex32::new(*re, *im))
+                .collect(),
         })
     }
 }

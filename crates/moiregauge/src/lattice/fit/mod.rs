@@ -14,6 +14,8 @@
 //! strong offsets. A harmonic along the fast axis, which free offsets would swallow, keeps the weight
 //! 1 − λ that it deserves.
 //!
+//! Strong waves beside the lattice that are the same everywhere are taken off, and the fit is made again.
+//!
 //! Covariance: `(JᵀWJ)⁻¹ Jᵀ W C W J (JᵀWJ)⁻¹` with C diagonal in frequency, read from the residual
 //! around each harmonic along either axis.
 //!
@@ -22,6 +24,7 @@
 //! Huber, Robust Statistics (1981), modified residuals; Schwarz, Ann. Stat. 6, 461 (1978), BIC.
 
 pub(crate) mod bend;
+pub(crate) mod beside;
 pub(crate) mod choose;
 pub(crate) mod closure;
 pub(crate) mod fit_pixels;

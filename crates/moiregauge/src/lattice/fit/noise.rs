@@ -213,6 +213,25 @@ impl ResidualNoise {
         median(&mut powers) / (std::f64::consts::LN_2 * self.window_power)
     }
 
+    /// Power of the bins within two of a frequency (cycles per frame): all of a wave that is there, under the window.
+    pub(crate) fn power_near(&self, k: Vector2<f64>) -> f64 {
+        let centre = k.map(|c| c.round() as i64);
+        let bins = (-2..=2).flat_map(|y| (-2..=2).map(move |x| [x, y]));
+        bins.map(|[x, y]| self.power(centre.x + x, centre.y + y))
+            .sum()
+    }
+
+    /// Noise power around a frequency (cycles per frame), in the units of a power over noise.
+    pub(crate) fn noise_near(&self, k: Vector2<f64>) -> f64 {
+        // Waves of opposite sign are one.
+        let k = if k.x < 0.0 { -k } else { k }.map(|c| c.round() as i64);
+        let rows = self.spectrum.rows as i64;
+        let noise = NoiseMap::new(&self.spectrum);
+        let row = noise.row(k.y.rem_euclid(rows) as usize);
+        let block = k.x as usize / BLOCK_WIDTH;
+        row.get(block).copied().unwrap_or(1.0)
+    }
+
     /// The strongest wave away from the lattice, from slow waves and from the line ridge.
     pub(crate) fn foreign_wave(&self, frame: &Frame, model: &Model) -> Option<ForeignWave> {
         let noise = NoiseMap::new(&self.spectrum);
