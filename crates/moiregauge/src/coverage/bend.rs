@@ -15,10 +15,10 @@ use serde::{Deserialize, Serialize};
 
 use crate::coverage::cells::Cells;
 use crate::coverage::higher;
+use crate::coverage::hollows::hollows;
 use crate::coverage::nodes::{Node, View, nodes};
 use crate::coverage::patch::Patch;
 use crate::coverage::phases::{Basis, Fit, fit, powers, rows};
-use crate::coverage::settle::hollows;
 use crate::coverage::windows::straightened;
 use crate::numbers::exact;
 use crate::numbers::splines::Splines;

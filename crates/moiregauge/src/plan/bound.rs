@@ -18,8 +18,8 @@ use heterostrain::lattice::{Waves, reciprocal};
 use heterostrain::strain::twist_strain;
 use nalgebra::{Matrix2, Matrix4, Vector2};
 
+use crate::drift::joint::choose::fit;
 use crate::drift::joint::sighting::Sighting;
-use crate::drift::joint::solve::fit;
 use crate::simulate::settings::Simulation;
 use crate::simulate::simulator::Simulator;
 use crate::simulate::truth::FrameTruth;
