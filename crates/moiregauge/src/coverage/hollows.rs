@@ -2,11 +2,7 @@
 
 use nalgebra::{Matrix2, Vector2};
 
-/// K₁, K₂ and K₂ − K₁.
-pub(crate) fn waves(pair: &Matrix2<f64>) -> [Vector2<f64>; 3] {
-    let (a, b) = (pair.column(0).into_owned(), pair.column(1).into_owned());
-    [a, b, b - a]
-}
+use crate::numbers::three::three;
 
 /// Two places for each wave where noise stands and nothing else: of the same frequency along the lines, since the noise of a scan is a
 /// function of time, and as far from all waves as can be.
@@ -19,7 +15,7 @@ pub(crate) fn hollows(pair: &Matrix2<f64>) -> [[Vector2<f64>; 2]; 3] {
         let distances = corners.map(|[h, k]| (q - pair * (index + Vector2::new(h, k))).norm());
         distances.into_iter().fold(f64::INFINITY, f64::min)
     };
-    waves(pair).map(|wave| {
+    three(pair).map(|wave| {
         [1.0, -1.0].map(|side| {
             let places =
                 (5..=25).map(|i| wave + Vector2::y() * (side * 0.05 * f64::from(i) * length));

@@ -11,11 +11,12 @@ use rustfft::num_complex::Complex64;
 use crate::coverage::bend::{Mean, mean, refined};
 use crate::coverage::cells::{Cells, Window};
 use crate::coverage::grains::{Grains, split};
-use crate::coverage::hollows::{hollows, waves};
+use crate::coverage::hollows::hollows;
 use crate::coverage::nodes::View;
 use crate::coverage::patch::Patch;
 use crate::frame::image::Image;
 use crate::numbers::median::median;
+use crate::numbers::three::three;
 
 /// Windows that are tried, mean periods: the narrowest that keeps waves a wave vector apart, and wider ones for
 /// noisy images.
@@ -74,7 +75,7 @@ pub(crate) fn settle_in_bins(
     pair: &Matrix2<f64>,
     pitch: [f64; 2],
 ) -> Option<Settled> {
-    let shortest = waves(pair).map(|q| std::f64::consts::TAU / (q.amax() * bins as f64));
+    let shortest = three(pair).map(|q| std::f64::consts::TAU / (q.amax() * bins as f64));
     let shortest = shortest.into_iter().fold(f64::INFINITY, f64::min);
     let more = ((shortest / BINS_PER_PERIOD) as usize).max(1);
     let bins = bins * more;
@@ -101,7 +102,7 @@ fn settle_bins(
     let mut narrowest = 0;
     let mut settled = None;
     for _ in 0..ROUNDS {
-        let sums = waves(&pair).map(|q| cells.mixed(image, q));
+        let sums = three(&pair).map(|q| cells.mixed(image, q));
         let quiet = hollows(&pair).map(|places| places.map(|q| cells.mixed(image, q)));
         let seen = (narrowest..WIDTHS.len()).find_map(|i| {
             let (_, window) = &windows[i];
@@ -354,7 +355,7 @@ fn slope(cells: &Cells, seen: &Seen, inside: &[bool]) -> Option<(Matrix2<f64>, f
         (extent[0] * cells.pixels[0]) as f64,
         (extent[1] * cells.pixels[1]) as f64,
     );
-    let turn = waves(&step)
+    let turn = three(&step)
         .iter()
         .map(|q| q.component_mul(&size).abs().max())
         .fold(0.0, f64::max)
