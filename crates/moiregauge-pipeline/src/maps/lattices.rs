@@ -1,7 +1,5 @@
 //! Scans that show a lattice → their maps, and the average of these.
 
-use std::path::PathBuf;
-
 use moiregauge::campaign::{Analysis, ScanAnalysis, picture};
 use moiregauge::caveat::Caveat;
 use moiregauge::domains::{Contrast, DomainMap};
@@ -17,24 +15,10 @@ use moiregauge_report::results::{MappedImage, TwistStrainResult};
 use spmfile::LineDirection;
 
 use super::doubts;
-use crate::campaign::{Advice, in_words};
+use crate::campaign::{Scans, in_words};
 use crate::job::{Cancelled, Job};
-use crate::known::Known;
 use crate::names::in_full;
 use crate::opened::{InputError, read_again};
-
-/// Analysed scans whose pixels can be read again.
-#[derive(Clone, Copy, Debug)]
-pub struct Scans<'a> {
-    /// What was found in them.
-    pub analysis: &'a Analysis,
-    /// The files.
-    pub inputs: &'a [PathBuf],
-    /// What is known of them.
-    pub known: &'a Known,
-    /// What helps against errors.
-    pub advice: Advice,
-}
 
 /// A map and what came with it.
 #[derive(Clone, Debug)]

@@ -15,6 +15,7 @@ mod joint;
 mod lattice;
 mod map;
 mod profile;
+mod provenance;
 mod quantity;
 mod readings;
 mod region;
@@ -41,6 +42,7 @@ pub use map::{
     mask_counts, quantities,
 };
 pub use profile::{ProfilePointResult, ProfileResult};
+pub use provenance::Provenance;
 pub use quantity::{QuantityResult, TrendResult};
 pub use readings::{
     AtomicResult, IsotropicStrainResult, NameResult, NamesResult, OtherSenseResult, ReadingsResult,

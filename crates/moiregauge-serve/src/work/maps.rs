@@ -15,11 +15,11 @@ use super::asked::Asked;
 use super::done::Written;
 use super::table::Table;
 use super::task::{NoResult, Progress, run_beside};
-use crate::api::places;
-use crate::app::lock;
 use crate::events::Hub;
+use crate::lock::lock;
 use crate::options::Words;
 use crate::problem::{Answer, Problem};
+use crate::roots::places;
 
 /// Maps at a time: each holds all its quantities.
 const MOST: usize = 20;
