@@ -14,6 +14,7 @@ mod estimate;
 mod joint;
 mod lattice;
 mod map;
+mod pattern;
 mod profile;
 mod quantity;
 mod readings;
@@ -40,6 +41,7 @@ pub use map::{
     AgreementResult, DriftChangeResult, HarmonicResult, MapResults, MappedImage, MaskCount,
     mask_counts, quantities,
 };
+pub use pattern::{MeanCellResult, PatternResult, RegistryResult, UndistortedResult};
 pub use profile::{ProfilePointResult, ProfileResult};
 pub use quantity::{QuantityResult, TrendResult};
 pub use readings::{
