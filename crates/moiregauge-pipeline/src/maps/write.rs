@@ -159,11 +159,13 @@ impl MapFound {
 
 /// The undistorted image for Gwyddion, and it and the averaged cell as groups of their own within the map.
 fn write_pattern(pattern: &MappedPattern, sink: &dyn Sink) -> Result<(), SinkError> {
-    let image = undistorted_scan(pattern);
-    let cell = cell_scan(pattern);
-    write_all(&files_of(&image, WritableFormat::Gwy, "undistorted")?, sink)?;
-    for (scan, name) in [(&image, "undistorted"), (&cell, "cell")] {
-        for (file, bytes) in files_of(scan, WritableFormat::Zarr, name)? {
+    let named = undistorted_scan(pattern, &format!("{} undistorted", pattern.channel));
+    write_all(&files_of(&named, WritableFormat::Gwy, "undistorted")?, sink)?;
+    drop(named);
+    let image = Some(undistorted_scan(pattern, "image"));
+    for (scan, name) in [(image, "undistorted"), (cell_scan(pattern), "cell")] {
+        let Some(scan) = scan else { continue };
+        for (file, bytes) in files_of(&scan, WritableFormat::Zarr, name)? {
             let within = file.replacen(".zarr", "", 1);
             sink.write(&format!("map.zarr/{within}"), &bytes)?;
         }

@@ -11,6 +11,7 @@ use super::map_panel::scale_bar;
 use super::picture::{IN_NM, Picture, column, extent};
 use super::subject::MapSubject;
 use crate::draw::axes::Axes;
+use crate::draw::scale::Range;
 use crate::draw::style::{BLACK, COLUMN, HAIR, SMALL, lettering};
 use crate::draw::svg::{Anchor, Ink, Lettering, Rect, Svg};
 use crate::draw::{colorbar, raster};
@@ -18,6 +19,10 @@ use crate::format::two_digits;
 
 /// Cells that are drawn along each vector.
 const CELLS: usize = 2;
+/// Room around the cells as a share of their extent.
+const MARGIN: f64 = 0.08;
+/// How far beside a vector its name stands, in lengths of the other one.
+const BESIDE: f64 = 0.13;
 /// Space above a panel and beside it for the colour bar, pt.
 const TOP: f64 = 12.0;
 const BAR: f64 = 50.0;
@@ -83,16 +88,16 @@ pub(super) fn undistorted(subject: &MapSubject) -> Result<Drawing, String> {
 /// The averaged cell in its true shape.
 pub(super) fn cell(subject: &MapSubject) -> Result<Drawing, String> {
     let found = pattern(subject)?;
-    let cell = &found.cell;
+    let cell = found.cell.as_ref();
+    let cell = cell.ok_or("the displacement is known on fewer than two cells of the pattern")?;
     let image = repeated(cell);
     let linear = cell.vectors / cell.bins as f64;
     let origin = linear * Vector2::repeat(0.5);
     let (x, y) = extent(&image, &linear, origin).ok_or("the cell has no area")?;
-    let margin = 0.04 * x.width().max(y.width());
-    let (x, y) = (
-        x.padded(0.0, x.width() + 2.0 * margin),
-        y.padded(0.0, y.width() + 2.0 * margin),
-    );
+    // Room for names around the cells, and for the scale bar below them.
+    let margin = MARGIN * x.width().max(y.width());
+    let x = Range::new(x.low - margin, x.high + margin);
+    let y = Range::new(y.low - 2.0 * margin, y.high + margin);
     let area = column(x, y, TOP, BAR);
     let axes = Axes::equal(area, x, y);
     let mut svg = Svg::new(subject.id, COLUMN, area.bottom() + layout::BELOW);
@@ -166,7 +171,7 @@ fn outlines(svg: &mut Svg, axes: &Axes, vectors: &Matrix2<f64>) {
         halo: Some("#ffffff"),
         ..lettering(SMALL + 1.0, Anchor::Middle)
     };
-    for (name, (i, j)) in [("L₁", (1.5, 0.0)), ("L₂", (0.0, 1.5))] {
+    for (name, (i, j)) in [("L₁", (1.5, -BESIDE)), ("L₂", (-BESIDE, 1.5))] {
         let (x, y) = at(i, j);
         svg.text((x, y + 2.5), name, &style);
     }

@@ -27,8 +27,8 @@ pub struct PatternResult {
     pub nodes_are: String,
     /// The image with the displacement of its pattern taken off. Resampled to be shown: nothing is measured from it.
     pub undistorted: UndistortedResult,
-    /// The averaged cell.
-    pub cell: MeanCellResult,
+    /// The averaged cell; nothing where fewer than two cells of the image are known.
+    pub cell: Option<MeanCellResult>,
 }
 
 /// The undistorted image.
@@ -59,7 +59,7 @@ pub struct MeanCellResult {
 
 impl From<&MappedPattern> for PatternResult {
     fn from(found: &MappedPattern) -> Self {
-        let (shown, cell) = (&found.undistorted, &found.cell);
+        let shown = &found.undistorted;
         Self {
             file: found.file.clone(),
             line: match found.line {
@@ -79,12 +79,12 @@ impl From<&MappedPattern> for PatternResult {
                 origin_nm: shown.origin.into(),
                 known_percent: 100.0 * shown.known,
             },
-            cell: MeanCellResult {
+            cell: found.cell.as_ref().map(|cell| MeanCellResult {
                 bins: cell.bins,
                 cells: cell.all_cells,
                 pixels: cell.pixels.iter().map(|n| u64::from(*n)).sum(),
                 sigma: rms(cell.sigma.iter().copied()),
-            },
+            }),
         }
     }
 }

@@ -30,7 +30,8 @@ taken as perfect, with the orientation α of the mean lattice; an error of α tu
 no measurement: which stacking a node has, an image of the moiré does not tell.
 - **Sign**: a moiré knows its layers up to their exchange; with the twist that is reported as positive d has this sign, with the \
 layers exchanged the other one.
-- **Errors** are those of the phases by image noise; neighbouring nodes are not independent.";
+- **Errors** are those of the phases by image noise; neighbouring nodes are not independent. What all nodes share is not in them: \
+drift, calibration of the scanner, lattice constant, α.";
 
 fn shown(value: f32) -> String {
     if value.is_finite() {
@@ -155,13 +156,12 @@ fn channel(name: &str, unit: &str, [columns, rows]: [usize; 2], values: Vec<f64>
     }
 }
 
-/// The undistorted image as a scan of one channel in the axes of the laboratory.
-pub fn undistorted_scan(pattern: &MappedPattern) -> Scan {
+/// The undistorted image as a scan of one channel of this name in the axes of the laboratory.
+pub fn undistorted_scan(pattern: &MappedPattern, name: &str) -> Scan {
     let shown = &pattern.undistorted;
     let size = [shown.image.columns, shown.image.rows];
     let [width, height] = size.map(|n| n as f64 * shown.pitch);
     let half = |n: usize| 0.5 * shown.pitch * (n as f64 - 1.0);
-    let name = format!("{} undistorted", pattern.channel);
     let values = shown.image.values.clone();
     Scan {
         format: "moiregauge map".to_owned(),
@@ -174,15 +174,15 @@ pub fn undistorted_scan(pattern: &MappedPattern) -> Scan {
             width_nm: Some(width),
             height_nm: Some(height),
             scaling: "resampled".to_owned(),
-            ..channel(&name, &pattern.unit, size, values)
+            ..channel(name, &pattern.unit, size, values)
         }],
         ..Scan::default()
     }
 }
 
-/// The averaged cell as a scan: rows and columns are bins along L₂ and L₁; places and shares are channels of their own.
-pub fn cell_scan(pattern: &MappedPattern) -> Scan {
-    let cell = &pattern.cell;
+/// The averaged cell as a scan, if there is one: rows and columns are bins along L₂ and L₁; places and shares are channels of their own.
+pub fn cell_scan(pattern: &MappedPattern) -> Option<Scan> {
+    let cell = pattern.cell.as_ref()?;
     let bins = 0..cell.mean.len();
     let of = |value: &dyn Fn(usize) -> f64| bins.clone().map(value).collect::<Vec<f64>>();
     let unit = pattern.unit.as_str();
@@ -205,9 +205,9 @@ pub fn cell_scan(pattern: &MappedPattern) -> Scan {
         ),
     ];
     let channels = all.map(|(name, unit, values)| channel(name, unit, [cell.bins; 2], values));
-    Scan {
+    Some(Scan {
         format: "moiregauge map".to_owned(),
         channels: channels.into(),
         ..Scan::default()
-    }
+    })
 }

@@ -78,8 +78,8 @@ pub fn map_tables(map: &TwistStrainMap, details: &MapDetails) -> Vec<(String, Ve
             &rows,
         );
     }
-    if let Some(pattern) = &details.pattern {
-        let rows = Bin::all(&pattern.cell);
+    if let Some(cell) = details.pattern.as_ref().and_then(|p| p.cell.as_ref()) {
+        let rows = Bin::all(cell);
         let columns = Bin::COLUMNS;
         add(
             &mut files, &mut about, "cell.csv", BIN_ABOUT, columns, &rows,

@@ -21,6 +21,9 @@ const MOST_BINS: usize = 64;
 /// ... and pixels of a bin, at least, in the mean.
 const LEAST_PIXELS: f64 = 9.0;
 
+/// Cells that the pixels have to cover together: of fewer there is no mean, and nothing that scatters.
+const LEAST_CELLS: f64 = 2.0;
+
 /// The mean of all cells of a pattern.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
@@ -49,14 +52,16 @@ impl MeanCell {
     }
 }
 
-/// Averages the cells of an image whose pixels are `placed` on the sample; `None` where none of them is known.
+/// Averages the cells of an image whose pixels are `placed` on the sample; `None` where fewer than two
+/// cells of the pattern are known.
 pub(crate) fn mean_cell(image: &Image, placed: &Geometry, followed: &Followed) -> Option<MeanCell> {
     let places = places(image, placed, followed);
     let known = places.iter().filter(|p| p[0].is_finite()).count();
-    if known == 0 {
+    let vectors = followed.gauge.vectors;
+    let area = known as f64 * placed.pixel_to_nm.determinant().abs();
+    if !(area >= LEAST_CELLS * vectors.determinant().abs()) {
         return None;
     }
-    let vectors = followed.gauge.vectors;
     let pitch = placed.fast_step().norm().min(placed.slow_step().norm());
     let longest = vectors.column(0).norm().max(vectors.column(1).norm());
     let most = (known as f64 / LEAST_PIXELS).sqrt() as usize;

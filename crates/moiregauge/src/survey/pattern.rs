@@ -30,8 +30,8 @@ pub struct MappedPattern {
     pub gauge: Gauge,
     /// The image, background removed, as it would be with the mean lattice everywhere.
     pub undistorted: Undistorted,
-    /// The mean over all cells, background removed.
-    pub cell: MeanCell,
+    /// The mean over all cells, background removed; `None` where fewer than two of them are known.
+    pub cell: Option<MeanCell>,
 }
 
 /// The pattern of the image behind `map`; `origin` as for [`crate::survey::mapping::map_scan`], whose places `map` has.
@@ -60,7 +60,7 @@ pub fn pattern_of_scan(
         drift_corrected: map.drift_corrected,
         gauge: followed.gauge,
         undistorted: undistorted(&image, &placed, &followed)?,
-        cell: mean_cell(&image, &placed, &followed)?,
+        cell: mean_cell(&image, &placed, &followed),
     })
 }
 
@@ -109,7 +109,7 @@ mod tests {
         let (method, resolution) = (MapMethod::Demodulation, Resolution::default());
         let maps = map_scan(&scan, analysed, None, &settings, method, &resolution).unwrap();
         let pattern = pattern_of_scan(&scan, analysed, None, &settings, &maps[0]).unwrap();
-        assert!(pattern.undistorted.known > 0.3 && pattern.cell.all_cells > 100);
+        assert!(pattern.undistorted.known > 0.3 && pattern.cell.unwrap().all_cells > 100);
         let (average, _) = average_maps(&maps).unwrap();
         let found = average.registry(
             &maps[0].whole,
