@@ -68,7 +68,7 @@ pub(crate) fn mean_cell(image: &Image, placed: &Geometry, followed: &Followed) -
     let bins = ((longest / pitch).round() as usize)
         .min(most)
         .clamp(2, MOST_BINS);
-    let mut sums = Sums::new(bins, image, known);
+    let mut sums = Sums::new(bins, image);
     by_cell(&places, |pixels| sums.add_cell(pixels, &places, image));
     Some(sums.finish(vectors))
 }
@@ -137,24 +137,23 @@ struct Sums {
     cells: Vec<u32>,
     all_cells: usize,
     /// Σ s, Σ s², Σ s n and Σ n² over cells.
-    sums: Vec<[f64; 4]>,
+    over_cells: Vec<[f64; 4]>,
     /// Of the cell at hand: s and n of each bin.
     own: Vec<(f64, u32)>,
 }
 
 impl Sums {
-    fn new(bins: usize, image: &Image, known: usize) -> Self {
+    fn new(bins: usize, image: &Image) -> Self {
         let finite = image.values.iter().filter(|v| v.is_finite());
         let (sum, count) = finite.fold((0.0, 0.0f64), |(s, n), v| (s + v, n + 1.0));
         let all = bins * bins;
-        debug_assert!(known > 0);
         Self {
             bins,
             middle: sum / count,
             pixels: vec![0; all],
             cells: vec![0; all],
             all_cells: 0,
-            sums: vec![[0.0; 4]; all],
+            over_cells: vec![[0.0; 4]; all],
             own: vec![(0.0, 0); all],
         }
     }
@@ -170,7 +169,7 @@ impl Sums {
             own.1 += 1;
         }
         self.all_cells += 1;
-        let bins = self.own.iter_mut().zip(&mut self.sums);
+        let bins = self.own.iter_mut().zip(&mut self.over_cells);
         for (bin, (own, sums)) in bins.enumerate().filter(|(_, (own, _))| own.1 > 0) {
             let (s, n) = (own.0, f64::from(own.1));
             for (sum, term) in sums.iter_mut().zip([s, s * s, s * n, n * n]) {
@@ -183,7 +182,7 @@ impl Sums {
     }
 
     fn finish(self, vectors: Matrix2<f64>) -> MeanCell {
-        let bins = self.sums.iter().zip(&self.pixels).zip(&self.cells);
+        let bins = self.over_cells.iter().zip(&self.pixels).zip(&self.cells);
         let found = bins.map(|((&[s, ss, sn, nn], &pixels), &cells)| {
             let (n, k) = (f64::from(pixels), f64::from(cells));
             let mean = s / n;

@@ -13,7 +13,7 @@ use heterostrain::lattice::Waves;
 use nalgebra::{Matrix2, Matrix4, Vector2, Vector3, Vector4};
 use rayon::prelude::*;
 
-use crate::map::gauge::in_one_gauge;
+use crate::map::one_gauge::in_one_gauge;
 use crate::map::sample::{Grid, LatticeMap, LatticeNode};
 use crate::numbers::chi2::enlargement;
 use crate::numbers::interrupt;

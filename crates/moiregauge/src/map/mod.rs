@@ -22,6 +22,7 @@ pub(crate) mod followed;
 pub(crate) mod gauge;
 pub(crate) mod local;
 pub(crate) mod mosaic;
+pub(crate) mod one_gauge;
 #[cfg(test)]
 mod pattern_tests;
 pub(crate) mod phase_blur;
