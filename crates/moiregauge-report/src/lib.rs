@@ -38,4 +38,6 @@ pub use samples::samples_parquet;
 pub use samples::{
     SampleRow, SampleStatus, SamplesPage, failed_csv, samples_csv, samples_page, thumbnail,
 };
-pub use tables::{map_scan, map_scans, map_tables, stripe_scan, tables};
+pub use tables::{
+    cell_scan, map_scan, map_scans, map_tables, stripe_scan, tables, undistorted_scan,
+};

@@ -92,9 +92,7 @@ impl Questions {
                 .collect(),
             devices: devices.unwrap_or_default(),
             wanted,
-            domains: None,
-            regime: None,
-            picture: None,
+            ..MapDetails::default()
         };
         Ok((details, doubts))
     }

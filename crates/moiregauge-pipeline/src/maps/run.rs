@@ -105,6 +105,8 @@ fn mapped(
             map: found.map,
             whole: found.whole,
             picture: found.picture,
+            pattern: found.pattern,
+            registry: found.registry,
             agreement: found.agreement,
             drift_change: found.drift_change,
             domains,

@@ -14,6 +14,7 @@ mod estimate;
 mod joint;
 mod lattice;
 mod map;
+mod pattern;
 mod profile;
 mod provenance;
 mod quantity;
@@ -41,6 +42,7 @@ pub use map::{
     AgreementResult, DriftChangeResult, HarmonicResult, MapResults, MappedImage, MaskCount,
     mask_counts, quantities,
 };
+pub use pattern::{MeanCellResult, PatternResult, RegistryResult, UndistortedResult};
 pub use profile::{ProfilePointResult, ProfileResult};
 pub use provenance::Provenance;
 pub use quantity::{QuantityResult, TrendResult};

@@ -235,7 +235,7 @@ impl MapWork {
         written.map_err(|e| of_error(&e))?;
         let mut files = sink.commit("map").map_err(|e| of_error(&e))?;
         let planes = match &found.shown {
-            Shown::Lattice(found) => map_scan(&found.map).channels,
+            Shown::Lattice(found) => map_scan(&found.map, found.registry.as_ref()).channels,
             Shown::Stripes(found) => stripe_scan(&found.stripes).channels,
         };
         Ok(Mapped {

@@ -123,8 +123,8 @@ pub struct WaveNode {
     pub pair: Matrix2<f64>,
     /// Covariance of (q₁x, q₁y, q₂x, q₂y), rad² per pixel².
     pub covariance: Matrix4<f64>,
-    /// Covariance of the phases of q₁ and q₂, rad².
-    pub phase_covariance: Matrix2<f64>,
+    /// Weights of the three `phases`, 1/rad²: one over their variances, 0 for a wave that does not stand out.
+    pub phase_weights: [f64; 3],
     /// χ² of the closure of all harmonics.
     pub chi2: f64,
     /// Its degrees of freedom.
