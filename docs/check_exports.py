@@ -175,4 +175,37 @@ for table in ("vectors", "scans", "sets", "budget"):
             }[type(cell)]()
             check(same, f"pyarrow: {table}.{name}: {cell!r} for {text!r}")
 
+# Maps: tables against arrays, the undistorted image in two formats, the registry against its own definition.
+maps = folder / "maps"
+whole = xr.open_zarr(maps / "map.zarr", consolidated=False)
+shown = xr.open_zarr(maps / "map.zarr", group="undistorted", consolidated=False)["image"]
+cell = xr.open_zarr(maps / "map.zarr", group="cell", consolidated=False)
+details = json.loads((maps / "map.json").read_text())["details"]
+field = gwyfile.load(str(maps / "undistorted.gwy"))["/0/data"]
+close(field.data, shown.values[::-1] * to_si(shown.attrs["units"])[0], 1e-12, "undistorted image")
+pitch = details["pattern"]["undistorted"]["pitch_nm"]
+step = np.diff(shown["x"].values)
+close(step, np.full(step.shape, pitch), 1e-9, "undistorted image: x")
+close(shown["y"].values[0], details["pattern"]["undistorted"]["origin_nm"][1], 1e-9, "undistorted image: y")
+
+table = np.genfromtxt(maps / "cell.csv", delimiter=",", names=True)
+for column, array in (("mean", "mean"), ("sigma", "sigma"), ("pixels", "pixels"), ("x_nm", "position_x")):
+    close(table[column], cell[array].values.ravel(), 0.0, f"cell.csv: {column}")
+
+table = np.genfromtxt(maps / "displacement.csv", delimiter=",", names=True)
+for column, array in (("x_nm", "position_x"), ("mask", "mask")):
+    close(table[column], whole[array].values.ravel(), 0.0, f"displacement.csv: {column}")
+known = np.isfinite(table["registry_x_nm"])
+check(known.sum() > 20 and not table["mask"][known].any(), "displacement.csv: known nodes")
+for axis in "xy":
+    for what in ("displacement", "registry"):
+        close(table[f"{what}_{axis}_nm"][known], whole[f"{what}_{axis}"].values.ravel()[known], 1e-6, f"{what} {axis}")
+place = np.column_stack([table[f"{axis}_nm"] - table[f"displacement_{axis}_nm"] for axis in "xy"])
+told = details["registry"]
+shares = np.linalg.solve(np.transpose(told["moire_vectors_nm"]), (place - told["zero_nm"]).T)
+registry = -np.transpose(told["layer_1_vectors_nm"]) @ shares
+for n, axis in enumerate("xy"):
+    miss = np.abs(registry[n] - table[f"registry_{axis}_nm"])[known].max()
+    check(miss < 1e-6, f"registry {axis} by its definition: {miss} nm")
+
 print(f"{checks} comparisons agree")

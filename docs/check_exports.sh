@@ -35,4 +35,5 @@ for format in npz gwy tiff csv zarr gxyzf; do
 done
 "$program" analyze scans/simulated --out results --no-report --quiet --parquet \
   --export corrected.gwy,corrected.npz,corrected.zarr
+"$program" map scans/simulated --out maps --no-report --quiet
 "$python" "$here/check_exports.py" "$scratch"

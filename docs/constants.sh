@@ -63,7 +63,7 @@ drift/linear WORST_CONDITION set: half double
 joint/link SHARE set: half double
 joint/link ACCELERATION set: half double
 joint/solve LINKED set: half double
-joint/choose LOOSE set: half double
+joint/found LOOSE set: half double
 samples APART set: half double
 samples SIGMAS set: half double
 samples DRIFT set: half double

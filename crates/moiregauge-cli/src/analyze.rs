@@ -6,7 +6,6 @@ mod arguments;
 mod by_hand;
 mod command;
 mod export;
-mod hint;
 mod orientation;
 mod output;
 mod run;
@@ -14,7 +13,6 @@ mod task;
 
 pub(crate) use args::{AnalyzeArgs, BackgroundArg, ConventionArg, LineArg, MethodArg};
 pub(crate) use command::AnalyzeCommand;
-pub(crate) use hint::{advice, in_words, with_advice};
 pub(crate) use orientation::{Angle, DirectionArg, SenseArg, parse_angle};
 pub(crate) use output::report_names;
 pub(crate) use run::run;

@@ -9,8 +9,9 @@ use moiregauge_pipeline::samples::{
     Samples, SamplesDone, SamplesError, Shard, analyse_samples, samples_in, samples_of_table,
 };
 
-use crate::analyze::{AnalyzeArgs, advice};
+use crate::analyze::AnalyzeArgs;
 use crate::config::with_option;
+use crate::errors::advice;
 use crate::outputs::hinted;
 use crate::say::say;
 

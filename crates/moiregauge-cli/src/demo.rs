@@ -12,7 +12,8 @@ use moiregauge_pipeline::sink::Target;
 use moiregauge_report::screen::summary;
 use moiregauge_report::{Choice, write_report};
 
-use crate::analyze::{in_words, report_names};
+use crate::analyze::report_names;
+use crate::errors::in_words;
 use crate::outputs;
 use crate::paths::expand;
 use crate::say::say;

@@ -132,7 +132,7 @@ pub(crate) fn told_as_options(told: &Told) -> Vec<String> {
 
 /// The error with the option that it is about.
 pub(crate) fn with_option(error: KnownError) -> anyhow::Error {
-    crate::analyze::with_advice(error.into())
+    crate::errors::with_advice(error.into())
 }
 
 /// `70nm×70nm`, `70x70 nm`: two lengths; the first may leave its unit to the second.

@@ -3,9 +3,11 @@
 mod analyze;
 mod calibrate;
 mod campaign;
+mod conditions;
 mod config;
 mod convert;
 mod demo;
+mod errors;
 mod explain;
 mod hints;
 mod info;
@@ -18,6 +20,7 @@ mod nearest;
 mod numbers;
 mod outputs;
 mod paths;
+mod places;
 mod plan;
 mod progress;
 mod say;
@@ -26,12 +29,12 @@ mod serve;
 mod shells;
 mod simulate;
 mod stripes;
+mod typed;
 mod validate;
 mod watch;
 
 use std::ffi::OsString;
 use std::process::ExitCode;
-use std::sync::OnceLock;
 
 use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 use moiregauge_pipeline::Job;
@@ -76,19 +79,10 @@ fn arguments() -> clap::Command {
     Cli::command().mut_subcommands(|command| command.allow_negative_numbers(true))
 }
 
-/// What was typed, for results that record it.
-static TYPED: OnceLock<Vec<OsString>> = OnceLock::new();
-
-/// What was typed, the name of the program first.
-fn typed() -> impl Iterator<Item = OsString> {
-    TYPED.get().into_iter().flatten().cloned()
-}
-
 /// The program, once in a process: runs the command of these arguments, the name of the program first. It ends the
 /// process where the arguments are wrong, and listens to Ctrl-C.
 pub fn program(typed: Vec<OsString>) -> ExitCode {
-    let typed = TYPED.get_or_init(|| typed);
-    let matches = arguments().get_matches_from(typed);
+    let matches = arguments().get_matches_from(typed::keep(typed));
     let parsed = Cli::from_arg_matches(&matches).unwrap_or_else(|e| e.exit());
     let command = parsed.command;
     let bars = Bars::new(command.is_loud());

@@ -10,5 +10,4 @@ mod words;
 
 pub(crate) use args::MapArgs;
 pub(crate) use options::as_options;
-pub(crate) use regions::{length, parse_region};
 pub(crate) use run::run;

@@ -7,7 +7,7 @@ use std::process::ExitCode;
 use moiregauge_pipeline::Job;
 use moiregauge_serve::{Options, ServeError, Words};
 
-use crate::analyze::advice;
+use crate::errors::advice;
 use crate::input::told_as_options;
 use crate::map::as_options as map_as_options;
 use crate::say::say;

@@ -37,22 +37,7 @@ pub struct MoireQuestion {
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub enum Given {
     /// Layer 2 lies on layer 1, is stretched and then turned by the twist.
-    Layers {
-        /// Twist of layer 2 against layer 1.
-        twist_deg: f64,
-        /// Uniaxial strain of layer 2: that much along the axis, −ν times as much across.
-        #[serde(default)]
-        strain_percent: Option<f64>,
-        /// Axis of the strain, counted from the reciprocal vectors of layer 1.
-        #[serde(default)]
-        strain_axis_deg: Option<f64>,
-        /// Strain of layer 2 that is the same in all directions, on top.
-        #[serde(default)]
-        biaxial_percent: Option<f64>,
-        /// Orientation of layer 1: of its reciprocal vectors along x where it is not given.
-        #[serde(default)]
-        lattice_angle: Option<Direction>,
-    },
+    Layers(GivenLayers),
     /// Three wavelengths, whose meanings differ as soon as there is strain.
     Wavelengths {
         /// The wavelengths.
@@ -72,6 +57,26 @@ pub enum Given {
         #[serde(default)]
         sigma_nm: f64,
     },
+}
+
+/// How layer 2 lies on layer 1.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct GivenLayers {
+    /// Twist of layer 2 against layer 1.
+    pub twist_deg: f64,
+    /// Uniaxial strain of layer 2: that much along the axis, −ν times as much across.
+    #[serde(default)]
+    pub strain_percent: Option<f64>,
+    /// Axis of the strain, counted from the reciprocal vectors of layer 1.
+    #[serde(default)]
+    pub strain_axis_deg: Option<f64>,
+    /// Strain of layer 2 that is the same in all directions, on top.
+    #[serde(default)]
+    pub biaxial_percent: Option<f64>,
+    /// Orientation of layer 1: of its reciprocal vectors along x where it is not given.
+    #[serde(default)]
+    pub lattice_angle: Option<Direction>,
 }
 
 /// The direction of a vector of layer 1.
@@ -120,13 +125,13 @@ pub struct Moire {
 impl Default for MoireQuestion {
     /// Graphene on graphene at the first magic angle.
     fn default() -> Self {
-        Self::new(Given::Layers {
+        Self::new(Given::Layers(GivenLayers {
             twist_deg: 1.1,
             strain_percent: None,
             strain_axis_deg: None,
             biaxial_percent: None,
             lattice_angle: None,
-        })
+        }))
     }
 }
 
@@ -164,18 +169,7 @@ impl MoireQuestion {
     pub fn check(&self) -> Result<(), SettingsError> {
         self.settings.check()?;
         let (setting, numbers): (&'static str, Vec<f64>) = match self.given {
-            Given::Layers {
-                twist_deg,
-                strain_percent,
-                strain_axis_deg,
-                biaxial_percent,
-                lattice_angle,
-            } => {
-                let others = [strain_percent, strain_axis_deg, biaxial_percent];
-                let others = others.into_iter().flatten();
-                let angle = lattice_angle.map(|a| a.angle_deg);
-                ("layers", others.chain(angle).chain([twist_deg]).collect())
-            }
+            Given::Layers(layers) => ("layers", layers.numbers().collect()),
             Given::Wavelengths {
                 lengths_nm,
                 sigma_nm,
@@ -212,22 +206,13 @@ impl MoireQuestion {
     fn lattice(&self) -> Result<Lattice, MoireError> {
         let settings = &self.settings;
         Ok(match self.given {
-            Given::Layers {
-                twist_deg,
-                strain_percent,
-                strain_axis_deg,
-                biaxial_percent,
-                lattice_angle,
-            } => {
-                let stacking = Stacking {
-                    twist: twist_deg.to_radians(),
-                    lattice_angle: lattice_angle.map_or(0.0, |of| reference_angle(of, settings)),
-                    strain: strain_percent.unwrap_or(0.0) / 100.0,
-                    axis_lattice: strain_axis_deg.unwrap_or(0.0).to_radians(),
-                    biaxial: biaxial_percent.unwrap_or(0.0) / 100.0,
-                };
+            Given::Layers(layers) => {
                 let convention = settings.strain_convention;
-                Lattice::exact(moire_of(&stacking, settings.bilayer(), convention)?)
+                Lattice::exact(moire_of(
+                    &layers.stacking(settings),
+                    settings.bilayer(),
+                    convention,
+                )?)
             }
             Given::Wavelengths {
                 lengths_nm,
@@ -249,6 +234,32 @@ impl MoireQuestion {
                 Matrix4::identity() * (sigma_nm * sigma_nm),
             ),
         })
+    }
+}
+
+impl GivenLayers {
+    /// All numbers that are given.
+    fn numbers(&self) -> impl Iterator<Item = f64> {
+        let others = [
+            self.strain_percent,
+            self.strain_axis_deg,
+            self.biaxial_percent,
+        ];
+        let angle = self.lattice_angle.map(|a| a.angle_deg);
+        let others = others.into_iter().flatten();
+        others.chain(angle).chain([self.twist_deg])
+    }
+
+    /// The same in rad and as shares.
+    fn stacking(&self, settings: &Settings) -> Stacking {
+        let angle = self.lattice_angle;
+        Stacking {
+            twist: self.twist_deg.to_radians(),
+            lattice_angle: angle.map_or(0.0, |of| reference_angle(of, settings)),
+            strain: self.strain_percent.unwrap_or(0.0) / 100.0,
+            axis_lattice: self.strain_axis_deg.unwrap_or(0.0).to_radians(),
+            biaxial: self.biaxial_percent.unwrap_or(0.0) / 100.0,
+        }
     }
 }
 
@@ -299,7 +310,7 @@ pub fn moire(asked: &MoireQuestion) -> Result<Moire, MoireError> {
     // Names of waves are those of the vectors that are shown.
     let lattice = cell.pair_of(&lattice);
     let read = match asked.given {
-        Given::Layers { .. } => None,
+        Given::Layers(_) => None,
         Given::Wavelengths { .. } if settings.lattice_angle.is_some() => {
             return Err(MoireError::NoOrientation);
         }
@@ -366,13 +377,13 @@ impl Given {
                 let [a, b] = vectors_nm.map(|[x, y]| format!("({},{})", typed(x), typed(y)));
                 format!("vectors {a} and {b} nm")
             }
-            Self::Layers {
+            Self::Layers(GivenLayers {
                 twist_deg,
                 strain_percent,
                 strain_axis_deg,
                 biaxial_percent,
                 ..
-            } => {
+            }) => {
                 // Writing into a string cannot fail.
                 let mut text = format!("twist {}°", typed(*twist_deg));
                 if let Some(strain) = strain_percent.map(typed) {
@@ -411,13 +422,13 @@ mod tests {
 
     #[test]
     fn what_is_given_is_told_in_words() {
-        let layers = Given::Layers {
+        let layers = Given::Layers(GivenLayers {
             twist_deg: -1.1,
             strain_percent: Some(0.3),
             strain_axis_deg: Some(20.0),
             biaxial_percent: Some(-0.1),
             lattice_angle: None,
-        };
+        });
         assert_eq!(
             layers.in_words(),
             "twist −1.1°, strain 0.3 % along 20° from layer 1, biaxial strain −0.1 %"

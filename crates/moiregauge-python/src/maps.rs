@@ -47,7 +47,7 @@ pub(crate) fn map<'py>(
         };
         let document = map.write(nothing_drawn, &MemorySink::new())?;
         let planes = match &map.found.shown {
-            Shown::Lattice(found) => map_scan(&found.map).channels,
+            Shown::Lattice(found) => map_scan(&found.map, found.registry.as_ref()).channels,
             Shown::Stripes(found) => moiregauge_report::stripe_scan(&found.stripes).channels,
         };
         Ok((map, document, planes))

@@ -1,8 +1,10 @@
 //! What was asked of a map beside the map itself.
 
 use moiregauge::domains::{DomainMap, Regime};
+use moiregauge::map::RegistryMap;
 use moiregauge::region::{Device, Profile, RegionStatistics, WantedArea, WantedTwist};
 use moiregauge::scan::Picture;
+use moiregauge::survey::MappedPattern;
 
 /// Answers to what was asked of a map.
 #[derive(Clone, Debug, Default)]
@@ -21,4 +23,8 @@ pub struct MapDetails {
     pub regime: Option<Regime>,
     /// The first image behind the map, to be shown.
     pub picture: Option<Picture>,
+    /// The pattern of that image: undistorted, and its averaged cell.
+    pub pattern: Option<MappedPattern>,
+    /// The registry of the layers on the nodes.
+    pub registry: Option<RegistryMap>,
 }

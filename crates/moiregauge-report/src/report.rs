@@ -9,7 +9,7 @@ use crate::draw::png;
 use crate::error::ReportError;
 use crate::figures::{Figure, figures};
 use crate::html;
-use crate::provenance::Provenance;
+use crate::results::Provenance;
 use crate::results::Results;
 use crate::tables::tables;
 

@@ -20,7 +20,7 @@ use spmfile::FrameDirection;
 use crate::draw::scale::fixed;
 use crate::format::{plus_minus, two_digits, with_statistical};
 use crate::html::layers;
-use crate::provenance::FailedInput;
+use crate::input::FailedInput;
 
 /// The option that helps against a doubt, by its code.
 pub type Hint = fn(&str) -> Option<&'static str>;

@@ -2,12 +2,13 @@
 
 use std::collections::VecDeque;
 use std::path::PathBuf;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 
 use spmfile::Scan;
 use tokio::sync::watch;
 
 use crate::events::Hub;
+use crate::lock::lock;
 use crate::options::Options;
 use crate::page::Page;
 use crate::roots::Roots;
@@ -102,9 +103,4 @@ fn size(scan: &Scan) -> usize {
         spmfile::Samples::F64(v) => 8 * v.len(),
     });
     samples.sum()
-}
-
-/// A lock; what a thread that panicked left is whole, since nothing is changed in steps.
-pub(crate) fn lock<T>(of: &Mutex<T>) -> MutexGuard<'_, T> {
-    of.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -14,7 +14,7 @@ use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::Notify;
 use tower::ServiceExt as _;
 
-use crate::app::lock;
+use crate::lock::lock;
 
 /// How long a connection may take for the head of a request, the pause before it included. Pages that are open ask
 /// anew when a connection was closed.

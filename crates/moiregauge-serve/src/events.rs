@@ -10,7 +10,7 @@ use futures_util::stream::{self, Stream};
 use serde_json::Value;
 use tokio::sync::watch;
 
-use crate::app::lock;
+use crate::lock::lock;
 
 /// Events that are kept.
 const KEPT: usize = 1024;

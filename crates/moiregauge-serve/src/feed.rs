@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex};
 use moiregauge_pipeline::watch::Line;
 use serde_json::Value;
 
-use crate::app::lock;
+use crate::lock::lock;
 
 /// Who hears of a line.
 type Listener = Box<dyn Fn(&Value) + Send>;

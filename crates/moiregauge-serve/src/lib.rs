@@ -17,6 +17,7 @@ mod error;
 mod events;
 mod feed;
 mod guard;
+mod lock;
 mod options;
 mod page;
 mod paths;

@@ -4,12 +4,12 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
-use moiregauge_pipeline::hexadecimal;
+use moiregauge_pipeline::{Places, hexadecimal};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
 
-use crate::app::lock;
 use crate::error::ServeError;
+use crate::lock::lock;
 use crate::paths::below;
 use crate::problem::{Answer, Problem};
 
@@ -36,6 +36,17 @@ pub(crate) struct File {
     pub(crate) place: PathBuf,
     /// The id of its root.
     pub(crate) root: String,
+}
+
+/// Where files are that are not where their names say.
+pub(crate) fn places(files: &[File]) -> Places {
+    let mut places = Places::new();
+    for file in files {
+        if file.name != file.place {
+            places.insert(file.name.clone(), file.place.clone());
+        }
+    }
+    places
 }
 
 /// A folder as it is shown.

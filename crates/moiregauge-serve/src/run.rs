@@ -12,10 +12,11 @@ use tokio::net::TcpListener;
 use tokio::sync::watch;
 
 use crate::api::routes;
-use crate::app::{App, Scans, lock};
+use crate::app::{App, Scans};
 use crate::connection::accept;
 use crate::error::ServeError;
 use crate::events::Hub;
+use crate::lock::lock;
 use crate::options::Options;
 use crate::page::Page;
 use crate::roots::Roots;

@@ -19,10 +19,10 @@ use crate::strain::twist_strain::TwistStrain;
 /// A labelling and a branch.
 #[derive(Clone, Debug)]
 pub struct FixedBranch {
-    layers: Layers,
-    signs: Signs,
+    pub(crate) layers: Layers,
+    pub(crate) signs: Signs,
     /// From the names of the reference to the least strained ones.
-    change: Matrix2<f64>,
+    pub(crate) change: Matrix2<f64>,
     /// α of the reference as the equation has it, and as it is reported.
     angle: [f64; 2],
 }

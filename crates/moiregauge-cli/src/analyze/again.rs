@@ -8,6 +8,7 @@ use moiregauge_report::results::Run;
 
 use super::arguments::arguments;
 use crate::config;
+use crate::typed::typed;
 
 /// The document of the run to be repeated.
 pub(super) struct Again {
@@ -22,7 +23,7 @@ impl Again {
         folders: &[PathBuf],
         command: &str,
     ) -> anyhow::Result<(Self, Places)> {
-        let others = arguments(crate::typed(), &["--replay", "--data"]);
+        let others = arguments(typed(), &["--replay", "--data"]);
         ensure!(
             others.len() == 1,
             "--replay takes files, settings and options from the document; leave out {}",

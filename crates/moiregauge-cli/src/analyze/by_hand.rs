@@ -7,8 +7,8 @@ use moiregauge::settings::{MOST_GRAINS, Settings};
 use moiregauge_pipeline::read_mask;
 use nalgebra::Vector2;
 
-use crate::map::{length, parse_region};
 use crate::numbers;
+use crate::places::{length, parse_region};
 
 /// The options for it.
 #[derive(clap::Args, Clone, Debug, Default)]

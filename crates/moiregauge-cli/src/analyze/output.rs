@@ -5,16 +5,15 @@ use std::process::ExitCode;
 
 use moiregauge::campaign::refusal;
 use moiregauge_pipeline::Job;
-use moiregauge_pipeline::campaign::{Export, Outcome, write_corrected};
-use moiregauge_pipeline::maps::Scans;
+use moiregauge_pipeline::campaign::{Export, Outcome, Scans, write_corrected};
 use moiregauge_pipeline::sink::{FolderSink, Target};
 use moiregauge_report::screen::{failures, summary};
 use moiregauge_report::{FailedInput, write_report};
 
 use super::args::AnalyzeArgs;
 use super::export;
-use super::hint::advice;
 use super::task::Task;
+use crate::errors::advice;
 use crate::hints;
 use crate::outputs::{commit, folder, write_all};
 use crate::say::say;

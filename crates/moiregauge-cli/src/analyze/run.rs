@@ -6,9 +6,9 @@ use moiregauge_pipeline::Job;
 use moiregauge_pipeline::campaign::{Campaign, Outcome, outcomes};
 
 use super::args::AnalyzeArgs;
-use super::hint::in_words;
 use super::output::Output;
 use super::task::Task;
+use crate::errors::in_words;
 use crate::interrupt::{kept_for_next, take};
 use crate::stripes;
 

@@ -11,9 +11,10 @@ use moiregauge_report::results::Run;
 use super::again::Again;
 use super::args::AnalyzeArgs;
 use super::arguments::arguments;
-use super::hint::advice;
 use crate::config::with_option;
+use crate::errors::advice;
 use crate::paths::inputs;
+use crate::typed::typed;
 
 /// A run to be done.
 pub(crate) struct Task {
@@ -48,7 +49,7 @@ impl Task {
         }
         let run = Run {
             command: command.to_owned(),
-            arguments: arguments(crate::typed(), &[]),
+            arguments: arguments(typed(), &[]),
             settings,
             known: args.known.told(),
             sets,

@@ -16,8 +16,9 @@ use moiregauge_report::FailedInput;
 use moiregauge_report::screen::failures;
 
 use super::words;
-use crate::analyze::{BackgroundArg, LineArg, with_advice};
+use crate::analyze::{BackgroundArg, LineArg};
 use crate::config;
+use crate::errors::with_advice;
 use crate::input::KnownArgs;
 use crate::numbers;
 use crate::paths::inputs;

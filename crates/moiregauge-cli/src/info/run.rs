@@ -9,7 +9,7 @@ use moiregauge_pipeline::{Known, inspect};
 
 use super::table::table;
 
-use crate::analyze::advice;
+use crate::errors::advice;
 use crate::input::KnownArgs;
 use crate::paths::expand;
 

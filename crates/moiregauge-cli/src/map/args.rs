@@ -28,8 +28,10 @@ Examples:
   moiregauge map scan.000 --out maps --profile 'cut=0,0 100,80'
   moiregauge map small_angle.sxm --out maps --domains on --nodes bright
 
-Written: report.html, map.zarr and map.gwy (all quantities, their errors, mask), map.json (summary), figures/,
-and what was asked for: regions.csv, profiles.csv, devices.csv, domains.csv, nodes.csv; columns.md explains them.")]
+Written: report.html, map.zarr and map.gwy (all quantities, their errors, mask), undistorted.gwy (the image with its
+lattice made straight), displacement.csv (displacement, registry of the layers), cell.csv (averaged moiré cell),
+map.json (summary), figures/, and what was asked for: regions.csv, profiles.csv, devices.csv, domains.csv, nodes.csv;
+columns.md explains them.")]
 pub(crate) struct MapArgs {
     #[command(flatten)]
     pub(super) analyze: AnalyzeArgs,

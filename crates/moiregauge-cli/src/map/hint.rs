@@ -3,8 +3,8 @@
 use moiregauge_pipeline::maps::{NoBands, NoStripes, NotMapped};
 use moiregauge_report::screen::failures;
 
-use crate::analyze::{self, with_advice};
 use crate::config;
+use crate::errors::{self, with_advice};
 use crate::input::with_option;
 use crate::outputs::hinted;
 
@@ -23,10 +23,10 @@ pub(super) fn in_words(error: NotMapped) -> anyhow::Error {
             )
         }
         NotMapped::NoLattice { why, stripes } => {
-            let words = analyze::in_words(*why);
+            let words = errors::in_words(*why);
             stripes.map_or(words, |stripes| of_stripes(*stripes))
         }
-        NotMapped::Analyse(why) => analyze::in_words(*why),
+        NotMapped::Analyse(why) => errors::in_words(*why),
         NotMapped::Nothing { failed } => {
             eprint!("{}", failures(&failed));
             anyhow::anyhow!("no image gave a map")

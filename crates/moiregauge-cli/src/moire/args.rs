@@ -6,7 +6,7 @@ use anyhow::bail;
 use clap::ValueEnum;
 use heterostrain::strain::KnownOrientation;
 use moiregauge::settings::Settings;
-use moiregauge_pipeline::moire::{Direction, Given, MoireQuestion};
+use moiregauge_pipeline::moire::{Direction, Given, GivenLayers, MoireQuestion};
 
 use crate::analyze::{Angle, ConventionArg, DirectionArg, SenseArg, parse_angle};
 use crate::config;
@@ -223,13 +223,13 @@ impl MoireArgs {
         let Some(twist_deg) = self.twist else {
             bail!("expected --twist, --wavelengths or --vectors; see moiregauge moire --help");
         };
-        Ok(Given::Layers {
+        Ok(Given::Layers(GivenLayers {
             twist_deg,
             strain_percent: self.strain,
             strain_axis_deg: self.strain_axis,
             biaxial_percent: self.biaxial,
             lattice_angle: self.direction()?,
-        })
+        }))
     }
 
     /// The orientation of layer 1 for layers that are given.

@@ -9,6 +9,7 @@ use moiregauge_pipeline::Job;
 use moiregauge_pipeline::plan::{PlanError, PlanRequest, Wishes};
 
 use super::words;
+use crate::conditions::given_conditions;
 use crate::numbers;
 use crate::say::say;
 use crate::scanner::ScannerArgs;
@@ -75,7 +76,7 @@ pub(crate) fn run(args: &PlanArgs, job: &Job) -> anyhow::Result<ExitCode> {
     let inputs: Vec<PathBuf> = args.config.iter().chain(&args.like).cloned().collect();
     let file = |out| crate::outputs::file(out, args.force, &inputs);
     let file = args.out.as_deref().map(file).transpose()?;
-    let given = crate::validate::given_conditions(args.config.as_deref(), &args.like, job)?;
+    let given = given_conditions(args.config.as_deref(), &args.like, job)?;
     let conditions = given.unwrap_or_default();
     let request = PlanRequest {
         wishes: Wishes {

@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use moiregauge::meaning::Source;
 use moiregauge_pipeline::plan::{Expected, Limit, OutOfReach, Plan, Plans};
 use moiregauge_report::two_digits;
 
@@ -97,17 +98,17 @@ fn row(text: &mut String, mark: &str, plan: &Plan) {
 
 fn source(limit: Limit) -> &'static str {
     match limit {
-        Limit::ImageNoise => "noise of the images",
-        Limit::Drift => "drift",
-        Limit::SensorNoise => "noise of the sensors",
-        Limit::Gain => "calibration: gain",
-        Limit::Mismatch => "calibration: mismatch of x and y",
-        Limit::Orthogonality => "calibration: orthogonality",
-        Limit::Pitch => "pitch of the pixels",
-        Limit::LatticeConstant => "lattice constant",
-        Limit::StrainedLayer => "which layer is strained",
-        Limit::IsotropicStrain => "isotropic strain",
-        Limit::PoissonRatio => "Poisson ratio",
+        Limit::Of(Source::Image) => "noise of the images",
+        Limit::Of(Source::Drift) => "drift",
+        Limit::Of(Source::Sensor) => "noise of the sensors",
+        Limit::Of(Source::Gain) => "calibration: gain",
+        Limit::Of(Source::Mismatch) => "calibration: mismatch of x and y",
+        Limit::Of(Source::Orthogonality) => "calibration: orthogonality",
+        Limit::Of(Source::Pitch) => "pitch of the pixels",
+        Limit::Of(Source::LatticeConstant) => "lattice constant",
+        Limit::Of(Source::StrainedLayer) => "which layer is strained",
+        Limit::Of(Source::IsotropicStrain) => "isotropic strain",
+        Limit::Of(Source::PoissonRatio) => "Poisson ratio",
         Limit::Unlinked => "frames that cannot be linked by phases",
         Limit::FrameTimes => "times of the frames",
         _ => "",
@@ -162,14 +163,14 @@ fn limit(text: &mut String, one: &OutOfReach) {
 
 fn remedy(limit: Limit) -> &'static str {
     match limit {
-        Limit::Gain | Limit::Mismatch | Limit::Orthogonality => {
+        Limit::Of(Source::Gain | Source::Mismatch | Source::Orthogonality) => {
             "`moiregauge calibrate` with a known lattice does"
         }
-        Limit::Pitch => "recording the position sensors does",
-        Limit::LatticeConstant => "a better known lattice constant does",
-        Limit::IsotropicStrain => "the orientation of one of the layers does",
-        Limit::PoissonRatio => "a better known Poisson ratio does",
-        Limit::StrainedLayer => "knowing which layer is strained does",
+        Limit::Of(Source::Pitch) => "recording the position sensors does",
+        Limit::Of(Source::LatticeConstant) => "a better known lattice constant does",
+        Limit::Of(Source::IsotropicStrain) => "the orientation of one of the layers does",
+        Limit::Of(Source::PoissonRatio) => "a better known Poisson ratio does",
+        Limit::Of(Source::StrainedLayer) => "knowing which layer is strained does",
         _ => "more scans do",
     }
 }

@@ -11,9 +11,9 @@ use moiregauge_pipeline::validate::{
     validate_samples,
 };
 
-use super::conditions::given_conditions;
 use super::words;
 use crate::analyze::MethodArg;
+use crate::conditions::given_conditions;
 use crate::numbers;
 use crate::outputs;
 use crate::say::say;

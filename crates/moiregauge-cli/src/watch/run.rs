@@ -15,8 +15,8 @@ use super::args::WatchArgs;
 use super::exec::Exec;
 use super::keep::Keep;
 use super::table::Table;
-use crate::analyze::advice;
 use crate::config::with_option;
+use crate::errors::advice;
 use crate::say::say;
 
 /// Between two looks whether the watch is to stop.

@@ -186,6 +186,8 @@ fn questions_about_a_map_have_answers() {
         "twist",
         "strain",
         "wavelength",
+        "undistorted",
+        "cell",
         "displacement",
         "histograms",
         "mask",
@@ -195,6 +197,16 @@ fn questions_about_a_map_have_answers() {
             out.join(format!("figures/map-{name}.svg")).exists(),
             "{name}"
         );
+    }
+    let field = rows(&out.join("displacement.csv"));
+    let masks: Vec<f64> = column(&field, "mask");
+    let known = column(&field, "registry_x_nm").len();
+    assert!(masks.len() == field.len() - 1 && known > 0);
+    assert!(known <= masks.iter().filter(|m| **m == 0.0).count());
+    let cell = rows(&out.join("cell.csv"));
+    assert_eq!(column(&cell, "mean").len(), cell.len() - 1);
+    for group in ["undistorted/image", "cell/mean", "registry_x_sigma"] {
+        assert!(out.join(format!("map.zarr/{group}/zarr.json")).exists());
     }
     let columns = std::fs::read_to_string(out.join("columns.md")).expect("columns.md");
     assert!(columns.contains("calibration of the scanner"));

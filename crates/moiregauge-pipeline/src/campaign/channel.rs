@@ -6,7 +6,7 @@ use moiregauge::caveat::{Caveat, ChannelReason, FileDoubt};
 use moiregauge::scan::channels_by_preference;
 use moiregauge::settings::Settings;
 
-use super::measure::Failure;
+use super::failure::Failure;
 use crate::known::Known;
 use crate::opened::Opened;
 

@@ -10,9 +10,9 @@ use moiregauge_report::FailedInput;
 use rayon::prelude::*;
 use spmfile::{ExportError, LineDirection, WritableFormat};
 
-use super::measure::in_words;
+use super::failure::in_words;
+use super::scans::Scans;
 use crate::job::{Cancelled, Job};
-use crate::maps::Scans;
 use crate::opened::{InputError, read_again};
 use crate::sink::{Sink, SinkError};
 

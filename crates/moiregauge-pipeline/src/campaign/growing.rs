@@ -11,8 +11,9 @@ use serde::{Deserialize, Serialize, Serializer};
 
 use super::channel::Other;
 use super::error::AnalyseError;
+use super::failure::{Advice, no_advice};
 use super::kept::{Kept, With};
-use super::measure::{Advice, Inputs, Measured, given_again, measured, no_advice};
+use super::measure::{Inputs, Measured, given_again, measured};
 use super::overlap::overlap;
 use super::shown::show;
 use crate::job::Job;

@@ -9,7 +9,7 @@ use moiregauge_report::InputFile;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
 
-use super::measure::Failure;
+use super::failure::Failure;
 use crate::hash::hexadecimal;
 use crate::known::Known;
 use crate::stamp::Stamp;

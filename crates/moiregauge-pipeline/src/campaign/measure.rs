@@ -6,58 +6,22 @@ use std::sync::{Mutex, PoisonError};
 use moiregauge::campaign::about_repeat;
 use moiregauge::caveat::Caveat;
 use moiregauge::numbers::interrupt;
-use moiregauge::scan::{MeasureError, MeasuredScan, Window, measure_moires};
+use moiregauge::scan::{MeasuredScan, Window, measure_moires};
 use moiregauge::settings::Settings;
 use moiregauge_report::InputFile;
 use moiregauge_report::results::NamedSet;
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 
 use super::channel::{Other, others};
+use super::failure::{Advice, Failure};
 use super::kept::{Kept, With};
 use crate::job::{Cancelled, Job};
 use crate::known::Known;
 use crate::memory::enough_for;
-use crate::names::in_full;
 use crate::opened::{InputError, Opened, Reading, read_scan};
 use crate::sets::set_of;
 use crate::stamp::Stamp;
 use crate::twice::Repeated;
-
-/// What a front end says that helps against an error: its own options.
-pub type Advice = fn(&InputError) -> Option<String>;
-
-/// Nothing.
-pub fn no_advice(_: &InputError) -> Option<String> {
-    None
-}
-
-/// An error with what helps against it and with all its causes, in one line.
-pub fn in_words(error: &InputError, advice: Advice) -> String {
-    let words = in_full(error);
-    match advice(error) {
-        Some(advice) => format!("{advice}: {words}"),
-        None => words,
-    }
-}
-
-/// Why a file could not be measured, in words that can be kept.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct Failure {
-    pub(super) error: String,
-    /// Whether it is the image that shows none.
-    pub(super) no_lattice: bool,
-}
-
-impl Failure {
-    fn of(error: &InputError, advice: Advice) -> Self {
-        Self {
-            error: in_words(error, advice),
-            no_lattice: matches!(error, InputError::Measure(MeasureError::Lattice { .. })),
-        }
-    }
-}
 
 /// What is to be measured, and how.
 pub(super) struct Inputs<'a> {

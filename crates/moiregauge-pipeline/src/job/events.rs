@@ -2,8 +2,6 @@
 
 use serde::Serialize;
 
-use super::Job;
-
 /// Somebody whom a job tells how far it is. Calls come from any thread of the job, several at once, and should be short.
 pub trait Events: Sync {
     /// Something happened.
@@ -41,31 +39,4 @@ pub struct Quiet;
 
 impl Events for Quiet {
     fn tell(&self, _: &Event<'_>) {}
-}
-
-/// A stage under way; over when it is dropped, however that comes.
-pub struct Stage<'a> {
-    job: &'a Job<'a>,
-}
-
-impl<'a> Stage<'a> {
-    pub(super) fn new(job: &'a Job<'a>, doing: &str, things: &str, count: usize) -> Self {
-        job.tell(&Event::Stage {
-            doing,
-            things,
-            count,
-        });
-        Self { job }
-    }
-
-    /// One more is done.
-    pub fn step(&self) {
-        self.job.tell(&Event::Step);
-    }
-}
-
-impl Drop for Stage<'_> {
-    fn drop(&mut self) {
-        self.job.tell(&Event::Ended);
-    }
 }

@@ -5,5 +5,5 @@ mod events;
 mod pool;
 
 pub use cancel::{Cancel, Cancelled};
-pub use events::{Event, Events, Quiet, Stage};
-pub use pool::{Job, JobError};
+pub use events::{Event, Events, Quiet};
+pub use pool::{Job, JobError, Stage};

@@ -6,7 +6,8 @@ use std::sync::Arc;
 use moiregauge::numbers::interrupt::{self, Interrupted};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
-use super::{Cancel, Cancelled, Event, Events, Quiet, Stage};
+use super::cancel::{Cancel, Cancelled};
+use super::events::{Event, Events, Quiet};
 
 /// Room on the stack of each thread, bytes: that of the first thread of a program.
 const STACK: usize = 8 << 20;
@@ -119,6 +120,33 @@ impl<'a> Job<'a> {
     /// Begins a stage of `count` steps, as in `measuring`, `scans`.
     pub fn stage(&self, doing: &str, things: &str, count: usize) -> Stage<'_> {
         Stage::new(self, doing, things, count)
+    }
+}
+
+/// A stage under way; over when it is dropped, however that comes.
+pub struct Stage<'a> {
+    job: &'a Job<'a>,
+}
+
+impl<'a> Stage<'a> {
+    fn new(job: &'a Job<'a>, doing: &str, things: &str, count: usize) -> Self {
+        job.tell(&Event::Stage {
+            doing,
+            things,
+            count,
+        });
+        Self { job }
+    }
+
+    /// One more is done.
+    pub fn step(&self) {
+        self.job.tell(&Event::Step);
+    }
+}
+
+impl Drop for Stage<'_> {
+    fn drop(&mut self) {
+        self.job.tell(&Event::Ended);
     }
 }
 

@@ -4,36 +4,12 @@ use moiregauge::caveat::{Caveat, MapDoubt};
 use moiregauge::map::TwistStrainMap;
 use moiregauge::numbers::two_digits;
 use moiregauge::region::{
-    Device, DeviceSearch, Profile, Region, RegionStatistics, WantedArea, WantedTwist, uniform_areas,
+    Device, DeviceSearch, Profile, RegionStatistics, WantedArea, uniform_areas,
 };
 use moiregauge_report::MapDetails;
 use nalgebra::Vector2;
-use serde::{Deserialize, Serialize};
 
-use super::asked::Asked;
-
-/// Questions to a map. Places are those of the map: x right, y up, nm.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(from = "Asked", into = "Asked")]
-pub struct Questions {
-    /// Mean, spread and errors within these.
-    pub regions: Vec<Region>,
-    /// Twist, strain and wavelength along these.
-    pub profiles: Vec<Line>,
-    /// The most uniform areas.
-    pub device: Option<DeviceSearch>,
-    /// How much of the map has this twist.
-    pub wanted: Option<WantedTwist>,
-}
-
-/// A line with a name.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Line {
-    /// Its name.
-    pub name: String,
-    /// Its ends, nm.
-    pub ends: [Vector2<f64>; 2],
-}
+use super::asked::Questions;
 
 /// A region or line that does not touch the map.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -116,9 +92,7 @@ impl Questions {
                 .collect(),
             devices: devices.unwrap_or_default(),
             wanted,
-            domains: None,
-            regime: None,
-            picture: None,
+            ..MapDetails::default()
         };
         Ok((details, doubts))
     }

@@ -1,15 +1,36 @@
-//! Questions to a map as they are kept: in nm and degrees, places as pairs.
+//! Questions to a map, and how they are kept: in nm and degrees, places as pairs.
 
 use moiregauge::region::{DeviceSearch, Region, WantedTwist};
 use nalgebra::Vector2;
 use serde::{Deserialize, Serialize};
 
-use super::ask::{Line, Questions};
+/// Questions to a map. Places are those of the map: x right, y up, nm.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(from = "Asked", into = "Asked")]
+pub struct Questions {
+    /// Mean, spread and errors within these.
+    pub regions: Vec<Region>,
+    /// Twist, strain and wavelength along these.
+    pub profiles: Vec<Line>,
+    /// The most uniform areas.
+    pub device: Option<DeviceSearch>,
+    /// How much of the map has this twist.
+    pub wanted: Option<WantedTwist>,
+}
 
-/// All questions.
+/// A line with a name.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Line {
+    /// Its name.
+    pub name: String,
+    /// Its ends, nm.
+    pub ends: [Vector2<f64>; 2],
+}
+
+/// All questions as they are kept.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub(super) struct Asked {
+struct Asked {
     #[serde(skip_serializing_if = "Vec::is_empty")]
     regions: Vec<AskedRegion>,
     #[serde(skip_serializing_if = "Vec::is_empty")]

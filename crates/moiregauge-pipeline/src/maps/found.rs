@@ -1,10 +1,10 @@
 //! A map as it was made.
 
 use moiregauge::caveat::Caveat;
-use moiregauge::map::{Agreement, DriftChange, TwistStrainMap};
+use moiregauge::map::{Agreement, DriftChange, RegistryMap, TwistStrainMap};
 use moiregauge::scan::Picture;
 use moiregauge::settings::Settings;
-use moiregauge::survey::ScanStripes;
+use moiregauge::survey::{MappedPattern, ScanStripes};
 use moiregauge_report::Provenance;
 use moiregauge_report::results::{MappedImage, TwistStrainResult};
 
@@ -43,6 +43,10 @@ pub struct LatticeShown {
     pub whole: Option<TwistStrainResult>,
     /// The first image, to be shown.
     pub picture: Option<Picture>,
+    /// The pattern of that image: undistorted, and its averaged cell; nothing where phases are not followed.
+    pub pattern: Option<MappedPattern>,
+    /// The registry of the layers; nothing where phases are not followed.
+    pub registry: Option<RegistryMap>,
     /// How well maps of several images agree.
     pub agreement: Option<Agreement>,
     /// How the drift changes between upward and downward frames.

@@ -1,15 +1,14 @@
 //! Scans that show a lattice → their maps, and the average of these.
 
-use std::path::PathBuf;
-
 use moiregauge::campaign::{Analysis, ScanAnalysis, picture};
 use moiregauge::caveat::Caveat;
 use moiregauge::domains::{Contrast, DomainMap};
-use moiregauge::map::{Agreement, DriftChange, TwistStrainMap};
+use moiregauge::map::{Agreement, DriftChange, RegistryMap, TwistStrainMap};
 use moiregauge::scan::Picture;
 use moiregauge::settings::Settings;
 use moiregauge::survey::{
-    LineMap, MapError, MapMethod, average_maps, change_of_drift, domains_of_scan, map_scan,
+    LineMap, MapError, MapMethod, MappedPattern, average_maps, change_of_drift, domains_of_scan,
+    map_scan, pattern_of_scan,
 };
 use moiregauge::window::{Resolution, UsedHarmonic};
 use moiregauge_report::FailedInput;
@@ -17,24 +16,10 @@ use moiregauge_report::results::{MappedImage, TwistStrainResult};
 use spmfile::LineDirection;
 
 use super::doubts;
-use crate::campaign::{Advice, in_words};
+use crate::campaign::{Scans, in_words};
 use crate::job::{Cancelled, Job};
-use crate::known::Known;
 use crate::names::in_full;
 use crate::opened::{InputError, read_again};
-
-/// Analysed scans whose pixels can be read again.
-#[derive(Clone, Copy, Debug)]
-pub struct Scans<'a> {
-    /// What was found in them.
-    pub analysis: &'a Analysis,
-    /// The files.
-    pub inputs: &'a [PathBuf],
-    /// What is known of them.
-    pub known: &'a Known,
-    /// What helps against errors.
-    pub advice: Advice,
-}
 
 /// A map and what came with it.
 #[derive(Clone, Debug)]
@@ -47,6 +32,10 @@ pub struct Mapped {
     pub images: Vec<MappedImage>,
     /// The first of them, to be shown.
     pub picture: Option<Picture>,
+    /// Its pattern: undistorted, and its averaged cell.
+    pub pattern: Option<MappedPattern>,
+    /// The registry of the layers on the nodes.
+    pub registry: Option<RegistryMap>,
     /// How well maps of several images agree.
     pub agreement: Option<Agreement>,
     /// How the drift changes between upward and downward frames.
@@ -55,6 +44,13 @@ pub struct Mapped {
     pub caveats: Vec<Caveat>,
     /// Files that gave no map.
     pub failed: Vec<FailedInput>,
+}
+
+/// The first image, to be shown as it is and undistorted.
+#[derive(Default)]
+struct FirstImage {
+    picture: Option<Picture>,
+    pattern: Option<MappedPattern>,
 }
 
 /// Why there is no map.
@@ -102,7 +98,7 @@ impl Scans<'_> {
     ) -> Result<Mapped, NoMap> {
         // The maps read the lattice under the name that the analysis found.
         let settings = &self.analysis.named_settings();
-        let (mut maps, picture, failed) = self.maps(settings, method, resolution, job);
+        let (mut maps, shown, failed) = self.maps(settings, method, resolution, job);
         let mut caveats = self.analysis.caveats.clone();
         doubts::registered(&mut maps, &mut caveats);
         let Some((lattices, agreement)) = average_maps(&maps) else {
@@ -131,7 +127,9 @@ impl Scans<'_> {
             map: TwistStrainMap::new(&lattices, &found),
             whole: whole_image(self.analysis),
             images: maps.iter().map(image).collect(),
-            picture,
+            picture: shown.picture,
+            pattern: shown.pattern,
+            registry: lattices.registry(&reference, layers, convention),
             agreement,
             drift_change,
             caveats,
@@ -172,17 +170,22 @@ impl Scans<'_> {
         method: MapMethod,
         resolution: &Resolution,
         job: &Job,
-    ) -> (Vec<LineMap>, Option<Picture>, Vec<FailedInput>) {
-        let (mut maps, mut shown, mut failed) = (Vec::new(), None, Vec::new());
+    ) -> (Vec<LineMap>, FirstImage, Vec<FailedInput>) {
+        let (mut maps, mut failed) = (Vec::new(), Vec::new());
+        let mut first = FirstImage::default();
         let origin = self.origin();
         let stage = job.stage("mapping", "scans", self.used().count());
         for scan in self.used() {
             let mut of_scan = || -> Result<Vec<LineMap>, OfScan> {
                 let read = read_again(self.inputs, &scan.file, settings, self.known)?;
                 let lines = map_scan(&read, scan, origin, settings, method, resolution)?;
-                shown = shown
-                    .take()
-                    .or_else(|| picture(&scan.file, &read, settings));
+                if first.picture.is_none() {
+                    first.picture = picture(&scan.file, &read, settings);
+                }
+                if first.pattern.is_none() {
+                    let of = |map| pattern_of_scan(&read, scan, origin, settings, map);
+                    first.pattern = lines.iter().find_map(of);
+                }
                 Ok(lines)
             };
             match of_scan() {
@@ -197,7 +200,7 @@ impl Scans<'_> {
             }
             stage.step();
         }
-        (maps, shown, failed)
+        (maps, first, failed)
     }
 }
 

@@ -16,11 +16,12 @@ mod stripes;
 mod survey;
 mod write;
 
-pub use ask::{Line, NameTwice, OutsideOfMap, Questions};
+pub use ask::{NameTwice, OutsideOfMap};
+pub use asked::{Line, Questions};
 pub use domains::Domains;
 pub use error::{NoBands, NoStripes, NotMapped};
 pub use found::{LatticeShown, MapFound, Shown};
-pub use lattices::{Mapped, NoMap, Scans, map_lattices};
+pub use lattices::{Mapped, NoMap, map_lattices};
 pub use request::{DomainSearch, MapRequest, When};
 pub use run::map;
 pub use stripes::{StripesSeen, stripes_seen};

@@ -5,7 +5,8 @@ use moiregauge::survey::MapMethod;
 use moiregauge::window::Resolution;
 use serde::{Deserialize, Serialize};
 
-use super::ask::{NameTwice, Questions};
+use super::ask::NameTwice;
+use super::asked::Questions;
 use super::error::NotMapped;
 use moiregauge::settings::SettingsError;
 

@@ -5,11 +5,11 @@ use moiregauge_report::Provenance;
 
 use super::error::NotMapped;
 use super::found::{LatticeShown, MapFound, Shown};
-use super::lattices::{NoMap, Scans, map_lattices};
+use super::lattices::{NoMap, map_lattices};
 use super::request::MapRequest;
 use super::stripes;
 use super::survey::survey;
-use crate::campaign::{AnalyseError, Campaign, Outcome};
+use crate::campaign::{AnalyseError, Campaign, Outcome, Scans};
 use crate::job::Job;
 use crate::sink::Keep;
 
@@ -105,6 +105,8 @@ fn mapped(
             map: found.map,
             whole: found.whole,
             picture: found.picture,
+            pattern: found.pattern,
+            registry: found.registry,
             agreement: found.agreement,
             drift_change: found.drift_change,
             domains,

@@ -105,6 +105,9 @@ pub(super) fn survey(
             map,
             whole: None,
             picture: plans.first().and_then(|(large, _)| large.picture(settings)),
+            // Bands follow no phases.
+            pattern: None,
+            registry: None,
             agreement: None,
             drift_change: None,
             domains,

@@ -3,12 +3,13 @@
 use moiregauge::map::TwistStrainMap;
 use moiregauge::numbers::interrupt;
 use moiregauge::settings::Settings;
+use moiregauge::survey::MappedPattern;
 use moiregauge_report::results::{
     Conventions, MapDetailsResult, MapResults, StripesResult, mask_counts, quantities,
 };
 use moiregauge_report::{
-    Choice, ColorMap, Figure, Provenance, figure_files, map_figures, map_page, map_scan, map_scans,
-    map_tables, stripe_figures, stripe_scan,
+    Choice, ColorMap, Figure, Provenance, cell_scan, figure_files, map_figures, map_page, map_scan,
+    map_scans, map_tables, stripe_figures, stripe_scan, undistorted_scan,
 };
 use spmfile::{Scan, WritableFormat};
 
@@ -19,6 +20,9 @@ use crate::sink::{Sink, SinkError};
 
 /// With more nodes than this there is no `.gwy` file: it would not fit into memory beside the map.
 const MANY: usize = 1_500_000;
+
+/// Tables of whole fields.
+const FIELDS: [&str; 2] = ["displacement.csv", "cell.csv"];
 
 const ERRORS: &str = "one standard deviation from the noise of the images, for each node; neighbouring nodes are not \
                       independent; enlarged where the window visibly blurs. Errors that all nodes share (drift, \
@@ -32,10 +36,13 @@ const ERRORS_OF_STRIPES: &str = "one standard deviation from the noise of the im
                                  included";
 
 /// What may be written at the top of the folder; folders of which others may have files, too, end with a slash.
-pub const MAP_FILES: [&str; 11] = [
+pub const MAP_FILES: [&str; 14] = [
     "map.json",
     "map.zarr",
     "map.gwy",
+    "undistorted.gwy",
+    "displacement.csv",
+    "cell.csv",
     "report.html",
     "columns.md",
     "regions.csv",
@@ -91,12 +98,18 @@ impl MapFound {
         // First, lest a region beyond the map leave half of the files.
         let (mut details, doubts) = request.questions.ask(map)?;
         // One array at a time; the group and its coordinates are the same every time.
-        for scan in map_scans(map) {
+        let registry = found.registry.as_ref();
+        for scan in map_scans(map, registry) {
             write_scan(&scan, WritableFormat::Zarr, sink)?;
         }
         if map.grid.len() <= MANY {
-            write_scan(&map_scan(map), WritableFormat::Gwy, sink)?;
+            write_scan(&map_scan(map, registry), WritableFormat::Gwy, sink)?;
         }
+        if let Some(pattern) = &found.pattern {
+            write_pattern(pattern, sink)?;
+        }
+        details.pattern.clone_from(&found.pattern);
+        details.registry.clone_from(&found.registry);
         details.picture.clone_from(&found.picture);
         details.domains.clone_from(&found.domains.map);
         details.regime = Some(found.domains.regime.clone());
@@ -110,7 +123,7 @@ impl MapFound {
         };
         results.caveats.extend(doubts.iter().map(Into::into));
         let figures = |colours| map_figures(map, &details, colours);
-        finish(&results, map_tables(&details), figures, choice, sink)?;
+        finish(&results, map_tables(map, &details), figures, choice, sink)?;
         Ok(results)
     }
 
@@ -144,11 +157,35 @@ impl MapFound {
     }
 }
 
+/// The undistorted image for Gwyddion, and it and the averaged cell as groups of their own within the map.
+fn write_pattern(pattern: &MappedPattern, sink: &dyn Sink) -> Result<(), SinkError> {
+    let named = undistorted_scan(pattern, &format!("{} undistorted", pattern.channel));
+    write_all(&files_of(&named, WritableFormat::Gwy, "undistorted")?, sink)?;
+    drop(named);
+    let image = Some(undistorted_scan(pattern, "image"));
+    for (scan, name) in [(image, "undistorted"), (cell_scan(pattern), "cell")] {
+        let Some(scan) = scan else { continue };
+        for (file, bytes) in files_of(&scan, WritableFormat::Zarr, name)? {
+            let within = file.replacen(".zarr", "", 1);
+            sink.write(&format!("map.zarr/{within}"), &bytes)?;
+        }
+    }
+    Ok(())
+}
+
 fn write_scan(scan: &Scan, format: WritableFormat, sink: &dyn Sink) -> Result<(), SinkError> {
+    write_all(&files_of(scan, format, "map")?, sink)
+}
+
+fn files_of(
+    scan: &Scan,
+    format: WritableFormat,
+    stem: &'static str,
+) -> Result<Vec<(String, Vec<u8>)>, SinkError> {
     // The first line of the history of what is written.
     let log = [format!("moiregauge {} map", env!("CARGO_PKG_VERSION"))];
-    let files = spmfile::write_between(scan, format, "map", &log, &interrupt::check);
-    write_all(&files.map_err(|why| SinkError::made("map", why))?, sink)
+    let files = spmfile::write_between(scan, format, stem, &log, &interrupt::check);
+    files.map_err(|why| SinkError::made(stem, why))
 }
 
 fn write_all(files: &[(String, Vec<u8>)], sink: &dyn Sink) -> Result<(), SinkError> {
@@ -168,6 +205,11 @@ fn finish(
     let document = serde_json::to_vec_pretty(results);
     let document = document.map_err(|why| SinkError::made("map", why))?;
     let mut files = vec![("map.json".to_owned(), document)];
+    // The page carries what was asked for, not whole fields.
+    let (fields, tables) = tables
+        .into_iter()
+        .partition::<Vec<_>, _>(|(name, _)| FIELDS.contains(&name.as_str()));
+    write_all(&fields, sink)?;
     files.extend(tables);
     if choice.figures || choice.png || choice.html {
         let figures = figures(choice.colormap);

@@ -4,7 +4,7 @@ use moiregauge::meaning::Source;
 use moiregauge::plan::{Prediction, Quantity};
 use moiregauge::settings::Settings;
 use moiregauge::simulate::Simulation;
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 use super::request::Wishes;
 
@@ -74,53 +74,35 @@ pub struct OutOfReach {
 }
 
 /// What makes most of an error.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Limit {
-    /// Noise of the images.
-    ImageNoise,
-    /// The drift, as far as it will be known.
-    Drift,
-    /// Noise of the position sensors.
-    SensorNoise,
-    /// Calibration: gain common to x and y.
-    Gain,
-    /// Calibration: difference of the gains.
-    Mismatch,
-    /// Calibration: deviation from a right angle.
-    Orthogonality,
-    /// Pitch of the pixels.
-    Pitch,
-    /// The lattice constant.
-    LatticeConstant,
-    /// Which layer is strained.
-    StrainedLayer,
-    /// Isotropic strain.
-    IsotropicStrain,
-    /// The Poisson ratio.
-    PoissonRatio,
+    /// A part of the budget.
+    Of(Source),
     /// Frames that cannot be linked by phases.
     Unlinked,
     /// Times of the frames.
     FrameTimes,
 }
 
-impl From<Source> for Limit {
-    fn from(source: Source) -> Self {
-        match source {
-            Source::Image => Self::ImageNoise,
-            Source::Drift => Self::Drift,
-            Source::Sensor => Self::SensorNoise,
-            Source::Gain => Self::Gain,
-            Source::Mismatch => Self::Mismatch,
-            Source::Orthogonality => Self::Orthogonality,
-            Source::Pitch => Self::Pitch,
-            Source::LatticeConstant => Self::LatticeConstant,
-            Source::StrainedLayer => Self::StrainedLayer,
-            Source::IsotropicStrain => Self::IsotropicStrain,
-            Source::PoissonRatio => Self::PoissonRatio,
-        }
+impl Serialize for Limit {
+    /// Its name.
+    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        to.serialize_str(match self {
+            Self::Of(Source::Image) => "image-noise",
+            Self::Of(Source::Drift) => "drift",
+            Self::Of(Source::Sensor) => "sensor-noise",
+            Self::Of(Source::Gain) => "gain",
+            Self::Of(Source::Mismatch) => "mismatch",
+            Self::Of(Source::Orthogonality) => "orthogonality",
+            Self::Of(Source::Pitch) => "pitch",
+            Self::Of(Source::LatticeConstant) => "lattice-constant",
+            Self::Of(Source::StrainedLayer) => "strained-layer",
+            Self::Of(Source::IsotropicStrain) => "isotropic-strain",
+            Self::Of(Source::PoissonRatio) => "poisson-ratio",
+            Self::Unlinked => "unlinked",
+            Self::FrameTimes => "frame-times",
+        })
     }
 }
 
@@ -155,7 +137,7 @@ pub(super) fn beyond(prediction: &Prediction, quantity: Quantity, wish: f64) -> 
 
 fn limit(p: &Prediction, wishes: &Wishes) -> Option<Limit> {
     let of = |quantity: Quantity, wish: f64| {
-        let largest = p.largest(quantity).into();
+        let largest = Limit::Of(p.largest(quantity));
         (p.sigma(quantity, |_| true) / wish, largest)
     };
     let twist = wishes.twist_deg.map(f64::to_radians);
@@ -177,7 +159,7 @@ fn of_drift(p: &Prediction) -> Limit {
     } else if p.drift_sigma_with_clock() < CLEARLY * p.drift_sigma() {
         Limit::FrameTimes
     } else {
-        Limit::ImageNoise
+        Limit::Of(Source::Image)
     }
 }
 
@@ -197,7 +179,7 @@ fn out_of_reach(p: &Prediction, wishes: &Wishes) -> Vec<OutOfReach> {
             is_twist: quantity == Quantity::Twist,
             wish,
             floor: unit * p.sigma(quantity, |s| !s.is_statistical()),
-            largest: largest.into(),
+            largest: Limit::Of(largest),
             largest_sigma: by(largest),
         })
     };

@@ -3,10 +3,10 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use super::done::SamplesDone;
 use super::error::{SamplesError, at};
 use super::list::{List, Listed, PARTS, Shard, lists_in};
 use super::part::{Part, part_name, picture_name};
-use super::run::SamplesDone;
 use super::tables;
 use crate::job::Job;
 use crate::sink::FileSink;

@@ -10,6 +10,7 @@
 //! page are made from the parts alone, so that they have the same bytes however often a run was interrupted and
 //! however it was divided. [`merge`] joins the parts of several folders.
 
+mod done;
 mod error;
 mod find;
 mod list;
@@ -20,9 +21,10 @@ mod run;
 mod shown;
 mod tables;
 
+pub use done::SamplesDone;
 pub use error::SamplesError;
 pub use find::{Sample, samples_in, samples_of_table};
 pub use list::Shard;
 pub use merge::{Merge, merge};
-pub use run::{Samples, SamplesDone, analyse_samples, analyse_some, give_up};
+pub use run::{Samples, analyse_samples, analyse_some, give_up};
 pub use shown::{SamplesShown, samples_shown};

@@ -7,6 +7,7 @@ use moiregauge_report::results::Told;
 use moiregauge_report::{ColorMap, FailedInput, SampleRow};
 use rayon::prelude::*;
 
+use super::done::SamplesDone;
 use super::error::SamplesError;
 use super::find::Sample;
 use super::list::{Asked, List, Listed, PARTS, Shard};
@@ -27,19 +28,6 @@ pub struct Samples {
     shard: Shard,
     advice: Advice,
     colours: ColorMap,
-}
-
-/// How many samples ended how.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct SamplesDone {
-    /// With numbers.
-    pub ok: usize,
-    /// With numbers that are doubtful.
-    pub doubtful: usize,
-    /// Without numbers.
-    pub failed: usize,
-    /// Those of them that an earlier run had done.
-    pub done_before: usize,
 }
 
 impl Samples {

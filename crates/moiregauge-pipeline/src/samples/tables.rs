@@ -2,14 +2,12 @@
 
 use std::path::Path;
 
-use moiregauge_report::{
-    SampleRow, SampleStatus, SamplesPage, failed_csv, samples_csv, samples_page,
-};
+use moiregauge_report::{SampleRow, SamplesPage, failed_csv, samples_csv, samples_page};
 
+use super::done::SamplesDone;
 use super::error::SamplesError;
 use super::list::{List, PARTS};
 use super::part::{Part, picture_name};
-use super::run::SamplesDone;
 use crate::sink::{FolderSink, Target};
 
 /// What is written beside the parts.
@@ -79,22 +77,4 @@ pub(super) fn read(
         pictures.resize(pictures.len() + count - 1, None);
     }
     Ok((rows, pictures))
-}
-
-impl SamplesDone {
-    /// Counts of rows; those of a sample of several moirés by the worst.
-    pub(super) fn of(rows: &[SampleRow]) -> Self {
-        let mut done = Self::default();
-        for sample in rows.chunk_by(|a, b| a.sample == b.sample) {
-            let is = |status| sample.iter().any(|row| row.status == status);
-            if is(SampleStatus::Failed) {
-                done.failed += 1;
-            } else if is(SampleStatus::Doubtful) {
-                done.doubtful += 1;
-            } else {
-                done.ok += 1;
-            }
-        }
-        done
-    }
 }

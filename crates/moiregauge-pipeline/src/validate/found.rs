@@ -8,7 +8,7 @@ use moiregauge_report::pulls;
 use serde::Serialize;
 
 use super::compare::{Compared, Comparison, QUANTITIES};
-use super::run::ValidateRequest;
+use super::request::ValidateRequest;
 use crate::sink::{Sink, SinkError};
 
 /// Whatever a figure or a document cannot be made for.

@@ -4,6 +4,7 @@ mod compare;
 mod error;
 mod found;
 mod like;
+mod request;
 mod run;
 mod samples;
 
@@ -12,7 +13,8 @@ pub use error::ValidateError;
 pub use found::{QuantityFound, VALIDATION_FILES, Validation};
 pub(crate) use like::conditions_of;
 pub use like::{LikeError, conditions_like};
-pub use run::{ValidateRequest, validate};
+pub use request::ValidateRequest;
+pub use run::validate;
 pub use samples::{
     Answer, Outcome, SAMPLES_FILE, SamplesRequest, Tallies, Tally, validate_samples,
 };

@@ -15,7 +15,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::error::ValidateError;
-use super::run::{ValidateRequest, check_sets};
+use super::request::{ValidateRequest, check_sets};
 use crate::job::Job;
 use crate::sink::{Sink, SinkError};
 

@@ -14,6 +14,7 @@
 
 mod files;
 mod line;
+mod mean;
 mod next;
 mod request;
 mod run;
@@ -21,7 +22,8 @@ mod tell;
 mod until;
 mod warnings;
 
-pub use line::{Happened, Line, LineDrift, Mean, Number, Point, line_schema};
+pub use line::{Happened, Line, LineDrift, Point, line_schema};
+pub use mean::{Mean, Number};
 pub use next::Next;
 pub use request::{WatchError, WatchRequest};
 pub use run::Watch;

@@ -8,7 +8,7 @@ use moiregauge::simulate::Simulation;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::line::{Mean, Number};
+use super::mean::{Mean, Number};
 use super::until::Until;
 use crate::validate::conditions_of;
 

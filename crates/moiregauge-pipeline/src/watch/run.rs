@@ -16,9 +16,9 @@ use crate::opened::Opened;
 /// A folder that is watched.
 #[derive(Clone, Debug)]
 pub struct Watch {
-    pub(super) request: WatchRequest,
+    request: WatchRequest,
     files: Files,
-    pub(super) campaign: Campaign,
+    campaign: Campaign,
     advice: Advice,
     history: Vec<Point>,
     /// The last line with numbers of each moiré, for what happens to the folder.
@@ -26,7 +26,7 @@ pub struct Watch {
     /// Steps so far.
     steps: usize,
     /// The file of the last line about a set, for events that belong to none.
-    pub(super) last: Option<String>,
+    last: Option<String>,
     reached: bool,
     /// What was seen and not told, since the step was stopped.
     untold: Option<Seen>,
@@ -215,7 +215,8 @@ impl Watch {
     fn lines(&self, outcomes: &[Outcome], happened: &Happenings, seen: &Seen) -> Vec<Line> {
         let mut lines = Vec::new();
         for (number, outcome) in outcomes.iter().enumerate() {
-            let mut of = OfMoire::new(self, outcome, seen);
+            let last = self.last.as_deref();
+            let mut of = OfMoire::new(&self.request, &self.campaign, last, outcome, seen);
             for (event, files, error) in happened {
                 let names: Vec<String> = files.iter().map(|path| in_words(path)).collect();
                 for (set, files) in of.shares(*event, names) {

@@ -6,19 +6,22 @@ use moiregauge_report::results::{ResultCaveat, SetResult};
 use moiregauge_report::{FailedInput, Results, two_digits};
 
 use super::files::Seen;
-use super::line::{Happened, Line, Mean, used};
+use super::line::{Happened, Line, used};
+use super::mean::Mean;
 use super::next::{Next, Outlook, is_out_of_reach};
-use super::run::Watch;
+use super::request::WatchRequest;
 use super::until::UntilState;
 use super::warnings;
-use crate::campaign::Outcome;
+use crate::campaign::{Campaign, Outcome};
 
 /// Errors that two more frames make smaller by less than this share are hardly worth the time of two frames.
 const HARDLY: f64 = 0.05;
 
 /// The numbers of one moiré, for all lines of a step.
 pub(super) struct OfMoire<'a> {
-    watch: &'a Watch,
+    request: &'a WatchRequest,
+    /// The file of the last line about a set.
+    last: Option<&'a str>,
     analysis: &'a Analysis,
     results: Results,
     seen: &'a Seen,
@@ -26,17 +29,24 @@ pub(super) struct OfMoire<'a> {
 }
 
 impl<'a> OfMoire<'a> {
-    pub(super) fn new(watch: &'a Watch, outcome: &'a Outcome, seen: &'a Seen) -> Self {
+    pub(super) fn new(
+        request: &'a WatchRequest,
+        campaign: &'a Campaign,
+        last: Option<&'a str>,
+        outcome: &'a Outcome,
+        seen: &'a Seen,
+    ) -> Self {
         // Which of several lattices of a file is which, and what a region leaves of it, is not known here.
-        let settings = &watch.request.settings;
+        let settings = &request.settings;
         let plain = settings.moires == 1 && !settings.overlap;
         Self {
-            watch,
+            request,
+            last,
             analysis: &outcome.analysis,
             results: Results::new(&outcome.analysis, &outcome.provenance),
             seen,
             scans: if plain {
-                watch.campaign.behind(outcome)
+                campaign.behind(outcome)
             } else {
                 Vec::new()
             },
@@ -55,7 +65,7 @@ impl<'a> OfMoire<'a> {
         event: Happened,
         files: Vec<String>,
     ) -> Vec<(Option<usize>, Vec<String>)> {
-        let before = self.watch.last.as_ref().and_then(|file| self.set_of(file));
+        let before = self.last.and_then(|file| self.set_of(file));
         let usual = before.or_else(|| self.analysis.sets.len().checked_sub(1));
         if !matches!(event, Happened::Start | Happened::New | Happened::Again) {
             return vec![(usual, files)];
@@ -136,7 +146,7 @@ impl<'a> OfMoire<'a> {
         };
         let outlook = Outlook::new(set, &self.scans, frames, best, &self.analysis.settings);
         line.next = outlook.as_ref().and_then(Outlook::next);
-        let wanted = self.watch.request.until;
+        let wanted = self.request.until;
         if wanted.is_any() {
             let reached = wanted.is_met_by(&best);
             let out_of_reach = is_out_of_reach(&wanted, &best);

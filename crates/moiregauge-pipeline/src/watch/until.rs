@@ -5,7 +5,7 @@ use std::str::FromStr;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::line::Mean;
+use super::mean::Mean;
 
 /// Errors that can be wished for, in any unit.
 const WISH: [f64; 2] = [1e-9, 1e6];

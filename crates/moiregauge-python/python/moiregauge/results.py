@@ -57,6 +57,7 @@ __all__ = [
     "MaskCount",
     "MaskShare",
     "Material",
+    "MeanCellResult",
     "MeanResult",
     "Method",
     "MoireLayers",
@@ -64,12 +65,14 @@ __all__ = [
     "NamedSet",
     "NamesResult",
     "OtherSenseResult",
+    "PatternResult",
     "Provenance",
     "QuantityResult",
     "ReadingsResult",
     "RegimeResult",
     "RegionMeanResult",
     "RegionResult",
+    "RegistryResult",
     "ResidualResult",
     "Results",
     "Run",
@@ -97,6 +100,7 @@ __all__ = [
     "TrendResult",
     "TwistSense",
     "TwistStrainResult",
+    "UndistortedResult",
     "WantedResult",
     "Window",
 ]
@@ -720,10 +724,16 @@ class MapDetailsResult(Document):
     """The most uniform areas of the wanted size, best first."""
     domains: DomainsResult | None
     """Domain structure, where it was looked for and found."""
+    pattern: PatternResult | None = None
+    """The pattern of the first image: undistorted, and its averaged cell; nothing where phases are not
+    followed.
+    """
     regime: RegimeResult | None
     """Whether the maps or the triangles are to be used."""
     regions: tuple[RegionResult, ...]
     """Boxes and polygons."""
+    registry: RegistryResult | None = None
+    """What the registry of the layers in `displacement.csv` and `map.zarr` counts from."""
     wanted: WantedResult | None
     """How much of the map has the wanted twist."""
 
@@ -844,6 +854,20 @@ class Material(Document):
     """Standard uncertainty of the Poisson ratio."""
     source: str
     """Where the numbers come from."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class MeanCellResult(Document):
+    """The averaged cell."""
+
+    bins: int
+    """Bins along each vector."""
+    cells: int
+    """Moiré cells of the image with pixels in it."""
+    pixels: int
+    """Pixels that were averaged."""
+    sigma: float | None
+    """Root mean square of the standard errors of the bins, unit of the channel."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -970,6 +994,34 @@ class OtherSenseResult(Document):
     """Twist of layer 2 against layer 1."""
     twist_interval_deg: tuple[float | None, float | None]
     """Range of the magnitude of the twist from both readings, with 1.96 σ of `total` on either side."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class PatternResult(Document):
+    """The pattern of one image as its map shows it."""
+
+    cell: MeanCellResult | None
+    """The averaged cell; nothing where fewer than two cells of the image are known."""
+    channel: str
+    """The channel."""
+    drift_corrected: bool
+    """Whether the drift is taken off."""
+    file: str
+    """The file as the user named it."""
+    lattice_vectors_nm: tuple[tuple[float, float], tuple[float, float]]
+    """L₁ and L₂ of the mean lattice, nm."""
+    line: str
+    """`trace` or `retrace`."""
+    node_nm: tuple[float, float]
+    """A node of the mean lattice, nm: corners of the averaged cell are such nodes."""
+    nodes_are: str
+    """`bright` or `dark`: what the nodes are."""
+    undistorted: UndistortedResult
+    """The image with the displacement of its pattern taken off. Resampled to be shown: nothing is measured
+    from it.
+    """
+    unit: str
+    """Its unit."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -1107,6 +1159,28 @@ class RegionResult(Document):
     """Twist, degrees."""
     wavelength_nm: RegionMeanResult | None
     """Mean wavelength, nm."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RegistryResult(Document):
+    """The registry of the layers: what its numbers in `displacement.csv` and `map.zarr` count from."""
+
+    convention: str
+    """What it is, and how signs and zero are chosen."""
+    layer_1_vectors_nm: tuple[tuple[float, float], tuple[float, float]]
+    """Atomic vectors a₁ and a₂ of layer 1 (A as columns), nm."""
+    moire_vectors_nm: tuple[tuple[float, float], tuple[float, float]]
+    """Moiré vectors of the same names (L as columns), nm: along each the registry changes by minus one vector
+    of layer 1.
+    """
+    nodes: int
+    """Nodes of the map where it is known."""
+    sigma_nm: float | None
+    """Root mean square error of a component, nm."""
+    zero_is: str
+    """`bright` or `dark`: what that node is."""
+    zero_nm: tuple[float, float]
+    """r₀, the node of the pattern where the registry is zero, nm."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -1653,6 +1727,20 @@ class TwistStrainResult(Document):
     """
     twist_deg: Estimate
     """Twist of layer 2 against layer 1, degrees."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class UndistortedResult(Document):
+    """The undistorted image."""
+
+    known_percent: float
+    """Share of its pixels that are not missing."""
+    origin_nm: tuple[float, float]
+    """Its bottom left pixel, nm."""
+    pitch_nm: float
+    """Distance of its pixels, nm."""
+    pixels: tuple[int, int]
+    """Columns and rows."""
 
 
 @dataclass(frozen=True, kw_only=True)

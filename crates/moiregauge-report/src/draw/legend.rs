@@ -64,6 +64,15 @@ pub(crate) fn directions() -> [(Key<'static>, &'static str); 2] {
     ]
 }
 
+/// The keys of the three lattice vectors, and of the directions of scans.
+pub(crate) fn vectors_and_directions(svg: &mut Svg, start: (f64, f64)) {
+    row(
+        svg,
+        start,
+        &vectors().chain(directions()).collect::<Vec<_>>(),
+    );
+}
+
 /// The keys of the three lattice vectors.
 pub(crate) fn vectors() -> impl Iterator<Item = (Key<'static>, &'static str)> {
     (0..3).map(|v| {

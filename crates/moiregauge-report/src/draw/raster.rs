@@ -26,12 +26,7 @@ pub(crate) struct Shades {
 
 /// The range from the `share` quantile to the `1 − share` quantile of the finite values.
 pub(crate) fn contrast(image: &Image, share: f64) -> Range {
-    let mut values: Vec<f64> = image
-        .values
-        .iter()
-        .copied()
-        .filter(|v| v.is_finite())
-        .collect();
+    let mut values = image.finite();
     values.sort_by(f64::total_cmp);
     let at = |q: f64| values.get(((values.len().max(1) - 1) as f64 * q).round() as usize);
     match (at(share), at(1.0 - share)) {

@@ -4,15 +4,23 @@ use moiregauge::map::TwistStrainMap;
 
 use super::figure::{Drawing, Figure};
 use super::subject::MapSubject;
-use super::{map_domains, map_fields, map_histograms, map_image, map_mask, map_profiles};
+use super::{
+    map_domains, map_fields, map_histograms, map_image, map_mask, map_pattern, map_profiles,
+};
 use crate::draw::colormap::ColorMap;
 use crate::map_details::MapDetails;
 
 type Draw = fn(&MapSubject) -> Result<Drawing, String>;
 
 /// The image first, then the maps; what was asked of them is drawn in a figure of its own.
-const ALL: [(&str, &str, Draw); 11] = [
+const ALL: [(&str, &str, Draw); 13] = [
     ("map-image", "Image", map_image::draw),
+    (
+        "map-undistorted",
+        "Undistorted image",
+        map_pattern::undistorted,
+    ),
+    ("map-cell", "Averaged moiré cell", map_pattern::cell),
     ("map-twist", "Twist", map_fields::twist),
     ("map-strain", "Heterostrain", map_fields::strain),
     (

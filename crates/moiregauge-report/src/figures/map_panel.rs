@@ -117,7 +117,7 @@ impl Panel {
 }
 
 /// A bar of a round length in the lower left corner.
-fn scale_bar(svg: &mut Svg, axes: &Axes) {
+pub(super) fn scale_bar(svg: &mut Svg, axes: &Axes) {
     let (x, y) = (axes.x.range, axes.y.range);
     let length = round_step(0.3 * x.width());
     let (left, bottom) = (x.low + 0.05 * x.width(), y.low + 0.05 * x.width());

@@ -19,6 +19,7 @@ mod map_histograms;
 mod map_image;
 mod map_mask;
 mod map_panel;
+mod map_pattern;
 mod map_profiles;
 mod map_stripes;
 mod parameters;

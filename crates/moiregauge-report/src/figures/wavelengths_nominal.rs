@@ -81,8 +81,7 @@ pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
             axes.draw(&mut svg, &labels);
         }
     }
-    let keys: Vec<_> = legend::vectors().chain(legend::directions()).collect();
-    legend::row(&mut svg, (layout::LEFT, 11.0), &keys);
+    legend::vectors_and_directions(&mut svg, (layout::LEFT, 11.0));
     Ok(Drawing {
         wide: true,
         svg: svg.finish("Wavelengths and naive twist, nominal against sensor"),

@@ -18,8 +18,10 @@ use crate::tables::COMMON;
 const TEMPLATE: &str = include_str!("map.html");
 
 /// Figures before the numbers; a map of stripes has its own.
-const FIRST: [&str; 5] = [
+const FIRST: [&str; 7] = [
     "map-image",
+    "map-undistorted",
+    "map-cell",
     "map-twist",
     "map-strain",
     "map-overlays",

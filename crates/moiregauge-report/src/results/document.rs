@@ -20,9 +20,10 @@ use super::conventions::Conventions;
 use super::convert::{PER_MINUTE, PERCENT, correlation, degree, estimate, estimate_in_all, number};
 use super::estimate::ResultEstimate;
 use super::lattice::{LatticeVector, TwistStrainResult};
+use super::provenance::Provenance;
 use super::readings::{AtomicResult, ReadingsResult};
 use super::scan::ScanResult;
-use crate::provenance::{FailedInput, InputFile, Provenance};
+use crate::input::{FailedInput, InputFile};
 use crate::stats::mean_and_deviation;
 
 /// Name and version of the document.

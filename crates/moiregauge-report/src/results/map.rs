@@ -10,8 +10,8 @@ use serde::{Deserialize, Serialize};
 use super::caveat::ResultCaveat;
 use super::conventions::Conventions;
 use super::lattice::TwistStrainResult;
+use super::provenance::Provenance;
 use super::quantity::{QuantityResult, TrendResult};
-use crate::provenance::Provenance;
 
 /// What a map comes to.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]

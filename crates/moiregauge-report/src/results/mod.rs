@@ -14,7 +14,9 @@ mod estimate;
 mod joint;
 mod lattice;
 mod map;
+mod pattern;
 mod profile;
+mod provenance;
 mod quantity;
 mod readings;
 mod region;
@@ -40,7 +42,9 @@ pub use map::{
     AgreementResult, DriftChangeResult, HarmonicResult, MapResults, MappedImage, MaskCount,
     mask_counts, quantities,
 };
+pub use pattern::{MeanCellResult, PatternResult, RegistryResult, UndistortedResult};
 pub use profile::{ProfilePointResult, ProfileResult};
+pub use provenance::Provenance;
 pub use quantity::{QuantityResult, TrendResult};
 pub use readings::{
     AtomicResult, IsotropicStrainResult, NameResult, NamesResult, OtherSenseResult, ReadingsResult,

@@ -22,6 +22,12 @@ pub struct MapDetailsResult {
     pub domains: Option<super::domains::DomainsResult>,
     /// Whether the maps or the triangles are to be used.
     pub regime: Option<super::domains::RegimeResult>,
+    /// The pattern of the first image: undistorted, and its averaged cell; nothing where phases are not followed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pattern: Option<super::pattern::PatternResult>,
+    /// What the registry of the layers in `displacement.csv` and `map.zarr` counts from.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub registry: Option<super::pattern::RegistryResult>,
 }
 
 /// Mean and spread of a quantity over an area.
@@ -191,6 +197,8 @@ impl From<&MapDetails> for MapDetailsResult {
             wanted: details.wanted.as_ref().map(wanted),
             domains: details.domains.as_ref().map(Into::into),
             regime: details.regime.as_ref().map(Into::into),
+            pattern: details.pattern.as_ref().map(Into::into),
+            registry: details.registry.as_ref().map(Into::into),
         }
     }
 }

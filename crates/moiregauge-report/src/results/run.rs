@@ -5,7 +5,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::choice::Choice;
-use crate::provenance::{FailedInput, InputFile};
+use crate::input::{FailedInput, InputFile};
 
 /// A run of the program: what a repetition needs beside the files themselves.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]

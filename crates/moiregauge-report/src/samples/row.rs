@@ -6,7 +6,8 @@ use moiregauge::campaign::{Analysis, refusal};
 use moiregauge::caveat::Severity;
 use serde::{Deserialize, Serialize};
 
-use crate::provenance::{FailedInput, Provenance};
+use crate::input::FailedInput;
+use crate::results::Provenance;
 use crate::results::{DriftResult, Results, TwistStrainResult};
 
 /// Whether the numbers of a sample can be used.

@@ -83,7 +83,7 @@ pub fn samples_csv(rows: &[SampleRow]) -> Vec<u8> {
 /// # Errors
 /// None in practice: everything is written into memory.
 #[cfg(feature = "parquet")]
-pub fn samples_parquet(rows: &[SampleRow]) -> Result<Vec<u8>, crate::ReportError> {
+pub fn samples_parquet(rows: &[SampleRow]) -> Result<Vec<u8>, crate::error::ReportError> {
     crate::tables::parquet_of(&COLUMNS, rows)
 }
 

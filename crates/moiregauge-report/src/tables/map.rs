@@ -4,7 +4,7 @@
 //! them are to be believed (0). `x` and `y` of each node are channels too, since a frame may be sheared and the
 //! axes of a file are not.
 
-use moiregauge::map::{Plane, TwistStrainMap};
+use moiregauge::map::{Plane, RegistryMap, TwistStrainMap};
 use nalgebra::Vector2;
 use spmfile::{Channel, Samples, Scan, Span};
 
@@ -17,9 +17,10 @@ pub(super) enum Shown<'a> {
     Position(usize),
 }
 
-/// The map as a scan of all its quantities; its axes run along the rows and columns of nodes.
-pub fn map_scan(map: &TwistStrainMap) -> Scan {
-    scan_of(map, shown(map))
+/// The map as a scan of all its quantities, the registry among them where there is one; its axes run along the rows and
+/// columns of nodes.
+pub fn map_scan(map: &TwistStrainMap, registry: Option<&RegistryMap>) -> Scan {
+    scan_of(map, shown(map, registry))
 }
 
 /// Named quantities of a map as a scan.
@@ -31,16 +32,22 @@ pub(super) fn scan_of(map: &TwistStrainMap, all: Vec<(String, &'static str, Show
 }
 
 /// The same one quantity at a time, for maps of which memory holds no second copy.
-pub fn map_scans(map: &TwistStrainMap) -> impl Iterator<Item = Scan> + '_ {
-    let all = shown(map).into_iter();
+pub fn map_scans<'a>(
+    map: &'a TwistStrainMap,
+    registry: Option<&'a RegistryMap>,
+) -> impl Iterator<Item = Scan> + 'a {
+    let all = shown(map, registry).into_iter();
     all.map(|(name, unit, shown)| scan(map, vec![channel(map, &name, unit, shown)]))
 }
 
-fn shown(map: &TwistStrainMap) -> Vec<(String, &'static str, Shown<'_>)> {
+fn shown<'a>(
+    map: &'a TwistStrainMap,
+    registry: Option<&'a RegistryMap>,
+) -> Vec<(String, &'static str, Shown<'a>)> {
     let mut all = Vec::new();
     let degree = 1f64.to_degrees();
     let [l1, l2, l3] = &map.wavelengths;
-    let planes: [(&str, &'static str, &Plane, f64); 12] = [
+    let mut planes: Vec<(&str, &'static str, &Plane, f64)> = vec![
         ("twist", "°", &map.twist, degree),
         ("strain", "%", &map.magnitude, 100.0),
         ("strain axis", "°", &map.axis, degree),
@@ -54,6 +61,10 @@ fn shown(map: &TwistStrainMap) -> Vec<(String, &'static str, Shown<'_>)> {
         ("displacement x", "nm", &map.displacement[0], 1.0),
         ("displacement y", "nm", &map.displacement[1], 1.0),
     ];
+    if let Some(found) = registry {
+        planes.push(("registry x", "nm", &found.registry[0], 1.0));
+        planes.push(("registry y", "nm", &found.registry[1], 1.0));
+    }
     for (name, unit, plane, factor) in planes {
         all.push((name.to_owned(), unit, Shown::Values(&plane.value, factor)));
         all.push((
@@ -75,6 +86,10 @@ fn shown(map: &TwistStrainMap) -> Vec<(String, &'static str, Shown<'_>)> {
     ];
     for (name, unit, values, factor) in plain {
         all.push((name.to_owned(), unit, Shown::Values(values, factor)));
+    }
+    if let Some(found) = registry {
+        let values = Shown::Values(&found.covariance, 1.0);
+        all.push(("registry covariance".to_owned(), "nm²", values));
     }
     all.push(("mask".to_owned(), "", Shown::Mask));
     all.push(("position x".to_owned(), "nm", Shown::Position(0)));

@@ -11,6 +11,7 @@ mod domains;
 mod map;
 #[cfg(feature = "parquet")]
 mod parquet;
+mod pattern;
 mod region;
 mod results;
 mod stripes;
@@ -19,6 +20,7 @@ pub(crate) use csv::{Column, number, text as csv_text};
 pub use map::{map_scan, map_scans};
 #[cfg(feature = "parquet")]
 pub(crate) use parquet::{parquet_of, parquet_tables};
+pub use pattern::{cell_scan, undistorted_scan};
 pub(crate) use region::COMMON;
 pub use region::map_tables;
 pub use results::tables;

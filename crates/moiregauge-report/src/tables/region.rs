@@ -1,15 +1,20 @@
-//! `regions.csv`, `devices.csv`, `profiles.csv` of a map.
+//! `regions.csv`, `devices.csv`, `profiles.csv` and the other tables of a map.
 
+use moiregauge::map::TwistStrainMap;
 use moiregauge::region::ProfilePoint;
 
 use super::columns::columns;
 use super::csv::{APOSTROPHE, Column, explanation, number, text};
 use super::domains::{CELL, CellRow, NODE, NodeRow};
+use super::pattern::{BIN_ABOUT, Bin, FIELD_ABOUT, NodeOfField};
 use crate::map_details::MapDetails;
 use crate::results::{DeviceResult, MapDetailsResult, RegionMeanResult, RegionResult};
 
-/// The tables of what was asked of a map; those without rows are left out.
-pub fn map_tables(details: &MapDetails) -> Vec<(String, Vec<u8>)> {
+/// With more nodes than this there is no `displacement.csv`: text of that size helps nobody, and `map.zarr` has it all.
+const MANY: usize = 250_000;
+
+/// The tables of a map; those without rows are left out.
+pub fn map_tables(map: &TwistStrainMap, details: &MapDetails) -> Vec<(String, Vec<u8>)> {
     let found = MapDetailsResult::from(details);
     let mut files = Vec::new();
     let mut about = format!("{ABOUT}{COMMON}\n\n{APOSTROPHE}\n");
@@ -60,6 +65,25 @@ pub fn map_tables(details: &MapDetails) -> Vec<(String, Vec<u8>)> {
         let rows: Vec<NodeRow> = (0..map.nodes.len()).map(|n| NodeRow::new(map, n)).collect();
         let what = "One row per node.";
         add(&mut files, &mut about, "nodes.csv", what, NODE, &rows);
+    }
+    if let Some(registry) = details.registry.as_ref().filter(|_| map.grid.len() <= MANY) {
+        let rows = NodeOfField::all(map, registry);
+        let (what, columns) = (FIELD_ABOUT, NodeOfField::COLUMNS);
+        add(
+            &mut files,
+            &mut about,
+            "displacement.csv",
+            what,
+            columns,
+            &rows,
+        );
+    }
+    if let Some(cell) = details.pattern.as_ref().and_then(|p| p.cell.as_ref()) {
+        let rows = Bin::all(cell);
+        let columns = Bin::COLUMNS;
+        add(
+            &mut files, &mut about, "cell.csv", BIN_ABOUT, columns, &rows,
+        );
     }
     if !files.is_empty() {
         files.push(("columns.md".to_owned(), about.into_bytes()));

@@ -19,7 +19,7 @@ use moiregauge_pipeline::{Job, conditions_on, moire, plan, settings_on};
 use serde::Deserialize;
 use serde_json::{Map, Value, json};
 
-use super::beside;
+use super::beside::beside;
 use crate::app::{App, Shared};
 use crate::body::document;
 use crate::problem::{Answer, Problem};

@@ -2,16 +2,16 @@
 
 use axum::Json;
 use axum::extract::{Query, State};
-use moiregauge_pipeline::{Known, Places, find, names};
+use moiregauge_pipeline::{Known, find, names};
 use moiregauge_report::results::Told;
 use serde::Deserialize;
 use serde_json::{Value, json};
 
-use super::beside;
+use super::beside::beside;
 use crate::app::Shared;
 use crate::paths::below;
 use crate::problem::{Answer, Problem};
-use crate::roots::File;
+use crate::roots::{File, places};
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -95,17 +95,6 @@ pub(crate) fn known(files: &[File], told: &Told) -> Answer<Known> {
     }
     let names: Vec<_> = files.iter().map(|file| file.name.clone()).collect();
     Ok(Known::new(told, &names).at(&places(files)))
-}
-
-/// Where files are that are not where their names say.
-pub(crate) fn places(files: &[File]) -> Places {
-    let mut places = Places::new();
-    for file in files {
-        if file.name != file.place {
-            places.insert(file.name.clone(), file.place.clone());
-        }
-    }
-    places
 }
 
 /// What the program tells of a file, and the rest of its header.

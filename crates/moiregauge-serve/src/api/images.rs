@@ -10,8 +10,9 @@ use moiregauge_report::ColorMap;
 use serde::Deserialize;
 use spmfile::{Channel, Scan};
 
+use super::beside::beside;
+use super::binary;
 use super::files::known_of;
-use super::{beside, binary};
 use crate::app::{App, Shared};
 use crate::problem::{Answer, Problem};
 

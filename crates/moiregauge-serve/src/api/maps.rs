@@ -10,14 +10,13 @@ use axum::routing::{get, post};
 use axum::{Json, Router};
 use moiregauge_pipeline::campaign::Kept;
 use moiregauge_pipeline::maps::{MapRequest, Questions, Shown};
-use moiregauge_pipeline::sink::archive;
 use moiregauge_pipeline::view::{Part, blocks};
 use moiregauge_report::results::{MapDetailsResult, ProfileResult, ResultCaveat};
 use serde::Deserialize;
 use serde_json::{Map, Value, json};
 
-use super::works::{of_results, zipped};
-use super::{beside, binary};
+use super::beside::beside;
+use super::{binary, written};
 use crate::app::{App, Shared};
 use crate::body::document;
 use crate::problem::{Answer, Problem};
@@ -150,31 +149,17 @@ async fn ask(
 }
 
 async fn outputs(State(app): Shared, Path(id): Path<String>) -> Answer<Json<Value>> {
-    beside(move || {
-        let all = app.maps.get(&id)?.mapped()?.written()?;
-        let all = all
-            .iter()
-            .map(|(name, bytes)| json!({"name": name, "bytes": bytes.len()}));
-        Ok(Json(all.collect()))
-    })
-    .await
+    beside(move || Ok(written::listed(&*app.maps.get(&id)?.mapped()?.written()?))).await
 }
 
 async fn output(State(app): Shared, Path((id, name)): Path<(String, String)>) -> Answer {
-    beside(move || {
-        let all = app.maps.get(&id)?.mapped()?.written()?;
-        let bytes = all.get(&name).cloned();
-        let bytes = bytes.ok_or_else(|| Problem::missing("no such file of results").at(&name))?;
-        Ok(of_results(&name, bytes))
-    })
-    .await
+    beside(move || written::one(&*app.maps.get(&id)?.mapped()?.written()?, &name)).await
 }
 
 async fn zip(State(app): Shared, Path(id): Path<String>) -> Answer {
     beside(move || {
         let all = app.maps.get(&id)?.mapped()?.written()?;
-        let bytes = archive(&all).map_err(Problem::fault)?;
-        Ok(zipped("attachment; filename=\"map.zip\"", bytes))
+        written::zipped(&all, "attachment; filename=\"map.zip\"")
     })
     .await
 }

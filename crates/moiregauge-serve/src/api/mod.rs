@@ -1,6 +1,7 @@
 //! The routes.
 
 mod asks;
+mod beside;
 mod binary;
 mod files;
 mod images;
@@ -9,8 +10,7 @@ mod session;
 mod upload;
 mod watches;
 mod works;
-
-pub(crate) use files::places;
+mod written;
 
 use std::sync::Arc;
 
@@ -71,12 +71,4 @@ async fn events(State(app): Shared, headers: HeaderMap) -> Response {
     Arc::clone(&app.events)
         .stream(heard, app.stop.clone())
         .into_response()
-}
-
-/// Work that reads files or calculates, beside the threads that answer.
-pub(crate) async fn beside<T: Send + 'static>(
-    work: impl FnOnce() -> Answer<T> + Send + 'static,
-) -> Answer<T> {
-    let done = tokio::task::spawn_blocking(work).await;
-    done.unwrap_or_else(|_| Err(Problem::fault("a fault of moiregauge, please report it")))
 }

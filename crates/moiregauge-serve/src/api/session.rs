@@ -8,8 +8,9 @@ use axum::response::{IntoResponse as _, Response};
 use serde::Deserialize;
 use serde_json::{Value, json};
 
-use crate::app::{Shared, lock};
+use crate::app::Shared;
 use crate::body::document;
+use crate::lock::lock;
 use crate::problem::{Answer, Problem};
 
 #[derive(Deserialize)]

@@ -11,7 +11,7 @@ use serde::Deserialize;
 use serde_json::{Value, json};
 use tempfile::NamedTempFile;
 
-use super::beside;
+use super::beside::beside;
 use crate::app::Shared;
 use crate::body::{pieces, too_long};
 use crate::problem::{Answer, Problem};

@@ -14,7 +14,7 @@ use moiregauge_report::results::Told;
 use serde::Deserialize;
 use serde_json::{Map, Value};
 
-use super::beside;
+use super::beside::beside;
 use crate::app::{App, Shared};
 use crate::body::document;
 use crate::problem::{Answer, Problem};

@@ -4,27 +4,23 @@ use std::sync::Arc;
 
 use axum::body::Body;
 use axum::extract::{Path, Query, State};
-use axum::http::{HeaderMap, HeaderName, HeaderValue, header};
-use axum::response::{IntoResponse as _, Response};
+use axum::http::{HeaderMap, header};
+use axum::response::IntoResponse as _;
 use axum::routing::{get, post};
 use axum::{Json, Router};
 use moiregauge_pipeline::choices::{self, grains};
-use moiregauge_pipeline::sink::archive;
 use moiregauge_pipeline::view::{FitView, fit_of, overlays};
 use serde::Deserialize;
 use serde_json::{Value, json};
 use spmfile::LineDirection;
 
+use super::beside::beside;
 use super::files::known;
-use super::{beside, binary};
+use super::{binary, written};
 use crate::app::{App, Shared};
 use crate::body::document;
 use crate::problem::{Answer, Problem};
 use crate::work::{Asked, Change, Work, command};
-
-/// Pages and pictures of results: their own styles, and nothing else that runs or loads.
-const OF_RESULTS: &str = "sandbox; default-src 'none'; img-src data:; style-src 'unsafe-inline'; font-src data:; \
-                          frame-ancestors 'none'";
 
 pub(super) fn routes() -> Router<Arc<App>> {
     Router::new()
@@ -229,11 +225,7 @@ async fn overlay(
 async fn outputs(State(app): Shared, Path(id): Id) -> Answer<Json<Value>> {
     beside(move || {
         let (done, kept) = app.works.get(&id)?.done()?;
-        let all = done.written(&app.options.words, &kept)?;
-        let all = all
-            .iter()
-            .map(|(name, bytes)| json!({"name": name, "bytes": bytes.len()}));
-        Ok(Json(all.collect()))
+        Ok(written::listed(&*done.written(&app.options.words, &kept)?))
     })
     .await
 }
@@ -241,49 +233,16 @@ async fn outputs(State(app): Shared, Path(id): Id) -> Answer<Json<Value>> {
 async fn output(State(app): Shared, Path((id, name)): Path<(String, String)>) -> Answer {
     beside(move || {
         let (done, kept) = app.works.get(&id)?.done()?;
-        let all = done.written(&app.options.words, &kept)?;
-        let bytes = all.get(&name).cloned();
-        let bytes = bytes.ok_or_else(|| Problem::missing("no such file of results").at(&name))?;
-        Ok(of_results(&name, bytes))
+        written::one(&*done.written(&app.options.words, &kept)?, &name)
     })
     .await
-}
-
-/// A file of results.
-pub(super) fn of_results(name: &str, bytes: Vec<u8>) -> Response {
-    let extension = name.rsplit_once('.').map_or("", |(_, extension)| extension);
-    let kind = match extension {
-        "html" => "text/html; charset=utf-8",
-        "svg" => "image/svg+xml",
-        "png" => "image/png",
-        "json" => "application/json",
-        "csv" => "text/csv; charset=utf-8",
-        "md" | "toml" | "txt" => "text/plain; charset=utf-8",
-        _ => "application/octet-stream",
-    };
-    let policy = HeaderValue::from_static(OF_RESULTS);
-    let headers: [(HeaderName, HeaderValue); 2] = [
-        (header::CONTENT_TYPE, HeaderValue::from_static(kind)),
-        (header::CONTENT_SECURITY_POLICY, policy),
-    ];
-    (headers, bytes).into_response()
-}
-
-/// An archive to be kept, under the name in `disposition`.
-pub(super) fn zipped(disposition: &'static str, bytes: Vec<u8>) -> Response {
-    let headers = [
-        (header::CONTENT_TYPE, "application/zip"),
-        (header::CONTENT_DISPOSITION, disposition),
-    ];
-    (headers, bytes).into_response()
 }
 
 async fn zip(State(app): Shared, Path(id): Id) -> Answer {
     beside(move || {
         let (done, kept) = app.works.get(&id)?.done()?;
         let all = done.written(&app.options.words, &kept)?;
-        let bytes = archive(&all).map_err(Problem::fault)?;
-        Ok(zipped("attachment; filename=\"moiregauge.zip\"", bytes))
+        written::zipped(&all, "attachment; filename=\"moiregauge.zip\"")
     })
     .await
 }

@@ -11,10 +11,10 @@ use moiregauge_report::{FailedInput, write_report};
 
 use super::asked::{Asked, SETTINGS_FILE, quoted};
 use super::task::{NoResult, run_beside};
-use crate::api::places;
-use crate::app::lock;
+use crate::lock::lock;
 use crate::options::Words;
 use crate::problem::{Answer, Problem};
+use crate::roots::places;
 
 /// What was asked and what came out.
 #[derive(Debug)]

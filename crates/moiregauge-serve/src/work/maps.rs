@@ -15,11 +15,11 @@ use super::asked::Asked;
 use super::done::Written;
 use super::table::Table;
 use super::task::{NoResult, Progress, run_beside};
-use crate::api::places;
-use crate::app::lock;
 use crate::events::Hub;
+use crate::lock::lock;
 use crate::options::Words;
 use crate::problem::{Answer, Problem};
+use crate::roots::places;
 
 /// Maps at a time: each holds all its quantities.
 const MOST: usize = 20;
@@ -235,7 +235,7 @@ impl MapWork {
         written.map_err(|e| of_error(&e))?;
         let mut files = sink.commit("map").map_err(|e| of_error(&e))?;
         let planes = match &found.shown {
-            Shown::Lattice(found) => map_scan(&found.map).channels,
+            Shown::Lattice(found) => map_scan(&found.map, found.registry.as_ref()).channels,
             Shown::Stripes(found) => stripe_scan(&found.stripes).channels,
         };
         Ok(Mapped {

@@ -11,7 +11,7 @@ mod watches;
 mod works;
 
 pub(crate) use asked::{Asked, Change};
-pub(crate) use done::command;
+pub(crate) use done::{Written, command};
 pub(crate) use maps::Maps;
 pub(crate) use watches::Watches;
 pub(crate) use works::{Work, Works};

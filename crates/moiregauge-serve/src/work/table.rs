@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex};
 
-use crate::app::lock;
+use crate::lock::lock;
 use crate::problem::{Answer, Problem};
 
 /// Things by their numbers; an id is a letter and a number, and no number is given twice.

@@ -7,8 +7,8 @@ use std::time::{Duration, Instant};
 use moiregauge_pipeline::{Cancel, Event, Events, Job};
 use serde_json::{Value, json};
 
-use crate::app::lock;
 use crate::events::Hub;
+use crate::lock::lock;
 
 /// Steps are told at most that often.
 const OFTEN: Duration = Duration::from_millis(100);

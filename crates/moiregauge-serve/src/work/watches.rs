@@ -9,9 +9,9 @@ use moiregauge_pipeline::{Cancel, Job, Quiet};
 use serde_json::{Value, json};
 
 use super::table::Table;
-use crate::app::lock;
 use crate::events::Hub;
 use crate::feed::Feed;
+use crate::lock::lock;
 use crate::options::Words;
 use crate::problem::{Answer, Problem};
 

@@ -6,6 +6,7 @@ use spmfile::{DateTime, LineDirection};
 
 use crate::drift::joint::sighting::Sighting;
 use crate::frame::axis::Axis;
+use crate::numbers::three::three;
 use crate::scan::measured::{MeasuredLine, MeasuredScan};
 use crate::spectrum::phases::Phases;
 
@@ -80,13 +81,9 @@ pub(crate) fn seconds(t: DateTime) -> f64 {
 
 /// The phases of the reference's harmonics: those measured, in another order and sign.
 fn phases(line: &MeasuredLine, dual: &Matrix2<f64>, reference: &Matrix2<f64>) -> Option<Phases> {
-    let three = |pair: Matrix2<f64>| {
-        let (a, b) = (pair.column(0).into_owned(), pair.column(1).into_owned());
-        [a, b, b - a]
-    };
-    let measured = three(dual * line.lattice.reciprocal);
+    let measured = three(&(dual * line.lattice.reciprocal));
     let mut places = [(0, 0.0); 3];
-    for (place, wanted) in places.iter_mut().zip(three(*reference)) {
+    for (place, wanted) in places.iter_mut().zip(three(reference)) {
         let signs = [1.0, -1.0];
         let (h, sign) = (0..3).flat_map(|h| signs.map(|s| (h, s))).min_by(|a, b| {
             let miss = |(h, s): &(usize, f64)| (measured[*h] * *s - wanted).norm();

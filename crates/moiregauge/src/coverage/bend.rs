@@ -15,13 +15,14 @@ use serde::{Deserialize, Serialize};
 
 use crate::coverage::cells::Cells;
 use crate::coverage::higher;
+use crate::coverage::hollows::hollows;
 use crate::coverage::nodes::{Node, View, nodes};
 use crate::coverage::patch::Patch;
 use crate::coverage::phases::{Basis, Fit, fit, powers, rows};
-use crate::coverage::settle::hollows;
 use crate::coverage::windows::straightened;
 use crate::numbers::exact;
 use crate::numbers::splines::Splines;
+use crate::numbers::three::three;
 
 /// Cells of splines along the longer side of the patch that are tried.
 const SPLINES: [usize; 7] = [1, 2, 3, 4, 6, 9, 13];
@@ -449,17 +450,10 @@ fn spread(
     local: &[(f64, Matrix2<f64>)],
     pixels: f64,
 ) -> (f64, f64) {
-    let third = |m: &Matrix2<f64>| {
-        [
-            m.column(0).into_owned(),
-            m.column(1).into_owned(),
-            m.column(1) - m.column(0),
-        ]
-    };
-    let waves = third(pair);
+    let waves = three(pair);
     let mut sums = [[0.0; 2]; 3];
     for (count, slopes) in local {
-        for ((sum, change), wave) in sums.iter_mut().zip(third(&(slopes - mean))).zip(&waves) {
+        for ((sum, change), wave) in sums.iter_mut().zip(three(&(slopes - mean))).zip(&waves) {
             let length = wave.norm_squared();
             sum[0] += count * (change.dot(wave) / length).powi(2);
             sum[1] += count * (change.perp(wave) / length).powi(2);

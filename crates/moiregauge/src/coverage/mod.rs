@@ -11,6 +11,7 @@ pub(crate) mod find;
 pub(crate) mod finer;
 pub(crate) mod grains;
 pub(crate) mod higher;
+pub(crate) mod hollows;
 pub(crate) mod local;
 pub(crate) mod nodes;
 pub(crate) mod patch;

@@ -11,10 +11,12 @@ use rustfft::num_complex::Complex64;
 use crate::coverage::bend::{Mean, mean, refined};
 use crate::coverage::cells::{Cells, Window};
 use crate::coverage::grains::{Grains, split};
+use crate::coverage::hollows::hollows;
 use crate::coverage::nodes::View;
 use crate::coverage::patch::Patch;
 use crate::frame::image::Image;
 use crate::numbers::median::median;
+use crate::numbers::three::three;
 
 /// Windows that are tried, mean periods: the narrowest that keeps waves a wave vector apart, and wider ones for
 /// noisy images.
@@ -73,7 +75,7 @@ pub(crate) fn settle_in_bins(
     pair: &Matrix2<f64>,
     pitch: [f64; 2],
 ) -> Option<Settled> {
-    let shortest = waves(pair).map(|q| std::f64::consts::TAU / (q.amax() * bins as f64));
+    let shortest = three(pair).map(|q| std::f64::consts::TAU / (q.amax() * bins as f64));
     let shortest = shortest.into_iter().fold(f64::INFINITY, f64::min);
     let more = ((shortest / BINS_PER_PERIOD) as usize).max(1);
     let bins = bins * more;
@@ -100,7 +102,7 @@ fn settle_bins(
     let mut narrowest = 0;
     let mut settled = None;
     for _ in 0..ROUNDS {
-        let sums = waves(&pair).map(|q| cells.mixed(image, q));
+        let sums = three(&pair).map(|q| cells.mixed(image, q));
         let quiet = hollows(&pair).map(|places| places.map(|q| cells.mixed(image, q)));
         let seen = (narrowest..WIDTHS.len()).find_map(|i| {
             let (_, window) = &windows[i];
@@ -198,33 +200,6 @@ impl Settled {
     pub(crate) fn refined(&self) -> Option<Mean> {
         Some(refined(&self.view(), &self.inner)?.in_pixels(self.bins))
     }
-}
-
-/// K₁, K₂ and K₂ − K₁.
-fn waves(pair: &Matrix2<f64>) -> [Vector2<f64>; 3] {
-    let (a, b) = (pair.column(0).into_owned(), pair.column(1).into_owned());
-    [a, b, b - a]
-}
-
-/// Two places for each wave where noise stands and nothing else: of the same frequency along the lines, since the noise of a scan is a
-/// function of time, and as far from all waves as can be.
-pub(crate) fn hollows(pair: &Matrix2<f64>) -> [[Vector2<f64>; 2]; 3] {
-    let inverse = pair.try_inverse().unwrap_or_else(Matrix2::zeros);
-    let length = pair.determinant().abs().sqrt();
-    let clearance = |q: &Vector2<f64>| {
-        let index = (inverse * q).map(f64::floor);
-        let corners = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]];
-        let distances = corners.map(|[h, k]| (q - pair * (index + Vector2::new(h, k))).norm());
-        distances.into_iter().fold(f64::INFINITY, f64::min)
-    };
-    waves(pair).map(|wave| {
-        [1.0, -1.0].map(|side| {
-            let places =
-                (5..=25).map(|i| wave + Vector2::y() * (side * 0.05 * f64::from(i) * length));
-            let farthest = places.max_by(|a, b| clearance(a).total_cmp(&clearance(b)));
-            farthest.unwrap_or(wave)
-        })
-    })
 }
 
 /// What a window sees.
@@ -380,7 +355,7 @@ fn slope(cells: &Cells, seen: &Seen, inside: &[bool]) -> Option<(Matrix2<f64>, f
         (extent[0] * cells.pixels[0]) as f64,
         (extent[1] * cells.pixels[1]) as f64,
     );
-    let turn = waves(&step)
+    let turn = three(&step)
         .iter()
         .map(|q| q.component_mul(&size).abs().max())
         .fold(0.0, f64::max)

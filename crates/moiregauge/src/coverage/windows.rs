@@ -11,6 +11,7 @@ use crate::coverage::nodes::{Node, View, nodes};
 use crate::coverage::patch::Patch;
 use crate::coverage::phases::{Fit, rows, value};
 use crate::frame::image::Image;
+use crate::numbers::three::three;
 
 /// The nodes without what their windows do to waves that run as `fit` says; `read`: what was read at them.
 pub(crate) fn straightened(view: &View, patch: &Patch, read: &[Node], fit: &Fit) -> Vec<Node> {
@@ -42,8 +43,7 @@ pub(crate) fn straightened(view: &View, patch: &Patch, read: &[Node], fit: &Fit)
 /// Three waves with the phases of a description and the mean amplitudes of some nodes; missing where `image` is.
 fn drawn(image: &Image, patch: &Patch, nodes: &[Node], fit: &Fit) -> Image {
     let amplitudes = [0, 1, 2].map(|i| nodes.iter().map(|n| n.envelopes[i].norm()).sum::<f64>());
-    let [a, b] = [0, 1].map(|i| patch.pair.column(i).into_owned());
-    let waves = [a, b, b - a];
+    let waves = three(&patch.pair);
     let values = image.values.iter().enumerate().map(|(pixel, value_here)| {
         let place = [pixel % image.columns, pixel / image.columns];
         if !value_here.is_finite() || !patch.holds(place) {

@@ -13,6 +13,7 @@ use crate::domains::patch::{Fit, Template};
 use crate::frame::image::Image;
 use crate::numbers::interrupt;
 use crate::numbers::median::median;
+use crate::numbers::three::three;
 
 /// Bins per period: a node of a tenth of a period is four bins wide, which an interpolation follows.
 const FINE: f64 = 40.0;
@@ -91,9 +92,8 @@ pub fn find_nodes(
     contrast: Contrast,
 ) -> Option<FoundNodes> {
     let metric = Matrix2::new(pitch[0], 0.0, 0.0, pitch[1]);
-    let real = metric * lattice;
-    let third = real.column(1) - real.column(0);
-    let period = (real.column(0).norm() + real.column(1).norm() + third.norm()) / 3.0;
+    let lengths = three(&(metric * lattice)).map(|vector| vector.norm());
+    let period = lengths.iter().sum::<f64>() / 3.0;
     let in_pixels = pitch.map(|p| period / p);
     if !in_pixels.iter().all(|p| p.is_finite() && *p > 4.0) {
         return None;

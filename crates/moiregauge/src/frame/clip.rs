@@ -9,12 +9,7 @@ pub(crate) const CLIP: f64 = 3.0;
 
 /// The image with outliers moved to where they are none.
 pub(crate) fn cut_off(image: &Image) -> Image {
-    let mut values: Vec<f64> = image
-        .values
-        .iter()
-        .copied()
-        .filter(|v| v.is_finite())
-        .collect();
+    let mut values = image.finite();
     let middle = median(&mut values);
     for value in &mut values {
         *value = (*value - middle).abs();

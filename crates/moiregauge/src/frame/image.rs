@@ -30,6 +30,12 @@ impl Image {
         &self.values[row * self.columns..(row + 1) * self.columns]
     }
 
+    /// The values that are there.
+    pub fn finite(&self) -> Vec<f64> {
+        let values = self.values.iter().copied();
+        values.filter(|v| v.is_finite()).collect()
+    }
+
     /// The block of `size` (columns, rows) that starts at `first` (column, row).
     ///
     /// # Panics

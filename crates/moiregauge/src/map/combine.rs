@@ -13,6 +13,7 @@ use heterostrain::lattice::Waves;
 use nalgebra::{Matrix2, Matrix4, Vector2, Vector3, Vector4};
 use rayon::prelude::*;
 
+use crate::map::one_gauge::in_one_gauge;
 use crate::map::sample::{Grid, LatticeMap, LatticeNode};
 use crate::numbers::chi2::enlargement;
 use crate::numbers::interrupt;
@@ -61,6 +62,10 @@ pub(crate) fn combine_with(
         return Some((alone.clone(), None));
     }
     let grid = common_grid(&all)?;
+    let own = |lines: &Vec<&LatticeMap>| lines.iter().map(|map| (*map).clone()).collect();
+    let mut owned: Vec<Vec<LatticeMap>> = frames.iter().map(own).collect();
+    in_one_gauge(&mut owned.iter_mut().flatten().collect::<Vec<_>>());
+    let frames: Vec<Vec<&LatticeMap>> = owned.iter().map(|lines| lines.iter().collect()).collect();
     let frames: Vec<(Cow<LatticeMap>, Option<Agreement>)> = frames
         .iter()
         .filter_map(|lines| match lines[..] {
@@ -98,7 +103,9 @@ fn average_of(
     if let Some(scatter) = &scatter {
         for (node, chi2, dof) in &mut found {
             if *dof > 0 {
-                node.waves.covariance *= scatter.factor(1 + *dof / COMPONENTS);
+                let factor = scatter.factor(1 + *dof / COMPONENTS);
+                node.waves.covariance *= factor;
+                node.displacement_covariance *= factor;
                 let scaled = *chi2 / scatter.reduced.max(1.0);
                 if node.mask == Mask::Good && is_improbable(scaled, *dof) {
                     node.mask = Mask::Contradiction;
@@ -109,6 +116,7 @@ fn average_of(
     let map = LatticeMap {
         grid: *grid,
         window_nm,
+        gauge: maps.iter().find_map(|map| map.gauge),
         nodes: found.into_iter().map(|(node, _, _)| node).collect(),
     };
     let agreement = scatter.map(|scatter| Agreement {
@@ -319,6 +327,7 @@ fn average(views: &[View], place: Vector2<f64>) -> (LatticeNode, f64, usize) {
         let miss = node.waves.flat() - mean;
         (miss.transpose() * weight * miss)[0]
     });
+    let (displacement, displacement_covariance) = mean_displacement(&good);
     let node = LatticeNode {
         mask: Mask::Good,
         waves: Waves::new(Matrix2::from_column_slice(mean.as_slice()), covariance),
@@ -326,11 +335,27 @@ fn average(views: &[View], place: Vector2<f64>) -> (LatticeNode, f64, usize) {
         freedom: good.iter().map(|n| n.freedom).sum(),
         signal_to_noise: good.iter().map(|n| n.signal_to_noise).sum(),
         phases: Vector3::repeat(f64::NAN),
-        // Of the first map that has one: maps have mean lattices of their own.
-        displacement: good[0].displacement,
-        displacement_covariance: good[0].displacement_covariance,
+        displacement,
+        displacement_covariance,
     };
     (node, chi2.sum(), COMPONENTS * (good.len() - 1))
+}
+
+/// The weighted mean of the displacements, all against one mean lattice, of those maps that have one; NaN where none has.
+fn mean_displacement(good: &[&LatticeNode]) -> (Vector2<f64>, Matrix2<f64>) {
+    let (mut normal, mut right) = (Matrix2::zeros(), Vector2::zeros());
+    for node in good {
+        let weight = node.displacement_covariance.try_inverse();
+        let weight = weight.filter(|w| w.iter().all(|x| x.is_finite()));
+        if let Some(weight) = weight.filter(|_| node.displacement.iter().all(|u| u.is_finite())) {
+            normal += weight;
+            right += weight * node.displacement;
+        }
+    }
+    normal.try_inverse().map_or(
+        (Vector2::repeat(f64::NAN), Matrix2::repeat(f64::NAN)),
+        |covariance| (covariance * right, covariance),
+    )
 }
 
 #[cfg(test)]

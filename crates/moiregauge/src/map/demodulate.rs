@@ -8,6 +8,7 @@ use nalgebra::{Matrix2, Matrix4, Vector2};
 
 use crate::frame::image::Image;
 use crate::map::defects::{Blur, Setting, blur, masks};
+use crate::map::phase_blur::{VARIANCE, blurs_of_phases};
 use crate::map::waves::{Harmonics, LocalLattice, Nothing, local_lattices};
 use crate::numbers::median::median;
 use crate::spectrum::shells::{FIRST_SHELL, shells};
@@ -128,7 +129,9 @@ impl<'a> Work<'a> {
             self.noise.disagreement = self.disagreement(&lattices, nodes, window_nm);
             lattices = self.lattices(&smoothed, window_nm);
         }
-        let blurs = self.blurs(&lattices, window_nm * std::f64::consts::SQRT_2, nodes);
+        let wider = window_nm * std::f64::consts::SQRT_2;
+        let wide = self.mixed.cleaned(wider, nodes);
+        let blurs = self.blurs(&lattices, &wide, wider);
         for (lattice, blur) in lattices.iter_mut().zip(&blurs) {
             if let Ok(lattice) = lattice {
                 lattice.covariance *= blur.factor();
@@ -148,12 +151,15 @@ impl<'a> Work<'a> {
             frame,
         };
         let masks = masks(&setting, &lattices, &blurs, &self.noise_shares(&smoothed));
+        let step = nodes.step(&mixed.blocks);
+        let steps = [0, 1].map(|axis| step[axis] / width[axis]);
+        let bent = blurs_of_phases(&smoothed, &wide, &masks, steps);
         let nodes_out = (0..nodes.len()).map(|n| {
             let carried = mixed.carried(places[n]);
             let phases = [0, 1, 2].map(|i| {
                 let [h, k] = mixed.indices[i].map(f64::from);
                 let amplitude = smoothed.envelopes[i].amplitude[n];
-                f64::from(amplitude.arg()) + h * carried.x + k * carried.y
+                f64::from(amplitude.arg()) - bent[n][i] + h * carried.x + k * carried.y
             });
             node_of(lattices[n].as_ref().ok(), masks[n], phases)
         });
@@ -232,14 +238,14 @@ impl<'a> Work<'a> {
         median(&mut all.collect::<Vec<f64>>()).max(1.0)
     }
 
-    /// What a window of `wider` nm changes at each node.
+    /// What a window of `wider` nm, under which the blocks are `wide`, changes at each node.
     fn blurs(
         &self,
         lattices: &[Result<LocalLattice, Nothing>],
+        wide: &Smoothed,
         wider: f64,
-        nodes: Nodes,
     ) -> Vec<Blur> {
-        let wide = self.lattices(&self.mixed.cleaned(wider, nodes), wider);
+        let wide = self.lattices(wide, wider);
         let pairs = lattices.iter().zip(&wide);
         pairs
             .map(|pair| match pair {
@@ -274,7 +280,7 @@ fn node_of(lattice: Option<&LocalLattice>, mask: Mask, phases: [f64; 3]) -> Wave
         mask,
         pair: lattice.map_or(unknown, |l| l.pair),
         covariance: lattice.map_or(Matrix4::repeat(f64::NAN), |l| l.covariance),
-        phase_covariance: lattice.map_or(unknown, |l| l.phase_covariance),
+        phase_weights: lattice.map_or([0.0; 3], |l| l.phase_weights.map(|w| w / VARIANCE)),
         chi2: lattice.map_or(f64::NAN, |l| l.chi2),
         freedom: lattice.map_or(0, |l| l.freedom),
         signal_to_noise: lattice.map_or(0.0, |l| l.signal_to_noise),

@@ -36,9 +36,11 @@ pub(crate) fn phases(map: &WaveMap) -> Vec<Option<(Vector2<f64>, Matrix2<f64>)>>
     let node = |n: usize| {
         let phases = unwrapped[n]?;
         let [a, b, c] = [0, 1, 2].map(|i| phases[i] - offset[i]);
-        // Least squares of (ψ₁, ψ₂, ψ₂ − ψ₁), equal weights.
-        let both = Vector2::new(2.0 * a + b - c, a + 2.0 * b + c) / 3.0;
-        Some((both, map.nodes[n].phase_covariance))
+        // Least squares of (ψ₁, ψ₂, ψ₂ − ψ₁).
+        let [u, v, w] = map.nodes[n].phase_weights;
+        let covariance = Matrix2::new(u + w, -w, -w, v + w).try_inverse()?;
+        let both = covariance * Vector2::new(u * a - w * c, v * b + w * c);
+        Some((both, covariance))
     };
     (0..map.nodes.len()).map(node).collect()
 }

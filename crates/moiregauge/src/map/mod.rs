@@ -12,28 +12,41 @@
 //! Phase demodulation: Hÿtch, Snoeck and Kilaas, Ultramicroscopy 74, 131 (1998); for moirés: Benschop et
 //! al., Phys. Rev. Research 3, 013153 (2021).
 
+pub(crate) mod cell;
 pub(crate) mod combine;
 pub(crate) mod defects;
 pub(crate) mod demodulate;
 pub(crate) mod displacement;
 pub(crate) mod drift_change;
+pub(crate) mod followed;
+pub(crate) mod gauge;
 pub(crate) mod local;
 pub(crate) mod mosaic;
+pub(crate) mod one_gauge;
+#[cfg(test)]
+mod pattern_tests;
+pub(crate) mod phase_blur;
 pub(crate) mod pilot;
 pub(crate) mod quantities;
 pub(crate) mod register;
+pub(crate) mod registry;
 pub(crate) mod sample;
 pub(crate) mod summary;
 pub(crate) mod survey;
 #[cfg(test)]
 pub(crate) mod tests;
+pub(crate) mod undistorted;
 pub(crate) mod waves;
 
+pub use cell::MeanCell;
 pub use combine::{Agreement, combine, combine_frames};
 pub use drift_change::{DriftChange, drift_change};
+pub use gauge::Gauge;
 pub use local::local_lattices;
 pub use quantities::{Plane, TwistStrainMap};
 pub use register::{Registration, register};
+pub use registry::RegistryMap;
 pub use sample::{Grid, LatticeMap, LatticeNode};
 pub use summary::Spread;
 pub use survey::Survey;
+pub use undistorted::Undistorted;

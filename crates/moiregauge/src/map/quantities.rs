@@ -17,7 +17,7 @@ pub struct Plane {
 }
 
 impl Plane {
-    fn push(&mut self, estimate: Option<Estimate>) {
+    pub(crate) fn push(&mut self, estimate: Option<Estimate>) {
         let Estimate { value, sigma } = estimate.unwrap_or(Estimate::new(f64::NAN, f64::NAN));
         self.value.push(value as f32);
         self.sigma.push(sigma as f32);
@@ -181,6 +181,7 @@ impl TwistStrainMap {
                 ..grid
             },
             window_nm,
+            gauge: None,
             nodes: Vec::new(),
         };
         Self::new(&none, &[])

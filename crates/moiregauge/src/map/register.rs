@@ -47,7 +47,7 @@ pub fn register(maps: &mut [&mut LatticeMap]) -> Vec<Option<Registration>> {
             .max_by(|a, b| a.1.total_cmp(&b.1));
         let registration = found.map(|(registration, _)| registration);
         if let Some(found) = &registration {
-            map.grid.origin -= Vector2::new(found.shift[0].value, found.shift[1].value);
+            map.move_by(-Vector2::new(found.shift[0].value, found.shift[1].value));
         }
         out.push(registration);
     }

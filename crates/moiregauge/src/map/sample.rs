@@ -11,6 +11,7 @@ use rayon::prelude::*;
 
 use crate::frame::geometry::Geometry;
 use crate::map::displacement;
+use crate::map::gauge::Gauge;
 use crate::window::mask::Mask;
 use crate::window::types::WaveMap;
 
@@ -109,6 +110,8 @@ pub struct LatticeMap {
     pub grid: Grid,
     /// Width of the window, nm.
     pub window_nm: f64,
+    /// What displacements count from; `None` where no phase could be followed.
+    pub gauge: Option<Gauge>,
     /// Row by row.
     pub nodes: Vec<LatticeNode>,
 }
@@ -128,7 +131,8 @@ impl LatticeMap {
             (sum + node.pair, count + 1.0)
         });
         // ψ = −Qᵀ u.
-        let back = (dual * sum / count.max(1.0)).transpose().try_inverse();
+        let mean = dual * sum / count.max(1.0);
+        let back = mean.transpose().try_inverse();
         let back = -back.unwrap_or_else(|| Matrix2::repeat(f64::NAN));
         let unknown = (Vector2::repeat(f64::NAN), Matrix2::repeat(f64::NAN));
         let nodes = map.nodes.par_iter().zip(followed).enumerate();
@@ -148,15 +152,26 @@ impl LatticeMap {
                 displacement_covariance: back * covariance * back.transpose(),
             }
         });
+        let nodes: Vec<LatticeNode> = nodes.collect();
+        let grid = Grid {
+            size: map.size,
+            origin: at_rest.origin + j * map.first,
+            step: j * Matrix2::new(map.step[0], 0.0, 0.0, map.step[1]),
+        };
         Some(Self {
-            grid: Grid {
-                size: map.size,
-                origin: at_rest.origin + j * map.first,
-                step: j * Matrix2::new(map.step[0], 0.0, 0.0, map.step[1]),
-            },
+            grid,
             window_nm: map.window_nm,
-            nodes: nodes.collect(),
+            gauge: Gauge::of(&grid, mean, &nodes),
+            nodes,
         })
+    }
+
+    /// Puts all places of the map elsewhere.
+    pub(crate) fn move_by(&mut self, way: Vector2<f64>) {
+        self.grid.origin += way;
+        if let Some(gauge) = &mut self.gauge {
+            gauge.node += way;
+        }
     }
 
     /// The mean lattice of the good nodes: plain mean of their wave vectors, rad/nm.

@@ -22,6 +22,7 @@ use nalgebra::{Matrix2, Matrix4, Vector2};
 use rayon::prelude::*;
 
 use crate::numbers::interrupt;
+use crate::spectrum::shells::FIRST_SHELL;
 use crate::window::blocks::Blocks;
 use crate::window::leaks::{ROUNDING, pulls};
 use crate::window::lines::Levelled;
@@ -40,8 +41,8 @@ pub(crate) struct LocalLattice {
     pub(crate) pair: Matrix2<f64>,
     /// Covariance of (q₁x, q₁y, q₂x, q₂y).
     pub(crate) covariance: Matrix4<f64>,
-    /// Covariance of the phases of q₁ and q₂, rad².
-    pub(crate) phase_covariance: Matrix2<f64>,
+    /// One over the variances of the phases of the first three harmonics, 1/rad²; 0 for one that does not stand out.
+    pub(crate) phase_weights: [f64; 3],
     /// χ² of the closure, and its degrees of freedom.
     pub(crate) chi2: f64,
     pub(crate) freedom: usize,
@@ -255,15 +256,25 @@ impl Terms {
             (axis, _) => indices[axis][(a / 2, b / 2)] * noise[(axis, axis)],
         });
         let chi2 = self.closure(&pair, noise).ok_or(Nothing::NoPixels)?;
-        let phases = inverse(self.normal(|v| 1.0 / v.phase))?;
         Ok(LocalLattice {
             pair: pair + taken,
             covariance,
-            phase_covariance: phases * support.amplitude_noise,
+            phase_weights: self.phase_weights().map(|w| w / support.amplitude_noise),
             chi2,
             freedom: 2 * self.all.len() - 4,
             signal_to_noise: self.signal_to_noise,
         })
+    }
+
+    /// One over the variances of the phases of the first three harmonics, in units of the noise of the window.
+    fn phase_weights(&self) -> [f64; 3] {
+        let mut weights = [0.0; 3];
+        for (weight, index) in weights.iter_mut().zip(FIRST_SHELL) {
+            let index = Vector2::from(index.map(f64::from));
+            let term = self.all.iter().find(|t| t.index == index);
+            *weight = term.map_or(0.0, |t| 1.0 / t.variances.phase);
+        }
+        weights
     }
 
     /// χ² of what a pair leaves of the slopes.

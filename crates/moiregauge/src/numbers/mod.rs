@@ -12,6 +12,7 @@ pub(crate) mod normal_equations;
 pub(crate) mod rng;
 pub(crate) mod splines;
 pub(crate) mod spread;
+pub(crate) mod three;
 pub(crate) mod widest;
 pub(crate) mod words;
 

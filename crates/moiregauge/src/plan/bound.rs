@@ -18,8 +18,9 @@ use heterostrain::lattice::{Waves, reciprocal};
 use heterostrain::strain::twist_strain;
 use nalgebra::{Matrix2, Matrix4, Vector2};
 
+use crate::drift::joint::choose::fit;
 use crate::drift::joint::sighting::Sighting;
-use crate::drift::joint::solve::fit;
+use crate::numbers::three::three;
 use crate::simulate::settings::Simulation;
 use crate::simulate::simulator::Simulator;
 use crate::simulate::truth::FrameTruth;
@@ -120,12 +121,7 @@ fn ideal(
     let last = Vector2::from(simulator.settings().raster.pixels.map(|n| n as f64 - 1.0));
     let middle = Vector2::from(frame.origin_nm) + j * last / 2.0;
     let place = middle - drift * time;
-    let three = [
-        pair.column(0).into_owned(),
-        pair.column(1).into_owned(),
-        pair.column(1) - pair.column(0),
-    ];
-    let phases = Phases::independent(three.map(|g| g.dot(&place)), variances);
+    let phases = Phases::independent(three(pair).map(|g| g.dot(&place)), variances);
     Some(Sighting {
         scan: 0,
         class,

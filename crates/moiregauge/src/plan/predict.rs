@@ -14,8 +14,9 @@ use heterostrain::lattice::{Lattice, Waves};
 use heterostrain::strain::twist_strain;
 use nalgebra::{Matrix2, Matrix4};
 
+use crate::drift::joint::choose::foreseen;
+use crate::drift::joint::found::JointFit;
 use crate::drift::joint::sighting::Sighting;
-use crate::drift::joint::solve::{JointFit, foreseen};
 use crate::drift::shares::Statistical;
 use crate::meaning::budget::{Budget, Source};
 use crate::plan::bound::ideal_sightings;

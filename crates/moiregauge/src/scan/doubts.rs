@@ -13,6 +13,7 @@ use crate::lattice::fit::fit_pixels::LatticeFit;
 use crate::lattice::fit::noise::ForeignWave;
 use crate::lattice::measured::{Grain, MeasuredLattice};
 use crate::numbers::chi2;
+use crate::numbers::three::three;
 use crate::scan::measured::MeasuredLine;
 
 /// Fewer periods than this across the shorter side deserve a warning. Chosen by eye; see docs/constants.md.
@@ -145,11 +146,7 @@ fn other_grain(
     let change = there * here.try_inverse()?;
     Some(OtherGrain {
         share: grain.share,
-        wavelengths: [
-            there.column(0).norm(),
-            there.column(1).norm(),
-            (there.column(1) - there.column(0)).norm(),
-        ],
+        wavelengths: three(&there).map(|vector| vector.norm()),
         turned: (change[(1, 0)] - change[(0, 1)]).atan2(change[(0, 0)] + change[(1, 1)]),
         boundary: boundary(grain, geometry),
     })

@@ -85,11 +85,6 @@ impl ByHand {
         *self == Self::default()
     }
 
-    /// Whether it says where to look.
-    pub fn says_where(&self) -> bool {
-        !self.regions_nm.is_empty() || self.mask.is_some()
-    }
-
     /// Whether it says which lattice is meant.
     pub fn says_which(&self) -> bool {
         self.lattice_nm.is_some() || self.near_nm.is_some()

@@ -14,6 +14,7 @@ use nalgebra::{Matrix2, Vector2};
 use crate::frame::background::Background;
 use crate::frame::geometry::Geometry;
 use crate::frame::image::Image;
+use crate::numbers::three::three;
 use crate::spectrum::error::LatticeError;
 use crate::spectrum::harmonics::Windowed;
 use crate::spectrum::prepare::{Prepared, Verdict, binned, levelled, signal_to_noise, verdict};
@@ -71,12 +72,11 @@ pub(crate) fn prepare(
         let Some(start) = reciprocal(&harmonics.pair) else {
             continue;
         };
-        let (a, b) = (pair.column(0).into_owned(), pair.column(1).into_owned());
         return Ok(Prepared {
             image: Arc::new(image),
             binning,
             look: None,
-            peaks: [a, b, b - a],
+            peaks: three(&pair),
             harmonics,
             start,
         });

@@ -10,6 +10,7 @@ use rayon::prelude::*;
 use crate::frame::background::{Background, take_background_off};
 use crate::frame::geometry::Geometry;
 use crate::frame::image::Image;
+use crate::numbers::three::three;
 use crate::spectrum::error::{LatticeError, SECOND, THIRD};
 use crate::spectrum::harmonics::{Harmonic, Harmonics, Windowed};
 use crate::spectrum::look::{Look, in_other_bins};
@@ -193,13 +194,8 @@ const BINS_PER_PERIOD: f64 = 16.0;
 /// How many pixels may be averaged without touching the lattice: it is band-limited, and what the
 /// mean over a bin does to a harmonic is to its amplitude, not to its wave vector.
 pub(crate) fn binning(pair: &Matrix2<f64>) -> usize {
-    let third = pair.column(1) - pair.column(0);
-    let largest = pair
-        .column(0)
-        .norm()
-        .max(pair.column(1).norm())
-        .max(third.norm());
-    let shortest_period = std::f64::consts::TAU / largest;
+    let [a, b, c] = three(pair).map(|wave| wave.norm());
+    let shortest_period = std::f64::consts::TAU / a.max(b).max(c);
     ((shortest_period / BINS_PER_PERIOD) as usize).max(1)
 }
 
@@ -221,13 +217,7 @@ pub(crate) fn refine(
     background: Background,
 ) -> Option<(Harmonics, [Vector2<f64>; 3])> {
     let windowed = Windowed::new(image);
-    let third = pair.column(1) - pair.column(0);
-    let seen = [
-        pair.column(0).into_owned(),
-        pair.column(1).into_owned(),
-        third,
-    ]
-    .map(|q| windowed.refined_peak(q));
+    let seen = three(pair).map(|q| windowed.refined_peak(q));
     let first = windowed.amplitudes(&common_pair(&seen), shells(3))?;
     let model = Windowed::new(&first.model(image, background));
     let mut peaks = seen;

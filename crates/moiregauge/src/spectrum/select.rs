@@ -12,6 +12,7 @@ use rustfft::num_complex::Complex;
 
 use crate::numbers::interrupt;
 use crate::numbers::median::median;
+use crate::numbers::three::three;
 use crate::spectrum::fourier::{Kept, wide};
 use crate::spectrum::transform::Spectrum;
 
@@ -136,9 +137,8 @@ fn assess(
     }
     let frame = frame_cycles(spectrum);
     let shortest = |p: &Matrix2<f64>| {
-        let c = frame * p;
-        let third = c.column(1) - c.column(0);
-        c.column(0).norm().min(c.column(1).norm()).min(third.norm())
+        let [a, b, c] = three(&(frame * p)).map(|wave| wave.norm());
+        a.min(b).min(c)
     };
     if shortest(&pair) < LOWEST_CYCLES {
         return None;

@@ -263,7 +263,7 @@ impl Work<'_> {
                 mask: if own { Mask::Good } else { Mask::Weak },
                 pair: only(nodes[n].wave),
                 covariance: Matrix4::zeros(),
-                phase_covariance: Matrix2::identity() * variance,
+                phase_weights: [1.0 / variance, 1.0 / variance, 0.0],
                 chi2: 0.0,
                 freedom: 0,
                 signal_to_noise: nodes[n].signal_to_noise,

@@ -91,7 +91,7 @@ pub fn map_scan(
     for channel in channels {
         match map_line(scan, channel, analysed, settings, method, resolution) {
             Ok(mut map) => {
-                map.map.grid.origin -= drifted(analysed, origin);
+                map.map.move_by(-drifted(analysed, origin));
                 maps.push(map);
             }
             Err(why) => error = why,

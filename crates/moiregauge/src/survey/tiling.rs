@@ -67,6 +67,8 @@ pub(crate) fn tile_map(
             step: still.pixel_to_nm * steps,
         },
         window_nm: side_nm / 20f64.sqrt(),
+        // Tiles follow no phases.
+        gauge: None,
         nodes,
     })
 }

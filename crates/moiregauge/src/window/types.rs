@@ -2,6 +2,7 @@
 
 use nalgebra::{Matrix2, Matrix4, Vector2, Vector3};
 
+use crate::numbers::three::three;
 use crate::window::mask::Mask;
 
 /// How maps are made.
@@ -98,9 +99,8 @@ impl Reference {
     /// Distance of neighbouring spots, `4π/(√3|q|)` of the mean |q|, nm.
     pub fn period(&self) -> f64 {
         let metric = Matrix2::new(1.0 / self.pitch[0], 0.0, 0.0, 1.0 / self.pitch[1]);
-        let pair = metric * self.pair;
-        let third = pair.column(1) - pair.column(0);
-        let mean = (pair.column(0).norm() + pair.column(1).norm() + third.norm()) / 3.0;
+        let lengths = three(&(metric * self.pair)).map(|wave| wave.norm());
+        let mean = lengths.iter().sum::<f64>() / 3.0;
         2.0 * std::f64::consts::TAU / (3.0f64.sqrt() * mean)
     }
 
@@ -123,8 +123,8 @@ pub struct WaveNode {
     pub pair: Matrix2<f64>,
     /// Covariance of (q₁x, q₁y, q₂x, q₂y), rad² per pixel².
     pub covariance: Matrix4<f64>,
-    /// Covariance of the phases of q₁ and q₂, rad².
-    pub phase_covariance: Matrix2<f64>,
+    /// Weights of the three `phases`, 1/rad²: one over their variances, 0 for a wave that does not stand out.
+    pub phase_weights: [f64; 3],
     /// χ² of the closure of all harmonics.
     pub chi2: f64,
     /// Its degrees of freedom.

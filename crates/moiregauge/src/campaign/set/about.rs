@@ -1,6 +1,7 @@
 //! What has to be said of a set: scatter, significance, scans that do not fit, readings.
 
-use crate::campaign::analysis::{Residual, SetAnalysis, SetMean};
+use crate::campaign::analysis::{SetAnalysis, SetMean};
+use crate::campaign::set::moire;
 use crate::caveat::Caveat;
 use crate::caveat::moires::MoireDoubt;
 use crate::caveat::sets::{Scattered, SetDoubt};
@@ -12,7 +13,23 @@ const LARGE_CHI2: f64 = 2.0;
 /// The scatter of fewer scans is too uncertain itself to doubt the errors.
 const FEWEST_TO_DOUBT: usize = 6;
 
-pub(crate) fn about_readings(name: &str, mean: &SetMean, settings: &Settings) -> Vec<Caveat> {
+/// What has to be said of a set of which `used` scans count.
+pub(crate) fn about_set(
+    set: &SetAnalysis,
+    used: usize,
+    settings: &Settings,
+    caveats: &mut Vec<Caveat>,
+) {
+    about_mean(&set.name, set.mean.as_ref(), caveats);
+    let shown = set.mean.as_ref().or(set.uncorrected.as_ref());
+    if let Some(mean) = shown {
+        caveats.extend(about_readings(&set.name, mean, settings));
+    }
+    moire::doubts(&set.name, shown, &set.scans, settings, caveats);
+    about_checks(set, used, caveats);
+}
+
+fn about_readings(name: &str, mean: &SetMean, settings: &Settings) -> Vec<Caveat> {
     let SetMean {
         lattice,
         twist_strain,
@@ -22,7 +39,7 @@ pub(crate) fn about_readings(name: &str, mean: &SetMean, settings: &Settings) ->
     caveats(name, lattice, twist_strain, readings, settings)
 }
 
-pub(crate) fn about_mean(name: &str, mean: Option<&SetMean>, caveats: &mut Vec<Caveat>) {
+fn about_mean(name: &str, mean: Option<&SetMean>, caveats: &mut Vec<Caveat>) {
     let Some(mean) = mean else { return };
     if mean.chi2_per_dof > LARGE_CHI2 {
         caveats.push(Caveat::new(
@@ -57,30 +74,9 @@ pub(crate) fn about_mean(name: &str, mean: Option<&SetMean>, caveats: &mut Vec<C
     }
 }
 
-pub(crate) fn about_residual(
-    file: &str,
-    residual: &Residual,
-    settings: &Settings,
-    caveats: &mut Vec<Caveat>,
-) {
-    if !residual.outlying {
-        return;
-    }
-    caveats.push(Caveat::new(
-        SetDoubt::OutlyingScan {
-            chi_squared: residual.chi2,
-            degrees_of_freedom: residual.degrees_of_freedom,
-            p_value: residual.p_value,
-            displacement: residual.displacement.map(|d| d.norm()),
-            by_rule: settings.exclude_outliers,
-        },
-        file,
-    ));
-}
-
 /// Says where the scatter of `n` scans makes clearly larger errors than those stated: by more than four
 /// times the scatter of such a comparison, 1/√(2(n − 1)).
-pub(crate) fn about_checks(set: &SetAnalysis, n: usize, caveats: &mut Vec<Caveat>) {
+fn about_checks(set: &SetAnalysis, n: usize, caveats: &mut Vec<Caveat>) {
     let found = set.checks.as_ref().and_then(|c| c.leave_one_out);
     let (Some(found), Some(drift), Some(mean)) = (found, &set.drift, &set.mean) else {
         return;

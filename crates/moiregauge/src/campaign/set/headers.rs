@@ -12,8 +12,9 @@ use spmfile::FrameDirection;
 use crate::campaign::sightings::{seconds, sightings};
 use crate::caveat::Caveat;
 use crate::caveat::drifting::{DriftDoubt, FrameDates};
+use crate::drift::joint::choose::fit;
+use crate::drift::joint::found::JointFit;
 use crate::drift::joint::sighting::Sighting;
-use crate::drift::joint::solve::{JointFit, fit};
 use crate::scan::measured::MeasuredScan;
 use crate::settings::knobs::Settings;
 

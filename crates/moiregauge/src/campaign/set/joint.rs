@@ -5,14 +5,15 @@ use heterostrain::strain::twist_strain;
 use nalgebra::{Matrix2, Vector2};
 use spmfile::FrameDirection;
 
-use crate::campaign::analysis::{
-    Checks, Drift, JointTerms, Motion, Residual, ScanAnalysis, Scatter,
-};
+use crate::campaign::analysis::{Checks, Drift, JointTerms, Residual, ScanAnalysis, Scatter};
+use crate::campaign::set::headers::about_headers;
 use crate::campaign::set::solved::Solved;
-use crate::campaign::sightings::{middle_of_frame, sightings};
+use crate::campaign::sightings::sightings;
+use crate::caveat::Caveat;
+use crate::caveat::sets::SetDoubt;
 use crate::drift::joint::checks::{LeftOut, Resampled};
-use crate::drift::joint::path::DriftPath;
-use crate::drift::joint::solve::{JointFit, fit};
+use crate::drift::joint::choose::fit;
+use crate::drift::joint::found::JointFit;
 use crate::drift::linear::{Observation, solve};
 use crate::drift::shares::Statistical;
 use crate::numbers::chi2::{enlargement, tail};
@@ -28,9 +29,27 @@ const FEWEST: usize = 4;
 /// Pairs of up and down scans from which a bootstrap says something: three have ten different draws only.
 const FEWEST_PAIRS: usize = 4;
 
+/// The linear solution refined by the joint fit, with doubts about headers that contradict it.
+pub(crate) fn refined(
+    name: &str,
+    linear: Solved,
+    used: &[&MeasuredScan],
+    reference: &Matrix2<f64>,
+    settings: &Settings,
+    caveats: &mut Vec<Caveat>,
+) -> (Solved, Option<JointFit>) {
+    let (lattice, velocity) = (linear.lattice, linear.drift.velocity);
+    let (solved, fit) = jointly(linear, used, reference, settings);
+    let doubts = fit
+        .as_ref()
+        .and_then(|fit| about_headers(name, used, reference, &lattice, &velocity, fit, settings));
+    caveats.extend(doubts);
+    (solved, fit)
+}
+
 /// Refines the linear solution of a set with the phases of its scans; keeps it where they do not help.
 /// Also returns the fit.
-pub(crate) fn jointly(
+fn jointly(
     linear: Solved,
     scans: &[&MeasuredScan],
     reference: &Matrix2<f64>,
@@ -102,8 +121,29 @@ pub(crate) fn terms(fit: &JointFit) -> JointTerms {
     }
 }
 
+/// The errors by the scatter of the `used` scans; tells each of `scans` how it lies against the others.
+pub(crate) fn checked(
+    fit: &JointFit,
+    scans: &mut [ScanAnalysis],
+    used: &[&MeasuredScan],
+    name: &str,
+    settings: &Settings,
+    caveats: &mut Vec<Caveat>,
+) -> Checks {
+    let left_out = fit.leave_one_out();
+    let residuals = residuals(&left_out);
+    for (one, residual) in left_out.iter().zip(residuals) {
+        let file = &used[one.scan].file;
+        if let Some(scan) = scans.iter_mut().find(|s| s.file == *file) {
+            scan.residual = Some(residual);
+            about_residual(file, &residual, settings, caveats);
+        }
+    }
+    checks(fit, &left_out, used, name, settings)
+}
+
 /// How each scan lies against the others.
-pub(crate) fn residuals(left_out: &[LeftOut]) -> Vec<Residual> {
+fn residuals(left_out: &[LeftOut]) -> Vec<Residual> {
     let share = OUTLYING / left_out.len() as f64;
     left_out
         .iter()
@@ -120,6 +160,23 @@ pub(crate) fn residuals(left_out: &[LeftOut]) -> Vec<Residual> {
             }
         })
         .collect()
+}
+
+/// Says which scan does not fit.
+fn about_residual(file: &str, residual: &Residual, settings: &Settings, caveats: &mut Vec<Caveat>) {
+    if !residual.outlying {
+        return;
+    }
+    caveats.push(Caveat::new(
+        SetDoubt::OutlyingScan {
+            chi_squared: residual.chi2,
+            degrees_of_freedom: residual.degrees_of_freedom,
+            p_value: residual.p_value,
+            displacement: residual.displacement.map(|d| d.norm()),
+            by_rule: settings.exclude_outliers,
+        },
+        file,
+    ));
 }
 
 /// Leaves out scans that do not fit the others: one after the other, worst first, no more than a
@@ -247,34 +304,6 @@ fn half_width(values: &[f64]) -> f64 {
     sorted.sort_by(f64::total_cmp);
     let at = |share: f64| sorted[((sorted.len() - 1) as f64 * share).round() as usize];
     (at(0.841_345) - at(0.158_655)) / 2.0
-}
-
-/// The drift of each scan, by the time of its middle.
-pub(crate) fn velocity_of(
-    fit: &JointFit,
-    scan: &MeasuredScan,
-) -> Option<(Vector2<f64>, Matrix2<f64>)> {
-    Some(fit.velocity_at(middle_of_frame(scan)?))
-}
-
-/// A scan with its time and the way of the sample: that of the fit, or without one that of a steady drift.
-pub(crate) fn with_motion(
-    found: ScanAnalysis,
-    fit: Option<&JointFit>,
-    scan: &MeasuredScan,
-) -> ScanAnalysis {
-    let of = |velocity| {
-        let middle = middle_of_frame(scan)?;
-        let steady = || DriftPath::steady(velocity, middle);
-        Some(Motion {
-            middle,
-            path: fit.map_or_else(steady, JointFit::path),
-        })
-    };
-    ScanAnalysis {
-        motion: found.drift.and_then(of),
-        ..found
-    }
 }
 
 #[cfg(test)]

@@ -3,10 +3,12 @@
 pub(crate) mod about;
 pub(crate) mod analyse;
 pub(crate) mod common;
+pub(crate) mod drift;
 pub(crate) mod faint;
 pub(crate) mod ground;
 pub(crate) mod headers;
 pub(crate) mod joint;
+pub(crate) mod mean;
 pub(crate) mod moire;
 pub(crate) mod published;
 pub(crate) mod scan;

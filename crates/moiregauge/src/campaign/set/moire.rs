@@ -9,12 +9,15 @@ use std::f64::consts::FRAC_PI_6;
 
 use heterostrain::lattice::Lattice;
 use heterostrain::material::{Bilayer, Material};
-use heterostrain::strain::{TwistStrain, twist_strain};
+use heterostrain::strain::{TwistStrain, draws, twist_strain};
+use rayon::prelude::*;
 
 use crate::calibration::KnownLattice;
 use crate::campaign::analysis::{ScanAnalysis, SetMean};
 use crate::caveat::Caveat;
 use crate::caveat::moires::{Impossible, MoireDoubt, PeriodDoubt};
+use crate::numbers::interrupt;
+use crate::numbers::rng::normals;
 use crate::settings::knobs::Settings;
 
 /// Heterostrains of layers on each other stay below a few tenths of a per cent, rarely a per cent; more
@@ -38,6 +41,24 @@ fn is_below_30_degrees(found: &TwistStrain, settings: &Settings) -> bool {
     let layers = settings.bilayer();
     let hexagonal = layers.reference.is_hexagonal() && layers.stretched.is_hexagonal();
     found.twist.abs() <= FRAC_PI_6 || !hexagonal
+}
+
+/// Draws twist and strain of every scan.
+pub(crate) fn draw(scans: &mut [ScanAnalysis], settings: &Settings, first_index: u64) {
+    scans.par_iter_mut().enumerate().for_each(|(i, scan)| {
+        interrupt::check();
+        let lattice = scan.drift_corrected.as_ref().unwrap_or(&scan.sensor);
+        if moire(lattice, settings).is_none() {
+            return;
+        }
+        scan.draws = draws(
+            lattice,
+            settings.bilayer(),
+            settings.strain_convention,
+            settings.strain_draws,
+            normals(settings.seed, "strain", first_index + i as u64),
+        );
+    });
 }
 
 /// Says where a lattice is no moiré, or hardly one.

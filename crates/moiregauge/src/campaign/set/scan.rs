@@ -4,14 +4,34 @@ use heterostrain::Estimate;
 use heterostrain::lattice::{Lattice, Nm, Pair, Px, labelled_like};
 use nalgebra::{Matrix2, Matrix4, Vector2};
 
-use crate::campaign::analysis::{LineAnalysis, ScanAnalysis};
+use crate::campaign::analysis::{Drift, LineAnalysis, Motion, ScanAnalysis};
 use crate::campaign::set::moire::moire;
+use crate::campaign::sightings::middle_of_frame;
+use crate::drift::joint::found::JointFit;
+use crate::drift::joint::path::DriftPath;
 use crate::drift::linear::{Observation, common_lattice};
 use crate::scan::measured::{MeasuredLine, MeasuredScan};
 use crate::settings::knobs::Settings;
 
+/// A scan before and after its drift is taken off: its own by the `fit` of the set, or else the mean one.
+pub(crate) fn scan_at_drift(
+    scan: &MeasuredScan,
+    seen: &[Observation],
+    reference: &Matrix2<f64>,
+    drift: Option<&Drift>,
+    fit: Option<&JointFit>,
+    settings: &Settings,
+) -> Option<ScanAnalysis> {
+    let drift = drift.map(|mean| {
+        let own = fit.and_then(|fit| velocity_of(fit, scan));
+        own.unwrap_or((mean.velocity, mean.covariance))
+    });
+    let found = scan_analysis(scan, seen, reference, drift, settings)?;
+    Some(with_motion(found, fit, scan))
+}
+
 /// Without its motion, which the fit of its set tells.
-pub(crate) fn scan_analysis(
+fn scan_analysis(
     scan: &MeasuredScan,
     seen: &[Observation],
     reference: &Matrix2<f64>,
@@ -107,4 +127,25 @@ pub(crate) fn plain_mean<Space>(all: &[Pair<Space, Nm>]) -> Option<Pair<Space, N
             all.iter().map(|l| l.covariance).sum::<Matrix4<f64>>() / (n * n),
         )
     })
+}
+
+/// The drift of each scan, by the time of its middle.
+fn velocity_of(fit: &JointFit, scan: &MeasuredScan) -> Option<(Vector2<f64>, Matrix2<f64>)> {
+    Some(fit.velocity_at(middle_of_frame(scan)?))
+}
+
+/// A scan with its time and the way of the sample: that of the fit, or without one that of a steady drift.
+fn with_motion(found: ScanAnalysis, fit: Option<&JointFit>, scan: &MeasuredScan) -> ScanAnalysis {
+    let of = |velocity| {
+        let middle = middle_of_frame(scan)?;
+        let steady = || DriftPath::steady(velocity, middle);
+        Some(Motion {
+            middle,
+            path: fit.map_or_else(steady, JointFit::path),
+        })
+    };
+    ScanAnalysis {
+        motion: found.drift.and_then(of),
+        ..found
+    }
 }

@@ -14,8 +14,8 @@ use rayon::prelude::*;
 
 use crate::drift::joint::arrow::{Arrow, BlockSums, ScanSums};
 use crate::drift::joint::evaluate::{Linearised, PhaseMiss, linearise, phases};
+use crate::drift::joint::found::JointFit;
 use crate::drift::joint::instability::instability;
-use crate::drift::joint::solve::JointFit;
 use crate::numbers::rng::stream;
 
 /// Directions in which a scan alone determines a parameter have a residual of zero: below this share of the largest

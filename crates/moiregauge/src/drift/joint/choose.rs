@@ -1,19 +1,68 @@
 //! Which terms a fit has: those that lower the Bayesian information criterion.
 
-use crate::drift::joint::sighting::Terms;
-use crate::drift::joint::solve::{JointFit, Problem, TestedTerm};
+use nalgebra::{Matrix2, Vector2};
+
+use crate::drift::joint::found::{JointFit, TestedTerm};
+use crate::drift::joint::sighting::{Sighting, Terms};
+use crate::drift::joint::solve::Problem;
 
 /// Settling times that are tried, as shares of the duration of the campaign: factors of two, between which curves
 /// differ little.
 const SETTLING: [f64; 5] = [0.05, 0.1, 0.2, 0.4, 0.8];
-/// Errors of the lattice that grow by more than this say that a term is not determined. Chosen by eye; see
-/// docs/constants.md.
-const LOOSE: f64 = 3.0;
 /// Fewer scans than this cannot tell an exponential from a parabola. Chosen by eye.
 const FEWEST_SETTLING: usize = 6;
 
+/// Fits all sightings together and adds the terms that earn it by an information criterion.
+///
+/// The reciprocal `pair` (rad/nm) and the drift `velocity` (nm/s) are those of the linear solution, `time_sigma` is the standard uncertainty of a frame time, s. `None` where the sightings do not determine lattice
+/// and drift.
+pub fn fit(
+    sightings: &[Sighting],
+    pair: &Matrix2<f64>,
+    velocity: &Vector2<f64>,
+    time_sigma: f64,
+) -> Option<JointFit> {
+    let (problem, mut best) = Problem::linked(sightings, pair, velocity, time_sigma)?;
+    let plain = Terms::default();
+    let (pair, velocity) = (best.waves.basis, best.velocity);
+    if sightings.iter().any(|s| s.phases.is_some()) {
+        // Over a long campaign a drift that changes can be linked only as what it is.
+        let linked = [false, true].into_iter().find_map(|acceleration| {
+            let terms = Terms {
+                phases: true,
+                acceleration,
+                ..plain
+            };
+            let linked = problem.solve(terms, &pair, &velocity, None);
+            linked.filter(|fit| !fit.loosens(&best))
+        });
+        best = linked.unwrap_or(best);
+    }
+    Some(with_terms(&problem, best))
+}
+
+/// The covariance that a fit with a constant drift has for sightings that are exactly what the model says:
+/// nothing is chosen, nothing scatters. Otherwise as [`fit`].
+pub(crate) fn foreseen(
+    sightings: &[Sighting],
+    pair: &Matrix2<f64>,
+    velocity: &Vector2<f64>,
+    time_sigma: f64,
+) -> Option<JointFit> {
+    let (problem, plain) = Problem::linked(sightings, pair, velocity, time_sigma)?;
+    let with_phases = Terms {
+        phases: sightings.iter().any(|s| s.phases.is_some()),
+        ..Terms::default()
+    };
+    Some(
+        problem
+            .solve(with_phases, pair, velocity, Some(0.0))
+            .unwrap_or(plain),
+    )
+}
+
 /// The fit with the terms that earn their place beside those of `best`.
-pub(crate) fn terms(problem: &Problem, best: JointFit) -> JointFit {
+fn with_terms(problem: &Problem, best: JointFit) -> JointFit {
     let sightings = &problem.sightings;
     let times = || sightings.iter().map(|s| s.time);
     let duration =
@@ -84,7 +133,10 @@ impl<'a> Choice<'a> {
         let plain = problem.solve(base, &best.waves.basis, &best.velocity, None);
         // Where only a changing drift can be linked there is nothing simpler to compare with.
         let (best, lowest) = match plain {
-            Some(fit) => (fit.clone(), criterion(&fit)),
+            Some(fit) => {
+                let lowest = fit.criterion();
+                (fit, lowest)
+            }
             None => (best, f64::INFINITY),
         };
         Self {
@@ -102,7 +154,7 @@ impl<'a> Choice<'a> {
             let Some(fit) = self.problem.solve(terms, &pair, &velocity, None) else {
                 continue;
             };
-            if self.lowest.is_finite() && loosens(&fit, &self.best) {
+            if self.lowest.is_finite() && fit.loosens(&self.best) {
                 continue;
             }
             let name = if terms.fast_gain {
@@ -112,7 +164,7 @@ impl<'a> Choice<'a> {
             } else {
                 EXPONENTIAL
             };
-            let value = criterion(&fit);
+            let value = fit.criterion();
             let gain = if before.is_finite() {
                 before - value
             } else {
@@ -128,22 +180,4 @@ impl<'a> Choice<'a> {
             }
         }
     }
-}
-
-/// Whether a fit knows the lattice much worse than a simpler one: its terms cannot be told from the lattice (two scans
-/// do not tell a drift that changes), so that no χ² speaks for them.
-pub(crate) fn loosens(fit: &JointFit, simpler: &JointFit) -> bool {
-    let variance = |fit: &JointFit, i: usize| fit.unscaled.shared[(i, i)];
-    (0..4).any(|i| variance(fit, i) > LOOSE * LOOSE * variance(simpler, i))
-}
-
-/// Bayesian information criterion, up to a constant: −2 ln L and ln n for each parameter. A settling time is a
-/// parameter as well, and so is the scatter of positions, which lowers χ² at the cost of wider distributions: a
-/// drift that changes must not pass for scatter.
-pub(crate) fn criterion(fit: &JointFit) -> f64 {
-    let n = (fit.degrees_of_freedom + fit.layout.size()) as f64;
-    let settling = usize::from(fit.terms.settling.is_some());
-    let scatter = usize::from(fit.instability_nm > 0.0);
-    let parameters = fit.layout.count() + settling + scatter;
-    fit.chi2 + fit.widening + parameters as f64 * n.ln()
 }

@@ -20,6 +20,7 @@ pub(crate) mod arrow;
 pub(crate) mod checks;
 pub(crate) mod choose;
 pub(crate) mod evaluate;
+pub(crate) mod found;
 pub(crate) mod instability;
 pub(crate) mod link;
 pub(crate) mod parts;
@@ -30,6 +31,7 @@ pub(crate) mod solve;
 mod tests;
 
 pub use checks::{LeftOut, Resampled};
+pub use choose::fit;
+pub use found::{JointFit, TestedTerm};
 pub use path::DriftPath;
 pub use sighting::{Sighting, Terms};
-pub use solve::{JointFit, TestedTerm, fit};

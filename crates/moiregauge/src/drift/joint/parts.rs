@@ -11,7 +11,7 @@ use nalgebra::{DVector, Matrix4, Matrix4xX};
 
 use crate::drift::joint::arrow::{Arrow, ScanSums, Whitened};
 use crate::drift::joint::evaluate::{factor, linearise};
-use crate::drift::joint::solve::JointFit;
+use crate::drift::joint::found::JointFit;
 use crate::drift::shares::Statistical;
 
 impl JointFit {

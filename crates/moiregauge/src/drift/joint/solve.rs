@@ -1,16 +1,14 @@
-//! Gauss–Newton over all parameters, phases linked outwards from the middle of the campaign, and the
-//! choice of terms.
+//! Gauss–Newton over all parameters, phases linked outwards from the middle of the campaign.
 
 use heterostrain::Estimate;
 use heterostrain::lattice::Waves;
 use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
 
 use crate::drift::joint::arrow::{Arrow, ScanSums};
-use crate::drift::joint::choose;
 use crate::drift::joint::evaluate::{DRIFT, Layout, linearise, wrapped};
+use crate::drift::joint::found::{JointFit, motion};
 use crate::drift::joint::instability::instability as estimate;
 use crate::drift::joint::link::number_blocks;
-use crate::drift::joint::path::DriftPath;
 use crate::drift::joint::sighting::{Sighting, Terms};
 use crate::numbers::chi2::enlargement;
 use crate::numbers::normal_equations::NormalEquations;
@@ -29,142 +27,6 @@ const LINKED: f64 = 0.08;
 /// 100 squared, as in the linear fit.
 const WORST_CONDITION: f64 = 1e4;
 
-/// The result of the fit over all scans.
-#[derive(Clone, Debug)]
-pub struct JointFit {
-    /// Reciprocal pair free of drift, rad/nm.
-    pub waves: Waves,
-    /// Drift velocity in the middle of the campaign, nm/s, and its covariance.
-    pub velocity: Vector2<f64>,
-    /// Covariance of `velocity`, (nm/s)².
-    pub velocity_covariance: Matrix2<f64>,
-    /// Acceleration, nm/s², where it earned its place.
-    pub acceleration: Option<Vector2<f64>>,
-    /// Relative gain error of the fast axis with its uncertainty, where it earned its place.
-    pub fast_gain: Option<Estimate>,
-    /// The terms that the fit has.
-    pub terms: Terms,
-    /// Standard deviation of positions about the fit beyond the phase noise, nm.
-    pub instability_nm: f64,
-    /// Weighted sum of squared residuals and its degrees of freedom.
-    pub chi2: f64,
-    /// Degrees of freedom of `chi2`.
-    pub degrees_of_freedom: usize,
-    /// What the instability adds to the logarithm of the determinant of the covariance of what was measured.
-    pub(crate) widening: f64,
-    /// The terms that were tried beside a constant drift, and what the criterion said.
-    pub tested: Vec<TestedTerm>,
-    /// What was fitted, with the blocks of linked scans.
-    pub(crate) sightings: Vec<Sighting>,
-    pub(crate) layout: Layout,
-    pub(crate) solution: DVector<f64>,
-    /// Covariance of `solution`, as the errors of the sightings make it.
-    pub(crate) unscaled: Arrow,
-    /// That of the parameters that all scans share, enlarged where the scans scatter more.
-    pub(crate) covariance: DMatrix<f64>,
-}
-
-/// A term that was tried.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[non_exhaustive]
-pub struct TestedTerm {
-    /// What it is called.
-    pub name: &'static str,
-    /// By how much it lowers the Bayesian information criterion; it is used if this is positive (and,
-    /// of two that describe a changing drift, the larger).
-    pub gain: f64,
-    /// Whether the fit has it.
-    pub used: bool,
-}
-
-impl JointFit {
-    /// What was fitted, with the blocks of linked scans.
-    pub(crate) fn sightings(&self) -> &[Sighting] {
-        &self.sightings
-    }
-
-    /// Bayesian information criterion, up to a constant that fits of the same data with phases have in common.
-    pub(crate) fn criterion(&self) -> f64 {
-        choose::criterion(self)
-    }
-
-    /// Drift velocity at a time (same origin as the sightings), nm/s, with its covariance.
-    pub fn velocity_at(&self, time: f64) -> (Vector2<f64>, Matrix2<f64>) {
-        motion(&self.layout, &self.solution, &self.covariance, time)
-    }
-
-    /// The way of the sample (times of the same origin as the sightings).
-    pub fn path(&self) -> DriftPath {
-        self.layout.path(&self.solution)
-    }
-}
-
-/// Drift velocity at a time and its covariance.
-fn motion(
-    layout: &Layout,
-    x: &DVector<f64>,
-    covariance: &DMatrix<f64>,
-    time: f64,
-) -> (Vector2<f64>, Matrix2<f64>) {
-    let (_, velocity) = layout.motion(x, time);
-    let mut of_velocity = Matrix2::zeros();
-    for (i, _, a) in layout.drift_weights(time) {
-        for (j, _, b) in layout.drift_weights(time) {
-            of_velocity += a * b * covariance.fixed_view::<2, 2>(i, j);
-        }
-    }
-    (velocity, of_velocity)
-}
-
-/// Fits all sightings together and adds the terms that earn it by an information criterion.
-///
-/// The reciprocal `pair` (rad/nm) and the drift `velocity` (nm/s) are those of the linear solution, `time_sigma` is the standard uncertainty of a frame time, s. `None` where the sightings do not determine lattice
-/// and drift.
-pub fn fit(
-    sightings: &[Sighting],
-    pair: &Matrix2<f64>,
-    velocity: &Vector2<f64>,
-    time_sigma: f64,
-) -> Option<JointFit> {
-    let (problem, mut best) = Problem::linked(sightings, pair, velocity, time_sigma)?;
-    let plain = Terms::default();
-    let (pair, velocity) = (best.waves.basis, best.velocity);
-    if sightings.iter().any(|s| s.phases.is_some()) {
-        // Over a long campaign a drift that changes can be linked only as what it is.
-        let linked = [false, true].into_iter().find_map(|acceleration| {
-            let terms = Terms {
-                phases: true,
-                acceleration,
-                ..plain
-            };
-            let linked = problem.solve(terms, &pair, &velocity, None);
-            linked.filter(|fit| !choose::loosens(fit, &best))
-        });
-        best = linked.unwrap_or(best);
-    }
-    Some(choose::terms(&problem, best))
-}
-
-/// The covariance that a fit with a constant drift has for sightings that are exactly what the model says:
-/// nothing is chosen, nothing scatters. Otherwise as [`fit`].
-pub(crate) fn foreseen(
-    sightings: &[Sighting],
-    pair: &Matrix2<f64>,
-    velocity: &Vector2<f64>,
-    time_sigma: f64,
-) -> Option<JointFit> {
-    let (problem, plain) = Problem::linked(sightings, pair, velocity, time_sigma)?;
-    let with_phases = Terms {
-        phases: sightings.iter().any(|s| s.phases.is_some()),
-        ..Terms::default()
-    };
-    Some(
-        problem
-            .solve(with_phases, pair, velocity, Some(0.0))
-            .unwrap_or(plain),
-    )
-}
-
 /// What is fitted.
 pub(crate) struct Problem {
     pub(crate) sightings: Vec<Sighting>,
@@ -174,7 +36,7 @@ pub(crate) struct Problem {
 impl Problem {
     /// The problem with its scans in blocks whose phases can be linked, and the fit without phases that tells
     /// the blocks.
-    fn linked(
+    pub(crate) fn linked(
         sightings: &[Sighting],
         pair: &Matrix2<f64>,
         velocity: &Vector2<f64>,

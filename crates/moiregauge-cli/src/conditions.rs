@@ -7,7 +7,7 @@ use moiregauge::simulate::Simulation;
 use moiregauge_pipeline::validate::{LikeError, conditions_like};
 use moiregauge_pipeline::{Job, Known};
 
-use crate::analyze::with_advice;
+use crate::errors::with_advice;
 use crate::paths::expand;
 
 /// Those of a settings file or of the user's own scans; `None` without either.

@@ -3,7 +3,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::results::Run;
+use super::run::Run;
+use crate::input::{FailedInput, InputFile};
 
 /// What is needed to make the numbers again.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -19,24 +20,4 @@ pub struct Provenance {
     /// What was asked, for a repetition.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub run: Option<Run>,
-}
-
-/// An input, known by its content.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-pub struct InputFile {
-    /// The file as the user named it.
-    pub file: String,
-    /// SHA-256 of its bytes, hexadecimal.
-    pub sha256: String,
-    /// Its size in bytes.
-    pub bytes: u64,
-}
-
-/// An input that could not be used.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-pub struct FailedInput {
-    /// The file as the user named it.
-    pub file: String,
-    /// What was expected and what was found.
-    pub error: String,
 }

@@ -1,0 +1,128 @@
+//! The drift of a set as a constant velocity: given, published, or the linear solution.
+
+use nalgebra::Matrix2;
+
+use crate::campaign::analysis::{Drift, DriftFit};
+use crate::campaign::set::headers::about_dates;
+use crate::campaign::set::published;
+use crate::campaign::set::solved::Solved;
+use crate::caveat::Caveat;
+use crate::caveat::drifting::DriftDoubt;
+use crate::drift::linear::{DriftSolution, Observation, at_known_drift, common_lattice, solve};
+use crate::drift::monte_carlo;
+use crate::drift::paper::successive_drift;
+use crate::drift::shares::Statistical;
+use crate::numbers::chi2::enlargement;
+use crate::scan::measured::MeasuredScan;
+use crate::settings::knobs::{GivenDrift, Settings};
+use crate::spectrum::method::Method;
+
+/// nm/min → nm/s.
+const PER_MINUTE: f64 = 1.0 / 60.0;
+
+/// The drift and the lattice of the scans of a set; `None`, and a word, where they do not tell them.
+pub(crate) fn constant_drift(
+    name: &str,
+    scans: &[&MeasuredScan],
+    all: &[Observation],
+    settings: &Settings,
+    caveats: &mut Vec<Caveat>,
+) -> Option<Solved> {
+    if scans.is_empty() {
+        return None;
+    }
+    if scans
+        .iter()
+        .any(|s| s.lines.iter().any(|l| l.timing.is_none()))
+    {
+        caveats.push(Caveat::new(DriftDoubt::NoTiming, name));
+        return None;
+    }
+    caveats.extend(about_dates(name, scans));
+    if let Some(given) = settings.drift {
+        return given_drift(name, all, given, caveats);
+    }
+    match solve(all) {
+        Ok(solution) if settings.method != Method::Paper => {
+            linear_drift(name, scans, all, &solution, settings)
+        }
+        Ok(solution) => {
+            let scans = published::paper_scans(scans, all);
+            published::drift(name, &scans, all, &solution, settings, caveats)
+        }
+        Err(error) => {
+            let reason = error.to_string();
+            caveats.push(Caveat::new(DriftDoubt::Undetermined { reason }, name));
+            None
+        }
+    }
+}
+
+/// The linear solution, its errors enlarged for scatter.
+fn linear_drift(
+    name: &str,
+    scans: &[&MeasuredScan],
+    all: &[Observation],
+    solution: &DriftSolution,
+    settings: &Settings,
+) -> Option<Solved> {
+    let scale = enlargement(solution.chi2, solution.degrees_of_freedom);
+    let mut lattice = solution.lattice;
+    lattice.covariance *= scale;
+    let statistical = Statistical::at_known_drift(at_known_drift(all)?, scale, &lattice.covariance);
+    let stream = format!("drift {name}");
+    Some(Solved {
+        drift: Drift {
+            velocity: solution.velocity,
+            covariance: solution.covariance * scale,
+            given: false,
+            fit: Some(DriftFit {
+                rank: solution.rank,
+                condition: solution.condition,
+                chi2: solution.chi2,
+                degrees_of_freedom: solution.degrees_of_freedom,
+                paper_velocity: successive_drift(&published::paper_scans(scans, all)),
+            }),
+            monte_carlo: monte_carlo(all, settings.drift_draws, settings.seed, &stream),
+            joint: None,
+        },
+        lattice,
+        statistical,
+        chi2: solution.chi2,
+        freedom: solution.degrees_of_freedom,
+        enlargement: scale,
+    })
+}
+
+fn given_drift(
+    name: &str,
+    all: &[Observation],
+    given: GivenDrift,
+    caveats: &mut Vec<Caveat>,
+) -> Option<Solved> {
+    let velocity = given.velocity();
+    let sigma = given.sigma_nm_per_min * PER_MINUTE;
+    let covariance = Matrix2::identity() * sigma * sigma;
+    caveats.push(Caveat::new(DriftDoubt::Given, name));
+    let (mut lattice, chi2, freedom) = common_lattice(all, &velocity, &covariance).ok()?;
+    // Scatter enlarges what the scans say, not what the user said of the drift.
+    let (measured, _, _) = common_lattice(all, &velocity, &Matrix2::zeros()).ok()?;
+    let scale = enlargement(chi2, freedom);
+    lattice.covariance += measured.covariance * (scale - 1.0);
+    let parts = at_known_drift(all)?;
+    Some(Solved {
+        drift: Drift {
+            velocity,
+            covariance,
+            given: true,
+            fit: None,
+            monte_carlo: None,
+            joint: None,
+        },
+        statistical: Statistical::at_known_drift(parts, scale, &lattice.covariance),
+        lattice,
+        chi2,
+        freedom,
+        enlargement: scale,
+    })
+}
