@@ -5,7 +5,7 @@ use nalgebra::{Matrix2, Matrix4};
 use serde::{Deserialize, Serialize};
 
 use crate::coverage::bend::Mean;
-use crate::lattice::fit::fit_pixels::LatticeFit;
+use crate::lattice::fit::fitted::LatticeFit;
 use crate::numbers::exact;
 
 /// What a mean over an area owes to how the change is described and to where the area ends: every image of the sample owes it, and

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use crate::coverage::bend::Change;
 use crate::coverage::patch::Patch;
 use crate::lattice::common::Common;
-use crate::lattice::fit::fit_pixels::LatticeFit;
+use crate::lattice::fit::fitted::LatticeFit;
 use crate::lattice::paper::PublishedPeaks;
 use crate::numbers::exact;
 use crate::spectrum::phases::Phases;

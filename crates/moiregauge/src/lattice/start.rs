@@ -15,8 +15,8 @@ use crate::frame::clip::cut_off;
 use crate::frame::geometry::Geometry;
 use crate::frame::image::Image;
 use crate::lattice::common::Common;
-use crate::lattice::fit::fit_pixels as fit;
-use crate::lattice::fit::fit_pixels::LatticeFit;
+use crate::lattice::fit::fitted::LatticeFit;
+use crate::lattice::fit::measure as fit;
 use crate::lattice::measured::{Grain, MeasuredLattice};
 use crate::lattice::{autocorrelation, fourier, paper};
 use crate::spectrum::error::{LatticeError, THIRD};
@@ -24,11 +24,9 @@ use crate::spectrum::harmonics::Harmonics;
 use crate::spectrum::look::bins_for;
 use crate::spectrum::method::Method;
 use crate::spectrum::phases::Phases;
-use crate::spectrum::prepare::{
-    Prepared, Verdict, binned, middle, phases, prepare, prepare_levelled, refine, signal_to_noise,
-    verdict,
-};
+use crate::spectrum::prepare::{Prepared, binned, middle, phases, prepare, prepare_levelled};
 use crate::spectrum::transform::Spectrum;
+use crate::spectrum::verdict::{Verdict, refine, signal_to_noise, verdict};
 use crate::spectrum::{known, rescue, select};
 
 /// A lattice whose waves bend so much that a transform of the whole patch does not show them has at least so many unit

@@ -8,8 +8,8 @@
 use heterostrain::Estimate;
 use nalgebra::{Matrix2, Vector2};
 
-use crate::map::combine::View;
 use crate::map::sample::LatticeMap;
+use crate::map::view::View;
 use crate::window::mask::Mask;
 
 /// χ² of two numbers that is more than chance: p < 0.01, a convention.

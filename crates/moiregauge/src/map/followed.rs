@@ -5,7 +5,8 @@ use nalgebra::{Matrix2, Vector2};
 use crate::frame::image::Image;
 use crate::frame::resample::at;
 use crate::map::gauge::Gauge;
-use crate::map::sample::{Grid, LatticeMap};
+use crate::map::nodes::Grid;
+use crate::map::sample::LatticeMap;
 use crate::window::mask::Mask;
 
 /// The displacement field of a map: cubic between nodes, nothing beyond those whose phase could be followed.

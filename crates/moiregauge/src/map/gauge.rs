@@ -9,7 +9,7 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use heterostrain::lattice::{Nm, Waves};
 use nalgebra::{Matrix2, Vector2};
 
-use crate::map::sample::{Grid, LatticeNode};
+use crate::map::nodes::{Grid, LatticeNode};
 use crate::window::mask::Mask;
 
 /// What displacements count from.

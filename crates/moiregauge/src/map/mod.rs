@@ -22,6 +22,7 @@ pub(crate) mod followed;
 pub(crate) mod gauge;
 pub(crate) mod local;
 pub(crate) mod mosaic;
+pub(crate) mod nodes;
 pub(crate) mod one_gauge;
 #[cfg(test)]
 mod pattern_tests;
@@ -36,6 +37,7 @@ pub(crate) mod survey;
 #[cfg(test)]
 pub(crate) mod tests;
 pub(crate) mod undistorted;
+pub(crate) mod view;
 pub(crate) mod waves;
 
 pub use cell::MeanCell;
@@ -43,10 +45,11 @@ pub use combine::{Agreement, combine, combine_frames};
 pub use drift_change::{DriftChange, drift_change};
 pub use gauge::Gauge;
 pub use local::local_lattices;
+pub use nodes::{Grid, LatticeNode};
 pub use quantities::{Plane, TwistStrainMap};
 pub use register::{Registration, register};
 pub use registry::RegistryMap;
-pub use sample::{Grid, LatticeMap, LatticeNode};
+pub use sample::LatticeMap;
 pub use summary::Spread;
 pub use survey::Survey;
 pub use undistorted::Undistorted;

@@ -2,8 +2,8 @@
 
 use nalgebra::{Matrix2, Vector2};
 
+use crate::map::nodes::Grid;
 use crate::map::quantities::TwistStrainMap;
-use crate::map::sample::Grid;
 use crate::window::mask::Mask;
 
 impl TwistStrainMap {

@@ -5,9 +5,9 @@
 
 use nalgebra::Vector2;
 
-use crate::map::combine::View;
 use crate::map::gauge::Gauge;
 use crate::map::sample::LatticeMap;
+use crate::map::view::View;
 use crate::window::mask::Mask;
 
 /// Nodes that two maps have to share before displacements of one are put on the other: three by three.

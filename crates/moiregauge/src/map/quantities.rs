@@ -4,7 +4,8 @@ use heterostrain::Estimate;
 use heterostrain::strain::TwistStrain;
 use nalgebra::Vector2;
 
-use crate::map::sample::{Grid, LatticeMap};
+use crate::map::nodes::Grid;
+use crate::map::sample::LatticeMap;
 use crate::window::mask::Mask;
 
 /// One quantity on all nodes, row by row; NaN where there is none.

@@ -11,8 +11,8 @@ use std::f64::consts::{PI, TAU};
 use heterostrain::Estimate;
 use nalgebra::{Matrix2, Vector2, Vector3};
 
-use crate::map::combine::View;
 use crate::map::sample::LatticeMap;
+use crate::map::view::View;
 use crate::window::mask::Mask;
 
 /// Nodes that two maps have to share: three by three, one window.

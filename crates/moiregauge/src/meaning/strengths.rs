@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use heterostrain::lattice::reciprocal;
 use nalgebra::{Matrix2, Vector2};
 
-use crate::lattice::fit::fit_pixels::LatticeFit;
+use crate::lattice::fit::fitted::LatticeFit;
 
 /// Standard deviations between an amplitude and its bounds: 3, as for what deserves a word.
 const SIGMAS: f64 = 3.0;

@@ -8,7 +8,7 @@
 use nalgebra::Vector2;
 use rayon::prelude::*;
 
-use crate::map::sample::Grid;
+use crate::map::nodes::Grid;
 use crate::numbers::interrupt;
 
 /// Beyond this many windows nodes count as independent: e⁻¹² is left.

@@ -7,8 +7,8 @@
 use nalgebra::Vector2;
 use rayon::prelude::*;
 
+use crate::map::nodes::Grid;
 use crate::map::quantities::TwistStrainMap;
-use crate::map::sample::Grid;
 use crate::numbers::interrupt;
 use crate::region::correlation::pairs;
 use crate::region::polygon::Region;

@@ -3,7 +3,7 @@
 use nalgebra::{Rotation2, Vector2};
 
 use crate::frame::polygon;
-use crate::map::sample::Grid;
+use crate::map::nodes::Grid;
 
 /// An area of a map with a name.
 #[derive(Clone, Debug, PartialEq)]

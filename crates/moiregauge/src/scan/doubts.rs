@@ -9,7 +9,7 @@ use crate::coverage::bend::{Change, ChangeModel};
 use crate::frame::geometry::Geometry;
 use crate::lattice::fit::bend::Inhomogeneity;
 use crate::lattice::fit::closure::Closure;
-use crate::lattice::fit::fit_pixels::LatticeFit;
+use crate::lattice::fit::fitted::LatticeFit;
 use crate::lattice::fit::noise::ForeignWave;
 use crate::lattice::measured::{Grain, MeasuredLattice};
 use crate::numbers::chi2;

@@ -15,7 +15,7 @@ use std::f64::consts::TAU;
 
 use rustfft::num_complex::Complex64;
 
-use crate::lattice::fit::fit_pixels::LatticeFit;
+use crate::lattice::fit::fitted::LatticeFit;
 
 /// A harmonic of the other image is the same one if it is nearer than this share of it: below half, where the next is as near.
 const SAME: f64 = 0.2;

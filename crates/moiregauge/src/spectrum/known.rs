@@ -17,12 +17,13 @@ use crate::frame::image::Image;
 use crate::numbers::three::three;
 use crate::spectrum::error::LatticeError;
 use crate::spectrum::harmonics::Windowed;
-use crate::spectrum::prepare::{Prepared, Verdict, binned, levelled, signal_to_noise, verdict};
+use crate::spectrum::prepare::{Prepared, binned, levelled};
 use crate::spectrum::select::{
     Candidate, Orders, Peak, by_score, frame_cycles, score, spectrum_peaks, well_explained,
 };
 use crate::spectrum::shells::shells;
 use crate::spectrum::transform::Spectrum;
+use crate::spectrum::verdict::{Verdict, signal_to_noise, verdict};
 
 /// The lattice may be smaller or larger than expected by this factor: less than √3, by which the second
 /// harmonics of a hexagon differ from the first.

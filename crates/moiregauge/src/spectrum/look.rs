@@ -17,8 +17,8 @@ use crate::frame::smaller::{mean_over, response, smaller};
 use crate::numbers::dot::dot;
 use crate::numbers::interrupt;
 use crate::spectrum::harmonics::Harmonics;
-use crate::spectrum::prepare::{Verdict, refine, signal_to_noise, verdict};
 use crate::spectrum::transform::{Spectrum, hann};
+use crate::spectrum::verdict::{Verdict, refine, signal_to_noise, verdict};
 use crate::spectrum::{high_orders, select};
 
 /// Images of fewer pixels than twice this many are looked at as they are; others in about so many bins, whose transform

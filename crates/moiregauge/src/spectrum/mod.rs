@@ -15,6 +15,7 @@ pub(crate) mod rescue;
 pub(crate) mod select;
 pub(crate) mod shells;
 pub(crate) mod transform;
+pub(crate) mod verdict;
 
 pub use error::LatticeError;
 pub use method::Method;

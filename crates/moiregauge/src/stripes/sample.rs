@@ -10,8 +10,8 @@ use nalgebra::{Matrix2, Vector2};
 
 use crate::frame::geometry::Geometry;
 use crate::map::combine::Agreement;
+use crate::map::nodes::Grid;
 use crate::map::quantities::{Plane, TwistStrainMap};
-use crate::map::sample::Grid;
 use crate::map::summary::Spread;
 use crate::numbers::chi2::enlargement;
 use crate::stripes::types::{StripeMap, StripeNode};

@@ -70,8 +70,8 @@ mod tests {
 
     use super::pattern_of_scan;
     use crate::campaign::analyse;
+    use crate::map::nodes::Grid;
     use crate::map::registry::RegistryMap;
-    use crate::map::sample::Grid;
     use crate::scan::measure::measure_scan;
     use crate::settings::knobs::Settings;
     use crate::simulate::bend::Bend;

@@ -5,10 +5,11 @@ use nalgebra::{DMatrix, Vector2};
 use crate::lattice::fit::fit_pixels::{FinalNoise, Fit, ROUNDS};
 use crate::lattice::fit::frame::{Basis, STRAIGHT, wave};
 use crate::lattice::fit::gram::gram;
-use crate::lattice::fit::model::{Clip, Tables, look};
+use crate::lattice::fit::model::{Clip, look};
 use crate::lattice::fit::noise::Leverage;
 use crate::lattice::fit::solve;
-use crate::spectrum::harmonics::{Harmonic, Harmonics};
+use crate::lattice::fit::tables::Tables;
+use crate::spectrum::harmonics::Harmonics;
 use crate::spectrum::shells::{FIRST_SHELL, shells};
 
 /// A harmonic of which less than this share is left by those that are fitted cannot be told from them. Chosen by eye.
@@ -26,24 +27,6 @@ const SKETCHABLE: f64 = 60.0;
 const GOLDEN: f64 = 0.618_033_988_749_895;
 /// Largest wave vector, as a share of the Nyquist frequency. Chosen by eye.
 const HIGHEST: f64 = 0.9;
-
-/// What the fit starts with: the first shell, and of the others what the spectrum shows clearly.
-/// `None` where the first shell is not complete (one of it beyond the Nyquist frequency).
-pub(crate) fn at_first(start: &Harmonics, pixels: usize) -> Option<Vec<([i32; 2], &Harmonic)>> {
-    let inverse = start.pair.try_inverse()?;
-    let price = (pixels as f64).ln();
-    let found = start.list.iter().map(|harmonic| {
-        let index = (inverse * harmonic.q).map(|n| n.round() as i32);
-        ([index.x, index.y], harmonic)
-    });
-    let chosen: Vec<_> = found
-        .filter(|(index, harmonic)| {
-            FIRST_SHELL.contains(index) || harmonic.significance(start.window_sums) > price
-        })
-        .collect();
-    let first = chosen.iter().map(|(index, _)| *index).take(3);
-    first.eq(FIRST_SHELL).then_some(chosen)
-}
 
 impl Fit<'_> {
     /// Whether a few lines of the image are enough to get near the end.

@@ -1,26 +1,24 @@
 //! The fit itself: Gauss–Newton on two wave vectors, harmonics added where they earn it.
 
 use heterostrain::lattice::{Lattice, Px, Waves};
-use nalgebra::{DMatrix, DVector, Matrix2, Matrix3, SMatrix, Vector2};
+use nalgebra::{DMatrix, DVector, Matrix2, SMatrix, Vector2};
 use rustfft::num_complex::Complex64;
-use serde::{Deserialize, Serialize};
 
 use crate::frame::background::Background;
 use crate::frame::image::Image;
-use crate::lattice::fit::bend::{FOLLOWED, Inhomogeneity};
-use crate::lattice::fit::closure::Closure;
+use crate::lattice::fit::bend::Inhomogeneity;
+use crate::lattice::fit::first::at_first;
+use crate::lattice::fit::fitted::{FittedHarmonic, LatticeFit};
 use crate::lattice::fit::folded::{Bends, Folded};
 use crate::lattice::fit::frame::{Basis, Frame};
 use crate::lattice::fit::gram::gram;
-use crate::lattice::fit::left::LeftOver;
 use crate::lattice::fit::lines::LineStatistics;
-use crate::lattice::fit::model::{Clip, LineOffsets, Model, Tables, look, residuals, settled};
+use crate::lattice::fit::model::{Clip, LineOffsets, Model, look, residuals, settled};
 use crate::lattice::fit::noise::{ForeignWave, Leverage, ResidualNoise};
-use crate::lattice::fit::{bend, beside, choose, closure, frame, solve};
+use crate::lattice::fit::tables::Tables;
+use crate::lattice::fit::{bend, closure, frame, solve};
 use crate::numbers::dot::dot;
-use crate::numbers::exact;
 use crate::spectrum::harmonics::Harmonics;
-use crate::spectrum::phases::Phases;
 use crate::spectrum::shells::FIRST_SHELL;
 
 /// Steps until the fit has to stand still. Chosen by eye.
@@ -33,93 +31,6 @@ const STILL: f64 = 0.05;
 const LEFT: f64 = 0.01;
 /// Rounds of adding harmonics: as many as there are shells.
 pub(crate) const ROUNDS: usize = 5;
-
-/// A lattice fitted to the pixels of an image.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct LatticeFit {
-    /// The wave vectors q₁, q₂ (about 60° apart), rad per pixel along columns and rows.
-    #[serde(with = "exact")]
-    pub wave_vectors: Waves<Px>,
-    /// Where the phases hold, pixels (column, row): the centre of the frame.
-    #[serde(with = "exact")]
-    pub centre: Vector2<f64>,
-    /// The harmonics, first shell first.
-    pub harmonics: Vec<FittedHarmonic>,
-    /// Covariance of the phases of the first three harmonics, rad². Where line offsets or neighbours take
-    /// up a part of a harmonic its phase is less certain than its signal and noise say.
-    #[serde(with = "exact")]
-    pub phase_covariance: Matrix3<f64>,
-    /// Residual over noise, root mean square: 1 for white noise and a model that is complete; more
-    /// where the noise is coloured or the lattice is not the same everywhere.
-    #[serde(with = "exact")]
-    pub goodness: f64,
-    /// Standard deviation of the line offsets, units of the image; `None` where none are used.
-    #[serde(with = "exact")]
-    pub line_offsets: Option<f64>,
-    /// Lines left out because they went wrong or are mostly missing.
-    pub lines_left_out: usize,
-    /// Share of the pixels whose residuals are cut off; 0.3 % for Gaussian noise.
-    #[serde(with = "exact")]
-    pub clipped: f64,
-    /// The strongest wave that is left and none of the lattice's: a second lattice, or pick-up.
-    pub foreign_wave: Option<ForeignWave>,
-    /// The transform of what is left, across the lines from each of the first three harmonics: two images tell by it what noise they
-    /// share.
-    #[serde(default)]
-    pub(crate) residual: [LeftOver; 3],
-    /// How the lattice changes across the frame; `None` where the frame is too small to tell.
-    pub inhomogeneity: Option<Inhomogeneity>,
-    /// Whether the harmonics agree on one lattice; `None` where too few of them are strong. The
-    /// covariance of `wave_vectors` is enlarged already where they do not.
-    pub closure: Option<Closure>,
-}
-
-/// One harmonic of a fitted lattice.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[non_exhaustive]
-pub struct FittedHarmonic {
-    /// (h, k): the wave vector is `h q₁ + k q₂`.
-    pub index: [i32; 2],
-    /// A of `A cos(q·(n − centre) + φ)`, units of the image.
-    #[serde(with = "exact")]
-    pub amplitude: f64,
-    /// φ, rad. Far from other harmonics and from line offsets its standard error is
-    /// `1/(√2 · signal_to_noise)`.
-    #[serde(with = "exact")]
-    pub phase: f64,
-    /// Amplitude over noise amplitude in one resolution cell.
-    #[serde(with = "exact")]
-    pub signal_to_noise: f64,
-}
-
-/// Fits the lattice, starting from what the spectrum of `image` says.
-///
-/// `None` where the fit does not settle within half a cycle over the frame of its start, or the
-/// harmonics cannot be told apart on this frame. Everything counts in pixels of `image`.
-pub(crate) fn measure(
-    image: &Image,
-    start: &Harmonics,
-    background: Background,
-) -> Option<(Lattice<Px>, LatticeFit)> {
-    let (fit, noise) = finished(image, start, background)?;
-    let foreign = noise.residual.foreign_wave(&fit.frame, &fit.model);
-    let again = foreign.and_then(|wave| fit.again_without(&wave, &noise, start, background));
-    again.or_else(|| fit.result(&noise, foreign))
-}
-
-/// The fit with all harmonics that earn their place, and the noise that it leaves.
-fn finished<'a>(
-    image: &'a Image,
-    start: &Harmonics,
-    background: Background,
-) -> Option<(Fit<'a>, FinalNoise)> {
-    let mut fit = Fit::new(image, start, background)?;
-    if fit.worth_a_sketch(start) && fit.sketch().is_none() {
-        fit = Fit::new(image, start, background)?;
-    }
-    let noise = fit.choose()?;
-    Some((fit, noise))
-}
 
 /// A fit under way.
 pub(crate) struct Fit<'a> {
@@ -155,7 +66,7 @@ pub(crate) struct FinalNoise {
 }
 
 impl<'a> Fit<'a> {
-    fn new(image: &'a Image, start: &Harmonics, background: Background) -> Option<Self> {
+    pub(crate) fn new(image: &'a Image, start: &Harmonics, background: Background) -> Option<Self> {
         let frame = Frame::new(image);
         let free_lines = background == Background::LineMean;
         let degree = match background {
@@ -164,7 +75,7 @@ impl<'a> Fit<'a> {
             Background::Quadratic => 2,
             Background::Cubic => 3,
         };
-        let starts = choose::at_first(start, frame.pixels())?;
+        let starts = at_first(start, frame.pixels())?;
         let indices: Vec<[i32; 2]> = starts.iter().map(|(index, _)| *index).collect();
         let basis = Basis::new(degree, free_lines, &indices);
         let origin = Matrix2::from_diagonal(&frame.edge()) * start.pair;
@@ -347,33 +258,8 @@ impl<'a> Fit<'a> {
         )
     }
 
-    /// The same in the image without perfect waves beside the lattice, of which `strongest` is one; `None` where there are none. What is
-    /// told of it is how it stands out of the noise that is then left.
-    fn again_without(
-        &self,
-        strongest: &ForeignWave,
-        noise: &FinalNoise,
-        start: &Harmonics,
-        background: Background,
-    ) -> Option<(Lattice<Px>, LatticeFit)> {
-        if !beside::is_strong(strongest) {
-            return None;
-        }
-        let (frame, model) = (&self.frame, &self.model);
-        let seen = |seen: &ResidualNoise| seen.foreign_wave(frame, model);
-        let image = beside::without_waves(frame, &model.pair, self.left(), seen)?;
-        let (fit, left) = finished(&image, start, background)?;
-        let k = strongest.wave_vector.component_mul(&frame.edge()) / std::f64::consts::PI;
-        let quieter = noise.residual.noise_near(k) / left.residual.noise_near(k);
-        let told = ForeignWave {
-            significance: strongest.significance * quieter.max(1.0),
-            ..*strongest
-        };
-        fit.result(&left, Some(told))
-    }
-
     /// What is left of all pixels, 0 where they do not count; offsets of lines are in it.
-    fn left(&self) -> Vec<f64> {
+    pub(crate) fn left(&self) -> Vec<f64> {
         let (frame, model) = (&self.frame, &self.model);
         let tables = Tables::new(frame, &model.pair, &model.basis.indices);
         let mut left = vec![0.0; frame.image.values.len()];
@@ -422,7 +308,7 @@ impl<'a> Fit<'a> {
             .collect()
     }
 
-    fn result(
+    pub(crate) fn result(
         &self,
         noise: &FinalNoise,
         foreign_wave: Option<ForeignWave>,
@@ -481,61 +367,5 @@ impl<'a> Fit<'a> {
             closure,
         };
         Some((wave_vectors.lattice()?, fit))
-    }
-}
-
-impl LatticeFit {
-    /// Phases of the first shell at the centre: q₁, q₂, q₂ − q₁.
-    pub(crate) fn first_phases(&self) -> Phases {
-        Phases {
-            values: [0, 1, 2].map(|i| self.harmonics[i].phase),
-            covariance: self.phase_covariance,
-        }
-    }
-
-    /// How the lattice changes, where that is more than chance.
-    pub(crate) fn change(&self) -> Option<&Inhomogeneity> {
-        self.inhomogeneity.as_ref().filter(|c| c.stands_out())
-    }
-
-    /// Whether the lattice may bend more than the fit can follow.
-    pub(crate) fn may_bend_more(&self) -> bool {
-        self.change().is_some() && self.clipped >= FOLLOWED
-    }
-
-    /// Of the first shell.
-    pub(crate) fn weakest_signal_to_noise(&self) -> f64 {
-        let first = self.harmonics.iter().take(3);
-        first.fold(f64::INFINITY, |least, h| least.min(h.signal_to_noise))
-    }
-
-    /// The same in pixels of which `binning` make one bin along each axis.
-    pub(crate) fn in_pixels(mut self, binning: usize) -> Self {
-        let size = binning as f64;
-        self.wave_vectors = self.wave_vectors.mapped(&(Matrix2::identity() / size));
-        self.centre = self.centre * size + Vector2::repeat((size - 1.0) / 2.0);
-        for harmonic in &mut self.harmonics {
-            let q = frame::wave(&self.wave_vectors.basis, harmonic.index);
-            // The mean over a bin lowers the amplitude, and so it does the noise in a cell.
-            harmonic.amplitude /= mean_over_bin(q.x, size) * mean_over_bin(q.y, size);
-        }
-        if let Some(foreign) = &mut self.foreign_wave {
-            foreign.wave_vector /= size;
-        }
-        if let Some(change) = &mut self.inhomogeneity {
-            change.mean /= size;
-            change.noise /= size * size;
-        }
-        self
-    }
-}
-
-/// Mean of `cos(q x)` over `size` pixels around 0.
-fn mean_over_bin(q: f64, size: f64) -> f64 {
-    let half = (q / 2.0).sin();
-    if half.abs() < 1e-12 {
-        1.0
-    } else {
-        (size * q / 2.0).sin() / (size * half)
     }
 }

@@ -3,7 +3,7 @@
 use rustfft::num_complex::Complex64;
 
 use crate::lattice::fit::frame::{BENDS, BENT, Frame};
-use crate::lattice::fit::model::{Block, LANES, Tables, sum};
+use crate::lattice::fit::tables::{Block, LANES, Tables, sum};
 use crate::numbers::widest::widest;
 
 /// A line folded about its middle: sums and differences of what lies at X and −X, and both times X.

@@ -1,7 +1,8 @@
 //! What whole lines do: offsets of their own, and lines that went wrong.
 
 use crate::lattice::fit::frame::Frame;
-use crate::lattice::fit::model::{Model, Tables, residuals, sum};
+use crate::lattice::fit::model::{Model, residuals};
+use crate::lattice::fit::tables::{Tables, sum};
 use crate::numbers::dot::dot;
 use crate::numbers::median::median;
 

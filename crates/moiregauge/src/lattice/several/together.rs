@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, Matrix2, Matrix3, Matrix4, SMatrix, Vector2};
 use crate::frame::background::{Background, remove_background};
 use crate::frame::geometry::Geometry;
 use crate::frame::image::Image;
-use crate::lattice::fit::fit_pixels::LatticeFit;
+use crate::lattice::fit::fitted::LatticeFit;
 use crate::lattice::measure::measure_whole;
 use crate::lattice::measured::MeasuredLattice;
 use crate::lattice::several::split;
