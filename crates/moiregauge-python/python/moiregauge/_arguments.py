@@ -12,8 +12,9 @@ from typing import Any, BinaryIO, TypeAlias, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from moiregauge._labelled import Frame, grid_of_labelled, is_labelled
 from moiregauge._options import TOLD
-from moiregauge._scan import Scan, grid_of_labelled, is_labelled
+from moiregauge._scan import Scan
 
 Progress: TypeAlias = bool | Callable[[str, int, int], object] | None
 """`True` for a bar, or a function of what is being done, how much of it is done, and how much there is."""
@@ -33,20 +34,6 @@ class Asked:
     held: list[tuple[str, Any]] = field(default_factory=list)
     options: str = "{}"
     told: str = "{}"
-
-
-@dataclass
-class Frame:
-    """What is told of an array."""
-
-    size_nm: tuple[float, float] | None
-    pixel_nm: tuple[float, float] | None = None
-    offset_nm: tuple[float, float] = (0.0, 0.0)
-    line_rate_hz: float | None = None
-    frame_direction: str | None = None
-    rotation_deg: float = 0.0
-    unit: str = ""
-    sensor_unit: str = "nm"
 
 
 def is_array(given: object) -> bool:
