@@ -80,7 +80,8 @@ def definition(name):
 
 
 def prepare(crates, lines):
-    for place, name, *_ in lines:
+    # What is looked at in two kinds of scenes stands there twice.
+    for place, name in dict.fromkeys((place, name) for place, name, *_ in lines):
         found = files(crates, place, name)
         if len(found) != 1:
             sys.exit(f"{place} {name}: expected one file, found {[str(f) for f in found]}")
@@ -106,6 +107,14 @@ def prepare(crates, lines):
             return "\n".join("//".join([use.sub(f"{name}()", c[0]), *c[1:]]) for c in code)
 
         found[0].write_text(used(before) + call(head) + used(after))
+        # Files that import it call it as well.
+        imported = re.compile(rf"^(?:pub\(crate\) )?use crate::[\w:]*\b{found[0].stem}::(?:\{{[^}}]*\b{name}\b[^}}]*\}}|{name});\n", re.M)
+        for crate in CRATES:
+            for file in sorted((crates / crate / "src").rglob("*.rs")):
+                text = file.read_text()
+                import_of = imported.search(text)
+                if file != found[0] and import_of:
+                    file.write_text(used(text[: import_of.start()]) + import_of.group() + used(text[import_of.end() :]))
     for crate in CRATES:
         (crates / crate / "src/varied.rs").write_text(VARIED)
         root = crates / crate / "src/lib.rs"
