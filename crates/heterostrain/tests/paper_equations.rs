@@ -162,7 +162,7 @@ fn twelve_pairs_of_drawn_peaks_are_solved_at_once() {
             -found.axis_lattice().unwrap().value + ahead,
         );
         let solved = fit(&six, start);
-        let drawn = published_draws(&lattice, &graphene, KSpace, &[six]);
+        let drawn = published_draws(&lattice, &graphene, KSpace, [six]);
         let drawn = drawn[0];
         assert!((solved[1] - drawn.twist).abs() < 1e-8, "{solved} {drawn:?}");
         let strain = drawn.strain_vector.norm();

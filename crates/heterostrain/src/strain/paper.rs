@@ -28,15 +28,15 @@ pub fn published_draws<'a>(
     lattice: &Lattice,
     bilayer: impl Into<Bilayer<'a>>,
     convention: StrainConvention,
-    drawn: &[[Vector2<f64>; 6]],
+    drawn: impl IntoIterator<Item = [Vector2<f64>; 6]>,
 ) -> Vec<StrainDraw> {
     let Some(around) = Around::new(lattice, bilayer.into(), convention) else {
         return Vec::new();
     };
     let (names, atoms) = (six(&around.lattice.basis), six(&around.layers.atoms));
     drawn
-        .iter()
-        .filter_map(|peaks| around.draw(&twelve_pairs(&in_order_of(peaks, &names), &atoms)?))
+        .into_iter()
+        .filter_map(|peaks| around.draw(&twelve_pairs(&in_order_of(&peaks, &names), &atoms)?))
         .collect()
 }
 

@@ -131,18 +131,18 @@ pub(crate) fn draw_all(
     first_index: u64,
 ) {
     scans.par_iter_mut().enumerate().for_each(|(i, scan)| {
-        interrupt::check();
         let Some(k) = measured.iter().position(|m| m.file == scan.file) else {
             return;
         };
         let lines = paper_scans(&[&measured[k]], &observations[k]);
         if let Some(lattice) = &scan.drift_corrected {
             let mut rng = rng::stream(settings.seed, "strain", first_index + i as u64);
-            let drawn: Vec<_> = (0..settings.strain_draws)
-                .filter_map(|_| mean_peaks(&lines, drift, &mut rng))
-                .collect();
+            let drawn = (0..settings.strain_draws).filter_map(|_| {
+                interrupt::check();
+                mean_peaks(&lines, drift, &mut rng)
+            });
             let convention = settings.strain_convention;
-            scan.draws = published_draws(lattice, settings.bilayer(), convention, &drawn);
+            scan.draws = published_draws(lattice, settings.bilayer(), convention, drawn);
         }
     });
 }

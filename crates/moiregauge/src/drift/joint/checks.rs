@@ -16,6 +16,7 @@ use crate::drift::joint::arrow::{Arrow, BlockSums, ScanSums};
 use crate::drift::joint::evaluate::{Linearised, PhaseMiss, linearise, phases};
 use crate::drift::joint::found::JointFit;
 use crate::drift::joint::instability::instability;
+use crate::numbers::interrupt;
 use crate::numbers::rng::stream;
 
 /// Directions in which a scan alone determines a parameter have a residual of zero: below this share of the largest
@@ -99,6 +100,7 @@ impl JointFit {
         (0..draws)
             .into_par_iter()
             .filter_map(|draw| {
+                interrupt::check();
                 let mut rng = stream(seed, name, draw as u64);
                 let mut times = vec![0.0; parts.len()];
                 for _ in blocks {
