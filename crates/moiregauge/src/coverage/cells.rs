@@ -305,6 +305,37 @@ pub(crate) struct Window {
     pub(crate) support: Vec<f64>,
 }
 
+impl Window {
+    /// The cells under the window at one of them, of so many columns and rows: each with its distance from it and its tap.
+    pub(crate) fn cells(
+        &self,
+        size: [usize; 2],
+        at: usize,
+    ) -> impl Iterator<Item = (usize, [f64; 2], f64)> + '_ {
+        let [along, up] = [0, 1].map(|axis| {
+            let at = if axis == 0 {
+                at % size[0]
+            } else {
+                at / size[0]
+            };
+            let reach = self.taps[axis].len() / 2;
+            let others = at.saturating_sub(reach)..=(at + reach).min(size[axis] - 1);
+            others.map(move |other| {
+                (
+                    other,
+                    other as f64 - at as f64,
+                    self.taps[axis][other + reach - at],
+                )
+            })
+        });
+        up.flat_map(move |(y, dy, v)| {
+            along
+                .clone()
+                .map(move |(x, dx, u)| (y * size[0] + x, [dx, dy], u * v))
+        })
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -13,10 +13,12 @@ pub(crate) mod grains;
 pub(crate) mod higher;
 pub(crate) mod hollows;
 pub(crate) mod local;
+pub(crate) mod look;
 pub(crate) mod nodes;
 pub(crate) mod patch;
 pub(crate) mod phases;
 pub(crate) mod settle;
+pub(crate) mod sides;
 pub(crate) mod tiles;
 pub(crate) mod windows;
 
