@@ -388,6 +388,20 @@ fn a_changing_lattice_is_pointed_out() {
     }
 }
 
+/// What a lattice that changes by 1 % leaves beside its waves is no noise: errors are as large as is stated, 80 numbers, and not a third smaller.
+#[test]
+fn a_change_of_the_lattice_is_no_noise() {
+    let mut squares = 0.0;
+    for seed in 0..20 {
+        let angle = 0.618 * seed as f64;
+        let mut scene = Scene::new([256, 256], 11.0, angle, Contrast::Cosines, seed);
+        (scene.white, scene.line, scene.change) = (0.2, 0.1, 0.01);
+        squares += pull(&scene, &fit(&scene.image(), &scene)).norm_squared() / 4.0;
+    }
+    let rms = (squares / 20.0).sqrt();
+    assert!((0.8..1.25).contains(&rms), "rms pull {rms}");
+}
+
 /// Of a lattice whose wave vectors are larger at both edges than in the middle the mean over the frame is given. Straight waves fitted
 /// to the pixels weigh the middle more: what they see is 0.4 times the bow less, four times the error that is told.
 #[test]

@@ -30,6 +30,8 @@ use crate::spectrum::shells::FIRST_SHELL;
 const THRESHOLD: f64 = 43.0;
 /// The same for the eight numbers of the cubic terms: 26.1.
 const CUBIC: f64 = 31.0;
+/// Terms of the third order in both phases.
+const THIRD_ORDER: f64 = 8.0;
 /// Changes below this share across the frame harm nobody: a tenth of the calibration that is assumed.
 const HARMLESS: f64 = 1e-3;
 
@@ -91,16 +93,52 @@ impl Inhomogeneity {
         }
     }
 
-    /// How far the mean of the waves may be from what is told of it: covariance of the four numbers. All of what the third order says, where
-    /// that is not added.
+    /// How far the mean of the waves may be from what is told of it: covariance of the four numbers. What the third order says and is more than
+    /// noise makes of it, where that is not added (`E m mᵀ` of a measured shift is that of the true one and of noise, whose χ² is the number
+    /// of its terms); all of it, where the fit does not follow the lattice.
     pub(crate) fn beyond(&self, clipped: f64) -> Matrix4<f64> {
         let share = if self.tells_the_mean(clipped) {
             BEYOND
+        } else if clipped < FOLLOWED {
+            (1.0 - THIRD_ORDER / self.cubic).max(0.0).sqrt()
         } else {
             1.0
         };
         let off = Vector4::from_column_slice(self.mean.as_slice()) * share;
         off * off.transpose()
+    }
+}
+
+/// What is told of a bend, as a change of the phases.
+pub(crate) struct Bend {
+    /// By ψ₁, then by ψ₂: slopes along X and Y, which the fit would have with the bends.
+    slopes: Vector4<f64>,
+    bends: DVector<f64>,
+}
+
+impl Bend {
+    /// No bend.
+    pub(crate) fn none() -> Self {
+        Self {
+            slopes: Vector4::zeros(),
+            bends: DVector::zeros(2 * BENDS),
+        }
+    }
+
+    pub(crate) fn add(&mut self, other: &Self) {
+        self.slopes += other.slopes;
+        self.bends += &other.bends;
+    }
+
+    /// ψ₁ and ψ₂ at (X, Y), rad.
+    pub(crate) fn phases(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        [0, 1].map(|vector| {
+            let straight = self.slopes[2 * vector] * x + self.slopes[2 * vector + 1] * y;
+            let bent = powers().iter().enumerate().map(|(i, [a, b])| {
+                self.bends[BENDS * vector + i] * x.powi(*a as i32) * y.powi(*b as i32)
+            });
+            straight + bent.sum::<f64>()
+        })
     }
 }
 
@@ -111,7 +149,7 @@ pub(crate) fn inhomogeneity(
     lambda: &[f64],
     bends: &Bends,
     noise: &[[f64; 3]],
-) -> Option<Inhomogeneity> {
+) -> Option<(Inhomogeneity, Bend)> {
     let mut basis = model.basis.clone();
     basis.orders = BENT;
     let gram = gram(frame, &basis, &model.pair, lambda);
@@ -135,14 +173,16 @@ pub(crate) fn inhomogeneity(
     let inverse = solve::inverse(&information)?;
     let bend = &inverse * &score;
     let cubic = cubic_chi_squared(&score, &variance)?;
-    let [wavelength, angle] = changes(model, frame, &told(&bend, cubic));
+    let told = told(&bend, cubic);
+    let [wavelength, angle] = changes(model, frame, &told);
     // The fit would be another one with the bends, and they have a mean slope.
     let scale = frame.edge().map(|e| 1.0 / e);
     let to_pixels = Matrix4::from_diagonal(&Vector4::new(scale.x, scale.y, scale.x, scale.y));
     let of_mean = to_pixels * (mean_slopes() - coupling.transpose());
     let shift = &of_mean * bend;
     let noise = &of_mean * &inverse * variance * inverse * of_mean.transpose();
-    Some(Inhomogeneity {
+    let slopes = -coupling.transpose() * &told;
+    let inhomogeneity = Inhomogeneity {
         wavelength,
         angle,
         chi_squared,
@@ -150,7 +190,15 @@ pub(crate) fn inhomogeneity(
         mean: Matrix2::from_column_slice(shift.as_slice()),
         noise: Matrix4::from_column_slice(noise.as_slice()),
         cubic,
-    })
+    };
+    let slopes = Vector4::from_column_slice(slopes.as_slice());
+    Some((
+        inhomogeneity,
+        Bend {
+            slopes,
+            bends: told,
+        },
+    ))
 }
 
 /// Which of the bends are of the third order.

@@ -60,9 +60,16 @@ pub(crate) struct FinalNoise {
     /// Noise power at each harmonic as it acts along x, along y and on the phase.
     pub(crate) local: Vec<[f64; 3]>,
     /// Root mean square of the residual.
-    rms: f64,
+    pub(crate) rms: f64,
     /// What the residual says about a bent lattice.
-    bends: Bends,
+    pub(crate) bends: Bends,
+}
+
+impl FinalNoise {
+    /// Noise power at the first harmonics, in sum.
+    pub(crate) fn power(&self) -> f64 {
+        self.local.iter().take(FIRST_SHELL.len()).flatten().sum()
+    }
 }
 
 impl<'a> Fit<'a> {
@@ -249,6 +256,23 @@ impl<'a> Fit<'a> {
         })
     }
 
+    /// The same fit of another image with the same pixels.
+    pub(crate) fn in_image<'b>(&self, image: &'b Image) -> Fit<'b> {
+        Fit {
+            frame: self.frame.with(image),
+            model: self.model.clone(),
+            lines: self.lines.clone(),
+            gram: self.gram.clone(),
+            gradient: self.gradient.clone(),
+            ..*self
+        }
+    }
+
+    /// The share of the pixels whose residuals are cut off.
+    pub(crate) fn clipped(&self) -> f64 {
+        self.clipped as f64 / self.frame.pixels() as f64
+    }
+
     fn leverage(&self) -> Option<Leverage<'_>> {
         let map = solve::contraction(&self.model, |_, _| 1.0);
         Leverage::new(
@@ -286,7 +310,7 @@ impl<'a> Fit<'a> {
         let meat = solve::projected(&self.gram, &noisy, FIRST + 4)?;
         let inverse = solve::inverse(&bread)?;
         // Pixels whose residuals are cut off do not follow the model.
-        let follow = 1.0 - self.clipped as f64 / self.frame.pixels() as f64;
+        let follow = 1.0 - self.clipped();
         let covariance = &inverse * meat * &inverse / (follow * follow);
         Some(covariance.fixed_view::<7, 7>(0, 0).into_owned())
     }
@@ -337,7 +361,8 @@ impl<'a> Fit<'a> {
             covariance.fixed_view::<4, 4>(3, 3) * enlargement,
         )
         .mapped(&Matrix2::from_diagonal(&scale));
-        let clipped = self.clipped as f64 / self.frame.pixels() as f64;
+        let clipped = self.clipped();
+        let inhomogeneity = inhomogeneity.map(|(inhomogeneity, _)| inhomogeneity);
         if let Some(change) = inhomogeneity.filter(Inhomogeneity::stands_out) {
             let (mean, covariance) = change.of_the_mean(clipped);
             wave_vectors.basis += mean;

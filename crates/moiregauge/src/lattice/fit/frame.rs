@@ -60,6 +60,17 @@ impl<'a> Frame<'a> {
         }
     }
 
+    /// The same of another image of which the same pixels count.
+    pub(crate) fn with<'b>(&self, image: &'b Image) -> Frame<'b> {
+        Frame {
+            image,
+            x: self.x.clone(),
+            y: self.y.clone(),
+            present: self.present.clone(),
+            missing: self.missing.clone(),
+        }
+    }
+
     /// Number of pixels that count.
     pub(crate) fn pixels(&self) -> usize {
         self.present.iter().sum()

@@ -8,6 +8,7 @@ use crate::lattice::fit::beside;
 use crate::lattice::fit::fit_pixels::{FinalNoise, Fit};
 use crate::lattice::fit::fitted::LatticeFit;
 use crate::lattice::fit::noise::{ForeignWave, ResidualNoise};
+use crate::lattice::fit::straight::without_bend;
 use crate::spectrum::harmonics::Harmonics;
 
 /// Fits the lattice, starting from what the spectrum of `image` says.
@@ -36,6 +37,7 @@ fn finished<'a>(
         fit = Fit::new(image, start, background)?;
     }
     let noise = fit.choose()?;
+    let noise = without_bend(&fit, noise);
     Some((fit, noise))
 }
 

@@ -40,6 +40,7 @@ pub(crate) mod measure;
 pub(crate) mod model;
 pub(crate) mod noise;
 pub(crate) mod solve;
+pub(crate) mod straight;
 pub(crate) mod tables;
 
 pub use bend::Inhomogeneity;
