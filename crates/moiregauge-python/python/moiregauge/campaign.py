@@ -22,10 +22,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias, Unpack, cast
 
 from moiregauge import _core
-from moiregauge._arguments import PathLike, Progress, words
+from moiregauge._arguments import PathLike, words
 from moiregauge._maps import MapOptions, Maps, failures, made
 from moiregauge._options import TOLD
-from moiregauge._progress import Tell, teller
+from moiregauge._progress import Progress, Tell, teller
 
 if TYPE_CHECKING:
     import pandas
