@@ -38,8 +38,14 @@ def test_without_a_cluster_it_runs_here(samples: Path, expected: dict[str, bytes
     done = mg.campaign.run(samples, tmp_path / "out", progress=lambda _, n, __: told.append(n), **FAST)
     assert (done.ok + done.doubtful, done.failed) == (40, 0) or done.failed == 0
     assert files(tmp_path / "out") == expected and told[-1] == 40
-    if pytest.importorskip("pandas"):
-        assert len(done.to_pandas()) == 40
+    pandas = pytest.importorskip("pandas")
+    table = done.to_pandas()
+    assert len(table) == 40
+    pytest.importorskip("pyarrow")
+    # The same table, seen by readers that are not ours.
+    parquet = pandas.read_parquet(done.out / "samples.parquet")
+    assert parquet["sample"].tolist() == table["sample"].tolist()
+    assert parquet["twist_deg"].tolist() == pytest.approx(table["twist_deg"].tolist(), rel=1e-15, nan_ok=True)
 
 
 @pytest.fixture

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeAlias, TypeVar, cast
 
@@ -42,6 +43,12 @@ def _encoded(value: Any) -> Any:
     return value
 
 
+@functools.cache
+def _fields(of: type[Document]) -> list[tuple[str, Any]]:
+    """Names of the fields of a class, and what they are where a document leaves them out."""
+    return [(field.name, field.default) for field in dataclasses.fields(cast(Any, of))]
+
+
 class Document:
     """A part of a published document. Frozen; compared by value; no reference to a file or an image."""
 
@@ -64,10 +71,9 @@ class Document:
     def to_dict(self) -> dict[str, Any]:
         """The document as plain dictionaries, lists, numbers and words: that of `results.json` or `map.json`."""
         document = {}
-        for field in dataclasses.fields(cast(Any, self)):
-            value = getattr(self, field.name)
+        for name, default in _fields(type(self)):
+            value = getattr(self, name)
             # What a document may leave out is left out where there is none.
-            if field.default is not dataclasses.MISSING and value == field.default:
-                continue
-            document[field.name] = _encoded(value)
+            if default is dataclasses.MISSING or value != default:
+                document[name] = _encoded(value)
         return document
