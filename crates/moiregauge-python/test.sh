@@ -21,11 +21,14 @@ pip uninstall --yes maturin
 ls -l "$scratch"/wheel/*.whl
 
 # What hangs fails.
-run() { timeout 900 "$scratch/venv/bin/python" -m pytest -q -p no:cacheprovider tests "$@"; }
+tested() { timeout "$1" "$scratch/venv/bin/python" -m pytest -q -p no:cacheprovider "${@:2}"; }
+run() { tested 900 tests --ignore tests/test_corpus.py "$@"; }
 pip install "$scratch"/wheel/*.whl pytest
 # Nothing but numpy comes along.
 test "$(pip list --format freeze | grep -civE '^(moiregauge|numpy|pip|setuptools|pytest|pluggy|iniconfig|packaging|pygments)=')" -eq 0
 run "$@"
+# The whole corpus, once.
+[ "$#" -gt 0 ] || tested 2400 tests/test_corpus.py
 pip install "$(ls "$scratch"/wheel/*.whl)[all]" mypy pyright npe2 ipykernel
 # It fetches its own program when it runs for the first time.
 if ! "$scratch/venv/bin/pyright" --version > /dev/null 2>&1; then

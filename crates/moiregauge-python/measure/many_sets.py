@@ -1,7 +1,8 @@
-"""How much of the processor a Dask cluster needs to hand out many small sets: many_sets.py [SETS]
+"""How much of the processor a Dask cluster needs to hand out many small sets: many_sets.py [SETS] [quiet]
 
-Ten thousand sets of two frames of 48² (links to the files of one), two workers, settings of Dask as they come. Says which
-share of the processor time scheduler, nannies and client take, tables included; it has to stay below 5 %.
+Ten thousand sets of two frames of 48² (links to the files of one), two workers, settings of Dask as they come or, with
+`quiet`, those of `campaign.QUIET`. Says which share of the processor time scheduler, nannies and client take, tables
+included; it has to stay below 5 %.
 
 Dask takes a share of the time that passes, whether there is work or not (it looks at its event loops fifty times a second).
 Where others use the processors as well, the work takes longer and that share grows with it, so the share counts it for
@@ -22,10 +23,11 @@ IDLE_S = 10
 FAST = {"drift_draws": 0, "strain_draws": 0}
 
 
-def main(count):
+def main(count, settings):
+    import dask
     from distributed import Client, LocalCluster
 
-    with tempfile.TemporaryDirectory() as scratch:
+    with dask.config.set(settings), tempfile.TemporaryDirectory() as scratch:
         one = mg.simulate(Path(scratch) / "one", name="set", seed=1, raster={"scans": 2, "pixels": [48, 48]})[0]
         root = Path(scratch) / "sets"
         for number in range(count):
@@ -59,4 +61,6 @@ def main(count):
 
 
 if __name__ == "__main__":
-    sys.exit(not main(int(sys.argv[1]) if len(sys.argv) > 1 else 10_000))
+    given = sys.argv[1:]
+    numbers = [int(one) for one in given if one != "quiet"]
+    sys.exit(not main(numbers[0] if numbers else 10_000, mg.campaign.QUIET if "quiet" in given else {}))

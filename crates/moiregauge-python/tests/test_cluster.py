@@ -55,6 +55,16 @@ def cluster() -> object:
         yield cluster
 
 
+def test_a_quiet_cluster_is_one_of_settings_that_there_are() -> None:
+    pytest.importorskip("distributed")
+    import dask
+    from moiregauge import campaign
+
+    for name, value in campaign.QUIET.items():
+        # Dask takes names that it does not know, and does nothing.
+        assert dask.config.get(name, None) not in (None, value), name
+
+
 # What a notebook of the user's does, in a process of its own.
 RUN = """
 import sys

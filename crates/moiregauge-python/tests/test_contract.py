@@ -79,6 +79,16 @@ def test_results_survive_pickling(results: mg.Results, tmp_path: Path) -> None:
 def test_unknown_names_are_refused() -> None:
     with pytest.raises(ValueError, match="nonsense"):
         mg.Estimate.from_dict({"value": 1.0, "sigma": 0.1, "nonsense": 2})
+    with pytest.raises(ValueError, match="expected 2 values, found 3"):
+        mg.results.Window.from_dict({"centre_nm": [0.0, 0.0, 0.0], "extent_nm": [1.0, 1.0]})
+
+
+def test_classes_of_users_are_documents_too() -> None:
+    class Own(mg.Estimate):
+        pass
+
+    own = Own.from_dict({"value": 1, "sigma": None})
+    assert own.to_dict() == {"value": 1.0, "sigma": None} and isinstance(own.value, float)
 
 
 def test_channels_have_row_0_at_the_bottom(image: Path, tmp_path: Path) -> None:

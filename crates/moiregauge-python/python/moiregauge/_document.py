@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import functools
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeAlias, TypeVar, cast
 
@@ -43,10 +42,19 @@ def _encoded(value: Any) -> Any:
     return value
 
 
-@functools.cache
+# Names of the fields of every class that was met, and what they are where a document leaves them out.
+_FIELDS: dict[type[Document], list[tuple[str, Any]]] = {}
+
+
+def _decoders(of: type[Document]) -> Mapping[str, Decoder]:
+    # A class made of one of ours has its fields.
+    return next((_DECODERS[one] for one in of.__mro__ if one in _DECODERS), {})
+
+
 def _fields(of: type[Document]) -> list[tuple[str, Any]]:
-    """Names of the fields of a class, and what they are where a document leaves them out."""
-    return [(field.name, field.default) for field in dataclasses.fields(cast(Any, of))]
+    if of not in _FIELDS:
+        _FIELDS[of] = [(field.name, field.default) for field in dataclasses.fields(cast(Any, of))]
+    return _FIELDS[of]
 
 
 class Document:
@@ -62,7 +70,7 @@ class Document:
         if not document.keys() <= known:
             raise ValueError(f"{cls.__name__}: expected {sorted(known)}, found also {sorted(document.keys() - known)}")
         given = dict(document)
-        for name, decoder in _DECODERS[cls].items():
+        for name, decoder in _decoders(cls).items():
             value = given.get(name)
             if value is not None:
                 given[name] = decoder(value)
