@@ -21,15 +21,28 @@ pip uninstall --yes maturin
 ls -l "$scratch"/wheel/*.whl
 
 # What hangs fails.
-run() { timeout 900 "$scratch/venv/bin/python" -m pytest -q -p no:cacheprovider tests "$@"; }
+tested() { timeout "$1" "$scratch/venv/bin/python" -m pytest -q -p no:cacheprovider "${@:2}"; }
+run() { tested 1500 tests --ignore tests/test_corpus.py "$@"; }
 pip install "$scratch"/wheel/*.whl pytest
 # Nothing but numpy comes along.
 test "$(pip list --format freeze | grep -civE '^(moiregauge|numpy|pip|setuptools|pytest|pluggy|iniconfig|packaging|pygments)=')" -eq 0
 run "$@"
-pip install "$(ls "$scratch"/wheel/*.whl)[all]" mypy pyright npe2
+# The whole corpus, once.
+[ "$#" -gt 0 ] || tested 2400 tests/test_corpus.py
+pip install "$(ls "$scratch"/wheel/*.whl)[all]" mypy pyright npe2 ipykernel
 # It fetches its own program when it runs for the first time.
 if ! "$scratch/venv/bin/pyright" --version > /dev/null 2>&1; then
   echo "NOT CHECKED: types by pyright, which cannot be fetched"
   set -- "$@" --deselect tests/test_words.py::test_types_are_right_for_pyright
 fi
 run "$@"
+
+# As a new user would: in a browser.
+status=0
+pip install jupyterlab || status=77
+[ "$status" -eq 77 ] || PYTHON=$scratch/venv/bin/python notebook/test.sh || status=$?
+case $status in
+  0) ;;
+  77) echo "NOT CHECKED: the package in JupyterLab: no node, npm or chromium, or no packages" ;;
+  *) echo "in JupyterLab it does not do what it should" >&2; exit 1 ;;
+esac

@@ -1,8 +1,9 @@
 """What calling from Python costs beside the program, and what arrays cost: calling.py [ROUNDS]
 
 The same analysis in turn by the program of the wheel (`results.json` alone) and by `analyze` with `to_dict`, each in a
-process of its own whose start is not counted; processor time, medians. It has to stay below 5 %. Then how often an array
-is copied: the peak of the memory over its size while it is handed over. Needs Linux and the package.
+process of its own whose start is not counted; processor time, the median of the ratios of neighbours. It has to stay
+below 5 %. Then how often an array is copied: the peak of the memory over its size while it is handed over. Needs Linux
+and the package.
 """
 
 import re
@@ -60,14 +61,14 @@ def main(rounds):
             for _ in range(rounds):
                 of_program.append(told(HEAD + PROGRAM, folder, Path(scratch) / "out"))
                 of_call.append(told(HEAD + CALLED, folder, Path(scratch) / "results.json"))
-            program, called = statistics.median(of_program), statistics.median(of_call)
-            more = 100 * (called / program - 1)
-            print(f"{scans} scans of {pixels}²: program {program:.3f} s, called {called:.3f} s: {more:+.1f} %", flush=True)
-            good &= called < 1.05 * program
+            ratios = [called / program for called, program in zip(of_call, of_program, strict=True)]
+            ratio, program = statistics.median(ratios), statistics.median(of_program)
+            print(f"{scans} scans of {pixels}²: program {program:.3f} s, called {100 * (ratio - 1):+.1f} %", flush=True)
+            good &= ratio < 1.05
     copies = told(COPIES)
     print(f"an array is copied {copies:.2f} times")
     return good and copies < 1.1
 
 
 if __name__ == "__main__":
-    sys.exit(not main(int(sys.argv[1]) if len(sys.argv) > 1 else 7))
+    sys.exit(not main(int(sys.argv[1]) if len(sys.argv) > 1 else 15))

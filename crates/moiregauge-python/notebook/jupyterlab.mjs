@@ -18,7 +18,21 @@ async function opened() {
   throw new Error("JupyterLab does not begin");
 }
 
-const shot = () => page.screenshot({ path: `${process.env.SHOTS}/jupyterlab.png` });
+const shot = (name = "jupyterlab") => page.screenshot({ path: `${process.env.SHOTS}/${name}.png` });
+
+/** How bright the words of the first table are, and what is behind them, from 0 to 1. */
+const brightness = () =>
+  page.evaluate(() => {
+    const of = (/** @type {string} */ colour) => {
+      const [r, g, b] = (colour.match(/[\d.]+/g) ?? []).map(Number);
+      return (0.299 * r + 0.587 * g + 0.114 * b) / 255;
+    };
+    const cell = document.querySelector(".mg-r td");
+    let behind = cell;
+    while (behind && /^(transparent|rgba\(.*, 0\))$/.test(getComputedStyle(behind).backgroundColor)) behind = behind.parentElement;
+    if (!cell || !behind) throw new Error("there is no table");
+    return { words: of(getComputedStyle(cell).color), behind: of(getComputedStyle(behind).backgroundColor) };
+  });
 try {
   await opened();
   const cells = page.locator(".jp-Notebook .jp-CodeCell");
@@ -48,6 +62,15 @@ try {
   await run(4);
   await has(4, /the session goes on: 1\.1/);
   await shot();
+  const light = await brightness();
+  assert.ok(light.words < 0.3 && light.behind > 0.9, JSON.stringify(light));
+  await page.locator(".lm-MenuBar-itemLabel", { hasText: /^Settings$/ }).click();
+  for (const entry of [/^Theme$/, /^JupyterLab Dark$/]) await page.locator(".lm-Menu-itemLabel", { hasText: entry }).click();
+  await page.locator('body[data-jp-theme-light="false"]').waitFor({ state: "attached", timeout: 30000 });
+  await page.waitForTimeout(1000);
+  await shot("jupyterlab-dark");
+  const dark = await brightness();
+  assert.ok(dark.words > 0.7 && dark.behind < 0.2, JSON.stringify(dark));
 } catch (error) {
   await shot();
   console.error(error);

@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
-# Tries the package in JupyterLab, in a real browser: results, progress, plots, and a cell that is interrupted.
+# Tries the package in JupyterLab, in a real browser: results, light and dark, progress, plots, and a cell that is interrupted.
 #
 #   notebook/test.sh WHEEL        or PYTHON=… (an environment with the package and jupyterlab) notebook/test.sh
 #
-# JupyterLab goes into a temporary environment, the browser is the one of the page of `moiregauge serve`. The screenshot is
-# SCREENSHOTS/jupyterlab.png. Ends with 77 where something is missing that is no part of the project.
+# JupyterLab goes into a temporary environment, the browser is the one of the page of `moiregauge serve`. The screenshots are
+# SCREENSHOTS/jupyterlab.png and jupyterlab-dark.png. Ends with 77 where something is missing that is no part of the project.
 set -euo pipefail
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 page=$here/../../moiregauge-serve/browser

@@ -26,7 +26,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from moiregauge._base import Document, EstimateBase, MapBase, ResultsBase
+from moiregauge._base import EstimateBase, MapBase, ResultsBase
+from moiregauge._document import Document, decoded_by, several
 '''
 
 # Bases that add what data cannot do.
@@ -66,6 +67,32 @@ def default_of(annotation: str) -> str:
     if annotation.startswith("tuple") and annotation.endswith("...]"):
         return "()"
     return "None"
+
+
+def decoder_of(schema: Schema, classes: dict[str, Schema]) -> str | None:
+    """What makes a value of this property, as code; `None` where it stays as it is."""
+    if "$ref" in schema:
+        name = type_of(schema)
+        return f"{name}.from_dict" if "properties" in classes[name] else decoder_of(classes[name], classes)
+    if "anyOf" in schema:
+        return next(filter(None, (decoder_of(one, classes) for one in schema["anyOf"])), None)
+    if "oneOf" in schema:
+        return None
+    kinds = schema["type"] if isinstance(schema["type"], list) else [schema["type"]]
+    if "array" not in kinds:
+        return "float" if "number" in kinds else None
+    count = [str(schema["minItems"])] if schema.get("minItems", 0) == schema.get("maxItems") else []
+    return f"several({', '.join([str(decoder_of(schema['items'], classes)), *count])})"
+
+
+def decoders(classes: dict[str, Schema]) -> str:
+    """The table of what makes the fields of all classes."""
+    out = ["decoded_by(", "    {"]
+    for name in sorted(name for name, schema in classes.items() if "properties" in schema):
+        found = {key: decoder_of(of, classes) for key, of in classes[name]["properties"].items()}
+        made = "".join(f'            "{key}": {decoder},\n' for key, decoder in found.items() if decoder)
+        out.append(f"        {name}: {{\n{made}        }}," if made else f"        {name}: {{}},")
+    return "\n".join([*out, "    }", ")"]) + "\n"
 
 
 def doc(text: str, indent: str) -> str:
@@ -117,7 +144,7 @@ def generated() -> str:
             aliases.append(f"{name} = {type_of(schema)}\n{doc(schema.get('description', name), '')}\n")
     names = "".join(f'    "{name}",\n' for name in sorted(classes))
     parts = [HEAD, f"__all__ = [\n{names}]\n", "\n".join(aliases), "\n\n".join(bodies)]
-    return "\n".join(parts[:2]) + "\n" + parts[2] + "\n\n" + parts[3]
+    return "\n".join(parts[:2]) + "\n" + parts[2] + "\n\n" + parts[3] + "\n\n" + decoders(classes)
 
 
 OPTIONS_HEAD = '''"""Options of an analysis: the settings of the program, and what files do not tell.

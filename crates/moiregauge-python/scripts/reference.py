@@ -53,10 +53,16 @@ ERRORS = {
 
 
 def found(file: str, name: str) -> ast.FunctionDef | ast.ClassDef:
-    """A function or class of a file."""
+    """A function or class of a file, a function with the arguments that it takes from another one."""
     tree = ast.parse((PACKAGE / f"{file}.py").read_text(encoding="utf-8"))
     for node in tree.body:
         if isinstance(node, (ast.FunctionDef, ast.ClassDef)) and node.name == name:
+            for other in node.decorator_list:
+                if isinstance(node, ast.FunctionDef) and ast.unparse(other).startswith("takes_what("):
+                    assert isinstance(other, ast.Call)
+                    taken = found(file, ast.unparse(other.args[0]))
+                    assert isinstance(taken, ast.FunctionDef)
+                    node.args = taken.args
             return node
     raise SystemExit(f"{file}.py has no {name}")
 

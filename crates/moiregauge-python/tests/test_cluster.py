@@ -38,8 +38,14 @@ def test_without_a_cluster_it_runs_here(samples: Path, expected: dict[str, bytes
     done = mg.campaign.run(samples, tmp_path / "out", progress=lambda _, n, __: told.append(n), **FAST)
     assert (done.ok + done.doubtful, done.failed) == (40, 0) or done.failed == 0
     assert files(tmp_path / "out") == expected and told[-1] == 40
-    if pytest.importorskip("pandas"):
-        assert len(done.to_pandas()) == 40
+    pandas = pytest.importorskip("pandas")
+    table = done.to_pandas()
+    assert len(table) == 40
+    pytest.importorskip("pyarrow")
+    # The same table, seen by readers that are not ours.
+    parquet = pandas.read_parquet(done.out / "samples.parquet")
+    assert parquet["sample"].tolist() == table["sample"].tolist()
+    assert parquet["twist_deg"].tolist() == pytest.approx(table["twist_deg"].tolist(), rel=1e-15, nan_ok=True)
 
 
 @pytest.fixture
@@ -47,6 +53,24 @@ def cluster() -> object:
     distributed = pytest.importorskip("distributed")
     with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None, processes=True) as cluster:
         yield cluster
+
+
+def test_a_quiet_cluster_is_one_of_settings_that_there_are() -> None:
+    pytest.importorskip("distributed")
+    import dask
+    from moiregauge import campaign
+
+    for name, value in campaign.QUIET.items():
+        # Dask takes names that it does not know, and does nothing.
+        assert dask.config.get(name, None) not in (None, value), name
+
+
+def test_scheduler_and_client_take_less_than_a_twentieth() -> None:
+    """Of the processor time, with fewer sets than the ten thousand that the script takes by itself."""
+    pytest.importorskip("distributed")
+    script = Path(__file__).resolve().parent.parent / "measure" / "many_sets.py"
+    done = subprocess.run([sys.executable, script, "500"], capture_output=True, text=True, timeout=400, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
 
 
 # What a notebook of the user's does, in a process of its own.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import pickle
+import subprocess
 import warnings
 from pathlib import Path
 
@@ -57,6 +58,12 @@ def test_reports_are_those_of_the_program(results: mg.Results, scans: Path, tmp_
     for name in names:
         if name.name not in asked:
             assert (tmp_path / "program" / name).read_bytes() == (tmp_path / "python" / name).read_bytes(), name
+    documents = [json.loads((tmp_path / by / "results.json").read_text()) for by in ("program", "python")]
+    assert without_run(documents[0]) == without_run(documents[1])
+    # The run of one, done again by the program, is the report of the other.
+    program("analyze", "--replay", tmp_path / "python" / "results.json", "--out", tmp_path / "again")
+    for name in names:
+        assert (tmp_path / "again" / name).read_bytes() == (tmp_path / "python" / name).read_bytes(), name
     with pytest.raises(OSError, match="already holds results"):
         results.report(tmp_path / "python")
     results.report(tmp_path / "python", force=True, png=False)
@@ -72,6 +79,16 @@ def test_results_survive_pickling(results: mg.Results, tmp_path: Path) -> None:
 def test_unknown_names_are_refused() -> None:
     with pytest.raises(ValueError, match="nonsense"):
         mg.Estimate.from_dict({"value": 1.0, "sigma": 0.1, "nonsense": 2})
+    with pytest.raises(ValueError, match="expected 2 values, found 3"):
+        mg.results.Window.from_dict({"centre_nm": [0.0, 0.0, 0.0], "extent_nm": [1.0, 1.0]})
+
+
+def test_classes_of_users_are_documents_too() -> None:
+    class Own(mg.Estimate):
+        pass
+
+    own = Own.from_dict({"value": 1, "sigma": None})
+    assert own.to_dict() == {"value": 1.0, "sigma": None} and isinstance(own.value, float)
 
 
 def test_channels_have_row_0_at_the_bottom(image: Path, tmp_path: Path) -> None:
@@ -131,6 +148,10 @@ def test_the_program_is_there(tmp_path: Path) -> None:
     assert mg.__version__ in program("--version").stdout
     assert program("analyze", tmp_path / "nothing", "--out", tmp_path / "out", ok=False).returncode == 1
     assert "twist" in program("explain", "--markdown").stdout
+    # The one line for somebody without anything.
+    said = subprocess.run([str(PROGRAM), "demo"], cwd=tmp_path, capture_output=True, text=True, timeout=300, check=True)
+    assert "True values of the simulation" in said.stdout
+    assert (tmp_path / "moiregauge-demo" / "results" / "report.html").is_file()
 
 
 def test_moires_are_several(scans: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from pathlib import Path
 from typing import Any
 
@@ -120,17 +121,47 @@ def test_doubts_are_warned_of_once_a_kind(image: Path) -> None:
     assert {one.filename for one in doubts} == {__file__}
 
 
+class Writer(threading.Thread):
+    """Writes noise into an array, from when it is told to until it is stopped."""
+
+    def __init__(self, array: np.ndarray) -> None:
+        super().__init__()
+        self.array, self.begin, self.end, self.times = array, threading.Event(), threading.Event(), 0
+
+    def run(self) -> None:
+        noise = np.random.default_rng(1)
+        self.begin.wait()
+        while not self.end.is_set() or not self.times:
+            self.array[:] = noise.normal(size=self.array.shape)
+            self.times += 1
+
+    def __enter__(self) -> Writer:
+        self.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.begin.set()
+        self.end.set()
+        self.join()
+
+
 def test_another_thread_may_write_into_an_array(array: np.ndarray) -> None:
-    import threading
-
+    """What is written once the work goes on comes too late."""
     expected, shared = lattice(array), array.copy()
-    stop = threading.Event()
-
-    def spoil(doing: str, done: int, count: int) -> None:
-        # Called while the work goes on: what is written now comes too late.
-        shared[:] = 0.0
-
-    found = mg.analyze(arrays=[shared], pixel_nm=0.5, drift_draws=0, strain_draws=0, progress=spoil)
-    stop.set()
+    with Writer(shared) as writer:
+        options = {"pixel_nm": 0.5, "drift_draws": 0, "strain_draws": 0}
+        found = mg.analyze(arrays=[shared], progress=lambda *_: writer.begin.set(), **options)
     assert found.sets[0].scans[0].vectors == expected
-    assert not shared.any()
+    assert writer.times and not (shared == array).any()
+
+
+def test_an_array_that_is_written_all_the_time_is_one_of_noise(array: np.ndarray) -> None:
+    """An answer, or a refusal that names the array; nothing else."""
+    shared = array.copy()
+    with Writer(shared) as writer:
+        writer.begin.set()
+        for _ in range(20):
+            try:
+                mg.analyze(arrays=[shared], pixel_nm=0.5, drift_draws=0, strain_draws=0)
+            except mg.MeasureError as error:
+                assert error.file == "array 1"

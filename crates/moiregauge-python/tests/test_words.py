@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import ast
+import graphlib
+import inspect
 import os
+import pydoc
 import subprocess
 import sys
 import sysconfig
@@ -73,7 +77,36 @@ def test_versions_are_those_of_the_workspace() -> None:
         pytest.skip("the workspace is not there")
     known, own = versions(workspace), versions(HERE / "Cargo.lock")
     names = {name for name, _ in known}
+    # Who has no Python builds and tests the workspace all the same.
+    assert not names & {"pyo3", "pyo3-ffi", "numpy", "moiregauge-python"}
     assert not {one for one in own - known if one[0] in names}
+
+
+def test_modules_import_each_other_one_way() -> None:
+    """Wherever an import stands: in functions, and for annotations alone."""
+    files = {path.stem: path for path in (HERE / "python" / "moiregauge").glob("*.py")}
+
+    def imported(path: Path) -> set[str]:
+        found = set()
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ImportFrom) and node.module == "moiregauge":
+                found |= {one.name if one.name in files else "__init__" for one in node.names if one.name != "_core"}
+            elif isinstance(node, ast.ImportFrom) and str(node.module).startswith("moiregauge."):
+                found.add(str(node.module).split(".")[1])
+            elif isinstance(node, ast.Import):
+                found |= {one.name.partition(".")[2] or "__init__" for one in node.names if one.name.startswith("moiregauge")}
+        return found
+
+    order = graphlib.TopologicalSorter({name: imported(path) for name, path in files.items()})
+    # Raises `CycleError`, with the circle in words.
+    assert set(order.static_order()) >= set(files)
+
+
+def test_arguments_stand_in_one_place_and_are_shown() -> None:
+    one, several = inspect.signature(mg.analyze), inspect.signature(mg.analyze_moires)
+    assert one.parameters == several.parameters and "arrays" in one.parameters
+    assert (one.return_annotation, several.return_annotation) == ("Results", "list[Results]")
+    assert "pixel_nm: 'float | tuple[float, float] | None' = None" in pydoc.render_doc(mg.analyze, renderer=pydoc.plaintext)
 
 
 def test_types_are_right() -> None:

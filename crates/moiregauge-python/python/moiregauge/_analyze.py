@@ -10,10 +10,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Unpack, cast
 
 from moiregauge import _core
-from moiregauge._arguments import Asked, Input, Progress, asked, words
+from moiregauge._arguments import Asked, Input, asked, words
 from moiregauge._errors import CaveatWarning, FailedFileWarning
-from moiregauge._progress import teller
+from moiregauge._progress import Progress, teller
 from moiregauge._scan import Scan, scan
+from moiregauge._signature import takes_what
 from moiregauge.results import Caveat, FailedInput, MapResults, Results, ScanResult
 
 if TYPE_CHECKING:
@@ -96,7 +97,7 @@ def _warn(text: str, category: type[Warning], inside: tuple[str, ...]) -> None:
     warnings.warn(text, category, stacklevel=level)
 
 
-def analyze(
+def analyze_moires(
     paths: Input | Sequence[Input] | None = None,
     *,
     arrays: Sequence[Any] | None = None,
@@ -109,7 +110,18 @@ def analyze(
     threads: int | None = None,
     progress: Progress = None,
     **options: Unpack[Options],
-) -> Results:
+) -> list[Results]:
+    """As `analyze` with `moires=N`, of images that show several moirés each: the results of all, the largest cell first."""
+    found = asked(paths, arrays, pixel_nm, names, options)
+    run = run_of(found, options, sets, atomic, atomic_layer, survey_image)
+    all_of_them = results_of(run, threads, progress)
+    for results in all_of_them:
+        warn(results.caveats, results.failed)
+    return all_of_them
+
+
+@takes_what(analyze_moires)
+def analyze(*inputs: Any, **given: Any) -> Results:
     """From scans to drift, moiré lattice, twist and heterostrain, each with its uncertainty.
 
     Does what `moiregauge analyze` does: scans are grouped into sets by slow axis, line rate, size and channel and
@@ -133,36 +145,10 @@ def analyze(
     Doubts are in `caveats` and warned of once for each kind (`CaveatWarning`). Raises `ReadError` where nothing can be
     read, `MeasureError` where nothing shows a lattice, `ValueError` for options that make no sense.
     """
-    found = asked(paths, arrays, pixel_nm, names, options)
-    if int(options.get("moires", 1)) != 1:
+    if int(given.get("moires", 1)) != 1:
         raise ValueError("moires: analyze gives the results of one moiré; analyze_moires gives those of all")
-    run = run_of(found, options, sets, atomic, atomic_layer, survey_image)
-    (results,) = results_of(run, threads, progress)
-    warn(results.caveats, results.failed)
+    (results,) = analyze_moires(*inputs, **given)
     return results
-
-
-def analyze_moires(
-    paths: Input | Sequence[Input] | None = None,
-    *,
-    arrays: Sequence[Any] | None = None,
-    pixel_nm: float | tuple[float, float] | None = None,
-    names: Sequence[str] | None = None,
-    sets: Mapping[str, Any] | None = None,
-    atomic: Sequence[Any] | None = None,
-    atomic_layer: Literal[1, 2] = 1,
-    survey_image: Any = None,
-    threads: int | None = None,
-    progress: Progress = None,
-    **options: Unpack[Options],
-) -> list[Results]:
-    """As `analyze` with `moires=N`, of images that show several moirés each: the results of all, the largest cell first."""
-    found = asked(paths, arrays, pixel_nm, names, options)
-    run = run_of(found, options, sets, atomic, atomic_layer, survey_image)
-    all_of_them = results_of(run, threads, progress)
-    for results in all_of_them:
-        warn(results.caveats, results.failed)
-    return all_of_them
 
 
 def measure(
@@ -240,44 +226,6 @@ class Campaign:
 def _same(one: Any, other: Any) -> bool:
     plain = (str, os.PathLike)
     return isinstance(one, plain) and isinstance(other, plain) and Path(one) == Path(other)
-
-
-def write_report(
-    results: Results,
-    folder: Path,
-    force: bool,
-    choice: Mapping[str, Any],
-    parquet: bool,
-    threads: int | None,
-    progress: Progress,
-) -> Path:
-    """What `Results.report` does."""
-    run = results._run
-    if run is None:
-        run = again(results, threads, progress)
-    several = run.report(folder, force, json.dumps(choice), parquet, threads, teller(progress))
-    within = folder / "moire-1" if several > 1 else folder
-    return within / ("report.html" if choice["html"] else "results.json")
-
-
-def again(results: Results, threads: int | None, progress: Progress) -> _core.Analysis:
-    """The run that results record, done again."""
-    recorded = results.provenance.run
-    if recorded is None:
-        raise ValueError("the results do not record their run: they cannot be reported again")
-    document = recorded.to_dict()
-    beside = {key: document.get(key) for key in ("arguments", "atomic", "survey_image")}
-    run = _core.Analysis(
-        [Path(path) for path in recorded.inputs],
-        json.dumps({"settings": document["settings"]}),
-        json.dumps(document.get("known", {})),
-        json.dumps({**beside, "sets": document.get("sets", [])}),
-        [],
-    )
-    documents = [json.loads(one) for one, _ in run.analyse(threads, teller(progress))]
-    if results.to_dict() not in documents:
-        raise ValueError("the same run does not come to these results any more: its files or this version have changed")
-    return run
 
 
 def map(  # noqa: A001

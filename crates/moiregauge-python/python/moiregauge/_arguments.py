@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, BinaryIO, TypeAlias, cast
@@ -16,8 +16,6 @@ from moiregauge._labelled import Frame, grid_of_labelled, is_labelled
 from moiregauge._options import TOLD
 from moiregauge._scan import Scan
 
-Progress: TypeAlias = bool | Callable[[str, int, int], object] | None
-"""`True` for a bar, or a function of what is being done, how much of it is done, and how much there is."""
 PathLike: TypeAlias = "str | os.PathLike[str]"
 # Arrays are objects here, since xarray need not be installed.
 Input: TypeAlias = "PathLike | BinaryIO | NDArray[Any] | Scan | Mapping[str, Any] | Any"

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias, Unpack
 
 from moiregauge import _core
 from moiregauge._analyze import warn
-from moiregauge._arguments import PathLike, Progress, listed, words
+from moiregauge._arguments import PathLike, listed, words
 from moiregauge._options import TOLD
-from moiregauge._progress import teller
+from moiregauge._progress import Progress, teller
 from moiregauge._record import Record
 from moiregauge.results import Caveat, FailedInput
 

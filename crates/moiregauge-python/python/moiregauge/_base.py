@@ -1,17 +1,17 @@
-"""What documents can do: dictionaries, tables, arrays, words, HTML."""
+"""What estimates, results and maps can do beside being documents."""
 
 from __future__ import annotations
 
-import dataclasses
-import functools
-import json
 import types
-import typing
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, TypeAlias, TypeVar, Union, cast
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
+
+from moiregauge import _frames, _html, _report, _words
+from moiregauge._document import Document
+from moiregauge._progress import Progress
 
 if TYPE_CHECKING:
     import os
@@ -21,98 +21,13 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from moiregauge import _core
-    from moiregauge._arguments import Progress
-    from moiregauge.results import Estimate, MapResults, Results
-
-T = TypeVar("T", bound="Document")
-
-
-def _encoded(value: Any) -> Any:
-    if isinstance(value, Document):
-        return value.to_dict()
-    if isinstance(value, tuple):
-        return [_encoded(one) for one in value]
-    return value
-
-
-# What makes a value of a document one of ours; `None` where it stays as it is.
-Decoder: TypeAlias = "Callable[[Any], Any] | None"
-
-
-@functools.cache
-def _decoders(of: type[Any]) -> dict[str, Decoder]:
-    """Those of the fields of a class, made once."""
-    return {name: _decoder(wanted) for name, wanted in typing.get_type_hints(of).items()}
-
-
-@functools.cache
-def _decoder(wanted: Any) -> Decoder:
-    origin = typing.get_origin(wanted)
-    if origin in (Union, types.UnionType):
-        return _decoder(next(one for one in typing.get_args(wanted) if one is not type(None)))
-    if origin is tuple:
-        inner = typing.get_args(wanted)
-        if inner[-1] is Ellipsis:
-            return functools.partial(_tuple, _decoder(inner[0]))
-        return functools.partial(_tuple_of, [_decoder(of) for of in inner])
-    if isinstance(wanted, type) and issubclass(wanted, Document):
-        return wanted.from_dict
-    return float if wanted is float else None
-
-
-def _tuple(decoder: Decoder, values: list[Any]) -> tuple[Any, ...]:
-    if decoder is None:
-        return tuple(values)
-    return tuple([None if value is None else decoder(value) for value in values])
-
-
-def _tuple_of(decoders: list[Decoder], values: list[Any]) -> tuple[Any, ...]:
-    both = zip(decoders, values, strict=True)
-    return tuple([value if value is None or decoder is None else decoder(value) for decoder, value in both])
-
-
-class Document:
-    """A part of a published document. Frozen; compared by value; no reference to a file or an image."""
-
-    @classmethod
-    def from_dict(cls: type[T], document: Mapping[str, Any]) -> T:
-        """That of a document, as `results.json` holds it.
-
-        Raises `ValueError` for names that this version does not know.
-        """
-        decoders = _decoders(cast(Any, cls))
-        if not document.keys() <= decoders.keys():
-            known = {field.name for field in dataclasses.fields(cast(Any, cls))}
-            raise ValueError(f"{cls.__name__}: expected {sorted(known)}, found also {sorted(document.keys() - known)}")
-        given = {}
-        for name, value in document.items():
-            decoder = decoders[name]
-            given[name] = value if value is None or decoder is None else decoder(value)
-        return cls(**given)
-
-    def to_dict(self) -> dict[str, Any]:
-        """The document as plain dictionaries, lists, numbers and words: that of `results.json` or `map.json`."""
-        document = {}
-        for field in dataclasses.fields(cast(Any, self)):
-            value = getattr(self, field.name)
-            # What a document may leave out is left out where there is none.
-            if field.default is not dataclasses.MISSING and value == field.default:
-                continue
-            document[field.name] = _encoded(value)
-        return document
 
 
 class EstimateBase(Document):
     """A value with its errors."""
 
     def __str__(self) -> str:
-        from moiregauge import _core
-
-        def known(value: float | None) -> float:
-            return float("nan") if value is None else value
-
-        own = cast("Estimate", self)
-        return _core.plus_minus(known(own.value), known(own.sigma), own.sigma_total)
+        return _words.estimate(self.to_dict())
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self})"
@@ -138,34 +53,26 @@ class ResultsBase(Document):
         return state
 
     def _repr_html_(self) -> str:
-        from moiregauge._html import results
-
-        return results(cast("Results", self))
+        return _html.results(self.to_dict())
 
     def __str__(self) -> str:
         return self._summary or repr(self)
 
     def __repr__(self) -> str:
-        from moiregauge._html import in_a_line
-
-        return in_a_line(cast("Results", self))
+        return _words.results(self.to_dict())
 
     def to_pandas(self, table: Literal["scans", "vectors", "sets", "budget"] = "scans") -> pandas.DataFrame:
         """A table of the report as a `pandas.DataFrame`: one row a scan, or those of `vectors.csv`, `sets.csv` or
         `budget.csv`. Columns have the names and units of these files.
         """
-        from moiregauge._frames import to_pandas
-
-        return to_pandas(cast("Results", self), table)
+        return _frames.to_pandas(self.to_dict(), table)
 
     def to_xarray(self) -> xarray.Dataset:
         """The scans as an `xarray.Dataset` along `scan`: twist, strain, wavelengths, each with a variable for its σ,
         `units`, `long_name` and `ancillary_variables` as in the CF conventions; settings and provenance as JSON in the
         attributes.
         """
-        from moiregauge._frames import to_xarray
-
-        return to_xarray(cast("Results", self))
+        return _frames.to_xarray(self.to_dict())
 
     def report(
         self,
@@ -186,10 +93,9 @@ class ResultsBase(Document):
         A folder that holds results is refused unless `force`. Results that were pickled have no scans any more: these
         are measured again, and `ValueError` says where something else came out.
         """
-        from moiregauge._analyze import write_report
-
         choice = {"figures": figures, "png": png, "html": html, "colormap": colormap}
-        return write_report(cast("Results", self), Path(folder), force, choice, parquet, threads, progress)
+        run = self._run or _report.run_again(self.to_dict(), threads, progress)
+        return _report.write(run, Path(folder), force, choice, parquet, threads, progress)
 
 
 class MapBase(Document):
@@ -241,28 +147,19 @@ class MapBase(Document):
         """Writes what `moiregauge map` writes into a folder: the document, `map.zarr`, `map.gwy`, tables, figures,
         `report.html`. Returns the page, or `map.json` where none was wanted. Maps that were pickled cannot be reported.
         """
-        from moiregauge._progress import teller
-
         if self._map is None:
             raise ValueError("this map was pickled or read from a document: map the scans again to report it")
         choice = {"figures": figures, "png": png, "html": html, "colormap": colormap}
-        self._map.report(folder, force, json.dumps(choice), threads, teller(progress))
-        return Path(folder) / ("report.html" if html else "map.json")
+        return _report.write_map(self._map, Path(folder), force, choice, threads, progress)
 
     def to_xarray(self) -> xarray.Dataset:
         """The map as an `xarray.Dataset` with the dimensions `y` and `x` (nm, row 0 at the bottom): every quantity with
         `units`, `long_name` and, in `ancillary_variables`, the name of its σ; `mask` as CF flags.
         """
-        from moiregauge._frames import map_to_xarray
-
-        return map_to_xarray(cast("MapResults", self))
+        return _frames.map_to_xarray(self.to_dict(), self._arrays)
 
     def __repr__(self) -> str:
-        from moiregauge._html import map_in_a_line
-
-        return map_in_a_line(cast("MapResults", self))
+        return _words.map_results(self.to_dict())
 
     def _repr_html_(self) -> str:
-        from moiregauge._html import map_results
-
-        return map_results(cast("MapResults", self))
+        return _html.map_results(self.to_dict())

@@ -6,9 +6,11 @@ import csv
 import io
 import json
 import re
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from moiregauge import _core
 
@@ -16,7 +18,7 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-    from moiregauge.results import MapResults, Results
+Found: TypeAlias = Mapping[str, Any]
 
 WORDS = {
     "set",
@@ -43,8 +45,8 @@ UNITS = {
 }
 
 
-def _tables(results: Results) -> dict[str, str]:
-    return dict(_core.tables(json.dumps(results.to_dict())))
+def _tables(found: Found) -> dict[str, str]:
+    return dict(_core.tables(json.dumps(found)))
 
 
 def _rows(text: str) -> list[dict[str, str]]:
@@ -63,9 +65,9 @@ def _value(name: str, text: str) -> Any:
         return text
 
 
-def scans(results: Results) -> list[dict[str, Any]]:
+def scans(found: Found) -> list[dict[str, Any]]:
     """One row a scan: free of drift where that is known, and the wavelengths beside it."""
-    tables = _tables(results)
+    tables = _tables(found)
     best: dict[tuple[str, str], dict[str, str]] = {}
     for row in _rows(tables["scans.csv"]):
         key = (row["set"], row["scan"])
@@ -80,15 +82,15 @@ def scans(results: Results) -> list[dict[str, Any]]:
     return [{name: _value(name, text) for name, text in row.items()} for row in best.values()]
 
 
-def to_pandas(results: Results, table: str) -> pandas.DataFrame:
+def to_pandas(found: Found, table: str) -> pandas.DataFrame:
     import pandas
 
     if table not in ("scans", "vectors", "sets", "budget"):
         raise ValueError(f'table: expected "scans", "vectors", "sets" or "budget", found {table!r}')
     if table == "scans":
-        frame = pandas.DataFrame(scans(results))
+        frame = pandas.DataFrame(scans(found))
     else:
-        rows = _rows(_tables(results)[f"{table}.csv"])
+        rows = _rows(_tables(found)[f"{table}.csv"])
         frame = pandas.DataFrame([{name: _value(name, text) for name, text in row.items()} for row in rows])
     for name in ("scan", "scans"):
         if name in frame:
@@ -107,11 +109,11 @@ def _unit(name: str) -> str:
     return next((unit for end, unit in UNITS.items() if name.endswith(end)), "1")
 
 
-def to_xarray(results: Results) -> xarray.Dataset:
+def to_xarray(found: Found) -> xarray.Dataset:
     import xarray
 
-    rows = scans(results)
-    meaning = _meaning(_tables(results)["columns.md"])
+    rows = scans(found)
+    meaning = _meaning(_tables(found)["columns.md"])
     data = xarray.Dataset()
     names = list(dict.fromkeys(name for row in rows for name in row))
     for name in names:
@@ -133,13 +135,12 @@ def to_xarray(results: Results) -> xarray.Dataset:
         np.arange(1, len(rows) + 1),
         {"long_name": "number of the scan, in order of sets and time"},
     )
-    document = results.to_dict()
     data.attrs = {
         "Conventions": "CF-1.11",
         "title": "Twist and strain of a moiré superlattice, scan by scan",
-        "source": f"moiregauge {results.provenance.version}",
+        "source": f"moiregauge {found['provenance']['version']}",
         **{
-            name: json.dumps(document[name], ensure_ascii=False)
+            name: json.dumps(found[name], ensure_ascii=False)
             for name in ("settings", "provenance", "conventions", "caveats")
         },
     }
@@ -153,12 +154,12 @@ def _sigma_of(name: str) -> str:
     return f"{stem.removesuffix('_ccw_from_x')}_sigma{end}"
 
 
-def map_to_xarray(found: MapResults) -> xarray.Dataset:
+def map_to_xarray(found: Found, arrays: Mapping[str, tuple[str, NDArray[Any]]]) -> xarray.Dataset:
     import xarray
 
-    columns, rows = found.nodes
-    along, across = np.array(found.step_nm[0]), np.array(found.step_nm[1])
-    origin = np.array(found.origin_nm)
+    columns, rows = found["nodes"]
+    along, across = np.array(found["step_nm"][0]), np.array(found["step_nm"][1])
+    origin = np.array(found["origin_nm"])
     # Exact where the axes of the map are those of the laboratory; `position_x` and `position_y` hold always.
     straight = abs(along[1]) < 1e-9 and abs(across[0]) < 1e-9
     x = np.arange(columns) * (along[0] if straight else np.hypot(*along)) + (origin[0] if straight else 0.0)
@@ -179,32 +180,31 @@ def map_to_xarray(found: MapResults) -> xarray.Dataset:
         }
     )
     units = {"°": "degree", "%": "percent", "nm": "nm", "%²": "1e-4", "rad/nm²": "rad nm-2", "": "1"}
-    for name, (unit, values) in found._arrays.items():
+    for name, (unit, values) in arrays.items():
         key = name.replace(" ", "_")
         attrs: dict[str, Any] = {"long_name": name, "units": units.get(unit, unit)}
         if key == "mask":
-            names = {mask.value: mask.name for mask in found.masks}
+            names = {mask["value"]: mask["name"] for mask in found["masks"]}
             attrs = {
                 "long_name": "why a node is not to be believed",
                 "flag_values": sorted(names),
                 "flag_meanings": " ".join(names[value].replace(" ", "_") for value in sorted(names)),
             }
             values = values.astype("uint8")
-        elif f"{name} sigma" in found._arrays:
+        elif f"{name} sigma" in arrays:
             attrs["ancillary_variables"] = f"{key}_sigma mask"
         data[key] = (("y", "x"), values, attrs)
     for axis in ("x", "y"):
         if f"position_{axis}" in data:
             data = data.set_coords(f"position_{axis}")
-    document = found.to_dict()
     kept = ("settings", "provenance", "conventions", "caveats", "quantities", "method")
     data.attrs = {
         "Conventions": "CF-1.11",
         "title": "Map of twist and strain of a moiré superlattice",
-        "source": f"moiregauge {found.provenance.version}",
-        "errors": found.errors,
-        "window_nm": found.window_nm,
-        "resolution_nm": found.resolution_nm,
-        **{name: json.dumps(document[name], ensure_ascii=False) for name in kept},
+        "source": f"moiregauge {found['provenance']['version']}",
+        "errors": found["errors"],
+        "window_nm": found["window_nm"],
+        "resolution_nm": found["resolution_nm"],
+        **{name: json.dumps(found[name], ensure_ascii=False) for name in kept},
     }
     return data

@@ -2,19 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from html import escape
-from typing import TYPE_CHECKING
+from typing import Any, TypeAlias
 
-if TYPE_CHECKING:
-    from moiregauge.results import (
-        Caveat,
-        CombinedResult,
-        DriftResult,
-        Estimate,
-        MapResults,
-        MeanResult,
-        Results,
-    )
+from moiregauge import _words
+
+Found: TypeAlias = Mapping[str, Any]
 
 # `currentColor` is black on white and white on black.
 STYLE = (
@@ -26,47 +20,54 @@ STYLE = (
 )
 
 
-def _shown(estimate: Estimate | None, unit: str) -> str:
-    if estimate is None or estimate.value is None:
+def _shown(estimate: Found | None, unit: str) -> str:
+    if estimate is None or estimate["value"] is None:
         return "–"
-    return f"{escape(str(estimate))} {unit}".strip()
+    return f"{escape(_words.estimate(estimate))} {unit}".strip()
 
 
-def _drift(drift: DriftResult | None) -> str:
+def _drift(drift: Found | None) -> str:
     if drift is None:
         return "not determined"
-    return f"{_shown(drift.x_nm_per_min, '')}, {_shown(drift.y_nm_per_min, 'nm/min')}"
+    return f"{_shown(drift['x_nm_per_min'], '')}, {_shown(drift['y_nm_per_min'], 'nm/min')}"
 
 
-def _row(name: str, scans: int, mean: MeanResult | CombinedResult | None, drift: DriftResult | None) -> str:
+def _row(name: str, scans: int, mean: Found | None, drift: Found | None) -> str:
     if mean is None:
         cells = ["–"] * 3
     else:
-        lengths = ", ".join(escape(str(vector.wavelength_nm)).split(" (")[0] for vector in mean.vectors)
-        cells = [_shown(mean.twist_deg, "°"), _shown(mean.heterostrain_percent, "%"), f"{lengths} nm"]
+        lengths = [_words.estimate(vector["wavelength_nm"]).split(" (")[0] for vector in mean["vectors"]]
+        cells = [
+            _shown(mean["twist_deg"], "°"),
+            _shown(mean["heterostrain_percent"], "%"),
+            f"{', '.join(map(escape, lengths))} nm",
+        ]
     cells = [escape(name), str(scans), _drift(drift), *cells]
     return "<tr>" + "".join(f"<td>{cell}</td>" for cell in cells) + "</tr>"
 
 
-def _caveats(caveats: tuple[Caveat, ...]) -> str:
+def _caveats(caveats: Sequence[Found]) -> str:
     if not caveats:
         return ""
-    items = "".join(f"<li><code>{escape(c.code)}</code> {escape(c.where)}: {escape(c.message)}</li>" for c in caveats)
+    items = "".join(
+        f"<li><code>{escape(c['code'])}</code> {escape(c['where'])}: {escape(c['message'])}</li>" for c in caveats
+    )
     return f'<details><summary>{len(caveats)} to keep in mind</summary><ul class="mg-c">{items}</ul></details>'
 
 
-def results(found: Results) -> str:
+def results(found: Found) -> str:
+    """Those of an analysis: the sets, and all of them together."""
     head = ["Set", "Scans", "Drift x, y", "Twist", "Heterostrain", "Wavelengths"]
+    sets, combined = found["sets"], found["combined"]
     # A set that has no drift has its mean all the same.
-    rows = [_row(one.name, len(one.scans), one.mean or one.uncorrected, one.drift) for one in found.sets]
-    if found.combined is not None and len(found.sets) > 1:
-        scans = sum(len(one.scans) for one in found.sets)
-        rows.append(_row("all", scans, found.combined, found.combined.drift))
+    rows = [_row(one["name"], len(one["scans"]), one["mean"] or one["uncorrected"], one["drift"]) for one in sets]
+    if combined is not None and len(sets) > 1:
+        rows.append(_row("all", sum(len(one["scans"]) for one in sets), combined, combined["drift"]))
     columns = "".join(f"<th>{name}</th>" for name in head)
     return (
         f'{STYLE}<table class="mg-r"><thead><tr>{columns}</tr></thead><tbody>{"".join(rows)}</tbody></table>'
-        + _failed(len(found.failed))
-        + _caveats(found.caveats)
+        + _failed(len(found["failed"]))
+        + _caveats(found["caveats"])
     )
 
 
@@ -78,29 +79,18 @@ def _failed(count: int) -> str:
     )
 
 
-def map_results(found: MapResults) -> str:
+def map_results(found: Found) -> str:
+    """Those of a map: its quantities in short."""
     rows = "".join(
-        f"<tr><td>{escape(q.name)}</td><td>{q.mean:.6g} {escape(q.unit)}</td><td>{q.spread_corrected:.3g}</td>"
-        f"<td>{q.noise:.2g}</td></tr>"
-        for q in found.quantities
+        f"<tr><td>{escape(q['name'])}</td><td>{q['mean']:.6g} {escape(q['unit'])}</td>"
+        f"<td>{q['spread_corrected']:.3g}</td><td>{q['noise']:.2g}</td></tr>"
+        for q in found["quantities"]
     )
-    columns, lines = found.nodes
-    caption = f"{columns} × {lines} nodes, resolution {found.resolution_nm:.3g} nm"
+    columns, lines = found["nodes"]
+    caption = f"{columns} × {lines} nodes, resolution {found['resolution_nm']:.3g} nm"
     head = "<th>Quantity</th><th>Mean</th><th>Varies by</th><th>Noise of a node</th>"
     return (
         f'{STYLE}<table class="mg-r"><caption>{caption}</caption><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>'
-        + _failed(len(found.provenance.failed))
-        + _caveats(found.caveats)
+        + _failed(len(found["provenance"]["failed"]))
+        + _caveats(found["caveats"])
     )
-
-
-def in_a_line(found: Results) -> str:
-    scans = sum(len(one.scans) for one in found.sets)
-    mean = found.combined or next((one.mean or one.uncorrected for one in found.sets), None)
-    twist = f", twist {mean.twist_deg}°" if mean is not None else ""
-    return f"<Results: {scans} scans in {len(found.sets)} sets{twist}, {len(found.caveats)} caveats>"
-
-
-def map_in_a_line(found: MapResults) -> str:
-    columns, lines = found.nodes
-    return f"<MapResults: {columns} × {lines} nodes, resolution {found.resolution_nm:.3g} nm, {len(found.caveats)} caveats>"

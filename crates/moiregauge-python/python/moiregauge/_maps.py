@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypedDict
 from urllib.parse import quote
 
 from moiregauge import _core
+from moiregauge._analyze import map as map_of
 
 if TYPE_CHECKING:
     import xarray
@@ -82,8 +83,6 @@ def quoted(sample: str) -> str:
 
 def made(many: _core.ManySamples, out: str, wanted: tuple[Any, ...], place: int, threads: int | None) -> None:
     """Maps a sample, unless that was done; a sample without a map leaves the reason."""
-    from moiregauge._analyze import map as map_of
-
     sample, key, files = many.sample(place)
     folder, key = Path(out) / "maps", _key(key, wanted)
     store = folder / f"{quoted(sample)}.zarr"

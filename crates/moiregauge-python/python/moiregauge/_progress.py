@@ -10,6 +10,8 @@ WIDTH = 30
 
 Tell: TypeAlias = Callable[[str, int, int], object]
 """What is being done, how much of it is done, how much there is."""
+Progress: TypeAlias = bool | Tell | None
+"""`True` for a bar, or a function of what is being done, how much of it is done, and how much there is."""
 
 
 class Bar:
@@ -27,7 +29,7 @@ class Bar:
         sys.stderr.flush()
 
 
-def teller(progress: bool | Tell | None) -> Tell | None:
+def teller(progress: Progress) -> Tell | None:
     """The function to call, if any."""
     if progress is None or progress is False:
         return None
