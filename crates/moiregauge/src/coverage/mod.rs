@@ -13,6 +13,7 @@ pub(crate) mod grains;
 pub(crate) mod higher;
 pub(crate) mod hollows;
 pub(crate) mod local;
+pub(crate) mod look;
 pub(crate) mod nodes;
 pub(crate) mod patch;
 pub(crate) mod phases;

@@ -12,32 +12,15 @@ use crate::coverage::bend::{Mean, mean, refined};
 use crate::coverage::cells::{Cells, Window};
 use crate::coverage::grains::{Grains, split};
 use crate::coverage::hollows::hollows;
+use crate::coverage::look::{Seen, look, shows};
 use crate::coverage::nodes::View;
 use crate::coverage::patch::Patch;
 use crate::frame::image::Image;
-use crate::numbers::median::median;
 use crate::numbers::three::three;
 
 /// Windows that are tried, mean periods: the narrowest that keeps waves a wave vector apart, and wider ones for
 /// noisy images.
 const WIDTHS: [f64; 4] = [0.8, 1.2, 1.8, 2.7];
-
-/// Wide enough: noise in the weighted sum, which is 1 where the lattice is, is below this. Five times it fits between
-/// half and one.
-const QUIET: f64 = 0.1;
-
-/// Cells with more than this share of what is typical are the patch: an edge is where the window sees half.
-const INSIDE: f64 = 0.5;
-
-/// What is typical of a wave is less than in this share of the cells has more of it: half of the windows of a small patch see its
-/// edge, which does not count.
-const TYPICAL: f64 = 0.75;
-
-/// Cells whose window is missing for the most part tell nothing.
-const SUPPORT: f64 = 0.15;
-
-/// Power over noise that each wave has under the window, at least: e⁻⁸ by chance, in each of many windows.
-const PLAIN: f64 = 8.0;
 
 /// Pixels are averaged where the shortest period has twice so many: harmonics need not be seen.
 const BINS_PER_PERIOD: f64 = 8.0;
@@ -101,9 +84,13 @@ fn settle_bins(
     let mut pair = *pair;
     let mut narrowest = 0;
     let mut settled = None;
-    for _ in 0..ROUNDS {
+    for round in 0..ROUNDS {
         let sums = three(&pair).map(|q| cells.mixed(image, q));
         let quiet = hollows(&pair).map(|places| places.map(|q| cells.mixed(image, q)));
+        let at_a_glance = |window: &Window, width| shows(&cells, &sums, &quiet, window, width);
+        if round == 0 && !windows.iter().any(|(width, w)| at_a_glance(w, *width)) {
+            return None;
+        }
         let seen = (narrowest..WIDTHS.len()).find_map(|i| {
             let (_, window) = &windows[i];
             Some((i, look(&cells, &sums, &quiet, window, WIDTHS[i])?))
@@ -200,114 +187,6 @@ impl Settled {
     pub(crate) fn refined(&self) -> Option<Mean> {
         Some(refined(&self.view(), &self.inner)?.in_pixels(self.bins))
     }
-}
-
-/// What a window sees.
-pub(crate) struct Seen {
-    pub(crate) envelopes: [Vec<Complex64>; 3],
-    inside: Vec<bool>,
-    /// Power over noise power of each wave where it is.
-    pub(crate) weights: [f64; 3],
-    /// Noise power per pixel at each wave.
-    pub(crate) noise: [f64; 3],
-    /// The window, mean periods.
-    pub(crate) width: f64,
-}
-
-impl Seen {
-    /// Amplitude over noise amplitude in one resolution cell of the patch, weakest of the three waves.
-    pub(crate) fn signal_to_noise(&self, cells: &Cells, patch: &Patch) -> f64 {
-        let weakest = self.weights.iter().copied().fold(f64::INFINITY, f64::min);
-        (weakest * self.windows(cells, patch)).sqrt()
-    }
-
-    /// Independent windows in a patch.
-    fn windows(&self, cells: &Cells, patch: &Patch) -> f64 {
-        let inside = patch.inside.iter().zip(cells.counts());
-        let pixels: f64 = inside.filter(|(i, _)| **i).map(|(_, n)| n).sum();
-        let [a, b] = [0, 1].map(|axis| self.width * cells.period[axis]);
-        pixels / (4.0 * std::f64::consts::PI * a * b)
-    }
-
-    /// Whether each of the three waves stands out of the noise under the window itself.
-    pub(crate) fn is_plain(&self) -> bool {
-        self.weights.iter().all(|w| *w > PLAIN)
-    }
-
-    /// Power over noise of the three waves in one resolution cell of the patch, in sum.
-    pub(crate) fn evidence(&self, cells: &Cells, patch: &Patch) -> f64 {
-        self.weights.iter().sum::<f64>() * self.windows(cells, patch)
-    }
-}
-
-/// `None` where noise makes the window unfit.
-fn look(
-    cells: &Cells,
-    sums: &[Vec<Complex64>; 3],
-    quiet: &[[Vec<Complex64>; 2]; 3],
-    window: &Window,
-    width: f64,
-) -> Option<Seen> {
-    let envelopes = [0, 1, 2].map(|i| cells.envelope(&sums[i], window));
-    let usable: Vec<usize> = (0..cells.len())
-        .filter(|&i| window.support[i] > SUPPORT)
-        .collect();
-    if usable.is_empty() {
-        return None;
-    }
-    // Per pixel, as the median sees it: edges and steps, which are in few cells, do not count.
-    let level = |sums: &Vec<Complex64>| {
-        let envelope = cells.envelope(sums, window);
-        let powers = usable
-            .iter()
-            .map(|&i| envelope[i].norm_sqr() / window.noise[i]);
-        median(&mut powers.collect::<Vec<f64>>()) / std::f64::consts::LN_2
-    };
-    let noise = [0, 1, 2].map(|i| f64::midpoint(level(&quiet[i][0]), level(&quiet[i][1])));
-    let all: Vec<f64> = usable.iter().map(|&i| window.noise[i]).collect();
-    let one = median(&mut all.clone());
-    let unit = noise.map(|noise| noise * one);
-    // Typical power of each wave where it is: first by the strong cells, then as the median of the patch.
-    let mut typical = [0, 1, 2].map(|i| {
-        let powers = || usable.iter().map(|&n| envelopes[i][n].norm_sqr());
-        powers().map(|p| p * p).sum::<f64>() / powers().sum::<f64>().max(f64::MIN_POSITIVE)
-    });
-    let mut inside = vec![false; cells.len()];
-    for _ in 0..4 {
-        let total: f64 = typical.iter().sum();
-        let noisy: f64 = (0..3).map(|i| typical[i] * unit[i]).sum();
-        let quiet = (noisy / 2.0).sqrt() / total;
-        if !(quiet < QUIET) {
-            return None;
-        }
-        let mut any = false;
-        for &n in &usable {
-            let found = [0, 1, 2].map(|i| envelopes[i][n].norm() * typical[i].sqrt());
-            inside[n] = found.iter().sum::<f64>() > INSIDE * total;
-            any |= inside[n];
-        }
-        if !any {
-            return None;
-        }
-        let before = typical;
-        for i in 0..3 {
-            let powers = usable.iter().filter(|n| inside[**n]);
-            let mut powers: Vec<f64> = powers.map(|&n| envelopes[i][n].norm_sqr()).collect();
-            let place = (TYPICAL * (powers.len() - 1) as f64) as usize;
-            typical[i] = *powers.select_nth_unstable_by(place, f64::total_cmp).1;
-        }
-        let moved = (0..3).map(|i| (typical[i] / before[i] - 1.0).abs());
-        if moved.fold(0.0, f64::max) < 0.02 {
-            break;
-        }
-    }
-    Some(Seen {
-        weights: [0, 1, 2].map(|i| typical[i] / unit[i]),
-        envelopes,
-        inside,
-        noise,
-        width,
-    })
 }
 
 /// By how much the phases of the envelopes say that the pair is off, and by how many cycles that turns them over the

@@ -1,0 +1,182 @@
+//! What a window shows of three waves: where in the frame they are, how strong, and above what noise.
+
+use rustfft::num_complex::Complex64;
+
+use crate::coverage::cells::{Cells, Window};
+use crate::coverage::patch::Patch;
+use crate::numbers::median::median;
+
+/// Wide enough: noise in the weighted sum, which is 1 where the lattice is, is below this. Five times it fits between
+/// half and one.
+const QUIET: f64 = 0.1;
+
+/// So many times [`QUIET`] is let pass where only some cells are looked at. Chosen by eye: what is typical is known to a fraction.
+const GLANCE: f64 = 2.0;
+
+/// Cells with more than this share of what is typical are the patch: an edge is where the window sees half.
+const INSIDE: f64 = 0.5;
+
+/// What is typical of a wave is less than in this share of the cells has more of it: half of the windows of a small patch see its
+/// edge, which does not count.
+const TYPICAL: f64 = 0.75;
+
+/// Cells whose window is missing for the most part tell nothing.
+const SUPPORT: f64 = 0.15;
+
+/// Power over noise that each wave has under the window, at least: e⁻⁸ by chance, in each of many windows.
+const PLAIN: f64 = 8.0;
+
+/// What a window sees.
+pub(crate) struct Seen {
+    pub(crate) envelopes: [Vec<Complex64>; 3],
+    pub(crate) inside: Vec<bool>,
+    /// Power over noise power of each wave where it is.
+    pub(crate) weights: [f64; 3],
+    /// Noise power per pixel at each wave.
+    pub(crate) noise: [f64; 3],
+    /// The window, mean periods.
+    pub(crate) width: f64,
+}
+
+impl Seen {
+    /// Amplitude over noise amplitude in one resolution cell of the patch, weakest of the three waves.
+    pub(crate) fn signal_to_noise(&self, cells: &Cells, patch: &Patch) -> f64 {
+        let weakest = self.weights.iter().copied().fold(f64::INFINITY, f64::min);
+        (weakest * self.windows(cells, patch)).sqrt()
+    }
+
+    /// Independent windows in a patch.
+    fn windows(&self, cells: &Cells, patch: &Patch) -> f64 {
+        let inside = patch.inside.iter().zip(cells.counts());
+        let pixels: f64 = inside.filter(|(i, _)| **i).map(|(_, n)| n).sum();
+        let [a, b] = [0, 1].map(|axis| self.width * cells.period[axis]);
+        pixels / (4.0 * std::f64::consts::PI * a * b)
+    }
+
+    /// Whether each of the three waves stands out of the noise under the window itself.
+    pub(crate) fn is_plain(&self) -> bool {
+        self.weights.iter().all(|w| *w > PLAIN)
+    }
+
+    /// Power over noise of the three waves in one resolution cell of the patch, in sum.
+    pub(crate) fn evidence(&self, cells: &Cells, patch: &Patch) -> f64 {
+        self.weights.iter().sum::<f64>() * self.windows(cells, patch)
+    }
+}
+
+/// `None` where noise makes the window unfit.
+pub(crate) fn look(
+    cells: &Cells,
+    sums: &[Vec<Complex64>; 3],
+    quiet_sums: &[[Vec<Complex64>; 2]; 3],
+    window: &Window,
+    width: f64,
+) -> Option<Seen> {
+    let envelopes = [0, 1, 2].map(|i| cells.envelope(&sums[i], window));
+    let usable: Vec<usize> = (0..cells.len())
+        .filter(|&i| window.support[i] > SUPPORT)
+        .collect();
+    if usable.is_empty() {
+        return None;
+    }
+    let at = |values: Vec<Complex64>| usable.iter().map(|&i| values[i]).collect::<Vec<_>>();
+    let of_noise: Vec<f64> = usable.iter().map(|&i| window.noise[i]).collect();
+    let quiet = |places: &[Vec<Complex64>; 2]| {
+        let level = |sums| level(&at(cells.envelope(sums, window)), &of_noise);
+        f64::midpoint(level(&places[0]), level(&places[1]))
+    };
+    let noise = [0, 1, 2].map(|i| quiet(&quiet_sums[i]));
+    let one = median(&mut of_noise.clone());
+    let unit = noise.map(|noise| noise * one);
+    let powers = [0, 1, 2].map(|i| usable.iter().map(|&n| envelopes[i][n].norm_sqr()).collect());
+    let (typical, there) = typical(&powers, unit, QUIET)?;
+    let mut inside = vec![false; cells.len()];
+    for (&i, there) in usable.iter().zip(there) {
+        inside[i] = there;
+    }
+    Some(Seen {
+        weights: [0, 1, 2].map(|i| typical[i] / unit[i]),
+        envelopes,
+        inside,
+        noise,
+        width,
+    })
+}
+
+/// Whether a look may find anything: the same at cells a window apart, which is a fraction of the work where cells are many.
+/// Waves that noise proposes are refused by it.
+pub(crate) fn shows(
+    cells: &Cells,
+    sums: &[Vec<Complex64>; 3],
+    quiet: &[[Vec<Complex64>; 2]; 3],
+    window: &Window,
+    width: f64,
+) -> bool {
+    let stride = [0, 1].map(|axis| {
+        let cells = width * cells.period[axis] / cells.pixels[axis] as f64;
+        (cells as usize).max(1)
+    });
+    if stride[0] * stride[1] == 1 {
+        return true;
+    }
+    let every = |axis: usize| (stride[axis] / 2..cells.size[axis]).step_by(stride[axis]);
+    let usable: Vec<usize> = every(1)
+        .flat_map(|y| every(0).map(move |x| y * cells.size[0] + x))
+        .filter(|&i| window.support[i] > SUPPORT)
+        .collect();
+    if usable.is_empty() {
+        return true;
+    }
+    let of_noise: Vec<f64> = usable.iter().map(|&i| window.noise[i]).collect();
+    let envelope = |sums| cells.envelope_at(sums, window, &usable);
+    let one = median(&mut of_noise.clone());
+    let unit = [0, 1, 2].map(|i| {
+        let [a, b] = [0, 1].map(|k| level(&envelope(&quiet[i][k]), &of_noise));
+        f64::midpoint(a, b) * one
+    });
+    let powers = [0, 1, 2].map(|i| envelope(&sums[i]).iter().map(|e| e.norm_sqr()).collect());
+    typical(&powers, unit, GLANCE * QUIET).is_some()
+}
+
+/// Noise power per pixel, as the median sees it: edges and steps, which are in few cells, do not count.
+fn level(envelope: &[Complex64], noise: &[f64]) -> f64 {
+    let powers = envelope.iter().zip(noise);
+    let mut powers: Vec<f64> = powers.map(|(e, noise)| e.norm_sqr() / noise).collect();
+    median(&mut powers) / std::f64::consts::LN_2
+}
+
+/// Typical power of each wave where it is, and where that is, by the powers at some cells: first by the strong cells, then as the
+/// median of the patch. `None` where noise, of power `unit` in a cell, is more than `most` of it.
+fn typical(powers: &[Vec<f64>; 3], unit: [f64; 3], most: f64) -> Option<([f64; 3], Vec<bool>)> {
+    let mut typical = powers.each_ref().map(|powers| {
+        powers.iter().map(|p| p * p).sum::<f64>()
+            / powers.iter().sum::<f64>().max(f64::MIN_POSITIVE)
+    });
+    let mut inside = vec![false; powers[0].len()];
+    for _ in 0..4 {
+        let total: f64 = typical.iter().sum();
+        let noisy: f64 = (0..3).map(|i| typical[i] * unit[i]).sum();
+        if !((noisy / 2.0).sqrt() / total < most) {
+            return None;
+        }
+        for (n, inside) in inside.iter_mut().enumerate() {
+            let found = (0..3).map(|i| (powers[i][n] * typical[i]).sqrt());
+            *inside = found.sum::<f64>() > INSIDE * total;
+        }
+        if !inside.contains(&true) {
+            return None;
+        }
+        let before = typical;
+        for (typical, powers) in typical.iter_mut().zip(powers) {
+            let there = powers.iter().zip(&inside).filter(|(_, inside)| **inside);
+            let mut there: Vec<f64> = there.map(|(power, _)| *power).collect();
+            let place = (TYPICAL * (there.len() - 1) as f64) as usize;
+            *typical = *there.select_nth_unstable_by(place, f64::total_cmp).1;
+        }
+        let moved = (0..3).map(|i| (typical[i] / before[i] - 1.0).abs());
+        if moved.fold(0.0, f64::max) < 0.02 {
+            break;
+        }
+    }
+    Some((typical, inside))
+}
