@@ -128,13 +128,14 @@ pub(crate) fn shows(
         return true;
     }
     let of_noise: Vec<f64> = usable.iter().map(|&i| window.noise[i]).collect();
-    let envelope = |sums| cells.envelope_at(sums, window, &usable);
+    let envelope = |sums: &[Complex64]| cells.envelope_at(sums, window, &usable);
     let one = median(&mut of_noise.clone());
     let unit = [0, 1, 2].map(|i| {
         let [a, b] = [0, 1].map(|k| level(&envelope(&quiet[i][k]), &of_noise));
         f64::midpoint(a, b) * one
     });
-    let powers = [0, 1, 2].map(|i| envelope(&sums[i]).iter().map(|e| e.norm_sqr()).collect());
+    let power = |sums: &Vec<Complex64>| envelope(sums).iter().map(Complex64::norm_sqr).collect();
+    let powers = sums.each_ref().map(power);
     typical(&powers, unit, GLANCE * QUIET).is_some()
 }
 
