@@ -336,7 +336,7 @@ fn it_goes_on_where_it_was() {
     let kept = std::fs::read(keep).expect("a file");
     // What was written is not written again: the third frame is a line of its own.
     assert!(kept.starts_with(&two) && kept.len() < 2 * two.len());
-    assert_eq!(kept.iter().filter(|byte| **byte == b'\n').count(), 2);
+    assert_eq!(kept.split_inclusive(|byte| *byte == b'\n').count(), 2);
     std::fs::remove_file(watched.join(name(2))).expect("removed");
     let watching = Watching::json(&watched, &["--keep", keep]);
     let again = watching.next();

@@ -164,7 +164,7 @@ mod tests {
         assert_eq!(std::fs::read(&path).unwrap(), one);
         journal.add(&failed(&["a", "b", "c"])).unwrap();
         let both = std::fs::read(&path).unwrap();
-        assert!(both.starts_with(&one) && both.iter().filter(|b| **b == b'\n').count() == 2);
+        assert!(both.starts_with(&one) && both.split_inclusive(|b| *b == b'\n').count() == 2);
         for cut in 0..both.len() {
             std::fs::write(&path, &both[..cut]).unwrap();
             let (mut journal, kept) = Journal::open(&path).unwrap();
