@@ -27,10 +27,10 @@ spectrum/error SECOND set: half double
 spectrum/error THIRD set: half double
 high_orders STANDS_OUT set: half double
 high_orders FEWEST set: half double
-coverage/settle QUIET edge,island,grains half double
-coverage/settle INSIDE edge,island,grains half closer
-coverage/settle TYPICAL edge,island,grains half closer
-coverage/settle PLAIN edge,island,grains half double
+coverage/look QUIET edge,island,grains half double
+coverage/look INSIDE edge,island,grains half closer
+coverage/look TYPICAL edge,island,grains half closer
+coverage/look PLAIN edge,island,grains half double
 coverage/settle FEWEST_CELLS edge,island,grains half double
 coverage/find SAME edge,island,grains half double
 coverage/find WORTH edge,island,grains half double

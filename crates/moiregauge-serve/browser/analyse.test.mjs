@@ -42,6 +42,11 @@ test("scans are analysed, and the page shows the numbers of results.json", async
   await tables.first().click();
   await page.locator("#view-analyse .figure-table tbody button").nth(2).click();
   await page.getByRole("heading", { name: "scan.002.spm" }).waitFor();
+  const plot = await page.locator("#view-analyse .u-over").first().boundingBox();
+  assert.ok(plot);
+  await page.mouse.click(plot.x + 0.98 * plot.width, plot.y + plot.height / 2);
+  await page.getByRole("heading", { name: "scan.003.spm" }).waitFor();
+  for (const name of [/^Residual, data/, /^Mean moiré cell/]) assert.equal(await page.locator("#view-analyse .panel figcaption").filter({ hasText: name }).count(), 1);
   await page.getByText("Show all figures").click();
   await page.waitForFunction(() => [...document.querySelectorAll(".figures img")].some((i) => /** @type {HTMLImageElement} */ (i).naturalWidth > 0));
   assert.deepEqual(page.wrong, []);

@@ -59,6 +59,17 @@ test("a scan is shown, and contrast, colours and profile follow", async () => {
   const reading = await page.locator(".reading").innerText();
   await page.keyboard.press("Shift+ArrowUp");
   assert.notEqual(await page.locator(".reading").innerText(), reading);
+  await page.getByRole("button", { name: "Angle", exact: true }).click();
+  assert.match(await page.locator(".reading").innerText(), /^Angle \d+.*legs at/);
+  await page.getByRole("button", { name: "Line", exact: true }).click();
+  // Levelling and colours change the picture, and nothing else.
+  for (const [name, value] of [["Level for display", 2], ["Colours", 1]]) {
+    const before = await colours();
+    await page.getByRole("combobox", { name: String(name) }).selectOption({ index: Number(value) });
+    await page.waitForTimeout(100);
+    assert.notEqual(await colours(), before, String(name));
+  }
+  assert.match((await page.locator(".look .ruler text").first().textContent()) ?? "", /\d.*nm/);
   await page.locator(".look .plot summary").click();
   await page.locator(".look .plot tbody tr").nth(50).waitFor();
   await page.getByRole("searchbox").fill("line rate");

@@ -47,3 +47,46 @@ test("a map is made, read with the keyboard, and asked about a region", async ()
   assert.deepEqual(page.wrong, []);
   await page.leave();
 });
+
+test("a profile is drawn with the mouse, areas for a device are found and drawn, the histogram is that of the map", async () => {
+  const page = await open(server.url);
+  await openFolder(page, "wide");
+  await page.getByRole("button", { name: /^scan\.000\.spm/ }).click();
+  await page.waitForSelector("html[data-picture]");
+  await view(page, "Maps");
+  await page.getByRole("button", { name: "Make the map" }).click();
+  await page.waitForSelector("html[data-map]", { timeout: 60000 });
+  const box = await page.locator("#view-maps canvas").first().boundingBox();
+  assert.ok(box);
+  await page.getByRole("button", { name: "Profile", exact: true }).click();
+  await page.mouse.move(box.x + box.width * 0.3, box.y + box.height * 0.4);
+  await page.mouse.down();
+  await page.mouse.move(box.x + box.width * 0.7, box.y + box.height * 0.6, { steps: 5 });
+  await page.mouse.up();
+  await page.getByText("Along profile 1").waitFor();
+  await page.getByRole("button", { name: "profile 1, end" }).waitFor();
+  for (const [name, size] of [["Width of the device, nm", "30"], ["Height of the device, nm", "20"], ["Wanted twist, degrees", "1.13"], ["Within, degrees", "0.01"]]) await page.getByLabel(name).fill(size);
+  await page.getByRole("button", { name: "Ask" }).click();
+  const areas = page.getByRole("table", { name: "Most uniform areas" });
+  await areas.waitFor();
+  await page.getByRole("table", { name: "Area with the wanted twist" }).waitFor();
+  const ranks = await areas.locator("tbody tr").count();
+  assert.ok(ranks > 0);
+  assert.equal(await page.locator("#view-maps .overlay polygon.line").count(), ranks, "every area is drawn");
+  // Other ends of the colours are another picture.
+  const colours = () => page.evaluate(() => {
+    const canvas = /** @type {HTMLCanvasElement} */ (document.querySelector("#view-maps canvas"));
+    const c = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
+    return [...c.getImageData(canvas.width >> 1, canvas.height >> 1, 40, 40).data].join();
+  });
+  const before = await colours();
+  const high = page.getByRole("slider", { name: "Upper end of the colours" });
+  await high.focus();
+  const was = Number(await high.getAttribute("aria-valuenow"));
+  await page.keyboard.press("Shift+ArrowLeft");
+  assert.ok(Number(await high.getAttribute("aria-valuenow")) < was);
+  await page.waitForTimeout(100);
+  assert.notEqual(await colours(), before);
+  assert.deepEqual(page.wrong, []);
+  await page.leave();
+});

@@ -43,6 +43,11 @@ test("frames that arrive are shown with their errors", async () => {
   assert.match(shown, /\d ± .*°/);
   assert.match(shown, /after 3 frames/);
   assert.ok(await page.locator("#view-watch .uplot").count() === 3);
+  // Earlier frames keep their numbers, and their doubts by name.
+  const rows = await page.getByRole("table", { name: "Results, newest first" }).locator("tbody tr").allInnerTexts();
+  assert.equal(rows.length, 3);
+  assert.match(rows[0], /\d ± /);
+  for (const row of rows.slice(1)) assert.match(row, /drift-undetermined/);
   await page.getByRole("button", { name: "Stop", exact: true }).click();
   await page.getByText("Ended.").waitFor();
   assert.deepEqual(page.wrong, []);

@@ -300,7 +300,7 @@ export class MapsView {
 
   async showInfo() {
     const d = this.document;
-    const q = (d.quantities ?? []).map((/** @type {any} */ x) => h("tr", {}, h("th", { scope: "row", text: x.name }), h("td", { class: "number", text: withError(x.mean, x.mean_sigma) }), h("td", { text: x.unit })));
+    const q = (d.quantities ?? []).map((/** @type {any} */ x) => h("tr", {}, h("th", { scope: "row", text: x.name }), h("td", { class: "number", text: withError(x.mean, x.mean_sigma, x.unit) })));
     fill(this.info, h("h3", { text: "Means of the good nodes" }), scroll("Means of the good nodes", h("table", {}, h("caption", { class: "away", text: "Means over the good nodes, noise of the images only" }), h("tbody", {}, q))),
       h("p", { class: "hint", text: `Window σ ${number(d.window_nm, 3)} nm, resolution ${number(d.resolution_nm, 3)} nm, ${d.nodes?.join(" × ") ?? ""} nodes.` }),
       d.caveats?.length ? h("h3", { text: `${d.caveats.length} caveats` }) : null, d.caveats?.length ? await caveatList(d.caveats) : null);

@@ -1,20 +1,14 @@
 //! Measured scans between two watches of one folder.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use anyhow::{Context as _, ensure};
+use anyhow::{Context as _, anyhow, ensure};
 use moiregauge_pipeline::absolute;
-use moiregauge_pipeline::campaign::Kept;
+use moiregauge_pipeline::campaign::{Journal, JournalError};
 use moiregauge_pipeline::watch::Watch;
 
-use crate::outputs;
-
 /// A file outside the folder that holds what is measured.
-pub(super) struct Keep {
-    path: PathBuf,
-    /// How many scans it holds.
-    count: usize,
-}
+pub(super) struct Keep(Journal);
 
 impl Keep {
     /// Takes what an earlier watch has kept.
@@ -34,31 +28,19 @@ impl Keep {
             "{}: this is inside the watched folder, where nothing is written. Give a place outside of it",
             option()
         );
-        if path.exists() {
-            let bytes = moiregauge_pipeline::read(path).with_context(option)?;
-            let kept: Kept = serde_json::from_slice(&bytes).with_context(|| {
-                format!(
-                    "{}: expected a file that an earlier watch wrote (--keep)",
-                    option()
-                )
-            })?;
-            watch.take(kept);
-        }
-        outputs::file(path, true, &[]).with_context(option)?;
-        Ok(Self {
-            path: path.to_owned(),
-            count: watch.kept().len(),
-        })
+        let opened = Journal::open(path).map_err(|error| match error {
+            JournalError::Foreign { why, .. } => {
+                anyhow!("expected a file that an earlier watch wrote (--keep): {why}")
+            }
+            other => other.into(),
+        });
+        let (journal, kept) = opened.with_context(option)?;
+        watch.take(kept);
+        Ok(Self(journal))
     }
 
-    /// Writes what is measured, if that is more than before.
+    /// Writes what was measured since.
     pub(super) fn save(&mut self, watch: &Watch) -> anyhow::Result<()> {
-        let kept = watch.kept();
-        if kept.len() == self.count {
-            return Ok(());
-        }
-        outputs::file(&self.path, true, &[])?.write(serde_json::to_vec(kept)?)?;
-        self.count = kept.len();
-        Ok(())
+        Ok(self.0.add(watch.kept())?)
     }
 }

@@ -320,11 +320,23 @@ fn it_goes_on_where_it_was() {
     arrive(&made, &watched, 1);
     let watching = Watching::json(&watched, &["--keep", keep]);
     let first = watching.next();
+    let begun = Instant::now();
+    let two = loop {
+        let two = std::fs::read(keep).expect("a file");
+        if two.ends_with(b"\n") {
+            break two;
+        }
+        assert!(begun.elapsed() < LIMIT, "nothing is kept");
+        std::thread::sleep(Duration::from_millis(20));
+    };
     arrive(&made, &watched, 2);
     watching.of(3);
     watching.signal("-TERM");
     assert_eq!(watching.end().0, Some(0));
     let kept = std::fs::read(keep).expect("a file");
+    // What was written is not written again: the third frame is a line of its own.
+    assert!(kept.starts_with(&two) && kept.len() < 2 * two.len());
+    assert_eq!(kept.split_inclusive(|byte| *byte == b'\n').count(), 2);
     std::fs::remove_file(watched.join(name(2))).expect("removed");
     let watching = Watching::json(&watched, &["--keep", keep]);
     let again = watching.next();

@@ -1,6 +1,6 @@
 //! What was measured, by what it depends on.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use moiregauge::scan::{MeasuredScan, Window};
@@ -38,6 +38,20 @@ impl Kept {
     /// Whether nothing is measured.
     pub fn is_empty(&self) -> bool {
         self.files.is_empty()
+    }
+
+    /// The keys of what is measured.
+    pub(super) fn keys(&self) -> impl Iterator<Item = &String> {
+        self.files.keys()
+    }
+
+    /// What has none of these keys.
+    pub(super) fn beside(&self, keys: &BTreeSet<String>) -> Self {
+        let others = self.files.iter().filter(|(key, _)| !keys.contains(*key));
+        Self {
+            files: others.map(|(key, of)| (key.clone(), of.clone())).collect(),
+            read: None,
+        }
     }
 
     pub(super) fn get(&self, key: &str) -> Option<&Result<Vec<MeasuredScan>, Failure>> {

@@ -19,6 +19,19 @@ use crate::problem::{Answer, Problem};
 const LINES: usize = 2000;
 /// Folders that are watched at a time.
 const MOST: usize = 10;
+/// What is kept of a line once another has come: what a table and pictures in time are made of.
+const NUMBERS: [&str; 10] = [
+    "event",
+    "file",
+    "acquired",
+    "set",
+    "moire",
+    "frames",
+    "twist_deg",
+    "heterostrain_percent",
+    "uncorrected",
+    "drift",
+];
 /// Between two looks into the folder.
 const POLL: Duration = Duration::from_secs(2);
 /// Between two looks whether the watch is to stop.
@@ -124,6 +137,16 @@ impl Watches {
     }
 }
 
+/// A line without words: doubts by their codes alone.
+fn numbers(line: &Value) -> Value {
+    let kept = |key: &&str| Some(((*key).to_owned(), line.get(*key)?.clone()));
+    let mut all: serde_json::Map<String, Value> = NUMBERS.iter().filter_map(kept).collect();
+    let caveats = line["caveats"].as_array().into_iter().flatten();
+    let codes: Vec<Value> = caveats.map(|caveat| caveat["code"].clone()).collect();
+    all.insert("caveats".to_owned(), codes.into());
+    Value::Object(all)
+}
+
 impl Watched {
     /// What there is to tell of it.
     pub(crate) fn shown(&self) -> Value {
@@ -142,6 +165,9 @@ impl Watched {
 
     fn tell(&self, line: &Value) {
         let mut inner = lock(&self.inner);
+        if let Some(last) = inner.lines.back_mut() {
+            *last = numbers(last);
+        }
         inner.lines.push_back(line.clone());
         if inner.lines.len() > LINES {
             inner.lines.pop_front();

@@ -217,6 +217,22 @@ impl Cells {
             .collect()
     }
 
+    /// The same at some cells.
+    pub(crate) fn envelope_at(
+        &self,
+        sums: &[Complex64],
+        window: &Window,
+        at: &[usize],
+    ) -> Vec<Complex64> {
+        let summed = self.summed_at(sums, window, at).into_iter().zip(at);
+        summed
+            .map(|(sum, &i)| match window.weight[i] {
+                weight if weight > 0.0 => sum / weight,
+                _ => Complex64::default(),
+            })
+            .collect()
+    }
+
     /// Convolution with the taps along columns, then along rows.
     fn smoothed<T>(&self, values: &[T], taps: &[Vec<f64>; 2]) -> Vec<T>
     where

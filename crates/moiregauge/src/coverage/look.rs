@@ -14,6 +14,9 @@ use crate::numbers::three::three;
 /// half and one.
 const QUIET: f64 = 0.1;
 
+/// So many times [`QUIET`] is let pass where only some cells are looked at. Chosen by eye: what is typical is known to a fraction.
+const GLANCE: f64 = 2.0;
+
 /// Cells with more than this share of what is typical are the patch: an edge is where the window sees half.
 pub(crate) const INSIDE: f64 = 0.5;
 
@@ -126,9 +129,9 @@ impl<'a> Frame<'a> {
         self.cells.envelope(&self.level, window)
     }
 
-    /// What a window of so many mean periods sees; `None` where noise makes the window unfit.
+    /// What a window of so many mean periods sees; `None` where noise makes it unfit.
     pub(crate) fn look(&self, waves: &Waves, window: &Window, width: f64) -> Option<Seen> {
-        let (cells, quiet) = (self.cells, &waves.quiet);
+        let (cells, quiet_sums) = (self.cells, &waves.quiet);
         let sums = waves.without(&self.level(window));
         let envelopes = sums.map(|sums| cells.envelope(&sums, window));
         let usable: Vec<usize> = (0..cells.len())
@@ -137,51 +140,21 @@ impl<'a> Frame<'a> {
         if usable.is_empty() {
             return None;
         }
-        // Per pixel, as the median sees it: edges and steps, which are in few cells, do not count.
-        let level = |sums: &Vec<Complex64>| {
-            let envelope = cells.envelope(sums, window);
-            let powers = usable
-                .iter()
-                .map(|&i| envelope[i].norm_sqr() / window.noise[i]);
-            median(&mut powers.collect::<Vec<f64>>()) / std::f64::consts::LN_2
+        let at = |values: Vec<Complex64>| usable.iter().map(|&i| values[i]).collect::<Vec<_>>();
+        let of_noise: Vec<f64> = usable.iter().map(|&i| window.noise[i]).collect();
+        let quiet = |places: &[Vec<Complex64>; 2]| {
+            let level = |sums| level(&at(cells.envelope(sums, window)), &of_noise);
+            f64::midpoint(level(&places[0]), level(&places[1]))
         };
-        let noise = [0, 1, 2].map(|i| f64::midpoint(level(&quiet[i][0]), level(&quiet[i][1])));
-        let all: Vec<f64> = usable.iter().map(|&i| window.noise[i]).collect();
-        let one = median(&mut all.clone());
+        let noise = [0, 1, 2].map(|i| quiet(&quiet_sums[i]));
+        let one = median(&mut of_noise.clone());
         let unit = noise.map(|noise| noise * one);
-        // Typical power of each wave where it is: first by the strong cells, then as the median of the patch.
-        let mut typical = [0, 1, 2].map(|i| {
-            let powers = || usable.iter().map(|&n| envelopes[i][n].norm_sqr());
-            powers().map(|p| p * p).sum::<f64>() / powers().sum::<f64>().max(f64::MIN_POSITIVE)
-        });
+        let powers =
+            [0, 1, 2].map(|i| usable.iter().map(|&n| envelopes[i][n].norm_sqr()).collect());
+        let (typical, there) = typical(&powers, unit, QUIET)?;
         let mut inside = vec![false; cells.len()];
-        for _ in 0..4 {
-            let total: f64 = typical.iter().sum();
-            let noisy: f64 = (0..3).map(|i| typical[i] * unit[i]).sum();
-            let quiet = (noisy / 2.0).sqrt() / total;
-            if !(quiet < QUIET) {
-                return None;
-            }
-            let mut any = false;
-            for &n in &usable {
-                let found = [0, 1, 2].map(|i| envelopes[i][n].norm() * typical[i].sqrt());
-                inside[n] = found.iter().sum::<f64>() > INSIDE * total;
-                any |= inside[n];
-            }
-            if !any {
-                return None;
-            }
-            let before = typical;
-            for i in 0..3 {
-                let powers = usable.iter().filter(|n| inside[**n]);
-                let mut powers: Vec<f64> = powers.map(|&n| envelopes[i][n].norm_sqr()).collect();
-                let place = (TYPICAL * (powers.len() - 1) as f64) as usize;
-                typical[i] = *powers.select_nth_unstable_by(place, f64::total_cmp).1;
-            }
-            let moved = (0..3).map(|i| (typical[i] / before[i] - 1.0).abs());
-            if moved.fold(0.0, f64::max) < 0.02 {
-                break;
-            }
+        for (&i, there) in usable.iter().zip(there) {
+            inside[i] = there;
         }
         Some(Seen {
             typical,
@@ -192,4 +165,79 @@ impl<'a> Frame<'a> {
             width,
         })
     }
+
+    /// Whether a look may find anything: the same at cells a window apart, which is a fraction of the work where cells are many.
+    /// Waves that noise proposes are refused by it.
+    pub(crate) fn shows(&self, waves: &Waves, window: &Window, width: f64) -> bool {
+        let (cells, quiet) = (self.cells, &waves.quiet);
+        let stride = [0, 1].map(|axis| {
+            let cells = width * cells.period[axis] / cells.pixels[axis] as f64;
+            (cells as usize).max(1)
+        });
+        if stride[0] * stride[1] == 1 {
+            return true;
+        }
+        let every = |axis: usize| (stride[axis] / 2..cells.size[axis]).step_by(stride[axis]);
+        let usable: Vec<usize> = every(1)
+            .flat_map(|y| every(0).map(move |x| y * cells.size[0] + x))
+            .filter(|&i| window.support[i] > SUPPORT)
+            .collect();
+        if usable.is_empty() {
+            return true;
+        }
+        let of_noise: Vec<f64> = usable.iter().map(|&i| window.noise[i]).collect();
+        let envelope = |sums: &[Complex64]| cells.envelope_at(sums, window, &usable);
+        let one = median(&mut of_noise.clone());
+        let unit = [0, 1, 2].map(|i| {
+            let [a, b] = [0, 1].map(|k| level(&envelope(&quiet[i][k]), &of_noise));
+            f64::midpoint(a, b) * one
+        });
+        let power =
+            |sums: &Vec<Complex64>| envelope(sums).iter().map(Complex64::norm_sqr).collect();
+        let powers = waves.sums.each_ref().map(power);
+        typical(&powers, unit, GLANCE * QUIET).is_some()
+    }
+}
+
+/// Noise power per pixel, as the median sees it: edges and steps, which are in few cells, do not count.
+fn level(envelope: &[Complex64], noise: &[f64]) -> f64 {
+    let powers = envelope.iter().zip(noise);
+    let mut powers: Vec<f64> = powers.map(|(e, noise)| e.norm_sqr() / noise).collect();
+    median(&mut powers) / std::f64::consts::LN_2
+}
+
+/// Typical power of each wave where it is, and where that is, by the powers at some cells: first by the strong cells, then as the
+/// median of the patch. `None` where noise, of power `unit` in a cell, is more than `most` of it.
+fn typical(powers: &[Vec<f64>; 3], unit: [f64; 3], most: f64) -> Option<([f64; 3], Vec<bool>)> {
+    let mut typical = powers.each_ref().map(|powers| {
+        powers.iter().map(|p| p * p).sum::<f64>()
+            / powers.iter().sum::<f64>().max(f64::MIN_POSITIVE)
+    });
+    let mut inside = vec![false; powers[0].len()];
+    for _ in 0..4 {
+        let total: f64 = typical.iter().sum();
+        let noisy: f64 = (0..3).map(|i| typical[i] * unit[i]).sum();
+        if !((noisy / 2.0).sqrt() / total < most) {
+            return None;
+        }
+        for (n, inside) in inside.iter_mut().enumerate() {
+            let found = (0..3).map(|i| (powers[i][n] * typical[i]).sqrt());
+            *inside = found.sum::<f64>() > INSIDE * total;
+        }
+        if !inside.contains(&true) {
+            return None;
+        }
+        let before = typical;
+        for (typical, powers) in typical.iter_mut().zip(powers) {
+            let there = powers.iter().zip(&inside).filter(|(_, inside)| **inside);
+            let mut there: Vec<f64> = there.map(|(power, _)| *power).collect();
+            let place = (TYPICAL * (there.len() - 1) as f64) as usize;
+            *typical = *there.select_nth_unstable_by(place, f64::total_cmp).1;
+        }
+        let moved = (0..3).map(|i| (typical[i] / before[i] - 1.0).abs());
+        if moved.fold(0.0, f64::max) < 0.02 {
+            break;
+        }
+    }
+    Some((typical, inside))
 }

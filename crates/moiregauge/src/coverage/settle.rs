@@ -85,8 +85,12 @@ fn settle_bins(
     let mut pair = *pair;
     let mut narrowest = 0;
     let mut settled = None;
-    for _ in 0..ROUNDS {
+    for round in 0..ROUNDS {
         let waves = frame.waves(&pair);
+        let mut all = windows.iter().zip(WIDTHS);
+        if round == 0 && !all.any(|(window, width)| frame.shows(&waves, window, width)) {
+            return None;
+        }
         let seen = (narrowest..WIDTHS.len())
             .find_map(|i| Some((i, frame.look(&waves, &windows[i], WIDTHS[i])?)));
         let (width, seen) = seen?;

@@ -25,10 +25,10 @@ const CORRELATED: f64 = 2.0;
 const SIGNIFICANT: f64 = 2.6;
 /// The same for the highest coherence at any shift, which some 16 independent ones are: once in a thousand.
 const SEARCHED: f64 = 4.0;
-/// Frames are shifted against each other by this share of a frame at most: farther, they show little of the same sample.
-const FARTHEST: f64 = 0.25;
-/// Shifts that are tried on either side: steps of half of what 33 rows resolve.
-const SHIFTS: i32 = 16;
+/// Frames are shifted against each other in steps of a frame over this: half of what 33 rows resolve.
+const TURN: usize = 64;
+/// Steps that are tried on either side, a quarter of a frame: farther, frames show little of the same sample.
+const SHIFTS: i64 = 16;
 
 /// The correlation of the errors that two images of one scan have at the three first harmonics of the
 /// first one; 0 where chance would do.
@@ -61,8 +61,8 @@ pub(crate) fn correlation(first: &LatticeFit, second: &LatticeFit) -> [f64; 3] {
 /// The correlation of the errors that two frames of one sample have, by all three harmonics; 0 where chance would do.
 pub(crate) fn correlation_of_frames(first: &LatticeFit, second: &LatticeFit) -> f64 {
     let mut sums = Sums::default();
-    // Bins from the harmonic across the lines, and the product there.
-    let mut products = Vec::new();
+    // The sums of the products, by bins from the harmonic across the lines modulo a turn of the smallest shift.
+    let mut products = [Complex64::default(); TURN];
     for h in 0..3 {
         let Some(partner) = Partner::of(first, second, h) else {
             continue;
@@ -84,15 +84,18 @@ pub(crate) fn correlation_of_frames(first: &LatticeFit, second: &LatticeFit) -> 
             };
             let product = a * partner.turned(b).conj();
             sums.add(product, [a, b]);
-            products.push((off as f64, product));
+            products[off.rem_euclid(TURN as i64) as usize] += product;
         }
     }
-    let shifted = |f: f64| {
-        let turned = |(off, product): &(f64, Complex64)| product * Complex64::cis(-TAU * off * f);
-        sums.coherence(products.iter().map(turned).sum())
+    let turns =
+        std::array::from_fn::<_, TURN, _>(|n| Complex64::cis(-TAU * n as f64 / TURN as f64));
+    let shifted = |n: i64| {
+        let all = products.iter().zip(0_i64..);
+        let turned =
+            all.map(|(product, off)| product * turns[(off * n).rem_euclid(TURN as i64) as usize]);
+        sums.coherence(turned.sum())
     };
-    let shifts = (-SHIFTS..=SHIFTS).map(|n| f64::from(n) * FARTHEST / f64::from(SHIFTS));
-    let coherence = shifts.map(shifted).fold(0.0, f64::max);
+    let coherence = (-SHIFTS..=SHIFTS).map(shifted).fold(0.0, f64::max);
     if coherence > SEARCHED * sums.scatter() {
         coherence.min(1.0)
     } else {

@@ -66,7 +66,7 @@ impl Shape {
     }
 
     /// Where a local parameter of a scan stands among all.
-    fn place(&self, scan: usize, local: usize) -> usize {
+    pub(crate) fn place(&self, scan: usize, local: usize) -> usize {
         match local.checked_sub(self.shared) {
             None => local,
             Some(PHASES) => self.clocks_at() + scan,
@@ -355,7 +355,9 @@ impl Arrow {
         for (scan, clock) in self.clocks.iter().enumerate() {
             let own = right[shape.clocks_at() + scan];
             if own != 0.0 {
-                shape.scatter(scan, &(&clock.gain * -own), &mut rest);
+                for (i, gain) in clock.gain.iter().enumerate() {
+                    rest[shape.place(scan, i)] -= gain * own;
+                }
             }
         }
         let mut side = rest.rows(0, n).into_owned();
@@ -373,20 +375,21 @@ impl Arrow {
         }
         for (scan, clock) in self.clocks.iter().enumerate() {
             let at = shape.clocks_at() + scan;
-            let others = shape.local(scan, &found);
-            let followed = clock.gain.dot(&others.rows(0, clock.gain.len()));
+            let gains = clock.gain.iter().enumerate();
+            let followed: f64 = gains
+                .map(|(i, gain)| gain * found[shape.place(scan, i)])
+                .sum();
             found[at] = right[at] / clock.pivot - followed;
         }
         found
     }
 
-    /// The covariance of the local parameters of a scan.
-    pub(crate) fn local(&self, scan: usize) -> DMatrix<f64> {
-        let shape = &self.shape;
-        let (n, width) = (shape.shared, shape.width());
+    /// The covariance of the local parameters of the scans of a block, the clock left free.
+    fn of_block(&self, block: usize) -> DMatrix<f64> {
+        let (n, width) = (self.shape.shared, self.shape.width());
         let mut all = DMatrix::zeros(width, width);
         all.view_mut((0, 0), (n, n)).copy_from(&self.shared);
-        let Some(block) = self.blocks.get(shape.blocks[scan]) else {
+        let Some(block) = self.blocks.get(block) else {
             return all;
         };
         let across = -(&block.gain * &self.shared);
@@ -395,8 +398,21 @@ impl Arrow {
         all.view_mut((0, n), (n, PHASES))
             .copy_from(&across.transpose());
         all.view_mut((n, n), (PHASES, PHASES)).copy_from(&own);
-        let clock = &self.clocks[scan];
-        let known = width - 1;
+        all
+    }
+
+    /// The covariance of the local parameters of a scan.
+    pub(crate) fn local(&self, scan: usize) -> DMatrix<f64> {
+        let all = self.of_block(self.shape.blocks[scan]);
+        self.with_clock(scan, all)
+    }
+
+    /// The covariance of a block with that of the clock of a scan.
+    fn with_clock(&self, scan: usize, mut all: DMatrix<f64>) -> DMatrix<f64> {
+        let Some(clock) = self.clocks.get(scan) else {
+            return all;
+        };
+        let known = clock.gain.len();
         let across = -(all.view((0, 0), (known, known)) * &clock.gain);
         all[(known, known)] = 1.0 / clock.pivot - across.dot(&clock.gain);
         all.view_mut((0, known), (known, 1)).copy_from(&across);
@@ -407,17 +423,31 @@ impl Arrow {
 
     /// The covariance of the local parameters of every scan.
     pub(crate) fn locals(&self) -> Vec<DMatrix<f64>> {
-        let scans = 0..self.shape.blocks.len();
-        scans.map(|scan| self.local(scan)).collect()
+        let of_blocks = self.of_blocks();
+        let scans = self.shape.blocks.iter().enumerate();
+        scans
+            .map(|(scan, block)| self.with_clock(scan, of_blocks[*block].clone()))
+            .collect()
+    }
+
+    /// The covariance of the local parameters of the scans of each block, the clocks left free.
+    fn of_blocks(&self) -> Vec<DMatrix<f64>> {
+        let blocks = 1 + self.shape.blocks.iter().max().unwrap_or(&0);
+        (0..blocks).map(|block| self.of_block(block)).collect()
     }
 
     /// The variances of all parameters.
     pub(crate) fn variances(&self) -> DVector<f64> {
         let mut all = DVector::zeros(self.shape.size());
-        for scan in 0..self.shape.blocks.len() {
-            let own = self.local(scan);
-            for i in 0..self.shape.width() {
+        let of_blocks = self.of_blocks();
+        for (scan, block) in self.shape.blocks.iter().enumerate() {
+            let own = &of_blocks[*block];
+            for i in 0..self.shape.without_clock() {
                 all[self.shape.place(scan, i)] = own[(i, i)];
+            }
+            if let Some(Clock { pivot, gain }) = self.clocks.get(scan) {
+                let known = own.view((0, 0), (gain.len(), gain.len()));
+                all[self.shape.clocks_at() + scan] = 1.0 / pivot + gain.dot(&(known * gain));
             }
         }
         all

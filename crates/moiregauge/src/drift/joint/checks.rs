@@ -8,14 +8,16 @@
 //!   with weights `w_i` of the scans it moves by `(Σ w_i N_i)⁻¹ Σ w_i X_iᵀ e_i`.
 //! N has the shape of an arrow, so that each of these takes a few products.
 
+use std::sync::OnceLock;
+
 use nalgebra::{DMatrix, DVector, Matrix, Matrix2, RowDVector, Vector2};
 use rand::RngExt as _;
 use rayon::prelude::*;
 
 use crate::drift::joint::arrow::{Arrow, BlockSums, ScanSums};
-use crate::drift::joint::evaluate::{Linearised, PhaseMiss, linearise, phases};
+use crate::drift::joint::evaluate::{Linearised, linearise, phases};
 use crate::drift::joint::found::JointFit;
-use crate::drift::joint::instability::instability;
+use crate::drift::joint::instability::Displacements;
 use crate::numbers::interrupt;
 use crate::numbers::rng::stream;
 
@@ -26,6 +28,11 @@ const NULL: f64 = 1e-6;
 /// Damping that holds what nothing determines: times of scans that were not drawn. Any number far below 1 and above
 /// rounding.
 const HELD: f64 = 1e-10;
+
+/// The scatter of positions (variance) is the same with or without a scan if it changes by no more than this: it changes χ² as
+/// little. A scan that stands out among fewer than some thousand changes it by more (its χ² is beyond 26, of as many as
+/// there are), so that it never excuses itself.
+const SAME: f64 = 0.01;
 
 /// One scan against all others.
 #[derive(Clone, Copy, Debug)]
@@ -63,17 +70,31 @@ impl JointFit {
         let Some(first) = Step::new(&all, self.instability_nm) else {
             return Vec::new();
         };
-        let locals = self.unscaled.locals();
-        (0..self.layout.shape.blocks.len())
+        let scatter = self.instability_nm * self.instability_nm;
+        let seen = self.terms.phases.then(|| {
+            let locals = self.unscaled.locals();
+            Displacements::new(&all.rows.phases, &locals, scatter)
+        });
+        let shape = &self.layout.shape;
+        // Where the others do not scatter, which is one step for all.
+        let still = OnceLock::new();
+        (0..shape.blocks.len())
             .into_par_iter()
             .filter_map(|scan| {
                 let alone = first.without(scan)?;
-                if !self.terms.phases {
+                let Some(seen) = &seen else {
+                    return Some(alone);
+                };
+                let change = &alone.solution - &self.solution;
+                let others = seen.scatter_without(scan, shape, &change);
+                if (others * others - scatter).abs() <= SAME * scatter {
                     return Some(alone);
                 }
-                let others = self.instability_without(scan, &alone.solution, &locals);
-                if others.to_bits() == self.instability_nm.to_bits() {
-                    return Some(alone);
+                if others == 0.0 {
+                    return still
+                        .get_or_init(|| Step::new(&all, 0.0))
+                        .as_ref()?
+                        .without(scan);
                 }
                 Step::new(&all, others)?.without(scan)
             })
@@ -118,16 +139,6 @@ impl JointFit {
                 Some(self.resampled(&x))
             })
             .collect()
-    }
-
-    /// The instability that the phases of all other scans show at the solution `x` without `scan`.
-    fn instability_without(&self, scan: usize, x: &DVector<f64>, locals: &[DMatrix<f64>]) -> f64 {
-        let others = self.sightings.iter().filter(|s| s.scan != scan);
-        let seen: Vec<PhaseMiss> = others
-            .filter_map(|sighting| phases(sighting, &self.layout, x))
-            .collect();
-        let scatter = self.instability_nm * self.instability_nm;
-        instability(seen.iter(), locals, scatter)
     }
 }
 

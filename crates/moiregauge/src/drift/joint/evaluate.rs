@@ -1,7 +1,8 @@
 //! The model of a sighting and its derivatives.
 
 use nalgebra::{
-    DVector, Matrix2, Matrix3, Matrix3x2, Matrix3xX, Matrix4, Matrix4xX, Vector2, Vector3, Vector4,
+    DVector, Matrix2, Matrix2x3, Matrix3, Matrix3x2, Matrix3xX, Matrix4, Matrix4xX, Vector2,
+    Vector3, Vector4,
 };
 
 use crate::drift::joint::arrow::{ScanSums, Shape, Whitened};
@@ -255,13 +256,12 @@ impl PhaseMiss {
             .map_or(0.0, |(wide, narrow)| wide - narrow)
     }
 
-    /// The displacement that explains the phases best, nm, and the covariance that noise gives it, nm².
-    pub(crate) fn displacement(&self) -> Option<(Vector2<f64>, Matrix2<f64>)> {
-        let lower = self.factor(0.0)?;
-        let design = lower.solve_lower_triangular(&self.waves)?;
-        let miss = lower.solve_lower_triangular(&self.miss)?;
-        let covariance = (design.transpose() * design).try_inverse()?;
-        Some((covariance * design.transpose() * miss, covariance))
+    /// What gives the displacement that explains phases best, nm/rad, and the covariance that their noise gives it, nm².
+    pub(crate) fn displacement(&self) -> Option<(Matrix2x3<f64>, Matrix2<f64>)> {
+        let weight = self.noise.cholesky()?;
+        let design = weight.solve(&self.waves);
+        let covariance = (self.waves.transpose() * design).try_inverse()?;
+        Some((covariance * design.transpose(), covariance))
     }
 }
 

@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
 use crate::drift::joint::arrow::{Arrow, ScanSums};
 use crate::drift::joint::evaluate::{DRIFT, Layout, linearise, wrapped};
 use crate::drift::joint::found::{JointFit, motion};
-use crate::drift::joint::instability::instability as estimate;
+use crate::drift::joint::instability::Displacements;
 use crate::drift::joint::link::number_blocks;
 use crate::drift::joint::sighting::{Sighting, Terms};
 use crate::numbers::chi2::enlargement;
@@ -127,7 +127,8 @@ fn converge(
         for _ in 0..ROUNDS {
             let now = linearise(sightings, layout, x, f64::INFINITY);
             let scatter = instability * instability;
-            instability = estimate(now.phases.iter(), &unscaled.locals(), scatter);
+            let seen = Displacements::new(&now.phases, &unscaled.locals(), scatter);
+            instability = seen.scatter();
             unscaled = iterate(sightings, layout, x, f64::INFINITY, instability)?;
         }
     }

@@ -337,3 +337,39 @@ fn the_covariance_splits_by_source() {
         }
     }
 }
+
+/// The scatter without a scan, where the parameters are changed by as much as a scan changes them, against the phases of all others
+/// read anew there. What is not linear is far below the error of a scatter.
+#[test]
+fn the_scatter_without_a_scan_is_that_of_the_others() {
+    use crate::drift::joint::evaluate::linearise;
+    use crate::drift::joint::instability::Displacements;
+
+    let drift = Vector2::new(0.5, -0.15) / MINUTE;
+    let mut all = sightings(12, drift, Vector2::zeros(), 11);
+    for sighting in &mut all {
+        let scan = sighting.scan as f64;
+        sighting.position += 0.02 * Vector2::new((1.7 * scan).sin(), (2.9 * scan).cos());
+    }
+    let fitted = fit(&all, &pair(), &drift, TIME_SIGMA).unwrap();
+    assert!(fitted.instability_nm > 0.005, "{}", fitted.instability_nm);
+    let (layout, scatter) = (&fitted.layout, fitted.instability_nm.powi(2));
+    let phases = |x: &DVector<f64>| linearise(fitted.sightings(), layout, x, f64::INFINITY).phases;
+    let locals = fitted.unscaled.locals();
+    let seen = Displacements::new(&phases(&fitted.solution), &locals, scatter);
+    assert!((seen.scatter() / fitted.instability_nm - 1.0).abs() < 1e-3);
+    let sigmas = fitted.unscaled.variances().map(f64::sqrt);
+    for scan in 0..12 {
+        let change = DVector::from_fn(sigmas.len(), |i, _| {
+            sigmas[i] * 0.5 * ((3.3 * i as f64 + scan as f64).sin())
+        });
+        let mut others = phases(&(&fitted.solution + &change));
+        others.retain(|phases| phases.scan != scan);
+        let anew = Displacements::new(&others, &locals, scatter).scatter();
+        let found = seen.scatter_without(scan, &layout.shape, &change);
+        assert!(
+            anew > 0.0 && (found / anew - 1.0).abs() < 1e-3,
+            "{scan}: {found}, {anew}"
+        );
+    }
+}
