@@ -16,6 +16,8 @@ pub(crate) struct Group {
     pub(crate) line_rate_hz: f64,
     pub(crate) channel: String,
     pub(crate) scans: Vec<MeasuredScan>,
+    /// How many times the cell of these scans is that of others beside them, or theirs of it, where one may be a harmonic shell of the other.
+    pub(crate) other_shell: Option<i32>,
 }
 
 /// Groups scans; the groups are in order of their first scans. Scans that repeat others go with them.
@@ -63,6 +65,7 @@ pub(crate) fn groups(mut scans: Vec<MeasuredScan>, grouping: Grouping) -> Vec<Gr
                 line_rate_hz: rate,
                 channel: scan.channel.clone(),
                 scans: vec![scan],
+                other_shell: None,
             });
         }
     }

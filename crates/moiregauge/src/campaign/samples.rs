@@ -9,6 +9,7 @@ use heterostrain::lattice::{Waves, same_handed};
 use nalgebra::Vector2;
 
 use crate::campaign::group::{Group, folder};
+use crate::campaign::set::shells::of_each_other;
 use crate::caveat::Caveat;
 use crate::caveat::sets::{DifferentSamples, SetDoubt};
 use crate::scan::measured::MeasuredScan;
@@ -259,6 +260,7 @@ fn names(group: &Group, parts: &[Vec<usize>]) -> Vec<String> {
 /// One group for each part; scans that are not used go with the one that they repeat, or with the first.
 fn split(group: Group, parts: &[Vec<usize>], names: Vec<String>) -> Vec<Group> {
     let of = |i: usize| parts.iter().position(|part| part.contains(&i));
+    let other_shell = other_shell(&group, parts);
     let files: Vec<String> = group.scans.iter().map(|s| s.file.clone()).collect();
     let places: Vec<usize> = (0..group.scans.len())
         .map(|i| {
@@ -275,10 +277,25 @@ fn split(group: Group, parts: &[Vec<usize>], names: Vec<String>) -> Vec<Group> {
             line_rate_hz: group.line_rate_hz,
             channel: group.channel.clone(),
             scans: Vec::new(),
+            other_shell,
         })
         .collect();
     for (scan, place) in group.scans.into_iter().zip(places) {
         all[place].scans.push(scan);
     }
     all
+}
+
+/// How many times the cell of one part is that of another from the same folder: where noise hides the first waves in some frames, those show a
+/// harmonic shell, and no other sample.
+fn other_shell(group: &Group, parts: &[Vec<usize>]) -> Option<i32> {
+    let scan = |part: &Vec<usize>| &group.scans[part[0]];
+    let first = |part| scan(part).lines.first();
+    let mut pairs = (0..parts.len()).flat_map(|i| (0..i).map(move |k| (&parts[i], &parts[k])));
+    pairs.find_map(|(a, b)| {
+        if folder(&scan(a).file) != folder(&scan(b).file) {
+            return None;
+        }
+        of_each_other(first(a)?, first(b)?)
+    })
 }

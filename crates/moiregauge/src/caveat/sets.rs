@@ -18,9 +18,9 @@ pub enum SetDoubt {
         /// Frames that show it.
         scans: usize,
     },
-    /// Two images of one scan show a lattice and a harmonic shell of it.
+    /// Two images, of one scan or of a set, show a lattice and a harmonic shell of it.
     #[error(
-        "trace and retrace of one scan show two lattices, and the cell of one is {times} times that of the other. \
+        "images of one set show two lattices, and the cell of one is {times} times that of the other. \
          Where noise hides the first waves, a harmonic shell looks like a lattice of its own. It is not known which of \
          the two the other scans show. Only the vectors are given, no twist and strain of the set"
     )]
