@@ -1,4 +1,7 @@
-"""Recorded and simulated files: the numbers of the package and of the program are the same bytes."""
+"""Recorded and simulated files: the numbers of the package and of the program are the same bytes.
+
+`MOIREGAUGE_CORPUS=all` compares the results and maps of all files, else of each fourth.
+"""
 
 from __future__ import annotations
 
@@ -28,6 +31,11 @@ def corpus() -> list[tuple[Path, dict[str, Any]]]:
     return [(path, {"size_nm": SIZE_NM}) for path in sets] + [(path, {}) for path in files]
 
 
+def some() -> list[tuple[Path, dict[str, Any]]]:
+    """Each fourth, unless all are asked for: all take minutes."""
+    return corpus()[:: 1 if os.environ.get("MOIREGAUGE_CORPUS") == "all" else 4]
+
+
 def test_the_corpus_is_there() -> None:
     if not corpus():
         assert os.environ.get("MOIREGAUGE_REQUIRE_TESTDATA") != "1", f"no test data in {DATA}"
@@ -40,7 +48,7 @@ def without_run(document: Any) -> str:
     return json.dumps(document, sort_keys=True)
 
 
-@pytest.mark.parametrize(("path", "options"), corpus(), ids=lambda one: one.name if isinstance(one, Path) else "")
+@pytest.mark.parametrize(("path", "options"), some(), ids=lambda one: one.name if isinstance(one, Path) else "")
 @pytest.mark.parametrize("command", ["analyze", "map"])
 def test_numbers_are_the_same_bytes(command: str, path: Path, options: dict[str, Any], tmp_path: Path) -> None:
     told = ["--size", "{}nm×{}nm".format(*options["size_nm"])] if options else []
