@@ -34,10 +34,6 @@ const STILL: f64 = 0.02;
 /// The smallest patch, unit cells of the lattice: fewer make no lattice. Chosen by eye.
 const FEWEST_CELLS: f64 = 5.0;
 
-/// Cells of a quarter period that are taken off all around a patch of which something has to be left: in bands narrower than one and a half periods
-/// waves cannot be told apart, and what is found there may be any lattice.
-const NARROW: usize = 3;
-
 /// Parts of the patch smaller than this share of the largest part are dropped, and so are those of fewer unit cells
 /// than [`SMALLEST_PART`].
 const PART: f64 = 0.05;
@@ -120,15 +116,14 @@ fn settle_bins(
     })
 }
 
-/// The patch of the cells that show the waves of a pair; `None` where they are too few, or in bands that are too narrow.
+/// The patch of the cells that show the waves of a pair; `None` where they are too few.
 fn patch(cells: &Cells, inside: &[bool], pair: &Matrix2<f64>) -> Option<Patch> {
     let mut inside = shrunk(cells, &tidy(cells, inside, pair));
     for (inside, count) in inside.iter_mut().zip(cells.counts()) {
         *inside &= *count > 0.0;
     }
     let unit_cells = area(cells, &inside, pair);
-    let core = (0..NARROW).fold(inside.clone(), |inside, _| shrunk(cells, &inside));
-    if unit_cells < FEWEST_CELLS || !core.contains(&true) {
+    if unit_cells < FEWEST_CELLS {
         return None;
     }
     let there = inside.iter().zip(cells.counts()).filter(|(i, _)| **i);
