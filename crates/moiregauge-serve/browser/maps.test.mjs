@@ -2,7 +2,7 @@
 
 import assert from "node:assert/strict";
 import { after, afterEach, beforeEach, test } from "node:test";
-import { closeBrowser, open, openFolder, rootWith, serve, simulated, view } from "./harness.mjs";
+import { api, closeBrowser, open, openFolder, rootWith, serve, simulated, view } from "./harness.mjs";
 
 /** @type {Awaited<ReturnType<typeof serve>>} */
 let server;
@@ -25,6 +25,8 @@ test("a map is made, read with the keyboard, and asked about a region", async ()
   await cursor.focus();
   await page.keyboard.press("ArrowRight");
   assert.match(await page.locator("#view-maps .middle > div > .readout").innerText(), /twist .*\d ± .*\d°/);
+  // Crosses are drawn with the next frame of the screen.
+  await page.locator("#view-maps .overlay .cross").nth(5).waitFor({ state: "attached" });
   assert.equal(await page.locator("#view-maps .overlay .cross").count(), 6);
   await page.getByRole("button", { name: "Region", exact: true }).click();
   const box = await page.locator("#view-maps canvas").first().boundingBox();
@@ -87,6 +89,33 @@ test("a profile is drawn with the mouse, areas for a device are found and drawn,
   assert.ok(Number(await high.getAttribute("aria-valuenow")) < was);
   await page.waitForTimeout(100);
   assert.notEqual(await colours(), before);
+  assert.deepEqual(page.wrong, []);
+  await page.leave();
+});
+
+test("a map that is done while the page asks for it is shown, once", async () => {
+  const page = await open(server.url);
+  await openFolder(page, "wide");
+  await page.getByRole("button", { name: /^scan\.000\.spm/ }).click();
+  await page.waitForSelector("html[data-picture]");
+  await view(page, "Maps");
+  // The first answer, "running", comes after the map is done and after the program has said so.
+  let [states, documents] = [0, 0];
+  await page.route(/\/api\/maps\/[^/]+$/, async (route) => {
+    const answer = await route.fetch();
+    if (states++ === 0) {
+      const id = new URL(route.request().url()).pathname.split("/").at(-1);
+      while ((await api(page, `maps/${id}`)).state === "running") await page.waitForTimeout(100);
+      await page.waitForTimeout(500);
+    }
+    await route.fulfill({ response: answer });
+  });
+  page.on("request", (r) => (documents += Number(r.url().endsWith("/result.json"))));
+  await page.getByRole("button", { name: "Make the map" }).click();
+  await page.waitForSelector("html[data-map]", { timeout: 60000 });
+  await page.unrouteAll({ behavior: "wait" });
+  await page.waitForTimeout(300);
+  assert.equal(documents, 1);
   assert.deepEqual(page.wrong, []);
   await page.leave();
 });

@@ -33,6 +33,8 @@ export class Asked {
     /** @type {ReturnType<typeof setTimeout> | undefined} */
     this.wait = undefined;
     this.count = 0;
+    /** How often was asked: of several answers that are under way the last asked for counts. */
+    this.times = 0;
     /** The areas that were found. @type {Region[]} */
     this.devices = [];
     /** What is being drawn, nodes. @type {{x: number, y: number}[] | null} */
@@ -188,9 +190,11 @@ export class Asked {
     const questions = { regions: this.regions, profiles: this.profiles };
     if (w > 0 && t > 0) questions.device = { size_nm: [w, t] };
     if (twist !== 0 && within > 0) questions.wanted = { twist_deg: twist, within_deg: within };
+    const time = ++this.times;
     if (this.regions.length + this.profiles.length === 0 && Object.keys(questions).length === 2) return this.show({});
     try {
-      this.show(await send("POST", `maps/${this.view.map.map}/ask`, questions));
+      const answer = await send("POST", `maps/${this.view.map.map}/ask`, questions);
+      if (time === this.times) this.show(answer);
     } catch (error) {
       this.failed(/** @type {Error} */ (error).message);
     }

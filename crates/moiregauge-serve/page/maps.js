@@ -45,6 +45,9 @@ export class MapsView {
     this.viewers = [this.main, this.error, this.masked];
     /** @type {{x: number, y: number} | null} */
     this.cursor = null;
+    /** The map that is followed, and how often it was asked for. */
+    this.following = "";
+    this.looks = 0;
     /** @type {Marker | null} */
     this.keyCursor = null;
     this.linking = false;
@@ -120,7 +123,7 @@ export class MapsView {
   }
 
   refresh() {
-    if (this.map) this.take(this.map.map).catch((e) => this.failed(e.message));
+    if (this.following) this.take(this.following).catch((e) => this.failed(e.message));
   }
 
   offerFiles() {
@@ -161,8 +164,9 @@ export class MapsView {
 
   /** @param {import("./events.js").Happening} event */
   happened(event) {
-    if (event.id !== this.map?.map) return;
+    if (event.id !== this.following) return;
     if (event.state === "running") {
+      if (this.map?.map !== event.id) return;
       this.map.state = "running";
       this.state.textContent = `${event.stage ?? "Running"}${event.of ? `, ${event.done} of ${event.of}` : ""}`;
       this.bar.style.width = `${event.of ? (100 * (event.done ?? 0)) / event.of : 0}%`;
@@ -170,12 +174,16 @@ export class MapsView {
     } else this.refresh();
   }
 
-  /** @param {string} id */
+  /** Follows a map; of several answers that are under way the last asked for counts. @param {string} id */
   async take(id) {
+    this.following = id;
+    const look = ++this.looks;
+    const is = await get(`maps/${id}`);
+    if (look !== this.looks) return;
     const before = this.map?.map === id ? this.map.state : "";
-    this.map = { map: id, ...(await get(`maps/${id}`)) };
+    this.map = { map: id, ...is };
     this.show();
-    if (this.map.state === "done" && before !== "done") await this.load();
+    if (is.state === "done" && before !== "done") await this.load();
   }
 
   show() {

@@ -17,6 +17,10 @@ export class WatchView {
     this.failed = failed;
     /** @type {any} */
     this.watch = null;
+    /** The watch that is followed, and how often it was asked for and answered. */
+    this.following = "";
+    this.looks = 0;
+    this.answered = 0;
     this.folder = select([["", "reading the folders …"]], "", () => undefined);
     this.until = h("input", { type: "number", min: 0, step: "any", placeholder: "none" });
     this.of = select([["twist_deg", "twist (°)"], ["strain_percent", "heterostrain (%)"]], "twist_deg", () => undefined);
@@ -43,14 +47,17 @@ export class WatchView {
   }
 
   refresh() {
-    if (this.watch) this.take(this.watch.watch).catch((e) => this.failed(e.message));
+    if (this.following) this.take(this.following).catch((e) => this.failed(e.message));
   }
 
   /** A line comes with its event, so that nothing is asked anew. @param {import("./events.js").Happening} event */
   happened(event) {
-    if (event.id !== this.watch?.watch) return;
+    if (event.id !== this.following) return;
+    // An answer that is under way may be older than the event.
+    if (this.looks !== this.answered) return this.refresh();
     const frames = this.watch.frames ?? [];
-    if (event.line) {
+    const last = frames.at(-1);
+    if (event.line && !(last?.file === event.line.file && last?.frames === event.line.frames)) {
       frames.push(event.line);
       if (frames.length > MOST) frames.splice(0, frames.length - MOST);
       this.watch = { ...this.watch, frames, advice: event.line.advice, warnings: event.line.warnings };
@@ -114,9 +121,17 @@ export class WatchView {
     }
   }
 
-  /** @param {string} id */
+  /** Follows a watch; of several answers that are under way the last asked for counts. @param {string} id */
   async take(id) {
-    this.watch = { watch: id, ...(await get(`watches/${id}`)) };
+    this.following = id;
+    const look = ++this.looks;
+    try {
+      const is = await get(`watches/${id}`);
+      if (look !== this.looks) return;
+      this.watch = { watch: id, ...is };
+    } finally {
+      if (look === this.looks) this.answered = look;
+    }
     const last = this.watch.frames?.at(-1);
     if (last) this.tell(last);
     this.show();
