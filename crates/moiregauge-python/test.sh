@@ -24,9 +24,11 @@ ls -l "$scratch"/wheel/*.whl
 tested() { timeout "$1" "$scratch/venv/bin/python" -m pytest -q -p no:cacheprovider "${@:2}"; }
 run() { tested 1500 tests --ignore tests/test_corpus.py "$@"; }
 pip install "$scratch"/wheel/*.whl pytest
+# What passes with numpy alone is not run again beside the extras.
+but_for=(--but-for "$scratch/passed")
 # Nothing but numpy comes along.
 test "$(pip list --format freeze | grep -civE '^(moiregauge|numpy|pip|setuptools|pytest|pluggy|iniconfig|packaging|pygments)=')" -eq 0
-run "$@"
+run "${but_for[@]}" "$@"
 # The corpus, once.
 [ "$#" -gt 0 ] || tested 2400 tests/test_corpus.py
 [ "${MOIREGAUGE_CORPUS:-}" = all ] || echo "NOT CHECKED: that package and program give the same numbers for each of the recorded files, but for each fourth (MOIREGAUGE_CORPUS=all)"
@@ -36,7 +38,7 @@ if ! "$scratch/venv/bin/pyright" --version > /dev/null 2>&1; then
   echo "NOT CHECKED: types by pyright, which cannot be fetched"
   set -- "$@" --deselect tests/test_words.py::test_types_are_right_for_pyright
 fi
-run "$@"
+run "${but_for[@]}" "$@"
 
 # As a new user would: in a browser.
 status=0

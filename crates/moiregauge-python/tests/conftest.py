@@ -5,12 +5,44 @@ from __future__ import annotations
 import shutil
 import subprocess
 import sysconfig
+from collections.abc import Generator
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 PROGRAM = Path(sysconfig.get_path("scripts")) / "moiregauge"
+
+
+PASSED = pytest.StashKey[set[str]]()
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--but-for", metavar="FILE", help="leave out the tests that FILE names; those that pass are written there")
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    config.stash[PASSED] = set()
+    file = config.getoption("--but-for")
+    if not file or not Path(file).exists():
+        return
+    before = set(Path(file).read_text(encoding="utf-8").splitlines())
+    config.hook.pytest_deselected(items=[item for item in items if item.nodeid in before])
+    items[:] = [item for item in items if item.nodeid not in before]
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    report = yield
+    if report.when == "call" and report.passed:
+        item.config.stash[PASSED].add(item.nodeid)
+    return report
+
+
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    file = session.config.getoption("--but-for")
+    if file and not Path(file).exists():
+        Path(file).write_text("\n".join(sorted(session.config.stash[PASSED])), encoding="utf-8")
 
 
 def program(*arguments: object, ok: bool = True) -> subprocess.CompletedProcess[str]:
