@@ -23,6 +23,8 @@ from pathlib import Path
 
 SHOWN = [10, 50, 100, 200, 300, 400, 500, 1000]
 POLL = "50ms"
+# From here on the program has what it needs of memory for one frame.
+SETTLED = 100
 
 
 def memory_mb(pid):
@@ -47,6 +49,7 @@ def main(program, frames):
         folder.mkdir()
         watch = [program, "watch", str(folder), "--json", "--poll", POLL, "--quiet"]
         print("frames  memory MB  seconds to the line  seconds of CPU", flush=True)
+        memory = {}
         with subprocess.Popen(watch, stdout=subprocess.PIPE, text=True) as process:
             for number, scan in enumerate(scans, 1):
                 begun, before = time.monotonic(), cpu_s(process.pid)
@@ -55,7 +58,11 @@ def main(program, frames):
                 assert line["frames"] == number, line
                 took, cpu = time.monotonic() - begun, cpu_s(process.pid) - before
                 if number in SHOWN or number == frames:
-                    print(f"{number:6} {memory_mb(process.pid):10.1f} {took:20.2f} {cpu:15.2f}", flush=True)
+                    memory[number] = memory_mb(process.pid)
+                    print(f"{number:6} {memory[number]:10.1f} {took:20.2f} {cpu:15.2f}", flush=True)
+            if frames > SETTLED:
+                more = 1e3 * (memory[frames] - memory[SETTLED]) / (frames - SETTLED)
+                print(f"memory from frame {SETTLED} on: {more:.0f} kB a frame")
             print(f"the line of frame {number}: twist {line['twist_deg']}")
             process.terminate()
             assert process.wait() == 0
