@@ -193,3 +193,37 @@ pub(crate) const SAMPLES: usize = 1024;
 
 /// Share of the compared pixels that may be missing in one image only. Chosen by eye.
 pub(crate) const MISSING: f64 = 0.02;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What is missing stays so, what is far off stops at the end, and text reads back to the same.
+    #[test]
+    fn samples_are_kept_in_steps_and_read_back() {
+        let values = [
+            0.0,
+            0.5,
+            -1.25,
+            1e-5,
+            7.5,
+            100.0,
+            -100.0,
+            f64::NAN,
+            f64::INFINITY,
+        ];
+        let known = Fingerprint {
+            size: [3, 3],
+            samples: values.into_iter().map(stepped).collect(),
+            noise: 0.1,
+        };
+        assert_eq!(
+            *known.samples,
+            [0, 2048, -5120, 0, 30720, i16::MAX, NONE + 1, NONE, NONE]
+        );
+        let text = serde_json::to_string(&known).unwrap();
+        let read: Fingerprint = serde_json::from_str(&text).unwrap();
+        assert_eq!(read.samples, known.samples);
+        assert_eq!(known.difference(&read, 1e-6), Some(0.0));
+    }
+}
