@@ -7,10 +7,11 @@ The frames are simulated first and then come one by one: the next one when the l
 after some of them, the memory that the program has, the time from a frame to its line (the two looks, 50 ms apart, that tell
 that it is whole are in it), and the time of the processor that the frame took. Linux only.
 
-Measured with a release on two busy processors: 21 MB after 10 frames, 26 MB after 100, 36 MB after 300 and 44 MB after 500, 47 kB a
-frame. Of these 14 kB stay (the joint fit needs 6 kB of each frame, the search for copies 8 kB); the rest is what an analysis of all
-frames needs while it lasts. A frame takes longer the more there are, since all are fitted together: 0.03 s of CPU after 10 frames, 0.09 s
-after 100, 0.35 s after 300 and 0.61 s after 500.
+Measured on two busy processors: 28 MB after 100 frames and 40 MB after 500, 29 kB a frame. It cannot be constant, since all frames are
+fitted together. Of each frame 13 kB stay: lattices, geometry and times of both lines (4.5 kB), samples that tell copies of a file (4 kB), what the
+fits leave around the waves (2 kB), harmonics, names and hashes (2 kB). 14 kB more are needed while the frames are fitted: normal equations, their
+derivatives, and the numbers of each scan; the rest is what the allocator holds. A frame takes longer the more there are. With a release it took
+0.03 s of CPU after 10 frames, 0.09 s after 100, 0.35 s after 300 and 0.61 s after 500.
 """
 
 import json
@@ -23,6 +24,8 @@ from pathlib import Path
 
 SHOWN = [10, 50, 100, 200, 300, 400, 500, 1000]
 POLL = "50ms"
+# From here on the program has what it needs of memory for one frame.
+SETTLED = 100
 
 
 def memory_mb(pid):
@@ -47,6 +50,7 @@ def main(program, frames):
         folder.mkdir()
         watch = [program, "watch", str(folder), "--json", "--poll", POLL, "--quiet"]
         print("frames  memory MB  seconds to the line  seconds of CPU", flush=True)
+        memory = {}
         with subprocess.Popen(watch, stdout=subprocess.PIPE, text=True) as process:
             for number, scan in enumerate(scans, 1):
                 begun, before = time.monotonic(), cpu_s(process.pid)
@@ -55,7 +59,11 @@ def main(program, frames):
                 assert line["frames"] == number, line
                 took, cpu = time.monotonic() - begun, cpu_s(process.pid) - before
                 if number in SHOWN or number == frames:
-                    print(f"{number:6} {memory_mb(process.pid):10.1f} {took:20.2f} {cpu:15.2f}", flush=True)
+                    memory[number] = memory_mb(process.pid)
+                    print(f"{number:6} {memory[number]:10.1f} {took:20.2f} {cpu:15.2f}", flush=True)
+            if frames > SETTLED:
+                more = 1e3 * (memory[frames] - memory[SETTLED]) / (frames - SETTLED)
+                print(f"memory from frame {SETTLED} on: {more:.0f} kB a frame")
             print(f"the line of frame {number}: twist {line['twist_deg']}")
             process.terminate()
             assert process.wait() == 0

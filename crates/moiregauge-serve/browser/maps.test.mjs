@@ -119,3 +119,51 @@ test("a map that is done while the page asks for it is shown, once", async () =>
   assert.deepEqual(page.wrong, []);
   await page.leave();
 });
+
+test("a device dragged on the map fills its size and is asked for at once", async () => {
+  const page = await open(server.url);
+  await openFolder(page, "wide");
+  await page.getByRole("button", { name: /^scan\.000\.spm/ }).click();
+  await page.waitForSelector("html[data-picture]");
+  await view(page, "Maps");
+  await page.getByRole("button", { name: "Make the map" }).click();
+  await page.waitForSelector("html[data-map]", { timeout: 60000 });
+  const box = await page.locator("#view-maps canvas").first().boundingBox();
+  assert.ok(box);
+  const [x, y] = [box.x + box.width * 0.35, box.y + box.height * 0.4];
+  await page.getByRole("button", { name: "Device", exact: true }).click();
+  const [width, height] = [page.getByLabel("Width of the device, nm"), page.getByLabel("Height of the device, nm")];
+  await page.mouse.move(x, y);
+  await page.mouse.down();
+  await page.mouse.move(x + 100, y + 50, { steps: 5 });
+  // The rectangle is drawn with its size while it is dragged; nothing is asked yet.
+  const words = page.locator("#view-maps .overlay text.words");
+  await words.waitFor({ state: "attached" });
+  assert.equal(await page.locator("#view-maps .overlay polygon.outline").count(), 1);
+  const shown = /^([\d.]+) × ([\d.]+) nm$/.exec((await words.textContent()) ?? "");
+  assert.ok(shown, await words.textContent() ?? "");
+  assert.equal(await width.inputValue(), "");
+  if (process.env.SCREENSHOTS) await page.screenshot({ path: `${process.env.SCREENSHOTS}/device-drag.png` });
+  await page.mouse.up();
+  const areas = page.getByRole("table", { name: "Most uniform areas" });
+  await areas.waitFor();
+  assert.deepEqual([await width.inputValue(), await height.inputValue()], [shown[1], shown[2]]);
+  // Twice as wide as high on the screen is so on the sample.
+  assert.ok(Math.abs(Number(shown[1]) / Number(shown[2]) - 2) < 0.05, shown[0]);
+  // Every area is drawn, with the sides of the rectangle on the screen.
+  const ranks = await areas.locator("tbody tr").count();
+  assert.ok(ranks > 0);
+  const drawn = page.locator("#view-maps .overlay polygon.line");
+  await drawn.nth(ranks - 1).waitFor({ state: "attached" });
+  assert.equal(await drawn.count(), ranks);
+  assert.equal(await page.locator("#view-maps .overlay polygon.outline").count(), 0);
+  for (const points of await drawn.evaluateAll((all) => all.map((p) => p.getAttribute("points") ?? ""))) {
+    const at = points.split(" ").map((p) => p.split(",").map(Number));
+    const side = (/** @type {number} */ i) => Math.hypot(at[i + 1][0] - at[i][0], at[i + 1][1] - at[i][1]);
+    const [long, short] = [side(0), side(1)].sort((a, b) => b - a);
+    assert.ok(Math.abs(long - 100) < 1 && Math.abs(short - 50) < 1, points);
+  }
+  if (process.env.SCREENSHOTS) await page.screenshot({ path: `${process.env.SCREENSHOTS}/device.png` });
+  assert.deepEqual(page.wrong, []);
+  await page.leave();
+});

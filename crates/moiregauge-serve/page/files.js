@@ -48,11 +48,12 @@ export class FileTree {
     const inside = h("ul", { hidden: true });
     const button = h("button", { type: "button", class: "folder", "aria-expanded": "false" }, h("span", { class: "twist", "aria-hidden": "true" }), h("span", { class: "file-name", text: name, title }));
     const all = h("input", { type: "checkbox", "aria-label": `Use all scans of ${name}`, title: "Use all scans of this folder" });
-    let read = false;
+    /** The reading, once for all who wait for it; one that failed is made again. @type {Promise<boolean> | null} */
+    let reading = null;
     const toggle = async (/** @type {boolean} */ on) => {
       button.setAttribute("aria-expanded", String(on));
       inside.hidden = !on;
-      if (on && !read) read = await this.read(root, under, inside);
+      if (on && !(await (reading ??= this.read(root, under, inside)))) reading = null;
     };
     button.addEventListener("click", () => toggle(button.getAttribute("aria-expanded") !== "true"));
     all.addEventListener("change", async () => {

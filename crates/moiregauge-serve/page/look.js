@@ -31,6 +31,8 @@ export class LookView {
     this.levelling = "plane";
     /** @type {import("./api.js").Floats | null} */
     this.raw = null;
+    /** What the file says of the image that is shown. @type {any} */
+    this.about = null;
     this.channel = 0;
     this.channelName = "";
     /** @type {AbortController | null} */
@@ -96,6 +98,8 @@ export class LookView {
   async open() {
     const file = store.current;
     if (!file) return;
+    // An image of the file before comes too late from now on.
+    this.loading?.abort();
     this.title.textContent = store.name(file);
     // The image of a small file is asked for before it is known what else the file holds.
     const guess = this.channel;
@@ -109,6 +113,7 @@ export class LookView {
       const same = names.indexOf(this.channelName);
       this.showHeader(info);
       if (info.channels.length === 0) {
+        this.raw = null;
         this.viewer.clear("This file has no channel that can be shown.");
         fill(this.thumbs, (info.unreadable ?? []).map((/** @type {any} */ u) => h("p", { class: "hint", text: typeof u === "string" ? u : JSON.stringify(u) })));
         return;
@@ -118,7 +123,7 @@ export class LookView {
       this.showThumbs(file, info);
       await load;
     } catch (error) {
-      this.fail(error);
+      if (store.current === file) this.fail(error);
     }
   }
 
@@ -152,6 +157,7 @@ export class LookView {
       if (loading.signal.aborted) return;
       image.unit ||= about.unit ?? "";
       this.raw = image;
+      this.about = about;
       this.step = step;
       this.relevel(true);
       this.title.textContent = `${store.name(file)} · ${this.channelName}`;
@@ -168,7 +174,7 @@ export class LookView {
     if (!this.raw) return;
     this.level = background(this.raw, this.levelling);
     const shown = this.levelling === "none" ? this.raw.data : without(this.raw, this.level);
-    const about = this.info.channels[this.channel];
+    const about = this.about;
     this.viewer.show(this.raw, { step: this.step, shown, keepView: true, full: { columns: about.columns, rows: about.rows } });
     this.contrast.take(shown, this.raw.unit);
     if (other) this.measure.use(this.measure.kind);
@@ -241,6 +247,7 @@ export class LookView {
   /** @param {unknown} error */
   fail(error) {
     const e = /** @type {import("./api.js").ApiError} */ (error);
+    this.raw = null;
     this.viewer.clear([e.message, e.what].filter(Boolean).join(" "));
     fill(this.thumbs);
   }

@@ -10,6 +10,7 @@ import { Plot } from "./plot.js";
 /** @typedef {[number, number]} Pair */
 /** @typedef {{name: string, corners_nm: Pair[]}} Region */
 /** @typedef {{name: string, ends_nm: [Pair, Pair]}} Line */
+/** @typedef {"none" | "region" | "profile" | "device"} Mode */
 
 /** What a line tells: its key in the answer, how the quantity of the map begins, the unit. @type {[string, string, string][]} */
 const PROFILED = [["twist_deg", "twist", "°"], ["heterostrain_percent", "strain", "%"], ["wavelength_nm", "wavelength", "nm"]];
@@ -37,8 +38,9 @@ export class Asked {
     this.times = 0;
     /** The areas that were found. @type {Region[]} */
     this.devices = [];
-    /** What is being drawn, nodes. @type {{x: number, y: number}[] | null} */
+    /** What is being drawn, nodes, and the words beside it. @type {{x: number, y: number}[] | null} */
     this.draft = null;
+    this.draftWords = "";
     this.drawing = s("g", {});
     view.main.overlay.insertBefore(this.drawing, view.main.ruler);
     view.main.addEventListener("view", () => this.draw());
@@ -51,13 +53,13 @@ export class Asked {
     this.profilePlot.element.hidden = true;
     this.answers = h("div", { class: "section", "aria-live": "polite" }, this.table, this.profilePlot.element);
     this.element = h("div", {}, h("h3", { text: "Regions and profiles" }), h("p", { class: "hint", text: "Choose Region or Profile and drag on the map. Corners move with the mouse or the arrow keys." }), this.list,
-      h("h3", { text: "Most uniform areas" }), h("div", { class: "pair" }, field("Width (nm)", this.device[0]), field("Height (nm)", this.device[1])),
+      h("h3", { text: "Most uniform areas" }), h("p", { class: "hint", text: "Choose Device and drag a rectangle of its size on the map, or type the size." }), h("div", { class: "pair" }, field("Width (nm)", this.device[0]), field("Height (nm)", this.device[1])),
       h("h3", { text: "Area with a twist" }), h("div", { class: "pair" }, field("Twist (°)", this.wanted[0]), field("Within (°)", this.wanted[1])),
       h("div", { class: "buttons" }, h("button", { type: "button", text: "Ask", onclick: () => this.ask() })));
   }
 
   makeTools() {
-    const modes = /** @type {["none" | "region" | "profile", string][]} */ ([["none", "Move"], ["region", "Region"], ["profile", "Profile"]]);
+    const modes = /** @type {[Mode, string][]} */ ([["none", "Move"], ["region", "Region"], ["profile", "Profile"], ["device", "Device"]]);
     const buttons = modes.map(([mode, words]) => h("button", { type: "button", text: words, "aria-pressed": String(mode === "none"), onclick: () => {
       buttons.forEach((b, i) => b.setAttribute("aria-pressed", String(modes[i][0] === mode)));
       this.use(mode);
@@ -75,7 +77,7 @@ export class Asked {
     if (this.regions.length + this.profiles.length > 0) this.ask();
   }
 
-  /** @param {"none" | "region" | "profile"} mode */
+  /** @param {Mode} mode */
   use(mode) {
     const viewer = this.view.main;
     /** @type {{x: number, y: number} | null} */
@@ -89,18 +91,39 @@ export class Asked {
       up: (at) => {
         if (from && Math.hypot(at.x - from.x, at.y - from.y) > 0.5) {
           if (mode === "region") this.addRegion(from, at, false);
-          else this.addProfile(from, at, false);
+          else if (mode === "profile") this.addProfile(from, at, false);
+          else this.sizeDevice(from, at);
         }
+        from = null;
         this.draft = null;
         this.draw();
       },
     };
   }
 
-  /** @param {string} mode @param {{x: number, y: number}} a @param {{x: number, y: number}} b */
+  /** @param {Mode} mode @param {{x: number, y: number}} a @param {{x: number, y: number}} b */
   sketch(mode, a, b) {
-    this.draft = mode === "region" ? rectangle(a, b) : [a, b];
+    this.draft = mode === "profile" ? [a, b] : rectangle(a, b);
+    this.draftWords = mode === "device" ? `${this.size(a, b).join(" × ")} nm` : "";
     this.draw();
+  }
+
+  /** Width and height of a rectangle between two nodes, nm, to three digits. @param {{x: number, y: number}} a @param {{x: number, y: number}} b */
+  size(a, b) {
+    const [along, across] = [{ x: b.x, y: a.y }, { x: a.x, y: b.y }];
+    const from = this.view.nm(a.x, a.y);
+    return [along, across].map((p) => {
+      const to = this.view.nm(p.x, p.y);
+      return Number(Math.hypot(to[0] - from[0], to[1] - from[1]).toPrecision(3));
+    });
+  }
+
+  /** A device of the size of a rectangle: the areas for it are asked for at once. @param {{x: number, y: number}} a @param {{x: number, y: number}} b */
+  sizeDevice(a, b) {
+    const size = this.size(a, b);
+    if (!size.every((side) => side > 0)) return;
+    this.device.forEach((input, i) => (input.value = String(size[i])));
+    this.ask();
   }
 
   /** @param {{x: number, y: number}} at @param {boolean} share of the map, or nodes @returns {Pair} */
@@ -175,7 +198,11 @@ export class Asked {
       const at = d.corners_nm.map((c) => this.view.node(c));
       this.drawing.append(s("polygon", { points: points(at), class: "halo" }), s("polygon", { points: points(at), class: "line" }), words(d.name, at[0]));
     }
-    if (this.draft) this.drawing.append(s("polygon", { points: points(this.draft), class: "outline" }));
+    if (this.draft) {
+      this.drawing.append(s("polygon", { points: points(this.draft), class: "outline" }));
+      const [from, , to] = this.draft.map((p) => v.toScreen(p.x, p.y));
+      if (this.draftWords) this.drawing.append(s("text", { x: clamped((from.x + to.x) / 2, 60, v.stage.clientWidth - 60), y: (from.y + to.y) / 2 + 4, class: "words", "text-anchor": "middle" }, this.draftWords));
+    }
   }
 
   later() {
@@ -240,6 +267,11 @@ export class Asked {
 /** @param {{x: number, y: number}} a @param {{x: number, y: number}} b */
 function rectangle(a, b) {
   return [{ x: a.x, y: a.y }, { x: b.x, y: a.y }, { x: b.x, y: b.y }, { x: a.x, y: b.y }];
+}
+
+/** @param {number} value @param {number} low @param {number} high */
+function clamped(value, low, high) {
+  return Math.max(low, Math.min(high, value));
 }
 
 /** @param {any} statistic */

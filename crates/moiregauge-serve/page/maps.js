@@ -48,6 +48,8 @@ export class MapsView {
     /** The map that is followed, and how often it was asked for. */
     this.following = "";
     this.looks = 0;
+    /** How often a quantity was chosen: the last one is shown, whichever comes last. */
+    this.chosen = 0;
     /** @type {Marker | null} */
     this.keyCursor = null;
     this.linking = false;
@@ -204,13 +206,17 @@ export class MapsView {
   async load() {
     const id = this.map.map;
     try {
-      this.document = { ...(await get(`maps/${id}/result.json`)), of: id };
+      const found = await get(`maps/${id}/result.json`);
+      if (id !== this.map.map) return;
+      this.document = { ...found, of: id };
       this.show();
       const all = /** @type {Quantity[]} */ (this.map.quantities ?? []);
       const quantities = all.filter((q) => !q.name.endsWith(" sigma") && !/^(mask|position)/.test(q.name));
       fill(this.choice, quantities.map((q) => h("option", { value: q.name, text: q.name.replace(/_/g, " ") })));
       await this.showMask(id);
+      if (id !== this.map.map) return;
       await this.showQuantity(quantities[0]?.name ?? "");
+      if (id !== this.map.map) return;
       await this.showInfo();
       this.asked.fresh();
       say("The map is ready.");
@@ -248,12 +254,11 @@ export class MapsView {
 
   /** @param {string} id */
   async showMask(id) {
-    try {
-      this.mask = await this.grid("mask");
-    } catch {
-      this.mask = null;
-    }
-    if (id !== this.map.map || !this.mask) {
+    /** @type {import("./api.js").Floats | null} */
+    const mask = await this.grid("mask").catch(() => null);
+    if (id !== this.map.map) return;
+    this.mask = mask;
+    if (!this.mask) {
       this.masked.clear("No mask");
       return;
     }
@@ -278,14 +283,15 @@ export class MapsView {
   async showQuantity(name) {
     const found = /** @type {Quantity[]} */ (this.map?.quantities ?? []).find((q) => q.name === name);
     if (!found) return;
-    this.quantity = found;
+    const mine = ++this.chosen;
     this.choice.value = name;
     try {
-      this.values = await this.grid(name);
+      const [values, sigmas] = await Promise.all([this.grid(name), found.sigma ? this.grid(found.sigma) : null]);
+      if (mine !== this.chosen) return;
+      [this.quantity, this.values, this.sigmas] = [found, values, sigmas];
       this.values.unit = found.unit;
-      this.sigmas = found.sigma ? await this.grid(found.sigma) : null;
     } catch (error) {
-      this.failed(/** @type {Error} */ (error).message);
+      if (mine === this.chosen) this.failed(/** @type {Error} */ (error).message);
       return;
     }
     this.main.show(this.values, { keepView: true });

@@ -39,7 +39,9 @@ export class MoireView {
         h("div", { class: "buttons" }, h("button", { type: "button", class: "main", text: "Plan", onclick: () => this.askPlan() })), this.planState),
       h("section", { class: "middle" }, this.cell, this.plan));
     fill(this.plan, empty("The plan appears here: how many scans, how fast and how large."));
+    /** Of several answers that are under way the last asked for counts. */
     this.asked = 0;
+    this.plans = 0;
     this.ask();
   }
 
@@ -99,11 +101,15 @@ export class MoireView {
     const wishes = Object.fromEntries(this.wishes.map(([key, input]) => [key, positive(input)]));
     const { twist_deg, strain_percent, strain_axis_deg, biaxial_percent } = this.values;
     const sample = { ...this.layers(), twist_deg, strain_percent, strain_axis_deg, biaxial_percent };
+    const mine = ++this.plans;
     this.planState.textContent = "Searching for a plan …";
     try {
-      this.showPlan(await send("POST", "plan", { wishes, conditions: { sample }, max_size_nm: positive(this.maxSize), max_rate_hz: positive(this.maxRate) }));
+      const answer = await send("POST", "plan", { wishes, conditions: { sample }, max_size_nm: positive(this.maxSize), max_rate_hz: positive(this.maxRate) });
+      if (mine !== this.plans) return;
+      this.showPlan(answer);
       this.planState.textContent = "";
     } catch (error) {
+      if (mine !== this.plans) return;
       const e = /** @type {import("./api.js").ApiError} */ (error);
       this.planState.textContent = "";
       fill(this.plan, h("h2", { text: "Plan" }), empty(e.missing ? "This version of the program does not plan for the page." : [e.message, e.what, e.where].filter(Boolean).join(" ")));

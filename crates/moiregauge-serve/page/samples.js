@@ -29,6 +29,10 @@ export class SamplesView {
     this.sorted = { column: "sample", down: false };
     /** @type {Set<string>} */
     this.pair = new Set();
+    /** How often a table was asked for: of several answers that are under way the last asked for counts. */
+    this.asked = 0;
+    /** The reading of the folders, once for all who wait for it. @type {Promise<void> | null} */
+    this.reading = null;
     this.folder = select([["", "reading the folders …"]], "", () => this.load());
     this.host = scroll("Table of samples");
     this.compare = h("div", { class: "compare" });
@@ -43,14 +47,18 @@ export class SamplesView {
     fill(this.host, empty("Choose the folder with the results of moiregauge campaign. You see one row for each sample, with a picture."));
   }
 
-  async shown() {
-    if (this.folder.options.length > 1) return;
+  shown() {
+    return (this.reading ??= this.offerFolders());
+  }
+
+  async offerFolders() {
     /** @type {[string, string][]} */
     const found = [["", "choose …"]];
     try {
       for (const root of store.state.roots) await this.walk(root, "", 2, found);
     } catch (error) {
       this.failed(/** @type {Error} */ (error).message);
+      this.reading = null;
     }
     fill(this.folder, found.map(([v, words]) => h("option", { value: v, text: words })));
   }
@@ -64,15 +72,18 @@ export class SamplesView {
   }
 
   async load() {
+    const mine = ++this.asked;
     if (!this.folder.value) return;
     const [root, under] = JSON.parse(this.folder.value);
     this.pair.clear();
     try {
       const found = await get(`samples${query({ root, under })}`);
+      if (mine !== this.asked) return;
       const columns = found.columns.map((/** @type {any} */ c) => (typeof c === "string" ? c : c.name));
       const rows = found.rows.map((/** @type {any} */ r) => (Array.isArray(r) ? Object.fromEntries(columns.map((/** @type {string} */ c, /** @type {number} */ i) => [c, r[i]])) : r));
       this.table = { columns, rows, thumbs: found.pictures ?? [], root, under };
     } catch (error) {
+      if (mine !== this.asked) return;
       const e = /** @type {import("./api.js").ApiError} */ (error);
       this.table = { columns: [], rows: [], thumbs: [], root, under };
       fill(this.host, empty(e.missing ? "This version of the program cannot show campaigns." : [e.message, e.what].filter(Boolean).join(" ")));

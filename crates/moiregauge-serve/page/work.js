@@ -22,6 +22,8 @@ class Work extends EventTarget {
     /** @type {{stage?: string, done?: number, of?: number} | null} */
     this.progress = null;
     this.busy = Promise.resolve();
+    /** How often results were asked for: of several answers that are under way the last asked for counts. */
+    this.loads = 0;
     onHappening("work", (event) => this.happened(event));
     onConnection((up) => up && this.is && this.refresh());
   }
@@ -57,24 +59,28 @@ class Work extends EventTarget {
   }
 
   /** Takes up the newest work that the program knows, after the page was loaded anew. */
-  async restore() {
-    if (this.is) return;
-    const known = /** @type {string[]} */ (store.state.works ?? []);
-    const last = sessionStorage.getItem("work");
-    const id = last && known.includes(last) ? last : known[known.length - 1];
-    if (id) await this.take(await get(`works/${id}`));
+  restore() {
+    return this.inTurn(async () => {
+      if (this.is) return;
+      const known = /** @type {string[]} */ (store.state.works ?? []);
+      const last = sessionStorage.getItem("work");
+      const id = last && known.includes(last) ? last : known[known.length - 1];
+      if (id) await this.take(await get(`works/${id}`));
+    });
   }
 
   /**
-   * A new work.
+   * A new work; in turn, lest an answer about the one before takes its place.
    * @param {string[]} files
    * @param {any} settings
    * @param {any} known
    */
-  async create(files, settings, known) {
-    const { work } = await send("POST", "works", { files, settings, known });
-    this.results = null;
-    await this.take(await get(`works/${work}`));
+  create(files, settings, known) {
+    return this.inTurn(async () => {
+      const { work } = await send("POST", "works", { files, settings, known });
+      this.results = null;
+      await this.take(await get(`works/${work}`));
+    });
   }
 
   /**
@@ -89,9 +95,11 @@ class Work extends EventTarget {
   }
 
   /** @param {"run" | "cancel" | "undo" | "redo"} what */
-  do(what) {
-    const request = async () => this.take(await send("POST", this.path(what)));
-    return what === "cancel" ? request() : this.inTurn(request);
+  async do(what) {
+    if (what !== "cancel") return this.inTurn(async () => this.take(await send("POST", this.path(what))));
+    // It waits for nothing; its answer may come after what it led to.
+    await send("POST", this.path(what));
+    return this.refresh();
   }
 
   /** In turn, lest an answer to a change that was made before comes later. */
@@ -114,11 +122,11 @@ class Work extends EventTarget {
   }
 
   async load() {
-    const id = this.id;
+    const [id, load] = [this.id, ++this.loads];
     const most = this.is?.result?.moires ?? 1;
     this.moire = Math.min(this.moire, most);
     const results = await get(this.path(`results.json${this.moire > 1 ? query({ moire: this.moire }) : ""}`));
-    if (id !== this.id) return;
+    if (id !== this.id || load !== this.loads) return;
     this.results = results;
     this.version++;
     this.tell("results");

@@ -42,7 +42,7 @@ impl Progress {
 
     /// Tells the state of the thing, and what else there is to tell.
     pub(crate) fn state(&self, state: &str) {
-        self.hub.tell(self.kind, self.value(state));
+        self.hub.tell(self.kind, &self.value(state));
     }
 
     fn value(&self, state: &str) -> Value {
@@ -55,7 +55,7 @@ impl Progress {
         value["stage"] = now.stage.clone().into();
         value["done"] = now.done.into();
         value["of"] = now.of.into();
-        self.hub.tell(self.kind, value);
+        self.hub.tell(self.kind, &value);
     }
 }
 

@@ -60,7 +60,9 @@ pub(crate) struct Watched {
 struct Inner {
     state: &'static str,
     error: Option<String>,
-    lines: VecDeque<Value>,
+    /// What is kept of earlier lines, as JSON: text takes a tenth of the memory of values.
+    earlier: VecDeque<String>,
+    last: Option<Value>,
 }
 
 impl Watches {
@@ -90,7 +92,8 @@ impl Watches {
             inner: Mutex::new(Inner {
                 state: "running",
                 error: None,
-                lines: VecDeque::new(),
+                earlier: VecDeque::new(),
+                last: None,
             }),
         })
     }
@@ -151,13 +154,16 @@ impl Watched {
     /// What there is to tell of it.
     pub(crate) fn shown(&self) -> Value {
         let inner = lock(&self.inner);
-        let last = inner.lines.back();
+        let last = inner.last.as_ref();
+        let earlier = inner.earlier.iter().map(|line| serde_json::from_str(line));
+        let mut lines: Vec<Value> = earlier.filter_map(Result::ok).collect();
+        lines.extend(last.cloned());
         json!({
             "watch": self.id,
             "folder": self.folder,
             "state": inner.state,
             "error": inner.error,
-            "frames": inner.lines,
+            "frames": lines,
             "advice": last.map(|line| line["advice"].clone()),
             "warnings": last.map(|line| line["warnings"].clone()),
         })
@@ -165,22 +171,21 @@ impl Watched {
 
     fn tell(&self, line: &Value) {
         let mut inner = lock(&self.inner);
-        if let Some(last) = inner.lines.back_mut() {
-            *last = numbers(last);
+        if let Some(last) = inner.last.replace(line.clone()) {
+            inner.earlier.push_back(numbers(&last).to_string());
         }
-        inner.lines.push_back(line.clone());
-        if inner.lines.len() > LINES {
-            inner.lines.pop_front();
+        if inner.earlier.len() >= LINES {
+            inner.earlier.pop_front();
         }
         drop(inner);
         let event = json!({"watch": self.id, "state": "running", "line": line});
-        self.hub.tell("watch", event);
+        self.hub.tell("watch", &event);
     }
 
     fn ended(&self, state: &'static str) {
         lock(&self.inner).state = state;
         let event = json!({"watch": self.id, "state": state});
-        self.hub.tell("watch", event);
+        self.hub.tell("watch", &event);
     }
 
     fn drive(&self, watch: &mut Watch) {

@@ -58,7 +58,7 @@ pub(crate) fn beside(scan: &MeasuredScan, lines: Vec<MeasuredLine>) -> MeasuredS
     }
     caveats.dedup_by(|a, b| a.says_the_same(b));
     MeasuredScan {
-        lines,
+        lines: lines.into(),
         caveats,
         grains: Vec::new(),
         ..scan.clone()

@@ -155,7 +155,7 @@ fn measure_with(
             size_nm: scan.size_nm,
             set: None,
             digest: None,
-            lines,
+            lines: lines.into(),
             excluded,
             repeats: None,
             caveats,

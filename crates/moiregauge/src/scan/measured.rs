@@ -12,6 +12,7 @@ use crate::frame::geometry::{Geometry, Timing};
 use crate::lattice::measured::MeasuredLattice;
 use crate::numbers::exact;
 use crate::scan::fingerprint::Fingerprint;
+use crate::scan::lines::MeasuredLines;
 use crate::scan::written;
 use crate::settings::ranges::OutOfRange;
 use crate::spectrum::error::LatticeError;
@@ -41,7 +42,7 @@ pub struct MeasuredScan {
     /// Hash of the bytes of its file, where whoever read it tells it; files of equal bytes are one.
     pub digest: Option<String>,
     /// One entry for each line direction that was used.
-    pub lines: Vec<MeasuredLine>,
+    pub lines: MeasuredLines,
     /// Why it is shown but not used; `None` where it is used.
     pub excluded: Option<String>,
     /// The file that holds the same data and is used in its place.

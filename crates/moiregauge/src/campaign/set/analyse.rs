@@ -53,7 +53,9 @@ pub(crate) fn analyse_set(
         scan_at_drift(scan, seen, reference, of_set, fit.as_ref(), settings)
     };
     let pairs = group.scans.iter().zip(&seen);
-    let mut scans: Vec<ScanAnalysis> = pairs.filter_map(of_scan).collect();
+    // They are long, and a vector that grows would hold twice as many.
+    let mut scans: Vec<ScanAnalysis> = Vec::with_capacity(seen.len());
+    scans.extend(pairs.filter_map(of_scan));
     let checks = fit
         .as_ref()
         .map(|fit| joint::checked(fit, &mut scans, &used, name, settings, caveats));

@@ -23,7 +23,7 @@ fn of_lines(group: &Group) -> Option<i32> {
     let differs = |reason: &String| reason == LineDifference::OTHER_LATTICES;
     let scans = group.scans.iter();
     let mut differing = scans.filter(|scan| scan.excluded.as_ref().is_some_and(differs));
-    differing.find_map(|scan| match scan.lines.as_slice() {
+    differing.find_map(|scan| match &*scan.lines {
         [one, other] => of_each_other(one, other),
         _ => None,
     })

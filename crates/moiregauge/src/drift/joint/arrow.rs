@@ -167,28 +167,25 @@ impl ScanSums {
         all
     }
 
-    /// Each scan without its clock: `(XᵀX, Xᵀe)` by the rest of its local parameters.
+    /// Scans without their clocks, one after the other: `(XᵀX, Xᵀe)` by the rest of their local parameters. `None` where nothing
+    /// determines a clock.
     pub(crate) fn without_clocks(
         &self,
         held: &DVector<f64>,
-    ) -> Option<Vec<(DMatrix<f64>, DVector<f64>)>> {
+    ) -> impl Iterator<Item = Option<(DMatrix<f64>, DVector<f64>)>> {
         let right = self.right.iter();
-        self.normal
-            .iter()
-            .zip(right)
-            .enumerate()
-            .map(|(scan, (normal, right))| {
-                let n = self.shape.without_clock();
-                let mut reduced = normal.view((0, 0), (n, n)).into_owned();
-                let mut side = right.rows(0, n).into_owned();
-                if self.shape.has_clocks() {
-                    let clock = self.clock(scan, held)?;
-                    clock.take_off(&mut reduced);
-                    side.axpy(-right[n], &clock.gain, 1.0);
-                }
-                Some((reduced, side))
-            })
-            .collect()
+        let all = self.normal.iter().zip(right).enumerate();
+        all.map(|(scan, (normal, right))| {
+            let n = self.shape.without_clock();
+            let mut reduced = normal.view((0, 0), (n, n)).into_owned();
+            let mut side = right.rows(0, n).into_owned();
+            if self.shape.has_clocks() {
+                let clock = self.clock(scan, held)?;
+                clock.take_off(&mut reduced);
+                side.axpy(-right[n], &clock.gain, 1.0);
+            }
+            Some((reduced, side))
+        })
     }
 
     /// The clock of a scan that has one; `None` where nothing determines it.
@@ -332,11 +329,12 @@ impl Arrow {
         let shape = &sums.shape;
         let mut of_blocks = BlockSums::new(shape);
         let mut clocks = Vec::new();
-        for (scan, part) in sums.without_clocks(held)?.iter().enumerate() {
+        for (scan, part) in sums.without_clocks(held).enumerate() {
+            let part = part?;
             if shape.has_clocks() {
                 clocks.push(sums.clock(scan, held)?);
             }
-            of_blocks.add(scan, part, 1.0);
+            of_blocks.add(scan, &part, 1.0);
         }
         let (shared, blocks) = of_blocks.eliminated(held)?;
         Some(Self {

@@ -115,7 +115,7 @@ impl JointFit {
         let rows = linearise(&self.sightings, &self.layout, &self.solution, f64::INFINITY);
         let sums = rows.sums(shape, self.instability_nm);
         let held = held(&sums);
-        let Some(parts) = sums.without_clocks(&held) else {
+        let Some(parts) = sums.without_clocks(&held).collect::<Option<Vec<_>>>() else {
             return Vec::new();
         };
         (0..draws)

@@ -1,5 +1,7 @@
 //! What a fit over all scans found.
 
+use std::sync::Arc;
+
 use heterostrain::Estimate;
 use heterostrain::lattice::Waves;
 use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
@@ -39,7 +41,7 @@ pub struct JointFit {
     /// The terms that were tried beside a constant drift, and what the criterion said.
     pub tested: Vec<TestedTerm>,
     /// What was fitted, with the blocks of linked scans.
-    pub(crate) sightings: Vec<Sighting>,
+    pub(crate) sightings: Arc<[Sighting]>,
     pub(crate) layout: Layout,
     pub(crate) solution: DVector<f64>,
     /// Covariance of `solution`, as the errors of the sightings make it.

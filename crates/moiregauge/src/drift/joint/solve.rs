@@ -1,5 +1,7 @@
 //! Gauss–Newton over all parameters, phases linked outwards from the middle of the campaign.
 
+use std::sync::Arc;
+
 use heterostrain::Estimate;
 use heterostrain::lattice::Waves;
 use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
@@ -29,7 +31,8 @@ const WORST_CONDITION: f64 = 1e4;
 
 /// What is fitted.
 pub(crate) struct Problem {
-    pub(crate) sightings: Vec<Sighting>,
+    /// All fits share them.
+    pub(crate) sightings: Arc<[Sighting]>,
     time_sigma: f64,
 }
 
@@ -43,14 +46,18 @@ impl Problem {
         time_sigma: f64,
     ) -> Option<(Self, JointFit)> {
         let mut problem = Self {
-            sightings: sightings.to_vec(),
+            sightings: sightings.into(),
             // Exact times would make the weights infinite; a millisecond is exact enough.
             time_sigma: time_sigma.max(1e-3),
         };
         let plain = problem.solve(Terms::default(), pair, velocity, None)?;
         let speeds = plain.velocity_covariance.symmetric_eigenvalues();
         let sigma = speeds.max().sqrt();
-        number_blocks(&mut problem.sightings, &plain.waves.basis, sigma);
+        number_blocks(
+            Arc::make_mut(&mut problem.sightings),
+            &plain.waves.basis,
+            sigma,
+        );
         Some((problem, plain))
     }
 
@@ -101,7 +108,7 @@ impl Problem {
             degrees_of_freedom,
             widening: last.phases.iter().map(|p| p.widening(scatter)).sum(),
             tested: Vec::new(),
-            sightings: sightings.clone(),
+            sightings: Arc::clone(sightings),
             layout,
             solution: x,
             unscaled,
