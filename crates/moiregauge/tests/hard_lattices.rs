@@ -49,6 +49,29 @@ fn many_atoms(seed: u64) -> Scene {
     scene
 }
 
+/// A strong second shell, whose first shell has waves of this amplitude in noise of 1.
+fn second_shell(first: f64, seed: u64) -> Scene {
+    let mut scene = Scene::new(
+        [192, 192],
+        8.0,
+        0.618 * seed as f64,
+        Contrast::Cosines,
+        seed,
+    );
+    let pair = scene.pair();
+    scene.waves.clear();
+    for (h, k) in [(1, 0), (0, 1), (1, 1), (2, 1), (1, 2), (1, -1)] {
+        let strong = h * h - h * k + k * k == 3;
+        scene.waves.push(Wave {
+            q: pair * Vector2::new(f64::from(h), f64::from(k)),
+            amplitude: if strong { 0.5 } else { first },
+            phase: f64::from(7 * h + 3 * k),
+        });
+    }
+    scene.white = 1.0;
+    scene
+}
+
 /// Waves in time are multiples of one wave in the image, folded back at the line rate: a grid of peaks in the
 /// spectrum. Amplitude a third of the lattice's, as strong against the noise around it.
 fn with_pick_up(mut scene: Scene) -> Scene {
@@ -79,6 +102,26 @@ fn high_orders_make_the_lattice() {
     }
     // 24 times four degrees of freedom, not quite independent: 96 with a standard deviation of 20.
     assert!((36.0..156.0).contains(&sum), "{sum}");
+}
+
+/// Waves of the first shell that no search among all waves would find (26 times the noise; 24 can be chance) make the lattice together,
+/// and where there are none the lattice is that of the waves there are.
+#[test]
+fn a_first_shell_that_hides_makes_the_lattice() {
+    let mut sum = 0.0;
+    for seed in 0..24 {
+        let scene = second_shell(0.08, seed);
+        let measured = fit(&scene.image(), &scene);
+        let error = scene.error(&measured.pixels.basis).norm();
+        assert!(error < 1e-2 * scene.basis.norm(), "seed {seed}: {error}");
+        sum += chi_squared(&scene, &measured);
+        let scene = second_shell(0.0, seed);
+        let alone = fit(&scene.image(), &scene).pixels.basis.determinant();
+        let cells = scene.basis.determinant() / alone;
+        assert!((cells.abs() - 3.0).abs() < 0.02, "seed {seed}: {cells}");
+    }
+    // 24 times four degrees of freedom: 96 with a standard deviation of 14.
+    assert!((54.0..138.0).contains(&sum), "{sum}");
 }
 
 /// Images of one lattice say so: χ² of the closure is what it should be, and no error is enlarged.

@@ -88,6 +88,31 @@ fn the_lattice_that_was_told_is_measured() {
     assert!(off < 4.0 * sigma + 0.0005, "{value} ± {sigma}");
 }
 
+/// Bands of less than a period, with gaps of a period and a half between them, tell the lattice together: phases under windows leave
+/// whole turns from band to band open.
+#[test]
+fn bands_that_a_mask_leaves_are_one_lattice() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let scans = simulate(folder.path(), &["--pixels", "512", "--scans", "2"]);
+    let truth = json(&scans.join("truth.json"));
+    let wanted = number(&truth, "/twist_deg");
+    for radius in [34.0, 48.0, 62.0] {
+        let bands = mask(folder.path(), "bands", |column| {
+            let apart = |middle: f64| (column as f64 - 512.0 * middle).abs();
+            apart(0.3) > radius && apart(0.7) > radius
+        });
+        let out = folder.path().join(radius.to_string());
+        let mut command = analyze(&scans, &out);
+        succeed(command.arg("--mask").arg(&bands));
+        let found = results(&out);
+        let [value, sigma] = ["value", "sigma"]
+            .map(|part| number(&found, &format!("/sets/0/mean/twist_deg/{part}")));
+        let error = (value - wanted) / sigma;
+        assert!(error.abs() < 5.0, "{radius}: {value} ± {sigma}");
+        assert!(sigma < 1e-3, "{radius}: {value} ± {sigma}");
+    }
+}
+
 /// Each grain alone by its number, with the numbers that it has beside the other; the record of the run repeats it.
 #[test]
 fn a_grain_is_chosen_by_its_number() {

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use heterostrain::lattice::shortest_pair;
 use nalgebra::Vector2;
 
 use crate::coverage::find::{WHOLE, pitch, same};
@@ -11,6 +12,7 @@ use crate::frame::background::{Background, remove_background};
 use crate::frame::clip::cut_off;
 use crate::frame::geometry::Geometry;
 use crate::frame::image::Image;
+use crate::lattice::fit::hidden::{Hidden, first_shell};
 use crate::lattice::fit::noise::ForeignWave;
 use crate::lattice::measured::MeasuredLattice;
 use crate::lattice::start::{HANN, Start};
@@ -21,6 +23,8 @@ use crate::spectrum::prepare::levelled;
 /// Waves shorter than this share of the shortest lattice vector are atoms, and those longer by as much are background: both
 /// may be stronger than the lattice.
 const ATOMS: f64 = 0.25;
+/// A lattice is the second shell of another if noise alone has as much power where the first would be less often than this.
+pub(crate) const SECOND_SHELL: f64 = 1e-6;
 
 /// Finds and measures the lattice of an image.
 ///
@@ -50,6 +54,11 @@ pub(crate) fn measure_own(
 ) -> Result<MeasuredLattice, LatticeError> {
     let image = &Arc::new(levelled(image, background)?);
     let found = find_anywhere(image, geometry, background, method)?.measure(method)?;
+    if hidden(&found).chance() < SECOND_SHELL
+        && let Some(first) = of_first_shell(&found, image, geometry, background, method)
+    {
+        return Ok(first);
+    }
     let Some(wave) = beside(&found) else {
         return Ok(found);
     };
@@ -75,6 +84,43 @@ pub(crate) fn measure_own(
             period: period(&wave, geometry),
         }),
     }
+}
+
+/// What a lattice that was measured leaves where the first shell would be, if it is the second shell of another.
+pub(crate) fn hidden(found: &MeasuredLattice) -> Hidden {
+    let fit = found.fit.as_ref();
+    fit.map_or_else(Hidden::default, |fit| fit.hidden)
+}
+
+/// The lattice of which that which was found in an image is the second shell.
+///
+/// # Errors
+/// As [`measure`]; [`LatticeError::NoPeaks`] where it cannot be measured.
+pub(crate) fn measure_first_shell(
+    image: Image,
+    geometry: &Geometry,
+    background: Background,
+    method: Method,
+    found: &MeasuredLattice,
+) -> Result<MeasuredLattice, LatticeError> {
+    let image = Arc::new(levelled(image, background)?);
+    of_first_shell(found, &image, geometry, background, method)
+        .ok_or(LatticeError::NoPeaks { method })
+}
+
+fn of_first_shell(
+    found: &MeasuredLattice,
+    image: &Image,
+    geometry: &Geometry,
+    background: Background,
+    method: Method,
+) -> Option<MeasuredLattice> {
+    let pair = first_shell(&found.reciprocal);
+    let to_physical = geometry.pixel_to_nm.try_inverse()?.transpose();
+    let pair = pair * shortest_pair(&(to_physical * pair))?;
+    Start::at(image, geometry, background, &pair)?
+        .measure(method)
+        .ok()
 }
 
 /// Whether every part of the frame shows the waves of a lattice, each far above the noise.

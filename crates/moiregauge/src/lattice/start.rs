@@ -19,12 +19,14 @@ use crate::lattice::fit::fitted::LatticeFit;
 use crate::lattice::fit::measure as fit;
 use crate::lattice::measured::{Grain, MeasuredLattice};
 use crate::lattice::{autocorrelation, fourier, paper};
+use crate::numbers::three::three;
 use crate::spectrum::error::{LatticeError, THIRD};
-use crate::spectrum::harmonics::Harmonics;
+use crate::spectrum::harmonics::{Harmonics, Windowed};
 use crate::spectrum::look::bins_for;
 use crate::spectrum::method::Method;
 use crate::spectrum::phases::Phases;
 use crate::spectrum::prepare::{Prepared, binned, middle, phases, prepare, prepare_levelled};
+use crate::spectrum::shells::shells;
 use crate::spectrum::transform::Spectrum;
 use crate::spectrum::verdict::{Verdict, refine, signal_to_noise, verdict};
 use crate::spectrum::{known, rescue, select};
@@ -121,9 +123,35 @@ impl Start {
         background: Background,
         pair: &Matrix2<f64>,
     ) -> Option<Self> {
+        Self::around(image, geometry, background, pair, |binned, pair| {
+            refine(binned, pair, background)
+        })
+    }
+
+    /// Starts from a reciprocal pair (rad per pixel) that is known better than its first waves can show.
+    pub(crate) fn at(
+        image: &Image,
+        geometry: &Geometry,
+        background: Background,
+        pair: &Matrix2<f64>,
+    ) -> Option<Self> {
+        Self::around(image, geometry, background, pair, |binned, pair| {
+            let harmonics = Windowed::new(binned).fit(binned, pair, background, shells(3))?;
+            Some((harmonics, three(pair)))
+        })
+    }
+
+    /// `seen`: the harmonics in an image of bins, and the three first wave vectors, from a pair.
+    fn around(
+        image: &Image,
+        geometry: &Geometry,
+        background: Background,
+        pair: &Matrix2<f64>,
+        seen: impl Fn(&Image, &Matrix2<f64>) -> Option<(Harmonics, [Vector2<f64>; 3])>,
+    ) -> Option<Self> {
         let flat = remove_background(image, background);
         let (binning, binned) = binned(&flat, pair);
-        let (harmonics, peaks) = refine(&binned, &(pair * binning as f64), background)?;
+        let (harmonics, peaks) = seen(&binned, &(pair * binning as f64))?;
         drop(binned);
         let prepared = Prepared {
             start: reciprocal(&harmonics.pair)?,

@@ -11,7 +11,7 @@ use crate::frame::geometry::Geometry;
 use crate::frame::image::Image;
 use crate::frame::polygon;
 use crate::lattice::by_hand::{Meant, measure_by_hand};
-use crate::lattice::measure::measure_own;
+use crate::lattice::measure::{measure_first_shell, measure_own};
 use crate::lattice::measured::MeasuredLattice;
 use crate::lattice::several::together::measure_several;
 use crate::lattice::start::Start;
@@ -29,6 +29,7 @@ use crate::scan::place::Place;
 use crate::scan::positions::pitch_sigma;
 use crate::scan::scanner::about_calibration;
 use crate::scan::shared::correlation;
+use crate::scan::shells::of_first_shells;
 use crate::settings::by_hand::ByHand;
 use crate::settings::knobs::Settings;
 use crate::spectrum::error::LatticeError;
@@ -117,12 +118,31 @@ fn measure_with(
         .collect();
     let mut moires: Vec<Vec<MeasuredLine>> = Vec::new();
     let mut failures = Vec::new();
-    for channel in &channels {
+    let mut found = Vec::new();
+    let measure = |channel: &Channel, find: Find| {
         interrupt::check();
-        match measure_line(file, scan, channel, settings, window, find, &mut caveats) {
-            Ok(lines) => add_lines(&mut moires, lines),
+        let mut caveats = Vec::new();
+        let lines = measure_line(file, scan, channel, settings, window, find, &mut caveats);
+        lines.map(|lines| (lines, caveats))
+    };
+    for channel in &channels {
+        match measure(channel, find) {
+            Ok(lines) => found.push((*channel, lines)),
             Err(error) => failures.push(error),
         }
+    }
+    if settings.moires < 2 && settings.by_hand.is_nothing() {
+        let (background, method) = (settings.background, settings.method);
+        of_first_shells(&mut found, &|channel, second| {
+            measure(channel, &|image, geometry| {
+                let first = measure_first_shell(image, geometry, background, method, second)?;
+                Ok(vec![first])
+            })
+        });
+    }
+    for (_, (lines, told)) in found {
+        caveats.extend(told);
+        add_lines(&mut moires, lines);
     }
     if moires.is_empty() {
         return Err(failures.swap_remove(0));

@@ -11,7 +11,7 @@ use crate::campaign::set::faint::too_faint;
 use crate::campaign::set::mean::{at_drift, forward_backward, without_drift};
 use crate::campaign::set::moire::draw;
 use crate::campaign::set::scan::scan_at_drift;
-use crate::campaign::set::shells::of_other_shell;
+use crate::campaign::set::shells::{of_other_shell, of_second_shell};
 use crate::campaign::set::{joint, published};
 use crate::caveat::Caveat;
 use crate::caveat::sets::SetDoubt;
@@ -97,7 +97,8 @@ pub(crate) fn analyse_set(
 
 /// Why the lattice of a set may be another one, so that the set has no result.
 fn no_result(group: &Group, used: &[&MeasuredScan]) -> Option<SetDoubt> {
-    let hidden = of_other_shell(group).map(|times| SetDoubt::ShellForLattice { times });
+    let hidden = of_other_shell(group).or_else(|| of_second_shell(used));
+    let hidden = hidden.map(|times| SetDoubt::ShellForLattice { times });
     let scans = used.len();
     let faint = || {
         too_faint(used).map(|signal_to_noise| SetDoubt::LatticeDoubtful {

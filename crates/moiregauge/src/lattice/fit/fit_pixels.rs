@@ -382,6 +382,7 @@ impl<'a> Fit<'a> {
             lines_left_out: self.frame.image.rows - self.frame.lines(),
             clipped,
             foreign_wave,
+            hidden: noise.residual.hidden(&self.model),
             residual: [0, 1, 2].map(|i| {
                 let index = self.model.basis.indices[i];
                 let offsets = self.free_lines || self.line_sigma.is_some();

@@ -33,6 +33,7 @@ pub(crate) mod fitted;
 pub(crate) mod folded;
 pub(crate) mod frame;
 pub(crate) mod gram;
+pub(crate) mod hidden;
 pub(crate) mod left;
 pub(crate) mod lines;
 pub(crate) mod local;

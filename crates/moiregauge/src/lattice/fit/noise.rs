@@ -13,6 +13,7 @@ use nalgebra::{DMatrix, DVector, Vector2};
 use serde::{Deserialize, Serialize};
 
 use crate::lattice::fit::frame::{Basis, Frame, wave};
+use crate::lattice::fit::hidden::Hidden;
 use crate::lattice::fit::left::LeftOver;
 use crate::lattice::fit::local::{Bin, acting_on};
 use crate::lattice::fit::model::Model;
@@ -35,6 +36,8 @@ const SHARE: usize = 6;
 const NEAR: i64 = 8;
 /// Bins nearer to zero frequency belong to the background: a plane fills the first.
 const BACKGROUND: i64 = 2;
+/// Waves with fewer cycles per frame are background.
+const SLOW: f64 = 2.5;
 /// The first column that the window keeps free of what whole lines do.
 const BESIDE: i64 = 2;
 /// A wave reaches no farther through the window (bins): beyond, 10⁻⁴ of its power is left.
@@ -230,6 +233,33 @@ impl ResidualNoise {
         let row = noise.row(k.y.rem_euclid(rows) as usize);
         let block = k.x as usize / BLOCK_WIDTH;
         row.get(block).copied().unwrap_or(1.0)
+    }
+
+    /// Power where the first shell would be, if the lattice is the second shell of another.
+    pub(crate) fn hidden(&self, model: &Model) -> Hidden {
+        let cycles = model.pair / PI;
+        Hidden::new(|index| {
+            let k = cycles * index;
+            let centre = k.map(|c| c.round() as i64);
+            let slow = k.norm() < SLOW || (self.free_lines && centre.x.abs() < BESIDE);
+            (!slow).then(|| {
+                let [near, around] = self.near_and_around(centre);
+                let noise = around.max(self.noise_near(k) / self.window_power);
+                near / noise
+            })
+        })
+    }
+
+    /// Power at a bin (cycles per frame), and that of the noise around it.
+    fn near_and_around(&self, centre: Vector2<i64>) -> [f64; 2] {
+        let mut around = Vec::new();
+        for (dx, dy) in (-ALONG..=ALONG).flat_map(|x| (-ALONG..=ALONG).map(move |y| (x, y))) {
+            if dx.abs().max(dy.abs()) > 1 {
+                around.push(self.power(centre.x + dx, centre.y + dy));
+            }
+        }
+        let noise = median(&mut around) / std::f64::consts::LN_2;
+        [self.power(centre.x, centre.y), noise]
     }
 
     /// The strongest wave away from the lattice, from slow waves and from the line ridge.

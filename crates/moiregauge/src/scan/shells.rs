@@ -1,0 +1,61 @@
+//! Lattices of which one holds the other: where noise hides the first waves, a harmonic shell is a lattice, too.
+
+use spmfile::Channel;
+
+use crate::caveat::Caveat;
+use crate::lattice::fit::hidden::Hidden;
+use crate::lattice::measure::{SECOND_SHELL, hidden};
+use crate::lattice::measured::MeasuredLattice;
+use crate::scan::measured::{MeasureError, MeasuredLine};
+
+/// A harmonic shell has so many cells for each of the lattice: 3 (the second shell), 4 (the third), 2 (every other row).
+const CELLS: std::ops::RangeInclusive<i32> = 2..=4;
+/// Lattices of trace and retrace agree to this share of a vector: creep and lag are smaller. Chosen by eye.
+const AGREE: f64 = 0.1;
+
+/// How many times the cell of one image is that of the other, if one lattice holds the other.
+pub(crate) fn of_each_other(one: &MeasuredLine, other: &MeasuredLine) -> Option<i32> {
+    times(one, other).or_else(|| times(other, one))
+}
+
+/// The cells of `small` in one of `large`, if all of its points are points of `small`.
+fn times(large: &MeasuredLine, small: &MeasuredLine) -> Option<i32> {
+    let vectors = |line: &MeasuredLine| line.geometry.pixel_to_nm * line.lattice.pixels.basis;
+    let names = vectors(small).try_inverse()? * vectors(large);
+    let whole = names.map(f64::round);
+    let cells = whole.determinant().abs().round() as i32;
+    ((names - whole).amax() < AGREE && CELLS.contains(&cells)).then_some(cells)
+}
+
+/// The lines of one direction and what there is to say of them.
+pub(crate) type Told = (Vec<MeasuredLine>, Vec<Caveat>);
+
+/// Measures lines again that show but the second shell of their lattice: since the other direction shows the first, or since both
+/// directions together do.
+///
+/// `again` measures the lattice of which that which was found is the second shell.
+pub(crate) fn of_first_shells(
+    found: &mut [(&Channel, Told)],
+    again: &dyn Fn(&Channel, &MeasuredLattice) -> Result<Told, MeasureError>,
+) {
+    let [(_, (one, _)), (_, (other, _))] = &*found else {
+        return;
+    };
+    let ([one], [other]) = (one.as_slice(), other.as_slice()) else {
+        return;
+    };
+    let cell = |line: &MeasuredLine| line.in_sensor_coordinates().basis.determinant().abs();
+    let second = match of_each_other(one, other) {
+        Some(3) => [cell(one) < cell(other), cell(other) < cell(one)],
+        Some(_) => return,
+        None => {
+            let both = Hidden::of_all([one, other].map(|line| hidden(&line.lattice)).into_iter());
+            [both.chance() < SECOND_SHELL; 2]
+        }
+    };
+    for ((channel, told), _) in found.iter_mut().zip(second).filter(|(_, second)| *second) {
+        if let Ok(first) = again(channel, &told.0[0].lattice) {
+            *told = first;
+        }
+    }
+}
