@@ -106,8 +106,7 @@ fn measure_with(
     window: Option<&Window>,
     find: Find,
 ) -> Result<Vec<MeasuredScan>, MeasureError> {
-    let problem = settings.scanner.as_ref().and_then(Calibration::problem);
-    if let Some(problem) = problem {
+    if let Some(problem) = settings.scanner.as_ref().and_then(Calibration::problem) {
         return Err(MeasureError::Calibration(problem));
     }
     let channels = channels(scan, settings)?;
@@ -158,36 +157,45 @@ fn measure_with(
     about_calibration(file, scan, moires.iter().flatten(), settings, &mut caveats);
     caveats.dedup_by(|a, b| a.says_the_same(b));
     once(&mut caveats);
-    let measured = moires.into_iter().map(|lines| {
-        let mut grains = grains(lines);
-        for lines in &mut grains {
-            share_noise(lines);
-        }
-        let lines = grains.remove(0);
-        let mut caveats = caveats.clone();
-        let excluded = lines_disagree(file, &lines, &mut caveats);
-        let largest = MeasuredScan {
-            file: file.to_owned(),
-            acquired: scan.acquired,
-            frame_direction: scan.frame_direction,
-            line_rate_hz: scan.line_rate_hz,
-            channel: channels[0].name.clone(),
-            size_nm: scan.size_nm,
-            set: None,
-            digest: None,
-            lines: lines.into(),
-            excluded,
-            repeats: None,
-            caveats,
-            grains: Vec::new(),
-        };
-        let others = grains.into_iter().map(|lines| beside(&largest, lines));
-        MeasuredScan {
-            grains: others.collect(),
-            ..largest
-        }
-    });
-    Ok(measured.collect())
+    let channel = &channels[0].name;
+    let of_moire = |lines| joined(file, scan, channel, lines, caveats.clone());
+    Ok(moires.into_iter().map(of_moire).collect())
+}
+
+/// One moiré of a scan, from the lines that show it, with the grains beside the largest.
+fn joined(
+    file: &str,
+    scan: &Scan,
+    channel: &str,
+    lines: Vec<MeasuredLine>,
+    mut caveats: Vec<Caveat>,
+) -> MeasuredScan {
+    let mut grains = grains(lines);
+    for lines in &mut grains {
+        share_noise(lines);
+    }
+    let lines = grains.remove(0);
+    let excluded = lines_disagree(file, &lines, &mut caveats);
+    let largest = MeasuredScan {
+        file: file.to_owned(),
+        acquired: scan.acquired,
+        frame_direction: scan.frame_direction,
+        line_rate_hz: scan.line_rate_hz,
+        channel: channel.to_owned(),
+        size_nm: scan.size_nm,
+        set: None,
+        digest: None,
+        lines: lines.into(),
+        excluded,
+        repeats: None,
+        caveats,
+        grains: Vec::new(),
+    };
+    let others = grains.into_iter().map(|lines| beside(&largest, lines));
+    MeasuredScan {
+        grains: others.collect(),
+        ..largest
+    }
 }
 
 /// Trace and retrace say the same of the grains beside the largest: once is enough.

@@ -13,6 +13,10 @@ const CELLS: std::ops::RangeInclusive<i32> = 2..=4;
 /// Lattices of trace and retrace agree to this share of a vector: creep and lag are smaller. Chosen by eye.
 const AGREE: f64 = 0.1;
 
+/// One line direction shows the first shell, the other the second: noise alone has as much power in the latter, where the first
+/// shell is, less often than this.
+const CONFIRMED: f64 = 0.01;
+
 /// How many times the cell of one image is that of the other, if one lattice holds the other.
 pub(crate) fn of_each_other(one: &MeasuredLine, other: &MeasuredLine) -> Option<i32> {
     times(one, other).or_else(|| times(other, one))
@@ -44,14 +48,13 @@ pub(crate) fn of_first_shells(
     let ([one], [other]) = (one.as_slice(), other.as_slice()) else {
         return;
     };
-    let cell = |line: &MeasuredLine| line.in_sensor_coordinates().basis.determinant().abs();
-    let second = match of_each_other(one, other) {
-        Some(3) => [cell(one) < cell(other), cell(other) < cell(one)],
-        Some(_) => return,
-        None => {
-            let both = Hidden::of_all([one, other].map(|line| hidden(&line.lattice)).into_iter());
-            [both.chance() < SECOND_SHELL; 2]
-        }
+    let shells = [one, other].map(|line| hidden(&line.lattice));
+    let confirms = |i: usize| shells[i].chance() < CONFIRMED;
+    let second = match (times(one, other), times(other, one)) {
+        (Some(3), _) => [false, confirms(1)],
+        (_, Some(3)) => [confirms(0), false],
+        (None, None) => [Hidden::of_all(shells.into_iter()).chance() < SECOND_SHELL; 2],
+        _ => return,
     };
     for ((channel, told), _) in found.iter_mut().zip(second).filter(|(_, second)| *second) {
         if let Ok(first) = again(channel, &told.0[0].lattice) {

@@ -5,11 +5,16 @@
 //! the power of each over that of the noise is exponentially distributed; the images of a set say it together. The strongest of the
 //! three does not count: it may be that of stripes.
 
+use std::f64::consts::PI;
+
 use nalgebra::{Matrix2, Vector2};
 use serde::{Deserialize, Serialize};
 
+use crate::lattice::fit::model::Model;
+use crate::lattice::fit::noise::{ALONG, BESIDE, ResidualNoise};
 use crate::numbers::chi2;
 use crate::numbers::exact;
+use crate::numbers::median::median;
 
 /// The waves of the first shell in thirds of the pair of the second.
 pub(crate) const FIRST: [[f64; 2]; 3] = [[1.0, 1.0], [-1.0, 2.0], [-2.0, 1.0]];
@@ -17,6 +22,9 @@ pub(crate) const FIRST: [[f64; 2]; 3] = [[1.0, 1.0], [-1.0, 2.0], [-2.0, 1.0]];
 /// By which the noise around the waves may be underestimated, as a power: some seventy bins tell it to an eighth, and slow noise is
 /// steep.
 const NOISE_KNOWN_TO: f64 = 1.3;
+
+/// Waves with fewer cycles per frame are background.
+const SLOW: f64 = 2.5;
 
 /// Power where the first shell would be, if a lattice is the second shell of another.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -52,6 +60,35 @@ impl Hidden {
     /// The probability that noise alone has so much power there, at most.
     pub(crate) fn chance(&self) -> f64 {
         chi2::tail(2.0 * self.power / NOISE_KNOWN_TO, 2 * self.waves as usize)
+    }
+}
+
+impl ResidualNoise {
+    /// Power where the first shell would be, if the lattice is the second shell of another.
+    pub(crate) fn hidden(&self, model: &Model) -> Hidden {
+        let cycles = model.pair / PI;
+        Hidden::new(|index| {
+            let k = cycles * index;
+            let centre = k.map(|c| c.round() as i64);
+            let slow = k.norm() < SLOW || (self.free_lines && centre.x.abs() < BESIDE);
+            (!slow).then(|| {
+                let [near, around] = self.near_and_around(centre);
+                let noise = around.max(self.level_near(k));
+                near / noise
+            })
+        })
+    }
+
+    /// Power at a bin (cycles per frame), and that of the noise around it.
+    fn near_and_around(&self, centre: Vector2<i64>) -> [f64; 2] {
+        let mut around = Vec::new();
+        for (dx, dy) in (-ALONG..=ALONG).flat_map(|x| (-ALONG..=ALONG).map(move |y| (x, y))) {
+            if dx.abs().max(dy.abs()) > 1 {
+                around.push(self.power(centre.x + dx, centre.y + dy));
+            }
+        }
+        let noise = median(&mut around) / std::f64::consts::LN_2;
+        [self.power(centre.x, centre.y), noise]
     }
 }
 

@@ -13,7 +13,6 @@ use nalgebra::{DMatrix, DVector, Vector2};
 use serde::{Deserialize, Serialize};
 
 use crate::lattice::fit::frame::{Basis, Frame, wave};
-use crate::lattice::fit::hidden::Hidden;
 use crate::lattice::fit::left::LeftOver;
 use crate::lattice::fit::local::{Bin, acting_on};
 use crate::lattice::fit::model::Model;
@@ -27,7 +26,7 @@ use crate::spectrum::transform::{Spectrum, hann};
 const PROMISING: f64 = 4.0;
 /// Bins (cycles per frame) on either side of a harmonic that count, along the lines: few, since noise in time is a
 /// function of kx, ...
-const ALONG: i64 = 4;
+pub(super) const ALONG: i64 = 4;
 /// ... and across, where it is the same: 300 bins, four of which count as one, tell it to about a tenth.
 const ACROSS: i64 = 16;
 /// On small frames at most one in this many of all lines' frequencies counts on either side.
@@ -36,10 +35,8 @@ const SHARE: usize = 6;
 const NEAR: i64 = 8;
 /// Bins nearer to zero frequency belong to the background: a plane fills the first.
 const BACKGROUND: i64 = 2;
-/// Waves with fewer cycles per frame are background.
-const SLOW: f64 = 2.5;
 /// The first column that the window keeps free of what whole lines do.
-const BESIDE: i64 = 2;
+pub(super) const BESIDE: i64 = 2;
 /// A wave reaches no farther through the window (bins): beyond, 10⁻⁴ of its power is left.
 const SPREAD: f64 = 4.0;
 /// Farther than this from a point of the lattice (cycles per frame) a wave is none of its: nearer, it may be that of
@@ -57,7 +54,7 @@ pub(crate) struct ResidualNoise {
     spectrum: Spectrum<f32>,
     /// `Σ w²` over the pixels that count.
     window_power: f64,
-    free_lines: bool,
+    pub(super) free_lines: bool,
 }
 
 /// The strongest wave in the residual that is none of the lattice's.
@@ -184,7 +181,7 @@ impl ResidualNoise {
     }
 
     /// Power per pixel at (x, y) cycles per frame.
-    fn power(&self, x: i64, y: i64) -> f64 {
+    pub(super) fn power(&self, x: i64, y: i64) -> f64 {
         self.spectrum.at(x, y).norm_sqr() / self.window_power
     }
 
@@ -235,31 +232,9 @@ impl ResidualNoise {
         row.get(block).copied().unwrap_or(1.0)
     }
 
-    /// Power where the first shell would be, if the lattice is the second shell of another.
-    pub(crate) fn hidden(&self, model: &Model) -> Hidden {
-        let cycles = model.pair / PI;
-        Hidden::new(|index| {
-            let k = cycles * index;
-            let centre = k.map(|c| c.round() as i64);
-            let slow = k.norm() < SLOW || (self.free_lines && centre.x.abs() < BESIDE);
-            (!slow).then(|| {
-                let [near, around] = self.near_and_around(centre);
-                let noise = around.max(self.noise_near(k) / self.window_power);
-                near / noise
-            })
-        })
-    }
-
-    /// Power at a bin (cycles per frame), and that of the noise around it.
-    fn near_and_around(&self, centre: Vector2<i64>) -> [f64; 2] {
-        let mut around = Vec::new();
-        for (dx, dy) in (-ALONG..=ALONG).flat_map(|x| (-ALONG..=ALONG).map(move |y| (x, y))) {
-            if dx.abs().max(dy.abs()) > 1 {
-                around.push(self.power(centre.x + dx, centre.y + dy));
-            }
-        }
-        let noise = median(&mut around) / std::f64::consts::LN_2;
-        [self.power(centre.x, centre.y), noise]
+    /// The same per pixel.
+    pub(super) fn level_near(&self, k: Vector2<f64>) -> f64 {
+        self.noise_near(k) / self.window_power
     }
 
     /// The strongest wave away from the lattice, from slow waves and from the line ridge.

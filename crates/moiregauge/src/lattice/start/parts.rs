@@ -1,0 +1,108 @@
+//! The lattices of parts of a frame, and which of them has the most evidence.
+
+use std::sync::Arc;
+
+use nalgebra::Matrix2;
+
+use crate::coverage::find::{WHOLE, patches};
+use crate::coverage::patch::Patch;
+use crate::coverage::settle::Settled;
+use crate::frame::background::{Background, remove_background};
+use crate::frame::clip::cut_off;
+use crate::frame::geometry::Geometry;
+use crate::frame::image::Image;
+use crate::lattice::start::{FEWEST_CELLS, HANN, Start, evidence};
+use crate::spectrum::verdict::{Verdict, verdict};
+
+impl Start {
+    /// Looks for the lattices of parts of the frame, that near `first` among them, and takes the one with the most
+    /// evidence.
+    pub(crate) fn find_patch(
+        image: &Image,
+        geometry: &Geometry,
+        background: Background,
+        first: Option<Matrix2<f64>>,
+    ) -> Option<Self> {
+        Self::find_meant(image, geometry, background, first, &|_| true)
+    }
+
+    /// The same among those lattices that are meant. Where much of the frame is missing the lattice is one of a part.
+    pub(crate) fn find_meant(
+        image: &Image,
+        geometry: &Geometry,
+        background: Background,
+        first: Option<Matrix2<f64>>,
+        is_meant: &dyn Fn(&Matrix2<f64>) -> bool,
+    ) -> Option<Self> {
+        let flat = cut_off(&remove_background(image, background));
+        let there = image.values.iter().filter(|v| v.is_finite()).count();
+        let recorded = there as f64 / image.values.len() as f64;
+        let mut best: Option<(f64, Settled, Self)> = None;
+        let mut in_parts: Option<(f64, Self)> = None;
+        for mut settled in patches(&flat, geometry, first, is_meant) {
+            settled.patch.share *= recorded;
+            let patch = &settled.patch;
+            // Outliers hide the waves; the fit to the pixels deals with them by itself.
+            let part = patch.of(&flat);
+            let near = Self::near(&part, geometry, background, &patch.pair);
+            let Some(start) = near else { continue };
+            if !start.stands_out() && settled.is_plain() && settled.is_straight() {
+                let all = Self::in_parts(image, &part, geometry, background, patch, is_meant);
+                let most = in_parts.as_ref().map_or(0.0, |(most, _)| *most);
+                in_parts = all.filter(|(evidence, _)| *evidence > most).or(in_parts);
+                continue;
+            }
+            let coherent = match verdict(&start.prepared.harmonics) {
+                // A part of the frame is chosen by its waves: they have to be plain to see in it.
+                Verdict::Lattice if patch.share > WHOLE || settled.is_plain() => {
+                    evidence(&start.prepared.harmonics)
+                }
+                _ => 0.0,
+            };
+            let plain = settled.is_plain() && patch.unit_cells > FEWEST_CELLS;
+            let local = if plain {
+                HANN * settled.evidence()
+            } else {
+                0.0
+            };
+            let evidence = f64::max(coherent, local);
+            if evidence > best.as_ref().map_or(0.0, |(most, _, _)| *most) {
+                best = Some((evidence, settled, start));
+            }
+        }
+        if let Some((evidence, start)) = in_parts
+            && best.as_ref().is_none_or(|(most, _, _)| evidence > *most)
+        {
+            return Some(start);
+        }
+        let (_, settled, mut start) = best?;
+        let flat = remove_background(&settled.patch.of(image), background);
+        start.prepared.image = Arc::new(flat);
+        start.on_patch(image, settled)
+    }
+
+    /// The lattice of a patch of several parts, with its evidence, where waves that look straight under windows are not those of all
+    /// parts together: from part to part windows leave whole turns open. The pixels of all parts tell which.
+    fn in_parts(
+        image: &Image,
+        part: &Image,
+        geometry: &Geometry,
+        background: Background,
+        patch: &Patch,
+        is_meant: &dyn Fn(&Matrix2<f64>) -> bool,
+    ) -> Option<(f64, Self)> {
+        let near = Self::proposals(part, geometry, background)
+            .into_iter()
+            .filter_map(|pair| Self::near(part, geometry, background, &pair));
+        let (evidence, mut start) = near
+            .filter(|start| start.stands_out() && is_meant(&start.pair()))
+            .map(|start| (evidence(&start.prepared.harmonics), start))
+            .max_by(|(a, _), (b, _)| a.total_cmp(b))?;
+        start.prepared.image = Arc::new(remove_background(&patch.of(image), background));
+        start.patch = Some(Patch {
+            pair: start.pair(),
+            ..patch.clone()
+        });
+        Some((evidence, start))
+    }
+}
