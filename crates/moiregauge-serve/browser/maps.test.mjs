@@ -13,14 +13,24 @@ beforeEach(async () => {
 afterEach(() => server.stop());
 after(closeBrowser);
 
-test("a map is made, read with the keyboard, and asked about a region", async () => {
-  const page = await open(server.url);
+/** Shows a scan, and the view of its maps. @param {import("playwright-core").Page} page */
+async function viewMaps(page) {
   await openFolder(page, "wide");
   await page.getByRole("button", { name: /^scan\.000\.spm/ }).click();
   await page.waitForSelector("html[data-picture]");
   await view(page, "Maps");
+}
+
+/** Makes the map of a scan. @param {import("playwright-core").Page} page */
+async function makeMap(page) {
+  await viewMaps(page);
   await page.getByRole("button", { name: "Make the map" }).click();
   await page.waitForSelector("html[data-map]", { timeout: 60000 });
+}
+
+test("a map is made, read with the keyboard, and asked about a region", async () => {
+  const page = await open(server.url);
+  await makeMap(page);
   const cursor = page.getByRole("button", { name: /^Cursor/ });
   await cursor.focus();
   await page.keyboard.press("ArrowRight");
@@ -52,12 +62,7 @@ test("a map is made, read with the keyboard, and asked about a region", async ()
 
 test("a profile is drawn with the mouse, areas for a device are found and drawn, the histogram is that of the map", async () => {
   const page = await open(server.url);
-  await openFolder(page, "wide");
-  await page.getByRole("button", { name: /^scan\.000\.spm/ }).click();
-  await page.waitForSelector("html[data-picture]");
-  await view(page, "Maps");
-  await page.getByRole("button", { name: "Make the map" }).click();
-  await page.waitForSelector("html[data-map]", { timeout: 60000 });
+  await makeMap(page);
   const box = await page.locator("#view-maps canvas").first().boundingBox();
   assert.ok(box);
   await page.getByRole("button", { name: "Profile", exact: true }).click();
@@ -95,10 +100,7 @@ test("a profile is drawn with the mouse, areas for a device are found and drawn,
 
 test("a map that is done while the page asks for it is shown, once", async () => {
   const page = await open(server.url);
-  await openFolder(page, "wide");
-  await page.getByRole("button", { name: /^scan\.000\.spm/ }).click();
-  await page.waitForSelector("html[data-picture]");
-  await view(page, "Maps");
+  await viewMaps(page);
   // The first answer, "running", comes after the map is done and after the program has said so.
   let [states, documents] = [0, 0];
   await page.route(/\/api\/maps\/[^/]+$/, async (route) => {
@@ -122,12 +124,7 @@ test("a map that is done while the page asks for it is shown, once", async () =>
 
 test("a device dragged on the map fills its size and is asked for at once", async () => {
   const page = await open(server.url);
-  await openFolder(page, "wide");
-  await page.getByRole("button", { name: /^scan\.000\.spm/ }).click();
-  await page.waitForSelector("html[data-picture]");
-  await view(page, "Maps");
-  await page.getByRole("button", { name: "Make the map" }).click();
-  await page.waitForSelector("html[data-map]", { timeout: 60000 });
+  await makeMap(page);
   const box = await page.locator("#view-maps canvas").first().boundingBox();
   assert.ok(box);
   const [x, y] = [box.x + box.width * 0.35, box.y + box.height * 0.4];

@@ -66,7 +66,7 @@ pub fn measure_known(
         let start = Start::find_known(&image, geometry, settings.background, cell)?;
         Ok(vec![start.measure(settings.method)?])
     };
-    Ok(measure_with(file, scan, settings, None, &find)?.swap_remove(0))
+    Ok(measure_with(file, scan, settings, None, &find, false)?.swap_remove(0))
 }
 
 /// Measures every moiré of one scan, as many as `settings` say, the largest cell first; otherwise as
@@ -93,18 +93,21 @@ pub fn measure_moires(
         0 | 1 => measure_own(image, geometry, background, method).map(|lattice| vec![lattice]),
         n => measure_several(&image, geometry, background, n),
     };
-    measure_with(file, scan, settings, window, &find)
+    let searched = settings.moires < 2 && told.is_nothing();
+    measure_with(file, scan, settings, window, &find, searched)
 }
 
 /// How the lattices of an image are found and measured; at least one.
 type Find<'a> = &'a dyn Fn(Image, &Geometry) -> Result<Vec<MeasuredLattice>, LatticeError>;
 
+/// `searched`: which lattice it is was not told, so that it may be the second shell of another.
 fn measure_with(
     file: &str,
     scan: &Scan,
     settings: &Settings,
     window: Option<&Window>,
     find: Find,
+    searched: bool,
 ) -> Result<Vec<MeasuredScan>, MeasureError> {
     if let Some(problem) = settings.scanner.as_ref().and_then(Calibration::problem) {
         return Err(MeasureError::Calibration(problem));
@@ -130,7 +133,7 @@ fn measure_with(
             Err(error) => failures.push(error),
         }
     }
-    if settings.moires < 2 && settings.by_hand.is_nothing() {
+    if searched {
         let (background, method) = (settings.background, settings.method);
         of_first_shells(&mut found, &|channel, second| {
             measure(channel, &|image, geometry| {
