@@ -218,9 +218,9 @@ impl Work {
     }
 }
 
-/// Without figures, on so many threads.
+/// Without figures, on so many threads, into a folder of the command's name.
 fn plain<'a>(command: &'a str, input: &'a str, threads: &'a str) -> Vec<&'a str> {
-    let mut all = vec![command, input, "--out", "out", "--force", "--quiet"];
+    let mut all = vec![command, input, "--out", command, "--force", "--quiet"];
     all.extend(["--no-report", "--no-png", "--threads", threads]);
     all
 }
@@ -243,7 +243,7 @@ fn ten_scans(work: &Work) -> Vec<Row> {
             "analyze",
             "one",
             "--out",
-            "out",
+            "analyze",
             "--force",
             "--quiet",
             "--threads",
