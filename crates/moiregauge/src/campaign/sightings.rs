@@ -34,14 +34,18 @@ pub(crate) fn sightings(
             let sensor = line.sensor_part().waves()?;
             let j = line.geometry.pixel_to_nm;
             let dual = j.try_inverse()?.transpose();
-            let time = middle_of_frame(scan);
+            let time_gradient = line.geometry.time_gradient(&line.timing?)?;
+            let middle = line.geometry.size.map(|n| 0.5 * (n as f64 - 1.0));
+            let off = j * (line.lattice.middle - Vector2::from(middle));
+            // What was used of the frame may lie early or late in it.
+            let time = middle_of_frame(scan).map(|time| time + time_gradient.dot(&off));
             all.push(Sighting {
                 scan: index,
                 class,
                 block: 0,
                 waves: labelled_like(&waves, &reference),
                 sensor: labelled_like(&sensor, &reference).covariance,
-                time_gradient: line.geometry.time_gradient(&line.timing?)?,
+                time_gradient,
                 fast_gain: dual * Matrix2::new(1.0, 0.0, 0.0, 0.0) * j.transpose(),
                 time: time.unwrap_or(0.0),
                 position: line.geometry.origin + j * line.lattice.middle,

@@ -13,7 +13,7 @@ use crate::coverage::cells::Cells;
 use crate::coverage::grains::{Grains, split};
 use crate::coverage::look::{Frame, Seen};
 use crate::coverage::nodes::View;
-use crate::coverage::patch::Patch;
+use crate::coverage::patch::{Patch, unit_cells_per_pixel};
 use crate::coverage::sides::without_tails;
 use crate::frame::image::Image;
 use crate::numbers::three::three;
@@ -272,10 +272,6 @@ fn extent(cells: &Cells, inside: &[bool]) -> [usize; 2] {
 fn area(cells: &Cells, inside: &[bool], pair: &Matrix2<f64>) -> f64 {
     let pixels = inside.iter().zip(cells.counts()).filter(|(i, _)| **i);
     pixels.map(|(_, n)| n).sum::<f64>() * unit_cells_per_pixel(pair)
-}
-
-fn unit_cells_per_pixel(pair: &Matrix2<f64>) -> f64 {
-    pair.determinant().abs() / std::f64::consts::TAU.powi(2)
 }
 
 /// The patch without small gaps and small parts. A gap that is two cells wide, half a period, is a line that went wrong.

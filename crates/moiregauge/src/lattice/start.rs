@@ -4,7 +4,7 @@ mod parts;
 
 use std::sync::Arc;
 
-use heterostrain::lattice::{Lattice, Px, labelled_like, reciprocal};
+use heterostrain::lattice::{Lattice, Px, Waves, labelled_like, reciprocal};
 use nalgebra::{Matrix2, Vector2};
 
 use crate::coverage::bend::Mean;
@@ -311,10 +311,13 @@ impl Start {
 
     /// The same without the grains beside it.
     fn measure_this(&self, method: Method) -> Result<MeasuredLattice, LatticeError> {
-        if let (Some(mean), Method::Lattice) = (&self.mean, method) {
-            return self
-                .mean_lattice(mean)
-                .ok_or(LatticeError::NoPeaks { method });
+        let mean = self.mean.as_ref().filter(|_| method == Method::Lattice);
+        let of_mean = |mean| {
+            let found = self.mean_lattice(mean);
+            found.ok_or(LatticeError::NoPeaks { method })
+        };
+        if let Some(mean) = mean.filter(|mean| mean.change.is_some()) {
+            return of_mean(mean);
         }
         let (prepared, size) = (&self.prepared, self.prepared.size());
         let refined = match method {
@@ -334,12 +337,21 @@ impl Start {
                 autocorrelation::measure(&prepared.binned(), self.background, harmonics, start);
             found.map(in_pixels)
         };
-        let (mut fit, mut published) = (None, None);
+        let (mut fit, mut rest, mut published) = (None, None, None);
         let (pixels, comparison) = match method {
             Method::Autocorrelation => (autocorrelation(), fourier()),
             Method::Fourier => (fourier(), autocorrelation()),
             Method::Lattice => {
-                fit = fitted(&self.prepared, self.background);
+                let found = fitted(&self.prepared, self.background);
+                if let Some(mean) = mean
+                    && !found
+                        .as_ref()
+                        .is_some_and(|found| is_better(&found.fit, mean))
+                {
+                    return of_mean(mean);
+                }
+                rest = found.as_ref().and_then(|found| found.rest.clone());
+                fit = found.map(|found| (found.lattice, found.fit));
                 let bent = fit.as_ref().and_then(|(_, fit)| self.bent(fit));
                 if let Some(bent) = bent {
                     return Ok(bent);
@@ -358,7 +370,10 @@ impl Start {
         let label = |l: Lattice<Px>| labelled_like(&l, &pixels.basis);
         let bin_to_nm = self.geometry.pixel_to_nm * pixels_per_bin;
         Ok(MeasuredLattice {
-            patch: self.patch.clone(),
+            patch: match &rest {
+                Some(rest) => self.part(rest, &pixels),
+                None => self.patch.clone(),
+            },
             grains: self.others.clone(),
             beside: Vec::new(),
             change: None,
@@ -371,7 +386,10 @@ impl Start {
             phases: fit
                 .as_ref()
                 .map_or_else(|| phases(harmonics, size), LatticeFit::first_phases),
-            middle: middle(size) * pixels_per_bin + Vector2::repeat((pixels_per_bin - 1.0) / 2.0),
+            middle: fit.as_ref().map_or_else(
+                || middle(size) * pixels_per_bin + Vector2::repeat((pixels_per_bin - 1.0) / 2.0),
+                |fit| fit.middle,
+            ),
             shortcut_wavelengths: fourier::shortcut_wavelengths(peaks, &bin_to_nm),
             periods: self.periods(&pixels),
             signal_to_noise: fit.as_ref().map_or_else(
@@ -384,7 +402,22 @@ impl Start {
     }
 }
 
+/// Whether a fit to the pixels says more than what windows show: the lattice is the same everywhere, and its errors are smaller.
+fn is_better(fit: &LatticeFit, mean: &Mean) -> bool {
+    let size = |waves: &Waves<Px>| waves.covariance.trace();
+    fit.change().is_none() && size(&fit.wave_vectors) < size(&mean.waves)
+}
+
 impl Start {
+    /// The part of the frame that shows the lattice, where of its bins only `rest` does; `None` for all of it but for a little.
+    fn part(&self, rest: &Image, lattice: &Lattice<Px>) -> Option<Patch> {
+        let Prepared { image, binning, .. } = &self.prepared;
+        let whole = || Patch::whole(image, &lattice.waves()?.basis, pitch(&self.geometry));
+        let patch = self.patch.clone().or_else(whole)?;
+        let part = patch.left_by(&self.prepared.binned(), rest, *binning);
+        (self.patch.is_some() || part.share < WHOLE).then_some(part)
+    }
+
     /// The mean of a lattice that changes.
     fn mean_lattice(&self, mean: &Mean) -> Option<MeasuredLattice> {
         let Prepared {
@@ -440,13 +473,14 @@ pub(crate) fn evidence(harmonics: &Harmonics) -> f64 {
     powers.filter(|power| *power > THIRD).sum()
 }
 
-/// The lattice fitted to the pixels, in pixels.
-pub(crate) fn fitted(
-    prepared: &Prepared,
-    background: Background,
-) -> Option<(Lattice<Px>, LatticeFit)> {
+/// The lattice fitted to the pixels, in pixels; what is left of the image in bins.
+pub(crate) fn fitted(prepared: &Prepared, background: Background) -> Option<fit::Found> {
     let binning = prepared.binning;
-    let (lattice, fit) = fit::measure(&prepared.binned(), &prepared.harmonics, background)?;
+    let found = fit::measure(&prepared.binned(), &prepared.harmonics, background)?;
     let to_pixels = Matrix2::identity() * binning as f64;
-    Some((lattice.mapped(&to_pixels), fit.in_pixels(binning)))
+    Some(fit::Found {
+        lattice: found.lattice.mapped(&to_pixels),
+        fit: found.fit.in_pixels(binning),
+        rest: found.rest,
+    })
 }

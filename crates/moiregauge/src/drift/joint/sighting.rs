@@ -8,7 +8,7 @@ use crate::spectrum::phases::Phases;
 /// What one line direction of one scan contributes.
 #[derive(Clone, Debug)]
 pub struct Sighting {
-    /// Which scan it belongs to; sightings of one scan share its time.
+    /// Which scan it belongs to; those of one scan are of about one time.
     pub scan: usize,
     /// Class of scans that share an offset: fast axis and line direction.
     pub class: usize,
@@ -22,9 +22,9 @@ pub struct Sighting {
     pub time_gradient: Vector2<f64>,
     /// What a relative gain of the fast axis does to a wave vector, `J^{−T} diag(1, 0) Jᵀ`.
     pub fast_gain: Matrix2<f64>,
-    /// Time of the middle of the frame, s from any origin.
+    /// Time of the middle of what was used of the frame, s from any origin.
     pub time: f64,
-    /// Position of the middle of the frame, nm.
+    /// Its position, nm.
     pub position: Vector2<f64>,
     /// Phases of K₁, K₂, K₂ − K₁ there, rad; `None` where they cannot be told.
     pub phases: Option<Phases>,

@@ -315,6 +315,19 @@ impl<'a> Fit<'a> {
         Some(covariance.fixed_view::<7, 7>(0, 0).into_owned())
     }
 
+    /// How the lattice changes across the frame.
+    fn inhomogeneity(&self, noise: &FinalNoise) -> Option<Inhomogeneity> {
+        let (bends, local) = (&noise.bends, &noise.local);
+        let found = bend::inhomogeneity(&self.frame, &self.model, &self.lines.lambda, bends, local);
+        found.map(|(inhomogeneity, _)| inhomogeneity)
+    }
+
+    /// Whether the lattice changes, by more than chance.
+    pub(crate) fn bends(&self, noise: &FinalNoise) -> bool {
+        let found = self.inhomogeneity(noise);
+        found.is_some_and(|change| change.stands_out())
+    }
+
     fn harmonics(&self, noise: &FinalNoise) -> Vec<FittedHarmonic> {
         let pixels = self.frame.pixels() as f64;
         let waves = self.model.waves.iter().zip(&self.model.basis.indices);
@@ -349,20 +362,13 @@ impl<'a> Fit<'a> {
         );
         let covariance = self.covariance(noise)?;
         let enlargement = closure.map_or(1.0, |closure| closure.enlargement());
-        let inhomogeneity = bend::inhomogeneity(
-            &self.frame,
-            &self.model,
-            &self.lines.lambda,
-            &noise.bends,
-            &noise.local,
-        );
+        let inhomogeneity = self.inhomogeneity(noise);
         let mut wave_vectors = Waves::new(
             self.model.pair,
             covariance.fixed_view::<4, 4>(3, 3) * enlargement,
         )
         .mapped(&Matrix2::from_diagonal(&scale));
         let clipped = self.clipped();
-        let inhomogeneity = inhomogeneity.map(|(inhomogeneity, _)| inhomogeneity);
         if let Some(change) = inhomogeneity.filter(Inhomogeneity::stands_out) {
             let (mean, covariance) = change.of_the_mean(clipped);
             wave_vectors.basis += mean;
@@ -372,11 +378,15 @@ impl<'a> Fit<'a> {
             self.frame.image.columns as f64,
             self.frame.image.rows as f64,
         ];
+        let centre = Vector2::new(columns - 1.0, rows - 1.0) / 2.0;
+        let off = self.frame.middle();
+        let carry = carry(off);
         let fit = LatticeFit {
             wave_vectors,
-            centre: Vector2::new(columns - 1.0, rows - 1.0) / 2.0,
+            centre,
+            middle: centre + off.component_mul(&self.frame.edge()),
             harmonics,
-            phase_covariance: covariance.fixed_view::<3, 3>(0, 0).into_owned(),
+            phase_covariance: carry * covariance * carry.transpose(),
             goodness: noise.rms / noise.residual.level().sqrt(),
             line_offsets: self.line_sigma,
             lines_left_out: self.frame.image.rows - self.frame.lines(),
@@ -394,4 +404,17 @@ impl<'a> Fit<'a> {
         };
         Some((wave_vectors.lattice()?, fit))
     }
+}
+
+/// What carries the phases of the first shell, with the pair, from the centre of the frame to (X, Y): 3 × 7.
+fn carry(to: Vector2<f64>) -> SMatrix<f64, 3, 7> {
+    let mut carry = SMatrix::<f64, 3, 7>::zeros();
+    for (i, [h, k]) in FIRST_SHELL.into_iter().enumerate() {
+        carry[(i, i)] = 1.0;
+        for axis in 0..2 {
+            carry[(i, 3 + axis)] = f64::from(h) * to[axis];
+            carry[(i, 5 + axis)] = f64::from(k) * to[axis];
+        }
+    }
+    carry
 }

@@ -11,6 +11,7 @@ use crate::lattice::fit::hidden::Hidden;
 use crate::lattice::fit::left::LeftOver;
 use crate::lattice::fit::noise::ForeignWave;
 use crate::numbers::exact;
+use crate::numbers::three::three;
 use crate::spectrum::phases::Phases;
 
 /// A lattice fitted to the pixels of an image.
@@ -19,12 +20,15 @@ pub struct LatticeFit {
     /// The wave vectors q₁, q₂ (about 60° apart), rad per pixel along columns and rows.
     #[serde(with = "exact")]
     pub wave_vectors: Waves<Px>,
-    /// Where the phases hold, pixels (column, row): the centre of the frame.
+    /// Where the phases of the harmonics hold, pixels (column, row): the centre of the frame.
     #[serde(with = "exact")]
     pub centre: Vector2<f64>,
+    /// The mean place of the pixels that count: phases there are uncorrelated with the wave vectors.
+    #[serde(with = "exact")]
+    pub middle: Vector2<f64>,
     /// The harmonics, first shell first.
     pub harmonics: Vec<FittedHarmonic>,
-    /// Covariance of the phases of the first three harmonics, rad². Where line offsets or neighbours take
+    /// Covariance of the phases of the first three harmonics at `middle`, rad². Where line offsets or neighbours take
     /// up a part of a harmonic its phase is less certain than its signal and noise say.
     #[serde(with = "exact")]
     pub phase_covariance: Matrix3<f64>,
@@ -75,10 +79,12 @@ pub struct FittedHarmonic {
 }
 
 impl LatticeFit {
-    /// Phases of the first shell at the centre: q₁, q₂, q₂ − q₁.
+    /// Phases of the first shell at the middle: q₁, q₂, q₂ − q₁.
     pub(crate) fn first_phases(&self) -> Phases {
+        let off = self.middle - self.centre;
+        let waves = three(&self.wave_vectors.basis);
         Phases {
-            values: [0, 1, 2].map(|i| self.harmonics[i].phase),
+            values: [0, 1, 2].map(|i| self.harmonics[i].phase + waves[i].dot(&off)),
             covariance: self.phase_covariance,
         }
     }
@@ -103,7 +109,9 @@ impl LatticeFit {
     pub(crate) fn in_pixels(mut self, binning: usize) -> Self {
         let size = binning as f64;
         self.wave_vectors = self.wave_vectors.mapped(&(Matrix2::identity() / size));
-        self.centre = self.centre * size + Vector2::repeat((size - 1.0) / 2.0);
+        for place in [&mut self.centre, &mut self.middle] {
+            *place = *place * size + Vector2::repeat((size - 1.0) / 2.0);
+        }
         for harmonic in &mut self.harmonics {
             let q = frame::wave(&self.wave_vectors.basis, harmonic.index);
             // The mean over a bin lowers the amplitude, and so it does the noise in a cell.

@@ -102,12 +102,15 @@ impl LineStatistics {
         let rows = || (0..self.rms.len()).filter(used);
         let mut sizes: Vec<f64> = rows().map(|r| self.rms[r]).collect();
         let typical = median(&mut sizes);
-        for size in &mut sizes {
-            *size = (*size - typical).abs();
-        }
-        let spread = 1.4826 * median(&mut sizes);
-        let most = typical + (BAD * spread).max(0.5 * typical);
-        let bad: Vec<usize> = rows().filter(|&r| self.rms[r] > most).collect();
+        // Lines with fewer pixels scatter more.
+        let whole = frame.image.columns as f64;
+        let scatter = |r: usize| (frame.present[r] as f64 / whole).sqrt();
+        let mut off: Vec<f64> = rows()
+            .map(|r| (self.rms[r] - typical).abs() * scatter(r))
+            .collect();
+        let spread = 1.4826 * median(&mut off);
+        let most = |r: usize| typical + (BAD * spread / scatter(r)).max(0.5 * typical);
+        let bad: Vec<usize> = rows().filter(|&r| self.rms[r] > most(r)).collect();
         if bad.len() as f64 > MOST_BAD * frame.lines() as f64 {
             Vec::new()
         } else {

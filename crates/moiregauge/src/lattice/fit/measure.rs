@@ -11,19 +11,51 @@ use crate::lattice::fit::noise::{ForeignWave, ResidualNoise};
 use crate::lattice::fit::straight::without_bend;
 use crate::spectrum::harmonics::Harmonics;
 
+/// Rounds of taking out places that do not show the lattice: each shows weaker ones.
+const ROUNDS: usize = 3;
+
+/// A lattice fitted to an image.
+pub(crate) struct Found {
+    pub(crate) lattice: Lattice<Px>,
+    pub(crate) fit: LatticeFit,
+    /// The image without the places that do not show the lattice, where there are some.
+    pub(crate) rest: Option<Image>,
+}
+
 /// Fits the lattice, starting from what the spectrum of `image` says.
 ///
 /// `None` where the fit does not settle within half a cycle over the frame of its start, or the
 /// harmonics cannot be told apart on this frame. Everything counts in pixels of `image`.
-pub(crate) fn measure(
+pub(crate) fn measure(image: &Image, start: &Harmonics, background: Background) -> Option<Found> {
+    measure_rest(image, start, background, ROUNDS)
+}
+
+/// The same with so many rounds of taking out what does not show the lattice.
+fn measure_rest(
     image: &Image,
     start: &Harmonics,
     background: Background,
-) -> Option<(Lattice<Px>, LatticeFit)> {
+    rounds: usize,
+) -> Option<Found> {
     let (fit, noise) = finished(image, start, background)?;
+    if rounds > 0
+        && let Some(rest) = fit.without_misfits()
+        && !fit.bends(&noise)
+        && let Some(found) = measure_rest(&rest, start, background, rounds - 1)
+    {
+        return Some(Found {
+            rest: Some(found.rest.unwrap_or(rest)),
+            ..found
+        });
+    }
     let foreign = noise.residual.foreign_wave(&fit.frame, &fit.model);
     let again = foreign.and_then(|wave| fit.again_without(&wave, &noise, start, background));
-    again.or_else(|| fit.result(&noise, foreign))
+    let (lattice, fit) = again.or_else(|| fit.result(&noise, foreign))?;
+    Some(Found {
+        lattice,
+        fit,
+        rest: None,
+    })
 }
 
 /// The fit with all harmonics that earn their place, and the noise that it leaves.

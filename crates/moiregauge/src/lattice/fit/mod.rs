@@ -38,6 +38,7 @@ pub(crate) mod left;
 pub(crate) mod lines;
 pub(crate) mod local;
 pub(crate) mod measure;
+pub(crate) mod misfits;
 pub(crate) mod model;
 pub(crate) mod noise;
 pub(crate) mod solve;

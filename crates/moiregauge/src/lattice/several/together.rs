@@ -377,7 +377,7 @@ impl Part {
             &beside.fixed_view::<4, 4>(3, 3).into_owned(),
             &alone.fixed_view::<4, 4>(3, 3).into_owned(),
         )?;
-        let size = self.lattice.middle.map(|m| 2.0 * m + 1.0);
+        let size = self.fit.centre.map(|m| 2.0 * m + 1.0);
         let scale = Matrix4::from_diagonal(&nalgebra::Vector4::new(size.x, size.y, size.x, size.y));
         let back = scale.map(|s| if s == 0.0 { 0.0 } else { 1.0 / s });
         let pair: Matrix4<f64> = back * pair * scale;

@@ -1,0 +1,142 @@
+//! Places that do not show the lattice: holes, defects, what lies beyond an edge.
+//!
+//! A fit with all harmonics leaves noise, which is the same everywhere. Where the lattice is missing it leaves the lattice, and much
+//! more than noise. So the power that is left is averaged under a box of one unit cell, in which whatever harmonics leave
+//! averages out, and where it exceeds that of most places, pixels are taken out and the rest is fitted again. A lattice that bends
+//! leaves more where it is farthest from straight, and is left as it is.
+
+use heterostrain::lattice::{Px, Waves};
+use nalgebra::{Matrix2, Matrix4};
+
+use crate::frame::image::Image;
+use crate::lattice::fit::fit_pixels::Fit;
+use crate::numbers::median::median;
+
+/// Power that is left under the box over the median of all boxes, beyond which the lattice is missing there. The mean over a unit cell of 100
+/// pixels of white noise scatters by 0.14.
+const MISSING: f64 = 2.0;
+/// The same in standard deviations of the boxes, by the quartiles: for noise that is uneven, or a unit cell of few pixels.
+const DEVIATIONS: f64 = 8.0;
+/// Median of the distance from the median, of normal numbers, in standard deviations.
+const MEDIAN_DISTANCE: f64 = 0.674_489_750_196_082;
+/// A box with a smaller share of its pixels says nothing. Chosen by eye.
+const FULL_ENOUGH: f64 = 0.2;
+/// Where more than this share of the pixels does not follow the lattice, it is none of the frame. Chosen by eye.
+const MOST: f64 = 0.35;
+
+impl Fit<'_> {
+    /// The image without the places that do not show the lattice; `None` where there are none.
+    pub(crate) fn without_misfits(&self) -> Option<Image> {
+        let image = self.frame.image;
+        let left = self.left();
+        let counts =
+            |i: usize| self.frame.present[i / image.columns] > 0 && image.values[i].is_finite();
+        let there: Vec<bool> = (0..left.len()).map(counts).collect();
+        let boxes = Boxes::new(image, &left, &there, self.unit_cell()?);
+        let gone = boxes.misfits(&there)?;
+        let mut rest = image.clone();
+        for (value, gone) in rest.values.iter_mut().zip(gone) {
+            if gone {
+                *value = f64::NAN;
+            }
+        }
+        Some(rest)
+    }
+
+    /// Pixels of a unit cell along columns and rows, from one side to the other.
+    fn unit_cell(&self) -> Option<[usize; 2]> {
+        let scale = self.frame.edge().map(|e| 1.0 / e);
+        let pair = Matrix2::from_diagonal(&scale) * self.model.pair;
+        let lattice = Waves::<Px>::new(pair, Matrix4::zeros()).lattice()?;
+        let most = |axis: usize| {
+            (0..3)
+                .map(|i| lattice.vector(i)[axis].abs())
+                .fold(0.0, f64::max)
+        };
+        Some([0, 1].map(|axis| (most(axis).round() as usize).max(1)))
+    }
+}
+
+/// Mean squares of what is left under boxes around every pixel.
+struct Boxes {
+    power: Vec<f64>,
+}
+
+impl Boxes {
+    fn new(image: &Image, left: &[f64], there: &[bool], size: [usize; 2]) -> Self {
+        let shape = [image.columns, image.rows];
+        let squares = left
+            .iter()
+            .zip(there)
+            .map(|(l, t)| if *t { l * l } else { 0.0 });
+        let squares = box_sums(squares.collect(), shape, size);
+        let counts = there.iter().map(|t| f64::from(u8::from(*t)));
+        let counts = box_sums(counts.collect(), shape, size);
+        let fewest = FULL_ENOUGH * (size[0] * size[1]) as f64;
+        let mean = |(sum, n): (&f64, &f64)| if *n < fewest { f64::NAN } else { sum / n };
+        Self {
+            power: squares.iter().zip(&counts).map(mean).collect(),
+        }
+    }
+
+    /// The pixels of those that are `there` in whose boxes much more is left than in most; `None` where there are none, or too many.
+    fn misfits(&self, there: &[bool]) -> Option<Vec<bool>> {
+        let known = |(power, there): (&f64, &bool)| (*there && power.is_finite()).then_some(*power);
+        let mut all: Vec<f64> = self.power.iter().zip(there).filter_map(known).collect();
+        if all.is_empty() {
+            return None;
+        }
+        let typical = median(&mut all);
+        for power in &mut all {
+            *power = (*power - typical).abs();
+        }
+        let spread = median(&mut all) / MEDIAN_DISTANCE;
+        let most = (MISSING * typical).max(typical + DEVIATIONS * spread);
+        let gone: Vec<bool> = self
+            .power
+            .iter()
+            .zip(there)
+            .map(|(p, t)| *t && *p > most)
+            .collect();
+        let count = gone.iter().filter(|gone| **gone).count();
+        let few = (count as f64) < MOST * there.iter().filter(|t| **t).count() as f64;
+        (count > 0 && few).then_some(gone)
+    }
+}
+
+/// Sums over boxes of a size around every pixel of an image of a shape (columns, rows).
+fn box_sums(mut values: Vec<f64>, shape: [usize; 2], size: [usize; 2]) -> Vec<f64> {
+    let [columns, rows] = shape;
+    let mut line = vec![0.0; columns.max(rows)];
+    for row in values.chunks_exact_mut(columns) {
+        line[..columns].copy_from_slice(row);
+        running(&line[..columns], size[0], |i, sum| row[i] = sum);
+    }
+    for column in 0..columns {
+        for row in 0..rows {
+            line[row] = values[row * columns + column];
+        }
+        running(&line[..rows], size[1], |row, sum| {
+            values[row * columns + column] = sum
+        });
+    }
+    values
+}
+
+/// Sums over `size` numbers around each, fewer at the ends.
+fn running(line: &[f64], size: usize, mut put: impl FnMut(usize, f64)) {
+    let mut sums = Vec::with_capacity(line.len() + 1);
+    let mut sum = 0.0;
+    sums.push(sum);
+    for value in line {
+        sum += value;
+        sums.push(sum);
+    }
+    for i in 0..line.len() {
+        let (first, last) = (
+            i.saturating_sub(size / 2),
+            (i + size.div_ceil(2)).min(line.len()),
+        );
+        put(i, sums[last] - sums[first]);
+    }
+}
