@@ -3,6 +3,7 @@
 use heterostrain::lattice::shortest_pair;
 use nalgebra::{Matrix2, Vector2};
 
+use crate::coverage::patch::WHOLE;
 use crate::coverage::settle::{Settled, settle};
 use crate::coverage::tiles;
 use crate::frame::geometry::Geometry;
@@ -14,8 +15,6 @@ use crate::spectrum::transform::Spectrum;
 /// peaks are one.
 const SAME: f64 = 0.5;
 
-/// A lattice on more than this share of the frame is taken to be everywhere: noise and defects leave small gaps.
-pub(crate) const WHOLE: f64 = 0.95;
 /// Lattices with less than this share of the power of the strongest one are its harmonics, or skirts. Chosen by eye.
 const WORTH: f64 = 0.1;
 

@@ -7,6 +7,9 @@ use crate::coverage::cells::Cells;
 use crate::frame::image::Image;
 use crate::numbers::exact;
 
+/// A lattice on more than this share of the frame is taken to be everywhere: noise and defects leave small gaps.
+pub(crate) const WHOLE: f64 = 0.95;
+
 /// The part of a frame that carries a lattice.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]

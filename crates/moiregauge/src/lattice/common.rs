@@ -24,12 +24,11 @@ pub struct Common {
 impl Common {
     /// That of a fit to the pixels of a lattice that changes: how far its mean may be from what a cubic phase says.
     pub(crate) fn of_fit(fit: &LatticeFit, pixels: &Lattice<Px>) -> Option<Self> {
-        let change = fit.change()?;
-        let edges =
-            Waves::<Px>::new(fit.wave_vectors.basis, change.beyond(fit.clipped)).lattice()?;
+        let basis = fit.wave_vectors.basis + fit.change()?.beside(fit.clipped);
+        let other = Waves::<Px>::exact(basis).lattice()?;
         Some(Self {
-            other: pixels.basis,
-            edges: labelled_like(&edges, &pixels.basis).covariance,
+            other: labelled_like(&other, &pixels.basis).basis,
+            edges: Matrix4::zeros(),
         })
     }
 

@@ -5,8 +5,9 @@ use std::sync::Arc;
 use heterostrain::lattice::shortest_pair;
 use nalgebra::Vector2;
 
-use crate::coverage::find::{WHOLE, pitch, same};
+use crate::coverage::find::{pitch, same};
 use crate::coverage::finer::finer;
+use crate::coverage::patch::WHOLE;
 use crate::coverage::settle::settle;
 use crate::frame::background::{Background, remove_background};
 use crate::frame::clip::cut_off;

@@ -8,9 +8,9 @@ use heterostrain::lattice::{Lattice, Px, Waves, labelled_like, reciprocal};
 use nalgebra::{Matrix2, Vector2};
 
 use crate::coverage::bend::Mean;
-use crate::coverage::find::{WHOLE, pitch, same};
+use crate::coverage::find::{pitch, same};
 use crate::coverage::grains::Grains;
-use crate::coverage::patch::Patch;
+use crate::coverage::patch::{Patch, WHOLE};
 use crate::coverage::settle::{Settled, settle, settle_in_bins};
 use crate::frame::background::{Background, remove_background};
 use crate::frame::clip::cut_off;
@@ -388,7 +388,7 @@ impl Start {
                 .map_or_else(|| phases(harmonics, size), LatticeFit::first_phases),
             middle: fit.as_ref().map_or_else(
                 || middle(size) * pixels_per_bin + Vector2::repeat((pixels_per_bin - 1.0) / 2.0),
-                |fit| fit.middle,
+                LatticeFit::middle,
             ),
             shortcut_wavelengths: fourier::shortcut_wavelengths(peaks, &bin_to_nm),
             periods: self.periods(&pixels),

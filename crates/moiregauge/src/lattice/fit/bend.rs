@@ -107,6 +107,17 @@ impl Inhomogeneity {
         let off = Vector4::from_column_slice(self.mean.as_slice()) * share;
         off * off.transpose()
     }
+
+    /// How far the mean would be from what is told of it if the third order were all there is, or if more were: what images of one
+    /// sample have in common of it is no noise.
+    pub(crate) fn beside(&self, clipped: f64) -> Matrix2<f64> {
+        let share = if self.tells_the_mean(clipped) {
+            BEYOND
+        } else {
+            1.0
+        };
+        self.mean * share
+    }
 }
 
 /// What is told of a bend, as a change of the phases.

@@ -378,13 +378,12 @@ impl<'a> Fit<'a> {
             self.frame.image.columns as f64,
             self.frame.image.rows as f64,
         ];
-        let centre = Vector2::new(columns - 1.0, rows - 1.0) / 2.0;
         let off = self.frame.middle();
         let carry = carry(off);
         let fit = LatticeFit {
             wave_vectors,
-            centre,
-            middle: centre + off.component_mul(&self.frame.edge()),
+            centre: Vector2::new(columns - 1.0, rows - 1.0) / 2.0,
+            off_centre: off.component_mul(&self.frame.edge()),
             harmonics,
             phase_covariance: carry * covariance * carry.transpose(),
             goodness: noise.rms / noise.residual.level().sqrt(),

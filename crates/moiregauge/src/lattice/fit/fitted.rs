@@ -23,12 +23,12 @@ pub struct LatticeFit {
     /// Where the phases of the harmonics hold, pixels (column, row): the centre of the frame.
     #[serde(with = "exact")]
     pub centre: Vector2<f64>,
-    /// The mean place of the pixels that count: phases there are uncorrelated with the wave vectors.
-    #[serde(with = "exact")]
-    pub middle: Vector2<f64>,
+    /// From there to the mean place of the pixels that count, pixels: phases there are uncorrelated with the wave vectors.
+    #[serde(with = "exact", default)]
+    pub off_centre: Vector2<f64>,
     /// The harmonics, first shell first.
     pub harmonics: Vec<FittedHarmonic>,
-    /// Covariance of the phases of the first three harmonics at `middle`, rad². Where line offsets or neighbours take
+    /// Covariance of the phases of the first three harmonics at that place, rad². Where line offsets or neighbours take
     /// up a part of a harmonic its phase is less certain than its signal and noise say.
     #[serde(with = "exact")]
     pub phase_covariance: Matrix3<f64>,
@@ -79,12 +79,16 @@ pub struct FittedHarmonic {
 }
 
 impl LatticeFit {
+    /// The mean place of the pixels that count, (column, row).
+    pub(crate) fn middle(&self) -> Vector2<f64> {
+        self.centre + self.off_centre
+    }
+
     /// Phases of the first shell at the middle: q₁, q₂, q₂ − q₁.
     pub(crate) fn first_phases(&self) -> Phases {
-        let off = self.middle - self.centre;
         let waves = three(&self.wave_vectors.basis);
         Phases {
-            values: [0, 1, 2].map(|i| self.harmonics[i].phase + waves[i].dot(&off)),
+            values: [0, 1, 2].map(|i| self.harmonics[i].phase + waves[i].dot(&self.off_centre)),
             covariance: self.phase_covariance,
         }
     }
@@ -109,9 +113,8 @@ impl LatticeFit {
     pub(crate) fn in_pixels(mut self, binning: usize) -> Self {
         let size = binning as f64;
         self.wave_vectors = self.wave_vectors.mapped(&(Matrix2::identity() / size));
-        for place in [&mut self.centre, &mut self.middle] {
-            *place = *place * size + Vector2::repeat((size - 1.0) / 2.0);
-        }
+        self.centre = self.centre * size + Vector2::repeat((size - 1.0) / 2.0);
+        self.off_centre *= size;
         for harmonic in &mut self.harmonics {
             let q = frame::wave(&self.wave_vectors.basis, harmonic.index);
             // The mean over a bin lowers the amplitude, and so it does the noise in a cell.

@@ -140,3 +140,79 @@ fn running(line: &[f64], size: usize, mut put: impl FnMut(usize, f64)) {
         put(i, sums[last] - sums[first]);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::frame::background::Background;
+    use crate::lattice::fit::measure::measure;
+    use crate::numbers::rng::normals;
+    use crate::spectrum::harmonics::Windowed;
+    use crate::spectrum::shells::shells;
+    use nalgebra::Vector2;
+
+    const SIZE: usize = 128;
+
+    fn pair() -> Matrix2<f64> {
+        Matrix2::new(0.45, -0.02, 0.21, 0.52)
+    }
+
+    /// Three waves of amplitude 1 where there is a lattice, and white noise of 0.3.
+    fn image(seed: u64, shows: impl Fn(Vector2<f64>) -> bool) -> Image {
+        let mut normal = normals(seed, "misfits", 0);
+        let value = |i: usize| {
+            let at = Vector2::new((i % SIZE) as f64, (i / SIZE) as f64);
+            let [a, b] = [0, 1].map(|j| pair().column(j).dot(&at));
+            let lattice = a.cos() + b.cos() + (b - a).cos();
+            f64::from(u8::from(shows(at))) * lattice + 0.3 * normal()
+        };
+        Image::new(SIZE, SIZE, (0..SIZE * SIZE).map(value).collect())
+    }
+
+    fn rest(image: &Image) -> Option<Image> {
+        let start = Windowed::new(image).fit(image, &pair(), Background::Plane, shells(3));
+        measure(image, &start.unwrap(), Background::Plane)
+            .unwrap()
+            .rest
+    }
+
+    /// Boxes against sums that are written out, at the ends too.
+    #[test]
+    fn sums_are_those_of_boxes() {
+        let (shape, size) = ([7, 5], [4, 3]);
+        let values: Vec<f64> = (0..35).map(|i| f64::from(i * i % 11)).collect();
+        let sums = box_sums(values.clone(), shape, size);
+        for (i, sum) in sums.iter().enumerate() {
+            let (x, y) = ((i % 7) as i32, (i / 7) as i32);
+            let near = |j: &usize| {
+                let (dx, dy) = ((j % 7) as i32 - x, (j / 7) as i32 - y);
+                (-2..2).contains(&dx) && (-1..2).contains(&dy)
+            };
+            let written: f64 = (0..35).filter(near).map(|j| values[j]).sum();
+            assert_eq!(*sum, written, "{x}, {y}");
+        }
+    }
+
+    /// A whole lattice is left whole, whatever the noise.
+    #[test]
+    fn a_whole_lattice_has_no_misfits() {
+        for seed in 0..20 {
+            assert!(rest(&image(seed, |_| true)).is_none(), "{seed}");
+        }
+    }
+
+    /// A hole is taken out, and not much more: half a box around it at most.
+    #[test]
+    fn holes_are_taken_out() {
+        for seed in 0..5 {
+            let place = Vector2::new(40.0 + 10.0 * seed as f64, 64.0);
+            let far = |at: Vector2<f64>| (at - place).norm();
+            let rest = rest(&image(seed, |at| far(at) > 18.0)).unwrap();
+            for (i, value) in rest.values.iter().enumerate() {
+                let d = far(Vector2::new((i % SIZE) as f64, (i / SIZE) as f64));
+                assert!(value.is_nan() || d > 16.0, "{seed}: {d}");
+                assert!(value.is_finite() || d < 36.0, "{seed}: {d}");
+            }
+        }
+    }
+}

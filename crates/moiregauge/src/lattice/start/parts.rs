@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use nalgebra::Matrix2;
 
-use crate::coverage::find::{WHOLE, patches};
-use crate::coverage::patch::Patch;
+use crate::coverage::find::patches;
+use crate::coverage::patch::{Patch, WHOLE};
 use crate::coverage::settle::Settled;
 use crate::frame::background::{Background, remove_background};
 use crate::frame::clip::cut_off;
