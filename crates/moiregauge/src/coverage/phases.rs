@@ -2,15 +2,18 @@
 //!
 //! Differences of phases over a window come first, which need no unwrapping, then the phases themselves.
 
+use std::cmp::Ordering;
 use std::collections::HashMap;
 
 use nalgebra::{DMatrix, DVector, Vector2};
+use rayon::prelude::*;
 use rustfft::num_complex::Complex64;
 
 use crate::coverage::nodes::{Node, information, neighbours};
 use crate::coverage::patch::Patch;
 use crate::numbers::normal_equations::NormalEquations;
 use crate::numbers::splines::Splines;
+use crate::numbers::widest::widest;
 
 /// Independent phases in a node of one window: nodes closer than a window are correlated.
 pub(crate) const INDEPENDENT: f64 = 2.5;
@@ -54,6 +57,14 @@ impl Basis {
 
     /// The functions that are not zero at a place: position, value and slopes.
     pub(crate) fn at(&self, at: Vector2<f64>) -> Vec<(usize, [f64; 3])> {
+        let mut all = Vec::new();
+        self.put(at, &mut all);
+        all
+    }
+
+    /// The same in place of what was there.
+    pub(crate) fn put(&self, at: Vector2<f64>, out: &mut Vec<(usize, [f64; 3])>) {
+        out.clear();
         match self {
             Self::Powers {
                 degree,
@@ -68,13 +79,12 @@ impl Basis {
                     [x * y, slope(a, dx * y) / half.x, slope(b, x * dy) / half.y]
                 };
                 let all = (0..=*degree).flat_map(|total| (0..=total).map(move |b| [total - b, b]));
-                all.map(of).enumerate().collect()
+                out.extend(all.map(of).enumerate());
             }
             Self::Splines(splines) => {
                 let s = splines.at(at);
-                (0..16)
-                    .map(|i| (s.places[i], [s.values[i], s.along[i], s.across[i]]))
-                    .collect()
+                let all = (0..16).map(|i| (s.places[i], [s.values[i], s.along[i], s.across[i]]));
+                out.extend(all);
             }
         }
     }
@@ -111,45 +121,59 @@ impl Fit {
         for (mut gain, sum) in gains.row_iter_mut().zip(sums.row_iter()) {
             gain.tr_copy_from(&self.equations.solve(&sum.transpose()));
         }
-        // What each phase does to the sums, times its error.
-        let of_node = |node: &Node| {
-            rows(&self.basis, node.at).map(|row| {
-                let mut gain = DVector::zeros(sums.nrows());
-                for (i, x) in row {
-                    gain += gains.column(i) * x;
-                }
-                gain
-            })
-        };
-        let all: Vec<[DVector<f64>; 3]> = nodes
-            .iter()
-            .map(|node| {
-                let mut gains = of_node(node);
-                for (wave, gain) in gains.iter_mut().enumerate() {
-                    *gain *= node.weights[wave] * node.errors[wave];
-                }
-                gains
-            })
-            .collect();
-        let mut covariance = DMatrix::zeros(sums.nrows(), sums.nrows());
+        let count = sums.nrows();
+        let all = self.of_phases(&gains, nodes);
+        let of = |node: usize, wave: usize| &all[(3 * node + wave) * count..][..count];
         let near = Near::new(nodes, reach);
-        for (i, a) in nodes.iter().enumerate() {
-            for j in near.from(i) {
-                let d = (nodes[j].at - a.at).component_div(&reach);
-                let correlation = (-0.25 * d.norm_squared()).exp();
-                if correlation < UNCORRELATED {
-                    continue;
-                }
-                for (first, second) in all[i].iter().zip(&all[j]) {
-                    let product = correlation * first * second.transpose();
-                    covariance += &product;
+        let near: Vec<Vec<(usize, f64)>> = (0..nodes.len())
+            .into_par_iter()
+            .map(|i| near.correlated(i, nodes, reach))
+            .collect();
+        let mut covariance = DMatrix::zeros(count, count);
+        for (i, near) in near.iter().enumerate() {
+            for &(j, correlation) in near {
+                for wave in 0..3 {
+                    let (first, second) = (of(i, wave), of(j, wave));
+                    add_outer(&mut covariance, |a, b| correlation * first[a] * second[b]);
                     if i != j {
-                        covariance += product.transpose();
+                        add_outer(&mut covariance, |a, b| correlation * first[b] * second[a]);
                     }
                 }
             }
         }
         covariance * self.enlarged
+    }
+
+    /// What each phase of each node does to some sums, times its error: the sums of each phase side by side.
+    fn of_phases(&self, gains: &DMatrix<f64>, nodes: &[Node]) -> Vec<f64> {
+        let count = gains.nrows();
+        let mut all = vec![0.0; 3 * nodes.len() * count];
+        let of_nodes = all.par_chunks_exact_mut(3 * count).zip(nodes);
+        of_nodes.with_min_len(AT_ONCE).for_each(|(all, node)| {
+            let rows = rows(&self.basis, node.at);
+            for (wave, (all, row)) in all.chunks_exact_mut(count).zip(rows).enumerate() {
+                for (i, x) in row {
+                    for (sum, gain) in all.iter_mut().zip(&gains.column(i)) {
+                        *sum += gain * x;
+                    }
+                }
+                let error = node.weights[wave] * node.errors[wave];
+                all.iter_mut().for_each(|sum| *sum *= error);
+            }
+        });
+        all
+    }
+}
+
+/// Nodes that a thread takes at once, at least.
+const AT_ONCE: usize = 64;
+
+/// Adds a value for each row and column.
+fn add_outer(sum: &mut DMatrix<f64>, value: impl Fn(usize, usize) -> f64) {
+    for column in 0..sum.ncols() {
+        for row in 0..sum.nrows() {
+            sum[(row, column)] += value(row, column);
+        }
     }
 }
 
@@ -176,13 +200,19 @@ impl Near {
         Self { squares, members }
     }
 
-    /// A node and those after it that may be near, in order.
-    fn from(&self, i: usize) -> Vec<usize> {
+    /// A node and those after it whose errors are correlated with its own, in order, and how much.
+    fn correlated(&self, i: usize, nodes: &[Node], reach: Vector2<f64>) -> Vec<(usize, f64)> {
         let [x, y] = self.squares[i];
         let around = (y - 1..=y + 1).flat_map(|y| (x - 1..=x + 1).map(move |x| [x, y]));
         let members = around.filter_map(|square| self.members.get(&square));
-        let mut near: Vec<usize> = members.flatten().copied().filter(|&j| j >= i).collect();
-        near.sort_unstable();
+        let near = members.flatten().copied().filter(|&j| j >= i);
+        let near = near.map(|j| {
+            let d = (nodes[j].at - nodes[i].at).component_div(&reach);
+            (j, (-0.25 * d.norm_squared()).exp())
+        });
+        // Not the same as what is at least that where a correlation is not a number.
+        let mut near: Vec<_> = near.filter(|(_, c)| !(*c < UNCORRELATED)).collect();
+        near.sort_unstable_by_key(|(j, _)| *j);
         near
     }
 }
@@ -220,6 +250,16 @@ pub(crate) fn value(row: &[(usize, f64)], coefficients: &DVector<f64>) -> f64 {
 struct Sums {
     normal: DMatrix<f64>,
     right: DVector<f64>,
+    /// Those of a row.
+    values: Vec<f64>,
+}
+
+/// Adds values times a number.
+#[inline(always)]
+fn add_times(sums: &mut [f64], values: &[f64], by: f64) {
+    for (sum, value) in sums.iter_mut().zip(values) {
+        *sum += value * by;
+    }
 }
 
 impl Sums {
@@ -227,19 +267,36 @@ impl Sums {
         Self {
             normal: DMatrix::zeros(size, size),
             right: DVector::zeros(size),
+            values: Vec::new(),
         }
     }
 
     /// A row, ordered by coefficients.
     fn add(&mut self, row: &[(usize, f64)], weight: f64) {
         let size = self.normal.nrows();
-        for (n, (j, y)) in row.iter().enumerate() {
-            let column = &mut self.normal.as_mut_slice()[j * size..(j + 1) * size];
-            let y = weight * y;
-            for (i, x) in &row[n..] {
-                column[*i] += x * y;
-            }
-        }
+        self.values.clear();
+        self.values.extend(row.iter().map(|(_, value)| value));
+        let (values, normal) = (&self.values, self.normal.as_mut_slice());
+        widest(
+            #[inline(always)]
+            || {
+                let mut end = 0;
+                for run in row.chunk_by(|(a, _), (b, _)| a + 1 == *b) {
+                    let start = end;
+                    end += run.len();
+                    for n in start..end {
+                        let column = &mut normal[row[n].0 * size..][..size];
+                        let y = weight * values[n];
+                        add_times(&mut column[row[n].0..], &values[n..end], y);
+                        let mut next = end;
+                        for run in row[end..].chunk_by(|(a, _), (b, _)| a + 1 == *b) {
+                            add_times(&mut column[run[0].0..], &values[next..][..run.len()], y);
+                            next += run.len();
+                        }
+                    }
+                }
+            },
+        );
     }
 
     /// What was measured of a row.
@@ -394,25 +451,20 @@ pub(crate) fn price(chi2: f64, parameters: f64, independent: f64) -> f64 {
 /// b − a, of rows that are ordered by coefficients.
 fn difference(b: &[(usize, f64)], a: &[(usize, f64)]) -> Vec<(usize, f64)> {
     let mut both = Vec::with_capacity(a.len() + b.len());
-    let (mut a, mut b) = (a.iter().peekable(), b.iter().peekable());
-    loop {
-        match (a.peek(), b.peek()) {
-            (Some((i, x)), Some((j, y))) if i == j => {
-                both.push((*i, y - x));
-                a.next();
-                b.next();
-            }
-            (Some((i, x)), other) if other.is_none_or(|(j, _)| i < j) => {
-                both.push((*i, -x));
-                a.next();
-            }
-            (_, Some((j, y))) => {
-                both.push((*j, *y));
-                b.next();
-            }
-            _ => return both,
-        }
+    let (mut m, mut n) = (0, 0);
+    while m < a.len() && n < b.len() {
+        let ((i, x), (j, y)) = (a[m], b[n]);
+        both.push(match i.cmp(&j) {
+            Ordering::Equal => (i, y - x),
+            Ordering::Less => (i, -x),
+            Ordering::Greater => (j, y),
+        });
+        m += usize::from(i <= j);
+        n += usize::from(j <= i);
     }
+    both.extend(a[m..].iter().map(|(i, x)| (*i, -x)));
+    both.extend(&b[n..]);
+    both
 }
 
 /// Sets the constants to the mean phases.
