@@ -2,18 +2,17 @@
 //!
 //! Differences of phases over a window come first, which need no unwrapping, then the phases themselves.
 
-use std::cmp::Ordering;
 use std::collections::HashMap;
 
 use nalgebra::{DMatrix, DVector, Vector2};
 use rayon::prelude::*;
 use rustfft::num_complex::Complex64;
 
+use crate::coverage::equations::{Functions, Sums};
 use crate::coverage::nodes::{Node, information, neighbours};
 use crate::coverage::patch::Patch;
 use crate::numbers::normal_equations::NormalEquations;
 use crate::numbers::splines::Splines;
-use crate::numbers::widest::widest;
 
 /// Independent phases in a node of one window: nodes closer than a window are correlated.
 pub(crate) const INDEPENDENT: f64 = 2.5;
@@ -246,161 +245,86 @@ pub(crate) fn value(row: &[(usize, f64)], coefficients: &DVector<f64>) -> f64 {
     row.iter().map(|(i, x)| coefficients[*i] * x).sum()
 }
 
-/// Normal equations that are filled row by row, in the lower triangle.
-struct Sums {
-    normal: DMatrix<f64>,
-    right: DVector<f64>,
-    /// Those of a row.
-    values: Vec<f64>,
-}
-
-/// Adds values times a number.
-#[inline(always)]
-fn add_times(sums: &mut [f64], values: &[f64], by: f64) {
-    for (sum, value) in sums.iter_mut().zip(values) {
-        *sum += value * by;
-    }
-}
-
-impl Sums {
-    fn new(size: usize) -> Self {
-        Self {
-            normal: DMatrix::zeros(size, size),
-            right: DVector::zeros(size),
-            values: Vec::new(),
-        }
-    }
-
-    /// A row, ordered by coefficients.
-    fn add(&mut self, row: &[(usize, f64)], weight: f64) {
-        let size = self.normal.nrows();
-        self.values.clear();
-        self.values.extend(row.iter().map(|(_, value)| value));
-        let (values, normal) = (&self.values, self.normal.as_mut_slice());
-        widest(
-            #[inline(always)]
-            || {
-                let mut end = 0;
-                for run in row.chunk_by(|(a, _), (b, _)| a + 1 == *b) {
-                    let start = end;
-                    end += run.len();
-                    for n in start..end {
-                        let column = &mut normal[row[n].0 * size..][..size];
-                        let y = weight * values[n];
-                        add_times(&mut column[row[n].0..], &values[n..end], y);
-                        let mut next = end;
-                        for run in row[end..].chunk_by(|(a, _), (b, _)| a + 1 == *b) {
-                            add_times(&mut column[run[0].0..], &values[next..][..run.len()], y);
-                            next += run.len();
-                        }
-                    }
-                }
-            },
-        );
-    }
-
-    /// What was measured of a row.
-    fn add_right(&mut self, row: &[(usize, f64)], measured: f64, weight: f64) {
-        for (i, x) in row {
-            self.right[*i] += weight * x * measured;
-        }
-    }
-
-    fn equations(&self, basis: &Basis) -> Option<NormalEquations> {
-        let mut normal = self.normal.clone();
-        let size = self.right.len();
-        let stiffness = STIFFNESS * normal.trace() / size as f64;
-        normal.fill_upper_triangle_with_lower_triangle();
-        if let Basis::Splines(splines) = basis {
-            for first in [0, basis.len()] {
-                splines.in_lines(|places| {
-                    for (a, x) in places.iter().zip([1.0, -2.0, 1.0]) {
-                        for (b, y) in places.iter().zip([1.0, -2.0, 1.0]) {
-                            normal[(first + a, first + b)] += stiffness * x * y;
-                        }
-                    }
-                });
-            }
-        }
-        // Constants are free where only differences are looked at.
-        for i in 0..size {
-            normal[(i, i)] += 1e-3 * stiffness;
-        }
-        let units = NormalEquations::units(&normal);
-        NormalEquations::new(&normal, units, |_| 0.0)
-    }
-}
-
 /// The coefficients by what changes from node to node, which needs no unwrapping.
-fn by_differences(
-    basis: &Basis,
-    nodes: &[Node],
-    rows: &[[Vec<(usize, f64)>; 3]],
-) -> Option<DVector<f64>> {
-    let size = 2 * basis.len() + 1;
-    let mut coefficients = DVector::zeros(size);
+fn by_differences(basis: &Basis, nodes: &[Node], functions: &[Functions]) -> Option<DVector<f64>> {
+    let mut sums = Sums::new(basis.len());
+    let mut coefficients = DVector::zeros(sums.right.len());
     let neighbours = neighbours(nodes);
-    let weight =
-        |a: usize, b: usize, wave: usize| f64::min(nodes[a].weights[wave], nodes[b].weights[wave]);
-    let mut sums = Sums::new(size);
+    let weights = |a: usize, b: usize| {
+        [0, 1, 2].map(|wave| f64::min(nodes[a].weights[wave], nodes[b].weights[wave]))
+    };
     let mut differences = Vec::with_capacity(neighbours.len());
     for &(a, b) in &neighbours {
-        let each = [0, 1, 2].map(|wave| difference(&rows[b][wave], &rows[a][wave]));
-        for (wave, row) in each.iter().enumerate() {
-            sums.add(row, weight(a, b, wave));
-        }
-        differences.push(each);
+        let difference = functions[b].less(&functions[a]);
+        sums.add(&difference, weights(a, b), 0.0);
+        differences.push(difference);
     }
     let equations = sums.equations(basis)?;
     for _ in 0..ROUNDS[0] {
         sums.right.fill(0.0);
-        for (&(a, b), each) in neighbours.iter().zip(&differences) {
-            for (wave, row) in each.iter().enumerate() {
+        for (&(a, b), difference) in neighbours.iter().zip(&differences) {
+            let phases = difference.phases(&coefficients, basis.len());
+            let left = [0, 1, 2].map(|wave| {
                 let turn = nodes[a].envelopes[wave].conj() * nodes[b].envelopes[wave];
-                let left = (turn * Complex64::cis(-value(row, &coefficients))).arg();
-                sums.add_right(row, left, weight(a, b, wave));
-            }
+                (turn * Complex64::cis(-phases[wave])).arg()
+            });
+            sums.add_right(difference, left, weights(a, b), 0.0);
         }
         coefficients += equations.solve(&sums.right);
     }
     Some(coefficients)
 }
 
+/// The phases of the three waves at a place.
+fn phases(functions: &Functions, coefficients: &DVector<f64>) -> [f64; 3] {
+    let last = coefficients.len() - 1;
+    let [first, second, third] = functions.phases(coefficients, last / 2);
+    [first, second, third + coefficients[last]]
+}
+
 /// Improves the coefficients by the phases themselves; the equations and χ² of the last round.
 fn by_phases(
     basis: &Basis,
     nodes: &[Node],
-    rows: &[[Vec<(usize, f64)>; 3]],
+    functions: &[Functions],
     coefficients: &mut DVector<f64>,
 ) -> Option<(NormalEquations, f64)> {
     let mut chi2 = 0.0;
     // What is followed, and the equations for that.
-    let mut last: Option<(Vec<bool>, NormalEquations)> = None;
+    let mut last: Option<(Vec<[bool; 3]>, NormalEquations)> = None;
     for _ in 0..ROUNDS[1] {
-        let mut sums = Sums::new(coefficients.len());
-        let mut followed = Vec::with_capacity(3 * nodes.len());
+        let mut sums = Sums::new(basis.len());
+        let mut followed = Vec::with_capacity(nodes.len());
         chi2 = 0.0;
-        for (node, rows) in nodes.iter().zip(rows) {
-            for (wave, row) in rows.iter().enumerate() {
-                let left = node.envelopes[wave] * Complex64::cis(-value(row, coefficients));
-                let (left, weight) = (left.arg(), node.weights[wave]);
+        for (node, functions) in nodes.iter().zip(functions) {
+            let phases = phases(functions, coefficients);
+            let (mut measured, mut weights) = ([0.0; 3], [0.0; 3]);
+            followed.push([0, 1, 2].map(|wave| {
+                let left = (node.envelopes[wave] * Complex64::cis(-phases[wave])).arg();
+                let weight = node.weights[wave];
                 // What is lost counts as if it were at the limit, and moves nothing.
                 chi2 += weight * left.clamp(-LOST, LOST).powi(2);
                 let follows = left.abs() < LOST;
-                followed.push(follows);
                 if follows {
-                    sums.add_right(row, left, weight);
+                    (measured[wave], weights[wave]) = (left, weight);
                 }
-            }
+                follows
+            }));
+            sums.add_right(functions, measured, weights, 1.0);
         }
         let known = last.take().filter(|(before, _)| *before == followed);
         let (followed, equations) = if let Some(known) = known {
             known
         } else {
-            for (n, (node, rows)) in nodes.iter().zip(rows).enumerate() {
-                for (wave, row) in rows.iter().enumerate().filter(|(i, _)| followed[3 * n + i]) {
-                    sums.add(row, node.weights[wave]);
-                }
+            for ((node, functions), follows) in nodes.iter().zip(functions).zip(&followed) {
+                let weight = |wave: usize| {
+                    if follows[wave] {
+                        node.weights[wave]
+                    } else {
+                        0.0
+                    }
+                };
+                sums.add(functions, [0, 1, 2].map(weight), 1.0);
             }
             let equations = sums.equations(basis)?;
             (followed, equations)
@@ -413,10 +337,11 @@ fn by_phases(
 
 pub(crate) fn fit(basis: Basis, nodes: &[Node]) -> Option<Fit> {
     let size = 2 * basis.len() + 1;
-    let rows: Vec<[Vec<(usize, f64)>; 3]> = nodes.iter().map(|n| rows(&basis, n.at)).collect();
-    let mut coefficients = by_differences(&basis, nodes, &rows)?;
-    align(&basis, nodes, &rows, &mut coefficients);
-    let (equations, chi2) = by_phases(&basis, nodes, &rows, &mut coefficients)?;
+    let functions = nodes.iter().map(|node| Functions::at(&basis, node.at));
+    let functions: Vec<Functions> = functions.collect();
+    let mut coefficients = by_differences(&basis, nodes, &functions)?;
+    align(&basis, nodes, &functions, &mut coefficients);
+    let (equations, chi2) = by_phases(&basis, nodes, &functions, &mut coefficients)?;
     let all: f64 = nodes.iter().flat_map(|node| node.weights).sum();
     let count = 3.0 * nodes.len() as f64;
     let share = nodes.first()?.share;
@@ -448,35 +373,11 @@ pub(crate) fn price(chi2: f64, parameters: f64, independent: f64) -> f64 {
     independent * (chi2 / independent).ln() + parameters * independent.ln()
 }
 
-/// b − a, of rows that are ordered by coefficients.
-fn difference(b: &[(usize, f64)], a: &[(usize, f64)]) -> Vec<(usize, f64)> {
-    let mut both = Vec::with_capacity(a.len() + b.len());
-    let (mut m, mut n) = (0, 0);
-    while m < a.len() && n < b.len() {
-        let ((i, x), (j, y)) = (a[m], b[n]);
-        both.push(match i.cmp(&j) {
-            Ordering::Equal => (i, y - x),
-            Ordering::Less => (i, -x),
-            Ordering::Greater => (j, y),
-        });
-        m += usize::from(i <= j);
-        n += usize::from(j <= i);
-    }
-    both.extend(a[m..].iter().map(|(i, x)| (*i, -x)));
-    both.extend(&b[n..]);
-    both
-}
-
 /// Sets the constants to the mean phases.
-pub(crate) fn align(
-    basis: &Basis,
-    nodes: &[Node],
-    rows: &[[Vec<(usize, f64)>; 3]],
-    coefficients: &mut DVector<f64>,
-) {
+fn align(basis: &Basis, nodes: &[Node], functions: &[Functions], coefficients: &mut DVector<f64>) {
     let mean = |wave: usize, coefficients: &DVector<f64>| {
-        let sum = nodes.iter().zip(rows).map(|(node, rows)| {
-            node.envelopes[wave] * Complex64::cis(-value(&rows[wave], coefficients))
+        let sum = nodes.iter().zip(functions).map(|(node, functions)| {
+            node.envelopes[wave] * Complex64::cis(-phases(functions, coefficients)[wave])
         });
         sum.sum::<Complex64>().arg()
     };
