@@ -286,10 +286,14 @@ impl Statistics {
         let (mut low, mut high) = ([f64::INFINITY; LANES], [f64::NEG_INFINITY; LANES]);
         let mut counts = [0u64; LANES];
         let sums = &mut self.sums;
+        let (eights, rest) = values.as_chunks::<LANES>();
+        // What is missing changes nothing.
+        let mut last = [f64::NAN; LANES];
+        last[..rest.len()].copy_from_slice(rest);
         widest(
             #[inline(always)]
             || {
-                for eight in values.chunks(LANES) {
+                for eight in eights.iter().chain([&last]) {
                     for (lane, value) in eight.iter().enumerate() {
                         let there = value.is_finite();
                         counts[lane] += u64::from(there);

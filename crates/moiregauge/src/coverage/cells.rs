@@ -234,18 +234,16 @@ impl Cells {
 
     /// The envelope of a wave: its sums under the window.
     pub(crate) fn envelope(&self, sums: &[Complex64], window: &Window) -> Vec<Complex64> {
-        let smoothed = self.smoothed(sums, &window.taps);
-        let weights = smoothed.into_par_iter().zip(&window.weight);
-        weights
-            .with_min_len(FEWEST)
-            .map(|(sum, weight)| {
-                if *weight > 0.0 {
-                    sum / weight
-                } else {
-                    Complex64::default()
-                }
-            })
-            .collect()
+        let mut envelope = self.smoothed(sums, &window.taps);
+        let weights = envelope.par_iter_mut().zip(&window.weight);
+        weights.with_min_len(FEWEST).for_each(|(sum, weight)| {
+            *sum = if *weight > 0.0 {
+                *sum / weight
+            } else {
+                Complex64::default()
+            };
+        });
+        envelope
     }
 
     /// The same at some cells.

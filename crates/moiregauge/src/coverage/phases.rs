@@ -157,7 +157,9 @@ impl Fit {
                     }
                 }
                 let error = node.weights[wave] * node.errors[wave];
-                all.iter_mut().for_each(|sum| *sum *= error);
+                for sum in all {
+                    *sum *= error;
+                }
             }
         });
         all

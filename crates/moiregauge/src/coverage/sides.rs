@@ -36,8 +36,8 @@ pub(crate) fn without_tails(
         let Some(line) = lines.at(n) else {
             return true;
         };
-        let found = sums.iter().zip(seen.typical);
-        let found = found.map(|(sums, typical)| line.value(sums, n).norm() * typical.sqrt());
+        let found = line.values(&sums, n).into_iter().zip(seen.typical);
+        let found = found.map(|(value, typical)| value.norm() * typical.sqrt());
         let noise = seen.noise.iter().zip(seen.typical);
         let noise = noise.map(|(noise, typical)| noise * typical).sum::<f64>() * line.noise;
         found.sum::<f64>() > asked - PLAINLY * (noise / 2.0).sqrt()
@@ -126,11 +126,16 @@ impl Line {
         })
     }
 
-    fn value(&self, sums: &[Complex64], n: usize) -> Complex64 {
-        let weights = self.weights.iter();
-        weights
-            .map(|(by, w)| sums[n.wrapping_add_signed(*by)] * w)
-            .sum()
+    /// Those of three waves.
+    fn values(&self, sums: &[Vec<Complex64>; 3], n: usize) -> [Complex64; 3] {
+        let mut values = [Complex64::default(); 3];
+        for (by, w) in &self.weights {
+            let cell = n.wrapping_add_signed(*by);
+            for (value, sums) in values.iter_mut().zip(sums) {
+                *value += sums[cell] * w;
+            }
+        }
+        values
     }
 }
 

@@ -66,48 +66,47 @@ impl NormalEquations {
 /// L of `L Lᵀ`, column by column; `None` where the matrix is not positive.
 fn factored(mut matrix: DMatrix<f64>) -> Option<DMatrix<f64>> {
     let size = matrix.nrows();
-    let all = matrix.as_mut_slice();
-    let positive = widest(
-        #[inline(always)]
-        || {
-            for j in 0..size {
-                let (before, column) = all.split_at_mut(j * size);
-                let column = &mut column[j..size];
-                take_off(column, before, size, j);
-                let diagonal = column[0];
-                if !(diagonal > 0.0) {
-                    return false;
-                }
-                column[0] = diagonal.sqrt();
-                let root = column[0];
-                column[1..].iter_mut().for_each(|x| *x /= root);
-            }
-            true
-        },
-    );
-    positive.then_some(matrix)
+    for j in 0..size {
+        let (before, column) = matrix.as_mut_slice().split_at_mut(j * size);
+        let column = &mut column[j..size];
+        take_off(column, before, size, j);
+        let diagonal = column[0];
+        if !(diagonal > 0.0) {
+            return None;
+        }
+        let root = diagonal.sqrt();
+        column[0] = root;
+        for below in &mut column[1..] {
+            *below /= root;
+        }
+    }
+    Some(matrix)
 }
 
 /// Takes the finished columns off the part of column `j` from its diagonal on, one after the other, four in one go.
-#[inline(always)]
 fn take_off(column: &mut [f64], before: &[f64], size: usize, j: usize) {
     let below = |k: usize| &before[k * size + j..(k + 1) * size];
     let fours = j / 4;
-    for four in 0..fours {
-        let [a, b, c, d] = [0, 1, 2, 3].map(|i| below(4 * four + i));
-        let [p, q, r, s] = [a[0], b[0], c[0], d[0]];
-        let all = column.iter_mut().zip(a).zip(b).zip(c).zip(d);
-        for ((((x, a), b), c), d) in all {
-            *x = *x - p * a - q * b - r * c - s * d;
-        }
-    }
-    for k in 4 * fours..j {
-        let finished = below(k);
-        let factor = finished[0];
-        for (x, y) in column.iter_mut().zip(finished) {
-            *x -= factor * y;
-        }
-    }
+    widest(
+        #[inline(always)]
+        || {
+            for four in 0..fours {
+                let [a, b, c, d] = [0, 1, 2, 3].map(|i| below(4 * four + i));
+                let [p, q, r, s] = [a[0], b[0], c[0], d[0]];
+                let all = column.iter_mut().zip(a).zip(b).zip(c).zip(d);
+                for ((((x, a), b), c), d) in all {
+                    *x = *x - p * a - q * b - r * c - s * d;
+                }
+            }
+            for k in 4 * fours..j {
+                let finished = below(k);
+                let factor = finished[0];
+                for (x, y) in column.iter_mut().zip(finished) {
+                    *x -= factor * y;
+                }
+            }
+        },
+    );
 }
 
 #[cfg(test)]
