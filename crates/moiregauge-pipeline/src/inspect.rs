@@ -5,7 +5,7 @@
 use std::fmt;
 use std::path::Path;
 
-use moiregauge::numbers::line_name;
+use moiregauge::numbers::{line_name, widest};
 use moiregauge::scan::image_choice;
 use moiregauge::settings::Settings;
 use serde::{Deserialize, Serialize};
@@ -285,23 +285,27 @@ impl Statistics {
     fn add(&mut self, values: &[f64], of: impl Fn(f64) -> f64) {
         let (mut low, mut high) = ([f64::INFINITY; LANES], [f64::NEG_INFINITY; LANES]);
         let mut counts = [0u64; LANES];
-        for eight in values.chunks(LANES) {
-            for (lane, value) in eight.iter().enumerate() {
-                let there = value.is_finite();
-                counts[lane] += u64::from(there);
-                self.sums[lane] += if there { of(*value) } else { 0.0 };
-                low[lane] = if there && *value < low[lane] {
-                    *value
-                } else {
-                    low[lane]
-                };
-                high[lane] = if there && *value > high[lane] {
-                    *value
-                } else {
-                    high[lane]
-                };
-            }
-        }
+        let sums = &mut self.sums;
+        let (eights, rest) = values.as_chunks::<LANES>();
+        // What is missing changes nothing.
+        let mut last = [f64::NAN; LANES];
+        last[..rest.len()].copy_from_slice(rest);
+        widest(
+            #[inline(always)]
+            || {
+                for eight in eights.iter().chain([&last]) {
+                    for (lane, value) in eight.iter().enumerate() {
+                        let there = value.is_finite();
+                        counts[lane] += u64::from(there);
+                        sums[lane] += if there { of(*value) } else { 0.0 };
+                        let lower = there && *value < low[lane];
+                        low[lane] = if lower { *value } else { low[lane] };
+                        let higher = there && *value > high[lane];
+                        high[lane] = if higher { *value } else { high[lane] };
+                    }
+                }
+            },
+        );
         self.count += counts.iter().sum::<u64>() as usize;
         self.min = low.into_iter().fold(self.min, f64::min);
         self.max = high.into_iter().fold(self.max, f64::max);

@@ -127,6 +127,8 @@ impl Inputs<'_> {
             Ok(opened) => opened,
             Err(error) => return (None, failed(&error)),
         };
+        // Where nothing is kept the file is measured in any case: it is hashed beside being decoded.
+        let early = kept.is_empty().then(|| opened.reading(settings));
         let input = opened.identity();
         if let Some(stamp) = stamp {
             let mut read = read.lock().unwrap_or_else(PoisonError::into_inner);
@@ -137,7 +139,7 @@ impl Inputs<'_> {
             return (None, known.clone().map(|moires| (moires, input)));
         }
         interrupt::check();
-        let reading = opened.reading(settings);
+        let reading = early.unwrap_or_else(|| opened.reading(settings));
         let reading = reading.and_then(|r| enough_for(&r.scan).map(|()| r).map_err(Into::into));
         drop(opened);
         match reading.and_then(|reading| of_reading(reading, settings, self.window)) {

@@ -27,11 +27,14 @@ pub(crate) struct Shades {
 /// The range from the `share` quantile to the `1 − share` quantile of the finite values.
 pub(crate) fn contrast(image: &Image, share: f64) -> Range {
     let mut values = image.finite();
-    values.sort_by(f64::total_cmp);
-    let at = |q: f64| values.get(((values.len().max(1) - 1) as f64 * q).round() as usize);
+    let mut at = |q: f64| {
+        let place = (values.len().checked_sub(1)? as f64 * q).round() as usize;
+        let (_, value, _) = values.select_nth_unstable_by(place, f64::total_cmp);
+        Some(*value)
+    };
     match (at(share), at(1.0 - share)) {
-        (Some(&low), Some(&high)) if low < high => Range::new(low, high),
-        (Some(&low), _) => Range::new(low - 0.5, low + 0.5),
+        (Some(low), Some(high)) if low < high => Range::new(low, high),
+        (Some(low), _) => Range::new(low - 0.5, low + 0.5),
         _ => Range::new(0.0, 1.0),
     }
 }

@@ -4,11 +4,10 @@ use nalgebra::Vector2;
 use spmfile::{Channel, LineDirection, Scan};
 
 use crate::campaign::analysis::ScanAnalysis;
-use crate::frame::background::remove_background;
 use crate::frame::image::Image;
 use crate::frame::plane::PlaneFit;
 use crate::frame::sensors::SensorGeometry;
-use crate::scan::channel::{channels, choose_channel, image_of};
+use crate::scan::channel::{channels, choose_channel, flat_image_of};
 use crate::scan::picture::{Companion, Illustration, Picture};
 use crate::scan::place::Place;
 use crate::scan::positions::sensor_images;
@@ -33,7 +32,7 @@ pub fn illustrate(
         .ok()?
         .into_iter()
         .find(|c| c.line_direction.unwrap_or(LineDirection::Trace) == line.line)?;
-    let image = remove_background(&image_of(channel), settings.background);
+    let image = flat_image_of(channel, settings.background);
     let mut ignored = Vec::new();
     let place = Place::of("", scan, channel, settings, &mut ignored)?;
     let measured = place
@@ -133,7 +132,7 @@ fn amplitude(scan: &Scan, phase: &Channel, settings: &Settings) -> Option<Compan
     Some(Companion {
         channel: found.name.clone(),
         unit: found.unit.clone(),
-        image: remove_background(&image_of(found), settings.background),
+        image: flat_image_of(found, settings.background),
     })
 }
 
@@ -152,7 +151,7 @@ pub fn picture(file: &str, scan: &Scan, settings: &Settings) -> Option<Picture> 
     let channel = scan.channels.iter().find(|c| c.name == name)?;
     let place = Place::of(file, scan, channel, settings, &mut Vec::new())?;
     let geometry = place.geometry;
-    let image = remove_background(&image_of(channel), settings.background);
+    let image = flat_image_of(channel, settings.background);
     let block = image.columns.max(image.rows).div_ceil(MOST_PIXELS).max(1);
     // Pixels that fill no block are left out, as few as they are.
     let middle = Vector2::repeat((block - 1) as f64 / 2.0);

@@ -286,12 +286,13 @@ fn slopes(fit: &Fit, cells: &Cells, patch: &Patch) -> Slopes {
     let inside = area(cells, patch);
     let lines = (0..cells.size[1]).into_par_iter().map(|row| {
         let mut sums = DMatrix::zeros(4, fit.coefficients.len());
-        let mut local = Vec::new();
+        let (mut local, mut functions) = (Vec::new(), Vec::new());
         let first = row * cells.size[0];
         for cell in (first..first + cells.size[0]).filter(|&c| inside[c]) {
             let count = cells.counts()[cell];
             let mut slopes = Matrix2::zeros();
-            for (i, [_, along, across]) in fit.basis.at(cells.middle_of(cell)) {
+            fit.basis.put(cells.middle_of(cell), &mut functions);
+            for &(i, [_, along, across]) in &functions {
                 for wave in 0..2 {
                     let c = fit.coefficients[wave * n + i];
                     for (axis, slope) in [along, across].into_iter().enumerate() {
@@ -322,7 +323,7 @@ fn slopes(fit: &Fit, cells: &Cells, patch: &Patch) -> Slopes {
     }
 }
 
-/// By how much the mean (ψ₁ and ψ₂, a column each) would differ with another choice.
+/// By how much the mean `step` (ψ₁ and ψ₂, a column each) would differ with another choice.
 struct Otherwise {
     /// By the next description or, where the lattice is the same everywhere, by the nodes whose windows no edge cuts off.
     next: Matrix2<f64>,
@@ -330,7 +331,13 @@ struct Otherwise {
     finest: Option<Matrix2<f64>>,
 }
 
-fn otherwise(chosen: &Chosen, nodes: &[Node], view: &View, patch: &Patch) -> Otherwise {
+fn otherwise(
+    chosen: &Chosen,
+    step: &Matrix2<f64>,
+    nodes: &[Node],
+    view: &View,
+    patch: &Patch,
+) -> Otherwise {
     let inner = || {
         let least = nodes.iter().map(|n| n.gain).fold(f64::INFINITY, f64::min);
         let inner: Vec<Node> = (nodes.iter())
@@ -345,8 +352,7 @@ fn otherwise(chosen: &Chosen, nodes: &[Node], view: &View, patch: &Patch) -> Oth
     } else {
         None
     };
-    let mean = |fit: &Fit| slopes(fit, view.cells, patch).mean;
-    let off = |other: &Fit| mean(other) - mean(&chosen.fit);
+    let off = |other: &Fit| slopes(other, view.cells, patch).mean - step;
     let next = chosen.next.as_ref().or(again.as_ref());
     Otherwise {
         next: next.map_or_else(Matrix2::zeros, off),
@@ -368,7 +374,7 @@ fn summary(chosen: &Chosen, nodes: &[Node], view: &View, patch: &Patch) -> Mean 
     let covariance = fit.covariance(&sums, nodes, reach);
     let covariance = Matrix4::from_column_slice(covariance.as_slice());
     let edges = edges(fit, cells, patch, &step);
-    let Otherwise { next, finest } = otherwise(chosen, nodes, view, patch);
+    let Otherwise { next, finest } = otherwise(chosen, &step, nodes, view, patch);
     let square = |off: &Matrix2<f64>| {
         let off = Vector4::from_column_slice(off.as_slice());
         off * off.transpose()

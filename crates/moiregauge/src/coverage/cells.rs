@@ -3,6 +3,8 @@
 //! `a(r) = Σ g(n − r) I(n) e^{−iq·n} / Σ g(n − r)` over the pixels n that are there. Sums over the pixels of a cell
 //! come first, then the window on the cells, which are few.
 
+use std::ops::Range;
+
 use heterostrain::lattice::reciprocal;
 use nalgebra::{Matrix2, Vector2};
 use rayon::prelude::*;
@@ -95,12 +97,39 @@ impl Cells {
 
     /// `Σ I e^{−iq·n}` over each cell, pixels counted from (0, 0).
     pub(crate) fn mixed(&self, image: &Image, q: Vector2<f64>) -> Vec<Complex64> {
-        let turns = |axis: usize, count: usize| -> Vec<Complex64> {
-            (0..count)
+        let size = [image.columns, image.rows];
+        self.mix(size, q, |first, turns, parts| {
+            for (row, turn) in (first..).zip(turns) {
+                add_turned(parts, image.row(row), *turn);
+            }
+        })
+    }
+
+    /// The same for an image of ones, of so many columns and rows.
+    pub(crate) fn mixed_ones(&self, size: [usize; 2], q: Vector2<f64>) -> Vec<Complex64> {
+        self.mix(size, q, |_, turns, [re, im]| {
+            // One after the other, as in any image.
+            let sum = turns
+                .iter()
+                .fold(Complex64::default(), |sum, turn| sum + turn);
+            re.fill(sum.re);
+            im.fill(sum.im);
+        })
+    }
+
+    /// The same; `add` adds up some lines, of which the first is given, each turned by its phase.
+    fn mix(
+        &self,
+        size: [usize; 2],
+        q: Vector2<f64>,
+        add: impl Fn(usize, &[Complex64], &mut [Vec<f64>; 2]) + Sync,
+    ) -> Vec<Complex64> {
+        let turns = |axis: usize| -> Vec<Complex64> {
+            (0..size[axis])
                 .map(|i| Complex64::cis(-q[axis] * i as f64))
                 .collect()
         };
-        let (along, up) = (turns(0, image.columns), turns(1, image.rows));
+        let (along, up) = (turns(0), turns(1));
         let mut sums = vec![Complex64::default(); self.len()];
         let [width, height] = self.pixels;
         let bands = sums
@@ -108,11 +137,10 @@ impl Cells {
             .with_min_len(FEWEST.div_ceil(self.size[0]));
         bands.enumerate().for_each(|(band, cells)| {
             // All lines of the cells first, column by column.
-            let mut parts = [vec![0.0; image.columns], vec![0.0; image.columns]];
+            let mut parts = [vec![0.0; size[0]], vec![0.0; size[0]]];
             let first = band * height;
-            for (row, turn) in (first..).zip(up[first..].iter().take(height)) {
-                add_turned(&mut parts, image.row(row), *turn);
-            }
+            let turns = &up[first..(first + height).min(size[1])];
+            add(first, turns, &mut parts);
             let [re, im] = &parts;
             let columns = re
                 .chunks(width)
@@ -162,14 +190,16 @@ impl Cells {
         let mut columns: Vec<usize> = at.iter().map(|i| i % across).collect();
         columns.sort_unstable();
         columns.dedup();
-        let mut lines = Vec::with_capacity(up * columns.len());
-        for line in sums.chunks_exact(across) {
-            lines.extend(
-                columns
-                    .iter()
-                    .map(|&x| under(&window.taps[0], x, across, |i| line[i])),
-            );
-        }
+        let mut lines = vec![Complex64::default(); up * columns.len()];
+        let all = sums
+            .par_chunks_exact(across)
+            .zip(lines.par_chunks_exact_mut(columns.len().max(1)))
+            .with_min_len(FEWEST.div_ceil(across));
+        all.for_each(|(line, out)| {
+            for (out, &x) in out.iter_mut().zip(&columns) {
+                *out = under(&window.taps[0], x, across, |i| line[i]);
+            }
+        });
         let of = |&i: &usize| {
             let column = columns.partition_point(|x| *x < i % across);
             let line = |y: usize| lines[y * columns.len() + column];
@@ -204,17 +234,16 @@ impl Cells {
 
     /// The envelope of a wave: its sums under the window.
     pub(crate) fn envelope(&self, sums: &[Complex64], window: &Window) -> Vec<Complex64> {
-        let smoothed = self.smoothed(sums, &window.taps);
-        let weights = smoothed.iter().zip(&window.weight);
-        weights
-            .map(|(sum, weight)| {
-                if *weight > 0.0 {
-                    sum / weight
-                } else {
-                    Complex64::default()
-                }
-            })
-            .collect()
+        let mut envelope = self.smoothed(sums, &window.taps);
+        let weights = envelope.par_iter_mut().zip(&window.weight);
+        weights.with_min_len(FEWEST).for_each(|(sum, weight)| {
+            *sum = if *weight > 0.0 {
+                *sum / weight
+            } else {
+                Complex64::default()
+            };
+        });
+        envelope
     }
 
     /// The same at some cells.
@@ -243,9 +272,10 @@ impl Cells {
         let mut lines = vec![T::default(); values.len()];
         let reach = taps[0].len() / 2;
         let all = values
-            .chunks_exact(across)
-            .zip(lines.chunks_exact_mut(across));
-        for (line, out) in all {
+            .par_chunks_exact(across)
+            .zip(lines.par_chunks_exact_mut(across))
+            .with_min_len(at_once);
+        all.for_each(|(line, out)| {
             for (i, tap) in taps[0].iter().enumerate() {
                 // Values at x + i − reach.
                 let (before, after) = (reach.saturating_sub(i), i.saturating_sub(reach));
@@ -257,7 +287,7 @@ impl Cells {
                     );
                 }
             }
-        }
+        });
         let mut out = vec![T::default(); values.len()];
         let reach = taps[1].len() / 2;
         let targets = out.par_chunks_exact_mut(across).with_min_len(at_once);
@@ -322,21 +352,27 @@ pub(crate) struct Window {
 }
 
 impl Window {
+    /// Columns and rows of the cells under the window at one of them, of so many.
+    pub(crate) fn under(&self, size: [usize; 2], at: usize) -> [Range<usize>; 2] {
+        let at = [at % size[0], at / size[0]];
+        [0, 1].map(|axis| {
+            let reach = self.taps[axis].len() / 2;
+            at[axis].saturating_sub(reach)..(at[axis] + reach + 1).min(size[axis])
+        })
+    }
+
     /// The cells under the window at one of them, of so many columns and rows: each with its distance from it and its tap.
     pub(crate) fn cells(
         &self,
         size: [usize; 2],
         at: usize,
     ) -> impl Iterator<Item = (usize, [f64; 2], f64)> + '_ {
+        let place = [at % size[0], at / size[0]];
+        let under = self.under(size, at);
         let [along, up] = [0, 1].map(|axis| {
-            let at = if axis == 0 {
-                at % size[0]
-            } else {
-                at / size[0]
-            };
+            let at = place[axis];
             let reach = self.taps[axis].len() / 2;
-            let others = at.saturating_sub(reach)..=(at + reach).min(size[axis] - 1);
-            others.map(move |other| {
+            under[axis].clone().map(move |other| {
                 (
                     other,
                     other as f64 - at as f64,

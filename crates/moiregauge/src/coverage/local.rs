@@ -4,15 +4,20 @@
 //! each other and with the background, by a tenth and more; the normal equations take that off.
 
 use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
+use rayon::prelude::*;
 use rustfft::num_complex::Complex64;
 
 use crate::coverage::cells::Cells;
+use crate::coverage::look::ones;
 use crate::frame::image::Image;
 
 /// The background and the two waves of each of three harmonics, as (h, k).
 const BASIS: [[i32; 2]; 7] = [[0, 0], [1, 0], [0, 1], [-1, 1], [-1, 0], [0, -1], [1, -1]];
 /// Noise is enlarged by no more than this where an edge is near: beyond, the waves cannot be told apart.
 const MOST: f64 = 4.0;
+
+/// Places that a thread solves at once, at least.
+const AT_ONCE: usize = 64;
 
 /// The envelopes of K₁, K₂ and K₂ − K₁ at a place, and the variance that white noise of unit power per pixel gives each.
 pub(crate) struct Local {
@@ -90,19 +95,11 @@ pub(crate) fn local(
             noise: larger.map(|l| l * window.noise[at[n]]),
         })
     };
-    (0..at.len()).map(solve).collect()
-}
-
-/// 1 where a pixel is; `None` if all are there.
-fn ones(part: &Image) -> Option<Image> {
-    if part.values.iter().all(|v| v.is_finite()) {
-        return None;
-    }
-    let ones = part
-        .values
-        .iter()
-        .map(|v| if v.is_finite() { 1.0 } else { f64::NAN });
-    Some(Image::new(part.rows, part.columns, ones.collect()))
+    (0..at.len())
+        .into_par_iter()
+        .with_min_len(AT_ONCE)
+        .map(solve)
+        .collect()
 }
 
 #[cfg(test)]

@@ -1,6 +1,7 @@
 //! What a window that is slid over a frame sees of three waves: where they are, how strong they are, and how strong noise is.
 
 use nalgebra::{Matrix2, Vector2};
+use rayon::prelude::*;
 use rustfft::num_complex::Complex64;
 
 use crate::coverage::cells::{Cells, Window};
@@ -74,8 +75,8 @@ impl Seen {
 pub(crate) struct Frame<'a> {
     pub(crate) cells: &'a Cells,
     image: &'a Image,
-    /// 1 where a pixel is there.
-    ones: Image,
+    /// 1 where a pixel is there; `None` where all are.
+    ones: Option<Image>,
     /// Sums of the pixels of each cell.
     level: Vec<Complex64>,
 }
@@ -103,14 +104,10 @@ impl Waves {
 
 impl<'a> Frame<'a> {
     pub(crate) fn new(cells: &'a Cells, image: &'a Image) -> Self {
-        let present = image
-            .values
-            .iter()
-            .map(|v| if v.is_finite() { 1.0 } else { f64::NAN });
         Self {
             cells,
             image,
-            ones: Image::new(image.rows, image.columns, present.collect()),
+            ones: ones(image),
             level: cells.mixed(image, Vector2::zeros()),
         }
     }
@@ -119,7 +116,10 @@ impl<'a> Frame<'a> {
         let mixed = |image: &Image, q: Vector2<f64>| self.cells.mixed(image, q);
         Waves {
             sums: three(pair).map(|q| mixed(self.image, q)),
-            ones: three(pair).map(|q| mixed(&self.ones, q)),
+            ones: three(pair).map(|q| match &self.ones {
+                Some(ones) => mixed(ones, q),
+                None => (self.cells).mixed_ones([self.image.columns, self.image.rows], q),
+            }),
             quiet: hollows(pair).map(|places| places.map(|q| mixed(self.image, q))),
         }
     }
@@ -142,11 +142,10 @@ impl<'a> Frame<'a> {
         }
         let at = |values: Vec<Complex64>| usable.iter().map(|&i| values[i]).collect::<Vec<_>>();
         let of_noise: Vec<f64> = usable.iter().map(|&i| window.noise[i]).collect();
-        let quiet = |places: &[Vec<Complex64>; 2]| {
-            let level = |sums| level(&at(cells.envelope(sums, window)), &of_noise);
-            f64::midpoint(level(&places[0]), level(&places[1]))
-        };
-        let noise = [0, 1, 2].map(|i| quiet(&quiet_sums[i]));
+        let quiet = quiet_sums.as_flattened().par_iter();
+        let quiet = quiet.map(|sums| level(&at(cells.envelope(sums, window)), &of_noise));
+        let quiet: Vec<f64> = quiet.collect();
+        let noise = [0, 2, 4].map(|i| f64::midpoint(quiet[i], quiet[i + 1]));
         let one = median(&mut of_noise.clone());
         let unit = noise.map(|noise| noise * one);
         let powers =
@@ -197,6 +196,18 @@ impl<'a> Frame<'a> {
         let powers = waves.sums.each_ref().map(power);
         typical(&powers, unit, GLANCE * QUIET).is_some()
     }
+}
+
+/// 1 where a pixel is; `None` if all are there.
+pub(crate) fn ones(image: &Image) -> Option<Image> {
+    if image.values.par_iter().all(|v| v.is_finite()) {
+        return None;
+    }
+    let ones = image
+        .values
+        .iter()
+        .map(|v| if v.is_finite() { 1.0 } else { f64::NAN });
+    Some(Image::new(image.rows, image.columns, ones.collect()))
 }
 
 /// Noise power per pixel, as the median sees it: edges and steps, which are in few cells, do not count.

@@ -5,8 +5,10 @@
 use std::collections::HashMap;
 
 use nalgebra::{DMatrix, DVector, Vector2};
+use rayon::prelude::*;
 use rustfft::num_complex::Complex64;
 
+use crate::coverage::equations::{Functions, Sums};
 use crate::coverage::nodes::{Node, information, neighbours};
 use crate::coverage::patch::Patch;
 use crate::numbers::normal_equations::NormalEquations;
@@ -54,6 +56,14 @@ impl Basis {
 
     /// The functions that are not zero at a place: position, value and slopes.
     pub(crate) fn at(&self, at: Vector2<f64>) -> Vec<(usize, [f64; 3])> {
+        let mut all = Vec::new();
+        self.put(at, &mut all);
+        all
+    }
+
+    /// The same in place of what was there.
+    pub(crate) fn put(&self, at: Vector2<f64>, out: &mut Vec<(usize, [f64; 3])>) {
+        out.clear();
         match self {
             Self::Powers {
                 degree,
@@ -68,13 +78,12 @@ impl Basis {
                     [x * y, slope(a, dx * y) / half.x, slope(b, x * dy) / half.y]
                 };
                 let all = (0..=*degree).flat_map(|total| (0..=total).map(move |b| [total - b, b]));
-                all.map(of).enumerate().collect()
+                out.extend(all.map(of).enumerate());
             }
             Self::Splines(splines) => {
                 let s = splines.at(at);
-                (0..16)
-                    .map(|i| (s.places[i], [s.values[i], s.along[i], s.across[i]]))
-                    .collect()
+                let all = (0..16).map(|i| (s.places[i], [s.values[i], s.along[i], s.across[i]]));
+                out.extend(all);
             }
         }
     }
@@ -111,45 +120,61 @@ impl Fit {
         for (mut gain, sum) in gains.row_iter_mut().zip(sums.row_iter()) {
             gain.tr_copy_from(&self.equations.solve(&sum.transpose()));
         }
-        // What each phase does to the sums, times its error.
-        let of_node = |node: &Node| {
-            rows(&self.basis, node.at).map(|row| {
-                let mut gain = DVector::zeros(sums.nrows());
-                for (i, x) in row {
-                    gain += gains.column(i) * x;
-                }
-                gain
-            })
-        };
-        let all: Vec<[DVector<f64>; 3]> = nodes
-            .iter()
-            .map(|node| {
-                let mut gains = of_node(node);
-                for (wave, gain) in gains.iter_mut().enumerate() {
-                    *gain *= node.weights[wave] * node.errors[wave];
-                }
-                gains
-            })
-            .collect();
-        let mut covariance = DMatrix::zeros(sums.nrows(), sums.nrows());
+        let count = sums.nrows();
+        let all = self.of_phases(&gains, nodes);
+        let of = |node: usize, wave: usize| &all[(3 * node + wave) * count..][..count];
         let near = Near::new(nodes, reach);
-        for (i, a) in nodes.iter().enumerate() {
-            for j in near.from(i) {
-                let d = (nodes[j].at - a.at).component_div(&reach);
-                let correlation = (-0.25 * d.norm_squared()).exp();
-                if correlation < UNCORRELATED {
-                    continue;
-                }
-                for (first, second) in all[i].iter().zip(&all[j]) {
-                    let product = correlation * first * second.transpose();
-                    covariance += &product;
+        let near: Vec<Vec<(usize, f64)>> = (0..nodes.len())
+            .into_par_iter()
+            .map(|i| near.correlated(i, nodes, reach))
+            .collect();
+        let mut covariance = DMatrix::zeros(count, count);
+        for (i, near) in near.iter().enumerate() {
+            for &(j, correlation) in near {
+                for wave in 0..3 {
+                    let (first, second) = (of(i, wave), of(j, wave));
+                    add_outer(&mut covariance, |a, b| correlation * first[a] * second[b]);
                     if i != j {
-                        covariance += product.transpose();
+                        add_outer(&mut covariance, |a, b| correlation * first[b] * second[a]);
                     }
                 }
             }
         }
         covariance * self.enlarged
+    }
+
+    /// What each phase of each node does to some sums, times its error: the sums of each phase side by side.
+    fn of_phases(&self, gains: &DMatrix<f64>, nodes: &[Node]) -> Vec<f64> {
+        let count = gains.nrows();
+        let mut all = vec![0.0; 3 * nodes.len() * count];
+        let of_nodes = all.par_chunks_exact_mut(3 * count).zip(nodes);
+        of_nodes.with_min_len(AT_ONCE).for_each(|(all, node)| {
+            let rows = rows(&self.basis, node.at);
+            for (wave, (all, row)) in all.chunks_exact_mut(count).zip(rows).enumerate() {
+                for (i, x) in row {
+                    for (sum, gain) in all.iter_mut().zip(&gains.column(i)) {
+                        *sum += gain * x;
+                    }
+                }
+                let error = node.weights[wave] * node.errors[wave];
+                for sum in all {
+                    *sum *= error;
+                }
+            }
+        });
+        all
+    }
+}
+
+/// Nodes that a thread takes at once, at least.
+const AT_ONCE: usize = 64;
+
+/// Adds a value for each row and column.
+fn add_outer(sum: &mut DMatrix<f64>, value: impl Fn(usize, usize) -> f64) {
+    for column in 0..sum.ncols() {
+        for row in 0..sum.nrows() {
+            sum[(row, column)] += value(row, column);
+        }
     }
 }
 
@@ -176,13 +201,19 @@ impl Near {
         Self { squares, members }
     }
 
-    /// A node and those after it that may be near, in order.
-    fn from(&self, i: usize) -> Vec<usize> {
+    /// A node and those after it whose errors are correlated with its own, in order, and how much.
+    fn correlated(&self, i: usize, nodes: &[Node], reach: Vector2<f64>) -> Vec<(usize, f64)> {
         let [x, y] = self.squares[i];
         let around = (y - 1..=y + 1).flat_map(|y| (x - 1..=x + 1).map(move |x| [x, y]));
         let members = around.filter_map(|square| self.members.get(&square));
-        let mut near: Vec<usize> = members.flatten().copied().filter(|&j| j >= i).collect();
-        near.sort_unstable();
+        let near = members.flatten().copied().filter(|&j| j >= i);
+        let near = near.map(|j| {
+            let d = (nodes[j].at - nodes[i].at).component_div(&reach);
+            (j, (-0.25 * d.norm_squared()).exp())
+        });
+        // Not the same as what is at least that where a correlation is not a number.
+        let mut near: Vec<_> = near.filter(|(_, c)| !(*c < UNCORRELATED)).collect();
+        near.sort_unstable_by_key(|(j, _)| *j);
         near
     }
 }
@@ -216,134 +247,86 @@ pub(crate) fn value(row: &[(usize, f64)], coefficients: &DVector<f64>) -> f64 {
     row.iter().map(|(i, x)| coefficients[*i] * x).sum()
 }
 
-/// Normal equations that are filled row by row, in the lower triangle.
-struct Sums {
-    normal: DMatrix<f64>,
-    right: DVector<f64>,
-}
-
-impl Sums {
-    fn new(size: usize) -> Self {
-        Self {
-            normal: DMatrix::zeros(size, size),
-            right: DVector::zeros(size),
-        }
-    }
-
-    /// A row, ordered by coefficients.
-    fn add(&mut self, row: &[(usize, f64)], weight: f64) {
-        let size = self.normal.nrows();
-        for (n, (j, y)) in row.iter().enumerate() {
-            let column = &mut self.normal.as_mut_slice()[j * size..(j + 1) * size];
-            let y = weight * y;
-            for (i, x) in &row[n..] {
-                column[*i] += x * y;
-            }
-        }
-    }
-
-    /// What was measured of a row.
-    fn add_right(&mut self, row: &[(usize, f64)], measured: f64, weight: f64) {
-        for (i, x) in row {
-            self.right[*i] += weight * x * measured;
-        }
-    }
-
-    fn equations(&self, basis: &Basis) -> Option<NormalEquations> {
-        let mut normal = self.normal.clone();
-        let size = self.right.len();
-        let stiffness = STIFFNESS * normal.trace() / size as f64;
-        normal.fill_upper_triangle_with_lower_triangle();
-        if let Basis::Splines(splines) = basis {
-            for first in [0, basis.len()] {
-                splines.in_lines(|places| {
-                    for (a, x) in places.iter().zip([1.0, -2.0, 1.0]) {
-                        for (b, y) in places.iter().zip([1.0, -2.0, 1.0]) {
-                            normal[(first + a, first + b)] += stiffness * x * y;
-                        }
-                    }
-                });
-            }
-        }
-        // Constants are free where only differences are looked at.
-        for i in 0..size {
-            normal[(i, i)] += 1e-3 * stiffness;
-        }
-        let units = NormalEquations::units(&normal);
-        NormalEquations::new(&normal, units, |_| 0.0)
-    }
-}
-
 /// The coefficients by what changes from node to node, which needs no unwrapping.
-fn by_differences(
-    basis: &Basis,
-    nodes: &[Node],
-    rows: &[[Vec<(usize, f64)>; 3]],
-) -> Option<DVector<f64>> {
-    let size = 2 * basis.len() + 1;
-    let mut coefficients = DVector::zeros(size);
+fn by_differences(basis: &Basis, nodes: &[Node], functions: &[Functions]) -> Option<DVector<f64>> {
+    let mut sums = Sums::new(basis.len());
+    let mut coefficients = DVector::zeros(sums.right.len());
     let neighbours = neighbours(nodes);
-    let weight =
-        |a: usize, b: usize, wave: usize| f64::min(nodes[a].weights[wave], nodes[b].weights[wave]);
-    let mut sums = Sums::new(size);
+    let weights = |a: usize, b: usize| {
+        [0, 1, 2].map(|wave| f64::min(nodes[a].weights[wave], nodes[b].weights[wave]))
+    };
     let mut differences = Vec::with_capacity(neighbours.len());
     for &(a, b) in &neighbours {
-        let each = [0, 1, 2].map(|wave| difference(&rows[b][wave], &rows[a][wave]));
-        for (wave, row) in each.iter().enumerate() {
-            sums.add(row, weight(a, b, wave));
-        }
-        differences.push(each);
+        let difference = functions[b].less(&functions[a]);
+        sums.add(&difference, weights(a, b), 0.0);
+        differences.push(difference);
     }
     let equations = sums.equations(basis)?;
     for _ in 0..ROUNDS[0] {
         sums.right.fill(0.0);
-        for (&(a, b), each) in neighbours.iter().zip(&differences) {
-            for (wave, row) in each.iter().enumerate() {
+        for (&(a, b), difference) in neighbours.iter().zip(&differences) {
+            let phases = difference.phases(&coefficients, basis.len());
+            let left = [0, 1, 2].map(|wave| {
                 let turn = nodes[a].envelopes[wave].conj() * nodes[b].envelopes[wave];
-                let left = (turn * Complex64::cis(-value(row, &coefficients))).arg();
-                sums.add_right(row, left, weight(a, b, wave));
-            }
+                (turn * Complex64::cis(-phases[wave])).arg()
+            });
+            sums.add_right(difference, left, weights(a, b), 0.0);
         }
         coefficients += equations.solve(&sums.right);
     }
     Some(coefficients)
 }
 
+/// The phases of the three waves at a place.
+fn phases(functions: &Functions, coefficients: &DVector<f64>) -> [f64; 3] {
+    let last = coefficients.len() - 1;
+    let [first, second, third] = functions.phases(coefficients, last / 2);
+    [first, second, third + coefficients[last]]
+}
+
 /// Improves the coefficients by the phases themselves; the equations and χ² of the last round.
 fn by_phases(
     basis: &Basis,
     nodes: &[Node],
-    rows: &[[Vec<(usize, f64)>; 3]],
+    functions: &[Functions],
     coefficients: &mut DVector<f64>,
 ) -> Option<(NormalEquations, f64)> {
     let mut chi2 = 0.0;
     // What is followed, and the equations for that.
-    let mut last: Option<(Vec<bool>, NormalEquations)> = None;
+    let mut last: Option<(Vec<[bool; 3]>, NormalEquations)> = None;
     for _ in 0..ROUNDS[1] {
-        let mut sums = Sums::new(coefficients.len());
-        let mut followed = Vec::with_capacity(3 * nodes.len());
+        let mut sums = Sums::new(basis.len());
+        let mut followed = Vec::with_capacity(nodes.len());
         chi2 = 0.0;
-        for (node, rows) in nodes.iter().zip(rows) {
-            for (wave, row) in rows.iter().enumerate() {
-                let left = node.envelopes[wave] * Complex64::cis(-value(row, coefficients));
-                let (left, weight) = (left.arg(), node.weights[wave]);
+        for (node, functions) in nodes.iter().zip(functions) {
+            let phases = phases(functions, coefficients);
+            let (mut measured, mut weights) = ([0.0; 3], [0.0; 3]);
+            followed.push([0, 1, 2].map(|wave| {
+                let left = (node.envelopes[wave] * Complex64::cis(-phases[wave])).arg();
+                let weight = node.weights[wave];
                 // What is lost counts as if it were at the limit, and moves nothing.
                 chi2 += weight * left.clamp(-LOST, LOST).powi(2);
                 let follows = left.abs() < LOST;
-                followed.push(follows);
                 if follows {
-                    sums.add_right(row, left, weight);
+                    (measured[wave], weights[wave]) = (left, weight);
                 }
-            }
+                follows
+            }));
+            sums.add_right(functions, measured, weights, 1.0);
         }
         let known = last.take().filter(|(before, _)| *before == followed);
         let (followed, equations) = if let Some(known) = known {
             known
         } else {
-            for (n, (node, rows)) in nodes.iter().zip(rows).enumerate() {
-                for (wave, row) in rows.iter().enumerate().filter(|(i, _)| followed[3 * n + i]) {
-                    sums.add(row, node.weights[wave]);
-                }
+            for ((node, functions), follows) in nodes.iter().zip(functions).zip(&followed) {
+                let weight = |wave: usize| {
+                    if follows[wave] {
+                        node.weights[wave]
+                    } else {
+                        0.0
+                    }
+                };
+                sums.add(functions, [0, 1, 2].map(weight), 1.0);
             }
             let equations = sums.equations(basis)?;
             (followed, equations)
@@ -356,10 +339,11 @@ fn by_phases(
 
 pub(crate) fn fit(basis: Basis, nodes: &[Node]) -> Option<Fit> {
     let size = 2 * basis.len() + 1;
-    let rows: Vec<[Vec<(usize, f64)>; 3]> = nodes.iter().map(|n| rows(&basis, n.at)).collect();
-    let mut coefficients = by_differences(&basis, nodes, &rows)?;
-    align(&basis, nodes, &rows, &mut coefficients);
-    let (equations, chi2) = by_phases(&basis, nodes, &rows, &mut coefficients)?;
+    let functions = nodes.iter().map(|node| Functions::at(&basis, node.at));
+    let functions: Vec<Functions> = functions.collect();
+    let mut coefficients = by_differences(&basis, nodes, &functions)?;
+    align(&basis, nodes, &functions, &mut coefficients);
+    let (equations, chi2) = by_phases(&basis, nodes, &functions, &mut coefficients)?;
     let all: f64 = nodes.iter().flat_map(|node| node.weights).sum();
     let count = 3.0 * nodes.len() as f64;
     let share = nodes.first()?.share;
@@ -391,40 +375,11 @@ pub(crate) fn price(chi2: f64, parameters: f64, independent: f64) -> f64 {
     independent * (chi2 / independent).ln() + parameters * independent.ln()
 }
 
-/// b − a, of rows that are ordered by coefficients.
-fn difference(b: &[(usize, f64)], a: &[(usize, f64)]) -> Vec<(usize, f64)> {
-    let mut both = Vec::with_capacity(a.len() + b.len());
-    let (mut a, mut b) = (a.iter().peekable(), b.iter().peekable());
-    loop {
-        match (a.peek(), b.peek()) {
-            (Some((i, x)), Some((j, y))) if i == j => {
-                both.push((*i, y - x));
-                a.next();
-                b.next();
-            }
-            (Some((i, x)), other) if other.is_none_or(|(j, _)| i < j) => {
-                both.push((*i, -x));
-                a.next();
-            }
-            (_, Some((j, y))) => {
-                both.push((*j, *y));
-                b.next();
-            }
-            _ => return both,
-        }
-    }
-}
-
 /// Sets the constants to the mean phases.
-pub(crate) fn align(
-    basis: &Basis,
-    nodes: &[Node],
-    rows: &[[Vec<(usize, f64)>; 3]],
-    coefficients: &mut DVector<f64>,
-) {
+fn align(basis: &Basis, nodes: &[Node], functions: &[Functions], coefficients: &mut DVector<f64>) {
     let mean = |wave: usize, coefficients: &DVector<f64>| {
-        let sum = nodes.iter().zip(rows).map(|(node, rows)| {
-            node.envelopes[wave] * Complex64::cis(-value(&rows[wave], coefficients))
+        let sum = nodes.iter().zip(functions).map(|(node, functions)| {
+            node.envelopes[wave] * Complex64::cis(-phases(functions, coefficients)[wave])
         });
         sum.sum::<Complex64>().arg()
     };

@@ -5,11 +5,14 @@
 //! far the pair is off; a few rounds of both settle. The skirts that an edge gives to a wave are this wave with a
 //! slope of its phase: they settle on the wave itself.
 
+use std::cell::OnceCell;
+
 use nalgebra::{Matrix2, Vector2};
+use rayon::prelude::*;
 use rustfft::num_complex::Complex64;
 
 use crate::coverage::bend::{Mean, mean, refined};
-use crate::coverage::cells::Cells;
+use crate::coverage::cells::{Cells, Window};
 use crate::coverage::grains::{Grains, split};
 use crate::coverage::look::{Frame, Seen};
 use crate::coverage::nodes::View;
@@ -80,19 +83,19 @@ fn settle_bins(
     if cells.size.iter().any(|n| *n < 4) {
         return None;
     }
-    let windows = WIDTHS.map(|width| cells.window(width));
+    let windows = Windows::new(&cells);
     let frame = Frame::new(&cells, image);
     let mut pair = *pair;
     let mut narrowest = 0;
     let mut settled = None;
     for round in 0..ROUNDS {
         let waves = frame.waves(&pair);
-        let mut all = windows.iter().zip(WIDTHS);
-        if round == 0 && !all.any(|(window, width)| frame.shows(&waves, window, width)) {
+        let mut all = WIDTHS.into_iter().enumerate();
+        if round == 0 && !all.any(|(i, width)| frame.shows(&waves, windows.at(i), width)) {
             return None;
         }
         let seen = (narrowest..WIDTHS.len())
-            .find_map(|i| Some((i, frame.look(&waves, &windows[i], WIDTHS[i])?)));
+            .find_map(|i| Some((i, frame.look(&waves, windows.at(i), WIDTHS[i])?)));
         let (width, seen) = seen?;
         narrowest = width;
         let patch = patch(&cells, &seen.inside, &pair)?;
@@ -104,7 +107,7 @@ fn settle_bins(
         pair += step;
     }
     let (waves, mut seen, pair) = settled?;
-    seen.inside = without_tails(&frame, &waves, &windows[narrowest], &seen);
+    seen.inside = without_tails(&frame, &waves, windows.at(narrowest), &seen);
     let inner = patch(&cells, &seen.inside, &pair)?;
     Some(Settled {
         patch: inner.in_pixels(bins),
@@ -114,6 +117,23 @@ fn settle_bins(
         inner,
         bins,
     })
+}
+
+/// The windows of [`WIDTHS`] at some cells, each made when it is first looked through: mostly the narrowest will do.
+struct Windows<'a> {
+    cells: &'a Cells,
+    made: [OnceCell<Window>; WIDTHS.len()],
+}
+
+impl<'a> Windows<'a> {
+    fn new(cells: &'a Cells) -> Self {
+        let made = Default::default();
+        Self { cells, made }
+    }
+
+    fn at(&self, i: usize) -> &Window {
+        self.made[i].get_or_init(|| self.cells.window(WIDTHS[i]))
+    }
 }
 
 /// The patch of the cells that show the waves of a pair; `None` where they are too few.
@@ -203,35 +223,27 @@ impl Settled {
 /// By how much the phases of the envelopes say that the pair is off, and by how many cycles that turns them over the
 /// patch.
 fn slope(cells: &Cells, seen: &Seen, inside: &[bool]) -> Option<(Matrix2<f64>, f64)> {
-    let [across, up] = cells.size;
-    let at = |x: usize, y: usize| y * across + x;
-    // Far enough apart that noise is not the same, and as far as the patch allows once that is small.
     let extent = extent(cells, inside);
-    let mut steps = [Vector2::<f64>::zeros(); 3];
-    for axis in 0..2 {
+    let along = |envelope: &[Complex64], axis: usize| {
         let window = (seen.width * cells.period[axis] / cells.pixels[axis] as f64).ceil() as usize;
+        let mut step = 0.0;
+        // Far enough apart that noise is not the same, and as far as the patch allows once that is small.
         let mut lag = window.max(1);
         for _ in 0..3 {
-            let (w, h) = if axis == 0 { (lag, 0) } else { (0, lag) };
-            for (step, envelope) in steps.iter_mut().zip(&seen.envelopes) {
-                let turn = step[axis] * (lag * cells.pixels[axis]) as f64;
-                let mut sum = Complex64::default();
-                for y in 0..up.saturating_sub(h) {
-                    for x in 0..across.saturating_sub(w) {
-                        let (a, b) = (at(x, y), at(x + w, y + h));
-                        if inside[a] && inside[b] {
-                            sum += envelope[a].conj() * envelope[b];
-                        }
-                    }
-                }
-                sum *= Complex64::cis(-turn);
-                if sum.norm() > 0.0 {
-                    step[axis] += sum.arg() / (lag * cells.pixels[axis]) as f64;
-                }
+            let apart = (lag * cells.pixels[axis]) as f64;
+            let by = if axis == 0 { [lag, 0] } else { [0, lag] };
+            let sum = turned(cells.size, envelope, inside, by) * Complex64::cis(-step * apart);
+            if sum.norm() > 0.0 {
+                step += sum.arg() / apart;
             }
             lag = (2 * lag).min((extent[axis] / 2).max(window)).max(1);
         }
-    }
+        step
+    };
+    let steps = (0..6).into_par_iter();
+    let steps = steps.map(|i| along(&seen.envelopes[i / 2], i % 2));
+    let steps: Vec<f64> = steps.collect();
+    let steps = [0, 2, 4].map(|i| Vector2::new(steps[i], steps[i + 1]));
     // K₁, K₂ by least squares with K₃ = K₂ − K₁.
     let w = seen.weights;
     let normal = Matrix2::new(w[0] + w[2], -w[2], -w[2], w[1] + w[2]);
@@ -251,6 +263,25 @@ fn slope(cells: &Cells, seen: &Seen, inside: &[bool]) -> Option<(Matrix2<f64>, f
         .fold(0.0, f64::max)
         / std::f64::consts::TAU;
     step.iter().all(|s| s.is_finite()).then_some((step, turn))
+}
+
+/// `Σ a* b` over the cells `a` of a patch and those `b` that lie so many columns and rows beyond.
+fn turned(
+    [across, up]: [usize; 2],
+    envelope: &[Complex64],
+    inside: &[bool],
+    [w, h]: [usize; 2],
+) -> Complex64 {
+    let mut sum = Complex64::default();
+    for y in 0..up.saturating_sub(h) {
+        for a in y * across..y * across + across.saturating_sub(w) {
+            let b = a + h * across + w;
+            if inside[a] && inside[b] {
+                sum += envelope[a].conj() * envelope[b];
+            }
+        }
+    }
+    sum
 }
 
 /// Cells from the first to the last of the patch, along columns and rows.

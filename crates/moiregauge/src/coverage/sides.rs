@@ -4,7 +4,10 @@
 //! side seems to go on to it. A straight line through the envelope, by least squares under the window, says what is at the place itself.
 //! Its noise is larger, so that a cell is taken away only where it is plainly less than what makes a cell part of the lattice.
 
+use std::collections::HashMap;
+
 use nalgebra::{Matrix3, Vector3};
+use rayon::prelude::*;
 use rustfft::num_complex::Complex64;
 
 use crate::coverage::cells::Window;
@@ -17,6 +20,9 @@ const CUT: f64 = 0.9;
 /// has just enough.
 const PLAINLY: f64 = 2.0;
 
+/// Cells that a thread looks at together, at least.
+const AT_ONCE: usize = 1024;
+
 /// Takes away the cells beside the sides of a frame whose own place carries no lattice.
 pub(crate) fn without_tails(
     frame: &Frame,
@@ -26,26 +32,70 @@ pub(crate) fn without_tails(
 ) -> Vec<bool> {
     let sums = waves.without(&frame.level(window));
     let asked = INSIDE * seen.typical.iter().sum::<f64>();
-    let stays = |n: usize| {
-        let Some(line) = Line::at(frame, window, n) else {
+    let stays = |lines: &mut Lines, n: usize| {
+        let Some(line) = lines.at(n) else {
             return true;
         };
-        let found = sums.iter().zip(seen.typical);
-        let found = found.map(|(sums, typical)| line.value(sums).norm() * typical.sqrt());
+        let found = line.values(&sums, n).into_iter().zip(seen.typical);
+        let found = found.map(|(value, typical)| value.norm() * typical.sqrt());
         let noise = seen.noise.iter().zip(seen.typical);
         let noise = noise.map(|(noise, typical)| noise * typical).sum::<f64>() * line.noise;
         found.sum::<f64>() > asked - PLAINLY * (noise / 2.0).sqrt()
     };
-    let cells = seen.inside.iter().zip(&window.support).enumerate();
+    let cells = seen.inside.par_iter().zip(&window.support).enumerate();
     cells
-        .map(|(n, (inside, support))| *inside && (*support > CUT || stays(n)))
+        .with_min_len(AT_ONCE)
+        .map_init(
+            || Lines::new(frame, window),
+            |lines, (n, (inside, support))| *inside && (*support > CUT || stays(lines, n)),
+        )
         .collect()
+}
+
+/// Straight lines at cells. Cells that see as much of the frame on all sides, and as many pixels in each cell there, have the same one.
+struct Lines<'a> {
+    frame: &'a Frame<'a>,
+    window: &'a Window,
+    /// The last one for each extent of the window, with the pixels of the cells under it.
+    known: HashMap<[usize; 4], (Vec<f64>, Option<Line>)>,
+}
+
+impl<'a> Lines<'a> {
+    fn new(frame: &'a Frame, window: &'a Window) -> Self {
+        let known = HashMap::new();
+        Self {
+            frame,
+            window,
+            known,
+        }
+    }
+
+    /// `None` where the cells under the window lie on a line.
+    fn at(&mut self, n: usize) -> Option<&Line> {
+        let cells = self.frame.cells;
+        let across = cells.size[0];
+        let [x, y] = self.window.under(cells.size, n);
+        let pixels = || y.clone().map(|y| &cells.counts()[y * across..][x.clone()]);
+        let extent = [
+            n % across - x.start,
+            x.end - n % across,
+            n / across - y.start,
+            y.end - n / across,
+        ];
+        let (before, line) = self.known.entry(extent).or_default();
+        let lines = before.chunks_exact(x.len());
+        if before.is_empty() || !lines.eq(pixels()) {
+            *before = pixels().flatten().copied().collect();
+            *line = Line::at(self.frame, self.window, n);
+        }
+        line.as_ref()
+    }
 }
 
 /// A straight line through the cells under the window at one of them: its value there is a weighted sum.
 struct Line {
-    /// Cells and their weights.
-    weights: Vec<(usize, f64)>,
+    /// Weights of cells, by how far behind that one they come.
+    weights: Vec<(isize, f64)>,
     /// Variance that white noise of unit power per pixel gives the value.
     noise: f64,
 }
@@ -69,11 +119,23 @@ impl Line {
             .map(|(cell, tap, place)| (*cell, tap * first.dot(place)));
         let weights: Vec<(usize, f64)> = weights.collect();
         let noise = weights.iter().map(|(cell, w)| w * w * counts[*cell]).sum();
-        Some(Self { weights, noise })
+        let from_here = |(cell, w): (usize, f64)| (cell as isize - n as isize, w);
+        Some(Self {
+            weights: weights.into_iter().map(from_here).collect(),
+            noise,
+        })
     }
 
-    fn value(&self, sums: &[Complex64]) -> Complex64 {
-        self.weights.iter().map(|(cell, w)| sums[*cell] * w).sum()
+    /// Those of three waves.
+    fn values(&self, sums: &[Vec<Complex64>; 3], n: usize) -> [Complex64; 3] {
+        let mut values = [Complex64::default(); 3];
+        for (by, w) in &self.weights {
+            let cell = n.wrapping_add_signed(*by);
+            for (value, sums) in values.iter_mut().zip(sums) {
+                *value += sums[cell] * w;
+            }
+        }
+        values
     }
 }
 

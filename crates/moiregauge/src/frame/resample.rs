@@ -74,20 +74,17 @@ pub fn resample(
     // The grid lies in the middle of the frame.
     let size = Vector2::new(columns as f64 - 1.0, rows as f64 - 1.0) * pitch;
     let first = low + 0.5 * (extent - size);
-    let lines: Vec<Vec<f64>> = (0..rows)
-        .into_par_iter()
-        .map(|row| {
-            interrupt::check();
-            (0..columns)
-                .map(|column| {
-                    let point = first + pitch * Vector2::new(column as f64, row as f64);
-                    at(image, inverse * (point - origin))
-                })
-                .collect()
-        })
-        .collect();
+    let mut values = vec![0.0; rows * columns];
+    let lines = values.par_chunks_exact_mut(columns).enumerate();
+    lines.for_each(|(row, line)| {
+        interrupt::check();
+        for (column, value) in line.iter_mut().enumerate() {
+            let point = first + pitch * Vector2::new(column as f64, row as f64);
+            *value = at(image, inverse * (point - origin));
+        }
+    });
     Some(Resampled {
-        image: Image::new(rows, columns, lines.concat()),
+        image: Image::new(rows, columns, values),
         pitch,
         origin: first,
     })
@@ -95,31 +92,68 @@ pub fn resample(
 
 /// The value at a place in pixels (column, row); NaN outside.
 pub(crate) fn at(image: &Image, place: Vector2<f64>) -> f64 {
-    let Some(((column, u), (row, v))) = cell(place.x, image.columns).zip(cell(place.y, image.rows))
-    else {
-        return f64::NAN;
+    let (samples, _) = image.values.as_chunks();
+    let [value] = all_at(samples, [image.columns, image.rows], place);
+    value
+}
+
+/// The same of several quantities that have their pixels in common, which lie side by side; `size`: columns and rows.
+pub(crate) fn all_at<const N: usize>(
+    samples: &[[f64; N]],
+    size: [usize; 2],
+    place: Vector2<f64>,
+) -> [f64; N] {
+    let Some(((column, u), (row, v))) = cell(place.x, size[0]).zip(cell(place.y, size[1])) else {
+        return [f64::NAN; N];
     };
+    let first = row * size[0] + column;
     let inside = |first: usize, count: usize| first >= 1 && first + 2 < count;
-    if inside(column, image.columns) && inside(row, image.rows) {
-        let (across, along) = (keys(v), keys(u));
-        let value: f64 = (0..4)
-            .map(|j| {
-                let line = &image.row(row + j - 1)[column - 1..column + 3];
-                let sum: f64 = line.iter().zip(along).map(|(value, w)| value * w).sum();
-                sum * across[j]
-            })
-            .sum();
-        if value.is_finite() {
-            return value;
+    if !(inside(column, size[0]) && inside(row, size[1])) {
+        return between(samples, size[0], first, [u, v]);
+    }
+    let (across, along) = (keys(v), keys(u));
+    // Sums start from −0, which changes no sign.
+    let mut found = [-0.0; N];
+    for (j, across) in across.into_iter().enumerate() {
+        let start = first + j * size[0] - size[0] - 1;
+        let mut sum = [-0.0; N];
+        for (sample, weight) in samples[start..start + 4].iter().zip(along) {
+            for (sum, value) in sum.iter_mut().zip(sample) {
+                *sum += value * weight;
+            }
+        }
+        for (found, sum) in found.iter_mut().zip(sum) {
+            *found += sum * across;
         }
     }
-    let (below, above) = (image.row(row), image.row(row + 1));
+    if found.iter().all(|value| value.is_finite()) {
+        return found;
+    }
+    let linear = between(samples, size[0], first, [u, v]);
+    for (found, linear) in found.iter_mut().zip(linear) {
+        if !found.is_finite() {
+            *found = linear;
+        }
+    }
+    found
+}
+
+/// Bilinear between the pixel `first` and the next ones.
+fn between<const N: usize>(
+    samples: &[[f64; N]],
+    columns: usize,
+    first: usize,
+    [u, v]: [f64; 2],
+) -> [f64; N] {
     // A missing pixel of no weight is no loss.
     let part = |value: f64, weight: f64| if weight == 0.0 { 0.0 } else { weight * value };
-    part(below[column], (1.0 - u) * (1.0 - v))
-        + part(below[column + 1], u * (1.0 - v))
-        + part(above[column], (1.0 - u) * v)
-        + part(above[column + 1], u * v)
+    let (below, above) = (&samples[first..first + 2], &samples[first + columns..][..2]);
+    std::array::from_fn(|i| {
+        part(below[0][i], (1.0 - u) * (1.0 - v))
+            + part(below[1][i], u * (1.0 - v))
+            + part(above[0][i], (1.0 - u) * v)
+            + part(above[1][i], u * v)
+    })
 }
 
 /// The pixel before a coordinate and the way to the next one, 0 to 1.
@@ -129,7 +163,7 @@ fn cell(x: f64, count: usize) -> Option<(usize, f64)> {
         return None;
     }
     let x = x.clamp(0.0, last);
-    let first = (x.floor() as usize).min(count - 2);
+    let first = (x as usize).min(count - 2);
     Some((first, x - first as f64))
 }
 

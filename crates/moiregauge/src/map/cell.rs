@@ -8,6 +8,8 @@
 //! σ² = K/(K − 1) Σ_c (s_c − n_c m)²/n²      m = Σ_c s_c/n,  n = Σ_c n_c,  K cells
 //! ```
 
+use std::ops::Range;
+
 use nalgebra::{Matrix2, Vector2};
 use rayon::prelude::*;
 
@@ -55,140 +57,210 @@ impl MeanCell {
 /// Averages the cells of an image whose pixels are `placed` on the sample; `None` where fewer than two
 /// cells of the pattern are known.
 pub(crate) fn mean_cell(image: &Image, placed: &Geometry, followed: &Followed) -> Option<MeanCell> {
-    let places = places(image, placed, followed);
-    let known = places.iter().filter(|p| p[0].is_finite()).count();
     let vectors = followed.gauge.vectors;
-    let area = known as f64 * placed.pixel_to_nm.determinant().abs();
+    let pitch = placed.fast_step().norm().min(placed.slow_step().norm());
+    let longest = vectors.column(0).norm().max(vectors.column(1).norm());
+    let wanted = ((longest / pitch).round() as usize).clamp(2, MOST_BINS);
+    let mut found = Found::new(image, placed, followed, wanted);
+    let area = found.known as f64 * placed.pixel_to_nm.determinant().abs();
     if !(area >= LEAST_CELLS * vectors.determinant().abs()) {
         return None;
     }
-    let pitch = placed.fast_step().norm().min(placed.slow_step().norm());
-    let longest = vectors.column(0).norm().max(vectors.column(1).norm());
-    let most = (known as f64 / LEAST_PIXELS).sqrt() as usize;
-    let bins = ((longest / pitch).round() as usize)
-        .min(most)
-        .clamp(2, MOST_BINS);
+    let most = (found.known as f64 / LEAST_PIXELS).sqrt() as usize;
+    let bins = wanted.min(most).max(2);
+    if bins < wanted {
+        found = Found::new(image, placed, followed, bins);
+    }
     let mut sums = Sums::new(bins, image);
-    by_cell(&places, |pixels| sums.add_cell(pixels, &places, image));
+    for cells in found.cells().chunks(CELLS_AT_ONCE) {
+        interrupt::check();
+        sums.add_cells(cells, &found.bins, image);
+    }
     Some(sums.finish(vectors))
 }
 
-/// Where each pixel lies, in moiré vectors from the node; NaN where it is not known. In single precision: some 10⁻⁴ of a
-/// cell in a thousand of them, far below a bin.
-fn places(image: &Image, placed: &Geometry, followed: &Followed) -> Vec<[f32; 2]> {
-    let of_row = |row: usize| {
-        interrupt::check();
-        let of_pixel = move |column: usize| {
-            let place =
-                placed.origin + placed.pixel_to_nm * Vector2::new(column as f64, row as f64);
-            let value = image.values[row * image.columns + column];
-            let known = value.is_finite().then(|| followed.at(place)).flatten();
-            known.map_or([f32::NAN; 2], |u| {
-                let cells = followed.cells(place, u);
-                [cells.x as f32, cells.y as f32]
-            })
-        };
-        (0..image.columns).map(of_pixel)
-    };
-    let rows = (0..image.rows).into_par_iter();
-    rows.flat_map_iter(of_row).collect()
+/// Where the pixels of an image lie in the cells of its pattern.
+struct Found {
+    /// Bin of each pixel within its cell; of no meaning where that is not known.
+    bins: Vec<u16>,
+    /// What lies in one cell, ordered by cells, and by pixels within each.
+    runs: Vec<Run>,
+    /// Pixels in all.
+    known: usize,
 }
 
-/// Calls `each` with the pixels of every cell, in a fixed order.
-fn by_cell(places: &[[f32; 2]], mut each: impl FnMut(&[u32])) {
-    let known = || places.iter().filter(|p| p[0].is_finite());
-    let first = [0, 1].map(|i| known().map(|p| p[i].floor() as i64).min().unwrap_or(0));
-    let last = known().map(|p| p[0].floor() as i64).max().unwrap_or(0);
-    let columns = (last - first[0] + 1) as usize;
-    let cell = |p: &[f32; 2]| {
-        let [i, j] = [0, 1].map(|i| (p[i].floor() as i64 - first[i]) as usize);
-        j * columns + i
-    };
-    // A counting sort.
-    let mut ends = vec![0u32; known().map(cell).max().unwrap_or(0) + 2];
-    for place in known() {
-        ends[cell(place) + 1] += 1;
-    }
-    for n in 1..ends.len() {
-        ends[n] += ends[n - 1];
-    }
-    let starts = ends.clone();
-    let mut sorted = vec![0u32; starts.last().copied().unwrap_or(0) as usize];
-    let mut next = ends;
-    for (pixel, place) in places.iter().enumerate() {
-        if place[0].is_finite() {
-            let slot = &mut next[cell(place)];
-            sorted[*slot as usize] = pixel as u32;
-            *slot += 1;
-        }
-    }
-    for range in starts.windows(2).filter(|range| range[0] < range[1]) {
-        interrupt::check();
-        each(&sorted[range[0] as usize..range[1] as usize]);
+/// Pixels beside each other in one cell.
+struct Run {
+    /// Number of the cell along the second vector and along the first.
+    cell: [i32; 2],
+    first: u32,
+    count: u32,
+}
+
+impl Run {
+    fn pixels(&self) -> Range<usize> {
+        self.first as usize..(self.first + self.count) as usize
     }
 }
+
+impl Found {
+    fn new(image: &Image, placed: &Geometry, followed: &Followed, bins: usize) -> Self {
+        let mut found = vec![0; image.values.len()];
+        let rows = found.par_chunks_exact_mut(image.columns).enumerate();
+        let rows = rows.map(|(row, of_pixels)| {
+            interrupt::check();
+            let place = |column: usize| {
+                let place = [column, row].map(|n| n as f64);
+                let place = placed.origin + placed.pixel_to_nm * Vector2::from(place);
+                Some(followed.cells(place, followed.at(place)?))
+            };
+            runs(image, row, bins, of_pixels, place)
+        });
+        let rows: Vec<Vec<Run>> = rows.collect();
+        let mut runs: Vec<Run> = rows.into_iter().flatten().collect();
+        runs.par_sort_unstable_by_key(|run| (run.cell, run.first));
+        Self {
+            known: runs.iter().map(|run| run.count as usize).sum(),
+            bins: found,
+            runs,
+        }
+    }
+
+    /// The runs of every cell.
+    fn cells(&self) -> Vec<&[Run]> {
+        self.runs.chunk_by(|a, b| a.cell == b.cell).collect()
+    }
+}
+
+/// Finds the bins of the pixels of a row, and the runs of those that lie in one cell; `place` is in moiré vectors from the node.
+fn runs(
+    image: &Image,
+    row: usize,
+    bins: usize,
+    of_pixels: &mut [u16],
+    place: impl Fn(usize) -> Option<Vector2<f64>>,
+) -> Vec<Run> {
+    let mut runs: Vec<Run> = Vec::new();
+    let start = row * image.columns;
+    for (column, bin) in of_pixels.iter_mut().enumerate() {
+        let pixel = start + column;
+        let known = image.values[pixel].is_finite().then(|| place(column));
+        let Some(place) = known.flatten() else {
+            continue;
+        };
+        // In single precision: some 10⁻⁴ of a cell in a thousand of them, far below a bin.
+        let [[i, x], [j, y]] = [place.x, place.y].map(|x| below(x as f32));
+        let [x, y] = [x, y].map(|share| ((share * bins as f32) as usize).min(bins - 1));
+        *bin = (y * bins + x) as u16;
+        let cell = [j as i32, i as i32];
+        match runs.last_mut() {
+            Some(run) if run.cell == cell && run.pixels().end == pixel => run.count += 1,
+            _ => runs.push(Run {
+                cell,
+                first: pixel as u32,
+                count: 1,
+            }),
+        }
+    }
+    runs
+}
+
+/// The whole number below, and what is left.
+fn below(x: f32) -> [f32; 2] {
+    let whole = x as i32 as f32;
+    let whole = if whole > x { whole - 1.0 } else { whole };
+    [whole, x - whole]
+}
+
+/// Cells that are summed before their sums are added up: what they hold fits into the cache.
+const CELLS_AT_ONCE: usize = 64;
 
 /// What is summed over cells, bin by bin.
 struct Sums {
     bins: usize,
     /// Taken off all values, lest squares of a large mean drown their differences.
     middle: f64,
-    pixels: Vec<u32>,
-    cells: Vec<u32>,
     all_cells: usize,
+    of_bins: Vec<OfBin>,
+}
+
+/// What is summed of one bin.
+#[derive(Clone, Copy, Default)]
+struct OfBin {
+    pixels: u32,
+    cells: u32,
     /// Σ s, Σ s², Σ s n and Σ n² over cells.
-    over_cells: Vec<[f64; 4]>,
-    /// Of the cell at hand: s and n of each bin.
-    own: Vec<(f64, u32)>,
+    over_cells: [f64; 4],
+}
+
+impl OfBin {
+    /// Adds the sum over some pixels of a cell.
+    fn add(&mut self, sum: f64, pixels: u32) {
+        let n = f64::from(pixels);
+        for (all, term) in self
+            .over_cells
+            .iter_mut()
+            .zip([sum, sum * sum, sum * n, n * n])
+        {
+            *all += term;
+        }
+        self.pixels += pixels;
+        self.cells += 1;
+    }
 }
 
 impl Sums {
     fn new(bins: usize, image: &Image) -> Self {
         let finite = image.values.iter().filter(|v| v.is_finite());
         let (sum, count) = finite.fold((0.0, 0.0f64), |(s, n), v| (s + v, n + 1.0));
-        let all = bins * bins;
         Self {
             bins,
             middle: sum / count,
-            pixels: vec![0; all],
-            cells: vec![0; all],
             all_cells: 0,
-            over_cells: vec![[0.0; 4]; all],
-            own: vec![(0.0, 0); all],
+            of_bins: vec![OfBin::default(); bins * bins],
         }
     }
 
-    /// Adds the pixels of a cell.
-    fn add_cell(&mut self, pixels: &[u32], places: &[[f32; 2]], image: &Image) {
-        let along = |x: f32| ((x - x.floor()) * self.bins as f32) as usize;
-        for &pixel in pixels {
-            let [x, y] = places[pixel as usize];
-            let [i, j] = [x, y].map(|x| along(x).min(self.bins - 1));
-            let own = &mut self.own[j * self.bins + i];
-            own.0 += image.values[pixel as usize] - self.middle;
-            own.1 += 1;
-        }
-        self.all_cells += 1;
-        let bins = self.own.iter_mut().zip(&mut self.over_cells);
-        for (bin, (own, sums)) in bins.enumerate().filter(|(_, (own, _))| own.1 > 0) {
-            let (s, n) = (own.0, f64::from(own.1));
-            for (sum, term) in sums.iter_mut().zip([s, s * s, s * n, n * n]) {
-                *sum += term;
+    /// Adds the pixels of some cells: each cell by itself, then each bin by itself, cell by cell.
+    fn add_cells(&mut self, cells: &[&[Run]], bins: &[u16], image: &Image) {
+        let of_cell = |runs: &&[Run]| {
+            let mut own = vec![(0.0, 0u32); self.bins * self.bins];
+            for run in *runs {
+                let values = &image.values[run.pixels()];
+                for (value, bin) in values.iter().zip(&bins[run.pixels()]) {
+                    let own = &mut own[usize::from(*bin)];
+                    own.0 += value - self.middle;
+                    own.1 += 1;
+                }
             }
-            self.pixels[bin] += own.1;
-            self.cells[bin] += 1;
-            *own = (0.0, 0);
-        }
+            own
+        };
+        let own: Vec<_> = cells.par_iter().map(of_cell).collect();
+        self.all_cells += cells.len();
+        let lines = self.of_bins.par_chunks_mut(self.bins).enumerate();
+        lines.for_each(|(line, all)| {
+            let start = line * self.bins;
+            for own in &own {
+                let own = &own[start..start + all.len()];
+                for (bin, (sum, pixels)) in all.iter_mut().zip(own).filter(|(_, own)| own.1 > 0) {
+                    bin.add(*sum, *pixels);
+                }
+            }
+        });
     }
 
     fn finish(self, vectors: Matrix2<f64>) -> MeanCell {
-        let bins = self.over_cells.iter().zip(&self.pixels).zip(&self.cells);
-        let found = bins.map(|((&[s, ss, sn, nn], &pixels), &cells)| {
-            let (n, k) = (f64::from(pixels), f64::from(cells));
+        let found = self.of_bins.iter().map(|bin| {
+            let [s, ss, sn, nn] = bin.over_cells;
+            let (n, k) = (f64::from(bin.pixels), f64::from(bin.cells));
             let mean = s / n;
             let square = (ss - 2.0 * mean * sn + mean * mean * nn).max(0.0);
             let variance = k / (k - 1.0) * square / (n * n);
-            let sigma = if cells > 1 { variance.sqrt() } else { f64::NAN };
+            let sigma = if bin.cells > 1 {
+                variance.sqrt()
+            } else {
+                f64::NAN
+            };
             (self.middle + mean, sigma)
         });
         let (mean, sigma) = found.unzip();
@@ -197,8 +269,8 @@ impl Sums {
             bins: self.bins,
             mean,
             sigma,
-            pixels: self.pixels,
-            cells: self.cells,
+            pixels: self.of_bins.iter().map(|bin| bin.pixels).collect(),
+            cells: self.of_bins.iter().map(|bin| bin.cells).collect(),
             all_cells: self.all_cells,
         }
     }

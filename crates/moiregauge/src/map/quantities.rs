@@ -20,8 +20,10 @@ pub struct Plane {
 impl Plane {
     pub(crate) fn push(&mut self, estimate: Option<Estimate>) {
         let Estimate { value, sigma } = estimate.unwrap_or(Estimate::new(f64::NAN, f64::NAN));
-        self.value.push(value as f32);
-        self.sigma.push(sigma as f32);
+        // What is no number has no sign, lest files differ in bits that say nothing and that compilers choose.
+        let plain = |x: f64| if x.is_nan() { f32::NAN } else { x as f32 };
+        self.value.push(plain(value));
+        self.sigma.push(plain(sigma));
     }
 
     /// A node's value and error.

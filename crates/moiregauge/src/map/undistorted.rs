@@ -51,23 +51,21 @@ pub(crate) fn undistorted(
     }
     let size = Vector2::new(columns as f64 - 1.0, rows as f64 - 1.0) * pitch;
     let origin = starts.low + 0.5 * (extent - size);
-    let lines: Vec<Vec<f64>> = (0..rows)
-        .into_par_iter()
-        .map(|row| {
-            interrupt::check();
-            let mut before = None;
-            let of_pixel = |column: usize| {
-                let place = origin + pitch * Vector2::new(column as f64, row as f64);
-                let from = before.or_else(|| starts.near(place));
-                before = from.and_then(|from| settled(followed, place, from, SETTLED * pitch));
-                before.map_or(f64::NAN, |u| {
-                    at(image, inverse * (place + u - placed.origin))
-                })
-            };
-            (0..columns).map(of_pixel).collect()
-        })
-        .collect();
-    let image = Image::new(rows, columns, lines.concat());
+    let mut values = vec![0.0; rows * columns];
+    let lines = values.par_chunks_exact_mut(columns).enumerate();
+    lines.for_each(|(row, line)| {
+        interrupt::check();
+        let mut before = None;
+        for (column, value) in line.iter_mut().enumerate() {
+            let place = origin + pitch * Vector2::new(column as f64, row as f64);
+            let from = before.or_else(|| starts.near(place));
+            before = from.and_then(|from| settled(followed, place, from, SETTLED * pitch));
+            *value = before.map_or(f64::NAN, |u| {
+                at(image, inverse * (place + u - placed.origin))
+            });
+        }
+    });
+    let image = Image::new(rows, columns, values);
     let seen = image.values.iter().filter(|v| v.is_finite()).count();
     (seen > 0).then(|| Undistorted {
         known: seen as f64 / image.values.len() as f64,

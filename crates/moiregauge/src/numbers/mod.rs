@@ -17,4 +17,5 @@ pub(crate) mod widest;
 pub(crate) mod words;
 
 pub use rng::{normals, stream};
+pub use widest::widest;
 pub use words::{fixed, line_name, plus_minus, two_digits};

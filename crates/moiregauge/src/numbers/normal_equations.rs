@@ -1,10 +1,13 @@
 //! Normal equations whose parameters differ in unit: scaled to ones on the diagonal before they are factored.
 
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use nalgebra::{DMatrix, DVector};
+
+use crate::numbers::widest::widest;
 
 /// A scaled and factored normal matrix.
 pub(crate) struct NormalEquations {
-    factor: Cholesky<f64, Dyn>,
+    /// L of `L Lᵀ`; what is above its diagonal does not count.
+    factor: DMatrix<f64>,
     scale: DVector<f64>,
 }
 
@@ -20,7 +23,7 @@ impl NormalEquations {
             let held = if i == j { held(i) } else { 0.0 };
             normal[(i, j)] * scale[i] * scale[j] + held
         });
-        let factor = scaled.cholesky()?;
+        let factor = factored(scaled)?;
         Some(Self { factor, scale })
     }
 
@@ -32,13 +35,22 @@ impl NormalEquations {
 
     /// The parameters.
     pub(crate) fn solve(&self, right: &DVector<f64>) -> DVector<f64> {
-        let scaled = self.factor.solve(&right.component_mul(&self.scale));
+        let mut scaled = right.component_mul(&self.scale);
+        self.factor
+            .solve_lower_triangular_unchecked_mut(&mut scaled);
+        self.factor
+            .tr_solve_lower_triangular_unchecked_mut(&mut scaled);
         scaled.component_mul(&self.scale)
     }
 
     /// The inverse of the normal matrix.
     pub(crate) fn inverse(&self) -> DMatrix<f64> {
-        let inverse = self.factor.inverse();
+        let size = self.scale.len();
+        let mut inverse = DMatrix::identity(size, size);
+        self.factor
+            .solve_lower_triangular_unchecked_mut(&mut inverse);
+        self.factor
+            .tr_solve_lower_triangular_unchecked_mut(&mut inverse);
         DMatrix::from_fn(inverse.nrows(), inverse.ncols(), |i, j| {
             inverse[(i, j)] * self.scale[i] * self.scale[j]
         })
@@ -46,9 +58,55 @@ impl NormalEquations {
 
     /// The least share of any parameter that those before it leave open.
     pub(crate) fn least_pivot(&self) -> f64 {
-        let pivots = self.factor.l_dirty().diagonal();
+        let pivots = self.factor.diagonal();
         pivots.iter().map(|d| d * d).fold(f64::INFINITY, f64::min)
     }
+}
+
+/// L of `L Lᵀ`, column by column; `None` where the matrix is not positive.
+fn factored(mut matrix: DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let size = matrix.nrows();
+    for j in 0..size {
+        let (before, column) = matrix.as_mut_slice().split_at_mut(j * size);
+        let column = &mut column[j..size];
+        take_off(column, before, size, j);
+        let diagonal = column[0];
+        if !(diagonal > 0.0) {
+            return None;
+        }
+        let root = diagonal.sqrt();
+        column[0] = root;
+        for below in &mut column[1..] {
+            *below /= root;
+        }
+    }
+    Some(matrix)
+}
+
+/// Takes the finished columns off the part of column `j` from its diagonal on, one after the other, four in one go.
+fn take_off(column: &mut [f64], before: &[f64], size: usize, j: usize) {
+    let below = |k: usize| &before[k * size + j..(k + 1) * size];
+    let fours = j / 4;
+    widest(
+        #[inline(always)]
+        || {
+            for four in 0..fours {
+                let [a, b, c, d] = [0, 1, 2, 3].map(|i| below(4 * four + i));
+                let [p, q, r, s] = [a[0], b[0], c[0], d[0]];
+                let all = column.iter_mut().zip(a).zip(b).zip(c).zip(d);
+                for ((((x, a), b), c), d) in all {
+                    *x = *x - p * a - q * b - r * c - s * d;
+                }
+            }
+            for k in 4 * fours..j {
+                let finished = below(k);
+                let factor = finished[0];
+                for (x, y) in column.iter_mut().zip(finished) {
+                    *x -= factor * y;
+                }
+            }
+        },
+    );
 }
 
 #[cfg(test)]

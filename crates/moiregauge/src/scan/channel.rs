@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 use spmfile::{Channel, LineDirection, Scan};
 
+use crate::frame::background::{Background, take_background_off};
 use crate::frame::image::Image;
 use crate::scan::measured::MeasureError;
 use crate::settings::knobs::{Lines, Settings};
@@ -107,6 +108,13 @@ pub(crate) fn image_of(channel: &Channel) -> Image {
         values.copy_from_slice(&channel.lines(first..(first + LINES).min(rows)));
     });
     Image::new(rows, columns, values)
+}
+
+/// The same without its background.
+pub(crate) fn flat_image_of(channel: &Channel, background: Background) -> Image {
+    let mut image = image_of(channel);
+    take_background_off(&mut image, background);
+    image
 }
 
 /// The images to measure: the chosen channel in the chosen line directions, main scan line first.

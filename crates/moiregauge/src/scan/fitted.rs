@@ -3,10 +3,9 @@
 use nalgebra::{Matrix2, Vector2};
 use spmfile::{LineDirection, Scan};
 
-use crate::frame::background::remove_background;
 use crate::frame::image::Image;
 use crate::lattice::several::together::model;
-use crate::scan::channel::{channels, image_of};
+use crate::scan::channel::{channels, flat_image_of};
 use crate::scan::measured::{MeasuredLine, MeasuredScan};
 use crate::settings::knobs::Settings;
 
@@ -44,7 +43,7 @@ pub fn fitted(
         .ok()?
         .into_iter()
         .find(|c| c.line_direction.unwrap_or(LineDirection::Trace) == line)?;
-    let image = remove_background(&image_of(channel), settings.background);
+    let image = flat_image_of(channel, settings.background);
     let (cell, cell_step) = mean_cell(&image, found)?;
     let fit = found.lattice.fit.as_ref();
     Some(Fitted {
@@ -119,7 +118,7 @@ mod tests {
             (square / n - (sum / n) * (sum / n)).sqrt()
         };
         let channel = channels(&scan, &settings).unwrap()[0];
-        let image = remove_background(&image_of(channel), settings.background);
+        let image = flat_image_of(channel, settings.background);
         let residual = shown.residual.unwrap();
         assert!(spread(&residual) < 0.3 * spread(&image));
         let ratio = spread(&shown.cell) / spread(&image);

@@ -188,6 +188,15 @@ impl Windowed {
         q
     }
 
+    /// The same of three waves.
+    pub(crate) fn refined_peaks(&self, q: [Vector2<f64>; 3]) -> [Vector2<f64>; 3] {
+        let ((a, b), c) = rayon::join(
+            || rayon::join(|| self.refined_peak(q[0]), || self.refined_peak(q[1])),
+            || self.refined_peak(q[2]),
+        );
+        [a, b, c]
+    }
+
     /// `Σ w e^{−iq·n}` with the phase at the centre: that of the whole window, which is separable, less what
     /// the missing pixels would add.
     fn window_transform(&self, q: Vector2<f64>) -> Complex64 {

@@ -19,13 +19,12 @@ pub(crate) fn refine(
     background: Background,
 ) -> Option<(Harmonics, [Vector2<f64>; 3])> {
     let windowed = Windowed::new(image);
-    let seen = three(pair).map(|q| windowed.refined_peak(q));
+    let seen = windowed.refined_peaks(three(pair));
     let first = windowed.amplitudes(&common_pair(&seen), shells(3))?;
     let model = Windowed::new(&first.model(image, background));
-    let mut peaks = seen;
-    for (peak, (q, _)) in peaks.iter_mut().zip(&first.waves) {
-        *peak -= model.refined_peak(*q) - q;
-    }
+    let known = [0, 1, 2].map(|i| first.waves[i].0);
+    let again = model.refined_peaks(known);
+    let peaks = [0, 1, 2].map(|i| seen[i] - (again[i] - known[i]));
     let second = windowed.fit(image, &common_pair(&peaks), background, shells(3))?;
     Some((second, peaks))
 }

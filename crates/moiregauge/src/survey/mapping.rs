@@ -7,11 +7,10 @@ use nalgebra::{Matrix2, Vector2};
 use spmfile::{Channel, FrameDirection, LineDirection, Scan};
 
 use crate::campaign::analysis::ScanAnalysis;
-use crate::frame::background::remove_background;
 use crate::frame::geometry::Geometry;
 use crate::map::local::local_lattices;
 use crate::map::sample::LatticeMap;
-use crate::scan::channel::{channels, image_of};
+use crate::scan::channel::{channels, flat_image_of, image_of};
 use crate::scan::place::Place;
 use crate::settings::knobs::Settings;
 use crate::survey::tiling::tile_map;
@@ -136,7 +135,7 @@ fn map_line(
     resolution.fits(geometry.extent(), widths)?;
     let (map, harmonics, noise_measured, margin) = match method {
         MapMethod::Demodulation => {
-            let image = remove_background(&image_of(channel), settings.background);
+            let image = flat_image_of(channel, settings.background);
             let waves = local_lattices(&image, &reference, resolution).ok_or(MapError::TooSmall)?;
             let map = LatticeMap::new(&waves, placed).ok_or(MapError::NoImage)?;
             (map, waves.harmonics, waves.noise_measured, waves.margin)

@@ -3,12 +3,11 @@
 use spmfile::{LineDirection, Scan};
 
 use crate::campaign::analysis::ScanAnalysis;
-use crate::frame::background::remove_background;
 use crate::map::cell::{MeanCell, mean_cell};
 use crate::map::followed::Followed;
 use crate::map::gauge::Gauge;
 use crate::map::undistorted::{Undistorted, undistorted};
-use crate::scan::channel::{channels, image_of};
+use crate::scan::channel::{channels, flat_image_of};
 use crate::settings::knobs::Settings;
 use crate::survey::mapping::{LineMap, drifted, place_of};
 
@@ -51,7 +50,7 @@ pub fn pattern_of_scan(
     let (place, _) = place_of(scan, channel, analysed, settings)?;
     let mut placed = place.still(analysed.drift).unwrap_or(place.geometry);
     placed.origin -= drifted(analysed, origin);
-    let image = remove_background(&image_of(channel), settings.background);
+    let image = flat_image_of(channel, settings.background);
     Some(MappedPattern {
         file: analysed.file.clone(),
         line: map.line,

@@ -4,11 +4,10 @@ use spmfile::{LineDirection, Scan};
 
 use crate::caveat::Caveat;
 use crate::caveat::patterns::PatternDoubt;
-use crate::frame::background::remove_background;
 use crate::frame::geometry::Geometry;
 use crate::frame::image::Image;
 use crate::lattice::start::Start;
-use crate::scan::channel::{channels, image_of};
+use crate::scan::channel::{channels, flat_image_of};
 use crate::scan::place::Place;
 use crate::settings::knobs::Settings;
 use crate::stripes::maps::{find_stripes, stripe_maps};
@@ -70,7 +69,7 @@ fn frames(
         let place = Place::of(file, scan, channel, settings, caveats);
         let place = place.ok_or(StripeError::NoImage)?;
         let still = place.still(settings.drift.map(|d| d.velocity()));
-        let flat = remove_background(&image_of(channel), settings.background);
+        let flat = flat_image_of(channel, settings.background);
         let same = |f: &Frame| (f.flat.rows, f.flat.columns) == (flat.rows, flat.columns);
         if frames.first().is_none_or(same) {
             frames.push(Frame {

@@ -26,35 +26,33 @@ pub(crate) fn write_between(
     if scan.channels.is_empty() {
         return Err(ExportError::NoChannel);
     }
-    let mut items = Vec::new();
-    for (number, channel) in scan.channels.iter().enumerate() {
-        put_object(
-            &mut items,
-            &format!("/{number}/data"),
-            "GwyDataField",
-            |o| data_field(o, scan, channel, between),
-        )?;
-        put_text(&mut items, &format!("/{number}/data/title"), &channel.name);
-        let mut lines = labels::describe(scan);
-        lines.extend(labels::describe_channel(channel));
-        lines.extend(scan.metadata.clone());
-        let steps = log.iter().enumerate();
-        lines.extend(steps.map(|(step, text)| (format!("log {}", step + 1), text.clone())));
-        put_object(
-            &mut items,
-            &format!("/{number}/meta"),
-            "GwyContainer",
-            |o| {
-                for (key, value) in &lines {
-                    put_text(o, &one_line(key), value);
-                }
-                Ok(())
-            },
-        )?;
-    }
     let mut bytes = b"GWYP".to_vec();
-    object(&mut bytes, "GwyContainer", &items)?;
+    object(&mut bytes, "GwyContainer", |items| {
+        let mut channels = scan.channels.iter().enumerate();
+        channels.try_for_each(|(number, channel)| {
+            put_object(items, &format!("/{number}/data"), "GwyDataField", |o| {
+                data_field(o, scan, channel, between)
+            })?;
+            put_text(items, &format!("/{number}/data/title"), &channel.name);
+            put_object(items, &format!("/{number}/meta"), "GwyContainer", |o| {
+                meta(o, scan, channel, log);
+                Ok(())
+            })
+        })
+    })?;
     Ok(bytes)
+}
+
+/// What the header says of a channel, and what was done.
+fn meta(out: &mut Vec<u8>, scan: &Scan, channel: &Channel, log: &[String]) {
+    let mut lines = labels::describe(scan);
+    lines.extend(labels::describe_channel(channel));
+    lines.extend(scan.metadata.clone());
+    let steps = log.iter().enumerate();
+    lines.extend(steps.map(|(step, text)| (format!("log {}", step + 1), text.clone())));
+    for (key, value) in &lines {
+        put_text(out, &one_line(key), value);
+    }
 }
 
 fn data_field(
@@ -91,8 +89,11 @@ fn data_field(
     let length = u32::try_from(values.len()).map_err(|_| ExportError::TooLong)?;
     head(out, "data", b'D');
     out.extend(length.to_le_bytes());
+    out.reserve(8 * values.len());
     for line in from_the_top(&values, channel, between) {
-        out.extend(line.iter().flat_map(|value| value.to_le_bytes()));
+        for value in line {
+            out.extend_from_slice(&value.to_le_bytes());
+        }
     }
     Ok(())
 }
@@ -125,17 +126,23 @@ fn put_object(
     kind: &str,
     fill: impl FnOnce(&mut Vec<u8>) -> Result<(), ExportError>,
 ) -> Result<(), ExportError> {
-    let mut items = Vec::new();
-    fill(&mut items)?;
     head(out, name, b'o');
-    object(out, kind, &items)
+    object(out, kind, fill)
 }
 
-fn object(out: &mut Vec<u8>, kind: &str, items: &[u8]) -> Result<(), ExportError> {
-    let length = u32::try_from(items.len()).map_err(|_| ExportError::TooLong)?;
+/// The length of what is in it goes before it.
+fn object(
+    out: &mut Vec<u8>,
+    kind: &str,
+    fill: impl FnOnce(&mut Vec<u8>) -> Result<(), ExportError>,
+) -> Result<(), ExportError> {
     out.extend(kind.bytes());
     out.push(0);
-    out.extend(length.to_le_bytes());
-    out.extend(items);
+    let before = out.len();
+    out.extend([0; 4]);
+    let first = out.len();
+    fill(out)?;
+    let length = u32::try_from(out.len() - first).map_err(|_| ExportError::TooLong)?;
+    out[before..first].copy_from_slice(&length.to_le_bytes());
     Ok(())
 }

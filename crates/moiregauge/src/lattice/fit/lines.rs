@@ -1,9 +1,12 @@
 //! What whole lines do: offsets of their own, and lines that went wrong.
 
+use rayon::prelude::*;
+
 use crate::lattice::fit::frame::Frame;
-use crate::lattice::fit::model::{Model, residuals};
+use crate::lattice::fit::model::{AT_ONCE, Model, residual};
 use crate::lattice::fit::tables::{Tables, sum};
 use crate::numbers::dot::dot;
+use crate::numbers::interrupt;
 use crate::numbers::median::median;
 
 /// Offsets of lines matter beyond this over the root of the number of lines: 3.5 times the scatter of the ratio, 2.3.
@@ -33,6 +36,40 @@ pub(crate) struct LineStatistics {
     rms: Vec<f64>,
 }
 
+/// What the residual of a line says.
+struct OfLine {
+    /// Power of its mean, times its pixels.
+    mean: f64,
+    /// Root mean square about the mean.
+    rms: f64,
+    /// Powers of the waves near zero; empty for a line at which these are not looked at.
+    near: Vec<f64>,
+}
+
+impl OfLine {
+    /// Of a line with so many pixels that are there.
+    fn new(line: &mut [f64], present: usize, waves: Option<&Vec<[Vec<f64>; 2]>>) -> Self {
+        let (columns, count) = (line.len(), present as f64);
+        if present < columns {
+            let mean = line.iter().filter(|v| v.is_finite()).sum::<f64>() / count;
+            for value in line.iter_mut().filter(|v| v.is_nan()) {
+                *value = mean;
+            }
+        }
+        let mean = sum(line) / columns as f64;
+        for value in line.iter_mut() {
+            *value -= mean;
+        }
+        let power =
+            |[cos, sin]: &[Vec<f64>; 2]| (dot(line, cos).powi(2) + dot(line, sin).powi(2)) / count;
+        Self {
+            mean: count * mean * mean,
+            rms: (dot(line, line) / count).sqrt(),
+            near: waves.into_iter().flatten().map(power).collect(),
+        }
+    }
+}
+
 impl LineStatistics {
     /// Reads the residuals of `model`. Medians: a few lines that went wrong do not matter.
     pub(crate) fn new(frame: &Frame, model: &Model) -> Self {
@@ -46,31 +83,25 @@ impl LineStatistics {
                 [cos, sin]
             })
             .collect();
-        let mut rms = vec![0.0; frame.image.rows];
         let stride = (frame.lines() / LOOKED_AT).max(1);
-        let mut count_lines = 0;
-        let (mut means, mut near) = (Vec::new(), Vec::new());
-        residuals(frame, model, &tables, |row, line| {
-            let count = frame.present[row] as f64;
-            if frame.present[row] < columns {
-                let mean = line.iter().filter(|v| v.is_finite()).sum::<f64>() / count;
-                for value in line.iter_mut().filter(|v| v.is_nan()) {
-                    *value = mean;
-                }
-            }
-            let mean = sum(line) / columns as f64;
-            for value in line.iter_mut() {
-                *value -= mean;
-            }
-            means.push(count * mean * mean);
-            rms[row] = (dot(line, line) / count).sqrt();
-            count_lines += 1;
-            if count_lines % stride == 0 {
-                for [cos, sin] in &waves {
-                    near.push((dot(line, cos).powi(2) + dot(line, sin).powi(2)) / count);
-                }
-            }
-        });
+        let used = (0..frame.image.rows).filter(|&row| frame.present[row] > 0);
+        let used: Vec<usize> = used.collect();
+        let seen = used.par_iter().enumerate().with_min_len(AT_ONCE).map_init(
+            || vec![0.0; columns],
+            |line, (number, &row)| {
+                interrupt::check();
+                residual(frame, model, &tables, row, line);
+                let looked_at = (number + 1) % stride == 0;
+                OfLine::new(line, frame.present[row], looked_at.then_some(&waves))
+            },
+        );
+        let seen: Vec<OfLine> = seen.collect();
+        let mut rms = vec![0.0; frame.image.rows];
+        for (row, line) in used.into_iter().zip(&seen) {
+            rms[row] = line.rms;
+        }
+        let mut means: Vec<f64> = seen.iter().map(|line| line.mean).collect();
+        let mut near: Vec<f64> = seen.into_iter().flat_map(|line| line.near).collect();
         let ridge = median(&mut means) / MEDIAN_CHI2;
         let adjacent = median(&mut near) / std::f64::consts::LN_2;
         Self {

@@ -227,7 +227,7 @@ pub(crate) fn look(
 }
 
 /// Lines that a thread looks at together, at least.
-const AT_ONCE: usize = 32;
+pub(crate) const AT_ONCE: usize = 32;
 
 /// Takes the best offset off a line, `o = λ (o + mean ψ(r − o))`, and returns it.
 fn settle(line: &mut [f64], row: usize, frame: &Frame, lines: &LineOffsets, clip: Clip) -> f64 {

@@ -8,6 +8,7 @@
 
 use std::f64::consts::PI;
 use std::ops::RangeInclusive;
+use std::sync::OnceLock;
 
 use nalgebra::{DMatrix, DVector, Vector2};
 use serde::{Deserialize, Serialize};
@@ -52,6 +53,8 @@ const HARMONIC: f64 = 2.0;
 pub(crate) struct ResidualNoise {
     /// In single precision: noise is known to a few per cent.
     spectrum: Spectrum<f32>,
+    /// Its noise in blocks, once it is asked for.
+    blocks: OnceLock<NoiseMap>,
     /// `Σ w²` over the pixels that count.
     window_power: f64,
     pub(super) free_lines: bool,
@@ -101,6 +104,7 @@ impl ResidualNoise {
         let noise = Self {
             window_power: x.iter().sum::<f64>() * lines - missing,
             spectrum,
+            blocks: OnceLock::new(),
             free_lines,
         };
         (noise, said)
@@ -226,10 +230,13 @@ impl ResidualNoise {
         // Waves of opposite sign are one.
         let k = if k.x < 0.0 { -k } else { k }.map(|c| c.round() as i64);
         let rows = self.spectrum.rows as i64;
-        let noise = NoiseMap::new(&self.spectrum);
-        let row = noise.row(k.y.rem_euclid(rows) as usize);
+        let row = self.blocks().row(k.y.rem_euclid(rows) as usize);
         let block = k.x as usize / BLOCK_WIDTH;
         row.get(block).copied().unwrap_or(1.0)
+    }
+
+    fn blocks(&self) -> &NoiseMap {
+        self.blocks.get_or_init(|| NoiseMap::new(&self.spectrum))
     }
 
     /// The same per pixel.
@@ -239,7 +246,7 @@ impl ResidualNoise {
 
     /// The strongest wave away from the lattice, from slow waves and from the line ridge.
     pub(crate) fn foreign_wave(&self, frame: &Frame, model: &Model) -> Option<ForeignWave> {
-        let noise = NoiseMap::new(&self.spectrum);
+        let noise = self.blocks();
         let rows = self.spectrum.rows;
         let cycles = model.pair / PI;
         let inverse = cycles.try_inverse()?;
