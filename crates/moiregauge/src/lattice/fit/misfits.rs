@@ -92,15 +92,15 @@ impl Boxes {
         }
         let spread = median(&mut all) / MEDIAN_DISTANCE;
         let most = (MISSING * typical).max(typical + DEVIATIONS * spread);
-        let gone: Vec<bool> = self
-            .power
-            .iter()
-            .zip(there)
-            .map(|(p, t)| *t && *p > most)
-            .collect();
+        if !self.power.iter().zip(there).any(|(p, t)| *t && *p > most) {
+            return None;
+        }
+        // With them go slivers between what is gone already.
+        let goes = |(p, t): (&f64, &bool)| *t && (p.is_nan() || *p > most);
+        let gone: Vec<bool> = self.power.iter().zip(there).map(goes).collect();
         let count = gone.iter().filter(|gone| **gone).count();
         let few = (count as f64) < MOST * there.iter().filter(|t| **t).count() as f64;
-        (count > 0 && few).then_some(gone)
+        few.then_some(gone)
     }
 }
 
