@@ -19,6 +19,8 @@ const MISSING: f64 = 2.0;
 const DEVIATIONS: f64 = 8.0;
 /// Median of the distance from the median, of normal numbers, in standard deviations.
 const MEDIAN_DISTANCE: f64 = 0.674_489_750_196_082;
+/// What is left of a pixel counts up to this, in standard deviations by the median: scars and spikes are no holes.
+const CUT: f64 = 3.0;
 /// A box with a smaller share of its pixels says nothing. Chosen by eye.
 const FULL_ENOUGH: f64 = 0.2;
 /// Where more than this share of the pixels does not follow the lattice, it is none of the frame. Chosen by eye.
@@ -65,10 +67,9 @@ struct Boxes {
 impl Boxes {
     fn new(image: &Image, left: &[f64], there: &[bool], size: [usize; 2]) -> Self {
         let shape = [image.columns, image.rows];
-        let squares = left
-            .iter()
-            .zip(there)
-            .map(|(l, t)| if *t { l * l } else { 0.0 });
+        let most = (CUT * scatter(left, there)).powi(2);
+        let squares = left.iter().zip(there);
+        let squares = squares.map(|(l, t)| if *t { (l * l).min(most) } else { 0.0 });
         let squares = box_sums(squares.collect(), shape, size);
         let counts = there.iter().map(|t| f64::from(u8::from(*t)));
         let counts = box_sums(counts.collect(), shape, size);
@@ -102,6 +103,13 @@ impl Boxes {
         let few = (count as f64) < MOST * there.iter().filter(|t| **t).count() as f64;
         few.then_some(gone)
     }
+}
+
+/// Standard deviation by the median of the sizes.
+fn scatter(left: &[f64], there: &[bool]) -> f64 {
+    let sizes = left.iter().zip(there).filter(|(_, there)| **there);
+    let mut sizes: Vec<f64> = sizes.map(|(left, _)| left.abs()).collect();
+    median(&mut sizes) / MEDIAN_DISTANCE
 }
 
 /// Sums over boxes of a size around every pixel of an image of a shape (columns, rows).
