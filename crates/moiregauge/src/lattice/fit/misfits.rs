@@ -73,10 +73,17 @@ impl Boxes {
         let squares = box_sums(squares.collect(), shape, size);
         let counts = there.iter().map(|t| f64::from(u8::from(*t)));
         let counts = box_sums(counts.collect(), shape, size);
-        let fewest = FULL_ENOUGH * (size[0] * size[1]) as f64;
-        let mean = |(sum, n): (&f64, &f64)| if *n < fewest { f64::NAN } else { sum / n };
+        // At the sides of the frame a box is smaller.
+        let whole = box_sums(vec![1.0; left.len()], shape, size);
+        let mean = |((sum, n), whole): ((&f64, &f64), &f64)| {
+            if *n < FULL_ENOUGH * whole {
+                f64::NAN
+            } else {
+                sum / n
+            }
+        };
         Self {
-            power: squares.iter().zip(&counts).map(mean).collect(),
+            power: squares.iter().zip(&counts).zip(&whole).map(mean).collect(),
         }
     }
 
@@ -160,6 +167,8 @@ mod tests {
     use nalgebra::Vector2;
 
     const SIZE: usize = 128;
+    /// Half of a box, and a pixel.
+    const HALF: f64 = 8.0;
 
     fn pair() -> Matrix2<f64> {
         Matrix2::new(0.45, -0.02, 0.21, 0.52)
@@ -218,8 +227,8 @@ mod tests {
             let rest = rest(&image(seed, |at| far(at) > 18.0)).unwrap();
             for (i, value) in rest.values.iter().enumerate() {
                 let d = far(Vector2::new((i % SIZE) as f64, (i / SIZE) as f64));
-                assert!(value.is_nan() || d > 18.0 - 7.0, "{seed}: {d}");
-                assert!(value.is_finite() || d < 18.0 + 3.0 * 7.0, "{seed}: {d}");
+                assert!(value.is_nan() || d > 18.0 - HALF, "{seed}: {d}");
+                assert!(value.is_finite() || d < 18.0 + 3.0 * HALF, "{seed}: {d}");
             }
         }
     }
