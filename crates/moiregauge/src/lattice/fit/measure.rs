@@ -11,8 +11,8 @@ use crate::lattice::fit::noise::{ForeignWave, ResidualNoise};
 use crate::lattice::fit::straight::without_bend;
 use crate::spectrum::harmonics::Harmonics;
 
-/// Rounds of taking out places that do not show the lattice: each shows weaker ones, and lines that were left out for them come back.
-const ROUNDS: usize = 5;
+/// Rounds of taking out places that do not show the lattice: each shows weaker ones.
+const ROUNDS: usize = 3;
 
 /// A lattice fitted to an image.
 pub(crate) struct Found {
