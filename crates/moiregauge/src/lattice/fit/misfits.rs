@@ -117,7 +117,7 @@ fn box_sums(mut values: Vec<f64>, shape: [usize; 2], size: [usize; 2]) -> Vec<f6
             line[row] = values[row * columns + column];
         }
         running(&line[..rows], size[1], |row, sum| {
-            values[row * columns + column] = sum
+            values[row * columns + column] = sum;
         });
     }
     values
