@@ -227,4 +227,35 @@ mod tests {
             assert!(50 * lost < beyond, "{seed}: {lost} of {beyond}");
         }
     }
+
+    /// The phases of a part are those at the mean place of its pixels, where the wave vectors do not matter: as certain as those of
+    /// a frame of as many pixels.
+    #[test]
+    fn phases_of_a_part_hold_at_its_middle() {
+        for seed in 0..5 {
+            let mut part = image(seed, |_| true);
+            for (i, value) in part.values.iter_mut().enumerate() {
+                if i % SIZE < 70 || i / SIZE > 90 {
+                    *value = f64::NAN;
+                }
+            }
+            let start = Windowed::new(&part).fit(&part, &pair(), Background::Plane, shells(3));
+            let fit = measure(&part, &start.unwrap(), Background::Plane)
+                .unwrap()
+                .fit;
+            let middle = Vector2::new((70 + SIZE - 1) as f64 / 2.0, 45.0);
+            assert!((fit.middle() - middle).norm() < 1e-9, "{}", fit.middle());
+            let found = fit.first_phases();
+            let pixels = ((SIZE - 70) * 91) as f64;
+            for (i, q) in crate::numbers::three::three(&pair()).iter().enumerate() {
+                let off = found.values[i] - q.dot(&middle);
+                let off = off - (off / std::f64::consts::TAU).round() * std::f64::consts::TAU;
+                let sigma = found.covariance[(i, i)].sqrt();
+                // Amplitude 1, noise 0.3: variance 2 σ²/N. The noise is read off a part; at the centre of the frame it would be three times that.
+                let bound = 0.3 * (2.0 / pixels).sqrt();
+                assert!((0.5..2.0).contains(&(sigma / bound)), "{}", sigma / bound);
+                assert!(off.abs() < 5.0 * bound, "{seed}: {off} ± {sigma}");
+            }
+        }
+    }
 }
