@@ -8,7 +8,7 @@
 //! whose lattice is said to change across the frame (none of them does); `phase` is the pull of the phases of the
 //! first harmonics, `ridge` that of those with fewer than three cycles along the fast axis.
 
-#[path = "../tests/fit_scene/mod.rs"]
+#[path = "../tests/science/fit_scene/mod.rs"]
 mod fit_scene;
 
 use fit_scene::{Contrast, Scene};

@@ -5,7 +5,7 @@
 //! share of sets within one, two and three σ (true errors: 68.3, 95.4 and 99.7 %), the spread of the pulls, and the rms error
 //! in degrees and per cent.
 
-#[path = "../tests/tensor_scene/mod.rs"]
+#[path = "../tests/science/tensor_scene/mod.rs"]
 mod tensor_scene;
 
 use moiregauge::caveat::Caveat;

@@ -1,6 +1,6 @@
 //! What caveats mean: `moiregauge explain`, its page, and that there are no others.
 
-#[path = "../../../moiregauge/tests/sources/mod.rs"]
+#[path = "../../../moiregauge/tests/science/sources/mod.rs"]
 mod sources;
 
 use std::path::{Path, PathBuf};

@@ -13,6 +13,8 @@ use crate::frame::background::{Background, remove_background};
 use crate::frame::clip::cut_off;
 use crate::frame::geometry::Geometry;
 use crate::frame::image::Image;
+use crate::lattice::fit::few::FewWaves;
+use crate::lattice::fit::fitted::LatticeFit;
 use crate::lattice::fit::hidden::{Hidden, first_shell};
 use crate::lattice::fit::noise::ForeignWave;
 use crate::lattice::measured::MeasuredLattice;
@@ -53,7 +55,61 @@ pub(crate) fn measure_own(
     background: Background,
     method: Method,
 ) -> Result<MeasuredLattice, LatticeError> {
-    let image = &Arc::new(levelled(image, background)?);
+    let image = Arc::new(levelled(image, background)?);
+    let found = measure_levelled(&image, geometry, background, method);
+    if !is_doubtful(&found) {
+        return found;
+    }
+    let Some(waves) = FewWaves::of(&image) else {
+        return found;
+    };
+    // A lattice that covers the frame and whose waves are all there is right, whatever else there is.
+    let whole = found.as_ref().ok().filter(|found| found.patch.is_none());
+    if whole.is_some_and(|found| waves.has(&found.reciprocal)) {
+        return found;
+    }
+    beside_stripes(&waves, &image, geometry, background, method).map_or(found, Ok)
+}
+
+/// Whether stripes may have made a lattice, or hidden one.
+fn is_doubtful(found: &Result<MeasuredLattice, LatticeError>) -> bool {
+    let Ok(found) = found else {
+        return true;
+    };
+    let disagrees = |fit: &LatticeFit| fit.closure.is_some_and(|c| c.enlargement() > 1.0);
+    found.patch.is_some() || beside(found).is_some() || found.fit.as_ref().is_none_or(disagrees)
+}
+
+/// The lattice of an image that is a few perfect waves, of which some are none of the lattice's.
+fn beside_stripes(
+    waves: &FewWaves,
+    image: &Image,
+    geometry: &Geometry,
+    background: Background,
+    method: Method,
+) -> Option<MeasuredLattice> {
+    let pair = waves.pair()?;
+    let to_physical = geometry.pixel_to_nm.try_inverse()?.transpose();
+    let pair = pair * shortest_pair(&(to_physical * pair))?;
+    let (rest, wave) = waves.taken_off(image, &pair)?;
+    let start = Start::at(&rest, geometry, background, &pair)?;
+    let mut found = start.measure(method).ok()?;
+    if let Some(fit) = &mut found.fit {
+        let told = fit.foreign_wave.map_or(0.0, |told| told.significance);
+        if wave.significance > told {
+            fit.foreign_wave = Some(wave);
+        }
+    }
+    Some(found)
+}
+
+/// The lattice of an image whose background is off already.
+fn measure_levelled(
+    image: &Arc<Image>,
+    geometry: &Geometry,
+    background: Background,
+    method: Method,
+) -> Result<MeasuredLattice, LatticeError> {
     let found = find_anywhere(image, geometry, background, method)?.measure(method)?;
     if hidden(&found).chance() < SECOND_SHELL
         && let Some(first) = of_first_shell(&found, image, geometry, background, method)

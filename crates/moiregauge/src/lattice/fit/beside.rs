@@ -27,7 +27,7 @@ const OPPOSITE: f64 = 0.1;
 /// Points of the lattice that count, by their order.
 const ORDER: f64 = 4.0;
 /// A wave has more than so many cycles in the frame: slower ones are background.
-const SLOWEST: f64 = 2.0;
+pub(super) const SLOWEST: f64 = 2.0;
 /// Steps until a wave has to stand still.
 const STEPS: usize = 30;
 
@@ -44,15 +44,8 @@ pub(crate) fn without_waves(
     mut left: Vec<f64>,
     strongest: impl Fn(&ResidualNoise) -> Option<ForeignWave>,
 ) -> Option<Image> {
-    let columns = frame.image.columns;
-    let spectrum = |left: &[f64]| {
-        let line = |(): &mut (), row: usize, out: &mut [f64]| {
-            out.copy_from_slice(&left[row * columns..][..columns]);
-        };
-        ResidualNoise::new(frame, false, || (), line).0
-    };
     let mut image = frame.image.clone();
-    let mut seen = spectrum(&left);
+    let mut seen = spectrum(frame, &left);
     for taken in 0..=MOST {
         let wave = strongest(&seen).filter(is_strong);
         let cycles = wave.map(|w| w.wave_vector.component_mul(&frame.edge()) / PI);
@@ -63,7 +56,7 @@ pub(crate) fn without_waves(
         };
         wave.take_off(frame, &mut left);
         clear(frame, &mut left);
-        let rest = spectrum(&left);
+        let rest = spectrum(frame, &left);
         if rest.power_near(k) > LEFT * seen.power_near(k) {
             return (taken > 0).then_some(image);
         }
@@ -73,8 +66,17 @@ pub(crate) fn without_waves(
     None
 }
 
+/// The transform of what is left of the pixels, 0 where they do not count.
+pub(super) fn spectrum(frame: &Frame, left: &[f64]) -> ResidualNoise {
+    let columns = frame.image.columns;
+    let line = |(): &mut (), row: usize, out: &mut [f64]| {
+        out.copy_from_slice(&left[row * columns..][..columns]);
+    };
+    ResidualNoise::new(frame, false, || (), line).0
+}
+
 /// Puts 0 where pixels do not count.
-fn clear(frame: &Frame, values: &mut [f64]) {
+pub(super) fn clear(frame: &Frame, values: &mut [f64]) {
     let columns = frame.image.columns;
     let lines = values.chunks_exact_mut(columns).zip(&frame.present);
     for (line, _) in lines.filter(|(_, present)| **present == 0) {

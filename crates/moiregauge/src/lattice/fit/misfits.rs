@@ -7,9 +7,13 @@
 
 use heterostrain::lattice::{Px, Waves};
 use nalgebra::{Matrix2, Matrix4};
+use rayon::prelude::*;
 
 use crate::frame::image::Image;
 use crate::lattice::fit::fit_pixels::Fit;
+use crate::lattice::fit::model::{AT_ONCE, residual};
+use crate::lattice::fit::tables::Tables;
+use crate::numbers::interrupt;
 use crate::numbers::median::median;
 
 /// Power that is left under the box over the median of all boxes, beyond which the lattice is missing there. The mean over a unit cell of 100
@@ -24,20 +28,24 @@ const FULL_ENOUGH: f64 = 0.2;
 /// Where more than this share of the pixels does not follow the lattice, it is none of the frame. Chosen by eye.
 const MOST: f64 = 0.35;
 
+/// Bins across the narrower side of a unit cell, at least: boxes of bins are as good as boxes of pixels then. Chosen by eye.
+const BINS: usize = 10;
+
 impl Fit<'_> {
     /// The image without the places that do not show the lattice; `None` where there are none.
     pub(crate) fn without_misfits(&self) -> Option<Image> {
         let image = self.frame.image;
-        let left = self.left();
-        let counts =
-            |i: usize| self.frame.present[i / image.columns] > 0 && image.values[i].is_finite();
-        let there: Vec<bool> = (0..left.len()).map(counts).collect();
-        let boxes = Boxes::new(image, &left, &there, self.unit_cell()?);
-        let gone = boxes.misfits(&there)?;
+        let cell = self.unit_cell()?;
+        let bin = (cell[0].min(cell[1]) / BINS).max(1);
+        let left = self.left_in_bins(bin);
+        let gone = left.misfits(cell.map(|n| n.div_ceil(bin)))?;
         let mut rest = image.clone();
-        for (value, gone) in rest.values.iter_mut().zip(gone) {
-            if gone {
-                *value = f64::NAN;
+        for (row, line) in rest.values.chunks_exact_mut(image.columns).enumerate() {
+            if self.frame.present[row] > 0 {
+                let gone = &gone[row / bin * left.shape[0]..];
+                for (pixels, _) in line.chunks_mut(bin).zip(gone).filter(|(_, gone)| **gone) {
+                    pixels.fill(f64::NAN);
+                }
             }
         }
         Some(rest)
@@ -55,34 +63,81 @@ impl Fit<'_> {
         };
         Some([0, 1].map(|axis| (most(axis).round() as usize).max(1)))
     }
+
+    /// What is left of the pixels that count, in bins of so many pixels along each axis; offsets of lines are in it.
+    fn left_in_bins(&self, bin: usize) -> Left {
+        let (frame, model) = (&self.frame, &self.model);
+        let image = frame.image;
+        let tables = Tables::new(frame, &model.pair, &model.basis.indices);
+        let shape = [image.columns, image.rows].map(|n| n.div_ceil(bin));
+        let mut left = Left::none(shape, bin);
+        let lines = (left.squares.par_chunks_exact_mut(shape[0]))
+            .zip(left.counts.par_chunks_exact_mut(shape[0]))
+            .enumerate();
+        lines.with_min_len(AT_ONCE.div_ceil(bin)).for_each_init(
+            || vec![0.0; image.columns],
+            |line, (i, (squares, counts))| {
+                let rows = i * bin..((i + 1) * bin).min(image.rows);
+                for row in rows.filter(|row| frame.present[*row] > 0) {
+                    interrupt::check();
+                    residual(frame, model, &tables, row, line);
+                    add(line, bin, squares, counts);
+                }
+            },
+        );
+        left
+    }
 }
 
-/// Mean squares of what is left under boxes around every pixel.
-struct Boxes {
-    power: Vec<f64>,
+/// Adds the squares of the pixels of a line to its bins; missing ones are NaN.
+fn add(line: &[f64], bin: usize, squares: &mut [f64], counts: &mut [f64]) {
+    let bins = squares.iter_mut().zip(counts);
+    for (pixels, (square, count)) in line.chunks(bin).zip(bins) {
+        for value in pixels.iter().filter(|value| value.is_finite()) {
+            *square += value * value;
+            *count += 1.0;
+        }
+    }
 }
 
-impl Boxes {
-    fn new(image: &Image, left: &[f64], there: &[bool], size: [usize; 2]) -> Self {
-        let shape = [image.columns, image.rows];
-        let squares = left
-            .iter()
-            .zip(there)
-            .map(|(l, t)| if *t { l * l } else { 0.0 });
-        let squares = box_sums(squares.collect(), shape, size);
-        let counts = there.iter().map(|t| f64::from(u8::from(*t)));
-        let counts = box_sums(counts.collect(), shape, size);
-        let fewest = FULL_ENOUGH * (size[0] * size[1]) as f64;
-        let mean = |(sum, n): (&f64, &f64)| if *n < fewest { f64::NAN } else { sum / n };
+/// What a fit leaves in square bins.
+struct Left {
+    /// Bins along columns and rows.
+    shape: [usize; 2],
+    /// Pixels of a bin.
+    pixels: usize,
+    /// Sum of the squares of the pixels that count ...
+    squares: Vec<f64>,
+    /// ... and how many do.
+    counts: Vec<f64>,
+}
+
+impl Left {
+    fn none(shape: [usize; 2], bin: usize) -> Self {
+        let zeros = vec![0.0; shape[0] * shape[1]];
         Self {
-            power: squares.iter().zip(&counts).map(mean).collect(),
+            shape,
+            pixels: bin * bin,
+            squares: zeros.clone(),
+            counts: zeros,
         }
     }
 
-    /// The pixels of those that are `there` in whose boxes much more is left than in most; `None` where there are none, or too many.
-    fn misfits(&self, there: &[bool]) -> Option<Vec<bool>> {
-        let known = |(power, there): (&f64, &bool)| (*there && power.is_finite()).then_some(*power);
-        let mut all: Vec<f64> = self.power.iter().zip(there).filter_map(known).collect();
+    /// Mean squares under boxes of so many bins around every bin; NaN where hardly any pixel of a box counts.
+    fn power(&self, size: [usize; 2]) -> Vec<f64> {
+        let squares = box_sums(self.squares.clone(), self.shape, size);
+        let counts = box_sums(self.counts.clone(), self.shape, size);
+        let fewest = FULL_ENOUGH * (size[0] * size[1] * self.pixels) as f64;
+        let mean = |(sum, n): (&f64, &f64)| if *n < fewest { f64::NAN } else { sum / n };
+        squares.iter().zip(&counts).map(mean).collect()
+    }
+
+    /// The bins with pixels that count in whose boxes, so many bins wide and high, much more is left than in most; `None` where there are
+    /// none, or too many.
+    fn misfits(&self, size: [usize; 2]) -> Option<Vec<bool>> {
+        let power = self.power(size);
+        let there = || power.iter().zip(&self.counts).filter(|(_, n)| **n > 0.0);
+        let mut all: Vec<f64> = there().map(|(p, _)| *p).filter(|p| p.is_finite()).collect();
         if all.is_empty() {
             return None;
         }
@@ -92,35 +147,48 @@ impl Boxes {
         }
         let spread = median(&mut all) / MEDIAN_DISTANCE;
         let most = (MISSING * typical).max(typical + DEVIATIONS * spread);
-        if !self.power.iter().zip(there).any(|(p, t)| *t && *p > most) {
+        if !there().any(|(p, _)| *p > most) {
             return None;
         }
         // With them go slivers between what is gone already.
-        let goes = |(p, t): (&f64, &bool)| *t && (p.is_nan() || *p > most);
-        let gone: Vec<bool> = self.power.iter().zip(there).map(goes).collect();
+        let goes = |(p, n): (&f64, &f64)| *n > 0.0 && (p.is_nan() || *p > most);
+        let gone: Vec<bool> = power.iter().zip(&self.counts).map(goes).collect();
         let count = gone.iter().filter(|gone| **gone).count();
-        let few = (count as f64) < MOST * there.iter().filter(|t| **t).count() as f64;
+        let few = (count as f64) < MOST * there().count() as f64;
         few.then_some(gone)
     }
 }
 
-/// Sums over boxes of a size around every pixel of an image of a shape (columns, rows).
+/// Sums over boxes of a size around every number of a field of a shape (columns, rows).
 fn box_sums(mut values: Vec<f64>, shape: [usize; 2], size: [usize; 2]) -> Vec<f64> {
     let [columns, rows] = shape;
-    let mut line = vec![0.0; columns.max(rows)];
+    let mut line = vec![0.0; columns];
     for row in values.chunks_exact_mut(columns) {
-        line[..columns].copy_from_slice(row);
-        running(&line[..columns], size[0], |i, sum| row[i] = sum);
+        line.copy_from_slice(row);
+        running(&line, size[0], |i, sum| row[i] = sum);
     }
-    for column in 0..columns {
-        for row in 0..rows {
-            line[row] = values[row * columns + column];
+    // Sums of the rows above each.
+    let mut above = vec![0.0; (rows + 1) * columns];
+    for (row, line) in values.chunks_exact(columns).enumerate() {
+        for (column, value) in line.iter().enumerate() {
+            above[(row + 1) * columns + column] = above[row * columns + column] + value;
         }
-        running(&line[..rows], size[1], |row, sum| {
-            values[row * columns + column] = sum;
-        });
+    }
+    for (row, line) in values.chunks_exact_mut(columns).enumerate() {
+        let [first, last] = around(row, size[1], rows).map(|row| &above[row * columns..]);
+        for (sum, (first, last)) in line.iter_mut().zip(first.iter().zip(last)) {
+            *sum = last - first;
+        }
     }
     values
+}
+
+/// Where `size` numbers around one of so many begin and end: fewer at the ends.
+fn around(i: usize, size: usize, count: usize) -> [usize; 2] {
+    [
+        i.saturating_sub(size / 2),
+        (i + size.div_ceil(2)).min(count),
+    ]
 }
 
 /// Sums over `size` numbers around each, fewer at the ends.
@@ -133,10 +201,7 @@ fn running(line: &[f64], size: usize, mut put: impl FnMut(usize, f64)) {
         sums.push(sum);
     }
     for i in 0..line.len() {
-        let (first, last) = (
-            i.saturating_sub(size / 2),
-            (i + size.div_ceil(2)).min(line.len()),
-        );
+        let [first, last] = around(i, size, line.len());
         put(i, sums[last] - sums[first]);
     }
 }
@@ -212,9 +277,9 @@ mod tests {
             let place = Vector2::new(50.0 + 6.0 * seed as f64, 64.0);
             let far = |at: Vector2<f64>| (at - place).norm();
             let left = image(seed, |at| far(at) < RADIUS);
-            let there = vec![true; left.values.len()];
-            let boxes = Boxes::new(&left, &left.values, &there, [14, 14]);
-            let gone = boxes.misfits(&there).unwrap();
+            let mut bins = Left::none([SIZE, SIZE], 1);
+            add(&left.values, 1, &mut bins.squares, &mut bins.counts);
+            let gone = bins.misfits([14, 14]).unwrap();
             let [mut inside, mut kept, mut beyond, mut lost] = [0; 4];
             for (i, gone) in gone.into_iter().enumerate() {
                 let d = far(Vector2::new((i % SIZE) as f64, (i / SIZE) as f64));

@@ -27,6 +27,7 @@ pub(crate) mod bend;
 pub(crate) mod beside;
 pub(crate) mod choose;
 pub(crate) mod closure;
+pub(crate) mod few;
 pub(crate) mod first;
 pub(crate) mod fit_pixels;
 pub(crate) mod fitted;

@@ -289,13 +289,18 @@ impl ResidualNoise {
             }
         }
         let k = best?;
-        let bins = self.spectrum.values.len() as f64;
         Some(ForeignWave {
             wave_vector: (k * PI).component_div(&frame.edge()),
             significance: most,
-            // The local noise is known to a fifth or so, hence the factor.
-            threshold: 1.3 * (bins.ln() + 9.0),
+            threshold: self.threshold(),
         })
+    }
+
+    /// Power over noise that chance exceeds once in some ten thousand images of this size.
+    pub(super) fn threshold(&self) -> f64 {
+        let bins = self.spectrum.values.len() as f64;
+        // The local noise is known to a fifth or so, hence the factor.
+        1.3 * (bins.ln() + 9.0)
     }
 }
 

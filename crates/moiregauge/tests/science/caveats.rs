@@ -1,11 +1,9 @@
 //! The table of doubts: every code once, with a meaning and an advice in sentences.
 
-mod sources;
-
 use std::path::Path;
 
+use crate::sources::sources;
 use moiregauge::caveat::{Caveat, FileDoubt, Severity, explained};
-use sources::sources;
 
 #[test]
 fn codes_are_kebab_case_and_unique() {

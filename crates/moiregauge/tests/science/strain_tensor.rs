@@ -1,11 +1,9 @@
 //! Twist, biaxial and uniaxial strain of simulated sets, with and without atomic images.
 
-mod tensor_scene;
-
+use crate::tensor_scene::{atoms, measured, moire, on_hbn, run, settings, truth};
 use heterostrain::strain::{KnownOrientation, LatticeDirection};
 use moiregauge::campaign::{analyse, atomic_orientation};
 use moiregauge::caveat::Caveat;
-use tensor_scene::{atoms, measured, moire, on_hbn, run, settings, truth};
 
 /// χ² of twist, mean strain and shear part over several sets is that of true errors (p > 10⁻³ to either side).
 /// Returns how many sets have one of these, the uniaxial or the biaxial part beyond 3 σ.

@@ -1,6 +1,5 @@
 //! Two equal layers and the orientation of one of them: which sense the twist has is open, and both readings are there.
 //! In: stackings that are put in. Nothing is simulated.
-
 use heterostrain::lattice::Lattice;
 use heterostrain::material::Material;
 use heterostrain::strain::twist_strain;

@@ -1,10 +1,8 @@
 //! Errors of twist and strain, and what they do to a strain near zero.
 
-#[path = "../../heterostrain/tests/two_layers/mod.rs"]
-mod two_layers;
-
 use std::f64::consts::PI;
 
+use crate::two_layers::{graphene, lattice, solve};
 use heterostrain::lattice::Lattice;
 use heterostrain::strain::StrainConvention::RealSpace;
 use heterostrain::strain::draws;
@@ -13,7 +11,6 @@ use moiregauge::numbers::normals;
 use moiregauge::numbers::stream;
 use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
 use rand_distr::{Distribution, StandardNormal};
-use two_layers::{graphene, lattice, solve};
 
 /// At q → 0 and equal errors v of the harmonics: `σ_θ = σ_p`, `σ_E = 2σ_q/(1+ν)`, `σ_p² = v/(3|G|²)`.
 #[test]

@@ -1,9 +1,6 @@
 //! Several lattices in one image are separated, each within its errors.
 
-#[allow(dead_code, reason = "other tests use the rest of it")]
-mod fit_scene;
-
-use fit_scene::{Contrast, Scene};
+use crate::fit_scene::{Contrast, Scene};
 use moiregauge::frame::Background;
 use moiregauge::lattice::{MeasuredLattice, measure_several};
 use moiregauge::spectrum::LatticeError;

@@ -1,14 +1,12 @@
 //! The simulator against its definition, pixel by pixel, and against its own record of the truth.
 
-mod noiseless;
-
 use std::f64::consts::PI;
 
 use moiregauge::simulate::{FirstDirection, SimulateError, Simulation, Simulator};
 use nalgebra::{Matrix2, Matrix3, Rotation2, Vector2, Vector3};
 use spmfile::{Channel, FrameDirection, LineDirection, Scan};
 
-use noiseless::noiseless;
+use crate::noiseless::noiseless;
 
 /// Small, noiseless, everything else as far from symmetric as it gets.
 fn quiet() -> Simulation {

@@ -1,10 +1,8 @@
 //! The rooms of the core stand on floors: each takes from those below it, never from those above.
 
-mod sources;
-
 use std::path::Path;
 
-use sources::sources;
+use crate::sources::sources;
 
 /// From the top floor down, as in DESIGN.md.
 const FLOORS: [&[&str]; 13] = [

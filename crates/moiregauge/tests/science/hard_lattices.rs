@@ -1,10 +1,6 @@
 //! Lattices whose first shell is hidden, waves of pick-up, and harmonics that do not agree.
 
-// The tests of the fit use the rest.
-#[allow(dead_code, reason = "other tests use the rest of it")]
-mod fit_scene;
-
-use fit_scene::{Contrast, Scene, Wave};
+use crate::fit_scene::{Contrast, Scene, Wave};
 use moiregauge::frame::Background;
 use moiregauge::frame::Image;
 use moiregauge::lattice::{MeasuredLattice, measure};

@@ -1,6 +1,5 @@
 //! Every name of a lattice: the truth is among the readings up to the strain that is stated, and what decides among them.
 //! The forward equation is written out here once more, without the names of the library.
-
 use std::f64::consts::{PI, TAU};
 
 use heterostrain::lattice::Lattice;

@@ -1,10 +1,8 @@
 //! The page of constants says of each the value that the sources have.
 
-mod sources;
-
 use std::path::{Path, PathBuf};
 
-use sources::sources;
+use crate::sources::sources;
 
 /// The values of all definitions of a constant in a source.
 fn values<'a>(text: &'a str, name: &str) -> impl Iterator<Item = &'a str> {

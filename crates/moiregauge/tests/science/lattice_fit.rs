@@ -1,8 +1,6 @@
 //! The lattice fit against the truth, the Cramér–Rao bound, and everything that goes wrong in scans.
 
-mod fit_scene;
-
-use fit_scene::{Contrast, Scene, Wave};
+use crate::fit_scene::{Contrast, Scene, Wave};
 use moiregauge::frame::Background;
 use moiregauge::frame::Image;
 use moiregauge::lattice::{MeasuredLattice, measure};

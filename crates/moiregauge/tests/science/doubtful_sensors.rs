@@ -1,6 +1,5 @@
 //! Position sensors that glitch, that lag through every turn, or that are not there: what is said of twist and strain stays
 //! within its errors.
-
 use moiregauge::campaign::{Analysis, analyse};
 use moiregauge::caveat::Caveat;
 use moiregauge::meaning::Source;

@@ -1,10 +1,8 @@
 //! Symmetries of the strain equation and its derivatives.
 
-#[path = "../../heterostrain/tests/two_layers/mod.rs"]
-mod two_layers;
-
 use std::f64::consts::{FRAC_PI_3, PI};
 
+use crate::two_layers::{graphene, lattice, modulo, solve};
 use heterostrain::lattice::Lattice;
 use heterostrain::lattice::three_vectors;
 use heterostrain::strain::StrainConvention;
@@ -16,7 +14,6 @@ use nalgebra::{
 };
 use proptest::prelude::*;
 use rand_distr::{Distribution, StandardNormal};
-use two_layers::{graphene, lattice, modulo, solve};
 
 prop_compose! {
     fn sample()(

@@ -1,14 +1,12 @@
 //! Simulated samples that are no perfect lattice, against closed forms and against counting.
 
-mod noiseless;
-
 use heterostrain::lattice::Lattice;
 use heterostrain::strain::twist_strain;
 use moiregauge::simulate::{SampleFeature, Simulation, Simulator, Truth};
 use nalgebra::{Matrix2, Matrix4, Vector2};
 use spmfile::{LineDirection, Scan};
 
-use noiseless::noiseless;
+use crate::noiseless::noiseless;
 
 /// Noiseless frames of one channel whose window goes where it is told.
 fn quiet(sample: &str) -> Simulation {

@@ -1,0 +1,344 @@
+//! Images that are a few perfect waves: a lattice and stripes, and nothing else.
+//!
+//! In: an image without its background. Out: the wave vectors of its strong waves, each to a small share of a cycle of the frame, if they are
+//! all there is. A wave beside a lattice that is as strong as those of the lattice makes another "lattice" with two of them, or beats with one
+//! of them, so that the lattice seems to cover parts of the frame. Waves that are fitted together (Gauss–Newton, from the highest
+//! bins of what is left) are told apart from two bins of the spectrum on, and only those of a lattice add up:
+//! `k₁ + k₂ = k₃` to within their errors.
+
+use std::f64::consts::{PI, TAU};
+
+use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
+
+use crate::frame::image::Image;
+use crate::lattice::fit::beside::{SLOWEST, clear, spectrum};
+use crate::lattice::fit::frame::{Frame, turns};
+use crate::lattice::fit::noise::{BESIDE, ForeignWave, ResidualNoise};
+
+/// Waves at most: a lattice with a few harmonics, and stripes with overtones.
+const MOST: usize = 9;
+/// A wave with less than this share of the power of the strongest may be left. Chosen by eye.
+const NEGLIGIBLE: f64 = 0.01;
+/// Bins in the shortest period of a strong wave, at least.
+const BINS_PER_PERIOD: f64 = 5.0;
+/// Steps until all waves have to stand still.
+const STEPS: usize = 25;
+/// They do when no phase at an edge moves by more than this, rad.
+const STILL: f64 = 1e-4;
+/// Cycles of the frame by which a wave may move from its bin: two waves under one peak are farther from it than one.
+const FARTHEST: f64 = 1.6;
+/// Waves closer than this, cycles of the frame, are one that is not perfect.
+const APART: f64 = 0.7;
+/// Waves add up where they do to within so many cycles of the frame: three waves of noise 0.03 each.
+const ADDS_UP: f64 = 0.15;
+/// The same for a harmonic of a lattice: up to the fourth order.
+const HARMONIC: f64 = 0.4;
+/// Points of a lattice that count, by their order.
+const ORDER: f64 = 4.0;
+/// Sine of the angle between two waves of a lattice, at least.
+const OPEN: f64 = 0.4;
+
+/// The strong waves of an image.
+pub(crate) struct FewWaves {
+    /// Their wave vectors, rad per pixel, strongest first found.
+    waves: Vec<Vector2<f64>>,
+    amplitudes: Vec<f64>,
+    /// (columns, rows) of the image.
+    size: [usize; 2],
+}
+
+impl FewWaves {
+    /// `None` where they are not all there is.
+    pub(crate) fn of(image: &Image) -> Option<Self> {
+        let bins = bins_for(image)?;
+        let small = image.binned(bins);
+        let frame = Frame::new(&small);
+        let mut model = Joint::default();
+        let mut strongest = None;
+        loop {
+            let left = model.left(&frame);
+            let seen = spectrum(&frame, &left);
+            let (k, power) = highest(&frame, &seen)?;
+            let first = *strongest.get_or_insert(power);
+            if power < NEGLIGIBLE * first || power < seen.threshold() * seen.level_near(k) {
+                break;
+            }
+            if model.waves.len() == MOST {
+                return None;
+            }
+            model.add(k * PI);
+            model.converge(&frame)?;
+        }
+        let edge = frame.edge() * bins as f64;
+        Some(Self {
+            waves: model.waves.iter().map(|p| p.component_div(&edge)).collect(),
+            amplitudes: (model.amplitudes.iter().map(|[a, b]| a.hypot(*b))).collect(),
+            size: [image.columns, image.rows],
+        })
+    }
+
+    /// Whether all three first waves of a lattice (rad per pixel) are among them.
+    pub(crate) fn has(&self, reciprocal: &Matrix2<f64>) -> bool {
+        let three = crate::numbers::three::three(reciprocal);
+        let near = |a: &Vector2<f64>, b: &Vector2<f64>| self.cycles(&(a - b)).norm() < HARMONIC;
+        let is = |q: &Vector2<f64>| self.waves.iter().any(|w| near(w, q) || near(&-w, q));
+        three.iter().all(is)
+    }
+
+    /// The pair of waves that makes a lattice with a third: of all such, that whose weakest wave is strongest.
+    pub(crate) fn pair(&self) -> Option<Matrix2<f64>> {
+        let n = self.waves.len();
+        let triples =
+            (0..n).flat_map(|i| (i + 1..n).flat_map(move |j| (j + 1..n).map(move |l| [i, j, l])));
+        let weakest = |t: &[usize; 3]| {
+            t.iter()
+                .map(|&i| self.amplitudes[i])
+                .fold(f64::INFINITY, f64::min)
+        };
+        let lattices = triples.filter_map(|t| Some((weakest(&t), self.lattice(t)?)));
+        let best = lattices.max_by(|a, b| a.0.total_cmp(&b.0))?;
+        Some(best.1)
+    }
+
+    /// The pair of three waves that add up.
+    fn lattice(&self, triple: [usize; 3]) -> Option<Matrix2<f64>> {
+        let [a, b, c] = triple.map(|i| self.waves[i]);
+        let sign = [1.0, -1.0].into_iter().find(|sign| {
+            let sum = a + b * *sign;
+            self.cycles(&(sum - c))
+                .norm()
+                .min(self.cycles(&(sum + c)).norm())
+                < ADDS_UP
+        })?;
+        let open = a.perp(&b).abs() > OPEN * a.norm() * b.norm();
+        // The third is the difference of the two.
+        open.then(|| Matrix2::from_columns(&[a, -b * sign]))
+    }
+
+    /// The image without the waves that are none of the harmonics of a lattice (rad per pixel), and the strongest of these; `None` where there is none.
+    pub(crate) fn taken_off(
+        &self,
+        image: &Image,
+        pair: &Matrix2<f64>,
+    ) -> Option<(Image, ForeignWave)> {
+        let inverse = pair.try_inverse()?;
+        let is_beside = |q: &Vector2<f64>| {
+            let index = (inverse * q).map(|i| i.round().clamp(-ORDER, ORDER));
+            self.cycles(&(q - pair * index)).norm() > HARMONIC
+        };
+        let frame = Frame::new(image);
+        let mut model = Joint {
+            waves: self
+                .waves
+                .iter()
+                .map(|q| q.component_mul(&frame.edge()))
+                .collect(),
+            amplitudes: vec![[0.0; 2]; self.waves.len()],
+            ..Joint::default()
+        };
+        model.fit_amplitudes(&frame)?;
+        let seen = spectrum(&frame, &model.left(&frame));
+        let mut rest = image.clone();
+        let mut strongest: Option<ForeignWave> = None;
+        for (i, q) in self.waves.iter().enumerate().filter(|(_, q)| is_beside(q)) {
+            model.take_off(&frame, i, &mut rest.values);
+            let [a, b] = model.amplitudes[i];
+            // A wave of amplitude A has A²N/4 under the window's 4/9 in its highest bin.
+            let power = (a * a + b * b) * frame.pixels() as f64 / 9.0;
+            let significance = power / seen.level_near(model.waves[i] / PI);
+            if strongest.is_none_or(|s| s.significance < significance) {
+                strongest = Some(ForeignWave {
+                    wave_vector: *q,
+                    significance,
+                    threshold: seen.threshold(),
+                });
+            }
+        }
+        Some((rest, strongest?))
+    }
+
+    /// Cycles of the frame of a wave vector, rad per pixel.
+    fn cycles(&self, q: &Vector2<f64>) -> Vector2<f64> {
+        q.component_mul(&Vector2::from(self.size.map(|n| n as f64 / TAU)))
+    }
+}
+
+/// Pixels that are averaged along each axis before waves are fitted: `None` where there is no wave.
+fn bins_for(image: &Image) -> Option<usize> {
+    let frame = Frame::new(image);
+    let mut left = image.values.clone();
+    clear(&frame, &mut left);
+    let seen = spectrum(&frame, &left);
+    let (_, most) = highest(&frame, &seen)?;
+    let size = [image.columns, image.rows];
+    let mut fastest = 0.0f64;
+    each_bin(&frame, |k| {
+        if seen.power(k[0], k[1]) > NEGLIGIBLE * most {
+            let per_pixel = |axis: usize| k[axis].abs() as f64 / size[axis] as f64;
+            fastest = fastest.max(per_pixel(0)).max(per_pixel(1));
+        }
+    });
+    Some(((1.0 / (fastest * BINS_PER_PERIOD)) as usize).max(1))
+}
+
+/// Calls `f` with (x, y) of each bin that is neither ground nor noise of whole lines, cycles per frame.
+fn each_bin(frame: &Frame, mut f: impl FnMut([i64; 2])) {
+    let [columns, rows] = [frame.image.columns as i64 / 2, frame.image.rows as i64 / 2];
+    for y in -rows..=rows {
+        for x in BESIDE..=columns {
+            if ((x * x + y * y) as f64).sqrt() > SLOWEST {
+                f([x, y]);
+            }
+        }
+    }
+}
+
+/// Cycles per frame of the strongest bin, and its power.
+fn highest(frame: &Frame, seen: &ResidualNoise) -> Option<(Vector2<f64>, f64)> {
+    let mut best = None;
+    each_bin(frame, |[x, y]| {
+        let power = seen.power(x, y);
+        if power > best.map_or(0.0, |(_, most)| most) {
+            best = Some((Vector2::new(x as f64, y as f64), power));
+        }
+    });
+    best
+}
+
+/// A plane and perfect waves, fitted together.
+#[derive(Default)]
+struct Joint {
+    plane: [f64; 3],
+    /// Phases at the edges.
+    waves: Vec<Vector2<f64>>,
+    /// (a, b) of `a cos θ + b sin θ`.
+    amplitudes: Vec<[f64; 2]>,
+    /// Where the waves started.
+    starts: Vec<Vector2<f64>>,
+}
+
+impl Joint {
+    fn add(&mut self, p: Vector2<f64>) {
+        self.waves.push(p);
+        self.amplitudes.push([0.0; 2]);
+        self.starts.push(p);
+    }
+
+    /// Gauss–Newton on all of it; `None` where a wave runs away, or two are one.
+    fn converge(&mut self, frame: &Frame) -> Option<()> {
+        self.fit_amplitudes(frame)?;
+        for _ in 0..STEPS {
+            let step = self.step(frame, true)?;
+            let turns = step.rows(3 + 2 * self.waves.len(), 2 * self.waves.len());
+            let turn = turns.amax();
+            self.apply(&step, (std::f64::consts::FRAC_PI_8 / turn).min(1.0));
+            let ran = self.waves.iter().zip(&self.starts);
+            if ran
+                .map(|(p, start)| (p - start).norm())
+                .any(|d| !(d < FARTHEST * PI))
+            {
+                return None;
+            }
+            if turn < STILL {
+                break;
+            }
+        }
+        let apart = |(i, p): (usize, &Vector2<f64>)| {
+            let others = self.waves[i + 1..].iter();
+            others.map(|q| (p - q).norm()).all(|d| d > APART * PI)
+        };
+        self.waves.iter().enumerate().all(apart).then_some(())
+    }
+
+    fn fit_amplitudes(&mut self, frame: &Frame) -> Option<()> {
+        let step = self.step(frame, false)?;
+        self.apply(&step, 1.0);
+        Some(())
+    }
+
+    /// By how much all numbers change: plane, amplitudes and, where they are free, phases at the edges.
+    fn step(&self, frame: &Frame, free: bool) -> Option<DVector<f64>> {
+        let count = self.waves.len();
+        let numbers = 3 + if free { 4 } else { 2 } * count;
+        let (mut normal, mut right) = (DMatrix::zeros(numbers, numbers), DVector::zeros(numbers));
+        let mut parts = DVector::zeros(numbers);
+        self.each(frame, |[x, y], turns, value, _| {
+            parts[0] = 1.0;
+            parts[1] = x;
+            parts[2] = y;
+            for (i, ([cos, sin], [a, b])) in turns.iter().zip(&self.amplitudes).enumerate() {
+                parts[3 + 2 * i] = *cos;
+                parts[4 + 2 * i] = *sin;
+                if free {
+                    let slope = b * cos - a * sin;
+                    parts[3 + 2 * (count + i)] = slope * x;
+                    parts[4 + 2 * (count + i)] = slope * y;
+                }
+            }
+            normal.syger(1.0, &parts, &parts, 1.0);
+            right.axpy(value, &parts, 1.0);
+        });
+        normal.fill_upper_triangle_with_lower_triangle();
+        Some(normal.cholesky()?.solve(&right))
+    }
+
+    fn apply(&mut self, step: &DVector<f64>, share: f64) {
+        let count = self.waves.len();
+        for (value, change) in self.plane.iter_mut().zip(step.iter()) {
+            *value += share * change;
+        }
+        for i in 0..count {
+            for axis in 0..2 {
+                self.amplitudes[i][axis] += share * step[3 + 2 * i + axis];
+                if step.len() > 3 + 2 * count {
+                    self.waves[i][axis] += share * step[3 + 2 * (count + i) + axis];
+                }
+            }
+        }
+    }
+
+    /// What is left of the pixels, 0 where they do not count.
+    fn left(&self, frame: &Frame) -> Vec<f64> {
+        let mut left = vec![0.0; frame.image.values.len()];
+        self.each(frame, |_, _, value, i| left[i] = value);
+        left
+    }
+
+    /// Takes one wave off an image.
+    fn take_off(&self, frame: &Frame, wave: usize, values: &mut [f64]) {
+        let (p, [a, b]) = (self.waves[wave], self.amplitudes[wave]);
+        let along = turns(p.x, &frame.x);
+        let up = turns(p.y, &frame.y);
+        for (line, up) in values.chunks_exact_mut(frame.image.columns).zip(&up) {
+            for (value, along) in line.iter_mut().zip(&along) {
+                let turn = along * up;
+                *value -= a * turn.re + b * turn.im;
+            }
+        }
+    }
+
+    /// Calls `f` with place, cosine and sine of each wave, what is left and the index of every pixel that counts.
+    fn each(&self, frame: &Frame, mut f: impl FnMut([f64; 2], &[[f64; 2]], f64, usize)) {
+        let columns = frame.image.columns;
+        let along: Vec<_> = self.waves.iter().map(|p| turns(p.x, &frame.x)).collect();
+        let up: Vec<_> = self.waves.iter().map(|p| turns(p.y, &frame.y)).collect();
+        let mut here = vec![[0.0; 2]; self.waves.len()];
+        for row in (0..frame.image.rows).filter(|row| frame.present[*row] > 0) {
+            crate::numbers::interrupt::check();
+            let y = frame.y[row];
+            for (column, pixel) in frame.image.row(row).iter().enumerate() {
+                if !pixel.is_finite() {
+                    continue;
+                }
+                let x = frame.x[column];
+                let mut value = pixel - self.plane[0] - self.plane[1] * x - self.plane[2] * y;
+                for (i, [a, b]) in self.amplitudes.iter().enumerate() {
+                    let turn = along[i][column] * up[i][row];
+                    here[i] = [turn.re, turn.im];
+                    value -= a * turn.re + b * turn.im;
+                }
+                f([x, y], &here, value, row * columns + column);
+            }
+        }
+    }
+}
