@@ -13,7 +13,7 @@ use crate::frame::background::{Background, remove_background};
 use crate::frame::clip::cut_off;
 use crate::frame::geometry::Geometry;
 use crate::frame::image::Image;
-use crate::lattice::fit::few::FewWaves;
+use crate::lattice::fit::few::{FewWaves, strongest_beside};
 use crate::lattice::fit::fitted::LatticeFit;
 use crate::lattice::fit::hidden::{Hidden, first_shell};
 use crate::lattice::fit::noise::ForeignWave;
@@ -22,10 +22,13 @@ use crate::lattice::start::{HANN, Start};
 use crate::spectrum::error::LatticeError;
 use crate::spectrum::method::Method;
 use crate::spectrum::prepare::levelled;
+use crate::spectrum::shells::FIRST_SHELL;
 
 /// Waves shorter than this share of the shortest lattice vector are atoms, and those longer by as much are background: both
 /// may be stronger than the lattice.
 const ATOMS: f64 = 0.25;
+/// A wave of so many times the amplitude of the first ones of a lattice is what an image shows, and they are not. Chosen by eye.
+const TOWERS: f64 = 3.0;
 /// A lattice is the second shell of another if noise alone has as much power where the first would be less often than this.
 pub(crate) const SECOND_SHELL: f64 = 1e-6;
 
@@ -119,6 +122,9 @@ fn measure_levelled(
     let Some(wave) = beside(&found) else {
         return Ok(found);
     };
+    if let Some(period) = towering(&found, image, geometry) {
+        return Err(LatticeError::Contradicted { period });
+    }
     let (pair, size) = (found.reciprocal, [image.columns, image.rows]);
     let to_physical = geometry.pixel_to_nm.try_inverse().map(|m| m.transpose());
     let finer = to_physical.and_then(|m| finer(&pair, &wave.wave_vector, size, &m));
@@ -141,6 +147,21 @@ fn measure_levelled(
             period: period(&wave, geometry),
         }),
     }
+}
+
+/// Period (nm) of a wave of the image that is none of the lattice's and much stronger than any of its first ones: however plain these are, nobody
+/// meant them.
+fn towering(found: &MeasuredLattice, image: &Image, geometry: &Geometry) -> Option<f64> {
+    let fit = found.fit.as_ref().filter(|_| found.patch.is_none())?;
+    let (wave_vector, amplitude) = strongest_beside(image, &found.reciprocal)?;
+    let first = fit.harmonics.iter().take(FIRST_SHELL.len());
+    let strongest = first.map(|h| h.amplitude).fold(0.0, f64::max);
+    let wave = ForeignWave {
+        wave_vector,
+        ..fit.foreign_wave?
+    };
+    (amplitude > TOWERS * strongest && competes(found, &wave, geometry))
+        .then(|| period(&wave, geometry))
 }
 
 /// What a lattice that was measured leaves where the first shell would be, if it is the second shell of another.
