@@ -66,9 +66,11 @@ pub(crate) fn measure_own(
     let Some(waves) = FewWaves::of(&image) else {
         return found;
     };
-    // A lattice that covers the frame and whose waves are all there is right, whatever else there is.
+    // A lattice that covers the frame and whose waves are all there is right, if it does not seem to change: perfect waves do not.
+    let plain = |fit: &LatticeFit| !disagrees(fit) && fit.change().is_none();
     let whole = found.as_ref().ok().filter(|found| found.patch.is_none());
-    if whole.is_some_and(|found| waves.has(&found.reciprocal)) {
+    let plain = whole.filter(|found| found.fit.as_ref().is_some_and(plain));
+    if plain.is_some_and(|found| waves.has(&found.reciprocal)) {
         return found;
     }
     beside_stripes(&waves, &image, geometry, background, method).map_or(found, Ok)
@@ -79,8 +81,13 @@ fn is_doubtful(found: &Result<MeasuredLattice, LatticeError>) -> bool {
     let Ok(found) = found else {
         return true;
     };
-    let disagrees = |fit: &LatticeFit| fit.closure.is_some_and(|c| c.enlargement() > 1.0);
     found.patch.is_some() || beside(found).is_some() || found.fit.as_ref().is_none_or(disagrees)
+}
+
+/// Whether its harmonics do not agree on one lattice.
+fn disagrees(fit: &LatticeFit) -> bool {
+    fit.closure
+        .is_some_and(|closure| closure.enlargement() > 1.0)
 }
 
 /// The lattice of an image that is a few perfect waves, of which some are none of the lattice's.

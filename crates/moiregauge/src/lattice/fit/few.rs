@@ -21,6 +21,10 @@ const MOST: usize = 9;
 const NEGLIGIBLE: f64 = 0.01;
 /// Bins in the shortest period of a strong wave, at least.
 const BINS_PER_PERIOD: f64 = 5.0;
+/// Steps on the way.
+const SOME_STEPS: usize = 8;
+/// Waves that may have another within [`SKIRT`]: a stripe and an overtone of it may each be close to a wave of a lattice.
+const CLOSE: usize = 4;
 /// Steps until all waves have to stand still.
 const STEPS: usize = 25;
 /// They do when no phase at an edge moves by more than this, rad.
@@ -71,8 +75,12 @@ impl FewWaves {
                 return None;
             }
             model.add(k * PI);
-            model.converge(&frame)?;
+            model.converge(&frame, SOME_STEPS)?;
+            if model.has_skirts() {
+                return None;
+            }
         }
+        model.converge(&frame, STEPS)?;
         let edge = frame.edge() * bins as f64;
         Some(Self {
             waves: model.waves.iter().map(|p| p.component_div(&edge)).collect(),
@@ -130,6 +138,12 @@ impl FewWaves {
             let index = (inverse * q).map(|i| i.round().clamp(-ORDER, ORDER));
             self.cycles(&(q - pair * index)).norm() > HARMONIC
         };
+        let beside: Vec<usize> = (0..self.waves.len())
+            .filter(|&i| is_beside(&self.waves[i]))
+            .collect();
+        if !self.are_stripes(&beside) {
+            return None;
+        }
         let frame = Frame::new(image);
         let mut model = Joint {
             waves: self
@@ -144,7 +158,7 @@ impl FewWaves {
         let seen = spectrum(&frame, &model.left(&frame));
         let mut rest = image.clone();
         let mut strongest: Option<ForeignWave> = None;
-        for (i, q) in self.waves.iter().enumerate().filter(|(_, q)| is_beside(q)) {
+        for i in beside {
             model.take_off(&frame, i, &mut rest.values);
             let [a, b] = model.amplitudes[i];
             // A wave of amplitude A has A²N/4 under the window's 4/9 in its highest bin.
@@ -152,13 +166,25 @@ impl FewWaves {
             let significance = power / seen.level_near(model.waves[i] / PI);
             if strongest.is_none_or(|s| s.significance < significance) {
                 strongest = Some(ForeignWave {
-                    wave_vector: *q,
+                    wave_vector: self.waves[i],
                     significance,
                     threshold: seen.threshold(),
                 });
             }
         }
         Some((rest, strongest?))
+    }
+
+    /// Whether some of the waves are one and its overtones.
+    fn are_stripes(&self, some: &[usize]) -> bool {
+        let waves = || some.iter().map(|&i| self.waves[i]);
+        let Some(slowest) = waves().min_by(|a, b| a.norm().total_cmp(&b.norm())) else {
+            return false;
+        };
+        waves().all(|q| {
+            let n = (q.dot(&slowest) / slowest.norm_squared()).round();
+            self.cycles(&(q - slowest * n)).norm() < HARMONIC
+        })
     }
 
     /// Cycles of the frame of a wave vector, rad per pixel.
@@ -254,9 +280,9 @@ impl Joint {
     }
 
     /// Gauss–Newton on all of it; `None` where a wave runs away, or two are one.
-    fn converge(&mut self, frame: &Frame) -> Option<()> {
+    fn converge(&mut self, frame: &Frame, steps: usize) -> Option<()> {
         self.fit_amplitudes(frame)?;
-        for _ in 0..STEPS {
+        for _ in 0..steps {
             let step = self.step(frame, true)?;
             let turns = step.rows(3 + 2 * self.waves.len(), 2 * self.waves.len());
             let turn = turns.amax();
@@ -277,6 +303,15 @@ impl Joint {
             others.map(|q| (p - q).norm()).all(|d| d > APART * PI)
         };
         self.waves.iter().enumerate().all(apart).then_some(())
+    }
+
+    /// Whether many waves have another close to them: those of a lattice that changes, or that covers a part of the frame.
+    fn has_skirts(&self) -> bool {
+        let close = |p: &&Vector2<f64>| {
+            let others = self.waves.iter().map(|q| (*p - q).norm() / PI);
+            others.filter(|d| *d > 0.0).any(|d| d < SKIRT)
+        };
+        self.waves.iter().filter(close).count() > CLOSE
     }
 
     fn fit_amplitudes(&mut self, frame: &Frame) -> Option<()> {
