@@ -193,7 +193,7 @@ impl FewWaves {
     }
 }
 
-/// The strongest wave that is none of the harmonics of a lattice (rad per pixel): wave vector, rad per pixel, and amplitude.
+/// The strongest wave that is none of the harmonics of a lattice (rad per pixel), nor of whole lines: wave vector, rad per pixel, and amplitude.
 pub(crate) fn strongest_beside(image: &Image, pair: &Matrix2<f64>) -> Option<(Vector2<f64>, f64)> {
     let frame = Frame::new(image);
     let mut left = image.values.clone();
@@ -202,7 +202,7 @@ pub(crate) fn strongest_beside(image: &Image, pair: &Matrix2<f64>) -> Option<(Ve
     let cycles = Matrix2::from_diagonal(&frame.edge()) * pair / PI;
     let inverse = cycles.try_inverse()?;
     let mut best: Option<(Vector2<f64>, f64)> = None;
-    each_bin(&frame, |[x, y]| {
+    each_bin(&frame, BESIDE, |[x, y]| {
         let (k, power) = (Vector2::new(x as f64, y as f64), seen.power(x, y));
         if k.norm() > PERIODS && power > best.map_or(0.0, |(_, most)| most) {
             let index = (inverse * k).map(|i| i.round().clamp(-ORDER, ORDER));
@@ -227,7 +227,7 @@ fn bins_for(image: &Image) -> Option<usize> {
     let (_, most) = highest(&frame, &seen)?;
     let size = [image.columns, image.rows];
     let mut fastest = 0.0f64;
-    each_bin(&frame, |k| {
+    each_bin(&frame, 0, |k| {
         if seen.power(k[0], k[1]) > NEGLIGIBLE * most {
             let per_pixel = |axis: usize| k[axis].abs() as f64 / size[axis] as f64;
             fastest = fastest.max(per_pixel(0)).max(per_pixel(1));
@@ -236,11 +236,11 @@ fn bins_for(image: &Image) -> Option<usize> {
     Some(((1.0 / (fastest * BINS_PER_PERIOD)) as usize).max(1))
 }
 
-/// Calls `f` with (x, y) of each bin that is neither ground nor noise of whole lines, cycles per frame.
-fn each_bin(frame: &Frame, mut f: impl FnMut([i64; 2])) {
+/// Calls `f` with (x, y) of each bin that is no ground, cycles per frame, from an x on: what whole lines do is below [`BESIDE`].
+fn each_bin(frame: &Frame, from: i64, mut f: impl FnMut([i64; 2])) {
     let [columns, rows] = [frame.image.columns as i64 / 2, frame.image.rows as i64 / 2];
     for y in -rows..=rows {
-        for x in BESIDE..=columns {
+        for x in from..=columns {
             if ((x * x + y * y) as f64).sqrt() > SLOWEST {
                 f([x, y]);
             }
@@ -251,7 +251,7 @@ fn each_bin(frame: &Frame, mut f: impl FnMut([i64; 2])) {
 /// Cycles per frame of the strongest bin, and its power.
 fn highest(frame: &Frame, seen: &ResidualNoise) -> Option<(Vector2<f64>, f64)> {
     let mut best = None;
-    each_bin(frame, |[x, y]| {
+    each_bin(frame, 0, |[x, y]| {
         let power = seen.power(x, y);
         if power > best.map_or(0.0, |(_, most)| most) {
             best = Some((Vector2::new(x as f64, y as f64), power));
@@ -403,6 +403,102 @@ impl Joint {
                 }
                 f([x, y], &here, value, row * columns + column);
             }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::numbers::rng::normals;
+    use crate::numbers::three::three;
+
+    const SIZE: usize = 128;
+    const NOISE: f64 = 0.3;
+
+    /// Eight to ten periods of a lattice.
+    fn pair() -> Matrix2<f64> {
+        Matrix2::new(0.45, -0.02, 0.21, 0.52)
+    }
+
+    /// A wave by its phase at a place, its wave vector being so many rad per pixel.
+    fn image(seed: u64, value: impl Fn(Vector2<f64>) -> f64) -> Image {
+        let mut normal = normals(seed, "few", 0);
+        let values = (0..SIZE * SIZE).map(|i| {
+            let at = Vector2::new((i % SIZE) as f64, (i / SIZE) as f64);
+            value(at) + NOISE * normal()
+        });
+        Image::new(SIZE, SIZE, values.collect())
+    }
+
+    fn lattice(at: Vector2<f64>) -> f64 {
+        three(&pair())
+            .iter()
+            .map(|q| (q.dot(&at) + 0.7).cos())
+            .sum()
+    }
+
+    /// A wave one and a half times as strong as those of a lattice and two cycles of the frame from one of them, with an overtone, is told
+    /// from them: three waves that add up are left, and of the wave less than the noise in one pixel of a hundred.
+    #[test]
+    fn stripes_close_to_a_lattice_are_told_from_it() {
+        for seed in 0..12 {
+            let turn = seed as f64 * 0.5;
+            let away = Vector2::new(turn.cos(), turn.sin()) * (2.0 * TAU / SIZE as f64);
+            let q = three(&pair())[seed as usize % 3] + away;
+            let stripes = |at: Vector2<f64>| {
+                let theta = q.dot(&at) + turn;
+                1.5 * theta.cos() + 0.4 * (2.0 * theta).cos()
+            };
+            let striped = image(seed, |at| lattice(at) + stripes(at));
+            let waves = FewWaves::of(&striped).unwrap();
+            let found = waves.pair().unwrap();
+            let names = pair().try_inverse().unwrap() * found;
+            let whole = names.map(f64::round);
+            assert!(
+                (whole.determinant().abs() - 1.0).abs() < 1e-9,
+                "{seed}: {names}"
+            );
+            assert!((names - whole).amax() < 0.01, "{seed}: {names}");
+            assert!(waves.has(&pair()));
+            let (rest, told) = waves.taken_off(&striped, &found).unwrap();
+            let off = told.wave_vector;
+            assert!(
+                (off - q).norm().min((off + q).norm()) < 1e-3,
+                "{seed}: {off}"
+            );
+            let bare = image(seed, lattice);
+            let left = rest
+                .values
+                .iter()
+                .zip(&bare.values)
+                .map(|(a, b)| (a - b).powi(2));
+            let left = left.sum::<f64>() / (SIZE * SIZE) as f64;
+            assert!(left < (0.1 * NOISE).powi(2), "{seed}: {}", left.sqrt());
+        }
+    }
+
+    /// Nothing is taken off a lattice that is alone, covers a part of the frame, or changes across it.
+    #[test]
+    fn what_a_lattice_does_is_no_stripes() {
+        let taken =
+            |image: &Image| FewWaves::of(image).and_then(|w| w.taken_off(image, &w.pair()?));
+        for seed in 0..12 {
+            assert!(taken(&image(seed, lattice)).is_none(), "alone, {seed}");
+            let turn = seed as f64 * 0.5;
+            let across = Vector2::new(turn.cos(), turn.sin());
+            let from_middle = |at: Vector2<f64>| (at - Vector2::repeat(64.0)).dot(&across);
+            let half = |at| {
+                if from_middle(at) < 10.0 {
+                    lattice(at)
+                } else {
+                    0.0
+                }
+            };
+            assert!(taken(&image(seed, half)).is_none(), "half, {seed}");
+            let bent =
+                |at: Vector2<f64>| lattice(at + across * (from_middle(at) / 64.0).powi(2) * 4.0);
+            assert!(taken(&image(seed, bent)).is_none(), "bent, {seed}");
         }
     }
 }
