@@ -4,7 +4,9 @@ use crate::fit_scene::{Contrast, Scene, Wave};
 use moiregauge::frame::Background;
 use moiregauge::frame::Image;
 use moiregauge::lattice::{MeasuredLattice, measure};
+use moiregauge::simulate::{SampleFeature, Simulation, Simulator, vary};
 use moiregauge::spectrum::Method;
+use moiregauge::{Settings, analyse, measure_scan};
 use nalgebra::Vector2;
 
 fn fit(image: &Image, scene: &Scene) -> MeasuredLattice {
@@ -164,5 +166,46 @@ fn harmonics_that_make_no_lattice_enlarge_the_errors() {
         let chi_squared = chi_squared(&scene, &measured);
         // Four degrees of freedom: once in ten thousand, and χ² of the closure is uncertain itself.
         assert!(chi_squared < 24.0, "seed {seed}: {chi_squared}");
+    }
+}
+
+/// Sets whose stripes are as strong as the lattice and two or three cycles of the frame from one of its waves, or make a larger
+/// cell with it: read as parts, grains and other lattices they were 0.03 to 0.66 degrees off, by 15 to 88 of their errors.
+#[test]
+fn strong_stripes_make_no_lattice() {
+    for seed in [1075, 1086, 1090] {
+        let mut set = Simulation {
+            features: SampleFeature::parse("stripes").unwrap(),
+            ..Simulation::default()
+        };
+        set.raster.pixels = [192, 192];
+        set.raster.scans = 4;
+        vary(&mut set, seed);
+        let truth = set.sample.twist_deg;
+        let simulator = Simulator::new(set).unwrap();
+        let settings = Settings {
+            drift_draws: 0,
+            strain_draws: 0,
+            ..Settings::default()
+        };
+        let measured = (0..simulator.frames()).filter_map(|i| {
+            measure_scan(
+                &Simulator::file_name(i),
+                &simulator.frame(i),
+                &settings,
+                None,
+            )
+            .ok()
+        });
+        let analysis = analyse(measured.collect(), &settings);
+        for set in &analysis.sets {
+            let Some(mean) = &set.mean else { continue };
+            let (twist, sigma) = (mean.twist().value, mean.twist().statistical);
+            let off = twist.to_degrees() - truth;
+            assert!(off.abs() < 5.0 * sigma.to_degrees(), "{seed}: {off}");
+            assert!(off.abs() < 0.001, "{seed}: {off}");
+        }
+        let answered = analysis.sets.iter().any(|set| set.mean.is_some());
+        assert!(answered || seed == 1086, "{seed}");
     }
 }

@@ -35,6 +35,7 @@ pub(crate) mod folded;
 pub(crate) mod frame;
 pub(crate) mod gram;
 pub(crate) mod hidden;
+pub(crate) mod joint;
 pub(crate) mod left;
 pub(crate) mod lines;
 pub(crate) mod local;
