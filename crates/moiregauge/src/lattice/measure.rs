@@ -70,7 +70,7 @@ pub(crate) fn measure_own(
     let plain = |fit: &LatticeFit| !disagrees(fit) && fit.change().is_none();
     let whole = found.as_ref().ok().filter(|found| found.patch.is_none());
     let plain = whole.filter(|found| found.fit.as_ref().is_some_and(plain));
-    if plain.is_some_and(|found| waves.has(&found.reciprocal)) {
+    if plain.is_some_and(|found| waves.are_of(&found.reciprocal)) {
         return found;
     }
     beside_stripes(&waves, &image, geometry, background, method).map_or(found, Ok)
@@ -104,6 +104,9 @@ fn beside_stripes(
     let (rest, wave) = waves.taken_off(image, &pair)?;
     let start = Start::at(&rest, geometry, background, &pair)?;
     let mut found = start.measure(method).ok()?;
+    if hidden(&found).chance() < SECOND_SHELL {
+        found = of_first_shell(&found, &rest, geometry, background, method)?;
+    }
     if let Some(fit) = &mut found.fit {
         let told = fit.foreign_wave.map_or(0.0, |told| told.significance);
         if wave.significance > told {

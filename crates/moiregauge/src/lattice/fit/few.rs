@@ -82,12 +82,23 @@ impl FewWaves {
         })
     }
 
-    /// Whether all three first waves of a lattice (rad per pixel) are among them.
-    pub(crate) fn has(&self, reciprocal: &Matrix2<f64>) -> bool {
-        let three = crate::numbers::three::three(reciprocal);
-        let near = |a: &Vector2<f64>, b: &Vector2<f64>| self.cycles(&(a - b)).norm() < HARMONIC;
-        let is = |q: &Vector2<f64>| self.waves.iter().any(|w| near(w, q) || near(&-w, q));
-        three.iter().all(is)
+    /// Whether a lattice (rad per pixel) is that of three of them that add up, or one of which these are a higher shell, and the others are none of
+    /// its harmonics.
+    pub(crate) fn are_of(&self, reciprocal: &Matrix2<f64>) -> bool {
+        let Some(pair) = self.pair() else {
+            return false;
+        };
+        let is_on = |q: &Vector2<f64>| self.is_harmonic(q, reciprocal);
+        let mut others = self.waves.iter().filter(|q| !self.is_harmonic(q, &pair));
+        pair.column_iter().all(|q| is_on(&q.into_owned())) && !others.any(is_on)
+    }
+
+    /// Whether a wave is a harmonic of a lattice (both rad per pixel).
+    fn is_harmonic(&self, q: &Vector2<f64>, pair: &Matrix2<f64>) -> bool {
+        pair.try_inverse().is_some_and(|inverse| {
+            let index = (inverse * q).map(|i| i.round().clamp(-ORDER, ORDER));
+            self.cycles(&(q - pair * index)).norm() < HARMONIC
+        })
     }
 
     /// The pair of waves that makes a lattice with a third: of all such, that whose weakest wave is strongest.
@@ -126,13 +137,8 @@ impl FewWaves {
         image: &Image,
         pair: &Matrix2<f64>,
     ) -> Option<(Image, ForeignWave)> {
-        let inverse = pair.try_inverse()?;
-        let is_beside = |q: &Vector2<f64>| {
-            let index = (inverse * q).map(|i| i.round().clamp(-ORDER, ORDER));
-            self.cycles(&(q - pair * index)).norm() > HARMONIC
-        };
         let beside: Vec<usize> = (0..self.waves.len())
-            .filter(|&i| is_beside(&self.waves[i]))
+            .filter(|&i| !self.is_harmonic(&self.waves[i], pair))
             .collect();
         if !self.are_stripes(&beside) {
             return None;
@@ -299,7 +305,12 @@ mod tests {
                 "{seed}: {names}"
             );
             assert!((names - whole).amax() < 0.01, "{seed}: {names}");
-            assert!(waves.has(&pair()));
+            assert!(waves.are_of(&pair()));
+            // A lattice that has these waves as a higher shell, and one that has the stripes as well.
+            let finer = pair() * Matrix2::new(1.0, 1.0, -1.0, 2.0).try_inverse().unwrap();
+            assert!(waves.are_of(&finer));
+            let with_stripes = Matrix2::from_columns(&[pair().column(0).into_owned(), q]);
+            assert!(!waves.are_of(&with_stripes));
             let (rest, told) = waves.taken_off(&striped, &found).unwrap();
             let off = told.wave_vector;
             assert!(
