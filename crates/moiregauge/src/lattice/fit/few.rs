@@ -15,6 +15,7 @@ use crate::lattice::fit::beside::{SLOWEST, clear, spectrum};
 use crate::lattice::fit::frame::Frame;
 use crate::lattice::fit::joint::Joint;
 use crate::lattice::fit::noise::{BESIDE, ForeignWave, ResidualNoise};
+use crate::numbers::three::three;
 
 /// Waves at most: a lattice with a few harmonics, and stripes with overtones.
 const MOST: usize = 9;
@@ -34,6 +35,10 @@ const HARMONIC: f64 = 0.4;
 const ORDER: f64 = 4.0;
 /// Farther from a point of a lattice a wave is none of its, cycles of the frame: that of a lattice that changes is nearer.
 pub(super) const SKIRT: f64 = 3.0;
+/// A harmonic that is not fitted has all of its power within so many cycles of the frame of its point.
+const LOBE: f64 = 2.0;
+/// Periods of the first waves of a lattice across the frame, at least: fewer are ground.
+const FEWEST: f64 = 3.0;
 /// A wave has more periods than this across the frame; slower ones are ground.
 const PERIODS: f64 = 5.0;
 /// Sine of the angle between two waves of a lattice, at least.
@@ -148,6 +153,9 @@ impl FewWaves {
         let mut model = Joint::of(self.waves.iter().map(|q| q.component_mul(&edge)).collect());
         model.fit_amplitudes(&frame)?;
         let seen = spectrum(&frame, &model.left(&frame));
+        if !self.are_all(&frame, &seen, &model, pair) {
+            return None;
+        }
         let mut rest = image.clone();
         let mut strongest: Option<ForeignWave> = None;
         for i in beside {
@@ -165,6 +173,44 @@ impl FewWaves {
             }
         }
         Some((rest, strongest?))
+    }
+
+    /// Whether nothing is left but noise and higher harmonics, compared with the weakest of the first waves of a lattice: holes and edges leave skirts
+    /// beside them.
+    fn are_all(
+        &self,
+        frame: &Frame,
+        seen: &ResidualNoise,
+        model: &Joint,
+        pair: &Matrix2<f64>,
+    ) -> bool {
+        let three = three(pair);
+        let first = |q: &Vector2<f64>| {
+            let is = |w: &Vector2<f64>| self.cycles(&(w - q)).norm() < HARMONIC;
+            three.iter().any(|w| is(w) || is(&-w))
+        };
+        let amplitudes = self.waves.iter().zip(&model.amplitudes);
+        let amplitudes = amplitudes.filter(|(q, _)| first(q));
+        let weakest = amplitudes.map(|(_, [a, b])| a * a + b * b);
+        let weakest = weakest.fold(f64::INFINITY, f64::min) * frame.pixels() as f64 / 9.0;
+        let cycles = three.map(|q| self.cycles(&q));
+        let Some(inverse) = Matrix2::from_columns(&[cycles[0], cycles[1]]).try_inverse() else {
+            return false;
+        };
+        let is_higher = |k: &Vector2<f64>| {
+            let index = (inverse * k).map(f64::round);
+            let point = cycles[0] * index.x + cycles[1] * index.y;
+            let order = index.x * index.x + index.x * index.y + index.y * index.y;
+            order > 1.0 && (k - point).norm() < LOBE
+        };
+        let mut all = cycles.iter().all(|k| k.norm() > FEWEST);
+        each_bin(frame, BESIDE, |[x, y]| {
+            let (k, power) = (Vector2::new(x as f64, y as f64), seen.power(x, y));
+            if power > NEGLIGIBLE * weakest && !is_higher(&k) {
+                all &= power < seen.threshold() * seen.level_near(k);
+            }
+        });
+        all
     }
 
     /// Whether some of the waves are one and its overtones.
@@ -256,7 +302,6 @@ fn highest(frame: &Frame, seen: &ResidualNoise) -> Option<(Vector2<f64>, f64)> {
 mod tests {
     use super::*;
     use crate::numbers::rng::normals;
-    use crate::numbers::three::three;
 
     const SIZE: usize = 128;
     const NOISE: f64 = 0.3;
