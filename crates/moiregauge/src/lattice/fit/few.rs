@@ -35,10 +35,12 @@ const HARMONIC: f64 = 0.4;
 const ORDER: f64 = 4.0;
 /// Farther from a point of a lattice a wave is none of its, cycles of the frame: that of a lattice that changes is nearer.
 pub(super) const SKIRT: f64 = 3.0;
-/// A harmonic that is not fitted has all of its power within so many cycles of the frame of its point.
-const LOBE: f64 = 2.0;
-/// Periods of the first waves of a lattice across the frame, at least: fewer are ground.
-const FEWEST: f64 = 3.0;
+/// A harmonic that is not fitted has nearly all of its power within so many cycles of the frame of its point.
+const LOBE: f64 = 1.5;
+/// Periods of the first waves of a lattice across the frame, at least: fewer are ground, and their harmonics would be everywhere.
+const FEWEST: f64 = 5.0;
+/// Square of the highest order that a harmonic may have: the fifth shell.
+const HIGHEST: f64 = 9.0;
 /// A wave has more periods than this across the frame; slower ones are ground.
 const PERIODS: f64 = 5.0;
 /// Sine of the angle between two waves of a lattice, at least.
@@ -201,7 +203,7 @@ impl FewWaves {
             let index = (inverse * k).map(f64::round);
             let point = cycles[0] * index.x + cycles[1] * index.y;
             let order = index.x * index.x + index.x * index.y + index.y * index.y;
-            order > 1.0 && (k - point).norm() < LOBE
+            (1.5..=HIGHEST).contains(&order) && (k - point).norm() < LOBE
         };
         let mut all = cycles.iter().all(|k| k.norm() > FEWEST);
         each_bin(frame, BESIDE, |[x, y]| {
