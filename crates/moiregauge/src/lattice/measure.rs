@@ -60,7 +60,8 @@ pub(crate) fn measure_own(
 ) -> Result<MeasuredLattice, LatticeError> {
     let image = Arc::new(levelled(image, background)?);
     let found = measure_levelled(&image, geometry, background, method);
-    if !is_doubtful(&found) {
+    // Other methods have no fit that would name the wave that is taken off.
+    if method != Method::Lattice || !is_doubtful(&found) {
         return found;
     }
     let Some(waves) = FewWaves::of(&image) else {
