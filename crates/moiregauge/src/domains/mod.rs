@@ -7,7 +7,6 @@
 //! In: an image without background and its lattice as a start. Out: places of nodes with covariances (pixels), a
 //! mesh with missing and extra nodes and dislocations, and twist and strain of every triangle on the sample.
 
-pub(crate) mod blur;
 pub(crate) mod cells;
 pub(crate) mod mesh;
 pub(crate) mod nodes;

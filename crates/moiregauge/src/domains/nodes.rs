@@ -8,8 +8,8 @@
 use nalgebra::{Matrix2, Vector2};
 use rayon::prelude::*;
 
-use crate::domains::blur::blurred;
 use crate::domains::patch::{Fit, Template};
+use crate::frame::blur::blurred;
 use crate::frame::image::Image;
 use crate::numbers::interrupt;
 use crate::numbers::median::median;

@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix6, Vector2, Vector6};
 
-use crate::domains::blur::blurred;
+use crate::frame::blur::blurred;
 use crate::frame::image::Image;
 
 /// Smoothing of the mean node (standard deviation), share of the radius of a patch: less than a node is wide. Chosen

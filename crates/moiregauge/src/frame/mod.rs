@@ -2,6 +2,7 @@
 
 pub(crate) mod axis;
 pub(crate) mod background;
+pub(crate) mod blur;
 pub(crate) mod clip;
 pub(crate) mod column_sums;
 pub(crate) mod fit_plane;

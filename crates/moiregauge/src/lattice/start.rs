@@ -255,8 +255,12 @@ impl Start {
         let cells = settled.patch.unit_cells;
         let gentle = mean.as_ref().is_some_and(|mean| mean.is_gentle(cells));
         let mean = mean.filter(|_| !everywhere || (changes && !gentle));
+        let mean = mean.map(|rough| settled.refined().unwrap_or(rough));
+        if mean.as_ref().is_some_and(Mean::is_poor) {
+            return None;
+        }
         Some(Self {
-            mean: mean.map(|rough| settled.refined().unwrap_or(rough)),
+            mean,
             patch: (!everywhere).then_some(settled.patch),
             ..self
         })

@@ -16,6 +16,7 @@ use crate::lattice::fit::lines::LineStatistics;
 use crate::lattice::fit::model::{Clip, LineOffsets, Model, look, residuals, settled};
 use crate::lattice::fit::noise::{ForeignWave, Leverage, ResidualNoise};
 use crate::lattice::fit::tables::Tables;
+use crate::lattice::fit::uneven::Levelled;
 use crate::lattice::fit::{bend, closure, frame, solve};
 use crate::numbers::dot::dot;
 use crate::spectrum::harmonics::Harmonics;
@@ -73,8 +74,17 @@ impl FinalNoise {
 }
 
 impl<'a> Fit<'a> {
-    pub(crate) fn new(image: &'a Image, start: &Harmonics, background: Background) -> Option<Self> {
-        let frame = Frame::new(image);
+    /// `levelled`: how ground was taken off the image.
+    pub(crate) fn new(
+        image: &'a Image,
+        start: &Harmonics,
+        background: Background,
+        levelled: Option<Levelled>,
+    ) -> Option<Self> {
+        let frame = Frame {
+            levelled,
+            ..Frame::new(image)
+        };
         let free_lines = background == Background::LineMean;
         let degree = match background {
             Background::Mean => 0,
@@ -207,6 +217,7 @@ impl<'a> Fit<'a> {
         let tables = Tables::new(&self.frame, &self.model.pair, &self.model.basis.indices);
         let (frame, model) = (&self.frame, &self.model);
         let lines = &self.lines;
+        let contrast = self.uneven_contrast();
         let residual = |folded: &mut Folded, row: usize, line: &mut [f64]| {
             let settled = settled(frame, model, &tables, lines, clip, row, line);
             let bends = (frame.present[row] > 0).then(|| {
@@ -219,6 +230,11 @@ impl<'a> Fit<'a> {
                 } else {
                     0.0
                 };
+            }
+            if let Some(contrast) = &contrast {
+                for (value, part) in line.iter_mut().zip(&contrast[row * frame.image.columns..]) {
+                    *value -= if part.is_finite() { *part } else { 0.0 };
+                }
             }
             (settled.offset, bends, dot(line, line))
         };

@@ -31,28 +31,50 @@ const MOST: f64 = 0.35;
 /// Bins across the narrower side of a unit cell, at least: boxes of bins are as good as boxes of pixels then. Chosen by eye.
 const BINS: usize = 10;
 
+/// Bins that do not show the lattice.
+pub(crate) struct Misfits {
+    /// Pixels of a bin along each axis, and bins along the columns.
+    bin: usize,
+    columns: usize,
+    gone: Vec<bool>,
+    /// Whether most of the frame shows the lattice.
+    pub(crate) are_few: bool,
+}
+
+impl Misfits {
+    /// The image without them.
+    pub(crate) fn taken_out(&self, image: &Image) -> Image {
+        let mut rest = image.clone();
+        for (row, line) in rest.values.chunks_exact_mut(image.columns).enumerate() {
+            let gone = &self.gone[row / self.bin * self.columns..];
+            let bins = line.chunks_mut(self.bin).zip(gone);
+            for (pixels, _) in bins.filter(|(_, gone)| **gone) {
+                pixels.fill(f64::NAN);
+            }
+        }
+        rest
+    }
+}
+
 impl Fit<'_> {
-    /// The image without the places that do not show the lattice; `None` where there are none.
-    pub(crate) fn without_misfits(&self) -> Option<Image> {
-        let image = self.frame.image;
+    /// The places that do not show the lattice; `None` where there are none.
+    pub(crate) fn misfits(&self) -> Option<Misfits> {
         let cell = self.unit_cell()?;
         let bin = (cell[0].min(cell[1]) / BINS).max(1);
         let left = self.left_in_bins(bin);
         let gone = left.misfits(cell.map(|n| n.div_ceil(bin)))?;
-        let mut rest = image.clone();
-        for (row, line) in rest.values.chunks_exact_mut(image.columns).enumerate() {
-            if self.frame.present[row] > 0 {
-                let gone = &gone[row / bin * left.shape[0]..];
-                for (pixels, _) in line.chunks_mut(bin).zip(gone).filter(|(_, gone)| **gone) {
-                    pixels.fill(f64::NAN);
-                }
-            }
-        }
-        Some(rest)
+        let count = |bins: &dyn Fn(usize) -> bool| (0..gone.len()).filter(|i| bins(*i)).count();
+        let there = count(&|i| left.counts[i] > 0.0);
+        Some(Misfits {
+            bin,
+            columns: left.shape[0],
+            are_few: (count(&|i| gone[i]) as f64) < MOST * there as f64,
+            gone,
+        })
     }
 
     /// Pixels of a unit cell along columns and rows, from one side to the other.
-    fn unit_cell(&self) -> Option<[usize; 2]> {
+    pub(crate) fn unit_cell(&self) -> Option<[usize; 2]> {
         let scale = self.frame.edge().map(|e| 1.0 / e);
         let pair = Matrix2::from_diagonal(&scale) * self.model.pair;
         let lattice = Waves::<Px>::new(pair, Matrix4::zeros()).lattice()?;
@@ -133,7 +155,7 @@ impl Left {
     }
 
     /// The bins with pixels that count in whose boxes, so many bins wide and high, much more is left than in most; `None` where there are
-    /// none, or too many.
+    /// none.
     fn misfits(&self, size: [usize; 2]) -> Option<Vec<bool>> {
         let power = self.power(size);
         let there = || power.iter().zip(&self.counts).filter(|(_, n)| **n > 0.0);
@@ -152,10 +174,7 @@ impl Left {
         }
         // With them go slivers between what is gone already.
         let goes = |(p, n): (&f64, &f64)| *n > 0.0 && (p.is_nan() || *p > most);
-        let gone: Vec<bool> = power.iter().zip(&self.counts).map(goes).collect();
-        let count = gone.iter().filter(|gone| **gone).count();
-        let few = (count as f64) < MOST * there().count() as f64;
-        few.then_some(gone)
+        Some(power.iter().zip(&self.counts).map(goes).collect())
     }
 }
 

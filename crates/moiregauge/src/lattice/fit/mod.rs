@@ -46,6 +46,7 @@ pub(crate) mod noise;
 pub(crate) mod solve;
 pub(crate) mod straight;
 pub(crate) mod tables;
+pub(crate) mod uneven;
 
 pub use bend::Inhomogeneity;
 pub use closure::Closure;

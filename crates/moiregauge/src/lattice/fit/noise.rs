@@ -17,6 +17,7 @@ use crate::lattice::fit::frame::{Basis, Frame, wave};
 use crate::lattice::fit::left::LeftOver;
 use crate::lattice::fit::local::{Bin, acting_on};
 use crate::lattice::fit::model::Model;
+use crate::lattice::fit::uneven::Levelled;
 use crate::numbers::exact;
 use crate::numbers::median::median;
 use crate::spectrum::fourier::wide;
@@ -34,6 +35,8 @@ const ACROSS: i64 = 16;
 const SHARE: usize = 6;
 /// The same across where nothing but a wave is looked for: half.
 const NEAR: i64 = 8;
+/// Frequencies of which less than this share is left without the ground say nothing of the noise.
+const FLAT: f64 = 0.3;
 /// Bins nearer to zero frequency belong to the background: a plane fills the first.
 const BACKGROUND: i64 = 2;
 /// The first column that the window keeps free of what whole lines do.
@@ -58,6 +61,8 @@ pub(crate) struct ResidualNoise {
     /// `Σ w²` over the pixels that count.
     window_power: f64,
     pub(super) free_lines: bool,
+    /// How ground was taken off the image.
+    levelled: Option<Levelled>,
 }
 
 /// The strongest wave in the residual that is none of the lattice's.
@@ -106,6 +111,7 @@ impl ResidualNoise {
             spectrum,
             blocks: OnceLock::new(),
             free_lines,
+            levelled: frame.levelled,
         };
         (noise, said)
     }
@@ -176,12 +182,28 @@ impl ResidualNoise {
                 if x.abs() < BACKGROUND && y.abs() < BACKGROUND {
                     continue;
                 }
-                let white = 1.0 - leverage.at(&mut taps, dx, dy) / self.window_power;
+                let left = self.left_of_ground([x, y]);
+                if left < FLAT {
+                    continue;
+                }
+                let white = left * (1.0 - leverage.at(&mut taps, dx, dy) / self.window_power);
                 if white > 0.02 {
                     each(Vector2::new(x, y), self.power(x, y), white);
                 }
             }
         }
+    }
+
+    /// The share of noise power at (x, y) cycles per frame that is left without the ground.
+    fn left_of_ground(&self, bin: [i64; 2]) -> f64 {
+        let Some(levelled) = self.levelled else {
+            return 1.0;
+        };
+        let turn = |axis: usize, n: usize| 2.0 * PI * bin[axis] as f64 / n as f64;
+        levelled.left(Vector2::new(
+            turn(0, self.spectrum.columns),
+            turn(1, self.spectrum.rows),
+        ))
     }
 
     /// Power per pixel at (x, y) cycles per frame.
