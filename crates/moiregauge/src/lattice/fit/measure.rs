@@ -92,10 +92,11 @@ fn finished<'a>(
 }
 
 impl Fit<'_> {
-    /// The image without the ground below the lattice; `None` where that is even.
+    /// The image without the ground below the lattice; `None` where that is even, or rough throughout.
     fn levelled(&self) -> Option<(Image, Option<Ground>)> {
         let levelled = Levelled::for_cell(self.unit_cell()?);
-        let ground = self.ground(levelled, self.frame.image, None)?;
+        let ground = self.ground(levelled, self.frame.image, None);
+        let ground = ground.filter(Ground::is_in_places)?;
         Some((ground.off(self.frame.image), Some(ground)))
     }
 

@@ -17,8 +17,8 @@ const PASSES: i32 = 3;
 /// Power of the ground over that of white noise under the same averages, from which on it is worth its while. Chosen by eye.
 const WORTH: f64 = 10.0;
 /// Share of the power of the ground that three quarters of the pixels have at most, if it is bumps: of one with a standard deviation of a sixth of the frame
-/// they have a twentieth, of rough ground, which all frames of a set show alike, more than a quarter.
-const ELSEWHERE: f64 = 0.1;
+/// they have a twentieth, of rough ground, which all frames of a set show alike, a quarter.
+const ELSEWHERE: f64 = 0.15;
 /// What white noise of variance 1 leaves in the ground, times the product of both widths in pixels: ∫ (1 − (1 − B)³)² d²k / 4π², B the Gaussian.
 const WHITE: f64 = 0.194;
 
@@ -44,6 +44,20 @@ impl Ground {
     /// An image of which it was taken off, with it.
     pub(crate) fn put_back(&self, image: &Image) -> Image {
         self.combined(image, |value, ground| value + ground)
+    }
+
+    /// Whether hardly any of its power is in most of the pixels: bumps, and not rough ground.
+    pub(crate) fn is_in_places(&self) -> bool {
+        let mut powers: Vec<f64> = self
+            .image
+            .values
+            .iter()
+            .map(|value| value * value)
+            .collect();
+        powers.sort_unstable_by(f64::total_cmp);
+        let all: f64 = powers.iter().sum();
+        let most = &powers[..powers.len() * 3 / 4];
+        most.iter().sum::<f64>() < ELSEWHERE * all
     }
 
     fn combined(&self, image: &Image, each: impl Fn(f64, f64) -> f64) -> Image {
@@ -122,8 +136,7 @@ impl Fit<'_> {
         }
         let image = levelled.ground(&left);
         let power = mean_square(&image.values);
-        let worth = power > WORTH * white && is_in_places(&image.values);
-        worth.then_some(Ground { levelled, image })
+        (power > WORTH * white).then_some(Ground { levelled, image })
     }
 }
 
@@ -150,15 +163,6 @@ impl Fit<'_> {
         let negative = lattice.left_of(image);
         Some(levelled.contrast(&self.left_of(image), &negative))
     }
-}
-
-/// Whether hardly any of the power of some numbers is in most of them.
-fn is_in_places(values: &[f64]) -> bool {
-    let mut powers: Vec<f64> = values.iter().map(|value| value * value).collect();
-    powers.sort_unstable_by(f64::total_cmp);
-    let all: f64 = powers.iter().sum();
-    let most = &powers[..powers.len() * 3 / 4];
-    most.iter().sum::<f64>() < ELSEWHERE * all
 }
 
 /// Mean square of the numbers that are there.
@@ -255,14 +259,20 @@ mod tests {
     /// Bumps lie in places, and waves and rough ground do not.
     #[test]
     fn bumps_are_told_from_rough_ground() {
+        let levelled = Levelled::for_cell([30, 30]);
+        let ground = |image| Ground { levelled, image };
         let of = |value: &dyn Fn(Vector2<f64>) -> f64| {
             let at = |i: usize| Vector2::new((i % SIZE) as f64, (i / SIZE) as f64);
-            (0..SIZE * SIZE).map(|i| value(at(i))).collect::<Vec<_>>()
+            ground(Image::new(
+                SIZE,
+                SIZE,
+                (0..SIZE * SIZE).map(|i| value(at(i))).collect(),
+            ))
         };
-        assert!(is_in_places(&of(&bump)));
-        assert!(!is_in_places(&of(&|at| (0.05 * at.x).sin())));
-        let rough = Levelled::for_cell([30, 30]);
-        assert!((0..20).all(|seed| !is_in_places(&rough.ground(&white(seed)).values)));
+        assert!(of(&bump).is_in_places());
+        assert!(!of(&|at| (0.05 * at.x).sin()).is_in_places());
+        let rough = |seed| ground(levelled.ground(&white(seed)));
+        assert!((0..20).all(|seed| !rough(seed).is_in_places()));
     }
 
     /// A lattice goes on across a bump: nothing is left out, and its waves are as certain as without, by what they are off.
