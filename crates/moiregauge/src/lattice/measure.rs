@@ -85,6 +85,12 @@ fn is_doubtful(found: &Result<MeasuredLattice, LatticeError>) -> bool {
     found.patch.is_some() || beside(found).is_some() || found.fit.as_ref().is_none_or(disagrees)
 }
 
+/// Whether these are grains, each fitted to its pixels.
+fn are_grains(found: &MeasuredLattice) -> bool {
+    let is_fitted = |grain: &MeasuredLattice| grain.fit.is_some();
+    is_fitted(found) && !found.beside.is_empty() && found.beside.iter().all(is_fitted)
+}
+
 /// Whether its harmonics do not agree on one lattice.
 fn disagrees(fit: &LatticeFit) -> bool {
     fit.closure
@@ -124,7 +130,15 @@ fn measure_levelled(
     background: Background,
     method: Method,
 ) -> Result<MeasuredLattice, LatticeError> {
-    let found = find_anywhere(image, geometry, background, method)?.measure(method)?;
+    let found = match find_anywhere(image, geometry, background, method)?.measure(method) {
+        // Waves of two grains may look like one lattice, which no part of the frame has.
+        Err(error) if method == Method::Lattice => {
+            let part = Start::find_patch(image, geometry, background, None);
+            let found = part.and_then(|start| start.measure(method).ok());
+            found.filter(are_grains).ok_or(error)?
+        }
+        found => found?,
+    };
     if hidden(&found).chance() < SECOND_SHELL
         && let Some(first) = of_first_shell(&found, image, geometry, background, method)
     {

@@ -1,13 +1,15 @@
 //! Lattices whose first shell is hidden, waves of pick-up, and harmonics that do not agree.
 
 use crate::fit_scene::{Contrast, Scene, Wave};
+use heterostrain::lattice::labelled_like;
 use moiregauge::frame::Background;
 use moiregauge::frame::Image;
 use moiregauge::lattice::{MeasuredLattice, measure};
+use moiregauge::settings::Lines;
 use moiregauge::simulate::{SampleFeature, Simulation, Simulator, vary};
 use moiregauge::spectrum::Method;
 use moiregauge::{Settings, analyse, measure_scan};
-use nalgebra::Vector2;
+use nalgebra::{Matrix2, Vector2};
 
 fn fit(image: &Image, scene: &Scene) -> MeasuredLattice {
     measure(image, &scene.geometry(), Background::Plane, Method::Lattice).unwrap()
@@ -207,5 +209,36 @@ fn strong_stripes_make_no_lattice() {
         }
         let answered = analysis.sets.iter().any(|set| set.mean.is_some());
         assert!(answered || seed == 1086, "{seed}");
+    }
+}
+
+/// The strongest waves of a frame may be those of two grains: no part of it has them together, and each grain has a lattice of its own.
+#[test]
+fn waves_of_two_grains_make_no_lattice() {
+    let mut set = Simulation {
+        features: SampleFeature::parse("grains").unwrap(),
+        ..Simulation::default()
+    };
+    vary(&mut set, 1003);
+    set.raster.pixels = [768, 768];
+    set.raster.nominal_size_nm = [250.0, 250.0];
+    let simulator = Simulator::new(set).unwrap();
+    let settings = Settings {
+        line: Lines::Trace,
+        ..Settings::default()
+    };
+    let largest = measure_scan("down", &simulator.frame(1), &settings, None).unwrap();
+    let truth = simulator.truth().sample.unwrap().grains;
+    assert_eq!(largest.grains.len() + 1, truth.len());
+    let found = std::iter::once(&largest).chain(&largest.grains);
+    // Drift changes vectors by a thousandth; those of the grains differ by forty.
+    for (grain, truth) in found.zip(&truth) {
+        let [a, b, _] = truth.lattice_vectors_nm.map(Vector2::from);
+        let truth = Matrix2::from_columns(&[a, b]);
+        let found = labelled_like(&grain.lines[0].in_sensor_coordinates(), &truth).basis;
+        assert!(
+            (found - truth).norm() < 0.005 * truth.norm(),
+            "{found} {truth}"
+        );
     }
 }
