@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use rustfft::num_complex::Complex64;
 
 use crate::frame::image::Image;
-use crate::lattice::fit::uneven::Levelled;
+use crate::lattice::fit::levelled::Levelled;
 use crate::numbers::interrupt;
 
 /// Lines that a thread counts together, at least.

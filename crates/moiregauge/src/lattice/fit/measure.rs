@@ -7,10 +7,11 @@ use crate::frame::image::Image;
 use crate::lattice::fit::beside;
 use crate::lattice::fit::fit_pixels::{FinalNoise, Fit};
 use crate::lattice::fit::fitted::LatticeFit;
+use crate::lattice::fit::levelled::Levelled;
 use crate::lattice::fit::misfits::Misfits;
 use crate::lattice::fit::noise::{ForeignWave, ResidualNoise};
 use crate::lattice::fit::straight::without_bend;
-use crate::lattice::fit::uneven::{Ground, Levelled};
+use crate::lattice::fit::uneven::Ground;
 use crate::spectrum::harmonics::Harmonics;
 
 /// Rounds of taking out places that do not show the lattice: each shows weaker ones.

@@ -37,6 +37,7 @@ pub(crate) mod gram;
 pub(crate) mod hidden;
 pub(crate) mod joint;
 pub(crate) mod left;
+pub(crate) mod levelled;
 pub(crate) mod lines;
 pub(crate) mod local;
 pub(crate) mod measure;

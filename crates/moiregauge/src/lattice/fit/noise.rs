@@ -15,9 +15,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::lattice::fit::frame::{Basis, Frame, wave};
 use crate::lattice::fit::left::LeftOver;
+use crate::lattice::fit::levelled::Levelled;
 use crate::lattice::fit::local::{Bin, acting_on};
 use crate::lattice::fit::model::Model;
-use crate::lattice::fit::uneven::Levelled;
 use crate::numbers::exact;
 use crate::numbers::median::median;
 use crate::spectrum::fourier::wide;
