@@ -23,6 +23,7 @@ pub(crate) fn advice(error: &InputError) -> Option<String> {
             LatticeError::Contradicted { .. } | LatticeError::NowhereTogether => {
                 "say which lattice to measure, or where it is: --near WAVELENGTH, --lattice, --region or --mask"
             }
+            LatticeError::NotThere => "leave out what hides it: --mask or --region",
             LatticeError::NoPeaks { .. } => "try --method fourier",
             LatticeError::FewerLattices { found, .. } => {
                 return Some(format!("--moires {found} measures those that were found"));

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use heterostrain::lattice::shortest_pair;
-use nalgebra::Vector2;
+use nalgebra::{Matrix2, Vector2};
 
 use crate::coverage::find::{pitch, same};
 use crate::coverage::finer::finer;
@@ -29,6 +29,9 @@ use crate::spectrum::shells::FIRST_SHELL;
 const ATOMS: f64 = 0.25;
 /// A wave of so many times the amplitude of the first ones of a lattice is what an image shows, and they are not. Chosen by eye.
 const TOWERS: f64 = 3.0;
+/// A lattice whose wavelength changes by more than this share from corner to corner, or that turns by as much (rad), is none: gradients and waves of
+/// twist and strain make up to a tenth, holes that pass for a coarse lattice 0.4 to 1.
+const TORN: f64 = 0.25;
 /// A lattice is the second shell of another if noise alone has as much power where the first would be less often than this.
 pub(crate) const SECOND_SHELL: f64 = 1e-6;
 
@@ -85,6 +88,23 @@ fn is_doubtful(found: &Result<MeasuredLattice, LatticeError>) -> bool {
     found.patch.is_some() || beside(found).is_some() || found.fit.as_ref().is_none_or(disagrees)
 }
 
+/// The lattice of some part of the frame, of those that are `meant`.
+fn in_parts(
+    image: &Image,
+    geometry: &Geometry,
+    background: Background,
+    meant: &dyn Fn(&Matrix2<f64>) -> bool,
+) -> Option<MeasuredLattice> {
+    let found = Start::find_meant(image, geometry, background, None, meant)?;
+    found.measure(Method::Lattice).ok()
+}
+
+/// Whether the fit says of a lattice that it changes so much that it is none.
+fn is_torn(found: &MeasuredLattice) -> bool {
+    let change = found.fit.as_ref().and_then(|fit| fit.inhomogeneity);
+    change.is_some_and(|change| change.stands_out() && change.wavelength.max(change.angle) > TORN)
+}
+
 /// Whether these are grains, each fitted to its pixels.
 fn are_grains(found: &MeasuredLattice) -> bool {
     let is_fitted = |grain: &MeasuredLattice| grain.fit.is_some();
@@ -131,13 +151,20 @@ fn measure_levelled(
     method: Method,
 ) -> Result<MeasuredLattice, LatticeError> {
     let found = match find_anywhere(image, geometry, background, method)?.measure(method) {
-        // Waves of two grains may look like one lattice, which no part of the frame has.
-        Err(error) if method == Method::Lattice => {
-            let part = Start::find_patch(image, geometry, background, None);
-            let found = part.and_then(|start| start.measure(method).ok());
-            found.filter(are_grains).ok_or(error)?
+        Ok(found) if !is_torn(&found) => found,
+        // Holes and what is around them may look like a lattice of few periods.
+        Ok(torn) => {
+            let size = [image.columns, image.rows];
+            let another = |pair: &Matrix2<f64>| !same(size, pair, &torn.reciprocal);
+            in_parts(image, geometry, background, &another)
+                .filter(|found| found.fit.is_some() && !is_torn(found))
+                .ok_or(LatticeError::NowhereTogether)?
         }
-        found => found?,
+        // Waves of two grains may look like one lattice, which no part of the frame has.
+        Err(error) if method == Method::Lattice => in_parts(image, geometry, background, &|_| true)
+            .filter(are_grains)
+            .ok_or(error)?,
+        Err(error) => return Err(error),
     };
     if hidden(&found).chance() < SECOND_SHELL
         && let Some(first) = of_first_shell(&found, image, geometry, background, method)

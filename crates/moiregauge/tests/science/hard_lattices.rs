@@ -242,3 +242,31 @@ fn waves_of_two_grains_make_no_lattice() {
         );
     }
 }
+
+/// Eight holes in a moiré of nine periods make a lattice of two and a half of their own, which changes by as much as itself across the frame.
+#[test]
+fn holes_make_no_lattice_of_few_periods() {
+    let mut set = Simulation {
+        features: SampleFeature::parse("hole:count=8").unwrap(),
+        ..Simulation::default()
+    };
+    set.raster.pixels = [192, 192];
+    set.raster.scans = 4;
+    vary(&mut set, 78);
+    let simulator = Simulator::new(set).unwrap();
+    let truth = simulator.truth().sample.unwrap().grains[0].lattice_vectors_nm;
+    let wanted = truth.map(|v| Vector2::from(v).norm());
+    for i in 0..simulator.frames() {
+        let name = Simulator::file_name(i);
+        let Ok(scan) = measure_scan(&name, &simulator.frame(i), &Settings::default(), None) else {
+            continue;
+        };
+        let found = scan.lines[0].in_sensor_coordinates();
+        for wavelength in [0, 1, 2].map(|k| found.vector(k).norm()) {
+            assert!(
+                wanted.iter().any(|w| (wavelength / w - 1.0).abs() < 0.02),
+                "{name}: {wavelength} nm, {wanted:?}"
+            );
+        }
+    }
+}
