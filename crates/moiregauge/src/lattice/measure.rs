@@ -29,9 +29,9 @@ use crate::spectrum::shells::FIRST_SHELL;
 const ATOMS: f64 = 0.25;
 /// A wave of so many times the amplitude of the first ones of a lattice is what an image shows, and they are not. Chosen by eye.
 const TOWERS: f64 = 3.0;
-/// A lattice whose wavelength changes by more than this share from corner to corner, or that turns by as much (rad), is none: gradients and waves of
-/// twist and strain make up to a tenth, holes that pass for a coarse lattice 0.4 to 1.
-const TORN: f64 = 0.25;
+/// A lattice whose waves change by more than this share of themselves from corner to corner is none: gradients and waves of twist and strain make up
+/// to a tenth, creep in a frame of four periods of atoms a half, and holes that pass for a coarse lattice 0.7 to 1.4.
+const TORN: f64 = 0.6;
 /// A lattice is the second shell of another if noise alone has as much power where the first would be less often than this.
 pub(crate) const SECOND_SHELL: f64 = 1e-6;
 
@@ -102,7 +102,7 @@ fn in_parts(
 /// Whether the fit says of a lattice that it changes so much that it is none.
 fn is_torn(found: &MeasuredLattice) -> bool {
     let change = found.fit.as_ref().and_then(|fit| fit.inhomogeneity);
-    change.is_some_and(|change| change.stands_out() && change.wavelength.max(change.angle) > TORN)
+    change.is_some_and(|change| change.stands_out() && change.wavelength.hypot(change.angle) > TORN)
 }
 
 /// Whether these are grains, each fitted to its pixels.

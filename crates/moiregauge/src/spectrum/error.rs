@@ -48,8 +48,8 @@ pub enum LatticeError {
     },
     /// The lattice that was told by hand is not there.
     #[error(
-        "in the part of the image that is used, no lattice of the kind that is looked for stands out. Noise hides it, or \
-         what lies beside it"
+        "in the part of the image that is used, no lattice like the given one stands out. Noise hides it, or what lies \
+         beside it"
     )]
     NotThere,
     /// The lattice shows in the spectrum, but this method gets no hold of it.
