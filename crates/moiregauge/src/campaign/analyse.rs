@@ -9,7 +9,7 @@ use nalgebra::Matrix2;
 use crate::campaign::analysis::Analysis;
 use crate::campaign::naming::Named;
 use crate::campaign::set::analyse as set;
-use crate::campaign::{combine, group, identity, samples};
+use crate::campaign::{combine, group, identity, samples, shells};
 use crate::caveat::files::FileDoubt;
 use crate::caveat::lattices::LatticeDoubt;
 use crate::caveat::moires::MoireDoubt;
@@ -32,7 +32,11 @@ pub fn analyse(scans: Vec<MeasuredScan>, settings: &Settings) -> Analysis {
     caveats.extend(nothing_left(&scans));
     identity::mark_repeats(&mut scans, &mut caveats);
     grains::each(&mut scans);
-    let groups = group::groups(scans, settings.grouping);
+    let mut groups = group::groups(scans, settings.grouping);
+    // What is told by hand is known to be there.
+    if !settings.by_hand.says_which() {
+        shells::agree(&mut groups, &mut caveats);
+    }
     let (groups, separated) = samples::separated(groups, settings, &mut caveats);
     let used: Vec<&MeasuredScan> = groups.iter().flat_map(|group| &group.scans).collect();
     let named = Named::new(&used, settings);

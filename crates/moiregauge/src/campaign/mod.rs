@@ -15,6 +15,7 @@ pub(crate) mod illustrate;
 pub(crate) mod naming;
 pub(crate) mod samples;
 pub(crate) mod set;
+pub(crate) mod shells;
 pub(crate) mod sightings;
 pub(crate) mod totals;
 

@@ -11,6 +11,7 @@ pub(crate) mod glitches;
 pub(crate) mod image;
 pub(crate) mod lag;
 pub(crate) mod loops;
+pub(crate) mod median_ground;
 pub(crate) mod plane;
 pub(crate) mod polygon;
 pub(crate) mod resample;

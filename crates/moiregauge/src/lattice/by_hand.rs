@@ -2,16 +2,20 @@
 //!
 //! Nothing is asked of what lies beside it: whoever told it has seen the rest of the image.
 
+use std::sync::Arc;
+
 use heterostrain::lattice::reciprocal;
 use nalgebra::Matrix2;
 
 use crate::frame::background::Background;
 use crate::frame::geometry::Geometry;
 use crate::frame::image::Image;
+use crate::lattice::ground::below;
 use crate::lattice::measured::MeasuredLattice;
 use crate::lattice::start::Start;
 use crate::spectrum::error::LatticeError;
 use crate::spectrum::method::Method;
+use crate::spectrum::prepare::levelled;
 
 /// A lattice is the one that was told if its waves differ by less than this share: twice what an eye sees.
 const NEAR: f64 = 0.15;
@@ -33,7 +37,7 @@ pub(crate) enum Meant {
 /// Finds and measures the lattice that was told. `image`: with the pixels missing that are not to be used.
 ///
 /// # Errors
-/// As [`measure`](crate::lattice::measure::measure); [`LatticeError::NotThere`] where lattices are found, but none like it.
+/// As [`measure`](crate::lattice::find::measure); [`LatticeError::NotThere`] where lattices are found, but none like it.
 pub(crate) fn measure_by_hand(
     image: &Image,
     geometry: &Geometry,
@@ -65,8 +69,17 @@ pub(crate) fn measure_by_hand(
         return start.measure(method);
     }
     let near = first.and_then(|pair| Start::near(image, geometry, background, &pair));
-    match near.filter(Start::stands_out) {
-        Some(start) => start.measure(method),
-        None => Err(LatticeError::NotThere),
+    if let Some(start) = near.filter(Start::stands_out) {
+        return start.measure(method);
     }
+    // Ground that is stronger than its waves hides it.
+    let find = |even: &Arc<Image>| {
+        let start = Start::find_meant(even, geometry, background, first, &is_meant)?;
+        start.measure(Method::Lattice).ok()
+    };
+    let flat = levelled(image.clone(), background)?;
+    let found = (method == Method::Lattice)
+        .then(|| below(&flat, geometry, background, &find))
+        .flatten();
+    found.ok_or(LatticeError::NotThere)
 }

@@ -1,4 +1,4 @@
-//! Image and geometry → the lattice, by any method.
+//! The lattice of an image whose background is off, by any method: found, measured, and what contradicts it asked.
 
 use std::sync::Arc;
 
@@ -13,13 +13,13 @@ use crate::frame::background::{Background, remove_background};
 use crate::frame::clip::cut_off;
 use crate::frame::geometry::Geometry;
 use crate::frame::image::Image;
-use crate::lattice::fit::few::{FewWaves, strongest_beside};
-use crate::lattice::fit::fitted::LatticeFit;
+use crate::lattice::fit::few::strongest_beside;
+use crate::lattice::fit::fitted::FittedHarmonic;
 use crate::lattice::fit::hidden::{Hidden, first_shell};
 use crate::lattice::fit::noise::ForeignWave;
 use crate::lattice::measured::MeasuredLattice;
 use crate::lattice::start::{HANN, Start};
-use crate::spectrum::error::LatticeError;
+use crate::spectrum::error::{LatticeError, SECOND, THIRD};
 use crate::spectrum::method::Method;
 use crate::spectrum::prepare::levelled;
 use crate::spectrum::shells::FIRST_SHELL;
@@ -32,61 +32,12 @@ const TOWERS: f64 = 3.0;
 /// A lattice whose waves change by more than this share of themselves from corner to corner is none: gradients and waves of twist and strain make up
 /// to a tenth, creep in a frame of four periods of atoms a half, and holes that pass for a coarse lattice 0.7 to 1.4.
 const TORN: f64 = 0.6;
+/// Harmonics with so many times the amplitude of the first shell make a lattice whose first shell has to be shown. Chosen by eye.
+const OUTSHINES: f64 = 2.0;
+/// So many harmonics that stand out say it instead. Chosen by eye.
+const FEWEST_BESIDE: usize = 3;
 /// A lattice is the second shell of another if noise alone has as much power where the first would be less often than this.
 pub(crate) const SECOND_SHELL: f64 = 1e-6;
-
-/// Finds and measures the lattice of an image.
-///
-/// # Errors
-/// - [`LatticeError::TooSmall`], [`LatticeError::Constant`], [`LatticeError::Missing`]: nothing to
-///   measure.
-/// - [`LatticeError::NoLattice`]: no consistent lattice stands out of the noise.
-/// - [`LatticeError::NoPeaks`]: there is one, but the method cannot measure it.
-pub fn measure(
-    image: &Image,
-    geometry: &Geometry,
-    background: Background,
-    method: Method,
-) -> Result<MeasuredLattice, LatticeError> {
-    measure_own(image.clone(), geometry, background, method)
-}
-
-/// The same of an image that nobody needs any more: its background is taken off in its place.
-///
-/// # Errors
-/// As [`measure`].
-pub(crate) fn measure_own(
-    image: Image,
-    geometry: &Geometry,
-    background: Background,
-    method: Method,
-) -> Result<MeasuredLattice, LatticeError> {
-    let image = Arc::new(levelled(image, background)?);
-    let found = measure_levelled(&image, geometry, background, method);
-    // Other methods have no fit that would name the wave that is taken off.
-    if method != Method::Lattice || !is_doubtful(&found) {
-        return found;
-    }
-    let Some(waves) = FewWaves::of(&image) else {
-        return found;
-    };
-    // A lattice that covers the frame and whose waves are all there is right, if it does not seem to change: perfect waves do not.
-    let plain = |fit: &LatticeFit| !disagrees(fit) && fit.change().is_none();
-    let whole = found.as_ref().ok().filter(|found| found.patch.is_none());
-    let plain = whole.filter(|found| found.fit.as_ref().is_some_and(plain));
-    if plain.is_some_and(|found| waves.are_of(&found.reciprocal)) {
-        return found;
-    }
-    beside_stripes(&waves, &image, geometry, background, method).map_or(found, Ok)
-}
-
-/// Whether stripes may have made a lattice, or hidden one.
-fn is_doubtful(found: &Result<MeasuredLattice, LatticeError>) -> bool {
-    let Ok(found) = found else {
-        return true;
-    };
-    found.patch.is_some() || beside(found).is_some() || found.fit.as_ref().is_none_or(disagrees)
-}
 
 /// The lattice of some part of the frame, of those that are `meant`.
 fn in_parts(
@@ -100,7 +51,7 @@ fn in_parts(
 }
 
 /// Whether the fit says of a lattice that it changes so much that it is none.
-fn is_torn(found: &MeasuredLattice) -> bool {
+pub(crate) fn is_torn(found: &MeasuredLattice) -> bool {
     let change = found.fit.as_ref().and_then(|fit| fit.inhomogeneity);
     change.is_some_and(|change| change.stands_out() && change.wavelength.hypot(change.angle) > TORN)
 }
@@ -111,40 +62,11 @@ fn are_grains(found: &MeasuredLattice) -> bool {
     is_fitted(found) && !found.beside.is_empty() && found.beside.iter().all(is_fitted)
 }
 
-/// Whether its harmonics do not agree on one lattice.
-fn disagrees(fit: &LatticeFit) -> bool {
-    fit.closure
-        .is_some_and(|closure| closure.enlargement() > 1.0)
-}
-
-/// The lattice of an image that is a few perfect waves, of which some are none of the lattice's.
-fn beside_stripes(
-    waves: &FewWaves,
-    image: &Image,
-    geometry: &Geometry,
-    background: Background,
-    method: Method,
-) -> Option<MeasuredLattice> {
-    let pair = waves.pair()?;
-    let to_physical = geometry.pixel_to_nm.try_inverse()?.transpose();
-    let pair = pair * shortest_pair(&(to_physical * pair))?;
-    let (rest, wave) = waves.taken_off(image, &pair)?;
-    let start = Start::at(&rest, geometry, background, &pair)?;
-    let mut found = start.measure(method).ok()?;
-    if hidden(&found).chance() < SECOND_SHELL {
-        found = of_first_shell(&found, &rest, geometry, background, method)?;
-    }
-    if let Some(fit) = &mut found.fit {
-        let told = fit.foreign_wave.map_or(0.0, |told| told.significance);
-        if wave.significance > told {
-            fit.foreign_wave = Some(wave);
-        }
-    }
-    Some(found)
-}
-
 /// The lattice of an image whose background is off already.
-fn measure_levelled(
+///
+/// # Errors
+/// As [`measure`](crate::lattice::find::measure).
+pub(crate) fn measure_levelled(
     image: &Arc<Image>,
     geometry: &Geometry,
     background: Background,
@@ -166,6 +88,9 @@ fn measure_levelled(
             .ok_or(error)?,
         Err(error) => return Err(error),
     };
+    if is_hollow(&found) {
+        return Err(LatticeError::NowhereTogether);
+    }
     if hidden(&found).chance() < SECOND_SHELL
         && let Some(first) = of_first_shell(&found, image, geometry, background, method)
     {
@@ -184,7 +109,7 @@ fn measure_levelled(
     if let Some(start) = finer.filter(Start::stands_out) {
         return start.measure(method);
     }
-    if !is_stronger(&found, &wave) || !competes(&found, &wave, geometry) {
+    if !is_contradicted(&found, geometry) {
         return Ok(found);
     }
     // Another part of the frame explains it, or it is something else beside the lattice.
@@ -216,6 +141,29 @@ fn towering(found: &MeasuredLattice, image: &Image, geometry: &Geometry) -> Opti
         .then(|| period(&wave, geometry))
 }
 
+/// Whether its first shell is nowhere to be seen beside stronger harmonics, of which all that stand out are those of another lattice, but for one or
+/// two that may be chance: slow ground makes a coarser lattice of every lattice.
+pub(crate) fn is_hollow(found: &MeasuredLattice) -> bool {
+    let Some(fit) = &found.fit else { return false };
+    let (first, higher) = fit.harmonics.split_at(FIRST_SHELL.len());
+    let largest = |some: &[FittedHarmonic]| some.iter().map(|h| h.amplitude).fold(0.0, f64::max);
+    let mut ratios: Vec<f64> = first.iter().map(|h| h.signal_to_noise.powi(2)).collect();
+    ratios.sort_by(|a, b| b.total_cmp(a));
+    if largest(higher) < OUTSHINES * largest(first) || ratios[1] > THIRD {
+        return false;
+    }
+    // The points of the second and of the third shell.
+    let of_second = |[h, k]: [i32; 2]| (h - k).rem_euclid(3) == 0;
+    let of_third = |[h, k]: [i32; 2]| h % 2 == 0 && k % 2 == 0;
+    let strong = || {
+        let all = fit.harmonics.iter();
+        all.filter(|h| h.signal_to_noise.powi(2) > SECOND)
+            .map(|h| h.index)
+    };
+    let beside = |is_of: &dyn Fn([i32; 2]) -> bool| strong().filter(|i| !is_of(*i)).count();
+    beside(&of_second).min(beside(&of_third)) < FEWEST_BESIDE
+}
+
 /// What a lattice that was measured leaves where the first shell would be, if it is the second shell of another.
 pub(crate) fn hidden(found: &MeasuredLattice) -> Hidden {
     let fit = found.fit.as_ref();
@@ -225,7 +173,7 @@ pub(crate) fn hidden(found: &MeasuredLattice) -> Hidden {
 /// The lattice of which that which was found in an image is the second shell.
 ///
 /// # Errors
-/// As [`measure`]; [`LatticeError::NoPeaks`] where it cannot be measured.
+/// As [`measure`](crate::lattice::find::measure); [`LatticeError::NoPeaks`] where it cannot be measured.
 pub(crate) fn measure_first_shell(
     image: Image,
     geometry: &Geometry,
@@ -238,7 +186,8 @@ pub(crate) fn measure_first_shell(
         .ok_or(LatticeError::NoPeaks { method })
 }
 
-fn of_first_shell(
+/// The same of an image whose background is off already.
+pub(crate) fn of_first_shell(
     found: &MeasuredLattice,
     image: &Image,
     geometry: &Geometry,
@@ -287,7 +236,7 @@ fn period(wave: &ForeignWave, geometry: &Geometry) -> f64 {
 /// The same for a lattice that is one of several and everywhere: nothing is asked of what lies beside it.
 ///
 /// # Errors
-/// As [`measure`].
+/// As [`measure`](crate::lattice::find::measure).
 pub(crate) fn measure_whole(
     image: &Image,
     geometry: &Geometry,
@@ -304,12 +253,17 @@ pub(crate) fn measure_whole(
 }
 
 /// A wave that stands out beside the lattice.
-fn beside(found: &MeasuredLattice) -> Option<ForeignWave> {
+pub(crate) fn beside(found: &MeasuredLattice) -> Option<ForeignWave> {
     found
         .fit
         .as_ref()?
         .foreign_wave
         .filter(ForeignWave::stands_out)
+}
+
+/// Whether a wave beside a lattice that may be the one that was meant is stronger than it.
+pub(crate) fn is_contradicted(found: &MeasuredLattice, geometry: &Geometry) -> bool {
+    beside(found).is_some_and(|wave| is_stronger(found, &wave) && competes(found, &wave, geometry))
 }
 
 /// Whether a wave beside the lattice is stronger than the weakest of its first ones.

@@ -7,8 +7,10 @@
 pub(crate) mod autocorrelation;
 pub(crate) mod by_hand;
 pub(crate) mod common;
+pub(crate) mod find;
 pub(crate) mod fit;
 pub(crate) mod fourier;
+pub(crate) mod ground;
 pub(crate) mod measure;
 pub(crate) mod measured;
 pub(crate) mod paper;
@@ -16,8 +18,8 @@ pub(crate) mod several;
 pub(crate) mod start;
 
 pub use common::Common;
+pub use find::measure;
 pub use fit::{Closure, FittedHarmonic, ForeignWave, Inhomogeneity, LatticeFit};
-pub use measure::measure;
 pub use measured::MeasuredLattice;
 pub use paper::PublishedPeaks;
 pub use several::measure_several;

@@ -11,7 +11,8 @@ use crate::frame::geometry::Geometry;
 use crate::frame::image::Image;
 use crate::frame::polygon;
 use crate::lattice::by_hand::{Meant, measure_by_hand};
-use crate::lattice::measure::{measure_first_shell, measure_own};
+use crate::lattice::find::measure_own;
+use crate::lattice::measure::measure_first_shell;
 use crate::lattice::measured::MeasuredLattice;
 use crate::lattice::several::together::measure_several;
 use crate::lattice::start::Start;
@@ -29,7 +30,7 @@ use crate::scan::place::Place;
 use crate::scan::positions::pitch_sigma;
 use crate::scan::scanner::about_calibration;
 use crate::scan::shared::correlation;
-use crate::scan::shells::of_first_shells;
+use crate::scan::shells::{keep_first_shells, of_first_shells};
 use crate::settings::by_hand::ByHand;
 use crate::settings::knobs::Settings;
 use crate::spectrum::error::LatticeError;
@@ -135,12 +136,14 @@ fn measure_with(
     }
     if searched {
         let (background, method) = (settings.background, settings.method);
-        of_first_shells(&mut found, &|channel, second| {
+        let again = |channel: &Channel, second: &MeasuredLattice| {
             measure(channel, &|image, geometry| {
                 let first = measure_first_shell(image, geometry, background, method, second)?;
                 Ok(vec![first])
             })
-        });
+        };
+        of_first_shells(&mut found, &again);
+        keep_first_shells(&mut found, &again);
     }
     for (_, (lines, told)) in found {
         caveats.extend(told);
@@ -228,7 +231,7 @@ fn add_lines(moires: &mut Vec<Vec<MeasuredLine>>, lines: Vec<MeasuredLine>) {
 
 /// Enlarges the errors of trace and retrace by what their noise has in common, so that they can be
 /// taken as independent.
-fn share_noise(lines: &mut [MeasuredLine]) {
+pub(crate) fn share_noise(lines: &mut [MeasuredLine]) {
     let [first, second] = lines else { return };
     let (Some(a), Some(b)) = (&first.lattice.fit, &second.lattice.fit) else {
         return;
@@ -305,6 +308,7 @@ fn measure_line(
             frame_columns: channel.columns,
             lines_after,
             lattice,
+            first_shell: None,
             speeds,
             pitch_sigma: pitch,
             speed_error,
@@ -362,7 +366,7 @@ fn leave_out(
     Ok(())
 }
 
-fn about_lattice(
+pub(crate) fn about_lattice(
     file: &str,
     lattice: &MeasuredLattice,
     geometry: &Geometry,

@@ -17,7 +17,7 @@ use crate::domains::nodes::Contrast;
 use crate::frame::background::remove_background;
 use crate::frame::geometry::{Geometry, Timing};
 use crate::frame::image::Image;
-use crate::lattice::measure::measure;
+use crate::lattice::find::measure;
 use crate::lattice::measured::MeasuredLattice;
 use crate::map::local::local_lattices;
 use crate::map::nodes::Grid;

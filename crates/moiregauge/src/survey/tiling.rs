@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use crate::frame::geometry::Geometry;
 use crate::frame::image::Image;
-use crate::lattice::measure::measure;
+use crate::lattice::find::measure;
 use crate::map::nodes::{Grid, LatticeNode};
 use crate::map::sample::LatticeMap;
 use crate::numbers::interrupt;

@@ -2,8 +2,8 @@
 //!
 //! The waves K₁ and K₂ of a second shell say where the first shell is: (K₁ + K₂)/3, (2K₂ − K₁)/3 and (K₂ − 2K₁)/3. Nothing is searched
 //! there, so that far less power than a wave needs that stands out of a whole transform says that it is there. Under noise alone
-//! the power of each over that of the noise is exponentially distributed; the images of a set say it together. The strongest of the
-//! three does not count: it may be that of stripes.
+//! the power of each over that of the noise is exponentially distributed; the images of a set say it together. Each of the three has to be
+//! there: stripes and lumps of slow ground make one or two of them, in all images of a set alike.
 
 use std::f64::consts::PI;
 
@@ -23,43 +23,86 @@ pub(crate) const FIRST: [[f64; 2]; 3] = [[1.0, 1.0], [-1.0, 2.0], [-2.0, 1.0]];
 /// steep.
 const NOISE_KNOWN_TO: f64 = 1.3;
 
+/// Noise up to so many times that of short waves is an image's own.
+const OWN: f64 = 2.0;
+
 /// Waves with fewer cycles per frame are background.
 const SLOW: f64 = 2.5;
+
+/// Ground is a function of the wavelength: what it is at a wave is read at all waves as long, to within this share ...
+const AS_LONG: f64 = 0.25;
+
+/// ... and farther than this from those that the first shell would be, cycles per frame; ...
+const LOBE: f64 = 1.5;
+
+/// ... and there are so many at least.
+const FEWEST: usize = 6;
 
 /// Power where the first shell would be, if a lattice is the second shell of another.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Hidden {
-    /// Power over noise, in sum.
+    /// Power over noise of each wave that can be told, of all images in sum, ...
     #[serde(with = "exact")]
-    power: f64,
-    /// Of so many waves.
-    waves: u32,
+    power: [f64; 3],
+    /// ... in so many images, ...
+    images: [u32; 3],
+    /// ... and what of their noise each has for itself, as a share, in sum: ground is the same in all.
+    #[serde(with = "exact")]
+    own: f64,
 }
 
 impl Hidden {
-    /// `power`: power over noise at a place, in multiples of the pair; `None` where it cannot be told.
-    pub(crate) fn new(power: impl Fn(Vector2<f64>) -> Option<f64>) -> Self {
-        let seen = FIRST.map(|[h, k]| power(Vector2::new(h, k) / 3.0));
-        let strongest = seen.iter().flatten().copied().fold(0.0, f64::max);
-        let seen = seen.iter().flatten();
+    /// `seen`: power and noise at a place, in multiples of the pair; `None` where they cannot be told. `own_noise`: that no other image has.
+    pub(crate) fn new(seen: impl Fn(Vector2<f64>) -> Option<[f64; 2]>, own_noise: f64) -> Self {
+        let seen = FIRST.map(|[h, k]| seen(Vector2::new(h, k) / 3.0));
+        // One wave may be that of stripes.
+        if seen.iter().flatten().count() < 2 {
+            return Self::default();
+        }
+        let own = seen.iter().flatten();
         Self {
-            waves: (seen.clone().count() as u32).saturating_sub(1),
-            power: seen.sum::<f64>() - strongest,
+            power: seen.map(|seen| seen.map_or(0.0, |[power, noise]| power / noise)),
+            images: seen.map(|seen| u32::from(seen.is_some())),
+            own: own
+                .map(|[_, noise]| OWN * own_noise / noise)
+                .fold(1.0, f64::min),
         }
     }
 
     /// What several images say together.
     pub(crate) fn of_all(all: impl Iterator<Item = Self>) -> Self {
         all.fold(Self::default(), |a, b| Self {
-            power: a.power + b.power,
-            waves: a.waves + b.waves,
+            power: [0, 1, 2].map(|i| a.power[i] + b.power[i]),
+            images: [0, 1, 2].map(|i| a.images[i] + b.images[i]),
+            own: a.own + b.own,
         })
     }
 
     /// The probability that noise alone has so much power there, at most.
     pub(crate) fn chance(&self) -> f64 {
-        chi2::tail(2.0 * self.power / NOISE_KNOWN_TO, 2 * self.waves as usize)
+        let most = self.images.into_iter().max().unwrap_or(0);
+        // What is there in some images alone is told by these.
+        let told = |i: &usize| self.images[*i] > 0 && 2 * self.images[*i] >= most;
+        let mut waves = 0;
+        let mut least = (f64::INFINITY, 0);
+        for i in (0..3).filter(told) {
+            waves += 1;
+            let images = self.images[i];
+            let mean = self.power[i] / f64::from(images);
+            if mean < least.0 {
+                least = (mean, images);
+            }
+        }
+        if waves < 2 {
+            return 1.0;
+        }
+        // As many images as noise of their own makes of them.
+        let (mean, images) = least;
+        let others = f64::from(images) - 1.0;
+        let independent = (1.0 + others * self.own / f64::from(most)).floor();
+        let power = mean * independent / NOISE_KNOWN_TO;
+        chi2::tail(2.0 * power, 2 * independent as usize).powi(waves)
     }
 }
 
@@ -67,16 +110,38 @@ impl ResidualNoise {
     /// Power where the first shell would be, if the lattice is the second shell of another.
     pub(crate) fn hidden(&self, model: &Model) -> Hidden {
         let cycles = model.pair / PI;
-        Hidden::new(|index| {
+        let seen = |index: Vector2<f64>| {
             let k = cycles * index;
             let centre = k.map(|c| c.round() as i64);
             let slow = k.norm() < SLOW || (self.free_lines && centre.x.abs() < BESIDE);
-            (!slow).then(|| {
-                let [near, around] = self.near_and_around(centre);
-                let noise = around.max(self.level_near(k));
-                near / noise
-            })
-        })
+            if slow {
+                return None;
+            }
+            let ground = self.as_long(k, &cycles)?;
+            let [near, around] = self.near_and_around(centre);
+            Some([near, around.max(self.level_near(k)).max(ground)])
+        };
+        Hidden::new(seen, self.level())
+    }
+
+    /// The typical power of all waves about as long as `k` (cycles per frame), but for those that the first shell would be; `None` where these are
+    /// nearly all.
+    fn as_long(&self, k: Vector2<f64>, cycles: &Matrix2<f64>) -> Option<f64> {
+        let ends = FIRST.map(|[h, k]| cycles * Vector2::new(h, k) / 3.0);
+        let reach = (k.norm() * (1.0 + AS_LONG)).ceil() as i64;
+        let mut around = Vec::new();
+        for (x, y) in (0..=reach).flat_map(|x| (-reach..=reach).map(move |y| (x, y))) {
+            let at = Vector2::new(x as f64, y as f64);
+            let is_end = |end: &Vector2<f64>| (at - end).norm() < LOBE || (at + end).norm() < LOBE;
+            // Half of the plane: the other half says the same.
+            if (x > 0 || y > 0)
+                && (at.norm() / k.norm() - 1.0).abs() < AS_LONG
+                && !ends.iter().any(is_end)
+            {
+                around.push(self.power(x, y));
+            }
+        }
+        (around.len() >= FEWEST).then(|| median(&mut around) / std::f64::consts::LN_2)
     }
 
     /// Power at a bin (cycles per frame), and that of the noise around it.
@@ -110,19 +175,25 @@ mod tests {
         let names = hexagon.try_inverse().unwrap() * first_shell(&second);
         assert!((names - names.map(f64::round)).amax() < 1e-12, "{names}");
         assert!((names.determinant().abs() - 1.0).abs() < 1e-12);
-        let noise = Hidden::new(|_| Some(1.0));
+        let image = |power: f64| Hidden::new(|_| Some([power, 1.0]), 1.0);
+        let noise = image(0.3);
         assert!(noise.chance() > 0.1);
-        let images = |n: usize, power: f64| {
-            Hidden::of_all((0..n).map(|_| Hidden::new(|_| Some(power)))).chance()
-        };
-        // e⁻ˢ(1 + s) with s = 8/1.3.
+        let images = |n: usize, power: f64| Hidden::of_all((0..n).map(|_| image(power))).chance();
+        // Three waves above 4 each: e⁻ˢ with s = 12/1.3.
+        let s: f64 = 12.0 / 1.3;
+        assert!((images(1, 4.0) / (-s).exp() - 1.0).abs() < 1e-6);
+        // Two images: (e⁻ˢ (1 + s))³ with s = 8/1.3.
         let s: f64 = 8.0 / 1.3;
-        let wanted = (-s).exp() * (1.0 + s);
-        assert!((images(1, 4.0) / wanted - 1.0).abs() < 1e-6);
-        assert!(images(8, 4.0) < 1e-7 && images(8, 1.0) > 0.1);
+        let wanted = ((-s).exp() * (1.0 + s)).powi(3);
+        assert!((images(2, 4.0) / wanted - 1.0).abs() < 1e-6);
+        assert!(images(8, 4.0) < 1e-7 && images(8, 1.0) > 0.05);
         assert_eq!(Hidden::default().chance(), 1.0);
-        assert_eq!(Hidden::new(|_| None).chance(), 1.0);
-        let stripes = Hidden::new(|q| Some(if q.x > 0.0 { 1e6 } else { 1.0 }));
-        assert_eq!(stripes, noise);
+        assert_eq!(Hidden::new(|_| None, 1.0).chance(), 1.0);
+        let place = |q: Vector2<f64>| Some([if q.x > 0.0 { 1e6 } else { 0.3 }, 1.0]);
+        assert_eq!(Hidden::new(place, 1.0), noise);
+        // Ground that all images have alike is told once.
+        let ground = Hidden::new(|_| Some([4.0, 1.0]), 0.0);
+        let all = Hidden::of_all((0..8).map(|_| ground));
+        assert!((all.chance() / ground.chance() - 1.0).abs() < 1e-6);
     }
 }

@@ -1,0 +1,107 @@
+//! The images of a set say together whether their lattice is the second shell of another.
+//!
+//! A weak first shell stands out of the noise in some images and not in others, and those measure a lattice of a third of the cell. What each has
+//! at the places of the first shell is known; all together tell what no image can.
+
+use crate::campaign::group::Group;
+use crate::caveat::lattices::LineDifference;
+use crate::caveat::sets::SetDoubt;
+use crate::caveat::{Caveat, Doubt};
+use crate::lattice::fit::hidden::Hidden;
+use crate::lattice::measure::{SECOND_SHELL, hidden};
+use crate::scan::doubts::lines_disagree;
+use crate::scan::measure::{about_lattice, share_noise};
+use crate::scan::measured::{MeasuredLine, MeasuredScan};
+use crate::scan::shells::{CONFIRMED, cells};
+
+/// Takes the lattice of which that which was measured is the second shell in all images of a set that say so together.
+pub(crate) fn agree(groups: &mut [Group], caveats: &mut Vec<Caveat>) {
+    for group in groups {
+        let second = second_shells(&group.scans);
+        for (scan, second) in group.scans.iter_mut().zip(second) {
+            if second.contains(&true) {
+                caveats.extend(take_first_shells(scan, &second));
+            }
+        }
+    }
+}
+
+/// Whether a scan is one that only its lines may have put out.
+fn counts(scan: &MeasuredScan) -> bool {
+    let other = |reason: &String| reason != LineDifference::OTHER_LATTICES;
+    scan.repeats.is_none() && !scan.excluded.as_ref().is_some_and(other)
+}
+
+/// Which lines of each scan show the second shell of their lattice.
+fn second_shells(scans: &[MeasuredScan]) -> Vec<Vec<bool>> {
+    let all: Vec<&MeasuredLine> = scans
+        .iter()
+        .filter(|scan| counts(scan))
+        .flat_map(|scan| &scan.lines)
+        .collect();
+    let suspected = all.iter().any(|line| line.first_shell.is_some());
+    // One line for each lattice that is seen, with what all that see it say.
+    let mut lattices: Vec<(&MeasuredLine, Hidden)> = Vec::new();
+    for line in all.iter().filter(|_| suspected) {
+        let told = hidden(&line.lattice);
+        match lattices
+            .iter_mut()
+            .find(|(first, _)| cells(first, line) == Some(1))
+        {
+            Some((_, so_far)) => *so_far = Hidden::of_all([*so_far, told].into_iter()),
+            None => lattices.push((line, told)),
+        }
+    }
+    let is_second = |(line, told): &(&MeasuredLine, Hidden)| {
+        let chance = told.chance();
+        let larger = || {
+            lattices
+                .iter()
+                .any(|(other, _)| cells(other, line) == Some(3))
+        };
+        chance < SECOND_SHELL || (chance < CONFIRMED && larger())
+    };
+    let second: Vec<&MeasuredLine> = lattices
+        .iter()
+        .filter(|lattice| is_second(lattice))
+        .map(|(line, _)| *line)
+        .collect();
+    let shows_it = |line: &MeasuredLine| second.iter().any(|other| cells(other, line) == Some(1));
+    let of_scan = |scan: &MeasuredScan| {
+        let asked = counts(scan);
+        scan.lines
+            .iter()
+            .map(|line| asked && shows_it(line))
+            .collect()
+    };
+    scans.iter().map(of_scan).collect()
+}
+
+/// Takes the first shell where the second was measured; lines that do not know it are left out. What there is to say of a scan without any.
+fn take_first_shells(scan: &mut MeasuredScan, second: &[bool]) -> Option<Caveat> {
+    let mut lines = Vec::new();
+    for (line, second) in scan.lines.iter().zip(second) {
+        let mut line = line.clone();
+        if *second {
+            let Some(first) = line.first_shell.take() else {
+                continue;
+            };
+            line.lattice = *first;
+        }
+        lines.push(line);
+    }
+    if lines.is_empty() {
+        let reason = "noise hides the first waves of its lattice".to_owned();
+        scan.excluded = Some(reason.clone());
+        return Some(Caveat::new(SetDoubt::ScanLeftOut { reason }, &scan.file));
+    }
+    share_noise(&mut lines);
+    scan.caveats
+        .retain(|caveat| !matches!(caveat.doubt, Doubt::Lattice(_)));
+    for line in &lines {
+        about_lattice(&scan.file, &line.lattice, &line.geometry, &mut scan.caveats);
+    }
+    scan.excluded = lines_disagree(&scan.file, &lines, &mut scan.caveats);
+    scan.lines = lines.into();
+    None
+}

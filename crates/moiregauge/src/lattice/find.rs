@@ -1,0 +1,126 @@
+//! Image and geometry → the lattice, by any method.
+
+use std::sync::Arc;
+
+use heterostrain::lattice::shortest_pair;
+
+use crate::frame::background::Background;
+use crate::frame::geometry::Geometry;
+use crate::frame::image::Image;
+use crate::lattice::fit::few::FewWaves;
+use crate::lattice::fit::fitted::LatticeFit;
+use crate::lattice::ground::below;
+use crate::lattice::measure::{
+    SECOND_SHELL, beside, hidden, is_contradicted, is_hollow, is_torn, measure_levelled,
+    of_first_shell,
+};
+use crate::lattice::measured::MeasuredLattice;
+use crate::lattice::start::Start;
+use crate::spectrum::error::LatticeError;
+use crate::spectrum::method::Method;
+use crate::spectrum::prepare::levelled;
+
+/// Finds and measures the lattice of an image.
+///
+/// # Errors
+/// - [`LatticeError::TooSmall`], [`LatticeError::Constant`], [`LatticeError::Missing`]: nothing to
+///   measure.
+/// - [`LatticeError::NoLattice`]: no consistent lattice stands out of the noise.
+/// - [`LatticeError::NoPeaks`]: there is one, but the method cannot measure it.
+pub fn measure(
+    image: &Image,
+    geometry: &Geometry,
+    background: Background,
+    method: Method,
+) -> Result<MeasuredLattice, LatticeError> {
+    measure_own(image.clone(), geometry, background, method)
+}
+
+/// The same of an image that nobody needs any more: its background is taken off in its place.
+///
+/// # Errors
+/// As [`measure`].
+pub(crate) fn measure_own(
+    image: Image,
+    geometry: &Geometry,
+    background: Background,
+    method: Method,
+) -> Result<MeasuredLattice, LatticeError> {
+    let image = Arc::new(levelled(image, background)?);
+    // Other methods have no fit that would name the wave, or the ground, that is taken off.
+    if method != Method::Lattice {
+        return measure_levelled(&image, geometry, background, method);
+    }
+    let found = measure_beside(&image, geometry, background);
+    found.or_else(|error| {
+        let find = |even: &Arc<Image>| measure_levelled(even, geometry, background, method).ok();
+        below(&image, geometry, background, &find)
+            .filter(|found| !is_torn(found) && !is_contradicted(found, geometry))
+            .ok_or(error)
+    })
+}
+
+/// The lattice of an image without its background, and of perfect waves beside it.
+fn measure_beside(
+    image: &Arc<Image>,
+    geometry: &Geometry,
+    background: Background,
+) -> Result<MeasuredLattice, LatticeError> {
+    let found = measure_levelled(image, geometry, background, Method::Lattice);
+    if !is_doubtful(&found) {
+        return found;
+    }
+    let Some(waves) = FewWaves::of(image) else {
+        return found;
+    };
+    // A lattice that covers the frame and whose waves are all there is right, if it does not seem to change: perfect waves do not.
+    let plain = |fit: &LatticeFit| !disagrees(fit) && fit.change().is_none();
+    let whole = found.as_ref().ok().filter(|found| found.patch.is_none());
+    let plain = whole.filter(|found| found.fit.as_ref().is_some_and(plain));
+    if plain.is_some_and(|found| waves.are_of(&found.reciprocal)) {
+        return found;
+    }
+    beside_stripes(&waves, image, geometry, background).map_or(found, Ok)
+}
+
+/// Whether stripes may have made a lattice, or hidden one.
+fn is_doubtful(found: &Result<MeasuredLattice, LatticeError>) -> bool {
+    let Ok(found) = found else {
+        return true;
+    };
+    found.patch.is_some() || beside(found).is_some() || found.fit.as_ref().is_none_or(disagrees)
+}
+
+/// Whether its harmonics do not agree on one lattice.
+fn disagrees(fit: &LatticeFit) -> bool {
+    fit.closure
+        .is_some_and(|closure| closure.enlargement() > 1.0)
+}
+
+/// The lattice of an image that is a few perfect waves, of which some are none of the lattice's.
+fn beside_stripes(
+    waves: &FewWaves,
+    image: &Image,
+    geometry: &Geometry,
+    background: Background,
+) -> Option<MeasuredLattice> {
+    let method = Method::Lattice;
+    let pair = waves.pair()?;
+    let to_physical = geometry.pixel_to_nm.try_inverse()?.transpose();
+    let pair = pair * shortest_pair(&(to_physical * pair))?;
+    let (rest, wave) = waves.taken_off(image, &pair)?;
+    let start = Start::at(&rest, geometry, background, &pair)?;
+    let mut found = start.measure(method).ok()?;
+    if hidden(&found).chance() < SECOND_SHELL {
+        found = of_first_shell(&found, &rest, geometry, background, method)?;
+    } else if is_hollow(&found) {
+        return None;
+    }
+    if let Some(fit) = &mut found.fit {
+        let told = fit.foreign_wave.map_or(0.0, |told| told.significance);
+        if wave.significance > told {
+            fit.foreign_wave = Some(wave);
+        }
+    }
+    Some(found)
+}
