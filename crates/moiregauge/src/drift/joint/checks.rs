@@ -14,10 +14,11 @@ use nalgebra::{DMatrix, DVector, Matrix, Matrix2, RowDVector, Vector2};
 use rand::RngExt as _;
 use rayon::prelude::*;
 
-use crate::drift::joint::arrow::{Arrow, BlockSums, ScanSums};
+use crate::drift::joint::arrow::{Arrow, BlockSums};
 use crate::drift::joint::evaluate::{Linearised, linearise, phases};
 use crate::drift::joint::found::JointFit;
 use crate::drift::joint::instability::Displacements;
+use crate::drift::joint::sums::ScanSums;
 use crate::numbers::interrupt;
 use crate::numbers::rng::stream;
 

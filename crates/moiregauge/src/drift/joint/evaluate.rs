@@ -5,9 +5,10 @@ use nalgebra::{
     Vector3, Vector4,
 };
 
-use crate::drift::joint::arrow::{ScanSums, Shape, Whitened};
 use crate::drift::joint::path::{DriftPath, Settling};
+use crate::drift::joint::shape::Shape;
 use crate::drift::joint::sighting::{Sighting, Terms};
+use crate::drift::joint::sums::{ScanSums, Whitened};
 use crate::numbers::interrupt;
 
 /// Where each parameter stands in the vector.

@@ -2,8 +2,8 @@
 
 use nalgebra::{DMatrix, DVector, Matrix2xX, Vector2};
 
-use crate::drift::joint::arrow::Shape;
 use crate::drift::joint::evaluate::PhaseMiss;
+use crate::drift::joint::shape::Shape;
 use crate::numbers::chi2::is_significant;
 
 /// Newton steps to the scatter: they double the digits.

@@ -25,8 +25,10 @@ pub(crate) mod instability;
 pub(crate) mod link;
 pub(crate) mod parts;
 pub(crate) mod path;
+pub(crate) mod shape;
 pub(crate) mod sighting;
 pub(crate) mod solve;
+pub(crate) mod sums;
 #[cfg(test)]
 mod tests;
 

@@ -9,9 +9,10 @@
 
 use nalgebra::{DVector, Matrix4, Matrix4xX};
 
-use crate::drift::joint::arrow::{Arrow, ScanSums, Whitened};
+use crate::drift::joint::arrow::Arrow;
 use crate::drift::joint::evaluate::{factor, linearise};
 use crate::drift::joint::found::JointFit;
+use crate::drift::joint::sums::{ScanSums, Whitened};
 use crate::drift::shares::Statistical;
 
 impl JointFit {

@@ -6,12 +6,13 @@ use heterostrain::Estimate;
 use heterostrain::lattice::Waves;
 use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
 
-use crate::drift::joint::arrow::{Arrow, ScanSums};
+use crate::drift::joint::arrow::Arrow;
 use crate::drift::joint::evaluate::{DRIFT, Layout, linearise, wrapped};
 use crate::drift::joint::found::{JointFit, motion};
 use crate::drift::joint::instability::Displacements;
 use crate::drift::joint::link::number_blocks;
 use crate::drift::joint::sighting::{Sighting, Terms};
+use crate::drift::joint::sums::ScanSums;
 use crate::numbers::chi2::enlargement;
 use crate::numbers::normal_equations::NormalEquations;
 use crate::spectrum::phases::Phases;
