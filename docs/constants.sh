@@ -57,7 +57,7 @@ fit/beside NEAR moirés,terrain half double
 fit/beside OPPOSITE moirés,terrain half double
 fit/closure STRONG few,noisy,contrast half double
 fit/closure NOISE_KNOWN_TO few,noisy,contrast root double
-fit/noise ACROSS few,noisy,contrast half double
+fit/leverage ACROSS few,noisy,contrast half double
 fit/noise FOREIGN moirés,gradient,grains half double
 fit/model CLIP few,noisy,contrast half double
 fit/lines BAD few,noisy,contrast half double

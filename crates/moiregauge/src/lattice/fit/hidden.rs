@@ -10,8 +10,9 @@ use std::f64::consts::PI;
 use nalgebra::{Matrix2, Vector2};
 use serde::{Deserialize, Serialize};
 
+use crate::lattice::fit::leverage::ALONG;
 use crate::lattice::fit::model::Model;
-use crate::lattice::fit::noise::{ALONG, BESIDE, ResidualNoise};
+use crate::lattice::fit::noise::{BESIDE, ResidualNoise};
 use crate::numbers::chi2;
 use crate::numbers::exact;
 use crate::numbers::median::median;

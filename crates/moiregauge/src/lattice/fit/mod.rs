@@ -38,6 +38,7 @@ pub(crate) mod hidden;
 pub(crate) mod joint;
 pub(crate) mod left;
 pub(crate) mod levelled;
+pub(crate) mod leverage;
 pub(crate) mod lines;
 pub(crate) mod local;
 pub(crate) mod measure;
