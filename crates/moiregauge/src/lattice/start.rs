@@ -1,10 +1,11 @@
-//! Where the lattice of an image is, roughly, and the lattice measured from there.
+//! Where the lattice of an image is, roughly.
 
+mod by_method;
 mod parts;
 
 use std::sync::Arc;
 
-use heterostrain::lattice::{Lattice, Px, Waves, labelled_like, reciprocal};
+use heterostrain::lattice::reciprocal;
 use nalgebra::{Matrix2, Vector2};
 
 use crate::coverage::bend::Mean;
@@ -16,21 +17,16 @@ use crate::frame::background::{Background, remove_background};
 use crate::frame::clip::cut_off;
 use crate::frame::geometry::Geometry;
 use crate::frame::image::Image;
-use crate::lattice::common::Common;
-use crate::lattice::fit::fitted::LatticeFit;
 use crate::lattice::fit::measure as fit;
-use crate::lattice::measured::{Grain, MeasuredLattice};
-use crate::lattice::{autocorrelation, fourier, paper};
+use crate::lattice::measured::Grain;
 use crate::numbers::three::three;
 use crate::spectrum::error::{LatticeError, THIRD};
 use crate::spectrum::harmonics::{Harmonics, Windowed};
 use crate::spectrum::look::bins_for;
-use crate::spectrum::method::Method;
-use crate::spectrum::phases::Phases;
-use crate::spectrum::prepare::{Prepared, binned, middle, phases, prepare, prepare_levelled};
+use crate::spectrum::prepare::{Prepared, binned, prepare, prepare_levelled};
 use crate::spectrum::shells::shells;
 use crate::spectrum::transform::Spectrum;
-use crate::spectrum::verdict::{Verdict, refine, signal_to_noise, verdict};
+use crate::spectrum::verdict::{Verdict, refine, verdict};
 use crate::spectrum::{known, rescue, select};
 
 /// A lattice whose waves bend so much that a transform of the whole patch does not show them has at least so many unit
@@ -218,16 +214,6 @@ impl Start {
         settle_in_bins(&cut_off(&image), bins, &pair, pitch)
     }
 
-    /// The mean of a lattice that bends more than the fit to the pixels can describe.
-    fn bent(&self, fit: &LatticeFit) -> Option<MeasuredLattice> {
-        if self.patch.is_some() || !fit.may_bend_more() {
-            return None;
-        }
-        let mean = self.settled()?.refined()?;
-        let bends = mean.change.is_some() && !mean.is_poor();
-        bends.then(|| self.mean_lattice(&mean)).flatten()
-    }
-
     /// The lattice of a patch, of the largest grain in it, or its mean.
     ///
     /// Where it is everywhere and the same the fit to the pixels measures it, which uses all harmonics.
@@ -300,173 +286,6 @@ impl Start {
     fn waves(&self) -> Matrix2<f64> {
         let mean = self.mean.as_ref().map(|mean| mean.waves.basis);
         mean.unwrap_or_else(|| self.pair())
-    }
-
-    /// Measures the lattice.
-    ///
-    /// # Errors
-    /// [`LatticeError::NoPeaks`]: the method gets no hold of it.
-    pub fn measure(&self, method: Method) -> Result<MeasuredLattice, LatticeError> {
-        let mut found = self.measure_this(method)?;
-        let beside = self.beside.iter().map(|start| start.measure(method));
-        found.beside = beside.filter_map(Result::ok).collect();
-        Ok(found)
-    }
-
-    /// The same without the grains beside it.
-    fn measure_this(&self, method: Method) -> Result<MeasuredLattice, LatticeError> {
-        let mean = self.mean.as_ref().filter(|_| method == Method::Lattice);
-        let of_mean = |mean| {
-            let found = self.mean_lattice(mean);
-            found.ok_or(LatticeError::NoPeaks { method })
-        };
-        if let Some(mean) = mean.filter(|mean| mean.change.is_some()) {
-            return of_mean(mean);
-        }
-        let (prepared, size) = (&self.prepared, self.prepared.size());
-        let refined = match method {
-            Method::Lattice => None,
-            _ => prepared.refined(self.background),
-        };
-        let (harmonics, peaks) = match &refined {
-            Some((harmonics, peaks)) => (harmonics, peaks),
-            None => (&prepared.harmonics, &prepared.peaks),
-        };
-        let start = &prepared.start;
-        let pixels_per_bin = prepared.binning as f64;
-        let in_pixels = |l: Lattice<Px>| l.mapped(&(Matrix2::identity() * pixels_per_bin));
-        let fourier = || fourier::measure(harmonics, peaks, size).map(in_pixels);
-        let autocorrelation = || {
-            let found =
-                autocorrelation::measure(&prepared.binned(), self.background, harmonics, start);
-            found.map(in_pixels)
-        };
-        let (mut fit, mut rest, mut published) = (None, None, None);
-        let (pixels, comparison) = match method {
-            Method::Autocorrelation => (autocorrelation(), fourier()),
-            Method::Fourier => (fourier(), autocorrelation()),
-            Method::Lattice => {
-                let found = fitted(&self.prepared, self.background);
-                if let Some(mean) = mean
-                    && !found
-                        .as_ref()
-                        .is_some_and(|found| is_better(&found.fit, mean))
-                {
-                    return of_mean(mean);
-                }
-                rest = found.as_ref().and_then(|found| found.rest.clone());
-                fit = found.map(|found| (found.lattice, found.fit));
-                let bent = fit.as_ref().and_then(|(_, fit)| self.bent(fit));
-                if let Some(bent) = bent {
-                    return Ok(bent);
-                }
-                (fit.as_ref().map(|(lattice, _)| *lattice), fourier())
-            }
-            Method::Paper => {
-                let image = &self.prepared.image;
-                let found = paper::measure(image, &self.geometry, &(start * pixels_per_bin));
-                published = found.map(|(_, peaks)| peaks);
-                (found.map(|(lattice, _)| lattice), fourier())
-            }
-        };
-        let fit = fit.map(|(_, fit)| fit);
-        let pixels = pixels.ok_or(LatticeError::NoPeaks { method })?;
-        let label = |l: Lattice<Px>| labelled_like(&l, &pixels.basis);
-        let bin_to_nm = self.geometry.pixel_to_nm * pixels_per_bin;
-        Ok(MeasuredLattice {
-            patch: match &rest {
-                Some(rest) => self.part(rest, &pixels),
-                None => self.patch.clone(),
-            },
-            grains: self.others.clone(),
-            beside: Vec::new(),
-            change: None,
-            common: fit.as_ref().and_then(|fit| Common::of_fit(fit, &pixels)),
-            pixels,
-            comparison: comparison.map(label),
-            reciprocal: fit.as_ref().map_or(harmonics.pair / pixels_per_bin, |fit| {
-                fit.wave_vectors.basis
-            }),
-            phases: fit
-                .as_ref()
-                .map_or_else(|| phases(harmonics, size), LatticeFit::first_phases),
-            middle: fit.as_ref().map_or_else(
-                || middle(size) * pixels_per_bin + Vector2::repeat((pixels_per_bin - 1.0) / 2.0),
-                LatticeFit::middle,
-            ),
-            shortcut_wavelengths: fourier::shortcut_wavelengths(peaks, &bin_to_nm),
-            periods: self.periods(&pixels),
-            signal_to_noise: fit.as_ref().map_or_else(
-                || signal_to_noise(harmonics)[2],
-                LatticeFit::weakest_signal_to_noise,
-            ),
-            published,
-            fit,
-        })
-    }
-}
-
-/// Whether a fit to the pixels says more than what windows show: the lattice is the same everywhere, and its errors are smaller.
-fn is_better(fit: &LatticeFit, mean: &Mean) -> bool {
-    let size = |waves: &Waves<Px>| waves.covariance.trace();
-    fit.change().is_none() && size(&fit.wave_vectors) < size(&mean.waves)
-}
-
-impl Start {
-    /// The part of the frame that shows the lattice, where of its bins only `rest` does; `None` for all of it but for a little.
-    fn part(&self, rest: &Image, lattice: &Lattice<Px>) -> Option<Patch> {
-        let Prepared { image, binning, .. } = &self.prepared;
-        let whole = || Patch::whole(image, &lattice.waves()?.basis, pitch(&self.geometry));
-        let patch = self.patch.clone().or_else(whole)?;
-        let part = patch.left_by(&self.prepared.binned(), rest, *binning);
-        (self.patch.is_some() || part.share < WHOLE).then_some(part)
-    }
-
-    /// The mean of a lattice that changes.
-    fn mean_lattice(&self, mean: &Mean) -> Option<MeasuredLattice> {
-        let Prepared {
-            harmonics, peaks, ..
-        } = &self.prepared;
-        let bins = self.prepared.binning as f64;
-        let pixels = mean.waves.lattice()?;
-        let fourier = fourier::measure(harmonics, peaks, self.prepared.size());
-        let bin_to_nm = self.geometry.pixel_to_nm * bins;
-        Some(MeasuredLattice {
-            comparison: fourier
-                .map(|l| labelled_like(&l.mapped(&(Matrix2::identity() * bins)), &pixels.basis)),
-            pixels,
-            patch: self.patch.clone(),
-            grains: self.others.clone(),
-            beside: Vec::new(),
-            change: mean.change,
-            common: Common::of(mean, &pixels),
-            reciprocal: mean.waves.basis,
-            phases: Phases {
-                values: mean.phases,
-                covariance: mean.phase_covariance,
-            },
-            middle: mean.middle,
-            shortcut_wavelengths: fourier::shortcut_wavelengths(peaks, &bin_to_nm),
-            periods: self.periods(&pixels),
-            signal_to_noise: mean.signal_to_noise,
-            published: None,
-            fit: None,
-        })
-    }
-
-    /// Periods across the shorter side of the frame, or of the patch.
-    fn periods(&self, pixels: &Lattice<Px>) -> f64 {
-        let size = match &self.patch {
-            Some(patch) => {
-                let [low, high] = patch.corners();
-                high - low
-            }
-            None => Vector2::new(self.size[0] as f64, self.size[1] as f64),
-        };
-        let longest = (0..3)
-            .map(|i| pixels.vector(i))
-            .map(|v| (v.x / size.x).hypot(v.y / size.y));
-        1.0 / longest.fold(0.0, f64::max)
     }
 }
 
