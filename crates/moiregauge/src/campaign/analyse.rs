@@ -6,7 +6,7 @@
 use heterostrain::lattice::canonical;
 use nalgebra::Matrix2;
 
-use crate::campaign::analysis::Analysis;
+use crate::campaign::analysis::{Analysis, SetAnalysis};
 use crate::campaign::naming::Named;
 use crate::campaign::set::analyse as set;
 use crate::campaign::{combine, group, identity, samples, shells};
@@ -15,6 +15,7 @@ use crate::caveat::lattices::LatticeDoubt;
 use crate::caveat::moires::MoireDoubt;
 use crate::caveat::sets::SetDoubt;
 use crate::caveat::{Caveat, Doubt};
+use crate::drift::joint::path::DriftPath;
 use crate::frame::background::Background;
 use crate::scan::grains;
 use crate::scan::measured::MeasuredScan;
@@ -76,10 +77,7 @@ pub fn analyse(scans: Vec<MeasuredScan>, settings: &Settings) -> Analysis {
         })
         .flatten();
     if let Some(path) = combined.as_ref().and_then(|c| c.path) {
-        let scans = sets.iter_mut().flat_map(|set| &mut set.scans);
-        for motion in scans.filter_map(|scan| scan.motion.as_mut()) {
-            motion.path = path;
-        }
+        follow(&mut sets, path);
     }
     Analysis {
         settings: settings.clone(),
@@ -88,6 +86,14 @@ pub fn analyse(scans: Vec<MeasuredScan>, settings: &Settings) -> Analysis {
         atomic: None,
         survey: None,
         caveats,
+    }
+}
+
+/// All scans moved on the path that all sets have in common.
+fn follow(sets: &mut [SetAnalysis], path: DriftPath) {
+    let scans = sets.iter_mut().flat_map(|set| &mut set.scans);
+    for motion in scans.filter_map(|scan| scan.motion.as_mut()) {
+        motion.path = path;
     }
 }
 

@@ -115,16 +115,7 @@ fn together(
         checks: None,
     };
     if let ([set], [mean]) = (sets, means) {
-        // Nothing to combine: the set has it all.
-        let drift = set.drift.clone().filter(|drift| drift.joint.is_some());
-        return Some(Together {
-            lattice: mean.lattice,
-            statistical: mean.budget.statistical,
-            joint: drift.as_ref().and_then(|drift| drift.joint.clone()),
-            drift,
-            path: None,
-            checks: set.checks.clone(),
-        });
+        return Some(of_one(set, mean));
     }
     let joint = joint.filter(|(scans, _)| !scans.is_empty());
     let start = sets.iter().find_map(|s| s.drift.as_ref());
@@ -160,6 +151,19 @@ fn together(
         path: Some(fit.path()),
         checks: Some(set_checks(&fit, &left_out, scans, "all sets", settings)),
     })
+}
+
+/// Where there is nothing to combine: the set has it all.
+fn of_one(set: &SetAnalysis, mean: &SetMean) -> Together {
+    let drift = set.drift.clone().filter(|drift| drift.joint.is_some());
+    Together {
+        lattice: mean.lattice,
+        statistical: mean.budget.statistical,
+        joint: drift.as_ref().and_then(|drift| drift.joint.clone()),
+        drift,
+        path: None,
+        checks: set.checks.clone(),
+    }
 }
 
 /// By what share the lattices of sets differ at most; `None` where they are of one sample and place.

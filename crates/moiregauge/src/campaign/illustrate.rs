@@ -53,12 +53,8 @@ pub fn illustrate(
     });
     let longer = channel.columns.max(channel.rows);
     let residual_block = longer.div_ceil(RESIDUAL_BLOCKS).max(1);
-    let sensor_residuals = sensors.map(|(sensors, measured)| {
-        [0, 1].map(|axis| {
-            let left = sensors.residual_map(axis, &measured[axis]);
-            left.binned(residual_block)
-        })
-    });
+    let sensor_residuals =
+        sensors.map(|(sensors, measured)| residuals(sensors, measured, residual_block));
     let (autocorrelation, spectrum, spectrum_step) = pictures(&image, &line.pixels);
     // Pixels of a cropped image are others.
     let patch = line
@@ -84,6 +80,14 @@ pub fn illustrate(
         sensor_residuals,
         residual_block,
         amplitude: amplitude(scan, channel, settings),
+    })
+}
+
+/// What the planes leave of each sensor, in blocks.
+fn residuals(sensors: &SensorGeometry, measured: &[Image; 2], block: usize) -> [Image; 2] {
+    [0, 1].map(|axis| {
+        let left = sensors.residual_map(axis, &measured[axis]);
+        left.binned(block)
     })
 }
 

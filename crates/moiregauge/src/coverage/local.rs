@@ -55,29 +55,13 @@ pub(crate) fn local(
         None => cells.of_whole([part.columns, part.rows], wave(index), &window, at),
     };
     let data = [0, 1, 2, 3].map(|i| seen(part, BASIS[i]));
-    // Each difference of two of the basis, one of ± each.
-    let mut known: Vec<([i32; 2], Vec<Complex64>)> = Vec::new();
-    for a in BASIS {
-        for b in BASIS {
-            let d = [a[0] - b[0], a[1] - b[1]];
-            if !known.iter().any(|(k, _)| *k == d || *k == [-d[0], -d[1]]) {
-                known.push((d, of_ones(d)));
-            }
-        }
-    }
-    // For each pair of the basis: which difference, and whether its conjugate.
-    let which = BASIS.map(|a| {
-        BASIS.map(|b| {
-            let d = [a[0] - b[0], a[1] - b[1]];
-            let found = known.iter().position(|(k, _)| *k == d);
-            let opposite = || known.iter().position(|(k, _)| *k == [-d[0], -d[1]]);
-            (found.or_else(opposite).unwrap_or(0), found.is_none())
-        })
-    });
+    let differences = differences();
+    let which = which_of(&differences);
+    let known: Vec<Vec<Complex64>> = differences.into_iter().map(of_ones).collect();
     let solve = |n: usize| {
         let gram = SMatrix::<Complex64, 7, 7>::from_fn(|a, b| {
             let (i, conjugate) = which[a][b];
-            let value = known[i].1[n];
+            let value = known[i][n];
             if conjugate { value.conj() } else { value }
         });
         let right = SVector::<Complex64, 7>::from_fn(|a, _| match a {
@@ -100,6 +84,32 @@ pub(crate) fn local(
         .with_min_len(AT_ONCE)
         .map(solve)
         .collect()
+}
+
+/// Each difference of two of the basis, one of ± each.
+fn differences() -> Vec<[i32; 2]> {
+    let mut known: Vec<[i32; 2]> = Vec::new();
+    for a in BASIS {
+        for b in BASIS {
+            let d = [a[0] - b[0], a[1] - b[1]];
+            if !known.iter().any(|k| *k == d || *k == [-d[0], -d[1]]) {
+                known.push(d);
+            }
+        }
+    }
+    known
+}
+
+/// For each pair of the basis: which difference, and whether its conjugate.
+fn which_of(differences: &[[i32; 2]]) -> [[(usize, bool); 7]; 7] {
+    BASIS.map(|a| {
+        BASIS.map(|b| {
+            let d = [a[0] - b[0], a[1] - b[1]];
+            let found = differences.iter().position(|k| *k == d);
+            let opposite = || differences.iter().position(|k| *k == [-d[0], -d[1]]);
+            (found.or_else(opposite).unwrap_or(0), found.is_none())
+        })
+    })
 }
 
 #[cfg(test)]

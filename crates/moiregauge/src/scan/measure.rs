@@ -152,20 +152,19 @@ fn measure_with(
     if moires.is_empty() {
         return Err(failures.swap_remove(0));
     }
-    for error in failures {
-        caveats.push(Caveat::new(
-            FileDoubt::LineLeftOut {
-                reason: error.to_string(),
-            },
-            file,
-        ));
-    }
+    caveats.extend(failures.iter().map(|error| left_out(error, file)));
     about_calibration(file, scan, moires.iter().flatten(), settings, &mut caveats);
     caveats.dedup_by(|a, b| a.says_the_same(b));
     once(&mut caveats);
     let channel = &channels[0].name;
     let of_moire = |lines| joined(file, scan, channel, lines, caveats.clone());
     Ok(moires.into_iter().map(of_moire).collect())
+}
+
+/// That one of several lines could not be measured.
+fn left_out(error: &MeasureError, file: &str) -> Caveat {
+    let reason = error.to_string();
+    Caveat::new(FileDoubt::LineLeftOut { reason }, file)
 }
 
 /// One moiré of a scan, from the lines that show it, with the grains beside the largest.
@@ -275,14 +274,7 @@ fn measure_line(
     interrupt::check();
     let mut lines_after = 0;
     if let Some(window) = window {
-        let recorded = &place.recorded;
-        let (first, size) = window.pixels(recorded).ok_or(MeasureError::NoOverlap)?;
-        lines_after = match scan.frame_direction {
-            Some(FrameDirection::Down) => first[1],
-            _ => image.rows - first[1] - size[1],
-        };
-        image = image.cropped(first, size);
-        place = place.cropped(first, size);
+        (image, place, lines_after) = under(window, &image, place, scan.frame_direction)?;
     }
     let Place {
         line,
@@ -316,6 +308,23 @@ fn measure_line(
         }
     });
     Ok(lines.collect())
+}
+
+/// What lies under a window, and how many lines of the frame were recorded after it.
+fn under(
+    window: &Window,
+    image: &Image,
+    place: Place,
+    direction: Option<FrameDirection>,
+) -> Result<(Image, Place, usize), MeasureError> {
+    let recorded = &place.recorded;
+    let (first, size) = window.pixels(recorded).ok_or(MeasureError::NoOverlap)?;
+    let lines_after = match direction {
+        Some(FrameDirection::Down) => first[1],
+        _ => image.rows - first[1] - size[1],
+    };
+    let (image, place) = (image.cropped(first, size), place.cropped(first, size));
+    Ok((image, place, lines_after))
 }
 
 fn meant(told: &ByHand) -> Meant {

@@ -114,9 +114,7 @@ pub(crate) fn prepare_levelled(
         let look = look.as_ref();
         let roughly = look.and_then(|look| look.verdict(&image, &candidate.pair, background));
         if let Some((Verdict::Chance, ratios)) = roughly {
-            if ratios[2] > best[2] {
-                best = ratios;
-            }
+            best = better(best, ratios);
             continue;
         }
         let (binning, binned) = binned(&image, &candidate.pair);
@@ -132,10 +130,7 @@ pub(crate) fn prepare_levelled(
             verdict = Verdict::Lattice;
         }
         if verdict != Verdict::Lattice {
-            let ratios = signal_to_noise(&harmonics);
-            if ratios[2] > best[2] {
-                best = ratios;
-            }
+            best = better(best, signal_to_noise(&harmonics));
             // A strong second shell belongs to a lattice whose first shell is hidden; the lattice
             // of the second shell alone would be a wrong answer.
             if verdict == Verdict::Doubtful {
@@ -156,6 +151,11 @@ pub(crate) fn prepare_levelled(
         });
     }
     Err(LatticeError::NoLattice { best })
+}
+
+/// Of two candidates' signal-to-noise ratios those whose weakest wave is stronger.
+fn better(best: [f64; 3], ratios: [f64; 3]) -> [f64; 3] {
+    if ratios[2] > best[2] { ratios } else { best }
 }
 
 /// The image without its background, if there is anything in it to measure.

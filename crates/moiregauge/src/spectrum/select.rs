@@ -268,18 +268,9 @@ pub(crate) fn spectrum_peaks(spectrum: &Spectrum) -> Vec<Peak> {
             if !highest {
                 continue;
             }
-            let offset = |minus: f64, plus: f64| {
-                let (m, c, p) = (minus.ln(), power.ln(), plus.ln());
-                let curvature = m - 2.0 * c + p;
-                if curvature < 0.0 {
-                    (0.5 * (m - p) / curvature).clamp(-0.5, 0.5)
-                } else {
-                    0.0
-                }
-            };
             let bin = Vector2::new(
-                kx as f64 + offset(near(-1, 0), near(1, 0)),
-                signed + offset(near(0, -1), near(0, 1)),
+                kx as f64 + summit(near(-1, 0), power, near(1, 0)),
+                signed + summit(near(0, -1), power, near(0, 1)),
             );
             let q = bin.component_mul(&step);
             let cycles = frame * q;
@@ -297,12 +288,28 @@ pub(crate) fn spectrum_peaks(spectrum: &Spectrum) -> Vec<Peak> {
             });
         }
     }
+    best(found)
+}
+
+/// The most significant ones, best first, without side lobes.
+fn best(mut found: Vec<Peak>) -> Vec<Peak> {
     found.sort_by(|a, b| b.significance.total_cmp(&a.significance));
     found.truncate(8 * PEAKS);
     let all = found.clone();
     found.retain(|peak| !all.iter().any(|other| is_side_lobe(peak, other)));
     found.truncate(PEAKS);
     found
+}
+
+/// The place of the highest point between three neighbouring powers, in bins from the middle one: that of a parabola through their logarithms.
+fn summit(minus: f64, middle: f64, plus: f64) -> f64 {
+    let (m, c, p) = (minus.ln(), middle.ln(), plus.ln());
+    let curvature = m - 2.0 * c + p;
+    if curvature < 0.0 {
+        (0.5 * (m - p) / curvature).clamp(-0.5, 0.5)
+    } else {
+        0.0
+    }
 }
 
 /// Whether `peak` is no higher than what the window spreads there from the stronger `other`.

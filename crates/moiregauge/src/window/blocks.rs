@@ -59,6 +59,17 @@ pub(crate) struct Layer {
     pub(crate) im: Vec<f32>,
 }
 
+impl Layer {
+    /// None yet, of so many blocks.
+    fn with_room(blocks: usize) -> Self {
+        let room = || Vec::with_capacity(blocks);
+        Self {
+            re: room(),
+            im: room(),
+        }
+    }
+}
+
 impl Blocks {
     /// Middle of a block, pixels.
     pub(crate) fn middle(&self, column: f64, row: f64) -> Vector2<f64> {
@@ -104,12 +115,8 @@ pub(crate) fn mix_some(
     let along: Vec<[Vec<f32>; 2]> = along.collect();
     let up = |g: &Vector2<f64>| turns(g.y, place.row, size[1] * height, place.centre.y);
     let up: Vec<[Vec<f32>; 2]> = waves.iter().map(up).collect();
-    let room = || Vec::with_capacity(size[0] * size[1]);
-    let layer = || Layer {
-        re: room(),
-        im: room(),
-    };
-    let mut layers: Vec<Layer> = waves.iter().map(|_| layer()).collect();
+    let layer = |_| Layer::with_room(size[0] * size[1]);
+    let mut layers: Vec<Layer> = waves.iter().map(layer).collect();
     let mut shares = Vec::new();
     // A few rows at a time, so that they need no memory to speak of.
     let mut first = 0;

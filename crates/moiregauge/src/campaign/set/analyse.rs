@@ -2,7 +2,7 @@
 
 use nalgebra::Matrix2;
 
-use crate::campaign::analysis::{ScanAnalysis, SetAnalysis};
+use crate::campaign::analysis::SetAnalysis;
 use crate::campaign::group::Group;
 use crate::campaign::set::about::about_set;
 use crate::campaign::set::common::common;
@@ -10,7 +10,7 @@ use crate::campaign::set::drift::constant_drift;
 use crate::campaign::set::faint::too_faint;
 use crate::campaign::set::mean::{at_drift, forward_backward, without_drift};
 use crate::campaign::set::moire::draw;
-use crate::campaign::set::scan::scan_at_drift;
+use crate::campaign::set::scan::scans_at_drift;
 use crate::campaign::set::shells::{of_other_shell, of_second_shell};
 use crate::campaign::set::{joint, published};
 use crate::caveat::Caveat;
@@ -49,13 +49,8 @@ pub(crate) fn analyse_set(
         linear => (linear, None),
     };
     let of_set = solved.as_ref().map(|solved| &solved.drift);
-    let of_scan = |(scan, seen): (&MeasuredScan, &Vec<Observation>)| {
-        scan_at_drift(scan, seen, reference, of_set, fit.as_ref(), settings)
-    };
-    let pairs = group.scans.iter().zip(&seen);
-    // They are long, and a vector that grows would hold twice as many.
-    let mut scans: Vec<ScanAnalysis> = Vec::with_capacity(seen.len());
-    scans.extend(pairs.filter_map(of_scan));
+    let fitted = fit.as_ref();
+    let mut scans = scans_at_drift(&group.scans, &seen, reference, of_set, fitted, settings);
     let checks = fit
         .as_ref()
         .map(|fit| joint::checked(fit, &mut scans, &used, name, settings, caveats));

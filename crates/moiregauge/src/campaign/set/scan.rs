@@ -13,8 +13,26 @@ use crate::drift::linear::{Observation, common_lattice};
 use crate::scan::measured::{MeasuredLine, MeasuredScan};
 use crate::settings::knobs::Settings;
 
+/// Scans, with what was `seen` of each, before and after their drift is taken off; without those that cannot be told.
+pub(crate) fn scans_at_drift(
+    scans: &[MeasuredScan],
+    seen: &[Vec<Observation>],
+    reference: &Matrix2<f64>,
+    drift: Option<&Drift>,
+    fit: Option<&JointFit>,
+    settings: &Settings,
+) -> Vec<ScanAnalysis> {
+    let of_scan = |(scan, seen): (&MeasuredScan, &Vec<Observation>)| {
+        scan_at_drift(scan, seen, reference, drift, fit, settings)
+    };
+    // They are long, and a vector that grows would hold twice as many.
+    let mut found = Vec::with_capacity(seen.len());
+    found.extend(scans.iter().zip(seen).filter_map(of_scan));
+    found
+}
+
 /// A scan before and after its drift is taken off: its own by the `fit` of the set, or else the mean one.
-pub(crate) fn scan_at_drift(
+fn scan_at_drift(
     scan: &MeasuredScan,
     seen: &[Observation],
     reference: &Matrix2<f64>,
