@@ -28,6 +28,7 @@ spectrum/error THIRD set: half double
 high_orders STANDS_OUT set: half double
 high_orders FEWEST set: half double
 coverage/look QUIET edge,island,grains half double
+coverage/look GLANCE edge,island,grains half double
 coverage/look INSIDE edge,island,grains half closer
 coverage/look TYPICAL edge,island,grains half closer
 coverage/look PLAIN edge,island,grains half double
@@ -37,6 +38,7 @@ coverage/find WORTH edge,island,grains half double
 coverage/bend BETTER edge,island,grains half double
 coverage/bend WILD edge,island,grains half double
 coverage/bend POOR edge,island,grains half double
+coverage/bend FRAME_ENDS twist-wave half double
 coverage/grains BETTER edge,island,grains half double
 coverage/grains MISFIT edge,island,grains half double
 coverage/grains NEITHER edge,island,grains half double
@@ -46,15 +48,49 @@ scan/grains SAME grains half double
 set/faint FAINT terrain,contrast half double
 set/faint TOTAL terrain,contrast half double
 set/faint FRAMES terrain,contrast half double
-set/shells AGREE second half double
+scan/shells AGREE second half double
 bend THRESHOLD few,moirés,gradient,grains half double
 bend HARMLESS few,moirés,gradient,grains half double
 fit/bend CUBIC few,moirés,gradient,grains half double
 fit/bend BEYOND few,moirés,gradient,grains half double
-fit/beside STRONG moirés,terrain half double
-fit/beside LEFT moirés,terrain half double
-fit/beside NEAR moirés,terrain half double
-fit/beside OPPOSITE moirés,terrain half double
+fit/bend THIRD_ORDER few,moirés,gradient,grains half double
+fit/straight STEPS few,moirés,gradient,grains half double
+fit/measure ROUNDS bump half double
+fit/measure CLEARER bump half double
+fit/misfits MISSING hole half double
+fit/misfits DEVIATIONS hole half double
+fit/misfits FULL_ENOUGH hole half double
+fit/misfits MOST hole half double
+fit/misfits BINS hole half double
+fit/uneven WORTH bump half double
+fit/uneven ELSEWHERE bump half double
+fit/levelled WIDTH bump half double
+fit/levelled PASSES bump half double
+fit/few MOST +stripes half double
+fit/few NEGLIGIBLE +stripes half double
+fit/few BINS_PER_PERIOD +stripes half double
+fit/few ADDS_UP +stripes half double
+fit/few HARMONIC +stripes half double
+fit/few ORDER +stripes half double
+fit/few SKIRT +stripes half double
+fit/few LOBE +stripes half double
+fit/few FEWEST +stripes half double
+fit/few HIGHEST +stripes half double
+fit/few PERIODS +stripes half double
+fit/few OPEN +stripes half double
+fit/joint FARTHEST +stripes half double
+fit/joint APART +stripes half double
+fit/joint CLOSE +stripes half double
+fit/hidden NOISE_KNOWN_TO second root double
+fit/hidden SLOW second half double
+lattice/measure SECOND_SHELL second half double
+lattice/measure ATOMS hole,+stripes half double
+lattice/measure TOWERS hole,+stripes half double
+lattice/measure TORN hole,+stripes half double
+fit/beside STRONG moirés,+stripes half double
+fit/beside LEFT moirés,+stripes half double
+fit/beside NEAR moirés,+stripes half double
+fit/beside OPPOSITE moirés,+stripes half double
 fit/closure STRONG few,noisy,contrast half double
 fit/closure NOISE_KNOWN_TO few,noisy,contrast root double
 fit/leverage ACROSS few,noisy,contrast half double
@@ -69,7 +105,6 @@ doubts NO_CHANCE few,noisy,contrast half double
 shared SIGNIFICANT few,noisy,contrast half double
 shared CORRELATED few,noisy,contrast half double
 shared SEARCHED terrain,contrast half double
-shared FARTHEST terrain,contrast half double
 drift/linear WORST_CONDITION set: half double
 joint/link SHARE set: half double
 joint/link ACCELERATION set: half double
@@ -133,17 +168,17 @@ domains/nodes CLEAR domains half double
 domains/nodes SHARE domains half closer
 domains/nodes TELLING domains half double
 domains/nodes LINES domains half double
-stripes/find MEMBER stripes half double
-stripes/find PATTERN stripes half double
-stripes/find FEWEST stripes half double
-stripes/find ALONG stripes half double
-stripes/find SAME stripes half double
-window/setting LOST stripes half double
-stripes/nodes CROSSED stripes half closer
-window/setting STRAIGHT stripes half double
-window/blur OF_TWO stripes half double
-window/smooth WEAKEST stripes half double
-stripes/wave ENDS stripes half double
+stripes/find MEMBER stripes: half double
+stripes/find PATTERN stripes: half double
+stripes/find FEWEST stripes: half double
+stripes/find ALONG stripes: half double
+stripes/find SAME stripes: half double
+window/setting LOST stripes: half double
+stripes/nodes CROSSED stripes: half closer
+window/setting STRAIGHT stripes: half double
+window/blur OF_TWO stripes: half double
+window/smooth WEAKEST stripes: half double
+stripes/wave ENDS stripes: half double
 LIST
 
 program=$work/target/release/examples/constants
@@ -169,11 +204,11 @@ scenes() {
 mkdir -p "$work/outputs"
 while read -r place name words half double; do
   base=$work/outputs/$words.txt
-  [ -s "$base" ] || scenes "$words" "$base"
   for how in "$half" "$double"; do
     line="$place::$name $how"
     output=$work/outputs/${line//\//.}.txt
     [[ -z ${ONLY:-} || $line == *"$ONLY"* ]] || continue
+    [ -s "$base" ] || scenes "$words" "$base"
     if ! [ -s "$output" ]; then
       MOIREGAUGE_VARIED="$line" scenes "$words" "$work/new.txt" || echo "$words | said | it stopped: $(tail -1 "$work/said.txt")" >>"$work/new.txt"
       grep -q reached "$work/said.txt" || echo "$words | said | no scene comes to it" >>"$work/new.txt"

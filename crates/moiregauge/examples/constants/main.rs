@@ -39,7 +39,7 @@ fn main() {
     let words = arguments.get(1..).unwrap_or_default();
     let wanted = |name: &str| words.is_empty() || words.iter().any(|word| name.contains(word));
     let mut scenes = scenes::sets();
-    scenes.extend(scenes::samples());
+    scenes.extend(scenes::samples(wanted));
     scenes.extend(scenes::faint());
     scenes.extend(scenes::two_moires());
     scenes.extend(scenes::fields());

@@ -101,8 +101,8 @@ pub(crate) fn sets() -> Vec<Scene> {
     ]
 }
 
-/// Samples that are covered in part, change, have grains, a weak first shell, or no moiré: with the seed of each.
-pub(crate) fn samples() -> Vec<Scene> {
+/// Samples that are covered in part, change, have grains, bumps, stripes, a weak first shell, or no moiré: with the seed of each.
+pub(crate) fn samples(wanted: impl Fn(&str) -> bool) -> Vec<Scene> {
     let classes = [
         ("edge", 1),
         ("hole:count=8", 2),
@@ -111,19 +111,31 @@ pub(crate) fn samples() -> Vec<Scene> {
         ("grains", 5),
         ("twist-wave", 6),
         ("second-shell", 13),
+        ("bump", 1),
+        ("bump", 4),
+        ("hole:count=8", 78),
+        ("clean+stripes", 1),
+        ("clean+stripes", 4),
+        ("clean+stripes:amplitude=5", 2),
+        ("clean+stripes:amplitude=5", 4),
+        ("second-shell", 2),
         ("bare+terrain", 1),
         ("bare+terrain", 2),
         ("bare+terrain", 3),
     ];
+    // They take longer to make than all others together.
     let one = |(class, seed): (&str, u64)| {
-        let frames = simulation(|s| {
-            s.raster.pixels = [160, 160];
-            s.features = SampleFeature::parse(class).expect("a class");
-            vary(s, seed);
-        });
-        Scene::new(&format!("sample: {class} {seed}"), frames)
+        let name = format!("sample: {class} {seed}");
+        let frames = || {
+            simulation(|s| {
+                s.raster.pixels = [160, 160];
+                s.features = SampleFeature::parse(class).expect("a class");
+                vary(s, seed);
+            })
+        };
+        wanted(&name).then(|| Scene::new(&name, frames()))
     };
-    classes.into_iter().map(one).collect()
+    classes.into_iter().filter_map(one).collect()
 }
 
 /// One frame with less and less contrast: where it is found no more.
