@@ -48,6 +48,15 @@ pub enum LatticeDoubt {
         /// Unit cells of the lattice in it.
         unit_cells: f64,
     },
+    /// Ground was taken off.
+    #[error(
+        "ground that is stronger than the lattice (steps, bumps, slopes) was taken off: what a running median over \
+         {window:.1} nm makes of the image without the lattice"
+    )]
+    GroundTakenOff {
+        /// Side of the window, nm.
+        window: f64,
+    },
     /// The lattice changes, and the result is its mean.
     #[error(
         "the lattice changes across {part}: its wavelength by {:.2} % and its direction by {:.2}° (standard deviation \
@@ -209,6 +218,10 @@ explain! { LatticeDoubt:
         "The lattice covers only a part of the frame, as at an edge, around a hole or on an island. It was measured in \
          this part, and the rest was left out."
         "Look at the figure of the scan: the outline shows where the lattice was measured."
+    GroundTakenOff "ground-taken-off" Note
+        "Steps, bumps or rough ground hide the lattice. It was found and measured in the image without them. Where ground \
+         is as short as the lattice, some of it is left, alike in all frames."
+        "Look at the figure of the scan. A channel that shows less topography, as the phase, serves better."
     Changes "changing-lattice" Warning
         "The lattice changes across the frame by more than chance. The results are means over the area that it covers. \
          Their errors include how far the means depend on where this area ends."

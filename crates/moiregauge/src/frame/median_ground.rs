@@ -96,3 +96,80 @@ fn spread(bins: &Image, bin: usize, like: &Image) -> Image {
     });
     Image::new(like.rows, like.columns, values)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn image([columns, rows]: [usize; 2], value: impl Fn(f64, f64) -> f64) -> Image {
+        let at = |i: usize| value((i % columns) as f64, (i / columns) as f64);
+        Image::new(rows, columns, (0..columns * rows).map(at).collect())
+    }
+
+    /// Against medians that are written out, at the edges and where pixels are missing, too.
+    #[test]
+    fn medians_are_those_of_squares() {
+        let mut made = image([9, 7], |x, y| (7.0 * x + 3.0 * y * y) % 11.0);
+        made.values[31] = f64::NAN;
+        let found = running_median(&made, 5);
+        for (i, found) in found.values.iter().enumerate() {
+            let (x, y) = ((i % 9) as i32, (i / 9) as i32);
+            let near = |j: &usize| {
+                let (dx, dy) = ((j % 9) as i32 - x, (j / 9) as i32 - y);
+                dx.abs() <= 2 && dy.abs() <= 2 && made.values[*j].is_finite()
+            };
+            let mut all: Vec<f64> = (0..63).filter(near).map(|j| made.values[j]).collect();
+            all.sort_by(f64::total_cmp);
+            assert_eq!(*found, all[all.len() / 2], "{x}, {y}");
+        }
+    }
+
+    /// A straight step is left where it is, and as high; a bin at it may be on either side.
+    #[test]
+    fn steps_stay_sharp() {
+        let step = |x: f64, y: f64| f64::from(u8::from(x + 0.3 * y > 70.0));
+        let made = image([128, 96], step);
+        // Bins of two pixels.
+        let found = running_median(&made, 48);
+        let mut off = 0;
+        for (i, (found, made)) in found.values.iter().zip(&made.values).enumerate() {
+            let (x, y) = ((i % 128) as f64, (i / 128) as f64);
+            let far = (x + 0.3 * y - 70.0).abs() > 4.0;
+            // Where the frame cuts a window off it sees more of one side.
+            let inside = (24.0..72.0).contains(&y);
+            off += usize::from(far && inside && (found - made).abs() > 1e-9);
+        }
+        assert_eq!(off, 0);
+    }
+
+    /// What is taken off a perfect lattice has its periods, so that the waves of what is left are its own: columns and rows are told apart.
+    #[test]
+    fn a_lattice_keeps_its_periods() {
+        let turn = std::f64::consts::TAU;
+        let lattice = |x: f64, y: f64| (turn * x / 8.0).cos() + (turn * y / 12.0).cos().powi(3);
+        let found = running_median(&image([96, 84], lattice), 15);
+        for (x, y) in (16..72).flat_map(|x| (16..56).map(move |y| (x, y))) {
+            let at = |x: usize, y: usize| found.values[y * 96 + x];
+            assert_eq!(at(x, y), at(x + 8, y), "{x}, {y}");
+            assert_eq!(at(x, y), at(x, y + 12), "{x}, {y}");
+        }
+    }
+
+    /// Wide windows are taken of bins, and a slope goes through them as it is.
+    #[test]
+    fn slopes_go_through_bins() {
+        let slope = |x: f64, y: f64| 0.25 * x - 0.5 * y;
+        let made = image([200, 150], slope);
+        let found = running_median(&made, 72);
+        for (x, y) in (40..160).flat_map(|x| (40..110).map(move |y| (x, y))) {
+            let off = found.values[y * 200 + x] - slope(x as f64, y as f64);
+            assert!(off.abs() < 0.5, "{x}, {y}: {off}");
+        }
+        let mut holed = made;
+        for i in 0..200 * 100 {
+            holed.values[i] = f64::NAN;
+        }
+        let found = running_median(&holed, 72);
+        assert!(found.values[200 * 149].is_finite() && found.values[0].is_nan());
+    }
+}

@@ -9,7 +9,8 @@ use crate::frame::geometry::Geometry;
 use crate::frame::image::Image;
 use crate::lattice::fit::few::FewWaves;
 use crate::lattice::fit::fitted::LatticeFit;
-use crate::lattice::ground::below;
+use crate::lattice::fit::measure::CLEARER;
+use crate::lattice::ground::{below, on_even_ground};
 use crate::lattice::measure::{
     SECOND_SHELL, beside, hidden, is_contradicted, is_hollow, is_torn, measure_levelled,
     of_first_shell,
@@ -51,13 +52,36 @@ pub(crate) fn measure_own(
     if method != Method::Lattice {
         return measure_levelled(&image, geometry, background, method);
     }
-    let found = measure_beside(&image, geometry, background);
-    found.or_else(|error| {
-        let find = |even: &Arc<Image>| measure_levelled(even, geometry, background, method).ok();
-        below(&image, geometry, background, &find)
-            .filter(|found| !is_torn(found) && !is_contradicted(found, geometry))
-            .ok_or(error)
-    })
+    match measure_beside(&image, geometry, background) {
+        Ok(found) => Ok(clearer(found, &image, geometry, background)),
+        Err(error) => {
+            let find =
+                |even: &Arc<Image>| measure_levelled(even, geometry, background, method).ok();
+            below(&image, geometry, background, &find)
+                .filter(|found| !is_torn(found) && !is_contradicted(found, geometry))
+                .ok_or(error)
+        }
+    }
+}
+
+/// The same lattice in the image without ground, where something stands out beside it and the image without ground says much more of it.
+fn clearer(
+    found: MeasuredLattice,
+    image: &Image,
+    geometry: &Geometry,
+    background: Background,
+) -> MeasuredLattice {
+    let variance = |found: &MeasuredLattice| {
+        let fit = found.fit.as_ref();
+        fit.map_or(f64::INFINITY, |fit| fit.wave_vectors.covariance.trace())
+    };
+    if beside(&found).is_none() || !found.beside.is_empty() {
+        return found;
+    }
+    let most = CLEARER * variance(&found);
+    on_even_ground(image, found.clone(), geometry, background)
+        .filter(|even| !is_torn(even) && !is_contradicted(even, geometry) && variance(even) < most)
+        .unwrap_or(found)
 }
 
 /// The lattice of an image without its background, and of perfect waves beside it.

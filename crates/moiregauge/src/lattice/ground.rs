@@ -52,7 +52,7 @@ pub(crate) fn below(
 }
 
 /// A lattice measured anew in an image without the ground below it.
-fn on_even_ground(
+pub(crate) fn on_even_ground(
     image: &Image,
     mut found: MeasuredLattice,
     geometry: &Geometry,
@@ -63,7 +63,8 @@ fn on_even_ground(
         let fit = found.fit.as_ref()?;
         let waves = &fit.wave_vectors.basis;
         let rest = without(image, &picture(fit, size));
-        let even = without(image, &running_median(&rest, window(waves)));
+        let side = window(waves);
+        let even = without(image, &running_median(&rest, side));
         let start = Start::at(&even, geometry, background, waves)?;
         let mut again = start.measure(Method::Lattice).ok()?;
         if hidden(&again).chance() < SECOND_SHELL {
@@ -71,6 +72,7 @@ fn on_even_ground(
         } else if is_hollow(&again) || !same(size, &again.reciprocal, &found.reciprocal) {
             return None;
         }
+        again.ground = Some(side as f64);
         found = again;
     }
     Some(found)
@@ -103,4 +105,79 @@ fn without(image: &Image, other: &Image) -> Image {
     let both = image.values.iter().zip(&other.values);
     let values = both.map(|(value, other)| value - other);
     Image::new(image.rows, image.columns, values.collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lattice::find::measure;
+    use crate::numbers::rng::normals;
+
+    /// (columns, rows)
+    const SIZE: [usize; 2] = [176, 144];
+    const SEEDS: u64 = 16;
+
+    /// Waves of 26 to 29 pixels: five periods across the frame.
+    fn pair(seed: u64) -> Matrix2<f64> {
+        let (sin, cos) = (0.37 * seed as f64).sin_cos();
+        Matrix2::new(cos, -sin, sin, cos) * Matrix2::new(0.25, 0.115, -0.01, 0.21)
+    }
+
+    /// A lattice of waves of this amplitude, a step, a bump and noise.
+    fn image(seed: u64, amplitude: f64) -> Image {
+        let mut normal = normals(seed, "ground", 0);
+        let turn = 0.9 * seed as f64;
+        let (sin, cos) = turn.sin_cos();
+        let value = |i: usize| {
+            let at = Vector2::new((i % SIZE[0]) as f64, (i / SIZE[0]) as f64);
+            let [a, b] = [0, 1].map(|j| pair(seed).column(j).dot(&at));
+            let lattice = amplitude * (a.cos() + b.cos() + (b - a).cos());
+            let off = at - Vector2::new(80.0, 70.0);
+            let step = 4.0 * ((cos * off.x + sin * off.y) / 2.0).tanh();
+            let beside = (off - 45.0 * Vector2::new(-sin, cos)).norm() / 18.0;
+            let bump = 8.0 * (1.0 - beside * beside).max(0.0);
+            lattice + step + bump + 0.3 * normal()
+        };
+        Image::new(
+            SIZE[1],
+            SIZE[0],
+            (0..SIZE[0] * SIZE[1]).map(value).collect(),
+        )
+    }
+
+    fn measured(image: &Image) -> Option<MeasuredLattice> {
+        let geometry = Geometry::of_pitch(SIZE, [0.25, 0.25], 0.0, Vector2::zeros()).unwrap();
+        measure(image, &geometry, Background::Plane, Method::Lattice).ok()
+    }
+
+    /// Steps and bumps of many times its amplitude do not move the waves of a lattice by more than the errors say.
+    #[test]
+    fn a_lattice_is_found_below_steps_and_bumps() {
+        let (mut sum, mut answered) = (0.0, 0);
+        for seed in 0..SEEDS {
+            let Some(found) = measured(&image(seed, 0.7)) else {
+                continue;
+            };
+            let names = pair(seed).try_inverse().unwrap() * found.reciprocal;
+            let whole = names.map(f64::round);
+            assert_eq!(whole.determinant().abs(), 1.0, "{seed}: {names}");
+            let off = (names - whole).norm();
+            assert!(off < 0.02, "{seed}: {off}");
+            let fit = found.fit.unwrap();
+            let error = fit.wave_vectors.basis - pair(seed) * whole;
+            sum += error.norm_squared() / fit.wave_vectors.covariance.trace();
+            answered += 1;
+        }
+        assert!(10 * answered >= 9 * SEEDS, "{answered}");
+        let pull = (sum / answered as f64).sqrt();
+        assert!((0.4..1.6).contains(&pull), "{pull}");
+    }
+
+    /// What is taken off makes no lattice of steps, bumps and noise.
+    #[test]
+    fn ground_alone_is_no_lattice() {
+        for seed in 0..SEEDS {
+            assert!(measured(&image(seed, 0.0)).is_none(), "{seed}");
+        }
+    }
 }

@@ -35,6 +35,9 @@ pub struct MeasuredLattice {
     pub pixels: Lattice<Px>,
     /// The part of the frame that carries the lattice; `None` for all of it.
     pub patch: Option<Patch>,
+    /// Side of the window of the running median that was taken off as ground, pixels; `None` where nothing was.
+    #[serde(with = "exact", default, skip_serializing_if = "Option::is_none")]
+    pub ground: Option<f64>,
     /// How it changes across that part; `None` where it is the same everywhere, as far as can be seen.
     pub change: Option<Change>,
     /// What of its errors all images of the sample share; `None` where there is nothing of the kind.

@@ -103,6 +103,10 @@ pub(crate) fn about_coverage(
         };
         caveats.push(Caveat::new(doubt, file));
     }
+    if let Some(side) = lattice.ground {
+        let window = side * (geometry.fast_step().norm() * geometry.slow_step().norm()).sqrt();
+        caveats.push(Caveat::new(LatticeDoubt::GroundTakenOff { window }, file));
+    }
     let harmful = |change: &Change| change.wavelength.max(change.angle) > HARMLESS;
     if let Some(change) = lattice.change.filter(harmful) {
         let doubt = LatticeDoubt::Changes {
