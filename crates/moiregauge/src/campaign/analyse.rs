@@ -120,7 +120,11 @@ pub fn is_nothing_left(doubt: &Doubt) -> bool {
 fn is_doubtful(doubt: &Doubt) -> bool {
     matches!(
         doubt,
-        Doubt::Sets(SetDoubt::LatticeDoubtful { .. } | SetDoubt::ShellForLattice { .. })
+        Doubt::Sets(
+            SetDoubt::LatticeDoubtful { .. }
+                | SetDoubt::ShellForLattice { .. }
+                | SetDoubt::DriftOutrunsScan { .. }
+        )
     )
 }
 

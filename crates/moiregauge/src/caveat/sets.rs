@@ -28,6 +28,16 @@ pub enum SetDoubt {
         /// How many times the cell.
         times: i32,
     },
+    /// The drift would be faster than the slow scan.
+    #[error(
+        "the scans fit together only with a drift of {share:.1} times the speed of the slow scan. No sample drifts like \
+         this: at least one scan shows another lattice, or its header has the wrong direction or rate. Only the vectors \
+         are given, no twist and strain of the set"
+    )]
+    DriftOutrunsScan {
+        /// Drift over the slow speed of the tip.
+        share: f64,
+    },
     /// Scans scatter by more than their errors.
     #[error("{}", scattered(*.of, *.chi2_per_dof))]
     Scatter {
@@ -168,6 +178,11 @@ explain! { SetDoubt:
          are weak. Where noise hides them, a harmonic shell is taken for the lattice. There is no result for the set."
         "Look at the figures of both line directions. Give the approximate wavelength of the right lattice, or choose \
          the channel with the stronger first waves."
+    DriftOutrunsScan "drift-outruns-scan" Serious
+        "The scans fit together only with a drift that is faster than the slow scan. No sample drifts like this. At least \
+         one scan shows another lattice, or its header is wrong. There is no result for the set."
+        "Look at the figures of the scans, and compare the headers with the notebook. Give the approximate wavelength of \
+         the lattice, or exclude the scan that shows another one."
     Scatter "scatter" Warning
         "The scans of a set differ from each other by more than their errors say. The errors of the set were enlarged to \
          match."

@@ -129,6 +129,20 @@ impl Geometry {
         }
     }
 
+    /// The same map for bins of `bin × bin` pixels; those that fill no bin are left out.
+    #[must_use]
+    pub fn in_bins(&self, bin: usize) -> Self {
+        let pixels = bin as f64;
+        let middle = Vector2::repeat((pixels - 1.0) / 2.0);
+        Self {
+            size: self.size.map(|n| n / bin),
+            pixel_to_nm: self.pixel_to_nm * pixels,
+            origin: self.origin + self.pixel_to_nm * middle,
+            covariance: self.covariance * (pixels * pixels),
+            from_sensors: self.from_sensors,
+        }
+    }
+
     /// The same pixels in coordinates that are `map` times these (known exactly).
     #[must_use]
     pub fn mapped(&self, map: &Matrix2<f64>) -> Self {

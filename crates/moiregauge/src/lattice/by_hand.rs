@@ -34,6 +34,41 @@ pub(crate) enum Meant {
     Any,
 }
 
+impl Meant {
+    /// The waves that were told, rad per pixel.
+    fn first(self, geometry: &Geometry) -> Option<Matrix2<f64>> {
+        match self {
+            Self::Vectors(basis) => {
+                reciprocal(&basis).map(|q| geometry.pixel_to_nm.transpose() * q)
+            }
+            _ => None,
+        }
+    }
+
+    /// Whether a pair of waves (rad per pixel) may be the lattice.
+    fn is_near(self, pair: &Matrix2<f64>, geometry: &Geometry) -> bool {
+        match self {
+            Self::Any => true,
+            Self::Wavelength(near) => {
+                let cell =
+                    reciprocal(pair).map(|basis| (geometry.pixel_to_nm * basis).determinant());
+                let wavelength = cell.map_or(0.0, |area| (area.abs() / 0.75f64.sqrt()).sqrt());
+                (wavelength / near - 1.0).abs() < NEAR_WAVELENGTH
+            }
+            Self::Vectors(_) => {
+                let first = self.first(geometry);
+                first
+                    .and_then(|first| first.try_inverse())
+                    .is_some_and(|inverse| {
+                        let names = inverse * pair;
+                        let whole = names.map(f64::round);
+                        whole.determinant().abs() == 1.0 && (names - whole).amax() < NEAR
+                    })
+            }
+        }
+    }
+}
+
 /// Finds and measures the lattice that was told. `image`: with the pixels missing that are not to be used.
 ///
 /// # Errors
@@ -48,23 +83,8 @@ pub(crate) fn measure_by_hand(
     if image.values.iter().all(|v| !v.is_finite()) {
         return Err(LatticeError::Constant);
     }
-    let first = match meant {
-        Meant::Vectors(basis) => reciprocal(&basis).map(|q| geometry.pixel_to_nm.transpose() * q),
-        _ => None,
-    };
-    let is_meant = |pair: &Matrix2<f64>| match meant {
-        Meant::Any => true,
-        Meant::Wavelength(near) => {
-            let cell = reciprocal(pair).map(|basis| (geometry.pixel_to_nm * basis).determinant());
-            let wavelength = cell.map_or(0.0, |area| (area.abs() / 0.75f64.sqrt()).sqrt());
-            (wavelength / near - 1.0).abs() < NEAR_WAVELENGTH
-        }
-        Meant::Vectors(_) => first.and_then(Matrix2::try_inverse).is_some_and(|inverse| {
-            let names = inverse * pair;
-            let whole = names.map(f64::round);
-            whole.determinant().abs() == 1.0 && (names - whole).amax() < NEAR
-        }),
-    };
+    let first = meant.first(geometry);
+    let is_meant = |pair: &Matrix2<f64>| meant.is_near(pair, geometry);
     if let Some(start) = Start::find_meant(image, geometry, background, first, &is_meant) {
         return start.measure(method);
     }
@@ -73,7 +93,9 @@ pub(crate) fn measure_by_hand(
         return start.measure(method);
     }
     // Ground that is stronger than its waves hides it.
-    let find = |even: &Arc<Image>| {
+    let find = |even: &Arc<Image>, geometry: &Geometry| {
+        let is_meant = |pair: &Matrix2<f64>| meant.is_near(pair, geometry);
+        let first = meant.first(geometry);
         let start = Start::find_meant(even, geometry, background, first, &is_meant)?;
         start.measure(Method::Lattice).ok()
     };

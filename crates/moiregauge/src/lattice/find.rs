@@ -55,8 +55,9 @@ pub(crate) fn measure_own(
     match measure_beside(&image, geometry, background) {
         Ok(found) => Ok(clearer(found, &image, geometry, background)),
         Err(error) => {
-            let find =
-                |even: &Arc<Image>| measure_levelled(even, geometry, background, method).ok();
+            let find = |even: &Arc<Image>, geometry: &Geometry| {
+                measure_levelled(even, geometry, background, method).ok()
+            };
             below(&image, geometry, background, &find)
                 .filter(|found| !is_torn(found) && !is_contradicted(found, geometry))
                 .ok_or(error)
@@ -75,11 +76,12 @@ fn clearer(
         let fit = found.fit.as_ref();
         fit.map_or(f64::INFINITY, |fit| fit.wave_vectors.covariance.trace())
     };
+    let Some(fit) = &found.fit else { return found };
     if beside(&found).is_none() || !found.beside.is_empty() {
         return found;
     }
     let most = CLEARER * variance(&found);
-    on_even_ground(image, found.clone(), geometry, background)
+    on_even_ground(image, fit, geometry, background)
         .filter(|even| !is_torn(even) && !is_contradicted(even, geometry) && variance(even) < most)
         .unwrap_or(found)
 }

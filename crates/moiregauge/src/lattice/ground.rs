@@ -4,6 +4,7 @@
 //! that several are tried; what a window that the frame cuts off sees of the lattice bends the waves at the edges a little. That serves for
 //! a start: once a lattice is fitted, it is taken off, and the ground of what is left knows nothing of it.
 
+use std::borrow::Cow;
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
@@ -15,7 +16,8 @@ use crate::frame::background::Background;
 use crate::frame::clip::cut_off;
 use crate::frame::geometry::Geometry;
 use crate::frame::image::Image;
-use crate::frame::median_ground::running_median;
+use crate::frame::median_ground::{bin_of, running_median};
+use crate::frame::smaller::smaller;
 use crate::lattice::fit::fitted::LatticeFit;
 use crate::lattice::measure::{SECOND_SHELL, hidden, is_hollow, of_first_shell};
 use crate::lattice::measured::MeasuredLattice;
@@ -33,49 +35,61 @@ const PERIODS: f64 = 2.0;
 /// Rounds of lattice and ground: the second changes the waves by less than a tenth of their errors.
 const ROUNDS: usize = 2;
 
+/// How the lattice of an even image is found.
+type Find<'a> = &'a dyn Fn(&Arc<Image>, &Geometry) -> Option<MeasuredLattice>;
+
 /// The lattice of an image without its background, if it shows one beside ground that is taken off. `find`: the lattice of an even image.
 pub(crate) fn below(
     image: &Image,
     geometry: &Geometry,
     background: Background,
-    find: &dyn Fn(&Arc<Image>) -> Option<MeasuredLattice>,
+    find: Find,
 ) -> Option<MeasuredLattice> {
     let shorter = image.columns.min(image.rows) as f64;
     let sides = SHARES.map(|share| share * shorter);
     let mut sides = sides.into_iter().filter(|side| *side >= SMALLEST);
     sides.find_map(|side| {
         interrupt::check();
-        let even = without(image, &running_median(image, side as usize));
-        let found = find(&Arc::new(cut_off(&even)))?;
-        on_even_ground(image, found, geometry, background)
+        // A lattice that such a window lets pass has some ten bins a period.
+        let bin = bin_of(side as usize);
+        let bins = match bin {
+            1 => Cow::Borrowed(image),
+            _ => Cow::Owned(smaller(image, bin)),
+        };
+        let even = without(&bins, &running_median(&bins, side as usize / bin));
+        let found = find(&Arc::new(cut_off(&even)), &geometry.in_bins(bin))?;
+        let fit = found.fit?.in_pixels(bin);
+        on_even_ground(image, &fit, geometry, background)
     })
 }
 
-/// A lattice measured anew in an image without the ground below it.
+/// A lattice that was fitted before, measured anew in an image without the ground below it.
 pub(crate) fn on_even_ground(
     image: &Image,
-    mut found: MeasuredLattice,
+    before: &LatticeFit,
     geometry: &Geometry,
     background: Background,
 ) -> Option<MeasuredLattice> {
     let size = [image.columns, image.rows];
+    let mut found: Option<MeasuredLattice> = None;
     for _ in 0..ROUNDS {
-        let fit = found.fit.as_ref()?;
-        let waves = &fit.wave_vectors.basis;
+        let last = found.as_ref().map(|found| found.fit.as_ref());
+        let fit = last.unwrap_or(Some(before))?;
+        let waves = fit.wave_vectors.basis;
         let rest = without(image, &picture(fit, size));
-        let side = window(waves);
+        let side = window(&waves);
         let even = without(image, &running_median(&rest, side));
-        let start = Start::at(&even, geometry, background, waves)?;
+        let start = Start::at(&even, geometry, background, &waves)?;
         let mut again = start.measure(Method::Lattice).ok()?;
         if hidden(&again).chance() < SECOND_SHELL {
             again = of_first_shell(&again, &even, geometry, background, Method::Lattice)?;
-        } else if is_hollow(&again) || !same(size, &again.reciprocal, &found.reciprocal) {
+        } else if is_hollow(&again) || !same(size, &again.reciprocal, &waves) {
             return None;
         }
         again.ground = Some(side as f64);
-        found = again;
+        found = Some(again);
     }
-    Some(found)
+    found
 }
 
 /// A window of so many periods of the longest of three waves, pixels.
@@ -155,7 +169,7 @@ mod tests {
     fn a_lattice_is_found_below_steps_and_bumps() {
         let (mut sum, mut answered) = (0.0, 0);
         for seed in 0..SEEDS {
-            let Some(found) = measured(&image(seed, 0.7)) else {
+            let Some(found) = measured(&image(seed, 1.0)) else {
                 continue;
             };
             let names = pair(seed).try_inverse().unwrap() * found.reciprocal;

@@ -6,7 +6,7 @@ use crate::campaign::analysis::SetAnalysis;
 use crate::campaign::group::Group;
 use crate::campaign::set::about::about_set;
 use crate::campaign::set::common::common;
-use crate::campaign::set::drift::constant_drift;
+use crate::campaign::set::drift::{constant_drift, outruns};
 use crate::campaign::set::faint::too_faint;
 use crate::campaign::set::mean::{at_drift, forward_backward, without_drift};
 use crate::campaign::set::moire::draw;
@@ -62,6 +62,8 @@ pub(crate) fn analyse_set(
     let pitch = pitch_error(&used);
     // What is told by hand is known to be there.
     let doubt = no_result(group, &used).filter(|_| !settings.by_hand.says_which());
+    let outruns = of_set.and_then(|drift| outruns(drift, &all));
+    let doubt = doubt.or_else(|| outruns.map(|share| SetDoubt::DriftOutrunsScan { share }));
     let (mut uncorrected, mut mean) = (None, None);
     if let Some(doubt) = doubt {
         caveats.push(Caveat::new(doubt, name));

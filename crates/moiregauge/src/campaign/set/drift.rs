@@ -17,6 +17,8 @@ use crate::scan::measured::MeasuredScan;
 use crate::settings::knobs::{GivenDrift, Settings};
 use crate::spectrum::method::Method;
 
+/// A drift outruns the scan if it does so beyond this many standard errors.
+const OUTRUN_SIGMAS: f64 = 2.0;
 /// nm/min → nm/s.
 const PER_MINUTE: f64 = 1.0 / 60.0;
 
@@ -94,6 +96,18 @@ fn linear_drift(
     })
 }
 
+/// Drift over the speed of the slow scan where it is more than 1 beyond its errors: the sample outruns the tip, and each frame is a mirror image. No
+/// instrument drifts like this; the lattice is another one than the scans were taken to show.
+pub(crate) fn outruns(drift: &Drift, all: &[Observation]) -> Option<f64> {
+    let beyond = |seen: &Observation| {
+        let u = seen.time_gradient;
+        let sigma = u.dot(&(drift.covariance * u)).max(0.0).sqrt();
+        let share = u.dot(&drift.velocity).abs();
+        (!drift.given && share - OUTRUN_SIGMAS * sigma > 1.0).then_some(share)
+    };
+    all.iter().filter_map(beyond).max_by(f64::total_cmp)
+}
+
 fn given_drift(
     name: &str,
     all: &[Observation],
@@ -125,4 +139,39 @@ fn given_drift(
         freedom,
         enlargement: scale,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use heterostrain::Lattice;
+    use nalgebra::{Matrix4, Vector2};
+
+    /// Up and down at 1 nm/s: a drift along the slow axis outruns the tip, one along the fast axis does not, nor one that is hardly known.
+    #[test]
+    fn only_a_drift_along_the_slow_axis_outruns_the_scan() {
+        let seen = [1.0, -1.0].map(|sense| Observation {
+            lattice: Lattice::new(Matrix2::identity(), Matrix4::zeros()),
+            time_gradient: Vector2::new(1e-3, sense),
+            speed_error: [0.0; 2],
+            sensor: Matrix4::zeros(),
+        });
+        let share = |velocity: [f64; 2], sigma: f64, given: bool| {
+            let drift = Drift {
+                velocity: Vector2::from(velocity),
+                covariance: Matrix2::identity() * sigma * sigma,
+                given,
+                fit: None,
+                monte_carlo: None,
+                joint: None,
+            };
+            outruns(&drift, &seen)
+        };
+        let found = share([0.0, -1.5], 0.1, false).unwrap();
+        assert!((found - 1.5).abs() < 1e-12, "{found}");
+        assert_eq!(share([1.5, 0.0], 0.1, false), None);
+        assert_eq!(share([0.0, 0.9], 0.01, false), None);
+        assert_eq!(share([0.0, 1.5], 0.4, false), None);
+        assert_eq!(share([0.0, 1.5], 0.1, true), None);
+    }
 }

@@ -191,7 +191,7 @@ mod tests {
         assert_eq!(Hidden::default().chance(), 1.0);
         assert_eq!(Hidden::new(|_| None, 1.0).chance(), 1.0);
         let place = |q: Vector2<f64>| Some([if q.x > 0.0 { 1e6 } else { 0.3 }, 1.0]);
-        assert_eq!(Hidden::new(place, 1.0), noise);
+        assert_eq!(Hidden::new(place, 1.0).chance(), noise.chance());
         // Ground that all images have alike is told once.
         let ground = Hidden::new(|_| Some([4.0, 1.0]), 0.0);
         let all = Hidden::of_all((0..8).map(|_| ground));
