@@ -129,7 +129,7 @@ mod tests {
 
     /// (columns, rows)
     const SIZE: [usize; 2] = [176, 144];
-    const SEEDS: u64 = 16;
+    const SEEDS: u64 = 10;
 
     /// Waves of 26 to 29 pixels: five periods across the frame.
     fn pair(seed: u64) -> Matrix2<f64> {

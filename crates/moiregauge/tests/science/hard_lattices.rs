@@ -212,6 +212,45 @@ fn strong_stripes_make_no_lattice() {
     }
 }
 
+/// A first shell of a fiftieth of the contrast stands out in some images and not in others: the images of a set say together what the lattice is.
+#[test]
+fn images_of_a_set_agree_on_a_first_shell() {
+    let mut split = 0;
+    for seed in [1, 3, 5, 6] {
+        let mut set = Simulation {
+            features: SampleFeature::parse("second-shell:first=0.02").unwrap(),
+            ..Simulation::default()
+        };
+        set.raster.pixels = [160, 160];
+        set.raster.scans = 4;
+        vary(&mut set, seed);
+        let truth = set.sample.twist_deg;
+        let simulator = Simulator::new(set).unwrap();
+        let settings = Settings {
+            drift_draws: 0,
+            strain_draws: 0,
+            ..Settings::default()
+        };
+        let scan = |i| {
+            let (name, scan) = (Simulator::file_name(i), simulator.frame(i));
+            measure_scan(&name, &scan, &settings, None).unwrap()
+        };
+        let measured: Vec<_> = (0..simulator.frames()).map(scan).collect();
+        let lines = measured.iter().flat_map(|scan| &scan.lines);
+        let cells = lines.map(|line| line.in_sensor_coordinates().basis.determinant().abs());
+        let [least, most] = cells.fold([f64::INFINITY, 0.0], |[a, b], c| [c.min(a), c.max(b)]);
+        split += usize::from(most > 2.0 * least);
+        let analysis = analyse(measured, &settings);
+        assert_eq!(analysis.sets.len(), 1, "{seed}");
+        let twist = analysis.sets[0].mean.as_ref().unwrap().twist();
+        let off = (twist.value.to_degrees() - truth).abs();
+        assert!(off < 5.0 * twist.statistical.to_degrees(), "{seed}: {off}");
+        assert!(off < 0.001, "{seed}: {off}");
+    }
+    // Otherwise nothing was decided together.
+    assert!(split >= 2, "{split}");
+}
+
 /// The strongest waves of a frame may be those of two grains: no part of it has them together, and each grain has a lattice of its own.
 #[test]
 fn waves_of_two_grains_make_no_lattice() {
