@@ -251,6 +251,39 @@ fn images_of_a_set_agree_on_a_first_shell() {
     assert!(split >= 2, "{split}");
 }
 
+/// Two samples of which one has the points of the other, with a third of its cell: no image of the smaller one has a first shell of the other, and
+/// which is meant nobody knows.
+#[test]
+fn lattices_that_hold_each_other_are_no_result() {
+    let large = Simulation::default().sample;
+    let half = |twist: f64| twist.to_radians() / 2.0;
+    let twist = 2.0
+        * (3f64.sqrt() * half(large.twist_deg).sin())
+            .asin()
+            .to_degrees();
+    let mut measured = Vec::new();
+    for (first, twist) in [(0, large.twist_deg), (2, twist)] {
+        let mut set = Simulation::default();
+        set.raster.pixels = [128, 128];
+        set.raster.scans = 4;
+        set.sample.strain_percent = 0.0;
+        set.sample.twist_deg = twist;
+        // Turned by 30°, as the second shell is.
+        let turn = if first == 0 { 0.0 } else { 30.0 };
+        set.sample.lattice_angle_deg += turn + (large.twist_deg - twist) / 2.0;
+        let simulator = Simulator::new(set).unwrap();
+        for i in first..first + 2 {
+            let (name, scan) = (Simulator::file_name(i), simulator.frame(i));
+            measured.push(measure_scan(&name, &scan, &Settings::default(), None).unwrap());
+        }
+    }
+    let analysis = analyse(measured, &Settings::default());
+    let codes: Vec<_> = analysis.caveats.iter().map(|c| c.code()).collect();
+    assert!(codes.contains(&"shell-for-lattice"), "{codes:?}");
+    let means = analysis.sets.iter().map(|set| &set.mean);
+    assert!(means.into_iter().all(Option::is_none) && analysis.combined.is_none());
+}
+
 /// The strongest waves of a frame may be those of two grains: no part of it has them together, and each grain has a lattice of its own.
 #[test]
 fn waves_of_two_grains_make_no_lattice() {
