@@ -57,13 +57,11 @@ impl Meant {
             }
             Self::Vectors(_) => {
                 let first = self.first(geometry);
-                first
-                    .and_then(|first| first.try_inverse())
-                    .is_some_and(|inverse| {
-                        let names = inverse * pair;
-                        let whole = names.map(f64::round);
-                        whole.determinant().abs() == 1.0 && (names - whole).amax() < NEAR
-                    })
+                first.and_then(Matrix2::try_inverse).is_some_and(|inverse| {
+                    let names = inverse * pair;
+                    let whole = names.map(f64::round);
+                    whole.determinant().abs() == 1.0 && (names - whole).amax() < NEAR
+                })
             }
         }
     }

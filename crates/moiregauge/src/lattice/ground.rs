@@ -32,6 +32,8 @@ const SHARES: [f64; 4] = [0.22, 0.14, 0.34, 0.08];
 const SMALLEST: f64 = 12.0;
 /// The window of the ground below a known lattice, in periods: a hidden first shell, longer by √3, is left.
 const PERIODS: f64 = 2.0;
+/// The widest window, as a share of the shorter side of the frame: lattices of fewer than four periods cannot be told from ground.
+const WIDEST: f64 = 0.5;
 /// Rounds of lattice and ground: the second changes the waves by less than a tenth of their errors.
 const ROUNDS: usize = 2;
 
@@ -84,6 +86,10 @@ pub(crate) fn on_even_ground(
         if hidden(&again).chance() < SECOND_SHELL {
             again = of_first_shell(&again, &even, geometry, background, Method::Lattice)?;
         } else if is_hollow(&again) || !same(size, &again.reciprocal, &waves) {
+            return None;
+        }
+        let widest = window(&waves).max(window(&again.reciprocal));
+        if widest as f64 > WIDEST * size[0].min(size[1]) as f64 {
             return None;
         }
         again.ground = Some(side as f64);
@@ -147,7 +153,7 @@ mod tests {
             let [a, b] = [0, 1].map(|j| pair(seed).column(j).dot(&at));
             let lattice = amplitude * (a.cos() + b.cos() + (b - a).cos());
             let off = at - Vector2::new(80.0, 70.0);
-            let step = 4.0 * ((cos * off.x + sin * off.y) / 2.0).tanh();
+            let step = 4.0 * (0.5 * (cos * off.x + sin * off.y)).tanh();
             let beside = (off - 45.0 * Vector2::new(-sin, cos)).norm() / 18.0;
             let bump = 8.0 * (1.0 - beside * beside).max(0.0);
             lattice + step + bump + 0.3 * normal()

@@ -32,6 +32,8 @@ const TOWERS: f64 = 3.0;
 /// A lattice whose waves change by more than this share of themselves from corner to corner is none: gradients and waves of twist and strain make up
 /// to a tenth, creep in a frame of four periods of atoms a half, and holes that pass for a coarse lattice 0.7 to 1.4.
 const TORN: f64 = 0.6;
+/// A lattice of fewer periods across the frame that changes at all is none: three bumps make one. Chosen by eye.
+const FEWEST_PERIODS: f64 = 2.0;
 /// Harmonics with so many times the amplitude of the first shell make a lattice whose first shell has to be shown. Chosen by eye.
 const OUTSHINES: f64 = 2.0;
 /// So many harmonics that stand out say it instead. Chosen by eye.
@@ -53,7 +55,10 @@ fn in_parts(
 /// Whether the fit says of a lattice that it changes so much that it is none.
 pub(crate) fn is_torn(found: &MeasuredLattice) -> bool {
     let change = found.fit.as_ref().and_then(|fit| fit.inhomogeneity);
-    change.is_some_and(|change| change.stands_out() && change.wavelength.hypot(change.angle) > TORN)
+    change.is_some_and(|change| {
+        let much = change.wavelength.hypot(change.angle) > TORN || found.periods < FEWEST_PERIODS;
+        change.stands_out() && much
+    })
 }
 
 /// Whether these are grains, each fitted to its pixels.

@@ -278,7 +278,11 @@ fn lattices_that_hold_each_other_are_no_result() {
         }
     }
     let analysis = analyse(measured, &Settings::default());
-    let codes: Vec<_> = analysis.caveats.iter().map(|c| c.code()).collect();
+    let codes: Vec<_> = analysis
+        .caveats
+        .iter()
+        .map(moiregauge::Caveat::code)
+        .collect();
     assert!(codes.contains(&"shell-for-lattice"), "{codes:?}");
     let means = analysis.sets.iter().map(|set| &set.mean);
     assert!(means.into_iter().all(Option::is_none) && analysis.combined.is_none());
