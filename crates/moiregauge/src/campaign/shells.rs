@@ -4,6 +4,7 @@
 //! at the places of the first shell is known; all together tell what no image can.
 
 use crate::campaign::group::Group;
+use crate::caveat::files::FileDoubt;
 use crate::caveat::lattices::LineDifference;
 use crate::caveat::sets::SetDoubt;
 use crate::caveat::{Caveat, Doubt};
@@ -79,11 +80,13 @@ fn second_shells(scans: &[MeasuredScan]) -> Vec<Vec<bool>> {
 
 /// Takes the first shell where the second was measured; lines that do not know it are left out. What there is to say of a scan without any.
 fn take_first_shells(scan: &mut MeasuredScan, second: &[bool]) -> Option<Caveat> {
-    let mut lines = Vec::new();
+    let reason = || "noise hides the first waves of its lattice".to_owned();
+    let (mut lines, mut left_out) = (Vec::new(), false);
     for (line, second) in scan.lines.iter().zip(second) {
         let mut line = line.clone();
         if *second {
             let Some(first) = line.first_shell.take() else {
+                left_out = true;
                 continue;
             };
             line.lattice = *first;
@@ -91,9 +94,13 @@ fn take_first_shells(scan: &mut MeasuredScan, second: &[bool]) -> Option<Caveat>
         lines.push(line);
     }
     if lines.is_empty() {
-        let reason = "noise hides the first waves of its lattice".to_owned();
+        let reason = reason();
         scan.excluded = Some(reason.clone());
         return Some(Caveat::new(SetDoubt::ScanLeftOut { reason }, &scan.file));
+    }
+    if left_out {
+        let doubt = FileDoubt::LineLeftOut { reason: reason() };
+        scan.caveats.push(Caveat::new(doubt, &scan.file));
     }
     share_noise(&mut lines);
     scan.caveats

@@ -23,6 +23,28 @@ fn chi_squared(scene: &Scene, measured: &MeasuredLattice) -> f64 {
     error.dot(&(covariance.try_inverse().unwrap() * error))
 }
 
+/// Four square frames of a sample whose numbers are drawn, and its twist in degrees.
+fn varied(sample: &str, pixels: usize, seed: u64) -> (Simulator, f64) {
+    let mut set = Simulation {
+        features: SampleFeature::parse(sample).unwrap(),
+        ..Simulation::default()
+    };
+    set.raster.pixels = [pixels, pixels];
+    set.raster.scans = 4;
+    vary(&mut set, seed);
+    let twist = set.sample.twist_deg;
+    (Simulator::new(set).unwrap(), twist)
+}
+
+/// Without draws, which take time and change no result.
+fn undrawn() -> Settings {
+    Settings {
+        drift_draws: 0,
+        strain_draws: 0,
+        ..Settings::default()
+    }
+}
+
 /// A cell with many atoms: as in Si(111)-7×7, the waves of the shells 7, 9 and 13 are strong and those below 7
 /// are lost in noise.
 fn many_atoms(seed: u64) -> Scene {
@@ -176,20 +198,8 @@ fn harmonics_that_make_no_lattice_enlarge_the_errors() {
 #[test]
 fn strong_stripes_make_no_lattice() {
     for seed in [1075, 1086, 1090] {
-        let mut set = Simulation {
-            features: SampleFeature::parse("stripes").unwrap(),
-            ..Simulation::default()
-        };
-        set.raster.pixels = [192, 192];
-        set.raster.scans = 4;
-        vary(&mut set, seed);
-        let truth = set.sample.twist_deg;
-        let simulator = Simulator::new(set).unwrap();
-        let settings = Settings {
-            drift_draws: 0,
-            strain_draws: 0,
-            ..Settings::default()
-        };
+        let (simulator, truth) = varied("stripes", 192, seed);
+        let settings = undrawn();
         let measured = (0..simulator.frames()).filter_map(|i| {
             measure_scan(
                 &Simulator::file_name(i),
@@ -217,20 +227,8 @@ fn strong_stripes_make_no_lattice() {
 fn images_of_a_set_agree_on_a_first_shell() {
     let mut split = 0;
     for seed in [1, 3, 5, 6] {
-        let mut set = Simulation {
-            features: SampleFeature::parse("second-shell:first=0.02").unwrap(),
-            ..Simulation::default()
-        };
-        set.raster.pixels = [160, 160];
-        set.raster.scans = 4;
-        vary(&mut set, seed);
-        let truth = set.sample.twist_deg;
-        let simulator = Simulator::new(set).unwrap();
-        let settings = Settings {
-            drift_draws: 0,
-            strain_draws: 0,
-            ..Settings::default()
-        };
+        let (simulator, truth) = varied("second-shell:first=0.02", 160, seed);
+        let settings = undrawn();
         let scan = |i| {
             let (name, scan) = (Simulator::file_name(i), simulator.frame(i));
             measure_scan(&name, &scan, &settings, None).unwrap()
@@ -322,14 +320,7 @@ fn waves_of_two_grains_make_no_lattice() {
 /// Eight holes in a moiré of nine periods make a lattice of two and a half of their own, which changes by as much as itself across the frame.
 #[test]
 fn holes_make_no_lattice_of_few_periods() {
-    let mut set = Simulation {
-        features: SampleFeature::parse("hole:count=8").unwrap(),
-        ..Simulation::default()
-    };
-    set.raster.pixels = [192, 192];
-    set.raster.scans = 4;
-    vary(&mut set, 78);
-    let simulator = Simulator::new(set).unwrap();
+    let (simulator, _) = varied("hole:count=8", 192, 78);
     let truth = simulator.truth().sample.unwrap().grains[0].lattice_vectors_nm;
     let wanted = truth.map(|v| Vector2::from(v).norm());
     for i in 0..simulator.frames() {
