@@ -20,7 +20,9 @@ pub(crate) fn advice(error: &InputError) -> Option<String> {
         }
         InputError::Measure(MeasureError::NoSize) => "give the size, as in --size 70nm×70nm",
         InputError::Measure(MeasureError::Lattice { error, .. }) => match error {
-            LatticeError::Contradicted { .. } | LatticeError::NowhereTogether => {
+            LatticeError::Contradicted { .. }
+            | LatticeError::NowhereTogether
+            | LatticeError::NoHarmonics { .. } => {
                 "say which lattice to measure, or where it is: --near WAVELENGTH, --lattice, --region or --mask"
             }
             LatticeError::NotThere => "leave out what hides it: --mask or --region",

@@ -1,7 +1,7 @@
 //! Options of this program that help against what is doubtful.
 
 /// By the code of a caveat.
-const HINTS: [(&str, &str); 42] = [
+const HINTS: [(&str, &str); 43] = [
     ("several-images", "--channel NAME or --image N"),
     ("channel-chosen", "--channel NAME"),
     ("nothing-excluded", "--exclude NAME with the name of a file"),
@@ -36,6 +36,7 @@ const HINTS: [(&str, &str); 42] = [
     ("lattice-doubtful", "--near WAVELENGTH or --lattice"),
     ("shell-for-lattice", "--near WAVELENGTH or --lattice"),
     ("drift-outruns-scan", "--near WAVELENGTH or --exclude"),
+    ("grains-contradict", "--region, --mask or --grain"),
     ("outlying-scan", "--exclude NAME or --exclude-outliers"),
     ("samples-mixed", "--set NAME=PATH"),
     ("large-strain", "--layers UPPER/LOWER or --size W×H"),

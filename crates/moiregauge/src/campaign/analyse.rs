@@ -9,7 +9,7 @@ use nalgebra::Matrix2;
 use crate::campaign::analysis::{Analysis, SetAnalysis};
 use crate::campaign::naming::Named;
 use crate::campaign::set::analyse as set;
-use crate::campaign::{combine, group, identity, samples, shells};
+use crate::campaign::{combine, grains, group, identity, samples, shells};
 use crate::caveat::files::FileDoubt;
 use crate::caveat::lattices::LatticeDoubt;
 use crate::caveat::moires::MoireDoubt;
@@ -17,7 +17,7 @@ use crate::caveat::sets::SetDoubt;
 use crate::caveat::{Caveat, Doubt};
 use crate::drift::joint::path::DriftPath;
 use crate::frame::background::Background;
-use crate::scan::grains;
+use crate::scan::grains::each;
 use crate::scan::measured::MeasuredScan;
 use crate::settings::knobs::Settings;
 use crate::spectrum::method::Method;
@@ -32,7 +32,7 @@ pub fn analyse(scans: Vec<MeasuredScan>, settings: &Settings) -> Analysis {
     exclude(&mut scans, settings, &mut caveats);
     caveats.extend(nothing_left(&scans));
     identity::mark_repeats(&mut scans, &mut caveats);
-    grains::each(&mut scans);
+    each(&mut scans);
     let mut groups = group::groups(scans, settings.grouping);
     // What is told by hand is known to be there.
     if !settings.by_hand.says_which() {
@@ -67,6 +67,7 @@ pub fn analyse(scans: Vec<MeasuredScan>, settings: &Settings) -> Analysis {
             joint_scans.extend(group.scans.into_iter().filter(|s| s.excluded.is_none()));
         }
     }
+    grains::agree_on_drift(&mut sets, &mut caveats);
     let all: Vec<&MeasuredScan> = joint_scans.iter().collect();
     let joint = reference.map(|reference| (all.as_slice(), reference));
     // Samples have no mean.
@@ -124,6 +125,7 @@ fn is_doubtful(doubt: &Doubt) -> bool {
             SetDoubt::LatticeDoubtful { .. }
                 | SetDoubt::ShellForLattice { .. }
                 | SetDoubt::DriftOutrunsScan { .. }
+                | SetDoubt::GrainsContradict { .. }
         )
     )
 }

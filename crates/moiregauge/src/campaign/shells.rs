@@ -15,6 +15,9 @@ use crate::scan::measure::{about_lattice, share_noise};
 use crate::scan::measured::{MeasuredLine, MeasuredScan};
 use crate::scan::shells::{CONFIRMED, cells};
 
+/// A lattice is the second shell of another that so many times as many lines show: those that show the other cannot all be wrong about the same waves.
+const OUTVOTED: usize = 3;
+
 /// Takes the lattice of which that which was measured is the second shell in all images of a set that say so together.
 pub(crate) fn agree(groups: &mut [Group], caveats: &mut Vec<Caveat>) {
     for group in groups {
@@ -33,6 +36,35 @@ fn counts(scan: &MeasuredScan) -> bool {
     scan.repeats.is_none() && !scan.excluded.as_ref().is_some_and(other)
 }
 
+/// A lattice that lines of a set show.
+struct Seen<'a> {
+    /// One that shows it, ...
+    line: &'a MeasuredLine,
+    /// ... how many do, ...
+    lines: usize,
+    /// ... and what all say together.
+    told: Hidden,
+}
+
+fn lattices<'a>(all: &[&'a MeasuredLine]) -> Vec<Seen<'a>> {
+    let mut found: Vec<Seen> = Vec::new();
+    for line in all {
+        let told = hidden(&line.lattice);
+        match found.iter_mut().find(|f| cells(f.line, line) == Some(1)) {
+            Some(seen) => {
+                seen.told = Hidden::of_all([seen.told, told].into_iter());
+                seen.lines += 1;
+            }
+            None => found.push(Seen {
+                line,
+                lines: 1,
+                told,
+            }),
+        }
+    }
+    found
+}
+
 /// Which lines of each scan show the second shell of their lattice.
 fn second_shells(scans: &[MeasuredScan]) -> Vec<Vec<bool>> {
     let all: Vec<&MeasuredLine> = scans
@@ -41,31 +73,18 @@ fn second_shells(scans: &[MeasuredScan]) -> Vec<Vec<bool>> {
         .flat_map(|scan| &scan.lines)
         .collect();
     let suspected = all.iter().any(|line| line.first_shell.is_some());
-    // One line for each lattice that is seen, with what all that see it say.
-    let mut lattices: Vec<(&MeasuredLine, Hidden)> = Vec::new();
-    for line in all.iter().filter(|_| suspected) {
-        let told = hidden(&line.lattice);
-        match lattices
-            .iter_mut()
-            .find(|(first, _)| cells(first, line) == Some(1))
-        {
-            Some((_, so_far)) => *so_far = Hidden::of_all([*so_far, told].into_iter()),
-            None => lattices.push((line, told)),
-        }
-    }
-    let is_second = |(line, told): &(&MeasuredLine, Hidden)| {
-        let chance = told.chance();
-        let larger = || {
-            lattices
-                .iter()
-                .any(|(other, _)| cells(other, line) == Some(3))
-        };
-        chance < SECOND_SHELL || (chance < CONFIRMED && larger())
+    let lattices = lattices(&all);
+    let is_second = |seen: &Seen| {
+        let chance = seen.told.chance();
+        let is_larger = |other: &&Seen| cells(other.line, seen.line) == Some(3);
+        let larger: usize = lattices.iter().filter(is_larger).map(|l| l.lines).sum();
+        let told = chance < SECOND_SHELL || (chance < CONFIRMED && larger > 0);
+        (suspected && told) || larger >= OUTVOTED * seen.lines
     };
     let second: Vec<&MeasuredLine> = lattices
         .iter()
         .filter(|lattice| is_second(lattice))
-        .map(|(line, _)| *line)
+        .map(|lattice| lattice.line)
         .collect();
     let shows_it = |line: &MeasuredLine| second.iter().any(|other| cells(other, line) == Some(1));
     let of_scan = |scan: &MeasuredScan| {

@@ -38,6 +38,18 @@ pub enum SetDoubt {
         /// Drift over the slow speed of the tip.
         share: f64,
     },
+    /// Grains of the same scans drift differently.
+    #[error(
+        "the drift of this grain and that of {other} differ by {nm_per_min:.2} nm/min, more than their errors allow. Both \
+         lie in the same frames and drift alike, so that at least one shows another lattice. Only the vectors are given, no \
+         twist and strain of this grain"
+    )]
+    GrainsContradict {
+        /// How far apart.
+        nm_per_min: f64,
+        /// The other.
+        other: String,
+    },
     /// Scans scatter by more than their errors.
     #[error("{}", scattered(*.of, *.chi2_per_dof))]
     Scatter {
@@ -183,6 +195,11 @@ explain! { SetDoubt:
          one scan shows another lattice, or its header is wrong. There is no result for the set."
         "Look at the figures of the scans, and compare the headers with the notebook. Give the approximate wavelength of \
          the lattice, or exclude the scan that shows another one."
+    GrainsContradict "grains-contradict" Serious
+        "Two grains of the same frames seem to drift differently. This cannot be: in one of them something else was taken \
+         for the lattice, or the scans of one show different lattices. There is no result for the grain that is less \
+         certain, or for both."
+        "Look at the outlines in the figures of the scans. Analyse each grain by itself, with a region or a mask."
     Scatter "scatter" Warning
         "The scans of a set differ from each other by more than their errors say. The errors of the set were enlarged to \
          match."

@@ -12,7 +12,7 @@ use crate::lattice::fit::fitted::LatticeFit;
 use crate::lattice::fit::measure::CLEARER;
 use crate::lattice::ground::{below, on_even_ground};
 use crate::lattice::measure::{
-    SECOND_SHELL, beside, hidden, is_contradicted, is_hollow, is_torn, measure_levelled,
+    SECOND_SHELL, beside, hidden, is_contradicted, is_torn, measure_levelled, no_lattice,
     of_first_shell,
 };
 use crate::lattice::measured::MeasuredLattice;
@@ -139,7 +139,7 @@ fn beside_stripes(
     let mut found = start.measure(method).ok()?;
     if hidden(&found).chance() < SECOND_SHELL {
         found = of_first_shell(&found, &rest, geometry, background, method)?;
-    } else if is_hollow(&found) {
+    } else if no_lattice(&found).is_some() {
         return None;
     }
     if let Some(fit) = &mut found.fit {

@@ -13,6 +13,7 @@ use crate::frame::background::{Background, remove_background};
 use crate::frame::clip::cut_off;
 use crate::frame::geometry::Geometry;
 use crate::frame::image::Image;
+use crate::lattice::fit::closure::Closure;
 use crate::lattice::fit::few::strongest_beside;
 use crate::lattice::fit::fitted::FittedHarmonic;
 use crate::lattice::fit::hidden::{Hidden, first_shell};
@@ -93,8 +94,8 @@ pub(crate) fn measure_levelled(
             .ok_or(error)?,
         Err(error) => return Err(error),
     };
-    if is_hollow(&found) {
-        return Err(LatticeError::NowhereTogether);
+    if let Some(error) = no_lattice(&found) {
+        return Err(error);
     }
     if hidden(&found).chance() < SECOND_SHELL
         && let Some(first) = of_first_shell(&found, image, geometry, background, method)
@@ -112,7 +113,8 @@ pub(crate) fn measure_levelled(
     let finer = to_physical.and_then(|m| finer(&pair, &wave.wave_vector, size, &m));
     let finer = finer.and_then(|pair| Start::near(image, geometry, background, &pair));
     if let Some(start) = finer.filter(Start::stands_out) {
-        return start.measure(method);
+        let found = start.measure(method)?;
+        return no_lattice(&found).map_or(Ok(found), Err);
     }
     if !is_contradicted(&found, geometry) {
         return Ok(found);
@@ -120,7 +122,8 @@ pub(crate) fn measure_levelled(
     // Another part of the frame explains it, or it is something else beside the lattice.
     let another = Start::find_patch(image, geometry, background, Some(pair))
         .and_then(|start| start.measure(method).ok())
-        .filter(|other| beside(other).is_none_or(|wave| !is_stronger(other, &wave)));
+        .filter(|other| beside(other).is_none_or(|wave| !is_stronger(other, &wave)))
+        .filter(|other| no_lattice(other).is_none());
     match another {
         Some(other) => Ok(other),
         // A step, a slope or stripes below a lattice that every part of the frame shows.
@@ -146,9 +149,19 @@ fn towering(found: &MeasuredLattice, image: &Image, geometry: &Geometry) -> Opti
         .then(|| period(&wave, geometry))
 }
 
+/// Why what the fit says of its waves makes a lattice none.
+pub(crate) fn no_lattice(found: &MeasuredLattice) -> Option<LatticeError> {
+    if is_hollow(found) {
+        return Some(LatticeError::NowhereTogether);
+    }
+    let closure = found.fit.as_ref()?.closure.filter(Closure::is_no_lattice)?;
+    let cycles = closure.apart;
+    Some(LatticeError::NoHarmonics { cycles })
+}
+
 /// Whether its first shell is nowhere to be seen beside stronger harmonics, of which all that stand out are those of another lattice, but for one or
 /// two that may be chance: slow ground makes a coarser lattice of every lattice.
-pub(crate) fn is_hollow(found: &MeasuredLattice) -> bool {
+fn is_hollow(found: &MeasuredLattice) -> bool {
     let Some(fit) = &found.fit else { return false };
     let (first, higher) = fit.harmonics.split_at(FIRST_SHELL.len());
     let largest = |some: &[FittedHarmonic]| some.iter().map(|h| h.amplitude).fold(0.0, f64::max);

@@ -37,6 +37,15 @@ pub enum LatticeError {
          together. The peaks come from an edge, from stripes, or from different lattices"
     )]
     NowhereTogether,
+    /// The waves are not those of one lattice.
+    #[error(
+        "the strongest waves of the image are not harmonics of one lattice: they miss the points of the best one by \
+         {cycles:.2} cycles per frame. They come from stripes beside a lattice, or from different lattices"
+    )]
+    NoHarmonics {
+        /// By how much: root mean square, weighted with their power.
+        cycles: f64,
+    },
     /// Something else is stronger.
     #[error(
         "a wave with a period of {period:.2} nm is stronger than the lattice that was found, and is not one of its \

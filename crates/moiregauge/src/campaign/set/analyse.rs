@@ -6,7 +6,7 @@ use crate::campaign::analysis::SetAnalysis;
 use crate::campaign::group::Group;
 use crate::campaign::set::about::about_set;
 use crate::campaign::set::common::common;
-use crate::campaign::set::drift::{constant_drift, outruns};
+use crate::campaign::set::drift::{constant_drift, outruns, unknown};
 use crate::campaign::set::faint::too_faint;
 use crate::campaign::set::mean::{at_drift, forward_backward, without_drift};
 use crate::campaign::set::moire::draw;
@@ -14,6 +14,7 @@ use crate::campaign::set::scan::scans_at_drift;
 use crate::campaign::set::shells::{of_other_shell, of_second_shell};
 use crate::campaign::set::{joint, published};
 use crate::caveat::Caveat;
+use crate::caveat::drifting::DriftDoubt;
 use crate::caveat::sets::SetDoubt;
 use crate::drift::linear::Observation;
 use crate::meaning::strengths::WaveStrengths;
@@ -71,8 +72,17 @@ pub(crate) fn analyse_set(
         let shared = common(&used, reference);
         let alone = kept.len() == 1;
         uncorrected = without_drift(&all, &scans, alone, &shared, &pitch, settings, strengths);
+        let unknown = solved.as_ref().and_then(|solved| unknown(&solved.lattice));
+        if let Some(share) = unknown {
+            let reason = format!(
+                "the scans tell the drift so poorly that it leaves {:.0} % of a moiré vector open",
+                100.0 * share
+            );
+            caveats.push(Caveat::new(DriftDoubt::Undetermined { reason }, name));
+        }
         mean = solved
             .as_ref()
+            .filter(|_| unknown.is_none())
             .and_then(|solved| at_drift(solved, &scans, &shared, &pitch, settings, strengths));
     }
     let set = SetAnalysis {

@@ -1,5 +1,6 @@
 //! The drift of a set as a constant velocity: given, published, or the linear solution.
 
+use heterostrain::lattice::Lattice;
 use nalgebra::Matrix2;
 
 use crate::campaign::analysis::{Drift, DriftFit};
@@ -19,6 +20,8 @@ use crate::spectrum::method::Method;
 
 /// A drift outruns the scan if it does so beyond this many standard errors.
 const OUTRUN_SIGMAS: f64 = 2.0;
+/// A lattice whose vectors are not known to this share of themselves has no twist: what is linear in the errors is not any more.
+const KNOWN_TO: f64 = 0.2;
 /// nm/min → nm/s.
 const PER_MINUTE: f64 = 1.0 / 60.0;
 
@@ -108,6 +111,17 @@ pub(crate) fn outruns(drift: &Drift, all: &[Observation]) -> Option<f64> {
     all.iter().filter_map(beyond).max_by(f64::total_cmp)
 }
 
+/// The share of a moiré vector that its error is, where a corrected lattice is not known to better than [`KNOWN_TO`].
+pub(crate) fn unknown(lattice: &Lattice) -> Option<f64> {
+    let of_vector = |i: usize| {
+        let covariance = lattice.covariance.fixed_view::<2, 2>(2 * i, 2 * i);
+        let largest = covariance.into_owned().symmetric_eigenvalues().max();
+        largest.max(0.0).sqrt() / lattice.basis.column(i).norm()
+    };
+    let share = of_vector(0).max(of_vector(1));
+    (share > KNOWN_TO).then_some(share)
+}
+
 fn given_drift(
     name: &str,
     all: &[Observation],
@@ -144,7 +158,6 @@ fn given_drift(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use heterostrain::Lattice;
     use nalgebra::{Matrix4, Vector2};
 
     /// Up and down at 1 nm/s: a drift along the slow axis outruns the tip, one along the fast axis does not, nor one that is hardly known.
@@ -173,5 +186,17 @@ mod tests {
         assert_eq!(share([0.0, 0.9], 0.01, false), None);
         assert_eq!(share([0.0, 1.5], 0.4, false), None);
         assert_eq!(share([0.0, 1.5], 0.1, true), None);
+    }
+
+    /// A vector of 10 nm along x, its error of 2.2 nm along y: 22 % of itself are open.
+    #[test]
+    fn a_vector_that_is_hardly_known_is_told() {
+        let known = |sigma: f64| {
+            let mut covariance = Matrix4::zeros();
+            covariance[(1, 1)] = sigma * sigma;
+            unknown(&Lattice::new(Matrix2::identity() * 10.0, covariance))
+        };
+        assert_eq!(known(1.9), None);
+        assert!((known(2.2).unwrap() - 0.22).abs() < 1e-12);
     }
 }

@@ -9,6 +9,8 @@
 //! much that is. One Gauss–Newton step from the fit gives each harmonic its own wave vector, with
 //! background and amplitudes free.
 
+use std::f64::consts::PI;
+
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
@@ -24,6 +26,10 @@ const STRONG: f64 = 5.0;
 /// quarter.
 const NOISE_KNOWN_TO: f64 = 1.25;
 
+/// Waves that miss the points of a lattice by more than this, cycles per frame, where noise does not explain it, are not its harmonics. Of a lattice
+/// that bends they miss them by 0.04 at most; stripes beside a lattice that were taken for one of twice its size by 0.3.
+const APART: f64 = 0.1;
+
 /// How well the harmonics agree on one lattice.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
@@ -33,6 +39,9 @@ pub struct Closure {
     pub chi_squared: f64,
     /// Its degrees of freedom: two for each strong harmonic, less four.
     pub degrees_of_freedom: usize,
+    /// How far their wave vectors are from the points of the lattice, cycles per frame: root mean square, weighted with their power.
+    #[serde(with = "exact")]
+    pub apart: f64,
 }
 
 impl Closure {
@@ -40,6 +49,11 @@ impl Closure {
     pub fn enlargement(&self) -> f64 {
         let (chi2, freedom) = (self.chi_squared, self.degrees_of_freedom);
         enlargement_by_estimated_noise(chi2, freedom, NOISE_KNOWN_TO)
+    }
+
+    /// Whether the waves are no harmonics of one lattice, however close to its points they lie.
+    pub(crate) fn is_no_lattice(&self) -> bool {
+        self.enlargement() > 1.0 && self.apart > APART
     }
 }
 
@@ -81,7 +95,16 @@ pub(crate) fn closure(
     let normal = common.transpose() * &weight * &common;
     let shared = solve::solve(&normal, &(common.transpose() * &weight * &own))?;
     let rest = own - common * shared;
+    let (mut missed, mut power) = (0.0, 0.0);
+    for (row, &i) in strong.iter().enumerate() {
+        let [alpha, beta] = model.waves[i];
+        let weight = alpha * alpha + beta * beta;
+        missed += weight * rest.rows(2 * row, 2).norm_squared();
+        power += weight;
+    }
     Some(Closure {
+        // The frame is from −1 to 1.
+        apart: (missed / power).sqrt() / PI,
         chi_squared: rest.dot(&(weight * &rest)),
         degrees_of_freedom: count - 4,
     })

@@ -114,8 +114,8 @@ impl ResidualNoise {
         let seen = |index: Vector2<f64>| {
             let k = cycles * index;
             let centre = k.map(|c| c.round() as i64);
-            let slow = k.norm() < SLOW || (self.free_lines && centre.x.abs() < BESIDE);
-            if slow {
+            // The offsets of lines hide a wave along the slow axis, and levelling them takes it off.
+            if k.norm() < SLOW || centre.x.abs() < BESIDE {
                 return None;
             }
             let ground = self.as_long(k, &cycles)?;
