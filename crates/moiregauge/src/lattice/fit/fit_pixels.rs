@@ -397,6 +397,7 @@ impl<'a> Fit<'a> {
         ];
         let off = self.frame.middle();
         let carry = carry(off);
+        let offsets = self.free_lines || self.line_sigma.is_some();
         let fit = LatticeFit {
             wave_vectors,
             centre: Vector2::new(columns - 1.0, rows - 1.0) / 2.0,
@@ -408,10 +409,9 @@ impl<'a> Fit<'a> {
             lines_left_out: self.frame.image.rows - self.frame.lines(),
             clipped,
             foreign_wave,
-            hidden: noise.residual.hidden(&self.model),
+            hidden: noise.residual.hidden(&self.model, offsets),
             residual: [0, 1, 2].map(|i| {
                 let index = self.model.basis.indices[i];
-                let offsets = self.free_lines || self.line_sigma.is_some();
                 let p = frame::wave(&self.model.pair, index);
                 noise.residual.samples(p, offsets)
             }),

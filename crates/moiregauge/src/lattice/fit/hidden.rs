@@ -108,14 +108,15 @@ impl Hidden {
 }
 
 impl ResidualNoise {
-    /// Power where the first shell would be, if the lattice is the second shell of another.
-    pub(crate) fn hidden(&self, model: &Model) -> Hidden {
+    /// Power where the first shell would be, if the lattice is the second shell of another; `offsets`: lines have some.
+    pub(crate) fn hidden(&self, model: &Model, offsets: bool) -> Hidden {
         let cycles = model.pair / PI;
         let seen = |index: Vector2<f64>| {
             let k = cycles * index;
             let centre = k.map(|c| c.round() as i64);
             // The offsets of lines hide a wave along the slow axis, and levelling them takes it off.
-            if k.norm() < SLOW || centre.x.abs() < BESIDE {
+            let slow = offsets && centre.x.abs() < BESIDE;
+            if slow || k.norm() < SLOW {
                 return None;
             }
             let ground = self.as_long(k, &cycles)?;
