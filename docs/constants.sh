@@ -96,6 +96,10 @@ lattice/ground ROUNDS step,bump half double
 lattice/ground SMALLEST step,bump half double
 frame/median_ground BINS step,bump half double
 set/drift OUTRUN_SIGMAS step half double
+set/drift KNOWN_TO grains half double
+campaign/shells OUTVOTED second half double
+campaign/grains CONTRADICTED grains half double
+campaign/grains BETTER_KNOWN grains half double
 lattice/measure ATOMS hole,+stripes half double
 lattice/measure TOWERS hole,+stripes half double
 lattice/measure TORN hole,+stripes half double
@@ -103,6 +107,7 @@ fit/beside STRONG moirés,+stripes half double
 fit/beside LEFT moirés,+stripes half double
 fit/beside NEAR moirés,+stripes half double
 fit/beside OPPOSITE moirés,+stripes half double
+fit/closure APART second,step,stripes half double
 fit/closure STRONG few,noisy,contrast half double
 fit/closure NOISE_KNOWN_TO few,noisy,contrast root double
 fit/leverage ACROSS few,noisy,contrast half double

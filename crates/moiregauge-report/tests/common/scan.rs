@@ -121,6 +121,7 @@ pub(super) fn scan(
         signal_to_noise: 11.0,
         patch: None,
         change: None,
+        on_ground: false,
     };
     ScanAnalysis {
         file: format!("Messung 3 ü/tbg µ-scan_{}.{:03}", set + 1, index + 1),

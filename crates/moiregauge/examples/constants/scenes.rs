@@ -104,35 +104,42 @@ pub(crate) fn sets() -> Vec<Scene> {
 /// Samples that are covered in part, change, have grains, bumps, stripes, a weak first shell, or no moiré: with the seed of each.
 pub(crate) fn samples(wanted: impl Fn(&str) -> bool) -> Vec<Scene> {
     let classes = [
-        ("edge", 1),
-        ("hole:count=8", 2),
-        ("island", 3),
-        ("grains", 4),
-        ("grains", 5),
-        ("twist-wave", 6),
-        ("second-shell", 13),
-        ("bump", 1),
-        ("bump", 4),
-        ("hole:count=8", 78),
-        ("clean+stripes", 1),
-        ("clean+stripes", 4),
-        ("clean+stripes:amplitude=5", 2),
-        ("clean+stripes:amplitude=5", 4),
-        ("second-shell", 2),
-        ("second-shell:first=0.02", 1),
-        ("second-shell:first=0.02", 3),
-        ("step", 1),
-        ("step", 4),
-        ("bare+terrain", 1),
-        ("bare+terrain", 2),
-        ("bare+terrain", 3),
+        ("edge", 1, 160),
+        ("hole:count=8", 2, 160),
+        ("island", 3, 160),
+        ("grains", 4, 160),
+        ("grains", 5, 160),
+        ("twist-wave", 6, 160),
+        ("second-shell", 13, 160),
+        ("bump", 1, 160),
+        ("bump", 4, 160),
+        ("hole:count=8", 78, 160),
+        ("clean+stripes", 1, 160),
+        ("clean+stripes", 4, 160),
+        ("clean+stripes:amplitude=5", 2, 160),
+        ("clean+stripes:amplitude=5", 4, 160),
+        ("second-shell", 2, 160),
+        ("second-shell:first=0.02", 1, 160),
+        ("second-shell:first=0.02", 3, 160),
+        ("step", 1, 160),
+        ("step", 4, 160),
+        ("bare+terrain", 1, 160),
+        ("bare+terrain", 2, 160),
+        ("bare+terrain", 3, 160),
+        // A line that knows nothing of its first shell, and a wave of one along the slow axis; stripes that pass for waves of a coarse lattice; a
+        // grain that is two lattices, and one that a single line shows.
+        ("second-shell", 33, 192),
+        ("second-shell", 242, 192),
+        ("stripes", 45, 192),
+        ("grains", 55, 192),
+        ("grains", 42, 192),
     ];
     // They take longer to make than all others together.
-    let one = |(class, seed): (&str, u64)| {
+    let one = |(class, seed, side): (&str, u64, usize)| {
         let name = format!("sample: {class} {seed}");
         let frames = || {
             simulation(|s| {
-                s.raster.pixels = [160, 160];
+                s.raster.pixels = [side, side];
                 s.features = SampleFeature::parse(class).expect("a class");
                 vary(s, seed);
             })

@@ -318,6 +318,8 @@ pub struct LineAnalysis {
     pub patch: Option<Patch>,
     /// How the lattice changes across that part; `None` where it is the same everywhere, as far as can be seen.
     pub change: Option<Change>,
+    /// Whether ground was taken off before it was measured.
+    pub on_ground: bool,
 }
 
 /// The orientation of a layer by its atomic lattice.

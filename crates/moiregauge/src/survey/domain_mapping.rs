@@ -25,13 +25,13 @@ pub fn domains_of_scan(
 ) -> Vec<DomainMap> {
     let channels = channels(scan, settings).unwrap_or_default();
     let of_channel = |channel: &spmfile::Channel| {
-        let (place, pixels) = place_of(scan, channel, analysed, settings)?;
+        let (place, found) = place_of(scan, channel, analysed, settings)?;
         let pitch = pitch(&place.geometry);
         let mut placed = place.still(analysed.drift).unwrap_or(place.geometry);
         placed.origin -= drifted(analysed, origin);
         domains_of(
             &image_of(channel),
-            &pixels,
+            &found.pixels.basis,
             pitch,
             &placed,
             settings,

@@ -6,8 +6,9 @@ use heterostrain::lattice::reciprocal;
 use nalgebra::{Matrix2, Vector2};
 use spmfile::{Channel, FrameDirection, LineDirection, Scan};
 
-use crate::campaign::analysis::ScanAnalysis;
+use crate::campaign::analysis::{LineAnalysis, ScanAnalysis};
 use crate::frame::geometry::Geometry;
+use crate::lattice::ground::even_image;
 use crate::map::local::local_lattices;
 use crate::map::sample::LatticeMap;
 use crate::scan::channel::{channels, flat_image_of, image_of};
@@ -119,11 +120,11 @@ fn map_line(
     method: MapMethod,
     resolution: &Resolution,
 ) -> Result<LineMap, MapError> {
-    let (place, pixels) = place_of(scan, channel, analysed, settings).ok_or(MapError::NoImage)?;
+    let (place, found) = place_of(scan, channel, analysed, settings).ok_or(MapError::NoImage)?;
     let still = place.still(analysed.drift);
     let geometry = place.geometry;
     let reference = Reference {
-        pair: reciprocal(&pixels).ok_or(MapError::NoImage)?,
+        pair: reciprocal(&found.pixels.basis).ok_or(MapError::NoImage)?,
         pitch: pitch(&geometry),
     };
     let placed = still.as_ref().unwrap_or(&geometry);
@@ -135,7 +136,12 @@ fn map_line(
     resolution.fits(geometry.extent(), widths)?;
     let (map, harmonics, noise_measured, margin) = match method {
         MapMethod::Demodulation => {
-            let image = flat_image_of(channel, settings.background);
+            let mut image = flat_image_of(channel, settings.background);
+            if found.on_ground {
+                let (pair, background) = (&reference.pair, settings.background);
+                let even = even_image(&image, pair, &geometry, background);
+                image = even.unwrap_or(image);
+            }
             let waves = local_lattices(&image, &reference, resolution).ok_or(MapError::TooSmall)?;
             let map = LatticeMap::new(&waves, placed).ok_or(MapError::NoImage)?;
             (map, waves.harmonics, waves.noise_measured, waves.margin)
@@ -163,17 +169,17 @@ fn map_line(
     })
 }
 
-/// The place of a channel and the lattice of its whole image, pixels; `None` for one that was not analysed or has no size.
-pub(crate) fn place_of(
+/// The place of a channel and what was found in its whole image; `None` for one that was not analysed or has no size.
+pub(crate) fn place_of<'a>(
     scan: &Scan,
     channel: &Channel,
-    analysed: &ScanAnalysis,
+    analysed: &'a ScanAnalysis,
     settings: &Settings,
-) -> Option<(Place, Matrix2<f64>)> {
+) -> Option<(Place, &'a LineAnalysis)> {
     // Doubts about the sensors are in the analysis already.
     let place = Place::of(&analysed.file, scan, channel, settings, &mut Vec::new())?;
     let found = analysed.lines.iter().find(|l| l.line == place.line)?;
-    Some((place, found.pixels.basis))
+    Some((place, found))
 }
 
 pub(crate) fn pitch(geometry: &Geometry) -> [f64; 2] {

@@ -124,6 +124,7 @@ fn line_analysis(
         signal_to_noise: line.lattice.signal_to_noise,
         patch: line.lattice.patch.clone(),
         change: line.lattice.change,
+        on_ground: line.lattice.ground.is_some(),
     }
 }
 
