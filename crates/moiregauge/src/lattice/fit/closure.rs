@@ -26,9 +26,10 @@ const STRONG: f64 = 5.0;
 /// quarter.
 const NOISE_KNOWN_TO: f64 = 1.25;
 
-/// Waves that miss the points of a lattice by more than this, cycles per frame, where noise does not explain it, are not its harmonics. Of a lattice
-/// that bends they miss them by 0.04 at most; stripes beside a lattice that were taken for one of twice its size by 0.3.
-const APART: f64 = 0.1;
+/// Waves that miss the points of a lattice by more than this, cycles per frame, where noise does not explain it, are not its harmonics. Of simulated
+/// lattices that bend they miss them by 0.04 at most, of atoms of graphite that were recorded with creep by 0.11; stripes beside a lattice that were
+/// taken for one of twice its size by 0.3.
+const APART: f64 = 0.2;
 
 /// How well the harmonics agree on one lattice.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
