@@ -7,7 +7,7 @@ use moiregauge::frame::Image;
 use moiregauge::lattice::{MeasuredLattice, measure};
 use moiregauge::settings::Lines;
 use moiregauge::simulate::{SampleFeature, Simulation, Simulator, vary};
-use moiregauge::spectrum::{LatticeError, Method};
+use moiregauge::spectrum::Method;
 use moiregauge::{Settings, analyse, measure_scan};
 use nalgebra::{Matrix2, Vector2};
 
@@ -167,7 +167,7 @@ fn harmonics_of_one_lattice_agree() {
 
 /// Three waves that do not add up to zero by 0.25 cycles over the frame, each known to 0.015: no lattice is right for
 /// all of them, and the errors are enlarged to say so. The lattice of the first two, which are right, is
-/// then within them. By 0.7 cycles they are no harmonics of one lattice.
+/// then within them.
 #[test]
 fn harmonics_that_make_no_lattice_enlarge_the_errors() {
     for seed in 0..8 {
@@ -182,29 +182,18 @@ fn harmonics_that_make_no_lattice_enlarge_the_errors() {
         let closure = whole.fit.unwrap().closure.unwrap();
         assert_eq!(closure.enlargement(), 1.0, "seed {seed}: {closure:?}");
         assert!(closure.apart < 0.03, "seed {seed}: {closure:?}");
-        let mut moved = |cycles: f64| {
-            let change = cycles * std::f64::consts::TAU / 160.0;
-            scene.waves[2].q.x += change;
-            scene.waves[2].phase -= 79.5 * change;
-            scene.clone()
-        };
-        let apart = moved(0.25);
-        let measured = fit(&apart.image(), &apart);
+        let change = 0.25 * std::f64::consts::TAU / 160.0;
+        scene.waves[2].q.x += change;
+        scene.waves[2].phase -= 79.5 * change;
+        let measured = fit(&scene.image(), &scene);
         let closure = measured.fit.as_ref().unwrap().closure.unwrap();
         assert!(closure.enlargement() > 5.0, "seed {seed}: {closure:?}");
         // Three equal waves share what they miss.
         let missed = closure.apart - 0.25 / 3.0;
         assert!(missed.abs() < 0.015, "seed {seed}: {closure:?}");
-        let chi_squared = chi_squared(&apart, &measured);
+        let chi_squared = chi_squared(&scene, &measured);
         // Four degrees of freedom: once in ten thousand, and χ² of the closure is uncertain itself.
         assert!(chi_squared < 24.0, "seed {seed}: {chi_squared}");
-        let apart = moved(0.45);
-        let (image, geometry) = (apart.image(), apart.geometry());
-        let refused = measure(&image, &geometry, Background::Plane, Method::Lattice);
-        let Err(LatticeError::NoHarmonics { cycles }) = refused else {
-            panic!("seed {seed}: a lattice");
-        };
-        assert!((cycles - 0.7 / 3.0).abs() < 0.02, "seed {seed}: {cycles}");
     }
 }
 
