@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # What each constant that decides a result does when it is half and twice as large: the measurements of docs/constants.md.
 #
-#   docs/constants.sh [WORK]      half an hour of a processor; a line a measurement; goes on where it stopped
+#   docs/constants.sh [WORK]      some hours of a processor; a line a measurement; goes on where it stopped
 #
 # WORK is for one state of the sources: another one needs another folder.
 #
