@@ -1,5 +1,7 @@
 //! Grains of one frame drift together: sets of the same scans whose drifts contradict each other do not all show a lattice.
 
+use std::collections::{BTreeMap, BTreeSet};
+
 use crate::campaign::analysis::{Drift, SetAnalysis};
 use crate::caveat::Caveat;
 use crate::caveat::sets::SetDoubt;
@@ -15,20 +17,17 @@ const PER_MINUTE: f64 = 60.0;
 /// Takes the twist and strain from grains whose drift contradicts that of another grain of the same scans.
 pub(crate) fn agree_on_drift(sets: &mut [SetAnalysis], caveats: &mut Vec<Caveat>) {
     let mut contradicted = vec![None; sets.len()];
-    for (i, one) in sets.iter().enumerate() {
-        for (j, other) in sets.iter().enumerate().skip(i + 1) {
-            let (Some(a), Some(b)) = (&one.drift, &other.drift) else {
-                continue;
-            };
-            let Some(apart) = contradiction(a, b).filter(|_| share_a_scan(one, other)) else {
-                continue;
-            };
-            let [a, b] = [a, b].map(|drift| drift.covariance.trace());
-            if a > b / BETTER_KNOWN {
-                contradicted[i] = Some((apart, other.name.clone()));
-            }
-            if b > a / BETTER_KNOWN {
-                contradicted[j] = Some((apart, one.name.clone()));
+    for [i, j] in sharing_a_scan(sets) {
+        let (Some(a), Some(b)) = (&sets[i].drift, &sets[j].drift) else {
+            continue;
+        };
+        let Some(apart) = contradiction(a, b) else {
+            continue;
+        };
+        let doubted = doubted([a, b].map(|drift| drift.covariance.trace()));
+        for (doubted, one, other) in [(doubted[0], i, j), (doubted[1], j, i)] {
+            if doubted {
+                contradicted[one] = Some((apart, sets[other].name.clone()));
             }
         }
     }
@@ -53,9 +52,29 @@ fn contradiction(one: &Drift, other: &Drift) -> Option<f64> {
     (chance < CONTRADICTED).then(|| PER_MINUTE * apart.norm())
 }
 
-fn share_a_scan(one: &SetAnalysis, other: &SetAnalysis) -> bool {
-    let of_other = |file: &String| other.scans.iter().any(|scan| scan.file == *file);
-    one.scans.iter().any(|scan| of_other(&scan.file))
+/// Which of two drifts that contradict each other, with these variances, are not believed.
+fn doubted([a, b]: [f64; 2]) -> [bool; 2] {
+    [a * BETTER_KNOWN > b, b * BETTER_KNOWN > a]
+}
+
+/// The pairs of sets with a scan in common. A campaign has thousands of sets, and few of them are grains.
+fn sharing_a_scan(sets: &[SetAnalysis]) -> BTreeSet<[usize; 2]> {
+    let mut of_file: BTreeMap<&str, BTreeSet<usize>> = BTreeMap::new();
+    for (i, set) in sets.iter().enumerate() {
+        for scan in &set.scans {
+            of_file.entry(&scan.file).or_default().insert(i);
+        }
+    }
+    let pairs = |sets: BTreeSet<usize>| {
+        let firsts = sets.clone().into_iter();
+        firsts.flat_map(move |i| {
+            sets.clone()
+                .into_iter()
+                .filter(move |j| i < *j)
+                .map(move |j| [i, j])
+        })
+    };
+    of_file.into_values().flat_map(pairs).collect()
 }
 
 #[cfg(test)]
@@ -86,5 +105,13 @@ mod tests {
             ..drift(100.0, 1.0)
         };
         assert_eq!(contradiction(&given, &drift(0.0, 1.0)), None);
+    }
+
+    /// Three times the error is nine times the variance: the other is believed; what is known alike is both doubted.
+    #[test]
+    fn the_better_known_drift_is_believed() {
+        assert_eq!(doubted([1.0, 10.0]), [false, true]);
+        assert_eq!(doubted([10.0, 1.0]), [true, false]);
+        assert_eq!(doubted([1.0, 8.0]), [true, true]);
     }
 }

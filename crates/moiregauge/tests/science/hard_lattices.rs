@@ -165,7 +165,7 @@ fn harmonics_of_one_lattice_agree() {
     assert!((0.8..1.25).contains(&reduced), "{reduced} for {freedom}");
 }
 
-/// Three waves that do not add up to zero by 0.25 cycles over the frame, each known to 0.015: no lattice is right for
+/// Three waves that do not add up to zero by 0.4 cycles over the frame, each known to 0.03: no lattice is right for
 /// all of them, and the errors are enlarged to say so. The lattice of the first two, which are right, is
 /// then within them.
 #[test]
@@ -173,24 +173,23 @@ fn harmonics_that_make_no_lattice_enlarge_the_errors() {
     for seed in 0..8 {
         let angle = 0.618 * seed as f64;
         let mut scene = Scene::new([160, 160], 10.0, angle, Contrast::Cosines, seed);
-        // Amplitude over noise in one resolution cell: 160/(2 · 3) = 27. Phase zero in the middle.
-        scene.white = 3.0;
+        // Amplitude over noise in one resolution cell: 160/(2 · 6) = 13. Phase zero in the middle.
+        scene.white = 6.0;
         for wave in &mut scene.waves {
             wave.phase = -wave.q.dot(&Vector2::repeat(79.5));
         }
         let whole = fit(&scene.image(), &scene);
         let closure = whole.fit.unwrap().closure.unwrap();
         assert_eq!(closure.enlargement(), 1.0, "seed {seed}: {closure:?}");
-        assert!(closure.apart < 0.03, "seed {seed}: {closure:?}");
-        let change = 0.25 * std::f64::consts::TAU / 160.0;
+        let change = 0.4 * std::f64::consts::TAU / 160.0;
         scene.waves[2].q.x += change;
         scene.waves[2].phase -= 79.5 * change;
         let measured = fit(&scene.image(), &scene);
         let closure = measured.fit.as_ref().unwrap().closure.unwrap();
         assert!(closure.enlargement() > 5.0, "seed {seed}: {closure:?}");
         // Three equal waves share what they miss.
-        let missed = closure.apart - 0.25 / 3.0;
-        assert!(missed.abs() < 0.015, "seed {seed}: {closure:?}");
+        let missed = closure.apart - 0.4 / 3.0;
+        assert!(missed.abs() < 0.02, "seed {seed}: {closure:?}");
         let chi_squared = chi_squared(&scene, &measured);
         // Four degrees of freedom: once in ten thousand, and χ² of the closure is uncertain itself.
         assert!(chi_squared < 24.0, "seed {seed}: {chi_squared}");

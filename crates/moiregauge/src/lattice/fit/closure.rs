@@ -140,3 +140,21 @@ fn each_its_own(
     }
     map
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Waves are no harmonics where they miss the points by much and noise does not explain it.
+    #[test]
+    fn waves_are_no_harmonics_if_far_off_and_not_by_chance() {
+        let closure = |chi_squared: f64, apart: f64| Closure {
+            chi_squared,
+            degrees_of_freedom: 8,
+            apart,
+        };
+        assert!(closure(1800.0, 0.3).is_no_lattice());
+        assert!(!closure(8.0, 0.3).is_no_lattice());
+        assert!(!closure(1800.0, 0.11).is_no_lattice());
+    }
+}
