@@ -3,10 +3,10 @@
 //! `a(r) = Σ g(n − r) I(n) e^{−iq·n} / Σ g(n − r)` over the pixels n that are there. Sums over the pixels of a cell
 //! come first, then the window on the cells, which are few.
 
-use std::ops::Range;
+use std::ops::{AddAssign, Div, Mul};
 
 use heterostrain::lattice::reciprocal;
-use nalgebra::{Matrix2, Vector2};
+use nalgebra::{Matrix2, SVector, Vector2};
 use rayon::prelude::*;
 use rustfft::num_complex::Complex64;
 
@@ -20,6 +20,9 @@ const REACH: f64 = 3.0;
 
 /// Cells that a thread takes at once, at least: fewer are not worth handing out.
 const FEWEST: usize = 4096;
+
+/// Lines of cells in a band.
+const BAND: usize = 128;
 
 /// The cells of a frame.
 #[derive(Clone, Debug, PartialEq)]
@@ -180,17 +183,12 @@ impl Cells {
     }
 
     /// Sums of cells under the window at some of them.
-    pub(crate) fn summed_at(
-        &self,
-        sums: &[Complex64],
-        window: &Window,
-        at: &[usize],
-    ) -> Vec<Complex64> {
+    pub(crate) fn summed_at<T: Summed>(&self, sums: &[T], window: &Window, at: &[usize]) -> Vec<T> {
         let [across, up] = self.size;
         let mut columns: Vec<usize> = at.iter().map(|i| i % across).collect();
         columns.sort_unstable();
         columns.dedup();
-        let mut lines = vec![Complex64::default(); up * columns.len()];
+        let mut lines = vec![T::default(); up * columns.len()];
         let all = sums
             .par_chunks_exact(across)
             .zip(lines.par_chunks_exact_mut(columns.len().max(1)))
@@ -246,27 +244,77 @@ impl Cells {
         envelope
     }
 
-    /// The same at some cells.
-    pub(crate) fn envelope_at(
+    /// Those of nine waves, band by band of lines; `take` what is kept of a band.
+    pub(crate) fn nine_envelopes<R: Send>(
         &self,
-        sums: &[Complex64],
+        sums: [&[Complex64]; 9],
+        window: &Window,
+        take: impl Fn(&[Nine]) -> R + Sync,
+    ) -> Vec<R> {
+        let [across, up] = self.size;
+        let reach = window.taps[1].len() / 2;
+        let bands = (0..up.div_ceil(BAND)).into_par_iter().map(|band| {
+            let (first, end) = (band * BAND, ((band + 1) * BAND).min(up));
+            // Along the lines of all windows of the band, then across them.
+            let from = first.saturating_sub(reach);
+            let lines: Vec<Nine> = (from..(end + reach).min(up))
+                .flat_map(|y| {
+                    let line = together(sums.map(|sums| &sums[y * across..][..across]));
+                    let smoothed = move |x| under(&window.taps[0], x, across, |i| line[i]);
+                    (0..across).map(smoothed)
+                })
+                .collect();
+            let all = (first * across..end * across).map(|i| match window.weight[i] {
+                weight if weight > 0.0 => {
+                    let line = |y: usize| lines[(y - from) * across + i % across];
+                    under(&window.taps[1], i / across, up, line) / weight
+                }
+                _ => Nine::zeros(),
+            });
+            take(&all.collect::<Vec<Nine>>())
+        });
+        bands.collect()
+    }
+
+    /// The same at some cells.
+    pub(crate) fn envelope_at<T: Summed + Div<f64, Output = T>>(
+        &self,
+        sums: &[T],
         window: &Window,
         at: &[usize],
-    ) -> Vec<Complex64> {
+    ) -> Vec<T> {
         let summed = self.summed_at(sums, window, at).into_iter().zip(at);
         summed
             .map(|(sum, &i)| match window.weight[i] {
                 weight if weight > 0.0 => sum / weight,
-                _ => Complex64::default(),
+                _ => T::default(),
             })
             .collect()
     }
 
+    /// Sums of values under the window at each cell, times powers of their distances from it along columns and rows, cells; `squared`: under the square of
+    /// the window.
+    pub(crate) fn moments<T: Summed>(
+        &self,
+        values: &[T],
+        window: &Window,
+        powers: [usize; 2],
+        squared: bool,
+    ) -> Vec<T> {
+        let taps = [0, 1].map(|axis| {
+            let taps = &window.taps[axis];
+            let reach = (taps.len() / 2) as f64;
+            let all = taps.iter().enumerate().map(|(i, tap)| {
+                let tap = if squared { tap * tap } else { *tap };
+                tap * (i as f64 - reach).powi(powers[axis] as i32)
+            });
+            all.collect::<Vec<f64>>()
+        });
+        self.smoothed(values, &taps)
+    }
+
     /// Convolution with the taps along columns, then along rows.
-    fn smoothed<T>(&self, values: &[T], taps: &[Vec<f64>; 2]) -> Vec<T>
-    where
-        T: Copy + Default + Send + Sync + std::ops::AddAssign + std::ops::Mul<f64, Output = T>,
-    {
+    fn smoothed<T: Summed>(&self, values: &[T], taps: &[Vec<f64>; 2]) -> Vec<T> {
         let [across, up] = self.size;
         let at_once = FEWEST.div_ceil(across);
         let mut lines = vec![T::default(); values.len()];
@@ -316,10 +364,7 @@ fn add_turned([re, im]: &mut [Vec<f64>; 2], line: &[f64], turn: Complex64) {
 }
 
 /// Adds values times a tap.
-fn add<T>(sums: &mut [T], values: &[T], tap: f64)
-where
-    T: Copy + std::ops::AddAssign + std::ops::Mul<f64, Output = T>,
-{
+fn add<T: Summed>(sums: &mut [T], values: &[T], tap: f64) {
     widest(
         #[inline(always)]
         || {
@@ -331,14 +376,43 @@ where
 }
 
 /// The sum under a window at one of `count` values in a line.
-fn under(taps: &[f64], at: usize, count: usize, value: impl Fn(usize) -> Complex64) -> Complex64 {
+fn under<T: Summed>(taps: &[f64], at: usize, count: usize, value: impl Fn(usize) -> T) -> T {
     let reach = taps.len() / 2;
-    let mut sum = Complex64::default();
-    for other in at.saturating_sub(reach)..=(at + reach).min(count - 1) {
-        sum += value(other) * taps[other + reach - at];
-    }
-    sum
+    let under = at.saturating_sub(reach)..(at + reach + 1).min(count);
+    let taps = &taps[under.start + reach - at..];
+    widest(
+        #[inline(always)]
+        || {
+            let mut sum = T::default();
+            for (other, tap) in under.zip(taps) {
+                sum += value(other) * *tap;
+            }
+            sum
+        },
+    )
 }
+
+/// Nine complex numbers.
+pub(crate) type Nine = SVector<f64, 18>;
+
+/// What is in nine lists, all of one place together.
+pub(crate) fn together(lists: [&[Complex64]; 9]) -> Vec<Nine> {
+    let mut together = vec![Nine::zeros(); lists[0].len()];
+    for (n, list) in lists.into_iter().enumerate() {
+        for (all, value) in together.iter_mut().zip(list) {
+            (all[2 * n], all[2 * n + 1]) = (value.re, value.im);
+        }
+    }
+    together
+}
+
+/// What is summed under a window: numbers, or some of them together.
+pub(crate) trait Summed:
+    Copy + Default + Send + Sync + AddAssign + Mul<f64, Output = Self>
+{
+}
+
+impl<T: Copy + Default + Send + Sync + AddAssign + Mul<f64, Output = T>> Summed for T {}
 
 /// A Gaussian window at all cells.
 pub(crate) struct Window {
@@ -349,43 +423,6 @@ pub(crate) struct Window {
     pub(crate) noise: Vec<f64>,
     /// `Σ g` over that of a window without missing pixels.
     pub(crate) support: Vec<f64>,
-}
-
-impl Window {
-    /// Columns and rows of the cells under the window at one of them, of so many.
-    pub(crate) fn under(&self, size: [usize; 2], at: usize) -> [Range<usize>; 2] {
-        let at = [at % size[0], at / size[0]];
-        [0, 1].map(|axis| {
-            let reach = self.taps[axis].len() / 2;
-            at[axis].saturating_sub(reach)..(at[axis] + reach + 1).min(size[axis])
-        })
-    }
-
-    /// The cells under the window at one of them, of so many columns and rows: each with its distance from it and its tap.
-    pub(crate) fn cells(
-        &self,
-        size: [usize; 2],
-        at: usize,
-    ) -> impl Iterator<Item = (usize, [f64; 2], f64)> + '_ {
-        let place = [at % size[0], at / size[0]];
-        let under = self.under(size, at);
-        let [along, up] = [0, 1].map(|axis| {
-            let at = place[axis];
-            let reach = self.taps[axis].len() / 2;
-            under[axis].clone().map(move |other| {
-                (
-                    other,
-                    other as f64 - at as f64,
-                    self.taps[axis][other + reach - at],
-                )
-            })
-        });
-        up.flat_map(move |(y, dy, v)| {
-            along
-                .clone()
-                .map(move |(x, dx, u)| (y * size[0] + x, [dx, dy], u * v))
-        })
-    }
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@ use heterostrain::lattice::shortest_pair;
 use nalgebra::{Matrix2, Vector2};
 
 use crate::coverage::patch::WHOLE;
-use crate::coverage::settle::{Settled, settle};
+use crate::coverage::settle::{Settled, settle_if};
 use crate::coverage::tiles;
 use crate::frame::geometry::Geometry;
 use crate::frame::image::Image;
@@ -43,13 +43,12 @@ pub(crate) fn patches(
                 continue;
             }
             tried.push(pair);
-            let Some(settled) = settle(flat, &pair, pitch(geometry)) else {
-                continue;
+            let is_new = |pair: &Matrix2<f64>| {
+                let known = |other: &Settled| same(size, &other.patch.pair, pair);
+                is_meant(pair) && !found.iter().any(known)
             };
-            let known = |other: &Settled| same(size, &other.patch.pair, &settled.patch.pair);
-            if is_meant(&settled.patch.pair) && !found.iter().any(known) {
-                found.push(settled);
-            }
+            let settled = settle_if(flat, &pair, pitch(geometry), &is_new);
+            found.extend(settled);
         }
         // What is plain to see everywhere is not looked for any more.
         let everywhere = |s: &Settled| s.patch.share > WHOLE && s.is_plain();

@@ -4,7 +4,7 @@ use nalgebra::{Matrix2, Vector2};
 use rayon::prelude::*;
 use rustfft::num_complex::Complex64;
 
-use crate::coverage::cells::{Cells, Window};
+use crate::coverage::cells::{Cells, Nine, Window, together};
 use crate::coverage::hollows::hollows;
 use crate::coverage::patch::Patch;
 use crate::frame::image::Image;
@@ -90,7 +90,50 @@ pub(crate) struct Waves {
     quiet: [[Vec<Complex64>; 2]; 3],
 }
 
+/// The sums of three waves and what is beside each.
+fn nine<'a>(
+    [a, b, c]: &'a [Vec<Complex64>; 3],
+    [beside_a, beside_b, beside_c]: &'a [[Vec<Complex64>; 2]; 3],
+) -> [&'a [Complex64]; 9] {
+    let ([d, e], [f, g], [h, i]) = (beside_a, beside_b, beside_c);
+    [a, b, c, d, e, f, g, h, i].map(Vec::as_slice)
+}
+
+/// What is kept of the envelopes of some lines: those of three waves, and the powers beside them.
+struct Band {
+    waves: [Vec<Complex64>; 3],
+    beside: [Vec<f64>; 6],
+}
+
+impl Band {
+    fn of(envelopes: &[Nine]) -> Self {
+        let of = |n: usize| envelopes.iter().map(move |all| part(all, n));
+        Self {
+            waves: [0, 1, 2].map(|n| of(n).collect()),
+            beside: [3, 4, 5, 6, 7, 8].map(|n| of(n).map(|value| value.norm_sqr()).collect()),
+        }
+    }
+}
+
+/// One list of all bands.
+fn joined<T: Copy>(bands: &[Band], list: impl Fn(&Band) -> &Vec<T>) -> Vec<T> {
+    bands
+        .iter()
+        .flat_map(|band| list(band).iter().copied())
+        .collect()
+}
+
+/// One of nine.
+fn part(all: &Nine, n: usize) -> Complex64 {
+    Complex64::new(all[2 * n], all[2 * n + 1])
+}
+
 impl Waves {
+    /// The sums, and those of what is beside: all of a cell together.
+    pub(crate) fn together(&self) -> Vec<Nine> {
+        together(nine(&self.sums, &self.quiet))
+    }
+
     /// The same for the image without a level of each cell.
     pub(crate) fn without(&self, level: &[Complex64]) -> [Vec<Complex64>; 3] {
         [0, 1, 2].map(|i| {
@@ -116,11 +159,11 @@ impl<'a> Frame<'a> {
         let mixed = |image: &Image, q: Vector2<f64>| self.cells.mixed(image, q);
         Waves {
             sums: three(pair).map(|q| mixed(self.image, q)),
+            quiet: hollows(pair).map(|places| places.map(|q| mixed(self.image, q))),
             ones: three(pair).map(|q| match &self.ones {
                 Some(ones) => mixed(ones, q),
                 None => (self.cells).mixed_ones([self.image.columns, self.image.rows], q),
             }),
-            quiet: hollows(pair).map(|places| places.map(|q| mixed(self.image, q))),
         }
     }
 
@@ -131,19 +174,21 @@ impl<'a> Frame<'a> {
 
     /// What a window of so many mean periods sees; `None` where noise makes it unfit.
     pub(crate) fn look(&self, waves: &Waves, window: &Window, width: f64) -> Option<Seen> {
-        let (cells, quiet_sums) = (self.cells, &waves.quiet);
+        let cells = self.cells;
         let sums = waves.without(&self.level(window));
-        let envelopes = sums.map(|sums| cells.envelope(&sums, window));
+        let bands = cells.nine_envelopes(nine(&sums, &waves.quiet), window, Band::of);
+        let envelopes = [0, 1, 2].map(|n| joined(&bands, |band| &band.waves[n]));
         let usable: Vec<usize> = (0..cells.len())
             .filter(|&i| window.support[i] > SUPPORT)
             .collect();
         if usable.is_empty() {
             return None;
         }
-        let at = |values: Vec<Complex64>| usable.iter().map(|&i| values[i]).collect::<Vec<_>>();
         let of_noise: Vec<f64> = usable.iter().map(|&i| window.noise[i]).collect();
-        let quiet = quiet_sums.as_flattened().par_iter();
-        let quiet = quiet.map(|sums| level(&at(cells.envelope(sums, window)), &of_noise));
+        let quiet = (0..6).into_par_iter().map(|n| {
+            let powers = joined(&bands, |band| &band.beside[n]);
+            level(usable.iter().map(|&i| powers[i]), &of_noise)
+        });
         let quiet: Vec<f64> = quiet.collect();
         let noise = [0, 2, 4].map(|i| f64::midpoint(quiet[i], quiet[i + 1]));
         let one = median(&mut of_noise.clone());
@@ -167,8 +212,8 @@ impl<'a> Frame<'a> {
 
     /// Whether a look may find anything: the same at cells a window apart, which is a fraction of the work where cells are many.
     /// Waves that noise proposes are refused by it.
-    pub(crate) fn shows(&self, waves: &Waves, window: &Window, width: f64) -> bool {
-        let (cells, quiet) = (self.cells, &waves.quiet);
+    pub(crate) fn shows(&self, together: &[Nine], window: &Window, width: f64) -> bool {
+        let cells = self.cells;
         let stride = [0, 1].map(|axis| {
             let cells = width * cells.period[axis] / cells.pixels[axis] as f64;
             (cells as usize).max(1)
@@ -185,16 +230,15 @@ impl<'a> Frame<'a> {
             return true;
         }
         let of_noise: Vec<f64> = usable.iter().map(|&i| window.noise[i]).collect();
-        let envelope = |sums: &[Complex64]| cells.envelope_at(sums, window, &usable);
+        let envelopes = cells.envelope_at(together, window, &usable);
+        let power = |n: usize| envelopes.iter().map(move |all| part(all, n).norm_sqr());
         let one = median(&mut of_noise.clone());
         let unit = [0, 1, 2].map(|i| {
-            let [a, b] = [0, 1].map(|k| level(&envelope(&quiet[i][k]), &of_noise));
+            let quiet = [3 + 2 * i, 4 + 2 * i];
+            let [a, b] = quiet.map(|n| level(power(n), &of_noise));
             f64::midpoint(a, b) * one
         });
-        let power =
-            |sums: &Vec<Complex64>| envelope(sums).iter().map(Complex64::norm_sqr).collect();
-        let powers = waves.sums.each_ref().map(power);
-        typical(&powers, unit, GLANCE * QUIET).is_some()
+        typical(&[0, 1, 2].map(|n| power(n).collect()), unit, GLANCE * QUIET).is_some()
     }
 }
 
@@ -211,10 +255,9 @@ pub(crate) fn ones(image: &Image) -> Option<Image> {
 }
 
 /// Noise power per pixel, as the median sees it: edges and steps, which are in few cells, do not count.
-fn level(envelope: &[Complex64], noise: &[f64]) -> f64 {
-    let powers = envelope.iter().zip(noise);
-    let mut powers: Vec<f64> = powers.map(|(e, noise)| e.norm_sqr() / noise).collect();
-    median(&mut powers) / std::f64::consts::LN_2
+fn level(powers: impl Iterator<Item = f64>, noise: &[f64]) -> f64 {
+    let powers = powers.zip(noise).map(|(power, noise)| power / noise);
+    median(&mut powers.collect::<Vec<f64>>()) / std::f64::consts::LN_2
 }
 
 /// Typical power of each wave where it is, and where that is, by the powers at some cells: first by the strong cells, then as the

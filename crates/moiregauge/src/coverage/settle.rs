@@ -54,6 +54,16 @@ pub(crate) fn settle(image: &Image, pair: &Matrix2<f64>, pitch: [f64; 2]) -> Opt
     settle_in_bins(image, 1, pair, pitch)
 }
 
+/// The same for a lattice that is `wanted` by where its waves settle, rad per pixel.
+pub(crate) fn settle_if(
+    image: &Image,
+    pair: &Matrix2<f64>,
+    pitch: [f64; 2],
+    wanted: &dyn Fn(&Matrix2<f64>) -> bool,
+) -> Option<Settled> {
+    settle_binned(image, 1, pair, pitch, wanted)
+}
+
 /// The same in an image that has been averaged over `bins` pixels along each axis.
 pub(crate) fn settle_in_bins(
     image: &Image,
@@ -61,14 +71,24 @@ pub(crate) fn settle_in_bins(
     pair: &Matrix2<f64>,
     pitch: [f64; 2],
 ) -> Option<Settled> {
+    settle_binned(image, bins, pair, pitch, &|_| true)
+}
+
+fn settle_binned(
+    image: &Image,
+    bins: usize,
+    pair: &Matrix2<f64>,
+    pitch: [f64; 2],
+    wanted: &dyn Fn(&Matrix2<f64>) -> bool,
+) -> Option<Settled> {
     let shortest = three(pair).map(|q| std::f64::consts::TAU / (q.amax() * bins as f64));
     let shortest = shortest.into_iter().fold(f64::INFINITY, f64::min);
     let more = ((shortest / BINS_PER_PERIOD) as usize).max(1);
     let bins = bins * more;
     let (pair, pitch) = (pair * bins as f64, pitch.map(|p| p * bins as f64));
     match more {
-        1 => settle_bins(image, &pair, pitch, bins),
-        _ => settle_bins(&image.binned(more), &pair, pitch, bins),
+        1 => settle_bins(image, &pair, pitch, bins, wanted),
+        _ => settle_bins(&image.binned(more), &pair, pitch, bins, wanted),
     }
 }
 
@@ -78,6 +98,7 @@ fn settle_bins(
     pair: &Matrix2<f64>,
     pitch: [f64; 2],
     bins: usize,
+    wanted: &dyn Fn(&Matrix2<f64>) -> bool,
 ) -> Option<Settled> {
     let cells = Cells::new(image, pair, pitch)?;
     if cells.size.iter().any(|n| *n < 4) {
@@ -90,9 +111,12 @@ fn settle_bins(
     let mut settled = None;
     for round in 0..ROUNDS {
         let waves = frame.waves(&pair);
-        let mut all = WIDTHS.into_iter().enumerate();
-        if round == 0 && !all.any(|(i, width)| frame.shows(&waves, windows.at(i), width)) {
-            return None;
+        if round == 0 {
+            let together = waves.together();
+            let mut all = WIDTHS.into_iter().enumerate();
+            if !all.any(|(i, width)| frame.shows(&together, windows.at(i), width)) {
+                return None;
+            }
         }
         let seen = (narrowest..WIDTHS.len())
             .find_map(|i| Some((i, frame.look(&waves, windows.at(i), WIDTHS[i])?)));
@@ -107,6 +131,9 @@ fn settle_bins(
         pair += step;
     }
     let (waves, mut seen, pair) = settled?;
+    if !wanted(&(pair / bins as f64)) {
+        return None;
+    }
     seen.inside = without_tails(&frame, &waves, windows.at(narrowest), &seen);
     let inner = patch(&cells, &seen.inside, &pair)?;
     Some(Settled {

@@ -4,8 +4,6 @@
 //! side seems to go on to it. A straight line through the envelope, by least squares under the window, says what is at the place itself.
 //! Its noise is larger, so that a cell is taken away only where it is plainly less than what makes a cell part of the lattice.
 
-use std::collections::HashMap;
-
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 use rustfft::num_complex::Complex64;
@@ -23,6 +21,10 @@ const PLAINLY: f64 = 2.0;
 /// Cells that a thread looks at together, at least.
 const AT_ONCE: usize = 1024;
 
+/// Powers of the distances along columns and rows that the sums of a straight line need, and those of its normal equations.
+const LINE: [[usize; 2]; 3] = [[0, 0], [1, 0], [0, 1]];
+const SQUARES: [[usize; 2]; 6] = [[0, 0], [1, 0], [0, 1], [2, 0], [1, 1], [0, 2]];
+
 /// Takes away the cells beside the sides of a frame whose own place carries no lattice.
 pub(crate) fn without_tails(
     frame: &Frame,
@@ -30,113 +32,49 @@ pub(crate) fn without_tails(
     window: &Window,
     seen: &Seen,
 ) -> Vec<bool> {
+    let cut_off = |n: usize| seen.inside[n] && window.support[n] <= CUT;
+    if !(0..seen.inside.len()).any(cut_off) {
+        return seen.inside.clone();
+    }
+    let cells = frame.cells;
+    let counts = cells.counts();
+    // Σ g n, Σ g n dx, …, and the same with g².
+    let normal = SQUARES.map(|powers| cells.moments(counts, window, powers, false));
+    let noise = SQUARES.map(|powers| cells.moments(counts, window, powers, true));
     let sums = waves.without(&frame.level(window));
+    let sums = sums.map(|sums| LINE.map(|powers| cells.moments(&sums, window, powers, false)));
     let asked = INSIDE * seen.typical.iter().sum::<f64>();
-    let stays = |lines: &mut Lines, n: usize| {
-        let Some(line) = lines.at(n) else {
+    let stays = |n: usize| {
+        // The value of a straight line at the cell itself is a weighted sum: `Σ g (first · (1, dx, dy)) S`.
+        let Some(inverse) = symmetric(&normal, n).try_inverse() else {
             return true;
         };
-        let found = line.values(&sums, n).into_iter().zip(seen.typical);
-        let found = found.map(|(value, typical)| value.norm() * typical.sqrt());
-        let noise = seen.noise.iter().zip(seen.typical);
-        let noise = noise.map(|(noise, typical)| noise * typical).sum::<f64>() * line.noise;
-        found.sum::<f64>() > asked - PLAINLY * (noise / 2.0).sqrt()
+        let first = inverse.row(0).transpose();
+        let found = sums.iter().zip(seen.typical).map(|(sums, typical)| {
+            let value = (0..3).fold(Complex64::ZERO, |value, i| value + sums[i][n] * first[i]);
+            value.norm() * typical.sqrt()
+        });
+        let of_waves = seen.noise.iter().zip(seen.typical);
+        let of_waves = of_waves
+            .map(|(noise, typical)| noise * typical)
+            .sum::<f64>();
+        let variance = of_waves * first.dot(&(symmetric(&noise, n) * first));
+        found.sum::<f64>() > asked - PLAINLY * (variance / 2.0).max(0.0).sqrt()
     };
-    let cells = seen.inside.par_iter().zip(&window.support).enumerate();
-    cells
-        .with_min_len(AT_ONCE)
-        .map_init(
-            || Lines::new(frame, window),
-            |lines, (n, (inside, support))| *inside && (*support > CUT || stays(lines, n)),
-        )
+    let all = (0..seen.inside.len()).into_par_iter();
+    all.with_min_len(AT_ONCE)
+        .map(|n| seen.inside[n] && (!cut_off(n) || stays(n)))
         .collect()
 }
 
-/// Straight lines at cells. Cells that see as much of the frame on all sides, and as many pixels in each cell there, have the same one.
-struct Lines<'a> {
-    frame: &'a Frame<'a>,
-    window: &'a Window,
-    /// The last one for each extent of the window, with the pixels of the cells under it.
-    known: HashMap<[usize; 4], (Vec<f64>, Option<Line>)>,
-}
-
-impl<'a> Lines<'a> {
-    fn new(frame: &'a Frame, window: &'a Window) -> Self {
-        let known = HashMap::new();
-        Self {
-            frame,
-            window,
-            known,
-        }
-    }
-
-    /// `None` where the cells under the window lie on a line.
-    fn at(&mut self, n: usize) -> Option<&Line> {
-        let cells = self.frame.cells;
-        let across = cells.size[0];
-        let [x, y] = self.window.under(cells.size, n);
-        let pixels = || y.clone().map(|y| &cells.counts()[y * across..][x.clone()]);
-        let extent = [
-            n % across - x.start,
-            x.end - n % across,
-            n / across - y.start,
-            y.end - n / across,
-        ];
-        let (before, line) = self.known.entry(extent).or_default();
-        let lines = before.chunks_exact(x.len());
-        if before.is_empty() || !lines.eq(pixels()) {
-            *before = pixels().flatten().copied().collect();
-            *line = Line::at(self.frame, self.window, n);
-        }
-        line.as_ref()
-    }
-}
-
-/// A straight line through the cells under the window at one of them: its value there is a weighted sum.
-struct Line {
-    /// Weights of cells, by how far behind that one they come.
-    weights: Vec<(isize, f64)>,
-    /// Variance that white noise of unit power per pixel gives the value.
-    noise: f64,
-}
-
-impl Line {
-    /// `None` where the cells under the window lie on a line.
-    fn at(frame: &Frame, window: &Window, n: usize) -> Option<Self> {
-        let counts = frame.cells.counts();
-        let under: Vec<(usize, f64, Vector3<f64>)> = window
-            .cells(frame.cells.size, n)
-            .filter(|(cell, ..)| counts[*cell] > 0.0)
-            .map(|(cell, [x, y], tap)| (cell, tap, Vector3::new(1.0, x, y)))
-            .collect();
-        let mut normal = Matrix3::zeros();
-        for (cell, tap, place) in &under {
-            normal += place * place.transpose() * (tap * counts[*cell]);
-        }
-        let first = normal.try_inverse()?.row(0).transpose();
-        let weights = under
-            .iter()
-            .map(|(cell, tap, place)| (*cell, tap * first.dot(place)));
-        let weights: Vec<(usize, f64)> = weights.collect();
-        let noise = weights.iter().map(|(cell, w)| w * w * counts[*cell]).sum();
-        let from_here = |(cell, w): (usize, f64)| (cell as isize - n as isize, w);
-        Some(Self {
-            weights: weights.into_iter().map(from_here).collect(),
-            noise,
-        })
-    }
-
-    /// Those of three waves.
-    fn values(&self, sums: &[Vec<Complex64>; 3], n: usize) -> [Complex64; 3] {
-        let mut values = [Complex64::default(); 3];
-        for (by, w) in &self.weights {
-            let cell = n.wrapping_add_signed(*by);
-            for (value, sums) in values.iter_mut().zip(sums) {
-                *value += sums[cell] * w;
-            }
-        }
-        values
-    }
+/// The matrix of six moments at a cell.
+fn symmetric(moments: &[Vec<f64>; 6], n: usize) -> Matrix3<f64> {
+    let [one, x, y, xx, xy, yy] = moments.each_ref().map(|moment| moment[n]);
+    Matrix3::from_columns(&[
+        Vector3::new(one, x, y),
+        Vector3::new(x, xx, xy),
+        Vector3::new(y, xy, yy),
+    ])
 }
 
 #[cfg(test)]

@@ -3,14 +3,19 @@
 //! A median keeps an edge where it is, which means and polynomials spread over their whole width. It treats every place alike, so that
 //! what is left of a perfect lattice is a lattice with the same waves, but for windows that the frame cuts off.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
 use crate::frame::image::Image;
 use crate::numbers::interrupt;
-use crate::numbers::median::median;
+use crate::numbers::moving_median::MovingMedian;
 
 /// Bins along a side of the window: an edge is known to half of one.
 const BINS: usize = 16;
+
+/// The rank of a value that is missing.
+const MISSING: u32 = u32::MAX;
 
 /// Pixels along a side of the bins of which the median under a window of `side` pixels is taken.
 pub(crate) fn bin_of(side: usize) -> usize {
@@ -26,23 +31,59 @@ pub(crate) fn running_median(image: &Image, side: usize) -> Image {
     let binned = means(image, bin);
     let (columns, rows) = (binned.columns, binned.rows);
     let mut ground = vec![f64::NAN; columns * rows];
-    let lines = ground.par_chunks_mut(columns).enumerate();
-    lines.for_each(|(row, line)| {
+    // Values are put into order once for so many lines, and those that their windows reach.
+    let together = 2 * reach;
+    let bands = ground.par_chunks_mut(columns * together).enumerate();
+    bands.for_each(|(band, ground)| {
         interrupt::check();
-        let near = |at: usize, count: usize| at.saturating_sub(reach)..(at + reach + 1).min(count);
-        let mut window = Vec::with_capacity((2 * reach + 1).pow(2));
-        for (column, ground) in line.iter_mut().enumerate() {
-            window.clear();
-            for other in near(row, rows) {
-                let part = &binned.row(other)[near(column, columns)];
-                window.extend(part.iter().copied().filter(|v| v.is_finite()));
-            }
-            if !window.is_empty() {
-                *ground = median(&mut window);
-            }
-        }
+        let lines = band * together..band * together + ground.len() / columns;
+        medians(&binned, reach, lines, ground);
     });
     spread(&Image::new(rows, columns, ground), bin, image)
+}
+
+/// The medians at some lines, in a square that reaches so far to each side.
+fn medians(image: &Image, reach: usize, lines: Range<usize>, ground: &mut [f64]) {
+    let (columns, rows) = (image.columns, image.rows);
+    let near = |line: usize| line.saturating_sub(reach)..(line + reach + 1).min(rows);
+    let first = near(lines.start).start;
+    let last = near(lines.end - 1).end;
+    let (order, ranks) = ranked(&image.values[first * columns..last * columns]);
+    for (line, ground) in lines.zip(ground.chunks_mut(columns)) {
+        let mut window = MovingMedian::new(order.len());
+        let ranks = &ranks;
+        let there = |column: usize| {
+            let places = near(line).map(move |line| (line - first) * columns + column);
+            places.map(|i| ranks[i]).filter(|rank| *rank != MISSING)
+        };
+        for column in 0..reach.min(columns) {
+            there(column).for_each(|rank| window.add(rank));
+        }
+        for (column, ground) in ground.iter_mut().enumerate() {
+            if column + reach < columns {
+                there(column + reach).for_each(|rank| window.add(rank));
+            }
+            if let Some(gone) = column.checked_sub(reach + 1) {
+                there(gone).for_each(|rank| window.remove(rank));
+            }
+            if let Some(middle) = window.median() {
+                *ground = order[middle];
+            }
+        }
+    }
+}
+
+/// The values that are there in order, and the place of each value in it, or [`MISSING`].
+fn ranked(values: &[f64]) -> (Vec<f64>, Vec<u32>) {
+    let mut places: Vec<usize> = (0..values.len())
+        .filter(|i| values[*i].is_finite())
+        .collect();
+    places.sort_unstable_by(|a, b| values[*a].total_cmp(&values[*b]).then(a.cmp(b)));
+    let mut ranks = vec![MISSING; values.len()];
+    for (rank, place) in (0..).zip(&places) {
+        ranks[*place] = rank;
+    }
+    (places.into_iter().map(|i| values[i]).collect(), ranks)
 }
 
 /// Means over square bins, those at the upper and right ends too, which may have fewer pixels.

@@ -8,6 +8,7 @@ pub(crate) mod exact;
 pub mod interrupt;
 pub(crate) mod least_squares;
 pub(crate) mod median;
+pub(crate) mod moving_median;
 pub(crate) mod normal_equations;
 pub(crate) mod rng;
 pub(crate) mod splines;

@@ -67,6 +67,9 @@ impl FewWaves {
             let left = model.left(&frame);
             let seen = spectrum(&frame, &left);
             let (k, power) = highest(&frame, &seen)?;
+            if strongest.is_none() && are_many(&frame, &seen, power) {
+                return None;
+            }
             let first = *strongest.get_or_insert(power);
             if power < NEGLIGIBLE * first || power < seen.threshold() * seen.level_near(k) {
                 break;
@@ -286,6 +289,32 @@ fn each_bin(frame: &Frame, from: i64, mut f: impl FnMut([i64; 2])) {
             }
         }
     }
+}
+
+/// Whether more bins than there may be waves stand out, each farther from the others than one wave reaches.
+fn are_many(frame: &Frame, seen: &ResidualNoise, strongest: f64) -> bool {
+    let mut all: Vec<(f64, Vector2<f64>)> = Vec::new();
+    each_bin(frame, 0, |[x, y]| {
+        let (k, power) = (Vector2::new(x as f64, y as f64), seen.power(x, y));
+        if power >= NEGLIGIBLE * strongest && power >= seen.threshold() * seen.level_near(k) {
+            all.push((power, k));
+        }
+    });
+    all.sort_by(|(a, _), (b, _)| b.total_cmp(a));
+    let mut apart: Vec<Vector2<f64>> = Vec::new();
+    for (_, k) in all {
+        // Waves of opposite sign are one.
+        if apart
+            .iter()
+            .all(|q| (q - k).norm().min((q + k).norm()) > SKIRT)
+        {
+            apart.push(k);
+            if apart.len() > MOST {
+                return true;
+            }
+        }
+    }
+    false
 }
 
 /// Cycles per frame of the strongest bin, and its power.
