@@ -45,8 +45,8 @@ const STRAIGHTENED: usize = 3;
 const BETTER: f64 = 20.0;
 
 /// Where the frame ends is known, but windows see only half of what is there: the share of what is told of an edge in the frame. By the
-/// coverage of fifty simulated sets whose twist swings once across the frame.
-const FRAME_ENDS: f64 = 1.0 / 3.0;
+/// coverage of a hundred simulated sets whose twist or strain swings once across the frame.
+const FRAME_ENDS: f64 = 1.0 / 6.0;
 
 /// How a lattice changes across its patch.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

@@ -17,6 +17,7 @@ use crate::lattice::fit::leverage::Leverage;
 use crate::lattice::fit::lines::LineStatistics;
 use crate::lattice::fit::model::{Clip, LineOffsets, Model, look, residuals, settled};
 use crate::lattice::fit::noise::{ForeignWave, ResidualNoise};
+use crate::lattice::fit::places::{InPlaces, Places};
 use crate::lattice::fit::tables::Tables;
 use crate::lattice::fit::{bend, closure, frame, solve};
 use crate::numbers::dot::dot;
@@ -59,8 +60,10 @@ pub(crate) struct Fit<'a> {
 /// The noise of a finished fit.
 pub(crate) struct FinalNoise {
     pub(crate) residual: ResidualNoise,
-    /// Noise power at each harmonic as it acts along x, along y and on the phase.
+    /// Noise power at each harmonic as it acts along x, along y and on the phase, where noise is the same everywhere.
     pub(crate) local: Vec<[f64; 3]>,
+    /// Where it lies.
+    pub(crate) places: InPlaces,
     /// Root mean square of the residual.
     pub(crate) rms: f64,
     /// What the residual says about a bent lattice.
@@ -68,6 +71,13 @@ pub(crate) struct FinalNoise {
 }
 
 impl FinalNoise {
+    /// Noise power at each harmonic as it acts along x, along y and on the phase, wherever it lies.
+    pub(crate) fn acting(&self) -> Vec<[f64; 3]> {
+        let factors = self.places.factors;
+        let acting = |local: &[f64; 3]| std::array::from_fn(|i| local[i] * factors[i]);
+        self.local.iter().map(acting).collect()
+    }
+
     /// Noise power at the first harmonics, in sum.
     pub(crate) fn power(&self) -> f64 {
         self.local.iter().take(FIRST_SHELL.len()).flatten().sum()
@@ -219,6 +229,7 @@ impl<'a> Fit<'a> {
         let (frame, model) = (&self.frame, &self.model);
         let lines = &self.lines;
         let contrast = self.uneven_contrast();
+        let places = Places::new(frame, model, self.has_offsets());
         let residual = |folded: &mut Folded, row: usize, line: &mut [f64]| {
             let settled = settled(frame, model, &tables, lines, clip, row, line);
             let bends = (frame.present[row] > 0).then(|| {
@@ -237,18 +248,23 @@ impl<'a> Fit<'a> {
                     *value -= if part.is_finite() { *part } else { 0.0 };
                 }
             }
-            (settled.offset, bends, dot(line, line))
+            let of_places =
+                (frame.present[row] > 0).then(|| places.of_line(row, line, frame.image.row(row)));
+            (settled.offset, bends, of_places, dot(line, line))
         };
         let room = || Folded::new(frame);
         let (residual, seen) = ResidualNoise::new(frame, self.free_lines, room, residual);
         let (mut bends, mut squares) = (Bends::new(model.waves.len()), 0.0);
-        for (row, (offset, of_line, square)) in seen.into_iter().enumerate() {
+        let mut of_places = Vec::with_capacity(seen.len());
+        for (row, (offset, of_line, in_places, square)) in seen.into_iter().enumerate() {
             self.lines.offset[row] = offset;
+            of_places.push(in_places);
             squares += square;
             if let Some(of_line) = of_line {
                 bends.add(&of_line);
             }
         }
+        let places = places.of_lines(&self.frame, &self.model, &of_places);
         let parameters = self.model.background.len() + 2 * self.model.waves.len() + 4;
         let lost = if self.free_lines {
             self.frame.lines()
@@ -268,9 +284,15 @@ impl<'a> Fit<'a> {
         Some(FinalNoise {
             residual,
             local,
+            places,
             rms: (squares / freedom as f64).sqrt(),
             bends,
         })
+    }
+
+    /// Whether lines have offsets, which take up what whole lines do.
+    fn has_offsets(&self) -> bool {
+        self.free_lines || self.line_sigma.is_some()
     }
 
     /// The same fit of another image with the same pixels.
@@ -321,7 +343,8 @@ impl<'a> Fit<'a> {
         let plain = solve::contraction(model, |_, _| 1.0);
         let plain = solve::by_phases(model, FIRST, &plain, |_| 1.0);
         let bread = solve::projected(&self.gram, &plain, FIRST + 4)?;
-        let weight = |i: usize, axis: usize| noise.local[i][axis].sqrt();
+        let acting = noise.acting();
+        let weight = |i: usize, axis: usize| acting[i][axis].sqrt();
         let noisy = solve::contraction(model, weight);
         let noisy = solve::by_phases(model, FIRST, &noisy, |i| weight(i, 2));
         let meat = solve::projected(&self.gram, &noisy, FIRST + 4)?;
@@ -334,8 +357,9 @@ impl<'a> Fit<'a> {
 
     /// How the lattice changes across the frame.
     fn inhomogeneity(&self, noise: &FinalNoise) -> Option<Inhomogeneity> {
-        let (bends, local) = (&noise.bends, &noise.local);
-        let found = bend::inhomogeneity(&self.frame, &self.model, &self.lines.lambda, bends, local);
+        let (bends, acting) = (&noise.bends, noise.acting());
+        let lambda = &self.lines.lambda;
+        let found = bend::inhomogeneity(&self.frame, &self.model, lambda, bends, &acting);
         found.map(|(inhomogeneity, _)| inhomogeneity)
     }
 
@@ -374,7 +398,7 @@ impl<'a> Fit<'a> {
             &self.model,
             &self.gram,
             &self.gradient,
-            &noise.local,
+            &noise.acting(),
             &strengths,
         );
         let covariance = self.covariance(noise)?;
@@ -397,7 +421,6 @@ impl<'a> Fit<'a> {
         ];
         let off = self.frame.middle();
         let carry = carry(off);
-        let offsets = self.free_lines || self.line_sigma.is_some();
         let fit = LatticeFit {
             wave_vectors,
             centre: Vector2::new(columns - 1.0, rows - 1.0) / 2.0,
@@ -409,12 +432,8 @@ impl<'a> Fit<'a> {
             lines_left_out: self.frame.image.rows - self.frame.lines(),
             clipped,
             foreign_wave,
-            hidden: noise.residual.hidden(&self.model, offsets),
-            residual: [0, 1, 2].map(|i| {
-                let index = self.model.basis.indices[i];
-                let p = frame::wave(&self.model.pair, index);
-                noise.residual.samples(p, offsets)
-            }),
+            hidden: noise.residual.hidden(&self.model, self.has_offsets()),
+            residual: noise.places.left.clone(),
             inhomogeneity,
             closure,
         };

@@ -18,7 +18,7 @@ use crate::spectrum::harmonics::Harmonics;
 const ROUNDS: usize = 4;
 /// Ground is taken off where that leaves less than this share of the variance of the wave vectors: what it makes of the edges of holes is no better than
 /// leaving it.
-pub(crate) const CLEARER: f64 = 0.5;
+pub(crate) const CLEARER: f64 = 0.7;
 
 /// A lattice fitted to an image.
 pub(crate) struct Found {

@@ -45,6 +45,7 @@ pub(crate) mod measure;
 pub(crate) mod misfits;
 pub(crate) mod model;
 pub(crate) mod noise;
+pub(crate) mod places;
 pub(crate) mod solve;
 pub(crate) mod straight;
 pub(crate) mod tables;

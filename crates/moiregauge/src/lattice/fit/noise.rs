@@ -12,9 +12,8 @@ use nalgebra::Vector2;
 use serde::{Deserialize, Serialize};
 
 use crate::lattice::fit::frame::Frame;
-use crate::lattice::fit::left::LeftOver;
 use crate::lattice::fit::levelled::Levelled;
-use crate::lattice::fit::leverage::{ACROSS, ALONG, Leverage};
+use crate::lattice::fit::leverage::{ALONG, Leverage};
 use crate::lattice::fit::local::{Bin, acting_on};
 use crate::lattice::fit::model::Model;
 use crate::numbers::exact;
@@ -199,21 +198,6 @@ impl ResidualNoise {
     /// Power per pixel at (x, y) cycles per frame.
     pub(super) fn power(&self, x: i64, y: i64) -> f64 {
         self.spectrum.at(x, y).norm_sqr() / self.window_power
-    }
-
-    /// The transform of the residual across the lines from a harmonic. `offsets`: offsets take up what whole lines do, so that it is no
-    /// part of the harmonic's noise.
-    pub(crate) fn samples(&self, p: Vector2<f64>, offsets: bool) -> LeftOver {
-        let centre = (p / PI).map(|c| c.round() as i64);
-        // Noise of whole lines stands at kx = 0 alone, and beside it through the window: what lies at another kx
-        // says nothing of it.
-        let columns = if offsets && centre.x.abs() < BESIDE {
-            vec![-BESIDE, BESIDE]
-        } else {
-            vec![centre.x]
-        };
-        let rows = centre.y - ACROSS..=centre.y + ACROSS;
-        LeftOver::new(columns, rows, |x, y| self.spectrum.at(x, y))
     }
 
     /// Noise power per pixel over all frequencies, by the median.

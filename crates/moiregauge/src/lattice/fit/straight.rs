@@ -23,7 +23,7 @@ pub(crate) fn without_bend(fit: &Fit, noise: FinalNoise) -> FinalNoise {
     let mut straight: Option<FinalNoise> = None;
     for _ in 0..STEPS {
         let seen = straight.as_ref().unwrap_or(&noise);
-        let found = inhomogeneity(&fit.frame, &fit.model, lambda, &seen.bends, &seen.local);
+        let found = inhomogeneity(&fit.frame, &fit.model, lambda, &seen.bends, &seen.acting());
         let Some((_, bend)) =
             found.filter(|(change, _)| change.stands_out() && fit.clipped() < FOLLOWED)
         else {
