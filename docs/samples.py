@@ -121,7 +121,7 @@ def row(sample, sets):
 
 HEAD = """# Real samples
 
-{sets} simulated sets of {scans} frames of {pixels} × {pixels} pixels of each class (`moiregauge simulate --list-samples` says what
+Simulated sets of {scans} frames of {pixels} × {pixels} pixels of each class, as many as the table says (`moiregauge simulate --list-samples` says what
 they are), every set with a twist of 1.0 to 1.6°, strain, orientation, drift, noise and numbers of its own (`--vary --seed`),
 each analysed by `moiregauge analyze FOLDER` and compared with its truth. `docs/samples.sh` makes this page.
 
@@ -140,7 +140,7 @@ def main(program, sets=20, *samples):
     store = os.environ.get("WORK", os.path.join(tempfile.gettempdir(), "moiregauge-samples"))
     work = pathlib.Path(store) / digest
     samples, sets, first = list(samples) or SAMPLES, int(sets), number("FIRST", 1)
-    print(HEAD.format(sets=sets, scans=number("SCANS", 4), pixels=number("PIXELS", 192)))
+    print(HEAD.format(scans=number("SCANS", 4), pixels=number("PIXELS", 192)))
     with concurrent.futures.ThreadPoolExecutor(number("JOBS", os.cpu_count() or 1)) as pool:
         for sample in samples:
             seeds = range(first, first + sets)

@@ -57,6 +57,33 @@ fn a_lattice_in_a_part_of_the_frame_is_measured_there() {
     }
 }
 
+/// Layers do not hold a strain of 7 % on each other: such a lattice has vectors and no twist, unless it is named by hand.
+#[test]
+fn strain_that_no_layers_hold_has_no_twist() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let sample = ["--twist", "9", "--strain", "7", "--size", "18", "18"];
+    let frames = ["--pixels", "192", "--scans", "4", "--name", "set"];
+    let mut simulate = program();
+    simulate.args(["simulate", "--out"]).arg(folder.path());
+    succeed(simulate.args(sample).args(frames));
+    let (set, out) = (folder.path().join("set"), folder.path().join("results"));
+    let run = |more: &[&str]| {
+        let ran = analyze(&set, &out).args(more).output();
+        ran.expect("the program runs");
+        results(&out)
+    };
+    let found = run(&[]);
+    let codes = caveats(&found);
+    assert!(codes.contains(&"layers-cannot-make-it"), "{codes:?}");
+    assert!(found["sets"][0]["mean"].is_null());
+    let by_hand = run(&["--near", "1.6", "--force"]);
+    let [value, sigma] = twist(&by_hand, "mean");
+    assert!(
+        (value - 9.0).abs() < 5.0 * sigma + 0.01,
+        "{value} ± {sigma}"
+    );
+}
+
 /// Rough ground whose spectrum has three waves in one frame: there are vectors, and no twist that could be taken for a result.
 #[test]
 fn what_may_be_no_lattice_has_no_twist() {

@@ -86,6 +86,18 @@ pub enum Impossible {
         /// The isotropic strain that would make it.
         strain: f64,
     },
+    /// No layers hold the strain that it takes.
+    #[error(
+        "it would take a heterostrain of {:.0} %, which no layers hold on each other. An image distorted by drift or by the scanner, a wrong \
+         scan size, other layers than {layers}, or a lattice that is no moiré",
+        100.0 * .strain
+    )]
+    Strain {
+        /// The heterostrain.
+        strain: f64,
+        /// The layers.
+        layers: String,
+    },
     /// Another reason.
     #[error(
         "no twist and strain of {layers} explain a lattice with a period of {period:.1} nm: {reason}"

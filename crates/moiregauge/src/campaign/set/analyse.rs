@@ -9,7 +9,7 @@ use crate::campaign::set::common::common;
 use crate::campaign::set::drift::{constant_drift, outruns, unknown};
 use crate::campaign::set::faint::too_faint;
 use crate::campaign::set::mean::{at_drift, forward_backward, without_drift};
-use crate::campaign::set::moire::draw;
+use crate::campaign::set::moire::{breaks, draw};
 use crate::campaign::set::scan::scans_at_drift;
 use crate::campaign::set::shells::{of_other_shell, of_second_shell};
 use crate::campaign::set::{joint, published};
@@ -84,6 +84,10 @@ pub(crate) fn analyse_set(
             .as_ref()
             .filter(|_| unknown.is_none())
             .and_then(|solved| at_drift(solved, &scans, &shared, &pitch, settings, strengths));
+        if let Some(doubt) = mean.as_ref().and_then(|mean| breaks(mean, settings)) {
+            caveats.push(Caveat::new(doubt, name));
+            (uncorrected, mean) = (None, None);
+        }
     }
     let set = SetAnalysis {
         name: name.clone(),

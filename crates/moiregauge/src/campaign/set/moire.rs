@@ -23,6 +23,8 @@ use crate::settings::knobs::Settings;
 /// Heterostrains of layers on each other stay below a few tenths of a per cent, rarely a per cent; more
 /// than this deserves a word.
 const LARGE_STRAIN: f64 = 0.02;
+/// Layers slide on each other before they hold so much, and two-dimensional crystals break at two or three times that: it is no result. Chosen by eye.
+const MOST_STRAIN: f64 = 0.05;
 /// A period this near to that of a known surface may be that of the surface: four times the calibration that is
 /// assumed.
 const SURFACE: f64 = 0.04;
@@ -41,6 +43,18 @@ fn is_below_30_degrees(found: &TwistStrain, settings: &Settings) -> bool {
     let layers = settings.bilayer();
     let hexagonal = layers.reference.is_hexagonal() && layers.stretched.is_hexagonal();
     found.twist.abs() <= FRAC_PI_6 || !hexagonal
+}
+
+/// Why a mean is none: its strain is more than layers hold, whatever its errors. What was told by hand is meant.
+pub(crate) fn breaks(mean: &SetMean, settings: &Settings) -> Option<MoireDoubt> {
+    let [least, _] = mean.twist_strain.strain().interval_95();
+    let breaks = least > MOST_STRAIN && !settings.by_hand.says_which();
+    breaks.then(|| {
+        MoireDoubt::LayersCannotMakeIt(Impossible::Strain {
+            strain: mean.twist_strain.heterostrain().value,
+            layers: settings.bilayer().name(),
+        })
+    })
 }
 
 /// Draws twist and strain of every scan.
