@@ -86,6 +86,7 @@ fit/hidden SLOW second half double
 fit/hidden OWN second half double
 fit/hidden AS_LONG second half double
 fit/hidden LOBE second half double
+fit/hidden ELSE second half double
 scan/shells SUSPECTED second half double
 scan/shells CONFIRMED second half double
 lattice/measure SECOND_SHELL second half double
