@@ -252,7 +252,7 @@ HEAD = """# Images of another generator
 second), and offsets of lines. They are arrays: no sensors, no drift, and their size is exact, so that the statistical error is all there is.
 Each is analysed by `moiregauge analyze FRAMES --size … --drift 0 0`; `docs/independent.sh` makes this page.
 
-*right*: within {sigmas:.0f} statistical σ and {share} %. The classes from `white` on have no moiré: every answer is wrong.
+*right*: within {sigmas:.0f} statistical σ and {share} %. The classes from white on have no moiré: every answer is wrong.
 
 | class | sets | answered | right | refused | wrong | rms pull | median error (°) |
 | --- | --- | --- | --- | --- | --- | --- | --- |"""
@@ -272,7 +272,7 @@ def main(program, sets=20, *names):
                 rms = f"{math.sqrt(sum(p * p for p in pulls) / len(pulls)):.2f}" if pulls else "–"
                 errors = sorted(abs(error) for judged in answered for error, *_ in judged)
                 median = f"{errors[len(errors) // 2]:.5f}" if errors else "–"
-                cells = [f"`{name}`", len(done), len(answered), right, len(done) - len(answered), len(answered) - right, rms, median]
+                cells = [name.replace("-", " "), len(done), len(answered), right, len(done) - len(answered), len(answered) - right, rms, median]
                 print("| " + " | ".join(map(str, cells)) + " |", flush=True)
                 for seed, judged, _ in done:
                     if not all(ok for *_, ok in judged):
