@@ -244,7 +244,23 @@ impl Cells {
         envelope
     }
 
-    /// Those of nine waves, band by band of lines; `take` what is kept of a band.
+    /// The same at some cells.
+    pub(crate) fn envelope_at<T: Summed + Div<f64, Output = T>>(
+        &self,
+        sums: &[T],
+        window: &Window,
+        at: &[usize],
+    ) -> Vec<T> {
+        let summed = self.summed_at(sums, window, at).into_iter().zip(at);
+        summed
+            .map(|(sum, &i)| match window.weight[i] {
+                weight if weight > 0.0 => sum / weight,
+                _ => T::default(),
+            })
+            .collect()
+    }
+
+    /// The envelopes of nine waves, band by band of lines; `take`: what is kept of a band.
     pub(crate) fn nine_envelopes<R: Send>(
         &self,
         sums: [&[Complex64]; 9],
@@ -274,22 +290,6 @@ impl Cells {
             take(&all.collect::<Vec<Nine>>())
         });
         bands.collect()
-    }
-
-    /// The same at some cells.
-    pub(crate) fn envelope_at<T: Summed + Div<f64, Output = T>>(
-        &self,
-        sums: &[T],
-        window: &Window,
-        at: &[usize],
-    ) -> Vec<T> {
-        let summed = self.summed_at(sums, window, at).into_iter().zip(at);
-        summed
-            .map(|(sum, &i)| match window.weight[i] {
-                weight if weight > 0.0 => sum / weight,
-                _ => T::default(),
-            })
-            .collect()
     }
 
     /// Sums of values under the window at each cell, times powers of their distances from it along columns and rows, cells; `squared`: under the square of

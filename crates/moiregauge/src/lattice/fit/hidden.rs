@@ -39,8 +39,8 @@ const LOBE: f64 = 1.5;
 /// ... and there are so many at least.
 const FEWEST: usize = 6;
 
-/// A place with more than so many times the power of another holds a wave of something else: hum, or stripes. Chosen by eye: first waves of one lattice
-/// differ by less than ten times.
+/// A place with more than so many times the power of each other holds a wave of something else: hum, or stripes. Chosen by eye: first waves of one
+/// lattice differ by less than ten times.
 const ELSE: f64 = 30.0;
 
 /// Power where the first shell would be, if a lattice is the second shell of another.
@@ -89,22 +89,23 @@ impl Hidden {
         let most = self.images.into_iter().max().unwrap_or(0);
         // What is there in some images alone is told by these.
         let told = |i: &usize| self.images[*i] > 0 && 2 * self.images[*i] >= most;
-        let mean = |i: usize| self.power[i] / f64::from(self.images[i]);
-        let least = (0..3).filter(told).map(|i| (mean(i), self.images[i]));
-        let Some(least) = least.min_by(|a, b| a.0.total_cmp(&b.0)) else {
+        let mean = |i: &usize| self.power[*i] / f64::from(self.images[*i]);
+        let mut places: Vec<usize> = (0..3).filter(told).collect();
+        places.sort_by(|a, b| mean(a).total_cmp(&mean(b)));
+        if let [.., second, first] = &*places
+            && mean(first) > ELSE * mean(second)
+        {
+            places.pop();
+        }
+        let [weakest, _, ..] = &*places else {
             return 1.0;
         };
-        let of_lattice = |i: &usize| told(i) && mean(*i) < ELSE * least.0;
-        let waves = (0..3).filter(of_lattice).count() as i32;
-        if waves < 2 {
-            return 1.0;
-        }
         // As many images as noise of their own makes of them.
-        let (mean, images) = least;
+        let (mean, images) = (mean(weakest), self.images[*weakest]);
         let others = f64::from(images) - 1.0;
         let independent = (1.0 + others * self.own / f64::from(most)).floor();
         let power = mean * independent / NOISE_KNOWN_TO;
-        chi2::tail(2.0 * power, 2 * independent as usize).powi(waves)
+        chi2::tail(2.0 * power, 2 * independent as usize).powi(places.len() as i32)
     }
 }
 
