@@ -16,7 +16,7 @@ use crate::coverage::cells::{Cells, Window};
 use crate::coverage::grains::{Grains, split};
 use crate::coverage::look::{Frame, Seen};
 use crate::coverage::nodes::View;
-use crate::coverage::patch::{Patch, unit_cells_per_pixel};
+use crate::coverage::patch::{Patch, WHOLE, unit_cells_per_pixel};
 use crate::coverage::sides::without_tails;
 use crate::frame::image::Image;
 use crate::numbers::three::three;
@@ -43,6 +43,9 @@ const PART: f64 = 0.05;
 
 /// See [`PART`].
 const SMALLEST_PART: f64 = 3.0;
+
+/// A Gaussian window makes a strip of this many of its widths (standard deviations) of a line, where it sees half: √(8 ln 2).
+const LINE: f64 = 2.354_820_045_030_949;
 
 /// Gaps of fewer unit cells than this are closed: a defect, or noise.
 const SMALLEST_GAP: f64 = 1.5;
@@ -136,6 +139,9 @@ fn settle_bins(
     }
     seen.inside = without_tails(&frame, &waves, windows.at(narrowest), &seen);
     let inner = patch(&cells, &seen.inside, &pair)?;
+    if inner.share < WHOLE && !is_broad(&cells, &inner.inside, LINE * seen.width) {
+        return None;
+    }
     Some(Settled {
         patch: inner.in_pixels(bins),
         image: image.clone(),
@@ -358,6 +364,34 @@ fn tidy(cells: &Cells, inside: &[bool], pair: &Matrix2<f64>) -> Vec<bool> {
     inside
 }
 
+/// Whether a disc of a diameter of so many mean periods fits into a patch. A patch that is as narrow as what a window makes of a line
+/// is one: of a step, the edge of a terrace, a scratch, with the stairs that pixels make of it.
+fn is_broad(cells: &Cells, inside: &[bool], diameter: f64) -> bool {
+    let [across, up] = cells.size;
+    let radii = [0, 1].map(|axis| diameter / 2.0 * cells.period[axis] / cells.pixels[axis] as f64);
+    let reach = radii.map(|r| r as usize);
+    // Cells to the left and to the right of the middle, on each line of the disc.
+    let half = |line: usize| {
+        let left = 1.0 - (line as f64 / radii[1]).powi(2);
+        (radii[0] * left.max(0.0).sqrt()) as usize
+    };
+    let halves: Vec<usize> = (0..=reach[1]).map(half).collect();
+    let line_is = |x: usize, y: usize, half: usize| {
+        x >= half
+            && x + half < across
+            && inside[y * across + x - half..=y * across + x + half]
+                .iter()
+                .all(|i| *i)
+    };
+    let fits = |x: usize, y: usize| {
+        let mut lines = halves.iter().enumerate();
+        y >= reach[1]
+            && y + reach[1] < up
+            && lines.all(|(d, half)| line_is(x, y - d, *half) && line_is(x, y + d, *half))
+    };
+    (0..inside.len()).any(|i| fits(i % across, i / across))
+}
+
 /// The patch without the cells at its edges, but for those of the frame: an edge is known to about a cell, and what
 /// lies beyond it is no lattice.
 fn shrunk(cells: &Cells, inside: &[bool]) -> Vec<bool> {
@@ -402,4 +436,55 @@ fn parts(size: [usize; 2], inside: &[bool], wanted: bool) -> Vec<Vec<usize>> {
         all.push(part);
     }
     all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::frame::image::Image;
+
+    /// Cells of a lattice of `period` pixels in a frame of 240 × 200, and those of them near which `holds` is true.
+    fn cells(
+        period: f64,
+        holds: impl Fn(Vector2<f64>) -> bool,
+    ) -> (Cells, Matrix2<f64>, Vec<bool>) {
+        let g = std::f64::consts::TAU / (period * 0.75f64.sqrt());
+        let pair = Matrix2::new(g, g / 2.0, 0.0, g * 0.75f64.sqrt());
+        let image = Image::new(200, 240, vec![0.0; 240 * 200]);
+        let cells = Cells::new(&image, &pair, [1.0, 1.0]).unwrap();
+        let inside = (0..cells.len())
+            .map(|i| holds(cells.middle_of(i)))
+            .collect();
+        (cells, pair, inside)
+    }
+
+    /// A window sees a line over √(8 ln 2) of its widths, wherever the line runs: this is no patch. The smallest round patch is one.
+    #[test]
+    fn what_a_window_makes_of_a_line_is_no_patch() {
+        let period = 16.0;
+        for (degrees, width) in [0.0f64, 17.0, 56.0, 90.0, 131.0]
+            .into_iter()
+            .flat_map(|a| WIDTHS.map(|w| (a, w)))
+        {
+            let across = Vector2::new(-degrees.to_radians().sin(), degrees.to_radians().cos());
+            let seen = |at: Vector2<f64>| {
+                let far = across.dot(&(at - Vector2::new(120.0, 100.0)));
+                (-0.5 * (far / (width * period)).powi(2)).exp() > 0.5
+            };
+            let (cells, pair, inside) = cells(period, seen);
+            let Some(patch) = patch(&cells, &inside, &pair) else {
+                continue;
+            };
+            assert!(
+                !is_broad(&cells, &patch.inside, LINE * width),
+                "{degrees}° {width}"
+            );
+        }
+        let cell = period * period * 0.75f64.sqrt();
+        let radius = (1.3 * FEWEST_CELLS * cell / std::f64::consts::PI).sqrt() + period / 4.0;
+        let round = |at: Vector2<f64>| (at - Vector2::new(120.0, 100.0)).norm() < radius;
+        let (cells, pair, inside) = cells(period, round);
+        let patch = patch(&cells, &inside, &pair).expect("cells enough");
+        assert!(is_broad(&cells, &patch.inside, LINE * WIDTHS[0]));
+    }
 }
