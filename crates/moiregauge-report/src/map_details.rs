@@ -9,6 +9,8 @@ use moiregauge::survey::MappedPattern;
 /// Answers to what was asked of a map.
 #[derive(Clone, Debug, Default)]
 pub struct MapDetails {
+    /// The grains, in the order of their numbers; none in the map of one lattice.
+    pub grains: Vec<RegionStatistics>,
     /// Boxes and polygons.
     pub regions: Vec<RegionStatistics>,
     /// Lines.

@@ -135,6 +135,7 @@ fn constant(twist_sigma_deg: f64) -> TwistStrainMap {
         closure: vec![1.0; n],
         curl: vec![0.0; n],
         signal_to_noise: vec![20.0; n],
+        grain: Vec::new(),
     }
 }
 

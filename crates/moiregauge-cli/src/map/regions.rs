@@ -70,6 +70,21 @@ pub(super) fn summary(details: &MapDetailsResult) -> String {
             two_digits(known(t.spread_below_95))
         )
     };
+    for grain in &details.grains {
+        let known = |v: Option<f64>| v.unwrap_or(f64::NAN);
+        let strain = grain.mean.as_ref().map(|mean| mean.heterostrain_percent);
+        let strain = strain.map_or_else(String::new, |e| {
+            let strain = heterostrain::Estimate::new(known(e.value), known(e.sigma));
+            format!(", heterostrain {} %", plus_minus(strain))
+        });
+        let _ = writeln!(
+            text,
+            "{}: {} good nodes, {}{strain}",
+            grain.name,
+            grain.good_nodes,
+            twist(grain.twist_deg)
+        );
+    }
     for region in &details.regions {
         let _ = writeln!(text, "region {}: {}", region.name, twist(region.twist_deg));
     }

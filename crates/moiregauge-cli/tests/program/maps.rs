@@ -7,7 +7,7 @@ use moiregauge::frame::Image;
 use moiregauge::simulate::{DomainScene, FieldScene};
 use serde_json::Value;
 
-use crate::common::{caveats, json, number, program, run, succeed};
+use crate::common::{caveats, json, number, program, run, succeed, testdata};
 
 /// 16 pixels per period, 0.7 nm per pixel: 11.2 nm.
 const PERIOD: f64 = 16.0;
@@ -87,6 +87,65 @@ fn maps_of_one_lattice_show_its_twist() {
         assert!(there.join("map.gwy").exists(), "{name}");
         assert!(!there.join("moiregauge-unfinished").exists(), "{name}");
     }
+}
+
+/// Two lattices side by side are one map, each node of its own grain, and no mean of both; one of them alone is a map of its own.
+#[test]
+fn grains_are_two_lattices_of_one_map() {
+    let Some(data) = testdata("grains_are_two_lattices_of_one_map") else {
+        return;
+    };
+    let folder = tempfile::tempdir().expect("a folder");
+    let input = data.join("hard/two_grains/two_grains.npy");
+    let truth = json(&data.join("hard/two_grains/truth.json"));
+    let wanted = ["left", "right"].map(|side| number(&truth, &format!("/{side}_theta_deg")));
+    let mapped = |name: &str, more: &[&str]| {
+        let out = folder.path().join(name);
+        let mut command = program();
+        command
+            .arg("map")
+            .arg(&input)
+            .args(["--size", "256nm×256nm"]);
+        command.args(["--no-report", "--quiet", "--out"]).arg(&out);
+        succeed(command.args(more));
+        (json(&out.join("map.json")), out)
+    };
+    let (results, out) = mapped("both", &[]);
+    follows_schema(&results);
+    let grains = results["details"]["grains"].as_array().expect("grains");
+    assert_eq!(grains.len(), 2);
+    let mut seen: Vec<f64> = Vec::new();
+    for grain in grains {
+        let mean = number(grain, "/twist_deg/mean");
+        let nearest = wanted
+            .into_iter()
+            .min_by(|a, b| (a - mean).abs().total_cmp(&(b - mean).abs()));
+        let nearest = nearest.expect("two");
+        let sigma = number(grain, "/twist_deg/sigma");
+        assert!(
+            sigma < 0.0005 && (mean - nearest).abs() < 4.0 * sigma,
+            "{mean} ± {sigma}, {nearest}"
+        );
+        // Neither varies: nodes of one in the other would make a spread of a hundredth of a degree.
+        assert!(
+            number(grain, "/twist_deg/spread_below_95") < 0.002,
+            "{grain}"
+        );
+        assert!(number(grain, "/area_nm2") > 10_000.0, "{grain}");
+        seen.push(nearest);
+    }
+    seen.sort_by(f64::total_cmp);
+    assert_eq!(seen, wanted);
+    assert_eq!(results["quantities"].as_array().map(Vec::len), Some(0));
+    assert!(results["whole_image"].is_null());
+    assert!(caveats(&results).contains(&"map-of-grains"));
+    assert!(out.join("map.zarr/grain/zarr.json").exists());
+    assert!(!out.join("displacement.csv").exists());
+    let (alone, out) = mapped("one", &["--grain", "2"]);
+    let twist = quantity(&alone, "twist")["mean"].as_f64().expect("a mean");
+    let second = number(&grains[1], "/twist_deg/mean");
+    assert!((twist - second).abs() < 0.001, "{twist} {second}");
+    assert!(out.join("displacement.csv").exists());
 }
 
 /// The rows of a table, split at commas; the first one has the names.

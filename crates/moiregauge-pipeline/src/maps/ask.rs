@@ -85,7 +85,10 @@ impl Questions {
             .wanted
             .map(|w| (w, WantedArea::new(map, 0..map.grid.len(), &w)));
         let profiles = self.profiles.iter();
+        let numbers = 1..=map.grain.iter().copied().max().unwrap_or(0);
+        let grains = numbers.filter_map(|number| RegionStatistics::of_grain(map, number));
         let details = MapDetails {
+            grains: grains.collect(),
             regions,
             profiles: profiles
                 .map(|l| Profile::new(map, &l.name, l.ends))

@@ -14,6 +14,11 @@ pub(super) fn no_twist_strain(why: &impl std::fmt::Display) -> Caveat {
     Caveat::new(MapDoubt::NoTwistStrain { reason }, "map")
 }
 
+/// Says that several grains are mapped.
+pub(super) fn of_grains(grains: usize) -> Caveat {
+    Caveat::new(MapDoubt::OfGrains { grains }, "map")
+}
+
 /// Says that the drift changes, where it does.
 pub(super) fn about_change(drift_change: Option<DriftChange>, caveats: &mut Vec<Caveat>) {
     if let Some(found) = drift_change.filter(DriftChange::stands_out) {

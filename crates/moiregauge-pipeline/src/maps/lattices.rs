@@ -1,6 +1,6 @@
 //! Scans that show a lattice → their maps, and the average of these.
 
-use moiregauge::campaign::{Analysis, ScanAnalysis, picture};
+use moiregauge::campaign::{Analysis, ScanAnalysis, grains, picture};
 use moiregauge::caveat::Caveat;
 use moiregauge::domains::{Contrast, DomainMap};
 use moiregauge::map::{Agreement, DriftChange, RegistryMap, TwistStrainMap};
@@ -8,7 +8,7 @@ use moiregauge::scan::Picture;
 use moiregauge::settings::Settings;
 use moiregauge::survey::{
     LineMap, MapError, MapMethod, MappedPattern, average_maps, change_of_drift, domains_of_scan,
-    map_scan, pattern_of_scan,
+    map_grain, map_scan, pattern_of_scan,
 };
 use moiregauge::window::{Resolution, UsedHarmonic};
 use moiregauge_report::FailedInput;
@@ -96,10 +96,62 @@ impl Scans<'_> {
         resolution: &Resolution,
         job: &Job,
     ) -> Result<Mapped, NoMap> {
-        // The maps read the lattice under the name that the analysis found.
-        let settings = &self.analysis.named_settings();
-        let (mut maps, shown, failed) = self.maps(settings, method, resolution, job);
-        let mut caveats = self.analysis.caveats.clone();
+        let caveats = self.analysis.caveats.clone();
+        match grains(self.analysis) {
+            None => {
+                // The maps read the lattice under the name that the analysis found.
+                let settings = &self.analysis.named_settings();
+                let maps = self.maps(settings, method, resolution, None, job);
+                self.averaged(maps, settings, resolution, caveats)
+            }
+            Some(grains) => self.of_grains(&grains, method, resolution, job, caveats),
+        }
+    }
+
+    /// One map of grains that lie side by side; the window of the first is that of all.
+    fn of_grains(
+        &self,
+        grains: &[Vec<usize>],
+        method: MapMethod,
+        resolution: &Resolution,
+        job: &Job,
+        caveats: Vec<Caveat>,
+    ) -> Result<Mapped, NoMap> {
+        let (mut found, mut failed) = (Vec::<Mapped>::new(), Vec::new());
+        for sets in grains {
+            let settings = &self.analysis.named_settings_of(sets);
+            let first = found.first().map(|first| first.map.window_nm);
+            let resolution = &Resolution {
+                window_nm: resolution.window_nm.or(first),
+                ..*resolution
+            };
+            let maps = self.maps(settings, method, resolution, Some(sets), job);
+            match self.averaged(maps, settings, resolution, Vec::new()) {
+                Ok(mapped) => found.push(mapped),
+                Err(NoMap::Nothing { failed: of_grain }) => failed.extend(of_grain),
+                Err(cancelled) => return Err(cancelled),
+            }
+        }
+        if found.len() > 1 {
+            return side_by_side(found, failed, caveats)
+                .ok_or(NoMap::Nothing { failed: Vec::new() });
+        }
+        let Some(mut alone) = found.pop() else {
+            return Err(NoMap::Nothing { failed });
+        };
+        alone.caveats.splice(0..0, caveats);
+        alone.failed.append(&mut failed);
+        Ok(alone)
+    }
+
+    /// The average of the maps of some scans, and what came with it; doubts follow on `caveats`.
+    fn averaged(
+        &self,
+        (mut maps, shown, failed): (Vec<LineMap>, FirstImage, Vec<FailedInput>),
+        settings: &Settings,
+        resolution: &Resolution,
+        mut caveats: Vec<Caveat>,
+    ) -> Result<Mapped, NoMap> {
         doubts::registered(&mut maps, &mut caveats);
         let Some((lattices, agreement)) = average_maps(&maps) else {
             return Err(NoMap::Nothing { failed });
@@ -152,7 +204,12 @@ impl Scans<'_> {
 
     /// The scans that are not excluded.
     fn used(&self) -> impl Iterator<Item = &ScanAnalysis> {
-        let all = self.analysis.sets.iter().flat_map(|set| &set.scans);
+        (0..self.analysis.sets.len()).flat_map(|set| self.used_of(set))
+    }
+
+    /// Those of a set.
+    fn used_of(&self, set: usize) -> impl Iterator<Item = &ScanAnalysis> {
+        let all = self.analysis.sets[set].scans.iter();
         all.filter(|scan| scan.excluded.is_none())
     }
 
@@ -163,22 +220,29 @@ impl Scans<'_> {
             .min_by(f64::total_cmp)
     }
 
-    /// The maps of all scans, trace and retrace, with the first image, to be shown, and the files that gave none.
+    /// The maps of all scans, or of one grain in those of its sets, trace and retrace, with the first image, to be shown, and the files
+    /// that gave none.
     fn maps(
         &self,
         settings: &Settings,
         method: MapMethod,
         resolution: &Resolution,
+        grain: Option<&[usize]>,
         job: &Job,
     ) -> (Vec<LineMap>, FirstImage, Vec<FailedInput>) {
         let (mut maps, mut failed) = (Vec::new(), Vec::new());
         let mut first = FirstImage::default();
         let origin = self.origin();
-        let stage = job.stage("mapping", "scans", self.used().count());
-        for scan in self.used() {
+        let of_part = if grain.is_some() { map_grain } else { map_scan };
+        let scans: Vec<&ScanAnalysis> = match grain {
+            Some(sets) => sets.iter().flat_map(|set| self.used_of(*set)).collect(),
+            None => self.used().collect(),
+        };
+        let stage = job.stage("mapping", "scans", scans.len());
+        for scan in scans {
             let mut of_scan = || -> Result<Vec<LineMap>, OfScan> {
                 let read = read_again(self.inputs, &scan.file, settings, self.known)?;
-                let lines = map_scan(&read, scan, origin, settings, method, resolution)?;
+                let lines = of_part(&read, scan, origin, settings, method, resolution)?;
                 if first.picture.is_none() {
                     first.picture = picture(&scan.file, &read, settings);
                 }
@@ -202,6 +266,43 @@ impl Scans<'_> {
         }
         (maps, first, failed)
     }
+}
+
+/// The maps of grains as one. What counts from the mean lattice of one of them (displacements, registry, averaged cell) is left out, and so
+/// is a mean over all.
+fn side_by_side(
+    found: Vec<Mapped>,
+    mut failed: Vec<FailedInput>,
+    mut caveats: Vec<Caveat>,
+) -> Option<Mapped> {
+    let grains = found.len();
+    let (mut maps, mut images, mut picture, mut drift_change) =
+        (Vec::new(), Vec::new(), None, None);
+    for mut grain in found {
+        for doubt in grain.caveats {
+            if !caveats.iter().any(|known| known.says_the_same(&doubt)) {
+                caveats.push(doubt);
+            }
+        }
+        images.append(&mut grain.images);
+        failed.append(&mut grain.failed);
+        picture = picture.or(grain.picture);
+        drift_change = drift_change.or(grain.drift_change);
+        maps.push(grain.map);
+    }
+    caveats.push(doubts::of_grains(grains));
+    Some(Mapped {
+        map: TwistStrainMap::of_grains(maps)?,
+        whole: None,
+        images,
+        picture,
+        pattern: None,
+        registry: None,
+        agreement: None,
+        drift_change,
+        caveats,
+        failed,
+    })
 }
 
 /// Twist and strain of the whole images.

@@ -114,7 +114,12 @@ impl MapFound {
         details.domains.clone_from(&found.domains.map);
         details.regime = Some(found.domains.regime.clone());
         let mut results = MapResults {
-            quantities: quantities(map),
+            // Of grains there is no mean of all.
+            quantities: if map.grain.is_empty() {
+                quantities(map)
+            } else {
+                Vec::new()
+            },
             whole_image: found.whole,
             agreement: found.agreement.map(Into::into),
             drift_change: found.drift_change.map(Into::into),

@@ -725,6 +725,8 @@ class MapDetailsResult(Document):
     """The most uniform areas of the wanted size, best first."""
     domains: DomainsResult | None
     """Domain structure, where it was looked for and found."""
+    grains: tuple[RegionResult, ...] = ()
+    """Grains that lie side by side; they have no corners, and their area is that of their good nodes."""
     pattern: PatternResult | None = None
     """The pattern of the first image: undistorted, and its averaged cell; nothing where phases are not
     followed.
@@ -1967,6 +1969,7 @@ decoded_by(
         MapDetailsResult: {
             "devices": several(DeviceResult.from_dict),
             "domains": DomainsResult.from_dict,
+            "grains": several(RegionResult.from_dict),
             "pattern": PatternResult.from_dict,
             "regime": RegimeResult.from_dict,
             "regions": several(RegionResult.from_dict),

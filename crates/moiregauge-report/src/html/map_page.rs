@@ -41,6 +41,7 @@ struct Page<'a> {
     /// Reason, nodes, per cent.
     masks: Vec<[String; 3]>,
     resolution: [String; 2],
+    grains: Vec<Area>,
     regions: Vec<Area>,
     devices: Vec<Area>,
     wanted: Option<[String; 7]>,
@@ -199,6 +200,11 @@ pub fn map_page(
             two_digits(results.window_nm),
             two_digits(results.resolution_nm),
         ],
+        grains: details
+            .grains
+            .iter()
+            .map(|g| Area::new(g.name.clone(), g.good_nodes.to_string(), g))
+            .collect(),
         regions: details
             .regions
             .iter()

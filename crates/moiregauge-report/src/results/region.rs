@@ -12,6 +12,9 @@ use crate::map_details::MapDetails;
 /// What was asked of a map.
 #[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
 pub struct MapDetailsResult {
+    /// Grains that lie side by side; they have no corners, and their area is that of their good nodes.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub grains: Vec<RegionResult>,
     /// Boxes and polygons.
     pub regions: Vec<RegionResult>,
     /// The most uniform areas of the wanted size, best first.
@@ -120,7 +123,7 @@ impl From<&RegionStatistics> for RegionResult {
         Self {
             name: found.region.name.clone(),
             corners_nm: found.region.corners.iter().map(|c| (*c).into()).collect(),
-            area_nm2: found.region.area(),
+            area_nm2: found.area_nm2,
             covered_percent: PERCENT * found.covered,
             nodes: found.nodes,
             good_nodes: found.good,
@@ -192,6 +195,7 @@ impl From<&MapDetails> for MapDetailsResult {
             area: (&device.found).into(),
         };
         Self {
+            grains: details.grains.iter().map(Into::into).collect(),
             regions: details.regions.iter().map(Into::into).collect(),
             devices: details.devices.iter().enumerate().map(device).collect(),
             wanted: details.wanted.as_ref().map(wanted),

@@ -92,6 +92,9 @@ fn shown<'a>(
         all.push(("registry covariance".to_owned(), "nm²", values));
     }
     all.push(("mask".to_owned(), "", Shown::Mask));
+    if !map.grain.is_empty() {
+        all.push(("grain".to_owned(), "", Shown::Classes(&map.grain)));
+    }
     all.push(("position x".to_owned(), "nm", Shown::Position(0)));
     all.push(("position y".to_owned(), "nm", Shown::Position(1)));
     all

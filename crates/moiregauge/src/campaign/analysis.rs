@@ -40,15 +40,25 @@ impl Analysis {
     /// The settings with the waves of the lattice that the numbers go with, for what is made from the same scans: maps
     /// have to read the lattice under the same name.
     pub fn named_settings(&self) -> Settings {
+        let all = self.combined.as_ref();
+        let all = all.map(|all| (all.lattice, all.readings.clone()));
+        let sets: Vec<usize> = (0..self.sets.len()).collect();
+        self.named_by(all.or_else(|| self.first_of(&sets)))
+    }
+
+    /// The same for scans of some of the sets, those of a grain.
+    pub fn named_settings_of(&self, sets: &[usize]) -> Settings {
+        self.named_by(self.first_of(sets))
+    }
+
+    /// The lattice of the first of some sets that has one.
+    fn first_of(&self, sets: &[usize]) -> Option<(Lattice, Readings)> {
         let of_set = |set: &SetAnalysis| set.mean.clone().or(set.uncorrected.clone());
-        let found = self
-            .combined
-            .as_ref()
-            .map(|all| (all.lattice, all.readings.clone()))
-            .or_else(|| {
-                let mean = self.sets.iter().find_map(of_set)?;
-                Some((mean.lattice, mean.readings))
-            });
+        let mean = sets.iter().find_map(|&i| of_set(&self.sets[i]))?;
+        Some((mean.lattice, mean.readings))
+    }
+
+    fn named_by(&self, found: Option<(Lattice, Readings)>) -> Settings {
         let waves = found.and_then(|(lattice, readings)| {
             let naming = readings.naming?;
             let least = naming.names.iter().map(|n| n.strain);

@@ -1,16 +1,23 @@
-//! Grains of one frame drift together: sets of the same scans whose drifts contradict each other do not all show a lattice.
+//! Grains of one frame drift together: sets of the same scans whose drifts contradict each other do not all show a lattice. Which sets
+//! show the same grain.
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::campaign::analysis::{Drift, SetAnalysis};
-use crate::caveat::Caveat;
+use heterostrain::lattice::{Lattice, labelled_like};
+
+use crate::campaign::analysis::{Analysis, Drift, SetAnalysis};
+use crate::caveat::lattices::LatticeDoubt;
 use crate::caveat::sets::SetDoubt;
+use crate::caveat::{Caveat, Doubt};
 use crate::numbers::chi2;
 
 /// Drifts contradict each other where chance separates them as far less often than this.
 const CONTRADICTED: f64 = 1e-6;
 /// The drift of one set is believed against that of another whose variance is so many times as large; else neither is.
 const BETTER_KNOWN: f64 = 9.0;
+/// Sets of other scans show a grain if their vectors differ by less than this share of them: more than drift that is not known does in two
+/// slow axes, and less than grains that are told from each other by eye. Of several grains it is the nearest.
+const SAME_GRAIN: f64 = 0.05;
 /// nm/s → nm/min.
 const PER_MINUTE: f64 = 60.0;
 
@@ -39,6 +46,50 @@ pub(crate) fn agree_on_drift(sets: &mut [SetAnalysis], caveats: &mut Vec<Caveat>
         let doubt = SetDoubt::GrainsContradict { nm_per_min, other };
         caveats.push(Caveat::new(doubt, &set.name));
     }
+}
+
+/// The grains that lie side by side in the frames, each with the numbers of its sets; sets without a result are left out. `None` where the
+/// frames show one lattice.
+///
+/// Sets of one scan are different grains; a set of other scans shows the grain whose lattice is the nearest.
+pub fn grains(analysis: &Analysis) -> Option<Vec<Vec<usize>>> {
+    let sets = &analysis.sets;
+    let is_several = |caveat: &Caveat| {
+        matches!(
+            caveat.doubt,
+            Doubt::Lattice(LatticeDoubt::SeveralGrains { .. })
+        )
+    };
+    let shared = sharing_a_scan(sets);
+    let told = analysis.settings.grain.is_some() || analysis.caveats.iter().any(is_several);
+    if shared.is_empty() && !told {
+        return None;
+    }
+    let lattices: Vec<Option<Lattice>> = sets.iter().map(lattice_of).collect();
+    let mut found: Vec<Vec<usize>> = Vec::new();
+    for (set, lattice) in lattices.iter().enumerate() {
+        let Some(lattice) = lattice else { continue };
+        let apart = |grain: &Vec<usize>| {
+            let beside = grain.iter().any(|other| shared.contains(&[*other, set]));
+            let first = lattices[grain[0]].as_ref().filter(|_| !beside)?;
+            let (a, b) = (first.basis, labelled_like(lattice, &first.basis).basis);
+            let apart = (b - a).norm() / a.norm();
+            (apart < SAME_GRAIN).then_some(apart)
+        };
+        let known = found.iter().enumerate();
+        let known = known.filter_map(|(i, grain)| Some((i, apart(grain)?)));
+        match known.min_by(|a, b| a.1.total_cmp(&b.1)) {
+            Some((nearest, _)) => found[nearest].push(set),
+            None => found.push(vec![set]),
+        }
+    }
+    Some(found)
+}
+
+/// The lattice of a set that has a result.
+fn lattice_of(set: &SetAnalysis) -> Option<Lattice> {
+    let mean = set.mean.as_ref().or(set.uncorrected.as_ref());
+    mean.map(|mean| mean.lattice)
 }
 
 /// By how much two drifts differ, nm/min, where that is no chance. What the user gave is no measurement.

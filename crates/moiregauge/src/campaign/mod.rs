@@ -27,6 +27,7 @@ pub use analysis::{
 };
 pub use atomic::{AtomicError, atomic_orientation};
 pub use calibrate::{CalibrateError, Calibrated, CalibratedSet, calibrate};
+pub use grains::grains;
 pub use group::natural_order;
 pub use identity::about_repeat;
 pub use illustrate::{amplitude_of, illustrate, picture};

@@ -30,6 +30,16 @@ pub enum MapDoubt {
         /// What is mapped.
         of: Mapped,
     },
+    /// Several grains are in one map.
+    #[error(
+        "the map shows {grains} grains side by side. Each node is measured in its own grain, and nodes whose windows reach far \
+         beyond it are masked as missing pixels. Displacements, registry and averaged cell count from the mean lattice of one grain, so there are \
+         none"
+    )]
+    OfGrains {
+        /// How many.
+        grains: usize,
+    },
     /// The noise could not be measured.
     #[error(
         "the frame holds too few periods to measure the noise between the harmonics. Instead, the errors of the map \
@@ -157,6 +167,10 @@ explain! { MapDoubt:
         "The drift is not known. It stretches and shears the whole map by the same amount. Mean values are wrong by \
          this; differences within the map hardly change."
         "Take frames up and down, or give the drift."
+    OfGrains "map-of-grains" Note
+        "Several grains lie side by side in the map. Each node is measured in its own grain, and the results are those of \
+         each grain. There is no mean of all, no displacement, registry or averaged cell."
+        "To have these of one grain, map it alone (`--grain`)."
     NoiseGuessed "map-noise-guessed" Warning
         "The frame is too small to measure the noise between the harmonics. The errors of the map were estimated from \
          the residual of the lattice fit, and may be wrong."

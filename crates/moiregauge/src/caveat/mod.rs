@@ -70,6 +70,18 @@ impl Caveat {
     }
 }
 
+/// Leaves the first of all that say the same of one place: trace and retrace do.
+pub(crate) fn each_once(caveats: &mut Vec<Caveat>) {
+    let mut kept: Vec<Caveat> = Vec::with_capacity(caveats.len());
+    for caveat in caveats.drain(..) {
+        let known = |other: &Caveat| other.place == caveat.place && other.says_the_same(&caveat);
+        if !kept.iter().any(known) {
+            kept.push(caveat);
+        }
+    }
+    *caveats = kept;
+}
+
 /// What can be doubtful, by subject.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]

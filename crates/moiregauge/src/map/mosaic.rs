@@ -1,4 +1,4 @@
-//! Finished maps of a survey → one map, each where it lies.
+//! Finished maps of a survey, or of grains → one map, each where it lies.
 
 use nalgebra::{Matrix2, Vector2};
 
@@ -14,52 +14,73 @@ impl TwistStrainMap {
         if maps.len() < 2 {
             return maps.pop();
         }
-        let first = &maps[0];
-        let step = first.grid.step.determinant().abs().sqrt();
-        let corners = maps.iter().flat_map(|map| {
-            let [columns, rows] = map.grid.size.map(|n| n.max(1) as f64 - 1.0);
-            [(0.0, 0.0), (columns, 0.0), (0.0, rows), (columns, rows)]
-                .map(|(c, r)| map.grid.origin + map.grid.step * Vector2::new(c, r))
-        });
-        let beyond = Vector2::repeat(f64::INFINITY);
-        let (low, high) = corners.fold((beyond, -beyond), |(low, high): (Vector2<f64>, _), c| {
-            (low.inf(&c), high.sup(&c))
-        });
-        let size = [0, 1].map(|i| ((high - low)[i] / step + 0.5).floor() as usize + 1);
-        let grid = Grid {
-            size,
-            origin: low,
-            step: Matrix2::identity() * step,
-        };
-        let inverses: Vec<Matrix2<f64>> = maps
-            .iter()
-            .map(|map| map.grid.step.try_inverse())
-            .collect::<Option<_>>()?;
-        // Map and node that each place takes.
-        let taken: Vec<Option<(usize, usize)>> = (0..grid.len())
-            .map(|node| {
-                let place = grid.place(node);
-                let seen = maps.iter().zip(&inverses).enumerate();
-                let seen = seen.filter_map(|(m, (map, inverse))| {
-                    let t = (inverse * (place - map.grid.origin)).map(|x| (x + 0.5).floor());
-                    let [columns, rows] = map.grid.size.map(|n| n as f64);
-                    let inside = t.x >= 0.0 && t.y >= 0.0 && t.x < columns && t.y < rows;
-                    inside.then(|| (m, t.y as usize * map.grid.size[0] + t.x as usize))
-                });
-                seen.min_by_key(|&(m, n)| maps[m].mask[n])
-            })
-            .collect();
-        let mut out = Self::empty(grid, first.window_nm);
-        out.grid = grid;
-        let mask = |t: &Option<(usize, usize)>| t.map_or(Mask::Margin, |(m, n)| maps[m].mask[n]);
-        out.mask = taken.iter().map(mask).collect();
-        let planes: Vec<Vec<&mut Vec<f32>>> = maps.iter_mut().map(Self::planes_mut).collect();
-        for (i, plane) in out.planes_mut().into_iter().enumerate() {
-            let value = |t: &Option<(usize, usize)>| t.map_or(f32::NAN, |(m, n)| planes[m][i][n]);
-            *plane = taken.iter().map(value).collect();
-        }
-        Some(out)
+        Some(put_together(maps)?.0)
     }
+
+    /// The same of the maps of grains that lie side by side, with the number of the grain at each good node. Displacements count from
+    /// the mean lattice of a grain and do not go on in another: there are none.
+    pub fn of_grains(maps: Vec<Self>) -> Option<Self> {
+        let (mut all, taken) = put_together(maps)?;
+        let grain = |(taken, mask): (&Option<usize>, &Mask)| match taken {
+            Some(map) if *mask == Mask::Good => u8::try_from(map + 1).unwrap_or(u8::MAX),
+            _ => 0,
+        };
+        all.grain = taken.iter().zip(&all.mask).map(grain).collect();
+        for plane in &mut all.displacement {
+            plane.value.fill(f32::NAN);
+            plane.sigma.fill(f32::NAN);
+        }
+        Some(all)
+    }
+}
+
+/// The maps on one grid, and which of them each node is of.
+fn put_together(mut maps: Vec<TwistStrainMap>) -> Option<(TwistStrainMap, Vec<Option<usize>>)> {
+    let first = maps.first()?;
+    let step = first.grid.step.determinant().abs().sqrt();
+    let corners = maps.iter().flat_map(|map| {
+        let [columns, rows] = map.grid.size.map(|n| n.max(1) as f64 - 1.0);
+        [(0.0, 0.0), (columns, 0.0), (0.0, rows), (columns, rows)]
+            .map(|(c, r)| map.grid.origin + map.grid.step * Vector2::new(c, r))
+    });
+    let beyond = Vector2::repeat(f64::INFINITY);
+    let (low, high) = corners.fold((beyond, -beyond), |(low, high): (Vector2<f64>, _), c| {
+        (low.inf(&c), high.sup(&c))
+    });
+    let size = [0, 1].map(|i| ((high - low)[i] / step + 0.5).floor() as usize + 1);
+    let grid = Grid {
+        size,
+        origin: low,
+        step: Matrix2::identity() * step,
+    };
+    let inverses: Vec<Matrix2<f64>> = maps
+        .iter()
+        .map(|map| map.grid.step.try_inverse())
+        .collect::<Option<_>>()?;
+    // Map and node that each place takes.
+    let taken: Vec<Option<(usize, usize)>> = (0..grid.len())
+        .map(|node| {
+            let place = grid.place(node);
+            let seen = maps.iter().zip(&inverses).enumerate();
+            let seen = seen.filter_map(|(m, (map, inverse))| {
+                let t = (inverse * (place - map.grid.origin)).map(|x| (x + 0.5).floor());
+                let [columns, rows] = map.grid.size.map(|n| n as f64);
+                let inside = t.x >= 0.0 && t.y >= 0.0 && t.x < columns && t.y < rows;
+                inside.then(|| (m, t.y as usize * map.grid.size[0] + t.x as usize))
+            });
+            seen.min_by_key(|&(m, n)| maps[m].mask[n])
+        })
+        .collect();
+    let mut out = TwistStrainMap::empty(grid, first.window_nm);
+    out.grid = grid;
+    let mask = |t: &Option<(usize, usize)>| t.map_or(Mask::Margin, |(m, n)| maps[m].mask[n]);
+    out.mask = taken.iter().map(mask).collect();
+    let planes: Vec<Vec<&mut Vec<f32>>> = maps.iter_mut().map(TwistStrainMap::planes_mut).collect();
+    for (i, plane) in out.planes_mut().into_iter().enumerate() {
+        let value = |t: &Option<(usize, usize)>| t.map_or(f32::NAN, |(m, n)| planes[m][i][n]);
+        *plane = taken.iter().map(value).collect();
+    }
+    Some((out, taken.into_iter().map(|t| t.map(|(m, _)| m)).collect()))
 }
 
 #[cfg(test)]
@@ -104,5 +125,24 @@ mod tests {
         }
         assert_eq!(all.mask[..3], [Mask::Weak, Mask::Weak, Mask::Good]);
         assert_eq!(all.mask[5], Mask::Margin);
+        assert!(all.grain.is_empty());
+    }
+
+    #[test]
+    fn grains_are_numbered_where_they_are_good() {
+        let maps = vec![
+            map(4, 0.0, 10.0, Mask::Good),
+            map(3, 4.2, 20.0, Mask::Good),
+            map(2, 12.0, 30.0, Mask::Weak),
+        ];
+        let all = TwistStrainMap::of_grains(maps).unwrap();
+        // Where two are good the first is taken.
+        assert_eq!(all.grain, [1, 1, 1, 1, 2, 0, 0, 0].repeat(2));
+        assert!(
+            all.displacement
+                .iter()
+                .all(|p| p.value.iter().all(|u| u.is_nan()))
+        );
+        assert_eq!(all.twist.value[3..5], [13.0, 22.0]);
     }
 }

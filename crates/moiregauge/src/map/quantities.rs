@@ -69,6 +69,8 @@ pub struct TwistStrainMap {
     pub curl: Vec<f32>,
     /// Signal over noise (amplitude) under the window.
     pub signal_to_noise: Vec<f32>,
+    /// The grain that each node belongs to, counted from 1, and 0 of none; empty where the map shows one lattice.
+    pub grain: Vec<u8>,
 }
 
 impl TwistStrainMap {
@@ -90,6 +92,7 @@ impl TwistStrainMap {
             closure: Vec::new(),
             curl: curl(map),
             signal_to_noise: Vec::new(),
+            grain: Vec::new(),
         };
         for (node, found) in map.nodes.iter().zip(found) {
             let mask = match node.mask {

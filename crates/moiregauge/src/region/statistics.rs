@@ -209,6 +209,8 @@ fn curvature(map: &TwistStrainMap, nodes: &[(usize, f64)]) -> Vec<(usize, f64)> 
 pub struct RegionStatistics {
     /// The region.
     pub region: Region,
+    /// Its area, nm²; of a grain that of its nodes.
+    pub area_nm2: f64,
     /// Nodes whose cells the area covers at least in part.
     pub nodes: usize,
     /// Good nodes.
@@ -234,14 +236,35 @@ pub struct RegionStatistics {
 impl RegionStatistics {
     /// The good nodes of a map within a region.
     pub fn new(map: &TwistStrainMap, region: &Region) -> Self {
-        let shares = region.shares(&map.grid);
+        Self::of_nodes(map, region, region.area(), &region.shares(&map.grid))
+    }
+
+    /// The good nodes of a grain of a map, which has no corners; `None` where no node is of it.
+    pub fn of_grain(map: &TwistStrainMap, number: u8) -> Option<Self> {
+        let all = map.grain.iter().enumerate();
+        let own = all.filter(|(_, grain)| **grain == number);
+        let nodes: Vec<(usize, f64)> = own.map(|(node, _)| (node, 1.0)).collect();
+        let region = Region {
+            name: format!("grain {number}"),
+            corners: Vec::new(),
+        };
+        let area = nodes.len() as f64 * map.node_area();
+        (!nodes.is_empty()).then(|| Self::of_nodes(map, &region, area, &nodes))
+    }
+
+    fn of_nodes(
+        map: &TwistStrainMap,
+        region: &Region,
+        area_nm2: f64,
+        shares: &[(usize, f64)],
+    ) -> Self {
         let (good, masked): (Vec<_>, Vec<_>) = shares
             .iter()
             .copied()
             .partition(|(n, _)| map.mask[*n] == Mask::Good);
         let of_mask = |m: Mask| masked.iter().filter(|(n, _)| map.mask[*n] == m).count();
         let sum = |nodes: &[(usize, f64)]| nodes.iter().map(|n| n.1).sum::<f64>();
-        let (all, believed) = (sum(&shares), sum(&good));
+        let (all, believed) = (sum(shares), sum(&good));
         let counts = (shares.len(), good.len());
         let area = Area::new(map, good);
         let twist = area.plane(&map.twist);
@@ -268,6 +291,7 @@ impl RegionStatistics {
         });
         Self {
             region: region.clone(),
+            area_nm2,
             nodes: counts.0,
             good: counts.1,
             masked: Mask::ALL
@@ -276,7 +300,7 @@ impl RegionStatistics {
                 .filter(|(_, count)| *count > 0)
                 .collect(),
             masked_share: 1.0 - if all > 0.0 { believed / all } else { 0.0 },
-            covered: (all * map.node_area() / region.area()).min(1.0),
+            covered: (all * map.node_area() / area_nm2).min(1.0),
             twist,
             strain,
             mean,

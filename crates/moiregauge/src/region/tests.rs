@@ -42,6 +42,7 @@ pub(crate) fn made(twist: impl Fn(Vector2<f64>) -> f64, sigma: f64) -> TwistStra
         closure: vec![1.0; places.len()],
         curl: vec![0.0; places.len()],
         signal_to_noise: vec![10.0; places.len()],
+        grain: Vec::new(),
     }
 }
 

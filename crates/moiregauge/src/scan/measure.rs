@@ -6,7 +6,7 @@ use spmfile::{Channel, FrameDirection, Scan};
 use crate::calibration::Calibration;
 use crate::caveat::files::FileDoubt;
 use crate::caveat::lattices::LatticeDoubt;
-use crate::caveat::{Caveat, Doubt};
+use crate::caveat::{Caveat, Doubt, each_once};
 use crate::frame::geometry::Geometry;
 use crate::frame::image::Image;
 use crate::frame::polygon;
@@ -154,8 +154,8 @@ fn measure_with(
     }
     caveats.extend(failures.iter().map(|error| left_out(error, file)));
     about_calibration(file, scan, moires.iter().flatten(), settings, &mut caveats);
-    caveats.dedup_by(|a, b| a.says_the_same(b));
-    once(&mut caveats);
+    each_once(&mut caveats);
+    grains_once(&mut caveats);
     let channel = &channels[0].name;
     let of_moire = |lines| joined(file, scan, channel, lines, caveats.clone());
     Ok(moires.into_iter().map(of_moire).collect())
@@ -204,7 +204,7 @@ fn joined(
 }
 
 /// Trace and retrace say the same of the grains beside the largest: once is enough.
-fn once(caveats: &mut Vec<Caveat>) {
+fn grains_once(caveats: &mut Vec<Caveat>) {
     let mut said = false;
     caveats.retain(|caveat| match &caveat.doubt {
         Doubt::Lattice(LatticeDoubt::SeveralGrains { .. }) => !std::mem::replace(&mut said, true),

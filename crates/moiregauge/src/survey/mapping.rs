@@ -86,10 +86,46 @@ pub fn map_scan(
     method: MapMethod,
     resolution: &Resolution,
 ) -> Result<Vec<LineMap>, MapError> {
+    let wanted = (method, resolution, Part::Frame);
+    map_lines(scan, analysed, origin, settings, wanted)
+}
+
+/// The same of one grain of several: what lies beside its patch is left out.
+///
+/// # Errors
+/// [`MapError`], where none of its images gives a map.
+pub fn map_grain(
+    scan: &Scan,
+    analysed: &ScanAnalysis,
+    origin: Option<f64>,
+    settings: &Settings,
+    method: MapMethod,
+    resolution: &Resolution,
+) -> Result<Vec<LineMap>, MapError> {
+    let wanted = (method, resolution, Part::Patch);
+    map_lines(scan, analysed, origin, settings, wanted)
+}
+
+/// What of a frame is mapped.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Part {
+    /// All of it: nodes say themselves whether they are of the lattice.
+    Frame,
+    /// The patch that the lattice was measured on: beside it is another.
+    Patch,
+}
+
+fn map_lines(
+    scan: &Scan,
+    analysed: &ScanAnalysis,
+    origin: Option<f64>,
+    settings: &Settings,
+    wanted: (MapMethod, &Resolution, Part),
+) -> Result<Vec<LineMap>, MapError> {
     let channels = channels(scan, settings).map_err(|_| MapError::NoImage)?;
     let (mut maps, mut error) = (Vec::new(), MapError::NoImage);
     for channel in channels {
-        match map_line(scan, channel, analysed, settings, method, resolution) {
+        match map_line(scan, channel, analysed, settings, wanted) {
             Ok(mut map) => {
                 map.map.move_by(-drifted(analysed, origin));
                 maps.push(map);
@@ -117,8 +153,7 @@ fn map_line(
     channel: &Channel,
     analysed: &ScanAnalysis,
     settings: &Settings,
-    method: MapMethod,
-    resolution: &Resolution,
+    (method, resolution, part): (MapMethod, &Resolution, Part),
 ) -> Result<LineMap, MapError> {
     let (place, found) = place_of(scan, channel, analysed, settings).ok_or(MapError::NoImage)?;
     let still = place.still(analysed.drift);
@@ -134,6 +169,7 @@ fn map_line(
         MapMethod::Tiles => 1.0,
     };
     resolution.fits(geometry.extent(), widths)?;
+    let patch = found.patch.as_ref().filter(|_| part == Part::Patch);
     let (map, harmonics, noise_measured, margin) = match method {
         MapMethod::Demodulation => {
             let mut image = flat_image_of(channel, settings.background);
@@ -142,12 +178,18 @@ fn map_line(
                 let even = even_image(&image, pair, &geometry, background);
                 image = even.unwrap_or(image);
             }
+            if let Some(patch) = patch {
+                image = patch.of(&image);
+            }
             let waves = local_lattices(&image, &reference, resolution).ok_or(MapError::TooSmall)?;
             let map = LatticeMap::new(&waves, placed).ok_or(MapError::NoImage)?;
             (map, waves.harmonics, waves.noise_measured, waves.margin)
         }
         MapMethod::Tiles => {
-            let image = image_of(channel);
+            let mut image = image_of(channel);
+            if let Some(patch) = patch {
+                image = patch.of(&image);
+            }
             let map = tile_map(&image, &geometry, placed, &reference, resolution, settings);
             (map.ok_or(MapError::TooSmall)?, Vec::new(), true, 0.0)
         }

@@ -2,8 +2,8 @@
 
 use spmfile::{LineDirection, Scan};
 
-use crate::caveat::Caveat;
 use crate::caveat::patterns::PatternDoubt;
+use crate::caveat::{Caveat, each_once};
 use crate::frame::geometry::Geometry;
 use crate::frame::image::Image;
 use crate::lattice::start::Start;
@@ -80,7 +80,7 @@ fn frames(
             });
         }
     }
-    caveats.dedup_by(|a, b| a.says_the_same(b));
+    each_once(caveats);
     Ok((name, frames))
 }
 
