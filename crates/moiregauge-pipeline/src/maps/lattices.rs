@@ -284,7 +284,13 @@ fn side_by_side(
                 caveats.push(doubt);
             }
         }
-        images.append(&mut grain.images);
+        for image in grain.images {
+            let known =
+                |other: &MappedImage| [&other.file, &other.line] == [&image.file, &image.line];
+            if !images.iter().any(known) {
+                images.push(image);
+            }
+        }
         failed.append(&mut grain.failed);
         picture = picture.or(grain.picture);
         drift_change = drift_change.or(grain.drift_change);
