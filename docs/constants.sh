@@ -91,6 +91,7 @@ scan/shells SUSPECTED second half double
 scan/shells CONFIRMED second half double
 lattice/measure SECOND_SHELL second half double
 lattice/measure OUTSHINES second,step half double
+lattice/measure REPEATS few half double
 lattice/measure FEWEST_BESIDE second,step half double
 lattice/ground PERIODS step,bump half double
 lattice/ground ROUNDS step,bump half double
