@@ -66,6 +66,7 @@ const HINTS: [(&str, &str); 43] = [
     ),
     ("no-twist-strain", "--layers UPPER/LOWER"),
     ("map-not-drift-corrected", "--drift X Y"),
+    ("map-of-grains", "--grain N"),
     (
         "map-narrow-margin",
         "--margin 2, which leaves the outer nodes out",

@@ -170,7 +170,7 @@ explain! { MapDoubt:
     OfGrains "map-of-grains" Note
         "Several grains lie side by side in the map. Each node is measured in its own grain, and the results are those of \
          each grain. There is no mean of all, no displacement, registry or averaged cell."
-        "To have these of one grain, map it alone (`--grain`)."
+        "To have these of one grain, map it alone."
     NoiseGuessed "map-noise-guessed" Warning
         "The frame is too small to measure the noise between the harmonics. The errors of the map were estimated from \
          the residual of the lattice fit, and may be wrong."
