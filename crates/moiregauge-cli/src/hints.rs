@@ -1,7 +1,7 @@
 //! Options of this program that help against what is doubtful.
 
 /// By the code of a caveat.
-const HINTS: [(&str, &str); 43] = [
+const HINTS: [(&str, &str); 44] = [
     ("several-images", "--channel NAME or --image N"),
     ("channel-chosen", "--channel NAME"),
     ("nothing-excluded", "--exclude NAME with the name of a file"),
