@@ -7,9 +7,9 @@ The frames are simulated first and then come one by one: the next one when the l
 after some of them, the memory that the program has, the time from a frame to its line (the two looks, 50 ms apart, that tell
 that it is whole are in it), and the time of the processor that the frame took. Linux only.
 
-Measured on two busy processors: 28 MB after 100 frames and 40 MB after 500, 29 kB a frame. It cannot be constant, since all frames are
-fitted together. Of each frame 13 kB stay: lattices, geometry and times of both lines (4.5 kB), samples that tell copies of a file (4 kB), what the
-fits leave around the waves (2 kB), harmonics, names and hashes (2 kB). 14 kB more are needed while the frames are fitted: normal equations, their
+Measured on two busy processors: 26 MB after 100 frames and 39 MB after 500, 31 kB a frame. It cannot be constant, since all frames are
+fitted together. Of each frame 16 kB stay: lattices, geometry and times of both lines (4.5 kB), samples that tell copies of a file (4 kB), what the
+fits leave around the waves (5 kB), harmonics, names and hashes (2 kB). 14 kB more are needed while the frames are fitted: normal equations, their
 derivatives, and the numbers of each scan; the rest is what the allocator holds. A frame takes longer the more there are. With a release it took
 0.03 s of CPU after 10 frames, 0.09 s after 100, 0.35 s after 300 and 0.61 s after 500.
 """
