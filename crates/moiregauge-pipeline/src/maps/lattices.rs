@@ -1,6 +1,6 @@
 //! Scans that show a lattice → their maps, and the average of these.
 
-use moiregauge::campaign::{Analysis, ScanAnalysis, grains, picture};
+use moiregauge::campaign::{Analysis, ScanAnalysis, SetAnalysis, grains, picture};
 use moiregauge::caveat::Caveat;
 use moiregauge::domains::{Contrast, DomainMap};
 use moiregauge::map::{Agreement, DriftChange, RegistryMap, TwistStrainMap};
@@ -102,7 +102,7 @@ impl Scans<'_> {
                 // The maps read the lattice under the name that the analysis found.
                 let settings = &self.analysis.named_settings();
                 let maps = self.maps(settings, method, resolution, None, job);
-                self.averaged(maps, settings, resolution, caveats)
+                self.averaged(maps, None, settings, resolution, caveats)
             }
             Some(grains) => self.of_grains(&grains, method, resolution, job, caveats),
         }
@@ -117,18 +117,24 @@ impl Scans<'_> {
         job: &Job,
         caveats: Vec<Caveat>,
     ) -> Result<Mapped, NoMap> {
-        let (mut found, mut failed) = (Vec::<Mapped>::new(), Vec::new());
-        for sets in grains {
+        let (mut found, mut failed) = (Vec::<(u8, Mapped)>::new(), Vec::new());
+        for (number, sets) in (1..).zip(grains).filter(|(_, sets)| !sets.is_empty()) {
             let settings = &self.analysis.named_settings_of(sets);
-            let first = found.first().map(|first| first.map.window_nm);
+            let first = found.first().map(|(_, first)| first.map.window_nm);
             let resolution = &Resolution {
                 window_nm: resolution.window_nm.or(first),
                 ..*resolution
             };
-            let maps = self.maps(settings, method, resolution, Some(sets), job);
-            match self.averaged(maps, settings, resolution, Vec::new()) {
-                Ok(mapped) => found.push(mapped),
-                Err(NoMap::Nothing { failed: of_grain }) => failed.extend(of_grain),
+            let (maps, shown, without) = self.maps(settings, method, resolution, Some(sets), job);
+            let told = self.analysis.settings.grain.unwrap_or(number.into());
+            failed.extend(without.into_iter().map(|file| FailedInput {
+                error: format!("grain {told}: {}", file.error),
+                ..file
+            }));
+            let maps = (maps, shown, Vec::new());
+            match self.averaged(maps, Some(sets), settings, resolution, Vec::new()) {
+                Ok(mapped) => found.push((number, mapped)),
+                Err(NoMap::Nothing { .. }) => {}
                 Err(cancelled) => return Err(cancelled),
             }
         }
@@ -136,7 +142,7 @@ impl Scans<'_> {
             return side_by_side(found, failed, caveats)
                 .ok_or(NoMap::Nothing { failed: Vec::new() });
         }
-        let Some(mut alone) = found.pop() else {
+        let Some((_, mut alone)) = found.pop() else {
             return Err(NoMap::Nothing { failed });
         };
         alone.caveats.splice(0..0, caveats);
@@ -144,10 +150,11 @@ impl Scans<'_> {
         Ok(alone)
     }
 
-    /// The average of the maps of some scans, and what came with it; doubts follow on `caveats`.
+    /// The average of the maps of all scans, or of those of a grain in its sets, and what came with it; doubts follow on `caveats`.
     fn averaged(
         &self,
         (mut maps, shown, failed): (Vec<LineMap>, FirstImage, Vec<FailedInput>),
+        grain: Option<&[usize]>,
         settings: &Settings,
         resolution: &Resolution,
         mut caveats: Vec<Caveat>,
@@ -177,7 +184,10 @@ impl Scans<'_> {
             |m: &LineMap| mapped_image(&m.file, Some(m.line), m.drift_corrected, &m.harmonics);
         Ok(Mapped {
             map: TwistStrainMap::new(&lattices, &found),
-            whole: whole_image(self.analysis),
+            whole: match grain {
+                Some(sets) => whole_set(&self.analysis.sets[sets[0]]),
+                None => whole_image(self.analysis),
+            },
             images: maps.iter().map(image).collect(),
             picture: shown.picture,
             pattern: shown.pattern,
@@ -271,14 +281,14 @@ impl Scans<'_> {
 /// The maps of grains as one. What counts from the mean lattice of one of them (displacements, registry, averaged cell) is left out, and so
 /// is a mean over all.
 fn side_by_side(
-    found: Vec<Mapped>,
-    mut failed: Vec<FailedInput>,
+    found: Vec<(u8, Mapped)>,
+    failed: Vec<FailedInput>,
     mut caveats: Vec<Caveat>,
 ) -> Option<Mapped> {
     let grains = found.len();
     let (mut maps, mut images, mut picture, mut drift_change) =
         (Vec::new(), Vec::new(), None, None);
-    for mut grain in found {
+    for (number, grain) in found {
         for doubt in grain.caveats {
             if !caveats.iter().any(|known| known.says_the_same(&doubt)) {
                 caveats.push(doubt);
@@ -291,10 +301,9 @@ fn side_by_side(
                 images.push(image);
             }
         }
-        failed.append(&mut grain.failed);
         picture = picture.or(grain.picture);
         drift_change = drift_change.or(grain.drift_change);
-        maps.push(grain.map);
+        maps.push((number, grain.map));
     }
     caveats.push(doubts::of_grains(grains));
     Some(Mapped {
@@ -317,7 +326,11 @@ fn whole_image(analysis: &Analysis) -> Option<TwistStrainResult> {
         let found = &combined.twist_strain;
         return Some(TwistStrainResult::of_mean(found, &combined.budget));
     }
-    let set = analysis.sets.first()?;
+    whole_set(analysis.sets.first()?)
+}
+
+/// The same of the images of a set.
+fn whole_set(set: &SetAnalysis) -> Option<TwistStrainResult> {
     let mean = set.mean.as_ref().or(set.uncorrected.as_ref());
     let scan = set.scans.first();
     mean.map(|m| TwistStrainResult::of_mean(&m.twist_strain, &m.budget))

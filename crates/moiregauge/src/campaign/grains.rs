@@ -15,8 +15,8 @@ use crate::numbers::chi2;
 const CONTRADICTED: f64 = 1e-6;
 /// The drift of one set is believed against that of another whose variance is so many times as large; else neither is.
 const BETTER_KNOWN: f64 = 9.0;
-/// Sets of other scans show a grain if their vectors differ by less than this share of them: more than drift that is not known does in two
-/// slow axes, and less than grains that are told from each other by eye. Of several grains it is the nearest.
+/// A set of other scans shows the nearest of the grains, if their vectors differ by less than this share of them: drift that is not known makes a few
+/// per cent between two slow axes. Chosen by eye.
 const SAME_GRAIN: f64 = 0.05;
 /// nm/s → nm/min.
 const PER_MINUTE: f64 = 60.0;
@@ -48,8 +48,8 @@ pub(crate) fn agree_on_drift(sets: &mut [SetAnalysis], caveats: &mut Vec<Caveat>
     }
 }
 
-/// The grains that lie side by side in the frames, each with the numbers of its sets; sets without a result are left out. `None` where the
-/// frames show one lattice.
+/// The grains that lie side by side in the frames, in the order of their names, each with the numbers of its sets that have a result; a grain without
+/// any keeps its place. `None` where the frames show one lattice.
 ///
 /// Sets of one scan are different grains; a set of other scans shows the grain whose lattice is the nearest.
 pub fn grains(analysis: &Analysis) -> Option<Vec<Vec<usize>>> {
@@ -64,6 +64,10 @@ pub fn grains(analysis: &Analysis) -> Option<Vec<Vec<usize>>> {
     let told = analysis.settings.grain.is_some() || analysis.caveats.iter().any(is_several);
     if shared.is_empty() && !told {
         return None;
+    }
+    let with_result = |set: &usize| sets[*set].mean.is_some() || sets[*set].uncorrected.is_some();
+    if shared.is_empty() {
+        return Some(vec![(0..sets.len()).filter(with_result).collect()]);
     }
     let lattices: Vec<Option<Lattice>> = sets.iter().map(lattice_of).collect();
     let mut found: Vec<Vec<usize>> = Vec::new();
@@ -83,13 +87,17 @@ pub fn grains(analysis: &Analysis) -> Option<Vec<Vec<usize>>> {
             None => found.push(vec![set]),
         }
     }
+    for grain in &mut found {
+        grain.retain(with_result);
+    }
     Some(found)
 }
 
-/// The lattice of a set that has a result.
+/// The lattice of a set, that of its first scan where it has no result.
 fn lattice_of(set: &SetAnalysis) -> Option<Lattice> {
     let mean = set.mean.as_ref().or(set.uncorrected.as_ref());
-    mean.map(|mean| mean.lattice)
+    let scan = || set.scans.first().map(|scan| scan.sensor);
+    mean.map(|mean| mean.lattice).or_else(scan)
 }
 
 /// By how much two drifts differ, nm/min, where that is no chance. What the user gave is no measurement.

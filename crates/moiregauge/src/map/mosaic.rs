@@ -17,12 +17,13 @@ impl TwistStrainMap {
         Some(put_together(maps)?.0)
     }
 
-    /// The same of the maps of grains that lie side by side, with the number of the grain at each good node. Displacements count from
+    /// The same of the maps of grains that lie side by side, each with its number, which each good node then has. Displacements count from
     /// the mean lattice of a grain and do not go on in another: there are none.
-    pub fn of_grains(maps: Vec<Self>) -> Option<Self> {
+    pub fn of_grains(maps: Vec<(u8, Self)>) -> Option<Self> {
+        let (numbers, maps): (Vec<u8>, Vec<Self>) = maps.into_iter().unzip();
         let (mut all, taken) = put_together(maps)?;
         let grain = |(taken, mask): (&Option<usize>, &Mask)| match taken {
-            Some(map) if *mask == Mask::Good => u8::try_from(map + 1).unwrap_or(u8::MAX),
+            Some(map) if *mask == Mask::Good => numbers[*map],
             _ => 0,
         };
         all.grain = taken.iter().zip(&all.mask).map(grain).collect();
@@ -131,13 +132,13 @@ mod tests {
     #[test]
     fn grains_are_numbered_where_they_are_good() {
         let maps = vec![
-            map(4, 0.0, 10.0, Mask::Good),
-            map(3, 4.2, 20.0, Mask::Good),
-            map(2, 12.0, 30.0, Mask::Weak),
+            (1, map(4, 0.0, 10.0, Mask::Good)),
+            (3, map(3, 4.2, 20.0, Mask::Good)),
+            (4, map(2, 12.0, 30.0, Mask::Weak)),
         ];
         let all = TwistStrainMap::of_grains(maps).unwrap();
         // Where two are good the first is taken.
-        assert_eq!(all.grain, [1, 1, 1, 1, 2, 0, 0, 0].repeat(2));
+        assert_eq!(all.grain, [1, 1, 1, 1, 3, 0, 0, 0].repeat(2));
         assert!(
             all.displacement
                 .iter()
