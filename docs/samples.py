@@ -14,7 +14,7 @@ import tempfile
 
 # One of each class, and images without any lattice.
 SAMPLES = [
-    "clean", "edge", "hole", "hole:count=8", "bump", "island", "grains", "twist-wave", "strain-wave", "twist-gradient",
+    "clean", "edge", "fade", "hole", "hole:count=8", "bump", "island", "grains", "twist-wave", "strain-wave", "twist-gradient",
     "strain-gradient", "walls", "second-shell", "atoms", "step", "terrain", "stripes", "hum", "scars", "glitches", "lag",
     "bare", "bare+terrain", "bare+ripples", "bare+stripes", "bare+hum+scars",
 ]

@@ -84,7 +84,7 @@ const WAVE_HEIGHT: Key = key("amplitude", "°", 1.0, [0.5, 2.0], [0.0, 1000.0]);
 const WAVELENGTH: Key = key("wavelength", "nm", 125.0, [80.0, 250.0], [1.0, 1e6]);
 
 /// All classes.
-pub const CLASSES: [SampleClass; 22] = [
+pub const CLASSES: [SampleClass; 23] = [
     class("clean", "only the lattice", &[]),
     class(
         "edge",
@@ -99,6 +99,33 @@ pub const CLASSES: [SampleClass; 22] = [
                 TURN,
             ),
             key("height", "of the empty part, °", 0.0, [-3.0, 3.0], HEIGHT),
+        ],
+    ),
+    class(
+        "fade",
+        "the contrast of the moiré falls across a straight line: ten to ninety in a hundred within 4.4 widths",
+        &[
+            key(
+                "share",
+                "share with more than half of the contrast",
+                0.5,
+                [0.4, 0.85],
+                [0.02, 0.98],
+            ),
+            key(
+                "angle",
+                "direction in which it falls, °",
+                20.0,
+                [0.0, 360.0],
+                TURN,
+            ),
+            key(
+                "width",
+                "of the logistic function, share of the frame's side",
+                0.05,
+                [0.01, 0.1],
+                [1e-6, 1.0],
+            ),
         ],
     ),
     class(
@@ -459,9 +486,10 @@ impl SampleClass {
 
 /// Samples that a program ought to be tried on: one of each class, and images without any lattice. Classes joined by `+`
 /// come together.
-pub const TRIED: [&str; 26] = [
+pub const TRIED: [&str; 27] = [
     "clean",
     "edge",
+    "fade",
     "hole",
     "hole:count=8",
     "bump",

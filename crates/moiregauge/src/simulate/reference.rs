@@ -27,7 +27,12 @@ pub(crate) struct HalfPlane {
 
 impl HalfPlane {
     pub(crate) fn has(&self, at: Vector2<f64>) -> bool {
-        self.normal.dot(&at) > self.at
+        self.inside(at) > 0.0
+    }
+
+    /// How far a place lies in it, nm; negative beyond its line.
+    pub(crate) fn inside(&self, at: Vector2<f64>) -> f64 {
+        self.normal.dot(&at) - self.at
     }
 }
 

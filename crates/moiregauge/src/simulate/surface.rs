@@ -22,6 +22,7 @@ pub(crate) struct Surface {
     pub(crate) boundaries: Vec<HalfPlane>,
     pub(crate) bends: Vec<Bend>,
     empty: Vec<Empty>,
+    fades: Vec<Fade>,
     bumps: Vec<Bump>,
     steps: Vec<(HalfPlane, f64)>,
     /// Ground without a lattice.
@@ -47,6 +48,14 @@ enum Shape {
         centre: Vector2<f64>,
         radius: f64,
     },
+}
+
+/// Contrast that falls across a line.
+#[derive(Clone, Copy, Debug)]
+struct Fade {
+    /// Where less than half of it is left.
+    beyond: HalfPlane,
+    width: f64,
 }
 
 /// A smooth bump.
@@ -80,6 +89,7 @@ impl Surface {
                 .filter_map(|f| Bend::of(f, &reference, poisson_ratio))
                 .collect(),
             empty: Vec::new(),
+            fades: Vec::new(),
             bumps: Vec::new(),
             steps: Vec::new(),
             ground: Vec::new(),
@@ -106,6 +116,10 @@ impl Surface {
         let middle = || reference.place(value("x"), value("y"));
         match feature.class.as_str() {
             "edge" => self.empty(Shape::Beyond(beyond()), value("height")),
+            "fade" => self.fades.push(Fade {
+                beyond: beyond(),
+                width: value("width") * reference.side(),
+            }),
             "island" => {
                 let radius = (value("share") * area / std::f64::consts::PI).sqrt();
                 let centre = middle();
@@ -199,7 +213,8 @@ impl Surface {
             return 0.0;
         }
         let left = |bump: &Bump| 1.0 - (1.0 - bump.keep) * bump.form(at);
-        self.bumps.iter().map(left).product()
+        let bumps: f64 = self.bumps.iter().map(left).product();
+        bumps * self.fades.iter().map(|fade| fade.left(at)).product::<f64>()
     }
 
     /// Whether there is moiré at a place: at least half of its contrast.
@@ -248,6 +263,12 @@ impl Shape {
             }
             Self::Around { centre, radius } => (at - centre).norm_squared() >= radius * radius,
         }
+    }
+}
+
+impl Fade {
+    fn left(&self, at: Vector2<f64>) -> f64 {
+        1.0 / (1.0 + (self.beyond.inside(at) / self.width).exp())
     }
 }
 

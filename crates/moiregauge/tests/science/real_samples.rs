@@ -72,6 +72,7 @@ fn a_sample_without_effect_is_the_plain_lattice() {
 fn shares_are_counted() {
     for (sample, share) in [
         ("edge:share=0.37,angle=70", 0.37),
+        ("fade:share=0.6,angle=200,width=0.1", 0.6),
         ("hole:share=0.2", 0.8),
         ("hole:share=0.12,count=6", 0.88),
         ("island:share=0.3,x=0.05", 0.3),

@@ -68,7 +68,7 @@ fn every_class_can_be_simulated() {
 #[test]
 fn what_is_not_known_is_named() {
     for (text, word) in [
-        ("edges", "one of clean, edge, hole"),
+        ("edges", "one of clean, edge, fade, hole"),
         ("edge:shar=0.4", "one of share, angle, height"),
         ("edge:share=1.4", "0.02 to 0.98"),
         ("edge:share", "numbers like share=0.4"),

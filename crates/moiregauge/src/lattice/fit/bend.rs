@@ -18,8 +18,7 @@ use nalgebra::{DMatrix, DVector, Matrix2, Matrix4, Vector2, Vector4};
 use serde::{Deserialize, Serialize};
 
 use crate::lattice::fit::folded::Bends;
-use crate::lattice::fit::frame::{BENDS, BENT, Frame, wave};
-use crate::lattice::fit::gram::gram;
+use crate::lattice::fit::frame::{BENDS, BENT, Frame, ORDERS, wave};
 use crate::lattice::fit::model::Model;
 use crate::lattice::fit::solve;
 use crate::numbers::exact;
@@ -153,19 +152,16 @@ impl Bend {
     }
 }
 
-/// Reads the bend off the residual. `noise` is the power around each harmonic along x and along y.
+/// Reads the bend off the residual. `gram`: sums of products of the waves times all powers; `noise`: the power around each harmonic along x and along y.
 pub(crate) fn inhomogeneity(
     frame: &Frame,
     model: &Model,
-    lambda: &[f64],
+    gram: &DMatrix<f64>,
     bends: &Bends,
     noise: &[[f64; 3]],
 ) -> Option<(Inhomogeneity, Bend)> {
-    let mut basis = model.basis.clone();
-    basis.orders = BENT;
-    let gram = gram(frame, &basis, &model.pair, lambda);
-    let bread = left(&gram, model, |_, _| 1.0)?;
-    let meat = left(&gram, model, |i, [a, b]| {
+    let bread = left(gram, model, |_, _| 1.0)?;
+    let meat = left(gram, model, |i, [a, b]| {
         let [x, y, _] = noise[i];
         // What bends along an axis is moved by the noise along it.
         ((a as f64 * x + b as f64 * y) / (a + b) as f64).sqrt()
@@ -239,7 +235,7 @@ fn told(bend: &DVector<f64>, chi_squared: f64) -> DVector<f64> {
 
 /// The powers of a bend.
 fn powers() -> &'static [[usize; 2]] {
-    &BENT[BENT.len() - BENDS..]
+    &BENT[ORDERS - BENDS..]
 }
 
 /// Slopes of `XᵃYᵇ` at a place.
@@ -279,7 +275,7 @@ fn score(model: &Model, bends: &Bends) -> DVector<f64> {
     for (i, sums) in bends.0.iter().enumerate() {
         let [alpha, beta] = model.waves[i];
         for (vector, index) in model.basis.indices[i].into_iter().enumerate() {
-            for (j, sum) in sums.iter().enumerate() {
+            for (j, sum) in sums[ORDERS - BENDS..].iter().enumerate() {
                 score[BENDS * vector + j] += f64::from(index) * (beta * sum.re - alpha * sum.im);
             }
         }

@@ -10,7 +10,7 @@ use crate::lattice::fit::bend::Inhomogeneity;
 use crate::lattice::fit::first::at_first;
 use crate::lattice::fit::fitted::{FittedHarmonic, LatticeFit};
 use crate::lattice::fit::folded::{Bends, Folded};
-use crate::lattice::fit::frame::{Basis, Frame};
+use crate::lattice::fit::frame::{BENT, Basis, Frame};
 use crate::lattice::fit::gram::gram;
 use crate::lattice::fit::levelled::Levelled;
 use crate::lattice::fit::leverage::Leverage;
@@ -66,7 +66,7 @@ pub(crate) struct FinalNoise {
     pub(crate) places: InPlaces,
     /// Root mean square of the residual.
     pub(crate) rms: f64,
-    /// What the residual says about a bent lattice.
+    /// What the residual says about a bent lattice, and about one whose contrast changes.
     pub(crate) bends: Bends,
 }
 
@@ -337,7 +337,7 @@ impl<'a> Fit<'a> {
 
     /// Covariance of the phases of the first three harmonics and of (p₁, p₂): what the local noise does to
     /// the seven derivatives when background and amplitudes are free.
-    fn covariance(&self, noise: &FinalNoise) -> Option<SMatrix<f64, 7, 7>> {
+    pub(crate) fn covariance(&self, noise: &FinalNoise) -> Option<SMatrix<f64, 7, 7>> {
         const FIRST: usize = FIRST_SHELL.len();
         let model = &self.model;
         let plain = solve::contraction(model, |_, _| 1.0);
@@ -355,11 +355,21 @@ impl<'a> Fit<'a> {
         Some(covariance.fixed_view::<7, 7>(0, 0).into_owned())
     }
 
+    /// `Φᵀ W Φ` of the waves times such powers.
+    pub(crate) fn gram_of(&self, orders: &'static [[usize; 2]]) -> DMatrix<f64> {
+        let (frame, model) = (&self.frame, &self.model);
+        let basis = Basis {
+            orders,
+            ..model.basis.clone()
+        };
+        gram(frame, &basis, &model.pair, &self.lines.lambda)
+    }
+
     /// How the lattice changes across the frame.
     fn inhomogeneity(&self, noise: &FinalNoise) -> Option<Inhomogeneity> {
         let (bends, acting) = (&noise.bends, noise.acting());
-        let lambda = &self.lines.lambda;
-        let found = bend::inhomogeneity(&self.frame, &self.model, lambda, bends, &acting);
+        let gram = self.gram_of(BENT);
+        let found = bend::inhomogeneity(&self.frame, &self.model, &gram, bends, &acting);
         found.map(|(inhomogeneity, _)| inhomogeneity)
     }
 
@@ -435,6 +445,7 @@ impl<'a> Fit<'a> {
             hidden: noise.residual.hidden(&self.model, self.has_offsets()),
             residual: noise.places.left.clone(),
             inhomogeneity,
+            contrast: None,
             closure,
         };
         Some((wave_vectors.lattice()?, fit))

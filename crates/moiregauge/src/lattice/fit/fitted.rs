@@ -1,11 +1,12 @@
 //! What a fit to the pixels says.
 
-use heterostrain::lattice::{Px, Waves};
+use heterostrain::lattice::{Lattice, Px, Waves};
 use nalgebra::{Matrix2, Matrix3, Vector2};
 use serde::{Deserialize, Serialize};
 
 use crate::lattice::fit::bend::{FOLLOWED, Inhomogeneity};
 use crate::lattice::fit::closure::Closure;
+use crate::lattice::fit::contrast::Contrast;
 use crate::lattice::fit::frame;
 use crate::lattice::fit::hidden::Hidden;
 use crate::lattice::fit::left::LeftOver;
@@ -55,6 +56,9 @@ pub struct LatticeFit {
     pub(crate) residual: [LeftOver; 3],
     /// How the lattice changes across the frame; `None` where the frame is too small to tell.
     pub inhomogeneity: Option<Inhomogeneity>,
+    /// How the contrast of its waves changes across the frame, where that is more than chance.
+    #[serde(default)]
+    pub(crate) contrast: Option<Contrast>,
     /// Whether the harmonics agree on one lattice; `None` where too few of them are strong. The
     /// covariance of `wave_vectors` is enlarged already where they do not.
     pub closure: Option<Closure>,
@@ -79,6 +83,13 @@ pub struct FittedHarmonic {
 }
 
 impl LatticeFit {
+    /// Of a fit to an image that was made even by such a contrast: what noise does by that is added. Returns the lattice.
+    pub(crate) fn add(&mut self, contrast: Contrast) -> Option<Lattice<Px>> {
+        self.wave_vectors.covariance += contrast.noise;
+        self.contrast = Some(contrast);
+        self.wave_vectors.lattice()
+    }
+
     /// The mean place of the pixels that count, (column, row).
     pub(crate) fn middle(&self) -> Vector2<f64> {
         self.centre + self.off_centre
@@ -127,6 +138,7 @@ impl LatticeFit {
             change.mean /= size;
             change.noise /= size * size;
         }
+        self.contrast = self.contrast.map(|contrast| contrast.in_pixels(size));
         self
     }
 }

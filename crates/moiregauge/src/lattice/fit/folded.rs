@@ -2,7 +2,7 @@
 
 use rustfft::num_complex::Complex64;
 
-use crate::lattice::fit::frame::{BENDS, BENT, Frame};
+use crate::lattice::fit::frame::{BENT, Frame, ORDERS};
 use crate::lattice::fit::tables::{Block, LANES, Tables, sum};
 use crate::numbers::widest::widest;
 
@@ -172,13 +172,13 @@ impl Folded {
     }
 }
 
-/// Correlations of lines with `XᵃYᵇ e^{iθ}` of each harmonic, for the powers that bend a lattice: real parts are those with
+/// Correlations of lines with `XᵃYᵇ e^{iθ}` of each harmonic, for the powers of [`BENT`]: real parts are those with
 /// cosines, imaginary parts those with sines.
-pub(crate) struct Bends(pub(crate) Vec<[Complex64; BENDS]>);
+pub(crate) struct Bends(pub(crate) Vec<[Complex64; ORDERS]>);
 
 impl Bends {
     pub(crate) fn new(harmonics: usize) -> Self {
-        Self(vec![[Complex64::default(); BENDS]; harmonics])
+        Self(vec![[Complex64::default(); ORDERS]; harmonics])
     }
 
     /// Those of one line.
@@ -191,7 +191,7 @@ impl Bends {
             let turn = tables.up[i][row];
             let along = [[c, s], [xc, xs], [xxc, xxs], [xxxc, xxxs]]
                 .map(|[re, im]| Complex64::new(re, im) * turn);
-            for (sum, [a, b]) in bends.0[i].iter_mut().zip(&BENT[BENT.len() - BENDS..]) {
+            for (sum, [a, b]) in bends.0[i].iter_mut().zip(BENT) {
                 *sum = along[*a] * y.powi(*b as i32);
             }
         });

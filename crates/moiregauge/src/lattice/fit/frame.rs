@@ -163,7 +163,7 @@ pub(crate) struct Basis {
 /// What a change of the wave vectors needs.
 pub(crate) const STRAIGHT: &[[usize; 2]] = &[[0, 0], [1, 0], [0, 1]];
 /// What a bent lattice needs.
-pub(crate) const BENT: &[[usize; 2]] = &[
+pub(crate) const BENT: &[[usize; 2]; ORDERS] = &[
     [0, 0],
     [1, 0],
     [0, 1],
@@ -175,7 +175,9 @@ pub(crate) const BENT: &[[usize; 2]] = &[
     [1, 2],
     [0, 3],
 ];
-/// Those of them that bend it.
+/// How many these are.
+pub(crate) const ORDERS: usize = 10;
+/// Those of them that bend it, the last ones.
 pub(crate) const BENDS: usize = 7;
 
 impl Basis {

@@ -126,8 +126,27 @@ impl Fit<'_> {
         Some((rest, ground))
     }
 
-    /// What it found, without perfect waves beside the lattice.
+    /// What it found, with contrast that changes where it does.
     fn found(
+        &self,
+        noise: &FinalNoise,
+        start: &Harmonics,
+        background: Background,
+    ) -> Option<Found> {
+        let Some(mut faded) = self.faded(noise) else {
+            return self.found_even(noise, start, background);
+        };
+        let even = self.evened(&faded);
+        let Some((fit, noise)) = self.of_even(&mut faded, &even) else {
+            return self.found_even(noise, start, background);
+        };
+        let mut found = fit.found_even(&noise, start, background)?;
+        found.lattice = found.fit.add(faded.contrast)?;
+        Some(found)
+    }
+
+    /// What it found, without perfect waves beside the lattice.
+    fn found_even(
         &self,
         noise: &FinalNoise,
         start: &Harmonics,

@@ -27,8 +27,10 @@ pub(crate) mod bend;
 pub(crate) mod beside;
 pub(crate) mod choose;
 pub(crate) mod closure;
+pub(crate) mod contrast;
 pub(crate) mod few;
 pub(crate) mod first;
+
 pub(crate) mod fit_pixels;
 pub(crate) mod fitted;
 pub(crate) mod folded;
