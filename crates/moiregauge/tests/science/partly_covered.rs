@@ -62,7 +62,7 @@ fn pulls(sample: &str, draws: u64) -> (f64, usize, f64) {
 /// χ² of ten draws is below 30 but for once in a thousand: an rms pull of 1.7.
 #[test]
 fn errors_of_partly_covered_frames_cover() {
-    for sample in ["edge", "hole", "island:share=0.35"] {
+    for sample in ["edge", "fade", "hole", "island:share=0.35"] {
         let (rms, answers, largest) = pulls(sample, 10);
         println!("{sample}: {answers} answers, rms pull {rms:.2}, largest {largest:.1}");
         assert!(answers >= 9, "{sample}: {answers}");

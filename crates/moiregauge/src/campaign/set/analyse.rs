@@ -2,14 +2,14 @@
 
 use nalgebra::Matrix2;
 
-use crate::campaign::analysis::SetAnalysis;
+use crate::campaign::analysis::{SetAnalysis, SetMean};
 use crate::campaign::group::Group;
 use crate::campaign::set::about::about_set;
 use crate::campaign::set::common::common;
 use crate::campaign::set::drift::{constant_drift, outruns, unknown};
-use crate::campaign::set::faint::too_faint;
+use crate::campaign::set::faint::{too_faint, weak};
 use crate::campaign::set::mean::{at_drift, forward_backward, without_drift};
-use crate::campaign::set::moire::{breaks, draw};
+use crate::campaign::set::moire::{breaks, draw, is_large_strain};
 use crate::campaign::set::scan::scans_at_drift;
 use crate::campaign::set::shells::{of_other_shell, of_second_shell};
 use crate::campaign::set::{joint, published};
@@ -88,6 +88,11 @@ pub(crate) fn analyse_set(
             caveats.push(Caveat::new(doubt, name));
             (uncorrected, mean) = (None, None);
         }
+        let told = mean.as_ref().or(uncorrected.as_ref());
+        if let Some(doubt) = told.and_then(|told| strained_and_weak(told, &used, settings)) {
+            caveats.push(Caveat::new(doubt, name));
+            (uncorrected, mean) = (None, None);
+        }
     }
     let set = SetAnalysis {
         name: name.clone(),
@@ -104,6 +109,21 @@ pub(crate) fn analyse_set(
     };
     about_set(&set, kept.len(), settings, caveats);
     set
+}
+
+/// Why a mean is none: its strain is larger than any that is known, and few faint images show the lattice. What was told by hand is meant.
+fn strained_and_weak(
+    told: &SetMean,
+    used: &[&MeasuredScan],
+    settings: &Settings,
+) -> Option<SetDoubt> {
+    let scans = used.len();
+    let strained = is_large_strain(told) && !settings.by_hand.says_which();
+    let weak = weak(used).filter(|_| strained);
+    weak.map(|signal_to_noise| SetDoubt::LatticeDoubtful {
+        signal_to_noise,
+        scans,
+    })
 }
 
 /// Why the lattice of a set may be another one, so that the set has no result.

@@ -9,23 +9,33 @@ use crate::scan::measured::MeasuredScan;
 /// Amplitude over noise of the weakest first wave; a lattice with more is none of terrain, whose two in 96
 /// simulated images had 4 and 6.
 const FAINT: f64 = 8.0;
-/// Power over noise of all waves together: more are not faint, though the first ones be. Three waves of [`FAINT`] have 192.
-const TOTAL: f64 = 300.0;
+/// Power over noise of all waves but the strongest together: more are not faint, though the first ones be. Two waves of [`FAINT`] have 128. One
+/// strong wave is no lattice: terrain has some with a power of 300.
+const TOTAL: f64 = 200.0;
 /// So many frames that show one lattice do not agree by chance.
 const FRAMES: usize = 3;
 
 /// The signal-to-noise ratio of the plainest image, if all of these scans are faint and too few to confirm each other.
 pub(crate) fn too_faint(scans: &[&MeasuredScan]) -> Option<f64> {
-    let mut images = scans.iter().flat_map(|scan| &scan.lines);
-    if scans.len() >= FRAMES || !images.all(|line| is_faint(&line.lattice)) {
-        return None;
-    }
-    let images = scans.iter().flat_map(|scan| &scan.lines);
-    Some(images.fold(0.0, |most, line| line.lattice.signal_to_noise.max(most)))
+    weak(scans).filter(|_| {
+        let mut images = scans.iter().flat_map(|scan| &scan.lines);
+        images.all(|line| others(&line.lattice) < TOTAL)
+    })
 }
 
-fn is_faint(lattice: &MeasuredLattice) -> bool {
+/// The same if the weakest first waves alone are faint, whatever the others: terrain has a few strong ones.
+pub(crate) fn weak(scans: &[&MeasuredScan]) -> Option<f64> {
+    let images = scans.iter().flat_map(|scan| &scan.lines);
+    let plainest = images.fold(0.0, |most, line| line.lattice.signal_to_noise.max(most));
+    (scans.len() < FRAMES && plainest < FAINT).then_some(plainest)
+}
+
+/// Power over noise of all waves but the strongest.
+fn others(lattice: &MeasuredLattice) -> f64 {
     let waves = lattice.fit.iter().flat_map(|fit| &fit.harmonics);
-    let total: f64 = waves.map(|wave| wave.signal_to_noise.powi(2)).sum();
-    lattice.signal_to_noise < FAINT && total < TOTAL
+    let powers = waves.map(|wave| wave.signal_to_noise.powi(2));
+    let [sum, strongest] = powers.fold([0.0, 0.0], |[sum, most], power| {
+        [sum + power, f64::max(most, power)]
+    });
+    sum - strongest
 }

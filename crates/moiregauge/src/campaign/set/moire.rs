@@ -57,6 +57,12 @@ pub(crate) fn breaks(mean: &SetMean, settings: &Settings) -> Option<MoireDoubt> 
     })
 }
 
+/// Whether the strain is larger than any that is known, whatever its errors.
+pub(crate) fn is_large_strain(mean: &SetMean) -> bool {
+    let [least, _] = mean.twist_strain.strain().interval_95();
+    least > LARGE_STRAIN
+}
+
 /// Draws twist and strain of every scan.
 pub(crate) fn draw(scans: &mut [ScanAnalysis], settings: &Settings, first_index: u64) {
     scans.par_iter_mut().enumerate().for_each(|(i, scan)| {
@@ -103,8 +109,7 @@ pub(crate) fn doubts(
     );
     if let Some(mean) = mean {
         caveats.extend(about_period(name, &mean.lattice, settings));
-        let [least, _] = mean.twist_strain.strain().interval_95();
-        if least > LARGE_STRAIN {
+        if is_large_strain(mean) {
             caveats.push(Caveat::new(
                 MoireDoubt::LargeStrain {
                     strain: mean.twist_strain.heterostrain().value,

@@ -1,5 +1,7 @@
 //! The fit itself: Gauss–Newton on two wave vectors, harmonics added where they earn it.
 
+use std::sync::OnceLock;
+
 use heterostrain::lattice::{Lattice, Px, Waves};
 use nalgebra::{DMatrix, DVector, Matrix2, SMatrix, Vector2};
 use rustfft::num_complex::Complex64;
@@ -68,6 +70,8 @@ pub(crate) struct FinalNoise {
     pub(crate) rms: f64,
     /// What the residual says about a bent lattice, and about one whose contrast changes.
     pub(crate) bends: Bends,
+    /// `Φᵀ W Φ` for that, once it was asked for.
+    pub(crate) bent: OnceLock<DMatrix<f64>>,
 }
 
 impl FinalNoise {
@@ -287,6 +291,7 @@ impl<'a> Fit<'a> {
             places,
             rms: (squares / freedom as f64).sqrt(),
             bends,
+            bent: OnceLock::new(),
         })
     }
 
@@ -365,11 +370,16 @@ impl<'a> Fit<'a> {
         gram(frame, &basis, &model.pair, &self.lines.lambda)
     }
 
+    /// The same times the powers that bend a lattice, and that its contrast has.
+    pub(crate) fn bent_gram<'n>(&self, noise: &'n FinalNoise) -> &'n DMatrix<f64> {
+        noise.bent.get_or_init(|| self.gram_of(BENT))
+    }
+
     /// How the lattice changes across the frame.
     fn inhomogeneity(&self, noise: &FinalNoise) -> Option<Inhomogeneity> {
         let (bends, acting) = (&noise.bends, noise.acting());
-        let gram = self.gram_of(BENT);
-        let found = bend::inhomogeneity(&self.frame, &self.model, &gram, bends, &acting);
+        let gram = self.bent_gram(noise);
+        let found = bend::inhomogeneity(&self.frame, &self.model, gram, bends, &acting);
         found.map(|(inhomogeneity, _)| inhomogeneity)
     }
 

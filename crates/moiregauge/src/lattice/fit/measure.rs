@@ -133,15 +133,16 @@ impl Fit<'_> {
         start: &Harmonics,
         background: Background,
     ) -> Option<Found> {
-        let Some(mut faded) = self.faded(noise) else {
-            return self.found_even(noise, start, background);
+        let plain = || self.found_even(noise, start, background);
+        let Some(faded) = self.faded(noise) else {
+            return plain();
         };
-        let even = self.evened(&faded);
-        let Some((fit, noise)) = self.of_even(&mut faded, &even) else {
-            return self.found_even(noise, start, background);
+        let image = self.evened(&faded);
+        let Some(even) = self.of_even(faded, &image) else {
+            return plain();
         };
-        let mut found = fit.found_even(&noise, start, background)?;
-        found.lattice = found.fit.add(faded.contrast)?;
+        let mut found = even.fit.found_even(&even.noise, start, background)?;
+        found.lattice = found.fit.add(even.contrast)?;
         Some(found)
     }
 

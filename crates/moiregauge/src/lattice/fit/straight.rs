@@ -10,7 +10,7 @@ use rustfft::num_complex::Complex64;
 use crate::frame::image::Image;
 use crate::lattice::fit::bend::{Bend, FOLLOWED, inhomogeneity};
 use crate::lattice::fit::fit_pixels::{FinalNoise, Fit};
-use crate::lattice::fit::frame::{BENT, Frame, turns, wave};
+use crate::lattice::fit::frame::{Frame, turns, wave};
 use crate::lattice::fit::model::Model;
 
 /// Steps of the bend: each is linear in it.
@@ -18,12 +18,17 @@ const STEPS: usize = 2;
 
 /// The same noise without what a bend leaves.
 pub(crate) fn without_bend(fit: &Fit, noise: FinalNoise) -> FinalNoise {
-    let gram = fit.gram_of(BENT);
     let mut total = Bend::none();
     let mut straight: Option<FinalNoise> = None;
     for _ in 0..STEPS {
         let seen = straight.as_ref().unwrap_or(&noise);
-        let found = inhomogeneity(&fit.frame, &fit.model, &gram, &seen.bends, &seen.acting());
+        let found = inhomogeneity(
+            &fit.frame,
+            &fit.model,
+            fit.bent_gram(&noise),
+            &seen.bends,
+            &seen.acting(),
+        );
         let Some((_, bend)) =
             found.filter(|(change, _)| change.stands_out() && fit.clipped() < FOLLOWED)
         else {
@@ -40,6 +45,7 @@ pub(crate) fn without_bend(fit: &Fit, noise: FinalNoise) -> FinalNoise {
     match straight {
         Some(straight) => FinalNoise {
             bends: noise.bends,
+            bent: noise.bent,
             ..straight
         },
         None => noise,
