@@ -126,28 +126,8 @@ impl Fit<'_> {
         Some((rest, ground))
     }
 
-    /// What it found, with contrast that changes where it does.
-    fn found(
-        &self,
-        noise: &FinalNoise,
-        start: &Harmonics,
-        background: Background,
-    ) -> Option<Found> {
-        let plain = || self.found_even(noise, start, background);
-        let Some(faded) = self.faded(noise) else {
-            return plain();
-        };
-        let image = self.evened(&faded);
-        let Some(even) = self.of_even(faded, &image) else {
-            return plain();
-        };
-        let mut found = even.fit.found_even(&even.noise, start, background)?;
-        found.lattice = found.fit.add(even.contrast)?;
-        Some(found)
-    }
-
     /// What it found, without perfect waves beside the lattice.
-    fn found_even(
+    fn found(
         &self,
         noise: &FinalNoise,
         start: &Harmonics,
@@ -155,12 +135,34 @@ impl Fit<'_> {
     ) -> Option<Found> {
         let foreign = noise.residual.foreign_wave(&self.frame, &self.model);
         let again = foreign.and_then(|wave| self.again_without(&wave, noise, start, background));
-        let (lattice, fit) = again.or_else(|| self.result(noise, foreign))?;
+        let (lattice, fit) = again.or_else(|| self.told(noise, None))?;
         Some(Found {
             lattice,
             fit,
             rest: None,
         })
+    }
+
+    /// What it says, with contrast that changes where it does. `strongest`: of the waves that were taken off.
+    fn told(
+        &self,
+        noise: &FinalNoise,
+        strongest: Option<ForeignWave>,
+    ) -> Option<(Lattice<Px>, LatticeFit)> {
+        let result = |fit: &Fit, noise: &FinalNoise| {
+            let beside = || noise.residual.foreign_wave(&fit.frame, &fit.model);
+            fit.result(noise, strongest.or_else(beside))
+        };
+        let faded = self.faded(noise);
+        let image = faded.as_ref().map(|faded| self.evened(faded));
+        let even = faded
+            .zip(image.as_ref())
+            .and_then(|(faded, image)| self.of_even(faded, image));
+        let Some(even) = even else {
+            return result(self, noise);
+        };
+        let (_, mut fit) = result(&even.fit, &even.noise)?;
+        Some((fit.add(even.contrast)?, fit))
     }
 
     /// The same in the image without perfect waves beside the lattice, of which `strongest` is one; `None` where there are none. What is
@@ -185,6 +187,6 @@ impl Fit<'_> {
             significance: strongest.significance * quieter.max(1.0),
             ..*strongest
         };
-        fit.result(&left, Some(told))
+        fit.told(&left, Some(told))
     }
 }
