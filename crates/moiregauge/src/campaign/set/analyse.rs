@@ -7,7 +7,7 @@ use crate::campaign::group::Group;
 use crate::campaign::set::about::about_set;
 use crate::campaign::set::common::common;
 use crate::campaign::set::drift::{constant_drift, outruns, unknown};
-use crate::campaign::set::faint::{too_faint, weak};
+use crate::campaign::set::faint::{in_all_directions, too_faint, weak};
 use crate::campaign::set::mean::{at_drift, forward_backward, without_drift};
 use crate::campaign::set::moire::{breaks, draw, is_large_strain};
 use crate::campaign::set::scan::scans_at_drift;
@@ -117,27 +117,25 @@ fn strained_and_weak(
     used: &[&MeasuredScan],
     settings: &Settings,
 ) -> Option<SetDoubt> {
-    let scans = used.len();
     let strained = is_large_strain(told) && !settings.by_hand.says_which();
     let weak = weak(used).filter(|_| strained);
-    weak.map(|signal_to_noise| SetDoubt::LatticeDoubtful {
+    weak.map(|ratio| doubtful(used, ratio))
+}
+
+/// That the lattice of these scans, with such a signal-to-noise ratio, may be none.
+fn doubtful(used: &[&MeasuredScan], signal_to_noise: f64) -> SetDoubt {
+    SetDoubt::LatticeDoubtful {
         signal_to_noise,
-        scans,
-    })
+        scans: used.len(),
+        whole: in_all_directions(used),
+    }
 }
 
 /// Why the lattice of a set may be another one, so that the set has no result.
 fn no_result(group: &Group, used: &[&MeasuredScan]) -> Option<SetDoubt> {
     let hidden = of_other_shell(group).or_else(|| of_second_shell(used));
     let hidden = hidden.map(|times| SetDoubt::ShellForLattice { times });
-    let scans = used.len();
-    let faint = || {
-        too_faint(used).map(|signal_to_noise| SetDoubt::LatticeDoubtful {
-            signal_to_noise,
-            scans,
-        })
-    };
-    hidden.or_else(faint)
+    hidden.or_else(|| too_faint(used).map(|ratio| doubtful(used, ratio)))
 }
 
 /// The scans that are not left out, by their number.

@@ -3,6 +3,8 @@
 //! The spectrum of rough terrain has peaks of its own, and of many frames some have three that add up to zero. Such lattices are
 //! faint, and other frames show others.
 
+use crate::caveat::files::FileDoubt;
+use crate::caveat::{Caveat, Doubt};
 use crate::lattice::measured::MeasuredLattice;
 use crate::scan::measured::MeasuredScan;
 
@@ -12,22 +14,45 @@ const FAINT: f64 = 8.0;
 /// Power over noise of all waves but the strongest together: more are not faint, though the first ones be. Two waves of [`FAINT`] have 128. One
 /// strong wave is no lattice: terrain has some with a power of 300.
 const TOTAL: f64 = 200.0;
-/// So many frames that show one lattice do not agree by chance.
+/// So many frames that show one lattice do not agree by chance. They may agree on terrain, which all of them show.
 const FRAMES: usize = 3;
+/// Trace and retrace pass over the same terrain. A lattice that most scans show in one of them only is none unless its weakest first wave has this amplitude
+/// over noise: two in 200 sets of terrain had up to 8. A retrace may be bad throughout.
+const CONTRADICTED: f64 = 12.0;
 
-/// The signal-to-noise ratio of the plainest image, if all of these scans are faint and too few to confirm each other.
+/// The signal-to-noise ratio of the plainest image, if all of these scans are faint and too few to confirm each other, or if most of them contradict
+/// themselves.
 pub(crate) fn too_faint(scans: &[&MeasuredScan]) -> Option<f64> {
-    weak(scans).filter(|_| {
+    let is_faint = |_: &f64| {
         let mut images = scans.iter().flat_map(|scan| &scan.lines);
         images.all(|line| others(&line.lattice) < TOTAL)
-    })
+    };
+    let contradicted = || {
+        let plainest = plainest(scans);
+        let most = 2 * in_all_directions(scans) < scans.len();
+        (most && plainest < CONTRADICTED).then_some(plainest)
+    };
+    weak(scans).filter(is_faint).or_else(contradicted)
 }
 
 /// The same if the weakest first waves alone are faint, whatever the others: terrain has a few strong ones.
 pub(crate) fn weak(scans: &[&MeasuredScan]) -> Option<f64> {
-    let images = scans.iter().flat_map(|scan| &scan.lines);
-    let plainest = images.fold(0.0, |most, line| line.lattice.signal_to_noise.max(most));
+    let plainest = plainest(scans);
     (scans.len() < FRAMES && plainest < FAINT).then_some(plainest)
+}
+
+/// How many of the scans show the lattice in every line direction that was recorded.
+pub(crate) fn in_all_directions(scans: &[&MeasuredScan]) -> usize {
+    let is_left_out =
+        |caveat: &Caveat| matches!(caveat.doubt, Doubt::Files(FileDoubt::LineLeftOut { .. }));
+    let whole = |scan: &&&MeasuredScan| !scan.caveats.iter().any(is_left_out);
+    scans.iter().filter(whole).count()
+}
+
+/// Amplitude over noise of the weakest first wave, in the image where it is largest.
+fn plainest(scans: &[&MeasuredScan]) -> f64 {
+    let images = scans.iter().flat_map(|scan| &scan.lines);
+    images.fold(0.0, |most, line| line.lattice.signal_to_noise.max(most))
 }
 
 /// Power over noise of all waves but the strongest.
