@@ -7,7 +7,7 @@ use crate::campaign::group::Group;
 use crate::campaign::set::about::about_set;
 use crate::campaign::set::common::common;
 use crate::campaign::set::drift::{constant_drift, outruns, unknown};
-use crate::campaign::set::faint::{in_all_directions, too_faint, weak};
+use crate::campaign::set::faint::{in_all_directions, too_faint, weak_for_its_strain};
 use crate::campaign::set::mean::{at_drift, forward_backward, without_drift};
 use crate::campaign::set::moire::{breaks, draw, is_large_strain};
 use crate::campaign::set::scan::scans_at_drift;
@@ -118,7 +118,7 @@ fn strained_and_weak(
     settings: &Settings,
 ) -> Option<SetDoubt> {
     let strained = is_large_strain(told) && !settings.by_hand.says_which();
-    let weak = weak(used).filter(|_| strained);
+    let weak = weak_for_its_strain(used).filter(|_| strained);
     weak.map(|ratio| doubtful(used, ratio))
 }
 

@@ -14,6 +14,8 @@ const FAINT: f64 = 8.0;
 /// Power over noise of all waves but the strongest together: more are not faint, though the first ones be. Two waves of [`FAINT`] have 128. One
 /// strong wave is no lattice: terrain has some with a power of 300.
 const TOTAL: f64 = 200.0;
+/// The same for a lattice with more strain than is known: one of terrain had 320, silicon 7 × 7, which has it as a moiré of graphene, has above 1000.
+const OF_STRAINED: f64 = 500.0;
 /// So many frames that show one lattice do not agree by chance. They may agree on terrain, which all of them show.
 const FRAMES: usize = 3;
 /// Trace and retrace pass over the same terrain. A lattice that most scans show in one of them only is none unless its weakest first wave has this amplitude
@@ -23,22 +25,24 @@ const CONTRADICTED: f64 = 12.0;
 /// The signal-to-noise ratio of the plainest image, if all of these scans are faint and too few to confirm each other, or if most of them contradict
 /// themselves.
 pub(crate) fn too_faint(scans: &[&MeasuredScan]) -> Option<f64> {
-    let is_faint = |_: &f64| {
-        let mut images = scans.iter().flat_map(|scan| &scan.lines);
-        images.all(|line| others(&line.lattice) < TOTAL)
-    };
     let contradicted = || {
         let plainest = plainest(scans);
         let most = 2 * in_all_directions(scans) < scans.len();
         (most && plainest < CONTRADICTED).then_some(plainest)
     };
-    weak(scans).filter(is_faint).or_else(contradicted)
+    few_and_weak(scans, TOTAL).or_else(contradicted)
 }
 
-/// The same if the weakest first waves alone are faint, whatever the others: terrain has a few strong ones.
-pub(crate) fn weak(scans: &[&MeasuredScan]) -> Option<f64> {
+/// The same if the lattice would have more strain than is known: terrain has a few strong waves.
+pub(crate) fn weak_for_its_strain(scans: &[&MeasuredScan]) -> Option<f64> {
+    few_and_weak(scans, OF_STRAINED)
+}
+
+fn few_and_weak(scans: &[&MeasuredScan], total: f64) -> Option<f64> {
     let plainest = plainest(scans);
-    (scans.len() < FRAMES && plainest < FAINT).then_some(plainest)
+    let mut images = scans.iter().flat_map(|scan| &scan.lines);
+    let weak = plainest < FAINT && images.all(|line| others(&line.lattice) < total);
+    (scans.len() < FRAMES && weak).then_some(plainest)
 }
 
 /// How many of the scans show the lattice in every line direction that was recorded.
