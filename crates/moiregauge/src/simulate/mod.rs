@@ -27,10 +27,11 @@ pub(crate) mod seen;
 pub(crate) mod settings;
 pub(crate) mod simulator;
 pub(crate) mod surface;
+pub(crate) mod tried;
 pub(crate) mod truth;
 pub(crate) mod vary;
 
-pub use classes::{CLASSES, Key, SampleClass, TRIED, sample_class};
+pub use classes::{CLASSES, Key, SampleClass, sample_class};
 pub use domains::DomainScene;
 pub use error::SimulateError;
 pub use feature::SampleFeature;
@@ -40,5 +41,6 @@ pub use settings::{
     Drift, FirstDirection, MOST_PIXELS, Noise, Pattern, Raster, Sample, Simulation, Window,
 };
 pub use simulator::Simulator;
+pub use tried::TRIED;
 pub use truth::{FrameTruth, Truth};
 pub use vary::vary;

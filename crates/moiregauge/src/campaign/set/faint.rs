@@ -1,7 +1,8 @@
 //! A lattice that a few faint images show may be none.
 //!
 //! The spectrum of rough terrain has peaks of its own, and of many frames some have three that add up to zero. Such lattices are
-//! faint, and other frames show others.
+//! faint. All frames of a set show the same terrain, so that a few agree; but their weakest wave hardly exceeds the noise, and many images of the set
+//! do not have it.
 
 use crate::caveat::files::FileDoubt;
 use crate::caveat::{Caveat, Doubt};

@@ -20,7 +20,7 @@ use serde::{Deserialize, Serialize};
 use crate::lattice::fit::folded::Bends;
 use crate::lattice::fit::frame::{BENDS, BENT, Frame, ORDERS, wave};
 use crate::lattice::fit::model::Model;
-use crate::lattice::fit::solve;
+use crate::lattice::fit::solve::{self, Freed};
 use crate::numbers::exact;
 use crate::spectrum::shells::FIRST_SHELL;
 
@@ -166,15 +166,11 @@ pub(crate) fn inhomogeneity(
         // What bends along an axis is moved by the noise along it.
         ((a as f64 * x + b as f64 * y) / (a + b) as f64).sqrt()
     })?;
-    // The four derivatives are free.
-    let of_pair = bread.view((0, 0), (4, 4)).into_owned().try_inverse()?;
-    let coupling = bread.view((4, 0), (2 * BENDS, 4)) * of_pair;
-    let mut free = DMatrix::zeros(2 * BENDS, 4 + 2 * BENDS);
-    free.view_mut((0, 0), (2 * BENDS, 4)).copy_from(&-&coupling);
-    free.view_mut((0, 4), (2 * BENDS, 2 * BENDS))
-        .fill_with_identity();
-    let information = &free * bread * free.transpose();
-    let variance = &free * meat * free.transpose();
+    let Freed {
+        information,
+        variance,
+        coupling,
+    } = solve::with_pair_free(bread, meat)?;
     let score = score(model, bends);
     let chi_squared = score.dot(&solve::solve(&variance, &score)?);
     let inverse = solve::inverse(&information)?;

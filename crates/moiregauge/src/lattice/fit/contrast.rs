@@ -18,9 +18,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::frame::image::Image;
 use crate::lattice::fit::fit_pixels::{FinalNoise, Fit};
-use crate::lattice::fit::frame::{BENT, turns, wave};
+use crate::lattice::fit::frame::{BENT, powers, turns, wave};
 use crate::lattice::fit::model::{AT_ONCE, Clip, Model, settled};
-use crate::lattice::fit::solve;
+use crate::lattice::fit::solve::{self, Freed};
 use crate::lattice::fit::straight::without_bend;
 use crate::lattice::fit::tables::Tables;
 use crate::numbers::dot::dot;
@@ -28,32 +28,10 @@ use crate::numbers::exact;
 
 /// χ² with nine degrees of freedom exceeds 27.9 once in a thousand; the noise that it is counted in is known to a tenth.
 const THRESHOLD: f64 = 34.0;
-/// Powers of X and Y by which the waves are multiplied.
-const FADED: &[[usize; 2]] = &[
-    [0, 0],
-    [1, 0],
-    [0, 1],
-    [2, 0],
-    [1, 1],
-    [0, 2],
-    [3, 0],
-    [2, 1],
-    [1, 2],
-    [0, 3],
-    [4, 0],
-    [3, 1],
-    [2, 2],
-    [1, 3],
-    [0, 4],
-    [5, 0],
-    [4, 1],
-    [3, 2],
-    [2, 3],
-    [1, 4],
-    [0, 5],
-];
-/// The highest of them.
+/// The highest powers of X and Y, together, by which the waves are multiplied.
 const HIGHEST: usize = 5;
+/// All of them, [`BENT`] first.
+const FADED: &[[usize; 2]; 21] = &powers();
 /// Steps of the fit.
 const STEPS: usize = 4;
 
@@ -90,6 +68,22 @@ pub(crate) struct Contrast {
 }
 
 impl Contrast {
+    /// Of the wave vectors, beside that of a fit with an even contrast. Each image has the doubt; the mean of a set keeps it
+    /// ([`Common`](crate::lattice::common::Common)).
+    pub(crate) fn covariance(&self) -> Matrix4<f64> {
+        let beside = Vector4::from_column_slice(self.beside.as_slice());
+        self.noise + beside * beside.transpose()
+    }
+
+    /// Where nothing was added to the wave vectors: the doubt is what might have been.
+    pub(crate) fn untold(self) -> Self {
+        Self {
+            shift: Matrix2::zeros(),
+            noise: Matrix4::zeros(),
+            beside: self.shift,
+        }
+    }
+
     /// The same in pixels of which `binning` make one bin along each axis.
     pub(crate) fn in_pixels(self, binning: f64) -> Self {
         Self {
@@ -102,7 +96,7 @@ impl Contrast {
 
 /// A fit with contrast that changes.
 pub(crate) struct Faded {
-    contrast: Contrast,
+    pub(crate) contrast: Contrast,
     model: Model,
     /// Of the powers.
     factors: Vec<f64>,
@@ -138,11 +132,7 @@ impl Fit<'_> {
         }
         let dear = dear?;
         Some(Faded {
-            contrast: Contrast {
-                shift: Matrix2::zeros(),
-                noise: Matrix4::zeros(),
-                beside: dear.contrast.shift,
-            },
+            contrast: dear.contrast.untold(),
             model: self.model.clone(),
             factors: Vec::new(),
             ..dear
@@ -182,22 +172,14 @@ impl Fit<'_> {
         let normal = map.transpose() * &gram * &map;
         let mut model = self.model.clone();
         model.basis.orders = orders;
-        let (terms, linear) = (model.background.len(), normal.nrows() - 3 - orders.len());
         let mut factors = vec![0.0; orders.len()];
         for _ in 0..STEPS {
             let gradient = self.gradient(&model, &factors);
             let step = solve::solve(&normal, &(map.transpose() * gradient))?;
-            for (value, change) in model.background.iter_mut().zip(step.iter()) {
-                *value += change;
-            }
-            let amplitudes = model.waves.as_flattened_mut().iter_mut();
-            for (value, change) in amplitudes.zip(step.iter().skip(terms)) {
-                *value += change;
-            }
-            for (value, change) in model.pair.iter_mut().zip(step.iter().skip(linear)) {
-                *value += change;
-            }
-            for (factor, change) in factors[1..].iter_mut().zip(step.iter().skip(linear + 4)) {
+            // The factors come last; that of the constant is in the amplitudes.
+            let (of_fit, of_factors) = step.as_slice().split_at(step.len() - (orders.len() - 1));
+            model.add(of_fit, 1.0);
+            for (factor, change) in factors[1..].iter_mut().zip(of_factors) {
                 *factor += change;
             }
         }
@@ -223,7 +205,11 @@ impl Fit<'_> {
         orders: &[[usize; 2]],
         acting: &[[f64; 3]],
     ) -> Option<Matrix4<f64>> {
-        let [information, variance, coupling] = self.of_contrast(gram, orders, acting)?;
+        let Freed {
+            information,
+            variance,
+            coupling,
+        } = self.of_contrast(gram, orders, acting)?;
         let scale = self.frame.edge().map(|e| 1.0 / e);
         let to_pixels = Matrix4::from_diagonal(&Vector4::new(scale.x, scale.y, scale.x, scale.y));
         let moved = to_pixels * coupling.transpose() * solve::inverse(&information)?;
@@ -234,7 +220,7 @@ impl Fit<'_> {
     /// χ² of the nine numbers that say whether the contrast changes.
     fn contrast_changes(&self, noise: &FinalNoise) -> Option<f64> {
         let gram = self.bent_gram(noise);
-        let [_, variance, _] = self.of_contrast(gram, BENT, &noise.acting())?;
+        let Freed { variance, .. } = self.of_contrast(gram, BENT, &noise.acting())?;
         let mut score = DVector::zeros(BENT.len() - 1);
         for ([alpha, beta], sums) in self.model.waves.iter().zip(&noise.bends.0) {
             for (score, sum) in score.iter_mut().zip(&sums[1..]) {
@@ -244,14 +230,13 @@ impl Fit<'_> {
         Some(score.dot(&solve::solve(&variance, &score)?))
     }
 
-    /// Of the factors of some powers, when background, amplitudes and wave vectors are free: the information, the variance of the score, and what they
-    /// are to a change of the pair.
+    /// Of the factors of some powers, when background, amplitudes and wave vectors are free.
     fn of_contrast(
         &self,
         gram: &DMatrix<f64>,
         orders: &[[usize; 2]],
         acting: &[[f64; 3]],
-    ) -> Option<[DMatrix<f64>; 3]> {
+    ) -> Option<Freed> {
         let count = orders.len() - 1;
         let plain = derivatives(&self.model, orders, |_, _| 1.0);
         let noisy = derivatives(&self.model, orders, |i, [a, b]| {
@@ -260,14 +245,7 @@ impl Fit<'_> {
         });
         let bread = solve::projected(gram, &plain, 4 + count)?;
         let meat = solve::projected(gram, &noisy, 4 + count)?;
-        let of_pair = bread.view((0, 0), (4, 4)).into_owned().try_inverse()?;
-        let coupling = bread.view((4, 0), (count, 4)) * of_pair;
-        let mut free = DMatrix::zeros(count, 4 + count);
-        free.view_mut((0, 0), (count, 4)).copy_from(&-&coupling);
-        free.view_mut((0, 4), (count, count)).fill_with_identity();
-        let information = &free * bread * free.transpose();
-        let variance = &free * meat * free.transpose();
-        Some([information, variance, coupling])
+        solve::with_pair_free(bread, meat)
     }
 
     /// `Φᵀ u` for the background and all waves times all powers, u what a model with such factors leaves.
@@ -368,6 +346,7 @@ fn derivatives(
         let first = terms + each * i;
         map[(first, terms + 2 * i)] = 1.0;
         map[(first + 1, terms + 2 * i + 1)] = 1.0;
+        // The constant is the amplitude itself.
         for (j, &powers) in orders.iter().enumerate().skip(1) {
             let weight = weight(i, powers);
             let (cosine, sine) = (first + 2 * j, first + 2 * j + 1);
@@ -421,15 +400,19 @@ mod tests {
         found.unwrap().fit
     }
 
-    /// Mean square of the errors of the four numbers over their variances.
+    /// Mean square of the errors of the four numbers over what noise makes of their variances.
     fn square_pull(fit: &LatticeFit, added: &Matrix2<f64>) -> f64 {
         let off = fit.wave_vectors.basis - added - pair();
-        let variances = fit.wave_vectors.covariance.diagonal();
+        let doubt = fit.contrast.map_or_else(Matrix4::zeros, |c| {
+            let beside = Vector4::from_column_slice(c.beside.as_slice());
+            beside * beside.transpose()
+        });
+        let variances = (fit.wave_vectors.covariance - doubt).diagonal();
         let squares = off.iter().zip(variances.iter()).map(|(d, v)| d * d / v);
         squares.sum::<f64>() / 4.0
     }
 
-    /// Where contrast falls slowly the errors cover what wave vectors are off; without what was added they would not.
+    /// Where contrast falls slowly the errors cover what wave vectors are off, by noise alone; without what was added they would not.
     #[test]
     fn fading_contrast_moves_no_wave_vector() {
         let (mut with, mut without, mut added) = (0.0, 0.0, 0);
@@ -437,6 +420,10 @@ mod tests {
             let fit = fitted(seed, 0.3, 0.1);
             let shift = fit.contrast.map_or_else(Matrix2::zeros, |c| c.shift);
             added += usize::from(shift != Matrix2::zeros());
+            // A single image has the doubt, too.
+            let variances = fit.wave_vectors.covariance.diagonal();
+            let doubts = shift.iter().zip(variances.iter());
+            assert!(doubts.fold(true, |all, (s, v)| all && *v > (0.3 * s).powi(2)));
             with += square_pull(&fit, &Matrix2::zeros()) / SEEDS as f64;
             without += square_pull(&fit, &shift) / SEEDS as f64;
         }

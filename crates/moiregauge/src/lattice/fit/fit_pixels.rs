@@ -152,7 +152,7 @@ impl<'a> Fit<'a> {
             let turn = step.rows(n - 4, 4).amax();
             // Never by more than a quarter of the radius of convergence at once.
             let share = (std::f64::consts::FRAC_PI_8 / turn).min(1.0);
-            self.apply(&step, share);
+            self.model.add(step.as_slice(), share);
             let change = self.model.pair - self.origin;
             let third = change.column(1) - change.column(0);
             if !(change.amax().max(third.amax()) < std::f64::consts::FRAC_PI_2) {
@@ -186,20 +186,6 @@ impl<'a> Fit<'a> {
         self.clipped = seen.clipped;
         let decrement = step.dot(&right);
         Some((step, decrement))
-    }
-
-    fn apply(&mut self, step: &DVector<f64>, share: f64) {
-        let terms = self.model.background.len();
-        for (value, change) in self.model.background.iter_mut().zip(step.iter()) {
-            *value += share * change;
-        }
-        for (i, wave) in self.model.waves.iter_mut().enumerate() {
-            wave[0] += share * step[terms + 2 * i];
-            wave[1] += share * step[terms + 2 * i + 1];
-        }
-        for (i, value) in self.model.pair.iter_mut().enumerate() {
-            *value += share * step[step.len() - 4 + i];
-        }
     }
 
     /// Looks at the lines: leaves out bad ones, gives them offsets where these matter. Whether that

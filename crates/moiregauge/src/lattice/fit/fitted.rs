@@ -83,9 +83,9 @@ pub struct FittedHarmonic {
 }
 
 impl LatticeFit {
-    /// Of a fit to an image that was made even by such a contrast: what noise does by that is added. Returns the lattice.
+    /// What such a contrast adds to the covariance, noise and what it may have missed; the fit is one to an image that was made even by it. Returns the lattice.
     pub(crate) fn add(&mut self, contrast: Contrast) -> Option<Lattice<Px>> {
-        self.wave_vectors.covariance += contrast.noise;
+        self.wave_vectors.covariance += contrast.covariance();
         self.contrast = Some(contrast);
         self.wave_vectors.lattice()
     }

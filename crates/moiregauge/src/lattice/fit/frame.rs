@@ -161,24 +161,27 @@ pub(crate) struct Basis {
 }
 
 /// What a change of the wave vectors needs.
-pub(crate) const STRAIGHT: &[[usize; 2]] = &[[0, 0], [1, 0], [0, 1]];
+pub(crate) const STRAIGHT: &[[usize; 2]] = &powers::<3>();
 /// What a bent lattice needs.
-pub(crate) const BENT: &[[usize; 2]; ORDERS] = &[
-    [0, 0],
-    [1, 0],
-    [0, 1],
-    [2, 0],
-    [1, 1],
-    [0, 2],
-    [3, 0],
-    [2, 1],
-    [1, 2],
-    [0, 3],
-];
+pub(crate) const BENT: &[[usize; 2]; ORDERS] = &powers();
 /// How many these are.
 pub(crate) const ORDERS: usize = 10;
 /// Those of them that bend it, the last ones.
 pub(crate) const BENDS: usize = 7;
+
+/// The first powers (a, b) of `XᵃYᵇ`: by degree, then by that of Y.
+pub(crate) const fn powers<const N: usize>() -> [[usize; 2]; N] {
+    let mut all = [[0; 2]; N];
+    let (mut i, mut degree, mut b) = (1, 1, 0);
+    while i < N {
+        all[i] = [degree - b, b];
+        (i, b) = (i + 1, b + 1);
+        if b > degree {
+            (degree, b) = (degree + 1, 0);
+        }
+    }
+    all
+}
 
 impl Basis {
     /// A background of total degree `degree`. Where every line has an offset of its own

@@ -153,16 +153,15 @@ impl Fit<'_> {
             let beside = || noise.residual.foreign_wave(&fit.frame, &fit.model);
             fit.result(noise, strongest.or_else(beside))
         };
-        let faded = self.faded(noise);
-        let image = faded.as_ref().map(|faded| self.evened(faded));
-        let even = faded
-            .zip(image.as_ref())
-            .and_then(|(faded, image)| self.of_even(faded, image));
-        let Some(even) = even else {
+        let Some(faded) = self.faded(noise) else {
             return result(self, noise);
         };
-        let (_, mut fit) = result(&even.fit, &even.noise)?;
-        Some((fit.add(even.contrast)?, fit))
+        let (image, contrast) = (self.evened(&faded), faded.contrast);
+        let (mut fit, contrast) = match self.of_even(faded, &image) {
+            Some(even) => (result(&even.fit, &even.noise)?.1, even.contrast),
+            None => (result(self, noise)?.1, contrast.untold()),
+        };
+        Some((fit.add(contrast)?, fit))
     }
 
     /// The same in the image without perfect waves beside the lattice, of which `strongest` is one; `None` where there are none. What is

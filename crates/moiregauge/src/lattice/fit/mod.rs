@@ -30,7 +30,6 @@ pub(crate) mod closure;
 pub(crate) mod contrast;
 pub(crate) mod few;
 pub(crate) mod first;
-
 pub(crate) mod fit_pixels;
 pub(crate) mod fitted;
 pub(crate) mod folded;

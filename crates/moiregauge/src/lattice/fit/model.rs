@@ -28,6 +28,17 @@ pub(crate) struct Model {
     pub(crate) pair: Matrix2<f64>,
 }
 
+impl Model {
+    /// Adds a share of a step: background, (α, β) of each harmonic, then the pair.
+    pub(crate) fn add(&mut self, step: &[f64], share: f64) {
+        let waves = self.waves.as_flattened_mut().iter_mut();
+        let all = self.background.iter_mut().chain(waves);
+        for (value, change) in all.chain(self.pair.iter_mut()).zip(step) {
+            *value += share * change;
+        }
+    }
+}
+
 /// One offset per line: random, with a variance that the image tells.
 #[derive(Clone, Debug)]
 pub(crate) struct LineOffsets {

@@ -99,3 +99,28 @@ pub(crate) fn projected(
     let own = normal.view((linear, linear), (count, count)).into_owned();
     Some(own - cross.transpose() * inverse(&phi)? * &cross)
 }
+
+/// Derivatives of something beside the pair, when the pair is free, too.
+pub(crate) struct Freed {
+    /// `Dᵀ D` of what is left of them.
+    pub(crate) information: DMatrix<f64>,
+    /// Covariance of `Dᵀ u`.
+    pub(crate) variance: DMatrix<f64>,
+    /// A column for each of the four derivatives by the pair: by how much it moves, with the opposite sign, when something else changes by one.
+    pub(crate) coupling: DMatrix<f64>,
+}
+
+/// From what [`projected`] says of the four derivatives by the pair and those of something else, unweighted and weighted with the noise.
+pub(crate) fn with_pair_free(bread: DMatrix<f64>, meat: DMatrix<f64>) -> Option<Freed> {
+    let count = bread.nrows() - 4;
+    let of_pair = bread.view((0, 0), (4, 4)).into_owned().try_inverse()?;
+    let coupling = bread.view((4, 0), (count, 4)) * of_pair;
+    let mut free = DMatrix::zeros(count, 4 + count);
+    free.view_mut((0, 0), (count, 4)).copy_from(&-&coupling);
+    free.view_mut((0, 4), (count, count)).fill_with_identity();
+    Some(Freed {
+        information: &free * bread * free.transpose(),
+        variance: &free * meat * free.transpose(),
+        coupling,
+    })
+}
