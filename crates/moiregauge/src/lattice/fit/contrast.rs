@@ -36,7 +36,7 @@ const FADED: &[[usize; 2]; 21] = &powers();
 const STEPS: usize = 4;
 
 /// Powers up to a degree, and what those beyond do to the wave vectors as a share of what these do. Of simulated edges of all widths the third degree leaves up
-/// to nine tenths of a shift, the fifth mostly less than a tenth and at times the half: with three tenths the rms pull is 0.94.
+/// to nine tenths of a shift, the fifth mostly less than a tenth and at times the half: with three tenths the rms pull of 60 sets is 0.89.
 struct Description {
     orders: &'static [[usize; 2]],
     beyond: f64,
