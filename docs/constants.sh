@@ -89,7 +89,7 @@ fit/hidden LOBE second half double
 fit/hidden ELSE second half double
 scan/shells SUSPECTED second half double
 scan/shells CONFIRMED second half double
-lattice/measure SECOND_SHELL second half double
+fit/hidden SECOND_SHELL second half double
 lattice/measure OUTSHINES second,step half double
 lattice/measure REPEATS few half double
 lattice/measure FEWEST_BESIDE second,step half double

@@ -9,7 +9,7 @@ use crate::caveat::lattices::LineDifference;
 use crate::caveat::sets::SetDoubt;
 use crate::caveat::{Caveat, Doubt};
 use crate::lattice::fit::hidden::Hidden;
-use crate::lattice::measure::{SECOND_SHELL, hidden};
+use crate::lattice::measure::hidden;
 use crate::scan::doubts::lines_disagree;
 use crate::scan::measure::{about_lattice, share_noise};
 use crate::scan::measured::{MeasuredLine, MeasuredScan};
@@ -75,10 +75,9 @@ fn second_shells(scans: &[MeasuredScan]) -> Vec<Vec<bool>> {
     let suspected = all.iter().any(|line| line.first_shell.is_some());
     let lattices = lattices(&all);
     let is_second = |seen: &Seen| {
-        let chance = seen.told.chance();
         let is_larger = |other: &&Seen| cells(other.line, seen.line) == Some(3);
         let larger: usize = lattices.iter().filter(is_larger).map(|l| l.lines).sum();
-        let told = chance < SECOND_SHELL || (chance < CONFIRMED && larger > 0);
+        let told = seen.told.is_first_shell() || (seen.told.chance() < CONFIRMED && larger > 0);
         (suspected && told) || larger >= OUTVOTED * seen.lines
     };
     let second: Vec<&MeasuredLine> = lattices

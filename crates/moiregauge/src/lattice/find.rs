@@ -12,8 +12,7 @@ use crate::lattice::fit::fitted::LatticeFit;
 use crate::lattice::fit::measure::CLEARER;
 use crate::lattice::ground::{below, on_even_ground};
 use crate::lattice::measure::{
-    SECOND_SHELL, beside, hidden, is_contradicted, is_torn, measure_levelled, no_lattice,
-    of_first_shell,
+    beside, hidden, is_contradicted, is_torn, measure_levelled, no_lattice, of_first_shell,
 };
 use crate::lattice::measured::MeasuredLattice;
 use crate::lattice::start::Start;
@@ -137,7 +136,7 @@ fn beside_stripes(
     let (rest, wave) = waves.taken_off(image, &pair)?;
     let start = Start::at(&rest, geometry, background, &pair)?;
     let mut found = start.measure(method).ok()?;
-    if hidden(&found).chance() < SECOND_SHELL {
+    if hidden(&found).is_first_shell() {
         found = of_first_shell(&found, &rest, geometry, background, method)?;
     } else if no_lattice(&found).is_some() {
         return None;

@@ -19,7 +19,7 @@ use crate::frame::image::Image;
 use crate::frame::median_ground::{bin_of, running_median};
 use crate::frame::smaller::smaller;
 use crate::lattice::fit::fitted::LatticeFit;
-use crate::lattice::measure::{SECOND_SHELL, hidden, no_lattice, of_first_shell};
+use crate::lattice::measure::{hidden, no_lattice, of_first_shell};
 use crate::lattice::measured::MeasuredLattice;
 use crate::lattice::start::Start;
 use crate::numbers::interrupt;
@@ -81,7 +81,7 @@ pub(crate) fn on_even_ground(
         let (even, side) = evened(image, fit);
         let start = Start::at(&even, geometry, background, &waves)?;
         let mut again = start.measure(Method::Lattice).ok()?;
-        if hidden(&again).chance() < SECOND_SHELL {
+        if hidden(&again).is_first_shell() {
             again = of_first_shell(&again, &even, geometry, background, Method::Lattice)?;
         } else if no_lattice(&again).is_some() || !same(size, &again.reciprocal, &waves) {
             return None;

@@ -42,8 +42,6 @@ const REPEATS: f64 = 1.5;
 const OUTSHINES: f64 = 2.0;
 /// So many harmonics that stand out say it instead. Chosen by eye.
 const FEWEST_BESIDE: usize = 3;
-/// A lattice is the second shell of another if noise alone has as much power where the first would be less often than this.
-pub(crate) const SECOND_SHELL: f64 = 1e-6;
 
 /// The lattice of some part of the frame, of those that are `meant`.
 fn in_parts(
@@ -101,7 +99,7 @@ pub(crate) fn measure_levelled(
     if let Some(error) = no_lattice(&found) {
         return Err(error);
     }
-    if hidden(&found).chance() < SECOND_SHELL
+    if hidden(&found).is_first_shell()
         && let Some(first) = of_first_shell(&found, image, geometry, background, method)
     {
         return Ok(first);

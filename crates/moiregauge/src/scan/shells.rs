@@ -4,7 +4,7 @@ use spmfile::Channel;
 
 use crate::caveat::Caveat;
 use crate::lattice::fit::hidden::Hidden;
-use crate::lattice::measure::{SECOND_SHELL, hidden};
+use crate::lattice::measure::hidden;
 use crate::lattice::measured::MeasuredLattice;
 use crate::scan::measured::{MeasureError, MeasuredLine};
 
@@ -78,7 +78,7 @@ pub(crate) fn of_first_shells(
     let second = match (times(one, other), times(other, one)) {
         (Some(3), _) => [false, confirms(1)],
         (_, Some(3)) => [confirms(0), false],
-        (None, None) => [Hidden::of_all(shells.into_iter()).chance() < SECOND_SHELL; 2],
+        (None, None) => [Hidden::of_all(shells.into_iter()).is_first_shell(); 2],
         _ => return,
     };
     for ((channel, told), _) in found.iter_mut().zip(second).filter(|(_, second)| *second) {

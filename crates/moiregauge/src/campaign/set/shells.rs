@@ -3,7 +3,7 @@
 use crate::campaign::group::Group;
 use crate::caveat::lattices::LineDifference;
 use crate::lattice::fit::hidden::Hidden;
-use crate::lattice::measure::{SECOND_SHELL, hidden};
+use crate::lattice::measure::hidden;
 use crate::scan::measured::MeasuredScan;
 use crate::scan::shells::of_each_other;
 
@@ -17,7 +17,7 @@ pub(crate) fn of_other_shell(group: &Group) -> Option<i32> {
 pub(crate) fn of_second_shell(used: &[&MeasuredScan]) -> Option<i32> {
     let lines = used.iter().flat_map(|scan| &scan.lines);
     let all = Hidden::of_all(lines.map(|line| hidden(&line.lattice)));
-    (all.chance() < SECOND_SHELL).then_some(3)
+    all.is_first_shell().then_some(3)
 }
 
 fn of_lines(group: &Group) -> Option<i32> {

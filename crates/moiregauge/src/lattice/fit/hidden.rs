@@ -17,6 +17,9 @@ use crate::numbers::chi2;
 use crate::numbers::exact;
 use crate::numbers::median::median;
 
+/// A lattice is the second shell of another if noise alone has as much power where the first would be less often than this.
+const SECOND_SHELL: f64 = 1e-6;
+
 /// The waves of the first shell in thirds of the pair of the second.
 pub(crate) const FIRST: [[f64; 2]; 3] = [[1.0, 1.0], [-1.0, 2.0], [-2.0, 1.0]];
 
@@ -82,6 +85,11 @@ impl Hidden {
             images: [0, 1, 2].map(|i| a.images[i] + b.images[i]),
             own: a.own + b.own,
         })
+    }
+
+    /// Whether what is there is the first shell of a lattice of which that of the fit is the second.
+    pub(crate) fn is_first_shell(&self) -> bool {
+        self.chance() < SECOND_SHELL
     }
 
     /// The probability that noise alone has so much power there, at most.

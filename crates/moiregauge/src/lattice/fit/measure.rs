@@ -65,15 +65,19 @@ fn measure_rest(
     let rest = fit.rest(&misfits, &noise, ground).and_then(again);
     let plain = rest.or_else(|| fit.found(&noise, start, background));
     match (plain, even) {
-        (Some(plain), Some(even)) if !is_clearer(&even, &plain) => Some(plain),
-        (plain, even) => even.or(plain),
+        (Some(plain), Some(mut even)) if is_clearer(&even, &plain) => {
+            // The waves of a first shell are in the ground that was taken off.
+            even.fit.hidden = plain.fit.hidden;
+            Some(even)
+        }
+        (plain, even) => plain.or(even),
     }
 }
 
-/// Whether one says much more than another.
+/// Whether one says much more than another, which is no second shell.
 fn is_clearer(one: &Found, other: &Found) -> bool {
     let variance = |found: &Found| found.fit.wave_vectors.covariance.trace();
-    variance(one) < CLEARER * variance(other)
+    !other.fit.hidden.is_first_shell() && variance(one) < CLEARER * variance(other)
 }
 
 /// The fit with all harmonics that earn their place, and the noise that it leaves.
@@ -164,8 +168,8 @@ impl Fit<'_> {
         Some((fit.add(contrast)?, fit))
     }
 
-    /// The same in the image without perfect waves beside the lattice, of which `strongest` is one; `None` where there are none. What is
-    /// told of it is how it stands out of the noise that is then left.
+    /// The same in the image without perfect waves beside the lattice, of which `strongest` is one; `None` where there are none, or where they are
+    /// those of a first shell. What is told of it is how it stands out of the noise that is then left.
     fn again_without(
         &self,
         strongest: &ForeignWave,
@@ -173,7 +177,7 @@ impl Fit<'_> {
         start: &Harmonics,
         background: Background,
     ) -> Option<(Lattice<Px>, LatticeFit)> {
-        if !beside::is_strong(strongest) {
+        if !beside::is_strong(strongest) || self.hidden(noise).is_first_shell() {
             return None;
         }
         let (frame, model) = (&self.frame, &self.model);
