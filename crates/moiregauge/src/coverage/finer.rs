@@ -7,7 +7,7 @@ use nalgebra::{Matrix2, Vector2};
 /// its points, every other row a half, double waves a quarter.
 const FINER: [i32; 3] = [2, 3, 4];
 /// A wave lies on a point that is nearer than this, cycles over the frame: two bins.
-const ON: f64 = 1.0;
+pub(crate) const ON: f64 = 1.0;
 
 /// The coarsest lattice of waves that holds a pair and the wave `q` (all rad per pixel) in a frame of `size` pixels (columns, rows);
 /// `None` where none does that is little finer, or where `q` lies on the pair's own.
@@ -17,16 +17,7 @@ pub(crate) fn finer(
     size: [usize; 2],
     to_physical: &Matrix2<f64>,
 ) -> Option<Matrix2<f64>> {
-    let frame = Vector2::from(size.map(|n| n as f64)) / std::f64::consts::TAU;
-    let misses = |pair: &Matrix2<f64>| {
-        let index = pair.try_inverse()? * q;
-        Some(
-            (pair * (index - index.map(f64::round)))
-                .component_mul(&frame)
-                .norm(),
-        )
-    };
-    if misses(pair)? < ON {
+    if misses(pair, q, size)? < ON {
         return None;
     }
     FINER.into_iter().find_map(|n| {
@@ -36,11 +27,19 @@ pub(crate) fn finer(
         let fits = all.filter_map(|(a, b)| {
             let change = Matrix2::new(f64::from(a), f64::from(b), 0.0, f64::from(n / a));
             let finer = pair * change.try_inverse()?;
-            Some((misses(&finer)?, finer)).filter(|(miss, _)| *miss < ON)
+            Some((misses(&finer, q, size)?, finer)).filter(|(miss, _)| *miss < ON)
         });
         let (_, finer) = fits.min_by(|a, b| a.0.total_cmp(&b.0))?;
         Some(finer * shortest_pair(&(to_physical * finer))?)
     })
+}
+
+/// How far a wave `q` is from the nearest point of a lattice of waves, cycles over the frame.
+pub(crate) fn misses(pair: &Matrix2<f64>, q: &Vector2<f64>, size: [usize; 2]) -> Option<f64> {
+    let frame = Vector2::from(size.map(|n| n as f64)) / std::f64::consts::TAU;
+    let index = pair.try_inverse()? * q;
+    let off = pair * (index - index.map(f64::round));
+    Some(off.component_mul(&frame).norm())
 }
 
 #[cfg(test)]

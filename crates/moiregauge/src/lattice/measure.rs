@@ -6,7 +6,7 @@ use heterostrain::lattice::shortest_pair;
 use nalgebra::{Matrix2, Vector2};
 
 use crate::coverage::find::{pitch, same};
-use crate::coverage::finer::finer;
+use crate::coverage::finer::{ON, finer, misses};
 use crate::coverage::patch::WHOLE;
 use crate::coverage::settle::settle;
 use crate::frame::background::{Background, remove_background};
@@ -15,7 +15,7 @@ use crate::frame::geometry::Geometry;
 use crate::frame::image::Image;
 use crate::lattice::fit::closure::Closure;
 use crate::lattice::fit::few::strongest_beside;
-use crate::lattice::fit::fitted::FittedHarmonic;
+use crate::lattice::fit::fitted::{FittedHarmonic, LatticeFit};
 use crate::lattice::fit::hidden::{Hidden, first_shell};
 use crate::lattice::fit::noise::ForeignWave;
 use crate::lattice::measured::MeasuredLattice;
@@ -107,6 +107,9 @@ pub(crate) fn measure_levelled(
     let Some(wave) = beside(&found) else {
         return Ok(found);
     };
+    if let Some(larger) = of_larger_cell(&found, &wave, image, geometry, background, method) {
+        return Ok(larger);
+    }
     if let Some(period) = towering(&found, image, geometry) {
         return Err(LatticeError::Contradicted { period });
     }
@@ -161,6 +164,41 @@ pub(crate) fn no_lattice(found: &MeasuredLattice) -> Option<LatticeError> {
     Some(LatticeError::NoHarmonics { cycles })
 }
 
+/// The lattice of which that which was found has but the second or the third shell, where a wave beside it is another harmonic of that. Sharp walls have
+/// strong harmonics of all orders, and rough ground hides the first.
+fn of_larger_cell(
+    found: &MeasuredLattice,
+    wave: &ForeignWave,
+    image: &Image,
+    geometry: &Geometry,
+    background: Background,
+    method: Method,
+) -> Option<MeasuredLattice> {
+    let to_physical = geometry.pixel_to_nm.try_inverse()?.transpose();
+    let (pair, size) = (found.reciprocal, [image.columns, image.rows]);
+    let larger = [(first_shell(&pair), 3), (pair / 2.0, 4)];
+    larger.into_iter().find_map(|(pair, cells)| {
+        let beside = misses(&found.reciprocal, &wave.wave_vector, size)? > ON;
+        let on = misses(&pair, &wave.wave_vector, size)? < ON;
+        let pair = pair * shortest_pair(&(to_physical * pair))?;
+        let start = (beside && on).then(|| Start::at(image, geometry, background, &pair))?;
+        let other = start?.measure(method).ok()?;
+        let is_shown = harmonics_beside(other.fit.as_ref()?, cells) >= FEWEST_BESIDE;
+        (is_shown && no_lattice(&other).is_none()).then_some(other)
+    })
+}
+
+/// How many harmonics stand out that are none of its second shell, which has a third of its points, or of its third, which has a quarter.
+fn harmonics_beside(fit: &LatticeFit, cells: i32) -> usize {
+    let is_of = |[h, k]: [i32; 2]| match cells {
+        3 => (h - k).rem_euclid(3) == 0,
+        _ => h % 2 == 0 && k % 2 == 0,
+    };
+    let strong = fit.harmonics.iter();
+    let strong = strong.filter(|h| h.signal_to_noise.powi(2) > SECOND);
+    strong.filter(|h| !is_of(h.index)).count()
+}
+
 /// Whether its first shell is nowhere to be seen beside stronger harmonics, of which all that stand out are those of another lattice, but for one or
 /// two that may be chance: slow ground makes a coarser lattice of every lattice.
 fn is_hollow(found: &MeasuredLattice) -> bool {
@@ -172,16 +210,9 @@ fn is_hollow(found: &MeasuredLattice) -> bool {
     if largest(higher) < OUTSHINES * largest(first) || ratios[1] > THIRD {
         return false;
     }
-    // The points of the second and of the third shell.
-    let of_second = |[h, k]: [i32; 2]| (h - k).rem_euclid(3) == 0;
-    let of_third = |[h, k]: [i32; 2]| h % 2 == 0 && k % 2 == 0;
-    let strong = || {
-        let all = fit.harmonics.iter();
-        all.filter(|h| h.signal_to_noise.powi(2) > SECOND)
-            .map(|h| h.index)
-    };
-    let beside = |is_of: &dyn Fn([i32; 2]) -> bool| strong().filter(|i| !is_of(*i)).count();
-    beside(&of_second).min(beside(&of_third)) < FEWEST_BESIDE
+    [3, 4]
+        .iter()
+        .any(|cells| harmonics_beside(fit, *cells) < FEWEST_BESIDE)
 }
 
 /// What a lattice that was measured leaves where the first shell would be, if it is the second shell of another.

@@ -25,6 +25,7 @@ use crate::lattice::fit::straight::without_bend;
 use crate::lattice::fit::tables::Tables;
 use crate::numbers::dot::dot;
 use crate::numbers::exact;
+use crate::numbers::three::three;
 
 /// χ² with nine degrees of freedom exceeds 27.9 once in a thousand; the noise that it is counted in is known to a tenth.
 const THRESHOLD: f64 = 34.0;
@@ -73,6 +74,15 @@ impl Contrast {
     pub(crate) fn covariance(&self) -> Matrix4<f64> {
         let beside = Vector4::from_column_slice(self.beside.as_slice());
         self.noise + beside * beside.transpose()
+    }
+
+    /// Whether it was fitted, and by how much the wave vectors of a fit with an even contrast are or may be off at most, as a share of them.
+    pub(crate) fn told(&self, pair: &Matrix2<f64>) -> (bool, f64) {
+        let fitted = self.shift != Matrix2::zeros();
+        let moved = if fitted { &self.shift } else { &self.beside };
+        let shares = three(moved).into_iter().zip(three(pair));
+        let shares = shares.map(|(off, wave)| off.norm() / wave.norm());
+        (fitted, shares.fold(0.0, f64::max))
     }
 
     /// Where nothing was added to the wave vectors: the doubt is what might have been.
