@@ -1,6 +1,7 @@
 //! Doubts about the lattice of one image.
 
 use crate::caveat::explained::explain;
+use crate::coverage::bend::BETTER;
 
 /// The lattice of one image.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -74,9 +75,9 @@ pub enum LatticeDoubt {
     /// The lattice changes, and the result is its mean.
     #[error(
         "the lattice changes across {part}: its wavelength by {:.2} % and its direction by {:.2}° (standard deviation \
-         over the area), {} (evidence {evidence:.0}; 20 can be chance). The results are means over the area. A drift \
-         that changes, and creep, look like this along the slow axis",
-        100.0 * .wavelength, .angle.to_degrees(), if *.evenly { "evenly" } else { "smoothly" }
+         over the area), {} ({}). The results are means over the area. A drift that changes, and creep, look like this \
+         along the slow axis",
+        100.0 * .wavelength, .angle.to_degrees(), if *.evenly { "evenly" } else { "smoothly" }, how_sure(*.evidence)
     )]
     Changes {
         /// The frame, or the part of it that the lattice covers.
@@ -167,6 +168,15 @@ fn listed(all: &[OtherGrain]) -> String {
         )
     };
     all.iter().map(of).collect::<Vec<_>>().join("; ")
+}
+
+/// How sure it is that a lattice changes.
+fn how_sure(by_windows: f64) -> String {
+    if by_windows > BETTER {
+        format!("evidence {by_windows:.0}; {BETTER:.0} can be chance")
+    } else {
+        "what the fit to the pixels leaves says it".to_owned()
+    }
 }
 
 /// How trace and retrace differ. Wavelengths are in nm.

@@ -42,7 +42,7 @@ const FEWEST_INNER: usize = 6;
 const STRAIGHTENED: usize = 3;
 
 /// By how much the evidence (BIC) of a lattice that changes has to be better: chance does that once in e¹⁰.
-const BETTER: f64 = 20.0;
+pub(crate) const BETTER: f64 = 20.0;
 
 /// Where the frame ends is known, but windows see only half of what is there: the share of what is told of an edge in the frame. By the
 /// coverage of a hundred simulated sets whose twist or strain swings once across the frame.
@@ -72,6 +72,8 @@ pub struct Change {
 pub enum ChangeModel {
     /// The wave vectors change evenly across the patch.
     Even,
+    /// The phases are cubic polynomials.
+    Cubic,
     /// Any smooth change, on so many cells along columns and rows.
     Smooth([usize; 2]),
 }
@@ -163,6 +165,19 @@ pub(crate) fn mean(view: &View, patch: &Patch) -> Option<Mean> {
 
 /// The same without what higher harmonics put into the windows, and without what windows make of waves that bend.
 pub(crate) fn refined(view: &View, patch: &Patch) -> Option<Mean> {
+    refined_by(choose, view, patch)
+}
+
+/// The same for a lattice that is known to change.
+pub(crate) fn refined_change(view: &View, patch: &Patch) -> Option<Mean> {
+    refined_by(choose_change, view, patch)
+}
+
+fn refined_by(
+    choose: impl Fn(&View, &Patch, &[Node]) -> Option<Chosen>,
+    view: &View,
+    patch: &Patch,
+) -> Option<Mean> {
     let rough = choose(view, patch, &nodes(view, patch))?;
     let parts = higher::parts(view.image, patch, &rough.fit)?;
     // Waves that the envelopes stand still against: where exactly a phase holds does not matter then.
@@ -204,9 +219,47 @@ pub(crate) fn described_as_straight(patch: &Patch, nodes: &[Node]) -> Option<[f6
 }
 
 fn choose(view: &View, patch: &Patch, nodes: &[Node]) -> Option<Chosen> {
+    let straight = fit(powers(patch, 1), nodes)?;
+    let even = (ChangeModel::Even, powers(patch, 2));
+    let fits = changes(view, patch, nodes, vec![even]);
+    let best = cheapest(&fits);
+    let best = best.filter(|best| straight.price - fits[*best].1.price > BETTER);
+    let Some(best) = best else {
+        return Some(Chosen {
+            model: None,
+            fit: straight,
+            evidence: 0.0,
+            next: None,
+            finest: None,
+        });
+    };
+    chosen(fits, best, &straight)
+}
+
+/// The best description of a lattice that is known to change; of a few periods cubic polynomials say it in fewer numbers than splines.
+fn choose_change(view: &View, patch: &Patch, nodes: &[Node]) -> Option<Chosen> {
+    let straight = fit(powers(patch, 1), nodes)?;
+    let even = (ChangeModel::Even, powers(patch, 2));
+    let cubic = (ChangeModel::Cubic, powers(patch, 3));
+    let fits = changes(view, patch, nodes, vec![even, cubic]);
+    let best = cheapest(&fits)?;
+    chosen(fits, best, &straight)
+}
+
+fn cheapest(fits: &[(ChangeModel, Fit)]) -> Option<usize> {
+    let by_price = |a: &usize, b: &usize| fits[*a].1.price.total_cmp(&fits[*b].1.price);
+    (0..fits.len()).min_by(by_price)
+}
+
+/// The phases by some powers, and by splines of as many cells as their windows see.
+fn changes(
+    view: &View,
+    patch: &Patch,
+    nodes: &[Node],
+    powers: Vec<(ChangeModel, Basis)>,
+) -> Vec<(ChangeModel, Fit)> {
     let frame = patch.corners();
     let half = (frame[1] - frame[0]) / 2.0;
-    let straight = fit(powers(patch, 1), nodes)?;
     let window = [0, 1].map(|axis| view.width * view.cells.period[axis]);
     let sizes = SPLINES.map(|n| {
         let longer = half.x.max(half.y);
@@ -216,8 +269,7 @@ fn choose(view: &View, patch: &Patch, nodes: &[Node]) -> Option<Chosen> {
         (0..2)
             .all(|i| size[i] == 1 || 2.0 * half[i] / size[i] as f64 > WINDOWS_PER_CELL * window[i])
     });
-    let even = (ChangeModel::Even, powers(patch, 2));
-    let all = std::iter::once(even).chain(smooth.map(|size| {
+    let all = powers.into_iter().chain(smooth.map(|size| {
         (
             ChangeModel::Smooth(size),
             Basis::Splines(Splines::new(frame, size)),
@@ -229,19 +281,11 @@ fn choose(view: &View, patch: &Patch, nodes: &[Node]) -> Option<Chosen> {
         .into_par_iter()
         .map(|(model, basis)| Some((model, fit(basis, nodes)?)));
     let fits: Vec<Option<(ChangeModel, Fit)>> = fits.collect();
-    let fits: Vec<(ChangeModel, Fit)> = fits.into_iter().flatten().collect();
-    let by_price = |a: &usize, b: &usize| fits[*a].1.price.total_cmp(&fits[*b].1.price);
-    let best = (0..fits.len()).min_by(by_price);
-    let best = best.filter(|best| straight.price - fits[*best].1.price > BETTER);
-    let Some(best) = best else {
-        return Some(Chosen {
-            model: None,
-            fit: straight,
-            evidence: 0.0,
-            next: None,
-            finest: None,
-        });
-    };
+    fits.into_iter().flatten().collect()
+}
+
+/// One of some descriptions, the simplest first.
+fn chosen(fits: Vec<(ChangeModel, Fit)>, best: usize, straight: &Fit) -> Option<Chosen> {
     let beside = if best + 1 < fits.len() {
         Some(best + 1)
     } else {

@@ -79,7 +79,9 @@ impl Start {
                 if let Some(mean) = mean
                     && !found.as_ref().is_some_and(|found| is_better(found, mean))
                 {
-                    return of_mean(mean);
+                    let fit = found.as_ref().map(|found| &found.fit);
+                    let changing = fit.and_then(|fit| self.changing(fit));
+                    return of_mean(changing.as_ref().unwrap_or(mean));
                 }
                 rest = found.as_ref().and_then(|found| found.rest.clone());
                 fit = found.map(|found| (found.lattice, found.fit));
@@ -175,6 +177,13 @@ impl Start {
         let mean = self.settled()?.refined()?;
         let bends = mean.change.is_some() && !mean.is_poor();
         bends.then(|| self.mean_lattice(&mean)).flatten()
+    }
+
+    /// The mean in a part of the frame where the fit to the pixels says that the lattice changes, and what windows show does not pay for it.
+    fn changing(&self, fit: &LatticeFit) -> Option<Mean> {
+        fit.change()?;
+        let mean = self.settled()?.refined_change()?;
+        (!mean.is_poor()).then_some(mean)
     }
 
     /// The mean of a lattice that changes.
