@@ -60,7 +60,7 @@ pub enum LatticeDoubt {
     },
     /// The contrast of the lattice changes.
     #[error(
-        "the contrast of the lattice changes across the frame. {} {:.3} %{}",
+        "the contrast of the lattice changes across the frame. {} {:.2} %{}",
         if *.fitted { "It was fitted with the waves, which moved the wave vectors by" }
         else { "It could not be fitted with the waves:" },
         100.0 * .share,
@@ -247,10 +247,10 @@ explain! { LatticeDoubt:
          is as short as the lattice, some of it is left, alike in all frames."
         "Look at the figure of the scan. A channel that shows less topography, as the phase, serves better."
     ContrastChanges "contrast-changes" Note
-        "The lattice fades somewhere in the frame, as at a soft edge, or because the tip changes slowly. Unless this is \
-         known, the waves move each other. It was fitted with them, and the errors of the vectors hold what that may have \
-         missed."
-        "Look at the figure of the scan. A part of the frame with even contrast (--region) does without."
+        "The contrast of the lattice changes across the frame: it fades at a soft edge, the tip changes slowly, or a lattice that \
+         bends cancels itself where it is farthest from straight. Unless this is known, the waves move each other. It was fitted \
+         with them, and the errors of the vectors hold what that may have missed."
+        "Look at the figure of the scan. A part of the frame with even contrast does without."
     Changes "changing-lattice" Warning
         "The lattice changes across the frame by more than chance. The results are means over the area that it covers. \
          Their errors include how far the means depend on where this area ends."

@@ -38,8 +38,10 @@ const NEITHER: f64 = 0.8;
 
 /// Two lattices side by side.
 pub(crate) struct Grains {
-    /// The larger first.
+    /// Where windows see one of them alone; the larger first.
     pub(crate) patches: [Patch; 2],
+    /// Shares of the pixels that there are, as far as the boundary.
+    pub(crate) shares: [f64; 2],
     /// Length of the boundary between them along columns and along rows, pixels: the legs of a straight line.
     pub(crate) boundary: [f64; 2],
 }
@@ -79,12 +81,16 @@ pub(crate) fn split(view: &View, patch: &Patch) -> Option<Grains> {
         return None;
     }
     let mut patches = [0, 1].map(|which| grain(view.cells, patch, &all, &owner, which));
+    let nearest = nearest(view.cells, patch, &all, &owner);
+    let mut shares = shares(view.cells, &nearest);
     if patches[1].unit_cells > patches[0].unit_cells {
         patches.swap(0, 1);
+        shares.swap(0, 1);
     }
     Some(Grains {
         patches,
-        boundary: boundary(view.cells, patch, &all, &owner),
+        shares,
+        boundary: boundary(view.cells, &nearest),
     })
 }
 
@@ -166,9 +172,13 @@ fn grown(patch: &Patch, nodes: &[Node], seed: [usize; 2]) -> Option<Fit> {
     Some(found)
 }
 
-/// Length of the sides of cells (along columns, along rows; pixels) between those nearest to nodes of one and of the other grain.
-fn boundary(cells: &Cells, patch: &Patch, nodes: &[Node], owner: &[Option<usize>]) -> [f64; 2] {
-    let [across, up] = cells.size;
+/// The grain to whose nodes each cell of a patch is nearest.
+fn nearest(
+    cells: &Cells,
+    patch: &Patch,
+    nodes: &[Node],
+    owner: &[Option<usize>],
+) -> Vec<Option<usize>> {
     let nearest = |cell: usize| {
         let at = cells.middle_of(cell);
         let owned = nodes
@@ -182,9 +192,24 @@ fn boundary(cells: &Cells, patch: &Patch, nodes: &[Node], owner: &[Option<usize>
         let nearest = owned.min_by(|a, b| distance(a.0).total_cmp(&distance(b.0)));
         nearest.map(|(_, owner)| owner)
     };
-    let of: Vec<Option<usize>> = (0..cells.len())
+    (0..cells.len())
         .map(|cell| patch.inside[cell].then(|| nearest(cell)).flatten())
-        .collect();
+        .collect()
+}
+
+/// Shares of the pixels that there are.
+fn shares(cells: &Cells, of: &[Option<usize>]) -> [f64; 2] {
+    let counts = || of.iter().zip(cells.counts());
+    let all: f64 = cells.counts().iter().sum();
+    [0, 1].map(|which| {
+        let own = counts().filter(|(owner, _)| **owner == Some(which));
+        own.map(|(_, count)| count).sum::<f64>() / all
+    })
+}
+
+/// Length of the sides of cells (along columns, along rows; pixels) between those of one and of the other grain.
+fn boundary(cells: &Cells, of: &[Option<usize>]) -> [f64; 2] {
+    let [across, up] = cells.size;
     let differ = |a: usize, b: usize| of[a].is_some() && of[b].is_some() && of[a] != of[b];
     let mut lengths = [0.0; 2];
     for (x, y) in (0..cells.len()).map(|i| (i % across, i / across)) {

@@ -235,9 +235,14 @@ impl Settled {
 
     /// Two grains where it is no single lattice.
     pub(crate) fn grains(&self) -> Option<Grains> {
-        let Grains { patches, boundary } = split(&self.view(), &self.inner)?;
+        let Grains {
+            patches,
+            shares,
+            boundary,
+        } = split(&self.view(), &self.inner)?;
         Some(Grains {
             patches: patches.map(|grain| grain.in_pixels(self.bins)),
+            shares,
             boundary: boundary.map(|length| length * self.bins as f64),
         })
     }

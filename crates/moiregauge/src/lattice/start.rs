@@ -255,11 +255,19 @@ impl Start {
     /// The lattice of the first of two grains; the other is beside it.
     fn grain(&self, image: &Image, grains: Grains) -> Option<Self> {
         let [largest, other] = grains.patches;
-        let mut found = self.of_grain(image, &largest)?;
-        let mut beside = self.of_grain(image, &other);
+        let within = |patch: &Patch| {
+            let mut found = self.of_grain(image, patch)?;
+            // Those in a grain have shares of that.
+            for grain in &mut found.others {
+                grain.share *= patch.share;
+            }
+            Some(found)
+        };
+        let mut found = within(&largest)?;
+        let mut beside = within(&other);
         let waves = beside.as_ref().map_or(other.pair, Self::waves);
         found.others.push(Grain {
-            share: other.share,
+            share: grains.shares[1],
             waves,
             boundary: grains.boundary,
         });

@@ -117,9 +117,9 @@ fn grains_are_results_of_their_own() {
     assert!(complete >= 4, "{complete}");
 }
 
-/// A straight boundary through the middle of the frame, 30° to an axis, is `side / cos 30°` long.
+/// A straight boundary through the middle of the frame, 30° to an axis, is `side / cos 30°` long, and half of the frame lies on either side.
 #[test]
-fn boundaries_have_their_length() {
+fn grains_have_their_area_and_boundary() {
     let (scans, analysis) = analysed("grains:share=0.5,angle=30", 2);
     let frame = scans.frame(0).channels[0].clone();
     let found = measure_scan("scan", &scans.frame(0), &Settings::default(), None).expect("a scan");
@@ -129,15 +129,17 @@ fn boundaries_have_their_length() {
         geometry.slow_step().norm() * frame.rows as f64,
     ];
     let [shorter, longer] = [sides[0].min(sides[1]), sides[0].max(sides[1])];
-    let lengths: Vec<f64> = (analysis.caveats.iter())
+    let others: Vec<[f64; 2]> = (analysis.caveats.iter())
         .filter_map(|caveat| match &caveat.doubt {
-            Doubt::Lattice(LatticeDoubt::SeveralGrains { others }) => Some(others[0].boundary),
+            Doubt::Lattice(LatticeDoubt::SeveralGrains { others }) => {
+                Some([others[0].boundary, others[0].share])
+            }
             _ => None,
         })
         .collect();
-    assert!(!lengths.is_empty());
+    assert!(!others.is_empty());
     let cosine = 30.0_f64.to_radians().cos();
-    for length in lengths {
+    for [length, share] in others {
         println!(
             "{length:.1} nm, {:.1} to {:.1} wanted",
             shorter / cosine,
@@ -145,5 +147,7 @@ fn boundaries_have_their_length() {
         );
         let wanted = 0.9 * shorter / cosine..1.1 * longer / cosine;
         assert!(wanted.contains(&length), "{length}, {wanted:?}");
+        println!("a share of {share:.3}");
+        assert!((0.45..0.55).contains(&share), "{share}");
     }
 }
