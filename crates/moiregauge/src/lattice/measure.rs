@@ -183,20 +183,24 @@ fn of_larger_cell(
         let pair = pair * shortest_pair(&(to_physical * pair))?;
         let start = (beside && on).then(|| Start::at(image, geometry, background, &pair))?;
         let other = start?.measure(method).ok()?;
-        let is_shown = harmonics_beside(other.fit.as_ref()?, cells) >= FEWEST_BESIDE;
+        let shown = harmonics_beside(other.fit.as_ref()?, cells);
+        // Stripes and their overtones are in line.
+        let [h, k] = *shown.first()?;
+        let is_shown = shown.len() >= FEWEST_BESIDE && shown.iter().any(|i| h * i[1] != k * i[0]);
         (is_shown && no_lattice(&other).is_none()).then_some(other)
     })
 }
 
-/// How many harmonics stand out that are none of its second shell, which has a third of its points, or of its third, which has a quarter.
-fn harmonics_beside(fit: &LatticeFit, cells: i32) -> usize {
+/// The harmonics that stand out and are none of its second shell, which has a third of its points, or of its third, which has a quarter.
+fn harmonics_beside(fit: &LatticeFit, cells: i32) -> Vec<[i32; 2]> {
     let is_of = |[h, k]: [i32; 2]| match cells {
         3 => (h - k).rem_euclid(3) == 0,
         _ => h % 2 == 0 && k % 2 == 0,
     };
     let strong = fit.harmonics.iter();
     let strong = strong.filter(|h| h.signal_to_noise.powi(2) > SECOND);
-    strong.filter(|h| !is_of(h.index)).count()
+    let indices = strong.map(|h| h.index);
+    indices.filter(|index| !is_of(*index)).collect()
 }
 
 /// Whether its first shell is nowhere to be seen beside stronger harmonics, of which all that stand out are those of another lattice, but for one or
@@ -212,7 +216,7 @@ fn is_hollow(found: &MeasuredLattice) -> bool {
     }
     [3, 4]
         .iter()
-        .any(|cells| harmonics_beside(fit, *cells) < FEWEST_BESIDE)
+        .any(|cells| harmonics_beside(fit, *cells).len() < FEWEST_BESIDE)
 }
 
 /// What a lattice that was measured leaves where the first shell would be, if it is the second shell of another.
