@@ -60,10 +60,10 @@ pub enum LatticeDoubt {
     },
     /// The contrast of the lattice changes.
     #[error(
-        "the contrast of the lattice changes across the frame. {} {:.2} %{}",
+        "the contrast of the lattice changes across the frame. {} {}{}",
         if *.fitted { "It was fitted with the waves, which moved the wave vectors by" }
         else { "It could not be fitted with the waves:" },
-        100.0 * .share,
+        tenths(*.share),
         if *.fitted { "" } else { " by which it may have moved the wave vectors are in their errors" }
     )]
     ContrastChanges {
@@ -168,6 +168,15 @@ fn listed(all: &[OtherGrain]) -> String {
         )
     };
     all.iter().map(of).collect::<Vec<_>>().join("; ")
+}
+
+/// A share in tenths of a per cent, so that images say the same.
+fn tenths(share: f64) -> String {
+    if share < 1e-3 {
+        "less than 0.1 %".to_owned()
+    } else {
+        format!("{:.1} %", 100.0 * share)
+    }
 }
 
 /// How sure it is that a lattice changes.
