@@ -7,7 +7,7 @@ use moiregauge::frame::Image;
 use moiregauge::simulate::{DomainScene, FieldScene};
 use serde_json::Value;
 
-use crate::common::{caveats, json, number, program, run, succeed, testdata};
+use crate::common::{caveats, json, number, program, run, simulate, succeed, testdata};
 
 /// 16 pixels per period, 0.7 nm per pixel: 11.2 nm.
 const PERIOD: f64 = 16.0;
@@ -146,6 +146,46 @@ fn grains_are_two_lattices_of_one_map() {
     let second = number(&grains[1], "/twist_deg/mean");
     assert!((twist - second).abs() < 0.001, "{twist} {second}");
     assert!(out.join("displacement.csv").exists());
+}
+
+/// Sets of two slow axes show the same two grains: each is in one map with the other, and has the numbers of all sets that show it.
+#[test]
+fn grains_are_followed_over_slow_axes() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let sample = "grains:twist=0.05,turn=3,share=0.5,angle=20";
+    let sets = ["x", "y"].map(|slow| {
+        let options = ["--slow", slow, "--scans", "2", "--pixels", "256"];
+        let size = ["--size", "140", "140", "--sample", sample, "--seed", "3"];
+        let set = folder.path().join(slow);
+        simulate(&set, &[options.as_slice(), &size].concat())
+    });
+    let out = folder.path().join("maps");
+    let mut command = program();
+    command.arg("map").args(&sets).arg("--out").arg(&out);
+    succeed(command.args(["--no-report", "--quiet"]));
+    let results = json(&out.join("map.json"));
+    follows_schema(&results);
+    let truth = json(&sets[0].join("truth.json"));
+    let grains = results["details"]["grains"].as_array().expect("grains");
+    assert_eq!(grains.len(), 2);
+    let mut seen: Vec<usize> = Vec::new();
+    for grain in grains {
+        let [mean, sigma] =
+            ["mean", "sigma"].map(|key| number(grain, &format!("/twist_deg/{key}")));
+        let off = |i: usize| {
+            let wanted = number(&truth, &format!("/sample/grains/{i}/mean/twist_deg"));
+            (mean - wanted).abs()
+        };
+        let nearest = usize::from(off(1) < off(0));
+        assert!(
+            sigma < 0.003 && off(nearest) < 4.0 * sigma,
+            "{mean} ± {sigma}"
+        );
+        seen.push(nearest);
+    }
+    seen.sort_unstable();
+    assert_eq!(seen, [0, 1]);
+    assert!(caveats(&results).contains(&"map-of-grains"));
 }
 
 /// The rows of a table, split at commas; the first one has the names.
