@@ -35,7 +35,7 @@ coverage/look PLAIN edge,island,grains half double
 coverage/settle FEWEST_CELLS edge,island,grains half double
 coverage/find SAME edge,island,grains half double
 coverage/find WORTH edge,island,grains half double
-coverage/bend BETTER edge,island,grains half double
+coverage/choose BETTER edge,island,grains half double
 coverage/bend WILD edge,island,grains half double
 coverage/bend POOR edge,island,grains half double
 coverage/bend FRAME_ENDS twist-wave half double

@@ -1,7 +1,7 @@
 //! Doubts about the lattice of one image.
 
 use crate::caveat::explained::explain;
-use crate::coverage::bend::BETTER;
+use crate::coverage::choose::BETTER;
 
 /// The lattice of one image.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

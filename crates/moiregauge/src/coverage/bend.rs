@@ -16,21 +16,15 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::coverage::cells::Cells;
+use crate::coverage::choose::{Chosen, choose, choose_change};
 use crate::coverage::higher;
 use crate::coverage::hollows::hollows;
 use crate::coverage::nodes::{Node, View, nodes};
 use crate::coverage::patch::{Patch, WHOLE};
-use crate::coverage::phases::{Basis, Fit, fit, powers, rows};
+use crate::coverage::phases::{Fit, fit, powers, rows};
 use crate::coverage::windows::straightened;
 use crate::numbers::exact;
-use crate::numbers::splines::Splines;
 use crate::numbers::three::three;
-
-/// Cells of splines along the longer side of the patch that are tried.
-const SPLINES: [usize; 7] = [1, 2, 3, 4, 6, 9, 13];
-
-/// A cell of the splines is at least so many windows wide: what is smaller the window does not see.
-const WINDOWS_PER_CELL: f64 = 2.0;
 
 /// An edge cuts a window off that makes the variance of a phase larger than this, times the least.
 const WHOLE_WINDOW: f64 = 1.5;
@@ -40,9 +34,6 @@ const FEWEST_INNER: usize = 6;
 
 /// Rounds in which what windows make of a description is taken off: each leaves a tenth or two of what the one before left.
 const STRAIGHTENED: usize = 3;
-
-/// By how much the evidence (BIC) of a lattice that changes has to be better: chance does that once in e¹⁰.
-pub(crate) const BETTER: f64 = 20.0;
 
 /// Where the frame ends is known, but windows see only half of what is there: the share of what is told of an edge in the frame. By the
 /// coverage of a hundred simulated sets whose twist or strain swings once across the frame.
@@ -60,7 +51,8 @@ pub struct Change {
     /// Standard deviation of their directions, rad.
     #[serde(with = "exact")]
     pub angle: f64,
-    /// By how much the evidence (BIC) for it exceeds that for a lattice that is the same everywhere.
+    /// By how much the evidence (BIC) for it, as windows show it, exceeds that for a lattice that is the same everywhere; below 20 and even negative where
+    /// the fit to the pixels says that the lattice changes.
     #[serde(with = "exact")]
     pub evidence: f64,
 }
@@ -143,19 +135,6 @@ impl Mean {
     }
 }
 
-/// What describes the phases over a patch best.
-struct Chosen {
-    /// `None` for a lattice that is the same everywhere.
-    model: Option<ChangeModel>,
-    fit: Fit,
-    /// By how much its evidence exceeds that for a lattice that is the same everywhere.
-    evidence: f64,
-    /// The description that comes next, with more numbers or, where it has the most, with fewer.
-    next: Option<Fit>,
-    /// The description with the most numbers, where there is one with more than the next.
-    finest: Option<Fit>,
-}
-
 /// The mean over a patch; `None` where its phases cannot be described.
 pub(crate) fn mean(view: &View, patch: &Patch) -> Option<Mean> {
     let nodes = nodes(view, patch);
@@ -216,92 +195,6 @@ pub(crate) fn described_as_straight(patch: &Patch, nodes: &[Node]) -> Option<[f6
     let fit = fit(powers(patch, 1), nodes)?;
     let straight = fit.left < LEFT;
     straight.then_some([fit.chi2, fit.coefficients.len() as f64, fit.independent])
-}
-
-fn choose(view: &View, patch: &Patch, nodes: &[Node]) -> Option<Chosen> {
-    let straight = fit(powers(patch, 1), nodes)?;
-    let even = (ChangeModel::Even, powers(patch, 2));
-    let fits = changes(view, patch, nodes, vec![even]);
-    let best = cheapest(&fits);
-    let best = best.filter(|best| straight.price - fits[*best].1.price > BETTER);
-    let Some(best) = best else {
-        return Some(Chosen {
-            model: None,
-            fit: straight,
-            evidence: 0.0,
-            next: None,
-            finest: None,
-        });
-    };
-    chosen(fits, best, &straight)
-}
-
-/// The best description of a lattice that is known to change; of a few periods cubic polynomials say it in fewer numbers than splines.
-fn choose_change(view: &View, patch: &Patch, nodes: &[Node]) -> Option<Chosen> {
-    let straight = fit(powers(patch, 1), nodes)?;
-    let even = (ChangeModel::Even, powers(patch, 2));
-    let cubic = (ChangeModel::Cubic, powers(patch, 3));
-    let fits = changes(view, patch, nodes, vec![even, cubic]);
-    let best = cheapest(&fits)?;
-    chosen(fits, best, &straight)
-}
-
-fn cheapest(fits: &[(ChangeModel, Fit)]) -> Option<usize> {
-    let by_price = |a: &usize, b: &usize| fits[*a].1.price.total_cmp(&fits[*b].1.price);
-    (0..fits.len()).min_by(by_price)
-}
-
-/// The phases by some powers, and by splines of as many cells as their windows see.
-fn changes(
-    view: &View,
-    patch: &Patch,
-    nodes: &[Node],
-    powers: Vec<(ChangeModel, Basis)>,
-) -> Vec<(ChangeModel, Fit)> {
-    let frame = patch.corners();
-    let half = (frame[1] - frame[0]) / 2.0;
-    let window = [0, 1].map(|axis| view.width * view.cells.period[axis]);
-    let sizes = SPLINES.map(|n| {
-        let longer = half.x.max(half.y);
-        [0, 1].map(|axis| ((n as f64 * half[axis] / longer).ceil() as usize).max(1))
-    });
-    let smooth = sizes.into_iter().filter(|size| {
-        (0..2)
-            .all(|i| size[i] == 1 || 2.0 * half[i] / size[i] as f64 > WINDOWS_PER_CELL * window[i])
-    });
-    let all = powers.into_iter().chain(smooth.map(|size| {
-        (
-            ChangeModel::Smooth(size),
-            Basis::Splines(Splines::new(frame, size)),
-        )
-    }));
-    let all = all.take_while(|(_, basis)| 2 * basis.len() < nodes.len());
-    let all: Vec<(ChangeModel, Basis)> = all.collect();
-    let fits = all
-        .into_par_iter()
-        .map(|(model, basis)| Some((model, fit(basis, nodes)?)));
-    let fits: Vec<Option<(ChangeModel, Fit)>> = fits.collect();
-    fits.into_iter().flatten().collect()
-}
-
-/// One of some descriptions, the simplest first.
-fn chosen(fits: Vec<(ChangeModel, Fit)>, best: usize, straight: &Fit) -> Option<Chosen> {
-    let beside = if best + 1 < fits.len() {
-        Some(best + 1)
-    } else {
-        best.checked_sub(1)
-    };
-    let mut fits: Vec<_> = fits.into_iter().map(Some).collect();
-    let (model, chosen) = fits[best].take()?;
-    let next = beside.and_then(|i| fits[i].take());
-    let finest = fits.pop().flatten();
-    Some(Chosen {
-        model: Some(model),
-        evidence: straight.price - chosen.price,
-        fit: chosen,
-        next: next.map(|(_, fit)| fit),
-        finest: finest.map(|(_, fit)| fit),
-    })
 }
 
 /// The slopes of ψ₁ and ψ₂ over a patch.

@@ -7,6 +7,7 @@
 
 pub(crate) mod bend;
 pub(crate) mod cells;
+pub(crate) mod choose;
 pub(crate) mod equations;
 pub(crate) mod find;
 pub(crate) mod finer;

@@ -1,0 +1,118 @@
+//! What describes the phases of a lattice over its patch: a plane, where it is the same everywhere, or a change.
+
+use rayon::prelude::*;
+
+use crate::coverage::bend::ChangeModel;
+use crate::coverage::nodes::{Node, View};
+use crate::coverage::patch::Patch;
+use crate::coverage::phases::{Basis, Fit, fit, powers};
+use crate::numbers::splines::Splines;
+
+/// Cells of splines along the longer side of the patch that are tried.
+const SPLINES: [usize; 7] = [1, 2, 3, 4, 6, 9, 13];
+
+/// A cell of the splines is at least so many windows wide: what is smaller the window does not see.
+const WINDOWS_PER_CELL: f64 = 2.0;
+
+/// By how much the evidence (BIC) of a lattice that changes has to be better: chance does that once in e¹⁰.
+pub(crate) const BETTER: f64 = 20.0;
+
+/// What describes the phases over a patch best.
+pub(crate) struct Chosen {
+    /// `None` for a lattice that is the same everywhere.
+    pub(crate) model: Option<ChangeModel>,
+    pub(crate) fit: Fit,
+    /// By how much its evidence exceeds that for a lattice that is the same everywhere.
+    pub(crate) evidence: f64,
+    /// The description that comes next, with more numbers or, where it has the most, with fewer.
+    pub(crate) next: Option<Fit>,
+    /// The description with the most numbers, where there is one with more than the next.
+    pub(crate) finest: Option<Fit>,
+}
+
+/// The best description; a change only where the data pay for it (BIC).
+pub(crate) fn choose(view: &View, patch: &Patch, nodes: &[Node]) -> Option<Chosen> {
+    let straight = fit(powers(patch, 1), nodes)?;
+    let even = (ChangeModel::Even, powers(patch, 2));
+    let fits = changes(view, patch, nodes, vec![even]);
+    let best = cheapest(&fits);
+    let best = best.filter(|best| straight.price - fits[*best].1.price > BETTER);
+    let Some(best) = best else {
+        return Some(Chosen {
+            model: None,
+            fit: straight,
+            evidence: 0.0,
+            next: None,
+            finest: None,
+        });
+    };
+    chosen(fits, best, &straight)
+}
+
+/// The best description of a lattice that is known to change; of a few periods cubic polynomials say it in fewer numbers than splines.
+pub(crate) fn choose_change(view: &View, patch: &Patch, nodes: &[Node]) -> Option<Chosen> {
+    let straight = fit(powers(patch, 1), nodes)?;
+    let even = (ChangeModel::Even, powers(patch, 2));
+    let cubic = (ChangeModel::Cubic, powers(patch, 3));
+    let fits = changes(view, patch, nodes, vec![even, cubic]);
+    let best = cheapest(&fits)?;
+    chosen(fits, best, &straight)
+}
+
+fn cheapest(fits: &[(ChangeModel, Fit)]) -> Option<usize> {
+    let by_price = |a: &usize, b: &usize| fits[*a].1.price.total_cmp(&fits[*b].1.price);
+    (0..fits.len()).min_by(by_price)
+}
+
+/// The phases by some powers, and by splines of as many cells as their windows see.
+fn changes(
+    view: &View,
+    patch: &Patch,
+    nodes: &[Node],
+    powers: Vec<(ChangeModel, Basis)>,
+) -> Vec<(ChangeModel, Fit)> {
+    let frame = patch.corners();
+    let half = (frame[1] - frame[0]) / 2.0;
+    let window = [0, 1].map(|axis| view.width * view.cells.period[axis]);
+    let sizes = SPLINES.map(|n| {
+        let longer = half.x.max(half.y);
+        [0, 1].map(|axis| ((n as f64 * half[axis] / longer).ceil() as usize).max(1))
+    });
+    let smooth = sizes.into_iter().filter(|size| {
+        (0..2)
+            .all(|i| size[i] == 1 || 2.0 * half[i] / size[i] as f64 > WINDOWS_PER_CELL * window[i])
+    });
+    let all = powers.into_iter().chain(smooth.map(|size| {
+        (
+            ChangeModel::Smooth(size),
+            Basis::Splines(Splines::new(frame, size)),
+        )
+    }));
+    let all = all.take_while(|(_, basis)| 2 * basis.len() < nodes.len());
+    let all: Vec<(ChangeModel, Basis)> = all.collect();
+    let fits = all
+        .into_par_iter()
+        .map(|(model, basis)| Some((model, fit(basis, nodes)?)));
+    let fits: Vec<Option<(ChangeModel, Fit)>> = fits.collect();
+    fits.into_iter().flatten().collect()
+}
+
+/// One of some descriptions, the simplest first.
+fn chosen(fits: Vec<(ChangeModel, Fit)>, best: usize, straight: &Fit) -> Option<Chosen> {
+    let beside = if best + 1 < fits.len() {
+        Some(best + 1)
+    } else {
+        best.checked_sub(1)
+    };
+    let mut fits: Vec<_> = fits.into_iter().map(Some).collect();
+    let (model, chosen) = fits[best].take()?;
+    let next = beside.and_then(|i| fits[i].take());
+    let finest = fits.pop().flatten();
+    Some(Chosen {
+        model: Some(model),
+        evidence: straight.price - chosen.price,
+        fit: chosen,
+        next: next.map(|(_, fit)| fit),
+        finest: finest.map(|(_, fit)| fit),
+    })
+}
