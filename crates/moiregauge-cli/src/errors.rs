@@ -20,7 +20,7 @@ pub(crate) fn advice(error: &InputError) -> Option<String> {
         }
         InputError::Measure(MeasureError::NoSize) => "give the size, as in --size 70nm×70nm",
         InputError::Measure(MeasureError::Lattice { error, .. }) => match error {
-            LatticeError::Contradicted { .. }
+            LatticeError::OneOfMany { .. }
             | LatticeError::NowhereTogether
             | LatticeError::NoHarmonics { .. } => {
                 "say which lattice to measure, or where it is: --near WAVELENGTH, --lattice, --region or --mask"

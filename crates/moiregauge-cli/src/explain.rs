@@ -131,8 +131,9 @@ fn markdown() -> String {
 # Caveats
 
 Caveats are doubts that you should know before you trust the numbers. They are shown on the screen, in the report, in
-`results.json` and in `map.json`. Each has a code, a message, and what it concerns. `moiregauge explain CODE` says the
-same as this page, which `moiregauge explain --markdown` makes.
+`results.json` and in `map.json`. Each has a code, a message, and what it concerns. What several scans of a set have is
+one caveat of the set: its message is that of the worst scan, and ends with how many scans have it. `moiregauge explain
+CODE` says the same as this page, which `moiregauge explain --markdown` makes.
 
 "
     .to_owned();

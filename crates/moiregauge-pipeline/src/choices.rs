@@ -1,7 +1,7 @@
 //! What a person may choose in place of the program: the name of a lattice, and so its twist and strain, or the grain.
 
-use moiregauge::campaign::Analysis;
-use moiregauge::caveat::{Doubt, LatticeDoubt, OtherGrain};
+use moiregauge::campaign::{Analysis, SetAnalysis};
+use moiregauge::caveat::{Caveat, Doubt, LatticeDoubt, OtherGrain};
 use moiregauge::meaning::{NameReading, Naming};
 use moiregauge_report::results::{NameResult, NamesResult};
 use nalgebra::Matrix2;
@@ -55,26 +55,24 @@ pub struct GrainChoice {
     pub lattice_nm: [[f64; 2]; 2],
 }
 
-/// The other grains of a file, by its words.
+/// The other grains of a file, by the words about it or about its set.
 pub fn grains(analysis: &Analysis, file: &str) -> Vec<GrainChoice> {
-    let scans = analysis.sets.iter().flat_map(|set| &set.scans);
-    let mut lines = scans
-        .filter(|scan| scan.file == file)
-        .flat_map(|scan| &scan.lines);
-    let Some(line) = lines.next() else {
-        return Vec::new();
+    let of_set = |set: &SetAnalysis| {
+        let line = set.scans.iter().find(|s| s.file == file)?.lines.first()?;
+        let told = |caveat: &Caveat| caveat.place == file || caveat.place == set.name;
+        let mut told = analysis.caveats.iter().filter(|caveat| told(caveat));
+        let others = told.find_map(|caveat| match &caveat.doubt {
+            Doubt::Lattice(LatticeDoubt::SeveralGrains { others }) => Some(others),
+            _ => None,
+        })?;
+        let choice = |grain: &OtherGrain| GrainChoice {
+            share: grain.share,
+            lattice_nm: like(&line.sensor.basis, grain.wavelengths, grain.turned),
+        };
+        Some(others.iter().map(choice).collect())
     };
-    let others = analysis.caveats.iter().filter(|c| c.place == file);
-    let others = others.filter_map(|caveat| match &caveat.doubt {
-        Doubt::Lattice(LatticeDoubt::SeveralGrains { others }) => Some(others),
-        _ => None,
-    });
-    let choice = |grain: &OtherGrain| GrainChoice {
-        share: grain.share,
-        lattice_nm: like(&line.sensor.basis, grain.wavelengths, grain.turned),
-    };
-    // Trace and retrace see the same grains.
-    others.take(1).flatten().map(choice).collect()
+    let mut sets = analysis.sets.iter();
+    sets.find_map(of_set).unwrap_or_default()
 }
 
 /// A lattice of these wavelengths that is turned against another one by an angle: a start, which may be some degrees off.

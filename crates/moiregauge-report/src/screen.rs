@@ -3,14 +3,12 @@
 //! `value ± total`: calibration, lattice constant and model are in it. What noise, drift and sensors make of
 //! that stands behind it as the statistical part.
 
-use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use heterostrain::lattice::Lattice;
 use heterostrain::strain::{StrainTensor, TwistStrain};
 use heterostrain::{Estimate, TotalEstimate};
 use moiregauge::campaign::{Analysis, Combined, Drift, ScanAnalysis, SetAnalysis, SetMean};
-use moiregauge::caveat::Caveat;
 use moiregauge::caveat::ChosenBy;
 use moiregauge::meaning::Budget;
 use moiregauge::meaning::{NameReading, Naming, Readings};
@@ -21,6 +19,7 @@ use crate::draw::scale::fixed;
 use crate::format::{plus_minus, two_digits, with_statistical};
 use crate::html::layers;
 use crate::input::FailedInput;
+use crate::results::ResultCaveat;
 
 /// The option that helps against a doubt, by its code.
 pub type Hint = fn(&str) -> Option<&'static str>;
@@ -38,7 +37,7 @@ pub fn summary(analysis: &Analysis, hint: Hint) -> String {
     {
         combined_summary(&mut text, combined);
     }
-    caveats(&mut text, &analysis.caveats, hint);
+    caveats(&mut text, analysis.caveats.iter().map(Into::into), hint);
     text
 }
 
@@ -355,32 +354,22 @@ fn combined_summary(text: &mut String, combined: &Combined) {
     text.push('\n');
 }
 
-/// One line for each caveat, however many files it concerns; after the last of a code the option that helps.
-pub fn caveats(text: &mut String, all: &[Caveat], hint: Hint) {
-    let mut by_message: BTreeMap<(&str, String), Vec<&str>> = BTreeMap::new();
-    for caveat in all {
-        let places = by_message
-            .entry((caveat.code(), caveat.message()))
-            .or_default();
-        places.push(&caveat.place);
-    }
-    let mut lines = by_message.into_iter().peekable();
-    while let Some(((code, message), places)) = lines.next() {
-        let place = match places.as_slice() {
-            [one] => (*one).to_owned(),
-            many => format!("{} and {} more", many[0], many.len() - 1),
-        };
-        let _ = writeln!(text, "caveat {code} ({place}): {message}");
-        if lines.peek().is_none_or(|((next, _), _)| *next != code) {
-            try_option(text, code, hint);
+/// One line for each caveat, in order of their codes; after the last of a code the option that helps.
+pub fn caveats(text: &mut String, all: impl IntoIterator<Item = ResultCaveat>, hint: Hint) {
+    let mut all: Vec<ResultCaveat> = all.into_iter().collect();
+    all.sort_by(|a, b| a.code.cmp(&b.code));
+    for same in all.chunk_by(|a, b| a.code == b.code) {
+        for ResultCaveat {
+            code,
+            message,
+            place,
+        } in same
+        {
+            let _ = writeln!(text, "caveat {code} ({place}): {message}");
         }
-    }
-}
-
-/// The option that helps against a doubt, on a line of its own.
-pub fn try_option(text: &mut String, code: &str, hint: Hint) {
-    if let Some(option) = hint(code) {
-        let _ = writeln!(text, "  try {option}");
+        if let Some(option) = hint(&same[0].code) {
+            let _ = writeln!(text, "  try {option}");
+        }
     }
 }
 

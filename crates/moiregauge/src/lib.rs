@@ -58,6 +58,7 @@ pub mod caveat;
 pub mod coverage;
 pub mod domains;
 pub mod drift;
+pub(crate) mod explain;
 pub mod frame;
 pub mod lattice;
 pub mod map;

@@ -5,12 +5,13 @@ use crate::readers::{Kind, READERS, Reader};
 use crate::signature::{head, is_text};
 
 /// First bytes of files that are none of those that are read.
-const OTHERS: [(&[u8], &str); 7] = [
+const OTHERS: [(&[u8], &str); 8] = [
     (b"GIF8", "a GIF picture"),
     (b"BM", "a BMP picture"),
     (b"%PDF", "a PDF document"),
     (b"\x1f\x8b", "a gzip archive"),
     (b"\x89HDF\r\n\x1a\n", "an HDF5 file"),
+    (b"[ParVERT", "a spectrum of a Createc controller: no image"),
     (b"?*File list", "a NanoScope text export"),
     (b"PK\x03\x04", "a ZIP archive"),
 ];

@@ -28,6 +28,8 @@ pub enum Format {
     ParkTiff,
     /// `WSxM` (`.stp`, `.top` …).
     Wsxm,
+    /// Createc scan (`.dat`).
+    Createc,
     /// RHK (`.sm4` and its elders).
     Rhk,
     /// Agilent, Molecular Imaging (`.mi`).

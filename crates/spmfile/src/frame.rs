@@ -192,6 +192,12 @@ impl<'a> Frame<'a> {
                 Err(Failure::Channel { name, error }) => {
                     scan.unreadable.push(unreadable(entry, name, error));
                 }
+                Err(Failure::Lost(error)) => {
+                    let lost = format!("channel {:?}: {error}", entry.header.info.name);
+                    damage =
+                        Some(damage.map_or(lost.clone(), |before| format!("{before}; {lost}")));
+                    scan.unreadable.push(unreadable(entry, None, error));
+                }
             }
         }
         if let Some(reason) = damage {

@@ -29,6 +29,7 @@ mod agilent;
 mod archive;
 mod array;
 mod clock;
+mod createc;
 mod crop;
 mod cursor;
 mod detect;
@@ -48,7 +49,6 @@ mod iso28632;
 mod jpk;
 mod judge;
 mod labels;
-#[cfg(any(feature = "archives", feature = "pictures"))]
 mod limits;
 pub mod matrix;
 mod nanonis;

@@ -50,6 +50,8 @@ impl Unpacked {
 pub(crate) enum Failure {
     /// It alone cannot be read; a name stands for its own where it has none.
     Channel { name: Option<String>, error: String },
+    /// The file ends before it does.
+    Lost(String),
     /// Its scale is no number.
     Scale(String),
     /// The file is refused.
@@ -277,7 +279,7 @@ impl Failure {
         let (name, reason) = match self {
             Self::File(error) => return error,
             Self::Channel { name, error } => (name, error),
-            Self::Scale(error) => (None, error),
+            Self::Lost(error) | Self::Scale(error) => (None, error),
         };
         ReadError::Channel {
             name: name.unwrap_or_else(|| header.info.name.clone()),

@@ -70,7 +70,7 @@ pub(super) fn summary(calibration: &CalibrationFound) -> String {
     }
     let [x, y] = calibration.gains().map(plus_minus);
     let _ = writeln!(text, "  which is      x {x} %, y {y} %\n");
-    caveats(&mut text, &found.caveats, hints::of);
+    caveats(&mut text, found.caveats.iter().map(Into::into), hints::of);
     text
 }
 

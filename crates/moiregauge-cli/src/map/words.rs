@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use heterostrain::Estimate;
 use moiregauge_report::results::{MapResults, ResultEstimate, StripesResult};
-use moiregauge_report::screen::try_option;
+use moiregauge_report::screen::caveats;
 use moiregauge_report::{layers, plus_minus, two_digits};
 
 use super::regions;
@@ -59,17 +59,7 @@ pub(super) fn summary(results: &MapResults) -> String {
         );
     }
     text.push_str(&regions::summary(&results.details));
-    let mut caveats = results.caveats.iter().peekable();
-    while let Some(caveat) = caveats.next() {
-        let _ = writeln!(
-            text,
-            "caveat {} ({}): {}",
-            caveat.code, caveat.place, caveat.message
-        );
-        if caveats.peek().is_none_or(|next| next.code != caveat.code) {
-            try_option(&mut text, &caveat.code, hints::of);
-        }
-    }
+    caveats(&mut text, results.caveats.iter().cloned(), hints::of);
     text
 }
 

@@ -84,21 +84,14 @@ fn strain_that_no_layers_hold_has_no_twist() {
     );
 }
 
-/// Rough ground whose spectrum has three waves in one frame, one in which one of them is strong, and one of which three frames show the same place in one line
-/// direction: there are vectors, and no twist that could be taken
-/// for a result.
+/// Rough ground has waves of which some three make a lattice by chance; that there are many as strong tells.
 #[test]
-fn what_may_be_no_lattice_has_no_twist() {
+fn what_is_one_of_many_is_no_lattice() {
     for seed in ["3", "101", "176"] {
         let (_folder, [set, out]) = varied("bare+terrain", seed);
-        let run = analyze(&set, &out).output().expect("the program runs");
-        assert!(!run.status.success());
-        let found = results(&out);
-        assert!(caveats(&found).contains(&"lattice-doubtful"), "{seed}");
-        for mean in ["/sets/0/mean", "/sets/0/uncorrected", "/combined"] {
-            let mean = found.pointer(mean);
-            assert!(mean.is_some_and(Value::is_null), "{seed}: {mean:?}");
-        }
+        let said = run(&mut analyze(&set, &out));
+        assert_ne!(said.code, Some(0), "{seed}");
+        assert!(!out.join("results.json").exists(), "{seed}");
     }
 }
 
@@ -154,15 +147,20 @@ fn varied(sample: &str, seed: &str) -> (tempfile::TempDir, [PathBuf; 2]) {
     (folder, [set, out])
 }
 
-/// Sharp stripes and a lattice lie near the points of one lattice of twice its size, 0.3 cycles per frame beside them: it is none, also where its
-/// coarse waves pass for ground.
+/// Sharp stripes and a lattice lie near the points of one lattice of twice its size, 0.3 cycles per frame beside them: the lattice is measured, the stripes
+/// are told.
 #[test]
 fn waves_beside_the_points_of_a_lattice_are_none_of_its() {
     let (_folder, [set, out]) = varied("stripes", "45");
-    let said = run(&mut analyze(&set, &out));
-    assert_ne!(said.code, Some(0));
-    let reason = "is not one of its harmonics";
-    assert!(said.stderr.contains(reason), "{}", said.stderr);
+    succeed(&mut analyze(&set, &out));
+    let found = results(&out);
+    let [value, sigma] = twist(&found, "mean");
+    let wanted = number(&json(&set.join("truth.json")), "/twist_deg");
+    assert!(
+        (value - wanted).abs() < 4.0 * sigma,
+        "{value} ± {sigma}, {wanted}"
+    );
+    assert!(caveats(&found).contains(&"second-lattice"));
 }
 
 /// Of two grains one has frames that do not fit each other and seems to drift by 0.2 nm/min differently from the other, more than the errors allow: it has no twist,

@@ -147,7 +147,7 @@ fn a_single_scan() {
     assert_eq!(results(&out)["sets"][0]["drift"], Value::Null);
 }
 
-/// Nominal sizes are used then, and the user is told, once for each file.
+/// Nominal sizes are used then, and the user is told, once for all scans that are used; one that is not has a word of its own.
 #[test]
 fn no_sensors() {
     let folder = tempfile::tempdir().unwrap();
@@ -159,9 +159,23 @@ fn no_sensors() {
     let run = succeed(&mut analyze(&scans, &out));
     assert!(run.stdout.contains("no-position-sensors"), "{}", run.stdout);
     let found = results(&out);
-    assert_eq!(caveats(&found), ["no-position-sensors"; 4]);
+    assert_eq!(caveats(&found), ["no-position-sensors"]);
+    let set = &found["sets"][0]["name"];
+    let told = |found: &Value, i: usize, place: &Value, end: &str| {
+        let told = &found["caveats"][i];
+        assert_eq!(&told["where"], place);
+        assert!(told["message"].as_str().unwrap().ends_with(end), "{told}");
+    };
+    told(&found, 0, set, " (4 of 4 scans)");
     let line = &found["sets"][0]["scans"][0]["lines"][0];
     assert_eq!(line["from_sensors"], Value::Bool(false));
+    let out = folder.path().join("without");
+    succeed(analyze(&scans, &out).args(["--exclude", "scan.001.spm"]));
+    let without = results(&out);
+    assert_eq!(caveats(&without), ["no-position-sensors"; 2]);
+    told(&without, 0, set, " (3 of 3 scans)");
+    let file = &without["sets"][0]["scans"][1]["file"];
+    told(&without, 1, file, "twist and strain");
 }
 
 /// Noise without a moiré gives no numbers, not even with large error bars.

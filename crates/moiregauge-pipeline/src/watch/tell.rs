@@ -166,22 +166,14 @@ impl<'a> OfMoire<'a> {
     }
 }
 
-/// Doubts about a set and its files, each once.
+/// Doubts about a set and its files.
 fn caveats(all: &[ResultCaveat], set: &SetResult) -> Vec<ResultCaveat> {
     let concerns = |caveat: &&ResultCaveat| {
         caveat.place == set.name
             || caveat.place == "analysis"
             || set.scans.iter().any(|scan| scan.file == caveat.place)
     };
-    let mut kept: Vec<ResultCaveat> = Vec::new();
-    for caveat in all.iter().filter(concerns) {
-        let same =
-            |other: &ResultCaveat| other.code == caveat.code && other.message == caveat.message;
-        if !kept.iter().any(same) {
-            kept.push(caveat.clone());
-        }
-    }
-    kept
+    all.iter().filter(concerns).cloned().collect()
 }
 
 /// What to do now.

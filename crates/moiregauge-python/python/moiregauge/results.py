@@ -705,6 +705,14 @@ class LineResult(Document):
     """Lattice periods across the shorter side."""
     pixel_to_nm: tuple[tuple[float | None, float | None], tuple[float | None, float | None]]
     """Linear part of the map (column, row) → (x, y), nm per pixel, row by row."""
+    predicted_by: float | None
+    """By how many standard errors the weakest of the three waves improves the prediction of parts of the
+    frame that were held out.
+    """
+    rivals: int | None
+    """How many waves of about the same period beside the lattice are as strong as its weakest one; three
+    could make another lattice.
+    """
     share_covered: float | None
     """Share of the frame that carries the lattice and was measured."""
     shortcut_wavelengths_nm: tuple[float | None, float | None, float | None] | None
@@ -1961,6 +1969,7 @@ decoded_by(
             "origin_nm": several(float, 2),
             "periods": float,
             "pixel_to_nm": several(several(float, 2), 2),
+            "predicted_by": float,
             "share_covered": float,
             "shortcut_wavelengths_nm": several(float, 3),
             "signal_to_noise": float,

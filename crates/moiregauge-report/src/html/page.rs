@@ -123,6 +123,8 @@ struct Scan<'a> {
     wavelengths: [String; 3],
     periods: String,
     signal_to_noise: String,
+    predicted_by: String,
+    rivals: String,
 }
 
 #[derive(Clone, Debug, Serialize)]
@@ -367,6 +369,13 @@ impl<'a> Scan<'a> {
                 .map(|v| shown(v.drift_corrected.unwrap_or(v.sensor).wavelength_nm)),
             periods: plain(lowest(|line| line.periods), 1),
             signal_to_noise: plain(lowest(|line| line.signal_to_noise), 1),
+            predicted_by: plain(lowest(|line| line.predicted_by), 1),
+            rivals: scan
+                .lines
+                .iter()
+                .filter_map(|line| line.rivals)
+                .max()
+                .map_or_else(|| "–".to_owned(), |most| most.to_string()),
         }
     }
 }

@@ -330,7 +330,7 @@ fn mean(mean: &SetMean, bilayer: Bilayer<'_>) -> MeanResult {
         vectors: LatticeVector::of_mean(&mean.lattice, &mean.budget, bilayer),
         twist_scatter_deg: number(mean.twist_scatter * degree()),
         strain_scatter_percent: number(mean.strain_scatter * PERCENT),
-        chi2_per_dof: number(mean.chi2_per_dof),
+        chi2_per_dof: mean.chi2_per_dof.and_then(number),
         twist_sigma_unscaled_deg: number(unscaled.twist().sigma * degree()),
         heterostrain_sigma_unscaled_percent: number(unscaled.heterostrain().sigma * PERCENT),
         within_one_percent: mean.within_one_percent,

@@ -93,6 +93,10 @@ pub struct LineResult {
     pub periods: Option<f64>,
     /// Amplitude of the weakest first harmonic over its noise.
     pub signal_to_noise: Option<f64>,
+    /// By how many standard errors the weakest of the three waves improves the prediction of parts of the frame that were held out.
+    pub predicted_by: Option<f64>,
+    /// How many waves of about the same period beside the lattice are as strong as its weakest one; three could make another lattice.
+    pub rivals: Option<usize>,
     /// Share of the frame that carries the lattice and was measured.
     pub share_covered: Option<f64>,
     /// What describes the lattice there: `constant`, or a mean of one that changes: `even` (wave vectors change in
@@ -171,6 +175,8 @@ fn line_result(line: &LineAnalysis, bilayer: Bilayer<'_>) -> LineResult {
         from_sensors: line.from_sensors,
         periods: number(line.periods),
         signal_to_noise: number(line.signal_to_noise),
+        predicted_by: line.evidence.and_then(|e| e.predicts).and_then(number),
+        rivals: line.evidence.map(|e| e.rivals),
         share_covered: number(line.patch.as_ref().map_or(1.0, |patch| patch.share)),
         lattice_model: match line.change.map(|change| change.model) {
             None => "constant",

@@ -43,7 +43,7 @@ pub(crate) fn analysis() -> Analysis {
         .filter_map(|s| s.mean.as_ref())
         .map(|m| m.lattice)
         .collect();
-    let combined = mean(&both, &settings, f64::NAN, true).map(|m| Combined {
+    let combined = mean(&both, &settings, None, true).map(|m| Combined {
         budget: m.budget,
         readings: m.readings,
         lattice: m.lattice,
@@ -148,7 +148,7 @@ pub(crate) fn spoil(analysis: &mut Analysis) {
         for mean in set.mean.iter_mut().chain(&mut set.uncorrected) {
             mean.lattice = nan;
             spoil_result(&mut mean.twist_strain);
-            mean.chi2_per_dof = f64::NAN;
+            mean.chi2_per_dof = Some(f64::NAN);
             let statistical = mean.budget.statistical;
             mean.budget = Budget::new(&nan, &mean.twist_strain, &statistical, &settings);
         }

@@ -119,6 +119,7 @@ pub(super) fn scan(
         from_sensors: true,
         periods: 4.5,
         signal_to_noise: 11.0,
+        evidence: None,
         patch: None,
         change: None,
         on_ground: false,

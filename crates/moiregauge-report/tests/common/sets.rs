@@ -20,7 +20,7 @@ use super::scan::{Noise, PIXELS, SIZE_NM, drift_nm_per_s, scan};
 pub(super) fn mean(
     lattices: &[Lattice],
     settings: &Settings,
-    chi2_per_dof: f64,
+    chi2_per_dof: Option<f64>,
     drift_known: bool,
 ) -> Option<SetMean> {
     let n = lattices.len() as f64;
@@ -67,7 +67,7 @@ pub(super) fn mean(
                 .sum(),
         ),
         chi2_per_dof,
-        enlargement: chi2_per_dof.max(1.0),
+        enlargement: chi2_per_dof.unwrap_or(1.0).max(1.0),
         within_one_percent: true,
     })
 }
@@ -190,7 +190,7 @@ pub(super) fn good_set(
     let sensor: Vec<_> = scans.iter().map(|s| s.sensor).collect();
     let sigma = 0.014 / 60.0;
     let found = drift_nm_per_s() + sigma * noise.pair();
-    let mean = mean(&corrected, settings, 1.3, true);
+    let mean = mean(&corrected, settings, Some(1.3), true);
     SetAnalysis {
         name: format!(
             "slow {}, {rate} Hz",
@@ -215,7 +215,7 @@ pub(super) fn good_set(
         }),
         forward_backward: mean.as_ref().map(|m| m.twist_strain),
         mean,
-        uncorrected: self::mean(&sensor, settings, f64::NAN, false),
+        uncorrected: self::mean(&sensor, settings, None, false),
         checks: None,
         illustration: scans.first().and_then(|s| illustration(s, &mut noise)),
         scans,
@@ -243,7 +243,7 @@ pub(super) fn poor_set(settings: &Settings) -> SetAnalysis {
         channel: "TR Amplitude".to_owned(),
         drift: None,
         mean: None,
-        uncorrected: mean(&[scan.sensor], settings, f64::NAN, false),
+        uncorrected: mean(&[scan.sensor], settings, None, false),
         forward_backward: None,
         checks: None,
         illustration: None,

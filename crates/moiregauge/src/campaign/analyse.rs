@@ -48,9 +48,7 @@ pub fn analyse(scans: Vec<MeasuredScan>, settings: &Settings) -> Analysis {
     for mut group in groups {
         let line = group.scans.first().and_then(|s| s.lines.first());
         reference = reference.or_else(|| Some(canonical(&line?.in_sensor_coordinates()).basis));
-        for scan in group.scans.iter().filter(|s| s.repeats.is_none()) {
-            caveats.extend(scan.caveats.iter().cloned());
-        }
+        caveats.extend(group.caveats());
         let Some(reference) = reference else { continue };
         // Repeated scans come last and take no random numbers from those that follow.
         let count = group.scans.iter().filter(|s| s.repeats.is_none()).count() as u64;
@@ -122,8 +120,7 @@ fn is_doubtful(doubt: &Doubt) -> bool {
     matches!(
         doubt,
         Doubt::Sets(
-            SetDoubt::LatticeDoubtful { .. }
-                | SetDoubt::ShellForLattice { .. }
+            SetDoubt::ShellForLattice { .. }
                 | SetDoubt::DriftOutrunsScan { .. }
                 | SetDoubt::GrainsContradict { .. }
         )

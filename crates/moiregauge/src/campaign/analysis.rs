@@ -14,6 +14,7 @@ use crate::drift::drawn::DriftMonteCarlo;
 use crate::drift::joint::found::TestedTerm;
 use crate::drift::joint::path::DriftPath;
 use crate::frame::axis::Axis;
+use crate::lattice::Evidence;
 use crate::meaning::budget::Budget;
 use crate::meaning::readings::Readings;
 use crate::scan::picture::{Illustration, Picture};
@@ -155,8 +156,8 @@ pub struct SetMean {
     pub twist_scatter: f64,
     /// Root-mean-square deviation per component of the strain vector over the scans; NaN for one scan.
     pub strain_scatter: f64,
-    /// χ² per degree of freedom of the scans against the common lattice; NaN where there is none.
-    pub chi2_per_dof: f64,
+    /// χ² per degree of freedom of the scans against the common lattice; `None` for one image, which has nothing to differ from.
+    pub chi2_per_dof: Option<f64>,
     /// Factor by which all variances were enlarged for that scatter; 1 where it is not significant.
     pub enlargement: f64,
     /// Whether each scan's wavelengths lie within ±1 % of the common ones.
@@ -324,6 +325,8 @@ pub struct LineAnalysis {
     pub periods: f64,
     /// Signal-to-noise ratio of the weakest of the three first harmonics (amplitude).
     pub signal_to_noise: f64,
+    /// What speaks for the lattice; `None` with the other methods, and where it was told by hand.
+    pub evidence: Option<Evidence>,
     /// The part of the frame that carries the lattice; `None` for all of it.
     pub patch: Option<Patch>,
     /// How the lattice changes across that part; `None` where it is the same everywhere, as far as can be seen.

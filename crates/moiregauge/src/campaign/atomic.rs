@@ -23,6 +23,7 @@ use crate::campaign::alike::{Alike, alike};
 use crate::campaign::analysis::AtomicOrientation;
 use crate::campaign::identity::once;
 use crate::caveat::Caveat;
+use crate::caveat::kinds::each_kind_once;
 use crate::caveat::orientation::OrientationDoubt;
 use crate::drift::linear::{Observation, solve};
 use crate::numbers::chi2::enlargement;
@@ -134,10 +135,10 @@ pub fn atomic_orientation(
             misfit_percent: 100.0 * misfit,
         });
     }
-    let mut caveats: Vec<Caveat> = scans.iter().flat_map(|s| s.caveats.clone()).collect();
-    caveats.extend(repeats);
     let files: Vec<String> = scans.iter().map(|s| s.file.clone()).collect();
     let place = files.join(", ");
+    let mut caveats = each_kind_once(&place, scans.iter().map(|s| &s.caveats));
+    caveats.extend(repeats);
     let found = if let Ok(solution) = solve(&observations) {
         let scale = enlargement(solution.chi2, solution.degrees_of_freedom);
         if scale > LARGE_SCATTER {

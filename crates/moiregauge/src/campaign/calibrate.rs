@@ -155,15 +155,14 @@ pub fn calibrate(
         .cell()
         .filter(|_| known.problem().is_none())
         .ok_or(CalibrateError::Cell)?;
-    let (scans, repeats) = once(scans);
-    let mut caveats: Vec<Caveat> = scans.iter().flat_map(|s| s.caveats.clone()).collect();
-    caveats.extend(repeats);
-    caveats.retain(|c| !is_expected(&c.doubt));
+    let (scans, mut caveats) = once(scans);
     let coordinates = coordinates_of(&scans)?;
     let sizes_nm = without_repeats(scans.iter().filter_map(|s| s.size_nm));
     let line_rates_hz = without_repeats(scans.iter().filter_map(|s| s.line_rate_hz));
     let mut sets = Vec::new();
     for group in groups(scans, grouping) {
+        let told = group.caveats().into_iter();
+        caveats.extend(told.filter(|c| !is_expected(&c.doubt)));
         sets.push(see(group, &cell, drift_sigma, &mut caveats)?);
     }
     let separated = sets.iter().any(|s| s.drift.is_some());

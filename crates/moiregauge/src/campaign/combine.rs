@@ -198,7 +198,7 @@ fn joined(
         .ok_or("their drift cannot be determined together")?;
     let reduced = fit.chi2 / fit.degrees_of_freedom.max(1) as f64;
     let means = sets.iter().filter_map(|s| s.mean.as_ref());
-    let usual = means.map(|m| m.chi2_per_dof).fold(1.0, f64::max);
+    let usual = means.filter_map(|m| m.chi2_per_dof).fold(1.0, f64::max);
     if reduced > WORSE * usual {
         return Err(format!(
             "together they scatter {:.0} times more than alone",

@@ -2,6 +2,8 @@
 
 use std::cmp::Ordering;
 
+use crate::caveat::Caveat;
+use crate::caveat::kinds::each_kind_once;
 use crate::frame::axis::Axis;
 use crate::scan::measured::MeasuredScan;
 use crate::settings::knobs::Grouping;
@@ -18,6 +20,18 @@ pub(crate) struct Group {
     pub(crate) scans: Vec<MeasuredScan>,
     /// How many times the cell of these scans is that of others beside them, or theirs of it, where one may be a harmonic shell of the other.
     pub(crate) other_shell: Option<i32>,
+}
+
+impl Group {
+    /// What its scans doubt: those that are used together, each other one by itself.
+    pub(crate) fn caveats(&self) -> Vec<Caveat> {
+        let scans = self.scans.iter().filter(|scan| scan.repeats.is_none());
+        let (used, others): (Vec<_>, Vec<_>) = scans.partition(|scan| scan.excluded.is_none());
+        let mut told = each_kind_once(&self.name, used.into_iter().map(|scan| &scan.caveats));
+        let alone = |scan: &MeasuredScan| each_kind_once(&scan.file, [&scan.caveats]);
+        told.extend(others.into_iter().flat_map(alone));
+        told
+    }
 }
 
 /// Groups scans; the groups are in order of their first scans. Scans that repeat others go with them.

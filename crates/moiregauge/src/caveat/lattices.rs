@@ -114,6 +114,15 @@ pub enum LatticeDoubt {
         /// By how much the errors are enlarged.
         times: f64,
     },
+    /// Other waves are as strong.
+    #[error(
+        "{rivals} of the waves of about its period that do not belong to the lattice are as strong as its weakest one (stripes, or a second moiré); three \
+         could be a lattice as well"
+    )]
+    Rivals {
+        /// How many they are.
+        rivals: usize,
+    },
     /// There is another wave.
     #[error(
         "the residual of the fit shows another wave, with a period of {period:.2} nm ({significance:.0} times the \
@@ -242,7 +251,7 @@ explain! { LatticeDoubt:
          creep, hysteresis or a lag of the sensors. If the two show different lattices, the scan is not used."
         "Look at both images, and use the line direction that is right. Slower lines and more overscan make the \
          difference smaller."
-    Inhomogeneous "inhomogeneous-lattice" Warning
+    Inhomogeneous "inhomogeneous-lattice" Note
         "The lattice changes across the frame by more than chance. The results are means over the frame. A part of the \
          change may come from creep or from a drift that changed."
         "Map the lattice to see where it changes. Compare frames up and down: a change that has opposite signs in the \
@@ -260,12 +269,12 @@ explain! { LatticeDoubt:
          bends cancels itself where it is farthest from straight. Unless this is known, the waves move each other. It was fitted \
          with them, and the errors of the vectors hold what that may have missed."
         "Look at the figure of the scan. A part of the frame with even contrast does without."
-    Changes "changing-lattice" Warning
+    Changes "changing-lattice" Note
         "The lattice changes across the frame by more than chance. The results are means over the area that it covers. \
          Their errors include how far the means depend on where this area ends."
         "Map the lattice to see where it changes. Compare frames up and down: a change that has opposite signs in the \
          two is drift or creep."
-    SeveralGrains "several-grains" Warning
+    SeveralGrains "several-grains" Note
         "Two or more lattices lie side by side in the frame. Each of them that could be measured is a set of its own, \
          together with the other scans that show it. There is no mean of all."
         "Look at the outlines in the figures of the scans, or map the frame."
@@ -273,7 +282,11 @@ explain! { LatticeDoubt:
         "The harmonics of the image do not agree on one lattice. This happens where the lattice is not the same \
          everywhere. The errors of the vectors were enlarged to match."
         "Map the lattice, or analyse a smaller part of the frame."
-    SecondLattice "second-lattice" Warning
+    Rivals "rival-waves" Warning
+        "One or two waves of about the period of the lattice, and none of its own, are as strong as its weakest one: stripes, or a second moiré. With three the \
+         image would be refused, since these could be a lattice as well."
+        "Look at the Fourier transform of the image. Give the approximate wavelength of the right lattice, or measure two moirés."
+    SecondLattice "second-lattice" Note
         "The image shows a wave, well above the noise, that does not belong to the lattice. It may come from a second \
          moiré, from interference, or from a lattice that changes across the frame."
         "Look at the Fourier transform of the image. If the image shows two moirés, measure both."

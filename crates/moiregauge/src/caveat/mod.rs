@@ -7,6 +7,7 @@ pub(crate) mod calibrating;
 pub(crate) mod drifting;
 mod explained;
 pub(crate) mod files;
+pub(crate) mod kinds;
 pub(crate) mod lattices;
 mod maps;
 pub(crate) mod moires;
@@ -21,6 +22,7 @@ pub use calibrating::CalibrationDoubt;
 pub use drifting::{DriftDoubt, FrameDates};
 pub use explained::{Explained, Severity};
 pub use files::{ChannelReason, FileDoubt, ImageChoice};
+pub use kinds::Having;
 pub use lattices::{LatticeDoubt, LineDifference, OtherGrain};
 pub use maps::{MapDoubt, Mapped, SurveyDrift};
 pub use moires::{Impossible, MoireDoubt, PeriodDoubt};
@@ -38,6 +40,8 @@ pub struct Caveat {
     pub doubt: Doubt,
     /// What it concerns: a file, a set, or `analysis`.
     pub place: String,
+    /// Where it stands for those of several scans of a set: how many have it.
+    pub having: Option<Having>,
 }
 
 impl Caveat {
@@ -46,6 +50,7 @@ impl Caveat {
         Self {
             doubt: doubt.into(),
             place: place.into(),
+            having: None,
         }
     }
 
@@ -56,7 +61,12 @@ impl Caveat {
 
     /// What is wrong and what it means for the result, in words.
     pub fn message(&self) -> String {
-        self.doubt.to_string()
+        let having = self.having.as_ref();
+        format!(
+            "{}{}",
+            self.doubt,
+            having.map_or_else(String::new, Having::to_string)
+        )
     }
 
     /// How much it weighs.
@@ -68,18 +78,6 @@ impl Caveat {
     pub fn says_the_same(&self, other: &Self) -> bool {
         self.code() == other.code() && self.message() == other.message()
     }
-}
-
-/// Leaves the first of all that say the same of one place: trace and retrace do.
-pub(crate) fn each_once(caveats: &mut Vec<Caveat>) {
-    let mut kept: Vec<Caveat> = Vec::with_capacity(caveats.len());
-    for caveat in caveats.drain(..) {
-        let known = |other: &Caveat| other.place == caveat.place && other.says_the_same(&caveat);
-        if !kept.iter().any(known) {
-            kept.push(caveat);
-        }
-    }
-    *caveats = kept;
 }
 
 /// What can be doubtful, by subject.

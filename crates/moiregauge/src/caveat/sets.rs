@@ -6,20 +6,6 @@ use crate::caveat::explained::explain;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SetDoubt {
-    /// A lattice so faint that it may be none.
-    #[error(
-        "the lattice is very faint (signal-to-noise ratio {signal_to_noise:.1}), so terrain or noise may look the \
-         same. Three frames that show it in every line direction would confirm it; {scans} show it, {whole} of them in every one. Only \
-         the vectors are given, no twist and strain of the set"
-    )]
-    LatticeDoubtful {
-        /// Amplitude over noise of the weakest first wave, in the plainest image.
-        signal_to_noise: f64,
-        /// Frames that show it.
-        scans: usize,
-        /// Those of them that show it in every line direction that was recorded.
-        whole: usize,
-    },
     /// Two images, of one scan or of a set, show a lattice and a harmonic shell of it.
     #[error(
         "images of one set show two lattices, and the cell of one is {times} times that of the other. \
@@ -183,10 +169,6 @@ fn scattered(of: Scattered, chi2_per_dof: f64) -> String {
 }
 
 explain! { SetDoubt:
-    LatticeDoubtful "lattice-doubtful" Serious
-        "The lattice is very faint, and fewer than three frames show it, or most of them in one line direction only. Rough terrain or \
-         noise may look the same. There is no result for the set."
-        "Look at the figure of the scan. If you see a lattice, give its approximate wavelength, or take more frames."
     ShellForLattice "shell-for-lattice" Serious
         "One image shows a lattice whose cell is two to four times that of the others. The first waves of the lattice \
          are weak. Where noise hides them, a harmonic shell is taken for the lattice. There is no result for the set."

@@ -10,7 +10,6 @@ pub(crate) mod cells;
 pub(crate) mod choose;
 pub(crate) mod equations;
 pub(crate) mod find;
-pub(crate) mod finer;
 pub(crate) mod grains;
 pub(crate) mod higher;
 pub(crate) mod hollows;

@@ -12,9 +12,10 @@ use crate::lattice::fit::fitted::LatticeFit;
 use crate::lattice::fit::measure::CLEARER;
 use crate::lattice::ground::{below, on_even_ground};
 use crate::lattice::measure::{
-    beside, hidden, is_contradicted, is_torn, measure_levelled, no_lattice, of_first_shell,
+    beside, hidden, is_torn, measure_levelled, no_lattice, of_first_shell,
 };
 use crate::lattice::measured::MeasuredLattice;
+use crate::lattice::predicted::{disagrees, judged, predicted};
 use crate::lattice::start::Start;
 use crate::spectrum::error::LatticeError;
 use crate::spectrum::method::Method;
@@ -51,17 +52,23 @@ pub(crate) fn measure_own(
     if method != Method::Lattice {
         return measure_levelled(&image, geometry, background, method);
     }
-    match measure_beside(&image, geometry, background) {
+    let found = match measure_beside(&image, geometry, background) {
         Ok(found) => Ok(clearer(found, &image, geometry, background)),
         Err(error) => {
             let find = |even: &Arc<Image>, geometry: &Geometry| {
                 measure_levelled(even, geometry, background, method).ok()
             };
             below(&image, geometry, background, &find)
-                .filter(|found| !is_torn(found) && !is_contradicted(found, geometry))
+                .filter(|found| !is_torn(found))
+                .or_else(|| {
+                    predicted(&image, geometry, background)?
+                        .measure(method)
+                        .ok()
+                })
                 .ok_or(error)
         }
-    }
+    };
+    found.and_then(|found| judged(found, &image, geometry))
 }
 
 /// The same lattice in the image without ground, where something stands out beside it and the image without ground says much more of it.
@@ -81,7 +88,7 @@ fn clearer(
     }
     let most = CLEARER * variance(&found);
     on_even_ground(image, fit, geometry, background)
-        .filter(|even| !is_torn(even) && !is_contradicted(even, geometry) && variance(even) < most)
+        .filter(|even| !is_torn(even) && variance(even) < most)
         .unwrap_or(found)
 }
 
@@ -114,12 +121,6 @@ fn is_doubtful(found: &Result<MeasuredLattice, LatticeError>) -> bool {
         return true;
     };
     found.patch.is_some() || beside(found).is_some() || found.fit.as_ref().is_none_or(disagrees)
-}
-
-/// Whether its harmonics do not agree on one lattice.
-fn disagrees(fit: &LatticeFit) -> bool {
-    fit.closure
-        .is_some_and(|closure| closure.enlargement() > 1.0)
 }
 
 /// The lattice of an image that is a few perfect waves, of which some are none of the lattice's.

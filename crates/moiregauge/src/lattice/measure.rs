@@ -3,33 +3,24 @@
 use std::sync::Arc;
 
 use heterostrain::lattice::shortest_pair;
-use nalgebra::{Matrix2, Vector2};
+use nalgebra::Matrix2;
 
-use crate::coverage::find::{pitch, same};
-use crate::coverage::finer::{ON, finer, misses};
-use crate::coverage::patch::WHOLE;
-use crate::coverage::settle::settle;
-use crate::frame::background::{Background, remove_background};
-use crate::frame::clip::cut_off;
+use crate::coverage::find::same;
+use crate::frame::background::Background;
 use crate::frame::geometry::Geometry;
 use crate::frame::image::Image;
 use crate::lattice::fit::closure::Closure;
-use crate::lattice::fit::few::strongest_beside;
 use crate::lattice::fit::fitted::{FittedHarmonic, LatticeFit};
 use crate::lattice::fit::hidden::{Hidden, first_shell};
 use crate::lattice::fit::noise::ForeignWave;
 use crate::lattice::measured::MeasuredLattice;
-use crate::lattice::start::{HANN, Start};
+use crate::lattice::predicted::{disagrees, of_better_cell, without_foreign_peaks};
+use crate::lattice::start::Start;
 use crate::spectrum::error::{LatticeError, SECOND, THIRD};
 use crate::spectrum::method::Method;
 use crate::spectrum::prepare::levelled;
 use crate::spectrum::shells::FIRST_SHELL;
 
-/// Waves shorter than this share of the shortest lattice vector are atoms, and those longer by as much are background: both
-/// may be stronger than the lattice.
-const ATOMS: f64 = 0.25;
-/// A wave of so many times the amplitude of the first ones of a lattice is what an image shows, and they are not. Chosen by eye.
-const TOWERS: f64 = 3.0;
 /// A lattice whose waves change by more than this share of themselves from corner to corner is none: gradients and waves of twist and strain make up
 /// to a tenth, creep in a frame of four periods of atoms a half, and holes that pass for a coarse lattice 0.7 to 1.4.
 const TORN: f64 = 0.6;
@@ -99,59 +90,8 @@ pub(crate) fn measure_levelled(
     if let Some(error) = no_lattice(&found) {
         return Err(error);
     }
-    if hidden(&found).is_first_shell()
-        && let Some(first) = of_first_shell(&found, image, geometry, background, method)
-    {
-        return Ok(first);
-    }
-    let Some(wave) = beside(&found) else {
-        return Ok(found);
-    };
-    if let Some(larger) = of_larger_cell(&found, &wave, image, geometry, background, method) {
-        return Ok(larger);
-    }
-    if let Some(period) = towering(&found, image, geometry) {
-        return Err(LatticeError::Contradicted { period });
-    }
-    let (pair, size) = (found.reciprocal, [image.columns, image.rows]);
-    let to_physical = geometry.pixel_to_nm.try_inverse().map(|m| m.transpose());
-    let finer = to_physical.and_then(|m| finer(&pair, &wave.wave_vector, size, &m));
-    let finer = finer.and_then(|pair| Start::near(image, geometry, background, &pair));
-    if let Some(start) = finer.filter(Start::stands_out) {
-        let found = start.measure(method)?;
-        return no_lattice(&found).map_or(Ok(found), Err);
-    }
-    if !is_contradicted(&found, geometry) {
-        return Ok(found);
-    }
-    // Another part of the frame explains it, or it is something else beside the lattice.
-    let another = Start::find_patch(image, geometry, background, Some(pair))
-        .and_then(|start| start.measure(method).ok())
-        .filter(|other| beside(other).is_none_or(|wave| !is_stronger(other, &wave)))
-        .filter(|other| no_lattice(other).is_none());
-    match another {
-        Some(other) => Ok(other),
-        // A step, a slope or stripes below a lattice that every part of the frame shows.
-        None if is_plain_everywhere(&found, image, geometry, background) => Ok(found),
-        None => Err(LatticeError::Contradicted {
-            period: period(&wave, geometry),
-        }),
-    }
-}
-
-/// Period (nm) of a wave of the image that is none of the lattice's and much stronger than any of its first ones: however plain these are, nobody
-/// meant them.
-fn towering(found: &MeasuredLattice, image: &Image, geometry: &Geometry) -> Option<f64> {
-    let fit = found.fit.as_ref().filter(|_| found.patch.is_none())?;
-    let (wave_vector, amplitude) = strongest_beside(image, &found.reciprocal)?;
-    let first = fit.harmonics.iter().take(FIRST_SHELL.len());
-    let strongest = first.map(|h| h.amplitude).fold(0.0, f64::max);
-    let wave = ForeignWave {
-        wave_vector,
-        ..fit.foreign_wave?
-    };
-    (amplitude > TOWERS * strongest && competes(found, &wave, geometry))
-        .then(|| period(&wave, geometry))
+    Ok(of_better_cell(&found, image, geometry, background, method)
+        .unwrap_or_else(|| without_foreign_peaks(found, image)))
 }
 
 /// Why what the fit says of its waves makes a lattice none.
@@ -162,33 +102,6 @@ pub(crate) fn no_lattice(found: &MeasuredLattice) -> Option<LatticeError> {
     let closure = found.fit.as_ref()?.closure.filter(Closure::is_no_lattice)?;
     let cycles = closure.apart;
     Some(LatticeError::NoHarmonics { cycles })
-}
-
-/// The lattice of which that which was found has but the second or the third shell, where a wave beside it is another harmonic of that. Sharp walls have
-/// strong harmonics of all orders, and rough ground hides the first.
-fn of_larger_cell(
-    found: &MeasuredLattice,
-    wave: &ForeignWave,
-    image: &Image,
-    geometry: &Geometry,
-    background: Background,
-    method: Method,
-) -> Option<MeasuredLattice> {
-    let to_physical = geometry.pixel_to_nm.try_inverse()?.transpose();
-    let (pair, size) = (found.reciprocal, [image.columns, image.rows]);
-    let larger = [(first_shell(&pair), 3), (pair / 2.0, 4)];
-    larger.into_iter().find_map(|(pair, cells)| {
-        let beside = misses(&found.reciprocal, &wave.wave_vector, size)? > ON;
-        let on = misses(&pair, &wave.wave_vector, size)? < ON;
-        let pair = pair * shortest_pair(&(to_physical * pair))?;
-        let start = (beside && on).then(|| Start::at(image, geometry, background, &pair))?;
-        let other = start?.measure(method).ok()?;
-        let shown = harmonics_beside(other.fit.as_ref()?, cells);
-        // Stripes and their overtones are in line.
-        let [h, k] = *shown.first()?;
-        let is_shown = shown.len() >= FEWEST_BESIDE && shown.iter().any(|i| h * i[1] != k * i[0]);
-        (is_shown && no_lattice(&other).is_none()).then_some(other)
-    })
 }
 
 /// The harmonics that stand out and are none of its second shell, which has a third of its points, or of its third, which has a quarter.
@@ -252,40 +165,12 @@ pub(crate) fn of_first_shell(
     let pair = first_shell(&found.reciprocal);
     let to_physical = geometry.pixel_to_nm.try_inverse()?.transpose();
     let pair = pair * shortest_pair(&(to_physical * pair))?;
-    Start::at(image, geometry, background, &pair)?
+    let first = Start::at_on(found.patch.as_ref(), image, geometry, background, &pair)?
         .measure(method)
-        .ok()
-}
-
-/// Whether every part of the frame shows the waves of a lattice, each far above the noise.
-fn is_plain_everywhere(
-    found: &MeasuredLattice,
-    image: &Image,
-    geometry: &Geometry,
-    background: Background,
-) -> bool {
-    let flat = cut_off(&remove_background(image, background));
-    let size = [image.columns, image.rows];
-    found.patch.is_none()
-        && settle(&flat, &found.reciprocal, pitch(geometry)).is_some_and(|settled| {
-            let patch = &settled.patch;
-            let there = same(size, &patch.pair, &found.reciprocal);
-            there && patch.share > WHOLE && settled.is_plain()
-        })
-}
-
-/// Whether a wave can be that of the lattice that was meant: atoms, which are much shorter, and background are none.
-fn competes(found: &MeasuredLattice, wave: &ForeignWave, geometry: &Geometry) -> bool {
-    let basis = geometry.pixel_to_nm * found.pixels.basis;
-    let shortest = basis.column(0).norm().min(basis.column(1).norm());
-    (ATOMS * shortest..shortest / ATOMS).contains(&period(wave, geometry))
-}
-
-/// Period of a wave, nm.
-fn period(wave: &ForeignWave, geometry: &Geometry) -> f64 {
-    let inverse = geometry.pixel_to_nm.try_inverse();
-    let q = inverse.map_or_else(Vector2::zeros, |m| m.transpose() * wave.wave_vector);
-    std::f64::consts::TAU / q.norm()
+        .ok()?;
+    // Waves that miss its points are those of something else.
+    let agrees = |found: &MeasuredLattice| !found.fit.as_ref().is_some_and(disagrees);
+    (agrees(&first) || !agrees(found)).then_some(first)
 }
 
 /// The same for a lattice that is one of several and everywhere: nothing is asked of what lies beside it.
@@ -316,16 +201,6 @@ pub(crate) fn beside(found: &MeasuredLattice) -> Option<ForeignWave> {
         .filter(ForeignWave::stands_out)
 }
 
-/// Whether a wave beside a lattice that may be the one that was meant is stronger than it.
-pub(crate) fn is_contradicted(found: &MeasuredLattice, geometry: &Geometry) -> bool {
-    beside(found).is_some_and(|wave| is_stronger(found, &wave) && competes(found, &wave, geometry))
-}
-
-/// Whether a wave beside the lattice is stronger than the weakest of its first ones.
-fn is_stronger(found: &MeasuredLattice, wave: &ForeignWave) -> bool {
-    wave.significance > HANN * found.signal_to_noise.powi(2)
-}
-
 /// The lattice of the whole frame or, where it does not cover it, of the part that it covers. The background is off already.
 fn find_anywhere(
     image: &Arc<Image>,
@@ -344,11 +219,11 @@ fn find_anywhere(
     if first.is_none() && !matches!(error, LatticeError::NoLattice { .. }) {
         return Err(error);
     }
-    match Start::find_patch(image, geometry, background, first) {
-        Some(found) => Ok(found),
-        None if method == Method::Lattice => {
-            Start::find_again(image, geometry, background).map_err(|_| error)
-        }
-        None => Err(error),
-    }
+    let found = Start::find_patch(image, geometry, background, first);
+    let again = || Start::find_again(image, geometry, background).ok();
+    let found = match method {
+        Method::Lattice => found.or_else(again),
+        _ => found,
+    };
+    found.ok_or(error)
 }

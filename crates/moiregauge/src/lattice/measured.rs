@@ -63,6 +63,9 @@ pub struct MeasuredLattice {
     /// Middle of the part of the frame that was used, (column, row), in fractions of pixels.
     #[serde(with = "exact")]
     pub middle: Vector2<f64>,
+    /// What speaks for it; `None` with the other methods, and where it was told by hand.
+    #[serde(default)]
+    pub evidence: Option<Evidence>,
     /// Lattice periods across the shorter side of the frame.
     #[serde(with = "exact")]
     pub periods: f64,
@@ -73,4 +76,16 @@ pub struct MeasuredLattice {
     pub published: Option<PublishedPeaks>,
     /// The fit to the pixels; `None` with the other methods.
     pub fit: Option<LatticeFit>,
+}
+
+/// What speaks for a lattice, beside its signal-to-noise ratio: its margin to an image without any.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct Evidence {
+    /// By how many standard errors the weakest of its three waves improves the prediction of blocks of the frame that were held out; `None` where the
+    /// frame is too small.
+    #[serde(with = "exact")]
+    pub predicts: Option<f64>,
+    /// How many waves of about its period beside it are as strong as its weakest one.
+    pub rivals: usize,
 }

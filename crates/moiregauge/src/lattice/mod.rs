@@ -14,13 +14,14 @@ pub(crate) mod ground;
 pub(crate) mod measure;
 pub(crate) mod measured;
 pub(crate) mod paper;
+pub(crate) mod predicted;
 pub(crate) mod several;
 pub(crate) mod start;
 
 pub use common::Common;
 pub use find::measure;
 pub use fit::{Closure, FittedHarmonic, ForeignWave, Inhomogeneity, LatticeFit};
-pub use measured::MeasuredLattice;
+pub use measured::{Evidence, MeasuredLattice};
 pub use paper::PublishedPeaks;
 pub use several::measure_several;
 pub use start::Start;

@@ -139,6 +139,25 @@ impl Start {
         })
     }
 
+    /// The same on a part of an image; `None` for all of it.
+    pub(crate) fn at_on(
+        part: Option<&Patch>,
+        image: &Image,
+        geometry: &Geometry,
+        background: Background,
+        pair: &Matrix2<f64>,
+    ) -> Option<Self> {
+        let Some(part) = part else {
+            return Self::at(image, geometry, background, pair);
+        };
+        let start = Self::at(&part.of(image), geometry, background, pair)?;
+        let patch = Some(Patch {
+            pair: start.pair(),
+            ..part.clone()
+        });
+        Some(Self { patch, ..start })
+    }
+
     /// `seen`: the harmonics in an image of bins, and the three first wave vectors, from a pair.
     fn around(
         image: &Image,

@@ -2,7 +2,7 @@
 
 use heterostrain::lattice::labelled_like;
 
-use crate::caveat::{Caveat, each_once};
+use crate::caveat::Caveat;
 use crate::scan::doubts::about_coverage;
 use crate::scan::measured::{MeasuredLine, MeasuredScan};
 
@@ -57,7 +57,6 @@ pub(crate) fn beside(scan: &MeasuredScan, lines: Vec<MeasuredLine>) -> MeasuredS
     for line in &lines {
         about_coverage(&scan.file, &line.lattice, &line.geometry, &mut caveats);
     }
-    each_once(&mut caveats);
     MeasuredScan {
         lines: lines.into(),
         caveats,

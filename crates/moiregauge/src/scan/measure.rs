@@ -4,9 +4,8 @@ use nalgebra::{Matrix2, Vector2};
 use spmfile::{Channel, FrameDirection, Scan};
 
 use crate::calibration::Calibration;
+use crate::caveat::Caveat;
 use crate::caveat::files::FileDoubt;
-use crate::caveat::lattices::LatticeDoubt;
-use crate::caveat::{Caveat, Doubt, each_once};
 use crate::frame::geometry::Geometry;
 use crate::frame::image::Image;
 use crate::frame::polygon;
@@ -154,8 +153,6 @@ fn measure_with(
     }
     caveats.extend(failures.iter().map(|error| left_out(error, file)));
     about_calibration(file, scan, moires.iter().flatten(), settings, &mut caveats);
-    each_once(&mut caveats);
-    grains_once(&mut caveats);
     let channel = &channels[0].name;
     let of_moire = |lines| joined(file, scan, channel, lines, caveats.clone());
     Ok(moires.into_iter().map(of_moire).collect())
@@ -201,15 +198,6 @@ fn joined(
         grains: others.collect(),
         ..largest
     }
-}
-
-/// Trace and retrace say the same of the grains beside the largest: once is enough.
-fn grains_once(caveats: &mut Vec<Caveat>) {
-    let mut said = false;
-    caveats.retain(|caveat| match &caveat.doubt {
-        Doubt::Lattice(LatticeDoubt::SeveralGrains { .. }) => !std::mem::replace(&mut said, true),
-        _ => true,
-    });
 }
 
 /// Adds the lines of one direction, each to its moiré.

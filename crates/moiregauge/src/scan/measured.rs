@@ -47,7 +47,7 @@ pub struct MeasuredScan {
     pub excluded: Option<String>,
     /// The file that holds the same data and is used in its place.
     pub repeats: Option<String>,
-    /// Doubts about this scan.
+    /// Doubts about this scan, of its trace and of its retrace.
     pub caveats: Vec<Caveat>,
     /// The same scan in the other grains that it shows: the analysis makes a set of each grain.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]

@@ -46,15 +46,30 @@ pub enum LatticeError {
         /// By how much: root mean square, weighted with their power.
         cycles: f64,
     },
-    /// Something else is stronger.
+    /// Other waves are as strong.
     #[error(
-        "a wave with a period of {period:.2} nm is stronger than the lattice that was found, and is not one of its \
-         harmonics. It may come from another lattice, from stripes, or from an edge"
+        "the lattice that was found is one of many: {rivals} other waves of about its period are as strong as its weakest \
+         one, and chance makes a lattice of so many. Rough ground, steps and noise have such waves"
     )]
-    Contradicted {
-        /// Its period, nm.
-        period: f64,
+    OneOfMany {
+        /// How many they are.
+        rivals: usize,
     },
+    /// It does not predict what was left out.
+    #[error(
+        "the lattice that was found does not predict parts of the image that were left out of its fit ({standard_errors:.1} \
+         standard errors without the weakest of its three waves). The peaks come from an edge, from stripes or from rough ground"
+    )]
+    NotPredicted {
+        /// By how many standard errors the weakest of its waves improves the prediction.
+        standard_errors: f64,
+    },
+    /// No known crystal has such a cell.
+    #[error(
+        "the strongest waves of the image make a cell far from any hexagon. They come from stripes, from a double tip or from \
+         different lattices"
+    )]
+    Distorted,
     /// The lattice that was told by hand is not there.
     #[error(
         "in the part of the image that is used, no lattice like the given one stands out. Noise hides it, or what lies \

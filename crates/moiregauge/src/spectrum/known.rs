@@ -122,7 +122,7 @@ fn candidates(
             }
         }
     }
-    by_score(found, spectrum)
+    by_score(found, spectrum, |_| true)
 }
 
 /// Whether a candidate has the same vectors already, before it was refined or after.

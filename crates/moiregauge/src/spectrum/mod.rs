@@ -12,6 +12,7 @@ pub(crate) mod phases;
 pub(crate) mod pictures;
 pub(crate) mod prepare;
 pub(crate) mod rescue;
+pub(crate) mod rivals;
 pub(crate) mod select;
 pub(crate) mod shells;
 pub(crate) mod transform;

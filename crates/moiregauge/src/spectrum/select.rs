@@ -5,6 +5,8 @@
 //! wins that explains most of the peaks with the fewest places to put them (sum rule, primitive
 //! cell, small distortion).
 
+use std::cell::OnceCell;
+
 use heterostrain::lattice::{distortion, shortest_pair};
 use nalgebra::{Matrix2, Vector2};
 use rayon::prelude::*;
@@ -14,6 +16,7 @@ use crate::numbers::interrupt;
 use crate::numbers::median::median;
 use crate::numbers::three::three;
 use crate::spectrum::fourier::{Kept, wide};
+use crate::spectrum::rivals::{ENOUGH, Rivals};
 use crate::spectrum::transform::Spectrum;
 
 /// A lattice is well explained by so many peaks, and by so many times those that chance puts on it. Chosen by eye.
@@ -35,7 +38,7 @@ const TOLERANCE: f64 = 0.45;
 const ORDERS: f64 = 4.0;
 /// A moiré of hexagonal layers is a hexagon distorted by less than this; see [`distortion`]. Beyond, other pairs of
 /// the lattice are nearer to a hexagon.
-const MOST_DISTORTION: f64 = 0.45;
+pub(crate) const MOST_DISTORTION: f64 = 0.45;
 
 /// A lattice proposed by the spectrum.
 #[derive(Clone, Copy, Debug)]
@@ -85,11 +88,20 @@ pub(crate) fn candidates(spectrum: &Spectrum, pixel_to_nm: &Matrix2<f64>) -> Vec
             }
         }
     }
-    by_score(found, spectrum)
+    let rivals = OnceCell::new();
+    // A cell of many atoms explains many peaks; single shells of it need not stand out.
+    by_score(found, spectrum, |candidate| {
+        let rivals = rivals.get_or_init(|| Rivals::new(spectrum));
+        well_explained(candidate) || rivals.of(&candidate.pair, &to_physical) < ENOUGH
+    })
 }
 
-/// The best few that are different lattices.
-pub(crate) fn by_score(mut found: Vec<Candidate>, spectrum: &Spectrum) -> Vec<Candidate> {
+/// The best few that are different lattices, of those that are to be kept.
+pub(crate) fn by_score(
+    mut found: Vec<Candidate>,
+    spectrum: &Spectrum,
+    keep: impl Fn(&Candidate) -> bool,
+) -> Vec<Candidate> {
     found.sort_by(|a, b| b.score.total_cmp(&a.score));
     let mut distinct: Vec<Candidate> = Vec::new();
     let frame = frame_cycles(spectrum);
@@ -98,7 +110,7 @@ pub(crate) fn by_score(mut found: Vec<Candidate>, spectrum: &Spectrum) -> Vec<Ca
             let d = frame * (candidate.pair - other.pair);
             d.column(0).norm() < TOLERANCE && d.column(1).norm() < TOLERANCE
         };
-        if !distinct.iter().any(same) {
+        if !distinct.iter().any(same) && keep(&candidate) {
             distinct.push(candidate);
         }
         if distinct.len() == 4 {
@@ -132,19 +144,17 @@ fn assess(
         }
         pair *= Matrix2::new(0.0, -1.0, 1.0, 1.0);
     }
-    if distortion(&(to_physical * pair)) > MOST_DISTORTION {
-        return None;
-    }
     let frame = frame_cycles(spectrum);
-    let shortest = |p: &Matrix2<f64>| {
-        let [a, b, c] = three(&(frame * p)).map(|wave| wave.norm());
-        a.min(b).min(c)
+    let may_be = |pair: &Matrix2<f64>| {
+        let shortest = three(&(frame * pair)).map(|wave| wave.norm());
+        let shortest = shortest.into_iter().fold(f64::INFINITY, f64::min);
+        shortest >= LOWEST_CYCLES && distortion(&(to_physical * pair)) <= MOST_DISTORTION
     };
-    if shortest(&pair) < LOWEST_CYCLES {
+    if !may_be(&pair) {
         return None;
     }
     let candidate = score(&pair, peaks, spectrum, Orders(ORDERS))?;
-    Some(Candidate {
+    may_be(&candidate.pair).then_some(Candidate {
         score: candidate.score * (1.0 - distortion(&(to_physical * candidate.pair)).powi(2)),
         ..candidate
     })

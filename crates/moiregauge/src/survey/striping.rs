@@ -2,8 +2,9 @@
 
 use spmfile::{LineDirection, Scan};
 
+use crate::caveat::Caveat;
+use crate::caveat::kinds::each_kind_once;
 use crate::caveat::patterns::PatternDoubt;
-use crate::caveat::{Caveat, each_once};
 use crate::frame::geometry::Geometry;
 use crate::frame::image::Image;
 use crate::lattice::start::Start;
@@ -80,7 +81,7 @@ fn frames(
             });
         }
     }
-    each_once(caveats);
+    *caveats = each_kind_once(file, [&*caveats]);
     Ok((name, frames))
 }
 

@@ -4,7 +4,7 @@ use moiregauge::campaign::{Analysis, analyse};
 use moiregauge::caveat::Caveat;
 use moiregauge::meaning::Source;
 use moiregauge::scan::{MeasuredScan, measure_scan};
-use moiregauge::settings::{GivenDrift, Settings};
+use moiregauge::settings::{GivenDrift, Lines, Settings};
 use moiregauge::simulate::{Simulation, Simulator};
 use moiregauge::spectrum::Method;
 use spmfile::{FrameDirection, Samples, Scan};
@@ -196,6 +196,26 @@ fn one_direction_needs_a_given_drift() {
     assert!(codes(&analysis).contains(&"drift-given"));
 }
 
+/// One image fits the lattice that it alone tells, up to rounding: it has no χ² and no scatter.
+#[test]
+fn one_image_does_not_scatter() {
+    let settings = Settings {
+        line: Lines::Trace,
+        drift: Some(GivenDrift {
+            x_nm_per_min: 0.5,
+            y_nm_per_min: -0.15,
+            sigma_nm_per_min: 0.0,
+        }),
+        ..quick(Method::Autocorrelation)
+    };
+    for scan in frames(&small_set(9)) {
+        let analysis = analyse_frames(&[scan], &settings);
+        let mean = analysis.sets[0].mean.as_ref().unwrap();
+        assert_eq!((mean.chi2_per_dof, mean.enlargement), (None, 1.0));
+        assert!(!codes(&analysis).contains(&"scatter"));
+    }
+}
+
 /// Without sensors the nominal geometry is used and said so.
 #[test]
 fn no_sensors_is_a_caveat() {
@@ -375,7 +395,7 @@ fn noise_that_trace_and_retrace_share_counts_once() {
     }
     let settings = quick(Method::Lattice);
     let trace_only = Settings {
-        line: moiregauge::settings::Lines::Trace,
+        line: Lines::Trace,
         ..settings.clone()
     };
     let sigma = |scans: &[Scan], settings: &Settings| {

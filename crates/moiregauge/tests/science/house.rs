@@ -15,7 +15,7 @@ const FLOORS: [&[&str]; 13] = [
     &["window", "drift"],
     &["settings", "caveat"],
     &["lattice", "calibration"],
-    &["coverage"],
+    &["coverage", "explain"],
     &["spectrum", "simulate"],
     &["frame"],
     &["numbers"],

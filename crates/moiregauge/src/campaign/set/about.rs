@@ -41,11 +41,11 @@ fn about_readings(name: &str, mean: &SetMean, settings: &Settings) -> Vec<Caveat
 
 fn about_mean(name: &str, mean: Option<&SetMean>, caveats: &mut Vec<Caveat>) {
     let Some(mean) = mean else { return };
-    if mean.chi2_per_dof > LARGE_CHI2 {
+    if let Some(chi2_per_dof) = mean.chi2_per_dof.filter(|chi2| *chi2 > LARGE_CHI2) {
         caveats.push(Caveat::new(
             SetDoubt::Scatter {
                 of: Scattered::Moires,
-                chi2_per_dof: mean.chi2_per_dof,
+                chi2_per_dof,
             },
             name,
         ));

@@ -2,14 +2,13 @@
 
 use nalgebra::Matrix2;
 
-use crate::campaign::analysis::{SetAnalysis, SetMean};
+use crate::campaign::analysis::SetAnalysis;
 use crate::campaign::group::Group;
 use crate::campaign::set::about::about_set;
 use crate::campaign::set::common::common;
 use crate::campaign::set::drift::{constant_drift, outruns, unknown};
-use crate::campaign::set::faint::{in_all_directions, too_faint, weak_for_its_strain};
 use crate::campaign::set::mean::{at_drift, forward_backward, without_drift};
-use crate::campaign::set::moire::{breaks, draw, is_large_strain};
+use crate::campaign::set::moire::{breaks, draw};
 use crate::campaign::set::scan::scans_at_drift;
 use crate::campaign::set::shells::{of_other_shell, of_second_shell};
 use crate::campaign::set::{joint, published};
@@ -88,11 +87,6 @@ pub(crate) fn analyse_set(
             caveats.push(Caveat::new(doubt, name));
             (uncorrected, mean) = (None, None);
         }
-        let told = mean.as_ref().or(uncorrected.as_ref());
-        if let Some(doubt) = told.and_then(|told| strained_and_weak(told, &used, settings)) {
-            caveats.push(Caveat::new(doubt, name));
-            (uncorrected, mean) = (None, None);
-        }
     }
     let set = SetAnalysis {
         name: name.clone(),
@@ -111,31 +105,10 @@ pub(crate) fn analyse_set(
     set
 }
 
-/// Why a mean is none: its strain is larger than any that is known, and few faint images show the lattice. What was told by hand is meant.
-fn strained_and_weak(
-    told: &SetMean,
-    used: &[&MeasuredScan],
-    settings: &Settings,
-) -> Option<SetDoubt> {
-    let strained = is_large_strain(told) && !settings.by_hand.says_which();
-    let weak = weak_for_its_strain(used).filter(|_| strained);
-    weak.map(|ratio| doubtful(used, ratio))
-}
-
-/// That the lattice of these scans, with such a signal-to-noise ratio, may be none.
-fn doubtful(used: &[&MeasuredScan], signal_to_noise: f64) -> SetDoubt {
-    SetDoubt::LatticeDoubtful {
-        signal_to_noise,
-        scans: used.len(),
-        whole: in_all_directions(used),
-    }
-}
-
 /// Why the lattice of a set may be another one, so that the set has no result.
 fn no_result(group: &Group, used: &[&MeasuredScan]) -> Option<SetDoubt> {
     let hidden = of_other_shell(group).or_else(|| of_second_shell(used));
-    let hidden = hidden.map(|times| SetDoubt::ShellForLattice { times });
-    hidden.or_else(|| too_faint(used).map(|ratio| doubtful(used, ratio)))
+    hidden.map(|times| SetDoubt::ShellForLattice { times })
 }
 
 /// The scans that are not left out, by their number.

@@ -42,10 +42,7 @@ pub(crate) fn at_drift(
         &Lattice::new(lattice.basis, lattice.covariance + shared),
         &statistical,
         pitch,
-        Agreement {
-            chi2_per_dof: solved.chi2 / solved.freedom as f64,
-            enlargement: solved.enlargement,
-        },
+        Agreement::new(solved.chi2, solved.freedom, solved.enlargement),
         counted(scans).map(of),
         settings,
         strengths,
@@ -78,10 +75,7 @@ pub(crate) fn without_drift(
         &lattice,
         &statistical,
         pitch,
-        Agreement {
-            chi2_per_dof: chi2 / freedom as f64,
-            enlargement: scale,
-        },
+        Agreement::new(chi2, freedom, scale),
         counted(scans).map(of),
         settings,
         strengths,
@@ -91,9 +85,19 @@ pub(crate) fn without_drift(
 /// How well scans agree with their common lattice.
 #[derive(Clone, Copy)]
 struct Agreement {
-    chi2_per_dof: f64,
+    /// `None` where nothing is left over to disagree: what rounding leaves there is no χ².
+    chi2_per_dof: Option<f64>,
     /// By how much their scatter enlarged all variances.
     enlargement: f64,
+}
+
+impl Agreement {
+    fn new(chi2: f64, freedom: usize, enlargement: f64) -> Self {
+        Self {
+            chi2_per_dof: (freedom > 0).then(|| chi2 / freedom as f64),
+            enlargement,
+        }
+    }
 }
 
 /// Twist and strain of the common lattice, and how the scans scatter about it.

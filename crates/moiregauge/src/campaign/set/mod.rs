@@ -4,7 +4,6 @@ pub(crate) mod about;
 pub(crate) mod analyse;
 pub(crate) mod common;
 pub(crate) mod drift;
-pub(crate) mod faint;
 pub(crate) mod ground;
 pub(crate) mod headers;
 pub(crate) mod joint;

@@ -6,7 +6,7 @@ use crate::lattice::fit::fit_pixels::{FinalNoise, Fit, ROUNDS};
 use crate::lattice::fit::frame::{Basis, STRAIGHT, wave};
 use crate::lattice::fit::gram::gram;
 use crate::lattice::fit::leverage::Leverage;
-use crate::lattice::fit::model::{Clip, look};
+use crate::lattice::fit::model::look;
 use crate::lattice::fit::solve;
 use crate::lattice::fit::tables::Tables;
 use crate::spectrum::harmonics::Harmonics;
@@ -151,7 +151,7 @@ impl Fit<'_> {
             orders: STRAIGHT,
         };
         let probes = Tables::new(&self.frame, &self.model.pair, &outside);
-        let (frame, model, clip) = (&self.frame, &self.model, Clip::at(self.sigma));
+        let (frame, model, clip) = (&self.frame, &self.model, self.clip());
         let lines = &mut self.lines;
         let seen = look(frame, model, &tables, &probed, &probes, lines, clip);
         let gram = gram(frame, &basis, &self.model.pair, &self.lines.lambda);

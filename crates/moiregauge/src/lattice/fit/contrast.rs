@@ -19,7 +19,7 @@ use serde::{Deserialize, Serialize};
 use crate::frame::image::Image;
 use crate::lattice::fit::fit_pixels::{FinalNoise, Fit};
 use crate::lattice::fit::frame::{BENT, powers, turns, wave};
-use crate::lattice::fit::model::{AT_ONCE, Clip, Model, settled};
+use crate::lattice::fit::model::{AT_ONCE, Model, settled};
 use crate::lattice::fit::solve::{self, Freed};
 use crate::lattice::fit::straight::without_bend;
 use crate::lattice::fit::tables::Tables;
@@ -122,10 +122,22 @@ pub(crate) struct Even<'a> {
 }
 
 impl Fit<'_> {
+    /// Whether a contrast that changes predicts blocks that were held out. The heights of disordered spots do not.
+    fn contrast_predicts(&self) -> Option<bool> {
+        // Standard errors. Few spots that differ by chance have 1 at most, contrast that fades above 5.
+        const PREDICTS: f64 = 2.0;
+        let edge = self.frame.edge();
+        let pair = Matrix2::from_fn(|i, j| self.model.pair[(i, j)] / edge[i]);
+        Some(crate::explain::evidence::contrast(self.frame.image, &pair)? > PREDICTS)
+    }
+
     /// The fit with contrast that changes, where it does by more than chance. The finest description is taken whose noise costs no more than noise does
     /// already; where all cost more there are no powers, and the doubt is what might have been.
     pub(crate) fn faded(&self, noise: &FinalNoise) -> Option<Faded> {
         if !(self.contrast_changes(noise)? > THRESHOLD) {
+            return None;
+        }
+        if !self.contrast_predicts()? {
             return None;
         }
         let acting = noise.acting();
@@ -275,7 +287,7 @@ impl Fit<'_> {
             (0..=highest).map(times).collect()
         };
         let along: Vec<Vec<[Vec<f64>; 2]>> = model.basis.indices.iter().map(raised).collect();
-        let clip = Clip::at(self.sigma);
+        let clip = self.clip();
         let of_row = |line: &mut Vec<f64>, row: usize| {
             settled(&frame, model, &tables, &self.lines, clip, row, line);
             let (y, line) = (frame.y[row], &*line);

@@ -41,8 +41,6 @@ const LOBE: f64 = 1.5;
 const FEWEST: f64 = 5.0;
 /// Square of the highest order that a harmonic may have: the fifth shell.
 const HIGHEST: f64 = 9.0;
-/// A wave has more periods than this across the frame; slower ones are ground.
-const PERIODS: f64 = 5.0;
 /// Sine of the angle between two waves of a lattice, at least.
 const OPEN: f64 = 0.4;
 
@@ -234,31 +232,6 @@ impl FewWaves {
     fn cycles(&self, q: &Vector2<f64>) -> Vector2<f64> {
         q.component_mul(&Vector2::from(self.size.map(|n| n as f64 / TAU)))
     }
-}
-
-/// The strongest wave that is none of the harmonics of a lattice (rad per pixel), nor of whole lines: wave vector, rad per pixel, and amplitude.
-pub(crate) fn strongest_beside(image: &Image, pair: &Matrix2<f64>) -> Option<(Vector2<f64>, f64)> {
-    let frame = Frame::new(image);
-    let mut left = image.values.clone();
-    clear(&frame, &mut left);
-    let seen = spectrum(&frame, &left);
-    let cycles = Matrix2::from_diagonal(&frame.edge()) * pair / PI;
-    let inverse = cycles.try_inverse()?;
-    let mut best: Option<(Vector2<f64>, f64)> = None;
-    each_bin(&frame, BESIDE, |[x, y]| {
-        let (k, power) = (Vector2::new(x as f64, y as f64), seen.power(x, y));
-        if k.norm() > PERIODS && power > best.map_or(0.0, |(_, most)| most) {
-            let index = (inverse * k).map(|i| i.round().clamp(-ORDER, ORDER));
-            if (k - cycles * index).norm() > SKIRT {
-                best = Some((k, power));
-            }
-        }
-    });
-    // A wave of amplitude A has A²N/9 in the highest bin under the window.
-    best.map(|(k, power)| {
-        let amplitude = 3.0 * (power / frame.pixels() as f64).sqrt();
-        ((k * PI).component_div(&frame.edge()), amplitude)
-    })
 }
 
 /// Pixels that are averaged along each axis before waves are fitted: `None` where there is no wave.

@@ -9,6 +9,7 @@ use rustfft::num_complex::Complex64;
 use crate::frame::background::Background;
 use crate::frame::image::Image;
 use crate::lattice::fit::bend::Inhomogeneity;
+use crate::lattice::fit::cells::larger_of;
 use crate::lattice::fit::first::at_first;
 use crate::lattice::fit::fitted::{FittedHarmonic, LatticeFit};
 use crate::lattice::fit::folded::{Bends, Folded};
@@ -174,7 +175,7 @@ impl<'a> Fit<'a> {
     fn step(&mut self) -> Option<(DVector<f64>, f64)> {
         let (model, frame) = (&self.model, &self.frame);
         let tables = Tables::new(frame, &model.pair, &model.basis.indices);
-        let clip = Clip::at(self.sigma);
+        let clip = self.clip();
         let lines = &mut self.lines;
         let seen = look(frame, model, &tables, &model.basis, &tables, lines, clip);
         let gram = gram(frame, &model.basis, &model.pair, &self.lines.lambda);
@@ -215,7 +216,7 @@ impl<'a> Fit<'a> {
 
     /// The noise that is left around each harmonic.
     pub(crate) fn noise(&mut self) -> Option<FinalNoise> {
-        let clip = Clip::at(self.sigma);
+        let clip = self.clip();
         let tables = Tables::new(&self.frame, &self.model.pair, &self.model.basis.indices);
         let (frame, model) = (&self.frame, &self.model);
         let lines = &self.lines;
@@ -280,6 +281,11 @@ impl<'a> Fit<'a> {
             bends,
             bent: OnceLock::new(),
         })
+    }
+
+    /// Where residuals are cut off.
+    pub(crate) fn clip(&self) -> Clip {
+        Clip::at(self.sigma)
     }
 
     /// Whether lines have offsets, which take up what whole lines do.
@@ -426,6 +432,13 @@ impl<'a> Fit<'a> {
             let (mean, covariance) = change.of_the_mean(clipped);
             wave_vectors.basis += mean;
             wave_vectors.covariance += covariance;
+        }
+        let bends = inhomogeneity.is_some_and(|change| change.stands_out());
+        let of_noise = covariance.fixed_view::<4, 4>(3, 3).trace();
+        if let Some(cells) = self.of_cells(bends).filter(|cells| cells.exceed(of_noise)) {
+            let cells = Waves::<Px>::new(self.model.pair, cells.covariance)
+                .mapped(&Matrix2::from_diagonal(&scale));
+            wave_vectors.covariance = larger_of(&wave_vectors.covariance, &cells.covariance)?;
         }
         let [columns, rows] = [
             self.frame.image.columns as f64,

@@ -25,6 +25,7 @@
 
 pub(crate) mod bend;
 pub(crate) mod beside;
+mod cells;
 pub(crate) mod choose;
 pub(crate) mod closure;
 pub(crate) mod contrast;

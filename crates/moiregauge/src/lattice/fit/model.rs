@@ -154,6 +154,11 @@ impl Clip {
         Self(CLIP * sigma)
     }
 
+    /// Whether such a value is one that was cut off.
+    pub(crate) fn is_at(self, value: f64) -> bool {
+        value.abs() >= self.0
+    }
+
     /// The residual as it counts; missing pixels not at all.
     #[inline]
     pub(crate) fn apply(self, value: f64) -> f64 {

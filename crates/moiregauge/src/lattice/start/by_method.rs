@@ -149,6 +149,7 @@ impl Start {
                 || middle(size) * pixels_per_bin + Vector2::repeat((pixels_per_bin - 1.0) / 2.0),
                 LatticeFit::middle,
             ),
+            evidence: None,
             shortcut_wavelengths: fourier::shortcut_wavelengths(peaks, &bin_to_nm),
             periods: self.periods(&pixels),
             signal_to_noise: fit.as_ref().map_or_else(
@@ -211,6 +212,7 @@ impl Start {
                 covariance: mean.phase_covariance,
             },
             middle: mean.middle,
+            evidence: None,
             shortcut_wavelengths: fourier::shortcut_wavelengths(peaks, &bin_to_nm),
             periods: self.periods(&pixels),
             signal_to_noise: mean.signal_to_noise,

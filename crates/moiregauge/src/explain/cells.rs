@@ -1,0 +1,223 @@
+//! Lattices of which one holds the other, compared by what they predict.
+//!
+//! The lattice with the larger cell (a superlattice) has all wave vectors of the other and more between them. It is taken where these predict pixels
+//! that they have not seen, in all three directions, and lie on its points: a second moiré that only comes near them is none of its harmonics.
+
+use std::f64::consts::TAU;
+
+use nalgebra::{Matrix2, Vector2};
+
+use crate::explain::evidence::{Blocks, gain, weakest};
+use crate::explain::normal::{Phases, gains};
+use crate::explain::scene::Scene;
+use crate::frame::image::Image;
+use crate::numbers::three::three;
+use crate::spectrum::shells::FIRST_SHELL;
+
+/// Harmonics up to so many times the longest first-order wave vector of the smaller cell.
+const ORDERS: f64 = 1.1;
+/// Largest index of a harmonic of the larger cell.
+const LARGEST: i32 = 5;
+/// Longest wave vector that counts, rad per bin: three bins a period.
+const LONGEST: f64 = 2.1;
+/// A description is better if it predicts better by so many standard errors. Larger cells that were there gained 10 and more, those that were
+/// not at most 2.7 (simulated frames of two generators, lines with gains among them).
+const BETTER: f64 = 4.0;
+/// The smaller cell is taken if it predicts this fraction of what the larger does: the larger one has waves that are not its own.
+const MOST: f64 = 0.5;
+/// Wave vectors are looked for within so many cycles per frame of the points, in steps of a fifth of that.
+const REACH: f64 = 1.0;
+
+/// Cells whose shortest and longest waves differ by more than this are compared with those of twice the area: a hexagonal lattice without every other
+/// row has a ratio of two.
+const ELONGATED: f64 = 1.5;
+
+/// √3 × √3 (three cells in one), 2 × 2 (four), and every other row along one of three vectors (two).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Supercell {
+    Root3,
+    Double,
+    Rows(usize),
+}
+
+impl Supercell {
+    /// The first-order wave vectors of the smaller cell in those of the larger.
+    fn names(self) -> Matrix2<f64> {
+        match self {
+            Self::Root3 => Matrix2::new(1.0, -1.0, 1.0, 2.0),
+            Self::Double => Matrix2::new(2.0, 0.0, 0.0, 2.0),
+            Self::Rows(0) => Matrix2::new(2.0, 0.0, 0.0, 1.0),
+            Self::Rows(1) => Matrix2::new(1.0, 0.0, 0.0, 2.0),
+            // The third wave of the smaller cell is twice that of the larger.
+            Self::Rows(_) => Matrix2::new(1.0, -1.0, 0.0, 2.0),
+        }
+    }
+
+    /// Reciprocal pair of the larger cell, from that of the smaller.
+    pub(crate) fn coarse(self, fine: &Matrix2<f64>) -> Option<Matrix2<f64>> {
+        Some(fine * self.names().try_inverse()?)
+    }
+
+    /// Reciprocal pair of the smaller cell, from that of the larger.
+    pub(crate) fn fine(self, coarse: &Matrix2<f64>) -> Matrix2<f64> {
+        coarse * self.names()
+    }
+}
+
+/// The reciprocal pair (rad per pixel) of the lattice with a larger or a smaller cell that predicts an image better than that of `pair`; `None` where
+/// none does. `disagrees`: the harmonics of `pair` do not lie on its points, and the smaller cell is taken where it predicts most of what they do.
+pub(crate) fn better_cell(
+    image: &Image,
+    pair: &Matrix2<f64>,
+    disagrees: bool,
+) -> Option<Matrix2<f64>> {
+    let all = [Supercell::Root3, Supercell::Double];
+    let waves = three(pair).map(|q| q.norm());
+    let [shortest, longest] = [
+        waves.into_iter().reduce(f64::min)?,
+        waves.into_iter().reduce(f64::max)?,
+    ];
+    let is_elongated = longest > ELONGATED * shortest;
+    let rows = (0..3).map(Supercell::Rows).filter(|_| is_elongated);
+    let larger = all.into_iter().chain(rows).find_map(|supercell| {
+        let coarse = supercell.coarse(pair)?;
+        (superlattice(image, &coarse, supercell, false)? == Superlattice::Shown).then_some(coarse)
+    });
+    larger.or_else(|| {
+        let mut fine = all
+            .into_iter()
+            .map(|supercell| (supercell, supercell.fine(pair)));
+        let is_better = |(supercell, fine): &(Supercell, Matrix2<f64>)| {
+            let shown =
+                || superlattice(image, pair, *supercell, false) == Some(Superlattice::Shown);
+            predicts_as_well(image, fine, pair) == Some(true) && (disagrees || !shown())
+        };
+        fine.find(is_better).map(|(_, fine)| fine)
+    })
+}
+
+/// Whether one lattice alone predicts most of what another does.
+fn predicts_as_well(image: &Image, one: &Matrix2<f64>, other: &Matrix2<f64>) -> Option<bool> {
+    let enough = gain(image, one)? > MOST * gain(image, other)?;
+    Some(enough && weakest(image, one, false)? > BETTER)
+}
+
+/// What an image says of the lattice with the larger cell.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Superlattice {
+    /// Its waves predict, in all three directions, and lie on its points.
+    Shown,
+    /// They do not predict, or not in all directions: noise may hide them, or there are none.
+    NotShown,
+    /// Peaks near its points predict better with wave vectors of their own: they are none of its harmonics.
+    Foreign,
+}
+
+/// Whether an image shows the lattice with the larger cell and not only that with the smaller. `coarse`: reciprocal pair of the larger cell, at 60°,
+/// rad per pixel; `image`: without its background; `suspected`: non-lattice peaks near its points are looked for even where the larger cell does not
+/// predict better. `None` where the two cannot be compared.
+pub(crate) fn superlattice(
+    image: &Image,
+    coarse: &Matrix2<f64>,
+    supercell: Supercell,
+    suspected: bool,
+) -> Option<Superlattice> {
+    let fine = supercell.fine(coarse);
+    let scene = Scene::new(image, coarse, &fine)?;
+    let [coarse, fine] = [*coarse, fine].map(|pair| pair * scene.binning as f64);
+    let wave = |[h, k]: [i32; 2]| coarse * Vector2::new(f64::from(h), f64::from(k));
+    let most = ORDERS
+        * FIRST_SHELL
+            .iter()
+            .map(|[h, k]| (fine * Vector2::new(f64::from(*h), f64::from(*k))).norm())
+            .fold(0.0, f64::max);
+    let half = (0..=LARGEST).flat_map(|h| (-LARGEST..=LARGEST).map(move |k| [h, k]));
+    let half = half.filter(|[h, k]| *h > 0 || *k > 0);
+    let indices: Vec<[i32; 2]> = half
+        .filter(|index| wave(*index).norm() < most.min(LONGEST))
+        .collect();
+    let inverse = supercell.names().try_inverse()?;
+    let is_fine = |[h, k]: [i32; 2]| {
+        let index = inverse * Vector2::new(f64::from(h), f64::from(k));
+        (index - index.map(f64::round)).amax() < 1e-6
+    };
+    let straight = Phases::straight(coarse);
+    let normals = straight.normals(&scene, &indices, false);
+    let of = |kept: &dyn Fn(usize) -> bool| {
+        let kept: Vec<usize> = (0..2 * indices.len()).filter(|i| kept(i / 2)).collect();
+        gains(&normals, &kept)
+    };
+    let (large, small) = (of(&|_| true)?, of(&|i| is_fine(indices[i]))?);
+    let errors =
+        |one: &[f64], other: &[f64]| Blocks::difference(&scene, one, other).standard_errors();
+    // Waves in one direction alone are stripes.
+    let in_line = |[h, k]: [i32; 2], [m, n]: [i32; 2]| h * n == k * m;
+    let adds = |first: &[i32; 2]| {
+        let without = of(&|i| is_fine(indices[i]) || !in_line(indices[i], *first));
+        without.is_some_and(|without| errors(&large, &without) > BETTER / 2.0)
+    };
+    let predicts = errors(&large, &small) > BETTER;
+    if !predicts && !suspected {
+        return Some(Superlattice::NotShown);
+    }
+    let first: Vec<[i32; 2]> = FIRST_SHELL.into_iter().filter(|i| !is_fine(*i)).collect();
+    let said = if predicts && first.iter().all(adds) {
+        Superlattice::Shown
+    } else {
+        Superlattice::NotShown
+    };
+    // Waves with wave vectors of their own in place of the first order.
+    let others: Vec<[i32; 2]> = indices
+        .iter()
+        .copied()
+        .filter(|i| !first.iter().any(|f| f == i || f.map(|x| -x) == *i))
+        .collect();
+    let mut own = straight.clone();
+    let rest = straight.residual(
+        &scene,
+        &indices
+            .iter()
+            .copied()
+            .filter(|i| is_fine(*i))
+            .collect::<Vec<_>>(),
+    )?;
+    own.others = first
+        .iter()
+        .map(|index| strongest_near(&scene, &rest, wave(*index)))
+        .collect();
+    let normals = own.normals(&scene, &others, false);
+    let all: Vec<usize> = (0..2 * (others.len() + first.len())).collect();
+    let beside = gains(&normals, &all)?;
+    Some(if errors(&beside, &large) > BETTER {
+        Superlattice::Foreign
+    } else {
+        said
+    })
+}
+
+/// The wave vector (rad per bin) with the most power near a given one.
+fn strongest_near(scene: &Scene, values: &[f64], q: Vector2<f64>) -> Vector2<f64> {
+    let step = scene.half.map(|half| TAU / (2.0 * half)) * (REACH / 5.0);
+    let rows = values.len() / scene.columns;
+    let power = |q: &Vector2<f64>| {
+        let (mut re, mut im) = (0.0, 0.0);
+        let (turn_re, turn_im) = (q.x.cos(), q.x.sin());
+        for row in 0..rows {
+            let start = q.y * (row as f64 - scene.middle.y) - q.x * scene.middle.x;
+            let (mut c, mut s) = (start.cos(), start.sin());
+            for value in &values[row * scene.columns..(row + 1) * scene.columns] {
+                re += value * c;
+                im += value * s;
+                (c, s) = (c * turn_re - s * turn_im, s * turn_re + c * turn_im);
+            }
+        }
+        re * re + im * im
+    };
+    let grid =
+        (-5..=5).flat_map(|i| (-5..=5).map(move |j| Vector2::new(f64::from(i), f64::from(j))));
+    let near = grid.map(|at| q + at.component_mul(&step));
+    let best = near
+        .map(|q| (power(&q), q))
+        .max_by(|a, b| a.0.total_cmp(&b.0));
+    best.map_or(q, |(_, q)| q)
+}

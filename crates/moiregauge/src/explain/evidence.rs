@@ -1,0 +1,110 @@
+//! Evidence for a lattice: what it predicts, and what each family of its waves adds to that.
+
+use nalgebra::Matrix2;
+
+use crate::explain::normal::{Phases, gains};
+use crate::explain::scene::Scene;
+use crate::frame::background::{Background, remove_background};
+use crate::frame::image::Image;
+use crate::numbers::spread::mean_and_spread;
+use crate::spectrum::shells::{FIRST_SHELL, shells};
+
+/// Coefficients of cubic phases beyond a plane.
+const CUBIC: usize = 7;
+
+/// By how much more of the variance one description predicts than another, block by block.
+#[derive(Clone, Debug)]
+pub(crate) struct Blocks(Vec<f64>);
+
+impl Blocks {
+    /// Of the gains of two descriptions; blocks of which too little is there are left out.
+    pub(crate) fn difference(scene: &Scene, one: &[f64], other: &[f64]) -> Self {
+        let power = scene.values.iter().map(|v| v * v).sum::<f64>();
+        let each = one.iter().zip(other).zip(scene.filled());
+        let there = each.filter(|(_, filled)| *filled);
+        Self(
+            there
+                .map(|((a, b), _)| (a - b) / power.max(f64::MIN_POSITIVE))
+                .collect(),
+        )
+    }
+
+    /// The mean over its standard error.
+    pub(crate) fn standard_errors(&self) -> f64 {
+        let spread = mean_and_spread(&self.0);
+        spread.value / (spread.sigma / (self.0.len() as f64).sqrt()).max(f64::MIN_POSITIVE)
+    }
+}
+
+/// By how many standard errors over blocks the weakest of the three families of collinear waves of a lattice (reciprocal pair at 60°, rad per pixel)
+/// improves the prediction of pixels that were held out, in an image without its background; `bends`: its phases may be cubic polynomials. Means of
+/// lines are taken off where that shows more. `None` where the image is too small.
+pub(crate) fn weakest(image: &Image, pair: &Matrix2<f64>, bends: bool) -> Option<f64> {
+    let plain = of_image(image, pair, bends)?;
+    let level = remove_background(image, Background::LineMean);
+    Some(of_image(&level, pair, bends).map_or(plain, |level| level.max(plain)))
+}
+
+fn of_image(image: &Image, pair: &Matrix2<f64>, bends: bool) -> Option<f64> {
+    let scene = Scene::new(image, pair, pair)?;
+    let indices = shells(3);
+    let all: Vec<usize> = (0..2 * indices.len()).collect();
+    let straight = Phases::straight(pair * scene.binning as f64);
+    let bent = || straight.clone().fitted(&scene, indices, CUBIC);
+    let phases = if bends { bent() } else { None };
+    let normals = phases
+        .as_ref()
+        .unwrap_or(&straight)
+        .normals(&scene, indices, false);
+    let gain = gains(&normals, &all)?;
+    FIRST_SHELL
+        .into_iter()
+        .try_fold(f64::INFINITY, |least, [h, k]| {
+            let others = |i: &usize| h * indices[i / 2][1] != k * indices[i / 2][0];
+            let kept: Vec<usize> = all.iter().copied().filter(others).collect();
+            let lost = Blocks::difference(&scene, &gain, &gains(&normals, &kept)?);
+            Some(least.min(lost.standard_errors()))
+        })
+}
+
+/// Fraction of the variance (without slow background) that a lattice predicts.
+pub(crate) fn gain(image: &Image, pair: &Matrix2<f64>) -> Option<f64> {
+    let scene = Scene::new(image, pair, pair)?;
+    let indices = shells(3);
+    let all: Vec<usize> = (0..2 * indices.len()).collect();
+    let phases = Phases::straight(pair * scene.binning as f64);
+    let gain = gains(&phases.normals(&scene, indices, false), &all)?;
+    Some(gain.iter().sum::<f64>() / scene.values.iter().map(|v| v * v).sum::<f64>())
+}
+
+/// The lattice near a proposed one that fits best, and by how many standard errors its weakest family predicts. `pair`: reciprocal pair at 60°, rad per
+/// pixel, to within a cycle per frame.
+pub(crate) fn proposed(image: &Image, pair: &Matrix2<f64>) -> Option<(Matrix2<f64>, f64)> {
+    let scene = Scene::new(image, pair, pair)?;
+    // What predicts nothing near its place is not fitted.
+    (of_image(image, pair, false)? > 0.0).then_some(())?;
+    let binning = scene.binning as f64;
+    let fitted = Phases::straight(pair * binning).fitted(&scene, shells(2), 0)?;
+    let fitted = fitted.pair / binning;
+    let frame = Matrix2::from_diagonal(&scene.half) * (binning / std::f64::consts::PI);
+    let moved = frame * (fitted - pair);
+    if moved.column_iter().any(|off| off.norm() > 1.0) {
+        return None;
+    }
+    Some((fitted, of_image(image, &fitted, false)?))
+}
+
+/// By how many standard errors a contrast that changes across the frame (each first-order wave times a quadratic polynomial) predicts better than one
+/// that does not.
+pub(crate) fn contrast(image: &Image, pair: &Matrix2<f64>) -> Option<f64> {
+    let scene = Scene::new(image, pair, pair)?;
+    let indices = shells(3);
+    let phases = Phases::straight(pair * scene.binning as f64).fitted(&scene, indices, 0)?;
+    let normals = phases.normals(&scene, indices, true);
+    let all: Vec<usize> = (0..normals[0].moment.len()).collect();
+    let (with, without) = (
+        gains(&normals, &all)?,
+        gains(&normals, &all[..2 * indices.len()])?,
+    );
+    Some(Blocks::difference(&scene, &with, &without).standard_errors())
+}

@@ -1,0 +1,185 @@
+//! The pixels that descriptions of an image are compared on.
+
+use std::f64::consts::TAU;
+
+use nalgebra::{Matrix2, Vector2};
+
+use crate::frame::image::Image;
+use crate::numbers::median::median;
+use crate::numbers::three::three;
+use crate::numbers::widest::widest;
+
+/// Blocks along columns and along rows. With 36 blocks the standard error of a mean is known to 12 %.
+const BLOCKS: usize = 6;
+/// A block with less than one in so many of the bins of the fullest does not count.
+const FULL: usize = 4;
+/// Blocks are held out in so many turns.
+pub(crate) const FOLDS: usize = 4;
+/// Bins per shortest period: harmonics of twice the first order keep three bins a period.
+const BINS_PER_PERIOD: f64 = 7.0;
+/// Standard deviation of the Gaussian mean that is subtracted as background, in longest periods: it leaves 98 % of the first order.
+const BACKGROUND: f64 = 0.45;
+/// Values beyond so many times the median absolute value are clipped: 4 σ of Gaussian noise.
+const CLIPPED: f64 = 6.0;
+/// Bins that are looked at, at most.
+const MOST_BINS: usize = 1 << 16;
+/// Multiples of it are spread evenly, modulo 1: the golden ratio.
+const GOLDEN: f64 = 0.618_033_988_749_895;
+/// The Gaussian is cut off at so many standard deviations.
+const REACH: f64 = 3.0;
+
+/// An image in bins without its slow background, divided into blocks.
+pub(crate) struct Scene {
+    pub(crate) columns: usize,
+    /// Values in bins; 0 where a bin is missing.
+    pub(crate) values: Vec<f64>,
+    /// Block of each bin; `None` where the bin is missing.
+    pub(crate) block: Vec<Option<usize>>,
+    /// Pixels of a bin along each axis.
+    pub(crate) binning: usize,
+    /// Middle of the bins that are there (column, row), and half of their extent.
+    pub(crate) middle: Vector2<f64>,
+    pub(crate) half: Vector2<f64>,
+}
+
+impl Scene {
+    /// The bins of an image in which lattices with wave vectors from those of `coarse` to those of `fine` (reciprocal pairs, rad per pixel)
+    /// are compared. `None` for an image without pixels.
+    pub(crate) fn new(image: &Image, coarse: &Matrix2<f64>, fine: &Matrix2<f64>) -> Option<Self> {
+        let norms = |pair: &Matrix2<f64>| three(pair).map(|q| q.norm());
+        let shortest = TAU / norms(fine).into_iter().fold(0.0, f64::max);
+        let binning = ((shortest / BINS_PER_PERIOD) as usize).max(1);
+        let binned = if binning > 1 {
+            image.binned(binning)
+        } else {
+            image.clone()
+        };
+        let [columns, rows] = [binned.columns, binned.rows];
+        let there = |i: &usize| binned.values[*i].is_finite();
+        let place = |i: usize| Vector2::new((i % columns) as f64, (i / columns) as f64);
+        let places = (0..binned.values.len()).filter(there).map(place);
+        let (low, high) = places.fold(
+            (
+                Vector2::repeat(f64::INFINITY),
+                Vector2::repeat(f64::NEG_INFINITY),
+            ),
+            |(low, high): (Vector2<f64>, Vector2<f64>), at| (low.inf(&at), high.sup(&at)),
+        );
+        if low.x >= high.x || low.y >= high.y {
+            return None;
+        }
+        let extent = high - low + Vector2::repeat(1.0);
+        // Of large images some lines, at irregular places, lest waves look like others.
+        let few = (MOST_BINS as f64 / (columns * rows) as f64).min(1.0);
+        let mut picked = vec![few == 1.0; rows];
+        for i in (0..(rows as f64 * few) as usize).filter(|_| few < 1.0) {
+            let within = (i as f64 * GOLDEN).fract();
+            picked[(((i as f64 + within) / few) as usize).min(rows - 1)] = true;
+        }
+        let block = |i: usize| {
+            let at = (place(i) - low).component_div(&extent) * BLOCKS as f64;
+            (there(&i) && picked[i / columns]).then(|| at.y as usize * BLOCKS + at.x as usize)
+        };
+        let longest = TAU / norms(coarse).into_iter().fold(f64::INFINITY, f64::min);
+        let sigma = BACKGROUND * longest / binning as f64;
+        let background = gaussian_mean(&binned.values, columns, sigma);
+        let block: Vec<Option<usize>> = (0..binned.values.len()).map(block).collect();
+        let without = |i: usize| block[i].map_or(0.0, |_| binned.values[i] - background[i]);
+        let mut values: Vec<f64> = (0..binned.values.len()).map(without).collect();
+        clip(&mut values);
+        Some(Self {
+            columns,
+            block,
+            values,
+            binning,
+            middle: (low + high) / 2.0,
+            half: extent / 2.0,
+        })
+    }
+
+    /// The turn in which each block is held out: neighbours in different ones.
+    pub(crate) fn fold(block: usize) -> usize {
+        (block % BLOCKS + 2 * (block / BLOCKS)) % FOLDS
+    }
+
+    /// How many blocks there are.
+    pub(crate) const fn blocks() -> usize {
+        BLOCKS * BLOCKS
+    }
+
+    /// Whether each block has enough bins to count.
+    pub(crate) fn filled(&self) -> Vec<bool> {
+        let mut counts = [0usize; BLOCKS * BLOCKS];
+        self.block
+            .iter()
+            .flatten()
+            .for_each(|block| counts[*block] += 1);
+        let most = counts.iter().max().copied().unwrap_or(0);
+        counts.iter().map(|count| FULL * *count > most).collect()
+    }
+}
+
+/// Means weighted with a Gaussian of `sigma` over what is there.
+pub(crate) fn gaussian_mean(values: &[f64], columns: usize, sigma: f64) -> Vec<f64> {
+    let reach = (REACH * sigma).ceil() as usize;
+    let taps: Vec<f64> = (0..=reach)
+        .map(|i| (-0.5 * (i as f64 / sigma).powi(2)).exp())
+        .collect();
+    // Sums of shifted copies, along a line and of lines.
+    let shift = |output: &mut [f64], input: &[f64], tap: f64| {
+        let each = output.iter_mut().zip(input);
+        each.for_each(|(sum, value)| *sum += tap * value);
+    };
+    let shifted = |output: &mut [f64], input: &[f64], step: usize| {
+        widest(
+            #[inline(always)]
+            || {
+                let count = input.len();
+                shift(output, input, taps[0]);
+                for (i, tap) in taps.iter().enumerate().skip(1) {
+                    let off = (i * step).min(count);
+                    shift(&mut output[off..], &input[..count - off], *tap);
+                    shift(&mut output[..count - off], &input[off..], *tap);
+                }
+            },
+        );
+    };
+    let smooth = |input: &[f64]| {
+        let (mut lines, mut both) = (vec![0.0; input.len()], vec![0.0; input.len()]);
+        let each = lines
+            .chunks_exact_mut(columns)
+            .zip(input.chunks_exact(columns));
+        each.for_each(|(output, input)| shifted(output, input, 1));
+        shifted(&mut both, &lines, columns);
+        both
+    };
+    let there: Vec<f64> = values
+        .iter()
+        .map(|v| f64::from(u8::from(v.is_finite())))
+        .collect();
+    let filled: Vec<f64> = values
+        .iter()
+        .map(|v| if v.is_finite() { *v } else { 0.0 })
+        .collect();
+    let (sums, weights) = (smooth(&filled), smooth(&there));
+    sums.iter()
+        .zip(&weights)
+        .map(|(s, w)| if *w > 0.0 { s / w } else { 0.0 })
+        .collect()
+}
+
+/// Clips what is farther from 0 than so many median absolute values: a spike is no more than a step.
+fn clip(values: &mut [f64]) {
+    let mut sizes: Vec<f64> = values
+        .iter()
+        .filter(|v| **v != 0.0)
+        .map(|v| v.abs())
+        .collect();
+    if sizes.is_empty() {
+        return;
+    }
+    let most = CLIPPED * median(&mut sizes);
+    for value in values {
+        *value = value.clamp(-most, most);
+    }
+}

@@ -1,0 +1,107 @@
+//! Held-out prediction against closed forms and known truth.
+
+use std::f64::consts::TAU;
+
+use nalgebra::{Matrix2, Vector2};
+
+use crate::explain::cells::{Supercell, Superlattice, better_cell, superlattice};
+use crate::explain::evidence::{contrast, gain, weakest};
+use crate::frame::image::Image;
+use crate::numbers::rng::normals;
+use crate::numbers::three::three;
+
+/// (columns, rows), not square: exchanged axes would show.
+const SIZE: [usize; 2] = [132, 92];
+
+/// Waves of some nine pixels at 60°.
+fn pair() -> Matrix2<f64> {
+    Matrix2::new(0.70, 0.24, 0.05, 0.63)
+}
+
+fn image(seed: u64, noise: f64, value: impl Fn(Vector2<f64>) -> f64) -> Image {
+    let mut normal = normals(seed, "explain", 0);
+    let at = |i: usize| Vector2::new((i % SIZE[0]) as f64, (i / SIZE[0]) as f64);
+    let values = (0..SIZE[0] * SIZE[1]).map(|i| value(at(i)) + noise * normal());
+    Image::new(SIZE[1], SIZE[0], values.collect())
+}
+
+fn lattice(pair: &Matrix2<f64>, at: Vector2<f64>) -> f64 {
+    three(pair).iter().map(|q| (q.dot(&at) + 0.4).cos()).sum()
+}
+
+/// Three cosines have a variance of 3/2 beside that of the noise. One family of stripes, and noise, have no weakest family.
+#[test]
+fn the_gain_is_the_fraction_of_the_variance() {
+    for seed in 0..4 {
+        let weakest = |image: &Image, bends| weakest(image, &pair(), bends).unwrap();
+        let noisy = image(seed, 1.0, |at| lattice(&pair(), at));
+        let found = gain(&noisy, &pair()).unwrap();
+        assert!((found - 0.6).abs() < 0.02, "{found}");
+        assert!(weakest(&noisy, false) > 15.0 && weakest(&noisy, true) > 15.0);
+        let stripes = image(seed, 0.5, |at| pair().column(0).dot(&at).cos());
+        assert!(weakest(&stripes, false) < 3.0);
+        let noise = image(seed, 1.0, |_| 0.0);
+        assert!(weakest(&noise, false) < 3.0 && gain(&noise, &pair()).unwrap() < 0.01);
+    }
+}
+
+/// A lattice without every other row is taken for none.
+#[test]
+fn every_other_row_belongs_to_the_lattice() {
+    for rows in 0..3 {
+        let fine = Supercell::Rows(rows).fine(&pair());
+        let value = |at: Vector2<f64>| lattice(&pair(), at) + 1.5 * lattice(&fine, at);
+        let found = better_cell(&image(1, 0.5, value), &fine, false);
+        assert_eq!(found, Some(pair()), "{rows}");
+        let alone = image(1, 0.5, |at| lattice(&fine, at));
+        assert_eq!(better_cell(&alone, &fine, false), None, "{rows}");
+    }
+}
+
+/// Contrast that fades predicts blocks that were held out; an even one does not.
+#[test]
+fn fading_contrast_predicts() {
+    for seed in 0..4 {
+        let fading = image(seed, 0.3, |at| at.x / 80.0 * lattice(&pair(), at));
+        assert!(contrast(&fading, &pair()).unwrap() > 5.0);
+        let even = image(seed, 0.3, |at| lattice(&pair(), at));
+        assert!(contrast(&even, &pair()).unwrap() < 2.0);
+    }
+}
+
+/// A superlattice is found from its sublattice and kept; peaks 0.4 cycles per frame off its points leave the sublattice, and lead back to it.
+#[test]
+fn superlattices_are_told_from_foreign_peaks() {
+    for cell in [Supercell::Root3, Supercell::Double] {
+        let coarse = cell.coarse(&pair()).unwrap();
+        let frame = Vector2::new(TAU / SIZE[0] as f64, TAU / SIZE[1] as f64);
+        let off =
+            Matrix2::from_columns(&[0.5 * frame, Vector2::new(-0.5 * frame.x, 0.5 * frame.y)]);
+        for seed in 0..4 {
+            let with = |other: Matrix2<f64>| {
+                image(seed, 0.5, |at| {
+                    lattice(&pair(), at) + 0.4 * lattice(&other, at)
+                })
+            };
+            let nested = with(coarse);
+            assert_eq!(
+                better_cell(&nested, &pair(), false),
+                Some(coarse),
+                "{cell:?}"
+            );
+            assert_eq!(better_cell(&nested, &coarse, false), None, "{cell:?}");
+            let foreign = with(coarse + off);
+            let said = superlattice(&foreign, &coarse, cell, true);
+            assert_eq!(said, Some(Superlattice::Foreign), "{cell:?}");
+            assert_eq!(better_cell(&foreign, &pair(), false), None, "{cell:?}");
+            assert_eq!(
+                better_cell(&foreign, &coarse, false),
+                Some(cell.fine(&coarse)),
+                "{cell:?}"
+            );
+            let alone = image(seed, 0.5, |at| lattice(&pair(), at));
+            let said = superlattice(&alone, &coarse, cell, true);
+            assert_eq!(said, Some(Superlattice::NotShown), "{cell:?}");
+        }
+    }
+}
