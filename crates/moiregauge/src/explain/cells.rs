@@ -79,14 +79,13 @@ pub(crate) fn better_cell(
     ];
     let is_elongated = longest > ELONGATED * shortest;
     let rows = (0..3).map(Supercell::Rows).filter(|_| is_elongated);
-    let larger = all.into_iter().chain(rows).find_map(|supercell| {
+    let all = all.into_iter().chain(rows);
+    let larger = all.clone().find_map(|supercell| {
         let coarse = supercell.coarse(pair)?;
         (superlattice(image, &coarse, supercell, false)? == Superlattice::Shown).then_some(coarse)
     });
     larger.or_else(|| {
-        let mut fine = all
-            .into_iter()
-            .map(|supercell| (supercell, supercell.fine(pair)));
+        let mut fine = all.map(|supercell| (supercell, supercell.fine(pair)));
         let is_better = |(supercell, fine): &(Supercell, Matrix2<f64>)| {
             let shown =
                 || superlattice(image, pair, *supercell, false) == Some(Superlattice::Shown);

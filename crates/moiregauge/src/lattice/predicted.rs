@@ -1,6 +1,7 @@
 //! What held-out prediction says of a lattice that was found.
 
 use heterostrain::lattice::{distortion, shortest_pair};
+use nalgebra::Matrix2;
 
 use crate::explain::cells::{Supercell, Superlattice, better_cell, superlattice};
 use crate::explain::evidence::{proposed, weakest};
@@ -22,10 +23,12 @@ use crate::spectrum::transform::Spectrum;
 
 /// A lattice without a first order that stands out is taken where the weakest family of its waves predicts by so many standard errors. The best of
 /// 57 candidates in rough ground had 3.4.
-const BEYOND_DOUBT: f64 = 5.0;
+pub(crate) const BEYOND_DOUBT: f64 = 5.0;
 /// With less a lattice is none. Right answers had 2.3 and more (60 sets of one to four troubles; that one covers half the frame and fades), lone steps 0 at
 /// most.
 const LEAST: f64 = 1.5;
+/// Waves this close to a point of a lattice are its own, in shortest waves: lattices that are fitted agree to a hundredth.
+const OFF_POINT: f64 = 0.1;
 /// As in `scan::shells`: below this probability of chance an image may hide a first order.
 const SUSPECTED: f64 = 0.2;
 
@@ -78,17 +81,27 @@ fn is_foreign(found: &MeasuredLattice, image: &Image) -> Option<bool> {
 
 /// The proposed lattice that predicts pixels which were held out best, where it does so beyond doubt. Spots that differ are noise beside each wave, and no
 /// wave stands out of that.
-pub(crate) fn predicted(
+pub(crate) fn best_predicted(
     image: &Image,
     geometry: &Geometry,
     background: Background,
-) -> Option<Start> {
+) -> Option<MeasuredLattice> {
     let (pair, weakest) = Start::proposals(image, geometry, background)
         .iter()
         .filter_map(|pair| proposed(image, pair))
         .max_by(|a, b| a.1.total_cmp(&b.1))?;
     let predicts = weakest > BEYOND_DOUBT;
-    predicts.then(|| Start::at(image, geometry, background, &pair))?
+    let start = predicts.then(|| Start::at(image, geometry, background, &pair))??;
+    start.measure(Method::Lattice).ok()
+}
+
+/// Whether all waves of one lattice (reciprocal pairs) are points of the other: [`better_cell`] compares these.
+pub(crate) fn are_nested(one: &Matrix2<f64>, other: &Matrix2<f64>) -> bool {
+    let holds = |one: &Matrix2<f64>, other: &Matrix2<f64>| {
+        let names = one.try_inverse().map(|inverse| inverse * other);
+        names.is_some_and(|names| (names - names.map(f64::round)).amax() < OFF_POINT)
+    };
+    holds(one, other) || holds(other, one)
 }
 
 /// A lattice with what it predicts of the part of the image that shows it.

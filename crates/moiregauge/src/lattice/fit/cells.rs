@@ -303,7 +303,7 @@ mod tests {
     /// Wave vectors (rad per pixel) and their covariance from the scatter of cells.
     fn fitted(image: &Image, pair: &Matrix2<f64>) -> (Matrix2<f64>, Matrix4<f64>) {
         let start = Windowed::new(image).fit(image, pair, Background::Plane, shells(1));
-        let mut fit = Fit::new(image, &start.unwrap(), Background::Plane, None).unwrap();
+        let mut fit = Fit::new(image, &start.unwrap(), Background::Plane).unwrap();
         fit.choose().unwrap();
         let scale = fit.frame.edge().map(|edge| 1.0 / edge);
         let to_pixels = Matrix2::from_diagonal(&scale);

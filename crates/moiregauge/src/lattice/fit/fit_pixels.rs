@@ -16,7 +16,6 @@ use crate::lattice::fit::folded::{Bends, Folded};
 use crate::lattice::fit::frame::{BENT, Basis, Frame};
 use crate::lattice::fit::gram::gram;
 use crate::lattice::fit::hidden::Hidden;
-use crate::lattice::fit::levelled::Levelled;
 use crate::lattice::fit::leverage::Leverage;
 use crate::lattice::fit::lines::LineStatistics;
 use crate::lattice::fit::model::{Clip, LineOffsets, Model, look, residuals, settled};
@@ -91,17 +90,8 @@ impl FinalNoise {
 }
 
 impl<'a> Fit<'a> {
-    /// `levelled`: how ground was taken off the image.
-    pub(crate) fn new(
-        image: &'a Image,
-        start: &Harmonics,
-        background: Background,
-        levelled: Option<Levelled>,
-    ) -> Option<Self> {
-        let frame = Frame {
-            levelled,
-            ..Frame::new(image)
-        };
+    pub(crate) fn new(image: &'a Image, start: &Harmonics, background: Background) -> Option<Self> {
+        let frame = Frame::new(image);
         let free_lines = background == Background::LineMean;
         let degree = match background {
             Background::Mean => 0,
@@ -220,7 +210,6 @@ impl<'a> Fit<'a> {
         let tables = Tables::new(&self.frame, &self.model.pair, &self.model.basis.indices);
         let (frame, model) = (&self.frame, &self.model);
         let lines = &self.lines;
-        let contrast = self.uneven_contrast();
         let places = Places::new(frame, model, self.has_offsets());
         let residual = |folded: &mut Folded, row: usize, line: &mut [f64]| {
             let settled = settled(frame, model, &tables, lines, clip, row, line);
@@ -234,11 +223,6 @@ impl<'a> Fit<'a> {
                 } else {
                     0.0
                 };
-            }
-            if let Some(contrast) = &contrast {
-                for (value, part) in line.iter_mut().zip(&contrast[row * frame.image.columns..]) {
-                    *value -= if part.is_finite() { *part } else { 0.0 };
-                }
             }
             let of_places =
                 (frame.present[row] > 0).then(|| places.of_line(row, line, frame.image.row(row)));

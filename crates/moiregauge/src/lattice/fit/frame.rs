@@ -8,7 +8,6 @@ use rayon::prelude::*;
 use rustfft::num_complex::Complex64;
 
 use crate::frame::image::Image;
-use crate::lattice::fit::levelled::Levelled;
 use crate::numbers::interrupt;
 
 /// Lines that a thread counts together, at least.
@@ -28,8 +27,6 @@ pub(crate) struct Frame<'a> {
     pub(crate) present: Vec<usize>,
     /// (row, column) of missing pixels in lines that count.
     pub(crate) missing: Vec<[usize; 2]>,
-    /// How ground was taken off the image.
-    pub(crate) levelled: Option<Levelled>,
 }
 
 impl<'a> Frame<'a> {
@@ -40,7 +37,6 @@ impl<'a> Frame<'a> {
             y: positions(image.rows),
             present: vec![0; image.rows],
             missing: Vec::new(),
-            levelled: None,
         };
         frame.leave_out(|_| false);
         frame
@@ -76,7 +72,6 @@ impl<'a> Frame<'a> {
             y: self.y.clone(),
             present: self.present.clone(),
             missing: self.missing.clone(),
-            levelled: self.levelled,
         }
     }
 

@@ -12,7 +12,6 @@ use nalgebra::Vector2;
 use serde::{Deserialize, Serialize};
 
 use crate::lattice::fit::frame::Frame;
-use crate::lattice::fit::levelled::Levelled;
 use crate::lattice::fit::leverage::{ALONG, Leverage};
 use crate::lattice::fit::local::{Bin, acting_on};
 use crate::lattice::fit::model::Model;
@@ -26,8 +25,6 @@ use crate::spectrum::transform::{Spectrum, hann};
 const PROMISING: f64 = 4.0;
 /// Bins across the lines on either side of a place where nothing but a wave is looked for: half of those around a harmonic.
 const NEAR: i64 = 8;
-/// Frequencies of which less than this share is left without the ground say nothing of the noise.
-const FLAT: f64 = 0.3;
 /// Bins nearer to zero frequency belong to the background: a plane fills the first.
 const BACKGROUND: i64 = 2;
 /// The first column that the window keeps free of what whole lines do.
@@ -50,8 +47,6 @@ pub(crate) struct ResidualNoise {
     /// `Σ w²` over the pixels that count.
     window_power: f64,
     pub(super) free_lines: bool,
-    /// How ground was taken off the image.
-    levelled: Option<Levelled>,
 }
 
 /// The strongest wave in the residual that is none of the lattice's.
@@ -100,7 +95,6 @@ impl ResidualNoise {
             spectrum,
             blocks: OnceLock::new(),
             free_lines,
-            levelled: frame.levelled,
         };
         (noise, said)
     }
@@ -171,28 +165,12 @@ impl ResidualNoise {
                 if x.abs() < BACKGROUND && y.abs() < BACKGROUND {
                     continue;
                 }
-                let left = self.left_of_ground([x, y]);
-                if left < FLAT {
-                    continue;
-                }
-                let white = left * (1.0 - leverage.at(&mut taps, dx, dy) / self.window_power);
+                let white = 1.0 - leverage.at(&mut taps, dx, dy) / self.window_power;
                 if white > 0.02 {
                     each(Vector2::new(x, y), self.power(x, y), white);
                 }
             }
         }
-    }
-
-    /// The share of noise power at (x, y) cycles per frame that is left without the ground.
-    fn left_of_ground(&self, bin: [i64; 2]) -> f64 {
-        let Some(levelled) = self.levelled else {
-            return 1.0;
-        };
-        let turn = |axis: usize, n: usize| 2.0 * PI * bin[axis] as f64 / n as f64;
-        levelled.left(Vector2::new(
-            turn(0, self.spectrum.columns),
-            turn(1, self.spectrum.rows),
-        ))
     }
 
     /// Power per pixel at (x, y) cycles per frame.
