@@ -65,12 +65,8 @@ impl Supercell {
 }
 
 /// The reciprocal pair (rad per pixel) of the lattice with a larger or a smaller cell that predicts an image better than that of `pair`; `None` where
-/// none does. `disagrees`: the harmonics of `pair` do not lie on its points, and the smaller cell is taken where it predicts most of what they do.
-pub(crate) fn better_cell(
-    image: &Image,
-    pair: &Matrix2<f64>,
-    disagrees: bool,
-) -> Option<Matrix2<f64>> {
+/// none does.
+pub(crate) fn better_cell(image: &Image, pair: &Matrix2<f64>) -> Option<Matrix2<f64>> {
     let all = [Supercell::Root3, Supercell::Double];
     let waves = three(pair).map(|q| q.norm());
     let [shortest, longest] = [
@@ -89,7 +85,7 @@ pub(crate) fn better_cell(
         let is_better = |(supercell, fine): &(Supercell, Matrix2<f64>)| {
             let shown =
                 || superlattice(image, pair, *supercell, false) == Some(Superlattice::Shown);
-            predicts_as_well(image, fine, pair) == Some(true) && (disagrees || !shown())
+            predicts_as_well(image, fine, pair) == Some(true) && !shown()
         };
         fine.find(is_better).map(|(_, fine)| fine)
     })

@@ -51,10 +51,21 @@ fn every_other_row_belongs_to_the_lattice() {
     for rows in 0..3 {
         let fine = Supercell::Rows(rows).fine(&pair());
         let value = |at: Vector2<f64>| lattice(&pair(), at) + 1.5 * lattice(&fine, at);
-        let found = better_cell(&image(1, 0.5, value), &fine, false);
+        let found = better_cell(&image(1, 0.5, value), &fine);
         assert_eq!(found, Some(pair()), "{rows}");
         let alone = image(1, 0.5, |at| lattice(&fine, at));
-        assert_eq!(better_cell(&alone, &fine, false), None, "{rows}");
+        assert_eq!(better_cell(&alone, &fine), None, "{rows}");
+    }
+}
+
+/// A lattice with every other of its waves missing in one direction is that of the finer cell.
+#[test]
+fn waves_that_are_missing_belong_to_no_lattice() {
+    let alone = image(2, 0.5, |at| lattice(&pair(), at));
+    for rows in 0..3 {
+        let coarse = Supercell::Rows(rows).coarse(&pair()).unwrap();
+        let found = better_cell(&alone, &coarse).unwrap();
+        assert!((found - pair()).amax() < 1e-12, "{rows}: {found}");
     }
 }
 
@@ -84,18 +95,14 @@ fn superlattices_are_told_from_foreign_peaks() {
                 })
             };
             let nested = with(coarse);
-            assert_eq!(
-                better_cell(&nested, &pair(), false),
-                Some(coarse),
-                "{cell:?}"
-            );
-            assert_eq!(better_cell(&nested, &coarse, false), None, "{cell:?}");
+            assert_eq!(better_cell(&nested, &pair()), Some(coarse), "{cell:?}");
+            assert_eq!(better_cell(&nested, &coarse), None, "{cell:?}");
             let foreign = with(coarse + off);
             let said = superlattice(&foreign, &coarse, cell, true);
             assert_eq!(said, Some(Superlattice::Foreign), "{cell:?}");
-            assert_eq!(better_cell(&foreign, &pair(), false), None, "{cell:?}");
+            assert_eq!(better_cell(&foreign, &pair()), None, "{cell:?}");
             assert_eq!(
-                better_cell(&foreign, &coarse, false),
+                better_cell(&foreign, &coarse),
                 Some(cell.fine(&coarse)),
                 "{cell:?}"
             );

@@ -8,7 +8,7 @@ use crate::frame::image::Image;
 use crate::lattice::ground::{below, on_even_ground};
 use crate::lattice::measure::{beside, is_torn, measure_levelled};
 use crate::lattice::measured::MeasuredLattice;
-use crate::lattice::predicted::{BEYOND_DOUBT, are_nested, best_predicted, judged};
+use crate::lattice::predicted::{best_predicted, judged};
 use crate::spectrum::error::LatticeError;
 use crate::spectrum::method::Method;
 use crate::spectrum::prepare::levelled;
@@ -61,20 +61,7 @@ pub(crate) fn measure_own(
                 .ok_or(error)?
         }
     };
-    let pair = found.reciprocal;
-    let found = judged(found, &image, geometry);
-    let predicts = |found: &MeasuredLattice| found.evidence?.predicts;
-    let is_poor = match &found {
-        Ok(found) => predicts(found).is_some_and(|most| most < BEYOND_DOUBT),
-        Err(error) => matches!(error, LatticeError::NotPredicted { .. }),
-    };
-    // What predicts little is compared with what else is proposed.
-    let other = is_poor.then(|| best_predicted(&image, geometry, background));
-    let other = other
-        .flatten()
-        .filter(|other| !are_nested(&pair, &other.reciprocal));
-    let other = other.and_then(|other| judged(other, &image, geometry).ok());
-    other.map_or(found, Ok)
+    judged(found, &image, geometry)
 }
 
 /// The same lattice in the image without ground, where something stands out beside it and the image without ground says much more of it.

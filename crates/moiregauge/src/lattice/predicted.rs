@@ -1,7 +1,6 @@
 //! What held-out prediction says of a lattice that was found.
 
 use heterostrain::lattice::{distortion, shortest_pair};
-use nalgebra::Matrix2;
 
 use crate::explain::cells::{Supercell, Superlattice, better_cell, superlattice};
 use crate::explain::evidence::{proposed, weakest};
@@ -23,12 +22,10 @@ use crate::spectrum::transform::Spectrum;
 
 /// A lattice without a first order that stands out is taken where the weakest family of its waves predicts by so many standard errors. The best of
 /// 57 candidates in rough ground had 3.4.
-pub(crate) const BEYOND_DOUBT: f64 = 5.0;
+const BEYOND_DOUBT: f64 = 5.0;
 /// With less a lattice is none. Right answers had 2.3 and more (60 sets of one to four troubles; that one covers half the frame and fades), lone steps 0 at
 /// most.
 const LEAST: f64 = 1.5;
-/// Waves this close to a point of a lattice are its own, in shortest waves: lattices that are fitted agree to a hundredth.
-const OFF_POINT: f64 = 0.1;
 /// As in `scan::shells`: below this probability of chance an image may hide a first order.
 const SUSPECTED: f64 = 0.2;
 
@@ -41,12 +38,7 @@ pub(crate) fn of_better_cell(
     method: Method,
 ) -> Option<MeasuredLattice> {
     let part = found.patch.as_ref().map(|patch| patch.of(image));
-    let disagreeing = found.fit.as_ref().is_some_and(disagrees);
-    let pair = better_cell(
-        part.as_ref().unwrap_or(image),
-        &found.reciprocal,
-        disagreeing,
-    )?;
+    let pair = better_cell(part.as_ref().unwrap_or(image), &found.reciprocal)?;
     let to_physical = geometry.pixel_to_nm.try_inverse()?.transpose();
     let pair = pair * shortest_pair(&(to_physical * pair))?;
     let other = Start::at_on(found.patch.as_ref(), image, geometry, background, &pair)?
@@ -93,15 +85,6 @@ pub(crate) fn best_predicted(
     let predicts = weakest > BEYOND_DOUBT;
     let start = predicts.then(|| Start::at(image, geometry, background, &pair))??;
     start.measure(Method::Lattice).ok()
-}
-
-/// Whether all waves of one lattice (reciprocal pairs) are points of the other: [`better_cell`] compares these.
-pub(crate) fn are_nested(one: &Matrix2<f64>, other: &Matrix2<f64>) -> bool {
-    let holds = |one: &Matrix2<f64>, other: &Matrix2<f64>| {
-        let names = one.try_inverse().map(|inverse| inverse * other);
-        names.is_some_and(|names| (names - names.map(f64::round)).amax() < OFF_POINT)
-    };
-    holds(one, other) || holds(other, one)
 }
 
 /// A lattice with what it predicts of the part of the image that shows it.
