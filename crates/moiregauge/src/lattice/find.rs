@@ -2,13 +2,20 @@
 
 use std::sync::Arc;
 
+use heterostrain::lattice::shortest_pair;
+
 use crate::frame::background::Background;
 use crate::frame::geometry::Geometry;
 use crate::frame::image::Image;
+use crate::lattice::fit::few::FewWaves;
+use crate::lattice::fit::fitted::LatticeFit;
 use crate::lattice::ground::{below, on_even_ground};
-use crate::lattice::measure::{beside, is_torn, measure_levelled};
+use crate::lattice::measure::{
+    beside, hidden, is_torn, measure_levelled, no_lattice, of_first_shell,
+};
 use crate::lattice::measured::MeasuredLattice;
-use crate::lattice::predicted::{best_predicted, judged};
+use crate::lattice::predicted::{best_predicted, disagrees, judged};
+use crate::lattice::start::Start;
 use crate::spectrum::error::LatticeError;
 use crate::spectrum::method::Method;
 use crate::spectrum::prepare::levelled;
@@ -44,13 +51,12 @@ pub(crate) fn measure_own(
     method: Method,
 ) -> Result<MeasuredLattice, LatticeError> {
     let image = Arc::new(levelled(image, background)?);
-    let found = measure_levelled(&image, geometry, background, method);
-    // Other methods have no fit that would name the ground that is taken off.
+    // Other methods have no fit that would name the wave, or the ground, that is taken off.
     if method != Method::Lattice {
-        return found;
+        return measure_levelled(&image, geometry, background, method);
     }
-    let found = match found {
-        Ok(found) => clearer(found, &image, geometry, background),
+    let found = match measure_beside(&image, geometry, background) {
+        Ok(found) => Ok(clearer(found, &image, geometry, background)),
         Err(error) => {
             let find = |even: &Arc<Image>, geometry: &Geometry| {
                 measure_levelled(even, geometry, background, method).ok()
@@ -58,10 +64,10 @@ pub(crate) fn measure_own(
             below(&image, geometry, background, &find)
                 .filter(|found| !is_torn(found))
                 .or_else(|| best_predicted(&image, geometry, background))
-                .ok_or(error)?
+                .ok_or(error)
         }
     };
-    judged(found, &image, geometry)
+    found.and_then(|found| judged(found, &image, geometry))
 }
 
 /// The same lattice in the image without ground, where something stands out beside it and the image without ground says much more of it.
@@ -83,4 +89,63 @@ fn clearer(
     on_even_ground(image, fit, geometry, background)
         .filter(|even| !is_torn(even) && variance(even) < most)
         .unwrap_or(found)
+}
+
+/// The lattice of an image without its background, and of perfect waves beside it.
+fn measure_beside(
+    image: &Arc<Image>,
+    geometry: &Geometry,
+    background: Background,
+) -> Result<MeasuredLattice, LatticeError> {
+    let found = measure_levelled(image, geometry, background, Method::Lattice);
+    if !is_doubtful(&found) {
+        return found;
+    }
+    let Some(waves) = FewWaves::of(image) else {
+        return found;
+    };
+    // A lattice that covers the frame and whose waves are all there is right, if it does not seem to change: perfect waves do not.
+    let plain = |fit: &LatticeFit| !disagrees(fit) && fit.change().is_none();
+    let whole = found.as_ref().ok().filter(|found| found.patch.is_none());
+    let plain = whole.filter(|found| found.fit.as_ref().is_some_and(plain));
+    if plain.is_some_and(|found| waves.are_of(&found.reciprocal)) {
+        return found;
+    }
+    beside_stripes(&waves, image, geometry, background).map_or(found, Ok)
+}
+
+/// Whether stripes may have made a lattice, or hidden one.
+fn is_doubtful(found: &Result<MeasuredLattice, LatticeError>) -> bool {
+    let Ok(found) = found else {
+        return true;
+    };
+    found.patch.is_some() || beside(found).is_some() || found.fit.as_ref().is_none_or(disagrees)
+}
+
+/// The lattice of an image that is a few perfect waves, of which some are none of the lattice's.
+fn beside_stripes(
+    waves: &FewWaves,
+    image: &Image,
+    geometry: &Geometry,
+    background: Background,
+) -> Option<MeasuredLattice> {
+    let method = Method::Lattice;
+    let pair = waves.pair()?;
+    let to_physical = geometry.pixel_to_nm.try_inverse()?.transpose();
+    let pair = pair * shortest_pair(&(to_physical * pair))?;
+    let (rest, wave) = waves.taken_off(image, &pair)?;
+    let start = Start::at(&rest, geometry, background, &pair)?;
+    let mut found = start.measure(method).ok()?;
+    if hidden(&found).is_first_shell() {
+        found = of_first_shell(&found, &rest, geometry, background, method)?;
+    } else if no_lattice(&found).is_some() {
+        return None;
+    }
+    if let Some(fit) = &mut found.fit {
+        let told = fit.foreign_wave.map_or(0.0, |told| told.significance);
+        if wave.significance > told {
+            fit.foreign_wave = Some(wave);
+        }
+    }
+    Some(found)
 }

@@ -27,7 +27,7 @@ const OPPOSITE: f64 = 0.1;
 /// Points of the lattice that count, by their order.
 const ORDER: f64 = 4.0;
 /// A wave has more than so many cycles in the frame: slower ones are background.
-const SLOWEST: f64 = 2.0;
+pub(super) const SLOWEST: f64 = 2.0;
 /// Steps until a wave has to stand still.
 const STEPS: usize = 30;
 
@@ -67,7 +67,7 @@ pub(crate) fn without_waves(
 }
 
 /// The transform of what is left of the pixels, 0 where they do not count.
-fn spectrum(frame: &Frame, left: &[f64]) -> ResidualNoise {
+pub(super) fn spectrum(frame: &Frame, left: &[f64]) -> ResidualNoise {
     let columns = frame.image.columns;
     let line = |(): &mut (), row: usize, out: &mut [f64]| {
         out.copy_from_slice(&left[row * columns..][..columns]);
@@ -76,7 +76,7 @@ fn spectrum(frame: &Frame, left: &[f64]) -> ResidualNoise {
 }
 
 /// Puts 0 where pixels do not count.
-fn clear(frame: &Frame, values: &mut [f64]) {
+pub(super) fn clear(frame: &Frame, values: &mut [f64]) {
     let columns = frame.image.columns;
     let lines = values.chunks_exact_mut(columns).zip(&frame.present);
     for (line, _) in lines.filter(|(_, present)| **present == 0) {
