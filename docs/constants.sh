@@ -86,7 +86,9 @@ fit/hidden ELSE second half double
 scan/shells SUSPECTED second half double
 scan/shells CONFIRMED second half double
 fit/hidden SECOND_SHELL second half double
+lattice/measure OUTSHINES second,step half double
 lattice/measure REPEATS few half double
+lattice/measure FEWEST_BESIDE second,step half double
 lattice/ground PERIODS step,bump half double
 lattice/ground ROUNDS step,bump half double
 lattice/ground SMALLEST step,bump half double

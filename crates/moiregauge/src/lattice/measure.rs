@@ -10,14 +10,16 @@ use crate::frame::background::Background;
 use crate::frame::geometry::Geometry;
 use crate::frame::image::Image;
 use crate::lattice::fit::closure::Closure;
+use crate::lattice::fit::fitted::{FittedHarmonic, LatticeFit};
 use crate::lattice::fit::hidden::{Hidden, first_shell};
 use crate::lattice::fit::noise::ForeignWave;
 use crate::lattice::measured::MeasuredLattice;
 use crate::lattice::predicted::{disagrees, of_better_cell, without_foreign_peaks};
 use crate::lattice::start::Start;
-use crate::spectrum::error::LatticeError;
+use crate::spectrum::error::{LatticeError, SECOND, THIRD};
 use crate::spectrum::method::Method;
 use crate::spectrum::prepare::levelled;
+use crate::spectrum::shells::FIRST_SHELL;
 
 /// A lattice whose waves change by more than this share of themselves from corner to corner is none: gradients and waves of twist and strain make up
 /// to a tenth, creep in a frame of four periods of atoms a half, and holes that pass for a coarse lattice 0.7 to 1.4.
@@ -27,6 +29,11 @@ const FEWEST_PERIODS: f64 = 2.0;
 /// A lattice of fewer periods across the frame is none, changes or not: the edges of a few bodies make one. What repeats shows twice. Chosen by eye
 /// between the 0.8 to 1.0 of simulated discs with sharp edges and the three of the smallest recorded images.
 const REPEATS: f64 = 1.5;
+/// Harmonics with so many times the amplitude of the first shell make a lattice whose first shell has to be shown. Chosen by eye.
+const OUTSHINES: f64 = 2.0;
+/// So many harmonics that stand out say it instead. Chosen by eye.
+const FEWEST_BESIDE: usize = 3;
+
 /// The lattice of some part of the frame, of those that are `meant`.
 fn in_parts(
     image: &Image,
@@ -89,9 +96,40 @@ pub(crate) fn measure_levelled(
 
 /// Why what the fit says of its waves makes a lattice none.
 pub(crate) fn no_lattice(found: &MeasuredLattice) -> Option<LatticeError> {
+    if is_hollow(found) {
+        return Some(LatticeError::NowhereTogether);
+    }
     let closure = found.fit.as_ref()?.closure.filter(Closure::is_no_lattice)?;
     let cycles = closure.apart;
     Some(LatticeError::NoHarmonics { cycles })
+}
+
+/// The harmonics that stand out and are none of its second shell, which has a third of its points, or of its third, which has a quarter.
+fn harmonics_beside(fit: &LatticeFit, cells: i32) -> Vec<[i32; 2]> {
+    let is_of = |[h, k]: [i32; 2]| match cells {
+        3 => (h - k).rem_euclid(3) == 0,
+        _ => h % 2 == 0 && k % 2 == 0,
+    };
+    let strong = fit.harmonics.iter();
+    let strong = strong.filter(|h| h.signal_to_noise.powi(2) > SECOND);
+    let indices = strong.map(|h| h.index);
+    indices.filter(|index| !is_of(*index)).collect()
+}
+
+/// Whether its first shell is nowhere to be seen beside stronger harmonics, of which all that stand out are those of another lattice, but for one or
+/// two that may be chance: slow ground makes a coarser lattice of every lattice.
+fn is_hollow(found: &MeasuredLattice) -> bool {
+    let Some(fit) = &found.fit else { return false };
+    let (first, higher) = fit.harmonics.split_at(FIRST_SHELL.len());
+    let largest = |some: &[FittedHarmonic]| some.iter().map(|h| h.amplitude).fold(0.0, f64::max);
+    let mut ratios: Vec<f64> = first.iter().map(|h| h.signal_to_noise.powi(2)).collect();
+    ratios.sort_by(|a, b| b.total_cmp(a));
+    if largest(higher) < OUTSHINES * largest(first) || ratios[1] > THIRD {
+        return false;
+    }
+    [3, 4]
+        .iter()
+        .any(|cells| harmonics_beside(fit, *cells).len() < FEWEST_BESIDE)
 }
 
 /// What a lattice that was measured leaves where the first shell would be, if it is the second shell of another.
