@@ -104,8 +104,8 @@ pub(crate) enum Superlattice {
     Shown,
     /// They do not predict, or not in all directions: noise may hide them, or there are none.
     NotShown,
-    /// Peaks near its points predict better with wave vectors of their own: they are none of its harmonics.
-    Foreign,
+    /// What is near its points is none of its harmonics: it predicts better with wave vectors of its own, or worse than nothing in some direction.
+    Refuted,
 }
 
 /// Whether an image shows the lattice with the larger cell and not only that with the smaller. `coarse`: reciprocal pair of the larger cell, at 60°,
@@ -148,15 +148,20 @@ pub(crate) fn superlattice(
     // Waves in one direction alone are stripes.
     let in_line = |[h, k]: [i32; 2], [m, n]: [i32; 2]| h * n == k * m;
     let adds = |first: &[i32; 2]| {
-        let without = of(&|i| is_fine(indices[i]) || !in_line(indices[i], *first));
-        without.is_some_and(|without| errors(&large, &without) > BETTER / 2.0)
+        let without = of(&|i| is_fine(indices[i]) || !in_line(indices[i], *first))?;
+        Some(errors(&large, &without))
     };
     let predicts = errors(&large, &small) > BETTER;
     if !predicts && !suspected {
         return Some(Superlattice::NotShown);
     }
     let first: Vec<[i32; 2]> = FIRST_SHELL.into_iter().filter(|i| !is_fine(*i)).collect();
-    let said = if predicts && first.iter().all(adds) {
+    let adds: Option<Vec<f64>> = first.iter().map(adds).collect();
+    let least = adds?.into_iter().fold(f64::INFINITY, f64::min);
+    if least < 0.0 {
+        return Some(Superlattice::Refuted);
+    }
+    let said = if predicts && least > BETTER / 2.0 {
         Superlattice::Shown
     } else {
         Superlattice::NotShown
@@ -184,7 +189,7 @@ pub(crate) fn superlattice(
     let all: Vec<usize> = (0..2 * (others.len() + first.len())).collect();
     let beside = gains(&normals, &all)?;
     Some(if errors(&beside, &large) > BETTER {
-        Superlattice::Foreign
+        Superlattice::Refuted
     } else {
         said
     })

@@ -6,6 +6,7 @@ use heterostrain::lattice::shortest_pair;
 use nalgebra::Matrix2;
 
 use crate::coverage::find::same;
+use crate::coverage::patch::Patch;
 use crate::frame::background::Background;
 use crate::frame::geometry::Geometry;
 use crate::frame::image::Image;
@@ -14,7 +15,7 @@ use crate::lattice::fit::fitted::{FittedHarmonic, LatticeFit};
 use crate::lattice::fit::hidden::{Hidden, first_shell};
 use crate::lattice::fit::noise::ForeignWave;
 use crate::lattice::measured::MeasuredLattice;
-use crate::lattice::predicted::{disagrees, of_better_cell, without_foreign_peaks};
+use crate::lattice::predicted::{disagrees, of_better_cell, without_refuted_shell};
 use crate::lattice::start::Start;
 use crate::spectrum::error::{LatticeError, SECOND, THIRD};
 use crate::spectrum::method::Method;
@@ -91,7 +92,7 @@ pub(crate) fn measure_levelled(
         return Err(error);
     }
     Ok(of_better_cell(&found, image, geometry, background, method)
-        .unwrap_or_else(|| without_foreign_peaks(found, image)))
+        .unwrap_or_else(|| without_refuted_shell(found, image)))
 }
 
 /// Why what the fit says of its waves makes a lattice none.
@@ -163,14 +164,26 @@ pub(crate) fn of_first_shell(
     method: Method,
 ) -> Option<MeasuredLattice> {
     let pair = first_shell(&found.reciprocal);
-    let to_physical = geometry.pixel_to_nm.try_inverse()?.transpose();
-    let pair = pair * shortest_pair(&(to_physical * pair))?;
-    let first = Start::at_on(found.patch.as_ref(), image, geometry, background, &pair)?
-        .measure(method)
-        .ok()?;
+    let part = found.patch.as_ref();
+    let first = measure_pair(&pair, part, image, geometry, background, method)?;
     // Waves that miss its points are those of something else.
     let agrees = |found: &MeasuredLattice| !found.fit.as_ref().is_some_and(disagrees);
     (agrees(&first) || !agrees(found)).then_some(first)
+}
+
+/// The lattice of some pair of waves (rad per pixel) in a part of an image, or in all of it; `None` where it cannot be measured.
+pub(crate) fn measure_pair(
+    pair: &Matrix2<f64>,
+    part: Option<&Patch>,
+    image: &Image,
+    geometry: &Geometry,
+    background: Background,
+    method: Method,
+) -> Option<MeasuredLattice> {
+    let to_physical = geometry.pixel_to_nm.try_inverse()?.transpose();
+    let pair = pair * shortest_pair(&(to_physical * pair))?;
+    let start = Start::at_on(part, image, geometry, background, &pair)?;
+    start.measure(method).ok()
 }
 
 /// The same for a lattice that is one of several and everywhere: nothing is asked of what lies beside it.

@@ -1,6 +1,6 @@
 //! What held-out prediction says of a lattice that was found.
 
-use heterostrain::lattice::{distortion, shortest_pair};
+use heterostrain::lattice::distortion;
 
 use crate::explain::cells::{Supercell, Superlattice, better_cell, superlattice};
 use crate::explain::evidence::{proposed, weakest};
@@ -9,7 +9,7 @@ use crate::frame::geometry::Geometry;
 use crate::frame::image::Image;
 use crate::lattice::fit::fitted::LatticeFit;
 use crate::lattice::fit::hidden::Hidden;
-use crate::lattice::measure::{hidden, no_lattice};
+use crate::lattice::measure::{hidden, measure_pair, no_lattice};
 use crate::lattice::measured::{Evidence, MeasuredLattice};
 use crate::lattice::start::Start;
 use crate::spectrum::error::{LatticeError, SECOND};
@@ -39,18 +39,15 @@ pub(crate) fn of_better_cell(
 ) -> Option<MeasuredLattice> {
     let part = found.patch.as_ref().map(|patch| patch.of(image));
     let pair = better_cell(part.as_ref().unwrap_or(image), &found.reciprocal)?;
-    let to_physical = geometry.pixel_to_nm.try_inverse()?.transpose();
-    let pair = pair * shortest_pair(&(to_physical * pair))?;
-    let other = Start::at_on(found.patch.as_ref(), image, geometry, background, &pair)?
-        .measure(method)
-        .ok()?;
+    let part = found.patch.as_ref();
+    let other = measure_pair(&pair, part, image, geometry, background, method)?;
     no_lattice(&other).is_none().then_some(other)
 }
 
-/// Clears the evidence for a suppressed first order where the power near its points is that of non-lattice peaks, so that the set does not use it.
-pub(crate) fn without_foreign_peaks(mut found: MeasuredLattice, image: &Image) -> MeasuredLattice {
+/// Clears the evidence for a hidden first order where what predicts pixels refutes it, so that the set does not use it.
+pub(crate) fn without_refuted_shell(mut found: MeasuredLattice, image: &Image) -> MeasuredLattice {
     if hidden(&found).chance() < SUSPECTED
-        && is_foreign(&found, image) == Some(true)
+        && is_refuted(&found, image) == Some(true)
         && let Some(fit) = &mut found.fit
     {
         fit.hidden = Hidden::default();
@@ -58,8 +55,8 @@ pub(crate) fn without_foreign_peaks(mut found: MeasuredLattice, image: &Image) -
     found
 }
 
-/// Whether peaks near the points of a suppressed first order have wave vectors of their own.
-fn is_foreign(found: &MeasuredLattice, image: &Image) -> Option<bool> {
+/// Whether what is near the points of a hidden first order is none of its harmonics.
+fn is_refuted(found: &MeasuredLattice, image: &Image) -> Option<bool> {
     let part = found.patch.as_ref().map(|patch| patch.of(image));
     let coarse = Supercell::Root3.coarse(&found.reciprocal)?;
     let said = superlattice(
@@ -68,7 +65,7 @@ fn is_foreign(found: &MeasuredLattice, image: &Image) -> Option<bool> {
         Supercell::Root3,
         true,
     )?;
-    Some(said == Superlattice::Foreign)
+    Some(said == Superlattice::Refuted)
 }
 
 /// The proposed lattice that predicts pixels which were held out best, where it does so beyond doubt. Spots that differ are noise beside each wave, and no

@@ -16,6 +16,7 @@ use rayon::prelude::*;
 use rustfft::num_complex::Complex64;
 use serde::{Deserialize, Serialize};
 
+use crate::explain::evidence::contrast as predicted_by;
 use crate::frame::image::Image;
 use crate::lattice::fit::fit_pixels::{FinalNoise, Fit};
 use crate::lattice::fit::frame::{BENT, powers, turns, wave};
@@ -29,6 +30,9 @@ use crate::numbers::three::three;
 
 /// χ² with nine degrees of freedom exceeds 27.9 once in a thousand; the noise that it is counted in is known to a tenth.
 const THRESHOLD: f64 = 34.0;
+/// Contrast changes where that predicts blocks that were held out by so many standard errors. Few spots that differ by chance have 1 at most, contrast that
+/// fades above 5.
+const PREDICTS: f64 = 2.0;
 /// The highest powers of X and Y, together, by which the waves are multiplied.
 const HIGHEST: usize = 5;
 /// All of them, [`BENT`] first.
@@ -124,11 +128,9 @@ pub(crate) struct Even<'a> {
 impl Fit<'_> {
     /// Whether a contrast that changes predicts blocks that were held out. The heights of disordered spots do not.
     fn contrast_predicts(&self) -> Option<bool> {
-        // Standard errors. Few spots that differ by chance have 1 at most, contrast that fades above 5.
-        const PREDICTS: f64 = 2.0;
         let edge = self.frame.edge();
         let pair = Matrix2::from_fn(|i, j| self.model.pair[(i, j)] / edge[i]);
-        Some(crate::explain::evidence::contrast(self.frame.image, &pair)? > PREDICTS)
+        Some(predicted_by(self.frame.image, &pair)? > PREDICTS)
     }
 
     /// The fit with contrast that changes, where it does by more than chance. The finest description is taken whose noise costs no more than noise does
