@@ -45,9 +45,6 @@ coverage/grains NEITHER edge,island,grains half double
 coverage/grains SEEDS edge,island,grains half double
 coverage/grains NEAR edge,island,grains half double
 scan/grains SAME grains half double
-set/faint FAINT terrain,contrast half double
-set/faint TOTAL terrain,contrast half double
-set/faint FRAMES terrain,contrast half double
 scan/shells AGREE second half double
 bend THRESHOLD few,moirés,gradient,grains half double
 bend HARMLESS few,moirés,gradient,grains half double
@@ -72,7 +69,6 @@ fit/few SKIRT +stripes half double
 fit/few LOBE +stripes half double
 fit/few FEWEST +stripes half double
 fit/few HIGHEST +stripes half double
-fit/few PERIODS +stripes half double
 fit/few OPEN +stripes half double
 fit/joint FARTHEST +stripes half double
 fit/joint APART +stripes half double
@@ -98,8 +94,6 @@ set/drift KNOWN_TO grains half double
 campaign/shells OUTVOTED second half double
 campaign/grains CONTRADICTED grains half double
 campaign/grains BETTER_KNOWN grains half double
-lattice/measure ATOMS hole,+stripes half double
-lattice/measure TOWERS hole,+stripes half double
 lattice/measure TORN hole,+stripes half double
 fit/beside STRONG moirés,+stripes half double
 fit/beside LEFT moirés,+stripes half double
