@@ -20,6 +20,7 @@ __all__ = [
     "BudgetResult",
     "ByHand",
     "Calibration",
+    "CandidateResult",
     "Caveat",
     "ChecksResult",
     "Choice",
@@ -271,6 +272,24 @@ class Calibration(Document):
     """Difference of the gains of x and y, per cent."""
     orthogonality_mrad: float
     """Deviation of the axes from a right angle, mrad."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class CandidateResult(Document):
+    """A lattice that an image may show."""
+
+    behind_by: float | None
+    """By how many standard errors the lattice that was measured predicts better."""
+    cells: int
+    """How many of its cells the lattice that was measured has in one: 3 or 4 for a lattice that is made of
+    harmonics of that.
+    """
+    predicted_share: float | None
+    """Share of the variance of parts of the frame that were held out, without slow background, that it
+    predicts.
+    """
+    wavelengths_nm: tuple[float | None, float | None, float | None]
+    """Lengths of its three shortest vectors by the geometry of the scan, drift included."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -689,6 +708,10 @@ class LatticeVector(Document):
 class LineResult(Document):
     """What one line direction of a frame gave."""
 
+    candidates: tuple[CandidateResult, ...]
+    """The lattices that were compared: the one that was measured, then the others, those that predict most
+    first.
+    """
     comparison: tuple[LatticeVector, LatticeVector, LatticeVector] | None
     """The same by the other estimator."""
     from_sensors: bool
@@ -1840,6 +1863,11 @@ decoded_by(
             "mismatch_percent": float,
             "orthogonality_mrad": float,
         },
+        CandidateResult: {
+            "behind_by": float,
+            "predicted_share": float,
+            "wavelengths_nm": several(float, 3),
+        },
         Caveat: {},
         ChecksResult: {
             "bootstrap": ScatterResult.from_dict,
@@ -1965,6 +1993,7 @@ decoded_by(
             "y_nm": float,
         },
         LineResult: {
+            "candidates": several(CandidateResult.from_dict),
             "comparison": several(LatticeVector.from_dict, 3),
             "origin_nm": several(float, 2),
             "periods": float,

@@ -14,7 +14,7 @@ use super::words::{
 use crate::draw::base64;
 use crate::error::ReportError;
 use crate::figures::Figure;
-use crate::results::{AtomicResult, DriftResult, Results, ScanResult, SetResult};
+use crate::results::{AtomicResult, DriftResult, LineResult, Results, ScanResult, SetResult};
 
 const TEMPLATE: &str = include_str!("report.html");
 
@@ -125,6 +125,8 @@ struct Scan<'a> {
     signal_to_noise: String,
     predicted_by: String,
     rivals: String,
+    /// Of each line and lattice: line, wavelengths, what it is, share, behind by.
+    candidates: Vec<[String; 5]>,
 }
 
 #[derive(Clone, Debug, Serialize)]
@@ -353,9 +355,28 @@ fn drift(drift: &DriftResult) -> Drift {
     }
 }
 
+fn candidates(line: &LineResult) -> impl Iterator<Item = [String; 5]> {
+    line.candidates.iter().enumerate().map(|(i, candidate)| {
+        let [a, b, c] = candidate.wavelengths_nm.map(|length| plain(length, 2));
+        let what = match (i, candidate.cells) {
+            (0, _) => "measured".to_owned(),
+            (_, 1) => "another".to_owned(),
+            (_, cells) => format!("1/{cells} of its cell"),
+        };
+        let share = candidate.predicted_share.map(|share| 100.0 * share);
+        [
+            line.line.clone(),
+            format!("{a}, {b}, {c}"),
+            what,
+            plain(share, 1),
+            plain(candidate.behind_by.filter(|_| i > 0), 1),
+        ]
+    })
+}
+
 impl<'a> Scan<'a> {
     fn new(index: usize, scan: &'a ScanResult) -> Self {
-        let lowest = |values: fn(&crate::results::LineResult) -> Option<f64>| {
+        let lowest = |values: fn(&LineResult) -> Option<f64>| {
             scan.lines.iter().filter_map(values).reduce(f64::min)
         };
         Self {
@@ -376,6 +397,7 @@ impl<'a> Scan<'a> {
                 .filter_map(|line| line.rivals)
                 .max()
                 .map_or_else(|| "–".to_owned(), |most| most.to_string()),
+            candidates: scan.lines.iter().flat_map(candidates).collect(),
         }
     }
 }

@@ -54,6 +54,8 @@ pub use region::{
     DeviceResult, MapDetailsResult, MaskShare, RegionMeanResult, RegionResult, WantedResult,
 };
 pub use run::{AtomicImages, Crop, FrameOrder, NamedSet, Run, Told};
-pub use scan::{LineResult, ScanResult, ScanTwistStrain, ScanVector, TipVelocity, Window};
+pub use scan::{
+    CandidateResult, LineResult, ScanResult, ScanTwistStrain, ScanVector, TipVelocity, Window,
+};
 pub use schema::{map_schema, schema};
 pub use stripes::{StripeHarmonicResult, StripePatternResult, StripesResult};

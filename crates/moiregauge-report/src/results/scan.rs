@@ -4,6 +4,7 @@ use heterostrain::material::Bilayer;
 use moiregauge::campaign::{LineAnalysis, ScanAnalysis};
 use moiregauge::coverage::ChangeModel;
 use moiregauge::frame::Axis;
+use moiregauge::lattice::Candidate;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use spmfile::{DateTime, FrameDirection, LineDirection};
@@ -82,6 +83,19 @@ pub struct ScanTwistStrain {
     pub drift_corrected: Option<TwistStrainResult>,
 }
 
+/// A lattice that an image may show.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct CandidateResult {
+    /// Lengths of its three shortest vectors by the geometry of the scan, drift included.
+    pub wavelengths_nm: [Option<f64>; 3],
+    /// How many of its cells the lattice that was measured has in one: 3 or 4 for a lattice that is made of harmonics of that.
+    pub cells: usize,
+    /// Share of the variance of parts of the frame that were held out, without slow background, that it predicts.
+    pub predicted_share: Option<f64>,
+    /// By how many standard errors the lattice that was measured predicts better.
+    pub behind_by: Option<f64>,
+}
+
 /// What one line direction of a frame gave.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct LineResult {
@@ -97,6 +111,8 @@ pub struct LineResult {
     pub predicted_by: Option<f64>,
     /// How many waves of about the same period beside the lattice are as strong as its weakest one; three could make another lattice.
     pub rivals: Option<usize>,
+    /// The lattices that were compared: the one that was measured, then the others, those that predict most first.
+    pub candidates: Vec<CandidateResult>,
     /// Share of the frame that carries the lattice and was measured.
     pub share_covered: Option<f64>,
     /// What describes the lattice there: `constant`, or a mean of one that changes: `even` (wave vectors change in
@@ -165,7 +181,17 @@ fn vector(scan: &ScanAnalysis, index: usize, bilayer: Bilayer<'_>) -> ScanVector
     }
 }
 
+fn candidate(candidate: &Candidate) -> CandidateResult {
+    CandidateResult {
+        wavelengths_nm: candidate.wavelengths.map(number),
+        cells: candidate.cells,
+        predicted_share: number(candidate.share),
+        behind_by: number(candidate.behind),
+    }
+}
+
 fn line_result(line: &LineAnalysis, bilayer: Bilayer<'_>) -> LineResult {
+    let evidence = line.evidence.as_ref();
     LineResult {
         line: match line.line {
             LineDirection::Trace => "trace",
@@ -175,8 +201,10 @@ fn line_result(line: &LineAnalysis, bilayer: Bilayer<'_>) -> LineResult {
         from_sensors: line.from_sensors,
         periods: number(line.periods),
         signal_to_noise: number(line.signal_to_noise),
-        predicted_by: line.evidence.and_then(|e| e.predicts).and_then(number),
-        rivals: line.evidence.map(|e| e.rivals),
+        predicted_by: evidence.and_then(|e| e.predicts).and_then(number),
+        rivals: evidence.map(|e| e.rivals),
+        candidates: evidence
+            .map_or_else(Vec::new, |e| e.candidates.iter().map(candidate).collect()),
         share_covered: number(line.patch.as_ref().map_or(1.0, |patch| patch.share)),
         lattice_model: match line.change.map(|change| change.model) {
             None => "constant",

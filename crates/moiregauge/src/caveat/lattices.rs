@@ -123,6 +123,22 @@ pub enum LatticeDoubt {
         /// How many they are.
         rivals: usize,
     },
+    /// The lattice may be that of a part of the cell.
+    #[error(
+        "the harmonics do not agree on one lattice, and those of a cell of one {} of the area ({:.2}, {:.2}, {:.2} nm) alone predict {:.0} % of the image \
+         where all together predict {:.0} %: the rest may be a second moiré that lies near points of a superlattice. The twist by the smaller cell is {:.2} times as large",
+        if *.cells == 3 { "third" } else { "fourth" }, .wavelengths[0], .wavelengths[1], .wavelengths[2], 100.0 * .share, 100.0 * .whole, (*.cells as f64).sqrt()
+    )]
+    PartOfCell {
+        /// How many cells of the smaller lattice the one that was measured has in one.
+        cells: usize,
+        /// Wavelengths of the smaller lattice, nm.
+        wavelengths: [f64; 3],
+        /// Share of the variance that it predicts.
+        share: f64,
+        /// Share that the lattice that was measured predicts.
+        whole: f64,
+    },
     /// There is another wave.
     #[error(
         "the residual of the fit shows another wave, with a period of {period:.2} nm ({significance:.0} times the \
@@ -282,7 +298,11 @@ explain! { LatticeDoubt:
         "The harmonics of the image do not agree on one lattice. This happens where the lattice is not the same \
          everywhere. The errors of the vectors were enlarged to match."
         "Map the lattice, or analyse a smaller part of the frame."
-    Rivals "rival-waves" Warning
+    PartOfCell "part-of-cell" Serious
+        "Most of the image is predicted by a lattice of a third or a fourth of the cell, and the other harmonics do not agree with it: they may be a second \
+         moiré that comes near the points of a superlattice. Then the twist is too small by √3 or 2."
+        "Look at the Fourier transform of the image. Give the approximate wavelength of the right lattice, or measure two moirés."
+    Rivals "rival-waves" Serious
         "One or two waves of about the period of the lattice, and none of its own, are as strong as its weakest one: stripes, or a second moiré. With three the \
          image would be refused, since these could be a lattice as well."
         "Look at the Fourier transform of the image. Give the approximate wavelength of the right lattice, or measure two moirés."

@@ -5,6 +5,7 @@
 
 use std::f64::consts::TAU;
 
+use heterostrain::lattice::shortest_pair;
 use nalgebra::{Matrix2, Vector2};
 
 use crate::explain::evidence::{Blocks, gain, weakest};
@@ -22,7 +23,7 @@ const LARGEST: i32 = 5;
 const LONGEST: f64 = 2.1;
 /// A description is better if it predicts better by so many standard errors. Larger cells that were there gained 10 and more, those that were
 /// not at most 2.7 (simulated frames of two generators, lines with gains among them).
-const BETTER: f64 = 4.0;
+pub(crate) const BETTER: f64 = 4.0;
 /// The smaller cell is taken if it predicts this fraction of what the larger does: the larger one has waves that are not its own.
 const MOST: f64 = 0.5;
 /// Wave vectors are looked for within so many cycles per frame of the points, in steps of a fifth of that.
@@ -48,8 +49,8 @@ impl Supercell {
             Self::Double => Matrix2::new(2.0, 0.0, 0.0, 2.0),
             Self::Rows(0) => Matrix2::new(2.0, 0.0, 0.0, 1.0),
             Self::Rows(1) => Matrix2::new(1.0, 0.0, 0.0, 2.0),
-            // The third wave of the smaller cell is twice that of the larger.
-            Self::Rows(_) => Matrix2::new(1.0, -1.0, 0.0, 2.0),
+            // The difference of the waves of the smaller cell is twice a wave of the larger.
+            Self::Rows(_) => Matrix2::new(1.0, -1.0, 1.0, 1.0),
         }
     }
 
@@ -68,13 +69,8 @@ impl Supercell {
 /// none does.
 pub(crate) fn better_cell(image: &Image, pair: &Matrix2<f64>) -> Option<Matrix2<f64>> {
     let all = [Supercell::Root3, Supercell::Double];
-    let waves = three(pair).map(|q| q.norm());
-    let [shortest, longest] = [
-        waves.into_iter().reduce(f64::min)?,
-        waves.into_iter().reduce(f64::max)?,
-    ];
-    let is_elongated = longest > ELONGATED * shortest;
-    let rows = (0..3).map(Supercell::Rows).filter(|_| is_elongated);
+    let elongated = is_elongated(pair);
+    let rows = (0..3).map(Supercell::Rows).filter(|_| elongated);
     let all = all.into_iter().chain(rows);
     let larger = all.clone().find_map(|supercell| {
         let coarse = supercell.coarse(pair)?;
@@ -83,12 +79,24 @@ pub(crate) fn better_cell(image: &Image, pair: &Matrix2<f64>) -> Option<Matrix2<
     larger.or_else(|| {
         let mut fine = all.map(|supercell| (supercell, supercell.fine(pair)));
         let is_better = |(supercell, fine): &(Supercell, Matrix2<f64>)| {
+            // Moirés of hexagonal layers are nearly hexagons: half-order waves in one direction make a superlattice of one.
+            let is_regular = elongated && !is_elongated(fine);
             let shown =
                 || superlattice(image, pair, *supercell, false) == Some(Superlattice::Shown);
-            predicts_as_well(image, fine, pair) == Some(true) && !shown()
+            predicts_as_well(image, fine, pair) == Some(true) && (is_regular || !shown())
         };
         fine.find(is_better).map(|(_, fine)| fine)
     })
+}
+
+/// Whether the longest of the three first-order waves has more than one and a half times the wave vector of the shortest.
+fn is_elongated(pair: &Matrix2<f64>) -> bool {
+    let Some(change) = shortest_pair(pair) else {
+        return true;
+    };
+    let waves = three(&(pair * change)).map(|q| q.norm());
+    let shortest = waves.into_iter().fold(f64::INFINITY, f64::min);
+    waves.into_iter().fold(0.0, f64::max) > ELONGATED * shortest
 }
 
 /// Whether one lattice alone predicts most of what another does.

@@ -10,7 +10,7 @@ use crate::numbers::spread::mean_and_spread;
 use crate::spectrum::shells::{FIRST_SHELL, shells};
 
 /// Coefficients of cubic phases beyond a plane.
-const CUBIC: usize = 7;
+pub(crate) const CUBIC: usize = 7;
 
 /// By how much more of the variance one description predicts than another, block by block.
 #[derive(Clone, Debug)]

@@ -6,6 +6,7 @@ use nalgebra::{Matrix2, Vector2};
 
 use crate::explain::cells::{Supercell, Superlattice, better_cell, superlattice};
 use crate::explain::evidence::{contrast, gain, weakest};
+use crate::explain::table::table;
 use crate::frame::image::Image;
 use crate::numbers::rng::normals;
 use crate::numbers::three::three;
@@ -51,10 +52,29 @@ fn every_other_row_belongs_to_the_lattice() {
     for rows in 0..3 {
         let fine = Supercell::Rows(rows).fine(&pair());
         let value = |at: Vector2<f64>| lattice(&pair(), at) + 1.5 * lattice(&fine, at);
-        let found = better_cell(&image(1, 0.5, value), &fine);
-        assert_eq!(found, Some(pair()), "{rows}");
+        let found = better_cell(&image(1, 0.5, value), &fine).unwrap();
+        assert!((found - pair()).amax() < 1e-12, "{rows}: {found}");
         let alone = image(1, 0.5, |at| lattice(&fine, at));
         assert_eq!(better_cell(&alone, &fine), None, "{rows}");
+    }
+}
+
+/// Half-order waves in one direction make a superlattice of a lattice that is nearly hexagonal: its cell is measured.
+#[test]
+fn half_order_rows_are_no_cell() {
+    for rows in 0..3 {
+        let coarse = Supercell::Rows(rows).coarse(&pair()).unwrap();
+        let value = |at: Vector2<f64>| lattice(&pair(), at) + 0.7 * lattice(&coarse, at);
+        let found = better_cell(&image(3, 0.3, value), &coarse).unwrap();
+        let names = pair().try_inverse().unwrap() * found;
+        assert!(
+            (names - names.map(f64::round)).amax() < 1e-9,
+            "{rows}: {names}"
+        );
+        assert!(
+            (names.determinant().abs() - 1.0).abs() < 1e-9,
+            "{rows}: {names}"
+        );
     }
 }
 
@@ -127,5 +147,50 @@ fn superlattices_are_told_from_foreign_peaks() {
                 "{cell:?}"
             );
         }
+    }
+}
+
+/// Of two moirés in one image the table tells the shares, in closed form, and which predicts more, whichever was measured. Cells of several times the
+/// area are no other lattices.
+#[test]
+fn the_table_ranks_two_moires_by_what_they_predict() {
+    let (sin, cos) = 0.31_f64.sin_cos();
+    let other = 1.21 * Matrix2::new(cos, -sin, sin, cos) * pair();
+    let coarse = Supercell::Root3.coarse(&pair()).unwrap();
+    for seed in 0..3 {
+        let value = |at: Vector2<f64>| lattice(&pair(), at) + 0.7 * lattice(&other, at);
+        let both = image(seed, 0.5, value);
+        // Variances: 3/2, 0.49 · 3/2, 1/4.
+        let all = 1.5 * 1.49 + 0.25;
+        let near = other * 1.004;
+        let rows = table(&both, &pair(), &[near, pair(), coarse], false).unwrap();
+        assert_eq!(rows.len(), 2);
+        assert!(
+            (rows[0].share - 1.5 / all).abs() < 0.02,
+            "{}",
+            rows[0].share
+        );
+        assert!((rows[1].share - 1.5 * 0.49 / all).abs() < 0.02);
+        assert!(rows[1].behind > 10.0 && (rows[1].pair - other).amax() < 0.003);
+        let swapped = table(&both, &other, &[pair()], false).unwrap();
+        assert!(swapped[1].behind < -10.0 && swapped[1].cells == 1);
+    }
+}
+
+/// A superlattice lists the lattice of a third of its cell with what the harmonics of that predict.
+#[test]
+fn the_table_knows_the_parts_of_a_cell() {
+    for (cell, cells) in [(Supercell::Root3, 3), (Supercell::Double, 4)] {
+        let coarse = cell.coarse(&pair()).unwrap();
+        let value = |at: Vector2<f64>| lattice(&pair(), at) + 0.5 * lattice(&coarse, at);
+        let rows = table(&image(1, 0.2, value), &coarse, &[pair()], false).unwrap();
+        let all = 1.5 * 1.25 + 0.04;
+        assert_eq!((rows.len(), rows[1].cells), (2, cells));
+        assert!(
+            (rows[1].share - 1.5 / all).abs() < 0.03,
+            "{}",
+            rows[1].share
+        );
+        assert!((rows[1].pair - pair()).amax() < 1e-9 || cells == 3);
     }
 }

@@ -14,7 +14,7 @@ use crate::lattice::measure::{
     beside, hidden, is_torn, measure_levelled, no_lattice, of_first_shell,
 };
 use crate::lattice::measured::MeasuredLattice;
-use crate::lattice::predicted::{best_predicted, disagrees, judged};
+use crate::lattice::predicted::{best_predicted, judged};
 use crate::lattice::start::Start;
 use crate::spectrum::error::LatticeError;
 use crate::spectrum::method::Method;
@@ -67,7 +67,7 @@ pub(crate) fn measure_own(
                 .ok_or(error)
         }
     };
-    found.and_then(|found| judged(found, &image, geometry))
+    found.and_then(|found| judged(found, &image, geometry, background))
 }
 
 /// The same lattice in the image without ground, where something stands out beside it and the image without ground says much more of it.
@@ -105,7 +105,7 @@ fn measure_beside(
         return found;
     };
     // A lattice that covers the frame and whose waves are all there is right, if it does not seem to change: perfect waves do not.
-    let plain = |fit: &LatticeFit| !disagrees(fit) && fit.change().is_none();
+    let plain = |fit: &LatticeFit| !fit.disagrees() && fit.change().is_none();
     let whole = found.as_ref().ok().filter(|found| found.patch.is_none());
     let plain = whole.filter(|found| found.fit.as_ref().is_some_and(plain));
     if plain.is_some_and(|found| waves.are_of(&found.reciprocal)) {
@@ -119,7 +119,9 @@ fn is_doubtful(found: &Result<MeasuredLattice, LatticeError>) -> bool {
     let Ok(found) = found else {
         return true;
     };
-    found.patch.is_some() || beside(found).is_some() || found.fit.as_ref().is_none_or(disagrees)
+    found.patch.is_some()
+        || beside(found).is_some()
+        || found.fit.as_ref().is_none_or(LatticeFit::disagrees)
 }
 
 /// The lattice of an image that is a few perfect waves, of which some are none of the lattice's.

@@ -15,7 +15,7 @@ use crate::lattice::fit::fitted::{FittedHarmonic, LatticeFit};
 use crate::lattice::fit::hidden::{Hidden, first_shell};
 use crate::lattice::fit::noise::ForeignWave;
 use crate::lattice::measured::MeasuredLattice;
-use crate::lattice::predicted::{disagrees, of_better_cell, without_refuted_shell};
+use crate::lattice::predicted::{of_better_cell, with_evidence, without_refuted_shell};
 use crate::lattice::start::Start;
 use crate::spectrum::error::{LatticeError, SECOND, THIRD};
 use crate::spectrum::method::Method;
@@ -151,8 +151,9 @@ pub(crate) fn measure_first_shell(
     found: &MeasuredLattice,
 ) -> Result<MeasuredLattice, LatticeError> {
     let image = Arc::new(levelled(image, background)?);
-    of_first_shell(found, &image, geometry, background, method)
-        .ok_or(LatticeError::NoPeaks { method })
+    let first = of_first_shell(found, &image, geometry, background, method);
+    let first = first.ok_or(LatticeError::NoPeaks { method })?;
+    Ok(with_evidence(first, &image, geometry).0)
 }
 
 /// The same of an image whose background is off already.
@@ -167,7 +168,7 @@ pub(crate) fn of_first_shell(
     let part = found.patch.as_ref();
     let first = measure_pair(&pair, part, image, geometry, background, method)?;
     // Waves that miss its points are those of something else.
-    let agrees = |found: &MeasuredLattice| !found.fit.as_ref().is_some_and(disagrees);
+    let agrees = |found: &MeasuredLattice| !found.fit.as_ref().is_some_and(LatticeFit::disagrees);
     (agrees(&first) || !agrees(found)).then_some(first)
 }
 

@@ -6,10 +6,12 @@ use serde::{Deserialize, Serialize};
 
 use crate::coverage::bend::Change;
 use crate::coverage::patch::Patch;
+use crate::explain::table::Row;
 use crate::lattice::common::Common;
 use crate::lattice::fit::fitted::LatticeFit;
 use crate::lattice::paper::PublishedPeaks;
 use crate::numbers::exact;
+use crate::numbers::three::three;
 use crate::spectrum::phases::Phases;
 
 /// A grain beside the one that is measured.
@@ -79,7 +81,7 @@ pub struct MeasuredLattice {
 }
 
 /// What speaks for a lattice, beside its signal-to-noise ratio: its margin to an image without any.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct Evidence {
     /// By how many standard errors the weakest of its three waves improves the prediction of blocks of the frame that were held out; `None` where the
@@ -88,4 +90,48 @@ pub struct Evidence {
     pub predicts: Option<f64>,
     /// How many waves of about its period beside it are as strong as its weakest one.
     pub rivals: usize,
+    /// The lattices that were compared: this one, then the others, those that predict most first.
+    #[serde(default)]
+    pub candidates: Vec<Candidate>,
+}
+
+/// A lattice that an image may show.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct Candidate {
+    /// Lengths of its three shortest vectors before drift and calibration are taken off, nm.
+    #[serde(with = "exact")]
+    pub wavelengths: [f64; 3],
+    /// How many of its cells the lattice that was measured has in one: 3 and 4 where it is made of harmonics of that.
+    pub cells: usize,
+    /// Share of the variance of held-out blocks, without slow background, that it predicts.
+    #[serde(with = "exact")]
+    pub share: f64,
+    /// By how many standard errors over blocks the lattice that was measured predicts better.
+    #[serde(with = "exact")]
+    pub behind: f64,
+}
+
+impl Evidence {
+    /// The lattice that was measured, and that of a part of its cell that predicts at least half of what the rest of its harmonics does.
+    pub(crate) fn part_of_cell(&self) -> Option<[Candidate; 2]> {
+        let (whole, others) = self.candidates.split_first()?;
+        let most =
+            |other: &&Candidate| other.cells > 1 && 2.0 * other.share > whole.share - other.share;
+        others.iter().find(most).map(|part| [*whole, *part])
+    }
+}
+
+impl Candidate {
+    /// `to_physical`: wave vectors (rad per pixel) to rad per nm.
+    pub(crate) fn new(row: &Row, to_physical: &Matrix2<f64>) -> Self {
+        let pair = to_physical * row.pair;
+        let per_wave = std::f64::consts::TAU / pair.determinant().abs();
+        Self {
+            wavelengths: three(&pair).map(|wave| per_wave * wave.norm()),
+            cells: row.cells,
+            share: row.share,
+            behind: row.behind,
+        }
+    }
 }

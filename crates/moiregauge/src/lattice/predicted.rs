@@ -1,22 +1,23 @@
 //! What held-out prediction says of a lattice that was found.
 
 use heterostrain::lattice::distortion;
+use nalgebra::Matrix2;
 
-use crate::explain::cells::{Supercell, Superlattice, better_cell, superlattice};
+use crate::explain::cells::{BETTER, Supercell, Superlattice, better_cell, superlattice};
 use crate::explain::evidence::{proposed, weakest};
+use crate::explain::table::{Row, table};
 use crate::frame::background::Background;
 use crate::frame::geometry::Geometry;
 use crate::frame::image::Image;
-use crate::lattice::fit::fitted::LatticeFit;
 use crate::lattice::fit::hidden::Hidden;
 use crate::lattice::measure::{hidden, measure_pair, no_lattice};
-use crate::lattice::measured::{Evidence, MeasuredLattice};
+use crate::lattice::measured::{Candidate, Evidence, MeasuredLattice};
 use crate::lattice::start::Start;
 use crate::spectrum::error::{LatticeError, SECOND};
 use crate::spectrum::method::Method;
 use crate::spectrum::prepare::binned;
 use crate::spectrum::rivals::{ENOUGH, Rivals};
-use crate::spectrum::select::MOST_DISTORTION;
+use crate::spectrum::select::{MOST_DISTORTION, candidates};
 use crate::spectrum::shells::shells;
 use crate::spectrum::transform::Spectrum;
 
@@ -84,49 +85,95 @@ pub(crate) fn best_predicted(
     start.measure(Method::Lattice).ok()
 }
 
-/// A lattice with what it predicts of the part of the image that shows it.
+/// A lattice with what speaks for it, or the proposed one that predicts the part of the image that shows it better.
 ///
 /// # Errors
-/// [`LatticeError::OneOfMany`]: other waves of the image could be one as well. [`LatticeError::NotPredicted`]: next to nothing. [`LatticeError::Distorted`]: its cell is none that a proposal may have.
+/// As [`accepted`].
 pub(crate) fn judged(
+    found: MeasuredLattice,
+    image: &Image,
+    geometry: &Geometry,
+    background: Background,
+) -> Result<MeasuredLattice, LatticeError> {
+    let (found, better) = with_evidence(found, image, geometry);
+    let found = accepted(found, geometry)?;
+    let instead = || {
+        let part = found.patch.as_ref();
+        let other = measure_pair(&better?, part, image, geometry, background, Method::Lattice)?;
+        let (other, _) = with_evidence(other, image, geometry);
+        let other = accepted(other, geometry).ok()?;
+        no_lattice(&other).is_none().then_some(other)
+    };
+    Ok(instead().unwrap_or(found))
+}
+
+/// A lattice, and grains beside it, with what they predict of the part of the image that shows them; and the reciprocal pair (rad per pixel) of another
+/// that predicts better.
+pub(crate) fn with_evidence(
     mut found: MeasuredLattice,
     image: &Image,
     geometry: &Geometry,
+) -> (MeasuredLattice, Option<Matrix2<f64>>) {
+    let beside = std::mem::take(&mut found.beside);
+    let of_grain = |grain| with_evidence(grain, image, geometry).0;
+    found.beside = beside.into_iter().map(of_grain).collect();
+    let Some(to_physical) = geometry.pixel_to_nm.try_inverse().map(|m| m.transpose()) else {
+        return (found, None);
+    };
+    let part = found.patch.as_ref().map(|patch| patch.of(image));
+    let part = part.as_ref().unwrap_or(image);
+    let (binning, bins) = binned(part, &found.reciprocal);
+    let (binning, spectrum) = (binning as f64, Spectrum::new(&bins));
+    let fit = found.fit.as_ref();
+    let bends = found.change.is_some() || fit.is_some_and(|fit| fit.change().is_some());
+    let proposals = candidates(&spectrum, &(geometry.pixel_to_nm * binning));
+    let proposals: Vec<Matrix2<f64>> = proposals.iter().map(|c| c.pair / binning).collect();
+    let rows = table(part, &found.reciprocal, &proposals, bends).unwrap_or_default();
+    let is_better = |row: &&Row| {
+        let weakest = || weakest(part, &row.pair, bends);
+        row.cells == 1 && row.behind < -BETTER && weakest().is_some_and(|least| least > BETTER)
+    };
+    let better = rows.iter().find(is_better).map(|row| row.pair);
+    let candidates = rows.iter().map(|row| Candidate::new(row, &to_physical));
+    found.evidence = Some(Evidence {
+        predicts: weakest(part, &found.reciprocal, bends),
+        rivals: Rivals::new(&spectrum).of(&(found.reciprocal * binning), &to_physical),
+        candidates: candidates.collect(),
+    });
+    (found, better)
+}
+
+/// A lattice that its evidence does not refute, with those grains beside it of which this is true.
+///
+/// # Errors
+/// [`LatticeError::OneOfMany`]: other waves of the image could be one as well. [`LatticeError::NotPredicted`]: next to nothing. [`LatticeError::Distorted`]: its cell is none that a proposal may have.
+fn accepted(
+    mut found: MeasuredLattice,
+    geometry: &Geometry,
 ) -> Result<MeasuredLattice, LatticeError> {
-    found.beside = std::mem::take(&mut found.beside)
-        .into_iter()
-        .filter_map(|grain| judged(grain, image, geometry).ok())
+    let beside = std::mem::take(&mut found.beside).into_iter();
+    found.beside = beside
+        .filter_map(|grain| accepted(grain, geometry).ok())
         .collect();
     let to_physical = geometry.pixel_to_nm.try_inverse().map(|m| m.transpose());
     if to_physical.is_some_and(|m| distortion(&(m * found.reciprocal)) > MOST_DISTORTION) {
         return Err(LatticeError::Distorted);
     }
-    let part = found.patch.as_ref().map(|patch| patch.of(image));
-    let rivals = to_physical.map_or(0, |metric| {
-        let (binning, bins) = binned(part.as_ref().unwrap_or(image), &found.reciprocal);
-        Rivals::new(&Spectrum::new(&bins)).of(&(found.reciprocal * binning as f64), &metric)
-    });
     // A cell of many atoms is made by its harmonics.
-    let by_few = !is_made_by_many(&found);
-    if rivals >= ENOUGH && by_few {
+    if is_made_by_many(&found) {
+        return Ok(found);
+    }
+    let evidence = found.evidence.as_ref();
+    let rivals = evidence.map_or(0, |evidence| evidence.rivals);
+    if rivals >= ENOUGH {
         return Err(LatticeError::OneOfMany { rivals });
     }
-    let fit = found.fit.as_ref();
-    let bends = found.change.is_some() || fit.is_some_and(|fit| fit.change().is_some());
-    let predicts = weakest(part.as_ref().unwrap_or(image), &found.reciprocal, bends);
     // Phases of a lattice that changes are no cubic polynomials.
-    let is_plain = found.change.is_none() && by_few;
-    if let Some(standard_errors) = predicts.filter(|p| *p < LEAST && is_plain) {
-        return Err(LatticeError::NotPredicted { standard_errors });
+    let predicts = evidence.and_then(|evidence| evidence.predicts);
+    match predicts.filter(|least| *least < LEAST && found.change.is_none()) {
+        Some(standard_errors) => Err(LatticeError::NotPredicted { standard_errors }),
+        None => Ok(found),
     }
-    found.evidence = Some(Evidence { predicts, rivals });
-    Ok(found)
-}
-
-/// Whether its harmonics do not agree on one lattice.
-pub(crate) fn disagrees(fit: &LatticeFit) -> bool {
-    fit.closure
-        .is_some_and(|closure| closure.enlargement() > 1.0)
 }
 
 /// Whether more harmonics stand out than two shells have.

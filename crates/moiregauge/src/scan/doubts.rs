@@ -97,8 +97,21 @@ pub(crate) fn about_coverage(
     geometry: &Geometry,
     caveats: &mut Vec<Caveat>,
 ) {
-    if let Some(rivals) = lattice.evidence.map(|e| e.rivals).filter(|n| *n > 0) {
-        caveats.push(Caveat::new(LatticeDoubt::Rivals { rivals }, file));
+    if let Some(evidence) = &lattice.evidence {
+        if evidence.rivals > 0 {
+            let rivals = evidence.rivals;
+            caveats.push(Caveat::new(LatticeDoubt::Rivals { rivals }, file));
+        }
+        let disagrees = lattice.fit.as_ref().is_some_and(LatticeFit::disagrees);
+        if let Some([whole, part]) = evidence.part_of_cell().filter(|_| disagrees) {
+            let doubt = LatticeDoubt::PartOfCell {
+                cells: part.cells,
+                wavelengths: part.wavelengths,
+                share: part.share,
+                whole: whole.share,
+            };
+            caveats.push(Caveat::new(doubt, file));
+        }
     }
     if let Some(patch) = &lattice.patch {
         let doubt = LatticeDoubt::PartlyCovered {

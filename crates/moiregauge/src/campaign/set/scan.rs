@@ -122,7 +122,7 @@ fn line_analysis(
         from_sensors: line.geometry.from_sensors,
         periods: line.lattice.periods,
         signal_to_noise: line.lattice.signal_to_noise,
-        evidence: line.lattice.evidence,
+        evidence: line.lattice.evidence.clone(),
         patch: line.lattice.patch.clone(),
         change: line.lattice.change,
         on_ground: line.lattice.ground.is_some(),

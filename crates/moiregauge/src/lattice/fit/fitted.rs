@@ -90,6 +90,12 @@ impl LatticeFit {
         self.wave_vectors.lattice()
     }
 
+    /// Whether its harmonics do not agree on one lattice.
+    pub(crate) fn disagrees(&self) -> bool {
+        let closure = self.closure.as_ref();
+        closure.is_some_and(|closure| closure.enlargement() > 1.0)
+    }
+
     /// The mean place of the pixels that count, (column, row).
     pub(crate) fn middle(&self) -> Vector2<f64> {
         self.centre + self.off_centre

@@ -1,0 +1,111 @@
+//! The lattices that an image may show, in one table, by what each predicts.
+
+use nalgebra::{Matrix2, Vector2};
+
+use crate::coverage::find::same;
+use crate::explain::evidence::{Blocks, CUBIC};
+use crate::explain::normal::{Phases, gains};
+use crate::explain::scene::Scene;
+use crate::frame::image::Image;
+use crate::spectrum::shells::shells;
+
+/// What predicts less than this share of the variance is not listed.
+const LISTED: f64 = 0.05;
+/// Wave vectors within this part of those of a cell of several times or a part of the area are harmonics: such cells are compared by
+/// [`superlattice`](crate::explain::cells::superlattice).
+const NESTED: f64 = 0.1;
+
+/// What one lattice predicts.
+pub(crate) struct Row {
+    /// Reciprocal pair at 60°, rad per pixel.
+    pub(crate) pair: Matrix2<f64>,
+    /// Share of the variance of held-out blocks (without slow background) that it predicts.
+    pub(crate) share: f64,
+    /// By how many standard errors over blocks the first lattice of the table predicts better.
+    pub(crate) behind: f64,
+    /// How many of its cells the first lattice has in one.
+    pub(crate) cells: usize,
+}
+
+/// A lattice (reciprocal pair at 60°, rad per pixel), the lattices whose cells are a third and a fourth of its own, and those proposals that are neither it
+/// nor a cell of several times or a part of its area. `bends`: phases may be cubic polynomials. `None` where the image is too small.
+pub(crate) fn table(
+    image: &Image,
+    first: &Matrix2<f64>,
+    proposals: &[Matrix2<f64>],
+    bends: bool,
+) -> Option<Vec<Row>> {
+    let scene = Scene::new(image, first, first)?;
+    let binning = scene.binning as f64;
+    let power = scene.values.iter().map(|v| v * v).sum::<f64>();
+    let indices = shells(3);
+    let all: Vec<usize> = (0..2 * indices.len()).collect();
+    let normals = |phases: &Phases| phases.normals(&scene, indices, false);
+    let straight = |pair: &Matrix2<f64>| Phases::straight(pair * binning);
+    let fitted = |pair: &Matrix2<f64>| {
+        let terms = if bends { CUBIC } else { 0 };
+        let fitted = straight(pair).fitted(&scene, shells(2), terms);
+        fitted.unwrap_or_else(|| straight(pair))
+    };
+    let answer = normals(&if bends {
+        fitted(first)
+    } else {
+        straight(first)
+    });
+    let most = gains(&answer, &all)?;
+    let row = |pair: Matrix2<f64>, own: &[f64], cells: usize| Row {
+        pair,
+        share: own.iter().sum::<f64>() / power,
+        behind: Blocks::difference(&scene, &most, own).standard_errors(),
+        cells,
+    };
+    let mut rows = Vec::new();
+    // The second shell is the first of a third of the cell, the third that of a fourth.
+    for (shell, cells) in [(2, 3), (3, 4)] {
+        let own = shells(shell - 1).len()..shells(shell).len();
+        let wave = |[h, k]: [i32; 2]| first * Vector2::new(f64::from(h), f64::from(k));
+        let pair = [wave(indices[own.start]), wave(indices[own.start + 1])];
+        let kept: Vec<usize> = (2 * own.start..2 * own.end).collect();
+        let gain = gains(&answer, &kept)?;
+        rows.push(row(Matrix2::from_columns(&pair), &gain, cells));
+    }
+    let size = [image.columns, image.rows];
+    for proposal in proposals {
+        let is_known = |pair: &Matrix2<f64>| {
+            let mut known = rows.iter().map(|row| &row.pair).chain([first]);
+            known.any(|known| same(size, known, pair)) || are_nested(first, pair)
+        };
+        if is_known(proposal) {
+            continue;
+        }
+        // What predicts next to nothing where it was proposed is not fitted.
+        let roughly = gains(&normals(&straight(proposal)), &all)?;
+        if roughly.iter().sum::<f64>() < LISTED * power {
+            continue;
+        }
+        let phases = fitted(proposal);
+        let pair = phases.pair / binning;
+        if !is_known(&pair) {
+            rows.push(row(pair, &gains(&normals(&phases), &all)?, 1));
+        }
+    }
+    rows.retain(|row| row.share > LISTED);
+    rows.sort_by(|a, b| a.behind.total_cmp(&b.behind));
+    let answer = Row {
+        behind: 0.0,
+        ..row(*first, &most, 1)
+    };
+    rows.insert(0, answer);
+    Some(rows)
+}
+
+/// Whether all points of one lattice are those of the other.
+fn are_nested(one: &Matrix2<f64>, other: &Matrix2<f64>) -> bool {
+    let holds = |large: &Matrix2<f64>, small: &Matrix2<f64>| {
+        large.try_inverse().is_some_and(|inverse| {
+            let names = inverse * small;
+            (names - names.map(f64::round)).amax() < NESTED
+        })
+    };
+    holds(one, other) || holds(other, one)
+}
