@@ -123,8 +123,7 @@ fn of_lattice(doubt: &LatticeDoubt) -> Option<f64> {
     match doubt {
         LatticeDoubt::FewPeriods { periods, .. } => Some(-periods),
         LatticeDoubt::PartlyCovered { share, .. } => Some(-share),
-        LatticeDoubt::LinesDisagree(LineDifference::BeyondErrors { share, .. })
-        | LatticeDoubt::ContrastChanges { share, .. } => Some(*share),
+        LatticeDoubt::LinesDisagree(LineDifference::BeyondErrors { share, .. }) => Some(*share),
         LatticeDoubt::Inhomogeneous {
             wavelength, angle, ..
         }

@@ -58,20 +58,6 @@ pub enum LatticeDoubt {
         /// Side of the window, nm.
         window: f64,
     },
-    /// The contrast of the lattice changes.
-    #[error(
-        "the contrast of the lattice changes across the frame. {} {}{}",
-        if *.fitted { "It was fitted with the waves, which moved the wave vectors by" }
-        else { "It could not be fitted with the waves:" },
-        tenths(*.share),
-        if *.fitted { "" } else { " by which it may have moved the wave vectors are in their errors" }
-    )]
-    ContrastChanges {
-        /// By how much that moves the wave vectors at most, as a share of them.
-        share: f64,
-        /// Whether it was fitted.
-        fitted: bool,
-    },
     /// The lattice changes, and the result is its mean.
     #[error(
         "the lattice changes across {part}: its wavelength by {:.2} % and its direction by {:.2}° (standard deviation \
@@ -195,15 +181,6 @@ fn listed(all: &[OtherGrain]) -> String {
     all.iter().map(of).collect::<Vec<_>>().join("; ")
 }
 
-/// A share in tenths of a per cent, so that images say the same.
-fn tenths(share: f64) -> String {
-    if share < 1e-3 {
-        "less than 0.1 %".to_owned()
-    } else {
-        format!("{:.1} %", 100.0 * share)
-    }
-}
-
 /// How sure it is that a lattice changes.
 fn how_sure(by_windows: f64) -> String {
     if by_windows > BETTER {
@@ -280,11 +257,6 @@ explain! { LatticeDoubt:
         "Steps, bumps or rough ground hide the lattice. It was found and measured in the image without them. Where ground \
          is as short as the lattice, some of it is left, alike in all frames."
         "Look at the figure of the scan. A channel that shows less topography, as the phase, serves better."
-    ContrastChanges "contrast-changes" Note
-        "The contrast of the lattice changes across the frame: it fades at a soft edge, the tip changes slowly, or a lattice that \
-         bends cancels itself where it is farthest from straight. Unless this is known, the waves move each other. It was fitted \
-         with them, and the errors of the vectors hold what that may have missed."
-        "Look at the figure of the scan. A part of the frame with even contrast does without."
     Changes "changing-lattice" Note
         "The lattice changes across the frame by more than chance. The results are means over the area that it covers. \
          Their errors include how far the means depend on where this area ends."

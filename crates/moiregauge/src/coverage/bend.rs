@@ -16,13 +16,12 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::coverage::cells::Cells;
-use crate::coverage::choose::{Chosen, choose, choose_change};
+use crate::coverage::choose::{Chosen, choose};
 use crate::coverage::higher;
 use crate::coverage::hollows::hollows;
 use crate::coverage::nodes::{Node, View, nodes};
 use crate::coverage::patch::{Patch, WHOLE};
 use crate::coverage::phases::{Fit, fit, powers, rows};
-use crate::coverage::windows::straightened;
 use crate::numbers::exact;
 use crate::numbers::three::three;
 
@@ -31,9 +30,6 @@ const WHOLE_WINDOW: f64 = 1.5;
 
 /// Fewer nodes than this tell nothing of a lattice. Chosen by eye.
 const FEWEST_INNER: usize = 6;
-
-/// Rounds in which what windows make of a description is taken off: each leaves a tenth or two of what the one before left.
-const STRAIGHTENED: usize = 3;
 
 /// Where the frame ends is known, but windows see only half of what is there: the share of what is told of an edge in the frame. By the
 /// coverage of a hundred simulated sets whose twist or strain swings once across the frame.
@@ -64,8 +60,6 @@ pub struct Change {
 pub enum ChangeModel {
     /// The wave vectors change evenly across the patch.
     Even,
-    /// The phases are cubic polynomials.
-    Cubic,
     /// Any smooth change, on so many cells along columns and rows.
     Smooth([usize; 2]),
 }
@@ -142,21 +136,8 @@ pub(crate) fn mean(view: &View, patch: &Patch) -> Option<Mean> {
     Some(summary(&chosen, &nodes, view, patch))
 }
 
-/// The same without what higher harmonics put into the windows, and without what windows make of waves that bend.
+/// The same without what higher harmonics put into the windows.
 pub(crate) fn refined(view: &View, patch: &Patch) -> Option<Mean> {
-    refined_by(choose, view, patch)
-}
-
-/// The same for a lattice that is known to change.
-pub(crate) fn refined_change(view: &View, patch: &Patch) -> Option<Mean> {
-    refined_by(choose_change, view, patch)
-}
-
-fn refined_by(
-    choose: impl Fn(&View, &Patch, &[Node]) -> Option<Chosen>,
-    view: &View,
-    patch: &Patch,
-) -> Option<Mean> {
     let rough = choose(view, patch, &nodes(view, patch))?;
     let parts = higher::parts(view.image, patch, &rough.fit)?;
     // Waves that the envelopes stand still against: where exactly a phase holds does not matter then.
@@ -171,16 +152,8 @@ fn refined_by(
         noise: [0, 1, 2].map(|i| view.noise[i].max(left[i])),
         ..*view
     };
-    let read = nodes(&view, patch);
-    let mut nodes = read.clone();
-    let mut chosen = choose(&view, patch, &nodes)?;
-    for _ in 0..STRAIGHTENED {
-        if chosen.model.is_none() {
-            break;
-        }
-        nodes = straightened(&view, patch, &read, &chosen.fit);
-        chosen = choose(&view, patch, &nodes)?;
-    }
+    let nodes = nodes(&view, patch);
+    let chosen = choose(&view, patch, &nodes)?;
     Some(summary(&chosen, &nodes, &view, patch))
 }
 

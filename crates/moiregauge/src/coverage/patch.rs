@@ -32,42 +32,6 @@ pub struct Patch {
 }
 
 impl Patch {
-    /// All of an image that carries waves (rad per pixel) and has pixels of `pitch` (columns, rows).
-    pub(crate) fn whole(image: &Image, pair: &Matrix2<f64>, pitch: [f64; 2]) -> Option<Self> {
-        let cells = Cells::new(image, pair, pitch)?;
-        let counts = cells.counts();
-        Some(Self {
-            pair: *pair,
-            size: cells.size,
-            pixels: cells.pixels,
-            inside: counts.iter().map(|count| *count > 0.0).collect(),
-            share: 1.0,
-            unit_cells: counts.iter().sum::<f64>() * unit_cells_per_pixel(pair),
-        })
-    }
-
-    /// What of it is left where of `image`, with `bins` pixels to a bin along each axis, only `rest` is: the cells that keep half of their
-    /// pixels.
-    pub(crate) fn left_by(&self, image: &Image, rest: &Image, bins: usize) -> Self {
-        let mut counts = vec![[0usize; 2]; self.inside.len()];
-        for (i, (all, left)) in image.values.iter().zip(&rest.values).enumerate() {
-            let place = [i % image.columns, i / image.columns].map(|n| n * bins + bins / 2);
-            let [before, after] = &mut counts[self.cell(place)];
-            *before += usize::from(all.is_finite());
-            *after += usize::from(left.is_finite());
-        }
-        let keeps =
-            |(inside, [before, after]): (&bool, &[usize; 2])| *inside && 2 * after >= *before;
-        let sum = |of: usize| counts.iter().map(|counts| counts[of] as f64).sum::<f64>();
-        let left = sum(1) / sum(0).max(1.0);
-        Self {
-            inside: self.inside.iter().zip(&counts).map(keeps).collect(),
-            share: self.share * left,
-            unit_cells: self.unit_cells * left,
-            ..self.clone()
-        }
-    }
-
     /// The cell of the pixel at (column, row).
     fn cell(&self, [column, row]: [usize; 2]) -> usize {
         let cell = |axis: usize, at: usize| (at / self.pixels[axis]).min(self.size[axis] - 1);

@@ -11,13 +11,12 @@ use nalgebra::{Matrix2, Vector2};
 use rayon::prelude::*;
 use rustfft::num_complex::Complex64;
 
-use crate::coverage::bend::{Mean, mean, refined, refined_change};
+use crate::coverage::bend::{Mean, mean, refined};
 use crate::coverage::cells::{Cells, Window};
 use crate::coverage::grains::{Grains, split};
 use crate::coverage::look::{Frame, Seen};
 use crate::coverage::nodes::View;
 use crate::coverage::patch::{Patch, WHOLE, unit_cells_per_pixel};
-use crate::coverage::sides::without_tails;
 use crate::frame::image::Image;
 use crate::numbers::three::three;
 
@@ -127,17 +126,16 @@ fn settle_bins(
         narrowest = width;
         let patch = patch(&cells, &seen.inside, &pair)?;
         let (step, turn) = slope(&cells, &seen, &patch.inside)?;
-        settled = Some((waves, seen, pair));
+        settled = Some((seen, pair));
         if turn < STILL {
             break;
         }
         pair += step;
     }
-    let (waves, mut seen, pair) = settled?;
+    let (seen, pair) = settled?;
     if !wanted(&(pair / bins as f64)) {
         return None;
     }
-    seen.inside = without_tails(&frame, &waves, windows.at(narrowest), &seen);
     let inner = patch(&cells, &seen.inside, &pair)?;
     if inner.share < WHOLE && !is_broad(&cells, &inner.inside, LINE * seen.width) {
         return None;
@@ -255,11 +253,6 @@ impl Settled {
     /// The same without what higher harmonics put into the windows.
     pub(crate) fn refined(&self) -> Option<Mean> {
         Some(refined(&self.view(), &self.inner)?.in_pixels(self.bins))
-    }
-
-    /// The same for a lattice that is known to change.
-    pub(crate) fn refined_change(&self) -> Option<Mean> {
-        Some(refined_change(&self.view(), &self.inner)?.in_pixels(self.bins))
     }
 }
 

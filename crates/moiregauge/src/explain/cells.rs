@@ -145,7 +145,7 @@ pub(crate) fn superlattice(
         (index - index.map(f64::round)).amax() < 1e-6
     };
     let straight = Phases::straight(coarse);
-    let normals = straight.normals(&scene, &indices, false);
+    let normals = straight.normals(&scene, &indices);
     let of = |kept: &dyn Fn(usize) -> bool| {
         let kept: Vec<usize> = (0..2 * indices.len()).filter(|i| kept(i / 2)).collect();
         gains(&normals, &kept)
@@ -193,7 +193,7 @@ pub(crate) fn superlattice(
         .iter()
         .map(|index| strongest_near(&scene, &rest, wave(*index)))
         .collect();
-    let normals = own.normals(&scene, &others, false);
+    let normals = own.normals(&scene, &others);
     let all: Vec<usize> = (0..2 * (others.len() + first.len())).collect();
     let beside = gains(&normals, &all)?;
     Some(if errors(&beside, &large) > BETTER {

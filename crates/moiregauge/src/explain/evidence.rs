@@ -55,7 +55,7 @@ fn of_image(image: &Image, pair: &Matrix2<f64>, bends: bool) -> Option<f64> {
     let normals = phases
         .as_ref()
         .unwrap_or(&straight)
-        .normals(&scene, indices, false);
+        .normals(&scene, indices);
     let gain = gains(&normals, &all)?;
     FIRST_SHELL
         .into_iter()
@@ -73,7 +73,7 @@ pub(crate) fn gain(image: &Image, pair: &Matrix2<f64>) -> Option<f64> {
     let indices = shells(3);
     let all: Vec<usize> = (0..2 * indices.len()).collect();
     let phases = Phases::straight(pair * scene.binning as f64);
-    let gain = gains(&phases.normals(&scene, indices, false), &all)?;
+    let gain = gains(&phases.normals(&scene, indices), &all)?;
     Some(gain.iter().sum::<f64>() / scene.values.iter().map(|v| v * v).sum::<f64>())
 }
 
@@ -92,19 +92,4 @@ pub(crate) fn proposed(image: &Image, pair: &Matrix2<f64>) -> Option<(Matrix2<f6
         return None;
     }
     Some((fitted, of_image(image, &fitted, false)?))
-}
-
-/// By how many standard errors a contrast that changes across the frame (each first-order wave times a quadratic polynomial) predicts better than one
-/// that does not.
-pub(crate) fn contrast(image: &Image, pair: &Matrix2<f64>) -> Option<f64> {
-    let scene = Scene::new(image, pair, pair)?;
-    let indices = shells(3);
-    let phases = Phases::straight(pair * scene.binning as f64).fitted(&scene, indices, 0)?;
-    let normals = phases.normals(&scene, indices, true);
-    let all: Vec<usize> = (0..normals[0].moment.len()).collect();
-    let (with, without) = (
-        gains(&normals, &all)?,
-        gains(&normals, &all[..2 * indices.len()])?,
-    );
-    Some(Blocks::difference(&scene, &with, &without).standard_errors())
 }

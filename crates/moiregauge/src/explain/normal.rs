@@ -5,7 +5,6 @@ use rustfft::num_complex::Complex64;
 
 use crate::explain::scene::{FOLDS, Scene};
 use crate::numbers::widest::widest;
-use crate::spectrum::shells::FIRST_SHELL;
 
 /// Damping of amplitudes, relative to each diagonal element of the normal equations: separates harmonics that a few blocks cannot.
 const RIDGE: f64 = 1e-3;
@@ -102,26 +101,14 @@ impl Phases {
         }
     }
 
-    /// Normal equations of the amplitudes of cosine and sine of each wave, block by block; with `contrast` those of the first-order waves times u, v,
-    /// u², uv and v² follow.
-    pub(crate) fn normals(
-        &self,
-        scene: &Scene,
-        indices: &[[i32; 2]],
-        contrast: bool,
-    ) -> Vec<Normal> {
-        let plain = 2 * (indices.len() + self.others.len());
-        let first = if contrast { 2 * FIRST_SHELL.len() } else { 0 };
-        let n = plain + 5 * first;
+    /// Normal equations of the amplitudes of cosine and sine of each wave, block by block.
+    pub(crate) fn normals(&self, scene: &Scene, indices: &[[i32; 2]]) -> Vec<Normal> {
+        let n = 2 * (indices.len() + self.others.len());
         let mut sums = Sums::new(Scene::blocks(), n);
         let mut row = vec![0.0; n];
-        self.for_each(scene, indices, |i, block, unit, waves| {
+        self.for_each(scene, indices, |i, block, _, waves| {
             for (pair, wave) in row.chunks_exact_mut(2).zip(waves) {
                 pair.copy_from_slice(&[wave.re, wave.im]);
-            }
-            let (u, v) = (unit.x, unit.y);
-            for (t, factor) in [u, v, u * u, u * v, v * v].into_iter().enumerate() {
-                (0..first).for_each(|j| row[plain + t * first + j] = factor * row[j]);
             }
             sums.add(block, &row, scene.values[i]);
         });
@@ -214,7 +201,7 @@ impl Phases {
 
     /// Values less the fitted waves; 0 where a bin is missing.
     pub(crate) fn residual(&self, scene: &Scene, indices: &[[i32; 2]]) -> Option<Vec<f64>> {
-        let weights = amplitudes(&total(&self.normals(scene, indices, false)), RIDGE)?;
+        let weights = amplitudes(&total(&self.normals(scene, indices)), RIDGE)?;
         let mut rest = scene.values.clone();
         self.for_each(scene, indices, |i, _, _, waves| {
             let fitted = waves

@@ -40,7 +40,7 @@ pub(crate) fn table(
     let power = scene.values.iter().map(|v| v * v).sum::<f64>();
     let indices = shells(3);
     let all: Vec<usize> = (0..2 * indices.len()).collect();
-    let normals = |phases: &Phases| phases.normals(&scene, indices, false);
+    let normals = |phases: &Phases| phases.normals(&scene, indices);
     let straight = |pair: &Matrix2<f64>| Phases::straight(pair * binning);
     let fitted = |pair: &Matrix2<f64>| {
         let terms = if bends { CUBIC } else { 0 };

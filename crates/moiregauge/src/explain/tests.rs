@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use nalgebra::{Matrix2, Vector2};
 
 use crate::explain::cells::{Supercell, Superlattice, better_cell, superlattice};
-use crate::explain::evidence::{contrast, gain, weakest};
+use crate::explain::evidence::{gain, weakest};
 use crate::explain::table::table;
 use crate::frame::image::Image;
 use crate::numbers::rng::normals;
@@ -101,17 +101,6 @@ fn waves_in_one_direction_refute_a_first_shell() {
         said == Some(Superlattice::Refuted)
     });
     assert!(refuted.count() >= 11);
-}
-
-/// Contrast that fades predicts blocks that were held out; an even one does not.
-#[test]
-fn fading_contrast_predicts() {
-    for seed in 0..4 {
-        let fading = image(seed, 0.3, |at| at.x / 80.0 * lattice(&pair(), at));
-        assert!(contrast(&fading, &pair()).unwrap() > 5.0);
-        let even = image(seed, 0.3, |at| lattice(&pair(), at));
-        assert!(contrast(&even, &pair()).unwrap() < 2.0);
-    }
 }
 
 /// A superlattice is found from its sublattice and kept; peaks 0.4 cycles per frame off its points leave the sublattice, and lead back to it.

@@ -22,12 +22,10 @@ pub struct Common {
 }
 
 impl Common {
-    /// That of a fit to the pixels of a lattice that changes, or whose contrast does: how far its mean may be from what cubic polynomials say.
+    /// That of a fit to the pixels of a lattice that changes: how far its mean may be from what cubic polynomials say.
     pub(crate) fn of_fit(fit: &LatticeFit, pixels: &Lattice<Px>) -> Option<Self> {
         let change = fit.change().map(|change| change.beside(fit.clipped));
-        let contrast = fit.contrast.map(|contrast| contrast.beside);
-        let basis =
-            fit.wave_vectors.basis + change.into_iter().chain(contrast).reduce(|a, b| a + b)?;
+        let basis = fit.wave_vectors.basis + change?;
         let other = Waves::<Px>::exact(basis).lattice()?;
         Some(Self {
             other: labelled_like(&other, &pixels.basis).basis,

@@ -9,20 +9,14 @@ use crate::frame::geometry::Geometry;
 use crate::frame::image::Image;
 use crate::lattice::fit::few::FewWaves;
 use crate::lattice::fit::fitted::LatticeFit;
-use crate::lattice::ground::{below, on_even_ground};
-use crate::lattice::measure::{
-    beside, hidden, is_torn, measure_levelled, no_lattice, of_first_shell,
-};
+use crate::lattice::ground::below;
+use crate::lattice::measure::{beside, hidden, measure_levelled, no_lattice, of_first_shell};
 use crate::lattice::measured::MeasuredLattice;
 use crate::lattice::predicted::{best_predicted, judged};
 use crate::lattice::start::Start;
 use crate::spectrum::error::LatticeError;
 use crate::spectrum::method::Method;
 use crate::spectrum::prepare::levelled;
-
-/// The image without ground is taken where that leaves less than this share of the variance of the wave vectors: what it makes of the edges of holes is no
-/// better than leaving it.
-const CLEARER: f64 = 0.7;
 
 /// Finds and measures the lattice of an image.
 ///
@@ -55,40 +49,15 @@ pub(crate) fn measure_own(
     if method != Method::Lattice {
         return measure_levelled(&image, geometry, background, method);
     }
-    let found = match measure_beside(&image, geometry, background) {
-        Ok(found) => Ok(clearer(found, &image, geometry, background)),
-        Err(error) => {
-            let find = |even: &Arc<Image>, geometry: &Geometry| {
-                measure_levelled(even, geometry, background, method).ok()
-            };
-            below(&image, geometry, background, &find)
-                .filter(|found| !is_torn(found))
-                .or_else(|| best_predicted(&image, geometry, background))
-                .ok_or(error)
-        }
-    };
+    let found = measure_beside(&image, geometry, background).or_else(|error| {
+        let find = |even: &Arc<Image>, geometry: &Geometry| {
+            measure_levelled(even, geometry, background, method).ok()
+        };
+        below(&image, geometry, background, &find)
+            .or_else(|| best_predicted(&image, geometry, background))
+            .ok_or(error)
+    });
     found.and_then(|found| judged(found, &image, geometry, background))
-}
-
-/// The same lattice in the image without ground, where something stands out beside it and the image without ground says much more of it.
-fn clearer(
-    found: MeasuredLattice,
-    image: &Image,
-    geometry: &Geometry,
-    background: Background,
-) -> MeasuredLattice {
-    let variance = |found: &MeasuredLattice| {
-        let fit = found.fit.as_ref();
-        fit.map_or(f64::INFINITY, |fit| fit.wave_vectors.covariance.trace())
-    };
-    let Some(fit) = &found.fit else { return found };
-    if beside(&found).is_none() || !found.beside.is_empty() {
-        return found;
-    }
-    let most = CLEARER * variance(&found);
-    on_even_ground(image, fit, geometry, background)
-        .filter(|even| !is_torn(even) && variance(even) < most)
-        .unwrap_or(found)
 }
 
 /// The lattice of an image without its background, and of perfect waves beside it.

@@ -66,7 +66,7 @@ pub(crate) fn below(
 }
 
 /// A lattice that was fitted before, measured anew in an image without the ground below it.
-pub(crate) fn on_even_ground(
+fn on_even_ground(
     image: &Image,
     before: &LatticeFit,
     geometry: &Geometry,

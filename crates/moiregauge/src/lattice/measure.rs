@@ -5,7 +5,6 @@ use std::sync::Arc;
 use heterostrain::lattice::shortest_pair;
 use nalgebra::Matrix2;
 
-use crate::coverage::find::same;
 use crate::coverage::patch::Patch;
 use crate::frame::background::Background;
 use crate::frame::geometry::Geometry;
@@ -22,45 +21,10 @@ use crate::spectrum::method::Method;
 use crate::spectrum::prepare::levelled;
 use crate::spectrum::shells::FIRST_SHELL;
 
-/// A lattice whose waves change by more than this share of themselves from corner to corner is none: gradients and waves of twist and strain make up
-/// to a tenth, creep in a frame of four periods of atoms a half, and holes that pass for a coarse lattice 0.7 to 1.4.
-const TORN: f64 = 0.6;
-/// A lattice of fewer periods across the frame that changes at all is none: three bumps make one. Chosen by eye.
-const FEWEST_PERIODS: f64 = 2.0;
-/// A lattice of fewer periods across the frame is none, changes or not: the edges of a few bodies make one. What repeats shows twice. Chosen by eye
-/// between the 0.8 to 1.0 of simulated discs with sharp edges and the three of the smallest recorded images.
-const REPEATS: f64 = 1.5;
 /// Harmonics with so many times the amplitude of the first shell make a lattice whose first shell has to be shown. Chosen by eye.
 const OUTSHINES: f64 = 2.0;
 /// So many harmonics that stand out say it instead. Chosen by eye.
 const FEWEST_BESIDE: usize = 3;
-
-/// The lattice of some part of the frame, of those that are `meant`.
-fn in_parts(
-    image: &Image,
-    geometry: &Geometry,
-    background: Background,
-    meant: &dyn Fn(&Matrix2<f64>) -> bool,
-) -> Option<MeasuredLattice> {
-    let found = Start::find_meant(image, geometry, background, None, meant)?;
-    found.measure(Method::Lattice).ok()
-}
-
-/// Whether a lattice does not repeat itself, or the fit says that it changes so much that it is none.
-pub(crate) fn is_torn(found: &MeasuredLattice) -> bool {
-    let change = found.fit.as_ref().and_then(|fit| fit.inhomogeneity);
-    let changes = change.is_some_and(|change| {
-        let much = change.wavelength.hypot(change.angle) > TORN || found.periods < FEWEST_PERIODS;
-        change.stands_out() && much
-    });
-    found.periods < REPEATS || changes
-}
-
-/// Whether these are grains, each fitted to its pixels.
-fn are_grains(found: &MeasuredLattice) -> bool {
-    let is_fitted = |grain: &MeasuredLattice| grain.fit.is_some();
-    is_fitted(found) && !found.beside.is_empty() && found.beside.iter().all(is_fitted)
-}
 
 /// The lattice of an image whose background is off already.
 ///
@@ -72,22 +36,7 @@ pub(crate) fn measure_levelled(
     background: Background,
     method: Method,
 ) -> Result<MeasuredLattice, LatticeError> {
-    let found = match find_anywhere(image, geometry, background, method)?.measure(method) {
-        Ok(found) if !is_torn(&found) => found,
-        // Holes and what is around them may look like a lattice of few periods.
-        Ok(torn) => {
-            let size = [image.columns, image.rows];
-            let another = |pair: &Matrix2<f64>| !same(size, pair, &torn.reciprocal);
-            in_parts(image, geometry, background, &another)
-                .filter(|found| found.fit.is_some() && !is_torn(found))
-                .ok_or(LatticeError::NowhereTogether)?
-        }
-        // Waves of two grains may look like one lattice, which no part of the frame has.
-        Err(error) if method == Method::Lattice => in_parts(image, geometry, background, &|_| true)
-            .filter(are_grains)
-            .ok_or(error)?,
-        Err(error) => return Err(error),
-    };
+    let found = find_anywhere(image, geometry, background, method)?.measure(method)?;
     if let Some(error) = no_lattice(&found) {
         return Err(error);
     }

@@ -27,6 +27,9 @@ const BEYOND_DOUBT: f64 = 5.0;
 /// With less a lattice is none. Right answers had 2.3 and more (60 sets of one to four troubles; that one covers half the frame and fades), lone steps 0 at
 /// most.
 const LEAST: f64 = 1.5;
+/// A lattice of fewer periods across the frame is none: what repeats shows more than once. Of simulated discs with sharp edges 0.8 to 1.0 fit across the
+/// frame, of the smallest recorded images three.
+const FEWEST_PERIODS: f64 = 1.5;
 /// As in `scan::shells`: below this probability of chance an image may hide a first order.
 const SUSPECTED: f64 = 0.2;
 
@@ -146,7 +149,8 @@ pub(crate) fn with_evidence(
 /// A lattice that its evidence does not refute, with those grains beside it of which this is true.
 ///
 /// # Errors
-/// [`LatticeError::OneOfMany`]: other waves of the image could be one as well. [`LatticeError::NotPredicted`]: next to nothing. [`LatticeError::Distorted`]: its cell is none that a proposal may have.
+/// [`LatticeError::OneOfMany`]: other waves of the image could be one as well. [`LatticeError::NotPredicted`]: next to nothing.
+/// [`LatticeError::Distorted`]: its cell is none that a proposal may have. [`LatticeError::TooFewPeriods`]: it does not repeat.
 fn accepted(
     mut found: MeasuredLattice,
     geometry: &Geometry,
@@ -158,6 +162,10 @@ fn accepted(
     let to_physical = geometry.pixel_to_nm.try_inverse().map(|m| m.transpose());
     if to_physical.is_some_and(|m| distortion(&(m * found.reciprocal)) > MOST_DISTORTION) {
         return Err(LatticeError::Distorted);
+    }
+    if found.periods < FEWEST_PERIODS {
+        let periods = found.periods;
+        return Err(LatticeError::TooFewPeriods { periods });
     }
     // A cell of many atoms is made by its harmonics.
     if is_made_by_many(&found) {

@@ -323,7 +323,7 @@ pub(crate) fn evidence(harmonics: &Harmonics) -> f64 {
     powers.filter(|power| *power > THIRD).sum()
 }
 
-/// The lattice fitted to the pixels, in pixels; what is left of the image in bins.
+/// The lattice fitted to the pixels, in pixels.
 pub(crate) fn fitted(prepared: &Prepared, background: Background) -> Option<fit::Found> {
     let binning = prepared.binning;
     let found = fit::measure(&prepared.binned(), &prepared.harmonics, background)?;
@@ -331,6 +331,5 @@ pub(crate) fn fitted(prepared: &Prepared, background: Background) -> Option<fit:
     Some(fit::Found {
         lattice: found.lattice.mapped(&to_pixels),
         fit: found.fit.in_pixels(binning),
-        rest: found.rest,
     })
 }

@@ -124,12 +124,6 @@ pub(crate) fn about_coverage(
         let window = side * (geometry.fast_step().norm() * geometry.slow_step().norm()).sqrt();
         caveats.push(Caveat::new(LatticeDoubt::GroundTakenOff { window }, file));
     }
-    let fit = lattice.fit.as_ref();
-    if let Some((fit, contrast)) = fit.and_then(|fit| Some((fit, fit.contrast?))) {
-        let (fitted, share) = contrast.told(&fit.wave_vectors.basis);
-        let doubt = LatticeDoubt::ContrastChanges { share, fitted };
-        caveats.push(Caveat::new(doubt, file));
-    }
     let harmful = |change: &Change| change.wavelength.max(change.angle) > HARMLESS;
     if let Some(change) = lattice.change.filter(harmful) {
         let doubt = LatticeDoubt::Changes {

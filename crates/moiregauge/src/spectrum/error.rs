@@ -64,6 +64,14 @@ pub enum LatticeError {
         /// By how many standard errors the weakest of its waves improves the prediction.
         standard_errors: f64,
     },
+    /// What repeats shows more than once.
+    #[error(
+        "only {periods:.1} periods of the lattice that was found fit across the frame: what does not repeat is no lattice. Scan a larger frame"
+    )]
+    TooFewPeriods {
+        /// How many they are.
+        periods: f64,
+    },
     /// No known crystal has such a cell.
     #[error(
         "the strongest waves of the image make a cell far from any hexagon. They come from stripes, from a double tip or from \

@@ -11,12 +11,13 @@ use std::f64::consts::{PI, TAU};
 use nalgebra::{Matrix2, Vector2};
 
 use crate::frame::image::Image;
-use crate::lattice::fit::beside::{SLOWEST, clear, spectrum};
 use crate::lattice::fit::frame::Frame;
 use crate::lattice::fit::joint::Joint;
 use crate::lattice::fit::noise::{BESIDE, ForeignWave, ResidualNoise};
 use crate::numbers::three::three;
 
+/// A wave has more than so many cycles in the frame: slower ones are background.
+const SLOWEST: f64 = 2.0;
 /// Waves at most: a lattice with a few harmonics, and stripes with overtones.
 const MOST: usize = 9;
 /// A wave with less than this share of the power of the strongest may be left. Chosen by eye.
@@ -300,6 +301,27 @@ fn highest(frame: &Frame, seen: &ResidualNoise) -> Option<(Vector2<f64>, f64)> {
         }
     });
     best
+}
+
+/// The transform of what is left of the pixels, 0 where they do not count.
+fn spectrum(frame: &Frame, left: &[f64]) -> ResidualNoise {
+    let columns = frame.image.columns;
+    let line = |(): &mut (), row: usize, out: &mut [f64]| {
+        out.copy_from_slice(&left[row * columns..][..columns]);
+    };
+    ResidualNoise::new(frame, false, || (), line).0
+}
+
+/// Puts 0 where pixels do not count.
+fn clear(frame: &Frame, values: &mut [f64]) {
+    let columns = frame.image.columns;
+    let lines = values.chunks_exact_mut(columns).zip(&frame.present);
+    for (line, _) in lines.filter(|(_, present)| **present == 0) {
+        line.fill(0.0);
+    }
+    for &[row, column] in &frame.missing {
+        values[row * columns + column] = 0.0;
+    }
 }
 
 #[cfg(test)]

@@ -18,7 +18,7 @@ use crate::lattice::fit::gram::gram;
 use crate::lattice::fit::hidden::Hidden;
 use crate::lattice::fit::leverage::Leverage;
 use crate::lattice::fit::lines::LineStatistics;
-use crate::lattice::fit::model::{Clip, LineOffsets, Model, look, residuals, settled};
+use crate::lattice::fit::model::{Clip, LineOffsets, Model, look, settled};
 use crate::lattice::fit::noise::{ForeignWave, ResidualNoise};
 use crate::lattice::fit::places::{InPlaces, Places};
 use crate::lattice::fit::tables::Tables;
@@ -303,20 +303,6 @@ impl<'a> Fit<'a> {
         )
     }
 
-    /// What is left of all pixels, 0 where they do not count; offsets of lines are in it.
-    pub(crate) fn left(&self) -> Vec<f64> {
-        let (frame, model) = (&self.frame, &self.model);
-        let tables = Tables::new(frame, &model.pair, &model.basis.indices);
-        let mut left = vec![0.0; frame.image.values.len()];
-        residuals(frame, model, &tables, |row, line| {
-            let there = left[row * line.len()..].iter_mut().zip(line.iter());
-            for (left, value) in there.filter(|(_, value)| value.is_finite()) {
-                *left = *value;
-            }
-        });
-        left
-    }
-
     /// Covariance of the phases of the first three harmonics and of (p₁, p₂): what the local noise does to
     /// the seven derivatives when background and amplitudes are free.
     pub(crate) fn covariance(&self, noise: &FinalNoise) -> Option<SMatrix<f64, 7, 7>> {
@@ -358,12 +344,6 @@ impl<'a> Fit<'a> {
         let gram = self.bent_gram(noise);
         let found = bend::inhomogeneity(&self.frame, &self.model, gram, bends, &acting);
         found.map(|(inhomogeneity, _)| inhomogeneity)
-    }
-
-    /// Whether the lattice changes, by more than chance.
-    pub(crate) fn bends(&self, noise: &FinalNoise) -> bool {
-        let found = self.inhomogeneity(noise);
-        found.is_some_and(|change| change.stands_out())
     }
 
     fn harmonics(&self, noise: &FinalNoise) -> Vec<FittedHarmonic> {
@@ -444,7 +424,6 @@ impl<'a> Fit<'a> {
             hidden: self.hidden(noise),
             residual: noise.places.left.clone(),
             inhomogeneity,
-            contrast: None,
             closure,
         };
         Some((wave_vectors.lattice()?, fit))

@@ -1,12 +1,11 @@
 //! What a fit to the pixels says.
 
-use heterostrain::lattice::{Lattice, Px, Waves};
+use heterostrain::lattice::{Px, Waves};
 use nalgebra::{Matrix2, Matrix3, Vector2};
 use serde::{Deserialize, Serialize};
 
-use crate::lattice::fit::bend::{FOLLOWED, Inhomogeneity};
+use crate::lattice::fit::bend::Inhomogeneity;
 use crate::lattice::fit::closure::Closure;
-use crate::lattice::fit::contrast::Contrast;
 use crate::lattice::fit::frame;
 use crate::lattice::fit::hidden::Hidden;
 use crate::lattice::fit::left::LeftOver;
@@ -56,9 +55,6 @@ pub struct LatticeFit {
     pub(crate) residual: [LeftOver; 3],
     /// How the lattice changes across the frame; `None` where the frame is too small to tell.
     pub inhomogeneity: Option<Inhomogeneity>,
-    /// How the contrast of its waves changes across the frame, where that is more than chance.
-    #[serde(default)]
-    pub(crate) contrast: Option<Contrast>,
     /// Whether the harmonics agree on one lattice; `None` where too few of them are strong. The
     /// covariance of `wave_vectors` is enlarged already where they do not.
     pub closure: Option<Closure>,
@@ -83,13 +79,6 @@ pub struct FittedHarmonic {
 }
 
 impl LatticeFit {
-    /// What such a contrast adds to the covariance, noise and what it may have missed; the fit is one to an image that was made even by it. Returns the lattice.
-    pub(crate) fn add(&mut self, contrast: Contrast) -> Option<Lattice<Px>> {
-        self.wave_vectors.covariance += contrast.covariance();
-        self.contrast = Some(contrast);
-        self.wave_vectors.lattice()
-    }
-
     /// Whether its harmonics do not agree on one lattice.
     pub(crate) fn disagrees(&self) -> bool {
         let closure = self.closure.as_ref();
@@ -113,11 +102,6 @@ impl LatticeFit {
     /// How the lattice changes, where that is more than chance.
     pub(crate) fn change(&self) -> Option<&Inhomogeneity> {
         self.inhomogeneity.as_ref().filter(|c| c.stands_out())
-    }
-
-    /// Whether the lattice may bend more than the fit can follow.
-    pub(crate) fn may_bend_more(&self) -> bool {
-        self.change().is_some() && self.clipped >= FOLLOWED
     }
 
     /// Of the first shell.
@@ -144,7 +128,6 @@ impl LatticeFit {
             change.mean /= size;
             change.noise /= size * size;
         }
-        self.contrast = self.contrast.map(|contrast| contrast.in_pixels(size));
         self
     }
 }

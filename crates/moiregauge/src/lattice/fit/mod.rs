@@ -14,8 +14,6 @@
 //! strong offsets. A harmonic along the fast axis, which free offsets would swallow, keeps the weight
 //! 1 − λ that it deserves.
 //!
-//! Strong waves beside the lattice that are the same everywhere are taken off, and the fit is made again.
-//!
 //! Covariance: `(JᵀWJ)⁻¹ Jᵀ W C W J (JᵀWJ)⁻¹` with C diagonal in frequency, read from the residual
 //! around each harmonic along either axis.
 //!
@@ -24,11 +22,9 @@
 //! Huber, Robust Statistics (1981), modified residuals; Schwarz, Ann. Stat. 6, 461 (1978), BIC.
 
 pub(crate) mod bend;
-pub(crate) mod beside;
 mod cells;
 pub(crate) mod choose;
 pub(crate) mod closure;
-pub(crate) mod contrast;
 pub(crate) mod few;
 pub(crate) mod first;
 pub(crate) mod fit_pixels;
@@ -43,7 +39,6 @@ pub(crate) mod leverage;
 pub(crate) mod lines;
 pub(crate) mod local;
 pub(crate) mod measure;
-pub(crate) mod misfits;
 pub(crate) mod model;
 pub(crate) mod noise;
 pub(crate) mod places;

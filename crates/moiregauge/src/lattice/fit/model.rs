@@ -48,23 +48,6 @@ pub(crate) struct LineOffsets {
     pub(crate) offset: Vec<f64>,
 }
 
-/// Calls `each` with every line that counts and its residual; missing pixels are NaN.
-pub(crate) fn residuals(
-    frame: &Frame,
-    model: &Model,
-    tables: &Tables,
-    mut each: impl FnMut(usize, &mut [f64]),
-) {
-    let mut line = vec![0.0; frame.image.columns];
-    for row in 0..frame.image.rows {
-        interrupt::check();
-        if frame.present[row] > 0 {
-            residual(frame, model, tables, row, &mut line);
-            each(row, &mut line);
-        }
-    }
-}
-
 /// The residual of one line.
 pub(crate) fn residual(
     frame: &Frame,

@@ -191,14 +191,6 @@ impl ResidualNoise {
         median(&mut powers) / (std::f64::consts::LN_2 * self.window_power)
     }
 
-    /// Power of the bins within two of a frequency (cycles per frame): all of a wave that is there, under the window.
-    pub(crate) fn power_near(&self, k: Vector2<f64>) -> f64 {
-        let centre = k.map(|c| c.round() as i64);
-        let bins = (-2..=2).flat_map(|y| (-2..=2).map(move |x| [x, y]));
-        bins.map(|[x, y]| self.power(centre.x + x, centre.y + y))
-            .sum()
-    }
-
     /// Noise power around a frequency (cycles per frame), in the units of a power over noise.
     pub(crate) fn noise_near(&self, k: Vector2<f64>) -> f64 {
         // Waves of opposite sign are one.

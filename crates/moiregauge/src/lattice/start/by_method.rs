@@ -4,9 +4,6 @@ use heterostrain::lattice::{Lattice, Px, Waves, labelled_like};
 use nalgebra::{Matrix2, Vector2};
 
 use crate::coverage::bend::Mean;
-use crate::coverage::find::pitch;
-use crate::coverage::patch::{Patch, WHOLE};
-use crate::frame::image::Image;
 use crate::lattice::common::Common;
 use crate::lattice::fit::fitted::LatticeFit;
 use crate::lattice::fit::measure as fit;
@@ -27,8 +24,6 @@ struct Seen {
     /// The same by another method.
     comparison: Option<Lattice<Px>>,
     fit: Option<LatticeFit>,
-    /// The image without the places that do not show the lattice, where there are some.
-    rest: Option<Image>,
     published: Option<PublishedPeaks>,
 }
 
@@ -70,7 +65,7 @@ impl Start {
             let found = autocorrelation::measure(&image, self.background, harmonics, start);
             found.map(in_pixels)
         };
-        let (mut fit, mut rest, mut published) = (None, None, None);
+        let (mut fit, mut published) = (None, None);
         let (pixels, comparison) = match method {
             Method::Autocorrelation => (autocorrelation(), fourier()),
             Method::Fourier => (fourier(), autocorrelation()),
@@ -79,15 +74,9 @@ impl Start {
                 if let Some(mean) = mean
                     && !found.as_ref().is_some_and(|found| is_better(found, mean))
                 {
-                    let fit = found.as_ref().map(|found| &found.fit);
-                    let changing = fit.and_then(|fit| self.changing(fit));
-                    return of_mean(changing.as_ref().unwrap_or(mean));
+                    return of_mean(mean);
                 }
-                rest = found.as_ref().and_then(|found| found.rest.clone());
                 fit = found.map(|found| (found.lattice, found.fit));
-                if let Some(bent) = fit.as_ref().and_then(|(_, fit)| self.bent(fit)) {
-                    return Ok(bent);
-                }
                 (fit.as_ref().map(|(lattice, _)| *lattice), fourier())
             }
             Method::Paper => {
@@ -103,7 +92,6 @@ impl Start {
             pixels,
             comparison,
             fit: fit.map(|(_, fit)| fit),
-            rest,
             published,
         };
         Ok(self.told(seen, harmonics, peaks))
@@ -120,7 +108,6 @@ impl Start {
             pixels,
             comparison,
             fit,
-            rest,
             published,
         } = seen;
         let size = self.prepared.size();
@@ -128,10 +115,7 @@ impl Start {
         let label = |l: Lattice<Px>| labelled_like(&l, &pixels.basis);
         let bin_to_nm = self.geometry.pixel_to_nm * pixels_per_bin;
         MeasuredLattice {
-            patch: match &rest {
-                Some(rest) => self.part(rest, &pixels),
-                None => self.patch.clone(),
-            },
+            patch: self.patch.clone(),
             grains: self.others.clone(),
             beside: Vec::new(),
             ground: None,
@@ -159,32 +143,6 @@ impl Start {
             published,
             fit,
         }
-    }
-
-    /// The part of the frame that shows the lattice, where of its bins only `rest` does; `None` for all of it but for a little.
-    fn part(&self, rest: &Image, lattice: &Lattice<Px>) -> Option<Patch> {
-        let Prepared { image, binning, .. } = &self.prepared;
-        let whole = || Patch::whole(image, &lattice.waves()?.basis, pitch(&self.geometry));
-        let patch = self.patch.clone().or_else(whole)?;
-        let part = patch.left_by(&self.prepared.binned(), rest, *binning);
-        (self.patch.is_some() || part.share < WHOLE).then_some(part)
-    }
-
-    /// The mean of a lattice that bends more than the fit to the pixels can describe.
-    fn bent(&self, fit: &LatticeFit) -> Option<MeasuredLattice> {
-        if self.patch.is_some() || !fit.may_bend_more() {
-            return None;
-        }
-        let mean = self.settled()?.refined()?;
-        let bends = mean.change.is_some() && !mean.is_poor();
-        bends.then(|| self.mean_lattice(&mean)).flatten()
-    }
-
-    /// The mean in a part of the frame where the fit to the pixels says that the lattice changes, and what windows show does not pay for it.
-    fn changing(&self, fit: &LatticeFit) -> Option<Mean> {
-        fit.change()?;
-        let mean = self.settled()?.refined_change()?;
-        (!mean.is_poor()).then_some(mean)
     }
 
     /// The mean of a lattice that changes.
