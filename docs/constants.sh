@@ -53,12 +53,6 @@ fit/bend BEYOND few,moirés,gradient,grains half double
 fit/bend THIRD_ORDER few,moirés,gradient,grains half double
 fit/straight STEPS few,moirés,gradient,grains half double
 fit/measure ROUNDS bump half double
-lattice/find CLEARER bump half double
-fit/misfits MISSING hole half double
-fit/misfits DEVIATIONS hole half double
-fit/misfits FULL_ENOUGH hole half double
-fit/misfits MOST hole half double
-fit/misfits BINS hole half double
 fit/few MOST +stripes half double
 fit/few NEGLIGIBLE +stripes half double
 fit/few BINS_PER_PERIOD +stripes half double
@@ -83,7 +77,6 @@ scan/shells SUSPECTED second half double
 scan/shells CONFIRMED second half double
 fit/hidden SECOND_SHELL second half double
 lattice/measure OUTSHINES second,step half double
-lattice/measure REPEATS few half double
 lattice/measure FEWEST_BESIDE second,step half double
 lattice/ground PERIODS step,bump half double
 lattice/ground ROUNDS step,bump half double
@@ -94,11 +87,6 @@ set/drift KNOWN_TO grains half double
 campaign/shells OUTVOTED second half double
 campaign/grains CONTRADICTED grains half double
 campaign/grains BETTER_KNOWN grains half double
-lattice/measure TORN hole,+stripes half double
-fit/beside STRONG moirés,+stripes half double
-fit/beside LEFT moirés,+stripes half double
-fit/beside NEAR moirés,+stripes half double
-fit/beside OPPOSITE moirés,+stripes half double
 fit/closure APART second,step,stripes half double
 fit/closure STRONG few,noisy,contrast half double
 fit/closure NOISE_KNOWN_TO few,noisy,contrast root double
