@@ -138,9 +138,15 @@ pub(crate) fn with_evidence(
     };
     let better = rows.iter().find(is_better).map(|row| row.pair);
     let candidates = rows.iter().map(|row| Candidate::new(row, &to_physical));
+    // A cell of many atoms is made by its harmonics.
+    let rivals = if is_made_by_many(&found) {
+        0
+    } else {
+        Rivals::new(&spectrum).of(&(found.reciprocal * binning), &to_physical)
+    };
     found.evidence = Some(Evidence {
         predicts: weakest(part, &found.reciprocal, bends),
-        rivals: Rivals::new(&spectrum).of(&(found.reciprocal * binning), &to_physical),
+        rivals,
         candidates: candidates.collect(),
     });
     (found, better)
@@ -167,10 +173,6 @@ fn accepted(
         let periods = found.periods;
         return Err(LatticeError::TooFewPeriods { periods });
     }
-    // A cell of many atoms is made by its harmonics.
-    if is_made_by_many(&found) {
-        return Ok(found);
-    }
     let evidence = found.evidence.as_ref();
     let rivals = evidence.map_or(0, |evidence| evidence.rivals);
     if rivals >= ENOUGH {
@@ -178,7 +180,8 @@ fn accepted(
     }
     // Phases of a lattice that changes are no cubic polynomials.
     let predicts = evidence.and_then(|evidence| evidence.predicts);
-    match predicts.filter(|least| *least < LEAST && found.change.is_none()) {
+    let is_plain = found.change.is_none() && !is_made_by_many(&found);
+    match predicts.filter(|least| *least < LEAST && is_plain) {
         Some(standard_errors) => Err(LatticeError::NotPredicted { standard_errors }),
         None => Ok(found),
     }
