@@ -718,7 +718,7 @@ class LineResult(Document):
     """Whether position sensors placed the pixels."""
     lattice_model: str
     """What describes the lattice there: `constant`, or a mean of one that changes: `even` (wave vectors
-    change in proportion to the place) or `smooth`.
+    change in proportion to the place), `cubic` (phases are cubic polynomials) or `smooth`.
     """
     line: str
     """`trace` or `retrace`."""

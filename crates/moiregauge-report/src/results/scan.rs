@@ -116,7 +116,7 @@ pub struct LineResult {
     /// Share of the frame that carries the lattice and was measured.
     pub share_covered: Option<f64>,
     /// What describes the lattice there: `constant`, or a mean of one that changes: `even` (wave vectors change in
-    /// proportion to the place) or `smooth`.
+    /// proportion to the place), `cubic` (phases are cubic polynomials) or `smooth`.
     pub lattice_model: String,
     /// Linear part of the map (column, row) → (x, y), nm per pixel, row by row.
     pub pixel_to_nm: [[Option<f64>; 2]; 2],
@@ -209,6 +209,7 @@ fn line_result(line: &LineAnalysis, bilayer: Bilayer<'_>) -> LineResult {
         lattice_model: match line.change.map(|change| change.model) {
             None => "constant",
             Some(ChangeModel::Even) => "even",
+            Some(ChangeModel::Cubic) => "cubic",
             Some(_) => "smooth",
         }
         .to_owned(),

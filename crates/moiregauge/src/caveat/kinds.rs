@@ -134,7 +134,9 @@ fn of_lattice(doubt: &LatticeDoubt) -> Option<f64> {
         LatticeDoubt::SeveralGrains { others } => Some(others.iter().map(|g| g.share).sum()),
         LatticeDoubt::HarmonicsDisagree { times, .. } => Some(*times),
         LatticeDoubt::Rivals { rivals } => Some(*rivals as f64),
-        LatticeDoubt::PartOfCell { share, .. } => Some(*share),
+        LatticeDoubt::PartOfCell { share, .. } | LatticeDoubt::OtherLattice { share, .. } => {
+            Some(*share)
+        }
         LatticeDoubt::SecondLattice { significance, .. } => Some(*significance),
         _ => None,
     }

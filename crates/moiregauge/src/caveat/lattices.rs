@@ -109,6 +109,22 @@ pub enum LatticeDoubt {
         /// How many they are.
         rivals: usize,
     },
+    /// Another lattice predicts the image about as well.
+    #[error(
+        "another lattice ({:.2}, {:.2}, {:.2} nm) predicts {:.0} % of the image where this one predicts {:.0} %, {behind:.1} standard errors less: the image does not \
+         decide between them",
+        .wavelengths[0], .wavelengths[1], .wavelengths[2], 100.0 * .share, 100.0 * .own
+    )]
+    OtherLattice {
+        /// Its wavelengths, nm.
+        wavelengths: [f64; 3],
+        /// Share of the variance that it predicts.
+        share: f64,
+        /// Share that the lattice that was measured predicts.
+        own: f64,
+        /// By how many standard errors it is behind.
+        behind: f64,
+    },
     /// The lattice may be that of a part of the cell.
     #[error(
         "the harmonics do not agree on one lattice, and those of a cell of one {} of the area ({:.2}, {:.2}, {:.2} nm) alone predict {:.0} % of the image \
@@ -270,6 +286,10 @@ explain! { LatticeDoubt:
         "The harmonics of the image do not agree on one lattice. This happens where the lattice is not the same \
          everywhere. The errors of the vectors were enlarged to match."
         "Map the lattice, or analyse a smaller part of the frame."
+    OtherLattice "other-lattice" Serious
+        "Another lattice predicts the image about as well, within four standard errors. The image does not decide which one it shows: a second moiré, holes or rough \
+         ground may have made either."
+        "Look at the Fourier transform of the image. Give the approximate wavelength of the right lattice, or measure two moirés."
     PartOfCell "part-of-cell" Serious
         "Most of the image is predicted by a lattice of a third or a fourth of the cell, and the other harmonics do not agree with it: they may be a second \
          moiré that comes near the points of a superlattice. Then the twist is too small by √3 or 2."

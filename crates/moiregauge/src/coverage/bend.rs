@@ -16,7 +16,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::coverage::cells::Cells;
-use crate::coverage::choose::{Chosen, choose};
+use crate::coverage::choose::{Chosen, choose, choose_change};
 use crate::coverage::higher;
 use crate::coverage::hollows::hollows;
 use crate::coverage::nodes::{Node, View, nodes};
@@ -60,6 +60,8 @@ pub struct Change {
 pub enum ChangeModel {
     /// The wave vectors change evenly across the patch.
     Even,
+    /// The phases are cubic polynomials.
+    Cubic,
     /// Any smooth change, on so many cells along columns and rows.
     Smooth([usize; 2]),
 }
@@ -138,6 +140,19 @@ pub(crate) fn mean(view: &View, patch: &Patch) -> Option<Mean> {
 
 /// The same without what higher harmonics put into the windows.
 pub(crate) fn refined(view: &View, patch: &Patch) -> Option<Mean> {
+    refined_by(choose, view, patch)
+}
+
+/// The same for a lattice that is known to change.
+pub(crate) fn refined_change(view: &View, patch: &Patch) -> Option<Mean> {
+    refined_by(choose_change, view, patch)
+}
+
+fn refined_by(
+    choose: impl Fn(&View, &Patch, &[Node]) -> Option<Chosen>,
+    view: &View,
+    patch: &Patch,
+) -> Option<Mean> {
     let rough = choose(view, patch, &nodes(view, patch))?;
     let parts = higher::parts(view.image, patch, &rough.fit)?;
     // Waves that the envelopes stand still against: where exactly a phase holds does not matter then.

@@ -49,6 +49,16 @@ pub(crate) fn choose(view: &View, patch: &Patch, nodes: &[Node]) -> Option<Chose
     chosen(fits, best, &straight)
 }
 
+/// The best description of a lattice that is known to change; of a few periods cubic polynomials say it in fewer numbers than splines.
+pub(crate) fn choose_change(view: &View, patch: &Patch, nodes: &[Node]) -> Option<Chosen> {
+    let straight = fit(powers(patch, 1), nodes)?;
+    let even = (ChangeModel::Even, powers(patch, 2));
+    let cubic = (ChangeModel::Cubic, powers(patch, 3));
+    let fits = changes(view, patch, nodes, vec![even, cubic]);
+    let best = cheapest(&fits)?;
+    chosen(fits, best, &straight)
+}
+
 fn cheapest(fits: &[(ChangeModel, Fit)]) -> Option<usize> {
     let by_price = |a: &usize, b: &usize| fits[*a].1.price.total_cmp(&fits[*b].1.price);
     (0..fits.len()).min_by(by_price)

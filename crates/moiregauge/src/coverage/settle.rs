@@ -11,7 +11,7 @@ use nalgebra::{Matrix2, Vector2};
 use rayon::prelude::*;
 use rustfft::num_complex::Complex64;
 
-use crate::coverage::bend::{Mean, mean, refined};
+use crate::coverage::bend::{Mean, mean, refined, refined_change};
 use crate::coverage::cells::{Cells, Window};
 use crate::coverage::grains::{Grains, split};
 use crate::coverage::look::{Frame, Seen};
@@ -253,6 +253,11 @@ impl Settled {
     /// The same without what higher harmonics put into the windows.
     pub(crate) fn refined(&self) -> Option<Mean> {
         Some(refined(&self.view(), &self.inner)?.in_pixels(self.bins))
+    }
+
+    /// The same for a lattice that is known to change.
+    pub(crate) fn refined_change(&self) -> Option<Mean> {
+        Some(refined_change(&self.view(), &self.inner)?.in_pixels(self.bins))
     }
 }
 

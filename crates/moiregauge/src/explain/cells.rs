@@ -25,7 +25,7 @@ const LONGEST: f64 = 2.1;
 /// not at most 2.7 (simulated frames of two generators, lines with gains among them).
 pub(crate) const BETTER: f64 = 4.0;
 /// The smaller cell is taken if it predicts this fraction of what the larger does: the larger one has waves that are not its own.
-const MOST: f64 = 0.5;
+pub(crate) const MOST: f64 = 0.5;
 /// Wave vectors are looked for within so many cycles per frame of the points, in steps of a fifth of that.
 const REACH: f64 = 1.0;
 

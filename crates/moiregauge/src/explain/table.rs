@@ -2,11 +2,11 @@
 
 use nalgebra::{Matrix2, Vector2};
 
-use crate::coverage::find::same;
 use crate::explain::evidence::{Blocks, CUBIC};
 use crate::explain::normal::{Phases, gains};
 use crate::explain::scene::Scene;
 use crate::frame::image::Image;
+use crate::numbers::three::three;
 use crate::spectrum::shells::shells;
 
 /// What predicts less than this share of the variance is not listed.
@@ -35,7 +35,20 @@ pub(crate) fn table(
     proposals: &[Matrix2<f64>],
     bends: bool,
 ) -> Option<Vec<Row>> {
-    let scene = Scene::new(image, first, first)?;
+    let longest = |pair: &Matrix2<f64>| {
+        three(pair)
+            .map(|q| q.norm())
+            .into_iter()
+            .fold(0.0, f64::max)
+    };
+    let finest = proposals.iter().fold(first, |finest, other| {
+        if longest(other) > longest(finest) {
+            other
+        } else {
+            finest
+        }
+    });
+    let scene = Scene::new(image, first, finest)?;
     let binning = scene.binning as f64;
     let power = scene.values.iter().map(|v| v * v).sum::<f64>();
     let indices = shells(3);
@@ -69,11 +82,10 @@ pub(crate) fn table(
         let gain = gains(&answer, &kept)?;
         rows.push(row(Matrix2::from_columns(&pair), &gain, cells));
     }
-    let size = [image.columns, image.rows];
     for proposal in proposals {
         let is_known = |pair: &Matrix2<f64>| {
             let mut known = rows.iter().map(|row| &row.pair).chain([first]);
-            known.any(|known| same(size, known, pair)) || are_nested(first, pair)
+            known.any(|known| are_nested(known, pair))
         };
         if is_known(proposal) {
             continue;

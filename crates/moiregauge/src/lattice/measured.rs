@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::coverage::bend::Change;
 use crate::coverage::patch::Patch;
+use crate::explain::cells::{BETTER, MOST};
 use crate::explain::table::Row;
 use crate::lattice::common::Common;
 use crate::lattice::fit::fitted::LatticeFit;
@@ -113,6 +114,13 @@ pub struct Candidate {
 }
 
 impl Evidence {
+    /// Other lattices, no parts of its cell, that predict at least half as much and are less than four standard errors behind.
+    pub(crate) fn undecided(&self) -> impl Iterator<Item = &Candidate> {
+        let most = self.candidates.first().map_or(0.0, |first| first.share);
+        let others = self.candidates.iter().skip(1).filter(|c| c.cells == 1);
+        others.filter(move |c| c.behind < BETTER && c.share > MOST * most)
+    }
+
     /// The lattice that was measured, and that of a part of its cell that predicts at least half of what the rest of its harmonics does.
     pub(crate) fn part_of_cell(&self) -> Option<[Candidate; 2]> {
         let (whole, others) = self.candidates.split_first()?;

