@@ -116,7 +116,7 @@ fn uploads_have_a_limit() {
         .unwrap();
     stream.write_all(&[0; 100]).unwrap();
     drop(stream);
-    for _ in 0..100 {
+    for _ in 0..600 {
         if left().is_empty() {
             break;
         }
