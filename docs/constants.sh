@@ -52,7 +52,6 @@ fit/bend CUBIC few,moirés,gradient,grains half double
 fit/bend BEYOND few,moirés,gradient,grains half double
 fit/bend THIRD_ORDER few,moirés,gradient,grains half double
 fit/straight STEPS few,moirés,gradient,grains half double
-fit/measure ROUNDS bump half double
 fit/few MOST +stripes half double
 fit/few NEGLIGIBLE +stripes half double
 fit/few BINS_PER_PERIOD +stripes half double
