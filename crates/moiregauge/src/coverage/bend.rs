@@ -22,6 +22,7 @@ use crate::coverage::hollows::hollows;
 use crate::coverage::nodes::{Node, View, nodes};
 use crate::coverage::patch::{Patch, WHOLE};
 use crate::coverage::phases::{Fit, fit, powers, rows};
+use crate::coverage::windows::straightened;
 use crate::numbers::exact;
 use crate::numbers::three::three;
 
@@ -30,6 +31,9 @@ const WHOLE_WINDOW: f64 = 1.5;
 
 /// Fewer nodes than this tell nothing of a lattice. Chosen by eye.
 const FEWEST_INNER: usize = 6;
+
+/// Rounds in which what windows make of a description is taken off: each leaves a tenth or two of what the one before left.
+const STRAIGHTENED: usize = 3;
 
 /// Where the frame ends is known, but windows see only half of what is there: the share of what is told of an edge in the frame. By the
 /// coverage of a hundred simulated sets whose twist or strain swings once across the frame.
@@ -138,7 +142,7 @@ pub(crate) fn mean(view: &View, patch: &Patch) -> Option<Mean> {
     Some(summary(&chosen, &nodes, view, patch))
 }
 
-/// The same without what higher harmonics put into the windows.
+/// The same without what higher harmonics put into the windows, and without what windows make of waves that bend.
 pub(crate) fn refined(view: &View, patch: &Patch) -> Option<Mean> {
     refined_by(choose, view, patch)
 }
@@ -167,8 +171,16 @@ fn refined_by(
         noise: [0, 1, 2].map(|i| view.noise[i].max(left[i])),
         ..*view
     };
-    let nodes = nodes(&view, patch);
-    let chosen = choose(&view, patch, &nodes)?;
+    let read = nodes(&view, patch);
+    let mut nodes = read.clone();
+    let mut chosen = choose(&view, patch, &nodes)?;
+    for _ in 0..STRAIGHTENED {
+        if chosen.model.is_none() {
+            break;
+        }
+        nodes = straightened(&view, patch, &read, &chosen.fit);
+        chosen = choose(&view, patch, &nodes)?;
+    }
     Some(summary(&chosen, &nodes, &view, patch))
 }
 

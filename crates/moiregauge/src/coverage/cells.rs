@@ -292,6 +292,27 @@ impl Cells {
         bands.collect()
     }
 
+    /// Sums of values under the window at each cell, times powers of their distances from it along columns and rows, cells; `squared`: under the square of
+    /// the window.
+    pub(crate) fn moments<T: Summed>(
+        &self,
+        values: &[T],
+        window: &Window,
+        powers: [usize; 2],
+        squared: bool,
+    ) -> Vec<T> {
+        let taps = [0, 1].map(|axis| {
+            let taps = &window.taps[axis];
+            let reach = (taps.len() / 2) as f64;
+            let all = taps.iter().enumerate().map(|(i, tap)| {
+                let tap = if squared { tap * tap } else { *tap };
+                tap * (i as f64 - reach).powi(powers[axis] as i32)
+            });
+            all.collect::<Vec<f64>>()
+        });
+        self.smoothed(values, &taps)
+    }
+
     /// Convolution with the taps along columns, then along rows.
     fn smoothed<T: Summed>(&self, values: &[T], taps: &[Vec<f64>; 2]) -> Vec<T> {
         let [across, up] = self.size;

@@ -35,7 +35,9 @@ const PLAIN: f64 = 8.0;
 pub(crate) struct Seen {
     pub(crate) envelopes: [Vec<Complex64>; 3],
     pub(crate) inside: Vec<bool>,
-    /// Typical power of each wave where it is, over that of noise.
+    /// Typical power of each wave where it is.
+    pub(crate) typical: [f64; 3],
+    /// The same over that of noise.
     pub(crate) weights: [f64; 3],
     /// Noise power per pixel at each wave.
     pub(crate) noise: [f64; 3],
@@ -199,6 +201,7 @@ impl<'a> Frame<'a> {
             inside[i] = there;
         }
         Some(Seen {
+            typical,
             weights: [0, 1, 2].map(|i| typical[i] / unit[i]),
             envelopes,
             inside,

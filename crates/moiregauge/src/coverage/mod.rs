@@ -19,7 +19,9 @@ pub(crate) mod nodes;
 pub(crate) mod patch;
 pub(crate) mod phases;
 pub(crate) mod settle;
+pub(crate) mod sides;
 pub(crate) mod tiles;
+pub(crate) mod windows;
 
 pub use bend::{Change, ChangeModel};
 pub use patch::Patch;

@@ -17,6 +17,7 @@ use crate::coverage::grains::{Grains, split};
 use crate::coverage::look::{Frame, Seen};
 use crate::coverage::nodes::View;
 use crate::coverage::patch::{Patch, WHOLE, unit_cells_per_pixel};
+use crate::coverage::sides::without_tails;
 use crate::frame::image::Image;
 use crate::numbers::three::three;
 
@@ -126,16 +127,17 @@ fn settle_bins(
         narrowest = width;
         let patch = patch(&cells, &seen.inside, &pair)?;
         let (step, turn) = slope(&cells, &seen, &patch.inside)?;
-        settled = Some((seen, pair));
+        settled = Some((waves, seen, pair));
         if turn < STILL {
             break;
         }
         pair += step;
     }
-    let (seen, pair) = settled?;
+    let (waves, mut seen, pair) = settled?;
     if !wanted(&(pair / bins as f64)) {
         return None;
     }
+    seen.inside = without_tails(&frame, &waves, windows.at(narrowest), &seen);
     let inner = patch(&cells, &seen.inside, &pair)?;
     if inner.share < WHOLE && !is_broad(&cells, &inner.inside, LINE * seen.width) {
         return None;
