@@ -134,8 +134,8 @@ fn of_lattice(doubt: &LatticeDoubt) -> Option<f64> {
         LatticeDoubt::SeveralGrains { others } => Some(others.iter().map(|g| g.share).sum()),
         LatticeDoubt::HarmonicsDisagree { times, .. } => Some(*times),
         LatticeDoubt::Rivals { rivals } => Some(*rivals as f64),
-        LatticeDoubt::PartOfCell { share, .. } | LatticeDoubt::OtherLattice { share, .. } => {
-            Some(*share)
+        LatticeDoubt::PartOfCell { part: other, .. } | LatticeDoubt::OtherLattice { other, .. } => {
+            Some(other.share)
         }
         LatticeDoubt::SecondLattice { significance, .. } => Some(*significance),
         _ => None,

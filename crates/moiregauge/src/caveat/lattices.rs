@@ -2,6 +2,7 @@
 
 use crate::caveat::explained::explain;
 use crate::coverage::choose::BETTER;
+use crate::lattice::measured::Candidate;
 
 /// The lattice of one image.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -111,35 +112,27 @@ pub enum LatticeDoubt {
     },
     /// Another lattice predicts the image about as well.
     #[error(
-        "another lattice ({:.2}, {:.2}, {:.2} nm) predicts {:.0} % of the image where this one predicts {:.0} %, {behind:.1} standard errors less: the image does not \
-         decide between them",
-        .wavelengths[0], .wavelengths[1], .wavelengths[2], 100.0 * .share, 100.0 * .own
+        "another lattice ({}) predicts {:.0} % of the image where this one predicts {:.0} %. That is {} by {:.1} standard errors: the image does not decide \
+         between them",
+        nanometres(&.other.wavelengths), 100.0 * .other.share, 100.0 * .whole.share, if .other.behind < 0.0 { "better" } else { "worse" }, .other.behind.abs()
     )]
     OtherLattice {
-        /// Its wavelengths, nm.
-        wavelengths: [f64; 3],
-        /// Share of the variance that it predicts.
-        share: f64,
-        /// Share that the lattice that was measured predicts.
-        own: f64,
-        /// By how many standard errors it is behind.
-        behind: f64,
+        /// The lattice that was measured.
+        whole: Candidate,
+        /// The other one.
+        other: Candidate,
     },
     /// The lattice may be that of a part of the cell.
     #[error(
-        "the harmonics do not agree on one lattice, and those of a cell of one {} of the area ({:.2}, {:.2}, {:.2} nm) alone predict {:.0} % of the image \
-         where all together predict {:.0} %: the rest may be a second moiré that lies near points of a superlattice. The twist by the smaller cell is {:.2} times as large",
-        if *.cells == 3 { "third" } else { "fourth" }, .wavelengths[0], .wavelengths[1], .wavelengths[2], 100.0 * .share, 100.0 * .whole, (*.cells as f64).sqrt()
+        "the harmonics do not agree on one lattice. Those of a cell of 1/{} of the area ({}) alone predict {:.0} % of the image, all together {:.0} %. The rest may be \
+         a second moiré that lies near points of a superlattice",
+        .part.cells, nanometres(&.part.wavelengths), 100.0 * .part.share, 100.0 * .whole.share
     )]
     PartOfCell {
-        /// How many cells of the smaller lattice the one that was measured has in one.
-        cells: usize,
-        /// Wavelengths of the smaller lattice, nm.
-        wavelengths: [f64; 3],
-        /// Share of the variance that it predicts.
-        share: f64,
-        /// Share that the lattice that was measured predicts.
-        whole: f64,
+        /// The lattice that was measured.
+        whole: Candidate,
+        /// That of a part of its cell.
+        part: Candidate,
     },
     /// There is another wave.
     #[error(
@@ -195,6 +188,11 @@ fn listed(all: &[OtherGrain]) -> String {
         )
     };
     all.iter().map(of).collect::<Vec<_>>().join("; ")
+}
+
+/// Three lengths, nm.
+fn nanometres([a, b, c]: &[f64; 3]) -> String {
+    format!("{a:.2}, {b:.2}, {c:.2} nm")
 }
 
 /// How sure it is that a lattice changes.
@@ -292,7 +290,7 @@ explain! { LatticeDoubt:
         "Look at the Fourier transform of the image. Give the approximate wavelength of the right lattice, or measure two moirés."
     PartOfCell "part-of-cell" Serious
         "Most of the image is predicted by a lattice of a third or a fourth of the cell, and the other harmonics do not agree with it: they may be a second \
-         moiré that comes near the points of a superlattice. Then the twist is too small by √3 or 2."
+         moiré that comes near the points of a superlattice. Then all wavelengths are too long by √3 or 2, and the twist of two equal layers is too small by as much."
         "Look at the Fourier transform of the image. Give the approximate wavelength of the right lattice, or measure two moirés."
     Rivals "rival-waves" Serious
         "One or two waves of about the period of the lattice, and none of its own, are as strong as its weakest one: stripes, or a second moiré. With three the \

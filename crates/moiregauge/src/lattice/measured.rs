@@ -114,19 +114,27 @@ pub struct Candidate {
 }
 
 impl Evidence {
-    /// Other lattices, no parts of its cell, that predict at least half as much and are less than four standard errors behind.
-    pub(crate) fn undecided(&self) -> impl Iterator<Item = &Candidate> {
-        let most = self.candidates.first().map_or(0.0, |first| first.share);
-        let others = self.candidates.iter().skip(1).filter(|c| c.cells == 1);
-        others.filter(move |c| c.behind < BETTER && c.share > MOST * most)
+    /// The lattice that was measured, and another one, no part of its cell, that predicts at least half as much and is less than four standard errors behind.
+    pub(crate) fn undecided(&self) -> Option<[Candidate; 2]> {
+        let as_well = |whole: &Candidate, other: &Candidate| {
+            other.cells == 1 && other.behind < BETTER && other.share > MOST * whole.share
+        };
+        self.with(as_well)
     }
 
     /// The lattice that was measured, and that of a part of its cell that predicts at least half of what the rest of its harmonics does.
     pub(crate) fn part_of_cell(&self) -> Option<[Candidate; 2]> {
+        let most = |whole: &Candidate, other: &Candidate| {
+            other.cells > 1 && 2.0 * other.share > whole.share - other.share
+        };
+        self.with(most)
+    }
+
+    /// The lattice that was measured, and the first other one of which something is true.
+    fn with(&self, is_it: impl Fn(&Candidate, &Candidate) -> bool) -> Option<[Candidate; 2]> {
         let (whole, others) = self.candidates.split_first()?;
-        let most =
-            |other: &&Candidate| other.cells > 1 && 2.0 * other.share > whole.share - other.share;
-        others.iter().find(most).map(|part| [*whole, *part])
+        let other = others.iter().find(|other| is_it(whole, other))?;
+        Some([*whole, *other])
     }
 }
 

@@ -103,28 +103,15 @@ pub(crate) fn about_coverage(
             let rivals = evidence.rivals;
             caveats.push(Caveat::new(LatticeDoubt::Rivals { rivals }, file));
         }
-        if let (Some(first), Some(other)) =
-            (evidence.candidates.first(), evidence.undecided().next())
-            && !bends(lattice)
-        {
-            let doubt = LatticeDoubt::OtherLattice {
-                wavelengths: other.wavelengths,
-                share: other.share,
-                own: first.share,
-                behind: other.behind,
-            };
-            caveats.push(Caveat::new(doubt, file));
-        }
         let disagrees = lattice.fit.as_ref().is_some_and(LatticeFit::disagrees);
-        if let Some([whole, part]) = evidence.part_of_cell().filter(|_| disagrees) {
-            let doubt = LatticeDoubt::PartOfCell {
-                cells: part.cells,
-                wavelengths: part.wavelengths,
-                share: part.share,
-                whole: whole.share,
-            };
-            caveats.push(Caveat::new(doubt, file));
-        }
+        let other = evidence.undecided().filter(|_| !bends(lattice));
+        let part = evidence.part_of_cell().filter(|_| disagrees);
+        let doubts = [
+            other.map(|[whole, other]| LatticeDoubt::OtherLattice { whole, other }),
+            part.map(|[whole, part]| LatticeDoubt::PartOfCell { whole, part }),
+        ];
+        let doubts = doubts.into_iter().flatten();
+        caveats.extend(doubts.map(|doubt| Caveat::new(doubt, file)));
     }
     if let Some(patch) = &lattice.patch {
         let doubt = LatticeDoubt::PartlyCovered {

@@ -1,6 +1,7 @@
 //! The tests of the crate as one program: it links once, and whatever takes long runs beside the rest.
 
 mod calibrate;
+mod candidates;
 mod caveats;
 mod chain;
 mod constants;

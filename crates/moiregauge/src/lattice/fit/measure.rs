@@ -4,7 +4,7 @@ use heterostrain::lattice::{Lattice, Px};
 
 use crate::frame::background::Background;
 use crate::frame::image::Image;
-use crate::lattice::fit::fit_pixels::{FinalNoise, Fit};
+use crate::lattice::fit::fit_pixels::Fit;
 use crate::lattice::fit::fitted::LatticeFit;
 use crate::lattice::fit::straight::without_bend;
 use crate::spectrum::harmonics::Harmonics;
@@ -20,30 +20,13 @@ pub(crate) struct Found {
 /// `None` where the fit does not settle within half a cycle over the frame of its start, or the
 /// harmonics cannot be told apart on this frame. Everything counts in pixels of `image`.
 pub(crate) fn measure(image: &Image, start: &Harmonics, background: Background) -> Option<Found> {
-    let (fit, noise) = finished(image, start, background)?;
-    let (lattice, fit) = fit.found(&noise)?;
-    Some(Found { lattice, fit })
-}
-
-/// The fit with all harmonics that earn their place, and the noise that it leaves.
-fn finished<'a>(
-    image: &'a Image,
-    start: &Harmonics,
-    background: Background,
-) -> Option<(Fit<'a>, FinalNoise)> {
     let mut fit = Fit::new(image, start, background)?;
     if fit.worth_a_sketch(start) && fit.sketch().is_none() {
         fit = Fit::new(image, start, background)?;
     }
     let noise = fit.choose()?;
     let noise = without_bend(&fit, noise);
-    Some((fit, noise))
-}
-
-impl Fit<'_> {
-    /// What it found.
-    fn found(&self, noise: &FinalNoise) -> Option<(Lattice<Px>, LatticeFit)> {
-        let foreign = noise.residual.foreign_wave(&self.frame, &self.model);
-        self.result(noise, foreign)
-    }
+    let foreign = noise.residual.foreign_wave(&fit.frame, &fit.model);
+    let (lattice, fit) = fit.result(&noise, foreign)?;
+    Some(Found { lattice, fit })
 }
