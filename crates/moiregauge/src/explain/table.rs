@@ -6,7 +6,6 @@ use crate::explain::evidence::{Blocks, CUBIC};
 use crate::explain::normal::{Phases, gains};
 use crate::explain::scene::Scene;
 use crate::frame::image::Image;
-use crate::numbers::three::three;
 use crate::spectrum::shells::shells;
 
 /// What predicts less than this share of the variance is not listed.
@@ -14,6 +13,10 @@ const LISTED: f64 = 0.05;
 /// Wave vectors within this part of those of a cell of several times or a part of the area are harmonics: such cells are compared by
 /// [`superlattice`](crate::explain::cells::superlattice).
 const NESTED: f64 = 0.1;
+
+/// Lattices of more than so many times the period, or less than that part of it, lie on top of each other, as atoms and moiré do: an image that shows both
+/// shows neither instead of the other.
+const LIKE: f64 = 2.0;
 
 /// What one lattice predicts.
 pub(crate) struct Row {
@@ -27,28 +30,24 @@ pub(crate) struct Row {
     pub(crate) cells: usize,
 }
 
-/// A lattice (reciprocal pair at 60°, rad per pixel), the lattices whose cells are a third and a fourth of its own, and those proposals that are neither it
-/// nor a cell of several times or a part of its area. `bends`: phases may be cubic polynomials. `None` where the image is too small.
+/// A lattice (reciprocal pair at 60°, rad per pixel), the lattices whose cells are a third and a fourth of its own, and those proposals of about its
+/// period that are neither it nor a cell of several times or a part of its area. `bends`: phases may be cubic polynomials. `None` where the image is too small.
 pub(crate) fn table(
     image: &Image,
     first: &Matrix2<f64>,
     proposals: &[Matrix2<f64>],
     bends: bool,
 ) -> Option<Vec<Row>> {
-    let longest = |pair: &Matrix2<f64>| {
-        three(pair)
-            .map(|q| q.norm())
-            .into_iter()
-            .fold(0.0, f64::max)
+    let area = |pair: &Matrix2<f64>| pair.determinant().abs();
+    let is_like = |pair: &&Matrix2<f64>| {
+        let ratio = area(pair) / area(first);
+        (LIKE.powi(-2)..LIKE.powi(2)).contains(&ratio)
     };
-    let finest = proposals.iter().fold(first, |finest, other| {
-        if longest(other) > longest(finest) {
-            other
-        } else {
-            finest
-        }
-    });
-    let scene = Scene::new(image, first, finest)?;
+    let proposals = || proposals.iter().filter(is_like);
+    let finest = proposals()
+        .chain([first])
+        .max_by(|a, b| area(a).total_cmp(&area(b)));
+    let scene = Scene::new(image, first, finest?)?;
     let binning = scene.binning as f64;
     let power = scene.values.iter().map(|v| v * v).sum::<f64>();
     let indices = shells(3);
@@ -82,7 +81,7 @@ pub(crate) fn table(
         let gain = gains(&answer, &kept)?;
         rows.push(row(Matrix2::from_columns(&pair), &gain, cells));
     }
-    for proposal in proposals {
+    for proposal in proposals() {
         let is_known = |pair: &Matrix2<f64>| {
             let mut known = rows.iter().map(|row| &row.pair).chain([first]);
             known.any(|known| are_nested(known, pair))

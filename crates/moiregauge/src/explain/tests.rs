@@ -183,3 +183,13 @@ fn the_table_knows_the_parts_of_a_cell() {
         assert!((rows[1].pair - pair()).amax() < 1e-9 || cells == 3);
     }
 }
+
+/// Atoms that are stronger than the moiré they make are no other lattice in its place: they lie on top of it.
+#[test]
+fn atoms_are_not_listed_beside_a_moire() {
+    let (sin, cos) = 0.2_f64.sin_cos();
+    let atoms = 3.3 * Matrix2::new(cos, -sin, sin, cos) * pair();
+    let value = |at: Vector2<f64>| lattice(&pair(), at) + 2.0 * lattice(&atoms, at);
+    let rows = table(&image(1, 0.5, value), &pair(), &[atoms], false).unwrap();
+    assert_eq!(rows.len(), 1);
+}
