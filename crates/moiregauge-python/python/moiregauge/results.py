@@ -289,7 +289,7 @@ class CandidateResult(Document):
     predicts.
     """
     wavelengths_nm: tuple[float | None, float | None, float | None]
-    """Lengths of its three shortest vectors by the geometry of the scan, drift included."""
+    """Lengths of its three shortest vectors by the geometry of the scan, drift included, shortest first."""
 
 
 @dataclass(frozen=True, kw_only=True)

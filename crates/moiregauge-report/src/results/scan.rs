@@ -86,7 +86,7 @@ pub struct ScanTwistStrain {
 /// A lattice that an image may show.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct CandidateResult {
-    /// Lengths of its three shortest vectors by the geometry of the scan, drift included.
+    /// Lengths of its three shortest vectors by the geometry of the scan, drift included, shortest first.
     pub wavelengths_nm: [Option<f64>; 3],
     /// How many of its cells the lattice that was measured has in one: 3 or 4 for a lattice that is made of harmonics of that.
     pub cells: usize,

@@ -100,7 +100,7 @@ pub struct Evidence {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct Candidate {
-    /// Lengths of its three shortest vectors before drift and calibration are taken off, nm.
+    /// Lengths of its three shortest vectors before drift and calibration are taken off, nm, shortest first.
     #[serde(with = "exact")]
     pub wavelengths: [f64; 3],
     /// How many of its cells the lattice that was measured has in one: 3 and 4 where it is made of harmonics of that.
@@ -142,9 +142,12 @@ impl Candidate {
     /// `to_physical`: wave vectors (rad per pixel) to rad per nm.
     pub(crate) fn new(row: &Row, to_physical: &Matrix2<f64>) -> Self {
         let pair = to_physical * row.pair;
+        // Each vector is across a wave: L = 2π |K| / |K₁ × K₂|.
         let per_wave = std::f64::consts::TAU / pair.determinant().abs();
+        let mut wavelengths = three(&pair).map(|wave| per_wave * wave.norm());
+        wavelengths.sort_by(f64::total_cmp);
         Self {
-            wavelengths: three(&pair).map(|wave| per_wave * wave.norm()),
+            wavelengths,
             cells: row.cells,
             share: row.share,
             behind: row.behind,
