@@ -18,7 +18,7 @@ use crate::spectrum::error::{LatticeError, SECOND};
 use crate::spectrum::method::Method;
 use crate::spectrum::prepare::binned;
 use crate::spectrum::rivals::{ENOUGH, Rivals};
-use crate::spectrum::select::{MOST_DISTORTION, candidates};
+use crate::spectrum::select::{MOST_DISTORTION, candidates_beside};
 use crate::spectrum::shells::shells;
 use crate::spectrum::transform::Spectrum;
 
@@ -132,7 +132,8 @@ pub(crate) fn with_evidence(
     let (binning, bins) = binned(part, &found.reciprocal);
     let (binning, spectrum) = (binning as f64, Spectrum::new(&bins));
     let bends = bends(&found);
-    let proposals = candidates(&spectrum, &(geometry.pixel_to_nm * binning));
+    let own = found.reciprocal * binning;
+    let proposals = candidates_beside(&own, &spectrum, &(geometry.pixel_to_nm * binning));
     let proposals: Vec<Matrix2<f64>> = proposals.iter().map(|c| c.pair / binning).collect();
     let rows = table(part, &found.reciprocal, &proposals, bends).unwrap_or_default();
     let is_better = |row: &&Row| {
@@ -145,7 +146,7 @@ pub(crate) fn with_evidence(
     let rivals = if is_made_by_many(&found) {
         0
     } else {
-        Rivals::new(&spectrum).of(&(found.reciprocal * binning), &to_physical)
+        Rivals::new(&spectrum).of(&own, &to_physical)
     };
     found.evidence = Some(Evidence {
         predicts: weakest(part, &found.reciprocal, bends),

@@ -6,6 +6,7 @@
 use nalgebra::{Matrix2, Vector2};
 
 use crate::numbers::interrupt;
+use crate::numbers::three::three;
 use crate::spectrum::shells::{FIRST_SHELL, shells};
 use crate::spectrum::transform::Spectrum;
 
@@ -61,11 +62,9 @@ impl<'a> Rivals<'a> {
         let length = |q: Vector2<f64>| (to_physical * q).norm();
         let shortest = FIRST_SHELL.map(|index| length(wave(index)));
         let shortest = shortest.into_iter().fold(f64::INFINITY, f64::min);
-        let frame =
-            Vector2::from(self.spectrum.image_size.map(|n| n as f64)) / std::f64::consts::TAU;
         let is_own = |q: &Vector2<f64>| {
             let off = pair * (inverse * q).map(f64::round) - q;
-            off.component_mul(&frame).norm() < LOBE || length(off) < OWN * shortest
+            off.component_mul(&self.frame()).norm() < LOBE || length(off) < OWN * shortest
         };
         let of_shell = |shell: &[[i32; 2]]| {
             let waves = || shell.iter().map(|index| wave(*index));
@@ -78,6 +77,23 @@ impl<'a> Rivals<'a> {
         };
         let all = (1..=SHELLS).map(|n| of_shell(&shells(n)[shells(n - 1).len()..]));
         all.min().unwrap_or(0)
+    }
+
+    /// The peaks that are none of a lattice's first order (reciprocal pair, rad per pixel).
+    pub(crate) fn beside(mut self, pair: &Matrix2<f64>) -> Self {
+        let (waves, frame) = (three(pair), self.frame());
+        let is_own = |q: Vector2<f64>| q.component_mul(&frame).norm() < LOBE;
+        self.peaks.retain(|(q, _)| {
+            !waves
+                .iter()
+                .any(|wave| is_own(q - wave) || is_own(q + wave))
+        });
+        self
+    }
+
+    /// rad per pixel → cycles per frame.
+    fn frame(&self) -> Vector2<f64> {
+        Vector2::from(self.spectrum.image_size.map(|n| n as f64)) / std::f64::consts::TAU
     }
 
     /// The largest power near a wave vector.
@@ -99,7 +115,6 @@ mod tests {
     use super::*;
     use crate::frame::image::Image;
     use crate::numbers::rng::normals;
-    use crate::numbers::three::three;
 
     /// (columns, rows)
     const SIZE: [usize; 2] = [160, 120];

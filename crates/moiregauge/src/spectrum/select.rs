@@ -74,6 +74,23 @@ pub(crate) struct Peak {
 ///
 /// `pixel_to_nm` is the metric in which vectors are short and hexagons regular.
 pub(crate) fn candidates(spectrum: &Spectrum, pixel_to_nm: &Matrix2<f64>) -> Vec<Candidate> {
+    distinct(spectrum, pixel_to_nm, || Rivals::new(spectrum))
+}
+
+/// The same beside a lattice that is there (reciprocal pair, rad per pixel): its waves are no rivals.
+pub(crate) fn candidates_beside(
+    pair: &Matrix2<f64>,
+    spectrum: &Spectrum,
+    pixel_to_nm: &Matrix2<f64>,
+) -> Vec<Candidate> {
+    distinct(spectrum, pixel_to_nm, || Rivals::new(spectrum).beside(pair))
+}
+
+fn distinct<'a>(
+    spectrum: &'a Spectrum,
+    pixel_to_nm: &Matrix2<f64>,
+    rivals: impl Fn() -> Rivals<'a>,
+) -> Vec<Candidate> {
     let Some(to_physical) = pixel_to_nm.try_inverse().map(|m| m.transpose()) else {
         return Vec::new();
     };
@@ -88,10 +105,10 @@ pub(crate) fn candidates(spectrum: &Spectrum, pixel_to_nm: &Matrix2<f64>) -> Vec
             }
         }
     }
-    let rivals = OnceCell::new();
+    let ranked = OnceCell::new();
     // A cell of many atoms explains many peaks; single shells of it need not stand out.
     by_score(found, spectrum, |candidate| {
-        let rivals = rivals.get_or_init(|| Rivals::new(spectrum));
+        let rivals = ranked.get_or_init(&rivals);
         well_explained(candidate) || rivals.of(&candidate.pair, &to_physical) < ENOUGH
     })
 }
