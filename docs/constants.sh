@@ -86,7 +86,6 @@ set/drift KNOWN_TO grains half double
 campaign/shells OUTVOTED second half double
 campaign/grains CONTRADICTED grains half double
 campaign/grains BETTER_KNOWN grains half double
-fit/closure APART second,step,stripes half double
 fit/closure STRONG few,noisy,contrast half double
 fit/closure NOISE_KNOWN_TO few,noisy,contrast root double
 fit/leverage ACROSS few,noisy,contrast half double

@@ -20,9 +20,7 @@ pub(crate) fn advice(error: &InputError) -> Option<String> {
         }
         InputError::Measure(MeasureError::NoSize) => "give the size, as in --size 70nm×70nm",
         InputError::Measure(MeasureError::Lattice { error, .. }) => match error {
-            LatticeError::OneOfMany { .. }
-            | LatticeError::NowhereTogether
-            | LatticeError::NoHarmonics { .. } => {
+            LatticeError::OneOfMany { .. } | LatticeError::NowhereTogether => {
                 "say which lattice to measure, or where it is: --near WAVELENGTH, --lattice, --region or --mask"
             }
             LatticeError::NotThere => "leave out what hides it: --mask or --region",

@@ -14,7 +14,7 @@ use crate::numbers;
 #[derive(clap::Args, Clone, Debug, Default)]
 #[command(next_help_heading = "What the files do not tell")]
 pub(crate) struct KnownArgs {
-    /// Width and height of the image from edge to edge, as in 70nm×70nm, 1.5umx1.5um or 70x35nm;
+    /// Width and height of the image from edge to edge, as in 70nm×35nm, 1.5umx1.5um or 70x35nm; one length (70nm) is a square;
     /// arrays and pictures need it; in other files it replaces their own size
     #[arg(long, value_name = "W×H", value_parser = parse_size)]
     size: Option<[f64; 2]>,
@@ -135,10 +135,12 @@ pub(crate) fn with_option(error: KnownError) -> anyhow::Error {
     crate::errors::with_advice(error.into())
 }
 
-/// `70nm×70nm`, `70x70 nm`: two lengths; the first may leave its unit to the second.
+/// `70nm×35nm`, `70x35 nm`: two lengths; the first may leave its unit to the second. `70nm`: a square.
 pub(crate) fn parse_size(text: &str) -> Result<[f64; 2], String> {
     let parsed = || {
-        let (width, height) = text.split_once(['×', 'x', 'X', '*'])?;
+        let Some((width, height)) = text.split_once(['×', 'x', 'X', '*']) else {
+            return Some([length_nm(text)?; 2]);
+        };
         // `um` is how the micrometre is typed.
         let height_nm = length_nm(height)?;
         let unit = height.trim_start_matches(|c: char| !c.is_alphabetic() || c == 'e');
@@ -146,7 +148,7 @@ pub(crate) fn parse_size(text: &str) -> Result<[f64; 2], String> {
         Some([width_nm, height_nm])
     };
     let size = parsed().ok_or_else(|| {
-        "expected width × height with a unit (pm, Å, nm, um, mm), as in 70nm×70nm".to_owned()
+        "expected width × height with a unit (pm, Å, nm, um, mm), as in 70nm×35nm, or one length for a square".to_owned()
     })?;
     numbers::sides(size)
 }
@@ -183,10 +185,11 @@ mod tests {
         };
         near("70nm×70nm", [70.0, 70.0]);
         near("70x35nm", [70.0, 35.0]);
+        near("600 Å", [60.0, 60.0]);
         near("1.5 um x 2 µm", [1500.0, 2000.0]);
         near("500pm×7Å", [0.5, 0.7]);
         near("1e3nm×2e3 nm", [1000.0, 2000.0]);
-        for wrong in ["70×70", "70nm", "-1nm×2nm", "0nm×2nm", "1V×2V", "", "nm×nm"] {
+        for wrong in ["70×70", "70", "-1nm×2nm", "0nm×2nm", "1V×2V", "", "nm×nm"] {
             assert!(parse_size(wrong).is_err(), "{wrong}");
         }
     }

@@ -9,7 +9,6 @@ use crate::coverage::patch::Patch;
 use crate::frame::background::Background;
 use crate::frame::geometry::Geometry;
 use crate::frame::image::Image;
-use crate::lattice::fit::closure::Closure;
 use crate::lattice::fit::fitted::{FittedHarmonic, LatticeFit};
 use crate::lattice::fit::hidden::{Hidden, first_shell};
 use crate::lattice::fit::noise::ForeignWave;
@@ -46,12 +45,7 @@ pub(crate) fn measure_levelled(
 
 /// Why what the fit says of its waves makes a lattice none.
 pub(crate) fn no_lattice(found: &MeasuredLattice) -> Option<LatticeError> {
-    if is_hollow(found) {
-        return Some(LatticeError::NowhereTogether);
-    }
-    let closure = found.fit.as_ref()?.closure.filter(Closure::is_no_lattice)?;
-    let cycles = closure.apart;
-    Some(LatticeError::NoHarmonics { cycles })
+    is_hollow(found).then_some(LatticeError::NowhereTogether)
 }
 
 /// The harmonics that stand out and are none of its second shell, which has a third of its points, or of its third, which has a quarter.

@@ -37,15 +37,6 @@ pub enum LatticeError {
          together. The peaks come from an edge, from stripes, or from different lattices"
     )]
     NowhereTogether,
-    /// The waves are not those of one lattice.
-    #[error(
-        "the strongest waves of the image are not harmonics of one lattice: they miss the points of the best one by \
-         {cycles:.2} cycles per frame. They come from stripes beside a lattice, or from different lattices"
-    )]
-    NoHarmonics {
-        /// By how much: root mean square, weighted with their power.
-        cycles: f64,
-    },
     /// Other waves are as strong.
     #[error(
         "the lattice that was found is one of many: {rivals} other waves of about its period are as strong as its weakest \

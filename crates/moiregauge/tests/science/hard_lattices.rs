@@ -187,9 +187,6 @@ fn harmonics_that_make_no_lattice_enlarge_the_errors() {
         let measured = fit(&scene.image(), &scene);
         let closure = measured.fit.as_ref().unwrap().closure.unwrap();
         assert!(closure.enlargement() > 5.0, "seed {seed}: {closure:?}");
-        // Three equal waves share what they miss.
-        let missed = closure.apart - 0.4 / 3.0;
-        assert!(missed.abs() < 0.02, "seed {seed}: {closure:?}");
         let chi_squared = chi_squared(&scene, &measured);
         // Four degrees of freedom: once in ten thousand, and χ² of the closure is uncertain itself.
         assert!(chi_squared < 24.0, "seed {seed}: {chi_squared}");

@@ -9,8 +9,6 @@
 //! much that is. One Gauss–Newton step from the fit gives each harmonic its own wave vector, with
 //! background and amplitudes free.
 
-use std::f64::consts::PI;
-
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
@@ -26,11 +24,6 @@ const STRONG: f64 = 5.0;
 /// quarter.
 const NOISE_KNOWN_TO: f64 = 1.25;
 
-/// Waves that miss the points of a lattice by more than this, cycles per frame, where noise does not explain it, are not its harmonics. Of simulated
-/// lattices that bend they miss them by 0.04 at most, of atoms of graphite that were recorded with creep by 0.11; stripes beside a lattice that were
-/// taken for one of twice its size by 0.3.
-const APART: f64 = 0.2;
-
 /// How well the harmonics agree on one lattice.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
@@ -40,9 +33,6 @@ pub struct Closure {
     pub chi_squared: f64,
     /// Its degrees of freedom: two for each strong harmonic, less four.
     pub degrees_of_freedom: usize,
-    /// How far their wave vectors are from the points of the lattice, cycles per frame: root mean square, weighted with their power.
-    #[serde(with = "exact")]
-    pub apart: f64,
 }
 
 impl Closure {
@@ -50,11 +40,6 @@ impl Closure {
     pub fn enlargement(&self) -> f64 {
         let (chi2, freedom) = (self.chi_squared, self.degrees_of_freedom);
         enlargement_by_estimated_noise(chi2, freedom, NOISE_KNOWN_TO)
-    }
-
-    /// Whether the waves are no harmonics of one lattice, however close to its points they lie.
-    pub(crate) fn is_no_lattice(&self) -> bool {
-        self.enlargement() > 1.0 && self.apart > APART
     }
 }
 
@@ -96,16 +81,7 @@ pub(crate) fn closure(
     let normal = common.transpose() * &weight * &common;
     let shared = solve::solve(&normal, &(common.transpose() * &weight * &own))?;
     let rest = own - common * shared;
-    let (mut missed, mut power) = (0.0, 0.0);
-    for (row, &i) in strong.iter().enumerate() {
-        let [alpha, beta] = model.waves[i];
-        let weight = alpha * alpha + beta * beta;
-        missed += weight * rest.rows(2 * row, 2).norm_squared();
-        power += weight;
-    }
     Some(Closure {
-        // The frame is from −1 to 1.
-        apart: (missed / power).sqrt() / PI,
         chi_squared: rest.dot(&(weight * &rest)),
         degrees_of_freedom: count - 4,
     })
@@ -139,22 +115,4 @@ fn each_its_own(
         }
     }
     map
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Waves are no harmonics where they miss the points by much and noise does not explain it.
-    #[test]
-    fn waves_are_no_harmonics_if_far_off_and_not_by_chance() {
-        let closure = |chi_squared: f64, apart: f64| Closure {
-            chi_squared,
-            degrees_of_freedom: 8,
-            apart,
-        };
-        assert!(closure(1800.0, 0.3).is_no_lattice());
-        assert!(!closure(8.0, 0.3).is_no_lattice());
-        assert!(!closure(1800.0, 0.11).is_no_lattice());
-    }
 }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use nalgebra::Matrix2;
 
 use crate::coverage::find::patches;
-use crate::coverage::patch::{Patch, WHOLE};
+use crate::coverage::patch::WHOLE;
 use crate::coverage::settle::Settled;
 use crate::frame::background::{Background, remove_background};
 use crate::frame::clip::cut_off;
@@ -38,7 +38,6 @@ impl Start {
         let there = image.values.iter().filter(|v| v.is_finite()).count();
         let recorded = there as f64 / image.values.len() as f64;
         let mut best: Option<(f64, Settled, Self)> = None;
-        let mut in_parts: Option<(f64, Self)> = None;
         for mut settled in patches(&flat, geometry, first, is_meant) {
             settled.patch.share *= recorded;
             let patch = &settled.patch;
@@ -46,12 +45,6 @@ impl Start {
             let part = patch.of(&flat);
             let near = Self::near(&part, geometry, background, &patch.pair);
             let Some(start) = near else { continue };
-            if !start.stands_out() && settled.is_plain() && settled.is_straight() {
-                let all = Self::in_parts(image, &part, geometry, background, patch, is_meant);
-                let most = in_parts.as_ref().map_or(0.0, |(most, _)| *most);
-                in_parts = all.filter(|(evidence, _)| *evidence > most).or(in_parts);
-                continue;
-            }
             let coherent = match verdict(&start.prepared.harmonics) {
                 // A part of the frame is chosen by its waves: they have to be plain to see in it.
                 Verdict::Lattice if patch.share > WHOLE || settled.is_plain() => {
@@ -70,39 +63,9 @@ impl Start {
                 best = Some((evidence, settled, start));
             }
         }
-        if let Some((evidence, start)) = in_parts
-            && best.as_ref().is_none_or(|(most, _, _)| evidence > *most)
-        {
-            return Some(start);
-        }
         let (_, settled, mut start) = best?;
         let flat = remove_background(&settled.patch.of(image), background);
         start.prepared.image = Arc::new(flat);
         start.on_patch(image, settled)
-    }
-
-    /// The lattice of a patch of several parts, with its evidence, where waves that look straight under windows are not those of all
-    /// parts together: from part to part windows leave whole turns open. The pixels of all parts tell which.
-    fn in_parts(
-        image: &Image,
-        part: &Image,
-        geometry: &Geometry,
-        background: Background,
-        patch: &Patch,
-        is_meant: &dyn Fn(&Matrix2<f64>) -> bool,
-    ) -> Option<(f64, Self)> {
-        let near = Self::proposals(part, geometry, background)
-            .into_iter()
-            .filter_map(|pair| Self::near(part, geometry, background, &pair));
-        let (evidence, mut start) = near
-            .filter(|start| start.stands_out() && is_meant(&start.pair()))
-            .map(|start| (evidence(&start.prepared.harmonics), start))
-            .max_by(|(a, _), (b, _)| a.total_cmp(b))?;
-        start.prepared.image = Arc::new(remove_background(&patch.of(image), background));
-        start.patch = Some(Patch {
-            pair: start.pair(),
-            ..patch.clone()
-        });
-        Some((evidence, start))
     }
 }
