@@ -17,6 +17,7 @@ use crate::raster::{self, Encoding};
 use crate::scan::{ChannelInfo, DateTime, FrameDirection, LineDirection, Scan, UnreadableChannel};
 use crate::stored::Flat;
 use crate::whole::{Extent, MOST_CHANNELS, some_readable};
+use crate::words::{self, Unread};
 
 const FORMAT: &str = "Agilent";
 const KEY_WIDTH: usize = 14;
@@ -33,13 +34,6 @@ type Lines = Vec<(String, String)>;
 fn get<'a>(lines: &'a [(String, String)], key: &str) -> Option<&'a str> {
     let (_, value) = lines.iter().find(|(k, _)| k == key)?;
     Some(value)
-}
-
-fn number(lines: &[(String, String)], key: &str) -> Option<f64> {
-    get(lines, key)?
-        .parse()
-        .ok()
-        .filter(|n: &f64| n.is_finite())
 }
 
 /// The text before the samples.
@@ -93,10 +87,11 @@ pub(crate) fn open<'a>(input: &Input<'a>) -> Result<Outline<'a>, ReadError> {
         if !extent.take(input.length, start, length, &info.name) {
             continue;
         }
-        let Some(range) = number(lines, "bufferRange") else {
+        let range = get(lines, "bufferRange").unwrap_or("");
+        let Some(range) = words::number(range) else {
             outline.scan.unreadable.push(UnreadableChannel {
                 name: info.name,
-                error: "expected a number bufferRange, found none".to_owned(),
+                error: format!("expected a number bufferRange, found {range:?}"),
             });
             continue;
         };
@@ -119,10 +114,7 @@ fn header(bytes: &[u8]) -> Result<Header, ReadError> {
         end: 0,
     };
     while let Some(length) = bytes[header.end..].iter().position(|&b| b == b'\n') {
-        let line: String = bytes[header.end..header.end + length]
-            .iter()
-            .map(|&b| char::from(b))
-            .collect();
+        let line = words::decode(&bytes[header.end..header.end + length]);
         header.end += length + 1;
         // A blank begins a line of a longer value, such as a comment.
         if line.starts_with(' ') {
@@ -174,20 +166,22 @@ fn info(lines: &[(String, String)]) -> ChannelInfo {
 
 /// Everything about the frame but its channels.
 fn frame(lines: &[(String, String)]) -> Scan {
-    let nm = |key: &str| number(lines, key).map(|metres| metres * 1e9);
+    let unread = Unread::default();
+    let number = |key: &str| unread.number(key, get(lines, key));
+    let nm = |key: &str| number(key).map(|metres| metres * 1e9);
     Scan {
         format: match get(lines, "version").filter(|version| !version.is_empty()) {
             Some(version) => format!("{FORMAT} {version}"),
             None => FORMAT.to_owned(),
         },
-        acquired: get(lines, "dateAcquired").and_then(date_time),
-        frame_direction: match get(lines, "scanUp") {
-            Some("TRUE") => Some(FrameDirection::Up),
-            Some("FALSE") => Some(FrameDirection::Down),
+        acquired: unread.entry("dateAcquired", get(lines, "dateAcquired"), date_time),
+        frame_direction: unread.entry("scanUp", get(lines, "scanUp"), |up| match up {
+            "TRUE" => Some(FrameDirection::Up),
+            "FALSE" => Some(FrameDirection::Down),
             _ => None,
-        },
-        line_rate_hz: number(lines, "scanSpeed").filter(|&rate| rate > 0.0),
-        rotation_rad: number(lines, "scanAngle").unwrap_or(0.0).to_radians(),
+        }),
+        line_rate_hz: number("scanSpeed").filter(|&rate| rate > 0.0),
+        rotation_rad: number("scanAngle").unwrap_or(0.0).to_radians(),
         offset_nm: ["xOffset", "yOffset"].map(|key| nm(key).unwrap_or(0.0)),
         size_nm: nm("xLength")
             .zip(nm("yLength"))
@@ -198,6 +192,7 @@ fn frame(lines: &[(String, String)]) -> Scan {
             .filter(|(_, value)| !value.is_empty())
             .cloned()
             .collect(),
+        notes: unread.notes(),
         ..Scan::default()
     }
 }

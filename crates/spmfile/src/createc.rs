@@ -30,8 +30,8 @@ use crate::raster::{self, Encoding, Order};
 use crate::scan::{ChannelInfo, FrameDirection, LineDirection, Samples, Scan};
 use crate::signature::head;
 use crate::stored::{Failure, Stored, Unpacked};
-use crate::units;
 use crate::whole::{Extent, MOST_CHANNELS};
+use crate::words::{self, Unread};
 
 const FORMAT: &str = "Createc";
 /// The header with the letters `DATA` at its end.
@@ -125,6 +125,7 @@ pub(crate) fn open<'a>(input: &Input<'a>) -> Result<Outline<'a>, ReadError> {
         let samples = move || stored.channel(index).map(Unpacked::measured);
         outline.add(of_channel, Stored::Packed(Box::new(samples)));
     }
+    outline.scan.notes.extend(header.unread.notes());
     extent.judge(outline, input.length)
 }
 
@@ -147,32 +148,38 @@ fn data_start(bytes: &[u8]) -> Result<usize, ReadError> {
 fn text(bytes: &[u8]) -> Cow<'_, str> {
     let binary = |b: &u8| *b < b' ' && !matches!(b, b'\t' | b'\r' | b'\n');
     let head = &bytes[..bytes.len().min(HEADER)];
-    units::decode(&head[..head.iter().position(binary).unwrap_or(head.len())])
+    words::decode(&head[..head.iter().position(binary).unwrap_or(head.len())])
 }
 
 /// Name and unit of a channel; factor and words where its samples become values by them.
 type Described = (ChannelInfo, &'static str, Option<(f64, String)>);
 
 /// Keys and values, in the order of the file.
-struct Header<'a>(Vec<(&'a str, &'a str)>);
+struct Header<'a> {
+    lines: Vec<(&'a str, &'a str)>,
+    unread: Unread,
+}
 
 impl<'a> Header<'a> {
     fn of(text: &'a str) -> Self {
         let lines = text.lines().filter_map(|line| line.split_once('='));
         let lines = lines.map(|(key, value)| (key.trim(), value.trim()));
-        Self(lines.filter(|(key, _)| !matches!(*key, "" | "/")).collect())
+        Self {
+            lines: lines.filter(|(key, _)| !matches!(*key, "" | "/")).collect(),
+            unread: Unread::default(),
+        }
     }
 
     /// The value of a key by its internal name.
     fn get(&self, key: &str) -> Option<&'a str> {
         let name = |full: &'a str| full.split(" / ").next().unwrap_or("").trim();
-        let found = self.0.iter().find(|(full, _)| name(full) == key);
+        let found = self.lines.iter().find(|(full, _)| name(full) == key);
         found.map(|(_, value)| *value).filter(|v| !v.is_empty())
     }
 
     fn number(&self, key: &str) -> Option<f64> {
-        let text = self.get(key)?.replace(',', ".");
-        text.parse().ok().filter(|n: &f64| n.is_finite())
+        let number = |text: &str| words::number(&text.replace(',', "."));
+        self.unread.entry(key, self.get(key), number)
     }
 
     fn count(&self, key: &str) -> Result<usize, ReadError> {
@@ -188,7 +195,8 @@ impl<'a> Header<'a> {
     fn signals(&self, channels: usize) -> Option<Vec<u32>> {
         let bits = |word: u32| (0..32).filter(|bit| word >> bit & 1 == 1).collect();
         let first = |n: u32| (0..n.min(32)).collect();
-        let told = |key: &str| self.get(key)?.parse::<u32>().ok();
+        let word = |text: &str| text.parse::<u32>().ok();
+        let told = |key: &str| self.unread.entry(key, self.get(key), word);
         let selected: [Option<Vec<u32>>; 2] = [
             told("Channelselectval").map(bits),
             told("Chan(1,2,4)").map(first),
@@ -247,7 +255,8 @@ impl<'a> Header<'a> {
     fn volts_per_count(&self) -> Option<(f64, String)> {
         if let Some(kind) = self.get("DAC-Type") {
             let bits = kind.trim_end_matches(|c: char| !c.is_ascii_digit());
-            let bits: i32 = bits.parse().ok().filter(|bits| (8..=32).contains(bits))?;
+            let told = |_: &str| bits.parse().ok().filter(|bits| (8..=32).contains(bits));
+            let bits: i32 = self.unread.entry("DAC-Type", Some(kind), told)?;
             return Some((RANGE_V / 2f64.powi(bits), format!("{RANGE_V} V / 2^{bits}")));
         }
         let [length, columns] = [self.number("Length x[A]")?, self.number("Num.X")?];
@@ -278,7 +287,7 @@ impl<'a> Header<'a> {
                 .then(|| "the lines followed a sine (ScanmodeSine): whether their samples are evenly spaced is not known".to_owned())
                 .into_iter()
                 .collect(),
-            metadata: self.0.iter().map(|&(key, value)| (key.to_owned(), value.to_owned())).collect(),
+            metadata: self.lines.iter().map(|&(key, value)| (key.to_owned(), value.to_owned())).collect(),
             ..Scan::default()
         }
     }

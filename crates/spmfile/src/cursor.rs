@@ -86,12 +86,10 @@ impl<'a> Cursor<'a> {
         self.slice(length, "a block").map(|_| ())
     }
 
-    /// A text of fixed width in Latin-1, without what follows its first NUL and outer blanks.
+    /// A text of fixed width, without what follows its first NUL and outer blanks.
     pub(crate) fn text(&mut self, width: usize, what: &str) -> Result<String, String> {
         let bytes = self.slice(width, what)?;
-        let end = bytes.iter().position(|&b| b == 0).unwrap_or(width);
-        let text: String = bytes[..end].iter().map(|&b| char::from(b)).collect();
-        Ok(text.trim().to_owned())
+        Ok(crate::words::field(bytes))
     }
 
     /// The bytes up to the next NUL, behind which the position moves.

@@ -1,7 +1,7 @@
 //! The text headers of Gwyddion's simple formats: a magic line, lines `Key = value`, NULs up to
 //! the next multiple of a width, binary samples.
 
-use crate::words::one_line;
+use crate::words::{self, Unread, one_line};
 
 /// Keys and values of the header and the byte at which the samples begin.
 ///
@@ -15,7 +15,7 @@ pub(crate) fn header(bytes: &[u8], padding: usize) -> Result<Header, String> {
         .position(|&b| b == 0)
         .ok_or("expected a NUL behind the header, found none: the file was cut off inside it")?;
     let start = (end / padding + 1) * padding;
-    let text = String::from_utf8_lossy(&bytes[..end]);
+    let text = words::decode(&bytes[..end]);
     let fields = text
         .lines()
         .skip(1)
@@ -46,11 +46,8 @@ pub(crate) fn get<'a>(fields: &'a [(String, String)], key: &str) -> Option<&'a s
 }
 
 /// A finite number.
-pub(crate) fn number(fields: &[(String, String)], key: &str) -> Option<f64> {
-    get(fields, key)?
-        .parse()
-        .ok()
-        .filter(|n: &f64| n.is_finite())
+pub(crate) fn number(fields: &[(String, String)], key: &str, unread: &Unread) -> Option<f64> {
+    unread.number(key, get(fields, key))
 }
 
 /// A count above 0.

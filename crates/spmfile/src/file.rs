@@ -10,6 +10,7 @@ use crate::options::ArrayOptions;
 use crate::outline::{Input, Outline};
 use crate::readers::Reader;
 use crate::source::{Data, Source};
+use crate::words;
 
 /// Headers at the start of a file are looked for in so many bytes; most have less.
 const HEAD: u64 = 128 << 10;
@@ -176,11 +177,7 @@ fn no_reader(format: Format, bytes: &[u8]) -> ReadError {
         Format::Empty => ReadError::Empty,
         Format::Other(found) => ReadError::OtherFormat { found },
         Format::Text => ReadError::Text {
-            start: String::from_utf8_lossy(&bytes[..bytes.len().min(40)])
-                .lines()
-                .next()
-                .unwrap_or("")
-                .to_owned(),
+            start: words::beginning(bytes),
         },
         _ => ReadError::Unknown {
             start: format!("{:02x?}", &bytes[..bytes.len().min(8)]),

@@ -24,6 +24,7 @@ use crate::scan::{ChannelInfo, DateTime, FrameDirection, LineDirection, Scan, Sp
 use crate::stored::Flat;
 use crate::units::{self, quantity};
 use crate::whole::{Extent, MOST_CHANNELS};
+use crate::words::{self, Unread};
 
 const FORMAT: &str = "Igor binary wave";
 /// Length of both headers of a version 5 file.
@@ -98,9 +99,13 @@ pub(crate) fn open<'a>(input: &Input<'a>) -> Result<Outline<'a>, ReadError> {
             tail.line_labels.join(", ")
         )));
     }
-    let note = Note(&tail.note);
+    let note = Note {
+        lines: &tail.note,
+        unread: Unread::default(),
+    };
     let mut outline = Outline::of(frame(&note));
     let [width_nm, height_nm] = extent_nm(&wave, &note);
+    outline.scan.notes = note.unread.notes();
     outline.scan.size_nm = width_nm
         .zip(height_nm)
         .map(|(width, height)| [width, height]);
@@ -289,7 +294,7 @@ fn tail(bytes: &[u8], wave: &Wave, data: usize) -> Tail {
         Ok((note, [lines, layers]))
     };
     let (note, [line_labels, labels]) = blocks().unwrap_or_default();
-    let text = units::decode(note);
+    let text = words::decode(note);
     let note = text
         .split(['\r', '\n'])
         .filter_map(|line| line.split_once(':'))
@@ -307,11 +312,7 @@ fn labels(block: &[u8]) -> Vec<String> {
     let mut labels: Vec<String> = block
         .chunks_exact(LABEL)
         .skip(1)
-        .map(|label| {
-            let end = label.iter().position(|&b| b == 0).unwrap_or(LABEL);
-            let text = units::decode(&label[..end]);
-            text.trim().to_owned()
-        })
+        .map(words::field)
         .collect();
     if labels.iter().all(String::is_empty) {
         labels.clear();
@@ -361,22 +362,26 @@ fn unit(wave: &Wave, label: &str, layers: usize) -> String {
 }
 
 /// Keys and values of the note; a value changed during the scan stands there again, with `@Line`.
-struct Note<'a>(&'a [(String, String)]);
+struct Note<'a> {
+    lines: &'a [(String, String)],
+    unread: Unread,
+}
 
 impl Note<'_> {
     fn get(&self, key: &str) -> Option<&str> {
-        let (_, value) = self.0.iter().find(|(k, _)| k == key)?;
+        let (_, value) = self.lines.iter().find(|(k, _)| k == key)?;
         Some(value)
     }
 
     fn number(&self, key: &str) -> Option<f64> {
-        quantity(self.get(key)?).map(|(number, _)| number)
+        let number = |text| quantity(text).map(|(number, _)| number);
+        self.unread.entry(key, self.get(key), number)
     }
 
     /// A number that did not change during the scan.
     fn constant(&self, key: &str) -> Option<f64> {
         let first = self.number(key)?;
-        let mut all = self.0.iter().filter(|(k, _)| k == key);
+        let mut all = self.lines.iter().filter(|(k, _)| k == key);
         let same = |value: &str| {
             quantity(value).is_some_and(|(n, _)| (n - first).abs() <= 1e-3 * first.abs())
         };
@@ -438,22 +443,22 @@ fn frame(note: &Note<'_>) -> Scan {
             (_, true) => Some(false),
             _ => None,
         },
-        metadata: note.0.to_vec(),
+        metadata: note.lines.to_vec(),
         ..Scan::default()
     }
 }
 
 /// `2021-10-11` and `3:52:01 PM`.
 fn acquired(note: &Note<'_>) -> Option<DateTime> {
-    let date: Vec<i64> = note
-        .get("Date")?
-        .split('-')
-        .filter_map(|part| part.trim().parse().ok())
-        .collect();
-    let [year, month, day] = date[..] else {
-        return None;
-    };
-    clock::date([year, month, day], clock::clock(note.get("Time")?)?)
+    let day = note.unread.entry("Date", note.get("Date"), |text| {
+        let date: Option<Vec<i64>> = text
+            .split('-')
+            .map(|part| part.trim().parse().ok())
+            .collect();
+        <[i64; 3]>::try_from(date?).ok()
+    });
+    let time = note.unread.entry("Time", note.get("Time"), clock::clock);
+    clock::date(day?, time?)
 }
 
 #[cfg(test)]

@@ -20,6 +20,7 @@ use crate::raster::{self, Order};
 use crate::scan::{ChannelInfo, DateTime, FrameDirection, LineDirection, Scan};
 use crate::stored::Stored;
 use crate::units;
+use crate::words::{self, Unread};
 
 const FORMAT: &str = "ISO 28632";
 /// Number of header lines.
@@ -58,6 +59,7 @@ pub(crate) fn open<'a>(input: &Input<'a>) -> Result<Outline<'a>, ReadError> {
         })?;
     let order = header.order()?;
     let mut outline = Outline::of(header.frame());
+    outline.scan.notes = header.unread.notes();
     let size = outline.scan.size_nm;
     for (info, unit) in channels {
         let of_channel = ChannelHeader {
@@ -90,14 +92,17 @@ fn split(bytes: &[u8]) -> Result<(Vec<String>, &[u8]), ReadError> {
                 lines.len()
             )));
         };
-        let text = units::decode(&rest[..end]);
+        let text = words::decode(&rest[..end]);
         lines.push(text.trim().to_owned());
         rest = &rest[end + 1..];
     }
     Ok((lines, rest))
 }
 
-struct Header<'a>(&'a [String]);
+struct Header<'a> {
+    lines: &'a [String],
+    unread: Unread,
+}
 
 impl<'a> Header<'a> {
     fn of(lines: &'a [String]) -> Result<Self, ReadError> {
@@ -109,20 +114,20 @@ impl<'a> Header<'a> {
                 )));
             }
         }
-        Ok(Self(lines))
+        Ok(Self {
+            lines,
+            unread: Unread::default(),
+        })
     }
 
     /// A line that is not empty; numbers count from 1.
     fn text(&self, line: usize) -> Option<&'a str> {
-        let text = self.0.get(line.checked_sub(1)?)?.as_str();
+        let text = self.lines.get(line.checked_sub(1)?)?.as_str();
         (!text.is_empty()).then_some(text)
     }
 
     fn number(&self, line: usize) -> Option<f64> {
-        self.text(line)?
-            .parse()
-            .ok()
-            .filter(|n: &f64| n.is_finite())
+        self.unread.number(&format!("line {line}"), self.text(line))
     }
 
     fn count(&self, line: usize) -> Result<usize, ReadError> {
@@ -137,8 +142,7 @@ impl<'a> Header<'a> {
 
     /// A length: its number in one line, its unit in another.
     fn length_nm(&self, line: usize, unit: usize) -> Option<f64> {
-        let unit = units::clean(self.text(unit)?);
-        Some(self.number(line)? * units::nm_per(&unit)?)
+        Some(self.number(line)? * units::nm_per(self.text(unit)?)?)
     }
 
     /// Whether the scan's parameters are said to be invented.
@@ -259,7 +263,7 @@ impl<'a> Header<'a> {
                 _ => None,
             },
             metadata: self
-                .0
+                .lines
                 .iter()
                 .enumerate()
                 .filter(|(index, line)| {
@@ -273,7 +277,11 @@ impl<'a> Header<'a> {
     }
 
     fn date(&self) -> Option<DateTime> {
-        let part = |line: usize| self.text(line)?.parse::<i64>().ok();
+        let whole = |text: &str| text.parse::<i64>().ok();
+        let part = |line: usize| {
+            self.unread
+                .entry(&format!("line {line}"), self.text(line), whole)
+        };
         clock::date(
             [part(9)?, part(10)?, part(11)?],
             [part(12)?, part(13)?, part(14)?],
@@ -289,7 +297,7 @@ fn values(
 ) -> Result<(Vec<Vec<f64>>, Option<String>), ReadError> {
     let count = chosen.iter().filter(|&&c| c).count();
     let mut all: Vec<Vec<f64>> = vec![Vec::with_capacity(pixels); count];
-    let text = String::from_utf8_lossy(body);
+    let text = words::decode(body);
     let mut lines = text.lines();
     for pixel in 0..pixels {
         let line = lines.next().unwrap_or("").trim();

@@ -26,6 +26,7 @@ use crate::signature::{first_entry, tiff_has};
 use crate::stored::Flat;
 use crate::tiff_tags::{Directory, directories};
 use crate::whole::{Extent, some_readable};
+use crate::words::Unread;
 
 const FORMAT: &str = "JPK";
 /// The entry of an archive of curves that holds the image of the map begins like this, and ends
@@ -276,6 +277,7 @@ fn default_slot(page: &Directory<'_>) -> Result<Slot, String> {
 
 /// Everything about the frame but its channels.
 fn frame(first: &Directory<'_>) -> Scan {
+    let unread = Unread::default();
     let nm = |tag: u16| first.number(tag).map(|metres| metres * 1e9);
     let size = nm(U_LENGTH)
         .zip(nm(V_LENGTH))
@@ -292,7 +294,7 @@ fn frame(first: &Directory<'_>) -> Scan {
         format: FORMAT.to_owned(),
         acquired: [END_DATE, START_DATE]
             .iter()
-            .find_map(|&tag| date_time(&first.text(tag)?)),
+            .find_map(|&tag| unread.entry("its date", first.text(tag).as_deref(), date_time)),
         frame_direction: match first.text(MOTION).as_deref() {
             // Whether a reflected grid reverses the words as well is not known.
             Some("bottomUp") if !reflected => Some(FrameDirection::Up),
@@ -305,6 +307,7 @@ fn frame(first: &Directory<'_>) -> Scan {
         offset_nm: centre(nm(X0), nm(Y0), size, rotation, reflected),
         size_nm: size,
         metadata: metadata(first),
+        notes: unread.notes(),
         ..Scan::default()
     }
 }

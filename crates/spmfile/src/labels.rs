@@ -5,6 +5,7 @@
 
 use crate::fields;
 use crate::scan::{Channel, DateTime, FrameDirection, LineDirection, Scan};
+use crate::words::{self, Unread};
 
 /// The line direction that a title tells: `Z (Backward)`, `Height [Trace]`, `Phase Retrace`.
 pub(crate) fn line_direction(title: &str) -> Option<LineDirection> {
@@ -187,16 +188,13 @@ pub(crate) fn value<'a>(lines: &'a [(String, String)], key: &str) -> Option<&'a 
 /// Moves our keys from the metadata of a scan to where they belong.
 pub(crate) fn apply(scan: &mut Scan) {
     let lines = std::mem::take(&mut scan.metadata);
-    let number = |key: &str| {
-        value(&lines, key)?
-            .parse()
-            .ok()
-            .filter(|n: &f64| n.is_finite())
-    };
+    let unread = Unread::default();
+    let number = |key: &str| unread.number(key, value(&lines, key));
     let pair = |key: &str| -> Option<[f64; 2]> {
-        let (a, b) = value(&lines, key)?.split_once(' ')?;
-        let both = [a.parse().ok()?, b.parse().ok()?];
-        both.iter().all(|n: &f64| n.is_finite()).then_some(both)
+        unread.entry(key, value(&lines, key), |text| {
+            let (a, b) = text.split_once(' ')?;
+            Some([words::number(a)?, words::number(b)?])
+        })
     };
     if let Some(format) = value(&lines, "format") {
         // Once only, however often it is converted.
@@ -204,12 +202,8 @@ pub(crate) fn apply(scan: &mut Scan) {
         scan.format = format!("{} from {origin}", scan.format);
     }
     scan.instrument = value(&lines, "instrument").map(str::to_owned);
-    scan.acquired = value(&lines, "acquired").and_then(date);
-    scan.frame_direction = match value(&lines, "frame direction") {
-        Some("up") => Some(FrameDirection::Up),
-        Some("down") => Some(FrameDirection::Down),
-        _ => None,
-    };
+    scan.acquired = unread.entry("acquired", value(&lines, "acquired"), date);
+    scan.frame_direction = value(&lines, "frame direction").and_then(FrameDirection::named);
     scan.line_rate_hz = number("line rate (Hz)").filter(|&n| n > 0.0);
     scan.line_times_s = pair("line times (s)").filter(|&[a, b]| a > 0.0 && b >= 0.0);
     scan.rounding = number("rounding").filter(|&n| n >= 0.0);
@@ -219,6 +213,7 @@ pub(crate) fn apply(scan: &mut Scan) {
     scan.closed_loop = value(&lines, "closed loop").and_then(|v| v.parse().ok());
     let notes = (1..).map_while(|n| value(&lines, &format!("note {n}")));
     scan.notes.extend(notes.map(str::to_owned));
+    scan.notes.extend(unread.notes());
     scan.metadata = lines
         .into_iter()
         .filter(|(key, _)| !key.starts_with("spmfile "))

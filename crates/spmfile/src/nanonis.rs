@@ -25,8 +25,8 @@ use crate::outline::{Input, Outline};
 use crate::raster::{self, Encoding, Order};
 use crate::scan::{ChannelInfo, DateTime, FrameDirection, LineDirection, Scan};
 use crate::stored::Flat;
-use crate::units;
 use crate::whole::{Extent, MOST_CHANNELS};
+use crate::words::{self, Unread};
 
 const FORMAT: &str = "Nanonis";
 const END: &[u8] = b":SCANIT_END:";
@@ -88,7 +88,7 @@ fn header(bytes: &[u8]) -> Result<(String, usize), ReadError> {
     };
     let end = find(END, 0).ok_or_else(|| cut_off(":SCANIT_END:"))?;
     let mark = find(&[0x1a, 0x04], end).ok_or_else(|| cut_off("the bytes 1A 04"))?;
-    let text = units::decode(&bytes[..end]);
+    let text = words::decode(&bytes[..end]);
     Ok((text.into_owned(), mark + 2))
 }
 
@@ -118,12 +118,15 @@ fn field<'a>(fields: &'a [(&str, String)], key: &str) -> Option<&'a str> {
 }
 
 /// The numbers of a field, if they are `N` finite ones.
-fn numbers<const N: usize>(fields: &[(&str, String)], key: &str) -> Option<[f64; N]> {
-    let parsed: Option<Vec<f64>> = field(fields, key)?
-        .split_whitespace()
-        .map(|word| word.parse().ok().filter(|n: &f64| n.is_finite()))
-        .collect();
-    parsed?.try_into().ok()
+fn numbers<const N: usize>(
+    fields: &[(&str, String)],
+    key: &str,
+    unread: &Unread,
+) -> Option<[f64; N]> {
+    unread.entry(key, field(fields, key), |text| {
+        let numbers: Option<Vec<f64>> = text.split_whitespace().map(words::number).collect();
+        numbers?.try_into().ok()
+    })
 }
 
 fn sample_kind(fields: &[(&str, String)]) -> Result<Endian, ReadError> {
@@ -217,24 +220,18 @@ fn images(fields: &[(&str, String)]) -> Result<Vec<(ChannelInfo, String)>, ReadE
 
 /// Everything about the frame but its channels.
 fn frame(fields: &[(&str, String)]) -> Scan {
-    let nm = |key: &str| numbers::<2>(fields, key).map(|lengths| lengths.map(|m| m * 1e9));
-    let line_times_s = numbers::<2>(fields, "SCAN_TIME")
+    let unread = Unread::default();
+    let nm = |key: &str| numbers::<2>(fields, key, &unread).map(|lengths| lengths.map(|m| m * 1e9));
+    let line_times_s = numbers::<2>(fields, "SCAN_TIME", &unread)
         .filter(|&[forward, backward]| forward > 0.0 && backward >= 0.0);
-    let clockwise = numbers::<1>(fields, "SCAN_ANGLE").map_or(0.0, |[angle]| angle);
+    let clockwise = numbers::<1>(fields, "SCAN_ANGLE", &unread).map_or(0.0, |[angle]| angle);
     Scan {
         format: match field(fields, "NANONIS_VERSION") {
             Some(version) => format!("Nanonis {version}"),
             None => FORMAT.to_owned(),
         },
-        acquired: saved(fields),
-        frame_direction: match field(fields, "SCAN_DIR")
-            .map(str::to_ascii_lowercase)
-            .as_deref()
-        {
-            Some("up") => Some(FrameDirection::Up),
-            Some("down") => Some(FrameDirection::Down),
-            _ => None,
-        },
+        acquired: saved(fields, &unread),
+        frame_direction: field(fields, "SCAN_DIR").and_then(FrameDirection::named),
         line_rate_hz: line_times_s.map(|[forward, backward]| 1.0 / (forward + backward)),
         line_times_s,
         rotation_rad: if clockwise == 0.0 {
@@ -249,24 +246,25 @@ fn frame(fields: &[(&str, String)]) -> Scan {
             .filter(|(key, _)| *key != "DATA_INFO")
             .map(|(key, value)| ((*key).to_owned(), value.trim().to_owned()))
             .collect(),
+        notes: unread.notes(),
         ..Scan::default()
     }
 }
 
 /// When the frame ended.
-fn saved(fields: &[(&str, String)]) -> Option<DateTime> {
-    let date: Vec<i64> = field(fields, "REC_DATE")?
-        .split('.')
-        .filter_map(|part| part.trim().parse().ok())
-        .collect();
-    let [day, month, year] = date[..] else {
-        return None;
-    };
-    let start = clock::date(
-        [year, month, day],
-        clock::clock(field(fields, "REC_TIME")?)?,
-    )?;
-    let duration = numbers::<1>(fields, "ACQ_TIME").map_or(0.0, |[seconds]| seconds.max(0.0));
+fn saved(fields: &[(&str, String)], unread: &Unread) -> Option<DateTime> {
+    let date = unread.entry("REC_DATE", field(fields, "REC_DATE"), |text| {
+        let date: Option<Vec<i64>> = text
+            .split('.')
+            .map(|part| part.trim().parse().ok())
+            .collect();
+        <[i64; 3]>::try_from(date?).ok()
+    });
+    let time = unread.entry("REC_TIME", field(fields, "REC_TIME"), clock::clock);
+    let [day, month, year] = date?;
+    let start = clock::date([year, month, day], time?)?;
+    let duration =
+        numbers::<1>(fields, "ACQ_TIME", unread).map_or(0.0, |[seconds]| seconds.max(0.0));
     Some(clock::later(start, duration))
 }
 

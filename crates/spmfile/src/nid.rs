@@ -1,6 +1,6 @@
 //! Nanosurf files (`.nid`, and `.ezd` before).
 //!
-//! A text of sections `[name]` with lines `key=value` in Latin-1, the bytes `#!`, and the images
+//! A text of sections `[name]` with lines `key=value`, the bytes `#!`, and the images
 //! one behind the other. The section `DataSet` lists them by group (`Gr0-Ch1`), each with a section
 //! of its own; `Dim0` and `Dim1` are the axes, `Dim2` the value.
 //!
@@ -24,8 +24,9 @@ use crate::outline::{Input, Outline};
 use crate::raster::{self, Encoding};
 use crate::scan::{ChannelInfo, DateTime, FrameDirection, LineDirection, Scan, UnreadableChannel};
 use crate::stored::Flat;
-use crate::units::{clean, nm_per};
+use crate::units::{self, nm_per};
 use crate::whole::{Extent, MOST_CHANNELS, some_readable};
+use crate::words::{self, Unread};
 
 const FORMAT: &str = "Nanosurf";
 const DATA_MARK: &[u8] = b"#!";
@@ -37,6 +38,7 @@ fn damaged(reason: impl Into<String>) -> ReadError {
 /// Sections by name, keys in the order of the file.
 struct Header {
     sections: Vec<(String, Vec<(String, String)>)>,
+    unread: Unread,
 }
 
 impl Header {
@@ -48,6 +50,11 @@ impl Header {
     /// A value of what the user sees of the scan.
     fn info(&self, key: &str) -> Option<&str> {
         get(self.section("DataSet-Info")?, key)
+    }
+
+    /// The same as a number with a unit: lengths in nm, times in s.
+    fn quantity(&self, key: &str) -> Option<(f64, String)> {
+        self.unread.entry(key, self.info(key), quantity)
     }
 }
 
@@ -96,7 +103,10 @@ pub(crate) fn open<'a>(input: &Input<'a>) -> Result<Outline<'a>, ReadError> {
                     check: unfilled(&block, section, outline.scan.frame_direction),
                     ..Flat::at(here, block.encoding, block.endian)
                 };
-                outline.add_flat(channel(info, &block, section, scaling), samples);
+                outline.add_flat(
+                    channel(info, &block, section, scaling, &header.unread),
+                    samples,
+                );
             }
             Err(error) => outline.scan.unreadable.push(UnreadableChannel {
                 name: info.name,
@@ -114,13 +124,12 @@ pub(crate) fn open<'a>(input: &Input<'a>) -> Result<Outline<'a>, ReadError> {
     outline.scan.size_nm = first
         .and_then(|c| c.header.width_nm.zip(c.header.height_nm))
         .map(Into::into);
+    outline.scan.notes = header.unread.notes();
     extent.judge(some_readable(outline, announced)?, input.length)
 }
 
 fn header(bytes: &[u8]) -> Header {
-    let text = encoding_rs::WINDOWS_1252
-        .decode_without_bom_handling(bytes)
-        .0;
+    let text = words::decode(bytes);
     let mut sections: Vec<(String, Vec<(String, String)>)> = Vec::new();
     for line in text.lines().map(str::trim) {
         let name = line.strip_prefix('[').and_then(|l| l.strip_suffix(']'));
@@ -133,7 +142,10 @@ fn header(bytes: &[u8]) -> Header {
             lines.push((key.trim().to_owned(), value.trim().to_owned()));
         }
     }
-    Header { sections }
+    Header {
+        sections,
+        unread: Unread::default(),
+    }
 }
 
 /// Names of the sections of all blocks of data, in the order of the data.
@@ -266,11 +278,11 @@ fn channel(
     block: &Block,
     section: &[(String, String)],
     scaling: Scaling,
+    unread: &Unread,
 ) -> ChannelHeader {
     let length = |axis: u8| {
-        let range = get(section, &format!("Dim{axis}Range"))?
-            .parse::<f64>()
-            .ok()?;
+        let key = format!("Dim{axis}Range");
+        let range = unread.number(&key, get(section, &key))?;
         let nm = nm_per(get(section, &format!("Dim{axis}Unit"))?)?;
         Some((range * nm).abs()).filter(|&length| length > 0.0 && length.is_finite())
     };
@@ -306,17 +318,13 @@ fn unfilled(
 
 /// Everything about the frame but its channels.
 fn frame(header: &Header) -> Scan {
-    let length = |key: &str| quantity(header.info(key)?).filter(|(_, unit)| unit == "nm");
+    let length = |key: &str| header.quantity(key).filter(|(_, unit)| unit == "nm");
     let offset_nm = ["X-Pos", "Y-Pos"].map(|key| length(key).map_or(0.0, |(nm, _)| nm));
     let line_time = header
-        .info("Time/Line")
-        .and_then(quantity)
+        .quantity("Time/Line")
         .filter(|(time, unit)| unit == "s" && *time > 0.0)
         .map(|(time, _)| time);
-    let rotation = header
-        .info("Rotation")
-        .and_then(quantity)
-        .map_or(0.0, |(angle, _)| angle);
+    let rotation = header.quantity("Rotation").map_or(0.0, |(angle, _)| angle);
     let software = header.info("Software ver.");
     Scan {
         format: match software {
@@ -325,15 +333,11 @@ fn frame(header: &Header) -> Scan {
         },
         instrument: header.info("Head type").map(str::to_owned),
         acquired: date_time(header),
-        frame_direction: match header
-            .info("Scan direction")
-            .map(str::to_ascii_lowercase)
-            .as_deref()
-        {
-            Some("up") => Some(FrameDirection::Up),
-            Some("down") => Some(FrameDirection::Down),
-            _ => None,
-        },
+        frame_direction: header.unread.entry(
+            "Scan direction",
+            header.info("Scan direction"),
+            FrameDirection::named,
+        ),
         line_rate_hz: line_time.map(|time| 0.5 / time),
         line_times_s: line_time.map(|time| [time, time]),
         rotation_rad: rotation.to_radians(),
@@ -343,21 +347,8 @@ fn frame(header: &Header) -> Scan {
     }
 }
 
-/// A number and its unit; lengths in nm, times in s.
 fn quantity(text: &str) -> Option<(f64, String)> {
-    let text = clean(text);
-    // An exponent belongs to the number, the unit begins with a letter that is none.
-    let end = text
-        .char_indices()
-        .find(|&(i, c)| {
-            let exponent = matches!(c, 'e' | 'E')
-                && text[i + 1..]
-                    .starts_with(|c: char| c.is_ascii_digit() || matches!(c, '+' | '-'));
-            !(c.is_ascii_digit() || matches!(c, '+' | '-' | '.') || exponent)
-        })
-        .map_or(text.len(), |(i, _)| i);
-    let number = text[..end].parse::<f64>().ok().filter(|n| n.is_finite())?;
-    let unit = text[end..].trim();
+    let (number, unit) = units::quantity(text)?;
     Some(match (nm_per(unit), unit) {
         (Some(nm), _) => (number * nm, "nm".to_owned()),
         (None, "ms") => (number * 1e-3, "s".to_owned()),
@@ -368,10 +359,16 @@ fn quantity(text: &str) -> Option<(f64, String)> {
 
 /// `01-03-2016`, day first, and `18:36:58`.
 fn date_time(header: &Header) -> Option<DateTime> {
-    let mut dmy = header.info("Date")?.split('-').map(str::parse::<i64>);
-    let mut number = || dmy.next()?.ok();
-    let (day, month, year) = (number()?, number()?, number()?);
-    clock::date([year, month, day], clock::clock(header.info("Time")?)?)
+    let day = header.unread.entry("Date", header.info("Date"), |text| {
+        let mut dmy = text.split('-').map(str::parse::<i64>);
+        let mut number = || dmy.next()?.ok();
+        Some([number()?, number()?, number()?])
+    });
+    let time = header
+        .unread
+        .entry("Time", header.info("Time"), clock::clock);
+    let [day, month, year] = day?;
+    clock::date([year, month, day], time?)
 }
 
 #[cfg(test)]

@@ -24,6 +24,7 @@ use crate::signature::tiff_has;
 use crate::stored::Flat;
 use crate::tiff_tags::{Directory, directories};
 use crate::whole::Extent;
+use crate::words::{Unread, wide_field};
 
 const FORMAT: &str = "Park";
 const DATE: u16 = 306;
@@ -207,12 +208,7 @@ fn structure(c: &mut Cursor<'_>, version: f64) -> Result<(u32, Result<Header, St
 /// A text of fixed width in UTF-16.
 fn text(cursor: &mut Cursor<'_>, units: usize) -> Result<String, String> {
     let bytes = cursor.slice(2 * units, "a text")?;
-    let (pairs, _) = bytes.as_chunks::<2>();
-    let units = pairs.iter().map(|&pair| u16::from_le_bytes(pair));
-    let text = char::decode_utf16(units.take_while(|&unit| unit != 0))
-        .map(|c| c.unwrap_or(char::REPLACEMENT_CHARACTER))
-        .collect::<String>();
-    Ok(text.trim().to_owned())
+    Ok(wide_field(bytes))
 }
 
 fn channel(header: &Header, info: ChannelInfo) -> ChannelHeader {
@@ -227,6 +223,7 @@ fn channel(header: &Header, info: ChannelInfo) -> ChannelHeader {
 }
 
 fn frame(header: &Header, page: &Directory<'_>) -> Scan {
+    let unread = Unread::default();
     let lines = !header.swapped;
     let nm = |lengths: [f64; 2]| lengths.map(|um| um * NM_PER_MICROMETRE);
     let mut metadata: Vec<(String, String)> = [
@@ -245,7 +242,7 @@ fn frame(header: &Header, page: &Directory<'_>) -> Scan {
     let angle = Some(header.angle_degrees).filter(|angle| angle.is_finite());
     Scan {
         format: FORMAT.to_owned(),
-        acquired: page.text(DATE).and_then(|text| date_time(&text)),
+        acquired: unread.entry("its date", page.text(DATE).as_deref(), date_time),
         frame_direction: lines.then_some(if header.up {
             FrameDirection::Up
         } else {
@@ -259,6 +256,7 @@ fn frame(header: &Header, page: &Directory<'_>) -> Scan {
         size_nm: Some(nm(header.size_um))
             .filter(|size| size.iter().all(|&x| x > 0.0 && x.is_finite())),
         metadata,
+        notes: unread.notes(),
         ..Scan::default()
     }
 }

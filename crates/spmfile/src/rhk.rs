@@ -22,10 +22,11 @@ use crate::header::ChannelHeader;
 use crate::judge::Check;
 use crate::outline::{Input, Outline};
 use crate::raster::{self, Encoding, Order};
-use crate::scan::{ChannelInfo, DateTime, FrameDirection, LineDirection, Scan};
+use crate::scan::{ChannelInfo, FrameDirection, LineDirection, Scan};
 use crate::stored::Flat;
-use crate::units::{clean, nm_per};
+use crate::units::nm_per;
 use crate::whole::{Extent, MOST_CHANNELS};
+use crate::words::{Unread, wide_field};
 
 const FORMAT: &str = "RHK";
 /// Kinds of objects.
@@ -120,19 +121,8 @@ fn version(bytes: &[u8]) -> Result<String, String> {
         return Ok(mark.split_whitespace().nth(1).unwrap_or("").to_owned());
     }
     cursor.skip(2)?;
-    let mark = wide(cursor.slice(36, "a mark")?);
+    let mark = wide_field(cursor.slice(36, "a mark")?);
     Ok(mark.split_whitespace().nth(1).unwrap_or("").to_owned())
-}
-
-/// UTF-16 up to the first NUL.
-fn wide(bytes: &[u8]) -> String {
-    let (pairs, _) = bytes.as_chunks::<2>();
-    let units = pairs.iter().map(|&pair| u16::from_le_bytes(pair));
-    char::decode_utf16(units.take_while(|&unit| unit != 0))
-        .map(|c| c.unwrap_or(char::REPLACEMENT_CHARACTER))
-        .collect::<String>()
-        .trim()
-        .to_owned()
 }
 
 /// A part of the file.
@@ -273,7 +263,7 @@ fn texts(bytes: &[u8], object: Object, number: usize) -> Vec<String> {
     let mut cursor = Cursor::new(&bytes[..end], Endian::Little).at(object.place);
     let mut next = || {
         let length = usize::from(cursor.u16().ok()?);
-        cursor.slice(2 * length, "a text").ok().map(wide)
+        cursor.slice(2 * length, "a text").ok().map(wide_field)
     };
     (0..number).map_while(|_| next()).collect()
 }
@@ -299,7 +289,7 @@ impl Page {
 
     /// Width and height, nm.
     fn size_nm(&self) -> Option<[f64; 2]> {
-        let unit = nm_per(&clean(self.text(X_UNIT)))?;
+        let unit = nm_per(self.text(X_UNIT))?;
         let width = self.columns as f64 * self.x_step.abs() * unit;
         let height = self.rows as f64 * self.y_step.abs() * unit;
         let positive = |length: f64| length > 0.0 && length.is_finite();
@@ -367,13 +357,19 @@ fn tell(scan: &mut Scan, first: &Page, pages: &[Page]) {
     if first.angle_degrees.is_finite() {
         scan.rotation_rad = first.angle_degrees.to_radians();
     }
-    let unit = nm_per(&clean(first.text(X_UNIT)));
+    let unit = nm_per(first.text(X_UNIT));
     let offset = unit.map(|unit| [first.x_offset * unit, first.y_offset * unit]);
     scan.offset_nm = offset
         .filter(|offset| offset.iter().all(|x| x.is_finite()))
         .unwrap_or_default();
     scan.size_nm = first.size_nm();
-    scan.acquired = date_time(first.text(DATE), first.text(TIME));
+    let unread = Unread::default();
+    let date = unread.entry("Date", Some(first.text(DATE)), calendar_day);
+    let time = unread.entry("Time", Some(first.text(TIME)), clock::clock);
+    scan.acquired = date
+        .zip(time)
+        .and_then(|(date, time)| clock::date(date, time));
+    scan.notes = unread.notes();
     scan.metadata = [("Bias (V)", first.bias), ("Current (A)", first.current)]
         .map(|(name, value)| (name.to_owned(), value.to_string()))
         .into_iter()
@@ -384,14 +380,14 @@ fn tell(scan: &mut Scan, first: &Page, pages: &[Page]) {
         .collect();
 }
 
-/// `07/02/20`, month first, and `07:44:02`.
-fn date_time(date: &str, time: &str) -> Option<DateTime> {
+/// Year, month and day of `07/02/20`, month first.
+fn calendar_day(date: &str) -> Option<[i64; 3]> {
     let mut mdy = date.split('/').map(str::parse::<i64>);
     let mut number = || mdy.next()?.ok();
     let (month, day, year) = (number()?, number()?, number()?);
     // The format is younger than 2000.
     let year = if year < 100 { year + 2000 } else { year };
-    clock::date([year, month, day], clock::clock(time)?)
+    Some([year, month, day])
 }
 
 #[cfg(test)]

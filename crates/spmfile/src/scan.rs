@@ -16,6 +16,17 @@ pub enum FrameDirection {
     Down,
 }
 
+impl FrameDirection {
+    /// The one that is called `up` or `down`.
+    pub(crate) fn named(name: &str) -> Option<Self> {
+        match name.trim().to_ascii_lowercase().as_str() {
+            "up" => Some(Self::Up),
+            "down" => Some(Self::Down),
+            _ => None,
+        }
+    }
+}
+
 /// Sense of the fast motion within a line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum LineDirection {

@@ -1,10 +1,16 @@
 //! What the first bytes of containers and texts tell: tags of a TIFF file, entries of a ZIP archive,
 //! numbers or words.
 
+use std::borrow::Cow;
+
+use crate::array::begins_table;
 use crate::cursor::{Cursor, Endian};
+use crate::words;
 
 /// So many bytes tell the format.
 const HEAD: usize = 512;
+/// A line of labels and one of numbers are no longer, mostly.
+const HEAD_OF_TABLE: usize = 1 << 16;
 
 /// The first bytes, as many as tell the format.
 pub(crate) fn head(bytes: &[u8]) -> &[u8] {
@@ -49,47 +55,35 @@ pub(crate) fn first_entry(bytes: &[u8]) -> &[u8] {
 /// Whether the first bytes are those of a text.
 pub(crate) fn is_text(bytes: &[u8]) -> bool {
     let head = head(bytes);
-    let text = head.strip_prefix(b"\xef\xbb\xbf").unwrap_or(head);
     let printable = |b: &u8| *b >= 0x20 || matches!(b, b'\t' | b'\n' | b'\r');
-    text.iter().all(printable)
+    head.iter().all(printable) || words::utf_16(head).is_some()
 }
 
-/// Whether a text is a matrix of numbers, as far as its first lines behind comments tell.
+/// Whether a text is a matrix of numbers, with labels or without, as far as its first lines behind comments tell.
 pub(crate) fn is_matrix(bytes: &[u8]) -> bool {
-    is_text(bytes) && numbers_only(behind_comments(bytes))
+    is_text(bytes) && begins_table(&whole_lines(behind_comments(bytes)))
 }
 
 /// The head of a text behind its leading comments, however long they are.
-fn behind_comments(text: &[u8]) -> &[u8] {
+fn behind_comments(text: &[u8]) -> Cow<'_, str> {
+    if words::utf_16(text).is_some() {
+        return words::decode(&text[..text.len().min(HEAD_OF_TABLE)]);
+    }
     let mut rest = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text);
     while rest.first() == Some(&b'#') {
         let end = rest.iter().position(|&b| b == b'\n');
         rest = end.map_or(&[][..], |end| &rest[end + 1..]);
     }
-    &rest[..rest.len().min(HEAD)]
+    words::decode(&rest[..rest.len().min(HEAD_OF_TABLE)])
 }
 
-/// Whether the lines, comments aside, hold numbers and nothing else. The last one may be cut off.
-fn numbers_only(text: &[u8]) -> bool {
-    let text = String::from_utf8_lossy(text);
-    // Of a single line that is longer than the head the last number may be cut off, too.
+/// The lines of a head without the one that it cuts off; of a single one without its last field.
+fn whole_lines(text: Cow<'_, str>) -> String {
     let cut = |text| str::rsplit_once(text, [',', ';', '\t', ' ']);
     let whole = match text.rsplit_once('\n') {
         Some((whole, _)) => whole,
         None if text.len() >= HEAD => cut(&*text).map_or("", |(whole, _)| whole),
         None => &text,
     };
-    let mut lines = whole
-        .lines()
-        .map(str::trim)
-        .filter(|line| !line.is_empty() && !line.starts_with('#'))
-        .peekable();
-    lines.peek().is_some()
-        && lines.all(|line| {
-            let mut words = line
-                .split([',', ';', '\t', ' '])
-                .filter(|word| !word.is_empty())
-                .peekable();
-            words.peek().is_some() && words.all(|word| word.parse::<f64>().is_ok())
-        })
+    whole.to_owned()
 }

@@ -8,6 +8,7 @@ use std::borrow::Cow;
 
 use crate::cursor::{Cursor, Endian};
 use crate::raster::Encoding;
+use crate::words;
 
 /// More directories than any instrument writes.
 const MOST_DIRECTORIES: usize = 1024;
@@ -108,15 +109,11 @@ impl<'a> Directory<'a> {
         self.entry(tag).map(|entry| entry.value)
     }
 
-    /// A text, in UTF-8 or else Latin-1, without its end mark.
+    /// A text without its end mark.
     pub(crate) fn text(&self, tag: u16) -> Option<String> {
         let entry = self.entry(tag).filter(|entry| entry.kind == 2)?;
-        let end = entry.value.iter().position(|&b| b == 0);
-        let text = &entry.value[..end.unwrap_or(entry.value.len())];
-        Some(match std::str::from_utf8(text) {
-            Ok(text) => text.trim().to_owned(),
-            Err(_) => text.iter().map(|&b| char::from(b)).collect(),
-        })
+        let end = memchr::memchr(0, entry.value).unwrap_or(entry.value.len());
+        Some(words::decode(&entry.value[..end]).trim().to_owned())
     }
 
     /// The first number of a tag.

@@ -2,11 +2,11 @@
 
 /// How many nanometres one `unit` is; `None` where it is not a length.
 pub fn nm_per(unit: &str) -> Option<f64> {
-    match unit.trim() {
+    match &*plain_unit(unit) {
         "pm" => Some(1e-3),
-        "Å" | "\u{212b}" | "angstrom" => Some(0.1),
+        "Å" => Some(0.1),
         "nm" => Some(1.0),
-        "um" | "~m" | "µm" | "μm" => Some(1e3),
+        "µm" => Some(1e3),
         "mm" => Some(1e6),
         "m" => Some(1e9),
         _ => None,
@@ -34,24 +34,10 @@ pub(crate) fn quantity(text: &str) -> Option<(f64, &str)> {
 /// `0.6 µm` in nm; `None` without a unit of length.
 pub fn length_nm(text: &str) -> Option<f64> {
     let (number, unit) = quantity(text)?;
-    Some(number * nm_per(&clean(unit))?)
+    Some(number * nm_per(unit)?)
 }
 
-/// The text of a header: UTF-8 if it is, as converters write it, otherwise Windows-1252.
-///
-/// Of the signs that matter (µ, °, Å) none is UTF-8 by chance in Windows-1252.
-pub(crate) fn decode(bytes: &[u8]) -> std::borrow::Cow<'_, str> {
-    match std::str::from_utf8(bytes) {
-        Ok(text) => text.into(),
-        Err(_) => {
-            encoding_rs::WINDOWS_1252
-                .decode_without_bom_handling(bytes)
-                .0
-        }
-    }
-}
-
-/// A unit in plain signs: `~` is micro, the ordinal sign and the like are degrees.
+/// A unit in plain signs: `~` and the Greek letter are micro, the ordinal sign and the like are degrees.
 pub(crate) fn clean(unit: &str) -> String {
     unit.trim()
         .chars()
@@ -113,7 +99,7 @@ pub(crate) fn prefix_ratio(unit: &str, base: &str) -> Option<f64> {
                 Some('f') => 1e-15,
                 Some('p') => 1e-12,
                 Some('n') => 1e-9,
-                Some('u' | 'µ') => 1e-6,
+                Some('u' | 'µ' | 'μ' | '~') => 1e-6,
                 Some('m') => 1e-3,
                 Some('k') => 1e3,
                 Some('M') => 1e6,
@@ -146,12 +132,6 @@ mod tests {
         assert_eq!(prefix_ratio("V", "Arb"), None);
         assert_eq!(prefix_ratio("m", "n"), None);
         assert_eq!(prefix_ratio("", "V"), None);
-    }
-
-    #[test]
-    fn headers_in_either_encoding() {
-        assert_eq!(decode("0.6 µm, 5 °".as_bytes()), "0.6 µm, 5 °");
-        assert_eq!(decode(b"0.6 \xb5m, 5 \xb0"), "0.6 µm, 5 °");
     }
 
     #[test]
@@ -193,7 +173,7 @@ mod tests {
     #[test]
     fn lengths() {
         assert_eq!(nm_per("nm"), Some(1.0));
-        assert_eq!(nm_per(&clean("~m")), Some(1e3));
+        assert_eq!(nm_per("~m"), Some(1e3));
         assert_eq!(nm_per("V"), None);
     }
 }

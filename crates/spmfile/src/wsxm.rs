@@ -28,6 +28,7 @@ use crate::scan::{ChannelInfo, DateTime, FrameDirection, LineDirection, Scan};
 use crate::stored::Flat;
 use crate::units::{self, quantity};
 use crate::whole::Extent;
+use crate::words::{self, Unread};
 
 const FORMAT: &str = "WSxM";
 const END: &[u8] = b"[Header end]";
@@ -69,6 +70,7 @@ pub(crate) fn open<'a>(input: &Input<'a>) -> Result<Outline<'a>, ReadError> {
     let mut extent = Extent::default();
     if extent.take(input.length, start, length, &info.name) {
         let (unit, scaling) = scaling(&header, encoding);
+        outline.scan.notes = header.unread.notes();
         let header = ChannelHeader {
             scaling: None,
             plane_fit: header
@@ -100,7 +102,7 @@ fn text(bytes: &[u8]) -> Result<(Cow<'_, str>, usize), ReadError> {
         ))
     });
     let head = &bytes[..end.as_ref().copied().unwrap_or(bytes.len().min(4096))];
-    let text = units::decode(head);
+    let text = words::decode(head);
     // Before the header's end: tables of numbers have none.
     let kind = text.lines().nth(1).unwrap_or("").trim();
     if !kind.eq_ignore_ascii_case("SxM Image file") {
@@ -113,7 +115,10 @@ fn text(bytes: &[u8]) -> Result<(Cow<'_, str>, usize), ReadError> {
 }
 
 /// Section, key and value of every line.
-struct Header<'a>(Vec<(&'a str, &'a str, &'a str)>);
+struct Header<'a> {
+    lines: Vec<(&'a str, &'a str, &'a str)>,
+    unread: Unread,
+}
 
 impl<'a> Header<'a> {
     fn of(text: &'a str) -> Self {
@@ -126,12 +131,15 @@ impl<'a> Header<'a> {
                 lines.push((section, key.trim(), value.trim()));
             }
         }
-        Self(lines)
+        Self {
+            lines,
+            unread: Unread::default(),
+        }
     }
 
     fn get(&self, section: &str, key: &str) -> Option<&'a str> {
         let found = self
-            .0
+            .lines
             .iter()
             .find(|(s, k, _)| s.eq_ignore_ascii_case(section) && k.eq_ignore_ascii_case(key));
         found.map(|(_, _, value)| *value).filter(|v| !v.is_empty())
@@ -142,7 +150,11 @@ impl<'a> Header<'a> {
     }
 
     fn number(&self, section: &str, key: &str) -> Option<f64> {
-        quantity(self.get(section, key)?).map(|(number, _)| number)
+        self.quantity(section, key).map(|(number, _)| number)
+    }
+
+    fn quantity(&self, section: &str, key: &str) -> Option<(f64, &'a str)> {
+        self.unread.entry(key, self.get(section, key), quantity)
     }
 
     fn count(&self, section: &str, key: &str) -> Result<usize, ReadError> {
@@ -219,8 +231,7 @@ type ByRange = Box<dyn Fn(f64) -> Scaling + Send + Sync>;
 /// The unit, and how samples become values.
 fn scaling(header: &Header<'_>, encoding: Encoding) -> (String, ByRange) {
     let (amplitude, unit) = header
-        .get("General Info", "Z Amplitude")
-        .and_then(quantity)
+        .quantity("General Info", "Z Amplitude")
         .map_or((None, ""), |(n, unit)| (Some(n).filter(|&n| n > 0.0), unit));
     let unit = match unit {
         "a.u." => "",
@@ -257,7 +268,8 @@ fn scaling(header: &Header<'_>, encoding: Encoding) -> (String, ByRange) {
 
 /// Everything about the frame but its channel.
 fn frame(header: &Header<'_>) -> Scan {
-    let length = |key: &str| units::length_nm(header.get("Control", key)?);
+    let unread = &header.unread;
+    let length = |key: &str| unread.entry(key, header.get("Control", key), units::length_nm);
     let positive = |key: &str| length(key).filter(|&n| n > 0.0);
     let angle = header.number("Control", "Angle").unwrap_or(0.0);
     Scan {
@@ -266,17 +278,13 @@ fn frame(header: &Header<'_>) -> Scan {
         acquired: header
             .get("General Info", "Acquisition time")
             .and_then(date),
-        frame_direction: match header
-            .lower("General Info", "Y scanning direction")
-            .as_deref()
-        {
-            Some("up") => Some(FrameDirection::Up),
-            Some("down") => Some(FrameDirection::Down),
-            _ => None,
-        },
+        frame_direction: unread.entry(
+            "Y scanning direction",
+            header.get("General Info", "Y scanning direction"),
+            FrameDirection::named,
+        ),
         line_rate_hz: header
-            .get("Control", "X-Frequency")
-            .and_then(quantity)
+            .quantity("Control", "X-Frequency")
             .filter(|&(rate, unit)| rate > 0.0 && matches!(unit, "" | "Hz"))
             .map(|(rate, _)| rate),
         rotation_rad: angle.to_radians(),
@@ -286,7 +294,7 @@ fn frame(header: &Header<'_>) -> Scan {
             [width, height.unwrap_or(width)]
         }),
         metadata: header
-            .0
+            .lines
             .iter()
             .filter(|(section, _, value)| !section.is_empty() && !value.is_empty())
             .map(|(section, key, value)| (format!("{section}: {key}"), (*value).to_owned()))

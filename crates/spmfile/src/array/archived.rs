@@ -10,6 +10,7 @@ use crate::outline::{Input, Outline};
 use crate::scan::Scan;
 use crate::stored::{Failure, Stored, Unpacked};
 use crate::whole::MOST_CHANNELS;
+use crate::words;
 
 const FORMAT: &str = "NumPy archive";
 /// Arrays of one dimension beside the images: positions of columns and of lines.
@@ -39,7 +40,7 @@ pub(crate) fn open<'a>(input: &Input<'a>) -> Result<Outline<'a>, ReadError> {
     for entry in &names {
         let stem = entry.trim_end_matches(".npy");
         let carried = match archive.entry(&format!("{stem}.txt")) {
-            Some(text) => labels::lines(&String::from_utf8_lossy(&text.map_err(damaged)?)),
+            Some(text) => labels::lines(&words::decode(&text.map_err(damaged)?)),
             None => Vec::new(),
         };
         let head = archive.head(entry).map_err(damaged)?;

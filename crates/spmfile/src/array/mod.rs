@@ -2,11 +2,13 @@
 
 #[cfg(feature = "archives")]
 mod archived;
+mod axis;
 mod npy;
 #[cfg(feature = "pictures")]
 mod picture;
 mod plane;
 mod read;
+mod table;
 mod text;
 #[cfg(feature = "write")]
 mod write;
@@ -16,6 +18,7 @@ pub(crate) use archived::open as open_npz;
 #[cfg(feature = "pictures")]
 pub(crate) use read::{open_jpeg, open_png, open_tiff};
 pub(crate) use read::{open_npy, open_text};
+pub(crate) use table::begins as begins_table;
 #[cfg(feature = "write")]
 pub use write::csv;
 #[cfg(feature = "write")]

@@ -9,6 +9,7 @@ use crate::outline::Input;
 use crate::raster::{self, Encoding, Order};
 use crate::scan::Samples;
 use crate::stored::{Failure, Flat, Stored, Unpacked};
+use crate::words;
 
 const MAGIC: &[u8] = b"\x93NUMPY";
 const TOP_FIRST: Order = Order {
@@ -43,7 +44,7 @@ pub(super) fn header(bytes: &[u8]) -> Result<Array, String> {
         2 | 3 => cursor.u32()? as usize,
         other => return Err(format!("expected version 1, 2 or 3, found {other}")),
     };
-    let header = String::from_utf8_lossy(cursor.slice(length, "a header")?);
+    let header = words::decode(cursor.slice(length, "a header")?);
     let (encoding, endian) = kind(&header)?;
     let [rows, columns] = shape(&header)?;
     let length = raster::byte_length(rows, columns, encoding)

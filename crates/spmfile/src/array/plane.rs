@@ -21,6 +21,8 @@ pub(super) struct Told {
     pub(super) size_nm: Option<[f64; 2]>,
     /// How the frame was scanned, as [`labels::describe`] has it.
     pub(super) lines: Vec<(String, String)>,
+    /// What was doubtful.
+    pub(super) notes: Vec<String>,
     /// Of the channel: as [`labels::describe_channel`] has it.
     pub(super) channel: Vec<(String, String)>,
 }
@@ -40,6 +42,7 @@ impl Told {
             size_nm: length("width (nm)")
                 .zip(length("height (nm)"))
                 .map(|(width, height)| [width, height]),
+            notes: Vec::new(),
             lines,
             channel,
         }
@@ -52,6 +55,7 @@ impl Told {
                 name: other.name.or(self.name),
                 unit: other.unit.or(self.unit),
                 size_nm: other.size_nm.or(self.size_nm),
+                notes: self.notes,
                 ..other
             };
         }

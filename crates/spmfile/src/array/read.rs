@@ -26,8 +26,7 @@ pub(crate) fn open_npy<'a>(input: &Input<'a>) -> Result<Outline<'a>, ReadError> 
 
 /// Opens a matrix as text.
 pub(crate) fn open_text<'a>(input: &Input<'a>) -> Result<Outline<'a>, ReadError> {
-    let opened = text::open(input.bytes);
-    let (told, plane) = opened.map_err(|reason| ReadError::damaged(text::FORMAT, reason))?;
+    let (told, plane) = text::open(input.bytes)?;
     Ok(outline(text::FORMAT, &input.options, told, vec![plane]))
 }
 
@@ -138,6 +137,7 @@ pub(super) fn frame(format: &str, options: &ArrayOptions, told: &Told) -> Scan {
         ..Scan::default()
     };
     labels::apply(&mut scan);
+    scan.notes.extend(told.notes.iter().cloned());
     scan.size_nm = options.size_nm.or(scan.size_nm);
     scan.frame_direction = options.frame_direction.or(scan.frame_direction);
     scan.line_rate_hz = options.line_rate_hz.or(scan.line_rate_hz);

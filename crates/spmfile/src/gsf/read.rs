@@ -11,6 +11,7 @@ use crate::scan::{ChannelInfo, Scan};
 use crate::stored::Flat;
 use crate::units;
 use crate::whole::Extent;
+use crate::words::Unread;
 
 const FORMAT: &str = "Gwyddion simple field";
 /// Keys of the format; others are metadata.
@@ -38,7 +39,8 @@ pub(crate) fn open<'a>(input: &Input<'a>) -> Result<Outline<'a>, ReadError> {
             "{beyond} bytes too many for {rows} lines of {columns} samples"
         )));
     }
-    let size = size(&fields);
+    let unread = Unread::default();
+    let size = size(&fields, &unread);
     let info = info(&fields);
     let unit = fields::get(&fields, "ZUnits").unwrap_or("").to_owned();
     let plane_fit = labels::value(&fields, "plane fit").map(str::to_owned);
@@ -47,6 +49,7 @@ pub(crate) fn open<'a>(input: &Input<'a>) -> Result<Outline<'a>, ReadError> {
         size_nm: size.width.zip(size.height).map(<[f64; 2]>::from),
         offset_nm: size.centre,
         metadata: fields::others(fields, &KEYS),
+        notes: unread.notes(),
         ..Scan::default()
     };
     labels::apply(&mut scan);
@@ -76,10 +79,10 @@ struct Size {
     centre: [f64; 2],
 }
 
-fn size(fields: &[(String, String)]) -> Size {
-    let nm = fields::get(fields, "XYUnits").and_then(|unit| units::nm_per(&units::clean(unit)));
+fn size(fields: &[(String, String)], unread: &Unread) -> Size {
+    let nm = fields::get(fields, "XYUnits").and_then(units::nm_per);
     let length_of = |key: &str| {
-        let size = fields::number(fields, key)? * nm?;
+        let size = fields::number(fields, key, unread)? * nm?;
         Some(size.abs()).filter(|&size| size > 0.0)
     };
     let (width, height) = (length_of("XReal"), length_of("YReal"));
@@ -87,7 +90,7 @@ fn size(fields: &[(String, String)]) -> Size {
     if let (Some(nm), Some(width), Some(height)) = (nm, width, height) {
         let axes = [("XOffset", width), ("YOffset", height)];
         for (centre, (key, length)) in centre.iter_mut().zip(axes) {
-            if let Some(offset) = fields::number(fields, key) {
+            if let Some(offset) = fields::number(fields, key, unread) {
                 *centre = offset * nm + 0.5 * length;
             }
         }

@@ -13,6 +13,7 @@ use crate::scan::{ChannelInfo, Scan};
 use crate::stored::Flat;
 use crate::units;
 use crate::whole::MOST_CHANNELS;
+use crate::words;
 
 const FORMAT: &str = "Gwyddion";
 
@@ -108,7 +109,7 @@ impl<'a> Object<'a> {
 }
 
 fn text(bytes: &[u8]) -> String {
-    String::from_utf8_lossy(bytes).trim().to_owned()
+    words::decode(bytes).trim().to_owned()
 }
 
 fn item<'a>(cursor: &mut Cursor<'a>) -> Result<Item<'a>, String> {
@@ -304,7 +305,7 @@ fn resolution(field: Object<'_>) -> Result<[usize; 2], String> {
 
 /// Width and height in nm, if the lateral unit is a length.
 fn size_nm(field: Object<'_>) -> Option<[f64; 2]> {
-    let nm = units::nm_per(&units::clean(&field.unit("si_unit_xy")))?;
+    let nm = units::nm_per(&field.unit("si_unit_xy"))?;
     let length = |key: &str| field.double(key).map(|n| n * nm).filter(|&n| n > 0.0);
     Some([length("xreal")?, length("yreal")?])
 }
@@ -345,10 +346,9 @@ fn frame(fields: &[(u32, Object<'_>)], meta: &dyn Fn(u32) -> Vec<(String, String
     if sizes.iter().all(|size| *size == sizes[0]) {
         scan.size_nm = sizes[0];
     }
-    if let (Some([width, height]), Some(nm)) = (
-        size_nm(first),
-        units::nm_per(&units::clean(&first.unit("si_unit_xy"))),
-    ) {
+    if let (Some([width, height]), Some(nm)) =
+        (size_nm(first), units::nm_per(&first.unit("si_unit_xy")))
+    {
         let offset = |key: &str| first.double(key).unwrap_or(0.0) * nm;
         if first.get("xoff").is_some() || first.get("yoff").is_some() {
             scan.offset_nm = [offset("xoff") + 0.5 * width, offset("yoff") + 0.5 * height];

@@ -36,7 +36,7 @@ pub(crate) fn open<'a>(input: &Input<'a>) -> Result<Outline<'a>, ReadError> {
     let (fields, start) = fields::header(input.bytes, 8).map_err(damaged)?;
     let points = Points::of(&fields, input.bytes.get(start..).unwrap_or(&[]))?;
     let lateral = fields::get(&fields, "XYUnits").unwrap_or("");
-    let nm = units::nm_per(&units::clean(lateral)).ok_or_else(|| {
+    let nm = units::nm_per(lateral).ok_or_else(|| {
         unsupported(format!(
             "its positions are in {lateral:?}, not in a unit of length"
         ))

@@ -5,6 +5,7 @@
 //! values stand behind a mark of their kind. All little endian.
 
 use crate::cursor::{Cursor, Endian};
+use crate::words;
 
 /// A mark, the right way round.
 pub(super) type Mark = [u8; 4];
@@ -92,11 +93,7 @@ pub(super) fn inner<'a>(c: &mut Cursor<'a>) -> Result<Block<'a>, String> {
 pub(super) fn text(c: &mut Cursor<'_>) -> Result<String, String> {
     let units = c.u32()? as usize;
     let length = units.checked_mul(2).ok_or("a text of impossible length")?;
-    let (pairs, _) = c.slice(length, "a text")?.as_chunks::<2>();
-    let units = pairs.iter().map(|&pair| u16::from_le_bytes(pair));
-    Ok(char::decode_utf16(units)
-        .map(|c| c.unwrap_or(char::REPLACEMENT_CHARACTER))
-        .collect())
+    Ok(words::wide(c.slice(length, "a text")?).into_owned())
 }
 
 /// A value behind the mark of its kind.

@@ -6,7 +6,7 @@ use super::header::{Section, leading_number};
 use crate::cursor::Endian;
 use crate::judge::Check;
 use crate::raster::Encoding;
-use crate::scan::{ChannelInfo, FrameDirection, LineDirection};
+use crate::scan::{ChannelInfo, LineDirection};
 use crate::stored::{Flat, Valid};
 
 /// Where a channel's samples lie in the file.
@@ -54,17 +54,6 @@ pub(super) fn names(value: &str) -> (&str, &str) {
         between('[', ']').unwrap_or(""),
         between('"', '"').unwrap_or(""),
     )
-}
-
-/// `Up` or `Down`.
-pub(super) fn frame_direction(value: &str) -> Option<FrameDirection> {
-    if value.eq_ignore_ascii_case("Up") {
-        Some(FrameDirection::Up)
-    } else if value.eq_ignore_ascii_case("Down") {
-        Some(FrameDirection::Down)
-    } else {
-        None
-    }
 }
 
 /// Reads where the samples lie; the error says what is odd.

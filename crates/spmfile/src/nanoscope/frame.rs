@@ -5,6 +5,7 @@
 use super::header::{Section, leading_number, lookup};
 use crate::scan::DateTime;
 use crate::units;
+use crate::words::{self, Unread};
 
 const SCAN_LIST: &str = "Ciao scan list";
 
@@ -14,15 +15,19 @@ pub(super) fn scan_value<'a>(sections: &[Section<'a>], key: &str) -> Option<&'a 
 }
 
 /// A plain number of the scan list.
-pub(super) fn scan_number(sections: &[Section<'_>], key: &str) -> Option<f64> {
-    leading_number(scan_value(sections, key)?).map(|(n, _)| n)
+pub(super) fn scan_number(sections: &[Section<'_>], key: &str, unread: &Unread) -> Option<f64> {
+    unread.entry(key, scan_value(sections, key), |text| {
+        leading_number(text).map(|(n, _)| n)
+    })
 }
 
 /// A length of the scan list; without a unit it is in nm, as the software writes it there.
-pub(super) fn scan_length(sections: &[Section<'_>], key: &str) -> Option<f64> {
-    let (n, unit) = leading_number(scan_value(sections, key)?)?;
-    let unit = if unit.is_empty() { "nm" } else { unit };
-    Some(n * units::nm_per(unit)?)
+pub(super) fn scan_length(sections: &[Section<'_>], key: &str, unread: &Unread) -> Option<f64> {
+    unread.entry(key, scan_value(sections, key), |text| {
+        let (n, unit) = leading_number(text)?;
+        let unit = if unit.is_empty() { "nm" } else { unit };
+        Some(n * units::nm_per(unit)?)
+    })
 }
 
 /// `1 1 ~m` or `1000 nm` → the two lengths in nm (the second may be absent).
@@ -41,17 +46,25 @@ fn lengths(text: &str) -> Option<(f64, Option<f64>)> {
 ///
 /// The image list gives `Scan Size: W H unit`, with H = W even where the frame is not square
 /// in some versions; the scan list knows better (`Slow Axis Size`, `Aspect Ratio: a:b`).
-pub(super) fn full_size(image: Option<&Section<'_>>, sections: &[Section<'_>]) -> Option<[f64; 2]> {
+pub(super) fn full_size(
+    image: Option<&Section<'_>>,
+    sections: &[Section<'_>],
+    unread: &Unread,
+) -> Option<[f64; 2]> {
+    let size = |text| unread.entry("Scan size", text, lengths);
     let (width, height) = image
-        .and_then(|s| s.get("Scan size"))
-        .and_then(lengths)
-        .or_else(|| scan_value(sections, "Scan size").and_then(lengths))?;
+        .and_then(|s| s.get("Scan size").and_then(lengths))
+        .or_else(|| size(scan_value(sections, "Scan size")))
+        .or_else(|| size(image.and_then(|s| s.get("Scan size"))))?;
     let by_aspect = || {
-        let (a, b) = scan_value(sections, "Aspect ratio")?.split_once(':')?;
-        let (a, b): (f64, f64) = (a.trim().parse().ok()?, b.trim().parse().ok()?);
-        (a > 0.0 && b > 0.0 && a != b).then(|| width * b / a)
+        let ratio = |text: &str| {
+            let (a, b) = text.split_once(':')?;
+            Some((words::number(a)?, words::number(b)?)).filter(|&(a, b)| a > 0.0 && b > 0.0)
+        };
+        let ratio = unread.entry("Aspect ratio", scan_value(sections, "Aspect ratio"), ratio);
+        ratio.filter(|(a, b)| a != b).map(|(a, b)| width * b / a)
     };
-    let slow = scan_length(sections, "Slow Axis Size")
+    let slow = scan_length(sections, "Slow Axis Size", unread)
         .filter(|&n| n > 0.0)
         .or_else(by_aspect)
         .or(height)
@@ -65,7 +78,7 @@ pub(super) fn full_size(image: Option<&Section<'_>>, sections: &[Section<'_>]) -
 /// the full frame. With square pixels this is `width · rows / columns`. Up leaves the bottom lines
 /// of the frame, Down the top ones; either way the first stored row is the lowest one recorded.
 pub(super) fn recorded_height(full: f64, rows: usize, sections: &[Section<'_>]) -> f64 {
-    match scan_number(sections, "Lines") {
+    match scan_number(sections, "Lines", &Unread::default()) {
         Some(lines) if lines > rows as f64 => full * rows as f64 / lines,
         _ => full,
     }
@@ -160,7 +173,7 @@ mod tests {
             let text =
                 format!("\\*Ciao scan list\n{scan}\\*Ciao image list\n\\Scan Size: {image}\n");
             let all = sections(&text);
-            full_size(all.last(), &all)
+            full_size(all.last(), &all, &Unread::default())
         };
         assert_eq!(size("", "1 1 ~m"), Some([1000.0, 1000.0]));
         assert_eq!(size("\\Scan size: 250 nm\n", "?"), Some([250.0, 250.0]));

@@ -8,7 +8,7 @@ use std::collections::HashMap;
 
 use memchr::memmem;
 
-use crate::words::one_line;
+use crate::words::{self, one_line};
 
 /// Real headers have 20 to 100 kB; beyond this no header is looked for.
 const LONGEST: usize = 4 << 20;
@@ -33,13 +33,8 @@ pub(super) fn header_text(bytes: &[u8]) -> Option<HeaderText<'_>> {
     let head = &bytes[..bytes.len().min(LONGEST)];
     let length = memmem::find(head, END)?;
     let raw = &head[..length];
-    // Headers are Windows-1252; those that a newer program wrote as UTF-8 hardly ever decode by chance.
-    let text = match std::str::from_utf8(raw) {
-        Ok(text) => Cow::Borrowed(text),
-        Err(_) => encoding_rs::WINDOWS_1252.decode(raw).0,
-    };
     Some(HeaderText {
-        text,
+        text: words::decode(raw),
         length: length + END.len(),
         crlf: memmem::find(raw, b"\r\n").is_some(),
     })

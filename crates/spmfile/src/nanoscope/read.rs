@@ -11,6 +11,7 @@ use crate::outline::{Input, Outline};
 use crate::scan::{ChannelInfo, FrameDirection, Scan, Span, UnreadableChannel};
 use crate::signature::head;
 use crate::stored::Stored;
+use crate::words::Unread;
 
 /// More images than any instrument records at once.
 const MOST_CHANNELS: usize = 256;
@@ -88,7 +89,7 @@ fn add(
     info: ChannelInfo,
     place: &Layout,
 ) {
-    let size = frame::full_size(Some(image), sections);
+    let size = frame::full_size(Some(image), sections, &Unread::default());
     let mut header = ChannelHeader {
         width_nm: size.map(|[width, _]| width),
         height_nm: size.map(|[_, full]| frame::recorded_height(full, place.rows, sections)),
@@ -213,6 +214,8 @@ fn frame(sections: &[Section<'_>], images: &[&Section<'_>]) -> Scan {
     let version = lookup(sections, "File list", "Version")
         .or_else(|| sections.first().and_then(|s| s.get("Version")))
         .and_then(frame::version);
+    let unread = Unread::default();
+    let number = |key: &str| frame::scan_number(sections, key, &unread);
     let named = |section, key| lookup(sections, section, key).filter(|v| !v.is_empty());
     let on_off = |value: &str| match value.to_ascii_lowercase().as_str() {
         "on" => Some(true),
@@ -228,23 +231,24 @@ fn frame(sections: &[Section<'_>], images: &[&Section<'_>]) -> Scan {
             .or_else(|| named("Equipment list", "Microscope"))
             .or_else(|| named("File list", "Instrument"))
             .map(str::to_owned),
-        acquired: sections
-            .first()
-            .and_then(|s| s.get("Date"))
-            .and_then(frame::date_time),
-        frame_direction: frame_direction(sections, images),
-        line_rate_hz: frame::scan_number(sections, "Scan rate").filter(|&rate| rate > 0.0),
-        rounding: frame::scan_number(sections, "X round").or_else(|| {
+        acquired: unread.entry(
+            "Date",
+            sections.first().and_then(|s| s.get("Date")),
+            frame::date_time,
+        ),
+        frame_direction: frame_direction(sections, images, &unread),
+        line_rate_hz: number("Scan rate").filter(|&rate| rate > 0.0),
+        rounding: number("X round").or_else(|| {
             // Version 5 keeps it with the scanner.
             header::leading_number(lookup(sections, "Scanner list", "X round")?).map(|(n, _)| n)
         }),
-        rotation_rad: frame::scan_number(sections, "Rotate Ang.").unwrap_or(0.0),
+        rotation_rad: number("Rotate Ang.").unwrap_or(0.0),
         offset_nm: ["X Offset", "Y Offset"]
-            .map(|key| frame::scan_length(sections, key).unwrap_or(0.0)),
-        size_nm: frame::full_size(images.first().copied(), sections),
+            .map(|key| frame::scan_length(sections, key, &unread).unwrap_or(0.0)),
+        size_nm: frame::full_size(images.first().copied(), sections, &unread),
         closed_loop: frame::scan_value(sections, "XY Closed Loop").and_then(on_off),
         line_times_s: None,
-        notes: Vec::new(),
+        notes: unread.notes(),
         metadata: Vec::new(),
         channels: Vec::new(),
         unreadable: Vec::new(),
@@ -253,13 +257,21 @@ fn frame(sections: &[Section<'_>], images: &[&Section<'_>]) -> Scan {
 
 /// Each image tells its direction, the scan list the last one set. Images that contradict each
 /// other leave it unknown: the wrong sense would turn the sign of the drift.
-fn frame_direction(sections: &[Section<'_>], images: &[&Section<'_>]) -> Option<FrameDirection> {
+fn frame_direction(
+    sections: &[Section<'_>],
+    images: &[&Section<'_>],
+    unread: &Unread,
+) -> Option<FrameDirection> {
+    let named = |key, text| unread.entry(key, text, FrameDirection::named);
     let mut told = images
         .iter()
-        .filter_map(|image| channel::frame_direction(image.get("Frame direction")?));
+        .filter_map(|image| named("Frame direction", image.get("Frame direction")));
     match told.next() {
         Some(first) => told.all(|other| other == first).then_some(first),
-        None => channel::frame_direction(frame::scan_value(sections, "Capture direction")?),
+        None => named(
+            "Capture direction",
+            frame::scan_value(sections, "Capture direction"),
+        ),
     }
 }
 
