@@ -5,16 +5,76 @@ use crate::readers::{Kind, READERS, Reader};
 use crate::signature::{head, is_text};
 
 /// First bytes of files that are none of those that are read.
-const OTHERS: [(&[u8], &str); 8] = [
+const OTHERS: [(&[u8], &str); 12] = [
     (b"GIF8", "a GIF picture"),
     (b"BM", "a BMP picture"),
     (b"%PDF", "a PDF document"),
     (b"\x1f\x8b", "a gzip archive"),
-    (b"\x89HDF\r\n\x1a\n", "an HDF5 file"),
+    (b"CDF\x01", NETCDF),
+    (b"CDF\x02", NETCDF),
+    (b"CDF\x05", NETCDF),
+    (
+        b"Experiment\t",
+        "a spectrum or a log of a Nanonis controller: no image",
+    ),
+    (
+        b"Grid dim=",
+        "a grid of spectra of a Nanonis controller (.3ds): save its topography as .sxm",
+    ),
     (b"[ParVERT", "a spectrum of a Createc controller: no image"),
     (b"?*File list", "a NanoScope text export"),
     (b"PK\x03\x04", "a ZIP archive"),
 ];
+
+const NETCDF: &str =
+    "a NetCDF file, as GXSM writes them: save the image as Gwyddion or Nanonis file";
+/// Words of the programs that write HDF5 files, within the first bytes; the last one is in none.
+const HDF5: [(&[u8], &str); 5] = [
+    (
+        b"jpk",
+        "an HDF5 file of a JPK instrument (.h5-jpk): save the image as JPK (.jpk) or TIFF",
+    ),
+    (
+        b"JPK",
+        "an HDF5 file of a JPK instrument (.h5-jpk): save the image as JPK (.jpk) or TIFF",
+    ),
+    (
+        b"NX_class",
+        "a NeXus file (HDF5): save the image as Gwyddion, TIFF or NumPy array",
+    ),
+    (b"IGOR", "an HDF5 file of Igor: save the wave as .ibw"),
+    (
+        b"",
+        "an HDF5 file: save the image as Gwyddion, TIFF or NumPy array",
+    ),
+];
+/// A file of a high-speed AFM: version 1, a header of 1 to 65535 bytes, 32 bytes for each frame, Japanese text.
+fn is_asd(bytes: &[u8]) -> bool {
+    matches!(
+        bytes,
+        [1, 0, 0, 0, _, _, 0, 0, 32, 0, 0, 0, 0xa4, 3, 0, 0, ..]
+    )
+}
+
+/// What a file is that is not read, in words.
+fn other(bytes: &[u8]) -> Option<&'static str> {
+    if is_asd(bytes) {
+        return Some("a film of a high-speed AFM (.asd): save frames as Gwyddion or TIFF");
+    }
+    if bytes.starts_with(b"\x89HDF\r\n\x1a\n") {
+        let head = &bytes[..bytes.len().min(HEAD_OF_HDF5)];
+        let by = |word: &[u8]| word.is_empty() || memchr::memmem::find(head, word).is_some();
+        return HDF5
+            .iter()
+            .find(|(word, _)| by(word))
+            .map(|(_, found)| *found);
+    }
+    let (_, found) = OTHERS.iter().find(|(magic, _)| bytes.starts_with(magic))?;
+    Some(found)
+}
+
+/// Names of groups of an HDF5 file stand within so many bytes, mostly.
+const HEAD_OF_HDF5: usize = 1 << 20;
 
 /// Tells the format from the first bytes of a file; a few hundred are enough but for TIFF files,
 /// whose directory may lie anywhere.
@@ -25,7 +85,7 @@ pub fn detect(bytes: &[u8]) -> Format {
     if let Some(reader) = READERS.iter().find(|reader| reader.signature.fits(bytes)) {
         return reader.format;
     }
-    if let Some((_, found)) = OTHERS.iter().find(|(magic, _)| bytes.starts_with(magic)) {
+    if let Some(found) = other(bytes) {
         return Format::Other(found);
     }
     if is_text(head(bytes)) {

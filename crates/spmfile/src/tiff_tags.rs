@@ -124,6 +124,9 @@ impl<'a> Directory<'a> {
             1 => cursor.u8().map(f64::from),
             3 => cursor.u16().map(f64::from),
             4 => cursor.u32().map(f64::from),
+            5 => cursor
+                .u32()
+                .and_then(|n| Ok(f64::from(n) / f64::from(cursor.u32()?))),
             6 => cursor.i8().map(f64::from),
             8 => cursor.i16().map(f64::from),
             9 => cursor.i32().map(f64::from),

@@ -241,3 +241,45 @@ fn lost_section_lines_are_damage() {
         assert_eq!(readable.unreadable.len(), 1);
     }
 }
+
+#[test]
+fn narrow_scans_have_their_valid_lines() {
+    let narrow = |valid: &str| {
+        let lines = format!("{valid}\\Scan size: 90 90 nm\r\n{VOLTS}");
+        let wrong = image("A", 0, &lines).replace("Number of lines: 2", "Number of lines: 3");
+        read(&file("\\Aspect ratio: 3:2\r\n\\Lines: 2\r\n", &[wrong]))
+    };
+    let scan = narrow("\\Valid data start Y: 0\r\n\\Valid data len Y: 2\r\n").expect("two lines");
+    let channel = &scan.channels[0];
+    assert_eq!((channel.rows, channel.columns), (2, 3));
+    assert_eq!(channel.values(), [0.0, 1.0, 2.0, 3.0, 4.0, 5.0]);
+    assert_eq!(
+        (channel.width_nm, channel.height_nm),
+        (Some(90.0), Some(60.0))
+    );
+    for contradiction in [
+        "",
+        "\\Valid data len Y: 1\r\n",
+        "\\Valid data start Y: 1\r\n\\Valid data len Y: 2\r\n",
+    ] {
+        assert!(narrow(contradiction).is_err(), "{contradiction}");
+    }
+}
+
+#[test]
+fn what_cannot_be_read_is_said_with_its_text() {
+    let header =
+        "\\Scan size: 90 nm\r\n\\Rotate Ang.: 0,5\r\n\\X Offset: ten nm\r\n\\Scan rate: 1\r\n";
+    let scan = read(&file(header, &[image("A", 0, VOLTS)])).expect("an image");
+    assert_eq!((scan.rotation_rad, scan.offset_nm), (0.0, [0.0, 0.0]));
+    let notes = scan.notes.join("; ");
+    assert_eq!(scan.notes.len(), 2, "{notes}");
+    assert!(
+        notes.contains("Rotate Ang.") && notes.contains("0,5"),
+        "{notes}"
+    );
+    assert!(
+        notes.contains("X Offset") && notes.contains("ten nm"),
+        "{notes}"
+    );
+}

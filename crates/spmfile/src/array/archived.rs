@@ -53,6 +53,7 @@ pub(crate) fn open<'a>(input: &Input<'a>) -> Result<Outline<'a>, ReadError> {
                     columns: array.columns,
                     samples: unpacked(input.bytes, entry.clone()),
                     carried: if fits { carried } else { Vec::new() },
+                    size_nm: None,
                 }
             }
             // Positions of the pixels, written beside the images.
@@ -60,8 +61,9 @@ pub(crate) fn open<'a>(input: &Input<'a>) -> Result<Outline<'a>, ReadError> {
             Err(error) => Plane {
                 rows: 0,
                 columns: 0,
-                samples: Stored::Refused(error),
+                samples: Stored::Refused(error.reason()),
                 carried: Vec::new(),
+                size_nm: None,
             },
         };
         let told = Told::by(&mut plane);
@@ -84,7 +86,7 @@ fn unpacked(archive: &[u8], entry: String) -> Stored<'_> {
         let content = archive.entry(&entry);
         let content = content.unwrap_or_else(|| Err(format!("{entry:?} is gone")));
         let content = content.map_err(whole)?;
-        let array = npy::header(&content).map_err(Failure::channel)?;
+        let array = npy::header(&content).map_err(|trouble| Failure::channel(trouble.reason()))?;
         let samples = array.samples(&content).map_err(Failure::channel)?;
         Ok(Unpacked::measured(samples))
     };

@@ -3,6 +3,8 @@
 #[cfg(feature = "archives")]
 mod archived;
 mod axis;
+#[cfg(feature = "pictures")]
+mod calibration;
 mod npy;
 #[cfg(feature = "pictures")]
 mod picture;

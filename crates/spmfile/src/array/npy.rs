@@ -3,7 +3,7 @@
 //! In: the first bytes of a file; out: where its image is. The header is a Python dictionary of three keys
 //! (`numpy.lib.format`), read here by its keys rather than as Python.
 
-use super::plane::Plane;
+use super::plane::{Plane, Trouble};
 use crate::cursor::{Cursor, Endian};
 use crate::outline::Input;
 use crate::raster::{self, Encoding, Order};
@@ -32,17 +32,17 @@ pub(super) struct Array {
 }
 
 /// Reads the header of an array.
-pub(super) fn header(bytes: &[u8]) -> Result<Array, String> {
+pub(super) fn header(bytes: &[u8]) -> Result<Array, Trouble> {
     let mut cursor = Cursor::new(bytes, Endian::Little);
     if cursor.slice(MAGIC.len(), "the mark of an array")? != MAGIC {
-        return Err("expected the mark of an array, found other bytes".to_owned());
+        return Err("expected the mark of an array, found other bytes".into());
     }
     let major = cursor.u8()?;
     cursor.skip(1)?;
     let length = match major {
         1 => usize::from(cursor.u16()?),
         2 | 3 => cursor.u32()? as usize,
-        other => return Err(format!("expected version 1, 2 or 3, found {other}")),
+        other => return Err(format!("expected version 1, 2 or 3, found {other}").into()),
     };
     let header = words::decode(cursor.slice(length, "a header")?);
     let (encoding, endian) = kind(&header)?;
@@ -95,7 +95,7 @@ impl Array {
 }
 
 /// Finds the image of a file of which the first bytes are given.
-pub(super) fn open<'a>(input: &Input<'a>) -> Result<Plane<'a>, String> {
+pub(super) fn open<'a>(input: &Input<'a>) -> Result<Plane<'a>, Trouble> {
     let array = header(input.bytes)?;
     array.fits(input.length)?;
     let (rows, columns) = (array.rows, array.columns);
@@ -115,6 +115,7 @@ pub(super) fn open<'a>(input: &Input<'a>) -> Result<Plane<'a>, String> {
         columns,
         samples,
         carried: Vec::new(),
+        size_nm: None,
     })
 }
 
@@ -129,7 +130,7 @@ fn value<'a>(header: &'a str, key: &str) -> Result<&'a str, String> {
 }
 
 /// How the samples are stored.
-fn kind(header: &str) -> Result<(Encoding, Endian), String> {
+fn kind(header: &str) -> Result<(Encoding, Endian), Trouble> {
     let value = value(header, "descr")?;
     let descr: String = value
         .strip_prefix(['\'', '"'])
@@ -138,12 +139,14 @@ fn kind(header: &str) -> Result<(Encoding, Endian), String> {
                 .take_while(|c| !matches!(c, '\'' | '"'))
                 .collect()
         })
-        .ok_or("expected numbers, found records of several fields")?;
+        .ok_or_else(|| {
+            Trouble::NotRead("expected numbers, found records of several fields".to_owned())
+        })?;
     let (order, kind) = descr.split_at_checked(1).unwrap_or(("", ""));
     let endian = match order {
         "<" | "|" | "=" => Endian::Little,
         ">" => Endian::Big,
-        _ => return Err(format!("expected an order of bytes, found {descr:?}")),
+        _ => return Err(format!("expected an order of bytes, found {descr:?}").into()),
     };
     let encoding = match kind {
         "b1" | "u1" => Encoding::U8,
@@ -157,13 +160,22 @@ fn kind(header: &str) -> Result<(Encoding, Endian), String> {
         "f2" => Encoding::F16,
         "f4" => Encoding::F32,
         "f8" => Encoding::F64,
-        _ => return Err(format!("expected real numbers, found the type {descr:?}")),
+        "c8" | "c16" => {
+            return Err(Trouble::NotRead(format!(
+                "expected real numbers, found complex ones (type {descr:?}); save their real part, size or phase"
+            )));
+        }
+        _ => {
+            return Err(Trouble::NotRead(format!(
+                "expected real numbers, found the type {descr:?}"
+            )));
+        }
     };
     Ok((encoding, endian))
 }
 
 /// Lines and samples.
-fn shape(header: &str) -> Result<[usize; 2], String> {
+fn shape(header: &str) -> Result<[usize; 2], Trouble> {
     let text = value(header, "shape")?;
     let inner = text
         .strip_prefix('(')
@@ -185,9 +197,9 @@ fn shape(header: &str) -> Result<[usize; 2], String> {
     let long: Vec<usize> = axes.iter().copied().filter(|&n| n != 1).collect();
     match long[..] {
         [rows, columns] if axes.len() > 2 => Ok([rows, columns]),
-        _ => Err(format!(
+        _ => Err(Trouble::NotRead(format!(
             "expected an array of two dimensions, found the shape ({inner})"
-        )),
+        ))),
     }
 }
 
@@ -209,7 +221,7 @@ mod tests {
 
     /// Rows, columns and samples.
     fn read(bytes: &[u8]) -> Result<(usize, usize, Samples), String> {
-        let array = super::header(bytes)?;
+        let array = super::header(bytes).map_err(Trouble::reason)?;
         Ok((array.rows, array.columns, array.samples(bytes)?))
     }
 

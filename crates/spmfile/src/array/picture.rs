@@ -10,14 +10,15 @@ use zune_core::colorspace::ColorSpace;
 use zune_core::options::DecoderOptions;
 use zune_jpeg::JpegDecoder;
 
-use super::plane::{Plane, turn};
+use super::calibration;
+use super::plane::{Plane, Trouble, turn};
 use crate::cursor::Endian;
-use crate::error::ReadError;
 use crate::labels;
 use crate::limits::unpacked_limit;
 use crate::raster::{self, Encoding, Order};
 use crate::scan::Samples;
 use crate::stored::{Failure, Stored, Unpacked};
+use crate::tiff_tags::directories;
 use crate::whole::MOST_CHANNELS;
 
 /// Shares of red, green and blue in the luminance (ITU-R BT.601, as in JPEG).
@@ -137,8 +138,9 @@ fn jpeg_samples(bytes: &[u8]) -> Result<Unpacked, String> {
 }
 
 /// Finds every picture of a TIFF file.
-pub(super) fn tiff(bytes: &[u8]) -> Result<Vec<Plane<'_>>, String> {
-    let words = |error: tiff::TiffError| error.to_string();
+pub(super) fn tiff(bytes: &[u8]) -> Result<Vec<Plane<'_>>, Trouble> {
+    let pages = directories(bytes).unwrap_or_default();
+    let mut ome = None;
     let mut left = unpacked_limit(bytes.len()) as usize;
     let mut decoder = Decoder::new(Bytes::new(bytes)).map_err(words)?;
     let mut planes = Vec::new();
@@ -148,10 +150,19 @@ pub(super) fn tiff(bytes: &[u8]) -> Result<Vec<Plane<'_>>, String> {
         let (index, allowed) = (planes.len(), left);
         let samples = move || tiff_samples(bytes, index, allowed);
         let mut plane = plane("TIFF", page.rows as u32, page.columns as u32, samples);
-        let description = decoder.get_tag_ascii_string(Tag::ImageDescription);
-        let carried = labels::lines(&labels::from_ascii(&description.unwrap_or_default()));
+        // BigTIFF is left to the library.
+        let tags = pages.get(index);
+        let description = tags.and_then(|tags| tags.text(Tag::ImageDescription.to_u16()));
+        let description = description
+            .or_else(|| decoder.get_tag_ascii_string(Tag::ImageDescription).ok())
+            .unwrap_or_default();
+        let carried = labels::lines(&labels::from_ascii(&description));
         if labels::fits(&carried, [page.rows, page.columns]) {
             plane.carried = carried;
+        } else if labels::value(&carried, "shape").is_none() {
+            ome = ome.or_else(|| calibration::ome(&description));
+            let steps = ome.or_else(|| calibration::imagej(&description, tags?));
+            plane.size_nm = steps.map(|[x, y]| [x * page.columns as f64, y * page.rows as f64]);
         }
         let pixels = page.rows.saturating_mul(page.columns);
         left = left.saturating_sub(pixels.saturating_mul(8));
@@ -160,9 +171,17 @@ pub(super) fn tiff(bytes: &[u8]) -> Result<Vec<Plane<'_>>, String> {
             return Ok(planes);
         }
         if planes.len() == MOST_CHANNELS {
-            return Err(format!("it holds more than {MOST_CHANNELS} pictures"));
+            return Err(format!("it holds more than {MOST_CHANNELS} pictures").into());
         }
         decoder.next_image().map_err(words)?;
+    }
+}
+
+/// What the library says, which tells damage from what it does not read.
+fn words(error: tiff::TiffError) -> Trouble {
+    match error {
+        tiff::TiffError::UnsupportedError(error) => Trouble::NotRead(error.to_string()),
+        error => Trouble::Damaged(error.to_string()),
     }
 }
 
@@ -185,9 +204,8 @@ struct Page {
     left: bool,
 }
 
-fn tiff_page(decoder: &mut Decoder<Bytes<&[u8]>>) -> Result<Page, String> {
+fn tiff_page(decoder: &mut Decoder<Bytes<&[u8]>>) -> Result<Page, Trouble> {
     use tiff::ColorType;
-    let words = |error: tiff::TiffError| error.to_string();
     let (width, height) = decoder.dimensions().map_err(words)?;
     let per_pixel = match decoder.colortype().map_err(words)? {
         ColorType::Gray(_) | ColorType::Multiband { num_samples: 1, .. } => 1,
@@ -195,14 +213,17 @@ fn tiff_page(decoder: &mut Decoder<Bytes<&[u8]>>) -> Result<Page, String> {
         ColorType::RGB(_) => 3,
         ColorType::RGBA(_) => 4,
         other => {
-            return Err(format!(
+            return Err(Trouble::NotRead(format!(
                 "expected grey values or red, green, blue, found {other:?}"
-            ));
+            )));
         }
     };
     let mut tag = |tag: Tag| decoder.find_tag_unsigned::<u16>(tag).map_err(words);
     if per_pixel > 1 && tag(Tag::PlanarConfiguration)?.unwrap_or(1) != 1 {
-        return Err("expected colours side by side, found one plane for each".to_owned());
+        return Err(Trouble::NotRead(format!(
+            "expected the {per_pixel} values of a pixel side by side, found one plane for each; save the planes as \
+             pictures of their own"
+        )));
     }
     // Where the first pixel lies: top left, top right, bottom right, bottom left.
     let (top, left) = match tag(Tag::Orientation)?.unwrap_or(1) {
@@ -210,7 +231,11 @@ fn tiff_page(decoder: &mut Decoder<Bytes<&[u8]>>) -> Result<Page, String> {
         2 => (true, false),
         3 => (false, false),
         4 => (false, true),
-        other => return Err(format!("expected orientation 1 to 4, found {other}")),
+        other => {
+            return Err(Trouble::NotRead(format!(
+                "expected orientation 1 to 4, found {other}"
+            )));
+        }
     };
     Ok(Page {
         rows: height as usize,
@@ -221,8 +246,7 @@ fn tiff_page(decoder: &mut Decoder<Bytes<&[u8]>>) -> Result<Page, String> {
     })
 }
 
-fn tiff_samples(bytes: &[u8], index: usize, allowed: usize) -> Result<Unpacked, String> {
-    let words = |error: tiff::TiffError| error.to_string();
+fn tiff_samples(bytes: &[u8], index: usize, allowed: usize) -> Result<Unpacked, Trouble> {
     let mut decoder = Decoder::new(Bytes::new(bytes)).map_err(words)?;
     decoder = decoder.with_limits(limits(allowed, bytes.len()));
     decoder.seek_to_image(index).map_err(words)?;
@@ -252,19 +276,20 @@ fn tiff_samples(bytes: &[u8], index: usize, allowed: usize) -> Result<Unpacked, 
 }
 
 /// A picture that is decoded when it is wanted.
-fn plane<'a>(
+fn plane<'a, T: Into<Trouble>>(
     format: &'static str,
     rows: u32,
     columns: u32,
-    samples: impl Fn() -> Result<Unpacked, String> + Send + Sync + 'a,
+    samples: impl Fn() -> Result<Unpacked, T> + Send + Sync + 'a,
 ) -> Plane<'a> {
-    let damaged = move |reason| Failure::File(ReadError::damaged(format, reason));
-    let samples = move || samples().map_err(damaged);
+    let failed = move |trouble: T| Failure::File(trouble.into().of(format));
+    let samples = move || samples().map_err(failed);
     Plane {
         rows: rows as usize,
         columns: columns as usize,
         samples: Stored::Packed(Box::new(samples)),
         carried: Vec::new(),
+        size_nm: None,
     }
 }
 

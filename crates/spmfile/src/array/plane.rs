@@ -1,5 +1,6 @@
 //! One image of an array or a picture, and what its file says of it.
 
+use crate::error::ReadError;
 use crate::labels;
 use crate::stored::Stored;
 
@@ -11,6 +12,44 @@ pub(super) struct Plane<'a> {
     pub(super) samples: Stored<'a>,
     /// What the file says of it; only files written here do.
     pub(super) carried: Vec<(String, String)>,
+    /// Its size by what other programs write.
+    pub(super) size_nm: Option<[f64; 2]>,
+}
+
+/// Why there is no image.
+#[derive(Debug)]
+pub(super) enum Trouble {
+    /// The bytes contradict each other.
+    Damaged(String),
+    /// The file is whole, and of a kind that is not read.
+    NotRead(String),
+}
+
+impl Trouble {
+    pub(super) fn of(self, format: &'static str) -> ReadError {
+        match self {
+            Self::Damaged(reason) => ReadError::damaged(format, reason),
+            Self::NotRead(reason) => ReadError::unsupported(format, reason),
+        }
+    }
+
+    pub(super) fn reason(self) -> String {
+        match self {
+            Self::Damaged(reason) | Self::NotRead(reason) => reason,
+        }
+    }
+}
+
+impl From<String> for Trouble {
+    fn from(reason: String) -> Self {
+        Self::Damaged(reason)
+    }
+}
+
+impl From<&str> for Trouble {
+    fn from(reason: &str) -> Self {
+        Self::Damaged(reason.to_owned())
+    }
 }
 
 /// What a file says beside its numbers; only text files do.
@@ -41,7 +80,8 @@ impl Told {
             unit: value("unit"),
             size_nm: length("width (nm)")
                 .zip(length("height (nm)"))
-                .map(|(width, height)| [width, height]),
+                .map(|(width, height)| [width, height])
+                .or(plane.size_nm),
             notes: Vec::new(),
             lines,
             channel,
@@ -50,16 +90,13 @@ impl Told {
 
     /// What is told twice is taken from `self`.
     pub(super) fn or(self, other: Self) -> Self {
-        if other.name.is_some() || !other.lines.is_empty() {
-            return Self {
-                name: other.name.or(self.name),
-                unit: other.unit.or(self.unit),
-                size_nm: other.size_nm.or(self.size_nm),
-                notes: self.notes,
-                ..other
-            };
+        Self {
+            name: other.name.or(self.name),
+            unit: other.unit.or(self.unit),
+            size_nm: other.size_nm.or(self.size_nm),
+            notes: self.notes,
+            ..other
         }
-        self
     }
 }
 

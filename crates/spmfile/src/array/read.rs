@@ -2,7 +2,7 @@
 
 #[cfg(feature = "pictures")]
 use super::picture;
-use super::plane::{Plane, Told};
+use super::plane::{Plane, Told, Trouble};
 use super::{npy, text};
 use crate::error::ReadError;
 use crate::header::ChannelHeader;
@@ -15,7 +15,7 @@ use crate::sensors::sensor_axis;
 /// Opens a `NumPy` array.
 pub(crate) fn open_npy<'a>(input: &Input<'a>) -> Result<Outline<'a>, ReadError> {
     const FORMAT: &str = "NumPy array";
-    let plane = npy::open(input).map_err(|reason| ReadError::damaged(FORMAT, reason))?;
+    let plane = npy::open(input).map_err(|trouble| trouble.of(FORMAT))?;
     Ok(outline(
         FORMAT,
         &input.options,
@@ -36,7 +36,9 @@ pub(crate) fn open_png<'a>(input: &Input<'a>) -> Result<Outline<'a>, ReadError> 
     pictures(
         "PNG",
         input,
-        picture::png(input.bytes).map(|plane| vec![plane]),
+        picture::png(input.bytes)
+            .map(|plane| vec![plane])
+            .map_err(Trouble::from),
     )
 }
 
@@ -46,7 +48,9 @@ pub(crate) fn open_jpeg<'a>(input: &Input<'a>) -> Result<Outline<'a>, ReadError>
     pictures(
         "JPEG",
         input,
-        picture::jpeg(input.bytes).map(|plane| vec![plane]),
+        picture::jpeg(input.bytes)
+            .map(|plane| vec![plane])
+            .map_err(Trouble::from),
     )
 }
 
@@ -60,9 +64,9 @@ pub(crate) fn open_tiff<'a>(input: &Input<'a>) -> Result<Outline<'a>, ReadError>
 fn pictures<'a>(
     format: &'static str,
     input: &Input<'a>,
-    planes: Result<Vec<Plane<'a>>, String>,
+    planes: Result<Vec<Plane<'a>>, Trouble>,
 ) -> Result<Outline<'a>, ReadError> {
-    let planes = planes.map_err(|reason| ReadError::damaged(format, reason))?;
+    let planes = planes.map_err(|trouble| trouble.of(format))?;
     Ok(outline(format, &input.options, Told::default(), planes))
 }
 

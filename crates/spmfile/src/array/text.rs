@@ -56,6 +56,7 @@ pub(super) fn open(bytes: &[u8]) -> Result<(Told, Plane<'_>), ReadError> {
         columns,
         samples: Stored::Packed(Box::new(samples)),
         carried: if fits { carried } else { Vec::new() },
+        size_nm: None,
     };
     Ok((told, plane))
 }

@@ -65,8 +65,23 @@ pub(super) fn layout(image: &Section<'_>) -> Result<Layout, String> {
             .parse()
             .map_err(|_| format!("its {key:?} is {text:?}, not a whole number"))
     };
-    let (columns, rows) = (number("Samps/line")?, number("Number of lines")?);
+    let (columns, mut rows) = (number("Samps/line")?, number("Number of lines")?);
     let (offset, length) = (number("Data offset")?, number("Data length")?);
+    // Narrow scans of version 5 have as many lines as samples by `Number of lines`; the data have those that are valid.
+    let fits = |rows: u64| {
+        let samples = columns.saturating_mul(rows);
+        length > 0
+            && [2, 4]
+                .iter()
+                .any(|&bytes| samples.saturating_mul(bytes) == length)
+    };
+    if !fits(rows)
+        && number("Valid data start Y") == Ok(0)
+        && let Ok(valid) = number("Valid data len Y")
+        && fits(valid)
+    {
+        rows = valid;
+    }
     let pixels = columns.checked_mul(rows).filter(|&n| n > 0);
     let Some(pixels) = pixels else {
         return Err(format!("its size is {rows} lines of {columns} samples"));
