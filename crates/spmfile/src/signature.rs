@@ -61,7 +61,7 @@ pub(crate) fn is_text(bytes: &[u8]) -> bool {
 
 /// Whether a text is a matrix of numbers, with labels or without, as far as its first lines behind comments tell.
 pub(crate) fn is_matrix(bytes: &[u8]) -> bool {
-    is_text(bytes) && begins_table(&whole_lines(behind_comments(bytes)))
+    is_text(bytes) && begins_table(whole_lines(&behind_comments(bytes)))
 }
 
 /// The head of a text behind its leading comments, however long they are.
@@ -78,12 +78,11 @@ fn behind_comments(text: &[u8]) -> Cow<'_, str> {
 }
 
 /// The lines of a head without the one that it cuts off; of a single one without its last field.
-fn whole_lines(text: Cow<'_, str>) -> String {
+fn whole_lines(text: &str) -> &str {
     let cut = |text| str::rsplit_once(text, [',', ';', '\t', ' ']);
-    let whole = match text.rsplit_once('\n') {
+    match text.rsplit_once('\n') {
         Some((whole, _)) => whole,
-        None if text.len() >= HEAD => cut(&*text).map_or("", |(whole, _)| whole),
-        None => &text,
-    };
-    whole.to_owned()
+        None if text.len() >= HEAD => cut(text).map_or("", |(whole, _)| whole),
+        None => text,
+    }
 }

@@ -7,6 +7,8 @@ use super::axis::Axis;
 
 /// So many lines of labels may stand above the numbers.
 const MOST_LABELS: usize = 3;
+/// So many lines tell a table; what is wrong further down is said by its reader.
+const FIRST: usize = 16;
 /// So few numbers may be evenly spaced by chance.
 const FEW: usize = 4;
 
@@ -98,7 +100,8 @@ pub(crate) fn begins(text: &str) -> bool {
     let Some((above, separator)) = numbers(text) else {
         return false;
     };
-    let mut numbers = lines(text).skip(above).map(|(_, line)| line).enumerate();
+    let first = lines(text).skip(above).take(FIRST);
+    let mut numbers = first.map(|(_, line)| line).enumerate();
     numbers.all(|(n, line)| {
         // A word before numbers: the corner, or the name of a line where words stand above them, too.
         let word = above > 0 || n == 0 && fields(line, separator).count() > FEW;

@@ -35,9 +35,10 @@ pub(super) fn open(bytes: &[u8]) -> Result<(Told, Plane<'_>), ReadError> {
     let nothing = || damaged("expected numbers, found none".to_owned());
     let plain = Table::of(&text, true).ok_or_else(nothing)?;
     let fits = labels::fits(&carried, [plain.rows, plain.columns]);
-    let table = match fits {
-        true => plain,
-        false => Table::of(&text, false).ok_or_else(nothing)?,
+    let table = if fits {
+        plain
+    } else {
+        Table::of(&text, false).ok_or_else(nothing)?
     };
     if let Some(reason) = table.no_image().filter(|_| !fits) {
         return Err(ReadError::unsupported(FORMAT, reason));
