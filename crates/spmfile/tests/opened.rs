@@ -246,11 +246,12 @@ fn surveys_larger_than_memory_are_read_by_rows() {
 /// Whatever stands where the samples are, opening a file does not see it.
 #[test]
 fn samples_are_not_decoded_before_they_are_wanted() {
-    // Of three columns it would be a list of points.
-    let words = "1 2 3 5\n".repeat(500) + "4 five 6 7\n";
+    // Of few columns it would be a list of points.
+    let line = "1 2 3 5 ".repeat(10) + "\n";
+    let words = line.repeat(500) + "4 five 6 7\n";
     let file = File::open(words.as_bytes()).expect("its last line is not looked at");
     let header = file.frames()[0].channels().next().expect("a matrix");
-    assert_eq!((header.rows, header.columns), (501, 4));
+    assert_eq!((header.rows, header.columns), (501, 40));
     let error = file.frames()[0].read(0).expect_err("a word");
     assert!(error.to_string().contains("five"), "{error}");
 

@@ -195,7 +195,8 @@ impl Table {
         const OF_CURVES: usize = 16;
         let (rows, columns) = (self.rows, self.columns);
         let all = columns + self.index;
-        let list = all <= OF_LIST && rows > OF_CURVES;
+        let long = all < OF_CURVES && rows > OF_CURVES * all;
+        let list = long || all <= OF_LIST && rows > OF_CURVES;
         let curves = columns < OF_CURVES && rows > 2 * OF_CURVES && rows > 4 * columns;
         let curves = curves && (self.named || self.index > 0);
         (list || curves).then(|| {

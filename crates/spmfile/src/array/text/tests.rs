@@ -210,6 +210,7 @@ fn lists_and_curves_are_no_images() {
     };
     for (n, columns, heads) in [
         (100, 3, ""),
+        (480, 4, ""),
         (100, 2, ""),
         (200, 5, ""),
         (200, 5, "Bias (V),I (A),X,Y,Z\n"),
