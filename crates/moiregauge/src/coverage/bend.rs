@@ -158,7 +158,7 @@ fn refined_by(
     patch: &Patch,
 ) -> Option<Mean> {
     let rough = choose(view, patch, &nodes(view, patch))?;
-    let parts = higher::parts(view.image, patch, &rough.fit)?;
+    let parts = higher::parts(view, patch, &rough.fit)?;
     // Waves that the envelopes stand still against: where exactly a phase holds does not matter then.
     let patch = &Patch {
         pair: patch.pair + slopes(&rough.fit, view.cells, patch).mean,

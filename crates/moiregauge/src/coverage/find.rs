@@ -48,7 +48,7 @@ pub(crate) fn patches(
                 is_meant(pair) && !found.iter().any(known)
             };
             let settled = settle_if(flat, &pair, pitch(geometry), &is_new);
-            found.extend(settled);
+            found.extend(settled.map(|settled| settled.on(geometry)));
         }
         // What is plain to see everywhere is not looked for any more.
         let everywhere = |s: &Settled| s.patch.share > WHOLE && s.is_plain();

@@ -8,6 +8,7 @@ use nalgebra::{DMatrix, DVector, Vector2};
 use rustfft::num_complex::Complex64;
 
 use crate::coverage::cells::Cells;
+use crate::coverage::nodes::View;
 use crate::coverage::patch::Patch;
 use crate::coverage::phases::Fit;
 use crate::frame::image::Image;
@@ -51,7 +52,8 @@ pub(crate) struct Parts {
 }
 
 /// Takes the higher harmonics off. `fit`: how the phases of the first waves run.
-pub(crate) fn parts(image: &Image, patch: &Patch, fit: &Fit) -> Option<Parts> {
+pub(crate) fn parts(view: &View, patch: &Patch, fit: &Fit) -> Option<Parts> {
+    let image = view.image;
     let names: Vec<[i32; 2]> = FIRST
         .into_iter()
         .chain(HIGHER)
@@ -75,7 +77,7 @@ pub(crate) fn parts(image: &Image, patch: &Patch, fit: &Fit) -> Option<Parts> {
         let place = (at - low)
             .component_div(&(high - low))
             .map(|x| 2.0 * x - 1.0);
-        waves(fit, patch, at, place, &names)
+        waves(view, fit, patch, [at, place], &names)
     };
     let mut normal = DMatrix::zeros(size, size);
     let mut right = DVector::zeros(size);
@@ -109,19 +111,20 @@ pub(crate) fn parts(image: &Image, patch: &Patch, fit: &Fit) -> Option<Parts> {
 
 /// The background, and cosine and sine of each harmonic. `at` in pixels, `place` on −1 … 1.
 fn waves(
+    view: &View,
     fit: &Fit,
     patch: &Patch,
-    at: Vector2<f64>,
-    place: Vector2<f64>,
+    [at, place]: [Vector2<f64>; 2],
     names: &[[i32; 2]],
 ) -> DVector<f64> {
     let n = fit.basis.len();
-    let mut bent = [0.0; 2];
+    let first = [0, 1].map(|i| patch.pair.column(i).into_owned());
+    let mut bent = view.turned(at, first);
     for (i, [value, ..]) in fit.basis.at(at) {
         bent[0] += fit.coefficients[i] * value;
         bent[1] += fit.coefficients[n + i] * value;
     }
-    let phases = [0, 1].map(|i| patch.pair.column(i).dot(&at) + bent[i]);
+    let phases = [0, 1].map(|i| first[i].dot(&at) + bent[i]);
     let mut row = DVector::zeros(BACKGROUND + 2 * names.len());
     let (x, y) = (place.x, place.y);
     row.rows_mut(0, BACKGROUND)

@@ -6,7 +6,9 @@ use rustfft::num_complex::Complex64;
 use crate::coverage::cells::Cells;
 use crate::coverage::local::{Local, local};
 use crate::coverage::patch::Patch;
+use crate::frame::departure::Departure;
 use crate::frame::image::Image;
+use crate::numbers::three::three;
 
 /// Distance of nodes in widths of the window: small patches need every place, ...
 pub(crate) const CLOSE: f64 = 1.0;
@@ -26,6 +28,25 @@ pub(crate) struct View<'a> {
     /// Noise power per pixel at each wave.
     pub(crate) noise: [f64; 3],
     pub(crate) signal_to_noise: f64,
+    /// How far from its own place each pixel is on a straight grid, pixels; `None` of a straight scanner.
+    pub(crate) displacement: Option<&'a Departure>,
+}
+
+impl View<'_> {
+    /// By how much a bent scanner turns the phases of some waves at a place.
+    pub(crate) fn turned<const N: usize>(
+        &self,
+        at: Vector2<f64>,
+        waves: [Vector2<f64>; N],
+    ) -> [f64; N] {
+        match self.displacement {
+            Some(displacement) => {
+                let off = displacement.at(at);
+                waves.map(|q| q.dot(&off))
+            }
+            None => [0.0; N],
+        }
+    }
 }
 
 /// One place where the phases are read.
@@ -85,6 +106,12 @@ pub(crate) fn nodes(view: &View, patch: &Patch) -> Vec<Node> {
             envelopes,
             noise,
         } = local?;
+        // The phases are those of a straight scanner.
+        let turned = view.turned(at, three(&patch.pair));
+        let envelopes = [0, 1, 2].map(|i| match turned[i] {
+            0.0 => envelopes[i],
+            turned => envelopes[i] * Complex64::cis(-turned),
+        });
         let errors =
             [0, 1, 2].map(|i| (view.noise[i] * noise[i] / (2.0 * envelopes[i].norm_sqr())).sqrt());
         Some(Node {

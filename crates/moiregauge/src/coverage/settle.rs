@@ -18,6 +18,8 @@ use crate::coverage::look::{Frame, Seen};
 use crate::coverage::nodes::View;
 use crate::coverage::patch::{Patch, WHOLE, unit_cells_per_pixel};
 use crate::coverage::sides::without_tails;
+use crate::frame::departure::Departure;
+use crate::frame::geometry::Geometry;
 use crate::frame::image::Image;
 use crate::numbers::three::three;
 
@@ -149,6 +151,7 @@ fn settle_bins(
         seen,
         inner,
         bins,
+        displacement: None,
     })
 }
 
@@ -204,9 +207,17 @@ pub(crate) struct Settled {
     bins: usize,
     /// The patch in pixels.
     pub(crate) patch: Patch,
+    /// How far from its own place each bin is on a straight grid, bins; `None` of a straight scanner.
+    displacement: Option<Departure>,
 }
 
 impl Settled {
+    /// The same of an image with this geometry of its pixels.
+    pub(crate) fn on(mut self, geometry: &Geometry) -> Self {
+        self.displacement = geometry.in_bins(self.bins).displacement();
+        self
+    }
+
     fn view(&self) -> View<'_> {
         View {
             image: &self.image,
@@ -214,6 +225,7 @@ impl Settled {
             width: self.seen.width,
             noise: self.seen.noise,
             signal_to_noise: self.seen.signal_to_noise(&self.cells, &self.inner),
+            displacement: self.displacement.as_ref(),
         }
     }
 

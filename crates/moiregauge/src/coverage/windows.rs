@@ -15,7 +15,7 @@ use crate::numbers::three::three;
 
 /// The nodes without what their windows do to waves that run as `fit` says; `read`: what was read at them.
 pub(crate) fn straightened(view: &View, patch: &Patch, read: &[Node], fit: &Fit) -> Vec<Node> {
-    let image = drawn(view.image, patch, read, fit);
+    let image = drawn(view, patch, read, fit);
     let seen = nodes(
         &View {
             image: &image,
@@ -40,8 +40,9 @@ pub(crate) fn straightened(view: &View, patch: &Patch, read: &[Node], fit: &Fit)
     read.iter().map(of).collect()
 }
 
-/// Three waves with the phases of a description and the mean amplitudes of some nodes; missing where `image` is.
-fn drawn(image: &Image, patch: &Patch, nodes: &[Node], fit: &Fit) -> Image {
+/// Three waves with the phases of a description and the mean amplitudes of some nodes; missing where the image is.
+fn drawn(view: &View, patch: &Patch, nodes: &[Node], fit: &Fit) -> Image {
+    let image = view.image;
     let amplitudes = [0, 1, 2].map(|i| nodes.iter().map(|n| n.envelopes[i].norm()).sum::<f64>());
     let waves = three(&patch.pair);
     let values = image.values.iter().enumerate().map(|(pixel, value_here)| {
@@ -51,8 +52,9 @@ fn drawn(image: &Image, patch: &Patch, nodes: &[Node], fit: &Fit) -> Image {
         }
         let at = Vector2::new(place[0] as f64, place[1] as f64);
         let rows = rows(&fit.basis, at);
+        let turned = view.turned(at, waves);
         let wave = |i: usize| {
-            let phase = waves[i].dot(&at) + value(&rows[i], &fit.coefficients);
+            let phase = waves[i].dot(&at) + turned[i] + value(&rows[i], &fit.coefficients);
             amplitudes[i] * phase.cos()
         };
         (0..3).map(wave).sum()

@@ -196,6 +196,7 @@ fn triangles_have_the_twist_of_their_nodes() {
         origin: Vector2::new(3.0, -8.0),
         covariance: Matrix4::zeros(),
         from_sensors: true,
+        departure: None,
     };
     let (material, convention) = (Material::graphene(), StrainConvention::RealSpace);
     let (mut twists, mut strains, mut cells) = (Vec::new(), Vec::new(), 0);
@@ -244,6 +245,7 @@ fn triangles_of_known_layers_have_their_twist_and_strain() {
         origin: Vector2::zeros(),
         covariance: Matrix4::zeros(),
         from_sensors: false,
+        departure: None,
     };
     let lab = 2.0 * (axis + angle + twist);
     let truth = strain * Vector2::new(lab.cos(), lab.sin());
@@ -294,6 +296,7 @@ fn the_regime_has_its_reasons() {
         origin: Vector2::zeros(),
         covariance: Matrix4::zeros(),
         from_sensors: false,
+        departure: None,
     };
     let (material, convention) = (Material::graphene(), StrainConvention::RealSpace);
     let domains = |pitch: f64, found: &FoundNodes| {

@@ -8,12 +8,15 @@
 //! Plane fit and tip velocities: Tran et al., arXiv:2406.08681. With N pixels the extent is
 //! `(N − 1)·|column of J|`: positions are those of pixel centres.
 
+use std::sync::Arc;
+
 use heterostrain::lattice::both;
 use nalgebra::{Matrix2, Matrix4, Vector2};
 use serde::{Deserialize, Serialize};
 use spmfile::{FrameDirection, LineDirection, Scan};
 
 use crate::frame::axis::Axis;
+use crate::frame::departure::Departure;
 use crate::numbers::exact;
 
 /// The affine map from pixels to nm.
@@ -32,6 +35,10 @@ pub struct Geometry {
     pub covariance: Matrix4<f64>,
     /// Whether it comes from position sensors.
     pub from_sensors: bool,
+    /// What the sensors say beside the affine map, nm; `None` of a straight scanner. It belongs to the pixels and is not stored
+    /// with what was measured in them.
+    #[serde(skip)]
+    pub departure: Option<Arc<Departure>>,
 }
 
 /// When each pixel was recorded, as a linear function of its index.
@@ -64,6 +71,7 @@ impl Geometry {
             origin: centre - pixel_to_nm * middle,
             covariance: Matrix4::zeros(),
             from_sensors: false,
+            departure: None,
         })
     }
 
@@ -125,6 +133,7 @@ impl Geometry {
         Self {
             size,
             origin: self.origin + self.pixel_to_nm * shift,
+            departure: self.departed(|departure| departure.cropped(first)),
             ..self.clone()
         }
     }
@@ -140,7 +149,19 @@ impl Geometry {
             origin: self.origin + self.pixel_to_nm * middle,
             covariance: self.covariance * (pixels * pixels),
             from_sensors: self.from_sensors,
+            departure: self.departed(|departure| departure.in_bins(bin)),
         }
+    }
+
+    fn departed(&self, change: impl Fn(&Departure) -> Departure) -> Option<Arc<Departure>> {
+        let departure = self.departure.as_deref()?;
+        Some(Arc::new(change(departure)))
+    }
+
+    /// How far from its own place each pixel is on a straight grid, pixels; `None` of a straight scanner.
+    pub(crate) fn displacement(&self) -> Option<Departure> {
+        let departure = self.departure.as_deref()?;
+        Some(departure.mapped(&self.pixel_to_nm.try_inverse()?))
     }
 
     /// The same pixels in coordinates that are `map` times these (known exactly).
@@ -151,6 +172,7 @@ impl Geometry {
             pixel_to_nm: map * self.pixel_to_nm,
             origin: map * self.origin,
             covariance: both * self.covariance * both.transpose(),
+            departure: self.departed(|departure| departure.mapped(map)),
             ..self.clone()
         }
     }

@@ -3,13 +3,16 @@
 pub(crate) mod axis;
 pub(crate) mod background;
 pub(crate) mod blur;
+pub(crate) mod bowed;
 pub(crate) mod clip;
 pub(crate) mod column_sums;
+pub(crate) mod departure;
 pub(crate) mod fit_plane;
 pub(crate) mod geometry;
 pub(crate) mod glitches;
 pub(crate) mod image;
 pub(crate) mod lag;
+pub(crate) mod line_steps;
 pub(crate) mod loops;
 pub(crate) mod median_ground;
 pub(crate) mod plane;
@@ -20,6 +23,7 @@ pub(crate) mod smaller;
 
 pub use axis::Axis;
 pub use background::{Background, remove_background};
+pub use departure::Departure;
 pub use geometry::{Geometry, Timing};
 pub use image::Image;
 pub use lag::Lag;

@@ -2,17 +2,21 @@
 
 use std::borrow::Cow;
 use std::ops::Range;
+use std::sync::Arc;
 
-use nalgebra::{Matrix2, Matrix4, Vector2};
+use nalgebra::{Matrix2, Vector2};
 
+use crate::frame::bowed;
 use crate::frame::column_sums::ColumnSums;
+use crate::frame::departure::{Departure, Term};
 use crate::frame::fit_plane::through;
 use crate::frame::geometry::Geometry;
 use crate::frame::glitches;
 use crate::frame::image::Image;
 use crate::frame::lag;
 use crate::frame::lag::Lag;
-use crate::frame::plane::{PlaneFit, line_sums};
+use crate::frame::line_steps::{covariance, lines};
+use crate::frame::plane::PlaneFit;
 
 /// Sine of the angle between fast and slow axis, at least: a frame is no line. Chosen by eye.
 const UPRIGHT: f64 = 0.2;
@@ -20,8 +24,6 @@ const UPRIGHT: f64 = 0.2;
 const BENDS: f64 = 5.0;
 /// The outer fraction of a line in which turn-around is looked for, on either side: twice a usual overscan (5 %).
 const TURN_AROUND: f64 = 0.1;
-/// A line with fewer values has no slope.
-const FEWEST: f64 = 3.0;
 
 /// The geometry by the sensors, and how well a plane describes them.
 #[derive(Clone, Debug)]
@@ -73,6 +75,11 @@ fn fitted(x: &Image, y: &Image, taken_off: Option<[Option<Lag>; 2]>) -> Option<S
         None => without_lags(sensors)?,
     };
     let planes = [sensors[0].plane(&used)?, sensors[1].plane(&used)?];
+    let departure = departure(&sensors, &planes, &used);
+    let sensors = match &departure {
+        Some(departure) => without_departure(sensors, departure),
+        None => sensors,
+    };
     let [x, y] = sensors.each_ref().map(|sensor| sensor.image.as_ref());
     let pixel_to_nm = Matrix2::new(
         planes[0].per_column,
@@ -102,6 +109,7 @@ fn fitted(x: &Image, y: &Image, taken_off: Option<[Option<Lag>; 2]>) -> Option<S
             origin: Vector2::new(planes[0].origin, planes[1].origin),
             covariance,
             from_sensors: true,
+            departure: departure.map(Arc::new),
         },
         planes,
         columns: used,
@@ -112,27 +120,41 @@ fn fitted(x: &Image, y: &Image, taken_off: Option<[Option<Lag>; 2]>) -> Option<S
     })
 }
 
-/// What a plane leaves of a line of a sensor, nm.
-struct LineLeft {
-    /// Step from column to column, that of the plane included; `None` of fewer than three values.
-    slope: Option<f64>,
-    /// The mean; NaN of a line without values.
-    mean: f64,
+/// The smooth departure of both sensors from their planes; `None` of a straight scanner.
+fn departure(
+    sensors: &[Sensor<'_>; 2],
+    planes: &[PlaneFit; 2],
+    used: &Range<usize>,
+) -> Option<Departure> {
+    let axes = [Vector2::x(), Vector2::y()];
+    let mut terms = Vec::new();
+    for ((sensor, plane), axis) in sensors.iter().zip(planes).zip(axes) {
+        let found = bowed::departure(&sensor.image, plane, used);
+        terms.extend(found.into_iter().map(|(along, across, size)| Term {
+            along,
+            across,
+            size: axis * size,
+        }));
+    }
+    let rows = sensors[0].image.rows;
+    let columns = [used.start, used.end - 1];
+    (!terms.is_empty()).then(|| Departure::new(terms, columns, [0, rows - 1]))
 }
 
-/// Looks at every line of a sensor.
-fn lines(image: &Image, plane: &PlaneFit, used: &Range<usize>) -> Vec<LineLeft> {
-    let mut lines = Vec::with_capacity(image.rows);
-    let add = |_, [n, x, xx, v, xv, _]: [f64; 6]| {
-        let spread = n * xx - x * x;
-        let known = n >= FEWEST && spread > 0.0;
-        lines.push(LineLeft {
-            slope: known.then(|| plane.per_column + (n * xv - x * v) / spread),
-            mean: v / n,
-        });
-    };
-    line_sums(image, used.clone(), plane, f64::INFINITY, 1, add);
-    lines
+/// Both sensors as those of a straight scanner.
+fn without_departure<'a>(sensors: [Sensor<'a>; 2], departure: &Departure) -> [Sensor<'a>; 2] {
+    let [mut x, mut y] = sensors.map(|sensor| sensor.image.into_owned());
+    let columns = x.columns;
+    for row in 0..x.rows {
+        let line = row * columns..(row + 1) * columns;
+        let places = departure.line(row, columns);
+        let both = x.values[line.clone()].iter_mut().zip(&mut y.values[line]);
+        for ((x, y), off) in both.zip(places) {
+            *x -= off.x;
+            *y -= off.y;
+        }
+    }
+    [x, y].map(|image| Sensor::new(Cow::Owned(image)))
 }
 
 /// Steps of the x and of the y sensor, where both are known.
@@ -260,60 +282,6 @@ fn straight_columns(sensors: &[Sensor<'_>; 2]) -> Option<Range<usize>> {
         last = last.min(columns - (columns - margin..columns).rev().take_while(bends).count());
     }
     Some(first..last)
-}
-
-/// Covariance of `J` from what repeats: the fast step from line to line, the slow step from the
-/// scatter of the line means, each with an effective number of independent lines.
-fn covariance(
-    line_slopes: &[Vector2<f64>],
-    lines: &[Vec<LineLeft>; 2],
-    planes: &[PlaneFit; 2],
-) -> Matrix4<f64> {
-    let mut c = Matrix4::zeros();
-    for (axis, (lines, plane)) in lines.iter().zip(planes).enumerate() {
-        let slopes: Vec<f64> = line_slopes
-            .iter()
-            .map(|s| s[axis] - plane.per_column)
-            .collect();
-        let n = slopes.len() as f64;
-        if n > 1.0 {
-            let variance = slopes.iter().map(|s| s * s).sum::<f64>() / (n - 1.0);
-            c[(axis, axis)] = variance * correlated(&slopes) / n;
-        }
-        let means = lines.iter().map(|line| line.mean);
-        let means: Vec<f64> = means.filter(|m| m.is_finite()).collect();
-        let n = means.len() as f64;
-        if n > 2.0 {
-            let variance = means.iter().map(|m| m * m).sum::<f64>() / (n - 2.0);
-            let spread = n * (n * n - 1.0) / 12.0;
-            c[(2 + axis, 2 + axis)] = variance * correlated(&means) / spread;
-        }
-    }
-    c
-}
-
-/// By how much correlation between successive residuals raises the variance of their mean:
-/// `1 + 2 Σ ρ_k`, summed while the autocorrelation is positive (initial positive sequence).
-fn correlated(residuals: &[f64]) -> f64 {
-    let total: f64 = residuals.iter().map(|r| r * r).sum();
-    if total == 0.0 {
-        return 1.0;
-    }
-    let mut factor = 1.0;
-    for lag in 1..residuals.len() / 4 {
-        let rho = residuals
-            .iter()
-            .zip(&residuals[lag..])
-            .map(|(a, b)| a * b)
-            .sum::<f64>()
-            / total;
-        // Below twice the scatter of ρ for independent residuals it is noise.
-        if rho < 2.0 / (residuals.len() as f64).sqrt() {
-            break;
-        }
-        factor += 2.0 * rho;
-    }
-    factor
 }
 
 #[cfg(test)]

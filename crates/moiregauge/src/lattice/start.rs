@@ -226,11 +226,13 @@ impl Start {
     fn settled(&self) -> Option<Settled> {
         let (pair, pitch) = (self.pair(), pitch(&self.geometry));
         let Some(look) = &self.prepared.look else {
-            return settle(&cut_off(&self.prepared.image), &pair, pitch);
+            let settled = settle(&cut_off(&self.prepared.image), &pair, pitch);
+            return settled.map(|settled| settled.on(&self.geometry));
         };
         let bins = bins_for(&pair);
         let image = look.in_bins(&self.prepared.image, bins);
-        settle_in_bins(&cut_off(&image), bins, &pair, pitch)
+        let settled = settle_in_bins(&cut_off(&image), bins, &pair, pitch);
+        settled.map(|settled| settled.on(&self.geometry))
     }
 
     /// The lattice of a patch, of the largest grain in it, or its mean.
@@ -302,7 +304,7 @@ impl Start {
     fn of_grain(&self, image: &Image, grain: &Patch) -> Option<Self> {
         let (geometry, background) = (&self.geometry, self.background);
         let flat = remove_background(&grain.of(image), background);
-        let mut again = settle(&flat, &grain.pair, pitch(geometry))?;
+        let mut again = settle(&flat, &grain.pair, pitch(geometry))?.on(geometry);
         again.patch.share *= grain.share;
         let part = again.patch.of(image);
         let start = Self::near(&part, geometry, background, &again.patch.pair)?;
@@ -324,9 +326,15 @@ pub(crate) fn evidence(harmonics: &Harmonics) -> f64 {
 }
 
 /// The lattice fitted to the pixels, in pixels.
-pub(crate) fn fitted(prepared: &Prepared, background: Background) -> Option<fit::Found> {
+pub(crate) fn fitted(
+    prepared: &Prepared,
+    geometry: &Geometry,
+    background: Background,
+) -> Option<fit::Found> {
     let binning = prepared.binning;
-    let found = fit::measure(&prepared.binned(), &prepared.harmonics, background)?;
+    let displacement = geometry.in_bins(binning).displacement();
+    let (image, start) = (&prepared.binned(), &prepared.harmonics);
+    let found = fit::measure(image, start, background, displacement.as_ref())?;
     let to_pixels = Matrix2::identity() * binning as f64;
     Some(fit::Found {
         lattice: found.lattice.mapped(&to_pixels),

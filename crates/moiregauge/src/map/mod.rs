@@ -32,6 +32,7 @@ pub(crate) mod quantities;
 pub(crate) mod register;
 pub(crate) mod registry;
 pub(crate) mod sample;
+pub(crate) mod scanner;
 pub(crate) mod summary;
 pub(crate) mod survey;
 #[cfg(test)]

@@ -26,6 +26,7 @@ fn geometry(size: [usize; 2]) -> Geometry {
         origin: Vector2::zeros(),
         covariance: Matrix4::zeros(),
         from_sensors: false,
+        departure: None,
     }
 }
 

@@ -13,6 +13,7 @@ use crate::frame::geometry::Geometry;
 use crate::map::displacement;
 use crate::map::gauge::Gauge;
 use crate::map::nodes::{Grid, LatticeNode};
+use crate::map::scanner::straight;
 use crate::window::mask::Mask;
 use crate::window::types::WaveMap;
 
@@ -36,6 +37,7 @@ impl LatticeMap {
     ///
     /// `None` where the geometry is singular.
     pub fn new(map: &WaveMap, at_rest: &Geometry) -> Option<Self> {
+        let map = &*straight(map, at_rest);
         let j = at_rest.pixel_to_nm;
         let dual = j.try_inverse()?.transpose();
         let of_both = both(&dual);

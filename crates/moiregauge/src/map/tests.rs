@@ -305,6 +305,7 @@ fn twist_and_strain_are_those_of_the_local_lattice() {
         origin: Vector2::new(-3.0, 8.0),
         covariance: Matrix4::zeros(),
         from_sensors: true,
+        departure: None,
     };
     let lattices = LatticeMap::new(&map, &geometry).unwrap();
     let material = Material::graphene();
@@ -349,6 +350,7 @@ fn displacements_follow_the_phases() {
         origin: Vector2::zeros(),
         covariance: Matrix4::zeros(),
         from_sensors: false,
+        departure: None,
     };
     let lattices = LatticeMap::new(&map, &geometry).unwrap();
     let mean = lattices.mean().unwrap();
@@ -432,6 +434,7 @@ fn changing_drift_is_told_from_strain() {
             origin: Vector2::zeros(),
             covariance: Matrix4::zeros(),
             from_sensors: true,
+            departure: None,
         };
         LatticeMap::new(&map_of(&scene, Some(16.0)), &geometry).unwrap()
     };

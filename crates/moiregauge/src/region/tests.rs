@@ -297,6 +297,7 @@ fn mapped(scene: &FieldScene) -> (TwistStrainMap, f64) {
         origin: Vector2::zeros(),
         covariance: Matrix4::zeros(),
         from_sensors: false,
+        departure: None,
     };
     let map = LatticeMap::new(&waves, &geometry).unwrap();
     let (material, convention) = (Material::graphene(), StrainConvention::RealSpace);

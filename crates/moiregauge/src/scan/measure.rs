@@ -91,7 +91,14 @@ pub fn measure_moires(
             Ok(vec![lattice])
         }
         0 | 1 => measure_own(image, geometry, background, method).map(|lattice| vec![lattice]),
-        n => measure_several(&image, geometry, background, n),
+        n => {
+            // Several lattices are fitted together on a straight grid.
+            let plane = Geometry {
+                departure: None,
+                ..geometry.clone()
+            };
+            measure_several(&image, &plane, background, n)
+        }
     };
     let searched = settings.moires < 2 && told.is_nothing();
     measure_with(file, scan, settings, window, &find, searched)
@@ -282,7 +289,11 @@ fn measure_line(
         about_lattice(file, &lattice, &geometry, caveats);
         MeasuredLine {
             line,
-            geometry: geometry.clone(),
+            // What departs from it is in the lattice already.
+            geometry: Geometry {
+                departure: None,
+                ..geometry.clone()
+            },
             nominal: nominal.clone(),
             timing,
             frame_columns: channel.columns,

@@ -293,6 +293,7 @@ impl SurveyPlan {
             origin: self.placed.origin + j * Vector2::repeat(0.5 * (share - 1.0)),
             covariance: self.placed.covariance * (share * share),
             from_sensors: self.placed.from_sensors,
+            departure: None,
         };
         let (pixels, pitch) = (pixels / share, pitch(&binned));
         Ok(domains_of(

@@ -18,6 +18,8 @@ pub(crate) struct Folded {
     squared_odd: Vec<Block>,
     cubed_even: Vec<Block>,
     cubed_odd: Vec<Block>,
+    /// The line itself, where its waves are bent.
+    whole: Option<Vec<f64>>,
 }
 
 impl Folded {
@@ -37,10 +39,14 @@ impl Folded {
             squared_odd: zeros.clone(),
             cubed_even: zeros.clone(),
             cubed_odd: zeros,
+            whole: (frame.displacement.as_ref()).map(|_| vec![0.0; frame.image.columns]),
         }
     }
 
     pub(crate) fn take(&mut self, line: &[f64]) {
+        if let Some(whole) = &mut self.whole {
+            whole.copy_from_slice(line);
+        }
         let half = line.len().div_ceil(2);
         let (even, odd) = (self.even.as_flattened_mut(), self.odd.as_flattened_mut());
         widest(
@@ -157,8 +163,19 @@ impl Folded {
         )
     }
 
-    /// The same for all harmonics, two at a time.
-    pub(crate) fn all_products(&self, tables: &Tables, mut each: impl FnMut(usize, [f64; 4])) {
+    /// The same of a line for all harmonics, two at a time.
+    pub(crate) fn all_products(
+        &self,
+        tables: &Tables,
+        row: usize,
+        mut each: impl FnMut(usize, [f64; 4]),
+    ) {
+        if let (Some(bent), Some(line)) = (&tables.bent, &self.whole) {
+            for (i, [plain, tilted, ..]) in bent.products(row, line).into_iter().enumerate() {
+                each(i, [plain.re, plain.im, tilted.re, tilted.im]);
+            }
+            return;
+        }
         let harmonics = tables.up.len();
         for i in (0..harmonics - harmonics % 2).step_by(2) {
             let [first, second] = self.products([tables.of(i), tables.of(i + 1)]);
@@ -185,15 +202,23 @@ impl Bends {
     pub(crate) fn of_line(frame: &Frame, tables: &Tables, row: usize, line: &mut Folded) -> Self {
         let mut bends = Self::new(tables.up.len());
         let y = frame.y[row];
-        line.raise();
-        line.all_products(tables, |i, [c, s, xc, xs]| {
-            let [xxc, xxs, xxxc, xxxs] = line.raised_products(tables.of(i));
-            let turn = tables.up[i][row];
-            let along = [[c, s], [xc, xs], [xxc, xxs], [xxxc, xxxs]]
-                .map(|[re, im]| Complex64::new(re, im) * turn);
+        let mut put = |i: usize, along: [Complex64; 4]| {
+            let along = along.map(|sum| sum * tables.up[i][row]);
             for (sum, [a, b]) in bends.0[i].iter_mut().zip(BENT) {
                 *sum = along[*a] * y.powi(*b as i32);
             }
+        };
+        if let (Some(bent), Some(whole)) = (&tables.bent, &line.whole) {
+            for (i, along) in bent.products(row, whole).into_iter().enumerate() {
+                put(i, along);
+            }
+            return bends;
+        }
+        line.raise();
+        line.all_products(tables, row, |i, [c, s, xc, xs]| {
+            let [xxc, xxs, xxxc, xxxs] = line.raised_products(tables.of(i));
+            let along = [[c, s], [xc, xs], [xxc, xxs], [xxxc, xxxs]];
+            put(i, along.map(|[re, im]| Complex64::new(re, im)));
         });
         bends
     }

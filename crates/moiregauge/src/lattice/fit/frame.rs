@@ -7,6 +7,7 @@ use nalgebra::{Matrix2, Vector2};
 use rayon::prelude::*;
 use rustfft::num_complex::Complex64;
 
+use crate::frame::departure::Departure;
 use crate::frame::image::Image;
 use crate::numbers::interrupt;
 
@@ -27,6 +28,8 @@ pub(crate) struct Frame<'a> {
     pub(crate) present: Vec<usize>,
     /// (row, column) of missing pixels in lines that count.
     pub(crate) missing: Vec<[usize; 2]>,
+    /// How far from its own place each pixel is on a straight grid, pixels; `None` of a straight scanner.
+    pub(crate) displacement: Option<Departure>,
 }
 
 impl<'a> Frame<'a> {
@@ -37,6 +40,7 @@ impl<'a> Frame<'a> {
             y: positions(image.rows),
             present: vec![0; image.rows],
             missing: Vec::new(),
+            displacement: None,
         };
         frame.leave_out(|_| false);
         frame
@@ -72,6 +76,7 @@ impl<'a> Frame<'a> {
             y: self.y.clone(),
             present: self.present.clone(),
             missing: self.missing.clone(),
+            displacement: self.displacement.clone(),
         }
     }
 

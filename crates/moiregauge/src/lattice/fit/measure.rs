@@ -3,6 +3,7 @@
 use heterostrain::lattice::{Lattice, Px};
 
 use crate::frame::background::Background;
+use crate::frame::departure::Departure;
 use crate::frame::image::Image;
 use crate::lattice::fit::fit_pixels::Fit;
 use crate::lattice::fit::fitted::LatticeFit;
@@ -19,10 +20,21 @@ pub(crate) struct Found {
 ///
 /// `None` where the fit does not settle within half a cycle over the frame of its start, or the
 /// harmonics cannot be told apart on this frame. Everything counts in pixels of `image`.
-pub(crate) fn measure(image: &Image, start: &Harmonics, background: Background) -> Option<Found> {
-    let mut fit = Fit::new(image, start, background)?;
+/// `displacement`: how far from its own place each pixel is on a straight grid.
+pub(crate) fn measure(
+    image: &Image,
+    start: &Harmonics,
+    background: Background,
+    displacement: Option<&Departure>,
+) -> Option<Found> {
+    let new = || {
+        let mut fit = Fit::new(image, start, background)?;
+        fit.frame.displacement = displacement.cloned();
+        Some(fit)
+    };
+    let mut fit = new()?;
     if fit.worth_a_sketch(start) && fit.sketch().is_none() {
-        fit = Fit::new(image, start, background)?;
+        fit = new()?;
     }
     let noise = fit.choose()?;
     let noise = without_bend(&fit, noise);

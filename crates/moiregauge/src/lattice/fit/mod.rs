@@ -22,6 +22,7 @@
 //! Huber, Robust Statistics (1981), modified residuals; Schwarz, Ann. Stat. 6, 461 (1978), BIC.
 
 pub(crate) mod bend;
+pub(crate) mod bent_waves;
 mod cells;
 pub(crate) mod choose;
 pub(crate) mod closure;

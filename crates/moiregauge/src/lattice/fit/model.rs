@@ -80,6 +80,10 @@ pub(crate) fn residual(
             [alpha * c + beta * s, beta * c - alpha * s]
         })
         .collect();
+    if let Some(bent) = &tables.bent {
+        bent.take_off(row, &turned, line);
+        return;
+    }
     // Cosines are the same on either side of the middle, sines change their sign.
     let half = line.len().div_ceil(2);
     let middle = line.len() % 2;
@@ -285,7 +289,7 @@ fn add(
             gradient[t] += moments[a] * y.powi(b as i32);
         }
     }
-    line.all_products(tables, |i, [c, s, xc, xs]| {
+    line.all_products(tables, row, |i, [c, s, xc, xs]| {
         let turn = tables.up[i][row];
         let first = basis.cosine(i);
         let (plain_c, plain_s) = (c * turn.re - s * turn.im, s * turn.re + c * turn.im);

@@ -300,7 +300,7 @@ mod tests {
             (0..SIZE[0] * SIZE[1]).map(value).collect(),
         );
         let start = Windowed::new(&image).fit(&image, &pair(), Background::Plane, shells(3));
-        measure(&image, &start.unwrap(), Background::Plane)
+        measure(&image, &start.unwrap(), Background::Plane, None)
             .unwrap()
             .fit
     }

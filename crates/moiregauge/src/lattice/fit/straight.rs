@@ -9,6 +9,7 @@ use rustfft::num_complex::Complex64;
 
 use crate::frame::image::Image;
 use crate::lattice::fit::bend::{Bend, FOLLOWED, inhomogeneity};
+use crate::lattice::fit::bent_waves::BentWaves;
 use crate::lattice::fit::fit_pixels::{FinalNoise, Fit};
 use crate::lattice::fit::frame::{Frame, turns, wave};
 use crate::lattice::fit::model::Model;
@@ -55,18 +56,21 @@ pub(crate) fn without_bend(fit: &Fit, noise: FinalNoise) -> FinalNoise {
 /// The image without the difference between the bent waves and the straight ones.
 fn straightened(frame: &Frame, model: &Model, bend: &Bend) -> Image {
     let columns = frame.image.columns;
-    let places: Vec<_> = model
-        .basis
-        .indices
-        .iter()
-        .map(|&index| wave(&model.pair, index))
-        .collect();
+    let indices = &model.basis.indices;
+    let waves = indices.iter().map(|&index| wave(&model.pair, index));
+    let places: Vec<_> = waves.collect();
     let along: Vec<_> = places.iter().map(|p| turns(p.x, &frame.x)).collect();
     let up: Vec<_> = places.iter().map(|p| turns(p.y, &frame.y)).collect();
+    let scanner = BentWaves::new(frame, &model.pair, indices);
     let middle = mean_phases(frame, bend);
     let mut image = frame.image.clone();
     let lines = image.values.par_chunks_exact_mut(columns).enumerate();
     lines.for_each(|(row, line)| {
+        let mut own = Vec::new();
+        if let Some(scanner) = &scanner {
+            scanner.each(row, |_, turns| own.push(turns.to_vec()));
+        }
+        let along = if scanner.is_some() { &own } else { &along };
         for (column, value) in line.iter_mut().enumerate() {
             let phases = bend.phases([frame.x[column], frame.y[row]]);
             let bent = [0, 1].map(|i| Complex64::cis(phases[i] - middle[i]));

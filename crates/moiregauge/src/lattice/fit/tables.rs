@@ -3,6 +3,7 @@
 use nalgebra::Matrix2;
 use rustfft::num_complex::Complex64;
 
+use crate::lattice::fit::bent_waves::BentWaves;
 use crate::lattice::fit::frame::{Frame, turns, wave};
 
 /// Values handled together: as many as the compiler keeps in registers.
@@ -18,6 +19,8 @@ pub(crate) struct Tables {
     each: Vec<[Block; 2]>,
     /// `e^{iθ_y}` of each line.
     pub(crate) up: Vec<Vec<Complex64>>,
+    /// The same waves on a bent scanner.
+    pub(crate) bent: Option<BentWaves>,
 }
 
 impl Tables {
@@ -38,6 +41,7 @@ impl Tables {
         Self {
             along: along.collect(),
             each,
+            bent: BentWaves::new(frame, pair, indices),
             up: waves.iter().map(|p| turns(p.y, &frame.y)).collect(),
         }
     }

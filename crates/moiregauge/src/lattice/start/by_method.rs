@@ -70,7 +70,7 @@ impl Start {
             Method::Autocorrelation => (autocorrelation(), fourier()),
             Method::Fourier => (fourier(), autocorrelation()),
             Method::Lattice => {
-                let found = fitted(&self.prepared, self.background);
+                let found = fitted(&self.prepared, &self.geometry, self.background);
                 if let Some(mean) = mean
                     && !found.as_ref().is_some_and(|found| is_better(found, mean))
                 {

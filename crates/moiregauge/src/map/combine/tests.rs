@@ -16,6 +16,7 @@ fn maps_of_one_place_are_averaged() {
         origin: Vector2::zeros(),
         covariance: Matrix4::zeros(),
         from_sensors: false,
+        departure: None,
     };
     let one = |seed: u64, white: f64| {
         let scene = FieldScene {

@@ -1,0 +1,261 @@
+//! What a plane leaves of a position sensor → its smooth departure, chosen by what predicts lines that were held out.
+//!
+//! Each line is described by Legendre polynomials along it. How the coefficient of each degree runs from line to line is described by
+//! such polynomials across the lines and, where the frame creeps, by a logarithm of the time since it began. Blocks of lines are held
+//! out in turn; of all descriptions that which predicts them best is taken, if it predicts them better than the plane by
+//! more than chance. A straight scanner so keeps its plane.
+//!
+//! # References
+//! Stone, J. R. Stat. Soc. B 36, 111 (1974), cross-validation.
+
+use std::ops::Range;
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::frame::departure::{Across, legendre};
+use crate::frame::image::Image;
+use crate::frame::line_steps::correlated;
+use crate::frame::plane::PlaneFit;
+
+/// Degrees along a line that are tried, and across the lines: a sum of so many follows a creep or a hysteresis to a thousandth.
+const DEGREES: [usize; 2] = [8, 8];
+/// Blocks of lines that are held out in turn.
+const BLOCKS: usize = 24;
+/// By so much, in units of what it leaves of a line, a description has to predict the lines that were held out better than the plane: e⁻²⁵ by chance,
+/// the search included.
+const BEYOND_CHANCE: f64 = 50.0;
+/// The same of other degrees of a sensor that is bent: e⁻⁶.
+const BESIDE: f64 = 12.0;
+/// Departures of less than this share of the frame are rounding, and harm nobody.
+const HARMLESS: f64 = 1e-7;
+/// Steps of the times after which creep is logarithmic, as shares of the frame: factors of two down to a line.
+const HALVES: i32 = 9;
+
+/// A line that was described: its v and the coefficients of the degrees along it.
+struct Line {
+    v: f64,
+    sizes: Vec<f64>,
+}
+
+/// One term: the degree along the lines, a function across them, and its size, nm.
+pub(crate) type Size = (usize, Across, f64);
+
+/// The terms of one sensor; none of a straight one.
+pub(crate) fn departure(image: &Image, plane: &PlaneFit, used: &Range<usize>) -> Vec<Size> {
+    let lines = lines(image, plane, used);
+    if lines.len() < 2 * BLOCKS {
+        return Vec::new();
+    }
+    let span = (plane.per_column * image.columns as f64).hypot(plane.per_row * image.rows as f64);
+    let found: Vec<(f64, Vec<Size>)> = (0..=DEGREES[0])
+        .filter_map(|along| of_degree(&lines, along, HARMLESS * span))
+        .collect();
+    if found.iter().all(|(gain, _)| *gain < BEYOND_CHANCE) {
+        return Vec::new();
+    }
+    found.into_iter().flat_map(|(_, terms)| terms).collect()
+}
+
+/// Every line of which most pixels are there.
+fn lines(image: &Image, plane: &PlaneFit, used: &Range<usize>) -> Vec<Line> {
+    let degrees = DEGREES[0] + 1;
+    if used.len() < 4 * degrees || image.rows < 2 {
+        return Vec::new();
+    }
+    let side = (used.len() - 1) as f64;
+    let along: Vec<Vec<f64>> = (0..used.len())
+        .map(|c| {
+            let all = legendre(2.0 * c as f64 / side - 1.0, DEGREES[0]);
+            all.into_iter().map(|[value, _]| value).collect()
+        })
+        .collect();
+    let normal = |there: &dyn Fn(usize) -> bool| {
+        let mut normal = DMatrix::zeros(degrees, degrees);
+        for row in along.iter().enumerate().filter(|(c, _)| there(*c)) {
+            let row = DVector::from_column_slice(row.1);
+            normal.syger(1.0, &row, &row, 1.0);
+        }
+        normal.fill_upper_triangle_with_lower_triangle();
+        normal.cholesky()
+    };
+    let Some(whole) = normal(&|_| true) else {
+        return Vec::new();
+    };
+    let mut lines = Vec::with_capacity(image.rows);
+    for row in 0..image.rows {
+        let values = &image.row(row)[used.clone()];
+        let mut right = DVector::<f64>::zeros(degrees);
+        let mut count = 0;
+        for (c, value) in values.iter().enumerate().filter(|(_, v)| v.is_finite()) {
+            let left = value - plane.at((used.start + c) as f64, row as f64);
+            count += 1;
+            for (sum, p) in right.iter_mut().zip(&along[c]) {
+                *sum += left * p;
+            }
+        }
+        let sizes = if count == values.len() {
+            Some(whole.solve(&right))
+        } else if 2 * count > values.len() {
+            normal(&|c| values[c].is_finite()).map(|n| n.solve(&right))
+        } else {
+            None
+        };
+        if let Some(sizes) = sizes {
+            lines.push(Line {
+                v: 2.0 * row as f64 / (image.rows - 1) as f64 - 1.0,
+                sizes: sizes.as_slice().to_vec(),
+            });
+        }
+    }
+    lines
+}
+
+/// How one degree along the lines runs across them, and by how much that predicts lines better than the plane; `None` where it may be chance.
+fn of_degree(lines: &[Line], along: usize, least: f64) -> Option<(f64, Vec<Size>)> {
+    let values = DVector::from_iterator(lines.len(), lines.iter().map(|l| l.sizes[along]));
+    let powers = |n: usize| (0..n).map(Across::Power).collect::<Vec<_>>();
+    // What the plane has already.
+    let plane = [2, 1].get(along).copied().unwrap_or(0);
+    let straight = held_out(lines, &values, &powers(plane))?;
+    let better = |best: (f64, Vec<Across>), across: Vec<Across>| {
+        let left = held_out(lines, &values, &across);
+        left.filter(|left| *left < best.0)
+            .map_or(best, |left| (left, across))
+    };
+    let all = (plane + 1..=DEGREES[1] + 1).map(powers);
+    let mut best = all.fold((straight, powers(plane)), better);
+    let gain = |(left, across): &(f64, Vec<Across>)| {
+        Some(sharpness(lines, &values, across, least)? * (straight - left))
+    };
+    let mut gained = gain(&best)?;
+    if gained < BESIDE {
+        return None;
+    }
+    // Creep is a matter of whole lines.
+    if along == 0 {
+        let ends = [false, true].into_iter();
+        let times = ends.flat_map(|last| (1..=HALVES).map(move |halves| (last, halves)));
+        let all = times.flat_map(|(from_last, halves)| {
+            let tau = 0.5f64.powi(halves);
+            let log = Across::Log { tau, from_last };
+            (2..=DEGREES[1] / 2 + 1).map(move |n| powers(n).into_iter().chain([log]).collect())
+        });
+        best = all.fold(best, better);
+        gained = gain(&best)?;
+    }
+    let sizes = sizes(lines, &values, &best.1)?;
+    let terms = best.1.into_iter().zip(sizes.iter());
+    let terms = terms.map(|(across, size)| (along, across, *size));
+    Some((gained, terms.collect()))
+}
+
+/// One over what chance gains: lines are as noisy, and as correlated, as a description leaves them; `least` of noise is always there.
+fn sharpness(lines: &[Line], values: &DVector<f64>, across: &[Across], least: f64) -> Option<f64> {
+    let left = match across {
+        [] => values.clone(),
+        _ => values - design(lines, across) * sizes(lines, values, across)?,
+    };
+    let variance = left.norm_squared() / left.len() as f64;
+    Some(1.0 / (variance * correlated(left.as_slice()) + least * least))
+}
+
+/// The sizes of some functions by least squares.
+fn sizes(lines: &[Line], values: &DVector<f64>, across: &[Across]) -> Option<DVector<f64>> {
+    let design = design(lines, across);
+    solved(&design.tr_mul(&design), &design.tr_mul(values))
+}
+
+fn design(lines: &[Line], across: &[Across]) -> DMatrix<f64> {
+    DMatrix::from_fn(lines.len(), across.len(), |i, j| {
+        across[j].at(lines[i].v)[0]
+    })
+}
+
+fn solved(normal: &DMatrix<f64>, right: &DVector<f64>) -> Option<DVector<f64>> {
+    Some(normal.clone().cholesky()?.solve(right))
+}
+
+/// Sum of the squares of what each block of lines has beside what the other blocks predict of it.
+fn held_out(lines: &[Line], values: &DVector<f64>, across: &[Across]) -> Option<f64> {
+    let block = |b: usize| b * lines.len() / BLOCKS..(b + 1) * lines.len() / BLOCKS;
+    if across.is_empty() {
+        return Some(values.norm_squared());
+    }
+    let design = design(lines, across);
+    let (normal, right) = (design.tr_mul(&design), design.tr_mul(values));
+    (0..BLOCKS)
+        .map(|b| {
+            let part = design.rows_range(block(b));
+            let own = values.rows_range(block(b));
+            let rest = &normal - part.tr_mul(&part);
+            let sizes = solved(&rest, &(&right - part.tr_mul(&own)))?;
+            Some((own - part * sizes).norm_squared())
+        })
+        .sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::frame::fit_plane::fit_plane;
+    use crate::numbers::rng::normals;
+
+    const SIZE: [usize; 2] = [96, 120];
+
+    /// A sensor of a steady scan with a departure of (u, v), white noise (nm) and noise of whole lines.
+    fn sensor(seed: u64, bent: impl Fn(f64, f64) -> f64, lines: f64) -> Image {
+        let mut normal = normals(seed, "bowed", 0);
+        let mut values = Vec::new();
+        for row in 0..SIZE[1] {
+            let of_line = lines * normal();
+            for column in 0..SIZE[0] {
+                let [u, v] = [(column, SIZE[0]), (row, SIZE[1])]
+                    .map(|(i, n)| 2.0 * i as f64 / (n - 1) as f64 - 1.0);
+                values.push(30.0 * u + 0.4 * v + bent(u, v) + of_line + 0.2 * normal());
+            }
+        }
+        Image::new(SIZE[1], SIZE[0], values)
+    }
+
+    fn found(image: &Image) -> Vec<Size> {
+        let used = 0..image.columns;
+        departure(image, &fit_plane(image, used.clone()).unwrap(), &used)
+    }
+
+    /// Straight scanners keep their planes: white noise, and lines that scatter as a whole.
+    #[test]
+    fn straight_sensors_keep_their_planes() {
+        for seed in 0..60 {
+            let image = sensor(seed, |_, _| 0.0, if seed % 2 == 0 { 0.0 } else { 0.1 });
+            assert_eq!(found(&image), [], "{seed}");
+        }
+    }
+
+    /// What a scanner does is found to the noise: a bow of the lines that changes from line to line, and creep. 0.2 nm of noise leave some
+    /// 0.2 √(p/N) of a description with p numbers in N samples: 0.01 nm for thirty.
+    #[test]
+    fn bows_and_creep_are_found() {
+        let bent = |u: f64, v: f64| {
+            0.8 * (1.0 - u * u) * (1.0 + 0.4 * u - 0.2 * v)
+                + 0.3 * (1.0 + 0.5 * (1.0 + v) / 0.02).ln()
+        };
+        let image = sensor(1, bent, 0.0);
+        let plane = fit_plane(&image, 0..SIZE[0]).unwrap();
+        let terms = found(&image);
+        assert!(terms.iter().any(|(along, ..)| *along == 2), "{terms:?}");
+        let mut square = 0.0;
+        for row in 0..SIZE[1] {
+            for column in 0..SIZE[0] {
+                let [u, v] = [(column, SIZE[0]), (row, SIZE[1])]
+                    .map(|(i, n)| 2.0 * i as f64 / (n - 1) as f64 - 1.0);
+                let along = legendre(u, DEGREES[0]);
+                let of = |(a, across, size): &Size| along[*a][0] * across.at(v)[0] * size;
+                let told: f64 = terms.iter().map(of).sum();
+                let truth = 30.0 * u + 0.4 * v + bent(u, v);
+                square += (plane.at(column as f64, row as f64) + told - truth).powi(2);
+            }
+        }
+        let rms = (square / (SIZE[0] * SIZE[1]) as f64).sqrt();
+        assert!(rms < 0.015, "{rms} {terms:?}");
+    }
+}
