@@ -87,8 +87,8 @@ def nanoscope(path, scene, number):
     """A NanoScope file with the fields of a Dimension Icon."""
     up, n, size = number % 2 == 0, scene.pixels, scene.size
     direction, data, start = "Up" if up else "Down", [], 40960
-    hour, minute, second = 10 + number * 2 // 60, int(number * 2 % 60), 0
-    head = ["\\*File list", "\\Version: 0x09700105", f"\\Date: {hour:02}:{minute:02}:{second:02} AM Fri Mar 15 2024", "\\Start context: OL2",
+    minute, second = divmod(round((number + 1) * n * LINE_TIME), 60)
+    head = ["\\*File list", "\\Version: 0x09700105", f"\\Date: 10:{minute:02}:{second:02} AM Fri Mar 15 2024", "\\Start context: OL2",
             f"\\Data length: {start}", "\\*Scanner list", "\\@Sens. Xsensor: V 3000.000 nm/V", "\\@Sens. Ysensor: V 3000.000 nm/V", "\\*Ciao scan list",
             f"\\Scan Size: {size:.6f} nm", "\\X Offset: 0 nm", "\\Y Offset: 0 nm", "\\Rotate Ang.: 0", "\\X round: 0", f"\\Samps/line: {n}", f"\\Lines: {n}",
             "\\Aspect Ratio: 1:1", f"\\Scan Rate: {1 / LINE_TIME:g}", f"\\Capture direction: {direction}", "\\@Sens. TR Phase: V 1.000000 "]

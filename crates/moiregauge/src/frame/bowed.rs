@@ -110,7 +110,8 @@ fn lines(image: &Image, plane: &PlaneFit, used: &Range<usize>) -> Vec<Line> {
     lines
 }
 
-/// How one degree along the lines runs across them, and by how much that predicts lines better than the plane; `None` where it may be chance.
+/// How one degree along the lines runs across them, and by how much that predicts lines better than the plane. What may be chance is
+/// left to the plane.
 fn of_degree(lines: &[Line], along: usize, least: f64) -> Option<(f64, Vec<Size>)> {
     let values = DVector::from_iterator(lines.len(), lines.iter().map(|l| l.sizes[along]));
     let powers = |n: usize| (0..n).map(Across::Power).collect::<Vec<_>>();
@@ -128,11 +129,13 @@ fn of_degree(lines: &[Line], along: usize, least: f64) -> Option<(f64, Vec<Size>
         Some(sharpness(lines, &values, across, least)? * (straight - left))
     };
     let mut gained = gain(&best)?;
-    if gained < BESIDE {
-        return None;
+    let pays = gained > BESIDE;
+    if !pays {
+        // The plane leaves outliers out: what it misses of the rest belongs to the departure.
+        best.1 = powers(plane);
     }
     // Creep is a matter of whole lines.
-    if along == 0 {
+    if pays && along == 0 {
         let ends = [false, true].into_iter();
         let times = ends.flat_map(|last| (1..=HALVES).map(move |halves| (last, halves)));
         let all = times.flat_map(|(from_last, halves)| {
@@ -142,6 +145,9 @@ fn of_degree(lines: &[Line], along: usize, least: f64) -> Option<(f64, Vec<Size>
         });
         best = all.fold(best, better);
         gained = gain(&best)?;
+    }
+    if best.1.is_empty() {
+        return None;
     }
     let sizes = sizes(lines, &values, &best.1)?;
     let terms = best.1.into_iter().zip(sizes.iter());

@@ -74,12 +74,12 @@ fn fitted(x: &Image, y: &Image, taken_off: Option<[Option<Lag>; 2]>) -> Option<S
         }
         None => without_lags(sensors)?,
     };
-    let planes = [sensors[0].plane(&used)?, sensors[1].plane(&used)?];
-    let departure = departure(&sensors, &planes, &used);
-    let sensors = match &departure {
-        Some(departure) => without_departure(sensors, departure),
-        None => sensors,
-    };
+    let Bent {
+        used,
+        planes,
+        straight: sensors,
+        departure,
+    } = bent(sensors, used)?;
     let [x, y] = sensors.each_ref().map(|sensor| sensor.image.as_ref());
     let pixel_to_nm = Matrix2::new(
         planes[0].per_column,
@@ -120,6 +120,52 @@ fn fitted(x: &Image, y: &Image, taken_off: Option<[Option<Lag>; 2]>) -> Option<S
     })
 }
 
+/// What planes and a smooth departure make of two sensors.
+struct Bent<'a> {
+    used: Range<usize>,
+    planes: [PlaneFit; 2],
+    /// The sensors without the departure.
+    straight: [Sensor<'a>; 2],
+    /// `None` of a straight scanner.
+    departure: Option<Departure>,
+}
+
+/// Columns that bend away at a side are turn-around, unless a smooth departure describes them like all others.
+fn bent(sensors: [Sensor<'_>; 2], used: Range<usize>) -> Option<Bent<'_>> {
+    let of = |used: Range<usize>| {
+        let planes = [sensors[0].plane(&used)?, sensors[1].plane(&used)?];
+        let departure = departure(&sensors, &planes, &used);
+        Some((used, planes, departure))
+    };
+    let every = 0..sensors[0].image.columns;
+    let first = of(used)?;
+    if first.2.is_some()
+        && first.0 != every
+        && let Some((used, planes, Some(departure))) = of(every.clone())
+    {
+        let straight = without_departure(&sensors, &departure);
+        if straight_columns(&straight)? == every {
+            let departure = Some(departure);
+            return Some(Bent {
+                used,
+                planes,
+                straight,
+                departure,
+            });
+        }
+    }
+    let (used, planes, departure) = first;
+    Some(Bent {
+        used,
+        planes,
+        straight: match &departure {
+            Some(departure) => without_departure(&sensors, departure),
+            None => sensors,
+        },
+        departure,
+    })
+}
+
 /// The smooth departure of both sensors from their planes; `None` of a straight scanner.
 fn departure(
     sensors: &[Sensor<'_>; 2],
@@ -142,8 +188,10 @@ fn departure(
 }
 
 /// Both sensors as those of a straight scanner.
-fn without_departure<'a>(sensors: [Sensor<'a>; 2], departure: &Departure) -> [Sensor<'a>; 2] {
-    let [mut x, mut y] = sensors.map(|sensor| sensor.image.into_owned());
+fn without_departure<'a>(sensors: &[Sensor<'a>; 2], departure: &Departure) -> [Sensor<'a>; 2] {
+    let [mut x, mut y] = sensors
+        .each_ref()
+        .map(|sensor| sensor.image.clone().into_owned());
     let columns = x.columns;
     for row in 0..x.rows {
         let line = row * columns..(row + 1) * columns;

@@ -150,7 +150,11 @@ impl<'a> Fit<'a> {
             if !(change.amax().max(third.amax()) < std::f64::consts::FRAC_PI_2) {
                 return None;
             }
-            let left = LEFT + turn + self.clipped as f64 / self.frame.pixels() as f64;
+            // The normal equations are those of straight waves.
+            let left = match self.frame.displacement {
+                Some(_) => 1.0,
+                None => LEFT + turn + self.clipped(),
+            };
             let still = decrement * left * left < STILL * self.sigma.powi(2) && !blind;
             if share == 1.0 && (still || turn < 1e-13) {
                 self.settled = true;
