@@ -132,8 +132,9 @@ def analyse(program, kind, seed, folder):
         line["twist"] = value(results) and [value(results)[k] for k in ("value", "sigma")]
     if os.environ.get("MAPS"):
         line["map refused"] = ran(program, "map", files, made / "map")
-        for path in sorted((made / "map").glob("**/map*.json")):
-            line["map"] = json.loads(path.read_text())
+        for path in sorted((made / "map").glob("**/map.json")):
+            twist = next(q for q in json.loads(path.read_text())["quantities"] if q["name"] == "twist")
+            line["map"] = [twist[k] for k in ("mean", "mean_sigma", "spread_corrected")]
     if not os.environ.get("KEEP"):
         shutil.rmtree(made)
     return line
@@ -153,14 +154,19 @@ def table(*files):
     by_kind = {}
     for line in (json.loads(text) for file in files for text in open(file)):
         by_kind.setdefault(line["kind"], []).append(line)
-    print("| scanner | sets | answered | median error (%) | rms pull | the lattice is said to change |\n|" + " --- |" * 6)
+    print("| scanner | sets | answered | median error (%) | rms pull | the lattice is said to change | rms pull of the mean of maps | largest spread without noise (°) |")
+    print("|" + " --- |" * 8)
     for kind, lines in by_kind.items():
         told = [line for line in lines if line.get("twist")]
         errors = [line["twist"][0] - line["truth"] for line in told]
         pulls = [error / line["twist"][1] for error, line in zip(errors, told)]
         changing = sum(any(word in code for code in line.get("caveats", []) for word in CHANGES) for line in lines)
         median = 100 * numpy.median([abs(error) / line["truth"] for error, line in zip(errors, told)]) if told else math.nan
-        print(f"| {kind} | {len(lines)} | {len(told)} | {median:.4f} | {numpy.sqrt(numpy.mean(numpy.square(pulls))):.2f} | {changing} of {len(lines)} |")
+        rms = lambda values: f"{numpy.sqrt(numpy.mean(numpy.square(values))):.2f}" if values else "–"
+        mapped = [line for line in lines if line.get("map")]
+        off = [(line["map"][0] - line["truth"]) / line["map"][1] for line in mapped]
+        spread = f"{max(line['map'][2] for line in mapped):.4f}" if mapped else "–"
+        print(f"| {kind} | {len(lines)} | {len(told)} | {median:.4f} | {rms(pulls)} | {changing} of {len(lines)} | {rms(off)} | {spread} |")
 
 
 if __name__ == "__main__":

@@ -34,6 +34,8 @@ const HALVES: i32 = 9;
 /// A line that was described: its v and the coefficients of the degrees along it.
 struct Line {
     v: f64,
+    /// The polynomials across the lines at v.
+    powers: Vec<f64>,
     sizes: Vec<f64>,
 }
 
@@ -101,8 +103,11 @@ fn lines(image: &Image, plane: &PlaneFit, used: &Range<usize>) -> Vec<Line> {
             None
         };
         if let Some(sizes) = sizes {
+            let v = 2.0 * row as f64 / (image.rows - 1) as f64 - 1.0;
+            let powers = legendre(v, DEGREES[1]).into_iter();
             lines.push(Line {
-                v: 2.0 * row as f64 / (image.rows - 1) as f64 - 1.0,
+                v,
+                powers: powers.map(|[value, _]| value).collect(),
                 sizes: sizes.as_slice().to_vec(),
             });
         }
@@ -172,8 +177,9 @@ fn sizes(lines: &[Line], values: &DVector<f64>, across: &[Across]) -> Option<DVe
 }
 
 fn design(lines: &[Line], across: &[Across]) -> DMatrix<f64> {
-    DMatrix::from_fn(lines.len(), across.len(), |i, j| {
-        across[j].at(lines[i].v)[0]
+    DMatrix::from_fn(lines.len(), across.len(), |i, j| match across[j] {
+        Across::Power(degree) => lines[i].powers[degree],
+        log @ Across::Log { .. } => log.at(lines[i].v)[0],
     })
 }
 
