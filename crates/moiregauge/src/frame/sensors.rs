@@ -49,19 +49,25 @@ pub struct SensorGeometry {
 ///
 /// `None` where the sensors do not span an area: constant, all missing, or moving along one line.
 pub fn from_sensors(x: &Image, y: &Image) -> Option<SensorGeometry> {
-    fitted(x, y, None)
+    fitted(x, y, None, Grid::Curved)
 }
 
-/// The same for sensors from which these lags were taken off already.
-pub(crate) fn freed_of_lags(
+/// What describes the sensors.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Grid {
+    /// Planes, as published.
+    Plane,
+    /// Planes and a smooth departure where it predicts lines that were held out.
+    Curved,
+}
+
+/// The same by some grid. `taken_off`: lags that the sensors are free of already.
+pub(crate) fn fitted(
     x: &Image,
     y: &Image,
-    lags: [Option<Lag>; 2],
+    taken_off: Option<[Option<Lag>; 2]>,
+    grid: Grid,
 ) -> Option<SensorGeometry> {
-    fitted(x, y, Some(lags))
-}
-
-fn fitted(x: &Image, y: &Image, taken_off: Option<[Option<Lag>; 2]>) -> Option<SensorGeometry> {
     let (rows, columns) = (x.rows, x.columns);
     if (y.rows, y.columns) != (rows, columns) {
         return None;
@@ -79,7 +85,7 @@ fn fitted(x: &Image, y: &Image, taken_off: Option<[Option<Lag>; 2]>) -> Option<S
         planes,
         straight: sensors,
         departure,
-    } = bent(sensors, used)?;
+    } = bent(sensors, used, grid)?;
     let [x, y] = sensors.each_ref().map(|sensor| sensor.image.as_ref());
     let pixel_to_nm = Matrix2::new(
         planes[0].per_column,
@@ -131,10 +137,11 @@ struct Bent<'a> {
 }
 
 /// Columns that bend away at a side are turn-around, unless a smooth departure describes them like all others.
-fn bent(sensors: [Sensor<'_>; 2], used: Range<usize>) -> Option<Bent<'_>> {
+fn bent(sensors: [Sensor<'_>; 2], used: Range<usize>, grid: Grid) -> Option<Bent<'_>> {
     let of = |used: Range<usize>| {
         let planes = [sensors[0].plane(&used)?, sensors[1].plane(&used)?];
-        let departure = departure(&sensors, &planes, &used);
+        let curved = (grid == Grid::Curved).then(|| departure(&sensors, &planes, &used));
+        let departure = curved.flatten();
         Some((used, planes, departure))
     };
     let every = 0..sensors[0].image.columns;

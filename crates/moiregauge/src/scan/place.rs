@@ -10,9 +10,10 @@ use spmfile::{Channel, LineDirection, Scan};
 use crate::calibration::Calibration;
 use crate::caveat::Caveat;
 use crate::frame::geometry::{Geometry, Timing, at_rest};
-use crate::frame::sensors::SensorGeometry;
+use crate::frame::sensors::{Grid, SensorGeometry};
 use crate::scan::positions::{nominal, speeds, usable_sensors};
 use crate::settings::knobs::Settings;
+use crate::spectrum::method::Method;
 
 /// The place of one channel.
 #[derive(Clone, Debug)]
@@ -44,7 +45,11 @@ impl Place {
     ) -> Option<Self> {
         let line = channel.line_direction.unwrap_or(LineDirection::Trace);
         let nominal = nominal(scan, channel);
-        let sensors = usable_sensors(file, scan, channel, nominal.as_ref(), caveats);
+        let grid = match settings.method {
+            Method::Paper => Grid::Plane,
+            _ => Grid::Curved,
+        };
+        let sensors = usable_sensors(file, scan, channel, nominal.as_ref(), grid, caveats);
         let by_sensors = sensors.as_ref().map(|s| s.geometry.clone());
         let recorded = by_sensors.or_else(|| nominal.clone())?;
         let timing = scan

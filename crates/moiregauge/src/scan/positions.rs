@@ -10,7 +10,7 @@ use crate::frame::axis::Axis;
 use crate::frame::geometry::{Geometry, Timing};
 use crate::frame::image::Image;
 use crate::frame::loops::{self, HalfLine, SlowLag};
-use crate::frame::sensors::{SensorGeometry, freed_of_lags, from_sensors};
+use crate::frame::sensors::{Grid, SensorGeometry, fitted};
 use crate::numbers::spread::mean_and_spread;
 use crate::scan::channel::image_of;
 
@@ -98,6 +98,7 @@ pub(crate) fn usable_sensors(
     scan: &Scan,
     channel: &Channel,
     nominal: Option<&Geometry>,
+    grid: Grid,
     caveats: &mut Vec<Caveat>,
 ) -> Option<SensorGeometry> {
     let [x, y] = sensor_images(file, scan, channel, caveats)?;
@@ -116,9 +117,10 @@ pub(crate) fn usable_sensors(
     let found = match slow_lag(scan, channel, [&x, &y]) {
         Some(lag) => {
             let [x, y] = [(&x, 0), (&y, 1)].map(|(s, axis)| lag.taken_off(s, axis, line));
-            freed_of_lags(&x, &y, [0, 1].map(|axis| lag.of_sensor(axis, line)))
+            let lags = [0, 1].map(|axis| lag.of_sensor(axis, line));
+            fitted(&x, &y, Some(lags), grid)
         }
-        None => from_sensors(&x, &y),
+        None => fitted(&x, &y, None, grid),
     };
     let Some(sensors) = found else {
         caveats.push(Caveat::new(PositionDoubt::SensorsFlat, file));
