@@ -234,6 +234,12 @@ impl Settled {
         self.seen.is_plain()
     }
 
+    /// Whether its phases are those of a lattice that is the same everywhere.
+    pub(crate) fn is_straight(&self) -> bool {
+        let mean = self.mean();
+        mean.is_some_and(|mean| mean.change.is_none() && !mean.is_poor())
+    }
+
     /// Power over noise of its waves in one resolution cell, in sum.
     pub(crate) fn evidence(&self) -> f64 {
         self.seen.evidence(&self.cells, &self.inner)

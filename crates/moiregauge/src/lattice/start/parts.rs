@@ -45,6 +45,10 @@ impl Start {
             let part = patch.of(&flat);
             let near = Self::near(&part, geometry, background, &patch.pair);
             let Some(start) = near else { continue };
+            // Straight waves that all of the patch does not show are not those of one lattice.
+            if !start.stands_out() && settled.is_plain() && settled.is_straight() {
+                continue;
+            }
             let coherent = match verdict(&start.prepared.harmonics) {
                 // A part of the frame is chosen by its waves: they have to be plain to see in it.
                 Verdict::Lattice if patch.share > WHOLE || settled.is_plain() => {
