@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use moiregauge::campaign::natural_order;
+use moiregauge::scan::plain_name;
 use moiregauge_report::results::{Crop, FrameOrder, Told};
 use spmfile::arrays::ArrayOptions;
 use spmfile::{
@@ -388,16 +389,10 @@ fn adopt(scan: &mut Scan, (x, y): (&str, &str)) -> Result<(), KnownError> {
     Ok(())
 }
 
-/// Whether a name is the wanted one: case, blanks and signs do not count, and a name without line
+/// Whether a name is the wanted one: case, blanks and signs but those of numbers do not count, and a name without line
 /// direction stands for both.
 pub fn is_named(name: &str, wanted: &str) -> bool {
-    let plain = |text: &str| -> String {
-        text.chars()
-            .filter(|c| c.is_alphanumeric())
-            .flat_map(char::to_lowercase)
-            .collect()
-    };
-    let (name, wanted) = (plain(name), plain(wanted));
+    let (name, wanted) = (plain_name(name), plain_name(wanted));
     let rest = name.strip_prefix(&wanted);
     let directions = ["", "trace", "retrace", "forward", "backward"];
     !wanted.is_empty() && rest.is_some_and(|rest| directions.contains(&rest))
@@ -411,6 +406,7 @@ mod tests {
     fn names_without_direction_stand_for_both() {
         assert!(is_named("Phase_Retrace", "phase") && is_named("TR Phase", "tr_phase"));
         assert!(!is_named("Phase 2", "phase") && !is_named("TR Phase", "phase"));
+        assert!(!is_named("LI (-0.5 V)", "LI (0.5 V)") && is_named("LI (-0.5 V)", "li -0.5v"));
         assert!(!is_named("", ""));
     }
 

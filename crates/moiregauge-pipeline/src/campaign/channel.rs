@@ -10,6 +10,9 @@ use super::failure::Failure;
 use crate::known::Known;
 use crate::opened::Opened;
 
+/// At most so many other channels are tried.
+const MOST_TRIED: usize = 16;
+
 /// A channel to try instead, as settings that name it.
 pub(super) struct Other {
     pub(super) settings: Settings,
@@ -46,7 +49,15 @@ pub(super) fn others<T>(
         return Vec::new();
     };
     let names = opened.names();
+    // Of the many slices of a grid some are tried, evenly.
     let all = channels_by_preference(&names);
+    let step = all.len().saturating_sub(1).div_ceil(MOST_TRIED).max(1);
+    let all: Vec<&str> = all
+        .iter()
+        .copied()
+        .take(1)
+        .chain(all.iter().copied().skip(1).step_by(step))
+        .collect();
     let others = (1..all.len()).map(|i| Other {
         settings: Settings {
             channel: Some(all[i].to_owned()),

@@ -1,5 +1,7 @@
 //! Which channel shows the moiré.
 
+use std::collections::HashSet;
+
 use rayon::prelude::*;
 use spmfile::{Channel, LineDirection, Scan};
 
@@ -32,18 +34,17 @@ const LINES: usize = 32;
 /// The channel to analyse: the one asked for, or the first usual one, or the first that is no
 /// position sensor. `None` where there is no such channel.
 ///
-/// `channels` are pairs of the name the user sees and the instrument's own. Case, spaces and
-/// underscores do not count, and a name without line direction stands for both (`Phase` for
-/// `PhaseTrace` and `PhaseRetrace`). Returns the name the user sees.
+/// `channels` are pairs of the name the user sees and the instrument's own. Names are compared by [`plain_name`], and one
+/// without line direction stands for both (`Phase` for `PhaseTrace` and `PhaseRetrace`). Returns the name the user sees.
 pub fn choose_channel<'a>(
     channels: &[(&'a str, &'a str)],
     wanted: Option<&str>,
 ) -> Option<&'a str> {
     let find = |wanted: &str| {
-        let wanted = plain(wanted);
+        let wanted = plain_name(wanted);
         channels
             .iter()
-            .find(|(name, internal)| plain(name) == wanted || plain(internal) == wanted)
+            .find(|(name, internal)| plain_name(name) == wanted || plain_name(internal) == wanted)
             .or_else(|| channels.iter().find(|(name, _)| stem(name) == wanted))
             .map(|(name, _)| *name)
     };
@@ -63,13 +64,11 @@ pub fn channels_by_preference<'a>(channels: &[(&'a str, &'a str)]) -> Vec<&'a st
         .iter()
         .filter(|(name, internal)| spmfile::sensor_axis(name, internal).is_none())
         .map(|(name, _)| *name);
-    let mut all: Vec<&str> = Vec::new();
-    for name in usual.chain(others) {
-        if !all.iter().any(|known| stem(known) == stem(name)) {
-            all.push(name);
-        }
-    }
-    all
+    let mut known = HashSet::new();
+    usual
+        .chain(others)
+        .filter(|name| known.insert(stem(name)))
+        .collect()
 }
 
 /// Whether one of them has the name of a channel in which moirés are usually seen.
@@ -79,18 +78,31 @@ pub(crate) fn is_usual(channels: &[(&str, &str)]) -> bool {
         .any(|name| choose_channel(channels, Some(name)).is_some())
 }
 
-/// Lower case, letters and digits only.
-fn plain(name: &str) -> String {
-    name.chars()
-        .filter(|c| c.is_alphanumeric())
-        .flat_map(char::to_lowercase)
-        .collect()
+/// A name for comparing: lower case, letters and digits only, and the sign and the point of a number, as the images of
+/// a grid differ in nothing else.
+pub fn plain_name(name: &str) -> String {
+    let mut before = None;
+    let mut rest = name.chars().peekable();
+    let mut plain = String::new();
+    while let Some(c) = rest.next() {
+        let digit_follows = rest.peek().is_some_and(char::is_ascii_digit);
+        let of_number = match c {
+            '-' => digit_follows && matches!(before, None | Some(' ' | '(')),
+            '.' => digit_follows && before.is_some_and(|b| b.is_ascii_digit()),
+            _ => c.is_alphanumeric(),
+        };
+        if of_number {
+            plain.extend(c.to_lowercase());
+        }
+        before = Some(c);
+    }
+    plain
 }
 
 /// The plain name without the line direction that some instruments put behind it: what trace and
 /// retrace of one quantity have in common.
 pub(crate) fn stem(name: &str) -> String {
-    let plain = plain(name);
+    let plain = plain_name(name);
     let stem = ["retrace", "trace", "forward", "backward"]
         .iter()
         .find_map(|word| plain.strip_suffix(word))
@@ -213,6 +225,21 @@ mod tests {
             channels_by_preference(&CHANNELS),
             ["TR Phase", "TR Amplitude", "Height Sensor"]
         );
+    }
+
+    /// The slices of a grid of spectra.
+    #[test]
+    fn signs_and_points_of_numbers_count() {
+        let slices = ["-1.25", "-0.5", "0.5", "1.25", "12.5"].map(|v| format!("LI X ({v} V)"));
+        let channels: Vec<(&str, &str)> = slices.iter().map(|name| (name.as_str(), "")).collect();
+        for name in &slices {
+            assert_eq!(choose_channel(&channels, Some(name)), Some(name.as_str()));
+        }
+        let half = choose_channel(&channels, Some("li x -0.5v"));
+        assert_eq!(half, Some("LI X (-0.5 V)"));
+        assert_eq!(channels_by_preference(&channels).len(), slices.len());
+        assert_eq!(plain_name("Z-Axis"), plain_name("z axis"));
+        assert_eq!(plain_name("Phase-2."), "phase2");
     }
 
     #[test]

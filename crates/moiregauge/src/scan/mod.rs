@@ -19,7 +19,7 @@ pub(crate) mod shared;
 pub(crate) mod shells;
 pub(crate) mod written;
 
-pub use channel::{channels_by_preference, choose_channel};
+pub use channel::{channels_by_preference, choose_channel, plain_name};
 pub use fitted::{Fitted, fitted};
 pub use images::{image_choice, unusual_channels};
 pub use lines::MeasuredLines;
