@@ -5,7 +5,7 @@ use crate::readers::{Kind, READERS, Reader};
 use crate::signature::{head, is_text};
 
 /// First bytes of files that are none of those that are read.
-const OTHERS: [(&[u8], &str); 12] = [
+const OTHERS: [(&[u8], &str); 11] = [
     (b"GIF8", "a GIF picture"),
     (b"BM", "a BMP picture"),
     (b"%PDF", "a PDF document"),
@@ -16,10 +16,6 @@ const OTHERS: [(&[u8], &str); 12] = [
     (
         b"Experiment\t",
         "a spectrum or a log of a Nanonis controller: no image",
-    ),
-    (
-        b"Grid dim=",
-        "a grid of spectra of a Nanonis controller (.3ds): save its topography as .sxm",
     ),
     (b"[ParVERT", "a spectrum of a Createc controller: no image"),
     (b"?*File list", "a NanoScope text export"),

@@ -10,6 +10,8 @@ pub enum Format {
     NanoScopeForce,
     /// Nanonis scan (`.sxm`).
     Nanonis,
+    /// Nanonis grid of spectra (`.3ds`).
+    NanonisGrid,
     /// Gwyddion container (`.gwy`).
     Gwy,
     /// Gwyddion simple field (`.gsf`).

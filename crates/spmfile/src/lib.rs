@@ -52,6 +52,7 @@ mod labels;
 mod limits;
 pub mod matrix;
 mod nanonis;
+mod nanonis_grid;
 pub mod nanoscope;
 mod nid;
 mod options;

@@ -8,8 +8,8 @@ use crate::format::Format;
 use crate::outline::{Input, Outline};
 use crate::signature::{first_entry, is_matrix};
 use crate::{
-    agilent, array, createc, gsf, gwy, gxyzf, igor, iso28632, jpk, matrix, nanonis, nanoscope, nid,
-    park, rhk, wsxm,
+    agilent, array, createc, gsf, gwy, gxyzf, igor, iso28632, jpk, matrix, nanonis, nanonis_grid,
+    nanoscope, nid, park, rhk, wsxm,
 };
 
 /// One format.
@@ -92,6 +92,7 @@ pub(crate) static READERS: &[Reader] = &[
     reader!(F::NanoScopeForce, "NanoScope force curve", ["spm", "pfc"], own [], By(nanoscope::detect_force), Scan, flat false, nanoscope::refuse_force),
     reader!(F::NanoScope, "NanoScope", ["spm", "000"], own ["spm"], By(nanoscope::detect), Scan, flat true, nanoscope::open),
     reader!(F::Nanonis, "Nanonis", ["sxm"], own ["sxm"], Magic(&[b":NANONIS_VERSION:"]), Scan, flat true, nanonis::open),
+    reader!(F::NanonisGrid, "Nanonis grid", ["3ds"], own ["3ds"], Magic(&[nanonis_grid::BEGIN]), Scan, flat false, nanonis_grid::open),
     reader!(F::Gwy, "Gwyddion", ["gwy"], own ["gwy"], Magic(&[b"GWYP", b"GWYO"]), Scan, flat false, gwy::open),
     reader!(F::Gsf, "Gwyddion simple field", ["gsf"], own ["gsf"], Magic(&[b"Gwyddion Simple Field"]), Scan, flat true, gsf::open),
     reader!(F::Gxyzf, "Gwyddion XYZ field", ["gxyzf"], own ["gxyzf"], Magic(&[b"Gwyddion XYZ Field"]), Scan, flat false, gxyzf::open),

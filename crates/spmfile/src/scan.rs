@@ -222,9 +222,10 @@ const SIZE_TAKEN_AS: [&str; 8] = [
 impl Scan {
     /// Whether the format defines what its size spans. Otherwise the pitch of the pixels may be off by 1/N of N pixels.
     pub fn size_is_defined(&self) -> bool {
-        !SIZE_TAKEN_AS
-            .iter()
-            .any(|format| self.format.starts_with(format))
+        self.format == crate::nanonis_grid::WITH_POSITIONS
+            || !SIZE_TAKEN_AS
+                .iter()
+                .any(|format| self.format.starts_with(format))
     }
 }
 

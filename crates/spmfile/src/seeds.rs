@@ -66,6 +66,7 @@ fn reader(format: Format) -> String {
 fn names_of_targets() {
     assert_eq!(reader(Format::JpkZip), "jpk_zip");
     assert_eq!(reader(Format::Iso28632), "iso28632");
+    assert_eq!(reader(Format::NanonisGrid), "nanonis_grid");
     assert_eq!(reader(Format::NanoScopeForce), "nanoscope_force");
 }
 

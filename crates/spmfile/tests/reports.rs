@@ -131,7 +131,6 @@ fn sound_files_are_read_without_doubt() {
 fn other_files_of_controllers_are_named() {
     for (head, words) in [
         (&b"Experiment\tbias spectroscopy\t\r\n"[..], "Nanonis"),
-        (b"Grid dim=\"4 x 4\"\r\nGrid settings=0;0;1;1;0\r\n", "grid"),
         (b"[ParVERT30]\r\n", "Createc"),
         (b"CDF\x02\0\0\0\0", "GXSM"),
         (b"\x89HDF\r\n\x1a\n\0\0\0jpk-force", ".jpk"),
