@@ -50,7 +50,7 @@ class Scene:
         sign = lambda: self.random.choice([-1, 1])
         self.bows, self.skews = [draw(0.004, 0.03) * sign() for _ in "xy"], draw(-0.5, 0.5, 2)
         self.creeps, self.first_time = [draw(0.002, 0.015) * sign() for _ in "xy"], draw(0.3, 3)
-        if kind == "straight":
+        if kind.startswith("straight"):
             self.bows, self.creeps = [0, 0], [0, 0]
 
     def places(self, up, back):
@@ -68,6 +68,9 @@ class Scene:
                 for w, way, bow, skew, creep in zip(meant, ways, self.bows, self.skews, self.creeps)]
 
     def image(self, x, y):
+        if self.kind.endswith("changing"):  # Moiré vectors that change by 2.4 % from the middle to either side.
+            half = self.size / 2
+            x, y = x + 0.012 * x ** 2 / half, y - 0.008 * x * y / half
         a, b = (g[0] * x + g[1] * y + s for g, s in zip(self.vectors, self.start))
         first = numpy.cos(a) + numpy.cos(b) + numpy.cos(b - a)
         return first + self.second * (numpy.cos(a + b) + numpy.cos(2 * b - a) + numpy.cos(2 * a - b)) + self.noise * self.random.normal(size=x.shape)
@@ -129,6 +132,7 @@ def analyse(program, kind, seed, folder):
     for path in sorted((made / "results").glob("**/results.json")):
         results = json.loads(path.read_text())
         line["caveats"] = sorted({c["code"] for c in results.get("caveats", [])})
+        line["changes"] = [c["message"] for c in results.get("caveats", []) if c["code"] == "inhomogeneous-lattice"]
         line["twist"] = value(results) and [value(results)[k] for k in ("value", "sigma")]
     if os.environ.get("MAPS"):
         line["map refused"] = ran(program, "map", files, made / "map")
