@@ -12,7 +12,7 @@ pub(crate) fn scans(folder: &Path, count: usize) -> Vec<PathBuf> {
     scans_of(folder, count, 64)
 }
 
-/// The same, of so many pixels along a side.
+/// The same with a number of pixels along a side.
 pub(crate) fn scans_of(folder: &Path, count: usize, pixels: usize) -> Vec<PathBuf> {
     let mut made = Simulation::default();
     made.raster.pixels = [pixels; 2];

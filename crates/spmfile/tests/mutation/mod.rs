@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use spmfile::{ChannelInfo, ReadError, Scan, read_selected};
 
-/// Most headers end within so many bytes.
+/// Bytes that hold most headers.
 const HEADER: usize = 16 << 10;
 /// Longer text files are cut: all of their bytes are looked at each time.
 const LONGEST_TEXT: usize = 48 << 10;

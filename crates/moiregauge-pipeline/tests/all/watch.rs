@@ -1,13 +1,11 @@
 //! A folder that fills: the numbers at every moment, what is foreseen, what is told.
 
-mod scene;
-mod small;
-
 use moiregauge::simulate::{Simulation, Simulator};
 use moiregauge_pipeline::Job;
 use moiregauge_pipeline::watch::{Happened, Line, Until, WatchRequest, line_schema};
 use moiregauge_report::Results;
-use scene::{Scene, codes, names};
+
+use crate::scene::{Scene, codes, names};
 
 /// A watch draws nothing at random for its lines, and an analysis of the folder has the same numbers with all draws.
 #[test]

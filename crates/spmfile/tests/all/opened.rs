@@ -1,13 +1,13 @@
 //! Files opened before they are decoded: the same channels and values as read at once, whole and by rows.
 
-mod common;
-
 use std::io::Result as IoResult;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use spmfile::{Channel, File, Format, OpenOptions, ReadError, Seekable, Source};
+
+use crate::common;
 
 /// Formats that are read by rows without having their bytes in memory.
 const FLAT: [Format; 7] = [

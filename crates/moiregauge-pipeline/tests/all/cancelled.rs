@@ -1,8 +1,6 @@
 //! Stopped at random moments: every long call ends soon, loses nothing that was measured, and the next call makes the
 //! same bytes.
 
-mod small;
-
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
@@ -17,8 +15,10 @@ use moiregauge_pipeline::validate::{ValidateError, ValidateRequest};
 use moiregauge_pipeline::{Cancel, Cancelled, Job, Known, Quiet, map, validate};
 use moiregauge_report::Choice;
 use moiregauge_report::results::Told;
-use small::{campaign, document, scans, settings};
 use spmfile::WritableFormat;
+
+use crate::small;
+use crate::small::{campaign, document, scans, settings};
 
 /// Ten times what is promised: the processors may be busy.
 const SOON: Duration = Duration::from_secs(3);

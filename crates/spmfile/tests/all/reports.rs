@@ -1,11 +1,11 @@
 //! Small files that show what public reports found, against what is right for each, and that sound files of
 //! instruments give no cause for doubt.
 
-mod common;
-
 use std::path::{Path, PathBuf};
 
 use spmfile::{ReadError, Scan, read};
+
+use crate::common;
 
 fn report(folder: &Path, name: &str) -> Result<Scan, ReadError> {
     read(&common::bytes(&folder.join("reports").join(name)))

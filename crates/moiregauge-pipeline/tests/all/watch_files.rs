@@ -1,11 +1,9 @@
-//! Files of a folder that is watched: they come in pieces, anew, damaged, or are none of its business.
-
-mod scene;
-mod small;
+//! Files of a folder that is watched: they come in pieces, anew, damaged, or do not concern it.
 
 use moiregauge_pipeline::watch::{Happened, Line, Watch};
-use scene::{Scene, codes, names};
-use small::document;
+
+use crate::scene::{Scene, codes, names};
+use crate::small::document;
 
 #[test]
 fn what_is_half_written_waits() {
@@ -146,7 +144,7 @@ fn frames_without_a_lattice_say_why() {
     );
 }
 
-/// Results in a subfolder, and what the watch kept, are none of its business.
+/// Results in a subfolder, and what the watch kept, do not concern it.
 #[test]
 fn own_results_are_left_alone_and_a_new_watch_goes_on() {
     let mut scene = Scene::new(4);

@@ -1,21 +1,20 @@
 //! Ten thousand damaged copies of every real file: no reader panics or hangs, and what is read
 //! can be true.
 
-mod common;
-mod mutation;
-
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use mutation::{Dice, Sample, samples, survive};
 use spmfile::{File, OpenOptions};
+
+use crate::common;
+use crate::mutation::{Dice, Sample, samples, survive};
 
 const MUTATIONS: u64 = 10_000;
 /// Copies that are opened; one in ten of them is read in both ways.
 const OPENED: u64 = 400;
-/// One in so many copies is decoded; in the others only the headers matter.
+/// One copy in this number is decoded; in the others only the headers matter.
 const DECODED: u64 = 250;
 /// Reading a damaged file takes milliseconds; a loaded machine makes that more.
 const LONGEST: Duration = Duration::from_secs(5);

@@ -1,13 +1,13 @@
 //! Damaged files end in an error or in the part that is whole: never in a panic, and never in more
 //! memory than the file's bytes call for.
 
-mod common;
-
 use std::sync::LazyLock;
 
 use proptest::prelude::*;
 use spmfile::nanoscope::write;
 use spmfile::{Channel, LineDirection, ReadError, Samples, Scan, read};
+
+use crate::common;
 
 /// A small file of our own: three channels of 12 × 16.
 static WRITTEN: LazyLock<Vec<u8>> = LazyLock::new(|| {

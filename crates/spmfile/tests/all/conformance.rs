@@ -1,7 +1,5 @@
 //! Every real file against its truth record, which independent readers made.
 
-mod common;
-
 use std::f64::consts::FRAC_PI_2;
 use std::path::Path;
 
@@ -9,6 +7,8 @@ use serde_json::Value;
 use spmfile::{
     Channel, FrameDirection, LineDirection, ReadError, Samples, Scan, position_sensors, read,
 };
+
+use crate::common;
 
 const TRACE: Option<LineDirection> = Some(LineDirection::Trace);
 const RETRACE: Option<LineDirection> = Some(LineDirection::Retrace);

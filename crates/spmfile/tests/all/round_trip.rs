@@ -1,12 +1,12 @@
 //! What is written is read back: the same names, the same frame, values within half a count.
 
-mod common;
-
 use proptest::prelude::*;
 use spmfile::nanoscope::{WriteError, write};
 use spmfile::{
     Channel, DateTime, FrameDirection, LineDirection, Samples, Scan, position_sensors, read,
 };
+
+use crate::common;
 
 fn channel(
     name: &str,

@@ -1,13 +1,13 @@
 //! Real files of JPK, Nanosurf, Park, RHK and Agilent instruments and a plain array against their
 //! truth records, and what the records do not hold: frame, directions and times, from the headers.
 
-mod common;
-
 use std::path::Path;
 
 use serde_json::Value;
 use spmfile::arrays::{self, ArrayOptions};
 use spmfile::{Channel, FrameDirection, LineDirection, ReadError, Scan, nm_per, read};
+
+use crate::common;
 
 const TRACE: Option<LineDirection> = Some(LineDirection::Trace);
 const RETRACE: Option<LineDirection> = Some(LineDirection::Retrace);

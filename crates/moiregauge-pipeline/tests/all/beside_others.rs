@@ -1,13 +1,12 @@
 //! Jobs beside each other and beside pools of others in one process; files on the disk beside uploads.
 
-mod small;
-
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use moiregauge_pipeline::{Cancel, Job, Places, Quiet};
 use rayon::prelude::*;
-use small::{campaign, document, scans};
+
+use crate::small::{campaign, document, scans};
 
 /// Jobs of one, two and three threads at once, while a pool of somebody else is busy; one of them is stopped.
 #[test]

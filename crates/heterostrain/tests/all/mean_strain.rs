@@ -1,14 +1,13 @@
 //! Mean strain, alignment, and the exchange of layers, against closed forms.
 
-mod two_layers;
-
 use heterostrain::lattice::Lattice;
 use heterostrain::material::Bilayer;
 use heterostrain::strain::StrainConvention;
 use heterostrain::strain::StrainConvention::{KSpace, RealSpace};
 use heterostrain::strain::{Orientation, Stacking, branches, moire_of, strain_tensors};
 use heterostrain::strain::{degeneracy, twist_strain};
-use two_layers::{exact, named};
+
+use crate::two_layers::{exact, named};
 
 /// The error of the mean strain of equal layers is `θ σ_α`: 0.0034, 0.010, 0.034 and 0.10 % for 0.1°, 0.3°, 1° and
 /// 3° at 1.126°.

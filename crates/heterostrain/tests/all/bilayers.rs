@@ -1,7 +1,5 @@
 //! Two layers of any kind: forward and back, the circle of isotropic strains, the strain tensor.
 
-mod two_layers;
-
 use std::f64::consts::{PI, TAU};
 
 use heterostrain::lattice::Lattice;
@@ -13,7 +11,8 @@ use heterostrain::strain::{
 use heterostrain::strain::{degeneracy, twist_strain};
 use nalgebra::{Matrix2, Matrix5, Vector2, Vector5};
 use proptest::prelude::*;
-use two_layers::{exact, modulo, named, some_covariance};
+
+use crate::two_layers::{exact, modulo, named, some_covariance};
 
 /// An oblique layer, and one of another shape that is a little different.
 fn oblique(a: f64, b: f64, angle: f64) -> Material {
@@ -104,7 +103,7 @@ fn waves_that_are_given_name_layers_of_different_shapes() {
             .all(|t| all.iter().any(|of_all| same(t, of_all)))
     );
     assert!((given[0].twist - made.twist).abs() < 1e-10, "{given:#?}");
-    // Waves that are none of this lattice name nothing.
+    // Waves outside this lattice give no indexing.
     assert_eq!(of(Some(Matrix2::new(1.0, 2.0, 2.0, 4.0))).len(), all.len());
 }
 

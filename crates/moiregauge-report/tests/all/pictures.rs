@@ -1,9 +1,9 @@
 //! Figures and page: well-formed, escaped, self-contained, the same on any number of threads.
 
-mod common;
-
 use moiregauge::caveat::{Caveat, FileDoubt};
 use moiregauge_report::{Choice, ColorMap, figures, write_report};
+
+use crate::common;
 
 type Files = Vec<(String, Vec<u8>)>;
 

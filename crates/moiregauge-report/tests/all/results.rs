@@ -1,10 +1,10 @@
 //! The document and the tables: schema, paths, units, nothing that is not a number.
 
-mod common;
-
 use moiregauge::campaign::Analysis;
 use moiregauge_report::{Choice, Results, map_schema, schema, write_report};
 use serde_json::Value;
+
+use crate::common;
 
 const NUMBERS_ONLY: Choice = Choice {
     figures: false,

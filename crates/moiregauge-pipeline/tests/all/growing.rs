@@ -1,7 +1,5 @@
 //! A campaign that grows, is written, read again, cancelled, on any number of threads.
 
-mod small;
-
 use std::path::PathBuf;
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
@@ -9,7 +7,8 @@ use std::time::{Duration, Instant};
 use moiregauge::settings::{ByHand, Settings};
 use moiregauge_pipeline::campaign::{AnalyseError, Campaign};
 use moiregauge_pipeline::{Cancel, Event, Events, Job, Quiet};
-use small::{campaign, document, scans, settings};
+
+use crate::small::{campaign, document, scans, settings};
 
 /// Counts the files that were measured, or cancels at one of them.
 struct Watch {
@@ -65,7 +64,7 @@ fn what_is_kept_fits_its_schema() {
     array.extend((0..64 * 64).map(|n: u32| (n.wrapping_mul(2_654_435_761) >> 24) as u8));
     std::fs::write(&blank, array).unwrap();
     scans.push(blank);
-    let schema = include_str!("../../moiregauge-report/schema/measured-1.schema.json");
+    let schema = include_str!("../../../moiregauge-report/schema/measured-1.schema.json");
     let schema = jsonschema::validator_for(&serde_json::from_str(schema).unwrap()).unwrap();
     for method in [moiregauge::Method::Lattice, moiregauge::Method::Paper] {
         let settings = Settings {

@@ -14,13 +14,13 @@
 //! - `createc_partial_11nm.dat` is whole. Its header is 112 bytes shorter than others; the record's reader looks for
 //!   the zlib stream at byte 16384 all the same and takes a quarter of the packed bytes for the number of samples.
 
-mod common;
-
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 use spmfile::{Channel, DateTime, FrameDirection, LineDirection, ReadError, Scan, nm_per, read};
+
+use crate::common;
 
 fn record_of(path: &Path) -> Value {
     let mut name = path.as_os_str().to_owned();

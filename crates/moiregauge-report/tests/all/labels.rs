@@ -1,7 +1,5 @@
 //! Every text of every figure lies on its page, and colours of maps do not show noise as a landscape.
 
-mod common;
-
 use std::sync::Arc;
 
 use moiregauge::map::{Grid, Plane, TwistStrainMap};
@@ -9,6 +7,8 @@ use moiregauge::window::Mask;
 use moiregauge_report::{ColorMap, Figure, MapDetails, figures, map_figures};
 use nalgebra::{Matrix2, Vector2};
 use resvg::usvg::{self, fontdb};
+
+use crate::common;
 
 /// By the bundled font, measured by the renderer.
 fn texts_off_the_page(figure: &Figure) -> Vec<String> {

@@ -1,7 +1,5 @@
 //! Numbers and formulas of the literature, each with its source and its convention.
 
-mod two_layers;
-
 use heterostrain::Estimate;
 use heterostrain::lattice::{MoireCell, WavelengthMeaning, from_wavelengths};
 use heterostrain::material::Bilayer;
@@ -9,7 +7,8 @@ use heterostrain::strain::StrainConvention::{KSpace, RealSpace};
 use heterostrain::strain::twist_strain;
 use heterostrain::strain::{Stacking, branches, moire_of, naive_twist};
 use nalgebra::{Matrix2, Rotation2, Vector2};
-use two_layers::{exact, named};
+
+use crate::two_layers::{exact, named};
 
 fn cell(stacking: &Stacking, layers: Bilayer<'_>) -> MoireCell {
     MoireCell::new(&moire_of(stacking, layers, RealSpace).unwrap()).unwrap()

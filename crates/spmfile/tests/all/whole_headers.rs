@@ -1,11 +1,10 @@
 //! No line of a `NanoScope` header is lost on the way into another format and back.
 
-#[path = "common/mod.rs"]
-mod common;
-
 use std::path::PathBuf;
 
 use spmfile::{ReadError, Scan, WritableFormat, read, write};
+
+use crate::common;
 
 /// The bytes of a header as lines without line ends; no blank ones.
 fn header_lines(bytes: &[u8]) -> Vec<&[u8]> {

@@ -1,0 +1,8 @@
+//! The tests of the crate as one program: it links once.
+
+#[path = "../common/mod.rs"]
+mod common;
+
+mod labels;
+mod pictures;
+mod results;
