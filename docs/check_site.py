@@ -32,10 +32,9 @@ def main(site, program, root):
     said = subprocess.run([program, "explain", "--json"], capture_output=True, text=True, check=True).stdout
     wanted = {entry["code"] for entry in json.loads(said)}
     listed = subprocess.run([program, "help"], capture_output=True, text=True, check=True).stdout
-    for command in re.findall(r"^  ([a-z]+) ", listed.split("Commands:")[1], re.M):
-        if command != "help":
-            about = subprocess.run([program, command, "--help"], capture_output=True, text=True, check=True).stdout
-            wanted |= set(re.findall(r"^ +(?:-\w, )?(--[a-z0-9-]+)", about, re.M))
+    for command in re.findall(r"^  ([a-z]+) ", listed.split("\nOptions:")[0], re.M):
+        about = subprocess.run([program, command, "--help"], capture_output=True, text=True, check=True).stdout
+        wanted |= set(re.findall(r"^ +(?:-\w, )?(--[a-z0-9-]+)", about, re.M))
     for schema in ("results", "map"):
         document = json.loads((root / f"crates/moiregauge-report/schema/{schema}-1.schema.json").read_text(encoding="utf-8"))
         for part in [document, *document["$defs"].values()]:

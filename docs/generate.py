@@ -40,16 +40,16 @@ def plain(text):
 
 
 def commands_of(program):
-    """Names and one-line descriptions, in the order of the help."""
-    listed = program.says("help").split("Commands:\n")[1].split("\n\n")[0]
-    found = []
+    """Headings, each with names and one-line descriptions, in the order of the help."""
+    listed = program.says("help").split("\nOptions:")[0]
+    groups = []
     for line in listed.splitlines():
         name = re.match(r"  (\S+)\s+(.*)", line)
         if name:
-            found.append([name[1], name[2]])
-        else:
-            found[-1][1] += " " + line.strip()
-    return [pair for pair in found if pair[0] != "help"]
+            groups[-1][1].append((name[1], name[2]))
+        elif re.match(r"[A-Z].*:$", line):
+            groups.append((line[:-1], []))
+    return groups
 
 
 def paragraphs(lines):
@@ -130,14 +130,19 @@ def command_page(program, name):
 def write_commands(program, folder):
     """One page for each command, and the list of them."""
     folder.mkdir(parents=True, exist_ok=True)
-    listed = commands_of(program)
+    groups = commands_of(program)
+    listed = [pair for _, pairs in groups for pair in pairs]
     for name, _ in listed:
         (folder / f"{name}.md").write_text(command_page(program, name), encoding="utf-8")
-    rows = "".join(f"| [`{name}`]({name}.md) | {plain(about)} |\n" for name, about in listed)
+    rows = "\n".join(
+        f"## {title}\n\n| command | what it does |\n| --- | --- |\n"
+        + "".join(f"| [`{name}`]({name}.md) | {plain(about)} |\n" for name, about in pairs)
+        for title, pairs in groups
+    )
     names = "\n".join(name for name, _ in listed)
     index = (
         "# Commands\n\nEvery command and every option, as the program itself describes them (`moiregauge help COMMAND`).\n\n"
-        f"| command | what it does |\n| --- | --- |\n{rows}\n"
+        f"{rows}\n"
         f"`{'moiregauge --version'}` says which version it is.\n\n:::{{toctree}}\n:hidden:\n\n{names}\n:::\n"
     )
     (folder / "index.md").write_text(MADE + index, encoding="utf-8")

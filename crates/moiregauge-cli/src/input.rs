@@ -14,8 +14,10 @@ use crate::numbers;
 #[derive(clap::Args, Clone, Debug, Default)]
 #[command(next_help_heading = "What the files do not tell")]
 pub(crate) struct KnownArgs {
-    /// Width and height of the image from edge to edge, as in 70nm×35nm, 1.5umx1.5um or 70x35nm; one length (70nm) is a square;
-    /// arrays and pictures need it; in other files it replaces their own size
+    /// Width and height from edge to edge, as in 70nm×35nm or 70nm
+    ///
+    /// Also 1.5umx1.5um or 70x35nm; one length is a square. Arrays and pictures need it; in other files it replaces their
+    /// own size.
     #[arg(long, value_name = "W×H", value_parser = parse_size)]
     size: Option<[f64; 2]>,
     /// Unit of the values of arrays and pictures
@@ -24,9 +26,10 @@ pub(crate) struct KnownArgs {
     /// Lines per second, trace and retrace together
     #[arg(long, value_name = "HZ", value_parser = numbers::number(numbers::LINE_RATE_HZ))]
     line_rate: Option<f64>,
-    /// Direction of the slow scan: up means that the bottom line was scanned first. alternating-… starts with the first
-    /// file by name (numbers in names are sorted as numbers). Of files that hold a frame of each direction (Omicron
-    /// Matrix) this frame is read [default there: up]
+    /// Direction of the slow scan: up if the bottom line was first
+    ///
+    /// alternating-… starts with the first file by name (numbers in names are sorted as numbers). Of files that hold a
+    /// frame of each direction (Omicron Matrix) this frame is read; default there: up.
     #[arg(long, value_enum)]
     frame_direction: Option<FrameArg>,
     /// Angle of the fast axis against x, degrees counter-clockwise

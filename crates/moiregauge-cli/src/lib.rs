@@ -25,6 +25,7 @@ mod plan;
 mod progress;
 mod say;
 mod scanner;
+mod screen;
 mod serve;
 mod shells;
 mod simulate;
@@ -76,7 +77,9 @@ enum Command {
 
 /// The arguments. A negative number is a value everywhere, so that its option is named where it is refused.
 fn arguments() -> clap::Command {
-    Cli::command().mut_subcommands(|command| command.allow_negative_numbers(true))
+    let commands = Cli::command()
+        .mut_subcommands(|command| screen::short(command.allow_negative_numbers(true)));
+    screen::grouped(commands)
 }
 
 /// The program, once in a process: runs the command of these arguments, the name of the program first. It ends the

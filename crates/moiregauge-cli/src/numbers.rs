@@ -18,7 +18,7 @@ pub(crate) const NOT_NEGATIVE: [f64; 2] = [0.0, 1e6];
 pub(crate) const WISH: [f64; 2] = [1e-9, 1e6];
 /// Times, s: up to a day.
 pub(crate) const TIME_S: [f64; 2] = [0.0, 86_400.0];
-/// The longer side of an image is at most so many times the shorter one.
+/// Largest ratio of the sides of an image.
 const LONGEST: f64 = 1e4;
 
 /// Reads a number within a range.

@@ -53,7 +53,7 @@ pub(crate) struct ServeArgs {
     token_file: Option<PathBuf>,
 }
 
-/// What the page says of the options of the program.
+/// The options of the program, for the page.
 pub(crate) fn words() -> Words {
     Words {
         advice,

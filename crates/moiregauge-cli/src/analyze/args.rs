@@ -34,24 +34,30 @@ pub(crate) struct AnalyzeArgs {
     /// Scan files, folders (the scans in them, without subfolders) or names with * and ?
     #[arg(required_unless_present = "replay", value_name = "PATH")]
     pub(super) paths: Vec<PathBuf>,
-    /// Folder for results.json, tables, figures and report.html; created if it does not exist [default with --replay:
-    /// beside the folder of the document]
+    /// Folder for results.json, tables, figures and report.html
+    ///
+    /// It is created if it does not exist. Default with --replay: beside the folder of the document.
     #[arg(long, value_name = "DIR", required_unless_present = "replay")]
     pub(super) out: Option<PathBuf>,
-    /// Repeat the run recorded in a results.json (or in a map.json, with `map`): the same files, settings and options
-    /// give the same bytes. The files are found by name and content and checked first; other options are refused
+    /// Repeat the run recorded in a results.json (or in a map.json, with `map`)
+    ///
+    /// The same files, settings and options give the same bytes. The files are found by name and content and checked
+    /// first; other options are refused.
     #[arg(long, value_name = "FILE")]
     pub(super) replay: Option<PathBuf>,
     /// Folder in which --replay looks for the files; may be repeated [default: the current folder; that of the document
     /// and the one above it]
     #[arg(long, value_name = "DIR", requires = "replay")]
     pub(super) data: Vec<PathBuf>,
-    /// Settings from a TOML file (see `moiregauge config`), or from a results.json or map.json; options on the command
-    /// line override them
+    /// Settings from a TOML file, a results.json or a map.json
+    ///
+    /// `moiregauge config` prints a file to begin with. Options on the command line override the file.
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
-    /// Channel that shows the moiré [default: the first of TR Phase, TR Amplitude, Phase, … that the files have; if no
-    /// scan shows a lattice in it, the next]
+    /// Channel that shows the moiré [default: the first usual one]
+    ///
+    /// The usual ones are TR Phase, TR Amplitude, Phase, … in this order; if no scan shows a lattice in one, the next is
+    /// tried.
     #[arg(long, value_name = "NAME", help_heading = SCANS)]
     channel: Option<String>,
     /// Number of the image, if a file holds several images of the channel (pages, frames) [default: the first]
@@ -66,9 +72,11 @@ pub(crate) struct AnalyzeArgs {
     /// The layers: graphene, hBN, MoS2, … [default: graphene]
     #[arg(long, value_name = "NAME", help_heading = LAYERS)]
     material: Option<String>,
-    /// The layers: graphene for two equal ones, graphene/hBN for graphene (layer 2) on hBN (layer 1, the reference);
-    /// names from --materials too. With --moires N: one pair for all moirés, or one for each, the largest cell first:
-    /// graphene,graphene/hBN
+    /// The layers: graphene, MoS2, graphene/hBN, …
+    ///
+    /// graphene stands for two equal layers, graphene/hBN for graphene (layer 2) on hBN (layer 1, the reference); names
+    /// from --materials too. With --moires N: one pair for all moirés, or one for each, the largest cell first:
+    /// graphene,graphene/hBN.
     #[arg(
         long,
         value_name = "UPPER/LOWER[,…]",
@@ -103,7 +111,9 @@ pub(crate) struct AnalyzeArgs {
     /// Make a set by hand: all files under PATH (a folder or a file among the inputs) form the set NAME; may be repeated
     #[arg(long = "set", value_name = "NAME=PATH", help_heading = SCANS)]
     sets: Vec<String>,
-    /// Show these scans but do not use them: names of files, * for any characters; may be repeated
+    /// Show scans with these names but do not use them
+    ///
+    /// * stands for any characters. May be repeated.
     #[arg(long, value_name = "NAME", help_heading = SCANS)]
     exclude: Vec<String>,
     /// Leave out scans that do not fit the others (leave-one-out χ², p < 0.001 divided by the number of scans)
@@ -112,8 +122,9 @@ pub(crate) struct AnalyzeArgs {
     /// Standard uncertainty of the frame times in the files, s [default: 0.6]
     #[arg(long, value_name = "S", value_parser = numbers::number(numbers::TIME_S), help_heading = METHOD)]
     frame_time_sigma: Option<f64>,
-    /// Number of moirés that every image shows; each is fitted after the others are subtracted and has its own folder
-    /// of results [default: 1]
+    /// Number of moirés that every image shows [default: 1]
+    ///
+    /// Each is fitted after the others are subtracted and has its own folder of results.
     #[arg(long, value_name = "N", value_parser = numbers::count(1, 6), help_heading = SCANS)]
     moires: Option<usize>,
     /// Use only the region that all scans have in common
@@ -161,8 +172,9 @@ pub(crate) struct AnalyzeArgs {
     /// angle is turned back. This is the default; `--rotation 0` gives the axes of the image
     #[arg(long, help_heading = OUTPUT)]
     rotate_to_lab: bool,
-    /// Print results.json instead of the summary; with --moires a list with one entry for each moiré, the largest cell
-    /// first
+    /// Print results.json instead of the summary
+    ///
+    /// With --moires a list with one entry for each moiré, the largest cell first.
     #[arg(long)]
     pub(super) json: bool,
     /// Open the report when it is written

@@ -40,7 +40,7 @@ const NAMES: [&str; 12] = [
 /// Named files in memory.
 pub(super) type Files = Vec<(String, Vec<u8>)>;
 
-/// Where results go, and what is said of them.
+/// Where results go, and what the screen shows.
 pub(super) struct Output {
     out: PathBuf,
     sink: FolderSink,

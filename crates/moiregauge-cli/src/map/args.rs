@@ -38,8 +38,10 @@ pub(crate) struct MapArgs {
     /// How local lattices are measured
     #[arg(help_heading = "Maps", long, value_enum, default_value_t = MapMethodArg::Demodulation)]
     map_method: MapMethodArg,
-    /// Width of the Gaussian window (standard deviation), nm; the resolution is 2.35 times this [default: as wide as
-    /// the lattice stays straight, at least 0.6 periods]. With tiles: the side of a tile [default: 6 periods]
+    /// Width of the Gaussian window (standard deviation), nm
+    ///
+    /// The resolution is 2.35 times this. Default: as wide as the lattice stays straight, at least 0.6 periods. With tiles:
+    /// the side of a tile; default: 6 periods.
     #[arg(long, value_name = "NM", value_parser = numbers::number(numbers::LENGTH_NM), help_heading = "Maps")]
     window: Option<f64>,
     /// Distance of the nodes, nm [default: a third of the window, at least two pixels; a quarter of a tile]

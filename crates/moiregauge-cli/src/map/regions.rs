@@ -14,14 +14,18 @@ use crate::places::{parse_line, parse_region};
 #[derive(clap::Args, Clone, Debug)]
 #[command(next_help_heading = "Regions of the map")]
 pub(super) struct RegionArgs {
-    /// Mean, spread and errors within a box (lower left corner, width, height) or within a polygon (its corners
-    /// separated by blanks: flake='0,0 100,10 60,80'); nm, or with a unit (bar=0.1um,0.2um,1um,500nm); may be repeated
+    /// Mean, spread and errors within a box or polygon
+    ///
+    /// A box is its lower left corner, width and height; a polygon its corners separated by blanks: flake='0,0 100,10
+    /// 60,80'. In nm, or with a unit (bar=0.1um,0.2um,1um,500nm). May be repeated.
     #[arg(long, value_name = "NAME=X,Y,W,H", value_parser = parse_region, allow_hyphen_values = true)]
     region: Vec<Region>,
-    /// Twist, strain and wavelength along a line; nm, or with a unit; may be repeated
+    /// Twist, strain and wavelength along a line
+    ///
+    /// In nm, or with a unit. May be repeated.
     #[arg(long, value_name = "NAME=X1,Y1 X2,Y2", value_parser = parse_line, allow_hyphen_values = true)]
     profile: Vec<Line>,
-    /// The most uniform areas of this size (200nm×100nm): where the twist varies least, ranked
+    /// The most uniform areas of this size, as in 200nm×100nm, ranked
     #[arg(long, value_name = "W×H", value_parser = parse_size)]
     device: Option<[f64; 2]>,
     /// Number of orientations of the device to try, evenly over half a turn; 1: along x only
@@ -32,7 +36,7 @@ pub(super) struct RegionArgs {
     #[arg(long, value_name = "N", default_value_t = 10, requires = "device",
         value_parser = clap::value_parser!(u16).range(1..=1000))]
     device_count: u16,
-    /// Find how much of the map has this twist, degrees: 1.05±0.02 or 1.05+-0.02
+    /// How much of the map has this twist, as in 1.05±0.02 or 1.05+-0.02
     #[arg(long, value_name = "TWIST±DEG", value_parser = parse_wanted)]
     wanted: Option<WantedTwist>,
 }
@@ -54,7 +58,7 @@ impl RegionArgs {
     }
 }
 
-/// What is said of them on the screen.
+/// What the screen shows of them.
 pub(super) fn summary(details: &MapDetailsResult) -> String {
     let mut text = String::new();
     let twist = |found: Option<RegionMeanResult>| {

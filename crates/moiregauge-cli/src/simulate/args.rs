@@ -25,7 +25,7 @@ Examples:
   moiregauge simulate --out sim --name fast --scans 6 --slow x --rate 4 --drift -0.3 0.6
   moiregauge simulate --out sim --layers graphene/hBN --twist 0.8 --biaxial 0.1
   moiregauge simulate --out sim --name atoms --atoms 1 --size 5 5 --scans 2 --pixels 256
-  moiregauge simulate --out sim --name torn --sample edge:share=0.6,angle=30 --sample hole:share=0.1
+  moiregauge simulate --out sim --name flake --sample edge:share=0.6,angle=30 --sample hole:share=0.1
   moiregauge simulate --out sim --name g7 --sample grains --vary --seed 7
   moiregauge simulate --list-samples                   the classes of samples and their numbers
   moiregauge simulate --print-config > set.toml        every setting, to be edited

@@ -1,4 +1,4 @@
-//! The documentation: what it says of the program is there, what the program has is in it, and its examples run.
+//! The documentation: everything it names exists, everything that exists is named, and its examples run.
 
 mod links;
 mod pages;

@@ -28,7 +28,8 @@ pub(crate) fn pages() -> Vec<PathBuf> {
     found
 }
 
-fn below(folder: &Path, found: &mut Vec<PathBuf>) {
+/// All files below a folder.
+pub(crate) fn below(folder: &Path, found: &mut Vec<PathBuf>) {
     for entry in std::fs::read_dir(folder).expect("a folder") {
         let path = entry.expect("an entry").path();
         if path.is_dir() {
@@ -77,19 +78,19 @@ pub(crate) fn says(words: &[&str]) -> String {
     String::from_utf8(output.stdout).expect("UTF-8")
 }
 
-/// The commands of the program.
+/// The commands of the program: they stand under headings, indented by two.
 pub(crate) fn commands() -> Vec<String> {
     let help = says(&["help"]);
-    let list = help.split("Commands:").nth(1).expect("a list");
+    let list = help.split("\nOptions:").next().expect("a list");
     let names = list
         .lines()
-        .take_while(|line| !line.starts_with("Options"))
         .filter(|line| line.starts_with("  ") && !line.starts_with("   "));
-    let names = names.filter_map(|line| line.split_whitespace().next());
-    names
-        .filter(|name| *name != "help")
+    let names: Vec<String> = names
+        .filter_map(|line| line.split_whitespace().next())
         .map(str::to_owned)
-        .collect()
+        .collect();
+    assert!(names.len() > 10, "{names:?}");
+    names
 }
 
 /// The options of a command: the names at the beginning of the entries of its help.

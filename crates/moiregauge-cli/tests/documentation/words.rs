@@ -1,11 +1,11 @@
 //! Options, keys, settings and caveats: each is in the documentation, and none that the program does not have.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-use crate::pages::{commands, long_options, options, pages, parts, read, root, says, spans};
+use crate::pages::{below, commands, long_options, options, pages, parts, read, root, says, spans};
 
 const RENEW: &str = "renew it: python3 docs/generate.py target/debug/moiregauge .";
 
@@ -218,8 +218,70 @@ fn no_line_begins_as_a_comment() {
     }
 }
 
+/// Words, but for numbers and marks alone.
+fn words(text: &str) -> usize {
+    let all = text.split_whitespace();
+    all.filter(|word| word.contains(char::is_alphanumeric))
+        .count()
+}
+
+/// Pages that the program makes do not count, nor do the tables of formats.
+fn is_written(path: &Path) -> bool {
+    !read(path).starts_with("<!-- Made by") && !path.ends_with("docs/caveats.md")
+}
+
 #[test]
-fn the_readme_is_short() {
-    let words = read(&root().join("README.md")).split_whitespace().count();
-    assert!(words < 900, "{words} words");
+fn the_pages_are_short() {
+    let count = |name: &str| words(&read(&root().join(name)));
+    assert!(count("README.md") <= 700, "{}", count("README.md"));
+    assert!(count("DESIGN.md") <= 2500, "{}", count("DESIGN.md"));
+    let all = pages().into_iter().filter(|path| is_written(path));
+    let total: usize = all.map(|path| words(&read(&path))).sum();
+    assert!((10_000..=30_000).contains(&total), "{total} words");
+}
+
+/// Words that no textbook of the field has: the glossary has others.
+const STRANGE: [&str; 8] = [
+    "torn",
+    "hollow",
+    "says of",
+    "said of",
+    "is none",
+    "are none",
+    "so many",
+    "outshines",
+];
+
+/// A word of [`STRANGE`] in a text, but for `there is none`.
+fn strange(text: &str) -> Option<&'static str> {
+    let text = text.to_lowercase();
+    let marks = |word: &&str| !matches!(*word, "///" | "//!" | "//");
+    let text: Vec<&str> = text.split_whitespace().filter(marks).collect();
+    let text = text.join(" ");
+    STRANGE.into_iter().find(|word| {
+        text.match_indices(word).any(|(at, _)| {
+            let before = &text[..at];
+            let after = text[at + word.len()..].chars().next();
+            let inside = [before.chars().next_back(), after];
+            let ordinary = word.ends_with("none") && before.ends_with("there ");
+            !ordinary && !inside.iter().flatten().any(|c| c.is_alphanumeric())
+        })
+    })
+}
+
+#[test]
+fn pages_and_sources_speak_the_language_of_the_field() {
+    assert_eq!(strange("as\n/// so many\n/// times"), Some("so many"));
+    assert_eq!(strange("where there is none, somehow thorn"), None);
+    for page in pages().into_iter().filter(|path| is_written(path)) {
+        assert_eq!(strange(&read(&page)), None, "{}", page.display());
+    }
+    let mut sources = Vec::new();
+    below(&root().join("crates"), &mut sources);
+    sources.retain(|path| path.extension().is_some_and(|e| e == "rs"));
+    sources.retain(|path| !path.ends_with("documentation/words.rs"));
+    assert!(sources.len() > 300, "{}", sources.len());
+    for source in sources {
+        assert_eq!(strange(&read(&source)), None, "{}", source.display());
+    }
 }
