@@ -75,7 +75,7 @@ fit/hidden ELSE second half double
 scan/shells SUSPECTED second half double
 scan/shells CONFIRMED second half double
 fit/hidden SECOND_SHELL second half double
-lattice/measure OUTSHINES second,step half double
+lattice/measure MIN_HIGHER_ORDER_RATIO second,step half double
 lattice/measure FEWEST_BESIDE second,step half double
 lattice/ground PERIODS step,bump half double
 lattice/ground ROUNDS step,bump half double

@@ -218,7 +218,7 @@ impl Work {
     }
 }
 
-/// Without figures, on so many threads, into a folder of the command's name.
+/// Without figures, on a number of threads, into a folder of the command's name.
 fn plain<'a>(command: &'a str, input: &'a str, threads: &'a str) -> Vec<&'a str> {
     let mut all = vec![command, input, "--out", command, "--force", "--quiet"];
     all.extend(["--no-report", "--no-png", "--threads", threads]);

@@ -14,9 +14,9 @@ use crate::reading;
 use crate::session::{channels_of_one_frame, one_per_frame};
 use crate::sink::MANIFEST;
 
-/// So many bytes tell the format of a file.
+/// Bytes that identify the format of a file.
 const HEAD: u64 = 512;
-/// Of what was left alone, so many are named.
+/// Number of ignored files that are named.
 const NAMED: usize = 3;
 
 /// What names of files, folders and wildcards mean.

@@ -23,7 +23,7 @@ pub fn hexadecimal(bytes: &[u8]) -> String {
 /// The file at `place` by its content, read piece by piece; `name` is what the user calls it.
 ///
 /// # Errors
-/// The file cannot be read, or is none.
+/// The file cannot be read, or is not a regular file.
 pub fn identity(name: &Path, place: &Path) -> Result<InputFile, FileError> {
     let mut file = open(place)?;
     let mut hash = Sha256::new();

@@ -72,7 +72,7 @@ pub struct ScanInfo {
     pub notes: Vec<String>,
     /// In words.
     pub missing_for_analysis: Vec<String>,
-    /// So many of the last notes say that the image to be analysed was chosen among several: a front end tells how to
+    /// Number of the last notes that say that the image to be analysed was chosen among several: a front end tells how to
     /// choose another one.
     #[serde(skip)]
     pub notes_on_choice: usize,
@@ -249,7 +249,7 @@ fn scan_info(scan: &Scan, at: &[Pixel]) -> ScanInfo {
     }
 }
 
-/// Lines that are looked at together, about so many samples: they stay in the fastest memory.
+/// Samples of the lines that are processed together: they stay in the fastest memory.
 const AT_ONCE: usize = 1 << 14;
 /// Samples that are summed side by side, so that every vector width gives the same bits.
 const LANES: usize = 8;

@@ -94,7 +94,7 @@ pub fn read_text(path: &Path) -> Result<String, FileError> {
     String::from_utf8(bytes).map_err(|_| FileError::NotText)
 }
 
-/// The first bytes of a file, at most so many.
+/// The first bytes of a file, up to a number.
 pub(crate) fn head(path: &Path, length: u64) -> Result<Vec<u8>, FileError> {
     let mut head = Vec::new();
     open(path)?.take(length).read_to_end(&mut head)?;

@@ -109,7 +109,7 @@ impl Analysis {
         })
     }
 
-    /// Measures what is not measured yet and analyses all: the document of each moiré and what is said of it on a
+    /// Measures what is not measured yet and analyses all: the document of each moiré and its summary for a
     /// screen, the largest cell first.
     #[pyo3(signature = (threads, progress))]
     fn analyse(

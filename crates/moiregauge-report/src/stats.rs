@@ -91,7 +91,7 @@ pub(crate) fn ellipse(
     covariance: &nalgebra::Matrix2<f64>,
     n: f64,
 ) -> Vec<(f64, f64)> {
-    // The decomposition would not end on numbers that are none.
+    // The decomposition would not end on NaN.
     if !covariance.iter().all(|c| c.is_finite()) {
         return Vec::new();
     }

@@ -1,4 +1,4 @@
-//! Who may ask: the host, the origin of the page, the cookie; and what every answer says of itself.
+//! Who may ask: the host, the origin of the page, the cookie; and the headers of every answer.
 
 use std::net::IpAddr;
 use std::sync::Arc;

@@ -12,7 +12,7 @@ use crate::feed::Feed;
 /// Bytes of one uploaded file, at most.
 const UPLOAD_LIMIT: u64 = 4 << 30;
 
-/// What a program says of its own options.
+/// How a program names its own options.
 #[derive(Clone, Copy, Debug)]
 pub struct Words {
     /// What helps against an error.

@@ -9,7 +9,7 @@ use zip::ZipArchive;
 
 use crate::limits::unpacked_limit;
 
-/// The header of an entry lies within so many bytes: that of an array has two bytes for its length.
+/// Largest header of an entry, bytes: that of an array has two bytes for its length.
 const HEAD: u64 = 1 << 17;
 /// More entries than an archive of scans has; every curve of a map is one or two.
 const MOST_ENTRIES: usize = 1 << 22;

@@ -4,7 +4,7 @@ use crate::format::Format;
 use crate::readers::{Kind, READERS, Reader};
 use crate::signature::{head, is_text};
 
-/// First bytes of files that are none of those that are read.
+/// First bytes of formats that are not read.
 const OTHERS: [(&[u8], &str); 11] = [
     (b"GIF8", "a GIF picture"),
     (b"BM", "a BMP picture"),
@@ -69,7 +69,7 @@ fn other(bytes: &[u8]) -> Option<&'static str> {
     Some(found)
 }
 
-/// Names of groups of an HDF5 file stand within so many bytes, mostly.
+/// Bytes in which names of groups of an HDF5 file stand, mostly.
 const HEAD_OF_HDF5: usize = 1 << 20;
 
 /// Tells the format from the first bytes of a file; a few hundred are enough but for TIFF files,
@@ -100,7 +100,7 @@ impl Format {
     /// Whether files of this kind are meant to be scans, readable or not.
     ///
     /// For picking the scans out of a folder that also holds notes, pictures and arrays: of these the
-    /// user has to say that they are scans, by naming them. Logs that go with scans are none.
+    /// user has to say that they are scans, by naming them. Logs that go with scans do not count.
     pub fn is_scan(self) -> bool {
         Reader::of(self).is_some_and(|reader| reader.kind == Kind::Scan)
     }

@@ -12,9 +12,9 @@ use crate::readers::Reader;
 use crate::source::{Data, Source};
 use crate::words;
 
-/// Headers at the start of a file are looked for in so many bytes; most have less.
+/// Bytes in which a header is searched first; most have less.
 const HEAD: u64 = 128 << 10;
-/// And then in so many: those of NanoScope files may have 4 MB.
+/// And then: those of NanoScope files may have 4 MB.
 const LONG_HEAD: u64 = 5 << 20;
 
 /// A file whose headers were read.

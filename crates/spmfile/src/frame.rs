@@ -260,7 +260,7 @@ impl<'a> Frame<'a> {
     }
 }
 
-/// A channel with its samples, and what is to be said of it.
+/// A channel with its samples and notes.
 type Decoded = (Channel, Option<(String, String)>);
 
 fn decoded(entry: &Entry<'_>, data: &Data<'_>) -> Result<Decoded, Failure> {

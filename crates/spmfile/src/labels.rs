@@ -98,7 +98,7 @@ pub(crate) fn text(scan: &Scan, channel: &Channel, log: &[String]) -> String {
     text
 }
 
-/// The lines `key = value` of a text; others are none.
+/// The lines `key = value` of a text; others are ignored.
 pub(crate) fn lines(text: &str) -> Vec<(String, String)> {
     text.lines()
         .filter_map(|line| line.split_once('='))

@@ -2,7 +2,7 @@
 
 /// Up to this many bytes any file may unpack to: constant arrays shrink a thousandfold.
 const ALWAYS_ALLOWED: u64 = 64 << 20;
-/// Beyond that, what comes out of a file is at most so many times its length.
+/// Beyond that, the largest ratio of decoded bytes to the length of the file.
 const MOST_GAIN: u64 = 20;
 
 /// How many bytes a compressed file of a length may become.

@@ -7,7 +7,7 @@ use crate::array::begins_table;
 use crate::cursor::{Cursor, Endian};
 use crate::words;
 
-/// So many bytes tell the format.
+/// Bytes that identify a format.
 const HEAD: usize = 512;
 /// A line of labels and one of numbers are no longer, mostly.
 const HEAD_OF_TABLE: usize = 1 << 16;
@@ -38,7 +38,7 @@ pub(crate) fn tiff_has(bytes: &[u8], first: u16, last: u16) -> bool {
     found().unwrap_or(false)
 }
 
-/// The name of the first entry of a ZIP archive; empty where it is none.
+/// The name of the first entry of a ZIP archive; empty if it is not one.
 pub(crate) fn first_entry(bytes: &[u8]) -> &[u8] {
     if !bytes.starts_with(b"PK\x03\x04") {
         return &[];

@@ -11,7 +11,7 @@ use crate::raster::{self, Encoding, Order};
 use crate::scan::Samples;
 use crate::source::Data;
 
-/// Samples that are decoded together where all of them are looked at first, about so many.
+/// Samples that are decoded together where all of them are examined first.
 const AT_ONCE: usize = 1 << 20;
 
 /// The samples of a channel in its file.

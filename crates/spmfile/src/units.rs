@@ -50,7 +50,7 @@ pub(crate) fn clean(unit: &str) -> String {
 }
 
 /// A unit as the SI writes it, whatever a file wrote: `deg` and `degree` are `°`, `um` and `micron` are `µm`,
-/// `angstrom` is `Å`, `Ohm` is `Ω`, `a.u.` is none. Units that are not known stay as they are.
+/// `angstrom` is `Å`, `Ohm` is `Ω`, `a.u.` is no unit. Units that are not known stay as they are.
 ///
 /// ```
 /// assert_eq!(spmfile::plain_unit("um"), "µm");

@@ -44,7 +44,7 @@ pub struct Orientation {
 }
 
 impl Orientation {
-    /// What the user says of a layer.
+    /// The orientation of a layer as the user gives it.
     pub fn of(known: &KnownOrientation, bilayer: Bilayer<'_>) -> Self {
         let of_reference = known.layer == 1;
         let material = if of_reference {

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use crate::common::{program, run, simulate, succeed};
 use crate::outputs::{UNFINISHED, contents, names, refused};
 
-/// Five good samples and one that is none.
+/// Five good samples and one without scans.
 fn samples(folder: &Path) -> PathBuf {
     let root = folder.join("root");
     for seed in ["1", "2", "3", "4", "5"] {

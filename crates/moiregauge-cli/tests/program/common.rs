@@ -17,7 +17,7 @@ pub(crate) fn program() -> Command {
     Command::new(env!("CARGO_BIN_EXE_moiregauge"))
 }
 
-/// The program where no file can be longer than so many blocks of 512 bytes, as where a disk is full.
+/// The program where files are limited to a number of blocks of 512 bytes, as where a disk is full.
 #[cfg(unix)]
 pub(crate) fn with_files_up_to(blocks: usize) -> Command {
     let mut command = Command::new("sh");

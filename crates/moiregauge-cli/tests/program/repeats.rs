@@ -72,7 +72,7 @@ fn runs_are_repeated_byte_for_byte() {
         &[&size[..], &["--name", "t", "--seed", "2"]].concat(),
     );
     std::fs::write(folder.join("scanner.toml"), SCANNER).unwrap();
-    // Something that looks like a scan and is none fails again with the same words.
+    // A file that looks like a scan but is not one fails again with the same words.
     let scan = std::fs::read_dir(folder.join("t")).unwrap();
     let scan = scan
         .map(|e| e.unwrap().path())

@@ -18,7 +18,7 @@ enum Kind {
     EstimateOrNull,
     Pair,
     Matrix,
-    /// So many entries.
+    /// A number of entries.
     List(usize),
     AnyList,
 }

@@ -1,4 +1,4 @@
-//! Scanners as they are: sensors that lag, calibrations that are none.
+//! Scanners as they are: sensors that lag, calibrations that no scanner has.
 
 use serde_json::Value;
 

@@ -73,7 +73,7 @@ impl Watching {
         value
     }
 
-    /// The first line of so many frames.
+    /// The first line with this number of frames.
     fn of(&self, frames: u64) -> Value {
         loop {
             let line = self.next();
@@ -198,7 +198,7 @@ fn files_change_and_the_watch_goes_on() {
     (0..3).for_each(|number| arrive(&made, &watched, number));
     let watching = Watching::json(&watched, &["--patience", "500ms"]);
     assert_eq!(watching.next()["frames"], 3);
-    // Results beside the scans are none.
+    // Results beside the scans are not scans.
     let out = watched.join("results");
     succeed(analyze(&watched, &out).args(["--export", "corrected.gwy"]));
     // Truncated, then written again with another frame.

@@ -114,7 +114,7 @@ pub enum CalibrationFileError {
         /// Why not.
         source: FileError,
     },
-    /// It is none.
+    /// Not a calibration.
     #[error("in the calibration file {file}")]
     Toml {
         /// Its name.

@@ -10,7 +10,7 @@ use super::failure::Failure;
 use crate::known::Known;
 use crate::opened::Opened;
 
-/// At most so many other channels are tried.
+/// Largest number of other channels that are tried.
 const MOST_TRIED: usize = 16;
 
 /// A channel to try instead, as settings that name it.

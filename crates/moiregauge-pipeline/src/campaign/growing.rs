@@ -75,7 +75,7 @@ impl TryFrom<Written> for Campaign {
     }
 }
 
-/// What a front end says of errors; it is no part of what is written.
+/// How a front end words errors; not part of what is written.
 #[derive(Clone, Copy, Debug)]
 struct Words(Advice);
 

@@ -190,7 +190,7 @@ fn of_reading(
     Ok((moires, input))
 }
 
-/// What has to be said of files that were named more than once.
+/// Caveats about files that were named more than once.
 pub fn given_again(repeated: &[Repeated]) -> Vec<Caveat> {
     let words = |again: &Repeated| {
         let of = again.of.display().to_string();

@@ -30,7 +30,7 @@ pub struct Job<'a> {
 }
 
 impl<'a> Job<'a> {
-    /// A job of so many threads; `None`: as many as there are processors.
+    /// A job of a number of threads; `None`: as many as there are processors.
     ///
     /// # Errors
     /// The system gives no threads.

@@ -54,7 +54,7 @@ pub(super) fn encoded(map: &mut TwistStrainMap) -> Vec<u8> {
     bytes
 }
 
-/// The band; `None` if it is none.
+/// The band; `None` if the bytes are not a band.
 pub(super) fn decoded(bytes: &[u8], plan: &SurveyPlan) -> Option<TwistStrainMap> {
     let (head, rest) = bytes.split_at_checked(8 * HEAD)?;
     let head: Vec<f64> = head

@@ -1,4 +1,4 @@
-//! What has to be said of maps beside their numbers.
+//! Caveats of maps.
 
 use moiregauge::caveat::{Caveat, DriftDoubt, MapDoubt, Mapped};
 use moiregauge::map::register;

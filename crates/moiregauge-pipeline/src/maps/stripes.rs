@@ -144,7 +144,7 @@ fn images(found: &ScanStripes, file: &str) -> Vec<moiregauge_report::results::Ma
         .collect()
 }
 
-/// What has to be said of the stripes beside their numbers.
+/// Caveats of a map of stripes.
 fn doubts(found: &ScanStripes, file: &str, caveats: &mut Vec<Caveat>) {
     let mut doubt = |doubt: Doubt| caveats.push(Caveat::new(doubt, file));
     doubt(PatternDoubt::StripesOnly.into());

@@ -8,7 +8,7 @@ use crate::job::Cancelled;
 
 /// Errors that can be wished for, in any unit.
 const WISH: [f64; 2] = [1e-9, 1e6];
-/// What the header of a file says of its time is rounded to whole seconds: variance, s².
+/// Variance of a time in a header, which is rounded to whole seconds, s².
 const ROUNDED_TIMES: f64 = 1.0 / 12.0;
 
 /// Standard errors that are wanted, with calibration and model.

@@ -302,7 +302,7 @@ fn complete(folder: &Path, work: &Work) -> Result<(), SinkError> {
     Ok(())
 }
 
-/// An error if a file that is to be moved would replace one that is none of ours, or was changed.
+/// An error if a file that is to be moved would replace one that is not ours, or was changed.
 fn check_places(folder: &Path, work: &Work, intent: &Intent) -> Result<(), SinkError> {
     for entry in &intent.manifest.files {
         let place = folder.join(&entry.path);

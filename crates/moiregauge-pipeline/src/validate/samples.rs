@@ -19,7 +19,7 @@ use super::request::{ValidateRequest, check_sets};
 use crate::job::Job;
 use crate::sink::{Sink, SinkError};
 
-/// An answer further from the truth than so many total σ is wrong.
+/// Distance from the truth beyond which an answer is wrong, total σ.
 const WRONG_SIGMAS: f64 = 5.0;
 
 /// Every set of a validation with real samples.

@@ -11,7 +11,7 @@ use crate::names::in_words;
 use crate::session::one_per_frame;
 use crate::stamp::Stamp;
 
-/// A file is gone when it was missing for so many steps: one listing of a network share may leave it out.
+/// Steps without a file after which it is gone: one listing of a network share may leave it out.
 const MISSING: usize = 2;
 
 /// Whether a file can be read as its header promises; otherwise why not.

@@ -16,7 +16,7 @@ use crate::validate::conditions_of;
 const PAIR: usize = 2;
 /// A wish that takes more frames than that is not counted out.
 const MOST: usize = 1000;
-/// Beyond so many frames errors fall with the root of their number: the ends of a long series no longer matter.
+/// Frames beyond which errors fall with the root of their number: the ends of a long series no longer matter.
 const LONG: usize = 40;
 
 /// Errors after two more frames like those before, the slow axis up and down in turn.
@@ -77,7 +77,7 @@ impl Outlook {
         predict(&[set], &self.settings, 1)
     }
 
-    /// Statistical errors of so many frames, degrees and per cent.
+    /// Statistical errors of this number of frames, degrees and per cent.
     fn foreseen(&self, frames: usize) -> Option<[f64; 2]> {
         let found = self.predicted(frames.min(LONG))?;
         let fewer = (frames.min(LONG) as f64 / frames as f64).sqrt();
@@ -118,7 +118,7 @@ impl Outlook {
         })
     }
 
-    /// So many more frames fulfil the wish; `None` where that is beyond all numbers.
+    /// Further frames that reach the wanted error; `None` where no number does.
     pub(super) fn frames_needed(&self, wish: &Until) -> Option<usize> {
         let met = |more: usize| {
             let then = self.after(self.frames + more);

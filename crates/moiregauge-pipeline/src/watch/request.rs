@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::until::Until;
 
-/// A file that cannot be read is told after so many steps without a change: a minute at two seconds a step. Writing
+/// Steps without a change after which an unreadable file is reported: a minute at two seconds a step. Writing
 /// pauses for less, and somebody who waits for a frame should not wait longer for the reason.
 const PATIENCE: usize = 30;
 
@@ -24,7 +24,7 @@ pub struct WatchRequest {
     pub told: Told,
     /// The errors that are wished for.
     pub until: Until,
-    /// So many steps without a change and a file that cannot be read is given up.
+    /// Steps without a change after which an unreadable file is given up.
     pub patience: usize,
 }
 

@@ -59,7 +59,7 @@ pub struct UntilState {
     pub wanted: Until,
     /// Whether it is fulfilled.
     pub reached: bool,
-    /// So many more frames may do; `null` where that is not known, or where no number of frames does.
+    /// Number of further frames that may suffice; `null` where that is not known, or where no number of frames does.
     pub frames_needed: Option<usize>,
     /// Whether calibration and model alone exceed it, which no frame changes.
     pub out_of_reach: bool,

@@ -12,7 +12,7 @@ const SAME: f64 = 0.01;
 /// A lattice that stands out so much less than before is worth a word: noise and drift change it by some per cent, a tip
 /// that changed by a factor.
 const WEAKER: f64 = 0.5;
-/// Before so many frames nobody knows what is usual.
+/// Frames before which nothing is known to be usual.
 const USUAL: usize = 3;
 
 /// One thing that is wrong.

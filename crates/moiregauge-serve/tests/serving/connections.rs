@@ -12,7 +12,7 @@ fn slow_connections_do_not_keep_others_out() {
     let server = Server::start(options(&[]));
     let mut slow = Vec::new();
     for number in 0..1000 {
-        // This process has an end of each, too, and may not have so many files open.
+        // This process has an end of each, too, and the number of open files is limited.
         if slow.len() >= 300 {
             slow.remove(0);
         }

@@ -85,7 +85,7 @@ fn nothing_beyond_the_folders_is_opened() {
             "{root}"
         );
     }
-    // Files have ids; names of files are none.
+    // Files have ids; names of files are not ids.
     for id in [
         "0",
         "..",

@@ -375,7 +375,7 @@ fn grains_are_told() {
     );
 }
 
-/// Another name of the lattice is chosen by what the server says of it; it stands in the results, and in the settings that repeat them.
+/// Another name of the lattice is chosen by its description from the server; it stands in the results, and in the settings that repeat them.
 #[test]
 fn readings_can_be_chosen() {
     let (_folder, server, path) = of_sample(|set| {

@@ -231,7 +231,7 @@ pub struct JointTerms {
     pub fast_gain: Option<Estimate>,
     /// Scatter of the positions about the fit beyond the noise of the phases, nm.
     pub instability_nm: f64,
-    /// The terms that were tried, and what the information criterion said of them.
+    /// The terms that were tried, and their information criteria.
     pub tested: Vec<TestedTerm>,
 }
 

@@ -322,7 +322,7 @@ fn one_direction(
         let variance = (slopes * covariance * slopes.transpose())[0].max(f64::MIN_POSITIVE);
         let start = *reference.get_or_insert(angle);
         let turns = angle - start;
-        // Names of vectors may differ by a turn that is none for the lattice.
+        // Labels of vectors may differ by a rotation that maps the lattice onto itself.
         let period = material.rotation_period();
         let near = turns - period * (turns / period).round();
         let ComplexPair { p, q } = f.into();

@@ -144,7 +144,7 @@ struct Seen {
 /// standard deviation of each component of a drift that the frames cannot tell.
 ///
 /// # Errors
-/// [`CalibrateError`]: nothing to measure, sensors and nominal coordinates mixed, or lattices that are none.
+/// [`CalibrateError`]: nothing to measure, sensors and nominal coordinates mixed, or lattices that are not valid.
 pub fn calibrate(
     scans: Vec<MeasuredScan>,
     known: &KnownLattice,
@@ -225,7 +225,7 @@ fn coordinates_of(scans: &[MeasuredScan]) -> Result<Coordinates, CalibrateError>
     })
 }
 
-/// Whether a doubt about a scan is none about a calibration: that of nominal coordinates is what is looked for, and atoms
+/// Whether a caveat of a scan does not concern a calibration: that of nominal coordinates is what is looked for, and atoms
 /// show other waves beside their lattice.
 fn is_expected(doubt: &Doubt) -> bool {
     matches!(

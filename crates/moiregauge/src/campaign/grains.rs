@@ -13,7 +13,7 @@ use crate::numbers::chi2;
 
 /// Drifts contradict each other where chance separates them as far less often than this.
 const CONTRADICTED: f64 = 1e-6;
-/// The drift of one set is believed against that of another whose variance is so many times as large; else neither is.
+/// Ratio of variances from which the drift of one set is believed against that of another; else neither is.
 const BETTER_KNOWN: f64 = 9.0;
 /// A set of other scans shows the nearest of the grains, if their vectors differ by less than this share of them: drift that is not known makes a few
 /// per cent between two slow axes. Chosen by eye.

@@ -116,7 +116,7 @@ pub(crate) fn once(mut scans: Vec<MeasuredScan>) -> (Vec<MeasuredScan>, Vec<Cave
     (scans, caveats)
 }
 
-/// What is said of a file that holds the data of another one, `of`, or is that file.
+/// The caveat about a file that holds the data of another one, `of`, or is that file.
 pub fn about_repeat(file: &str, of: &str) -> Caveat {
     let of = (file != of).then(|| of.to_owned());
     Caveat::new(FileDoubt::SameScanTwice { of }, file)

@@ -15,7 +15,7 @@ use crate::scan::measure::{about_lattice, share_noise};
 use crate::scan::measured::{MeasuredLine, MeasuredScan};
 use crate::scan::shells::{CONFIRMED, cells};
 
-/// A lattice is the second shell of another that so many times as many lines show: those that show the other cannot all be wrong about the same waves.
+/// Ratio of the numbers of lines from which a lattice is the second shell of another: lines that show the other cannot all be wrong about the same waves.
 const OUTVOTED: usize = 3;
 
 /// Takes the lattice of which that which was measured is the second shell in all images of a set that say so together.

@@ -43,7 +43,7 @@ pub struct Explained {
     pub code: &'static str,
     /// How much it weighs.
     pub severity: Severity,
-    /// What it says of the results.
+    /// What it means for the results.
     pub meaning: &'static str,
     /// What helps.
     pub what_to_do: &'static str,

@@ -16,7 +16,7 @@ pub enum LatticeDoubt {
     FewPeriods {
         /// How many across the shorter side.
         periods: f64,
-        /// So many would do.
+        /// The power that suffices.
         enough: f64,
     },
     /// Trace and retrace do not show the same.

@@ -50,7 +50,7 @@ pub enum OrientationDoubt {
          another vector, another layer or another sample, or its error is too small"
     )]
     Disagree {
-        /// By so many standard deviations.
+        /// The difference in standard deviations.
         sigmas: f64,
     },
     /// The orientation goes with the other sense.
@@ -79,7 +79,7 @@ pub enum OrientationDoubt {
          move of the window, does this. The error of the orientation was enlarged to match"
     )]
     AtomicScatter {
-        /// So many times more.
+        /// The ratio.
         times: f64,
     },
     /// Atomic images of one frame direction.

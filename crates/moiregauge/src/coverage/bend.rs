@@ -66,7 +66,7 @@ pub enum ChangeModel {
     Even,
     /// The phases are cubic polynomials.
     Cubic,
-    /// Any smooth change, on so many cells along columns and rows.
+    /// Any smooth variation, on a number of cells along columns and rows.
     Smooth([usize; 2]),
 }
 
@@ -93,7 +93,7 @@ pub(crate) struct Mean {
     left: f64,
 }
 
-/// A lattice whose wavelengths or directions change by more than this (standard deviation) is none. Chosen by eye.
+/// Largest variation (standard deviation) of wavelengths or directions of a lattice. Chosen by eye.
 const WILD: f64 = 0.25;
 
 /// Standard deviation of the waves times the periods across: the phase bends by 2π √12/8 times that, half a radian here.
@@ -112,7 +112,7 @@ impl Mean {
         (self.reduced > POOR && self.left > LEFT) || self.change.is_some_and(wild)
     }
 
-    /// Whether the wave vectors change in proportion to the place and bend the phases of so many unit cells so little
+    /// Whether the wave vectors change in proportion to the place and bend the phases of this number of unit cells so little
     /// that a straight wave still fits.
     pub(crate) fn is_gentle(&self, unit_cells: f64) -> bool {
         let bent = |change: &Change| change.wavelength.max(change.angle) * unit_cells.sqrt();

@@ -15,7 +15,7 @@ use crate::numbers::widest::widest;
 
 /// Cells per period: what the sums over a cell take off a wave at the distance of a wave vector is then a tenth.
 const CELLS_PER_PERIOD: f64 = 4.0;
-/// A window reaches so many of its widths: what is left out is a thousandth.
+/// Reach of a window, widths: the rest is a thousandth.
 const REACH: f64 = 3.0;
 
 /// Cells that a thread takes at once, at least: fewer are not worth handing out.
@@ -108,7 +108,7 @@ impl Cells {
         })
     }
 
-    /// The same for an image of ones, of so many columns and rows.
+    /// The same for an image of ones, of a number of columns and rows.
     pub(crate) fn mixed_ones(&self, size: [usize; 2], q: Vector2<f64>) -> Vec<Complex64> {
         self.mix(size, q, |_, turns, [re, im]| {
             // One after the other, as in any image.

@@ -11,7 +11,7 @@ use crate::numbers::splines::Splines;
 /// Cells of splines along the longer side of the patch that are tried.
 const SPLINES: [usize; 7] = [1, 2, 3, 4, 6, 9, 13];
 
-/// A cell of the splines is at least so many windows wide: what is smaller the window does not see.
+/// Smallest cell of the splines, windows: the window does not resolve less.
 const WINDOWS_PER_CELL: f64 = 2.0;
 
 /// By how much the evidence (BIC) of a lattice that changes has to be better: chance does that once in e¹⁰.

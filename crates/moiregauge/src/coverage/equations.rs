@@ -77,7 +77,7 @@ struct Here {
 }
 
 impl Sums {
-    /// For so many functions of each phase.
+    /// For a number of functions of each phase.
     pub(crate) fn new(count: usize) -> Self {
         let size = 2 * count + 1;
         Self {

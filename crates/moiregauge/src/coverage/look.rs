@@ -15,7 +15,7 @@ use crate::numbers::three::three;
 /// half and one.
 const QUIET: f64 = 0.1;
 
-/// So many times [`QUIET`] is let pass where only some cells are looked at. Chosen by eye: what is typical is known to a fraction.
+/// Multiple of [`QUIET`] that is allowed where only some cells are examined. Chosen by eye: the typical value is known to a fraction.
 const GLANCE: f64 = 2.0;
 
 /// Cells with more than this share of what is typical are the patch: an edge is where the window sees half.
@@ -172,7 +172,7 @@ impl<'a> Frame<'a> {
         self.cells.envelope(&self.level, window)
     }
 
-    /// What a window of so many mean periods sees; `None` where noise makes it unfit.
+    /// Amplitudes under a window of a number of mean periods; `None` where noise makes it unfit.
     pub(crate) fn look(&self, waves: &Waves, window: &Window, width: f64) -> Option<Seen> {
         let cells = self.cells;
         let sums = waves.without(&self.level(window));

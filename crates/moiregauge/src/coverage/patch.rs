@@ -43,7 +43,7 @@ impl Patch {
         self.inside[self.cell(place)]
     }
 
-    /// Whether its cells are those of an image of so many columns and rows.
+    /// Whether its cells are those of an image of this number of columns and rows.
     pub fn is_of(&self, image: [usize; 2]) -> bool {
         (0..2).all(|i| image[i].abs_diff(self.size[i] * self.pixels[i]) < 2 * self.pixels[i])
     }

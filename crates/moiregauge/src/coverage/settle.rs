@@ -27,7 +27,7 @@ use crate::numbers::three::three;
 /// noisy images.
 const WIDTHS: [f64; 4] = [0.8, 1.2, 1.8, 2.7];
 
-/// Pixels are averaged where the shortest period has twice so many: harmonics need not be seen.
+/// Bins per shortest period; pixels are averaged where there are twice as many: harmonics need not be resolved.
 const BINS_PER_PERIOD: f64 = 8.0;
 
 /// Rounds of patch and pair, at most. Chosen by eye.
@@ -97,7 +97,7 @@ fn settle_binned(
     }
 }
 
-/// The same in an image of bins of so many pixels along each axis.
+/// The same in an image of bins, in pixels along each axis.
 fn settle_bins(
     image: &Image,
     pair: &Matrix2<f64>,
@@ -320,7 +320,7 @@ fn slope(cells: &Cells, seen: &Seen, inside: &[bool]) -> Option<(Matrix2<f64>, f
     step.iter().all(|s| s.is_finite()).then_some((step, turn))
 }
 
-/// `Σ a* b` over the cells `a` of a patch and those `b` that lie so many columns and rows beyond.
+/// `Σ a* b` over the cells `a` of a patch and those `b` that lie a number of columns and rows beyond.
 fn turned(
     [across, up]: [usize; 2],
     envelope: &[Complex64],
@@ -386,7 +386,7 @@ fn tidy(cells: &Cells, inside: &[bool], pair: &Matrix2<f64>) -> Vec<bool> {
     inside
 }
 
-/// Whether a disc of a diameter of so many mean periods fits into a patch. A patch that is as narrow as what a window makes of a line
+/// Whether a disc of a diameter in mean periods fits into a patch. A patch that is as narrow as what a window makes of a line
 /// is one: of a step, the edge of a terrace, a scratch, with the stairs that pixels make of it.
 fn is_broad(cells: &Cells, inside: &[bool], diameter: f64) -> bool {
     let [across, up] = cells.size;

@@ -14,7 +14,7 @@ use crate::coverage::look::{Frame, INSIDE, Seen, Waves};
 /// Windows of which less than this is there are cut off.
 const CUT: f64 = 0.9;
 
-/// A cell is taken away if it has less than is asked of it by so many standard deviations of its noise: by chance one cell of forty that
+/// A cell is removed if it is below its threshold by this many standard deviations of its noise: by chance one cell of forty that
 /// has just enough.
 const PLAINLY: f64 = 2.0;
 

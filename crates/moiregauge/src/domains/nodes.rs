@@ -26,7 +26,7 @@ const APART: f64 = 0.45;
 /// Radius of the fitted patch, periods: less than half of the way to the next node, whose slope would pull. Chosen by
 /// eye.
 const RADIUS: f64 = 0.36;
-/// Candidates and nodes this weak against the usual one are none. Chosen by eye; see docs/constants.md.
+/// Height of a candidate or node over the typical one below which it is rejected. Chosen by eye; see docs/constants.md.
 const WEAK: f64 = 0.4;
 /// Nodes stand out of their noise by this: below, places jump to peaks of the noise. See docs/constants.md.
 const CLEAR: f64 = 7.0;

@@ -1,7 +1,7 @@
 //! Lattices of which one holds the other, compared by what they predict.
 //!
 //! The lattice with the larger cell (a superlattice) has all wave vectors of the other and more between them. It is taken where these predict pixels
-//! that they have not seen, in all three directions, and lie on its points: a second moiré that only comes near them is none of its harmonics.
+//! that they have not seen, in all three directions, and lie on its points: a second moiré that only comes near them does not belong to it.
 
 use std::f64::consts::TAU;
 
@@ -15,18 +15,18 @@ use crate::frame::image::Image;
 use crate::numbers::three::three;
 use crate::spectrum::shells::FIRST_SHELL;
 
-/// Harmonics up to so many times the longest first-order wave vector of the smaller cell.
+/// Harmonics up to this multiple of the longest first-order wave vector of the smaller cell.
 const ORDERS: f64 = 1.1;
 /// Largest index of a harmonic of the larger cell.
 const LARGEST: i32 = 5;
 /// Longest wave vector that counts, rad per bin: three bins a period.
 const LONGEST: f64 = 2.1;
-/// A description is better if it predicts better by so many standard errors. Larger cells that were there gained 10 and more, those that were
+/// Standard errors by which a better description predicts more. Larger cells that were there gained 10 and more, those that were
 /// not at most 2.7 (simulated frames of two generators, lines with gains among them).
 pub(crate) const BETTER: f64 = 4.0;
 /// The smaller cell is taken if it predicts this fraction of what the larger does: the larger one has waves that are not its own.
 pub(crate) const MOST: f64 = 0.5;
-/// Wave vectors are looked for within so many cycles per frame of the points, in steps of a fifth of that.
+/// Reach of the search for wave vectors around the points, cycles per frame, in steps of a fifth of that.
 const REACH: f64 = 1.0;
 
 /// Cells whose shortest and longest waves differ by more than this are compared with those of twice the area: a hexagonal lattice without every other
@@ -105,14 +105,14 @@ fn predicts_as_well(image: &Image, one: &Matrix2<f64>, other: &Matrix2<f64>) -> 
     Some(enough && weakest(image, one, false)? > BETTER)
 }
 
-/// What an image says of the lattice with the larger cell.
+/// What an image shows of the superlattice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Superlattice {
     /// Its waves predict, in all three directions, and lie on its points.
     Shown,
     /// They do not predict, or not in all directions: noise may hide them, or there are none.
     NotShown,
-    /// What is near its points is none of its harmonics: it predicts better with wave vectors of its own, or worse than nothing in some direction.
+    /// The waves near its points are not its harmonics: they predict better with free wave vectors, or worse than nothing in some direction.
     Refuted,
 }
 

@@ -24,7 +24,7 @@ pub(crate) struct Phases {
     pub(crate) pair: Matrix2<f64>,
     /// Coefficients of [`terms`] of both phases, rad.
     pub(crate) bend: Vec<[f64; 2]>,
-    /// Wave vectors of waves that are none of the lattice's, rad per bin: they follow the harmonics.
+    /// Wave vectors of non-lattice waves, rad per bin: they follow the harmonics.
     pub(crate) others: Vec<Vector2<f64>>,
 }
 

@@ -11,21 +11,21 @@ use crate::numbers::widest::widest;
 
 /// Blocks along columns and along rows. With 36 blocks the standard error of a mean is known to 12 %.
 const BLOCKS: usize = 6;
-/// A block with less than one in so many of the bins of the fullest does not count.
+/// A block counts with at least the inverse of this fraction of the bins of the fullest.
 const FULL: usize = 4;
-/// Blocks are held out in so many turns.
+/// Number of groups of blocks that are held out in turn.
 pub(crate) const FOLDS: usize = 4;
 /// Bins per shortest period: harmonics of twice the first order keep three bins a period.
 const BINS_PER_PERIOD: f64 = 7.0;
 /// Standard deviation of the Gaussian mean that is subtracted as background, in longest periods: it leaves 98 % of the first order.
 const BACKGROUND: f64 = 0.45;
-/// Values beyond so many times the median absolute value are clipped: 4 σ of Gaussian noise.
+/// Multiple of the median absolute value at which values are clipped: 4 σ of Gaussian noise.
 const CLIPPED: f64 = 6.0;
 /// Bins that are looked at, at most.
 const MOST_BINS: usize = 1 << 16;
 /// Multiples of it are spread evenly, modulo 1: the golden ratio.
 const GOLDEN: f64 = 0.618_033_988_749_895;
-/// The Gaussian is cut off at so many standard deviations.
+/// Reach of the Gaussian, standard deviations.
 const REACH: f64 = 3.0;
 
 /// An image in bins without its slow background, divided into blocks.
@@ -168,7 +168,7 @@ pub(crate) fn gaussian_mean(values: &[f64], columns: usize, sigma: f64) -> Vec<f
         .collect()
 }
 
-/// Clips what is farther from 0 than so many median absolute values: a spike is no more than a step.
+/// Clips at a multiple of the median absolute value: a spike is no more than a step.
 fn clip(values: &mut [f64]) {
     let mut sizes: Vec<f64> = values
         .iter()

@@ -14,7 +14,7 @@ const LISTED: f64 = 0.05;
 /// [`superlattice`](crate::explain::cells::superlattice).
 const NESTED: f64 = 0.1;
 
-/// Lattices of more than so many times the period, or less than that part of it, lie on top of each other, as atoms and moiré do: an image that shows both
+/// Ratio of periods beyond which lattices lie on top of each other, as atoms and moiré do: an image that shows both
 /// shows neither instead of the other.
 const LIKE: f64 = 2.0;
 

@@ -17,7 +17,7 @@ use crate::frame::image::Image;
 use crate::frame::line_steps::correlated;
 use crate::frame::plane::PlaneFit;
 
-/// Degrees along a line that are tried, and across the lines: a sum of so many follows a creep or a hysteresis to a thousandth.
+/// Largest degrees along a line and across the lines: such a sum follows a creep or a hysteresis to a thousandth.
 const DEGREES: [usize; 2] = [8, 8];
 /// Blocks of lines that are held out in turn.
 const BLOCKS: usize = 24;

@@ -1,4 +1,4 @@
-//! Outliers moved to where they are none.
+//! Outliers clipped to the limit.
 
 use crate::frame::image::Image;
 use crate::numbers::median::median;
@@ -7,7 +7,7 @@ use crate::numbers::median::median;
 /// 2.5 of theirs, stay whole.
 pub(crate) const CLIP: f64 = 3.0;
 
-/// The image with outliers moved to where they are none.
+/// The image with outliers clipped to the limit.
 pub(crate) fn cut_off(image: &Image) -> Image {
     let mut values = image.finite();
     let middle = median(&mut values);

@@ -8,7 +8,7 @@ use crate::frame::plane::{FLAT, Plain, PlaneFit, PlaneSums, roughly};
 use crate::numbers::interrupt;
 use crate::numbers::widest::widest;
 
-/// Lines from which a plane is guessed, about so many: sums of what it leaves keep their digits.
+/// Approximate number of lines for the first plane: sums of what it leaves keep their digits.
 const GUESSED_FROM: usize = 16;
 /// A column with fewer values has no slope.
 const FEWEST: f64 = 3.0;

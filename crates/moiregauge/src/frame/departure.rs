@@ -97,7 +97,7 @@ impl Departure {
         }
     }
 
-    /// The same in bins of so many pixels along each axis; its values stay those of pixels.
+    /// The same in bins of a number of pixels along each axis; its values stay those of pixels.
     #[must_use]
     pub(crate) fn in_bins(&self, bin: usize) -> Self {
         let pixels = bin as f64;

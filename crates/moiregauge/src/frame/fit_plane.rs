@@ -51,7 +51,7 @@ fn sampled_residuals(image: &Image, columns: Range<usize>, plane: &PlaneFit) -> 
     let width = columns.len();
     let step = 1 + image.values.len() / SAMPLED;
     let mut sizes = Vec::with_capacity(image.rows * width / step + 1);
-    // Of each line every so many columns, where the line before left off.
+    // Columns of each line at a constant step, from where the line before left off.
     let mut first = 0;
     for row in 0..image.rows {
         let line = &image.row(row)[columns.clone()];

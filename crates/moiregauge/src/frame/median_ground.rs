@@ -31,7 +31,7 @@ pub(crate) fn running_median(image: &Image, side: usize) -> Image {
     let binned = means(image, bin);
     let (columns, rows) = (binned.columns, binned.rows);
     let mut ground = vec![f64::NAN; columns * rows];
-    // Values are put into order once for so many lines, and those that their windows reach.
+    // Values are sorted once for this number of lines and those that their windows reach.
     let together = 2 * reach;
     let bands = ground.par_chunks_mut(columns * together).enumerate();
     bands.for_each(|(band, ground)| {

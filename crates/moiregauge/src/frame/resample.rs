@@ -19,7 +19,7 @@ use rayon::prelude::*;
 use crate::frame::image::Image;
 use crate::numbers::interrupt;
 
-/// So many times the pixels of the image a grid has at most: finer ones hold nothing new and fill the memory.
+/// Largest number of pixels of a grid over that of the image: finer ones hold nothing new and fill the memory.
 const MOST_POINTS: f64 = 8.0;
 /// Points this far outside the outermost pixel centres (pixels) are on them but for rounding: far above 10⁻¹⁶ of a
 /// million pixels.

@@ -125,7 +125,7 @@ fn shortest(basis: &Matrix2<f64>) -> f64 {
     both.min(third.norm())
 }
 
-/// Measures the peaks at these lattice points; those that are none are left out.
+/// Measures the peaks at these lattice points; points without a peak are left out.
 fn peaks(
     autocorrelation: &Autocorrelation,
     basis: &Matrix2<f64>,

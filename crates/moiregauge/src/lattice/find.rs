@@ -93,7 +93,7 @@ fn is_doubtful(found: &Result<MeasuredLattice, LatticeError>) -> bool {
         || found.fit.as_ref().is_none_or(LatticeFit::disagrees)
 }
 
-/// The lattice of an image that is a few perfect waves, of which some are none of the lattice's.
+/// The lattice of an image of a few perfect waves, some of which are not harmonics of the lattice.
 fn beside_stripes(
     waves: &FewWaves,
     image: &Image,

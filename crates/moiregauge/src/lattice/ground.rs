@@ -117,7 +117,7 @@ fn evened(image: &Image, fit: &LatticeFit) -> (Image, usize) {
     (without(image, &running_median(&rest, side)), side)
 }
 
-/// A window of so many periods of the longest of three waves, pixels.
+/// A window in periods of the longest of three waves, pixels.
 fn window(pair: &Matrix2<f64>) -> usize {
     let longest = three(pair).map(|q| TAU / q.norm());
     (PERIODS * longest.into_iter().fold(0.0, f64::max)).ceil() as usize

@@ -20,9 +20,9 @@ use crate::spectrum::method::Method;
 use crate::spectrum::prepare::levelled;
 use crate::spectrum::shells::FIRST_SHELL;
 
-/// Harmonics with so many times the amplitude of the first shell make a lattice whose first shell has to be shown. Chosen by eye.
-const OUTSHINES: f64 = 2.0;
-/// So many harmonics that stand out say it instead. Chosen by eye.
+/// Amplitude of the higher orders over the first from which the first order has to be significant. Chosen by eye.
+const MIN_HIGHER_ORDER_RATIO: f64 = 2.0;
+/// Number of significant harmonics that replace it. Chosen by eye.
 const FEWEST_BESIDE: usize = 3;
 
 /// The lattice of an image whose background is off already.
@@ -43,12 +43,12 @@ pub(crate) fn measure_levelled(
         .unwrap_or_else(|| without_refuted_shell(found, image)))
 }
 
-/// Why what the fit says of its waves makes a lattice none.
+/// Why the amplitudes of the fit refuse a lattice.
 pub(crate) fn no_lattice(found: &MeasuredLattice) -> Option<LatticeError> {
-    is_hollow(found).then_some(LatticeError::NowhereTogether)
+    first_order_is_missing(found).then_some(LatticeError::NowhereTogether)
 }
 
-/// The harmonics that stand out and are none of its second shell, which has a third of its points, or of its third, which has a quarter.
+/// The significant harmonics outside its second shell, which has a third of its points, and its third, which has a quarter.
 fn harmonics_beside(fit: &LatticeFit, cells: i32) -> Vec<[i32; 2]> {
     let is_of = |[h, k]: [i32; 2]| match cells {
         3 => (h - k).rem_euclid(3) == 0,
@@ -62,13 +62,13 @@ fn harmonics_beside(fit: &LatticeFit, cells: i32) -> Vec<[i32; 2]> {
 
 /// Whether its first shell is nowhere to be seen beside stronger harmonics, of which all that stand out are those of another lattice, but for one or
 /// two that may be chance: slow ground makes a coarser lattice of every lattice.
-fn is_hollow(found: &MeasuredLattice) -> bool {
+fn first_order_is_missing(found: &MeasuredLattice) -> bool {
     let Some(fit) = &found.fit else { return false };
     let (first, higher) = fit.harmonics.split_at(FIRST_SHELL.len());
     let largest = |some: &[FittedHarmonic]| some.iter().map(|h| h.amplitude).fold(0.0, f64::max);
     let mut ratios: Vec<f64> = first.iter().map(|h| h.signal_to_noise.powi(2)).collect();
     ratios.sort_by(|a, b| b.total_cmp(a));
-    if largest(higher) < OUTSHINES * largest(first) || ratios[1] > THIRD {
+    if largest(higher) < MIN_HIGHER_ORDER_RATIO * largest(first) || ratios[1] > THIRD {
         return false;
     }
     [3, 4]

@@ -1,4 +1,4 @@
-//! What held-out prediction says of a lattice that was found.
+//! Acceptance of a lattice by the prediction of held-out blocks.
 
 use heterostrain::lattice::distortion;
 use nalgebra::Matrix2;
@@ -22,16 +22,16 @@ use crate::spectrum::select::{MOST_DISTORTION, candidates_beside};
 use crate::spectrum::shells::shells;
 use crate::spectrum::transform::Spectrum;
 
-/// A lattice without a first order that stands out is taken where the weakest family of its waves predicts by so many standard errors. The best of
+/// A lattice without a first order that stands out is accepted where the weakest family of its waves predicts by this many standard errors. The best of
 /// 57 candidates in rough ground had 3.4.
 const BEYOND_DOUBT: f64 = 5.0;
-/// With less a lattice is none. Right answers had 2.3 and more (60 sets of one to four troubles; that one covers half the frame and fades), lone steps 0 at
+/// Smallest significance of the prediction, standard errors. Right answers had 2.3 and more (60 sets of one to four troubles; that one covers half the frame and fades), lone steps 0 at
 /// most.
 const LEAST: f64 = 1.5;
-/// A lattice whose waves change by more than this share of themselves from corner to corner is none: gradients and waves of twist and strain make up
+/// Largest relative change of the waves from corner to corner: gradients and waves of twist and strain make up
 /// to a tenth, creep in a frame of four periods of atoms a half, and holes that pass for a coarse lattice 0.7 to 1.4.
 const MOST_CHANGE: f64 = 0.6;
-/// A lattice of fewer periods across the frame is none: what repeats shows more than once. Of simulated discs with sharp edges 0.8 to 1.0 fit across the
+/// Fewest periods across the frame: a few protrusions can mimic a lattice. Of simulated discs with sharp edges 0.8 to 1.0 fit across the
 /// frame, of the smallest recorded images three.
 const FEWEST_PERIODS: f64 = 1.5;
 /// As in `scan::shells`: below this probability of chance an image may hide a first order.
@@ -63,7 +63,7 @@ pub(crate) fn without_refuted_shell(mut found: MeasuredLattice, image: &Image) -
     found
 }
 
-/// Whether what is near the points of a hidden first order is none of its harmonics.
+/// Whether the waves near the points of a suppressed first order are not its harmonics.
 fn is_refuted(found: &MeasuredLattice, image: &Image) -> Option<bool> {
     let part = found.patch.as_ref().map(|patch| patch.of(image));
     let coarse = Supercell::Root3.coarse(&found.reciprocal)?;
@@ -160,8 +160,8 @@ pub(crate) fn with_evidence(
 ///
 /// # Errors
 /// [`LatticeError::OneOfMany`]: other waves of the image could be one as well. [`LatticeError::NotPredicted`]: next to nothing.
-/// [`LatticeError::Distorted`]: its cell is none that a proposal may have. [`LatticeError::TooFewPeriods`]: it does not repeat.
-/// [`LatticeError::NowhereTogether`]: it changes as much as what is none.
+/// [`LatticeError::Distorted`]: its cell is too far from a hexagon. [`LatticeError::TooFewPeriods`]: it does not repeat.
+/// [`LatticeError::NowhereTogether`]: it varies too much.
 fn accepted(
     mut found: MeasuredLattice,
     geometry: &Geometry,

@@ -29,7 +29,7 @@ use crate::spectrum::transform::Spectrum;
 use crate::spectrum::verdict::{Verdict, refine, verdict};
 use crate::spectrum::{known, rescue, select};
 
-/// A lattice whose waves bend so much that a transform of the whole patch does not show them has at least so many unit
+/// A lattice whose waves bend so much that a transform of the whole patch does not show them has at least this many unit
 /// cells: it is seen by what windows show. Chosen by eye.
 pub(crate) const FEWEST_CELLS: f64 = 12.0;
 
@@ -205,7 +205,7 @@ impl Start {
     }
 
     /// The same if the lattice is everywhere in the frame, as far as noise lets that be seen; otherwise its pair and why
-    /// it is none of the whole frame.
+    /// it is not a lattice of the whole frame.
     pub(crate) fn on_the_whole_frame(
         self,
         image: &Image,
@@ -252,7 +252,7 @@ impl Start {
         if grain.is_some() {
             return grain;
         }
-        // A cell with many harmonics is none of three waves: on the whole frame the fit to the pixels judges.
+        // A cell with many harmonics is not judged by three waves: on the whole frame the fit to the pixels decides.
         let told = mean.as_ref().is_some_and(|mean| !mean.is_poor());
         if !told && !everywhere {
             return None;

@@ -179,7 +179,7 @@ impl Scatter {
         })
     }
 
-    /// On the variances of the average of so many maps.
+    /// On the variances of the average of a number of maps.
     fn factor(&self, maps: usize) -> f64 {
         self.enlargement
             .max(1.0 + (maps as f64 - 1.0) * self.correlation)

@@ -9,7 +9,7 @@ use crate::window::mask::Mask;
 pub(crate) use crate::window::setting::{LOST, NEAR, SHARE, Setting, fours, winds};
 use crate::window::widths::of_difference;
 
-/// A wave winds only where it usually stands out by so many noise units. Chosen by eye; see docs/constants.md.
+/// Typical signal over noise from which a phase singularity counts. Chosen by eye; see docs/constants.md.
 const CLEAR: f64 = 6.0;
 
 /// The change from one lattice to that under a window wider by √2.

@@ -25,7 +25,7 @@ use crate::window::widths::NARROWEST;
 const LIKELY: &[[i32; 2]] = shells(4);
 /// Likely harmonics looked at together, for speed; and where blocks are single pixels, for the memory's sake.
 const AT_ONCE: [usize; 2] = [6, 1];
-/// Nodes so many windows from the edges say how well the harmonics agree: nearer ones hold what edges leak.
+/// Distance from the edges (windows) of nodes that test whether the harmonics agree: nearer ones contain leakage.
 const CLOSURE: f64 = 1.0;
 
 /// Demodulates an image whose background is gone. `place` says which part of a larger image it is.

@@ -2,7 +2,7 @@
 //!
 //! A drift that changes by A (nm/s²) while a frame is recorded bends the phases along the slow axis: the local
 //! wave vectors change by `−u (A·G)(u·r)`, u the time gradient (s/nm). What is the same in maps of upward
-//! and downward frames may be strain of the sample (or a change of drift common to both); what differs is none:
+//! and downward frames may be strain of the sample (or a change of drift common to both); what differs is drift:
 //! the slope of the difference along the slow axis gives `A_up − A_down`.
 
 use heterostrain::Estimate;

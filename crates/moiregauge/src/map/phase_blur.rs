@@ -14,7 +14,7 @@ const AVERAGED: f64 = 2.0;
 /// What that does to the variance of white noise in a phase: `∫ k [N − G(N² − N)]² dk / ∫ k N² dk` with `N = e^{−k²w²/2}` and
 /// `G = e^{−2k²w²}`.
 pub(crate) const VARIANCE: f64 = 1.098;
-/// The Gaussian ends at so many of its widths.
+/// Reach of the Gaussian, widths.
 const ENDS: f64 = 3.0;
 
 /// What is to be taken off the phases of the first three harmonics at each node, rad. `steps`: windows from node to node along

@@ -103,7 +103,7 @@ impl LatticeMap {
     /// `reference` (wave vectors, rad/nm).
     ///
     /// # Errors
-    /// What [`heterostrain::strain`] says of the reference.
+    /// The reference as [`heterostrain::strain`] defines it.
     pub fn twist_strain<'a>(
         &self,
         reference: &Matrix2<f64>,

@@ -12,9 +12,9 @@ use crate::frame::resample::at;
 use crate::map::followed::Followed;
 use crate::numbers::interrupt;
 
-/// An image has at most so many pixels, those of 2048 × 2048: finer ones are made coarser.
+/// Largest number of pixels, that of 2048 × 2048: finer images are made coarser.
 const MOST_PIXELS: f64 = 4_194_304.0;
-/// Iterations end where a place moves by less than this share of a pixel, and give up after so many: fields that change by
+/// Iterations end where a place moves by less than this share of a pixel, and give up after this number: fields that change by
 /// more than three quarters of a way over that way are no lattice any more.
 const SETTLED: f64 = 1e-3;
 const ROUNDS: usize = 40;

@@ -1,4 +1,4 @@
-//! What has to be said of the readings of a mean lattice.
+//! Caveats of the solutions of a mean lattice.
 
 use heterostrain::Estimate;
 use heterostrain::lattice::Lattice;
@@ -17,7 +17,7 @@ use crate::settings::knobs::Settings;
 /// A mean strain this large contradicts the orientation: layers on each other stay far below one per cent.
 const CONTRADICTION: f64 = 0.01;
 
-/// What has to be said of the readings of a mean lattice.
+/// Caveats of the solutions of a mean lattice.
 pub fn caveats(
     place: &str,
     lattice: &Lattice,
@@ -178,7 +178,7 @@ fn about_sense(tensor: &TensorReading, add: &mut impl FnMut(Doubt)) {
     .into());
 }
 
-/// What has to be said of the names of a lattice alone.
+/// Caveats of the indexing of a lattice.
 pub(crate) fn name_caveats(
     place: &str,
     lattice: &Lattice,

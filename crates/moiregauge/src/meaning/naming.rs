@@ -22,7 +22,7 @@ use crate::settings::knobs::Settings;
 /// A reading with no more strain than this, or than twice that of the one reported, is plausible. Chosen by eye; see
 /// docs/constants.md.
 const PLAUSIBLE_STRAIN: f64 = 0.007;
-/// A wave with less than this share of the amplitude of others is none of the first shell. Chosen by eye; see
+/// Amplitude over that of the others below which a wave is not of the first order. Chosen by eye; see
 /// docs/constants.md.
 const WEAK: f64 = 0.5;
 /// The strongest wave of a first shell over the weakest, at most. Chosen by eye; see docs/constants.md.
@@ -234,7 +234,7 @@ fn first_shell(
     Some([a?, b?, c?])
 }
 
-/// Whether the image shows a first shell in `strong` and has one of the waves of `other` so weak that it is none.
+/// Whether the image shows a first shell in `strong` and has one of the waves of `other` too weak for the first order.
 fn beats(strong: &[Wave; 3], other: &[Wave; 3]) -> bool {
     let weakest = strong.iter().map(|w| w.low).fold(f64::INFINITY, f64::min);
     let strongest = strong.iter().map(|w| w.high).fold(0.0, f64::max);

@@ -14,7 +14,7 @@ const SIGMAS: f64 = 3.0;
 /// A wave that the fit left out is weaker than this many times the noise of an amplitude: it has to earn its place by
 /// Δχ² > 2 ln N, N up to 10⁷, and the noise around it may be half as much again.
 const LEFT_OUT: f64 = 6.0;
-/// A wave farther than this from a whole number of the lattice's is none of it: below half. Chosen by eye.
+/// Distance from a lattice point (in units of the pair) beyond which a wave is not a harmonic: below half. Chosen by eye.
 const WHOLE: f64 = 0.3;
 
 /// The amplitudes of the waves of a lattice in all images, relative to the power of each.

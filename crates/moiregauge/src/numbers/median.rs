@@ -1,6 +1,6 @@
 //! The median.
 
-/// Of so many values the middle ones alone are put into order.
+/// Number of values from which only the middle ones are sorted.
 const MANY: usize = 1 << 16;
 /// Values that tell where the middle ones are.
 const SAMPLED: usize = 1 << 12;

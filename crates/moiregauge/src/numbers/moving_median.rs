@@ -15,7 +15,7 @@ pub(crate) struct MovingMedian {
 }
 
 impl MovingMedian {
-    /// Of an empty window; there are so many values in all.
+    /// Of an empty window, for a number of values in all.
     pub(crate) fn new(values: usize) -> Self {
         let blocks = values.div_ceil(64 * WORDS);
         Self {

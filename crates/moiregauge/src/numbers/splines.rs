@@ -39,7 +39,7 @@ pub(crate) fn cubic(t: f64) -> [[f64; 4]; 2] {
 }
 
 impl Splines {
-    /// So many cells along each axis between `low` and `high`.
+    /// A number of cells along each axis between `low` and `high`.
     pub(crate) fn new([low, high]: [Vector2<f64>; 2], cells: [usize; 2]) -> Self {
         Self {
             low,

@@ -11,7 +11,7 @@ use crate::map::quantities::TwistStrainMap;
 use crate::region::correlation::rho;
 use crate::window::mask::Mask;
 
-/// Curvatures are differences to neighbours so many windows away, or the next node. Chosen by eye.
+/// Distance of the neighbours whose differences give curvatures, windows, or the next node. Chosen by eye.
 const OVER: f64 = 0.5;
 /// κ² that is believed at most: what a window leaves a twentieth of is measured on noise.
 const MOST: f64 = 3.0;

@@ -306,7 +306,7 @@ fn mapped(scene: &FieldScene) -> (TwistStrainMap, f64) {
     (TwistStrainMap::new(&map, &found), exact_twist(&scene.pair))
 }
 
-/// Over seeds, the means of boxes of several sizes scatter by what σ says of noise, also where the harmonics are unequal,
+/// Over seeds, the means of boxes of several sizes scatter by σ, also where the harmonics are unequal,
 /// and nothing but noise is taken for spread.
 #[test]
 fn errors_of_means_are_those_of_the_noise() {

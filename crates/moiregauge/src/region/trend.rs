@@ -16,7 +16,7 @@ use crate::window::mask::Mask;
 const FEWEST: usize = 12;
 /// ... and how many are used at most: pairs of them are summed, 10⁸.
 const MOST: usize = 10_000;
-/// They have to reach so many windows along both axes (root mean square distance from their middle, times √12): less
+/// Smallest extent of the nodes along both axes, windows (root mean square distance from their middle, times √12): less
 /// is one number.
 const REACH: f64 = 1.0;
 

@@ -1,7 +1,7 @@
 //! How much of a map has a wanted twist.
 //!
 //! Noise moves nodes in and out of `θ₀ ± δ`, so that counting them gives a blurred answer. What is known of a
-//! node is its value and its error; what the map says of all nodes is their mean μ and their spread without
+//! node is its value and its error; the map gives for all nodes their mean μ and their spread without
 //! noise, √v. Together (normal distributions): the true twist of a node measured as x ± σ has the mean
 //! `μ + (x − μ) v/(v + σ²)` and the variance `vσ²/(v + σ²)`. The area is the mean probability of the nodes.
 //! The window draws twists towards their mean, too; how far that may move the answer is said beside it.

@@ -11,7 +11,7 @@ use crate::settings::knobs::Settings;
 
 /// Bins along each vector of the mean cell, at most.
 const BINS: usize = 64;
-/// So many vectors of the lattice the picture of the mean cell reaches across.
+/// Extent of the picture of the mean cell, lattice vectors.
 const CELLS: f64 = 2.0;
 /// Pixels along the side of that picture.
 const SIDE: usize = 128;

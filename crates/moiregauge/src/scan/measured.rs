@@ -164,7 +164,7 @@ pub enum MeasureError {
         /// The channels that are there.
         present: String,
     },
-    /// There are not so many images of the channel.
+    /// The channel has fewer images.
     #[error("expected image {wanted} of {channel:?}, found {found} in the file")]
     NoSuchImage {
         /// The channel.

@@ -19,7 +19,7 @@ use crate::lattice::fit::fitted::LatticeFit;
 
 /// A harmonic of the other image is the same one if it is nearer than this share of it: below half, where the next is as near.
 const SAME: f64 = 0.2;
-/// Neighbouring frequencies are correlated by their weights, the distance from the middle: Σ R² e^{iπX} is 0.3 of Σ R², and so many count as one.
+/// Neighbouring frequencies are correlated by their weights, the distance from the middle: Σ R² e^{iπX} is 0.3 of Σ R²; this number counts as one.
 const CORRELATED: f64 = 1.5;
 /// Coherence that chance exceeds in one case of two hundred counts, in units of its scatter.
 const SIGNIFICANT: f64 = 2.6;

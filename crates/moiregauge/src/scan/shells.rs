@@ -8,7 +8,7 @@ use crate::lattice::measure::hidden;
 use crate::lattice::measured::MeasuredLattice;
 use crate::scan::measured::{MeasureError, MeasuredLine};
 
-/// A harmonic shell has so many cells for each of the lattice: 3 (the second shell), 4 (the third), 2 (every other row).
+/// Cells of a harmonic shell for each of the lattice: 3 (the second shell), 4 (the third), 2 (every other row).
 const CELLS: std::ops::RangeInclusive<i32> = 2..=4;
 /// Lattices of trace and retrace agree to this share of a vector: creep and lag are smaller. Chosen by eye.
 const AGREE: f64 = 0.1;

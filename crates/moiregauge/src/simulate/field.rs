@@ -48,7 +48,7 @@ pub struct Ripple {
 /// What is no smooth change. Directions are angles from x, rad.
 #[derive(Clone, Copy, Debug)]
 pub enum Feature {
-    /// ψ₁ and ψ₂ wind so many times around a point.
+    /// Windings of ψ₁ and ψ₂ around a point.
     Dislocation {
         /// Where, pixels.
         at: Vector2<f64>,

@@ -40,7 +40,7 @@ pub enum LatticeError {
     /// Other waves are as strong.
     #[error(
         "the lattice that was found is one of many: {rivals} other waves of about its period are as strong as its weakest \
-         one, and chance makes a lattice of so many. Rough ground, steps and noise have such waves"
+         one, and three of them can make a lattice by chance. Rough ground, steps and noise have such waves"
     )]
     OneOfMany {
         /// How many they are.

@@ -89,7 +89,7 @@ pub(crate) struct Grid {
     pub(crate) padded: [usize; 2],
 }
 
-/// Real-to-complex transform of the lines of an image, zero-padded, on all threads, and what `line` says of each of them.
+/// Real-to-complex transform of the lines of an image, zero-padded, on all threads, and what `line` returns for each of them.
 ///
 /// `line` fills in one line; the padding of the buffer it is given is zero already. `room` makes what it needs, once for many
 /// lines.

@@ -402,7 +402,7 @@ mod tests {
     use crate::spectrum::shells::shells;
 
     /// An image with holes: one pixel, part of a line, whole lines, a corner.
-    fn torn(rows: usize, columns: usize) -> Image {
+    fn with_holes(rows: usize, columns: usize) -> Image {
         let mut values: Vec<f64> = (0..rows * columns)
             .map(|i| (0.7 * i as f64).sin())
             .collect();
@@ -424,7 +424,7 @@ mod tests {
     #[test]
     fn holes_are_taken_off_the_window_exactly() {
         let (rows, columns) = (52, 47);
-        let image = torn(rows, columns);
+        let image = with_holes(rows, columns);
         let windowed = Windowed::new(&image);
         let (wx, wy) = (hann(columns), hann(rows));
         for q in [[0.0, 0.0], [0.41, -0.23], [-2.3, 0.02], [5.9, 3.3]] {
@@ -448,7 +448,7 @@ mod tests {
     /// Every entry of the normal matrix is the transform at the difference of its two waves.
     #[test]
     fn equal_differences_share_their_sum() {
-        let windowed = Windowed::new(&torn(52, 47));
+        let windowed = Windowed::new(&with_holes(52, 47));
         let pair = Matrix2::new(0.5, 0.17, 0.06, 0.46);
         let indices: Vec<(f64, f64)> = std::iter::once((0.0, 0.0))
             .chain(shells(3).iter().flat_map(|&[h, k]| {

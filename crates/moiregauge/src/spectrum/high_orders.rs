@@ -16,7 +16,7 @@ use crate::spectrum::shells::{FIRST_SHELL, shells};
 
 /// Significance that none of a few thousand frequencies reaches by chance: e⁻²⁰ each, 10⁻⁵ for all.
 const STANDS_OUT: f64 = 20.0;
-/// So many harmonics that stand out make a lattice of which the first shell may be missing. Chosen by eye; see
+/// Significant harmonics that make a lattice whose first order may be suppressed. Chosen by eye; see
 /// docs/constants.md.
 const FEWEST: usize = 5;
 /// Share of the power of a lattice that is left when outliers are cut off, at least: tip events vanish with them.

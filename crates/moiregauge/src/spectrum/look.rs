@@ -21,7 +21,7 @@ use crate::spectrum::transform::{Spectrum, hann};
 use crate::spectrum::verdict::{Verdict, refine, signal_to_noise, verdict};
 use crate::spectrum::{high_orders, select};
 
-/// Images of fewer pixels than twice this many are looked at as they are; others in about so many bins, whose transform
+/// Images of fewer pixels than twice this many are searched as they are; others in about this many bins, whose transform
 /// takes a tenth of a second.
 const BINS: usize = 1 << 20;
 /// Bins along the shorter side, at least: enough for a dozen periods. Chosen by eye.
@@ -195,7 +195,7 @@ mod tests {
 
     const SIDE: usize = 1536;
 
-    /// Three waves of a lattice of so many pixels a period, in noise.
+    /// Three waves of a lattice with a period in pixels, in noise.
     fn image(period: f64) -> Image {
         let size = 2.0 * std::f64::consts::TAU / (3f64.sqrt() * period);
         let waves = [10.0, 70.0, 130.0_f64].map(|degrees| {

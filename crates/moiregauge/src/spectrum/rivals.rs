@@ -10,9 +10,9 @@ use crate::numbers::three::three;
 use crate::spectrum::shells::{FIRST_SHELL, shells};
 use crate::spectrum::transform::Spectrum;
 
-/// Three waves make a lattice: with so many rivals it may be another one.
+/// Number of rivals that refuse a lattice: three waves can make another one.
 pub(crate) const ENOUGH: usize = 3;
-/// Waves of up to so many times the period, or a part of it, are like those of a lattice. Of some 400 images of 30 kinds that were right none had a rival at
+/// Largest ratio of the periods of a rival and a lattice. Of some 400 images of 30 kinds that were right none had a rival at
 /// ratios of 1.3 to 1.8 but for a second moiré and stripes (one or two), and 22 lattices that chance had made of rough ground had 3 to 31 at 1.3.
 const LIKE: f64 = 1.5;
 /// Peaks this close to a point of the lattice, as a share of its shortest wave vector, are its own: bends and edges widen them.
@@ -79,7 +79,7 @@ impl<'a> Rivals<'a> {
         all.min().unwrap_or(0)
     }
 
-    /// The peaks that are none of a lattice's first order (reciprocal pair, rad per pixel).
+    /// The peaks outside a lattice's first order (reciprocal pair, rad per pixel).
     pub(crate) fn beside(mut self, pair: &Matrix2<f64>) -> Self {
         let (waves, frame) = (three(pair), self.frame());
         let is_own = |q: Vector2<f64>| q.component_mul(&frame).norm() < LOBE;

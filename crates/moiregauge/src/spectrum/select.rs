@@ -19,7 +19,7 @@ use crate::spectrum::fourier::{Kept, wide};
 use crate::spectrum::rivals::{ENOUGH, Rivals};
 use crate::spectrum::transform::Spectrum;
 
-/// A lattice is well explained by so many peaks, and by so many times those that chance puts on it. Chosen by eye.
+/// Peaks, and multiple of the chance matches, that explain a lattice well. Chosen by eye.
 const EXPLAINED: f64 = 6.0;
 /// Peaks over noise (power) that are looked at: e⁻⁴, so that some of the noise are among them.
 const PEAK: f64 = 4.0;

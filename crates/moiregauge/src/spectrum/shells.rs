@@ -22,7 +22,7 @@ pub(crate) const SHELLS: [[i32; 2]; 18] = [
     [0, 3],
     [-3, 3],
 ];
-/// How many of [`SHELLS`] belong to the first so many shells.
+/// How many of [`SHELLS`] belong to the first 0 to 5 shells.
 const UP_TO: [usize; 6] = [0, 3, 6, 9, 15, 18];
 
 /// The harmonics of the first `count` shells.

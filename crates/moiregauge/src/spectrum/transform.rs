@@ -200,7 +200,7 @@ impl Spectrum {
 
 impl<T: Kept> Spectrum<T> {
     /// The transform of values that `line` writes line by line, none of them missing, under the window and without padding,
-    /// and what it says of each line. `room` makes what it needs, once for many lines.
+    /// and what it returns for each line. `room` makes what it needs, once for many lines.
     pub(crate) fn of_lines<S, R: Send>(
         image_size: [usize; 2],
         room: impl Fn() -> S + Sync,

@@ -6,7 +6,7 @@
 //! around it, at all wave vectors of its length (terrain is the same in all directions), and at all wave vectors with
 //! its component along the lines (noise in time is a function of that alone). The least of the three counts. For a
 //! mean known from n independent bins the chance of such a maximum among N is `N (1 + P/(n⟨P⟩))^{−n}`.
-//! A wave along the slow axis is none: it cannot be told from offsets of lines. Waves of pick-up run the other way in
+//! A wave along the slow axis does not count: it looks like offsets of lines. Waves of pick-up run the other way in
 //! the retrace and are left out where there is one.
 
 use std::f64::consts::{LN_2, TAU};
@@ -39,7 +39,7 @@ const OVERTONES: i32 = 4;
 const OFF: f64 = 1.0;
 /// ... or by this share: stripes bend. Chosen by eye.
 const OFF_SHARE: f64 = 0.12;
-/// Trace and retrace may differ by so many cycles per frame, by drift and hysteresis. Chosen by eye.
+/// Largest difference of trace and retrace by drift and hysteresis, cycles per frame. Chosen by eye.
 const APART: f64 = 1.5;
 /// Two patterns whose wave vectors differ by less than this share are one that changes; 14° of direction.
 const SAME: f64 = 0.25;

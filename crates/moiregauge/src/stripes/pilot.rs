@@ -14,16 +14,16 @@ use crate::window::widths::OF_DIFFERENCE;
 
 /// The pilot's window in wavelengths, which are 0.87 of the period of a lattice: about as wide as the pilot of that.
 const PILOT: f64 = 0.75;
-/// The carrier is for frames of so many periods, its cells as long. Chosen by eye.
+/// Fewest periods of a frame with a carrier, and the length of its cells, periods. Chosen by eye.
 const CARRIED: f64 = 12.0;
 /// Window of the probes for noise in wavelengths; nodes are half of it apart, so that more of them have to be left than
 /// for lattices, where they are a whole one apart.
 const PROBE: f64 = 1.3;
-/// ... and so many have to be left: fewer tell no level. Chosen by eye.
+/// ... and the fewest that give a level. Chosen by eye.
 const FEWEST: usize = 12;
 
 impl Wave {
-    /// Envelopes under the pilot's window at no more than so many nodes along each axis, and the nodes where the
+    /// Envelopes under the pilot's window at a limited number of nodes along each axis, and the nodes where the
     /// pattern is.
     fn pilot(&self, most: usize) -> (Smoothed, Vec<usize>) {
         let width = PILOT * self.wavelength();
@@ -154,7 +154,7 @@ impl Wave {
                 })
             };
             let slopes: Vec<Slope> = present.iter().filter_map(slope).collect();
-            // A pattern that is only here and there is not followed into what is none.
+            // A pattern that is present only in places is not followed beyond them.
             if slopes.len() < 16 || slopes.len() * 2 < smoothed.nodes.len() {
                 return;
             }

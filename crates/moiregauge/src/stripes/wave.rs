@@ -19,7 +19,7 @@ use crate::window::types::Reference;
 const ORDERS: i32 = 4;
 /// Blocks per wavelength, more than of lattices: three overtones do not fold onto each other.
 pub(crate) const BLOCKS: f64 = 8.0;
-/// A change of amplitude of so many noise units is no noise. Chosen by eye; see docs/constants.md.
+/// Smallest significant change of amplitude, noise units. Chosen by eye; see docs/constants.md.
 const ENDS: f64 = 4.0;
 
 /// A pattern in an image, mixed down.
@@ -136,7 +136,7 @@ impl Wave {
 
     /// Adds what harmonics that end nearby, those of other patterns and its own, leave in each slope. Of a wave that ends
     /// at a line across the window a Gaussian lets through `|∇c|` times what is left of the beat along that line, with a
-    /// phase that is not known. Changes of amplitude that noise makes are none.
+    /// phase that is not known. Changes of amplitude within the noise do not count.
     fn beyond(
         &self,
         smoothed: &Smoothed,

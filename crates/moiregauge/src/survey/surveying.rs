@@ -39,7 +39,7 @@ use crate::window::types::{FULL_WIDTH, Reference, Resolution, ResolutionError, U
 const MIDDLE: usize = 2048;
 /// Pixels of a band, halo not counted, for the memory's sake.
 const BAND: usize = 1 << 24;
-/// Smaller images are cut into so many bands, so that work can be taken up again.
+/// Number of bands of smaller images, so that work can be resumed.
 const FEWEST_BANDS: usize = 4;
 
 /// Pixels of an image in which domains are looked for, for the memory's sake.

@@ -60,7 +60,7 @@ pub(crate) struct Layer {
 }
 
 impl Layer {
-    /// None yet, of so many blocks.
+    /// Room for a number of blocks, empty.
     fn with_room(blocks: usize) -> Self {
         let room = || Vec::with_capacity(blocks);
         Self {
@@ -271,7 +271,7 @@ pub(crate) fn block_of(reference: &Reference) -> [usize; 2] {
     block_within(reference.period() / BLOCKS, reference.pitch)
 }
 
-/// Pixels of a block of at most so many nm.
+/// Pixels of a block up to a size in nm.
 pub(crate) fn block_within(nm: f64, pitch: [f64; 2]) -> [usize; 2] {
     // Periods of whole pixels come out a hair too short.
     pitch.map(|p| ((nm / p + 1e-9) as usize).max(1))
@@ -290,7 +290,7 @@ pub(crate) fn step_of(resolution: &Resolution, reference: &Reference, window_nm:
     resolution.step_nm.unwrap_or(usual)
 }
 
-/// Nodes are so many pixels apart at least: nearer ones tell the same.
+/// Smallest distance of nodes, pixels: nearer ones add nothing.
 const APART: f64 = 2.0;
 
 /// Blocks per period: finer ones cost memory by the square, coarser ones fold the first shells; see `ALIASED` of the

@@ -19,7 +19,7 @@ use crate::window::blocks::Blocks;
 /// Weight of the penalty as a share of the mean diagonal element: any small number, which holds what was not measured
 /// and bends nothing else.
 const STIFFNESS: f64 = 1e-4;
-/// At most so many cells along each axis: the carrier need only be near.
+/// Largest number of cells along each axis: the carrier need only be near.
 pub(crate) const MOST_CELLS: usize = 16;
 
 /// Two phases as cubic B-splines on a grid of cells.
@@ -39,7 +39,7 @@ pub(crate) struct Slope {
 }
 
 impl Carrier {
-    /// Fits slopes measured in a `frame` (its lowest and highest corner, pixels) with so many cells along each axis.
+    /// Fits slopes measured in a `frame` (its lowest and highest corner, pixels) with a number of cells along each axis.
     pub(crate) fn fit(
         slopes: &[Slope],
         frame: [Vector2<f64>; 2],

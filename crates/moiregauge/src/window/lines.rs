@@ -41,7 +41,7 @@ struct Ridge {
 const ORDERS: i32 = 3;
 /// A harmonic hardly turns along x where its kx is below this share of itself, ...
 const ON_RIDGE: f64 = 0.15;
-/// ... and so many cycles per line: the nearer wave of `BESIDE`.
+/// ... and cycles per line: the nearer wave of `BESIDE`.
 const CYCLES: f64 = 3.0;
 /// Around the ky of such a harmonic, half of what is found is left at this distance, in lengths of q₁. Chosen by eye.
 const KEPT: f64 = 0.35;
@@ -274,7 +274,7 @@ mod tests {
     use crate::window::mask::Mask;
     use crate::window::types::Resolution;
 
-    /// A perfect lattice of 25 pixels, turned by so many degrees; at 30 one of its waves stands on the ridge, at 25 and 28
+    /// A perfect lattice of 25 pixels, rotated by degrees; at 30 one of its waves stands on the ridge, at 25 and 28
     /// it is near, at 17 one of the second shell, at 0 one of the second shell stands.
     fn scene(degrees: f64, seed: u64) -> FieldScene {
         let mut scene = FieldScene::hexagonal([512, 512], 25.0, degrees.to_radians());

@@ -78,7 +78,7 @@ impl Mixed {
         nodes
     }
 
-    /// Nodes `distance_nm` apart, or so far that at most so many along each axis fit into the frame.
+    /// Nodes `distance_nm` apart, or farther, so that their number along each axis is limited.
     pub(crate) fn sparse(&self, distance_nm: f64, most: usize) -> Nodes {
         let stride = stride_of(&self.reference, self.blocks.block, distance_nm);
         self.nodes([0, 1].map(|i| stride[i].max(self.blocks.size[i] / most)))
@@ -138,7 +138,7 @@ impl Mixed {
     }
 
     /// The widest window (nm) under which the waves are straight. `see` gives what is at each node under a window of
-    /// so many nm; `changes` the squared changes from one window to the next over the variances that noise gives them.
+    /// nm; `changes` the squared changes from one window to the next over the variances that noise gives them.
     pub(crate) fn choose_window<T>(
         &self,
         see: impl Fn(f64, Nodes) -> Vec<Option<T>>,

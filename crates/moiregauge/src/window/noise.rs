@@ -23,15 +23,15 @@ use crate::window::types::Reference;
 const TRIED: [f64; 9] = [0.35, 0.4, 0.45, 0.5, 0.55, 0.6, 0.65, 0.7, 0.75];
 /// Window of the probes in periods, lest harmonics reach them.
 const PROBE_WINDOW: f64 = 1.5;
-/// The local ratio is averaged over so many windows: nine of them in area.
+/// Width of the average of the local ratio, windows: nine of them in area.
 const AVERAGED: f64 = 3.0;
 /// Windows of which more is missing are not looked at: harmonics that are cut off reach the probes, ...
 const WHOLE: f64 = 0.85;
-/// ... nor those nearer to the edges than so many widths, for the same reason.
+/// ... nor those nearer to the edges than this, widths, for the same reason.
 const AWAY: f64 = 2.5;
 /// Nodes that have to be left: fewer tell no level. Chosen by eye.
 const FEWEST: usize = 6;
-/// Powers count up to so many times their level: e⁻⁴ of chance is cut, and allowed for; defects are cut, too.
+/// Multiple of the level at which powers are clipped: e⁻⁴ of chance is cut, and allowed for; defects are cut, too.
 const CUT: f64 = 4.0;
 /// Harmonics looked beside at a time, for the memory's sake.
 const AT_ONCE: usize = 2;

@@ -43,7 +43,7 @@ impl Setting<'_> {
         self.smoothed.support[node].is_none_or(|s| s.share < SHARE)
     }
 
-    /// Nodes no farther than so many window widths from one for which `is_core` holds.
+    /// Nodes within a number of window widths of one for which `is_core` holds.
     pub(crate) fn near(&self, widths: f64, is_core: impl Fn(usize) -> bool) -> Vec<bool> {
         let [columns, rows] = self.smoothed.nodes.size;
         let step = |axis: usize, next: usize| {

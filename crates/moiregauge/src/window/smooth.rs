@@ -19,9 +19,9 @@ use rustfft::num_complex::{Complex32, Complex64};
 use crate::numbers::interrupt;
 use crate::window::blocks::{Blocks, Layer};
 
-/// Windows end so many widths from their middle: 4·10⁻⁵ of the height.
+/// Distance from the middle at which windows end, widths: 4·10⁻⁵ of the height.
 const REACH: f64 = 4.5;
-/// With less than this share of its window a node is none; masks ask for far more. Chosen by eye; see
+/// Fraction of the window below which a node is not computed; masks ask for far more. Chosen by eye; see
 /// docs/constants.md.
 const LEAST_SHARE: f64 = 0.05;
 /// Harmonics below this many noise units (amplitude) are left out of a node: their phases are off by some third of a
@@ -44,7 +44,7 @@ pub(crate) struct Nodes {
 }
 
 impl Nodes {
-    /// As many nodes as fit into so many blocks, in their middle.
+    /// As many nodes as fit into a number of blocks, in their middle.
     pub(crate) fn filling(blocks: [usize; 2], stride: [usize; 2]) -> Self {
         let along = |axis: usize| {
             let count = (blocks[axis].max(1) - 1) / stride[axis] + 1;

@@ -55,7 +55,7 @@ pub enum ResolutionError {
 pub(crate) const FULL_WIDTH: f64 = 2.35;
 
 impl Resolution {
-    /// Whether a map with this resolution can be made of an image with sides of so many nm, of which `widths` windows
+    /// Whether a map with this resolution can be made of an image with sides in nm, of which `widths` windows
     /// have to fit into the shorter.
     ///
     /// # Errors
@@ -79,7 +79,7 @@ impl Resolution {
         }
     }
 
-    /// The margin, in window widths, of a frame with sides of so many nm.
+    /// The margin, in window widths, of a frame with sides in nm.
     pub fn margin_of(&self, window_nm: f64, sides: [f64; 2]) -> f64 {
         let most = OF_SIDE * sides[0].min(sides[1]) / window_nm;
         self.margin.unwrap_or(MARGIN.min(most))

@@ -287,7 +287,7 @@ fn tried(set: &Simulation) -> Result<Calibrated, String> {
 }
 
 /// A drift that moves the sample by a tenth to a third of the frame is taken out, in whatever direction; where it is not,
-/// nothing is said of the scanner.
+/// there is no calibration.
 #[test]
 fn frames_that_drift_by_a_third_of_their_width() {
     for (speed, least) in [(0.5, 10), (1.0, 10), (1.5, 8)] {

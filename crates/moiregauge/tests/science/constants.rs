@@ -1,4 +1,4 @@
-//! The page of constants says of each the value that the sources have.
+//! The page of constants has the values of the sources.
 
 use std::path::{Path, PathBuf};
 

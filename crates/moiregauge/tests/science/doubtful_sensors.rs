@@ -1,4 +1,4 @@
-//! Position sensors that glitch, that lag through every turn, or that are not there: what is said of twist and strain stays
+//! Position sensors that glitch, that lag through every turn, or that are not there: twist and strain stay
 //! within its errors.
 use moiregauge::campaign::{Analysis, analyse};
 use moiregauge::caveat::Caveat;

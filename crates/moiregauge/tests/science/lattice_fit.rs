@@ -293,7 +293,7 @@ fn finds_the_right_lattice() {
     }
 }
 
-/// A second lattice shows as a wave that is none of the first one's; one lattice leaves only noise.
+/// A second lattice appears as a non-lattice peak of the first; one lattice leaves only noise.
 #[test]
 fn a_second_lattice_stands_out() {
     let mut scene = Scene::new([160, 160], 8.0, 0.2, Contrast::Spots, 9);

@@ -150,7 +150,7 @@ fn draws_from_a_singular_covariance() {
     assert!(exact.iter().all(|d| (d.twist - 0.019).abs() < 1e-12));
 }
 
-/// What physics says of the length of a noisy vector: mean 1.25σ at zero, 2.27σ at 2σ; 95 % below
+/// The length of a noisy vector: mean 1.25σ at zero, 2.27σ at 2σ; 95 % below
 /// 2.45σ, 99 % below 3.03σ at zero. 20,000 vectors: fractions scatter by 0.15 %, means by 0.007σ.
 #[test]
 fn small_strain_is_not_overstated() {

@@ -1,4 +1,4 @@
-//! One image of an array or a picture, and what its file says of it.
+//! One image of an array or a picture, with the entries of its file.
 
 use crate::error::ReadError;
 use crate::labels;
@@ -10,7 +10,7 @@ pub(super) struct Plane<'a> {
     pub(super) columns: usize,
     /// Where its samples are.
     pub(super) samples: Stored<'a>,
-    /// What the file says of it; only files written here do.
+    /// The entries of the file about it; only files written here have them.
     pub(super) carried: Vec<(String, String)>,
     /// Its size by what other programs write.
     pub(super) size_nm: Option<[f64; 2]>,

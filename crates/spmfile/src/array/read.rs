@@ -112,7 +112,7 @@ pub(super) fn info(name: String, options: &ArrayOptions, told: &Told) -> Channel
     }
 }
 
-/// The header of an image of so many rows and columns.
+/// The header of an image of a number of rows and columns.
 pub(super) fn header(
     info: ChannelInfo,
     [rows, columns]: [usize; 2],

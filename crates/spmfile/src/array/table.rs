@@ -5,9 +5,9 @@
 
 use super::axis::Axis;
 
-/// So many lines of labels may stand above the numbers.
+/// Largest number of lines of labels above the numbers.
 const MOST_LABELS: usize = 3;
-/// So many lines tell a table; what is wrong further down is said by its reader.
+/// Lines that identify a table; its reader reports errors further down.
 const FIRST: usize = 16;
 /// So few numbers may be evenly spaced by chance.
 const FEW: usize = 4;

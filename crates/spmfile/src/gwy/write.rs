@@ -43,7 +43,7 @@ pub(crate) fn write_between(
     Ok(bytes)
 }
 
-/// What the header says of a channel, and what was done.
+/// The header entries of a channel, and what was done.
 fn meta(out: &mut Vec<u8>, scan: &Scan, channel: &Channel, log: &[String]) {
     let mut lines = labels::describe(scan);
     lines.extend(labels::describe_channel(channel));

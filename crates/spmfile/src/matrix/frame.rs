@@ -180,7 +180,7 @@ impl Shape {
     }
 }
 
-/// Finds what the log says of the channel `name`.
+/// Finds the entries of the log for the channel `name`.
 pub(super) fn understand<'a>(
     state: &'a State,
     data: &Data<'_>,

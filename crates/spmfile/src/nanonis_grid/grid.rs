@@ -8,7 +8,7 @@ use crate::whole::MOST_CHANNELS;
 
 /// Width of a number.
 const WIDTH: usize = 4;
-/// Missing points become NaN as long as all images take at most so many times the bytes of the file, or this many.
+/// Missing points become NaN as long as all images take at most this multiple of the bytes of the file, or this many.
 const MOST_GAIN: usize = 8;
 const ALWAYS_ALLOWED: usize = 128 << 10;
 
@@ -39,7 +39,7 @@ pub(super) struct Grid<'a> {
 }
 
 impl<'a> Grid<'a> {
-    /// The shape of the grid, and how much of it was recorded in a file of so many bytes.
+    /// The shape of the grid, and how much of it was recorded in a file of a number of bytes.
     pub(super) fn of(
         header: &Header,
         data: &'a [u8],

@@ -7,9 +7,9 @@ use super::header::Header;
 use super::name_and_unit;
 use crate::words;
 
-/// At most so many points of a sweep become images; of longer ones every second, third and so on.
+/// Largest number of points of a sweep that become images; of longer ones every second, third and so on.
 const MOST_POINTS: usize = 512;
-/// At most so many images in all.
+/// Largest number of images in all.
 const MOST_IMAGES: usize = 2048;
 
 impl Header {
@@ -98,7 +98,7 @@ impl Header {
     }
 }
 
-/// So many values from start to end.
+/// Values from start to end.
 fn ramp(start: f64, end: f64, count: usize) -> impl Iterator<Item = f64> {
     let steps = count.saturating_sub(1).max(1) as f64;
     (0..count).map(move |n| start + (end - start) * (n as f64 / steps))

@@ -1,4 +1,4 @@
-//! What has to be said of a set: scatter, significance, scans that do not fit, readings.
+//! Caveats of a set: scatter, significance, scans that do not fit, readings.
 
 use crate::campaign::analysis::{SetAnalysis, SetMean};
 use crate::campaign::set::moire;
@@ -13,7 +13,7 @@ const LARGE_CHI2: f64 = 2.0;
 /// The scatter of fewer scans is too uncertain itself to doubt the errors.
 const FEWEST_TO_DOUBT: usize = 6;
 
-/// What has to be said of a set of which `used` scans count.
+/// Caveats of a set of which `used` scans count.
 pub(crate) fn about_set(
     set: &SetAnalysis,
     used: usize,

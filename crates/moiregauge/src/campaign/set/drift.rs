@@ -133,7 +133,7 @@ fn given_drift(
     let covariance = Matrix2::identity() * sigma * sigma;
     caveats.push(Caveat::new(DriftDoubt::Given, name));
     let (mut lattice, chi2, freedom) = common_lattice(all, &velocity, &covariance).ok()?;
-    // Scatter enlarges what the scans say, not what the user said of the drift.
+    // Scatter enlarges the error of a measured drift, not that of a given one.
     let (measured, _, _) = common_lattice(all, &velocity, &Matrix2::zeros()).ok()?;
     let scale = enlargement(chi2, freedom);
     lattice.covariance += measured.covariance * (scale - 1.0);

@@ -10,7 +10,7 @@ use crate::lattice::LatticeFit;
 use crate::scan::measured::{MeasuredLine, MeasuredScan};
 use crate::scan::shared::correlation_of_frames;
 
-/// A frame is compared with so many that follow: all pairs of many frames would say no more.
+/// Number of following frames that a frame is compared with: all pairs of many frames would add nothing.
 const NEXT: usize = 4;
 /// Frames whose axes differ by more (cosine of 25°) are not compared: their pixels lie otherwise.
 const ALONG: f64 = 0.9;

@@ -46,7 +46,7 @@ const OTHERS: [(f64, &str); 5] = [
     ),
 ];
 
-/// What has to be said of the headers of a set, by its joint fit `found`, which started from `lattice` and `velocity`.
+/// Caveats of the headers of a set, by its joint fit `found`, which started from `lattice` and `velocity`.
 pub(crate) fn about_headers(
     name: &str,
     scans: &[&MeasuredScan],

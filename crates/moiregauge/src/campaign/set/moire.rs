@@ -45,7 +45,7 @@ fn is_below_30_degrees(found: &TwistStrain, settings: &Settings) -> bool {
     found.twist.abs() <= FRAC_PI_6 || !hexagonal
 }
 
-/// Why a mean is none: its strain is more than layers hold, whatever its errors. What was told by hand is meant.
+/// Why a mean is refused: its strain is beyond that of any layers, whatever its errors. A lattice chosen by hand is accepted.
 pub(crate) fn breaks(mean: &SetMean, settings: &Settings) -> Option<MoireDoubt> {
     let [least, _] = mean.twist_strain.strain().interval_95();
     let breaks = least > MOST_STRAIN && !settings.by_hand.says_which();

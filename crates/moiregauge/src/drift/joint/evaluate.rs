@@ -227,7 +227,7 @@ pub(crate) struct PhaseMiss {
 }
 
 impl PhaseMiss {
-    /// The three rows, whitened where positions have the variance `scatter`, nm²; `None` where their covariance is none.
+    /// The three rows, whitened where positions have the variance `scatter`, nm²; `None` if the covariance is not positive definite.
     pub(crate) fn whitened(&self, scatter: f64) -> Option<Whitened<3>> {
         let lower = self.factor(scatter)?;
         let mut slopes = self.slopes.clone();

@@ -53,7 +53,7 @@ pub(crate) struct OfCells {
 }
 
 impl OfCells {
-    /// Whether they scatter by more than noise explains, whose variances (all four in sum) are given. So many blocks tell a variance to √(2/n); three
+    /// Whether they scatter by more than noise explains, whose variances (all four in sum) are given. n blocks measure a variance to √(2/n); three
     /// times that.
     pub(crate) fn exceed(&self, noise: f64) -> bool {
         self.covariance.trace() > noise * (1.0 + 3.0 * (2.0 / self.blocks).sqrt())
@@ -62,7 +62,7 @@ impl OfCells {
 
 impl Fit<'_> {
     /// Covariance of the wave vectors (phases at the edges) from the scatter of cells; `bends`: phases may be cubic polynomials. `None` where there are
-    /// too few cells for that, or so many that the noise beside the harmonics says it.
+    /// too few cells for that, or enough that the noise beside the harmonics measures it.
     pub(crate) fn of_cells(&self, bends: bool) -> Option<OfCells> {
         let (frame, model) = (&self.frame, &self.model);
         // The frame has sides of 2 and a cell 4π²/|p₁ × p₂|.

@@ -16,7 +16,7 @@ use crate::lattice::fit::joint::Joint;
 use crate::lattice::fit::noise::{BESIDE, ForeignWave, ResidualNoise};
 use crate::numbers::three::three;
 
-/// A wave has more than so many cycles in the frame: slower ones are background.
+/// Fewest cycles of a wave in the frame: slower ones are background.
 const SLOWEST: f64 = 2.0;
 /// Waves at most: a lattice with a few harmonics, and stripes with overtones.
 const MOST: usize = 9;
@@ -28,15 +28,15 @@ const BINS_PER_PERIOD: f64 = 5.0;
 const SOME_STEPS: usize = 8;
 /// Steps until all waves have to stand still.
 const STEPS: usize = 25;
-/// Waves add up where they do to within so many cycles of the frame: three waves of noise 0.03 each.
+/// Largest closure error of three waves, cycles per frame: three waves of noise 0.03 each.
 const ADDS_UP: f64 = 0.15;
 /// The same for a harmonic of a lattice: up to the fourth order.
 const HARMONIC: f64 = 0.4;
 /// Points of a lattice that count, by their order.
 const ORDER: f64 = 4.0;
-/// Farther from a point of a lattice a wave is none of its, cycles of the frame: that of a lattice that changes is nearer.
+/// Distance from a lattice point (cycles per frame) beyond which a wave is not a harmonic: a varying lattice spreads less.
 pub(super) const SKIRT: f64 = 3.0;
-/// A harmonic that is not fitted has nearly all of its power within so many cycles of the frame of its point.
+/// Distance from its point that holds nearly all power of a harmonic that is not fitted, cycles per frame.
 const LOBE: f64 = 1.5;
 /// Periods of the first waves of a lattice across the frame, at least: fewer are ground, and their harmonics would be everywhere.
 const FEWEST: f64 = 5.0;
@@ -91,7 +91,7 @@ impl FewWaves {
         })
     }
 
-    /// Whether a lattice (rad per pixel) is that of three of them that add up, or one of which these are a higher shell, and the others are none of
+    /// Whether a lattice (rad per pixel) is that of three of them that add up, or one of which these are a higher shell, and the others are not harmonics of
     /// its harmonics.
     pub(crate) fn are_of(&self, reciprocal: &Matrix2<f64>) -> bool {
         let Some(pair) = self.pair() else {
@@ -140,7 +140,7 @@ impl FewWaves {
         open.then(|| Matrix2::from_columns(&[a, -b * sign]))
     }
 
-    /// The image without the waves that are none of the harmonics of a lattice (rad per pixel), and the strongest of these; `None` where there is none.
+    /// The image without the waves that are not harmonics of a lattice (rad per pixel), and the strongest of these; `None` where there is none.
     pub(crate) fn taken_off(
         &self,
         image: &Image,
@@ -337,7 +337,7 @@ mod tests {
         Matrix2::new(0.45, -0.02, 0.21, 0.52)
     }
 
-    /// A wave by its phase at a place, its wave vector being so many rad per pixel.
+    /// A wave by its phase at a place; its wave vector in rad per pixel.
     fn image(seed: u64, value: impl Fn(Vector2<f64>) -> f64) -> Image {
         let mut normal = normals(seed, "few", 0);
         let values = (0..SIZE * SIZE).map(|i| {

@@ -185,7 +185,7 @@ pub(crate) const fn powers<const N: usize>() -> [[usize; 2]; N] {
 
 impl Basis {
     /// A background of total degree `degree`. Where every line has an offset of its own
-    /// (`free_lines`), terms that are constant along lines are none of the background's.
+    /// (`free_lines`), terms that are constant along lines do not belong to the background.
     pub(crate) fn new(degree: usize, free_lines: bool, indices: &[[i32; 2]]) -> Self {
         let terms = (0..=degree)
             .flat_map(|total| (0..=total).map(move |b| [total - b, b]))

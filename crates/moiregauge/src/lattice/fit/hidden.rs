@@ -27,7 +27,7 @@ pub(crate) const FIRST: [[f64; 2]; 3] = [[1.0, 1.0], [-1.0, 2.0], [-2.0, 1.0]];
 /// steep.
 const NOISE_KNOWN_TO: f64 = 1.3;
 
-/// Noise up to so many times that of short waves is an image's own.
+/// Noise over that of short waves up to which it is an image's own.
 const OWN: f64 = 2.0;
 
 /// Waves with fewer cycles per frame are background.
@@ -39,10 +39,10 @@ const AS_LONG: f64 = 0.25;
 /// ... and farther than this from those that the first shell would be, cycles per frame; ...
 const LOBE: f64 = 1.5;
 
-/// ... and there are so many at least.
+/// ... and the fewest of them.
 const FEWEST: usize = 6;
 
-/// A place with more than so many times the power of each other holds a wave of something else: hum, or stripes. Chosen by eye: first waves of one
+/// Ratio of the power of a place to that of each other beyond which it holds a non-lattice wave: hum, or stripes. Chosen by eye: first waves of one
 /// lattice differ by less than ten times.
 const ELSE: f64 = 30.0;
 
@@ -53,7 +53,7 @@ pub(crate) struct Hidden {
     /// Power over noise of each wave that can be told, of all images in sum, ...
     #[serde(with = "exact")]
     power: [f64; 3],
-    /// ... in so many images, ...
+    /// ... in this number of images, ...
     images: [u32; 3],
     /// ... and what of their noise each has for itself, as a share, in sum: ground is the same in all.
     #[serde(with = "exact")]

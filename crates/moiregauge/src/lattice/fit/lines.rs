@@ -47,7 +47,7 @@ struct OfLine {
 }
 
 impl OfLine {
-    /// Of a line with so many pixels that are there.
+    /// Of a line with a number of valid pixels.
     fn new(line: &mut [f64], present: usize, waves: Option<&Vec<[Vec<f64>; 2]>>) -> Self {
         let (columns, count) = (line.len(), present as f64);
         if present < columns {

@@ -29,7 +29,7 @@ const NEAR: i64 = 8;
 const BACKGROUND: i64 = 2;
 /// The first column that the window keeps free of what whole lines do.
 pub(super) const BESIDE: i64 = 2;
-/// Farther than this from a point of the lattice (cycles per frame) a wave is none of its: nearer, it may be that of
+/// Distance from a lattice point (cycles per frame) beyond which a wave is not a harmonic: nearer, it may be that of
 /// a lattice that changes. Chosen by eye; see docs/constants.md.
 const FOREIGN: f64 = 3.0;
 /// Up to this order that holds ...
@@ -49,7 +49,7 @@ pub(crate) struct ResidualNoise {
     pub(super) free_lines: bool,
 }
 
-/// The strongest wave in the residual that is none of the lattice's.
+/// The strongest non-lattice peak of the residual.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct ForeignWave {

@@ -31,7 +31,7 @@ const ACROSS: i64 = 16;
 const NEAR: f64 = 2.0;
 /// Slower waves are background, and what whole lines do.
 const SLOWEST: f64 = 3.0;
-/// So many standard deviations of a logarithm of a ratio are chance.
+/// Standard deviations of the logarithm of a ratio that chance explains.
 const CHANCE: f64 = 2.0;
 
 /// Weights under which the residual is looked at: 1, X, Y, the Hann window, and the distance from the middle.

@@ -110,7 +110,7 @@ pub(crate) struct Freed {
     pub(crate) coupling: DMatrix<f64>,
 }
 
-/// From what [`projected`] says of the four derivatives by the pair and those of something else, unweighted and weighted with the noise.
+/// From what [`projected`] gives for the four derivatives by the pair and those of something else, unweighted and weighted with the noise.
 pub(crate) fn with_pair_free(bread: DMatrix<f64>, meat: DMatrix<f64>) -> Option<Freed> {
     let count = bread.nrows() - 4;
     let of_pair = bread.view((0, 0), (4, 4)).into_owned().try_inverse()?;

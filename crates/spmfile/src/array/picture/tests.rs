@@ -166,7 +166,7 @@ fn crc(bytes: &[u8]) -> u32 {
     })
 }
 
-/// A picture of two colours whose palette has so many bytes.
+/// A picture of two colours with a palette of a number of bytes.
 fn indexed(palette: usize) -> Vec<u8> {
     let mut whole = Vec::new();
     let mut encoder = png::Encoder::new(&mut whole, 2, 2);
