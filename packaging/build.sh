@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Builds into OUT what can be built on Linux: the static program, the Windows program, the Python wheel, the list of parts (SBOM);
-# with checksums.
+# Builds into OUT what can be built on Linux: the static program, the Windows program, the Python wheel, the one HTML file, the list of
+# parts (SBOM); with checksums.
 # Says at the end what could not be built, and why.
 #
 #   packaging/build.sh OUT
@@ -8,7 +8,8 @@
 # Needs a Rust toolchain. The Windows program needs gcc-mingw-w64-x86-64, and the target x86_64-pc-windows-gnu or the sources of
 # the standard library (the component rust-src, or Debian's rustc-web with rust-web-src; `-Z build-std`); it is started under
 # wine64 where there is one. The wheel needs Python 3.11 or later; maturin is installed in an environment of its own.
-# PARTS="linux windows wheel sbom" says what is wanted; all is.
+# The HTML file needs a compiler for WebAssembly (packaging/html.sh).
+# PARTS="linux windows wheel html sbom" says what is wanted; all is.
 set -euo pipefail
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 root=$(dirname "$here")
@@ -149,10 +150,11 @@ wheel() {
 # What the program is made of, as CycloneDX.
 sbom() { packaging/sbom.py x86_64-unknown-linux-gnu > "$out/moiregauge-sbom.json"; }
 
-wanted() { case " ${PARTS:-linux windows wheel sbom} " in *" $1 "*) ;; *) return 1 ;; esac; }
+wanted() { case " ${PARTS:-linux windows wheel html sbom} " in *" $1 "*) ;; *) return 1 ;; esac; }
 if wanted linux; then linux_program || missing "the static Linux program"; fi
 if wanted windows; then windows_program || missing "the Windows program"; fi
 if wanted wheel; then (wheel) || missing "the wheel"; fi
+if wanted html; then packaging/html.sh "$out/moiregauge.html" || missing "the HTML file"; fi
 if wanted sbom; then sbom || missing "the list of parts"; fi
 cd "$root"
 

@@ -38,6 +38,14 @@ pub mod validate;
 pub mod view;
 pub mod watch;
 
+/// The version of the program, as results name it: what a browser calculates with one thread and instructions of its own may
+/// differ in the last digits.
+pub const VERSION: &str = if cfg!(target_family = "wasm") {
+    concat!(env!("CARGO_PKG_VERSION"), " browser")
+} else {
+    env!("CARGO_PKG_VERSION")
+};
+
 pub use calibrate::calibrate;
 pub use content::Content;
 pub use convert::convert;

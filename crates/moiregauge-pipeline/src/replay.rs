@@ -118,7 +118,7 @@ impl Document {
 
     /// Whether another version of the program wrote it: numbers may differ.
     pub fn is_of_another_version(&self) -> bool {
-        self.version != env!("CARGO_PKG_VERSION")
+        self.version != crate::VERSION
     }
 
     /// Finds all files of the run and checks that they are the same: by their names from the current folder, then by

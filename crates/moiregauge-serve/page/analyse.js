@@ -3,6 +3,7 @@
 import { get } from "./api.js";
 import { baseName, empty, field, fill, h, say, scroll, select } from "./dom.js";
 import { total } from "./format.js";
+import { leading, showing } from "./host.js";
 import { KnownForm } from "./known.js";
 import { drawLattice, drawSpots, frameSpots } from "./overlay.js";
 import { overlayOf, showPart, showScan, showSpectrum } from "./pictures.js";
@@ -222,9 +223,9 @@ export class AnalyseView {
         const outputs = await get(work.path("outputs"));
         const figures = outputs.filter((/** @type {any} */ o) => o.name.endsWith(".svg"));
         fill(host, figures.map((/** @type {any} */ o) => {
-          const url = `/api/${work.path(`outputs/${o.name.split("/").map(encodeURIComponent).join("/")}`)}`;
+          const path = work.path(`outputs/${o.name.split("/").map(encodeURIComponent).join("/")}`);
           const words = baseName(o.name).replace(/\.svg$/, "").replace(/-/g, " ");
-          return h("figure", {}, h("a", { href: url, target: "_blank", rel: "noopener" }, h("img", { src: url, alt: words, loading: "lazy" })), h("figcaption", { text: words }));
+          return h("figure", {}, leading(h("a", { target: "_blank", rel: "noopener" }, showing(h("img", { alt: words, loading: "lazy" }), path)), path), h("figcaption", { text: words }));
         }));
         if (figures.length === 0) fill(host, empty("There are no figures."));
       } catch (error) {

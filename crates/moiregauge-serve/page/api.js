@@ -1,5 +1,7 @@
 // The only place that speaks with the program.
 
+import { reach } from "./host.js";
+
 export class ApiError extends Error {
   /**
    * @param {number} status 0: no answer
@@ -33,7 +35,7 @@ export class ApiError extends Error {
 export async function ask(path, init = {}) {
   let answer;
   try {
-    answer = await fetch(`/api/${path}`, { credentials: "same-origin", cache: "no-store", ...init });
+    answer = await reach(path, init);
   } catch (error) {
     if (error instanceof DOMException && error.name === "AbortError") throw error;
     throw new ApiError(0, "The program does not answer.");

@@ -1,6 +1,7 @@
 // What happens in the program, as it happens: one stream of events for the page, taken up again by itself.
 
 import { ApiError, get, openSession } from "./api.js";
+import { happenings } from "./host.js";
 
 /** @typedef {{kind: string, id: string, state?: string, stage?: string, done?: number, of?: number, line?: any}} Happening */
 
@@ -44,7 +45,7 @@ function tell(up) {
 /** Opens the stream. Browsers give up on some failures; then it is opened anew. */
 export function listen() {
   stream?.close();
-  stream = new EventSource("/api/events");
+  stream = happenings();
   stream.onopen = () => {
     waits = 500;
     tell(true);

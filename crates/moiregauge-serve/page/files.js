@@ -1,6 +1,6 @@
 // The folders of the program's roots as a tree, and the place to drop files.
 
-import { ask, get, query } from "./api.js";
+import { ask, get, query, send } from "./api.js";
 import { baseName, fill, h, say } from "./dom.js";
 import { size } from "./format.js";
 import { store } from "./store.js";
@@ -19,7 +19,8 @@ export class FileTree {
     picker.addEventListener("change", () => this.upload([...(picker.files ?? [])].map((file) => ({ file, name: file.name }))));
     this.drop = h("div", { class: "drop" },
       h("p", {}, "Drop files or folders here"),
-      h("button", { type: "button", text: "Choose files…", onclick: () => picker.click() }), picker);
+      h("button", { type: "button", text: "Choose files…", onclick: () => picker.click() }),
+      h("button", { type: "button", class: "link", text: "Try it with simulated scans", onclick: () => this.tryIt() }), picker);
     this.element = h("section", { class: "files", "aria-label": "Files" }, this.drop, this.note, this.list, this.count);
     this.listenToDrops();
     store.addEventListener("chosen", () => this.showChosen());
@@ -155,6 +156,22 @@ export class FileTree {
     say(`${taken.length} of ${files.length} files taken`);
     store.choose(taken, true);
     await this.openDropped();
+  }
+
+  /** Scans of the program, as if they were dropped. */
+  async tryIt() {
+    this.note.textContent = "Simulating three sets of scans …";
+    try {
+      const { files } = await send("POST", "demo");
+      for (const entry of files) store.learn({ ...entry, folder: DROPPED });
+      const ids = files.map((/** @type {any} */ entry) => entry.file);
+      store.open(ids[0]);
+      store.choose(ids, true);
+      await this.openDropped();
+    } catch (error) {
+      this.failed(/** @type {Error} */ (error).message);
+    }
+    this.note.textContent = "";
   }
 
   /** The folder of what was dropped, read anew and opened. */

@@ -6,6 +6,7 @@ import { Contrast } from "./contrast.js";
 import { empty, field, fill, h, say, select } from "./dom.js";
 import { FileTree } from "./files.js";
 import { minus } from "./format.js";
+import { showing } from "./host.js";
 import { background, LEVELLINGS, without } from "./levels.js";
 import { Measure } from "./measure.js";
 import { savePng, saveSvg } from "./picture.js";
@@ -131,7 +132,7 @@ export class LookView {
   showThumbs(file, info) {
     fill(this.thumbs, info.channels.map((/** @type {any} */ c, /** @type {number} */ i) =>
       h("button", { type: "button", class: "thumb", "aria-pressed": String(i === this.channel), "data-channel": i, onclick: () => this.load(file, i) },
-        h("img", { src: `/api/thumb${query({ file, channel: i, size: 160 })}`, alt: "", width: 72, height: 72, loading: "lazy" }),
+        showing(h("img", { alt: "", width: 72, height: 72, loading: "lazy" }), `thumb${query({ file, channel: i, size: 160 })}`),
         h("span", { text: c.name }), h("span", { class: "soft", text: c.line_direction ?? "" }))));
   }
 

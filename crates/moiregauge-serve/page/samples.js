@@ -3,6 +3,7 @@
 import { get, query } from "./api.js";
 import { baseName, empty, field, fill, h, scroll, select } from "./dom.js";
 import { number, withError } from "./format.js";
+import { showing } from "./host.js";
 import { Plot } from "./plot.js";
 import { store } from "./store.js";
 
@@ -140,7 +141,7 @@ export class SamplesView {
   thumb(row) {
     const { root, under, thumbs, rows } = this.table;
     const name = thumbs[rows.indexOf(row)];
-    return name ? h("img", { src: `/api/samples/picture${query({ root, under, name })}`, alt: "", loading: "lazy", width: 64, height: 64 }) : "";
+    return name ? showing(h("img", { alt: "", loading: "lazy", width: 64, height: 64 }), `samples/picture${query({ root, under, name })}`) : "";
   }
 
   /** @param {string} name @param {boolean} on */

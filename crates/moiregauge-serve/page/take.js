@@ -3,6 +3,7 @@
 import { ask, get } from "./api.js";
 import { empty, fill, h, say } from "./dom.js";
 import { size } from "./format.js";
+import { leading } from "./host.js";
 import { work } from "./work.js";
 
 export class TakeView {
@@ -30,7 +31,7 @@ export class TakeView {
     const parts = await Promise.all([this.command(), this.settings()]);
     if (mine !== this.asked) return;
     fill(this.body,
-      h("p", { class: "buttons" }, h("a", { class: "button", href: `/api/${work.path("archive.zip")}`, download: "moiregauge-result.zip", text: "Everything as zip" }),
+      h("p", { class: "buttons" }, leading(h("a", { class: "button", download: "moiregauge-result.zip", text: "Everything as zip" }), work.path("archive.zip")),
         h("span", { class: "hint", text: "results.json, tables, figures and report, as the program writes them" })), parts, files);
     this.outputs().then((found) => mine === this.asked && files.replaceWith(found));
   }
@@ -76,7 +77,7 @@ export class TakeView {
   async outputs() {
     try {
       const outputs = await get(work.path("outputs"));
-      const link = (/** @type {any} */ o) => h("li", {}, h("a", { href: `/api/${work.path(`outputs/${o.name.split("/").map(encodeURIComponent).join("/")}`)}`, target: "_blank", rel: "noopener", text: o.name }), h("span", { class: "soft", text: `  ${size(o.bytes)}` }));
+      const link = (/** @type {any} */ o) => h("li", {}, leading(h("a", { target: "_blank", rel: "noopener", text: o.name }), work.path(`outputs/${o.name.split("/").map(encodeURIComponent).join("/")}`)), h("span", { class: "soft", text: `  ${size(o.bytes)}` }));
       return h("section", {}, h("h3", { text: `${outputs.length} files` }), h("ul", { class: "outputs" }, outputs.map(link)));
     } catch (error) {
       return h("section", {}, h("h3", { text: "Files" }), empty(/** @type {Error} */ (error).message));

@@ -35,6 +35,7 @@ export class WatchView {
     this.element = h("div", { class: "columns" },
       h("section", { "aria-label": "Folder to watch" }, h("h2", { text: "Watch a folder" }), field("Folder", this.folder),
         field("Stop at an error of", this.of), field("Wanted error", this.until), h("div", { class: "buttons" }, this.start, this.stop), this.state,
+        store.state.watches_folders === false && h("p", { class: "hint", text: "This file cannot hold a folder open: moiregauge watch and moiregauge serve do." }),
         h("p", { class: "hint", text: "New scans are analysed as soon as their files are complete. Nothing is written into the folder." })),
       this.body);
     onHappening("watch", (event) => this.happened(event));

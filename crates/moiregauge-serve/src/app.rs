@@ -5,14 +5,12 @@ use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
 
 use spmfile::Scan;
-use tokio::sync::watch;
 
-use crate::events::Hub;
+#[cfg(not(target_family = "wasm"))]
+use crate::host::Hub;
 use crate::lock::lock;
 use crate::options::Options;
-use crate::page::Page;
 use crate::roots::Roots;
-use crate::token::Secret;
 use crate::work::{Maps, Watches, Works};
 
 /// Bytes of decoded files that are kept for the next look.
@@ -22,33 +20,19 @@ const KEPT_BYTES: usize = 256 << 20;
 #[derive(Debug)]
 pub(crate) struct App {
     pub(crate) options: Options,
-    /// The port it listens at.
-    pub(crate) port: u16,
-    pub(crate) token: Secret,
-    /// What lets the browser in that is opened at the start, once.
-    pub(crate) ticket: Mutex<Option<Secret>>,
-    /// What the cookie holds.
-    pub(crate) session: Secret,
+    #[cfg(not(target_family = "wasm"))]
+    pub(crate) door: crate::door::Door,
     pub(crate) roots: Roots,
-    pub(crate) page: Page,
     pub(crate) scans: Scans,
+    #[cfg(not(target_family = "wasm"))]
     pub(crate) events: Arc<Hub>,
     pub(crate) works: Works,
     pub(crate) maps: Maps,
     pub(crate) watches: Watches,
-    /// Becomes true when the server ends.
-    pub(crate) stop: watch::Receiver<bool>,
 }
 
 /// What is handed to every route.
 pub(crate) type Shared = axum::extract::State<Arc<App>>;
-
-impl App {
-    /// The name of the cookie: browsers do not keep ports apart.
-    pub(crate) fn cookie(&self) -> String {
-        format!("moiregauge-{}", self.port)
-    }
-}
 
 /// What tells a version of a file: its place, bytes and time.
 type Version = (PathBuf, u64, Option<std::time::SystemTime>);

@@ -7,6 +7,7 @@ use axum::http::{HeaderMap, StatusCode, header};
 use futures_util::StreamExt as _;
 use serde::de::DeserializeOwned;
 
+use crate::host;
 use crate::problem::{Answer, Problem};
 
 /// Bytes of a document.
@@ -29,9 +30,9 @@ pub(crate) async fn pieces(
     let mut stream = body.into_data_stream();
     let mut length = 0;
     loop {
-        let next = tokio::time::timeout(PIECE_TIME, stream.next()).await;
-        let slow = |_| Problem::new(StatusCode::REQUEST_TIMEOUT, "the body came too slowly");
-        let Some(piece) = next.map_err(slow)? else {
+        let next = host::within(PIECE_TIME, stream.next()).await;
+        let slow = || Problem::new(StatusCode::REQUEST_TIMEOUT, "the body came too slowly");
+        let Some(piece) = next.ok_or_else(slow)? else {
             return Ok(length);
         };
         let piece = piece.map_err(|e| Problem::wrong(format!("the body ended too early: {e}")))?;

@@ -106,7 +106,7 @@ fn is_ours(app: &App, host: &str) -> bool {
         Some((name, port)) if !port.ends_with(']') => (name, port),
         _ => (host, "80"),
     };
-    if port != app.port.to_string() {
+    if port != app.door.port.to_string() {
         return false;
     }
     let address = app.options.address;
@@ -118,12 +118,12 @@ fn is_ours(app: &App, host: &str) -> bool {
 }
 
 fn has_cookie(app: &App, headers: &HeaderMap) -> bool {
-    let name = app.cookie();
+    let name = app.door.cookie();
     let cookies = headers.get_all(header::COOKIE).iter();
     let cookies = cookies.filter_map(|line| line.to_str().ok());
     let mut pairs = cookies.flat_map(|line| line.split(';'));
     pairs.any(|pair| {
         let pair = pair.trim().split_once('=');
-        pair.is_some_and(|(key, value)| key == name && app.session.is(value))
+        pair.is_some_and(|(key, value)| key == name && app.door.session.is(value))
     })
 }

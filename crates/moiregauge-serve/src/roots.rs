@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
 
 use crate::error::ServeError;
+use crate::host::real;
 use crate::lock::lock;
 use crate::paths::below;
 use crate::problem::{Answer, Problem};
@@ -76,9 +77,7 @@ impl Roots {
                 folder: folder.clone(),
                 reason,
             };
-            let real = folder
-                .canonicalize()
-                .map_err(|e| refused(format!("found none: {e}")))?;
+            let real = real(folder).map_err(|e| refused(format!("found none: {e}")))?;
             if !real.is_dir() {
                 return Err(refused("found a file".to_owned()));
             }
@@ -93,7 +92,7 @@ impl Roots {
             dropped: Root {
                 id: DROPPED.to_owned(),
                 name: PathBuf::new(),
-                real: dropped.canonicalize().map_err(ServeError::System)?,
+                real: real(dropped).map_err(ServeError::System)?,
             },
             files: Mutex::default(),
         })
@@ -119,8 +118,8 @@ impl Roots {
     pub(crate) fn folder(&self, root: &str, under: &str) -> Answer<Folder> {
         let root = self.root(root)?;
         let relative = below(under).map_err(|why| refused_path().what(why).at("under"))?;
-        let real = root.real.join(&relative).canonicalize();
-        let real = real.map_err(|_| Problem::missing("no such folder").at("under"))?;
+        let found = real(&root.real.join(&relative));
+        let real = found.map_err(|_| Problem::missing("no such folder").at("under"))?;
         if !real.starts_with(&root.real) {
             return Err(refused_path()
                 .what("a link leads out of the folder")
@@ -165,7 +164,7 @@ impl Roots {
     /// Takes note of a file that is shown; none if a link leads out of its root.
     pub(crate) fn show(&self, root: &str, place: &Path) -> Option<File> {
         let root = self.root(root).ok()?;
-        let real = place.canonicalize().ok()?;
+        let real = real(place).ok()?;
         if !real.starts_with(&root.real) || !real.is_file() {
             return None;
         }
@@ -202,7 +201,7 @@ impl Roots {
         let gone = || Problem::missing("no such file").at(id);
         let file = lock(&self.files).get(id).cloned().ok_or_else(gone)?;
         let root = self.root(&file.root)?;
-        let real = file.place.canonicalize().map_err(|_| gone())?;
+        let real = real(&file.place).map_err(|_| gone())?;
         if !real.starts_with(&root.real) {
             return Err(refused_path().what("a link leads out of the folder").at(id));
         }

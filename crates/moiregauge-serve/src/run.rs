@@ -14,8 +14,9 @@ use tokio::sync::watch;
 use crate::api::routes;
 use crate::app::{App, Scans};
 use crate::connection::accept;
+use crate::door::Door;
 use crate::error::ServeError;
-use crate::events::Hub;
+use crate::host::Hub;
 use crate::lock::lock;
 use crate::options::Options;
 use crate::page::Page;
@@ -74,25 +75,27 @@ pub fn serve(
         options.feed.iter().for_each(|feed| watches.listen(feed));
         let app = Arc::new(App {
             options: options.clone(),
-            port: here.port(),
-            session,
+            door: Door {
+                port: here.port(),
+                token,
+                ticket: Mutex::default(),
+                session,
+                page,
+                stop,
+            },
             roots,
-            page,
             scans: Scans::default(),
             events: hub,
             works,
             maps,
             watches,
-            stop,
-            token,
-            ticket: Mutex::default(),
         });
-        let shown = url(here, &app.token);
+        let shown = url(here, &app.door.token);
         let accepting = tokio::spawn(accept(listener, routes(&app)));
         ready(&shown);
         if options.browser {
             let address = url(here, &ticket);
-            *lock(&app.ticket) = Some(ticket);
+            *lock(&app.door.ticket) = Some(ticket);
             open(address);
         }
         while !cancel.is_cancelled() {

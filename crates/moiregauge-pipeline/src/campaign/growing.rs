@@ -355,7 +355,7 @@ impl Campaign {
 /// What was analysed; the record of the run comes later.
 fn provenance(settings: &Settings, inputs: Vec<InputFile>, failed: Vec<FailedInput>) -> Provenance {
     Provenance {
-        version: env!("CARGO_PKG_VERSION").to_owned(),
+        version: crate::VERSION.to_owned(),
         seed: settings.seed,
         inputs,
         failed,

@@ -213,7 +213,7 @@ impl With {
         let told = known.told();
         let mut add = |part: &dyn std::fmt::Debug| hash.update(format!("{part:?}\n"));
         add(&SCHEMA);
-        add(&env!("CARGO_PKG_VERSION"));
+        add(&crate::VERSION);
         add(&measuring(settings));
         add(told);
         add(&window);

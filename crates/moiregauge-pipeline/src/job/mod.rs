@@ -3,6 +3,7 @@
 mod cancel;
 mod events;
 mod pool;
+mod threads;
 
 pub use cancel::{Cancel, Cancelled};
 pub use events::{Event, Events, Quiet};

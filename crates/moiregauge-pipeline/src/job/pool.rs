@@ -1,16 +1,12 @@
 //! Threads, a cancel and events together.
 
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
-use std::sync::Arc;
 
 use moiregauge::numbers::interrupt::{self, Interrupted};
-use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use super::cancel::{Cancel, Cancelled};
 use super::events::{Event, Events, Quiet};
-
-/// Room on the stack of each thread, bytes: that of the first thread of a program.
-const STACK: usize = 8 << 20;
+use super::threads::Threads;
 
 /// Threads that cannot be made.
 #[derive(Debug, thiserror::Error)]
@@ -24,7 +20,7 @@ pub struct JobError {
 ///
 /// Its threads are its own: no other pool of the process is used or changed, and results do not depend on their number.
 pub struct Job<'a> {
-    pool: Arc<ThreadPool>,
+    pool: Threads,
     cancel: Cancel,
     events: &'a dyn Events,
 }
@@ -39,18 +35,9 @@ impl<'a> Job<'a> {
         cancel: Cancel,
         events: &'a dyn Events,
     ) -> Result<Self, JobError> {
-        let flag = cancel.flag();
-        let builder = ThreadPoolBuilder::new()
-            .num_threads(threads.unwrap_or(0))
-            .stack_size(STACK)
-            .start_handler(move |_| {
-                interrupt::watch(Some(flag.clone()));
-            });
-        let pool = builder
-            .build()
-            .map_err(|source| JobError { threads, source })?;
+        let pool = Threads::new(threads, cancel.flag());
         Ok(Self {
-            pool: Arc::new(pool),
+            pool: pool.map_err(|source| JobError { threads, source })?,
             cancel,
             events,
         })
@@ -68,7 +55,7 @@ impl<'a> Job<'a> {
     #[must_use]
     pub fn silent(&self) -> Job<'static> {
         Job {
-            pool: Arc::clone(&self.pool),
+            pool: self.pool.clone(),
             cancel: self.cancel.clone(),
             events: &Quiet,
         }
@@ -153,7 +140,7 @@ impl Drop for Stage<'_> {
 impl std::fmt::Debug for Job<'_> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("Job")
-            .field("threads", &self.pool.current_num_threads())
+            .field("threads", &self.pool.count())
             .field("cancel", &self.cancel)
             .finish_non_exhaustive()
     }

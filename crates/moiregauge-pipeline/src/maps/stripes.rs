@@ -123,7 +123,7 @@ pub(super) fn look(
         images: images(&found, file),
         shown: Shown::Stripes(Box::new(found)),
         provenance: Provenance {
-            version: env!("CARGO_PKG_VERSION").to_owned(),
+            version: crate::VERSION.to_owned(),
             seed: settings.seed,
             inputs: vec![reading.input],
             failed: Vec::new(),

@@ -114,7 +114,7 @@ pub(super) fn survey(
         })),
         settings: settings.clone(),
         provenance: Provenance {
-            version: env!("CARGO_PKG_VERSION").to_owned(),
+            version: crate::VERSION.to_owned(),
             seed: settings.seed,
             inputs: read,
             failed: campaign.left_out().to_vec(),

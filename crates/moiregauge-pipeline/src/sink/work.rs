@@ -1,6 +1,6 @@
 //! Working folders: where files are until they are whole, with a lock that ends with its process.
 
-use std::fs::{File, OpenOptions, TryLockError};
+use std::fs::{File, OpenOptions};
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -20,6 +20,33 @@ pub(super) const PARTS: &str = "parts";
 /// Folders that are being replaced.
 pub(super) const OLD: &str = "old";
 pub(super) const INTENT: &str = "intent.json";
+
+#[cfg_attr(
+    target_family = "wasm",
+    expect(dead_code, reason = "a browser has no locks")
+)]
+/// What came of asking for a lock.
+enum Lock {
+    Ours,
+    /// Another process has it.
+    Taken,
+    /// There are no locks here.
+    None,
+}
+
+#[cfg(not(target_family = "wasm"))]
+fn lock(file: &File) -> Lock {
+    match file.try_lock() {
+        Ok(()) => Lock::Ours,
+        Err(std::fs::TryLockError::WouldBlock) => Lock::Taken,
+        Err(std::fs::TryLockError::Error(_)) => Lock::None,
+    }
+}
+
+#[cfg(target_family = "wasm")]
+fn lock(_: &File) -> Lock {
+    Lock::None
+}
 
 /// A working folder whose lock is held; it goes when it is dropped, but for what the next run needs.
 #[derive(Debug)]
@@ -58,7 +85,7 @@ impl Work {
                 Err(error) if error.kind() == io::ErrorKind::NotFound => continue,
                 Err(error) => return refused(at(&path)(error)),
             };
-            if matches!(file.try_lock(), Err(TryLockError::WouldBlock)) {
+            if matches!(lock(&file), Lock::Taken) {
                 return refused(SinkError::Running(folder.to_owned()));
             }
             if is_at(&file, &path) {
@@ -99,8 +126,7 @@ impl Work {
                     return Err(at(folder)(error));
                 }
             };
-            let taken = matches!(file.try_lock(), Err(TryLockError::WouldBlock));
-            if !taken && is_at(&file, &path) {
+            if !matches!(lock(&file), Lock::Taken) && is_at(&file, &path) {
                 return Ok(Self {
                     dir,
                     lock: Some(file),
@@ -250,12 +276,12 @@ fn sweep(folder: &Path) {
             continue;
         }
         let dir = entry.path();
-        let Ok(lock) = OpenOptions::new().append(true).open(dir.join(LOCK)) else {
+        let Ok(file) = OpenOptions::new().append(true).open(dir.join(LOCK)) else {
             // Killed before it had a lock; one with anything in it is not ours, and stays.
             std::fs::remove_dir(&dir).ok();
             continue;
         };
-        if lock.try_lock().is_ok() {
+        if matches!(lock(&file), Lock::Ours) {
             restore_old(&dir);
             remove(&dir);
         }

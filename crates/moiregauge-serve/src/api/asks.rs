@@ -19,9 +19,9 @@ use moiregauge_pipeline::{Job, conditions_on, moire, plan, settings_on};
 use serde::Deserialize;
 use serde_json::{Map, Value, json};
 
-use super::beside::beside;
 use crate::app::{App, Shared};
 use crate::body::document;
+use crate::host::{self, beside};
 use crate::problem::{Answer, Problem};
 
 pub(super) fn routes() -> Router<Arc<App>> {
@@ -154,7 +154,7 @@ async fn picture(State(app): Shared, Query(asked): Query<OfSamples>) -> Answer {
             return Err(missing());
         }
         let file = folder.real.join(format!("{stem}.png"));
-        let real = file.canonicalize().map_err(|_| missing())?;
+        let real = host::real(&file).map_err(|_| missing())?;
         if !real.starts_with(&folder.real) {
             return Err(missing());
         }

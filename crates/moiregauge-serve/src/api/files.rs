@@ -7,8 +7,8 @@ use moiregauge_report::results::Told;
 use serde::Deserialize;
 use serde_json::{Value, json};
 
-use super::beside::beside;
 use crate::app::Shared;
+use crate::host::beside;
 use crate::paths::below;
 use crate::problem::{Answer, Problem};
 use crate::roots::{File, places};

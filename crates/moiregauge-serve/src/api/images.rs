@@ -10,10 +10,10 @@ use moiregauge_report::ColorMap;
 use serde::Deserialize;
 use spmfile::{Channel, Scan};
 
-use super::beside::beside;
 use super::binary;
 use super::files::known_of;
 use crate::app::{App, Shared};
+use crate::host::beside;
 use crate::problem::{Answer, Problem};
 
 /// Pixels along the side of a thumbnail.

@@ -15,10 +15,10 @@ use moiregauge_report::results::{MapDetailsResult, ProfileResult, ResultCaveat};
 use serde::Deserialize;
 use serde_json::{Map, Value, json};
 
-use super::beside::beside;
 use super::{binary, written};
 use crate::app::{App, Shared};
 use crate::body::document;
+use crate::host::beside;
 use crate::problem::{Answer, Problem};
 use crate::work::{Asked, Change};
 

@@ -14,9 +14,9 @@ use moiregauge_report::results::Told;
 use serde::Deserialize;
 use serde_json::{Map, Value};
 
-use super::beside::beside;
 use crate::app::{App, Shared};
 use crate::body::document;
+use crate::host::beside;
 use crate::problem::{Answer, Problem};
 use crate::roots::DROPPED;
 

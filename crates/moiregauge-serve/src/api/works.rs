@@ -14,11 +14,11 @@ use serde::Deserialize;
 use serde_json::{Value, json};
 use spmfile::LineDirection;
 
-use super::beside::beside;
 use super::files::known;
 use super::{binary, written};
 use crate::app::{App, Shared};
 use crate::body::document;
+use crate::host::beside;
 use crate::problem::{Answer, Problem};
 use crate::work::{Asked, Change, Work, command};
 

@@ -1,14 +1,13 @@
 //! Works on the disk, if the user named a folder for them: whole or as before, whatever ends the server.
 
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use moiregauge_pipeline::campaign::Kept;
 use serde::{Deserialize, Serialize};
-use tempfile::NamedTempFile;
 
 use super::asked::Asked;
 use super::history::History;
+use crate::host::put;
 
 /// What says which other files count; it is written last.
 const WORK: &str = "work.json";
@@ -111,17 +110,6 @@ fn forget(folder: &Path, results: &Results) {
             let _ = std::fs::remove_file(entry.path());
         }
     }
-}
-
-/// A file, whole and on the disk when this comes back.
-fn put(folder: &Path, name: &str, bytes: &[u8]) -> std::io::Result<()> {
-    let mut file = NamedTempFile::with_prefix_in(".part-", folder)?;
-    file.write_all(bytes)?;
-    file.as_file().sync_all()?;
-    file.persist(folder.join(name)).map_err(|e| e.error)?;
-    #[cfg(unix)]
-    std::fs::File::open(folder)?.sync_all()?;
-    Ok(())
 }
 
 #[cfg(test)]

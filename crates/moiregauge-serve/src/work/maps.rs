@@ -15,7 +15,7 @@ use super::asked::Asked;
 use super::done::Written;
 use super::table::Table;
 use super::task::{NoResult, Progress, run_beside};
-use crate::events::Hub;
+use crate::host::{Hub, begin};
 use crate::lock::lock;
 use crate::options::Words;
 use crate::problem::{Answer, Problem};
@@ -23,8 +23,6 @@ use crate::roots::places;
 
 /// Maps at a time: each holds all its quantities.
 const MOST: usize = 20;
-/// Room on the stack of the thread that waits for a job.
-const STACK: usize = 8 << 20;
 
 /// All maps.
 #[derive(Debug)]
@@ -108,9 +106,7 @@ impl Maps {
         })?;
         let (made, words) = (Arc::clone(&map), self.words);
         let progress = Progress::new(&self.hub, "map", &map.id);
-        let thread = std::thread::Builder::new().stack_size(STACK);
-        let thread = thread.spawn(move || made.make(&words, kept, &progress));
-        thread.map_err(Problem::fault)?;
+        begin(move || made.make(&words, kept, &progress)).map_err(Problem::fault)?;
         Ok(map)
     }
 

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use moiregauge_pipeline::{Cancel, Event, Events, Job};
 use serde_json::{Value, json};
 
-use crate::events::Hub;
+use crate::host::Hub;
 use crate::lock::lock;
 
 /// Steps are told at most that often.

@@ -9,8 +9,8 @@ use moiregauge_pipeline::{Cancel, Job, Quiet};
 use serde_json::{Value, json};
 
 use super::table::Table;
-use crate::events::Hub;
 use crate::feed::Feed;
+use crate::host::{Hub, WATCHES_FOLDERS, begin};
 use crate::lock::lock;
 use crate::options::Words;
 use crate::problem::{Answer, Problem};
@@ -36,7 +36,6 @@ const NUMBERS: [&str; 10] = [
 const POLL: Duration = Duration::from_secs(2);
 /// Between two looks whether the watch is to stop.
 const STEP: Duration = Duration::from_millis(100);
-const STACK: usize = 8 << 20;
 
 /// All watches.
 #[derive(Debug)]
@@ -100,13 +99,17 @@ impl Watches {
 
     /// Begins one.
     pub(crate) fn add(&self, request: WatchRequest) -> Answer<Arc<Watched>> {
+        if !WATCHES_FOLDERS {
+            let words =
+                "this page cannot watch a folder: moiregauge watch does, and moiregauge serve";
+            return Err(Problem::conflict(words));
+        }
         let folder = request.folder.clone();
         let watch = Watch::new(request).map_err(Problem::wrong)?;
         let mut watch = watch.with_advice(self.words.advice);
         let watched = self.insert(&folder)?;
         let of_thread = Arc::clone(&watched);
-        let thread = std::thread::Builder::new().stack_size(STACK);
-        let thread = thread.spawn(move || {
+        let thread = begin(move || {
             let driven = std::panic::AssertUnwindSafe(|| of_thread.drive(&mut watch));
             if std::panic::catch_unwind(driven).is_err() {
                 lock(&of_thread.inner).error =

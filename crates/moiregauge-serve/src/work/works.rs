@@ -2,7 +2,6 @@
 
 use std::path::Path;
 use std::sync::{Arc, Mutex};
-use std::thread::JoinHandle;
 
 use moiregauge_pipeline::Cancel;
 use moiregauge_pipeline::campaign::{Kept, Outcome};
@@ -15,7 +14,7 @@ use super::history::History;
 use super::keep::{Keeper, OnDisk, Results};
 use super::table::Table;
 use super::task::{NoResult, Progress, run_beside};
-use crate::events::Hub;
+use crate::host::{Hub, Running, SAVES, begin, ended};
 use crate::lock::lock;
 use crate::options::Words;
 use crate::problem::{Answer, Problem};
@@ -23,8 +22,6 @@ use crate::roots::Roots;
 
 /// Works at a time.
 const MOST: usize = 500;
-/// Room on the stack of the thread that waits for a job.
-const STACK: usize = 8 << 20;
 
 /// All works.
 #[derive(Debug)]
@@ -71,7 +68,7 @@ struct Inner {
     cancel: Cancel,
     /// The number of the last run: earlier ones tell nothing any more.
     run: u64,
-    thread: Option<JoinHandle<()>>,
+    thread: Option<Running>,
 }
 
 impl Works {
@@ -179,7 +176,7 @@ impl Work {
                 Saved::Not(why) => Some(why),
                 _ => None,
             };
-            let saved = inner.saved == Saved::Yes;
+            let saved = SAVES && inner.saved == Saved::Yes;
             let current = done.asked == *asked;
             json!({"moires": done.documents.len(), "current": current, "saved": saved, "unsaved": unsaved})
         });
@@ -282,13 +279,13 @@ impl Work {
         (inner.state, inner.error) = ("running", None);
         inner.failed.clear();
         let (work, run, before) = (Arc::clone(self), inner.run, inner.thread.take());
-        let thread = std::thread::Builder::new()
-            .stack_size(STACK)
-            .spawn(move || {
-                // It has measured something, perhaps.
-                let _ = before.map(JoinHandle::join);
-                work.analyse(run);
-            });
+        let thread = begin(move || {
+            // It has measured something, perhaps.
+            if let Some(before) = before {
+                ended(before);
+            }
+            work.analyse(run);
+        });
         inner.thread = Some(thread.map_err(Problem::fault)?);
         drop(inner);
         Progress::new(&self.hub, "work", &self.id).state("running");
@@ -298,6 +295,10 @@ impl Work {
     fn analyse(&self, run: u64) {
         let (asked, mut kept, cancel) = {
             let inner = lock(&self.inner);
+            // Another one was begun before this had its turn.
+            if inner.run != run {
+                return;
+            }
             (
                 inner.history.now().clone(),
                 inner.kept.clone(),
