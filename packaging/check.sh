@@ -52,7 +52,7 @@ dependencies() {
 }
 
 parts() {
-  if cargo check --locked --package moiregauge-cli --no-default-features --quiet --target-dir "$target/features"; then
+  if cargo check --locked --package moiregauge-cli --no-default-features --quiet --target-dir "$target"; then
     ok "moiregauge-cli without default features"
   else
     bad "moiregauge-cli without default features"

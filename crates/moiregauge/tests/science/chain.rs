@@ -9,6 +9,8 @@ use moiregauge::simulate::{Simulation, Simulator};
 use moiregauge::spectrum::Method;
 use spmfile::{FrameDirection, Samples, Scan};
 
+use crate::draws::{draws, mean_square};
+
 /// A small, quick set: 128 × 128 pixels, four scans.
 fn small_set(seed: u64) -> Simulation {
     let mut simulation = Simulation {
@@ -103,7 +105,7 @@ fn stored_order_does_not_matter() {
 fn errors_cover_the_truth() {
     for method in [Method::Autocorrelation, Method::Fourier, Method::Lattice] {
         let settings = quick(method);
-        let (trials, mut squares) = (60u32, [0.0; 5]);
+        let (trials, mut squares) = (draws(10), [0.0; 5]);
         for seed in 0..trials {
             let mut simulation = small_set(u64::from(seed) + 100);
             simulation.sample.lattice_angle_deg = f64::from(seed) * 7.0;
@@ -133,12 +135,9 @@ fn errors_cover_the_truth() {
             }
         }
         println!("{method:?}: mean squared pulls of drift x, y, twist, E1, E2: {squares:.2?}");
-        // The mean of 60 squared pulls scatters by √(2/60) = 0.18; three times that.
-        for mean_square in squares {
-            assert!(
-                (0.45..1.55).contains(&mean_square),
-                "{method:?}: {squares:?}"
-            );
+        let true_errors = mean_square(trials);
+        for square in squares {
+            assert!(true_errors.contains(&square), "{method:?}: {squares:?}");
         }
     }
 }

@@ -6,6 +6,7 @@ mod caveats;
 mod chain;
 mod constants;
 mod doubtful_sensors;
+mod draws;
 mod fit_scene;
 mod hard_lattices;
 mod house;
