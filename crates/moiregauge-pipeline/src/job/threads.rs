@@ -20,7 +20,7 @@ mod system {
     pub(in crate::job) struct Threads(Arc<ThreadPool>);
 
     impl Threads {
-        /// So many that watch a flag; `None`: as many as there are processors.
+        /// Number of threads that watch a flag; `None`: as many as there are processors.
         pub(in crate::job) fn new(
             threads: Option<usize>,
             flag: Arc<AtomicBool>,
