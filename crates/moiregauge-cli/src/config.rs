@@ -128,6 +128,9 @@ overlap = false
 # y_nm_per_min = -0.15
 # sigma_nm_per_min = 0.05
 
+# Standard uncertainty of each component of the drift, nm/min, where the scans do not tell it: what an instrument at rest drifts.
+drift_prior_nm_per_min = 1.0
+
 # Standard uncertainties that the scans do not show, for the uncertainty budget. Calibration of the
 # position sensors (or of the scanner, without sensors): gain common to x and y, difference of the two,
 # deviation from a right angle. Values from your own calibration are better.
@@ -203,7 +206,7 @@ pub(crate) fn check(settings: &Settings) -> anyhow::Result<()> {
 }
 
 /// Options by the names of settings; the first that the name begins with.
-const OPTIONS: [(&str, &str); 24] = [
+const OPTIONS: [(&str, &str); 25] = [
     ("material.lattice_constant_nm", "--lattice-constant"),
     (
         "material.lattice_constant_sigma_nm",
@@ -227,6 +230,7 @@ const OPTIONS: [(&str, &str); 24] = [
     ("scanner", "--calibration"),
     ("drift_draws", "--drift-draws"),
     ("drift.sigma_nm_per_min", "--drift-sigma"),
+    ("drift_prior_nm_per_min", "--drift-prior"),
     ("drift", "--drift"),
     ("lattice_angle_2", "--lattice-angle-2"),
     ("lattice_angle.layer", "--lattice-angle-layer"),

@@ -1,5 +1,6 @@
 //! Errors of inputs, with the options that help against them.
 
+use moiregauge::caveat::Caveat;
 use moiregauge::scan::MeasureError;
 use moiregauge::spectrum::LatticeError;
 use moiregauge_pipeline::campaign::{AnalyseError, Place};
@@ -8,6 +9,7 @@ use moiregauge_report::FailedInput;
 use moiregauge_report::screen::failures;
 
 use crate::config;
+use crate::hints;
 use crate::nearest::nearest;
 
 /// What helps against an error: an option of this program.
@@ -18,7 +20,9 @@ pub(crate) fn advice(error: &InputError) -> Option<String> {
             let meant = nearest(wanted, present.split(", "));
             return (!meant.is_empty()).then(|| format!("--channel {wanted:?}{meant}"));
         }
-        InputError::Measure(MeasureError::NoSize) => "give the size, as in --size 70nm×70nm",
+        InputError::Measure(MeasureError::NoSize) => {
+            "give the size, as in --size 70nm (one length is a square)"
+        }
         InputError::Measure(MeasureError::Lattice { error, .. }) => match error {
             LatticeError::OneOfMany { .. } | LatticeError::NowhereTogether => {
                 "say which lattice to measure, or where it is: --near WAVELENGTH, --lattice, --region or --mask"
@@ -33,6 +37,14 @@ pub(crate) fn advice(error: &InputError) -> Option<String> {
         _ => return None,
     };
     Some(option.to_owned())
+}
+
+/// Says why scans are refused whose numbers are written all the same.
+pub(crate) fn refused(why: &Caveat) {
+    eprintln!("error: {}: {}", why.place, why.message());
+    if let Some(option) = hints::of(why.code()) {
+        eprintln!("try {option}");
+    }
 }
 
 /// The option that an error is about.

@@ -29,7 +29,7 @@ pub(crate) struct KnownArgs {
     /// Direction of the slow scan: up if the bottom line was first
     ///
     /// alternating-… starts with the first file by name (numbers in names are sorted as numbers). Of files that hold a
-    /// frame of each direction (Omicron Matrix) this frame is read; default there: up.
+    /// frame of each direction (Omicron Matrix) this frame is read; default there: both, for convert and info up.
     #[arg(long, value_enum)]
     frame_direction: Option<FrameArg>,
     /// Angle of the fast axis against x, degrees counter-clockwise

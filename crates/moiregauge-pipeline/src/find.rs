@@ -11,7 +11,7 @@ use spmfile::{Format, detect, named_like_scan};
 
 use crate::names::in_words;
 use crate::reading;
-use crate::session::{channels_of_one_frame, one_per_frame};
+use crate::session::{channels_of_one_frame, one_per_frame, with_second_frames};
 use crate::sink::MANIFEST;
 
 /// Bytes that identify the format of a file.
@@ -92,7 +92,7 @@ pub(crate) fn holds_scans(folder: &Path) -> bool {
 }
 
 impl Found {
-    /// What is to be measured apart from what cannot be, each frame once.
+    /// What is to be measured apart from what cannot be, each frame once: of files that hold two, both.
     pub fn frames(self) -> (Vec<PathBuf>, Vec<FailedInput>) {
         let (mut files, mut failed) = (Vec::new(), Vec::new());
         for file in self.files {
@@ -110,7 +110,7 @@ impl Found {
                 first.display()
             ),
         }));
-        (files, failed)
+        (with_second_frames(files), failed)
     }
 
     fn fail(&mut self, path: &Path, error: String) {

@@ -189,8 +189,12 @@ impl Known {
 
     /// The sense of the slow motion that is told of a file.
     pub fn frame_direction(&self, path: &Path) -> Option<FrameDirection> {
-        let number = self.order.iter().position(|p| p == path).unwrap_or(0);
-        let up = match self.told.frame_direction? {
+        let Some(told) = self.told.frame_direction else {
+            return session::is_second_frame(path).then_some(FrameDirection::Down);
+        };
+        let mut files = self.order.iter().filter(|p| !session::is_second_frame(p));
+        let number = files.position(|p| p == path).unwrap_or(0);
+        let up = match told {
             FrameOrder::Up => true,
             FrameOrder::Down => false,
             FrameOrder::AlternatingUp => number % 2 == 0,

@@ -12,6 +12,7 @@ use serde::Deserialize;
 use crate::hash::identity;
 use crate::known::Known;
 use crate::names::in_words;
+use crate::session::file_of;
 use crate::source::Places;
 
 /// Why a run cannot be repeated.
@@ -161,7 +162,7 @@ impl Document {
 
 /// Where the file lies now, or what is wrong.
 fn find(file: &InputFile, folders: &[PathBuf]) -> Result<PathBuf, String> {
-    let name = Path::new(&file.file);
+    let name = file_of(Path::new(&file.file));
     let mut candidates = vec![name.to_owned()];
     for folder in folders {
         // A name from the root stays what it is.
@@ -170,7 +171,7 @@ fn find(file: &InputFile, folders: &[PathBuf]) -> Result<PathBuf, String> {
     }
     let mut other = None;
     for place in candidates {
-        match identity(name, &place) {
+        match identity(Path::new(&file.file), &place) {
             Ok(found) if found.sha256 == file.sha256 => return Ok(place),
             Ok(found) => {
                 other.get_or_insert((found, place));

@@ -110,6 +110,49 @@ pub fn channels_of_one_frame(files: Vec<PathBuf>) -> (Vec<PathBuf>, Vec<(PathBuf
     (kept, others)
 }
 
+/// What stands behind the name of a file whose frame downwards is meant.
+const DOWN: &str = " (down)";
+
+/// The file of an input: of the name of its second frame, the file itself.
+pub fn file_of(input: &Path) -> &Path {
+    let first = input.to_str().and_then(|name| name.strip_suffix(DOWN));
+    first
+        .filter(|name| name.ends_with("_mtrx"))
+        .map_or(input, Path::new)
+}
+
+/// Whether an input is the second frame of a file.
+pub fn is_second_frame(input: &Path) -> bool {
+    file_of(input) != input
+}
+
+/// Behind each file that holds a whole frame downwards beside the one upwards the name of that frame: `NAME--1_1.Z_mtrx (down)`.
+pub fn with_second_frames(files: Vec<PathBuf>) -> Vec<PathBuf> {
+    let both = files.into_iter().flat_map(|file| {
+        let second = second_frame(&file);
+        [Some(file), second].into_iter().flatten()
+    });
+    both.collect()
+}
+
+/// The name of the second frame of a file, if it is there and whole.
+pub fn second_frame(file: &Path) -> Option<PathBuf> {
+    let name = file.file_name()?.to_str()?;
+    if is_curve(&frame_and_channel(name)?.1) {
+        return None;
+    }
+    let source = Source::disk(file);
+    let content = source.content().ok()?;
+    read(
+        &source,
+        content.bytes(),
+        Some(FrameDirection::Down),
+        &|_| false,
+    )
+    .ok()?;
+    Some(file.with_file_name(format!("{name}{DOWN}")))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

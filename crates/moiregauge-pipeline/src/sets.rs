@@ -4,6 +4,8 @@ use std::path::{Component, Path, PathBuf};
 
 use moiregauge_report::results::NamedSet;
 
+use crate::session::file_of;
+
 /// A set made by hand that has no file.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SetError {
@@ -51,7 +53,7 @@ pub fn absolute(path: &Path) -> PathBuf {
 
 /// The first set that has the file.
 pub fn set_of<'a>(sets: &'a [NamedSet], file: &Path) -> Option<&'a str> {
-    let file = absolute(file);
+    let file = absolute(file_of(file));
     let found = sets
         .iter()
         .find(|set| file.starts_with(absolute(Path::new(&set.path))));

@@ -15,6 +15,7 @@ use crate::content::Content;
 use crate::hash;
 use crate::in_memory::ScanInMemory;
 use crate::reading::{self, FileError};
+use crate::session::file_of;
 
 /// Where files are that are not where their names say: elsewhere on the disk, or in memory (uploads, arrays).
 ///
@@ -59,7 +60,7 @@ impl Places {
 
     /// Where a file lies on the disk, if it is not held.
     pub fn place<'a>(&'a self, name: &'a Path) -> &'a Path {
-        self.moved.get(name).map_or(name, PathBuf::as_path)
+        file_of(self.moved.get(name).map_or(name, PathBuf::as_path))
     }
 
     /// The file of this name.
@@ -78,6 +79,7 @@ impl Places {
 
     /// The file of this name, wherever others of its name may have been moved.
     pub(crate) fn named<'a>(&'a self, name: &'a Path) -> Source<'a> {
+        let name = file_of(name);
         Source {
             held: Some(&self.held).filter(|held| held.contains_key(name)),
             path: Cow::Borrowed(name),

@@ -8,7 +8,9 @@ use std::fmt::Write as _;
 use heterostrain::lattice::Lattice;
 use heterostrain::strain::{StrainTensor, TwistStrain};
 use heterostrain::{Estimate, TotalEstimate};
-use moiregauge::campaign::{Analysis, Combined, Drift, ScanAnalysis, SetAnalysis, SetMean};
+use moiregauge::campaign::{
+    Analysis, Combined, Drift, ScanAnalysis, SetAnalysis, SetLattice, SetMean,
+};
 use moiregauge::caveat::ChosenBy;
 use moiregauge::meaning::Budget;
 use moiregauge::meaning::{NameReading, Naming, Readings};
@@ -56,9 +58,15 @@ fn set_summary(text: &mut String, set: &SetAnalysis, settings: &Settings) {
             n => format!(", {n} more not used"),
         }
     );
-    match &set.drift {
-        Some(drift) => drift_line(text, drift, settings),
-        None => text.push_str("  drift         not determined\n"),
+    if let Some(drift) = &set.drift {
+        drift_line(text, drift, settings);
+    } else {
+        let alone = || set.lattice.as_ref()?.assumed;
+        let assumed = set.mean.as_ref().map_or_else(alone, |mean| mean.assumed);
+        let words = assumed.map_or_else(String::new, |drift| {
+            format!("; assumed: 0 ± {} nm/min", two_digits(60.0 * drift.sigma))
+        });
+        let _ = writeln!(text, "  drift         not determined{words}");
     }
     match (&set.mean, &set.uncorrected) {
         (Some(mean), _) => set_mean(text, mean),
@@ -69,13 +77,17 @@ fn set_summary(text: &mut String, set: &SetAnalysis, settings: &Settings) {
             set_mean(text, mean);
         }
         (None, None) => {
-            if let Some(scan) = set.scans.first() {
-                let lattice = scan.drift_corrected.as_ref().unwrap_or(&scan.sensor);
-                let lengths = [0, 1, 2].map(|i| plus_minus(lattice.wavelength(i)));
-                let all = lengths.join(", ");
-                lattice_line(text, lattice, &format!("{all} nm (statistical errors)"));
+            if let Some(found) = &set.lattice {
+                lattice_alone(text, found);
+            } else {
+                for scan in used() {
+                    let lattice = scan.drift_corrected.as_ref().unwrap_or(&scan.sensor);
+                    let lengths = [0, 1, 2].map(|i| plus_minus(lattice.wavelength(i)));
+                    let words = format!("{} nm in {}", lengths.join(", "), scan.file);
+                    lattice_line(text, lattice, &words);
+                }
+                text.push_str("  no result for all scans together\n");
             }
-            text.push_str("  no twist and strain explain this lattice\n");
         }
     }
     text.push('\n');
@@ -94,12 +106,26 @@ fn set_mean(text: &mut String, mean: &SetMean) {
         let variance = mean.budget.known().wavelengths[i];
         TotalEstimate::new(mean.lattice.wavelength(i), variance)
     });
-    let totals = lengths.map(|l| plus_minus(l.total())).join(", ");
-    let parts = lengths.map(|l| two_digits(l.statistical)).join(", ");
-    let words = format!("{totals} nm (statistical ± {parts} nm)");
-    lattice_line(text, &mean.lattice, &words);
+    lattice_line(text, &mean.lattice, &in_all(&lengths));
     twist_strain(text, &mean.twist_strain, &mean.budget, &mean.readings);
     readings(text, &mean.readings);
+}
+
+/// Lengths with their totals, in words.
+fn in_all(lengths: &[TotalEstimate; 3]) -> String {
+    let totals = lengths.map(|l| plus_minus(l.total())).join(", ");
+    let parts = lengths.map(|l| two_digits(l.statistical)).join(", ");
+    format!("{totals} nm (statistical ± {parts} nm)")
+}
+
+/// A lattice without twist and strain, and how the scans scatter about it.
+fn lattice_alone(text: &mut String, found: &SetLattice) {
+    lattice_line(text, &found.lattice, &in_all(&found.wavelengths));
+    if found.scatter.iter().all(|s| s.is_finite()) {
+        let scatter = found.scatter.map(two_digits).join(", ");
+        let _ = writeln!(text, "  scatter       {scatter} nm over the scans");
+    }
+    text.push_str("  no twist and strain explain this lattice\n");
 }
 
 /// How many scans went up, how many down.

@@ -17,7 +17,7 @@ function explanations() {
 }
 
 /**
- * The mean that stands for the results: of all sets together, or that of one set; without a drift the uncorrected one.
+ * The mean that stands for the results: of all sets together, or that of one set, without a drift with an assumed one in its errors.
  * @param {any} results
  * @param {string} [chosen] name of a set
  */
@@ -27,7 +27,7 @@ export function meanOf(results, chosen) {
   if (!set && results?.combined && sets.length > 1) return { name: "all sets together", mean: results.combined, drift: results.combined.drift, corrected: true };
   const one = set ?? sets[0];
   if (!one) return null;
-  return { name: one.name, mean: one.mean ?? one.uncorrected, drift: one.drift, corrected: !!one.mean };
+  return { name: one.name, mean: one.mean ?? one.uncorrected, drift: one.drift, corrected: !!one.mean && !one.mean.drift_assumed };
 }
 
 /**
@@ -58,7 +58,7 @@ export function headline(found) {
     item("Heterostrain ε", total(mean?.heterostrain_percent, "%"), interval ? `95 %: ${number(interval[0])} to ${number(interval[1])} % (statistical)` : statistical(mean?.heterostrain_percent, "%")),
     item("Axis of tension, to x", axis ? total(axis, "°") : "not significant", axis ? statistical(axis, "°") : null),
     drift ? lines(drift.given ? "Drift, as given" : "Drift", [["x", total(drift.x_nm_per_min, "nm/min")], ["y", total(drift.y_nm_per_min, "nm/min")]])
-      : item("Drift", "not determined", "Twist and strain are not corrected for drift", true),
+      : item("Drift", "not determined", mean?.drift_assumed ? `assumed: 0 ± ${number(mean.drift_assumed.sigma_nm_per_min)} nm/min, in the errors` : "Twist and strain are not corrected for drift", true),
     lines("Wavelengths, angles to x", (mean?.vectors ?? []).map((/** @type {any} */ v) => [total(v.wavelength_nm, "nm"), `at ${number(v.polar_angle_deg, 4)}°`])));
 }
 

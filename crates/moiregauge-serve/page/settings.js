@@ -22,6 +22,7 @@ const ENTRIES = [
   { key: "moires", label: "Moirés in an image", kind: "number", usual: 1, more: true },
   { key: "seed", label: "Seed", kind: "number", usual: 1, more: true },
   { key: "frame_time_sigma_s", label: "Error of frame times (s)", kind: "number", usual: 0.6, more: true },
+  { key: "drift_prior_nm_per_min", label: "Drift where scans do not tell it, ± (nm/min)", kind: "number", usual: 1, more: true },
   { key: "exclude_outliers", label: "Leave out scans that do not fit", kind: "check", usual: false, more: true },
   { key: "overlap", label: "Only the region all scans share", kind: "check", usual: false, more: true },
 ];

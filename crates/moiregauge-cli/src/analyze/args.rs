@@ -136,6 +136,9 @@ pub(crate) struct AnalyzeArgs {
     /// Standard uncertainty of each component of --drift, nm/min
     #[arg(long, value_name = "SIGMA", requires = "drift", value_parser = numbers::number(numbers::NOT_NEGATIVE), help_heading = METHOD)]
     drift_sigma: Option<f64>,
+    /// Standard uncertainty of a drift that scans do not tell, nm/min [default: 1]
+    #[arg(long, value_name = "SIGMA", value_parser = numbers::number(numbers::NOT_NEGATIVE), help_heading = METHOD)]
+    drift_prior: Option<f64>,
     /// Monte Carlo draws for the drift, per set [default: 10000]
     #[arg(long, value_name = "N", value_parser = numbers::count(0, MOST_DRAWS), help_heading = METHOD)]
     drift_draws: Option<usize>,
@@ -264,6 +267,7 @@ impl AnalyzeArgs {
         s.exclude.extend(self.exclude.iter().cloned());
         s.exclude_outliers |= self.exclude_outliers;
         s.frame_time_sigma_s = self.frame_time_sigma.unwrap_or(s.frame_time_sigma_s);
+        s.drift_prior_nm_per_min = self.drift_prior.unwrap_or(s.drift_prior_nm_per_min);
         s.drift_draws = self.drift_draws.unwrap_or(s.drift_draws);
         s.strain_draws = self.strain_draws.unwrap_or(s.strain_draws);
         s.seed = self.seed.unwrap_or(s.seed);

@@ -13,7 +13,7 @@ use moiregauge_report::{FailedInput, write_report};
 use super::args::AnalyzeArgs;
 use super::export;
 use super::task::Task;
-use crate::errors::advice;
+use crate::errors::{self, advice};
 use crate::hints;
 use crate::outputs::{commit, folder, write_all};
 use crate::say::say;
@@ -168,10 +168,7 @@ impl Output {
         eprint!("{}", failures(&failed));
         let refused = outcomes.iter().find_map(|o| refusal(&o.analysis));
         if let Some(why) = refused {
-            eprintln!("error: {}: {}", why.place, why.message());
-            if let Some(option) = hints::of(why.code()) {
-                eprintln!("try {option}");
-            }
+            errors::refused(why);
         }
         Ok(
             if task.is_same(&documents) && failed.is_empty() && refused.is_none() {

@@ -13,6 +13,7 @@ use super::args::MapArgs;
 use super::hint::in_words;
 use super::words::summary;
 use crate::analyze::Task;
+use crate::errors::refused;
 use crate::interrupt::{kept_for_next, take};
 use crate::outputs;
 use crate::say::say;
@@ -46,8 +47,11 @@ pub(crate) fn run(args: &MapArgs, job: &Job) -> anyhow::Result<ExitCode> {
     told(args, &results.map_err(in_words)?, sink)?;
     let failed = &found.provenance.failed;
     eprint!("{}", failures(failed));
+    if let Some(why) = &found.refused {
+        refused(why);
+    }
     let same = task.is_same(&written(&args.analyze.out().join("map.json")));
-    Ok(ended(same && failed.is_empty()))
+    Ok(ended(same && failed.is_empty() && found.refused.is_none()))
 }
 
 /// Puts everything in place and says what there is.

@@ -157,7 +157,7 @@ fn nothing_to_look_at_is_no_missing_lattice() {
     std::fs::write(&picture, "1,2,3\n4,5,6\n7,8,9\n").unwrap();
     for (input, reason) in [
         (&empty, "holds no scan files"),
-        (&picture, "--size 70nm×70nm"),
+        (&picture, "--size 70nm (one length"),
     ] {
         let run = run(&mut calibrate(input, &["--material", "graphite"]));
         assert_eq!(run.code, Some(1));

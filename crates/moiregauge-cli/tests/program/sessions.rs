@@ -157,6 +157,81 @@ fn what_is_missing_is_named() {
     );
 }
 
+/// Of a file that holds a frame upwards and one downwards both are measured, which gives the drift: 2 % of a frame in the time of
+/// one, in a frame of 80 nm. Who says which frame to read gets that one.
+#[test]
+fn both_frames_of_a_file_give_the_drift() {
+    let work = tempfile::tempdir().expect("a folder");
+    let side = 128;
+    let mut samples = Vec::new();
+    for n in 0..2 * side {
+        let line = if n < side { n } else { 2 * side - 1 - n };
+        let place = f64::from(line) - 0.02 * f64::from(n);
+        let row = |x: i32| {
+            let at = |degrees: f64| {
+                let (sin, cos) = degrees.to_radians().sin_cos();
+                let phase = (f64::from(x) * cos + place * sin) * 9.0 / f64::from(side);
+                (std::f64::consts::TAU * phase).cos()
+            };
+            (1e6 * (at(7.0) + at(67.0) + at(127.0))) as i32
+        };
+        samples.extend((0..side).map(row));
+        samples.extend((0..side).rev().map(row));
+    }
+    let name = "s--1_1.Z_mtrx";
+    let log = session()
+        .change(5, "XYScanner", "Points", "Count", V::Long(side))
+        .change(5, "XYScanner", "Lines", "Count", V::Long(side))
+        .change(5, "XYScanner", "Height", "Meter", V::Double(8e-8))
+        .stored(STORED, name);
+    let file = work.path().join(name);
+    std::fs::write(&file, data(STORED, 7, samples.len() as u32, &samples)).expect("written");
+    std::fs::write(work.path().join("s_0001.mtrx"), log.0).expect("written");
+    let out = work.path().join("out");
+    let folder = work.path();
+    succeed(analyze(folder, &out).args(["--channel", "Z"]));
+    let found = results(&out);
+    let set = &found["sets"][0];
+    let frames: Vec<(&str, &str)> = set["scans"]
+        .as_array()
+        .expect("scans")
+        .iter()
+        .map(|scan| {
+            let text = |key: &str| scan[key].as_str().expect("text");
+            (text("file"), text("frame_direction"))
+        })
+        .collect();
+    let second = format!("{name} (down)");
+    assert_eq!(frames.len(), 2);
+    assert!(
+        frames[0].0.ends_with(name) && frames[0].1 == "up",
+        "{frames:?}"
+    );
+    assert!(
+        frames[1].0.ends_with(&second) && frames[1].1 == "down",
+        "{frames:?}"
+    );
+    // Along the lines in the axes of the frame, which is turned; 0.02 of the speed of the slow scan.
+    let drift = |axis: &str| set["drift"][axis]["value"].as_f64().expect("a drift") / 60.0;
+    let speed = set["scans"][0]["tip_velocity_nm_per_s"]["slow"]["value"].as_f64();
+    let share = drift("x_nm_per_min").hypot(drift("y_nm_per_min")) / speed.expect("a speed");
+    assert!((share - 0.02).abs() < 0.001, "{share}");
+    let again = work.path().join("again");
+    let document = out.join("results.json");
+    succeed(
+        program()
+            .args(["analyze", "--replay"])
+            .arg(&document)
+            .arg("--out")
+            .arg(&again),
+    );
+    let one = work.path().join("one");
+    succeed(analyze(&file, &one).args(["--channel", "Z", "--frame-direction", "down"]));
+    let one = &results(&one)["sets"][0]["scans"];
+    assert_eq!(one.as_array().map(Vec::len), Some(1));
+    assert_eq!(one[0]["frame_direction"], "down");
+}
+
 /// A lattice through the whole chain: the doubt of the reader is one of the results.
 #[test]
 fn results_carry_the_doubt() {

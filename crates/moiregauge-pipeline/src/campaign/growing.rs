@@ -19,6 +19,7 @@ use super::shown::show;
 use crate::job::Job;
 use crate::known::Known;
 use crate::names::{in_words, with_words};
+use crate::session::is_second_frame;
 use crate::source::Places;
 use crate::told::check_told;
 use crate::twice::distinct;
@@ -125,9 +126,11 @@ impl Campaign {
         Ok(campaign)
     }
 
-    /// Adds scans, in order.
+    /// Adds scans, in order. Second frames of files are left out where somebody told which frame to read.
     pub fn add(&mut self, scans: impl IntoIterator<Item = PathBuf>) {
-        self.of.inputs.extend(scans);
+        let told = self.of.told.frame_direction.is_some();
+        let wanted = |scan: &PathBuf| !(told && is_second_frame(scan));
+        self.of.inputs.extend(scans.into_iter().filter(wanted));
     }
 
     /// Removes a scan; whether it was there. What was measured of it is kept.
@@ -195,7 +198,8 @@ impl Campaign {
 
     /// Puts these scans, and names that cannot be measured, in the place of those before. What was measured is kept.
     pub(crate) fn replace(&mut self, scans: Vec<PathBuf>, left_out: Vec<FailedInput>) {
-        self.of.inputs = scans;
+        self.of.inputs.clear();
+        self.add(scans);
         self.of.left_out = left_out;
     }
 

@@ -184,6 +184,7 @@ fn measuring(settings: &Settings) -> Settings {
         exclude_outliers: _,
         overlap: _,
         drift: _,
+        drift_prior_nm_per_min: _,
         calibration: _,
         isotropic_strain_percent: _,
         drift_draws: _,

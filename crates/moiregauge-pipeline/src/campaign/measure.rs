@@ -19,6 +19,7 @@ use crate::job::{Cancelled, Job};
 use crate::known::Known;
 use crate::memory::enough_for;
 use crate::opened::{InputError, Opened, Reading, read_scan};
+use crate::session::is_second_frame;
 use crate::sets::set_of;
 use crate::stamp::Stamp;
 use crate::twice::Repeated;
@@ -185,7 +186,13 @@ fn of_reading(
     let mut moires = measure_moires(&input.file, &scan, settings, window)?;
     for measured in &mut moires {
         measured.caveats.extend(caveats.iter().cloned());
-        measured.digest = Some(input.sha256.clone());
+        // A file may hold two frames.
+        let frame = if is_second_frame(Path::new(&input.file)) {
+            " down"
+        } else {
+            ""
+        };
+        measured.digest = Some(format!("{}{frame}", input.sha256));
     }
     Ok((moires, input))
 }

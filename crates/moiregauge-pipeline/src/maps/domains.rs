@@ -18,6 +18,17 @@ pub struct Domains {
     pub caveats: Vec<Caveat>,
 }
 
+impl Domains {
+    /// None are looked for where no layers make the lattice: triangles would read it all the same.
+    pub(super) fn none(map: &TwistStrainMap) -> Self {
+        Self {
+            map: None,
+            regime: regime(map, None),
+            caveats: Vec::new(),
+        }
+    }
+}
+
 /// Missing and extra nodes beyond this share of all make the mesh doubtful.
 const ODD: f64 = 0.15;
 

@@ -1,6 +1,6 @@
 //! Caveats of maps.
 
-use moiregauge::caveat::{Caveat, DriftDoubt, MapDoubt, Mapped};
+use moiregauge::caveat::{Caveat, Doubt, DriftDoubt, MapDoubt, Mapped};
 use moiregauge::map::register;
 use moiregauge::map::{DriftChange, LatticeMap};
 use moiregauge::survey::LineMap;
@@ -9,9 +9,13 @@ use moiregauge::survey::LineMap;
 const FAR: f64 = 0.3;
 
 /// Says that no twist and strain go with the map.
-pub(super) fn no_twist_strain(why: &impl std::fmt::Display) -> Caveat {
-    let reason = why.to_string();
+pub(super) fn no_twist_strain(reason: String) -> Caveat {
     Caveat::new(MapDoubt::NoTwistStrain { reason }, "map")
+}
+
+/// Whether it says that no twist and strain go with the map.
+pub(super) fn is_no_twist_strain(caveat: &Caveat) -> bool {
+    matches!(caveat.doubt, Doubt::Maps(MapDoubt::NoTwistStrain { .. }))
 }
 
 /// Says that several grains are mapped.

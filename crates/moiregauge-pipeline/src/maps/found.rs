@@ -23,6 +23,8 @@ pub struct MapFound {
     pub images: Vec<MappedImage>,
     /// Doubts.
     pub caveats: Vec<Caveat>,
+    /// Why the analysis of the same scans is refused: then the map has no twist and strain either.
+    pub refused: Option<Caveat>,
 }
 
 /// What scans show.

@@ -1,7 +1,7 @@
 //! Scans that show a lattice → their maps, and the average of these.
 
-use moiregauge::campaign::{Analysis, ScanAnalysis, SetAnalysis, grains, picture};
-use moiregauge::caveat::Caveat;
+use moiregauge::campaign::{Analysis, ScanAnalysis, SetAnalysis, grains, picture, refusal};
+use moiregauge::caveat::{Caveat, Doubt, MoireDoubt};
 use moiregauge::domains::{Contrast, DomainMap};
 use moiregauge::map::{Agreement, DriftChange, RegistryMap, TwistStrainMap};
 use moiregauge::scan::Picture;
@@ -165,12 +165,16 @@ impl Scans<'_> {
         };
         let reference = maps[0].whole;
         let (layers, convention) = (settings.bilayer(), settings.strain_convention);
-        let found = lattices
-            .twist_strain(&reference, layers, convention)
-            .unwrap_or_else(|why| {
-                caveats.push(doubts::no_twist_strain(&why));
-                vec![None; lattices.nodes.len()]
-            });
+        let found = match self.no_twist_strain(grain) {
+            Some(why) => Err(why),
+            None => lattices
+                .twist_strain(&reference, layers, convention)
+                .map_err(|why| why.to_string()),
+        };
+        let found = found.unwrap_or_else(|why| {
+            caveats.push(doubts::no_twist_strain(why));
+            vec![None; lattices.nodes.len()]
+        });
         doubts::of_maps(&maps, &mut caveats);
         if resolution.margin.is_none() {
             let narrow = maps
@@ -210,6 +214,23 @@ impl Scans<'_> {
             })
         };
         self.used().flat_map(of_scan).collect()
+    }
+
+    /// Why the analysis gives no twist and strain of all sets, or of those of a grain; `None` where it does. What it refuses is not mapped.
+    fn no_twist_strain(&self, grain: Option<&[usize]>) -> Option<String> {
+        let all: Vec<usize> = (0..self.analysis.sets.len()).collect();
+        let sets = grain
+            .unwrap_or(&all)
+            .iter()
+            .map(|&i| &self.analysis.sets[i]);
+        let found = |set: &SetAnalysis| set.mean.is_some() || set.uncorrected.is_some();
+        if sets.clone().any(found) {
+            return None;
+        }
+        let no_moire = |c: &&Caveat| matches!(c.doubt, Doubt::Moire(MoireDoubt::NoMoire { .. }));
+        let why = refusal(self.analysis).or_else(|| self.analysis.caveats.iter().find(no_moire));
+        let words = "no twist and strain explain the lattice of the images".to_owned();
+        Some(why.map_or(words, Caveat::message))
     }
 
     /// The scans that are not excluded.

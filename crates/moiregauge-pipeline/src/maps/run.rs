@@ -3,6 +3,8 @@
 use moiregauge::campaign::{Analysis, is_nothing_left, refusal};
 use moiregauge_report::Provenance;
 
+use super::domains::Domains;
+use super::doubts;
 use super::error::NotMapped;
 use super::found::{LatticeShown, MapFound, Shown};
 use super::lattices::{NoMap, map_lattices};
@@ -96,9 +98,13 @@ fn mapped(
         },
     })?;
     provenance.failed.append(&mut found.failed);
-    let domains = request
-        .domains
-        .answer(&found.map, |contrast| scans.domains(contrast));
+    let domains = if found.caveats.iter().any(doubts::is_no_twist_strain) {
+        Domains::none(&found.map)
+    } else {
+        request
+            .domains
+            .answer(&found.map, |contrast| scans.domains(contrast))
+    };
     found.caveats.extend(domains.caveats.iter().cloned());
     Ok(MapFound {
         shown: Shown::Lattice(Box::new(LatticeShown {
@@ -115,5 +121,6 @@ fn mapped(
         provenance,
         images: found.images,
         caveats: found.caveats,
+        refused: refusal(analysis).cloned(),
     })
 }

@@ -120,6 +120,7 @@ pub(super) fn look(
         caveats.extend(narrow_margin(found.stripes.margin, file));
     }
     Ok(Some(MapFound {
+        refused: None,
         images: images(&found, file),
         shown: Shown::Stripes(Box::new(found)),
         provenance: Provenance {

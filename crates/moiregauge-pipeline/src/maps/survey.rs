@@ -101,6 +101,7 @@ pub(super) fn survey(
     let domains = request.domains.answer(&map, look);
     caveats.extend(domains.caveats.iter().cloned());
     Ok(Some(MapFound {
+        refused: None,
         shown: Shown::Lattice(Box::new(LatticeShown {
             map,
             whole: None,

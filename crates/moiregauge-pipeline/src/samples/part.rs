@@ -55,7 +55,7 @@ pub(super) fn key(asked: &Asked, sample: &str, files: &SampleFiles) -> String {
     add(&SCHEMA);
     add(asked);
     add(&sample);
-    let identified = |path: &Path| match identity(path, path) {
+    let identified = |path: &Path| match identity(path, session::file_of(path)) {
         Ok(file) => file.sha256,
         // Unread: what is wrong with it is what is known of it.
         Err(error) => error.to_string(),

@@ -8,7 +8,7 @@ use spmfile::Format;
 
 use crate::find::{self, Look};
 use crate::names::in_words;
-use crate::session::one_per_frame;
+use crate::session::{one_per_frame, second_frame};
 use crate::stamp::Stamp;
 
 /// Steps without a file after which it is gone: one listing of a network share may leave it out.
@@ -35,6 +35,8 @@ struct File {
     /// Steps since it was last seen.
     missing: usize,
     state: State,
+    /// Its second frame, if it holds one.
+    second: Option<PathBuf>,
 }
 
 #[derive(Clone, Debug)]
@@ -126,6 +128,7 @@ impl Files {
             let again = self.listed.get(&path);
             let was_scan = again.is_some_and(|f| !matches!(f.state, State::Other | State::New));
             let new = File {
+                second: None,
                 stamp,
                 unchanged: 0,
                 missing: 0,
@@ -159,6 +162,7 @@ impl Files {
                 State::Other
             }
             Judged::Whole(format) => {
+                file.second = second_frame(&path);
                 seen.fresh.push(path);
                 State::Whole(format)
             }
@@ -185,7 +189,11 @@ impl Files {
                 State::New | State::Other => {}
             }
         }
-        seen.scans = one_per_frame(scans);
+        for path in one_per_frame(scans) {
+            let second = self.listed[&path].second.clone();
+            seen.scans.push(path);
+            seen.scans.extend(second);
+        }
     }
 }
 

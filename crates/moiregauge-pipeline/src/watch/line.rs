@@ -160,7 +160,11 @@ impl Line {
             .iter()
             .find(file)
             .and_then(|scan| scan.acquired.clone());
-        if let Some(mean) = &result.mean {
+        if let Some(mean) = result
+            .mean
+            .as_ref()
+            .filter(|mean| mean.drift_assumed.is_none())
+        {
             let Mean {
                 twist_deg,
                 heterostrain_percent,

@@ -30,6 +30,10 @@ class Options(TypedDict, total=False):
     crop: The block of the image to use.
     drift: A drift known beforehand; `None`: measure it.
     drift_draws: Monte Carlo draws for the drift.
+    drift_prior_nm_per_min: Standard deviation of each component of the drift where scans do not tell it and
+        `drift` is not given, nm/min, for the uncertainty budget. The default is what an instrument at rest
+        drifts; where a frame is so slow that this would be more than a quarter of the speed at which its
+        lines advance, that quarter is taken.
     exclude: Scans that are shown but not used: names of files, `*` stands for any characters.
     exclude_outliers: Whether scans that do not fit the others are left out by themselves: one after the
         other, worst first, while the leave-one-out χ² of a scan has p < 0.001/n; never more than a fifth.
@@ -85,6 +89,7 @@ class Options(TypedDict, total=False):
     crop: Mapping[str, Any]
     drift: tuple[float, float] | Mapping[str, float]
     drift_draws: int
+    drift_prior_nm_per_min: float
     exclude: Sequence[str]
     exclude_outliers: bool
     frame_direction: FrameOrder | Sequence[Literal['up', 'down']]

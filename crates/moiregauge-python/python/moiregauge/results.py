@@ -13,6 +13,7 @@ from moiregauge._document import Document, decoded_by, several
 
 __all__ = [
     "AgreementResult",
+    "AssumedDriftResult",
     "AtomicImages",
     "AtomicResult",
     "Background",
@@ -83,6 +84,7 @@ __all__ = [
     "ScanVector",
     "ScannerCalibration",
     "ScatterResult",
+    "SetLatticeResult",
     "SetResult",
     "Settings",
     "ShiftResult",
@@ -151,6 +153,18 @@ class AgreementResult(Document):
 
 
 @dataclass(frozen=True, kw_only=True)
+class AssumedDriftResult(Document):
+    """A drift of 0 that was assumed: its error is in every σ."""
+
+    line_rate_assumed: bool
+    """Whether the line rate was not known either, and one between 0.5 and 10 Hz was assumed."""
+    sigma_nm_per_min: float | None
+    """Standard deviation of each component, nm/min: that of the settings, or a quarter of the speed of the
+    slow scan.
+    """
+
+
+@dataclass(frozen=True, kw_only=True)
 class AtomicImages(Document):
     """Images in which the orientation of a layer is measured."""
 
@@ -194,7 +208,9 @@ class BudgetColumn(Document):
     calibration_orthogonality: float | None
     """Axes that do not stand at a right angle."""
     drift: float | None
-    """Uncertainty of the drift; `null` where the drift was not removed."""
+    """Uncertainty of the drift, that of a prior where `drift_assumed` says so; `null` where the drift was not
+    removed.
+    """
     image: float | None
     """Noise of the images, drift and sensors known exactly."""
     isotropic_strain: float | None
@@ -217,6 +233,8 @@ class BudgetColumn(Document):
 class BudgetResult(Document):
     """Contributions to the uncertainty of a lattice and of all that follows from it."""
 
+    drift_assumed: bool
+    """Whether nothing tells the drift, so that its row is that of a prior."""
     heterostrain_percent: BudgetColumn
     """Of `heterostrain_percent`."""
     lattice_angle_deg: BudgetColumn
@@ -691,7 +709,9 @@ class LatticeVector(Document):
     covariance_nm2: tuple[tuple[float | None, float | None], tuple[float | None, float | None]]
     """Covariance of (x, y), nm²."""
     naive_twist_deg: Estimate
-    """2 arcsin(a/2λ), degrees: the twist if nothing were strained."""
+    """2 arcsin(a/2λ), degrees: the twist if nothing were strained; `null` beyond 30°, where the vector is
+    that of atoms.
+    """
     polar_angle_deg: float | None
     """Direction, degrees counter-clockwise from x, in (−180, 180]."""
     polar_angle_sigma_deg: float | None
@@ -914,6 +934,8 @@ class MeanResult(Document):
     """χ² per degree of freedom of the scans against this lattice. Where it is significantly above 1 (p <
     0.05), every σ of this object is enlarged by its square root.
     """
+    drift_assumed: AssumedDriftResult | None
+    """What was assumed of a drift that the scans do not tell; `null` where it was measured or given."""
     heterostrain_percent: Estimate
     """Magnitude of the uniaxial heterostrain with the noise bias removed, per cent."""
     heterostrain_sigma_unscaled_percent: float | None
@@ -1244,7 +1266,7 @@ class Results(ResultsBase):
     caveats: tuple[Caveat, ...]
     """Doubts."""
     combined: CombinedResult | None
-    """All sets together; `null` where no set could be corrected for drift."""
+    """All sets together; `null` where the drift of several sets is known of none."""
     conventions: Conventions
     """What the numbers mean."""
     failed: tuple[FailedInput, ...]
@@ -1383,6 +1405,22 @@ class ScatterResult(Document):
 
 
 @dataclass(frozen=True, kw_only=True)
+class SetLatticeResult(Document):
+    """The lattice of a set that no twist and strain explain: of atoms, of a surface, of other layers."""
+
+    chi2_per_dof: float | None
+    """χ² per degree of freedom of the scans against this lattice. Where it is significantly above 1 (p <
+    0.05), every σ of this object is enlarged by its square root.
+    """
+    drift_assumed: AssumedDriftResult | None
+    """What was assumed of a drift that the scans do not tell; `null` where it was measured or given."""
+    vectors: tuple[LatticeVector, LatticeVector, LatticeVector]
+    """L1, L2 and L3, corrected for drift where the set has one."""
+    wavelength_scatter_nm: tuple[float | None, float | None, float | None]
+    """Standard deviations of the three lengths over the scans, nm."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class SetResult(Document):
     """Scans of one slow axis, line rate, size and channel."""
 
@@ -1391,15 +1429,21 @@ class SetResult(Document):
     checks: ChecksResult | None
     """Errors from the scatter of the scans; `null` without a joint fit."""
     drift: DriftResult | None
-    """The drift; `null` where the scans cannot determine it."""
+    """The drift; `null` where the scans cannot determine it: then one is assumed, see `drift_assumed` of
+    `mean`.
+    """
     forward_backward: TwistStrainResult | None
     """From the mean reciprocal lattice of up and down scans: free of constant drift without knowing it. A
     check of `mean`.
     """
+    lattice: SetLatticeResult | None
+    """The lattice of all scans together, where no twist and strain explain it; `null` where they do, and
+    where it may be another one.
+    """
     line_rate_hz: float | None
     """Lines per second (trace and retrace together)."""
     mean: MeanResult | None
-    """All scans together, corrected for drift."""
+    """All scans together, corrected for drift, or with an assumed drift in the errors."""
     name: str
     """Name for people, unique in the document."""
     scans: tuple[ScanResult, ...]
@@ -1426,6 +1470,12 @@ class Settings(Document):
     """A drift known beforehand; `None`: measure it."""
     drift_draws: int
     """Monte Carlo draws for the drift."""
+    drift_prior_nm_per_min: float
+    """Standard deviation of each component of the drift where scans do not tell it and `drift` is not given,
+    nm/min, for the uncertainty budget. The default is what an instrument at rest drifts; where a frame is
+    so slow that this would be more than a quarter of the speed at which its lines advance, that quarter is
+    taken.
+    """
     exclude: tuple[str, ...]
     """Scans that are shown but not used: names of files, `*` stands for any characters."""
     exclude_outliers: bool
@@ -1815,6 +1865,9 @@ decoded_by(
             "chi2_per_dof": float,
             "variance_factor": float,
         },
+        AssumedDriftResult: {
+            "sigma_nm_per_min": float,
+        },
         AtomicImages: {
             "files": several(None),
         },
@@ -2058,6 +2111,7 @@ decoded_by(
         MeanResult: {
             "budget": BudgetResult.from_dict,
             "chi2_per_dof": float,
+            "drift_assumed": AssumedDriftResult.from_dict,
             "heterostrain_percent": Estimate.from_dict,
             "heterostrain_sigma_unscaled_percent": float,
             "lattice_angle_deg": Estimate.from_dict,
@@ -2219,10 +2273,17 @@ decoded_by(
             "strain_vector_percent": several(float, 2),
             "twist_deg": float,
         },
+        SetLatticeResult: {
+            "chi2_per_dof": float,
+            "drift_assumed": AssumedDriftResult.from_dict,
+            "vectors": several(LatticeVector.from_dict, 3),
+            "wavelength_scatter_nm": several(float, 3),
+        },
         SetResult: {
             "checks": ChecksResult.from_dict,
             "drift": DriftResult.from_dict,
             "forward_backward": TwistStrainResult.from_dict,
+            "lattice": SetLatticeResult.from_dict,
             "line_rate_hz": float,
             "mean": MeanResult.from_dict,
             "scans": several(ScanResult.from_dict),
@@ -2232,6 +2293,7 @@ decoded_by(
             "by_hand": ByHand.from_dict,
             "calibration": Calibration.from_dict,
             "drift": GivenDrift.from_dict,
+            "drift_prior_nm_per_min": float,
             "exclude": several(None),
             "frame_time_sigma_s": float,
             "isotropic_strain_percent": float,

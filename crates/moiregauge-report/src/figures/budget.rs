@@ -109,7 +109,11 @@ pub(super) fn draw(analysis: &Analysis, id: &str) -> Result<Drawing, String> {
         ("b", "σ of the heterostrain (%)"),
         strain,
     )?;
-    for (row, (name, kind, _)) in rows.iter().enumerate() {
+    for (row, (name, kind, sources)) in rows.iter().enumerate() {
+        let name = match sources {
+            [Source::Drift] if budget.drift_assumed => "drift (assumed)",
+            _ => name,
+        };
         let at = (NAMES - 5.0, middle(top, row) + 0.36 * SMALL);
         let text = Lettering {
             bold: *kind == Kind::Sum,

@@ -18,7 +18,7 @@ pub(super) fn draw(analysis: &Analysis, id: &str) -> Result<Drawing, String> {
     let sets: Vec<(&SetAnalysis, &SetMean)> = analysis
         .sets
         .iter()
-        .filter_map(|s| s.mean.as_ref().map(|m| (s, m)))
+        .filter_map(|s| s.with_drift().map(|m| (s, m)))
         .collect();
     if sets.len() < 2 {
         return Err("fewer than two sets are corrected for drift".to_owned());

@@ -25,7 +25,7 @@ impl<'a> Subject<'a> {
 
     /// The drift-corrected mean of the set, or why there is none.
     pub(super) fn mean(&self) -> Result<&'a SetMean, &'static str> {
-        let mean = self.set.mean.as_ref();
+        let mean = self.set.with_drift();
         mean.ok_or("the drift of this set is not known")
     }
 }

@@ -29,7 +29,7 @@ fn quantity(result: &TwistStrain, row: usize, axis: f64) -> Option<Estimate> {
 
 pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
     let set = subject.set;
-    let (Some(after), Some(before)) = (&set.mean, &set.uncorrected) else {
+    let (Some(after), Some(before)) = (set.with_drift(), &set.uncorrected) else {
         return Err("the drift of this set is not known".to_owned());
     };
     let means = [&before.twist_strain, &after.twist_strain];

@@ -14,7 +14,9 @@ use super::words::{
 use crate::draw::base64;
 use crate::error::ReportError;
 use crate::figures::Figure;
-use crate::results::{AtomicResult, DriftResult, LineResult, Results, ScanResult, SetResult};
+use crate::results::{
+    AssumedDriftResult, AtomicResult, DriftResult, LineResult, Results, ScanResult, SetResult,
+};
 
 const TEMPLATE: &str = include_str!("report.html");
 
@@ -60,6 +62,8 @@ struct Set<'a> {
     used: usize,
     rate: String,
     drift: Option<Drift>,
+    /// σ of a drift that is assumed.
+    assumed: Option<String>,
     mean: Option<Numbers>,
     mean_statistical: Option<Numbers>,
     /// Of `mean` or, where there is none, of `uncorrected`.
@@ -68,6 +72,8 @@ struct Set<'a> {
     meanings: Option<Meanings>,
     uncorrected: Option<Numbers>,
     uncorrected_wavelengths: Option<[String; 3]>,
+    /// Where there is no twist: lengths, and their scatter over the scans.
+    lattice: Option<[[String; 3]; 2]>,
     forward_backward: Option<Numbers>,
     chi2_per_dof: String,
     twist_scatter: String,
@@ -306,6 +312,7 @@ impl<'a> Set<'a> {
                 .line_rate_hz
                 .map_or_else(|| plain(None, 0), |rate| rate.to_string()),
             drift: set.drift.as_ref().map(drift),
+            assumed: assumed(set).map(|drift| plain(drift.sigma_nm_per_min, 2)),
             mean: mean.map(|m| Numbers::in_all(&m.twist_strain, &m.budget)),
             mean_statistical: mean.map(|m| Numbers::statistical(&m.twist_strain)),
             budget: mean.or(uncorrected).map(|m| Budgeted::new(&m.budget)),
@@ -313,6 +320,10 @@ impl<'a> Set<'a> {
             meanings: mean.or(uncorrected).map(|m| Meanings::new(&m.readings)),
             uncorrected: uncorrected.map(|m| Numbers::statistical(&m.twist_strain)),
             uncorrected_wavelengths: uncorrected.map(|m| wavelengths(&m.vectors)),
+            lattice: set.lattice.as_ref().map(|l| {
+                let scatter = l.wavelength_scatter_nm.map(|s| plain(s, 5));
+                [wavelengths(&l.vectors), scatter]
+            }),
             forward_backward: set.forward_backward.as_ref().map(Numbers::new),
             chi2_per_dof: plain(mean.and_then(|m| m.chi2_per_dof), 2),
             twist_scatter: plain(mean.and_then(|m| m.twist_scatter_deg), 4),
@@ -327,6 +338,12 @@ impl<'a> Set<'a> {
             missing,
         }
     }
+}
+
+/// What was assumed of the drift of a set.
+fn assumed(set: &SetResult) -> Option<AssumedDriftResult> {
+    let alone = || set.lattice.as_ref()?.drift_assumed;
+    set.mean.as_ref().map_or_else(alone, |m| m.drift_assumed)
 }
 
 /// How many scans of a set were used.

@@ -17,7 +17,7 @@ use super::convert::{PERCENT, degree, number, square};
 pub struct BudgetColumn {
     /// Noise of the images, drift and sensors known exactly.
     pub image: Option<f64>,
-    /// Uncertainty of the drift; `null` where the drift was not removed.
+    /// Uncertainty of the drift, that of a prior where `drift_assumed` says so; `null` where the drift was not removed.
     pub drift: Option<f64>,
     /// Noise of the position sensors.
     pub sensor: Option<f64>,
@@ -57,6 +57,8 @@ pub struct BudgetResult {
     pub strain_axis_lab_deg: Option<BudgetColumn>,
     /// Of `lattice_angle_deg`.
     pub lattice_angle_deg: BudgetColumn,
+    /// Whether nothing tells the drift, so that its row is that of a prior.
+    pub drift_assumed: bool,
     /// Of the lengths of the three vectors.
     pub wavelengths_nm: [BudgetColumn; 3],
     /// Covariance of the strain vector from all sources that are known, per cent².
@@ -141,6 +143,7 @@ impl BudgetResult {
                 .axis_lab()
                 .map(|_| BudgetColumn::of(budget, degree(), |c| c.axis_lab)),
             lattice_angle_deg: entry(1, degree()),
+            drift_assumed: budget.drift_assumed,
             wavelengths_nm: [0, 1, 2].map(|i| BudgetColumn::of(budget, 1.0, |c| c.wavelengths[i])),
             strain_vector_covariance: square(&covariance, PERCENT * PERCENT),
             strain_p_value: number(all.strain().p_value()),

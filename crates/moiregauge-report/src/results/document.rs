@@ -23,6 +23,7 @@ use super::lattice::{LatticeVector, TwistStrainResult};
 use super::provenance::Provenance;
 use super::readings::{AtomicResult, ReadingsResult};
 use super::scan::ScanResult;
+use super::set_lattice::{AssumedDriftResult, SetLatticeResult};
 use crate::input::{FailedInput, InputFile};
 use crate::stats::mean_and_deviation;
 
@@ -37,7 +38,7 @@ pub struct Results {
     pub schema: String,
     /// The sets, in order of time.
     pub sets: Vec<SetResult>,
-    /// All sets together; `null` where no set could be corrected for drift.
+    /// All sets together; `null` where the drift of several sets is known of none.
     pub combined: Option<CombinedResult>,
     /// The orientation of a layer by atomically resolved images; `null` without any.
     pub atomic: Option<AtomicResult>,
@@ -80,12 +81,14 @@ pub struct SetResult {
     pub line_rate_hz: Option<f64>,
     /// The analysed channel.
     pub channel: String,
-    /// The drift; `null` where the scans cannot determine it.
+    /// The drift; `null` where the scans cannot determine it: then one is assumed, see `drift_assumed` of `mean`.
     pub drift: Option<DriftResult>,
-    /// All scans together, corrected for drift.
+    /// All scans together, corrected for drift, or with an assumed drift in the errors.
     pub mean: Option<MeanResult>,
     /// The plain mean over the scans, not corrected for drift.
     pub uncorrected: Option<MeanResult>,
+    /// The lattice of all scans together, where no twist and strain explain it; `null` where they do, and where it may be another one.
+    pub lattice: Option<SetLatticeResult>,
     /// From the mean reciprocal lattice of up and down scans: free of constant drift without
     /// knowing it. A check of `mean`.
     pub forward_backward: Option<TwistStrainResult>,
@@ -152,6 +155,8 @@ pub struct MeanResult {
     pub twist_strain: TwistStrainResult,
     /// What contributes to their uncertainty, calibration and model included.
     pub budget: BudgetResult,
+    /// What was assumed of a drift that the scans do not tell; `null` where it was measured or given.
+    pub drift_assumed: Option<AssumedDriftResult>,
     /// What else the lattice can mean.
     pub readings: ReadingsResult,
     /// L1, L2 and L3.
@@ -258,6 +263,10 @@ fn set_result(set: &SetAnalysis, settings: &Settings) -> SetResult {
         drift: set.drift.as_ref().map(|d| drift(d, settings)),
         mean: set.mean.as_ref().map(|m| mean(m, bilayer)),
         uncorrected: set.uncorrected.as_ref().map(|m| mean(m, bilayer)),
+        lattice: set
+            .lattice
+            .as_ref()
+            .map(|l| SetLatticeResult::of(l, bilayer)),
         forward_backward: set.forward_backward.as_ref().map(Into::into),
         checks: set.checks.as_ref().map(Into::into),
         scans: set
@@ -326,6 +335,7 @@ fn mean(mean: &SetMean, bilayer: Bilayer<'_>) -> MeanResult {
     MeanResult {
         twist_strain: TwistStrainResult::of_mean(result, &mean.budget),
         budget: BudgetResult::of(&mean.budget, result),
+        drift_assumed: mean.assumed.map(Into::into),
         readings: (&mean.readings).into(),
         vectors: LatticeVector::of_mean(&mean.lattice, &mean.budget, bilayer),
         twist_scatter_deg: number(mean.twist_scatter * degree()),

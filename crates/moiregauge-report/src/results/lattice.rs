@@ -1,10 +1,12 @@
 //! Estimates, lattice vectors, twist and strain as the document holds them.
 
-use heterostrain::Estimate;
+use std::f64::consts::FRAC_PI_6;
+
 use heterostrain::lattice::Lattice;
 use heterostrain::material::Bilayer;
 use heterostrain::strain::StrainDraw;
 use heterostrain::strain::{TwistStrain, naive_twist};
+use heterostrain::{Estimate, TotalEstimate};
 use moiregauge::meaning::Budget;
 use nalgebra::{Matrix2, Vector2};
 use schemars::JsonSchema;
@@ -32,7 +34,7 @@ pub struct LatticeVector {
     pub polar_angle_deg: Option<f64>,
     /// One standard deviation of the direction, degrees.
     pub polar_angle_sigma_deg: Option<f64>,
-    /// 2 arcsin(a/2λ), degrees: the twist if nothing were strained.
+    /// 2 arcsin(a/2λ), degrees: the twist if nothing were strained; `null` beyond 30°, where the vector is that of atoms.
     pub naive_twist_deg: ResultEstimate,
 }
 
@@ -48,7 +50,7 @@ impl LatticeVector {
             wavelength_nm: estimate(wavelength, 1.0),
             polar_angle_deg: angle.value,
             polar_angle_sigma_deg: angle.sigma,
-            naive_twist_deg: estimate(naive_twist(wavelength, bilayer), degree()),
+            naive_twist_deg: estimate(naive(wavelength, bilayer), degree()),
         }
     }
 
@@ -58,10 +60,30 @@ impl LatticeVector {
 
     /// The three vectors of a mean lattice.
     pub(crate) fn of_mean(lattice: &Lattice, budget: &Budget, bilayer: Bilayer<'_>) -> [Self; 3] {
+        let lengths = [0, 1, 2].map(|index| budget.wavelength(lattice, index));
+        Self::with_lengths(lattice, &lengths, bilayer)
+    }
+
+    /// The three vectors with the totals of their lengths.
+    pub(crate) fn with_lengths(
+        lattice: &Lattice,
+        lengths: &[TotalEstimate; 3],
+        bilayer: Bilayer<'_>,
+    ) -> [Self; 3] {
         [0, 1, 2].map(|index| Self {
-            wavelength_nm: estimate_in_all(budget.wavelength(lattice, index), 1.0),
+            wavelength_nm: estimate_in_all(lengths[index], 1.0),
             ..Self::of(lattice, index, bilayer)
         })
+    }
+}
+
+/// The twist if nothing were strained; none where it would be beyond 30°: the vector is that of atoms.
+fn naive(wavelength: Estimate, bilayer: Bilayer<'_>) -> Estimate {
+    let found = naive_twist(wavelength, bilayer);
+    if found.value > FRAC_PI_6 {
+        Estimate::new(f64::NAN, f64::NAN)
+    } else {
+        found
     }
 }
 

@@ -23,6 +23,7 @@ mod region;
 mod run;
 mod scan;
 mod schema;
+mod set_lattice;
 mod stripes;
 
 pub(crate) use budget::source_name;
@@ -58,4 +59,5 @@ pub use scan::{
     CandidateResult, LineResult, ScanResult, ScanTwistStrain, ScanVector, TipVelocity, Window,
 };
 pub use schema::{map_schema, schema};
+pub use set_lattice::{AssumedDriftResult, SetLatticeResult};
 pub use stripes::{StripeHarmonicResult, StripePatternResult, StripesResult};

@@ -24,6 +24,15 @@ impl BudgetRow<'_> {
     }
 }
 
+impl BudgetRow<'_> {
+    fn source_name(&self) -> &'static str {
+        match self.source {
+            Some(Source::Drift) if self.budget.drift_assumed => "drift (assumed)",
+            source => source.map_or("total", source_name),
+        }
+    }
+}
+
 impl<'a> Row<'a> for BudgetRow<'a> {
     const ABOUT: &'static str = "One row per set and source of error, the last row of each set is `total`. Each number \
                                  is one standard deviation. The squares of `image`, `drift` and `sensor` add up to the \
@@ -31,8 +40,8 @@ impl<'a> Row<'a> for BudgetRow<'a> {
     const COLUMNS: &'a [Column<Self>] = columns! {
         "set", "name of the set, or `all sets together`", |r| r.set.to_owned();
         "coordinates", "`sensor`: not corrected for drift, the contribution of the drift is not known; \
-                        `drift_corrected`: drift removed", |r| r.coordinates.to_owned();
-        "source", "where the error comes from", |r| r.source.map_or("total", source_name).to_owned();
+                        `drift_corrected`: drift removed, or assumed", |r| r.coordinates.to_owned();
+        "source", "where the error comes from; `drift (assumed)`: of the prior of a drift that the scans do not tell", |r| r.source_name().to_owned();
         "twist_sigma_deg", "of the twist", |r| r.of(&r.budget.twist_deg);
         "heterostrain_sigma_percent", "of the magnitude of the strain", |r| r.of(&r.budget.heterostrain_percent);
         "strain_e1_sigma_percent", "of ε cos 2φ_lab", |r| r.of(&r.budget.strain_e1_percent);

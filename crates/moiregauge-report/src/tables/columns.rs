@@ -2,8 +2,8 @@
 
 use super::csv::{Column, number};
 use crate::results::{
-    BudgetColumn, BudgetResult, LatticeVector, MeanResult, ResultEstimate, Results, ScanResult,
-    SetResult, TwistStrainResult,
+    AssumedDriftResult, BudgetColumn, BudgetResult, LatticeVector, MeanResult, ResultEstimate,
+    Results, ScanResult, SetResult, TwistStrainResult,
 };
 
 /// A kind of row.
@@ -191,14 +191,30 @@ impl SetRow<'_> {
         self.mean().map(|m| &m.twist_strain)
     }
 
+    fn assumed(&self) -> Option<AssumedDriftResult> {
+        let alone = || self.set.lattice.as_ref()?.drift_assumed;
+        self.mean().map_or_else(alone, |m| m.drift_assumed)
+    }
+
+    fn chi2_per_dof(&self) -> Option<f64> {
+        let alone = || self.set.lattice.as_ref()?.chi2_per_dof;
+        self.mean().map_or_else(alone, |m| m.chi2_per_dof)
+    }
+
+    /// Of one of the three vectors, with twist and strain or without.
+    fn length(&self, index: usize) -> Option<ResultEstimate> {
+        let alone = self.set.lattice.as_ref().map(|l| &l.vectors);
+        let vectors = self.mean().map(|m| &m.vectors).or(alone)?;
+        Some(vectors[index].wavelength_nm)
+    }
+
     fn budget(&self) -> Option<&BudgetResult> {
         self.mean().map(|m| &m.budget)
     }
 }
 
 impl<'a> Row<'a> for SetRow<'a> {
-    const ABOUT: &'static str =
-        "One row per set: drift, and twist and strain of all its scans together, drift removed.";
+    const ABOUT: &'static str = "One row per set: drift, and twist and strain of all its scans together, drift removed or, where nothing tells it, in the errors.";
     const COLUMNS: &'a [Column<Self>] = columns! {
         "set", "name of the set", |r| r.set.name.clone();
         "slow_axis", "`x` or `y`", |r| r.set.slow_axis.clone();
@@ -213,6 +229,7 @@ impl<'a> Row<'a> for SetRow<'a> {
         "drift_y_total_sigma_nm_per_min", "its total σ, with the calibration of the scanner", |r| number(r.set.drift.as_ref().and_then(|d| d.y_nm_per_min.sigma_total));
         "drift_correlation", "correlation coefficient of the two", |r| number(r.set.drift.as_ref().and_then(|d| d.correlation));
         "drift_given", "whether the user gave the drift", |r| r.set.drift.as_ref().map_or_else(String::new, |d| d.given.to_string());
+        "drift_assumed_sigma_nm_per_min", "σ of each component of a drift of 0 that was assumed; empty where the drift was measured or given", |r| number(r.assumed().and_then(|a| a.sigma_nm_per_min));
         "twist_deg", "twist θ", |r| value(r.result().map(|t| t.twist_deg));
         "twist_sigma_deg", "its statistical σ: image noise, drift and sensor noise", |r| sigma(r.result().map(|t| t.twist_deg));
         "twist_total_sigma_deg", "its total σ, calibration and model included, see budget.csv (publish this one)", |r| total(r.budget().map(|b| b.twist_deg));
@@ -238,7 +255,16 @@ impl<'a> Row<'a> for SetRow<'a> {
         "lattice_angle_deg", "orientation α of layer 1, modulo 60°", |r| value(r.result().map(|t| t.lattice_angle_deg));
         "lattice_angle_sigma_deg", "its statistical σ", |r| sigma(r.result().map(|t| t.lattice_angle_deg));
         "lattice_angle_total_sigma_deg", "its total σ", |r| total(r.budget().map(|b| b.lattice_angle_deg));
-        "chi2_per_dof", "χ² per degree of freedom of the scans against the common lattice; every σ is enlarged by its square root where it is significantly above 1 (p < 0.05)", |r| number(r.mean().and_then(|m| m.chi2_per_dof));
+        "chi2_per_dof", "χ² per degree of freedom of the scans against the common lattice; every σ is enlarged by its square root where it is significantly above 1 (p < 0.05)", |r| number(r.chi2_per_dof());
+        "wavelength_l1_nm", "length of L1 of all scans together", |r| value(r.length(0));
+        "wavelength_l1_sigma_nm", "its statistical σ", |r| sigma(r.length(0));
+        "wavelength_l1_total_sigma_nm", "its total σ", |r| number(r.length(0).and_then(|l| l.sigma_total));
+        "wavelength_l2_nm", "length of L2", |r| value(r.length(1));
+        "wavelength_l2_sigma_nm", "its statistical σ", |r| sigma(r.length(1));
+        "wavelength_l2_total_sigma_nm", "its total σ", |r| number(r.length(1).and_then(|l| l.sigma_total));
+        "wavelength_l3_nm", "length of L3", |r| value(r.length(2));
+        "wavelength_l3_sigma_nm", "its statistical σ", |r| sigma(r.length(2));
+        "wavelength_l3_total_sigma_nm", "its total σ", |r| number(r.length(2).and_then(|l| l.sigma_total));
         "within_one_percent", "whether all wavelengths lie within ±1 % of the common ones", |r| r.mean().map_or_else(String::new, |m| m.within_one_percent.to_string());
     };
 

@@ -75,6 +75,7 @@ pub(crate) fn analysis() -> Analysis {
             ),
             Caveat::new(
                 DriftDoubt::Undetermined {
+                    assumed: None,
                     reason: "One direction only: the scans cannot tell drift from strain."
                         .to_owned(),
                 },

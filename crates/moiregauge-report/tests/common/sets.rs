@@ -54,6 +54,7 @@ pub(super) fn mean(
             settings,
         ),
         budget,
+        assumed: None,
         lattice,
         twist_strain,
         twist_scatter: scatter(
@@ -216,6 +217,7 @@ pub(super) fn good_set(
         forward_backward: mean.as_ref().map(|m| m.twist_strain),
         mean,
         uncorrected: self::mean(&sensor, settings, None, false),
+        lattice: None,
         checks: None,
         illustration: scans.first().and_then(|s| illustration(s, &mut noise)),
         scans,
@@ -245,6 +247,7 @@ pub(super) fn poor_set(settings: &Settings) -> SetAnalysis {
         mean: None,
         uncorrected: mean(&[scan.sensor], settings, None, false),
         forward_backward: None,
+        lattice: None,
         checks: None,
         illustration: None,
         scans: vec![scan],

@@ -8,6 +8,8 @@ use heterostrain::strain::{KnownOrientation, LatticeDirection, StrainDraw, Twist
 use nalgebra::{Matrix2, Vector2};
 use spmfile::{DateTime, FrameDirection, LineDirection};
 
+use crate::campaign::set::assumed::AssumedDrift;
+use crate::campaign::set::bare::SetLattice;
 use crate::caveat::Caveat;
 use crate::coverage::{Change, Patch};
 use crate::drift::drawn::DriftMonteCarlo;
@@ -90,10 +92,12 @@ pub struct SetAnalysis {
     pub scans: Vec<ScanAnalysis>,
     /// The drift, measured or given; `None` where the scans cannot determine it.
     pub drift: Option<Drift>,
-    /// Lattice, twist and strain from all scans together, corrected for drift.
+    /// Lattice, twist and strain from all scans together, corrected for drift, or with an assumed one in their errors.
     pub mean: Option<SetMean>,
     /// The plain mean over the scans in sensor coordinates, not corrected for drift.
     pub uncorrected: Option<SetMean>,
+    /// The lattice alone, where no twist and strain explain it; `None` of sets that have them, and where the lattice may be another one.
+    pub lattice: Option<SetLattice>,
     /// Twist and strain from the mean reciprocal lattice of up and down scans, which is free of
     /// constant drift without knowing it; `None` where there is only one direction.
     pub forward_backward: Option<TwistStrain>,
@@ -101,6 +105,13 @@ pub struct SetAnalysis {
     pub checks: Option<Checks>,
     /// One scan in detail, for the figures.
     pub illustration: Option<Illustration>,
+}
+
+impl SetAnalysis {
+    /// The mean of scans whose drift was measured or given.
+    pub fn with_drift(&self) -> Option<&SetMean> {
+        self.mean.as_ref().filter(|mean| mean.assumed.is_none())
+    }
 }
 
 /// Errors from the scatter of the scans, to compare with those that are stated.
@@ -150,6 +161,8 @@ pub struct SetMean {
     pub twist_strain: TwistStrain,
     /// What contributes to their uncertainty, calibration and model included.
     pub budget: Budget,
+    /// The drift that was assumed where the scans do not tell it; `None` where it was measured or given.
+    pub assumed: Option<AssumedDrift>,
     /// What else the lattice can mean.
     pub readings: Readings,
     /// Standard deviation of the twist over the scans, rad; NaN for a single scan.

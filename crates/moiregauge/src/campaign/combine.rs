@@ -40,8 +40,8 @@ const WORSE: f64 = 3.0;
 /// Sets this many σ apart deserve a word: 3 as everywhere.
 const APART: f64 = 3.0;
 
-/// Weighted mean lattice of all sets that have one; `None` where there is none, or where the sets
-/// show different lattices.
+/// Weighted mean lattice of all sets whose drift is known; `None` where there is none, or where the sets show different lattices. The
+/// error of an assumed drift is the same in all sets and does not average out: such a set is combined with no other.
 pub(crate) fn combine(
     sets: &[SetAnalysis],
     joint: Option<(&[&MeasuredScan], Matrix2<f64>)>,
@@ -49,7 +49,10 @@ pub(crate) fn combine(
     strengths: &WaveStrengths,
     caveats: &mut Vec<Caveat>,
 ) -> Option<Combined> {
-    let means: Vec<&SetMean> = sets.iter().filter_map(|s| s.mean.as_ref()).collect();
+    let means: Vec<&SetMean> = match sets {
+        [one] => one.mean.iter().collect(),
+        all => all.iter().filter_map(SetAnalysis::with_drift).collect(),
+    };
     if let Some(share) = difference(&means) {
         let doubt = SetDoubt::DifferentLattices { share };
         caveats.push(Caveat::new(doubt, "analysis"));
@@ -68,7 +71,8 @@ pub(crate) fn combine(
     let twist_strain = moire(&lattice, settings)?;
     // Sets of one instrument have one convention: what it does does not average out.
     let pitch = means.iter().map(|m| m.budget.pitch).sum::<Matrix2<f64>>() / means.len() as f64;
-    let budget = Budget::with_pitch(&lattice, &twist_strain, &statistical, &pitch, settings);
+    let mut budget = Budget::with_pitch(&lattice, &twist_strain, &statistical, &pitch, settings);
+    budget.drift_assumed = means.iter().any(|mean| mean.assumed.is_some());
     let readings = Readings::new(&lattice, &twist_strain, &budget, strengths, settings);
     if sets.len() > 1 {
         let found = about_readings("analysis", &lattice, &twist_strain, &readings, settings);
@@ -197,7 +201,7 @@ fn joined(
     let fit = joint_fit(scans, reference, lattice, velocity, settings)
         .ok_or("their drift cannot be determined together")?;
     let reduced = fit.chi2 / fit.degrees_of_freedom.max(1) as f64;
-    let means = sets.iter().filter_map(|s| s.mean.as_ref());
+    let means = sets.iter().filter_map(SetAnalysis::with_drift);
     let usual = means.filter_map(|m| m.chi2_per_dof).fold(1.0, f64::max);
     if reduced > WORSE * usual {
         return Err(format!(
@@ -274,7 +278,7 @@ fn consistency(sets: &[SetAnalysis]) -> Vec<Consistency> {
     let mut all = Vec::new();
     for (i, a) in sets.iter().enumerate() {
         for b in &sets[i + 1..] {
-            let (Some(ma), Some(mb)) = (&a.mean, &b.mean) else {
+            let (Some(ma), Some(mb)) = (a.with_drift(), b.with_drift()) else {
                 continue;
             };
             let (ta, tb) = (&ma.twist_strain, &mb.twist_strain);

@@ -42,7 +42,7 @@ pub(crate) fn agree_on_drift(sets: &mut [SetAnalysis], caveats: &mut Vec<Caveat>
         let Some((nm_per_min, other)) = doubt else {
             continue;
         };
-        (set.mean, set.uncorrected) = (None, None);
+        (set.mean, set.uncorrected, set.lattice) = (None, None, None);
         let doubt = SetDoubt::GrainsContradict { nm_per_min, other };
         caveats.push(Caveat::new(doubt, &set.name));
     }
@@ -96,8 +96,9 @@ pub fn grains(analysis: &Analysis) -> Option<Vec<Vec<usize>>> {
 /// The lattice of a set, that of its first scan where it has no result.
 fn lattice_of(set: &SetAnalysis) -> Option<Lattice> {
     let mean = set.mean.as_ref().or(set.uncorrected.as_ref());
+    let alone = || set.lattice.as_ref().map(|found| found.lattice);
     let scan = || set.scans.first().map(|scan| scan.sensor);
-    mean.map(|mean| mean.lattice).or_else(scan)
+    mean.map(|mean| mean.lattice).or_else(alone).or_else(scan)
 }
 
 /// By how much two drifts differ, nm/min, where that is no chance. What the user gave is no measurement.

@@ -31,3 +31,5 @@ pub use grains::grains;
 pub use group::natural_order;
 pub use identity::about_repeat;
 pub use illustrate::{amplitude_of, illustrate, picture};
+pub use set::assumed::AssumedDrift;
+pub use set::bare::SetLattice;

@@ -1,9 +1,15 @@
 //! Doubts about the drift and the clock.
 
+use std::fmt;
+
 use heterostrain::Estimate;
 
+use crate::campaign::analysis::SetMean;
+use crate::campaign::set::assumed::AssumedDrift;
+use crate::campaign::set::bare::SetLattice;
 use crate::caveat::explained::explain;
-use crate::numbers::words::plus_minus;
+use crate::meaning::budget::Source;
+use crate::numbers::words::{plus_minus, two_digits};
 
 /// Drift and the clock.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -11,14 +17,20 @@ use crate::numbers::words::plus_minus;
 pub enum DriftDoubt {
     /// The files do not tell their times.
     #[error(
-        "at least one file has no line rate or no frame direction. Nothing was corrected for drift"
+        "at least one file has no line rate or no frame direction. Nothing was corrected for drift{}",
+        told(assumed.as_ref())
     )]
-    NoTiming,
+    NoTiming {
+        /// What the drift that was assumed makes of the result; `None` where there is none.
+        assumed: Option<DriftShare>,
+    },
     /// The scans do not tell the drift.
-    #[error("{reason}")]
+    #[error("{reason}{}", told(assumed.as_ref()))]
     Undetermined {
         /// Why.
         reason: String,
+        /// What the drift that was assumed makes of the result; `None` where there is none.
+        assumed: Option<DriftShare>,
     },
     /// The user gave the drift.
     #[error(
@@ -83,6 +95,92 @@ pub enum DriftDoubt {
     },
 }
 
+/// The part that an assumed drift has in the total error of a result.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct DriftShare {
+    /// What was assumed.
+    pub assumed: AssumedDrift,
+    /// Of what: the twist, or a length.
+    pub of: &'static str,
+    /// Its unit.
+    pub unit: &'static str,
+    /// The total error.
+    pub total: f64,
+    /// What it would be without the drift.
+    pub without: f64,
+}
+
+impl DriftShare {
+    /// In the twist of a mean (°).
+    pub(crate) fn of_mean(mean: &SetMean) -> Option<Self> {
+        let degrees = |variance: f64| variance.sqrt().to_degrees();
+        let without = mean.budget.sum(|source| source != Source::Drift);
+        Some(Self {
+            assumed: mean.assumed?,
+            of: "twist",
+            unit: "°",
+            total: degrees(mean.budget.total().covariance[(0, 0)]),
+            without: degrees(without.covariance[(0, 0)]),
+        })
+    }
+
+    /// In the first length of a lattice (nm).
+    pub(crate) fn of_lattice(found: &SetLattice) -> Option<Self> {
+        Some(Self {
+            assumed: found.assumed?,
+            of: "length of L₁",
+            unit: " nm",
+            total: found.wavelengths[0].total,
+            without: found.without_drift,
+        })
+    }
+}
+
+impl fmt::Display for DriftShare {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let prior = two_digits(60.0 * self.assumed.sigma);
+        let share = 100.0 * (1.0 - (self.without / self.total).powi(2));
+        let [total, without] = [self.total, self.without].map(two_digits);
+        let (of, unit) = (self.of, self.unit);
+        write!(
+            f,
+            ". A drift of 0 ± {prior} nm/min along each axis is assumed"
+        )?;
+        if self.assumed.no_rate {
+            f.write_str(", and a line rate between 0.5 and 10 Hz")?;
+        }
+        write!(
+            f,
+            ". It makes {share:.0} % of the squared total error of the {of}, ± {total}{unit}. One more frame in the other slow \
+             direction would measure the drift and leave about ± {without}{unit}"
+        )
+    }
+}
+
+fn told(share: Option<&DriftShare>) -> String {
+    share.map_or_else(String::new, DriftShare::to_string)
+}
+
+impl DriftDoubt {
+    pub(crate) fn undetermined(reason: String) -> Self {
+        Self::Undetermined {
+            reason,
+            assumed: None,
+        }
+    }
+
+    /// The same with what an assumed drift makes of the result.
+    #[must_use]
+    pub(crate) fn with(self, assumed: Option<DriftShare>) -> Self {
+        match self {
+            Self::NoTiming { .. } => Self::NoTiming { assumed },
+            Self::Undetermined { reason, .. } => Self::Undetermined { reason, assumed },
+            other => other,
+        }
+    }
+}
+
 /// How dates contradict a line rate. Times are in s, rates in lines per second.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -123,14 +221,16 @@ fn per_minute(acceleration: Estimate) -> String {
 
 explain! { DriftDoubt:
     NoTiming "no-timing" Serious
-        "The files do not say when their lines were scanned. Nothing was corrected for drift. Drift stretches and \
-         shears a lattice and looks like strain."
+        "The files do not say when their lines were scanned. Nothing was corrected for drift, which stretches and \
+         shears a lattice and looks like strain. A drift of 0, with the error of a setting (1 nm/min unless told), is \
+         assumed, and where the line rate is not known one between 0.5 and 10 Hz. Both are in the errors."
         "Give line rate and frame direction, from the log of the measurement."
     Undetermined "drift-undetermined" Serious
-        "The drift cannot be determined from these scans. Nothing was corrected for drift. Drift stretches and shears \
-         a lattice and looks like strain."
+        "The drift cannot be determined from these scans. Nothing was corrected for drift, which stretches and shears \
+         a lattice and looks like strain. A drift of 0, with the error of a setting (1 nm/min unless told), is assumed and \
+         is in the errors."
         "Take frames up and down of the same place, one after the other. If the drift is known from another \
-         measurement, give it."
+         measurement, give it; if it is known how much the instrument drifts at most, give that."
     Given "drift-given" Note
         "The drift was given by the user, not measured. If it is wrong by more than its stated uncertainty, twist and \
          strain are wrong too."

@@ -98,6 +98,8 @@ pub struct Budget {
     contributions: [Contribution; 11],
     /// The relative change of positions by one standard deviation of the pitch of the pixels; zero where that is settled.
     pub pitch: Matrix2<f64>,
+    /// Whether the drift is a prior: nothing tells it.
+    pub drift_assumed: bool,
     /// The statistical ones as covariances of the lattice.
     pub statistical: Statistical,
 }
@@ -149,6 +151,7 @@ impl Budget {
             contributions: Source::ALL.map(contribution),
             statistical: *statistical,
             pitch: *pitch,
+            drift_assumed: false,
         }
     }
 
@@ -253,6 +256,19 @@ pub(crate) fn scanner_covariance(vector: &Vector2<f64>, settings: &Settings) -> 
             Some(change * change.transpose())
         })
         .sum()
+}
+
+/// Variances of the lengths of L₁, L₂ and L₃ of a lattice, nm², with everything that is known: what the scans leave open, and the scanner.
+pub(crate) fn wavelength_variances(
+    lattice: &Lattice,
+    statistical: &Statistical,
+    pitch: &Matrix2<f64>,
+    settings: &Settings,
+) -> [f64; 3] {
+    let sources = Source::ALL.into_iter();
+    let errors =
+        sources.filter_map(|source| lattice_error(source, lattice, statistical, pitch, settings));
+    squared_wavelength_sigmas(lattice, &errors.sum())
 }
 
 /// The relative change of positions by one standard deviation of an error of the scanner; `None` for other sources.

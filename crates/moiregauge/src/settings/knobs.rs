@@ -150,6 +150,10 @@ pub struct Settings {
     pub overlap: bool,
     /// A drift known beforehand; `None`: measure it.
     pub drift: Option<GivenDrift>,
+    /// Standard deviation of each component of the drift where scans do not tell it and `drift` is not given, nm/min, for the uncertainty
+    /// budget. The default is what an instrument at rest drifts; where a frame is so slow that this would be more than a quarter of the
+    /// speed at which its lines advance, that quarter is taken.
+    pub drift_prior_nm_per_min: f64,
     /// How well the scanner is calibrated, for the uncertainty budget.
     pub calibration: Calibration,
     /// A measured calibration of the scanner: positions are corrected with it, and its covariance takes the
@@ -236,6 +240,7 @@ impl Default for Settings {
             exclude_outliers: false,
             overlap: false,
             drift: None,
+            drift_prior_nm_per_min: 1.0,
             calibration: Calibration::default(),
             scanner: None,
             isotropic_strain_percent: 0.05,

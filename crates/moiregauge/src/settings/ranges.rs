@@ -46,6 +46,12 @@ impl Settings {
                 0.0,
                 MOST_DRAWS as f64,
             ),
+            (
+                "drift_prior_nm_per_min",
+                self.drift_prior_nm_per_min,
+                0.0,
+                1e6,
+            ),
             ("frame_time_sigma_s", self.frame_time_sigma_s, 0.0, 86_400.0),
             (
                 "calibration.gain_percent",

@@ -9,9 +9,9 @@ use moiregauge::campaign::{
 };
 use moiregauge::caveat::Caveat;
 use moiregauge::scan::{MeasuredScan, measure_known, measure_scan};
-use moiregauge::settings::{Grouping, Settings};
+use moiregauge::settings::{GivenDrift, Grouping, Settings};
 use moiregauge::simulate::{FirstDirection, Simulation, Simulator};
-use spmfile::{FrameDirection, Samples, Scan};
+use spmfile::{FrameDirection, Samples, Scan, sensor_axis};
 
 /// A small, quick set.
 fn small_set(seed: u64) -> Simulation {
@@ -187,6 +187,62 @@ fn calibration_and_orientation_count_once() {
     };
     assert_eq!(angle(&once).angle, angle(&twice).angle);
     assert_eq!(repeats(&angle(&twice).caveats), 2);
+}
+
+/// Positions of the sensors times a factor for each frame.
+fn stretched(frames: &[Scan], factor: impl Fn(usize) -> f64) -> Vec<Scan> {
+    let mut all = frames.to_vec();
+    for (i, scan) in all.iter_mut().enumerate() {
+        for channel in &mut scan.channels {
+            if sensor_axis(&channel.name, &channel.internal_name).is_some() {
+                channel.scale *= factor(i);
+                channel.offset *= factor(i);
+            }
+        }
+    }
+    all
+}
+
+/// Four frames of atoms, the scanner gains 0.8 % between the pairs up and down: no twist, but a lattice of all of them with their scatter and the
+/// calibration in its total.
+#[test]
+fn atoms_have_a_lattice_of_all_scans() {
+    let mut set = small_set(5);
+    set.sample.twist_deg = 60.0;
+    set.sample.strain_percent = 0.0;
+    set.sample.sharpness = 0.1;
+    set.raster.nominal_size_nm = [4.0; 2];
+    set.drift.velocity_nm_per_min = [0.0; 2];
+    let gain = |i: usize| if i < 2 { 1.0 } else { 1.008 };
+    let scans = stretched(&frames(&set), gain);
+    // A drift that changes would look like a gain that does.
+    let still = Settings {
+        drift: Some(GivenDrift {
+            x_nm_per_min: 0.0,
+            y_nm_per_min: 0.0,
+            sigma_nm_per_min: 0.0,
+        }),
+        ..quick()
+    };
+    let found = analyse(measured("s", &scans), &still);
+    let set = &found.sets[0];
+    assert!(set.mean.is_none() && set.uncorrected.is_none());
+    let lattice = set.lattice.as_ref().unwrap();
+    for (i, length) in lattice.wavelengths.iter().enumerate() {
+        let off = length.value / (0.246 * 1.004) - 1.0;
+        assert!(off.abs() < 1e-3, "{length:?}");
+        let scans = set.scans.iter();
+        let scans = scans.map(|scan| scan.drift_corrected.unwrap().wavelength(i).value);
+        let scans: Vec<f64> = scans.collect();
+        let mean = scans.iter().sum::<f64>() / 4.0;
+        let spread = scans.iter().map(|s| (s - mean).powi(2)).sum::<f64>() / 3.0;
+        assert!((lattice.scatter[i] / spread.sqrt() - 1.0).abs() < 1e-9);
+        // The gains alone scatter by 0.46 %; the calibration of 1 % is in the total.
+        assert!((0.003..0.006).contains(&(lattice.scatter[i] / 0.246)));
+        let total = length.total / length.value;
+        assert!((0.01..0.011).contains(&total), "{length:?}");
+        assert!(length.statistical > 0.2 * lattice.scatter[i], "{length:?}");
+    }
 }
 
 /// Two samples make two sets, whatever their vectors are called, and no number is the mean of both.

@@ -15,6 +15,7 @@ mod lattice_fit;
 mod lattice_names;
 mod maps_of_scans;
 mod noiseless;
+mod one_frame;
 mod overlap;
 mod partly_covered;
 mod plan;

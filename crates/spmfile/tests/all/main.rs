@@ -10,6 +10,7 @@ mod damaged;
 mod exports;
 mod formats;
 mod instruments;
+mod kinds;
 mod mutations;
 mod oddities;
 mod opened;

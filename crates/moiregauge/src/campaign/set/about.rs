@@ -25,7 +25,7 @@ pub(crate) fn about_set(
     if let Some(mean) = shown {
         caveats.extend(about_readings(&set.name, mean, settings));
     }
-    moire::doubts(&set.name, shown, &set.scans, settings, caveats);
+    moire::doubts(&set.name, shown, set.lattice.as_ref(), settings, caveats);
     about_checks(set, used, caveats);
 }
 
@@ -78,7 +78,7 @@ fn about_mean(name: &str, mean: Option<&SetMean>, caveats: &mut Vec<Caveat>) {
 /// times the scatter of such a comparison, 1/√(2(n − 1)).
 fn about_checks(set: &SetAnalysis, n: usize, caveats: &mut Vec<Caveat>) {
     let found = set.checks.as_ref().and_then(|c| c.leave_one_out);
-    let (Some(found), Some(drift), Some(mean)) = (found, &set.drift, &set.mean) else {
+    let (Some(found), Some(drift), Some(mean)) = (found, &set.drift, set.with_drift()) else {
         return;
     };
     if n < FEWEST_TO_DOUBT {

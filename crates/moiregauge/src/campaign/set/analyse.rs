@@ -5,6 +5,8 @@ use nalgebra::Matrix2;
 use crate::campaign::analysis::SetAnalysis;
 use crate::campaign::group::Group;
 use crate::campaign::set::about::about_set;
+use crate::campaign::set::assumed::assumed;
+use crate::campaign::set::bare::bare;
 use crate::campaign::set::common::common;
 use crate::campaign::set::drift::{constant_drift, outruns, unknown};
 use crate::campaign::set::mean::{at_drift, forward_backward, without_drift};
@@ -13,7 +15,7 @@ use crate::campaign::set::scan::scans_at_drift;
 use crate::campaign::set::shells::{of_other_shell, of_second_shell};
 use crate::campaign::set::{joint, published};
 use crate::caveat::Caveat;
-use crate::caveat::drifting::DriftDoubt;
+use crate::caveat::drifting::{DriftDoubt, DriftShare};
 use crate::caveat::sets::SetDoubt;
 use crate::drift::linear::Observation;
 use crate::meaning::strengths::WaveStrengths;
@@ -41,12 +43,17 @@ pub(crate) fn analyse_set(
     let used: Vec<&MeasuredScan> = kept.iter().map(|&i| &group.scans[i]).collect();
     let all: Vec<Observation> = kept.iter().flat_map(|&i| &seen[i]).copied().collect();
     let name = &group.name;
+    let mut open = None;
     let (solved, fit) = match constant_drift(name, &used, &all, settings, caveats) {
-        Some(linear) if joint => {
+        Ok(linear) if joint => {
             let (solved, fit) = joint::refined(name, linear, &used, reference, settings, caveats);
             (Some(solved), fit)
         }
-        linear => (linear, None),
+        Ok(linear) => (Some(linear), None),
+        Err(why) => {
+            open = why;
+            (None, None)
+        }
     };
     let of_set = solved.as_ref().map(|solved| &solved.drift);
     let fitted = fit.as_ref();
@@ -64,30 +71,37 @@ pub(crate) fn analyse_set(
     let doubt = no_result(group, &used).filter(|_| !settings.by_hand.says_which());
     let outruns = of_set.and_then(|drift| outruns(drift, &all));
     let doubt = doubt.or_else(|| outruns.map(|share| SetDoubt::DriftOutrunsScan { share }));
-    let (mut uncorrected, mut mean) = (None, None);
+    let (mut uncorrected, mut mean, mut lattice) = (None, None, None);
     if let Some(doubt) = doubt {
         caveats.push(Caveat::new(doubt, name));
     } else {
         let shared = common(&used, reference);
         let alone = kept.len() == 1;
         uncorrected = without_drift(&all, &scans, alone, &shared, &pitch, settings, strengths);
-        let unknown = solved.as_ref().and_then(|solved| unknown(&solved.lattice));
-        if let Some(share) = unknown {
-            let reason = format!(
+        let poor = solved.as_ref().and_then(|solved| unknown(&solved.lattice));
+        if let Some(share) = poor {
+            open = Some(DriftDoubt::undetermined(format!(
                 "the scans tell the drift so poorly that it leaves {:.0} % of a moiré vector open",
                 100.0 * share
-            );
-            caveats.push(Caveat::new(DriftDoubt::Undetermined { reason }, name));
+            )));
         }
-        mean = solved
-            .as_ref()
-            .filter(|_| unknown.is_none())
-            .and_then(|solved| at_drift(solved, &scans, &shared, &pitch, settings, strengths));
+        let assumed = open.as_ref().and_then(|_| assumed(&used, &all, settings));
+        let known = solved.as_ref().filter(|_| open.is_none());
+        let known = known.or(assumed.as_ref());
+        let of = |solved| at_drift(solved, &scans, &shared, &pitch, settings, strengths);
+        // What contradicts itself by so much is no lattice of which one would have a twist.
+        mean = known.filter(|_| poor.is_none()).and_then(of);
         if let Some(doubt) = mean.as_ref().and_then(|mean| breaks(mean, settings)) {
             caveats.push(Caveat::new(doubt, name));
             (uncorrected, mean) = (None, None);
         }
+        if mean.is_none() && uncorrected.is_none() {
+            lattice = known.map(|solved| bare(solved, &scans, &shared, &pitch, settings));
+        }
     }
+    let share = mean.as_ref().and_then(DriftShare::of_mean);
+    let share = share.or_else(|| lattice.as_ref().and_then(DriftShare::of_lattice));
+    caveats.extend(open.map(|doubt| Caveat::new(doubt.with(share), name)));
     let set = SetAnalysis {
         name: name.clone(),
         slow_axis: group.slow_axis,
@@ -98,6 +112,7 @@ pub(crate) fn analyse_set(
         drift: solved.map(|s| s.drift),
         mean,
         uncorrected,
+        lattice,
         checks,
         illustration: None,
     };

@@ -1,7 +1,7 @@
 //! The drift of a set as a constant velocity: given, published, or the linear solution.
 
 use heterostrain::lattice::Lattice;
-use nalgebra::Matrix2;
+use nalgebra::{Matrix2, Vector2};
 
 use crate::campaign::analysis::{Drift, DriftFit};
 use crate::campaign::set::headers::about_dates;
@@ -25,41 +25,37 @@ const KNOWN_TO: f64 = 0.2;
 /// nm/min → nm/s.
 const PER_MINUTE: f64 = 1.0 / 60.0;
 
-/// The drift and the lattice of the scans of a set; `None`, and a word, where they do not tell them.
+/// The drift and the lattice of the scans of a set; where they do not tell them, why not (no word without scans).
 pub(crate) fn constant_drift(
     name: &str,
     scans: &[&MeasuredScan],
     all: &[Observation],
     settings: &Settings,
     caveats: &mut Vec<Caveat>,
-) -> Option<Solved> {
+) -> Result<Solved, Option<DriftDoubt>> {
     if scans.is_empty() {
-        return None;
+        return Err(None);
     }
     if scans
         .iter()
         .any(|s| s.lines.iter().any(|l| l.timing.is_none()))
     {
-        caveats.push(Caveat::new(DriftDoubt::NoTiming, name));
-        return None;
+        return Err(Some(DriftDoubt::NoTiming { assumed: None }));
     }
     caveats.extend(about_dates(name, scans));
     if let Some(given) = settings.drift {
-        return given_drift(name, all, given, caveats);
+        return given_drift(name, all, given, caveats).ok_or(None);
     }
     match solve(all) {
         Ok(solution) if settings.method != Method::Paper => {
-            linear_drift(name, scans, all, &solution, settings)
+            linear_drift(name, scans, all, &solution, settings).ok_or(None)
         }
         Ok(solution) => {
             let scans = published::paper_scans(scans, all);
-            published::drift(name, &scans, all, &solution, settings, caveats)
+            published::drift(name, &scans, all, &solution, settings)
+                .map_err(|reason| Some(DriftDoubt::undetermined(reason)))
         }
-        Err(error) => {
-            let reason = error.to_string();
-            caveats.push(Caveat::new(DriftDoubt::Undetermined { reason }, name));
-            None
-        }
+        Err(error) => Err(Some(DriftDoubt::undetermined(error.to_string()))),
     }
 }
 
@@ -95,6 +91,7 @@ fn linear_drift(
         statistical,
         chi2: solution.chi2,
         freedom: solution.degrees_of_freedom,
+        assumed: None,
         enlargement: scale,
     })
 }
@@ -128,12 +125,19 @@ fn given_drift(
     given: GivenDrift,
     caveats: &mut Vec<Caveat>,
 ) -> Option<Solved> {
-    let velocity = given.velocity();
     let sigma = given.sigma_nm_per_min * PER_MINUTE;
-    let covariance = Matrix2::identity() * sigma * sigma;
     caveats.push(Caveat::new(DriftDoubt::Given, name));
+    at_velocity(all, given.velocity(), Matrix2::identity() * sigma * sigma)
+}
+
+/// The lattice at a drift that is not measured.
+pub(crate) fn at_velocity(
+    all: &[Observation],
+    velocity: Vector2<f64>,
+    covariance: Matrix2<f64>,
+) -> Option<Solved> {
     let (mut lattice, chi2, freedom) = common_lattice(all, &velocity, &covariance).ok()?;
-    // Scatter enlarges the error of a measured drift, not that of a given one.
+    // Scatter enlarges the error of what was measured, not that of the drift.
     let (measured, _, _) = common_lattice(all, &velocity, &Matrix2::zeros()).ok()?;
     let scale = enlargement(chi2, freedom);
     lattice.covariance += measured.covariance * (scale - 1.0);
@@ -151,6 +155,7 @@ fn given_drift(
         lattice,
         chi2,
         freedom,
+        assumed: None,
         enlargement: scale,
     })
 }
@@ -158,7 +163,7 @@ fn given_drift(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::{Matrix4, Vector2};
+    use nalgebra::Matrix4;
 
     /// Up and down at 1 nm/s: a drift along the slow axis outruns the tip, one along the fast axis does not, nor one that is hardly known.
     #[test]

@@ -72,6 +72,7 @@ fn jointly(
         statistical,
         chi2: fit.chi2,
         freedom: fit.degrees_of_freedom,
+        assumed: None,
         enlargement: enlargement(fit.chi2, fit.degrees_of_freedom),
     };
     (solved, Some(fit))

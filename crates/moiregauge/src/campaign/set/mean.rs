@@ -19,7 +19,7 @@ use crate::numbers::spread::mean_and_spread;
 use crate::settings::knobs::Settings;
 
 /// The scans that are not left out.
-fn counted(scans: &[ScanAnalysis]) -> impl Iterator<Item = &ScanAnalysis> {
+pub(crate) fn counted(scans: &[ScanAnalysis]) -> impl Iterator<Item = &ScanAnalysis> {
     scans.iter().filter(|s| s.excluded.is_none())
 }
 
@@ -32,13 +32,19 @@ pub(crate) fn at_drift(
     settings: &Settings,
     strengths: &WaveStrengths,
 ) -> Option<SetMean> {
-    let of = |s: &ScanAnalysis| (s.twist_strain, s.drift_corrected.unwrap_or(s.sensor));
+    let assumed = solved.assumed.is_some();
+    let of = |s: &ScanAnalysis| {
+        if assumed {
+            return (s.twist_strain_sensor, s.sensor);
+        }
+        (s.twist_strain, s.drift_corrected.unwrap_or(s.sensor))
+    };
     let lattice = &solved.lattice;
     let statistical = Statistical {
         image: solved.statistical.image + shared,
         ..solved.statistical
     };
-    set_mean(
+    let mut mean = set_mean(
         &Lattice::new(lattice.basis, lattice.covariance + shared),
         &statistical,
         pitch,
@@ -46,7 +52,10 @@ pub(crate) fn at_drift(
         counted(scans).map(of),
         settings,
         strengths,
-    )
+    )?;
+    mean.assumed = solved.assumed;
+    mean.budget.drift_assumed = assumed;
+    Some(mean)
 }
 
 /// The mean of the scans as if nothing drifted, with the errors that drift adds left out; `alone`: there is one scan.
@@ -128,6 +137,7 @@ fn set_mean(
     Some(SetMean {
         readings: Readings::new(lattice, &twist_strain, &budget, strengths, settings),
         budget,
+        assumed: None,
         lattice: *lattice,
         twist_strain,
         twist_scatter: mean_and_spread(&twists).sigma,

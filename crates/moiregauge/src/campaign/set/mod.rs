@@ -2,6 +2,8 @@
 
 pub(crate) mod about;
 pub(crate) mod analyse;
+pub(crate) mod assumed;
+pub(crate) mod bare;
 pub(crate) mod common;
 pub(crate) mod drift;
 pub(crate) mod ground;

@@ -14,6 +14,7 @@ use rayon::prelude::*;
 
 use crate::calibration::KnownLattice;
 use crate::campaign::analysis::{ScanAnalysis, SetMean};
+use crate::campaign::set::bare::SetLattice;
 use crate::caveat::Caveat;
 use crate::caveat::moires::{Impossible, MoireDoubt, PeriodDoubt};
 use crate::numbers::interrupt;
@@ -93,7 +94,7 @@ fn watched(mut normal: impl FnMut() -> f64) -> impl FnMut() -> f64 {
 pub(crate) fn doubts(
     name: &str,
     mean: Option<&SetMean>,
-    scans: &[ScanAnalysis],
+    lattice: Option<&SetLattice>,
     settings: &Settings,
     caveats: &mut Vec<Caveat>,
 ) {
@@ -120,8 +121,7 @@ pub(crate) fn doubts(
         }
         return;
     }
-    let used = scans.iter().find(|scan| scan.excluded.is_none());
-    let Some(lattice) = used.map(|scan| scan.drift_corrected.unwrap_or(scan.sensor)) else {
+    let Some(lattice) = lattice.map(|found| found.lattice) else {
         return;
     };
     let found = twist_strain(&lattice, settings.bilayer(), settings.strain_convention);

@@ -7,8 +7,6 @@ use rayon::prelude::*;
 
 use crate::campaign::analysis::{Drift, DriftFit, ScanAnalysis};
 use crate::campaign::set::solved::Solved;
-use crate::caveat::Caveat;
-use crate::caveat::drifting::DriftDoubt;
 use crate::drift::linear::{DriftSolution, Observation, at_known_drift, common_lattice};
 use crate::drift::paper::{PaperScan, normal_vector, successive_draws, successive_drift};
 use crate::drift::shares::Statistical;
@@ -74,30 +72,26 @@ fn peaks(line: &MeasuredLine, seen: &Observation) -> ([Vector2<f64>; 6], Matrix2
     (peaks, to_nm * published.covariance * to_nm.transpose())
 }
 
-/// The published drift of a set, and the common lattice at that drift. Nothing is enlarged for scatter.
+/// The published drift of a set, and the common lattice at that drift. Nothing is enlarged for scatter. An error says why there is none.
 pub(crate) fn drift(
     name: &str,
     scans: &[PaperScan],
     all: &[Observation],
     linear: &DriftSolution,
     settings: &Settings,
-    caveats: &mut Vec<Caveat>,
-) -> Option<Solved> {
-    let minimum = successive_drift(scans);
-    if minimum.is_none() {
-        let reason = "the published comparison of successive scans has no minimum. Either no two successive scans have \
-                      the same line direction, or the scans contradict each other"
-            .to_owned();
-        caveats.push(Caveat::new(DriftDoubt::Undetermined { reason }, name));
-    }
-    let minimum = minimum?;
+) -> Result<Solved, String> {
+    let no_minimum = "the published comparison of successive scans has no minimum. Either no two successive scans have \
+                      the same line direction, or the scans contradict each other";
+    let minimum = successive_drift(scans).ok_or(no_minimum)?;
     let stream = format!("drift {name}");
     let draws = successive_draws(scans, settings.drift_draws, settings.seed, &stream);
     let (velocity, covariance) = draws
         .as_ref()
         .map_or((minimum, linear.covariance), |d| (d.mean, d.covariance));
-    let (lattice, chi2, freedom) = common_lattice(all, &velocity, &covariance).ok()?;
-    Some(Solved {
+    let (lattice, chi2, freedom) =
+        common_lattice(all, &velocity, &covariance).map_err(|error| error.to_string())?;
+    let parts = at_known_drift(all).ok_or("the lattices of the scans have no usable errors")?;
+    Ok(Solved {
         drift: Drift {
             velocity,
             covariance,
@@ -112,10 +106,11 @@ pub(crate) fn drift(
             monte_carlo: draws,
             joint: None,
         },
-        statistical: Statistical::at_known_drift(at_known_drift(all)?, 1.0, &lattice.covariance),
+        statistical: Statistical::at_known_drift(parts, 1.0, &lattice.covariance),
         lattice,
         chi2,
         freedom,
+        assumed: None,
         enlargement: 1.0,
     })
 }

@@ -3,6 +3,7 @@
 use heterostrain::lattice::Lattice;
 
 use crate::campaign::analysis::Drift;
+use crate::campaign::set::assumed::AssumedDrift;
 use crate::drift::shares::Statistical;
 
 /// The drift of a set and the lattice that goes with it.
@@ -10,6 +11,8 @@ pub(crate) struct Solved {
     pub(crate) drift: Drift,
     pub(crate) lattice: Lattice,
     pub(crate) statistical: Statistical,
+    /// Where nothing tells the drift: what was assumed of it.
+    pub(crate) assumed: Option<AssumedDrift>,
     pub(crate) chi2: f64,
     pub(crate) freedom: usize,
     /// By which the variances were enlarged for the scatter of the scans.
