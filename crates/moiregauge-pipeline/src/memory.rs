@@ -3,8 +3,12 @@
 use moiregauge::scan::BYTES_PER_PIXEL;
 use spmfile::Scan;
 
-/// Where the system does not tell, this much is taken for granted.
-const ASSUMED: u64 = 16 << 30;
+/// Where the system does not tell, this much is taken for granted; WebAssembly has addresses for 4 GB, a part of which is taken.
+const ASSUMED: u64 = if cfg!(target_family = "wasm") {
+    3 << 30
+} else {
+    16 << 30
+};
 
 /// An image that the memory does not hold.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
