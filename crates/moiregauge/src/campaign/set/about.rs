@@ -25,7 +25,9 @@ pub(crate) fn about_set(
     if let Some(mean) = shown {
         caveats.extend(about_readings(&set.name, mean, settings));
     }
-    moire::doubts(&set.name, shown, set.lattice.as_ref(), settings, caveats);
+    // The prior of a drift makes no strain less suspect.
+    let judged = set.with_drift().or(set.uncorrected.as_ref()).or(shown);
+    moire::doubts(&set.name, judged, set.lattice.as_ref(), settings, caveats);
     about_checks(set, used, caveats);
 }
 
