@@ -52,6 +52,8 @@ class Scene:
         self.creeps, self.first_time = [draw(0.002, 0.015) * sign() for _ in "xy"], draw(0.3, 3)
         if kind.startswith("straight"):
             self.bows, self.creeps = [0, 0], [0, 0]
+        if kind.endswith("unrecorded"):  # Up to 1 % and 0.5 % a decade.
+            self.bows, self.creeps = [bow / 3 for bow in self.bows], [creep / 3 for creep in self.creeps]
 
     def places(self, up, back):
         """(X, Y) of the pixels of a line direction."""
@@ -82,13 +84,17 @@ class Scene:
             x, y = self.places(up, back)
             noisy = lambda k: k + SENSOR_NOISE * self.random.normal(size=k.shape)
             way = "Retrace" if back else "Trace"
-            made += [("TRPhase", "TR Phase", way, self.image(x, y)), ("Xsensor", "Xsensor", way, noisy(x)), ("Ysensor", "Ysensor", way, noisy(y))]
+            made.append(("TRPhase", "TR Phase", way, self.image(x, y)))
+            if not self.kind.endswith("unrecorded"):
+                made += [("Xsensor", "Xsensor", way, noisy(x)), ("Ysensor", "Ysensor", way, noisy(y))]
         return made
 
 
 def nanoscope(path, scene, number):
     """A NanoScope file with the fields of a Dimension Icon."""
     up, n, size = number % 2 == 0, scene.pixels, scene.size
+    if scene.kind.endswith("unrecorded"):  # From the first pixel to the last.
+        size *= (n - 1) / n
     direction, data, start = "Up" if up else "Down", [], 40960
     minute, second = divmod(round((number + 1) * n * LINE_TIME), 60)
     head = ["\\*File list", "\\Version: 0x09700105", f"\\Date: 10:{minute:02}:{second:02} AM Fri Mar 15 2024", "\\Start context: OL2",
@@ -134,11 +140,12 @@ def analyse(program, kind, seed, folder):
         line["caveats"] = sorted({c["code"] for c in results.get("caveats", [])})
         line["changes"] = [c["message"] for c in results.get("caveats", []) if c["code"] == "inhomogeneous-lattice"]
         line["twist"] = value(results) and [value(results)[k] for k in ("value", "sigma")]
+        line["total"] = value(results) and value(results)["sigma_total"]
     if os.environ.get("MAPS"):
         line["map refused"] = ran(program, "map", files, made / "map")
         for path in sorted((made / "map").glob("**/map.json")):
             twist = next(q for q in json.loads(path.read_text())["quantities"] if q["name"] == "twist")
-            line["map"] = [twist[k] for k in ("mean", "mean_sigma", "spread_corrected")]
+            line["map"] = [twist.get(k) for k in ("mean", "mean_sigma", "spread_corrected", "bends")]
     if not os.environ.get("KEEP"):
         shutil.rmtree(made)
     return line

@@ -133,8 +133,13 @@ drift_prior_nm_per_min = 1.0
 
 # Standard uncertainties that the scans do not show, for the uncertainty budget. Calibration of the
 # position sensors (or of the scanner, without sensors): gain common to x and y, difference of the two,
-# deviation from a right angle. Values from your own calibration are better.
-calibration = { gain_percent = 1.0, mismatch_percent = 0.5, orthogonality_mrad = 5.0 }
+# deviation from a right angle; and by how much sensors, or a scanner without them, bend against a straight line,
+# per cent of their range in the frame. Values from your own calibration are better.
+calibration.gain_percent = 1.0
+calibration.mismatch_percent = 0.5
+calibration.orthogonality_mrad = 5.0
+calibration.sensor_bend_percent = 0.1
+calibration.scanner_bend_percent = 1.0
 
 # A calibration of the scanner, written by `moiregauge calibrate`: path of the file, relative to this one.
 # It corrects positions, and its errors replace those above.
@@ -206,7 +211,7 @@ pub(crate) fn check(settings: &Settings) -> anyhow::Result<()> {
 }
 
 /// Options by the names of settings; the first that the name begins with.
-const OPTIONS: [(&str, &str); 25] = [
+const OPTIONS: [(&str, &str); 27] = [
     ("material.lattice_constant_nm", "--lattice-constant"),
     (
         "material.lattice_constant_sigma_nm",
@@ -226,6 +231,8 @@ const OPTIONS: [(&str, &str); 25] = [
         "calibration.orthogonality_mrad",
         "--calibration-orthogonality",
     ),
+    ("calibration.sensor_bend_percent", "--sensor-bend"),
+    ("calibration.scanner_bend_percent", "--scanner-bend"),
     ("isotropic_strain_percent", "--isotropic-strain"),
     ("scanner", "--calibration"),
     ("drift_draws", "--drift-draws"),

@@ -23,6 +23,12 @@ pub(crate) struct ScannerArgs {
     /// Deviation of the axes from a right angle, mrad, for the budget [default: 5]
     #[arg(long, value_name = "MRAD", value_parser = number([0.0, 500.0]))]
     calibration_orthogonality: Option<f64>,
+    /// By how much a position sensor bends against a straight line, per cent of its range in the frame, for the budget [default: 0.1]
+    #[arg(long, value_name = "PERCENT", value_parser = number([0.0, 50.0]))]
+    sensor_bend: Option<f64>,
+    /// The same of a scanner without position sensors [default: 1]
+    #[arg(long, value_name = "PERCENT", value_parser = number([0.0, 50.0]))]
+    scanner_bend: Option<f64>,
     /// Isotropic heterostrain that the layers may have, per cent, for the budget [default: 0.05]
     #[arg(long, value_name = "PERCENT", value_parser = number([0.0, 10.0]))]
     isotropic_strain: Option<f64>,
@@ -39,6 +45,8 @@ impl ScannerArgs {
                 self.calibration_orthogonality,
                 &mut priors.orthogonality_mrad,
             ),
+            (self.sensor_bend, &mut priors.sensor_bend_percent),
+            (self.scanner_bend, &mut priors.scanner_bend_percent),
             (
                 self.isotropic_strain,
                 &mut settings.isotropic_strain_percent,

@@ -146,6 +146,8 @@ fn exact() -> Settings {
             gain_percent: 0.0,
             mismatch_percent: 0.0,
             orthogonality_mrad: 0.0,
+            sensor_bend_percent: 0.0,
+            scanner_bend_percent: 0.0,
         },
         ..Settings::default()
     }

@@ -105,6 +105,7 @@ fn source(limit: Limit) -> &'static str {
         Limit::Of(Source::Mismatch) => "calibration: mismatch of x and y",
         Limit::Of(Source::Orthogonality) => "calibration: orthogonality",
         Limit::Of(Source::Pitch) => "pitch of the pixels",
+        Limit::Of(Source::Shape) => "shape of the grid",
         Limit::Of(Source::LatticeConstant) => "lattice constant",
         Limit::Of(Source::StrainedLayer) => "which layer is strained",
         Limit::Of(Source::IsotropicStrain) => "isotropic strain",
@@ -166,7 +167,7 @@ fn remedy(limit: Limit) -> &'static str {
         Limit::Of(Source::Gain | Source::Mismatch | Source::Orthogonality) => {
             "`moiregauge calibrate` with a known lattice does"
         }
-        Limit::Of(Source::Pitch) => "recording the position sensors does",
+        Limit::Of(Source::Pitch | Source::Shape) => "recording the position sensors does",
         Limit::Of(Source::LatticeConstant) => "a better known lattice constant does",
         Limit::Of(Source::IsotropicStrain) => "the orientation of one of the layers does",
         Limit::Of(Source::PoissonRatio) => "a better known Poisson ratio does",

@@ -2,7 +2,7 @@
 
 use moiregauge::caveat::{Caveat, Doubt, DriftDoubt, MapDoubt, Mapped};
 use moiregauge::map::register;
-use moiregauge::map::{DriftChange, LatticeMap};
+use moiregauge::map::{DriftChange, LatticeMap, TwistStrainMap};
 use moiregauge::survey::LineMap;
 
 /// Shifts beyond this share of a period may belong to another one.
@@ -35,6 +35,19 @@ pub(super) fn about_change(drift_change: Option<DriftChange>, caveats: &mut Vec<
 pub(super) fn narrow_margin(margin: f64, file: &str) -> Option<Caveat> {
     let doubt = MapDoubt::NarrowMargin { margin };
     (margin > 0.0 && margin < 1.99).then(|| Caveat::new(doubt, file))
+}
+
+/// Says that the spread of the twist may be that of a bent grid.
+pub(super) fn of_bends(map: &TwistStrainMap, from_sensors: bool) -> Option<Caveat> {
+    let (found, bends) = (map.spread(&map.twist)?, map.rms_of_bends(0)?);
+    let spread = found.corrected;
+    let doubt = MapDoubt::SpreadOfGrid {
+        spread,
+        bends,
+        from_sensors,
+    };
+    let seen = spread > found.mean_sigma && spread < 2.0 * bends;
+    seen.then(|| Caveat::new(doubt, "map"))
 }
 
 /// What is not as good as it could be.

@@ -184,10 +184,17 @@ impl Scans<'_> {
         }
         let drift_change = change_of_drift(&maps);
         doubts::about_change(drift_change, &mut caveats);
+        let unbent = TwistStrainMap::new(&lattices, &found);
+        let of_bends = lattices.of_bends(&reference, layers, convention, &settings.calibration);
+        let map = match of_bends {
+            Ok(of_bends) => unbent.with_bends(&of_bends),
+            Err(_) => unbent,
+        };
+        caveats.extend(doubts::of_bends(&map, lattices.bends.from_sensors));
         let image =
             |m: &LineMap| mapped_image(&m.file, Some(m.line), m.drift_corrected, &m.harmonics);
         Ok(Mapped {
-            map: TwistStrainMap::new(&lattices, &found),
+            map,
             whole: match grain {
                 Some(sets) => whole_set(&self.analysis.sets[sets[0]]),
                 None => whole_image(self.analysis),

@@ -96,6 +96,7 @@ impl Serialize for Limit {
             Self::Of(Source::Mismatch) => "mismatch",
             Self::Of(Source::Orthogonality) => "orthogonality",
             Self::Of(Source::Pitch) => "pitch",
+            Self::Of(Source::Shape) => "grid-shape",
             Self::Of(Source::LatticeConstant) => "lattice-constant",
             Self::Of(Source::StrainedLayer) => "strained-layer",
             Self::Of(Source::IsotropicStrain) => "isotropic-strain",

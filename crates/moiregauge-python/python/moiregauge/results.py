@@ -211,6 +211,10 @@ class BudgetColumn(Document):
     """Uncertainty of the drift, that of a prior where `drift_assumed` says so; `null` where the drift was not
     removed.
     """
+    grid_shape: float | None = None
+    """Bends of the grid that no sensor told, where the area does not lie in the middle of the frame; left out
+    where it does.
+    """
     image: float | None
     """Noise of the images, drift and sensors known exactly."""
     isotropic_strain: float | None
@@ -290,6 +294,12 @@ class Calibration(Document):
     """Difference of the gains of x and y, per cent."""
     orthogonality_mrad: float
     """Deviation of the axes from a right angle, mrad."""
+    scanner_bend_percent: float
+    """The same of a scanner that no sensor recorded: hysteresis bends lines by a per cent."""
+    sensor_bend_percent: float
+    """By how much a position sensor bends against a straight line, per cent of the range that it goes through
+    in the frame.
+    """
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -1100,10 +1110,16 @@ class Provenance(Document):
 class QuantityResult(Document):
     """Mean and spread of a quantity over the good nodes."""
 
+    bends: float | None = None
+    """What bends of the grid that no sensor told may add to the nodes, root mean square; in no other number,
+    and left out where it is not known.
+    """
     mean: float
     """Mean."""
     mean_sigma: float
-    """Upper limit of the standard error of the mean by image noise."""
+    """Standard error of the mean by image noise; an upper limit of it for the size of the strain and
+    displacements.
+    """
     name: str
     """Its name in the files."""
     noise: float
@@ -1883,6 +1899,7 @@ decoded_by(
             "calibration_mismatch": float,
             "calibration_orthogonality": float,
             "drift": float,
+            "grid_shape": float,
             "image": float,
             "isotropic_strain": float,
             "lattice_constant": float,
@@ -1915,6 +1932,8 @@ decoded_by(
             "gain_percent": float,
             "mismatch_percent": float,
             "orthogonality_mrad": float,
+            "scanner_bend_percent": float,
+            "sensor_bend_percent": float,
         },
         CandidateResult: {
             "behind_by": float,
@@ -2167,6 +2186,7 @@ decoded_by(
             "run": Run.from_dict,
         },
         QuantityResult: {
+            "bends": float,
             "mean": float,
             "mean_sigma": float,
             "noise": float,

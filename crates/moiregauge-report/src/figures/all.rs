@@ -5,15 +5,15 @@ use moiregauge::campaign::Analysis;
 use super::figure::{Drawing, Figure};
 use super::subject::Subject;
 use super::{
-    amplitude, budget, comparison, drift, error_relation, parameters, residuals, scan, sensor_line,
-    sets, survey, transforms, twist_strain, twist_wavelength, velocities, wavelengths,
+    amplitude, budget, comparison, curved, drift, error_relation, parameters, residuals, scan,
+    sensor_line, sets, survey, transforms, twist_strain, twist_wavelength, velocities, wavelengths,
     wavelengths_nominal, window,
 };
 use crate::draw::colormap::ColorMap;
 
 type Draw = fn(&Subject) -> Result<Drawing, String>;
 
-const OF_A_SET: [(&str, &str, Draw); 15] = [
+const OF_A_SET: [(&str, &str, Draw); 16] = [
     ("scan", "Scan with intended and actual frame", scan::draw),
     ("amplitude", "Phase and amplitude", amplitude::draw),
     (
@@ -55,6 +55,11 @@ const OF_A_SET: [(&str, &str, Draw); 15] = [
         "residuals",
         "Residual maps of the position sensors",
         residuals::draw,
+    ),
+    (
+        "curved-grid",
+        "Position sensors of a scanner that bends",
+        curved::draw,
     ),
     ("velocities", "Tip velocities", velocities::draw),
     ("window", "Centre of the scanned window", window::draw),

@@ -25,7 +25,7 @@ const RIGHT: f64 = 12.0;
 const DECADES: f64 = 5.0;
 
 /// Rows from top to bottom: name, and the sources that it sums.
-const ROWS: [(&str, Kind, &[Source]); 13] = [
+const ROWS: [(&str, Kind, &[Source]); 14] = [
     ("image noise", Kind::Statistical, &[Source::Image]),
     ("drift", Kind::Statistical, &[Source::Drift]),
     ("sensor noise", Kind::Statistical, &[Source::Sensor]),
@@ -50,6 +50,7 @@ const ROWS: [(&str, Kind, &[Source]); 13] = [
         Kind::Calibration,
         &[Source::Pitch],
     ),
+    ("shape of the grid", Kind::Calibration, &[Source::Shape]),
     ("lattice constant", Kind::Model, &[Source::LatticeConstant]),
     (
         "model: which layer is strained",
@@ -175,10 +176,13 @@ fn shown(analysis: &Analysis) -> Option<(&Budget, String)> {
 /// A row: its name, and the sources that it sums.
 type Row = (&'static str, Kind, &'static [Source]);
 
-/// All rows, that of the pitch only where it is in doubt.
+/// All rows, those of the grid only where it is in doubt.
 fn rows(budget: &Budget) -> Vec<Row> {
-    let doubtful = budget.pitch.norm() > 0.0;
-    let shown = |sources: &[Source]| doubtful || sources != [Source::Pitch];
+    let shown = |sources: &[Source]| match sources {
+        [Source::Pitch] => budget.grid.pitch.norm() > 0.0,
+        [Source::Shape] => budget.grid.shape.norm() > 0.0,
+        _ => true,
+    };
     ROWS.into_iter().filter(|row| shown(row.2)).collect()
 }
 

@@ -8,6 +8,7 @@ mod amplitude;
 mod budget;
 mod cell;
 mod comparison;
+mod curved;
 mod drift;
 mod error_relation;
 mod figure;

@@ -30,6 +30,9 @@ pub struct BudgetColumn {
     /// Whether the nominal size spans N pixels or N − 1; left out where sensors or the format tell.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pitch_convention: Option<f64>,
+    /// Bends of the grid that no sensor told, where the area does not lie in the middle of the frame; left out where it does.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub grid_shape: Option<f64>,
     /// Lattice constant of the layers.
     pub lattice_constant: Option<f64>,
     /// Which layer is strained.
@@ -81,6 +84,7 @@ pub(crate) fn source_name(source: Source) -> &'static str {
         Source::Mismatch => "calibration_mismatch",
         Source::Orthogonality => "calibration_orthogonality",
         Source::Pitch => "pitch_convention",
+        Source::Shape => "grid_shape",
         Source::LatticeConstant => "lattice_constant",
         Source::StrainedLayer => "strained_layer",
         Source::IsotropicStrain => "isotropic_strain",
@@ -101,7 +105,8 @@ impl BudgetColumn {
             calibration_gain: of(Source::Gain),
             calibration_mismatch: of(Source::Mismatch),
             calibration_orthogonality: of(Source::Orthogonality),
-            pitch_convention: of(Source::Pitch).filter(|_| budget.pitch.norm() > 0.0),
+            pitch_convention: of(Source::Pitch).filter(|_| budget.grid.pitch.norm() > 0.0),
+            grid_shape: of(Source::Shape).filter(|_| budget.grid.shape.norm() > 0.0),
             lattice_constant: of(Source::LatticeConstant),
             strained_layer: of(Source::StrainedLayer),
             isotropic_strain: of(Source::IsotropicStrain),
@@ -120,6 +125,7 @@ impl BudgetColumn {
             Source::Mismatch => self.calibration_mismatch,
             Source::Orthogonality => self.calibration_orthogonality,
             Source::Pitch => self.pitch_convention,
+            Source::Shape => self.grid_shape,
             Source::LatticeConstant => self.lattice_constant,
             Source::StrainedLayer => self.strained_layer,
             Source::IsotropicStrain => self.isotropic_strain,

@@ -85,10 +85,11 @@ impl Conventions {
                     model; `budget` has every part".to_owned(),
             budget: format!("one standard deviation for each source of error and for all together; image, drift and \
                              sensor make up sigma; the scanner is assumed to be known to {} % in gain, {} % in the \
-                             ratio of x and y and {} mrad in the angle between them, the lattice constant to {}, the \
+                             ratio of x and y and {} mrad in the angle between them, to bend by {} % of its range in the frame \
+                             ({} % without sensors), the lattice constant to {}, the \
                              Poisson ratio to {}, an isotropic heterostrain to be {} %; strained_layer is the \
                              difference to strain in equal parts in both layers; angles are counted from the x axis of \
-                             the sensors, so a turned frame is no error", settings.calibration.gain_percent, settings.calibration.mismatch_percent, settings.calibration.orthogonality_mrad, constants(settings), settings.material.poisson_ratio_sigma, settings.isotropic_strain_percent),
+                             the sensors, so a turned frame is no error", settings.calibration.gain_percent, settings.calibration.mismatch_percent, settings.calibration.orthogonality_mrad, settings.calibration.sensor_bend_percent, settings.calibration.scanner_bend_percent, constants(settings), settings.material.poisson_ratio_sigma, settings.isotropic_strain_percent),
         }
     }
 }

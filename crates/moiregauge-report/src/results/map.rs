@@ -190,7 +190,14 @@ pub fn quantities(map: &TwistStrainMap) -> Vec<QuantityResult> {
         .filter_map(|(name, unit, plane, factor)| {
             let found = map.spread(plane)?;
             let trend = trends.as_ref().and_then(|t| t.of(plane));
+            let of_bends = match name {
+                "twist" => map.rms_of_bends(0),
+                "strain vector 1" => map.rms_of_bends(1),
+                "strain vector 2" => map.rms_of_bends(2),
+                _ => None,
+            };
             Some(QuantityResult {
+                bends: of_bends.map(|sigma| factor * sigma),
                 trend: trend.map(|t| TrendResult::new(&t, factor)),
                 ..QuantityResult::new(name, unit, &found, factor)
             })

@@ -14,7 +14,7 @@ pub struct QuantityResult {
     pub unit: String,
     /// Mean.
     pub mean: f64,
-    /// Upper limit of the standard error of the mean by image noise.
+    /// Standard error of the mean by image noise; an upper limit of it for the size of the strain and displacements.
     pub mean_sigma: f64,
     /// Standard deviation over the nodes.
     pub spread: f64,
@@ -22,6 +22,9 @@ pub struct QuantityResult {
     pub spread_corrected: f64,
     /// Root mean square of the errors of the nodes.
     pub noise: f64,
+    /// What bends of the grid that no sensor told may add to the nodes, root mean square; in no other number, and left out where it is not known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub bends: Option<f64>,
     /// A plane through the good nodes; `null` where they are too few or too near to each other.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub trend: Option<TrendResult>,
@@ -74,6 +77,7 @@ impl QuantityResult {
             spread: factor * found.spread,
             spread_corrected: factor * found.corrected,
             noise: factor * found.noise,
+            bends: None,
             trend: None,
         }
     }

@@ -70,10 +70,10 @@ impl<'a> Row<'a> for BudgetRow<'a> {
             .map(|c| ("all sets together", "drift_corrected", &c.budget));
         sets.chain(together)
             .flat_map(|(set, coordinates, budget)| {
-                let pitch = budget.twist_deg.pitch_convention.is_some();
+                let of_grid = |s: &Source| matches!(s, Source::Pitch | Source::Shape);
                 let shown = Source::ALL
                     .into_iter()
-                    .filter(move |s| pitch || *s != Source::Pitch);
+                    .filter(move |s| !of_grid(s) || budget.twist_deg.get(*s).is_some());
                 let sources = shown.map(Some).chain([None]);
                 sources.map(move |source| Self {
                     set,

@@ -73,7 +73,8 @@ fn shown<'a>(
             Shown::Values(&plane.sigma, factor),
         ));
     }
-    let plain: [(&str, &'static str, &[f32], f64); 4] = [
+    let [twist, e1, e2] = &map.of_bends;
+    let plain: [(&str, &'static str, &[f32], f64); 7] = [
         (
             "strain vector covariance",
             "%²",
@@ -83,6 +84,9 @@ fn shown<'a>(
         ("closure chi2 per dof", "", &map.closure, 1.0),
         ("curl", "rad/nm²", &map.curl, 1.0),
         ("signal to noise", "", &map.signal_to_noise, 1.0),
+        ("twist bend sigma", "°", twist, degree),
+        ("strain vector 1 bend sigma", "%", e1, 100.0),
+        ("strain vector 2 bend sigma", "%", e2, 100.0),
     ];
     for (name, unit, values, factor) in plain {
         all.push((name.to_owned(), unit, Shown::Values(values, factor)));

@@ -134,6 +134,7 @@ fn constant(twist_sigma_deg: f64) -> TwistStrainMap {
         displacement: [of(0.0, 0.01), of(0.0, 0.01)],
         closure: vec![1.0; n],
         curl: vec![0.0; n],
+        of_bends: Default::default(),
         signal_to_noise: vec![20.0; n],
         grain: Vec::new(),
     }

@@ -50,7 +50,11 @@ fn documents_follow_the_schema() {
     let mut empty = common::analysis();
     empty.sets.clear();
     empty.combined = None;
-    for analysis in [common::analysis(), hopeless, empty] {
+    for analysis in [
+        Box::new(common::analysis()),
+        Box::new(hopeless),
+        Box::new(empty),
+    ] {
         let document = document(&analysis);
         let errors: Vec<String> = validator
             .iter_errors(&document)

@@ -168,6 +168,7 @@ pub(super) fn illustration(scan: &ScanAnalysis, noise: &mut Noise) -> Option<Ill
             .collect(),
         sensor_residuals: Some([0.1, 0.07].map(|a| image(|x, y| a * (x / 40.0 + y / 90.0).sin()))),
         residual_block: 1,
+        bent: Vec::new(),
         amplitude: Some(Companion {
             channel: "TR Amplitude".to_owned(),
             unit: "mV".to_owned(),

@@ -16,6 +16,7 @@ use crate::caveat::sets::SetDoubt;
 use crate::drift::joint::found::JointFit;
 use crate::drift::joint::path::DriftPath;
 use crate::drift::shares::Statistical;
+use crate::frame::grid_errors::GridErrors;
 use crate::meaning::about::caveats as about_readings;
 use crate::meaning::budget::Budget;
 use crate::meaning::readings::Readings;
@@ -69,9 +70,8 @@ pub(crate) fn combine(
     let consistency = consistency(sets);
     caveats.extend(consistency.iter().filter_map(about_consistency));
     let twist_strain = moire(&lattice, settings)?;
-    // Sets of one instrument have one convention: what it does does not average out.
-    let pitch = means.iter().map(|m| m.budget.pitch).sum::<Matrix2<f64>>() / means.len() as f64;
-    let mut budget = Budget::with_pitch(&lattice, &twist_strain, &statistical, &pitch, settings);
+    let grid = GridErrors::mean(means.iter().map(|m| m.budget.grid));
+    let mut budget = Budget::with_grid(&lattice, &twist_strain, &statistical, &grid, settings);
     budget.drift_assumed = means.iter().any(|mean| mean.assumed.is_some());
     let readings = Readings::new(&lattice, &twist_strain, &budget, strengths, settings);
     if sets.len() > 1 {

@@ -4,11 +4,12 @@ use nalgebra::Vector2;
 use spmfile::{Channel, LineDirection, Scan};
 
 use crate::campaign::analysis::ScanAnalysis;
+use crate::frame::geometry::Geometry;
 use crate::frame::image::Image;
 use crate::frame::plane::PlaneFit;
 use crate::frame::sensors::SensorGeometry;
 use crate::scan::channel::{channels, choose_channel, flat_image_of};
-use crate::scan::picture::{Companion, Illustration, Picture};
+use crate::scan::picture::{BentSensors, Companion, Illustration, Picture};
 use crate::scan::place::Place;
 use crate::scan::positions::sensor_images;
 use crate::settings::knobs::Settings;
@@ -18,6 +19,10 @@ use crate::spectrum::pictures::pictures;
 const RESIDUAL_BLOCKS: usize = 128;
 /// Pixels along the longer side of a picture, at most: as fine as a figure shows.
 const MOST_PIXELS: usize = 1024;
+
+/// Cells of the grid that is drawn along each side, and pieces of the line along each.
+const GRID_LINES: usize = 10;
+const GRID_STEPS: usize = 6;
 
 /// The pictures behind the numbers of `analysed`, from the pixels of the same scan.
 ///
@@ -79,6 +84,7 @@ pub fn illustrate(
         slow_velocities,
         sensor_residuals,
         residual_block,
+        bent: bent(scan, settings, residual_block),
         amplitude: amplitude(scan, channel, settings),
     })
 }
@@ -89,6 +95,55 @@ fn residuals(sensors: &SensorGeometry, measured: &[Image; 2], block: usize) -> [
         let left = sensors.residual_map(axis, &measured[axis]);
         left.binned(block)
     })
+}
+
+/// The sensors of every line direction whose scanner bends.
+fn bent(scan: &Scan, settings: &Settings, block: usize) -> Vec<BentSensors> {
+    let of = |channel: &Channel| {
+        let place = Place::of("", scan, channel, settings, &mut Vec::new())?;
+        let sensors = place.sensors.as_ref()?;
+        let departure = sensors.geometry.departure.as_deref()?;
+        let mut measured = sensor_images("", scan, channel, &mut Vec::new())?;
+        let before = residuals(sensors, &measured, block);
+        for row in 0..channel.rows {
+            let places = departure.line(row, channel.columns);
+            for (axis, image) in measured.iter_mut().enumerate() {
+                let line = &mut image.values[row * channel.columns..][..channel.columns];
+                line.iter_mut()
+                    .zip(&places)
+                    .for_each(|(v, off)| *v -= off[axis]);
+            }
+        }
+        Some(BentSensors {
+            line: place.line,
+            before,
+            after: residuals(sensors, &measured, block),
+            grid: grid_lines(&place.geometry),
+        })
+    };
+    let channels = channels(scan, settings).unwrap_or_default();
+    channels.into_iter().filter_map(of).collect()
+}
+
+/// Lines along the columns and along the rows of a frame: places on the straight grid and the departure there.
+fn grid_lines(geometry: &Geometry) -> Vec<Vec<[Vector2<f64>; 2]>> {
+    let last = geometry.size.map(|n| n as f64 - 1.0);
+    let at = |column: usize, row: usize| {
+        let shares = Vector2::new(column as f64 * last[0], row as f64 * last[1]);
+        let pixel = shares / (GRID_LINES * GRID_STEPS) as f64;
+        let off = geometry.departure.as_deref().map(|d| d.at(pixel));
+        [geometry.place(pixel), off.unwrap_or_default()]
+    };
+    let steps = || 0..=GRID_LINES * GRID_STEPS;
+    let lines = (0..=GRID_LINES).map(|line| line * GRID_STEPS);
+    lines
+        .flat_map(|line| {
+            [
+                steps().map(|step| at(line, step)).collect(),
+                steps().map(|step| at(step, line)).collect(),
+            ]
+        })
+        .collect()
 }
 
 /// The velocities of the tip along the fast and the slow axis by the sensors, nm/s.

@@ -60,6 +60,21 @@ pub enum MapDoubt {
         /// Its width, windows.
         margin: f64,
     },
+    /// The spread may be that of the grid.
+    #[error(
+        "the twist varies by {}° beyond the noise, and bends of {} may make {}° of that",
+        two_digits(.spread.to_degrees()),
+        if *.from_sensors { "the position sensors that nothing tells" } else { "a scanner that no position sensor recorded" },
+        two_digits(.bends.to_degrees())
+    )]
+    SpreadOfGrid {
+        /// Standard deviation of the twist without its noise, rad.
+        spread: f64,
+        /// What bends make of it at the default of the settings or as they say, rad.
+        bends: f64,
+        /// Whether sensors recorded the places.
+        from_sensors: bool,
+    },
     /// An image has the contrast of an error signal.
     #[error(
         "the contrast of the {} is opposite to that of the images before, as in error signals. A shift of half a \
@@ -179,6 +194,11 @@ explain! { MapDoubt:
         "The frame is small for the window, and nodes closer to the edge than usual were kept. They average over the \
          inner side more than over the outer side."
         "Use a wider margin (fewer nodes), use a narrower window, or scan a larger frame."
+    SpreadOfGrid "map-spread-of-grid" Warning
+        "The twist varies over the map by no more than bends of the grid can make: of the position sensors, or of the scanner where \
+         there are none. The settings say how much these may bend."
+        "Do not read the variation as strain. Record the position sensors, turn the scan by 90°, or measure how much the sensors bend and \
+         give it with --sensor-bend or --scanner-bend."
     ContrastReversed "contrast-reversed" Note
         "One image has the opposite contrast of those before it, as in the error signals of trace and retrace. A shift \
          of half a period was taken for reversed contrast."

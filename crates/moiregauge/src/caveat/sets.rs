@@ -16,6 +16,18 @@ pub enum SetDoubt {
         /// How many times the cell.
         times: i32,
     },
+    /// The lattice changes by no more than the scanner may bend.
+    #[error(
+        "the lattice changes by {:.1} % across the frame (standard deviation), and a scanner that no position sensor recorded makes \
+         {:.1} % by the bends that the settings assume",
+        100.0 * .change, 100.0 * .bends
+    )]
+    ChangeOfScanner {
+        /// Standard deviation of wavelength or direction, as a share.
+        change: f64,
+        /// What bends make of it.
+        bends: f64,
+    },
     /// The drift would be faster than the slow scan.
     #[error(
         "the scans fit together only with a drift of {share:.1} times the speed of the slow scan. No sample drifts like \
@@ -169,6 +181,10 @@ fn scattered(of: Scattered, chi2_per_dof: f64) -> String {
 }
 
 explain! { SetDoubt:
+    ChangeOfScanner "change-of-scanner" Warning
+        "No position sensor says how the scanner bends, and hysteresis of a usual size makes as large a change of the lattice. The mean over a whole frame \
+         hardly feels it; the budget has what it does to a part of the frame."
+        "Record the position sensors, or scan the place again turned by 90°: a change that turns with the frame is the scanner's."
     ShellForLattice "shell-for-lattice" Serious
         "One image shows a lattice whose cell is two to four times that of the others. The first waves of the lattice \
          are weak. Where noise hides them, a harmonic shell is taken for the lattice. There is no result for the set."

@@ -48,6 +48,16 @@ impl Patch {
         (0..2).all(|i| image[i].abs_diff(self.size[i] * self.pixels[i]) < 2 * self.pixels[i])
     }
 
+    /// The middles of its cells, pixels.
+    pub(crate) fn places(&self) -> Vec<Vector2<f64>> {
+        let inside = (0..self.inside.len()).filter(|&i| self.inside[i]);
+        let middle = |i: usize| {
+            let cell = [i % self.size[0], i / self.size[0]];
+            Vector2::from([0, 1].map(|k| (cell[k] as f64 + 0.5) * self.pixels[k] as f64 - 0.5))
+        };
+        inside.map(middle).collect()
+    }
+
     /// Its outline: the sides of cells beyond which it ends, from point to point (column, row), where pixels lie at whole
     /// numbers.
     pub fn outline(&self) -> Vec<[Vector2<f64>; 2]> {

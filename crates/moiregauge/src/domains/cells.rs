@@ -66,11 +66,7 @@ impl DomainMap {
         convention: StrainConvention,
     ) -> Option<Result<Self, StrainError>> {
         let j = placed.pixel_to_nm;
-        let nodes: Vec<Vector2<f64>> = found
-            .nodes
-            .iter()
-            .map(|n| placed.origin + j * n.place)
-            .collect();
+        let nodes: Vec<Vector2<f64>> = found.nodes.iter().map(|n| placed.at(n.place)).collect();
         let covariances: Vec<Matrix2<f64>> = found
             .nodes
             .iter()
@@ -99,13 +95,13 @@ impl DomainMap {
         }
         Some(Ok(Self {
             indices: mesh.indices.clone(),
-            missing: mesh.missing.iter().map(|p| placed.origin + j * p).collect(),
+            missing: mesh.missing.iter().map(|p| placed.at(*p)).collect(),
             extra: mesh.extra.clone(),
             dislocations: mesh
                 .dislocations
                 .iter()
                 .map(|d| Dislocation {
-                    place: placed.origin + j * d.place,
+                    place: placed.at(d.place),
                     ..*d
                 })
                 .collect(),

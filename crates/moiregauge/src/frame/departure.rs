@@ -4,7 +4,7 @@
 //! such polynomials across the lines and, for creep, of logarithms of the time since the frame began. Measured in pixels,
 //! `U = J⁻¹ w` says where on a straight grid a pixel lies: a wave of q per pixel of that grid has the phase `q·(n + U(n))`.
 
-use nalgebra::{Matrix2, Vector2};
+use nalgebra::{DMatrix, Matrix2, Matrix2xX, Matrix4, Vector2};
 
 /// A function across the lines, of v from −1 to 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -58,10 +58,20 @@ pub(crate) struct Term {
     pub(crate) size: Vector2<f64>,
 }
 
+/// What is not known of one degree along the lines: the covariance of the sizes of functions across them, along an axis.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Noise {
+    pub(crate) along: usize,
+    pub(crate) across: Vec<Across>,
+    pub(crate) axis: Vector2<f64>,
+    pub(crate) covariance: DMatrix<f64>,
+}
+
 /// The departure of the lines of one direction.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Departure {
     terms: Vec<Term>,
+    noise: Vec<Noise>,
     /// u and v of pixel (0, 0), and their steps from pixel to pixel.
     first: [f64; 2],
     step: [f64; 2],
@@ -73,9 +83,59 @@ impl Departure {
         let step = [columns, rows].map(|[first, last]| 2.0 / (last.max(first + 1) - first) as f64);
         Self {
             terms,
+            noise: Vec::new(),
             first: [0, 1].map(|i| -1.0 - step[i] * [columns, rows][i][0] as f64),
             step,
         }
+    }
+
+    /// With errors of its terms.
+    #[must_use]
+    pub(crate) fn with_noise(self, noise: Vec<Noise>) -> Self {
+        Self { noise, ..self }
+    }
+
+    /// What is not known of its slopes at a place: for each axis the covariance of the slopes from column to column and from row to row.
+    pub(crate) fn noise_at(&self, place: Vector2<f64>) -> Vec<(Vector2<f64>, Matrix2<f64>)> {
+        let [u, v] = [0, 1].map(|i| (self.first[i] + self.step[i] * place[i]).clamp(-1.0, 1.0));
+        let of = |noise: &Noise| {
+            let [p, dp] = legendre(u, noise.along)[noise.along];
+            let sides = noise.across.iter().map(|across| {
+                let [q, dq] = across.at(v);
+                Vector2::new(dp * q * self.step[0], p * dq * self.step[1])
+            });
+            let sides = Matrix2xX::from_columns(&sides.collect::<Vec<_>>());
+            (noise.axis, &sides * &noise.covariance * sides.transpose())
+        };
+        self.noise.iter().map(of).collect()
+    }
+
+    /// What is not known of straight lines through it at such places: covariance of the steps from column to column and from row to row, as that
+    /// of a [`Geometry`](crate::frame::geometry::Geometry).
+    pub(crate) fn noise_of_steps(&self, places: &[Vector2<f64>]) -> Matrix4<f64> {
+        let middle = places.iter().sum::<Vector2<f64>>() / places.len() as f64;
+        let spread: Matrix2<f64> = places
+            .iter()
+            .map(|at| (at - middle) * (at - middle).transpose())
+            .sum();
+        let Some(inverse) = spread.try_inverse() else {
+            return Matrix4::zeros();
+        };
+        let of = |noise: &Noise| {
+            let mut sides = Matrix2xX::zeros(noise.across.len());
+            for at in places {
+                let [u, v] = [0, 1].map(|i| self.first[i] + self.step[i] * at[i]);
+                let along = legendre(u.clamp(-1.0, 1.0), noise.along)[noise.along][0];
+                for (i, across) in noise.across.iter().enumerate() {
+                    let value = along * across.at(v.clamp(-1.0, 1.0))[0];
+                    let mut side = sides.column_mut(i);
+                    side += inverse * (at - middle) * value;
+                }
+            }
+            let slopes: Matrix2<f64> = &sides * &noise.covariance * sides.transpose();
+            slopes.kronecker(&(noise.axis * noise.axis.transpose()))
+        };
+        self.noise.iter().map(of).sum()
     }
 
     /// In coordinates that are `map` times these.
@@ -84,6 +144,9 @@ impl Departure {
         let mut mapped = self.clone();
         for term in &mut mapped.terms {
             term.size = map * term.size;
+        }
+        for noise in &mut mapped.noise {
+            noise.axis = map * noise.axis;
         }
         mapped
     }

@@ -17,6 +17,7 @@ use spmfile::{FrameDirection, LineDirection, Scan};
 
 use crate::frame::axis::Axis;
 use crate::frame::departure::Departure;
+use crate::frame::grid_errors::Bends;
 use crate::numbers::exact;
 
 /// The affine map from pixels to nm.
@@ -106,6 +107,40 @@ impl Geometry {
         let [columns, rows] = self.size;
         let middle = Vector2::new((columns as f64 - 1.0) / 2.0, (rows as f64 - 1.0) / 2.0);
         self.origin + self.pixel_to_nm * middle
+    }
+
+    /// How x and y may bend in the frame.
+    pub fn bends(&self) -> Bends {
+        let sides = Vector2::from(self.size.map(|n| n as f64 - 1.0));
+        Bends {
+            centre: self.centre(),
+            range: self.pixel_to_nm.abs() * sides,
+            from_sensors: self.from_sensors,
+        }
+    }
+
+    /// Position of a pixel on the straight grid, nm.
+    pub(crate) fn place(&self, at: Vector2<f64>) -> Vector2<f64> {
+        self.origin + self.pixel_to_nm * at
+    }
+
+    /// Where the scanner was at a pixel, nm.
+    pub fn at(&self, pixel: Vector2<f64>) -> Vector2<f64> {
+        let off = self.departure.as_deref().map(|d| d.at(pixel));
+        self.place(pixel) + off.unwrap_or_default()
+    }
+
+    /// The pixel at which it was at a place (nm), and `None` where the map is singular. A departure is much smaller than the frame: each step of
+    /// the iteration leaves its slope, some per cent, of what was left.
+    pub fn pixel_of(&self) -> Option<impl Fn(Vector2<f64>) -> Vector2<f64> + Sync + '_> {
+        let inverse = self.pixel_to_nm.try_inverse()?;
+        Some(move |place: Vector2<f64>| {
+            let straight = inverse * (place - self.origin);
+            let Some(departure) = self.departure.as_deref() else {
+                return straight;
+            };
+            (0..8).fold(straight, |at, _| straight - inverse * departure.at(at))
+        })
     }
 
     /// Lengths of the fast and slow sides from first to last pixel centre, nm.
@@ -276,6 +311,7 @@ pub(crate) fn at_rest(geometry: &Geometry, timing: &Timing, drift: Vector2<f64>)
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::frame::departure::{Across, Term};
 
     /// The velocities `V_fast = 2 f (1+ρ) L_f`, `V_slow = L_s f / N`, and the time gradient of a
     /// rectangle, `(s_f/V_fast, s_s/V_slow)`, for both slow axes, written out independently.
@@ -302,6 +338,56 @@ mod tests {
                 g.slow_axis(),
                 if rotation == 0.0 { Axis::Y } else { Axis::X }
             );
+        }
+    }
+
+    /// Sensors that bend by a thousandth of their range: straight lines through what they show of a part of the frame are too long by
+    /// the stretch in its middle, and right over the whole frame.
+    #[test]
+    fn bends_stretch_parts_of_a_frame() {
+        let g = Geometry::of_pitch([201, 151], [0.4, 0.5], 0.3, Vector2::new(7.0, 2.0)).unwrap();
+        let place = |n| g.place(n);
+        let corners = [[0.0, 0.0], [200.0, 0.0], [0.0, 150.0], [200.0, 150.0]];
+        let corners = corners.map(|[c, r]| place(Vector2::new(c, r)));
+        for axis in [0, 1] {
+            let along = corners.map(|c| c[axis]);
+            let (low, high) = along
+                .iter()
+                .fold((f64::MAX, f64::MIN), |(l, h), v| (l.min(*v), h.max(*v)));
+            let range = high - low;
+            let bent = |x: f64| x + 0.001 * range * (2.0 * (x - g.centre()[axis]) / range).powi(2);
+            let middle = Vector2::new(160.0, 40.0);
+            let sides = [-9.0, 9.0].map(|d| place(middle + Vector2::new(d, 0.0))[axis]);
+            let slope = (bent(sides[1]) - bent(sides[0])) / (sides[1] - sides[0]) - 1.0;
+            assert!((slope / (0.001 * g.bends().stretch(place(middle))[axis]) - 1.0).abs() < 1e-9);
+        }
+        assert!(g.bends().stretch(g.centre()).norm() < 1e-12);
+    }
+
+    /// A pixel of a bowed frame is found from where the scanner was there, to a hundred thousandth.
+    #[test]
+    fn pixels_of_places_on_a_curved_grid() {
+        let mut g =
+            Geometry::of_pitch([201, 151], [0.4, 0.5], 0.3, Vector2::new(7.0, 2.0)).unwrap();
+        let term = |along, across, x, y| Term {
+            along,
+            across: Across::Power(across),
+            size: Vector2::new(x, y),
+        };
+        let terms = vec![
+            term(2, 0, 0.8, 0.1),
+            term(0, 2, -0.3, 0.6),
+            term(1, 3, 0.2, -0.2),
+        ];
+        g.departure = Some(Arc::new(Departure::new(terms, [0, 200], [0, 150])));
+        let pixel = g.pixel_of().unwrap();
+        for at in [
+            Vector2::new(12.0, 140.0),
+            Vector2::new(100.5, 75.0),
+            Vector2::new(200.0, 0.0),
+        ] {
+            assert!((g.at(at) - g.place(at)).norm() > 0.1);
+            assert!((pixel(g.at(at)) - at).norm() < 1e-5);
         }
     }
 

@@ -16,6 +16,7 @@
 use nalgebra::{Matrix2, Vector2};
 use rayon::prelude::*;
 
+use crate::frame::geometry::Geometry;
 use crate::frame::image::Image;
 use crate::numbers::interrupt;
 
@@ -53,7 +54,23 @@ pub fn resample(
     pixel_to_nm: &Matrix2<f64>,
     origin: Vector2<f64>,
 ) -> Option<Resampled> {
-    let inverse = pixel_to_nm.try_inverse()?;
+    let geometry = Geometry::of_pitch([2; 2], [1.0; 2], 0.0, Vector2::zeros())?;
+    let geometry = Geometry {
+        pixel_to_nm: *pixel_to_nm,
+        origin,
+        ..geometry
+    };
+    on_curved_grid(image, &geometry)
+}
+
+/// The same of an image whose pixels a geometry places, curved where it is.
+pub(crate) fn on_curved_grid(image: &Image, geometry: &Geometry) -> Option<Resampled> {
+    let Geometry {
+        pixel_to_nm,
+        origin,
+        ..
+    } = geometry;
+    let pixel = geometry.pixel_of()?;
     if image.rows < 2 || image.columns < 2 {
         return None;
     }
@@ -80,7 +97,7 @@ pub fn resample(
         interrupt::check();
         for (column, value) in line.iter_mut().enumerate() {
             let point = first + pitch * Vector2::new(column as f64, row as f64);
-            *value = at(image, inverse * (point - origin));
+            *value = at(image, pixel(point));
         }
     });
     Some(Resampled {

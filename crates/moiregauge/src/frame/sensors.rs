@@ -8,7 +8,7 @@ use nalgebra::{Matrix2, Vector2};
 
 use crate::frame::bowed;
 use crate::frame::column_sums::ColumnSums;
-use crate::frame::departure::{Departure, Term};
+use crate::frame::departure::{Departure, Noise, Term};
 use crate::frame::fit_plane::through;
 use crate::frame::geometry::Geometry;
 use crate::frame::glitches;
@@ -180,18 +180,28 @@ fn departure(
     used: &Range<usize>,
 ) -> Option<Departure> {
     let axes = [Vector2::x(), Vector2::y()];
-    let mut terms = Vec::new();
+    let (mut terms, mut noise) = (Vec::new(), Vec::new());
     for ((sensor, plane), axis) in sensors.iter().zip(planes).zip(axes) {
         let found = bowed::departure(&sensor.image, plane, used);
-        terms.extend(found.into_iter().map(|(along, across, size)| Term {
-            along,
-            across,
-            size: axis * size,
-        }));
+        for described in found {
+            let along = described.along;
+            let sizes = described.across.iter().zip(described.sizes.iter());
+            terms.extend(sizes.map(|(across, size)| Term {
+                along,
+                across: *across,
+                size: axis * *size,
+            }));
+            noise.push(Noise {
+                along,
+                across: described.across,
+                axis,
+                covariance: described.covariance,
+            });
+        }
     }
     let rows = sensors[0].image.rows;
     let columns = [used.start, used.end - 1];
-    (!terms.is_empty()).then(|| Departure::new(terms, columns, [0, rows - 1]))
+    (!terms.is_empty()).then(|| Departure::new(terms, columns, [0, rows - 1]).with_noise(noise))
 }
 
 /// Both sensors as those of a straight scanner.

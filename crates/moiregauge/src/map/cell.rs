@@ -111,7 +111,7 @@ impl Found {
             interrupt::check();
             let place = |column: usize| {
                 let place = [column, row].map(|n| n as f64);
-                let place = placed.origin + placed.pixel_to_nm * Vector2::from(place);
+                let place = placed.at(Vector2::from(place));
                 Some(followed.cells(place, followed.at(place)?))
             };
             runs(image, row, bins, of_pixels, place)

@@ -13,6 +13,7 @@ use heterostrain::lattice::Waves;
 use nalgebra::{Matrix2, Matrix4, Vector2, Vector3, Vector4};
 use rayon::prelude::*;
 
+use crate::frame::grid_errors::Bends;
 use crate::map::nodes::{Grid, LatticeNode};
 use crate::map::one_gauge::in_one_gauge;
 use crate::map::sample::LatticeMap;
@@ -92,6 +93,7 @@ fn average_of(
     maps: &[&LatticeMap],
     shared: Shared,
 ) -> (LatticeMap, Option<Agreement>) {
+    let bends = Bends::mean(maps.iter().map(|map| map.bends)).unwrap_or(maps[0].bends);
     let views: Vec<View> = maps.iter().filter_map(|map| View::new(map)).collect();
     let mut found: Vec<(LatticeNode, f64, usize)> = (0..grid.len())
         .into_par_iter()
@@ -119,6 +121,7 @@ fn average_of(
         grid: *grid,
         window_nm,
         gauge: maps.iter().find_map(|map| map.gauge),
+        bends,
         nodes: found.into_iter().map(|(node, _, _)| node).collect(),
     };
     let agreement = scatter.map(|scatter| Agreement {

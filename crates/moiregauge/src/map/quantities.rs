@@ -4,6 +4,7 @@ use heterostrain::Estimate;
 use heterostrain::strain::TwistStrain;
 use nalgebra::Vector2;
 
+use crate::frame::grid_errors::Bends;
 use crate::map::nodes::Grid;
 use crate::map::sample::LatticeMap;
 use crate::window::mask::Mask;
@@ -69,6 +70,9 @@ pub struct TwistStrainMap {
     pub curl: Vec<f32>,
     /// Signal over noise (amplitude) under the window.
     pub signal_to_noise: Vec<f32>,
+    /// Standard errors of twist (rad) and both components of the strain by bends of the grid that no sensor told; NaN where they were not asked for.
+    /// They are in no other number.
+    pub of_bends: [Vec<f32>; 3],
     /// The grain that each node belongs to, counted from 1, and 0 of none; empty where the map shows one lattice.
     pub grain: Vec<u8>,
 }
@@ -92,6 +96,7 @@ impl TwistStrainMap {
             closure: Vec::new(),
             curl: curl(map),
             signal_to_noise: Vec::new(),
+            of_bends: [(); 3].map(|()| vec![f32::NAN; map.nodes.len()]),
             grain: Vec::new(),
         };
         for (node, found) in map.nodes.iter().zip(found) {
@@ -135,6 +140,25 @@ impl TwistStrainMap {
         }
         out
     }
+
+    /// With what [`LatticeMap::of_bends`] says.
+    #[must_use]
+    pub fn with_bends(mut self, of_bends: &[[f32; 3]]) -> Self {
+        for (i, plane) in self.of_bends.iter_mut().enumerate() {
+            *plane = of_bends.iter().map(|of| of[i]).collect();
+        }
+        self
+    }
+
+    /// The root mean square of one of `of_bends` over the good nodes; `None` where it is not known.
+    pub fn rms_of_bends(&self, index: usize) -> Option<f64> {
+        let all = self.of_bends[index].iter().zip(&self.mask);
+        let good = all.filter(|(of, mask)| **mask == Mask::Good && of.is_finite());
+        let (sum, count) = good.fold((0.0, 0.0), |(sum, count), (of, _)| {
+            (sum + f64::from(*of).powi(2), count + 1.0)
+        });
+        (count > 0.0).then(|| f64::sqrt(sum / count))
+    }
 }
 
 impl TwistStrainMap {
@@ -167,6 +191,7 @@ impl TwistStrainMap {
             &mut self.curl,
             &mut self.signal_to_noise,
         ]);
+        all.extend(&mut self.of_bends);
         all
     }
 
@@ -188,6 +213,11 @@ impl TwistStrainMap {
             },
             window_nm,
             gauge: None,
+            bends: Bends {
+                centre: Vector2::zeros(),
+                range: Vector2::zeros(),
+                from_sensors: false,
+            },
             nodes: Vec::new(),
         };
         Self::new(&none, &[])

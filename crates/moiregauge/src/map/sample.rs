@@ -3,17 +3,19 @@
 //! One linear map for all: a frame's pixels lie at `r = r₀ + (J − D τᵀ) n` on a sample that drifts with D
 //! (see [`crate::drift::linear`]), so that wave vectors are mapped by the inverse transpose; nm, rad.
 
-use heterostrain::lattice::{Waves, both};
+use heterostrain::lattice::{Lattice, Waves, both};
 use heterostrain::material::Bilayer;
 use heterostrain::strain::{FixedBranch, StrainConvention, StrainError, TwistStrain};
-use nalgebra::{Matrix2, Vector2};
+use nalgebra::{Matrix2, Vector2, Vector4};
 use rayon::prelude::*;
 
 use crate::frame::geometry::Geometry;
+use crate::frame::grid_errors::Bends;
 use crate::map::displacement;
 use crate::map::gauge::Gauge;
 use crate::map::nodes::{Grid, LatticeNode};
 use crate::map::scanner::straight;
+use crate::settings::knobs::Calibration;
 use crate::window::mask::Mask;
 use crate::window::types::WaveMap;
 
@@ -27,6 +29,8 @@ pub struct LatticeMap {
     pub window_nm: f64,
     /// What displacements count from; `None` where no phase could be followed.
     pub gauge: Option<Gauge>,
+    /// How the grid may be bent.
+    pub bends: Bends,
     /// Row by row.
     pub nodes: Vec<LatticeNode>,
 }
@@ -78,6 +82,7 @@ impl LatticeMap {
             grid,
             window_nm: map.window_nm,
             gauge: Gauge::of(&grid, mean, &nodes),
+            bends: at_rest.bends(),
             nodes,
         })
     }
@@ -85,6 +90,7 @@ impl LatticeMap {
     /// Puts all places of the map elsewhere.
     pub(crate) fn move_by(&mut self, way: Vector2<f64>) {
         self.grid.origin += way;
+        self.bends.centre += way;
         if let Some(gauge) = &mut self.gauge {
             gauge.node += way;
         }
@@ -97,6 +103,43 @@ impl LatticeMap {
             (sum + node.waves.basis, count + 1.0)
         });
         (count > 0.0).then(|| sum / count)
+    }
+
+    /// What bends of the grid that no sensor told may do to twist (rad) and both components of the strain at every node: standard errors,
+    /// by the derivatives at `reference`.
+    ///
+    /// # Errors
+    /// As [`heterostrain::strain`] for the reference.
+    pub fn of_bends<'a>(
+        &self,
+        reference: &Matrix2<f64>,
+        bilayer: impl Into<Bilayer<'a>>,
+        convention: StrainConvention,
+        calibration: &Calibration,
+    ) -> Result<Vec<[f32; 3]>, StrainError> {
+        let exact = Waves::exact(*reference);
+        let no_area = StrainError::NoArea {
+            area: reference.determinant(),
+        };
+        let real = exact.lattice().ok_or(no_area)?;
+        let branch = FixedBranch::of(&real, bilayer, convention)?;
+        // Of x and of y stretched by the whole.
+        let variances = [(1.0, 0.0), (0.0, 1.0)].map(|(x, y)| {
+            let change = Matrix2::new(x, 0.0, 0.0, y) * real.basis;
+            let change = Vector4::from_column_slice(change.as_slice());
+            let stretched = Lattice::new(real.basis, change * change.transpose());
+            let covariance = branch.at(&stretched).map(|found| found.covariance);
+            covariance.map_or([f64::NAN; 3], |c| [0, 2, 3].map(|i| c[(i, i)]))
+        });
+        let share = calibration.bends(self.bends.from_sensors);
+        let of = |node: usize| {
+            let stretch = share * self.bends.stretch(self.grid.place(node));
+            let [along_x, along_y] = variances;
+            let variance =
+                |i: usize| stretch.x.powi(2) * along_x[i] + stretch.y.powi(2) * along_y[i];
+            [0, 1, 2].map(|i| variance(i).sqrt() as f32)
+        };
+        Ok((0..self.nodes.len()).map(of).collect())
     }
 
     /// Twist and strain of every node that has a lattice, with the labelling and the branch of

@@ -6,7 +6,7 @@
 use std::borrow::Cow;
 
 use heterostrain::lattice::both;
-use nalgebra::{Matrix2, Vector2};
+use nalgebra::{Matrix2, Matrix4, Vector2};
 use rayon::prelude::*;
 
 use crate::frame::geometry::Geometry;
@@ -29,9 +29,15 @@ pub(crate) fn straight<'a>(map: &'a WaveMap, geometry: &Geometry) -> Cow<'a, Wav
         let wave = if known { pair } else { map.reference.pair };
         let turned = wave.tr_mul(&displacement.at(at));
         let [a, b, c] = node.phases;
+        // δq = −(δ dU/dn)ᵀ p.
+        let of_axis = |(axis, slopes): (Vector2<f64>, Matrix2<f64>)| {
+            let along = wave.tr_mul(&axis);
+            (along * along.transpose()).kronecker(&slopes)
+        };
+        let noise: Matrix4<f64> = displacement.noise_at(at).into_iter().map(of_axis).sum();
         Some(WaveNode {
             pair,
-            covariance: of_both * node.covariance * of_both.transpose(),
+            covariance: of_both * node.covariance * of_both.transpose() + noise,
             phases: [a - turned.x, b - turned.y, c - (turned.y - turned.x)],
             ..*node
         })

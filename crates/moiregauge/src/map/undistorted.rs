@@ -39,7 +39,7 @@ pub(crate) fn undistorted(
     placed: &Geometry,
     followed: &Followed,
 ) -> Option<Undistorted> {
-    let inverse = placed.pixel_to_nm.try_inverse()?;
+    let pixel = placed.pixel_of()?;
     let starts = Starts::new(followed)?;
     let extent = starts.high - starts.low;
     let finest = placed.fast_step().norm().min(placed.slow_step().norm());
@@ -60,9 +60,7 @@ pub(crate) fn undistorted(
             let place = origin + pitch * Vector2::new(column as f64, row as f64);
             let from = before.or_else(|| starts.near(place));
             before = from.and_then(|from| settled(followed, place, from, SETTLED * pitch));
-            *value = before.map_or(f64::NAN, |u| {
-                at(image, inverse * (place + u - placed.origin))
-            });
+            *value = before.map_or(f64::NAN, |u| at(image, pixel(place + u)));
         }
     });
     let image = Image::new(rows, columns, values);

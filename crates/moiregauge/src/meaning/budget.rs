@@ -16,6 +16,8 @@
 //! - Pitch. Without sensors the pixels are as far apart as the nominal size says; of N pixels it spans N or N − 1, and
 //!   where the format does not say which, both are as likely: lengths along either side are uncertain by 1/(√2 N), the
 //!   root mean square of none and 1/N.
+//! - Shape of the grid. Sensors that bend by a share s of the range R that they go through in the frame, a quadratic with no mean
+//!   slope, change positions at a distance d from the middle by 8sd/R of themselves: nothing in the mean of a whole frame.
 //! - Lattice constant: θ is proportional to it.
 //! - Model: see [`heterostrain::strain`]. An isotropic strain h changes θ at first and second order; its
 //!   variance is the mean square over a Gaussian prior, `d² + 3c²` for a change `d h/σ + c h²/σ²`.
@@ -26,6 +28,7 @@ use heterostrain::strain::{Reference, TwistStrain, twist_strain};
 use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
 
 use crate::drift::shares::Statistical;
+use crate::frame::grid_errors::GridErrors;
 use crate::settings::knobs::Settings;
 
 /// Where an error comes from.
@@ -45,6 +48,8 @@ pub enum Source {
     Orthogonality,
     /// What the nominal size spans, where the format does not say: N pixels or N − 1.
     Pitch,
+    /// What the grid may be bent by, about the place of the area.
+    Shape,
     /// The lattice constant.
     LatticeConstant,
     /// Which layer is strained.
@@ -57,7 +62,7 @@ pub enum Source {
 
 impl Source {
     /// All of them, in the order of tables and figures: what averages out first.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 12] = [
         Self::Image,
         Self::Drift,
         Self::Sensor,
@@ -65,6 +70,7 @@ impl Source {
         Self::Mismatch,
         Self::Orthogonality,
         Self::Pitch,
+        Self::Shape,
         Self::LatticeConstant,
         Self::StrainedLayer,
         Self::IsotropicStrain,
@@ -95,9 +101,9 @@ pub struct Contribution {
 #[derive(Clone, Debug)]
 pub struct Budget {
     /// In the order of [`Source::ALL`].
-    contributions: [Contribution; 11],
-    /// The relative change of positions by one standard deviation of the pitch of the pixels; zero where that is settled.
-    pub pitch: Matrix2<f64>,
+    contributions: [Contribution; 12],
+    /// What errors of the grid do to positions.
+    pub grid: GridErrors,
     /// Whether the drift is a prior: nothing tells it.
     pub drift_assumed: bool,
     /// The statistical ones as covariances of the lattice.
@@ -115,21 +121,27 @@ impl Budget {
         statistical: &Statistical,
         settings: &Settings,
     ) -> Self {
-        Self::with_pitch(lattice, found, statistical, &Matrix2::zeros(), settings)
+        Self::with_grid(
+            lattice,
+            found,
+            statistical,
+            &GridErrors::default(),
+            settings,
+        )
     }
 
-    /// The same with an error of the pitch of the pixels: the relative change of positions that it makes.
-    pub fn with_pitch(
+    /// The same with errors of the grid of the pixels.
+    pub fn with_grid(
         lattice: &Lattice,
         found: &TwistStrain,
         statistical: &Statistical,
-        pitch: &Matrix2<f64>,
+        grid: &GridErrors,
         settings: &Settings,
     ) -> Self {
         let reference = Reference::new(lattice, settings.bilayer(), settings.strain_convention);
         let contribution = |source: Source| {
             let (covariance, wavelengths) =
-                match lattice_error(source, lattice, statistical, pitch, settings) {
+                match lattice_error(source, lattice, statistical, grid, settings) {
                     Some(error) => (
                         through(lattice, &error, settings),
                         squared_wavelength_sigmas(lattice, &error),
@@ -150,7 +162,7 @@ impl Budget {
         Self {
             contributions: Source::ALL.map(contribution),
             statistical: *statistical,
-            pitch: *pitch,
+            grid: *grid,
             drift_assumed: false,
         }
     }
@@ -161,15 +173,16 @@ impl Budget {
         &self,
         lattice: &Lattice,
         settings: &Settings,
-    ) -> [Matrix4<f64>; 4] {
+    ) -> [Matrix4<f64>; 5] {
         let sources = [
             Source::Gain,
             Source::Mismatch,
             Source::Orthogonality,
             Source::Pitch,
+            Source::Shape,
         ];
         sources.map(|source| {
-            lattice_error(source, lattice, &self.statistical, &self.pitch, settings)
+            lattice_error(source, lattice, &self.statistical, &self.grid, settings)
                 .unwrap_or_else(Matrix4::zeros)
         })
     }
@@ -229,7 +242,7 @@ fn lattice_error(
     source: Source,
     lattice: &Lattice,
     statistical: &Statistical,
-    pitch: &Matrix2<f64>,
+    grid: &GridErrors,
     settings: &Settings,
 ) -> Option<Matrix4<f64>> {
     let of = |change: Matrix2<f64>| {
@@ -241,7 +254,8 @@ fn lattice_error(
         Source::Image => Some(statistical.image),
         Source::Drift => Some(statistical.drift),
         Source::Sensor => Some(statistical.sensor),
-        Source::Pitch => Some(of(*pitch)),
+        Source::Pitch => Some(of(grid.pitch)),
+        Source::Shape => Some(grid.shape_changes().map(of).iter().sum()),
         _ => Some(of(distortion(source, settings)?)),
     }
 }
@@ -262,12 +276,12 @@ pub(crate) fn scanner_covariance(vector: &Vector2<f64>, settings: &Settings) -> 
 pub(crate) fn wavelength_variances(
     lattice: &Lattice,
     statistical: &Statistical,
-    pitch: &Matrix2<f64>,
+    grid: &GridErrors,
     settings: &Settings,
 ) -> [f64; 3] {
     let sources = Source::ALL.into_iter();
     let errors =
-        sources.filter_map(|source| lattice_error(source, lattice, statistical, pitch, settings));
+        sources.filter_map(|source| lattice_error(source, lattice, statistical, grid, settings));
     squared_wavelength_sigmas(lattice, &errors.sum())
 }
 

@@ -41,6 +41,7 @@ pub(crate) fn made(twist: impl Fn(Vector2<f64>) -> f64, sigma: f64) -> TwistStra
         displacement: [constant(0.0), constant(0.0)],
         closure: vec![1.0; places.len()],
         curl: vec![0.0; places.len()],
+        of_bends: Default::default(),
         signal_to_noise: vec![10.0; places.len()],
         grain: Vec::new(),
     }

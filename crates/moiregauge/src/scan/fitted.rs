@@ -3,10 +3,13 @@
 use nalgebra::{Matrix2, Vector2};
 use spmfile::{LineDirection, Scan};
 
+use crate::frame::departure::Departure;
 use crate::frame::image::Image;
+use crate::lattice::fit::fitted::LatticeFit;
 use crate::lattice::several::together::model;
 use crate::scan::channel::{channels, flat_image_of};
 use crate::scan::measured::{MeasuredLine, MeasuredScan};
+use crate::scan::place::Place;
 use crate::settings::knobs::Settings;
 
 /// Bins along each vector of the mean cell, at most.
@@ -44,12 +47,19 @@ pub fn fitted(
         .into_iter()
         .find(|c| c.line_direction.unwrap_or(LineDirection::Trace) == line)?;
     let image = flat_image_of(channel, settings.background);
-    let (cell, cell_step) = mean_cell(&image, found)?;
+    let place = Place::of("", scan, channel, settings, &mut Vec::new());
+    // Several lattices are fitted together on a straight grid.
+    let place = place.filter(|_| settings.moires < 2);
+    let displacement = place.and_then(|place| place.geometry.displacement());
+    let (cell, cell_step) = mean_cell(&image, found, displacement.as_ref())?;
     let fit = found.lattice.fit.as_ref();
     Some(Fitted {
         unit: channel.plain_unit(),
         residual: fit.map(|fit| {
-            let waves = model(fit, &image);
+            let waves = match &displacement {
+                Some(displacement) => bent_model(fit, &image, displacement),
+                None => model(fit, &image),
+            };
             let left = image.values.iter().zip(&waves).map(|(v, w)| v - w);
             Image::new(image.rows, image.columns, left.collect())
         }),
@@ -59,9 +69,43 @@ pub fn fitted(
     })
 }
 
+/// The waves of a fit on a scanner that is bent: `Σ A cos(q·(n + U(n) − centre) + φ)`.
+fn bent_model(fit: &LatticeFit, image: &Image, displacement: &Departure) -> Vec<f64> {
+    let waves: Vec<_> = fit
+        .harmonics
+        .iter()
+        .map(|h| {
+            (
+                h,
+                fit.wave_vectors.basis * Vector2::from(h.index.map(f64::from)),
+            )
+        })
+        .collect();
+    let of_line = |row: usize| {
+        let off = displacement
+            .line(row, image.columns)
+            .into_iter()
+            .enumerate();
+        let places = off
+            .map(move |(column, off)| Vector2::new(column as f64, row as f64) + off - fit.centre);
+        let value = |at| {
+            waves
+                .iter()
+                .map(|(h, q)| h.amplitude * (q.dot(&at) + h.phase).cos())
+                .sum()
+        };
+        places.map(value).collect::<Vec<f64>>()
+    };
+    (0..image.rows).flat_map(of_line).collect()
+}
+
 /// The mean over the cells of the part that carries the lattice, as a picture in the axes of the image; and the pixels
 /// along one of its pixels.
-fn mean_cell(image: &Image, line: &MeasuredLine) -> Option<(Image, f64)> {
+fn mean_cell(
+    image: &Image,
+    line: &MeasuredLine,
+    displacement: Option<&Departure>,
+) -> Option<(Image, f64)> {
     let basis = line.lattice.pixels.basis;
     let inverse = basis.try_inverse()?;
     let longest = basis.column(0).norm().max(basis.column(1).norm());
@@ -74,7 +118,8 @@ fn mean_cell(image: &Image, line: &MeasuredLine) -> Option<(Image, f64)> {
     for (i, value) in image.values.iter().enumerate() {
         let at = [i % image.columns, i / image.columns];
         if value.is_finite() && patch.is_none_or(|patch| patch.holds(at)) {
-            let bin = bin(Vector2::from(at.map(|n| n as f64)));
+            let at = Vector2::from(at.map(|n| n as f64));
+            let bin = bin(at + displacement.map_or_else(Vector2::zeros, |u| u.at(at)));
             sums[bin] += value;
             counts[bin] += 1;
         }
@@ -103,7 +148,20 @@ mod tests {
     /// Without noise the fit leaves next to nothing, and the mean cell has the contrast of the image.
     #[test]
     fn fits_leave_little_and_cells_are_the_image() {
-        let mut set = Simulation::default();
+        left_over("clean");
+    }
+
+    /// The same of a scanner that its sensors say is bent.
+    #[test]
+    fn fits_leave_little_where_the_scanner_bends() {
+        left_over("hysteresis+creep");
+    }
+
+    fn left_over(sample: &str) {
+        let mut set = Simulation {
+            features: crate::simulate::SampleFeature::parse(sample).unwrap(),
+            ..Simulation::default()
+        };
         set.raster.pixels = [128; 2];
         set.raster.scans = 1;
         set.noise.pixel_deg *= 0.01;

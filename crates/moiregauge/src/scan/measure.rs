@@ -1,6 +1,6 @@
 //! One scan: geometry, timing and lattice of each of its lines, trace and retrace.
 
-use nalgebra::{Matrix2, Vector2};
+use nalgebra::{Matrix2, Matrix4, Vector2};
 use spmfile::{Channel, FrameDirection, Scan};
 
 use crate::calibration::Calibration;
@@ -292,6 +292,7 @@ fn measure_line(
             // What departs from it is in the lattice already.
             geometry: Geometry {
                 departure: None,
+                covariance: geometry.covariance + noise_of_departure(&geometry, &lattice),
                 ..geometry.clone()
             },
             nominal: nominal.clone(),
@@ -307,6 +308,14 @@ fn measure_line(
         }
     });
     Ok(lines.collect())
+}
+
+/// What noise of the departure does to the steps: nothing over the whole frame, whose straight line it has no part in.
+fn noise_of_departure(geometry: &Geometry, lattice: &MeasuredLattice) -> Matrix4<f64> {
+    match (&geometry.departure, &lattice.patch) {
+        (Some(departure), Some(patch)) => departure.noise_of_steps(&patch.places()),
+        _ => Matrix4::zeros(),
+    }
 }
 
 /// What lies under a window, and how many lines of the frame were recorded after it.

@@ -9,11 +9,13 @@ use spmfile::{DateTime, FrameDirection, LineDirection};
 use crate::caveat::Caveat;
 use crate::drift::linear::Observation;
 use crate::frame::geometry::{Geometry, Timing};
+use crate::frame::grid_errors::GridErrors;
 use crate::lattice::measured::MeasuredLattice;
 use crate::numbers::exact;
 use crate::scan::fingerprint::Fingerprint;
 use crate::scan::lines::MeasuredLines;
 use crate::scan::written;
+use crate::settings::knobs::Settings;
 use crate::settings::ranges::OutOfRange;
 use crate::spectrum::error::LatticeError;
 
@@ -122,14 +124,17 @@ impl MeasuredLine {
         Some((Vector4::from_column_slice(off.as_slice()), own.covariance))
     }
 
-    /// The relative change of positions by one standard deviation of the pitch; zero where that is known.
-    pub(crate) fn pitch_error(&self) -> Matrix2<f64> {
-        let Some(sigma) = self.pitch_sigma else {
-            return Matrix2::zeros();
-        };
+    /// What the pitch, and bends that no sensor told, may do to the lattice.
+    pub(crate) fn grid_errors(&self, settings: &Settings) -> GridErrors {
         let j = self.geometry.pixel_to_nm;
         let inverse = j.try_inverse().unwrap_or_else(Matrix2::zeros);
-        j * Matrix2::from_diagonal(&Vector2::from(sigma)) * inverse
+        let pitch = |sigma| j * Matrix2::from_diagonal(&Vector2::from(sigma)) * inverse;
+        let place = self.geometry.place(self.lattice.middle);
+        let bends = settings.calibration.bends(self.geometry.from_sensors);
+        GridErrors {
+            pitch: self.pitch_sigma.map_or_else(Matrix2::zeros, pitch),
+            shape: self.geometry.bends().stretch(place) * bends,
+        }
     }
 
     /// The lattice in nominal coordinates, nm.

@@ -27,4 +27,4 @@ pub use measure::{BYTES_PER_PIXEL, measure_known, measure_moires, measure_scan};
 pub use measured::{MeasureError, MeasuredLine, MeasuredScan};
 pub use moires::sorted_moires;
 pub use overlap::{Window, common_window};
-pub use picture::{Companion, Illustration, Picture};
+pub use picture::{BentSensors, Companion, Illustration, Picture};

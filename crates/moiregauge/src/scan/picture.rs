@@ -45,8 +45,23 @@ pub struct Illustration {
     pub sensor_residuals: Option<[Image; 2]>,
     /// Pixels along the side of such a block.
     pub residual_block: usize,
+    /// What the sensors of each line direction say beside a plane; empty of a straight scanner.
+    pub bent: Vec<BentSensors>,
     /// The amplitude of the same line, where the phase is shown and both were recorded.
     pub amplitude: Option<Companion>,
+}
+
+/// The sensors of one line direction of a scanner that bends.
+#[derive(Clone, Debug)]
+pub struct BentSensors {
+    /// Trace or retrace.
+    pub line: LineDirection,
+    /// Readings of the x and of the y sensor less the planes, nm, means over blocks as those of [`Illustration::sensor_residuals`].
+    pub before: [Image; 2],
+    /// The same less the smooth departure.
+    pub after: [Image; 2],
+    /// Lines of the grid: places on the straight one and how far the scanner is from there, nm.
+    pub grid: Vec<Vec<[Vector2<f64>; 2]>>,
 }
 
 /// Another channel of a scan, pixel by pixel beside the one that is analysed.

@@ -63,6 +63,22 @@ pub struct Calibration {
     pub mismatch_percent: f64,
     /// Deviation of the axes from a right angle, mrad.
     pub orthogonality_mrad: f64,
+    /// By how much a position sensor bends against a straight line, per cent of the range that it goes through in the frame.
+    pub sensor_bend_percent: f64,
+    /// The same of a scanner that no sensor recorded: hysteresis bends lines by a per cent.
+    pub scanner_bend_percent: f64,
+}
+
+impl Calibration {
+    /// The share of the range by which positions may be bent.
+    pub(crate) fn bends(&self, from_sensors: bool) -> f64 {
+        let percent = if from_sensors {
+            self.sensor_bend_percent
+        } else {
+            self.scanner_bend_percent
+        };
+        percent / 100.0
+    }
 }
 
 impl Default for Calibration {
@@ -71,6 +87,8 @@ impl Default for Calibration {
             gain_percent: 1.0,
             mismatch_percent: 0.5,
             orthogonality_mrad: 5.0,
+            sensor_bend_percent: 0.1,
+            scanner_bend_percent: 1.0,
         }
     }
 }

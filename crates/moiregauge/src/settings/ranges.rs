@@ -72,6 +72,18 @@ impl Settings {
                 500.0,
             ),
             (
+                "calibration.sensor_bend_percent",
+                calibration.sensor_bend_percent,
+                0.0,
+                50.0,
+            ),
+            (
+                "calibration.scanner_bend_percent",
+                calibration.scanner_bend_percent,
+                0.0,
+                50.0,
+            ),
+            (
                 "isotropic_strain_percent",
                 self.isotropic_strain_percent,
                 0.0,

@@ -83,8 +83,17 @@ const WAVE_PHASE: Key = key(
 const WAVE_HEIGHT: Key = key("amplitude", "°", 1.0, [0.5, 2.0], [0.0, 1000.0]);
 const WAVELENGTH: Key = key("wavelength", "nm", 125.0, [80.0, 250.0], [1.0, 1e6]);
 
+const PERCENT: [f64; 2] = [-50.0, 50.0];
+const RECORDED: Key = key(
+    "recorded",
+    "share of it that the position sensors record",
+    1.0,
+    [1.0, 1.0],
+    [0.0, 1.0],
+);
+
 /// All classes.
-pub const CLASSES: [SampleClass; 23] = [
+pub const CLASSES: [SampleClass; 26] = [
     class("clean", "only the lattice", &[]),
     class(
         "edge",
@@ -464,6 +473,78 @@ pub const CLASSES: [SampleClass; 23] = [
         "lag",
         "position sensors late by a time constant (first order)",
         &[key("time", "ms", 2.0, [0.3, 4.0], [0.0, 1000.0])],
+    ),
+    class(
+        "hysteresis",
+        "a scanner whose lines, and whose slow axis, are bowed one way there and the other way back",
+        &[
+            key(
+                "fast",
+                "of the lines, against straight ones, % of the width",
+                2.0,
+                [-3.0, 3.0],
+                PERCENT,
+            ),
+            key(
+                "slow",
+                "of the slow axis, % of the height",
+                1.0,
+                [-3.0, 3.0],
+                PERCENT,
+            ),
+            key(
+                "skew",
+                "how much more at the end than at the start",
+                0.3,
+                [-0.5, 0.5],
+                [-1.0, 1.0],
+            ),
+            RECORDED,
+        ],
+    ),
+    class(
+        "creep",
+        "a scanner that goes on by the logarithm of the time since the frame began",
+        &[
+            key(
+                "fast",
+                "along the lines, % of the width a decade",
+                1.0,
+                [-1.5, 1.5],
+                PERCENT,
+            ),
+            key(
+                "slow",
+                "across the lines, % of the height a decade",
+                1.0,
+                [-1.5, 1.5],
+                PERCENT,
+            ),
+            key(
+                "begin",
+                "when it begins to slow down, s",
+                1.0,
+                [0.3, 3.0],
+                [1e-3, 1e6],
+            ),
+            RECORDED,
+        ],
+    ),
+    class(
+        "ringing",
+        "a scanner that swings after each turn-around",
+        &[
+            key("size", "% of the width", 0.3, [0.05, 0.5], PERCENT),
+            key("frequency", "Hz", 300.0, [100.0, 600.0], [0.0, 1e6]),
+            key(
+                "time",
+                "in which it falls to 1/e, ms",
+                5.0,
+                [2.0, 8.0],
+                [1e-3, 1e6],
+            ),
+            RECORDED,
+        ],
     ),
     class(
         "bare",

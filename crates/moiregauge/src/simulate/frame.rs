@@ -14,6 +14,7 @@ use crate::simulate::calendar::date_after;
 use crate::simulate::instrument::{Disturbances, glitch_stream};
 use crate::simulate::motion::Motion;
 use crate::simulate::raster::{FramePlan, PixelTime};
+use crate::simulate::scanner::Scanner;
 use crate::simulate::scene::{Harmonic, Scene};
 use crate::simulate::settings::Simulation;
 use crate::simulate::surface::Surface;
@@ -181,6 +182,7 @@ fn record_line(
         time: plan.time(direction),
         disturbances: (!settings.features.is_empty())
             .then(|| Disturbances::new(settings, plan, direction)),
+        scanner: Scanner::new(settings, plan, direction),
         motion: Motion::new(&settings.drift),
     };
     (
@@ -217,6 +219,7 @@ struct Recorder<'a> {
     time: PixelTime,
     motion: Motion,
     disturbances: Option<Disturbances>,
+    scanner: Option<Scanner>,
 }
 
 impl Recorder<'_> {
@@ -228,11 +231,23 @@ impl Recorder<'_> {
             Some(surface) => {
                 for (column, value) in pattern.iter_mut().enumerate() {
                     let at = self.plan.place(self.motion, self.direction, [column, row]);
+                    let off = self.scanner.as_ref().map(|s| s.off([column, row])[0]);
+                    let at = at + off.unwrap_or_default();
                     *value = surface.value(at);
+                    if self.scanner.is_some() {
+                        *value += surface
+                            .ground
+                            .iter()
+                            .map(|wave| wave.amplitude * (wave.wave.dot(&at) + wave.phase).cos())
+                            .sum::<f64>();
+                    }
                 }
-                &surface.ground
+                match self.scanner {
+                    Some(_) => &[],
+                    None => surface.ground.as_slice(),
+                }
             }
-            None => &self.sample.scene.harmonics,
+            None => self.sample.scene.harmonics.as_slice(),
         };
         for harmonic in waves {
             self.add_harmonic(row, harmonic, &mut pattern);
@@ -298,6 +313,9 @@ impl Recorder<'_> {
         let last = x.len() - 1;
         for (column, (x, y)) in x.iter_mut().zip(y).enumerate() {
             let mut position = start + step.column(0) * column as f64;
+            if let Some(scanner) = &self.scanner {
+                position += scanner.off([column, row])[1];
+            }
             if let Some(disturbances) = &self.disturbances {
                 let passed = match self.direction {
                     LineDirection::Trace => column,

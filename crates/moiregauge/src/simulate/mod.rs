@@ -22,6 +22,7 @@ pub(crate) mod local;
 pub(crate) mod motion;
 pub(crate) mod raster;
 pub(crate) mod reference;
+pub(crate) mod scanner;
 pub(crate) mod scene;
 pub(crate) mod seen;
 pub(crate) mod settings;

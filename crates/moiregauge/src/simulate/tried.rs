@@ -2,7 +2,7 @@
 
 /// Samples that a program ought to be tried on: one of each class, and images without any lattice. Classes joined by `+`
 /// come together.
-pub const TRIED: [&str; 27] = [
+pub const TRIED: [&str; 31] = [
     "clean",
     "edge",
     "fade",
@@ -25,6 +25,10 @@ pub const TRIED: [&str; 27] = [
     "scars",
     "glitches",
     "lag",
+    "hysteresis",
+    "creep",
+    "ringing",
+    "hysteresis:recorded=0+creep:recorded=0",
     "bare",
     "bare+terrain",
     "bare+ripples",

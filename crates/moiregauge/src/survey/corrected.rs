@@ -5,7 +5,7 @@ use spmfile::{Channel, LineDirection, Samples, Scan, Span};
 
 use crate::campaign::analysis::ScanAnalysis;
 use crate::frame::geometry::Geometry;
-use crate::frame::resample::resample;
+use crate::frame::resample::on_curved_grid;
 use crate::scan::channel::{channels, image_of};
 use crate::scan::place::Place;
 use crate::scan::positions::nominal;
@@ -97,7 +97,7 @@ fn corrected(
 ///
 /// `None` where the geometry is singular.
 pub fn on_grid(scan: &Scan, channel: &Channel, geometry: &Geometry) -> Option<Scan> {
-    let found = resample(&image_of(channel), &geometry.pixel_to_nm, geometry.origin)?;
+    let found = on_curved_grid(&image_of(channel), geometry)?;
     let centre = found.centre();
     let (rows, columns) = (found.image.rows, found.image.columns);
     let size = [columns, rows].map(|count| count as f64 * found.pitch);

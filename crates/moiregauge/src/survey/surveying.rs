@@ -244,7 +244,10 @@ impl SurveyPlan {
         let found = lattices
             .twist_strain(&self.whole, layers, convention)
             .map_err(SurveyError::Strain)?;
-        Ok(TwistStrainMap::new(&lattices, &found))
+        let bends = &self.settings.calibration;
+        let of_bends = lattices.of_bends(&self.whole, layers, convention, bends);
+        let of_bends = of_bends.map_err(SurveyError::Strain)?;
+        Ok(TwistStrainMap::new(&lattices, &found).with_bends(&of_bends))
     }
 
     /// Nodes and triangles of the whole image, its pixels averaged over blocks that leave some 24 to a period, and 16

@@ -70,6 +70,7 @@ pub(crate) fn tile_map(
         window_nm: side_nm / 20f64.sqrt(),
         // Tiles follow no phases.
         gauge: None,
+        bends: still.bends(),
         nodes,
     })
 }

@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use moiregauge::simulate::{FirstDirection, SimulateError, Simulation, Simulator};
+use moiregauge::simulate::{FirstDirection, SampleFeature, SimulateError, Simulation, Simulator};
 use nalgebra::{Matrix2, Matrix3, Rotation2, Vector2, Vector3};
 use spmfile::{Channel, FrameDirection, LineDirection, Scan};
 
@@ -118,6 +118,67 @@ fn every_pixel_shows_what_was_there_at_its_time() {
                         assert!((x[index] - r.x).abs() < 2e-5 && (y[index] - r.y).abs() < 2e-5);
                     }
                 }
+            }
+        }
+    }
+}
+
+/// A scanner that bows, creeps and swings shows the sample where it is, and its sensors say the share of it that they record.
+#[test]
+fn scanners_show_the_sample_where_they_are() {
+    let mut settings = quiet();
+    settings.raster.rotation_deg = -33.0;
+    settings.drift.velocity_nm_per_min = [0.0; 2];
+    settings.drift.acceleration_nm_per_min2 = [0.0; 2];
+    let classes = "hysteresis:fast=2,slow=-1,skew=0.4,recorded=0.5+creep:fast=0.7,slow=1.1,begin=2+ringing:size=0.4,frequency=90,time=6";
+    settings.features = SampleFeature::parse(classes).unwrap();
+    let simulator = Simulator::new(settings.clone()).unwrap();
+    let [g1, g2] = simulator
+        .truth()
+        .reciprocal_vectors_rad_per_nm
+        .map(Vector2::from);
+    let origin = Vector2::from(settings.sample.origin_nm);
+    let raster = &settings.raster;
+    let frame_time = raster.pixels[1] as f64 / raster.line_rate_hz;
+    for frame in [0, 3] {
+        let scan = simulator.frame(frame);
+        let start = raster.start_s + frame as f64 * (frame_time + raster.gap_s);
+        for (line, way) in [(LineDirection::Trace, 1.0), (LineDirection::Retrace, -1.0)] {
+            let of = |name| channel(&scan, name, line).values();
+            let [phase, x, y] = ["TR Phase", "Xsensor", "Ysensor"].map(of);
+            let at = |pixel| position_and_time(&settings, frame, pixel, line);
+            let corner = at([0, 0]).0;
+            let [along, across] = [at([23, 0]).0 - corner, at([0, 16]).0 - corner];
+            for (index, found) in phase.iter().enumerate() {
+                let pixel = [index % 24, index / 24];
+                let (r, time, direction) = at(pixel);
+                let up = if direction == FrameDirection::Up {
+                    1.0
+                } else {
+                    -1.0
+                };
+                let [u, v] = [(0, 23.0), (1, 16.0)].map(|(i, n)| 2.0 * pixel[i] as f64 / n - 1.0);
+                let bow = |w: f64| (1.0 - w * w) * (1.0 + 0.4 * w);
+                let bowed = along * (way * 0.01 * bow(u)) - across * (up * 0.005 * bow(v));
+                let crept = (along * 0.007 + across * 0.011) * (1.0 + (time - start) / 2.0).log10();
+                // The time since the tip turned: the way so far, and the overscan before it.
+                let rho = raster.rounding;
+                let since =
+                    ((1.0 + way * u) / 2.0 + rho / 2.0) / (1.0 + rho) / 2.0 / raster.line_rate_hz;
+                let swing = (-since / 0.006).exp() * (2.0 * PI * 90.0 * since).cos();
+                let swung = along * (way * 0.004 * swing);
+                let feature = r + bowed + crept + swung - origin;
+                let waves = [g1, g2, g1 + g2];
+                let expected: f64 = waves
+                    .iter()
+                    .map(|g| settings.sample.contrast_deg * g.dot(&feature).cos())
+                    .sum();
+                assert!(
+                    (found - expected).abs() < 1e-7,
+                    "{pixel:?}: {found} {expected}"
+                );
+                let told = r + bowed * 0.5 + crept + swung;
+                assert!((x[index] - told.x).abs() < 2e-5 && (y[index] - told.y).abs() < 2e-5);
             }
         }
     }

@@ -44,6 +44,7 @@ fn settings(made: &Stacking) -> Settings {
             gain_percent: 0.0,
             mismatch_percent: 0.0,
             orthogonality_mrad: 0.0,
+            ..moiregauge::settings::Calibration::default()
         },
         ..Settings::default()
     }

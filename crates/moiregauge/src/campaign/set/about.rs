@@ -29,6 +29,23 @@ pub(crate) fn about_set(
     let judged = set.with_drift().or(set.uncorrected.as_ref()).or(shown);
     moire::doubts(&set.name, judged, set.lattice.as_ref(), settings, caveats);
     about_checks(set, used, caveats);
+    about_bends(set, settings, caveats);
+}
+
+/// Says where a scanner without sensors may make the change that the lattice shows.
+fn about_bends(set: &SetAnalysis, settings: &Settings, caveats: &mut Vec<Caveat>) {
+    let counted = set.scans.iter().filter(|s| s.excluded.is_none());
+    let lines = counted.flat_map(|s| &s.lines).filter(|l| !l.from_sensors);
+    let changes = lines.filter_map(|l| l.change);
+    let change = changes
+        .map(|c| c.wavelength.max(c.angle))
+        .fold(0.0, f64::max);
+    // Stretches of 8sx/R, x over R.
+    let bends = settings.calibration.bends(false) * 8.0 / 12f64.sqrt();
+    if change > 0.0 && change < 2.0 * bends {
+        let doubt = SetDoubt::ChangeOfScanner { change, bends };
+        caveats.push(Caveat::new(doubt, &set.name));
+    }
 }
 
 fn about_readings(name: &str, mean: &SetMean, settings: &Settings) -> Vec<Caveat> {

@@ -18,8 +18,9 @@ use crate::caveat::Caveat;
 use crate::caveat::drifting::{DriftDoubt, DriftShare};
 use crate::caveat::sets::SetDoubt;
 use crate::drift::linear::Observation;
+use crate::frame::grid_errors::GridErrors;
 use crate::meaning::strengths::WaveStrengths;
-use crate::scan::measured::{MeasuredLine, MeasuredScan};
+use crate::scan::measured::MeasuredScan;
 use crate::settings::knobs::Settings;
 use crate::spectrum::method::Method;
 
@@ -66,7 +67,7 @@ pub(crate) fn analyse_set(
         let measured = &group.scans;
         published::draw_all(&mut scans, measured, &seen, drift, settings, first_index);
     }
-    let pitch = pitch_error(&used);
+    let grid = grid_errors(&used, settings);
     // What is told by hand is known to be there.
     let doubt = no_result(group, &used).filter(|_| !settings.by_hand.says_which());
     let outruns = of_set.and_then(|drift| outruns(drift, &all));
@@ -77,7 +78,7 @@ pub(crate) fn analyse_set(
     } else {
         let shared = common(&used, reference);
         let alone = kept.len() == 1;
-        uncorrected = without_drift(&all, &scans, alone, &shared, &pitch, settings, strengths);
+        uncorrected = without_drift(&all, &scans, alone, &shared, &grid, settings, strengths);
         let poor = solved.as_ref().and_then(|solved| unknown(&solved.lattice));
         if let Some(share) = poor {
             open = Some(DriftDoubt::undetermined(format!(
@@ -88,7 +89,7 @@ pub(crate) fn analyse_set(
         let assumed = open.as_ref().and_then(|_| assumed(&used, &all, settings));
         let known = solved.as_ref().filter(|_| open.is_none());
         let known = known.or(assumed.as_ref());
-        let of = |solved| at_drift(solved, &scans, &shared, &pitch, settings, strengths);
+        let of = |solved| at_drift(solved, &scans, &shared, &grid, settings, strengths);
         // What contradicts itself by so much is no lattice of which one would have a twist.
         mean = known.filter(|_| poor.is_none()).and_then(of);
         if let Some(doubt) = mean.as_ref().and_then(|mean| breaks(mean, settings)) {
@@ -96,7 +97,7 @@ pub(crate) fn analyse_set(
             (uncorrected, mean) = (None, None);
         }
         if mean.is_none() && uncorrected.is_none() {
-            lattice = known.map(|solved| bare(solved, &scans, &shared, &pitch, settings));
+            lattice = known.map(|solved| bare(solved, &scans, &shared, &grid, settings));
         }
     }
     let share = mean.as_ref().and_then(DriftShare::of_mean);
@@ -133,12 +134,10 @@ fn kept(group: &Group) -> Vec<usize> {
         .collect()
 }
 
-/// What an error of the pitch does to the positions of these scans: all of a set have the same size and format.
-fn pitch_error(used: &[&MeasuredScan]) -> Matrix2<f64> {
-    let mut lines = used.iter().flat_map(|scan| &scan.lines);
-    lines
-        .next()
-        .map_or_else(Matrix2::zeros, MeasuredLine::pitch_error)
+/// What errors of the grid do to the positions of these scans.
+fn grid_errors(used: &[&MeasuredScan], settings: &Settings) -> GridErrors {
+    let lines = used.iter().flat_map(|scan| &scan.lines);
+    GridErrors::mean(lines.map(|line| line.grid_errors(settings)))
 }
 
 /// Marks the scans that do not fit the others.

@@ -2,13 +2,14 @@
 
 use heterostrain::TotalEstimate;
 use heterostrain::lattice::Lattice;
-use nalgebra::{Matrix2, Matrix4};
+use nalgebra::Matrix4;
 
 use crate::campaign::analysis::ScanAnalysis;
 use crate::campaign::set::assumed::AssumedDrift;
 use crate::campaign::set::mean::counted;
 use crate::campaign::set::solved::Solved;
 use crate::drift::shares::Statistical;
+use crate::frame::grid_errors::GridErrors;
 use crate::meaning::budget::wavelength_variances;
 use crate::numbers::spread::mean_and_spread;
 use crate::settings::knobs::Settings;
@@ -36,14 +37,14 @@ pub(crate) fn bare(
     solved: &Solved,
     scans: &[ScanAnalysis],
     shared: &Matrix4<f64>,
-    pitch: &Matrix2<f64>,
+    grid: &GridErrors,
     settings: &Settings,
 ) -> SetLattice {
     let mut statistical = solved.statistical;
     statistical.image += shared;
     let lattice = Lattice::new(solved.lattice.basis, solved.lattice.covariance + shared);
     let totals = |statistical: &Statistical| {
-        let variances = wavelength_variances(&lattice, statistical, pitch, settings);
+        let variances = wavelength_variances(&lattice, statistical, grid, settings);
         [0, 1, 2].map(|i| TotalEstimate::new(lattice.wavelength(i), variances[i]))
     };
     let at_known_drift = Statistical {

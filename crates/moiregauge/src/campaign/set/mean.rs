@@ -11,6 +11,7 @@ use crate::campaign::set::scan::plain_mean;
 use crate::campaign::set::solved::Solved;
 use crate::drift::linear::{Observation, at_known_drift, common_lattice};
 use crate::drift::shares::Statistical;
+use crate::frame::grid_errors::GridErrors;
 use crate::meaning::budget::Budget;
 use crate::meaning::readings::Readings;
 use crate::meaning::strengths::WaveStrengths;
@@ -28,7 +29,7 @@ pub(crate) fn at_drift(
     solved: &Solved,
     scans: &[ScanAnalysis],
     shared: &Matrix4<f64>,
-    pitch: &Matrix2<f64>,
+    grid: &GridErrors,
     settings: &Settings,
     strengths: &WaveStrengths,
 ) -> Option<SetMean> {
@@ -47,7 +48,7 @@ pub(crate) fn at_drift(
     let mut mean = set_mean(
         &Lattice::new(lattice.basis, lattice.covariance + shared),
         &statistical,
-        pitch,
+        grid,
         Agreement::new(solved.chi2, solved.freedom, solved.enlargement),
         counted(scans).map(of),
         settings,
@@ -64,7 +65,7 @@ pub(crate) fn without_drift(
     scans: &[ScanAnalysis],
     alone: bool,
     shared: &Matrix4<f64>,
-    pitch: &Matrix2<f64>,
+    grid: &GridErrors,
     settings: &Settings,
     strengths: &WaveStrengths,
 ) -> Option<SetMean> {
@@ -83,7 +84,7 @@ pub(crate) fn without_drift(
     set_mean(
         &lattice,
         &statistical,
-        pitch,
+        grid,
         Agreement::new(chi2, freedom, scale),
         counted(scans).map(of),
         settings,
@@ -113,7 +114,7 @@ impl Agreement {
 fn set_mean(
     lattice: &Lattice,
     statistical: &Statistical,
-    pitch: &Matrix2<f64>,
+    grid: &GridErrors,
     agreement: Agreement,
     scans: impl Iterator<Item = (Option<TwistStrain>, Lattice)>,
     settings: &Settings,
@@ -133,7 +134,7 @@ fn set_mean(
             (ratio - 1.0).abs() <= 0.01
         })
     });
-    let budget = Budget::with_pitch(lattice, &twist_strain, statistical, pitch, settings);
+    let budget = Budget::with_grid(lattice, &twist_strain, statistical, grid, settings);
     Some(SetMean {
         readings: Readings::new(lattice, &twist_strain, &budget, strengths, settings),
         budget,

@@ -66,6 +66,7 @@ fn calibration_errors_have_the_known_size() {
             gain_percent: 1.0,
             mismatch_percent: 0.1,
             orthogonality_mrad: 1.0,
+            ..Calibration::default()
         },
         ..Settings::default()
     };
@@ -110,6 +111,28 @@ fn calibration_errors_have_the_known_size() {
     }
 }
 
+/// Bends of both sensors that stretch x and y alike are twice half a gain, independent: θ times one over √2 of it.
+#[test]
+fn bends_of_sensors_are_stretches_of_either_axis() {
+    let settings = Settings::default();
+    let lattice = graphene(1.1, 0.0);
+    let grid = GridErrors {
+        shape: Vector2::repeat(0.002),
+        ..GridErrors::default()
+    };
+    let statistical = budget(&lattice, &settings).statistical;
+    let found = inverted(&lattice);
+    let with = Budget::with_grid(&lattice, &found, &statistical, &grid, &settings);
+    let expected = 1.1 * 0.002 / std::f64::consts::SQRT_2;
+    assert!((twist_deg(with.of(Source::Shape)) / expected - 1.0).abs() < 0.01);
+    // A stretch of x alone is half a gain and a strain of the moiré of the other half: ΔE = θ g/(1 + ν), g the difference.
+    let nu = settings.material.poisson_ratio;
+    let covariance = with.of(Source::Shape).covariance;
+    let strain = (covariance[(2, 2)] + covariance[(3, 3)]).sqrt();
+    let of_one = 1.1f64.to_radians() * 0.002 / (1.0 + nu) * std::f64::consts::SQRT_2;
+    assert!((strain / of_one - 1.0).abs() < 0.02, "{strain} {of_one}");
+}
+
 /// Both sides off by the same share are a gain: θ times that; one side alone is a mismatch and half a gain.
 #[test]
 fn the_pitch_is_a_gain_of_either_side() {
@@ -117,10 +140,13 @@ fn the_pitch_is_a_gain_of_either_side() {
     let lattice = graphene(1.1, 0.003);
     let share = 1.0 / (std::f64::consts::SQRT_2 * 256.0);
     let with = |sides: [f64; 2]| {
-        let pitch = Matrix2::from_diagonal(&Vector2::from(sides));
+        let grid = GridErrors {
+            pitch: Matrix2::from_diagonal(&Vector2::from(sides)),
+            ..GridErrors::default()
+        };
         let found = inverted(&lattice);
         let statistical = budget(&lattice, &settings).statistical;
-        Budget::with_pitch(&lattice, &found, &statistical, &pitch, &settings)
+        Budget::with_grid(&lattice, &found, &statistical, &grid, &settings)
     };
     let both = with([share; 2]);
     let expected = 1.1 * share;
@@ -343,6 +369,7 @@ fn totals_hold_what_the_scanner_adds() {
             gain_percent,
             mismatch_percent: 0.0,
             orthogonality_mrad,
+            ..Calibration::default()
         },
         ..Settings::default()
     };
