@@ -149,6 +149,11 @@ calibration.scanner_bend_percent = 1.0
 # show it; up to 0.06 % changes the twist by less than 0.001°.
 isotropic_strain_percent = 0.05
 
+# Layer whose atoms the frames show beside the moiré and which measures them in place of the scanner: "1", "2", "auto" or
+# "off"; and the strain that it may have itself, along x and along y, per cent.
+ruler = "auto"
+ruler_strain_percent = 0.1
+
 # Monte Carlo draws for the drift (per set) and for twist and strain (per scan).
 drift_draws = 10000
 strain_draws = 1000
@@ -211,7 +216,7 @@ pub(crate) fn check(settings: &Settings) -> anyhow::Result<()> {
 }
 
 /// Options by the names of settings; the first that the name begins with.
-const OPTIONS: [(&str, &str); 27] = [
+const OPTIONS: [(&str, &str); 28] = [
     ("material.lattice_constant_nm", "--lattice-constant"),
     (
         "material.lattice_constant_sigma_nm",
@@ -234,6 +239,7 @@ const OPTIONS: [(&str, &str); 27] = [
     ("calibration.sensor_bend_percent", "--sensor-bend"),
     ("calibration.scanner_bend_percent", "--scanner-bend"),
     ("isotropic_strain_percent", "--isotropic-strain"),
+    ("ruler_strain_percent", "--ruler-strain"),
     ("scanner", "--calibration"),
     ("drift_draws", "--drift-draws"),
     ("drift.sigma_nm_per_min", "--drift-sigma"),

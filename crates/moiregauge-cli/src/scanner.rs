@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use moiregauge::settings::Settings;
+use moiregauge::settings::{RulerLayer, Settings};
 
 use crate::numbers::number;
 
@@ -32,6 +32,13 @@ pub(crate) struct ScannerArgs {
     /// Isotropic heterostrain that the layers may have, per cent, for the budget [default: 0.05]
     #[arg(long, value_name = "PERCENT", value_parser = number([0.0, 10.0]))]
     isotropic_strain: Option<f64>,
+    /// Layer whose atoms the frames show beside the moiré and which measures them in place of the scanner: free of drift and
+    /// calibration. `auto`: whichever they show, where that is more accurate [default: auto]
+    #[arg(long, value_name = "LAYER", value_parser = ["1", "2", "auto", "off"])]
+    ruler: Option<String>,
+    /// Strain that this layer itself may have, along x and along y, per cent, for the budget [default: 0.1]
+    #[arg(long, value_name = "PERCENT", value_parser = number([0.0, 10.0]))]
+    ruler_strain: Option<f64>,
 }
 
 impl ScannerArgs {
@@ -51,9 +58,17 @@ impl ScannerArgs {
                 self.isotropic_strain,
                 &mut settings.isotropic_strain_percent,
             ),
+            (self.ruler_strain, &mut settings.ruler_strain_percent),
         ] {
             *setting = given.unwrap_or(*setting);
         }
+        settings.ruler = match self.ruler.as_deref() {
+            Some("1") => RulerLayer::First,
+            Some("2") => RulerLayer::Second,
+            Some("off") => RulerLayer::Off,
+            Some(_) => RulerLayer::Auto,
+            None => settings.ruler,
+        };
         if let Some(path) = &self.calibration {
             settings.scanner = Some(moiregauge_pipeline::calibrate::read_calibration(path)?);
         }

@@ -9,7 +9,7 @@ use heterostrain::lattice::Lattice;
 use heterostrain::strain::{StrainTensor, TwistStrain};
 use heterostrain::{Estimate, TotalEstimate};
 use moiregauge::campaign::{
-    Analysis, Combined, Drift, ScanAnalysis, SetAnalysis, SetLattice, SetMean,
+    Analysis, Combined, Drift, Ruled, ScanAnalysis, SetAnalysis, SetLattice, SetMean,
 };
 use moiregauge::caveat::ChosenBy;
 use moiregauge::meaning::Budget;
@@ -69,7 +69,12 @@ fn set_summary(text: &mut String, set: &SetAnalysis, settings: &Settings) {
         let _ = writeln!(text, "  drift         not determined{words}");
     }
     match (&set.mean, &set.uncorrected) {
-        (Some(mean), _) => set_mean(text, mean),
+        (Some(mean), _) => {
+            if let Some(ruler) = &set.ruler {
+                ruler_lines(text, ruler, set.by_scanner.as_ref());
+            }
+            set_mean(text, mean);
+        }
         (None, Some(mean)) => {
             text.push_str(
                 "  not corrected for drift; the errors do not include the effect of the drift:\n",
@@ -91,6 +96,36 @@ fn set_summary(text: &mut String, set: &SetAnalysis, settings: &Settings) {
         }
     }
     text.push('\n');
+}
+
+/// What the atoms of a layer say of the scanner, and what the scanner says without them.
+fn ruler_lines(text: &mut String, ruler: &Ruled, by_scanner: Option<&SetMean>) {
+    let off = Estimate::new(
+        100.0 * (ruler.fast_gain.value - 1.0),
+        100.0 * ruler.fast_gain.sigma,
+    );
+    let _ = writeln!(
+        text,
+        "  ruler         atoms of layer {}{}; they show the fast axis of the scanner {} % too long",
+        ruler.layer,
+        if ruler.used { "" } else { ", not used" },
+        plus_minus(off)
+    );
+    if let Some(drift) = ruler.drift.filter(|_| ruler.used) {
+        let [x, y] = drift.map(|part| plus_minus(part.scaled(60.0)));
+        let _ = writeln!(
+            text,
+            "                drift in these frames x {x}, y {y} nm/min"
+        );
+    }
+    if let Some(alone) = by_scanner {
+        let twist = alone.twist().scaled(1f64.to_degrees());
+        let _ = writeln!(
+            text,
+            "                the scanner alone: twist {}",
+            with_statistical(twist, "°")
+        );
+    }
 }
 
 fn drift_line(text: &mut String, drift: &Drift, settings: &Settings) {
@@ -168,7 +203,9 @@ fn twist_strain(text: &mut String, found: &TwistStrain, budget: &Budget, reading
         } else {
             ", without drift"
         },
-        if readings.tensor.is_some() {
+        if budget.ruler.is_some() {
+            ""
+        } else if readings.tensor.is_some() {
             ", without isotropic strain"
         } else if readings.layers_differ {
             ", one reading of several"

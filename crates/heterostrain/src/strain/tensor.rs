@@ -336,7 +336,7 @@ impl StrainTensor {
 }
 
 /// `(ε_u, ε_b)` of a layer stretched by `mean + gamma` along and `mean − gamma` across the axis of `ε_u`.
-fn uniaxial_and_biaxial(mean: f64, gamma: f64, poisson_ratio: f64) -> [f64; 2] {
+pub(crate) fn uniaxial_and_biaxial(mean: f64, gamma: f64, poisson_ratio: f64) -> [f64; 2] {
     let (along, across) = (1.0 + mean + gamma, 1.0 + mean - gamma);
     let ratio = along / across;
     // r = (1 + ε_u)/(1 − νε_u).

@@ -110,6 +110,7 @@ fn source(limit: Limit) -> &'static str {
         Limit::Of(Source::StrainedLayer) => "which layer is strained",
         Limit::Of(Source::IsotropicStrain) => "isotropic strain",
         Limit::Of(Source::PoissonRatio) => "Poisson ratio",
+        Limit::Of(Source::RulerStrain) => "strain of the ruler",
         Limit::Unlinked => "frames that cannot be linked by phases",
         Limit::FrameTimes => "times of the frames",
         _ => "",

@@ -167,10 +167,12 @@ fn measuring(settings: &Settings) -> Settings {
         by_hand,
         moires,
         scanner,
+        ruler,
+        // The atoms that are looked for are those of the layers.
+        material,
+        substrate,
         // What is chosen after measuring changes no measured scan.
         grain: _,
-        material: _,
-        substrate: _,
         moire_layers: _,
         layers_chosen: _,
         lattice_angle: _,
@@ -187,6 +189,7 @@ fn measuring(settings: &Settings) -> Settings {
         drift_prior_nm_per_min: _,
         calibration: _,
         isotropic_strain_percent: _,
+        ruler_strain_percent: _,
         drift_draws: _,
         strain_draws: _,
         seed: _,
@@ -200,6 +203,9 @@ fn measuring(settings: &Settings) -> Settings {
         by_hand: by_hand.clone(),
         moires: *moires,
         scanner: scanner.clone(),
+        ruler: *ruler,
+        material: material.clone(),
+        substrate: substrate.clone(),
         ..Settings::default()
     }
 }

@@ -101,6 +101,7 @@ impl Serialize for Limit {
             Self::Of(Source::StrainedLayer) => "strained-layer",
             Self::Of(Source::IsotropicStrain) => "isotropic-strain",
             Self::Of(Source::PoissonRatio) => "poisson-ratio",
+            Self::Of(Source::RulerStrain) => "ruler-strain",
             Self::Unlinked => "unlinked",
             Self::FrameTimes => "frame-times",
         })

@@ -25,7 +25,7 @@ const RIGHT: f64 = 12.0;
 const DECADES: f64 = 5.0;
 
 /// Rows from top to bottom: name, and the sources that it sums.
-const ROWS: [(&str, Kind, &[Source]); 14] = [
+const ROWS: [(&str, Kind, &[Source]); 15] = [
     ("image noise", Kind::Statistical, &[Source::Image]),
     ("drift", Kind::Statistical, &[Source::Drift]),
     ("sensor noise", Kind::Statistical, &[Source::Sensor]),
@@ -63,6 +63,7 @@ const ROWS: [(&str, Kind, &[Source]); 14] = [
         &[Source::IsotropicStrain],
     ),
     ("model: Poisson ratio", Kind::Model, &[Source::PoissonRatio]),
+    ("strain of the ruler", Kind::Model, &[Source::RulerStrain]),
     ("total", Kind::Sum, &Source::ALL),
 ];
 
@@ -176,13 +177,9 @@ fn shown(analysis: &Analysis) -> Option<(&Budget, String)> {
 /// A row: its name, and the sources that it sums.
 type Row = (&'static str, Kind, &'static [Source]);
 
-/// All rows, those of the grid only where it is in doubt.
+/// All rows that say something.
 fn rows(budget: &Budget) -> Vec<Row> {
-    let shown = |sources: &[Source]| match sources {
-        [Source::Pitch] => budget.grid.pitch.norm() > 0.0,
-        [Source::Shape] => budget.grid.shape.norm() > 0.0,
-        _ => true,
-    };
+    let shown = |sources: &[Source]| sources.iter().any(|source| budget.has(*source));
     ROWS.into_iter().filter(|row| shown(row.2)).collect()
 }
 

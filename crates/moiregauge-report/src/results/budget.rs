@@ -41,6 +41,9 @@ pub struct BudgetColumn {
     pub isotropic_strain: Option<f64>,
     /// Poisson ratio of the layers.
     pub poisson_ratio: Option<f64>,
+    /// Strain of the layer whose atoms are the ruler; left out where the scanner is.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ruler_strain: Option<f64>,
     /// All together; `null` where one is not known.
     pub total: Option<f64>,
 }
@@ -89,6 +92,7 @@ pub(crate) fn source_name(source: Source) -> &'static str {
         Source::StrainedLayer => "strained_layer",
         Source::IsotropicStrain => "isotropic_strain",
         Source::PoissonRatio => "poisson_ratio",
+        Source::RulerStrain => "ruler_strain",
     }
 }
 
@@ -105,12 +109,13 @@ impl BudgetColumn {
             calibration_gain: of(Source::Gain),
             calibration_mismatch: of(Source::Mismatch),
             calibration_orthogonality: of(Source::Orthogonality),
-            pitch_convention: of(Source::Pitch).filter(|_| budget.grid.pitch.norm() > 0.0),
-            grid_shape: of(Source::Shape).filter(|_| budget.grid.shape.norm() > 0.0),
+            pitch_convention: of(Source::Pitch).filter(|_| budget.has(Source::Pitch)),
+            grid_shape: of(Source::Shape).filter(|_| budget.has(Source::Shape)),
             lattice_constant: of(Source::LatticeConstant),
             strained_layer: of(Source::StrainedLayer),
             isotropic_strain: of(Source::IsotropicStrain),
             poisson_ratio: of(Source::PoissonRatio),
+            ruler_strain: of(Source::RulerStrain).filter(|_| budget.has(Source::RulerStrain)),
             total: sigma(&budget.total()),
         }
     }
@@ -130,6 +135,7 @@ impl BudgetColumn {
             Source::StrainedLayer => self.strained_layer,
             Source::IsotropicStrain => self.isotropic_strain,
             Source::PoissonRatio => self.poisson_ratio,
+            Source::RulerStrain => self.ruler_strain,
         }
     }
 }

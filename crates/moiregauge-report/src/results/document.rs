@@ -4,7 +4,7 @@ use heterostrain::Estimate;
 use heterostrain::material::Bilayer;
 use heterostrain::strain::TwistStrain;
 use moiregauge::campaign::{
-    Analysis, Combined, Consistency, Drift, DriftFit, SetAnalysis, SetMean,
+    Analysis, Combined, Consistency, Drift, DriftFit, Ruled, SetAnalysis, SetMean,
 };
 use moiregauge::drift::DriftMonteCarlo;
 use moiregauge::frame::Axis;
@@ -89,6 +89,12 @@ pub struct SetResult {
     pub uncorrected: Option<MeanResult>,
     /// The lattice of all scans together, where no twist and strain explain it; `null` where they do, and where it may be another one.
     pub lattice: Option<SetLatticeResult>,
+    /// By the atoms of a layer that the scans show beside the moiré; left out where they do not.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ruler: Option<RulerResult>,
+    /// `mean` by the scanner alone, where that is by the atoms of a layer and the scanner alone gives one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub by_scanner: Option<MeanResult>,
     /// From the mean reciprocal lattice of up and down scans: free of constant drift without
     /// knowing it. A check of `mean`.
     pub forward_backward: Option<TwistStrainResult>,
@@ -96,6 +102,23 @@ pub struct SetResult {
     pub checks: Option<ChecksResult>,
     /// The scans in order of time.
     pub scans: Vec<ScanResult>,
+}
+
+/// A set measured by the atoms of one of its layers.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct RulerResult {
+    /// Layer 1, the reference, or layer 2.
+    pub layer: u8,
+    /// Traces and retraces that show its atoms.
+    pub lines: usize,
+    /// Whether `mean` of the set is by the atoms.
+    pub used: bool,
+    /// Twist and strain of layer 2 against layer 1, free of drift and of the calibration of the scanner.
+    pub mean: MeanResult,
+    /// What the scanner shows over what it is, along the fast axis.
+    pub fast_gain: ResultEstimate,
+    /// Drift to the right and up that goes with it, if both axes have this gain and stand at a right angle, nm/min; `null` without timing.
+    pub drift_nm_per_min: Option<[ResultEstimate; 2]>,
 }
 
 /// Velocity of the sample in the frame of the sensors.
@@ -267,6 +290,8 @@ fn set_result(set: &SetAnalysis, settings: &Settings) -> SetResult {
             .lattice
             .as_ref()
             .map(|l| SetLatticeResult::of(l, bilayer)),
+        ruler: set.ruler.as_ref().map(|r| ruler(r, bilayer)),
+        by_scanner: set.by_scanner.as_ref().map(|m| mean(m, bilayer)),
         forward_backward: set.forward_backward.as_ref().map(Into::into),
         checks: set.checks.as_ref().map(Into::into),
         scans: set
@@ -274,6 +299,19 @@ fn set_result(set: &SetAnalysis, settings: &Settings) -> SetResult {
             .iter()
             .map(|s| ScanResult::of(s, set.slow_axis, bilayer))
             .collect(),
+    }
+}
+
+fn ruler(ruled: &Ruled, bilayer: Bilayer<'_>) -> RulerResult {
+    RulerResult {
+        layer: ruled.layer,
+        lines: ruled.lines,
+        used: ruled.used,
+        mean: mean(&ruled.mean, bilayer),
+        fast_gain: estimate(ruled.fast_gain, 1.0),
+        drift_nm_per_min: ruled
+            .drift
+            .map(|v| v.map(|part| estimate(part, PER_MINUTE))),
     }
 }
 

@@ -70,10 +70,10 @@ impl<'a> Row<'a> for BudgetRow<'a> {
             .map(|c| ("all sets together", "drift_corrected", &c.budget));
         sets.chain(together)
             .flat_map(|(set, coordinates, budget)| {
-                let of_grid = |s: &Source| matches!(s, Source::Pitch | Source::Shape);
+                let rare = [Source::Pitch, Source::Shape, Source::RulerStrain];
                 let shown = Source::ALL
                     .into_iter()
-                    .filter(move |s| !of_grid(s) || budget.twist_deg.get(*s).is_some());
+                    .filter(move |s| !rare.contains(s) || budget.twist_deg.get(*s).is_some());
                 let sources = shown.map(Some).chain([None]);
                 sources.map(move |source| Self {
                     set,

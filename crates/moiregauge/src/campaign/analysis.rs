@@ -4,7 +4,7 @@
 
 use heterostrain::Estimate;
 use heterostrain::lattice::{Lattice, Px};
-use heterostrain::strain::{KnownOrientation, LatticeDirection, StrainDraw, TwistStrain};
+use heterostrain::strain::{KnownOrientation, LatticeDirection, Ruler, StrainDraw, TwistStrain};
 use nalgebra::{Matrix2, Vector2};
 use spmfile::{DateTime, FrameDirection, LineDirection};
 
@@ -98,6 +98,10 @@ pub struct SetAnalysis {
     pub uncorrected: Option<SetMean>,
     /// The lattice alone, where no twist and strain explain it; `None` of sets that have them, and where the lattice may be another one.
     pub lattice: Option<SetLattice>,
+    /// By the atoms of a layer that the scans show beside the moiré; `None` where they do not.
+    pub ruler: Option<Ruled>,
+    /// `mean` by the scanner alone, where it is by the atoms.
+    pub by_scanner: Option<SetMean>,
     /// Twist and strain from the mean reciprocal lattice of up and down scans, which is free of
     /// constant drift without knowing it; `None` where there is only one direction.
     pub forward_backward: Option<TwistStrain>,
@@ -111,6 +115,43 @@ impl SetAnalysis {
     /// The mean of scans whose drift was measured or given.
     pub fn with_drift(&self) -> Option<&SetMean> {
         self.mean.as_ref().filter(|mean| mean.assumed.is_none())
+    }
+}
+
+/// A set measured by the atoms of one of its layers.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub struct Ruled {
+    /// Layer 1, the reference, or layer 2.
+    pub layer: u8,
+    /// The ruler of the first line; that of the others has the same orientation.
+    pub ruler: Ruler,
+    /// Traces and retraces that show them.
+    pub lines: usize,
+    /// Whether the mean of the set is this.
+    pub used: bool,
+    /// The layer whose size the atoms have as well, as far as the calibration tells, where nobody said which layer it is; `None` for
+    /// equal layers.
+    pub other_layer: Option<u8>,
+    /// Lattice (nm of the ruler), twist and strain: free of drift and of the calibration of the scanner.
+    pub mean: SetMean,
+    /// What the scanner shows over what it is, along the fast axis.
+    pub fast_gain: Estimate,
+    /// The drift that this goes with if both axes have the same gain and stand at a right angle, nm/s along x and y; `None` without timing.
+    pub drift: Option<[Estimate; 2]>,
+}
+
+/// Readings of different layers with less mean strain than this are all possible: several times what layers on each other have.
+const POSSIBLE: f64 = 0.005;
+
+impl Ruled {
+    /// Twist (rad) and mean strain of the other readings that are possible.
+    pub(crate) fn others(&self) -> impl Iterator<Item = [f64; 2]> {
+        let tensor = self.mean.readings.tensor.iter();
+        let others = tensor.flat_map(|tensor| &tensor.alternatives);
+        others
+            .filter(|t| t.mean.abs() < POSSIBLE)
+            .map(|t| [t.twist, t.mean])
     }
 }
 

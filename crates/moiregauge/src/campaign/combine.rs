@@ -4,7 +4,7 @@ use heterostrain::lattice::Lattice;
 use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
 
 use crate::campaign::analysis::{
-    Checks, Combined, Consistency, Drift, JointTerms, SetAnalysis, SetMean,
+    Checks, Combined, Consistency, Drift, JointTerms, Ruled, SetAnalysis, SetMean,
 };
 use crate::campaign::set::common::common;
 use crate::campaign::set::joint::{checks as set_checks, joint_fit, lattice_of, terms};
@@ -20,6 +20,7 @@ use crate::frame::grid_errors::GridErrors;
 use crate::meaning::about::caveats as about_readings;
 use crate::meaning::budget::Budget;
 use crate::meaning::readings::Readings;
+use crate::meaning::ruler::ByRuler;
 use crate::meaning::strengths::WaveStrengths;
 use crate::numbers::chi2::enlargement;
 use crate::scan::measured::MeasuredScan;
@@ -50,6 +51,11 @@ pub(crate) fn combine(
     strengths: &WaveStrengths,
     caveats: &mut Vec<Caveat>,
 ) -> Option<Combined> {
+    let ruled: Vec<&Ruled> = sets.iter().filter_map(|s| s.ruler.as_ref()).collect();
+    let ruled: Vec<&Ruled> = ruled.into_iter().filter(|ruler| ruler.used).collect();
+    if !ruled.is_empty() {
+        return by_rulers(&ruled, sets, settings, strengths);
+    }
     let means: Vec<&SetMean> = match sets {
         [one] => one.mean.iter().collect(),
         all => all.iter().filter_map(SetAnalysis::with_drift).collect(),
@@ -88,6 +94,30 @@ pub(crate) fn combine(
         path,
         checks,
         consistency,
+    })
+}
+
+/// The mean of the sets that the atoms of a layer measure: what the scanner alone says of others is far worse.
+fn by_rulers(
+    ruled: &[&Ruled],
+    sets: &[SetAnalysis],
+    settings: &Settings,
+    strengths: &WaveStrengths,
+) -> Option<Combined> {
+    let means: Vec<&SetMean> = ruled.iter().map(|ruler| &ruler.mean).collect();
+    let (lattice, _) = weighted_mean(&means)?;
+    let first = ruled.first()?;
+    let all = ByRuler::new(&first.ruler, first.layer, &lattice, settings)?;
+    Some(Combined {
+        readings: all.readings(&lattice, strengths, settings),
+        lattice,
+        twist_strain: all.twist_strain,
+        budget: all.budget,
+        joint: None,
+        drift: None,
+        path: None,
+        checks: None,
+        consistency: consistency(sets),
     })
 }
 

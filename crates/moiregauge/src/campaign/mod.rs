@@ -23,7 +23,7 @@ pub(crate) mod totals;
 pub use analyse::{analyse, is_nothing_left, refusal};
 pub use analysis::{
     Analysis, AtomicOrientation, Checks, Combined, Consistency, Drift, DriftFit, JointTerms,
-    LineAnalysis, Motion, Residual, ScanAnalysis, Scatter, SetAnalysis, SetMean,
+    LineAnalysis, Motion, Residual, Ruled, ScanAnalysis, Scatter, SetAnalysis, SetMean,
 };
 pub use atomic::{AtomicError, atomic_orientation};
 pub use calibrate::{CalibrateError, Calibrated, CalibratedSet, calibrate};

@@ -100,6 +100,14 @@ pub enum OrientationDoubt {
         /// The layer that was expected.
         material: String,
     },
+    /// Atoms beside the moiré that may be of either layer.
+    #[error(
+        "the atoms beside the moiré may be those of layer {layer} as well, as far as the calibration of the scanner tells. Twist and          strain would differ by a share of themselves as large as the strain between the layers"
+    )]
+    RulerLayer {
+        /// The layer that was not taken.
+        layer: u8,
+    },
 }
 
 /// Twist and mean strain for one sense of the twist.
@@ -146,6 +154,10 @@ explain! { OrientationDoubt:
     SenseContradicts "twist-sense-contradicts" Serious
         "No twist of the sense that was given fits the orientation of the layer. The other sense is shown."
         "Check the sense of the twist, and whether the orientation belongs to this layer."
+    RulerLayer "ruler-layer-open" Warning
+        "The atoms beside the moiré may be those of either layer. The likelier one was taken: the upper layer, unless their size says \
+         the other one."
+        "Name the layer whose atoms the image shows with `--ruler 1` or `--ruler 2`."
     SenseOpen "twist-sense-open" Warning
         "The two layers are equal, and the orientation of one of them does not determine the sense of the twist. Both \
          readings fit equally well and have different strain tensors."

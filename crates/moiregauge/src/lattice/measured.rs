@@ -30,6 +30,21 @@ pub struct Grain {
     pub boundary: [f64; 2],
 }
 
+/// The atoms of a layer, in an image that shows its moiré as well.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct Atoms {
+    /// Vectors in pixels (columns, rows).
+    #[serde(with = "exact")]
+    pub pixels: Lattice<Px>,
+    /// As of [`Evidence`].
+    #[serde(with = "exact")]
+    pub predicts: Option<f64>,
+    /// Amplitude over noise amplitude in one resolution cell, weakest of the first harmonics.
+    #[serde(with = "exact")]
+    pub signal_to_noise: f64,
+}
+
 /// The lattice of one image.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct MeasuredLattice {
@@ -79,6 +94,9 @@ pub struct MeasuredLattice {
     pub published: Option<PublishedPeaks>,
     /// The fit to the pixels; `None` with the other methods.
     pub fit: Option<LatticeFit>,
+    /// The atoms of a layer that the image shows as well.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub atoms: Option<Box<Atoms>>,
 }
 
 /// What speaks for a lattice, beside its signal-to-noise ratio: its margin to an image without any.

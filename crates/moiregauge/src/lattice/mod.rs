@@ -21,7 +21,7 @@ pub(crate) mod start;
 pub use common::Common;
 pub use find::measure;
 pub use fit::{Closure, FittedHarmonic, ForeignWave, Inhomogeneity, LatticeFit};
-pub use measured::{Candidate, Evidence, MeasuredLattice};
+pub use measured::{Atoms, Candidate, Evidence, MeasuredLattice};
 pub use paper::PublishedPeaks;
 pub use several::measure_several;
 pub use start::Start;

@@ -46,7 +46,9 @@ pub fn caveats(
         add(OrientationDoubt::SenseUnused.into());
     }
     if let Some(tensor) = tensor {
-        about_tensor(found, tensor, settings, &mut add);
+        if known_orientation(settings).is_some() {
+            about_tensor(found, tensor, settings, &mut add);
+        }
         about_sense(tensor, &mut add);
     }
     caveats

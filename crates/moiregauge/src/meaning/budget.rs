@@ -58,11 +58,13 @@ pub enum Source {
     IsotropicStrain,
     /// The Poisson ratio.
     PoissonRatio,
+    /// Strain of the layer whose atoms are the ruler; 0 without a ruler.
+    RulerStrain,
 }
 
 impl Source {
     /// All of them, in the order of tables and figures: what averages out first.
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 13] = [
         Self::Image,
         Self::Drift,
         Self::Sensor,
@@ -75,6 +77,7 @@ impl Source {
         Self::StrainedLayer,
         Self::IsotropicStrain,
         Self::PoissonRatio,
+        Self::RulerStrain,
     ];
 
     /// Whether it is part of the σ of a result.
@@ -101,13 +104,15 @@ pub struct Contribution {
 #[derive(Clone, Debug)]
 pub struct Budget {
     /// In the order of [`Source::ALL`].
-    contributions: [Contribution; 12],
+    contributions: [Contribution; 13],
     /// What errors of the grid do to positions.
     pub grid: GridErrors,
     /// Whether the drift is a prior: nothing tells it.
     pub drift_assumed: bool,
     /// The statistical ones as covariances of the lattice.
     pub statistical: Statistical,
+    /// The layer (1 or 2) whose atoms are the ruler; `None` where the scanner is.
+    pub ruler: Option<u8>,
 }
 
 impl Budget {
@@ -164,6 +169,32 @@ impl Budget {
             statistical: *statistical,
             grid: *grid,
             drift_assumed: false,
+            ruler: None,
+        }
+    }
+
+    /// Where the atoms of a layer are the ruler: from what every source contributes, in the order of [`Source::ALL`].
+    pub(crate) fn of_ruler(
+        layer: u8,
+        contributions: [Contribution; 13],
+        statistical: Statistical,
+    ) -> Self {
+        Self {
+            contributions,
+            grid: GridErrors::default(),
+            statistical,
+            drift_assumed: false,
+            ruler: Some(layer),
+        }
+    }
+
+    /// Whether a source is worth a row: the pitch where it is in doubt, the strain of a ruler where there is one.
+    pub fn has(&self, source: Source) -> bool {
+        match source {
+            Source::Pitch => self.grid.pitch.norm() > 0.0,
+            Source::Shape => self.grid.shape.norm() > 0.0,
+            Source::RulerStrain => self.ruler.is_some(),
+            _ => true,
         }
     }
 
@@ -345,6 +376,7 @@ fn model_error(
             let sigma = settings.isotropic_strain_percent / 100.0;
             reference.and_then(|r| mean_square(sigma, |h| r.with_isotropic_strain(h)))
         }
+        Source::RulerStrain => Some(Matrix4::zeros()),
         _ => {
             let sigma = bilayer.stretched.poisson_ratio_sigma;
             reference.and_then(|r| mean_square(sigma, |change| r.with_poisson_ratio(change)))

@@ -4,6 +4,7 @@ pub(crate) mod about;
 pub(crate) mod budget;
 pub(crate) mod naming;
 pub(crate) mod readings;
+pub(crate) mod ruler;
 pub(crate) mod strengths;
 pub(crate) mod tensor;
 

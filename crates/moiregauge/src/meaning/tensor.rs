@@ -228,7 +228,7 @@ fn other_vector(lattice: &Lattice, bilayer: Bilayer<'_>, orientation: &Orientati
 
 /// The layers with lattice constants off by one σ: both together where they are one material, each by
 /// itself where they are not.
-fn constants(bilayer: Bilayer<'_>) -> Vec<[Material; 2]> {
+pub(crate) fn constants(bilayer: Bilayer<'_>) -> Vec<[Material; 2]> {
     let larger = |material: &Material| {
         let factor = 1.0 + material.lattice_constant_sigma_nm / material.lattice_constant_nm;
         Material {

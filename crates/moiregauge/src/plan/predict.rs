@@ -38,7 +38,7 @@ pub struct Prediction {
     /// The same if the times of the frames were known exactly.
     drift_with_clock: f64,
     /// Variances of twist (rad²) and of a component of the strain vector (mean of both), source by source.
-    parts: [[f64; 2]; 12],
+    parts: [[f64; 2]; 13],
     /// Whether the phases of successive frames can be linked.
     pub linked: bool,
     /// Amplitude over noise amplitude in one resolution cell, of a first harmonic in one image.

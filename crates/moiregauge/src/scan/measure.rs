@@ -13,6 +13,7 @@ use crate::lattice::by_hand::{Meant, measure_by_hand};
 use crate::lattice::find::measure_own;
 use crate::lattice::measure::measure_first_shell;
 use crate::lattice::measured::MeasuredLattice;
+use crate::lattice::several::atoms;
 use crate::lattice::several::together::measure_several;
 use crate::lattice::start::Start;
 use crate::numbers::interrupt;
@@ -86,11 +87,23 @@ pub fn measure_moires(
     let (background, method) = (settings.background, settings.method);
     let told = &settings.by_hand;
     let find = |image: Image, geometry: &Geometry| match settings.moires {
-        0 | 1 if !told.is_nothing() => {
-            let lattice = measure_by_hand(&image, geometry, background, method, meant(told))?;
-            Ok(vec![lattice])
+        0 | 1 => {
+            let find = |image: Image, geometry: &Geometry| match told.is_nothing() {
+                true => measure_own(image, geometry, background, method),
+                false => measure_by_hand(&image, geometry, background, method, meant(told)),
+            };
+            let mut layers = settings.ruler_layers();
+            layers.retain(|layer| atoms::may_show(geometry, layer));
+            let scene = atoms::Scene {
+                image: &image,
+                geometry,
+                background,
+                find: &find,
+            };
+            let both = scene.moire_with_atoms(&layers);
+            both.map_or_else(|| find(image, geometry), Ok)
+                .map(|lattice| vec![lattice])
         }
-        0 | 1 => measure_own(image, geometry, background, method).map(|lattice| vec![lattice]),
         n => {
             // Several lattices are fitted together on a straight grid.
             let plane = Geometry {

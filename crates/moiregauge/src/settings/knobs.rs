@@ -32,6 +32,26 @@ pub enum Grouping {
     File,
 }
 
+/// Which layer's atoms are the ruler of a frame that shows them beside the moiré.
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
+)]
+pub enum RulerLayer {
+    /// Whichever the frames show, where that makes the total uncertainty of the twist smaller.
+    #[default]
+    #[serde(rename = "auto")]
+    Auto,
+    /// None: the scanner alone.
+    #[serde(rename = "off")]
+    Off,
+    /// Layer 1, the reference.
+    #[serde(rename = "1")]
+    First,
+    /// Layer 2.
+    #[serde(rename = "2")]
+    Second,
+}
+
 /// A drift velocity known beforehand.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -182,6 +202,10 @@ pub struct Settings {
     /// one, per cent, for the uncertainty budget. The moiré does not show it. The default is a guess, of
     /// the size of small uniaxial strains; up to 0.06 % the twist stays within 0.001°.
     pub isotropic_strain_percent: f64,
+    /// The layer whose atoms the frames show beside the moiré and which measures them in place of the scanner.
+    pub ruler: RulerLayer,
+    /// Standard deviation of the strain that this layer itself may have, along x and along y, per cent, for the uncertainty budget.
+    pub ruler_strain_percent: f64,
     /// Monte Carlo draws for the drift.
     pub drift_draws: usize,
     /// Monte Carlo draws for twist and strain, per scan.
@@ -217,6 +241,21 @@ impl Settings {
             strain_convention: StrainConvention::KSpace,
             overlap: true,
             ..self
+        }
+    }
+
+    /// The layers whose atoms are looked for beside the moiré: the upper one first, which most images show.
+    pub fn ruler_layers(&self) -> Vec<&Material> {
+        let layers = self.bilayer();
+        let reads_it =
+            self.method == Method::Lattice && self.strain_convention == StrainConvention::RealSpace;
+        match self.ruler {
+            _ if !reads_it || self.moires > 1 => Vec::new(),
+            RulerLayer::Off => Vec::new(),
+            RulerLayer::First => vec![layers.reference],
+            RulerLayer::Second => vec![layers.stretched],
+            RulerLayer::Auto if layers.is_equal() => vec![layers.stretched],
+            RulerLayer::Auto => vec![layers.stretched, layers.reference],
         }
     }
 
@@ -262,6 +301,8 @@ impl Default for Settings {
             calibration: Calibration::default(),
             scanner: None,
             isotropic_strain_percent: 0.05,
+            ruler: RulerLayer::Auto,
+            ruler_strain_percent: 0.1,
             drift_draws: 10_000,
             strain_draws: 1_000,
             seed: 1,

@@ -7,5 +7,5 @@ pub(crate) mod ranges;
 
 pub use by_hand::{ByHand, Mask};
 pub use check::SettingsError;
-pub use knobs::{Calibration, GivenDrift, Grouping, Lines, MoireLayers, Settings};
+pub use knobs::{Calibration, GivenDrift, Grouping, Lines, MoireLayers, RulerLayer, Settings};
 pub use ranges::{MOST_DRAWS, MOST_GRAINS, MOST_IMAGES, MOST_MOIRES, OutOfRange};

@@ -4,6 +4,7 @@ use crate::campaign::analysis::{SetAnalysis, SetMean};
 use crate::campaign::set::moire;
 use crate::caveat::Caveat;
 use crate::caveat::moires::MoireDoubt;
+use crate::caveat::orientation::OrientationDoubt;
 use crate::caveat::sets::{Scattered, SetDoubt};
 use crate::meaning::about::caveats;
 use crate::settings::knobs::Settings;
@@ -22,6 +23,23 @@ pub(crate) fn about_set(
 ) {
     about_mean(&set.name, set.mean.as_ref(), caveats);
     let shown = set.mean.as_ref().or(set.uncorrected.as_ref());
+    let ruler = set.ruler.as_ref();
+    if let Some(layer) = ruler.and_then(|ruler| ruler.other_layer) {
+        caveats.push(Caveat::new(
+            OrientationDoubt::RulerLayer { layer },
+            &set.name,
+        ));
+    }
+    if let Some(ruler) = ruler.filter(|ruler| ruler.others().next().is_some())
+        && let Some(tensor) = &ruler.mean.readings.tensor
+    {
+        let doubt = OrientationDoubt::Ambiguous {
+            twist: tensor.best.twist,
+            strain: tensor.best.mean,
+            others: ruler.others().collect(),
+        };
+        caveats.push(Caveat::new(doubt, &set.name));
+    }
     if let Some(mean) = shown {
         caveats.extend(about_readings(&set.name, mean, settings));
     }

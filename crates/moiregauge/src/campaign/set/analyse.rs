@@ -2,7 +2,7 @@
 
 use nalgebra::Matrix2;
 
-use crate::campaign::analysis::SetAnalysis;
+use crate::campaign::analysis::{Ruled, SetAnalysis, SetMean};
 use crate::campaign::group::Group;
 use crate::campaign::set::about::about_set;
 use crate::campaign::set::assumed::assumed;
@@ -11,6 +11,7 @@ use crate::campaign::set::common::common;
 use crate::campaign::set::drift::{constant_drift, outruns, unknown};
 use crate::campaign::set::mean::{at_drift, forward_backward, without_drift};
 use crate::campaign::set::moire::{breaks, draw};
+use crate::campaign::set::ruler::ruled;
 use crate::campaign::set::scan::scans_at_drift;
 use crate::campaign::set::shells::{of_other_shell, of_second_shell};
 use crate::campaign::set::{joint, published};
@@ -21,7 +22,7 @@ use crate::drift::linear::Observation;
 use crate::frame::grid_errors::GridErrors;
 use crate::meaning::strengths::WaveStrengths;
 use crate::scan::measured::MeasuredScan;
-use crate::settings::knobs::Settings;
+use crate::settings::knobs::{RulerLayer, Settings};
 use crate::spectrum::method::Method;
 
 /// Everything about one set but its illustration; the settings name the waves of the lattice. `first_index` numbers its scans for the draws.
@@ -72,7 +73,7 @@ pub(crate) fn analyse_set(
     let doubt = no_result(group, &used).filter(|_| !settings.by_hand.says_which());
     let outruns = of_set.and_then(|drift| outruns(drift, &all));
     let doubt = doubt.or_else(|| outruns.map(|share| SetDoubt::DriftOutrunsScan { share }));
-    let (mut uncorrected, mut mean, mut lattice) = (None, None, None);
+    let (mut uncorrected, mut mean, mut lattice, mut ruler) = (None, None, None, None);
     if let Some(doubt) = doubt {
         caveats.push(Caveat::new(doubt, name));
     } else {
@@ -99,9 +100,19 @@ pub(crate) fn analyse_set(
         if mean.is_none() && uncorrected.is_none() {
             lattice = known.map(|solved| bare(solved, &scans, &shared, &grid, settings));
         }
+        ruler = ruled(&used, reference, &shared, settings, strengths);
+    }
+    let mut by_scanner = None;
+    if let Some(ruler) = &mut ruler
+        && is_better(ruler, mean.as_ref(), settings)
+    {
+        ruler.used = true;
+        by_scanner = mean.replace(ruler.mean.clone());
+        lattice = None;
     }
     let share = mean.as_ref().and_then(DriftShare::of_mean);
     let share = share.or_else(|| lattice.as_ref().and_then(DriftShare::of_lattice));
+    let open = open.filter(|_| !ruler.as_ref().is_some_and(|ruler| ruler.used));
     caveats.extend(open.map(|doubt| Caveat::new(doubt.with(share), name)));
     let set = SetAnalysis {
         name: name.clone(),
@@ -114,11 +125,23 @@ pub(crate) fn analyse_set(
         mean,
         uncorrected,
         lattice,
+        ruler,
+        by_scanner,
         checks,
         illustration: None,
     };
     about_set(&set, kept.len(), settings, caveats);
     set
+}
+
+/// Whether the set is measured by its ruler: where its reading is decided and the user says so, or the layer is decided as well and the
+/// total uncertainty of the twist is smaller.
+fn is_better(ruler: &Ruled, mean: Option<&SetMean>, settings: &Settings) -> bool {
+    let total = |mean: &SetMean| mean.twist().total;
+    let smaller = |mean: &SetMean| !(total(mean) <= total(&ruler.mean));
+    let told = settings.ruler != RulerLayer::Auto;
+    let layer = told || (ruler.other_layer.is_none() && mean.is_none_or(smaller));
+    layer && ruler.others().next().is_none()
 }
 
 /// Why the lattice of a set may be another one, so that the set has no result.

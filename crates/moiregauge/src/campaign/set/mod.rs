@@ -12,6 +12,7 @@ pub(crate) mod joint;
 pub(crate) mod mean;
 pub(crate) mod moire;
 pub(crate) mod published;
+pub(crate) mod ruler;
 pub(crate) mod scan;
 pub(crate) mod shells;
 pub(crate) mod solved;

@@ -15,6 +15,7 @@
 //! # References
 //! Buja, Hastie and Tibshirani, Ann. Statist. 17, 453 (1989), backfitting.
 
+pub(crate) mod atoms;
 pub(crate) mod split;
 pub(crate) mod together;
 

@@ -257,7 +257,7 @@ impl Scene<'_> {
     }
 }
 
-fn take_off(image: &mut Image, model: &[f64]) {
+pub(crate) fn take_off(image: &mut Image, model: &[f64]) {
     for (value, model) in image.values.iter_mut().zip(model) {
         *value -= model;
     }

@@ -144,6 +144,7 @@ impl Start {
             ),
             published,
             fit,
+            atoms: None,
         }
     }
 
@@ -185,6 +186,7 @@ impl Start {
             signal_to_noise: mean.signal_to_noise,
             published: None,
             fit: None,
+            atoms: None,
         })
     }
 

@@ -1,0 +1,204 @@
+//! A set whose frames show the atoms of a layer: the moiré by that ruler.
+//!
+//! Every line has a ruler of its own, its map turned to the orientation that all have in common. Drift, gains and skew are in these maps,
+//! so that the lattices are averaged as if nothing drifted.
+
+use heterostrain::Estimate;
+use heterostrain::lattice::{Lattice, labelled_like};
+use heterostrain::strain::Ruler;
+use nalgebra::{Matrix2, Matrix4, Vector2};
+
+use crate::campaign::analysis::{Ruled, SetMean};
+use crate::drift::linear::{Observation, common_lattice};
+use crate::lattice::several::atoms::is_of;
+use crate::meaning::ruler::ByRuler;
+use crate::meaning::strengths::WaveStrengths;
+use crate::numbers::chi2::enlargement;
+use crate::numbers::spread::mean_and_spread;
+use crate::scan::measured::{MeasuredLine, MeasuredScan};
+use crate::settings::knobs::{RulerLayer, Settings};
+
+/// The upper layer is the ruler unless the size of the atoms says the other one by odds of ten to one more: `2 ln 10`.
+const ODDS: f64 = 4.6;
+
+/// The other layer is excluded if the χ² of its size is larger by this: as for lattices that cannot be one, since calibrations may be worse than
+/// they are said to be.
+const DECIDED: f64 = 50.0;
+
+/// The mean of the lines that show the atoms of a layer; `None` where none does. `shared`: the covariance (nm²) that they have in common.
+pub(crate) fn ruled(
+    used: &[&MeasuredScan],
+    reference: &Matrix2<f64>,
+    shared: &Matrix4<f64>,
+    settings: &Settings,
+    strengths: &WaveStrengths,
+) -> Option<Ruled> {
+    // Noise that trace and retrace have in common is counted once.
+    let lines: Vec<(&MeasuredLine, f64)> = used
+        .iter()
+        .flat_map(|scan| {
+            scan.lines
+                .iter()
+                .map(|line| (line, scan.lines.len() as f64))
+        })
+        .filter(|(line, _)| line.lattice.atoms.is_some())
+        .collect();
+    let atoms: Vec<Lattice> = (lines.iter())
+        .filter_map(|(line, beside)| {
+            let pixels = &line.lattice.atoms.as_ref()?.pixels;
+            let mut found = pixels.in_nm(&line.geometry.pixel_to_nm);
+            found.covariance *= *beside;
+            Some(found)
+        })
+        .collect();
+    let (layer, other_layer) = layer(&atoms, settings)?;
+    let bilayer = settings.bilayer();
+    let material = if layer == 1 {
+        bilayer.reference
+    } else {
+        bilayer.stretched
+    };
+    let fast = |line: &MeasuredLine| line.geometry.fast_step().normalize();
+    let angle = Ruler::angle(atoms.first()?, material, &fast(lines[0].0))?;
+    let rulers: Vec<Ruler> = (atoms.iter())
+        .map(|atoms| Ruler::new(atoms, material, angle))
+        .collect::<Option<_>>()?;
+    let observations: Vec<Observation> = (rulers.iter().zip(&lines))
+        .map(|(ruler, (line, _))| {
+            let seen = line.lattice.pixels.in_nm(&line.geometry.pixel_to_nm);
+            Observation {
+                lattice: labelled_like(&ruler.measured(&seen), reference),
+                time_gradient: Vector2::zeros(),
+                speed_error: [0.0; 2],
+                sensor: Matrix4::zeros(),
+            }
+        })
+        .collect();
+    let (lattice, chi2, freedom) =
+        common_lattice(&observations, &Vector2::zeros(), &Matrix2::zeros()).ok()?;
+    let scale = enlargement(chi2, freedom);
+    let lattice = Lattice::new(lattice.basis, lattice.covariance * scale + shared);
+    let all = ByRuler::new(&rulers[0], layer, &lattice, settings)?;
+    let singles: Vec<_> = (rulers.iter().zip(&observations))
+        .filter_map(|(ruler, seen)| ByRuler::new(ruler, layer, &seen.lattice, settings))
+        .map(|single| single.twist_strain)
+        .collect();
+    let spread = |of: &dyn Fn(usize) -> f64| {
+        let values: Vec<f64> = (0..singles.len()).map(of).collect();
+        mean_and_spread(&values).sigma
+    };
+    let [first, second] = [0, 1].map(|i| spread(&|n| singles[n].strain_vector[i]));
+    let scanner = lines
+        .iter()
+        .zip(&rulers)
+        .map(|((line, _), ruler)| Scanner::of(line, ruler));
+    let scanner: Vec<Scanner> = scanner.collect();
+    let strain = settings.ruler_strain_percent / 100.0;
+    let mean =
+        |of: &dyn Fn(&Scanner) -> f64| scanner.iter().map(of).sum::<f64>() / scanner.len() as f64;
+    Some(Ruled {
+        layer,
+        ruler: rulers[0],
+        lines: lines.len(),
+        used: false,
+        other_layer,
+        fast_gain: Estimate::new(mean(&|s| s.fast_gain), strain),
+        drift: scanner.iter().all(|s| s.drift.is_some()).then(|| {
+            let per_speed = mean(&|s| s.slow_speed);
+            let calibration = &settings.calibration;
+            [
+                Estimate::new(
+                    mean(&|s| s.drift.map_or(0.0, |d| d.x)),
+                    per_speed * calibration.orthogonality_mrad / 1000.0,
+                ),
+                Estimate::new(
+                    mean(&|s| s.drift.map_or(0.0, |d| d.y)),
+                    per_speed * (calibration.mismatch_percent / 100.0).hypot(strain),
+                ),
+            ]
+        }),
+        mean: SetMean {
+            assumed: None,
+            twist_scatter: spread(&|n| singles[n].twist),
+            strain_scatter: first.hypot(second) / std::f64::consts::SQRT_2,
+            chi2_per_dof: (freedom > 0).then(|| chi2 / freedom as f64),
+            enlargement: scale,
+            within_one_percent: true,
+            readings: all.readings(&lattice, strengths, settings),
+            lattice,
+            twist_strain: all.twist_strain,
+            budget: all.budget,
+        },
+    })
+}
+
+/// What a ruler says of the scanner in a frame.
+struct Scanner {
+    /// What the scanner shows over what it is, along the fast axis: drift does not touch it.
+    fast_gain: f64,
+    /// Along the fast and the slow axis, nm/s, if both axes have this gain and stand at a right angle.
+    drift: Option<Vector2<f64>>,
+    /// nm/s.
+    slow_speed: f64,
+}
+
+impl Scanner {
+    fn of(line: &MeasuredLine, ruler: &Ruler) -> Self {
+        let fast = line.geometry.fast_step().normalize();
+        let fast_gain = (ruler.map * fast).norm().recip();
+        let gradient = line
+            .timing
+            .and_then(|timing| line.geometry.time_gradient(&timing));
+        // The map is I − v uᵀ over the gain: see heterostrain::strain::Ruler.
+        let turn = ruler.map * fast * fast_gain;
+        let turn = Matrix2::new(
+            turn.dot(&fast),
+            fast.perp(&turn),
+            -fast.perp(&turn),
+            turn.dot(&fast),
+        );
+        let map = turn * ruler.map * fast_gain;
+        let velocity = |u: Vector2<f64>| (Matrix2::identity() - map) * u / u.norm_squared();
+        Self {
+            fast_gain,
+            drift: gradient.map(velocity),
+            slow_speed: gradient.map_or(f64::NAN, |u| u.norm().recip()),
+        }
+    }
+}
+
+/// Which layer the atoms are of, and the other one where that is open.
+fn layer(atoms: &[Lattice], settings: &Settings) -> Option<(u8, Option<u8>)> {
+    let bilayer = settings.bilayer();
+    let materials = [bilayer.reference, bilayer.stretched];
+    let is_one = |layer: u8| {
+        let material = materials[usize::from(layer) - 1];
+        !atoms.is_empty() && atoms.iter().all(|atoms| is_of(atoms, material))
+    };
+    let told = |layer: u8| is_one(layer).then_some((layer, None));
+    match settings.ruler {
+        RulerLayer::Off => return None,
+        RulerLayer::First => return told(1),
+        RulerLayer::Second => return told(2),
+        RulerLayer::Auto if bilayer.is_equal() || !is_one(1) => return told(2),
+        RulerLayer::Auto if !is_one(2) => return told(1),
+        RulerLayer::Auto => {}
+    }
+    // χ² of the size by the calibration of the scanner.
+    let off = |layer: u8| {
+        let free = materials[usize::from(layer) - 1]
+            .atomic_pair()
+            .determinant();
+        let sizes = atoms
+            .iter()
+            .map(|atoms| (atoms.basis.determinant() / free).abs().sqrt() - 1.0);
+        let sigma = (settings.calibration.gain_percent / 100.0).max(1e-3);
+        (sizes.sum::<f64>() / atoms.len() as f64 / sigma).powi(2)
+    };
+    let (layer, other) = if off(2) - off(1) < ODDS {
+        (2, 1)
+    } else {
+        (1, 2)
+    };
+    Some((layer, (off(other) - off(layer) < DECIDED).then_some(other)))
+}
