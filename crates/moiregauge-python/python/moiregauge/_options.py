@@ -13,6 +13,7 @@ FrameOrder = Literal["up", "down", "alternating-up", "alternating-down"]
 Grouping = Literal["auto", "folder", "file"]
 Lines = Literal["trace", "retrace", "both"]
 Method = Literal["autocorrelation", "fourier", "lattice", "paper"]
+RulerLayer = Literal["auto", "off", "1", "2"]
 StrainConvention = Literal["real-space", "k-space"]
 TwistSense = Literal["positive", "negative"]
 
@@ -64,6 +65,10 @@ class Options(TypedDict, total=False):
     moires: How many moirés every image shows; each is fitted after the others are subtracted.
     overlap: Use only the region that all scans of a set have in common.
     rotation_deg: Angle by which the fast axis is turned against x, degrees, counter-clockwise.
+    ruler: The layer whose atoms the frames show beside the moiré and which measures them in place of the
+        scanner.
+    ruler_strain_percent: Standard deviation of the strain that this layer itself may have, along x and along
+        y, per cent, for the uncertainty budget.
     scanner: A measured calibration of the scanner: positions are corrected with it, and its covariance takes
         the place of `calibration` in the budget.
     seed: Seed of all random numbers.
@@ -110,6 +115,8 @@ class Options(TypedDict, total=False):
     moires: int
     overlap: bool
     rotation_deg: float
+    ruler: RulerLayer
+    ruler_strain_percent: float
     scanner: str | Mapping[str, Any]
     seed: int
     sensor_unit: str

@@ -78,6 +78,8 @@ __all__ = [
     "RegistryResult",
     "ResidualResult",
     "Results",
+    "RulerLayer",
+    "RulerResult",
     "Run",
     "ScanResult",
     "ScanTwistStrain",
@@ -132,6 +134,9 @@ Lines = Literal["trace", "retrace", "both"]
 
 Method = Literal["autocorrelation", "fourier", "lattice", "paper"]
 """How the lattice vectors are measured in an image."""
+
+RulerLayer = Literal["auto", "off", "1", "2"]
+"""Which layer's atoms are the ruler of a frame that shows them beside the moiré."""
 
 StrainConvention = Literal["real-space", "k-space"]
 """Which form of the strain equation is meant (physics of the two: they differ at second order)."""
@@ -225,6 +230,8 @@ class BudgetColumn(Document):
     """Whether the nominal size spans N pixels or N − 1; left out where sensors or the format tell."""
     poisson_ratio: float | None
     """Poisson ratio of the layers."""
+    ruler_strain: float | None = None
+    """Strain of the layer whose atoms are the ruler; left out where the scanner is."""
     sensor: float | None
     """Noise of the position sensors."""
     strained_layer: float | None
@@ -1298,6 +1305,26 @@ class Results(ResultsBase):
 
 
 @dataclass(frozen=True, kw_only=True)
+class RulerResult(Document):
+    """A set measured by the atoms of one of its layers."""
+
+    drift_nm_per_min: tuple[Estimate, Estimate] | None
+    """Drift to the right and up that goes with it, if both axes have this gain and stand at a right angle,
+    nm/min; `null` without timing.
+    """
+    fast_gain: Estimate
+    """What the scanner shows over what it is, along the fast axis."""
+    layer: int
+    """Layer 1, the reference, or layer 2."""
+    lines: int
+    """Traces and retraces that show its atoms."""
+    mean: MeanResult
+    """Twist and strain of layer 2 against layer 1, free of drift and of the calibration of the scanner."""
+    used: bool
+    """Whether `mean` of the set is by the atoms."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class Run(Document):
     """A run of the program: what a repetition needs beside the files themselves."""
 
@@ -1440,6 +1467,8 @@ class SetLatticeResult(Document):
 class SetResult(Document):
     """Scans of one slow axis, line rate, size and channel."""
 
+    by_scanner: MeanResult | None = None
+    """`mean` by the scanner alone, where that is by the atoms of a layer and the scanner alone gives one."""
     channel: str
     """The analysed channel."""
     checks: ChecksResult | None
@@ -1462,6 +1491,8 @@ class SetResult(Document):
     """All scans together, corrected for drift, or with an assumed drift in the errors."""
     name: str
     """Name for people, unique in the document."""
+    ruler: RulerResult | None = None
+    """By the atoms of a layer that the scans show beside the moiré; left out where they do not."""
     scans: tuple[ScanResult, ...]
     """The scans in order of time."""
     slow_axis: str
@@ -1542,6 +1573,13 @@ class Settings(Document):
     """How many moirés every image shows; each is fitted after the others are subtracted."""
     overlap: bool
     """Use only the region that all scans of a set have in common."""
+    ruler: RulerLayer
+    """The layer whose atoms the frames show beside the moiré and which measures them in place of the scanner.
+    """
+    ruler_strain_percent: float
+    """Standard deviation of the strain that this layer itself may have, along x and along y, per cent, for
+    the uncertainty budget.
+    """
     scanner: ScannerCalibration | None = None
     """A measured calibration of the scanner: positions are corrected with it, and its covariance takes the
     place of `calibration` in the budget.
@@ -1905,6 +1943,7 @@ decoded_by(
             "lattice_constant": float,
             "pitch_convention": float,
             "poisson_ratio": float,
+            "ruler_strain": float,
             "sensor": float,
             "strained_layer": float,
             "total": float,
@@ -2249,6 +2288,11 @@ decoded_by(
             "sets": several(SetResult.from_dict),
             "settings": Settings.from_dict,
         },
+        RulerResult: {
+            "drift_nm_per_min": several(Estimate.from_dict, 2),
+            "fast_gain": Estimate.from_dict,
+            "mean": MeanResult.from_dict,
+        },
         Run: {
             "arguments": several(None),
             "atomic": AtomicImages.from_dict,
@@ -2300,12 +2344,14 @@ decoded_by(
             "wavelength_scatter_nm": several(float, 3),
         },
         SetResult: {
+            "by_scanner": MeanResult.from_dict,
             "checks": ChecksResult.from_dict,
             "drift": DriftResult.from_dict,
             "forward_backward": TwistStrainResult.from_dict,
             "lattice": SetLatticeResult.from_dict,
             "line_rate_hz": float,
             "mean": MeanResult.from_dict,
+            "ruler": RulerResult.from_dict,
             "scans": several(ScanResult.from_dict),
             "uncorrected": MeanResult.from_dict,
         },
@@ -2322,6 +2368,7 @@ decoded_by(
             "material": Material.from_dict,
             "moire_layers": several(MoireLayers.from_dict),
             "moire_waves": several(several(float, 2), 2),
+            "ruler_strain_percent": float,
             "scanner": ScannerCalibration.from_dict,
             "substrate": Material.from_dict,
         },
