@@ -20,6 +20,7 @@ mod overlap;
 mod partly_covered;
 mod plan;
 mod real_samples;
+mod ruler;
 mod sample_classes;
 mod sensor_lag;
 mod several_lattices;

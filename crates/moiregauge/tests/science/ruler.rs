@@ -1,0 +1,143 @@
+//! Frames that show the atoms of a layer beside the moiré: twist and strain free of drift and calibration.
+
+use std::f64::consts::{FRAC_PI_3, TAU};
+
+use moiregauge::campaign::{Analysis, analyse};
+use moiregauge::meaning::Source;
+use moiregauge::scan::measure_scan;
+use moiregauge::settings::{RulerLayer, Settings};
+use nalgebra::{Matrix2, Rotation2, Vector2};
+use spmfile::{FrameDirection, Scan, Span};
+
+const PIXELS: usize = 256;
+/// nm.
+const SIZE: f64 = 18.0;
+/// Graphene.
+const CONSTANT: f64 = 0.246;
+const TWIST: f64 = 0.055;
+/// Of layer 2 against layer 1: a mean of 0.15 % and a shear part of 0.11 %.
+const STRAIN: Matrix2<f64> = Matrix2::new(1.002, 0.0005, 0.0005, 1.001);
+
+/// Three waves of a layer (rad/nm) that was deformed: they meet, the third is the second less the first.
+fn waves(deformation: &Matrix2<f64>) -> [Vector2<f64>; 3] {
+    let length = 2.0 * TAU / (3f64.sqrt() * CONSTANT);
+    let back = deformation.try_inverse().unwrap().transpose();
+    let of = |angle: f64| back * Vector2::new(angle.cos(), angle.sin()) * length;
+    let [a, b] = [of(0.0), of(FRAC_PI_3)];
+    [a, b, b - a]
+}
+
+/// A frame of a scanner that shows `frame` times what is there: moiré of amplitude 1, atoms of layer 2 of amplitude `atoms`, changed by the
+/// moiré, and some noise.
+fn frame(frame: &Matrix2<f64>, atoms: f64, seed: u64) -> Scan {
+    let first = Rotation2::new(0.4).into_inner();
+    let second = Rotation2::new(TWIST).into_inner() * STRAIN * first;
+    let [one, two] = [waves(&first), waves(&second)];
+    let inverse = frame.try_inverse().unwrap();
+    let pitch = SIZE / PIXELS as f64;
+    let mut state = seed;
+    let mut values = Vec::new();
+    // The top row comes first.
+    for row in (0..PIXELS).rev() {
+        for column in 0..PIXELS {
+            let at = inverse * Vector2::new(column as f64, row as f64) * pitch;
+            let sum = |of: &dyn Fn(usize) -> Vector2<f64>| {
+                (0..3).map(|i| of(i).dot(&at).cos()).sum::<f64>()
+            };
+            let moire = sum(&|i| two[i] - one[i]);
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            let noise = (state >> 40) as f64 / (1u64 << 24) as f64 - 0.5;
+            values.push(moire + atoms * (1.0 + 0.2 * moire) * sum(&|i| two[i]) + noise);
+        }
+    }
+    let mut bytes = b"\x93NUMPY\x01\x00\x76\x00".to_vec();
+    let head =
+        format!("{{'descr': '<f8', 'fortran_order': False, 'shape': ({PIXELS}, {PIXELS}), }}");
+    bytes.extend(format!("{head:<117}\n").bytes());
+    bytes.extend(values.iter().flat_map(|v| v.to_le_bytes()));
+    let mut scan = spmfile::read(&bytes).unwrap();
+    scan.size_nm = Some([SIZE; 2]);
+    scan.line_rate_hz = Some(10.0);
+    scan.frame_direction = Some(FrameDirection::Up);
+    for channel in &mut scan.channels {
+        (channel.width_nm, channel.height_nm) = (Some(SIZE), Some(SIZE));
+        channel.span = Span::PixelEdges;
+    }
+    scan
+}
+
+fn analysed(scans: &[Scan], ruler: RulerLayer) -> Analysis {
+    let settings = Settings {
+        drift_draws: 0,
+        strain_draws: 0,
+        ruler,
+        ..Settings::default()
+    };
+    let named = scans.iter().enumerate();
+    let measured =
+        named.map(|(i, scan)| measure_scan(&format!("scan.{i}"), scan, &settings, None).unwrap());
+    analyse(measured.collect(), &settings)
+}
+
+/// Gain, skew and drift of a scanner that is off by per cents.
+fn scanner(gain: f64) -> Matrix2<f64> {
+    Matrix2::new(gain, 0.012, 0.004, 0.985 * gain)
+}
+
+/// Whatever the scanner does, twist and mean strain are those of the layers within their errors, which are some ten thousandths.
+#[test]
+fn one_frame_gives_twist_and_mean_strain() {
+    let mean_strain = 0.0015;
+    for (seed, gain) in [(1, 1.0), (2, 1.03), (3, 0.97)] {
+        let found = analysed(&[frame(&scanner(gain), 0.5, seed)], RulerLayer::Auto);
+        let set = &found.sets[0];
+        let ruler = set.ruler.as_ref().unwrap();
+        assert!(ruler.used && ruler.layer == 2);
+        let mean = set.mean.as_ref().unwrap();
+        let twist = mean.twist();
+        let pull = (twist.value - TWIST) / twist.total;
+        assert!(pull.abs() < 4.0 && twist.total < 1e-3 * TWIST, "{twist:?}");
+        let tensor = mean.readings.tensor.as_ref().unwrap().in_all();
+        let strain = tensor.mean();
+        assert!(
+            (strain.value - mean_strain).abs() < 4.0 * strain.sigma && strain.sigma < 1e-4,
+            "{strain:?}"
+        );
+        assert!(
+            (ruler.fast_gain.value / (gain * 1.0015) - 1.0).abs() < 2e-3 + 0.0012,
+            "{:?}",
+            ruler.fast_gain
+        );
+        // The other row is of the ruler; those of the scanner are none.
+        assert!(mean.budget.of(Source::RulerStrain).wavelengths[0] > 0.0);
+        assert_eq!(mean.budget.of(Source::Gain).covariance[(0, 0)], 0.0);
+        // The scanner alone is there, and knows far less.
+        let alone = set.by_scanner.as_ref().unwrap();
+        assert!(alone.twist().total > 10.0 * twist.total);
+    }
+}
+
+/// Frames through scanners that differ are of one lattice in the ruler.
+#[test]
+fn frames_agree_in_the_ruler() {
+    let scans = [1.0, 1.004].map(|gain| frame(&scanner(gain), 0.5, (1000.0 * gain) as u64));
+    let found = analysed(&scans, RulerLayer::Auto);
+    let mean = found.sets[0].mean.as_ref().unwrap();
+    assert_eq!(mean.budget.ruler, Some(2));
+    assert!(mean.chi2_per_dof.unwrap() < 4.0, "{:?}", mean.chi2_per_dof);
+    let all = found.combined.as_ref().unwrap();
+    assert_eq!(all.twist_strain.twist, mean.twist_strain.twist);
+}
+
+/// No ruler without atoms, none where it is switched off, and the numbers of the moiré alone are then those of the scanner.
+#[test]
+fn there_is_no_ruler_without_atoms() {
+    let scanner = scanner(1.0);
+    let without = analysed(&[frame(&scanner, 0.0, 5)], RulerLayer::Auto);
+    assert!(without.sets[0].ruler.is_none());
+    let off = analysed(&[frame(&scanner, 0.0, 5)], RulerLayer::Off);
+    let twist = |found: &Analysis| found.sets[0].mean.as_ref().unwrap().twist().value;
+    assert_eq!(twist(&without), twist(&off));
+}
