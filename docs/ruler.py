@@ -123,29 +123,26 @@ def run(program, first, last, written, *rest):
 
 def table(*files):
     lines = [json.loads(line) for file in files for line in open(file)]
-    print("| kind | frames | ruler used | no twist | median error (%) | largest (%) | median total (%) | rms error / total | sign of the mean strain right |")
-    print("| --- | --- | --- | --- | --- | --- | --- | --- | --- |")
+    print("| kind | frames | by the atoms | by the scanner | no twist | median error (%) | largest (%) | median total (%) | rms error / total | sign of the mean strain | by the scanner: rms error / total |")
+    print("| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |")
     for kind in dict.fromkeys(line["kind"] for line in lines):
-        of, used, errors, totals, signs = [l for l in lines if l["kind"] == kind], 0, [], [], []
+        of, found, signs = [l for l in lines if l["kind"] == kind], {True: [], False: []}, []
         for line in of:
-            sets = line.get("sets") or [{}]
-            mean = sets[0].get("mean")
+            of_set = (line.get("sets") or [{}])[0]
+            mean = of_set.get("mean")
             if mean is None or mean.get("twist_deg") is None:
                 continue
-            used += sets[0].get("ruler") is not None and sets[0]["ruler"].get("used", False)
-            value, total = mean["twist_deg"]["value"], mean["twist_deg"]["sigma_total"]
-            errors.append((value - line["truth"]["twist"]) / line["truth"]["twist"])
-            totals.append(total / line["truth"]["twist"])
-            tensor = (mean.get("readings") or {}).get("strain_tensor")
-            if tensor and abs(line["truth"]["mean"]) > 0.03:
-                of_tensor = tensor["mean_strain_percent"]["value"]
-                signs.append((of_tensor > 0) == (line["truth"]["mean"] > 0))
-        if not errors:
-            print(f"| {kind} | {len(of)} | {used} | {len(of)} | – | – | – | – | – |")
-            continue
-        e, t = 100 * numpy.abs(errors), 100 * numpy.array(totals, float)
-        rms = math.sqrt(numpy.mean((e / t) ** 2))
-        print(f"| {kind} | {len(of)} | {used} | {len(of) - len(errors)} | {numpy.median(e):.3f} | {e.max():.3f} | {numpy.median(t):.3f} | {rms:.2f} | {sum(signs)} of {len(signs)} |")
+            ruled = (of_set.get("ruler") or {}).get("used", False)
+            truth, twist = line["truth"]["twist"], mean["twist_deg"]
+            found[ruled].append([100 * abs(twist["value"] - truth) / truth, 100 * twist["sigma_total"] / truth])
+            if ruled and abs(line["truth"]["mean"]) > 0.03:
+                signs.append((mean["readings"]["strain_tensor"]["mean_strain_percent"]["value"] > 0) == (line["truth"]["mean"] > 0))
+        rms = lambda some: f"{math.sqrt(numpy.mean([(e / t) ** 2 for e, t in some])):.2f}" if some else "–"
+        by = found[True]
+        e, t = numpy.array(by).T if by else (numpy.zeros(1), numpy.zeros(1))
+        numbers = f"{numpy.median(e):.3f} | {e.max():.3f} | {numpy.median(t):.3f} | {rms(by)} | {sum(signs)} of {len(signs)}" if by else "– | – | – | – | –"
+        none = len(of) - len(by) - len(found[False])
+        print(f"| {kind} | {len(of)} | {len(by)} | {len(found[False])} | {none} | {numbers} | {rms(found[False])} |")
 
 if __name__ == "__main__":
     table(*sys.argv[2:]) if sys.argv[1] == "table" else run(*sys.argv[1:])

@@ -18,7 +18,7 @@ const GROUPS: [(&str, &[&str]); 5] = [
 ];
 
 /// The options that `-h` shows, of commands that have more than a screen of them.
-const SHOWN: [(&str, &[&str]); 8] = [
+const SHOWN: [(&str, &[&str]); 9] = [
     (
         "analyze",
         &[
@@ -83,6 +83,21 @@ const SHOWN: [(&str, &[&str]); 8] = [
             "channel",
             "layers",
             "calibration",
+        ],
+    ),
+    (
+        "plan",
+        &[
+            "twist_sigma",
+            "strain_sigma",
+            "drift_sigma",
+            "config",
+            "like",
+            "max_size",
+            "max_rate",
+            "calibration",
+            "out",
+            "force",
         ],
     ),
     (

@@ -105,7 +105,7 @@ fn pictures_have_the_width_of_journals() {
 #[test]
 fn every_figure_of_a_good_set_is_drawn_and_none_of_a_poor_one_fails() {
     let all = figures(&common::analysis(), ColorMap::Viridis);
-    assert_eq!(all.len(), 3 + 3 * 15);
+    assert_eq!(all.len(), 3 + 3 * 16);
     for figure in &all {
         let drawn = figure.drawing.is_ok();
         assert_eq!(

@@ -97,7 +97,7 @@ pub(crate) fn combine(
     })
 }
 
-/// The mean of the sets that the atoms of a layer measure: what the scanner alone says of others is far worse.
+/// The mean of the sets that the atoms of a layer measure: the scanner alone measures others far worse.
 fn by_rulers(
     ruled: &[&Ruled],
     sets: &[SetAnalysis],

@@ -4,11 +4,7 @@ use std::fmt;
 
 use heterostrain::Estimate;
 
-use crate::campaign::analysis::SetMean;
-use crate::campaign::set::assumed::AssumedDrift;
-use crate::campaign::set::bare::SetLattice;
 use crate::caveat::explained::explain;
-use crate::meaning::budget::Source;
 use crate::numbers::words::{plus_minus, two_digits};
 
 /// Drift and the clock.
@@ -95,6 +91,16 @@ pub enum DriftDoubt {
     },
 }
 
+/// A drift that nothing tells: none, with the error of a prior.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct AssumedDrift {
+    /// Standard deviation of each component, nm/s.
+    pub sigma: f64,
+    /// Whether the line rate was assumed, too.
+    pub no_rate: bool,
+}
+
 /// The part that an assumed drift has in the total error of a result.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
@@ -109,32 +115,6 @@ pub struct DriftShare {
     pub total: f64,
     /// What it would be without the drift.
     pub without: f64,
-}
-
-impl DriftShare {
-    /// In the twist of a mean (°).
-    pub(crate) fn of_mean(mean: &SetMean) -> Option<Self> {
-        let degrees = |variance: f64| variance.sqrt().to_degrees();
-        let without = mean.budget.sum(|source| source != Source::Drift);
-        Some(Self {
-            assumed: mean.assumed?,
-            of: "twist",
-            unit: "°",
-            total: degrees(mean.budget.total().covariance[(0, 0)]),
-            without: degrees(without.covariance[(0, 0)]),
-        })
-    }
-
-    /// In the first length of a lattice (nm).
-    pub(crate) fn of_lattice(found: &SetLattice) -> Option<Self> {
-        Some(Self {
-            assumed: found.assumed?,
-            of: "length of L₁",
-            unit: " nm",
-            total: found.wavelengths[0].total,
-            without: found.without_drift,
-        })
-    }
 }
 
 impl fmt::Display for DriftShare {

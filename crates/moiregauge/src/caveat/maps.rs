@@ -198,7 +198,7 @@ explain! { MapDoubt:
         "The twist varies over the map by no more than bends of the grid can make: of the position sensors, or of the scanner where \
          there are none. The settings say how much these may bend."
         "Do not read the variation as strain. Record the position sensors, turn the scan by 90°, or measure how much the sensors bend and \
-         give it with --sensor-bend or --scanner-bend."
+         change the setting."
     ContrastReversed "contrast-reversed" Note
         "One image has the opposite contrast of those before it, as in the error signals of trace and retrace. A shift \
          of half a period was taken for reversed contrast."

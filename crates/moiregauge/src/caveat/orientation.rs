@@ -157,7 +157,7 @@ explain! { OrientationDoubt:
     RulerLayer "ruler-layer-open" Warning
         "The atoms beside the moiré may be those of either layer. The likelier one was taken: the upper layer, unless their size says \
          the other one."
-        "Name the layer whose atoms the image shows with `--ruler 1` or `--ruler 2`."
+        "Say which layer's atoms the image shows."
     SenseOpen "twist-sense-open" Warning
         "The two layers are equal, and the orientation of one of them does not determine the sense of the twist. Both \
          readings fit equally well and have different strain tensors."

@@ -173,16 +173,16 @@ impl Budget {
         }
     }
 
-    /// Where the atoms of a layer are the ruler: from what every source contributes, in the order of [`Source::ALL`].
+    /// Where the atoms of a layer are the ruler: from what every source contributes.
     pub(crate) fn of_ruler(
         layer: u8,
-        contributions: [Contribution; 13],
-        statistical: Statistical,
+        contribution: impl Fn(Source) -> Contribution,
+        statistical: &Statistical,
     ) -> Self {
         Self {
-            contributions,
+            contributions: Source::ALL.map(contribution),
             grid: GridErrors::default(),
-            statistical,
+            statistical: *statistical,
             drift_assumed: false,
             ruler: Some(layer),
         }

@@ -66,7 +66,7 @@ impl ByRuler {
         let contribution = |source| context.contribution(source, &best, &twist_strain);
         let statistical = Statistical::without_drift(&lattice.covariance, &Matrix4::zeros());
         Some(Self {
-            budget: Budget::of_ruler(layer, Source::ALL.map(contribution), statistical),
+            budget: Budget::of_ruler(layer, contribution, &statistical),
             twist_strain,
             tensor,
         })
@@ -191,7 +191,7 @@ impl Context<'_> {
             }
             // The fast axis is what angles are counted from: axes that miss a right angle, or differ in gain, turn it.
             Source::Mismatch => {
-                covariance[(1, 1)] = (self.settings.calibration.mismatch_percent / 200.0).powi(2)
+                covariance[(1, 1)] = (self.settings.calibration.mismatch_percent / 200.0).powi(2);
             }
             Source::Orthogonality => {
                 covariance[(1, 1)] =

@@ -88,9 +88,12 @@ pub fn measure_moires(
     let told = &settings.by_hand;
     let find = |image: Image, geometry: &Geometry| match settings.moires {
         0 | 1 => {
-            let find = |image: Image, geometry: &Geometry| match told.is_nothing() {
-                true => measure_own(image, geometry, background, method),
-                false => measure_by_hand(&image, geometry, background, method, meant(told)),
+            let find = |image: Image, geometry: &Geometry| {
+                if told.is_nothing() {
+                    measure_own(image, geometry, background, method)
+                } else {
+                    measure_by_hand(&image, geometry, background, method, meant(told))
+                }
             };
             let mut layers = settings.ruler_layers();
             layers.retain(|layer| atoms::may_show(geometry, layer));

@@ -41,7 +41,7 @@ pub enum RulerLayer {
     #[default]
     #[serde(rename = "auto")]
     Auto,
-    /// None: the scanner alone.
+    /// None: the scanner measures the moiré.
     #[serde(rename = "off")]
     Off,
     /// Layer 1, the reference.
@@ -244,18 +244,19 @@ impl Settings {
         }
     }
 
-    /// The layers whose atoms are looked for beside the moiré: the upper one first, which most images show.
+    /// The layers whose atoms are looked for beside the moiré, which they hide: the upper one first, which most images show.
     pub fn ruler_layers(&self) -> Vec<&Material> {
         let layers = self.bilayer();
         let reads_it =
             self.method == Method::Lattice && self.strain_convention == StrainConvention::RealSpace;
+        if !reads_it || self.moires > 1 {
+            return Vec::new();
+        }
         match self.ruler {
-            _ if !reads_it || self.moires > 1 => Vec::new(),
-            RulerLayer::Off => Vec::new(),
             RulerLayer::First => vec![layers.reference],
             RulerLayer::Second => vec![layers.stretched],
-            RulerLayer::Auto if layers.is_equal() => vec![layers.stretched],
-            RulerLayer::Auto => vec![layers.stretched, layers.reference],
+            _ if layers.is_equal() => vec![layers.stretched],
+            _ => vec![layers.stretched, layers.reference],
         }
     }
 

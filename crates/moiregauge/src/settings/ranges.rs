@@ -46,6 +46,7 @@ impl Settings {
                 0.0,
                 MOST_DRAWS as f64,
             ),
+            ("ruler_strain_percent", self.ruler_strain_percent, 0.0, 10.0),
             (
                 "drift_prior_nm_per_min",
                 self.drift_prior_nm_per_min,

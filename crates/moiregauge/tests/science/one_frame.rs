@@ -49,7 +49,7 @@ fn message(found: &Analysis, code: &str) -> String {
     all.next().unwrap().message()
 }
 
-/// A vector R of a frame whose lines advance by V along y is longer by D·R/|R| × R_y/V: σ_D |R_y|/V for a drift of σ_D each way. The
+/// A vector R of a frame whose lines advance by V along y is longer by `D·R/|R| × R_y/V`: `σ_D |R_y|/V` for a drift of `σ_D` each way. The
 /// prior is no more than V/4.
 #[test]
 fn one_frame_has_a_total() {

@@ -163,8 +163,10 @@ fn scanners_show_the_sample_where_they_are() {
                 let crept = (along * 0.007 + across * 0.011) * (1.0 + (time - start) / 2.0).log10();
                 // The time since the tip turned: the way so far, and the overscan before it.
                 let rho = raster.rounding;
-                let since =
-                    ((1.0 + way * u) / 2.0 + rho / 2.0) / (1.0 + rho) / 2.0 / raster.line_rate_hz;
+                let since = (f64::midpoint(1.0, way * u) + rho / 2.0)
+                    / (1.0 + rho)
+                    / 2.0
+                    / raster.line_rate_hz;
                 let swing = (-since / 0.006).exp() * (2.0 * PI * 90.0 * since).cos();
                 let swung = along * (way * 0.004 * swing);
                 let feature = r + bowed + crept + swung - origin;

@@ -11,9 +11,14 @@
 
 use nalgebra::{Matrix2, Vector2};
 
+use crate::campaign::analysis::SetMean;
+use crate::campaign::set::bare::SetLattice;
 use crate::campaign::set::drift::at_velocity;
 use crate::campaign::set::solved::Solved;
+pub use crate::caveat::drifting::AssumedDrift;
+use crate::caveat::drifting::DriftShare;
 use crate::drift::linear::Observation;
+use crate::meaning::budget::Source;
 use crate::scan::measured::{MeasuredLine, MeasuredScan};
 use crate::settings::knobs::Settings;
 
@@ -25,14 +30,30 @@ const MOST: f64 = 0.25;
 /// nm/min → nm/s.
 const PER_MINUTE: f64 = 1.0 / 60.0;
 
-/// A drift that nothing tells: none, with the error of a prior.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[non_exhaustive]
-pub struct AssumedDrift {
-    /// Standard deviation of each component, nm/s.
-    pub sigma: f64,
-    /// Whether the line rate was assumed, too.
-    pub no_rate: bool,
+impl DriftShare {
+    /// In the twist of a mean (°).
+    pub(crate) fn of_mean(mean: &SetMean) -> Option<Self> {
+        let degrees = |variance: f64| variance.sqrt().to_degrees();
+        let without = mean.budget.sum(|source| source != Source::Drift);
+        Some(Self {
+            assumed: mean.assumed?,
+            of: "twist",
+            unit: "°",
+            total: degrees(mean.budget.total().covariance[(0, 0)]),
+            without: degrees(without.covariance[(0, 0)]),
+        })
+    }
+
+    /// In the first length of a lattice (nm).
+    pub(crate) fn of_lattice(found: &SetLattice) -> Option<Self> {
+        Some(Self {
+            assumed: found.assumed?,
+            of: "length of L₁",
+            unit: " nm",
+            total: found.wavelengths[0].total,
+            without: found.without_drift,
+        })
+    }
 }
 
 /// The lattice of the scans at no drift with the error of the prior.
