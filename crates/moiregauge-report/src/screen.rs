@@ -58,9 +58,10 @@ fn set_summary(text: &mut String, set: &SetAnalysis, settings: &Settings) {
             n => format!(", {n} more not used"),
         }
     );
+    let ruled = set.ruler.as_ref().is_some_and(|ruler| ruler.used);
     if let Some(drift) = &set.drift {
         drift_line(text, drift, settings);
-    } else {
+    } else if !ruled {
         let alone = || set.lattice.as_ref()?.assumed;
         let assumed = set.mean.as_ref().map_or_else(alone, |mean| mean.assumed);
         let words = assumed.map_or_else(String::new, |drift| {
@@ -106,7 +107,7 @@ fn ruler_lines(text: &mut String, ruler: &Ruled, by_scanner: Option<&SetMean>) {
     );
     let _ = writeln!(
         text,
-        "  ruler         atoms of layer {}{}; they show the fast axis of the scanner {} % too long",
+        "  ruler         atoms of layer {}{}; lengths along the fast axis of the scanner are off by {} %",
         ruler.layer,
         if ruler.used { "" } else { ", not used" },
         plus_minus(off)

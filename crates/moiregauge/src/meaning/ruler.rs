@@ -64,7 +64,11 @@ impl ByRuler {
             sense_contradicted,
         };
         let contribution = |source| context.contribution(source, &best, &twist_strain);
-        let statistical = Statistical::without_drift(&lattice.covariance, &Matrix4::zeros());
+        let statistical = Statistical {
+            image: lattice.covariance,
+            drift: Matrix4::zeros(),
+            sensor: Matrix4::zeros(),
+        };
         Some(Self {
             budget: Budget::of_ruler(layer, contribution, &statistical),
             twist_strain,
