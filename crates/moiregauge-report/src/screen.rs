@@ -99,7 +99,7 @@ fn set_summary(text: &mut String, set: &SetAnalysis, settings: &Settings) {
     text.push('\n');
 }
 
-/// What the atoms of a layer say of the scanner, and what the scanner says without them.
+/// The scanner by the atoms of a layer, and the twist without them.
 fn ruler_lines(text: &mut String, ruler: &Ruled, by_scanner: Option<&SetMean>) {
     let off = Estimate::new(
         100.0 * (ruler.fast_gain.value - 1.0),

@@ -110,7 +110,8 @@ fn every_figure_of_a_good_set_is_drawn_and_none_of_a_poor_one_fails() {
         let drawn = figure.drawing.is_ok();
         assert_eq!(
             drawn,
-            figure.set != Some(2),
+            // The grid is that of the sensors where they depart from a plane, which those of these sets do not.
+            figure.set != Some(2) && !figure.name.ends_with("curved-grid"),
             "{}: {:?}",
             figure.name,
             figure.drawing.as_ref().err()

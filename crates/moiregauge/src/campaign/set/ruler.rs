@@ -132,7 +132,7 @@ pub(crate) fn ruled(
     })
 }
 
-/// What a ruler says of the scanner in a frame.
+/// The scanner in a frame, by a ruler.
 struct Scanner {
     /// What the scanner shows over what it is, along the fast axis: drift does not touch it.
     fast_gain: f64,

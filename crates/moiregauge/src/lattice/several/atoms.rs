@@ -10,6 +10,7 @@ use heterostrain::material::Material;
 use heterostrain::strain::named_like;
 use nalgebra::{Complex, DMatrix, DVector, Matrix2, Vector2};
 
+use crate::explain::evidence::weakest;
 use crate::frame::background::Background;
 use crate::frame::blur::blurred;
 use crate::frame::geometry::Geometry;
@@ -116,8 +117,9 @@ impl Scene<'_> {
         let fine = Image::new(flat.rows, flat.columns, fine.collect());
         let pair = self.strongest(&Spectrum::new(&fine), layer)?;
         let start = Start::near(&fine, self.geometry, self.background, &pair)?;
-        let found = start.stands_out().then(|| start.measure(Method::Lattice));
-        found?.ok()
+        let found = start.measure(Method::Lattice).ok()?;
+        let predicts = weakest(&fine, &found.reciprocal, false);
+        predicts.is_some_and(|least| least > PLAIN).then_some(found)
     }
 
     /// The two strongest waves of a spectrum that are those of a layer, rad per pixel.
