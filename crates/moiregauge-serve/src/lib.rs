@@ -10,7 +10,7 @@
 //! (`roots`).
 //!
 //! # In a browser
-//! Compiled to WebAssembly the same routes answer in memory ([`Alone`]), for a page on the same computer that holds program
+//! Compiled to WebAssembly the same routes answer in memory (`Alone`), for a page on the same computer that holds program
 //! and files itself: there is no address that others could ask, so the layers above are left out (`door`, `host`).
 #![cfg_attr(
     target_family = "wasm",
