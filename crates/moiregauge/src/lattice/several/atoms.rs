@@ -34,12 +34,12 @@ const SHAPE: f64 = 0.1;
 const COARSE: f64 = 0.6;
 /// Pixels per distance of the rows of atoms, at least: two, and some room for the errors of the size.
 const PIXELS: f64 = 2.2;
-/// The waves of atoms predict held-out blocks by so many standard errors, at least: as a lattice that is taken for that alone.
+/// The waves of atoms predict held-out blocks by at least this number of standard errors: as a lattice that is taken for that alone.
 const PLAIN: f64 = 5.0;
-/// So many of the strongest peaks are tried for the atoms: their waves are the strongest where they are plain, but for those of both
+/// This number of the strongest peaks is tried for the atoms: their waves are the strongest where they are plain, but for those of both
 /// layers.
 const PEAKS: usize = 12;
-/// A moiré has at least so many times the period of the atoms: of equal layers, at a twist of 15°.
+/// A moiré has at least this many times the period of the atoms: of equal layers, at a twist of 15°.
 const LARGER: f64 = 3.0;
 /// The moiré that is measured in the end is that which was found at first if its cell differs by less than this share: far less than
 /// that of a cell of twice or half the area.
