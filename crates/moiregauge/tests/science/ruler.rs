@@ -110,7 +110,7 @@ fn one_frame_gives_twist_and_mean_strain() {
             "{:?}",
             ruler.fast_gain
         );
-        // The other row is of the ruler; those of the scanner are none.
+        // The other row is of the ruler; those of the scanner are zero.
         assert!(mean.budget.of(Source::RulerStrain).wavelengths[0] > 0.0);
         assert_eq!(mean.budget.of(Source::Gain).covariance[(0, 0)], 0.0);
         // The scanner alone is there, and knows far less.
