@@ -16,6 +16,7 @@
 
 use heterostrain::lattice::{Lattice, renamings};
 use heterostrain::material::Material;
+use heterostrain::strain::named_like;
 use heterostrain::{ComplexPair, Estimate};
 use nalgebra::{Matrix2, Matrix4, RowVector4, Vector2};
 
@@ -206,24 +207,8 @@ fn about_shape(
 
 /// `F = L U A⁰⁻¹` for the name L U of the lattice that distorts the material's least.
 fn deformation(lattice: &Lattice, atoms: &Matrix2<f64>) -> Option<(Lattice, Matrix2<f64>)> {
-    let inverse = atoms.try_inverse()?;
-    let distortion = |f: &Matrix2<f64>| ComplexPair::from(*f).distortion();
-    // Two rounds reach every name of a pair that is nearly reduced.
-    let mut best = *lattice;
-    for _ in 0..2 {
-        let start = best;
-        for change in renamings(1) {
-            let named = start.relabelled(&change);
-            let f = named.basis * inverse;
-            if f.determinant() > 0.0
-                && distortion(&f) < distortion(&(best.basis * inverse)) * (1.0 - 1e-9)
-            {
-                best = named;
-            }
-        }
-    }
-    let f = best.basis * inverse;
-    (f.determinant() > 0.0).then_some((best, f))
+    let named = named_like(lattice, atoms)?;
+    Some((named, named.basis * atoms.try_inverse()?))
 }
 
 /// Size, distortion and turn of a lattice that is free of drift.

@@ -230,6 +230,7 @@ fn satellites(image: &Image, atoms: &MeasuredLattice, moire: &MeasuredLattice) -
     });
     let amplitudes = gram.lu().solve(&sums)? * Complex::from(2.0);
     let mut values = vec![0.0; image.values.len()];
+    // The first waves are those of the atoms themselves, which stay in the image.
     for (q, c) in waves.iter().zip(amplitudes.iter()).skip(centres.len()) {
         let along: Vec<Complex<f64>> = (0..image.columns)
             .map(|column| Complex::cis(q.x * (column as f64 - middle.x)) * c)
