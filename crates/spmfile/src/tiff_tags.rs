@@ -5,11 +5,14 @@
 //! TIFF 6.0 specification (Adobe, 1992), section 2.
 
 use std::borrow::Cow;
+use std::ops::RangeInclusive;
 
 use crate::cursor::{Cursor, Endian};
 use crate::raster::Encoding;
 use crate::words;
 
+/// Tags of pictures, from the kind of the image to the tables of JPEG; private ones are larger.
+const OF_PICTURES: RangeInclusive<u16> = 254..=347;
 /// More directories than any instrument writes.
 const MOST_DIRECTORIES: usize = 1024;
 
@@ -28,6 +31,8 @@ pub(crate) struct Directory<'a> {
     bytes: &'a [u8],
     pub(crate) endian: Endian,
     entries: Vec<Entry<'a>>,
+    /// The first tag of pictures whose values lie outside the file.
+    pub(crate) outside: Option<u16>,
 }
 
 #[derive(Debug)]
@@ -76,6 +81,7 @@ pub(crate) fn directories(bytes: &[u8]) -> Result<Vec<Directory<'_>>, String> {
         }
         entries_left -= count;
         let mut entries = Vec::with_capacity(count);
+        let mut outside = None;
         for _ in 0..count {
             let (tag, kind, number) = (cursor.u16()?, cursor.u16()?, cursor.u32()?);
             let length = (number as usize).checked_mul(width(kind));
@@ -85,14 +91,19 @@ pub(crate) fn directories(bytes: &[u8]) -> Result<Vec<Directory<'_>>, String> {
                 let mut place = if length <= 4 { inline } else { file.at(target) };
                 place.slice(length, "a tag").ok()
             });
-            if let Some(value) = value {
-                entries.push(Entry { tag, kind, value });
+            match value {
+                Some(value) => entries.push(Entry { tag, kind, value }),
+                None if OF_PICTURES.contains(&tag) && number > 0 && width(kind) > 0 => {
+                    outside = outside.or(Some(tag));
+                }
+                None => {}
             }
         }
         directories.push(Directory {
             bytes,
             endian,
             entries,
+            outside,
         });
         next = cursor.u32()? as usize;
     }

@@ -14,7 +14,7 @@ use super::calibration;
 use super::plane::{Plane, Trouble, turn};
 use crate::cursor::Endian;
 use crate::labels;
-use crate::limits::unpacked_limit;
+use crate::limits::{MOST_GAIN, unpacked_limit};
 use crate::raster::{self, Encoding, Order};
 use crate::scan::Samples;
 use crate::stored::{Failure, Stored, Unpacked};
@@ -86,7 +86,7 @@ fn png_samples(bytes: &[u8]) -> Result<Unpacked, String> {
     // One line as long as all lines together: nothing is turned yet.
     let count = buffer.len() / encoding.width();
     let pixels = raster::decode(buffer, count, encoding, Endian::Big, Order::default());
-    let mut unpacked = luminance(rows, columns, per_pixel, &pixels)?;
+    let mut unpacked = luminance(rows, columns, per_pixel, pixels)?;
     unpacked.samples = turned(unpacked.samples, columns);
     Ok(unpacked)
 }
@@ -139,18 +139,36 @@ fn jpeg_samples(bytes: &[u8]) -> Result<Unpacked, String> {
 
 /// Finds every picture of a TIFF file.
 pub(super) fn tiff(bytes: &[u8]) -> Result<Vec<Plane<'_>>, Trouble> {
-    let pages = directories(bytes).unwrap_or_default();
+    // BigTIFF is left to the library.
+    let big = matches!(bytes, [b'I', b'I', 43, ..] | [b'M', b'M', _, 43, ..]);
+    let pages = if big { Vec::new() } else { directories(bytes)? };
+    // The library takes memory for them before it looks.
+    if let Some(tag) = pages.iter().find_map(|page| page.outside) {
+        return Err(format!(
+            "its tag {tag} has more values than the file, of {} bytes, has room for",
+            bytes.len()
+        )
+        .into());
+    }
     let mut ome = None;
     let mut left = unpacked_limit(bytes.len()) as usize;
+    let mut stored = bytes.len();
     let mut decoder = Decoder::new(Bytes::new(bytes)).map_err(words)?;
     let mut planes = Vec::new();
+    decoder = decoder.with_limits(limits(0, bytes.len()));
     loop {
-        decoder = decoder.with_limits(limits(left, bytes.len()));
         let page = tiff_page(&mut decoder)?;
-        let (index, allowed) = (planes.len(), left);
+        // Headers that promise more than the file can hold take no memory.
+        stored = stored.checked_sub(page.stored).ok_or_else(|| {
+            let found = bytes.len();
+            format!(
+                "its pictures take at least {} bytes more than the {found} of the file",
+                page.stored - stored
+            )
+        })?;
+        let (index, allowed) = (planes.len(), page.decoded.min(left));
         let samples = move || tiff_samples(bytes, index, allowed);
         let mut plane = plane("TIFF", page.rows as u32, page.columns as u32, samples);
-        // BigTIFF is left to the library.
         let tags = pages.get(index);
         let description = tags.and_then(|tags| tags.text(Tag::ImageDescription.to_u16()));
         let description = description
@@ -185,12 +203,14 @@ fn words(error: tiff::TiffError) -> Trouble {
     }
 }
 
-/// Memory that a picture may take of a file of a length.
-fn limits(left: usize, length: usize) -> Limits {
+/// Memory that a picture of some bytes may take of a file of a length.
+fn limits(decoded: usize, length: usize) -> Limits {
+    /// A place or a length of a strip, in the file and in memory.
+    const VALUE: [usize; 2] = [8, 32];
     let mut limits = Limits::default();
-    limits.decoding_buffer_size = left;
-    limits.intermediate_buffer_size = left;
-    limits.ifd_value_size = length.max(1 << 20);
+    limits.decoding_buffer_size = decoded.max(length / VALUE[0] * VALUE[1]);
+    limits.intermediate_buffer_size = length;
+    limits.ifd_value_size = length;
     limits
 }
 
@@ -199,6 +219,9 @@ struct Page {
     rows: usize,
     columns: usize,
     per_pixel: usize,
+    /// Bytes that it is decoded to, and takes in the file at least.
+    decoded: usize,
+    stored: usize,
     /// Whether the first pixel is at the top, and at the left.
     top: bool,
     left: bool,
@@ -207,7 +230,8 @@ struct Page {
 fn tiff_page(decoder: &mut Decoder<Bytes<&[u8]>>) -> Result<Page, Trouble> {
     use tiff::ColorType;
     let (width, height) = decoder.dimensions().map_err(words)?;
-    let per_pixel = match decoder.colortype().map_err(words)? {
+    let colours = decoder.colortype().map_err(words)?;
+    let per_pixel = match colours {
         ColorType::Gray(_) | ColorType::Multiband { num_samples: 1, .. } => 1,
         ColorType::GrayA(_) => 2,
         ColorType::RGB(_) => 3,
@@ -237,10 +261,20 @@ fn tiff_page(decoder: &mut Decoder<Bytes<&[u8]>>) -> Result<Page, Trouble> {
             )));
         }
     };
+    let gain = match tag(Tag::Compression)?.unwrap_or(1) {
+        1 => 1,
+        _ => MOST_GAIN as usize,
+    };
+    let bits = u64::from(colours.bit_depth()) * per_pixel as u64;
+    let line = (u64::from(width) * bits).div_ceil(8);
+    let decoded = line.saturating_mul(height.into());
+    let decoded = usize::try_from(decoded).unwrap_or(usize::MAX);
     Ok(Page {
         rows: height as usize,
         columns: width as usize,
         per_pixel,
+        decoded,
+        stored: decoded / gain,
         top,
         left,
     })
@@ -265,7 +299,7 @@ fn tiff_samples(bytes: &[u8], index: usize, allowed: usize) -> Result<Unpacked, 
         DecodingResult::F64(v) => Samples::F64(v),
     };
     let columns = page.columns;
-    let mut unpacked = luminance(page.rows, columns, page.per_pixel, &pixels)?;
+    let mut unpacked = luminance(page.rows, columns, page.per_pixel, pixels)?;
     if page.top {
         unpacked.samples = turned(unpacked.samples, columns);
     }
@@ -299,7 +333,7 @@ fn luminance(
     rows: usize,
     columns: usize,
     per_pixel: usize,
-    pixels: &Samples,
+    pixels: Samples,
 ) -> Result<Unpacked, String> {
     let count = rows.saturating_mul(columns);
     let expected = count.saturating_mul(per_pixel);
@@ -312,7 +346,7 @@ fn luminance(
     macro_rules! each {
         ($($kind:ident),*) => {
             match pixels {
-                $(Samples::$kind(v) if per_pixel == 1 => (Samples::$kind(v.clone()), false),)*
+                $(Samples::$kind(v) if per_pixel == 1 => (Samples::$kind(v), false),)*
                 $(Samples::$kind(v) => {
                     let pixels = v.chunks_exact(per_pixel);
                     if per_pixel < 3 || pixels.clone().all(|p| p[0] == p[1] && p[1] == p[2]) {

@@ -64,7 +64,9 @@ pub(super) fn open(bytes: &[u8]) -> Result<(Told, Plane<'_>), ReadError> {
 
 /// The numbers, the bottom line first.
 fn values(text: &str, table: &Table) -> Result<Vec<f64>, String> {
-    let mut values = Vec::new();
+    // Each number and each separator is a byte at least.
+    let most = table.rows.saturating_mul(table.columns);
+    let mut values = Vec::with_capacity(most.min(text.len()));
     for (number, line) in lines(text).skip(table.labels) {
         let before = values.len();
         for field in fields(line, table.separator).skip(table.index) {

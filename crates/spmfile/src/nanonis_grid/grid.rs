@@ -8,9 +8,8 @@ use crate::whole::MOST_CHANNELS;
 
 /// Width of a number.
 const WIDTH: usize = 4;
-/// Missing points become NaN as long as all images take at most this multiple of the bytes of the file, or this many.
-const MOST_GAIN: usize = 8;
-const ALWAYS_ALLOWED: usize = 128 << 10;
+/// Missing points become NaN as long as all images take at most this multiple of the bytes of the file.
+const MOST_GAIN: usize = 3;
 
 /// The points of a grid.
 pub(super) struct Grid<'a> {
@@ -99,7 +98,7 @@ impl<'a> Grid<'a> {
         }
         let mut kept = rows;
         if recorded < announced {
-            if whole > MOST_GAIN.saturating_mul(file).max(ALWAYS_ALLOWED) {
+            if whole > MOST_GAIN.saturating_mul(file) {
                 kept = lines;
             }
             let inside = if data.len().is_multiple_of(stride) {

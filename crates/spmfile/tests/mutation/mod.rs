@@ -52,15 +52,17 @@ pub(crate) struct Sample {
     hot: Vec<Range<usize>>,
 }
 
-/// Every real file, in order of name.
+/// Every real file and every one that was reported, in order of name.
 pub(crate) fn samples(data: &Path) -> Vec<Sample> {
-    let folders = entries(&data.join("real"));
+    let mut folders = entries(&data.join("real"));
+    folders.push(data.join("reports"));
     let files = folders
         .iter()
         .filter(|p| p.is_dir())
         .flat_map(|f| entries(f));
     files
-        .filter(|path| path.extension().is_none_or(|e| e != "json"))
+        .filter(|path| path.extension().is_none_or(|e| e != "json" && e != "md"))
+        .filter(|path| path.is_file())
         .map(|path| {
             let name = path.file_name().unwrap_or_default().to_string_lossy();
             let mut bytes = super::common::bytes(&path);
