@@ -15,7 +15,7 @@ use crate::session::{channels_of_one_frame, one_per_frame, with_second_frames};
 use crate::sink::MANIFEST;
 
 /// Bytes that identify the format of a file.
-const HEAD: u64 = 512;
+const HEAD: u64 = 4096;
 /// Number of ignored files that are named.
 const NAMED: usize = 3;
 

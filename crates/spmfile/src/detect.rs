@@ -25,7 +25,7 @@ const OTHERS: [(&[u8], &str); 11] = [
 const NETCDF: &str =
     "a NetCDF file, as GXSM writes them: save the image as Gwyddion or Nanonis file";
 /// Words of the programs that write HDF5 files, within the first bytes; the last one is in none.
-const HDF5: [(&[u8], &str); 5] = [
+const PROGRAMS_OF_HDF5: [(&[u8], &str); 5] = [
     (
         b"jpk",
         "an HDF5 file of a JPK instrument (.h5-jpk): save the image as JPK (.jpk) or TIFF",
@@ -57,10 +57,10 @@ fn other(bytes: &[u8]) -> Option<&'static str> {
     if is_asd(bytes) {
         return Some("a film of a high-speed AFM (.asd): save frames as Gwyddion or TIFF");
     }
-    if bytes.starts_with(b"\x89HDF\r\n\x1a\n") {
-        let head = &bytes[..bytes.len().min(HEAD_OF_HDF5)];
+    if bytes.starts_with(HDF5) {
+        let head = head_of_hdf5(bytes);
         let by = |word: &[u8]| word.is_empty() || memchr::memmem::find(head, word).is_some();
-        return HDF5
+        return PROGRAMS_OF_HDF5
             .iter()
             .find(|(word, _)| by(word))
             .map(|(_, found)| *found);
@@ -69,8 +69,13 @@ fn other(bytes: &[u8]) -> Option<&'static str> {
     Some(found)
 }
 
-/// Bytes in which names of groups of an HDF5 file stand, mostly.
-const HEAD_OF_HDF5: usize = 1 << 20;
+/// What HDF5 files begin with.
+pub(crate) const HDF5: &[u8] = b"\x89HDF\r\n\x1a\n";
+
+/// The bytes in which names of groups of an HDF5 file stand, mostly.
+pub(crate) fn head_of_hdf5(bytes: &[u8]) -> &[u8] {
+    &bytes[..bytes.len().min(1 << 20)]
+}
 
 /// Tells the format from the first bytes of a file; a few hundred are enough but for TIFF files,
 /// whose directory may lie anywhere.

@@ -24,6 +24,8 @@ pub enum Format {
     Jpk,
     /// JPK archive (`.jpk-force`, `.jpk-force-map`, `.jpk-qi-data`), a ZIP container.
     JpkZip,
+    /// JPK images in HDF5 (`.h5-jpk`).
+    JpkHdf5,
     /// Nanosurf (`.nid`).
     Nid,
     /// Park Systems (`.tiff`), a TIFF container.

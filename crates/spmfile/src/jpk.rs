@@ -14,6 +14,9 @@
 //!
 //! Names of the tags: Gwyddion's `jpk.h`, by the maker of the instrument.
 
+#[cfg(all(feature = "hdf5", not(target_family = "wasm")))]
+pub(crate) mod hdf5;
+
 #[cfg(feature = "archives")]
 use crate::archive::Archive;
 use crate::clock;
@@ -99,6 +102,13 @@ pub(crate) fn detect_zip(bytes: &[u8]) -> bool {
     name == b"header.properties"
         || name.ends_with(b".jpk-qi-image")
         || folders.iter().any(|folder| name.starts_with(folder))
+}
+
+/// An HDF5 file of the maker.
+#[cfg(all(feature = "hdf5", not(target_family = "wasm")))]
+pub(crate) fn detect_hdf5(bytes: &[u8]) -> bool {
+    bytes.starts_with(crate::detect::HDF5)
+        && memchr::memmem::find(crate::detect::head_of_hdf5(bytes), b"Measurement_0").is_some()
 }
 
 /// Reads the headers and finds the samples.

@@ -108,6 +108,8 @@ pub(crate) static READERS: &[Reader] = &[
     reader!(F::Png, "PNG", ["png"], own [], Magic(&[b"\x89PNG\r\n\x1a\n"]), Array, flat false, open_png),
     reader!(F::Npz, "NumPy archive", ["npz"], own [], By(|bytes| first_entry(bytes).ends_with(b".npy")), Array, flat false, open_npz),
     reader!(F::JpkZip, "JPK archive", ["jpk-qi-data", "jpk-force-map", "jpk-force"], own [], By(jpk::detect_zip), Scan, flat false, open_jpk_zip),
+    #[cfg(all(feature = "hdf5", not(target_family = "wasm")))]
+    reader!(F::JpkHdf5, "JPK in HDF5", ["h5-jpk"], own ["h5-jpk"], By(jpk::detect_hdf5), Scan, flat false, jpk::hdf5::open),
     reader!(F::Rhk, "RHK", ["sm4"], own ["sm2", "sm3", "sm4"], By(rhk::detect), Scan, flat false, rhk::open),
     reader!(F::ParkTiff, "Park", ["tiff"], own [], By(park::detect), Scan, flat false, park::open),
     reader!(F::Jpk, "JPK", ["jpk", "jpk-qi-image"], own ["jpk", "jpk-qi-image"], By(jpk::detect), Scan, flat false, jpk::open),
