@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """The slowest tests of the workspace, in processor seconds, one a line.
 
-    python3 docs/slowest.py [--release] [-p CRATE --test NAME …]     (what `cargo test` takes; without: the whole workspace)
+    python3 docs/slowest.py [-p CRATE --test NAME …]     (what `cargo test` takes; without: the whole workspace)
 
 Each test program runs on one thread; the clock is that of its process, so that a busy machine changes little.
 """
@@ -18,7 +18,7 @@ MOST = 20
 
 def programs(asked):
     """The test programs, and where they run."""
-    command = ["cargo", "test", "--no-run", "--message-format=json", *(asked or ["--workspace"])]
+    command = ["cargo", "test", "--release", "--no-run", "--message-format=json", *(asked or ["--workspace"])]
     built = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True).stdout
     messages = [json.loads(line) for line in built.splitlines() if line.startswith("{")]
     for message in messages:

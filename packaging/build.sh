@@ -144,7 +144,7 @@ wheel() {
   local python=$target/packaging-python
   [ -d crates/moiregauge-python ] || { echo "there is no crates/moiregauge-python" >&2; return 1; }
   python3 -m venv "$python" && "$python/bin/python" -m pip install --quiet --disable-pip-version-check 'maturin>=1.16,<2' || return 1
-  (cd crates/moiregauge-python && "$python/bin/maturin" build --release --locked --out "$out") || return 1
+  (cd crates/moiregauge-python && "$python/bin/maturin" build --profile dist --locked --out "$out") || return 1
 }
 
 # What the program is made of, as CycloneDX.

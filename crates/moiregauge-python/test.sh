@@ -3,7 +3,7 @@
 # Leaves with 77 where there is no Python 3.11 or newer, or no package can be installed. Further arguments go to pytest.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")"
-# That of the workspace: versions and profiles are the same, and most of it is built there already.
+# That of the workspace: most of it is built there already.
 export CARGO_TARGET_DIR="${CARGO_TARGET_DIR:-$PWD/../../target}"
 
 python=${PYTHON:-python3}
@@ -14,9 +14,7 @@ trap 'rm -rf "$scratch"' EXIT
 pip() { "$scratch/venv/bin/python" -m pip --quiet --disable-pip-version-check "$@"; }
 pip install "maturin>=1.16,<2" || exit 77
 
-"$scratch/venv/bin/maturin" build --profile "${MOIREGAUGE_PROFILE:-dev}" --locked --out "$scratch/wheel"
-cargo fmt --check
-cargo clippy --locked -- -D warnings
+"$scratch/venv/bin/maturin" build --release --locked --out "$scratch/wheel"
 pip uninstall --yes maturin
 ls -l "$scratch"/wheel/*.whl
 

@@ -7,7 +7,7 @@ use serde_json::Value;
 
 use crate::pages::{below, commands, long_options, options, pages, parts, read, root, says, spans};
 
-const RENEW: &str = "renew it: python3 docs/generate.py target/debug/moiregauge .";
+const RENEW: &str = "renew it: python3 docs/generate.py target/release/moiregauge .";
 
 /// Options of other programs, and those that help does not show.
 const OTHERS: [&str; 7] = [

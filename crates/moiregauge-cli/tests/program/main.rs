@@ -26,6 +26,8 @@ mod results;
 mod round_trip;
 mod same_bytes;
 mod scanner;
+#[path = "../../../moiregauge-report/tests/common/schema.rs"]
+mod schema;
 mod senses;
 mod serving;
 mod sessions;

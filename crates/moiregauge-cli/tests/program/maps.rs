@@ -8,6 +8,7 @@ use moiregauge::simulate::{DomainScene, FieldScene};
 use serde_json::Value;
 
 use crate::common::{caveats, json, number, program, run, simulate, succeed, testdata};
+use crate::schema::problems;
 
 /// 16 pixels per period, 0.7 nm per pixel: 11.2 nm.
 const PERIOD: f64 = 16.0;
@@ -205,12 +206,7 @@ fn column(table: &[Vec<String>], name: &str) -> Vec<f64> {
 }
 
 pub(crate) fn follows_schema(results: &Value) {
-    let schema = moiregauge_report::map_schema();
-    let validator = jsonschema::validator_for(&schema).expect("a valid schema");
-    let errors: Vec<String> = validator
-        .iter_errors(results)
-        .map(|e| e.to_string())
-        .collect();
+    let errors = problems(&moiregauge_report::map_schema(), results);
     assert!(errors.is_empty(), "{errors:?}");
 }
 

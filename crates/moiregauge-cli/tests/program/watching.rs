@@ -12,6 +12,7 @@ use serde_json::Value;
 
 use crate::common::{analyze, number, program, results, simulate, succeed};
 use crate::outputs::{contents, refused};
+use crate::schema::problems;
 
 /// What is waited for comes long before.
 const LIMIT: Duration = Duration::from_secs(120);
@@ -109,8 +110,7 @@ impl Watching {
 fn follows_schema(line: &Value) {
     let schema = include_str!("../../../moiregauge-report/schema/watch-1.schema.json");
     let schema = serde_json::from_str(schema).expect("JSON");
-    let validator = jsonschema::validator_for(&schema).expect("a valid schema");
-    let wrong: Vec<String> = validator.iter_errors(line).map(|e| e.to_string()).collect();
+    let wrong = problems(&schema, line);
     assert!(wrong.is_empty(), "{wrong:?} in {line}");
 }
 

@@ -2,6 +2,8 @@
 
 #[path = "../scene/mod.rs"]
 mod scene;
+#[path = "../../../moiregauge-report/tests/common/schema.rs"]
+mod schema;
 #[path = "../small/mod.rs"]
 mod small;
 

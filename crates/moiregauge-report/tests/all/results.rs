@@ -5,6 +5,7 @@ use moiregauge_report::{Choice, Results, map_schema, schema, write_report};
 use serde_json::Value;
 
 use crate::common;
+use crate::schema::problems;
 
 const NUMBERS_ONLY: Choice = Choice {
     figures: false,
@@ -44,7 +45,6 @@ fn the_published_schemas_are_up_to_date() {
 
 #[test]
 fn documents_follow_the_schema() {
-    let validator = jsonschema::validator_for(&schema()).expect("a valid schema");
     let mut hopeless = common::analysis();
     common::spoil(&mut hopeless);
     let mut empty = common::analysis();
@@ -56,13 +56,61 @@ fn documents_follow_the_schema() {
         Box::new(empty),
     ] {
         let document = document(&analysis);
-        let errors: Vec<String> = validator
-            .iter_errors(&document)
-            .map(|e| e.to_string())
-            .collect();
+        let errors = problems(&schema(), &document);
         assert!(errors.is_empty(), "{errors:?}");
     }
-    assert!(!validator.is_valid(&serde_json::json!({"schema": "moiregauge/results/1"})));
+}
+
+/// Each rule of the schemas refuses what breaks it.
+#[test]
+fn documents_that_break_a_schema_are_refused() {
+    let good = document(&common::analysis());
+    let broken = |pointer: &str, value: Value| {
+        let mut document = good.clone();
+        *document.pointer_mut(pointer).expect(pointer) = value;
+        problems(&schema(), &document)
+    };
+    let stated = serde_json::json!({"schema": "moiregauge/results/1"});
+    assert!(problems(&schema(), &stated).len() > 1);
+    for (pointer, value, part) in [
+        ("/schema", "another".into(), "/schema"),
+        ("/sets", 1.into(), "/sets: 1 is not of type"),
+        ("/sets/0/mean", serde_json::json!({}), "/sets/0/mean"),
+        ("/provenance/seed", (-1).into(), "is outside minimum"),
+        ("/caveats/0/code", 7.into(), "/caveats/0/code"),
+    ] {
+        let found = broken(pointer, value);
+        assert!(
+            found.iter().any(|p| p.contains(part)),
+            "{pointer}: {found:?}"
+        );
+    }
+    let rules = serde_json::json!({
+        "type": "object", "additionalProperties": false,
+        "properties": {
+            "id": {"pattern": "^([0-9a-f]{16})*$"},
+            "pair": {"prefixItems": [{"type": "integer"}, {"enum": ["a", "b"]}], "minItems": 2, "maxItems": 2},
+            "one": {"oneOf": [{"type": "number", "maximum": 1}, {"type": "integer"}]},
+            "any": {"anyOf": [{"const": 1}, {"$ref": "#/$defs/text"}]},
+        },
+        "$defs": {"text": {"type": ["string", "null"]}},
+    });
+    let right =
+        serde_json::json!({"id": "0123456789abcdef", "pair": [1, "a"], "one": 2, "any": null});
+    assert_eq!(problems(&rules, &right), Vec::<String>::new());
+    for wrong in [
+        serde_json::json!({"id": "0123456789abcdeF"}),
+        serde_json::json!({"pair": [1]}),
+        serde_json::json!({"pair": [1, "a", 2]}),
+        serde_json::json!({"pair": [1.5, "a"]}),
+        serde_json::json!({"pair": [1, "c"]}),
+        serde_json::json!({"one": 1}),
+        serde_json::json!({"one": 1.5}),
+        serde_json::json!({"any": 2}),
+        serde_json::json!({"another": 2}),
+    ] {
+        assert_eq!(problems(&rules, &wrong).len(), 1, "{wrong}");
+    }
 }
 
 /// The paths that other programs rely on.
