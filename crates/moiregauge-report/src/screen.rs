@@ -427,6 +427,7 @@ pub fn caveats(text: &mut String, all: impl IntoIterator<Item = ResultCaveat>, h
             code,
             message,
             place,
+            ..
         } in same
         {
             let _ = writeln!(text, "caveat {code} ({place}): {message}");

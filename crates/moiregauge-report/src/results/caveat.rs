@@ -15,6 +15,9 @@ pub struct ResultCaveat {
     /// What it concerns: a file, a set, or `analysis`.
     #[serde(rename = "where")]
     pub place: String,
+    /// What was tried before it was raised, one line for each attempt. Left out where nothing was.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub attempts: Vec<String>,
 }
 
 impl From<&Caveat> for ResultCaveat {
@@ -23,6 +26,7 @@ impl From<&Caveat> for ResultCaveat {
             code: caveat.code().to_owned(),
             message: caveat.message(),
             place: caveat.place.clone(),
+            attempts: caveat.attempts().to_vec(),
         }
     }
 }

@@ -9,7 +9,8 @@ use crate::caveat::explained::explain;
 pub enum CalibrationDoubt {
     /// Sensors were calibrated and nominal coordinates are used, or the other way round.
     #[error(
-        "the calibration was made with {}, but the scan has {}. The correction may not hold for this scan",
+        "lengths and strain may be wrong by several per cent: the calibration was made with {}, but the scan has {}. \
+         Calibrate with images of the same kind",
         coordinates(*.calibrated), other_than(*.calibrated)
     )]
     OfOtherCoordinates {
@@ -18,8 +19,8 @@ pub enum CalibrationDoubt {
     },
     /// The scan is far from the conditions of the calibration.
     #[error(
-        "the {} of the scan differs by more than a factor of {factor} from that of the calibration images. Hysteresis, \
-         creep and lag of a scanner change with size and rate; this change is not in the budget",
+        "the errors lack the change of hysteresis, creep and lag with size and rate: the {} of the scan differs by \
+         more than a factor of {factor} from that of the calibration images. Calibrate with images like the scans",
         conditions(*.size, *.line_rate)
     )]
     Extrapolated {
@@ -32,22 +33,23 @@ pub enum CalibrationDoubt {
     },
     /// The sets of known lattices do not agree.
     #[error(
-        "the sets differ {times:.1} times more than their errors allow. Possible causes: lag or hysteresis of the fast \
-         axis, a drift that changes, strain of the sample. The errors were enlarged to match"
+        "the errors were enlarged, since the sets differ {times:.1} times more than their errors allow. Possible \
+         causes: lag or hysteresis of the fast axis, a drift that changes, strain of the sample"
     )]
     SetsDiffer {
         /// Root of χ² per degree of freedom.
         times: f64,
     },
     /// No scanner is like that.
-    #[error("the calibration is not plausible for a scanner and was not used: {reason}")]
+    #[error("the calibration was not used, since it is not plausible for a scanner: {reason}")]
     Implausible {
         /// What is beyond all scanners.
         reason: String,
     },
     /// Few scanners are like that.
     #[error(
-        "a scanner rarely has a {what}. Check that the images show the known lattice and that their size is right"
+        "the calibration may be wrong: a scanner rarely has a {what}. Check that the images show the known lattice and \
+         that their size is right"
     )]
     Unusual {
         /// What is rare, with its number.
@@ -55,8 +57,8 @@ pub enum CalibrationDoubt {
     },
     /// Two names of the vectors explain the image about as well.
     #[error(
-        "two assignments of the lattice vectors explain the image, with similar distortions ({:.1} % and {:.1} % \
-         between two axes). The smaller one was taken",
+        "the calibration may be wrong: two assignments of the lattice vectors explain the image, with similar \
+         distortions ({:.1} % and {:.1} % between two axes). The smaller one was taken. Take frames up and down",
         200.0 * .distortion, 200.0 * .next
     )]
     Ambiguous {
@@ -67,8 +69,8 @@ pub enum CalibrationDoubt {
     },
     /// Frames of one slow direction do not tell drift from gain.
     #[error(
-        "all frames have the same slow direction, so drift cannot be separated from the gain of the slow axis and the \
-         shear. {}. Frames up and down separate them",
+        "gain of the slow axis and shear contain the drift, since all frames have the same slow direction. {}. Take \
+         frames up and down",
         what_drift_does(*.gradient, *.sigma)
     )]
     DriftNotSeparated {

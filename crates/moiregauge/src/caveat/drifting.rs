@@ -13,7 +13,8 @@ use crate::numbers::words::{plus_minus, two_digits};
 pub enum DriftDoubt {
     /// The files do not tell their times.
     #[error(
-        "at least one file has no line rate or no frame direction. Nothing was corrected for drift{}",
+        "nothing was corrected for drift, since at least one file has no line rate or no frame direction. Give both, \
+         from the log of the measurement{}",
         told(assumed.as_ref())
     )]
     NoTiming {
@@ -21,7 +22,7 @@ pub enum DriftDoubt {
         assumed: Option<DriftShare>,
     },
     /// The scans do not tell the drift.
-    #[error("{reason}{}", told(assumed.as_ref()))]
+    #[error("nothing was corrected for drift: {reason}{}", told(assumed.as_ref()))]
     Undetermined {
         /// Why.
         reason: String,
@@ -30,38 +31,39 @@ pub enum DriftDoubt {
     },
     /// The user gave the drift.
     #[error(
-        "the drift was given by the user, not measured. It is correct only if the sample still drifts in the same way"
+        "twist and strain depend on the drift that the user gave. It was not measured, and it is correct only if the \
+         sample still drifts in the same way"
     )]
     Given,
     /// With other headers the scans fit together, with theirs they do not.
     #[error(
-        "the scans of this set do not fit together with the line rate and slow direction of their headers, but they do \
-         {headers} ({evidence}). Most likely an entry of the headers is wrong, and then the drift is wrong too. Twist \
-         and strain are not affected as long as the drift is constant"
+        "the drift is probably wrong; twist and strain are not affected as long as it is constant. The scans do not \
+         fit together with the line rate and slow direction of their headers, but they do {headers}. Compare the \
+         headers with the log of the measurement"
     )]
     HeadersContradictImages {
         /// The headers with which they do.
         headers: String,
-        /// How well they fit together with each.
-        evidence: String,
+        /// How well they fit together with each of the headers that were tried.
+        attempts: Vec<String>,
     },
     /// Positions from frame to frame are not those of the drift within frames.
     #[error(
-        "the motion of the lattice from frame to frame contradicts the drift within the frames ({evidence}). Possible \
-         causes: the drift changes, the scan window moves unseen by the sensors, or a header is wrong (slow direction, \
-         line rate or date). Do not trust the drift and its error"
+        "the drift and its error are probably wrong, since the motion of the lattice from frame to frame contradicts \
+         the drift within the frames. Check slow direction, line rate and dates in the headers, and look for a move of \
+         the scan window between frames"
     )]
     FramesDoNotLink {
-        /// How well they fit together with other headers.
-        evidence: String,
+        /// How well they fit together with each of the headers that were tried.
+        attempts: Vec<String>,
     },
     /// Dates and line rate contradict each other.
     #[error(transparent)]
     DatesContradictLineRate(FrameDates),
     /// The sets have no drift in common.
     #[error(
-        "no smooth drift describes all sets: {reason}. Instead each set has its own drift, and the lattices of the \
-         sets are averaged"
+        "each set has its own drift, and the lattices of the sets are averaged, since no smooth drift describes all \
+         sets: {reason}"
     )]
     NotJoined {
         /// Why.
@@ -69,9 +71,9 @@ pub enum DriftDoubt {
     },
     /// Frames up and down differ as if the drift changed within them.
     #[error(
-        "upward and downward frames differ along their slow axis as if the drift changed within a frame, by ({}, {}) \
-         nm/min² more upwards than downwards. The mean of both directions is free of this difference. A change of the \
-         drift that is the same in both directions would look like strain",
+        "a drift that changes within a frame may look like strain. Upward and downward frames differ along their slow \
+         axis by ({}, {}) nm/min² of such a change, more upwards than downwards. The mean of both directions is free \
+         of this difference, but not of a change that is the same in both. Wait until the instrument has settled",
         per_minute(.acceleration[0]), per_minute(.acceleration[1])
     )]
     Changes {
@@ -80,10 +82,10 @@ pub enum DriftDoubt {
     },
     /// The sample moves nearly as fast as the lines.
     #[error(
-        "the sample drifts at {:.0} % of the speed at which lines follow each other. A constant drift is removed \
-         exactly, but a drift that changes by a tenth during a frame leaves errors of {:.0} %. Scan faster lines or \
-         smaller frames to make them smaller",
-        100.0 * .share, 10.0 * .share
+        "a drift that changes by a tenth during a frame leaves errors of {:.0} %, since the sample drifts at {:.0} % \
+         of the speed at which lines follow each other. A constant drift is removed exactly. Scan faster lines or \
+         smaller frames",
+        10.0 * .share, 100.0 * .share
     )]
     Large {
         /// Drift over the slow speed of the tip.
@@ -143,6 +145,15 @@ fn told(share: Option<&DriftShare>) -> String {
 }
 
 impl DriftDoubt {
+    pub(super) fn attempts(&self) -> &[String] {
+        match self {
+            Self::HeadersContradictImages { attempts, .. } | Self::FramesDoNotLink { attempts } => {
+                attempts
+            }
+            _ => &[],
+        }
+    }
+
     pub(crate) fn undetermined(reason: String) -> Self {
         Self::Undetermined {
             reason,
@@ -167,9 +178,9 @@ impl DriftDoubt {
 pub enum FrameDates {
     /// Frames follow each other faster than their lines.
     #[error(
-        "the dates of two frames are {interval:.0} s apart, but the lines of one frame take {frame:.0} s at {rate} \
-         lines per second. Either the line rate is higher than the headers say, or the dates are wrong. If the line \
-         rate is wrong, the drift is wrong by the same factor"
+        "the drift is wrong by a factor if the line rate is wrong. The dates of two frames are {interval:.0} s apart, \
+         but the lines of one frame take {frame:.0} s at {rate} lines per second. Compare the line rate with the log \
+         of the measurement: it is higher than the headers say, or the dates are wrong"
     )]
     TooClose {
         /// Between the dates.
@@ -181,9 +192,10 @@ pub enum FrameDates {
     },
     /// Frames follow each other after twice their time.
     #[error(
-        "the dates of the frames are {interval:.0} s apart, twice the {frame:.0} s that the lines of one frame take at \
-         {rate} lines per second. Either there was a pause as long as a frame before each frame, or the line rate is \
-         half of what the headers say. Then the drift is also half of what is given"
+        "the drift may be half of what is given. The dates of the frames are {interval:.0} s apart, twice the \
+         {frame:.0} s that the lines of one frame take at {rate} lines per second. Compare the line rate with the log \
+         of the measurement: it is half of what the headers say, or there was a pause as long as a frame before each \
+         frame"
     )]
     Doubled {
         /// Between the dates.
@@ -202,12 +214,12 @@ fn per_minute(acceleration: Estimate) -> String {
 explain! { DriftDoubt:
     NoTiming "no-timing" Serious
         "The files do not say when their lines were scanned. Nothing was corrected for drift, which stretches and \
-         shears a lattice and looks like strain. A drift of 0, with the error of a setting (1 nm/min unless told), is \
+         shears a lattice and looks like strain. A drift of 0, with the error of a setting (1 nm/min by default), is \
          assumed, and where the line rate is not known one between 0.5 and 10 Hz. Both are in the errors."
         "Give line rate and frame direction, from the log of the measurement."
     Undetermined "drift-undetermined" Serious
         "The drift cannot be determined from these scans. Nothing was corrected for drift, which stretches and shears \
-         a lattice and looks like strain. A drift of 0, with the error of a setting (1 nm/min unless told), is assumed and \
+         a lattice and looks like strain. A drift of 0, with the error of a setting (1 nm/min by default), is assumed and \
          is in the errors."
         "Take frames up and down of the same place, one after the other. If the drift is known from another \
          measurement, give it; if it is known how much the instrument drifts at most, give that."

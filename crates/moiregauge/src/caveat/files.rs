@@ -25,7 +25,7 @@ pub enum FileDoubt {
     GivenByUser(String),
     /// The data of another file, or the same file once more.
     #[error(
-        "{}. Each scan counts once; counted twice, its noise would make the errors too small",
+        "each scan counts once: {}. Counted twice, its noise would make the errors too small",
         repeated(.of.as_ref())
     )]
     SameScanTwice {
@@ -33,19 +33,21 @@ pub enum FileDoubt {
         of: Option<String>,
     },
     /// What the user does not want is not there.
-    #[error("the name {pattern:?} was to be left out, but no scan has this name")]
+    #[error("a scan that should be left out may have been used: no scan has the name {pattern:?}")]
     NothingExcluded {
         /// As the user said it.
         pattern: String,
     },
     /// The user wants none of the scans.
-    #[error("the user excluded {}. No scan is left to analyse", all(*.scans))]
+    #[error("no scan is left to analyse: the user excluded {}", all(*.scans))]
     EverythingExcluded {
         /// How many there are.
         scans: usize,
     },
     /// Trace or retrace could not be measured.
-    #[error("one line direction could not be used: {reason}")]
+    #[error(
+        "the numbers of the scan come from one line direction alone, since the other could not be used: {reason}"
+    )]
     LineLeftOut {
         /// Why.
         reason: String,
@@ -57,7 +59,9 @@ pub enum FileDoubt {
 #[non_exhaustive]
 pub enum ImageChoice {
     /// The first of several of one channel.
-    #[error("the file holds {count} images of {channel:?}. Only the first of them is analysed")]
+    #[error(
+        "only the first of {count} images of {channel:?} is analysed. Select the one that shows the moiré"
+    )]
     First {
         /// The channel.
         channel: String,
@@ -66,8 +70,8 @@ pub enum ImageChoice {
     },
     /// The first of several channels, none of which has a usual name.
     #[error(
-        "the file holds {count} images ({names}), and none has the name of a channel that usually shows a moiré. Only \
-         the first, {first:?}, is analysed"
+        "only the first image, {first:?}, is analysed: the file holds {count} ({names}), and none has the name of a \
+         channel that usually shows a moiré"
     )]
     UnusualNames {
         /// How many there are.

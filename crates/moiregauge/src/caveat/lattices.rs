@@ -10,8 +10,8 @@ use crate::lattice::measured::Candidate;
 pub enum LatticeDoubt {
     /// The frame holds few periods.
     #[error(
-        "only {periods:.1} lattice periods fit across the frame. With fewer than {enough}, vectors are less accurate \
-         than their errors say"
+        "the vectors are less accurate than their errors say, since only {periods:.1} lattice periods fit across the \
+         frame. {enough} are enough: scan a larger frame"
     )]
     FewPeriods {
         /// How many across the shorter side.
@@ -24,9 +24,10 @@ pub enum LatticeDoubt {
     LinesDisagree(LineDifference),
     /// The lattice changes across the frame.
     #[error(
-        "the lattice is not the same everywhere in the frame: from corner to corner its wavelength changes by up to \
-         {:.2} % and its direction by up to {:.2}° (χ² {chi_squared:.0} for 14 numbers; {threshold:.0} can be chance). \
-         The results are means over the frame. A drift that changes, and creep, look like this along the slow axis",
+        "the results are means over the frame, since the lattice varies across it: its wavelength by up to {:.2} % and \
+         its direction by up to {:.2}° from corner to corner. Creep or a changing drift causes the same pattern along \
+         the slow axis. Map the lattice to see where it varies (χ² {chi_squared:.0} for 14 numbers; up to \
+         {threshold:.0} is consistent with noise)",
         100.0 * .wavelength, .angle.to_degrees()
     )]
     Inhomogeneous {
@@ -41,7 +42,8 @@ pub enum LatticeDoubt {
     },
     /// The lattice covers a part of the frame.
     #[error(
-        "the lattice covers {:.0} % of the frame, {unit_cells:.0} unit cells. The rest is left out",
+        "the results are those of a part of the frame: the lattice covers {:.0} % of it, {unit_cells:.0} unit cells. \
+         The figure of the scan shows where",
         100.0 * .share
     )]
     PartlyCovered {
@@ -52,8 +54,8 @@ pub enum LatticeDoubt {
     },
     /// Ground was taken off.
     #[error(
-        "ground that is stronger than the lattice (steps, bumps, slopes) was taken off: what a running median over \
-         {window:.1} nm makes of the image without the lattice"
+        "the lattice was measured after a background was subtracted that is stronger than it (steps, bumps, slopes): a \
+         running median over {window:.1} nm of the image without the lattice"
     )]
     GroundTakenOff {
         /// Side of the window, nm.
@@ -61,9 +63,9 @@ pub enum LatticeDoubt {
     },
     /// The lattice changes, and the result is its mean.
     #[error(
-        "the lattice changes across {part}: its wavelength by {:.2} % and its direction by {:.2}° (standard deviation \
-         over the area), {} ({}). The results are means over the area. A drift that changes, and creep, look like this \
-         along the slow axis",
+        "the results are means over {part}, since the lattice varies across it: its wavelength by {:.2} % and its \
+         direction by {:.2}° (standard deviation over the area), {}. Creep or a changing drift causes the same pattern \
+         along the slow axis. Map the lattice to see where it varies ({})",
         100.0 * .wavelength, .angle.to_degrees(), if *.evenly { "evenly" } else { "smoothly" }, how_sure(*.evidence)
     )]
     Changes {
@@ -80,7 +82,8 @@ pub enum LatticeDoubt {
     },
     /// Several lattices lie side by side.
     #[error(
-        "the frame shows {} lattices side by side. Each that could be measured has its own results. Beside the largest: {}",
+        "each grain that could be measured has its own results, and there is no mean of all: the frame shows {} \
+         lattices side by side. Beside the largest: {}",
         1 + .others.len(), listed(.others)
     )]
     SeveralGrains {
@@ -89,9 +92,9 @@ pub enum LatticeDoubt {
     },
     /// The harmonics are not those of one lattice.
     #[error(
-        "the harmonics of the image do not agree on one lattice (χ² {chi_squared:.0} for {degrees_of_freedom} degrees \
-         of freedom). This happens where the lattice is not the same everywhere in the frame. The errors of the \
-         vectors were enlarged {times:.1} times"
+        "the errors of the vectors were enlarged {times:.1} times, since the harmonics of the image do not agree on \
+         one lattice. Often the lattice varies across the frame: map it, or analyse a smaller part (χ² \
+         {chi_squared:.0} for {degrees_of_freedom} degrees of freedom)"
     )]
     HarmonicsDisagree {
         /// χ² of the harmonics against one lattice.
@@ -103,8 +106,9 @@ pub enum LatticeDoubt {
     },
     /// Other waves are as strong.
     #[error(
-        "{rivals} of the waves of about its period that do not belong to the lattice are as strong as its weakest one (stripes, or a second moiré); three \
-         could be a lattice as well"
+        "the lattice may be the wrong one: {rivals} Fourier peaks of about its period do not belong to it and are as \
+         strong as its weakest first-order peak (stripes, or a second moiré). Look at the Fourier transform of the \
+         image, and give the approximate wavelength of the right lattice"
     )]
     Rivals {
         /// How many they are.
@@ -112,8 +116,9 @@ pub enum LatticeDoubt {
     },
     /// Another lattice predicts the image about as well.
     #[error(
-        "another lattice ({}) predicts {:.0} % of the image where this one predicts {:.0} %. That is {} by {:.1} standard errors: the image does not decide \
-         between them",
+        "the image does not decide between two lattices. Look at its Fourier transform, and give the approximate \
+         wavelength of the right one. The other lattice ({}) predicts {:.0} % of the image where this one predicts \
+         {:.0} %, which is {} by {:.1} standard errors",
         nanometres(&.other.wavelengths), 100.0 * .other.share, 100.0 * .whole.share, if .other.behind < 0.0 { "better" } else { "worse" }, .other.behind.abs()
     )]
     OtherLattice {
@@ -124,8 +129,10 @@ pub enum LatticeDoubt {
     },
     /// The lattice may be that of a part of the cell.
     #[error(
-        "the harmonics do not agree on one lattice. Those of a cell of 1/{} of the area ({}) alone predict {:.0} % of the image, all together {:.0} %. The rest may be \
-         a second moiré that lies near points of a superlattice",
+        "all wavelengths may be too long by √{}, if the lattice is a superlattice of the right one. Look at the \
+         Fourier transform of the image, and give the approximate wavelength of the right lattice. The harmonics of \
+         the smaller cell ({}) alone predict {:.0} % of the image, all together {:.0} %; the rest may be a second \
+         moiré",
         .part.cells, nanometres(&.part.wavelengths), 100.0 * .part.share, 100.0 * .whole.share
     )]
     PartOfCell {
@@ -136,9 +143,9 @@ pub enum LatticeDoubt {
     },
     /// There is another wave.
     #[error(
-        "the residual of the fit shows another wave, with a period of {period:.2} nm ({significance:.0} times the \
-         noise around it; {threshold:.0} can be chance). Possible causes: a second lattice, interference, or a lattice \
-         that is not the same everywhere in the frame"
+        "the residual of the fit shows a wave that does not belong to the lattice. Possible causes: a second moiré, \
+         interference, or a lattice that varies across the frame. If the image shows two moirés, measure both (period \
+         {period:.2} nm, {significance:.0} times the noise around it; up to {threshold:.0} is consistent with noise)"
     )]
     SecondLattice {
         /// Its period, nm.
@@ -150,15 +157,15 @@ pub enum LatticeDoubt {
     },
     /// The published method was asked for.
     #[error(
-        "the published method does not divide the autocorrelation by the overlap, and takes peaks at whole pixels. \
-         With four to five periods its lattice vectors are too short by about one per cent, and the twist too large by \
-         the same fraction. Use it for comparison only"
+        "lattice vectors are too short by about one per cent at four to five periods, and the twist is too large by \
+         the same fraction. The published method does not divide the autocorrelation by the overlap, and takes peaks \
+         at whole pixels. Use it for comparison only"
     )]
     MethodPaperBias,
     /// Lines were levelled one by one.
     #[error(
-        "each line was levelled by itself. This damages harmonics whose crests run along the fast axis, and lattice \
-         vectors may be biased"
+        "lattice vectors may be biased, since each line was levelled by itself. This damages harmonics whose crests \
+         run along the fast axis. Subtract a plane instead"
     )]
     LineLevelling,
 }
@@ -181,7 +188,7 @@ fn listed(all: &[OtherGrain]) -> String {
     let of = |grain: &OtherGrain| {
         let [a, b, c] = grain.wavelengths;
         format!(
-            "{a:.2}, {b:.2}, {c:.2} nm on {:.0} % of the frame, turned by {:.1}°, behind a boundary of {:.0} nm",
+            "{a:.2}, {b:.2}, {c:.2} nm on {:.0} % of the frame, rotated by {:.1}°, behind a boundary of {:.0} nm",
             100.0 * grain.share,
             grain.turned.to_degrees(),
             grain.boundary
@@ -198,9 +205,9 @@ fn nanometres([a, b, c]: &[f64; 3]) -> String {
 /// How sure it is that a lattice changes.
 fn how_sure(by_windows: f64) -> String {
     if by_windows > BETTER {
-        format!("evidence {by_windows:.0}; {BETTER:.0} can be chance")
+        format!("evidence {by_windows:.0}; up to {BETTER:.0} is consistent with noise")
     } else {
-        "what the fit to the pixels leaves says it".to_owned()
+        "the residual of the fit to the pixels shows it".to_owned()
     }
 }
 
@@ -210,7 +217,7 @@ fn how_sure(by_windows: f64) -> String {
 pub enum LineDifference {
     /// They show different lattices.
     #[error(
-        "{} ({}). At least one of them is not the lattice of the sample. The scan is not used",
+        "the scan is not used: {} ({}). At least one of them is not the lattice of the sample",
         Self::OTHER_LATTICES, wavelengths(.trace, .retrace)
     )]
     OtherLattices {
@@ -221,9 +228,9 @@ pub enum LineDifference {
     },
     /// They differ by more than their errors.
     #[error(
-        "trace and retrace differ by {:.2} %, more than their errors allow (χ² {chi_squared:.0} for 4 numbers; {}). \
-         Possible causes: creep or hysteresis of the scanner, a lag of the sensors, or a drift that is not small \
-         against the speed of the tip",
+        "the vectors are less certain than their errors say, since trace and retrace differ by {:.2} %. Possible \
+         causes: creep or hysteresis of the scanner, a lag of the sensors, or a drift that is not small against the \
+         speed of the tip. Look at both images (χ² {chi_squared:.0} for 4 numbers; {})",
         100.0 * .share, wavelengths(.trace, .retrace)
     )]
     BeyondErrors {
@@ -268,8 +275,8 @@ explain! { LatticeDoubt:
          this part, and the rest was left out."
         "Look at the figure of the scan: the outline shows where the lattice was measured."
     GroundTakenOff "ground-taken-off" Note
-        "Steps, bumps or rough ground hide the lattice. It was found and measured in the image without them. Where ground \
-         is as short as the lattice, some of it is left, alike in all frames."
+        "Steps, bumps or a rough background hide the lattice. It was found and measured in the image without them. A part of a \
+         background that is as short as the lattice is left, alike in all frames."
         "Look at the figure of the scan. A channel that shows less topography, as the phase, serves better."
     Changes "changing-lattice" Note
         "The lattice changes across the frame by more than chance. The results are means over the area that it covers. \
@@ -285,8 +292,8 @@ explain! { LatticeDoubt:
          everywhere. The errors of the vectors were enlarged to match."
         "Map the lattice, or analyse a smaller part of the frame."
     OtherLattice "other-lattice" Serious
-        "Another lattice predicts the image about as well, within four standard errors. The image does not decide which one it shows: a second moiré, holes or rough \
-         ground may have made either."
+        "Another lattice predicts the image about as well, within four standard errors. The image does not decide which one it shows: a second moiré, holes or a rough \
+         background may have made either."
         "Look at the Fourier transform of the image. Give the approximate wavelength of the right lattice, or measure two moirés."
     PartOfCell "part-of-cell" Serious
         "Most of the image is predicted by a lattice of a third or a fourth of the cell, and the other harmonics do not agree with it: they may be a second \

@@ -12,14 +12,15 @@ use crate::numbers::words::{line_name, plus_minus, two_digits};
 pub enum MapDoubt {
     /// A large image was mapped in bands.
     #[error(
-        "the image was mapped in bands, with nominal positions, {drift}, and without displacements"
+        "errors of the scanner scale and shear the whole map: the image was mapped in bands, with nominal positions, \
+         {drift}, and without displacements"
     )]
     Survey {
         /// What was done about drift.
         drift: SurveyDrift,
     },
     /// No twist and strain at any node.
-    #[error("{reason}: the map has wavelengths and directions only")]
+    #[error("the map has wavelengths and directions only: {reason}")]
     NoTwistStrain {
         /// Why.
         reason: String,
@@ -32,9 +33,9 @@ pub enum MapDoubt {
     },
     /// Several grains are in one map.
     #[error(
-        "the map shows {grains} grains side by side. Each node is measured in its own grain, and nodes whose windows reach far \
-         beyond it are masked as missing pixels. Displacements, registry and averaged cell count from the mean lattice of one grain, so there are \
-         none"
+        "there are no displacements, registry and averaged cell, since the map shows {grains} grains side by side and \
+         these count from the mean lattice of one. Each node is measured in its own grain; nodes whose windows reach \
+         far beyond it are masked as missing pixels"
     )]
     OfGrains {
         /// How many.
@@ -42,8 +43,8 @@ pub enum MapDoubt {
     },
     /// The noise could not be measured.
     #[error(
-        "the frame holds too few periods to measure the noise between the harmonics. Instead, the errors of the map \
-         come from what {}",
+        "the errors of the map may be wrong: the frame holds too few periods to measure the noise between the \
+         harmonics, and they come from what {}",
         noise_of(*.of)
     )]
     NoiseGuessed {
@@ -52,9 +53,9 @@ pub enum MapDoubt {
     },
     /// The margin is narrower than two windows.
     #[error(
-        "the frame is small for its window: the margin is {margin:.2} windows wide instead of two. The edge of the \
-         frame cuts the windows there. Their errors include the noise and the leakage that follow from this, but such \
-         nodes average over the inner side more than over the outer side"
+        "nodes near the edge average over the inner side more than over the outer side, since the frame is small for \
+         its window: the margin is {margin:.2} windows wide instead of two. Their errors include the noise and the \
+         leakage that follow from this"
     )]
     NarrowMargin {
         /// Its width, windows.
@@ -62,9 +63,10 @@ pub enum MapDoubt {
     },
     /// The spread may be that of the grid.
     #[error(
-        "the twist varies by {}° beyond the noise, and bends of {} may make {}° of that",
+        "do not read the variation of the twist as strain: it is {}° beyond the noise, and bends of {} may make {}° of \
+         that",
         two_digits(.spread.to_degrees()),
-        if *.from_sensors { "the position sensors that nothing tells" } else { "a scanner that no position sensor recorded" },
+        if *.from_sensors { "the position sensors" } else { "a scanner that no position sensor recorded" },
         two_digits(.bends.to_degrees())
     )]
     SpreadOfGrid {
@@ -77,8 +79,8 @@ pub enum MapDoubt {
     },
     /// An image has the contrast of an error signal.
     #[error(
-        "the contrast of the {} is opposite to that of the images before, as in error signals. A shift of half a \
-         period between them was taken for reversed contrast",
+        "a shift of half a period was taken for reversed contrast: the contrast of the {} is opposite to that of the \
+         images before, as in error signals",
         line_name(*.line)
     )]
     ContrastReversed {
@@ -87,8 +89,8 @@ pub enum MapDoubt {
     },
     /// The pattern stands far from where it should.
     #[error(
-        "the pattern lies ({}, {}) nm, or {} of a period, from the place predicted by time and drift. It may have been \
-         aligned with the wrong period",
+        "the average may mix different places: the image may have been aligned with the wrong period. Its pattern lies \
+         ({}, {}) nm, or {} of a period, from the place predicted by time and drift",
         plus_minus(.shift[0]), plus_minus(.shift[1]), two_digits(*.of_period)
     )]
     Registration {
@@ -98,12 +100,12 @@ pub enum MapDoubt {
         of_period: f64,
     },
     /// A region without good nodes.
-    #[error("the region has no good node, so it has no values")]
+    #[error("the region has no values, since it has no good node")]
     RegionEmpty,
     /// A region that the map covers in part.
     #[error(
-        "the map covers {:.0} % of the region, and {:.0} % of the nodes there are bad. The numbers of the region come \
-         from the rest",
+        "the numbers of the region come from a part of it: the map covers {:.0} % of the region, and {:.0} % of the \
+         nodes there are bad",
         100.0 * .covered, 100.0 * .masked
     )]
     RegionInPart {
@@ -114,11 +116,12 @@ pub enum MapDoubt {
     },
     /// A device narrower than the resolution.
     #[error(
-        "the device is narrower than the resolution of the map. The twist may vary more within it than the map shows"
+        "the twist may vary more within the device than the map shows, since the device is narrower than the \
+         resolution of the map"
     )]
     DeviceBelowResolution,
     /// No place for a device.
-    #[error("no area of this size within the map has 95 % good nodes")]
+    #[error("no area is listed: none of this size within the map has 95 % good nodes")]
     DeviceFitsNowhere,
 }
 
@@ -141,7 +144,7 @@ pub enum SurveyDrift {
     Corrected,
     /// The user chose it, but the file does not tell its times.
     #[error(
-        "not corrected for the drift that was given (the file tells no line rate and frame direction)"
+        "not corrected for the drift that was given (the file states no line rate and frame direction)"
     )]
     NoTiming,
     /// It is not known.
@@ -152,10 +155,11 @@ pub enum SurveyDrift {
 fn not_corrected(of: Mapped) -> &'static str {
     match of {
         Mapped::Lattice => {
-            "the drift of some images is not known. It stretches and shears their maps, by the same amount everywhere"
+            "the maps of some images are stretched and sheared by the same amount everywhere, since their drift is not \
+         known"
         }
         Mapped::Stripes => {
-            "the drift is not known. It stretches and shears the map, by the same amount everywhere"
+            "the map is stretched and sheared by the same amount everywhere, since the drift is not known"
         }
     }
 }
@@ -163,9 +167,9 @@ fn not_corrected(of: Mapped) -> &'static str {
 fn noise_of(of: Mapped) -> &'static str {
     match of {
         Mapped::Lattice => {
-            "the lattice leaves of the variance of the image, enlarged where the harmonics disagree by more"
+            "the fit of the lattice leaves of the variance of the image, enlarged where the harmonics disagree by more"
         }
-        Mapped::Stripes => "a single wave in each pattern leaves",
+        Mapped::Stripes => "the fit of a single wave in each pattern leaves",
     }
 }
 

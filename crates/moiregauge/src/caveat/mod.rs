@@ -69,6 +69,14 @@ impl Caveat {
         )
     }
 
+    /// What was tried before it was raised, one line for each attempt. Empty for most caveats.
+    pub fn attempts(&self) -> &[String] {
+        match &self.doubt {
+            Doubt::Drift(doubt) => doubt.attempts(),
+            _ => &[],
+        }
+    }
+
     /// How much it weighs.
     pub fn severity(&self) -> Severity {
         self.doubt.explained().severity
@@ -151,7 +159,7 @@ pub const SUBJECTS: [(&str, &[Explained]); 11] = [
     ("Drift and time", DriftDoubt::TABLE),
     ("Scans and sets", SetDoubt::TABLE),
     ("Moiré and strain", MoireDoubt::TABLE),
-    ("Readings of a lattice", ReadingDoubt::TABLE),
+    ("Solutions for a lattice", ReadingDoubt::TABLE),
     (
         "Orientation of a layer and sense of the twist",
         OrientationDoubt::TABLE,

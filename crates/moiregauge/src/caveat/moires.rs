@@ -8,8 +8,9 @@ use crate::caveat::explained::explain;
 pub enum MoireDoubt {
     /// More strain than layers have.
     #[error(
-        "a heterostrain of {:.1} % is larger than any known between stacked layers. An image distorted by drift or by \
-         the scanner, other layers than {layers}, or a lattice that is no moiré would give the same numbers",
+        "twist and strain are probably wrong: a heterostrain of {:.1} % is larger than any known between stacked \
+         layers. An image distorted by drift or by the scanner, other layers than {layers}, or a lattice that is no \
+         moiré would give the same numbers",
         100.0 * .strain
     )]
     LargeStrain {
@@ -20,9 +21,9 @@ pub enum MoireDoubt {
     },
     /// The lattice would need more twist than the layers have.
     #[error(
-        "periods of {:.4}, {:.4} and {:.4} nm cannot be a moiré of {layers}: the twist would be {:.0}°, but layers of \
-         this symmetry have no twist beyond 30°. The image shows the atoms or another lattice. Only the vectors are \
-         given, no twist and strain",
+        "only the vectors are given, no twist and strain. Periods of {:.4}, {:.4} and {:.4} nm cannot be a moiré of \
+         {layers}: the twist would be {:.0}°, but layers of this symmetry have no twist beyond 30°. The image shows \
+         the atoms or another lattice",
         .periods[0], .periods[1], .periods[2], .twist.to_degrees()
     )]
     NoMoire {
@@ -34,15 +35,15 @@ pub enum MoireDoubt {
         layers: String,
     },
     /// No twist and strain of the layers make the lattice.
-    #[error("{0}. Only the vectors are given, no twist and strain")]
+    #[error("only the vectors are given, no twist and strain: {0}")]
     LayersCannotMakeIt(Impossible),
     /// The lattice may be that of atoms or of a surface.
     #[error(transparent)]
     Doubtful(PeriodDoubt),
     /// The strain may be noise.
     #[error(
-        "the heterostrain is not significant (p = {p_value:.2}). It is below {:.4} % with 95 % confidence, and its \
-         axis is not known",
+        "quote an upper limit of the heterostrain: it is below {:.4} % with 95 % confidence, and its axis is not \
+         known. It is not significant (p = {p_value:.2})",
         .below * 100.0
     )]
     StrainNotSignificant {
@@ -53,9 +54,9 @@ pub enum MoireDoubt {
     },
     /// The strain may be the scanner's.
     #[error(
-        "the heterostrain is significant against the noise of the scans, but not against the calibration of the \
-         scanner (p = {p_value:.2}). With the whole budget it is below {:.4} % with 95 % confidence. Scans of the \
-         sample turned by 90° can decide",
+        "only an upper limit of the heterostrain remains: with the whole budget it is below {:.4} % with 95 % \
+         confidence. It is significant against the noise of the scans, but not against the calibration of the scanner \
+         (p = {p_value:.2}). Scans of the sample turned by 90° can decide",
         .below * 100.0
     )]
     StrainWithinCalibration {
@@ -118,8 +119,8 @@ pub enum Impossible {
 pub enum PeriodDoubt {
     /// A surface has it.
     #[error(
-        "the period, {period:.3} nm, is that of {surface} ({constant} nm): If the images show this surface, twist and \
-         strain mean nothing. The numbers assume a moiré of {layers}"
+        "twist and strain mean nothing if the images show {surface}: the period, {period:.3} nm, is that of this \
+         surface ({constant} nm). The numbers assume a moiré of {layers}"
     )]
     OfSurface {
         /// Mean of the wavelengths, nm.
@@ -133,8 +134,8 @@ pub enum PeriodDoubt {
     },
     /// Few moirés are so short.
     #[error(
-        "a period of {period:.3} nm is short for a moiré. If the images show atoms or a surface, twist and strain mean \
-         nothing. The numbers assume a moiré of {layers}"
+        "twist and strain mean nothing if the images show atoms or a surface: a period of {period:.3} nm is short for \
+         a moiré. The numbers assume a moiré of {layers}"
     )]
     Short {
         /// Mean of the wavelengths, nm.

@@ -10,17 +10,20 @@ use crate::caveat::readings::degrees;
 #[non_exhaustive]
 pub enum OrientationDoubt {
     /// The orientation goes with no reading.
-    #[error("the orientation of the layer fits no reading of this moiré")]
+    #[error(
+        "the orientation of the layer was not used, since it fits no solution for this moiré. Check that it belongs to \
+         a layer of this moiré and is given in laboratory axes"
+    )]
     Unused,
     /// A sense without an orientation.
     #[error(
-        "the sense of the twist was given without the orientation of a layer. It was not used: the twist is a magnitude"
+        "the twist is a magnitude: its sense was given without the orientation of a layer and was not used"
     )]
     SenseUnused,
     /// The orientation needs too much isotropic strain.
     #[error(
-        "the orientation that was given needs an isotropic heterostrain of {:+.2} %{}. It probably belongs to another \
-         vector (30° off for a hexagonal layer), another layer or another sample",
+        "the strain tensor is probably wrong: the orientation that was given needs an isotropic heterostrain of {:+.2} \
+         %{}. It probably belongs to another vector (30° off for a hexagonal layer), another layer or another sample",
         100.0 * .strain,
         .other.map_or_else(String::new, |other| format!(", one 30° further {:+.2} %", 100.0 * other))
     )]
@@ -32,8 +35,8 @@ pub enum OrientationDoubt {
     },
     /// Orientations that the symmetry does not tell apart.
     #[error(
-        "the symmetry of the layer leaves several readings open. The one with the least mean strain is reported: {} of \
-         mean strain {:+.2} %. Others are {}",
+        "other solutions are possible: the symmetry of the layer leaves several open. The one with the least mean \
+         strain is reported: {} of mean strain {:+.2} %. Others are {}",
         degrees(*.twist), 100.0 * .strain, other_readings(.others)
     )]
     Ambiguous {
@@ -46,8 +49,8 @@ pub enum OrientationDoubt {
     },
     /// The orientations of both layers contradict each other.
     #[error(
-        "the orientations of the two layers contradict the moiré by at least {sigmas:.1} σ. One of them belongs to \
-         another vector, another layer or another sample, or its error is too small"
+        "one of the two orientations is wrong, or its error is too small: they contradict the moiré by at least \
+         {sigmas:.1} σ. Check direction, layer and sample of both"
     )]
     Disagree {
         /// The difference in standard deviations.
@@ -55,13 +58,14 @@ pub enum OrientationDoubt {
     },
     /// The orientation goes with the other sense.
     #[error(
-        "no twist of the sense that was given fits the orientation of the layer. The other sense is shown"
+        "the twist has the sense opposite to that given, since no twist of the given sense fits the orientation of the \
+         layer. Check both"
     )]
     SenseContradicts,
     /// Two equal layers: both senses explain the moiré.
     #[error(
-        "the two layers are equal, and the orientation of one of them fits a twist of either sense equally well: {} \
-         and {}{}. Give the sense of the twist or the orientation of the other layer to decide",
+        "the twist may have either sense: {} and {}{}. The two layers are equal, and the orientation of one of them \
+         fits both equally well. Give the sense of the twist or the orientation of the other layer",
         .senses[0], .senses[1],
         .magnitudes.map_or_else(String::new, |[low, high]| format!(
             "; magnitudes from {} to {} are open", degrees(low), degrees(high)
@@ -75,8 +79,8 @@ pub enum OrientationDoubt {
     },
     /// Atomic images scatter.
     #[error(
-        "the atomic images scatter {times:.1} times more than their errors allow. A drift that changes, as after a \
-         move of the window, does this. The error of the orientation was enlarged to match"
+        "the error of the orientation was enlarged, since the atomic images scatter {times:.1} times more than their \
+         errors allow. A drift that changes, as after a move of the window, does this"
     )]
     AtomicScatter {
         /// The ratio.
@@ -84,14 +88,14 @@ pub enum OrientationDoubt {
     },
     /// Atomic images of one frame direction.
     #[error(
-        "all atomic images have the same frame direction, so their drift cannot be determined. The orientation comes \
-         from the rows of atoms along the fast axis and from the lattice constant. Frames up and down are better"
+        "the orientation comes from the rows of atoms along the fast axis and from the lattice constant alone: all \
+         atomic images have the same frame direction, so their drift cannot be determined. Take frames up and down"
     )]
     AtomicDriftAssumed,
     /// The lattice of the atomic images has another size.
     #[error(
-        "the lattice of the atomic images is {:+.1} % larger than that of {material}. Either the gain of the scanner \
-         is wrong by this much, or the images show another layer",
+        "the gain of the scanner may be wrong, or the images may show another layer: the lattice of the atomic images \
+         is {:+.1} % larger than that of {material}",
         100.0 * .larger
     )]
     AtomicSize {
@@ -102,7 +106,9 @@ pub enum OrientationDoubt {
     },
     /// Atoms beside the moiré that may be of either layer.
     #[error(
-        "the atoms beside the moiré may be those of layer {layer} as well, as far as the calibration of the scanner tells. Twist and          strain would differ by a share of themselves as large as the strain between the layers"
+        "twist and strain may be wrong by a fraction as large as the strain between the layers: within the calibration \
+         of the scanner, the atoms beside the moiré may also be those of layer {layer}. Say which layer's atoms the \
+         image shows"
     )]
     RulerLayer {
         /// The layer that was not taken.
@@ -133,7 +139,7 @@ fn other_readings(all: &[[f64; 2]]) -> String {
 
 explain! { OrientationDoubt:
     Unused "orientation-unused" Warning
-        "The orientation that was given fits no reading of the moiré. It was not used."
+        "The orientation that was given fits no solution for the moiré. It was not used."
         "Check that the orientation belongs to a layer of this moiré, and that it is given in laboratory axes."
     SenseUnused "twist-sense-unused" Note
         "The sense of the twist was given without the orientation of a layer. It was not used: the twist is a \
@@ -145,7 +151,7 @@ explain! { OrientationDoubt:
         "Check whether the angle is that of a lattice row or of a reciprocal vector (30° apart in hexagonal layers), and \
          to which layer it belongs."
     Ambiguous "orientation-ambiguous" Warning
-        "The symmetry of the layer leaves several orientations, and each gives another reading. The one with the least \
+        "The symmetry of the layer leaves several orientations, and each gives another solution. The one with the least \
          strain is reported."
         "Use the edges of the flake or the record of the stacking to choose among the equivalent directions."
     Disagree "orientations-disagree" Serious
@@ -160,7 +166,7 @@ explain! { OrientationDoubt:
         "Say which layer's atoms the image shows."
     SenseOpen "twist-sense-open" Warning
         "The two layers are equal, and the orientation of one of them does not determine the sense of the twist. Both \
-         readings fit equally well and have different strain tensors."
+         solutions fit equally well and have different strain tensors."
         "Give the sense of the twist (from the record of the stacking) or the orientation of the other layer."
     AtomicScatter "atomic-scatter" Warning
         "The atomic images scatter by more than their errors. The error of the orientation was enlarged to match."

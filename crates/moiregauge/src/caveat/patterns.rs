@@ -11,14 +11,14 @@ use crate::numbers::words::plus_minus;
 pub enum PatternDoubt {
     /// There is no lattice.
     #[error(
-        "the image shows stripes and no lattice. Each pattern has one wave vector, which does not determine twist and \
-         strain. The map gives wavelength and direction"
+        "there is no twist and strain: the image shows stripes and no lattice, and one wave vector does not determine \
+         them. The map gives wavelength and direction"
     )]
     StripesOnly,
     /// Several patterns of stripes.
     #[error(
-        "{} patterns lie side by side ({} of the nodes). Each node has the wave of the pattern that is strongest \
-         there. Nodes within one window of a boundary are marked as bent",
+        "each node has the wave of the pattern that is strongest there: {} patterns lie side by side ({} of the \
+         nodes). Nodes within one window of a boundary are marked as bent",
         .shares.len(), percents(.shares)
     )]
     StripeDomains {
@@ -26,15 +26,15 @@ pub enum PatternDoubt {
         shares: Vec<f64>,
     },
     /// Stripes in a part of the image.
-    #[error("the stripes stand out at {:.0} % of the nodes only", 100.0 * .share)]
+    #[error("the numbers come from a part of the image: the stripes are significant at {:.0} % of the nodes only", 100.0 * .share)]
     StripesInPart {
         /// Of the nodes.
         share: f64,
     },
     /// Stripes that bend or change.
     #[error(
-        "the wave vector of pattern {pattern} changes across the frame: one wave has only {:.0} % of the power of its \
-         stripes. The mean of the map is the better number",
+        "use the mean of the map instead of the fit of one wave: the wave vector of pattern {pattern} changes across \
+         the frame, and one wave has only {:.0} % of the power of its stripes",
         100.0 * .coherence
     )]
     StripesVary {
@@ -45,8 +45,8 @@ pub enum PatternDoubt {
     },
     /// Map and fit contradict each other.
     #[error(
-        "at the middle of pattern {pattern} the map and the fit to all pixels differ by {} nm and {}°. The pattern \
-         changes across the frame by more than a plane",
+        "no single number describes pattern {pattern}: at its middle the map and the fit to all pixels differ by {} nm \
+         and {}°, and it changes across the frame by more than a plane",
         plus_minus(*.wavelength), plus_minus(.direction.scaled(1f64.to_degrees()))
     )]
     StripesMapAndFit {
@@ -59,8 +59,8 @@ pub enum PatternDoubt {
     },
     /// One line direction cannot tell stripes from interference.
     #[error(
-        "only trace or only retrace was measured. Mains pick-up and other interference make stripes too; only a \
-         comparison with the other line direction can show this"
+        "the stripes may be interference, such as mains pick-up: only trace or only retrace was measured. Compare with \
+         the other line direction"
     )]
     StripesOfOneDirection,
     /// The maps of phases may not hold.
@@ -77,24 +77,24 @@ pub enum PatternDoubt {
     },
     /// Several images show domains.
     #[error(
-        "{images} images show domains. The triangles come from the image that has most of them"
+        "the triangles come from one of the {images} images that show domains, the one that has most of them"
     )]
     DomainsOfOneImage {
         /// How many.
         images: usize,
     },
     /// No domains were found.
-    #[error("no mesh of nodes could be found in the image")]
+    #[error("there are no triangles, since no mesh of nodes was found in the image")]
     NoDomains,
     /// The contrast of nodes is open.
     #[error(
-        "the image does not show whether nodes are bright or dark. The corners of the triangles may be domains instead \
-         of nodes"
+        "twist and strain of the triangles may be wrong: the image does not show whether nodes are bright or dark. The \
+         corners of the triangles may be domains instead of nodes"
     )]
     NodesBrightOrDark,
     /// The mesh has gaps.
     #[error(
-        "{odd} of {nodes} nodes are missing or fit into no triangle. The mesh may not be that of the lattice"
+        "the mesh may not be that of the lattice: {odd} of {nodes} nodes are missing or fit into no triangle"
     )]
     MeshWithGaps {
         /// Missing and extra ones.

@@ -22,7 +22,8 @@ pub enum PositionDoubt {
     },
     /// The sensors of the other line direction were taken.
     #[error(
-        "the {} image has no position sensors of its own. Those of the {} are used",
+        "lengths may be off by some tenths of a per cent: the {} image has no position sensors of its own, and those \
+         of the {} are used",
         line_name(*.line), line_name(*.other)
     )]
     SensorsOfOtherLine {
@@ -33,8 +34,8 @@ pub enum PositionDoubt {
     },
     /// There are no sensors.
     #[error(
-        "{reason}. Nominal coordinates are used: the calibration error of the scanner (often 1 % and more) goes fully \
-         into lengths, twist and strain"
+        "the calibration error of the scanner (often 1 % and more) goes fully into lengths, twist and strain, since \
+         nominal coordinates are used: {reason}"
     )]
     NoPositionSensors {
         /// What is not there.
@@ -42,8 +43,8 @@ pub enum PositionDoubt {
     },
     /// The instrument levelled the sensors.
     #[error(
-        "the instrument subtracted a fit ({fit}) from {sensor:?}, which no longer contains positions. Nominal \
-         coordinates are used"
+        "nominal coordinates are used, with the full calibration error of the scanner: the instrument subtracted a fit \
+         ({fit}) from {sensor:?}, which no longer contains positions. Switch off levelling of the sensor channels"
     )]
     SensorPlaneFitted {
         /// What was subtracted.
@@ -53,7 +54,8 @@ pub enum PositionDoubt {
     },
     /// Sensors and image have other numbers of pixels.
     #[error(
-        "the position sensors have {} × {} pixels, but {channel:?} has {} × {}. Nominal coordinates are used",
+        "nominal coordinates are used, with the full calibration error of the scanner: the position sensors have {} × \
+         {} pixels, but {channel:?} has {} × {}",
         .sensors[0], .sensors[1], .image[0], .image[1]
     )]
     SensorShape {
@@ -66,13 +68,14 @@ pub enum PositionDoubt {
     },
     /// The sensors span no area.
     #[error(
-        "the position sensors do not span an area (constant, missing, or along one line). Nominal coordinates are used"
+        "nominal coordinates are used, with the full calibration error of the scanner: the position sensors do not \
+         span an area (constant, missing, or along one line)"
     )]
     SensorsFlat,
     /// The sensors span something else than the scan size.
     #[error(
-        "the sensors span {:.1} × {:.1} nm, but the scan size is {:.1} × {:.1} nm. The calibration of the sensors \
-         cannot be right. Nominal coordinates are used",
+        "nominal coordinates are used: the sensors span {:.1} × {:.1} nm, but the scan size is {:.1} × {:.1} nm. \
+         Correct the sensitivity of the sensors, or the scan size",
         .measured[0], .measured[1], .nominal[0], .nominal[1]
     )]
     SensorSpan {
@@ -83,14 +86,15 @@ pub enum PositionDoubt {
     },
     /// The sensors make a mirror image.
     #[error(
-        "the sensors describe a mirrored frame, so one of them has the wrong sign. The signs of the twist and of the \
-         strain axis follow the sensors"
+        "the signs of the twist and of the strain axis may be wrong: they follow the sensors, which describe a \
+         mirrored frame, so one of them has the wrong sign. Scan a sample with known features to find out which"
     )]
     SensorsMirrored,
     /// Samples of the sensors are far off and were left out.
     #[error(
-        "in the {} {} of {samples} samples of the position sensors ({:.1} %) are spikes and were left out. Each is \
-         away from its neighbours by more than eleven times the noise and more than three pixels",
+        "results are not affected: in the {}, {} of {samples} samples of the position sensors ({:.1} %) are spikes and \
+         were left out. Each is away from its neighbours by more than eleven times the noise and more than three \
+         pixels",
         line_name(*.line), .dropped, 100.0 * *.dropped as f64 / *.samples as f64
     )]
     SensorGlitches {
@@ -103,10 +107,10 @@ pub enum PositionDoubt {
     },
     /// The lines of a sensor bend as those of one that lags behind the tip.
     #[error(
-        "in the {} the {} sensor lags behind the tip: its lines are bent by {bend:.2} nm at their beginning, and \
-         straight after about {columns:.1} columns{}. Uncorrected, the pixels would be {:.2} % too {} along the fast \
-         axis. The bend was removed, and a part of its effect is in the errors. If the tip itself lags there, the \
-         first columns of the image are distorted",
+        "a lag of a sensor was removed, and a part of its effect is in the errors: in the {} the lines of the {} \
+         sensor are bent by {bend:.2} nm at their beginning, and straight after about {columns:.1} columns{}. \
+         Uncorrected, the pixels would be {:.2} % too {} along the fast axis. If the tip itself lags there, crop the \
+         first columns",
         line_name(*.line),
         axis_name(*.sensor),
         .time_constant.map_or_else(String::new, |t| format!(", a time constant of {:.2} ms", 1000.0 * t)),

@@ -8,7 +8,7 @@ use crate::caveat::explained::explain;
 pub enum ReadingDoubt {
     /// Layers of different size: isotropic strain and twist cannot be told apart.
     #[error(
-        "the layers of {layers} differ in lattice constant, so several pairs of twist and strain explain the moiré. \
+        "several pairs of twist and strain explain the moiré, since the layers of {layers} differ in lattice constant. \
          Another one is {}; {}{}. The orientation of a layer decides",
         all_choices(.choices), by_shift(*.shift), in_all(*.interval)
     )]
@@ -24,9 +24,8 @@ pub enum ReadingDoubt {
     },
     /// Larger than aligned layers make it.
     #[error(
-        "the moiré is larger than any that twist and uniaxial strain of {layers} can make ({longest:.3} nm). It is \
-         read as aligned layers, θ = 0. Isotropic strain, the lattice constants or the gain of the scanner explain the \
-         rest"
+        "the twist is given as 0: the moiré is larger than any that twist and uniaxial strain of {layers} can make \
+         ({longest:.3} nm). Isotropic strain, the lattice constants or the gain of the scanner explain the rest"
     )]
     LargerThanAligned {
         /// The layers.
@@ -36,8 +35,8 @@ pub enum ReadingDoubt {
     },
     /// The twist may be zero.
     #[error(
-        "the twist is not significantly different from zero: θ < {} (95 %, statistical errors only). Near alignment \
-         the moiré depends on θ², so quote this limit instead of σ",
+        "quote the upper limit of the twist, θ < {} (95 %, statistical errors only), instead of σ: the twist is not \
+         significantly different from zero, and near alignment the moiré depends on θ²",
         degrees(*.limit)
     )]
     AlignmentWithinErrors {
@@ -46,10 +45,10 @@ pub enum ReadingDoubt {
     },
     /// The layers differ in size by more than uniaxial strain does.
     #[error(
-        "with the orientation of layer {layer} the strain has an isotropic part: the layers differ in size by {}, more \
-         than uniaxial strain explains. `twist_deg` assumes no isotropic strain and differs by {} from the magnitude \
-         of the twist of `strain_tensor`, which allows for it",
-        all_sizes(.sizes), degrees(*.difference)
+        "use the magnitude of the twist of `strain_tensor`: it differs by {} from `twist_deg`, which assumes no \
+         isotropic strain. With the orientation of layer {layer} the layers differ in size by {}, more than uniaxial \
+         strain explains",
+        degrees(*.difference), all_sizes(.sizes)
     )]
     IsotropicStrainFound {
         /// The layer whose orientation is known.
@@ -61,15 +60,14 @@ pub enum ReadingDoubt {
     },
     /// Other pairs of vectors are as plausible.
     #[error(
-        "other pairs of vectors of the same lattice need a plausible strain too. The reading that is reported is \
-         {reported}; another is {}. {} The orientation of a layer may decide. `readings.solutions` lists all readings \
-         with up to {:.2} %",
+        "other solutions are as plausible, for other pairs of vectors of the same lattice. Reported is {reported}; \
+         another is {}. {} The orientation of a layer may decide. `readings.solutions` lists all solutions with up to \
+         {:.2} %",
         joined(.open, ", or "),
         if *.by_image {
-            "The image rules out other readings, but not these."
+            "The image rules out other solutions, but not these."
         } else {
-            "The image does not decide between them: the strengths of its waves fit more than one reading, or were not \
-             measured."
+            "The peak amplitudes do not decide between them, or were not measured."
         },
         100.0 * .complete_to
     )]
@@ -85,9 +83,9 @@ pub enum ReadingDoubt {
     },
     /// The reading that is reported needs more strain than others.
     #[error(
-        "the reported pair of waves, ({:.4}, {:.4}) and ({:.4}, {:.4}) rad/nm, is not the one with the least strain: \
-         {reported} instead of {}. {}",
-        .waves[0][0], .waves[0][1], .waves[1][0], .waves[1][1], joined(.less, " or "), decided_by(*.chosen_by)
+        "the reported solution is not the one with the least strain: {reported} instead of {}. {} (wave vectors \
+         ({:.4}, {:.4}) and ({:.4}, {:.4}) rad/nm)",
+        joined(.less, " or "), decided_by(*.chosen_by), .waves[0][0], .waves[0][1], .waves[1][0], .waves[1][1]
     )]
     NotTheLeastStrain {
         /// The two waves, rad/nm.
@@ -164,11 +162,10 @@ fn joined(all: &[NumbersOfName], by: &str) -> String {
 fn decided_by(what: ChosenBy) -> &'static str {
     match what {
         ChosenBy::Image => {
-            "The image decided: the waves of this reading are strong, and every other reading has a weak wave in its \
-             first shell"
+            "The image decided: the first-order peaks of this solution are strong, and every other solution has a weak one"
         }
         ChosenBy::Orientation => {
-            "The orientation of a layer decided: the other readings need isotropic strain as well"
+            "The orientation of a layer decided: the other solutions need isotropic strain as well"
         }
         ChosenBy::User | ChosenBy::LeastStrain => "The user chose it",
     }
@@ -188,16 +185,16 @@ explain! { ReadingDoubt:
          than its error."
         "Quote the upper limit."
     IsotropicStrainFound "isotropic-strain-found" Warning
-        "According to the orientation of a layer, the strain has an isotropic part. The twist of the usual reading \
+        "According to the orientation of a layer, the strain has an isotropic part. The usual twist \
          assumes that there is none."
         "Use twist and strain of the tensor. Calibrate the scanner: a wrong gain looks like isotropic strain."
     NamesCompete "names-compete" Warning
         "With another pair of its vectors the same lattice gives another twist and strain, which are equally plausible."
-        "Quote all open readings, or measure the orientation of a layer."
+        "Quote all open solutions, or measure the orientation of a layer."
     NotTheLeastStrain "not-the-least-strain" Note
-        "The reading that is reported is not the one with the least strain. It was chosen by the image, by an \
+        "The solution that is reported is not the one with the least strain. It was chosen by the image, by an \
          orientation or by the user."
-        "Nothing, if you trust this choice. The results list the other readings."
+        "Nothing, if you trust this choice. The results list the other solutions."
 }
 
 /// What chose the reported name.

@@ -8,9 +8,9 @@ use crate::caveat::explained::explain;
 pub enum SetDoubt {
     /// Two images, of one scan or of a set, show a lattice and a harmonic shell of it.
     #[error(
-        "images of one set show two lattices, and the cell of one is {times} times that of the other. \
-         Where noise hides the first waves, a harmonic shell looks like a lattice of its own. It is not known which of \
-         the two the other scans show. Only the vectors are given, no twist and strain of the set"
+        "the set has vectors only, no twist and strain. Its images show two lattices, and the cell of one is {times} \
+         times that of the other. Where noise hides the first-order peaks, a harmonic shell looks like a lattice of \
+         its own. Give the approximate wavelength of the right lattice"
     )]
     ShellForLattice {
         /// How many times the cell.
@@ -18,8 +18,8 @@ pub enum SetDoubt {
     },
     /// The lattice changes by no more than the scanner may bend.
     #[error(
-        "the lattice changes by {:.1} % across the frame (standard deviation), and a scanner that no position sensor recorded makes \
-         {:.1} % by the bends that the settings assume",
+        "do not read the variation of the lattice across the frame as strain: it is {:.1} % (standard deviation), and \
+         a scanner that no position sensor recorded makes {:.1} % by the bends that the settings assume",
         100.0 * .change, 100.0 * .bends
     )]
     ChangeOfScanner {
@@ -30,9 +30,9 @@ pub enum SetDoubt {
     },
     /// The drift would be faster than the slow scan.
     #[error(
-        "the scans fit together only with a drift of {share:.1} times the speed of the slow scan. No sample drifts like \
-         this: at least one scan shows another lattice, or its header has the wrong direction or rate. Only the vectors \
-         are given, no twist and strain of the set"
+        "the set has vectors only, no twist and strain. Its scans fit together only with a drift of {share:.1} times \
+         the speed of the slow scan, and no sample drifts like this: at least one scan shows another lattice, or its \
+         header has the wrong direction or rate. Look at the figures of the scans"
     )]
     DriftOutrunsScan {
         /// Drift over the slow speed of the tip.
@@ -40,9 +40,9 @@ pub enum SetDoubt {
     },
     /// Grains of the same scans drift differently.
     #[error(
-        "the drift of this grain and that of {other} differ by {nm_per_min:.2} nm/min, more than their errors allow. Both \
-         lie in the same frames and drift alike, so that at least one shows another lattice. Only the vectors are given, no \
-         twist and strain of this grain"
+        "this grain has vectors only, no twist and strain. Its drift and that of {other} differ by {nm_per_min:.2} \
+         nm/min, more than their errors allow. Grains of the same frames drift alike, so at least one shows another \
+         lattice. Analyse each grain by itself"
     )]
     GrainsContradict {
         /// How far apart.
@@ -59,7 +59,10 @@ pub enum SetDoubt {
         chi2_per_dof: f64,
     },
     /// A scan is far from the mean.
-    #[error("a wavelength of a single scan differs by more than 1 % from that of the set")]
+    #[error(
+        "a single scan may be wrong: one of its wavelengths differs by more than 1 % from that of the set. Look at the \
+         scan"
+    )]
     OutsideOnePercent,
     /// A scan does not fit the others.
     #[error(
@@ -85,29 +88,29 @@ pub enum SetDoubt {
         by_rule: bool,
     },
     /// A scan was left out by rule.
-    #[error("left out by the rule for outliers: {reason}")]
+    #[error("the scan was left out by the rule for outliers: {reason}")]
     ScanLeftOut {
         /// Why.
         reason: String,
     },
     /// Leaving out single scans changes results by more than their errors.
-    #[error(
-        "leaving out one scan at a time gives larger errors than those stated: {larger}. Trust the larger ones"
-    )]
+    #[error("trust the larger errors that leaving out one scan at a time gives: {larger}")]
     ScatterOfScans {
         /// Which numbers, and how many times.
         larger: String,
     },
     /// Scans of different lattices were put into one set by hand.
-    #[error("{0}. They were put into one set by hand; its mean belongs to no sample")]
+    #[error(
+        "the mean of the set belongs to no sample. Its scans were put into one set by hand, but {0}"
+    )]
     SamplesMixed(DifferentSamples),
     /// Scans of different lattices were taken apart.
-    #[error("{0}. Each lattice became a set of its own, and there is no mean over them")]
+    #[error("each lattice became a set of its own, and there is no mean over them, since {0}")]
     SamplesSeparated(DifferentSamples),
     /// Sets show different lattices.
     #[error(
-        "the sets show lattices that differ by up to {:.1} %. They come from different places or samples and were not \
-         combined",
+        "there is no mean over the sets, since their lattices differ by up to {:.1} %. They come from different places \
+         or samples: analyse each by itself",
         100.0 * .share
     )]
     DifferentLattices {
@@ -116,9 +119,9 @@ pub enum SetDoubt {
     },
     /// Sets differ by more than their errors. Distances are in standard deviations.
     #[error(
-        "the sets disagree: drift {drift:.1} σ, twist {twist:.1} σ, strain {strain:.1} σ apart. Possible causes: a \
-         drift that changes in time, or a scanner whose axes have different gains. The errors of the combined values \
-         were enlarged to match"
+        "the errors of the combined values were enlarged, since the sets are {drift:.1} σ apart in drift, {twist:.1} σ \
+         in twist and {strain:.1} σ in strain. Possible causes: a drift that changes in time, or a scanner whose axes \
+         have different gains"
     )]
     SetsDisagree {
         /// Of their drifts.
@@ -169,13 +172,13 @@ fn scattered(of: Scattered, chi2_per_dof: f64) -> String {
     let times = chi2_per_dof.sqrt();
     match of {
         Scattered::Moires => format!(
-            "the scans scatter {times:.1} times more than their errors allow (χ²/dof = {chi2_per_dof:.1}). Possible \
-             causes: a drift that changes, an inhomogeneous lattice, errors of the sensors. The errors of the set were \
-             enlarged to match"
+            "the errors of the set were enlarged, since the scans scatter {times:.1} times more than their errors allow \
+         (χ²/dof = {chi2_per_dof:.1}). Possible causes: a drift that changes, an inhomogeneous lattice, errors of the \
+         sensors"
         ),
         Scattered::KnownLattice => format!(
-            "the images scatter {times:.1} times more than their errors allow. Possible causes: a drift that changes, \
-             creep, or a lattice that is not the same everywhere. The errors were enlarged to match"
+            "the errors were enlarged, since the images scatter {times:.1} times more than their errors allow. Possible \
+         causes: a drift that changes, creep, or an inhomogeneous lattice"
         ),
     }
 }
@@ -183,13 +186,13 @@ fn scattered(of: Scattered, chi2_per_dof: f64) -> String {
 explain! { SetDoubt:
     ChangeOfScanner "change-of-scanner" Warning
         "No position sensor says how the scanner bends, and hysteresis of a usual size makes as large a change of the lattice. The mean over a whole frame \
-         hardly feels it; the budget has what it does to a part of the frame."
+         hardly changes; the budget has the effect on a part of the frame."
         "Record the position sensors, or scan the place again turned by 90°: a change that turns with the frame is the scanner's."
     ShellForLattice "shell-for-lattice" Serious
-        "One image shows a lattice whose cell is two to four times that of the others. The first waves of the lattice \
+        "One image shows a lattice whose cell is two to four times that of the others. The first-order peaks of the lattice \
          are weak. Where noise hides them, a harmonic shell is taken for the lattice. There is no result for the set."
         "Look at the figures of both line directions. Give the approximate wavelength of the right lattice, or choose \
-         the channel with the stronger first waves."
+         the channel with the stronger first-order peaks."
     DriftOutrunsScan "drift-outruns-scan" Serious
         "The scans fit together only with a drift that is faster than the slow scan. No sample drifts like this. At least \
          one scan shows another lattice, or its header is wrong. There is no result for the set."

@@ -36,7 +36,7 @@ fn a_doubt_has_the_entry_of_its_own() {
     assert_eq!(caveat.severity(), Severity::Serious);
     assert_eq!(
         caveat.message(),
-        "the user excluded all 4 scans. No scan is left to analyse"
+        "no scan is left to analyse: the user excluded all 4 scans"
     );
 }
 

@@ -79,21 +79,17 @@ pub(crate) fn about_headers(
     if best.is_none() && !troubled {
         return None;
     }
-    let evidence: Vec<String> = tried
-        .iter()
-        .map(|(words, other)| format!("{words}: {}", in_words(other.as_ref())))
+    let others = tried.iter().map(|(words, fit)| (*words, fit.as_ref()));
+    let attempts = std::iter::once(("with the headers", Some(found)))
+        .chain(others)
+        .map(|(words, fit)| format!("{words}: {}", in_words(fit)))
         .collect();
-    let evidence = format!(
-        "with the headers: {}; {}",
-        in_words(Some(found)),
-        evidence.join("; ")
-    );
     let doubt = match best {
         Some((headers, _)) => DriftDoubt::HeadersContradictImages {
             headers: headers.to_owned(),
-            evidence,
+            attempts,
         },
-        None => DriftDoubt::FramesDoNotLink { evidence },
+        None => DriftDoubt::FramesDoNotLink { attempts },
     };
     Some(Caveat::new(doubt, name))
 }
@@ -132,7 +128,7 @@ fn in_words(found: Option<&JointFit>) -> String {
             60.0 * found.velocity.x,
             60.0 * found.velocity.y
         ),
-        _ => "phases cannot be linked".to_owned(),
+        _ => "the frames cannot be registered".to_owned(),
     }
 }
 
