@@ -47,30 +47,39 @@ pub const VERSION: &str = if cfg!(target_family = "wasm") {
 };
 
 pub use calibrate::calibrate;
-pub use content::Content;
 pub use convert::convert;
-pub use find::{Found, LeftAlone, find};
-pub use hash::{hexadecimal, identity};
-pub use in_memory::ScanInMemory;
+pub use find::find;
 pub use inspect::inspect;
-pub use job::{Cancel, Cancelled, Event, Events, Job, JobError, Quiet, Stage};
-pub use known::{Known, KnownError, is_named};
+pub use job::{Cancel, Event, Events, Job, Quiet, Stage};
 pub use maps::map;
-pub use mask::read_mask;
-pub use memory::{NotEnoughMemory, available, enough_for};
 pub use moire::moire;
-pub use opened::{InputError, Opened, Reading, read_again, read_scan, read_shown};
-pub use options::{OptionError, conditions_on, settings_on};
+pub use opened::read_scan;
 pub use plan::plan;
-pub use reading::{FileError, open, read, read_text};
-pub use replay::{Document, ReplayError, record_files, settings_of};
-pub use sets::{SetError, absolute, check_sets, set_of};
-pub use settings_file::{
-    NotSettings, SettingsFileError, UnknownMaterial, named_layers, named_material, parse_settings,
-    read_layers, read_settings,
-};
 pub use simulate::simulate;
-pub use source::{Places, Source};
-pub use told::check_told;
-pub use twice::{Repeated, distinct};
 pub use validate::validate;
+
+/// What the front ends of this workspace share besides.
+mod front {
+    pub use crate::content::Content;
+    pub use crate::find::{Found, LeftAlone};
+    pub use crate::hash::{hexadecimal, identity};
+    pub use crate::in_memory::ScanInMemory;
+    pub use crate::job::{Cancelled, JobError};
+    pub use crate::known::{Known, KnownError, is_named};
+    pub use crate::mask::read_mask;
+    pub use crate::memory::{NotEnoughMemory, available, enough_for};
+    pub use crate::opened::{InputError, Opened, Reading, read_again, read_shown};
+    pub use crate::options::{OptionError, conditions_on, settings_on};
+    pub use crate::reading::{FileError, open, read, read_text};
+    pub use crate::replay::{Document, ReplayError, record_files, settings_of};
+    pub use crate::sets::{SetError, absolute, check_sets, set_of};
+    pub use crate::settings_file::{
+        NotSettings, SettingsFileError, UnknownMaterial, named_layers, named_material,
+        parse_settings, read_layers, read_settings,
+    };
+    pub use crate::source::{Places, Source};
+    pub use crate::told::check_told;
+    pub use crate::twice::{Repeated, distinct};
+}
+#[doc(hidden)]
+pub use front::*;

@@ -21,23 +21,31 @@ mod tables;
 
 pub use choice::Choice;
 pub use draw::colormap::ColorMap;
-pub use draw::scale::fixed;
 pub use error::ReportError;
-pub use figures::{Drawing, Figure, cell_figure, figures, map_figures, pulls, stripe_figures};
-pub use format::{plus_minus, two_digits, with_statistical};
-pub use html::{layers, map_page};
-pub use input::{FailedInput, InputFile};
-pub use map_details::MapDetails;
-pub use moire::{CellResult, MoireDocument};
-#[cfg(feature = "parquet")]
-pub use report::parquet_tables;
-pub use report::{figure_files, write_report};
+pub use figures::{Drawing, Figure, figures, map_figures};
+pub use html::map_page;
+pub use report::write_report;
 pub use results::{Provenance, Results, map_schema, schema};
-#[cfg(feature = "parquet")]
-pub use samples::samples_parquet;
-pub use samples::{
-    SampleRow, SampleStatus, SamplesPage, failed_csv, samples_csv, samples_page, thumbnail,
-};
-pub use tables::{
-    cell_scan, map_scan, map_scans, map_tables, stripe_scan, tables, undistorted_scan,
-};
+pub use tables::{map_tables, tables};
+
+/// What the front ends of this workspace use besides.
+mod front {
+    pub use crate::draw::scale::fixed;
+    pub use crate::figures::{cell_figure, pulls, stripe_figures};
+    pub use crate::format::{plus_minus, two_digits, with_statistical};
+    pub use crate::html::layers;
+    pub use crate::input::{FailedInput, InputFile};
+    pub use crate::map_details::MapDetails;
+    pub use crate::moire::{CellResult, MoireDocument};
+    pub use crate::report::figure_files;
+    #[cfg(feature = "parquet")]
+    pub use crate::report::parquet_tables;
+    #[cfg(feature = "parquet")]
+    pub use crate::samples::samples_parquet;
+    pub use crate::samples::{
+        SampleRow, SampleStatus, SamplesPage, failed_csv, samples_csv, samples_page, thumbnail,
+    };
+    pub use crate::tables::{cell_scan, map_scan, map_scans, stripe_scan, undistorted_scan};
+}
+#[doc(hidden)]
+pub use front::*;

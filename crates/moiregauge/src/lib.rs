@@ -55,6 +55,7 @@
 pub mod calibration;
 pub mod campaign;
 pub mod caveat;
+#[doc(hidden)]
 pub mod coverage;
 pub mod domains;
 pub mod drift;
@@ -63,15 +64,18 @@ pub mod frame;
 pub mod lattice;
 pub mod map;
 pub mod meaning;
+#[doc(hidden)]
 pub mod numbers;
 pub mod plan;
 pub mod region;
 pub mod scan;
 pub mod settings;
 pub mod simulate;
+#[doc(hidden)]
 pub mod spectrum;
 pub mod stripes;
 pub mod survey;
+#[doc(hidden)]
 pub mod window;
 
 pub use heterostrain;

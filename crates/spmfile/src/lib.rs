@@ -111,7 +111,9 @@ pub mod arrays {
 }
 
 pub use crop::{Block, CropError, crop};
-pub use detect::{detect, looks_like_scan, named_like_scan};
+pub use detect::detect;
+#[doc(hidden)]
+pub use detect::{looks_like_scan, named_like_scan};
 pub use error::ReadError;
 #[cfg(feature = "write")]
 pub use export::ExportError;
@@ -124,8 +126,11 @@ pub use scan::{
     Channel, ChannelInfo, DateTime, FrameDirection, LineDirection, Samples, Scan, Span,
     UnreadableChannel,
 };
-pub use sensors::{PositionSensors, SensorProblem, position_sensors, sensor_axis};
+#[doc(hidden)]
+pub use sensors::sensor_axis;
+pub use sensors::{PositionSensors, SensorProblem, position_sensors};
 pub use source::{Seekable, Source};
+#[doc(hidden)]
 pub use units::{length_nm, nm_per, plain_unit};
 #[cfg(feature = "write")]
 pub use writable::{WritableFormat, write, write_between};

@@ -285,3 +285,75 @@ fn pages_and_sources_speak_the_language_of_the_field() {
         assert_eq!(strange(&read(&source)), None, "{}", source.display());
     }
 }
+
+/// Parts of names for which the glossary has another term.
+const REPLACED: [&str; 13] = [
+    "hollow",
+    "leftover",
+    "misfits",
+    "outshines",
+    "patch",
+    "plainest",
+    "sighting",
+    "sightings",
+    "stands_out",
+    "strangers",
+    "told",
+    "torn",
+    "towers",
+];
+
+/// The name of the public item that a line begins, in small letters with underlines.
+fn public_name(line: &str) -> Option<String> {
+    let rest = line.trim_start().strip_prefix("pub ")?;
+    let kinds = [
+        "fn ",
+        "const fn ",
+        "struct ",
+        "enum ",
+        "const ",
+        "static ",
+        "type ",
+        "mod ",
+        "trait ",
+    ];
+    let named = kinds
+        .iter()
+        .find_map(|kind| rest.trim_start().strip_prefix(kind));
+    let name = named
+        .unwrap_or(rest)
+        .split(|c: char| !(c.is_alphanumeric() || c == '_'));
+    let mut small = String::new();
+    for c in name.map(str::trim).find(|name| !name.is_empty())?.chars() {
+        if c.is_uppercase() && small.ends_with(|c: char| c.is_lowercase()) {
+            small.push('_');
+        }
+        small.extend(c.to_lowercase());
+    }
+    Some(small)
+}
+
+#[test]
+fn public_names_are_terms_of_the_glossary() {
+    let replaced = |line: &str| {
+        let name = format!("_{}_", public_name(line)?);
+        REPLACED
+            .into_iter()
+            .find(|part| name.contains(&format!("_{part}_")))
+    };
+    assert_eq!(
+        replaced("    pub fn is_torn(&self) -> bool {"),
+        Some("torn")
+    );
+    assert_eq!(replaced("pub struct LatticePatch {"), Some("patch"));
+    assert_eq!(replaced("pub(crate) fn told() {"), None);
+    let mut sources = Vec::new();
+    below(&root().join("crates"), &mut sources);
+    sources.retain(|path| path.extension().is_some_and(|e| e == "rs"));
+    sources.retain(|path| !path.ends_with("documentation/words.rs"));
+    for source in sources {
+        for line in read(&source).lines() {
+            assert_eq!(replaced(line), None, "{}: {line}", source.display());
+        }
+    }
+}
