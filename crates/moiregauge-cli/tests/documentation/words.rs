@@ -320,9 +320,7 @@ fn public_name(line: &str) -> Option<String> {
     let named = kinds
         .iter()
         .find_map(|kind| rest.trim_start().strip_prefix(kind));
-    let name = named
-        .unwrap_or(rest)
-        .split(|c: char| !(c.is_alphanumeric() || c == '_'));
+    let name = named?.split(|c: char| !(c.is_alphanumeric() || c == '_'));
     let mut small = String::new();
     for c in name.map(str::trim).find(|name| !name.is_empty())?.chars() {
         if c.is_uppercase() && small.ends_with(|c: char| c.is_lowercase()) {
