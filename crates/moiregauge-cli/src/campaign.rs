@@ -65,7 +65,12 @@ pub(crate) fn run(args: &CampaignArgs, job: &Job) -> anyhow::Result<ExitCode> {
         Some(table) => samples_of_table(table, root),
         None => samples_in(root, out),
     };
-    let asked = Samples::new(root, samples?, analyze.settings()?, analyze.known.told());
+    let asked = Samples::new(
+        root,
+        samples?,
+        analyze.settings()?,
+        analyze.known.user_specified(),
+    );
     let mut asked = asked.map_err(with_option)?.advice(advice);
     if let Some(shard) = args.shard {
         asked = asked.shard(shard);

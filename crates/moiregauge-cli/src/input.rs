@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::ValueEnum;
 pub(crate) use moiregauge_pipeline::Known;
 use moiregauge_pipeline::KnownError;
-use moiregauge_report::results::{Crop, FrameOrder, Told};
+use moiregauge_report::results::{Crop, FrameOrder, UserSpecified};
 use spmfile::length_nm;
 
 use crate::numbers;
@@ -79,9 +79,9 @@ impl KnownArgs {
     }
 
     /// What the user tells.
-    pub(crate) fn told(&self) -> Told {
+    pub(crate) fn user_specified(&self) -> UserSpecified {
         let sensors = self.sensors.as_ref();
-        Told {
+        UserSpecified {
             size_nm: self.size,
             unit: self.unit.clone(),
             line_rate_hz: self.line_rate,
@@ -97,12 +97,12 @@ impl KnownArgs {
 
     /// What is known of these files.
     pub(crate) fn of(&self, inputs: &[PathBuf]) -> Known {
-        Known::new(&self.told(), inputs)
+        Known::new(&self.user_specified(), inputs)
     }
 }
 
 /// The options that tell what is told.
-pub(crate) fn told_as_options(told: &Told) -> Vec<String> {
+pub(crate) fn told_as_options(told: &UserSpecified) -> Vec<String> {
     let frame = told.frame_direction.map(|order| {
         let name = match order {
             FrameOrder::Up => "up",
@@ -205,7 +205,7 @@ mod tests {
             #[command(flatten)]
             known: KnownArgs,
         }
-        let told = Told {
+        let told = UserSpecified {
             size_nm: Some([70.0, 35.5]),
             unit: Some("a b".to_owned()),
             line_rate_hz: Some(0.1 + 0.2),
@@ -219,8 +219,8 @@ mod tests {
         };
         let typed = ["program".to_owned()].into_iter();
         let typed = Typed::parse_from(typed.chain(told_as_options(&told)));
-        assert_eq!(typed.known.told(), told);
-        assert!(told_as_options(&Told::default()).is_empty());
+        assert_eq!(typed.known.user_specified(), told);
+        assert!(told_as_options(&UserSpecified::default()).is_empty());
     }
 
     #[test]

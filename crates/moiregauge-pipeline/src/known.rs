@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use moiregauge::campaign::natural_order;
 use moiregauge::scan::plain_name;
-use moiregauge_report::results::{Crop, FrameOrder, Told};
+use moiregauge_report::results::{Crop, FrameOrder, UserSpecified};
 use spmfile::arrays::ArrayOptions;
 use spmfile::{
     Block, Channel, ChannelInfo, CropError, Format, FrameDirection, ReadError, Scan, Span, crop,
@@ -59,14 +59,14 @@ pub enum KnownError {
 /// What the user tells, the order of the files for those that alternate, and where they lie.
 #[derive(Clone, Debug, Default)]
 pub struct Known {
-    told: Told,
+    told: UserSpecified,
     order: Vec<PathBuf>,
     places: Places,
 }
 
 impl Known {
     /// What is told of these files.
-    pub fn new(told: &Told, inputs: &[PathBuf]) -> Self {
+    pub fn new(told: &UserSpecified, inputs: &[PathBuf]) -> Self {
         let (mut order, _) = distinct(inputs);
         order.sort_by(|a, b| natural_order(&a.to_string_lossy(), &b.to_string_lossy()));
         Self {
@@ -84,7 +84,7 @@ impl Known {
     }
 
     /// What is told.
-    pub fn told(&self) -> &Told {
+    pub fn user_specified(&self) -> &UserSpecified {
         &self.told
     }
 
@@ -441,12 +441,12 @@ mod tests {
             ..Scan::default()
         };
         std::fs::write(&path, spmfile::arrays::npz(&scan, &[]).unwrap()).unwrap();
-        let told = Told {
+        let told = UserSpecified {
             x_sensor: Some("stage x".to_owned()),
             y_sensor: Some("stage y".to_owned()),
             sensor_unit: Some("um".to_owned()),
             unit: Some("V".to_owned()),
-            ..Told::default()
+            ..UserSpecified::default()
         };
         let known = Known::new(&told, std::slice::from_ref(&path));
         let content = known.source(&path).content().unwrap();
@@ -462,9 +462,9 @@ mod tests {
 
     #[test]
     fn files_alternate_by_number() {
-        let told = Told {
+        let told = UserSpecified {
             frame_direction: Some(FrameOrder::AlternatingDown),
-            ..Told::default()
+            ..UserSpecified::default()
         };
         let known = Known::new(&told, &["s.10.npy", "s.9.npy"].map(PathBuf::from));
         let of = |name: &str| known.frame_direction(Path::new(name));

@@ -78,7 +78,7 @@ mod front {
         parse_settings, read_layers, read_settings,
     };
     pub use crate::source::{Places, Source};
-    pub use crate::told::check_told;
+    pub use crate::told::check_user_specified;
     pub use crate::twice::{Repeated, distinct};
 }
 #[doc(hidden)]

@@ -1,7 +1,7 @@
 //! What is refused of what a user tells of files.
 
 use moiregauge::settings::SettingsError;
-use moiregauge_report::results::Told;
+use moiregauge_report::results::UserSpecified;
 
 /// Lengths of frames, nm: from a thousandth of an atom to a centimetre.
 const LENGTH_NM: [f64; 2] = [1e-3, 1e7];
@@ -14,7 +14,7 @@ const ANGLE_DEG: [f64; 2] = [-3600.0, 3600.0];
 ///
 /// # Errors
 /// The first of them, by its name.
-pub fn check_told(told: &Told) -> Result<(), SettingsError> {
+pub fn check_user_specified(told: &UserSpecified) -> Result<(), SettingsError> {
     let [width, height] = told.size_nm.map_or([None; 2], |size| size.map(Some));
     for (setting, value, [low, high]) in [
         ("size_nm", width, LENGTH_NM),
@@ -54,13 +54,13 @@ mod tests {
 
     #[test]
     fn nonsense_is_refused_by_its_name() {
-        assert_eq!(check_told(&Told::default()), Ok(()));
-        let refused = |told: Told| check_told(&told).unwrap_err().setting;
-        let size = |size_nm| Told {
+        assert_eq!(check_user_specified(&UserSpecified::default()), Ok(()));
+        let refused = |told: UserSpecified| check_user_specified(&told).unwrap_err().setting;
+        let size = |size_nm| UserSpecified {
             size_nm: Some(size_nm),
-            ..Told::default()
+            ..UserSpecified::default()
         };
-        assert_eq!(check_told(&size([70.0, 70.0])), Ok(()));
+        assert_eq!(check_user_specified(&size([70.0, 70.0])), Ok(()));
         for wrong in [
             [f64::NAN, 1.0],
             [1.0, -1.0],
@@ -69,14 +69,14 @@ mod tests {
         ] {
             assert_eq!(refused(size(wrong)), "size_nm");
         }
-        let rate = Told {
+        let rate = UserSpecified {
             line_rate_hz: Some(0.0),
-            ..Told::default()
+            ..UserSpecified::default()
         };
         assert_eq!(refused(rate), "line_rate_hz");
-        let sensor = Told {
+        let sensor = UserSpecified {
             x_sensor: Some("x".to_owned()),
-            ..Told::default()
+            ..UserSpecified::default()
         };
         assert_eq!(refused(sensor), "x_sensor");
     }

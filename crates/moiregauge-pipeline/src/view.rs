@@ -88,7 +88,7 @@ pub fn overlays(analysis: &Analysis, file: &str) -> Vec<Overlay> {
         let outline = line
             .patch
             .as_ref()
-            .map(moiregauge::coverage::Patch::outline);
+            .map(moiregauge::coverage::LatticeRegion::outline);
         let outline = outline.unwrap_or_default().into_iter();
         Overlay {
             line: moiregauge::numbers::line_name(line.line),

@@ -7,7 +7,7 @@ use moiregauge::simulate::Simulation;
 use moiregauge_pipeline::calibrate::read_calibration;
 use moiregauge_pipeline::names::in_full;
 use moiregauge_pipeline::read_settings;
-use moiregauge_report::results::Told;
+use moiregauge_report::results::UserSpecified;
 use pyo3::PyResult;
 use serde_json::{Map, Value};
 
@@ -57,9 +57,9 @@ pub(crate) fn conditions(base: &Simulation, given: Value) -> PyResult<Simulation
 ///
 /// # Errors
 /// `ValueError` names what makes no sense.
-pub(crate) fn told(known: &str) -> PyResult<Told> {
-    let told: Told = serde_json::from_str(known).map_err(wrong)?;
-    moiregauge_pipeline::check_told(&told).map_err(wrong)?;
+pub(crate) fn told(known: &str) -> PyResult<UserSpecified> {
+    let told: UserSpecified = serde_json::from_str(known).map_err(wrong)?;
+    moiregauge_pipeline::check_user_specified(&told).map_err(wrong)?;
     Ok(told)
 }
 

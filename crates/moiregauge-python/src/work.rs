@@ -26,9 +26,9 @@ struct Progress {
 
 /// What a job has told. It is asked for by the thread of the interpreter: threads of a job never call Python.
 #[derive(Default)]
-struct Told(Mutex<Progress>);
+struct UserSpecified(Mutex<Progress>);
 
-impl Told {
+impl UserSpecified {
     fn now(&self) -> Progress {
         self.0
             .lock()
@@ -37,7 +37,7 @@ impl Told {
     }
 }
 
-impl Events for Told {
+impl Events for UserSpecified {
     fn tell(&self, event: &Event<'_>) {
         let mut told = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         match event {
@@ -67,7 +67,7 @@ pub(crate) fn work<T: Send>(
     if threads == Some(0) {
         return Err(wrong("threads: expected at least 1, found 0"));
     }
-    let (cancel, told) = (Cancel::new(), Told::default());
+    let (cancel, told) = (Cancel::new(), UserSpecified::default());
     py.detach(|| {
         std::thread::scope(|scope| {
             let (done, waiting) = channel::<()>();
@@ -106,7 +106,7 @@ pub(crate) fn work<T: Send>(
 fn look(
     py: Python<'_>,
     progress: Option<&Py<PyAny>>,
-    told: &Told,
+    told: &UserSpecified,
     shown: &mut Progress,
 ) -> PyResult<()> {
     py.check_signals()?;

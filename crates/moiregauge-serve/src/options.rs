@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use moiregauge_pipeline::campaign::{Advice, no_advice};
 use moiregauge_pipeline::maps::MapRequest;
-use moiregauge_report::results::Told;
+use moiregauge_report::results::UserSpecified;
 
 use crate::feed::Feed;
 
@@ -18,7 +18,7 @@ pub struct Words {
     /// What helps against an error.
     pub advice: Advice,
     /// The options that tell the program what is known of files.
-    pub told: fn(&Told) -> Vec<String>,
+    pub told: fn(&UserSpecified) -> Vec<String>,
     /// The options that tell the program what map is wanted.
     pub map: fn(&MapRequest) -> Vec<String>,
 }

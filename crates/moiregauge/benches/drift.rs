@@ -8,7 +8,7 @@ use std::f64::consts::TAU;
 use divan::{Bencher, counter::ItemsCount};
 use heterostrain::lattice::{Lattice, Waves};
 use moiregauge::drift::monte_carlo;
-use moiregauge::drift::{Observation, Sighting, fit, solve};
+use moiregauge::drift::{Detection, Observation, fit, solve};
 use moiregauge::spectrum::Phases;
 use nalgebra::{Matrix2, Matrix4, Vector2};
 
@@ -56,7 +56,7 @@ fn ten_thousand_draws(bencher: Bencher<'_, '_>) {
 
 /// Frames of a minute at 12.5 nm, alternately up and down, trace and retrace, drifting by 0.5 nm/min, with errors that
 /// follow no pattern.
-fn sightings(scans: usize) -> Vec<Sighting> {
+fn sightings(scans: usize) -> Vec<Detection> {
     let drift = Vector2::new(0.5, -0.15) / 60.0;
     let pair = Matrix2::new(0.58, 0.24, 0.05, 0.54);
     let harmonics = [
@@ -78,7 +78,7 @@ fn sightings(scans: usize) -> Vec<Sighting> {
                 plain - TAU * (plain / TAU).round()
             };
             let noise = Matrix2::new(error(0), error(1), error(2), error(3)) * 1e-4;
-            Sighting {
+            Detection {
                 scan,
                 class,
                 block: 0,

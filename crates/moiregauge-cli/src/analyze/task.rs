@@ -51,7 +51,7 @@ impl Task {
             command: command.to_owned(),
             arguments: arguments(typed(), &[]),
             settings,
-            known: args.known.told(),
+            known: args.known.user_specified(),
             sets,
             atomic: args.orientation.asked()?,
             report: args.choice(),

@@ -128,7 +128,7 @@ impl WatchArgs {
         Ok(WatchRequest {
             folder: folder.clone(),
             settings: self.analyze.settings()?,
-            told: self.analyze.known.told(),
+            told: self.analyze.known.user_specified(),
             until: self.until.unwrap_or_default(),
             patience: (steps.ceil() as usize).max(2),
         })

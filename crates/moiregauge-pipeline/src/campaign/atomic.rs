@@ -35,7 +35,7 @@ pub(super) fn orientation(
         ..settings.clone()
     };
     let (paths, repeated) = distinct(&paths);
-    let known = Known::new(told.told(), &paths).at(places);
+    let known = Known::new(told.user_specified(), &paths).at(places);
     let stage = job.stage("measuring", "images of atoms", paths.len());
     let (mut scans, mut files) = (Vec::new(), Vec::new());
     for path in &paths {

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use moiregauge::campaign::{Analysis, analyse};
 use moiregauge::scan::{MeasuredScan, sorted_moires};
 use moiregauge::settings::{Settings, SettingsError};
-use moiregauge_report::results::{NamedSet, Run, Told};
+use moiregauge_report::results::{NamedSet, Run, UserSpecified};
 use moiregauge_report::{FailedInput, InputFile, Provenance};
 use serde::{Deserialize, Serialize, Serializer};
 
@@ -21,7 +21,7 @@ use crate::known::Known;
 use crate::names::{in_words, with_words};
 use crate::session::is_second_frame;
 use crate::source::Places;
-use crate::told::check_told;
+use crate::told::check_user_specified;
 use crate::twice::distinct;
 
 /// What came out, and of what.
@@ -50,7 +50,7 @@ pub struct Campaign {
 #[serde(deny_unknown_fields)]
 struct Written {
     settings: Settings,
-    told: Told,
+    told: UserSpecified,
     sets: Vec<NamedSet>,
     inputs: Vec<PathBuf>,
     places: Places,
@@ -70,7 +70,7 @@ impl TryFrom<Written> for Campaign {
 
     fn try_from(of: Written) -> Result<Self, Self::Error> {
         of.settings.check()?;
-        check_told(&of.told)?;
+        check_user_specified(&of.told)?;
         let advice = Words::default();
         Ok(Self { of, advice })
     }
@@ -94,7 +94,7 @@ impl Campaign {
     pub fn new(settings: Settings) -> Result<Self, SettingsError> {
         Self::try_from(Written {
             settings,
-            told: Told::default(),
+            told: UserSpecified::default(),
             sets: Vec::new(),
             inputs: Vec::new(),
             places: Places::new(),
@@ -116,7 +116,7 @@ impl Campaign {
     ) -> Result<Self, SettingsError> {
         let wanted = run.report;
         let mut campaign = Self::new(run.settings.clone())?
-            .with_told(run.known.clone())?
+            .with_user_specified(run.known.clone())?
             .with_places(places.clone())
             .with_left_out(run.left_out.clone())
             .with_advice(advice)
@@ -154,8 +154,8 @@ impl Campaign {
     ///
     /// # Errors
     /// What no file can be like.
-    pub fn with_told(mut self, told: Told) -> Result<Self, SettingsError> {
-        check_told(&told)?;
+    pub fn with_user_specified(mut self, told: UserSpecified) -> Result<Self, SettingsError> {
+        check_user_specified(&told)?;
         self.of.told = told;
         Ok(self)
     }
@@ -230,7 +230,7 @@ impl Campaign {
     }
 
     /// What is known of the scans.
-    pub fn told(&self) -> &Told {
+    pub fn user_specified(&self) -> &UserSpecified {
         &self.of.told
     }
 

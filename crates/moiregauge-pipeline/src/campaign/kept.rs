@@ -217,7 +217,7 @@ impl With {
     /// Of settings, what is known of all files, and the region.
     pub(super) fn new(settings: &Settings, known: &Known, window: Option<&Window>) -> Self {
         let mut hash = Sha256::new();
-        let told = known.told();
+        let told = known.user_specified();
         let mut add = |part: &dyn std::fmt::Debug| hash.update(format!("{part:?}\n"));
         add(&SCHEMA);
         add(&crate::VERSION);

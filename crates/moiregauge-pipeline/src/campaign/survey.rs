@@ -6,7 +6,7 @@ use moiregauge::campaign::picture;
 use moiregauge::scan::Picture;
 use moiregauge::settings::Settings;
 use moiregauge_report::InputFile;
-use moiregauge_report::results::Told;
+use moiregauge_report::results::UserSpecified;
 
 use super::error::{AnalyseError, Place};
 use crate::known::Known;
@@ -21,7 +21,7 @@ pub(super) fn survey_image(
 ) -> Result<(Picture, InputFile), AnalyseError> {
     let path = Path::new(name);
     // What is known of the scans, as their size, is not known of it.
-    let known = Known::new(&Told::default(), &[path.to_owned()]).at(places);
+    let known = Known::new(&UserSpecified::default(), &[path.to_owned()]).at(places);
     let reading = read_scan(path, settings, &known).map_err(|source| AnalyseError::Beside {
         place: Place::Survey,
         file: name.to_owned(),

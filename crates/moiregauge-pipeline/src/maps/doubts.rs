@@ -25,7 +25,7 @@ pub(super) fn of_grains(grains: usize) -> Caveat {
 
 /// Says that the drift changes, where it does.
 pub(super) fn about_change(drift_change: Option<DriftChange>, caveats: &mut Vec<Caveat>) {
-    if let Some(found) = drift_change.filter(DriftChange::stands_out) {
+    if let Some(found) = drift_change.filter(DriftChange::is_significant) {
         let acceleration = found.acceleration;
         caveats.push(Caveat::new(DriftDoubt::Changes { acceleration }, "map"));
     }

@@ -234,7 +234,7 @@ fn timing(scan: &Scan, channel: &Channel) -> Option<Timing> {
 
 /// Refuses position sensors, which have no use here.
 fn no_sensors(known: &Known) -> Result<(), NoBands> {
-    let told = known.told();
+    let told = known.user_specified();
     if told.sensors.is_some() || told.x_sensor.is_some() {
         return Err(NoBands::Sensors);
     }

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use moiregauge::settings::Settings;
-use moiregauge_report::results::Told;
+use moiregauge_report::results::UserSpecified;
 use serde::{Deserialize, Serialize};
 
 use super::error::{SamplesError, at};
@@ -63,7 +63,7 @@ pub(super) struct Asked {
     /// Version of the program.
     pub(super) version: String,
     pub(super) settings: Settings,
-    pub(super) known: Told,
+    pub(super) known: UserSpecified,
 }
 
 /// The samples of a shard, when all of them are done.

@@ -77,7 +77,7 @@ pub(super) fn analysed(
 
 fn outcomes(files: &SampleFiles, with: &With, job: &Job) -> Result<Vec<Outcome>, AnalyseError> {
     let mut campaign = Campaign::new(with.asked.settings.clone())?
-        .with_told(with.asked.known.clone())?
+        .with_user_specified(with.asked.known.clone())?
         .with_advice(with.advice)
         .illustrated(true);
     let mut places = Places::new();

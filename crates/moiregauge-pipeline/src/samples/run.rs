@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use moiregauge::settings::{Settings, SettingsError};
-use moiregauge_report::results::Told;
+use moiregauge_report::results::UserSpecified;
 use moiregauge_report::{ColorMap, FailedInput, SampleRow};
 use rayon::prelude::*;
 
@@ -17,7 +17,7 @@ use super::tables;
 use crate::campaign::{Advice, no_advice};
 use crate::job::Job;
 use crate::sink::FileSink;
-use crate::told::check_told;
+use crate::told::check_user_specified;
 
 /// What is to be done with many samples.
 #[derive(Clone, Debug)]
@@ -39,10 +39,10 @@ impl Samples {
         root: &Path,
         mut all: Vec<Sample>,
         settings: Settings,
-        known: Told,
+        known: UserSpecified,
     ) -> Result<Self, SettingsError> {
         settings.check()?;
-        check_told(&known)?;
+        check_user_specified(&known)?;
         all.sort_by(|a, b| a.name.cmp(&b.name));
         Ok(Self {
             root: root.to_owned(),

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use moiregauge::settings::{Settings, SettingsError};
-use moiregauge_report::results::Told;
+use moiregauge_report::results::UserSpecified;
 use serde::{Deserialize, Serialize};
 
 use super::until::Until;
@@ -21,7 +21,7 @@ pub struct WatchRequest {
     /// Settings of the analysis.
     pub settings: Settings,
     /// What the files do not tell.
-    pub told: Told,
+    pub told: UserSpecified,
     /// The errors that are wished for.
     pub until: Until,
     /// Steps without a change after which an unreadable file is given up.
@@ -33,7 +33,7 @@ impl Default for WatchRequest {
         Self {
             folder: PathBuf::new(),
             settings: Settings::default(),
-            told: Told::default(),
+            told: UserSpecified::default(),
             until: Until::default(),
             patience: PATIENCE,
         }

@@ -45,7 +45,7 @@ impl Watch {
             return Err(WatchError::NoFolder(request.folder));
         }
         let campaign = Campaign::new(request.settings.clone())?
-            .with_told(request.told.clone())?
+            .with_user_specified(request.told.clone())?
             .trusting_dates();
         Ok(Self {
             files: Files::new(&request.folder, request.patience),
@@ -113,7 +113,7 @@ impl Watch {
         let mut seen = {
             let (files, campaign, advice) = (&mut self.files, &self.campaign, self.advice);
             // Whether all is there depends on no other file.
-            let known = Known::new(campaign.told(), &[]);
+            let known = Known::new(campaign.user_specified(), &[]);
             let whole = |path: &Path| {
                 let read = Opened::new(path, &known).and_then(|o| o.reading(campaign.settings()));
                 read.map(drop)

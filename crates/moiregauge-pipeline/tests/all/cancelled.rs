@@ -14,7 +14,7 @@ use moiregauge_pipeline::sink::{FileSink, Forget, Keep, MemorySink, Part, SinkEr
 use moiregauge_pipeline::validate::{ValidateError, ValidateRequest};
 use moiregauge_pipeline::{Cancel, Cancelled, Job, Known, Quiet, map, validate};
 use moiregauge_report::Choice;
-use moiregauge_report::results::Told;
+use moiregauge_report::results::UserSpecified;
 use spmfile::WritableFormat;
 
 use crate::small;
@@ -217,7 +217,7 @@ fn campaigns_keep_their_samples() {
     }
     let work = |out: &Path, job: &Job| {
         let all = samples_in(&root, out).unwrap();
-        let asked = Samples::new(&root, all, settings(), Told::default()).unwrap();
+        let asked = Samples::new(&root, all, settings(), UserSpecified::default()).unwrap();
         match analyse_samples(&asked, out, job) {
             Ok(_) => Some(files(out)),
             Err(SamplesError::Cancelled(_)) => None,

@@ -1,7 +1,7 @@
 //! The scan in true coordinates: every pixel where the sensors say it was, the frame that was
 //! asked for and the one that was scanned, a scale bar and the lattice vectors.
 
-use moiregauge::coverage::Patch;
+use moiregauge::coverage::LatticeRegion;
 use moiregauge::scan::Illustration;
 use nalgebra::{Matrix2, Vector2};
 
@@ -65,7 +65,7 @@ pub(super) fn draw(subject: &Subject) -> Result<Drawing, String> {
                 &Ink::line("#d55e00", LINE).dashed("4 2.5"),
             );
         }
-        for [from, to] in shown.patch.iter().flat_map(Patch::outline) {
+        for [from, to] in shown.patch.iter().flat_map(LatticeRegion::outline) {
             let at = |pixel: Vector2<f64>| {
                 let place = shown.origin + shown.pixel_to_nm * pixel;
                 axes.at(place.x, place.y)

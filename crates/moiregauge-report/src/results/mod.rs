@@ -54,7 +54,7 @@ pub use readings::{
 pub use region::{
     DeviceResult, MapDetailsResult, MaskShare, RegionMeanResult, RegionResult, WantedResult,
 };
-pub use run::{AtomicImages, Crop, FrameOrder, NamedSet, Run, Told};
+pub use run::{AtomicImages, Crop, FrameOrder, NamedSet, Run, UserSpecified};
 pub use scan::{
     CandidateResult, LineResult, ScanResult, ScanTwistStrain, ScanVector, TipVelocity, Window,
 };

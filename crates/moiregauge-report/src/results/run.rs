@@ -19,7 +19,7 @@ pub struct Run {
     pub settings: Settings,
     /// What the user said about the files.
     #[serde(default)]
-    pub known: Told,
+    pub known: UserSpecified,
     /// Sets made by hand.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub sets: Vec<NamedSet>,
@@ -51,7 +51,7 @@ pub struct Run {
 /// What files do not tell and the user does.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
-pub struct Told {
+pub struct UserSpecified {
     /// Width and height of the image from edge to edge, nm.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub size_nm: Option<[f64; 2]>,

@@ -3,7 +3,7 @@
 use axum::Json;
 use axum::extract::{Query, State};
 use moiregauge_pipeline::{Known, find, names};
-use moiregauge_report::results::Told;
+use moiregauge_report::results::UserSpecified;
 use serde::Deserialize;
 use serde_json::{Value, json};
 
@@ -80,16 +80,17 @@ pub(super) struct OfFile {
 
 /// What is known of one file.
 pub(super) fn known_of(file: &File, told: Option<&str>) -> Answer<Known> {
-    let told: Told = match told {
+    let told: UserSpecified = match told {
         Some(text) => serde_json::from_str(text).map_err(|e| Problem::wrong(e).at("known"))?,
-        None => Told::default(),
+        None => UserSpecified::default(),
     };
     known(std::slice::from_ref(file), &told)
 }
 
 /// What is told of files, and where they are.
-pub(crate) fn known(files: &[File], told: &Told) -> Answer<Known> {
-    moiregauge_pipeline::check_told(told).map_err(|e| Problem::wrong(&e).at(e.setting))?;
+pub(crate) fn known(files: &[File], told: &UserSpecified) -> Answer<Known> {
+    moiregauge_pipeline::check_user_specified(told)
+        .map_err(|e| Problem::wrong(&e).at(e.setting))?;
     if told.sensors.is_some() {
         return Err(Problem::wrong("a second file cannot be named here").at("known.sensors"));
     }

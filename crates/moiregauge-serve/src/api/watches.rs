@@ -10,7 +10,7 @@ use axum::{Json, Router};
 use moiregauge::settings::Settings;
 use moiregauge_pipeline::settings_on;
 use moiregauge_pipeline::watch::{Until, WatchRequest};
-use moiregauge_report::results::Told;
+use moiregauge_report::results::UserSpecified;
 use serde::Deserialize;
 use serde_json::{Map, Value};
 
@@ -37,7 +37,7 @@ struct Wanted {
     #[serde(default)]
     settings: Map<String, Value>,
     #[serde(default)]
-    known: Told,
+    known: UserSpecified,
 }
 
 async fn add(State(app): Shared, headers: HeaderMap, body: Body) -> Answer<Json<Value>> {

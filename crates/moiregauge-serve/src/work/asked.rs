@@ -6,7 +6,7 @@ use moiregauge::settings::Settings;
 use moiregauge_pipeline::names::in_words;
 use moiregauge_pipeline::settings_on;
 use moiregauge_report::Choice;
-use moiregauge_report::results::{Run, Told};
+use moiregauge_report::results::{Run, UserSpecified};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
@@ -27,7 +27,7 @@ pub(crate) struct Asked {
     pub(crate) excluded: Vec<String>,
     /// Without these.
     pub(crate) settings: Settings,
-    pub(crate) known: Told,
+    pub(crate) known: UserSpecified,
 }
 
 /// What a page changes. What is not there stays as it is.
@@ -37,7 +37,7 @@ pub(crate) struct Change {
     files: Option<Vec<String>>,
     excluded: Option<Vec<String>>,
     settings: Option<Map<String, Value>>,
-    known: Option<Told>,
+    known: Option<UserSpecified>,
     /// Whether it is to be analysed.
     pub(crate) run: bool,
 }
@@ -49,7 +49,7 @@ impl Asked {
             files: Vec::new(),
             excluded: Vec::new(),
             settings: Settings::default(),
-            known: Told::default(),
+            known: UserSpecified::default(),
         }
     }
 
@@ -83,7 +83,7 @@ impl Asked {
         }
         let wrong = |e: moiregauge::settings::SettingsError| Problem::wrong(&e).at(e.setting);
         self.effective().check().map_err(wrong)?;
-        moiregauge_pipeline::check_told(&self.known).map_err(wrong)?;
+        moiregauge_pipeline::check_user_specified(&self.known).map_err(wrong)?;
         if self.known.sensors.is_some() {
             return Err(Problem::wrong("a second file cannot be named here").at("known.sensors"));
         }

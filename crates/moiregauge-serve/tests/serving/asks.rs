@@ -3,7 +3,7 @@
 use moiregauge::settings::Settings;
 use moiregauge_pipeline::moire::{Given, MoireQuestion};
 use moiregauge_pipeline::samples::{Samples, analyse_samples, samples_in};
-use moiregauge_report::results::Told;
+use moiregauge_report::results::UserSpecified;
 use serde_json::json;
 
 use super::common::{Server, options, scans, scans_of};
@@ -67,7 +67,7 @@ fn tables_of_many_samples_are_shown() {
     scans(&all.join("two"), 2);
     let out = folder.path().join("results");
     let found = samples_in(&all, &out).unwrap();
-    let samples = Samples::new(&all, found, Settings::default(), Told::default()).unwrap();
+    let samples = Samples::new(&all, found, Settings::default(), UserSpecified::default()).unwrap();
     let job = moiregauge_pipeline::Job::quiet(Some(2)).unwrap();
     analyse_samples(&samples, &out, &job).unwrap();
     let server = Server::start(options(&[folder.path()]));

@@ -11,7 +11,7 @@ use spmfile::{DateTime, FrameDirection, LineDirection};
 use crate::campaign::set::assumed::AssumedDrift;
 use crate::campaign::set::bare::SetLattice;
 use crate::caveat::Caveat;
-use crate::coverage::{Change, Patch};
+use crate::coverage::{Change, LatticeRegion};
 use crate::drift::drawn::DriftMonteCarlo;
 use crate::drift::joint::found::TestedTerm;
 use crate::drift::joint::path::DriftPath;
@@ -382,7 +382,7 @@ pub struct LineAnalysis {
     /// What speaks for the lattice; `None` with the other methods, and where it was told by hand.
     pub evidence: Option<Evidence>,
     /// The part of the frame that carries the lattice; `None` for all of it.
-    pub patch: Option<Patch>,
+    pub patch: Option<LatticeRegion>,
     /// How the lattice changes across that part; `None` where it is the same everywhere, as far as can be seen.
     pub change: Option<Change>,
     /// Whether ground was taken off before it was measured.

@@ -4,7 +4,7 @@ use heterostrain::lattice::{labelled_like, reciprocal};
 use nalgebra::{Matrix2, Vector2};
 use spmfile::{DateTime, LineDirection};
 
-use crate::drift::joint::sighting::Sighting;
+use crate::drift::joint::sighting::Detection;
 use crate::frame::axis::Axis;
 use crate::numbers::three::three;
 use crate::scan::measured::{MeasuredLine, MeasuredScan};
@@ -19,7 +19,7 @@ const SAME_HARMONIC: f64 = 0.2;
 pub(crate) fn sightings(
     scans: &[&MeasuredScan],
     reference: &Matrix2<f64>,
-) -> Option<Vec<Sighting>> {
+) -> Option<Vec<Detection>> {
     let reference = reciprocal(reference)?;
     let mut classes: Vec<(Axis, LineDirection)> = Vec::new();
     let mut all = Vec::new();
@@ -39,7 +39,7 @@ pub(crate) fn sightings(
             let off = j * (line.lattice.middle - Vector2::from(middle));
             // What was used of the frame may lie early or late in it.
             let time = middle_of_frame(scan).map(|time| time + time_gradient.dot(&off));
-            all.push(Sighting {
+            all.push(Detection {
                 scan: index,
                 class,
                 block: 0,

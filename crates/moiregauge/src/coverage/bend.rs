@@ -20,7 +20,7 @@ use crate::coverage::choose::{Chosen, choose, choose_change};
 use crate::coverage::higher;
 use crate::coverage::hollows::hollows;
 use crate::coverage::nodes::{Node, View, nodes};
-use crate::coverage::patch::{Patch, WHOLE};
+use crate::coverage::patch::{LatticeRegion, WHOLE};
 use crate::coverage::phases::{Fit, fit, powers, rows};
 use crate::coverage::windows::straightened;
 use crate::numbers::exact;
@@ -136,31 +136,31 @@ impl Mean {
 }
 
 /// The mean over a patch; `None` where its phases cannot be described.
-pub(crate) fn mean(view: &View, patch: &Patch) -> Option<Mean> {
+pub(crate) fn mean(view: &View, patch: &LatticeRegion) -> Option<Mean> {
     let nodes = nodes(view, patch);
     let chosen = choose(view, patch, &nodes)?;
     Some(summary(&chosen, &nodes, view, patch))
 }
 
 /// The same without what higher harmonics put into the windows, and without what windows make of waves that bend.
-pub(crate) fn refined(view: &View, patch: &Patch) -> Option<Mean> {
+pub(crate) fn refined(view: &View, patch: &LatticeRegion) -> Option<Mean> {
     refined_by(choose, view, patch)
 }
 
 /// The same for a lattice that is known to change.
-pub(crate) fn refined_change(view: &View, patch: &Patch) -> Option<Mean> {
+pub(crate) fn refined_change(view: &View, patch: &LatticeRegion) -> Option<Mean> {
     refined_by(choose_change, view, patch)
 }
 
 fn refined_by(
-    choose: impl Fn(&View, &Patch, &[Node]) -> Option<Chosen>,
+    choose: impl Fn(&View, &LatticeRegion, &[Node]) -> Option<Chosen>,
     view: &View,
-    patch: &Patch,
+    patch: &LatticeRegion,
 ) -> Option<Mean> {
     let rough = choose(view, patch, &nodes(view, patch))?;
     let parts = higher::parts(view, patch, &rough.fit)?;
     // Waves that the envelopes stand still against: where exactly a phase holds does not matter then.
-    let patch = &Patch {
+    let patch = &LatticeRegion {
         pair: patch.pair + slopes(&rough.fit, view.cells, patch).mean,
         ..patch.clone()
     };
@@ -185,13 +185,13 @@ fn refined_by(
 }
 
 /// χ² of the best description of some nodes, its parameters, and the number of independent phases that it describes.
-pub(crate) fn described(view: &View, patch: &Patch, nodes: &[Node]) -> Option<[f64; 3]> {
+pub(crate) fn described(view: &View, patch: &LatticeRegion, nodes: &[Node]) -> Option<[f64; 3]> {
     let fit = choose(view, patch, nodes)?.fit;
     Some([fit.chi2, fit.coefficients.len() as f64, fit.independent])
 }
 
 /// The same for one lattice that is the same everywhere; `None` where the phases are not those of one.
-pub(crate) fn described_as_straight(patch: &Patch, nodes: &[Node]) -> Option<[f64; 3]> {
+pub(crate) fn described_as_straight(patch: &LatticeRegion, nodes: &[Node]) -> Option<[f64; 3]> {
     let fit = fit(powers(patch, 1), nodes)?;
     let straight = fit.left < LEFT;
     straight.then_some([fit.chi2, fit.coefficients.len() as f64, fit.independent])
@@ -210,7 +210,7 @@ struct Slopes {
 }
 
 /// The cells of which the mean is told: those of the patch; all where it is everywhere but for small gaps.
-fn area<'a>(cells: &Cells, patch: &'a Patch) -> Cow<'a, [bool]> {
+fn area<'a>(cells: &Cells, patch: &'a LatticeRegion) -> Cow<'a, [bool]> {
     if patch.share > WHOLE {
         cells.counts().iter().map(|count| *count > 0.0).collect()
     } else {
@@ -218,7 +218,7 @@ fn area<'a>(cells: &Cells, patch: &'a Patch) -> Cow<'a, [bool]> {
     }
 }
 
-fn slopes(fit: &Fit, cells: &Cells, patch: &Patch) -> Slopes {
+fn slopes(fit: &Fit, cells: &Cells, patch: &LatticeRegion) -> Slopes {
     let n = fit.basis.len();
     let inside = area(cells, patch);
     let lines = (0..cells.size[1]).into_par_iter().map(|row| {
@@ -273,7 +273,7 @@ fn otherwise(
     step: &Matrix2<f64>,
     nodes: &[Node],
     view: &View,
-    patch: &Patch,
+    patch: &LatticeRegion,
 ) -> Otherwise {
     let inner = || {
         let least = nodes.iter().map(|n| n.gain).fold(f64::INFINITY, f64::min);
@@ -297,7 +297,7 @@ fn otherwise(
     }
 }
 
-fn summary(chosen: &Chosen, nodes: &[Node], view: &View, patch: &Patch) -> Mean {
+fn summary(chosen: &Chosen, nodes: &[Node], view: &View, patch: &LatticeRegion) -> Mean {
     let cells = view.cells;
     let fit = &chosen.fit;
     let reach = Vector2::from_fn(|axis, _| view.width * view.cells.period[axis]);
@@ -353,7 +353,7 @@ fn summary(chosen: &Chosen, nodes: &[Node], view: &View, patch: &Patch) -> Mean 
 /// What the mean owes to where the patch begins and ends on the sample: moved by x, it changes by x times the mean of
 /// the second derivatives of the phases. A place is known to a period at most, evenly: 1/√12 of it, and where the frame ends to a share of
 /// that.
-fn edges(fit: &Fit, cells: &Cells, patch: &Patch, mean: &Matrix2<f64>) -> Matrix4<f64> {
+fn edges(fit: &Fit, cells: &Cells, patch: &LatticeRegion, mean: &Matrix2<f64>) -> Matrix4<f64> {
     let local = |cell: [usize; 2]| {
         let mut slopes = Matrix2::<f64>::zeros();
         for (i, [_, along, across]) in fit.basis.at(cells.middle(cell)) {

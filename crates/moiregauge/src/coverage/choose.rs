@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use crate::coverage::bend::ChangeModel;
 use crate::coverage::nodes::{Node, View};
-use crate::coverage::patch::Patch;
+use crate::coverage::patch::LatticeRegion;
 use crate::coverage::phases::{Basis, Fit, fit, powers};
 use crate::numbers::splines::Splines;
 
@@ -31,7 +31,7 @@ pub(crate) struct Chosen {
 }
 
 /// The best description; a change only where the data pay for it (BIC).
-pub(crate) fn choose(view: &View, patch: &Patch, nodes: &[Node]) -> Option<Chosen> {
+pub(crate) fn choose(view: &View, patch: &LatticeRegion, nodes: &[Node]) -> Option<Chosen> {
     let straight = fit(powers(patch, 1), nodes)?;
     let even = (ChangeModel::Even, powers(patch, 2));
     let fits = changes(view, patch, nodes, vec![even]);
@@ -50,7 +50,7 @@ pub(crate) fn choose(view: &View, patch: &Patch, nodes: &[Node]) -> Option<Chose
 }
 
 /// The best description of a lattice that is known to change; of a few periods cubic polynomials say it in fewer numbers than splines.
-pub(crate) fn choose_change(view: &View, patch: &Patch, nodes: &[Node]) -> Option<Chosen> {
+pub(crate) fn choose_change(view: &View, patch: &LatticeRegion, nodes: &[Node]) -> Option<Chosen> {
     let straight = fit(powers(patch, 1), nodes)?;
     let even = (ChangeModel::Even, powers(patch, 2));
     let cubic = (ChangeModel::Cubic, powers(patch, 3));
@@ -67,7 +67,7 @@ fn cheapest(fits: &[(ChangeModel, Fit)]) -> Option<usize> {
 /// The phases by some powers, and by splines of as many cells as their windows see.
 fn changes(
     view: &View,
-    patch: &Patch,
+    patch: &LatticeRegion,
     nodes: &[Node],
     powers: Vec<(ChangeModel, Basis)>,
 ) -> Vec<(ChangeModel, Fit)> {

@@ -9,7 +9,7 @@ use rustfft::num_complex::Complex64;
 use crate::coverage::bend::{described, described_as_straight};
 use crate::coverage::cells::Cells;
 use crate::coverage::nodes::{Node, View, information, neighbours, nodes};
-use crate::coverage::patch::Patch;
+use crate::coverage::patch::LatticeRegion;
 use crate::coverage::phases::{Fit, fit, freedom, powers, price, rows, value};
 
 /// Nodes from which lattices are followed, about.
@@ -39,7 +39,7 @@ const NEITHER: f64 = 0.8;
 /// Two lattices side by side.
 pub(crate) struct Grains {
     /// Where windows see one of them alone; the larger first.
-    pub(crate) patches: [Patch; 2],
+    pub(crate) patches: [LatticeRegion; 2],
     /// Shares of the pixels that there are, as far as the boundary.
     pub(crate) shares: [f64; 2],
     /// Length of the boundary between them along columns and along rows, pixels: the legs of a straight line.
@@ -47,7 +47,7 @@ pub(crate) struct Grains {
 }
 
 /// The two grains of a patch; `None` where one lattice describes all of the patch as well.
-pub(crate) fn split(view: &View, patch: &Patch) -> Option<Grains> {
+pub(crate) fn split(view: &View, patch: &LatticeRegion) -> Option<Grains> {
     let all = nodes(view, patch);
     if all.len() < 2 * FEWEST_NODES {
         return None;
@@ -128,7 +128,7 @@ fn nearer(node: &Node, fits: [&Fit; 2]) -> Option<usize> {
 }
 
 /// To which of two lattices each node belongs: of all that are found from nodes, the two that describe most nodes together.
-fn halves(patch: &Patch, nodes: &[Node]) -> Option<Vec<Option<usize>>> {
+fn halves(patch: &LatticeRegion, nodes: &[Node]) -> Option<Vec<Option<usize>>> {
     let stride = ((nodes.len() as f64 / SEEDS).sqrt().round() as usize).max(1);
     let seeds = nodes
         .iter()
@@ -153,7 +153,7 @@ fn halves(patch: &Patch, nodes: &[Node]) -> Option<Vec<Option<usize>>> {
 }
 
 /// The lattice at a node, from ever wider surroundings as far as they are of it.
-fn grown(patch: &Patch, nodes: &[Node], seed: [usize; 2]) -> Option<Fit> {
+fn grown(patch: &LatticeRegion, nodes: &[Node], seed: [usize; 2]) -> Option<Fit> {
     let far = |node: &Node| (0..2).map(|i| node.place[i].abs_diff(seed[i])).max();
     let within = |reach: usize| nodes.iter().filter(move |node| far(node) <= Some(reach));
     let around: Vec<Node> = within(1).cloned().collect();
@@ -175,7 +175,7 @@ fn grown(patch: &Patch, nodes: &[Node], seed: [usize; 2]) -> Option<Fit> {
 /// The grain to whose nodes each cell of a patch is nearest.
 fn nearest(
     cells: &Cells,
-    patch: &Patch,
+    patch: &LatticeRegion,
     nodes: &[Node],
     owner: &[Option<usize>],
 ) -> Vec<Option<usize>> {
@@ -227,11 +227,11 @@ fn boundary(cells: &Cells, of: &[Option<usize>]) -> [f64; 2] {
 /// The cells whose nearest nodes all belong to one grain.
 fn grain(
     cells: &Cells,
-    patch: &Patch,
+    patch: &LatticeRegion,
     nodes: &[Node],
     owner: &[Option<usize>],
     which: usize,
-) -> Patch {
+) -> LatticeRegion {
     let mut inside = vec![false; patch.inside.len()];
     let scale = cells.period;
     for cell in (0..inside.len()).filter(|&c| patch.inside[c]) {
@@ -260,7 +260,7 @@ fn grain(
         .map(|(_, n)| n)
         .sum();
     let share = there / counts.iter().sum::<f64>();
-    Patch {
+    LatticeRegion {
         unit_cells: there * patch.pair.determinant().abs() / std::f64::consts::TAU.powi(2),
         share,
         inside,

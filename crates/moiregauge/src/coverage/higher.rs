@@ -9,7 +9,7 @@ use rustfft::num_complex::Complex64;
 
 use crate::coverage::cells::Cells;
 use crate::coverage::nodes::View;
-use crate::coverage::patch::Patch;
+use crate::coverage::patch::LatticeRegion;
 use crate::coverage::phases::Fit;
 use crate::frame::image::Image;
 use crate::numbers::median::median;
@@ -52,7 +52,7 @@ pub(crate) struct Parts {
 }
 
 /// Takes the higher harmonics off. `fit`: how the phases of the first waves run.
-pub(crate) fn parts(view: &View, patch: &Patch, fit: &Fit) -> Option<Parts> {
+pub(crate) fn parts(view: &View, patch: &LatticeRegion, fit: &Fit) -> Option<Parts> {
     let image = view.image;
     let names: Vec<[i32; 2]> = FIRST
         .into_iter()
@@ -113,7 +113,7 @@ pub(crate) fn parts(view: &View, patch: &Patch, fit: &Fit) -> Option<Parts> {
 fn waves(
     view: &View,
     fit: &Fit,
-    patch: &Patch,
+    patch: &LatticeRegion,
     [at, place]: [Vector2<f64>; 2],
     names: &[[i32; 2]],
 ) -> DVector<f64> {
@@ -142,7 +142,7 @@ impl Parts {
     pub(crate) fn noise(
         &self,
         cells: &Cells,
-        patch: &Patch,
+        patch: &LatticeRegion,
         periods: f64,
         places: &[[Vector2<f64>; 2]; 3],
     ) -> [f64; 3] {

@@ -6,7 +6,7 @@ use rustfft::num_complex::Complex64;
 
 use crate::coverage::cells::{Cells, Nine, Window, together};
 use crate::coverage::hollows::hollows;
-use crate::coverage::patch::Patch;
+use crate::coverage::patch::LatticeRegion;
 use crate::frame::image::Image;
 use crate::numbers::median::median;
 use crate::numbers::three::three;
@@ -47,13 +47,13 @@ pub(crate) struct Seen {
 
 impl Seen {
     /// Amplitude over noise amplitude in one resolution cell of the patch, weakest of the three waves.
-    pub(crate) fn signal_to_noise(&self, cells: &Cells, patch: &Patch) -> f64 {
+    pub(crate) fn signal_to_noise(&self, cells: &Cells, patch: &LatticeRegion) -> f64 {
         let weakest = self.weights.iter().copied().fold(f64::INFINITY, f64::min);
         (weakest * self.windows(cells, patch)).sqrt()
     }
 
     /// Independent windows in a patch.
-    fn windows(&self, cells: &Cells, patch: &Patch) -> f64 {
+    fn windows(&self, cells: &Cells, patch: &LatticeRegion) -> f64 {
         let inside = patch.inside.iter().zip(cells.counts());
         let pixels: f64 = inside.filter(|(i, _)| **i).map(|(_, n)| n).sum();
         let [a, b] = [0, 1].map(|axis| self.width * cells.period[axis]);
@@ -66,7 +66,7 @@ impl Seen {
     }
 
     /// Power over noise of the three waves in one resolution cell of the patch, in sum.
-    pub(crate) fn evidence(&self, cells: &Cells, patch: &Patch) -> f64 {
+    pub(crate) fn evidence(&self, cells: &Cells, patch: &LatticeRegion) -> f64 {
         self.weights.iter().sum::<f64>() * self.windows(cells, patch)
     }
 }

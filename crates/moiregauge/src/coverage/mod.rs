@@ -24,4 +24,4 @@ pub(crate) mod tiles;
 pub(crate) mod windows;
 
 pub use bend::{Change, ChangeModel};
-pub use patch::Patch;
+pub use patch::LatticeRegion;

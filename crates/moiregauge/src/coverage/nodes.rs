@@ -5,7 +5,7 @@ use rustfft::num_complex::Complex64;
 
 use crate::coverage::cells::Cells;
 use crate::coverage::local::{Local, local};
-use crate::coverage::patch::Patch;
+use crate::coverage::patch::LatticeRegion;
 use crate::frame::departure::Departure;
 use crate::frame::image::Image;
 use crate::numbers::three::three;
@@ -68,7 +68,7 @@ pub(crate) struct Node {
 }
 
 /// The nodes of a patch at which the three waves can be told apart.
-pub(crate) fn nodes(view: &View, patch: &Patch) -> Vec<Node> {
+pub(crate) fn nodes(view: &View, patch: &LatticeRegion) -> Vec<Node> {
     let cells = view.cells;
     let width = [0, 1].map(|axis| view.width * cells.period[axis]);
     let apart = if patch.unit_cells > LARGE {

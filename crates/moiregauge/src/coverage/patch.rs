@@ -13,7 +13,7 @@ pub(crate) const WHOLE: f64 = 0.95;
 /// The part of a frame that carries a lattice.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
-pub struct Patch {
+pub struct LatticeRegion {
     /// The mean waves over it, rad per pixel.
     #[serde(with = "exact")]
     pub pair: Matrix2<f64>,
@@ -31,7 +31,7 @@ pub struct Patch {
     pub unit_cells: f64,
 }
 
-impl Patch {
+impl LatticeRegion {
     /// The cell of the pixel at (column, row).
     fn cell(&self, [column, row]: [usize; 2]) -> usize {
         let cell = |axis: usize, at: usize| (at / self.pixels[axis]).min(self.size[axis] - 1);

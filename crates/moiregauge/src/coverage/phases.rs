@@ -10,7 +10,7 @@ use rustfft::num_complex::Complex64;
 
 use crate::coverage::equations::{Functions, Sums};
 use crate::coverage::nodes::{Node, information, neighbours};
-use crate::coverage::patch::Patch;
+use crate::coverage::patch::LatticeRegion;
 use crate::numbers::normal_equations::NormalEquations;
 use crate::numbers::splines::Splines;
 
@@ -219,7 +219,7 @@ impl Near {
 }
 
 /// Powers of x and y up to a degree, on the extent of a patch.
-pub(crate) fn powers(patch: &Patch, degree: usize) -> Basis {
+pub(crate) fn powers(patch: &LatticeRegion, degree: usize) -> Basis {
     let [low, high] = patch.corners();
     Basis::Powers {
         degree,

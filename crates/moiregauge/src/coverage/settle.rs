@@ -16,7 +16,7 @@ use crate::coverage::cells::{Cells, Window};
 use crate::coverage::grains::{Grains, split};
 use crate::coverage::look::{Frame, Seen};
 use crate::coverage::nodes::View;
-use crate::coverage::patch::{Patch, WHOLE, unit_cells_per_pixel};
+use crate::coverage::patch::{LatticeRegion, WHOLE, unit_cells_per_pixel};
 use crate::coverage::sides::without_tails;
 use crate::frame::departure::Departure;
 use crate::frame::geometry::Geometry;
@@ -173,7 +173,7 @@ impl<'a> Windows<'a> {
 }
 
 /// The patch of the cells that show the waves of a pair; `None` where they are too few.
-fn patch(cells: &Cells, inside: &[bool], pair: &Matrix2<f64>) -> Option<Patch> {
+fn patch(cells: &Cells, inside: &[bool], pair: &Matrix2<f64>) -> Option<LatticeRegion> {
     let mut inside = shrunk(cells, &tidy(cells, inside, pair));
     for (inside, count) in inside.iter_mut().zip(cells.counts()) {
         *inside &= *count > 0.0;
@@ -184,7 +184,7 @@ fn patch(cells: &Cells, inside: &[bool], pair: &Matrix2<f64>) -> Option<Patch> {
     }
     let there = inside.iter().zip(cells.counts()).filter(|(i, _)| **i);
     let share = there.map(|(_, n)| n).sum::<f64>() / cells.counts().iter().sum::<f64>();
-    Some(Patch {
+    Some(LatticeRegion {
         // That of the envelopes.
         pair: *pair,
         size: cells.size,
@@ -202,11 +202,11 @@ pub(crate) struct Settled {
     cells: Cells,
     seen: Seen,
     /// The patch in bins.
-    inner: Patch,
+    inner: LatticeRegion,
     /// Pixels of a bin along each axis.
     bins: usize,
     /// The patch in pixels.
-    pub(crate) patch: Patch,
+    pub(crate) patch: LatticeRegion,
     /// How far from its own place each bin is on a straight grid, bins; `None` of a straight scanner.
     displacement: Option<Departure>,
 }

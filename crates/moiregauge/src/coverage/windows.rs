@@ -8,13 +8,18 @@ use nalgebra::Vector2;
 use rustfft::num_complex::Complex64;
 
 use crate::coverage::nodes::{Node, View, nodes};
-use crate::coverage::patch::Patch;
+use crate::coverage::patch::LatticeRegion;
 use crate::coverage::phases::{Fit, rows, value};
 use crate::frame::image::Image;
 use crate::numbers::three::three;
 
 /// The nodes without what their windows do to waves that run as `fit` says; `read`: what was read at them.
-pub(crate) fn straightened(view: &View, patch: &Patch, read: &[Node], fit: &Fit) -> Vec<Node> {
+pub(crate) fn straightened(
+    view: &View,
+    patch: &LatticeRegion,
+    read: &[Node],
+    fit: &Fit,
+) -> Vec<Node> {
     let image = drawn(view, patch, read, fit);
     let seen = nodes(
         &View {
@@ -41,7 +46,7 @@ pub(crate) fn straightened(view: &View, patch: &Patch, read: &[Node], fit: &Fit)
 }
 
 /// Three waves with the phases of a description and the mean amplitudes of some nodes; missing where the image is.
-fn drawn(view: &View, patch: &Patch, nodes: &[Node], fit: &Fit) -> Image {
+fn drawn(view: &View, patch: &LatticeRegion, nodes: &[Node], fit: &Fit) -> Image {
     let image = view.image;
     let amplitudes = [0, 1, 2].map(|i| nodes.iter().map(|n| n.envelopes[i].norm()).sum::<f64>());
     let waves = three(&patch.pair);

@@ -17,7 +17,7 @@ pub(crate) mod paper;
 pub(crate) mod shares;
 
 pub use drawn::DriftMonteCarlo;
-pub use joint::{DriftPath, JointFit, LeftOut, Resampled, Sighting, Terms, TestedTerm, fit};
+pub use joint::{Detection, DriftPath, JointFit, LeftOut, Resampled, Terms, TestedTerm, fit};
 pub use linear::{DriftError, DriftSolution, Observation, solve};
 pub use monte_carlo::monte_carlo;
 pub use shares::Statistical;

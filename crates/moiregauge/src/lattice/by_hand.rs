@@ -87,7 +87,7 @@ pub(crate) fn measure_by_hand(
         return start.measure(method);
     }
     let near = first.and_then(|pair| Start::near(image, geometry, background, &pair));
-    if let Some(start) = near.filter(Start::stands_out) {
+    if let Some(start) = near.filter(Start::is_significant) {
         return start.measure(method);
     }
     // Ground that is stronger than its waves hides it.

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use heterostrain::lattice::shortest_pair;
 use nalgebra::Matrix2;
 
-use crate::coverage::patch::Patch;
+use crate::coverage::patch::LatticeRegion;
 use crate::frame::background::Background;
 use crate::frame::geometry::Geometry;
 use crate::frame::image::Image;
@@ -118,7 +118,7 @@ pub(crate) fn of_first_shell(
 /// The lattice of some pair of waves (rad per pixel) in a part of an image, or in all of it; `None` where it cannot be measured.
 pub(crate) fn measure_pair(
     pair: &Matrix2<f64>,
-    part: Option<&Patch>,
+    part: Option<&LatticeRegion>,
     image: &Image,
     geometry: &Geometry,
     background: Background,
@@ -155,7 +155,7 @@ pub(crate) fn beside(found: &MeasuredLattice) -> Option<ForeignWave> {
         .fit
         .as_ref()?
         .foreign_wave
-        .filter(ForeignWave::stands_out)
+        .filter(ForeignWave::is_significant)
 }
 
 /// The lattice of the whole frame or, where it does not cover it, of the part that it covers. The background is off already.

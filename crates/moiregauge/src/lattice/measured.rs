@@ -5,7 +5,7 @@ use nalgebra::{Matrix2, Vector2};
 use serde::{Deserialize, Serialize};
 
 use crate::coverage::bend::Change;
-use crate::coverage::patch::Patch;
+use crate::coverage::patch::LatticeRegion;
 use crate::explain::cells::{BETTER, MOST};
 use crate::explain::table::Row;
 use crate::lattice::common::Common;
@@ -52,7 +52,7 @@ pub struct MeasuredLattice {
     #[serde(with = "exact")]
     pub pixels: Lattice<Px>,
     /// The part of the frame that carries the lattice; `None` for all of it.
-    pub patch: Option<Patch>,
+    pub patch: Option<LatticeRegion>,
     /// Side of the window of the running median that was taken off as ground, pixels; `None` where nothing was.
     #[serde(with = "exact", default, skip_serializing_if = "Option::is_none")]
     pub ground: Option<f64>,

@@ -11,7 +11,7 @@ use nalgebra::{Matrix2, Vector2};
 use crate::coverage::bend::Mean;
 use crate::coverage::find::{pitch, same};
 use crate::coverage::grains::Grains;
-use crate::coverage::patch::{Patch, WHOLE};
+use crate::coverage::patch::{LatticeRegion, WHOLE};
 use crate::coverage::settle::{Settled, settle, settle_in_bins};
 use crate::frame::background::{Background, remove_background};
 use crate::frame::clip::cut_off;
@@ -44,7 +44,7 @@ pub struct Start {
     /// (columns, rows).
     size: [usize; 2],
     /// The part of the frame that carries the lattice; `None` for all of it.
-    patch: Option<Patch>,
+    patch: Option<LatticeRegion>,
     /// The mean lattice, where it changes.
     mean: Option<Mean>,
     /// Other grains.
@@ -141,7 +141,7 @@ impl Start {
 
     /// The same on a part of an image; `None` for all of it.
     pub(crate) fn at_on(
-        part: Option<&Patch>,
+        part: Option<&LatticeRegion>,
         image: &Image,
         geometry: &Geometry,
         background: Background,
@@ -151,7 +151,7 @@ impl Start {
             return Self::at(image, geometry, background, pair);
         };
         let start = Self::at(&part.of(image), geometry, background, pair)?;
-        let patch = Some(Patch {
+        let patch = Some(LatticeRegion {
             pair: start.pair(),
             ..part.clone()
         });
@@ -195,7 +195,7 @@ impl Start {
     }
 
     /// Whether its harmonics cannot be chance.
-    pub(crate) fn stands_out(&self) -> bool {
+    pub(crate) fn is_significant(&self) -> bool {
         verdict(&self.prepared.harmonics) == Verdict::Lattice
     }
 
@@ -276,7 +276,7 @@ impl Start {
     /// The lattice of the first of two grains; the other is beside it.
     fn grain(&self, image: &Image, grains: Grains) -> Option<Self> {
         let [largest, other] = grains.patches;
-        let within = |patch: &Patch| {
+        let within = |patch: &LatticeRegion| {
             let mut found = self.of_grain(image, patch)?;
             // Those in a grain have shares of that.
             for grain in &mut found.others {
@@ -301,7 +301,7 @@ impl Start {
     }
 
     /// The lattice of one grain.
-    fn of_grain(&self, image: &Image, grain: &Patch) -> Option<Self> {
+    fn of_grain(&self, image: &Image, grain: &LatticeRegion) -> Option<Self> {
         let (geometry, background) = (&self.geometry, self.background);
         let flat = remove_background(&grain.of(image), background);
         let mut again = settle(&flat, &grain.pair, pitch(geometry))?.on(geometry);

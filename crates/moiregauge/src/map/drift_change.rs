@@ -27,7 +27,7 @@ pub struct DriftChange {
 
 impl DriftChange {
     /// Whether it is more than chance (p < 0.01).
-    pub fn stands_out(&self) -> bool {
+    pub fn is_significant(&self) -> bool {
         self.chi2 > MORE_THAN_CHANCE
     }
 }

@@ -440,12 +440,12 @@ fn changing_drift_is_told_from_strain() {
     };
     let gradient = Vector2::new(0.0, u);
     let found = drift_change(&of(1.0, 1), &of(-1.0, 2), gradient).unwrap();
-    assert!(found.stands_out(), "{found:?}");
+    assert!(found.is_significant(), "{found:?}");
     for i in 0..2 {
         let error = found.acceleration[i].value - 2.0 * acceleration[i];
         assert!(error.abs() < 4.0 * found.acceleration[i].sigma, "{found:?}");
         assert!(error.abs() < 0.3 * acceleration.norm(), "{found:?}");
     }
     let same = drift_change(&of(1.0, 3), &of(1.0, 4), gradient).unwrap();
-    assert!(!same.stands_out(), "{same:?}");
+    assert!(!same.is_significant(), "{same:?}");
 }

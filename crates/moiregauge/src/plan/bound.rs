@@ -19,7 +19,7 @@ use heterostrain::strain::twist_strain;
 use nalgebra::{Matrix2, Matrix4, Vector2};
 
 use crate::drift::joint::choose::fit;
-use crate::drift::joint::sighting::Sighting;
+use crate::drift::joint::sighting::Detection;
 use crate::numbers::three::three;
 use crate::simulate::settings::Simulation;
 use crate::simulate::simulator::Simulator;
@@ -67,7 +67,7 @@ pub(crate) fn ideal_sightings(
     simulator: &Simulator,
     linked: bool,
     line_noise: bool,
-) -> Option<(Vec<Sighting>, Matrix2<f64>, Vector2<f64>)> {
+) -> Option<(Vec<Detection>, Matrix2<f64>, Vector2<f64>)> {
     let settings = simulator.settings();
     let offsets = if line_noise {
         Lines::of(settings)
@@ -87,7 +87,7 @@ pub(crate) fn ideal_sightings(
         let lines = [Some(0), settings.raster.retrace.then_some(1)];
         for class in lines.into_iter().flatten() {
             let image = ideal(simulator, frame, &pair, &drift, class, &offsets)?;
-            sightings.push(Sighting {
+            sightings.push(Detection {
                 scan,
                 phases: image.phases.filter(|_| linked),
                 ..image
@@ -106,7 +106,7 @@ fn ideal(
     drift: &Vector2<f64>,
     class: usize,
     lines: &Lines,
-) -> Option<Sighting> {
+) -> Option<Detection> {
     let [[a, b], [c, d]] = frame.pixel_to_nm;
     let j = Matrix2::new(a, b, c, d);
     let tau = Vector2::from(if class == 0 {
@@ -122,7 +122,7 @@ fn ideal(
     let middle = Vector2::from(frame.origin_nm) + j * last / 2.0;
     let place = middle - drift * time;
     let phases = Phases::independent(three(pair).map(|g| g.dot(&place)), variances);
-    Some(Sighting {
+    Some(Detection {
         scan: 0,
         class,
         block: 0,

@@ -16,7 +16,7 @@ use nalgebra::{Matrix2, Matrix4};
 
 use crate::drift::joint::choose::foreseen;
 use crate::drift::joint::found::JointFit;
-use crate::drift::joint::sighting::Sighting;
+use crate::drift::joint::sighting::Detection;
 use crate::drift::shares::Statistical;
 use crate::meaning::budget::{Budget, Source};
 use crate::plan::bound::ideal_sightings;
@@ -149,7 +149,7 @@ fn added(a: &Prediction, b: &Prediction) -> Prediction {
 }
 
 fn at_one_orientation(sets: &[Simulation], settings: &Settings) -> Option<Prediction> {
-    let mut sightings: Vec<Sighting> = Vec::new();
+    let mut sightings: Vec<Detection> = Vec::new();
     let mut start = None;
     let (mut signal_to_noise, mut periods) = (f64::INFINITY, f64::INFINITY);
     for set in sets {
@@ -162,7 +162,7 @@ fn at_one_orientation(sets: &[Simulation], settings: &Settings) -> Option<Predic
         let step = Matrix2::from(simulator.truth().frames.first()?.pixel_to_nm).transpose();
         for image in images {
             let sensor = of_sensors(&image, set, &step)?;
-            sightings.push(Sighting {
+            sightings.push(Detection {
                 scan: image.scan + scan,
                 class: image.class + class,
                 waves: Waves::new(image.waves.basis, image.waves.covariance + sensor),
@@ -214,7 +214,7 @@ fn real(fit: &JointFit) -> Option<(Lattice, Statistical)> {
 
 /// What noise of the sensors does to wave vectors. The planes through both have steps with the variances
 /// `12 σ²/(N (n² − 1))` along columns and rows, and `K = J⁻ᵀ q` changes by `−J⁻ᵀ dJᵀ K`.
-fn of_sensors(image: &Sighting, set: &Simulation, step: &Matrix2<f64>) -> Option<Matrix4<f64>> {
+fn of_sensors(image: &Detection, set: &Simulation, step: &Matrix2<f64>) -> Option<Matrix4<f64>> {
     let mut covariance = Matrix4::zeros();
     if !set.raster.sensors {
         return Some(covariance);

@@ -180,7 +180,7 @@ pub(crate) fn about_fit(
     geometry: &Geometry,
     caveats: &mut Vec<Caveat>,
 ) {
-    if let Some(change) = fit.inhomogeneity.filter(Inhomogeneity::stands_out) {
+    if let Some(change) = fit.inhomogeneity.filter(Inhomogeneity::is_significant) {
         caveats.push(Caveat::new(
             LatticeDoubt::Inhomogeneous {
                 wavelength: change.wavelength,
@@ -201,7 +201,7 @@ pub(crate) fn about_fit(
             file,
         ));
     }
-    let Some(wave) = fit.foreign_wave.filter(ForeignWave::stands_out) else {
+    let Some(wave) = fit.foreign_wave.filter(ForeignWave::is_significant) else {
         return;
     };
     let Some(inverse) = geometry.pixel_to_nm.try_inverse() else {

@@ -4,7 +4,7 @@ use heterostrain::lattice::{Lattice, Px};
 use nalgebra::{Matrix2, Vector2};
 use spmfile::LineDirection;
 
-use crate::coverage::Patch;
+use crate::coverage::LatticeRegion;
 use crate::frame::image::Image;
 
 /// One scan in detail, for the figures.
@@ -33,7 +33,7 @@ pub struct Illustration {
     /// The measured lattice in pixels.
     pub lattice: Lattice<Px>,
     /// The part of the image that carries it; `None` for all of it, or where only a part was looked at.
-    pub patch: Option<Patch>,
+    pub patch: Option<LatticeRegion>,
     /// The sensor of the fast axis along the middle line: column, measured nm, fitted nm.
     pub sensor_line: Vec<[f64; 3]>,
     /// Fast tip velocity of every line, nm/s.

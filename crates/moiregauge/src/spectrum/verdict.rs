@@ -72,10 +72,10 @@ pub(crate) fn verdict(harmonics: &Harmonics) -> Verdict {
         s.sort_by(|a, b| b.total_cmp(a));
         s
     };
-    let stands_out = |s: [f64; 3]| s[1] > SECOND && s[2] > THIRD;
+    let is_significant = |s: [f64; 3]| s[1] > SECOND && s[2] > THIRD;
     let first = shell(&harmonics.list[..3]);
-    let second = stands_out(shell(&harmonics.list[3..harmonics.list.len().min(6)]));
-    if stands_out(first) || (second && first[1] > THIRD) {
+    let second = is_significant(shell(&harmonics.list[3..harmonics.list.len().min(6)]));
+    if is_significant(first) || (second && first[1] > THIRD) {
         Verdict::Lattice
     } else if second || first[1] > SECOND {
         Verdict::Doubtful

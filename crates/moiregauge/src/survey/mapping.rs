@@ -102,7 +102,7 @@ pub fn map_grain(
     method: MapMethod,
     resolution: &Resolution,
 ) -> Result<Vec<LineMap>, MapError> {
-    let wanted = (method, resolution, Part::Patch);
+    let wanted = (method, resolution, Part::LatticeRegion);
     map_lines(scan, analysed, origin, settings, wanted)
 }
 
@@ -112,7 +112,7 @@ enum Part {
     /// All of it: nodes say themselves whether they are of the lattice.
     Frame,
     /// The patch that the lattice was measured on: beside it is another.
-    Patch,
+    LatticeRegion,
 }
 
 fn map_lines(
@@ -169,7 +169,7 @@ fn map_line(
         MapMethod::Tiles => 1.0,
     };
     resolution.fits(geometry.extent(), widths)?;
-    let patch = found.patch.as_ref().filter(|_| part == Part::Patch);
+    let patch = found.patch.as_ref().filter(|_| part == Part::LatticeRegion);
     let (map, harmonics, noise_measured, margin) = match method {
         MapMethod::Demodulation => {
             let mut image = flat_image_of(channel, settings.background);

@@ -299,7 +299,7 @@ fn a_second_lattice_stands_out() {
     let mut scene = Scene::new([160, 160], 8.0, 0.2, Contrast::Spots, 9);
     scene.white = 1.0;
     let alone = fit(&scene.image(), &scene).fit.unwrap();
-    assert!(!alone.foreign_wave.unwrap().stands_out());
+    assert!(!alone.foreign_wave.unwrap().is_significant());
     let other = Scene::new([160, 160], 11.0, 0.7, Contrast::Cosines, 10);
     let mut both = scene.clone();
     both.waves.extend(other.waves.iter().map(|w| Wave {
@@ -309,7 +309,7 @@ fn a_second_lattice_stands_out() {
     let measured = fit(&both.image(), &both);
     assert!(scene.error(&measured.pixels.basis).norm() < 0.01 * scene.basis.norm());
     let wave = measured.fit.unwrap().foreign_wave.unwrap();
-    assert!(wave.stands_out());
+    assert!(wave.is_significant());
     let cycle = std::f64::consts::TAU / 160.0;
     let near = |w: &Wave| {
         let q = wave.wave_vector;
@@ -350,7 +350,7 @@ fn stripes_move_no_wave_vector() {
     assert!((0.8..1.25).contains(&ratio), "{ratio}");
     let scene = striped(1);
     let fit = fit(&scene.image(), &scene).fit.unwrap();
-    assert!(fit.foreign_wave.unwrap().stands_out());
+    assert!(fit.foreign_wave.unwrap().is_significant());
 }
 
 /// A wavelength that grows by 1 % across the frame is found, and its size; a second lattice it is not.
@@ -363,7 +363,7 @@ fn a_changing_lattice_is_pointed_out() {
         (scene.white, scene.line, scene.change) = (white, 0.5 * white, 0.01);
         let fit = fit(&scene.image(), &scene).fit.unwrap();
         let found = fit.inhomogeneity.unwrap();
-        assert!(found.stands_out(), "seed {seed}: {found:?}");
+        assert!(found.is_significant(), "seed {seed}: {found:?}");
         // q along x changes by 1 %: of |q| that is the square of its cosine, of its direction the
         // product of sine and cosine.
         let mut expected = [0.0f64; 2];
@@ -382,7 +382,7 @@ fn a_changing_lattice_is_pointed_out() {
         };
         near(found.wavelength, expected[0]);
         near(found.angle, expected[1]);
-        assert!(!fit.foreign_wave.unwrap().stands_out(), "seed {seed}");
+        assert!(!fit.foreign_wave.unwrap().is_significant(), "seed {seed}");
     }
 }
 
@@ -411,7 +411,7 @@ fn the_mean_of_a_lattice_that_changes_is_that_over_the_area() {
         (scene.white, scene.line, scene.bow) = (0.5, 0.1, 0.005);
         let measured = fit(&scene.image(), &scene);
         let change = measured.fit.as_ref().and_then(|fit| fit.inhomogeneity);
-        by_fit += usize::from(change.is_some_and(|change| change.stands_out()));
+        by_fit += usize::from(change.is_some_and(|change| change.is_significant()));
         squares += pull(&scene, &measured).norm_squared() / 4.0;
     }
     let rms = (squares / 20.0).sqrt();
@@ -432,7 +432,7 @@ fn a_constant_lattice_is_left_alone() {
             let mut scene = Scene::new([96, 96], periods, angle, Contrast::Cosines, seed);
             (scene.white, scene.line) = (1.0, 0.4);
             let fit = fit(&scene.image(), &scene).fit.unwrap();
-            fit.inhomogeneity.unwrap().stands_out()
+            fit.inhomogeneity.unwrap().is_significant()
         })
         .count();
     assert!(alarms < 3, "{alarms}");

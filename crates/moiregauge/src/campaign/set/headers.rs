@@ -14,7 +14,7 @@ use crate::caveat::Caveat;
 use crate::caveat::drifting::{DriftDoubt, FrameDates};
 use crate::drift::joint::choose::fit;
 use crate::drift::joint::found::JointFit;
-use crate::drift::joint::sighting::Sighting;
+use crate::drift::joint::sighting::Detection;
 use crate::scan::measured::MeasuredScan;
 use crate::settings::knobs::Settings;
 
@@ -98,7 +98,7 @@ pub(crate) fn about_headers(
 fn linkable(found: &JointFit) -> bool {
     let all = || found.sightings().iter().filter(|s| s.phases.is_some());
     let mut pairs = all().flat_map(|a| all().map(move |b| (a, b)));
-    pairs.any(|(a, b): (&Sighting, &Sighting)| a.block == b.block && a.scan != b.scan)
+    pairs.any(|(a, b): (&Detection, &Detection)| a.block == b.block && a.scan != b.scan)
 }
 
 fn reduced(found: &JointFit) -> f64 {

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix2, Vector2};
 
 use crate::drift::joint::found::{JointFit, TestedTerm};
-use crate::drift::joint::sighting::{Sighting, Terms};
+use crate::drift::joint::sighting::{Detection, Terms};
 use crate::drift::joint::solve::Problem;
 
 /// Settling times that are tried, as shares of the duration of the campaign: factors of two, between which curves
@@ -17,7 +17,7 @@ const FEWEST_SETTLING: usize = 6;
 /// The reciprocal `pair` (rad/nm) and the drift `velocity` (nm/s) are those of the linear solution, `time_sigma` is the standard uncertainty of a frame time, s. `None` where the sightings do not determine lattice
 /// and drift.
 pub fn fit(
-    sightings: &[Sighting],
+    sightings: &[Detection],
     pair: &Matrix2<f64>,
     velocity: &Vector2<f64>,
     time_sigma: f64,
@@ -44,7 +44,7 @@ pub fn fit(
 /// The covariance that a fit with a constant drift has for sightings that are exactly what the model says:
 /// nothing is chosen, nothing scatters. Otherwise as [`fit`].
 pub(crate) fn foreseen(
-    sightings: &[Sighting],
+    sightings: &[Detection],
     pair: &Matrix2<f64>,
     velocity: &Vector2<f64>,
     time_sigma: f64,

@@ -7,7 +7,7 @@ use nalgebra::{
 
 use crate::drift::joint::path::{DriftPath, Settling};
 use crate::drift::joint::shape::Shape;
-use crate::drift::joint::sighting::{Sighting, Terms};
+use crate::drift::joint::sighting::{Detection, Terms};
 use crate::drift::joint::sums::{ScanSums, Whitened};
 use crate::numbers::interrupt;
 
@@ -34,7 +34,7 @@ pub(crate) struct Layout {
 pub(crate) const DRIFT: usize = 4;
 
 impl Layout {
-    pub(crate) fn new(sightings: &[Sighting], terms: Terms, time_sigma: f64) -> Self {
+    pub(crate) fn new(sightings: &[Detection], terms: Terms, time_sigma: f64) -> Self {
         let mut size = 6;
         let mut take = |wanted: bool, n: usize| {
             wanted.then(|| {
@@ -269,13 +269,13 @@ impl PhaseMiss {
 /// Evaluates the model at `x` for the sightings within `reach` of the origin of time (phases beyond
 /// it may be off by a whole turn and are left out).
 pub(crate) fn linearise(
-    sightings: &[Sighting],
+    sightings: &[Detection],
     layout: &Layout,
     x: &DVector<f64>,
     reach: f64,
 ) -> Linearised {
     interrupt::check();
-    let near = |s: &&Sighting| (s.time - layout.origin).abs() <= reach;
+    let near = |s: &&Detection| (s.time - layout.origin).abs() <= reach;
     Linearised {
         waves: sightings
             .iter()
@@ -297,7 +297,7 @@ pub(crate) fn linearise(
 /// `K = (1 + g F)(G − u (D·G))`, two vectors.
 fn waves(
     number: usize,
-    sighting: &Sighting,
+    sighting: &Detection,
     layout: &Layout,
     x: &DVector<f64>,
 ) -> Option<WavesMiss> {
@@ -347,13 +347,13 @@ fn waves(
 }
 
 /// The Cholesky factor that whitens the waves; a floor keeps noise-free simulations solvable.
-pub(crate) fn factor(sighting: &Sighting) -> Option<Matrix4<f64>> {
+pub(crate) fn factor(sighting: &Detection) -> Option<Matrix4<f64>> {
     let floor = Matrix4::identity() * 1e-18;
     Some((sighting.waves.covariance + floor).cholesky()?.l())
 }
 
 /// The phases of a sighting that has some, `Φ_h = G_h·(r − d(t + δt) − o) + φ_h`, wrapped.
-pub(crate) fn phases(sighting: &Sighting, layout: &Layout, x: &DVector<f64>) -> Option<PhaseMiss> {
+pub(crate) fn phases(sighting: &Detection, layout: &Layout, x: &DVector<f64>) -> Option<PhaseMiss> {
     let first = layout.phases_of(sighting.block)?;
     let late = layout.times_at()? + sighting.scan;
     let measured = sighting.phases.as_ref()?;

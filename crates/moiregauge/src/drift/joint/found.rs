@@ -9,7 +9,7 @@ use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
 use crate::drift::joint::arrow::Arrow;
 use crate::drift::joint::evaluate::Layout;
 use crate::drift::joint::path::DriftPath;
-use crate::drift::joint::sighting::{Sighting, Terms};
+use crate::drift::joint::sighting::{Detection, Terms};
 
 /// Errors of the lattice that grow by more than this say that a term is not determined. Chosen by eye; see
 /// docs/constants.md.
@@ -41,7 +41,7 @@ pub struct JointFit {
     /// The terms that were tried beside a constant drift, and what the criterion said.
     pub tested: Vec<TestedTerm>,
     /// What was fitted, with the blocks of linked scans.
-    pub(crate) sightings: Arc<[Sighting]>,
+    pub(crate) sightings: Arc<[Detection]>,
     pub(crate) layout: Layout,
     pub(crate) solution: DVector<f64>,
     /// Covariance of `solution`, as the errors of the sightings make it.
@@ -65,7 +65,7 @@ pub struct TestedTerm {
 
 impl JointFit {
     /// What was fitted, with the blocks of linked scans.
-    pub(crate) fn sightings(&self) -> &[Sighting] {
+    pub(crate) fn sightings(&self) -> &[Detection] {
         &self.sightings
     }
 

@@ -6,7 +6,7 @@
 
 use nalgebra::{Matrix2, Vector2};
 
-use crate::drift::joint::sighting::Sighting;
+use crate::drift::joint::sighting::Detection;
 
 /// Predictions have to be this much better than a wavelength: 8 leaves 3.5 σ to half a period.
 const SHARE: f64 = 8.0;
@@ -16,7 +16,7 @@ const ACCELERATION: f64 = 0.008 / 3600.0;
 
 /// Numbers the blocks of frames that can be linked: a new one begins after every pause that is too
 /// long for the drift error `sigma` (nm/s, largest principal) and the shortest wavelength.
-pub(crate) fn number_blocks(sightings: &mut [Sighting], waves: &Matrix2<f64>, sigma: f64) {
+pub(crate) fn number_blocks(sightings: &mut [Detection], waves: &Matrix2<f64>, sigma: f64) {
     let (a, b): (Vector2<f64>, Vector2<f64>) = (waves.column(0).into(), waves.column(1).into());
     let longest = a.norm().max(b.norm()).max((b - a).norm());
     let limit = std::f64::consts::TAU / longest / SHARE;
@@ -39,8 +39,8 @@ mod tests {
 
     use nalgebra::Matrix4;
 
-    fn at(times: &[f64]) -> Vec<Sighting> {
-        let sighting = |(scan, &time): (usize, &f64)| Sighting {
+    fn at(times: &[f64]) -> Vec<Detection> {
+        let sighting = |(scan, &time): (usize, &f64)| Detection {
             scan,
             class: 0,
             block: 0,

@@ -36,4 +36,4 @@ pub use checks::{LeftOut, Resampled};
 pub use choose::fit;
 pub use found::{JointFit, TestedTerm};
 pub use path::DriftPath;
-pub use sighting::{Sighting, Terms};
+pub use sighting::{Detection, Terms};

@@ -7,7 +7,7 @@ use crate::spectrum::phases::Phases;
 
 /// What one line direction of one scan contributes.
 #[derive(Clone, Debug)]
-pub struct Sighting {
+pub struct Detection {
     /// Which scan it belongs to; those of one scan are of about one time.
     pub scan: usize,
     /// Class of scans that share an offset: fast axis and line direction.

@@ -11,7 +11,7 @@ use crate::drift::joint::evaluate::{DRIFT, Layout, linearise, wrapped};
 use crate::drift::joint::found::{JointFit, motion};
 use crate::drift::joint::instability::Displacements;
 use crate::drift::joint::link::number_blocks;
-use crate::drift::joint::sighting::{Sighting, Terms};
+use crate::drift::joint::sighting::{Detection, Terms};
 use crate::drift::joint::sums::ScanSums;
 use crate::numbers::chi2::enlargement;
 use crate::numbers::normal_equations::NormalEquations;
@@ -33,7 +33,7 @@ const WORST_CONDITION: f64 = 1e4;
 /// What is fitted.
 pub(crate) struct Problem {
     /// All fits share them.
-    pub(crate) sightings: Arc<[Sighting]>,
+    pub(crate) sightings: Arc<[Detection]>,
     time_sigma: f64,
 }
 
@@ -41,7 +41,7 @@ impl Problem {
     /// The problem with its scans in blocks whose phases can be linked, and the fit without phases that tells
     /// the blocks.
     pub(crate) fn linked(
-        sightings: &[Sighting],
+        sightings: &[Detection],
         pair: &Matrix2<f64>,
         velocity: &Vector2<f64>,
         time_sigma: f64,
@@ -120,7 +120,7 @@ impl Problem {
 
 /// The covariance of the parameters at the best ones, and the instability: as `given`, or estimated from the phases.
 fn converge(
-    sightings: &[Sighting],
+    sightings: &[Detection],
     layout: &Layout,
     x: &mut DVector<f64>,
     given: Option<f64>,
@@ -146,7 +146,7 @@ fn converge(
 /// Outwards from the middle of the campaign: each round predicts the next scans well enough to
 /// unwrap them.
 fn link_outwards(
-    sightings: &[Sighting],
+    sightings: &[Detection],
     layout: &Layout,
     x: &mut DVector<f64>,
     instability: f64,
@@ -164,12 +164,12 @@ fn link_outwards(
 /// φ of the harmonics of each block from its sighting of the lowest class nearest to the middle of the
 /// campaign; then the offset of every other class, modulo the lattice, from its nearest sighting in a
 /// block that another class has begun.
-fn start_phases(sightings: &[Sighting], layout: &Layout, x: &mut DVector<f64>) -> Option<()> {
+fn start_phases(sightings: &[Detection], layout: &Layout, x: &mut DVector<f64>) -> Option<()> {
     let first = layout.phases_of(0)?;
-    let distance = |s: &&Sighting| (s.time - layout.origin).abs();
+    let distance = |s: &&Detection| (s.time - layout.origin).abs();
     let with_phases = || sightings.iter().filter(|s| s.phases.is_some());
     let (k1, k2) = (Vector2::new(x[0], x[1]), Vector2::new(x[2], x[3]));
-    let unexplained = |s: &Sighting, x: &DVector<f64>| {
+    let unexplained = |s: &Detection, x: &DVector<f64>| {
         let (shift, _) = layout.motion(x, s.time);
         let place = s.position - shift;
         let miss = |h: usize, k: Vector2<f64>, phases: &Phases| {
@@ -211,7 +211,7 @@ fn start_phases(sightings: &[Sighting], layout: &Layout, x: &mut DVector<f64>) -
 
 /// Gauss–Newton to convergence; returns the covariance of the parameters.
 fn iterate(
-    sightings: &[Sighting],
+    sightings: &[Detection],
     layout: &Layout,
     x: &mut DVector<f64>,
     reach: f64,

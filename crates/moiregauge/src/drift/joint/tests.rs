@@ -24,7 +24,7 @@ fn sightings(
     drift: Vector2<f64>,
     acceleration: Vector2<f64>,
     seed: u64,
-) -> Vec<Sighting> {
+) -> Vec<Detection> {
     let mut rng = stream(seed, "joint test", 0);
     let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
     let frame = 64.0;
@@ -57,7 +57,7 @@ fn sightings(
                 let noisy = harmonics[h].dot(&place) + 0.7 * h as f64 + 0.003 * normal();
                 crate::drift::joint::evaluate::wrapped(noisy)
             });
-            all.push(Sighting {
+            all.push(Detection {
                 scan,
                 class,
                 block: 0,
@@ -171,16 +171,16 @@ fn two_scans_do_not_tell_a_changing_drift() {
 #[test]
 fn leaving_out_is_fitting_without() {
     let drift = Vector2::new(0.5, -0.15) / MINUTE;
-    let all: Vec<Sighting> = sightings(6, drift, Vector2::zeros(), 7)
+    let all: Vec<Detection> = sightings(6, drift, Vector2::zeros(), 7)
         .into_iter()
-        .map(|s| Sighting { phases: None, ..s })
+        .map(|s| Detection { phases: None, ..s })
         .collect();
     let fitted = fit(&all, &pair(), &drift, TIME_SIGMA).unwrap();
     let left_out = fitted.leave_one_out();
     assert_eq!(left_out.len(), 6);
     for (scan, found) in left_out.iter().enumerate() {
         assert_eq!((found.scan, found.degrees_of_freedom), (scan, 8));
-        let others: Vec<Sighting> = all.iter().filter(|s| s.scan != scan).cloned().collect();
+        let others: Vec<Detection> = all.iter().filter(|s| s.scan != scan).cloned().collect();
         let direct = fit(&others, &pair(), &drift, TIME_SIGMA).unwrap();
         let moved = direct.velocity - fitted.velocity;
         let difference = found.without.velocity - direct.velocity;
@@ -272,7 +272,7 @@ fn acceleration_earns_its_place() {
 #[test]
 fn one_direction_is_refused() {
     let drift = Vector2::new(0.5, -0.15) / MINUTE;
-    let up: Vec<Sighting> = sightings(10, drift, Vector2::zeros(), 1)
+    let up: Vec<Detection> = sightings(10, drift, Vector2::zeros(), 1)
         .into_iter()
         .filter(|s| s.time_gradient.y > 0.0)
         .collect();
@@ -286,9 +286,9 @@ fn one_direction_is_refused() {
 fn the_covariance_splits_by_source() {
     let drift = Vector2::new(0.5, -0.15) / MINUTE;
     let all = sightings(3, drift, Vector2::zeros(), 3);
-    let bare: Vec<Sighting> = all
+    let bare: Vec<Detection> = all
         .iter()
-        .map(|s| Sighting {
+        .map(|s| Detection {
             phases: None,
             ..s.clone()
         })

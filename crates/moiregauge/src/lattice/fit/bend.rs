@@ -72,7 +72,7 @@ const BEYOND: f64 = 0.2;
 
 impl Inhomogeneity {
     /// Whether it is more than chance, and enough to matter.
-    pub fn stands_out(&self) -> bool {
+    pub fn is_significant(&self) -> bool {
         self.chi_squared > self.threshold && self.wavelength.max(self.angle) > HARMLESS
     }
 

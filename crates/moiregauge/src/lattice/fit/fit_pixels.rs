@@ -396,12 +396,12 @@ impl<'a> Fit<'a> {
         )
         .mapped(&Matrix2::from_diagonal(&scale));
         let clipped = self.clipped();
-        if let Some(change) = inhomogeneity.filter(Inhomogeneity::stands_out) {
+        if let Some(change) = inhomogeneity.filter(Inhomogeneity::is_significant) {
             let (mean, covariance) = change.of_the_mean(clipped);
             wave_vectors.basis += mean;
             wave_vectors.covariance += covariance;
         }
-        let bends = inhomogeneity.is_some_and(|change| change.stands_out());
+        let bends = inhomogeneity.is_some_and(|change| change.is_significant());
         let of_noise = covariance.fixed_view::<4, 4>(3, 3).trace();
         if let Some(cells) = self.of_cells(bends).filter(|cells| cells.exceed(of_noise)) {
             let cells = Waves::<Px>::new(self.model.pair, cells.covariance)

@@ -101,7 +101,7 @@ impl LatticeFit {
 
     /// How the lattice changes, where that is more than chance.
     pub(crate) fn change(&self) -> Option<&Inhomogeneity> {
-        self.inhomogeneity.as_ref().filter(|c| c.stands_out())
+        self.inhomogeneity.as_ref().filter(|c| c.is_significant())
     }
 
     /// Of the first shell.

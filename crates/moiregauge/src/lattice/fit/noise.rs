@@ -66,7 +66,7 @@ pub struct ForeignWave {
 
 impl ForeignWave {
     /// Whether it is more than chance.
-    pub fn stands_out(&self) -> bool {
+    pub fn is_significant(&self) -> bool {
         self.significance > self.threshold
     }
 }

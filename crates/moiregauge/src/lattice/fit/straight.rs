@@ -31,7 +31,7 @@ pub(crate) fn without_bend(fit: &Fit, noise: FinalNoise) -> FinalNoise {
             &seen.acting(),
         );
         let Some((_, bend)) =
-            found.filter(|(change, _)| change.stands_out() && fit.clipped() < FOLLOWED)
+            found.filter(|(change, _)| change.is_significant() && fit.clipped() < FOLLOWED)
         else {
             break;
         };

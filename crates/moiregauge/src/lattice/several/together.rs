@@ -61,7 +61,7 @@ pub fn measure_several(
     }
     let own = |i: usize| !parts[..i].iter().any(|other| parts[i].is(other, image));
     let found = (0..parts.len())
-        .filter(|&i| parts[i].stands_out() && own(i))
+        .filter(|&i| parts[i].is_significant() && own(i))
         .count();
     if count > 1 && found < count {
         return Err(LatticeError::FewerLattices {
@@ -101,7 +101,7 @@ impl Part {
     }
 
     /// Whether its first harmonics are more than noise.
-    fn stands_out(&self) -> bool {
+    fn is_significant(&self) -> bool {
         self.lattice.signal_to_noise > WEAKEST
     }
 
@@ -191,7 +191,8 @@ impl Scene<'_> {
             let Some(second) = near(&first.model, &b.pair) else {
                 continue;
             };
-            if first.is(&second, self.image) || !(first.stands_out() && second.stands_out()) {
+            if first.is(&second, self.image) || !(first.is_significant() && second.is_significant())
+            {
                 continue;
             }
             if let Some(i) = replaced {

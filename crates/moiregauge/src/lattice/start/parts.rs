@@ -46,7 +46,7 @@ impl Start {
             let near = Self::near(&part, geometry, background, &patch.pair);
             let Some(start) = near else { continue };
             // Straight waves that all of the patch does not show are not those of one lattice.
-            if !start.stands_out() && settled.is_plain() && settled.is_straight() {
+            if !start.is_significant() && settled.is_plain() && settled.is_straight() {
                 continue;
             }
             let coherent = match verdict(&start.prepared.harmonics) {
