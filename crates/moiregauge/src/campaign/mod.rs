@@ -1,4 +1,4 @@
-//! All scans together: sets, drift, the joint fit, and what a layer's atoms or a known surface add.
+//! Analysis of all scans together: sets, drift, the joint fit, and the use of atomic images or of a known surface.
 //!
 //! In: measured scans ([`crate::scan`]). Out: an [`Analysis`]; or the orientation of a layer ([`atomic_orientation`]), or the
 //! calibration of a scanner ([`calibrate`]).

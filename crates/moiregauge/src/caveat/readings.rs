@@ -1,12 +1,12 @@
-//! Doubts about what else a lattice can mean.
+//! Caveats about other solutions (twist, strain) for the same lattice.
 
 use crate::caveat::explained::explain;
 
-/// What else the lattice can mean.
+/// Other solutions for the same lattice.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ReadingDoubt {
-    /// Layers of different size: isotropic strain and twist cannot be told apart.
+    /// Layers with different lattice constants: isotropic strain and twist cannot be separated.
     #[error(
         "several pairs of twist and strain explain the moiré, since the layers of {layers} differ in lattice constant. \
          Another one is {}; {}{}. The orientation of a layer decides",
@@ -15,14 +15,14 @@ pub enum ReadingDoubt {
     TwistTradesWithStrain {
         /// The layers.
         layers: String,
-        /// Twist (rad) and strain of each reading.
+        /// Twist (rad) and strain of each solution.
         choices: Vec<[f64; 2]>,
-        /// What 0.1 % of isotropic strain does to the twist; `None` where it was not asked.
+        /// Effect of 0.1 % of isotropic strain on the twist; `None` if not calculated.
         shift: Option<TwistShift>,
-        /// From which twist to which, rad.
+        /// Smallest and largest twist of all solutions, rad.
         interval: Option<[f64; 2]>,
     },
-    /// Larger than aligned layers make it.
+    /// A moiré larger than that of aligned layers.
     #[error(
         "the twist is given as 0: the moiré is larger than any that twist and uniaxial strain of {layers} can make \
          ({longest:.3} nm). Isotropic strain, the lattice constants or the gain of the scanner explain the rest"
@@ -43,7 +43,7 @@ pub enum ReadingDoubt {
         /// Upper limit, 95 %, rad.
         limit: f64,
     },
-    /// The layers differ in size by more than uniaxial strain does.
+    /// The lattice constants of the layers differ by more than uniaxial strain explains.
     #[error(
         "use the magnitude of the twist of `strain_tensor`: it differs by {} from `twist_deg`, which assumes no \
          isotropic strain. With the orientation of layer {layer} the layers differ in size by {}, more than uniaxial \
@@ -99,7 +99,7 @@ pub enum ReadingDoubt {
     },
 }
 
-/// Twist and strain of a lattice under one name of its vectors.
+/// Twist and strain of a lattice for one choice of its primitive vectors (indexing).
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error("{} with {:.3} % of strain", degrees(*.twist), 100.0 * .strain)]
 #[non_exhaustive]
@@ -110,14 +110,14 @@ pub struct NumbersOfName {
     pub strain: f64,
 }
 
-/// What 0.1 % of isotropic strain does to the twist.
+/// Effect of 0.1 % of isotropic strain on the twist.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum TwistShift {
-    /// It leaves none.
+    /// No twist explains the moiré with it.
     #[error("with 0.1 % of isotropic strain no twist explains the moiré")]
     NoTwist,
-    /// It moves it, rad.
+    /// Change of the twist, rad.
     #[error("0.1 % of isotropic strain changes the twist by {}", degrees(*.0))]
     By(f64),
 }
@@ -197,15 +197,15 @@ explain! { ReadingDoubt:
         "Nothing, if you trust this choice. The results list the other solutions."
 }
 
-/// What chose the reported name.
+/// How the reported solution was chosen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ChosenBy {
-    /// It needs the least strain, and nothing speaks against it.
+    /// It has the least strain, and no evidence contradicts it.
     LeastStrain,
-    /// The image speaks against the others that are plausible.
+    /// The peak amplitudes of the image exclude the other plausible ones.
     Image,
-    /// The orientation of a layer does.
+    /// The orientation of a layer excludes the others.
     Orientation,
-    /// The user.
+    /// The user specified it.
     User,
 }

@@ -22,11 +22,11 @@ use crate::spectrum::select::{MOST_DISTORTION, candidates_beside};
 use crate::spectrum::shells::shells;
 use crate::spectrum::transform::Spectrum;
 
-/// A lattice without a first order that stands out is accepted where the weakest family of its waves predicts by this many standard errors. The best of
-/// 57 candidates in rough ground had 3.4.
+/// A lattice without a significant first order is accepted if the weakest family of its harmonics predicts held-out pixels by this many standard
+/// errors. The best of 57 candidates in a rough background had 3.4.
 const BEYOND_DOUBT: f64 = 5.0;
-/// Smallest significance of the prediction, standard errors. Right answers had 2.3 and more (60 sets of one to four troubles; that one covers half the frame and fades), lone steps 0 at
-/// most.
+/// Smallest significance of the prediction, standard errors. True lattices had at least 2.3 (60 sets with one to four defects; the smallest is of one that
+/// covers half the frame and fades), single steps at most 0.
 const LEAST: f64 = 1.5;
 /// Largest relative change of the waves from corner to corner: gradients and waves of twist and strain make up
 /// to a tenth, creep in a frame of four periods of atoms a half, and holes that pass for a coarse lattice 0.7 to 1.4.
@@ -34,10 +34,10 @@ const MOST_CHANGE: f64 = 0.6;
 /// Fewest periods across the frame: a few protrusions can mimic a lattice. Of simulated discs with sharp edges 0.8 to 1.0 fit across the
 /// frame, of the smallest recorded images three.
 const FEWEST_PERIODS: f64 = 1.5;
-/// As in `scan::shells`: below this probability of chance an image may hide a first order.
+/// As in `scan::shells`: p-value of the first order below which it may be suppressed.
 const SUSPECTED: f64 = 0.2;
 
-/// The lattice with three or four times the cell, or a third or a fourth of it, that predicts the image better than the one that was found.
+/// The superlattice with three or four times the cell, or the sublattice with a third or a fourth of it, if it predicts the image better than `found`.
 pub(crate) fn of_better_cell(
     found: &MeasuredLattice,
     image: &Image,
@@ -52,7 +52,7 @@ pub(crate) fn of_better_cell(
     no_lattice(&other).is_none().then_some(other)
 }
 
-/// Clears the evidence for a hidden first order where what predicts pixels refutes it, so that the set does not use it.
+/// Clears the evidence for a suppressed first order if the prediction of held-out pixels refutes it. The set then does not use it.
 pub(crate) fn without_refuted_shell(mut found: MeasuredLattice, image: &Image) -> MeasuredLattice {
     if hidden(&found).chance() < SUSPECTED
         && is_refuted(&found, image) == Some(true)
@@ -63,7 +63,7 @@ pub(crate) fn without_refuted_shell(mut found: MeasuredLattice, image: &Image) -
     found
 }
 
-/// Whether the waves near the points of a suppressed first order are not its harmonics.
+/// True if the peaks near the points of a suppressed first order are not its harmonics.
 fn is_refuted(found: &MeasuredLattice, image: &Image) -> Option<bool> {
     let part = found.patch.as_ref().map(|patch| patch.of(image));
     let coarse = Supercell::Root3.coarse(&found.reciprocal)?;
@@ -76,8 +76,8 @@ fn is_refuted(found: &MeasuredLattice, image: &Image) -> Option<bool> {
     Some(said == Superlattice::Refuted)
 }
 
-/// The proposed lattice that predicts pixels which were held out best, where it does so beyond doubt. Spots that differ are noise beside each wave, and no
-/// wave stands out of that.
+/// The proposed lattice that predicts held-out pixels best, if it exceeds [`BEYOND_DOUBT`]. Spots of differing height put noise beside each peak, and the search
+/// for significant peaks then finds none.
 pub(crate) fn best_predicted(
     image: &Image,
     geometry: &Geometry,
@@ -92,7 +92,7 @@ pub(crate) fn best_predicted(
     start.measure(Method::Lattice).ok()
 }
 
-/// A lattice with what speaks for it, or the proposed one that predicts the part of the image that shows it better.
+/// The lattice `found` with its evidence, or a proposed lattice that predicts the lattice region better.
 ///
 /// # Errors
 /// As [`accepted`].
@@ -114,8 +114,8 @@ pub(crate) fn judged(
     Ok(instead().unwrap_or(found))
 }
 
-/// A lattice, and grains beside it, with what they predict of the part of the image that shows them; and the reciprocal pair (rad per pixel) of another
-/// that predicts better.
+/// Adds to a lattice, and to the grains beside it, their evidence within their lattice regions. Also returns the reciprocal pair (rad per pixel) of a
+/// lattice that predicts better, if there is one.
 pub(crate) fn with_evidence(
     mut found: MeasuredLattice,
     image: &Image,
@@ -142,7 +142,7 @@ pub(crate) fn with_evidence(
     };
     let better = rows.iter().find(is_better).map(|row| row.pair);
     let candidates = rows.iter().map(|row| Candidate::new(row, &to_physical));
-    // A cell of many atoms is made by its harmonics.
+    // A cell of many atoms has many strong harmonics, and peaks of its own period are no rivals.
     let rivals = if is_made_by_many(&found) {
         0
     } else {
@@ -156,11 +156,11 @@ pub(crate) fn with_evidence(
     (found, better)
 }
 
-/// A lattice that its evidence does not refute, with those grains beside it of which this is true.
+/// The lattice, if its evidence does not refute it, with the grains beside it that pass the same tests.
 ///
 /// # Errors
-/// [`LatticeError::OneOfMany`]: other waves of the image could be one as well. [`LatticeError::NotPredicted`]: next to nothing.
-/// [`LatticeError::Distorted`]: its cell is too far from a hexagon. [`LatticeError::TooFewPeriods`]: it does not repeat.
+/// [`LatticeError::OneOfMany`]: other peaks of the image could form a lattice as well. [`LatticeError::NotPredicted`]: it does not predict held-out
+/// pixels. [`LatticeError::Distorted`]: its cell is too far from a hexagon. [`LatticeError::TooFewPeriods`]: fewer than 1.5 periods fit across the frame.
 /// [`LatticeError::NowhereTogether`]: it varies too much.
 fn accepted(
     mut found: MeasuredLattice,
@@ -187,7 +187,7 @@ fn accepted(
     if rivals >= ENOUGH {
         return Err(LatticeError::OneOfMany { rivals });
     }
-    // Phases of a lattice that changes are no cubic polynomials.
+    // The prediction follows phases as cubic polynomials, which an inhomogeneous lattice does not have.
     let predicts = evidence.and_then(|evidence| evidence.predicts);
     let is_plain = found.change.is_none() && !is_made_by_many(&found);
     match predicts.filter(|least| *least < LEAST && is_plain) {
@@ -196,13 +196,13 @@ fn accepted(
     }
 }
 
-/// Whether it changes across the frame.
+/// True if the lattice varies across the frame.
 pub(crate) fn bends(found: &MeasuredLattice) -> bool {
     let fit = found.fit.as_ref();
     found.change.is_some() || fit.is_some_and(|fit| fit.change().is_some())
 }
 
-/// Whether more harmonics stand out than two shells have.
+/// True if more harmonics are strong than two shells have.
 fn is_made_by_many(found: &MeasuredLattice) -> bool {
     let harmonics = found.fit.iter().flat_map(|fit| &fit.harmonics);
     let strong = harmonics.filter(|harmonic| harmonic.signal_to_noise.powi(2) > SECOND);

@@ -1,8 +1,8 @@
-//! The averaged moiré cell: every pixel put by its local phases into the cell of the mean lattice.
+//! The averaged moiré cell: the local phases of each pixel give its position in the cell of the mean lattice.
 //!
-//! A pixel at r shows the place `L⁻¹(r − u(r) − r₀)` of the cell, which is (φ₁, φ₂)/2π of the waves dual to L, also where the lattice bends, where averaging by one
-//! lattice for the whole image smears. The error of a bin is seen from how the moiré cells of the image scatter about it,
-//! each with the sum of its pixels in the bin, so that noise that neighbouring pixels share counts:
+//! A pixel at r has the position `L⁻¹(r − u(r) − r₀)` in the cell, which is (φ₁, φ₂)/2π of the waves dual to L. This holds for distorted lattices too, which a
+//! single lattice for the whole image would smear. The error of a bin comes from the scatter of the moiré cells about the mean. Each cell enters with the
+//! sum of its pixels in the bin, so that correlated noise of neighbouring pixels is included:
 //!
 //! ```text
 //! σ² = K/(K − 1) Σ_c (s_c − n_c m)²/n²      m = Σ_c s_c/n,  n = Σ_c n_c,  K cells
@@ -18,12 +18,12 @@ use crate::frame::image::Image;
 use crate::map::followed::Followed;
 use crate::numbers::interrupt;
 
-/// Bins along each vector, at most; ...
+/// Most bins along each vector.
 const MOST_BINS: usize = 64;
-/// ... and pixels of a bin, at least, in the mean.
+/// Fewest pixels of a bin, on average.
 const LEAST_PIXELS: f64 = 9.0;
 
-/// Cells that the pixels have to cover together: of fewer there is no mean, and nothing that scatters.
+/// Fewest cells that the pixels cover together: one cell has no scatter.
 const LEAST_CELLS: f64 = 2.0;
 
 /// The mean of all cells of a pattern.
@@ -34,28 +34,28 @@ pub struct MeanCell {
     pub vectors: Matrix2<f64>,
     /// Bins along each of them: bin (i, j), number `j · bins + i`, covers from i/bins to (i + 1)/bins along the first.
     pub bins: usize,
-    /// Mean of each bin, units of the image, from which the mean of the image is not taken off; NaN where no pixel fell.
+    /// Mean of each bin in units of the image, with the mean of the image in it; NaN for a bin without pixels.
     pub mean: Vec<f64>,
-    /// Its standard error; NaN where fewer than two cells have pixels in it.
+    /// Standard error of each mean; NaN if fewer than two cells have pixels in the bin.
     pub sigma: Vec<f64>,
     /// Pixels of each bin.
     pub pixels: Vec<u32>,
-    /// Cells of the image with pixels in it.
+    /// Number of cells with pixels in each bin.
     pub cells: Vec<u32>,
-    /// Cells of the image of which any pixel was used.
+    /// Number of cells with at least one pixel that was used.
     pub all_cells: usize,
 }
 
 impl MeanCell {
-    /// Place of the middle of a bin in shares of the two vectors.
+    /// Centre of a bin as fractions of the two vectors.
     pub fn share(&self, bin: usize) -> Vector2<f64> {
         let [i, j] = [bin % self.bins, bin / self.bins].map(|n| n as f64 + 0.5);
         Vector2::new(i, j) / self.bins as f64
     }
 }
 
-/// Averages the cells of an image whose pixels are `placed` on the sample; `None` where fewer than two
-/// cells of the pattern are known.
+/// Averages the cells of an image; `placed` gives the positions of its pixels on the sample. `None` if pixels with known phases cover
+/// fewer than two cells.
 pub(crate) fn mean_cell(image: &Image, placed: &Geometry, followed: &Followed) -> Option<MeanCell> {
     let vectors = followed.gauge.vectors;
     let pitch = placed.fast_step().norm().min(placed.slow_step().norm());
@@ -81,17 +81,17 @@ pub(crate) fn mean_cell(image: &Image, placed: &Geometry, followed: &Followed) -
 
 /// Where the pixels of an image lie in the cells of its pattern.
 struct Found {
-    /// Bin of each pixel within its cell; of no meaning where that is not known.
+    /// Bin of each pixel within its cell; meaningless for pixels outside of all runs.
     bins: Vec<u16>,
-    /// What lies in one cell, ordered by cells, and by pixels within each.
+    /// Runs of pixels within one cell, ordered by cell, then by pixel.
     runs: Vec<Run>,
-    /// Pixels in all.
+    /// Number of pixels in all runs.
     known: usize,
 }
 
-/// Pixels beside each other in one cell.
+/// Neighbouring pixels of a row that lie in one cell.
 struct Run {
-    /// Number of the cell along the second vector and along the first.
+    /// Index of the cell along the second vector and along the first.
     cell: [i32; 2],
     first: u32,
     count: u32,
@@ -132,7 +132,7 @@ impl Found {
     }
 }
 
-/// Finds the bins of the pixels of a row, and the runs of those that lie in one cell; `place` is in moiré vectors from the node.
+/// Writes the bin of each pixel of a row into `of_pixels` and returns the runs. `place` gives the position of a column in units of the moiré vectors.
 fn runs(
     image: &Image,
     row: usize,
@@ -165,26 +165,26 @@ fn runs(
     runs
 }
 
-/// The whole number below, and what is left.
+/// Integer part (rounded down) and fractional part.
 fn below(x: f32) -> [f32; 2] {
     let whole = x as i32 as f32;
     let whole = if whole > x { whole - 1.0 } else { whole };
     [whole, x - whole]
 }
 
-/// Cells that are summed before their sums are added up: what they hold fits into the cache.
+/// Cells whose sums are formed together, so that these fit into the cache.
 const CELLS_AT_ONCE: usize = 64;
 
-/// What is summed over cells, bin by bin.
+/// Sums over cells for each bin.
 struct Sums {
     bins: usize,
-    /// Taken off all values, lest squares of a large mean drown their differences.
+    /// Mean of the image, subtracted from all values to avoid cancellation in the squares.
     middle: f64,
     all_cells: usize,
     of_bins: Vec<OfBin>,
 }
 
-/// What is summed of one bin.
+/// Sums of one bin.
 #[derive(Clone, Copy, Default)]
 struct OfBin {
     pixels: u32,
@@ -221,7 +221,8 @@ impl Sums {
         }
     }
 
-    /// Adds the pixels of some cells: each cell by itself, then each bin by itself, cell by cell.
+    /// Adds the pixels of some cells. The order of the sums does not depend on the number of threads: cells are summed one by one, then
+    /// added to each bin in order.
     fn add_cells(&mut self, cells: &[&[Run]], bins: &[u16], image: &Image) {
         let of_cell = |runs: &&[Run]| {
             let mut own = vec![(0.0, 0u32); self.bins * self.bins];

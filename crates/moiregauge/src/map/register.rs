@@ -1,10 +1,10 @@
-//! Maps of one pattern → put on each other by its phases.
+//! Registers maps of one pattern by its phases.
 //!
-//! Where a later frame stands is known from its time and the drift only roughly: drift changes between frames, and
-//! stages creep. The pattern itself says it: a frame whose pattern stands s farther has phases that differ by
-//! `−Qᵀ s` everywhere. All nodes that two maps share tell the same s, to a small part of a pixel; whole lattice
-//! vectors are left open, and the nearest is taken. Where the contrast is the other way round, as that of error signals of
-//! trace and retrace, all three phases are off by π; no shift does that to `φ₃ − φ₂ + φ₁`, which tells.
+//! Time and drift give the position of a later frame only roughly: drift changes between frames, and stages creep. The phases
+//! give it precisely: if the pattern of a frame is displaced by s, its phases differ by `−Qᵀ s` at every node. All shared nodes
+//! determine s to a small fraction of a pixel, up to a lattice vector; the smallest s is taken. Reversed contrast, as in error
+//! signals of trace and retrace, changes all three phases by π. No displacement changes `φ₃ − φ₂ + φ₁`, so its change by π
+//! identifies reversed contrast.
 
 use std::f64::consts::{PI, TAU};
 
@@ -15,21 +15,20 @@ use crate::map::sample::LatticeMap;
 use crate::map::view::View;
 use crate::window::mask::Mask;
 
-/// Nodes that two maps have to share: three by three, one window.
+/// Fewest shared nodes: three by three, one window.
 const FEWEST: usize = 9;
-/// Below this mean of the phasors the phases contradict each other: 0.7 is a scatter of 0.84 rad; uniform phases have
-/// 0.
+/// Smallest length of the mean phasor of the phase differences: 0.7 is a scatter of 0.84 rad. Uniform phases have 0.
 const COHERENT: f64 = 0.7;
 
-/// How far a map stood from where the others have the pattern.
+/// Displacement of the pattern of a map against the maps before it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Registration {
-    /// What was taken off its places, along x and y, nm.
+    /// Displacement that was subtracted from the positions of the nodes, along x and y, nm.
     pub shift: [Estimate; 2],
-    /// The shift as a share of the period of the pattern: beyond 0.3 it may be another lattice vector.
+    /// The displacement as a fraction of the period: beyond 0.3 it may be off by a lattice vector.
     pub of_period: f64,
-    /// Whether its contrast is the other way round.
+    /// True if the contrast is reversed.
     pub reversed: bool,
 }
 
@@ -40,7 +39,7 @@ pub fn register(maps: &mut [&mut LatticeMap]) -> Vec<Option<Registration>> {
     for i in 0..maps.len() {
         let (before, rest) = maps.split_at_mut(i);
         let map = &mut *rest[0];
-        // The one that shares most.
+        // The earlier map with the most shared nodes.
         let found = before
             .iter()
             .filter_map(|fixed| shift(fixed, map))
@@ -54,7 +53,7 @@ pub fn register(maps: &mut [&mut LatticeMap]) -> Vec<Option<Registration>> {
     out
 }
 
-/// Where `map` has the pattern against `fixed`, and how many nodes say so.
+/// Displacement of the pattern in `map` against `fixed`, and the number of shared nodes.
 fn shift(fixed: &LatticeMap, map: &LatticeMap) -> Option<(Registration, f64)> {
     let waves = fixed.mean()?;
     let view = View::new(fixed)?;
@@ -71,7 +70,7 @@ fn shift(fixed: &LatticeMap, map: &LatticeMap) -> Option<(Registration, f64)> {
         if near.mask != Mask::Good || near.phases.iter().any(|p| p.is_nan()) {
             continue;
         }
-        // From the node next to the place, by the wave vectors of both.
+        // Phase from the nearest node to this position, by the mean wave vectors of both nodes.
         let way = 0.5 * (near.waves.basis + node.waves.basis);
         let way = way.tr_mul(&(place - at));
         let difference = node.phases - near.phases - Vector3::new(way.x, way.y, 0.0);
@@ -89,7 +88,7 @@ fn shift(fixed: &LatticeMap, map: &LatticeMap) -> Option<(Registration, f64)> {
     }
     let mean = Vector2::new(sums[0].y.atan2(sums[0].x), sums[1].y.atan2(sums[1].x));
     let wrap = |x: f64| (x + PI).rem_euclid(TAU) - PI;
-    // Nodes under one window share their noise.
+    // Nodes within one window have correlated noise: the number of independent ones.
     let cell = map.grid.step.determinant().abs();
     let independent = (count * cell / (4.0 * PI * map.window_nm.powi(2))).clamp(1.0, count);
     let covariance = shared.iter().fold(Matrix2::zeros(), |sum, d| {
@@ -99,7 +98,7 @@ fn shift(fixed: &LatticeMap, map: &LatticeMap) -> Option<(Registration, f64)> {
     let reversed = sums[2].x < -COHERENT * count;
     let mean = mean.map(|phase| wrap(phase - if reversed { PI } else { 0.0 }));
     let back = -waves.transpose().try_inverse()?;
-    // The nearest of the lattice vectors that would do.
+    // The smallest displacement of those that differ by lattice vectors.
     let candidates = (-1..=1).flat_map(|h| (-1..=1).map(move |k| (f64::from(h), f64::from(k))));
     let shift = candidates
         .map(|(h, k)| back * (mean + Vector2::new(h, k) * TAU))

@@ -1,9 +1,9 @@
-//! How much of the spread of a map is a trend across the frame.
+//! Separates the spread of a map into a linear trend across the frame, noise, and the rest.
 //!
 //! Creep, a drift that changes and a scanner that bows stretch one side of a frame more than the other. A plane fitted to
-//! the good nodes by least squares says how much: `s² = trend² + noise² + rest²`. The mean of a map is that at the middle
-//! of its good nodes; a fit to the whole image weighs the frame evenly about its own middle, where the trend tells the
-//! value of the map. Errors count that neighbouring nodes share their noise (see [`correlation`](crate::region::correlation)).
+//! the good nodes by least squares gives its size: `s² = trend² + noise² + rest²`. The mean of a map belongs to the centre of
+//! its good nodes, the fit of a whole image to the centre of the frame; the plane gives the value of the map there. Errors
+//! include the correlated noise of neighbouring nodes (see [`correlation`](crate::region::correlation)).
 
 use heterostrain::Estimate;
 use nalgebra::{Matrix2, Vector2};
@@ -12,12 +12,12 @@ use crate::map::quantities::{Plane, TwistStrainMap};
 use crate::region::correlation::pairs;
 use crate::window::mask::Mask;
 
-/// Good nodes that it takes: four for each number of a plane, ...
+/// Fewest good nodes: four for each parameter of a plane.
 const FEWEST: usize = 12;
-/// ... and how many are used at most: pairs of them are summed, 10⁸.
+/// Most nodes that are used: the correlation sums over all pairs, 10⁸ of them.
 const MOST: usize = 10_000;
-/// Smallest extent of the nodes along both axes, windows (root mean square distance from their middle, times √12): less
-/// is one number.
+/// Smallest extent of the nodes along either axis, in windows (rms distance from their centre times √12): within one window
+/// a map has one independent value.
 const REACH: f64 = 1.0;
 
 /// A plane through a quantity of a map.
@@ -26,7 +26,7 @@ const REACH: f64 = 1.0;
 pub struct Trend {
     /// Change per nm along x and along y.
     pub gradient: [Estimate; 2],
-    /// Value of the plane at the middle of the frame, or at the place that was asked for.
+    /// Value of the plane at the centre of the frame, or at the position passed to [`Trends::about`].
     pub middle: Estimate,
     /// Standard deviation over the good nodes due to the plane.
     pub of_trend: f64,
@@ -41,23 +41,23 @@ pub struct Trends {
     nodes: Vec<(usize, Vector2<f64>)>,
     inverse: Matrix2<f64>,
     second: Matrix2<f64>,
-    /// From the middle of the good nodes to that place, nm.
+    /// Vector from the centre of the good nodes to the position of [`Trend::middle`], nm.
     aside: Vector2<f64>,
-    /// What noise of unit variance leaves in the mean, in both slopes and their covariance, at the middle.
+    /// Variance of the mean, of the slopes and of the value at that position, for node noise of unit variance.
     mean: f64,
     slopes: Matrix2<f64>,
     middle: f64,
 }
 
 impl Trends {
-    /// About the middle of the frame. `None` where the good nodes are too few or lie too near to each other.
+    /// Planes about the centre of the frame. `None` if there are fewer than 12 good nodes or they lie within one window.
     pub fn new(map: &TwistStrainMap) -> Option<Self> {
         let [columns, rows] = map.grid.size.map(|n| n as f64 - 1.0);
         let half = Vector2::new(columns, rows) / 2.0;
         Self::about(map, map.grid.origin + map.grid.step * half)
     }
 
-    /// The same about another place, nm, at which [`Trend::middle`] is then.
+    /// Planes about the position `place`, nm.
     pub fn about(map: &TwistStrainMap, place: Vector2<f64>) -> Option<Self> {
         let columns = map.grid.size[0];
         let every = ((map.good() as f64 / MOST as f64).sqrt().ceil() as usize).max(1);
@@ -108,7 +108,7 @@ impl Trends {
         })
     }
 
-    /// The plane through a quantity of this map; `None` where a good node has no value.
+    /// The plane fitted to a quantity of this map. `None` if a good node has no value.
     pub fn of(&self, plane: &Plane) -> Option<Trend> {
         let count = self.nodes.len() as f64;
         let (mut mean, mut noise) = (0.0, 0.0);

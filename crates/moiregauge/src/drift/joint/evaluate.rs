@@ -1,4 +1,4 @@
-//! The model of a sighting and its derivatives.
+//! The model of a detection (one line direction of one scan): whitened residuals and their derivatives.
 
 use nalgebra::{
     DVector, Matrix2, Matrix2x3, Matrix3, Matrix3x2, Matrix3xX, Matrix4, Matrix4xX, Vector2,
@@ -11,7 +11,7 @@ use crate::drift::joint::sighting::{Detection, Terms};
 use crate::drift::joint::sums::{ScanSums, Whitened};
 use crate::numbers::interrupt;
 
-/// Where each parameter stands in the vector.
+/// Index of each parameter in the parameter vector.
 #[derive(Clone, Debug)]
 pub(crate) struct Layout {
     pub(crate) terms: Terms,
@@ -26,11 +26,11 @@ pub(crate) struct Layout {
     gain: Option<usize>,
     /// Offsets of the classes after the first.
     offsets: Option<usize>,
-    /// Which scan sees which parameters.
+    /// Parameters on which each scan depends.
     pub(crate) shape: Shape,
 }
 
-/// Lattice 0..4 (K₁, K₂), drift 4..6, then what the terms add.
+/// Index of the drift: the lattice has 0..4 (G₁, G₂), the drift 4..6, the optional terms follow.
 pub(crate) const DRIFT: usize = 4;
 
 impl Layout {
@@ -74,28 +74,28 @@ impl Layout {
         }
     }
 
-    /// How many parameters there are.
+    /// Number of parameters.
     pub(crate) fn size(&self) -> usize {
         self.shape.size()
     }
 
-    /// How many of them are results; the others are nuisance for phases.
+    /// Number of parameters that are results; the others are nuisance parameters of the phases.
     pub(crate) fn count(&self) -> usize {
         self.offsets.unwrap_or(self.shape.shared)
     }
 
-    /// Where the offset of a class stands; `None` for the first class and beyond the last.
+    /// Index of the offset of a class; `None` for the first class, the reference, and beyond the last.
     pub(crate) fn offset_of(&self, class: usize) -> Option<usize> {
         let at = self.offsets? + 2 * class.checked_sub(1)?;
         (at < self.shape.shared).then_some(at)
     }
 
-    /// Where the phases of a block start; `None` of a fit without phases.
+    /// First index of the phases of a block; `None` for a fit without phases.
     pub(crate) fn phases_of(&self, block: usize) -> Option<usize> {
         self.terms.phases.then(|| self.shape.phases_at(block))
     }
 
-    /// Where the errors of the frame times start.
+    /// First index of the errors of the frame times; `None` for a fit without phases.
     pub(crate) fn times_at(&self) -> Option<usize> {
         self.terms.phases.then(|| self.shape.clocks_at())
     }
@@ -108,7 +108,7 @@ impl Layout {
         self.gain
     }
 
-    /// How much each drift parameter moves the sample at a time, and its velocity: (parameter index of the x component,
+    /// Weights of the drift parameters in displacement and velocity of the sample at a time: (index of the x component,
     /// weight in d, weight in d').
     pub(crate) fn drift_weights(&self, time: f64) -> impl Iterator<Item = (usize, f64, f64)> {
         let t = time - self.origin;
@@ -123,7 +123,7 @@ impl Layout {
             .flatten()
     }
 
-    /// The way of the sample.
+    /// Path of the sample.
     pub(crate) fn path(&self, x: &DVector<f64>) -> DriftPath {
         let two = |i: usize| Vector2::new(x[i], x[i + 1]);
         let settling = self.settling.zip(self.terms.settling);
@@ -155,7 +155,7 @@ impl Layout {
 /// The three harmonics as combinations of K₁ and K₂.
 const HARMONICS: [(f64, f64); 3] = [(1.0, 0.0), (0.0, 1.0), (-1.0, 1.0)];
 
-/// Sightings against the model, with derivatives by the local parameters of their scans.
+/// Residuals of all detections and their derivatives by the parameters of their scans.
 pub(crate) struct Linearised {
     /// The waves, whitened.
     pub(crate) waves: Vec<WavesMiss>,
@@ -168,7 +168,7 @@ pub(crate) struct Linearised {
 }
 
 impl Linearised {
-    /// The normal equations, with positions that scatter by `instability`, nm.
+    /// The normal equations, for positions with a scatter of `instability`, nm.
     pub(crate) fn sums(&self, shape: &Shape, instability: f64) -> ScanSums {
         let mut sums = self.sums_without_phases(shape);
         self.add_phases(&mut sums, instability);
@@ -189,7 +189,7 @@ impl Linearised {
         sums
     }
 
-    /// Adds the phases, with positions that scatter by `instability`, nm.
+    /// Adds the phases, for positions with a scatter of `instability`, nm.
     pub(crate) fn add_phases(&self, sums: &mut ScanSums, instability: f64) {
         for phases in &self.phases {
             if let Some(rows) = phases.whitened(instability * instability) {
@@ -198,29 +198,29 @@ impl Linearised {
         }
     }
 
-    /// What is known of the clock of a scan: the whitened residual and its slope.
+    /// The whitened residual of the frame time of a scan, and its derivative. The prior of the error is 0 ± `time_sigma`.
     pub(crate) fn clock(&self, scan: usize) -> Option<[f64; 2]> {
         let late = self.clocks.get(scan)?;
         Some([-late / self.time_sigma, 1.0 / self.time_sigma])
     }
 }
 
-/// The waves of one sighting against the model.
+/// Whitened residuals of the wave vectors of one detection.
 pub(crate) struct WavesMiss {
-    /// Its number.
+    /// Index of the detection.
     pub(crate) sighting: usize,
     pub(crate) scan: usize,
     pub(crate) rows: Whitened<4>,
 }
 
-/// The phases of one sighting against the model.
+/// Residuals of the phases of one detection.
 pub(crate) struct PhaseMiss {
     pub(crate) scan: usize,
     /// Measured − model, rad.
     pub(crate) miss: Vector3<f64>,
-    /// Covariance of what noise does to the measured ones, rad².
+    /// Covariance of the measured phases, rad².
     pub(crate) noise: Matrix3<f64>,
-    /// The three wave vectors as rows, rad/nm: what a displacement does.
+    /// The three wave vectors as rows, rad/nm: derivatives by a displacement.
     pub(crate) waves: Matrix3x2<f64>,
     /// Derivatives of the model by the local parameters of the scan.
     pub(crate) slopes: Matrix3xX<f64>,
@@ -246,7 +246,7 @@ impl PhaseMiss {
         Some((self.noise + shaken).cholesky()?.l())
     }
 
-    /// By how much `scatter` raises the logarithm of the determinant of their covariance.
+    /// Increase of the logarithm of the determinant of the covariance by a position variance `scatter`, nm².
     pub(crate) fn widening(&self, scatter: f64) -> f64 {
         let logarithm = |variance| {
             let diagonal = self.factor(variance)?.diagonal();
@@ -257,7 +257,7 @@ impl PhaseMiss {
             .map_or(0.0, |(wide, narrow)| wide - narrow)
     }
 
-    /// What gives the displacement that explains phases best, nm/rad, and the covariance that their noise gives it, nm².
+    /// The matrix that maps phase residuals to the displacement of least χ², nm/rad, and the covariance of that displacement, nm².
     pub(crate) fn displacement(&self) -> Option<(Matrix2x3<f64>, Matrix2<f64>)> {
         let weight = self.noise.cholesky()?;
         let design = weight.solve(&self.waves);
@@ -266,8 +266,8 @@ impl PhaseMiss {
     }
 }
 
-/// Evaluates the model at `x` for the sightings within `reach` of the origin of time (phases beyond
-/// it may be off by a whole turn and are left out).
+/// Evaluates the model at `x`. Phases of detections farther than `reach` (s) from the origin of time may be off by 2π and are left
+/// out; their wave vectors are used.
 pub(crate) fn linearise(
     sightings: &[Detection],
     layout: &Layout,
@@ -352,7 +352,7 @@ pub(crate) fn factor(sighting: &Detection) -> Option<Matrix4<f64>> {
     Some((sighting.waves.covariance + floor).cholesky()?.l())
 }
 
-/// The phases of a sighting that has some, `Φ_h = G_h·(r − d(t + δt) − o) + φ_h`, wrapped.
+/// The phases of a detection, `Φ_h = G_h·(r − d(t + δt) − o) + φ_h`, wrapped to (−π, π]. `None` if it has none.
 pub(crate) fn phases(sighting: &Detection, layout: &Layout, x: &DVector<f64>) -> Option<PhaseMiss> {
     let first = layout.phases_of(sighting.block)?;
     let late = layout.times_at()? + sighting.scan;

@@ -3,8 +3,8 @@
 use crate::spectrum::harmonics::{Harmonic, Harmonics};
 use crate::spectrum::shells::FIRST_SHELL;
 
-/// What the fit starts with: the first shell, and of the others what the spectrum shows clearly.
-/// `None` where the first shell is not complete (one of it beyond the Nyquist frequency).
+/// Indices and harmonics with which the fit starts: the three of first order, and those of higher order whose gain in χ² exceeds the
+/// price of the information criterion, ln(pixels). `None` if a first-order harmonic is missing, as beyond the Nyquist frequency.
 pub(crate) fn at_first(start: &Harmonics, pixels: usize) -> Option<Vec<([i32; 2], &Harmonic)>> {
     let inverse = start.pair.try_inverse()?;
     let price = (pixels as f64).ln();

@@ -1,4 +1,4 @@
-//! A line of an image folded about its middle, and its products with harmonics.
+//! A line of an image folded about its centre, and its correlation with harmonics. Folding halves the work: cosines are even in X, sines odd.
 
 use rustfft::num_complex::Complex64;
 
@@ -6,19 +6,19 @@ use crate::lattice::fit::frame::{BENT, Frame, ORDERS};
 use crate::lattice::fit::tables::{Block, LANES, Tables, sum};
 use crate::numbers::widest::widest;
 
-/// A line folded about its middle: sums and differences of what lies at X and −X, and both times X.
+/// A line folded about its centre: sums (even part) and differences (odd part) of the values at X and −X, also multiplied by powers of X.
 pub(crate) struct Folded {
     x: Vec<Block>,
     even: Vec<Block>,
     odd: Vec<Block>,
     tilted_even: Vec<Block>,
     tilted_odd: Vec<Block>,
-    /// Times X² and X³, on request.
+    /// Multiplied by X² and X³; filled by [`Self::raise`].
     squared_even: Vec<Block>,
     squared_odd: Vec<Block>,
     cubed_even: Vec<Block>,
     cubed_odd: Vec<Block>,
-    /// The line itself, where its waves are bent.
+    /// The unfolded line, for a frame whose pixels have displacements, where symmetry does not hold.
     whole: Option<Vec<f64>>,
 }
 
@@ -43,6 +43,7 @@ impl Folded {
         }
     }
 
+    /// Folds a line.
     pub(crate) fn take(&mut self, line: &[f64]) {
         if let Some(whole) = &mut self.whole {
             whole.copy_from_slice(line);
@@ -60,7 +61,7 @@ impl Folded {
             },
         );
         if line.len() % 2 == 1 {
-            // The middle is there once.
+            // The central pixel was added to itself.
             even[0] *= 0.5;
         }
         let tilted = self.tilted_even.iter_mut().zip(&mut self.tilted_odd);
@@ -73,6 +74,7 @@ impl Folded {
         }
     }
 
+    /// Multiplies the folded line by X² and X³.
     fn raise(&mut self) {
         let squared = self.squared_even.iter_mut().zip(&mut self.squared_odd);
         let cubed = self.cubed_even.iter_mut().zip(&mut self.cubed_odd);
@@ -97,7 +99,7 @@ impl Folded {
                 let squared = self.squared_even.iter().zip(&self.squared_odd);
                 let cubed = self.cubed_even.iter().zip(&self.cubed_odd);
                 for (((se, so), (ce, co)), [cos, sin]) in squared.zip(cubed).zip(waves) {
-                    // What is even in X goes with the cosine: X³ makes even of odd.
+                    // Cosines take what is even in X: the even part times X², the odd part times X³.
                     for (sum, (a, b)) in
                         (sums.iter_mut()).zip([(se, cos), (so, sin), (co, cos), (ce, sin)])
                     {
@@ -127,8 +129,8 @@ impl Folded {
         moments
     }
 
-    /// Sums of the line times `cos`, `sin`, `X cos`, `X sin` of some harmonics, in partial sums that the
-    /// compiler can keep in registers.
+    /// Sums of the line times `cos`, `sin`, `X cos`, `X sin` of N harmonics, as partial sums that the compiler
+    /// keeps in registers.
     fn products<const N: usize>(&self, waves: [&[[Block; 2]]; N]) -> [[f64; 4]; N] {
         /// Half of the values that are handled together.
         const HALF: usize = LANES / 2;
@@ -163,7 +165,7 @@ impl Folded {
         )
     }
 
-    /// The same of a line for all harmonics, two at a time.
+    /// Calls `each` with the index of each harmonic and the sums of the line times `cos`, `sin`, `X cos`, `X sin`.
     pub(crate) fn all_products(
         &self,
         tables: &Tables,
@@ -189,8 +191,8 @@ impl Folded {
     }
 }
 
-/// Correlations of lines with `XᵃYᵇ e^{iθ}` of each harmonic, for the powers of [`BENT`]: real parts are those with
-/// cosines, imaginary parts those with sines.
+/// Correlations of lines with `XᵃYᵇ e^{iθ}` of each harmonic for the powers (a, b) of [`BENT`]. Real parts belong to cosines,
+/// imaginary parts to sines.
 pub(crate) struct Bends(pub(crate) Vec<[Complex64; ORDERS]>);
 
 impl Bends {
@@ -198,7 +200,7 @@ impl Bends {
         Self(vec![[Complex64::default(); ORDERS]; harmonics])
     }
 
-    /// Those of one line.
+    /// Correlations of one line.
     pub(crate) fn of_line(frame: &Frame, tables: &Tables, row: usize, line: &mut Folded) -> Self {
         let mut bends = Self::new(tables.up.len());
         let y = frame.y[row];
@@ -223,7 +225,7 @@ impl Bends {
         bends
     }
 
-    /// Adds those of other lines.
+    /// Adds the correlations of other lines.
     pub(crate) fn add(&mut self, other: &Self) {
         for (sums, others) in self.0.iter_mut().zip(&other.0) {
             for (sum, other) in sums.iter_mut().zip(others) {

@@ -1,8 +1,8 @@
-//! The noise that is left: its power around each harmonic, and what else stands out of it.
+//! Noise of the residual: its power around each harmonic, and the strongest non-lattice peak.
 //!
-//! The residual is Hann-windowed and transformed. The fit has emptied it where the harmonics are, and with few periods that is
-//! nearly everywhere; so the power found is divided by the power that white noise of unit variance would have left in the same
-//! bins ([`leverage`](crate::lattice::fit::leverage)). What that says about the wave vectors is worked out in
+//! The residual is Hann-windowed and transformed. The fit removes power near each harmonic, and with few periods
+//! that is nearly everywhere. So the measured power is divided by the power that white noise of unit variance would leave in the same
+//! bins ([`leverage`](crate::lattice::fit::leverage)). The errors of the wave vectors follow from it in
 //! [`local`](crate::lattice::fit::local).
 
 use std::f64::consts::PI;
@@ -21,30 +21,30 @@ use crate::spectrum::fourier::wide;
 use crate::spectrum::select::{BLOCK_WIDTH, NoiseMap};
 use crate::spectrum::transform::{Spectrum, hann};
 
-/// Power over noise of the highest bin at a place that is worth a look: a third of what a wave needs to earn its place.
+/// Power over noise of the highest bin near a frequency where a harmonic is tried: a third of what the information criterion asks of one.
 const PROMISING: f64 = 4.0;
-/// Bins across the lines on either side of a place where nothing but a wave is looked for: half of those around a harmonic.
+/// Bins across the lines on either side of such a frequency from which the noise is taken: half of those around a harmonic.
 const NEAR: i64 = 8;
-/// Bins nearer to zero frequency belong to the background: a plane fills the first.
+/// Bins nearer to zero frequency than this belong to the background: a plane fills the first.
 const BACKGROUND: i64 = 2;
-/// The first column that the window keeps free of what whole lines do.
+/// The first column of the spectrum without power of line offsets, which the window spreads over two columns.
 pub(super) const BESIDE: i64 = 2;
-/// Distance from a lattice point (cycles per frame) beyond which a wave is not a harmonic: nearer, it may be that of
-/// a lattice that changes. Chosen by eye; see docs/constants.md.
+/// Distance from a lattice point (cycles per frame) beyond which a peak is no harmonic: nearer, it may belong to an
+/// inhomogeneous lattice. Chosen by eye; see docs/constants.md.
 const FOREIGN: f64 = 3.0;
-/// Up to this order that holds ...
+/// Highest order for which [`FOREIGN`] holds.
 const LOW_ORDER: f64 = 4.0;
-/// ... and beyond, where a lattice has more points than it has strong waves, a wave has to lie on the point itself:
-/// the main lobe of the window. Sharp walls make harmonics of any order.
+/// The same distance at higher orders, where most lattice points have no peak: the main lobe of the window. Sharp domain walls
+/// make harmonics of any order.
 const HARMONIC: f64 = 2.0;
 
 /// The periodogram of a residual.
 pub(crate) struct ResidualNoise {
     /// In single precision: noise is known to a few per cent.
     spectrum: Spectrum<f32>,
-    /// Its noise in blocks, once it is asked for.
+    /// Its noise in blocks, calculated at first use.
     blocks: OnceLock<NoiseMap>,
-    /// `Σ w²` over the pixels that count.
+    /// `Σ w²` of the window over the pixels that are used.
     window_power: f64,
     pub(super) free_lines: bool,
 }
@@ -65,14 +65,15 @@ pub struct ForeignWave {
 }
 
 impl ForeignWave {
-    /// Whether it is more than chance.
+    /// True if noise alone does not explain the peak.
     pub fn is_significant(&self) -> bool {
         self.significance > self.threshold
     }
 }
 
 impl ResidualNoise {
-    /// `residual` writes a line, 0 where pixels do not count, and says something of it. `free_lines`: line means are gone.
+    /// `residual` writes one line, 0 at masked pixels, and returns a value for it; the values are returned in order. `free_lines`: the
+    /// fit removed the mean of each line.
     pub(crate) fn new<S, R: Send>(
         frame: &Frame,
         free_lines: bool,
@@ -100,8 +101,8 @@ impl ResidualNoise {
     }
 
     /// Noise power around a harmonic as it acts on the x and on the y component of its wave vector and on
-    /// its phase; white noise of variance σ² gives σ². `lambda` is the share of line means that offsets
-    /// take up. `None` where the fit has left nothing.
+    /// its phase; white noise of variance σ² gives σ². `lambda` is the fraction of the line means that line
+    /// offsets absorb. `None` if the fit leaves no power.
     pub(crate) fn around(
         &self,
         p: Vector2<f64>,
@@ -115,7 +116,7 @@ impl ResidualNoise {
         acting_on(p / PI, lambda, &bins)
     }
 
-    /// The same by the median: waves that are not fitted yet do not matter.
+    /// Noise power around a harmonic by the median, which harmonics that are not fitted yet do not bias.
     pub(crate) fn median_around(&self, p: Vector2<f64>, leverage: &Leverage) -> Option<f64> {
         let mut all = Vec::new();
         self.bins(p, leverage, |_, found, white| {
@@ -126,8 +127,8 @@ impl ResidualNoise {
         (!all.is_empty()).then(|| median(&mut all) / std::f64::consts::LN_2)
     }
 
-    /// Whether there is a bit more than noise at a place. A wave that is worth its place stands there
-    /// at 12 times the noise or more, of which window and grid leave a quarter at worst.
+    /// True if a harmonic may be at this frequency. One that the information criterion accepts has 12 times the noise or more, of
+    /// which window and grid leave a quarter at worst.
     pub(crate) fn is_promising(&self, p: Vector2<f64>) -> bool {
         let centre = (p / PI).map(|c| c.round() as i64);
         let mut near = 0.0f64;
@@ -193,7 +194,7 @@ impl ResidualNoise {
 
     /// Noise power around a frequency (cycles per frame), in the units of a power over noise.
     pub(crate) fn noise_near(&self, k: Vector2<f64>) -> f64 {
-        // Waves of opposite sign are one.
+        // k and −k are the same wave of a real image.
         let k = if k.x < 0.0 { -k } else { k }.map(|c| c.round() as i64);
         let rows = self.spectrum.rows as i64;
         let row = self.blocks().row(k.y.rem_euclid(rows) as usize);
@@ -205,12 +206,12 @@ impl ResidualNoise {
         self.blocks.get_or_init(|| NoiseMap::new(&self.spectrum))
     }
 
-    /// The same per pixel.
+    /// Noise power per pixel around a frequency (cycles per frame).
     pub(super) fn level_near(&self, k: Vector2<f64>) -> f64 {
         self.noise_near(k) / self.window_power
     }
 
-    /// The strongest wave away from the lattice, from slow waves and from the line ridge.
+    /// The strongest peak that is no harmonic, no background and no line offset.
     pub(crate) fn foreign_wave(&self, frame: &Frame, model: &Model) -> Option<ForeignWave> {
         let noise = self.blocks();
         let rows = self.spectrum.rows;
@@ -225,7 +226,7 @@ impl ResidualNoise {
             };
             (k - cycles * index).norm() < near
         };
-        // Waves beyond the Nyquist frequency are seen a whole turn a pixel away.
+        // Waves beyond the Nyquist frequency are aliased by one cycle per pixel.
         let turn = Vector2::new(self.spectrum.columns as f64, rows as f64);
         let ours = |k: Vector2<f64>| {
             let turns = (-1..=1).flat_map(|x| (-1..=1).map(move |y| Vector2::new(x, y)));
@@ -262,7 +263,7 @@ impl ResidualNoise {
         })
     }
 
-    /// Power over noise that chance exceeds once in some ten thousand images of this size.
+    /// Power over noise that noise alone exceeds once in about ten thousand images of this size.
     pub(super) fn threshold(&self) -> f64 {
         let bins = self.spectrum.values.len() as f64;
         // The local noise is known to a fifth or so, hence the factor.
