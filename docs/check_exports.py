@@ -1,4 +1,4 @@
-"""What moiregauge writes, seen by independent readers: numpy, gwyfile, tifffile, xarray (zarr), pyarrow.
+"""What moiregauge writes, seen by independent readers: numpy, gwyfile, tifffile, xarray (zarr), pyarrow, jsonschema.
 
 Called by check_exports.sh with a folder of its making. Every file is compared with the same scan
 converted to .npz or with the CSV tables; the .npz itself with the raw counts that the simulator wrote.
@@ -11,6 +11,7 @@ import sys
 from pathlib import Path
 
 import gwyfile
+import jsonschema
 import numpy as np
 import pyarrow.parquet as pq
 import tifffile
@@ -207,5 +208,13 @@ registry = -np.transpose(told["layer_1_vectors_nm"]) @ shares
 for n, axis in enumerate("xy"):
     miss = np.abs(registry[n] - table[f"registry_{axis}_nm"])[known].max()
     check(miss < 1e-6, f"registry {axis} by its definition: {miss} nm")
+
+schemas = Path(__file__).resolve().parent.parent / "crates/moiregauge-report/schema"
+for name, document in (("results", folder / "results/results.json"), ("map", maps / "map.json")):
+    schema = json.loads((schemas / f"{name}-1.schema.json").read_text())
+    validator = jsonschema.validators.validator_for(schema)
+    validator.check_schema(schema)
+    wrong = [error.message for error in validator(schema).iter_errors(json.loads(document.read_text()))]
+    check(not wrong, f"{document.name} by its schema: {wrong[:3]}")
 
 print(f"{checks} comparisons agree")

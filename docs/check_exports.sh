@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Writes simulated scans in every format and has independent readers look at them: numpy, gwyfile,
-# tifffile, xarray with zarr, pyarrow. Installs them in an environment of its own.
+# tifffile, xarray with zarr, pyarrow, jsonschema. Installs them in an environment of its own.
 #
 #   docs/check_exports.sh [PROGRAM]     PROGRAM is built if it is not given
 #
@@ -16,7 +16,7 @@ command -v python3 > /dev/null || skip "there is no python3"
 python3 -m venv "$scratch/python" 2> "$scratch/log" || skip "python3 has no venv"
 python=$scratch/python/bin/python
 "$python" -m pip install --quiet --disable-pip-version-check \
-  numpy gwyfile tifffile 'xarray>=2024.10' 'zarr>=3' pyarrow 2> "$scratch/log" ||
+  numpy gwyfile jsonschema tifffile 'xarray>=2024.10' 'zarr>=3' pyarrow 2> "$scratch/log" ||
   skip "the packages cannot be installed: $(tail -n 1 "$scratch/log")"
 
 program=${1:-}
