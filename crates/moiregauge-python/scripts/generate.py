@@ -194,12 +194,12 @@ def options() -> str:
     aliases = {name: type_of(of) for name, of in defs.items() if "properties" not in of}
     entries = dict(MORE)
     known = []
-    for table in ("Settings", "Told"):
+    for table in ("Settings", "UserSpecified"):
         for name, of in defs[table]["properties"].items():
             if name in HIDDEN:
                 continue
             entries[name] = (GIVEN.get(name) or loose(type_of(of), classes), of.get("description", ""))
-            if table == "Told":
+            if table == "UserSpecified":
                 known.append(name)
     used = [name for name in sorted(aliases) if any(name in annotation for annotation, _ in entries.values())]
     out = [OPTIONS_HEAD + "".join(f"{name} = {aliases[name]}\n" for name in used)]

@@ -179,7 +179,7 @@ fn no_sensors() {
     assert_eq!(caveats(&without), ["no-position-sensors"; 2]);
     told(&without, 0, set, " (3 of 3 scans)");
     let file = &without["sets"][0]["scans"][1]["file"];
-    told(&without, 1, file, "twist and strain");
+    told(&without, 1, file, "sensor channels");
 }
 
 /// Noise without a moiré gives no numbers, not even with large error bars.

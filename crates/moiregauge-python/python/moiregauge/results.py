@@ -102,11 +102,11 @@ __all__ = [
     "TensorSigmas",
     "TestedResult",
     "TipVelocity",
-    "Told",
     "TrendResult",
     "TwistSense",
     "TwistStrainResult",
     "UndistortedResult",
+    "UserSpecified",
     "WantedResult",
     "Window",
 ]
@@ -331,6 +331,8 @@ class CandidateResult(Document):
 class Caveat(Document):
     """A reason to trust a number less, with a stable code for programs and words for people."""
 
+    attempts: tuple[str, ...] = ()
+    """What was tried before it was raised, one line for each attempt. Left out where nothing was."""
     code: str
     """Stable kebab-case code, as in `no-position-sensors`."""
     message: str
@@ -1340,7 +1342,7 @@ class Run(Document):
     """Names of corrected images that were wanted."""
     inputs: tuple[str, ...]
     """The files to measure as they were named, in order, those that could not be used among them."""
-    known: Told
+    known: UserSpecified
     """What the user said about the files."""
     left_out: tuple[FailedInput, ...] = ()
     """Names that were given and not measured: no file, or one that could not be read."""
@@ -1786,32 +1788,6 @@ class TipVelocity(Document):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Told(Document):
-    """What files do not tell and the user does."""
-
-    crop: Crop | None = None
-    """The block of the image to use."""
-    frame_direction: FrameOrder | None = None
-    """Sense of the slow motion."""
-    line_rate_hz: float | None = None
-    """Lines per second, trace and retrace together."""
-    rotation_deg: float | None = None
-    """Angle by which the fast axis is turned against x, degrees, counter-clockwise."""
-    sensor_unit: str | None = None
-    """Unit of the position sensors of arrays."""
-    sensors: str | None = None
-    """File that holds the position sensors."""
-    size_nm: tuple[float, float] | None = None
-    """Width and height of the image from edge to edge, nm."""
-    unit: str | None = None
-    """Unit of the values of arrays and pictures."""
-    x_sensor: str | None = None
-    """Channel that is the position sensor along x."""
-    y_sensor: str | None = None
-    """Channel that is the position sensor along y."""
-
-
-@dataclass(frozen=True, kw_only=True)
 class TrendResult(Document):
     """A plane through the good nodes: how much of the spread is a change across the frame (creep, drift that
     changes, a scanner that bows, or the sample).
@@ -1879,6 +1855,32 @@ class UndistortedResult(Document):
     """Distance of its pixels, nm."""
     pixels: tuple[int, int]
     """Columns and rows."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class UserSpecified(Document):
+    """What files do not tell and the user does."""
+
+    crop: Crop | None = None
+    """The block of the image to use."""
+    frame_direction: FrameOrder | None = None
+    """Sense of the slow motion."""
+    line_rate_hz: float | None = None
+    """Lines per second, trace and retrace together."""
+    rotation_deg: float | None = None
+    """Angle by which the fast axis is turned against x, degrees, counter-clockwise."""
+    sensor_unit: str | None = None
+    """Unit of the position sensors of arrays."""
+    sensors: str | None = None
+    """File that holds the position sensors."""
+    size_nm: tuple[float, float] | None = None
+    """Width and height of the image from edge to edge, nm."""
+    unit: str | None = None
+    """Unit of the values of arrays and pictures."""
+    x_sensor: str | None = None
+    """Channel that is the position sensor along x."""
+    y_sensor: str | None = None
+    """Channel that is the position sensor along y."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -1979,7 +1981,9 @@ decoded_by(
             "predicted_share": float,
             "wavelengths_nm": several(float, 3),
         },
-        Caveat: {},
+        Caveat: {
+            "attempts": several(None),
+        },
         ChecksResult: {
             "bootstrap": ScatterResult.from_dict,
             "leave_one_out": ScatterResult.from_dict,
@@ -2298,7 +2302,7 @@ decoded_by(
             "atomic": AtomicImages.from_dict,
             "export": several(None),
             "inputs": several(None),
-            "known": Told.from_dict,
+            "known": UserSpecified.from_dict,
             "left_out": several(FailedInput.from_dict),
             "other_files": several(InputFile.from_dict),
             "report": Choice.from_dict,
@@ -2444,12 +2448,6 @@ decoded_by(
             "fast": Estimate.from_dict,
             "slow": Estimate.from_dict,
         },
-        Told: {
-            "crop": Crop.from_dict,
-            "line_rate_hz": float,
-            "rotation_deg": float,
-            "size_nm": several(float, 2),
-        },
         TrendResult: {
             "middle": float,
             "middle_sigma": float,
@@ -2477,6 +2475,12 @@ decoded_by(
             "origin_nm": several(float, 2),
             "pitch_nm": float,
             "pixels": several(None, 2),
+        },
+        UserSpecified: {
+            "crop": Crop.from_dict,
+            "line_rate_hz": float,
+            "rotation_deg": float,
+            "size_nm": several(float, 2),
         },
         WantedResult: {
             "blur_percent": float,

@@ -70,8 +70,8 @@ pub enum ImageChoice {
     },
     /// The first of several channels, none of which has a usual name.
     #[error(
-        "only the first image, {first:?}, is analysed: the file holds {count} ({names}), and none has the name of a \
-         channel that usually shows a moiré"
+        "only the first image, {first:?}, is analysed: the file holds {count} images ({names}), and none has the name \
+          of a channel that usually shows a moiré"
     )]
     UnusualNames {
         /// How many there are.

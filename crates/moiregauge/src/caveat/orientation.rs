@@ -49,8 +49,8 @@ pub enum OrientationDoubt {
     },
     /// The orientations of both layers contradict each other.
     #[error(
-        "one of the two orientations is wrong, or its error is too small: they contradict the moiré by at least \
-         {sigmas:.1} σ. Check direction, layer and sample of both"
+        "the two orientations contradict the moiré by at least {sigmas:.1} σ. Check direction, layer and sample of \
+          both: one of them belongs to another vector, another layer or another sample, or its error is too small"
     )]
     Disagree {
         /// The difference in standard deviations.

@@ -66,8 +66,9 @@ pub enum SetDoubt {
     OutsideOnePercent,
     /// A scan does not fit the others.
     #[error(
-        "the scan does not fit the others (χ² = {chi_squared:.0} for {degrees_of_freedom} degrees of freedom, p = \
-         {p_value:.0e}{}); {}",
+        "the mean includes a scan that does not fit the others. Look at it, and exclude it if it shows a jump, a tip \
+          change or another place (χ² = {chi_squared:.0} for {degrees_of_freedom} degrees of freedom, p = \
+          {p_value:.0e}{}; {})",
         .displacement.map_or_else(String::new, |d| format!(", {d:.3} nm from where the others have it")),
         if *.by_rule {
             "the rule never leaves out more than a fifth of the scans"
