@@ -1,5 +1,4 @@
-//! Ten thousand damaged copies of every real file: no reader panics or hangs, and what is read
-//! can be true.
+//! Damaged copies of every real file: no reader panics or hangs, and what is read can be true.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -11,7 +10,6 @@ use spmfile::{File, OpenOptions};
 use crate::common;
 use crate::mutation::{Dice, Sample, samples, survive};
 
-const MUTATIONS: u64 = 10_000;
 /// Copies that are opened; one in ten of them is read in both ways.
 const OPENED: u64 = 400;
 /// One copy in this number is decoded; in the others only the headers matter.
@@ -19,8 +17,16 @@ const DECODED: u64 = 250;
 /// Reading a damaged file takes milliseconds; a loaded machine makes that more.
 const LONGEST: Duration = Duration::from_secs(5);
 
-fn check(sample: &mut Sample) {
-    for number in 0..MUTATIONS {
+/// Damaged copies of each file, or as many as `MOIREGAUGE_MUTATIONS` says: `.ci/run` asks for ten thousand.
+fn mutations() -> u64 {
+    let asked = std::env::var("MOIREGAUGE_MUTATIONS").ok();
+    asked.map_or(1000, |n| {
+        n.parse().expect("MOIREGAUGE_MUTATIONS is a number")
+    })
+}
+
+fn check(sample: &mut Sample, mutations: u64) {
+    for number in 0..mutations {
         let start = Instant::now();
         let mut dice = Dice(number);
         let outcome = catch_unwind(AssertUnwindSafe(|| {
@@ -40,7 +46,7 @@ fn no_reader_stumbles() {
     let Some(data) = common::testdata("no_reader_stumbles") else {
         return;
     };
-    let samples = samples(&data);
+    let (samples, mutations) = (samples(&data), mutations());
     let count = samples.len();
     assert!(count > 0);
     let queue: Vec<_> = samples.into_iter().map(std::sync::Mutex::new).collect();
@@ -52,13 +58,13 @@ fn no_reader_stumbles() {
                 while let Some(sample) = queue.get(next.fetch_add(1, Ordering::Relaxed)) {
                     let mut sample = sample.lock().expect("no other worker has it");
                     let start = Instant::now();
-                    check(&mut sample);
+                    check(&mut sample, mutations);
                     println!("{:>6.2} s {}", start.elapsed().as_secs_f64(), sample.name);
                 }
             });
         }
     });
-    println!("{MUTATIONS} damaged copies of each of {count} files");
+    println!("{mutations} damaged copies of each of {count} files");
 }
 
 /// Channel by channel and row by row, damaged files are as plausible as at once.
