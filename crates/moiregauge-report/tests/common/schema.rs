@@ -36,9 +36,6 @@ fn check(root: &Value, schema: &Value, value: &Value, place: &str, found: &mut V
     for (keyword, rule) in rules {
         let count = || rule.as_u64().expect("a count") as usize;
         match keyword.as_str() {
-            "$schema" | "$defs" | "title" | "description" | "default" | "format" => {}
-            // Checked below, with the values that they are about.
-            "properties" | "additionalProperties" | "items" | "prefixItems" | "$ref" => {}
             "type" if !types(rule).iter().any(|name| is(name, value)) => {
                 no(format!("{value} is not of type {rule}"));
             }
@@ -79,13 +76,32 @@ fn check(root: &Value, schema: &Value, value: &Value, place: &str, found: &mut V
             "pattern" => {
                 assert_eq!(rule, "^([0-9a-f]{16})*$", "{place}: an unknown pattern");
                 let hex = |t: &str| {
-                    t.len() % 16 == 0 && t.bytes().all(|b| b"0123456789abcdef".contains(&b))
+                    t.len().is_multiple_of(16)
+                        && t.bytes().all(|b| b"0123456789abcdef".contains(&b))
                 };
                 if value.as_str().is_some_and(|text| !hex(text)) {
                     no(format!("{value} does not match {rule}"));
                 }
             }
-            "type" | "const" | "enum" | "anyOf" | "oneOf" | "minItems" | "maxItems" => {}
+            // Followed, or checked below with the values that they are about, or no rules.
+            "type"
+            | "const"
+            | "enum"
+            | "anyOf"
+            | "oneOf"
+            | "minItems"
+            | "maxItems"
+            | "properties"
+            | "additionalProperties"
+            | "items"
+            | "prefixItems"
+            | "$ref"
+            | "$schema"
+            | "$defs"
+            | "title"
+            | "description"
+            | "default"
+            | "format" => {}
             other => panic!("{place}: the keyword {other} is not known"),
         }
     }
