@@ -32,7 +32,6 @@ fn check(root: &Value, schema: &Value, value: &Value, place: &str, found: &mut V
         problems.is_empty()
     };
     let mut no = |text: String| found.push(format!("{place}: {text}"));
-    let entry = |name: &str| schema.get(name).unwrap_or(&Value::Null);
     for (keyword, rule) in rules {
         let count = || rule.as_u64().expect("a count") as usize;
         match keyword.as_str() {
@@ -105,6 +104,12 @@ fn check(root: &Value, schema: &Value, value: &Value, place: &str, found: &mut V
             other => panic!("{place}: the keyword {other} is not known"),
         }
     }
+    check_inside(root, schema, value, place, found);
+}
+
+/// What a schema refers to, and the values inside of `value`.
+fn check_inside(root: &Value, schema: &Value, value: &Value, place: &str, found: &mut Vec<String>) {
+    let entry = |name: &str| schema.get(name).unwrap_or(&Value::Null);
     if let Some(name) = entry("$ref").as_str() {
         let inner = root.pointer(name.strip_prefix('#').expect("of this schema"));
         check(root, inner.expect(name), value, place, found);
