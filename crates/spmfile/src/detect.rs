@@ -23,7 +23,7 @@ const OTHERS: [(&[u8], &str); 11] = [
 ];
 
 const NETCDF: &str =
-    "a NetCDF file, as GXSM writes them: save the image as Gwyddion or Nanonis file";
+    "a NetCDF file without an image of GXSM: save the image as Gwyddion, TIFF or NumPy array";
 /// Words of the programs that write HDF5 files, within the first bytes; the last one is in none.
 const PROGRAMS_OF_HDF5: [(&[u8], &str); 5] = [
     (

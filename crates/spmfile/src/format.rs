@@ -18,6 +18,8 @@ pub enum Format {
     Gsf,
     /// Gwyddion XYZ field (`.gxyzf`).
     Gxyzf,
+    /// GXSM scan (`.nc`), a `NetCDF` file.
+    Gxsm,
     /// Igor binary wave (`.ibw`), as of Asylum instruments.
     Igor,
     /// JPK image (`.jpk`, `.jpk-qi-image`), a TIFF container.

@@ -42,6 +42,7 @@ mod format;
 mod frame;
 pub mod gsf;
 pub mod gwy;
+mod gxsm;
 pub mod gxyzf;
 mod header;
 mod igor;

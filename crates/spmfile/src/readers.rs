@@ -8,8 +8,8 @@ use crate::format::Format;
 use crate::outline::{Input, Outline};
 use crate::signature::{first_entry, is_matrix};
 use crate::{
-    agilent, array, createc, gsf, gwy, gxyzf, igor, iso28632, jpk, matrix, nanonis, nanonis_grid,
-    nanoscope, nid, park, rhk, wsxm,
+    agilent, array, createc, gsf, gwy, gxsm, gxyzf, igor, iso28632, jpk, matrix, nanonis,
+    nanonis_grid, nanoscope, nid, park, rhk, wsxm,
 };
 
 /// One format.
@@ -99,6 +99,7 @@ pub(crate) static READERS: &[Reader] = &[
     reader!(F::Nid, "Nanosurf", ["nid", "ezd"], own ["nid"], Magic(&[b"[DataSet]"]), Scan, flat true, nid::open),
     reader!(F::Wsxm, "WSxM", ["stp", "top"], own ["stp", "top"], Magic(&[b"WSxM file"]), Scan, flat true, wsxm::open),
     reader!(F::Createc, "Createc", ["dat"], own [], By(createc::detect), Scan, flat false, createc::open),
+    reader!(F::Gxsm, "GXSM", ["nc"], own [], By(gxsm::detect), Scan, flat false, gxsm::open),
     reader!(F::AgilentMi, "Agilent", ["mi"], own ["mi"], Magic(&[b"fileType "]), Scan, flat true, agilent::open),
     reader!(F::OmicronMatrixLog, "Omicron Matrix log", ["mtrx"], own [], Magic(&[b"ONTMATRX0101ATEM"]), Companion, flat false, matrix::open_alone),
     reader!(F::OmicronMatrix, "Omicron Matrix", ["Z_mtrx", "I_mtrx"], own [], Magic(&[b"ONTMATRX"]), Scan, flat false, matrix::open_alone),

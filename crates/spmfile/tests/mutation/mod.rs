@@ -60,9 +60,10 @@ pub(crate) fn samples(data: &Path) -> Vec<Sample> {
         .iter()
         .filter(|p| p.is_dir())
         .flat_map(|f| entries(f));
-    let made = concat!(env!("CARGO_MANIFEST_DIR"), "/src/jpk/hdf5/film.h5-jpk");
+    let made = ["jpk/hdf5/film.h5-jpk", "gxsm/scan.nc"];
+    let made = made.map(|name| Path::new(env!("CARGO_MANIFEST_DIR")).join("src").join(name));
     files
-        .chain([PathBuf::from(made)])
+        .chain(made)
         .filter(|path| path.extension().is_none_or(|e| e != "json" && e != "md"))
         .filter(|path| path.is_file())
         .map(|path| {
