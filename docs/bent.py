@@ -35,6 +35,15 @@ def moire(twist, strain, axis, orientation):
     return layer @ numpy.linalg.inv(turn(twist) @ stretch) - layer
 
 
+def twist_of(vectors, guess):
+    """The twist, degrees, of moiré vectors near those of (twist, strain, axis, orientation), by Newton's method."""
+    for _ in range(6):
+        here, steps = moire(*guess).ravel(), 1e-7 * numpy.eye(4)
+        slopes = numpy.array([(moire(*(guess + step)).ravel() - here) / 1e-7 for step in steps]).T
+        guess = guess + numpy.linalg.solve(slopes, vectors.ravel() - here)
+    return math.degrees(guess[0])
+
+
 class Scene:
     """One sample and its scanner; a bent and a straight one differ in the scanner alone."""
 
@@ -42,7 +51,8 @@ class Scene:
         self.random, self.kind, self.seed = numpy.random.default_rng([seed, 40]), kind, seed
         draw = self.random.uniform
         self.twist = draw(0.9, 2.0)
-        self.vectors = moire(math.radians(self.twist), draw(0, 0.004), draw(0, math.pi), draw(0, math.pi))
+        self.layers = numpy.array([math.radians(self.twist), draw(0, 0.004), draw(0, math.pi), draw(0, math.pi)])
+        self.vectors = moire(*self.layers)
         self.start, self.second = draw(0, 2 * math.pi, 2), draw(0, 0.4)
         period = numpy.mean([4 * math.pi / math.sqrt(3) / numpy.hypot(*g) for g in (*self.vectors, self.vectors[1] - self.vectors[0])])
         self.pixels, self.size = int(draw(128, 257)), draw(5, 12) * period
@@ -52,8 +62,9 @@ class Scene:
         self.creeps, self.first_time = [draw(0.002, 0.015) * sign() for _ in "xy"], draw(0.3, 3)
         if kind.startswith("straight"):
             self.bows, self.creeps = [0, 0], [0, 0]
-        if kind.endswith("unrecorded"):  # Up to 1 % and 0.5 % a decade.
-            self.bows, self.creeps = [bow / 3 for bow in self.bows], [creep / 3 for creep in self.creeps]
+        if kind.endswith("unrecorded"):  # Up to 0.5 % a decade, and up to 1 % of hysteresis or all of it.
+            self.creeps = [creep / 3 for creep in self.creeps]
+            self.bows = self.bows if kind.startswith("hysteresis") else [bow / 3 for bow in self.bows]
 
     def places(self, up, back):
         """(X, Y) of the pixels of a line direction."""
@@ -68,6 +79,13 @@ class Scene:
         decades = numpy.log10(1 + time / self.first_time)
         return [side * w + self.size * (way * bow / 2 * (1 - w ** 2) * (1 + skew * w) + creep * decades)
                 for w, way, bow, skew, creep in zip(meant, ways, self.bows, self.skews, self.creeps)]
+
+    def truth(self):
+        """The twist of the mean moiré vectors over the area that the pixels of all lines cover: creep moves it."""
+        if not self.kind.endswith("changing"):
+            return self.twist
+        x, y = numpy.mean([numpy.mean(self.places(up, back), axis=(1, 2)) for up in (True, False) for back in (False, True)], axis=0) / (self.size / 2)
+        return twist_of(self.vectors @ numpy.array([[1 + 0.024 * x, 0], [-0.008 * y, 1 - 0.008 * x]]), self.layers)
 
     def image(self, x, y):
         if self.kind.endswith("changing"):  # Moiré vectors that change by 2.4 % from the middle to either side.
@@ -133,7 +151,7 @@ def analyse(program, kind, seed, folder):
     files = [made / f"frame.0_{i:05}.spm" for i in range(FRAMES)]
     for number, path in enumerate(files):
         nanoscope(path, scene, number)
-    line = {"kind": kind, "seed": seed, "truth": scene.twist, "noise": scene.noise, "periods": scene.size, "bows": list(map(float, scene.bows)), "creeps": list(map(float, scene.creeps))}
+    line = {"kind": kind, "seed": seed, "truth": scene.truth(), "noise": scene.noise, "periods": scene.size, "bows": list(map(float, scene.bows)), "creeps": list(map(float, scene.creeps))}
     line["refused"] = ran(program, "analyze", files, made / "results")
     for path in sorted((made / "results").glob("**/results.json")):
         results = json.loads(path.read_text())
@@ -144,8 +162,9 @@ def analyse(program, kind, seed, folder):
     if os.environ.get("MAPS"):
         line["map refused"] = ran(program, "map", files, made / "map")
         for path in sorted((made / "map").glob("**/map.json")):
-            twist = next(q for q in json.loads(path.read_text())["quantities"] if q["name"] == "twist")
-            line["map"] = [twist.get(k) for k in ("mean", "mean_sigma", "spread_corrected", "bends")]
+            mapped = {q["name"]: q for q in json.loads(path.read_text())["quantities"]}
+            line["map"] = [mapped["twist"].get(k) for k in ("mean", "mean_sigma", "spread_corrected", "bends")]
+            line["along"] = mapped["displacement x"]["spread"]
     if not os.environ.get("KEEP"):
         shutil.rmtree(made)
     return line
@@ -165,8 +184,8 @@ def table(*files):
     by_kind = {}
     for line in (json.loads(text) for file in files for text in open(file)):
         by_kind.setdefault(line["kind"], []).append(line)
-    print("| scanner | sets | answered | median error (%) | rms pull | the lattice is said to change | rms pull of the mean of maps | largest spread without noise (°) |")
-    print("|" + " --- |" * 8)
+    print("| scanner | sets | answered | median error (%) | rms pull | the lattice is said to change | rms pull of the mean of maps | largest spread without noise (°) | displacement along the lines (nm) |")
+    print("|" + " --- |" * 9)
     for kind, lines in by_kind.items():
         told = [line for line in lines if line.get("twist")]
         errors = [line["twist"][0] - line["truth"] for line in told]
@@ -177,7 +196,8 @@ def table(*files):
         mapped = [line for line in lines if line.get("map")]
         off = [(line["map"][0] - line["truth"]) / line["map"][1] for line in mapped]
         spread = f"{max(line['map'][2] for line in mapped):.4f}" if mapped else "–"
-        print(f"| {kind} | {len(lines)} | {len(told)} | {median:.4f} | {rms(pulls)} | {changing} of {len(lines)} | {rms(off)} | {spread} |")
+        along = f"{numpy.median([line['along'] for line in mapped]):.3f}" if mapped else "–"
+        print(f"| {kind} | {len(lines)} | {len(told)} | {median:.4f} | {rms(pulls)} | {changing} of {len(lines)} | {rms(off)} | {spread} | {along} |")
 
 
 if __name__ == "__main__":

@@ -3,7 +3,7 @@
 # own in NumPy (docs/bent.py): uniform lattices of 5 to 12 periods, hysteresis of 0.4 to 3 % of the frame, logarithmic creep of 0.2 to
 # 1.5 % a decade, four frames with alternating slow direction, trace and retrace. One JSON line for each set; then a table.
 #
-#   docs/bent.sh PROGRAM FIRST LAST OUT.jsonl [straight] [bent] [straight-changing] [bent-changing] [bent-unrecorded]      (seeds FIRST to LAST)
+#   docs/bent.sh PROGRAM FIRST LAST OUT.jsonl [straight] [bent] [straight-changing] [bent-changing] [bent-unrecorded] [hysteresis-unrecorded]      (seeds FIRST to LAST)
 #   docs/bent.sh table OUT.jsonl…                                    (a Markdown table)
 #
 # Needs NumPy. PYTHON (python3) and JOBS (1) can be set; KEEP=FOLDER keeps files and results there, MAPS=1 maps the sets as well.

@@ -110,7 +110,9 @@ fn of_positions(doubt: &PositionDoubt) -> Option<f64> {
         PositionDoubt::SensorGlitches {
             dropped, samples, ..
         } => Some(*dropped as f64 / *samples as f64),
-        PositionDoubt::SensorLag { share, .. } => Some(*share),
+        PositionDoubt::SensorLag { share, .. } | PositionDoubt::LinesBent { share, .. } => {
+            Some(*share)
+        }
         PositionDoubt::SensorSpan { measured, nominal } => {
             let off = |i: usize| (measured[i] / nominal[i]).ln().abs();
             Some(off(0).max(off(1)))

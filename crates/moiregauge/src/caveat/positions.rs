@@ -133,6 +133,29 @@ pub enum PositionDoubt {
         /// Whether it would make them shorter.
         short: bool,
     },
+    /// Hysteresis that trace and retrace show was taken off.
+    #[error(
+        "no sensor recorded it, but {} and {} are bent against each other along the lines: by up to {bend:.2} nm on either \
+         side of their middle, {:.2} % of the frame, which changes the lattice by up to {:.2} % from place to place. This was \
+         taken off. What bends both alike, or the slow axis, stays in the image and may be as large",
+        line_name(*.line),
+        line_name(match line {
+            LineDirection::Trace => LineDirection::Retrace,
+            LineDirection::Retrace => LineDirection::Trace,
+        }),
+        100.0 * .share,
+        100.0 * .stretch
+    )]
+    LinesBent {
+        /// Trace or retrace.
+        line: LineDirection,
+        /// How far each is off a straight line, nm.
+        bend: f64,
+        /// As a share of the fast side.
+        share: f64,
+        /// The largest stretch along the lines.
+        stretch: f64,
+    },
 }
 
 fn axis_name(axis: Axis) -> &'static str {
@@ -185,4 +208,10 @@ explain! { PositionDoubt:
         "At the beginning of the lines a position sensor follows the tip with a delay. The effect was removed, and a \
          part of it is in the errors."
         "Scan more slowly or with more overscan. If the tip itself lags, crop the first columns."
+    LinesBent "lines-bent" Warning
+        "The scanner has hysteresis that no sensor recorded: trace and retrace show the same line bent in opposite ways. \
+         Half of their mutual displacement was taken off each. Creep, and hysteresis of the slow axis, are the same in both \
+         and stay in the image: they make a lattice that is uniform change across the frame, by about as much as is said \
+         here. The mean lattice of a whole frame suffers little."
+        "Do not take changes of this size across the frame, in maps or in the text, for strain. Record the position sensors."
 }

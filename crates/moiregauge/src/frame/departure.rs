@@ -230,6 +230,19 @@ impl Departure {
         slopes
     }
 
+    /// How far it goes, and its largest change from column to column, over some hundred places of a frame of such a size.
+    pub(crate) fn largest(&self, size: [usize; 2]) -> (f64, f64) {
+        const PLACES: usize = 10;
+        let (mut far, mut stretch) = (0.0f64, 0.0f64);
+        for i in 0..=PLACES * (PLACES + 2) {
+            let share = [i % (PLACES + 1), i / (PLACES + 1)];
+            let at = [0, 1].map(|k| (size[k] - 1) as f64 * share[k] as f64 / PLACES as f64);
+            far = far.max(self.at(Vector2::from(at)).norm());
+            stretch = stretch.max(self.slopes(Vector2::from(at)).column(0).norm());
+        }
+        (far, stretch)
+    }
+
     /// The mean of its slopes under a Gaussian window of such widths (standard deviations) about a place, over the pixels of a frame
     /// of such a size.
     pub(crate) fn mean_slopes(

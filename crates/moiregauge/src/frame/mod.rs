@@ -11,6 +11,7 @@ pub(crate) mod fit_plane;
 pub(crate) mod geometry;
 pub(crate) mod glitches;
 pub(crate) mod grid_errors;
+pub(crate) mod hysteresis;
 pub(crate) mod image;
 pub(crate) mod lag;
 pub(crate) mod line_steps;

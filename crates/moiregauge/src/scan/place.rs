@@ -1,7 +1,9 @@
 //! Where the pixels of a channel were, and when: the only place that says so.
 //!
-//! Nominal size and rotation → position sensors, where there are any that can be believed → calibration of the scanner →
-//! times of the pixels → the sample at rest.
+//! Nominal size and rotation → position sensors, where there are any that can be believed, and else what trace and retrace show of
+//! hysteresis → calibration of the scanner → times of the pixels → the sample at rest.
+
+use std::sync::Arc;
 
 use heterostrain::Estimate;
 use nalgebra::{Matrix2, Vector2};
@@ -9,11 +11,18 @@ use spmfile::{Channel, LineDirection, Scan};
 
 use crate::calibration::Calibration;
 use crate::caveat::Caveat;
+use crate::caveat::positions::PositionDoubt;
+use crate::frame::departure::Departure;
 use crate::frame::geometry::{Geometry, Timing, at_rest};
+use crate::frame::hysteresis;
 use crate::frame::sensors::{Grid, SensorGeometry};
+use crate::scan::channel::{image_of, images_of};
 use crate::scan::positions::{nominal, speeds, usable_sensors};
 use crate::settings::knobs::Settings;
 use crate::spectrum::method::Method;
+
+/// Bends that stretch no place by more than this share harm nobody: a tenth of the calibration that is assumed.
+const HARMLESS: f64 = 1e-3;
 
 /// The place of one channel.
 #[derive(Clone, Debug)]
@@ -50,8 +59,13 @@ impl Place {
             _ => Grid::Curved,
         };
         let sensors = usable_sensors(file, scan, channel, nominal.as_ref(), grid, caveats);
-        let by_sensors = sensors.as_ref().map(|s| s.geometry.clone());
-        let recorded = by_sensors.or_else(|| nominal.clone())?;
+        // Other methods, and several moirés at once, have no use for it.
+        let used = settings.method == Method::Lattice && settings.moires < 2;
+        let recorded = match &sensors {
+            Some(sensors) => sensors.geometry.clone(),
+            None if used => without_hysteresis(file, scan, channel, nominal.clone()?, caveats),
+            None => nominal.clone()?,
+        };
         let timing = scan
             .frame_direction
             .and_then(|frame| Timing::of_scan(scan, channel.columns, frame, line));
@@ -107,6 +121,46 @@ impl Place {
             _ => speeds,
         };
         (speeds, errors)
+    }
+}
+
+/// The nominal geometry with the bends that the other line direction shows; they are told.
+fn without_hysteresis(
+    file: &str,
+    scan: &Scan,
+    channel: &Channel,
+    nominal: Geometry,
+    caveats: &mut Vec<Caveat>,
+) -> Geometry {
+    let found = || {
+        let (line, back) = match channel.line_direction? {
+            LineDirection::Trace => (LineDirection::Trace, LineDirection::Retrace),
+            LineDirection::Retrace => (LineDirection::Retrace, LineDirection::Trace),
+        };
+        let images = images_of(scan, &channel.name, line);
+        let number = images.iter().position(|c| std::ptr::eq(*c, channel))?;
+        let back = *images_of(scan, &channel.name, back).get(number)?;
+        let terms = hysteresis::bend(&image_of(channel), &image_of(back))?;
+        let [columns, rows] = nominal.size;
+        let bent = Departure::new(terms, [0, columns - 1], [0, rows - 1]);
+        let departure = bent.mapped(&nominal.pixel_to_nm);
+        let (bend, longest) = departure.largest(nominal.size);
+        let stretch = longest / nominal.fast_step().norm();
+        let doubt = PositionDoubt::LinesBent {
+            line,
+            bend,
+            share: bend / nominal.extent()[0],
+            stretch,
+        };
+        (stretch > HARMLESS).then_some((doubt, departure))
+    };
+    let Some((doubt, departure)) = found() else {
+        return nominal;
+    };
+    caveats.push(Caveat::new(doubt, file));
+    Geometry {
+        departure: Some(Arc::new(departure)),
+        ..nominal
     }
 }
 
