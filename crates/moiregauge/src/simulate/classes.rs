@@ -350,14 +350,37 @@ pub const CLASSES: [SampleClass; 26] = [
     ),
     class(
         "atoms",
-        "atoms of layer 2 are visible too; needs pixels below 0.1 nm",
-        &[key(
-            "ratio",
-            "amplitude over that of the moiré",
-            1.0,
-            [0.3, 3.0],
-            [0.0, 1000.0],
-        )],
+        "atoms are visible too; needs pixels below 0.1 nm",
+        &[
+            key(
+                "ratio",
+                "amplitude over that of the moiré",
+                1.0,
+                [0.3, 3.0],
+                [0.0, 1000.0],
+            ),
+            key(
+                "layer",
+                "the layer that shows: 1, 2, or 3 for both",
+                2.0,
+                [2.0, 2.0],
+                [1.0, 3.0],
+            ),
+            key(
+                "change",
+                "by which share of themselves the moiré changes them where it is brightest",
+                0.0,
+                [0.0, 0.0],
+                [0.0, 1.0],
+            ),
+            key(
+                "honeycomb",
+                "1 for a honeycomb, 0 for a triangular lattice",
+                0.0,
+                [0.0, 0.0],
+                [0.0, 1.0],
+            ),
+        ],
     ),
     class(
         "step",

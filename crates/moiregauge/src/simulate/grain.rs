@@ -24,9 +24,22 @@ pub(crate) struct Grain {
     /// Indices and complex amplitudes.
     harmonics: Vec<([i32; 2], Complex64)>,
     contrast: Contrast,
-    /// Waves of the atoms of layer 2 as columns, rad/nm, and their amplitude.
-    atoms: (Matrix2<f64>, f64),
+    atoms: Atoms,
 }
+
+/// The atoms that are seen.
+#[derive(Clone, Debug, Default)]
+struct Atoms {
+    /// Waves of each layer that shows as columns, rad/nm, and whether it is displaced: layer 2 is.
+    layers: Vec<(Matrix2<f64>, bool)>,
+    /// Degrees of phase; negative for a honeycomb, which has its hollows where a triangular lattice has its atoms.
+    amplitude: f64,
+    /// By which share of itself a degree of phase of the moiré changes the amplitude.
+    change: f64,
+}
+
+/// Three waves that meet, over one of them.
+const BRIGHTEST: f64 = 3.0;
 
 /// What a cell looks like.
 #[derive(Clone, Copy, Debug)]
@@ -47,10 +60,10 @@ const NODE: f64 = 2.0;
 impl Grain {
     pub(crate) fn new(sample: &Sample, features: &[SampleFeature]) -> Result<Self, SimulateError> {
         let scene = Scene::new(sample)?;
-        let [_, atoms] = sample
+        let [lower, upper] = sample
             .stacking()
             .atoms(sample.bilayer(), sample.strain_convention)?;
-        let upper = waves(&atoms)?;
+        let [lower, upper] = [waves(&lower)?, waves(&upper)?];
         let moved = match sample.pattern {
             // The pair of the scene may be another one of the same lattice.
             Pattern::Moire => {
@@ -71,7 +84,7 @@ impl Grain {
             start: -scene.reciprocal.transpose() * Vector2::from(sample.origin_nm),
             harmonics: Vec::new(),
             contrast: Contrast::Waves,
-            atoms: (upper, 0.0),
+            atoms: Atoms::default(),
             scene,
         };
         let mut shells = [1.0, 1.0];
@@ -80,7 +93,18 @@ impl Grain {
                 "second-shell" => {
                     shells = [feature.value("first"), feature.value("second")];
                 }
-                "atoms" => grain.atoms.1 = feature.value("ratio") * sample.contrast_deg,
+                "atoms" => {
+                    let layer = feature.value("layer").round();
+                    let all = [(1.0, lower, false), (2.0, upper, true)];
+                    let seen = all.into_iter().filter(|(other, ..)| layer + other != 3.0);
+                    let form = 1.0 - 2.0 * feature.value("honeycomb").round();
+                    grain.atoms = Atoms {
+                        layers: seen.map(|(_, waves, moves)| (waves, moves)).collect(),
+                        amplitude: form * feature.value("ratio") * sample.contrast_deg,
+                        change: feature.value("change")
+                            / (BRIGHTEST * sample.contrast_deg).max(f64::MIN_POSITIVE),
+                    };
+                }
                 "walls" => {
                     grain.contrast = Contrast::Walls {
                         width: feature.value("width"),
@@ -166,14 +190,14 @@ impl Grain {
         }
     }
 
-    /// What is seen of the atoms of layer 2, degrees of phase.
-    pub(crate) fn atoms(&self, at: Vector2<f64>, u: Vector2<f64>) -> f64 {
-        let (waves, amplitude) = self.atoms;
-        if amplitude == 0.0 {
-            return 0.0;
-        }
-        let phases = waves.tr_mul(&(at - u));
-        amplitude * (phases.x.cos() + phases.y.cos() + (phases.x + phases.y).cos())
+    /// What is seen of the atoms where the moiré is so bright, degrees of phase.
+    pub(crate) fn atoms(&self, at: Vector2<f64>, u: Vector2<f64>, moire: f64) -> f64 {
+        let of_layer = |(waves, moves): &(Matrix2<f64>, bool)| {
+            let phases = waves.tr_mul(&if *moves { at - u } else { at });
+            phases.x.cos() + phases.y.cos() + (phases.x + phases.y).cos()
+        };
+        let all = self.atoms.layers.iter().map(of_layer);
+        self.atoms.amplitude * (1.0 + self.atoms.change * moire) * all.sum::<f64>()
     }
 
     /// Distances to the nearest walls of the three directions: lines from node to node, nm.

@@ -240,7 +240,8 @@ impl Surface {
         }
         let grain = &self.grains[self.grain_at(at)];
         let u = self.displacement(at);
-        height + contrast * (grain.moire(at, u) + grain.atoms(at, u))
+        let moire = grain.moire(at, u);
+        height + contrast * (moire + grain.atoms(at, u, moire))
     }
 
     fn displacement(&self, at: Vector2<f64>) -> Vector2<f64> {
