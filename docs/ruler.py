@@ -19,6 +19,7 @@ import numpy
 
 HEX = {"graphene": 0.246, "hBN": 0.2504, "WSe2": 0.3282, "WS2": 0.3153}
 LINE_TIME = 0.1
+DRIFT = 0.3  # nm/min, where it is in nm/min.
 
 def turn(angle):
     return numpy.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
@@ -53,6 +54,8 @@ class Frame:
         d_spacing = 2 * math.pi / numpy.hypot(*b[0].T).mean()
         self.columns = int(self.random.choice([384, 512, 768]))
         most = self.columns * d_spacing / 2.5
+        if kind == "from":
+            self.columns, most = 256, 8 * period
         self.size = min(draw(3, 7) * period, most)
         pitch = self.size / self.columns
         n = (numpy.arange(self.columns) + 0.5) * pitch
@@ -60,14 +63,16 @@ class Frame:
         # Where the tip is over the sample, for where the scanner says that it is.
         gain, mismatch, skew = normal(0.02 if kind != "none" else 0), normal(0.01), normal(0.005)
         d = numpy.array([[gain + mismatch / 2, skew / 2], [skew / 2, gain - mismatch / 2]])
-        drift = 0.01 * self.random.normal(size=2)
+        # Per time of the frame, 1 % of its slow speed; or the same drift in nm/min as in the frame of the atoms.
+        share = DRIFT / 60 * LINE_TIME * self.columns / self.size if kind == "from" else 0.01
+        drift = share * self.random.normal(size=2)
         true = numpy.linalg.inv(numpy.eye(2) + d) @ numpy.array([x.ravel(), y.ravel()])
         true -= numpy.outer(drift, y.ravel())
         phase = lambda q: (q @ true).reshape(x.shape)
         m = sum(numpy.cos(phase(q) + c) for q, c in zip(moire, self.at(moire, draw)))
         sharp = draw(0, 0.5)
         image = (numpy.exp(sharp * m) - 1) / sharp if sharp > 0.05 else m
-        if kind != "none":
+        if kind not in ("none", "from"):
             of = b[self.seen - 1]
             atoms = sum(numpy.cos(phase(q) + c) for q, c in zip(of, self.at(of, draw)))
             if self.random.random() < 0.5:
@@ -82,11 +87,27 @@ class Frame:
             q = waves(draw(0.24, 0.30), numpy.diag([1, draw(1.15, 1.6)])) if self.random.random() < 0.5 else waves(0.246 * draw(1.12, 2.2), turn(draw(0, 3)))
             image = image + draw(0.1, 0.6) * sum(numpy.cos(phase(k)) for k in q)
         self.image = 1e-10 * image
+        self.atoms = None
+        if kind == "from":
+            # The atoms of another frame: 10 nm, its own drift, gains that differ by 0.5 % along either axis.
+            n = (numpy.arange(256) + 0.5) * 10 / 256
+            x, y = numpy.meshgrid(n, n)
+            true = numpy.linalg.inv(numpy.eye(2) + d + numpy.diag([normal(0.005), normal(0.005)])) @ numpy.array([x.ravel(), y.ravel()])
+            true -= numpy.outer(DRIFT * self.random.normal(size=2) / 60 * LINE_TIME * 256 / 10, y.ravel())
+            of = b[self.seen - 1]
+            atoms = sum(numpy.cos(phase(q) + c) for q, c in zip(of, self.at(of, draw)))
+            self.atoms = atoms + draw(0, 0.6) * self.random.normal(size=x.shape)
     @staticmethod
     def at(q, draw):
         """Phases of three waves that meet: the third is the second less the first."""
         a, b = draw(0, 2 * math.pi, 2)
         return a, b, b - a
+
+def write_gsf(path, image, size):
+    """A square image of this size in nm, row 0 the lowest line."""
+    metres, (rows, columns) = size * 1e-9, image.shape
+    head = f"Gwyddion Simple Field 1.0\nXRes = {columns}\nYRes = {rows}\nXReal = {metres:e}\nYReal = {metres:e}\nXYUnits = m\nZUnits = m\n".encode()
+    path.write_bytes(head + b"\0" * (4 - len(head) % 4) + (1e-10 * image[::-1]).astype("<f4").tobytes())
 
 def measure(job):
     kind, seed, program, ruler = job
@@ -96,6 +117,9 @@ def measure(job):
     made = pathlib.Path(os.environ["KEEP"]) / f"{kind}-{seed}" if "KEEP" in os.environ else pathlib.Path(tempfile.mkdtemp())
     made.mkdir(parents=True, exist_ok=True)
     numpy.save(made / "frame.npy", frame.image[::-1])
+    if frame.atoms is not None:
+        write_gsf(made / "atoms.gsf", frame.atoms, 10)
+        ruler = ["--ruler-from", str(made / "atoms.gsf"), "--drift-prior", str(DRIFT)]
     upper, lower = frame.layers
     layers = ["--layers", upper if upper == lower else f"{upper}/{lower}"]
     command = [program, "analyze", str(made / "frame.npy"), "--size", f"{frame.size:.7f}nm", "--line-rate", str(1 / LINE_TIME), "--frame-direction", "up",
@@ -113,8 +137,8 @@ def measure(job):
     return line
 
 def run(program, first, last, written, *rest):
-    kinds = [k for k in rest if not k.startswith("--ruler")] or ["tbg"]
-    ruler = [k for k in rest if k.startswith("--ruler")]
+    kinds = [k for k in rest if not k.startswith("--")] or ["tbg"]
+    ruler = [k for k in rest if k.startswith("--")]
     jobs = [(kind, seed, program, ruler) for kind in kinds for seed in range(int(first), int(last) + 1)]
     with concurrent.futures.ProcessPoolExecutor(int(os.environ.get("JOBS", "1"))) as pool, open(written, "w") as out:
         for line in pool.map(measure, jobs):

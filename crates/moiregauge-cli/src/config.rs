@@ -150,9 +150,11 @@ calibration.scanner_bend_percent = 1.0
 isotropic_strain_percent = 0.05
 
 # Layer whose atoms the frames show beside the moiré and which measures them in place of the scanner: "1", "2", "auto" or
-# "off"; and the strain that it may have itself, along x and along y, per cent.
+# "off"; the strain that it may have itself, along x and along y, per cent; and, where the atoms of other frames calibrate
+# the scanner (--ruler-from), by how much its gains may differ from those at that magnification, per cent.
 ruler = "auto"
 ruler_strain_percent = 0.1
+ruler_magnification_percent = 0.5
 
 # Monte Carlo draws for the drift (per set) and for twist and strain (per scan).
 drift_draws = 10000
@@ -216,7 +218,7 @@ pub(crate) fn check(settings: &Settings) -> anyhow::Result<()> {
 }
 
 /// Options by the names of settings; the first that the name begins with.
-const OPTIONS: [(&str, &str); 28] = [
+const OPTIONS: [(&str, &str); 29] = [
     ("material.lattice_constant_nm", "--lattice-constant"),
     (
         "material.lattice_constant_sigma_nm",
@@ -240,6 +242,7 @@ const OPTIONS: [(&str, &str); 28] = [
     ("calibration.scanner_bend_percent", "--scanner-bend"),
     ("isotropic_strain_percent", "--isotropic-strain"),
     ("ruler_strain_percent", "--ruler-strain"),
+    ("ruler_magnification_percent", "--ruler-magnification"),
     ("scanner", "--calibration"),
     ("drift_draws", "--drift-draws"),
     ("drift.sigma_nm_per_min", "--drift-sigma"),

@@ -39,6 +39,10 @@ pub(crate) struct ScannerArgs {
     /// Strain that this layer itself may have, along x and along y, per cent, for the budget [default: 0.1]
     #[arg(long, value_name = "PERCENT", value_parser = number([0.0, 10.0]))]
     ruler_strain: Option<f64>,
+    /// By how much the gains of the scanner may differ from those in the frames of --ruler-from, along x and along y, per cent,
+    /// for the budget [default: 0.5]
+    #[arg(long, value_name = "PERCENT", value_parser = number([0.0, 50.0]))]
+    ruler_magnification: Option<f64>,
 }
 
 impl ScannerArgs {
@@ -59,6 +63,10 @@ impl ScannerArgs {
                 &mut settings.isotropic_strain_percent,
             ),
             (self.ruler_strain, &mut settings.ruler_strain_percent),
+            (
+                self.ruler_magnification,
+                &mut settings.ruler_magnification_percent,
+            ),
         ] {
             *setting = given.unwrap_or(*setting);
         }

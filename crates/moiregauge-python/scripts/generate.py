@@ -173,6 +173,11 @@ GIVEN = {
 HIDDEN = {"layers_chosen"}
 MORE = {
     "layers": ("str", "The layers by name: `graphene`, or `graphene/hBN` for graphene on hBN."),
+    "ruler_from": (
+        "str | Sequence[str]",
+        "Frames of the same scanner that show the atoms of a layer, at another magnification: they calibrate it, in place of `scanner`. "
+        "Of layer 2, or of that which `ruler` names.",
+    ),
     "settings": (
         "str | Mapping[str, Any]",
         "A file of settings (TOML), one of results, or settings that results hold; other options come on top of it.",

@@ -1,10 +1,11 @@
 //! Keyword arguments → settings, and what is known of files. Names, defaults and checks are those of the settings.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use moiregauge::settings::Settings;
 use moiregauge::simulate::Simulation;
-use moiregauge_pipeline::calibrate::read_calibration;
+use moiregauge_pipeline::Job;
+use moiregauge_pipeline::calibrate::{read_calibration, ruler_from};
 use moiregauge_pipeline::names::in_full;
 use moiregauge_pipeline::read_settings;
 use moiregauge_report::results::UserSpecified;
@@ -42,7 +43,20 @@ pub(crate) fn settings_on(base: Settings, options: &str) -> PyResult<Settings> {
         let read = serde_json::to_value(read).map_err(wrong)?;
         options.insert("scanner".to_owned(), read);
     }
-    moiregauge_pipeline::settings_on(base, options).map_err(wrong)
+    let atoms = options.remove("ruler_from");
+    let mut settings = moiregauge_pipeline::settings_on(base, options).map_err(wrong)?;
+    if let Some(atoms) = atoms {
+        let files: Vec<PathBuf> = match atoms {
+            Value::String(file) => vec![file.into()],
+            several => {
+                serde_json::from_value(several).map_err(|e| wrong(format!("ruler_from: {e}")))?
+            }
+        };
+        let job = Job::quiet(None).map_err(wrong)?;
+        let found = ruler_from(&files, &UserSpecified::default(), &settings, &job);
+        settings.scanner = Some(found.map_err(|e| wrong(format!("ruler_from: {}", in_full(&e))))?);
+    }
+    Ok(settings)
 }
 
 /// Instrument and sample as JSON: any part of it, the rest as in `base`, materials by name.

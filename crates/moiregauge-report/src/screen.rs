@@ -116,7 +116,15 @@ fn ruler_lines(text: &mut String, ruler: &Ruled, by_scanner: Option<&SetMean>) {
         let [x, y] = drift.map(|part| plus_minus(part.scaled(60.0)));
         let _ = writeln!(
             text,
-            "                drift in these frames x {x}, y {y} nm/min"
+            "                drift in these frames x {x}, y {y} nm/min, if both axes have this gain and a right angle"
+        );
+    }
+    if let Some(found) = ruler.calibration {
+        let [gain, mismatch, orthogonality] = found.map(plus_minus);
+        let _ = writeln!(
+            text,
+            "                at the drift of the set, lengths off by {gain} %, x against y by {mismatch} %, axes by \
+             {orthogonality} mrad"
         );
     }
     if let Some(alone) = by_scanner {

@@ -19,6 +19,7 @@ const ENTRIES = [
   { key: "background", label: "Background", kind: "choice", usual: "plane", more: true, options: ["mean", "plane", "quadratic", "cubic", "line-mean"].map((b) => [b, b]) },
   { key: "grouping", label: "Sets by", kind: "choice", usual: "auto", more: true, options: [["auto", "axis, rate, size, channel"], ["folder", "folder"], ["file", "file"]] },
   { key: "strain_convention", label: "Strain", kind: "choice", usual: "real-space", more: true, options: [["real-space", "real space"], ["k-space", "k space"]] },
+  { key: "ruler", label: "Atoms beside the moiré", kind: "choice", usual: "auto", more: true, options: [["auto", "measure it where that is better"], ["2", "are the upper layer's"], ["1", "are the lower layer's"], ["off", "are left out"]] },
   { key: "moires", label: "Moirés in an image", kind: "number", usual: 1, more: true },
   { key: "seed", label: "Seed", kind: "number", usual: 1, more: true },
   { key: "frame_time_sigma_s", label: "Error of frame times (s)", kind: "number", usual: 0.6, more: true },

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use anyhow::Context as _;
 use clap::ValueEnum;
 use heterostrain::material::Material;
 use heterostrain::strain::StrainConvention;
@@ -10,6 +11,8 @@ use moiregauge::settings::{
     GivenDrift, Grouping, Lines, MOST_DRAWS, MOST_IMAGES, MoireLayers, Settings,
 };
 use moiregauge::spectrum::Method;
+use moiregauge_pipeline::Job;
+use moiregauge_pipeline::calibrate::ruler_from;
 use moiregauge_report::results::NamedSet;
 use moiregauge_report::{Choice, ColorMap};
 
@@ -18,6 +21,7 @@ use super::orientation::OrientationArgs;
 use crate::config;
 use crate::input::KnownArgs;
 use crate::numbers;
+use crate::paths::expand;
 use crate::scanner::ScannerArgs;
 
 /// Headings of the help.
@@ -25,6 +29,7 @@ const SCANS: &str = "Which scans, and how they belong together";
 const METHOD: &str = "Method";
 const LAYERS: &str = "Layers";
 const OUTPUT: &str = "Output";
+const SCANNER: &str = "Scanner and uncertainty budget";
 
 /// What an analysis asks, for every command that begins with one.
 #[derive(clap::Args, Clone, Debug)]
@@ -196,6 +201,10 @@ pub(crate) struct AnalyzeArgs {
     pub(super) by_hand: HandArgs,
     #[command(flatten)]
     scanner: ScannerArgs,
+    /// Frames that show the atoms of a layer, through the same scanner at the same scan angle, at another magnification: they
+    /// calibrate the scanner. Of layer 2, or of that which --ruler names
+    #[arg(long, value_name = "FILE", num_args = 1.., conflicts_with = "calibration", help_heading = SCANNER)]
+    ruler_from: Vec<PathBuf>,
     #[command(flatten)]
     pub(crate) known: KnownArgs,
 }
@@ -272,6 +281,16 @@ impl AnalyzeArgs {
         s.strain_draws = self.strain_draws.unwrap_or(s.strain_draws);
         s.seed = self.seed.unwrap_or(s.seed);
         config::check(&s)?;
+        if !self.ruler_from.is_empty() {
+            let files = expand(&self.ruler_from, true);
+            let files = files.into_iter().map(|path| {
+                path.map_err(|one| anyhow::anyhow!("--ruler-from {}: {}", one.file, one.error))
+            });
+            let files = files.collect::<anyhow::Result<Vec<_>>>()?;
+            let job = Job::quiet(self.threads)?;
+            let found = ruler_from(&files, &self.known.user_specified(), &s, &job);
+            s.scanner = Some(found.context("--ruler-from")?);
+        }
         Ok(s)
     }
 

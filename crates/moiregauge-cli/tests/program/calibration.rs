@@ -294,3 +294,34 @@ fn a_plan_says_how_and_what_cannot_be_had() {
     let nothing = run(program().arg("plan"));
     assert_eq!(nothing.code, Some(2));
 }
+
+/// The atoms of other frames through the same scanner, up and down, take its gains off at once; their magnification has a row's share of the
+/// budget, which the user's own number changes.
+#[test]
+fn the_atoms_of_other_frames_are_the_ruler() {
+    let folder = tempfile::tempdir().unwrap();
+    let (atoms, scans) = (graphite(folder.path()), moire(folder.path()));
+    let from = atoms.join("*.spm");
+    let analysed = |name: &str, more: &[&str]| {
+        let out = folder.path().join(name);
+        let from = ["--ruler-from", from.to_str().unwrap()];
+        succeed(analyze(&scans, &out).args(from).args(more));
+        results(&out)
+    };
+    let usual = analysed("usual", &[]);
+    let (twist, _) = estimate(&usual, "/sets/0/mean/twist_deg");
+    assert!((twist - 1.13).abs() < 0.003, "{twist}");
+    let gain = |found: &Value| number(found, "/sets/0/mean/budget/twist_deg/calibration_gain");
+    let exact = analysed("exact", &["--ruler-magnification", "0"]);
+    // Half a per cent along either axis, over the square root of two.
+    let of_magnification = (gain(&usual).powi(2) - gain(&exact).powi(2)).sqrt();
+    let expected = 0.005 * twist / 2f64.sqrt();
+    assert!(
+        (of_magnification / expected - 1.0).abs() < 0.05,
+        "{of_magnification}"
+    );
+    assert_eq!(
+        usual["settings"]["scanner"]["sizes_nm"],
+        serde_json::json!([])
+    );
+}

@@ -168,9 +168,10 @@ fn measuring(settings: &Settings) -> Settings {
         moires,
         scanner,
         ruler,
-        // The atoms that are looked for are those of the layers.
+        // The atoms that are looked for are those of the layers, where they can be a ruler.
         material,
         substrate,
+        strain_convention,
         // What is chosen after measuring changes no measured scan.
         grain: _,
         moire_layers: _,
@@ -179,7 +180,6 @@ fn measuring(settings: &Settings) -> Settings {
         lattice_angle_2: _,
         twist_sense: _,
         moire_waves: _,
-        strain_convention: _,
         grouping: _,
         frame_time_sigma_s: _,
         exclude: _,
@@ -190,6 +190,7 @@ fn measuring(settings: &Settings) -> Settings {
         calibration: _,
         isotropic_strain_percent: _,
         ruler_strain_percent: _,
+        ruler_magnification_percent: _,
         drift_draws: _,
         strain_draws: _,
         seed: _,
@@ -206,6 +207,7 @@ fn measuring(settings: &Settings) -> Settings {
         ruler: *ruler,
         material: material.clone(),
         substrate: substrate.clone(),
+        strain_convention: *strain_convention,
         ..Settings::default()
     }
 }

@@ -12,7 +12,7 @@ use moiregauge::survey::{
 };
 use moiregauge::window::{Resolution, UsedHarmonic};
 use moiregauge_report::FailedInput;
-use moiregauge_report::results::{MappedImage, TwistStrainResult};
+use moiregauge_report::results::{MappedImage, MappedRuler, TwistStrainResult};
 use spmfile::LineDirection;
 
 use super::doubts;
@@ -167,9 +167,14 @@ impl Scans<'_> {
         let (layers, convention) = (settings.bilayer(), settings.strain_convention);
         let found = match self.no_twist_strain(grain) {
             Some(why) => Err(why),
-            None => lattices
-                .twist_strain(&reference, layers, convention)
-                .map_err(|why| why.to_string()),
+            None => match &maps[0].ruler {
+                Some((atoms, _)) => {
+                    Ok(lattices.twist_strain_by(&atoms.ruler, atoms.layer, atoms.twist, layers))
+                }
+                None => lattices
+                    .twist_strain(&reference, layers, convention)
+                    .map_err(|why| why.to_string()),
+            },
         };
         let found = found.unwrap_or_else(|why| {
             caveats.push(doubts::no_twist_strain(why));
@@ -182,17 +187,22 @@ impl Scans<'_> {
                 .find_map(|m| doubts::narrow_margin(m.margin, &m.file));
             caveats.extend(narrow);
         }
-        let drift_change = change_of_drift(&maps);
+        // Atoms show no drift that changes.
+        let ruled = maps.iter().any(|m| m.ruler.is_some());
+        let drift_change = change_of_drift(&maps).filter(|_| !ruled);
         doubts::about_change(drift_change, &mut caveats);
         let unbent = TwistStrainMap::new(&lattices, &found);
         let of_bends = lattices.of_bends(&reference, layers, convention, &settings.calibration);
+        let by_nodes = maps.iter().all(|m| m.ruler.is_some_and(|(_, nodes)| nodes));
         let map = match of_bends {
-            Ok(of_bends) => unbent.with_bends(&of_bends),
-            Err(_) => unbent,
+            Ok(of_bends) if !by_nodes => unbent.with_bends(&of_bends),
+            _ => unbent,
         };
         caveats.extend(doubts::of_bends(&map, lattices.bends.from_sensors));
-        let image =
-            |m: &LineMap| mapped_image(&m.file, Some(m.line), m.drift_corrected, &m.harmonics);
+        let image = |m: &LineMap| MappedImage {
+            ruler: m.ruler.map(|(_, nodes)| MappedRuler::of(nodes)),
+            ..mapped_image(&m.file, Some(m.line), m.drift_corrected, &m.harmonics)
+        };
         Ok(Mapped {
             map,
             whole: match grain {
@@ -380,6 +390,7 @@ pub(super) fn mapped_image(
         }
         .to_owned(),
         drift_corrected,
+        ruler: None,
         harmonics: harmonics.iter().map(Into::into).collect(),
     }
 }

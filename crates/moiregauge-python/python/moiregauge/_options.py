@@ -67,6 +67,12 @@ class Options(TypedDict, total=False):
     rotation_deg: Angle by which the fast axis is turned against x, degrees, counter-clockwise.
     ruler: The layer whose atoms the frames show beside the moiré and which measures them in place of the
         scanner.
+    ruler_from: Frames of the same scanner that show the atoms of a layer, at another magnification: they
+        calibrate it, in place of `scanner`. Of layer 2, or of that which `ruler` names.
+    ruler_magnification_percent: Standard deviation of the change of the gain along x and along y between the
+        frames of `ruler_from` and the scans, per cent, for the uncertainty budget. The default is that of
+        open piezo tubes whose frames differ by a twentieth of their range: their sensitivity grows with the
+        voltage, by some 10 % from the smallest to the full range.
     ruler_strain_percent: Standard deviation of the strain that this layer itself may have, along x and along
         y, per cent, for the uncertainty budget.
     scanner: A measured calibration of the scanner: positions are corrected with it, and its covariance takes
@@ -116,6 +122,8 @@ class Options(TypedDict, total=False):
     overlap: bool
     rotation_deg: float
     ruler: RulerLayer
+    ruler_from: str | Sequence[str]
+    ruler_magnification_percent: float
     ruler_strain_percent: float
     scanner: str | Mapping[str, Any]
     seed: int

@@ -56,6 +56,7 @@ __all__ = [
     "MapDetailsResult",
     "MapResults",
     "MappedImage",
+    "MappedRuler",
     "Mask",
     "MaskCount",
     "MaskShare",
@@ -78,6 +79,7 @@ __all__ = [
     "RegistryResult",
     "ResidualResult",
     "Results",
+    "RulerCalibration",
     "RulerLayer",
     "RulerResult",
     "Run",
@@ -131,6 +133,9 @@ LatticeDirection = Literal["atomic", "reciprocal"]
 
 Lines = Literal["trace", "retrace", "both"]
 """Which line directions are used."""
+
+MappedRuler = Literal["frame", "nodes"]
+"""What the atoms of a layer measured."""
 
 Method = Literal["autocorrelation", "fourier", "lattice", "paper"]
 """How the lattice vectors are measured in an image."""
@@ -871,6 +876,8 @@ class MappedImage(Document):
     """The harmonics that were used."""
     line: str
     """`trace` or `retrace`."""
+    ruler: MappedRuler | None = None
+    """What the atoms of a layer measured in place of the scanner; left out without."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -1307,9 +1314,23 @@ class Results(ResultsBase):
 
 
 @dataclass(frozen=True, kw_only=True)
+class RulerCalibration(Document):
+    """The scanner by the atoms of a layer: lengths in the image are `F` times the true ones."""
+
+    gain_percent: Estimate
+    """By how much lengths are too long, mean of x and y, per cent."""
+    mismatch_percent: Estimate
+    """By how much lengths along x are too long compared with y, per cent."""
+    orthogonality_mrad: Estimate
+    """A right angle minus the angle between the axes in the image, mrad."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class RulerResult(Document):
     """A set measured by the atoms of one of its layers."""
 
+    calibration: RulerCalibration | None
+    """The scanner at the drift of the set, which is given, measured or assumed; `null` without timing."""
     drift_nm_per_min: tuple[Estimate, Estimate] | None
     """Drift to the right and up that goes with it, if both axes have this gain and stand at a right angle,
     nm/min; `null` without timing.
@@ -1577,6 +1598,12 @@ class Settings(Document):
     """Use only the region that all scans of a set have in common."""
     ruler: RulerLayer
     """The layer whose atoms the frames show beside the moiré and which measures them in place of the scanner.
+    """
+    ruler_magnification_percent: float
+    """Standard deviation of the change of the gain along x and along y between the frames of `ruler_from` and
+    the scans, per cent, for the uncertainty budget. The default is that of open piezo tubes whose frames
+    differ by a twentieth of their range: their sensitivity grows with the voltage, by some 10 % from the
+    smallest to the full range.
     """
     ruler_strain_percent: float
     """Standard deviation of the strain that this layer itself may have, along x and along y, per cent, for
@@ -2292,7 +2319,13 @@ decoded_by(
             "sets": several(SetResult.from_dict),
             "settings": Settings.from_dict,
         },
+        RulerCalibration: {
+            "gain_percent": Estimate.from_dict,
+            "mismatch_percent": Estimate.from_dict,
+            "orthogonality_mrad": Estimate.from_dict,
+        },
         RulerResult: {
+            "calibration": RulerCalibration.from_dict,
             "drift_nm_per_min": several(Estimate.from_dict, 2),
             "fast_gain": Estimate.from_dict,
             "mean": MeanResult.from_dict,
@@ -2372,6 +2405,7 @@ decoded_by(
             "material": Material.from_dict,
             "moire_layers": several(MoireLayers.from_dict),
             "moire_waves": several(several(float, 2), 2),
+            "ruler_magnification_percent": float,
             "ruler_strain_percent": float,
             "scanner": ScannerCalibration.from_dict,
             "substrate": Material.from_dict,

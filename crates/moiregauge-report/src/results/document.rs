@@ -119,6 +119,19 @@ pub struct RulerResult {
     pub fast_gain: ResultEstimate,
     /// Drift to the right and up that goes with it, if both axes have this gain and stand at a right angle, nm/min; `null` without timing.
     pub drift_nm_per_min: Option<[ResultEstimate; 2]>,
+    /// The scanner at the drift of the set, which is given, measured or assumed; `null` without timing.
+    pub calibration: Option<RulerCalibration>,
+}
+
+/// The scanner by the atoms of a layer: lengths in the image are `F` times the true ones.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct RulerCalibration {
+    /// By how much lengths are too long, mean of x and y, per cent.
+    pub gain_percent: ResultEstimate,
+    /// By how much lengths along x are too long compared with y, per cent.
+    pub mismatch_percent: ResultEstimate,
+    /// A right angle minus the angle between the axes in the image, mrad.
+    pub orthogonality_mrad: ResultEstimate,
 }
 
 /// Velocity of the sample in the frame of the sensors.
@@ -305,13 +318,22 @@ fn set_result(set: &SetAnalysis, settings: &Settings) -> SetResult {
 fn ruler(ruled: &Ruled, bilayer: Bilayer<'_>) -> RulerResult {
     RulerResult {
         layer: ruled.layer,
-        lines: ruled.lines,
+        lines: ruled.rulers.len(),
         used: ruled.used,
         mean: mean(&ruled.mean, bilayer),
         fast_gain: estimate(ruled.fast_gain, 1.0),
         drift_nm_per_min: ruled
             .drift
             .map(|v| v.map(|part| estimate(part, PER_MINUTE))),
+        calibration: ruled.calibration.map(|found| {
+            let [gain_percent, mismatch_percent, orthogonality_mrad] =
+                found.map(|part| estimate(part, 1.0));
+            RulerCalibration {
+                gain_percent,
+                mismatch_percent,
+                orthogonality_mrad,
+            }
+        }),
     }
 }
 

@@ -81,8 +81,28 @@ pub struct MappedImage {
     pub line: String,
     /// Whether its drift is taken off.
     pub drift_corrected: bool,
+    /// What the atoms of a layer measured in place of the scanner; left out without.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ruler: Option<MappedRuler>,
     /// The harmonics that were used.
     pub harmonics: Vec<HarmonicResult>,
+}
+
+/// What the atoms of a layer measured.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum MappedRuler {
+    /// Places and lattices by one linear map for the frame.
+    Frame,
+    /// Places by one linear map, the lattice of each node by the atoms under its window: free of slow distortions.
+    Nodes,
+}
+
+impl MappedRuler {
+    /// Node by node, or the whole frame.
+    pub fn of(nodes: bool) -> Self {
+        if nodes { Self::Nodes } else { Self::Frame }
+    }
 }
 
 /// A harmonic of the lattice.

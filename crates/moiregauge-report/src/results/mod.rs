@@ -40,8 +40,8 @@ pub use estimate::ResultEstimate;
 pub use joint::{JointResult, TestedResult};
 pub use lattice::{LatticeVector, StrainMonteCarlo, TwistStrainResult};
 pub use map::{
-    AgreementResult, DriftChangeResult, HarmonicResult, MapResults, MappedImage, MaskCount,
-    mask_counts, quantities,
+    AgreementResult, DriftChangeResult, HarmonicResult, MapResults, MappedImage, MappedRuler,
+    MaskCount, mask_counts, quantities,
 };
 pub use pattern::{MeanCellResult, PatternResult, RegistryResult, UndistortedResult};
 pub use profile::{ProfilePointResult, ProfileResult};

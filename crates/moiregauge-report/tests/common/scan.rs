@@ -123,6 +123,7 @@ pub(super) fn scan(
         patch: None,
         change: None,
         on_ground: false,
+        ruler: None,
     };
     ScanAnalysis {
         file: format!("Messung 3 ü/tbg µ-scan_{}.{:03}", set + 1, index + 1),

@@ -124,10 +124,8 @@ impl SetAnalysis {
 pub struct Ruled {
     /// Layer 1, the reference, or layer 2.
     pub layer: u8,
-    /// The ruler of the first line; that of the others has the same orientation.
-    pub ruler: Ruler,
-    /// Traces and retraces that show them.
-    pub lines: usize,
+    /// Those of the traces and retraces that show them, by file; they have the same orientation.
+    pub rulers: Vec<(String, LineDirection, LineRuler)>,
     /// Whether the mean of the set is this.
     pub used: bool,
     /// The layer whose size the atoms have as well, as far as the calibration tells, where nobody said which layer it is; `None` for
@@ -139,6 +137,23 @@ pub struct Ruled {
     pub fast_gain: Estimate,
     /// The drift that this goes with if both axes have the same gain and stand at a right angle, nm/s along x and y; `None` without timing.
     pub drift: Option<[Estimate; 2]>,
+    /// Gain (per cent), mismatch (per cent) and deviation from a right angle (mrad) of the scanner that go with the drift of the set, which
+    /// is given, measured or assumed: see [`crate::calibration`]; `None` without timing.
+    pub calibration: Option<[Estimate; 3]>,
+}
+
+/// The atoms of a layer in one line.
+#[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
+pub struct LineRuler {
+    /// Layer 1, the reference, or layer 2.
+    pub layer: u8,
+    /// What they make of the positions of the scanner.
+    pub ruler: Ruler,
+    /// Their lattice in pixels (columns, rows).
+    pub atoms: Lattice<Px>,
+    /// Twist of the set, rad: which reading of a lattice is meant.
+    pub twist: f64,
 }
 
 /// Readings of different layers with less mean strain than this are all possible: several times what layers on each other have.
@@ -387,6 +402,8 @@ pub struct LineAnalysis {
     pub change: Option<Change>,
     /// Whether ground was taken off before it was measured.
     pub on_ground: bool,
+    /// The atoms that it shows, where they are the ruler of the set.
+    pub ruler: Option<LineRuler>,
 }
 
 /// The orientation of a layer by its atomic lattice.

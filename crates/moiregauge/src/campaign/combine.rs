@@ -107,7 +107,8 @@ fn by_rulers(
     let means: Vec<&SetMean> = ruled.iter().map(|ruler| &ruler.mean).collect();
     let (lattice, _) = weighted_mean(&means)?;
     let first = ruled.first()?;
-    let all = ByRuler::new(&first.ruler, first.layer, &lattice, settings)?;
+    let (_, _, ruler) = first.rulers.first()?;
+    let all = ByRuler::new(&ruler.ruler, ruler.layer, &lattice, settings)?;
     Some(Combined {
         readings: all.readings(&lattice, strengths, settings),
         lattice,

@@ -31,6 +31,7 @@ pub(crate) mod pilot;
 pub(crate) mod quantities;
 pub(crate) mod register;
 pub(crate) mod registry;
+pub(crate) mod ruler;
 pub(crate) mod sample;
 pub(crate) mod scanner;
 pub(crate) mod summary;

@@ -154,6 +154,11 @@ impl Settings {
                 10.0,
             ),
             ("ruler_strain_percent", self.ruler_strain_percent, 10.0),
+            (
+                "ruler_magnification_percent",
+                self.ruler_magnification_percent,
+                50.0,
+            ),
         ] {
             ensure(value >= 0.0 && value <= largest, setting, || {
                 format!("the uncertainty {setting} must lie between 0 and {largest}, found {value}")

@@ -206,6 +206,10 @@ pub struct Settings {
     pub ruler: RulerLayer,
     /// Standard deviation of the strain that this layer itself may have, along x and along y, per cent, for the uncertainty budget.
     pub ruler_strain_percent: f64,
+    /// Standard deviation of the change of the gain along x and along y between the frames of `ruler_from` and the scans, per cent, for the
+    /// uncertainty budget. The default is that of open piezo tubes whose frames differ by a twentieth of their range: their sensitivity
+    /// grows with the voltage, by some 10 % from the smallest to the full range.
+    pub ruler_magnification_percent: f64,
     /// Monte Carlo draws for the drift.
     pub drift_draws: usize,
     /// Monte Carlo draws for twist and strain, per scan.
@@ -304,6 +308,7 @@ impl Default for Settings {
             isotropic_strain_percent: 0.05,
             ruler: RulerLayer::Auto,
             ruler_strain_percent: 0.1,
+            ruler_magnification_percent: 0.5,
             drift_draws: 10_000,
             strain_draws: 1_000,
             seed: 1,

@@ -7,9 +7,9 @@ use crate::campaign::analysis::ScanAnalysis;
 use crate::frame::geometry::Geometry;
 use crate::frame::resample::on_curved_grid;
 use crate::scan::channel::{channels, image_of};
-use crate::scan::place::Place;
 use crate::scan::positions::nominal;
 use crate::settings::knobs::Settings;
+use crate::survey::mapping::{place_of, still};
 
 /// One corrected image as a scan of its own, and what was done with it.
 #[derive(Clone, Debug)]
@@ -36,26 +36,24 @@ pub fn corrected_images(
     let Ok(channels) = channels(scan, settings) else {
         return Vec::new();
     };
-    let wanted = |c: &&Channel| {
-        let line = c.line_direction.unwrap_or(LineDirection::Trace);
-        analysed.lines.iter().any(|l| l.line == line)
-    };
     channels
         .into_iter()
-        .filter(wanted)
-        .filter_map(|channel| corrected(scan, channel, &analysed.file, analysed.drift, settings))
+        .filter_map(|channel| corrected(scan, channel, analysed, settings))
         .collect()
 }
 
 fn corrected(
     scan: &Scan,
     channel: &Channel,
-    file: &str,
-    drift: Option<Vector2<f64>>,
+    analysed: &ScanAnalysis,
     settings: &Settings,
 ) -> Option<CorrectedImage> {
-    let place = Place::of(file, scan, channel, settings, &mut Vec::new())?;
-    let still = place.still(drift);
+    let (place, found) = place_of(scan, channel, analysed, settings)?;
+    let still = still(&place, found, analysed);
+    let (file, drift) = (
+        &analysed.file,
+        analysed.drift.filter(|_| found.ruler.is_none()),
+    );
     let geometry = place.geometry;
     let mut log = vec![format!("from {file}")];
     log.push(if geometry.from_sensors {
@@ -67,13 +65,17 @@ fn corrected(
         log.push("corrected by the calibration of the scanner".to_owned());
     }
     log.push(match (drift, &still) {
+        (None, Some(_)) => {
+            let layer = found.ruler.map_or(2, |atoms| atoms.layer);
+            format!("drift, gains and skew taken off by the atoms of layer {layer}")
+        }
         (Some(drift), Some(_)) => {
             let [x, y] = [drift.x * 60.0, drift.y * 60.0];
             format!(
                 "corrected for the drift at its time, {x} nm/min along x and {y} nm/min along y"
             )
         }
-        (None, _) => "not corrected for drift: it is not known".to_owned(),
+        (None, None) => "not corrected for drift: it is not known".to_owned(),
         (Some(_), None) => {
             "not corrected for drift: the times of the lines are not known".to_owned()
         }

@@ -12,7 +12,7 @@ use crate::frame::geometry::Geometry;
 use crate::frame::image::Image;
 use crate::scan::channel::{channels, image_of};
 use crate::settings::knobs::Settings;
-use crate::survey::mapping::{drifted, pitch, place_of};
+use crate::survey::mapping::{drifted, pitch, place_of, still};
 
 /// The domain structure of every image behind `analysed` that shows one, drift and sensors taken into account;
 /// `origin` as for [`crate::survey::mapping::map_scan`].
@@ -27,7 +27,7 @@ pub fn domains_of_scan(
     let of_channel = |channel: &spmfile::Channel| {
         let (place, found) = place_of(scan, channel, analysed, settings)?;
         let pitch = pitch(&place.geometry);
-        let mut placed = place.still(analysed.drift).unwrap_or(place.geometry);
+        let mut placed = still(&place, found, analysed).unwrap_or(place.geometry);
         placed.origin -= drifted(analysed, origin);
         domains_of(
             &image_of(channel),

@@ -6,8 +6,9 @@ use heterostrain::lattice::reciprocal;
 use nalgebra::{Matrix2, Vector2};
 use spmfile::{Channel, FrameDirection, LineDirection, Scan};
 
-use crate::campaign::analysis::{LineAnalysis, ScanAnalysis};
+use crate::campaign::analysis::{LineAnalysis, LineRuler, ScanAnalysis};
 use crate::frame::geometry::Geometry;
+use crate::frame::image::Image;
 use crate::lattice::ground::even_image;
 use crate::map::local::local_lattices;
 use crate::map::sample::LatticeMap;
@@ -15,7 +16,9 @@ use crate::scan::channel::{channels, flat_image_of, image_of};
 use crate::scan::place::Place;
 use crate::settings::knobs::Settings;
 use crate::survey::tiling::tile_map;
-use crate::window::types::{FULL_WIDTH, Reference, Resolution, ResolutionError, UsedHarmonic};
+use crate::window::types::{
+    FULL_WIDTH, Reference, Resolution, ResolutionError, UsedHarmonic, WaveMap,
+};
 
 /// The map of one line direction of a scan.
 #[derive(Clone, Debug)]
@@ -39,6 +42,8 @@ pub struct LineMap {
     pub noise_measured: bool,
     /// The lattice of the whole image under the same corrections, wave vectors as columns, rad/nm.
     pub whole: Matrix2<f64>,
+    /// The atoms of a layer that places and lattices are measured by, and whether node by node; `None` by the scanner.
+    pub ruler: Option<(LineRuler, bool)>,
     /// Local lattices on the sample.
     pub map: LatticeMap,
 }
@@ -156,7 +161,7 @@ fn map_line(
     (method, resolution, part): (MapMethod, &Resolution, Part),
 ) -> Result<LineMap, MapError> {
     let (place, found) = place_of(scan, channel, analysed, settings).ok_or(MapError::NoImage)?;
-    let still = place.still(analysed.drift);
+    let still = still(&place, found, analysed);
     let geometry = place.geometry;
     let reference = Reference {
         pair: reciprocal(&found.pixels.basis).ok_or(MapError::NoImage)?,
@@ -170,6 +175,7 @@ fn map_line(
     };
     resolution.fits(geometry.extent(), widths)?;
     let patch = found.patch.as_ref().filter(|_| part == Part::LatticeRegion);
+    let mut by_nodes = false;
     let (map, harmonics, noise_measured, margin) = match method {
         MapMethod::Demodulation => {
             let mut image = flat_image_of(channel, settings.background);
@@ -182,7 +188,17 @@ fn map_line(
                 image = patch.of(&image);
             }
             let waves = local_lattices(&image, &reference, resolution).ok_or(MapError::TooSmall)?;
-            let map = LatticeMap::new(&waves, placed).ok_or(MapError::NoImage)?;
+            let mut map = LatticeMap::new(&waves, placed).ok_or(MapError::NoImage)?;
+            if let Some(atoms) = &found.ruler
+                && let Some(local) = local_atoms(&image, atoms, &reference, &waves)
+            {
+                let layers = settings.bilayer();
+                let material = match atoms.layer {
+                    1 => layers.reference,
+                    _ => layers.stretched,
+                };
+                by_nodes = map.rule_nodes(&local, placed, material, atoms.ruler.angle);
+            }
             (map, waves.harmonics, waves.noise_measured, waves.margin)
         }
         MapMethod::Tiles => {
@@ -207,8 +223,44 @@ fn map_line(
         margin,
         noise_measured,
         whole: dual.transpose() * reference.pair,
+        ruler: found.ruler.map(|atoms| (atoms, by_nodes)),
         map,
     })
+}
+
+/// The atoms under the windows of a moiré.
+fn local_atoms(
+    image: &Image,
+    atoms: &LineRuler,
+    reference: &Reference,
+    waves: &WaveMap,
+) -> Option<WaveMap> {
+    let of_atoms = Reference {
+        pair: reciprocal(&atoms.atoms.basis)?,
+        ..*reference
+    };
+    let same = Resolution {
+        window_nm: Some(waves.window_nm),
+        step_nm: Some(waves.step[0] * reference.pitch[0]),
+        margin: Some(waves.margin),
+    };
+    local_lattices(image, &of_atoms, &same)
+}
+
+/// The pixels on the sample: by the atoms where they are the ruler, about the middle of the frame, or at rest; `None` where its drift is
+/// not known.
+pub(crate) fn still(
+    place: &Place,
+    found: &LineAnalysis,
+    analysed: &ScanAnalysis,
+) -> Option<Geometry> {
+    let Some(atoms) = &found.ruler else {
+        return place.still(analysed.drift);
+    };
+    let (map, centre) = (atoms.ruler.map, place.geometry.centre());
+    let mut placed = place.geometry.mapped(&map);
+    placed.origin += centre - map * centre;
+    Some(placed)
 }
 
 /// The place of a channel and what was found in its whole image; `None` for one that was not analysed or has no size.

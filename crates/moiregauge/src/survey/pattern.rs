@@ -9,7 +9,7 @@ use crate::map::gauge::Gauge;
 use crate::map::undistorted::{Undistorted, undistorted};
 use crate::scan::channel::{channels, flat_image_of};
 use crate::settings::knobs::Settings;
-use crate::survey::mapping::{LineMap, drifted, place_of};
+use crate::survey::mapping::{LineMap, drifted, place_of, still};
 
 /// An image that its own map puts on the mean lattice; to be shown, nothing is measured from it.
 #[derive(Clone, Debug)]
@@ -47,8 +47,8 @@ pub fn pattern_of_scan(
     let of_line =
         |c: &&spmfile::Channel| c.line_direction.unwrap_or(LineDirection::Trace) == map.line;
     let channel = channels(scan, settings).ok()?.into_iter().find(of_line)?;
-    let (place, _) = place_of(scan, channel, analysed, settings)?;
-    let mut placed = place.still(analysed.drift).unwrap_or(place.geometry);
+    let (place, found) = place_of(scan, channel, analysed, settings)?;
+    let mut placed = still(&place, found, analysed).unwrap_or(place.geometry);
     placed.origin -= drifted(analysed, origin);
     let image = flat_image_of(channel, settings.background);
     Some(MappedPattern {

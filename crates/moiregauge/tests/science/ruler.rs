@@ -3,9 +3,12 @@
 use std::f64::consts::{FRAC_PI_3, TAU};
 
 use moiregauge::campaign::{Analysis, analyse};
+use moiregauge::map::TwistStrainMap;
 use moiregauge::meaning::Source;
 use moiregauge::scan::measure_scan;
-use moiregauge::settings::{RulerLayer, Settings};
+use moiregauge::settings::{GivenDrift, RulerLayer, Settings};
+use moiregauge::survey::{MapMethod, corrected_images, map_scan};
+use moiregauge::window::Resolution;
 use nalgebra::{Matrix2, Rotation2, Vector2};
 use spmfile::{FrameDirection, Scan, Span};
 
@@ -30,6 +33,11 @@ fn waves(deformation: &Matrix2<f64>) -> [Vector2<f64>; 3] {
 /// A frame of a scanner that shows `frame` times what is there: moiré of amplitude 1, atoms of layer 2 of amplitude `atoms`, changed by the
 /// moiré, and some noise.
 fn frame(frame: &Matrix2<f64>, atoms: f64, seed: u64) -> Scan {
+    bent_frame(frame, 0.0, atoms, seed)
+}
+
+/// The same of a scanner that bends by `bow` of the size of the frame along both axes.
+fn bent_frame(frame: &Matrix2<f64>, bow: f64, atoms: f64, seed: u64) -> Scan {
     let first = Rotation2::new(0.4).into_inner();
     let second = Rotation2::new(TWIST).into_inner() * STRAIN * first;
     let [one, two] = [waves(&first), waves(&second)];
@@ -40,7 +48,10 @@ fn frame(frame: &Matrix2<f64>, atoms: f64, seed: u64) -> Scan {
     // The top row comes first.
     for row in (0..PIXELS).rev() {
         for column in 0..PIXELS {
-            let at = inverse * Vector2::new(column as f64, row as f64) * pitch;
+            let at = Vector2::new(column as f64, row as f64) * pitch;
+            let share = at / SIZE;
+            let bent = Vector2::new(share.y.powi(2), share.x * share.y) * bow * SIZE;
+            let at = inverse * (at + bent);
             let sum = |of: &dyn Fn(usize) -> Vector2<f64>| {
                 (0..3).map(|i| of(i).dot(&at).cos()).sum::<f64>()
             };
@@ -143,4 +154,96 @@ fn there_is_no_ruler_without_atoms() {
     let [alone, beside] = [&without, &off].map(twist);
     assert!((alone.value - beside.value).abs() < 1e-4 * TWIST);
     assert!(beside.total > 0.005 * TWIST);
+}
+
+/// Maps and exported images are in the coordinates of the atoms; node by node, what bends slowly drops out.
+#[test]
+fn maps_and_images_are_by_the_atoms() {
+    let (shown, settings) = (scanner(1.03), Settings::default());
+    for bow in [0.0, 0.003] {
+        let scan = bent_frame(&shown, bow, 0.5, 7);
+        let found = analysed(std::slice::from_ref(&scan), RulerLayer::Auto);
+        let (set, resolution) = (&found.sets[0], Resolution::default());
+        let seen = &set.scans[0];
+        let maps = map_scan(
+            &scan,
+            seen,
+            None,
+            &settings,
+            MapMethod::Demodulation,
+            &resolution,
+        );
+        let map = &maps.unwrap()[0];
+        let (atoms, by_nodes) = map.ruler.unwrap();
+        assert!(by_nodes && map.drift_corrected);
+        let nodes =
+            map.map
+                .twist_strain_by(&atoms.ruler, atoms.layer, atoms.twist, settings.bilayer());
+        let twist = TwistStrainMap::new(&map.map, &nodes);
+        let twist = twist.spread(&twist.twist).unwrap();
+        let pull = (twist.mean - TWIST) / twist.mean_sigma;
+        assert!(
+            pull.abs() < 4.0 && twist.mean_sigma < 2e-3 * TWIST,
+            "{bow}: {twist:?}"
+        );
+        assert!(twist.spread < 1.5 * twist.noise, "{bow}: {twist:?}");
+    }
+    let scan = frame(&shown, 0.5, 7);
+    let found = analysed(std::slice::from_ref(&scan), RulerLayer::Auto);
+    let image = corrected_images(&scan, &found.sets[0].scans[0], &settings);
+    assert!(
+        image[0]
+            .log
+            .iter()
+            .any(|line| line.contains("atoms of layer 2"))
+    );
+    let again = analysed(&[image[0].scan.clone()], RulerLayer::Off);
+    let lattice = |found: &Analysis| {
+        let set = &found.sets[0];
+        set.mean
+            .as_ref()
+            .map_or_else(|| set.scans[0].sensor, |m| m.lattice)
+    };
+    let [first, second] = [&found, &again].map(lattice);
+    for i in 0..3 {
+        let [a, b] = [first, second].map(|l| l.wavelength(i).value);
+        assert!((a / b - 1.0).abs() < 2e-3, "{a} {b}");
+    }
+}
+
+/// Gains and skew of the scanner at a drift that is known are those of its map, by the polar decomposition of what the atoms show.
+#[test]
+fn the_atoms_calibrate_the_scanner() {
+    let settings = Settings {
+        drift_draws: 0,
+        strain_draws: 0,
+        drift: Some(GivenDrift {
+            x_nm_per_min: 0.0,
+            y_nm_per_min: 0.0,
+            sigma_nm_per_min: 0.0,
+        }),
+        ..Settings::default()
+    };
+    let shown = scanner(1.02);
+    let scan = measure_scan("scan", &frame(&shown, 0.5, 11), &settings, None).unwrap();
+    let found = analyse(vec![scan], &settings);
+    let found = found.sets[0].ruler.as_ref().unwrap().calibration.unwrap();
+    // Layer 2 is strained itself.
+    let f =
+        shown * Rotation2::new(TWIST).into_inner() * STRAIN * Rotation2::new(-TWIST).into_inner();
+    let stretch = (f * f.transpose()).symmetric_eigen();
+    let root = Matrix2::from_diagonal(&stretch.eigenvalues.map(f64::sqrt));
+    let f = stretch.eigenvectors * root * stretch.eigenvectors.transpose();
+    let expected = [
+        100.0 * (f64::midpoint(f.m11, f.m22) - 1.0),
+        100.0 * (f.m11 - f.m22),
+        2000.0 * f.m12,
+    ];
+    for (found, expected) in found.iter().zip(expected) {
+        assert!(
+            (found.value - expected).abs() < 0.02,
+            "{found:?} {expected}"
+        );
+        assert!(found.sigma > 0.05);
+    }
 }

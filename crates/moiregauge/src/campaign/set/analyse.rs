@@ -11,7 +11,7 @@ use crate::campaign::set::common::common;
 use crate::campaign::set::drift::{constant_drift, outruns, unknown};
 use crate::campaign::set::mean::{at_drift, forward_backward, without_drift};
 use crate::campaign::set::moire::{breaks, draw};
-use crate::campaign::set::ruler::ruled;
+use crate::campaign::set::ruler::{ruled, tell};
 use crate::campaign::set::scan::scans_at_drift;
 use crate::campaign::set::shells::{of_other_shell, of_second_shell};
 use crate::campaign::set::{joint, published};
@@ -100,13 +100,15 @@ pub(crate) fn analyse_set(
         if mean.is_none() && uncorrected.is_none() {
             lattice = known.map(|solved| bare(solved, &scans, &shared, &grid, settings));
         }
-        ruler = ruled(&used, reference, &shared, settings, strengths);
+        let drift = known.map(|solved| &solved.drift);
+        ruler = ruled(&used, reference, &shared, drift, settings, strengths);
     }
     let mut by_scanner = None;
     if let Some(ruler) = &mut ruler
         && is_better(ruler, mean.as_ref(), settings)
     {
         ruler.used = true;
+        tell(&mut scans, ruler);
         by_scanner = mean.replace(ruler.mean.clone());
         lattice = None;
     }

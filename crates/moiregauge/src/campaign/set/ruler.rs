@@ -4,11 +4,14 @@
 //! so that the lattices are averaged as if nothing drifted.
 
 use heterostrain::Estimate;
-use heterostrain::lattice::{Lattice, labelled_like};
+use heterostrain::lattice::{Lattice, Px, labelled_like};
+use heterostrain::material::Material;
 use heterostrain::strain::Ruler;
-use nalgebra::{Matrix2, Matrix4, Vector2};
+use nalgebra::{Matrix2, Matrix3, Matrix4, Vector2, Vector3};
+use spmfile::LineDirection;
 
-use crate::campaign::analysis::{Ruled, SetMean};
+use crate::calibration::{Calibration, Coordinates, KnownLattice, shown};
+use crate::campaign::analysis::{Drift, LineRuler, Ruled, ScanAnalysis, SetMean};
 use crate::drift::linear::{Observation, common_lattice};
 use crate::lattice::several::atoms::is_of;
 use crate::meaning::ruler::ByRuler;
@@ -25,32 +28,46 @@ const ODDS: f64 = 4.6;
 /// they are said to be.
 const DECIDED: f64 = 50.0;
 
-/// The mean of the lines that show the atoms of a layer; `None` where none does. `shared`: the covariance (nm²) that they have in common.
+/// The atoms of one line.
+struct Seen<'a> {
+    scan: &'a MeasuredScan,
+    line: &'a MeasuredLine,
+    atoms: Lattice<Px>,
+    /// The same, nm of the scanner; noise that trace and retrace have in common is counted once.
+    shown: Lattice,
+}
+
+/// The lines that show atoms.
+fn seen<'a>(used: &[&'a MeasuredScan]) -> Vec<Seen<'a>> {
+    let of_scan = |scan: &&'a MeasuredScan| {
+        let scan = *scan;
+        scan.lines.iter().filter_map(move |line| {
+            let atoms = line.lattice.atoms.as_ref()?.pixels;
+            let mut shown = atoms.in_nm(&line.geometry.pixel_to_nm);
+            shown.covariance *= scan.lines.len() as f64;
+            Some(Seen {
+                scan,
+                line,
+                atoms,
+                shown,
+            })
+        })
+    };
+    used.iter().flat_map(of_scan).collect()
+}
+
+/// The mean of the lines that show the atoms of a layer; `None` where none does. `shared`: the covariance (nm²) that they have in common;
+/// `drift`: what is known of it, nm/s.
 pub(crate) fn ruled(
     used: &[&MeasuredScan],
     reference: &Matrix2<f64>,
     shared: &Matrix4<f64>,
+    drift: Option<&Drift>,
     settings: &Settings,
     strengths: &WaveStrengths,
 ) -> Option<Ruled> {
-    // Noise that trace and retrace have in common is counted once.
-    let lines: Vec<(&MeasuredLine, f64)> = used
-        .iter()
-        .flat_map(|scan| {
-            scan.lines
-                .iter()
-                .map(|line| (line, scan.lines.len() as f64))
-        })
-        .filter(|(line, _)| line.lattice.atoms.is_some())
-        .collect();
-    let atoms: Vec<Lattice> = (lines.iter())
-        .filter_map(|(line, beside)| {
-            let pixels = &line.lattice.atoms.as_ref()?.pixels;
-            let mut found = pixels.in_nm(&line.geometry.pixel_to_nm);
-            found.covariance *= *beside;
-            Some(found)
-        })
-        .collect();
+    let seen = seen(used);
+    let atoms: Vec<Lattice> = seen.iter().map(|seen| seen.shown).collect();
     let (layer, other_layer) = layer(&atoms, settings)?;
     let bilayer = settings.bilayer();
     let material = if layer == 1 {
@@ -58,13 +75,13 @@ pub(crate) fn ruled(
     } else {
         bilayer.stretched
     };
-    let fast = |line: &MeasuredLine| line.geometry.fast_step().normalize();
-    let angle = Ruler::angle(atoms.first()?, material, &fast(lines[0].0))?;
+    let fast = seen.first()?.line.geometry.fast_step().normalize();
+    let angle = Ruler::angle(atoms.first()?, material, &fast)?;
     let rulers: Vec<Ruler> = (atoms.iter())
         .map(|atoms| Ruler::new(atoms, material, angle))
         .collect::<Option<_>>()?;
-    let observations: Vec<Observation> = (rulers.iter().zip(&lines))
-        .map(|(ruler, (line, _))| {
+    let observations: Vec<Observation> = (rulers.iter().zip(&seen))
+        .map(|(ruler, Seen { line, .. })| {
             let seen = line.lattice.pixels.in_nm(&line.geometry.pixel_to_nm);
             Observation {
                 lattice: labelled_like(&ruler.measured(&seen), reference),
@@ -88,32 +105,44 @@ pub(crate) fn ruled(
         mean_and_spread(&values).sigma
     };
     let [first, second] = [0, 1].map(|i| spread(&|n| singles[n].strain_vector[i]));
-    let scanner = lines
-        .iter()
-        .zip(&rulers)
-        .map(|((line, _), ruler)| Scanner::of(line, ruler));
+    let scanner = seen.iter().zip(&rulers);
+    let scanner = scanner.map(|(seen, ruler)| Scanner::of(seen.line, ruler));
     let scanner: Vec<Scanner> = scanner.collect();
     let strain = settings.ruler_strain_percent / 100.0;
     let mean =
         |of: &dyn Fn(&Scanner) -> f64| scanner.iter().map(of).sum::<f64>() / scanner.len() as f64;
+    let of_line = |(seen, ruler): (&Seen, &Ruler)| {
+        let ruler = LineRuler {
+            layer,
+            ruler: *ruler,
+            atoms: seen.atoms,
+            twist: all.twist_strain.twist,
+        };
+        (seen.scan.file.clone(), seen.line.line, ruler)
+    };
     Some(Ruled {
         layer,
-        ruler: rulers[0],
-        lines: lines.len(),
+        rulers: seen.iter().zip(&rulers).map(of_line).collect(),
         used: false,
         other_layer,
         fast_gain: Estimate::new(mean(&|s| s.fast_gain), strain),
+        calibration: calibration(&seen, material, drift, settings),
         drift: scanner.iter().all(|s| s.drift.is_some()).then(|| {
             let per_speed = mean(&|s| s.slow_speed);
-            let calibration = &settings.calibration;
+            let priors = &settings.calibration;
+            let priors = [priors.mismatch_percent, priors.orthogonality_mrad];
+            let [mismatch, orthogonality] = settings.scanner.as_ref().map_or(priors, |scanner| {
+                let [_, mismatch, orthogonality] = scanner.estimates();
+                [mismatch.sigma, orthogonality.sigma]
+            });
             [
                 Estimate::new(
                     mean(&|s| s.drift.map_or(0.0, |d| d.x)),
-                    per_speed * calibration.orthogonality_mrad / 1000.0,
+                    per_speed * orthogonality / 1000.0,
                 ),
                 Estimate::new(
                     mean(&|s| s.drift.map_or(0.0, |d| d.y)),
-                    per_speed * (calibration.mismatch_percent / 100.0).hypot(strain),
+                    per_speed * (mismatch / 100.0).hypot(strain),
                 ),
             ]
         }),
@@ -130,6 +159,54 @@ pub(crate) fn ruled(
             budget: all.budget,
         },
     })
+}
+
+/// Tells the lines of a set that their atoms are its ruler.
+pub(crate) fn tell(scans: &mut [ScanAnalysis], ruled: &Ruled) {
+    for scan in scans {
+        for line in &mut scan.lines {
+            let own = |(file, of, _): &&(String, LineDirection, LineRuler)| {
+                *file == scan.file && *of == line.line
+            };
+            line.ruler = ruled.rulers.iter().find(own).map(|(_, _, ruler)| *ruler);
+        }
+    }
+}
+
+/// The scanner that goes with the drift: as by images of a known lattice.
+fn calibration(
+    seen: &[Seen],
+    material: &Material,
+    drift: Option<&Drift>,
+    settings: &Settings,
+) -> Option<[Estimate; 3]> {
+    let cell = KnownLattice::of_layer(material).cell()?;
+    let (velocity, covariance) = drift.map(|drift| (drift.velocity, drift.covariance))?;
+    let constant = material.lattice_constant_sigma_nm / material.lattice_constant_nm;
+    let strain = (settings.ruler_strain_percent / 100.0).powi(2);
+    let own = Matrix3::from_diagonal(&Vector3::new(
+        strain / 2.0 + constant * constant,
+        2.0 * strain,
+        2.0 * strain,
+    ));
+    let lines = seen.len() as f64;
+    let mut values = Vector3::zeros();
+    let mut errors = Matrix3::zeros();
+    for Seen { line, shown: l, .. } in seen {
+        let gradient = line.geometry.time_gradient(&line.timing?)?;
+        let seen = Observation {
+            lattice: *l,
+            time_gradient: gradient,
+            speed_error: [0.0; 2],
+            sensor: Matrix4::zeros(),
+        };
+        let found = shown(&seen.corrected(&velocity, &covariance), &cell)?;
+        values += found.values / lines;
+        // What the drift leaves open is the same in all.
+        errors += found.covariance / lines;
+    }
+    let found = Calibration::new(&values, &(errors + own), Coordinates::Nominal);
+    Some(found.estimates())
 }
 
 /// The scanner in a frame, by a ruler.

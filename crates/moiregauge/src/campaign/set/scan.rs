@@ -126,6 +126,7 @@ fn line_analysis(
         patch: line.lattice.patch.clone(),
         change: line.lattice.change,
         on_ground: line.lattice.ground.is_some(),
+        ruler: None,
     }
 }
 
