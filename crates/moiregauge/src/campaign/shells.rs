@@ -8,6 +8,7 @@ use crate::caveat::files::FileDoubt;
 use crate::caveat::lattices::LineDifference;
 use crate::caveat::sets::SetDoubt;
 use crate::caveat::{Caveat, Doubt};
+use crate::explain::cells::BETTER;
 use crate::lattice::fit::hidden::Hidden;
 use crate::lattice::measure::hidden;
 use crate::scan::doubts::lines_disagree;
@@ -42,8 +43,26 @@ struct Seen<'a> {
     line: &'a MeasuredLine,
     /// ... how many do, ...
     lines: usize,
-    /// ... and what all say together.
+    /// ... what all say together, ...
     told: Hidden,
+    /// ... and what waves of the first shell predict of each, standard errors.
+    predicts: Vec<f64>,
+}
+
+/// What the first shell of a line that may show the second predicts, standard errors.
+fn predicts(line: &MeasuredLine) -> Option<f64> {
+    line.first_shell.as_ref()?.evidence.as_ref()?.predicts
+}
+
+/// What first shells predict in several images together, standard errors.
+fn together(predicts: &[f64]) -> f64 {
+    predicts.iter().sum::<f64>() / (predicts.len().max(1) as f64).sqrt()
+}
+
+/// Whether the first shells that lines may hide predict next to nothing.
+pub(crate) fn are_refuted<'a>(lines: impl Iterator<Item = &'a MeasuredLine>) -> bool {
+    let predicts: Vec<f64> = lines.filter_map(predicts).collect();
+    !predicts.is_empty() && together(&predicts) < BETTER / 2.0
 }
 
 fn lattices<'a>(all: &[&'a MeasuredLine]) -> Vec<Seen<'a>> {
@@ -54,11 +73,13 @@ fn lattices<'a>(all: &[&'a MeasuredLine]) -> Vec<Seen<'a>> {
             Some(seen) => {
                 seen.told = Hidden::of_all([seen.told, told].into_iter());
                 seen.lines += 1;
+                seen.predicts.extend(predicts(line));
             }
             None => found.push(Seen {
                 line,
                 lines: 1,
                 told,
+                predicts: predicts(line).into_iter().collect(),
             }),
         }
     }
@@ -78,7 +99,7 @@ fn second_shells(scans: &[MeasuredScan]) -> Vec<Vec<bool>> {
         let is_larger = |other: &&Seen| cells(other.line, seen.line) == Some(3);
         let larger: usize = lattices.iter().filter(is_larger).map(|l| l.lines).sum();
         let told = seen.told.is_first_shell() || (seen.told.chance() < CONFIRMED && larger > 0);
-        (suspected && told) || larger >= OUTVOTED * seen.lines
+        (suspected && told && together(&seen.predicts) > BETTER) || larger >= OUTVOTED * seen.lines
     };
     let second: Vec<&MeasuredLine> = lattices
         .iter()

@@ -145,6 +145,7 @@ pub(crate) fn superlattice(
         (index - index.map(f64::round)).amax() < 1e-6
     };
     let straight = Phases::straight(coarse);
+    let scene = scene.without_waves_beside(&coarse, &indices);
     let normals = straight.normals(&scene, &indices);
     let of = |kept: &dyn Fn(usize) -> bool| {
         let kept: Vec<usize> = (0..2 * indices.len()).filter(|i| kept(i / 2)).collect();
@@ -196,7 +197,7 @@ pub(crate) fn superlattice(
     let normals = own.normals(&scene, &others);
     let all: Vec<usize> = (0..2 * (others.len() + first.len())).collect();
     let beside = gains(&normals, &all)?;
-    Some(if errors(&beside, &large) > BETTER {
+    Some(if errors(&beside, &large) > BETTER / 2.0 {
         Superlattice::Refuted
     } else {
         said

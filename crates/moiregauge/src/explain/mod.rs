@@ -7,6 +7,7 @@
 //! noise is needed: whatever differs from block to block enlarges the error. Two descriptions are compared by the mean difference of their gains in
 //! standard errors.
 
+pub(crate) mod beside;
 pub(crate) mod cells;
 pub(crate) mod evidence;
 pub(crate) mod normal;

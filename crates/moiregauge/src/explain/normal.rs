@@ -127,7 +127,7 @@ impl Phases {
         let linear = 2 * (indices.len() + self.others.len()) + GROUND;
         for _ in 0..STEPS {
             let (weights, rest) = self.rest(scene, indices)?;
-            let size = linear + 2 * (2 + bends);
+            let size = linear + 2 * (2 + bends + self.others.len());
             let (mut sums, mut row) = (Sums::new(1, size), vec![0.0; size]);
             self.for_each(scene, indices, |i, _, unit, waves| {
                 Self::row(unit, waves, &mut row);
@@ -142,6 +142,12 @@ impl Phases {
                     row[linear + 2 * t] = slopes[0] * shape;
                     row[linear + 2 * t + 1] = slopes[1] * shape;
                 }
+                for j in 0..self.others.len() {
+                    let (wave, at) = (indices.len() + j, linear + 2 * (2 + bends + j));
+                    let slope = weights[2 * wave + 1] * row[2 * wave]
+                        - weights[2 * wave] * row[2 * wave + 1];
+                    (row[at], row[at + 1]) = (slope * unit.x, slope * unit.y);
+                }
                 sums.add(0, &row, rest[i]);
             });
             let step = amplitudes(&sums.normals()[0], TINY)?;
@@ -153,6 +159,10 @@ impl Phases {
                 for (t, bend) in self.bend.iter_mut().enumerate() {
                     bend[j] += step[4 + 2 * t + j];
                 }
+            }
+            for (j, other) in self.others.iter_mut().enumerate() {
+                let own = step.rows(2 * (2 + bends + j), 2).into_owned();
+                *other += own.component_div(&scene.half);
             }
             if step.amax() < 1e-3 {
                 break;

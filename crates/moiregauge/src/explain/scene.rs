@@ -29,6 +29,7 @@ const GOLDEN: f64 = 0.618_033_988_749_895;
 const REACH: f64 = 3.0;
 
 /// An image in bins without its slow background, divided into blocks.
+#[derive(Clone)]
 pub(crate) struct Scene {
     pub(crate) columns: usize,
     /// Values in bins; 0 where a bin is missing.

@@ -139,6 +139,30 @@ fn superlattices_are_told_from_foreign_peaks() {
     }
 }
 
+/// Stripes and hum that are far stronger than the first shell do not drown it: they are a part of what is described.
+#[test]
+fn stripes_beside_a_lattice_drown_no_first_shell() {
+    let coarse = Supercell::Root3.coarse(&pair()).unwrap();
+    for seed in 0..6 {
+        let beside = |at: Vector2<f64>| {
+            3.0 * (0.31 * at.x + 0.52 * at.y + 1.0).cos() + 1.5 * (0.93 * at.x - 0.05 * at.y).cos()
+        };
+        let value = |at: Vector2<f64>| lattice(&pair(), at) + 0.15 * lattice(&coarse, at);
+        let striped = image(seed, 0.3, |at| value(at) + beside(at));
+        let plain = image(seed, 0.3, value);
+        let said = superlattice(&striped, &coarse, Supercell::Root3, false);
+        assert_eq!(said, Some(Superlattice::Shown), "{seed}");
+        let [with, without] = [&striped, &plain].map(|i| weakest(i, &coarse, false).unwrap());
+        assert!(
+            with > 0.5 * without && without > 5.0,
+            "{seed}: {with} {without}"
+        );
+        let none = image(seed, 0.3, |at| lattice(&pair(), at) + beside(at));
+        let said = superlattice(&none, &coarse, Supercell::Root3, false);
+        assert_eq!(said, Some(Superlattice::NotShown), "{seed}");
+    }
+}
+
 /// Of two moirés in one image the table tells the shares, in closed form, and which predicts more, whichever was measured. Cells of several times the
 /// area are no other lattices.
 #[test]

@@ -1,6 +1,7 @@
 //! Lattices of a scan of which one holds the other: where noise hides the first waves, a harmonic shell is a lattice, too.
 
 use crate::campaign::group::Group;
+use crate::campaign::shells::are_refuted;
 use crate::caveat::lattices::LineDifference;
 use crate::lattice::fit::hidden::Hidden;
 use crate::lattice::measure::hidden;
@@ -15,9 +16,9 @@ pub(crate) fn of_other_shell(group: &Group) -> Option<i32> {
 /// How many times the cell of the lattice is that of the one that was measured, if the images of a set say together that this is the
 /// second shell of another.
 pub(crate) fn of_second_shell(used: &[&MeasuredScan]) -> Option<i32> {
-    let lines = used.iter().flat_map(|scan| &scan.lines);
-    let all = Hidden::of_all(lines.map(|line| hidden(&line.lattice)));
-    all.is_first_shell().then_some(3)
+    let lines = || used.iter().flat_map(|scan| &scan.lines);
+    let all = Hidden::of_all(lines().map(|line| hidden(&line.lattice)));
+    (all.is_first_shell() && !are_refuted(lines())).then_some(3)
 }
 
 fn of_lines(group: &Group) -> Option<i32> {
