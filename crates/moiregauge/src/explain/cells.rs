@@ -145,7 +145,7 @@ pub(crate) fn superlattice(
         (index - index.map(f64::round)).amax() < 1e-6
     };
     let straight = Phases::straight(coarse);
-    let scene = scene.without_waves_beside(&coarse, &indices);
+    let scene = scene.without_waves_beside(&coarse, &fine, &indices);
     let normals = straight.normals(&scene, &indices);
     let of = |kept: &dyn Fn(usize) -> bool| {
         let kept: Vec<usize> = (0..2 * indices.len()).filter(|i| kept(i / 2)).collect();

@@ -50,7 +50,7 @@ fn of_image(image: &Image, pair: &Matrix2<f64>, bends: bool) -> Option<f64> {
     let indices = shells(3);
     let all: Vec<usize> = (0..2 * indices.len()).collect();
     let straight = Phases::straight(pair * scene.binning as f64);
-    let scene = scene.without_waves_beside(&straight.pair, indices);
+    let scene = scene.without_waves_beside(&straight.pair, &straight.pair, indices);
     let bent = || straight.clone().fitted(&scene, indices, CUBIC);
     let phases = if bends { bent() } else { None };
     let normals = phases

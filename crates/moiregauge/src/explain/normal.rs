@@ -82,7 +82,7 @@ impl Phases {
             for (term, c) in terms(unit.x, unit.y, self.bend.len()).zip(&self.bend) {
                 phases += Vector2::from(*c) * term;
             }
-            for j in 0..2 {
+            for j in (0..2).filter(|_| most > 0) {
                 let first = Complex64::cis(phases[j]);
                 powers[most as usize][j] = Complex64::new(1.0, 0.0);
                 for n in 1..=most as usize {
