@@ -73,7 +73,8 @@ def licences():
 
 
 def packed(data):
-    return base64.b64encode(gzip.compress(data, 9, mtime=0)).decode()
+    """Five signs for four bytes, which is a twentieth less than base 64; none of them begins a tag."""
+    return base64.b85encode(gzip.compress(data, 9, mtime=0)).decode().replace("<", ",")
 
 
 def main(program, out, largest):

@@ -1,8 +1,19 @@
 // Unpacks this file and begins: styles, modules one after the other, the program.
 (async () => {
+  const signs = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz!#$%&()*+-;,=>?@^_`{|}~";
+  const value = new Uint8Array(128);
+  [...signs].forEach((sign, i) => (value[sign.charCodeAt(0)] = i));
   const packed = (/** @type {string} */ id) => {
-    const text = atob(/** @type {HTMLElement} */ (document.getElementById(id)).textContent ?? "");
-    return Uint8Array.from(text, (c) => c.charCodeAt(0));
+    const text = /** @type {HTMLElement} */ (document.getElementById(id)).textContent ?? "";
+    const bytes = new Uint8Array(4 * Math.ceil(text.length / 5));
+    const view = new DataView(bytes.buffer);
+    for (let at = 0; at < text.length; at += 5) {
+      let number = 0;
+      // What is missing at the end counts as the last sign.
+      for (let i = at; i < at + 5; i++) number = 85 * number + (i < text.length ? value[text.charCodeAt(i)] : 84);
+      view.setUint32((at / 5) * 4, number);
+    }
+    return bytes.subarray(0, Math.floor((text.length * 4) / 5));
   };
   const unpacked = (/** @type {string} */ id) =>
     new Response(new Blob([packed(id)]).stream().pipeThrough(new DecompressionStream("gzip")));
