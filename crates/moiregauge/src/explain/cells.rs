@@ -65,28 +65,45 @@ impl Supercell {
     }
 }
 
-/// The reciprocal pair (rad per pixel) of the lattice with a larger or a smaller cell that predicts an image better than that of `pair`; `None` where
-/// none does.
-pub(crate) fn better_cell(image: &Image, pair: &Matrix2<f64>) -> Option<Matrix2<f64>> {
+/// A lattice beside those whose cells are several times or a part of its own.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Nested {
+    /// Reciprocal pair (rad per pixel) of one that predicts the image better.
+    pub(crate) better: Option<Matrix2<f64>>,
+    /// That of a larger cell whose waves may be those of something else, and by how many standard errors they predict better as such.
+    pub(crate) doubtful: Option<(Matrix2<f64>, f64)>,
+}
+
+/// Compares the lattice of `pair` (reciprocal, rad per pixel) with those of larger and smaller cells.
+pub(crate) fn better_cell(image: &Image, pair: &Matrix2<f64>) -> Nested {
     let all = [Supercell::Root3, Supercell::Double];
     let elongated = is_elongated(pair);
     let rows = (0..3).map(Supercell::Rows).filter(|_| elongated);
     let all = all.into_iter().chain(rows);
-    let larger = all.clone().find_map(|supercell| {
-        let coarse = supercell.coarse(pair)?;
-        (superlattice(image, &coarse, supercell, false)? == Superlattice::Shown).then_some(coarse)
-    });
-    larger.or_else(|| {
+    let mut doubtful = None;
+    let mut is_shown =
+        |coarse: &Matrix2<f64>, supercell| match superlattice(image, coarse, supercell, false) {
+            Some(Superlattice::Doubtful(by)) => {
+                doubtful = Some((*coarse, by));
+                false
+            }
+            said => said == Some(Superlattice::Shown),
+        };
+    let mut coarse = all
+        .clone()
+        .filter_map(|supercell| Some((supercell, supercell.coarse(pair)?)));
+    let larger = coarse.find(|(supercell, coarse)| is_shown(coarse, *supercell));
+    let better = larger.or_else(|| {
         let mut fine = all.map(|supercell| (supercell, supercell.fine(pair)));
-        let is_better = |(supercell, fine): &(Supercell, Matrix2<f64>)| {
+        fine.find(|(supercell, fine)| {
             // Moirés of hexagonal layers are nearly hexagons: half-order waves in one direction make a superlattice of one.
             let is_regular = elongated && !is_elongated(fine);
-            let shown =
-                || superlattice(image, pair, *supercell, false) == Some(Superlattice::Shown);
-            predicts_as_well(image, fine, pair) == Some(true) && (is_regular || !shown())
-        };
-        fine.find(is_better).map(|(_, fine)| fine)
-    })
+            predicts_as_well(image, fine, pair) == Some(true)
+                && (is_regular || !is_shown(pair, *supercell))
+        })
+    });
+    let better = better.map(|(_, pair)| pair);
+    Nested { better, doubtful }
 }
 
 /// Whether the longest of the three first-order waves has more than one and a half times the wave vector of the shortest.
@@ -106,12 +123,14 @@ fn predicts_as_well(image: &Image, one: &Matrix2<f64>, other: &Matrix2<f64>) -> 
 }
 
 /// What an image shows of the superlattice.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Superlattice {
     /// Its waves predict, in all three directions, and lie on its points.
     Shown,
     /// They do not predict, or not in all directions: noise may hide them, or there are none.
     NotShown,
+    /// The same, but the waves predict better with wave vectors of their own, by so many standard errors.
+    Doubtful(f64),
     /// The waves near its points are not its harmonics: they predict better with free wave vectors, or worse than nothing in some direction.
     Refuted,
 }
@@ -197,10 +216,11 @@ pub(crate) fn superlattice(
     let normals = own.normals(&scene, &others);
     let all: Vec<usize> = (0..2 * (others.len() + first.len())).collect();
     let beside = gains(&normals, &all)?;
-    Some(if errors(&beside, &large) > BETTER / 2.0 {
-        Superlattice::Refuted
-    } else {
-        said
+    let by = errors(&beside, &large);
+    Some(match said {
+        _ if by > BETTER => Superlattice::Refuted,
+        Superlattice::Shown if by > BETTER / 2.0 => Superlattice::Doubtful(by),
+        said => said,
     })
 }
 

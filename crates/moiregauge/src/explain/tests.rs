@@ -52,10 +52,10 @@ fn every_other_row_belongs_to_the_lattice() {
     for rows in 0..3 {
         let fine = Supercell::Rows(rows).fine(&pair());
         let value = |at: Vector2<f64>| lattice(&pair(), at) + 1.5 * lattice(&fine, at);
-        let found = better_cell(&image(1, 0.5, value), &fine).unwrap();
+        let found = better_cell(&image(1, 0.5, value), &fine).better.unwrap();
         assert!((found - pair()).amax() < 1e-12, "{rows}: {found}");
         let alone = image(1, 0.5, |at| lattice(&fine, at));
-        assert_eq!(better_cell(&alone, &fine), None, "{rows}");
+        assert_eq!(better_cell(&alone, &fine).better, None, "{rows}");
     }
 }
 
@@ -65,7 +65,7 @@ fn half_order_rows_are_no_cell() {
     for rows in 0..3 {
         let coarse = Supercell::Rows(rows).coarse(&pair()).unwrap();
         let value = |at: Vector2<f64>| lattice(&pair(), at) + 0.7 * lattice(&coarse, at);
-        let found = better_cell(&image(3, 0.3, value), &coarse).unwrap();
+        let found = better_cell(&image(3, 0.3, value), &coarse).better.unwrap();
         let names = pair().try_inverse().unwrap() * found;
         assert!(
             (names - names.map(f64::round)).amax() < 1e-9,
@@ -84,7 +84,7 @@ fn waves_that_are_missing_belong_to_no_lattice() {
     let alone = image(2, 0.5, |at| lattice(&pair(), at));
     for rows in 0..3 {
         let coarse = Supercell::Rows(rows).coarse(&pair()).unwrap();
-        let found = better_cell(&alone, &coarse).unwrap();
+        let found = better_cell(&alone, &coarse).better.unwrap();
         assert!((found - pair()).amax() < 1e-12, "{rows}: {found}");
     }
 }
@@ -118,14 +118,18 @@ fn superlattices_are_told_from_foreign_peaks() {
                 })
             };
             let nested = with(coarse);
-            assert_eq!(better_cell(&nested, &pair()), Some(coarse), "{cell:?}");
-            assert_eq!(better_cell(&nested, &coarse), None, "{cell:?}");
+            assert_eq!(
+                better_cell(&nested, &pair()).better,
+                Some(coarse),
+                "{cell:?}"
+            );
+            assert_eq!(better_cell(&nested, &coarse).better, None, "{cell:?}");
             let foreign = with(coarse + off);
             let said = superlattice(&foreign, &coarse, cell, true);
             assert_eq!(said, Some(Superlattice::Refuted), "{cell:?}");
-            assert_eq!(better_cell(&foreign, &pair()), None, "{cell:?}");
+            assert_eq!(better_cell(&foreign, &pair()).better, None, "{cell:?}");
             assert_eq!(
-                better_cell(&foreign, &coarse),
+                better_cell(&foreign, &coarse).better,
                 Some(cell.fine(&coarse)),
                 "{cell:?}"
             );

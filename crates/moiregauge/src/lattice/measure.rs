@@ -39,8 +39,8 @@ pub(crate) fn measure_levelled(
     if let Some(error) = no_lattice(&found) {
         return Err(error);
     }
-    let better = of_better_cell(&found, image, geometry, background, method);
-    Ok(without_refuted_shell(better.unwrap_or(found), image))
+    let found = of_better_cell(found, image, geometry, background, method);
+    Ok(without_refuted_shell(found, image))
 }
 
 /// Why the amplitudes of the fit refuse a lattice.

@@ -4,7 +4,7 @@ use heterostrain::lattice::distortion;
 use nalgebra::Matrix2;
 
 use crate::explain::cells::{BETTER, Supercell, Superlattice, better_cell, superlattice};
-use crate::explain::evidence::{proposed, weakest};
+use crate::explain::evidence::{gain, proposed, weakest};
 use crate::explain::table::{Row, table};
 use crate::frame::background::Background;
 use crate::frame::geometry::Geometry;
@@ -37,19 +37,24 @@ const FEWEST_PERIODS: f64 = 1.5;
 /// As in `scan::shells`: p-value of the first order below which it may be suppressed.
 const SUSPECTED: f64 = 0.2;
 
-/// The superlattice with three or four times the cell, or the sublattice with a third or a fourth of it, if it predicts the image better than `found`.
+/// The lattice with several times the cell, or a part of it, that predicts the image better than the one that was found; that one if none does.
 pub(crate) fn of_better_cell(
-    found: &MeasuredLattice,
+    found: MeasuredLattice,
     image: &Image,
     geometry: &Geometry,
     background: Background,
     method: Method,
-) -> Option<MeasuredLattice> {
+) -> MeasuredLattice {
     let part = found.patch.as_ref().map(|patch| patch.of(image));
-    let pair = better_cell(part.as_ref().unwrap_or(image), &found.reciprocal)?;
-    let part = found.patch.as_ref();
-    let other = measure_pair(&pair, part, image, geometry, background, method)?;
-    no_lattice(&other).is_none().then_some(other)
+    let nested = better_cell(part.as_ref().unwrap_or(image), &found.reciprocal);
+    let measured = || {
+        let part = found.patch.as_ref();
+        let other = measure_pair(&nested.better?, part, image, geometry, background, method)?;
+        no_lattice(&other).is_none().then_some(other)
+    };
+    let mut better = measured().unwrap_or(found);
+    better.doubtful_cell = nested.doubtful;
+    better
 }
 
 /// Clears the evidence for a suppressed first order if the prediction of held-out pixels refutes it. The set then does not use it.
@@ -142,6 +147,14 @@ pub(crate) fn with_evidence(
     };
     let better = rows.iter().find(is_better).map(|row| row.pair);
     let candidates = rows.iter().map(|row| Candidate::new(row, &to_physical));
+    // Waves near the points of a larger cell that may be its own: it predicts as much, and they more with wave vectors of their own.
+    let doubtful = found.doubtful_cell.map(|(pair, behind)| Row {
+        share: gain(part, &pair).unwrap_or(0.0),
+        cells: 1,
+        pair,
+        behind,
+    });
+    let doubtful = doubtful.map(|row| Candidate::new(&row, &to_physical));
     // A cell of many atoms has many strong harmonics, and peaks of its own period are no rivals.
     let rivals = if is_made_by_many(&found) {
         0
@@ -151,7 +164,7 @@ pub(crate) fn with_evidence(
     found.evidence = Some(Evidence {
         predicts: weakest(part, &found.reciprocal, bends),
         rivals,
-        candidates: candidates.collect(),
+        candidates: candidates.chain(doubtful).collect(),
     });
     (found, better)
 }
