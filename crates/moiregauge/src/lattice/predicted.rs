@@ -78,7 +78,10 @@ fn is_refuted(found: &MeasuredLattice, image: &Image) -> Option<bool> {
         Supercell::Root3,
         true,
     )?;
-    Some(said == Superlattice::Refuted)
+    Some(matches!(
+        said,
+        Superlattice::Refuted | Superlattice::Doubtful(_)
+    ))
 }
 
 /// The proposed lattice that predicts held-out pixels best, if it exceeds [`BEYOND_DOUBT`]. Spots of differing height put noise beside each peak, and the search
