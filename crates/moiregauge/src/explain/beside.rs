@@ -50,7 +50,7 @@ impl Scene {
         let least = of_first.fold(f64::INFINITY, f64::min);
         let strongest = |powers: &[(Vector2<f64>, f64)]| {
             let is_other = |q: &Vector2<f64>| {
-                self.from_point(q, pair) > LOBE && self.from_point(q, strong) > SKIRT
+                self.to_nearest(q, pair) > LOBE && self.to_nearest(q, strong) > SKIRT
             };
             let stands_out = |(q, power): &&(Vector2<f64>, f64)| {
                 let around = powers
@@ -95,7 +95,7 @@ impl Scene {
     }
 
     /// Distance of a wave vector from the nearest point of a lattice (rad per bin), cycles per frame.
-    fn from_point(&self, q: &Vector2<f64>, pair: &Matrix2<f64>) -> f64 {
+    fn to_nearest(&self, q: &Vector2<f64>, pair: &Matrix2<f64>) -> f64 {
         let nearest = pair
             .try_inverse()
             .map(|inverse| pair * (inverse * q).map(f64::round));
