@@ -22,8 +22,8 @@ use crate::strain::layers::Layers;
 use crate::strain::names::{Labelled, LatticeName, all_names, change_to};
 use crate::strain::twist_strain::TwistStrain;
 
-/// Above this |q|/|p| the mirrored labelling (strain makes the moiré, twist distorts it) is listed. Chosen by eye;
-/// see docs/constants.md.
+/// Above this |q|/|p| the mirrored labelling (strain makes the moiré, twist distorts it) is listed. Half and twice as
+/// much change no result of docs/constants.md.
 const MIRRORED_FROM: f64 = 0.3;
 /// Readings of layers of different, dissimilar lattices that need more strain are not listed: three times the per
 /// cent that layers rarely reach.

@@ -36,11 +36,11 @@ const LARGEST_ERROR: f64 = 0.15;
 /// A lattice free of drift that is further from the shape of the material's (`|q|/|p|`) is another one: one axis
 /// stretched by a fifth. Chosen by eye.
 const LARGEST_DISTORTION: f64 = 0.1;
-/// Frames up and down that a constant drift does not make of one another to this share contradict each other. Chosen
-/// by eye; see docs/constants.md.
+/// Frames up and down that a constant drift does not make of one another to this share contradict each other. Half and
+/// twice as much change no result of docs/constants.md.
 const LARGEST_MISFIT: f64 = 0.05;
 /// With frames of one direction, another orientation with a distortion that is larger by less than this is as good.
-/// Chosen by eye; see docs/constants.md.
+/// Half and twice as much change no result of docs/constants.md.
 const AMBIGUOUS: f64 = 0.1;
 /// Orientations that differ by less are the same, rad: two names of one lattice agree to rounding.
 const SAME_ANGLE: f64 = 1e-3;

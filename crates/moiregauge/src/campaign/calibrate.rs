@@ -38,8 +38,8 @@ use crate::settings::knobs::Grouping;
 const AMBIGUOUS: f64 = 0.1;
 /// Lattices of frames of one direction that differ by more than this share are of different things. Chosen by eye.
 const SAME: f64 = 0.35;
-/// Frames up and down that a constant drift does not make of one another to this share are not used. Chosen by eye;
-/// see docs/constants.md.
+/// Frames up and down that a constant drift does not make of one another to this share are not used. Half and twice as
+/// much change no result of docs/constants.md.
 const LARGEST_MISFIT: f64 = 0.05;
 /// A drift of this share of the speed of the slow axis deserves a word. Chosen by eye.
 const LARGE_DRIFT: f64 = 0.2;

@@ -23,8 +23,8 @@ const APART: f64 = 0.01;
 const APART_ROUGHLY: f64 = 0.03;
 /// Differences below this many σ are noise, however large: none of all pairs of scans exceeds it by chance.
 const SIGMAS: f64 = 5.0;
-/// Drift of the sample over the slow speed of the tip that has to be reckoned with. Chosen by eye; see
-/// docs/constants.md.
+/// Drift of the sample over the slow speed of the tip that has to be reckoned with. Half and twice as much change no
+/// result of docs/constants.md.
 const DRIFT: f64 = 0.25;
 
 /// How one scan shows its lattice.

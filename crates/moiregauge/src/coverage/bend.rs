@@ -93,7 +93,8 @@ pub(crate) struct Mean {
     left: f64,
 }
 
-/// Largest variation (standard deviation) of wavelengths or directions of a lattice. Chosen by eye.
+/// Largest variation (standard deviation) of wavelengths or directions of a lattice. Half and twice as much change no
+/// result of docs/constants.md.
 const WILD: f64 = 0.25;
 
 /// Standard deviation of the waves times the periods across: the phase bends by 2π √12/8 times that, half a radian here.

@@ -12,8 +12,8 @@ const RELAXED: f64 = 0.5 / 57.295_779_513;
 /// Share of the inner nodes of a map that the window blurs or whose harmonics contradict each other. Chosen by eye;
 /// see docs/constants.md.
 const BLURRED: f64 = 0.3;
-/// Change of the cell's area over one window, as a share of itself: a tenth of the twist. Chosen by eye; see
-/// docs/constants.md.
+/// Change of the cell's area over one window, as a share of itself: a tenth of the twist. Half and twice as much change
+/// no result of docs/constants.md.
 const VARIED: f64 = 0.2;
 /// Error of the twist of a triangle as a share of it, beyond which triangles tell nothing: as large as the change
 /// that calls for them.

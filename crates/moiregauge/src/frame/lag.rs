@@ -26,7 +26,8 @@ pub(crate) const SLOWEST: f64 = 0.1;
 pub(crate) const SHARE: f64 = 0.5;
 /// ... and improves χ² by this much, in units of what it leaves: e⁻²⁵ by chance, the search for the decay included.
 pub(crate) const IMPROVEMENT: f64 = 50.0;
-/// A lag that explains whole lines leaves less than this many times the noise. Chosen by eye; see docs/constants.md.
+/// A lag that explains whole lines leaves less than this many times the noise. Half and twice as much change no result
+/// of docs/constants.md.
 const EXCESS: f64 = 3.0;
 /// The same as a share of the bend, where there is no noise. Chosen by eye.
 const NOTHING: f64 = 1e-3;

@@ -9,7 +9,8 @@ use crate::window::mask::Mask;
 pub(crate) use crate::window::setting::{LOST, NEAR, SHARE, Setting, fours, winds};
 use crate::window::widths::of_difference;
 
-/// Typical signal over noise from which a phase singularity counts. Chosen by eye; see docs/constants.md.
+/// Typical signal over noise from which a phase singularity counts. Half and twice as much change no result of
+/// docs/constants.md.
 const CLEAR: f64 = 6.0;
 
 /// The change from one lattice to that under a window wider by √2.

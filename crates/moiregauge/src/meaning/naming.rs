@@ -25,7 +25,8 @@ const PLAUSIBLE_STRAIN: f64 = 0.007;
 /// Amplitude over that of the others below which a wave is not of the first order. Chosen by eye; see
 /// docs/constants.md.
 const WEAK: f64 = 0.5;
-/// The strongest wave of a first shell over the weakest, at most. Chosen by eye; see docs/constants.md.
+/// The strongest wave of a first shell over the weakest, at most. Half and twice as much change no result of
+/// docs/constants.md.
 const EVEN: f64 = 3.0;
 /// Standard deviation of a round Gaussian that may blur the contrast, nm: spots 7 nm wide, as of a blunt tip. See
 /// docs/constants.md.

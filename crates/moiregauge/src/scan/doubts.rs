@@ -20,8 +20,8 @@ use crate::scan::measured::MeasuredLine;
 /// Fewer periods than this across the shorter side deserve a warning: of 100 pictures of 2.6 to 5 periods with spots that differ the errors were right (rms
 /// pull 0.75 and 0.99), and fewer were not drawn. See docs/constants.md.
 const FEW_PERIODS: f64 = 2.5;
-/// Trace and retrace whose lattices differ by more than this share do not show the same one. Chosen by eye; see
-/// docs/constants.md.
+/// Trace and retrace whose lattices differ by more than this share do not show the same one. Half and twice as much
+/// change no result of docs/constants.md.
 const ANOTHER_LATTICE: f64 = 0.1;
 /// Differences that chance makes less often deserve a word: the scans of a session make none, ...
 const NO_CHANCE: f64 = 1e-4;

@@ -19,7 +19,8 @@ use crate::scan::channel::image_of;
 const WILD_SPAN: f64 = 2.0;
 /// Trace and retrace of different speeds, by more than headers round, are no loop.
 const SAME_SPEED: f64 = 0.01;
-/// More samples than this share that are off deserve a word: one in a thousand is no stray one. Chosen by eye.
+/// More samples than this share that are off deserve a word: one in a thousand is no stray one. Half and twice as much
+/// change no result of docs/constants.md.
 const NOTABLE_GLITCHES: f64 = 1e-3;
 /// A lag that changes the fast step by more than this share deserves a word: a hundredth of the calibration that is
 /// assumed.

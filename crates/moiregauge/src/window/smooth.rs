@@ -21,8 +21,8 @@ use crate::window::blocks::{Blocks, Layer};
 
 /// Distance from the middle at which windows end, widths: 4·10⁻⁵ of the height.
 const REACH: f64 = 4.5;
-/// Fraction of the window below which a node is not computed; masks ask for far more. Chosen by eye; see
-/// docs/constants.md.
+/// Fraction of the window below which a node is not computed; masks ask for far more. Half and twice as much change no
+/// result of docs/constants.md.
 const LEAST_SHARE: f64 = 0.05;
 /// Harmonics below this many noise units (amplitude) are left out of a node: their phases are off by some third of a
 /// rad.

@@ -20,11 +20,13 @@ use crate::settings::knobs::Settings;
 
 /// χ²/dof of such a fit, at most. Chosen by eye.
 const CLEAN_CHI2: f64 = 1.5;
-/// Positions of scans that fit together scatter by less than this, nm. Chosen by eye; see docs/constants.md.
+/// Positions of scans that fit together scatter by less than this, nm. Half and twice as much change no result of
+/// docs/constants.md.
 const SCATTER: f64 = 0.3;
 /// The information criterion has to fall by this much, with the scatter of the scans as unit: odds of e²⁵.
 const FAR_BETTER: f64 = 50.0;
-/// Below this scatter (nm) a fit needs no other explanation. Chosen by eye; see docs/constants.md.
+/// Below this scatter (nm) a fit needs no other explanation. Half and twice as much change no result of
+/// docs/constants.md.
 const CLEAN: f64 = 0.01;
 /// Dates are whole seconds, and files are written some time after the frame, s: a second for each.
 const CLOCK: f64 = 2.0;

@@ -11,8 +11,8 @@ use crate::drift::joint::evaluate::Layout;
 use crate::drift::joint::path::DriftPath;
 use crate::drift::joint::sighting::{Detection, Terms};
 
-/// Errors of the lattice that grow by more than this say that a term is not determined. Chosen by eye; see
-/// docs/constants.md.
+/// Errors of the lattice that grow by more than this say that a term is not determined. Half and twice as much change
+/// no result of docs/constants.md.
 const LOOSE: f64 = 3.0;
 
 /// The result of the fit over all scans.
