@@ -149,7 +149,7 @@ fn stripes_beside_a_lattice_drown_no_first_shell() {
     let coarse = Supercell::Root3.coarse(&pair()).unwrap();
     for seed in 0..6 {
         let beside = |at: Vector2<f64>| {
-            3.0 * (0.31 * at.x + 0.52 * at.y + 1.0).cos() + 1.5 * (0.93 * at.x - 0.05 * at.y).cos()
+            3.0 * (0.45 * at.x + 0.36 * at.y + 1.0).cos() + 1.5 * (0.93 * at.x - 0.05 * at.y).cos()
         };
         let value = |at: Vector2<f64>| lattice(&pair(), at) + 0.15 * lattice(&coarse, at);
         let striped = image(seed, 0.3, |at| value(at) + beside(at));
