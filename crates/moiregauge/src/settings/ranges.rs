@@ -48,6 +48,12 @@ impl Settings {
             ),
             ("ruler_strain_percent", self.ruler_strain_percent, 0.0, 10.0),
             (
+                "ruler_magnification_percent",
+                self.ruler_magnification_percent,
+                0.0,
+                100.0,
+            ),
+            (
                 "drift_prior_nm_per_min",
                 self.drift_prior_nm_per_min,
                 0.0,
