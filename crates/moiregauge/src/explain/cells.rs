@@ -129,7 +129,7 @@ pub(crate) enum Superlattice {
     Shown,
     /// They do not predict, or not in all directions: noise may hide them, or there are none.
     NotShown,
-    /// The same, but the waves predict better with wave vectors of their own, by so many standard errors.
+    /// The same, but the waves predict better with wave vectors of their own, by this many standard errors.
     Doubtful(f64),
     /// The waves near its points are not its harmonics: they predict better with free wave vectors, or worse than nothing in some direction.
     Refuted,
