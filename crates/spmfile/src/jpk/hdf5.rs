@@ -98,7 +98,7 @@ fn named(group: &Group, begin: &str) -> Result<Vec<String>, Error> {
     Ok(names)
 }
 
-/// What a group says of itself, as texts.
+/// The attributes of a group, as texts.
 struct Attributes {
     all: BTreeMap<String, String>,
     unread: Unread,
