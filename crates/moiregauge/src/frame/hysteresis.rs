@@ -24,7 +24,7 @@ const BLOCKS: usize = 24;
 const ENOUGH: usize = 256;
 /// Shifts and bows that are tried first, as a share of the frame: an open scanner bends by 3 % from trace to retrace.
 const LARGEST: f64 = 0.02;
-/// of this many lines one is looked at for these.
+/// Of this many lines one is looked at for these.
 const EVERY: usize = 4;
 /// Rounds of least squares, each of which leaves half of what was left where noise is as strong as the pattern.
 const ROUNDS: usize = 12;
