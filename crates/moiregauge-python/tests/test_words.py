@@ -10,7 +10,6 @@ import pydoc
 import subprocess
 import sys
 import sysconfig
-import tomllib
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -64,22 +63,6 @@ def test_generated_files_are_current() -> None:
         pytest.skip("the schemas are not there")
     for script in ("generate.py", "reference.py"):
         subprocess.run([sys.executable, HERE / "scripts" / script, "--check"], check=True)
-
-
-def test_versions_are_those_of_the_workspace() -> None:
-    """The same versions of everything: the numbers are equal, and what is built for the workspace is used."""
-
-    def versions(lock: Path) -> set[tuple[str, str]]:
-        return {(one["name"], one["version"]) for one in tomllib.loads(lock.read_text())["package"]}
-
-    workspace = HERE.parent.parent / "Cargo.lock"
-    if not workspace.is_file():
-        pytest.skip("the workspace is not there")
-    known, own = versions(workspace), versions(HERE / "Cargo.lock")
-    names = {name for name, _ in known}
-    # Who has no Python builds and tests the workspace all the same.
-    assert not names & {"pyo3", "pyo3-ffi", "numpy", "moiregauge-python"}
-    assert not {one for one in own - known if one[0] in names}
 
 
 def test_modules_import_each_other_one_way() -> None:
