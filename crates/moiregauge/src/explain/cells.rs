@@ -70,7 +70,7 @@ impl Supercell {
 pub(crate) struct Nested {
     /// Reciprocal pair (rad per pixel) of one that predicts the image better.
     pub(crate) better: Option<Matrix2<f64>>,
-    /// That of a larger cell whose waves may be those of something else, and by how many standard errors they predict better as such.
+    /// That of a larger cell whose waves may be those of something else, and by how many standard errors it predicts better.
     pub(crate) doubtful: Option<(Matrix2<f64>, f64)>,
 }
 
@@ -129,7 +129,7 @@ pub(crate) enum Superlattice {
     Shown,
     /// They do not predict, or not in all directions: noise may hide them, or there are none.
     NotShown,
-    /// The same, but the waves predict better with wave vectors of their own, by this many standard errors.
+    /// They predict better by this many standard errors, and with wave vectors of their own better still, by two to four.
     Doubtful(f64),
     /// The waves near its points are not its harmonics: they predict better with free wave vectors, or worse than nothing in some direction.
     Refuted,
@@ -219,7 +219,7 @@ pub(crate) fn superlattice(
     let by = errors(&beside, &large);
     Some(match said {
         _ if by > BETTER => Superlattice::Refuted,
-        Superlattice::Shown if by > BETTER / 2.0 => Superlattice::Doubtful(by),
+        Superlattice::Shown if by > BETTER / 2.0 => Superlattice::Doubtful(errors(&large, &small)),
         said => said,
     })
 }

@@ -66,8 +66,7 @@ pub struct MeasuredLattice {
     /// The lattices of those that could be measured, until the scan is put together.
     #[serde(skip)]
     pub(crate) beside: Vec<MeasuredLattice>,
-    /// Reciprocal pair (rad per pixel) of a larger cell that its waves may have, and by how many standard errors they predict better as waves of something
-    /// else.
+    /// Reciprocal pair (rad per pixel) of a larger cell that its waves may have, and by how many standard errors that predicts better.
     #[serde(skip)]
     pub(crate) doubtful_cell: Option<(Matrix2<f64>, f64)>,
     /// What the other estimator found: autocorrelation beside Fourier, Fourier beside all others.

@@ -150,12 +150,12 @@ pub(crate) fn with_evidence(
     };
     let better = rows.iter().find(is_better).map(|row| row.pair);
     let candidates = rows.iter().map(|row| Candidate::new(row, &to_physical));
-    // Waves near the points of a larger cell that may be its own: it predicts as much, and they more with wave vectors of their own.
-    let doubtful = found.doubtful_cell.map(|(pair, behind)| Row {
+    // Waves near the points of a larger cell that may be its own.
+    let doubtful = found.doubtful_cell.map(|(pair, better)| Row {
         share: gain(part, &pair).unwrap_or(0.0),
         cells: 1,
         pair,
-        behind,
+        behind: -better,
     });
     let doubtful = doubtful.map(|row| Candidate::new(&row, &to_physical));
     // A cell of many atoms has many strong harmonics, and peaks of its own period are no rivals.
