@@ -6,7 +6,7 @@ use crate::scan::Scan;
 
 /// What a user may hand in, for messages about everything else.
 const EXPECTED: &str = "a scan (NanoScope, Nanonis, Gwyddion, Igor, JPK, Nanosurf, Park, WSxM, RHK, \
-                        Createc, Agilent, ISO 28632, Omicron Matrix), an array or a picture";
+                        Createc, GXSM, Agilent, ISO 28632, Omicron Matrix), an array or a picture";
 
 /// Why a file is refused as a whole.
 ///

@@ -292,7 +292,7 @@ explain! { LatticeDoubt:
          everywhere. The errors of the vectors were enlarged to match."
         "Map the lattice, or analyse a smaller part of the frame."
     OtherLattice "other-lattice" Serious
-        "Another lattice predicts the image about as well, within four standard errors. The image does not decide which one it shows: a second moiré, holes or a rough \
+        "Another lattice predicts the image about as well, within four standard errors, or better with waves that may belong to something else. The image does not decide which one it shows: a second moiré, holes or a rough \
          background may have made either."
         "Look at the Fourier transform of the image. Give the approximate wavelength of the right lattice, or measure two moirés."
     PartOfCell "part-of-cell" Serious
